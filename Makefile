@@ -1,0 +1,65 @@
+# Two commands matter: `make reproduce` and `make test`. Both create .venv when it is missing.
+PYTHON  ?= python3
+PROFILE ?= quick
+WORKERS ?= 2
+
+VENV  := .venv
+PY    := $(VENV)/bin/python
+PIP   := $(PY) -m pip --disable-pip-version-check
+READY := $(VENV)/.ready
+
+.DEFAULT_GOAL := help
+.PHONY: help reproduce test test-long standard figures bench learn clean
+
+help:            ## this list
+	@sed -n 's/^\([a-z-]*\): [^#]*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 14
+
+reproduce: $(READY) ## every experiment at the quick profile -> results/quick/report.html and report.md
+	$(PY) -m validation run --profile quick
+
+test: $(READY)   ## lint and the test suite, without the tests marked `long`
+	$(PY) -m ruff check .
+	$(PY) -m pytest -n $(WORKERS) --dist loadfile
+
+test-long: $(READY) ## the tests marked `long`
+	$(PY) -m pytest -m long
+
+standard: $(READY) ## every experiment at the standard profile (hours) -> results/standard
+	$(PY) -m validation run --profile standard
+
+figures: $(READY) ## draw the figures again from the results of PROFILE (default: quick)
+	$(PY) -m figures --profile $(PROFILE)
+
+bench: $(READY)  ## our kernels beside Taichi and Warp (installs both)
+	$(PIP) install -c constraints.txt -e '.[bench]'
+	$(PY) -m benchmarks
+
+# PyPI's torch for Linux is the CUDA build: about 2.7 GB of wheels. The CPU build (0.2 GB) has an
+# index of its own, which the README tells how to find: make learn TORCH_INDEX=<that address>.
+# So pip is first asked what it would take; a CUDA build is installed only on request (TORCH=any).
+TORCH_INDEX ?=
+TORCH       ?= cpu
+TORCH_FROM  := $(if $(TORCH_INDEX),--extra-index-url $(TORCH_INDEX))
+
+learn: $(READY)  ## add PyTorch (CPU build) for what trains; see README before
+	@if [ "$(TORCH)" != any ] && $(PIP) install --dry-run --no-deps --quiet --report - \
+	        $(TORCH_FROM) -c constraints.txt torch | grep -Eq '"(nvidia|cuda)-'; then \
+	    echo "make learn: pip would take the CUDA build of torch, about 2.7 GB. Either name the"; \
+	    echo "index of the CPU builds, make learn TORCH_INDEX=..., (README, Installing),"; \
+	    echo "or accept the CUDA build: make learn TORCH=any. Nothing was installed."; \
+	    exit 1; \
+	fi
+	$(PIP) install $(TORCH_FROM) -c constraints.txt -e '.[learn]'
+
+clean:           ## remove caches and the quick results (the environment .venv stays)
+	rm -rf results/quick .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(PY):
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	    echo "$$($(PYTHON) --version) found, 3.11 or newer needed: make PYTHON=python3.12 ..."; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+
+$(READY): pyproject.toml constraints.txt | $(PY)
+	$(PIP) install -c constraints.txt -e '.[test]'
+	@touch $@

@@ -1,0 +1,53 @@
+"""A body: particles of one material, in arrays of their own."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .core.state import NO_HISTORY, NONE, Particles
+
+AFFINE = ("apic", "mls")      # transfers that carry C
+
+
+class Body(NamedTuple):
+    """Particles that share a law and a return map. Kernels change the arrays in place."""
+
+    name: str
+    particles: Particles
+    law: tuple            # NamedTuple of the elastic law's parameters (see materials)
+    flow: tuple           # NamedTuple of the return map's parameters
+    id: np.ndarray        # (N,) number of each particle in the order in which the body was sampled
+
+
+def particles_at(x, v, m, V0, transfer="mls", *, fluid=False, y=None, b=None):
+    """Particles at rest shape (F = I, no stress) at x (N, d) with velocity v (N, d), mass m (N,) and volume V0 (N,).
+
+    `fluid` carries J instead of F; `y` is the initial history (N,) of the return map, `b` a body force (N, d).
+    Only the fields that `transfer` and the material need are allocated.
+    """
+    n, d = x.shape
+    L = np.zeros((n, d, d))
+    C = NONE
+    if transfer in AFFINE:
+        C = L if transfer == "mls" else np.zeros((n, d, d))
+    return Particles(
+        x=np.ascontiguousarray(x, dtype=float),
+        v=np.ascontiguousarray(v, dtype=float),
+        C=C,
+        L=L,
+        F=np.ones(n) if fluid else np.tile(np.eye(d), (n, 1, 1)),
+        tau=np.zeros(n) if fluid else np.zeros((n, d, d)),
+        m=np.ascontiguousarray(m, dtype=float),
+        V0=np.ascontiguousarray(V0, dtype=float),
+        y=NO_HISTORY if y is None else np.ascontiguousarray(y, dtype=float),
+        b=NONE if b is None else np.ascontiguousarray(b, dtype=float),
+    )
+
+
+def permute(body, order):
+    """Put the particles of a body into the given order, in place."""
+    for name, a in zip(Particles._fields, body.particles, strict=True):
+        carried = len(a) == len(order)
+        if carried and not (name == "L" and a is body.particles.C):
+            a[:] = a[order]
+    body.id[:] = body.id[order]

@@ -1,0 +1,1 @@
+"""Arrays and leaf kernels: no objects, no files, no torch."""

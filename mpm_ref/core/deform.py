@@ -1,0 +1,115 @@
+"""Deformation, return map and stress of every particle: one pass, one singular value decomposition at most.
+
+    F_trial = (I + dt L) F,   F = project(F_trial),   tau = kirchhoff(F)        # NSF-alg-mpm step 3, NCLAW-alg1
+
+Three passes, by what the law needs: J alone (no F is carried), F without a return map, F with one. Return maps act on the
+singular values: F_trial = U diag(s) V^T becomes U diag(s_new) V^T, and tau = U diag(kirchhoff_hat(s_new)) U^T.
+"""
+
+from .jit import CHUNKS, chunk, kernel, parallel, prange
+from .law import intact, kirchhoff, kirchhoff_hat, pressure, project
+from .spectral import svd
+from .tensor import det, identity, lin, mat, mlin, mm, mmt, put_mat, scale_columns
+
+
+@kernel
+def growth(L, p, dt, like):
+    """I + dt L_p."""
+    return mlin(1.0, identity(like), dt, mat(L, p, like))
+
+
+@kernel
+def deform_fluid(particles, law, dt, like, bounds):
+    """J <- det(I + dt L) J, tau = pressure(J) I."""
+    for p in range(bounds[0], bounds[1]):
+        J = particles.F[p] * det(growth(particles.L, p, dt, like))
+        particles.F[p] = J
+        particles.tau[p] = pressure(J, law)
+
+
+@kernel
+def deform_elastic(particles, law, dt, like, bounds):
+    """F <- (I + dt L) F, tau = kirchhoff(F)."""
+    for p in range(bounds[0], bounds[1]):
+        F = mm(growth(particles.L, p, dt, like), mat(particles.F, p, like))
+        put_mat(particles.F, p, F)
+        put_mat(particles.tau, p, kirchhoff(F, law))
+
+
+@kernel
+def deform_plastic(particles, law, flow, dt, like, bounds):
+    """F <- U diag(s') V^T of (I + dt L) F = U diag(s) V^T with s', y' = project(s, y)."""
+    for p in range(bounds[0], bounds[1]):
+        F = mm(growth(particles.L, p, dt, like), mat(particles.F, p, like))
+        U, s, V, _ = svd(F)
+        s, y = project(s, recall(particles.y, p), dt, law, flow)
+        tau = kirchhoff_hat(s, law)
+        remember(particles.y, p, y)
+        put_mat(particles.F, p, mmt(scale_columns(U, s), V))
+        put_mat(particles.tau, p, mmt(scale_columns(U, lin(intact(y, flow), tau, 0.0, tau)), U))
+
+
+@kernel
+def stress(particles, law, flow, like, bounds):
+    """tau = kirchhoff(F) of the state as it stands (the first step of a run)."""
+    for p in range(bounds[0], bounds[1]):
+        tau = kirchhoff(mat(particles.F, p, like), law)
+        put_mat(particles.tau, p, mlin(intact(recall(particles.y, p), flow), tau, 0.0, tau))
+
+
+@kernel
+def stress_fluid(particles, law, bounds):
+    """tau = pressure(J) I of the state as it stands."""
+    for p in range(bounds[0], bounds[1]):
+        particles.tau[p] = pressure(particles.F[p], law)
+
+
+@kernel
+def recall(y, p):
+    """History of particle p; 0 where none is kept."""
+    if y.ndim == 1:
+        return y[p]
+    else:
+        return 0.0
+
+
+@kernel
+def remember(y, p, value):
+    """Store the history of particle p where it is kept."""
+    if y.ndim == 1:
+        y[p] = value
+
+
+@parallel
+def fluid(particles, law, dt, like):
+    """`deform_fluid` for all particles. `like` is any tuple of length d."""
+    for c in prange(CHUNKS):
+        deform_fluid(particles, law, dt, like, chunk(c, len(particles.x)))
+
+
+@parallel
+def elastic(particles, law, dt, like):
+    """`deform_elastic` for all particles. `like` is any tuple of length d."""
+    for c in prange(CHUNKS):
+        deform_elastic(particles, law, dt, like, chunk(c, len(particles.x)))
+
+
+@parallel
+def plastic(particles, law, flow, dt, like):
+    """`deform_plastic` for all particles. `like` is any tuple of length d."""
+    for c in prange(CHUNKS):
+        deform_plastic(particles, law, flow, dt, like, chunk(c, len(particles.x)))
+
+
+@parallel
+def initial_stress(particles, law, flow, like):
+    """`stress` for all particles. `like` is any tuple of length d."""
+    for c in prange(CHUNKS):
+        stress(particles, law, flow, like, chunk(c, len(particles.x)))
+
+
+@parallel
+def initial_pressure(particles, law):
+    """`stress_fluid` for all particles."""
+    for c in prange(CHUNKS):
+        stress_fluid(particles, law, chunk(c, len(particles.x)))

@@ -1,0 +1,153 @@
+"""Grid storage that covers the matter and moves with it, and the momentum update of its nodes.
+
+The grid is the smallest box of nodes, aligned to whole slabs, that the particles reach. A domain box is a boundary
+condition (see `boundary`), not an array bound.
+"""
+
+import numpy as np
+
+from .jit import CHUNKS, chunk, kernel, parallel, prange
+from .order import WIDTH
+from .spline import base_of
+from .state import NONE, Grid
+
+MAX_NODES = 200_000_000
+
+
+class OutOfRange(ValueError):
+    """A particle is not finite, or so far away that no grid can cover it."""
+
+
+@kernel
+def _extent(x, low, high, bad, bounds):
+    for p in range(bounds[0], bounds[1]):
+        for a in range(x.shape[1]):
+            if not np.isfinite(x[p, a]):
+                bad[0] = p
+                return
+            low[a] = min(low[a], x[p, a])
+            high[a] = max(high[a], x[p, a])
+
+
+@parallel
+def _extents(x, low, high, bad):
+    for c in prange(CHUNKS):
+        _extent(x, low[c], high[c], bad[c], chunk(c, len(x)))
+
+
+def extent(x):
+    """Smallest and largest coordinates of points x (N, d). Raises OutOfRange for a point that is not finite."""
+    d = x.shape[1]
+    low, high = np.full((CHUNKS, d), np.inf), np.full((CHUNKS, d), -np.inf)
+    bad = np.full((CHUNKS, 1), -1)
+    _extents(x, low, high, bad)
+    if bad.max() >= 0:
+        p = bad.max()
+        raise OutOfRange(f"particle {p} has position {x[p]}: expected finite coordinates")
+    return low.min(axis=0), high.max(axis=0)
+
+
+class Store:
+    """Reusable storage of a `Grid` for spacing dx [m] and a stencil; see `cover`."""
+
+    def __init__(self, dx, stencil, dim, flip=False):
+        self.dx, self.stencil, self.dim, self.flip = dx, stencil, dim, flip
+        self._buffer = NONE
+
+    def cover(self, clouds):
+        """Zeroed grid over all nodes that the points of `clouds`, arrays (N, d), reach.
+
+        Raises OutOfRange where a point is not finite or the box would exceed MAX_NODES nodes.
+        """
+        low, high = self._box(clouds)
+        first = self._base(low)
+        first[0] -= first[0] % WIDTH          # slabs begin at the same nodes wherever the matter is
+        shape = tuple(int(k) for k in self._base(high) + len(self.stencil) - first)
+        size = int(np.prod(np.array(shape, dtype=float)))
+        vectors = 3 if self.flip else 1
+        if len(self._buffer) < size * (1 + vectors * self.dim):
+            self._buffer = np.empty(int(1.3 * size) * (1 + vectors * self.dim))
+        self._buffer[: size * (1 + vectors * self.dim)] = 0.0
+        return self._carve(shape, size, first, vectors)
+
+    def _base(self, x):
+        return np.array([base_of(x_a, self.dx, self.stencil) for x_a in x], dtype=np.int64)
+
+    def _box(self, clouds):
+        boxes = [extent(x) for x in clouds]
+        low, high = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
+        nodes = np.prod((high - low) / self.dx + len(self.stencil))
+        if nodes > MAX_NODES or max(-low.min(), high.max()) / self.dx > 2.0**50:
+            raise OutOfRange(
+                f"particles from {low} to {high} need {nodes:.1e} grid nodes of spacing {self.dx}, at most "
+                f"{MAX_NODES:.0e} are allowed; has a particle flown off, or is dx too small?"
+            )
+        return low, high
+
+    def _carve(self, shape, size, first, vectors):
+        d, at = self.dim, size
+        fields = []
+        for _ in range(vectors):
+            fields.append(self._buffer[at : at + size * d].reshape((*shape, d)))
+            at += size * d
+        v, f, v_old = fields if vectors == 3 else (fields[0], NONE, NONE)
+        return Grid(self._buffer[:size].reshape(shape), v, f, v_old, first, self.dx)
+
+
+@kernel
+def _update(m, v, push, eps, bounds):
+    for i in range(bounds[0], bounds[1]):
+        if m[i] > 0.0:
+            for a in range(v.shape[1]):
+                v[i, a] = v[i, a] / (m[i] + eps) + push[a]
+
+
+@kernel
+def _update_empty(m, v, push, bounds):
+    for i in range(bounds[0], bounds[1]):
+        if not m[i] > 0.0:
+            v[i] = push
+
+
+@kernel
+def _update_apart(m, v, f, v_old, push, dt, bounds):
+    for i in range(bounds[0], bounds[1]):
+        if m[i] > 0.0:
+            for a in range(v.shape[1]):
+                v_old[i, a] = v[i, a] / m[i]
+                v[i, a] = v_old[i, a] + dt * f[i, a] / m[i] + push[a]
+
+
+@parallel
+def _update_all(m, v, push, eps):
+    for c in prange(CHUNKS):
+        _update(m, v, push, eps, chunk(c, len(m)))
+
+
+@parallel
+def _update_all_apart(m, v, f, v_old, push, dt):
+    for c in prange(CHUNKS):
+        _update_apart(m, v, f, v_old, push, dt, chunk(c, len(m)))
+
+
+@parallel
+def _update_all_empty(m, v, push):
+    for c in prange(CHUNKS):
+        _update_empty(m, v, push, chunk(c, len(m)))
+
+
+def update(grid, gravity, dt, eps=0.0, on_empty=False):
+    """Momentum to velocity: v_i = (m_i v_i + dt f_i)/(m_i + eps) + dt g on nodes that have mass.
+
+    gravity is an acceleration (d,) [m/s^2]; eps [kg] regularises the mass and `on_empty` gives empty nodes the velocity
+    dt g, both as in the release of NCLAW. Where the grid carries forces apart (FLIP), v_old is kept too.
+    """
+    d = grid.v.shape[-1]
+    m, v = grid.m.reshape(-1), grid.v.reshape(-1, d)
+    push = dt * np.asarray(gravity, dtype=float)
+    if grid.f.ndim > 1:
+        _update_all_apart(m, v, grid.f.reshape(-1, d), grid.v_old.reshape(-1, d), push, dt)
+    else:
+        _update_all(m, v, push, eps)
+    if on_empty:
+        _update_all_empty(m, v, push)

@@ -1,0 +1,90 @@
+"""Order of particles for a scatter that is parallel and yet gives the same bits for any number of threads.
+
+The box of cells is cut along the first axis into slabs of `WIDTH` cells. A particle whose base cell is in a slab writes
+nodes of that slab and at most degree <= 3 beyond, so slabs of the same colour (every other one) share no node.
+Within a slab the particles keep their order. A physical sort by cell, now and then, keeps memory access local.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .jit import CHUNKS, chunk, kernel, parallel, prange
+from .spline import base_of
+from .stencil import locate
+from .tensor import vec
+
+WIDTH = 4     # cells per slab: at least the largest degree, 3
+
+
+class Slabs(NamedTuple):
+    """Particles by slab: those of slab a are order[start[a] : start[a + 1]]."""
+
+    order: np.ndarray     # (N,)          particle indices, stable within a slab
+    start: np.ndarray     # (slabs + 1,)
+
+
+@kernel
+def _slab_of(x, p, grid, stencil):
+    return (base_of(x[p, 0], grid.dx, stencil) - grid.origin[0]) // WIDTH
+
+
+@kernel
+def _count(x, grid, stencil, count, bounds):
+    for p in range(bounds[0], bounds[1]):
+        count[_slab_of(x, p, grid, stencil)] += 1
+
+
+@kernel
+def _place(x, grid, stencil, at, order, bounds):
+    for p in range(bounds[0], bounds[1]):
+        a = _slab_of(x, p, grid, stencil)
+        order[at[a]] = p
+        at[a] += 1
+
+
+@parallel
+def _count_all(x, grid, stencil, count):
+    for c in prange(CHUNKS):
+        _count(x, grid, stencil, count[c], chunk(c, len(x)))
+
+
+@parallel
+def _place_all(x, grid, stencil, at, order):
+    for c in prange(CHUNKS):
+        _place(x, grid, stencil, at[c], order, chunk(c, len(x)))
+
+
+def slabs_of(x, grid, stencil):
+    """Stable counting sort of the particles at x (N, d) by slab. All must lie inside the grid."""
+    n_slabs = -(-grid.m.shape[0] // WIDTH)
+    count = np.zeros((CHUNKS, n_slabs), dtype=np.int64)
+    _count_all(x, grid, stencil, count)
+    ends = np.cumsum(count.T.ravel()).reshape(n_slabs, CHUNKS)     # by slab, then by chunk
+    order = np.empty(len(x), dtype=np.int64)
+    _place_all(x, grid, stencil, np.ascontiguousarray((ends - count.T).T), order)
+    return Slabs(order, np.concatenate(([0], ends[:, -1])))
+
+
+@kernel
+def _cells(x, grid, stencil, cell, bounds):
+    d = grid.m.shape
+    for p in range(bounds[0], bounds[1]):
+        base, _ = locate(vec(x, p, d), grid, stencil)
+        key = 0
+        for a in range(len(base)):
+            key = key * d[a] + base[a]
+        cell[p] = key
+
+
+@parallel
+def _cells_all(x, grid, stencil, cell):
+    for c in prange(CHUNKS):
+        _cells(x, grid, stencil, cell, chunk(c, len(x)))
+
+
+def by_cell(x, grid, stencil):
+    """Stable permutation that sorts the particles at x (N, d) by cell, first axis slowest."""
+    cell = np.empty(len(x), dtype=np.int64)
+    _cells_all(x, grid, stencil, cell)
+    return np.argsort(cell, kind="stable")

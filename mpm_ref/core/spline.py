@@ -1,0 +1,49 @@
+"""B-splines of degree 1, 2, 3 on a grid of spacing dx, and the nodes they reach.
+
+The degree is the length of `stencil` minus one: (0, 1), (0, 1, 2), (0, 1, 2, 3) are the offsets of the nodes
+that a point reaches from its base node, per axis.
+"""
+
+from math import floor
+
+from .jit import kernel
+
+STENCILS = {1: (0, 1), 2: (0, 1, 2), 3: (0, 1, 2, 3)}
+
+
+@kernel
+def base_of(x, dx, stencil):
+    """First node that a point at coordinate x reaches on one axis: floor(x/dx - (degree - 1)/2)."""
+    return floor(x / dx - 0.5 * (len(stencil) - 2))
+
+
+@kernel
+def weights(f, stencil):
+    """N(f - k) for the nodes k = 0 .. degree of one axis; f = x/dx - base in [(degree-1)/2, (degree+1)/2)."""
+    if len(stencil) == 2:
+        return 1.0 - f, f
+    elif len(stencil) == 3:
+        return 0.5 * (1.5 - f) ** 2, 0.75 - (f - 1.0) ** 2, 0.5 * (f - 0.5) ** 2
+    else:
+        return (
+            (2.0 - f) ** 3 / 6.0,
+            2.0 / 3.0 - (f - 1.0) ** 2 * (1.5 - 0.5 * f),
+            2.0 / 3.0 - (2.0 - f) ** 2 * (0.5 * f),
+            (f - 1.0) ** 3 / 6.0,
+        )
+
+
+@kernel
+def slopes(f, stencil):
+    """N'(f - k) for the same nodes: derivative with respect to f = x/dx - base."""
+    if len(stencil) == 2:
+        return -1.0, 1.0
+    elif len(stencil) == 3:
+        return f - 1.5, 2.0 - 2.0 * f, f - 0.5
+    else:
+        return (
+            -0.5 * (2.0 - f) ** 2,
+            (f - 1.0) * (1.5 * f - 3.5),
+            (2.0 - f) * (1.5 * f - 1.0),
+            0.5 * (f - 1.0) ** 2,
+        )

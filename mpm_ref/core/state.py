@@ -1,0 +1,77 @@
+"""Structures of arrays: what a particle carries, and what a grid node carries.
+
+A field that a scene does not need has another number of dimensions, which kernels read at compile time:
+
+* `C` of shape (0,): the transfer keeps no affine field (PIC, FLIP).
+* `F` of shape (N,): only J = det F is carried, and `tau` of shape (N,) is isotropic (a fluid).
+* `b` of shape (0,): no body force that differs between particles.
+* `y` of shape (0, 0): the return map has no memory.
+* `f`, `v_old` of shape (0,): the grid needs no forces apart from momenta, nor its velocity before forces.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .jit import kernel
+from .tensor import fill, identity, mat, mlin, vec
+
+
+class Particles(NamedTuple):
+    """Everything carried from step to step; N particles in d dimensions, C-contiguous, index first."""
+
+    x: np.ndarray     # (N, d)     position [m]
+    v: np.ndarray     # (N, d)     velocity [m/s]
+    C: np.ndarray     # (N, d, d)  affine velocity field [1/s], or (0,)
+    L: np.ndarray     # (N, d, d)  velocity gradient of the last step [1/s]; MLS: the same array as C
+    F: np.ndarray     # (N, d, d)  elastic deformation gradient, or (N,) its determinant
+    tau: np.ndarray   # (N, d, d)  Kirchhoff stress [Pa], or (N,) its isotropic value; derived from F
+    m: np.ndarray     # (N,)       mass [kg]
+    V0: np.ndarray    # (N,)       volume at rest [m^d]
+    y: np.ndarray     # (N,)       yield stress [Pa] where the return map changes it, or (0, 0)
+    b: np.ndarray     # (N, d)     body force per mass [m/s^2] where it differs, or (0,)
+
+
+class Grid(NamedTuple):
+    """Nodes at integer multiples of dx: node (i, j[, k]) lies at (origin + (i, j[, k])) dx.
+
+    The number of axes of `m` is the dimension, known when a kernel is compiled.
+    """
+
+    m: np.ndarray       # (n1, .., nd)     mass [kg]
+    v: np.ndarray       # (n1, .., nd, d)  momentum [kg m/s] after P2G, velocity [m/s] after the update
+    f: np.ndarray       # (n1, .., nd, d)  force [N], or (0,): forces join the momentum at once
+    v_old: np.ndarray   # (n1, .., nd, d)  velocity before forces [m/s] (FLIP), or (0,)
+    origin: np.ndarray  # (d,)             index of the first node, integer
+    dx: float           #                  spacing [m]
+
+
+NONE = np.empty(0)                # a field that is not carried
+NO_HISTORY = np.empty((0, 0))     # the same for y, which has one axis when it is carried
+
+
+@kernel
+def affine(C, p, like):
+    """C_p, or zero where no affine field is carried."""
+    if C.ndim == 3:
+        return mat(C, p, like)
+    else:
+        return mlin(0.0, identity(like), 0.0, identity(like))
+
+
+@kernel
+def full(a, p, like):
+    """Matrix p of an (N, d, d) field; s I of an isotropic field (N,)."""
+    if a.ndim == 3:
+        return mat(a, p, like)
+    else:
+        return mlin(a[p], identity(like), 0.0, identity(like))
+
+
+@kernel
+def body_force(b, p, like):
+    """b_p, or zero where no body force is carried."""
+    if b.ndim == 2:
+        return vec(b, p, like)
+    else:
+        return fill(0.0, like)

@@ -1,0 +1,225 @@
+"""Particle to grid and back: PIC, FLIP, APIC and MLS-MPM, for B-splines of degree 1, 2, 3, in 2D and 3D.
+
+i is a node, p a particle, ip a pair: w_ip = N((x_p - x_i)/dx), dw_ip = dw_ip/dx_p, r_ip = x_i - x_p. The sums of
+NSF-alg-mpm, LDM-alg1 and NCLAW-alg3 are special cases. There are two forms of force and velocity gradient:
+
+    gradient form   f_i = -sum_p V0_p tau_p dw_ip                   L_p = sum_i v_i dw_ip^T
+    MLS form        f_i = -sum_p V0_p tau_p D^-1 w_ip r_ip          L_p = C_p = sum_i w_ip v_i r_ip^T D^-1
+
+with D = sum_i w_ip r_ip r_ip^T = dx^2 (degree + 1)/12 I, for degrees 2 and 3 only. `scatter*` and `gather*` are the
+loops over particles; `p2g` and `g2p` run them in parallel. Which fields the particles and the grid carry (see
+`state`) selects the transfer, when the kernel is compiled.
+"""
+
+from .jit import CHUNKS, chunk, kernel, parallel, prange
+from .state import affine, body_force, full
+from .stencil import (
+    add_to_node,
+    arm,
+    column,
+    columns,
+    gradient,
+    inverse_inertia,
+    locate,
+    node,
+    of_node,
+    product,
+    slopes_per_axis,
+    weights_per_axis,
+)
+from .tensor import fill, lin, mat, mlin, mv, outer, put_mat, put_vec, transpose, vec
+
+
+@kernel
+def scatter(particles, grid, stencil, dt, members):
+    """Gradient form, for the particles listed in `members`.
+
+    m_i += sum_p w_ip m_p
+    m_i v_i += sum_p w_ip m_p (v_p + C_p r_ip)                                  # NSF-alg-mpm step 1
+    f_i += sum_p w_ip m_p b_p - V0_p tau_p dw_ip                                # NSF-eq6
+    """
+    d = grid.m.shape
+    for p in members:
+        base, s = locate(vec(particles.x, p, d), grid, stencil)
+        w, dw = weights_per_axis(s, stencil), slopes_per_axis(s, stencil)
+        m, v, C = particles.m[p], vec(particles.v, p, d), affine(particles.C, p, d)
+        b, tau = body_force(particles.b, p, d), full(particles.tau, p, d)
+        for c in range(columns(s, stencil)):
+            k = column(c, stencil, d)
+            for l in range(len(stencil)):
+                i = node(base, k, l)
+                w_ip, dw_ip = product(k, l, w), gradient(k, l, w, dw, grid.dx)
+                mv_ip = lin(w_ip * m, v, w_ip * m, mv(C, arm(k, l, s, grid.dx)))
+                f_ip = lin(w_ip * m, b, -particles.V0[p], mv(tau, dw_ip))
+                grid.m[i] += w_ip * m
+                add_momentum_and_force(grid.v, grid.f, i, mv_ip, f_ip, dt)
+
+
+@kernel
+def add_momentum_and_force(v, f, i, mv, force, dt):
+    """Forces join the momentum at once, unless the grid carries them apart."""
+    if f.ndim == 1:
+        add_to_node(v, i, lin(1.0, mv, dt, force))
+    else:
+        add_to_node(v, i, mv)
+        add_to_node(f, i, force)
+
+
+@kernel
+def scatter_mls(particles, grid, stencil, dt, members):
+    """MLS form: the force is part of the affine momentum.
+
+    m_i += sum_p w_ip m_p
+    m_i v_i += sum_p w_ip (m_p (v_p + dt b_p) + Q_p r_ip)
+    Q_p = m_p C_p - dt V0_p tau_p D^-1                                          # NCLAW-mls
+    """
+    d = grid.m.shape
+    for p in members:
+        base, s = locate(vec(particles.x, p, d), grid, stencil)
+        w = weights_per_axis(s, stencil)
+        m, C, tau = particles.m[p], affine(particles.C, p, d), full(particles.tau, p, d)
+        Q = mlin(m, C, -dt * inverse_inertia(grid.dx, stencil) * particles.V0[p], tau)
+        mv_p = lin(m, vec(particles.v, p, d), m * dt, body_force(particles.b, p, d))
+        for c in range(columns(s, stencil)):
+            k = column(c, stencil, d)
+            for l in range(len(stencil)):
+                i = node(base, k, l)
+                w_ip = product(k, l, w)
+                grid.m[i] += w_ip * m
+                add_to_node(grid.v, i, lin(w_ip, mv_p, w_ip, mv(Q, arm(k, l, s, grid.dx))))
+
+
+@kernel
+def gather(particles, grid, stencil, dt, flip, bounds):
+    """Gradient form, for the particles bounds[0] .. bounds[1] - 1.
+
+    u_p = sum_i w_ip v_i,   x_p += dt u_p,   L_p = sum_i v_i dw_ip^T            # NSF-alg-mpm step 3
+    C_p = sum_i w_ip v_i r_ip^T D^-1                       where C is carried (APIC)
+    v_p = u_p + flip (v_p - sum_i w_ip v_old_i)            where v_old is carried (FLIP), else u_p
+    """
+    d = grid.m.shape
+    for p in range(bounds[0], bounds[1]):
+        x = vec(particles.x, p, d)
+        base, s = locate(x, grid, stencil)
+        w, dw = weights_per_axis(s, stencil), slopes_per_axis(s, stencil)
+        u, lag = fill(0.0, d), vec(particles.v, p, d)
+        L, B = outer(u, u), outer(u, u)
+        for c in range(columns(s, stencil)):
+            k = column(c, stencil, d)
+            for l in range(len(stencil)):
+                i = node(base, k, l)
+                w_ip, v_i = product(k, l, w), of_node(grid.v, i)
+                u = lin(1.0, u, w_ip, v_i)
+                L = mlin(1.0, L, 1.0, outer(v_i, gradient(k, l, w, dw, grid.dx)))
+                B = mlin(1.0, B, w_ip, outer(v_i, arm(k, l, s, grid.dx)))
+                lag = minus_old(lag, w_ip, grid.v_old, i)
+        put_vec(particles.x, p, lin(1.0, x, dt, u))
+        put_mat(particles.L, p, L)
+        put_affine(particles.C, p, inverse_inertia(grid.dx, stencil), B)
+        put_vec(particles.v, p, blend(u, flip, lag, grid.v_old))
+
+
+@kernel
+def minus_old(lag, w_ip, v_old, i):
+    """lag - w_ip v_old_i, where the old velocity is carried."""
+    if v_old.ndim == 1:
+        return lag
+    else:
+        return lin(1.0, lag, -w_ip, of_node(v_old, i))
+
+
+@kernel
+def blend(u, flip, lag, v_old):
+    """u + flip lag, where the old velocity is carried (FLIP)."""
+    if v_old.ndim == 1:
+        return u
+    else:
+        return lin(1.0, u, flip, lag)
+
+
+@kernel
+def put_affine(C, p, scale, B):
+    """C_p = scale B, where an affine field is carried."""
+    if C.ndim == 3:
+        put_mat(C, p, mlin(scale, B, 0.0, B))
+
+
+@kernel
+def gather_mls(particles, grid, stencil, dt, bounds):
+    """MLS form: v_p = sum_i w_ip v_i, x_p += dt v_p, L_p = C_p = sum_i w_ip v_i r_ip^T D^-1."""
+    d = grid.m.shape
+    for p in range(bounds[0], bounds[1]):
+        x = vec(particles.x, p, d)
+        base, s = locate(x, grid, stencil)
+        w = weights_per_axis(s, stencil)
+        v = fill(0.0, d)
+        B = outer(v, v)
+        for c in range(columns(s, stencil)):
+            k = column(c, stencil, d)
+            for l in range(len(stencil)):
+                w_ip, v_i = product(k, l, w), of_node(grid.v, node(base, k, l))
+                v = lin(1.0, v, w_ip, v_i)
+                B = mlin(1.0, B, w_ip, outer(v_i, arm(k, l, s, grid.dx)))
+        put_vec(particles.v, p, v)
+        put_vec(particles.x, p, lin(1.0, x, dt, v))
+        put_affine(particles.C, p, inverse_inertia(grid.dx, stencil), B)
+
+
+@kernel
+def damp(C, rpic, bounds):
+    """C <- (1 - rpic) sym C + skew C: damps the strain rate, keeps the rotation (NSF-rpic)."""
+    for p in range(bounds[0], bounds[1]):
+        A = mat(C, p, C[p])
+        put_mat(C, p, mlin(1.0 - 0.5 * rpic, A, -0.5 * rpic, transpose(A)))
+
+
+@parallel
+def _scatter_color(particles, grid, stencil, dt, slabs, color):
+    for h in prange((len(slabs.start) - color) // 2):
+        a = 2 * h + color
+        scatter(particles, grid, stencil, dt, slabs.order[slabs.start[a] : slabs.start[a + 1]])
+
+
+@parallel
+def _scatter_mls_color(particles, grid, stencil, dt, slabs, color):
+    for h in prange((len(slabs.start) - color) // 2):
+        a = 2 * h + color
+        scatter_mls(particles, grid, stencil, dt, slabs.order[slabs.start[a] : slabs.start[a + 1]])
+
+
+@parallel
+def _gather(particles, grid, stencil, dt, flip):
+    for c in prange(CHUNKS):
+        gather(particles, grid, stencil, dt, flip, chunk(c, len(particles.x)))
+
+
+@parallel
+def _gather_mls(particles, grid, stencil, dt):
+    for c in prange(CHUNKS):
+        gather_mls(particles, grid, stencil, dt, chunk(c, len(particles.x)))
+
+
+@parallel
+def rpic(C, damping):
+    """`damp` for all particles, in parallel."""
+    for c in prange(CHUNKS):
+        damp(C, damping, chunk(c, len(C)))
+
+
+def p2g(particles, grid, stencil, dt, slabs, mls):
+    """Add mass and momentum of all particles to a zeroed grid; see `scatter` and `scatter_mls`.
+
+    Slabs of one colour are far enough apart to share no node, so they run in parallel; within a slab particles
+    come in a fixed order. Hence the same bits for any number of threads.
+    """
+    run = _scatter_mls_color if mls else _scatter_color
+    for color in (0, 1):
+        run(particles, grid, stencil, dt, slabs, color)
+
+
+def g2p(particles, grid, stencil, dt, flip, mls):
+    """New velocity, position and velocity gradient of all particles; see `gather` and `gather_mls`."""
+    if mls:
+        _gather_mls(particles, grid, stencil, dt)
+    else:
+        _gather(particles, grid, stencil, dt, flip)

@@ -1,0 +1,139 @@
+"""One symplectic Euler step of explicit MPM, phase by phase.
+
+    order -> p2g -> grid update -> boundaries -> g2p -> deform (F, return map, stress)
+
+NSF-alg-mpm with APIC, LDM-alg1 with PIC and NCLAW-alg3 with MLS-MPM are choices of a `Scheme`. The stress of the particles
+belongs to their F at the start of a step; `deform` leaves it so for the next one.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .body import AFFINE, permute
+from .core import deform
+from .core.grid import Store, update
+from .core.order import by_cell, slabs_of
+from .core.spline import STENCILS
+from .core.transfer import g2p, p2g, rpic
+from .materials import NoFlow
+
+TRANSFERS = ("pic", "flip", "apic", "mls")
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """How particles and grid exchange momentum.
+
+    degree of the B-spline (1, 2, 3); transfer "pic", "flip", "apic" or "mls"; flip is the share of FLIP (1) against
+    PIC (0); rpic in [0, 1] damps the strain rate in C (NSF-rpic); mass_eps [kg] and gravity_on_empty are NCLAW's.
+    Raises ValueError for a combination that does not exist.
+    """
+
+    degree: int = 2
+    transfer: str = "mls"
+    flip: float = 1.0
+    rpic: float = 0.0
+    mass_eps: float = 0.0
+    gravity_on_empty: bool = False
+
+    def __post_init__(self):
+        if self.transfer not in TRANSFERS:
+            raise ValueError(f"transfer = {self.transfer!r}: expected one of {', '.join(TRANSFERS)}")
+        if self.degree not in STENCILS:
+            raise ValueError(f"degree = {self.degree}: expected 1, 2 or 3")
+        if self.affine and self.degree == 1:
+            raise ValueError(
+                f"transfer {self.transfer!r} with degree 1: the moment sum_i w_ip r_ip r_ip^T of linear splines "
+                "is singular; take degree 2 or 3, or the transfer 'pic' or 'flip'"
+            )
+        for name in ("flip", "rpic"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise ValueError(f"{name} = {getattr(self, name)}: expected a number in [0, 1]")
+        if self.rpic and not self.affine:
+            raise ValueError(f"rpic = {self.rpic} with transfer {self.transfer!r}: it damps the affine field of apic or mls")
+        if not self.mass_eps >= 0.0:
+            raise ValueError(f"mass_eps = {self.mass_eps}: expected a mass >= 0 in kg")
+        if self.mass_eps and self.transfer == "flip":
+            raise ValueError("mass_eps with transfer 'flip': the regularised mass is for pic, apic and mls")
+
+    @property
+    def affine(self):
+        """Whether particles carry C."""
+        return self.transfer in AFFINE
+
+    @property
+    def stencil(self):
+        """Offsets (0, .., degree) of the nodes that a particle reaches, per axis."""
+        return STENCILS[self.degree]
+
+
+class Stepper:
+    """Advances bodies by explicit steps, reusing grid storage.
+
+    conditions is any object with `apply(grid, t, dt)`, which changes the nodal velocities (see `core.boundary`).
+    """
+
+    def __init__(self, scheme, dx, dim, gravity, conditions=None):
+        self.scheme, self.dx, self.conditions = scheme, dx, conditions
+        self.gravity = np.asarray(gravity, dtype=float)
+        self.store = Store(dx, scheme.stencil, dim, flip=scheme.transfer == "flip")
+
+    def start(self, bodies):
+        """Compute the stress of the bodies' state; needed once, before the first step."""
+        for body in bodies:
+            initial_stress(body)
+
+    def step(self, bodies, t, dt):
+        """Advance from time t [s] by dt [s]; returns the grid, which holds m and the new v. Changes the bodies in place."""
+        grid = scatter(bodies, self.store, self.scheme, dt)
+        update(grid, self.gravity, dt, self.scheme.mass_eps, self.scheme.gravity_on_empty)
+        if self.conditions is not None:
+            self.conditions.apply(grid, t + dt, dt)
+        for body in bodies:
+            gather(body, grid, self.scheme, dt)
+            deform_body(body, dt)
+        return grid
+
+    def sort(self, bodies):
+        """Sort every body's particles by cell, for locality; results do not depend on it but for round-off."""
+        grid = self.store.cover([body.particles.x for body in bodies])
+        for body in bodies:
+            permute(body, by_cell(body.particles.x, grid, self.scheme.stencil))
+
+
+def scatter(bodies, store, scheme, dt):
+    """Mass and momentum (with the impulse of the internal forces over dt) of all bodies on a grid that covers them."""
+    grid = store.cover([body.particles.x for body in bodies])
+    for body in bodies:
+        slabs = slabs_of(body.particles.x, grid, scheme.stencil)
+        p2g(body.particles, grid, scheme.stencil, dt, slabs, scheme.transfer == "mls")
+    return grid
+
+
+def gather(body, grid, scheme, dt):
+    """Velocity, position and velocity gradient of a body's particles from the grid."""
+    g2p(body.particles, grid, scheme.stencil, dt, scheme.flip, scheme.transfer == "mls")
+    if scheme.rpic:
+        rpic(body.particles.C, scheme.rpic)
+
+
+def deform_body(body, dt):
+    """Deformation gradient, return map and stress of a body's particles; only what its material needs."""
+    particles, law, flow = body.particles, body.law, body.flow
+    like = tuple(range(particles.x.shape[1]))
+    if particles.F.ndim == 1:
+        deform.fluid(particles, law, dt, like)
+    elif isinstance(flow, NoFlow):
+        deform.elastic(particles, law, dt, like)
+    else:
+        deform.plastic(particles, law, flow, dt, like)
+
+
+def initial_stress(body):
+    """Kirchhoff stress of a body's state as it stands."""
+    like = tuple(range(body.particles.x.shape[1]))
+    if body.particles.F.ndim == 1:
+        deform.initial_pressure(body.particles, body.law)
+    else:
+        deform.initial_stress(body.particles, body.law, body.flow, like)

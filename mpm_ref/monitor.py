@@ -1,0 +1,105 @@
+"""When a run has become unstable: the bounds, and the sentence that says where, when and why."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .energy import Energy, energy
+
+CHECK = 20      # steps between checks, so that a broken bound is reported well within 100 steps
+
+
+class Unstable(RuntimeError):
+    """A run broke a bound: attributes reason, step, t, body, particle, cfl, J, energy say which, where and when."""
+
+    def __init__(self, reason, **where):
+        self.reason = reason
+        self.__dict__.update(where)
+        super().__init__(
+            f"unstable at step {self.step}, t = {self.t:.6g} s: {reason}; body {self.body!r}, particle "
+            f"{self.particle}: CFL number {self.cfl:.3g}, J = {self.J:.3g}, energy of the run {self.energy:.6g} J. "
+            "Take a smaller dt, a stiffer or better sampled body, or look at the last checkpoint"
+        )
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a healthy run stays within.
+
+    cfl: cells that a particle may cross in one step; J: smallest and largest volume ratio (a law that recovers from
+    inversion may go below the smallest); growth: mechanical energy that may appear from nothing, relative to the
+    energy that was available.
+    """
+
+    cfl: float = 1.0
+    J: tuple = (1e-3, 1e3)
+    growth: float = 0.5
+
+
+@dataclass(frozen=True)
+class Account:
+    """Mechanical energy at the start of a run, and what round-off may add to it [J]."""
+
+    start: Energy
+    noise: float
+
+    def allowed(self, now, growth):
+        """Largest energy still credible: the start's, plus `growth` times what could have become motion by now,
+        namely the start's kinetic and elastic energy and the height lost since."""
+        released = max(self.start.gravity - now.gravity, 0.0)
+        return self.start.sum + growth * (self.start.kinetic + self.start.elastic + released) + self.noise
+
+
+def account(problem, bodies):
+    """`Account` of a run's first state; None where moving conditions put in energy that it could not know."""
+    if getattr(problem.conditions, "moves", False):
+        return None
+    weight = sum(float(b.particles.m.sum()) for b in bodies) * float(np.linalg.norm(problem.gravity))
+    return Account(energy(bodies, problem.gravity, problem.inertia), noise=1e-6 * weight * problem.dx + 1e-300)
+
+
+def speed(particles):
+    """|v_p| (N,) [m/s]."""
+    return np.sqrt(np.einsum("pa,pa->p", particles.v, particles.v))
+
+
+def volume_ratio(particles):
+    """J = det F (N,)."""
+    return particles.F if particles.F.ndim == 1 else np.linalg.det(particles.F)
+
+
+def check(problem, state, dt):
+    """Raise `Unstable` if the state breaks a limit; NaN breaks all of them."""
+    for body in state.bodies:
+        cfl = speed(body.particles) * (dt / problem.dx)
+        _stop_where(problem, state, body, dt, ~(cfl <= problem.limits.cfl),
+                    f"a particle crosses more than {problem.limits.cfl:g} cells in a step")
+        low, high = problem.limits.J
+        J = volume_ratio(body.particles)
+        low = -high if problem.may_invert(body) else low
+        _stop_where(problem, state, body, dt, ~((low <= J) & (J <= high)),
+                    f"J is outside [{low:g}, {high:g}]")
+    if state.account is not None:
+        now = energy(state.bodies, problem.gravity, problem.inertia)
+        allowed = state.account.allowed(now, problem.limits.growth)
+        if not now.sum <= allowed:
+            body = max(state.bodies, key=lambda b: speed(b.particles).max())
+            fastest = speed(body.particles) >= speed(body.particles).max()
+            _stop_where(problem, state, body, dt, fastest, f"energy exceeds {allowed:.6g} J")
+
+
+def _stop_where(problem, state, body, dt, broken, reason):
+    """Raise for the first particle of the mask, if there is one."""
+    if not broken.any():
+        return
+    p = int(np.argmax(broken))
+    raise Unstable(
+        reason,
+        step=state.step,
+        t=state.t,
+        body=body.name,
+        particle=int(body.id[p]),
+        cfl=float(speed(body.particles)[p] * dt / problem.dx),
+        J=float(volume_ratio(body.particles)[p]),
+        energy=energy(state.bodies, problem.gravity, problem.inertia).sum,
+    )

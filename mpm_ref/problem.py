@@ -1,0 +1,64 @@
+"""What a run needs, apart from files: bodies, scheme, conditions, clock."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .explicit import Scheme
+from .materials import recovers
+from .monitor import Limits
+
+
+@dataclass(frozen=True)
+class Clock:
+    """When a run steps, shows a frame and ends.
+
+    dt [s] fixed, or None: then `cfl` times the stable time step (see `timestep`). It ends after `steps` steps or at
+    time `end` [s], whichever is given; frames every `every` steps, or every `interval` seconds.
+    """
+
+    dt: float | None = None
+    cfl: float = 0.5
+    steps: int | None = None
+    end: float | None = None
+    every: int | None = None
+    interval: float | None = None
+
+    def __post_init__(self):
+        if (self.steps is None) == (self.end is None):
+            raise ValueError(f"steps = {self.steps}, end = {self.end}: give one of the two")
+        if self.every is not None and self.interval is not None:
+            raise ValueError(f"every = {self.every}, interval = {self.interval}: give at most one of the two")
+        if self.dt is not None and not (np.isfinite(self.dt) and self.dt > 0.0):
+            raise ValueError(f"dt = {self.dt}: expected a positive number of seconds")
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Initial state and rules of a run. Kernels change the arrays of the bodies in place."""
+
+    bodies: tuple                       # of Body
+    dx: float                           # grid spacing [m]
+    clock: Clock
+    gravity: np.ndarray                 # (d,) acceleration [m/s^2]
+    scheme: Scheme = field(default_factory=Scheme)
+    conditions: object = None           # with apply(grid, t, dt); see core.boundary
+    clip: tuple | None = None           # (low, high), each (d,): particles are kept inside this box (NCLaw)
+    limits: Limits = field(default_factory=Limits)
+    allow_unstable: bool = False        # run on although dt is past its bound
+    title: str = ""
+    source: str = ""                    # canonical text of the scene, "" if built in Python
+
+    @property
+    def inertia(self):
+        """D = dx^2 (degree + 1)/12 of the affine motion [m^2]; 0 where no affine field is carried."""
+        return self.dx**2 * (self.scheme.degree + 1) / 12.0 if self.scheme.affine else 0.0
+
+    def may_invert(self, body):
+        """Whether the body's law recovers from det F <= 0."""
+        return recovers(body.law)
+
+    @property
+    def dim(self):
+        """Number of space dimensions d."""
+        return self.bodies[0].particles.x.shape[1]

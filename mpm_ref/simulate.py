@@ -1,0 +1,141 @@
+"""The only loop over time: it steps, checks, shows frames, and stops with an explanation when a run becomes unstable.
+
+A run is resumed from a `State`, bit for bit: whatever the loop decides (dt, when to sort, when to check) is a function of
+the state alone.
+"""
+
+from dataclasses import dataclass
+from math import ceil, inf
+from typing import NamedTuple
+
+import numpy as np
+
+from .explicit import Stepper
+from .monitor import CHECK, Account, account, check
+from .timestep import refuse, stable_dt
+
+SORT = 64        # steps between physical sorts of the particles by cell
+REBOUND = 10     # steps between evaluations of the stable time step
+EVEN = 1e-9      # of a step: a frame this near is met, not stepped to
+
+
+@dataclass
+class State:
+    """Everything that a run carries from step to step."""
+
+    bodies: tuple                      # of Body
+    step: int = 0
+    t: float = 0.0                     # [s]
+    frame: int = 0                     # frames shown so far
+    bound: float = inf                 # stable dt at its last evaluation [s]
+    account: Account | None = None     # energy at the start
+
+
+class Frame(NamedTuple):
+    """What the loop shows. The next step changes the arrays of the state: copy what you keep."""
+
+    index: int      # 0 for the initial state
+    t: float        # [s]
+    dt: float       # length of the step that led here [s]; 0 for the initial state
+    state: State
+
+
+def simulate(problem, state=None, on_step=None):
+    """Run a problem, from its start or from a `State`, and yield a `Frame` at every frame time.
+
+    on_step(state, dt) is called after every step, when the state is whole: to save a checkpoint, show progress, or end
+    the run by raising. Raises `Unstable` (see `monitor`) and `TooLarge` (see `timestep`).
+    """
+    stepper = Stepper(problem.scheme, problem.dx, problem.dim, problem.gravity, problem.conditions)
+    if state is None:
+        state = State(problem.bodies)
+        stepper.start(state.bodies)
+        state.account = account(problem, state.bodies)
+    if state.frame == 0:
+        yield show(state, 0.0)
+    while not ended(problem.clock, state):
+        dt = advance(problem, stepper, state)
+        if on_step is not None:
+            on_step(state, dt)
+        if frame_is_due(problem.clock, state):
+            yield show(state, dt)
+
+
+def show(state, dt):
+    """The next frame of a run."""
+    frame = Frame(state.frame, state.t, dt, state)
+    state.frame += 1
+    return frame
+
+
+def advance(problem, stepper, state):
+    """One step: sort now and then, choose dt, step, clip, check. Returns dt."""
+    if state.step % SORT == 0:
+        stepper.sort(state.bodies)
+    if state.step % REBOUND == 0 and needs_bound(problem, state):
+        state.bound = rebound(problem, stepper, state)
+    dt = next_dt(problem.clock, state)
+    stepper.step(state.bodies, state.t, dt)
+    if problem.clip is not None:
+        keep_inside(state.bodies, *problem.clip)
+    state.step += 1
+    state.t = state.step * dt if problem.clock.dt else state.t + dt
+    if state.step % CHECK == 0 or ended(problem.clock, state):
+        check(problem, state, dt)
+    return dt
+
+
+def needs_bound(problem, state):
+    """An adaptive dt follows its bound; a fixed one is compared with it at checks."""
+    return problem.clock.dt is None or (state.step % CHECK == 0 and not problem.allow_unstable)
+
+
+def rebound(problem, stepper, state):
+    """Stable dt of the state [s]; refuses a fixed dt that is past it."""
+    terms = stable_dt(state.bodies, stepper)
+    if problem.clock.dt is not None:
+        refuse(problem.clock.dt, terms, state.step)
+    return terms.dt
+
+
+def next_dt(clock, state):
+    """Length of the next step [s]: fixed, or such that equal steps within the bound meet the next frame or the end."""
+    if clock.dt is not None:
+        return clock.dt
+    target = clock.end if clock.end is not None else inf
+    if clock.interval is not None:
+        target = min(target, state.frame * clock.interval)
+    dt = clock.cfl * state.bound
+    if target == inf:
+        return dt
+    return (target - state.t) / max(ceil((target - state.t) / dt - EVEN), 1)
+
+
+def last_step(clock):
+    """Number of steps of a run with fixed dt or fixed steps, else None."""
+    if clock.steps is not None:
+        return clock.steps
+    return ceil(clock.end / clock.dt - EVEN) if clock.dt is not None else None
+
+
+def ended(clock, state):
+    """Whether the run is over."""
+    steps = last_step(clock)
+    return state.step >= steps if steps is not None else state.t >= clock.end * (1.0 - EVEN)
+
+
+def frame_is_due(clock, state):
+    """Whether the state just reached is a frame: every so many steps or seconds, and the end."""
+    if ended(clock, state):
+        return True
+    if clock.every is not None:
+        return state.step % clock.every == 0
+    if clock.interval is not None:
+        return state.t >= state.frame * clock.interval * (1.0 - EVEN)
+    return False
+
+
+def keep_inside(bodies, low, high):
+    """Clip positions to a box, velocities unchanged (NCLaw)."""
+    for body in bodies:
+        np.clip(body.particles.x, low, high, out=body.particles.x)

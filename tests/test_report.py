@@ -1,0 +1,182 @@
+"""The report, the figures in it, and README's status table, from toy results."""
+
+import re
+from uuid import uuid4
+
+import pytest
+
+from figures.frame import draw_all
+from validation import Results
+from validation.registry import Experiment
+from validation.report import chapters, write_report
+from validation.results import RESULTS, ROOT
+from validation.run import Setting, run_all
+from validation.status import BEGIN, END, status_table, with_status
+from validation.targets import Target, load
+
+
+def target(id, kind="error", **fields):
+    fields = {"what": f"the {id.split('.')[-1]}", "confidence": "exact", **fields}
+    return Target(id=id, value=1.2, unit="%", paper_ref="Table 1", kind=kind, comparator="<=",
+                  **fields)
+
+
+TARGETS = {t.id: t for t in (
+    target("nsf.table1.bread"), target("nsf.table1.cake", confidence="ocr-uncertain"),
+    target("nsf.table1.jelly", what="a <b> & c | d"), target("nsf.table1.dt", kind="setting"),
+    target("nsf.printed.dt", kind="setting"))}
+
+FIGURE = '''"""Error of the {name} over cells."""
+
+from matplotlib.figure import Figure
+
+NEEDS = ["nsf.{name}"]
+
+
+def draw(results):
+    figure = Figure()
+    table = results.table("nsf.{name}", "errors")
+    figure.add_subplot().loglog(table["n"], table["error"])
+    return figure
+'''
+
+
+def bread(run):
+    run.record("nsf.table1.bread", 1.0, scale="1/10 of the particles")
+    run.record("nsf.table1.cake", 3.4567, note="the coarse grid <locks>")
+    run.record("nsf.bread.own_number", 7.0, comparator="band", bound=(6, 8), unit="m")
+    run.table("errors", ["n", "error"], [(16, 1e-3), (32, 2.5e-4)])
+
+
+def long_table(run):
+    run.table("long", ["n"], [(k,) for k in range(1000)])
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Results of a toy experiment."""
+    toys = [Experiment(f"nsf.{f.__name__}", "Bread of NSF", ("quick",), {}, f)
+            for f in (bread, long_table)]
+    assert run_all(toys, Setting("quick", tmp_path / "quick", targets=TARGETS, commit="abc")) == []
+    return tmp_path / "quick"
+
+
+def text(folder, name, targets=TARGETS):
+    write_report(folder, "quick", targets)
+    return (folder / name).read_text(encoding="utf-8")
+
+
+def test_chapter_counts(folder):
+    chapter, = chapters(Results(folder), TARGETS)
+    assert chapter.counts == {"pass": 2, "miss": 1}
+    assert [t.id for t in chapter.missing] == ["nsf.table1.jelly"]
+    assert [t.id for t in chapter.settings] == ["nsf.table1.dt"]
+    assert chapter.overruled == 1
+
+
+def test_printed_number_counts_for_its_paper(tmp_path):
+    def other(run):
+        run.record("nsf.table1.bread", 1.0)
+        run.record("trade.other.time", 1.0, comparator="info", unit="s")
+
+    setting = Setting("quick", tmp_path, targets=TARGETS)
+    run_all([Experiment("trade.other", "Cost", ("quick",), {}, other)], setting)
+    trade, nsf = chapters(Results(tmp_path), TARGETS)
+    assert (trade.counts, nsf.counts) == ({"info": 1}, {"pass": 1})
+    assert "nsf.table1.bread" not in [t.id for t in nsf.missing]
+
+
+def test_markdown_has_the_rows(folder):
+    said = text(folder, "report.md")
+    table = "the bread (Table 1) | 1.2 %; ≤ 1.2 | 1 % | 0.833 | pass | 1/10 of the particles |"
+    assert table in said
+    doubtful = "the cake (Table 1) | 1.2 % (ocr-uncertain); ≤ 1.2 | 3.457 % | 2.88 | **miss** |  |"
+    assert doubtful in said
+    assert "| own number | —; 6 … 8 | 7 m | — | pass |  |" in said
+    assert "- the cake (Table 1), miss: the coarse grid <locks>" in said
+    assert "[NSF: neural stress fields](#nsf) | 2 | 1 | 0 | 1 | 1 |" in said
+    assert "Results not reproduced yet: 1" in said
+    assert "a <b> & c \\| d" in said
+    assert "Bread of NSF" in said
+
+
+def test_html_has_the_same_and_escapes(folder):
+    said = text(folder, "report.html")
+    for part in ("the bread (Table 1)", "0.833", '<span class="miss">miss</span>', "commit abc",
+                 "the coarse grid &lt;locks&gt;", "a &lt;b&gt; &amp; c | d", "<td>0.00025</td>"):
+        assert part in said, part
+    assert not re.search(r'(src|href)="https?:', said), "the report must stand alone"
+
+
+def test_long_table_is_linked_not_shown(folder):
+    assert '<a href="nsf.long_table.long.csv">long</a>: 1000 rows' in text(folder, "report.html")
+
+
+def test_report_without_results_lists_what_is_missing(tmp_path):
+    said = text(tmp_path / "quick", "report.md", load())
+    assert "0 experiments" in said
+    assert said.count("Results not reproduced yet") == 5
+
+
+@pytest.fixture
+def scripts(tmp_path, monkeypatch):
+    """A package of figure scripts with a name of its own."""
+    package = tmp_path / f"drawn_{uuid4().hex}"
+    package.mkdir()
+    monkeypatch.syspath_prepend(tmp_path)
+    for name in ("bread", "unmade"):
+        (package / f"{name}.py").write_text(FIGURE.format(name=name))
+    return package
+
+
+def test_figure_is_drawn_and_shown_under_its_experiment(folder, scripts):
+    assert draw_all(Results(folder), folder=scripts) == []
+    assert sorted(f.name for f in (folder / "figures").iterdir()) == ["bread.pdf", "bread.png"]
+    section = chapters(Results(folder), TARGETS)[0].sections[0]
+    assert section.figures[0].caption == "Error of the bread over cells."
+    assert 'src="data:image/png;base64,iVBOR' in text(folder, "report.html")
+    assert "![bread](figures/bread.png)" in text(folder, "report.md")
+
+
+def test_figure_is_drawn_again_with_the_same_bytes(folder, scripts):
+    draw_all(Results(folder), folder=scripts)
+    first = {f.name: f.read_bytes() for f in (folder / "figures").iterdir()}
+    draw_all(Results(folder), folder=scripts)
+    assert first == {f.name: f.read_bytes() for f in (folder / "figures").iterdir()}
+
+
+def test_figure_that_raises_is_named(folder, scripts, capsys):
+    (scripts / "bad.py").write_text(FIGURE.format(name="bread").replace("Figure()", "1 / 0"))
+    assert draw_all(Results(folder), folder=scripts) == ["figure bad"]
+    assert (folder / "figures" / "bread.png").exists()
+    assert "ZeroDivisionError" in capsys.readouterr().err
+
+
+def test_figures_about_other_experiments_are_left(folder, scripts):
+    draw_all(Results(folder), about=["nsf.long_table"], folder=scripts)
+    assert not (folder / "figures").exists()
+
+
+def test_unknown_figure_is_refused(folder, scripts):
+    with pytest.raises(ValueError, match="no figure 'cake'; there are: bread, unmade"):
+        draw_all(Results(folder), names=["cake"], folder=scripts)
+
+
+def test_status_table(folder):
+    assert status_table(Results(folder), TARGETS).splitlines()[2:] == [
+        "| NSF | `nsf.bread` | 2 pass, 1 miss |", "| NSF |  | not yet: 1 printed result |"]
+
+
+def test_status_is_put_between_the_markers():
+    readme = f"# A\n{BEGIN}\nold\n{END}\ntail\n"
+    assert with_status(readme, "new") == f"# A\n{BEGIN}\nnew\n{END}\ntail\n"
+    with pytest.raises(ValueError, match="README has no lines"):
+        with_status("# A\n", "new")
+
+
+def test_readme_is_current():
+    """Where results are published, README shows them: `python -m validation status --write`."""
+    published = Results(RESULTS / "standard")
+    if published.ids():
+        readme = (ROOT / "README.md").read_text(encoding="utf-8")
+        assert readme == with_status(readme, status_table(published, load()))

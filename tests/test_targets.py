@@ -1,0 +1,116 @@
+"""The printed numbers load, are complete, and agree where one follows from others."""
+
+import re
+from collections import Counter
+
+import pytest
+
+from validation import equations, targets
+from validation.citations import ID
+
+GOOD = ('{id = "toy.a", value = 1.5, unit = "m", what = "length", paper_ref = "Table 1", '
+        'kind = "setting", comparator = "=", confidence = "exact"}')
+
+
+@pytest.fixture(scope="module")
+def printed():
+    return targets.load()
+
+
+def test_every_number_is_there(printed):
+    per_paper = Counter(i.split(".")[0] for i in printed)
+    assert per_paper == {"hot": 232, "ldm": 242, "ldmw": 56, "nclaw": 253, "nsf": 247}
+
+
+def test_ids_are_plain_and_fields_are_filled(printed):
+    assert not [i for i in printed if not re.fullmatch(r"[a-z]+(\.[A-Za-z0-9_-]+)+", i)]
+    assert not [t.id for t in printed.values() if not (t.unit and t.what and t.paper_ref)]
+
+
+def test_settings_of_the_reference_are_never_taken_from_a_literal_reading(printed):
+    literal = [t for t in printed.values() if ".printed." in t.id]
+    assert literal
+    assert {t.confidence for t in literal} == {"contradicted"}
+
+
+def test_contradictions_name_their_ruling(printed):
+    known = equations.read().entries
+    named = {t.id: [m[0] for m in ID.finditer(t.conditions)] for t in printed.values()}
+    assert not [i for i, ids in named.items() if not set(ids) <= known.keys()]
+    contradicted = [t.id for t in printed.values() if t.confidence == "contradicted"]
+    assert not [i for i in contradicted if not named[i]]
+
+
+def test_network_widths_follow_from_beta(printed):
+    scenes = ("bread", "cake", "sand", "metal", "toothpaste", "jelly", "ball")
+    for scene in scenes:
+        for field, outputs in {"g": 3, "h": 6, "l": 9}.items():
+            mlp = f"nsf.table1.{scene}.mlp.{field}"
+            assert printed[f"{mlp}.width"].value == outputs * printed[f"{mlp}.beta"].value
+
+
+@pytest.mark.parametrize("scene", ["bread", "sand", "metal", "toothpaste", "jelly", "ball"])
+def test_dimension_reduction_follows_from_particles(printed, scene):
+    particles = printed.get(f"nsf.{scene}.particles_text") or printed[f"nsf.{scene}.particles"]
+    gamma = 3 * particles.value / printed[f"nsf.{scene}.r"].value
+    assert gamma == pytest.approx(printed[f"nsf.{scene}.gamma"].value, rel=1e-4)
+
+
+@pytest.mark.parametrize("points", [1368, 1757, 3076115])
+def test_encoder_lengths_follow_from_the_convolution_rule(printed, points):
+    length, layers = 3 * points, 0
+    while (length - 6) // 2 + 1 >= printed["ldm.table1.encoder.dconv_min"].value:
+        length, layers = (length - 6) // 2 + 1, layers + 1
+    assert length == printed[f"ldm.table1.encoder.dconv.{points}"].value
+    assert layers == printed[f"ldm.table1.encoder.nconv.{points}"].value
+
+
+METHODS = ("spline", "neural", "gnn", "ours-init", "ours", "labeled", "sys-id")
+PLACES = ("jello", "sand", "plasticine", "water")
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_overall_means_follow_from_the_cells(printed, method):
+    # cells are printed to two digits, each up to 5 % off; Table 2 counts each velocity draw once
+    one = [printed[f"nclaw.table1.{method}.{p}"].value for p in PLACES]
+    weights = {"time": 1, "velocity": 3, "geometry": 1}
+    two = [w * printed[f"nclaw.table2.{method}.{p}.{task}"].value
+           for p in PLACES for task, w in weights.items()]
+    first, second = (printed[f"nclaw.table{n}.{method}.overall_mean"].value for n in (1, 2))
+    assert sum(one) / 4 == pytest.approx(first, rel=0.05)
+    assert sum(two) / 20 == pytest.approx(second, rel=0.1)      # the mean is rounded as well
+
+
+def write(folder, *records, head='paper = "toy"'):
+    (folder / "toy.toml").write_text(f"{head}\ntargets = [\n" + ",\n".join(records) + "\n]\n")
+    return folder
+
+
+def test_a_record_round_trips(tmp_path):
+    target = targets.load(write(tmp_path, GOOD))["toy.a"]
+    assert (target.value, target.unit, target.comparator, target.conditions) == (1.5, "m", "=", "")
+
+
+@pytest.mark.parametrize(("record", "message"), [
+    (GOOD.replace("unit", "units"), r"toy\.toml, target 'toy\.a'.*`units`"),
+    (GOOD.replace('unit = "m", ', ""), r"target 'toy\.a'.*missing required field `unit`"),
+    (GOOD.replace("1.5", '"1.5"'), r"target 'toy\.a'.*Expected `int \| float`.*\$\.value"),
+    (GOOD.replace("1.5", "true"), r"target 'toy\.a'.*got `bool`"),
+    (GOOD.replace("1.5", "nan"), r"target 'toy\.a': value is nan, expected a finite number"),
+    (GOOD.replace("1.5", "-inf"), r"target 'toy\.a': value is -inf, expected a finite number"),
+    (GOOD.replace('comparator = "="', 'comparator = "<"'), r"Invalid enum value '<'.*comparator"),
+    (GOOD.replace("toy.a", "other.a"), r"toy\.toml: target 'other\.a' must begin with 'toy\.'"),
+])
+def test_a_bad_record_is_refused_with_file_and_key(tmp_path, record, message):
+    with pytest.raises(ValueError, match=message):
+        targets.load(write(tmp_path, record))
+
+
+def test_an_id_given_twice_is_refused(tmp_path):
+    with pytest.raises(ValueError, match=r"toy\.toml: target 'toy\.a' is given twice"):
+        targets.load(write(tmp_path, GOOD, GOOD))
+
+
+def test_an_unknown_key_of_the_file_is_refused(tmp_path):
+    with pytest.raises(ValueError, match=r"toy\.toml: .*`count`"):
+        targets.load(write(tmp_path, GOOD, head='paper = "toy"\ncount = 1'))

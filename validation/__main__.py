@@ -1,0 +1,92 @@
+"""The command line of the validation suite: `python -m validation --help`."""
+
+import sys
+import traceback
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from figures.frame import draw_all
+
+from . import targets
+from .provenance import commit
+from .registry import discover, select
+from .report import write_report
+from .results import RESULTS, ROOT, Results
+from .run import Setting, run_all
+from .status import status_table, with_status
+
+app = typer.Typer(help=__doc__, add_completion=False, no_args_is_help=True,
+                  pretty_exceptions_enable=False)
+
+Profile = Annotated[
+    Literal["quick", "standard", "paper"],
+    typer.Option(help="quick: a minute at most each; standard: hours in all; paper: as printed")]
+Folder = Annotated[Path, typer.Option("--results", help="where results/<profile>/ stands")]
+Ids = Annotated[list[str] | None, typer.Argument(help="ids or their leading parts; none: all")]
+
+
+@app.command("list")
+def list_experiments(profile: Profile = "quick"):
+    """All experiments, their profiles and their expected seconds."""
+    catalogue = discover()
+    for e in catalogue.experiments.values():
+        cost = f"{e.seconds(profile):6.0f} s" if profile in e.profiles else f"{'—':>8}"
+        typer.echo(f"{e.id:<44} {cost}  {e.title}")
+    raise typer.Exit(_report_broken(catalogue.broken))
+
+
+@app.command()
+def run(ids: Ids = None, profile: Profile = "quick", seed: int = 0, results: Folder = RESULTS):
+    """Run experiments, draw their figures and write the report.
+
+    A miss is a result; only an experiment or a figure that raises makes the exit code 1.
+    """
+    catalogue = discover()
+    try:
+        chosen = select(catalogue.experiments, ids, profile)
+    except ValueError as error:
+        typer.echo(f"{error}", err=True)
+        raise typer.Exit(2) from None
+    folder = results / profile
+    printed = targets.load()
+    failed = run_all(chosen, Setting(profile, folder, seed, printed, commit(ROOT)))
+    undrawn = draw_all(Results(folder), about=[e.id for e in chosen])
+    _write_report(folder, profile, printed)
+    for name in (*failed, *undrawn):
+        typer.echo(f"failed: {name}", err=True)
+    raise typer.Exit(max(_report_broken(catalogue.broken), int(bool(failed or undrawn))))
+
+
+@app.command()
+def report(profile: Profile = "quick", results: Folder = RESULTS):
+    """Write report.html and report.md from the results there are."""
+    _write_report(results / profile, profile, targets.load())
+
+
+@app.command()
+def status(profile: Profile = "standard", results: Folder = RESULTS, write: bool = False):
+    """Print README's status table, or write it into README.md."""
+    table = status_table(Results(results / profile), targets.load())
+    if not write:
+        typer.echo(table)
+        return
+    readme = ROOT / "README.md"
+    readme.write_text(with_status(readme.read_text(encoding="utf-8"), table), encoding="utf-8")
+
+
+def _write_report(folder, profile, printed):
+    for path in write_report(folder, profile, printed):
+        typer.echo(f"wrote {path}")
+
+
+def _report_broken(broken):
+    """1 and the reasons where modules could not be imported, else 0."""
+    for module, error in broken.items():
+        print(f"{module} cannot be imported:", *traceback.format_exception(error), file=sys.stderr)
+    return int(bool(broken))
+
+
+if __name__ == "__main__":
+    app()
