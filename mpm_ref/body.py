@@ -19,11 +19,10 @@ class Body(NamedTuple):
     id: np.ndarray        # (N,) number of each particle in the order in which the body was sampled
 
 
-def particles_at(x, v, m, V0, transfer="mls", *, fluid=False, y=None, b=None):
-    """Particles at rest shape (F = I, no stress) at x (N, d) with velocity v (N, d), mass m (N,) and volume V0 (N,).
-
-    `fluid` carries J instead of F; `y` is the initial history (N,) of the return map, `b` a body force (N, d).
-    Only the fields that `transfer` and the material need are allocated.
+def particles_at(x, v, m, V0, transfer="mls", fluid=False):
+    """Particles without stress (F = I) at x (N, d) with velocity v (N, d), mass m (N,), volume V0
+    (N,). Only the fields that the transfer needs are allocated; `fluid` carries J instead of F.
+    Further fields are set by `_replace`: the history y (N,), a body force b (N, d).
     """
     n, d = x.shape
     L = np.zeros((n, d, d))
@@ -31,16 +30,15 @@ def particles_at(x, v, m, V0, transfer="mls", *, fluid=False, y=None, b=None):
     if transfer in AFFINE:
         C = L if transfer == "mls" else np.zeros((n, d, d))
     return Particles(
-        x=np.ascontiguousarray(x, dtype=float),
-        v=np.ascontiguousarray(v, dtype=float),
+        *(np.ascontiguousarray(a, dtype=float) for a in (x, v)),
         C=C,
         L=L,
         F=np.ones(n) if fluid else np.tile(np.eye(d), (n, 1, 1)),
         tau=np.zeros(n) if fluid else np.zeros((n, d, d)),
         m=np.ascontiguousarray(m, dtype=float),
         V0=np.ascontiguousarray(V0, dtype=float),
-        y=NO_HISTORY if y is None else np.ascontiguousarray(y, dtype=float),
-        b=NONE if b is None else np.ascontiguousarray(b, dtype=float),
+        y=NO_HISTORY,
+        b=NONE,
     )
 
 

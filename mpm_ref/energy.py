@@ -1,4 +1,6 @@
-"""Energies and momenta of bodies, summed in a fixed order: the same bits for any number of threads."""
+"""Energies and momenta of bodies, summed in a fixed order: the same bits for any number of
+threads.
+"""
 
 from typing import NamedTuple
 
@@ -60,8 +62,9 @@ def elastic(body):
 
 
 def kinetic(particles, inertia=0.0):
-    """Kinetic energy of every particle (N,) [J]; inertia D = dx^2 (degree + 1)/12 [m^2] adds the affine motion,
-    m D |C|^2 / 2."""
+    """Kinetic energy of every particle (N,) [J]; inertia D = dx^2 (degree + 1)/12 [m^2] adds the
+    affine motion, m D |C|^2 / 2.
+    """
     e = 0.5 * particles.m * np.einsum("pa,pa->p", particles.v, particles.v)
     if inertia and particles.C.ndim == 3:
         e += 0.5 * inertia * particles.m * np.einsum("pab,pab->p", particles.C, particles.C)
@@ -84,12 +87,15 @@ def energy(bodies, gravity, inertia=0.0):
 def momentum(bodies):
     """Linear momentum sum_p m_p v_p (d,) [kg m/s]."""
     d = bodies[0].particles.x.shape[1]
-    return np.array([sum(total(b.particles.m * b.particles.v[:, a]) for b in bodies) for a in range(d)])
+    sums = [[total(b.particles.m * b.particles.v[:, a]) for a in range(d)] for b in bodies]
+    return np.sum(sums, axis=0)
 
 
 def angular_momentum(bodies, inertia=0.0, about=None):
-    """Angular momentum about a point: sum_p m_p (x_p x v_p) plus, where C is carried, the particles' own spin
-    sum_p m_p D eps : C_p^T [APIC]. A scalar (1,) in 2D, a vector (3,) in 3D [kg m^2/s]."""
+    """Angular momentum about a point: sum_p m_p (x_p x v_p) plus, where C is carried, the
+    particles' own spin sum_p m_p D eps : C_p^T [APIC]. A scalar (1,) in 2D, a vector (3,) in 3D
+    [kg m^2/s].
+    """
     d = bodies[0].particles.x.shape[1]
     pairs = [(0, 1)] if d == 2 else [(1, 2), (2, 0), (0, 1)]
     out = np.zeros(len(pairs))

@@ -2,8 +2,9 @@
 
     order -> p2g -> grid update -> boundaries -> g2p -> deform (F, return map, stress)
 
-NSF-alg-mpm with APIC, LDM-alg1 with PIC and NCLAW-alg3 with MLS-MPM are choices of a `Scheme`. The stress of the particles
-belongs to their F at the start of a step; `deform` leaves it so for the next one.
+NSF-alg-mpm with APIC, LDM-alg1 with PIC and NCLAW-alg3 with MLS-MPM are choices of a `Scheme`.
+The stress of the particles belongs to their F at the start of a step; `deform` leaves it so for
+the next one.
 """
 
 from dataclasses import dataclass
@@ -25,9 +26,9 @@ TRANSFERS = ("pic", "flip", "apic", "mls")
 class Scheme:
     """How particles and grid exchange momentum.
 
-    degree of the B-spline (1, 2, 3); transfer "pic", "flip", "apic" or "mls"; flip is the share of FLIP (1) against
-    PIC (0); rpic in [0, 1] damps the strain rate in C (NSF-rpic); mass_eps [kg] and gravity_on_empty are NCLAW's.
-    Raises ValueError for a combination that does not exist.
+    degree of the B-spline (1, 2, 3); transfer "pic", "flip", "apic" or "mls"; flip is the share
+    of FLIP (1) against PIC (0); rpic in [0, 1] damps the strain rate in C (NSF-rpic); mass_eps
+    [kg] and gravity_on_empty are NCLAW's. Raises ValueError for a combination that does not exist.
     """
 
     degree: int = 2
@@ -39,23 +40,27 @@ class Scheme:
 
     def __post_init__(self):
         if self.transfer not in TRANSFERS:
-            raise ValueError(f"transfer = {self.transfer!r}: expected one of {', '.join(TRANSFERS)}")
+            known = ", ".join(TRANSFERS)
+            raise ValueError(f"transfer = {self.transfer!r}: expected one of {known}")
         if self.degree not in STENCILS:
             raise ValueError(f"degree = {self.degree}: expected 1, 2 or 3")
         if self.affine and self.degree == 1:
             raise ValueError(
-                f"transfer {self.transfer!r} with degree 1: the moment sum_i w_ip r_ip r_ip^T of linear splines "
-                "is singular; take degree 2 or 3, or the transfer 'pic' or 'flip'"
+                f"transfer {self.transfer!r} with degree 1: the moment sum_i w_ip r_ip r_ip^T of "
+                "linear splines is singular; take degree 2 or 3, or the transfer 'pic' or 'flip'"
             )
         for name in ("flip", "rpic"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ValueError(f"{name} = {getattr(self, name)}: expected a number in [0, 1]")
         if self.rpic and not self.affine:
-            raise ValueError(f"rpic = {self.rpic} with transfer {self.transfer!r}: it damps the affine field of apic or mls")
+            raise ValueError(
+                f"rpic = {self.rpic} with transfer {self.transfer!r}: it damps the affine field, "
+                "which only apic and mls have"
+            )
         if not self.mass_eps >= 0.0:
             raise ValueError(f"mass_eps = {self.mass_eps}: expected a mass >= 0 in kg")
         if self.mass_eps and self.transfer == "flip":
-            raise ValueError("mass_eps with transfer 'flip': the regularised mass is for pic, apic and mls")
+            raise ValueError("mass_eps with transfer 'flip': take it with pic, apic or mls")
 
     @property
     def affine(self):
@@ -71,7 +76,8 @@ class Scheme:
 class Stepper:
     """Advances bodies by explicit steps, reusing grid storage.
 
-    conditions is any object with `apply(grid, t, dt)`, which changes the nodal velocities (see `core.boundary`).
+    conditions is any object with `apply(grid, t, dt)`, which changes the nodal velocities (see
+    `core.boundary`).
     """
 
     def __init__(self, scheme, dx, dim, gravity, conditions=None):
@@ -85,7 +91,9 @@ class Stepper:
             initial_stress(body)
 
     def step(self, bodies, t, dt):
-        """Advance from time t [s] by dt [s]; returns the grid, which holds m and the new v. Changes the bodies in place."""
+        """Advance from time t [s] by dt [s]; returns the grid, which holds m and the new v.
+        Changes the bodies in place.
+        """
         grid = scatter(bodies, self.store, self.scheme, dt)
         update(grid, self.gravity, dt, self.scheme.mass_eps, self.scheme.gravity_on_empty)
         if self.conditions is not None:
@@ -96,14 +104,18 @@ class Stepper:
         return grid
 
     def sort(self, bodies):
-        """Sort every body's particles by cell, for locality; results do not depend on it but for round-off."""
+        """Sort every body's particles by cell, for locality; results do not depend on it but for
+        round-off.
+        """
         grid = self.store.cover([body.particles.x for body in bodies])
         for body in bodies:
             permute(body, by_cell(body.particles.x, grid, self.scheme.stencil))
 
 
 def scatter(bodies, store, scheme, dt):
-    """Mass and momentum (with the impulse of the internal forces over dt) of all bodies on a grid that covers them."""
+    """Mass and momentum (with the impulse of the internal forces over dt) of all bodies on a grid
+    that covers them.
+    """
     grid = store.cover([body.particles.x for body in bodies])
     for body in bodies:
         slabs = slabs_of(body.particles.x, grid, scheme.stencil)
@@ -119,7 +131,9 @@ def gather(body, grid, scheme, dt):
 
 
 def deform_body(body, dt):
-    """Deformation gradient, return map and stress of a body's particles; only what its material needs."""
+    """Deformation gradient, return map and stress of a body's particles; only what its material
+    needs.
+    """
     particles, law, flow = body.particles, body.law, body.flow
     like = tuple(range(particles.x.shape[1]))
     if particles.F.ndim == 1:

@@ -10,15 +10,17 @@ CHECK = 20      # steps between checks, so that a broken bound is reported well 
 
 
 class Unstable(RuntimeError):
-    """A run broke a bound: attributes reason, step, t, body, particle, cfl, J, energy say which, where and when."""
+    """A run broke a bound: attributes reason, step, t, body, particle, cfl, J, energy say which,
+    where and when.
+    """
 
     def __init__(self, reason, **where):
         self.reason = reason
         self.__dict__.update(where)
         super().__init__(
-            f"unstable at step {self.step}, t = {self.t:.6g} s: {reason}; body {self.body!r}, particle "
-            f"{self.particle}: CFL number {self.cfl:.3g}, J = {self.J:.3g}, energy of the run {self.energy:.6g} J. "
-            "Take a smaller dt, a stiffer or better sampled body, or look at the last checkpoint"
+            f"unstable at step {self.step}, t = {self.t:.6g} s: {reason}; body {self.body!r}, "
+            f"particle {self.particle}: CFL number {self.cfl:.3g}, J = {self.J:.3g}, energy of "
+            f"the run {self.energy:.6g} J; take a smaller dt, or look at the last checkpoint"
         )
 
 
@@ -26,9 +28,9 @@ class Unstable(RuntimeError):
 class Limits:
     """What a healthy run stays within.
 
-    cfl: cells that a particle may cross in one step; J: smallest and largest volume ratio (a law that recovers from
-    inversion may go below the smallest); growth: mechanical energy that may appear from nothing, relative to the
-    energy that was available.
+    cfl: cells that a particle may cross in one step; J: smallest and largest volume ratio (a law
+    that recovers from inversion may go below the smallest); growth: mechanical energy that may
+    appear from nothing, relative to the energy that was available.
     """
 
     cfl: float = 1.0
@@ -44,18 +46,23 @@ class Account:
     noise: float
 
     def allowed(self, now, growth):
-        """Largest energy still credible: the start's, plus `growth` times what could have become motion by now,
-        namely the start's kinetic and elastic energy and the height lost since."""
+        """Largest energy still credible: the start's, plus `growth` times what could have become
+        motion by now, namely the start's kinetic and elastic energy and the height lost since.
+        """
         released = max(self.start.gravity - now.gravity, 0.0)
-        return self.start.sum + growth * (self.start.kinetic + self.start.elastic + released) + self.noise
+        available = self.start.kinetic + self.start.elastic + released
+        return self.start.sum + growth * available + self.noise
 
 
 def account(problem, bodies):
-    """`Account` of a run's first state; None where moving conditions put in energy that it could not know."""
+    """`Account` of a run's first state; None where moving conditions put in energy that it could
+    not know.
+    """
     if getattr(problem.conditions, "moves", False):
         return None
-    weight = sum(float(b.particles.m.sum()) for b in bodies) * float(np.linalg.norm(problem.gravity))
-    return Account(energy(bodies, problem.gravity, problem.inertia), noise=1e-6 * weight * problem.dx + 1e-300)
+    mass = sum(float(b.particles.m.sum()) for b in bodies)
+    noise = 1e-6 * mass * float(np.linalg.norm(problem.gravity)) * problem.dx
+    return Account(energy(bodies, problem.gravity, problem.inertia), noise + 1e-300)
 
 
 def speed(particles):

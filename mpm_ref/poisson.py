@@ -15,7 +15,7 @@ from .core.tensor import dot, lin, put_vec, vec
 
 ATTEMPTS = 30               # darts around a point before it is given up [Bridson2007]
 PAD = 2                     # cells on each side of the box, so that no neighbour is out of range
-MAX_CELLS = 500_000_000     # of the background, 4 bytes each
+MAX_CELLS = 100_000_000     # of the background, 4 bytes each
 
 
 class Background(NamedTuple):
@@ -66,8 +66,8 @@ def _near(d):
 
 
 def _most_points(back):
-    """One per cell that meets the box."""
-    return int(np.prod(np.floor(back.span / back.edge) + 1))
+    """No packing of balls of diameter r is denser than sqrt(2)/r^3 points per volume in 3D, 2/sqrt(3)/r^2 in 2D."""
+    return int(sqrt(2.0) * np.prod(back.span / back.r + 1.0)) + 1
 
 
 @kernel

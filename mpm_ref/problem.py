@@ -13,8 +13,9 @@ from .monitor import Limits
 class Clock:
     """When a run steps, shows a frame and ends.
 
-    dt [s] fixed, or None: then `cfl` times the stable time step (see `timestep`). It ends after `steps` steps or at
-    time `end` [s], whichever is given; frames every `every` steps, or every `interval` seconds.
+    dt [s] fixed, or None: then `cfl` times the stable time step (see `timestep`). It ends after
+    `steps` steps or at time `end` [s], whichever is given; frames every `every` steps, or every
+    `interval` seconds.
     """
 
     dt: float | None = None
@@ -28,7 +29,7 @@ class Clock:
         if (self.steps is None) == (self.end is None):
             raise ValueError(f"steps = {self.steps}, end = {self.end}: give one of the two")
         if self.every is not None and self.interval is not None:
-            raise ValueError(f"every = {self.every}, interval = {self.interval}: give at most one of the two")
+            raise ValueError(f"every = {self.every}, interval = {self.interval}: give at most one")
         if self.dt is not None and not (np.isfinite(self.dt) and self.dt > 0.0):
             raise ValueError(f"dt = {self.dt}: expected a positive number of seconds")
 
@@ -43,7 +44,7 @@ class Problem:
     gravity: np.ndarray                 # (d,) acceleration [m/s^2]
     scheme: Scheme = field(default_factory=Scheme)
     conditions: object = None           # with apply(grid, t, dt); see core.boundary
-    clip: tuple | None = None           # (low, high), each (d,): particles are kept inside this box (NCLaw)
+    clip: tuple | None = None           # (low, high), (d,) each: box that keeps the particles
     limits: Limits = field(default_factory=Limits)
     allow_unstable: bool = False        # run on although dt is past its bound
     title: str = ""
@@ -51,7 +52,9 @@ class Problem:
 
     @property
     def inertia(self):
-        """D = dx^2 (degree + 1)/12 of the affine motion [m^2]; 0 where no affine field is carried."""
+        """D = dx^2 (degree + 1)/12 of the affine motion [m^2]; 0 where no affine field is
+        carried.
+        """
         return self.dx**2 * (self.scheme.degree + 1) / 12.0 if self.scheme.affine else 0.0
 
     def may_invert(self, body):

@@ -1,7 +1,8 @@
-"""The only loop over time: it steps, checks, shows frames, and stops with an explanation when a run becomes unstable.
+"""The only loop over time: it steps, checks, shows frames, and stops with an explanation when a
+run becomes unstable.
 
-A run is resumed from a `State`, bit for bit: whatever the loop decides (dt, when to sort, when to check) is a function of
-the state alone.
+A run is resumed from a `State`, bit for bit: whatever the loop decides (dt, when to sort, when to
+check) is a function of the state alone.
 """
 
 from dataclasses import dataclass
@@ -43,8 +44,9 @@ class Frame(NamedTuple):
 def simulate(problem, state=None, on_step=None):
     """Run a problem, from its start or from a `State`, and yield a `Frame` at every frame time.
 
-    on_step(state, dt) is called after every step, when the state is whole: to save a checkpoint, show progress, or end
-    the run by raising. Raises `Unstable` (see `monitor`) and `TooLarge` (see `timestep`).
+    on_step(state, dt) is called after every step, when the state is whole: to save a checkpoint,
+    show progress, or end the run by raising. Raises `Unstable` (see `monitor`) and `TooLarge`
+    (see `timestep`).
     """
     stepper = Stepper(problem.scheme, problem.dx, problem.dim, problem.gravity, problem.conditions)
     if state is None:
@@ -99,7 +101,9 @@ def rebound(problem, stepper, state):
 
 
 def next_dt(clock, state):
-    """Length of the next step [s]: fixed, or such that equal steps within the bound meet the next frame or the end."""
+    """Length of the next step [s]: fixed, or such that equal steps within the bound meet the next
+    frame or the end.
+    """
     if clock.dt is not None:
         return clock.dt
     target = clock.end if clock.end is not None else inf

@@ -1,15 +1,20 @@
 """The stable time step of the explicit method: four bounds, each reported.
 
-* advective: no part of a particle's support crosses more than a cell, dt (|v_p| + |L_p| dx (degree + 1)/2) < dx;
-* elastic: no wave crosses more than a cell, dt c_p < dx, with rho0 c^2 = max_k s_k^2 d2psi/ds_k^2 at the current stretches;
-* viscous: none of the shipped laws has an explicit viscosity (Bingham flow is integrated implicitly), so it is infinite;
-* single particle: a particle's own oscillation through the nodes it reaches must not grow [BaiSchroeder2022]. With
-  omega^2 = V0_p K_p S_p / m_p, K = d2psi/(d log s)^2 under uniform dilation and the node masses m_i of the whole state,
+* advective: no part of a particle's support crosses more than a cell, dt (|v_p| + |L_p| dx
+  (degree + 1)/2) < dx;
+* elastic: no wave crosses more than a cell, dt c_p < dx, with rho0 c^2 = max_k s_k^2 d2psi/ds_k^2
+  at the current stretches;
+* viscous: none of the shipped laws has an explicit viscosity (Bingham flow is integrated
+  implicitly), so it is infinite;
+* single particle: a particle's own oscillation through the nodes it reaches must not grow
+  [BaiSchroeder2022]. With omega^2 = V0_p K_p S_p / m_p, K = d2psi/(d log s)^2 under uniform
+  dilation and the node masses m_i of the whole state,
 
       S_p = sum_i |dw_ip|^2 m_p/m_i / d,    R_p = sum_i |D^-1 w_ip r_ip|^2 m_p/m_i / d,
 
-  linear stability of the one-particle recurrence gives dt^2 V0 K/m times S, 2 S - R and R at most 2, 4 and 4 for
-  PIC and FLIP, APIC and MLS-MPM; derived in docs/timestep.md. It is the exact limit for an isolated particle.
+  linear stability of the one-particle recurrence gives dt^2 V0 K/m times S, 2 S - R and R at most
+  2, 4 and 4 for PIC and FLIP, APIC and MLS-MPM; derived in docs/timestep.md. It is the exact
+  limit for an isolated particle.
 """
 
 from math import inf, sqrt
@@ -57,7 +62,8 @@ class TimeStep(NamedTuple):
 
     def sentence(self):
         """The bounds in words."""
-        return ", ".join(f"{name.replace('_', ' ')} {value:.3g} s" for name, value in self._asdict().items())
+        terms = self._asdict().items()
+        return ", ".join(f"{name.replace('_', ' ')} {bound:.3g} s" for name, bound in terms)
 
 
 @kernel
@@ -75,7 +81,9 @@ def stretched(s, k, factor):
 
 @kernel
 def wave_modulus(s, law):
-    """max_k s_k^2 d2psi/ds_k^2 = max_k (dtau_k/dlog s_k - tau_k) [Pa]: rho0 c^2 of waves along the principal axes."""
+    """max_k s_k^2 d2psi/ds_k^2 = max_k (dtau_k/dlog s_k - tau_k) [Pa]: rho0 c^2 of waves along
+    the principal axes.
+    """
     tau = kirchhoff_hat(s, law)
     modulus = 0.0
     for k in range(len(s)):
@@ -87,7 +95,9 @@ def wave_modulus(s, law):
 
 @kernel
 def dilation_modulus(s, law):
-    """d tr(tau)/d d(log s) under s -> s (1 + h): stiffness against uniform dilation, per axis [Pa]."""
+    """d tr(tau)/d d(log s) under s -> s (1 + h): stiffness against uniform dilation, per axis
+    [Pa].
+    """
     more = kirchhoff_hat(stretched(s, -1, 1.0 + STRAIN), law)
     less = kirchhoff_hat(stretched(s, -1, 1.0 - STRAIN), law)
     return (total_of(more) - total_of(less)) / (2.0 * STRAIN * len(s))
@@ -104,7 +114,8 @@ def _solid_moduli(F, law, wave, dilation, like, bounds):
 @kernel
 def _fluid_moduli(J, law, wave, dilation, dim, bounds):
     for p in range(bounds[0], bounds[1]):
-        slope = (pressure(J[p] * (1.0 + STRAIN), law) - pressure(J[p] * (1.0 - STRAIN), law)) / (2.0 * STRAIN)
+        more, less = pressure(J[p] * (1.0 + STRAIN), law), pressure(J[p] * (1.0 - STRAIN), law)
+        slope = (more - less) / (2.0 * STRAIN)
         wave[p] = max(slope - pressure(J[p], law), 0.0)
         dilation[p] = dim * slope
 
@@ -180,7 +191,8 @@ def _body_dt(body, grid, scheme, dx):
     q = body.particles
     wave, dilation = moduli(body)
     reach = 0.5 * (scheme.degree + 1) * dx
-    fastest = np.max(np.linalg.norm(q.v, axis=1) + reach * np.sqrt(np.einsum("pab,pab->p", q.L, q.L)))
+    spread = reach * np.sqrt(np.einsum("pab,pab->p", q.L, q.L))
+    fastest = np.max(np.linalg.norm(q.v, axis=1) + spread)
     c = sqrt(max(float(np.max(wave * q.V0 / q.m)), 0.0))
     return (
         dx / float(fastest) if fastest > 0.0 else inf,
@@ -194,6 +206,7 @@ def refuse(dt, terms, step=0):
     """Raise `TooLarge` if dt is past the bound, with all terms."""
     if dt > terms.dt:
         raise TooLarge(
-            f"dt = {dt:.6g} s is past the stable time step {terms.dt:.3g} s at step {step} ({terms.sentence()}); "
+            f"dt = {dt:.6g} s is past the stable time step {terms.dt:.3g} s at step {step} "
+            f"({terms.sentence()}); "
             'take a smaller dt, or let the scene say unstable = "allow"'
         )

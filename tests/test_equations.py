@@ -60,10 +60,11 @@ def test_the_page_is_what_the_generator_writes(source, cited):
     assert page == equations.render(source, cited), "run `python -m validation.equations`"
 
 
-def test_links_in_the_documentation_lead_somewhere():
+def test_links_and_ids_in_the_documentation_lead_somewhere(source):
     pages = [*(ROOT / "docs").glob("*.md"), ROOT / "REFERENCES.md"]
-    links = {m[0] for page in pages for m in LINK.finditer(page.read_text(encoding="utf-8"))}
-    assert not [link for link in sorted(links) if not exists(ROOT, link)]
+    text = "\n".join(page.read_text(encoding="utf-8") for page in pages)
+    assert not [m[0] for m in LINK.finditer(text) if not exists(ROOT, m[0])]
+    assert {m[0] for m in ID.finditer(text)} <= {*source.entries, *source.not_ids}
 
 
 def test_the_notation_says_where_every_ruling_between_papers_enters(source):

@@ -13,17 +13,22 @@ ROOMS = {"materials", "hot", "rom", "nclaw"}
 FLOORS = (
     ("core.jit",),
     ("core.tensor",),
-    ("core.law", "core.spectral", "core.spline"),
+    ("core.law", "core.spectral", "core.spline", "core.solids"),
     ("core.stencil", "core.state"),
     ("core.order",),
-    ("core.grid", "core.transfer", "core.deform", "core.levelset"),
+    ("core.grid", "core.transfer", "core.deform", "core.primitives"),
+    ("core.levelset",),
     ("core.boundary",),
     ("core",),
     ("materials",),
     ("body",),
-    ("explicit", "adjoint"),
+    ("explicit", "adjoint", "energy"),
+    ("timestep", "monitor"),
     ("hot", "rom", "nclaw"),
-    ("shapes", "sampling"),
+    ("poisson", "mesh"),
+    ("shapes",),
+    ("sampling",),
+    ("problem",),
     ("scene",),
     ("store",),
     ("simulate",),
@@ -107,7 +112,7 @@ def allowed(name, below):
     here, there = floor(name), floor(below)
     if here is None or there is None:
         return False
-    return there[0] < here[0] or (here == there and here[1] in ROOMS)
+    return there[0] < here[0] or here == there
 
 
 def cycle(graph):
@@ -144,7 +149,7 @@ def test_every_module_has_a_floor():
 
 
 def test_imports_go_down():
-    found = list(violations(ROOT))
+    found = sorted(set(violations(ROOT)))
     assert not found, "\n".join(found)
 
 
@@ -178,6 +183,8 @@ def toy(tmp_path, **files):
     ({"core/spline": "from .spectral import svd", "core/spectral": ""}, "core.spline imports"),
     ({"hot": "import mpm_ref.rom", "rom": ""}, "hot imports rom"),
     ({"hot": "from . import rom", "rom": ""}, "hot imports rom"),
+    ({"hot/__init__": "from ..rom import x", "rom": ""}, "hot imports rom"),
+    ({"hot/newton": "from ..rom import x", "rom": ""}, "hot.newton imports rom"),
     ({"explicit": "import torch"}, "explicit imports torch"),
     ({"explicit": "import validation.run"}, "explicit imports validation"),
     ({"explicit": "def f():\n    import scipy.sparse"}, "inside a function"),

@@ -132,9 +132,9 @@ def test_table_of_an_earlier_run_goes(tmp_path):
 
     for name in ("toy.old", "toy.other.old"):
         (tmp_path / f"verification.{name}.csv").write_text("x\n1\n")
-    run(tmp_path, toy)
-    assert {f.name for f in tmp_path.glob("*.csv")} \
-        == {"verification.toy.new.csv", "verification.toy.other.old.csv"}
+    results = run(tmp_path, toy)[1]
+    assert results.tables("verification.toy") == ["new"]
+    assert results.tables("verification.toy.other") == ["old"]
 
 
 @pytest.mark.parametrize(("name", "rows", "said"), [

@@ -1,7 +1,7 @@
 """Grid storage that covers the matter and moves with it, and the momentum update of its nodes.
 
-The grid is the smallest box of nodes, aligned to whole slabs, that the particles reach. A domain box is a boundary
-condition (see `boundary`), not an array bound.
+The grid is the smallest box of nodes, aligned to whole slabs, that the particles reach. A domain
+box is a boundary condition (see `boundary`), not an array bound.
 """
 
 import numpy as np
@@ -36,7 +36,9 @@ def _extents(x, low, high, bad):
 
 
 def extent(x):
-    """Smallest and largest coordinates of points x (N, d). Raises OutOfRange for a point that is not finite."""
+    """Smallest and largest coordinates of points x (N, d). Raises OutOfRange for a point that is
+    not finite.
+    """
     d = x.shape[1]
     low, high = np.full((CHUNKS, d), np.inf), np.full((CHUNKS, d), -np.inf)
     bad = np.full((CHUNKS, 1), -1)
@@ -79,8 +81,8 @@ class Store:
         nodes = np.prod((high - low) / self.dx + len(self.stencil))
         if nodes > MAX_NODES or max(-low.min(), high.max()) / self.dx > 2.0**50:
             raise OutOfRange(
-                f"particles from {low} to {high} need {nodes:.1e} grid nodes of spacing {self.dx}, at most "
-                f"{MAX_NODES:.0e} are allowed; has a particle flown off, or is dx too small?"
+                f"particles from {low} to {high} need {nodes:.1e} grid nodes of spacing {self.dx}, "
+                f"at most {MAX_NODES:.0e} are allowed; has a particle flown off, is dx too small?"
             )
         return low, high
 
@@ -95,59 +97,67 @@ class Store:
 
 
 @kernel
-def _update(m, v, push, eps, bounds):
+def _update(nodes, gravity, dt, eps, bounds):
     for i in range(bounds[0], bounds[1]):
-        if m[i] > 0.0:
-            for a in range(v.shape[1]):
-                v[i, a] = v[i, a] / (m[i] + eps) + push[a]
+        if nodes.m[i] > 0.0:
+            for a in range(len(gravity)):
+                nodes.v[i, a] = nodes.v[i, a] / (nodes.m[i] + eps) + dt * gravity[a]
 
 
 @kernel
-def _update_empty(m, v, push, bounds):
+def _update_apart(nodes, gravity, dt, bounds):
     for i in range(bounds[0], bounds[1]):
-        if not m[i] > 0.0:
-            v[i] = push
+        if nodes.m[i] > 0.0:
+            for a in range(len(gravity)):
+                nodes.v_old[i, a] = nodes.v[i, a] / nodes.m[i]
+                nodes.v[i, a] = nodes.v_old[i, a] + dt * (nodes.f[i, a] / nodes.m[i] + gravity[a])
 
 
 @kernel
-def _update_apart(m, v, f, v_old, push, dt, bounds):
+def _update_empty(nodes, gravity, dt, bounds):
     for i in range(bounds[0], bounds[1]):
-        if m[i] > 0.0:
-            for a in range(v.shape[1]):
-                v_old[i, a] = v[i, a] / m[i]
-                v[i, a] = v_old[i, a] + dt * f[i, a] / m[i] + push[a]
+        if not nodes.m[i] > 0.0:
+            for a in range(len(gravity)):
+                nodes.v[i, a] = dt * gravity[a]
 
 
 @parallel
-def _update_all(m, v, push, eps):
+def _update_all(nodes, gravity, dt, eps):
     for c in prange(CHUNKS):
-        _update(m, v, push, eps, chunk(c, len(m)))
+        _update(nodes, gravity, dt, eps, chunk(c, len(nodes.m)))
 
 
 @parallel
-def _update_all_apart(m, v, f, v_old, push, dt):
+def _update_all_apart(nodes, gravity, dt):
     for c in prange(CHUNKS):
-        _update_apart(m, v, f, v_old, push, dt, chunk(c, len(m)))
+        _update_apart(nodes, gravity, dt, chunk(c, len(nodes.m)))
 
 
 @parallel
-def _update_all_empty(m, v, push):
+def _update_all_empty(nodes, gravity, dt):
     for c in prange(CHUNKS):
-        _update_empty(m, v, push, chunk(c, len(m)))
+        _update_empty(nodes, gravity, dt, chunk(c, len(nodes.m)))
+
+
+def flattened(grid):
+                acceleration = nodes.f[i, a] / nodes.m[i] + gravity[a]
+                nodes.v[i, a] = nodes.v_old[i, a] + dt * acceleration
+    d = grid.m.ndim
+    f, v_old = (a if a.ndim == 1 else a.reshape(-1, d) for a in (grid.f, grid.v_old))
+    return Grid(grid.m.reshape(-1), grid.v.reshape(-1, d), f, v_old, grid.origin, grid.dx)
 
 
 def update(grid, gravity, dt, eps=0.0, on_empty=False):
     """Momentum to velocity: v_i = (m_i v_i + dt f_i)/(m_i + eps) + dt g on nodes that have mass.
 
-    gravity is an acceleration (d,) [m/s^2]; eps [kg] regularises the mass and `on_empty` gives empty nodes the velocity
-    dt g, both as in the release of NCLAW. Where the grid carries forces apart (FLIP), v_old is kept too.
+    gravity is an acceleration (d,) [m/s^2]; eps [kg] regularises the mass and `on_empty` gives
+    empty nodes the velocity dt g, both as in the release of NCLAW. Where the grid carries forces
+    apart (FLIP), v_old is kept too.
     """
-    d = grid.v.shape[-1]
-    m, v = grid.m.reshape(-1), grid.v.reshape(-1, d)
-    push = dt * np.asarray(gravity, dtype=float)
+    nodes, gravity = flattened(grid), np.asarray(gravity, dtype=float)
     if grid.f.ndim > 1:
-        _update_all_apart(m, v, grid.f.reshape(-1, d), grid.v_old.reshape(-1, d), push, dt)
+        _update_all_apart(nodes, gravity, dt)
     else:
-        _update_all(m, v, push, eps)
+        _update_all(nodes, gravity, dt, eps)
     if on_empty:
-        _update_all_empty(m, v, push)
+        _update_all_empty(nodes, gravity, dt)

@@ -1,17 +1,19 @@
-"""The only place where Numba is configured: two decorators, one dispatch, one cache, one thread pool.
+"""The only place where Numba is configured: two decorators, one dispatch, one cache, one thread
+pool.
 
 Every option and its reason:
 
-* ``error_model="numpy"``: 1/0 gives inf both in serial and in parallel code; Numba's default raises in
-  serial code only, so that the same kernel would behave differently.
-* ``fastmath`` off: kernels equal their plain twins to round-off, NaN stays visible, and the bits do not
-  depend on the width of the machine's vector registers.
-* ``SLP_VECTORIZE`` on: the compiler may use vector registers for the d components of a node. It reorders no
-  sum, hence changes no bit, and makes particle-to-grid transfer 1.3 times faster.
-* ``cache=True`` in a folder named by the hash of every file that holds kernels. Numba looks only at the file
-  of the cached function: after an edit of a *callee in another file* it would silently run the old code.
-* The threading layer is pinned (OpenMP where present, else Numba's own work queue): Numba's default changes
-  when another package installs TBB. The bits of our results do not depend on it.
+* ``error_model="numpy"``: 1/0 gives inf both in serial and in parallel code; Numba's default
+  raises in serial code only, so that the same kernel would behave differently.
+* ``fastmath`` off: kernels equal their plain twins to round-off, NaN stays visible, and the bits
+  do not depend on the width of the machine's vector registers.
+* ``SLP_VECTORIZE`` on: the compiler may use vector registers for the d components of a node. It
+  reorders no sum, hence changes no bit, and makes particle-to-grid transfer 1.3 times faster.
+* ``cache=True`` in a folder named by the hash of every file that holds kernels. Numba looks only
+  at the file of the cached function: after an edit of a *callee in another file* it would
+  silently run the old code.
+* The threading layer is pinned (OpenMP where present, else Numba's own work queue): Numba's
+  default changes when another package installs TBB. The bits of our results do not depend on it.
 * Parallel loops run over a fixed number of chunks, never over "one chunk per thread": a result is a
   function of the input alone. See `chunk` and `total`.
 """
@@ -59,8 +61,8 @@ def _cache_dir():
     try:
         here.mkdir(parents=True, exist_ok=True)
         os.utime(here)
-        versions = sorted((d for d in root.iterdir() if d.is_dir()), key=lambda d: d.stat().st_mtime)
-        for old in versions[:-KEPT_CACHES]:
+        versions = [d for d in root.iterdir() if d.is_dir()]
+        for old in sorted(versions, key=lambda d: d.stat().st_mtime)[:-KEPT_CACHES]:
             shutil.rmtree(old, ignore_errors=True)
     except OSError:
         return ""          # Numba then falls back to a folder of its own, or compiles anew
@@ -88,8 +90,9 @@ def kernel(function):
 def parallel(function):
     """Compile a driver: a `prange` over chunks that calls a serial traversal.
 
-    Only the driver is compiled with ``parallel=True``: the loop's body stays an ordinary kernel, which
-    compiles faster and can be run with ``NUMBA_BOUNDSCHECK=1`` (not honoured in parallel code).
+    Only the driver is compiled with ``parallel=True``: the loop's body stays an ordinary kernel,
+    which compiles faster and can be run with ``NUMBA_BOUNDSCHECK=1`` (not honoured in parallel
+    code).
     """
     with _our_cache():
         return njit(parallel=True, **_OPTIONS)(function)
@@ -99,9 +102,9 @@ def by_type(name, position=-1):
     """A function `name(*arguments)` that calls the method registered for one argument's type.
 
     The type is that of ``arguments[position]``, a NamedTuple class; methods are added with
-    ``f.method(Class, kernel)``. Compiled callers resolve the method when they are compiled, so that it is
-    inlined; and they are still cached on disk, which they are not when handed a kernel as an argument.
-    Raises TypeError for a type without a method.
+    ``f.method(Class, kernel)``. Compiled callers resolve the method when they are compiled, so
+    that it is inlined; and they are still cached on disk, which they are not when handed a kernel
+    as an argument. Raises TypeError for a type without a method.
     """
     methods = {}
 

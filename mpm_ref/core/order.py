@@ -1,8 +1,10 @@
-"""Order of particles for a scatter that is parallel and yet gives the same bits for any number of threads.
+"""Order of particles for a scatter that is parallel and yet gives the same bits for any number of
+threads.
 
-The box of cells is cut along the first axis into slabs of `WIDTH` cells. A particle whose base cell is in a slab writes
-nodes of that slab and at most degree <= 3 beyond, so slabs of the same colour (every other one) share no node.
-Within a slab the particles keep their order. A physical sort by cell, now and then, keeps memory access local.
+The box of cells is cut along the first axis into slabs of `WIDTH` cells. A particle whose base
+cell is in a slab writes nodes of that slab and at most degree <= 3 beyond, so slabs of the same
+colour (every other one) share no node. Within a slab the particles keep their order. A physical
+sort by cell, now and then, keeps memory access local.
 """
 
 from typing import NamedTuple

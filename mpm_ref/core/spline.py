@@ -1,7 +1,7 @@
 """B-splines of degree 1, 2, 3 on a grid of spacing dx, and the nodes they reach.
 
-The degree is the length of `stencil` minus one: (0, 1), (0, 1, 2), (0, 1, 2, 3) are the offsets of the nodes
-that a point reaches from its base node, per axis.
+The degree is the length of `stencil` minus one: (0, 1), (0, 1, 2), (0, 1, 2, 3) are the offsets
+of the nodes that a point reaches from its base node, per axis.
 """
 
 from math import floor
@@ -19,7 +19,9 @@ def base_of(x, dx, stencil):
 
 @kernel
 def weights(f, stencil):
-    """N(f - k) for the nodes k = 0 .. degree of one axis; f = x/dx - base in [(degree-1)/2, (degree+1)/2)."""
+    """N(f - k) for the nodes k = 0 .. degree of one axis; f = x/dx - base in [(degree-1)/2,
+    (degree+1)/2).
+    """
     if len(stencil) == 2:
         return 1.0 - f, f
     elif len(stencil) == 3:

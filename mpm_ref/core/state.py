@@ -1,12 +1,14 @@
 """Structures of arrays: what a particle carries, and what a grid node carries.
 
-A field that a scene does not need has another number of dimensions, which kernels read at compile time:
+A field that a scene does not need has another number of dimensions, which kernels read at compile
+time:
 
 * `C` of shape (0,): the transfer keeps no affine field (PIC, FLIP).
 * `F` of shape (N,): only J = det F is carried, and `tau` of shape (N,) is isotropic (a fluid).
 * `b` of shape (0,): no body force that differs between particles.
 * `y` of shape (0, 0): the return map has no memory.
-* `f`, `v_old` of shape (0,): the grid needs no forces apart from momenta, nor its velocity before forces.
+* `f`, `v_old` of shape (0,): the grid needs no forces apart from momenta, nor its velocity before
+  forces.
 """
 
 from typing import NamedTuple
@@ -18,18 +20,20 @@ from .tensor import fill, identity, mat, mlin, vec
 
 
 class Particles(NamedTuple):
-    """Everything carried from step to step; N particles in d dimensions, C-contiguous, index first."""
+    """Everything carried from step to step; N particles in d dimensions, C-contiguous, index
+    first.
+    """
 
-    x: np.ndarray     # (N, d)     position [m]
-    v: np.ndarray     # (N, d)     velocity [m/s]
-    C: np.ndarray     # (N, d, d)  affine velocity field [1/s], or (0,)
-    L: np.ndarray     # (N, d, d)  velocity gradient of the last step [1/s]; MLS: the same array as C
-    F: np.ndarray     # (N, d, d)  elastic deformation gradient, or (N,) its determinant
-    tau: np.ndarray   # (N, d, d)  Kirchhoff stress [Pa], or (N,) its isotropic value; derived from F
-    m: np.ndarray     # (N,)       mass [kg]
-    V0: np.ndarray    # (N,)       volume at rest [m^d]
-    y: np.ndarray     # (N,)       yield stress [Pa] where the return map changes it, or (0, 0)
-    b: np.ndarray     # (N, d)     body force per mass [m/s^2] where it differs, or (0,)
+    x: np.ndarray       # (N, d)     position [m]
+    v: np.ndarray       # (N, d)     velocity [m/s]
+    C: np.ndarray       # (N, d, d)  affine velocity field [1/s], or (0,)
+    L: np.ndarray       # (N, d, d)  velocity gradient [1/s]; MLS: the same array as C
+    F: np.ndarray       # (N, d, d)  elastic deformation gradient, or (N,) its determinant
+    tau: np.ndarray     # (N, d, d)  Kirchhoff stress [Pa], or (N,) if isotropic; from F
+    m: np.ndarray       # (N,)       mass [kg]
+    V0: np.ndarray      # (N,)       volume at rest [m^d]
+    y: np.ndarray       # (N,)       yield stress [Pa] if the return map changes it, or (0, 0)
+    b: np.ndarray       # (N, d)     body force per mass [m/s^2] where it differs, or (0,)
 
 
 class Grid(NamedTuple):
@@ -39,7 +43,7 @@ class Grid(NamedTuple):
     """
 
     m: np.ndarray       # (n1, .., nd)     mass [kg]
-    v: np.ndarray       # (n1, .., nd, d)  momentum [kg m/s] after P2G, velocity [m/s] after the update
+    v: np.ndarray       # (n1, .., nd, d)  momentum [kg m/s], after the update velocity [m/s]
     f: np.ndarray       # (n1, .., nd, d)  force [N], or (0,): forces join the momentum at once
     v_old: np.ndarray   # (n1, .., nd, d)  velocity before forces [m/s] (FLIP), or (0,)
     origin: np.ndarray  # (d,)             index of the first node, integer

@@ -1,7 +1,9 @@
-"""The nodes around a point: which they are, their weights, and how to reach them, in 2D and 3D from one text.
+"""The nodes around a point: which they are, their weights, and how to reach them, in 2D and 3D
+from one text.
 
-A stencil is walked column by column: a column is a run of nodes along the last axis. Node (k, l) of the stencil has
-offset k on all axes but the last (k is padded by 0 to d entries) and l on the last.
+A stencil is walked column by column: a column is a run of nodes along the last axis. Node (k, l)
+of the stencil has offset k on all axes but the last (k is padded by 0 to d entries) and l on the
+last.
 """
 
 from .jit import kernel
@@ -10,7 +12,9 @@ from .spline import base_of, slopes, weights
 
 @kernel
 def locate(x, grid, stencil):
-    """Base node of the point x, counted from the grid's first, and its offset s = x/dx - base [cells]."""
+    """Base node of the point x, counted from the grid's first, and its offset s = x/dx - base
+    [cells].
+    """
     dx, o = grid.dx, grid.origin
     if len(x) == 2:
         i, j = base_of(x[0], dx, stencil), base_of(x[1], dx, stencil)
@@ -98,7 +102,9 @@ def node(base, k, l):
 
 @kernel
 def inverse_inertia(dx, stencil):
-    """D^-1 of sum_i w_ip r_ip r_ip^T = dx^2 (degree + 1)/12 I [1/m^2]; degrees 2 and 3 only (NSF-alg-mpm)."""
+    """D^-1 of sum_i w_ip r_ip r_ip^T = dx^2 (degree + 1)/12 I [1/m^2]; degrees 2 and 3 only
+    (NSF-alg-mpm).
+    """
     return 12.0 / (len(stencil) * dx**2)
 
 

@@ -1,8 +1,8 @@
 """Vectors and matrices of two or three dimensions as nested tuples: one source for 2D and 3D.
 
-A vector is `(a0, a1[, a2])`, a matrix a tuple of its rows. The dimension is the length of the tuple, hence
-known when a kernel is compiled: `len(argument)` is settled before typing, and the untaken branch costs nothing.
-Arguments named `like` only lend their length.
+A vector is `(a0, a1[, a2])`, a matrix a tuple of its rows. The dimension is the length of the
+tuple, hence known when a kernel is compiled: `len(argument)` is settled before typing, and the
+untaken branch costs nothing. Arguments named `like` only lend their length.
 """
 
 from math import sqrt

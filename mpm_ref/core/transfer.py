@@ -1,14 +1,17 @@
-"""Particle to grid and back: PIC, FLIP, APIC and MLS-MPM, for B-splines of degree 1, 2, 3, in 2D and 3D.
+"""Particle to grid and back: PIC, FLIP, APIC and MLS-MPM, for B-splines of degree 1, 2, 3, in 2D
+and 3D.
 
-i is a node, p a particle, ip a pair: w_ip = N((x_p - x_i)/dx), dw_ip = dw_ip/dx_p, r_ip = x_i - x_p. The sums of
-NSF-alg-mpm, LDM-alg1 and NCLAW-alg3 are special cases. There are two forms of force and velocity gradient:
+i is a node, p a particle, ip a pair: w_ip = N((x_p - x_i)/dx), dw_ip = dw_ip/dx_p, r_ip = x_i -
+x_p. The sums of NSF-alg-mpm, LDM-alg1 and NCLAW-alg3 are special cases. There are two forms of
+force and velocity gradient:
 
     gradient form   f_i = -sum_p V0_p tau_p dw_ip                   L_p = sum_i v_i dw_ip^T
-    MLS form        f_i = -sum_p V0_p tau_p D^-1 w_ip r_ip          L_p = C_p = sum_i w_ip v_i r_ip^T D^-1
+    MLS form        f_i = -sum_p V0_p tau_p D^-1 w_ip r_ip          L_p = C_p = sum_i w_ip v_i
+    r_ip^T D^-1
 
-with D = sum_i w_ip r_ip r_ip^T = dx^2 (degree + 1)/12 I, for degrees 2 and 3 only. `scatter*` and `gather*` are the
-loops over particles; `p2g` and `g2p` run them in parallel. Which fields the particles and the grid carry (see
-`state`) selects the transfer, when the kernel is compiled.
+with D = sum_i w_ip r_ip r_ip^T = dx^2 (degree + 1)/12 I, for degrees 2 and 3 only. `scatter*` and
+`gather*` are the loops over particles; `p2g` and `g2p` run them in parallel. Which fields the
+particles and the grid carry (see `state`) selects the transfer, when the kernel is compiled.
 """
 
 from .jit import CHUNKS, chunk, kernel, parallel, prange
@@ -209,8 +212,8 @@ def rpic(C, damping):
 def p2g(particles, grid, stencil, dt, slabs, mls):
     """Add mass and momentum of all particles to a zeroed grid; see `scatter` and `scatter_mls`.
 
-    Slabs of one colour are far enough apart to share no node, so they run in parallel; within a slab particles
-    come in a fixed order. Hence the same bits for any number of threads.
+    Slabs of one colour are far enough apart to share no node, so they run in parallel; within a
+    slab particles come in a fixed order. Hence the same bits for any number of threads.
     """
     run = _scatter_mls_color if mls else _scatter_color
     for color in (0, 1):
@@ -218,7 +221,9 @@ def p2g(particles, grid, stencil, dt, slabs, mls):
 
 
 def g2p(particles, grid, stencil, dt, flip, mls):
-    """New velocity, position and velocity gradient of all particles; see `gather` and `gather_mls`."""
+    """New velocity, position and velocity gradient of all particles; see `gather` and
+    `gather_mls`.
+    """
     if mls:
         _gather_mls(particles, grid, stencil, dt)
     else:

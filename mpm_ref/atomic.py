@@ -1,0 +1,72 @@
+"""Files that are whole or not there: written beside their place, synced, then moved into it."""
+
+import os
+import shutil
+from contextlib import contextmanager
+from pathlib import Path
+
+MARGIN = 1 << 20     # bytes left free beyond what a file needs, for the file system's own records
+
+
+class NotWritten(OSError):
+    """A file could not be written; what stood in its place before still stands."""
+
+
+@contextmanager
+def replacing(path):
+    """Yield the path of a file to write; it takes the place of `path` when the block ends well.
+
+    Whoever reads `path`, and whatever kills the process, finds the old file or the new one. The
+    file to write lies in the same folder, since only within a file system is the move atomic.
+    Raises `NotWritten` where the system refuses.
+    """
+    path = Path(path)
+    part = path.with_name(f".{path.name}.part")
+    try:
+        yield part
+        sync(part)
+        os.replace(part, path)
+        sync(path.parent)
+    except NotWritten:
+        raise
+    except OSError as e:
+        raise not_written(path, e) from e
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def sync(path):
+    """Have the system put a file, or a folder's list of names, on the disk itself."""
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def require_space(path, size):
+    """Raise `NotWritten` unless the file system that holds `path` has `size` bytes free."""
+    folder = Path(path).resolve().parent
+    if not folder.is_dir():
+        raise NotWritten(f"{path}: there is no folder {folder}; create it or name another file")
+    free = shutil.disk_usage(folder).free
+    if free < size + MARGIN:
+        raise NotWritten(
+            f"{path}: {in_words(size)} needed, {in_words(free)} free in {folder}; "
+            "free some space or name a file on another disk"
+        )
+
+
+def not_written(path, error):
+    """`NotWritten` for an error of the system."""
+    return NotWritten(f"{path} could not be written: {error.strerror or error}; "
+                      "is the disk full, or the folder read-only?")
+
+
+def in_words(size):
+    """A number of bytes for people: 1.5 GB."""
+    for unit in ("B", "kB", "MB", "GB"):
+        if size < 1000.0:
+            return f"{size:.3g} {unit}"
+        size /= 1000.0
+    return f"{size:.3g} TB"

@@ -1,0 +1,153 @@
+"""One step of explicit MPM, from the functions of `transfer`, `laws`, `flows` and `walls`.
+
+    tau(F) given -> p2g -> velocity -> boundaries -> g2p -> F trial -> return map -> stress
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from . import transfer
+from .flows import intact, project
+from .laws import energy, kirchhoff
+from .spline import Pairs, pairs
+from .tensors import det
+
+
+class Matter(NamedTuple):
+    """Particles of one material. C, y, b are None where they are not carried; F, tau (N,) in a fluid."""
+
+    x: np.ndarray
+    v: np.ndarray
+    C: np.ndarray | None
+    F: np.ndarray
+    tau: np.ndarray
+    m: np.ndarray
+    V0: np.ndarray
+    y: np.ndarray | None
+    b: np.ndarray | None
+    law: tuple
+    flow: tuple
+
+
+class Method(NamedTuple):
+    """Discretisation: spacing [m], degree of the spline, transfer, and its options as in `explicit.Scheme`."""
+
+    dx: float
+    degree: int
+    transfer: str
+    flip: float = 1
+    rpic: float = 0
+    mass_eps: float = 0
+
+    @property
+    def D(self):
+        """Moment of the weights [m^2]."""
+        return transfer.moment(self.dx, self.degree)
+
+
+class Nodes(NamedTuple):
+    """What the grid holds in one step, as arrays over `box`."""
+
+    box: transfer.Box
+    m: np.ndarray
+    mv: np.ndarray
+    f: np.ndarray
+    v_free: np.ndarray     # velocity before boundary conditions
+    v: np.ndarray          # and after
+
+
+class Moved(NamedTuple):
+    """What one body's particles get in one step."""
+
+    ip: Pairs
+    v: np.ndarray
+    x: np.ndarray
+    C: np.ndarray | None
+    L: np.ndarray
+    F_trial: np.ndarray
+    F: np.ndarray
+    y: np.ndarray | None
+    tau: np.ndarray
+
+
+def step(bodies, method, gravity, dt, conditions=None):
+    """One step of length dt [s] of a list of `Matter`: returns its `Nodes` and one `Moved` per body.
+
+    gravity is (d,) [m/s^2]; conditions(v, m, box) returns the velocities that satisfy the boundary conditions.
+    """
+    clouds = [pairs(q.x, method.dx, method.degree) for q in bodies]
+    grid = to_grid(bodies, clouds, method, gravity, dt)
+    if conditions is not None:
+        grid = grid._replace(v=conditions(grid.v_free, grid.m, grid.box))
+    return grid, [to_particles(q, ip, grid, method, dt) for q, ip in zip(bodies, clouds)]
+
+
+def to_grid(bodies, clouds, method, gravity, dt):
+    """Mass, momentum and force of all bodies, and the velocity they give the nodes."""
+    box = transfer.box_of(*clouds)
+    both = list(zip(bodies, clouds))
+    m = sum(transfer.mass(q.m, ip, box) for q, ip in both)
+    mv = sum(transfer.momentum(q.m, q.v, q.C, ip, box) for q, ip in both)
+    f = sum(force(q, ip, method, box) for q, ip in both)
+    v = transfer.grid_velocity(m, mv, f, gravity, dt, method.mass_eps)
+    return Nodes(box, m, mv, f, v, v)
+
+
+def force(q, ip, method, box):
+    """Internal and body forces of one body on the nodes."""
+    tau = isotropic(q.tau, q.x.shape[1]) if q.tau.ndim == 1 else q.tau
+    if method.transfer == "mls":
+        f = transfer.internal_force_mls(q.V0, tau, method.D, ip, box)
+    else:
+        f = transfer.internal_force(q.V0, tau, ip, box)
+    return f if q.b is None else f + transfer.body_force(q.m, q.b, ip, box)
+
+
+def isotropic(s, d):
+    """s I (N, d, d)."""
+    return s[:, None, None] * np.eye(d, dtype=s.dtype)
+
+
+def to_particles(q, ip, grid, method, dt):
+    """New velocity, position, affine field and deformation of one body."""
+    v = transfer.velocity(grid.v, ip, grid.box)
+    x = q.x + dt * v
+    C = L = transfer.velocity_gradient(grid.v, ip, grid.box)
+    if method.transfer in ("apic", "mls"):
+        C = transfer.rpic(transfer.affine(grid.v, method.D, ip, grid.box), method.rpic)
+    if method.transfer == "mls":
+        L = C
+    if method.transfer == "flip":
+        m = np.where(grid.m > 0, grid.m, 1)[..., None]
+        v = transfer.flip(q.v, v, transfer.velocity(grid.mv / m, ip, grid.box), method.flip)
+    F_trial = deformed(q.F, L, dt)
+    F, y = project(F_trial, q.y, dt, q.law, q.flow)
+    return Moved(ip, v, x, None if q.C is None else C, L, F_trial, F, y, stress(F, y, q))
+
+
+def deformed(F, L, dt):
+    """F trial = (I + dt L) F (NSF-alg-mpm step 3), or its determinant det(I + dt L) J in a fluid."""
+    growth = np.eye(L.shape[1], dtype=L.dtype) + dt * L
+    return det(growth) * F if F.ndim == 1 else growth @ F
+
+
+def stress(F, y, q):
+    """tau of the law where the material is whole, 0 where it has failed."""
+    tau = kirchhoff(F, q.law)
+    return tau if q.y is None else tau * intact(y, q.flow)[:, None, None]
+
+
+def moved(q, new):
+    """The body after the step."""
+    return q._replace(x=new.x, v=new.v, C=new.C, F=new.F, y=new.y, tau=new.tau)
+
+
+def energies(q, method, gravity):
+    """Kinetic, elastic and gravitational energy of one body [J], as an array (3,)."""
+    kinetic = (q.m * (q.v**2).sum(axis=1)).sum() / 2
+    if q.C is not None:
+        kinetic = kinetic + method.D * (q.m * (q.C**2).sum(axis=(1, 2))).sum() / 2
+    psi = energy(q.F, q.law)
+    whole = 1 if q.y is None else intact(q.y, q.flow)
+    return np.stack([kinetic, (q.V0 * whole * psi).sum(), -(q.m * (q.x * gravity).sum(axis=1)).sum()])

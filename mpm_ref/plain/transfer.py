@@ -1,0 +1,107 @@
+"""Particle to grid and back, and the motion of the grid: each sum of the step is one function.
+
+i is a node, p a particle, ip a pair. Sums over particles give arrays over a `Box` of nodes.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Box(NamedTuple):
+    """A box of nodes."""
+
+    first: np.ndarray     # (d,) integer coordinates of its first node
+    shape: tuple          # number of nodes per axis
+
+
+def box_of(*clouds):
+    """Smallest box that holds the nodes of all the given `Pairs`."""
+    low = np.min([ip.node.min(axis=(0, 1)) for ip in clouds], axis=0)
+    high = np.max([ip.node.max(axis=(0, 1)) for ip in clouds], axis=0)
+    return Box(low, tuple(high - low + 1))
+
+
+def at(ip, box):
+    """Index of the nodes of all pairs in an array over a box."""
+    return tuple(np.moveaxis(ip.node - box.first, -1, 0))
+
+
+def sum_to_nodes(q, ip, box):
+    """sum_p q_ip, for a quantity q (N, S, ..) of pairs."""
+    total = np.zeros(box.shape + q.shape[2:], q.dtype)
+    np.add.at(total, at(ip, box), q)
+    return total
+
+
+def moment(dx, degree):
+    """D = sum_i w_ip r_ip r_ip^T = dx^2 (degree + 1)/12, times I, for degrees 2 and 3 (NSF-alg-mpm)."""
+    return dx * dx * (degree + 1) / 12
+
+
+# particle to grid
+
+def mass(m, ip, box):
+    """m_i = sum_p w_ip m_p [kg]."""
+    return sum_to_nodes(ip.w * m[:, None], ip, box)
+
+
+def momentum(m, v, C, ip, box):
+    """m_i v_i = sum_p w_ip m_p (v_p + C_p r_ip) [kg m/s]; C None in PIC and FLIP (NSF-alg-mpm step 1)."""
+    v_ip = v[:, None] + (0 if C is None else np.einsum("pab,psb->psa", C, ip.r))
+    return sum_to_nodes((ip.w * m[:, None])[..., None] * v_ip, ip, box)
+
+
+def internal_force(V0, tau, ip, box):
+    """f_i = -sum_p V0_p tau_p dw_ip [N] (NSF-eq6)."""
+    return sum_to_nodes(-np.einsum("p,pab,psb->psa", V0, tau, ip.dw), ip, box)
+
+
+def internal_force_mls(V0, tau, D, ip, box):
+    """f_i = -sum_p V0_p D^-1 w_ip tau_p r_ip [N] (NCLAW-mls)."""
+    return sum_to_nodes(-np.einsum("p,ps,pab,psb->psa", V0 / D, ip.w, tau, ip.r), ip, box)
+
+
+def body_force(m, b, ip, box):
+    """f_i = sum_p w_ip m_p b_p [N], b an acceleration that differs between particles."""
+    return sum_to_nodes((ip.w * m[:, None])[..., None] * b[:, None], ip, box)
+
+
+# the grid
+
+def grid_velocity(m, mv, f, gravity, dt, eps=0):
+    """v_i = (m_i v_i + dt f_i)/(m_i + eps) + dt g where there is mass, else 0 (NSF-alg-mpm step 2).
+
+    gravity is an array (d,) [m/s^2]; eps [kg] is the regularisation in the release of NCLAW.
+    """
+    full = m > 0
+    v = (mv + dt * f) / np.where(full, m + eps, 1)[..., None]
+    return np.where(full[..., None], v + dt * gravity, 0)
+
+
+# grid to particle
+
+def velocity(v_i, ip, box):
+    """v_p = sum_i w_ip v_i [m/s] (NSF-alg-mpm step 3)."""
+    return np.einsum("ps,psa->pa", ip.w, v_i[at(ip, box)])
+
+
+def velocity_gradient(v_i, ip, box):
+    """L_p = sum_i v_i dw_ip^T [1/s] (NSF-alg-mpm step 3)."""
+    return np.einsum("psa,psb->pab", v_i[at(ip, box)], ip.dw)
+
+
+def affine(v_i, D, ip, box):
+    """C_p = sum_i w_ip v_i r_ip^T D^-1 [1/s] (NSF-alg-mpm step 3)."""
+    return np.einsum("ps,psa,psb->pab", ip.w, v_i[at(ip, box)], ip.r) / D
+
+
+def flip(v, v_new, v_old, share):
+    """v_p = sum_i w_ip v_i + share (v_p - sum_i w_ip v_old_i): FLIP for share 1, PIC for 0 [FLIP]."""
+    return v_new + share * (v - v_old)
+
+
+def rpic(C, damping):
+    """(1 - damping) sym C + skew C (NSF-rpic)."""
+    T = np.swapaxes(C, 1, 2)
+    return (1 - damping) * (C + T) / 2 + (C - T) / 2

@@ -1,0 +1,222 @@
+"""Points that fill a solid, and the volume each stands for.
+
+Records describe a sampling as scene files do; `sample` carries one out. A point of the surface, to within `SKIN` of the
+solid's size, counts as inside. What each sampling is good for: docs/scenes.md.
+"""
+
+from functools import singledispatch
+from math import ceil
+from typing import Annotated, Literal, NamedTuple
+
+import numpy as np
+from msgspec import Meta, Struct
+
+from .poisson import poisson_disk
+
+Count = Annotated[int, Meta(ge=1, le=1_000_000_000)]
+PerCell = Annotated[int, Meta(ge=1, le=64)]
+Length = Annotated[float, Meta(ge=1e-12, le=1e12)]
+Share = Annotated[float, Meta(ge=0, le=1)]
+
+MOST_POINTS = 50_000_000        # candidates that a lattice may have
+FILL = 0.87                     # of per_cell^d points per cell, by Poisson-disk sampling (LDM-tab2-sampling)
+PACKING = {2: 0.62, 3: 0.59}    # N r^d / volume of `poisson_disk` in a large box: a first guess only
+SURPLUS = 0.01                  # of the points that may be left out to hit a number exactly
+TRIALS = 12                     # of radii, per number of points asked for
+
+
+class Points(NamedTuple):
+    """Sampled points and their volumes at rest."""
+
+    x: np.ndarray       # (N, d) position [m]
+    V0: np.ndarray      # (N,)   volume [m^d]
+
+
+class Sampling(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="type"):
+    """What every sampling has."""
+
+
+class Regular(Sampling, tag="regular"):
+    """per_cell^d points in every grid cell, at the centres of its equal sub-cells."""
+
+    per_cell: PerCell = 2
+    volume: Literal["shape", "cell"] = "shape"
+
+
+class Jittered(Sampling, tag="jittered"):
+    """As `Regular`, each point moved at random by up to `amplitude` / 2 of its sub-cell along each axis."""
+
+    per_cell: PerCell = 2
+    amplitude: Share = 1.0
+    seed: Annotated[int, Meta(ge=0)] | None = None
+    volume: Literal["shape", "cell"] = "shape"
+
+
+class Lattice(Sampling, tag="lattice"):
+    """A lattice fixed to the solid's bounding box: `counts` points per axis, or points `spacing` [m] apart.
+
+    With `faces` the outermost of `counts` points lie on the faces of the box, as in numpy.linspace; otherwise half
+    a step inside.
+    """
+
+    counts: tuple[Count, ...] | None = None
+    spacing: Length | None = None
+    faces: bool = False
+    volume: Literal["shape", "cell"] = "shape"
+
+    def __post_init__(self):
+        if (self.counts is None) == (self.spacing is None):
+            raise ValueError("a lattice needs `counts` or `spacing`, one of the two")
+        if self.faces and (self.counts is None or min(self.counts) < 2):
+            raise ValueError("`faces` needs `counts` of at least 2 along every axis")
+
+
+class Poisson(Sampling, tag="poisson"):
+    """Points no nearer than a radius, at random: `radius` [m], or as many as `count`, or `fill` of per_cell^d per cell."""
+
+    radius: Length | None = None
+    count: Count | None = None
+    per_cell: PerCell | None = None
+    fill: Annotated[float, Meta(gt=0, le=10)] = FILL
+    seed: Annotated[int, Meta(ge=0)] | None = None
+
+    def __post_init__(self):
+        if [self.radius, self.count, self.per_cell].count(None) != 2:
+            raise ValueError("poisson needs `radius`, `count` or `per_cell`, one of the three")
+
+
+Samplings = Regular | Jittered | Lattice | Poisson
+
+
+def sample(sampling, solid, dx, seed):
+    """`Points` of a solid (with inside(x), low, high, volume) for the grid spacing dx [m].
+
+    `seed`, any seed of NumPy's default generator, serves where the record has none. The volumes are equal and sum to the
+    solid's, or are dx^d / per_cell^d (the lattice's cell) for volume = "cell". Raises ValueError where nothing is inside.
+    """
+    own = getattr(sampling, "seed", None)
+    x = points(sampling, solid, dx, seed if own is None else own)
+    if len(x) == 0:
+        raise ValueError(f"no sample point lies inside the shape, whose box is {_text(solid)}; take a finer sampling")
+    V0 = solid.volume / len(x)
+    if getattr(sampling, "volume", "shape") == "cell":
+        V0 = cell_volume(sampling, solid, dx)
+    return Points(x, np.full(len(x), V0))
+
+
+@singledispatch
+def points(sampling, solid, dx, seed):
+    """Points (N, d) of a sampling record inside a solid."""
+    raise TypeError(f"{type(sampling).__name__} is not a sampling")
+
+
+@points.register
+def _(sampling: Regular, solid, dx, seed):
+    return within(solid, _centres(solid, dx, sampling.per_cell))
+
+
+@points.register
+def _(sampling: Jittered, solid, dx, seed):
+    x = _centres(solid, dx, sampling.per_cell)
+    jitter = np.random.default_rng(seed).uniform(-0.5, 0.5, x.shape)
+    return within(solid, x + jitter * (sampling.amplitude * dx / sampling.per_cell))
+
+
+@points.register
+def _(sampling: Lattice, solid, dx, seed):
+    middle, half = 0.5 * (solid.low + solid.high), 0.5 * (solid.high - solid.low)
+    axes = [m + _steps(n, h, step, sampling.faces) for m, h, n, step in zip(middle, half, *_lattice(sampling, solid))]
+    return within(solid, _grid(axes))
+
+
+@points.register
+def _(sampling: Poisson, solid, dx, seed):
+    if sampling.radius is not None:
+        return throw(solid, sampling.radius, seed)
+    count = sampling.count
+    if count is None:
+        count = round(sampling.fill * solid.volume * (sampling.per_cell / dx) ** len(solid.low))
+    if count < 1:
+        raise ValueError(f"a fill of {sampling.fill:g} asks for less than one point in the shape; take a larger per_cell")
+    return exactly(solid, count, seed)
+
+
+def within(solid, x):
+    """Those of the points x (N, d) that lie inside the solid."""
+    return np.ascontiguousarray(x[solid.inside(x)])
+
+
+def throw(solid, r, seed):
+    """Poisson-disk points of the solid's box with distances >= r, those outside the solid left out."""
+    return within(solid, poisson_disk(solid.low, solid.high, r, np.random.default_rng(seed)))
+
+
+def exactly(solid, count, seed):
+    """`count` Poisson-disk points of a solid: a radius that gives a few more, of which some are left out at random.
+
+    The number of points falls with the radius, but not steadily, so that hardly any radius gives a given number exactly.
+    Raises ValueError where no radius gives enough points.
+    """
+    d, best, n = len(solid.low), None, 0
+    aim = count * (1.0 + 0.5 * SURPLUS)
+    r = (PACKING[d] * solid.volume / aim) ** (1.0 / d)
+    for _ in range(TRIALS):
+        x = throw(solid, r, seed)
+        n = len(x)
+        if n >= count and (best is None or n < len(best)):
+            best = x
+        if count <= n <= count * (1.0 + SURPLUS):
+            break
+        r *= min(max((max(n, 1) / aim) ** (1.0 / d), 0.5), 2.0)
+    if best is None:
+        raise ValueError(f"count = {count}: no radius gave that many points, the last gave {n}; give `radius`")
+    keep = np.random.default_rng([count, len(best)]).permutation(len(best))[:count]
+    return best[np.sort(keep)]
+
+
+def cell_volume(sampling, solid, dx):
+    """Volume of a lattice's cell [m^d]."""
+    if isinstance(sampling, Lattice):
+        counts, steps = _lattice(sampling, solid)
+        return float(np.prod(steps))
+    return float((dx / sampling.per_cell) ** len(solid.low))
+
+
+def _lattice(sampling, solid):
+    """Points per axis, and their distance along it [m]."""
+    size = solid.high - solid.low
+    if sampling.counts is None:
+        counts = np.maximum(np.floor(size / sampling.spacing * (1.0 + 1e-12)), 1).astype(int)
+        return counts, np.full(len(size), sampling.spacing)
+    if len(sampling.counts) != len(size):
+        raise ValueError(f"counts = {list(sampling.counts)}: expected {len(size)} numbers, one per axis")
+    counts = np.array(sampling.counts)
+    return counts, size / (counts - sampling.faces)
+
+
+def _steps(n, half, step, faces):
+    """n coordinates about 0, `step` apart; with `faces` the ends are -half and half to the last bit."""
+    if faces:
+        return np.linspace(-half, half, n)
+    return (np.arange(n) - 0.5 * (n - 1)) * step
+
+
+def _centres(solid, dx, k):
+    """Centres of the sub-cells of edge dx/k that meet the solid's box, aligned to the grid."""
+    h = dx / k
+    cells = np.ceil(solid.high / h) - np.floor(solid.low / h)
+    if np.prod(cells) > MOST_POINTS:
+        raise ValueError(f"{np.prod(cells):.1e} sub-cells in the shape's box {_text(solid)}, the limit is {MOST_POINTS:.0e}")
+    return _grid([(np.arange(int(np.floor(a / h)), ceil(b / h)) + 0.5) * h for a, b in zip(solid.low, solid.high)])
+
+
+def _grid(axes):
+    """All combinations (N, d) of coordinates, the last axis fastest."""
+    size = np.prod([float(len(a)) for a in axes])
+    if size > MOST_POINTS:
+        raise ValueError(f"a lattice of {size:.1e} points, the limit is {MOST_POINTS:.0e}")
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
+
+
+def _text(solid):
+    return " to ".join("(" + ", ".join(f"{c:.6g}" for c in corner) + ")" for corner in (solid.low, solid.high))
