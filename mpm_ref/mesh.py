@@ -6,6 +6,7 @@ Triangles are binned by their shadow on the other two axes, so that a point meet
 """
 
 from math import floor
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -127,3 +128,35 @@ def enclosed_volume(triangles):
     """Volume inside a closed mesh (M, 3, 3): sum of the signed tetrahedra over its triangles [m^3]."""
     about = triangles - triangles.mean(axis=(0, 1))
     return float(np.einsum("ma,ma->", about[:, 0], np.cross(about[:, 1], about[:, 2])) / 6.0)
+
+
+def read_triangles(file):
+    """Triangles (M, 3, 3) of a closed mesh file (STL, OBJ, PLY, OFF), normals outward. Needs trimesh.
+
+    Raises ValueError where the file is missing, cannot be read, or holds a mesh that is not closed.
+    """
+    if not Path(file).is_file():
+        raise ValueError(f"file = {str(file)!r}: no such file")
+    try:
+        import trimesh
+    except ImportError:
+        raise ValueError("reading a mesh needs trimesh: pip install 'mpm_ref[mesh]'") from None
+    try:
+        mesh = trimesh.load_mesh(file)
+    except Exception as fault:      # trimesh has no common class for what unreadable files cause
+        raise ValueError(f"file = {str(file)!r}: not a readable mesh ({fault})") from None
+    if not len(getattr(mesh, "faces", ())):
+        raise ValueError(f"file = {str(file)!r}: holds no triangles")
+    if not (mesh.is_watertight and mesh.is_winding_consistent):
+        raise ValueError(f"file = {str(file)!r}: the mesh is not closed, {_open_edges(mesh)} of its edges do not "
+                         "join exactly two triangles of one orientation; repair it first")
+    triangles = np.array(mesh.triangles, dtype=float)
+    return triangles if enclosed_volume(triangles) > 0.0 else triangles[:, ::-1].copy()
+
+
+def _open_edges(mesh):
+    """Number of directed edges without exactly one opposite."""
+    there = {}
+    for a, b in mesh.edges.tolist():
+        there[a, b] = there.get((a, b), 0) + 1
+    return sum(there.get((b, a), 0) != n or n != 1 for (a, b), n in there.items())

@@ -9,14 +9,10 @@ from math import ceil
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
-from msgspec import Meta, Struct
+from msgspec import Meta
 
 from .poisson import poisson_disk
-
-Count = Annotated[int, Meta(ge=1, le=1_000_000_000)]
-PerCell = Annotated[int, Meta(ge=1, le=64)]
-Length = Annotated[float, Meta(ge=1e-12, le=1e12)]
-Share = Annotated[float, Meta(ge=0, le=1)]
+from .quantities import Count, Kind, Length, PerCell, Seed, Share
 
 MOST_POINTS = 50_000_000        # candidates that a lattice may have
 FILL = 0.87                     # of per_cell^d points per cell, by Poisson-disk sampling (LDM-tab2-sampling)
@@ -32,27 +28,23 @@ class Points(NamedTuple):
     V0: np.ndarray      # (N,)   volume [m^d]
 
 
-class Sampling(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="type"):
-    """What every sampling has."""
-
-
-class Regular(Sampling, tag="regular"):
+class Regular(Kind, tag="regular"):
     """per_cell^d points in every grid cell, at the centres of its equal sub-cells."""
 
     per_cell: PerCell = 2
     volume: Literal["shape", "cell"] = "shape"
 
 
-class Jittered(Sampling, tag="jittered"):
+class Jittered(Kind, tag="jittered"):
     """As `Regular`, each point moved at random by up to `amplitude` / 2 of its sub-cell along each axis."""
 
     per_cell: PerCell = 2
     amplitude: Share = 1.0
-    seed: Annotated[int, Meta(ge=0)] | None = None
+    seed: Seed | None = None
     volume: Literal["shape", "cell"] = "shape"
 
 
-class Lattice(Sampling, tag="lattice"):
+class Lattice(Kind, tag="lattice"):
     """A lattice fixed to the solid's bounding box: `counts` points per axis, or points `spacing` [m] apart.
 
     With `faces` the outermost of `counts` points lie on the faces of the box, as in numpy.linspace; otherwise half
@@ -71,14 +63,14 @@ class Lattice(Sampling, tag="lattice"):
             raise ValueError("`faces` needs `counts` of at least 2 along every axis")
 
 
-class Poisson(Sampling, tag="poisson"):
+class Poisson(Kind, tag="poisson"):
     """Points no nearer than a radius, at random: `radius` [m], or as many as `count`, or `fill` of per_cell^d per cell."""
 
     radius: Length | None = None
     count: Count | None = None
     per_cell: PerCell | None = None
     fill: Annotated[float, Meta(gt=0, le=10)] = FILL
-    seed: Annotated[int, Meta(ge=0)] | None = None
+    seed: Seed | None = None
 
     def __post_init__(self):
         if [self.radius, self.count, self.per_cell].count(None) != 2:

@@ -1,23 +1,17 @@
-"""Shapes as scene files describe them, and the solids they make: inside test, bounding box, volume.
+"""Shapes as scene files describe them: one record per shape, and the level sets of the analytic ones.
 
-One record per shape; `level_set` gives the analytic ones to colliders, `solid` any of them to samplings. Boolean
-combinations, moved shapes and meshes are for bodies only: they have an inside, but no distance.
+Boolean combinations, moved shapes and meshes are for bodies only (see `inside`): they have no distance.
 """
 
-from dataclasses import dataclass
-from functools import cached_property, singledispatch
-from math import cos, inf, pi, radians, sin, tan
+from functools import singledispatch
+from math import inf, radians
 from typing import Annotated
 
-import numpy as np
 from msgspec import Meta
 
 from .core import levelset
-from .mesh import bins_of, enclosed_volume, read_triangles, winding
-from .quantities import Angle, Count, Kind, Length, Vector
+from .quantities import Angle, Kind, Length, Vector
 
-SKIN = 1e-9                             # of a solid's size: points this far outside count as inside
-MEASURE = {2: 2000, 3: 160}             # cells per axis in which `measured_volume` throws one dart each
 Shapes = Annotated[tuple["Shape", ...], Meta(min_length=1, max_length=1000)]
 
 
@@ -68,7 +62,11 @@ class Torus(Kind, tag="torus"):
 
 
 class Wedge(Kind, tag="wedge"):
-    """Blade with its sharp edge at `tip`, thicker along `direction`; in 3D the edge has a direction and a `width`."""
+    """Blade with its sharp edge at `tip`, thicker along `direction` for `length`.
+
+    `half_angle` [degrees] is that between a face and the middle plane. In 3D `edge` is the direction
+    of the edge and `width` its length, without end if not given; in 2D neither has a meaning.
+    """
 
     tip: Vector
     direction: Vector
@@ -98,7 +96,7 @@ class Difference(Kind, tag="difference"):
 
 
 class Moved(Kind, tag="moved"):
-    """A shape scaled, then turned by `angle` [degrees], both about the point `about`, then shifted by `translate`."""
+    """A shape scaled, then turned by `angle` [degrees], both about `about`, then shifted."""
 
     shape: "Shape"
     scale: Length = 1.0
@@ -126,7 +124,8 @@ Shape = Analytic | Union | Intersection | Difference | Moved | Mesh
 @singledispatch
 def level_set(shape):
     """The level set (see core.levelset) of an analytic shape. Raises ValueError for sizes that make no shape."""
-    raise ValueError(f"a shape of type {type(shape).__name__.lower()} has no distance; only analytic shapes have")
+    raise ValueError(f"a shape of type {type(shape).__name__.lower()} has no distance; "
+                     "only analytic shapes have")
 
 
 @level_set.register
@@ -162,4 +161,7 @@ def _(shape: Torus):
 @level_set.register
 def _(shape: Wedge):
     width = inf if shape.width is None else shape.width
-    return levelset.wedge(shape.tip, shape.direction, radians(shape.half_angle), shape.length, shape.edge, width)
+    half_angle = radians(shape.half_angle)
+    return levelset.wedge(
+        shape.tip, shape.direction, half_angle, shape.length, shape.edge, width
+    )

@@ -140,8 +140,7 @@ def _update_all_empty(nodes, gravity, dt):
 
 
 def flattened(grid):
-                acceleration = nodes.f[i, a] / nodes.m[i] + gravity[a]
-                nodes.v[i, a] = nodes.v_old[i, a] + dt * acceleration
+    """The same storage with one axis for all nodes: m (n,), v (n, d); f, v_old where carried."""
     d = grid.m.ndim
     f, v_old = (a if a.ndim == 1 else a.reshape(-1, d) for a in (grid.f, grid.v_old))
     return Grid(grid.m.reshape(-1), grid.v.reshape(-1, d), f, v_old, grid.origin, grid.dx)

@@ -1,0 +1,275 @@
+"""The inside of shapes: which points it holds, its bounding box, its volume. Bodies are sampled from it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, singledispatch
+from math import cos, inf, pi, radians, sin, tan
+
+import numpy as np
+
+from . import shapes
+from .core import levelset
+from .mesh import bins_of, enclosed_volume, read_triangles, winding
+
+SKIN = 1e-9                     # of a solid's size: points so little outside count as inside
+DARTS = {2: 2000, 3: 160}       # cells per axis in which `measured_volume` throws one dart each
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A set of points in d dimensions; the corners of its bounding box may be infinite."""
+
+    inside: Callable                    # points (N, d) -> (N,) bool
+    low: np.ndarray                     # (d,) [m]
+    high: np.ndarray                    # (d,) [m]
+    exact_volume: float | None = None   # [m^d], where a formula is known
+
+    @cached_property
+    def volume(self):
+        """Volume [m^d]: by formula, or measured to about 1e-4 for boolean combinations."""
+        return measured_volume(self) if self.exact_volume is None else self.exact_volume
+
+
+def measured_volume(solid):
+    """Volume by one random dart in each of many equal cells of the bounding box.
+
+    The standard error is about 0.7 / n^((d + 1)/2) of the box for n cells per axis: 1e-5 in 2D, 3e-5 in
+    3D. The darts are the same each time. Raises ValueError for an unbounded solid.
+    """
+    size = check_bounded(solid).high - solid.low
+    d = len(size)
+    n, rng, hits = DARTS[d], np.random.default_rng(0), 0
+    rows = np.stack(np.meshgrid(*(d - 1) * [np.arange(n)], indexing="ij"), -1).reshape(-1, d - 1)
+    for i in range(n):
+        cells = np.column_stack([np.full(len(rows), i), rows])
+        hits += solid.inside(solid.low + (cells + rng.random(cells.shape)) / n * size).sum()
+    return float(hits / n**d * np.prod(size))
+
+
+def check_bounded(solid):
+    """The solid. Raises ValueError if it is infinite."""
+    if not np.isfinite([solid.low, solid.high]).all():
+        raise ValueError("the shape has no end; take its intersection with a box")
+    return solid
+
+
+@singledispatch
+def solid(shape):
+    """The `Solid` of a shape record. Raises ValueError for sizes that make no solid."""
+    level = shapes.level_set(shape)
+    (low, high), volume = bounds(shape), _volume(shape)
+    skin = SKIN * np.max(high - low, initial=0.0, where=np.isfinite(high - low))
+
+    def inside(x):
+        return levelset.distances(x, level) <= skin
+
+    return Solid(inside, low, high, volume)
+
+
+@solid.register
+def _(shape: shapes.Union):
+    parts = [solid(part) for part in shape.shapes]
+
+    def inside(x):
+        return np.logical_or.reduce([part.inside(x) for part in parts])
+
+    return Solid(inside, *_hull(np.concatenate([(part.low, part.high) for part in parts])))
+
+
+@solid.register
+def _(shape: shapes.Intersection):
+    parts = [solid(part) for part in shape.shapes]
+    low = np.max([part.low for part in parts], axis=0)
+    high = np.min([part.high for part in parts], axis=0)
+    if not (low < high).all():
+        raise ValueError("the intersection is empty: its shapes do not meet")
+
+    def inside(x):
+        return np.logical_and.reduce([part.inside(x) for part in parts])
+
+    return Solid(inside, low, high)
+
+
+@solid.register
+def _(shape: shapes.Difference):
+    whole, holes = solid(shape.shape), [solid(part) for part in shape.minus]
+
+    def inside(x):
+        return whole.inside(x) & ~np.logical_or.reduce([part.inside(x) for part in holes])
+
+    return Solid(inside, whole.low, whole.high)
+
+
+@solid.register
+def _(shape: shapes.Moved):
+    part = solid(shape.shape)
+    d = len(part.low)
+    R = rotation(shape.angle, shape.axis, d)
+    about = np.zeros(d) if shape.about is None else np.array(shape.about)
+    to = about if shape.translate is None else about + shape.translate
+
+    def inside(x):
+        return part.inside((x - to) @ R / shape.scale + about)      # (x - to) @ R = R^T (x - to)
+
+    low, high = np.full(d, -inf), np.full(d, inf)
+    if np.isfinite([part.low, part.high]).all():
+        low, high = _hull((_corners(part.low, part.high) - about) @ R.T * shape.scale + to)
+    exact = part.exact_volume
+    return Solid(inside, low, high, None if exact is None else exact * shape.scale**d)
+
+
+@solid.register
+def _(shape: shapes.Mesh):
+    triangles = read_triangles(shape.file)
+    low, high = _hull(triangles.reshape(-1, 3))
+    scale = 1.0 if shape.size is None else shape.size / (high - low).max()
+    middle = 0.5 * (low + high)
+    center = middle if shape.center is None else np.array(shape.center)
+    triangles = (triangles - middle) * scale + center
+    bins = bins_of(triangles)
+
+    def inside(x):
+        return winding(x, bins) > 0
+
+    return Solid(inside, *_hull(triangles.reshape(-1, 3)), enclosed_volume(triangles))
+
+
+@singledispatch
+def bounds(shape):
+    """Corners (low, high) of the bounding box of an analytic shape."""
+    raise TypeError(f"{type(shape).__name__} is not an analytic shape")
+
+
+@bounds.register
+def _(shape: shapes.HalfSpace):
+    d = len(shape.point)
+    low, high = np.full(d, -inf), np.full(d, inf)
+    along = np.flatnonzero(shape.normal)
+    if len(along) == 1:
+        a = along[0]
+        (high if shape.normal[a] > 0.0 else low)[a] = shape.point[a]
+    return low, high
+
+
+@bounds.register
+def _(shape: shapes.Box):
+    return np.array(shape.lower), np.array(shape.upper)
+
+
+@bounds.register
+def _(shape: shapes.Sphere):
+    return np.array(shape.center) - shape.radius, np.array(shape.center) + shape.radius
+
+
+@bounds.register
+def _(shape: shapes.Capsule):
+    low, high = _hull(np.array([shape.start, shape.end]))
+    return low - shape.radius, high + shape.radius
+
+
+@bounds.register
+def _(shape: shapes.Cylinder):
+    low, high = _hull(np.array([shape.start, shape.end]))
+    rim = shape.radius * _disk(np.subtract(shape.end, shape.start))
+    return low - rim, high + rim
+
+
+@bounds.register
+def _(shape: shapes.Torus):
+    ring = np.ones(2) if shape.axis is None else _disk(np.array(shape.axis))
+    reach = shape.major * ring + shape.minor
+    return np.array(shape.center) - reach, np.array(shape.center) + reach
+
+
+@bounds.register
+def _(shape: shapes.Wedge):
+    d = len(shape.tip)
+    w = shapes.level_set(shape)
+    a, b = np.array([w.ax, w.ay, w.az]), np.array([w.bx, w.by, w.bz])
+    across = np.cross(a, b) if d == 3 else np.array([-a[1], a[0], 0.0])
+    back = [w.length * (a + s * tan(w.half_angle) * across) for s in (-1.0, 1.0)]
+    low, high = _hull(np.array([0.0 * a, *back])[:, :d] + shape.tip)
+    reach = np.where(b[:d] == 0.0, 0.0, np.abs(b[:d]) * (inf if w.half_width == inf else w.half_width))
+    return low - reach, high + reach
+
+
+@singledispatch
+def _volume(shape):
+    return None
+
+
+@_volume.register
+def _(shape: shapes.Box):
+    return float(np.prod(np.subtract(shape.upper, shape.lower)))
+
+
+@_volume.register
+def _(shape: shapes.Sphere):
+    return _ball(len(shape.center), shape.radius)
+
+
+@_volume.register
+def _(shape: shapes.Cylinder):
+    return _ball(len(shape.start) - 1, shape.radius) * _distance(shape.start, shape.end)
+
+
+@_volume.register
+def _(shape: shapes.Capsule):
+    d, r = len(shape.start), shape.radius
+    return _ball(d - 1, r) * _distance(shape.start, shape.end) + _ball(d, r)
+
+
+@_volume.register
+def _(shape: shapes.Torus):
+    return 2.0 * pi * shape.major * _ball(len(shape.center) - 1, shape.minor)
+
+
+@_volume.register
+def _(shape: shapes.Wedge):
+    width = 1.0 if len(shape.tip) == 2 else shape.width
+    return None if width is None else shape.length**2 * tan(radians(shape.half_angle)) * width
+
+
+def _ball(d, r):
+    """Volume of a ball of radius r in d dimensions [m^d]."""
+    return {1: 2.0 * r, 2: pi * r**2, 3: 4.0 / 3.0 * pi * r**3}[d]
+
+
+def _distance(a, b):
+    return float(np.linalg.norm(np.subtract(b, a)))
+
+
+def _disk(axis):
+    """Half sizes of the box about a unit disk at right angles to `axis`."""
+    return np.sqrt(np.maximum(1.0 - (axis / np.linalg.norm(axis)) ** 2, 0.0))
+
+
+def _hull(x):
+    """Corners of the bounding box of points (N, d)."""
+    return x.min(axis=0), x.max(axis=0)
+
+
+def _corners(low, high):
+    return np.stack(np.meshgrid(*zip(low, high), indexing="ij"), axis=-1).reshape(-1, len(low))
+
+
+def rotation(angle, axis, d):
+    """Matrix that turns by `angle` [degrees]: in 2D counter-clockwise, in 3D about `axis` by the right hand.
+
+    Raises ValueError for an axis in 2D, and for an angle without an axis or a zero axis in 3D.
+    """
+    c, s = cos(radians(angle)), sin(radians(angle))
+    if d == 2:
+        if axis is not None:
+            raise ValueError(f"axis = {list(axis)}: in 2D the axis is given, leave it out")
+        return np.array([[c, -s], [s, c]])
+    if axis is None:
+        if angle:
+            raise ValueError(f"angle = {angle:g}: expected an axis beside it in 3D")
+        return np.eye(3)
+    size = np.linalg.norm(axis)
+    if not size > 0.0:
+        raise ValueError(f"axis = {list(axis)}: expected a vector of positive length")
+    n = np.array(axis) / size
+    cross = np.array([[0.0, -n[2], n[1]], [n[2], 0.0, -n[0]], [-n[1], n[0], 0.0]])
+    return c * np.eye(3) + s * cross + (1.0 - c) * np.outer(n, n)       # Rodrigues' formula
