@@ -23,7 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .atomic import not_written, replacing
+from .atomic import not_written, replacing, sync
 
 PAGE = 4096
 MAGIC = b"mpm_ref journal\n"
@@ -49,6 +49,8 @@ class JournaledFile(io.RawIOBase):
         self._file = open(self.path, "w+b" if new else "r+b", buffering=0)
         try:
             _lock(self._file, self.path)
+            if new:
+                journal_of(self.path).unlink(missing_ok=True)
             _apply_journal(self._file, self.path)
         except BaseException:
             self._file.close()
@@ -84,6 +86,13 @@ class JournaledFile(io.RawIOBase):
             _apply_journal(self._file, self.path)
         self._waiting.clear()
         self._freeze()
+
+    def move(self, path):
+        """Let the file take the place of `path`, in the same folder; what stood there is gone."""
+        journal_of(path).unlink(missing_ok=True)
+        os.replace(self.path, path)
+        sync(Path(path).parent)
+        self.path = Path(path)
 
     def write(self, data):
         """Write bytes at the current position; never refuses, see `commit`."""

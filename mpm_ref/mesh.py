@@ -1,8 +1,9 @@
 """The inside of a closed triangle mesh, by its winding number along vertical lines.
 
-The line through a point along the last axis crosses the mesh's triangles; each crossing above the point counts +1 or -1
-by the triangle's orientation. The sum is the winding number: 1 inside a mesh whose normals point outward, 0 outside.
-Triangles are binned by their shadow on the other two axes, so that a point meets only few of them.
+The line through a point along the last axis crosses triangles; each crossing above the point counts
++1 or -1 by the triangle's orientation. The sum is the winding number: 1 inside a mesh whose normals
+point outward, 0 outside. Triangles are binned by their shadow on the other two axes, so that a point
+meets only few of them.
 """
 
 from math import floor
@@ -13,8 +14,8 @@ import numpy as np
 
 from .core.jit import CHUNKS, chunk, kernel, parallel, prange
 
-# The line stands beside the point by this share of the mesh's size, so that it misses edges and vertices: in models,
-# points and vertices often share a coordinate. Two numbers without a small common multiple.
+# The line stands beside the point by these shares of the mesh's size, so that it misses edges and
+# vertices: points and vertices often share a coordinate.
 BESIDE = (1.1e-9, 1.7e-9)
 PER_BIN = 2             # triangles per bin, on average
 MAX_SIDE = 1024         # bins along an axis
@@ -74,7 +75,10 @@ def _enter(first, last, free, member):
 
 @kernel
 def _side(a, b, p):
-    """Twice the area of the plane triangle a, b, p; exactly odd under a <-> b, so that two triangles never share a line."""
+    """Twice the area of the plane triangle a, b, p.
+
+    Odd under a <-> b to the last bit: a line on an edge crosses one of its two triangles.
+    """
     if (a[0], a[1]) < (b[0], b[1]):
         return (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
     else:
@@ -117,7 +121,10 @@ def _winding(x, beside, bins, number):
 
 
 def winding(x, bins):
-    """Winding number (N,) of the mesh around points x (N, 3). A point of the surface may count either way."""
+    """Winding number (N,) of the mesh around points x (N, 3).
+
+    A point of the surface may count either way.
+    """
     number = np.zeros(len(x), dtype=np.int64)
     size = (bins.width * len(bins.start)).max()
     _winding(np.ascontiguousarray(x, dtype=float), tuple(s * size for s in BESIDE), bins, number)
@@ -125,15 +132,16 @@ def winding(x, bins):
 
 
 def enclosed_volume(triangles):
-    """Volume inside a closed mesh (M, 3, 3): sum of the signed tetrahedra over its triangles [m^3]."""
+    """Volume in a closed mesh (M, 3, 3) [m^3]: sum of signed tetrahedra over its triangles."""
     about = triangles - triangles.mean(axis=(0, 1))
     return float(np.einsum("ma,ma->", about[:, 0], np.cross(about[:, 1], about[:, 2])) / 6.0)
 
 
 def read_triangles(file):
-    """Triangles (M, 3, 3) of a closed mesh file (STL, OBJ, PLY, OFF), normals outward. Needs trimesh.
+    """Triangles (M, 3, 3) of a closed mesh file (STL, OBJ, PLY, OFF), normals outward.
 
-    Raises ValueError where the file is missing, cannot be read, or holds a mesh that is not closed.
+    Needs trimesh. Raises ValueError where the file is missing, cannot be read, or holds a mesh that
+    is not closed.
     """
     if not Path(file).is_file():
         raise ValueError(f"file = {str(file)!r}: no such file")
@@ -148,8 +156,8 @@ def read_triangles(file):
     if not len(getattr(mesh, "faces", ())):
         raise ValueError(f"file = {str(file)!r}: holds no triangles")
     if not (mesh.is_watertight and mesh.is_winding_consistent):
-        raise ValueError(f"file = {str(file)!r}: the mesh is not closed, {_open_edges(mesh)} of its edges do not "
-                         "join exactly two triangles of one orientation; repair it first")
+        raise ValueError(f"file = {str(file)!r}: the mesh is not closed, {_open_edges(mesh)} of its "
+                         "edges do not join two triangles of one orientation; repair it first")
     triangles = np.array(mesh.triangles, dtype=float)
     return triangles if enclosed_volume(triangles) > 0.0 else triangles[:, ::-1].copy()
 

@@ -1,7 +1,7 @@
-"""Poisson-disk points in a box: no two nearer than r, found by Bridson's dart throwing [Bridson2007].
+"""Poisson-disk points in a box: no two nearer than r, by dart throwing [Bridson2007].
 
-Points lie in a background lattice of cells of edge r/sqrt(d), which hold one point at most, so that a new dart is
-compared with the points of few cells. The result depends on the generator alone.
+Points lie in a background lattice of cells of edge r/sqrt(d), which hold one point at most, so that
+a new dart is compared with the points of few cells. The result depends on the generator alone.
 """
 
 from itertools import product
@@ -23,7 +23,7 @@ class Background(NamedTuple):
 
     point: np.ndarray       # (cells,)  int32
     strides: np.ndarray     # (d,)      cells per step along an axis
-    near: np.ndarray        # (k,)      index offsets of cells that can hold a point nearer than r, nearest first
+    near: np.ndarray        # (k,)      offsets to cells that can hold a point nearer than r
     span: np.ndarray        # (d,)      edges of the box [m]
     edge: float             # of a cell [m]
     r: float                # smallest distance [m]
@@ -49,16 +49,16 @@ def background(span, r):
     edge = r / sqrt(len(span))
     cells = np.floor(span / edge) + 1 + 2 * PAD
     if np.prod(cells) > MAX_CELLS:
-        raise ValueError(f"radius = {r}: would need {np.prod(cells):.1e} cells, the limit is {MAX_CELLS:.0e}; "
-                         "take a larger radius")
+        raise ValueError(f"radius = {r:.3g}: would need {np.prod(cells):.1e} cells, the limit is "
+                         f"{MAX_CELLS:.0e}; take a larger radius")
     cells = cells.astype(np.int64)
     strides = np.append(np.cumprod(cells[:0:-1])[::-1], 1).astype(np.int64)
     point = np.full(np.prod(cells), -1, dtype=np.int32)
-    return Background(point, strides, _near(len(span)) @ strides, np.asarray(span, dtype=float), edge, r)
+    return Background(point, strides, _near(len(span)) @ strides, span, edge, r)
 
 
 def _near(d):
-    """Cell offsets (k, d) whose cells come nearer than r = edge sqrt(d) to the central one."""
+    """Offsets (k, d) of cells that come nearer than r = edge sqrt(d) to one, nearest first."""
     offsets = np.array(list(product(range(-PAD, PAD + 1), repeat=d)))
     gap2 = (np.maximum(np.abs(offsets) - 1, 0) ** 2).sum(axis=1)
     offsets = offsets[gap2 < d]
@@ -66,13 +66,13 @@ def _near(d):
 
 
 def _most_points(back):
-    """No packing of balls of diameter r is denser than sqrt(2)/r^3 points per volume in 3D, 2/sqrt(3)/r^2 in 2D."""
+    """Balls of diameter r cannot be packed denser than sqrt(2)/r^3, disks 2/sqrt(3)/r^2."""
     return int(sqrt(2.0) * np.prod(back.span / back.r + 1.0)) + 1
 
 
 @kernel
 def _throw(rng, points, active, back, like):
-    """Fill `points`; returns how many there are. `active` is scratch: points that may still have room around them."""
+    """Fill `points`; returns how many. `active`: points that may still have room around them."""
     n = _add(_anywhere(rng, back.span, like), points, 0, active, 0, back)
     alive = n
     while alive > 0:

@@ -1,16 +1,19 @@
-"""Kinds of numbers in scene records, with the bounds within which the methods make sense. SI units; angles in degrees."""
+"""Kinds of numbers in scene records, and the bounds within which they make sense.
+
+SI units; angles are in degrees. The bounds keep every derived number far from overflow.
+"""
 
 from typing import Annotated
 
 from msgspec import Meta, Struct
 
-Coordinate = Annotated[float, Meta(ge=-1e9, le=1e9)]        # [m]; also velocities, accelerations
-Vector = Annotated[tuple[Coordinate, ...], Meta(min_length=2, max_length=3)]    # d components
-Length = Annotated[float, Meta(ge=1e-9, le=1e9)]            # [m]
-Positive = Annotated[float, Meta(gt=0)]
-NotNegative = Annotated[float, Meta(ge=0)]
+Coordinate = Annotated[float, Meta(ge=-1e9, le=1e9)]                # [m]; velocities and so on
+Vector = Annotated[tuple[Coordinate, ...], Meta(min_length=2, max_length=3)]    # d numbers
+Length = Annotated[float, Meta(ge=1e-9, le=1e9)]                    # [m]
+Positive = Annotated[float, Meta(ge=1e-30, le=1e30)]
+NotNegative = Annotated[float, Meta(ge=0, le=1e30)]
 Share = Annotated[float, Meta(ge=0, le=1)]
-Angle = Annotated[float, Meta(ge=-1e6, le=1e6)]             # [degrees]
+Angle = Annotated[float, Meta(ge=-1e6, le=1e6)]                     # [degrees]
 Count = Annotated[int, Meta(ge=1, le=1_000_000_000)]
 PerCell = Annotated[int, Meta(ge=1, le=64)]
 Seed = Annotated[int, Meta(ge=0, le=2**63 - 1)]

@@ -1,22 +1,22 @@
 """Points that fill a solid, and the volume each stands for.
 
-Records describe a sampling as scene files do; `sample` carries one out. A point of the surface, to within `SKIN` of the
-solid's size, counts as inside. What each sampling is good for: docs/scenes.md.
+Records describe a sampling as scene files do; `sample` carries one out. What each sampling is good
+for: docs/scenes.md.
 """
 
 from functools import singledispatch
-from math import ceil
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from msgspec import Meta
 
+from .inside import check_bounded
 from .poisson import poisson_disk
 from .quantities import Count, Kind, Length, PerCell, Seed, Share
 
 MOST_POINTS = 50_000_000        # candidates that a lattice may have
-FILL = 0.87                     # of per_cell^d points per cell, by Poisson-disk sampling (LDM-tab2-sampling)
-PACKING = {2: 0.62, 3: 0.59}    # N r^d / volume of `poisson_disk` in a large box: a first guess only
+FILL = 0.87                     # of per_cell^d points per cell (LDM-tab2-sampling)
+PACKING = {2: 0.62, 3: 0.59}    # N r^d / volume of `poisson_disk` in a large box: a first guess
 SURPLUS = 0.01                  # of the points that may be left out to hit a number exactly
 TRIALS = 12                     # of radii, per number of points asked for
 
@@ -36,7 +36,7 @@ class Regular(Kind, tag="regular"):
 
 
 class Jittered(Kind, tag="jittered"):
-    """As `Regular`, each point moved at random by up to `amplitude` / 2 of its sub-cell along each axis."""
+    """As `Regular`, but each point is anywhere in the middle `amplitude` share of its sub-cell."""
 
     per_cell: PerCell = 2
     amplitude: Share = 1.0
@@ -45,10 +45,10 @@ class Jittered(Kind, tag="jittered"):
 
 
 class Lattice(Kind, tag="lattice"):
-    """A lattice fixed to the solid's bounding box: `counts` points per axis, or points `spacing` [m] apart.
+    """A lattice fixed to the shape's box: `counts` points per axis, or points `spacing` [m] apart.
 
-    With `faces` the outermost of `counts` points lie on the faces of the box, as in numpy.linspace; otherwise half
-    a step inside.
+    With `faces` the outermost of `counts` points lie on the faces of the box, as in numpy.linspace;
+    otherwise half a step inside.
     """
 
     counts: tuple[Count, ...] | None = None
@@ -64,7 +64,10 @@ class Lattice(Kind, tag="lattice"):
 
 
 class Poisson(Kind, tag="poisson"):
-    """Points no nearer than a radius, at random: `radius` [m], or as many as `count`, or `fill` of per_cell^d per cell."""
+    """Random points no nearer than a radius.
+
+    Given is the `radius` [m], or how many points: `count`, or `fill` of per_cell^d per cell.
+    """
 
     radius: Length | None = None
     count: Count | None = None
@@ -83,13 +86,16 @@ Samplings = Regular | Jittered | Lattice | Poisson
 def sample(sampling, solid, dx, seed):
     """`Points` of a solid (with inside(x), low, high, volume) for the grid spacing dx [m].
 
-    `seed`, any seed of NumPy's default generator, serves where the record has none. The volumes are equal and sum to the
-    solid's, or are dx^d / per_cell^d (the lattice's cell) for volume = "cell". Raises ValueError where nothing is inside.
+    `seed`, any seed of NumPy's default generator, serves where the record has none. The volumes are
+    equal and sum to the solid's; with volume = "cell" they are dx^d / per_cell^d, or that of the
+    lattice's cell. Raises ValueError where no point is inside.
     """
+    check_bounded(solid)
     own = getattr(sampling, "seed", None)
     x = points(sampling, solid, dx, seed if own is None else own)
     if len(x) == 0:
-        raise ValueError(f"no sample point lies inside the shape, whose box is {_text(solid)}; take a finer sampling")
+        raise ValueError(f"no sample point is inside the shape, whose box is {_text(solid)}; "
+                         "take a finer sampling")
     V0 = solid.volume / len(x)
     if getattr(sampling, "volume", "shape") == "cell":
         V0 = cell_volume(sampling, solid, dx)
@@ -117,7 +123,10 @@ def _(sampling: Jittered, solid, dx, seed):
 @points.register
 def _(sampling: Lattice, solid, dx, seed):
     middle, half = 0.5 * (solid.low + solid.high), 0.5 * (solid.high - solid.low)
-    axes = [m + _steps(n, h, step, sampling.faces) for m, h, n, step in zip(middle, half, *_lattice(sampling, solid))]
+    counts, steps = _lattice(sampling, solid)
+    _check_number(counts)
+    axes = [m + _steps(n, h, step, sampling.faces)
+            for m, h, n, step in zip(middle, half, counts, steps)]
     return within(solid, _grid(axes))
 
 
@@ -129,7 +138,8 @@ def _(sampling: Poisson, solid, dx, seed):
     if count is None:
         count = round(sampling.fill * solid.volume * (sampling.per_cell / dx) ** len(solid.low))
     if count < 1:
-        raise ValueError(f"a fill of {sampling.fill:g} asks for less than one point in the shape; take a larger per_cell")
+        raise ValueError(f"fill = {sampling.fill:g} asks for less than one point in the shape; "
+                         "take a larger per_cell")
     return exactly(solid, count, seed)
 
 
@@ -139,14 +149,15 @@ def within(solid, x):
 
 
 def throw(solid, r, seed):
-    """Poisson-disk points of the solid's box with distances >= r, those outside the solid left out."""
+    """Poisson-disk points of the solid's box, no nearer than r, those outside the solid left out."""
     return within(solid, poisson_disk(solid.low, solid.high, r, np.random.default_rng(seed)))
 
 
 def exactly(solid, count, seed):
-    """`count` Poisson-disk points of a solid: a radius that gives a few more, of which some are left out at random.
+    """`count` Poisson-disk points of a solid.
 
-    The number of points falls with the radius, but not steadily, so that hardly any radius gives a given number exactly.
+    The number of points falls with the radius, but not steadily, so that hardly any radius gives a
+    number exactly: one that gives a few more is taken, and some points are left out at random.
     Raises ValueError where no radius gives enough points.
     """
     d, best, n = len(solid.low), None, 0
@@ -161,7 +172,8 @@ def exactly(solid, count, seed):
             break
         r *= min(max((max(n, 1) / aim) ** (1.0 / d), 0.5), 2.0)
     if best is None:
-        raise ValueError(f"count = {count}: no radius gave that many points, the last gave {n}; give `radius`")
+        raise ValueError(f"count = {count}: no radius gave that many points, the last gave {n}; "
+                         "give `radius`")
     keep = np.random.default_rng([count, len(best)]).permutation(len(best))[:count]
     return best[np.sort(keep)]
 
@@ -169,8 +181,7 @@ def exactly(solid, count, seed):
 def cell_volume(sampling, solid, dx):
     """Volume of a lattice's cell [m^d]."""
     if isinstance(sampling, Lattice):
-        counts, steps = _lattice(sampling, solid)
-        return float(np.prod(steps))
+        return float(np.prod(_lattice(sampling, solid)[1]))
     return float((dx / sampling.per_cell) ** len(solid.low))
 
 
@@ -178,37 +189,40 @@ def _lattice(sampling, solid):
     """Points per axis, and their distance along it [m]."""
     size = solid.high - solid.low
     if sampling.counts is None:
-        counts = np.maximum(np.floor(size / sampling.spacing * (1.0 + 1e-12)), 1).astype(int)
+        counts = np.maximum(np.floor(size / sampling.spacing * (1.0 + 1e-12)), 1)
         return counts, np.full(len(size), sampling.spacing)
     if len(sampling.counts) != len(size):
-        raise ValueError(f"counts = {list(sampling.counts)}: expected {len(size)} numbers, one per axis")
-    counts = np.array(sampling.counts)
+        raise ValueError(f"counts = {list(sampling.counts)}: expected {len(size)} numbers")
+    counts = np.array(sampling.counts, dtype=float)
     return counts, size / (counts - sampling.faces)
 
 
 def _steps(n, half, step, faces):
-    """n coordinates about 0, `step` apart; with `faces` the ends are -half and half to the last bit."""
+    """n coordinates about 0, `step` apart; with `faces` the ends are -half and half exactly."""
     if faces:
-        return np.linspace(-half, half, n)
+        return np.linspace(-half, half, int(n))
     return (np.arange(n) - 0.5 * (n - 1)) * step
 
 
 def _centres(solid, dx, k):
     """Centres of the sub-cells of edge dx/k that meet the solid's box, aligned to the grid."""
     h = dx / k
-    cells = np.ceil(solid.high / h) - np.floor(solid.low / h)
-    if np.prod(cells) > MOST_POINTS:
-        raise ValueError(f"{np.prod(cells):.1e} sub-cells in the shape's box {_text(solid)}, the limit is {MOST_POINTS:.0e}")
-    return _grid([(np.arange(int(np.floor(a / h)), ceil(b / h)) + 0.5) * h for a, b in zip(solid.low, solid.high)])
+    first, last = np.floor(solid.low / h), np.ceil(solid.high / h)
+    _check_number(last - first)
+    return _grid([(np.arange(a, b) + 0.5) * h for a, b in zip(first, last)])
+
+
+def _check_number(counts):
+    if not np.prod(counts) <= MOST_POINTS:
+        raise ValueError(f"{np.prod(counts):.1e} lattice points in the shape's box, the limit is "
+                         f"{MOST_POINTS:.0e}; take a coarser sampling")
 
 
 def _grid(axes):
     """All combinations (N, d) of coordinates, the last axis fastest."""
-    size = np.prod([float(len(a)) for a in axes])
-    if size > MOST_POINTS:
-        raise ValueError(f"a lattice of {size:.1e} points, the limit is {MOST_POINTS:.0e}")
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
 
 
 def _text(solid):
-    return " to ".join("(" + ", ".join(f"{c:.6g}" for c in corner) + ")" for corner in (solid.low, solid.high))
+    corners = [", ".join(f"{c:.6g}" for c in corner) for corner in (solid.low, solid.high)]
+    return f"({corners[0]}) to ({corners[1]})"

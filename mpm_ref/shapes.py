@@ -1,6 +1,7 @@
-"""Shapes as scene files describe them: one record per shape, and the level sets of the analytic ones.
+"""Shapes as scene files describe them: a record for each, and the level sets of the analytic ones.
 
-Boolean combinations, moved shapes and meshes are for bodies only (see `inside`): they have no distance.
+Boolean combinations, moved shapes and meshes are for bodies only (see `inside`): they have no
+distance. Collider and prescribed regions take the analytic ones.
 """
 
 from functools import singledispatch
@@ -64,8 +65,8 @@ class Torus(Kind, tag="torus"):
 class Wedge(Kind, tag="wedge"):
     """Blade with its sharp edge at `tip`, thicker along `direction` for `length`.
 
-    `half_angle` [degrees] is that between a face and the middle plane. In 3D `edge` is the direction
-    of the edge and `width` its length, without end if not given; in 2D neither has a meaning.
+    `half_angle` [degrees] is that between a face and the middle plane. In 3D `edge` is the
+    direction of the edge and `width` its length, without end if not given; 2D has neither.
     """
 
     tip: Vector
@@ -123,7 +124,10 @@ Shape = Analytic | Union | Intersection | Difference | Moved | Mesh
 
 @singledispatch
 def level_set(shape):
-    """The level set (see core.levelset) of an analytic shape. Raises ValueError for sizes that make no shape."""
+    """The level set (see core.levelset) of an analytic shape.
+
+    Raises ValueError for sizes that make no shape, and for shapes without a distance.
+    """
     raise ValueError(f"a shape of type {type(shape).__name__.lower()} has no distance; "
                      "only analytic shapes have")
 

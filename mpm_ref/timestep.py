@@ -2,13 +2,13 @@
 
 * advective: no part of a particle's support crosses more than a cell, dt (|v_p| + |L_p| dx
   (degree + 1)/2) < dx;
-* elastic: no wave crosses more than a cell, dt c_p < dx, with rho0 c^2 = max_k s_k^2 d2psi/ds_k^2
-  at the current stretches;
+* elastic: no wave crosses more than a cell, dt c_p < dx, c_p that of `materials.waves` at the
+  current stretches;
 * viscous: none of the shipped laws has an explicit viscosity (Bingham flow is integrated
   implicitly), so it is infinite;
 * single particle: a particle's own oscillation through the nodes it reaches must not grow
-  [BaiSchroeder2022]. With omega^2 = V0_p K_p S_p / m_p, K = d2psi/(d log s)^2 under uniform
-  dilation and the node masses m_i of the whole state,
+  [BaiSchroeder2022]. With K its modulus against uniform dilation (2 mu + d lam at rest) and the
+  node masses m_i of the whole state,
 
       S_p = sum_i |dw_ip|^2 m_p/m_i / d,    R_p = sum_i |D^-1 w_ip r_ip|^2 m_p/m_i / d,
 
@@ -37,10 +37,12 @@ from .core.stencil import (
     slopes_per_axis,
     weights_per_axis,
 )
-from .core.tensor import dot, mat, total_of, vec
+from .core.tensor import dot, mat, mv, total_of, vec
 from .explicit import scatter
+from .materials.principal import dpk1_hat
+from .materials.waves import wave_modulus
 
-STRAIN = 1e-5     # of the differences of the stress
+STRAIN = 1e-5     # of the differences of a fluid's pressure
 
 
 class TooLarge(ValueError):
@@ -67,40 +69,9 @@ class TimeStep(NamedTuple):
 
 
 @kernel
-def stretched(s, k, factor):
-    """s with component k times factor; all components for k = -1."""
-    if len(s) == 2:
-        return s[0] * (factor if k in (0, -1) else 1.0), s[1] * (factor if k in (1, -1) else 1.0)
-    else:
-        return (
-            s[0] * (factor if k in (0, -1) else 1.0),
-            s[1] * (factor if k in (1, -1) else 1.0),
-            s[2] * (factor if k in (2, -1) else 1.0),
-        )
-
-
-@kernel
-def wave_modulus(s, law):
-    """max_k s_k^2 d2psi/ds_k^2 = max_k (dtau_k/dlog s_k - tau_k) [Pa]: rho0 c^2 of waves along
-    the principal axes.
-    """
-    tau = kirchhoff_hat(s, law)
-    modulus = 0.0
-    for k in range(len(s)):
-        more = kirchhoff_hat(stretched(s, k, 1.0 + STRAIN), law)
-        less = kirchhoff_hat(stretched(s, k, 1.0 - STRAIN), law)
-        modulus = max(modulus, (more[k] - less[k]) / (2.0 * STRAIN) - tau[k])
-    return modulus
-
-
-@kernel
 def dilation_modulus(s, law):
-    """d tr(tau)/d d(log s) under s -> s (1 + h): stiffness against uniform dilation, per axis
-    [Pa].
-    """
-    more = kirchhoff_hat(stretched(s, -1, 1.0 + STRAIN), law)
-    less = kirchhoff_hat(stretched(s, -1, 1.0 - STRAIN), law)
-    return (total_of(more) - total_of(less)) / (2.0 * STRAIN * len(s))
+    """K = d(tr tau)/dh / d under s -> s (1 + h) [Pa]: (s . A s + tr tau)/d, A = dpk1_hat(s)."""
+    return (dot(s, mv(dpk1_hat(s, law), s)) + total_of(kirchhoff_hat(s, law))) / len(s)
 
 
 @kernel

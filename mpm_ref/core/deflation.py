@@ -2,11 +2,11 @@
 
 Of the three eigenvalues of a symmetric matrix, the one farthest from the middle one has a well
 conditioned eigenvector, however close the other two are (Scherzinger and Dohrmann 2008). With that
-vector split off, what remains lies in the plane across it, where singular values and eigenvalues are
-sums and differences of two lengths. No sweeps, no tolerances.
+vector split off, what remains lies in the plane across it, where singular values and eigenvalues
+are sums and differences of two lengths. No sweeps, no tolerances.
 
-The largest entry of an input is 0 or between 1e-30 and 1e30 (`spectral` sees to that), so that the
-fourth powers below stay in the range of floats.
+The largest entry of an input is 0 or moderate (see `extremes`), so that the fourth powers below
+stay in the range of floats.
 """
 
 from math import copysign, sqrt
@@ -15,7 +15,7 @@ from .jit import kernel
 from .tensor import cross, det, inner, lin, norm
 
 NEGLIGIBLE = 1e-40      # of one square against another: far below round-off
-NO_LENGTH = 1e-200      # a square too small to be that of a direction; negligible against 1e-30
+NO_LENGTH = 1e-200      # a square too small for its root to have a direction; negligible as well
 
 
 @kernel
@@ -136,8 +136,6 @@ def svd2(M):
     """
     a, q = direction(0.5 * (M[0][0] + M[1][1]), 0.5 * (M[1][0] - M[0][1]))
     b, r = direction(0.5 * (M[0][0] - M[1][1]), 0.5 * (M[1][0] + M[0][1]))
-    if r == 0.0:
-        b = a
     v = half(b[0] * a[0] + b[1] * a[1], b[1] * a[0] - b[0] * a[1])
     u = v[0] * a[0] - v[1] * a[1], v[1] * a[0] + v[0] * a[1]
     return u, (q + r, q - r), v

@@ -1,8 +1,8 @@
-"""Rigid motions on a schedule: where a collider is at time t, and how fast it moved in the step that led there.
+"""Rigid motions on a schedule: where a collider is, and how fast it moved in the step that led there.
 
-A schedule gives a displacement [m], or an angle [rad], as a function of time: `value(t)`. The velocity of a step that ends at
-t is (value(t) - value(t - dt)) / dt: the displacements of the steps add up to the schedule's, whatever it is (a start or stop
-within a step, a kink, a jump).
+A schedule gives a displacement [m] or an angle [rad] as a function of time, `value(t)`. The velocity
+in a step that ends at t is (value(t) - value(t - dt)) / dt, so that the displacements of the steps
+add up to the schedule's even where it starts, stops, bends or jumps within a step.
 """
 
 from dataclasses import dataclass
@@ -65,7 +65,7 @@ class Ramps:
 
 @dataclass(frozen=True)
 class Oscillation:
-    """amplitude (sin(2 pi frequency s + phase) - sin(phase)), s the time since start [s], until stop."""
+    """amplitude (sin(2 pi frequency s + phase) - sin(phase)), s the time since start; until stop."""
 
     amplitude: object
     frequency: float          # [1/s]
@@ -102,8 +102,9 @@ class Pose(NamedTuple):
 class Motion:
     """Translation [m] and rotation [rad] about `center` on schedules; None where there is none.
 
-    orientation is a rotation matrix that turns the shape about `center` before it moves (see `rotation`); center is the
-    world's origin unless given. In 3D a rotation has an `axis`; in 2D it is counter-clockwise.
+    `orientation` is a rotation matrix (see `rotation`) that turns the shape about `center` before it
+    moves. The centre is the world's origin unless given, and moves with the translation. A rotation
+    has an `axis` in 3D and is counter-clockwise in 2D.
     """
 
     translation: object = None
@@ -117,10 +118,16 @@ class Motion:
         """Whether the motion depends on time."""
         return self.translation is not None or self.rotation is not None
 
-    def pose(self, t, dt, d):
-        """`Pose` at time t [s] in d dimensions; velocities are means over the step of length dt [s] before t.
+    @property
+    def at_rest(self):
+        """The placement without the schedules."""
+        return Motion(center=self.center, orientation=self.orientation)
 
-        Raises ValueError for vectors of another dimension, an axis missing in 3D or one too many in 2D.
+    def pose(self, t, dt, d):
+        """`Pose` at time t [s] in d dimensions; velocities are means over the step of dt [s] before t.
+
+        Raises ValueError for vectors of another dimension, and for an axis missing in 3D or given
+        in 2D.
         """
         if not dt > 0.0:
             raise ValueError(f"dt = {dt}: expected the length of the step that ends at t, > 0 in s")
@@ -138,18 +145,19 @@ class Motion:
 
     def _turn(self, t, dt, d):
         """Rotation and angular velocity."""
-        R0 = np.eye(d) if self.orientation is None else _rotation("orientation", self.orientation, d)
+        R0 = np.eye(d) if self.orientation is None else _orthogonal(self.orientation, d)
         if self.rotation is None:
             return R0, np.zeros((d, d))
         K, angle = generator(d, self.axis), float(self.rotation.value(t))
-        return _exponential(K, angle) @ R0, (angle - float(self.rotation.value(t - dt))) / dt * K
+        rate = (angle - float(self.rotation.value(t - dt))) / dt
+        return _exponential(K, angle) @ R0, rate * K
 
 
 STILL = Motion()
 
 
 def rotation(angle, axis=None):
-    """Rotation matrix by an angle [rad]: about `axis` in 3D, counter-clockwise in 2D if axis is None."""
+    """Rotation matrix of an angle [rad], about `axis` in 3D, counter-clockwise in 2D without one."""
     return _exponential(generator(2 if axis is None else 3, axis), angle)
 
 
@@ -192,10 +200,10 @@ def _sized(name, x, d):
     return x
 
 
-def _rotation(name, R, d):
-    R = _finite(name, R)
+def _orthogonal(R, d):
+    R = _finite("orientation", R)
     if R.shape != (d, d) or abs(R @ R.T - np.eye(d)).max() > 1e-9 or np.linalg.det(R) < 0.0:
-        raise ValueError(f"{name} = {R.tolist()}: expected a {d} x {d} rotation matrix")
+        raise ValueError(f"orientation = {R.tolist()}: expected a {d} x {d} rotation matrix")
     return R
 
 

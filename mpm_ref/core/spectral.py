@@ -1,13 +1,14 @@
-"""Singular values, polar decomposition, symmetric eigenvalues, and their differentials, in 2D and 3D.
+"""Singular values, polar decomposition, symmetric eigenvalues and their differentials, 2D and 3D.
 
-Errors are a few units of round-off times the largest singular value, whether the singular values are
+Errors are a few units of round-off times the largest singular value, whether singular values are
 repeated, zero, negative or 1e-300: nothing is divided by a small one, nor by the difference of two.
 The method stands in `deflation`.
 """
 
-from math import frexp, isfinite, ldexp, nan, sqrt
+from math import nan, sqrt
 
 from .deflation import complement, direction, eigh2, separated, svd2, turned, unit
+from .extremes import is_finite, is_moderate, moderate, not_a_number, rescaled
 from .jit import kernel
 from .tensor import (
     cofactor,
@@ -15,9 +16,7 @@ from .tensor import (
     diagonal,
     dot,
     fill,
-    identity,
     inner,
-    lin,
     mlin,
     mm,
     mmt,
@@ -26,22 +25,21 @@ from .tensor import (
     transpose,
 )
 
-SMALLEST, LARGEST = 1e-30, 1e30     # of max |F_ij|, between which fourth powers lose no digits
-UNDETERMINED = 2.3e-16              # (s_i + s_j)/s_0, at and below which R is not determined
-FAR_FROM_SINGULAR = 6.0             # most (sum s)^3/prod (s_i + s_j) of the fast rotation; 27/8 at I
+UNDETERMINED = 2.3e-16      # (s_i + s_j)/s_0, at and below which R is not determined
+FAR_FROM_SINGULAR = 6.0     # most (sum s)^3/prod (s_i + s_j) for the fast rotation; 27/8 at F = I
 
 
 @kernel
 def svd(F):
-    """F = U diag(s) V^T, det U = det V = +1, s[0] >= s[1] >= |s[2]|; the last has the sign of det F.
+    """F = U diag(s) V^T, det U = det V = +1, s[0] >= s[1] >= |s[2]|; s[-1] has the sign of det F.
 
     Returns U, s, V, ok. For input that is not finite ok is False and U, s, V are NaN.
     """
-    if not _finite(F):
-        return _nan(F), fill(nan, F), _nan(F), False
-    A, e = _moderate(F)
+    if not is_finite(F):
+        return not_a_number(F), fill(nan, F), not_a_number(F), False
+    A, e = moderate(F)
     U, s, V = _svd(A)
-    return U, _rescaled(s, e), V, True
+    return U, rescaled(s, e), V, True
 
 
 @kernel
@@ -56,8 +54,8 @@ def polar(F):
 
 @kernel
 def rotation(F):
-    """R of `polar` to round-off, and four times as fast where F is far from singular and inverted."""
-    if SMALLEST < _largest_entry(F) and _largest_entry(F) < LARGEST:
+    """R of `polar` to round-off; four times as fast where F is far from singular and inverted."""
+    if is_moderate(F):
         R, ok = _fast_rotation(F)
         if ok:
             return R
@@ -71,19 +69,19 @@ def eigh(A):
 
     Returns w, Q; NaN for input that is not finite.
     """
-    if not _finite(A):
-        return fill(nan, A), _nan(A)
-    B, e = _moderate(A)
+    if not is_finite(A):
+        return fill(nan, A), not_a_number(A)
+    B, e = moderate(A)
     w, Q = _eigh(B)
-    return _rescaled(w, e), Q
+    return rescaled(w, e), Q
 
 
 @kernel
 def d_rotation(U, s, V, dF):
     """Change of R = U V^T when F = U diag(s) V^T changes by dF.
 
-    dR = U X V^T, X_ij = (M_ij - M_ji)/(s_i + s_j), M = U^T dF V: smooth for repeated singular values.
-    Where s_i + s_j = 0 to round-off, R is not unique and has no differential: X_ij = 0 is taken.
+    dR = U X V^T, X_ij = (M_ij - M_ji)/(s_i + s_j), M = U^T dF V: regular for repeated singular
+    values. Where s_i + s_j = 0 to round-off, R is not unique and has no differential: X_ij = 0.
     """
     M = mm(transpose(U), mm(dF, V))
     if len(s) == 2:
@@ -173,8 +171,8 @@ def _fast_rotation(F):
     (Markley 1993). It loses digits as z/t^3 does.
     """
     if len(F) == 2:
-        (c, s), _ = direction(F[0][0] + F[1][1], F[1][0] - F[0][1])
-        return ((c, -s), (s, c)), True
+        (c, s), r = direction(F[0][0] + F[1][1], F[1][0] - F[0][1])
+        return ((c, -s), (s, c)), r > 0.0
     else:
         K = cofactor(F)
         n2, J = inner(F, F), dot(F[0], K[0])
@@ -188,9 +186,10 @@ def _fast_rotation(F):
 
 @kernel
 def _sum_of_singular(n2, k2, J):
-    """t = sum s_i, of n2 = |F|^2, k2 = |cof F|^2, J = det F: largest root of (t^2 - n2)^2 - 8 J t - 4 k2.
+    """t = sum s_i of n2 = |F|^2, k2 = |cof F|^2, J = det F.
 
-    Halley's method descends to it from sqrt(3 n2), for all roots are real. Given up near singular F.
+    It is the largest root of (t^2 - n2)^2 - 8 J t - 4 k2. All roots are real, so that Halley's
+    method descends to it from sqrt(3 n2) >= t. Given up where the rotation will be.
     """
     t = sqrt(3.0 * n2)
     for _ in range(8):
@@ -204,68 +203,3 @@ def _sum_of_singular(n2, k2, J):
         if step <= 1e-6 * t:
             break
     return t
-
-
-@kernel
-def _nan(like):
-    return mlin(nan, identity(like), nan, identity(like))
-
-
-@kernel
-def _finite(A):
-    if len(A) == 2:
-        return isfinite(A[0][0]) and isfinite(A[0][1]) and isfinite(A[1][0]) and isfinite(A[1][1])
-    else:
-        return _finite_vector(A[0]) and _finite_vector(A[1]) and _finite_vector(A[2])
-
-
-@kernel
-def _finite_vector(x):
-    return isfinite(x[0]) and isfinite(x[1]) and isfinite(x[2])
-
-
-@kernel
-def _largest_entry(A):
-    if len(A) == 2:
-        return max(abs(A[0][0]), abs(A[0][1]), abs(A[1][0]), abs(A[1][1]))
-    else:
-        return max(_largest(A[0]), _largest(A[1]), _largest(A[2]))
-
-
-@kernel
-def _largest(x):
-    return max(abs(x[0]), abs(x[1]), abs(x[2]))
-
-
-@kernel
-def _moderate(A):
-    """2^-e A and e; e = 0 but for entries out of the range of `deflation`."""
-    a = _largest_entry(A)
-    if (SMALLEST < a and a < LARGEST) or a == 0.0:
-        return A, 0
-    e = frexp(a)[1]
-    return _shifted(A, -e), e
-
-
-@kernel
-def _shifted(A, e):
-    """2^e A."""
-    if len(A) == 2:
-        (a, b), (c, d) = A
-        return (ldexp(a, e), ldexp(b, e)), (ldexp(c, e), ldexp(d, e))
-    else:
-        return _shifted_vector(A[0], e), _shifted_vector(A[1], e), _shifted_vector(A[2], e)
-
-
-@kernel
-def _shifted_vector(x, e):
-    return ldexp(x[0], e), ldexp(x[1], e), ldexp(x[2], e)
-
-
-@kernel
-def _rescaled(s, e):
-    """2^e s, in two steps: 2^e may be out of range where 2^e s is not. Infinite where that is too."""
-    if e == 0:
-        return s
-    t = lin(ldexp(1.0, e // 2), s, 0.0, s)
-    return lin(ldexp(1.0, e - e // 2), t, 0.0, t)

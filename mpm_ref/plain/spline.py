@@ -34,7 +34,7 @@ class Pairs(NamedTuple):
 def pairs(x, dx, degree):
     """Pairs of the particles at x (N, d) [m] with nodes of a grid of spacing dx [m] (NSF-alg-mpm)."""
     d, half = x.shape[1], x.dtype.type(degree + 1) / 2
-    base = np.floor(x / dx + 1 - half).astype(int)
+    base = np.floor(x / dx - (half - 1)).astype(int)
     node = base[:, None] + np.array(list(np.ndindex(*d * (degree + 1,))))
     u = x[:, None] / dx - node.astype(x.dtype)
     n, dn = bspline(u + half, degree), slope(u + half, degree)

@@ -31,7 +31,7 @@ class Matter(NamedTuple):
 
 
 class Method(NamedTuple):
-    """Discretisation: spacing [m], degree of the spline, transfer, and its options as in `explicit.Scheme`."""
+    """Spacing [m], degree of the spline, transfer and its options, as in `explicit.Scheme`."""
 
     dx: float
     degree: int
@@ -58,29 +58,50 @@ class Nodes(NamedTuple):
 
 
 class Moved(NamedTuple):
-    """What one body's particles get in one step."""
+    """What the particles of one body get from the grid."""
 
-    ip: Pairs
     v: np.ndarray
     x: np.ndarray
     C: np.ndarray | None
     L: np.ndarray
+
+
+class Deformed(NamedTuple):
+    """What follows from the velocity gradient."""
+
     F_trial: np.ndarray
     F: np.ndarray
     y: np.ndarray | None
     tau: np.ndarray
 
 
-def step(bodies, method, gravity, dt, conditions=None):
-    """One step of length dt [s] of a list of `Matter`: returns its `Nodes` and one `Moved` per body.
+class Step(NamedTuple):
+    """Every stage of one step; the lists have one entry per body."""
 
-    gravity is (d,) [m/s^2]; conditions(v, m, box) returns the velocities that satisfy the boundary conditions.
+    clouds: list        # of Pairs
+    nodes: Nodes
+    moved: list         # of Moved
+    deformed: list      # of Deformed
+
+
+def step(bodies, method, gravity, dt, conditions=None):
+    """One step of length dt [s] of a list of `Matter`: its stages, as a `Step`.
+
+    gravity is (d,) [m/s^2]; conditions(v, m, box) returns the velocities that satisfy the boundary
+    conditions.
     """
     clouds = [pairs(q.x, method.dx, method.degree) for q in bodies]
-    grid = to_grid(bodies, clouds, method, gravity, dt)
+    nodes = to_grid(bodies, clouds, method, gravity, dt)
     if conditions is not None:
-        grid = grid._replace(v=conditions(grid.v_free, grid.m, grid.box))
-    return grid, [to_particles(q, ip, grid, method, dt) for q, ip in zip(bodies, clouds)]
+        nodes = nodes._replace(v=conditions(nodes.v_free, nodes.m, nodes.box))
+    moved = [to_particles(q, ip, nodes, method, dt) for q, ip in zip(bodies, clouds)]
+    return Step(clouds, nodes, moved, [deform(q, new.L, dt) for q, new in zip(bodies, moved)])
+
+
+def after(q, moved, deformed):
+    """A body after the step."""
+    return q._replace(x=moved.x, v=moved.v, C=moved.C,
+                      F=deformed.F, y=deformed.y, tau=deformed.tau)
 
 
 def to_grid(bodies, clouds, method, gravity, dt):
@@ -109,24 +130,28 @@ def isotropic(s, d):
     return s[:, None, None] * np.eye(d, dtype=s.dtype)
 
 
-def to_particles(q, ip, grid, method, dt):
-    """New velocity, position, affine field and deformation of one body."""
-    v = transfer.velocity(grid.v, ip, grid.box)
-    x = q.x + dt * v
-    C = L = transfer.velocity_gradient(grid.v, ip, grid.box)
+def to_particles(q, ip, nodes, method, dt):
+    """New velocity, position and velocity gradient of one body."""
+    v, box = transfer.velocity(nodes.v, ip, nodes.box), nodes.box
+    x, C, L = q.x + dt * v, None, transfer.velocity_gradient(nodes.v, ip, box)
     if method.transfer in ("apic", "mls"):
-        C = transfer.rpic(transfer.affine(grid.v, method.D, ip, grid.box), method.rpic)
+        C = transfer.rpic(transfer.affine(nodes.v, method.D, ip, box), method.rpic)
     if method.transfer == "mls":
         L = C
     if method.transfer == "flip":
-        m = np.where(grid.m > 0, grid.m, 1)[..., None]
-        v = transfer.flip(q.v, v, transfer.velocity(grid.mv / m, ip, grid.box), method.flip)
-    F_trial = deformed(q.F, L, dt)
+        v_old = nodes.mv / np.where(nodes.m > 0, nodes.m, 1)[..., None]
+        v = transfer.flip(q.v, v, transfer.velocity(v_old, ip, box), method.flip)
+    return Moved(v, x, C, L)
+
+
+def deform(q, L, dt):
+    """Trial deformation, return map and stress of one body."""
+    F_trial = grown(q.F, L, dt)
     F, y = project(F_trial, q.y, dt, q.law, q.flow)
-    return Moved(ip, v, x, None if q.C is None else C, L, F_trial, F, y, stress(F, y, q))
+    return Deformed(F_trial, F, y, stress(F, y, q))
 
 
-def deformed(F, L, dt):
+def grown(F, L, dt):
     """F trial = (I + dt L) F (NSF-alg-mpm step 3), or its determinant det(I + dt L) J in a fluid."""
     growth = np.eye(L.shape[1], dtype=L.dtype) + dt * L
     return det(growth) * F if F.ndim == 1 else growth @ F
@@ -138,11 +163,6 @@ def stress(F, y, q):
     return tau if q.y is None else tau * intact(y, q.flow)[:, None, None]
 
 
-def moved(q, new):
-    """The body after the step."""
-    return q._replace(x=new.x, v=new.v, C=new.C, F=new.F, y=new.y, tau=new.tau)
-
-
 def energies(q, method, gravity):
     """Kinetic, elastic and gravitational energy of one body [J], as an array (3,)."""
     kinetic = (q.m * (q.v**2).sum(axis=1)).sum() / 2
@@ -150,4 +170,5 @@ def energies(q, method, gravity):
         kinetic = kinetic + method.D * (q.m * (q.C**2).sum(axis=(1, 2))).sum() / 2
     psi = energy(q.F, q.law)
     whole = 1 if q.y is None else intact(q.y, q.flow)
-    return np.stack([kinetic, (q.V0 * whole * psi).sum(), -(q.m * (q.x * gravity).sum(axis=1)).sum()])
+    height = (q.x * gravity).sum(axis=1)
+    return np.stack([kinetic, (q.V0 * whole * psi).sum(), -(q.m * height).sum()])

@@ -1,0 +1,142 @@
+"""`python -m benchmarks`: ours beside Taichi and Warp on one elastic block, and what each feature
+of ours costs.
+"""
+
+import json
+import platform
+import resource
+import subprocess
+import sys
+import time
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from .problem import block
+
+app = typer.Typer(add_completion=False, no_args_is_help=True)
+CELLS = {"10k": 11, "100k": 23, "1M": 50}
+WARM_UP = 20        # steps before timing, after which the energies are compared
+AGREE = 1e-12       # relative difference of the kinetic energies that is allowed
+
+
+def backend(name, problem, threads):
+    """A stepper of the problem; imports the backend only when it is asked for."""
+    if name == "mpm_ref":
+        from .ours_block import OurBlock as Backend
+    elif name == "taichi":
+        from .taichi_block import TaichiBlock as Backend
+    else:
+        from .warp_block import WarpBlock as Backend
+    return Backend(problem, threads)
+
+
+def timed(stepper, steps):
+    """Wall and CPU seconds of some steps."""
+    wall, cpu = time.perf_counter(), time.process_time()
+    stepper.step(steps)
+    return time.perf_counter() - wall, time.process_time() - cpu
+
+
+def kinetic(stepper, mass):
+    """Kinetic energy of the particles [J]."""
+    return 0.5 * mass * float(np.sum(stepper.velocity() ** 2))
+
+
+def compare(problem, names, threads, repeats):
+    """Median wall and CPU ns per particle-step of each backend, timed in turn; and their
+    energies.
+    """
+    steppers = {name: backend(name, problem, threads) for name in names}
+    for stepper in steppers.values():
+        stepper.step(WARM_UP)
+    energies = {name: kinetic(stepper, problem.m) for name, stepper in steppers.items()}
+    per_round = max(1, round(300_000 / len(problem.x)))
+    rounds = {name: [] for name in names}
+    for _ in range(repeats):
+        for name, stepper in steppers.items():
+            rounds[name].append(timed(stepper, per_round))
+    scale = 1e9 / (per_round * len(problem.x))
+    times = {name: np.median(r, axis=0) * scale for name, r in rounds.items()}
+    return times, energies
+
+
+def disagreement(energies):
+    """Largest relative difference of the energies."""
+    values = np.array(list(energies.values()))
+    return float(np.ptp(values) / np.abs(values).max())
+
+
+@app.command()
+def blocks(
+    sizes: Annotated[str, typer.Option(help="of 10k, 100k, 1M, comma-separated")] = "10k,100k,1M",
+    backends: Annotated[str, typer.Option()] = "mpm_ref,taichi,warp",
+    threads: Annotated[int, typer.Option()] = 2,
+    repeats: Annotated[int, typer.Option()] = 9,
+    out: Annotated[Path, typer.Option()] = Path("results/benchmarks/block.json"),
+):
+    """Ns per particle-step of every backend, lattice and shuffled order, with ratios."""
+    names, rows = backends.split(","), []
+    for size in sizes.split(","):
+        for shuffle in (False, True):
+            problem = block(CELLS[size], shuffle)
+            times, energies = compare(problem, names, threads, repeats)
+            apart = disagreement(energies)
+            if apart > AGREE:
+                raise SystemExit(f"the backends disagree by {apart:.1e} > {AGREE}: {energies}")
+            for name, (wall, cpu) in times.items():
+                rows.append({
+                    "size": size, "particles": len(problem.x), "shuffled": shuffle,
+                    "backend": name, "wall_ns": wall, "cpu_ns": cpu,
+                    "cpu_ratio_to_ours": cpu / times[names[0]][1], "disagreement": apart,
+                })
+                show(rows[-1])
+    save(out, rows, threads, repeats)
+
+
+def show(row):
+    """One line of the table."""
+    order = "shuffled" if row["shuffled"] else "lattice"
+    typer.echo(
+        f"{row['size']:>5} {order:8} {row['backend']:8} wall {row['wall_ns']:7.1f} ns  "
+        f"CPU {row['cpu_ns']:7.1f} ns  x {row['cpu_ratio_to_ours']:.2f} of ours"
+    )
+
+
+def save(out, rows, threads, repeats):
+    """Results with what they were measured on."""
+    out.parent.mkdir(parents=True, exist_ok=True)
+    commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True)
+    out.write_text(json.dumps({
+        "command": "python -m benchmarks " + " ".join(sys.argv[1:]),
+        "commit": commit.stdout.strip() or "unknown",
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "machine": platform.machine(), "threads": threads, "repeats": repeats, "rows": rows,
+    }, indent=1) + "\n")
+    typer.echo(f"wrote {out}")
+
+
+@app.command()
+def start(name: str, size: str = "10k", threads: int = 2):
+    """Seconds to the end of the first step, and peak memory per particle, of one backend in a
+    fresh process. Run it twice: the second time with a warm cache.
+    """
+    began = time.perf_counter()
+    problem = block(CELLS[size])
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    stepper = backend(name, problem, threads)
+    stepper.step(1)
+    seconds = time.perf_counter() - began
+    stepper.step(WARM_UP)
+    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+    typer.echo(json.dumps({
+        "backend": name, "size": size, "first_step_s": round(seconds, 2),
+        "peak_bytes_per_particle": round(grown * 1024 / len(problem.x)),
+    }))
+
+
+if __name__ == "__main__":
+    app()

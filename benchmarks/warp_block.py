@@ -1,0 +1,182 @@
+"""The block in Warp, as a user of Warp would write it; its CPU backend runs on one thread."""
+
+import warp as wp
+
+from .problem import GRAVITY, WALL
+
+POLAR_ITERATIONS = 5
+
+
+@wp.struct
+class Constants:
+    """Numbers of a `Block`."""
+
+    m: wp.float64
+    V0: wp.float64
+    dx: wp.float64
+    dt: wp.float64
+    mu: wp.float64
+    lam: wp.float64
+    g: wp.float64
+    n: wp.int32
+    wall: wp.int32
+
+
+@wp.func
+def polar(A: wp.mat33d):
+    """Rotation of A by Newton's iteration."""
+    R = A
+    for _ in range(POLAR_ITERATIONS):
+        R = wp.float64(0.5) * (R + wp.transpose(wp.inverse(R)))
+    return R
+
+
+@wp.func
+def weights(f: wp.float64):
+    """Quadratic spline at the three nodes."""
+    a = wp.float64(1.5) - f
+    b = f - wp.float64(1.0)
+    c = f - wp.float64(0.5)
+    return wp.vec3d(wp.float64(0.5) * a * a, wp.float64(0.75) - b * b, wp.float64(0.5) * c * c)
+
+
+@wp.func
+def base_of(x: wp.float64, dx: wp.float64):
+    """First node that x reaches."""
+    return wp.int32(x / dx - wp.float64(0.5))
+
+
+@wp.func
+def arm(i: wp.int32, j: wp.int32, l: wp.int32, f: wp.vec3d, dx: wp.float64):
+    """x_i - x_p."""
+    return (wp.vec3d(wp.float64(i), wp.float64(j), wp.float64(l)) - f) * dx
+
+
+@wp.kernel
+def p2g(
+    x: wp.array(dtype=wp.vec3d),
+    v: wp.array(dtype=wp.vec3d),
+    C: wp.array(dtype=wp.mat33d),
+    F: wp.array(dtype=wp.mat33d),
+    grid_v: wp.array(dtype=wp.vec3d, ndim=3),
+    grid_m: wp.array(dtype=wp.float64, ndim=3),
+    k: Constants,
+):
+    """Mass and momentum with the internal forces' impulse."""
+    p = wp.tid()
+    bx = base_of(x[p][0], k.dx)
+    by = base_of(x[p][1], k.dx)
+    bz = base_of(x[p][2], k.dx)
+    f = x[p] / k.dx - wp.vec3d(wp.float64(bx), wp.float64(by), wp.float64(bz))
+    wx = weights(f[0])
+    wy = weights(f[1])
+    wz = weights(f[2])
+    J = wp.determinant(F[p])
+    tau = wp.float64(2.0) * k.mu * (F[p] - polar(F[p])) * wp.transpose(F[p])
+    tau += k.lam * J * (J - wp.float64(1.0)) * wp.identity(n=3, dtype=wp.float64)
+    Q = k.m * C[p] - k.dt * k.V0 * wp.float64(4.0) / (k.dx * k.dx) * tau
+    for i in range(3):
+        for j in range(3):
+            for l in range(3):
+                r = arm(i, j, l, f, k.dx)
+                w = wx[i] * wy[j] * wz[l]
+                wp.atomic_add(grid_v, bx + i, by + j, bz + l, w * (k.m * v[p] + Q * r))
+                wp.atomic_add(grid_m, bx + i, by + j, bz + l, w * k.m)
+
+
+@wp.func
+def stopped(u: wp.float64, i: wp.int32, n: wp.int32, wall: wp.int32):
+    """Slip wall."""
+    if i < wall and u < wp.float64(0.0):
+        return wp.float64(0.0)
+    if i > n - wall and u > wp.float64(0.0):
+        return wp.float64(0.0)
+    return u
+
+
+@wp.kernel
+def update(
+    grid_v: wp.array(dtype=wp.vec3d, ndim=3),
+    grid_m: wp.array(dtype=wp.float64, ndim=3),
+    k: Constants,
+):
+    """Velocity, gravity, walls."""
+    i, j, l = wp.tid()
+    if grid_m[i, j, l] > wp.float64(0.0):
+        u = grid_v[i, j, l] / grid_m[i, j, l]
+        w = u[2] + k.dt * k.g
+        grid_v[i, j, l] = wp.vec3d(
+            stopped(u[0], i, k.n, k.wall),
+            stopped(u[1], j, k.n, k.wall),
+            stopped(w, l, k.n, k.wall),
+        )
+
+
+@wp.kernel
+def g2p(
+    x: wp.array(dtype=wp.vec3d),
+    v: wp.array(dtype=wp.vec3d),
+    C: wp.array(dtype=wp.mat33d),
+    F: wp.array(dtype=wp.mat33d),
+    grid_v: wp.array(dtype=wp.vec3d, ndim=3),
+    k: Constants,
+):
+    """Velocity, affine field, position, deformation."""
+    p = wp.tid()
+    bx = base_of(x[p][0], k.dx)
+    by = base_of(x[p][1], k.dx)
+    bz = base_of(x[p][2], k.dx)
+    f = x[p] / k.dx - wp.vec3d(wp.float64(bx), wp.float64(by), wp.float64(bz))
+    wx = weights(f[0])
+    wy = weights(f[1])
+    wz = weights(f[2])
+    new_v = wp.vec3d()
+    B = wp.mat33d()
+    for i in range(3):
+        for j in range(3):
+            for l in range(3):
+                u = wx[i] * wy[j] * wz[l] * grid_v[bx + i, by + j, bz + l]
+                r = arm(i, j, l, f, k.dx)
+                new_v += u
+                B += wp.outer(u, r)
+    v[p] = new_v
+    C[p] = wp.float64(4.0) / (k.dx * k.dx) * B
+    x[p] = x[p] + k.dt * new_v
+    F[p] = (wp.identity(n=3, dtype=wp.float64) + k.dt * C[p]) * F[p]
+
+
+class WarpBlock:
+    """Steps a `Block` on Warp's CPU device."""
+
+    name = "warp"
+
+    def __init__(self, block, threads):
+        wp.config.quiet = True
+        wp.init()
+        self.particles = [
+            wp.array(block.x, dtype=wp.vec3d, device="cpu"),
+            wp.array(block.v, dtype=wp.vec3d, device="cpu"),
+            wp.zeros(len(block.x), dtype=wp.mat33d, device="cpu"),
+            wp.array(block.F, dtype=wp.mat33d, device="cpu"),
+        ]
+        self.grid_v = wp.zeros((block.n,) * 3, dtype=wp.vec3d, device="cpu")
+        self.grid_m = wp.zeros((block.n,) * 3, dtype=wp.float64, device="cpu")
+        self.k = Constants()
+        for name in ("m", "V0", "dx", "dt", "mu", "lam", "n"):
+            setattr(self.k, name, getattr(block, name))
+        self.k.g, self.k.wall = GRAVITY, WALL
+
+    def step(self, steps):
+        """Advance by a number of steps."""
+        n_particles = len(self.particles[0])
+        for _ in range(steps):
+            self.grid_v.zero_()
+            self.grid_m.zero_()
+            grid = [self.grid_v, self.grid_m, self.k]
+            wp.launch(p2g, n_particles, [*self.particles, *grid], device="cpu")
+            wp.launch(update, self.grid_m.shape, grid, device="cpu")
+            wp.launch(g2p, n_particles, [*self.particles, self.grid_v, self.k], device="cpu")
+
+    def velocity(self):
+        """Velocities (N, 3)."""
+        return self.particles[1].numpy()

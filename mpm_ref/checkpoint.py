@@ -1,0 +1,150 @@
+"""A run's complete state in a file, to continue bit for bit: all of it is there, or the one before.
+
+The file is HDF5 with a last line of our own: the sha256 of all bytes before it. HDF5 does not mind
+the line; and a file that is cut short, altered in one bit, or not ours is known before HDF5 reads it.
+"""
+
+import hashlib
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from .atomic import replacing, require_space
+from .core.state import Particles
+from .energy import Energy
+from .journal import JournaledFile
+from .manifest import scene_hash, source_hash
+from .monitor import Account
+from .simulate import State
+
+FORMAT = "mpm_ref checkpoint 1"
+SEAL = b"\nmpm_ref sha256 "
+SEALED = len(SEAL) + 64
+LIBVER = ("earliest", "v110")
+
+
+class BadCheckpoint(ValueError):
+    """A checkpoint cannot be continued from."""
+
+
+def save(path, state, problem):
+    """Write a `State` of a problem to `path`, in place of the checkpoint before.
+
+    The state must stand between two steps. Raises `NotWritten`; the checkpoint before then stands.
+    """
+    require_space(path, size_of(state))
+    with replacing(path) as part:
+        file = JournaledFile(part, new=True)
+        try:
+            with h5py.File(file, "w", libver=LIBVER) as h5:
+                _write(h5, state, problem)
+            file.commit()
+        finally:
+            file.close()
+        with open(part, "ab") as end:
+            end.write(SEAL + _sha256(part, part.stat().st_size).encode())
+
+
+def load(path, problem):
+    """The `State` that was saved to `path` for the same problem, and whether the code that saved it
+    was this one: only then is it certain that it continues bit for bit.
+
+    Laws and return maps come from the problem, everything else from the file. Raises
+    `BadCheckpoint` for a file that is damaged or belongs to another scene, or that is not there.
+    """
+    path = Path(path)
+    _verify(path)
+    with h5py.File(path, "r") as h5:
+        saved = h5.attrs["scene_sha256"]
+        if saved != scene_hash(problem):
+            raise BadCheckpoint(f"{path} belongs to another scene (sha256 {saved[:12]}, this one is "
+                                f"{scene_hash(problem)[:12]}); give the scene of that run, or start a new one")
+        return _read(h5, problem), h5.attrs["source_sha256"] == source_hash()
+
+
+def summary(path):
+    """Step, time [s], frames and scene hash of a checkpoint, as a dict. Raises `BadCheckpoint`."""
+    _verify(Path(path))
+    with h5py.File(path, "r") as h5:
+        return {"step": int(h5.attrs["step"]), "t": float(h5.attrs["t"]),
+                "frames": int(h5.attrs["frame"]), "scene_sha256": h5.attrs["scene_sha256"]}
+
+
+def size_of(state):
+    """Bytes of a state's arrays."""
+    return sum(a.nbytes for body in state.bodies for a in (*body.particles, body.id))
+
+
+def digest(state):
+    """sha256 of a state: equal for two states if and only if they continue alike."""
+    a = state.account
+    numbers = (state.step, state.t, state.frame, state.bound, *((*a.start, a.noise) if a else ()))
+    out = hashlib.sha256(np.array(numbers, dtype=float))
+    for body in state.bodies:
+        for a in (*body.particles, body.id):
+            out.update(repr((a.shape, a.dtype.str)).encode())
+            out.update(np.ascontiguousarray(a))
+    return out.hexdigest()
+
+
+def _write(h5, state, problem):
+    h5.attrs["format"] = FORMAT
+    h5.attrs["scene_sha256"] = scene_hash(problem)
+    h5.attrs["source_sha256"] = source_hash()
+    for name in ("step", "t", "frame", "bound"):
+        h5.attrs[name] = getattr(state, name)
+    if state.account is not None:
+        h5.attrs["account"] = [*state.account.start, state.account.noise]
+    for k, body in enumerate(state.bodies):
+        group = h5.create_group(f"bodies/{k}")
+        group.attrs["name"] = body.name
+        group.attrs["C is L"] = body.particles.C is body.particles.L
+        for name, a in {**body.particles._asdict(), "id": body.id}.items():
+            group.create_dataset(name, data=a, fletcher32=a.size > 0)
+
+
+def _read(h5, problem):
+    groups = [h5[f"bodies/{k}"] for k in range(len(h5["bodies"]))]
+    if [g.attrs["name"] for g in groups] != [body.name for body in problem.bodies]:
+        raise BadCheckpoint(f"{h5.filename} has other bodies than the problem; give the scene of that run")
+    bodies = tuple(body._replace(particles=_particles(g), id=g["id"][()])
+                   for body, g in zip(problem.bodies, groups, strict=True))
+    numbers = h5.attrs.get("account")
+    account = None if numbers is None else Account(
+        Energy(*map(float, numbers[:-1])), noise=float(numbers[-1]))
+    return State(bodies, step=int(h5.attrs["step"]), t=float(h5.attrs["t"]),
+                 frame=int(h5.attrs["frame"]), bound=float(h5.attrs["bound"]), account=account)
+
+
+def _particles(group):
+    arrays = {name: group[name][()] for name in Particles._fields}
+    if group.attrs["C is L"]:
+        arrays["C"] = arrays["L"]
+    return Particles(**arrays)
+
+
+def _verify(path):
+    """Raise `BadCheckpoint` unless the file is whole and ours."""
+    if not path.is_file():
+        raise BadCheckpoint(f"{path}: there is no such checkpoint")
+    size = path.stat().st_size - SEALED
+    with open(path, "rb") as file:
+        file.seek(max(size, 0))
+        end = file.read()
+    if size < 0 or not end.startswith(SEAL):
+        raise BadCheckpoint(f"{path} is cut short or is not a checkpoint of mpm_ref; "
+                            "take another one, or start the run anew")
+    if end != SEAL + _sha256(path, size).encode():
+        raise BadCheckpoint(f"{path} is damaged: its bytes are not those that were written; "
+                            "take a copy, or start the run anew")
+
+
+def _sha256(path, size):
+    """Of the first `size` bytes of a file."""
+    out = hashlib.sha256()
+    with open(path, "rb") as file:
+        while size > 0 and (block := file.read(min(size, 1 << 20))):
+            out.update(block)
+            size -= len(block)
+    return out.hexdigest()

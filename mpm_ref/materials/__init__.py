@@ -1,0 +1,96 @@
+"""Constitutive laws: one law per file, the same names in each.
+
+    mu, lam, ...    the parameters, a NamedTuple named as the law
+    from_E_nu       (or build) makes it from the parameters of a scene, checked
+    psi, pk1, kirchhoff, dpk1                   functions of F: energy, stresses, differential
+    kirchhoff_hat, pk1_hat, dpk1_hat, pair      the same in singular values, see `principal`
+    stiffness                                   lam + 2 mu
+
+and of the return maps ("flows"): `build`, `project` on singular values, `intact`. Elasticity:
+`fixed_corotated`, `hencky`, `neo_hookean`, `fluid`. Importing this package registers them all
+with the names of `core.law`.
+"""
+
+from ..core import law
+from . import (
+    drucker_prager,
+    fixed_corotated,
+    fixed_corotated_von_mises,
+    fluid,
+    fluid_projection,
+    hencky,
+    herschel_bulkley,
+    neo_hookean,
+    no_flow,
+    principal,
+    snow_clamp,
+    von_mises,
+    waves,
+)
+from .drucker_prager import DruckerPrager
+from .fixed_corotated import FixedCorotated
+from .fixed_corotated_von_mises import FixedCorotatedVonMises
+from .fluid import Fluid
+from .fluid_projection import FluidProjection
+from .hencky import Hencky
+from .herschel_bulkley import HerschelBulkley
+from .moduli import bulk_modulus, lame, yield_radius
+from .neo_hookean import NeoHookean
+from .no_flow import NoFlow
+from .principal import dpk1_spd
+from .snow_clamp import SnowClamp
+from .table import FLOWS, LAWS, Material, make_flow, make_law, recovers
+from .von_mises import Hardening, Softening, VonMises
+from .waves import stiffness, wave_modulus
+
+__all__ = [
+    "FLOWS",
+    "LAWS",
+    "DruckerPrager",
+    "FixedCorotated",
+    "FixedCorotatedVonMises",
+    "Fluid",
+    "FluidProjection",
+    "Hardening",
+    "Hencky",
+    "HerschelBulkley",
+    "Material",
+    "NeoHookean",
+    "NoFlow",
+    "SnowClamp",
+    "Softening",
+    "VonMises",
+    "bulk_modulus",
+    "dpk1_spd",
+    "lame",
+    "make_flow",
+    "make_law",
+    "recovers",
+    "stiffness",
+    "wave_modulus",
+    "yield_radius",
+]
+
+_OF_LAWS = (law.psi, law.pk1, law.kirchhoff, law.dpk1, law.kirchhoff_hat,
+            principal.pk1_hat, principal.dpk1_hat, principal.pair, waves.stiffness)
+
+for _law, _file in ((FixedCorotated, fixed_corotated), (Hencky, hencky),
+                    (NeoHookean, neo_hookean), (Fluid, fluid)):
+    for _function in _OF_LAWS:
+        _function.method(_law, getattr(_file, _function.__name__))
+law.pressure.method(Fluid, fluid.pressure)
+law.psi_volume.method(Fluid, fluid.psi_volume)
+
+for _flow, _project, _intact in (
+    (NoFlow, no_flow.project, no_flow.intact),
+    (DruckerPrager, drucker_prager.project, drucker_prager.intact),
+    (VonMises, von_mises.project, von_mises.intact),
+    (Hardening, von_mises.harden, von_mises.intact),
+    (Softening, von_mises.soften, von_mises.carries),
+    (HerschelBulkley, herschel_bulkley.project, herschel_bulkley.intact),
+    (FluidProjection, fluid_projection.project, fluid_projection.intact),
+    (SnowClamp, snow_clamp.project, snow_clamp.intact),
+    (FixedCorotatedVonMises, fixed_corotated_von_mises.project, fixed_corotated_von_mises.intact),
+):
+    law.project.method(_flow, _project)
+    law.intact.method(_flow, _intact)

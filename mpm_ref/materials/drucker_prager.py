@@ -1,0 +1,70 @@
+"""Drucker-Prager: dry sand on Hencky elasticity (NSF-F3, NCLAW-eq15, NCLAW-eq16).
+
+    tr eps > 0:    s <- 1, the tip of the cone
+    dgamma > 0:    eps <- eps - dgamma eps_hat / |eps_hat|
+    else           s stays
+
+    dgamma = |eps_hat| + alpha (d lam + 2 mu)/(2 mu) tr eps
+
+Matter in tension carries no stress; this wins over the cone (NCLAW-X7), |dev tau| = -alpha tr
+tau. The return keeps the volume, except at the tip: no correction is made for the volume gained
+there, as in the papers.
+"""
+
+from math import isfinite, radians, sin, sqrt
+from typing import NamedTuple
+
+from ..core.jit import kernel
+from ..core.tensor import fill, lin, norm, total_of
+from .log_strain import deviator, lifted, log_strain, stretch
+from .moduli import least_stretch
+from .no_flow import never_fails
+
+
+class DruckerPrager(NamedTuple):
+    """A cone without cohesion."""
+
+    alpha: float    # slope of the cone, |dev tau| / -tr tau
+    s_min: float    # trial singular values are first lifted to it (NCLaw 0.05); 0: they are not
+
+
+def build(dim, friction_angle, s_min=0.0):
+    """The cone of a friction angle in degrees.
+
+    Raises ValueError unless 0 <= friction_angle < 90, 0 <= s_min < 1.
+    """
+    if not (isfinite(friction_angle) and 0.0 <= friction_angle < 90.0):
+        raise ValueError(
+            f"friction_angle = {friction_angle}: expected degrees, 0 <= friction_angle < 90"
+        )
+    return DruckerPrager(slope(friction_angle, dim), least_stretch(s_min))
+
+
+def slope(friction_angle, dim):
+    """Slope alpha of the cone of a friction angle in degrees.
+
+    In 3D sqrt(2/3) 2 sin/(3 - sin), which equals Mohr-Coulomb in triaxial compression (NSF-F3,
+    NCLAW-eq15); in 2D, with the deviator of the plane, sin/sqrt(2), which equals Mohr-Coulomb
+    exactly (X-cross-15).
+    """
+    sine = sin(radians(friction_angle))
+    return sine / sqrt(2.0) if dim == 2 else sqrt(2.0 / 3.0) * 2.0 * sine / (3.0 - sine)
+
+
+@kernel
+def project(s, y, dt, law, flow):
+    """Singular values after the return; y as it is."""
+    s = lifted(s, flow.s_min)
+    eps = log_strain(s)
+    eps_hat = deviator(eps)
+    size, tr = norm(eps_hat), total_of(eps)
+    dgamma = size + flow.alpha * (len(s) * law.lam + 2.0 * law.mu) / (2.0 * law.mu) * tr
+    if tr > 0.0:
+        return fill(1.0, s), y
+    elif dgamma > 0.0:
+        return stretch(lin(1.0, eps, -dgamma / size, eps_hat)), y
+    else:
+        return s, y
+
+
+intact = never_fails

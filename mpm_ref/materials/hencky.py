@@ -1,0 +1,114 @@
+"""Hencky elasticity, "StVK" in log strain (NSF-eq13, NSF-F2, NCLAW-eq14, NCLAW-eq17).
+
+    psi(F) = mu sum_i eps_i^2 + lam/2 (sum_i eps_i)^2,    eps = log s,    F = U diag(s) V^T
+    tau = U diag(2 mu eps + lam sum(eps)) U^T,            P = tau F^-T
+
+NSF-eq13 prints V^T for the last U^T (then tau is not symmetric); NCLAW-eq14 calls this tau P
+(NCLAW-X1). Defined for det F > 0: otherwise psi is inf, which a line search refuses, and stresses
+are NaN, which no run overlooks. In 2D this is the law in plane strain, exactly.
+"""
+
+from math import inf, log1p
+from typing import NamedTuple
+
+from ..core.jit import kernel
+from ..core.spectral import svd
+from ..core.tensor import diag, dot, fill, lin, mlin, mmt, mul, outer, scale_columns, total_of
+from . import principal
+from .log_strain import log_strain
+from .moduli import lame
+from .principal import orientation_kept
+
+
+class Hencky(NamedTuple):
+    """Elasticity that is linear in the logarithmic strain."""
+
+    mu: float       # shear modulus [Pa]
+    lam: float      # Lame's first parameter [Pa]
+
+
+def from_E_nu(E, nu):  # noqa: N802  the constants' names
+    """The law with Young's modulus E [Pa] and Poisson's ratio nu at rest; errors as `lame`."""
+    return Hencky(*lame(E, nu))
+
+
+@kernel
+def stiffness(law):
+    """The modulus lam + 2 mu [Pa]."""
+    return law.lam + 2.0 * law.mu
+
+
+@kernel
+def psi(F, law):
+    """Energy per rest volume [J/m^d]; inf unless det F > 0."""
+    _, s, _, _ = svd(F)
+    if not s[len(s) - 1] > 0.0:
+        return inf
+    eps = log_strain(s)
+    return law.mu * dot(eps, eps) + 0.5 * law.lam * total_of(eps) * total_of(eps)
+
+
+@kernel
+def pk1(F, law):
+    """P = U diag(pk1_hat(s)) V^T [Pa]; NaN unless det F > 0."""
+    U, s, V, _ = svd(F)
+    return mmt(scale_columns(U, pk1_hat(s, law)), V)
+
+
+@kernel
+def kirchhoff(F, law):
+    """Kirchhoff stress U diag(kirchhoff_hat(s)) U^T [Pa] (NSF-eq13); NaN unless det F > 0."""
+    U, s, _, _ = svd(F)
+    return mmt(scale_columns(U, kirchhoff_hat(s, law)), U)
+
+
+@kernel
+def kirchhoff_hat(s, law):
+    """Principal tau_i = 2 mu eps_i + lam sum(eps) [Pa]."""
+    eps = log_strain(s)
+    return lin(2.0 * law.mu, eps, law.lam * total_of(eps), fill(1.0, eps))
+
+
+@kernel
+def pk1_hat(s, law):
+    """P_i = tau_i / s_i [Pa]."""
+    return mul(kirchhoff_hat(s, law), inverse(s))
+
+
+@kernel
+def dpk1_hat(s, law):
+    """dP_i/ds_j = lam / (s_i s_j), and (2 mu - tau_i) / s_i^2 more on the diagonal [Pa]."""
+    r = inverse(s)
+    own = lin(2.0 * law.mu, fill(1.0, s), -1.0, kirchhoff_hat(s, law))
+    return mlin(law.lam, outer(r, r), 1.0, diag(mul(own, mul(r, r))))
+
+
+@kernel
+def pair(s, i, j, law):
+    """(2 mu s_j (eps_i - eps_j)/(s_i - s_j) - tau_j)/(s_i s_j), (P_i + P_j)/(s_i + s_j) [Pa]."""
+    P, tau, r = pk1_hat(s, law), kirchhoff_hat(s, law), inverse(s)
+    a = (2.0 * law.mu * _log_ratio((s[i] - s[j]) * r[j]) - tau[j]) * r[i] * r[j]
+    return a, (P[i] + P[j]) / (s[i] + s[j])
+
+
+@kernel
+def _log_ratio(x):
+    """log(1 + x)/x, 1 at x = 0."""
+    return log1p(x) / x if x != 0.0 else 1.0
+
+
+@kernel
+def inverse(s):
+    """1/s_i; all NaN where one s_i is not > 0."""
+    return _inverse(orientation_kept(s))
+
+
+@kernel
+def _inverse(s):
+    if len(s) == 2:
+        return 1.0 / s[0], 1.0 / s[1]
+    else:
+        return 1.0 / s[0], 1.0 / s[1], 1.0 / s[2]
+
+
+dpk1 = principal.dpk1

@@ -1,0 +1,78 @@
+"""Principal logarithmic strain eps = log s, and what the return maps do with it."""
+
+from math import exp, inf, log
+
+from ..core.jit import kernel
+from ..core.tensor import fill, lin, norm, total_of
+from .principal import orientation_kept
+
+
+@kernel
+def log_strain(s):
+    """eps_i = log s_i; all NaN where one s_i is not > 0."""
+    return _log(orientation_kept(s))
+
+
+@kernel
+def _log(s):
+    if len(s) == 2:
+        return log(s[0]), log(s[1])
+    else:
+        return log(s[0]), log(s[1]), log(s[2])
+
+
+@kernel
+def stretch(eps):
+    """s_i = exp eps_i."""
+    if len(eps) == 2:
+        return exp(eps[0]), exp(eps[1])
+    else:
+        return exp(eps[0]), exp(eps[1]), exp(eps[2])
+
+
+@kernel
+def deviator(x):
+    """The deviator x - mean(x); in 2D that of the plane (X-cross-15)."""
+    return lin(1.0, x, -total_of(x) / len(x), fill(1.0, x))
+
+
+@kernel
+def clamp(s, low, high):
+    """Each s_i brought into [low, high]; NaN stays NaN."""
+    if len(s) == 2:
+        return _clamp(s[0], low, high), _clamp(s[1], low, high)
+    else:
+        return _clamp(s[0], low, high), _clamp(s[1], low, high), _clamp(s[2], low, high)
+
+
+@kernel
+def _clamp(x, low, high):
+    if x < low:
+        return low
+    else:
+        return high if x > high else x
+
+
+@kernel
+def lifted(s, s_min):
+    """s_i < s_min lifted to s_min, where s_min > 0."""
+    return clamp(s, s_min, inf) if s_min > 0.0 else s
+
+
+@kernel
+def radial_return(s, tau_y, law, s_min):
+    """Singular values on the surface |dev tau| = 2 mu |eps_hat| = tau_y, and dgamma; s, 0 inside.
+
+        dgamma = |eps_hat| - tau_y / (2 mu)                 (NSF-F4, NCLAW-eq18)
+        eps   <- eps - dgamma eps_hat / |eps_hat|           (NSF-F4, NCLAW-eq19)
+
+    NSF-F4 prints |eps| for the denominator |eps_hat|, with which the return misses the surface.
+    """
+    eps = log_strain(lifted(s, s_min))
+    eps_hat = deviator(eps)
+    size = norm(eps_hat)
+    dgamma = size - tau_y / (2.0 * law.mu)
+    if dgamma > 0.0:
+        return stretch(lin(1.0, eps, -dgamma / size, eps_hat)), dgamma
+    else:
+        return s, 0.0

@@ -1,0 +1,144 @@
+"""From functions of the singular values to differentials in F, for any isotropic law.
+
+With F = U diag(s) V^T and X = U^T dF V, the differential of P = U diag(pk1_hat(s)) V^T falls
+apart (Teran et al. 2005):
+
+    (U^T dP V)_ii          = sum_j A_ij X_jj                 A_ij = d pk1_hat_i / d s_j
+    sym  of the pair i, j  = a_ij (X_ij + X_ji) / 2          a_ij = (P_i - P_j) / (s_i - s_j)
+    skew of the pair i, j  = b_ij (X_ij - X_ji) / 2          b_ij = (P_i + P_j) / (s_i + s_j)
+
+`A, pairs` with pairs = ((a_01, b_01),) in 2D and those of (0, 1), (0, 2), (1, 2) in 3D is all
+there is to know at a point: the eigenvalues of d2psi/dF2 are those of A, the a and the b. A law
+gives the quotients in closed form, without subtracting or dividing by nearly equal singular
+values, so that repeated ones need no care.
+"""
+
+from math import nan
+
+from ..core.jit import by_type, kernel
+from ..core.spectral import eigh, svd
+from ..core.tensor import diagonal, fill, mm, mmt, mv, scale_columns, transpose
+
+pk1_hat = by_type("pk1_hat")        # (s, law) -> principal P_i
+dpk1_hat = by_type("dpk1_hat")      # (s, law) -> A, d x d
+pair = by_type("pair")              # (s, i, j, law) -> a_ij, b_ij
+
+
+@kernel
+def local(s, law):
+    """A, pairs of the exact differential at singular values s [Pa]."""
+    if len(s) == 2:
+        return dpk1_hat(s, law), (pair(s, 0, 1, law),)
+    else:
+        pairs = pair(s, 0, 1, law), pair(s, 0, 2, law), pair(s, 1, 2, law)
+        return dpk1_hat(s, law), pairs
+
+
+@kernel
+def local_spd(s, law):
+    """A, pairs with their negative eigenvalues set to zero; `local` to the bit if there are none.
+
+    The nearest differential, in the Frobenius norm, without negative eigenvalues.
+    """
+    A, pairs = local(s, law)
+    if len(s) == 2:
+        return semidefinite(A), (_not_negative(pairs[0]),)
+    else:
+        kept = _not_negative(pairs[0]), _not_negative(pairs[1]), _not_negative(pairs[2])
+        return semidefinite(A), kept
+
+
+@kernel
+def apply(A, pairs, X):
+    """U^T dP V for X = U^T dF V."""
+    y = mv(A, diagonal(X))
+    if len(X) == 2:
+        p, q = _mixed(pairs[0], X[0][1], X[1][0])
+        return (y[0], p), (q, y[1])
+    else:
+        p01, p10 = _mixed(pairs[0], X[0][1], X[1][0])
+        p02, p20 = _mixed(pairs[1], X[0][2], X[2][0])
+        p12, p21 = _mixed(pairs[2], X[1][2], X[2][1])
+        return (y[0], p01, p02), (p10, y[1], p12), (p20, p21, y[2])
+
+
+@kernel
+def dpk1(F, dF, law):
+    """The differential dP = (d2psi/dF2) : dF [Pa]."""
+    U, s, V, _ = svd(F)
+    A, pairs = local(s, law)
+    return mmt(mm(U, apply(A, pairs, mm(transpose(U), mm(dF, V)))), V)
+
+
+@kernel
+def dpk1_spd(F, dF, law):
+    """`dpk1` with its negative eigenvalues set to zero, as projected Newton needs it (HOT-alg1)."""
+    U, s, V, _ = svd(F)
+    A, pairs = local_spd(s, law)
+    return mmt(mm(U, apply(A, pairs, mm(transpose(U), mm(dF, V)))), V)
+
+
+@kernel
+def semidefinite(A):
+    """A symmetric matrix with its negative eigenvalues set to zero; A itself if none is."""
+    w, Q = eigh(A)
+    if w[0] >= 0.0:
+        return A
+    else:
+        return mmt(scale_columns(Q, _not_negative(w)), Q)
+
+
+@kernel
+def _not_negative(w):
+    """Negative components of a vector set to zero; NaN stays NaN."""
+    if len(w) == 2:
+        return _at_least_zero(w[0]), _at_least_zero(w[1])
+    else:
+        return _at_least_zero(w[0]), _at_least_zero(w[1]), _at_least_zero(w[2])
+
+
+@kernel
+def _at_least_zero(x):
+    return 0.0 if x < 0.0 else x
+
+
+@kernel
+def _mixed(ab, x_ij, x_ji):
+    sym, skew = 0.5 * ab[0] * (x_ij + x_ji), 0.5 * ab[1] * (x_ij - x_ji)
+    return sym + skew, sym - skew
+
+
+@kernel
+def volume(s):
+    """J, the product of the singular values."""
+    J = s[0]
+    for i in range(1, len(s)):
+        J *= s[i]
+    return J
+
+
+@kernel
+def others(s):
+    """dJ/ds_i: the product of all singular values but the i-th."""
+    if len(s) == 2:
+        return s[1], s[0]
+    else:
+        return s[1] * s[2], s[2] * s[0], s[0] * s[1]
+
+
+@kernel
+def d_others(s):
+    """d2J/ds_i ds_j: off the diagonal the product of the remaining singular values."""
+    if len(s) == 2:
+        return (0.0, 1.0), (1.0, 0.0)
+    else:
+        return (0.0, s[2], s[1]), (s[2], 0.0, s[0]), (s[1], s[0], 0.0)
+
+
+@kernel
+def orientation_kept(s):
+    """s, or NaN where one of them is not > 0: some laws are not defined there."""
+    for i in range(len(s)):
+        if not s[i] > 0.0:
+            return fill(nan, s)
+    return s

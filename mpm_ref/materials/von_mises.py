@@ -1,0 +1,90 @@
+"""Von Mises on Hencky elasticity: |dev tau|_F <= tau_y (NSF-F4, NCLAW-eq18, NCLAW-eq19).
+
+The return (`radial_return`) keeps the volume and goes to the surface as it was before the step.
+The yield stress then stays (`VonMises`), grows (`Hardening`: metal) or shrinks until the particle
+fails (`Softening`: cake). Where the yield stress of a paper is that of uniaxial tension,
+`moduli.yield_radius` converts it.
+"""
+
+from typing import NamedTuple
+
+from ..core.jit import kernel
+from ..core.tensor import fill
+from .log_strain import radial_return
+from .moduli import least_stretch, not_negative, yield_radius
+from .no_flow import never_fails
+
+
+class VonMises(NamedTuple):
+    """Perfect plasticity."""
+
+    tau_y: float    # radius of the yield surface [Pa]
+    s_min: float    # trial singular values that yield are first lifted to it (NCLaw 0.05); 0: no
+
+
+class Hardening(NamedTuple):
+    """The yield stress of a particle grows with its plastic strain."""
+
+    tau_y: float    # radius of the yield surface at the start [Pa]
+    xi: float       # hardening coefficient, in units of 2 mu
+    s_min: float    # as for VonMises
+
+
+class Softening(NamedTuple):
+    """The yield stress of a particle shrinks with its plastic strain; at 0 it has failed."""
+
+    tau_y: float    # radius of the yield surface at the start [Pa]
+    theta: float    # loss of yield stress per plastic strain [Pa]
+    s_min: float    # as for VonMises
+
+
+def build(dim, sigma_y=None, tau_y=None, s_min=0.0):
+    """Perfect plasticity at either yield stress [Pa]; errors as `yield_radius`, `least_stretch`."""
+    return VonMises(yield_radius(dim, sigma_y, tau_y), least_stretch(s_min))
+
+
+def build_hardening(dim, xi, sigma_y=None, tau_y=None, s_min=0.0):
+    """Hardening with coefficient xi >= 0; other errors as `build`."""
+    return Hardening(yield_radius(dim, sigma_y, tau_y), not_negative(xi=xi), least_stretch(s_min))
+
+
+def build_softening(dim, theta, sigma_y=None, tau_y=None, s_min=0.0):
+    """Softening with theta >= 0 [Pa]; other errors as `build`."""
+    radius = yield_radius(dim, sigma_y, tau_y)
+    return Softening(radius, not_negative(theta=theta), least_stretch(s_min))
+
+
+@kernel
+def project(s, y, dt, law, flow):
+    """Singular values after the return; y as it is."""
+    s, _ = radial_return(s, flow.tau_y, law, flow.s_min)
+    return s, y
+
+
+@kernel
+def harden(s, y, dt, law, flow):
+    """Singular values after the return to the yield stress y; y + 2 mu xi dgamma (NSF-F4)."""
+    s, dgamma = radial_return(s, y, law, flow.s_min)
+    return s, y + 2.0 * law.mu * flow.xi * dgamma
+
+
+@kernel
+def soften(s, y, dt, law, flow):
+    """Singular values after the return to y; y - theta |eps - proj(eps)|, at least 0 (NSF-F4).
+
+    The plastic strain of the step is |eps - proj(eps)| = dgamma. NSF sets mu = lam = 0 in a
+    failed particle, whose F is then of no consequence; here its elastic strain is released, s =
+    1, so that neither F nor energy grows without meaning.
+    """
+    s, dgamma = radial_return(s, y, law, flow.s_min)
+    y = max(y - flow.theta * dgamma, 0.0)
+    return (s, y) if y > 0.0 else (fill(1.0, s), y)
+
+
+@kernel
+def carries(y, flow):
+    """1, or 0 once the yield stress of a softening particle is 0."""
+    return 1.0 if y > 0.0 else 0.0
+
+
+intact = never_fails

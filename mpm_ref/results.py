@@ -1,0 +1,127 @@
+"""Reads a results file, finished or not: frames, energies, and what follows from the fields."""
+
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from .journal import recover
+from .store import FORMAT, BadResults
+
+SCALARS = {                       # name -> (unit, what it is)
+    "speed": ("m/s", "magnitude of the velocity"),
+    "J": ("1", "volume ratio det F"),
+    "tau": ("Pa", "Frobenius norm of the Kirchhoff stress"),
+    "pressure": ("Pa", "-tr(tau)/(d J), positive under compression"),
+    "y": ("Pa", "yield stress where a return map changes it"),
+    "body": ("1", "number of the body"),
+}
+
+
+class Results:
+    """A results file, open for reading: a context manager.
+
+    title, dim, dx [m], gravity (d,); time, dt [s], step (frames,); energy (frames, 3) [J] in the
+    order of `ENERGIES`; bodies, their names; manifest, a dict. Raises `BadResults`.
+    """
+
+    def __init__(self, path):
+        self.path = Path(path)
+        if not self.path.is_file():
+            raise BadResults(f"{path}: there is no such file")
+        try:
+            recover(self.path)
+            self.h5 = h5py.File(self.path, "r")
+        except OSError as e:
+            raise BadResults(f"{path} cannot be read as HDF5 ({_first_line(e)}); is it a results file, "
+                             "and whole?") from e
+        if self.h5.attrs.get("format") != FORMAT:
+            self.close()
+            raise BadResults(f"{path} is not a results file of mpm_ref (expected format {FORMAT!r})")
+        self._read_heads()
+
+    def _read_heads(self):
+        attrs = self.h5.attrs
+        self.title, self.dim, self.dx = attrs["title"], int(attrs["dim"]), float(attrs["dx"])
+        self.gravity = attrs["gravity"]
+        self.time, self.dt, self.step = (self.h5[name][()] for name in ("time", "dt", "step"))
+        self.energy = self.h5["energy"][()]
+        groups = self.h5["bodies"]
+        self.bodies = sorted(groups, key=lambda name: groups[name].attrs["index"])
+        self.manifest = json.loads(self.h5["manifest"][()]) if "manifest" in self.h5 else {}
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    def __len__(self):
+        return len(self.time)
+
+    def close(self):
+        """Close the file."""
+        self.h5.close()
+
+    def index(self, frame):
+        """A frame's number from 0; negative ones count from the end. Raises `BadResults`."""
+        n = len(self)
+        if not -n <= frame < n:
+            raise BadResults(f"{self.path}: there is no frame {frame}; it has {n}, from 0 to {n - 1}")
+        return frame % n
+
+    def count(self, body):
+        """Number of particles of a body."""
+        return len(self.h5[f"bodies/{body}/m"])
+
+    def has(self, body, name):
+        """Whether a field is stored of a body."""
+        return name in self.h5[f"bodies/{body}"]
+
+    def field(self, body, name, frame=None):
+        """A stored field of a body: of one frame (N, ..), or of none (m, V0). Raises `BadResults`."""
+        if not self.has(body, name):
+            stored = ", ".join(self.h5[f"bodies/{body}"])
+            raise BadResults(f"{self.path}: {name} of body {body!r} is not stored; stored are {stored}")
+        data = self.h5[f"bodies/{body}/{name}"]
+        try:
+            return data[()] if frame is None else data[self.index(frame)]
+        except OSError as e:
+            raise BadResults(f"{self.path}: {name} of body {body!r} is damaged ({_first_line(e)}); "
+                             "other fields and frames may still be right") from e
+
+    def scalar(self, body, name, frame):
+        """One number per particle (N,): an entry of `SCALARS`. Raises `BadResults` where what it
+        follows from is not stored."""
+        if name not in SCALARS:
+            raise BadResults(f"field {name!r}: expected one of {', '.join(SCALARS)}")
+        if name == "speed":
+            return np.linalg.norm(self.field(body, "v", frame), axis=1)
+        if name == "J":
+            return self._J(body, frame)
+        if name == "tau":
+            return self._norm(self.field(body, "tau", frame))
+        if name == "pressure":
+            return -self._mean(self.field(body, "tau", frame)) / self._J(body, frame)
+        if name == "y":
+            return self.field(body, "y", frame)
+        return np.full(self.count(body), float(self.bodies.index(body)))
+
+    def _J(self, body, frame):
+        if self.has(body, "J"):
+            return self.field(body, "J", frame)
+        return np.linalg.det(self.field(body, "F", frame))
+
+    def _norm(self, tau):
+        """|tau|; a fluid stores the isotropic value alone."""
+        return np.sqrt(self.dim) * np.abs(tau) if tau.ndim == 1 else np.linalg.norm(tau, axis=(1, 2))
+
+    def _mean(self, tau):
+        """tr(tau)/d."""
+        return tau if tau.ndim == 1 else np.trace(tau, axis1=1, axis2=2) / self.dim
+
+
+def _first_line(error):
+    """The first line of HDF5's long messages."""
+    return str(error).splitlines()[0]

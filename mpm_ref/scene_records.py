@@ -1,0 +1,244 @@
+"""The tables of a scene file: one record each, with the names, units and bounds of their keys.
+
+Each key is explained in docs/scenes.md. A record knows what one table can get wrong by itself; what
+belongs together across tables is checked by `Scene`, and what a record makes is in `scene_build`.
+"""
+
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from .explicit import Scheme as ExplicitScheme
+from .materials import make_flow, make_law
+from .quantities import (
+    Angle,
+    Coordinate,
+    Count,
+    Kind,
+    Length,
+    NotNegative,
+    Positive,
+    Record,
+    Seed,
+    Share,
+    Vector,
+)
+from .sampling import Regular, Samplings
+from .shapes import Analytic, Shape
+
+Name = Annotated[str, Meta(min_length=1, max_length=100, pattern=r"^[A-Za-z0-9_. -]+\Z")]
+Time = Annotated[float, Meta(ge=-1e12, le=1e12)]                        # [s]
+Node = Annotated[int, Meta(ge=-1_000_000_000, le=1_000_000_000)]
+Number = Annotated[float, Meta(ge=-1e30, le=1e30)]
+WallNodes = Annotated[tuple[Node | Literal["open"], ...], Meta(min_length=2, max_length=3)]
+Table = Annotated[tuple[Coordinate | Vector, ...], Meta(min_length=2)]
+
+
+class Flow(Record):
+    """A return map by its name in `materials.FLOWS`, and those parameters that it takes."""
+
+    type: str
+    friction_angle: Number | None = None        # [degrees]
+    s_min: Number | None = None
+    s_max: Number | None = None
+    sigma_y: Number | None = None               # [Pa] in uniaxial tension, or
+    tau_y: Number | None = None                 # [Pa] as Frobenius norm of the deviator
+    xi: Number | None = None
+    theta: Number | None = None                 # [Pa]
+    eta: Number | None = None                   # [Pa s]
+
+
+class Material(Record):
+    """An elastic law by its name in `materials.LAWS`, those parameters it takes, a return map."""
+
+    law: str
+    E: Number | None = None                     # [Pa]
+    nu: Number | None = None
+    lam: Number | None = None                   # [Pa]
+    flow: Flow = Flow(type="none")
+
+    def __post_init__(self):
+        self.elastic()
+
+    def elastic(self):
+        """The elastic law. Raises ValueError for a name or parameter that does not fit."""
+        return make_law(self.law, **_given(self, "law", "flow"))
+
+    def flowing(self, dim):
+        """The return map in `dim` dimensions; errors as `elastic`."""
+        parameters = _given(self.flow, "type")
+        return make_flow(self.flow.type, self.elastic(), dim, **parameters)
+
+
+def _given(record, *but):
+    """The keys of a record that have a value, except some."""
+    values = {name: getattr(record, name) for name in record.__struct_fields__ if name not in but}
+    return {name: value for name, value in values.items() if value is not None}
+
+
+class Velocity(Record):
+    """v(x) = linear + angular x (x - center) at the start; center is that of mass if not given."""
+
+    linear: Vector | None = None                # [m/s]
+    angular: Coordinate | Vector = 0.0          # [rad/s], a number in 2D, a vector in 3D
+    center: Vector | None = None                # [m]
+
+
+class Arrays(Record):
+    """Particles from the arrays of an NPZ or HDF5 file."""
+
+    file: str
+    group: str = "/"                            # of an HDF5 file
+    select: Annotated[int, Meta(ge=0)] | None = None    # particles whose `body` has this value
+
+
+class Body(Record):
+    """Particles of one material: a shape and how to fill it, or arrays from a file."""
+
+    name: Name
+    material: Material
+    shape: Shape | None = None
+    sampling: Samplings = Regular()
+    particles: Arrays | None = None
+    density: Positive | None = None             # at rest [kg/m^d]
+    velocity: Velocity = Velocity()
+
+    def __post_init__(self):
+        if (self.shape is None) == (self.particles is None):
+            raise ValueError("a body needs `shape` or `particles`, one of the two")
+        if self.shape is not None and self.density is None:
+            raise ValueError("a body with a shape needs `density`")
+        if self.particles is not None and self.sampling != Regular():
+            raise ValueError("`sampling` is for a body with a shape, not for `particles`")
+
+
+class Steady(Kind, tag="steady"):
+    """A constant rate [m/s or rad/s] from `start` to `stop` [s]."""
+
+    rate: Coordinate | Vector
+    start: Time = 0.0
+    stop: Time | None = None
+
+
+class Keyframes(Kind, tag="keyframes"):
+    """Values [m or rad] at given times [s], linear in between."""
+
+    times: Annotated[tuple[Time, ...], Meta(min_length=2)]
+    values: Table
+
+
+class Ramps(Kind, tag="ramps"):
+    """Rates [m/s or rad/s] at given times [s], linear in between, at rest before and after."""
+
+    times: Annotated[tuple[Time, ...], Meta(min_length=2)]
+    rates: Table
+
+
+class Oscillation(Kind, tag="oscillation"):
+    """amplitude (sin(2 pi frequency s + phase) - sin(phase)), s the time since `start`."""
+
+    amplitude: Coordinate | Vector              # [m or rad]
+    frequency: NotNegative                      # [1/s]
+    phase: Angle = 0.0                          # [degrees]
+    start: Time = 0.0
+    stop: Time | None = None
+
+
+Schedule = Steady | Keyframes | Ramps | Oscillation
+
+
+class Motion(Record):
+    """A rigid motion: first turned by `angle`, then shifted and rotated on schedules."""
+
+    translation: Schedule | None = None         # vectors
+    rotation: Schedule | None = None            # numbers [rad], about `axis` in 3D
+    center: Vector | None = None                # of the rotation [m]; the world's origin
+    axis: Vector | None = None
+    angle: Angle = 0.0                          # how the shape stands at the start [degrees]
+
+
+class Collider(Record):
+    """A shape that constrains the velocities of the nodes it contains."""
+
+    shape: Analytic
+    kind: Literal["sticky", "slip", "separate", "noslip"] = "sticky"
+    friction: NotNegative = 0.0
+    inside: bool = False                        # a container: the nodes outside of the shape
+    motion: Motion = Motion()
+    name: str = ""
+
+
+class Fixed(Record):
+    """A region whose nodes move as told: at rest without a motion."""
+
+    region: Analytic
+    motion: Motion = Motion()
+    inside: bool = False
+    follows: bool = True                        # the region moves along
+    name: str = ""
+
+
+class Walls(Record):
+    """Walls along the axes, counted in nodes: index < low or > high is in a wall."""
+
+    low: WallNodes | None = None
+    high: WallNodes | None = None
+    kind: Literal["sticky", "slip", "separate", "noslip"] = "separate"
+    friction: NotNegative = 0.0
+
+
+class Clip(Record):
+    """A box in which the particles' positions are kept, their velocities unchanged (NCLAW-sim)."""
+
+    lower: Vector
+    upper: Vector
+
+
+class Scheme(Record):
+    """How particles and grid exchange momentum; as `explicit.Scheme`."""
+
+    degree: int = 2
+    transfer: str = "mls"
+    flip: Share = 1.0
+    rpic: Share = 0.0
+    mass_eps: NotNegative = 0.0                 # [kg]
+    gravity_on_empty: bool = False
+
+    def __post_init__(self):
+        self.explicit()
+
+    def explicit(self):
+        """The scheme of the explicit step."""
+        return ExplicitScheme(**{name: getattr(self, name) for name in self.__struct_fields__})
+
+
+class Limits(Record):
+    """What a healthy run stays within; as `monitor.Limits`."""
+
+    cfl: Positive = 1.0
+    J: tuple[Positive, Positive] = (1e-3, 1e3)
+    growth: NotNegative = 0.5
+
+
+class Scene(Record):
+    """Everything that a run is determined by, apart from the program."""
+
+    dim: Literal[2, 3]
+    dx: Length                                  # grid spacing [m]
+    body: Annotated[tuple[Body, ...], Meta(min_length=1)]
+    title: str = ""
+    gravity: Vector | None = None               # [m/s^2]; none
+    dt: Positive | None = None                  # fixed time step [s], or
+    cfl: Annotated[float, Meta(gt=0, le=10)] | None = None      # share of the stable one; 0.5
+    steps: Count | None = None                  # length of the run, or
+    end: Positive | None = None                 # [s]
+    every: Count | None = None                  # steps between frames, or
+    interval: Positive | None = None            # [s]
+    seed: Seed = 0
+    unstable: Literal["refuse", "allow"] = "refuse"
+    scheme: Scheme = Scheme()
+    collider: tuple[Collider, ...] = ()
+    fixed: tuple[Fixed, ...] = ()
+    walls: Walls | None = None
+    clip: Clip | None = None
+    limits: Limits = Limits()

@@ -1,0 +1,209 @@
+"""Results of a run in one HDF5 file: frames stream into it, each wholly or not at all.
+
+The schema is in docs/files.md. A frame stands once `Writer.append` returns, whatever happens to the
+process afterwards (see `journal`). Particles are stored in the order in which their body was sampled,
+so that row p is the same particle in every frame. `results` reads the files.
+"""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from .atomic import require_space
+from .journal import JournaledFile
+from .manifest import scene_hash
+
+FORMAT = "mpm_ref results 1"
+LIBVER = ("earliest", "v110")     # the oldest format that holds it: every HDF5 tool reads it
+ROWS = 1 << 16                    # particles per chunk
+UNITS = {                         # of what may be stored of particles in every frame
+    "x": "m", "v": "m/s", "C": "1/s", "L": "1/s", "F": "1", "J": "1", "tau": "Pa", "y": "Pa",
+}
+USUAL = ("x", "v", "F", "tau")
+CLOCK = {"time": ("f8", "s"), "dt": ("f8", "s"), "step": ("i8", "1")}
+ENERGIES = ("kinetic", "elastic", "gravity")
+
+
+class BadResults(ValueError):
+    """A file is not a results file that can be read, or continued."""
+
+
+@dataclass(frozen=True)
+class Fields:
+    """What is stored of particles in every frame: names of `UNITS`; and the gzip level, 0 for none.
+
+    A body stores what it carries: J instead of F where only J is carried, no C under PIC or FLIP.
+    """
+
+    names: tuple = USUAL
+    gzip: int = 0
+
+    def __post_init__(self):
+        if "x" not in self.names or not set(self.names) <= set(UNITS):
+            raise ValueError(f"fields {', '.join(self.names)}: expected x and any of {', '.join(UNITS)}")
+        if not 0 <= self.gzip <= 9:
+            raise ValueError(f"gzip = {self.gzip}: expected a level from 0 (none) to 9")
+
+    def of(self, body):
+        """{name: array} of the fields that are stored of a body, particles in their current order."""
+        q = body.particles
+        have = {name: getattr(q, name) for name in UNITS if name != "J"}
+        names = self.names
+        if q.F.ndim == 1:
+            have["J"] = have.pop("F")
+            names = tuple("J" if name == "F" else name for name in names)
+        return {name: have[name] for name in names if len(have.get(name, ())) == len(body.id)}
+
+
+def create(path, problem, fields):
+    """`Writer` of a new results file, in place of what stood at `path`.
+
+    Raises `InUse` while another process writes it, `NotWritten`, or ValueError for names of bodies
+    that HDF5 cannot tell apart.
+    """
+    path = Path(path)
+    _require_names(problem.bodies)
+    require_space(path, 0)
+    if path.exists():
+        JournaledFile(path).close()          # raises if it is being written
+    file = JournaledFile(path.with_name(f".{path.name}.part"), new=True)
+    try:
+        with h5py.File(file, "w", libver=LIBVER) as h5:
+            _lay_out(h5, problem, fields)
+        file.commit()
+        file.move(path)
+    except BaseException:
+        file.close()
+        file.path.unlink(missing_ok=True)
+        raise
+    return Writer(file, fields)
+
+
+def reopen(path, problem, fields, frames):
+    """`Writer` that goes on after the first so many frames of a results file; later ones are dropped.
+
+    Raises `BadResults` if the file is of another scene or has fewer frames, `InUse`, or OSError.
+    """
+    writer = Writer(JournaledFile(path), fields)
+    try:
+        if writer.h5.attrs["scene_sha256"] != scene_hash(problem):
+            raise BadResults(f"{path} holds results of another scene; name another file, or overwrite it")
+        if len(writer) < frames:
+            raise BadResults(f"{path} holds {len(writer)} frames, but the checkpoint comes after {frames}; "
+                             "give the file of that run, or start the run anew")
+        writer.truncate(frames)
+    except BaseException:
+        writer.close()
+        raise
+    return writer
+
+
+class Writer:
+    """Appends frames to a results file; made by `create` and `reopen`, to be closed."""
+
+    def __init__(self, file, fields):
+        self._file, self._fields = file, fields
+        self.h5 = h5py.File(file, "r+", libver=LIBVER)
+
+    def __len__(self):
+        return len(self.h5["time"])
+
+    def append(self, frame, energy):
+        """Store a `Frame` and its `Energy`. Raises `NotWritten`; the frames before then stand."""
+        state = frame.state
+        stored = [(body, self._fields.of(body)) for body in state.bodies]
+        require_space(self._file.path, sum(a.nbytes for _, arrays in stored for a in arrays.values()))
+        for name, value in zip((*CLOCK, "energy"), (frame.t, frame.dt, state.step, energy), strict=True):
+            _put(self.h5[name], value)
+        for body, arrays in stored:
+            for name, a in arrays.items():
+                _put(self.h5[f"bodies/{body.name}/{name}"], in_order(a, body.id))
+        self._commit()
+
+    def truncate(self, frames):
+        """Keep the first so many frames."""
+        for dataset in _per_frame(self.h5):
+            dataset.resize(frames, axis=0)
+        self._commit()
+
+    def put_manifest(self, facts):
+        """Store the manifest (a dict of what JSON knows) in place of the one before."""
+        if "manifest" in self.h5:
+            del self.h5["manifest"]
+        self.h5["manifest"] = json.dumps(facts, indent=1)
+        self._commit()
+
+    def close(self):
+        """Close the file and let other writers have it."""
+        self.h5.close()
+        self._file.close()
+
+    def _commit(self):
+        self.h5.flush()
+        self._file.commit()
+
+
+def in_order(a, id):
+    """The rows of a field in the order in which the body was sampled."""
+    out = np.empty_like(a)
+    out[id] = a
+    return out
+
+
+def _put(dataset, value):
+    """Append a row."""
+    n = len(dataset)
+    dataset.resize(n + 1, axis=0)
+    dataset[n] = value
+
+
+def _lay_out(h5, problem, fields):
+    """Write what does not change, and the empty series of what does."""
+    scheme = problem.scheme
+    h5.attrs.update(format=FORMAT, scene_sha256=scene_hash(problem), title=problem.title,
+                    dim=problem.dim, dx=problem.dx, gravity=np.asarray(problem.gravity, dtype=float),
+                    degree=scheme.degree, transfer=scheme.transfer)
+    for name, (kind, unit) in CLOCK.items():
+        _series(h5, name, (), kind, 0).attrs["unit"] = unit
+    _series(h5, "energy", (len(ENERGIES),), "f8", 0).attrs.update(unit="J", columns=list(ENERGIES))
+    for k, body in enumerate(problem.bodies):
+        group = h5.create_group(f"bodies/{body.name}")
+        group.attrs.update(index=k, law=_in_words(body.law), flow=_in_words(body.flow))
+        for name, unit in (("m", "kg"), ("V0", f"m^{problem.dim}")):
+            a = in_order(getattr(body.particles, name), body.id)
+            group.create_dataset(name, data=a, fletcher32=a.size > 0).attrs["unit"] = unit
+        for name, a in fields.of(body).items():
+            _series(group, name, a.shape, "f8", fields.gzip).attrs["unit"] = UNITS[name]
+
+
+def _series(group, name, shape, kind, gzip):
+    """An empty dataset of one row of the given shape per frame; short rows share a chunk."""
+    rows = tuple(max(min(n, ROWS), 1) for n in shape[:1]) + shape[1:]
+    return group.create_dataset(
+        name, (0, *shape), kind, maxshape=(None, *shape),
+        chunks=(64 if np.prod(shape) < 64 else 1, *rows),
+        fletcher32=True, shuffle=gzip > 0, compression=gzip or None,
+    )
+
+
+def _per_frame(h5):
+    """All series of a file."""
+    found = []
+    h5.visititems(lambda _, item: found.append(item) if isinstance(item, h5py.Dataset)
+                  and item.maxshape and item.maxshape[0] is None else None)
+    return found
+
+
+def _in_words(record):
+    """A NamedTuple of parameters as JSON."""
+    return json.dumps({"type": type(record).__name__, **record._asdict()})
+
+
+def _require_names(bodies):
+    names = [body.name for body in bodies]
+    bad = [name for name in names if not name or "/" in name or name == "." or names.count(name) > 1]
+    if bad:
+        raise ValueError(f"body name {bad[0]!r}: expected names that differ and contain no '/'")

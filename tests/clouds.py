@@ -1,0 +1,119 @@
+"""Random particles on a grid, the transfers to test them with, and their plain twins."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mpm_ref.body import particles_at
+from mpm_ref.core.grid import Store
+from mpm_ref.core.order import slabs_of
+from mpm_ref.core.spline import STENCILS
+from mpm_ref.core.transfer import p2g
+from mpm_ref.plain.spline import pairs
+from mpm_ref.plain.step import Matter, Method, to_grid
+
+DX = 0.11
+AFFINE = ("apic", "mls")
+
+
+class Case(NamedTuple):
+    """One specialisation of the transfer kernels."""
+
+    transfer: str
+    degree: int
+    d: int
+    body_force: bool = False
+    fluid: bool = False
+
+    @property
+    def stencil(self):
+        return STENCILS[self.degree]
+
+    @property
+    def method(self):
+        return Method(DX, self.degree, self.transfer, flip=0.9)
+
+    @property
+    def D(self):
+        return self.method.D
+
+    @property
+    def name(self):
+        marks = "-b" * self.body_force + "-fluid" * self.fluid
+        return f"{self.transfer}{self.degree}-{self.d}d{marks}"
+
+
+# Every transfer and every degree in both dimensions: what is compiled costs seconds. EVERY combination runs
+# without compilation, in test_plain_python.
+COVER = (
+    Case("pic", 1, 2, body_force=True),
+    Case("pic", 2, 3),
+    Case("flip", 1, 3),
+    Case("flip", 3, 2),
+    Case("apic", 2, 2),
+    Case("apic", 3, 3, body_force=True),
+    Case("mls", 2, 2, fluid=True),
+    Case("mls", 2, 3),
+)
+EVERY = tuple(
+    Case(transfer, degree, d, body_force, fluid)
+    for transfer in ("pic", "flip", "apic", "mls")
+    for degree in ((2, 3) if transfer in AFFINE else (1, 2, 3))
+    for d in (2, 3)
+    for body_force, fluid in ((False, False), (True, True))
+)
+
+
+def cloud(case, rng, n=300, width=5.0):
+    """n random particles in a box of `width` cells, with random velocity, C, tau, mass and volume."""
+    d = case.d
+    x = DX * rng.uniform(-0.4 * width, 0.6 * width, (n, d))
+    m, V0 = rng.uniform(0.5, 2.0, n), rng.uniform(0.5, 2.0, n) * 1e-2
+    q = particles_at(x, rng.normal(size=(n, d)), m, V0, case.transfer, fluid=case.fluid)
+    if case.body_force:
+        q = q._replace(b=rng.normal(size=(n, d)))
+    if case.transfer in AFFINE:
+        q.C[:] = rng.normal(size=(n, d, d)) / DX
+    tau = rng.normal(size=q.tau.shape)
+    q.tau[:] = tau if case.fluid else tau + np.swapaxes(tau, 1, 2)
+    return q
+
+
+def deep(q):
+    """Copy of particles that keeps what is shared."""
+    C = q.C.copy()
+    L = C if q.L is q.C else q.L.copy()
+    return type(q)(*(a.copy() for a in q))._replace(C=C, L=L)
+
+
+def twin(q, law=None, flow=None, dtype=float):
+    """The plain twin of particles."""
+    def real(a, carried):
+        return a.astype(dtype) if carried else None
+
+    always = {name: getattr(q, name).astype(dtype) for name in ("x", "v", "F", "tau", "m", "V0")}
+    return Matter(C=real(q.C, q.C.ndim == 3), y=real(q.y, q.y.ndim == 1),
+                  b=real(q.b, q.b.ndim == 2), law=law, flow=flow, **always)
+
+
+def scattered(case, q, dt):
+    """Grid that holds the particles' mass and momentum."""
+    store = Store(DX, case.stencil, case.d, flip=case.transfer == "flip")
+    grid = store.cover([q.x])
+    p2g(q, grid, case.stencil, dt, slabs_of(q.x, grid, case.stencil), case.transfer == "mls")
+    return grid
+
+
+def over(grid, a, box):
+    """An array over a plain box, put on the nodes of a grid that contains the box."""
+    out = np.zeros(grid.m.shape + a.shape[len(box.shape):])
+    first = box.first - grid.origin
+    out[tuple(slice(k, k + n) for k, n in zip(first, box.shape))] = a
+    return out
+
+
+def plain_grid(case, q, dt, gravity):
+    """The plain twin of particles, its pairs, and its nodes."""
+    matter = twin(q)
+    ip = pairs(matter.x, DX, case.degree)
+    return matter, ip, to_grid([matter], [ip], case.method, gravity, dt)

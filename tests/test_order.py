@@ -1,0 +1,66 @@
+import numpy as np
+import pytest
+from clouds import DX, Case, cloud
+
+from mpm_ref.core.grid import Store
+from mpm_ref.core.order import WIDTH, by_cell, slabs_of
+from mpm_ref.plain.spline import pairs
+
+CASES = (Case("pic", 1, 2), Case("mls", 2, 3))
+
+
+@pytest.fixture(params=CASES, ids=lambda case: case.name)
+def sorted_(request, rng):
+    case = request.param
+    x = cloud(case, rng, n=1000, width=30.0).x
+    grid = Store(DX, case.stencil, case.d).cover([x])
+    node = pairs(x, DX, case.degree).node - grid.origin
+    return case, x, grid, node, slabs_of(x, grid, case.stencil)
+
+
+def test_slabs_hold_every_particle_once(sorted_):
+    _, x, grid, _, slabs = sorted_
+    assert np.array_equal(np.sort(slabs.order), np.arange(len(x)))
+    assert slabs.start[0] == 0
+    assert slabs.start[-1] == len(x)
+    assert len(slabs.start) == -(-grid.m.shape[0] // WIDTH) + 1
+    assert np.diff(slabs.start).min() >= 0
+
+
+def test_particles_are_in_the_slab_of_their_base_node_and_in_order(sorted_):
+    _, _, _, node, slabs = sorted_
+    base = node[:, 0, 0]
+    for a in range(len(slabs.start) - 1):
+        members = slabs.order[slabs.start[a] : slabs.start[a + 1]]
+        assert (base[members] // WIDTH == a).all()
+        assert (np.diff(members) > 0).all()
+
+
+def test_slabs_of_one_colour_share_no_node(sorted_):
+    _, _, grid, node, slabs = sorted_
+    for color in (0, 1):
+        owner = np.full(grid.m.shape[0], -1)
+        for a in range(color, len(slabs.start) - 1, 2):
+            reached = np.unique(node[slabs.order[slabs.start[a] : slabs.start[a + 1]], :, 0])
+            assert (owner[reached] == -1).all()
+            owner[reached] = a
+
+
+def test_every_reached_node_is_in_the_grid(sorted_):
+    _, _, grid, node, _ = sorted_
+    assert node.min() >= 0
+    assert (node.max(axis=(0, 1)) < grid.m.shape).all()
+
+
+def test_by_cell_sorts_stably(sorted_):
+    case, x, grid, node, _ = sorted_
+    order = by_cell(x, grid, case.stencil)
+    key = np.ravel_multi_index(tuple(node[:, 0].T), grid.m.shape)
+    assert np.array_equal(order, np.argsort(key, kind="stable"))
+
+
+def test_all_particles_in_one_slab(rng):
+    case = CASES[0]
+    x = DX * (0.5 + 0.01 * rng.uniform(size=(50, 2)))
+    slabs = slabs_of(x, Store(DX, case.stencil, 2).cover([x]), case.stencil)
+    assert np.array_equal(slabs.order, np.arange(50))
