@@ -120,6 +120,22 @@ def save(out, rows, threads, repeats):
 
 
 @app.command()
+def features(
+    threads: int = 2, repeats: int = 9, out: Path = Path("results/benchmarks/features.json")
+):
+    """Ns per particle-step and bytes per particle of each feature, on the block of 100k."""
+    from .features import costs
+
+    rows = costs(block(CELLS["100k"]), threads, repeats)
+    for row in rows:
+        typer.echo(
+            f"{row['feature']:34} wall {row['wall_ns']:7.1f} ns  CPU {row['cpu_ns']:7.1f} ns  "
+            f"x {row['cpu_ratio']:.2f}  {row['state_bytes_per_particle']:.0f} B"
+        )
+    save(out, rows, threads, repeats)
+
+
+@app.command()
 def start(name: str, size: str = "10k", threads: int = 2):
     """Seconds to the end of the first step, and peak memory per particle, of one backend in a
     fresh process. Run it twice: the second time with a warm cache.

@@ -1,6 +1,4 @@
-"""The block in Taichi, as a user of Taichi would write it: grid and particle fields, atomic
-scatter.
-"""
+"""The block in Taichi, as a user of Taichi would write it: fields and an atomic scatter."""
 
 import numpy as np
 import taichi as ti
@@ -10,112 +8,111 @@ from .problem import GRAVITY, WALL
 POLAR_ITERATIONS = 5
 
 
+@ti.func
+def polar(A):
+    """Rotation of A by Newton's iteration."""
+    R = A
+    for _ in ti.static(range(POLAR_ITERATIONS)):
+        R = 0.5 * (R + R.inverse().transpose())
+    return R
+
+
+@ti.func
+def weights(f):
+    """Quadratic splines at the three nodes of every axis."""
+    return [0.5 * (1.5 - f) ** 2, 0.75 - (f - 1.0) ** 2, 0.5 * (f - 0.5) ** 2]
+
+
+@ti.data_oriented
 class TaichiBlock:
-    """Steps a `Block`. ti.init is called once per process with the number of threads."""
+    """Steps a `Block` on a number of threads."""
 
     name = "taichi"
 
     def __init__(self, block, threads):
         ti.init(arch=ti.cpu, default_fp=ti.f64, cpu_max_num_threads=threads, log_level=ti.ERROR)
-        self.fields = make(block)
-        self.advance = kernels(block, self.fields)
+        n_particles = len(block.x)
+        self.m, self.V0, self.n, self.dx, self.dt, self.mu, self.lam = block[3:]
+        self.x = ti.Vector.field(3, float, n_particles)
+        self.v = ti.Vector.field(3, float, n_particles)
+        self.C = ti.Matrix.field(3, 3, float, n_particles)
+        self.F = ti.Matrix.field(3, 3, float, n_particles)
+        self.grid_v = ti.Vector.field(3, float, (block.n,) * 3)
+        self.grid_m = ti.field(float, (block.n,) * 3)
+        initial = (block.x, block.v, np.zeros_like(block.F), block.F)
+        for field, values in zip((self.x, self.v, self.C, self.F), initial, strict=True):
+            field.from_numpy(values)
 
     def step(self, steps):
         """Advance by a number of steps."""
         for _ in range(steps):
-            for phase in self.advance:
-                phase()
+            self.clear()
+            self.p2g()
+            self.update()
+            self.g2p()
         ti.sync()
 
     def velocity(self):
         """Velocities (N, 3)."""
-        return self.fields["v"].to_numpy()
-
-
-def make(block):
-    """Fields with the initial state."""
-    n_particles = len(block.x)
-    fields = {
-        "x": ti.Vector.field(3, float, n_particles),
-        "v": ti.Vector.field(3, float, n_particles),
-        "C": ti.Matrix.field(3, 3, float, n_particles),
-        "F": ti.Matrix.field(3, 3, float, n_particles),
-        "grid_v": ti.Vector.field(3, float, (block.n,) * 3),
-        "grid_m": ti.field(float, (block.n,) * 3),
-    }
-    fields["x"].from_numpy(block.x)
-    fields["v"].from_numpy(block.v)
-    fields["C"].from_numpy(np.zeros_like(block.F))
-    fields["F"].from_numpy(block.F)
-    return fields
-
-
-def kernels(block, fields):
-    """The phases of a step, in order."""
-    x, v, C, F = (fields[k] for k in "xvCF")
-    grid_v, grid_m = fields["grid_v"], fields["grid_m"]
-    m, V0, n, dx, dt, mu, lam = (float(a) for a in block[3:])
-    n = block.n
-    inv_dx = 1.0 / dx
+        return self.v.to_numpy()
 
     @ti.func
-    def polar(A):
-        R = A
-        for _ in ti.static(range(POLAR_ITERATIONS)):
-            R = 0.5 * (R + R.inverse().transpose())
-        return R
+    def stress(self, F):
+        """Kirchhoff stress of fixed corotated elasticity."""
+        J = F.determinant()
+        volume = ti.Matrix.identity(float, 3) * (self.lam * J * (J - 1.0))
+        return 2.0 * self.mu * (F - polar(F)) @ F.transpose() + volume
 
     @ti.kernel
-    def clear():
-        for i in ti.grouped(grid_m):
-            grid_m[i] = 0.0
-            grid_v[i] = [0.0, 0.0, 0.0]
+    def clear(self):
+        """Empty grid."""
+        for i in ti.grouped(self.grid_m):
+            self.grid_m[i] = 0.0
+            self.grid_v[i] = [0.0, 0.0, 0.0]
 
     @ti.kernel
-    def p2g():
-        for p in x:
-            base = int(x[p] * inv_dx - 0.5)
-            f = x[p] * inv_dx - base
-            w = [0.5 * (1.5 - f) ** 2, 0.75 - (f - 1.0) ** 2, 0.5 * (f - 0.5) ** 2]
-            J = F[p].determinant()
-            tau = 2.0 * mu * (F[p] - polar(F[p])) @ F[p].transpose()
-            tau += ti.Matrix.identity(float, 3) * (lam * J * (J - 1.0))
-            Q = m * C[p] - dt * V0 * 4.0 * inv_dx * inv_dx * tau
+    def p2g(self):
+        """Mass and momentum with the internal forces' impulse."""
+        for p in self.x:
+            base = int(self.x[p] / self.dx - 0.5)
+            f = self.x[p] / self.dx - base
+            w = weights(f)
+            Q = self.m * self.C[p]
+            Q -= self.dt * self.V0 * 4.0 / self.dx**2 * self.stress(self.F[p])
             for i, j, k in ti.static(ti.ndrange(3, 3, 3)):
                 offset = ti.Vector([i, j, k])
-                r = (offset - f) * dx
+                r = (offset - f) * self.dx
                 weight = w[i][0] * w[j][1] * w[k][2]
-                grid_v[base + offset] += weight * (m * v[p] + Q @ r)
-                grid_m[base + offset] += weight * m
+                self.grid_v[base + offset] += weight * (self.m * self.v[p] + Q @ r)
+                self.grid_m[base + offset] += weight * self.m
 
     @ti.kernel
-    def update():
-        for i in ti.grouped(grid_m):
-            if grid_m[i] > 0.0:
-                u = grid_v[i] / grid_m[i]
-                u[2] += dt * GRAVITY
+    def update(self):
+        """Velocity, gravity, walls."""
+        for i in ti.grouped(self.grid_m):
+            if self.grid_m[i] > 0.0:
+                u = self.grid_v[i] / self.grid_m[i]
+                u[2] += self.dt * GRAVITY
                 for a in ti.static(range(3)):
-                    if (i[a] < WALL and u[a] < 0.0) or (i[a] > n - WALL and u[a] > 0.0):
+                    if (i[a] < WALL and u[a] < 0.0) or (i[a] > self.n - WALL and u[a] > 0.0):
                         u[a] = 0.0
-                grid_v[i] = u
+                self.grid_v[i] = u
 
     @ti.kernel
-    def g2p():
-        for p in x:
-            base = int(x[p] * inv_dx - 0.5)
-            f = x[p] * inv_dx - base
-            w = [0.5 * (1.5 - f) ** 2, 0.75 - (f - 1.0) ** 2, 0.5 * (f - 0.5) ** 2]
-            new_v = ti.Vector.zero(float, 3)
+    def g2p(self):
+        """New velocity, affine field, position, deformation."""
+        for p in self.x:
+            base = int(self.x[p] / self.dx - 0.5)
+            f = self.x[p] / self.dx - base
+            w = weights(f)
+            v = ti.Vector.zero(float, 3)
             B = ti.Matrix.zero(float, 3, 3)
             for i, j, k in ti.static(ti.ndrange(3, 3, 3)):
                 offset = ti.Vector([i, j, k])
-                weight = w[i][0] * w[j][1] * w[k][2]
-                u = weight * grid_v[base + offset]
-                new_v += u
-                B += u.outer_product((offset - f) * dx)
-            v[p] = new_v
-            C[p] = 4.0 * inv_dx * inv_dx * B
-            x[p] += dt * new_v
-            F[p] = (ti.Matrix.identity(float, 3) + dt * C[p]) @ F[p]
-
-    return clear, p2g, update, g2p
+                u = w[i][0] * w[j][1] * w[k][2] * self.grid_v[base + offset]
+                v += u
+                B += u.outer_product((offset - f) * self.dx)
+            self.v[p] = v
+            self.C[p] = 4.0 / self.dx**2 * B
+            self.x[p] += self.dt * v
+            self.F[p] = (ti.Matrix.identity(float, 3) + self.dt * self.C[p]) @ self.F[p]

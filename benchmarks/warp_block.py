@@ -22,6 +22,18 @@ class Constants:
     wall: wp.int32
 
 
+@wp.struct
+class State:
+    """Arrays of particles and grid."""
+
+    x: wp.array(dtype=wp.vec3d)
+    v: wp.array(dtype=wp.vec3d)
+    C: wp.array(dtype=wp.mat33d)
+    F: wp.array(dtype=wp.mat33d)
+    grid_v: wp.array(dtype=wp.vec3d, ndim=3)
+    grid_m: wp.array(dtype=wp.float64, ndim=3)
+
+
 @wp.func
 def polar(A: wp.mat33d):
     """Rotation of A by Newton's iteration."""
@@ -53,35 +65,27 @@ def arm(i: wp.int32, j: wp.int32, l: wp.int32, f: wp.vec3d, dx: wp.float64):
 
 
 @wp.kernel
-def p2g(
-    x: wp.array(dtype=wp.vec3d),
-    v: wp.array(dtype=wp.vec3d),
-    C: wp.array(dtype=wp.mat33d),
-    F: wp.array(dtype=wp.mat33d),
-    grid_v: wp.array(dtype=wp.vec3d, ndim=3),
-    grid_m: wp.array(dtype=wp.float64, ndim=3),
-    k: Constants,
-):
+def p2g(a: State, k: Constants):
     """Mass and momentum with the internal forces' impulse."""
     p = wp.tid()
-    bx = base_of(x[p][0], k.dx)
-    by = base_of(x[p][1], k.dx)
-    bz = base_of(x[p][2], k.dx)
-    f = x[p] / k.dx - wp.vec3d(wp.float64(bx), wp.float64(by), wp.float64(bz))
+    bx = base_of(a.x[p][0], k.dx)
+    by = base_of(a.x[p][1], k.dx)
+    bz = base_of(a.x[p][2], k.dx)
+    f = a.x[p] / k.dx - wp.vec3d(wp.float64(bx), wp.float64(by), wp.float64(bz))
     wx = weights(f[0])
     wy = weights(f[1])
     wz = weights(f[2])
-    J = wp.determinant(F[p])
-    tau = wp.float64(2.0) * k.mu * (F[p] - polar(F[p])) * wp.transpose(F[p])
+    J = wp.determinant(a.F[p])
+    tau = wp.float64(2.0) * k.mu * (a.F[p] - polar(a.F[p])) * wp.transpose(a.F[p])
     tau += k.lam * J * (J - wp.float64(1.0)) * wp.identity(n=3, dtype=wp.float64)
-    Q = k.m * C[p] - k.dt * k.V0 * wp.float64(4.0) / (k.dx * k.dx) * tau
+    Q = k.m * a.C[p] - k.dt * k.V0 * wp.float64(4.0) / (k.dx * k.dx) * tau
     for i in range(3):
         for j in range(3):
             for l in range(3):
                 r = arm(i, j, l, f, k.dx)
                 w = wx[i] * wy[j] * wz[l]
-                wp.atomic_add(grid_v, bx + i, by + j, bz + l, w * (k.m * v[p] + Q * r))
-                wp.atomic_add(grid_m, bx + i, by + j, bz + l, w * k.m)
+                wp.atomic_add(a.grid_v, bx + i, by + j, bz + l, w * (k.m * a.v[p] + Q * r))
+                wp.atomic_add(a.grid_m, bx + i, by + j, bz + l, w * k.m)
 
 
 @wp.func
@@ -95,17 +99,13 @@ def stopped(u: wp.float64, i: wp.int32, n: wp.int32, wall: wp.int32):
 
 
 @wp.kernel
-def update(
-    grid_v: wp.array(dtype=wp.vec3d, ndim=3),
-    grid_m: wp.array(dtype=wp.float64, ndim=3),
-    k: Constants,
-):
+def update(a: State, k: Constants):
     """Velocity, gravity, walls."""
     i, j, l = wp.tid()
-    if grid_m[i, j, l] > wp.float64(0.0):
-        u = grid_v[i, j, l] / grid_m[i, j, l]
+    if a.grid_m[i, j, l] > wp.float64(0.0):
+        u = a.grid_v[i, j, l] / a.grid_m[i, j, l]
         w = u[2] + k.dt * k.g
-        grid_v[i, j, l] = wp.vec3d(
+        a.grid_v[i, j, l] = wp.vec3d(
             stopped(u[0], i, k.n, k.wall),
             stopped(u[1], j, k.n, k.wall),
             stopped(w, l, k.n, k.wall),
@@ -113,20 +113,13 @@ def update(
 
 
 @wp.kernel
-def g2p(
-    x: wp.array(dtype=wp.vec3d),
-    v: wp.array(dtype=wp.vec3d),
-    C: wp.array(dtype=wp.mat33d),
-    F: wp.array(dtype=wp.mat33d),
-    grid_v: wp.array(dtype=wp.vec3d, ndim=3),
-    k: Constants,
-):
+def g2p(a: State, k: Constants):
     """Velocity, affine field, position, deformation."""
     p = wp.tid()
-    bx = base_of(x[p][0], k.dx)
-    by = base_of(x[p][1], k.dx)
-    bz = base_of(x[p][2], k.dx)
-    f = x[p] / k.dx - wp.vec3d(wp.float64(bx), wp.float64(by), wp.float64(bz))
+    bx = base_of(a.x[p][0], k.dx)
+    by = base_of(a.x[p][1], k.dx)
+    bz = base_of(a.x[p][2], k.dx)
+    f = a.x[p] / k.dx - wp.vec3d(wp.float64(bx), wp.float64(by), wp.float64(bz))
     wx = weights(f[0])
     wy = weights(f[1])
     wz = weights(f[2])
@@ -135,14 +128,14 @@ def g2p(
     for i in range(3):
         for j in range(3):
             for l in range(3):
-                u = wx[i] * wy[j] * wz[l] * grid_v[bx + i, by + j, bz + l]
+                u = wx[i] * wy[j] * wz[l] * a.grid_v[bx + i, by + j, bz + l]
                 r = arm(i, j, l, f, k.dx)
                 new_v += u
                 B += wp.outer(u, r)
-    v[p] = new_v
-    C[p] = wp.float64(4.0) / (k.dx * k.dx) * B
-    x[p] = x[p] + k.dt * new_v
-    F[p] = (wp.identity(n=3, dtype=wp.float64) + k.dt * C[p]) * F[p]
+    a.v[p] = new_v
+    a.C[p] = wp.float64(4.0) / (k.dx * k.dx) * B
+    a.x[p] = a.x[p] + k.dt * new_v
+    a.F[p] = (wp.identity(n=3, dtype=wp.float64) + k.dt * a.C[p]) * a.F[p]
 
 
 class WarpBlock:
@@ -153,14 +146,13 @@ class WarpBlock:
     def __init__(self, block, threads):
         wp.config.quiet = True
         wp.init()
-        self.particles = [
-            wp.array(block.x, dtype=wp.vec3d, device="cpu"),
-            wp.array(block.v, dtype=wp.vec3d, device="cpu"),
-            wp.zeros(len(block.x), dtype=wp.mat33d, device="cpu"),
-            wp.array(block.F, dtype=wp.mat33d, device="cpu"),
-        ]
-        self.grid_v = wp.zeros((block.n,) * 3, dtype=wp.vec3d, device="cpu")
-        self.grid_m = wp.zeros((block.n,) * 3, dtype=wp.float64, device="cpu")
+        self.a = State()
+        self.a.x = wp.array(block.x, dtype=wp.vec3d, device="cpu")
+        self.a.v = wp.array(block.v, dtype=wp.vec3d, device="cpu")
+        self.a.C = wp.zeros(len(block.x), dtype=wp.mat33d, device="cpu")
+        self.a.F = wp.array(block.F, dtype=wp.mat33d, device="cpu")
+        self.a.grid_v = wp.zeros((block.n,) * 3, dtype=wp.vec3d, device="cpu")
+        self.a.grid_m = wp.zeros((block.n,) * 3, dtype=wp.float64, device="cpu")
         self.k = Constants()
         for name in ("m", "V0", "dx", "dt", "mu", "lam", "n"):
             setattr(self.k, name, getattr(block, name))
@@ -168,15 +160,14 @@ class WarpBlock:
 
     def step(self, steps):
         """Advance by a number of steps."""
-        n_particles = len(self.particles[0])
+        n = len(self.a.x)
+        phases = ((p2g, n), (update, self.a.grid_m.shape), (g2p, n))
         for _ in range(steps):
-            self.grid_v.zero_()
-            self.grid_m.zero_()
-            grid = [self.grid_v, self.grid_m, self.k]
-            wp.launch(p2g, n_particles, [*self.particles, *grid], device="cpu")
-            wp.launch(update, self.grid_m.shape, grid, device="cpu")
-            wp.launch(g2p, n_particles, [*self.particles, self.grid_v, self.k], device="cpu")
+            self.a.grid_v.zero_()
+            self.a.grid_m.zero_()
+            for phase, size in phases:
+                wp.launch(phase, size, [self.a, self.k], device="cpu")
 
     def velocity(self):
         """Velocities (N, 3)."""
-        return self.particles[1].numpy()
+        return self.a.v.numpy()

@@ -21,7 +21,7 @@ def replacing(path):
     Raises `NotWritten` where the system refuses.
     """
     path = Path(path)
-    part = path.with_name(f".{path.name}.part")
+    part = part_of(path)
     try:
         yield part
         sync(part)
@@ -33,6 +33,12 @@ def replacing(path):
         raise not_written(path, e) from e
     finally:
         part.unlink(missing_ok=True)
+
+
+def part_of(path):
+    """Path of the file that is written in place of `path`; the suffix is kept, as it says the kind."""
+    path = Path(path)
+    return path.with_name(f".{path.stem}.part{path.suffix}")
 
 
 def sync(path):

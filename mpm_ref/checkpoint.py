@@ -13,7 +13,7 @@ import numpy as np
 from .atomic import replacing, require_space
 from .core.state import Particles
 from .energy import Energy
-from .journal import JournaledFile
+from .journal import new_hdf5
 from .manifest import scene_hash, source_hash
 from .monitor import Account
 from .simulate import State
@@ -21,7 +21,6 @@ from .simulate import State
 FORMAT = "mpm_ref checkpoint 1"
 SEAL = b"\nmpm_ref sha256 "
 SEALED = len(SEAL) + 64
-LIBVER = ("earliest", "v110")
 
 
 class BadCheckpoint(ValueError):
@@ -35,13 +34,8 @@ def save(path, state, problem):
     """
     require_space(path, size_of(state))
     with replacing(path) as part:
-        file = JournaledFile(part, new=True)
-        try:
-            with h5py.File(file, "w", libver=LIBVER) as h5:
-                _write(h5, state, problem)
-            file.commit()
-        finally:
-            file.close()
+        with new_hdf5(part) as h5:
+            _write(h5, state, problem)
         with open(part, "ab") as end:
             end.write(SEAL + _sha256(part, part.stat().st_size).encode())
 
@@ -61,6 +55,13 @@ def load(path, problem):
             raise BadCheckpoint(f"{path} belongs to another scene (sha256 {saved[:12]}, this one is "
                                 f"{scene_hash(problem)[:12]}); give the scene of that run, or start a new one")
         return _read(h5, problem), h5.attrs["source_sha256"] == source_hash()
+
+
+def is_one(path):
+    """Whether a file ends as checkpoints do; see `summary` for whether it is whole."""
+    with open(path, "rb") as file:
+        file.seek(max(Path(path).stat().st_size - SEALED, 0))
+        return file.read(len(SEAL)) == SEAL
 
 
 def summary(path):

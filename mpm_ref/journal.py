@@ -19,14 +19,17 @@ import fcntl
 import hashlib
 import io
 import os
+from contextlib import contextmanager
 from pathlib import Path
 
+import h5py
 import numpy as np
 
 from .atomic import not_written, replacing, sync
 
 PAGE = 4096
 MAGIC = b"mpm_ref journal\n"
+LIBVER = ("earliest", "v110")     # the oldest format that will do: every HDF5 tool reads it
 
 
 class InUse(OSError):
@@ -41,12 +44,15 @@ class JournaledFile(io.RawIOBase):
     """A file object for `h5py.File(file, mode)` whose changes stand only after `commit`.
 
     `new` creates an empty file in place of what was there. Holds a lock against other writers.
-    Raises `InUse`, `Damaged`, or OSError where there is no such file.
+    Raises `InUse`, `Damaged`, or `NotWritten` where the file cannot be opened.
     """
 
     def __init__(self, path, new=False):
         self.path = Path(path)
-        self._file = open(self.path, "w+b" if new else "r+b", buffering=0)
+        try:
+            self._file = open(self.path, "w+b" if new else "r+b", buffering=0)
+        except OSError as e:
+            raise not_written(path, e) from e
         try:
             _lock(self._file, self.path)
             if new:
@@ -163,6 +169,18 @@ class JournaledFile(io.RawIOBase):
         """Close the file; what was not committed is forgotten."""
         self._file.close()
         super().close()
+
+
+@contextmanager
+def new_hdf5(path):
+    """An `h5py.File` to fill, committed when the block ends well. Raises `NotWritten`."""
+    file = JournaledFile(path, new=True)
+    try:
+        with h5py.File(file, "w", libver=LIBVER) as h5:
+            yield h5
+        file.commit()
+    finally:
+        file.close()
 
 
 def recover(path):

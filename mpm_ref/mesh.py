@@ -1,9 +1,9 @@
 """The inside of a closed triangle mesh, by its winding number along vertical lines.
 
-The line through a point along the last axis crosses triangles; each crossing above the point counts
-+1 or -1 by the triangle's orientation. The sum is the winding number: 1 inside a mesh whose normals
-point outward, 0 outside. Triangles are binned by their shadow on the other two axes, so that a point
-meets only few of them.
+The line through a point along the last axis crosses triangles; each crossing above the point
+counts +1 or -1 by the triangle's orientation. The sum is the winding number: 1 inside a mesh whose
+normals point outward, 0 outside. Triangles are binned by their shadow on the other two axes, so
+that a point meets only few of them.
 """
 
 from math import floor
@@ -156,8 +156,8 @@ def read_triangles(file):
     if not len(getattr(mesh, "faces", ())):
         raise ValueError(f"file = {str(file)!r}: holds no triangles")
     if not (mesh.is_watertight and mesh.is_winding_consistent):
-        raise ValueError(f"file = {str(file)!r}: the mesh is not closed, {_open_edges(mesh)} of its "
-                         "edges do not join two triangles of one orientation; repair it first")
+        raise ValueError(f"file = {str(file)!r}: the mesh is not closed, {_open_edges(mesh)} of "
+                         "its edges do not join two triangles of one orientation; repair it first")
     triangles = np.array(mesh.triangles, dtype=float)
     return triangles if enclosed_volume(triangles) > 0.0 else triangles[:, ::-1].copy()
 

@@ -16,6 +16,7 @@ Share = Annotated[float, Meta(ge=0, le=1)]
 Angle = Annotated[float, Meta(ge=-1e6, le=1e6)]                     # [degrees]
 Count = Annotated[int, Meta(ge=1, le=1_000_000_000)]
 PerCell = Annotated[int, Meta(ge=1, le=64)]
+Sha256 = Annotated[str, Meta(pattern=r"^[0-9a-f]{64}\Z")]
 Seed = Annotated[int, Meta(ge=0, le=2**63 - 1)]
 
 

@@ -7,22 +7,25 @@ import h5py
 import numpy as np
 
 from .journal import recover
-from .store import FORMAT, BadResults
+from .store import ENERGIES, FORMAT, UNITS, BadResults
 
-SCALARS = {                       # name -> (unit, what it is)
-    "speed": ("m/s", "magnitude of the velocity"),
-    "J": ("1", "volume ratio det F"),
-    "tau": ("Pa", "Frobenius norm of the Kirchhoff stress"),
-    "pressure": ("Pa", "-tr(tau)/(d J), positive under compression"),
-    "y": ("Pa", "yield stress where a return map changes it"),
-    "body": ("1", "number of the body"),
+SCALARS = {                       # name -> unit, what it is, and the fields it follows from
+    "speed": ("m/s", "magnitude of the velocity", ("v",)),
+    "J": ("1", "volume ratio det F", ("F",)),
+    "tau": ("Pa", "Frobenius norm of the Kirchhoff stress", ("tau",)),
+    "pressure": ("Pa", "-tr(tau)/(d J), positive under compression", ("tau", "F")),
+    "y": ("Pa", "yield stress, where a return map changes it", ("y",)),
+    "body": ("1", "number of the body", ()),
 }
+
+
+__all__ = ["ENERGIES", "SCALARS", "BadResults", "Results"]
 
 
 class Results:
     """A results file, open for reading: a context manager.
 
-    title, dim, dx [m], gravity (d,); time, dt [s], step (frames,); energy (frames, 3) [J] in the
+    title, dim, dx [m], gravity (d,), degree; time, dt [s], step (frames,); energy (frames, 3) [J] in the
     order of `ENERGIES`; bodies, their names; manifest, a dict. Raises `BadResults`.
     """
 
@@ -44,7 +47,7 @@ class Results:
     def _read_heads(self):
         attrs = self.h5.attrs
         self.title, self.dim, self.dx = attrs["title"], int(attrs["dim"]), float(attrs["dx"])
-        self.gravity = attrs["gravity"]
+        self.gravity, self.degree = attrs["gravity"], int(attrs["degree"])
         self.time, self.dt, self.step = (self.h5[name][()] for name in ("time", "dt", "step"))
         self.energy = self.h5["energy"][()]
         groups = self.h5["bodies"]
@@ -79,6 +82,10 @@ class Results:
         """Whether a field is stored of a body."""
         return name in self.h5[f"bodies/{body}"]
 
+    def fields(self, body):
+        """Names of the fields that are stored of a body in every frame."""
+        return [name for name in UNITS if self.has(body, name)]
+
     def field(self, body, name, frame=None):
         """A stored field of a body: of one frame (N, ..), or of none (m, V0). Raises `BadResults`."""
         if not self.has(body, name):
@@ -90,6 +97,11 @@ class Results:
         except OSError as e:
             raise BadResults(f"{self.path}: {name} of body {body!r} is damaged ({_first_line(e)}); "
                              "other fields and frames may still be right") from e
+
+    def offers(self, name):
+        """Whether every body stores what an entry of `SCALARS` follows from; J serves for F."""
+        return all(self.has(body, need) or need == "F" and self.has(body, "J")
+                   for body in self.bodies for need in SCALARS[name][2])
 
     def scalar(self, body, name, frame):
         """One number per particle (N,): an entry of `SCALARS`. Raises `BadResults` where what it

@@ -149,7 +149,7 @@ def within(solid, x):
 
 
 def throw(solid, r, seed):
-    """Poisson-disk points of the solid's box, no nearer than r, those outside the solid left out."""
+    """Poisson-disk points of the solid's box, without those outside of the solid."""
     return within(solid, poisson_disk(solid.low, solid.high, r, np.random.default_rng(seed)))
 
 

@@ -10,30 +10,11 @@ import msgspec
 import numpy as np
 
 from .quantities import Vector
+from .scene_error import SceneError, at, joined
 from .scene_parts import build_clock, build_conditions, build_limits
 from .scene_records import Scene
 from .scene_words import rephrase, shown
-
-
-class SceneError(ValueError):
-    """A scene that cannot be run; the message is one sentence that begins with the key's path."""
-
-    def __init__(self, message):
-        super().__init__(" ".join(str(message).split()))
-
-
-class At:
-    """A context that makes a ValueError of a part of a scene a SceneError that names the part."""
-
-    def __init__(self, path):
-        self.path = path
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, kind, fault, trace):
-        if isinstance(fault, ValueError) and not isinstance(fault, SceneError):
-            raise SceneError(f"{self.path}: {fault}") from None
+from .shapes import Mesh
 
 
 def checked(data, source=""):
@@ -77,7 +58,7 @@ def check_finite(data, path=""):
         raise SceneError(f"{path} = {data}: expected a finite number")
     if isinstance(data, dict):
         for key, value in data.items():
-            check_finite(value, f"{path}.{key}" if path else str(key))
+            check_finite(value, joined(path, key))
     elif isinstance(data, list | tuple):
         for k, value in enumerate(data):
             check_finite(value, f"{path}[{k}]")
@@ -94,23 +75,24 @@ def check_scene(scene):
         raise SceneError("clip: expected lower < upper on every axis")
     build_clock(scene)
     build_limits(scene)
-    build_conditions(scene, At)
+    build_conditions(scene)
 
 
 def check_body(body, dim, path):
     """Raise SceneError for a material or velocity that does not fit the dimension."""
-    with At(f"{path}.material.flow"):
+    with at(f"{path}.material.flow"):
         body.material.flowing(dim)
     angular = body.velocity.angular
     if isinstance(angular, tuple) != (dim == 3) and angular != 0.0:
         expected = "a number" if dim == 2 else "3 numbers"
         raise SceneError(f"{path}.velocity.angular = {shown(angular)}: expected {expected} "
                          f"(dim = {dim})")
-    if isinstance(body.shape, Mesh) 
 
 
 def check_dimension(record, dim, path=""):
     """Raise SceneError for a vector without `dim` components, in a record or what it holds."""
+    if dim == 2 and isinstance(record, Mesh):
+        raise SceneError(f"{path[:-1]}: a mesh of triangles is for dim = 3")
     for field in msgspec.structs.fields(record):
         value, where = getattr(record, field.name), f"{path}{field.name}"
         if isinstance(value, msgspec.Struct):

@@ -20,6 +20,7 @@ from .quantities import (
     Positive,
     Record,
     Seed,
+    Sha256,
     Share,
     Vector,
 )
@@ -83,11 +84,17 @@ class Velocity(Record):
     angular: Coordinate | Vector = 0.0          # [rad/s], a number in 2D, a vector in 3D
     center: Vector | None = None                # [m]
 
+    @property
+    def moves(self):
+        """Whether it is not zero."""
+        return self.linear is not None or self.angular != 0.0
+
 
 class Arrays(Record):
     """Particles from the arrays of an NPZ or HDF5 file."""
 
     file: str
+    sha256: Sha256 | None = None                # of what the file must hold
     group: str = "/"                            # of an HDF5 file
     select: Annotated[int, Meta(ge=0)] | None = None    # particles whose `body` has this value
 

@@ -1,4 +1,4 @@
-"""What msgspec says about a wrong scene, in one sentence that begins with the key's path and value."""
+"""What msgspec says about a wrong scene, in one sentence that begins with the key and its value."""
 
 import re
 from difflib import get_close_matches
@@ -7,11 +7,12 @@ from typing import Literal, Union, get_args, get_origin, get_type_hints
 
 from msgspec import Struct
 
+from .scene_error import joined, placed
 from .scene_records import Scene
 
 SHOWN = 60          # characters of a value
 WORDS = {"float": "a number", "int": "a whole number", "str": "text", "bool": "true or false",
-         "array": "a list", "object": "a table", "null": "nothing"}
+         "array": "a list", "object": "a table"}
 TYPES = {float: "a number", int: "a whole number"}
 
 
@@ -39,20 +40,7 @@ def rephrase(message, data):
     if said.startswith("Expected"):
         said = re.sub(r"`([a-z| ]+)`", _in_words, said.partition(", got")[0])
         return f"{where or 'the scene'} = {shown(value)}: e{said[1:]}"
-    return _own(said, where, value)
-
-
-def _own(said, where, value):
-    """A record's own check: the key that it begins with joins the path."""
-    key = re.match(r"(?:\w+ '[^']*': )?(\w+)(?= = )", said)
-    if key and isinstance(value, dict) and key[1] in value:
-        return f"{joined(where, key[1])}{said[key.end():]}"
-    return f"{where}: {said}" if where else said
-
-
-def joined(where, key):
-    """Path of a key of the table `where`."""
-    return f"{where}.{key}" if where else str(key)
+    return placed(where, said)
 
 
 def _unknown(where, key, types):
@@ -69,7 +57,7 @@ def _missing(where, key, types):
 
 
 def _in_words(match):
-    return " or ".join(WORDS.get(word, word) for word in match[1].split(" | "))
+    return " or ".join(WORDS.get(word, word) for word in match[1].split(" | ") if word != "null")
 
 
 def _choices(steps, data):
@@ -78,7 +66,7 @@ def _choices(steps, data):
     values = [repr(value) for kind in kinds if get_origin(kind) is Literal
               for value in get_args(kind)]
     values += [TYPES[kind] for kind in kinds if kind in TYPES]
-    return f"one of {', '.join(values)}" if values else f"one of {_tags(_types_at(steps[:-1], data))}"
+    return f"one of {', '.join(values) or _tags(_types_at(steps[:-1], data))}"
 
 
 # the types of the records along a path
@@ -98,7 +86,8 @@ def _parts(kind, step):
     """Types of an item of a list, or of a key of a table."""
     if isinstance(step, int):
         return _flat(get_args(kind)[0]) if get_origin(kind) is tuple else []
-    return _flat(get_type_hints(kind)[step]) if _is_record(kind) and step in _keys(kind) else []
+    here = step in getattr(kind, "__struct_fields__", ())
+    return _flat(get_type_hints(kind)[step]) if here else []
 
 
 def _flat(kind):

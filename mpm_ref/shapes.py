@@ -11,7 +11,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from .core import levelset
-from .quantities import Angle, Kind, Length, Vector
+from .quantities import Angle, Kind, Length, Sha256, Vector
 
 Shapes = Annotated[tuple["Shape", ...], Meta(min_length=1, max_length=1000)]
 
@@ -110,10 +110,12 @@ class Moved(Kind, tag="moved"):
 class Mesh(Kind, tag="mesh"):
     """The inside of a closed triangle mesh from a file.
 
-    `size` [m] scales it to that largest edge of its bounding box, whose centre `center` then gives.
+    `size` [m] scales it to that largest edge of its bounding box, and `center` is the middle of
+    that box. With `sha256` the file is refused unless that is the hash of what it holds.
     """
 
     file: str
+    sha256: Sha256 | None = None
     size: Length | None = None
     center: Vector | None = None
 

@@ -12,12 +12,11 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from .atomic import require_space
-from .journal import JournaledFile
+from .atomic import part_of, require_space
+from .journal import LIBVER, JournaledFile, new_hdf5
 from .manifest import scene_hash
 
 FORMAT = "mpm_ref results 1"
-LIBVER = ("earliest", "v110")     # the oldest format that holds it: every HDF5 tool reads it
 ROWS = 1 << 16                    # particles per chunk
 UNITS = {                         # of what may be stored of particles in every frame
     "x": "m", "v": "m/s", "C": "1/s", "L": "1/s", "F": "1", "J": "1", "tau": "Pa", "y": "Pa",
@@ -48,18 +47,21 @@ class Fields:
             raise ValueError(f"gzip = {self.gzip}: expected a level from 0 (none) to 9")
 
     def of(self, body):
-        """{name: array} of the fields that are stored of a body, particles in their current order."""
-        q = body.particles
-        have = {name: getattr(q, name) for name in UNITS if name != "J"}
-        names = self.names
-        if q.F.ndim == 1:
-            have["J"] = have.pop("F")
-            names = tuple("J" if name == "F" else name for name in names)
-        return {name: have[name] for name in names if len(have.get(name, ())) == len(body.id)}
+        """{name: array} of what is stored of a body."""
+        have = carried(body)
+        names = ["J" if name == "F" and "J" in have else name for name in self.names]
+        return {name: have[name] for name in names if name in have}
 
 
-def create(path, problem, fields):
-    """`Writer` of a new results file, in place of what stood at `path`.
+def carried(body):
+    """{name of `UNITS`: array (N, ..)} of all that a body carries, particles in their current order."""
+    q = body.particles
+    have = {"J" if name == "F" and q.F.ndim == 1 else name: a for name, a in q._asdict().items()}
+    return {name: a for name, a in have.items() if name in UNITS and len(a) == len(body.id)}
+
+
+def create(path, problem, fields, facts):
+    """`Writer` of a new results file with the manifest `facts`, in place of what stood at `path`.
 
     Raises `InUse` while another process writes it, `NotWritten`, or ValueError for names of bodies
     that HDF5 cannot tell apart.
@@ -69,25 +71,24 @@ def create(path, problem, fields):
     require_space(path, 0)
     if path.exists():
         JournaledFile(path).close()          # raises if it is being written
-    file = JournaledFile(path.with_name(f".{path.name}.part"), new=True)
+    part = part_of(path)
     try:
-        with h5py.File(file, "w", libver=LIBVER) as h5:
+        with new_hdf5(part) as h5:
             _lay_out(h5, problem, fields)
-        file.commit()
+            h5["manifest"] = json.dumps(facts, indent=1)
+        file = JournaledFile(part)
         file.move(path)
-    except BaseException:
-        file.close()
-        file.path.unlink(missing_ok=True)
-        raise
-    return Writer(file, fields)
+    finally:
+        part.unlink(missing_ok=True)
+    return Writer(file)
 
 
-def reopen(path, problem, fields, frames):
+def reopen(path, problem, frames):
     """`Writer` that goes on after the first so many frames of a results file; later ones are dropped.
 
     Raises `BadResults` if the file is of another scene or has fewer frames, `InUse`, or OSError.
     """
-    writer = Writer(JournaledFile(path), fields)
+    writer = Writer(JournaledFile(path))
     try:
         if writer.h5.attrs["scene_sha256"] != scene_hash(problem):
             raise BadResults(f"{path} holds results of another scene; name another file, or overwrite it")
@@ -104,8 +105,8 @@ def reopen(path, problem, fields, frames):
 class Writer:
     """Appends frames to a results file; made by `create` and `reopen`, to be closed."""
 
-    def __init__(self, file, fields):
-        self._file, self._fields = file, fields
+    def __init__(self, file):
+        self._file = file
         self.h5 = h5py.File(file, "r+", libver=LIBVER)
 
     def __len__(self):
@@ -113,15 +114,21 @@ class Writer:
 
     def append(self, frame, energy):
         """Store a `Frame` and its `Energy`. Raises `NotWritten`; the frames before then stand."""
-        state = frame.state
-        stored = [(body, self._fields.of(body)) for body in state.bodies]
-        require_space(self._file.path, sum(a.nbytes for _, arrays in stored for a in arrays.values()))
-        for name, value in zip((*CLOCK, "energy"), (frame.t, frame.dt, state.step, energy), strict=True):
-            _put(self.h5[name], value)
-        for body, arrays in stored:
-            for name, a in arrays.items():
-                _put(self.h5[f"bodies/{body.name}/{name}"], in_order(a, body.id))
+        rows = [(self.h5[name], value) for name, value in zip(
+            (*CLOCK, "energy"), (frame.t, frame.dt, frame.state.step, energy), strict=True)]
+        for body in frame.state.bodies:
+            group = self.h5[f"bodies/{body.name}"]
+            rows += [(group[name], in_order(a, body.id))
+                     for name, a in carried(body).items() if name in group]
+        require_space(self._file.path, sum(np.asarray(row).nbytes for _, row in rows))
+        for dataset, row in rows:
+            _put(dataset, row)
         self._commit()
+
+    @property
+    def manifest(self):
+        """The manifest, a dict."""
+        return json.loads(self.h5["manifest"][()])
 
     def truncate(self, frames):
         """Keep the first so many frames."""
@@ -131,8 +138,7 @@ class Writer:
 
     def put_manifest(self, facts):
         """Store the manifest (a dict of what JSON knows) in place of the one before."""
-        if "manifest" in self.h5:
-            del self.h5["manifest"]
+        del self.h5["manifest"]
         self.h5["manifest"] = json.dumps(facts, indent=1)
         self._commit()
 

@@ -34,8 +34,8 @@ class Case(NamedTuple):
         return Method(DX, self.degree, self.transfer, flip=0.9)
 
     @property
-    def D(self):
-        return self.method.D
+    def moment(self):
+        return self.method.moment
 
     @property
     def name(self):
@@ -43,8 +43,8 @@ class Case(NamedTuple):
         return f"{self.transfer}{self.degree}-{self.d}d{marks}"
 
 
-# Every transfer and every degree in both dimensions: what is compiled costs seconds. EVERY combination runs
-# without compilation, in test_plain_python.
+# Every transfer and every degree in both dimensions: what is compiled costs seconds. EVERY
+# combination runs without compilation, in test_plain_python.
 COVER = (
     Case("pic", 1, 2, body_force=True),
     Case("pic", 2, 3),
@@ -65,7 +65,7 @@ EVERY = tuple(
 
 
 def cloud(case, rng, n=300, width=5.0):
-    """n random particles in a box of `width` cells, with random velocity, C, tau, mass and volume."""
+    """n random particles in a box of `width` cells, with random v, C, tau, mass and volume."""
     d = case.d
     x = DX * rng.uniform(-0.4 * width, 0.6 * width, (n, d))
     m, V0 = rng.uniform(0.5, 2.0, n), rng.uniform(0.5, 2.0, n) * 1e-2

@@ -14,11 +14,7 @@ FUNCTION_LINES = 60         # without the docstring
 PARAMETERS = 6              # without self and cls
 
 # More parameters than six, each with its reason.
-MANY_PARAMETERS = {
-    "mpm_ref/body.py::particles_at": "the fields of a state; the optional ones by keyword",
-    "mpm_ref/core/grid.py::_update_apart":
-        "a parallel driver takes arrays one by one: Numba hands it no NamedTuple that holds a tuple",
-}
+MANY_PARAMETERS: dict[str, str] = {}
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 

@@ -22,7 +22,7 @@ def around(x, dx, degree):
 
 @st.composite
 def near_faces(draw):
-    """A coordinate at a multiple of half a cell, or one unit in the last place beside it; and dx."""
+    """A multiple of half a cell, or the number just below or above it, and dx."""
     dx = draw(st.sampled_from([0.1, 0.04, 1 / 3, 1.0, 2.0**-7, pi]))
     x = 0.5 * dx * draw(st.integers(-4000, 4000))
     return nextafter(x, draw(st.sampled_from([-1e9, x, 1e9]))), dx

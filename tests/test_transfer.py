@@ -104,7 +104,7 @@ def spin(trip):
     q.tau[:] = 0.0
     if case.body_force:
         q.b[:] = 0.0
-    D = case.D if case.transfer in AFFINE else 0.0
+    D = case.moment if case.transfer in AFFINE else 0.0
     first = angular_momentum([body(q)], D)
     grid = scattered(case, q, DT)
     middle = on_grid(grid, grid.v)

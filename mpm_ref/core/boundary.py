@@ -134,7 +134,7 @@ class Conditions:
         return any(part.motion.moves for part in self.parts)
 
     def apply(self, grid, t, dt):
-        """Change the velocities of a grid after its update, in the step of length dt that ends at t.
+        """Change the velocities of an updated grid, in the step of length dt that ends at time t.
 
         Returns the impulses [kg m/s] that the parts gave to the matter, (P, d): the colliders, the
         prescribed regions, then for each axis the low and the high wall. The force on a part is

@@ -84,8 +84,10 @@ def solve(touches, kind, mu, grid):
     touches has one `Touch` for each part, kind its rule (see `contact`), mu its friction.
     """
     d = grid.m.ndim
+    if not touches:
+        return np.zeros((0, d))
     J = np.zeros((CHUNKS, len(touches), d))
-    contacts = _sorted(touches, np.asarray(kind), np.asarray(mu, dtype=float), d)
+    contacts = _sorted(touches, np.asarray(kind), np.asarray(mu, dtype=float))
     if len(contacts.node):
         node = contacts.node
         first = np.flatnonzero(node[1:] != node[:-1]) + 1
@@ -95,7 +97,7 @@ def solve(touches, kind, mu, grid):
     return J.sum(axis=0)
 
 
-def _sorted(touches, kind, mu, d):
+def _sorted(touches, kind, mu):
     """Contacts by node; at a node the larger friction first, to which ties between planes go."""
     order = sorted(range(len(touches)), key=lambda p: -mu[p])
     rows = [touches[p] for p in order]

@@ -52,7 +52,7 @@ def approach(contacts, k, u):
 
 @kernel
 def meet(contacts, pairs, v):
-    """Velocity of a node in the colliders pairs[0] .. pairs[1] - 1, given its velocity without them.
+    """Velocity of a node in the colliders pairs[0] .. pairs[1] - 1, where v is that without them.
 
     What each collider changes is stored in contacts.dv. A node that colliders squeeze, so that no
     velocity suits all, or only one ESCAPE times theirs, moves with their mean velocity.

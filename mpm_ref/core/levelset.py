@@ -1,8 +1,9 @@
 """Level sets: one source for colliders, prescribed regions and bodies to fill.
 
-A shape is a NamedTuple of floats (`solids`), made by `half_space`, `box`, `sphere`, `cylinder`, `capsule`, `torus` or
-`wedge`. `distance(x, shape)` [m] is negative inside; `normal(x, shape)` is its gradient, a unit vector that points outward.
-Both take a point as a tuple (`primitives`); `distances` and `normals` map them over arrays.
+A shape is a NamedTuple of floats (`solids`), made by `half_space`, `box`, `sphere`, `cylinder`,
+`capsule`, `torus` or `wedge`. `distance(x, shape)` [m] is negative inside; `normal(x, shape)` is
+its gradient, a unit vector that points outward. Both take a point as a tuple (`primitives`);
+`distances` and `normals` map them over arrays.
 """
 
 import numpy as np
@@ -19,6 +20,7 @@ from .solids import (
     Wedge,
     box,
     capsule,
+    check_dimension,
     cylinder,
     half_space,
     sphere,
@@ -28,8 +30,25 @@ from .solids import (
 from .tensor import put_vec, vec
 
 __all__ = [
-    "SHAPES", "Box", "Capsule", "Cylinder", "HalfSpace", "Sphere", "Torus", "Wedge", "box", "capsule", "cylinder",
-    "distance", "distances", "half_space", "normal", "normals", "sphere", "torus", "wedge",
+    "SHAPES",
+    "Box",
+    "Capsule",
+    "Cylinder",
+    "HalfSpace",
+    "Sphere",
+    "Torus",
+    "Wedge",
+    "box",
+    "capsule",
+    "cylinder",
+    "distance",
+    "distances",
+    "half_space",
+    "normal",
+    "normals",
+    "sphere",
+    "torus",
+    "wedge",
 ]
 
 SHAPES = (HalfSpace, Box, Sphere, Cylinder, Capsule, Torus, Wedge)
@@ -60,24 +79,28 @@ def _all_normals(x, shape, out, like):
 
 
 def distances(x, shape):
-    """Signed distances (N,) [m] of points x (N, d) to the surface of a shape; negative inside."""
-    x, like = _points(x)
+    """Signed distances (N,) [m] of points x (N, d) to the surface of a shape; negative inside.
+
+    Raises ValueError for a shape that is not for d dimensions.
+    """
+    x, like = _points(x, shape)
     out = np.empty(len(x))
     _all_distances(x, shape, out, like)
     return out
 
 
 def normals(x, shape):
-    """Outward unit normals (N, d) of a shape at points x (N, d)."""
-    x, like = _points(x)
+    """Outward unit normals (N, d) of a shape at points x (N, d); see `distances`."""
+    x, like = _points(x, shape)
     out = np.empty_like(x)
     _all_normals(x, shape, out, like)
     return out
 
 
-def _points(x):
+def _points(x, shape):
     """The points as a C-contiguous array, and a tuple of length d."""
     x = np.ascontiguousarray(x, dtype=float)
     if x.ndim != 2 or x.shape[1] not in (2, 3):
         raise ValueError(f"points of shape {x.shape}: expected (N, 2) or (N, 3)")
+    check_dimension(shape, x.shape[1])
     return x, x.shape[1] * (0.0,)

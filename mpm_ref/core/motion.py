@@ -1,8 +1,8 @@
-"""Rigid motions on a schedule: where a collider is, and how fast it moved in the step that led there.
+"""Rigid motions on a schedule: where a collider is, and how fast it moved in the step before.
 
-A schedule gives a displacement [m] or an angle [rad] as a function of time, `value(t)`. The velocity
-in a step that ends at t is (value(t) - value(t - dt)) / dt, so that the displacements of the steps
-add up to the schedule's even where it starts, stops, bends or jumps within a step.
+A schedule gives a displacement [m] or an angle [rad] as a function of time, `value(t)`. The
+velocity in a step that ends at t is (value(t) - value(t - dt)) / dt, so that the displacements of
+the steps add up to the schedule's even where it starts, stops, bends or jumps within a step.
 """
 
 from dataclasses import dataclass
@@ -65,7 +65,7 @@ class Ramps:
 
 @dataclass(frozen=True)
 class Oscillation:
-    """amplitude (sin(2 pi frequency s + phase) - sin(phase)), s the time since start; until stop."""
+    """amplitude (sin(2 pi frequency s + phase) - sin(phase)), s the time since start, to stop."""
 
     amplitude: object
     frequency: float          # [1/s]
@@ -102,8 +102,8 @@ class Pose(NamedTuple):
 class Motion:
     """Translation [m] and rotation [rad] about `center` on schedules; None where there is none.
 
-    `orientation` is a rotation matrix (see `rotation`) that turns the shape about `center` before it
-    moves. The centre is the world's origin unless given, and moves with the translation. A rotation
+    `orientation` is a rotation matrix (see `rotation`) that turns the shape about `center` first.
+    The centre is the world's origin unless given, and moves with the translation. A rotation
     has an `axis` in 3D and is counter-clockwise in 2D.
     """
 
@@ -124,7 +124,7 @@ class Motion:
         return Motion(center=self.center, orientation=self.orientation)
 
     def pose(self, t, dt, d):
-        """`Pose` at time t [s] in d dimensions; velocities are means over the step of dt [s] before t.
+        """`Pose` at time t [s] in d dimensions; velocities are means over the dt [s] before t.
 
         Raises ValueError for vectors of another dimension, and for an axis missing in 3D or given
         in 2D.
@@ -157,7 +157,7 @@ STILL = Motion()
 
 
 def rotation(angle, axis=None):
-    """Rotation matrix of an angle [rad], about `axis` in 3D, counter-clockwise in 2D without one."""
+    """Rotation matrix of an angle [rad]: about `axis` in 3D, counter-clockwise in 2D (no axis)."""
     return _exponential(generator(2 if axis is None else 3, axis), angle)
 
 

@@ -1,10 +1,11 @@
 """Signed distance and normal of the analytic shapes, in 2D and 3D.
 
-Distances are exact inside and outside. The normal is the gradient of the distance; where that does not exist (an axis, a
-centre, a ridge inside a box) it is one of the gradients nearby, always the same one, so that it is finite everywhere.
+Distances are exact inside and outside. The normal is the gradient of the distance. Where that does
+not exist (on an axis, at a centre, on a ridge inside a box) it is one of the gradients nearby,
+always the same one, so that it is a unit vector everywhere.
 
-Most shapes reduce to a corner: with q_k the signed distances to faces at right angles, `corner` is the distance to the
-set of all q_k <= 0.
+Most shapes reduce to a corner: with q_k the signed distances to faces at right angles, `corner` is
+the distance to the set of all q_k <= 0.
 """
 
 from math import cos, sin
@@ -90,7 +91,7 @@ def across(a, b):
 
 @kernel
 def corner(q):
-    """Signed distance to the set of all q_k <= 0, where q_k are signed distances to faces at right angles."""
+    """Signed distance to the set of all q_k <= 0."""
     return norm(clip_below(q)) + min(q[largest(q)], 0.0)
 
 
@@ -226,11 +227,11 @@ def torus_normal(x, shape):
     return unit(from_circle(x, shape), unit(r, aside(a)))
 
 
-# wedge: half its profile is the triangle with vertices (0, 0), (0, length), (length tan(half_angle), length)
+# wedge: half its profile is the triangle (0, 0), (0, length), (length tan(half_angle), length)
 
 @kernel
 def triangle(u, h, shape):
-    """Distance to the half profile from the point (u >= 0, h), and its gradient with respect to u and h."""
+    """Distance to the half profile from (u >= 0, h), and its gradient with respect to u and h."""
     s, c = sin(shape.half_angle), cos(shape.half_angle)
     face, back = u * c - h * s, h - shape.length
     if face <= 0.0 and back <= 0.0:
@@ -246,7 +247,7 @@ def triangle(u, h, shape):
 
 @kernel
 def wedge_frame(x, shape):
-    """The point in the wedge's frame: depth h along a, width w along b, side u >= 0 along the unit vector e."""
+    """Depth h along a, width w along b, side u >= 0 along the unit vector e; and e, a, b."""
     a, b, p = axis(shape, x), triple(shape.bx, shape.by, shape.bz, x), from_center(x, shape)
     e, h, w = across(a, b), dot(p, a), dot(p, b)
     u = dot(p, e)

@@ -1,8 +1,9 @@
 """Analytic shapes as records of floats, and functions that make them from points and sizes.
 
-The same records describe 2D and 3D; what has no meaning in 2D is zero there. In 2D a sphere is a disk, a cylinder a
-rectangle, a capsule a stadium, a torus a ring and a wedge a triangle. Make shapes with the lower-case functions: they
-check their arguments and raise ValueError. Points and vectors are sequences of 2 or 3 numbers.
+The same records describe 2D and 3D; what has no meaning in 2D is zero there. In 2D a sphere is a
+disk, a cylinder a rectangle, a capsule a stadium, a torus a ring and a wedge a triangle. Make
+shapes with the lower-case functions: they check their arguments and raise ValueError. Points and
+vectors are sequences of 2 or 3 numbers.
 """
 
 from math import hypot, inf, isfinite, pi
@@ -94,8 +95,11 @@ class Wedge(NamedTuple):
     half_width: float     # half length of the edge [m]
 
 
+IN_3D = {Box: ("hz",), Torus: ("ax", "ay", "az"), Wedge: ("bx", "by", "bz")}     # not all zero
+
+
 def half_space(point, normal):
-    """Everything behind the plane (2D: line) through `point` [m]; `normal` points out of it, with any length."""
+    """Everything behind the plane through `point` [m]; `normal` points out of it, of any length."""
     n = _unit("normal", normal)
     return HalfSpace(*n, sum(a * b for a, b in zip(_vector("point", point), n)))
 
@@ -116,7 +120,7 @@ def sphere(center, radius):
 
 
 def cylinder(start, end, radius):
-    """Solid cylinder with flat ends at the points `start` and `end` of its axis [m]; a rectangle in 2D."""
+    """Solid cylinder with flat ends at the points `start` and `end` of its axis [m]."""
     return Cylinder(*_segment(start, end), _positive("radius", radius), _half_length(start, end))
 
 
@@ -126,9 +130,9 @@ def capsule(start, end, radius):
 
 
 def torus(center, major, minor, axis=None):
-    """Points within `minor` of a circle of radius `major` about `center` [m] and, in 3D, about `axis`."""
+    """Points within `minor` of a circle of radius `major` about `center` [m]; 3D: and `axis`."""
     if not 0.0 < minor <= major < inf:
-        raise ValueError(f"torus with major = {major}, minor = {minor}: expected 0 < minor <= major")
+        raise ValueError(f"major = {major}, minor = {minor}: expected 0 < minor <= major")
     _dimensions(center, axis, "axis")
     a = (0.0, 0.0, 0.0) if axis is None else _unit("axis", axis)
     return Torus(*_vector("center", center), *a, float(major), float(minor))
@@ -137,8 +141,9 @@ def torus(center, major, minor, axis=None):
 def wedge(tip, direction, half_angle, length, edge=None, width=inf):
     """Blade with its sharp edge at `tip` [m], getting thicker along `direction` for `length` [m].
 
-    half_angle [rad], between a face and the middle plane, is in (0, pi/2). In 3D the edge lies along `edge`, which is made
-    perpendicular to `direction`, and is `width` [m] long, `tip` being its middle; in 2D there is no edge and no width.
+    half_angle [rad], between a face and the middle plane, is in (0, pi/2). In 3D the edge lies
+    along `edge`, made perpendicular to `direction`, and is `width` [m] long with `tip` in its
+    middle; in 2D there is neither.
     """
     if not 0.0 < half_angle < 0.5 * pi:
         raise ValueError(f"half_angle = {half_angle}: expected an angle between 0 and pi/2 in rad")
@@ -149,6 +154,17 @@ def wedge(tip, direction, half_angle, length, edge=None, width=inf):
         raise ValueError(f"width = {width}: expected a positive length in m")
     sizes = float(half_angle), _positive("length", length), 0.5 * width
     return Wedge(*_vector("tip", tip), *a, *b, *sizes)
+
+
+def check_dimension(shape, d):
+    """Raise ValueError for a shape that is not one of d dimensions."""
+    if d == 2:
+        fits = not any(getattr(shape, name, 0.0) for name in ("z", "nz", "az", "bz", "hz"))
+    else:
+        names = IN_3D.get(type(shape))
+        fits = names is None or any(getattr(shape, name) for name in names)
+    if not fits:
+        raise ValueError(f"{shape} in {d}D: expected a shape made from points of {d} numbers")
 
 
 def _vector(name, x):
@@ -178,14 +194,15 @@ def _perpendicular(b, a):
     h = sum(p * q for p, q in zip(a, b))
     rest = tuple(q - h * p for p, q in zip(a, b))
     if hypot(*rest) < 1e-6:
-        raise ValueError(f"edge = {b} is parallel to direction = {a}: expected two different directions")
+        raise ValueError(f"edge = {b} and direction = {a} are parallel: expected them not to be")
     return _unit("edge", rest)
 
 
 def _dimensions(point, direction, name):
     """A direction that only 3D has is given in 3D, and only there."""
-    if (direction is None) == (len(tuple(point)) == 3):
-        raise ValueError(f"{name} = {direction} with a point in {len(tuple(point))}D: give {name} in 3D only")
+    d = len(tuple(point))
+    if (direction is None) == (d == 3):
+        raise ValueError(f"{name} = {direction} in {d}D: expected it in 3D, and only there")
 
 
 def _half_length(start, end):

@@ -169,10 +169,10 @@ def gather_mls(particles, grid, stencil, dt, bounds):
 
 
 @kernel
-def damp(C, rpic, bounds):
+def damp(C, rpic, like, bounds):
     """C <- (1 - rpic) sym C + skew C: damps the strain rate, keeps the rotation (NSF-rpic)."""
     for p in range(bounds[0], bounds[1]):
-        A = mat(C, p, C[p])
+        A = mat(C, p, like)
         put_mat(C, p, mlin(1.0 - 0.5 * rpic, A, -0.5 * rpic, transpose(A)))
 
 
@@ -203,10 +203,9 @@ def _gather_mls(particles, grid, stencil, dt):
 
 
 @parallel
-def rpic(C, damping):
-    """`damp` for all particles, in parallel."""
+def _damp(C, damping, like):
     for c in prange(CHUNKS):
-        damp(C, damping, chunk(c, len(C)))
+        damp(C, damping, like, chunk(c, len(C)))
 
 
 def p2g(particles, grid, stencil, dt, slabs, mls):
@@ -228,3 +227,8 @@ def g2p(particles, grid, stencil, dt, flip, mls):
         _gather_mls(particles, grid, stencil, dt)
     else:
         _gather(particles, grid, stencil, dt, flip)
+
+
+def rpic(C, damping):
+    """`damp` for all particles."""
+    _damp(C, damping, tuple(range(C.shape[1])))

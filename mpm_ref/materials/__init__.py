@@ -7,8 +7,8 @@
     stiffness                                   lam + 2 mu
 
 and of the return maps ("flows"): `build`, `project` on singular values, `intact`. Elasticity:
-`fixed_corotated`, `hencky`, `neo_hookean`, `fluid`. Importing this package registers them all
-with the names of `core.law`.
+`fixed_corotated`, `hencky`, `neo_hookean`, `log_neo_hookean`, `fluid`. Importing this package
+registers them all with the names of `core.law`.
 """
 
 from ..core import law
@@ -20,6 +20,7 @@ from . import (
     fluid_projection,
     hencky,
     herschel_bulkley,
+    log_neo_hookean,
     neo_hookean,
     no_flow,
     principal,
@@ -34,6 +35,7 @@ from .fluid import Fluid
 from .fluid_projection import FluidProjection
 from .hencky import Hencky
 from .herschel_bulkley import HerschelBulkley
+from .log_neo_hookean import LogNeoHookean
 from .moduli import bulk_modulus, lame, yield_radius
 from .neo_hookean import NeoHookean
 from .no_flow import NoFlow
@@ -54,6 +56,7 @@ __all__ = [
     "Hardening",
     "Hencky",
     "HerschelBulkley",
+    "LogNeoHookean",
     "Material",
     "NeoHookean",
     "NoFlow",
@@ -75,7 +78,7 @@ _OF_LAWS = (law.psi, law.pk1, law.kirchhoff, law.dpk1, law.kirchhoff_hat,
             principal.pk1_hat, principal.dpk1_hat, principal.pair, waves.stiffness)
 
 for _law, _file in ((FixedCorotated, fixed_corotated), (Hencky, hencky),
-                    (NeoHookean, neo_hookean), (Fluid, fluid)):
+                    (NeoHookean, neo_hookean), (LogNeoHookean, log_neo_hookean), (Fluid, fluid)):
     for _function in _OF_LAWS:
         _function.method(_law, getattr(_file, _function.__name__))
 law.pressure.method(Fluid, fluid.pressure)

@@ -13,6 +13,7 @@ from . import (
     fluid_projection,
     hencky,
     herschel_bulkley,
+    log_neo_hookean,
     neo_hookean,
     no_flow,
     snow_clamp,
@@ -21,6 +22,7 @@ from . import (
 from .fixed_corotated import FixedCorotated
 from .fluid import Fluid
 from .hencky import Hencky
+from .log_neo_hookean import LogNeoHookean
 from .neo_hookean import NeoHookean
 from .no_flow import NoFlow
 from .von_mises import Hardening, Softening
@@ -39,10 +41,11 @@ LAWS = {
     "fixed_corotated": fixed_corotated.from_E_nu,
     "hencky": hencky.from_E_nu,
     "neo_hookean": neo_hookean.from_E_nu,
+    "log_neo_hookean": log_neo_hookean.from_E_nu,
     "fluid": fluid.build,
 }
 
-SOLIDS = FixedCorotated, Hencky, NeoHookean
+SOLIDS = FixedCorotated, Hencky, NeoHookean, LogNeoHookean
 
 # Return maps in log strain are for Hencky; fixed corotated has its own von Mises (X-cross-13).
 FLOWS = {

@@ -1,7 +1,7 @@
 """Elastic laws in principal stretches: s (N, d) are the singular values of F, J their product.
 
-All are isotropic: psi and the principal Kirchhoff stresses tau_k = s_k dpsi/ds_k say everything. A law is
-named by the class of its parameters; stresses are in Pa, psi in J/m^d of rest volume.
+All are isotropic: psi and the principal Kirchhoff stresses tau_k = s_k dpsi/ds_k say everything. A
+law is named by the class of its parameters; stresses are in Pa, psi in J/m^d of rest volume.
 """
 
 import numpy as np
@@ -24,12 +24,19 @@ def hencky(s, mu, lam):
 
 
 def neo_hookean(s, mu, kappa):
-    """psi = mu/2 (J^(-2/d) sum s^2 - d) + kappa/2 ((J^2 - 1)/2 - log J); its tau is that of NSF-F5."""
+    """psi = mu/2 (J^(-2/d) sum s^2 - d) + kappa/2 ((J^2 - 1)/2 - log J), the law of NSF-F5."""
     d, J = s.shape[1], volume(s)
     b = s * s * J ** (-2 / s.dtype.type(d))
     tr = b.sum(axis=1, keepdims=True)
     psi = mu * (tr - d) / 2 + kappa * ((J * J - 1) / 2 - np.log(J)) / 2
     return psi, kappa * (J * J - 1) / 2 + mu * (b - tr / d)
+
+
+def log_neo_hookean(s, mu, lam):
+    """psi = mu/2 (sum s^2 - d) - mu log J + lam/2 log^2 J [WallstedtGuilkey2008]."""
+    log_J, b = np.log(volume(s)), s * s
+    psi = mu * (b - 1).sum(axis=1, keepdims=True) / 2 - mu * log_J + lam * log_J**2 / 2
+    return psi, mu * (b - 1) + lam * log_J
 
 
 def fluid(s, lam):
@@ -42,6 +49,7 @@ LAWS = {
     "FixedCorotated": fixed_corotated,
     "Hencky": hencky,
     "NeoHookean": neo_hookean,
+    "LogNeoHookean": log_neo_hookean,
     "Fluid": fluid,
 }
 

@@ -6,10 +6,10 @@ import numpy as np
 
 
 def bspline(u, degree):
-    """N(u) of the uniform B-spline with knots 0, 1, .., degree + 1: the recursion of Cox and de Boor.
+    """N(u) of the uniform B-spline with knots 0 .. degree + 1, by the recursion of Cox and de Boor.
 
-        N_0(u) = 1 for 0 <= u < 1, else 0
-        N_k(u) = (u N_{k-1}(u) + (k + 1 - u) N_{k-1}(u - 1)) / k
+    N_0(u) = 1 for 0 <= u < 1, else 0
+    N_k(u) = (u N_{k-1}(u) + (k + 1 - u) N_{k-1}(u - 1)) / k
     """
     if degree == 0:
         return ((u >= 0) & (u < 1)).astype(u.dtype)
@@ -26,13 +26,13 @@ class Pairs(NamedTuple):
     """All pairs ip of a particle p and one of the S = (degree + 1)^d nodes i that it reaches."""
 
     node: np.ndarray     # (N, S, d)  integer coordinates of the node, which lies at node * dx
-    w: np.ndarray        # (N, S)     weight w_ip = prod_a N((x_p - x_i)_a / dx), N centred
-    dw: np.ndarray       # (N, S, d)  dw_ip / dx_p [1/m]
+    w: np.ndarray        # (N, S)     weight prod_a N((x_p - x_i)_a / dx), N centred
+    dw: np.ndarray       # (N, S, d)  its gradient with respect to x_p [1/m]
     r: np.ndarray        # (N, S, d)  x_i - x_p [m]
 
 
 def pairs(x, dx, degree):
-    """Pairs of the particles at x (N, d) [m] with nodes of a grid of spacing dx [m] (NSF-alg-mpm)."""
+    """Pairs of the particles at x (N, d) [m] with the nodes of a grid of spacing dx [m]."""
     d, half = x.shape[1], x.dtype.type(degree + 1) / 2
     base = np.floor(x / dx - (half - 1)).astype(int)
     node = base[:, None] + np.array(list(np.ndindex(*d * (degree + 1,))))

@@ -1,6 +1,6 @@
-"""One step of explicit MPM, from the functions of `transfer`, `laws`, `flows` and `walls`.
+"""One step of explicit MPM, from the functions of `transfer`, `laws`, `flows` and `walls`:
 
-    tau(F) given -> p2g -> velocity -> boundaries -> g2p -> F trial -> return map -> stress
+tau(F) given -> p2g -> velocity -> boundaries -> g2p -> F trial -> return map -> stress
 """
 
 from typing import NamedTuple
@@ -10,12 +10,15 @@ import numpy as np
 from . import transfer
 from .flows import intact, project
 from .laws import energy, kirchhoff
-from .spline import Pairs, pairs
+from .spline import pairs
 from .tensors import det
 
 
 class Matter(NamedTuple):
-    """Particles of one material. C, y, b are None where they are not carried; F, tau (N,) in a fluid."""
+    """Particles of one material; the fields are those of `core.state`.
+
+    C, y, b are None where they are not carried; F and tau have shape (N,) in a fluid.
+    """
 
     x: np.ndarray
     v: np.ndarray
@@ -41,8 +44,8 @@ class Method(NamedTuple):
     mass_eps: float = 0
 
     @property
-    def D(self):
-        """Moment of the weights [m^2]."""
+    def moment(self):
+        """D, the moment of the weights [m^2]."""
         return transfer.moment(self.dx, self.degree)
 
 
@@ -82,6 +85,7 @@ class Step(NamedTuple):
     nodes: Nodes
     moved: list         # of Moved
     deformed: list      # of Deformed
+    dt: float           # [s]
 
 
 def step(bodies, method, gravity, dt, conditions=None):
@@ -95,7 +99,8 @@ def step(bodies, method, gravity, dt, conditions=None):
     if conditions is not None:
         nodes = nodes._replace(v=conditions(nodes.v_free, nodes.m, nodes.box))
     moved = [to_particles(q, ip, nodes, method, dt) for q, ip in zip(bodies, clouds)]
-    return Step(clouds, nodes, moved, [deform(q, new.L, dt) for q, new in zip(bodies, moved)])
+    deformed = [deform(q, new.L, dt) for q, new in zip(bodies, moved)]
+    return Step(clouds, nodes, moved, deformed, dt)
 
 
 def after(q, moved, deformed):
@@ -119,7 +124,7 @@ def force(q, ip, method, box):
     """Internal and body forces of one body on the nodes."""
     tau = isotropic(q.tau, q.x.shape[1]) if q.tau.ndim == 1 else q.tau
     if method.transfer == "mls":
-        f = transfer.internal_force_mls(q.V0, tau, method.D, ip, box)
+        f = transfer.internal_force_mls(q.V0, tau, method.moment, ip, box)
     else:
         f = transfer.internal_force(q.V0, tau, ip, box)
     return f if q.b is None else f + transfer.body_force(q.m, q.b, ip, box)
@@ -135,7 +140,7 @@ def to_particles(q, ip, nodes, method, dt):
     v, box = transfer.velocity(nodes.v, ip, nodes.box), nodes.box
     x, C, L = q.x + dt * v, None, transfer.velocity_gradient(nodes.v, ip, box)
     if method.transfer in ("apic", "mls"):
-        C = transfer.rpic(transfer.affine(nodes.v, method.D, ip, box), method.rpic)
+        C = transfer.rpic(transfer.affine(nodes.v, method.moment, ip, box), method.rpic)
     if method.transfer == "mls":
         L = C
     if method.transfer == "flip":
@@ -152,7 +157,7 @@ def deform(q, L, dt):
 
 
 def grown(F, L, dt):
-    """F trial = (I + dt L) F (NSF-alg-mpm step 3), or its determinant det(I + dt L) J in a fluid."""
+    """F trial = (I + dt L) F (NSF-alg-mpm step 3); of a fluid its determinant det(I + dt L) J."""
     growth = np.eye(L.shape[1], dtype=L.dtype) + dt * L
     return det(growth) * F if F.ndim == 1 else growth @ F
 
@@ -167,7 +172,7 @@ def energies(q, method, gravity):
     """Kinetic, elastic and gravitational energy of one body [J], as an array (3,)."""
     kinetic = (q.m * (q.v**2).sum(axis=1)).sum() / 2
     if q.C is not None:
-        kinetic = kinetic + method.D * (q.m * (q.C**2).sum(axis=(1, 2))).sum() / 2
+        kinetic = kinetic + method.moment * (q.m * (q.C**2).sum(axis=(1, 2))).sum() / 2
     psi = energy(q.F, q.law)
     whole = 1 if q.y is None else intact(q.y, q.flow)
     height = (q.x * gravity).sum(axis=1)

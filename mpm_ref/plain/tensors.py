@@ -16,10 +16,10 @@ def det(A):
 
 
 def svd(F):
-    """F = U diag(s) V^T with rotations U and V, for invertible F; det F < 0 makes the smallest s negative.
+    """F = U diag(s) V^T, rotations U and V, of invertible F; det F < 0 makes the least s negative.
 
-    One-sided Jacobi: rotations of column pairs, gathered in V, make the columns of F V orthogonal; their
-    lengths are the singular values, here in no particular order.
+    One-sided Jacobi: rotations of column pairs, gathered in V, make the columns of F V orthogonal;
+    their lengths are the singular values, here in no particular order.
     """
     d = F.shape[1]
     A, V = F.copy(), np.tile(np.eye(d, dtype=F.dtype), (len(F), 1, 1))

@@ -35,7 +35,7 @@ def sum_to_nodes(q, ip, box):
 
 
 def moment(dx, degree):
-    """D = sum_i w_ip r_ip r_ip^T = dx^2 (degree + 1)/12, times I, for degrees 2 and 3 (NSF-alg-mpm)."""
+    """D = sum_i w_ip r_ip r_ip^T = dx^2 (degree + 1)/12 I, for degrees 2 and 3 (NSF-alg-mpm)."""
     return dx * dx * (degree + 1) / 12
 
 
@@ -47,7 +47,7 @@ def mass(m, ip, box):
 
 
 def momentum(m, v, C, ip, box):
-    """m_i v_i = sum_p w_ip m_p (v_p + C_p r_ip) [kg m/s]; C None in PIC and FLIP (NSF-alg-mpm step 1)."""
+    """m_i v_i = sum_p w_ip m_p (v_p + C_p r_ip) [kg m/s] (NSF-alg-mpm step 1); C None: no C_p."""
     v_ip = v[:, None] + (0 if C is None else np.einsum("pab,psb->psa", C, ip.r))
     return sum_to_nodes((ip.w * m[:, None])[..., None] * v_ip, ip, box)
 
@@ -97,7 +97,7 @@ def affine(v_i, D, ip, box):
 
 
 def flip(v, v_new, v_old, share):
-    """v_p = sum_i w_ip v_i + share (v_p - sum_i w_ip v_old_i): FLIP for share 1, PIC for 0 [FLIP]."""
+    """v_p = sum_i w_ip v_i + share (v_p - sum_i w_ip v_old_i): PIC for share 0, FLIP for 1."""
     return v_new + share * (v - v_old)
 
 

@@ -1,0 +1,127 @@
+"""What each feature of a scene costs: the same block, with one thing changed at a time."""
+
+import time
+from typing import NamedTuple
+
+import numpy as np
+
+from mpm_ref.body import Body, particles_at
+from mpm_ref.core.boundary import Collider, Conditions, nclaw_walls
+from mpm_ref.core.jit import set_threads
+from mpm_ref.core.levelset import half_space
+from mpm_ref.energy import energy
+from mpm_ref.explicit import Scheme, Stepper
+from mpm_ref.materials import Material, make_flow, make_law
+
+from .problem import GRAVITY, NU, RHO, WALL, E
+
+ELASTIC = {"law": "fixed_corotated"}
+SAND = {"law": "hencky", "flow": "drucker_prager", "friction_angle": 30.0}
+METAL = {"law": "hencky", "flow": "von_mises_hardening", "tau_y": 1e9, "xi": 0.1}
+
+
+class Variant(NamedTuple):
+    """One way to step the block."""
+
+    name: str
+    scheme: Scheme = Scheme()
+    material: dict = ELASTIC
+    conditions: str = "none"
+    monitor: bool = False
+
+
+VARIANTS = (
+    Variant("MLS, quadratic, fixed corotated"),
+    Variant("PIC", Scheme(transfer="pic")),
+    Variant("FLIP", Scheme(transfer="flip")),
+    Variant("APIC", Scheme(transfer="apic")),
+    Variant("MLS with RPIC damping", Scheme(rpic=0.1)),
+    Variant("PIC, linear splines", Scheme(transfer="pic", degree=1)),
+    Variant("MLS, cubic splines", Scheme(degree=3)),
+    Variant("fluid, J only", material={"law": "fluid"}),
+    Variant("Hencky", material={"law": "hencky"}),
+    Variant("Hencky with Drucker-Prager", material=SAND),
+    Variant("Hencky with hardening von Mises", material=METAL),
+    Variant("walls of a box", conditions="walls"),
+    Variant("floor with friction", conditions="floor"),
+    Variant("energies every step", monitor=True),
+)
+
+
+class Run:
+    """A block that is stepped one way."""
+
+    def __init__(self, variant, block):
+        self.variant, self.dt = variant, block.dt
+        self.bodies = (body_of(variant, block),)
+        self.gravity = (0.0, 0.0, GRAVITY)
+        conditions = conditions_of(variant.conditions, block)
+        self.stepper = Stepper(variant.scheme, block.dx, 3, self.gravity, conditions)
+        self.stepper.start(self.bodies)
+        self.stepper.sort(self.bodies)
+
+    def step(self):
+        """One step."""
+        self.stepper.step(self.bodies, 0.0, self.dt)
+        if self.variant.monitor:
+            energy(self.bodies, self.gravity)
+
+    @property
+    def bytes_per_particle(self):
+        """Memory of the state per particle; arrays that share storage count once."""
+        arrays = {id(a): a.nbytes for a in self.bodies[0].particles}
+        return sum(arrays.values()) / len(self.bodies[0].id)
+
+
+def body_of(variant, block):
+    """The block's particles in the variant's material."""
+    words = dict(variant.material)
+    law_name, flow_name = words.pop("law"), words.pop("flow", "none")
+    law = make_law(law_name, E=E, nu=NU)
+    material = Material(law, make_flow(flow_name, law, 3, **words))
+    count = len(block.x)
+    particles = particles_at(
+        block.x.copy(), block.v.copy(), np.full(count, RHO * block.V0), np.full(count, block.V0),
+        variant.scheme.transfer, fluid=not material.needs_F,
+    )
+    if material.has_history:
+        particles = particles._replace(y=np.full(count, material.initial_y))
+    return Body("block", particles, law, material.flow, np.arange(count))
+
+
+def conditions_of(name, block):
+    """Walls or a floor just below the block, or nothing."""
+    if name == "walls":
+        return Conditions(walls=nclaw_walls(block.n, WALL))
+    if name == "floor":
+        floor = half_space((0.0, 0.0, 0.25), (0.0, 0.0, 1.0))
+        return Conditions(colliders=(Collider(floor, "separate", friction=0.3),))
+    return None
+
+
+def costs(block, threads, repeats):
+    """Rows name, median wall ns and CPU ns per particle-step, ratio to the first, bytes."""
+    set_threads(threads)
+    runs = [Run(variant, block) for variant in VARIANTS]
+    rounds = {run.variant.name: [] for run in runs}
+    for _ in range(repeats + 1):                 # the first round compiles
+        for run in runs:
+            rounds[run.variant.name].append(timed(run))
+    scale = 1e9 / len(block.x)
+    times = {name: np.median(r[1:], axis=0) * scale for name, r in rounds.items()}
+    first = times[VARIANTS[0].name][1]
+    return [
+        {"feature": run.variant.name, "wall_ns": times[run.variant.name][0],
+         "cpu_ns": times[run.variant.name][1],
+         "cpu_ratio": times[run.variant.name][1] / first,
+         "state_bytes_per_particle": run.bytes_per_particle}
+        for run in runs
+    ]
+
+
+def timed(run, steps=3):
+    """Wall and CPU seconds per step."""
+    wall, cpu = time.perf_counter(), time.process_time()
+    for _ in range(steps):
+        run.step()
+    return (time.perf_counter() - wall) / steps, (time.process_time() - cpu) / steps

@@ -1,0 +1,47 @@
+"""How faults end a command: one line on the error channel and an exit status, no traceback."""
+
+import sys
+from contextlib import contextmanager
+
+import typer
+
+from .atomic import NotWritten
+from .checkpoint import BadCheckpoint
+from .core.grid import OutOfRange
+from .journal import Damaged, InUse
+from .results import BadResults
+from .running import Refused
+from .scene import SceneError
+from .timestep import TooLarge
+
+BAD_INPUT, UNSTABLE, NOT_WRITTEN, INTERRUPT = 2, 3, 4, 130
+FAULTS = (SceneError, TooLarge, OutOfRange, Refused, BadCheckpoint, BadResults, InUse, Damaged)
+
+
+@contextmanager
+def one_line():
+    """Faults of the input, of files, and Ctrl-C where nothing waits for it. Others are bugs: they
+    keep their traceback."""
+    try:
+        yield
+    except FAULTS as fault:
+        end(fault, BAD_INPUT)
+    except NotWritten as fault:
+        end(fault, NOT_WRITTEN)
+    except KeyboardInterrupt:
+        end("interrupted", INTERRUPT)
+
+
+@contextmanager
+def options():
+    """While options are checked, any ValueError is a fault of the input."""
+    try:
+        yield
+    except ValueError as fault:
+        end(fault, BAD_INPUT)
+
+
+def end(message, status):
+    """Say a sentence on the error channel and end the command."""
+    print(f"mpm-ref: {' '.join(str(message).split())}", file=sys.stderr)
+    raise typer.Exit(status)

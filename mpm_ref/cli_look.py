@@ -1,0 +1,110 @@
+"""`mpm-ref info | plot | animate | export | scenes`: commands that look at results and scenes."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from . import checkpoint, info, plotting, scene
+from .cli_faults import one_line, options
+from .results import SCALARS, Results
+from .running import checkpoint_of
+from .shipped import find_scene, shipped_scenes
+from .vtkhdf import export_particles
+from .vtkhdf_grid import export_grid
+
+HDF5 = b"\x89HDF\r\n\x1a\n"      # how such files begin
+
+Machine = Annotated[bool, typer.Option("--json", help="Answer with JSON.")]
+ResultsFile = Annotated[Path, typer.Argument(metavar="FILE", help="A results file.")]
+Scalar = Annotated[str, typer.Option(help=f"Colour: {', '.join(SCALARS)}.")]
+View = Annotated[str | None, typer.Option(help="Axes to the right and up, such as xz.")]
+
+
+def describe(
+    name: Annotated[str, typer.Argument(metavar="FILE|SCENE")],
+    json: Machine = False,
+):
+    """Say what a results file, a checkpoint or a scene holds."""
+    with one_line():
+        facts, lines = _facts(name)
+        print(info.as_json(facts) if json else "\n".join(lines))
+
+
+def plot(
+    file: ResultsFile,
+    frame: Annotated[int, typer.Option(help="Number from 0; -1 is the last.")] = -1,
+    field: Scalar = "speed",
+    view: View = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="FILE.png")] = None,
+):
+    """Draw the particles of one frame (png, pdf or svg)."""
+    _to_file(plotting.save_plot, file, out, (".png", ".pdf", ".svg"), frame=frame, field=field, view=_axes(view))
+
+
+def animate(
+    file: ResultsFile,
+    field: Scalar = "speed",
+    view: View = None,
+    fps: Annotated[int, typer.Option(help="Frames per second.", min=1, max=100)] = 20,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="FILE.gif")] = None,
+):
+    """Make a GIF of all frames."""
+    _to_file(plotting.animate, file, out, (".gif",), field=field, view=_axes(view), fps=fps)
+
+
+def export(
+    file: ResultsFile,
+    grid: Annotated[bool, typer.Option("--grid", help="Nodes, not particles.")] = False,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="FILE.vtkhdf")] = None,
+):
+    """Write VTKHDF, which ParaView and VTK open: particles, or density and velocity of nodes."""
+    _to_file(export_grid if grid else export_particles, file, out, (".vtkhdf", ".hdf"))
+
+
+def scenes(json: Machine = False):
+    """List the scenes that come with the package."""
+    with one_line():
+        found = {name: scene.load(path).title for name, path in shipped_scenes().items()}
+        print(info.as_json(found) if json else "\n".join(f"{n:24} {title}" for n, title in found.items()))
+
+
+def _facts(name):
+    """(facts, lines) of whatever a name stands for."""
+    if not _is_hdf5(name):
+        facts = info.of_problem(scene.build(scene.load(find_scene(name))))
+        return facts, info.problem_lines(facts)
+    if checkpoint.is_one(name):
+        facts = checkpoint.summary(name)
+        return facts, [f"checkpoint: step {facts['step']}, t = {facts['t']:.6g} s, after {facts['frames']} "
+                       f"frames; scene sha256 {facts['scene_sha256'][:12]}"]
+    facts = info.of_results(name)
+    return facts, info.results_lines(facts)
+
+
+def _is_hdf5(name):
+    if not Path(name).is_file():
+        return False
+    with open(name, "rb") as file:
+        return file.read(len(HDF5)) == HDF5
+
+
+def _to_file(make, file, out, suffixes, **what):
+    """Make a file from results and name it."""
+    out = out or file.with_suffix(suffixes[0])
+    with options():
+        if out.suffix.lower() not in suffixes:
+            raise ValueError(f"--out {out}: expected a name that ends in {' or '.join(suffixes)}")
+    with one_line(), Results(file) as results:
+        make(results, out, **what)
+        print(out)
+
+
+def _axes(view):
+    """Axes by name, xz, as numbers."""
+    if view is None:
+        return None
+    with options():
+        if len(view) != 2 or len(set(view)) != 2 or not set(view) <= set(plotting.AXES):
+            raise ValueError(f"--view {view}: expected two different axes such as xy or xz")
+    return tuple(plotting.AXES.index(axis) for axis in view)

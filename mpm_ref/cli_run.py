@@ -1,0 +1,134 @@
+"""`mpm-ref run`: a scene into a results file, with progress, and what each way to end returns.
+
+Exit status: 0 finished, or stopped at --steps; 2 the scene, the options or the files do not fit;
+3 the run became unstable; 4 a file could not be written; 130 Ctrl-C; 143 terminated.
+"""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from tqdm import tqdm
+
+from . import checkpoint, info
+from .atomic import NotWritten
+from .cli_faults import INTERRUPT, NOT_WRITTEN, UNSTABLE, end
+from .core.grid import OutOfRange
+from .monitor import Unstable
+from .running import AT_LIMIT, FINISHED, INTERRUPTED, TERMINATED, Watch, checkpoint_of, run
+from .simulate import last_step
+from .timestep import TooLarge
+
+EXIT = {FINISHED: 0, AT_LIMIT: 0, INTERRUPTED: INTERRUPT, TERMINATED: 143}
+SHAPE = "{percentage:3.0f}% |{bar:20}| {n_fmt}/{total_fmt} {unit} [{elapsed}<{remaining}] {postfix}"
+
+
+class Bar(Watch):
+    """Progress on the terminal's error channel: steps or time done, time left, dt, energies."""
+
+    def __init__(self, hide):
+        self.hide, self.bar, self.energies = hide, None, ""
+
+    @property
+    def began(self):
+        """Whether the run began."""
+        return self.bar is not None
+
+    def begin(self, problem, state):
+        """Open the bar."""
+        self.total = last_step(problem.clock)
+        self.bar = tqdm(
+            total=self.total or problem.clock.end, unit="steps" if self.total else "s",
+            initial=0 if state is None else self.done(state), bar_format=SHAPE, file=sys.stderr,
+            disable=self.hide or None, mininterval=0.2,
+        )
+        self.bar.set_postfix_str("compiling kernels: seconds, once per version")
+
+    def done(self, state):
+        """How far a state is."""
+        return state.step if self.total else state.t
+
+    def step(self, state, dt):
+        """Move the bar."""
+        self.bar.set_postfix_str(f"t = {state.t:.4g} s, dt = {dt:.3g} s{self.energies}", refresh=False)
+        self.bar.update(self.done(state) - self.bar.n)
+
+    def frame(self, frame, energy):
+        """Note the energies, in joules."""
+        self.energies = ", energy [J] " + " ".join(f"{n} {e:.4g}" for n, e in energy._asdict().items())
+
+    def close(self):
+        """Leave the bar as it is."""
+        if self.bar is not None:
+            self.bar.close()
+
+
+@dataclass(frozen=True)
+class Request:
+    """What the command line asked for."""
+
+    scene: str
+    out: Path
+    json: bool = False
+    quiet: bool = False
+
+
+def run_scene(problem, request, options):
+    """Run a problem as asked; returns the exit status. Faults of the input are raised."""
+    facts = info.of_problem(problem)
+    if not request.json:
+        print("\n".join(info.problem_lines(facts)), flush=True)
+    bar = Bar(hide=request.quiet)
+    try:
+        outcome = run(problem, request.out, options, bar)
+    except (Unstable, OutOfRange, TooLarge, NotWritten, KeyboardInterrupt) as fault:
+        bar.close()
+        if not bar.began:
+            raise
+        _broke_off(fault, request)
+    bar.close()
+    if not outcome.same_code:
+        print("mpm-ref: the checkpoint was saved by another version of the code: the run went on, "
+              "but not bit for bit", file=sys.stderr)
+    _report(outcome, request, facts)
+    return EXIT[outcome.why]
+
+
+def _broke_off(fault, request):
+    """End a run that could not end between two steps by itself."""
+    if isinstance(fault, NotWritten):
+        end(f"{fault}. {last_good(request)}", NOT_WRITTEN)
+    if isinstance(fault, KeyboardInterrupt):
+        end(f"interrupted at once. {last_good(request)}", INTERRUPT)
+    end(f"{fault}. {last_good(request)}", UNSTABLE)
+
+
+def _report(outcome, request, facts):
+    """Say how the run ended and how to go on."""
+    state = outcome.state
+    if request.json:
+        print(info.as_json({
+            "why": outcome.why, "out": str(request.out), "step": state.step, "t": state.t,
+            "frames": outcome.frames, "checkpoint": str(checkpoint_of(request.out)),
+            "state_sha256": checkpoint.digest(state), "problem": facts,
+        }))
+    else:
+        print(f"{outcome.why}: step {state.step}, t = {state.t:.6g} s, {outcome.frames} frames in {request.out}")
+    if outcome.why != FINISHED:
+        print(f"to go on: {how_to_resume(request)}", file=sys.stderr)
+
+
+def how_to_resume(request):
+    """The command that continues a run."""
+    return f"mpm-ref run {request.scene} --out {request.out} --resume"
+
+
+def last_good(request):
+    """Where the last checkpoint of a run stands, and how to go on from it."""
+    path = checkpoint_of(request.out)
+    try:
+        there = checkpoint.summary(path)
+    except checkpoint.BadCheckpoint as fault:
+        return f"No checkpoint: {fault}"
+    return (f"Last good checkpoint: {path}, step {there['step']}, t = {there['t']:.6g} s; "
+            f"to go on from it: {how_to_resume(request)}")

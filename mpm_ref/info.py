@@ -1,0 +1,104 @@
+"""What a problem or a results file is, in numbers: for people as lines, for machines as a dict."""
+
+import json
+
+from .atomic import in_words
+from .explicit import Stepper
+from .manifest import scene_hash
+from .results import ENERGIES, Results
+from .running import checkpoint_of
+from .timestep import stable_dt
+
+
+def of_problem(problem):
+    """Size, spacing, wave speed, bounds of the time step and memory of a `Problem` as it stands."""
+    stepper = Stepper(problem.scheme, problem.dx, problem.dim, problem.gravity)
+    bounds = stable_dt(problem.bodies, stepper)
+    grid = stepper.store.cover([body.particles.x for body in problem.bodies])
+    clock = problem.clock
+    return {
+        "title": problem.title,
+        "dim": problem.dim,
+        "bodies": {body.name: len(body.id) for body in problem.bodies},
+        "particles": sum(len(body.id) for body in problem.bodies),
+        "dx": problem.dx,
+        "nodes": grid.m.size,
+        "wave_speed": problem.dx / bounds.elastic,
+        "dt": clock.dt,
+        "cfl": None if clock.dt else clock.cfl,
+        "bounds": bounds._asdict(),
+        "steps": clock.steps,
+        "end": clock.end,
+        "particle_bytes": sum(a.nbytes for body in problem.bodies
+                              for name, a in body.particles._asdict().items()
+                              if not (name == "C" and a is body.particles.L)),
+        "grid_bytes": sum(a.nbytes for a in grid[:4]),
+        "scene_sha256": scene_hash(problem),
+    }
+
+
+def of_results(path):
+    """Frames, times, energies, bodies, manifest and checkpoint of a results file."""
+    with Results(path) as results:
+        n = len(results)
+        return {
+            "title": results.title,
+            "dim": results.dim,
+            "bodies": {body: results.count(body) for body in results.bodies},
+            "fields": {body: results.fields(body) for body in results.bodies},
+            "dx": results.dx,
+            "frames": n,
+            "steps": int(results.step[-1]) if n else 0,
+            "time": [float(results.time[0]), float(results.time[-1])] if n else None,
+            "energy": dict(zip(ENERGIES, map(float, results.energy[-1]), strict=True)) if n else None,
+            "checkpoint": str(checkpoint_of(path)) if checkpoint_of(path).exists() else None,
+            "manifest": results.manifest,
+        }
+
+
+def problem_lines(facts):
+    """Facts of a problem in words."""
+    bodies = ", ".join(f"{name} {count}" for name, count in facts["bodies"].items())
+    bounds = ", ".join(f"{name.replace('_', ' ')} {value:.3g} s" for name, value in facts["bounds"].items())
+    step = f"dt = {facts['dt']:.6g} s" if facts["dt"] else f"dt = {facts['cfl']:g} of its bound"
+    length = f"{facts['steps']} steps" if facts["steps"] else f"until t = {facts['end']:g} s"
+    memory = in_words(facts["particle_bytes"]), in_words(facts["grid_bytes"])
+    return [
+        f"{facts['title'] or 'untitled'}: {facts['dim']}D, {facts['particles']} particles ({bodies}), "
+        f"dx = {facts['dx']:g} m, {facts['nodes']} nodes at the start",
+        f"wave speed {facts['wave_speed']:.4g} m/s; {step}, {length}; bounds of dt: {bounds}",
+        f"memory: particles {memory[0]}, grid {memory[1]}",
+    ]
+
+
+def results_lines(facts):
+    """Facts of a results file in words."""
+    bodies = ", ".join(f"{name} {count} ({' '.join(facts['fields'][name])})"
+                       for name, count in facts["bodies"].items())
+    lines = [f"{facts['title'] or 'untitled'}: {facts['dim']}D, dx = {facts['dx']:g} m, bodies: {bodies}"]
+    if facts["frames"]:
+        energies = ", ".join(f"{name} {value:.6g} J" for name, value in facts["energy"].items())
+        lines.append(f"{facts['frames']} frames, t = {facts['time'][0]:g} to {facts['time'][1]:g} s, "
+                     f"{facts['steps']} steps; at the end: {energies}")
+    else:
+        lines.append("no frame yet")
+    lines += [f"part: steps {part['first_step']} to {part['last_step']}, {part['why']}, "
+              f"{part['wall_s']} s, {in_words(part['peak_bytes'])}, state sha256 {part['state_sha256'][:12]}"
+              for part in facts["manifest"].get("parts", [])]
+    lines.append(f"checkpoint: {facts['checkpoint'] or 'none'}")
+    return lines
+
+
+def as_json(facts):
+    """Facts as JSON that every reader takes: numbers that are not finite become null."""
+    return json.dumps(_finite(facts), indent=1)
+
+
+def _finite(value):
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    if isinstance(value, float) and not abs(value) < float("inf"):
+        return None
+    return value

@@ -1,0 +1,150 @@
+"""Recording a golden file: what the kernels compute, stage by stage, and how far it can be trusted.
+
+Three runs of the same problem go side by side, each from its own states: the kernels; the kernels
+with all particles in reverse order, hence with all sums in another order; and the plain twin in
+extended precision. The reference's own error of an array is the larger of its distances to the
+other two. In units of round-off times the scale of each entry (see `scales`) it becomes one number,
+from which the tolerances follow:
+
+    tolerance of an entry = MARGIN max(own error, 1) eps * scale of the entry
+
+with the eps of the other code's precision: first-order errors are proportional to it.
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..explicit import Stepper
+from ..timestep import stable_dt
+from . import scaling, stages
+from .twin import Twin, placed
+
+MARGIN = 8.0            # another code's errors against the reference's own
+EPS = {"f64": float(np.finfo(np.float64).eps), "f32": float(np.finfo(np.float32).eps)}
+UNSURE = 1e-7           # of the largest entry: a larger own error is no reference
+FLOOR = 2.0**-24        # of the largest scale: no entry's scale is taken as smaller
+
+
+class Golden(NamedTuple):
+    """One array of one step."""
+
+    value: np.ndarray
+    scale: np.ndarray       # per pair, node, particle or energy
+    twin: float             # largest distance to the plain twin
+    reordered: float        # largest distance to the kernels with particles in reverse order
+    error: float            # the larger of both in units of eps(f64) * scale, worst entry
+
+    def tolerance(self, precision):
+        """Tolerance of an entry, divided by its scale."""
+        return MARGIN * max(self.error, 1.0) * EPS[precision]
+
+
+class Recorded(NamedTuple):
+    """One step."""
+
+    t: float        # at its start [s]
+    dt: float
+    nodes: np.ndarray
+    bases: dict     # {body name: first node of each particle}
+    arrays: dict    # {key: Golden}
+
+
+def run(problem, steps):
+    """Yield one `Recorded` for each step; the problem's own arrays stay as they are.
+
+    Raises ValueError where the reference's own error is too large to judge others by.
+    """
+    ours, mirrored = (problem_of(problem, order) for order in (1, -1))
+    steppers = [started(p) for p in (ours, mirrored)]
+    twin, errors = Twin(problem), [{} for _ in problem.bodies]
+    dt = step_length(problem, steppers[0])
+    for k in range(steps):
+        seen, contacts = stages.step(ours, ours.bodies, steppers[0], k * dt, dt)
+        other, _ = stages.step(mirrored, mirrored.bodies, steppers[1], k * dt, dt)
+        before = twin.bodies
+        exact, done = twin.step(dt, seen["nodes"], contacts)
+        held = placed(contacts, done.nodes.box, twin.real)
+        found = scaling.of_step(twin, before, done, held, errors)
+        S = scaling.listed(found, done.nodes.box, seen["nodes"])
+        other = unmirrored(other, seen["nodes"])
+        arrays = {key: golden(seen[key], S[key], exact[key], other[key])
+                  for key in S if key in seen}
+        refuse_unsure(arrays, k)
+        errors = [{field: arrays[f"{name}/{field}"].twin for field in "xvCF"
+                   if f"{name}/{field}" in arrays} for name in twin.names]
+        bases = {name: seen[f"{name}/base"] for name in twin.names}
+        yield Recorded(k * dt, dt, seen["nodes"], bases, arrays)
+
+
+def problem_of(problem, order):
+    """The problem with copies of its bodies, whose particles are in order (1) or reversed (-1)."""
+    return replace(problem, bodies=tuple(copied(body, order) for body in problem.bodies))
+
+
+def copied(body, order):
+    """Copy of a body in the same (1) or reverse (-1) order; C and L stay one array in MLS."""
+    q = body.particles
+    new = type(q)(*(np.ascontiguousarray(a[::order]).copy() for a in q))
+    if q.L is q.C:
+        new = new._replace(L=new.C)
+    return body._replace(particles=new, id=body.id[::order].copy())
+
+
+def started(problem):
+    """A stepper, and the stress of its bodies."""
+    stepper = Stepper(problem.scheme, problem.dx, problem.dim, problem.gravity, problem.conditions)
+    stepper.start(problem.bodies)
+    return stepper
+
+
+def step_length(problem, stepper):
+    """The fixed dt, or the one with which a run would start."""
+    clock = problem.clock
+    return clock.dt or clock.cfl * stable_dt(problem.bodies, stepper).dt
+
+
+def unmirrored(seen, nodes):
+    """What the reversed run saw, in the order of the other: particles, and grid arrays on nodes."""
+    place = {tuple(i): k for k, i in enumerate(seen["nodes"].tolist())}
+    at = np.array([place.get(tuple(i), -1) for i in nodes.tolist()])
+    return {key: a[::-1] if "/" in key and not key.endswith("/energy")
+            else a if "/" in key else np.where(shaped(at >= 0, a), a[at], 0)
+            for key, a in seen.items()}
+
+
+def shaped(mask, a):
+    """A mask over the first axis, in as many axes as a has."""
+    return mask.reshape(-1, *(1,) * (a.ndim - 1))
+
+
+def golden(value, scale, exact, other):
+    """The `Golden` of one array, from the twin's and the reversed run's."""
+    scale = floored(scale)
+    off_twin = abs(value - exact).astype(float)
+    off_order = abs(value - other)
+    unit = EPS["f64"] * np.maximum(scale, np.finfo(float).tiny)
+    worst = max((off / shaped_as(unit, off)).max() for off in (off_twin, off_order))
+    return Golden(value, scale, float(off_twin.max()), float(off_order.max()), float(worst))
+
+
+def floored(scale):
+    """Scales that are nowhere below FLOOR times the largest."""
+    return np.maximum(scale, FLOOR * scale.max())
+
+
+def shaped_as(scale, a):
+    """Scales of entities, for arrays that have components too."""
+    return scale.reshape(scale.shape + (1,) * (a.ndim - scale.ndim))
+
+
+def refuse_unsure(arrays, k):
+    """Raise ValueError where an own error is not small, which a NaN is not either."""
+    for key, a in arrays.items():
+        own, largest = max(a.twin, a.reordered), abs(a.value).max()
+        if not own <= UNSURE * max(largest, a.scale.max()):
+            raise ValueError(
+                f"{key} in step {k}: the reference's own error is {own:.1e}, too much beside its "
+                f"largest entry {largest:.1e} to judge others by; take another state or a smaller dt"
+            )

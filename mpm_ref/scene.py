@@ -1,0 +1,80 @@
+"""Scenes: what a run is determined by, from a TOML file or from Python, and the problem it makes.
+
+    scene = load("scenes/hello.toml")           # or Scene(dim=2, dx=0.05, body=(Body(...),), ...)
+    problem = build(scene)                      # for simulate.simulate
+
+The keys of the file are the fields of the records; docs/scenes.md explains each of them.
+"""
+
+import numpy as np
+
+from .problem import Problem
+from .sampling import Jittered, Lattice, Poisson, Regular
+from .scene_bodies import build_body
+from .scene_check import checked
+from .scene_error import SceneError
+from .scene_parts import build_clock, build_conditions, build_limits
+from .scene_records import (
+    Arrays,
+    Body,
+    Clip,
+    Collider,
+    Fixed,
+    Flow,
+    Keyframes,
+    Limits,
+    Material,
+    Motion,
+    Oscillation,
+    Ramps,
+    Scene,
+    Scheme,
+    Steady,
+    Velocity,
+    Walls,
+)
+from .scene_text import canonical, digest, dumps, load, loads
+from .shapes import (
+    Box,
+    Capsule,
+    Cylinder,
+    Difference,
+    HalfSpace,
+    Intersection,
+    Mesh,
+    Moved,
+    Sphere,
+    Torus,
+    Union,
+    Wedge,
+)
+
+__all__ = [
+    "Arrays", "Body", "Box", "Capsule", "Clip", "Collider", "Cylinder", "Difference", "Fixed",
+    "Flow", "HalfSpace", "Intersection", "Jittered", "Keyframes", "Lattice", "Limits", "Material",
+    "Mesh", "Motion", "Moved", "Oscillation", "Poisson", "Ramps", "Regular", "Scene", "SceneError",
+    "Scheme", "Sphere", "Steady", "Torus", "Union", "Velocity", "Walls", "Wedge", "build",
+    "canonical", "digest", "dumps", "load", "loads",
+]
+
+
+def build(scene):
+    """The `Problem` of a scene: bodies sampled, conditions and clock made.
+
+    Raises SceneError, which names the key that does not work.
+    """
+    scene = checked(scene)
+    clip = scene.clip
+    return Problem(
+        bodies=tuple(build_body(scene, k) for k in range(len(scene.body))),
+        dx=scene.dx,
+        clock=build_clock(scene),
+        gravity=np.zeros(scene.dim) if scene.gravity is None else np.array(scene.gravity),
+        scheme=scene.scheme.explicit(),
+        conditions=build_conditions(scene),
+        clip=None if clip is None else (np.array(clip.lower), np.array(clip.upper)),
+        limits=build_limits(scene),
+        allow_unstable=scene.unstable == "allow",
+        title=scene.title,
+        source=canonical(scene),
+    )

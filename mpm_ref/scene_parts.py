@@ -1,0 +1,126 @@
+"""What the small tables of a scene make: clock, limits, colliders and their motions.
+
+Each `build_*` takes a checked record, except for what only the built thing can check: then it
+raises SceneError with the key's path.
+"""
+
+from math import inf, radians
+
+import numpy as np
+
+from .core import motion as rigid
+from .core.boundary import BoxWalls, Conditions, Prescribed
+from .core.boundary import Collider as RigidCollider
+from .monitor import Limits
+from .problem import Clock
+from .scene_error import SceneError, at
+from .scene_records import Keyframes, Oscillation, Ramps, Steady
+from .shapes import level_set
+
+CFL = 0.5       # share of the stable time step, for a scene that says nothing about its step
+
+
+def build_clock(scene):
+    """When the run steps, shows frames and ends."""
+    for a, b in (("dt", "cfl"), ("steps", "end"), ("every", "interval")):
+        if getattr(scene, a) is not None and getattr(scene, b) is not None:
+            raise SceneError(f"{a}: given together with `{b}`; give one of the two")
+    if scene.steps is None and scene.end is None:
+        raise SceneError("steps: this key is missing; give `steps` or `end`")
+    cfl = CFL if scene.cfl is None else scene.cfl
+    return Clock(scene.dt, cfl, scene.steps, scene.end, scene.every, scene.interval)
+
+
+def build_limits(scene):
+    """What a healthy run stays within."""
+    limits = scene.limits
+    if not limits.J[0] < 1.0 < limits.J[1]:
+        raise SceneError(f"limits.J = {list(limits.J)}: expected two numbers, one < 1, one > 1")
+    return Limits(limits.cfl, limits.J, limits.growth)
+
+
+def build_conditions(scene):
+    """Colliders, prescribed regions and walls; None where there are none."""
+    colliders = tuple(_collider(c, scene.dim, f"collider[{k}]")
+                      for k, c in enumerate(scene.collider))
+    prescribed = tuple(_prescribed(f, scene.dim, f"fixed[{k}]") for k, f in enumerate(scene.fixed))
+    walls = _walls(scene.walls, scene.dim)
+    if not colliders and not prescribed and walls is None:
+        return None
+    return Conditions(colliders, prescribed, walls)
+
+
+def _collider(record, dim, path):
+    with at(f"{path}.shape"):
+        shape = level_set(record.shape)
+    motion = _motion(record.motion, dim, f"{path}.motion")
+    with at(path):
+        return RigidCollider(shape, record.kind, record.friction, motion, record.inside)
+
+
+def _prescribed(record, dim, path):
+    with at(f"{path}.region"):
+        shape = level_set(record.region)
+    motion = _motion(record.motion, dim, f"{path}.motion")
+    return Prescribed(shape, motion, record.inside, record.follows)
+
+
+def _walls(record, dim):
+    if record is None:
+        return None
+    with at("walls"):
+        low, high = _limits(record.low, dim), _limits(record.high, dim)
+        return BoxWalls(low, high, record.kind, record.friction)
+
+
+def _limits(nodes, dim):
+    """Node indices, None for "open"."""
+    return tuple(None if node == "open" else node for node in nodes or dim * ("open",))
+
+
+def _motion(record, dim, path):
+    """The rigid motion of a collider or region."""
+    translation = _schedule(record.translation, dim, f"{path}.translation")
+    turning = _schedule(record.rotation, 1, f"{path}.rotation")
+    with at(path):
+        axis = record.axis if dim == 3 else None
+        if record.axis is not None and dim == 2:
+            raise ValueError(f"axis = {list(record.axis)}: in 2D the axis is given, leave it out")
+        orientation = rigid.rotation(radians(record.angle), axis) if record.angle else None
+        made = rigid.Motion(translation, turning, axis, record.center, orientation)
+        made.pose(1.0, 1.0, dim)        # checks what belongs together
+    return made
+
+
+def _schedule(record, size, path):
+    """A schedule of vectors of that size, or of numbers for size 1."""
+    if record is None:
+        return None
+    with at(path):
+        match record:
+            case Steady():
+                return rigid.Steady(_value("rate", record.rate, size), record.start, _stop(record))
+            case Keyframes():
+                return rigid.Keyframes(record.times, _values("values", record.values, size))
+            case Ramps():
+                return rigid.Ramps(record.times, _values("rates", record.rates, size))
+            case Oscillation():
+                amplitude = _value("amplitude", record.amplitude, size)
+                return rigid.Oscillation(amplitude, record.frequency, radians(record.phase),
+                                         record.start, _stop(record))
+
+
+def _stop(record):
+    return inf if record.stop is None else record.stop
+
+
+def _values(name, values, size):
+    return [_value(f"{name}[{k}]", value, size) for k, value in enumerate(values)]
+
+
+def _value(name, value, size):
+    """A vector of that size, or a number for size 1."""
+    if np.shape(value) != (() if size == 1 else (size,)):
+        expected = "a number" if size == 1 else f"{size} numbers"
+        raise ValueError(f"{name} = {value}: expected {expected}")
+    return np.array(value) if size > 1 else value

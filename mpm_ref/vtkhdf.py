@@ -1,0 +1,93 @@
+"""Results as VTKHDF, the file format of VTK and ParaView, written by h5py alone.
+
+Particles become temporal PolyData: one vertex each, the vertices stored once and shared by all
+frames. Values are single precision, for looking at; the results file has them in full. 2D lies in
+the plane z = 0. Format: VTKHDF specification, version 2.0 (docs.vtk.org).
+"""
+
+import numpy as np
+
+from .atomic import replacing, require_space
+from .journal import new_hdf5
+
+TOPOLOGIES = ("Vertices", "Lines", "Polygons", "Strips")
+VALUES = {"v": ("speed", 3), "J": ("J", 1), "tau_norm": ("tau", 1), "body": ("body", 1)}
+#        name -> what offers it (see `results.SCALARS`), number of components
+
+
+def export_particles(results, out):
+    """Write the particles of all frames of `Results` to `out`.
+
+    Point data: v [m/s], J, tau_norm [Pa] (as far as they follow from what is stored), body (number).
+    Raises `NotWritten`.
+    """
+    names = [name for name, (scalar, _) in VALUES.items() if results.offers(scalar)]
+    count, frames = sum(map(results.count, results.bodies)), len(results)
+    require_space(out, 4 * count * (frames * (3 + sum(VALUES[name][1] for name in names)) + 5))
+    with replacing(out) as part, new_hdf5(part) as h5:
+        root = root_of(h5, "PolyData")
+        _topology(root, count)
+        points = root.create_dataset("Points", (frames * count, 3), "f4")
+        data = {name: _values(root, name, frames * count) for name in names}
+        for k in range(frames):
+            rows = slice(k * count, (k + 1) * count)
+            points[rows] = _gather(results, lambda body, k=k: three(results.field(body, "x", k)))
+            for name, dataset in data.items():
+                dataset[rows] = _gather(results, lambda body, k=k, name=name: _value(results, body, name, k))
+        _steps(root, results.time, count, names)
+
+
+def _value(results, body, name, frame):
+    if name == "v":
+        return three(results.field(body, "v", frame))
+    return results.scalar(body, VALUES[name][0], frame)
+
+
+def _gather(results, of):
+    """Rows of all bodies, one body after the other."""
+    return np.concatenate([of(body) for body in results.bodies])
+
+
+def three(a):
+    """Vectors (.., d) with three components (.., 3), the third 0 in 2D."""
+    return np.pad(a, [(0, 0)] * (a.ndim - 1) + [(0, 3 - a.shape[-1])])
+
+
+def root_of(h5, kind):
+    """The group that VTK reads, of a kind of data set."""
+    root = h5.create_group("VTKHDF")
+    root.attrs["Version"] = np.array([2, 0], dtype="i8")
+    root.attrs.create("Type", kind.encode("ascii"), dtype=f"S{len(kind)}")     # as VTK asks for it
+    return root
+
+
+def _topology(root, count):
+    """One vertex per particle, no other cells."""
+    root["NumberOfPoints"] = np.array([count], dtype="i8")
+    for name in TOPOLOGIES:
+        n = count if name == "Vertices" else 0
+        group = root.create_group(name)
+        group["NumberOfCells"] = group["NumberOfConnectivityIds"] = np.array([n], dtype="i8")
+        group["Offsets"] = np.arange(n + 1, dtype="i8")
+        group["Connectivity"] = np.arange(n, dtype="i8")
+
+
+def _values(root, name, rows):
+    shape = (rows, 3) if VALUES[name][1] == 3 else (rows,)
+    return root.require_group("PointData").create_dataset(name, shape, "i4" if name == "body" else "f4")
+
+
+def _steps(root, time, count, names):
+    """Times, and where each frame begins; the topology begins at 0 for all."""
+    n = len(time)
+    steps = root.create_group("Steps")
+    steps.attrs["NSteps"] = n
+    steps["Values"] = np.asarray(time, dtype=float)
+    starts = np.arange(n, dtype="i8") * count
+    steps["PartOffsets"] = np.zeros(n, dtype="i8")
+    steps["NumberOfParts"] = np.ones(n, dtype="i8")
+    steps["PointOffsets"] = starts
+    for name in ("CellOffsets", "ConnectivityIdOffsets"):
+        steps[name] = np.zeros((n, len(TOPOLOGIES)), dtype="i8")
+    for name in names:
+        steps[f"PointDataOffsets/{name}"] = starts
