@@ -36,7 +36,7 @@ def replacing(path):
 
 
 def part_of(path):
-    """Path of the file that is written in place of `path`; the suffix is kept, as it says the kind."""
+    """Path of the file that is written in place of `path`, with its suffix, which says the kind."""
     path = Path(path)
     return path.with_name(f".{path.stem}.part{path.suffix}")
 

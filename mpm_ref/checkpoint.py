@@ -1,7 +1,7 @@
 """A run's complete state in a file, to continue bit for bit: all of it is there, or the one before.
 
 The file is HDF5 with a last line of our own: the sha256 of all bytes before it. HDF5 does not mind
-the line; and a file that is cut short, altered in one bit, or not ours is known before HDF5 reads it.
+the line; and a file that is cut short, altered in a bit, or not ours is known before HDF5 reads it.
 """
 
 import hashlib
@@ -52,8 +52,9 @@ def load(path, problem):
     with h5py.File(path, "r") as h5:
         saved = h5.attrs["scene_sha256"]
         if saved != scene_hash(problem):
-            raise BadCheckpoint(f"{path} belongs to another scene (sha256 {saved[:12]}, this one is "
-                                f"{scene_hash(problem)[:12]}); give the scene of that run, or start a new one")
+            raise BadCheckpoint(f"{path} belongs to another scene (sha256 {saved[:12]}, this one "
+                                f"is {scene_hash(problem)[:12]}); give the scene of that run, or "
+                                "start a new one")
         return _read(h5, problem), h5.attrs["source_sha256"] == source_hash()
 
 
@@ -108,7 +109,8 @@ def _write(h5, state, problem):
 def _read(h5, problem):
     groups = [h5[f"bodies/{k}"] for k in range(len(h5["bodies"]))]
     if [g.attrs["name"] for g in groups] != [body.name for body in problem.bodies]:
-        raise BadCheckpoint(f"{h5.filename} has other bodies than the problem; give the scene of that run")
+        raise BadCheckpoint(f"{h5.filename} has other bodies than the problem; "
+                            "give the scene of that run")
     bodies = tuple(body._replace(particles=_particles(g), id=g["id"][()])
                    for body, g in zip(problem.bodies, groups, strict=True))
     numbers = h5.attrs.get("account")

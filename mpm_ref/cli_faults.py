@@ -20,8 +20,9 @@ FAULTS = (SceneError, TooLarge, OutOfRange, Refused, BadCheckpoint, BadResults, 
 
 @contextmanager
 def one_line():
-    """Faults of the input, of files, and Ctrl-C where nothing waits for it. Others are bugs: they
-    keep their traceback."""
+    """Faults of the input, of files, and Ctrl-C where nothing waits for it; any other keeps its
+    traceback: it is a bug.
+    """
     try:
         yield
     except FAULTS as fault:

@@ -8,7 +8,6 @@ import typer
 from . import checkpoint, info, plotting, scene
 from .cli_faults import one_line, options
 from .results import SCALARS, Results
-from .running import checkpoint_of
 from .shipped import find_scene, shipped_scenes
 from .vtkhdf import export_particles
 from .vtkhdf_grid import export_grid
@@ -39,7 +38,8 @@ def plot(
     out: Annotated[Path | None, typer.Option("--out", "-o", help="FILE.png")] = None,
 ):
     """Draw the particles of one frame (png, pdf or svg)."""
-    _to_file(plotting.save_plot, file, out, (".png", ".pdf", ".svg"), frame=frame, field=field, view=_axes(view))
+    what = {"frame": frame, "field": field, "view": _axes(view)}
+    _to_file(plotting.save_plot, file, out, (".png", ".pdf", ".svg"), **what)
 
 
 def animate(
@@ -66,7 +66,8 @@ def scenes(json: Machine = False):
     """List the scenes that come with the package."""
     with one_line():
         found = {name: scene.load(path).title for name, path in shipped_scenes().items()}
-        print(info.as_json(found) if json else "\n".join(f"{n:24} {title}" for n, title in found.items()))
+        lines = [f"{name:24} {title}" for name, title in found.items()]
+        print(info.as_json(found) if json else "\n".join(lines))
 
 
 def _facts(name):
@@ -76,8 +77,8 @@ def _facts(name):
         return facts, info.problem_lines(facts)
     if checkpoint.is_one(name):
         facts = checkpoint.summary(name)
-        return facts, [f"checkpoint: step {facts['step']}, t = {facts['t']:.6g} s, after {facts['frames']} "
-                       f"frames; scene sha256 {facts['scene_sha256'][:12]}"]
+        return facts, [f"checkpoint: step {facts['step']}, t = {facts['t']:.6g} s, after "
+                       f"{facts['frames']} frames; scene sha256 {facts['scene_sha256'][:12]}"]
     facts = info.of_results(name)
     return facts, info.results_lines(facts)
 

@@ -4,6 +4,7 @@ Exit status: 0 finished, or stopped at --steps; 2 the scene, the options or the 
 3 the run became unstable; 4 a file could not be written; 130 Ctrl-C; 143 terminated.
 """
 
+import shutil
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,19 +16,22 @@ from .atomic import NotWritten
 from .cli_faults import INTERRUPT, NOT_WRITTEN, UNSTABLE, end
 from .core.grid import OutOfRange
 from .monitor import Unstable
-from .running import AT_LIMIT, FINISHED, INTERRUPTED, TERMINATED, Watch, checkpoint_of, run
+from .running import run
+from .session import AT_LIMIT, FINISHED, INTERRUPTED, TERMINATED, Watch, checkpoint_of
 from .simulate import last_step
 from .timestep import TooLarge
 
 EXIT = {FINISHED: 0, AT_LIMIT: 0, INTERRUPTED: INTERRUPT, TERMINATED: 143}
-SHAPE = "{percentage:3.0f}% |{bar:20}| {n_fmt}/{total_fmt} {unit} [{elapsed}<{remaining}] {postfix}"
+SHAPE = "{percentage:3.0f}% |{bar:20}| {n:.6g}/{total:g} {unit} [{elapsed}<{remaining}{postfix}]"
 
 
 class Bar(Watch):
-    """Progress on the terminal's error channel: steps or time done, time left, dt, energies."""
+    """What is run, on the output; and progress on the error channel of a terminal: steps or time
+    done, time left, dt, energies.
+    """
 
-    def __init__(self, hide):
-        self.hide, self.bar, self.energies = hide, None, ""
+    def __init__(self, request):
+        self.request, self.bar, self.energies, self.facts = request, None, "", None
 
     @property
     def began(self):
@@ -35,12 +39,16 @@ class Bar(Watch):
         return self.bar is not None
 
     def begin(self, problem, state):
-        """Open the bar."""
+        """Say what is run, and open the bar."""
+        self.facts = info.of_problem(problem)
+        if not self.request.json:
+            print("\n".join(info.problem_lines(self.facts)), flush=True)
         self.total = last_step(problem.clock)
         self.bar = tqdm(
             total=self.total or problem.clock.end, unit="steps" if self.total else "s",
             initial=0 if state is None else self.done(state), bar_format=SHAPE, file=sys.stderr,
-            disable=self.hide or None, mininterval=0.2,
+            disable=self.request.quiet or None, mininterval=0.2,
+            ncols=shutil.get_terminal_size((120, 24)).columns,
         )
         self.bar.set_postfix_str("compiling kernels: seconds, once per version")
 
@@ -50,12 +58,14 @@ class Bar(Watch):
 
     def step(self, state, dt):
         """Move the bar."""
-        self.bar.set_postfix_str(f"t = {state.t:.4g} s, dt = {dt:.3g} s{self.energies}", refresh=False)
+        text = f"t = {state.t:.4g} s, dt = {dt:.3g} s{self.energies}"
+        self.bar.set_postfix_str(text, refresh=False)
         self.bar.update(self.done(state) - self.bar.n)
 
     def frame(self, frame, energy):
         """Note the energies, in joules."""
-        self.energies = ", energy [J] " + " ".join(f"{n} {e:.4g}" for n, e in energy._asdict().items())
+        parts = (f"{name} {value:.4g}" for name, value in energy._asdict().items())
+        self.energies = ", energy [J] " + " ".join(parts)
 
     def close(self):
         """Leave the bar as it is."""
@@ -75,10 +85,7 @@ class Request:
 
 def run_scene(problem, request, options):
     """Run a problem as asked; returns the exit status. Faults of the input are raised."""
-    facts = info.of_problem(problem)
-    if not request.json:
-        print("\n".join(info.problem_lines(facts)), flush=True)
-    bar = Bar(hide=request.quiet)
+    bar = Bar(request)
     try:
         outcome = run(problem, request.out, options, bar)
     except (Unstable, OutOfRange, TooLarge, NotWritten, KeyboardInterrupt) as fault:
@@ -90,7 +97,7 @@ def run_scene(problem, request, options):
     if not outcome.same_code:
         print("mpm-ref: the checkpoint was saved by another version of the code: the run went on, "
               "but not bit for bit", file=sys.stderr)
-    _report(outcome, request, facts)
+    _report(outcome, request, bar.facts)
     return EXIT[outcome.why]
 
 
@@ -113,7 +120,8 @@ def _report(outcome, request, facts):
             "state_sha256": checkpoint.digest(state), "problem": facts,
         }))
     else:
-        print(f"{outcome.why}: step {state.step}, t = {state.t:.6g} s, {outcome.frames} frames in {request.out}")
+        print(f"{outcome.why}: step {state.step}, t = {state.t:.6g} s, "
+              f"{outcome.frames} frames in {request.out}")
     if outcome.why != FINISHED:
         print(f"to go on: {how_to_resume(request)}", file=sys.stderr)
 

@@ -6,8 +6,8 @@ from .atomic import in_words
 from .explicit import Stepper
 from .manifest import scene_hash
 from .results import ENERGIES, Results
-from .running import checkpoint_of
-from .timestep import stable_dt
+from .session import checkpoint_of
+from .timestep import TimeStep, stable_dt
 
 
 def of_problem(problem):
@@ -49,8 +49,8 @@ def of_results(path):
             "dx": results.dx,
             "frames": n,
             "steps": int(results.step[-1]) if n else 0,
-            "time": [float(results.time[0]), float(results.time[-1])] if n else None,
-            "energy": dict(zip(ENERGIES, map(float, results.energy[-1]), strict=True)) if n else None,
+            "time": [float(t) for t in results.time[[0, -1]]] if n else None,
+            "energy": dict(zip(ENERGIES, results.energy[-1].tolist(), strict=True)) if n else None,
             "checkpoint": str(checkpoint_of(path)) if checkpoint_of(path).exists() else None,
             "manifest": results.manifest,
         }
@@ -59,13 +59,13 @@ def of_results(path):
 def problem_lines(facts):
     """Facts of a problem in words."""
     bodies = ", ".join(f"{name} {count}" for name, count in facts["bodies"].items())
-    bounds = ", ".join(f"{name.replace('_', ' ')} {value:.3g} s" for name, value in facts["bounds"].items())
+    bounds = TimeStep(**facts["bounds"]).sentence()
     step = f"dt = {facts['dt']:.6g} s" if facts["dt"] else f"dt = {facts['cfl']:g} of its bound"
     length = f"{facts['steps']} steps" if facts["steps"] else f"until t = {facts['end']:g} s"
     memory = in_words(facts["particle_bytes"]), in_words(facts["grid_bytes"])
     return [
-        f"{facts['title'] or 'untitled'}: {facts['dim']}D, {facts['particles']} particles ({bodies}), "
-        f"dx = {facts['dx']:g} m, {facts['nodes']} nodes at the start",
+        f"{facts['title'] or 'untitled'}: {facts['dim']}D, {facts['particles']} particles "
+        f"({bodies}), dx = {facts['dx']:g} m, {facts['nodes']} nodes at the start",
         f"wave speed {facts['wave_speed']:.4g} m/s; {step}, {length}; bounds of dt: {bounds}",
         f"memory: particles {memory[0]}, grid {memory[1]}",
     ]
@@ -75,15 +75,18 @@ def results_lines(facts):
     """Facts of a results file in words."""
     bodies = ", ".join(f"{name} {count} ({' '.join(facts['fields'][name])})"
                        for name, count in facts["bodies"].items())
-    lines = [f"{facts['title'] or 'untitled'}: {facts['dim']}D, dx = {facts['dx']:g} m, bodies: {bodies}"]
+    lines = [f"{facts['title'] or 'untitled'}: {facts['dim']}D, dx = {facts['dx']:g} m, "
+             f"bodies: {bodies}"]
     if facts["frames"]:
         energies = ", ".join(f"{name} {value:.6g} J" for name, value in facts["energy"].items())
-        lines.append(f"{facts['frames']} frames, t = {facts['time'][0]:g} to {facts['time'][1]:g} s, "
+        first, last = facts["time"]
+        lines.append(f"{facts['frames']} frames, t = {first:g} to {last:g} s, "
                      f"{facts['steps']} steps; at the end: {energies}")
     else:
         lines.append("no frame yet")
     lines += [f"part: steps {part['first_step']} to {part['last_step']}, {part['why']}, "
-              f"{part['wall_s']} s, {in_words(part['peak_bytes'])}, state sha256 {part['state_sha256'][:12]}"
+              f"{part['wall_s']} s, {in_words(part['peak_bytes'])}, "
+              f"state sha256 {part['state_sha256'][:12]}"
               for part in facts["manifest"].get("parts", [])]
     lines.append(f"checkpoint: {facts['checkpoint'] or 'none'}")
     return lines

@@ -3,13 +3,13 @@
 HDF5 cannot do this by itself: killed while it writes, it may leave a file that does not open. So
 h5py is given a file object of ours, and `commit` is the moment at which changes come to stand:
 
-* bytes past the end of the last commit (a new frame) go to the file at once: nobody reads them yet;
+* bytes past the end of the last commit (a new frame) go to the file at once: nobody reads them;
 * bytes before it (HDF5's own tables: few) wait in memory, page by page;
-* `commit` syncs the new bytes, writes the waiting pages into a journal beside the file (atomically),
+* `commit` syncs the new bytes, writes the waiting pages into a journal beside the file, atomically,
   copies them into the file, and removes the journal.
 
 Killed before the journal is there, the file is the old one; killed after, `recover` finishes the
-copy. Between commits the file is a plain HDF5 file that any tool may read, also while a run goes on.
+copy. Between commits the file is a plain HDF5 file, which any tool may read while a run goes on.
 
 A write that the system refuses (disk full) is kept in memory and reported by `commit`: HDF5, which
 does not survive such an error, never sees it.
@@ -73,7 +73,7 @@ class JournaledFile(io.RawIOBase):
         self._size = max(self._size, end)
 
     def commit(self):
-        """Make all changes since the last commit stand. Raises `NotWritten`; then none of them does."""
+        """Make all changes since the last commit stand, or none of them: raises `NotWritten`."""
         if self._error is None:
             try:
                 self._commit()
@@ -184,7 +184,7 @@ def new_hdf5(path):
 
 
 def recover(path):
-    """Finish the commit in which a writer of `path` was killed, if there is one. Call before reading."""
+    """Finish the commit in which a writer of `path` was killed, if so; to be called by readers."""
     if journal_of(path).exists():
         try:
             JournaledFile(path).close()

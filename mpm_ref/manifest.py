@@ -1,4 +1,4 @@
-"""What must be known to make a result again: scene, code, versions, machine, and what the run took."""
+"""What must be known to make a result again: scene, code, versions, machine; and what it took."""
 
 import hashlib
 import importlib.metadata
@@ -17,12 +17,14 @@ import threadpoolctl
 
 from . import __version__
 
+POOL = ("user_api", "internal_api", "version", "num_threads")
 LIBRARIES = ("numpy", "numba", "llvmlite", "scipy", "h5py", "msgspec")
 
 
 def manifest(problem, seed=None):
-    """The facts of a run at its start, as a dict of what JSON knows. `ends` gets an entry per part
-    of the run (a resumed run has several), see `Part`."""
+    """The facts of a run at its start, as a dict of what JSON knows. `parts` gets an entry for
+    every part of the run, as a resumed one has several; see `Part`.
+    """
     return {
         "title": problem.title,
         "scene": problem.source,
@@ -36,8 +38,9 @@ def manifest(problem, seed=None):
 
 
 def scene_hash(problem):
-    """sha256 of the scene's canonical text; of the rules in words for a problem built in Python
-    (its particles are then not part of it)."""
+    """sha256 of the scene's canonical text; for a problem built in Python of its rules in words,
+    without the particles.
+    """
     text = problem.source or repr((
         [(body.name, len(body.id), body.law, body.flow) for body in problem.bodies],
         problem.dx, problem.clock, list(map(float, problem.gravity)), problem.scheme, problem.clip,
@@ -69,8 +72,7 @@ def machine():
         "cores": os.cpu_count(),
         "threads": numba.get_num_threads(),
         "threading_layer": threading_layer(),
-        "pools": [{key: pool.get(key) for key in ("user_api", "internal_api", "version", "num_threads")}
-                  for pool in threadpoolctl.threadpool_info()],
+        "pools": [{key: pool.get(key) for key in POOL} for pool in threadpoolctl.threadpool_info()],
     }
 
 
@@ -114,7 +116,8 @@ class Part:
 
     def ended(self, why, state, digest):
         """The entry of `parts` in the manifest: why it ended, where, what it took and the sha256 of
-        the state it ended with."""
+        the state it ended with.
+        """
         return {
             "began": self.began,
             "ended": now(),

@@ -23,7 +23,8 @@ def view_of(results):
 
 def draw(results, frame=-1, field="speed", view=None):
     """Matplotlib `Figure` of the particles of one frame; `field` is one of `results.SCALARS`,
-    view the (horizontal, vertical) axes. Raises `BadResults`."""
+    view the (horizontal, vertical) axes. Raises `BadResults`.
+    """
     from matplotlib.figure import Figure
 
     frame = results.index(frame)
@@ -40,7 +41,7 @@ def draw(results, frame=-1, field="speed", view=None):
 
 
 def save_plot(results, out, **what):
-    """Write `draw(results, **what)` to an image file; its suffix says which kind (png, pdf, svg)."""
+    """Write `draw(results, **what)` to an image file, png, pdf or svg as its suffix says."""
     figure = draw(results, **what)
     with replacing(out) as part:
         figure.savefig(part)
@@ -92,9 +93,8 @@ def _order(results, frame, view):
 
 def _range(arrays):
     """Smallest and largest finite value."""
-    ends = [(a[np.isfinite(a)].min(), a[np.isfinite(a)].max()) for a in arrays if np.isfinite(a).any()]
-    if not ends:
-        return 0.0, 1.0
+    finite = [a[np.isfinite(a)] for a in arrays]
+    ends = [(a.min(), a.max()) for a in finite if len(a)] or [(0.0, 1.0)]
     return min(low for low, _ in ends), max(high for _, high in ends)
 
 

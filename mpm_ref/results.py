@@ -25,8 +25,8 @@ __all__ = ["ENERGIES", "SCALARS", "BadResults", "Results"]
 class Results:
     """A results file, open for reading: a context manager.
 
-    title, dim, dx [m], gravity (d,), degree; time, dt [s], step (frames,); energy (frames, 3) [J] in the
-    order of `ENERGIES`; bodies, their names; manifest, a dict. Raises `BadResults`.
+    title, dim, dx [m], gravity (d,), degree; time, dt [s], step (frames,); energy (frames, 3) [J],
+    see `ENERGIES`; bodies, their names; manifest, a dict. Raises `BadResults`.
     """
 
     def __init__(self, path):
@@ -37,16 +37,17 @@ class Results:
             recover(self.path)
             self.h5 = h5py.File(self.path, "r")
         except OSError as e:
-            raise BadResults(f"{path} cannot be read as HDF5 ({_first_line(e)}); is it a results file, "
-                             "and whole?") from e
+            raise BadResults(f"{path} cannot be read as HDF5 ({_first_line(e)}); "
+                             "is it a results file, and whole?") from e
         if self.h5.attrs.get("format") != FORMAT:
             self.close()
-            raise BadResults(f"{path} is not a results file of mpm_ref (expected format {FORMAT!r})")
+            raise BadResults(f"{path} is not a results file of mpm_ref (format {FORMAT!r})")
         self._read_heads()
 
     def _read_heads(self):
         attrs = self.h5.attrs
-        self.title, self.dim, self.dx = attrs["title"], int(attrs["dim"]), float(attrs["dx"])
+        self.title, self.dx = attrs["title"], float(attrs["dx"])
+        self.dim = int(attrs["dim"])
         self.gravity, self.degree = attrs["gravity"], int(attrs["degree"])
         self.time, self.dt, self.step = (self.h5[name][()] for name in ("time", "dt", "step"))
         self.energy = self.h5["energy"][()]
@@ -71,7 +72,7 @@ class Results:
         """A frame's number from 0; negative ones count from the end. Raises `BadResults`."""
         n = len(self)
         if not -n <= frame < n:
-            raise BadResults(f"{self.path}: there is no frame {frame}; it has {n}, from 0 to {n - 1}")
+            raise BadResults(f"{self.path}: there is no frame {frame}; it has {n}, counted from 0")
         return frame % n
 
     def count(self, body):
@@ -87,10 +88,13 @@ class Results:
         return [name for name in UNITS if self.has(body, name)]
 
     def field(self, body, name, frame=None):
-        """A stored field of a body: of one frame (N, ..), or of none (m, V0). Raises `BadResults`."""
+        """A stored field of a body: of a frame (N, ..), or of all; m and V0 (N,) have none. Raises
+        `BadResults`.
+        """
         if not self.has(body, name):
             stored = ", ".join(self.h5[f"bodies/{body}"])
-            raise BadResults(f"{self.path}: {name} of body {body!r} is not stored; stored are {stored}")
+            raise BadResults(f"{self.path}: {name} of body {body!r} is not stored; "
+                             f"stored are {stored}")
         data = self.h5[f"bodies/{body}/{name}"]
         try:
             return data[()] if frame is None else data[self.index(frame)]
@@ -100,34 +104,38 @@ class Results:
 
     def offers(self, name):
         """Whether every body stores what an entry of `SCALARS` follows from; J serves for F."""
-        return all(self.has(body, need) or need == "F" and self.has(body, "J")
+        return all(self.has(body, need) or (need == "F" and self.has(body, "J"))
                    for body in self.bodies for need in SCALARS[name][2])
 
     def scalar(self, body, name, frame):
         """One number per particle (N,): an entry of `SCALARS`. Raises `BadResults` where what it
-        follows from is not stored."""
+        follows from is not stored.
+        """
         if name not in SCALARS:
             raise BadResults(f"field {name!r}: expected one of {', '.join(SCALARS)}")
         if name == "speed":
             return np.linalg.norm(self.field(body, "v", frame), axis=1)
         if name == "J":
-            return self._J(body, frame)
+            return self._volume_ratio(body, frame)
         if name == "tau":
             return self._norm(self.field(body, "tau", frame))
         if name == "pressure":
-            return -self._mean(self.field(body, "tau", frame)) / self._J(body, frame)
+            mean = self._mean(self.field(body, "tau", frame))
+            return -mean / self._volume_ratio(body, frame)
         if name == "y":
             return self.field(body, "y", frame)
         return np.full(self.count(body), float(self.bodies.index(body)))
 
-    def _J(self, body, frame):
+    def _volume_ratio(self, body, frame):
         if self.has(body, "J"):
             return self.field(body, "J", frame)
         return np.linalg.det(self.field(body, "F", frame))
 
     def _norm(self, tau):
         """|tau|; a fluid stores the isotropic value alone."""
-        return np.sqrt(self.dim) * np.abs(tau) if tau.ndim == 1 else np.linalg.norm(tau, axis=(1, 2))
+        if tau.ndim == 1:
+            return np.sqrt(self.dim) * np.abs(tau)
+        return np.linalg.norm(tau, axis=(1, 2))
 
     def _mean(self, tau):
         """tr(tau)/d."""

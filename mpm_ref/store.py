@@ -1,8 +1,8 @@
 """Results of a run in one HDF5 file: frames stream into it, each wholly or not at all.
 
 The schema is in docs/files.md. A frame stands once `Writer.append` returns, whatever happens to the
-process afterwards (see `journal`). Particles are stored in the order in which their body was sampled,
-so that row p is the same particle in every frame. `results` reads the files.
+process afterwards (see `journal`). Particles are stored in the order in which their body was
+sampled, so that row p is the same particle in every frame. `results` reads the files.
 """
 
 import json
@@ -42,7 +42,8 @@ class Fields:
 
     def __post_init__(self):
         if "x" not in self.names or not set(self.names) <= set(UNITS):
-            raise ValueError(f"fields {', '.join(self.names)}: expected x and any of {', '.join(UNITS)}")
+            raise ValueError(f"fields {', '.join(self.names)}: expected x, "
+                             f"and any of {', '.join(UNITS)}")
         if not 0 <= self.gzip <= 9:
             raise ValueError(f"gzip = {self.gzip}: expected a level from 0 (none) to 9")
 
@@ -54,7 +55,7 @@ class Fields:
 
 
 def carried(body):
-    """{name of `UNITS`: array (N, ..)} of all that a body carries, particles in their current order."""
+    """{name of `UNITS`: array (N, ..)} of what a body carries, particles in their current order."""
     q = body.particles
     have = {"J" if name == "F" and q.F.ndim == 1 else name: a for name, a in q._asdict().items()}
     return {name: a for name, a in have.items() if name in UNITS and len(a) == len(body.id)}
@@ -84,17 +85,18 @@ def create(path, problem, fields, facts):
 
 
 def reopen(path, problem, frames):
-    """`Writer` that goes on after the first so many frames of a results file; later ones are dropped.
+    """`Writer` that goes on after the first so many frames of a results file, and drops the others.
 
     Raises `BadResults` if the file is of another scene or has fewer frames, `InUse`, or OSError.
     """
     writer = Writer(JournaledFile(path))
     try:
         if writer.h5.attrs["scene_sha256"] != scene_hash(problem):
-            raise BadResults(f"{path} holds results of another scene; name another file, or overwrite it")
+            raise BadResults(f"{path} holds results of another scene; name another file, "
+                             "or overwrite it")
         if len(writer) < frames:
-            raise BadResults(f"{path} holds {len(writer)} frames, but the checkpoint comes after {frames}; "
-                             "give the file of that run, or start the run anew")
+            raise BadResults(f"{path} holds {len(writer)} frames, but the checkpoint comes after "
+                             f"{frames}; give the file of that run, or start the run anew")
         writer.truncate(frames)
     except BaseException:
         writer.close()
@@ -120,10 +122,15 @@ class Writer:
             group = self.h5[f"bodies/{body.name}"]
             rows += [(group[name], in_order(a, body.id))
                      for name, a in carried(body).items() if name in group]
-        require_space(self._file.path, sum(np.asarray(row).nbytes for _, row in rows))
+        require_space(self.path, sum(np.asarray(row).nbytes for _, row in rows))
         for dataset, row in rows:
             _put(dataset, row)
         self._commit()
+
+    @property
+    def path(self):
+        """Path of the file."""
+        return self._file.path
 
     @property
     def manifest(self):
@@ -170,7 +177,7 @@ def _lay_out(h5, problem, fields):
     """Write what does not change, and the empty series of what does."""
     scheme = problem.scheme
     h5.attrs.update(format=FORMAT, scene_sha256=scene_hash(problem), title=problem.title,
-                    dim=problem.dim, dx=problem.dx, gravity=np.asarray(problem.gravity, dtype=float),
+                    dim=problem.dim, dx=problem.dx, gravity=np.array(problem.gravity, dtype=float),
                     degree=scheme.degree, transfer=scheme.transfer)
     for name, (kind, unit) in CLOCK.items():
         _series(h5, name, (), kind, 0).attrs["unit"] = unit
@@ -197,10 +204,10 @@ def _series(group, name, shape, kind, gzip):
 
 def _per_frame(h5):
     """All series of a file."""
-    found = []
-    h5.visititems(lambda _, item: found.append(item) if isinstance(item, h5py.Dataset)
-                  and item.maxshape and item.maxshape[0] is None else None)
-    return found
+    series = [h5[name] for name in (*CLOCK, "energy")]
+    for group in h5["bodies"].values():
+        series += [group[name] for name in UNITS if name in group]
+    return series
 
 
 def _in_words(record):
@@ -210,6 +217,6 @@ def _in_words(record):
 
 def _require_names(bodies):
     names = [body.name for body in bodies]
-    bad = [name for name in names if not name or "/" in name or name == "." or names.count(name) > 1]
+    bad = [name for name in names if name in ("", ".") or "/" in name or names.count(name) > 1]
     if bad:
         raise ValueError(f"body name {bad[0]!r}: expected names that differ and contain no '/'")

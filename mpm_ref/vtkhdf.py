@@ -11,15 +11,16 @@ from .atomic import replacing, require_space
 from .journal import new_hdf5
 
 TOPOLOGIES = ("Vertices", "Lines", "Polygons", "Strips")
-VALUES = {"v": ("speed", 3), "J": ("J", 1), "tau_norm": ("tau", 1), "body": ("body", 1)}
-#        name -> what offers it (see `results.SCALARS`), number of components
+VALUES = {                 # name -> what offers it (see `results.SCALARS`), number of components
+    "v": ("speed", 3), "J": ("J", 1), "tau_norm": ("tau", 1), "body": ("body", 1),
+}
 
 
 def export_particles(results, out):
     """Write the particles of all frames of `Results` to `out`.
 
-    Point data: v [m/s], J, tau_norm [Pa] (as far as they follow from what is stored), body (number).
-    Raises `NotWritten`.
+    Point data: v [m/s], J, tau_norm [Pa], as far as they follow from what is stored, and the
+    body's number. Raises `NotWritten`.
     """
     names = [name for name, (scalar, _) in VALUES.items() if results.offers(scalar)]
     count, frames = sum(map(results.count, results.bodies)), len(results)
@@ -33,7 +34,8 @@ def export_particles(results, out):
             rows = slice(k * count, (k + 1) * count)
             points[rows] = _gather(results, lambda body, k=k: three(results.field(body, "x", k)))
             for name, dataset in data.items():
-                dataset[rows] = _gather(results, lambda body, k=k, name=name: _value(results, body, name, k))
+                dataset[rows] = _gather(results, lambda body, k=k, name=name:
+                                        _value(results, body, name, k))
         _steps(root, results.time, count, names)
 
 
@@ -74,7 +76,8 @@ def _topology(root, count):
 
 def _values(root, name, rows):
     shape = (rows, 3) if VALUES[name][1] == 3 else (rows,)
-    return root.require_group("PointData").create_dataset(name, shape, "i4" if name == "body" else "f4")
+    kind = "i4" if name == "body" else "f4"
+    return root.require_group("PointData").create_dataset(name, shape, kind)
 
 
 def _steps(root, time, count, names):

@@ -50,8 +50,9 @@ def _body(results, name, frame):
 
 def _box(results, scheme):
     """(index of the first node, shape) of the nodes that particles reach in any frame."""
-    x = [results.field(body, "x", k) for body in results.bodies for k in range(len(results))]
-    corners = np.array([np.min([a.min(axis=0) for a in x], axis=0), np.max([a.max(axis=0) for a in x], axis=0)])
+    ends = [(x.min(axis=0), x.max(axis=0)) for body in results.bodies
+            for x in (results.field(body, "x", k) for k in range(len(results)))]
+    corners = np.array([np.min(ends, axis=(0, 1)), np.max(ends, axis=(0, 1))])
     grid = Store(results.dx, scheme.stencil, results.dim).cover([corners])
     return grid.origin.copy(), grid.m.shape
 

@@ -1,4 +1,4 @@
-"""Conditions on a grid: which nodes carry them, walls, motion, impulses."""
+"""Conditions on a grid: which nodes carry them, motion, impulses. Walls: test_walls.py."""
 
 import os
 import subprocess
@@ -9,48 +9,11 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
+from grids import DX, applied, floor, grid_of, positions, random_grid
 
-from mpm_ref.core.boundary import BoxWalls, Collider, Conditions, Prescribed, clip, nclaw_walls
+from mpm_ref.core.boundary import Collider, Conditions, Prescribed, nclaw_walls
 from mpm_ref.core.levelset import box, half_space, sphere
 from mpm_ref.core.motion import Keyframes, Motion, Steady, rotation
-from mpm_ref.core.state import NONE, Grid
-
-DX = 0.1
-
-
-def grid_of(v, origin=0, m=1.0, dx=DX):
-    """Grid with the velocities v (n1, .., nd, d)."""
-    v = np.array(v, dtype=float)
-    d = v.shape[-1]
-    mass = np.broadcast_to(m, v.shape[:-1]).astype(float)
-    return Grid(mass, v, NONE, NONE, np.full(d, origin, dtype=np.int64), dx)
-
-
-def random_grid(rng, d, n=8, origin=-3):
-    """Random velocities; a quarter of the nodes has no mass."""
-    m = rng.uniform(0.5, 1.0, d * (n,))
-    m[rng.random(m.shape) < 0.25] = 0.0
-    return grid_of(rng.normal(size=(*m.shape, d)), origin, m)
-
-
-def positions(grid):
-    """x_i of all nodes, (n1, .., nd, d)."""
-    index = np.stack(np.indices(grid.m.shape), axis=-1)
-    return (grid.origin + index) * grid.dx
-
-
-def applied(grid, *colliders, t=1.0, dt=0.1, **conditions):
-    """Velocities before and after, and the impulses."""
-    before = grid.v.copy()
-    J = Conditions(colliders, **conditions).apply(grid, t, dt)
-    return before, grid.v, J
-
-
-def floor(height, d, **options):
-    """Half-space below a height along the last axis."""
-    up = np.eye(d)[-1]
-    return Collider(half_space(height * up, up), **options)
-
 
 # where the wall is
 
@@ -71,7 +34,7 @@ def test_rounding_moves_no_wall(dx):
 
 
 def test_a_wall_between_nodes_acts_from_the_node_below():
-    _, u, _ = applied(grid_of(np.ones((2, 6, 2))), floor(0.399, 2))
+    _, u, _ = applied(grid_of(np.ones((2, 6, 2))), floor(0.4 - 1e-7, 2))
     assert (u[0, :, 0] == (0, 0, 0, 0, 1, 1)).all()
 
 
@@ -144,6 +107,10 @@ def test_a_turned_plane_has_a_turned_normal(d):
     down = sin(pi / 6) * np.array([slope * cos(pi / 6), 0.0, -sin(pi / 6)])
     down = down if d == 3 else down[[0, 2]]
     assert u[(1,) * d] == pytest.approx(down, abs=1e-15)
+    n = np.array([slope * sin(pi / 6), 0.0, cos(pi / 6)])
+    below = positions(grid) @ (n if d == 3 else n[[0, 2]]) <= 1e-12
+    assert u[below] == pytest.approx(np.broadcast_to(down, u.shape)[below], abs=1e-15)
+    assert (u[~below] == grid_of(v).v[~below]).all()
 
 
 def test_prescribed_region_that_follows_or_stays():
@@ -174,57 +141,6 @@ def test_a_stop_within_a_step_ends_where_the_schedule_does():
         u = applied(grid_of(np.zeros((1, 1, 2))), piston, t=0.1 * step)[1]
         path += 0.1 * u[0, 0, 0]
     assert path == pytest.approx(0.25)
-
-
-# walls counted in nodes
-
-def nclaw_by_hand(v, index, G, bound, noslip):
-    """The walls of NCLAW-sim at one node, axis by axis, as its release applies them."""
-    v = v.copy()
-    for towards in (-1.0, 1.0):
-        for a in range(len(v)):
-            wall = index[a] < bound if towards < 0 else index[a] > G - bound
-            if wall and towards * v[a] > 0.0:
-                v[slice(None) if noslip else a] = 0.0
-    return v
-
-
-@pytest.mark.parametrize("kind", ["separate", "noslip"])
-def test_nclaw_walls_are_exact(kind, rng):
-    """All 20^3 nodes, to the last bit, also on a window of the grid."""
-    v = rng.normal(size=(20, 20, 20, 3))
-    v[rng.random(v.shape) < 0.1] *= 1e-12          # small approaches are stopped too
-    expected = np.array([nclaw_by_hand(v[i], i, 20, 3, kind == "noslip")
-                         for i in np.ndindex(20, 20, 20)]).reshape(v.shape)
-    walls = nclaw_walls(20, 3, kind=kind)
-    assert (applied(grid_of(v, dx=1 / 20), walls=walls)[1] == expected).all()
-    part = grid_of(v[2:, 2:, 2:], origin=2, dx=1 / 20)
-    assert (applied(part, walls=walls)[1] == expected[2:, 2:, 2:]).all()
-    assert np.count_nonzero(expected == 0.0) > 1000
-
-
-def test_walls_on_some_axes_only():
-    v, u, J = applied(grid_of(np.ones((5, 5, 2)), origin=-2),
-                      walls=BoxWalls((None, -1), (1, None), "sticky"))
-    held = np.zeros((5, 5), dtype=bool)
-    held[4:], held[:, :1] = True, True
-    assert (u == np.where(held[..., None], 0.0, v)).all()
-    assert J.shape == (4, 2)
-    assert (J[[0, 3]] == 0.0).all()
-    assert J[1, 0] == J[2, 0] == -4.5          # four nodes each, and the one they share
-
-
-def test_walls_and_colliders_together(d, rng):
-    """An incline that runs into a wall: both hold at the nodes they share."""
-    n = np.ones(d) / np.sqrt(d)
-    grid = random_grid(rng, d)
-    _, u, _ = applied(grid, Collider(half_space(np.zeros(d), n), "separate"),
-                      walls=BoxWalls(d * (-1,), d * (None,)))
-    x = positions(grid)
-    on_incline = (x @ n <= 1e-9) & (grid.m > 0.0)
-    assert (u[on_incline] @ n > -1e-12).all()
-    for a in range(d):
-        assert (u[(x[..., a] < -1.5 * DX) & (grid.m > 0.0)][:, a] >= -1e-12).all()
 
 
 # impulses, order, threads
@@ -281,7 +197,8 @@ def test_the_same_bits_for_any_number_of_threads(d, rng):
 
 def test_without_compiler_the_same():
     """The kernels as plain Python, in a process of their own."""
-    code = ("import numpy as np; from test_boundary import applied, crowd, random_grid\n"
+    code = ("import numpy as np\n"
+            "from test_boundary import applied, crowd, random_grid\n"
             "for d in (2, 3):\n"
             "    _, v, J = applied(random_grid(np.random.default_rng(1), d, 5, -2), *crowd(d))\n"
             "    print(*v.ravel(), *J.ravel())")
@@ -314,20 +231,11 @@ def test_moves():
     assert Conditions(prescribed=(Prescribed(sphere((0, 0), 1), Motion(rotation=Steady(1))),)).moves
 
 
-def test_clip():
-    x = np.array([(0.5, -1.0, 2.0), (0.1, 0.9, np.nan)])
-    clip(x, 0.1, 0.9)
-    assert np.array_equal(x, [(0.5, 0.1, 0.9), (0.1, 0.9, np.nan)], equal_nan=True)
-
-
 @pytest.mark.parametrize(("make", "said"), [
     (lambda: floor(0.0, 2, kind="stick"), "kind = 'stick': expected one of sticky, slip, separate"),
     (lambda: floor(0.0, 2, kind="slip", friction=-1.0), "friction = -1.0: expected"),
     (lambda: floor(0.0, 2, kind="slip", friction=np.nan), "friction = nan: expected"),
     (lambda: floor(0.0, 2, friction=0.1), "friction = 0.1 with kind 'sticky'"),
-    (lambda: BoxWalls((0.5, 0), (1, 1)), "expected a node index or None for each axis"),
-    (lambda: BoxWalls((0, 0), (1, 1, 1)), "expected a node index or None for each axis"),
-    (lambda: applied(grid_of(np.ones((2, 2, 2))), walls=nclaw_walls(20, 3)), "expected 2 limits"),
     (lambda: applied(grid_of(np.ones((2, 2, 2))), floor(0.0, 3)), "in 2D"),
 ])
 def test_what_cannot_be_is_refused(make, said):

@@ -88,6 +88,18 @@ def test_coulomb_friction_on_an_incline_and_in_space(rng):
         assert solved(v, [n], SEPARATE, mu, [w])[0] == pytest.approx(u, abs=1e-14)
 
 
+@pytest.mark.parametrize("mu", [0.0, 0.2, np.tan(0.4), 1.0])
+def test_acceleration_down_an_incline(mu):
+    """g (sin - mu cos) at 0.4 rad, or rest; the node starts from rest and gains g dt each step."""
+    g, dt, angle = 9.81, 0.01, 0.4
+    n, down = (np.sin(angle), np.cos(angle)), np.array((np.cos(angle), -np.sin(angle)))
+    u = np.zeros(2)
+    for _ in range(100):
+        u, _ = solved(u + (0.0, -g * dt), [n], SEPARATE, mu)
+    expected = max(g * (np.sin(angle) - mu * np.cos(angle)), 0.0)
+    assert u == pytest.approx(expected * 100 * dt * down, abs=1e-13)
+
+
 # several colliders
 
 def test_nearest_velocity_for_any_planes(d, rng):
@@ -169,6 +181,13 @@ def test_friction_in_an_edge_of_sixty_degrees():
     u, contacts = solved(-n[0] - n[1] + (0, 0, 1), n, SEPARATE, (0.3, 0.1))
     assert u == pytest.approx((0, 0, 0.6), abs=1e-15)
     assert contacts.dv[:, 2] == pytest.approx((-0.3, -0.1), abs=1e-15)
+
+
+def test_friction_keeps_to_planes_that_move_differently():
+    """It acts along the edge, whatever the velocities of the planes across it."""
+    n, w = [(1, 0, 0), (0, 1, 0)], [(1, 5, 2), (-7, 3, 2)]
+    u, _ = solved((0, 0, 4), n, SEPARATE, (0.2, 0.1), w)
+    assert u == pytest.approx((1, 3, 4 - 0.2 * 1 - 0.1 * 3), abs=1e-15)
 
 
 def test_the_larger_friction_bears_what_two_equal_planes_could():

@@ -111,6 +111,13 @@ def test_unit_normals_where_the_gradient_does_not_exist(name, d):
     assert abs(np.linalg.norm(n, axis=1) - 1.0).max() < 1e-15
 
 
+@pytest.mark.parametrize("name", ["cylinder", "capsule"])
+@pytest.mark.parametrize("axis", np.eye(3), ids="xyz")
+def test_normals_on_an_axis_point_away_from_it(name, axis):
+    n = normals(np.zeros((1, 3)), getattr(levelset, name)(-axis, axis, 0.1))[0]
+    assert n @ axis == 0.0
+
+
 @pytest.mark.parametrize(("shape", "point", "value", "n"), [
     (levelset.half_space((0, 0, 1), (0, 0, 2)), (5, 6, 3), 2.0, (0, 0, 1)),
     (levelset.box((0, 0, 0), (2, 4, 6)), (1, 2, 3), -1.0, (1, 0, 0)),
@@ -126,6 +133,7 @@ def test_unit_normals_where_the_gradient_does_not_exist(name, d):
     (levelset.wedge((0, 0), (0, 1), np.arctan(0.75), 4), (0, -2), 2.0, (0, -1)),
     (levelset.wedge((0, 0), (0, 1), np.arctan(0.75), 4), (4, 3), 1.4, (0.8, -0.6)),
     (levelset.wedge((0, 0), (0, 1), np.arctan(0.75), 4), (-6, 8), 5.0, (-0.6, 0.8)),
+    (levelset.wedge((0, 0), (0, 1), np.arctan(0.75), 4), (2.8, 6), 2.0, (0, 1)),
     (levelset.wedge((0, 0, 0), (0, 0, 1), 0.4, 4, (0, 1, 0), 2), (0, 3, 2), 2.0, (0, 1, 0)),
     (levelset.wedge((0, 0, 0), (0, 0, 1), 0.4, 4, (0, 1, 0)), (0, 1e9, -1), 1.0, (0, 0, -1)),
 ])

@@ -30,7 +30,7 @@ class Nodes(NamedTuple):
 class Touch(NamedTuple):
     """The nodes that one part contains."""
 
-    node: np.ndarray      # (K,)    index in the grid's flattened arrays, increasing
+    node: np.ndarray      # (K,)    index in the grid's flattened arrays
     n: np.ndarray         # (K, d)  outward normal of the part
     v: np.ndarray         # (K, d)  velocity of the part there [m/s]
 
@@ -75,7 +75,7 @@ def touch_wall(grid, axis, limit, below):
     others.insert(axis, i + start)
     n = np.zeros((len(i), len(shape)))
     n[:, axis] = 1.0 if below else -1.0
-    return Touch(np.sort(np.ravel_multi_index(others, shape)), n, np.zeros_like(n))
+    return Touch(np.ravel_multi_index(others, shape), n, np.zeros_like(n))
 
 
 def solve(touches, kind, mu, grid):

@@ -88,7 +88,7 @@ def pair(s, i, j, law):
     """(2 mu s_j (eps_i - eps_j)/(s_i - s_j) - tau_j)/(s_i s_j), (P_i + P_j)/(s_i + s_j) [Pa]."""
     P, tau, r = pk1_hat(s, law), kirchhoff_hat(s, law), inverse(s)
     a = (2.0 * law.mu * _log_ratio((s[i] - s[j]) * r[j]) - tau[j]) * r[i] * r[j]
-    return a, (P[i] + P[j]) / (s[i] + s[j])
+    return a, (P[i] + P[j]) * r[i] * r[j] / (r[i] + r[j])
 
 
 @kernel

@@ -3,7 +3,7 @@
 The deviatoric stress of size s = mu |dev b_bar|, b_bar = J^(-2/d) b, above the yield radius tau_y
 relaxes towards it,
 
-    s_new = tau_y + (s - tau_y) 2 mu dt / (2 mu dt + eta)
+    s_new = s - (s - tau_y) / (1 + eta / (2 mu dt)) = tau_y + (s - tau_y) eta / (2 mu dt + eta)
 
 by backward Euler of ds/dt = -2 mu (s - tau_y) / eta. J stays. The paper stops here; the strain
 with this stress is rebuilt as b_bar_new = D + c I, where D has the direction of dev b_bar and
@@ -55,7 +55,7 @@ def project(s, y, dt, law, flow):
 def relaxed(size, dt, law, flow):
     """s_new [Pa] of a deviatoric stress of size s > tau_y (NSF-F5)."""
     rate = 2.0 * law.mu * dt
-    return flow.tau_y + (size - flow.tau_y) * rate / (rate + flow.eta)
+    return flow.tau_y + (size - flow.tau_y) * flow.eta / (rate + flow.eta)
 
 
 @kernel

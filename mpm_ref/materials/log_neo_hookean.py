@@ -63,14 +63,14 @@ def psi(F, law):
 
 @kernel
 def isotropic(J, law):
-    """c = lam log J - mu [Pa], of tau = mu F F^T + c I; NaN unless J > 0."""
+    """The c = lam log J - mu [Pa] of tau = mu F F^T + c I; NaN unless J > 0."""
     return law.lam * log(expanded(J)) - law.mu
 
 
 @kernel
 def pk1(F, law):
     """P = mu F + c F^-T [Pa]; NaN unless det F > 0."""
-    J = det(F)
+    J = expanded(det(F))
     return mlin(law.mu, F, isotropic(J, law) / J, cofactor(F))
 
 
@@ -83,7 +83,7 @@ def kirchhoff(F, law):
 @kernel
 def dpk1(F, dF, law):
     """The differential dP = mu dF + lam (G : dF) G - c G dF^T G [Pa], with G = F^-T."""
-    J = det(F)
+    J = expanded(det(F))
     G = mlin(1.0 / J, cofactor(F), 0.0, F)
     turned = mm(G, mm(transpose(dF), G))
     volumetric = mlin(law.lam * inner(G, dF), G, -isotropic(J, law), turned)

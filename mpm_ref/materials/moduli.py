@@ -6,8 +6,8 @@ from math import isfinite, sqrt
 def lame(E, nu):
     """mu, lam [Pa] of Young's modulus E [Pa] and Poisson's ratio nu (NSF-F0).
 
-    In 2D the laws with these constants are in plane strain. Raises ValueError unless E > 0 and -1
-    < nu < 1/2.
+    The same in 2D, where the laws without a deviator are then in plane strain. Raises ValueError
+    unless E > 0 and -1 < nu < 1/2.
     """
     positive(E=E)
     if not -1.0 < nu < 0.5:

@@ -74,7 +74,7 @@ def expanded(J):
 def parts(J, tr_b, law, like):
     """m, t, A [Pa] with tau = m b + (A - t) I."""
     m = law.mu * J ** (-2.0 / len(like))
-    return m, m * tr_b / len(like), 0.5 * law.kappa * (J * J - 1.0)
+    return m, m * (tr_b / len(like)), 0.5 * law.kappa * (J * J - 1.0)
 
 
 @kernel

@@ -95,7 +95,7 @@ def recovers(law):
     return isinstance(law, FixedCorotated)
 
 
-def make_law(name, **parameters):
+def make_law(name, /, **parameters):
     """The law of that name, e.g. `make_law("hencky", E=1e6, nu=0.2)` [Pa].
 
     Raises ValueError for an unknown name, an unknown, missing or impossible parameter.
@@ -104,7 +104,7 @@ def make_law(name, **parameters):
     return _built(build, f"law {name!r}", parameters)
 
 
-def make_flow(name, law, dim, **parameters):
+def make_flow(name, law, dim, /, **parameters):
     """The flow of that name on a law, in dim = 2 or 3 dimensions.
 
     E.g. `make_flow("drucker_prager", law, 3, friction_angle=25)` (degrees). Raises ValueError for

@@ -1,17 +1,22 @@
 """The stiffest wave of a deformed material, for the stable time step.
 
 A small plane wave of direction n and polarisation u, in the material as it stands at singular
-values s, travels at the speed c with rho_0 c^2 = u_i n_j a_ijkl u_k n_l [Pa], where a_ijkl = F_jJ
-F_lL d2psi/dF_iJ dF_kL and rho_0 is the density *at rest* (both sides are per rest volume). In
-principal axes, with A, a, b of `principal`, the form consists of
+values s, travels at the speed c with
+
+    rho_0 c^2 = u_i n_j a_ijkl u_k n_l,     a_ijkl = F_jJ F_lL d2psi/dF_iJ dF_kL [Pa]
+
+where rho_0 is the density *at rest*: both sides are per rest volume. In principal axes, with A, a,
+b of `principal`, the form consists of
 
     u_i^2 n_i^2 s_i^2 A_ii                                          compression along axis i
     u_i^2 n_j^2 s_j^2 g_ij,   g = (a + b)/2                         shear, i and j different
     2 u_i n_j u_j n_i k_ij,   k = s_i s_j (A_ij + (a - b)/2)        their coupling
 
-The last two are a quadratic form in (u_i n_j, u_j n_i). Since the u_i^2 n_j^2 sum up to 1, no
-wave exceeds the largest of the s_i^2 A_ii and of the larger eigenvalues of ((s_j^2 g, k), (k,
-s_i^2 g)). At rest all of these are lam + 2 mu: the bound is attained.
+The last two are a quadratic form in (u_i n_j, u_j n_i), of matrix ((s_j^2 g, k), (k, s_i^2 g)).
+Since the u_i^2 n_j^2 sum up to 1, no wave exceeds the largest of the s_i^2 A_ii and of the larger
+eigenvalues of these matrices. At rest all of them are lam + 2 mu: the bound is attained. Waves
+along the principal axes alone do not bound the others: in Hencky matter at large strain the
+fastest wave runs between the axes.
 """
 
 from math import isnan, nan, sqrt

@@ -146,5 +146,6 @@ def refuse_unsure(arrays, k):
         if not own <= UNSURE * max(largest, a.scale.max()):
             raise ValueError(
                 f"{key} in step {k}: the reference's own error is {own:.1e}, too much beside its "
-                f"largest entry {largest:.1e} to judge others by; take another state or a smaller dt"
+                f"largest entry {largest:.1e} to judge others by; take another state or a smaller "
+                "dt"
             )

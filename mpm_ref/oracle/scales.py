@@ -18,8 +18,9 @@ from ..plain.laws import energy
 from ..plain.spline import bspline, slope
 from ..plain.step import stress
 
-NEAR = 2.0**-10       # cells: slopes are taken at their largest within this distance
-STEP = 2.0**-20       # of the differences, in units of the scale of F
+NEAR = 2.0**-20       # cells: slopes are taken at their largest within this distance
+STEP = 2.0**-20       # of the differences, in units of the scale of F,
+LARGEST = 2.0**-12    # and at most, in units of F
 CURVATURE = 2         # largest second derivative of the splines, per cell^2
 
 
@@ -90,10 +91,8 @@ def inputs(q, errors, eps):
 def to_grid(q, ip, box, method, S, W):
     """Scales of mass, momentum and force from one body, over the box."""
     m, V0 = q.m[:, None], q.V0[:, None]
-    C = 0 * q.m if q.C is None else size(q.C)
-    v, S_v, C, S_C = (a[:, None] for a in (size(q.v), S.v, C, S.C))
+    v_ip, S_v_ip = size(velocities(q, ip), 2), passed(q, S, W)
     tau, S_tau = size(q.tau[:, None])[:, None], S.tau[:, None]
-    v_ip, S_v_ip = v + C * W.size_r, S_v + S_C * W.size_r + C * W.r
     mass = m * (W.w + ip.w)
     momentum = m * (W.w * v_ip + ip.w * S_v_ip)
     if method.transfer == "mls":
@@ -106,12 +105,36 @@ def to_grid(q, ip, box, method, S, W):
     return [transfer.sum_to_nodes(a, ip, box) for a in (mass, momentum, force)]
 
 
-def velocity(nodes, S, gravity, dt):
-    """Scale of the nodal velocities before boundary conditions, from those of m, mv and f."""
-    m = np.where(nodes.m > 0, nodes.m, 1)
-    pushed = S["momentum"] + dt * S["force"]
-    carried = size(nodes.mv + dt * nodes.f, nodes.m.ndim) / m
-    return np.where(nodes.m > 0, (pushed + carried * S["mass"]) / m + dt * size(gravity, 0), 0)
+def velocities(q, ip):
+    """v_p + C_p r_ip (N, S, d)."""
+    spin = 0 if q.C is None else np.einsum("pab,psb->psa", q.C, ip.r)
+    return q.v[:, None] + spin + 0 * ip.r
+
+
+def passed(q, S, W):
+    """Scales of v_p + C_p r_ip."""
+    C = 0 * q.m if q.C is None else size(q.C)
+    v, S_v, C, S_C = (a[:, None] for a in (size(q.v), S.v, C, S.C))
+    return v + S_v + (S_C + C) * W.size_r + C * W.r
+
+
+def swing(q, ip, box, v_i, S_W):
+    """Scale of m_i times sum_p w_ip m_p (v_p + C_p r_ip)/m_i, from one body, over the box.
+
+    An error of w_ip counts only where v_ip is not v_i: nodes with little mass are no worse.
+    """
+    S, W = S_W
+    apart = size(velocities(q, ip) - v_i[transfer.at(ip, box)], 2)
+    return transfer.sum_to_nodes(q.m[:, None] * (W.w * apart + ip.w * passed(q, S, W)), ip, box)
+
+
+def velocity(nodes, S, gravity, dt, m):
+    """Scale of the nodal velocities before boundary conditions; m is the mass to divide by.
+
+    S has the scales of mass and force, and `swing` for that of m times the velocity before forces.
+    """
+    pushed = dt * (S["force"] + size(nodes.f, nodes.m.ndim) / m * S["mass"])
+    return np.where(nodes.m > 0, (S["swing"] + pushed) / m + dt * size(gravity, 0), 0)
 
 
 def held(nodes, S_v, contacts):
@@ -142,29 +165,35 @@ def affine(v, S_v, ip, W):
 def through(function, F, S_F):
     """Scales of the results of `function` (arrays over particles) at F with the scale S_F (N,).
 
-    sum_kl |f(F + h S_F E_kl) - f(F)| / h over steps h of both signs in each entry of F: a return
+    S_F sum_kl |f(F + h E_kl) - f(F)| / h over steps h of both signs in each entry of F: a return
     map may have a kink right here.
     """
-    here = function(F)
+    here, h = function(F), np.minimum(STEP * S_F, LARGEST * size(F[:, None]))
     total = [size(a[:, None]) for a in here]
     for k in np.ndindex(F.shape[1:]):
-        for h in (STEP, -STEP):
+        for sign in (1, -1):
             moved = F.copy()
-            moved[(slice(None), *k)] += h * S_F
+            moved[(slice(None), *k)] += sign * h
             changes = zip(total, function(moved), here)
-            total = [s + size((a - b)[:, None]) / STEP for s, a, b in changes]
+            total = [s + size((a - b)[:, None]) / h * S_F for s, a, b in changes]
     return total
 
 
 def deformation(q, F_trial, S_F, dt):
-    """Scales of F, tau, psi and, where it is carried, y after the return map."""
+    """Scales of F, tau, psi and, where it is carried, y after the return map.
+
+    That of tau allows for a code that computes it from the stored F, where a map may have ended on
+    a corner of its surface at which the stress of the trial state no longer counts.
+    """
     def new(F):
         F, y = project(F, q.y, dt, q.law, q.flow)
         carried = [] if y is None else [y]
         return [F, stress(F, y, q), energy(F, q.law), *carried]
 
+    F, *_ = new(F_trial)
     S_F, S_tau, S_psi, *S_y = through(new, F_trial, S_F)
-    return S_F, S_tau, S_psi + S_tau, *S_y
+    again, = through(lambda F: [stress(F, q.y, q)], F, size(F[:, None]))
+    return S_F, S_tau + again, S_psi + S_tau + again, *S_y
 
 
 def energies(q, method, gravity, S, S_psi):

@@ -29,12 +29,14 @@ def of_step(twin, before, done, contacts, errors):
 
 
 def on_grid(twin, before, done, contacts, S_W):
-    """Scales of the grid arrays."""
-    nodes, method = done.nodes, twin.method
-    rows = [scales.to_grid(q, ip, nodes.box, method, S, W)
-            for q, ip, S, W in zip(before, done.clouds, *S_W)]
+    """Scales of the grid arrays; `swing` of mass times velocity before forces."""
+    nodes, method, bodies = done.nodes, twin.method, list(zip(before, done.clouds, *S_W))
+    m = np.where(nodes.m > 0, nodes.m + method.mass_eps, 1)
+    v = nodes.mv / m[..., None]
+    rows = [scales.to_grid(q, ip, nodes.box, method, S, W) for q, ip, S, W in bodies]
     found = {name: sum(a) for name, a in zip(("mass", "momentum", "force"), zip(*rows))}
-    found["velocity"] = scales.velocity(nodes, found, twin.gravity, done.dt)
+    found["swing"] = sum(scales.swing(q, ip, nodes.box, v, (S, W)) for q, ip, S, W in bodies)
+    found["velocity"] = scales.velocity(nodes, found, twin.gravity, done.dt, m)
     found["velocity_bc"] = scales.held(nodes, found["velocity"], contacts)
     return found
 
@@ -59,11 +61,9 @@ def particles(twin, q, done, k, S_W_grid):
 
 
 def old(nodes, grid, ip, W):
-    """Scale of sum_i w_ip v_old_i, the momentum before forces over the mass (FLIP)."""
-    m = np.where(nodes.m > 0, nodes.m, 1)
-    v = size(nodes.mv, nodes.m.ndim) / m
-    S_v = (grid["momentum"] + v * grid["mass"]) / m
-    at = transfer.at(ip, nodes.box)
+    """Scale of sum_i w_ip v_old_i, the velocity before forces (FLIP)."""
+    m, at = np.where(nodes.m > 0, nodes.m, 1), transfer.at(ip, nodes.box)
+    v, S_v = size(nodes.mv, nodes.m.ndim) / m, grid["swing"] / m
     return scales.gathered(v[at], S_v[at], ip, W)
 
 

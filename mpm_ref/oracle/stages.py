@@ -73,7 +73,7 @@ def advance(problem, body, grid, dt, seen):
 
 
 def contacts(conditions, grid, t, dt):
-    """{integer coordinates of a node: its `Contact`s} with boundary conditions at the end of a step.
+    """{integer coordinates of a node: its `Contact`s} with the boundary conditions at time t.
 
     Which nodes a condition holds, its normals and its velocities there are taken as they are.
     """

@@ -1,0 +1,16 @@
+"""Golden files: every stage of an explicit step, with the error of each number, to check others by.
+
+    record(problem, "golden.h5", steps=3)
+    write("other.h5", [{"nodes": .., "mass": .., "ball/v": ..}, ..])      # the other code's arrays
+    report = check("golden.h5", "other.h5")
+    print(report)                  # "agrees: ..", or the first stage that departs and where
+
+docs/oracle.md has the layout of the files and the rule for the tolerances.
+"""
+
+from .checking import check
+from .files import record, write
+from .matching import NotComparable
+from .report import Departure, Report
+
+__all__ = ["Departure", "NotComparable", "Report", "check", "record", "write"]

@@ -1,0 +1,127 @@
+"""Another code's arrays against a golden file: the first stage that departs, and where."""
+
+import h5py
+import numpy as np
+
+from .matching import Mismatch, NotComparable, matched
+from .recording import shaped_as
+from .report import Departure, Report
+from .schema import ARRAYS, BESIDE, ENERGIES, FORMAT, key
+
+
+def check(golden, other, precision="auto"):
+    """`Report` on the file `other`, written by `files.write`, against the golden file.
+
+    precision "f64" or "f32" selects the tolerances; "auto" takes f32 if an array of the other file
+    has that type. Not a number on either side departs; what is not given is listed. Raises
+    NotComparable for a file without the layout, or without the order of its nodes.
+    """
+    if precision not in ("auto", "f64", "f32"):
+        raise NotComparable(f"precision = {precision!r}: expected 'f64', 'f32' or 'auto'")
+    with opened(golden) as g, opened(other) as o:
+        if g.attrs.get("format") != FORMAT:
+            raise NotComparable(f"{golden}: no golden file, its format is {g.attrs.get('format')!r}"
+                                f"; expected {FORMAT!r}, as `mpm-ref oracle record` writes it")
+        if "steps" not in o:
+            raise NotComparable(f"{other}: it has no group 'steps'; write it with `oracle.write`")
+        bodies = list(g["bodies"])
+        given = {step: keys_of(o["steps"][step], bodies) for step in o["steps"]}
+        if precision == "auto":
+            types = {a.dtype for theirs in given.values() for a in theirs.values()}
+            precision = "f32" if np.dtype(np.float32) in types else "f64"
+        return compared(g["steps"], given, bodies, precision)
+
+
+def opened(path):
+    """The file, for reading; NotComparable if it is not HDF5 or cut short."""
+    try:
+        return h5py.File(path, "r")
+    except OSError as e:
+        raise NotComparable(f"{path}: cannot be read as HDF5 ({e})") from e
+
+
+def keys_of(group, bodies):
+    """{key: dataset} of one step of the other file; the name of a single body may be left out."""
+    of_particles = {a.name for a in ARRAYS if a.where != "nodes"} | {"base", "id"}
+    found = {}
+
+    def visit(name, item):
+        if isinstance(item, h5py.Dataset):
+            alone = len(bodies) == 1 and name in of_particles
+            found[f"{bodies[0]}/{name}" if alone else name] = item
+
+    group.visititems(visit)
+    return found
+
+
+def compared(steps, given, bodies, precision):
+    """The `Report` over all steps and arrays, in the order of the stages."""
+    departures, missing, count, nearest = [], set(), 0, 0.0
+    unknown = {name for theirs in given.values() for name in theirs
+               if name.split("/")[-1] not in BESIDE}
+    for step in sorted(steps, key=int):
+        theirs = given.get(step, {})
+        for array, name in named(steps[step], bodies):
+            unknown.discard(name)
+            if name not in theirs:
+                missing.add(name if theirs else f"step {step}")
+                continue
+            count += 1
+            departure, off = distance(steps[step], theirs, array, name, precision)
+            if departure is not None:
+                departures.append(Departure(int(step), array.stage, name, **departure))
+            nearest = max(nearest, off)
+    return Report(not departures and count > 0, precision, count, float(nearest),
+                  tuple(departures), tuple(sorted(missing)), tuple(sorted(unknown)))
+
+
+def named(group, bodies):
+    """The arrays of a golden step in the order of the stages: pairs of `Array` and key."""
+    for array in ARRAYS:
+        for name in [key(array)] if array.where == "nodes" else [key(array, b) for b in bodies]:
+            if name in group:
+                yield array, name
+
+
+def distance(group, theirs, array, name, precision):
+    """What departs in one array, or None; and its largest difference over the tolerance if not."""
+    golden, scale = group[name][()], group[f"scale/{name}"][()]
+    if not np.isfinite(golden).all():
+        return {"what": "the golden file holds numbers that are not finite"}, 0.0
+    try:
+        other = matched(group, theirs, array, name)
+    except Mismatch as mismatch:
+        return {"what": str(mismatch)}, 0.0
+    bad = np.argwhere(other.given & ~np.isfinite(other.value))
+    if len(bad) or not np.isfinite(other.extra).all():
+        at = words(group, array, name, tuple(bad[0])) if len(bad) else "a node that is not golden"
+        return {"where": at, "what": f"{at} is not finite"}, 0.0
+    tol = np.broadcast_to(shaped_as(group[name].attrs[f"tolerance_{precision}"] * scale, golden),
+                          golden.shape)
+    off = np.where(other.given, abs(other.value - golden), 0.0)
+    i = np.unravel_index(np.argmax(off / tol), off.shape)
+    if off[i] > tol[i]:
+        return {"where": words(group, array, name, i), "golden": float(golden[i]),
+                "other": float(other.value[i]), "difference": float(off[i]),
+                "tolerance": float(tol[i])}, 0.0
+    beyond = abs(other.extra).max(initial=0.0)
+    if beyond > tol.max():
+        return {"what": f"{beyond:.3g} at a node where the golden file has 0, which is more than "
+                        f"the tolerance {tol.max():.3g}"}, 0.0
+    return None, max(off[i] / tol[i], beyond / tol.max())
+
+
+def words(group, array, name, i):
+    """The entry i of an array in words: which node, particle, component."""
+    if array.where == "body":
+        return ENERGIES[i[0]]
+    component = f" component {', '.join(map(str, i[1:]))}" if len(i) > 1 else ""
+    if array.where == "nodes":
+        return f"node {tuple(group['nodes'][i[0]].tolist())}{component}"
+    if array.where == "pairs":
+        base = group[f"{name.partition('/')[0]}/base"][i[0]]
+        d = len(base)
+        width = round(group[name].shape[1] ** (1 / d))
+        node = base + np.array(np.unravel_index(i[1], d * (width,)))
+        return f"particle {i[0]}, node {tuple(node.tolist())}"
+    return f"particle {i[0]}{component}"

@@ -1,0 +1,125 @@
+"""Golden files, and files to check against them: HDF5 with the layout of docs/oracle.md."""
+
+import json
+
+import h5py
+import numpy as np
+
+from ..atomic import replacing
+from ..body import Body
+from . import recording
+from .schema import ARRAYS, BESIDE, FORMAT, key
+
+PACKED = {"compression": "gzip", "compression_opts": 9, "shuffle": True, "fletcher32": True}
+
+
+def record(problem, path, steps):
+    """Run the first `steps` steps of a problem and write the golden file `path`.
+
+    The problem's own arrays stay as they are; dt is its own, or the one with which it would start.
+    Raises ValueError for steps < 1, for names of bodies that cannot name arrays, and for a state
+    in which the reference's own error is too large to judge others by.
+    """
+    refuse_names(problem.bodies)
+    if steps < 1:
+        raise ValueError(f"steps = {steps}: expected at least one step to record")
+    with replacing(path) as part, h5py.File(part, "w") as f:
+        describe(f, problem)
+        for k, recorded in enumerate(recording.run(problem, steps)):
+            put_step(f.create_group(f"steps/{k}"), recorded)
+
+
+def refuse_names(bodies):
+    """Raise ValueError for names that are not unique, or mean something else in the file."""
+    names, taken = [body.name for body in bodies], {a.name for a in ARRAYS} | {*BESIDE, "scale"}
+    if len(set(names)) < len(names) or any("/" in name or name.strip(".") == "" for name in names):
+        raise ValueError(f"bodies {names}: expected a name of its own for each, without a slash")
+    if taken & set(names):
+        raise ValueError(f"body {min(taken & set(names))!r}: this names an array; rename the body")
+
+
+def describe(f, problem):
+    """The problem: attributes of the file, and the initial state of each body."""
+    s = problem.scheme
+    f.attrs.update({
+        "format": FORMAT, "title": problem.title, "scene": problem.source, "dim": problem.dim,
+        "dx": problem.dx, "gravity": problem.gravity, "degree": s.degree, "transfer": s.transfer,
+        "flip": s.flip, "rpic": s.rpic, "mass_eps": s.mass_eps,
+        "gravity_on_empty": s.gravity_on_empty, "conditions": str(problem.conditions),
+        "rule": "tolerance of an entry = tolerance_f64 or tolerance_f32 of its array * its scale",
+    })
+    if problem.clip is not None:
+        f.attrs["clip"] = np.array(problem.clip)
+    for body in problem.bodies:
+        put_body(f.create_group(f"bodies/{body.name}"), body)
+
+
+def put_body(group, body):
+    """Material and initial state of a body."""
+    for role in Body._fields[2:4]:
+        record_ = getattr(body, role)
+        group.attrs[role] = type(record_).__name__
+        group.attrs[f"{role}_parameters"] = json.dumps(record_._asdict())
+    for name, a in body.particles._asdict().items():
+        if len(a) and name not in ("L", "tau"):         # both follow from the rest
+            group.create_dataset(name, data=a, **PACKED)
+    group.create_dataset("id", data=np.arange(len(body.id)), **PACKED)
+
+
+def put_step(group, recorded):
+    """One step: every array with its scale, its own error and its tolerances."""
+    group.attrs.update({"t": recorded.t, "dt": recorded.dt})
+    group.create_dataset("nodes", data=recorded.nodes.astype(np.int32), **PACKED)
+    for name, base in recorded.bases.items():
+        group.create_dataset(f"{name}/base", data=base.astype(np.int32), **PACKED)
+    stages = {array.name: array for array in ARRAYS}
+    for name, a in recorded.arrays.items():
+        data = group.create_dataset(name, data=a.value, **PACKED)
+        group.create_dataset(f"scale/{name}", data=a.scale, **PACKED)
+        array = stages[name.split("/")[-1]]
+        data.attrs.update({
+            "stage": array.stage, "unit": array.unit, "error_twin": a.twin,
+            "error_reordered": a.reordered, "error_in_units": a.error,
+            **{f"tolerance_{p}": a.tolerance(p) for p in recording.EPS},
+        })
+
+
+def write(path, steps):
+    """Write another code's arrays in the layout that `check` reads.
+
+    steps is a list with one dictionary {key: array} for each step of the golden file, in order;
+    None for a step that was not computed. Keys are `mass`, `velocity`, .. on nodes, and `ball/x`,
+    `ball/C`, .. for the particles of the body "ball", or just `x`, `C` where there is one body.
+    Grid arrays are lists over `nodes`, (M, d) integer coordinates (node i lies at i dx); or whole
+    grids (n1, .., nd[, d]) with `origin` (d,), the coordinates of the first node. Particles in
+    another order come with `id` (N,), the number of each in the golden file. What is left out is
+    not checked. Raises ValueError for a key that no golden file has.
+    """
+    with replacing(path) as part, h5py.File(part, "w") as f:
+        for k, arrays in enumerate(steps):
+            for name, a in listed(arrays or {}).items():
+                refuse_key(name)
+                f.create_dataset(f"steps/{k}/{name}", data=a)
+
+
+def refuse_key(name):
+    """Raise ValueError for a key that is not in the schema."""
+    known = [array.name for array in ARRAYS]
+    if name.split("/")[-1] not in (*known, *BESIDE):
+        raise ValueError(f"array {name!r}: expected one of {', '.join(known)}, for particles with "
+                         f"the name of their body in front, or {', '.join(BESIDE)}")
+
+
+def listed(arrays):
+    """The arrays with whole grids, if there is an `origin`, as lists over their nodes with mass."""
+    if "origin" not in arrays:
+        return arrays
+    if "mass" not in arrays:
+        raise ValueError("origin without mass: whole grids need `mass`, which tells their nodes")
+    full = np.asarray(arrays["mass"]) != 0.0       # NaN counts: it must be seen
+    out = {name: a for name, a in arrays.items() if name != "origin"}
+    for array in ARRAYS:
+        if array.where == "nodes" and key(array) in out:
+            out[key(array)] = np.asarray(out[key(array)])[full]
+    out["nodes"] = np.argwhere(full) + np.asarray(arrays["origin"])
+    return out
