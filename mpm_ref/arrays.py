@@ -8,7 +8,6 @@ Names are those of `core.state.Particles`; N particles in d dimensions:
 Arrays of other names are left alone.
 """
 
-import zipfile
 from pathlib import Path
 
 import h5py
@@ -16,6 +15,10 @@ import numpy as np
 
 AXES = {"x": 1, "v": 1, "C": 2, "F": 2, "J": 0, "m": 0, "V0": 0, "y": 0, "body": 0}
 ABOVE_ZERO = ("m", "V0", "J")
+
+
+class NoGroup(ValueError):
+    """An HDF5 file without the group asked for."""
 
 
 def read_arrays(file, dim, group="/", select=None):
@@ -32,22 +35,25 @@ def read_arrays(file, dim, group="/", select=None):
         raise ValueError(f"file = {str(file)!r}: expected a name that ends in .npz, .h5 or .hdf5")
     try:
         arrays = read(path, group)
-    except (OSError, EOFError, zipfile.BadZipFile) as fault:
+    except NoGroup:
+        raise
+    except Exception as fault:      # what broken files raise in NumPy and h5py has no common class
         raise ValueError(f"file = {str(file)!r}: cannot be read ({fault})") from None
     return _selected(_checked(arrays, dim), select)
 
 
 def _read_npz(path, group):
-    with np.load(path, allow_pickle=False) as data:
+    with path.open("rb") as stream:
+        data = np.load(stream, allow_pickle=False)
         if not isinstance(data, np.lib.npyio.NpzFile):
-            raise ValueError(f"file = {str(path)!r}: not an NPZ archive")
+            raise ValueError("not an NPZ archive")
         return {name: data[name] for name in AXES if name in data.files}
 
 
 def _read_hdf5(path, group):
     with h5py.File(path, "r") as h5:
         if not isinstance(h5.get(group), h5py.Group):
-            raise ValueError(f"group = {group!r}: the file has no such group")
+            raise NoGroup(f"group = {group!r}: the file has no such group")
         there = h5[group]
         return {name: there[name][()] for name in AXES if isinstance(there.get(name), h5py.Dataset)}
 

@@ -1,4 +1,4 @@
-"""The command line `mpm-ref`. What the commands do is in `cli_run` and `cli_look`."""
+"""The command line `mpm-ref`. What the commands do is in `cli_run`, `cli_look`, `cli_oracle`."""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,7 +6,7 @@ from typing import Annotated
 import threadpoolctl
 import typer
 
-from . import __version__, cli_look, scene
+from . import __version__, cli_look, cli_oracle, scene
 from .cli_faults import one_line, options
 from .cli_look import Machine
 from .cli_run import Request, run_scene
@@ -21,6 +21,7 @@ for name, command in (("info", cli_look.describe), ("plot", cli_look.plot),
                       ("animate", cli_look.animate), ("export", cli_look.export),
                       ("scenes", cli_look.scenes)):
     app.command(name)(command)
+app.add_typer(cli_oracle.app, name="oracle")
 
 
 @app.callback(invoke_without_command=True)

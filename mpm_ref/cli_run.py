@@ -43,12 +43,12 @@ class Bar(Watch):
         self.facts = info.of_problem(problem)
         if not self.request.json:
             print("\n".join(info.problem_lines(self.facts)), flush=True)
-        self.total = last_step(problem.clock)
+        self.total, size = last_step(problem.clock), shutil.get_terminal_size((120, 24))
         self.bar = tqdm(
             total=self.total or problem.clock.end, unit="steps" if self.total else "s",
             initial=0 if state is None else self.done(state), bar_format=SHAPE, file=sys.stderr,
             disable=self.request.quiet or None, mininterval=0.2,
-            ncols=shutil.get_terminal_size((120, 24)).columns,
+            ncols=size.columns, nrows=size.lines,      # tqdm shows nothing where they are unknown
         )
         self.bar.set_postfix_str("compiling kernels: seconds, once per version")
 
@@ -103,11 +103,9 @@ def run_scene(problem, request, options):
 
 def _broke_off(fault, request):
     """End a run that could not end between two steps by itself."""
-    if isinstance(fault, NotWritten):
-        end(f"{fault}. {last_good(request)}", NOT_WRITTEN)
-    if isinstance(fault, KeyboardInterrupt):
-        end(f"interrupted at once. {last_good(request)}", INTERRUPT)
-    end(f"{fault}. {last_good(request)}", UNSTABLE)
+    said = str(fault) or "interrupted at once"
+    status = {NotWritten: NOT_WRITTEN, KeyboardInterrupt: INTERRUPT}.get(type(fault), UNSTABLE)
+    end(f"{said}{'' if said.endswith('?') else '.'} {last_good(request)}", status)
 
 
 def _report(outcome, request, facts):

@@ -1,7 +1,7 @@
 """Bounding boxes and volumes of the analytic shapes."""
 
 from functools import singledispatch
-from math import inf, pi, radians, tan
+from math import hypot, inf, pi, radians, tan
 
 import numpy as np
 
@@ -116,9 +116,9 @@ def _ball(d, r):
 
 
 def _distance(a, b):
-    return float(np.linalg.norm(np.subtract(b, a)))
+    return hypot(*np.subtract(b, a))
 
 
 def _disk(axis):
     """Half sizes of the box about a unit disk at right angles to `axis`."""
-    return np.sqrt(np.maximum(1.0 - (axis / np.linalg.norm(axis)) ** 2, 0.0))
+    return np.sqrt(np.maximum(1.0 - (axis / hypot(*axis)) ** 2, 0.0))

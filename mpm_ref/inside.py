@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, singledispatch
-from math import cos, inf, radians, sin
+from math import cos, hypot, inf, radians, sin
 
 import numpy as np
 
@@ -153,7 +153,7 @@ def rotation(angle, axis, d):
         if angle:
             raise ValueError(f"angle = {angle:g}: expected an axis beside it in 3D")
         return np.eye(3)
-    size = np.linalg.norm(axis)
+    size = hypot(*axis)
     if not size > 0.0:
         raise ValueError(f"axis = {list(axis)}: expected a vector of positive length")
     n = np.array(axis) / size

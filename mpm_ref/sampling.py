@@ -154,7 +154,7 @@ def throw(solid, r, seed):
 
 
 def exactly(solid, count, seed):
-    """`count` Poisson-disk points of a solid.
+    """`count` Poisson-disk points of a solid, such as the 1368 of LDM-sec5.1.
 
     The number of points falls with the radius, but not steadily, so that hardly any radius gives a
     number exactly: one that gives a few more is taken, and some points are left out at random.
@@ -213,8 +213,9 @@ def _centres(solid, dx, k):
 
 
 def _check_number(counts):
-    if not np.prod(counts) <= MOST_POINTS:
-        raise ValueError(f"{np.prod(counts):.1e} lattice points in the shape's box, the limit is "
+    most = np.prod(np.maximum(counts, 1.0))
+    if not most <= MOST_POINTS:
+        raise ValueError(f"{most:.1e} lattice points in the shape's box, the limit is "
                          f"{MOST_POINTS:.0e}; take a coarser sampling")
 
 

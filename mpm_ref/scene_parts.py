@@ -11,6 +11,7 @@ import numpy as np
 from .core import motion as rigid
 from .core.boundary import BoxWalls, Conditions, Prescribed
 from .core.boundary import Collider as RigidCollider
+from .inside import rotation
 from .monitor import Limits
 from .problem import Clock
 from .scene_error import SceneError, at
@@ -69,13 +70,16 @@ def _walls(record, dim):
     if record is None:
         return None
     with at("walls"):
-        low, high = _limits(record.low, dim), _limits(record.high, dim)
+        low, high = _nodes("low", record.low, dim), _nodes("high", record.high, dim)
         return BoxWalls(low, high, record.kind, record.friction)
 
 
-def _limits(nodes, dim):
-    """Node indices, None for "open"."""
-    return tuple(None if node == "open" else node for node in nodes or dim * ("open",))
+def _nodes(name, nodes, dim):
+    """Node indices per axis, None for "open"."""
+    nodes = nodes or dim * ("open",)
+    if len(nodes) != dim:
+        raise ValueError(f"{name} = {list(nodes)}: expected {dim} node indices or 'open'")
+    return tuple(None if node == "open" else node for node in nodes)
 
 
 def _motion(record, dim, path):
@@ -83,11 +87,8 @@ def _motion(record, dim, path):
     translation = _schedule(record.translation, dim, f"{path}.translation")
     turning = _schedule(record.rotation, 1, f"{path}.rotation")
     with at(path):
-        axis = record.axis if dim == 3 else None
-        if record.axis is not None and dim == 2:
-            raise ValueError(f"axis = {list(record.axis)}: in 2D the axis is given, leave it out")
-        orientation = rigid.rotation(radians(record.angle), axis) if record.angle else None
-        made = rigid.Motion(translation, turning, axis, record.center, orientation)
+        orientation = rotation(record.angle, record.axis, dim) if record.angle else None
+        made = rigid.Motion(translation, turning, record.axis, record.center, orientation)
         made.pose(1.0, 1.0, dim)        # checks what belongs together
     return made
 

@@ -62,7 +62,7 @@ class Session:
         self.saved = state.step if state else None
         try:
             with _signals(self):
-                for frame in simulate(self.problem, state, on_step=self.after_step):
+                for frame in self.frames(state):
                     self.show(frame)
             self.save()
             why = FINISHED
@@ -75,6 +75,14 @@ class Session:
             raise
         self.end(part, why)
         return why
+
+    def frames(self, state):
+        """Frames of the run. Particles that fly off the largest grid are a broken bound, too."""
+        try:
+            yield from simulate(self.problem, state, on_step=self.after_step)
+        except OutOfRange:
+            check(self.problem, self.state, self.dt)
+            raise
 
     def after_step(self, state, dt):
         """After every step; a frame that is due comes first."""

@@ -26,7 +26,7 @@ def export_grid(results, out):
     with replacing(out) as part, new_hdf5(part) as h5:
         root = root_of(h5, "ImageData")
         _place(root, first, shape, results.dx)
-        images = (len(results), *(1,) * (3 - len(shape)), *shape[::-1])
+        images = (len(results), *shape[::-1])
         density = root.create_dataset("PointData/density", images, "f4")
         velocity = root.create_dataset("PointData/velocity", (*images, 3), "f4")
         for k in range(len(results)):
@@ -64,16 +64,16 @@ def _velocity(grid):
 
 
 def _image(a, dim):
-    """Nodal values (n1, .., nd[, components]) with the axes of an image: z, y, x[, components]."""
-    turned = a.transpose(*range(dim)[::-1], *range(dim, a.ndim))
-    return turned[None] if dim == 2 else turned
+    """Nodal values (n1, .., nd[, components]) with the axes of an image: [z,] y, x[, components].
+    VTK wants no z axis where the image is flat.
+    """
+    return a.transpose(*range(dim)[::-1], *range(dim, a.ndim))
 
 
 def _within(grid, first):
-    """Where the nodes of a grid lie in the box, as slices along z, y, x."""
+    """Where the nodes of a grid lie in the box, as slices along [z,] y, x."""
     start = grid.origin - first
-    slices = [slice(s, s + n) for s, n in zip(start, grid.m.shape, strict=True)]
-    return [slice(0, 1)] * (3 - len(slices)) + slices[::-1]
+    return [slice(s, s + n) for s, n in zip(start, grid.m.shape, strict=True)][::-1]
 
 
 def _place(root, first, shape, dx):

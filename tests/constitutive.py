@@ -12,6 +12,8 @@ from mpm_ref.materials import Fluid, NeoHookean, dpk1_spd, make_law, wave_modulu
 from mpm_ref.materials.principal import pk1_hat
 
 YOUNG, NU = 10.0, 0.3
+STEPS = np.geomspace(1e-2, 1e-4, 5)     # of Taylor tests
+EPS = 1e-13     # round-off of some dozen operations on numbers of order 1
 LAW = {
     "fixed_corotated": make_law("fixed_corotated", E=YOUNG, nu=NU),
     "hencky": make_law("hencky", E=YOUNG, nu=NU),
@@ -119,3 +121,18 @@ def deviator(x):
 def rate(h, error):
     """Fitted exponent of error ~ h^rate."""
     return np.polyfit(np.log(h), np.log(error), 1)[0]
+
+
+def close(a, b, scale=10.0):
+    """Equal to round-off; E = 10 sets the scale of the stresses."""
+    return np.abs(np.asarray(a) - b).max() <= EPS * scale
+
+
+def remainders(law, F, dF):
+    """Remainders of psi and P for each h of STEPS, largest over the states."""
+    at = evaluate(law, F, dF)
+    beyond = evaluate(law, F[:, None] + STEPS[:, None, None] * dF[:, None])
+    slope = (at.P * dF).sum(axis=(1, 2))
+    of_psi = np.abs(beyond.psi - at.psi[:, None] - STEPS * slope[:, None])
+    of_P = beyond.P - at.P[:, None] - STEPS[:, None, None] * at.differential[:, None]
+    return of_psi.max(axis=0), np.abs(of_P).max(axis=(0, 2, 3))

@@ -1,4 +1,4 @@
-"""Small problems and states for the tests of files: two blocks, in two dimensions."""
+"""Small problems and states for the tests of files: two blocks."""
 
 import numpy as np
 
@@ -16,11 +16,11 @@ ENERGY = Energy(1.0, 2.0, -3.0)
 
 
 def block(name, corner, velocity, cells=4, fluid=False):
-    """A square block of so many cells, 2 x 2 particles in each."""
-    h = 0.5 * DX
-    x = (np.indices((2 * cells, 2 * cells)).reshape(2, -1).T + 0.5) * h + corner
+    """A square or cubic block of so many cells along an axis, 2 particles along each cell."""
+    h, d = 0.5 * DX, len(corner)
+    x = (np.indices((2 * cells,) * d).reshape(d, -1).T + 0.5) * h + corner
     n = len(x)
-    q = particles_at(x, np.tile(velocity, (n, 1)), np.full(n, 1000.0 * h**2), np.full(n, h**2),
+    q = particles_at(x, np.tile(velocity, (n, 1)), np.full(n, 1000.0 * h**d), np.full(n, h**d),
                      "mls", fluid=fluid)
     law = make_law("fluid", lam=1e5) if fluid else make_law("fixed_corotated", E=1e5, nu=0.3)
     return Body(name, q, law, NoFlow(), np.arange(n))

@@ -62,7 +62,8 @@ def test_a_run_in_two_halves_is_the_run(tmp_path, ends, clock):
 
 
 @settings(max_examples=8)
-@given(cuts=st.lists(st.integers(1, 99), max_size=4).map(sorted), clock=st.sampled_from([FIXED, ADAPTIVE]))
+@given(cuts=st.lists(st.integers(1, 99), max_size=4).map(sorted),
+       clock=st.sampled_from([FIXED, ADAPTIVE]))
 def test_a_run_in_any_pieces_is_the_run(tmp_path_factory, ends, cuts, clock):
     out = tmp_path_factory.mktemp("pieces") / "run.h5"
     for steps in (*cuts, None):
@@ -144,8 +145,9 @@ run(colliding(Clock(dt=5e-4, steps=400, every=5)), sys.argv[1],
 
 
 def started(out):
-    path = os.pathsep.join([str(TESTS), str(TESTS.parent)])
-    return subprocess.Popen([sys.executable, "-c", RUN, out], env={**os.environ, "PYTHONPATH": path})
+    here = os.pathsep.join([str(TESTS), str(TESTS.parent)])
+    return subprocess.Popen([sys.executable, "-c", RUN, out],
+                            env={**os.environ, "PYTHONPATH": here})
 
 
 def steps_saved(out):
@@ -230,5 +232,5 @@ def test_files_of_different_runs_do_not_go_on(tmp_path):
 @pytest.mark.parametrize("options", [{"steps": 0}, {"checkpoint_every": 0},
                                      {"resume": True, "overwrite": True}])
 def test_options_are_checked(options):
-    with pytest.raises(ValueError, match="expected|at most one"):
+    with pytest.raises(ValueError, match=r"expected|at most one"):
         Options(**options)

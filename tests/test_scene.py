@@ -32,7 +32,7 @@ def test_round_trip(text):
 
 
 def test_hash_does_not_depend_on_how_it_is_written():
-    same = loads("title = ''\nseed = 0\nunstable = 'refuse'" + TINY.replace("2.0", "2"))
+    same = loads("title = ''\nseed = 0\nunstable = 'refuse'\n" + TINY.replace("2.0", "2"))
     assert digest(same) == digest(loads(TINY))
     assert canonical(same) == canonical(loads(TINY))
     assert re.fullmatch("[0-9a-f]{64}", digest(same))
@@ -160,7 +160,7 @@ def test_bodies_of_one_scene_have_seeds_of_their_own():
     again, _ = build(loads(twice)).bodies
     assert np.array_equal(a.particles.x, again.particles.x)
     assert not np.array_equal(a.particles.x, b.particles.x)
-    other, _ = build(loads("seed = 1" + twice)).bodies
+    other, _ = build(loads("seed = 1\n" + twice)).bodies
     assert not np.array_equal(a.particles.x, other.particles.x)
 
 
@@ -217,6 +217,7 @@ def test_nclaw_particles(name):
 
 
 def test_ldm_gravity_has_the_constants_of_the_paper():
+    """LDM-sec5.1, with the sizes of LDM-X1 and the time step of LDM-X3."""
     paper, made = targets.load(), load(SCENES[0].parent / "ldm_gravity.toml")
     cylinder = made.body[0].shape
     assert cylinder.radius == paper["ldm.sec5_1.radius"].value

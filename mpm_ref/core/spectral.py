@@ -7,12 +7,22 @@ The method stands in `deflation`.
 
 from math import nan, sqrt
 
-from .deflation import complement, direction, eigh2, separated, svd2, turned, unit
+from .deflation import (
+    complement,
+    direction,
+    eigh2,
+    plus_diagonal,
+    separated,
+    svd2,
+    turned,
+    unit,
+)
 from .extremes import is_finite, is_moderate, moderate, not_a_number, rescaled
 from .jit import kernel
 from .tensor import (
     cofactor,
     cross,
+    det,
     diagonal,
     dot,
     fill,
@@ -22,6 +32,7 @@ from .tensor import (
     mmt,
     mv,
     scale_columns,
+    trace,
     transpose,
 )
 
@@ -61,6 +72,23 @@ def rotation(F):
             return R
     U, _, V, _ = svd(F)
     return mmt(U, V)
+
+
+@kernel
+def stretch(F):
+    """Left stretch V of F = V R with R of `polar`: V = R F^T = U diag(s) U^T, symmetric.
+
+    As fast as `rotation`, and all that a stress needs: F F^T - V = (F - R) F^T.
+    """
+    if len(F) == 2:
+        return mmt(rotation(F), F)
+    else:
+        if is_moderate(F):
+            V, ok = _fast_stretch(F)
+            if ok:
+                return V
+        U, s, _, _ = svd(F)
+        return mmt(scale_columns(U, s), U)
 
 
 @kernel
@@ -182,6 +210,19 @@ def _fast_rotation(F):
             return F, False
         G = mlin(0.5 * (n2 + t * t) / z, F, t / z, K)
         return mlin(1.0, G, -1.0 / z, mm(mmt(F, F), F)), True
+
+
+@kernel
+def _fast_stretch(F):
+    """R F^T of `_fast_rotation`, from B = F F^T: V = ((tr B + t^2)/2 B + t J I - B B)/z."""
+    B, J = mmt(F, F), det(F)
+    n2 = trace(B)
+    t = _sum_of_singular(n2, trace(cofactor(B)), J)
+    z = 0.5 * t * (t * t - n2) - J
+    if not (FAR_FROM_SINGULAR * z > t * t * t):
+        return F, False
+    V = mlin(0.5 * (n2 + t * t) / z, B, -1.0 / z, mmt(B, B))
+    return plus_diagonal(V, t * J / z), True
 
 
 @kernel

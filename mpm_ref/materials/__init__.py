@@ -6,9 +6,9 @@
     kirchhoff_hat, pk1_hat, dpk1_hat, pair      the same in singular values, see `principal`
     stiffness                                   lam + 2 mu
 
-and of the return maps ("flows"): `build`, `project` on singular values, `intact`. Elasticity:
-`fixed_corotated`, `hencky`, `neo_hookean`, `log_neo_hookean`, `fluid`. Importing this package
-registers them all with the names of `core.law`.
+with tau = P F^T (NSF-sec3.1-stress); and of the return maps ("flows"): `build`, `project` on
+singular values, `intact`. Elasticity: `fixed_corotated`, `hencky`, `neo_hookean`,
+`log_neo_hookean`, `fluid`. Importing this package registers them all with the names of `core.law`.
 """
 
 from ..core import law

@@ -23,7 +23,7 @@ def record(problem, path, steps):
     refuse_names(problem.bodies)
     if steps < 1:
         raise ValueError(f"steps = {steps}: expected at least one step to record")
-    with replacing(path) as part, h5py.File(part, "w") as f:
+    with replacing(path) as part, h5py.File(part, "w", libver=("v110", "v110")) as f:
         describe(f, problem)
         for k, recorded in enumerate(recording.run(problem, steps)):
             put_step(f.create_group(f"steps/{k}"), recorded)
@@ -95,7 +95,7 @@ def write(path, steps):
     another order come with `id` (N,), the number of each in the golden file. What is left out is
     not checked. Raises ValueError for a key that no golden file has.
     """
-    with replacing(path) as part, h5py.File(part, "w") as f:
+    with replacing(path) as part, h5py.File(part, "w", libver=("v110", "v110")) as f:
         for k, arrays in enumerate(steps):
             for name, a in listed(arrays or {}).items():
                 refuse_key(name)

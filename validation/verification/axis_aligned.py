@@ -2,16 +2,18 @@
 
     u_i = A sin(2 pi X_i) sin(c pi t + phi_i),     phi = (0, 2 pi/3, 4 pi/3),     c^2 = E / rho0
 
-on the unit square or cube, which stays itself and repeats periodically.
+in the unit square or cube, which repeats periodically. It is stretched and compressed, at most by
+1 +- 2 pi A per axis, and neither sheared nor turned.
 """
 
 from functools import cache
 
+import numpy as np
 import sympy as sp
 
-from .manufactured import T, body_force, function, log_neo_hookean
+from .manufactured import LAM, MU, RHO0, T, body_force, function, log_neo_hookean
 
-A, SPEED = sp.symbols("A c", positive=True)
+A, C = sp.symbols("A c", positive=True)
 PHASES = (0, 2 * sp.pi / 3, 4 * sp.pi / 3)
 
 
@@ -22,26 +24,54 @@ def coordinates(d):
 
 def displacement(d):
     """u(X, t), a list of d expressions."""
-    return [
-        A * sp.sin(2 * sp.pi * X_i) * sp.sin(SPEED * sp.pi * T + phase)
-        for X_i, phase in zip(coordinates(d), PHASES, strict=False)
-    ]
+    return [A * sp.sin(2 * sp.pi * X_i) * sp.sin(C * sp.pi * T + phase)
+            for X_i, phase in zip(coordinates(d), PHASES[:d], strict=True)]
 
 
 @cache
-def exact(d):
-    """NumPy functions of (A, c, t, *X): displacement, velocity (N, d) and F_ii - 1 (N, d)."""
+def kinematics(d):
+    """NumPy functions of (A, c, t, *X): displacement, velocity and F_ii - 1, each (N, d)."""
     u, X = displacement(d), coordinates(d)
-    arguments = (A, SPEED, T, *X)
-    strain = [sp.diff(u_i, X_i) for u_i, X_i in zip(u, X, strict=True)]
     velocity = [sp.diff(u_i, T) for u_i in u]
-    return tuple(function(arguments, f) for f in (u, velocity, strain))
+    strain = [sp.diff(u_i, X_i) for u_i, X_i in zip(u, X, strict=True)]
+    return tuple(function((A, C, T, *X), f) for f in (u, velocity, strain))
 
 
 @cache
 def forcing(d):
     """NumPy function of (mu, lam, rho0, A, c, t, *X): body force (N, d) [m/s^2]."""
-    from_rest = [X_i + u_i for X_i, u_i in zip(coordinates(d), displacement(d), strict=True)]
-    b = body_force(from_rest, coordinates(d), log_neo_hookean)
-    from .manufactured import LAM, MU, RHO0
-    return function((MU, LAM, RHO0, A, SPEED, T, *coordinates(d)), b)
+    X = coordinates(d)
+    x = [X_i + u_i for X_i, u_i in zip(X, displacement(d), strict=True)]
+    return function((MU, LAM, RHO0, A, C, T, *X), body_force(x, X, log_neo_hookean))
+
+
+class AxisAligned:
+    """The motion at particles X (N, d) of a law and a density rho0 [kg/m^d].
+
+    amplitude is A [m], c the speed [m/s]; one oscillation takes 2/c seconds.
+    """
+
+    def __init__(self, X, law, rho0, amplitude, c):
+        self.X, self.measured = X, slice(None)
+        self._kinematics, self._forcing = kinematics(X.shape[1]), forcing(X.shape[1])
+        self._motion, self._matter = (amplitude, c), (law.mu, law.lam, rho0)
+
+    def position(self, t):
+        """x (N, d) [m]."""
+        return self.X + self._kinematics[0](*self._motion, t, *self.X.T)
+
+    def velocity(self, t):
+        """v (N, d) [m/s]."""
+        return self._kinematics[1](*self._motion, t, *self.X.T)
+
+    def gradient(self, t):
+        """F (N, d, d)."""
+        d = self.X.shape[1]
+        return np.eye(d) * (1.0 + self._kinematics[2](*self._motion, t, *self.X.T))[:, :, None]
+
+    def body_force(self, t):
+        """b (N, d) [m/s^2]."""
+        return self._forcing(*self._matter, *self._motion, t, *self.X.T)
+
+    def hold(self, particles):
+        """Every particle is free."""

@@ -1,0 +1,76 @@
+"""One state, bit for bit, for any number of threads and any threading layer."""
+
+import importlib.util
+
+import numba
+import pytest
+from problems import digest, elsewhere, stepped, two_disks
+
+from mpm_ref.core.jit import set_threads
+
+STEPS, SORT = 100, 16
+MOST = numba.config.NUMBA_NUM_THREADS
+
+CODE = f"""
+import json, numba
+from problems import digest, stepped, two_disks
+sha = digest(stepped(two_disks(), {STEPS}, sort_every={SORT}))
+print(json.dumps([sha, numba.threading_layer(), numba.get_num_threads()]))
+"""
+
+LAYERS = [name for name, module in (("omp", "omppool"), ("workqueue", "workqueue"),
+                                    ("tbb", "tbbpool"))
+          if importlib.util.find_spec(f"numba.np.ufunc.{module}")]
+
+
+def run():
+    return digest(stepped(two_disks(), STEPS, sort_every=SORT))
+
+
+@pytest.fixture(scope="module")
+def here():
+    return run()
+
+
+def test_the_state_moves_on(here):
+    """The digest sees a change in the last bit of one number, and 100 steps are not 99."""
+    bodies = stepped(two_disks(), STEPS, sort_every=SORT)
+    assert digest(bodies) == here
+    bodies[1].particles.tau[3, 0, 1] *= 1 + 2.3e-16
+    assert digest(bodies) != here
+    assert digest(stepped(two_disks(), STEPS - 1, sort_every=SORT)) != here
+
+
+def test_one_thread_gives_the_same_bits(here):
+    try:
+        set_threads(1)
+        assert run() == here
+    finally:
+        set_threads(min(2, MOST))
+
+
+@pytest.mark.skipif(MOST < 2, reason="one core")
+def test_two_threads_give_the_same_bits(here):
+    set_threads(2)
+    assert run() == here
+
+
+def test_four_threads_give_the_same_bits(here):
+    sha, _, threads = elsewhere(CODE, NUMBA_NUM_THREADS="4")
+    assert threads == 4
+    assert sha == here
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+def test_every_threading_layer_gives_the_same_bits(here, layer):
+    if layer == "tbb" and importlib.util.find_spec("tbb") is None:
+        pytest.skip("the tbb library is not installed")
+    sha, used, _ = elsewhere(CODE, NUMBA_THREADING_LAYER=layer)
+    assert used == layer
+    assert sha == here
+
+
+@pytest.mark.parametrize("n", [0, 10**6])
+def test_impossible_numbers_of_threads_are_refused(n):
+    with pytest.raises(ValueError, match="expected 1 .."):
+        set_threads(n)

@@ -1,0 +1,50 @@
+"""What is measured while two bodies collide."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mpm_ref.energy import energy, momentum
+from mpm_ref.scene import build
+from mpm_ref.simulate import simulate
+
+from .scenes import mean, one_thread, with_
+
+TRANSFERS = ("pic", "mls", "apic", "flip")
+
+
+class Course(NamedTuple):
+    """Course of a collision at S times."""
+
+    t: np.ndarray           # (S,)    [s]
+    speed: np.ndarray       # (S,)    of the first body's centre, relative to its first [1]
+    kinetic: np.ndarray     # (S,)    [J], affine motion included
+    elastic: np.ndarray     # (S,)    [J]
+    momentum: np.ndarray    # (S, d)  of all bodies [kg m/s]
+    particles: int
+
+    @property
+    def total(self):
+        """Kinetic and elastic energy (S,) [J]."""
+        return self.kinetic + self.elastic
+
+
+def course(scene):
+    """Run a scene of bodies in free flight and measure after each step."""
+    problem, rows = build(with_(scene, every=1, interval=None)), []
+    with one_thread():
+        for frame in simulate(problem):
+            bodies = frame.state.bodies
+            E = energy(bodies, problem.gravity, problem.inertia)
+            v = np.linalg.norm(mean(bodies[0], "v"))
+            rows.append((frame.t, v, E.kinetic, E.elastic, momentum(bodies)))
+    t, v, kinetic, elastic, p = map(np.array, zip(*rows, strict=True))
+    count = sum(len(body.particles.x) for body in problem.bodies)
+    return Course(t, v / v[0], kinetic, elastic, p, count)
+
+
+def thinned(transfer, c, rows):
+    """At most so many rows (transfer, t, kinetic, elastic) of a course, energies relative."""
+    chosen = np.unique(np.linspace(0, len(c.t) - 1, rows).round().astype(int))
+    return [(transfer, c.t[k], c.kinetic[k] / c.total[0], c.elastic[k] / c.total[0])
+            for k in chosen]
