@@ -11,7 +11,8 @@ from .results import SCALARS
 
 AXES = "xyz"
 POINT = 72.0      # points per inch, in which marker sizes are given
-WIDTH = 6.0       # of the figure [inch]
+WIDTH = 4.6       # of the axes [inch]
+ROOM = 1.9, 0.8   # for the colour bar and for labels and title [inch]
 
 
 def view_of(results):
@@ -25,19 +26,8 @@ def draw(results, frame=-1, field="speed", view=None):
     """Matplotlib `Figure` of the particles of one frame; `field` is one of `results.SCALARS`,
     view the (horizontal, vertical) axes. Raises `BadResults`.
     """
-    from matplotlib.figure import Figure
-
-    frame = results.index(frame)
-    view = view or view_of(results)
-    box = _box(results, [frame], view)
-    figure = Figure(figsize=_size(box), dpi=150, layout="constrained")
-    axes = figure.add_subplot()
-    values = _values(results, frame, field)
-    points = _scatter(axes, results, frame, values, (box, view))
-    unit = SCALARS[field][0]
-    figure.colorbar(points, ax=axes, label=f"{field} [{unit}]" if unit != "1" else field)
-    axes.set_title(_title(results, frame), fontsize=9)
-    return figure
+    frame, view = results.index(frame), view or view_of(results)
+    return _drawing(results, frame, field, view, _box(results, [frame], view))
 
 
 def save_plot(results, out, **what):
@@ -53,17 +43,13 @@ def animate(results, out, field="speed", view=None, fps=20):
 
     view, frames = view or view_of(results), range(len(results))
     box = _box(results, frames, view)
-    scale = _range(_values(results, k, field) for k in frames)
-    figure = draw(results, 0, field, view)
-    figure.set_size_inches(_size(box))
+    figure = _drawing(results, results.index(0), field, view, box)
     axes, points = figure.axes[0], figure.axes[0].collections[0]
-    points.set_clim(*scale)
-    axes.set(xlim=box[0], ylim=box[1])
+    points.set_clim(*_range(_values(results, k, field) for k in frames))
 
     def show(k):
-        order = _order(results, k, view)
-        points.set_offsets(_positions(results, k)[order][:, view])
-        points.set_array(_values(results, k, field)[order])
+        x, values, sizes = _dots(results, k, field, view, box)
+        points.set(offsets=x, array=values, sizes=sizes)
         axes.set_title(_title(results, k), fontsize=9)
         return [points]
 
@@ -106,16 +92,31 @@ def _box(results, frames, view):
 
 def _size(box):
     (left, right), (low, high) = box
-    return WIDTH, float(np.clip(WIDTH * (high - low) / (right - left), 2.0, 10.0)) + 0.5
+    height = np.clip(WIDTH * (high - low) / (right - left), 1.5, 10.0)
+    return WIDTH + ROOM[0], float(height) + ROOM[1]
 
 
-def _scatter(axes, results, frame, values, frame_of):
-    """Particles as dots about half a cell wide."""
-    (horizontal, vertical), view = frame_of
-    order = _order(results, frame, view)
-    x = _positions(results, frame)[order][:, view]
-    inches = WIDTH * 0.8 / (horizontal[1] - horizontal[0])
-    size = np.clip((0.5 * results.dx * inches * POINT) ** 2, 0.2, 200.0)
-    axes.set(xlim=horizontal, ylim=vertical, aspect="equal",
+def _drawing(results, frame, field, view, box):
+    """The figure of a frame, with its axes from end to end of a box."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=_size(box), dpi=150, layout="constrained")
+    axes = figure.add_subplot()
+    axes.set(xlim=box[0], ylim=box[1], aspect="equal",
              xlabel=f"{AXES[view[0]]} [m]", ylabel=f"{AXES[view[1]]} [m]")
-    return axes.scatter(*x.T, c=values[order], s=size, linewidths=0, cmap="viridis")
+    axes.set_title(_title(results, frame), fontsize=9)
+    x, values, sizes = _dots(results, frame, field, view, box)
+    points = axes.scatter(*x.T, c=values, s=sizes, linewidths=0, cmap="viridis")
+    unit = SCALARS[field][0]
+    figure.colorbar(points, ax=axes, label=f"{field} [{unit}]" if unit != "1" else field)
+    return figure
+
+
+def _dots(results, frame, field, view, box):
+    """Places, values and sizes of the particles from far to near; as wide as they lie apart."""
+    order = _order(results, frame, view)
+    volume = np.concatenate([results.field(body, "V0") for body in results.bodies])
+    inches = WIDTH / (box[0][1] - box[0][0])
+    sizes = (volume ** (1.0 / results.dim) * inches * POINT) ** 2
+    x, values = _positions(results, frame)[:, view], _values(results, frame, field)
+    return x[order], values[order], sizes[order]

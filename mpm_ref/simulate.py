@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .explicit import Stepper
-from .monitor import CHECK, Account, account, check
+from .monitor import CHECK, Account, account, check, runs_away
 from .timestep import refuse, stable_dt
 
 SORT = 64        # steps between physical sorts of the particles by cell
@@ -52,6 +52,7 @@ def simulate(problem, state=None, on_step=None):
     if state is None:
         state = State(problem.bodies)
         stepper.start(state.bodies)
+        check(problem, state, 0.0)
         state.account = account(problem, state.bodies)
     if state.frame == 0:
         yield show(state, 0.0)
@@ -82,7 +83,8 @@ def advance(problem, stepper, state):
         keep_inside(state.bodies, *problem.clip)
     state.step += 1
     state.t = state.step * dt if problem.clock.dt else state.t + dt
-    if state.step % CHECK == 0 or ended(problem.clock, state):
+    due = state.step % CHECK == 0 or ended(problem.clock, state)
+    if due or runs_away(problem, state, dt):
         check(problem, state, dt)
     return dt
 

@@ -6,15 +6,15 @@
   current stretches;
 * viscous: none of the shipped laws has an explicit viscosity (Bingham flow is integrated
   implicitly), so it is infinite;
-* single particle: a particle's own oscillation through the nodes it reaches must not grow
-  [BaiSchroeder2022]. With K its modulus against uniform dilation (2 mu + d lam at rest) and the
-  node masses m_i of the whole state,
+* single particle: the oscillation of a particle through nodes that it has to itself must not grow
+  [BaiSchroeder2022]. With K its largest modulus, 2 mu + d lam at rest, 1/D of `inverse_inertia`,
 
-      S_p = sum_i |dw_ip|^2 m_p/m_i / d,    R_p = sum_i |D^-1 w_ip r_ip|^2 m_p/m_i / d,
+      S_p = max_a sum_i (dw_ip/dx_a)^2/w_ip,
 
-  linear stability of the one-particle recurrence gives dt^2 V0 K/m times S, 2 S - R and R at most
-  2, 4 and 4 for PIC and FLIP, APIC and MLS-MPM; derived in docs/timestep.md. It is the exact
-  limit for an isolated particle.
+  dt^2 V0 K/m times S, 2 S - 1/D and 1/D is at most 2, 4 and 4 for PIC and FLIP, APIC and MLS-MPM.
+  It is the limit of an isolated particle, and no cloud of particles has a smaller one: derived in
+  docs/timestep.md. Linear splines have no such limit (S is infinite at a node); for them m_p/m_i
+  with the nodes' masses stands for 1/w_ip, and the bound is necessary, not sufficient.
 """
 
 from math import inf, sqrt
@@ -26,7 +26,6 @@ from .core.jit import CHUNKS, chunk, kernel, parallel, prange
 from .core.law import kirchhoff_hat, pressure
 from .core.spectral import svd
 from .core.stencil import (
-    arm,
     column,
     columns,
     gradient,
@@ -37,7 +36,7 @@ from .core.stencil import (
     slopes_per_axis,
     weights_per_axis,
 )
-from .core.tensor import dot, mat, mv, total_of, vec
+from .core.tensor import dot, fill, lin, mat, mul, mv, total_of, vec
 from .explicit import scatter
 from .materials.principal import dpk1_hat
 from .materials.waves import wave_modulus
@@ -75,78 +74,114 @@ def dilation_modulus(s, law):
 
 
 @kernel
-def _solid_moduli(F, law, wave, dilation, like, bounds):
-    for p in range(bounds[0], bounds[1]):
-        _, s, _, _ = svd(mat(F, p, like))
-        wave[p] = wave_modulus(s, law)
-        dilation[p] = dilation_modulus(s, law)
+def largest_modulus(s, law):
+    """K [Pa] of the single-particle bound: no velocity gradient meets more stiffness.
+
+    In principal axes the tangent falls into the matrix s_i s_j A_ij, here bounded by its rows, and
+    the pairs of `wave_modulus`. At rest it is 2 mu + d lam, that of uniform dilation.
+    """
+    A = dpk1_hat(s, law)
+    K = max(wave_modulus(s, law), dilation_modulus(s, law))
+    for i in range(len(s)):
+        row = 0.0
+        for j in range(len(s)):
+            row += abs(s[i] * s[j] * A[i][j])
+        K = max(K, row)
+    return K
 
 
 @kernel
-def _fluid_moduli(J, law, wave, dilation, dim, bounds):
+def _solid_moduli(F, law, wave, largest, like, bounds):
+    for p in range(bounds[0], bounds[1]):
+        _, s, _, _ = svd(mat(F, p, like))
+        wave[p] = wave_modulus(s, law)
+        largest[p] = largest_modulus(s, law)
+
+
+@kernel
+def _fluid_moduli(J, law, wave, largest, dim, bounds):
     for p in range(bounds[0], bounds[1]):
         more, less = pressure(J[p] * (1.0 + STRAIN), law), pressure(J[p] * (1.0 - STRAIN), law)
         slope = (more - less) / (2.0 * STRAIN)
         wave[p] = max(slope - pressure(J[p], law), 0.0)
-        dilation[p] = dim * slope
+        largest[p] = dim * slope
 
 
 @parallel
-def _all_solid_moduli(F, law, wave, dilation, like):
+def _all_solid_moduli(F, law, wave, largest, like):
     for c in prange(CHUNKS):
-        _solid_moduli(F, law, wave, dilation, like, chunk(c, len(wave)))
+        _solid_moduli(F, law, wave, largest, like, chunk(c, len(wave)))
 
 
 @parallel
-def _all_fluid_moduli(J, law, wave, dilation, dim):
+def _all_fluid_moduli(J, law, wave, largest, dim):
     for c in prange(CHUNKS):
-        _fluid_moduli(J, law, wave, dilation, dim, chunk(c, len(wave)))
+        _fluid_moduli(J, law, wave, largest, dim, chunk(c, len(wave)))
 
 
 def moduli(body):
-    """Wave and dilation modulus of every particle of a body, two arrays (N,) [Pa]."""
+    """Modulus of the fastest wave and `largest_modulus` of a body's particles, two (N,) [Pa]."""
     q = body.particles
     dim = q.x.shape[1]
-    wave, dilation = np.empty(len(q.x)), np.empty(len(q.x))
+    wave, largest = np.empty(len(q.x)), np.empty(len(q.x))
     if q.F.ndim == 1:
-        _all_fluid_moduli(q.F, body.law, wave, dilation, dim)
+        _all_fluid_moduli(q.F, body.law, wave, largest, dim)
     else:
-        _all_solid_moduli(q.F, body.law, wave, dilation, tuple(range(dim)))
-    return wave, dilation
+        _all_solid_moduli(q.F, body.law, wave, largest, tuple(range(dim)))
+    return wave, largest
 
 
 @kernel
-def _coupling(particles, grid, stencil, S, R, bounds):
-    """S_p and R_p of the module's text."""
+def _coupling(particles, grid, stencil, S, bounds):
+    """S_p of the module's text [1/m^2]."""
     d = grid.m.shape
     for p in range(bounds[0], bounds[1]):
         base, s = locate(vec(particles.x, p, d), grid, stencil)
         w, dw = weights_per_axis(s, stencil), slopes_per_axis(s, stencil)
-        S[p] = 0.0
-        R[p] = 0.0
+        sums = fill(0.0, d)
         for c in range(columns(s, stencil)):
             k = column(c, stencil, d)
             for l in range(len(stencil)):
                 w_ip = product(k, l, w)
                 if w_ip > 0.0:
-                    share = particles.m[p] / (len(d) * grid.m[node(base, k, l)])
+                    own = share(w_ip, particles.m[p], grid.m[node(base, k, l)], stencil)
                     dw_ip = gradient(k, l, w, dw, grid.dx)
-                    r = arm(k, l, s, grid.dx)
-                    S[p] += share * dot(dw_ip, dw_ip)
-                    R[p] += share * dot(r, r) * (w_ip * inverse_inertia(grid.dx, stencil)) ** 2
+                    sums = lin(1.0, sums, own, mul(dw_ip, dw_ip))
+        S[p] = largest_of(sums)
+
+
+@kernel
+def share(w_ip, m_p, m_i, stencil):
+    """1/w_ip; for linear splines m_p/m_i."""
+    if len(stencil) == 2:
+        return m_p / m_i
+    else:
+        return 1.0 / w_ip
+
+
+@kernel
+def largest_of(a):
+    """The largest entry of a vector."""
+    most = a[0]
+    for a_i in a:
+        most = max(most, a_i)
+    return most
 
 
 @parallel
-def _couplings(particles, grid, stencil, S, R):
+def _couplings(particles, grid, stencil, S):
     for c in prange(CHUNKS):
-        _coupling(particles, grid, stencil, S, R, chunk(c, len(S)))
+        _coupling(particles, grid, stencil, S, chunk(c, len(S)))
 
 
 def single_particle_limit(particles, grid, scheme, stiffness):
     """Smallest dt limit of any particle's own oscillation [s]; stiffness (N,) is V0_p K_p / m_p."""
-    S, R = np.empty(len(particles.x)), np.empty(len(particles.x))
-    _couplings(particles, grid, scheme.stencil, S, R)
-    load, most = {"mls": (R, 4.0), "apic": (2.0 * S - R, 4.0)}.get(scheme.transfer, (S, 2.0))
+    own = inverse_inertia(grid.dx, scheme.stencil)
+    if scheme.transfer == "mls":
+        return sqrt(4.0 / max(float(np.max(stiffness * own)), 1e-300))
+    S = np.empty(len(particles.x))
+    _couplings(particles, grid, scheme.stencil, S)
+    load, most = (2.0 * S - own, 4.0) if scheme.transfer == "apic" else (S, 2.0)
     return sqrt(most / max(float(np.max(stiffness * load)), 1e-300))
 
 
@@ -160,7 +195,7 @@ def stable_dt(bodies, stepper):
 
 def _body_dt(body, grid, scheme, dx):
     q = body.particles
-    wave, dilation = moduli(body)
+    wave, largest = moduli(body)
     reach = 0.5 * (scheme.degree + 1) * dx
     spread = reach * np.sqrt(np.einsum("pab,pab->p", q.L, q.L))
     fastest = np.max(np.linalg.norm(q.v, axis=1) + spread)
@@ -169,7 +204,7 @@ def _body_dt(body, grid, scheme, dx):
         dx / float(fastest) if fastest > 0.0 else inf,
         dx / c if c > 0.0 else inf,
         inf,
-        single_particle_limit(q, grid, scheme, np.maximum(dilation, 0.0) * q.V0 / q.m),
+        single_particle_limit(q, grid, scheme, np.maximum(largest, 0.0) * q.V0 / q.m),
     )
 
 

@@ -21,9 +21,9 @@ DX, DT = 0.05, 1e-3
 JELLY, METAL = FixedCorotated(4e4, 6e4), Hencky(4e4, 6e4)
 
 
-def ball(name, center, law, flow, *, transfer="mls", radius=2.4, per_cell=2):
+def ball(name, center, law, flow, *, transfer="mls", radius=2.4):
     """A disk or ball of `radius` cells on a lattice."""
-    d, h = len(center), DX / per_cell
+    d, h = len(center), DX / 2
     k = np.arange(-10, 11) * h
     x = np.stack(np.meshgrid(*d * [k], indexing="ij"), axis=-1).reshape(-1, d)
     x = x[(x**2).sum(axis=1) < (radius * DX) ** 2] + center

@@ -82,6 +82,13 @@ def test_defaults(tmp_path, d, state):
     assert (moving.v == 1.0).all()
 
 
+def test_rotation_is_about_the_centre_of_mass(tmp_path, state):
+    arrays = {"x": state["x"][:, :2], "m": state["m"], "V0": state["V0"]}
+    made = particles(npz(tmp_path, arrays), 2, body="velocity = { angular = 2.0 }")
+    assert np.abs(made.m @ made.v).max() < 1e-13
+    assert np.allclose(made.v[1] - made.v[0], 2.0 * (made.x[1] - made.x[0])[::-1] * (-1.0, 1.0))
+
+
 def test_single_precision_and_whole_numbers_become_doubles(tmp_path):
     arrays = {"x": np.ones((N, 2), dtype=np.float32), "m": np.ones(N, dtype=np.int32),
               "V0": np.ones(N, dtype=">f8")}

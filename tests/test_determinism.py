@@ -72,5 +72,5 @@ def test_every_threading_layer_gives_the_same_bits(here, layer):
 
 @pytest.mark.parametrize("n", [0, 10**6])
 def test_impossible_numbers_of_threads_are_refused(n):
-    with pytest.raises(ValueError, match="expected 1 .."):
+    with pytest.raises(ValueError, match=r"expected 1 \.\."):
         set_threads(n)

@@ -202,9 +202,11 @@ def test_replacing_keeps_the_old_file_until_the_new_one_is_whole(tmp_path):
     with pytest.raises(ZeroDivisionError):
         half_write()
     assert [file.read_text() for file in tmp_path.iterdir()] == ["old"]
-    with replacing(path) as part:
-        part.write_text("new")
-        assert path.read_text() == "old"
+    with open(path) as reader:
+        with replacing(path) as part:
+            part.write_text("new")
+            assert path.read_text() == "old"
+        assert reader.read() == "old"           # a new file, not new content of the old one
     assert [file.read_text() for file in tmp_path.iterdir()] == ["new"]
 
 

@@ -215,6 +215,19 @@ def test_results_are_not_overwritten_by_accident(tmp_path):
         assert results.step.tolist() == [0, 20, 40, 60, 80, 100]
 
 
+def test_an_overwritten_run_leaves_no_checkpoint(tmp_path):
+    class Dies(Watch):
+        def begin(self, problem, state):
+            raise ZeroDivisionError
+
+    out = tmp_path / "run.h5"
+    run(colliding(FIXED), out)
+    with pytest.raises(ZeroDivisionError):
+        run(colliding(FIXED), out, Options(overwrite=True), Dies())
+    assert not checkpoint_of(out).exists()
+    assert run(colliding(FIXED), out, RESUME).state.step == 100
+
+
 def test_files_of_different_runs_do_not_go_on(tmp_path):
     out = tmp_path / "run.h5"
     run(colliding(FIXED), out, Options(steps=10))

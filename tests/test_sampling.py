@@ -83,7 +83,8 @@ def test_lattice_without_faces_stands_half_a_step_inside():
 def test_lattice_by_spacing_is_centred():
     x, _ = sample(Lattice(spacing=0.3), SQUARE, 1.0, 0)
     assert np.allclose(np.unique(x[:, 0]), [0.2, 0.5, 0.8])
-    assert len(sample(Lattice(spacing=0.1), SQUARE, 1.0, 0).x) == 100   # 1/0.1 must not lose a row
+    small = solid(shapes.Box(lower=(0.0, 0.0), upper=(0.6, 0.6)))
+    assert len(sample(Lattice(spacing=0.2), small, 1.0, 0).x) == 9    # though 0.6/0.2 < 3
 
 
 def test_jittered_points_keep_to_their_sub_cells(rng):

@@ -1,3 +1,4 @@
+import json
 import re
 from inspect import signature
 from pathlib import Path
@@ -36,6 +37,8 @@ def test_hash_does_not_depend_on_how_it_is_written():
     assert digest(same) == digest(loads(TINY))
     assert canonical(same) == canonical(loads(TINY))
     assert re.fullmatch("[0-9a-f]{64}", digest(same))
+    keys = list(json.loads(canonical(same)))
+    assert keys == sorted(keys)
 
 
 @pytest.mark.parametrize("change", [("seed", 1), ("dx", 0.1 + 1e-15), ("title", "other"),

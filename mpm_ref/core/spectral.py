@@ -65,7 +65,7 @@ def polar(F):
 
 @kernel
 def rotation(F):
-    """R of `polar` to round-off; four times as fast where F is far from singular and inverted."""
+    """R of `polar` to round-off; three times as fast where F is far from singular and inverted."""
     if is_moderate(F):
         R, ok = _fast_rotation(F)
         if ok:

@@ -96,6 +96,7 @@ def write(path, steps):
     not checked. Raises ValueError for a key that no golden file has.
     """
     with replacing(path) as part, h5py.File(part, "w", libver=("v110", "v110")) as f:
+        f.create_group("steps")
         for k, arrays in enumerate(steps):
             for name, a in listed(arrays or {}).items():
                 refuse_key(name)

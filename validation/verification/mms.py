@@ -25,7 +25,7 @@ E, NU, RHO0, A = 1e7, 0.3, 1000.0, 0.05
 LAW = LogNeoHookean(*lame(E, NU))
 C = sqrt(E / RHO0)                              # of the motion [m/s]
 SOUND = sqrt(stiffness(LAW) / RHO0)             # speed of compression waves at rest [m/s]
-CFL = 0.8           # of SOUND; the error of time is below that of space from 0.8 down (see trade)
+CFL = 0.4           # of SOUND; half of it changes no error by more than 10 % (measured)
 CELLS = (16, 32, 64)
 
 # What must be of second order, and what must not [Steffen2008]: (transfer, degree, per direction).
