@@ -20,8 +20,9 @@ def export_particles(results, out):
     """Write the particles of all frames of `Results` to `out`.
 
     Point data: v [m/s], J, tau_norm [Pa], as far as they follow from what is stored, and the
-    body's number. Raises `NotWritten`.
+    body's number. Raises `NotWritten`, and `BadResults` without a frame.
     """
+    results.index(0)            # there must be a frame
     names = [name for name, (scalar, _) in VALUES.items() if results.offers(scalar)]
     count, frames = sum(map(results.count, results.bodies)), len(results)
     require_space(out, 4 * count * (frames * (3 + sum(VALUES[name][1] for name in names)) + 5))

@@ -18,8 +18,9 @@ from .vtkhdf import root_of, three
 def export_grid(results, out):
     """Write nodal density [kg/m^d] and velocity [m/s] of all frames of `Results` to `out`.
 
-    Raises `NotWritten`, and `BadResults` if v is not stored.
+    Raises `NotWritten`, and `BadResults` without a frame or if v is not stored.
     """
+    results.index(0)            # there must be a frame
     scheme = Scheme(degree=results.degree, transfer="pic")
     first, shape = _box(results, scheme)
     require_space(out, 16 * len(results) * int(np.prod(shape)))

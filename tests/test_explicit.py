@@ -43,7 +43,10 @@ SCHEMES = {
 
 @pytest.mark.parametrize("name", SCHEMES)
 def test_steps_equal_the_twin(name):
-    """Elastic and hardening bodies, floor with friction and an oblique slip wall, ten steps."""
+    """Elastic and hardening bodies, floor with friction and an oblique slip wall, ten steps.
+
+    The stages in the order of NCLAW-alg1, by explicit Euler (NCLAW-eq11, LDM-sec2.2-Frate).
+    """
     off, touched = against_twin(two_disks(SCHEMES[name]))
     assert touched > 10 * STEPS
     assert off < 2e-13

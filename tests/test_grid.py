@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from mpm_ref.core import grid as grids
 from mpm_ref.core.grid import OutOfRange, Store, extent, update
-from mpm_ref.core.order import WIDTH
+from mpm_ref.core.order import slab_width
 from mpm_ref.core.spline import STENCILS
 from mpm_ref.plain.spline import pairs
 from mpm_ref.plain.transfer import grid_velocity
@@ -48,9 +48,9 @@ def test_grid_is_the_smallest_aligned_box(at, degree, edge):
         x = DX * np.round(x / DX)
     grid = Store(DX, STENCILS[degree], 2).cover([x])
     node = pairs(x, DX, degree).node - grid.origin
-    assert grid.origin[0] % WIDTH == 0
+    assert grid.origin[0] % slab_width(STENCILS[degree]) == 0
     assert node.min() >= 0
-    assert node[..., 0].min() < WIDTH
+    assert node[..., 0].min() < slab_width(STENCILS[degree])
     assert node[..., 1].min() == 0
     assert np.array_equal(node.max(axis=(0, 1)) + 1, grid.m.shape)
 

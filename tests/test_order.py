@@ -3,7 +3,7 @@ import pytest
 from clouds import DX, Case, cloud
 
 from mpm_ref.core.grid import Store
-from mpm_ref.core.order import WIDTH, by_cell, slabs_of
+from mpm_ref.core.order import by_cell, slab_width, slabs_of
 from mpm_ref.plain.spline import pairs
 
 CASES = (Case("pic", 1, 2), Case("mls", 2, 3))
@@ -19,20 +19,20 @@ def sorted_(request, rng):
 
 
 def test_slabs_hold_every_particle_once(sorted_):
-    _, x, grid, _, slabs = sorted_
+    case, x, grid, _, slabs = sorted_
     assert np.array_equal(np.sort(slabs.order), np.arange(len(x)))
     assert slabs.start[0] == 0
     assert slabs.start[-1] == len(x)
-    assert len(slabs.start) == -(-grid.m.shape[0] // WIDTH) + 1
+    assert len(slabs.start) == -(-grid.m.shape[0] // slab_width(case.stencil)) + 1
     assert np.diff(slabs.start).min() >= 0
 
 
 def test_particles_are_in_the_slab_of_their_base_node_and_in_order(sorted_):
-    _, _, _, node, slabs = sorted_
+    case, _, _, node, slabs = sorted_
     base = node[:, 0, 0]
     for a in range(len(slabs.start) - 1):
         members = slabs.order[slabs.start[a] : slabs.start[a + 1]]
-        assert (base[members] // WIDTH == a).all()
+        assert (base[members] // slab_width(case.stencil) == a).all()
         assert (np.diff(members) > 0).all()
 
 

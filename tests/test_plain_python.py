@@ -114,7 +114,7 @@ def once(case, lost=0):
         first, last = (slice(1, None),) * case.d, tuple(k - lost for k in grid.m.shape)
         cut = tuple(slice(0, k) for k in last)
         grid = grid._replace(m=grid.m[cut].copy(), v=grid.v[cut].copy())
-    count = np.zeros(-(-grid.m.shape[0] // order.WIDTH), dtype=np.int64)
+    count = np.zeros(-(-grid.m.shape[0] // order.slab_width(case.stencil)), dtype=np.int64)
     order._count(q.x, grid, case.stencil, count, n)
     at, where = np.cumsum(count) - count, np.empty(50, dtype=np.int64)
     order._place(q.x, grid, case.stencil, at, where, n)

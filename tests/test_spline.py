@@ -30,6 +30,7 @@ def near_faces(draw):
 
 @pytest.mark.parametrize("degree", DEGREES)
 def test_equal_the_recursion(degree, rng):
+    """The basis of LDM-sec2.2-spaces; its degree is not printed."""
     for x in rng.uniform(-7.0, 7.0, 50):
         base, w, dw = around(x, 1.0, degree)
         u = x - (base + np.arange(degree + 1)) + (degree + 1) / 2

@@ -41,6 +41,7 @@ def close(a, b, tol=ROUND_OFF):
 
 
 def test_scatter_equals_its_twin(trip):
+    """NSF-alg-mpm with NSF-eq6 (apic), LDM-alg1 and NCLAW-alg3 (pic), NCLAW-mls (mls)."""
     nodes, before = trip.nodes, trip.before
     assert close(before.m, over(trip.grid, nodes.m, nodes.box))
     if trip.case.transfer == "flip":
@@ -68,6 +69,7 @@ def body(q):
 
 
 def test_scatter_conserves_mass_and_momentum(trip):
+    """The lumped masses add up (LDM-eq8, LDM-eq10)."""
     q, before = trip.before.q, trip.before
     assert before.m.sum() == pytest.approx(q.m.sum(), rel=1e-14)
     mv = before.mv.reshape(-1, trip.case.d).sum(axis=0)
@@ -78,6 +80,7 @@ def test_scatter_conserves_mass_and_momentum(trip):
 
 
 def test_internal_forces_add_up_to_nothing(trip):
+    """Since the dw_ip do (NCLAW-eq10)."""
     if trip.case.transfer == "flip":
         f = trip.before.f
         assert abs(f.reshape(-1, trip.case.d).sum(axis=0)).max() <= 1e-13 * abs(f).sum()

@@ -113,3 +113,10 @@ def test_frames_share_the_cells(tmp_path, results, d):
         assert len(root["Vertices/Connectivity"]) == len(root["Points"]) // 3
         assert root["Steps/PointOffsets"][()].tolist() == [n * (4**d + 2**d) for n in range(3)]
         assert not root["Steps/CellOffsets"][()].any()
+
+
+@pytest.mark.parametrize("export", [export_particles, export_grid])
+def test_results_without_a_frame_are_told(tmp_path, export):
+    with results_of(tmp_path / "run.h5", colliding(), frames=0) as results:
+        with pytest.raises(BadResults, match="there is no frame 0; it has 0"):
+            export(results, tmp_path / "run.vtkhdf")

@@ -11,14 +11,14 @@ stay in the range of floats.
 
 from math import copysign, sqrt
 
-from .jit import kernel
+from .jit import leaf
 from .tensor import cross, det, inner, lin, norm
 
 NEGLIGIBLE = 1e-40      # of one square against another: far below round-off
 NO_LENGTH = 1e-200      # a square too small for its root to have a direction; negligible as well
 
 
-@kernel
+@leaf
 def separated(A):
     """Unit eigenvector of the eigenvalue farthest from the middle one, of a symmetric A (3 x 3).
 
@@ -38,7 +38,7 @@ def separated(A):
     return null_vector(plus_diagonal(B, -largest_root(min(abs(d), 2.0)))), largest
 
 
-@kernel
+@leaf
 def plus_diagonal(A, c):
     """A + c I, 3 x 3."""
     return (
@@ -48,7 +48,7 @@ def plus_diagonal(A, c):
     )
 
 
-@kernel
+@leaf
 def largest_root(d):
     """Largest root of b^3 - 3 b = d for 0 <= d <= 2, which is 2 cos(acos(d/2)/3).
 
@@ -59,7 +59,7 @@ def largest_root(d):
     return b - f * df / (df * df - 3.0 * b * f)
 
 
-@kernel
+@leaf
 def null_vector(M):
     """Unit x with M x = 0, M symmetric of rank 2: the largest column of its cofactors c x x^T."""
     x, y, z = cross(M[1], M[2]), cross(M[2], M[0]), cross(M[0], M[1])
@@ -71,13 +71,13 @@ def null_vector(M):
     return unit(x)
 
 
-@kernel
+@leaf
 def times(a, x):
     """a x of a vector of three."""
     return a * x[0], a * x[1], a * x[2]
 
 
-@kernel
+@leaf
 def unit(x):
     """x/|x| of a vector of three; the last axis if x = 0."""
     n = norm(x)
@@ -87,7 +87,7 @@ def unit(x):
         return 0.0, 0.0, 1.0
 
 
-@kernel
+@leaf
 def complement(n):
     """Vectors a, b that make (a, b, n) orthonormal and right-handed, |n| = 1 (Duff et al. 2017)."""
     sign = copysign(1.0, n[2])
@@ -98,14 +98,14 @@ def complement(n):
     return a, b
 
 
-@kernel
+@leaf
 def turned(a, cs):
     """Two vectors turned in their plane by the angle of cosine and sine cs."""
     c, s = cs
     return lin(c, a[0], s, a[1]), lin(-s, a[0], c, a[1])
 
 
-@kernel
+@leaf
 def direction(x, y):
     """(cosine, sine) of the direction of (x, y), and its length; the first axis if it has none."""
     r2 = x * x + y * y
@@ -116,7 +116,7 @@ def direction(x, y):
         return (1.0, 0.0), 0.0
 
 
-@kernel
+@leaf
 def half(c, s):
     """Cosine and sine of half the angle of cosine c and sine s; the cosine is not negative."""
     long = sqrt(0.5 + 0.5 * abs(c))
@@ -127,7 +127,7 @@ def half(c, s):
         return short, copysign(long, s)
 
 
-@kernel
+@leaf
 def svd2(M):
     """M = U diag(s) V^T, 2 x 2: angle of U as (cosine, sine), s[0] >= |s[1]|, angle of V.
 
@@ -141,7 +141,7 @@ def svd2(M):
     return u, (q + r, q - r), v
 
 
-@kernel
+@leaf
 def eigh2(a, b, c):
     """Eigenvalues of ((a, b), (b, c)), ascending, and the second's eigenvector."""
     beta, r = direction(0.5 * (a - c), b)

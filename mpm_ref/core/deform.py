@@ -35,8 +35,9 @@ def deform_elastic(particles, law, dt, like, bounds):
     """F <- (I + dt L) F, tau = kirchhoff(F)."""
     for p in range(bounds[0], bounds[1]):
         F = mm(growth(particles.L, p, dt, like), mat(particles.F, p, like))
+        tau = kirchhoff(F, law)
         put_mat(particles.F, p, F)
-        put_mat(particles.tau, p, kirchhoff(F, law))
+        put_mat(particles.tau, p, tau)
 
 
 @kernel
@@ -48,8 +49,10 @@ def deform_plastic(particles, law, flow, dt, like, bounds):
         s, y = project(s, recall(particles.y, p), dt, law, flow)
         tau = kirchhoff_hat(s, law)
         remember(particles.y, p, y)
-        put_mat(particles.F, p, mmt(scale_columns(U, s), V))
-        put_mat(particles.tau, p, mmt(scale_columns(U, lin(intact(y, flow), tau, 0.0, tau)), U))
+        tau = lin(intact(y, flow), tau, 0.0, tau)
+        F, tau = mmt(scale_columns(U, s), V), mmt(scale_columns(U, tau), U)
+        put_mat(particles.F, p, F)
+        put_mat(particles.tau, p, tau)
 
 
 @kernel

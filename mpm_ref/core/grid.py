@@ -7,7 +7,7 @@ box is a boundary condition (see `boundary`), not an array bound.
 import numpy as np
 
 from .jit import CHUNKS, chunk, kernel, parallel, prange
-from .order import WIDTH
+from .order import slab_width
 from .spline import base_of
 from .state import NONE, Grid
 
@@ -63,7 +63,7 @@ class Store:
         """
         low, high = self._box(clouds)
         first = self._base(low)
-        first[0] -= first[0] % WIDTH          # slabs begin at the same nodes wherever the matter is
+        first[0] -= first[0] % slab_width(self.stencil)   # slabs begin at fixed nodes of the world
         shape = tuple(int(k) for k in self._base(high) + len(self.stencil) - first)
         size = int(np.prod(np.array(shape, dtype=float)))
         vectors = 3 if self.flip else 1

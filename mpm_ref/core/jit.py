@@ -85,9 +85,15 @@ def _our_cache():
 
 
 def kernel(function):
-    """Compile a leaf (a formula) or a serial traversal (one loop calling leaves)."""
+    """Compile a formula, or a serial traversal (one loop calling formulas)."""
     with _our_cache():
         return njit(**_OPTIONS)(function)
+
+
+def leaf(function):
+    """Compile a formula that is worth inlining although it is long, as LLVM would not by itself."""
+    with _our_cache():
+        return njit(forceinline=True, **_OPTIONS)(function)
 
 
 def parallel(function):

@@ -1,9 +1,9 @@
 """Order of particles for a scatter that is parallel and yet gives the same bits for any number of
 threads.
 
-The box of cells is cut along the first axis into slabs of `WIDTH` cells. A particle whose base
-cell is in a slab writes nodes of that slab and at most degree <= 3 beyond, so slabs of the same
-colour (every other one) share no node. Within a slab the particles keep their order. A physical
+The box of cells is cut along the first axis into slabs of as many cells as
+the degree (at least 2). A particle whose base cell is in a slab writes nodes of that slab and at
+most `degree` beyond, so slabs of the same colour (every other one) share no node. Within a slab the particles keep their order. A physical
 sort by cell, now and then, keeps memory access local.
 """
 
@@ -16,9 +16,6 @@ from .spline import base_of
 from .stencil import locate
 from .tensor import vec
 
-WIDTH = 4     # cells per slab: at least the largest degree, 3
-
-
 class Slabs(NamedTuple):
     """Particles by slab: those of slab a are order[start[a] : start[a + 1]]."""
 
@@ -27,8 +24,14 @@ class Slabs(NamedTuple):
 
 
 @kernel
+def slab_width(stencil):
+    """Cells per slab: the degree, at least 2."""
+    return max(len(stencil) - 1, 2)
+
+
+@kernel
 def _slab_of(x, p, grid, stencil):
-    return (base_of(x[p, 0], grid.dx, stencil) - grid.origin[0]) // WIDTH
+    return (base_of(x[p, 0], grid.dx, stencil) - grid.origin[0]) // slab_width(stencil)
 
 
 @kernel
@@ -59,7 +62,7 @@ def _place_all(x, grid, stencil, at, order):
 
 def slabs_of(x, grid, stencil):
     """Stable counting sort of the particles at x (N, d) by slab. All must lie inside the grid."""
-    n_slabs = -(-grid.m.shape[0] // WIDTH)
+    n_slabs = -(-grid.m.shape[0] // slab_width(stencil))
     count = np.zeros((CHUNKS, n_slabs), dtype=np.int64)
     _count_all(x, grid, stencil, count)
     ends = np.cumsum(count.T.ravel()).reshape(n_slabs, CHUNKS)     # by slab, then by chunk

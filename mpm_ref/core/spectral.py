@@ -18,7 +18,7 @@ from .deflation import (
     unit,
 )
 from .extremes import is_finite, is_moderate, moderate, not_a_number, rescaled
-from .jit import kernel
+from .jit import kernel, leaf
 from .tensor import (
     cofactor,
     cross,
@@ -136,7 +136,7 @@ def _spin(M, s, i, j):
     return (M[i][j] - M[j][i]) / total if total > UNDETERMINED * s[0] else 0.0
 
 
-@kernel
+@leaf
 def _svd(F):
     if len(F) == 2:
         u, s, v = svd2(F)
@@ -191,7 +191,7 @@ def _eigh(A):
         return (min(t, w[0]), w[0], w[1]), _columns(v, a)
 
 
-@kernel
+@leaf
 def _fast_rotation(F):
     """R and True, or anything and False if F is too close to singular or inverted.
 
@@ -212,7 +212,7 @@ def _fast_rotation(F):
         return mlin(1.0, G, -1.0 / z, mm(mmt(F, F), F)), True
 
 
-@kernel
+@leaf
 def _fast_stretch(F):
     """R F^T of `_fast_rotation`, from B = F F^T: V = ((tr B + t^2)/2 B + t J I - B B)/z."""
     B, J = mmt(F, F), det(F)
@@ -225,7 +225,7 @@ def _fast_stretch(F):
     return plus_diagonal(V, t * J / z), True
 
 
-@kernel
+@leaf
 def _sum_of_singular(n2, k2, J):
     """t = sum s_i of n2 = |F|^2, k2 = |cof F|^2, J = det F.
 

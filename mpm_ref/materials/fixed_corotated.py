@@ -12,7 +12,7 @@ through inversion; there, b_ij would be -inf and is bounded.
 from typing import NamedTuple
 
 from ..core.jit import kernel
-from ..core.spectral import rotation
+from ..core.spectral import rotation, stretch
 from ..core.tensor import fill, identity, inner, lin, mlin, mmt, mul
 from . import fluid, principal
 from .moduli import lame
@@ -55,8 +55,8 @@ def pk1(F, law):
 @kernel
 def kirchhoff(F, law):
     """Kirchhoff stress 2 mu (F - R) F^T + lam (J - 1) J I [Pa] (NSF-eq12, whose print lacks I)."""
-    D = mlin(1.0, F, -1.0, rotation(F))
-    return mlin(2.0 * law.mu, mmt(D, F), 1.0, fluid.kirchhoff(F, law))
+    D = mlin(1.0, mmt(F, F), -1.0, stretch(F))
+    return mlin(2.0 * law.mu, D, 1.0, fluid.kirchhoff(F, law))
 
 
 @kernel

@@ -32,7 +32,7 @@ class Pairs(NamedTuple):
 
 
 def pairs(x, dx, degree):
-    """Pairs of the particles at x (N, d) [m] with the nodes of a grid of spacing dx [m]."""
+    """Pairs of particles at x (N, d) [m] and nodes of a grid of spacing dx (LDM-sec2.2-spaces)."""
     d, half = x.shape[1], x.dtype.type(degree + 1) / 2
     base = np.floor(x / dx - (half - 1)).astype(int)
     node = base[:, None] + np.array(list(np.ndindex(*d * (degree + 1,))))

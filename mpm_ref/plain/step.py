@@ -157,7 +157,7 @@ def deform(q, L, dt):
 
 
 def grown(F, L, dt):
-    """F trial = (I + dt L) F (NSF-alg-mpm step 3); of a fluid its determinant det(I + dt L) J."""
+    """F trial = (I + dt L) F (LDM-sec2.2-Frate); of a fluid its determinant det(I + dt L) J."""
     growth = np.eye(L.shape[1], dtype=L.dtype) + dt * L
     return det(growth) * F if F.ndim == 1 else growth @ F
 

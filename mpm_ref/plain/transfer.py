@@ -28,7 +28,7 @@ def at(ip, box):
 
 
 def sum_to_nodes(q, ip, box):
-    """sum_p q_ip, for a quantity q (N, S, ..) of pairs."""
+    """sum_p q_ip of a quantity q (N, S, ..): particles are the quadrature points (LDM-eq8)."""
     total = np.zeros(box.shape + q.shape[2:], q.dtype)
     np.add.at(total, at(ip, box), q)
     return total
@@ -42,7 +42,7 @@ def moment(dx, degree):
 # particle to grid
 
 def mass(m, ip, box):
-    """m_i = sum_p w_ip m_p [kg]."""
+    """m_i = sum_p w_ip m_p [kg], the lumped mass (LDM-eq10)."""
     return sum_to_nodes(ip.w * m[:, None], ip, box)
 
 
@@ -53,7 +53,7 @@ def momentum(m, v, C, ip, box):
 
 
 def internal_force(V0, tau, ip, box):
-    """f_i = -sum_p V0_p tau_p dw_ip [N] (NSF-eq6)."""
+    """f_i = -sum_p V0_p tau_p dw_ip [N] (NSF-eq6, NCLAW-eq10)."""
     return sum_to_nodes(-np.einsum("p,pab,psb->psa", V0, tau, ip.dw), ip, box)
 
 
@@ -72,7 +72,8 @@ def body_force(m, b, ip, box):
 def grid_velocity(m, mv, f, gravity, dt, eps=0):
     """v_i = (m_i v_i + dt f_i)/(m_i + eps) + dt g where there is mass, else 0 (NSF-alg-mpm step 2).
 
-    gravity is an array (d,) [m/s^2]; eps [kg] is the regularisation in the release of NCLAW.
+    Explicit Euler (NCLAW-eq11). gravity is an array (d,) [m/s^2]; eps [kg] is the regularisation
+    in the release of NCLAW.
     """
     full = m > 0
     v = (mv + dt * f) / np.where(full, m + eps, 1)[..., None]

@@ -23,7 +23,7 @@ from mpm_ref.scene import (
 from mpm_ref.scene import Scheme as SceneScheme
 from mpm_ref.simulate import simulate
 
-from .scenes import mean, one_thread
+from .scenes import mean, threads_for
 
 G = 9.81                        # [m/s^2]
 LENGTH, HEIGHT = 0.4, 0.2       # of the block [m]
@@ -95,11 +95,10 @@ def scene(slope, E, dx):
                  gravity=tuple(-slope.press * slope.normal), scheme=SceneScheme(transfer="pic"))
 
 
-def settled(slope, E, dx, v0):
-    """Problem of a block that has come to rest under the weight into the plane, by PIC, which
+def released(problem, slope, v0):
+    """The problem once the block has come to rest under its weight into the plane, by PIC, which
     damps; then it has the speed v0 down the plane and full gravity, and MLS-MPM takes over.
     """
-    problem = build(scene(slope, E, dx))
     for frame in simulate(problem):
         rest = frame.state.bodies[0]
     q = rest.particles
@@ -112,9 +111,10 @@ def settled(slope, E, dx, v0):
 
 def slide(slope, E, dx, v0=0.0, end=1.0):
     """`Slide` for `end` seconds from speed v0 [m/s]; E [Pa], grid spacing dx [m]."""
-    rows = []
-    with one_thread():
-        problem = replace(settled(slope, E, dx, v0), clock=Clock(end=end, interval=end / SHOWN))
+    problem, rows = build(scene(slope, E, dx)), []
+    with threads_for(problem.bodies):
+        problem = released(problem, slope, v0)
+        problem = replace(problem, clock=Clock(end=end, interval=end / SHOWN))
         for frame in simulate(problem):
             x, v = (mean(frame.state.bodies[0], name) for name in "xv")
             rows.append((frame.t, x @ slope.along, v @ slope.along, x @ slope.normal,

@@ -30,7 +30,7 @@ from mpm_ref.simulate import simulate
 
 from ..registry import experiment
 from .block import G
-from .scenes import mean, one_thread
+from .scenes import mean, threads_for
 
 RADIUS, THICKNESS, HALF_ANGLE, START = 1.0, 0.2, 15.0, 60.0     # [m], [m], degrees, degrees
 AGREED = 1e-3       # relative error of the speed that a public code's test of such a slide allows
@@ -70,7 +70,7 @@ def swing(dx):
     k2 = float(q.m @ np.sum(q.x**2, axis=1) / q.m.sum())
     center = mean(problem.bodies[0], "x")
     exact = pendulum_speed(np.hypot(*center), k2, -center[1])
-    with one_thread():
+    with threads_for(problem.bodies):
         for frame in simulate(problem):
             q = frame.state.bodies[0].particles
             L = q.m @ (q.x[:, 1] * q.v[:, 0] - q.x[:, 0] * q.v[:, 1]) / q.m.sum()

@@ -8,7 +8,7 @@ from mpm_ref.energy import energy, momentum
 from mpm_ref.scene import build
 from mpm_ref.simulate import simulate
 
-from .scenes import mean, one_thread, with_
+from .scenes import mean, threads_for, with_
 
 TRANSFERS = ("pic", "mls", "apic", "flip")
 
@@ -32,7 +32,7 @@ class Course(NamedTuple):
 def course(scene):
     """Run a scene of bodies in free flight and measure after each step."""
     problem, rows = build(with_(scene, every=1, interval=None)), []
-    with one_thread():
+    with threads_for(problem.bodies):
         for frame in simulate(problem):
             bodies = frame.state.bodies
             E = energy(bodies, problem.gravity, problem.inertia)

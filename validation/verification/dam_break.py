@@ -18,7 +18,7 @@ from mpm_ref.scene import Regular, build
 from mpm_ref.simulate import simulate
 
 from ..registry import experiment
-from .scenes import one_thread, shipped, with_
+from .scenes import threads_for, shipped, with_
 
 G = 9.81                            # [m/s^2]
 MEASURED = np.array([               # T, Z; unconfirmed
@@ -56,7 +56,7 @@ def front(cells, per_cell=2):
     water = with_(scene.body[0], sampling=Regular(per_cell=per_cell))
     scene = with_(scene, dx=a / cells, end=END, interval=END / 60, body=(water,))
     problem, rows, low, high = build(scene), [], 1.0, 1.0
-    with one_thread():
+    with threads_for(problem.bodies):
         for frame in simulate(problem):
             q = frame.state.bodies[0].particles
             low, high = min(low, q.F.min()), max(high, q.F.max())

@@ -10,7 +10,7 @@ from mpm_ref.scene import Body, Box, Material, Regular, Scene, Scheme, Sphere, V
 from mpm_ref.simulate import simulate
 
 from ..registry import experiment
-from .scenes import one_thread
+from .scenes import threads_for
 from .symplectic import allowed_gain
 
 RADIUS, DX, SPIN = 0.5, 0.1, 1.0        # [m], [m], [rad/s]
@@ -63,7 +63,7 @@ def history(scene):
     problem, rows = build(scene), []
     if problem.scheme.affine:
         problem.bodies[0].particles.C[:] = spin_matrix(scene.dim)
-    with one_thread():
+    with threads_for(problem.bodies):
         for frame in simulate(problem):
             L = angular_momentum(frame.state.bodies, problem.inertia)
             E = energy(frame.state.bodies, problem.gravity, problem.inertia)

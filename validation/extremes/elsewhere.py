@@ -1,0 +1,40 @@
+"""The extremes that tests hold already: where each of them is."""
+
+import ast
+
+from ..registry import experiment
+from ..results import ROOT
+
+# What, and the test file with a word that names of tests in it must contain.
+HELD = (
+    ("affine fields are reproduced by G2P after P2G", "test_transfer", "affine"),
+    ("partition of unity, gradients that sum to zero, at cell faces", "test_spline", "unity"),
+    ("the SPD-projected differential", "test_materials", "projected"),
+    ("Taylor tests of energy, force and differential", "test_materials", "derivative"),
+    ("the same bits for any number of threads, and across a restart", "test_determinism", "threads"),
+    ("singular values that coincide, vanish or overflow", "test_spectral", "svd"),
+    ("laws at degenerate deformation", "test_material_extremes", ""),
+    ("hostile scenes end in one line", "test_scene_errors", ""),
+    ("kill, full disk, damaged files", "test_journal", ""),
+)
+
+
+@experiment("extremes.explicit.elsewhere", title="Extremes that the tests hold",
+            profiles=("quick", "standard"), budget={"quick": 0.1, "standard": 0.1})
+def elsewhere(run):
+    """A pointer to each, and whether it still leads somewhere."""
+    for what, file, word in HELD:
+        found = tests_of(file, word)
+        run.record(f"extremes.explicit.elsewhere.{file}{'.' + word if word else ''}", len(found),
+                   unit="tests", comparator=">=", bound=1, scale="run by `make test`",
+                   note=f"{what}: tests/{file}.py, {', '.join(found[:3]) or 'none'}")
+
+
+def tests_of(file, word):
+    """Names of the test functions of a file that contain a word."""
+    path = ROOT / "tests" / f"{file}.py"
+    if not path.exists():
+        return []
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    return [node.name for node in tree.body if isinstance(node, ast.FunctionDef)
+            and node.name.startswith("test_") and word in node.name]

@@ -1,0 +1,110 @@
+"""A column of sand collapses on a rough floor, plane or axisymmetric, and how far it runs.
+
+A column of width L (half of it in the plane case, a quarter of the cylinder in 3D, beside smooth
+walls) and height a L. Its run-out is (front - L)/L once it has come to rest.
+"""
+
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from mpm_ref.scene import (
+    Box,
+    Collider,
+    Cylinder,
+    HalfSpace,
+    Intersection,
+    Regular,
+    Scene,
+    build,
+)
+from mpm_ref.simulate import simulate
+
+from .scenes import shipped, threads_for, with_
+
+G = 9.81                # [m/s^2]
+WIDTH = 0.1             # L [m]
+LASTS = 6.0             # duration over sqrt(max(height, L)/g)
+BULK = 0.99             # of the sand lies behind the front; the rest is a foot of single particles
+FRAMES = 60
+
+
+class Collapse(NamedTuple):
+    """A collapse of a column: its front at S times, and the deposit."""
+
+    t: np.ndarray           # (S,)   over sqrt(height/g)
+    front: np.ndarray       # (S,)   what 99 percent of the sand lie behind/L
+    foremost: float         # last distance of the foremost particle/L
+    deposit: np.ndarray     # (K, 2) distance and height of its surface/L, cell by cell
+    J: float                # mean volume ratio of F at the end
+    particles: int
+    steps: int
+
+    @property
+    def runout(self):
+        """Of the bulk."""
+        return float(self.front[-1] - 1.0)
+
+    @property
+    def creep(self):
+        """Last run-out less that at 9/10 of the time."""
+        return float(self.front[-1] - self.front[int(0.9 * len(self.front))])
+
+
+def scene(dim, a, cells):
+    """The shipped scene's sand in a column of aspect ratio a, dx = L/cells, 2^dim per cell."""
+    height, dx, up = a * WIDTH, WIDTH / cells, dim - 1
+    sand = with_(shipped("column_collapse").body[0], shape=column(dim, height),
+                 sampling=Regular(per_cell=2))
+    end = LASTS * sqrt(max(height, WIDTH) / G)
+    return Scene(dim=dim, dx=dx, cfl=0.5, end=end, interval=end / FRAMES, body=(sand,),
+                 gravity=tuple(-G * unit(up, dim)), collider=walls(dim))
+
+
+def column(dim, height):
+    """Half of a plane column, or a quarter of a cylinder."""
+    if dim == 2:
+        return Box(lower=(0.0, 0.0), upper=(WIDTH, height))
+    whole = Cylinder(start=(0.0, 0.0, 0.0), end=(0.0, 0.0, height), radius=WIDTH)
+    quarter = Box(lower=(0.0, 0.0, 0.0), upper=(WIDTH, WIDTH, height))
+    return Intersection(shapes=(whole, quarter))
+
+
+def walls(dim):
+    """A floor that holds, and smooth walls along the planes of symmetry."""
+    def wall(axis, kind):
+        plane = HalfSpace(point=(0.0,) * dim, normal=tuple(unit(axis, dim)))
+        return Collider(shape=plane, kind=kind)
+
+    return (wall(dim - 1, "sticky"), *(wall(axis, "slip") for axis in range(dim - 1)))
+
+
+def unit(axis, dim):
+    """Unit vector of an axis."""
+    return np.eye(dim)[axis]
+
+
+def collapse(dim, a, cells):
+    """Run a column until it rests."""
+    problem, rows = build(scene(dim, a, cells)), []
+    with threads_for(problem.bodies):
+        for frame in simulate(problem):
+            q = frame.state.bodies[0].particles
+            rows.append((frame.t, np.quantile(distance(q.x), BULK)))
+    t, front = np.array(rows).T
+    J = float(np.mean(np.linalg.det(q.F)))
+    return Collapse(t / sqrt(a * WIDTH / G), front / WIDTH, float(distance(q.x).max() / WIDTH),
+                    surface(q.x, WIDTH / cells) / WIDTH, J, len(q.x), frame.state.step)
+
+
+def distance(x):
+    """Distance of particles x (N, d) from the plane or axis of symmetry (N,)."""
+    return x[:, 0] if x.shape[1] == 2 else np.hypot(x[:, 0], x[:, 1])
+
+
+def surface(x, dx):
+    """Middle and greatest height of each ring of width dx that holds particles (K, 2)."""
+    ring = (distance(x) / dx).astype(int)
+    held = np.unique(ring)
+    return np.array([((k + 0.5) * dx, x[ring == k, -1].max()) for k in held])
