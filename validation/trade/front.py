@@ -1,0 +1,65 @@
+"""Pareto fronts of measured points, and what they are recorded as."""
+
+import numpy as np
+
+from .measure import COLUMNS
+
+TARGETS = (0.3, 0.1, 0.03, 0.01, 0.003, 0.001)
+
+
+def front(costs, errors):
+    """Mask (N,) of the points that no other one beats in both cost and error; NaN never is one."""
+    costs, errors = np.asarray(costs, dtype=float), np.asarray(errors, dtype=float)
+    mask = np.zeros(len(costs), dtype=bool)
+    least = np.inf
+    for k in np.lexsort((errors, costs)):
+        if errors[k] < least:
+            least, mask[k] = errors[k], True
+    return mask
+
+
+def cheapest(points, most, cost):
+    """The good point of least cost with an error of at most `most`, or None."""
+    fit = [p for p in points if p.good and p.error <= most]
+    return min(fit, key=cost, default=None)
+
+
+def record_points(run, points, scale):
+    """Table of all points, the cheapest settings, and the failures."""
+    errors = [p.error if p.good else np.nan for p in points]
+    by_cpu = front([p.cpu for p in points], errors)
+    by_bytes = front([p.bytes for p in points], errors)
+    run.table("points", COLUMNS, [(p.knob, *p.setting, *p[2:], int(c), int(b))
+                                  for p, c, b in zip(points, by_cpu, by_bytes, strict=True)])
+    record_cheapest(run, points, scale)
+    record_failures(run, points, scale)
+
+
+def record_cheapest(run, points, scale):
+    """The table "cheapest setting with error at most x", by CPU seconds and by bytes."""
+    name, rows = run.experiment.id, []
+    for most in TARGETS:
+        fast = cheapest(points, most, lambda p: p.cpu)
+        small = cheapest(points, most, lambda p: p.bytes)
+        if fast is None:
+            rows.append((most, "none", np.nan, "none", 0))
+            continue
+        rows.append((most, fast.setting.words(), fast.cpu, small.setting.words(), small.bytes))
+        run.record(f"{name}.cheapest.{most:g}", fast.cpu, unit="CPU s", comparator="info",
+                   scale=scale, note=f"with an error of at most {most:g}: {fast.setting.words()} "
+                   f"(error {fast.error:.2g}); least memory: {small.setting.words()}, "
+                   f"{small.bytes / 1e6:.2f} MB")
+    run.table("cheapest", ("error_at_most", "least_cpu", "cpu_s", "least_bytes", "bytes"), rows)
+
+
+def record_failures(run, points, scale):
+    """Failures are points too: how many, whether each was told, and none within the bound."""
+    name, bad = run.experiment.id, [p for p in points if not p.good]
+    run.record(f"{name}.failures", len(bad), unit="settings", comparator="info", scale=scale,
+               note="; ".join(f"{p.setting.words()}: {p.end}, step {p.steps}" for p in bad))
+    run.record(f"{name}.failures_within_bound", sum(p.of_bound <= 1.0 for p in bad),
+               unit="settings", comparator="<=", bound=0, scale=scale,
+               note="settings that broke although dt was within the stable time step")
+    run.record(f"{name}.told", sum(p.said != "" or p.end == "wrong" for p in bad), paper=len(bad),
+               unit="settings", comparator="=", scale=scale,
+               note="failures that ended with a sentence, or with an answer known to be wrong")
