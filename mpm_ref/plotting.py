@@ -6,8 +6,8 @@ is looked along, nearer particles drawn last. Matplotlib is imported when a pict
 
 import numpy as np
 
-from .atomic import replacing
-from .results import SCALARS
+from .store.atomic import replacing
+from .store.results import SCALARS
 
 AXES = "xyz"
 POINT = 72.0      # points per inch, in which marker sizes are given

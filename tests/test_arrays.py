@@ -2,7 +2,7 @@ import h5py
 import numpy as np
 import pytest
 
-from mpm_ref.arrays import read_arrays
+from mpm_ref.sampling.arrays import read_arrays
 from mpm_ref.scene import SceneError, build, loads
 
 N = 5

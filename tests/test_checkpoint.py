@@ -7,12 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from small_runs import ENERGY, colliding, state_of
 
-from mpm_ref import atomic, checkpoint
-from mpm_ref.atomic import NotWritten
-from mpm_ref.checkpoint import BadCheckpoint, digest, load, save
 from mpm_ref.core.state import NONE
-from mpm_ref.manifest import scene_hash, source_hash
 from mpm_ref.monitor import Account
+from mpm_ref.store import atomic, checkpoint
+from mpm_ref.store.atomic import NotWritten
+from mpm_ref.store.checkpoint import BadCheckpoint, digest, load, save
+from mpm_ref.store.manifest import scene_hash, source_hash
 
 
 @pytest.fixture
@@ -135,7 +135,7 @@ def test_a_full_disk_keeps_the_checkpoint_before(tmp_path, problem, monkeypatch,
         usage = type("Usage", (), {"free": 1000})
         monkeypatch.setattr(atomic.shutil, "disk_usage", lambda _: usage)
     else:
-        monkeypatch.setattr("mpm_ref.journal.os.pwrite", refuse)
+        monkeypatch.setattr("mpm_ref.store.journal.os.pwrite", refuse)
     with pytest.raises(NotWritten, match=r"1 kB free|No space left"):
         save(path, state_of(problem, 1), problem)
     monkeypatch.undo()

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 from command_line import SCENE, assert_told, mpm_ref
 
-from mpm_ref import atomic
-from mpm_ref.checkpoint import summary
-from mpm_ref.results import Results
-from mpm_ref.session import checkpoint_of
+from mpm_ref.store import atomic
+from mpm_ref.store.checkpoint import summary
+from mpm_ref.store.results import Results
+from mpm_ref.store.session import checkpoint_of
 
 ROOT = Path(__file__).resolve().parents[1]
 MAIN = "from mpm_ref.cli import main; main()"

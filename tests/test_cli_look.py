@@ -8,9 +8,9 @@ from command_line import SCENE, assert_told, mpm_ref
 from PIL import Image
 
 from mpm_ref import oracle, plotting
-from mpm_ref.results import Results
-from mpm_ref.session import checkpoint_of
-from mpm_ref.shipped import find_scene, shipped_scenes
+from mpm_ref.cli.shipped import find_scene, shipped_scenes
+from mpm_ref.store.results import Results
+from mpm_ref.store.session import checkpoint_of
 
 ROOT = Path(__file__).resolve().parents[1]
 

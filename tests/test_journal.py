@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mpm_ref import atomic
-from mpm_ref.atomic import NotWritten, in_words, replacing, require_space
-from mpm_ref.journal import PAGE, Damaged, JournaledFile, journal_of, new_hdf5, recover
+from mpm_ref.store import atomic
+from mpm_ref.store.atomic import NotWritten, in_words, replacing, require_space
+from mpm_ref.store.journal import PAGE, Damaged, JournaledFile, journal_of, new_hdf5, recover
 
 ROOT = Path(__file__).resolve().parents[1]
 writes = st.tuples(st.integers(0, 3 * PAGE), st.binary(min_size=1, max_size=2 * PAGE))
@@ -122,7 +122,7 @@ REFUSED = """
 import resource, sys
 import h5py, numpy as np
 from mpm_ref import journal
-from mpm_ref.atomic import NotWritten
+from mpm_ref.store.atomic import NotWritten
 path = sys.argv[1]
 with journal.new_hdf5(path) as h5:
     h5["kept"] = np.arange(10.0)
@@ -155,7 +155,7 @@ def test_one_writer_at_a_time(tmp_path):
     path = tmp_path / "x.h5"
     with new_hdf5(path) as h5:
         h5["x"] = 1
-    code = f"from mpm_ref.journal import *; JournaledFile({str(path)!r})"
+    code = f"from mpm_ref.store.journal import *; JournaledFile({str(path)!r})"
     file = JournaledFile(path)
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
     assert "is being written by another process" in done.stderr

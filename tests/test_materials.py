@@ -18,12 +18,7 @@ from constitutive import (
 )
 
 from mpm_ref.core.law import dpk1, pressure, psi_volume
-from mpm_ref.materials import (
-    LAWS,
-    FixedCorotated,
-    Fluid,
-    principal,
-)
+from mpm_ref.materials import LAWS, FixedCorotated, Fluid, principal
 
 
 @pytest.fixture(params=LAWS)

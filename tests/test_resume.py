@@ -12,15 +12,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_runs import colliding
 
-from mpm_ref import checkpoint
-from mpm_ref.checkpoint import digest
 from mpm_ref.monitor import Unstable, check
 from mpm_ref.problem import Clock
-from mpm_ref.results import Results
-from mpm_ref.running import Options, Refused, run
-from mpm_ref.session import Watch, checkpoint_of
 from mpm_ref.simulate import simulate
-from mpm_ref.store import BadResults
+from mpm_ref.store import BadResults, checkpoint
+from mpm_ref.store.checkpoint import digest
+from mpm_ref.store.results import Results
+from mpm_ref.store.running import Options, Refused, run
+from mpm_ref.store.session import Watch, checkpoint_of
 from mpm_ref.timestep import TooLarge
 
 TESTS = Path(__file__).resolve().parent
@@ -138,7 +137,7 @@ RUN = """
 import sys
 from small_runs import colliding
 from mpm_ref.problem import Clock
-from mpm_ref.running import Options, run
+from mpm_ref.store.running import Options, run
 run(colliding(Clock(dt=5e-4, steps=400, every=5)), sys.argv[1],
     Options(resume=True, checkpoint_every=3))
 """

@@ -8,9 +8,9 @@ import pytest
 from scipy.spatial import cKDTree
 
 from mpm_ref import shapes
-from mpm_ref.inside import solid
-from mpm_ref.poisson import MAX_CELLS, poisson_disk
 from mpm_ref.sampling import Jittered, Lattice, Poisson, Regular, exactly, sample
+from mpm_ref.sampling.poisson import MAX_CELLS, poisson_disk
+from mpm_ref.shapes.inside import solid
 
 CUBE = solid(shapes.Box(lower=(0.25, 0.25, 0.25), upper=(0.75, 0.75, 0.75)))
 SQUARE = solid(shapes.Box(lower=(0.0, 0.0), upper=(1.0, 1.0)))
@@ -164,7 +164,7 @@ def test_ldm_fill_gives_the_printed_number_of_points():
 
 def test_same_points_without_the_compiler():
     code = ("import numpy as np, sys\n"
-            "from mpm_ref.poisson import poisson_disk\n"
+            "from mpm_ref.sampling.poisson import poisson_disk\n"
             "for d, r in ((2, 0.2), (3, 0.4)):\n"
             "    x = poisson_disk(np.zeros(d), np.ones(d), r, np.random.default_rng(1))\n"
             "    sys.stdout.buffer.write(x.tobytes())\n")

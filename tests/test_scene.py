@@ -9,8 +9,8 @@ import pytest
 
 from mpm_ref import materials, scene
 from mpm_ref.scene import SceneError, build, canonical, digest, dumps, load, loads
-from mpm_ref.scene_check import checked
-from mpm_ref.scene_records import Flow, Material
+from mpm_ref.scene.check import checked
+from mpm_ref.scene.records import Flow, Material
 from validation import targets
 
 SCENES = sorted((Path(__file__).parents[1] / "scenes").glob("*.toml"))
@@ -219,7 +219,7 @@ def test_nclaw_particles(name):
     assert np.allclose(particles.v, (1.0, -1.5, -2.0) + np.cross((4.0, 4.0, 4.0), r), atol=1e-15)
 
 
-def test_ldm_gravity_has_the_constants_of_the_paper():
+def test_ldm_gravity_has_the_constants_of_the_paper():       # LDM-sec5.1, LDM-tab2-dt
     """LDM-sec5.1, with the sizes of LDM-X1 and the time step of LDM-X3."""
     paper, made = targets.load(), load(SCENES[0].parent / "ldm_gravity.toml")
     cylinder = made.body[0].shape

@@ -5,8 +5,8 @@ import msgspec
 import pytest
 
 from mpm_ref import materials, scene
-from mpm_ref.quantities import Record
 from mpm_ref.scene import build, loads
+from mpm_ref.shapes.quantities import Record
 
 TEXT = (Path(__file__).parents[1] / "docs" / "scenes.md").read_text()
 RECORDS = [record for record in vars(scene).values()

@@ -9,11 +9,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from mpm_ref import poisson, sampling, shapes
-from mpm_ref.inside import solid
+from mpm_ref import sampling, shapes
+from mpm_ref.sampling import poisson
 from mpm_ref.scene import SceneError, build, loads
-from mpm_ref.scene_check import checked
-from mpm_ref.scene_parts import build_conditions
+from mpm_ref.scene.check import checked
+from mpm_ref.scene.parts import build_conditions
+from mpm_ref.shapes.inside import solid
 
 RICH = tomllib.loads((Path(__file__).parent / "data" / "rich.toml").read_text())
 

@@ -14,7 +14,9 @@ FUNCTION_LINES = 60         # without the docstring
 PARAMETERS = 6              # without self and cls
 
 # More parameters than six, each with its reason.
-MANY_PARAMETERS: dict[str, str] = {}
+MANY_PARAMETERS: dict[str, str] = {
+    "mpm_ref/cli/__init__.py::run": "typer: one parameter per option",
+}
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 

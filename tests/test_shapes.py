@@ -3,9 +3,10 @@ import sys
 import numpy as np
 import pytest
 
-from mpm_ref import mesh, shapes
-from mpm_ref.extents import bounds, volume
-from mpm_ref.inside import Solid, check_bounded, measured_volume, rotation, solid
+from mpm_ref import shapes
+from mpm_ref.shapes import mesh
+from mpm_ref.shapes.extents import bounds, volume
+from mpm_ref.shapes.inside import Solid, check_bounded, measured_volume, rotation, solid
 
 ANALYTIC = {
     "box2": shapes.Box(lower=(-0.3, 0.1), upper=(0.5, 0.7)),

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from small_runs import ENERGY, block, colliding, frame_of, state_of
 
-from mpm_ref import atomic, store
-from mpm_ref.atomic import NotWritten
-from mpm_ref.manifest import Part, manifest, scene_hash, source_hash
-from mpm_ref.results import SCALARS, Results
-from mpm_ref.store import UNITS, BadResults, Fields, create, reopen
+from mpm_ref import store
+from mpm_ref.store import UNITS, BadResults, Fields, atomic, create, reopen
+from mpm_ref.store.atomic import NotWritten
+from mpm_ref.store.manifest import Part, manifest, scene_hash, source_hash
+from mpm_ref.store.results import SCALARS, Results
 
 
 def written(path, problem, states, fields=None):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from grids import DX, applied, grid_of, positions, random_grid
 
-from mpm_ref.core.boundary import BoxWalls, Collider, clip, nclaw_walls
+from mpm_ref.core.boundary import BoxWalls, Collider, nclaw_walls
 from mpm_ref.core.levelset import half_space
 
 
@@ -62,12 +62,6 @@ def test_walls_and_colliders_together(d, rng):
     assert (u[on_incline] @ n > -1e-12).all()
     for a in range(d):
         assert (u[(x[..., a] < -1.5 * DX) & (grid.m > 0.0)][:, a] >= -1e-12).all()
-
-
-def test_clip():
-    x = np.array([(0.5, -1.0, 2.0), (0.1, 0.9, np.nan)])
-    clip(x, 0.1, 0.9)
-    assert np.array_equal(x, [(0.5, 0.1, 0.9), (0.1, 0.9, np.nan)], equal_nan=True)
 
 
 @pytest.mark.parametrize(("make", "said"), [

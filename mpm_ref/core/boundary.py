@@ -12,7 +12,6 @@ import numpy as np
 
 from .collide import nodes_with_mass, solve, touch, touch_wall
 from .contact import NOSLIP, PRESCRIBED, SEPARATE, SLIP, STICKY
-from .jit import CHUNKS, chunk, kernel, parallel, prange
 from .motion import STILL, Motion
 
 KINDS = {"sticky": STICKY, "slip": SLIP, "separate": SEPARATE, "noslip": NOSLIP}
@@ -148,30 +147,6 @@ class Conditions:
             touches += self.walls.touches(grid)
             rules += [self.walls] * (2 * grid.m.ndim)
         return solve(touches, [r.rule for r in rules], [r.friction for r in rules], grid)
-
-
-@kernel
-def _clip(x, low, high, bounds):
-    for p in range(bounds[0], bounds[1]):
-        for a in range(x.shape[1]):
-            if x[p, a] < low:
-                x[p, a] = low
-            elif x[p, a] > high:
-                x[p, a] = high
-
-
-@parallel
-def _clip_all(x, low, high):
-    for c in prange(CHUNKS):
-        _clip(x, low, high, chunk(c, len(x)))
-
-
-def clip(x, low, high):
-    """Keep particles x (N, d) in the cube low <= x_a <= high [m], in place; NaN stays.
-
-    NCLaw keeps them half a cell or more inside its unit cube and leaves the velocities alone.
-    """
-    _clip_all(x, float(low), float(high))
 
 
 def _check(kind, friction):

@@ -1,9 +1,8 @@
-"""Deformation, return map and stress of every particle: one pass, one singular value
-decomposition at most.
+"""Deformation, return map and stress of every particle: one pass, one SVD at most.
 
-    F_trial = (I + dt L) F,   F = project(F_trial),   tau = kirchhoff(F)        # NSF-alg-mpm step
-    3, NCLAW-alg1
+    F_trial = (I + dt L) F,   F = project(F_trial),   tau = kirchhoff(F)
 
+as in NSF-alg-mpm step 3, LDM-sec2.2-Frate and NCLAW-alg1.
 Three passes, by what the law needs: J alone (no F is carried), F without a return map, F with
 one. Return maps act on the singular values: F_trial = U diag(s) V^T becomes U diag(s_new) V^T,
 and tau = U diag(kirchhoff_hat(s_new)) U^T.

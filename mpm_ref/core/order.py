@@ -1,10 +1,10 @@
 """Order of particles for a scatter that is parallel and yet gives the same bits for any number of
 threads.
 
-The box of cells is cut along the first axis into slabs of as many cells as
-the degree (at least 2). A particle whose base cell is in a slab writes nodes of that slab and at
-most `degree` beyond, so slabs of the same colour (every other one) share no node. Within a slab the particles keep their order. A physical
-sort by cell, now and then, keeps memory access local.
+The box of cells is cut along the first axis into slabs of as many cells as the degree, at least 2.
+A particle whose base cell is in a slab writes nodes of that slab and at most `degree` beyond, so
+slabs of the same colour (every other one) share no node. Within a slab the particles keep their
+order. A physical sort by cell, now and then, keeps memory access local.
 """
 
 from typing import NamedTuple
@@ -15,6 +15,7 @@ from .jit import CHUNKS, chunk, kernel, parallel, prange
 from .spline import base_of
 from .stencil import locate
 from .tensor import vec
+
 
 class Slabs(NamedTuple):
     """Particles by slab: those of slab a are order[start[a] : start[a + 1]]."""

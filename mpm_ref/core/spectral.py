@@ -7,16 +7,7 @@ The method stands in `deflation`.
 
 from math import nan, sqrt
 
-from .deflation import (
-    complement,
-    direction,
-    eigh2,
-    plus_diagonal,
-    separated,
-    svd2,
-    turned,
-    unit,
-)
+from .deflation import complement, direction, eigh2, plus_diagonal, separated, svd2, turned, unit
 from .extremes import is_finite, is_moderate, moderate, not_a_number, rescaled
 from .jit import kernel, leaf
 from .tensor import (

@@ -1,13 +1,12 @@
-"""Particle to grid and back: PIC, FLIP, APIC and MLS-MPM, for B-splines of degree 1, 2, 3, in 2D
-and 3D.
+"""Particle to grid and back: PIC, FLIP, APIC and MLS-MPM; degrees 1, 2, 3; 2D and 3D.
 
 i is a node, p a particle, ip a pair: w_ip = N((x_p - x_i)/dx), dw_ip = dw_ip/dx_p, r_ip = x_i -
-x_p. The sums of NSF-alg-mpm, LDM-alg1 and NCLAW-alg3 are special cases. There are two forms of
-force and velocity gradient:
+x_p. Velocity and test functions are spanned by the same splines (LDM-sec2.2-spaces), integrals are
+sums over particles (LDM-eq8) and the mass is lumped (LDM-eq10); the sums of NSF-alg-mpm, LDM-alg1
+and NCLAW-alg3 are special cases. There are two forms of force and velocity gradient:
 
-    gradient form   f_i = -sum_p V0_p tau_p dw_ip                   L_p = sum_i v_i dw_ip^T
-    MLS form        f_i = -sum_p V0_p tau_p D^-1 w_ip r_ip          L_p = C_p = sum_i w_ip v_i
-    r_ip^T D^-1
+    gradient form   f_i = -sum_p V0_p tau_p dw_ip             L_p = sum_i v_i dw_ip^T
+    MLS form        f_i = -sum_p V0_p tau_p D^-1 w_ip r_ip    L_p = sum_i w_ip v_i r_ip^T D^-1 = C_p
 
 with D = sum_i w_ip r_ip r_ip^T = dx^2 (degree + 1)/12 I, for degrees 2 and 3 only. `scatter*` and
 `gather*` are the loops over particles; `p2g` and `g2p` run them in parallel. Which fields the
@@ -40,7 +39,7 @@ def scatter(particles, grid, stencil, dt, members):
 
     m_i += sum_p w_ip m_p
     m_i v_i += sum_p w_ip m_p (v_p + C_p r_ip)                                  # NSF-alg-mpm step 1
-    f_i += sum_p w_ip m_p b_p - V0_p tau_p dw_ip                                # NSF-eq6
+    f_i += sum_p w_ip m_p b_p - V0_p tau_p dw_ip                         # NSF-eq6, NCLAW-eq10
     """
     d = grid.m.shape
     for p in members:

@@ -27,7 +27,7 @@ class FixedCorotated(NamedTuple):
     lam: float      # Lame's first parameter [Pa]
 
 
-def from_E_nu(E, nu):  # noqa: N802  the constants' names
+def from_E_nu(E, nu):
     """The law with Young's modulus E [Pa] and Poisson's ratio nu at rest; errors as `lame`."""
     return FixedCorotated(*lame(E, nu))
 

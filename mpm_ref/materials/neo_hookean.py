@@ -43,7 +43,7 @@ class NeoHookean(NamedTuple):
     kappa: float    # bulk modulus [Pa]
 
 
-def from_E_nu(E, nu):  # noqa: N802  the constants' names
+def from_E_nu(E, nu):
     """The law with the mu and kappa of E [Pa] and nu (NSF-F0); errors as `lame`."""
     return NeoHookean(lame(E, nu)[0], bulk_modulus(E, nu))
 

@@ -68,7 +68,7 @@ class Material(NamedTuple):
     flow: NamedTuple
 
     @property
-    def needs_F(self):  # noqa: N802  the field's name
+    def needs_F(self):
         """Whether the deformation gradient is carried; else its determinant J is."""
         return not (isinstance(self.law, Fluid) and isinstance(self.flow, NoFlow))
 

@@ -5,8 +5,8 @@ import json
 import h5py
 import numpy as np
 
-from ..atomic import replacing
 from ..body import Body
+from ..store.atomic import replacing
 from . import recording
 from .schema import ARRAYS, BESIDE, FORMAT, key
 

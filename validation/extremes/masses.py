@@ -8,7 +8,7 @@ from mpm_ref.materials import make_law
 
 from ..registry import experiment
 from ..verification.lattice import lattice
-from .blocks import E, NU, RHO, STILL, alone, block, bounds, problem, steps
+from .blocks import NU, RHO, STILL, E, alone, block, bounds, problem, steps
 from .outcome import FINISHED, outcome
 
 DX = 0.125

@@ -8,7 +8,7 @@ from mpm_ref.explicit import Scheme
 
 from ..registry import experiment
 from ..verification.lattice import lattice
-from .blocks import alone, block, bounds, problem, shaken, square, steps
+from .blocks import alone, block, bounds, problem, shaken, steps
 from .outcome import FINISHED, REFUSED, STOPS, outcome
 
 DX = 0.125

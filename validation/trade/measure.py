@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm_ref.explicit import Stepper, scatter
-from mpm_ref.inside import solid
 from mpm_ref.problem import Problem
 from mpm_ref.sampling import Poisson, sample
 from mpm_ref.shapes import Box
+from mpm_ref.shapes.inside import solid
 from mpm_ref.timestep import stable_dt
 
 from ..extremes.long_run import CARRIED, round_state

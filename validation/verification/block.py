@@ -9,17 +9,7 @@ import numpy as np
 from mpm_ref.body import particles_at
 from mpm_ref.explicit import Scheme
 from mpm_ref.problem import Clock
-from mpm_ref.scene import (
-    Body,
-    Box,
-    Collider,
-    HalfSpace,
-    Material,
-    Moved,
-    Regular,
-    Scene,
-    build,
-)
+from mpm_ref.scene import Body, Box, Collider, HalfSpace, Material, Moved, Regular, Scene, build
 from mpm_ref.scene import Scheme as SceneScheme
 from mpm_ref.simulate import simulate
 

@@ -19,7 +19,6 @@ from mpm_ref.core.boundary import BoxWalls, Conditions
 from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.materials import FixedCorotated, lame, stiffness
 
-from .elastica import deflected, timoshenko
 from .lattice import body, lattice
 from .settle import settle
 
@@ -44,7 +43,7 @@ class Beam(NamedTuple):
         return FixedCorotated(*lame(E, self.nu))
 
     @property
-    def EI(self):  # noqa: N802  the field's name
+    def EI(self):
         """Bending stiffness in plane strain [N m]."""
         return E / (1.0 - self.nu**2) / 12.0
 

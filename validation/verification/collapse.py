@@ -9,16 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.scene import (
-    Box,
-    Collider,
-    Cylinder,
-    HalfSpace,
-    Intersection,
-    Regular,
-    Scene,
-    build,
-)
+from mpm_ref.scene import Box, Collider, Cylinder, HalfSpace, Intersection, Regular, Scene, build
 from mpm_ref.simulate import simulate
 
 from .scenes import shipped, threads_for, with_

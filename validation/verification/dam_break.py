@@ -18,7 +18,7 @@ from mpm_ref.scene import Regular, build
 from mpm_ref.simulate import simulate
 
 from ..registry import experiment
-from .scenes import threads_for, shipped, with_
+from .scenes import shipped, threads_for, with_
 
 G = 9.81                            # [m/s^2]
 MEASURED = np.array([               # T, Z; unconfirmed

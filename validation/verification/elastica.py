@@ -16,7 +16,7 @@ import numpy as np
 from scipy.integrate import solve_bvp
 
 
-def deflected(load, length, EI, EA=inf, GA=inf):  # noqa: N803  the field's names
+def deflected(load, length, EI, EA=inf, GA=inf):
     """Position (x, y) of the loaded end [m]. load [N/m], length a [m], EI [N m], EA and GA [N/m].
 
     Raises ArithmeticError if the solver does not converge.
@@ -41,6 +41,6 @@ def deflected(load, length, EI, EA=inf, GA=inf):  # noqa: N803  the field's name
     return float(solution.y[2, -1]), float(solution.y[3, -1])
 
 
-def timoshenko(load, length, EI, GA):  # noqa: N803  the field's names
+def timoshenko(load, length, EI, GA):
     """Deflection of the loaded end under a small load [m]."""
     return load * length**3 / (3.0 * EI) + load * length / GA

@@ -7,8 +7,8 @@ from typing import Literal, Union, get_args, get_origin, get_type_hints
 
 from msgspec import Struct
 
-from .scene_error import joined, placed
-from .scene_records import Scene
+from .error import joined, placed
+from .records import Scene
 
 SHOWN = 60          # characters of a value
 WORDS = {"float": "a number", "int": "a whole number", "str": "text", "bool": "true or false",

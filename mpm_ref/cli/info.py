@@ -2,12 +2,12 @@
 
 import json
 
-from .atomic import in_words
-from .explicit import Stepper
-from .manifest import scene_hash
-from .results import ENERGIES, Results
-from .session import checkpoint_of
-from .timestep import TimeStep, stable_dt
+from ..explicit import Stepper
+from ..store.atomic import in_words
+from ..store.manifest import scene_hash
+from ..store.results import ENERGIES, Results
+from ..store.session import checkpoint_of
+from ..timestep import TimeStep, stable_dt
 
 
 def of_problem(problem):

@@ -10,13 +10,13 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from ..core.state import Particles
+from ..energy import Energy
+from ..monitor import Account
+from ..simulate import State
 from .atomic import replacing, require_space
-from .core.state import Particles
-from .energy import Energy
 from .journal import new_hdf5
 from .manifest import scene_hash, source_hash
-from .monitor import Account
-from .simulate import State
 
 FORMAT = "mpm_ref checkpoint 1"
 SEAL = b"\nmpm_ref sha256 "

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import msgspec
 
-from .quantities import Kind, Record
-from .scene_check import checked
-from .scene_error import SceneError, joined
+from ..shapes.quantities import Kind, Record
+from .check import checked
+from .error import SceneError, joined
 
 
 def load(path):

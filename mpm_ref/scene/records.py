@@ -8,9 +8,11 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from .explicit import Scheme as ExplicitScheme
-from .materials import make_flow, make_law
-from .quantities import (
+from ..explicit import Scheme as ExplicitScheme
+from ..materials import make_flow, make_law
+from ..sampling import Regular, Samplings
+from ..shapes import Analytic, Shape
+from ..shapes.quantities import (
     Angle,
     Coordinate,
     Count,
@@ -24,8 +26,6 @@ from .quantities import (
     Share,
     Vector,
 )
-from .sampling import Regular, Samplings
-from .shapes import Analytic, Shape
 
 Name = Annotated[str, Meta(min_length=1, max_length=100, pattern=r"^[A-Za-z0-9_. -]+\Z")]
 Time = Annotated[float, Meta(ge=-1e12, le=1e12)]                        # [s]

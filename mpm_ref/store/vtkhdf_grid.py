@@ -6,12 +6,12 @@ affine motion. All frames share one box of nodes, at integer multiples of dx as 
 
 import numpy as np
 
+from ..body import Body, particles_at
+from ..core.grid import Store
+from ..explicit import Scheme, scatter
+from ..materials import NoFlow
 from .atomic import replacing, require_space
-from .body import Body, particles_at
-from .core.grid import Store
-from .explicit import Scheme, scatter
 from .journal import new_hdf5
-from .materials import NoFlow
 from .vtkhdf import root_of, three
 
 

@@ -5,12 +5,14 @@ from typing import Annotated
 
 import typer
 
-from . import checkpoint, info, plotting, scene
-from .cli_faults import one_line, options
-from .results import SCALARS, Results
+from .. import plotting, scene
+from ..store import checkpoint
+from ..store.results import SCALARS, Results
+from ..store.vtkhdf import export_particles
+from ..store.vtkhdf_grid import export_grid
+from . import info
+from .faults import one_line, options
 from .shipped import find_scene, shipped_scenes
-from .vtkhdf import export_particles
-from .vtkhdf_grid import export_grid
 
 HDF5 = b"\x89HDF\r\n\x1a\n"      # how such files begin
 

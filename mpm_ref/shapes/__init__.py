@@ -10,7 +10,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from .core import levelset
+from ..core import levelset
 from .quantities import Angle, Kind, Length, Sha256, Vector
 
 Shapes = Annotated[tuple["Shape", ...], Meta(min_length=1, max_length=1000)]

@@ -8,13 +8,27 @@ The keys of the file are the fields of the records; docs/scenes.md explains each
 
 import numpy as np
 
-from .problem import Problem
-from .sampling import Jittered, Lattice, Poisson, Regular
-from .scene_bodies import build_body
-from .scene_check import checked
-from .scene_error import SceneError
-from .scene_parts import build_clock, build_conditions, build_limits
-from .scene_records import (
+from ..problem import Problem
+from ..sampling import Jittered, Lattice, Poisson, Regular
+from ..shapes import (
+    Box,
+    Capsule,
+    Cylinder,
+    Difference,
+    HalfSpace,
+    Intersection,
+    Mesh,
+    Moved,
+    Sphere,
+    Torus,
+    Union,
+    Wedge,
+)
+from .bodies import build_body
+from .check import checked
+from .error import SceneError
+from .parts import build_clock, build_conditions, build_limits
+from .records import (
     Arrays,
     Body,
     Clip,
@@ -33,21 +47,7 @@ from .scene_records import (
     Velocity,
     Walls,
 )
-from .scene_text import canonical, digest, dumps, load, loads
-from .shapes import (
-    Box,
-    Capsule,
-    Cylinder,
-    Difference,
-    HalfSpace,
-    Intersection,
-    Mesh,
-    Moved,
-    Sphere,
-    Torus,
-    Union,
-    Wedge,
-)
+from .text import canonical, digest, dumps, load, loads
 
 __all__ = [
     "Arrays", "Body", "Box", "Capsule", "Clip", "Collider", "Cylinder", "Difference", "Fixed",

@@ -5,14 +5,14 @@ from contextlib import contextmanager
 
 import typer
 
-from .atomic import NotWritten
-from .checkpoint import BadCheckpoint
-from .core.grid import OutOfRange
-from .journal import Damaged, InUse
-from .results import BadResults
-from .running import Refused
-from .scene import SceneError
-from .timestep import TooLarge
+from ..core.grid import OutOfRange
+from ..scene import SceneError
+from ..store.atomic import NotWritten
+from ..store.checkpoint import BadCheckpoint
+from ..store.journal import Damaged, InUse
+from ..store.results import BadResults
+from ..store.running import Refused
+from ..timestep import TooLarge
 
 BAD_INPUT, UNSTABLE, NOT_WRITTEN, INTERRUPT = 2, 3, 4, 130
 FAULTS = (SceneError, TooLarge, OutOfRange, Refused, BadCheckpoint, BadResults, InUse, Damaged)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .core.jit import CHUNKS, chunk, kernel, parallel, prange
+from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
 
 # The line stands beside the point by these shares of the mesh's size, so that it misses edges and
 # vertices: points and vertices often share a coordinate.

@@ -15,7 +15,7 @@ from pathlib import Path
 import numba
 import threadpoolctl
 
-from . import __version__
+from .. import __version__
 
 POOL = ("user_api", "internal_api", "version", "num_threads")
 LIBRARIES = ("numpy", "numba", "llvmlite", "scipy", "h5py", "msgspec")
@@ -51,7 +51,7 @@ def scene_hash(problem):
 @cache
 def source_hash():
     """sha256 over all Python files of the package, in the order of their paths."""
-    root = Path(__file__).parent
+    root = Path(__file__).parents[1]
     digest = hashlib.sha256()
     for file in sorted(root.rglob("*.py")):
         digest.update(file.relative_to(root).as_posix().encode() + b"\0" + file.read_bytes())

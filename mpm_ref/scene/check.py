@@ -9,12 +9,12 @@ from typing import get_args
 import msgspec
 import numpy as np
 
-from .quantities import Vector
-from .scene_error import SceneError, at, joined
-from .scene_parts import build_clock, build_conditions, build_limits
-from .scene_records import Scene
-from .scene_words import rephrase, shown
-from .shapes import Mesh
+from ..shapes import Mesh
+from ..shapes.quantities import Vector
+from .error import SceneError, at, joined
+from .parts import build_clock, build_conditions, build_limits
+from .records import Scene
+from .words import rephrase, shown
 
 
 def checked(data, source=""):

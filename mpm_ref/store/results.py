@@ -6,8 +6,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from . import ENERGIES, FORMAT, UNITS, BadResults
 from .journal import recover
-from .store import ENERGIES, FORMAT, UNITS, BadResults
 
 SCALARS = {                       # name -> unit, what it is, and the fields it follows from
     "speed": ("m/s", "magnitude of the velocity", ("v",)),

@@ -1,4 +1,4 @@
-"""The command line `mpm-ref`. What the commands do is in `cli_run`, `cli_look`, `cli_oracle`."""
+"""The command line `mpm-ref`. The commands are in `cli.execute`, `cli.look`, `cli.golden`."""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,22 +6,23 @@ from typing import Annotated
 import threadpoolctl
 import typer
 
-from . import __version__, cli_look, cli_oracle, scene
-from .cli_faults import one_line, options
-from .cli_look import Machine
-from .cli_run import Request, run_scene
-from .core.jit import set_threads
-from .running import Options
+from .. import __version__, scene
+from ..core.jit import set_threads
+from ..store import UNITS, USUAL, Fields
+from ..store.running import Options
+from . import golden, look
+from .execute import Request, run_scene
+from .faults import one_line, options
+from .look import Machine
 from .shipped import find_scene
-from .store import UNITS, USUAL, Fields
 
 app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False, add_completion=False,
                   help="Explicit material point method: run scenes and look at the results.")
-for name, command in (("info", cli_look.describe), ("plot", cli_look.plot),
-                      ("animate", cli_look.animate), ("export", cli_look.export),
-                      ("scenes", cli_look.scenes)):
+for name, command in (("info", look.describe), ("plot", look.plot),
+                      ("animate", look.animate), ("export", look.export),
+                      ("scenes", look.scenes)):
     app.command(name)(command)
-app.add_typer(cli_oracle.app, name="oracle")
+app.add_typer(golden.app, name="oracle")
 
 
 @app.callback(invoke_without_command=True)

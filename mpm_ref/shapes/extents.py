@@ -5,7 +5,7 @@ from math import hypot, inf, pi, radians, tan
 
 import numpy as np
 
-from . import shapes
+from .. import shapes
 
 
 def hull(x):

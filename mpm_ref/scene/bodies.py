@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from .arrays import read_arrays
-from .body import AFFINE, Body, particles_at
-from .inside import solid
-from .materials import Material
-from .sampling import sample
-from .scene_error import SceneError, at
+from ..body import AFFINE, Body, particles_at
+from ..materials import Material
+from ..sampling import sample
+from ..sampling.arrays import read_arrays
+from ..shapes.inside import solid
+from .error import SceneError, at
 
 
 def build_body(scene, k):

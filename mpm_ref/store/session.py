@@ -8,13 +8,13 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
+from ..core.grid import OutOfRange
+from ..energy import energy
+from ..monitor import Unstable, check
+from ..simulate import Frame, ended, frame_is_due, simulate
+from ..timestep import TooLarge
 from . import checkpoint
-from .core.grid import OutOfRange
-from .energy import energy
 from .manifest import Part
-from .monitor import Unstable, check
-from .simulate import Frame, ended, frame_is_due, simulate
-from .timestep import TooLarge
 
 SECONDS = 60.0     # between checkpoints, unless a number of steps is given
 FINISHED, AT_LIMIT, INTERRUPTED, TERMINATED = "finished", "step limit", "interrupted", "terminated"

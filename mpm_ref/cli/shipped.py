@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from .scene import SceneError
+from ..scene import SceneError
 
-PACKAGE = Path(__file__).resolve().parent
+PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def shipped_scenes():

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .core.jit import kernel
-from .core.tensor import dot, lin, put_vec, vec
+from ..core.jit import kernel
+from ..core.tensor import dot, lin, put_vec, vec
 
 ATTEMPTS = 30               # darts around a point before it is given up [Bridson2007]
 PAD = 2                     # cells on each side of the box, so that no neighbour is out of range

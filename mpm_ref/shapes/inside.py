@@ -7,8 +7,8 @@ from math import cos, hypot, inf, radians, sin
 
 import numpy as np
 
-from . import shapes
-from .core import levelset
+from .. import shapes
+from ..core import levelset
 from .extents import bounds, hull, volume
 from .mesh import bins_of, enclosed_volume, read_triangles, winding
 

@@ -10,9 +10,9 @@ from typing import Annotated, Literal, NamedTuple
 import numpy as np
 from msgspec import Meta
 
-from .inside import check_bounded
+from ..shapes.inside import check_bounded
+from ..shapes.quantities import Count, Kind, Length, PerCell, Seed, Share
 from .poisson import poisson_disk
-from .quantities import Count, Kind, Length, PerCell, Seed, Share
 
 MOST_POINTS = 50_000_000        # candidates that a lattice may have
 FILL = 0.87                     # of per_cell^d points per cell (LDM-tab2-sampling)

@@ -3,13 +3,12 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from . import checkpoint
-from .explicit import Stepper
+from ..explicit import Stepper
+from ..simulate import ended
+from ..timestep import refuse, stable_dt
+from . import Fields, checkpoint, create, reopen
 from .manifest import manifest
 from .session import AT_LIMIT, FINISHED, Session, Watch, checkpoint_of
-from .simulate import ended
-from .store import Fields, create, reopen
-from .timestep import refuse, stable_dt
 
 
 class Refused(ValueError):

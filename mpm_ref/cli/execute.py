@@ -11,15 +11,16 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from . import checkpoint, info
-from .atomic import NotWritten
-from .cli_faults import INTERRUPT, NOT_WRITTEN, UNSTABLE, end
-from .core.grid import OutOfRange
-from .monitor import Unstable
-from .running import run
-from .session import AT_LIMIT, FINISHED, INTERRUPTED, TERMINATED, Watch, checkpoint_of
-from .simulate import last_step
-from .timestep import TooLarge
+from ..core.grid import OutOfRange
+from ..monitor import Unstable
+from ..simulate import last_step
+from ..store import checkpoint
+from ..store.atomic import NotWritten
+from ..store.running import run
+from ..store.session import AT_LIMIT, FINISHED, INTERRUPTED, TERMINATED, Watch, checkpoint_of
+from ..timestep import TooLarge
+from . import info
+from .faults import INTERRUPT, NOT_WRITTEN, UNSTABLE, end
 
 EXIT = {FINISHED: 0, AT_LIMIT: 0, INTERRUPTED: INTERRUPT, TERMINATED: 143}
 SHAPE = "{percentage:3.0f}% |{bar:20}| {n:.6g}/{total:g} {unit} [{elapsed}<{remaining}{postfix}]"

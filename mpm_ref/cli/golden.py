@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from . import oracle, scene
-from .cli_faults import one_line, options
+from .. import oracle, scene
+from .faults import one_line, options
 from .shipped import find_scene
 
 DEPARTS = 1      # exit status of a check that another code fails

@@ -8,15 +8,15 @@ from math import inf, radians
 
 import numpy as np
 
-from .core import motion as rigid
-from .core.boundary import BoxWalls, Conditions, Prescribed
-from .core.boundary import Collider as RigidCollider
-from .inside import rotation
-from .monitor import Limits
-from .problem import Clock
-from .scene_error import SceneError, at
-from .scene_records import Keyframes, Oscillation, Ramps, Steady
-from .shapes import level_set
+from ..core import motion as rigid
+from ..core.boundary import BoxWalls, Conditions, Prescribed
+from ..core.boundary import Collider as RigidCollider
+from ..monitor import Limits
+from ..problem import Clock
+from ..shapes import level_set
+from ..shapes.inside import rotation
+from .error import SceneError, at
+from .records import Keyframes, Oscillation, Ramps, Steady
 
 CFL = 0.5       # share of the stable time step, for a scene that says nothing about its step
 
