@@ -101,6 +101,7 @@ def volume_ratio(particles):
     return particles.F if particles.F.ndim == 1 else np.linalg.det(particles.F)
 
 
+@np.errstate(invalid="ignore", over="ignore")      # what is not finite is said below
 def check(problem, state, dt):
     """Raise `Unstable` if the state breaks a limit; NaN breaks all of them."""
     for body in state.bodies:

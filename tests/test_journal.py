@@ -52,7 +52,7 @@ KILLED = """
 import os, sys
 from pathlib import Path
 import h5py, numpy as np
-from mpm_ref import atomic, journal
+from mpm_ref.store import atomic, journal
 path = Path(sys.argv[1])
 
 class Mortal:
@@ -121,7 +121,7 @@ def test_killed_at_any_call_every_committed_frame_stands(tmp_path):
 REFUSED = """
 import resource, sys
 import h5py, numpy as np
-from mpm_ref import journal
+from mpm_ref.store import journal
 from mpm_ref.store.atomic import NotWritten
 path = sys.argv[1]
 with journal.new_hdf5(path) as h5:

@@ -40,8 +40,8 @@ def record_bearing(run, name, result, scale):
     run.record(f"extremes.explicit.degenerate.fixed_corotated.{_id(name)}",
                E if end.kind == FINISHED else np.inf, comparator="<=", bound=1.0 + 1e-9,
                scale=f"{scale}, {end.step} steps",
-               note=f"energy at the end over that at first. J of the particle is {J:.3g} at the end: "
-                    "the law would turn it back, but F <- (I + dt L) F cannot change the sign of J, "
+               note=f"energy at the end over that at first. The particle's J ends at {J:.3g}: "
+                    "the law would turn it back, but F <- (I + dt L) F cannot change J's sign, "
                     "nor bring back a J of zero, while det(I + dt L) > 0: what is inverted in an "
                     "explicit run stays so, under stress, as a dead particle")
 

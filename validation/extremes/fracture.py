@@ -75,8 +75,8 @@ def pull(transfer, degree, per):
 
 
 def opened(bar, spacing, degree):
-    """Of the row of particles that is lowest at rest, the two neighbours with the most cells between
-    their base nodes: distance over that at rest, and these cells.
+    """Of the lowest row of particles, the two neighbours with the most cells between their base
+    nodes: their distance over that at rest, and these cells.
     """
     order = np.argsort(bar.id)
     x = bar.particles.x[order].reshape(-1, round(2 * DX / spacing), 2)[:, 0, 0]

@@ -53,7 +53,7 @@ def record_curve(run, rows):
         mark = "LOCKED: " if relative < LOCKED else ""
         run.record(f"extremes.explicit.locking.{nu:g}", relative, comparator="info",
                    scale=f"{layers} quadratic cells over the height, {per} per direction, MLS",
-                   note=f"{mark}first swing over twice Timoshenko's deflection, relative to nu = 0.3")
+                   note=f"{mark}first swing over twice Timoshenko's deflection, over that at 0.3")
 
 
 def timoshenko(nu):

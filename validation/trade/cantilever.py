@@ -27,7 +27,7 @@ TIP = 0.875                                 # from here on: the last cell of the
 
 
 def prepare(setting, reference=None, seed=0):
-    """`Trial` of the cantilever; its error is the sinking itself [m] where no reference is given."""
+    """`Trial` of the cantilever; its error is the sinking itself [m] without a reference."""
     dx = 1.0 / setting.cells
     X = sampled(setting, [-CLAMP, 0.0], [LENGTH, HEIGHT], seed)
     beam = body(X, dx / setting.per, RHO, LAW, setting.transfer)
@@ -59,8 +59,8 @@ def cantilever(run):
     half = sinking(DEFAULT._replace(cells=fine // 2, per=3, cfl=0.4))
     run.record("trade.explicit.cantilever.reference", best, unit="m", comparator="info",
                scale=f"{fine} cells over the length, 3 x 3 particles per cell",
-               note=f"mean sinking of the tip after half a period; with half the cells {half:.6g} m: "
-                    f"errors below {abs(half / best - 1.0):.1g} mean nothing")
+               note=f"mean sinking of the tip after half a period; with half the cells {half:.6g} "
+                    f"m: errors below {abs(half / best - 1.0):.1g} mean nothing")
     points = [measure(knob, setting, lambda s: prepare(s, best, run.seed), repeats)
               for knob, setting in run.progress(settings(levels), "settings")]
     record_points(run, points, f"2D, half a period, {len(points)} settings; CPU time: smallest of "

@@ -6,9 +6,9 @@ from ..extremes.outcome import STOPS
 from .measure import COLUMNS, LOST
 
 EMULATED = (
-    "32-bit storage is emulated: the state is rounded to single precision after every step, and half "
-    "the bytes of what is rounded are counted; the kernels compute in double precision, so that no "
-    "time is saved."
+    "32-bit storage is emulated: the state is rounded to single precision after every step, and "
+    "half the bytes of what is rounded are counted; the kernels compute in double precision, so "
+    "that no time is saved."
 )
 TARGETS = (0.3, 0.1, 0.03, 0.01, 0.003, 0.001)
 

@@ -58,5 +58,5 @@ def mms(run):
                comparator="info", scale=scale, note="slope of the error over dx at the default; "
                "what theory promises, and at which settings: verification.mms")
     run.note(EMULATED)
-    run.note("CPU time is that of the step loop alone, without the body force, on a machine that may "
-             "be busy: it is information, not a judgement.")
+    run.note("CPU time is that of the step loop alone, without the body force, on a machine that "
+             "may be busy: it is information, not a judgement.")

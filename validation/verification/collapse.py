@@ -43,11 +43,13 @@ class Collapse(NamedTuple):
         return float(self.front[-1] - self.front[int(0.9 * len(self.front))])
 
 
-def scene(dim, a, cells):
+def scene(dim, a, cells, friction_angle):
     """The shipped scene's sand in a column of aspect ratio a, dx = L/cells, 2^dim per cell."""
     height, dx, up = a * WIDTH, WIDTH / cells, dim - 1
-    sand = with_(shipped("column_collapse").body[0], shape=column(dim, height),
-                 sampling=Regular(per_cell=2))
+    sand = shipped("column_collapse").body[0]
+    flow = with_(sand.material.flow, friction_angle=friction_angle)
+    sand = with_(sand, shape=column(dim, height), sampling=Regular(per_cell=2),
+                 material=with_(sand.material, flow=flow))
     end = LASTS * sqrt(max(height, WIDTH) / G)
     return Scene(dim=dim, dx=dx, cfl=0.5, end=end, interval=end / FRAMES, body=(sand,),
                  gravity=tuple(-G * unit(up, dim)), collider=walls(dim))
@@ -76,9 +78,9 @@ def unit(axis, dim):
     return np.eye(dim)[axis]
 
 
-def collapse(dim, a, cells):
-    """Run a column until it rests."""
-    problem, rows = build(scene(dim, a, cells)), []
+def collapse(dim, a, cells, friction_angle=30.0):
+    """Run a column until it rests; the angle in degrees."""
+    problem, rows = build(scene(dim, a, cells, friction_angle)), []
     with threads_for(problem.bodies):
         for frame in simulate(problem):
             q = frame.state.bodies[0].particles

@@ -15,7 +15,10 @@ TALL = {2: 2.8, 3: 1.7}         # aspect ratios above which a column is tall [Lu
 EXPONENT = {                    # of tall columns: band, and why
     2: ((0.6, 1.0), "from the narrow channels' 0.65 - 0.05 to the wide ones' 0.9 + 0.1; the plane "
                     "column has no side walls"),
-    3: ((0.47, 0.57), "0.52 with the +- 0.05 that the plane channels' exponents have"),
+    3: ((0.47, 0.57), "0.52 with the +- 0.05 that the plane channels' exponents have; a miss is the "
+                      "law's: at L = 6 and 8 dx the exponent is the same, with a friction angle of "
+                      "20 degrees it is larger. Nothing in rate-independent flow damps fast "
+                      "grains more than slow ones, so that tall columns run too far for low ones"),
 }
 FRICTION = "friction angle 30 degrees, rough floor"
 
@@ -43,6 +46,8 @@ def column(run):
     for dim, cells, _ in plans:
         tall = {a: c for (d, n, a), c in done.items() if (d, n) == (dim, cells) and a > TALL[dim]}
         record_exponent(run, f"{KINDS[dim]}.n{cells}", dim, tall)
+    if run.choose(quick=False, standard=True):
+        weak_friction(run)
     write_tables(run, done)
 
 
@@ -63,6 +68,14 @@ def record_exponent(run, name, dim, tall):
     ratios = ", ".join(f"{a:g}" for a in tall)
     run.record(f"verification.column.{name}.exponent", value, comparator="band", bound=bound,
                scale=f"aspect ratios {ratios}; {FRICTION}", note=why)
+
+
+def weak_friction(run, angle=20.0, cells=6, ratios=(2.0, 4.0, 8.0)):
+    """How the exponent of cylinders depends on the friction angle, which the published does not."""
+    runouts = [collapse(3, a, cells, angle).runout for a in ratios]
+    run.record("verification.column.axisymmetric.weak.exponent", order(ratios, runouts),
+               comparator="info", scale=f"aspect ratios {ratios}, L = {cells} dx",
+               note=f"friction angle {angle:g} degrees instead of 30")
 
 
 def write_tables(run, done):

@@ -1,7 +1,7 @@
 """Columns of matter that settle under their weight and cannot widen.
 
-A column stands along x, from a floor at x = 0 to a free surface at x = H. At rest the stress along it
-balances the weight above, whatever the law: P_xx(X) = -rho0 g (H - X).
+A column stands along x, from a floor at x = 0 to a free surface at x = H. At rest the stress along
+it balances the weight above, whatever the law: P_xx(X) = -rho0 g (H - X).
 
 The floor is there in two ways: as a sticky wall, and without a wall by symmetry, as the middle of a
 column from -H to H whose weight points to its middle everywhere.
@@ -15,7 +15,7 @@ import numpy as np
 from mpm_ref.core.grid import OutOfRange
 from mpm_ref.materials import stiffness
 
-from .settle import settle
+from .settle import Pace, settle
 from .strip import ON_WALL, stepper, strip
 
 CFL = 0.4
@@ -60,8 +60,8 @@ def settled(column, scheme, cells, wall):
     weight[:, 0] = -column.g * np.sign(X)
     lowest = 0.5 * pi * column.sound / column.height
     try:
-        settle(matter, stepper(dx, scheme, ON_WALL if wall else None), weight, lowest,
-               CFL * dx / column.sound)
+        settle(matter, stepper(dx, scheme, ON_WALL if wall else None), weight,
+               Pace(lowest, CFL * dx / column.sound))
     except OutOfRange:
         return None
     q = matter.particles
@@ -70,7 +70,7 @@ def settled(column, scheme, cells, wall):
 
 
 def stress_errors(column, state):
-    """Mean and largest error of P_xx, relative to the pressure at the floor; 1 if the run was lost."""
+    """Mean and largest error of P_xx, relative to the pressure at the floor; 1 if lost."""
     if state is None:
         return 1.0, 1.0
     exact = -column.rho0 * column.g * (column.height - state.X)

@@ -11,7 +11,7 @@ def rms(error):
 
 
 def order(sizes, errors):
-    """Slope of log(error) against log(size), by least squares; NaN unless all are finite and > 0."""
+    """Slope of log(error) against log(size), by least squares; NaN unless all are > 0, finite."""
     if not all(isfinite(e) and e > 0.0 for e in errors):
         return nan
     x, y = [log(h) for h in sizes], [log(e) for e in errors]

@@ -7,6 +7,7 @@ import numpy as np
 from mpm_ref.core.grid import OutOfRange
 
 from .convergence import rms
+from .scenes import threads_for
 
 CHECKS = 20          # times at which the error is taken
 LOST = 1.0           # error [m] at which a body has nothing to do with its motion: it has this size
@@ -40,13 +41,14 @@ def follow(body, motion, stepper, end, dt):
     put_on(body.particles, motion, end / steps)
     stepper.start([body])
     worst = 0.0
-    try:
-        for error in errors(body, motion, stepper, end / steps, steps):
-            worst = max(worst, error)
-            if not worst < LOST:
-                return LOST
-    except OutOfRange:
-        return LOST
+    with threads_for([body]):
+        try:
+            for error in errors(body, motion, stepper, end / steps, steps):
+                worst = max(worst, error)
+                if not worst < LOST:
+                    return LOST
+        except OutOfRange:
+            return LOST
     return worst
 
 

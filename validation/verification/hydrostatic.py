@@ -45,10 +45,11 @@ def hydrostatic(run):
 
 def record(run, wall, cells, errors):
     """Orders of pressure and place."""
-    sizes, id = [1.0 / n for n in cells], f"verification.hydrostatic.{'wall' if wall else 'symmetric'}"
+    sizes, held = [1.0 / n for n in cells], "wall" if wall else "symmetric"
     scale = f"{cells} cells over the height, {name(SCHEME)}"
     for k, what in enumerate(("pressure", "place")):
         p, last = order(sizes, [e[k] for e in errors]), errors[-1][k]
-        run.record(f"{id}.{what}.order", p, paper=1.0 if wall else 2.0, comparator="band",
-                   bound=(0.8, 1.3) if wall else (1.8, 2.3), scale=f"{scale}; last error {last:.1e}",
+        run.record(f"verification.hydrostatic.{held}.{what}.order", p, paper=1.0 if wall else 2.0,
+                   comparator="band", bound=(0.8, 1.3) if wall else (1.8, 2.3),
+                   scale=f"{scale}; last error {last:.1e}",
                    note="the wall's first order, as in verification.compaction" if wall else "")

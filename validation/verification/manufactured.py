@@ -41,7 +41,7 @@ def body_force(x, X, psi):
 
 
 def function(arguments, expressions):
-    """NumPy function of numbers or arrays (N,) that returns the k expressions as an array (N, k)."""
+    """NumPy function of numbers or arrays (N,): the k expressions as an array (N, k)."""
     compiled = sp.lambdify(arguments, expressions, modules="numpy", cse=True)
 
     def evaluate(*values):

@@ -123,8 +123,8 @@ def record_orders(run, orders):
     for family in CONTROL:
         run.record(f"verification.mms.order.{name(family)}", orders[family], comparator="<=",
                    bound=1.0, scale=scale,
-                   note="negative control: linear splines must not converge, because their gradient "
-                        "jumps where particles cross cells")
+                   note="negative control: linear splines must not converge, because their "
+                        "gradient jumps where particles cross cells")
 
 
 def record_3d(run):

@@ -10,8 +10,8 @@ With F = diag(s, 1) a law gives, along and across,
 the outer quarter of each half. In its middle the stretch must be 3/4, and the stress across tau_yy.
 No wall takes part.
 
-*Platen*: a column from a sticky floor at x = 0 to a collider that moves from x = H to s H. The force
-on it, from the impulses that the grid's conditions report, is compared with P(s).
+*Platen*: a column from a sticky floor at x = 0 to a collider that moves from x = H to s H. The
+force on it, from the impulses that the grid's conditions report, is compared with P(s).
 """
 
 from math import log, pi, sqrt
@@ -27,7 +27,7 @@ from mpm_ref.materials import FixedCorotated, Hencky, LogNeoHookean, lame, stiff
 from ..registry import experiment
 from .convergence import order
 from .mms import name
-from .settle import settle
+from .settle import Pace, settle
 from .strip import stepper, strip
 
 H, RHO0, STRETCH, SCHEME = 1.0, 1000.0, 0.75, ("mls", 2, 2)
@@ -61,14 +61,14 @@ def press(law, cells):
     P, tau_yy = closed_form(law, STRETCH)
     load = np.zeros((len(X), 2))
     load[:, 0] = np.where(np.abs(X) > 0.75 * H, np.sign(X) * P / (0.25 * H * RHO0), 0.0)
-    settle(column, stepper(dx, SCHEME), load, 0.5 * pi * sound / H, CFL * dx / sound)
+    settle(column, stepper(dx, SCHEME), load, Pace(0.5 * pi * sound / H, CFL * dx / sound))
     q, middle = column.particles, np.abs(X) < 0.5 * H
     return Pressed(float(q.F[middle, 0, 0].mean()) / STRETCH - 1.0,
                    float(q.tau[middle, 1, 1].mean()) / tau_yy - 1.0)
 
 
 class Metered:
-    """Conditions that keep the forces [N/m] on the matter in the last step, per height of a strip."""
+    """Conditions that keep the forces on the matter in the last step [N/m per metre]."""
 
     moves = True
 
@@ -91,8 +91,8 @@ def platen_force(law, cells):
     floor = Collider(half_space((0.0, 0.0), (1.0, 0.0)))
     platen = Collider(half_space((H, 0.0), (-1.0, 0.0)), motion=down)
     metered = Metered(Conditions(colliders=(floor, platen)), dx)
-    settle(column, stepper(dx, SCHEME, metered), np.zeros((len(X), 2)), lowest, CFL * dx / sound,
-           waits=40.0)
+    settle(column, stepper(dx, SCHEME, metered), np.zeros((len(X), 2)),
+           Pace(lowest, CFL * dx / sound, waits=40.0))
     return float(metered.forces[1, 0]) / closed_form(law, STRETCH)[0] - 1.0
 
 
@@ -105,8 +105,8 @@ def oedometer(run):
     for key in run.progress(laws, "laws"):
         result = press(LAWS[key], cells)
         for what in ("stretch", "lateral"):
-            run.record(f"verification.oedometer.load.{key}.{what}", getattr(result, what), paper=0.0,
-                       comparator="band", bound=(-2e-3, 2e-3),
+            run.record(f"verification.oedometer.load.{key}.{what}", getattr(result, what),
+                       paper=0.0, comparator="band", bound=(-2e-3, 2e-3),
                        scale=f"{cells} cells over H, {name(SCHEME)}, s = {STRETCH}",
                        note="relative error; bound 1 / (2 cells of quick)^2: second order")
     record_platen(run)
@@ -120,9 +120,9 @@ def record_platen(run):
     scale = f"{cells[-1]} cells over H, {name(SCHEME)}, s = {STRETCH}"
     run.record("verification.oedometer.platen.force", abs(errors[-1]), paper=0.0, comparator="<=",
                bound=0.05, scale=scale,
-               note="bound: what an engineer expects of a load cell. A wall acts a fixed part of a "
-                    "cell too deep (see verification.bar), and one that moves lets matter creep past "
-                    "the nodes it reaches: both vanish with dx, at first order")
+               note="bound: what an engineer would accept. A wall acts a fixed part of a cell too "
+                    "deep (see verification.bar), and one that moves lets matter creep past the "
+                    "nodes it reaches: both vanish with dx, at first order")
     run.record("verification.oedometer.platen.order",
                order([1.0 / n for n in cells], np.abs(errors)), comparator="info",
                scale=f"{cells} cells over H", note="tends to 1 from below")

@@ -4,8 +4,8 @@ import numpy as np
 
 
 class Periodic:
-    """Condition that makes the grid periodic, exactly: momenta and masses of nodes that are a period
-    apart are added, and all of them get the common velocity.
+    """Condition that makes the grid periodic, exactly: momenta and masses of nodes that are a
+    period apart are added, and all of them get the common velocity.
 
     cells: period of each axis in cells, 0 where space does not repeat. then: another condition,
     applied to the folded grid. Particles may lie anywhere: no images of them are kept.

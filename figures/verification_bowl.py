@@ -1,0 +1,21 @@
+"""A saddle slides down in a bowl without friction: its angular velocity, with the exact pendulum's at
+the bottom.
+"""
+
+import matplotlib.pyplot as plt
+
+from ._orders import series
+
+NEEDS = ["verification.bowl"]
+
+
+def draw(results):
+    table = results.table(NEEDS[0], "course")
+    speed = next(r for r in results.records(NEEDS[0]) if r.target == "verification.bowl.speed")
+    figure, ax = plt.subplots(figsize=(5.6, 3.6))
+    for (dx,), rows in series(table, ("dx",)).items():
+        ax.plot(table["t"][rows], table["omega"][rows], label=f"dx = {dx:g} m")
+    ax.axhline(speed.paper, color="k", ls=":", label="exact at the bottom")
+    ax.set(xlabel="t [s]", ylabel="angular velocity [rad/s]")
+    ax.legend(fontsize=8)
+    return figure

@@ -1,0 +1,29 @@
+"""Cantilever whose end sinks by half its length: particles of the coarsest run, 4 cells high, with
+the axis by the elastica (left); distance of the loaded end from the elastica's, by scheme (right).
+"""
+
+import matplotlib.pyplot as plt
+
+from ._orders import DEGREES, look, series
+
+NEEDS = ["verification.cantilever"]
+
+
+def draw(results):
+    figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.8), width_ratios=(1.3, 1))
+    places, axis = (results.table(NEEDS[0], name) for name in ("places", "elastica"))
+    left.plot(places["x"], places["y"], ".", color="C0", ms=2, label="particles")
+    left.plot(axis["x"], axis["y"], "k-", lw=1, label="elastica")
+    left.axvline(0.0, color="0.5", lw=4, alpha=0.4)
+    left.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
+    left.legend(fontsize=8)
+    table = results.table(NEEDS[0], "large")
+    for (transfer, degree, per), rows in series(
+            table, ("transfer", "degree", "per_direction")).items():
+        right.plot(table["cells"][rows], table["error"][rows], **look(transfer, degree),
+                   label=f"{transfer} {DEGREES[degree]}, {int(per)} per direction")
+    right.set(xlabel="cells over the height", ylabel="distance / deflection", ylim=(0.0, None),
+              xticks=sorted(set(table["cells"])))
+    right.legend(fontsize=7)
+    figure.tight_layout()
+    return figure

@@ -1,0 +1,37 @@
+"""Column under its weight. Left: stress of the particles of the coarsest column, 8 cells high, beside
+the exact line; the wall spoils its own cell. Right: mean error of the stress, of a column that
+strains by 4 % (soft), where particles cross cells, and of one that hardly strains (stiff).
+"""
+
+import matplotlib.pyplot as plt
+
+from ._orders import DEGREES, look, series, slope
+
+NEEDS = ["verification.compaction"]
+
+
+def draw(results):
+    figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.8))
+    left.plot((-1, 0), (0, 1), "k:", label="exact")
+    for held, style in (("symmetric", "C0."), ("wall", "C3.")):
+        profile = results.table(NEEDS[0], f"profile-{held}")
+        left.plot(profile["stress"], profile["X"], style, ms=5, label=held)
+    left.set(xlabel="stress / pressure at the floor", ylabel="height X / H")
+    left.legend(fontsize=8)
+    table = results.table(NEEDS[0], "errors")
+    keys = ("transfer", "degree", "per_direction", "column", "wall")
+    for (transfer, degree, per, column, wall), rows in series(table, keys).items():
+        held = "wall" if wall == "True" else "symmetric"
+        style = look(transfer, degree) | {"marker": "s" if wall == "True" else "o"}
+        style["mfc"] = "w" if column == "soft" else style["color"]
+        right.loglog(table["cells"][rows], table["mean_error"][rows], **style,
+                     label=f"{transfer} {DEGREES[degree]} {int(per)}, {column}, {held}")
+    cells = sorted(set(table["cells"]))
+    slope(right, -2, (cells[0], cells[-1]), 1.2e-3, "2")
+    slope(right, -1, (cells[0], cells[-1]), 6e-2, "1")
+    right.set(xlabel="cells over the height", ylabel="mean stress error / floor pressure",
+              xticks=cells, xticklabels=[f"{n:.0f}" for n in cells])
+    right.minorticks_off()
+    right.legend(fontsize=5)
+    figure.tight_layout()
+    return figure

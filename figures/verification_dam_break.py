@@ -1,0 +1,22 @@
+"""Dam break: front (foremost particle, dotted: what 99 % of the water lie behind) over time, with
+Ritter's bound and the points measured by Martin and Moyce as others read them (unconfirmed).
+"""
+
+import matplotlib.pyplot as plt
+
+from ._orders import series
+
+NEEDS = ["verification.dam_break"]
+
+
+def draw(results):
+    table, points = (results.table(NEEDS[0], name) for name in ("front", "measured"))
+    figure, ax = plt.subplots(figsize=(6.0, 4.0))
+    for k, ((cells,), rows) in enumerate(series(table, ("cells",)).items()):
+        ax.plot(table["T"][rows], table["Z"][rows], color=f"C{k}", label=f"dx = a/{int(cells)}")
+        ax.plot(table["T"][rows], table["bulk"][rows], ":", color=f"C{k}")
+    ax.plot(table["T"][rows], table["ritter"][rows], "k--", lw=1, label="Ritter, upper bound")
+    ax.plot(points["T"], points["Z"], "ks", mfc="w", ms=5, label="measured (unconfirmed)")
+    ax.set(xlabel="t sqrt(2 g/a)", ylabel="front x/a")
+    ax.legend(fontsize=8)
+    return figure

@@ -1,0 +1,23 @@
+"""A free spinning body. Left: angular momentum, the spin of the affine field included; APIC and MLS
+keep it to round-off, PIC (the negative control) loses it. Right: mechanical energy.
+"""
+
+import matplotlib.pyplot as plt
+
+from ._orders import TRANSFERS, series
+
+NEEDS = ["verification.rotation"]
+
+
+def draw(results):
+    table = results.table(NEEDS[0], "history")
+    figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.6), sharex=True)
+    for (body, transfer), rows in series(table, ("body", "transfer")).items():
+        style = {"color": TRANSFERS[transfer], "ls": "-" if body == "disk" else "--"}
+        for ax, what in ((left, "L"), (right, "energy")):
+            ax.plot(table["turns"][rows], table[what][rows], **style, label=f"{body}, {transfer}")
+    left.set(xlabel="revolutions", ylabel="angular momentum / its start", ylim=(-0.05, 1.1))
+    right.set(xlabel="revolutions", ylabel="energy / its start", ylim=(-0.05, 1.1))
+    left.legend(fontsize=8)
+    figure.tight_layout()
+    return figure

@@ -1,0 +1,32 @@
+"""Generalized vortex. Left: largest RMS error of the displacement against cells per metre (the ring
+is half a metre wide). Right: how far the forcing printed in two public codes is from the one that
+the motion asks for, relative to the largest force.
+"""
+
+import matplotlib.pyplot as plt
+
+from ._orders import DEGREES, look, series, slope
+
+NEEDS = ["verification.vortex"]
+
+
+def draw(results):
+    figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.8))
+    table = results.table(NEEDS[0], "errors")
+    for (transfer, degree, per), rows in series(
+            table, ("transfer", "degree", "per_direction")).items():
+        left.loglog(table["cells"][rows], table["error"][rows], **look(transfer, degree),
+                    label=f"{transfer} {DEGREES[degree]}, {int(per)} per direction")
+    cells = sorted(set(table["cells"]))
+    slope(left, -2, (cells[0], cells[-1]), 0.7 * table["error"].max(), "order 2")
+    left.set(xlabel="cells per metre", ylabel="error / (R G)", xticks=cells,
+             xticklabels=[f"{n:.0f}" for n in cells], xlim=(0.8 * cells[0], 1.5 * cells[-1]))
+    left.minorticks_off()
+    left.legend(fontsize=7)
+    sign = results.table(NEEDS[0], "printed-sign")
+    for (turn,), rows in series(sign, ("G",)).items():
+        right.semilogy(sign["t"][rows], sign["difference"][rows], label=f"G = {turn:.3g}")
+    right.set(xlabel="t / period", ylabel="max |b_printed - b| / max |b|", ylim=(1e-6, 1e-1))
+    right.legend(fontsize=8)
+    figure.tight_layout()
+    return figure

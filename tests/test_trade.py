@@ -1,0 +1,70 @@
+"""Pareto fronts, the cheapest setting, and the bytes of a state."""
+
+import numpy as np
+import pytest
+
+from validation.extremes.long_run import round_state
+from validation.trade.front import cheapest, front
+from validation.trade.measure import Point, sampled, state_bytes
+from validation.trade.mms import prepare
+from validation.trade.setting import DEFAULT, QUICK, STANDARD, settings
+
+
+def point(cpu, error, end="finished"):
+    return Point("dt", DEFAULT, error, cpu, 100, 1, 0.5, end, "")
+
+
+def test_front_holds_what_no_point_beats():
+    costs, errors = [1.0, 2.0, 3.0, 4.0, 0.5], [0.5, 0.2, 0.3, 0.1, np.nan]
+    assert front(costs, errors).tolist() == [True, True, False, True, False]
+
+
+def test_front_of_equal_costs_and_errors_has_one_point():
+    assert front([1.0, 1.0, 2.0], [0.5, 0.3, 0.3]).tolist() == [False, True, False]
+
+
+def test_front_against_its_definition(rng):
+    costs, errors = rng.random(60), rng.random(60)
+    beaten = [any((costs <= c) & (errors <= e) & ((costs < c) | (errors < e)))
+              for c, e in zip(costs, errors, strict=True)]
+    assert front(costs, errors).tolist() == [not b for b in beaten]
+
+
+def test_cheapest_takes_no_failure():
+    points = [point(1.0, 0.05, "CFL"), point(2.0, 0.05), point(3.0, 0.01), point(0.5, 0.2)]
+    assert cheapest(points, 0.1, lambda p: p.cpu).cpu == 2.0
+    assert cheapest(points, 0.001, lambda p: p.cpu) is None
+
+
+@pytest.mark.parametrize("levels", [QUICK, STANDARD])
+def test_every_level_is_a_scheme_and_differs_from_the_default(levels):
+    chosen = [setting for _, setting in settings(levels)]
+    assert len(set(chosen)) == len(chosen)
+    assert all(setting.scheme for setting in chosen)
+
+
+@pytest.mark.parametrize("sampling", ["lattice", "jittered", "poisson"])
+def test_samplings_have_the_same_number_of_points_in_the_box(sampling):
+    X = sampled(DEFAULT._replace(sampling=sampling), [0.0, -0.25], [1.0, 0.25], 3)
+    assert X.shape == (32 * 16, 2)
+    assert np.all((X >= [0.0, -0.25]) & (X <= [1.0, 0.25]))
+
+
+def test_bytes_count_shared_arrays_once_and_f32_half():
+    small = DEFAULT._replace(cells=8)
+    n = (8 * 2) ** 2
+    problem = prepare(small).problem
+    per_particle = 8 * (2 + 2 + 4 + 4 + 4 + 1 + 1 + 2)          # x v C=L F tau m V0 b
+    grid = state_bytes(problem, small) - n * per_particle
+    assert 0 < grid < 20**2 * 3 * 8
+    halved = state_bytes(problem, small._replace(storage="f32"))
+    assert state_bytes(problem, small) - halved == n * 4 * (2 + 2 + 4 + 4 + 4)
+
+
+def test_rounded_state_is_single_precision():
+    problem = prepare(DEFAULT._replace(cells=8)).problem
+    x = problem.bodies[0].particles.x.copy()
+    round_state(problem.bodies)
+    rounded = problem.bodies[0].particles.x
+    assert np.array_equal(rounded, rounded.astype(np.float32))
+    assert not np.array_equal(rounded, x)

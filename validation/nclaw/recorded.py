@@ -1,0 +1,110 @@
+"""The four training environments: their settings, and the states that they end in.
+
+The final states are recorded for later comparison, of our runs with each other and with other
+codes; NCLaw's own are in single precision and not published.
+"""
+
+import hashlib
+
+import numpy as np
+
+from mpm_ref.energy import kinetic
+from mpm_ref.monitor import volume_ratio
+from mpm_ref.scene import build
+from mpm_ref.simulate import simulate
+
+from ..registry import experiment
+from ..settings import record_settings
+from ..verification.scenes import mean, shipped, threads_for, with_
+
+ENVIRONMENTS = ("jelly", "sand", "plasticine", "water")
+CARRIED = ("x", "v", "C", "F", "y")         # what a particle carries from step to step
+AXES = "xyz"
+
+
+@experiment("nclaw.settings", title="Settings of NCLaw's environments that its text prints",
+            profiles=("quick", "standard"), budget={"quick": 1, "standard": 1})
+def settings(run):
+    """Settings of the scenes nclaw_*.toml."""
+    scenes = {name: shipped(f"nclaw_{name}") for name in ENVIRONMENTS}
+    jelly = scenes["jelly"]
+    low, high = jelly.body[0].shape.lower, jelly.body[0].shape.upper
+    points = len(build(jelly).bodies[0].particles.x)
+    cells = round(1.0 / jelly.dx)
+    record_settings(run, "nclaw_jelly", {
+        "nclaw.sec4_1.train_points": points, "nclaw.sec4_1.steps": jelly.steps,
+        "nclaw.sec4_1.dt": jelly.dt, "nclaw.sec4_1.materials": len(scenes),
+        "nclaw.appD1.cube_edge": high[0] - low[0], "nclaw.appD1.grid_per_dim": cells,
+        "nclaw.appD1.dx": jelly.dx, "nclaw.appD1.gravity": jelly.gravity[1],
+        "nclaw.appD1.bc_threshold": jelly.walls.low[0],
+        "nclaw.appF1.real_time": jelly.steps * jelly.dt, "nclaw.appF1.steps_ours": jelly.steps})
+    record_release(run, scenes)
+
+
+def record_release(run, scenes):
+    """Constants that the text leaves out and the authors' release sets."""
+    of = {name: scene.body[0].material for name, scene in scenes.items()}
+    v = scenes["jelly"].body[0].velocity
+    record_settings(run, "nclaw_*", {
+        "nclaw.ext.jello.E": of["jelly"].E, "nclaw.ext.jello.nu": of["jelly"].nu,
+        "nclaw.ext.sand.E": of["sand"].E, "nclaw.ext.sand.nu": of["sand"].nu,
+        "nclaw.ext.sand.friction_deg": of["sand"].flow.friction_angle,
+        "nclaw.ext.plasticine.E": of["plasticine"].E,
+        "nclaw.ext.plasticine.nu": of["plasticine"].nu,
+        "nclaw.ext.plasticine.yield_stress": of["plasticine"].flow.tau_y,
+        "nclaw.ext.water.E": of["water"].E, "nclaw.ext.water.nu": of["water"].nu,
+        "nclaw.ext.rho": scenes["jelly"].body[0].density,
+        **{f"nclaw.ext.vlin.{a}": u for a, u in zip(AXES, v.linear, strict=True)},
+        **{f"nclaw.ext.vang.{a}": w for a, w in zip(AXES, v.angular, strict=True)}})
+
+
+@experiment("nclaw.environments", title="Final states of NCLaw's four environments",
+            profiles=("quick", "standard"), budget={"quick": 40, "standard": 40})
+def environments(run):
+    """1000 particles, 1000 steps each."""
+    rows = []
+    for name in run.progress(ENVIRONMENTS, "environments"):
+        body = final(name)
+        rows.append(state_row(name, body))
+        record_state(run, name, body)
+    run.table("states", ("environment", *(f"{what}_{a}" for what in ("center", "low", "high")
+                                          for a in AXES), "J", "kinetic", "sha256"), rows)
+
+
+def final(name):
+    """The body of an environment after its last step.
+
+    The fixed step is not compared with its bound here, which changes no bit.
+    """
+    problem = build(with_(shipped(f"nclaw_{name}"), unstable="allow", every=None))
+    with threads_for(problem.bodies):
+        for frame in simulate(problem):
+            body = frame.state.bodies[0]
+    return body
+
+
+def state_row(name, body):
+    """Centre of mass, bounding box, mean J, kinetic energy, hash of a body's state."""
+    q = body.particles
+    return (name, *mean(body, "x"), *q.x.min(axis=0), *q.x.max(axis=0),
+            float(volume_ratio(q).mean()), float(kinetic(q).sum()), digest(body))
+
+
+def record_state(run, name, body):
+    """Record the numbers of one final state."""
+    q, target = body.particles, f"nclaw.environments.{name}"
+    rule = {"comparator": "info", "scale": f"{len(q.x)} particles, 1000 steps, as printed"}
+    for axis, x in zip(AXES, mean(body, "x"), strict=True):
+        run.record(f"{target}.center.{axis}", float(x), unit="m", **rule)
+    run.record(f"{target}.J", float(volume_ratio(q).mean()), note="mean volume ratio", **rule)
+    run.record(f"{target}.kinetic", float(kinetic(q).sum()), unit="J",
+               note=f"sha256 of the state {digest(body)}", **rule)
+
+
+def digest(body):
+    """sha256 of what the particles carry, in the order in which they were sampled."""
+    order, text = np.argsort(body.id), hashlib.sha256()
+    for name in CARRIED:
+        a = getattr(body.particles, name)
+        text.update(np.ascontiguousarray(a[order] if len(a) == len(order) else a).tobytes())
+    return text.hexdigest()

@@ -1,0 +1,55 @@
+"""Free fall of a block, against what symplectic Euler does exactly.
+
+    v_n = v_0 + n dt g,     x_n = x_0 + n dt v_0 + dt^2 g n (n + 1)/2
+
+Every particle of a body without stress must do this to round-off, wherever it is in its cell and
+however many cells it crosses. Positions of the particles are random.
+"""
+
+import numpy as np
+
+from mpm_ref.body import Body, particles_at
+from mpm_ref.explicit import Scheme, Stepper
+from mpm_ref.materials import LogNeoHookean, NoFlow, lame
+
+from ..registry import experiment
+from .scenes import threads_for
+from .symplectic import travelled
+
+G, V, DX = np.array([0.3, -9.8]), np.array([1.0, 2.0]), 0.1
+LAW = LogNeoHookean(*lame(1e5, 0.3))
+STEPS, DT, PARTICLES = 1000, 1e-3, 200
+QUICK = (("mls", 2), ("mls", 3), ("flip", 1))
+STANDARD = (("pic", 1), ("pic", 2), ("pic", 3), ("flip", 1), ("flip", 2), ("flip", 3),
+            ("apic", 2), ("apic", 3), ("mls", 2), ("mls", 3))
+
+
+def fall(transfer, degree, x):
+    """Largest errors of position and velocity after `STEPS`, relative to the way and the speed."""
+    q = particles_at(x.copy(), np.tile(V, (len(x), 1)), np.ones(len(x)), np.full(len(x), 1e-3),
+                     transfer)
+    block = Body("block", q, LAW, NoFlow(), np.arange(len(x)))
+    stepper = Stepper(Scheme(degree, transfer), DX, 2, G)
+    stepper.start([block])
+    with threads_for([block]):
+        for k in range(STEPS):
+            stepper.step([block], k * DT, DT)
+    t = STEPS * DT
+    way, v = travelled(V, G, t, DT), V + t * G
+    return (float(np.abs(q.x - x - way).max() / np.linalg.norm(way)),
+            float(np.abs(q.v - v).max() / np.linalg.norm(v)))
+
+
+@experiment("verification.free_fall", title="Free fall to round-off",
+            profiles=("quick", "standard"), budget={"quick": 3, "standard": 20})
+def free_fall(run):
+    """All transfers."""
+    x = run.rng.uniform(0.0, 0.5, (PARTICLES, 2))
+    bound = STEPS * np.finfo(float).eps
+    schemes = run.choose(quick=QUICK, standard=STANDARD)
+    for transfer, degree in run.progress(schemes, "schemes"):
+        for what, error in zip(("x", "v"), fall(transfer, degree, x), strict=True):
+            run.record(f"verification.free_fall.{transfer}-{degree}.{what}", error, paper=0.0,
+                       comparator="<=", bound=bound,
+                       scale=f"{PARTICLES} particles, {STEPS} steps, 40 cells fallen",
+                       note="bound: one rounding of relative size 2^-52 in each step")
