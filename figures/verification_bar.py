@@ -1,5 +1,5 @@
-"""Axial vibration of a bar. Left: amplitude of the coarsest run, 8 cells over the length, beside the
-exact one. Right: largest RMS error of the displacement over four periods; free of walls the error
+"""Axial vibration of a bar. Left: amplitude of the coarsest run, 8 cells over the length, beside
+the exact one. Right: largest RMS error of the displacement over four periods; free of walls it
 falls with the second order of the method, at a sticky wall with the first order of the wall.
 """
 

@@ -1,5 +1,5 @@
-"""A saddle slides down in a bowl without friction: its angular velocity, with the exact pendulum's at
-the bottom.
+"""A saddle slides down in a bowl without friction: its angular velocity, with that of the exact
+pendulum at the bottom.
 """
 
 import matplotlib.pyplot as plt

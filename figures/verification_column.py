@@ -26,11 +26,10 @@ def draw(results):
              xticklabels=[f"{a:g}" for a in sorted(set(table["a"]))])
     left.minorticks_off()
     left.legend(fontsize=7)
-    chosen = series(deposit, ("kind", "cells", "a")).items()
-    for k, ((kind, cells, a), rows) in enumerate(
-            item for item in chosen if item[0][:2] == ("plane", finest["plane"])):
-        right.plot(deposit["r"][rows], deposit["height"][rows], color=f"C{k}", label=f"a = {a:g}")
-        right.plot((0.0, 1.0, 1.0), (a, a, 0.0), ":", color=f"C{k}", lw=1)
+    for (kind, cells, a), rows in series(deposit, ("kind", "cells", "a")).items():
+        if (kind, cells) == ("plane", finest["plane"]):
+            line, = right.plot(deposit["r"][rows], deposit["height"][rows], label=f"a = {a:g}")
+            right.plot((0.0, 1.0, 1.0), (a, a, 0.0), ":", color=line.get_color(), lw=1)
     right.set(xlabel="x / L", ylabel="height / L", ylim=(0.0, 2.6))
     right.legend(fontsize=7)
     figure.tight_layout()

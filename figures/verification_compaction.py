@@ -1,6 +1,7 @@
-"""Column under its weight. Left: stress of the particles of the coarsest column, 8 cells high, beside
-the exact line; the wall spoils its own cell. Right: mean error of the stress, of a column that
-strains by 4 % (soft), where particles cross cells, and of one that hardly strains (stiff).
+"""Column under its weight. Left: stress of the particles of the coarsest column, 8 cells high,
+beside the exact line; the wall spoils the stress of the cells next to it. Right: mean error of the
+stress, of a column that strains by 4 % (soft), where particles cross cells, and of one that hardly
+strains (stiff).
 """
 
 import matplotlib.pyplot as plt

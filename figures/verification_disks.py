@@ -25,6 +25,7 @@ def draw(results):
     right.set(xlabel="dx [m]", ylabel="gap at first contact [m]", xticks=contact["dx"],
               xticklabels=[f"{dx:g}" for dx in contact["dx"]])
     right.minorticks_off()
+    right.set(yticks=(0.05, 0.1, 0.2, 0.4), yticklabels=("0.05", "0.1", "0.2", "0.4"))
     right.legend(fontsize=8)
     figure.tight_layout()
     return figure

@@ -1,6 +1,6 @@
-"""Block on an incline of 24 degrees, gravity turned on a flat wall or a truly tilted plane. Way down
-the plane (left), and its difference from the rigid block's (right): the start from rest, during
-which the foot of the elastic block sticks, and its hopping are what is left.
+"""Block on an incline of 24 degrees, gravity turned on a flat wall or a truly tilted plane. Way
+down the plane (left), and its difference from the rigid block's (right): the start from rest,
+during which the foot of the elastic block sticks, and its hopping are what is left.
 """
 
 import matplotlib.pyplot as plt

@@ -1,5 +1,5 @@
-"""Colliding rings: mechanical energy with each transfer. Crosses: what a public code's tests hold for
-the end, from randomly placed particles on the grid of the standard profile.
+"""Colliding rings: mechanical energy with each transfer. Crosses: what a public code's tests hold
+for the end, from randomly placed particles on the grid of the standard profile.
 """
 
 import matplotlib.pyplot as plt

@@ -13,7 +13,8 @@ def draw(results):
     table = results.table(NEEDS[0], "history")
     figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.6), sharex=True)
     for (body, transfer), rows in series(table, ("body", "transfer")).items():
-        style = {"color": TRANSFERS[transfer], "ls": "-" if body == "disk" else "--"}
+        style = {"color": TRANSFERS[transfer], "ls": "-" if body == "disk" else ":",
+                 "lw": 3.0 if transfer == "mls" else 1.4}      # APIC lies upon MLS
         for ax, what in ((left, "L"), (right, "energy")):
             ax.plot(table["turns"][rows], table[what][rows], **style, label=f"{body}, {transfer}")
     left.set(xlabel="revolutions", ylabel="angular momentum / its start", ylim=(-0.05, 1.1))

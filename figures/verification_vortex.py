@@ -20,7 +20,8 @@ def draw(results):
     cells = sorted(set(table["cells"]))
     slope(left, -2, (cells[0], cells[-1]), 0.7 * table["error"].max(), "order 2")
     left.set(xlabel="cells per metre", ylabel="error / (R G)", xticks=cells,
-             xticklabels=[f"{n:.0f}" for n in cells], xlim=(0.8 * cells[0], 1.5 * cells[-1]))
+             xticklabels=[f"{n:.0f}" for n in cells], xlim=(0.8 * cells[0], 1.5 * cells[-1]),
+             ylim=(1e-3, 1.0))
     left.minorticks_off()
     left.legend(fontsize=7)
     sign = results.table(NEEDS[0], "printed-sign")

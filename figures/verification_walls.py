@@ -26,7 +26,8 @@ def draw(results):
     platen = results.table(NEEDS[1], "platen")
     right.loglog(platen["cells"], np.abs(platen["force_error"]), "s-", ms=4, label="platen")
     slope(right, -1, (platen["cells"][0], platen["cells"][-1]), 0.2, "1")
-    right.set(xlabel="cells over the height", ylabel="|force / closed form - 1|")
+    right.set(xlabel="cells over the height", ylabel="|force / closed form - 1|",
+              yticks=(0.05, 0.1, 0.2, 0.4), yticklabels=("5 %", "10 %", "20 %", "40 %"))
     for ax, ticks in ((left, cells), (right, platen["cells"])):
         ax.set(xticks=ticks, xticklabels=[f"{n:.0f}" for n in ticks])
         ax.minorticks_off()

@@ -21,8 +21,8 @@ class Body(NamedTuple):
 
 def particles_at(x, v, m, V0, transfer="mls", fluid=False):
     """Particles without stress (F = I) at x (N, d) with velocity v (N, d), mass m (N,), volume V0
-    (N,). Only the fields that the transfer needs are allocated; `fluid` carries J instead of F.
-    Further fields are set by `_replace`: the history y (N,), a body force b (N, d).
+    (N,); all are copied. Only the fields that the transfer needs are allocated; `fluid` carries J
+    instead of F. Further fields are set by `_replace`: the history y (N,), a body force b (N, d).
     """
     n, d = x.shape
     L = np.zeros((n, d, d))
@@ -30,13 +30,13 @@ def particles_at(x, v, m, V0, transfer="mls", fluid=False):
     if transfer in AFFINE:
         C = L if transfer == "mls" else np.zeros((n, d, d))
     return Particles(
-        *(np.ascontiguousarray(a, dtype=float) for a in (x, v)),
+        *(np.array(a, dtype=float, order="C") for a in (x, v)),
         C=C,
         L=L,
         F=np.ones(n) if fluid else np.tile(np.eye(d), (n, 1, 1)),
         tau=np.zeros(n) if fluid else np.zeros((n, d, d)),
-        m=np.ascontiguousarray(m, dtype=float),
-        V0=np.ascontiguousarray(V0, dtype=float),
+        m=np.array(m, dtype=float),
+        V0=np.array(V0, dtype=float),
         y=NO_HISTORY,
         b=NONE,
     )

@@ -79,7 +79,7 @@ def energy(bodies, gravity, inertia=0.0):
         parts += (
             total(kinetic(q, inertia)),
             total(elastic(body)),
-            -total(q.m * (q.x @ np.asarray(gravity, dtype=float))),
+            -sum(g * total(q.m * q.x[:, a]) for a, g in enumerate(gravity)),
         )
     return Energy(*map(float, parts))
 

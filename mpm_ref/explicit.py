@@ -1,6 +1,6 @@
 """One symplectic Euler step of explicit MPM, phase by phase.
 
-    order -> p2g -> grid update -> boundaries -> g2p -> deform (F, return map, stress)
+    order -> p2g -> grid update -> boundaries -> g2p -> deform (F, return map, stress) -> damp
 
 NSF-alg-mpm with APIC, LDM-alg1 with PIC and NCLAW-alg3 with MLS-MPM are choices of a `Scheme`.
 The stress of the particles belongs to their F at the start of a step; `deform` leaves it so for
@@ -17,6 +17,7 @@ from .core.grid import Store, update
 from .core.order import by_cell, slabs_of
 from .core.spline import STENCILS
 from .core.transfer import g2p, p2g, rpic
+from .fit import check_fit
 from .materials import NoFlow
 
 TRANSFERS = ("pic", "flip", "apic", "mls")
@@ -83,17 +84,26 @@ class Stepper:
     def __init__(self, scheme, dx, dim, gravity, conditions=None):
         self.scheme, self.dx, self.conditions = scheme, dx, conditions
         self.gravity = np.asarray(gravity, dtype=float)
+        if self.gravity.shape != (dim,) or not np.isfinite(self.gravity).all():
+            raise ValueError(f"gravity = {gravity}: expected {dim} finite numbers, in m/s^2")
+        if not 0.0 < dx < np.inf:
+            raise ValueError(f"dx = {dx}: expected a positive, finite length in m")
         self.store = Store(dx, scheme.stencil, dim, flip=scheme.transfer == "flip")
 
     def start(self, bodies):
-        """Compute the stress of the bodies' state; needed once, before the first step."""
+        """Check that the bodies fit the scheme, and compute their stress; needed once, before the
+        first step. Raises ValueError with what does not fit.
+        """
         for body in bodies:
+            check_fit(body, self.scheme, len(self.gravity))
             initial_stress(body)
 
     def step(self, bodies, t, dt):
         """Advance from time t [s] by dt [s]; returns the grid, which holds m and the new v.
-        Changes the bodies in place.
+        Changes the bodies in place. Raises ValueError unless dt > 0.
         """
+        if not 0.0 < dt < np.inf:
+            raise ValueError(f"dt = {dt}: expected a positive, finite time in s")
         grid = scatter(bodies, self.store, self.scheme, dt)
         update(grid, self.gravity, dt, self.scheme.mass_eps, self.scheme.gravity_on_empty)
         if self.conditions is not None:
@@ -101,6 +111,7 @@ class Stepper:
         for body in bodies:
             gather(body, grid, self.scheme, dt)
             deform_body(body, dt)
+            damp(body, self.scheme)
         return grid
 
     def sort(self, bodies):
@@ -126,6 +137,12 @@ def scatter(bodies, store, scheme, dt):
 def gather(body, grid, scheme, dt):
     """Velocity, position and velocity gradient of a body's particles from the grid."""
     g2p(body.particles, grid, scheme.stencil, dt, scheme.flip, scheme.transfer == "mls")
+
+
+def damp(body, scheme):
+    """RPIC damping of the affine field. It comes after the deformation, which under MLS-MPM reads
+    the same array: what is handed on is damped, the strain is not (NSF-rpic).
+    """
     if scheme.rpic:
         rpic(body.particles.C, scheme.rpic)
 

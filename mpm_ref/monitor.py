@@ -63,7 +63,7 @@ def account(problem, bodies):
     put in energy that it could not know.
     """
     driven = any(b.particles.b.ndim > 1 for b in bodies)
-    if driven or getattr(problem.conditions, "moves", False):
+    if driven or (problem.conditions is not None and getattr(problem.conditions, "moves", True)):
         return None
     mass = sum(float(b.particles.m.sum()) for b in bodies)
     noise = 1e-6 * mass * float(np.linalg.norm(problem.gravity)) * problem.dx
@@ -105,31 +105,39 @@ def volume_ratio(particles):
 def check(problem, state, dt):
     """Raise `Unstable` if the state breaks a limit; NaN breaks all of them."""
     for body in state.bodies:
-        cfl = speed(body.particles) * (dt / problem.dx)
-        _stop_where(problem, state, body, dt, ~np.isfinite(cfl), "a velocity is not finite")
-        _stop_where(problem, state, body, dt, ~(cfl <= problem.limits.cfl),
-                    f"a particle crosses more than {problem.limits.cfl:g} cells in a step")
         low, high = problem.limits.J
         J = volume_ratio(body.particles)
         low = -high if problem.may_invert(body) else low
         _stop_where(problem, state, body, dt, ~((low <= J) & (J <= high)),
                     f"J is outside [{low:g}, {high:g}]")
+        cfl = speed(body.particles) * (dt / problem.dx)
+        astray = ~(np.isfinite(cfl) & np.isfinite(body.particles.x).all(axis=1))
+        _stop_where(problem, state, body, dt, astray, "a position or velocity is not finite")
+        _stop_where(problem, state, body, dt, ~(cfl <= problem.limits.cfl),
+                    f"a particle crosses more than {problem.limits.cfl:g} cells in a step")
     if state.account is not None:
         now = energy(state.bodies, problem.gravity, problem.inertia)
         growth = problem.limits.growth + swing(dt, state.bound)
         allowed = state.account.allowed(now, growth)
         if not now.sum <= allowed:
-            body = max(state.bodies, key=lambda b: speed(b.particles).max())
-            fastest = speed(body.particles) >= speed(body.particles).max()
-            _stop_where(problem, state, body, dt, fastest, f"energy exceeds {allowed:.6g} J")
+            raise lost(problem, state, dt, f"energy exceeds {allowed:.6g} J")
 
 
 def _stop_where(problem, state, body, dt, broken, reason):
     """Raise for the first particle of the mask, if there is one."""
-    if not broken.any():
-        return
-    p = int(np.argmax(broken))
-    raise Unstable(
+    if broken.any():
+        raise unstable(problem, state, body, int(np.argmax(broken)), dt, reason)
+
+
+def lost(problem, state, dt, reason):
+    """`Unstable` for a reason that concerns the run as a whole: its fastest particle is named."""
+    body = max(state.bodies, key=lambda b: speed(b.particles).max())
+    return unstable(problem, state, body, int(np.argmax(speed(body.particles))), dt, reason)
+
+
+def unstable(problem, state, body, p, dt, reason):
+    """`Unstable` with what is to be said of particle p of a body."""
+    return Unstable(
         reason,
         step=state.step,
         t=state.t,

@@ -30,13 +30,17 @@ class Clock:
             raise ValueError(f"steps = {self.steps}, end = {self.end}: give one of the two")
         if self.every is not None and self.interval is not None:
             raise ValueError(f"every = {self.every}, interval = {self.interval}: give at most one")
-        if self.dt is not None and not (np.isfinite(self.dt) and self.dt > 0.0):
-            raise ValueError(f"dt = {self.dt}: expected a positive number of seconds")
+        for name in ("dt", "cfl", "steps", "end", "every", "interval"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 < value < np.inf:
+                raise ValueError(f"{name} = {value}: expected a positive, finite number")
+        if self.dt is not None and self.interval is not None and self.interval < self.dt:
+            raise ValueError(f"interval = {self.interval}: expected at least dt = {self.dt}")
 
 
 @dataclass(frozen=True)
 class Problem:
-    """Initial state and rules of a run. Kernels change the arrays of the bodies in place."""
+    """Initial state and rules of a run, for one run: it changes the arrays of the bodies."""
 
     bodies: tuple                       # of Body
     dx: float                           # grid spacing [m]
@@ -49,6 +53,15 @@ class Problem:
     allow_unstable: bool = False        # run on although dt is past its bound
     title: str = ""
     source: str = ""                    # canonical text of the scene, "" if built in Python
+
+    def __post_init__(self):
+        if not self.bodies:
+            raise ValueError("bodies = (): expected at least one body")
+        if self.clock.dt is None and self.clock.cfl > 1.0 and not self.allow_unstable:
+            raise ValueError(
+                f"cfl = {self.clock.cfl}: expected at most 1, the bound of the time step; past it "
+                "a run must say that it may be unstable"
+            )
 
     @property
     def inertia(self):

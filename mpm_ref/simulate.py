@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .core.grid import OutOfRange
 from .explicit import Stepper
-from .monitor import CHECK, Account, account, check, runs_away
-from .timestep import refuse, stable_dt
+from .monitor import CHECK, Account, account, check, lost, runs_away
+from .timestep import advective, refuse, stable_dt
 
 SORT = 64        # steps between physical sorts of the particles by cell
 REBOUND = 10     # steps between evaluations of the stable time step
@@ -45,8 +46,9 @@ def simulate(problem, state=None, on_step=None):
     """Run a problem, from its start or from a `State`, and yield a `Frame` at every frame time.
 
     on_step(state, dt) is called after every step, when the state is whole: to save a checkpoint,
-    show progress, or end the run by raising. Raises `Unstable` (see `monitor`) and `TooLarge`
-    (see `timestep`).
+    show progress, or end the run by raising. Raises `Unstable` (see `monitor`), `TooLarge` (see
+    `timestep`), and ValueError if a body does not fit the scheme. With a fixed dt, `end` is met by
+    the first step that reaches it.
     """
     stepper = Stepper(problem.scheme, problem.dx, problem.dim, problem.gravity, problem.conditions)
     if state is None:
@@ -57,7 +59,11 @@ def simulate(problem, state=None, on_step=None):
     if state.frame == 0:
         yield show(state, 0.0)
     while not ended(problem.clock, state):
-        dt = advance(problem, stepper, state)
+        try:
+            dt = advance(problem, stepper, state)
+        except OutOfRange as error:
+            check(problem, state, problem.clock.dt or 0.0)
+            raise lost(problem, state, problem.clock.dt or 0.0, str(error)) from error
         if on_step is not None:
             on_step(state, dt)
         if frame_is_due(problem.clock, state):
@@ -75,9 +81,9 @@ def advance(problem, stepper, state):
     """One step: sort now and then, choose dt, step, clip, check. Returns dt."""
     if state.step % SORT == 0:
         stepper.sort(state.bodies)
-    if state.step % REBOUND == 0 and needs_bound(problem, state):
+    if bound_is_due(problem.clock, state):
         state.bound = rebound(problem, stepper, state)
-    dt = next_dt(problem.clock, state)
+    dt = next_dt(problem.clock, state, swiftest(problem, state))
     stepper.step(state.bodies, state.t, dt)
     if problem.clip is not None:
         keep_inside(state.bodies, *problem.clip)
@@ -89,21 +95,33 @@ def advance(problem, stepper, state):
     return dt
 
 
-def needs_bound(problem, state):
-    """An adaptive dt follows its bound; a fixed one is compared with it at checks."""
-    return problem.clock.dt is None or (state.step % CHECK == 0 and not problem.allow_unstable)
+def bound_is_due(clock, state):
+    """An adaptive dt follows its bound closely; a fixed one is compared with it at checks."""
+    every = REBOUND if clock.dt is None else CHECK
+    return state.step % every == 0 or state.bound == inf
 
 
 def rebound(problem, stepper, state):
-    """Stable dt of the state [s]; refuses a fixed dt that is past it."""
+    """Stable dt of the state [s]; refuses a fixed dt that is past it, unless the problem allows."""
     terms = stable_dt(state.bodies, stepper)
-    if problem.clock.dt is not None:
+    if not terms.dt > 0.0:
+        check(problem, state, 0.0)
+        raise lost(problem, state, 0.0, f"no stable time step: {terms.sentence()}")
+    if problem.clock.dt is not None and not problem.allow_unstable:
         refuse(problem.clock.dt, terms, state.step)
     return terms.dt
 
 
-def next_dt(clock, state):
-    """Length of the next step [s]: fixed, or such that equal steps within the bound meet the next
+def swiftest(problem, state):
+    """Advective bound of dt as of now [s]; an adaptive step may not wait for the next `rebound`."""
+    if problem.clock.dt is not None:
+        return inf
+    particles = (body.particles for body in state.bodies)
+    return min(advective(q, problem.dx, 0.0, problem.gravity) for q in particles)
+
+
+def next_dt(clock, state, advective_bound):
+    """Length of the next step [s]: fixed, or such that equal steps within the bounds meet the next
     frame or the end.
     """
     if clock.dt is not None:
@@ -111,7 +129,7 @@ def next_dt(clock, state):
     target = clock.end if clock.end is not None else inf
     if clock.interval is not None:
         target = min(target, state.frame * clock.interval)
-    dt = clock.cfl * state.bound
+    dt = clock.cfl * min(state.bound, advective_bound)
     if target == inf:
         return dt
     return (target - state.t) / max(ceil((target - state.t) / dt - EVEN), 1)

@@ -1,7 +1,7 @@
 """The stable time step of the explicit method: four bounds, each reported.
 
-* advective: no part of a particle's support crosses more than a cell, dt (|v_p| + |L_p| dx
-  (degree + 1)/2) < dx;
+* advective: no part of a particle's support crosses more than a cell, dt u + dt^2 |g| < dx with
+  u = |v_p| + |L_p| dx (degree + 1)/2;
 * elastic: no wave crosses more than a cell, dt c_p < dx, c_p that of `materials.waves` at the
   current stretches;
 * viscous: none of the shipped laws has an explicit viscosity (Bingham flow is integrated
@@ -11,19 +11,20 @@
 
       S_p = max_a sum_i (dw_ip/dx_a)^2/w_ip,
 
-  dt^2 V0 K/m times S, 2 S - 1/D and 1/D is at most 2, 4 and 4 for PIC and FLIP, APIC and MLS-MPM.
+  dt^2 V0 K/m times S, S - 1/(2 D) and 1/D is at most 2, 2 and 4 for PIC and FLIP, APIC and
+  MLS-MPM; RPIC damping z makes it S - (1 - z)/(2 - z)/D and 2 (2 - z) for the last two.
   It is the limit of an isolated particle, and no cloud of particles has a smaller one: derived in
   docs/timestep.md. Linear splines have no such limit (S is infinite at a node); for them m_p/m_i
   with the nodes' masses stands for 1/w_ip, and the bound is necessary, not sufficient.
 """
 
-from math import inf, sqrt
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
 
 from .core.jit import CHUNKS, chunk, kernel, parallel, prange
-from .core.law import kirchhoff_hat, pressure
+from .core.law import kirchhoff_hat
 from .core.spectral import svd
 from .core.stencil import (
     column,
@@ -41,8 +42,6 @@ from .explicit import scatter
 from .materials.principal import dpk1_hat
 from .materials.waves import wave_modulus
 
-STRAIN = 1e-5     # of the differences of a fluid's pressure
-
 
 class TooLarge(ValueError):
     """A fixed time step is past its bound."""
@@ -58,8 +57,8 @@ class TimeStep(NamedTuple):
 
     @property
     def dt(self):
-        """The smallest bound."""
-        return min(self)
+        """The smallest bound; NaN if any of them is."""
+        return float(np.min(self))
 
     def sentence(self):
         """The bounds in words."""
@@ -99,12 +98,11 @@ def _solid_moduli(F, law, wave, largest, like, bounds):
 
 
 @kernel
-def _fluid_moduli(J, law, wave, largest, dim, bounds):
+def _fluid_moduli(J, law, wave, largest, like, bounds):
     for p in range(bounds[0], bounds[1]):
-        more, less = pressure(J[p] * (1.0 + STRAIN), law), pressure(J[p] * (1.0 - STRAIN), law)
-        slope = (more - less) / (2.0 * STRAIN)
-        wave[p] = max(slope - pressure(J[p], law), 0.0)
-        largest[p] = dim * slope
+        s = fill(J[p] ** (1.0 / len(like)), like)
+        wave[p] = wave_modulus(s, law)
+        largest[p] = largest_modulus(s, law)
 
 
 @parallel
@@ -114,20 +112,18 @@ def _all_solid_moduli(F, law, wave, largest, like):
 
 
 @parallel
-def _all_fluid_moduli(J, law, wave, largest, dim):
+def _all_fluid_moduli(J, law, wave, largest, like):
     for c in prange(CHUNKS):
-        _fluid_moduli(J, law, wave, largest, dim, chunk(c, len(wave)))
+        _fluid_moduli(J, law, wave, largest, like, chunk(c, len(wave)))
 
 
 def moduli(body):
     """Modulus of the fastest wave and `largest_modulus` of a body's particles, two (N,) [Pa]."""
     q = body.particles
-    dim = q.x.shape[1]
+    like = tuple(range(q.x.shape[1]))
     wave, largest = np.empty(len(q.x)), np.empty(len(q.x))
-    if q.F.ndim == 1:
-        _all_fluid_moduli(q.F, body.law, wave, largest, dim)
-    else:
-        _all_solid_moduli(q.F, body.law, wave, largest, tuple(range(dim)))
+    run = _all_fluid_moduli if q.F.ndim == 1 else _all_solid_moduli
+    run(q.F, body.law, wave, largest, like)
     return wave, largest
 
 
@@ -176,41 +172,62 @@ def _couplings(particles, grid, stencil, S):
 
 def single_particle_limit(particles, grid, scheme, stiffness):
     """Smallest dt limit of any particle's own oscillation [s]; stiffness (N,) is V0_p K_p / m_p."""
-    own = inverse_inertia(grid.dx, scheme.stencil)
+    own, kept = inverse_inertia(grid.dx, scheme.stencil), 1.0 - scheme.rpic
     if scheme.transfer == "mls":
-        return sqrt(4.0 / max(float(np.max(stiffness * own)), 1e-300))
+        return _limit(stiffness * own, 2.0 * (1.0 + kept))
     S = np.empty(len(particles.x))
     _couplings(particles, grid, scheme.stencil, S)
-    load, most = (2.0 * S - own, 4.0) if scheme.transfer == "apic" else (S, 2.0)
-    return sqrt(most / max(float(np.max(stiffness * load)), 1e-300))
+    memory = kept / (1.0 + kept) * own if scheme.transfer == "apic" else 0.0
+    return _limit(stiffness * (S - memory), 2.0)
+
+
+def _limit(load, most):
+    """Largest dt with dt^2 load <= most for every particle; infinite where there is no load."""
+    with np.errstate(divide="ignore"):
+        return float(np.sqrt(most / np.max(load)))
 
 
 def stable_dt(bodies, stepper):
     """`TimeStep` of the bodies' state under a `Stepper`'s scheme and grid spacing."""
-    scheme, dx = stepper.scheme, stepper.dx
-    grid = scatter(bodies, stepper.store, scheme, 0.0)
-    bounds = [_body_dt(body, grid, scheme, dx) for body in bodies]
-    return TimeStep(*(min(terms) for terms in zip(*bounds, strict=True)))
+    scheme = stepper.scheme
+    if scheme.degree == 1:
+        grid = scatter(bodies, stepper.store, scheme, 0.0)
+    else:
+        grid = stepper.store.cover([body.particles.x for body in bodies])
+    bounds = [_body_dt(body, grid, scheme, stepper.gravity) for body in bodies]
+    return TimeStep(*map(float, np.min(bounds, axis=0)))
 
 
-def _body_dt(body, grid, scheme, dx):
-    q = body.particles
+def _body_dt(body, grid, scheme, gravity):
+    q, dx = body.particles, grid.dx
     wave, largest = moduli(body)
-    reach = 0.5 * (scheme.degree + 1) * dx
-    spread = reach * np.sqrt(np.einsum("pab,pab->p", q.L, q.L))
-    fastest = np.max(np.linalg.norm(q.v, axis=1) + spread)
-    c = sqrt(max(float(np.max(wave * q.V0 / q.m)), 0.0))
     return (
-        dx / float(fastest) if fastest > 0.0 else inf,
-        dx / c if c > 0.0 else inf,
+        advective(q, dx, 0.5 * (scheme.degree + 1) * dx, gravity),
+        _limit(np.maximum(wave, 0.0) * q.V0 / q.m, dx**2),
         inf,
         single_particle_limit(q, grid, scheme, np.maximum(largest, 0.0) * q.V0 / q.m),
     )
 
 
+def advective(particles, dx, reach, gravity):
+    """Largest dt in which no particle, nor a point at the distance reach [m] that moves with its
+    velocity gradient, crosses a cell: dt u + dt^2 g = dx with the largest such speed u.
+    """
+    q = particles
+    u = np.sqrt(np.einsum("pa,pa->p", q.v, q.v))
+    if reach:
+        u += reach * np.sqrt(np.einsum("pab,pab->p", q.L, q.L))
+    u, g = float(np.max(u)), float(np.linalg.norm(gravity))
+    if q.b.ndim == 2:
+        g += float(np.sqrt(np.max(np.einsum("pa,pa->p", q.b, q.b))))
+    return float(np.float64(2.0 * dx) / (u + np.sqrt(u * u + 4.0 * g * dx))) if u or g else inf
+
+
 def refuse(dt, terms, step=0):
-    """Raise `TooLarge` if dt is past the bound, with all terms."""
-    if dt > terms.dt:
+    """Raise `TooLarge` if dt is past the bound, with all terms. Once the run has begun, only the
+    elastic and single-particle terms refuse it: whether particles cross cells is watched itself.
+    """
+    if dt > (terms.dt if step == 0 else min(terms.elastic, terms.single_particle)):
         raise TooLarge(
             f"dt = {dt:.6g} s is past the stable time step {terms.dt:.3g} s at step {step} "
             f"({terms.sentence()}); "

@@ -113,7 +113,7 @@ def test_empty_nodes_rest_or_fall(rng):
 
 
 def test_largest_grid_is_bounded():
-    """The bound protects memory: 200 million nodes are 6.4 GB in 3D."""
-    side = DX * grids.MAX_NODES ** (1 / 3)
-    with pytest.raises(OutOfRange, match="grid nodes of spacing"):
+    """The bound protects memory: of a node in 3D, mass and momentum are 32 bytes."""
+    side = DX * (grids.MAX_BYTES / 32) ** (1 / 3)
+    with pytest.raises(OutOfRange, match="bytes at dx"):
         Store(DX, STENCILS[2], 3).cover([np.array([[0.0] * 3, [1.01 * side] * 3])])

@@ -25,6 +25,7 @@ FLOORS = (
     ("core",),
     ("materials", "plain"),
     ("body",),
+    ("fit",),
     ("explicit", "adjoint", "energy"),
     ("timestep", "monitor"),
     ("hot", "rom", "nclaw"),

@@ -11,7 +11,7 @@ from validation.trade.setting import DEFAULT, QUICK, STANDARD, settings
 
 
 def point(cpu, error, end="finished"):
-    return Point("dt", DEFAULT, error, cpu, 100, 1, 0.5, end, "")
+    return Point("dt", DEFAULT, error, cpu, 100, 1, 0.5, end, "", False)
 
 
 def test_front_holds_what_no_point_beats():

@@ -11,7 +11,7 @@ from .order import slab_width
 from .spline import base_of
 from .state import NONE, Grid
 
-MAX_NODES = 200_000_000
+MAX_BYTES = 8e9
 
 
 class OutOfRange(ValueError):
@@ -53,24 +53,25 @@ class Store:
     """Reusable storage of a `Grid` for spacing dx [m] and a stencil; see `cover`."""
 
     def __init__(self, dx, stencil, dim, flip=False):
-        self.dx, self.stencil, self.dim, self.flip = dx, stencil, dim, flip
+        self.dx, self.stencil, self.dim = dx, stencil, dim
+        self.vectors = 3 if flip else 1
         self._buffer = NONE
 
     def cover(self, clouds):
         """Zeroed grid over all nodes that the points of `clouds`, arrays (N, d), reach.
 
-        Raises OutOfRange where a point is not finite or the box would exceed MAX_NODES nodes.
+        Raises OutOfRange where a point is not finite or the box would need more than MAX_BYTES.
         """
         low, high = self._box(clouds)
         first = self._base(low)
-        first[0] -= first[0] % slab_width(self.stencil)   # slabs begin at fixed nodes of the world
+        first[0] -= first[0] % (2 * slab_width(self.stencil))     # colours are fixed in the world
         shape = tuple(int(k) for k in self._base(high) + len(self.stencil) - first)
         size = int(np.prod(np.array(shape, dtype=float)))
-        vectors = 3 if self.flip else 1
-        if len(self._buffer) < size * (1 + vectors * self.dim):
-            self._buffer = np.empty(int(1.3 * size) * (1 + vectors * self.dim))
-        self._buffer[: size * (1 + vectors * self.dim)] = 0.0
-        return self._carve(shape, size, first, vectors)
+        needed = size * (1 + self.vectors * self.dim)
+        if len(self._buffer) < needed:
+            self._buffer = np.empty(int(1.3 * needed))
+        self._buffer[:needed] = 0.0
+        return self._carve(shape, size, first)
 
     def _base(self, x):
         return np.array([base_of(x_a, self.dx, self.stencil) for x_a in x], dtype=np.int64)
@@ -79,29 +80,33 @@ class Store:
         boxes = [extent(x) for x in clouds]
         low, high = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
         nodes = np.prod((high - low) / self.dx + len(self.stencil))
-        if nodes > MAX_NODES or max(-low.min(), high.max()) / self.dx > 2.0**50:
+        size = 8.0 * nodes * (1 + self.vectors * self.dim)
+        if size > MAX_BYTES or max(-low.min(), high.max()) / self.dx > 2.0**50:
             raise OutOfRange(
-                f"particles from {low} to {high} need {nodes:.1e} grid nodes of spacing {self.dx}, "
-                f"at most {MAX_NODES:.0e} are allowed; has a particle flown off, is dx too small?"
+                f"particles from {low} to {high} need a grid of {size:.1e} bytes at "
+                f"dx = {self.dx}, at most {MAX_BYTES:.0e} are allowed; has a particle flown off, "
+                "or is dx too small?"
             )
         return low, high
 
-    def _carve(self, shape, size, first, vectors):
+    def _carve(self, shape, size, first):
         d, at = self.dim, size
         fields = []
-        for _ in range(vectors):
+        for _ in range(self.vectors):
             fields.append(self._buffer[at : at + size * d].reshape((*shape, d)))
             at += size * d
-        v, f, v_old = fields if vectors == 3 else (fields[0], NONE, NONE)
+        v, f, v_old = fields if self.vectors == 3 else (fields[0], NONE, NONE)
         return Grid(self._buffer[:size].reshape(shape), v, f, v_old, first, self.dx)
 
 
 @kernel
 def _update(nodes, gravity, dt, eps, bounds):
     for i in range(bounds[0], bounds[1]):
-        if nodes.m[i] > 0.0:
-            for a in range(len(gravity)):
+        for a in range(len(gravity)):
+            if nodes.m[i] > 0.0:
                 nodes.v[i, a] = nodes.v[i, a] / (nodes.m[i] + eps) + dt * gravity[a]
+            else:
+                nodes.v[i, a] = 0.0     # a linear spline of weight 0 has a slope, hence a force
 
 
 @kernel

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .jit import kernel
-from .tensor import fill, identity, mat, mlin, vec
+from .tensor import fill, identity, mat, mlin, put_mat, vec
 
 
 class Particles(NamedTuple):
@@ -79,3 +79,10 @@ def body_force(b, p, like):
         return vec(b, p, like)
     else:
         return fill(0.0, like)
+
+
+@kernel
+def put_affine(C, p, scale, B):
+    """C_p = scale B, where an affine field is carried."""
+    if C.ndim == 3:
+        put_mat(C, p, mlin(scale, B, 0.0, B))

@@ -14,7 +14,7 @@ particles and the grid carry (see `state`) selects the transfer, when the kernel
 """
 
 from .jit import CHUNKS, chunk, kernel, parallel, prange
-from .state import affine, body_force, full
+from .state import affine, body_force, full, put_affine
 from .stencil import (
     add_to_node,
     arm,
@@ -138,13 +138,6 @@ def blend(u, flip, lag, v_old):
         return u
     else:
         return lin(1.0, u, flip, lag)
-
-
-@kernel
-def put_affine(C, p, scale, B):
-    """C_p = scale B, where an affine field is carried."""
-    if C.ndim == 3:
-        put_mat(C, p, mlin(scale, B, 0.0, B))
 
 
 @kernel

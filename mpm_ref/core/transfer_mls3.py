@@ -14,9 +14,9 @@ The same sums as `scatter_mls` and `gather_mls` of `transfer`, 2.5 times as fast
 import numpy as np
 
 from .jit import CHUNKS, chunk, kernel, parallel, prange
-from .state import affine, body_force, full
+from .state import affine, body_force, full, put_affine
 from .stencil import inverse_inertia, locate, weights_per_axis
-from .tensor import lin, mlin, mul, mv, outer, put_mat, put_vec, transpose, vec, vm
+from .tensor import lin, mlin, mul, mv, outer, put_vec, transpose, vec, vm
 
 # Offsets in an array, unsigned as the indices are: their sum with a signed integer is a float.
 _1, _2, _3, _4, _5, _6, _7, _8 = (np.uint64(k) for k in range(1, 9))
@@ -63,7 +63,7 @@ def gather_mls3(particles, grid, stencil, dt, bounds):
         rv = transpose((vm(w[2], r_x), vm(w[2], r_y), vm(r[2], line)))
         put_vec(particles.v, p, v_p)
         put_vec(particles.x, p, lin(1.0, x, dt, v_p))
-        put_gradient(particles.C, p, grid.dx * inverse_inertia(grid.dx, stencil), rv)
+        put_affine(particles.C, p, grid.dx * inverse_inertia(grid.dx, stencil), rv)
 
 
 @kernel
@@ -141,13 +141,6 @@ def plane(v, i, n, w, r):
 def weighted(w, A, B, C):
     """w_0 A + w_1 B + w_2 C of matrices."""
     return mlin(1.0, mlin(w[0], A, w[1], B), w[2], C)
-
-
-@kernel
-def put_gradient(C, p, scale, B):
-    """C_p = scale B, where an affine field is carried."""
-    if C.ndim == 3:
-        put_mat(C, p, mlin(scale, B, 0.0, B))
 
 
 @parallel

@@ -65,7 +65,9 @@ def advance(problem, body, grid, dt, seen):
     if q.F.ndim == 3:
         seen[f"{name}/F_trial"] = inner.trial(F, q.L, dt)
     explicit.deform_body(body, dt)
-    for field in ("v", "x", "C", "L", "F", "y", "tau"):
+    seen[f"{name}/L"] = q.L.copy()               # under MLS-MPM the array of C, damped next
+    explicit.damp(body, problem.scheme)
+    for field in ("v", "x", "C", "F", "y", "tau"):
         a = getattr(q, field)
         if len(a):
             seen[f"{name}/{field}"] = a.copy()

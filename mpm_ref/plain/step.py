@@ -140,9 +140,9 @@ def to_particles(q, ip, nodes, method, dt):
     v, box = transfer.velocity(nodes.v, ip, nodes.box), nodes.box
     x, C, L = q.x + dt * v, None, transfer.velocity_gradient(nodes.v, ip, box)
     if method.transfer in ("apic", "mls"):
-        C = transfer.rpic(transfer.affine(nodes.v, method.moment, ip, box), method.rpic)
-    if method.transfer == "mls":
-        L = C
+        C = transfer.affine(nodes.v, method.moment, ip, box)
+        L = C if method.transfer == "mls" else L
+        C = transfer.rpic(C, method.rpic)
     if method.transfer == "flip":
         v_old = nodes.mv / np.where(nodes.m > 0, nodes.m, 1)[..., None]
         v = transfer.flip(q.v, v, transfer.velocity(v_old, ip, box), method.flip)

@@ -56,7 +56,7 @@ def run(problem, out, options=None, watch=None):
     """Run a `Problem` into the results file `out`, and return an `Outcome`.
 
     SIGINT and SIGTERM end the run after the step being made, with a checkpoint. A run that becomes
-    unstable raises `Unstable`, `OutOfRange` or `TooLarge`; the last checkpoint, of a state that
+    unstable raises `Unstable` or `TooLarge`; the last checkpoint, of a state that
     passed all checks, then stands. Raises `Refused`, `BadCheckpoint`, `BadResults`, `InUse`
     or `NotWritten` where files stand in the way. The arrays of the problem's bodies are changed.
     """

@@ -8,7 +8,6 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..core.grid import OutOfRange
 from ..energy import energy
 from ..monitor import Unstable, check
 from ..simulate import Frame, ended, frame_is_due, simulate
@@ -62,27 +61,19 @@ class Session:
         self.saved = state.step if state else None
         try:
             with _signals(self):
-                for frame in self.frames(state):
+                for frame in simulate(self.problem, state, on_step=self.after_step):
                     self.show(frame)
             self.save()
             why = FINISHED
         except _Stop as stop:
             self.show_last()
             why = str(stop)
-        except (Unstable, OutOfRange, TooLarge) as fault:
+        except (Unstable, TooLarge) as fault:
             self.show_last()
             self.end(part, f"{type(fault).__name__}: {fault}")
             raise
         self.end(part, why)
         return why
-
-    def frames(self, state):
-        """Frames of the run. Particles that fly off the largest grid are a broken bound, too."""
-        try:
-            yield from simulate(self.problem, state, on_step=self.after_step)
-        except OutOfRange:
-            check(self.problem, self.state, self.dt)
-            raise
 
     def after_step(self, state, dt):
         """After every step; a frame that is due comes first."""
@@ -131,10 +122,15 @@ class Session:
         return time.perf_counter() - self.saved_at > SECONDS
 
     def save(self):
-        """Save a checkpoint, of a state that passes all checks. Raises `Unstable`, `NotWritten`."""
+        """Save a checkpoint, of a state that passes all checks; of another, the loop will judge at
+        its own time. Raises `NotWritten`.
+        """
         if self.saved == self.state.step:
             return
-        check(self.problem, self.state, self.dt)
+        try:
+            check(self.problem, self.state, self.dt)
+        except Unstable:
+            return
         checkpoint.save(checkpoint_of(self.writer.path), self.state, self.problem)
         self.saved, self.saved_at = self.state.step, time.perf_counter()
 

@@ -22,7 +22,7 @@ LOCKED = 0.5                            # of the deflection at nu = 0.3: marked 
 
 
 @experiment("extremes.explicit.locking", title="A clamped beam as it becomes incompressible",
-            profiles=("quick", "standard"), budget={"quick": 10, "standard": 900})
+            profiles=("quick", "standard"), budget={"quick": 5, "standard": 900})
 def locking(run):
     """First swing of the tip against Timoshenko's beam in plane strain, over nu."""
     ratios = run.choose(quick=(0.3, 0.45, 0.49, 0.499, 0.4999), standard=RATIOS)

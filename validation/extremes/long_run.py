@@ -64,7 +64,7 @@ class Oscillator:
 
 
 @experiment("extremes.explicit.long_run", title="Energy drift of oscillators over a long run",
-            profiles=("quick", "standard"), budget={"quick": 12, "standard": 900})
+            profiles=("quick", "standard"), budget={"quick": 4, "standard": 900})
 def long_run(run):
     """One particle, which nothing damps, and a block; both precisions of the state."""
     counts = {"one": run.choose(quick=10000, standard=1000000), "block": 100000}

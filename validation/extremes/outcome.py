@@ -8,18 +8,18 @@ from mpm_ref.simulate import simulate
 from mpm_ref.timestep import TooLarge
 
 # What a run says when it stops, by the beginning of its reason: the word for it.
-REASONS = {"energy": "energy", "J is": "J", "a particle crosses": "CFL", "a velocity": "not finite"}
-FINISHED, REFUSED, OUT_OF_RANGE = "finished", "refused", "out of range"
+REASONS = {"energy": "energy", "J is": "J", "a particle crosses": "CFL",
+           "a position or velocity": "not finite", "no stable": "no bound"}
+FINISHED, REFUSED, OUT_OF_RANGE, UNFIT = "finished", "refused", "out of range", "unfit"
 STOPS = (*REASONS.values(), REFUSED)       # how a run should end that cannot go on
 
 
 class Outcome(NamedTuple):
-    """The end of a run."""
+    """The end of a run. UNFIT is a state that no run accepts."""
 
-    kind: str           # FINISHED, a word of STOPS, or OUT_OF_RANGE
+    kind: str           # FINISHED, a word of STOPS, OUT_OF_RANGE or UNFIT
     step: int           # reached
     said: str           # the sentence of the error, "" if it finished
-    particle: int       # that was named, -1 if none was
 
 
 def outcome(problem, on_step=None):
@@ -35,10 +35,13 @@ def outcome(problem, on_step=None):
         for _ in simulate(problem, on_step=count):
             pass
     except TooLarge as refusal:
-        return Outcome(REFUSED, reached[0], str(refusal), -1)
+        return Outcome(REFUSED, reached[0], str(refusal))
     except OutOfRange as lost:
-        return Outcome(OUT_OF_RANGE, reached[0], str(lost), -1)
+        return Outcome(OUT_OF_RANGE, reached[0], str(lost))
+    except ValueError as misfit:
+        return Outcome(UNFIT, reached[0], str(misfit))
     except Unstable as stop:
-        kind = next(word for start, word in REASONS.items() if stop.reason.startswith(start))
-        return Outcome(kind, stop.step, str(stop), stop.particle)
-    return Outcome(FINISHED, reached[0], "", -1)
+        words = (word for start, word in REASONS.items() if stop.reason.startswith(start))
+        kind = next(words, OUT_OF_RANGE)        # else the grid could not follow, and says why
+        return Outcome(kind, stop.step, str(stop))
+    return Outcome(FINISHED, reached[0], "")

@@ -42,7 +42,7 @@ def climb(rung, count, rng):
             profiles=("quick", "standard"), budget={"quick": 6, "standard": 240})
 def cfl_ladder(run):
     """Finite up to the bound, refused past it, and stopped in time where it is allowed."""
-    count = run.choose(quick=500, standard=10000)
+    count = run.choose(quick=500, standard=3000)
     kinds = run.choose(quick=[(t, 2, "lattice") for t in TRANSFERS],
                        standard=[(t, d, s) for t in TRANSFERS for d in (2, 3)
                                  for s in ("lattice", "jittered")])
@@ -94,7 +94,7 @@ def single_particle(run):
     """Bounded at 0.9 of the limit, flagged at 1.1, for all transfers in the best and worst place
     [BaiSchroeder2022].
     """
-    count, rows = run.choose(quick=1000, standard=100000), []
+    count, rows = run.choose(quick=1000, standard=20000), []
     for transfer in TRANSFERS:
         for name, place in (("best", BEST), ("worst", WORST)):
             below, peak = breathe(transfer, place, 0.9, count)

@@ -1,4 +1,4 @@
-"""The cylinder under gravity (LDM section 5.1) by the full-order solver: settings and deflection."""
+"""The cylinder under gravity (LDM section 5.1), full order: its settings and its deflection."""
 
 import numpy as np
 

@@ -50,15 +50,15 @@ def sinking(setting):
 
 
 @experiment("trade.explicit.cantilever", title="Explicit MPM: swing of a cantilever against cost",
-            profiles=("quick", "standard"), budget={"quick": 20, "standard": 900})
+            profiles=("quick", "standard"), budget={"quick": 15, "standard": 900})
 def cantilever(run):
     """One knob at a time from the default, against a finer grid of the default."""
-    levels, fine = run.choose(quick=(QUICK, 48), standard=(STANDARD, 192))
+    levels, fine, per = run.choose(quick=(QUICK, 48, 2), standard=(STANDARD, 192, 3))
     repeats = run.choose(quick=2, standard=3)
-    best = sinking(DEFAULT._replace(cells=fine, per=3, cfl=0.4))
-    half = sinking(DEFAULT._replace(cells=fine // 2, per=3, cfl=0.4))
+    best = sinking(DEFAULT._replace(cells=fine, per=per, cfl=0.4))
+    half = sinking(DEFAULT._replace(cells=fine // 2, per=per, cfl=0.4))
     run.record("trade.explicit.cantilever.reference", best, unit="m", comparator="info",
-               scale=f"{fine} cells over the length, 3 x 3 particles per cell",
+               scale=f"{fine} cells over the length, {per} x {per} particles per cell",
                note=f"mean sinking of the tip after half a period; with half the cells {half:.6g} "
                     f"m: errors below {abs(half / best - 1.0):.1g} mean nothing")
     points = [measure(knob, setting, lambda s: prepare(s, best, run.seed), repeats)

@@ -1,6 +1,7 @@
 """What a setting costs and how wrong it is: CPU seconds, bytes, error, and how the run ended."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from time import process_time
 from typing import NamedTuple
 
@@ -14,7 +15,7 @@ from mpm_ref.shapes.inside import solid
 from mpm_ref.timestep import stable_dt
 
 from ..extremes.long_run import CARRIED, round_state
-from ..extremes.outcome import FINISHED, outcome
+from ..extremes.outcome import FINISHED, REFUSED, outcome
 from ..verification.lattice import lattice
 from .setting import Setting
 
@@ -41,6 +42,7 @@ class Point(NamedTuple):
     of_bound: float         # dt over the stable time step at the start
     end: str                # FINISHED, LOST, or how it broke
     said: str
+    refused: bool           # where it broke: whether the run stops at its bound unless allowed on
 
     @property
     def good(self):
@@ -67,7 +69,15 @@ def measure(knob, setting, prepare, repeats):
             break
     error = trial.error() if end.kind == FINISHED else np.nan
     kind = LOST if error > 1.0 else end.kind
-    return Point(knob, setting, error, min(times), size, end.step, of_bound, kind, end.said)
+    refused = end.kind != FINISHED and is_refused(prepare(setting))
+    ends = end.step, of_bound, kind, end.said, refused
+    return Point(knob, setting, error, min(times), size, *ends)
+
+
+def is_refused(trial):
+    """Whether the run that is not allowed past its bound, at any step, is refused."""
+    guarded = replace(trial.problem, allow_unstable=False)
+    return outcome(guarded, trial.watch).kind == REFUSED
 
 
 class Clocked:

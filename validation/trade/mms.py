@@ -43,7 +43,7 @@ def prepare(setting, seed=0):
 
 
 @experiment("trade.explicit.mms", title="Explicit MPM: manufactured solution, error against cost",
-            profiles=("quick", "standard"), budget={"quick": 20, "standard": 900})
+            profiles=("quick", "standard"), budget={"quick": 10, "standard": 300})
 def mms(run):
     """One knob at a time from the default."""
     levels = run.choose(quick=QUICK, standard=STANDARD)

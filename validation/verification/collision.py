@@ -24,6 +24,11 @@ class Course(NamedTuple):
     particles: int
 
     @property
+    def steps(self):
+        """Number of steps."""
+        return len(self.t) - 1
+
+    @property
     def total(self):
         """Kinetic and elastic energy (S,) [J]."""
         return self.kinetic + self.elastic

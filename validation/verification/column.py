@@ -15,10 +15,12 @@ TALL = {2: 2.8, 3: 1.7}         # aspect ratios above which a column is tall [Lu
 EXPONENT = {                    # of tall columns: band, and why
     2: ((0.6, 1.0), "from the narrow channels' 0.65 - 0.05 to the wide ones' 0.9 + 0.1; the plane "
                     "column has no side walls"),
-    3: ((0.47, 0.57), "0.52 with the +- 0.05 that the plane channels' exponents have; a miss is the "
-                      "law's: at L = 6 and 8 dx the exponent is the same, with a friction angle of "
-                      "20 degrees it is larger. Nothing in rate-independent flow damps fast "
-                      "grains more than slow ones, so that tall columns run too far for low ones"),
+    3: ((0.47, 0.57), "0.52 with the +- 0.05 that the plane channels' exponents have"),
+}
+CAUSE = {
+    2: "",
+    3: ". The exponent of the simulated cylinders does not fall with dx, and rises as friction "
+       "falls: rate-independent flow damps fast grains no more than slow ones",
 }
 FRICTION = "friction angle 30 degrees, rough floor"
 
@@ -35,9 +37,9 @@ def lube(dim, a):
 def column(run):
     """Plane and axisymmetric columns of several aspect ratios, and the exponent of tall ones."""
     plans = run.choose(
-        quick=((2, 8, (1.0, 4.0, 8.0)), (3, 4, (1.0, 2.0, 4.0))),
+        quick=((2, 6, (1.0, 4.0, 8.0)), (3, 4, (1.0, 2.0, 4.0))),
         standard=((2, 16, (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)), (2, 32, (0.5, 1.0, 2.0, 4.0, 8.0)),
-                  (3, 8, (0.5, 1.0, 2.0, 4.0, 8.0))))
+                  (3, 6, (2.0, 4.0, 8.0)), (3, 8, (0.5, 1.0, 2.0, 4.0, 8.0))))
     cases = [(dim, cells, a) for dim, cells, ratios in plans for a in ratios]
     done = {(dim, cells, a): collapse(dim, a, cells)
             for dim, cells, a in run.progress(cases, "columns")}
@@ -67,7 +69,7 @@ def record_exponent(run, name, dim, tall):
     value = order(list(tall), [c.runout for c in tall.values()])
     ratios = ", ".join(f"{a:g}" for a in tall)
     run.record(f"verification.column.{name}.exponent", value, comparator="band", bound=bound,
-               scale=f"aspect ratios {ratios}; {FRICTION}", note=why)
+               scale=f"aspect ratios {ratios}; {FRICTION}", note=why + CAUSE[dim])
 
 
 def weak_friction(run, angle=20.0, cells=6, ratios=(2.0, 4.0, 8.0)):

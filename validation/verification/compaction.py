@@ -31,7 +31,7 @@ class Series(NamedTuple):
 
 METHOD = "the order of the method: no particle leaves its cell, and there is no wall"
 CROSSING = "particles cross cells: the error of their sums is left; GIMP has about first order"
-AT_WALL = ("first order: at any dx the stress in the cell at the wall is off by a fixed share of "
+AT_WALL = ("first order: at any dx the stress in the cells at the wall is off by a fixed share of "
            "the floor's pressure (the largest error), because the splines of free nodes do not "
            "vanish at the wall")
 AFFINE = ("first order at a particle: the MLS velocity gradient of a quadratic spline is not exact "

@@ -86,6 +86,9 @@ def judge(run, f, scale):
     run.record("verification.dam_break.ahead_of_ritter", float(np.max(f.Z - ritter(f.T))),
                paper=0.0, comparator="<=", bound=0.0, scale=scale,
                note="in widths a, at any time; the foremost particle starts behind the dam")
+    fastest = float(np.max(np.diff(f.Z) / np.diff(f.T)) / 2.0)
+    run.record("verification.dam_break.fastest", fastest, paper=1.0, comparator="<=", scale=scale,
+               note="largest speed of the front over 2 sqrt(g h)")
     known = MEASURED[MEASURED[:, 0] <= f.T[-1]]
     ratio = np.interp(known[:, 0], f.T, f.Z) / known[:, 1]
     run.record("verification.dam_break.front", float(np.mean(ratio)), paper=1.0, comparator="info",

@@ -52,7 +52,7 @@ def disks(run):
 def judge(run, transfer, c):
     """Record momentum and energy of one transfer."""
     name = f"verification.disks.{transfer}"
-    scale = f"{c.particles} particles, {len(c.t) - 1} steps, dx = radius/4"
+    scale = f"{c.particles} particles, {c.steps} steps, dx = radius/4"
     one = c.total[0] / closing_speed()      # m v of one disk: m v^2 in all, closing speed is 2 v
     drift = np.abs(c.momentum).max() / (2.0 * one)
     run.record(f"{name}.momentum", drift, paper=0.0, comparator="<=", bound=ROUND_OFF, scale=scale,
@@ -73,7 +73,7 @@ def contact(run, sizes):
         t = contact_time(c)
         rows.append((dx, t, (exact - t) * closing_speed(), c.particles))
     run.table("contact", ("dx", "t", "gap", "particles"), rows)
-    dx, t, gap, particles = rows[-1]
+    dx, t, _, particles = rows[-1]
     scale = f"dx = {dx} m, {particles} particles; radius 0.2 m"
     early = REACH * dx / closing_speed()
     run.record("verification.disks.contact_time", t, unit="s", paper=exact, comparator="band",

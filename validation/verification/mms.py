@@ -25,12 +25,12 @@ E, NU, RHO0, A = 1e7, 0.3, 1000.0, 0.05
 LAW = LogNeoHookean(*lame(E, NU))
 C = sqrt(E / RHO0)                              # of the motion [m/s]
 SOUND = sqrt(stiffness(LAW) / RHO0)             # speed of compression waves at rest [m/s]
-CFL = 0.4           # of SOUND; half of it changes no error by more than 10 % (measured)
+CFL = 0.4           # of SOUND; half or twice of it changes errors at 64 cells by less than 10 %
 CELLS = (16, 32, 64)
 
 # What must be of second order, and what must not [Steffen2008]: (transfer, degree, per direction).
 SECOND_ORDER = (("mls", 3, 2), ("mls", 2, 3))
-CONTROL = (("flip", 1, 2), ("pic", 1, 2))
+CONTROL = ("flip", 1, 2)
 ALL = tuple((transfer, degree, per)
             for transfer, degrees in (("pic", (1, 2, 3)), ("flip", (1, 2, 3)),
                                       ("apic", (2, 3)), ("mls", (2, 3)))
@@ -87,7 +87,7 @@ def name(family):
 def mms(run):
     """Orders of all families; forcing against an evaluation without derivation."""
     record_forcing(run)
-    families = run.choose(quick=SECOND_ORDER + CONTROL, standard=ALL)
+    families = run.choose(quick=(*SECOND_ORDER, CONTROL), standard=ALL)
     rows, orders = [], {}
     for family in run.progress(families, "families"):
         orders[family], more = sweep(run, family, CELLS)
@@ -120,11 +120,10 @@ def record_orders(run, orders):
     for family in SECOND_ORDER:
         run.record(f"verification.mms.order.{name(family)}", orders[family], paper=2.0,
                    comparator="band", bound=(1.8, 2.3), scale=scale)
-    for family in CONTROL:
-        run.record(f"verification.mms.order.{name(family)}", orders[family], comparator="<=",
-                   bound=1.0, scale=scale,
-                   note="negative control: linear splines must not converge, because their "
-                        "gradient jumps where particles cross cells")
+    run.record(f"verification.mms.order.{name(CONTROL)}", orders[CONTROL], comparator="<=",
+               bound=1.0, scale=scale,
+               note="negative control: linear splines must not converge, because their gradient "
+                    "jumps where particles cross cells")
 
 
 def record_3d(run):

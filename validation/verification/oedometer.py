@@ -121,8 +121,8 @@ def record_platen(run):
     run.record("verification.oedometer.platen.force", abs(errors[-1]), paper=0.0, comparator="<=",
                bound=0.05, scale=scale,
                note="bound: what an engineer would accept. A wall acts a fixed part of a cell too "
-                    "deep (see verification.bar), and one that moves lets matter creep past the "
-                    "nodes it reaches: both vanish with dx, at first order")
+                    "deep (see verification.bar), and one that moves overtakes the layer of "
+                    "particles next to it: both errors are of first order in dx")
     run.record("verification.oedometer.platen.order",
                order([1.0 / n for n in cells], np.abs(errors)), comparator="info",
                scale=f"{cells} cells over H", note="tends to 1 from below")

@@ -6,6 +6,8 @@ with 30 m/s, E 100 MPa, nu 0.2, 1000 kg/m^3, log neo-Hookean, dx 0.1 m, 0.6 s. O
 lattice.
 """
 
+from itertools import pairwise
+
 from mpm_ref.scene import Body, Material, Regular, Scene, Scheme, Torus, Velocity
 
 from ..registry import experiment
@@ -24,7 +26,8 @@ def rings(dx, transfer):
 def ring(name, x, v):
     """One ring about (x, 0) that moves along x."""
     return Body(name=name, density=1000.0, sampling=Regular(per_cell=2),
-                shape=Torus(center=(x, 0.0), major=3.5, minor=0.5), velocity=Velocity(linear=(v, 0.0)),
+                shape=Torus(center=(x, 0.0), major=3.5, minor=0.5),
+                velocity=Velocity(linear=(v, 0.0)),
                 material=Material(law="log_neo_hookean", E=1e8, nu=0.2))
 
 
@@ -39,7 +42,7 @@ def ring_collision(run):
         kept[transfer] = float(c.total[-1] / c.total[0])
         run.record(f"verification.rings.{transfer}.energy", float(c.total[-1]), unit="J/m",
                    paper=PUBLISHED.get(transfer), comparator="info",
-                   scale=f"dx = {dx} m against 0.1 m, {c.particles} particles, {len(c.t) - 1} steps",
+                   scale=f"dx = {dx} m, theirs 0.1 m, {c.particles} particles, {c.steps} steps",
                    note=f"of {c.total[0]:.4g} J/m at the start; the other number is what a public "
                    "code's test holds for randomly placed particles")
         rows += thinned(transfer, c, SHOWN)
@@ -51,9 +54,9 @@ def record_ranking(run, kept, dx):
     """How many of the neighbours in the public code's order PIC < APIC < FLIP are so here."""
     ours = sorted(kept, key=kept.get)
     published = sorted(PUBLISHED, key=PUBLISHED.get)
-    pairs = list(zip(published, published[1:], strict=False))
+    pairs = list(pairwise(published))
     agree = sum(kept[a] < kept[b] for a, b in pairs)
     run.record("verification.rings.ranking", agree, paper=len(pairs), comparator="info",
-               scale=f"dx = {dx} m against 0.1 m",
+               scale=f"dx = {dx} m, theirs 0.1 m",
                note=f"pairs of neighbours in the order {' < '.join(published)} of that code that "
                f"hold here; ours: {' < '.join(ours)}")
