@@ -48,9 +48,10 @@ def test_grid_is_the_smallest_aligned_box(at, degree, edge):
         x = DX * np.round(x / DX)
     grid = Store(DX, STENCILS[degree], 2).cover([x])
     node = pairs(x, DX, degree).node - grid.origin
-    assert grid.origin[0] % slab_width(STENCILS[degree]) == 0
+    pair = 2 * slab_width(STENCILS[degree])      # of slabs, one of each colour
+    assert grid.origin[0] % pair == 0
     assert node.min() >= 0
-    assert node[..., 0].min() < slab_width(STENCILS[degree])
+    assert node[..., 0].min() < pair
     assert node[..., 1].min() == 0
     assert np.array_equal(node.max(axis=(0, 1)) + 1, grid.m.shape)
 

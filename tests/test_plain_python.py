@@ -38,9 +38,10 @@ def distances(case):
     m = grid.m[..., None]
     found.append(off(m * grid.v, m * over(grid, nodes.v, nodes.box)))
     g2p(q, grid, case.stencil, dt, 0.9, case.transfer == "mls")
+    found.append(off(q.L, moved.L))
     if method.rpic:
         rpic(q.C, 0.3)
-    return found + [off(getattr(q, n), getattr(moved, n)) for n in "vxLC" if len(getattr(q, n))]
+    return found + [off(getattr(q, n), getattr(moved, n)) for n in "vxC" if len(getattr(q, n))]
 
 print(json.dumps({case.name: max(distances(case)) for case in EVERY}))
 """

@@ -191,7 +191,7 @@ def test_an_unstable_run_leaves_a_good_checkpoint(tmp_path):
     with pytest.raises(Unstable) as fault:
         run(unstable(), out, Options(checkpoint_every=1))
     state, _ = checkpoint.load(checkpoint_of(out), unstable())
-    assert state.step == fault.value.step - 1
+    assert 0 < state.step < fault.value.step
     check(unstable(), state, 2e-2)
     with Results(out) as results:
         assert results.manifest["parts"][0]["why"].startswith("Unstable: unstable at step")

@@ -10,6 +10,7 @@ from mpm_ref.core.spline import weights
 from mpm_ref.materials import LogNeoHookean, lame
 from validation.verification import axis_aligned, oedometer, vortex_motion
 from validation.verification.axis_aligned import AxisAligned
+from validation.verification.bar import frequency
 from validation.verification.columns import Column, Settled, stress_errors
 from validation.verification.convergence import extrapolated, order, rms
 from validation.verification.elastica import deflected, timoshenko
@@ -175,6 +176,11 @@ def test_exact_water_has_no_error():
 
 def test_a_lost_column_has_the_largest_error():
     assert stress_errors(Column(LAW, 1.0, 1.0), None) == (1.0, 1.0)
+
+
+def test_frequency_of_a_cosine():
+    t = (np.arange(400) + 0.5) * 0.01
+    assert frequency(np.cos(5.3 * t), 0.01) == pytest.approx(5.3, rel=1e-5)
 
 
 def test_order_and_limit():
