@@ -1,7 +1,7 @@
 """How a 3 x 3 spectral problem becomes a 2 x 2 one, and the closed forms of the latter.
 
 Of the three eigenvalues of a symmetric matrix, the one farthest from the middle one has a well
-conditioned eigenvector, however close the other two are (Scherzinger and Dohrmann 2008). With that
+conditioned eigenvector, however close the other two are [Scherzinger2008]. With that
 vector split off, what remains lies in the plane across it, where singular values and eigenvalues
 are sums and differences of two lengths. No sweeps, no tolerances.
 
@@ -89,7 +89,7 @@ def unit(x):
 
 @leaf
 def complement(n):
-    """Vectors a, b that make (a, b, n) orthonormal and right-handed, |n| = 1 (Duff et al. 2017)."""
+    """Vectors a, b that make (a, b, n) orthonormal and right-handed, |n| = 1 [Duff2017]."""
     sign = copysign(1.0, n[2])
     h = -1.0 / (sign + n[2])
     g = n[0] * n[1] * h

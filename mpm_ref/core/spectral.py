@@ -187,7 +187,7 @@ def _fast_rotation(F):
     """R and True, or anything and False if F is too close to singular or inverted.
 
     R = ((|F|^2 + t^2)/2 F + t cof F - F F^T F)/z,  t = sum s_i,  z = prod (s_i + s_j)
-    (Markley 1993). It loses digits as z/t^3 does.
+    [Markley1993]. It loses digits as z/t^3 does.
     """
     if len(F) == 2:
         (c, s), r = direction(F[0][0] + F[1][1], F[1][0] - F[0][1])
