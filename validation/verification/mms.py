@@ -127,8 +127,8 @@ def record_orders(run, orders):
 
 
 def record_3d(run):
-    """One family in 3D."""
-    family, cells = SECOND_ORDER[0], (8, 16, 32)
+    """One family in 3D; 8 cells would be too few for an order, as they are in 2D."""
+    family, cells = SECOND_ORDER[0], (16, 24, 32)
     p, rows = sweep(run, family, cells, dim=3)
     run.table("errors-3d", ("dim", "transfer", "degree", "per_direction", "cells", "dx", "steps",
                             "particles", "error"), rows)
