@@ -199,7 +199,7 @@ def test_measured_front_speeds_up_but_stays_behind_ritter():
 # columns of sand
 
 def test_quarter_of_a_cylinder_has_its_mass():
-    q = build(collapse.scene(3, 2.0, 4, 30.0)).bodies[0].particles
+    q = build(collapse.scene(collapse.Case(3, 2.0, 4))).bodies[0].particles
     volume = pi * collapse.WIDTH**2 / 4.0 * 2.0 * collapse.WIDTH
     assert q.m.sum() == pytest.approx(1600.0 * volume, rel=1e-3)
     assert (q.x > 0.0).all()

@@ -18,6 +18,7 @@ from .scenes import mean, threads_for
 G = 9.81                        # [m/s^2]
 LENGTH, HEIGHT = 0.4, 0.2       # of the block [m]
 RHO, NU = 1000.0, 0.3
+LASTS = 1.0                     # [s]
 SETTLING = 0.3                  # [s] before the slide, some 15 times the slowest wave's period
 SHOWN = 100                     # times at which a slide is measured
 
@@ -51,6 +52,16 @@ class Slope(NamedTuple):
         return G * cos(radians(self.theta))
 
     @property
+    def gravity(self):
+        """Vector [m/s^2]."""
+        return self.pull * self.along - self.press * self.normal
+
+    @property
+    def sticks(self):
+        """Whether a rigid block stays."""
+        return self.friction * self.press >= self.pull
+
+    @property
     def friction(self):
         """Coulomb's coefficient."""
         return tan(radians(self.phi))
@@ -58,7 +69,7 @@ class Slope(NamedTuple):
     @property
     def acceleration(self):
         """Of a rigid block [m/s^2]: g (sin theta - tan phi cos theta), or 0 where it sticks."""
-        return max(self.pull - self.friction * self.press, 0.0)
+        return 0.0 if self.sticks else self.pull - self.friction * self.press
 
 
 class Slide(NamedTuple):
@@ -73,8 +84,10 @@ class Slide(NamedTuple):
     particles: int
 
 
-def scene(slope, E, dx):
-    """The block at rest on the plane, 3 x 3 particles per cell."""
+def scene(slope, E, dx, sudden):
+    """The block at rest on the plane, 3 x 3 particles per cell, under gravity or, where the pull
+    down the plane is to come suddenly, its part into the plane.
+    """
     box = Box(lower=(0.0, 0.0), upper=(LENGTH, HEIGHT))
     block = Body(name="block", density=RHO, sampling=Regular(per_cell=3),
                  shape=Moved(shape=box, angle=-slope.theta) if slope.tilted else box,
@@ -82,12 +95,13 @@ def scene(slope, E, dx):
     plane = Collider(shape=HalfSpace(point=(0.0, 0.0), normal=tuple(slope.normal)),
                      kind="separate", friction=slope.friction)
     return Scene(dim=2, dx=dx, cfl=0.5, end=SETTLING, body=(block,), collider=(plane,),
-                 gravity=tuple(-slope.press * slope.normal), scheme=SceneScheme(transfer="pic"))
+                 gravity=tuple(-slope.press * slope.normal if sudden else slope.gravity),
+                 scheme=SceneScheme(transfer="pic"))
 
 
 def released(problem, slope, v0):
-    """The problem once the block has come to rest under its weight into the plane, by PIC, which
-    damps; then it has the speed v0 down the plane and full gravity, and MLS-MPM takes over.
+    """The problem once the block has come to rest under the gravity of `scene`, by PIC, which
+    damps; then it has the speed v0 down the plane and all of gravity, and MLS-MPM takes over.
     """
     for frame in simulate(problem):
         rest = frame.state.bodies[0]
@@ -96,15 +110,15 @@ def released(problem, slope, v0):
     moving = particles_at(q.x, v, q.m, q.V0, "mls")
     moving.F[:] = q.F
     return replace(problem, bodies=(rest._replace(particles=moving),), scheme=Scheme(),
-                   gravity=slope.pull * slope.along - slope.press * slope.normal)
+                   gravity=slope.gravity)
 
 
-def slide(slope, E, dx, v0=0.0, end=1.0):
-    """`Slide` for `end` seconds from speed v0 [m/s]; E [Pa], grid spacing dx [m]."""
-    problem, rows = build(scene(slope, E, dx)), []
+def slide(slope, E, dx, v0=0.0, sudden=True):
+    """`Slide` for `LASTS` seconds from speed v0 [m/s]; E [Pa], grid spacing dx [m]."""
+    problem, rows = build(scene(slope, E, dx, sudden)), []
     with threads_for(problem.bodies):
         problem = released(problem, slope, v0)
-        problem = replace(problem, clock=Clock(end=end, interval=end / SHOWN))
+        problem = replace(problem, clock=Clock(end=LASTS, interval=LASTS / SHOWN))
         for frame in simulate(problem):
             x, v = (mean(frame.state.bodies[0], name) for name in "xv")
             rows.append((frame.t, x @ slope.along, v @ slope.along, x @ slope.normal,

@@ -2,6 +2,9 @@
 
 A column of width L (half of it in the plane case, a quarter of the cylinder in 3D, beside smooth
 walls) and height a L. Its run-out is (front - L)/L once it has come to rest.
+
+FLIP is the transfer: the others damp a little of the shear in each step, so that sand which flows
+over a rough floor runs the less the more steps are taken; see the records `dt` of `column`.
 """
 
 from math import sqrt
@@ -9,7 +12,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.scene import Box, Collider, Cylinder, HalfSpace, Intersection, Regular, Scene, build
+from mpm_ref.scene import (
+    Box,
+    Collider,
+    Cylinder,
+    HalfSpace,
+    Intersection,
+    Regular,
+    Scene,
+    Scheme,
+    build,
+)
 from mpm_ref.simulate import simulate
 
 from .scenes import shipped, threads_for, with_
@@ -19,6 +32,22 @@ WIDTH = 0.1             # L [m]
 LASTS = 6.0             # duration over sqrt(max(height, L)/g)
 BULK = 0.99             # of the sand lies behind the front; the rest is a foot of single particles
 FRAMES = 60
+
+
+class Case(NamedTuple):
+    """A column and how it is run."""
+
+    dim: int
+    a: float                        # height/L
+    cells: int                      # L/dx
+    transfer: str = "flip"
+    cfl: float = 0.9                # share of the stable time step
+    friction_angle: float = 30.0    # degrees
+
+    @property
+    def kind(self):
+        """In words."""
+        return {2: "plane", 3: "axisymmetric"}[self.dim]
 
 
 class Collapse(NamedTuple):
@@ -43,16 +72,17 @@ class Collapse(NamedTuple):
         return float(self.front[-1] - self.front[int(0.9 * len(self.front))])
 
 
-def scene(dim, a, cells, friction_angle):
-    """The shipped scene's sand in a column of aspect ratio a, dx = L/cells, 2^dim per cell."""
-    height, dx, up = a * WIDTH, WIDTH / cells, dim - 1
+def scene(case):
+    """The shipped scene's sand in a column, 2^dim particles per cell."""
+    dim, height, dx = case.dim, case.a * WIDTH, WIDTH / case.cells
     sand = shipped("column_collapse").body[0]
-    flow = with_(sand.material.flow, friction_angle=friction_angle)
+    flow = with_(sand.material.flow, friction_angle=case.friction_angle)
     sand = with_(sand, shape=column(dim, height), sampling=Regular(per_cell=2),
                  material=with_(sand.material, flow=flow))
     end = LASTS * sqrt(max(height, WIDTH) / G)
-    return Scene(dim=dim, dx=dx, cfl=0.5, end=end, interval=end / FRAMES, body=(sand,),
-                 gravity=tuple(-G * unit(up, dim)), collider=walls(dim))
+    return Scene(dim=dim, dx=dx, cfl=case.cfl, end=end, interval=end / FRAMES, body=(sand,),
+                 gravity=tuple(-G * unit(dim - 1, dim)), collider=walls(dim),
+                 scheme=Scheme(transfer=case.transfer))
 
 
 def column(dim, height):
@@ -78,17 +108,18 @@ def unit(axis, dim):
     return np.eye(dim)[axis]
 
 
-def collapse(dim, a, cells, friction_angle=30.0):
-    """Run a column until it rests; the angle in degrees."""
-    problem, rows = build(scene(dim, a, cells, friction_angle)), []
+def collapse(case):
+    """Run a column until it rests."""
+    problem, rows = build(scene(case)), []
     with threads_for(problem.bodies):
         for frame in simulate(problem):
             q = frame.state.bodies[0].particles
             rows.append((frame.t, np.quantile(distance(q.x), BULK)))
     t, front = np.array(rows).T
     J = float(np.mean(np.linalg.det(q.F)))
-    return Collapse(t / sqrt(a * WIDTH / G), front / WIDTH, float(distance(q.x).max() / WIDTH),
-                    surface(q.x, WIDTH / cells) / WIDTH, J, len(q.x), frame.state.step)
+    return Collapse(t / sqrt(case.a * WIDTH / G), front / WIDTH,
+                    float(distance(q.x).max() / WIDTH), surface(q.x, WIDTH / case.cells) / WIDTH,
+                    J, len(q.x), frame.state.step)
 
 
 def distance(x):

@@ -35,6 +35,8 @@ ALL = tuple((transfer, degree, per)
             for transfer, degrees in (("pic", (1, 2, 3)), ("flip", (1, 2, 3)),
                                       ("apic", (2, 3)), ("mls", (2, 3)))
             for degree in degrees for per in (1, 2, 3, 4))
+COLUMNS = ("dim", "transfer", "degree", "per_direction", "cells", "dx", "dt", "cfl", "steps",
+           "particles", "error")
 DEGREES = {1: "linear", 2: "quadratic", 3: "cubic"}
 
 
@@ -68,11 +70,12 @@ def error(case):
     return follow(square, AxisAligned(X, LAW, RHO0, A, C), stepper, 2.0 / C, case.dt) / A
 
 
-def sweep(run, family, cells, dim=2):
-    """Errors of a (transfer, degree, per direction) for numbers of cells; rows for the table."""
-    errors = [error(Case(*family, n, dim)) for n in cells]
-    rows = [(dim, *family, n, 1.0 / n, Case(*family, n, dim).steps, (n * family[2]) ** dim, e)
-            for n, e in zip(cells, errors, strict=True)]
+def sweep(family, cells, dim=2):
+    """Order of a (transfer, degree, per direction) over numbers of cells, and rows of the table."""
+    cases = [Case(*family, n, dim) for n in cells]
+    errors = [error(case) for case in cases]
+    rows = [(dim, *family, case.cells, 1.0 / case.cells, 2.0 / C / case.steps, CFL, case.steps,
+             (case.cells * case.per) ** dim, e) for case, e in zip(cases, errors, strict=True)]
     return order([1.0 / n for n in cells], errors), rows
 
 
@@ -90,10 +93,9 @@ def mms(run):
     families = run.choose(quick=(*SECOND_ORDER, CONTROL), standard=ALL)
     rows, orders = [], {}
     for family in run.progress(families, "families"):
-        orders[family], more = sweep(run, family, CELLS)
+        orders[family], more = sweep(family, CELLS)
         rows += more
-    run.table("errors", ("dim", "transfer", "degree", "per_direction", "cells", "dx", "steps",
-                         "particles", "error"), rows)
+    run.table("errors", COLUMNS, rows)
     run.table("orders", ("transfer", "degree", "per_direction", "order"),
               [(*family, p) for family, p in orders.items()])
     record_orders(run, orders)
@@ -129,8 +131,7 @@ def record_orders(run, orders):
 def record_3d(run):
     """One family in 3D; 8 cells would be too few for an order, as they are in 2D."""
     family, cells = SECOND_ORDER[0], (16, 24, 32)
-    p, rows = sweep(run, family, cells, dim=3)
-    run.table("errors-3d", ("dim", "transfer", "degree", "per_direction", "cells", "dx", "steps",
-                            "particles", "error"), rows)
+    p, rows = sweep(family, cells, dim=3)
+    run.table("errors-3d", COLUMNS, rows)
     run.record(f"verification.mms.order-3d.{name(family)}", p, paper=2.0, comparator="band",
                bound=(1.8, 2.3), scale=f"{cells} cells per side, {CFL} of the CFL limit")
