@@ -273,3 +273,19 @@ def test_the_example_in_single_precision(tmp_path, monkeypatch):
     report = oracle.check(path, tmp_path / "other.h5")
     assert report.precision == "f32"
     assert report.agrees, str(report)
+
+
+@pytest.mark.parametrize("name", ["hello", "incline"])
+def test_shipped_scenes_with_particles_half_way_between_nodes_are_recorded(tmp_path, name):
+    """There the twin's stencils begin at another node than ours, in extended precision."""
+    problem = scene.build(scene.load(ROOT / f"scenes/{name}.toml"))
+    oracle.record(problem, tmp_path / "golden.h5", steps=1)
+    with h5py.File(tmp_path / "golden.h5") as f:
+        assert len(f["steps"]) == 1
+
+
+def test_weights_move_to_another_first_node():
+    w = np.arange(1.0, 10.0).reshape(1, 9)
+    shifted = recording.aligned(w, np.array([[5, 5]]), np.array([[6, 4]]))
+    assert shifted.reshape(3, 3).tolist() == [[0.0, 4.0, 5.0], [0.0, 7.0, 8.0], [0.0, 0.0, 0.0]]
+    assert np.array_equal(recording.aligned(w, np.array([[5, 5]]), np.array([[5, 5]])), w)

@@ -68,6 +68,10 @@ def run(problem, steps):
         held = placed(contacts, done.nodes.box, twin.real)
         found = scaling.of_step(twin, before, done, held, errors)
         S = scaling.listed(found, done.nodes.box, seen["nodes"])
+        for name in twin.names:
+            at = exact[f"{name}/base"], seen[f"{name}/base"]
+            exact[f"{name}/weights"] = aligned(exact[f"{name}/weights"], *at)
+            S[f"{name}/weights"] = aligned(S[f"{name}/weights"], *at)
         other = unmirrored(other, seen["nodes"])
         arrays = {key: golden(seen[key], S[key], exact[key], other[key])
                   for key in S if key in seen}
@@ -76,6 +80,19 @@ def run(problem, steps):
                    if f"{name}/{field}" in arrays} for name in twin.names]
         bases = {name: seen[f"{name}/base"] for name in twin.names}
         yield Recorded(k * dt, dt, seen["nodes"], bases, arrays)
+
+
+def aligned(w, base, to):
+    """Weights w (N, S) of stencils that begin at the nodes base (N, d), for stencils that begin at
+    `to`: 0 where the first do not reach. At a tie, half-way between two nodes for quadratic
+    splines, precisions differ on where a stencil begins; the weight of the node in doubt is 0.
+    """
+    d = base.shape[1]
+    width = round(w.shape[1] ** (1.0 / d))
+    offset = (to - base)[:, None] + np.indices((width,) * d).reshape(d, -1).T
+    reached = ((offset >= 0) & (offset < width)).all(axis=2)
+    k = np.moveaxis(np.clip(offset, 0, width - 1), 2, 0)
+    return np.where(reached, np.take_along_axis(w, np.ravel_multi_index(k, (width,) * d), 1), 0)
 
 
 def problem_of(problem, order):

@@ -29,6 +29,8 @@ def build_clock(scene):
     if scene.steps is None and scene.end is None:
         raise SceneError("steps: this key is missing; give `steps` or `end`")
     cfl = CFL if scene.cfl is None else scene.cfl
+    if scene.dt is None and cfl > 1.0 and scene.unstable != "allow":
+        raise SceneError(f'cfl = {cfl}: expected at most 1, or with it unstable = "allow"')
     return Clock(scene.dt, cfl, scene.steps, scene.end, scene.every, scene.interval)
 
 
