@@ -113,7 +113,7 @@ def test_an_unstable_run_is_told(scene, tmp_path):
         "nu = 0.3 }", "nu = 0.3 }\nvelocity = { linear = [0.0, 1.0], angular = 9.0 }")
     scene.write_text(text.replace("steps = 40", "steps = 4000"))
     done = mpm_ref("run", scene, "--out", tmp_path / "run.h5", "--checkpoint-every", 1)
-    assert_told(done, 3, "unstable at step", "CFL number", "Last good checkpoint", "--resume")
+    assert_told(done, 3, "unstable at step", "CFL number", "Last good checkpoint", "--overwrite")
     assert f"step {summary(checkpoint_of(tmp_path / 'run.h5'))['step']}," in done.stderr
 
 

@@ -106,7 +106,8 @@ def _broke_off(fault, request):
     """End a run that could not end between two steps by itself."""
     said = str(fault) or "interrupted at once"
     status = {NotWritten: NOT_WRITTEN, KeyboardInterrupt: INTERRUPT}.get(type(fault), UNSTABLE)
-    end(f"{said}{'' if said.endswith('?') else '.'} {last_good(request)}", status)
+    next_ = last_good(request, again=status != UNSTABLE)
+    end(f"{said}{'' if said.endswith('?') else '.'} {next_}", status)
 
 
 def _report(outcome, request, facts):
@@ -130,12 +131,15 @@ def how_to_resume(request):
     return f"mpm-ref run {request.scene} --out {request.out} --resume"
 
 
-def last_good(request):
-    """Where the last checkpoint of a run stands, and how to go on from it."""
+def last_good(request, again):
+    """Where the last checkpoint of a run stands, and how to go on: from it, or, where the same
+    scene would break again, with another one.
+    """
     path = checkpoint_of(request.out)
     try:
         there = checkpoint.summary(path)
     except checkpoint.BadCheckpoint as fault:
         return f"No checkpoint: {fault}"
-    return (f"Last good checkpoint: {path}, step {there['step']}, t = {there['t']:.6g} s; "
-            f"to go on from it: {how_to_resume(request)}")
+    on = f"to go on from it: {how_to_resume(request)}" if again else (
+        "the same scene would break again: change it and start anew with --overwrite")
+    return f"Last good checkpoint: {path}, step {there['step']}, t = {there['t']:.6g} s; {on}"
