@@ -77,7 +77,7 @@ def frequency(amplitude, dt):
 
 
 @experiment("verification.bar", title="Axial vibration of a bar", profiles=("quick", "standard"),
-            budget={"quick": 10, "standard": 60})
+            budget={"quick": 15, "standard": 60})
 def bar(run):
     """Orders of displacement and frequency with and without a wall; what PIC loses."""
     cells = run.choose(quick=(8, 16, 32), standard=(8, 16, 32, 64, 128))

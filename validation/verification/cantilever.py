@@ -95,7 +95,7 @@ def elastica():
 
 
 @experiment("verification.cantilever", title="Cantilever: Timoshenko's beam and the elastica",
-            profiles=("quick", "standard"), budget={"quick": 15, "standard": 1200})
+            profiles=("quick", "standard"), budget={"quick": 14, "standard": 150})
 def cantilever(run):
     """Deflections under a small and a large load."""
     record_small(run)

@@ -56,7 +56,7 @@ STANDARD = (
 
 
 @experiment("verification.compaction", title="Elastic column under its weight",
-            profiles=("quick", "standard"), budget={"quick": 8, "standard": 120})
+            profiles=("quick", "standard"), budget={"quick": 10, "standard": 30})
 def compaction(run):
     """Orders of the stress with and without a wall; linear splines as negative control."""
     cells = run.choose(quick=(8, 16, 32), standard=(8, 16, 32, 64))

@@ -41,7 +41,7 @@ def fall(transfer, degree, x):
 
 
 @experiment("verification.free_fall", title="Free fall to round-off",
-            profiles=("quick", "standard"), budget={"quick": 3, "standard": 20})
+            profiles=("quick", "standard"), budget={"quick": 8, "standard": 30})
 def free_fall(run):
     """All transfers."""
     x = run.rng.uniform(0.0, 0.5, (PARTICLES, 2))

@@ -30,7 +30,7 @@ def place_error(column, state):
 
 
 @experiment("verification.hydrostatic", title="Column of weakly compressible water",
-            profiles=("quick", "standard"), budget={"quick": 6, "standard": 60})
+            profiles=("quick", "standard"), budget={"quick": 5, "standard": 15})
 def hydrostatic(run):
     """Pressure and places of the particles, with and without a wall."""
     cells = run.choose(quick=(8, 16, 32), standard=(8, 16, 32, 64, 128))

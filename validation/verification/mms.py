@@ -86,7 +86,7 @@ def name(family):
 
 
 @experiment("verification.mms", title="Axis-aligned manufactured solution: order of accuracy",
-            profiles=("quick", "standard"), budget={"quick": 25, "standard": 600})
+            profiles=("quick", "standard"), budget={"quick": 10, "standard": 240})
 def mms(run):
     """Orders of all families; forcing against an evaluation without derivation."""
     record_forcing(run)

@@ -97,7 +97,7 @@ def platen_force(law, cells):
 
 
 @experiment("verification.oedometer", title="Compression without widening, against closed forms",
-            profiles=("quick", "standard"), budget={"quick": 10, "standard": 60})
+            profiles=("quick", "standard"), budget={"quick": 4, "standard": 15})
 def oedometer(run):
     """Laws under load; what a platen costs."""
     cells = run.choose(quick=16, standard=64)
