@@ -92,7 +92,7 @@ def pendulum_speed(l, k2, depth):
 
 
 @experiment("verification.bowl", title="Slide without friction along a curve",
-            profiles=("quick", "standard"), budget={"quick": 8, "standard": 60})
+            profiles=("quick", "standard"), budget={"quick": 4, "standard": 20})
 def bowl(run):
     """Speed at the bottom against the pendulum's."""
     rows = []

@@ -68,7 +68,7 @@ def front(cells, per_cell=2):
 
 
 @experiment("verification.dam_break", title="Dam break: front against Ritter's bound and points",
-            profiles=("quick", "standard"), budget={"quick": 8, "standard": 200})
+            profiles=("quick", "standard"), budget={"quick": 4, "standard": 40})
 def dam_break(run):
     """Front over time, at two resolutions."""
     rows = []

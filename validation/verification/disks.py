@@ -37,7 +37,7 @@ def contact_time(c):
 
 
 @experiment("verification.disks", title="Colliding disks: momentum, energy, first contact",
-            profiles=("quick", "standard"), budget={"quick": 12, "standard": 120})
+            profiles=("quick", "standard"), budget={"quick": 6, "standard": 40})
 def disks(run):
     """All transfers at dx = 0.05 to the end; MLS up to first contact on finer grids."""
     rows = []

@@ -25,7 +25,7 @@ PLANES = {"flat": False, "tilted": True}
 
 
 @experiment("verification.incline", title="Block on an incline: friction, sticking, free slide",
-            profiles=("quick", "standard"), budget={"quick": 15, "standard": 150})
+            profiles=("quick", "standard"), budget={"quick": 8, "standard": 60})
 def incline(run):
     """Gravity turned on a flat wall, and a truly tilted plane."""
     dx = run.choose(quick=0.05, standard=0.025)

@@ -32,7 +32,7 @@ def ring(name, x, v):
 
 
 @experiment("verification.rings", title="Colliding rings: energy kept by each transfer",
-            profiles=("quick", "standard"), budget={"quick": 15, "standard": 200})
+            profiles=("quick", "standard"), budget={"quick": 6, "standard": 200})
 def ring_collision(run):
     """Energy at 0.6 s for each transfer, and their order."""
     dx = run.choose(quick=0.4, standard=0.1)

@@ -82,7 +82,7 @@ def pic_loss():
 
 
 @experiment("verification.rotation", title="A free body spins: angular momentum and energy",
-            profiles=("quick", "standard"), budget={"quick": 12, "standard": 300})
+            profiles=("quick", "standard"), budget={"quick": 8, "standard": 120})
 def rotation(run):
     """Disk (and cube) with each transfer: L per step, energy never above what the integrator may
     add.
