@@ -5,11 +5,22 @@ import numpy as np
 DEGREES = {1: "linear", 2: "quadratic", 3: "cubic"}
 TRANSFERS = {"pic": "C3", "flip": "C1", "apic": "C2", "mls": "C0"}
 DASHES = {1: ":", 2: "-", 3: "--"}
+MARKERS = {1: "v", 2: "o", 3: "s", 4: "D"}
 
 
-def look(transfer, degree):
-    """Line style of a scheme: colour by transfer, dashes by degree."""
-    return {"color": TRANSFERS[transfer], "ls": DASHES[degree], "marker": "o", "ms": 3.5}
+def look(transfer, degree, per=2):
+    """Line style: colour by transfer, dashes by degree, marker by particles per direction."""
+    return {"color": TRANSFERS[transfer], "ls": DASHES[degree], "marker": MARKERS[per], "ms": 4}
+
+
+def legend_below(figure, axes, columns=4):
+    """One legend under the figure for the labels of several axes, each once."""
+    found = {}
+    for ax in axes:
+        found |= {label: line for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
+    figure.tight_layout()
+    figure.legend(found.values(), found.keys(), ncol=columns, fontsize=7, loc="upper center",
+                  bbox_to_anchor=(0.5, 0.0))
 
 
 def series(table, keys):

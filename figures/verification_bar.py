@@ -5,7 +5,7 @@ falls with the second order of the method, at a sticky wall with the first order
 
 import matplotlib.pyplot as plt
 
-from ._orders import DEGREES, look, series, slope
+from ._orders import DEGREES, legend_below, look, series, slope
 
 NEEDS = ["verification.bar"]
 
@@ -21,8 +21,8 @@ def draw(results):
     table = results.table(NEEDS[0], "errors")
     for (transfer, degree, wall), rows in series(table, ("transfer", "degree", "wall")).items():
         held = "wall" if wall == "True" else "symmetric"
-        marker = {"marker": "s" if held == "wall" else "o"}
-        right.loglog(table["cells"][rows], table["error"][rows], **look(transfer, degree) | marker,
+        right.loglog(table["cells"][rows], table["error"][rows], **look(transfer, degree),
+                     mfc="w" if held == "wall" else None,
                      label=f"{transfer} {DEGREES[degree]}, {held}")
     cells = sorted(set(table["cells"]))
     slope(right, -2, (cells[0], cells[-1]), 0.05, "2")
@@ -30,6 +30,5 @@ def draw(results):
     right.set(xlabel="cells over the length", ylabel="displacement error / amplitude",
               xticks=cells, xticklabels=[f"{n:.0f}" for n in cells])
     right.minorticks_off()
-    right.legend(fontsize=6)
-    figure.tight_layout()
+    legend_below(figure, [right])
     return figure

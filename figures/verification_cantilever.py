@@ -6,7 +6,7 @@ of the deflection by Timoshenko's beam. Both relative to the deflection.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ._orders import DEGREES, look, series
+from ._orders import DEGREES, legend_below, look, series
 
 NEEDS = ["verification.cantilever"]
 
@@ -22,12 +22,11 @@ def draw(results):
     table = results.table(NEEDS[0], "large")
     for (transfer, degree, per), rows in series(
             table, ("transfer", "degree", "per_direction")).items():
-        right.plot(table["cells"][rows], table["error"][rows], **look(transfer, degree),
+        right.plot(table["cells"][rows], table["error"][rows], **look(transfer, degree, per),
                    label=f"{transfer} {DEGREES[degree]}, {int(per)} per direction")
     small = results.table(NEEDS[0], "small")
-    right.plot(small["cells"], np.abs(small["error"]), "k^:", ms=4, label="small load")
+    right.plot(small["cells"], np.abs(small["error"]), "k^:", ms=4, label="small load, mls quadratic")
     right.set(xlabel="cells over the height", ylabel="error / deflection", ylim=(0.0, None),
               xticks=sorted({*table["cells"], *small["cells"]}))
-    right.legend(fontsize=7)
-    figure.tight_layout()
+    legend_below(figure, [right])
     return figure

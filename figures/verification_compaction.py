@@ -6,7 +6,7 @@ strains (stiff).
 
 import matplotlib.pyplot as plt
 
-from ._orders import DEGREES, look, series, slope
+from ._orders import DEGREES, legend_below, look, series, slope
 
 NEEDS = ["verification.compaction"]
 
@@ -23,9 +23,9 @@ def draw(results):
     keys = ("transfer", "degree", "per_direction", "column", "wall")
     for (transfer, degree, per, column, wall), rows in series(table, keys).items():
         held = "wall" if wall == "True" else "symmetric"
-        style = look(transfer, degree) | {"marker": "s" if wall == "True" else "o"}
-        style["mfc"] = "w" if column == "soft" else style["color"]
-        right.loglog(table["cells"][rows], table["mean_error"][rows], **style,
+        right.loglog(table["cells"][rows], table["mean_error"][rows],
+                     **look(transfer, degree, per), mfc="w" if wall == "True" else None,
+                     alpha=0.5 if column == "soft" else 1.0,
                      label=f"{transfer} {DEGREES[degree]} {int(per)}, {column}, {held}")
     cells = sorted(set(table["cells"]))
     slope(right, -2, (cells[0], cells[-1]), 1.2e-3, "2")
@@ -33,6 +33,5 @@ def draw(results):
     right.set(xlabel="cells over the height", ylabel="mean stress error / floor pressure",
               xticks=cells, xticklabels=[f"{n:.0f}" for n in cells])
     right.minorticks_off()
-    right.legend(fontsize=5)
-    figure.tight_layout()
+    legend_below(figure, [right], columns=3)
     return figure

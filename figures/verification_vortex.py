@@ -15,7 +15,7 @@ def draw(results):
     table = results.table(NEEDS[0], "errors")
     for (transfer, degree, per), rows in series(
             table, ("transfer", "degree", "per_direction")).items():
-        left.loglog(table["cells"][rows], table["error"][rows], **look(transfer, degree),
+        left.loglog(table["cells"][rows], table["error"][rows], **look(transfer, degree, per),
                     label=f"{transfer} {DEGREES[degree]}, {int(per)} per direction")
     cells = sorted(set(table["cells"]))
     slope(left, -2, (cells[0], cells[-1]), 0.7 * table["error"].max(), "order 2")
