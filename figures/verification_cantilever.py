@@ -25,7 +25,8 @@ def draw(results):
         right.plot(table["cells"][rows], table["error"][rows], **look(transfer, degree, per),
                    label=f"{transfer} {DEGREES[degree]}, {int(per)} per direction")
     small = results.table(NEEDS[0], "small")
-    right.plot(small["cells"], np.abs(small["error"]), "k^:", ms=4, label="small load, mls quadratic")
+    right.plot(small["cells"], np.abs(small["error"]), "k^:", ms=4,
+               label="small load, mls quadratic")
     right.set(xlabel="cells over the height", ylabel="error / deflection", ylim=(0.0, None),
               xticks=sorted({*table["cells"], *small["cells"]}))
     legend_below(figure, [right])
