@@ -3,10 +3,12 @@ of ours costs.
 """
 
 import json
+import os
 import platform
 import resource
 import subprocess
 import sys
+import tempfile
 import time
 from datetime import UTC, datetime
 from pathlib import Path
@@ -136,9 +138,9 @@ def features(
 
 
 @app.command()
-def start(name: str, size: str = "10k", threads: int = 2):
-    """Seconds to the end of the first step, and peak memory per particle, of one backend in a
-    fresh process. Run it twice: the second time with a warm cache.
+def start(name: str, size: str = "100k", threads: int = 2):
+    """Seconds to the end of the first step, and peak memory per particle, of one backend in this
+    process, as JSON.
     """
     began = time.perf_counter()
     problem = block(CELLS[size])
@@ -152,6 +154,40 @@ def start(name: str, size: str = "10k", threads: int = 2):
         "backend": name, "size": size, "first_step_s": round(seconds, 2),
         "peak_bytes_per_particle": round(grown * 1024 / len(problem.x)),
     }))
+
+
+@app.command()
+def starts(
+    backends: Annotated[str, typer.Option()] = "mpm_ref,taichi,warp",
+    size: str = "100k",
+    threads: int = 2,
+    out: Annotated[Path, typer.Option()] = Path("results/benchmarks/start.json"),
+):
+    """`start` of every backend in processes of their own: with empty kernel caches, then warm."""
+    rows = []
+    for name in backends.split(","):
+        with tempfile.TemporaryDirectory() as caches:
+            rows += [
+                {"cache": cache} | fresh(["start", name, "--size", size], threads, caches)
+                for cache in ("cold", "warm")
+            ]
+    for row in rows:
+        typer.echo(json.dumps(row))
+    save(out, rows, threads, 1)
+
+
+def fresh(words, threads, caches):
+    """What a command of this module prints last in a process whose kernel caches lie in a folder;
+    with the seconds the process took.
+    """
+    places = ("NUMBA_CACHE_DIR", "TI_OFFLINE_CACHE_FILE_PATH", "WARP_CACHE_PATH")
+    began = time.perf_counter()
+    done = subprocess.run(
+        [sys.executable, "-m", "benchmarks", *words, "--threads", str(threads)],
+        env=os.environ | dict.fromkeys(places, caches), capture_output=True, text=True, check=True,
+    )
+    seconds = time.perf_counter() - began
+    return json.loads(done.stdout.splitlines()[-1]) | {"process_s": round(seconds, 2)}
 
 
 if __name__ == "__main__":
