@@ -13,7 +13,7 @@ import numpy as np
 
 from .body import AFFINE, permute
 from .core import deform
-from .core.grid import Store, update
+from .core.grid import Storage, update
 from .core.order import by_cell, slabs_of
 from .core.spline import STENCILS
 from .core.transfer import g2p, p2g, rpic
@@ -29,7 +29,8 @@ class Scheme:
 
     degree of the B-spline (1, 2, 3); transfer "pic", "flip", "apic" or "mls"; flip is the share
     of FLIP (1) against PIC (0); rpic in [0, 1] damps the strain rate in C (NSF-rpic); mass_eps
-    [kg] and gravity_on_empty are NCLAW's. Raises ValueError for a combination that does not exist.
+    [kg] and gravity_on_empty are NCLAW's, the latter without effect on particles. Raises
+    ValueError for a combination that does not exist.
     """
 
     degree: int = 2
@@ -88,7 +89,7 @@ class Stepper:
             raise ValueError(f"gravity = {gravity}: expected {dim} finite numbers, in m/s^2")
         if not 0.0 < dx < np.inf:
             raise ValueError(f"dx = {dx}: expected a positive, finite length in m")
-        self.store = Store(dx, scheme.stencil, dim, flip=scheme.transfer == "flip")
+        self.storage = Storage(dx, scheme.stencil, dim, flip=scheme.transfer == "flip")
 
     def start(self, bodies):
         """Check that the bodies fit the scheme, and compute their stress; needed once, before the
@@ -104,7 +105,7 @@ class Stepper:
         """
         if not 0.0 < dt < np.inf:
             raise ValueError(f"dt = {dt}: expected a positive, finite time in s")
-        grid = scatter(bodies, self.store, self.scheme, dt)
+        grid = scatter(bodies, self.storage, self.scheme, dt)
         update(grid, self.gravity, dt, self.scheme.mass_eps, self.scheme.gravity_on_empty)
         if self.conditions is not None:
             self.conditions.apply(grid, t + dt, dt)
@@ -118,7 +119,7 @@ class Stepper:
         """Sort every body's particles by cell, for locality; results do not depend on it but for
         round-off.
         """
-        grid = self.store.cover([body.particles.x for body in bodies])
+        grid = self.storage.cover([body.particles.x for body in bodies])
         for body in bodies:
             permute(body, by_cell(body.particles.x, grid, self.scheme.stencil))
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .core.stencil import inverse_inertia
 from .explicit import Scheme
 from .materials import recovers
 from .monitor import Limits
@@ -65,10 +66,9 @@ class Problem:
 
     @property
     def inertia(self):
-        """D = dx^2 (degree + 1)/12 of the affine motion [m^2]; 0 where no affine field is
-        carried.
-        """
-        return self.dx**2 * (self.scheme.degree + 1) / 12.0 if self.scheme.affine else 0.0
+        """D of the affine motion [m^2] (`core.stencil`); 0 where no affine field is carried."""
+        affine = self.scheme.affine
+        return 1.0 / inverse_inertia(self.dx, self.scheme.stencil) if affine else 0.0
 
     def may_invert(self, body):
         """Whether the body's law recovers from det F <= 0."""

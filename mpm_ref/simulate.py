@@ -18,7 +18,7 @@ from .timestep import advective, refuse, stable_dt
 
 SORT = 64        # steps between physical sorts of the particles by cell
 REBOUND = 10     # steps between evaluations of the stable time step
-EVEN = 1e-9      # of a step: a frame this near is met, not stepped to
+EVEN = 1e-9      # of a step: a frame or end this near is met, whatever the sum of the steps lost
 
 
 @dataclass

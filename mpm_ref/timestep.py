@@ -191,9 +191,9 @@ def stable_dt(bodies, stepper):
     """`TimeStep` of the bodies' state under a `Stepper`'s scheme and grid spacing."""
     scheme = stepper.scheme
     if scheme.degree == 1:
-        grid = scatter(bodies, stepper.store, scheme, 0.0)
+        grid = scatter(bodies, stepper.storage, scheme, 0.0)
     else:
-        grid = stepper.store.cover([body.particles.x for body in bodies])
+        grid = stepper.storage.cover([body.particles.x for body in bodies])
     bounds = [_body_dt(body, grid, scheme, stepper.gravity) for body in bodies]
     return TimeStep(*map(float, np.min(bounds, axis=0)))
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm_ref.body import particles_at
-from mpm_ref.core.grid import Store
+from mpm_ref.core.grid import Storage
 from mpm_ref.core.order import slabs_of
 from mpm_ref.core.spline import STENCILS
 from mpm_ref.core.transfer import p2g
@@ -98,7 +98,7 @@ def twin(q, law=None, flow=None, dtype=float):
 
 def scattered(case, q, dt):
     """Grid that holds the particles' mass and momentum."""
-    store = Store(DX, case.stencil, case.d, flip=case.transfer == "flip")
+    store = Storage(DX, case.stencil, case.d, flip=case.transfer == "flip")
     grid = store.cover([q.x])
     p2g(q, grid, case.stencil, dt, slabs_of(q.x, grid, case.stencil), case.transfer == "mls")
     return grid

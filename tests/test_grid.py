@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mpm_ref.core import grid as grids
-from mpm_ref.core.grid import OutOfRange, Store, extent, update
+from mpm_ref.core.grid import OutOfRange, Storage, extent, update
 from mpm_ref.core.order import slab_width
 from mpm_ref.core.spline import STENCILS
 from mpm_ref.plain.spline import pairs
@@ -32,13 +32,13 @@ def test_a_particle_too_far_away_is_refused(far, rng):
     x = rng.normal(size=(500, 2))
     x[137, 1] = far
     with pytest.raises(OutOfRange, match="flown off"):
-        Store(DX, STENCILS[2], 2).cover([x, x])
+        Storage(DX, STENCILS[2], 2).cover([x, x])
 
 
 def test_a_box_far_from_the_origin_is_refused_where_its_cells_are_lost():
     x = np.full((3, 2), 1e17)
     with pytest.raises(OutOfRange, match="flown off"):
-        Store(1.0, STENCILS[2], 2).cover([x])
+        Storage(1.0, STENCILS[2], 2).cover([x])
 
 
 @given(at=st.floats(-1e5, 1e5), degree=st.sampled_from([1, 2, 3]), edge=st.booleans())
@@ -46,7 +46,7 @@ def test_grid_is_the_smallest_aligned_box(at, degree, edge):
     x = np.array([[at, -at], [at + 3.3 * DX, -at + DX]])
     if edge:
         x = DX * np.round(x / DX)
-    grid = Store(DX, STENCILS[degree], 2).cover([x])
+    grid = Storage(DX, STENCILS[degree], 2).cover([x])
     node = pairs(x, DX, degree).node - grid.origin
     pair = 2 * slab_width(STENCILS[degree])      # of slabs, one of each colour
     assert grid.origin[0] % pair == 0
@@ -57,7 +57,7 @@ def test_grid_is_the_smallest_aligned_box(at, degree, edge):
 
 
 def test_storage_is_reused_and_zeroed(rng):
-    store = Store(DX, STENCILS[2], 2, flip=True)
+    store = Storage(DX, STENCILS[2], 2, flip=True)
     large, small = rng.uniform(0, 40 * DX, (9, 2)), rng.uniform(0, 4 * DX, (9, 2))
     first = store.cover([large])
     for a in (first.m, first.v, first.f, first.v_old):
@@ -71,14 +71,14 @@ def test_storage_is_reused_and_zeroed(rng):
 
 def test_cover_holds_every_cloud(rng):
     a, b = rng.uniform(0, DX, (5, 2)), rng.uniform(9 * DX, 10 * DX, (5, 2))
-    grid = Store(DX, STENCILS[1], 2).cover([a, b])
+    grid = Storage(DX, STENCILS[1], 2).cover([a, b])
     assert (pairs(b, DX, 1).node.max(axis=(0, 1)) - grid.origin + 1 == grid.m.shape).all()
 
 
 def filled(d, rng, flip=False):
     """A grid with random mass and momentum, half of its nodes empty."""
     case = Case("flip" if flip else "pic", 2, d)
-    grid = Store(DX, case.stencil, d, flip=flip).cover([cloud(case, rng).x])
+    grid = Storage(DX, case.stencil, d, flip=flip).cover([cloud(case, rng).x])
     grid.m[:] = np.where(rng.random(grid.m.shape) < 0.5, 0.0, rng.uniform(1, 2, grid.m.shape))
     grid.v[:] = np.where(grid.m[..., None] > 0, rng.normal(size=grid.v.shape), 0.0)
     return grid
@@ -117,4 +117,4 @@ def test_largest_grid_is_bounded():
     """The bound protects memory: of a node in 3D, mass and momentum are 32 bytes."""
     side = DX * (grids.MAX_BYTES / 32) ** (1 / 3)
     with pytest.raises(OutOfRange, match="bytes at dx"):
-        Store(DX, STENCILS[2], 3).cover([np.array([[0.0] * 3, [1.01 * side] * 3])])
+        Storage(DX, STENCILS[2], 3).cover([np.array([[0.0] * 3, [1.01 * side] * 3])])

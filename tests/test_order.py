@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from clouds import DX, Case, cloud
 
-from mpm_ref.core.grid import Store
+from mpm_ref.core.grid import Storage
 from mpm_ref.core.order import by_cell, slab_width, slabs_of
 from mpm_ref.plain.spline import pairs
 
@@ -13,7 +13,7 @@ CASES = (Case("pic", 1, 2), Case("mls", 2, 3))
 def sorted_(request, rng):
     case = request.param
     x = cloud(case, rng, n=1000, width=30.0).x
-    grid = Store(DX, case.stencil, case.d).cover([x])
+    grid = Storage(DX, case.stencil, case.d).cover([x])
     node = pairs(x, DX, case.degree).node - grid.origin
     return case, x, grid, node, slabs_of(x, grid, case.stencil)
 
@@ -62,5 +62,5 @@ def test_by_cell_sorts_stably(sorted_):
 def test_all_particles_in_one_slab(rng):
     case = CASES[0]
     x = DX * (0.5 + 0.01 * rng.uniform(size=(50, 2)))
-    slabs = slabs_of(x, Store(DX, case.stencil, 2).cover([x]), case.stencil)
+    slabs = slabs_of(x, Storage(DX, case.stencil, 2).cover([x]), case.stencil)
     assert np.array_equal(slabs.order, np.arange(50))

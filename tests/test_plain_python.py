@@ -104,12 +104,12 @@ import json
 import numpy as np
 from clouds import COVER, DX, cloud
 from mpm_ref.core import order, transfer
-from mpm_ref.core.grid import Store, _update, flattened
+from mpm_ref.core.grid import Storage, _update, flattened
 from mpm_ref.core.transfer import gather, gather_mls, scatter, scatter_mls
 
 def once(case, lost=0):
     q = cloud(case, np.random.default_rng(1), n=50)
-    grid = Store(DX, case.stencil, case.d, flip=case.transfer == "flip").cover([q.x])
+    grid = Storage(DX, case.stencil, case.d, flip=case.transfer == "flip").cover([q.x])
     members, n = np.arange(50), (0, 50)
     if lost:
         first, last = (slice(1, None),) * case.d, tuple(k - lost for k in grid.m.shape)

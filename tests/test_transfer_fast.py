@@ -5,7 +5,7 @@ import pytest
 from clouds import DX, Case, cloud, deep
 
 from mpm_ref.core import transfer
-from mpm_ref.core.grid import Store
+from mpm_ref.core.grid import Storage
 from mpm_ref.core.order import slabs_of
 from mpm_ref.core.spline import STENCILS
 from mpm_ref.core.state import NONE
@@ -31,7 +31,7 @@ def close(a, b):
 
 
 def scattered(kernel, q):
-    grid = Store(DX, STENCIL, 3).cover([q.x])
+    grid = Storage(DX, STENCIL, 3).cover([q.x])
     kernel(q, grid, STENCIL, DT, np.arange(len(q.x)))
     return grid
 
@@ -49,7 +49,7 @@ def test_scatter_equals_the_general_one(particles):
 
 
 def test_gather_equals_the_general_one(particles):
-    grid = Store(DX, STENCIL, 3).cover([particles.x])
+    grid = Storage(DX, STENCIL, 3).cover([particles.x])
     grid.v[:] = np.random.default_rng(2).normal(size=grid.v.shape)
     fast, general = (gathered(k, particles, grid) for k in (gather_mls3, transfer.gather_mls))
     assert close(fast.x, general.x)
@@ -69,7 +69,7 @@ def test_it_runs_where_it_applies_and_nowhere_else(degree, d, mls, fast, monkeyp
                  "gather_mls3_all", "_gather_mls", "_gather"):
         monkeypatch.setattr(transfer, name, lambda *arguments, name=name: ran.append(name))
     q = cloud(Case("mls", degree, d), np.random.default_rng(1), n=4)
-    grid = Store(DX, STENCILS[degree], d).cover([q.x])
+    grid = Storage(DX, STENCILS[degree], d).cover([q.x])
     slabs = slabs_of(q.x, grid, STENCILS[degree])
     transfer.p2g(q, grid, STENCILS[degree], DT, slabs, mls)
     transfer.g2p(q, grid, STENCILS[degree], DT, 0.0, mls)

@@ -1,7 +1,7 @@
 """Conditions on the velocities of the grid: colliders, prescribed nodes, walls counted in nodes.
 
-A node carries the condition of a part if it has mass and its signed distance to the part is not
-positive: the wall is the zero contour of the level set (docs/boundaries.md). Where several parts
+A node carries the condition of a part if it has mass and its signed distance to the part is at
+most 1e-9 cells: the wall is the zero contour of the level set (docs/boundaries.md). Where several parts
 meet, all their conditions are satisfied at once (see `contact`).
 """
 
@@ -139,6 +139,12 @@ class Conditions:
         prescribed regions, then for each axis the low and the high wall. The force on a part is
         minus its impulse / dt. Nodes without mass are left alone.
         """
+        return solve(*self.touched(grid, t, dt), grid)
+
+    def touched(self, grid, t, dt):
+        """What `apply` solves for: the `Touch` of each part at time t, its rule and its friction,
+        three lists.
+        """
         touches, rules = [], list(self.parts)
         if self.parts:
             nodes = nodes_with_mass(grid)
@@ -146,7 +152,7 @@ class Conditions:
         if self.walls is not None:
             touches += self.walls.touches(grid)
             rules += [self.walls] * (2 * grid.m.ndim)
-        return solve(touches, [r.rule for r in rules], [r.friction for r in rules], grid)
+        return touches, [r.rule for r in rules], [r.friction for r in rules]
 
 
 def _check(kind, friction):

@@ -3,7 +3,7 @@
     touch, touch_wall    the nodes of one part, with its normal and its velocity there: a `Touch`
     solve                new velocities of all nodes touched, and the impulse of each part
 
-A node is in a shape if it has mass and its signed distance is not positive.
+A node is in a shape if it has mass and its signed distance is at most `ON` cells.
 """
 
 from typing import NamedTuple
@@ -87,26 +87,28 @@ def solve(touches, kind, mu, grid):
     if not touches:
         return np.zeros((0, d))
     J = np.zeros((CHUNKS, len(touches), d))
-    contacts = _sorted(touches, np.asarray(kind), np.asarray(mu, dtype=float))
+    contacts, start = by_node(touches, kind, mu)
     if len(contacts.node):
-        node = contacts.node
-        first = np.flatnonzero(node[1:] != node[:-1]) + 1
-        start = np.concatenate(([0], first, [len(node)]))
         _settle_all(contacts, start, grid.v.reshape(-1, d), grid.m.shape)
         _add_all_impulses(contacts, grid.m.reshape(-1), J)
     return J.sum(axis=0)
 
 
-def _sorted(touches, kind, mu):
-    """Contacts by node; at a node the larger friction first, to which ties between planes go."""
+def by_node(touches, kind, mu):
+    """`Contacts` by node, those of the a-th node touched being start[a] .. start[a + 1] - 1. At a
+    node the larger friction comes first, to which ties between planes go.
+    """
     order = sorted(range(len(touches)), key=lambda p: -mu[p])
     rows = [touches[p] for p in order]
     node = np.concatenate([row.node for row in rows])
     part = np.repeat(order, [len(row.node) for row in rows])
-    by_node = np.argsort(node, kind="stable")
-    n = np.concatenate([row.n for row in rows])[by_node]
-    v = np.concatenate([row.v for row in rows])[by_node]
-    return Contacts(node[by_node], part[by_node], n, v, np.zeros_like(v), kind, mu)
+    sort = np.argsort(node, kind="stable")
+    n = np.concatenate([row.n for row in rows])[sort]
+    v = np.concatenate([row.v for row in rows])[sort]
+    node, kind, mu = node[sort], np.asarray(kind), np.asarray(mu, dtype=float)
+    first = np.flatnonzero(node[1:] != node[:-1]) + 1
+    start = np.concatenate(([0], first, [len(node)]))
+    return Contacts(node, part[sort], n, v, np.zeros_like(v), kind, mu), start
 
 
 @kernel

@@ -68,7 +68,7 @@ def null_vector(M):
         x, diagonal = y, y[1]
     if z[2] > diagonal:
         x = z
-    return unit(x)
+    return unit_or_last(x)
 
 
 @leaf
@@ -78,7 +78,7 @@ def times(a, x):
 
 
 @leaf
-def unit(x):
+def unit_or_last(x):
     """x/|x| of a vector of three; the last axis if x = 0."""
     n = norm(x)
     if n > 0.0:

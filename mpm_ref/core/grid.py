@@ -49,7 +49,7 @@ def extent(x):
     return low.min(axis=0), high.max(axis=0)
 
 
-class Store:
+class Storage:
     """Reusable storage of a `Grid` for spacing dx [m] and a stencil; see `cover`."""
 
     def __init__(self, dx, stencil, dim, flip=False):

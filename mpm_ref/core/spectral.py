@@ -7,7 +7,16 @@ The method stands in `deflation`.
 
 from math import nan, sqrt
 
-from .deflation import complement, direction, eigh2, plus_diagonal, separated, svd2, turned, unit
+from .deflation import (
+    complement,
+    direction,
+    eigh2,
+    plus_diagonal,
+    separated,
+    svd2,
+    turned,
+    unit_or_last,
+)
 from .extremes import is_finite, is_moderate, moderate, not_a_number, rescaled
 from .jit import kernel, leaf
 from .tensor import (
@@ -137,7 +146,7 @@ def _svd(F):
         v, largest = separated(mmt(C, C))
         w = complement(v)
         f0, f1, fv = mv(F, w[0]), mv(F, w[1]), mv(F, v)
-        u = unit(fv if largest else cross(f0, f1))
+        u = unit_or_last(fv if largest else cross(f0, f1))
         a = complement(u)
         turn_u, s, turn_v = svd2(((dot(a[0], f0), dot(a[0], f1)), (dot(a[1], f0), dot(a[1], f1))))
         a, w = turned(a, turn_u), turned(w, turn_v)

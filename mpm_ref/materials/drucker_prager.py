@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from ..core.jit import kernel
 from ..core.tensor import fill, lin, norm, total_of
-from .log_strain import deviator, lifted, log_strain, stretch
+from .log_strain import deviator, lifted, log_strain, stretches
 from .moduli import least_stretch
 from .no_flow import never_fails
 
@@ -62,7 +62,7 @@ def project(s, y, dt, law, flow):
     if tr > 0.0:
         return fill(1.0, s), y
     elif dgamma > 0.0:
-        return stretch(lin(1.0, eps, -dgamma / size, eps_hat)), y
+        return stretches(lin(1.0, eps, -dgamma / size, eps_hat)), y
     else:
         return s, y
 

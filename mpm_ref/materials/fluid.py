@@ -13,7 +13,7 @@ from ..core.jit import kernel
 from ..core.tensor import cofactor, det, diag, fill, lin, mlin, outer
 from . import principal
 from .moduli import lame, positive
-from .principal import d_others, others, volume
+from .stretches import d_others, others, volume
 
 
 class Fluid(NamedTuple):

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from ..core.jit import kernel
 from ..core.tensor import fill
 from .no_flow import never_fails
-from .principal import volume
+from .stretches import volume
 
 
 class FluidProjection(NamedTuple):

@@ -17,7 +17,7 @@ from ..core.tensor import diag, dot, fill, lin, mlin, mmt, mul, outer, scale_col
 from . import principal
 from .log_strain import log_strain
 from .moduli import lame
-from .principal import orientation_kept
+from .stretches import inverse
 
 
 class Hencky(NamedTuple):
@@ -95,20 +95,6 @@ def pair(s, i, j, law):
 def _log_ratio(x):
     """log(1 + x)/x, 1 at x = 0."""
     return log1p(x) / x if x != 0.0 else 1.0
-
-
-@kernel
-def inverse(s):
-    """1/s_i; all NaN where one s_i is not > 0."""
-    return _inverse(orientation_kept(s))
-
-
-@kernel
-def _inverse(s):
-    if len(s) == 2:
-        return 1.0 / s[0], 1.0 / s[1]
-    else:
-        return 1.0 / s[0], 1.0 / s[1], 1.0 / s[2]
 
 
 dpk1 = principal.dpk1

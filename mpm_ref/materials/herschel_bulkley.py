@@ -19,7 +19,7 @@ from ..core.tensor import dot, fill, lin, mul, norm, total_of
 from .log_strain import deviator
 from .moduli import not_negative, yield_radius
 from .no_flow import never_fails
-from .principal import volume
+from .stretches import volume
 
 
 class HerschelBulkley(NamedTuple):

@@ -27,10 +27,8 @@ from ..core.tensor import (
     outer,
     transpose,
 )
-from .hencky import inverse
 from .moduli import lame
-from .neo_hookean import expanded
-from .principal import volume
+from .stretches import expanded, inverse, volume
 
 
 class LogNeoHookean(NamedTuple):

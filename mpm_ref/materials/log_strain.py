@@ -4,7 +4,7 @@ from math import exp, inf, log
 
 from ..core.jit import kernel
 from ..core.tensor import fill, lin, norm, total_of
-from .principal import orientation_kept
+from .stretches import orientation_kept
 
 
 @kernel
@@ -22,7 +22,7 @@ def _log(s):
 
 
 @kernel
-def stretch(eps):
+def stretches(eps):
     """s_i = exp eps_i."""
     if len(eps) == 2:
         return exp(eps[0]), exp(eps[1])
@@ -73,6 +73,6 @@ def radial_return(s, tau_y, law, s_min):
     size = norm(eps_hat)
     dgamma = size - tau_y / (2.0 * law.mu)
     if dgamma > 0.0:
-        return stretch(lin(1.0, eps, -dgamma / size, eps_hat)), dgamma
+        return stretches(lin(1.0, eps, -dgamma / size, eps_hat)), dgamma
     else:
         return s, 0.0

@@ -11,7 +11,7 @@ where plane strain has lam + mu = kappa + mu/3. Defined for det F > 0: otherwise
 a line search refuses, and stresses are NaN, which no run overlooks.
 """
 
-from math import inf, log, nan
+from math import inf, log
 from typing import NamedTuple
 
 from ..core.jit import kernel
@@ -31,9 +31,8 @@ from ..core.tensor import (
     outer,
     transpose,
 )
-from .hencky import inverse
 from .moduli import bulk_modulus, lame
-from .principal import volume
+from .stretches import expanded, inverse, volume
 
 
 class NeoHookean(NamedTuple):
@@ -62,12 +61,6 @@ def psi(F, law):
         return inf
     shear = J ** (-2.0 / len(F)) * inner(F, F) - len(F)
     return 0.5 * (law.mu * shear + law.kappa * (0.5 * (J * J - 1.0) - log(J)))
-
-
-@kernel
-def expanded(J):
-    """J; NaN unless J > 0."""
-    return J if J > 0.0 else nan
 
 
 @kernel

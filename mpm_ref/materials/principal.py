@@ -13,11 +13,9 @@ gives the quotients in closed form, without subtracting or dividing by nearly eq
 values, so that repeated ones need no care.
 """
 
-from math import nan
-
 from ..core.jit import by_type, kernel
 from ..core.spectral import eigh, svd
-from ..core.tensor import diagonal, fill, mm, mmt, mv, scale_columns, transpose
+from ..core.tensor import diagonal, mm, mmt, mv, scale_columns, transpose
 
 pk1_hat = by_type("pk1_hat")        # (s, law) -> principal P_i
 dpk1_hat = by_type("dpk1_hat")      # (s, law) -> A, d x d
@@ -106,39 +104,3 @@ def _at_least_zero(x):
 def _mixed(ab, x_ij, x_ji):
     sym, skew = 0.5 * ab[0] * (x_ij + x_ji), 0.5 * ab[1] * (x_ij - x_ji)
     return sym + skew, sym - skew
-
-
-@kernel
-def volume(s):
-    """J, the product of the singular values."""
-    J = s[0]
-    for i in range(1, len(s)):
-        J *= s[i]
-    return J
-
-
-@kernel
-def others(s):
-    """dJ/ds_i: the product of all singular values but the i-th."""
-    if len(s) == 2:
-        return s[1], s[0]
-    else:
-        return s[1] * s[2], s[2] * s[0], s[0] * s[1]
-
-
-@kernel
-def d_others(s):
-    """d2J/ds_i ds_j: off the diagonal the product of the remaining singular values."""
-    if len(s) == 2:
-        return (0.0, 1.0), (1.0, 0.0)
-    else:
-        return (0.0, s[2], s[1]), (s[2], 0.0, s[0]), (s[1], s[0], 0.0)
-
-
-@kernel
-def orientation_kept(s):
-    """s, or NaN where one of them is not > 0: some laws are not defined there."""
-    for i in range(len(s)):
-        if not s[i] > 0.0:
-            return fill(nan, s)
-    return s

@@ -20,8 +20,8 @@ def step(problem, bodies, stepper, t, dt):
     plain twin, see `contacts`.
     """
     scheme, seen = problem.scheme, {}
-    apart(bodies, stepper.store, scheme, seen)
-    grid = explicit.scatter(bodies, stepper.store, scheme, dt)
+    apart(bodies, stepper.storage, scheme, seen)
+    grid = explicit.scatter(bodies, stepper.storage, scheme, dt)
     explicit.update(grid, stepper.gravity, dt, scheme.mass_eps, scheme.gravity_on_empty)
     full = grid.m > 0.0
     seen["velocity"] = grid.v[full]

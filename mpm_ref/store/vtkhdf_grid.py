@@ -7,7 +7,7 @@ affine motion. All frames share one box of nodes, at integer multiples of dx as 
 import numpy as np
 
 from ..body import Body, particles_at
-from ..core.grid import Store
+from ..core.grid import Storage
 from ..explicit import Scheme, scatter
 from ..materials import NoFlow
 from .atomic import replacing, require_space
@@ -40,7 +40,7 @@ def export_grid(results, out):
 
 def _grid(results, frame, scheme):
     bodies = [_body(results, name, frame) for name in results.bodies]
-    return scatter(bodies, Store(results.dx, scheme.stencil, results.dim), scheme, 0.0)
+    return scatter(bodies, Storage(results.dx, scheme.stencil, results.dim), scheme, 0.0)
 
 
 def _body(results, name, frame):
@@ -54,7 +54,7 @@ def _box(results, scheme):
     ends = [(x.min(axis=0), x.max(axis=0)) for body in results.bodies
             for x in (results.field(body, "x", k) for k in range(len(results)))]
     corners = np.array([np.min(ends, axis=(0, 1)), np.max(ends, axis=(0, 1))])
-    grid = Store(results.dx, scheme.stencil, results.dim).cover([corners])
+    grid = Storage(results.dx, scheme.stencil, results.dim).cover([corners])
     return grid.origin.copy(), grid.m.shape
 
 

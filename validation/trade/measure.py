@@ -110,7 +110,7 @@ def past(problem):
 
 def state_bytes(problem, setting):
     """Bytes of the particles' arrays, each counted once, and of the grid that covers them."""
-    grid = scatter(problem.bodies, started(problem).store, problem.scheme, 0.0)
+    grid = scatter(problem.bodies, started(problem).storage, problem.scheme, 0.0)
     size = sum(a.nbytes for a in (grid.m, grid.v, grid.f, grid.v_old))
     for body in problem.bodies:
         arrays = {id(a): (name, a) for name, a in body.particles._asdict().items()}
