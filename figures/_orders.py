@@ -1,9 +1,11 @@
-"""What figures of refinement studies share."""
+"""What figures share: looks of transfers and refinements, legends, slopes, words for the scale."""
 
 import numpy as np
+from matplotlib.colors import to_rgb
 
 DEGREES = {1: "linear", 2: "quadratic", 3: "cubic"}
 TRANSFERS = {"pic": "C3", "flip": "C1", "apic": "C2", "mls": "C0"}
+OTHERS = ("C4", "C5", "C6", "C8", "C9", "0.5")     # what is no transfer, beside transfers
 DASHES = {1: ":", 2: "-", 3: "--"}
 MARKERS = {1: "v", 2: "o", 3: "s", 4: "D"}
 
@@ -13,14 +15,43 @@ def look(transfer, degree, per=2):
     return {"color": TRANSFERS[transfer], "ls": DASHES[degree], "marker": MARKERS[per], "ms": 4}
 
 
+def shades(n, transfer="mls"):
+    """n colours from light to the transfer's own: from coarse to fine."""
+    full = np.array(to_rgb(TRANSFERS[transfer]))
+    return [1.0 - share * (1.0 - full) for share in np.linspace(1.0, 0.4, n)[::-1]]
+
+
+def scales(results, id, part=""):
+    """How large the runs behind an experiment's numbers were, as it recorded them: the first clause
+    of each scale, of the targets with `part` in their name.
+    """
+    return "; ".join(_clauses(results, id, part))
+
+
+def shared(results, id, part=""):
+    """What is the same in all that `scales` says."""
+    phrases = [clause.split(", ") for clause in _clauses(results, id, part)]
+    return ", ".join(p for p in phrases[0] if all(p in others for others in phrases))
+
+
+def _clauses(results, id, part):
+    found = (r.scale.split("; ")[0] for r in results.records(id) if r.scale and part in r.target)
+    return list(dict.fromkeys(found))
+
+
+def counts(values):
+    """Sorted distinct whole numbers in words: 8, 16, 32."""
+    return ", ".join(f"{v:g}" for v in sorted(set(values)))
+
+
 def legend_below(figure, axes, columns=4):
     """One legend under the figure for the labels of several axes, each once."""
     found = {}
     for ax in axes:
         found |= {label: line for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
     figure.tight_layout()
-    figure.legend(found.values(), found.keys(), ncol=columns, fontsize=7, loc="upper center",
-                  bbox_to_anchor=(0.5, 0.0))
+    figure.legend(found.values(), found.keys(), ncol=columns, fontsize=7, handlelength=3.2,
+                  loc="upper center", bbox_to_anchor=(0.5, 0.02))
 
 
 def series(table, keys):

@@ -5,7 +5,14 @@ Timoshenko's beam in plane strain, as Poisson's ratio goes to 1/2. Quadratic MLS
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ._orders import counts
+
 NEEDS = ["extremes.explicit.locking"]
+
+
+def scale(results):
+    curve = results.table(NEEDS[0], "curve")
+    return f"2D, {len(curve['nu'])} runs, beams of {counts(curve['layers'])} cells over the height"
 
 
 def draw(results):
@@ -13,10 +20,10 @@ def draw(results):
     figure, ax = plt.subplots()
     for layers, per in sorted(set(zip(curve["layers"], curve["per_direction"], strict=True))):
         mine = (curve["layers"] == layers) & (curve["per_direction"] == per)
-        ax.plot(0.5 - curve["nu"][mine], curve["swing"][mine], "o-",
+        ax.plot(0.5 - curve["nu"][mine], curve["swing"][mine], "o-", ms=4,
                 label=f"{layers:g} cells high, {per:g} x {per:g} particles")
     ax.axhline(1.0, color="0.5", lw=1, ls="--")
-    ax.set(xscale="log", ylabel="swing / Timoshenko", ylim=(0.0, None))
+    ax.set(xscale="log", ylabel="swing / Timoshenko (dashed: 1)", ylim=(0.0, None))
     gaps = np.unique(0.5 - curve["nu"])
     ax.set_xticks(gaps, [f"{0.5 - gap:g}" for gap in gaps])
     ax.set_xlabel("nu (1/2 - nu on a log scale)")

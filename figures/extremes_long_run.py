@@ -6,7 +6,14 @@ rounding). A particle by itself is not damped; a block is, by the filter of its 
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ._orders import TRANSFERS, scales
+
 NEEDS = ["extremes.explicit.long_run"]
+SHARES = {"f64": 1.0, "f32": 0.45}
+
+
+def scale(results):
+    return f"2D; {scales(results, NEEDS[0])}"
 
 
 def draw(results):
@@ -18,8 +25,10 @@ def draw(results):
     for ax, part in zip(axes[0], parts, strict=True):
         for name in part:
             mine = table["run"] == name
-            ax.plot(table["step"][mine], table["kept"][mine], label=name.replace(".", " "))
-        ax.set(xlabel="step", ylabel="energy kept / first")
+            what, transfer, storage = name.split(".")
+            ax.plot(table["step"][mine], table["kept"][mine], color=TRANSFERS[transfer],
+                    alpha=SHARES[storage], label=f"{what}, {transfer}, {storage}")
+        ax.set(xlabel="step", ylabel="energy kept / its start")
         ax.ticklabel_format(useOffset=False)
         if part[0].startswith("block") and np.nanmin(table["kept"]) > 0.0:
             ax.set_yscale("log")

@@ -6,9 +6,16 @@ all were here.
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ._orders import scales
+
 NEEDS = ["extremes.explicit.map"]
 COLOURS = {"finished": "#cfe8cf", "energy": "#f0c36d", "J": "#b58fd1", "CFL": "#e07a6a",
            "not finite": "#444444", "out of range": "#000000"}
+ENDS = {"energy": "energy grew", "J": "J out of bounds", "CFL": "crossed a cell in a step"}
+
+
+def scale(results):
+    return scales(results, NEEDS[0])
 
 
 def draw(results):
@@ -28,7 +35,8 @@ def draw(results):
     for ax in axes[:, 0]:
         ax.set_ylabel("dt [s]")
     seen = [kind for kind in COLOURS if kind in table["end"]]
-    handles = [plt.Line2D([], [], marker="s", ls="", color=COLOURS[k], label=k) for k in seen]
+    handles = [plt.Line2D([], [], marker="s", ls="", color=COLOURS[k], label=ENDS.get(k, k))
+               for k in seen]
     handles.append(plt.Line2D([], [], color="k", label="stable time step"))
     figure.legend(handles=handles, loc="upper center", ncol=len(handles),
                   bbox_to_anchor=(0.5, 1.05), fontsize=9)

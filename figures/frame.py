@@ -1,13 +1,15 @@
 """The frame of all figures.
 
 A figure is a module ``figures/<name>.py``. Its docstring is the caption, ``NEEDS`` lists the ids of
-the experiments whose results it reads (the report shows it under the first), and ``draw(results)``
-returns a matplotlib Figure. It computes nothing that an experiment did not record.
+the experiments whose results it reads (the report shows it under the first), ``draw(results)``
+returns a matplotlib Figure and ``scale(results)`` says how large the runs were, which is written
+under the figure and its caption. It computes nothing that an experiment did not record.
 """
 
 import importlib
 import io
 import sys
+import textwrap
 import traceback
 from pathlib import Path
 
@@ -17,6 +19,7 @@ from tqdm import tqdm
 from validation.record import write_whole
 
 HERE = Path(__file__).parent
+LETTERS = 18         # of the note on the scale, per inch
 STYLE = {
     "figure.figsize": (6.4, 4.0), "figure.dpi": 100, "savefig.dpi": 130, "savefig.bbox": "tight",
     "font.size": 10, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
@@ -72,11 +75,30 @@ def _save(script, name, results):
     """Write the PNG, which carries its owner and caption for the report, and the PDF."""
     with mpl.rc_context(STYLE):
         figure = script.draw(results)
-        caption = " ".join(script.__doc__.split())
+        scale = _scale(script, results)
+        _sign(figure, scale)
+        caption = " ".join([*script.__doc__.split(), *scale.split()])
         about = {"Source": script.NEEDS[0], "Description": caption, "Software": None}
         _write(figure, results.folder / "figures" / f"{name}.png", about)
         _write(figure, results.folder / "figures" / f"{name}.pdf", {"CreationDate": None})
     figure.clear()
+
+
+def _scale(script, results):
+    """The sentence on the scale, of a script that has one."""
+    if not hasattr(script, "scale"):
+        return ""
+    return f"Scale ({results.folder.name}): {script.scale(results)}."
+
+
+def _sign(figure, text):
+    """Write small grey lines under all that was drawn."""
+    if text:
+        box = figure.get_tightbbox()
+        width, height = figure.get_size_inches()
+        lines = textwrap.fill(text, int(LETTERS * (box.x1 - box.x0)))
+        figure.text(box.x0 / width, box.y0 / height - 0.02, lines, fontsize=7, color="0.4",
+                    va="top")
 
 
 def _write(figure, path, metadata):

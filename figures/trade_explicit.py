@@ -6,12 +6,19 @@ or whose answer is wrong. CPU seconds were taken on a machine that may have been
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.ticker import NullFormatter
+from matplotlib.ticker import EngFormatter, FuncFormatter, LogLocator, NullFormatter
+
+from ._orders import OTHERS, TRANSFERS, scales
 
 NEEDS = ["trade.explicit.mms", "trade.explicit.cantilever"]
 TITLES = ("manufactured solution", "cantilever")
-MARKS = {"dt": "o", "dx": "s", "particles": "D", "sampling": "^", "degree": "v", "transfer": "P",
-         "storage": "h"}
+MARKS = {"dt": "o", "dx": "s", "particles": "D", "sampling": "^", "degree": "v", "storage": "h"}
+FORMS = {"cpu": FuncFormatter(lambda x, _: f"{x:g}"), "bytes": EngFormatter(sep=" ")}
+
+
+def scale(results):
+    return "; ".join(f"{title}: {scales(results, id)}"
+                     for id, title in zip(NEEDS, TITLES, strict=True))
 
 
 def draw(results):
@@ -22,10 +29,10 @@ def draw(results):
                                       strict=True):
             scatter(ax, points, cost, points[on_front] > 0)
         row[0].set_ylabel(f"error, {title}")
-    axes[1, 0].set_xlabel("CPU seconds of the step loop")
-    axes[1, 1].set_xlabel("bytes of state and grid")
+    axes[1, 0].set_xlabel("CPU time of the step loop [s]")
+    axes[1, 1].set_xlabel("memory of state and grid [bytes]")
     handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="upper center", ncol=8, bbox_to_anchor=(0.5, 1.03),
+    figure.legend(handles, labels, loc="upper center", ncol=5, bbox_to_anchor=(0.5, 1.06),
                   fontsize=9, handletextpad=0.2, columnspacing=1.0)
     figure.tight_layout()
     return figure
@@ -35,9 +42,13 @@ def scatter(ax, points, cost, on_front):
     """Points by knob, the front, and the failures at the top."""
     good = points["end"] == "finished"
     error, x = points["error"].astype(float), points[cost].astype(float)
-    for k, (knob, mark) in enumerate(MARKS.items()):
+    for (knob, mark), color in zip(MARKS.items(), OTHERS, strict=True):
         mine = good & (points["knob"] == knob)
-        ax.plot(x[mine], error[mine], mark, color=f"C{k}", ms=5, label=knob)
+        ax.plot(x[mine], error[mine], mark, color=color, ms=5, label=knob)
+    for transfer, color in TRANSFERS.items():
+        mine = good & (points["knob"] == "transfer") & (points["transfer"] == transfer)
+        if mine.any():
+            ax.plot(x[mine], error[mine], "P", color=color, ms=6, label=f"transfer {transfer}")
     first = points["knob"] == "default"
     ax.plot(x[first], error[first], "k*", ms=10, label="default")
     front = np.flatnonzero(on_front)[np.argsort(x[on_front])]
@@ -49,4 +60,5 @@ def scatter(ax, points, cost, on_front):
         ax.annotate(points["end"][k], (x[k], top), xytext=(4, 2 - 8 * (row % 2)),
                     textcoords="offset points", fontsize=7)
     ax.set(xscale="log", yscale="log")
-    ax.xaxis.set_minor_formatter(NullFormatter())
+    ax.xaxis.set(minor_formatter=NullFormatter(), major_locator=LogLocator(subs=(1.0, 3.0)),
+                 major_formatter=FORMS[cost])

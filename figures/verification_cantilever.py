@@ -6,9 +6,15 @@ of the deflection by Timoshenko's beam. Both relative to the deflection.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ._orders import DEGREES, legend_below, look, series
+from ._orders import DEGREES, TRANSFERS, counts, legend_below, look, series
 
 NEEDS = ["verification.cantilever"]
+
+
+def scale(results):
+    large, small = (results.table(NEEDS[0], name) for name in ("large", "small"))
+    return (f"2D, {counts(large['cells'])} cells over the height; small load: "
+            f"{counts(small['cells'])}")
 
 
 def draw(results):
@@ -25,7 +31,7 @@ def draw(results):
         right.plot(table["cells"][rows], table["error"][rows], **look(transfer, degree, per),
                    label=f"{transfer} {DEGREES[degree]}, {int(per)} per direction")
     small = results.table(NEEDS[0], "small")
-    right.plot(small["cells"], np.abs(small["error"]), "k^:", ms=4,
+    right.plot(small["cells"], np.abs(small["error"]), "^:", color=TRANSFERS["mls"], ms=4,
                label="small load, mls quadratic")
     right.set(xlabel="cells over the height", ylabel="error / deflection", ylim=(0.0, None),
               xticks=sorted({*table["cells"], *small["cells"]}))

@@ -1,14 +1,20 @@
 """Collapse of columns of sand. Left: run-out of 99 % of the sand against the aspect ratio, with the
-laws quoted after Lube et al. (unconfirmed). Right: deposits of the finest plane columns, the
-initial columns dotted.
+laws quoted after Lube et al. (unconfirmed). Right: deposits of the finest plane columns; dotted:
+their initial width.
 """
 
 import matplotlib.pyplot as plt
 
-from ._orders import series
+from ._orders import OTHERS, counts, series
 
 NEEDS = ["verification.column"]
-COLORS = {"plane": "C0", "axisymmetric": "C3"}
+COLORS = dict(zip(("plane", "axisymmetric"), OTHERS))
+
+
+def scale(results):
+    table = results.table(NEEDS[0], "runout")
+    cells = {kind: counts(table["cells"][table["kind"] == kind]) for kind in COLORS}
+    return "; ".join(f"{kind}: L of {some} cells" for kind, some in cells.items())
 
 
 def draw(results):
@@ -24,13 +30,16 @@ def draw(results):
                         mec=COLORS[kind], label=f"{kind}, law (unconfirmed)")
     left.set(xlabel="aspect ratio a", ylabel="run-out / L", xticks=sorted(set(table["a"])),
              xticklabels=[f"{a:g}" for a in sorted(set(table["a"]))])
+    left.set(yticks=(0.5, 1, 2, 5, 10, 20), yticklabels=("0.5", "1", "2", "5", "10", "20"),
+             ylim=(0.8 * table["runout"].min(), 1.6 * table["runout"].max()))
     left.minorticks_off()
     left.legend(fontsize=7)
-    for (kind, cells, a), rows in series(deposit, ("kind", "cells", "a")).items():
-        if (kind, cells) == ("plane", finest["plane"]):
-            line, = right.plot(deposit["r"][rows], deposit["height"][rows], label=f"a = {a:g}")
-            right.plot((0.0, 1.0, 1.0), (a, a, 0.0), ":", color=line.get_color(), lw=1)
-    right.set(xlabel="x / L", ylabel="height / L", ylim=(0.0, 2.6))
+    right.axvline(1.0, color="0.5", ls=":", lw=1)
+    plane = ((a, rows) for (kind, cells, a), rows in series(deposit, ("kind", "cells", "a")).items()
+             if (kind, cells) == ("plane", finest["plane"]))
+    for (a, rows), color in zip(plane, OTHERS, strict=False):
+        right.plot(deposit["r"][rows], deposit["height"][rows], color=color, label=f"a = {a:g}")
+    right.set(xlabel="x / L", ylabel="height / L", ylim=(0.0, 1.3 * deposit["height"].max()))
     right.legend(fontsize=7)
     figure.tight_layout()
     return figure

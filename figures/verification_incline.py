@@ -5,12 +5,16 @@ during which the foot of the elastic block sticks, and its hopping are what is l
 
 import matplotlib.pyplot as plt
 
-from ._orders import series
+from ._orders import OTHERS, series, shared
 
 NEEDS = ["verification.incline"]
-COLORS = {"sliding": "C0", "thrown": "C1", "sticking": "C3", "frictionless": "C2"}
+COLORS = dict(zip(("sliding", "thrown", "sticking", "frictionless"), OTHERS))
 LABELS = {"sliding": "15 degrees, from rest", "thrown": "15 degrees, thrown",
           "sticking": "30 degrees", "frictionless": "no friction"}
+
+
+def scale(results):
+    return f"2D; {shared(results, NEEDS[0])}"
 
 
 def draw(results):
@@ -24,6 +28,7 @@ def draw(results):
     left.set(xlabel="t [s]", ylabel="way [m]")
     right.set(xlabel="t [s]", ylabel="way less that of a rigid block [mm]")
     left.legend(fontsize=8, title="friction angle", title_fontsize=8)
-    right.legend(fontsize=8)
+    for line in right.legend(fontsize=8, title="wall", title_fontsize=8).get_lines():
+        line.set_color("0.3")
     figure.tight_layout()
     return figure

@@ -5,9 +5,13 @@ against the number of cells, by scheme and particles per cell and direction. Lin
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ._orders import DEGREES, legend_below, look, series, slope
+from ._orders import DEGREES, legend_below, look, scales, series, slope
 
 NEEDS = ["verification.mms"]
+
+
+def scale(results):
+    return f"2D; {scales(results, NEEDS[0], '.order.')}"
 
 
 def draw(results):
@@ -22,7 +26,7 @@ def draw(results):
                 ax.loglog(table["cells"][rows], np.minimum(table["error"][rows], 1.0),
                           **look(transfer, degree), label=f"{transfer} {DEGREES[degree]}")
         slope(ax, -2, (16, 64), 3e-3, "order 2")
-        ax.set(title=f"{int(count)} per direction", xlabel="cells per side",
+        ax.set(title=f"{int(count)} particles per direction", xlabel="cells per side",
                xticks=(16, 32, 64), xticklabels=("16", "32", "64"), xlim=(14, 90))
         ax.minorticks_off()
     axes[0, 0].set_ylabel("error / A, cut at 1")

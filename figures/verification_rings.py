@@ -4,9 +4,13 @@ for the end, from randomly placed particles on the grid of the standard profile.
 
 import matplotlib.pyplot as plt
 
-from ._orders import TRANSFERS, series
+from ._orders import TRANSFERS, series, shared
 
 NEEDS = ["verification.rings"]
+
+
+def scale(results):
+    return f"2D; {shared(results, NEEDS[0])}"
 
 
 def draw(results):

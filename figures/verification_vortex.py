@@ -4,10 +4,15 @@ the motion asks for, relative to the largest force.
 """
 
 import matplotlib.pyplot as plt
+import numpy as np
 
-from ._orders import DEGREES, look, series, slope
+from ._orders import DEGREES, OTHERS, look, scales, series, slope
 
 NEEDS = ["verification.vortex"]
+
+
+def scale(results):
+    return f"2D; {scales(results, NEEDS[0], '.order.')}"
 
 
 def draw(results):
@@ -21,13 +26,15 @@ def draw(results):
     slope(left, -2, (cells[0], cells[-1]), 0.7 * table["error"].max(), "order 2")
     left.set(xlabel="cells per metre", ylabel="error / (R G)", xticks=cells,
              xticklabels=[f"{n:.0f}" for n in cells], xlim=(0.8 * cells[0], 1.5 * cells[-1]),
-             ylim=(1e-3, 1.0))
+             ylim=10.0 ** np.array([np.floor(np.log10(min(table["error"]))), 0.0]))
     left.minorticks_off()
     left.legend(fontsize=7)
     sign = results.table(NEEDS[0], "printed-sign")
-    for (turn,), rows in series(sign, ("G",)).items():
-        right.semilogy(sign["t"][rows], sign["difference"][rows], label=f"G = {turn:.3g}")
+    for ((turn,), rows), color in zip(series(sign, ("G",)).items(), OTHERS, strict=False):
+        right.semilogy(sign["t"][rows], sign["difference"][rows], color=color,
+                       label=f"G = {turn:.3g}")
     right.set(xlabel="t / period", ylabel="max |b_printed - b| / max |b|", ylim=(1e-6, 1e-1))
-    right.legend(fontsize=8)
+    right.minorticks_off()
+    right.legend(fontsize=8, loc="upper center")
     figure.tight_layout()
     return figure

@@ -39,7 +39,9 @@ def plot(
     view: View = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="FILE.png")] = None,
 ):
-    """Draw the particles of one frame (png, pdf or svg)."""
+    """Draw the particles and the solids of one frame (png, pdf or svg); 3D solids are cut halfway
+    of the particles' depth.
+    """
     what = {"frame": frame, "field": field, "view": _axes(view)}
     _to_file(plotting.save_plot, file, out, (".png", ".pdf", ".svg"), **what)
 
