@@ -82,6 +82,9 @@ class Stepper:
     `core.boundary`).
     """
 
+    implicit = False     # whether dt is free of the bounds of waves
+    report = None        # what a solver says of the last step: nothing was solved
+
     def __init__(self, scheme, dx, dim, gravity, conditions=None):
         self.scheme, self.dx, self.conditions = scheme, dx, conditions
         self.gravity = np.asarray(gravity, dtype=float)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .core.stencil import inverse_inertia
-from .explicit import Scheme
+from .explicit import Scheme, Stepper
 from .materials import recovers
 from .monitor import Limits
 
@@ -14,7 +14,8 @@ from .monitor import Limits
 class Clock:
     """When a run steps, shows a frame and ends.
 
-    dt [s] fixed, or None: then `cfl` times the stable time step (see `timestep`). It ends after
+    dt [s] fixed, or None: then `cfl` times the stable time step (see `timestep`), at most `longest`
+    [s]. It ends after
     `steps` steps or at time `end` [s], whichever is given; frames every `every` steps, or every
     `interval` seconds.
     """
@@ -25,6 +26,7 @@ class Clock:
     end: float | None = None
     every: int | None = None
     interval: float | None = None
+    longest: float = np.inf
 
     def __post_init__(self):
         if (self.steps is None) == (self.end is None):
@@ -35,6 +37,8 @@ class Clock:
             value = getattr(self, name)
             if value is not None and not 0.0 < value < np.inf:
                 raise ValueError(f"{name} = {value}: expected a positive, finite number")
+        if not self.longest > 0.0:
+            raise ValueError(f"longest = {self.longest}: expected a positive time step")
         if self.dt is not None and self.interval is not None and self.interval < self.dt:
             raise ValueError(f"interval = {self.interval}: expected at least dt = {self.dt}")
 
@@ -54,6 +58,8 @@ class Problem:
     allow_unstable: bool = False        # run on although dt is past its bound
     title: str = ""
     source: str = ""                    # canonical text of the scene, "" if built in Python
+    integrator: str = "explicit"        # or "implicit"
+    solver: object = None               # `hot.Options` of an implicit step; None: the defaults
 
     def __post_init__(self):
         if not self.bodies:
@@ -63,6 +69,17 @@ class Problem:
                 f"cfl = {self.clock.cfl}: expected at most 1, the bound of the time step; past it "
                 "a run must say that it may be unstable"
             )
+
+    def stepper(self):
+        """A new stepper of the integrator. Raises ValueError for one that does not exist."""
+        what = self.scheme, self.dx, self.dim, self.gravity, self.conditions
+        if self.integrator == "explicit":
+            return Stepper(*what)
+        if self.integrator == "implicit":
+            from .hot.step import ImplicitStepper
+
+            return ImplicitStepper(*what, self.solver)
+        raise ValueError(f"integrator = {self.integrator!r}: expected 'explicit' or 'implicit'")
 
     @property
     def inertia(self):

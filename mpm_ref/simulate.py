@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 
 from .core.grid import OutOfRange
-from .explicit import Stepper
 from .monitor import CHECK, Account, account, check, lost, runs_away
 from .timestep import advective, refuse, stable_dt
 
@@ -31,6 +30,7 @@ class State:
     frame: int = 0                     # frames shown so far
     bound: float = inf                 # stable dt at its last evaluation [s]
     account: Account | None = None     # energy at the start
+    solve: object = None               # `hot` report of the last step, if it was implicit
 
 
 class Frame(NamedTuple):
@@ -50,7 +50,7 @@ def simulate(problem, state=None, on_step=None):
     `timestep`), and ValueError if a body does not fit the scheme. With a fixed dt, `end` is met by
     the first step that reaches it.
     """
-    stepper = Stepper(problem.scheme, problem.dx, problem.dim, problem.gravity, problem.conditions)
+    stepper = problem.stepper()
     if state is None:
         state = State(problem.bodies)
         stepper.start(state.bodies)
@@ -88,10 +88,13 @@ def advance(problem, stepper, state):
     if problem.clip is not None:
         keep_inside(state.bodies, *problem.clip)
     state.step += 1
+    state.solve = stepper.report
     state.t = state.step * dt if problem.clock.dt else state.t + dt
     due = state.step % CHECK == 0 or ended(problem.clock, state)
     if due or runs_away(problem, state, dt):
         check(problem, state, dt)
+    if state.solve is not None and not (state.solve.converged or problem.allow_unstable):
+        raise lost(problem, state, dt, f"the solve of the implicit step {state.solve.why}")
     return dt
 
 
@@ -129,7 +132,7 @@ def next_dt(clock, state, advective_bound):
     target = clock.end if clock.end is not None else inf
     if clock.interval is not None:
         target = min(target, state.frame * clock.interval)
-    dt = clock.cfl * min(state.bound, advective_bound)
+    dt = min(clock.cfl * min(state.bound, advective_bound), clock.longest)
     if target == inf:
         return dt
     return (target - state.t) / max(ceil((target - state.t) / dt - EVEN), 1)

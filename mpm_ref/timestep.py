@@ -61,8 +61,8 @@ class TimeStep(NamedTuple):
         return float(np.min(self))
 
     def sentence(self):
-        """The bounds in words."""
-        terms = self._asdict().items()
+        """The bounds in words, without those that are infinite."""
+        terms = [(name, bound) for name, bound in self._asdict().items() if bound != inf]
         return ", ".join(f"{name.replace('_', ' ')} {bound:.3g} s" for name, bound in terms)
 
 
@@ -188,8 +188,14 @@ def _limit(load, most):
 
 
 def stable_dt(bodies, stepper):
-    """`TimeStep` of the bodies' state under a `Stepper`'s scheme and grid spacing."""
+    """`TimeStep` of the bodies' state under a `Stepper`'s scheme and grid spacing. An implicit step
+    is bound by its particles' speed alone (HOT-cfl).
+    """
     scheme = stepper.scheme
+    if stepper.implicit:
+        particles = (body.particles for body in bodies)
+        bounds = [advective(q, stepper.dx, 0.0, stepper.gravity) for q in particles]
+        return TimeStep(min(bounds), inf, inf, inf)
     if scheme.degree == 1:
         grid = scatter(bodies, stepper.storage, scheme, 0.0)
     else:

@@ -30,7 +30,7 @@ FLOORS = (
     ("timestep", "monitor"),
     ("hot", "rom", "nclaw"),
     ("problem", "shapes"),
-    ("simulate", "sampling"),
+    ("simulate", "sampling", "placement"),
     ("scene",),
     ("store",),
     ("oracle", "sweep", "plotting"),

@@ -104,6 +104,16 @@ def test_hash_holds_what_is_in_files(tmp_path):
         build(loads(held, folder=tmp_path))
 
 
+def test_what_building_finds_begins_with_the_source():
+    text = TINY.replace("upper = [1.0, 1.0]", "upper = [1e-3, 1e-3]")
+    with pytest.raises(SceneError, match=r"^body\[0\].sampling: no sample point"):
+        build(loads(text))
+    with pytest.raises(SceneError, match=r"^tiny.toml: body\[0\].sampling: no sample point"):
+        build(loads(text), "tiny.toml")
+    with pytest.raises(SceneError, match=r"^tiny.toml: dx = 'x': expected"):
+        build(msgspec.structs.replace(loads(TINY), dx="x"), "tiny.toml")
+
+
 @pytest.mark.parametrize(("name", "said"), [
     ("none.toml", "cannot be read"), (".", "cannot be read"),
     ("latin.toml", "not a text file in UTF-8"),

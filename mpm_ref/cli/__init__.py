@@ -1,4 +1,6 @@
-"""The command line `mpm-ref`. The commands are in `cli.execute`, `cli.look`, `cli.golden`."""
+"""The command line `mpm-ref`: `run` and the options of all; the other commands are in `describe`,
+`look` and `golden`.
+"""
 
 from pathlib import Path
 from typing import Annotated
@@ -11,18 +13,22 @@ from ..core.jit import set_threads
 from ..store import UNITS, USUAL, Fields
 from ..store.running import Options
 from . import golden, look
-from .execute import Request, run_scene
+from .describe import describe
+from .execute import Bar, Request, run_scene
 from .faults import one_line, options
 from .look import Machine
 from .shipped import find_scene
 
 app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False, add_completion=False,
                   help="Explicit material point method: run scenes and look at the results.")
-for name, command in (("info", look.describe), ("plot", look.plot),
+for name, command in (("info", describe), ("plot", look.plot),
                       ("animate", look.animate), ("export", look.export),
                       ("scenes", look.scenes)):
     app.command(name)(command)
 app.add_typer(golden.app, name="oracle")
+
+
+FIELDS = f"To store, of {','.join(UNITS)}; {','.join(USUAL)}."
 
 
 @app.callback(invoke_without_command=True)
@@ -44,8 +50,8 @@ def run(
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the results.")] = False,
     checkpoint_every: Annotated[int | None, typer.Option(help="Steps; one a minute.")] = None,
-    fields: Annotated[str, typer.Option(help=f"To store, of {','.join(UNITS)}.")] = ",".join(USUAL),
-    gzip: Annotated[int, typer.Option(help="Compression, 0 (none) to 9.")] = 0,
+    fields: Annotated[str | None, typer.Option(help=FIELDS)] = None,
+    gzip: Annotated[int | None, typer.Option(help="Compression, 1 to 9; none.")] = None,
     json: Machine = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar.")] = False,
 ):
@@ -59,11 +65,19 @@ def run(
         path = find_scene(name)
         record = scene.load(path)
         with options():
-            how = Options(steps, checkpoint_every, Fields(tuple(fields.split(",")), gzip),
-                          resume, overwrite, record.seed)
+            how = Options(steps, checkpoint_every, stored(fields, gzip), resume, overwrite,
+                          record.seed)
             use_threads(threads)
-        request = Request(name, out or Path(f"{path.stem}.h5"), json, quiet)
-        raise typer.Exit(run_scene(scene.build(record), request, how))
+        with Bar(Request(name, out or Path(f"{path.stem}.h5"), json, quiet)) as bar:
+            status = run_scene(scene.build(record, str(path)), bar, how)
+        raise typer.Exit(status)
+
+
+def stored(fields, gzip):
+    """`Fields` of the two options; None where neither is given. Raises ValueError."""
+    if fields is None and gzip is None:
+        return None
+    return Fields(USUAL if fields is None else tuple(fields.split(",")), gzip or 0)
 
 
 def use_threads(n):

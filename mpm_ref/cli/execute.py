@@ -4,12 +4,10 @@ Exit status: 0 finished, or stopped at --steps; 2 the scene, the options or the 
 3 the run became unstable; 4 a file could not be written; 130 Ctrl-C; 143 terminated.
 """
 
-import shutil
 import sys
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-
-from tqdm import tqdm
 
 from ..core.grid import OutOfRange
 from ..monitor import Unstable
@@ -21,57 +19,13 @@ from ..store.session import AT_LIMIT, FINISHED, INTERRUPTED, TERMINATED, Watch, 
 from ..timestep import TooLarge
 from . import info
 from .faults import INTERRUPT, NOT_WRITTEN, UNSTABLE, end
+from .terminal import COMPILING, compiling, passing, warn
 
 EXIT = {FINISHED: 0, AT_LIMIT: 0, INTERRUPTED: INTERRUPT, TERMINATED: 143}
-SHAPE = "{percentage:3.0f}% |{bar:20}| {n:.6g}/{total:g} {unit} [{elapsed}<{remaining}{postfix}]"
-
-
-class Bar(Watch):
-    """What is run, on the output; and progress on the error channel of a terminal: steps or time
-    done, time left, dt, energies.
-    """
-
-    def __init__(self, request):
-        self.request, self.bar, self.energies, self.facts = request, None, "", None
-
-    @property
-    def began(self):
-        """Whether the run began."""
-        return self.bar is not None
-
-    def begin(self, problem, state):
-        """Say what is run, and open the bar."""
-        self.facts = info.of_problem(problem)
-        if not self.request.json:
-            print("\n".join(info.problem_lines(self.facts)), flush=True)
-        self.total, size = last_step(problem.clock), shutil.get_terminal_size((120, 24))
-        self.bar = tqdm(
-            total=self.total or problem.clock.end, unit="steps" if self.total else "s",
-            initial=0 if state is None else self.done(state), bar_format=SHAPE, file=sys.stderr,
-            disable=self.request.quiet or None, mininterval=0.2,
-            ncols=size.columns, nrows=size.lines,      # tqdm shows nothing where they are unknown
-        )
-        self.bar.set_postfix_str("compiling kernels: seconds, once per version")
-
-    def done(self, state):
-        """How far a state is."""
-        return state.step if self.total else state.t
-
-    def step(self, state, dt):
-        """Move the bar."""
-        text = f"t = {state.t:.4g} s, dt = {dt:.3g} s{self.energies}"
-        self.bar.set_postfix_str(text, refresh=False)
-        self.bar.update(self.done(state) - self.bar.n)
-
-    def frame(self, frame, energy):
-        """Note the energies, in joules."""
-        parts = (f"{name} {value:.4g}" for name, value in energy._asdict().items())
-        self.energies = ", energy [J] " + " ".join(parts)
-
-    def close(self):
-        """Leave the bar as it is."""
-        if self.bar is not None:
-            self.bar.close()
+# The bar takes what the rest leaves of the line.
+LINE = "{{percentage:3.0f}}%|{{bar}}| {done} [{{elapsed}}<{{remaining}}{{postfix}}]"
+STEPS = LINE.format(done="{n}/{total:g} steps")
+SECONDS = LINE.format(done="t {n:.4g}/{total:g} s")
 
 
 @dataclass(frozen=True)
@@ -84,15 +38,83 @@ class Request:
     quiet: bool = False
 
 
-def run_scene(problem, request, options):
+class Bar(Watch):
+    """What is run, on the output; and progress on the error channel of a terminal: steps or time
+    done, time left, dt, kinetic and total energy. A context manager.
+    """
+
+    def __init__(self, request):
+        self.request, self.facts, self.energies, self.steps = request, None, "", 0
+        self.bar, self.stack = None, ExitStack()
+
+    def __enter__(self):
+        self.stack.enter_context(compiling(self.request.quiet))
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    @property
+    def began(self):
+        """Whether the run began."""
+        return self.bar is not None
+
+    def begin(self, problem, state):
+        """Say what is run and what looks wrong in it, and open the bar."""
+        self.facts = info.of_problem(problem)
+        self.stack.close()
+        if state is None:
+            warn(self.facts["warnings"])
+        if not self.request.json:
+            print("\n".join(info.problem_lines(self.facts)), flush=True)
+        self.total = last_step(problem.clock)
+        self.bar = passing(
+            self.request.quiet, total=self.total or problem.clock.end, mininterval=0.2,
+            initial=0 if state is None else self.done(state),
+            bar_format=STEPS if self.total else SECONDS,
+        )
+        self.bar.set_postfix_str(COMPILING)
+
+    def done(self, state):
+        """How far a state is."""
+        return state.step if self.total else state.t
+
+    def step(self, state, dt):
+        """Move the bar."""
+        self.steps += 1
+        if self.steps == 1:
+            self.start_clock(state)
+        t = f"t {state.t:.3g}, " if self.total else ""
+        self.bar.set_postfix_str(f"{t}dt {dt:.3g} s{self.energies}", refresh=False)
+        self.bar.update(self.done(state) - self.bar.n)
+
+    def start_clock(self, state):
+        """Count from here: the first step compiles."""
+        self.bar.reset()
+        self.bar.initial = self.bar.n = self.bar.last_print_n = self.done(state)
+
+    def frame(self, frame, energy):
+        """Note the energies."""
+        self.energies = f", E_kin {energy.kinetic:.3g}, E {energy.sum:.3g} J"
+
+    def close(self):
+        """Leave the bar as it is."""
+        self.stack.close()
+        if self.bar is not None:
+            self.bar.close()
+
+
+def run_scene(problem, bar, options):
     """Run a problem as asked; returns the exit status. Faults of the input are raised."""
-    bar = Bar(request)
+    request = bar.request
     try:
         outcome = run(problem, request.out, options, bar)
     except (Unstable, OutOfRange, TooLarge, NotWritten, KeyboardInterrupt) as fault:
         bar.close()
+        if isinstance(fault, TooLarge):
+            fault = TooLarge(f"{request.scene}: {fault}")
         if not bar.began:
-            raise
+            raise fault from None
         _broke_off(fault, request)
     bar.close()
     if not outcome.same_code:

@@ -22,7 +22,8 @@ def record(
 ):
     """Run the first steps of a scene and record every stage with the error of each number."""
     with one_line():
-        problem = scene.build(scene.load(find_scene(name)))
+        path = find_scene(name)
+        problem = scene.build(scene.load(path), str(path))
         with options():
             oracle.record(problem, out, steps)
         print(f"{out}: {steps} steps of {problem.title or name}")

@@ -1,8 +1,9 @@
 """What a problem or a results file is, in numbers: for people as lines, for machines as a dict."""
 
 import json
+from math import isfinite
 
-from ..explicit import Stepper
+from ..placement import misplaced
 from ..store.atomic import in_words
 from ..store.manifest import scene_hash
 from ..store.results import ENERGIES, Results
@@ -11,10 +12,12 @@ from ..timestep import TimeStep, stable_dt
 
 
 def of_problem(problem):
-    """Size, spacing, wave speed, bounds of the time step and memory of a `Problem` as it stands."""
-    stepper = Stepper(problem.scheme, problem.dx, problem.dim, problem.gravity)
+    """Size, spacing, wave speed, bounds of the time step and memory of a `Problem` as it stands,
+    and what looks wrong in it.
+    """
+    stepper = problem.stepper()
     bounds = stable_dt(problem.bodies, stepper)
-    grid = stepper.store.cover([body.particles.x for body in problem.bodies])
+    grid = stepper.storage.cover([body.particles.x for body in problem.bodies])
     clock = problem.clock
     return {
         "title": problem.title,
@@ -34,6 +37,7 @@ def of_problem(problem):
                               if not (name == "C" and a is body.particles.L)),
         "grid_bytes": sum(a.nbytes for a in grid[:4]),
         "scene_sha256": scene_hash(problem),
+        "warnings": misplaced(problem),
     }
 
 
@@ -59,16 +63,24 @@ def of_results(path):
 def problem_lines(facts):
     """Facts of a problem in words."""
     bodies = ", ".join(f"{name} {count}" for name, count in facts["bodies"].items())
-    bounds = TimeStep(**facts["bounds"]).sentence()
-    step = f"dt = {facts['dt']:.6g} s" if facts["dt"] else f"dt = {facts['cfl']:g} of its bound"
     length = f"{facts['steps']} steps" if facts["steps"] else f"until t = {facts['end']:g} s"
     memory = in_words(facts["particle_bytes"]), in_words(facts["grid_bytes"])
     return [
         f"{facts['title'] or 'untitled'}: {facts['dim']}D, {facts['particles']} particles "
         f"({bodies}), dx = {facts['dx']:g} m, {facts['nodes']} nodes at the start",
-        f"wave speed {facts['wave_speed']:.4g} m/s; {step}, {length}; bounds of dt: {bounds}",
+        f"{length}, {step_line(facts)}; wave speed {facts['wave_speed']:.4g} m/s",
         f"memory: particles {memory[0]}, grid {memory[1]}",
     ]
+
+
+def step_line(facts):
+    """How dt is chosen, and its bound with those terms that bound it."""
+    bound = TimeStep(**facts["bounds"])
+    finite = ", ".join(f"{name.replace('_', ' ')} {term:.3g} s"
+                       for name, term in bound._asdict().items() if isfinite(term))
+    chosen = (f"fixed dt = {facts['dt']:.6g} s" if facts["dt"] else
+              f"dt adaptive, cfl {facts['cfl']:g}")
+    return f"{chosen}, bound at the start {bound.dt:.3g} s ({finite or 'nothing bounds it'})"
 
 
 def results_lines(facts):

@@ -1,4 +1,4 @@
-"""`mpm-ref info | plot | animate | export | scenes`: commands that look at results and scenes."""
+"""`mpm-ref plot | animate | export | scenes`: commands that look at results and scenes."""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,30 +6,17 @@ from typing import Annotated
 import typer
 
 from .. import plotting, scene
-from ..store import checkpoint
 from ..store.results import SCALARS, Results
 from ..store.vtkhdf import export_particles
 from ..store.vtkhdf_grid import export_grid
 from . import info
 from .faults import one_line, options
-from .shipped import find_scene, shipped_scenes
-
-HDF5 = b"\x89HDF\r\n\x1a\n"      # how such files begin
+from .shipped import shipped_scenes
 
 Machine = Annotated[bool, typer.Option("--json", help="Answer with JSON.")]
 ResultsFile = Annotated[Path, typer.Argument(metavar="FILE", help="A results file.")]
 Scalar = Annotated[str, typer.Option(help=f"Colour: {', '.join(SCALARS)}.")]
 View = Annotated[str | None, typer.Option(help="Axes to the right and up, such as xz.")]
-
-
-def describe(
-    name: Annotated[str, typer.Argument(metavar="FILE|SCENE")],
-    json: Machine = False,
-):
-    """Say what a results file, a checkpoint or a scene holds."""
-    with one_line():
-        facts, lines = _facts(name)
-        print(info.as_json(facts) if json else "\n".join(lines))
 
 
 def plot(
@@ -72,26 +59,6 @@ def scenes(json: Machine = False):
         found = {name: scene.load(path).title for name, path in shipped_scenes().items()}
         lines = [f"{name:24} {title}" for name, title in found.items()]
         print(info.as_json(found) if json else "\n".join(lines))
-
-
-def _facts(name):
-    """(facts, lines) of whatever a name stands for."""
-    if not _is_hdf5(name):
-        facts = info.of_problem(scene.build(scene.load(find_scene(name))))
-        return facts, info.problem_lines(facts)
-    if checkpoint.is_one(name):
-        facts = checkpoint.summary(name)
-        return facts, [f"checkpoint: step {facts['step']}, t = {facts['t']:.6g} s, after "
-                       f"{facts['frames']} frames; scene sha256 {facts['scene_sha256'][:12]}"]
-    facts = info.of_results(name)
-    return facts, info.results_lines(facts)
-
-
-def _is_hdf5(name):
-    if not Path(name).is_file():
-        return False
-    with open(name, "rb") as file:
-        return file.read(len(HDF5)) == HDF5
 
 
 def _to_file(make, file, out, suffixes, **what):

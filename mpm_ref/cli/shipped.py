@@ -4,6 +4,7 @@ from pathlib import Path
 
 from ..scene import SceneError
 
+HDF5 = b"\x89HDF\r\n\x1a\n"      # how such files begin
 PACKAGE = Path(__file__).resolve().parents[1]
 
 
@@ -17,11 +18,32 @@ def shipped_scenes():
 
 def find_scene(name):
     """Path of a scene given by its file, or the bare name of a shipped one. Raises SceneError."""
-    if Path(name).is_file():
-        return Path(name)
+    file = Path(name)
+    if file.suffix.lower() in (".h5", ".hdf5"):
+        raise SceneError(f"{name}: {_wrong_with(file)}; expected a scene (a TOML file or a shipped "
+                         "name), or for `mpm-ref info` what `mpm-ref run` wrote")
+    if file.is_file():
+        return file
     scenes = shipped_scenes()
     if name in scenes:
         return scenes[name]
     known = ", ".join(scenes) or "not installed"
     raise SceneError(f"{name}: there is no such file, nor a shipped scene of that name; shipped "
                      f"scenes: {known}")
+
+
+def _wrong_with(file):
+    """Why a file named as HDF5 files are is no scene, nor results."""
+    if not file.is_file():
+        return "there is no such file"
+    if is_hdf5(file):
+        return "an HDF5 file is no scene"
+    return "the file is empty" if file.stat().st_size == 0 else "the file does not hold HDF5"
+
+
+def is_hdf5(name):
+    """Whether a name is that of a file that begins as HDF5 files do."""
+    if not Path(name).is_file():
+        return False
+    with open(name, "rb") as file:
+        return file.read(len(HDF5)) == HDF5

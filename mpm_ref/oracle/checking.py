@@ -1,5 +1,7 @@
 """Another code's arrays against a golden file: the first stage that departs, and where."""
 
+from pathlib import Path
+
 import h5py
 import numpy as np
 
@@ -7,6 +9,9 @@ from .matching import Mismatch, NotComparable, matched
 from .recording import shaped_as
 from .report import Departure, Report
 from .schema import ARRAYS, BESIDE, ENERGIES, FORMAT, key
+
+RECORDED = "a golden file, which `mpm-ref oracle record SCENE -o FILE` writes"
+WRITTEN = "the other code's arrays in HDF5, which `mpm_ref.oracle.write` writes"
 
 
 def check(golden, other, precision="auto"):
@@ -18,10 +23,10 @@ def check(golden, other, precision="auto"):
     """
     if precision not in ("auto", "f64", "f32"):
         raise NotComparable(f"precision = {precision!r}: expected 'f64', 'f32' or 'auto'")
-    with opened(golden) as g, opened(other) as o:
+    with opened(golden, RECORDED) as g, opened(other, WRITTEN) as o:
         if g.attrs.get("format") != FORMAT:
             raise NotComparable(f"{golden}: no golden file, its format is {g.attrs.get('format')!r}"
-                                f"; expected {FORMAT!r}, as `mpm-ref oracle record` writes it")
+                                f"; expected {RECORDED}")
         if "steps" not in o:
             raise NotComparable(f"{other}: it has no group 'steps'; write it with `oracle.write`")
         bodies = list(g["bodies"])
@@ -32,12 +37,15 @@ def check(golden, other, precision="auto"):
         return compared(g["steps"], given, bodies, precision)
 
 
-def opened(path):
-    """The file, for reading; NotComparable if it is not HDF5 or cut short."""
+def opened(path, expected):
+    """The file, for reading; NotComparable if it is not there, not HDF5 or cut short."""
+    if not Path(path).is_file():
+        raise NotComparable(f"{path}: there is no such file; expected {expected}")
     try:
         return h5py.File(path, "r")
     except OSError as e:
-        raise NotComparable(f"{path}: cannot be read as HDF5 ({e})") from e
+        why = "it is empty" if Path(path).stat().st_size == 0 else str(e).splitlines()[0]
+        raise NotComparable(f"{path}: cannot be read as HDF5 ({why}); expected {expected}") from e
 
 
 def keys_of(group, bodies):

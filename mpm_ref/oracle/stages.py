@@ -4,7 +4,6 @@ import numpy as np
 
 from .. import explicit
 from ..core import boundary
-from ..core.collide import nodes_with_mass
 from ..core.contact import PRESCRIBED
 from ..energy import energy
 from ..plain.walls import Contact
@@ -80,20 +79,11 @@ def contacts(conditions, grid, t, dt):
     Which nodes a condition holds, its normals and its velocities there are taken as they are.
     """
     found = {}
-    for touch, rule in [] if conditions is None else touches(conditions, grid, t, dt):
+    if conditions is None:
+        return found
+    for touch, rule, friction in zip(*conditions.touched(grid, t, dt), strict=True):
         nodes = np.array(np.unravel_index(touch.node, grid.m.shape)).T + grid.origin
         for i, n, v in zip(nodes, touch.n, touch.v):
-            contact = Contact(n, v, KINDS[rule.rule], rule.friction)
+            contact = Contact(n, v, KINDS[rule], friction)
             found.setdefault(tuple(map(int, i)), []).append(contact)
     return found
-
-
-def touches(conditions, grid, t, dt):
-    """Pairs of a `Touch` and the part or wall whose rule holds there."""
-    if conditions.parts:
-        nodes = nodes_with_mass(grid)
-        for part in conditions.parts:
-            yield part.touch(nodes, t, dt), part
-    if conditions.walls is not None:
-        for touch in conditions.walls.touches(grid):
-            yield touch, conditions.walls

@@ -26,7 +26,7 @@ from ..shapes import (
 )
 from .bodies import build_body
 from .check import checked
-from .error import SceneError
+from .error import SceneError, opened_by
 from .parts import build_clock, build_conditions, build_limits
 from .records import (
     Arrays,
@@ -58,12 +58,18 @@ __all__ = [
 ]
 
 
-def build(scene):
+def build(scene, source=""):
     """The `Problem` of a scene: bodies sampled, conditions and clock made.
 
-    Raises SceneError, which names the key that does not work.
+    `source`, usually a file name, opens error messages. Raises SceneError, which names the key that
+    does not work.
     """
-    scene = checked(scene)
+    scene = checked(scene, source)
+    with opened_by(source):
+        return _built(scene)
+
+
+def _built(scene):
     clip = scene.clip
     return Problem(
         bodies=tuple(build_body(scene, k) for k in range(len(scene.body))),

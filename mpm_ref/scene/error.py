@@ -36,3 +36,14 @@ def at(path):
         raise
     except ValueError as fault:
         raise SceneError(placed(path, str(fault))) from None
+
+
+@contextmanager
+def opened_by(source):
+    """Within this context the sentences of SceneErrors begin with `source`, unless it is empty."""
+    try:
+        yield
+    except SceneError as fault:
+        if not source:
+            raise
+        raise SceneError(f"{source}: {fault}") from None

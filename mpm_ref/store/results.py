@@ -32,16 +32,19 @@ class Results:
     def __init__(self, path):
         self.path = Path(path)
         if not self.path.is_file():
-            raise BadResults(f"{path}: there is no such file")
+            raise BadResults(f"{path}: there is no such file; expected a results file, as "
+                             "`mpm-ref run` writes it")
         try:
             recover(self.path)
             self.h5 = h5py.File(self.path, "r")
         except OSError as e:
-            raise BadResults(f"{path} cannot be read as HDF5 ({_first_line(e)}); "
-                             "is it a results file, and whole?") from e
+            why = "it is empty" if self.path.stat().st_size == 0 else _first_line(e)
+            raise BadResults(f"{path} cannot be read as HDF5 ({why}); expected a results file, as "
+                             "`mpm-ref run` writes it: is it one, and whole?") from e
         if self.h5.attrs.get("format") != FORMAT:
             self.close()
-            raise BadResults(f"{path} is not a results file of mpm_ref (format {FORMAT!r})")
+            raise BadResults(f"{path} is HDF5, but not a results file of mpm_ref (format "
+                             f"{FORMAT!r}); give a file that `mpm-ref run` wrote")
         self._read_heads()
 
     def _read_heads(self):
@@ -86,6 +89,10 @@ class Results:
     def fields(self, body):
         """Names of the fields that are stored of a body in every frame."""
         return [name for name in UNITS if self.has(body, name)]
+
+    def gzip(self, body):
+        """Level of compression of a body's fields, 0 for none."""
+        return self.h5[f"bodies/{body}/x"].compression_opts or 0
 
     def field(self, body, name, frame=None):
         """A stored field of a body: of a frame (N, ..), or of all; m and V0 (N,) have none. Raises

@@ -1,18 +1,18 @@
 """A run on files: `run(problem, "out.h5")`, to be continued bit for bit after whatever ended it."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
-from ..explicit import Stepper
 from ..simulate import ended
 from ..timestep import refuse, stable_dt
 from . import Fields, checkpoint, create, reopen
 from .manifest import manifest
+from .results import Results
 from .session import AT_LIMIT, FINISHED, Session, Watch, checkpoint_of
 
 
 class Refused(ValueError):
-    """A run that was asked for would destroy, or cannot find, an earlier one."""
+    """A run that was asked for would destroy, cannot find, or does not fit an earlier one."""
 
 
 @dataclass(frozen=True)
@@ -20,14 +20,15 @@ class Options:
     """How a run is recorded.
 
     steps: stop after this many steps in all, to be continued later; checkpoint_every: steps between
-    checkpoints, None for one a minute; fields: what is stored, of a resumed run what it began with;
-    resume: go on from the checkpoint beside the results, or begin where there is none; overwrite:
-    replace the results of an earlier run; seed: of the scene, for the manifest.
+    checkpoints, None for one a minute; fields: what is stored (`Fields`), None for the usual, or
+    what a resumed run began with, and nothing else is taken for that; resume: go on from the
+    checkpoint beside the results, or begin where there is none; overwrite: replace the results of
+    an earlier run; seed: of the scene, for the manifest.
     """
 
     steps: int | None = None
     checkpoint_every: int | None = None
-    fields: Fields = field(default_factory=Fields)
+    fields: Fields | None = None
     resume: bool = False
     overwrite: bool = False
     seed: int | None = None
@@ -62,6 +63,7 @@ def run(problem, out, options=None, watch=None):
     """
     options, watch = options or Options(), watch or Watch()
     state, same_code = _where_to_begin(problem, out, options)
+    _require_same_fields(problem, out, options)
     over = _why_over(problem, state, options)
     if over is not None:
         return Outcome(over, state, state.frame, same_code)
@@ -90,6 +92,23 @@ def _where_to_begin(problem, out, options):
     return None, True
 
 
+def _require_same_fields(problem, out, options):
+    """Raise `Refused` if a run that goes on is to store something else than it began with."""
+    if not options.resume or options.fields is None or not Path(out).exists():
+        return
+    with Results(out) as results:
+        for body in problem.bodies:
+            if body.name not in results.bodies:
+                return                  # of another scene, which `reopen` refuses
+            stored, gzip = results.fields(body.name), results.gzip(body.name)
+            asked = list(options.fields.of(body))
+            if set(asked) != set(stored) or options.fields.gzip != gzip:
+                raise Refused(
+                    f"{out} was begun with the fields {','.join(stored)} and gzip {gzip}, not with "
+                    f"{','.join(asked)} and gzip {options.fields.gzip}: leave fields and gzip out "
+                    "to continue it, or write to another file")
+
+
 def _why_over(problem, state, options):
     """Why a state needs no further step, or None."""
     if state is None:
@@ -102,7 +121,7 @@ def _why_over(problem, state, options):
 def _require_stable(problem):
     """Raise `TooLarge`, before anything is written, if a fixed dt is past its bound at first."""
     if problem.clock.dt is not None and not problem.allow_unstable:
-        stepper = Stepper(problem.scheme, problem.dx, problem.dim, problem.gravity)
+        stepper = problem.stepper()
         refuse(problem.clock.dt, stable_dt(problem.bodies, stepper))
 
 
@@ -110,6 +129,6 @@ def _open(problem, out, options, state):
     """`Writer` of the results, new ones or those of the run that goes on."""
     if options.resume and Path(out).exists():
         return reopen(out, problem, state.frame if state else 0)
-    writer = create(out, problem, options.fields, manifest(problem, options.seed))
+    writer = create(out, problem, options.fields or Fields(), manifest(problem, options.seed))
     checkpoint_of(out).unlink(missing_ok=True)
     return writer

@@ -1,0 +1,41 @@
+"""`mpm-ref info`: what a results file, a checkpoint or a scene holds."""
+
+from typing import Annotated
+
+import typer
+
+from .. import scene
+from ..store import checkpoint
+from . import info
+from .faults import one_line
+from .shipped import find_scene, is_hdf5
+from .terminal import compiling, warn
+
+
+def describe(
+    name: Annotated[str, typer.Argument(metavar="FILE|SCENE")],
+    json: Annotated[bool, typer.Option("--json", help="Answer with JSON.")] = False,
+):
+    """Say what a results file, a checkpoint or a scene holds."""
+    with one_line():
+        facts, lines = _facts(name)
+        warn(facts.get("warnings", []))
+        print(info.as_json(facts) if json else "\n".join(lines))
+
+
+def _facts(name):
+    """(facts, lines) of whatever a name stands for."""
+    if not is_hdf5(name):
+        return _facts_of_scene(find_scene(name))
+    if checkpoint.is_one(name):
+        facts = checkpoint.summary(name)
+        return facts, [f"checkpoint: step {facts['step']}, t = {facts['t']:.6g} s, after "
+                       f"{facts['frames']} frames; scene sha256 {facts['scene_sha256'][:12]}"]
+    facts = info.of_results(name)
+    return facts, info.results_lines(facts)
+
+
+def _facts_of_scene(path):
+    with compiling():
+        facts = info.of_problem(scene.build(scene.load(path), str(path)))
+    return facts, info.problem_lines(facts)

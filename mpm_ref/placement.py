@@ -1,0 +1,130 @@
+"""What looks wrong in how a problem's bodies stand at the start: in a collider, or in each other.
+
+    for sentence in misplaced(problem):
+        print(sentence)
+
+Neither is an error: a run may mean it. The command line says it before a run and in `info`.
+"""
+
+import json
+from itertools import combinations
+from math import pi
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from .core.levelset import distances
+from .monitor import volume_ratio
+
+ON = 1e-6           # cells: a particle this near to a surface is on it, however it was rounded
+REACH = 2.0         # particle spacings: radius of the ball in which material is measured
+CROWDED = 1.5       # of that ball; bodies that merely touch fill at most 1.3, also if random
+
+
+def misplaced(problem):
+    """Sentences about bodies that start inside a collider or a wall, or overlap; usually none.
+
+    The regions of `fixed`, whose nodes are moved as told, are meant to hold particles. Two bodies
+    overlap where they have half as much material again as there is room: one in the other by a
+    particle spacing or two, less is not seen.
+    """
+    return [*_in_solids(problem), *_in_each_other(problem.bodies)]
+
+
+# in colliders and walls
+
+def _in_solids(problem):
+    """A sentence for each body that is partly in a solid, and for each such solid."""
+    for body in problem.bodies:
+        for name, depth in _solids(problem, body.particles.x):
+            inside = depth > ON * problem.dx
+            if inside.any():
+                yield (f"{inside.sum()} of the {len(depth)} particles of body {body.name!r} start "
+                       f"inside {name}, up to {depth.max():.3g} m deep "
+                       f"({depth.max() / problem.dx:.3g} dx); move the body or the solid, unless "
+                       "it is meant to hold them")
+
+
+def _solids(problem, x):
+    """(name, depth (N,) [m] of the points x in it) of each collider and each wall."""
+    colliders = getattr(problem.conditions, "colliders", ())
+    for name, collider in zip(_names(problem, len(colliders)), colliders, strict=True):
+        yield name, _depth(collider, x)
+    walls = getattr(problem.conditions, "walls", None)
+    if walls is not None:
+        yield from _in_walls(walls, problem.dx, x)
+
+
+def _names(problem, n):
+    """n colliders by their keys, with their names where the scene gives any."""
+    try:
+        tables = json.loads(problem.source)["collider"]
+    except (ValueError, TypeError, KeyError):      # a problem made in Python has any source or none
+        tables = []
+    names = [table.get("name", "") for table in tables] or n * [""]
+    return [f"collider[{k}] {name!r}".removesuffix(" ''") for k, name in enumerate(names)]
+
+
+def _depth(collider, x):
+    """How deep points are in the solid of a collider at t = 0 [m]; negative outside."""
+    pose = collider.motion.pose(0.0, 1.0, x.shape[1])
+    X = pose.origin + (x - pose.center) @ pose.R[0]         # R^T r for each row r
+    side = 1.0 if collider.inside else -1.0
+    return side * distances(X, collider.shape)
+
+
+def _in_walls(walls, dx, x):
+    """Depths in the walls counted in nodes, each of which begins at its first node."""
+    for axis, (low, high) in enumerate(zip(walls.low, walls.high, strict=True)):
+        if low is not None:
+            yield f"the low wall of axis {axis}", (low - 1) * dx - x[:, axis]
+        if high is not None:
+            yield f"the high wall of axis {axis}", x[:, axis] - (high + 1) * dx
+
+
+# in each other
+
+def _in_each_other(bodies):
+    """A sentence for each pair of bodies that overlap."""
+    for a, b in combinations(bodies, 2):
+        x = _crowded(a, b)
+        if len(x):
+            at = ", ".join(f"{c:.3g}" for c in x.mean(axis=0))
+            yield (f"bodies {a.name!r} and {b.name!r} overlap at the start, about ({at}): "
+                   f"{len(x)} particles of {a.name!r} are where {b.name!r} is; move one of them, "
+                   "or cut it out of the other with a difference")
+
+
+def _crowded(a, b):
+    """Positions of the particles of a around which both bodies have more material than fits."""
+    reach = REACH * max(_spacing(a), _spacing(b))
+    near_a, near_b = _near(a, b, 2.0 * reach), _near(b, a, 2.0 * reach)
+    if not near_a.any() or not near_b.any():
+        return np.empty((0, a.particles.x.shape[1]))
+    x = a.particles.x[_near(a, b, reach)]
+    ours, theirs = _filled(a, near_a, x, reach), _filled(b, near_b, x, reach)
+    return x[(theirs > 0.5 * (CROWDED - 1.0)) & (ours + theirs > CROWDED)]
+
+
+def _near(a, b, reach):
+    """Which particles of a are within reach of the bounding box of b."""
+    x, y = a.particles.x, b.particles.x
+    return ((x > y.min(axis=0) - reach) & (x < y.max(axis=0) + reach)).all(axis=1)
+
+
+def _filled(body, near, x, reach):
+    """Share of the ball about each point x that the body's particles fill, on average ones."""
+    q = body.particles
+    count = cKDTree(q.x[near]).query_ball_point(x, reach, return_length=True)
+    ball = pi * reach**2 if x.shape[1] == 2 else 4.0 / 3.0 * pi * reach**3
+    return count * _volume(body) / ball
+
+
+def _volume(body):
+    """Mean volume of a particle as it is deformed [m^d]."""
+    q = body.particles
+    return float(np.mean(q.V0 * np.abs(volume_ratio(q))))
+
+
+def _spacing(body):
+    return _volume(body) ** (1.0 / body.particles.x.shape[1])
