@@ -6,6 +6,7 @@ import numpy as np
 
 from .core.stencil import inverse_inertia
 from .explicit import Scheme, Stepper
+from .hot.step import ImplicitStepper
 from .materials import recovers
 from .monitor import Limits
 
@@ -59,7 +60,7 @@ class Problem:
     title: str = ""
     source: str = ""                    # canonical text of the scene, "" if built in Python
     integrator: str = "explicit"        # or "implicit"
-    solver: object = None               # `hot.Options` of an implicit step; None: the defaults
+    solver: object = None               # `hot.methods.Options` of an implicit step; None: HOT's
 
     def __post_init__(self):
         if not self.bodies:
@@ -76,8 +77,6 @@ class Problem:
         if self.integrator == "explicit":
             return Stepper(*what)
         if self.integrator == "implicit":
-            from .hot.step import ImplicitStepper
-
             return ImplicitStepper(*what, self.solver)
         raise ValueError(f"integrator = {self.integrator!r}: expected 'explicit' or 'implicit'")
 

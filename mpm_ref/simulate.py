@@ -94,7 +94,7 @@ def advance(problem, stepper, state):
     if due or runs_away(problem, state, dt):
         check(problem, state, dt)
     if state.solve is not None and not (state.solve.converged or problem.allow_unstable):
-        raise lost(problem, state, dt, f"the solve of the implicit step {state.solve.why}")
+        raise lost(problem, state, dt, f"the implicit step was not solved: {state.solve.why}")
     return dt
 
 

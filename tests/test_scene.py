@@ -198,7 +198,7 @@ def test_every_parameter_of_the_tables_is_a_key():
 def test_all_scenes_are_here():
     asked = {"nclaw_jelly", "nclaw_sand", "nclaw_plasticine", "nclaw_water", "ldm_gravity",
              "nsf_sand", "nsf_metal", "colliding_disks", "cantilever", "dam_break",
-             "column_collapse", "incline", "hello"}
+             "column_collapse", "incline", "hello", "hot_stiffness"}
     assert {file.stem for file in SCENES} == asked
 
 

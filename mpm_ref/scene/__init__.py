@@ -27,7 +27,7 @@ from ..shapes import (
 from .bodies import build_body
 from .check import checked
 from .error import SceneError, opened_by
-from .parts import build_clock, build_conditions, build_limits
+from .parts import build_clock, build_conditions, build_limits, build_solver
 from .records import (
     Arrays,
     Body,
@@ -43,6 +43,7 @@ from .records import (
     Ramps,
     Scene,
     Scheme,
+    Solver,
     Steady,
     Velocity,
     Walls,
@@ -53,7 +54,7 @@ __all__ = [
     "Arrays", "Body", "Box", "Capsule", "Clip", "Collider", "Cylinder", "Difference", "Fixed",
     "Flow", "HalfSpace", "Intersection", "Jittered", "Keyframes", "Lattice", "Limits", "Material",
     "Mesh", "Motion", "Moved", "Oscillation", "Poisson", "Ramps", "Regular", "Scene", "SceneError",
-    "Scheme", "Sphere", "Steady", "Torus", "Union", "Velocity", "Walls", "Wedge", "build",
+    "Scheme", "Solver", "Sphere", "Steady", "Torus", "Union", "Velocity", "Walls", "Wedge", "build",
     "canonical", "digest", "dumps", "load", "loads",
 ]
 
@@ -70,7 +71,7 @@ def build(scene, source=""):
 
 
 def _built(scene):
-    clip = scene.clip
+    clip, solver = scene.clip, build_solver(scene)
     return Problem(
         bodies=tuple(build_body(scene, k) for k in range(len(scene.body))),
         dx=scene.dx,
@@ -83,4 +84,6 @@ def _built(scene):
         allow_unstable=scene.unstable == "allow",
         title=scene.title,
         source=canonical(scene),
+        integrator="explicit" if solver is None else "implicit",
+        solver=solver,
     )

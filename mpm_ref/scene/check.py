@@ -12,7 +12,7 @@ import numpy as np
 from ..shapes import Mesh
 from ..shapes.quantities import Vector
 from .error import SceneError, at, joined
-from .parts import build_clock, build_conditions, build_limits
+from .parts import build_clock, build_conditions, build_limits, build_solver
 from .records import Scene
 from .words import rephrase, shown
 
@@ -76,6 +76,7 @@ def check_scene(scene):
     build_clock(scene)
     build_limits(scene)
     build_conditions(scene)
+    build_solver(scene)
 
 
 def check_body(body, dim, path):

@@ -11,6 +11,8 @@ import numpy as np
 from ..core import motion as rigid
 from ..core.boundary import BoxWalls, Conditions, Prescribed
 from ..core.boundary import Collider as RigidCollider
+from ..hot.methods import METHODS, options_of
+from ..hot.step import check_scheme
 from ..monitor import Limits
 from ..problem import Clock
 from ..shapes import level_set
@@ -18,6 +20,7 @@ from ..shapes.inside import rotation
 from .error import SceneError, at
 from .records import Keyframes, Oscillation, Ramps, Steady
 
+NAMES = f'expected "explicit" or one of {", ".join(METHODS)}'
 CFL = 0.5       # share of the stable time step, for a scene that says nothing about its step
 
 
@@ -31,7 +34,28 @@ def build_clock(scene):
     cfl = CFL if scene.cfl is None else scene.cfl
     if scene.dt is None and cfl > 1.0 and scene.unstable != "allow":
         raise SceneError(f'cfl = {cfl}: expected at most 1, or with it unstable = "allow"')
-    return Clock(scene.dt, cfl, scene.steps, scene.end, scene.every, scene.interval)
+    if scene.dt is not None and scene.longest is not None:
+        raise SceneError("longest: given together with `dt`, which it could not change")
+    longest = inf if scene.longest is None else scene.longest
+    return Clock(scene.dt, cfl, scene.steps, scene.end, scene.every, scene.interval, longest)
+
+
+def build_solver(scene):
+    """Options of the implicit method that the scene names; None for the explicit integrator."""
+    if scene.integrator == "explicit":
+        if scene.solver is not None:
+            raise SceneError(f'solver: given with integrator = "explicit"; {NAMES}')
+        return None
+    if scene.integrator not in METHODS:
+        raise SceneError(f"integrator = {scene.integrator!r}: {NAMES}")
+    with at("scheme"):
+        check_scheme(scene.scheme.explicit())
+    for name, parts in (("collider", scene.collider), ("walls", filter(None, (scene.walls,)))):
+        for part in parts:
+            if part.friction:
+                raise SceneError(f"{name}.friction = {part.friction}: expected 0 with an implicit "
+                                 "integrator; friction has no potential")
+    return options_of(scene.integrator, **(scene.solver.given() if scene.solver else {}))
 
 
 def build_limits(scene):

@@ -18,6 +18,7 @@ from ..shapes.quantities import (
     Count,
     Kind,
     Length,
+    Natural,
     NotNegative,
     Positive,
     Record,
@@ -219,6 +220,24 @@ class Scheme(Record):
         return ExplicitScheme(**{name: getattr(self, name) for name in self.__struct_fields__})
 
 
+class Solver(Record):
+    """How an implicit step is solved; as `hot.methods.Options`, the method's where not given."""
+
+    eps: Positive | None = None                 # tolerance of the scaled gradient
+    start: Literal["zero", "gravity"] | None = None
+    window: Natural | None = None               # pairs of L-BFGS
+    rebuild: Natural | None = None              # steps between Hessians of L-BFGS
+    iterations: Count | None = None             # at most
+    cg_iterations: Count | None = None          # of a linear solve, at most
+    levels: Count | None = None                 # of multigrid
+    path: Literal["blocks", "scipy"] | None = None
+
+    def given(self):
+        """The keys that are given, as a dictionary."""
+        values = {name: getattr(self, name) for name in self.__struct_fields__}
+        return {name: value for name, value in values.items() if value is not None}
+
+
 class Limits(Record):
     """What a healthy run stays within; as `monitor.Limits`."""
 
@@ -237,6 +256,7 @@ class Scene(Record):
     gravity: Vector | None = None               # [m/s^2]; none
     dt: Positive | None = None                  # fixed time step [s], or
     cfl: Annotated[float, Meta(gt=0, le=10)] | None = None      # share of the stable one; 0.5
+    longest: Positive | None = None             # bound of a time step that is not fixed [s]
     steps: Count | None = None                  # length of the run, or
     end: Positive | None = None                 # [s]
     every: Count | None = None                  # steps between frames, or
@@ -244,6 +264,8 @@ class Scene(Record):
     seed: Seed = 0
     unstable: Literal["refuse", "allow"] = "refuse"
     scheme: Scheme = Scheme()
+    integrator: str = "explicit"                # or the word of an implicit method
+    solver: Solver | None = None
     collider: tuple[Collider, ...] = ()
     fixed: tuple[Fixed, ...] = ()
     walls: Walls | None = None

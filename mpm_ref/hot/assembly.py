@@ -1,0 +1,219 @@
+"""The Hessian as a block matrix: sums over the particles of a cell first, then one scatter.
+
+A pair of nodes i, j that a particle reaches gets the block
+
+    H_ij = sum_p sum_bc C_(b)(c) dw_ip,b dw_jp,c,    C_(ab)(cd) = dT_ab / dL_cd    (a row, c column)
+
+All particles of a cell reach the same nodes, so that their blocks are summed up in a small dense
+matrix, of which the blocks with j >= i suffice: nodes are numbered in the order of the stencil, and
+the matrix is mirrored in the end, which makes it symmetric to the bit. Slabs of cells write to rows
+of their own nodes only (see `core.order`).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import bsr_array
+
+from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
+from ..core.stencil import column, columns, gradient, slopes_per_axis, weights_per_axis
+from ..core.tensor import mat, mlin, mm, mmt, outer, put_mat, put_vec, vec
+from ..materials.principal import apply
+from .modes import pairs_of
+from .pattern import strides
+
+
+class Matrix(NamedTuple):
+    """Where the blocks of a cell go."""
+
+    data: np.ndarray      # (blocks, d, d)
+    block: np.ndarray     # (n, offsets)    as in `Pattern`
+    number: np.ndarray    # (n1, .., nd)    number of each node of the box, -1 without mass
+    hop: np.ndarray       # (S,)            nodes of the box from a cell's first to its I-th
+    code: np.ndarray      # (S,)            offset of the I-th node, numbered as in `Pattern`
+
+
+class Cell(NamedTuple):
+    """Workspace of one cell with S = (degree + 1)^d nodes."""
+
+    K: np.ndarray     # (S, S, d, d)    sums of the blocks I, J, for J >= I
+    g: np.ndarray     # (S, d)          dw_ip of one particle [1/m]
+    C: np.ndarray     # (d d, d, d)     C_(.b)(.c) of one particle at [c d + b]
+    T: np.ndarray     # (d, S, d, d)    sum_c C_(.b)(.c) dw_Jp,c at [b, J]
+
+
+def assembled(bodies, unknowns, pattern):
+    """H = M + the blocks of bodies, pairs of `Sites` and `Modes`, as a bsr_array [kg]."""
+    n, d = unknowns.v.shape
+    matrix = _empty(unknowns.number, pattern)
+    stencil = tuple(range(pattern.degree + 1))
+    for sites, modes in bodies:
+        for color in (0, 1):
+            _assemble_color(sites, modes, stencil, unknowns.dx, matrix, color)
+    _complete_all(matrix.data, pattern, unknowns.m)
+    return bsr_array((matrix.data, pattern.indices, pattern.indptr), (n * d, n * d))
+
+
+def _empty(number, pattern):
+    d, degree = number.ndim, pattern.degree
+    data = np.zeros((len(pattern.indices), d, d))
+    offset = np.indices(d * (degree + 1,)).reshape(d, -1)
+    code = strides(d * (2 * degree + 1,)) @ offset
+    return Matrix(data, pattern.block, number, strides(number.shape) @ offset, code)
+
+
+@kernel
+def assemble(sites, modes, stencil, dx, matrix, bounds):
+    """Add the blocks with j >= i of the particles bounds[0] .. bounds[1] - 1."""
+    like = matrix.number.shape
+    cell = empty_cell(len(matrix.hop), len(like))
+    for p in range(bounds[0], bounds[1]):
+        slopes(sites, p, stencil, dx, cell.g, like)
+        differential(modes, p, cell.C, like)
+        contract(cell, like)
+        accumulate(cell, like)
+        if p + 1 == bounds[1] or vec(sites.base, p, like) != vec(sites.base, p + 1, like):
+            flush(cell.K, first_node(sites.base, p, like), matrix, like)
+            clear(cell.K)
+
+
+@kernel
+def empty_cell(S, d):
+    """Workspace with K = 0."""
+    K = np.zeros((S, S, d, d))
+    return Cell(K, np.empty((S, d)), np.empty((d * d, d, d)), np.empty((d, S, d, d)))
+
+
+@kernel
+def slopes(sites, p, stencil, dx, g, like):
+    """g_I = dw_Ip [1/m]."""
+    s = vec(sites.s, p, like)
+    w, dw = weights_per_axis(s, stencil), slopes_per_axis(s, stencil)
+    for c in range(columns(s, stencil)):
+        k = column(c, stencil, like)
+        for l in range(len(stencil)):
+            put_vec(g, c * len(stencil) + l, gradient(k, l, w, dw, dx))
+
+
+@kernel
+def differential(modes, p, C, like):
+    """C_(ib)(jc): the stress T_ib of the velocity gradient e_j e_c^T."""
+    U, W, A = mat(modes.U, p, like), mat(modes.W, p, like), mat(modes.A, p, like)
+    pairs, d = pairs_of(modes.ab, p, like), len(like)
+    for j in range(d):
+        for c in range(d):
+            T = mmt(mm(U, apply(A, pairs, outer(U[j], W[c]))), W)
+            for i in range(d):
+                for b in range(d):
+                    C[c * d + b, i, j] = T[i][b]
+
+
+@kernel
+def contract(cell, like):
+    """T_b,J = sum_c C_(.b)(.c) g_J,c."""
+    d = len(like)
+    for b in range(d):
+        C_b = mat(cell.C, b, like), mat(cell.C, d + b, like), mat(cell.C, (d - 1) * d + b, like)
+        for J in range(len(cell.g)):
+            T_bJ = combined(vec(cell.g, J, like), C_b)
+            for i in range(d):
+                for j in range(d):
+                    cell.T[b, J, i, j] = T_bJ[i][j]
+
+
+@kernel
+def combined(x, A):
+    """sum_a x_a A_a of as many matrices as x has components."""
+    if len(x) == 2:
+        return mlin(x[0], A[0], x[1], A[1])
+    else:
+        return mlin(1.0, mlin(x[0], A[0], x[1], A[1]), x[2], A[2])
+
+
+@kernel
+def accumulate(cell, like):
+    """K_IJ += sum_b g_I,b T_b,J for J >= I. Unsigned indices let the compiler use vectors."""
+    S, d = len(cell.g), len(like)
+    K, T = cell.K.reshape(S, S * d * d), cell.T.reshape(d, S * d * d)
+    for I in range(S):
+        g_I = vec(cell.g, I, like)
+        for e in range(np.uint64(I * d * d), np.uint64(S * d * d)):
+            K[I, e] += combination(g_I, T, e)
+
+
+@kernel
+def combination(x, T, e):
+    """sum_b x_b T[b, e]."""
+    if len(x) == 2:
+        return x[0] * T[0, e] + x[1] * T[1, e]
+    else:
+        return x[0] * T[0, e] + x[1] * T[1, e] + x[2] * T[2, e]
+
+
+@kernel
+def clear(K):
+    """K_IJ = 0 for J >= I."""
+    for I in range(len(K)):
+        K[I, I:] = 0.0
+
+
+@kernel
+def first_node(base, p, shape):
+    """Number of a particle's base node in the box of the given shape, flattened."""
+    i = base[p, 0]
+    for a in range(1, len(shape)):
+        i = i * shape[a] + base[p, a]
+    return i
+
+
+@kernel
+def flush(K, first, matrix, like):
+    """Add the blocks of a cell to those of the matrix. Nodes without mass have only zeros."""
+    number, centre = matrix.number.reshape(-1), matrix.block.shape[1] // 2
+    for I in range(len(K)):
+        i = number[first + matrix.hop[I]]
+        if i >= 0:
+            for J in range(I, len(K)):
+                k = matrix.block[i, centre + matrix.code[J] - matrix.code[I]]
+                if k >= 0:
+                    K_IJ = mat(K[I], J, like)
+                    put_mat(matrix.data, k, mlin(1.0, mat(matrix.data, k, like), 1.0, K_IJ))
+
+
+@kernel
+def complete(data, pattern, m, bounds):
+    """H_ij = H_ji^T for j < i, and masses on the diagonal, in the rows from bounds[0] on."""
+    last = pattern.block.shape[1] - 1
+    for i in range(bounds[0], bounds[1]):
+        for o in range(last // 2):
+            k = pattern.block[i, o]
+            if k >= 0:
+                put_transposed(data, k, pattern.block[pattern.indices[k], last - o])
+        k = pattern.block[i, last // 2]
+        for a in range(data.shape[1]):
+            data[k, a, a] += m[i]
+        put_transposed(data, k, k)
+
+
+@kernel
+def put_transposed(data, k, l):
+    """Block k = block l^T, as its upper triangle says where they are the same."""
+    for a in range(data.shape[1]):
+        for b in range(data.shape[1]):
+            if k != l or b < a:
+                data[k, a, b] = data[l, b, a]
+
+
+@parallel
+def _assemble_color(sites, modes, stencil, dx, matrix, color):
+    for h in prange((len(sites.slab) - color) // 2):
+        a = 2 * h + color
+        bounds = sites.slab[a], sites.slab[a + 1]
+        if bounds[1] > bounds[0]:
+            assemble(sites, modes, stencil, dx, matrix, bounds)
+
+
+@parallel
+def _complete_all(data, pattern, m):
+    for c in prange(CHUNKS):
+        complete(data, pattern, m, chunk(c, len(m)))

@@ -1,0 +1,79 @@
+"""Solvers of the coarsest level: conjugate gradients with HOT's inexact stop, or direct.
+
+HOT's stop is relative: sqrt(r^T D^+ r) <= tolerance sqrt(b^T D^+ b), D the diagonal, or the
+diagonal blocks, of the coarsest matrix (HOT-sec5.3-coarse). What b is reads in two ways; see `Stop`
+in `multigrid`. The inexact solve makes the V-cycle slightly non-linear; a direct one does not.
+"""
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spla
+
+from .projectors import block_diagonal
+from .smoothers import times
+
+DENSE = 450       # unknowns up to which "direct" inverts instead of factorising
+CAP = 10_000      # iterations of conjugate gradients, as in HOT-methods
+
+
+def scalar_inverses(D, B):
+    """Inverse diagonals (n, d, d) for Jacobi by components: the diagonal D_aa of D, 0 where it is
+    held. For a slip plane askew the projector B keeps the result in the free directions.
+    """
+    d = D.shape[1]
+    diagonal = np.einsum("iaa->ia", D)
+    scale = diagonal.max(axis=1, keepdims=True, initial=0.0)
+    free = diagonal > 1e-13 * scale
+    inverse = np.where(free, 1.0 / np.where(free, diagonal, 1.0), 0.0)
+    return B @ (inverse[:, :, None] * np.eye(d)) @ B
+
+
+def conjugate_gradients(apply, D_inv, b, stop):
+    """(u, iterations): A u = b from u = 0 until r^T D^+ r <= stop, b and u (n, d).
+
+    Ends early where A or D^+ is not positive along the search: u is then what was reached.
+    """
+    u, r = np.zeros_like(b), b.copy()
+    z = times(D_inv, r)
+    p, rz = z.copy(), np.vdot(r, z)
+    for k in range(CAP):
+        if not rz > stop:
+            return u, k
+        q = apply(p)
+        curvature = np.vdot(p, q)
+        if not curvature > 0.0:
+            return u, k
+        alpha = rz / curvature
+        u += alpha * p
+        r -= alpha * q
+        z = times(D_inv, r)
+        rz, old = np.vdot(r, z), rz
+        p = z + rz / old * p
+    return u, CAP
+
+
+class Direct:
+    """Exact solver: dense inverse up to DENSE unknowns, sparse LU beyond.
+
+    Held directions are decoupled by a diagonal block of the matrix's own size, then masked.
+    """
+
+    def __init__(self, A, D, B):
+        d = D.shape[1]
+        scale = np.trace(D, axis1=1, axis2=2)[:, None, None]
+        held = np.where(scale > 0.0, scale, 1.0) * (np.eye(d) - B)
+        full = sp.csc_array(A + block_diagonal(held))
+        self.B, self.inverse, self.lu = B, None, None
+        if full.shape[0] <= DENSE:
+            inverse = np.linalg.inv(full.toarray())
+            self.inverse = 0.5 * (inverse + inverse.T)
+        else:
+            symmetric = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0,
+                         "options": {"SymmetricMode": True}}
+            self.lu = spla.splu(full, **symmetric)
+
+    def __call__(self, b):
+        """u (n, d) of A u = b (n, d)."""
+        rhs = times(self.B, b).reshape(-1)
+        u = self.lu.solve(rhs) if self.inverse is None else self.inverse @ rhs
+        return times(self.B, u.reshape(b.shape))

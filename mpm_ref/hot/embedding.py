@@ -1,0 +1,104 @@
+"""Nodes embedded in the next coarser lattice of nodes: the weights of HOT's multigrid.
+
+Coarse node c sits on fine node 2 c, in world indices, so that a hierarchy does not depend on where
+the grid's storage begins. Finer nodes act as particles of the coarser level (HOT-impl): fine node
+i hangs on coarse node c with the weight N(i/2 - c) of a B-spline, axis by axis.
+"""
+
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+
+# N(i/2 - c) at i - 2 c = -t .. t (HOT-sec4.2-kernel).
+TAPS = {
+    "linear": (1 / 2, 1.0, 1 / 2),
+    "quadratic": (1 / 8, 1 / 2, 3 / 4, 1 / 2, 1 / 8),
+}
+
+
+class Embedding(NamedTuple):
+    """How n fine nodes hang on m coarse ones: v_i = sum_c W_ic v_c."""
+
+    W: sp.csr_array           # (n, m)   weights; a row sums to 1
+    index: np.ndarray         # (m, d)   world index of coarse node, lexicographic
+
+
+def taps(kernel):
+    """Weights N(o/2), o = -t .. t, of one axis (HOT-sec4.2-kernel). Raises ValueError for a kernel
+    that is neither "linear" nor "quadratic".
+    """
+    if kernel not in TAPS:
+        raise ValueError(f"kernel = {kernel!r}: expected one of {', '.join(TAPS)}")
+    return TAPS[kernel]
+
+
+def parents(i, kernel):
+    """Coarse indices and weights (n, k) along one axis of fine nodes with indices i (n,)."""
+    w = taps(kernel)
+    t = len(w) // 2
+    first = -((t - i) // 2)                       # the smallest c with i - 2 c <= t, rounded up
+    c = first[:, None] + np.arange(t + 1)
+    offset = i[:, None] - 2 * c
+    weight = np.array(w)[np.clip(offset + t, 0, 2 * t)]
+    return c, np.where(abs(offset) <= t, weight, 0.0)
+
+
+def embed(index, kernel="linear"):
+    """Embedding of the nodes with world indices index (n, d), as in HOT-eq3 and HOT-eq4.
+
+    A coarse node exists where a fine node has a positive weight. Negative indices are nodes like
+    any others.
+    """
+    rows, c, w = _pairs(np.asarray(index, dtype=np.int64), kernel)
+    coarse, number = np.unique(c, axis=0, return_inverse=True)
+    shape = (len(index), len(coarse))
+    W = sp.csr_array(sp.coo_array((w, (rows, number.reshape(-1))), shape=shape))
+    W.sort_indices()
+    return Embedding(W, coarse)
+
+
+def _pairs(index, kernel):
+    """(fine node, coarse index (d,), weight) of every pair of positive weight."""
+    axes = [parents(i, kernel) for i in index.T]
+    per_axis = range(axes[0][0].shape[1])
+    rows, coarse, weights = [], [], []
+    for choice in product(per_axis, repeat=len(axes)):
+        w = np.prod([axis[1][:, k] for axis, k in zip(axes, choice)], axis=0)
+        keep = np.flatnonzero(w > 0.0)
+        rows.append(keep)
+        weights.append(w[keep])
+        coarse.append(np.stack([axis[0][keep, k] for axis, k in zip(axes, choice)], axis=1))
+    return np.concatenate(rows), np.concatenate(coarse), np.concatenate(weights)
+
+
+def restricted_to(embedding, keep):
+    """The embedding with the coarse nodes that keep (m,) marks."""
+    return Embedding(sp.csr_array(embedding.W[:, np.flatnonzero(keep)]), embedding.index[keep])
+
+
+# The geometric view: a level of the Galerkin hierarchy is MPM on a coarser grid, wider kernel.
+
+def width(kernel, level):
+    """Width of the particle-grid kernel of a level, in its own spacing (HOT-sec4.2-kernel).
+
+    Level 0 is the quadratic B-spline, 3; linear embedding gives 2 + 2^-l, quadratic 4 - 2^-l.
+    """
+    reach = 3.0
+    for _ in range(level):
+        reach = (reach + len(taps(kernel)) - 1) / 2
+    return reach
+
+
+def kernel_value(x, kernel, level):
+    """Particle-grid kernel of a level at distances x from its node, in that level's own spacing
+    (HOT-eq8): w_l(x) = sum_o N(o/2) w_{l-1}(2 x - o), from the quadratic B-spline on level 0.
+    """
+    x = np.asarray(x, dtype=float)
+    if level == 0:
+        r = abs(x)
+        return np.where(r < 0.5, 0.75 - r**2, np.where(r < 1.5, 0.5 * (1.5 - r) ** 2, 0.0))
+    w = taps(kernel)
+    t = len(w) // 2
+    return sum(w_o * kernel_value(2 * x - o, kernel, level - 1) for o, w_o in enumerate(w, -t))

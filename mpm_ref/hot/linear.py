@@ -1,0 +1,104 @@
+"""The Hessian as a solver uses it: the product with it, and an approximate inverse of it."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .krylov import JACOBI, Rule, half, pcg
+from .multigrid import hierarchy
+from .projectors import diagonal_blocks, inverses, onto_range
+from .smoothers import GaussSeidel
+
+
+class Linear(NamedTuple):
+    """Two functions from nodal fields (n, d) to nodal fields: r -> H r and, about, r -> H^-1 r."""
+
+    product: callable
+    inverse: callable
+
+
+def linearised(system, options, watch):
+    """The function from dv to the `Linear` of the Hessian there, of the kind that options name."""
+    at = _without_matrix if options.operator == "free" else _with_matrix
+    return lambda dv: at(system, dv, options, watch)
+
+
+def _without_matrix(system, dv, options, watch):
+    D = system.diagonal(dv)
+    if not np.isfinite(D).all():
+        return Linear(nowhere, nowhere)
+    with watch.part("hierarchy"):
+        inverse = JACOBI[options.jacobi](D)
+    return Linear(system.product(dv), watch.timed("jacobi", inverse))
+
+
+def _with_matrix(system, dv, options, watch):
+    A = system.matrix(dv)
+    if not np.isfinite(A.data).all():
+        return Linear(nowhere, nowhere)
+    with watch.part("hierarchy"):
+        name, inverse = INVERSES[options.inverse](A, system.index, options, watch)
+    return Linear(watch.timed("product", by_matrix(A)), watch.timed(name, inverse))
+
+
+def first_inverse(system, options, watch):
+    """The function from dv to the first inverse of L-BFGS: that of `linearised`, or CG with it as
+    preconditioner, to half of the energy norm (LBFGS-H; HOT-sec5.3-coarse).
+    """
+    at, rule = linearised(system, options, watch), Rule(half, options.cg_iterations)
+    if options.inverse != "cg":
+        return lambda dv: at(dv).inverse
+
+    def by_cg(dv):
+        linear = at(dv)
+        return lambda r: solve(linear, r, rule, watch)
+    return by_cg
+
+
+def solve(linear, b, rule, watch):
+    """x of H x = b by CG; what it took is told the watch."""
+    with watch.part("krylov"):
+        solved = pcg(linear.product, b, linear.inverse, rule)
+    watch.inner += solved.iterations
+    watch.capped += solved.why is not None
+    return solved.x
+
+
+def by_matrix(A):
+    """r -> A r of a bsr_array."""
+    return lambda r: (A @ r.reshape(-1)).reshape(r.shape)
+
+
+def nowhere(r):
+    """NaN: what can be done with a matrix that is not finite; the line search will say so."""
+    return np.full_like(r, np.nan)
+
+
+def symmetric_gauss_seidel(A, index):
+    """r -> (D + U)^+ D (D + L)^+ r of A = L + D + U: one coloured sweep forth and back."""
+    D = diagonal_blocks(A)
+    sweep = GaussSeidel(A, inverses(D, onto_range(D)), index)
+    return lambda r: sweep(r.reshape(-1)).reshape(r.shape)
+
+
+def _jacobi(A, index, options, watch):
+    return "jacobi", JACOBI[options.jacobi](diagonal_blocks(A))
+
+
+def _sgs(A, index, options, watch):
+    return "sgs", symmetric_gauss_seidel(A, index)
+
+
+def _cycle(A, index, options, watch):
+    grids = hierarchy(A, index, options.levels, options.kernel, options.path,
+                      **options.cycle._asdict())
+
+    def cycle(r):
+        before = grids.iterations
+        u = grids.cycle(r)
+        watch.coarse += grids.iterations - before
+        return u
+    return "cycle", cycle
+
+
+INVERSES = {"jacobi": _jacobi, "cg": _jacobi, "sgs": _sgs, "cycle": _cycle}

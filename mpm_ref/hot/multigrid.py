@@ -1,0 +1,162 @@
+"""Node-embedding multigrid: the readable path on SciPy matrices, and the door to the fast one.
+
+A level is a matrix and the prolongation from the next coarser level; coarse matrices are Galerkin
+products (HOT-eq6). Held directions are masked out of every prolongation, so that coarse levels
+learn of conditions through the product alone and no identity rows leak into them (HOT-bc).
+"""
+
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+
+from .choices import checked
+from .coarsest import Direct, conjugate_gradients, scalar_inverses
+from .embedding import embed, restricted_to
+from .projectors import coarser, diagonal_blocks, inverses, onto_range
+from .smoothers import POLYNOMIAL, GaussSeidel, largest_eigenvalue, times
+
+
+class Level(NamedTuple):
+    """One level of n nodes in d dimensions."""
+
+    A: sp.bsr_array               # (n d, n d)  matrix [kg]
+    P: sp.bsr_array | None        # (n d, m d)  prolongation from m coarse nodes; None if coarsest
+    index: np.ndarray             # (n, d)      world indices, in this level's spacing
+    B: np.ndarray                 # (n, d, d)   projectors onto the free directions
+    D: np.ndarray                 # (n, d, d)   diagonal blocks of A [kg]
+    D_inv: np.ndarray             # (n, d, d)   their pseudo-inverses [1/kg]
+
+
+def prolongation(W, B):
+    """P with blocks W_ic B_i (HOT-eq4), masked by the projectors B (n, d, d) of the finer nodes."""
+    row = np.repeat(np.arange(W.shape[0]), np.diff(W.indptr))
+    d = B.shape[1]
+    shape = (W.shape[0] * d, W.shape[1] * d)
+    return sp.bsr_array((W.data[:, None, None] * B[row], W.indices, W.indptr), shape=shape)
+
+
+def galerkin(A, P):
+    """Coarse matrix P^T A P (HOT-eq5, HOT-eq6)."""
+    product = sp.bsr_array(P.T @ A @ P)
+    product.sort_indices()
+    return product
+
+
+def coarse_nodes(index, B, kernel):
+    """(embedding, projectors) of the next level: nodes that no free direction reaches are gone."""
+    embedding = embed(index, kernel)
+    B = coarser(embedding.W, B)
+    keep = B.any(axis=(1, 2))
+    return restricted_to(embedding, keep), B[keep]
+
+
+def build(A, index, levels, kernel):
+    """Levels, finest first. Fewer than asked where coarsening would leave no node, or as many."""
+    D = diagonal_blocks(A)
+    B = onto_range(D)
+    built = []
+    for _ in range(levels - 1):
+        embedding, B_coarse = coarse_nodes(index, B, kernel)
+        if not 0 < len(embedding.index) < len(index):
+            break
+        P = prolongation(embedding.W, B)
+        built.append(Level(A, P, index, B, D, inverses(D, B)))
+        A, index, B = galerkin(A, P), embedding.index, B_coarse
+        D = diagonal_blocks(A)
+    return [*built, Level(A, None, index, B, D, inverses(D, B))]
+
+
+def smoother(level, word):
+    """The map r -> du, both (n d,), of a word in `choices.WORDS`."""
+    if word == "gauss-seidel":
+        return GaussSeidel(level.A, level.D_inv, level.index)
+    largest = largest_eigenvalue(on_nodes(level.A), level.D_inv)
+    polynomial = partial(POLYNOMIAL[word], on_nodes(level.A), level.D_inv, largest=largest)
+    return lambda r: polynomial(r.reshape(level.index.shape)).reshape(-1)
+
+
+def on_nodes(A):
+    """The product u -> A u on vectors over nodes (n, d)."""
+    return lambda u: (A @ u.reshape(-1)).reshape(u.shape)
+
+
+def v_cycle(levels, smoothers, b, solve, sweeps=1):
+    """u of A u = b, approximately (HOT-alg2): smooth from zero, correct on the next level, smooth
+    again. A symmetric positive map of b if each smoother and `solve`, of the coarsest, is one.
+    """
+    (A, P, *_), *coarser_levels = levels
+    if not coarser_levels:
+        return solve(b)
+    smooth, *coarser_smoothers = smoothers
+    u = np.zeros_like(b)
+    for _ in range(sweeps):
+        u += smooth(b - A @ u)
+    u += P @ v_cycle(coarser_levels, coarser_smoothers, P.T @ (b - A @ u), solve, sweeps)
+    for _ in range(sweeps):
+        u += smooth(b - A @ u)
+    return u
+
+
+class Hierarchy:
+    """Levels on SciPy matrices and the V-cycle over them; see `hierarchy`."""
+
+    def __init__(self, A, index, levels, kernel, choices):
+        self.choices = choices
+        self.levels = build(A, index, levels, kernel)
+        self.smoothers = [smoother(level, choices.smoother) for level in self.levels[:-1]]
+        last = self.levels[-1]
+        self.direct = Direct(last.A, last.D, last.B) if choices.coarsest == "direct" else None
+        scalar = choices.preconditioner == "scalar"
+        self.D_inv = scalar_inverses(last.D, last.B) if scalar else last.D_inv
+        self.iterations = 0           # of the coarsest CG, over all cycles
+
+    def cycle(self, b):
+        """u (n, d), roughly A^+ b, of b (n, d): one V-cycle from zero (HOT-alg2)."""
+        load = b.reshape(-1)
+        for level in self.levels[:-1]:
+            load = level.P.T @ load
+        solve = partial(self._coarsest, load=load)
+        flat = np.array(b, dtype=float).reshape(-1)
+        u = v_cycle(self.levels, self.smoothers, flat, solve, self.choices.sweeps)
+        return u.reshape(b.shape)
+
+    def _coarsest(self, b, load):
+        last = self.levels[-1]
+        b = times(last.B, b.reshape(last.index.shape))
+        if self.direct:
+            return self.direct(b).reshape(-1)
+        of = b if self.choices.stop == "residual" else load.reshape(b.shape)
+        stop = self.choices.tolerance**2 * np.vdot(of, times(self.D_inv, of))
+        u, k = conjugate_gradients(on_nodes(last.A), self.D_inv, b, stop)
+        self.iterations += k
+        return u.reshape(-1)
+
+
+PATHS = {"scipy": Hierarchy, "blocks": Hierarchy}
+
+
+def hierarchy(A, index, levels=3, kernel="linear", path="blocks", **choices):
+    """Multigrid hierarchy of A for nodes with world indices index (n, d), lexicographic.
+
+    A is a bsr_array with d x d blocks [kg], symmetric and positive semi-definite; its null
+    directions are held directions of single nodes. kernel is "linear", or "quadratic" for
+    HOT-quadratic; path is "blocks", or "scipy" for the readable twin; choices are fields of
+    `choices.Choices`. The result has `levels`, `cycle(b)` and the count `iterations` of coarsest
+    CG. One level is the coarsest solver alone (LBFGS-H in HOT-methods).
+
+    Raises ValueError for unknown words, for shapes that do not match, or a matrix not finite.
+    """
+    chosen = checked(levels, choices)
+    if path not in PATHS:
+        raise ValueError(f"path = {path!r}: expected one of {', '.join(PATHS)}")
+    index = np.ascontiguousarray(index, dtype=np.int64)
+    n, d = index.shape
+    if A.shape != (n * d, n * d) or A.blocksize != (d, d):
+        raise ValueError(
+            f"matrix of shape {A.shape} in blocks {A.blocksize} for index of shape {index.shape}: "
+            f"expected {(n * d, n * d)} in blocks {(d, d)}")
+    if not np.isfinite(A.data).all():
+        raise ValueError("the matrix is not finite: has the state blown up?")
+    return PATHS[path](A, index, levels, kernel, chosen)

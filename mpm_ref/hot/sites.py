@@ -1,0 +1,98 @@
+"""What of the particles does not change during an implicit step: where they are, what they
+are made of, and in which order they write to the grid.
+
+Particles are taken sorted by cell. Cells come first axis slowest, so that slabs (see `core.order`)
+are runs of them, and all particles of a cell, which share their nodes, follow each other.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
+from ..core.law import intact
+from ..core.order import by_cell, slab_width
+from ..core.stencil import locate
+from ..core.tensor import diag, mat, put_mat, put_vec, vec
+
+
+class Sites(NamedTuple):
+    """N particles of a body in the order of their cells."""
+
+    base: np.ndarray    # (N, d)        first node that the particle reaches, from the grid's first
+    s: np.ndarray       # (N, d)        offset x/dx - base [cells]
+    F: np.ndarray       # (N, d, d)     deformation gradient at the start of the step
+    V0: np.ndarray      # (N,)          volume at rest [m^d]
+    slab: np.ndarray    # (slabs + 1,)  first particle of each slab
+    psi: np.ndarray     # (N,)          workspace: energy [J]
+    T: np.ndarray       # (N, d, d)     workspace: a velocity gradient, then a stress
+
+
+def sites_of(body, grid, stencil):
+    """`Sites` of a body whose particles lie inside the grid; those that have failed are left out.
+
+    A fluid, which carries J alone, gets an F with that determinant: all of them are alike to it.
+    """
+    order = by_cell(body.particles.x, grid, stencil)
+    if body.particles.y.ndim == 1:
+        order = order[whole(body)[order]]
+    n, d = len(order), grid.m.ndim
+    base, s, F, V0 = np.empty((n, d), np.int64), np.empty((n, d)), np.empty((n, d, d)), np.empty(n)
+    _place_all(body.particles, grid, stencil, order, (base, s, F, V0))
+    width = slab_width(stencil)
+    slabs = np.arange(-(-grid.m.shape[0] // width) + 1)
+    start = np.searchsorted(base[:, 0] // width, slabs)
+    return Sites(base, s, F, V0, start, np.empty(n), np.empty((n, d, d)))
+
+
+def whole(body):
+    """Which particles (N,) have not failed."""
+    out = np.empty(len(body.particles.y), dtype=bool)
+    _ask_all(body.particles.y, body.flow, out)
+    return out
+
+
+@kernel
+def deformation(F, p, like):
+    """F_p; of a field (N,) of determinants, the diagonal matrix (j, .., j, +-j) with that one."""
+    if F.ndim == 3:
+        return mat(F, p, like)
+    else:
+        j = abs(F[p]) ** (1.0 / len(like))
+        last = -j if F[p] < 0.0 else j
+        if len(like) == 2:
+            return diag((j, last))
+        else:
+            return diag((j, j, last))
+
+
+@kernel
+def place(particles, grid, stencil, order, out, bounds):
+    """Base node, offset, F and V0 of the particles order[bounds[0]] .. order[bounds[1] - 1]."""
+    d = grid.m.shape
+    for k in range(bounds[0], bounds[1]):
+        p = order[k]
+        base, s = locate(vec(particles.x, p, d), grid, stencil)
+        put_vec(out[0], k, base)
+        put_vec(out[1], k, s)
+        put_mat(out[2], k, deformation(particles.F, p, d))
+        out[3][k] = particles.V0[p]
+
+
+@kernel
+def ask(y, flow, out, bounds):
+    """Whether the particles bounds[0] .. bounds[1] - 1 have not failed."""
+    for p in range(bounds[0], bounds[1]):
+        out[p] = intact(y[p], flow) > 0.0
+
+
+@parallel
+def _place_all(particles, grid, stencil, order, out):
+    for c in prange(CHUNKS):
+        place(particles, grid, stencil, order, out, chunk(c, len(order)))
+
+
+@parallel
+def _ask_all(y, flow, out):
+    for c in prange(CHUNKS):
+        ask(y, flow, out, chunk(c, len(y)))

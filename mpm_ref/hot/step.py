@@ -1,0 +1,123 @@
+"""The implicit step: backward Euler by minimisation, between the transfers of the explicit step.
+
+Particles to grid (HOT-sec3.1-seq) as in `explicit`; the increment dv of the nodes' velocities that
+minimises the incremental potential (HOT-eq1) under the conditions; grid to particles; deformation
+and, lagged, the return map.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core.state import Grid
+from ..explicit import Stepper, damp, deform_body, gather, scatter
+from .methods import Options, minimise
+from .norms import characteristic_norms
+from .objective import Potential
+from .restraint import Restraint
+from .system import System
+from .unknowns import Unknowns, free_part, unknowns_of
+
+REVISIONS = 20      # of the planes that bear, at most: after that, nodes stay as they are
+
+
+class Pose(NamedTuple):
+    """What an implicit step has to solve."""
+
+    grid: Grid                      # mass and momentum
+    unknowns: Unknowns
+    potential: Potential
+    kappa: np.ndarray               # (n,)  characteristic norms [kg m/s]
+    restraint: Restraint | None
+    falling: np.ndarray             # (d,)  dt g [m/s]
+
+
+class ImplicitStepper(Stepper):
+    """Advances bodies by implicit steps; used as `explicit.Stepper`. After each step `report` is
+    the solver's (see `report`), and `revisions` how often the set of bearing planes was changed.
+    """
+
+    implicit = True
+
+    def __init__(self, scheme, dx, dim, gravity, conditions=None, options=None):
+        super().__init__(scheme, dx, dim, gravity, conditions)
+        self.options = Options() if options is None else options
+        self.report, self.revisions = None, 0
+        check_scheme(scheme)
+
+    def start(self, bodies):
+        """As `explicit.Stepper.start`. Raises ValueError for body forces of particles."""
+        super().start(bodies)
+        for body in bodies:
+            if body.particles.b.ndim == 2:
+                raise ValueError(f"body {body.name!r} has body forces b of its own: expected "
+                                 "gravity alone with an implicit integrator")
+
+    def step(self, bodies, t, dt):
+        """Advance from time t [s] by dt [s]; returns the grid, which holds m and the new v.
+        Changes the bodies in place. Raises ValueError unless dt > 0.
+        """
+        if not 0.0 < dt < np.inf:
+            raise ValueError(f"dt = {dt}: expected a positive, finite time in s")
+        pose = self.pose(bodies, t, dt)
+        put(pose.grid, pose.unknowns, pose.unknowns.v + self.solve(pose))
+        for body in bodies:
+            gather(body, pose.grid, self.scheme, dt)
+            deform_body(body, dt)
+            damp(body, self.scheme)
+        return pose.grid
+
+    def pose(self, bodies, t, dt):
+        """`Pose` of the step from time t [s] by dt [s]; the bodies stay as they are."""
+        grid = scatter(bodies, self.storage, self.scheme, 0.0)
+        unknowns, stencil = unknowns_of(grid), self.scheme.stencil
+        potential = Potential(bodies, unknowns, stencil, dt, self.gravity)
+        kappa = characteristic_norms(bodies, unknowns, stencil, dt)
+        restraint = None
+        if self.conditions is not None:
+            restraint = Restraint(self.conditions, grid, unknowns, t + dt, dt)
+            unknowns = restraint.begin(unknowns, unknowns.v + dt * self.gravity)
+        return Pose(grid, unknowns, potential, kappa, restraint, dt * self.gravity)
+
+    def system(self, pose):
+        """`System` of a pose, for its conditions as they stand."""
+        q, start = pose.unknowns, pose.unknowns.dv0
+        if self.options.start == "gravity":
+            start = start + free_part(q, np.broadcast_to(pose.falling, start.shape))
+        return System(pose.potential, q, pose.kappa, start)
+
+    def solve(self, pose):
+        """The increment dv (n, d) [m/s] of a pose; separate planes come and go in between."""
+        for self.revisions in range(REVISIONS):
+            solution = minimise(self.system(pose), self.options)
+            self.report, dv = solution.report, solution.dv
+            if not (pose.restraint and self._revised(pose, dv)):
+                return dv
+            pose = pose._replace(unknowns=pose.restraint.applied(pose.unknowns))
+        self.report = self.report._replace(converged=False, why=f"separate planes still came or "
+                                           f"went after {REVISIONS} solves")
+        return dv
+
+    def _revised(self, pose, dv):
+        return pose.restraint.revise(pose.unknowns.v + dv, pose.potential.evaluate(dv)[1])
+
+
+def put(grid, unknowns, v):
+    """The velocities v (n, d) of the nodes into the grid; the old ones too where it keeps them."""
+    d = grid.m.ndim
+    at = np.flatnonzero(unknowns.number.reshape(-1) >= 0)
+    if grid.v_old.ndim > 1:
+        grid.v_old.reshape(-1, d)[at] = unknowns.v
+    nodes = grid.v.reshape(-1, d)
+    nodes[:] = 0.0
+    nodes[at] = v
+
+
+def check_scheme(scheme):
+    """Raise ValueError where a scheme has no implicit form."""
+    if scheme.transfer == "mls":
+        raise ValueError("transfer = 'mls' with an implicit integrator: expected 'apic', 'pic' or "
+                         "'flip', whose force is the gradient of an energy of the nodes")
+    if scheme.mass_eps or scheme.gravity_on_empty:
+        raise ValueError("mass_eps and gravity_on_empty belong to explicit NCLaw scenes: leave "
+                         "them out with an implicit integrator")

@@ -1,0 +1,62 @@
+"""One implicit step from a state that is given, solved in many ways: what each found and took."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mpm_ref.explicit import gather
+from mpm_ref.hot.methods import minimise
+from mpm_ref.hot.step import put
+from mpm_ref.scene import build
+from mpm_ref.simulate import simulate
+
+
+class Step(NamedTuple):
+    """A state and the pose of its next step."""
+
+    bodies: tuple
+    stepper: object
+    pose: object
+    dt: float
+
+
+def after(scene, steps, **solver):
+    """`Step` of a scene after so many steps, which are solved as the scene says."""
+    problem = build(scene)
+    frames = list(simulate(problem))
+    state, dt = frames[-1].state, frames[-1].dt
+    if state.step != steps:
+        raise ValueError(f"the scene made {state.step} steps: expected {steps}")
+    stepper = problem.stepper()
+    return Step(state.bodies, stepper, stepper.pose(state.bodies, state.t, dt), dt)
+
+
+def solved(step, method, **changes):
+    """`Solution` of the step by a method."""
+    return minimise(step.stepper.system(step.pose), method, **changes)
+
+
+def particle_velocities(step, dv):
+    """Velocities of all particles after the step with the increment dv, and their masses."""
+    grid, q = step.pose.grid, step.pose.unknowns
+    grid = grid._replace(v=grid.v.copy())
+    put(grid, q, q.v + dv)
+    v, m = [], []
+    for body in step.bodies:
+        copy = body._replace(particles=type(body.particles)(*(a.copy() for a in body.particles)))
+        gather(copy, grid, step.stepper.scheme, step.dt)
+        v.append(copy.particles.v)
+        m.append(copy.particles.m)
+    return np.concatenate(v), np.concatenate(m)
+
+
+def difference(step, dv, exact):
+    """Root mean square over the particles' mass of the error of their velocity increment, relative
+    to that of the increment; and the largest error of their displacement in cells.
+    """
+    v, m = particle_velocities(step, dv)
+    u, _ = particle_velocities(step, exact)
+    v0, _ = particle_velocities(step, np.zeros_like(dv))
+    rms = np.sqrt(m @ np.sum((v - u) ** 2, axis=1) / (m @ np.sum((u - v0) ** 2, axis=1)))
+    far = np.sqrt(np.sum((v - u) ** 2, axis=1)).max() * step.dt / step.pose.grid.dx
+    return float(rms), float(far)
