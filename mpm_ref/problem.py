@@ -6,6 +6,7 @@ import numpy as np
 
 from .core.stencil import inverse_inertia
 from .explicit import Scheme, Stepper
+from .hot.methods import Options
 from .hot.step import ImplicitStepper
 from .materials import recovers
 from .monitor import Limits
@@ -60,7 +61,7 @@ class Problem:
     title: str = ""
     source: str = ""                    # canonical text of the scene, "" if built in Python
     integrator: str = "explicit"        # or "implicit"
-    solver: object = None               # `hot.methods.Options` of an implicit step; None: HOT's
+    solver: Options | None = None       # of an implicit step; None: HOT's
 
     def __post_init__(self):
         if not self.bodies:

@@ -85,7 +85,8 @@ class Bar(Watch):
         if self.steps == 1:
             self.start_clock(state)
         t = f"t {state.t:.3g}, " if self.total else ""
-        self.bar.set_postfix_str(f"{t}dt {dt:.3g} s{self.energies}", refresh=False)
+        solve = "" if state.solve is None else f", {in_short(state.solve)}"
+        self.bar.set_postfix_str(f"{t}dt {dt:.3g} s{solve}{self.energies}", refresh=False)
         self.bar.update(self.done(state) - self.bar.n)
 
     def start_clock(self, state):
@@ -102,6 +103,11 @@ class Bar(Watch):
         self.stack.close()
         if self.bar is not None:
             self.bar.close()
+
+
+def in_short(report):
+    """Iterations and last residual of an implicit step."""
+    return f"{report.iterations} it to {report.residuals[-1]:.0e}"
 
 
 def run_scene(problem, bar, options):

@@ -26,7 +26,9 @@ def of_problem(problem):
         "particles": sum(len(body.id) for body in problem.bodies),
         "dx": problem.dx,
         "nodes": grid.m.size,
-        "wave_speed": problem.dx / bounds.elastic,
+        "integrator": problem.integrator,
+        "solver": solver_of(stepper),
+        "wave_speed": None if stepper.implicit else problem.dx / bounds.elastic,
         "dt": clock.dt,
         "cfl": None if clock.dt else clock.cfl,
         "bounds": bounds._asdict(),
@@ -39,6 +41,13 @@ def of_problem(problem):
         "scene_sha256": scene_hash(problem),
         "warnings": misplaced(problem),
     }
+
+
+def solver_of(stepper):
+    """Method and tolerance of an implicit stepper, else None."""
+    if not stepper.implicit:
+        return None
+    return {"method": stepper.options.method, "eps": stepper.options.eps}
 
 
 def of_results(path):
@@ -68,9 +77,17 @@ def problem_lines(facts):
     return [
         f"{facts['title'] or 'untitled'}: {facts['dim']}D, {facts['particles']} particles "
         f"({bodies}), dx = {facts['dx']:g} m, {facts['nodes']} nodes at the start",
-        f"{length}, {step_line(facts)}; wave speed {facts['wave_speed']:.4g} m/s",
+        f"{length}, {step_line(facts)}; {method(facts)}",
         f"memory: particles {memory[0]}, grid {memory[1]}",
     ]
+
+
+def method(facts):
+    """The wave speed of an explicit run, the solver of an implicit one."""
+    if facts["wave_speed"] is not None:
+        return f"wave speed {facts['wave_speed']:.4g} m/s"
+    solver = facts["solver"]
+    return f"implicit: {solver['method']}, eps {solver['eps']:g}"
 
 
 def step_line(facts):
@@ -80,7 +97,9 @@ def step_line(facts):
                        for name, term in bound._asdict().items() if isfinite(term))
     chosen = (f"fixed dt = {facts['dt']:.6g} s" if facts["dt"] else
               f"dt adaptive, cfl {facts['cfl']:g}")
-    return f"{chosen}, bound at the start {bound.dt:.3g} s ({finite or 'nothing bounds it'})"
+    if not finite:
+        return f"{chosen}, nothing bounds it at the start"
+    return f"{chosen}, bound at the start {bound.dt:.3g} s ({finite})"
 
 
 def results_lines(facts):

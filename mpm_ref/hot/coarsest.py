@@ -5,14 +5,18 @@ diagonal blocks, of the coarsest matrix (HOT-sec5.3-coarse). What b is reads in 
 in `multigrid`. The inexact solve makes the V-cycle slightly non-linear; a direct one does not.
 """
 
+from functools import partial
+
 import numpy as np
+import scipy.linalg as la
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 from .projectors import block_diagonal
-from .smoothers import times
+from .smoothers import dot, times
 
-DENSE = 450       # unknowns up to which "direct" inverts instead of factorising
+DENSE = 600       # unknowns up to which "direct" factorises a dense matrix
+SHIFT = 1e-14     # of its diagonal: above round-off, below all that matters
 CAP = 10_000      # iterations of conjugate gradients, as in HOT-methods
 
 
@@ -35,27 +39,29 @@ def conjugate_gradients(apply, D_inv, b, stop):
     """
     u, r = np.zeros_like(b), b.copy()
     z = times(D_inv, r)
-    p, rz = z.copy(), np.vdot(r, z)
+    p, rz = z.copy(), dot(r, z)
     for k in range(CAP):
         if not rz > stop:
             return u, k
         q = apply(p)
-        curvature = np.vdot(p, q)
+        curvature = dot(p, q)
         if not curvature > 0.0:
             return u, k
         alpha = rz / curvature
         u += alpha * p
         r -= alpha * q
         z = times(D_inv, r)
-        rz, old = np.vdot(r, z), rz
+        rz, old = dot(r, z), rz
         p = z + rz / old * p
     return u, CAP
 
 
 class Direct:
-    """Exact solver: dense inverse up to DENSE unknowns, sparse LU beyond.
+    """Exact solver: dense Cholesky up to DENSE unknowns, sparse LU beyond.
 
-    Held directions are decoupled by a diagonal block of the matrix's own size, then masked.
+    Held directions are decoupled by a diagonal block of the matrix's own size, then masked. Where
+    more coarse nodes than fine ones meet, P loses rank and the coarse matrix is singular; its null
+    vectors do nothing, P n = 0, and a shift of the diagonal by SHIFT keeps factors finite.
     """
 
     def __init__(self, A, D, B):
@@ -63,17 +69,27 @@ class Direct:
         scale = np.trace(D, axis1=1, axis2=2)[:, None, None]
         held = np.where(scale > 0.0, scale, 1.0) * (np.eye(d) - B)
         full = sp.csc_array(A + block_diagonal(held))
-        self.B, self.inverse, self.lu = B, None, None
+        self.B = B
         if full.shape[0] <= DENSE:
-            inverse = np.linalg.inv(full.toarray())
-            self.inverse = 0.5 * (inverse + inverse.T)
+            self.solve = partial(la.cho_solve, _cholesky(full.toarray()))
         else:
+            shifted = sp.csc_array(full + SHIFT * sp.diags_array(full.diagonal()))
             symmetric = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0,
                          "options": {"SymmetricMode": True}}
-            self.lu = spla.splu(full, **symmetric)
+            self.solve = spla.splu(shifted, **symmetric).solve
 
     def __call__(self, b):
         """u (n, d) of A u = b (n, d)."""
-        rhs = times(self.B, b).reshape(-1)
-        u = self.lu.solve(rhs) if self.inverse is None else self.inverse @ rhs
+        u = self.solve(times(self.B, b).reshape(-1))
         return times(self.B, u.reshape(b.shape))
+
+
+def _cholesky(A):
+    """Factor of A with its diagonal raised by SHIFT, or by as much more as round-off demands."""
+    diagonal, shift = np.diagonal(A).copy(), SHIFT
+    while True:
+        np.fill_diagonal(A, diagonal * (1.0 + shift))
+        try:
+            return la.cho_factor(A)
+        except la.LinAlgError:
+            shift *= 10.0

@@ -51,10 +51,16 @@ def embed(index, kernel="linear"):
     A coarse node exists where a fine node has a positive weight. Negative indices are nodes like
     any others.
     """
-    rows, c, w = _pairs(np.asarray(index, dtype=np.int64), kernel)
-    coarse, number = np.unique(c, axis=0, return_inverse=True)
-    shape = (len(index), len(coarse))
-    W = sp.csr_array(sp.coo_array((w, (rows, number.reshape(-1))), shape=shape))
+    index = np.asarray(index, dtype=np.int64)
+    rows, c, w = _pairs(index, kernel)
+    low = index.min(axis=0, initial=0) // 2 - 1
+    box = tuple(index.max(axis=0, initial=0) // 2 + 3 - low)
+    key = np.ravel_multi_index(tuple((c - low).T), box)
+    there = np.zeros(np.prod(box), dtype=bool)
+    there[key] = True
+    number = np.cumsum(there, dtype=np.int32) - 1
+    coarse = np.stack(np.unravel_index(np.flatnonzero(there), box), axis=1) + low
+    W = sp.csr_array(sp.coo_array((w, (rows, number[key])), shape=(len(index), len(coarse))))
     W.sort_indices()
     return Embedding(W, coarse)
 
@@ -71,11 +77,6 @@ def _pairs(index, kernel):
         weights.append(w[keep])
         coarse.append(np.stack([axis[0][keep, k] for axis, k in zip(axes, choice)], axis=1))
     return np.concatenate(rows), np.concatenate(coarse), np.concatenate(weights)
-
-
-def restricted_to(embedding, keep):
-    """The embedding with the coarse nodes that keep (m,) marks."""
-    return Embedding(sp.csr_array(embedding.W[:, np.flatnonzero(keep)]), embedding.index[keep])
 
 
 # The geometric view: a level of the Galerkin hierarchy is MPM on a coarser grid, wider kernel.

@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
+from . import block_multigrid
 from .choices import checked
 from .coarsest import Direct, conjugate_gradients, scalar_inverses
-from .embedding import embed, restricted_to
-from .projectors import coarser, diagonal_blocks, inverses, onto_range
-from .smoothers import POLYNOMIAL, GaussSeidel, largest_eigenvalue, times
+from .projectors import coarse_nodes, diagonal_blocks, inverses, onto_range
+from .smoothers import POLYNOMIAL, GaussSeidel, dot, largest_eigenvalue, times
 
 
 class Level(NamedTuple):
@@ -44,14 +44,6 @@ def galerkin(A, P):
     return product
 
 
-def coarse_nodes(index, B, kernel):
-    """(embedding, projectors) of the next level: nodes that no free direction reaches are gone."""
-    embedding = embed(index, kernel)
-    B = coarser(embedding.W, B)
-    keep = B.any(axis=(1, 2))
-    return restricted_to(embedding, keep), B[keep]
-
-
 def build(A, index, levels, kernel):
     """Levels, finest first. Fewer than asked where coarsening would leave no node, or as many."""
     D = diagonal_blocks(A)
@@ -72,7 +64,7 @@ def smoother(level, word):
     """The map r -> du, both (n d,), of a word in `choices.WORDS`."""
     if word == "gauss-seidel":
         return GaussSeidel(level.A, level.D_inv, level.index)
-    largest = largest_eigenvalue(on_nodes(level.A), level.D_inv)
+    largest = largest_eigenvalue(on_nodes(level.A), level.D_inv, level.index)
     polynomial = partial(POLYNOMIAL[word], on_nodes(level.A), level.D_inv, largest=largest)
     return lambda r: polynomial(r.reshape(level.index.shape)).reshape(-1)
 
@@ -128,13 +120,13 @@ class Hierarchy:
         if self.direct:
             return self.direct(b).reshape(-1)
         of = b if self.choices.stop == "residual" else load.reshape(b.shape)
-        stop = self.choices.tolerance**2 * np.vdot(of, times(self.D_inv, of))
+        stop = self.choices.tolerance**2 * dot(of, times(self.D_inv, of))
         u, k = conjugate_gradients(on_nodes(last.A), self.D_inv, b, stop)
         self.iterations += k
         return u.reshape(-1)
 
 
-PATHS = {"scipy": Hierarchy, "blocks": Hierarchy}
+PATHS = {"scipy": Hierarchy, "blocks": block_multigrid.Hierarchy}
 
 
 def hierarchy(A, index, levels=3, kernel="linear", path="blocks", **choices):
@@ -146,7 +138,7 @@ def hierarchy(A, index, levels=3, kernel="linear", path="blocks", **choices):
     `choices.Choices`. The result has `levels`, `cycle(b)` and the count `iterations` of coarsest
     CG. One level is the coarsest solver alone (LBFGS-H in HOT-methods).
 
-    Raises ValueError for unknown words, for shapes that do not match, or a matrix not finite.
+    Raises ValueError for unknown words, for shapes that do not match, or a diagonal not finite.
     """
     chosen = checked(levels, choices)
     if path not in PATHS:
@@ -157,6 +149,6 @@ def hierarchy(A, index, levels=3, kernel="linear", path="blocks", **choices):
         raise ValueError(
             f"matrix of shape {A.shape} in blocks {A.blocksize} for index of shape {index.shape}: "
             f"expected {(n * d, n * d)} in blocks {(d, d)}")
-    if not np.isfinite(A.data).all():
-        raise ValueError("the matrix is not finite: has the state blown up?")
+    if not np.isfinite(A.diagonal()).all():
+        raise ValueError("the matrix has a diagonal that is not finite: has the state blown up?")
     return PATHS[path](A, index, levels, kernel, chosen)

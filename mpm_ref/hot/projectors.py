@@ -8,7 +8,10 @@ is decided from the weights alone, since coarse blocks of a stiff body may lose 
 import numpy as np
 import scipy.sparse as sp
 
+from .embedding import Embedding, embed
+
 NULL = 1e-13      # of the largest eigenvalue; round-off of B H B leaves about 1e-16
+REGULAR = 1e-8    # a determinant, of a block of mean eigenvalue 1, that cannot be round-off
 TINY = 1e-14      # smallest eigenvalue of a block that is inverted, against its largest
 
 
@@ -22,21 +25,45 @@ def diagonal_blocks(A):
     return D
 
 
+def surely_regular(D):
+    """Whether symmetric semi-definite blocks D (n, d, d) have full rank beyond any doubt: the
+    product of the eigenvalues, each over their mean, is far above round-off.
+    """
+    d = D.shape[1]
+    mean = np.einsum("iaa->i", D) / d
+    return np.linalg.det(D / np.where(mean > 0.0, mean, 1.0)[:, None, None]) > REGULAR
+
+
 def onto_range(G):
     """Orthogonal projectors (n, d, d) onto the ranges of symmetric semi-definite blocks G."""
-    values, vectors = np.linalg.eigh(G)
+    B = np.tile(np.eye(G.shape[1]), (len(G), 1, 1))
+    doubtful = ~surely_regular(G)
+    values, vectors = np.linalg.eigh(G[doubtful])
     kept = values > NULL * np.maximum(values[:, -1:], 0.0)
     columns = vectors * kept[:, None, :]
-    free = kept.all(axis=1)[:, None, None]
-    return np.where(free, np.eye(G.shape[1]), columns @ columns.transpose(0, 2, 1))
+    partly = ~kept.all(axis=1)
+    B[np.flatnonzero(doubtful)[partly]] = (columns @ columns.transpose(0, 2, 1))[partly]
+    return B
 
 
-def coarser(W, B):
-    """Projectors of coarse nodes: onto the sum of the free directions of the nodes hanging on
-    them. W (n, m) weights, B (n, d, d) projectors; a coarse node of held ones alone gets zero.
+def coarse_nodes(index, B, kernel):
+    """(embedding, projectors) of the next level for nodes index (n, d) with projectors B (n, d, d).
+
+    A coarse projector is that onto the sum of the free directions of the nodes that hang on it.
+    Rows of wholly held nodes are empty; coarse nodes that no free direction reaches are gone.
     """
+    free = B.any(axis=(1, 2))
+    inner = embed(index[free], kernel)
+    W = sp.csr_array(inner.W)
+    start = np.zeros(len(index) + 1, dtype=W.indptr.dtype)
+    start[1:][free] = np.diff(W.indptr)
+    W = sp.csr_array((W.data, W.indices, np.cumsum(start, dtype=start.dtype)),
+                     shape=(len(index), len(inner.index)))
     d = B.shape[1]
-    return onto_range((W.T @ B.reshape(-1, d * d)).reshape(-1, d, d))
+    partly = ~(np.eye(d) == B).all(axis=(1, 2))
+    if not partly[free].any():
+        return Embedding(W, inner.index), np.tile(np.eye(d), (len(inner.index), 1, 1))
+    return Embedding(W, inner.index), onto_range((W.T @ B.reshape(-1, d * d)).reshape(-1, d, d))
 
 
 def inverses(D, B):

@@ -1,0 +1,144 @@
+"""The V-cycle on block kernels: the tested twin of the path on SciPy matrices in `multigrid`."""
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+
+from . import block_coarsest
+from .block_galerkin import coarse_reach, galerkin
+from .block_inverse import inverse_blocks
+from .block_sparse import SERIAL, Blocks, blocks_of, diagonal, product, reach_of
+from .block_sweep import Sweep, correct, residual, split, sweep
+from .block_transfer import Transfer, prolong, restrict, transfer
+from .coarsest import CAP, Direct, conjugate_gradients, scalar_inverses
+from .embedding import taps
+from .projectors import coarse_nodes, onto_range
+from .smoothers import POLYNOMIAL, dot, largest_eigenvalue, times
+
+
+class Level(NamedTuple):
+    """One level of n nodes in d dimensions."""
+
+    A: sp.bsr_array            # (n d, n d)  matrix [kg]
+    index: np.ndarray          # (n, d)      world indices, in this level's spacing
+    B: np.ndarray              # (n, d, d)   projectors onto the free directions
+    D: np.ndarray              # (n, d, d)   diagonal blocks of A [kg]
+    D_inv: np.ndarray          # (n, d, d)   their pseudo-inverses [1/kg]
+    reach: int                 # nodes over which A couples
+    blocks: Blocks             # the arrays of A
+    transfer: Transfer | None  # to the next level; None on the coarsest
+
+
+def build(A, index, levels, kernel):
+    """Levels, finest first, as `multigrid.build`."""
+    blocks, w = blocks_of(A), taps(kernel)
+    D, reach = diagonal(blocks), reach_of(blocks, index)
+    B, built = onto_range(D), []
+    for _ in range(levels - 1):
+        embedding, B_coarse = coarse_nodes(index, B, kernel)
+        if not 0 < len(embedding.index) < len(index):
+            break
+        to = transfer(embedding.W, B)
+        built.append(Level(A, index, B, D, inverse_blocks(D, B), reach, blocks, to))
+        A = galerkin(blocks, index, to, embedding.index, reach, w)
+        index, B, reach, blocks = embedding.index, B_coarse, coarse_reach(reach, w), blocks_of(A)
+        D = diagonal(blocks)
+    return [*built, Level(A, index, B, D, inverse_blocks(D, B), reach, blocks, None)]
+
+
+class GaussSeidel:
+    """Sweeps before and after the coarse correction, by kernels that keep their products."""
+
+    def __init__(self, level):
+        self.split = split(level.blocks, level.D_inv, level.index, level.reach)
+
+    def before(self, b, sweeps):
+        """(iterate, residual) of b (n, d) after sweeps from zero."""
+        self.state = Sweep(np.empty_like(b), np.zeros_like(b), np.empty_like(b))
+        self._sweep(b, sweeps)
+        return self.state.u, residual(self.split, self.state)
+
+    def after(self, b, correction, sweeps):
+        """The iterate of `before` plus a correction (n, d), smoothed again."""
+        correct(self.split, self.state, correction)
+        self._sweep(b, sweeps)
+        return self.state.u
+
+    def _sweep(self, b, sweeps):
+        for _ in range(sweeps):
+            sweep(self.split, b, self.state)
+
+
+class Polynomial:
+    """Jacobi or Chebyshev smoothing with products by kernel."""
+
+    def __init__(self, level, word):
+        self.level, self.smooth = level, POLYNOMIAL[word]
+        self.largest = largest_eigenvalue(self._product, level.D_inv, level.index)
+
+    def _product(self, u):
+        return product(self.level.blocks, u)
+
+    def before(self, b, sweeps):
+        """(iterate, residual) of b (n, d) after sweeps from zero."""
+        self.u = self.after(b, np.zeros_like(b), sweeps, np.zeros_like(b))
+        return self.u, b - self._product(self.u)
+
+    def after(self, b, correction, sweeps, u=None):
+        """The iterate of `before` plus a correction (n, d), smoothed again."""
+        u = (self.u if u is None else u) + correction
+        for _ in range(sweeps):
+            r = b - self._product(u)
+            u = u + self.smooth(self._product, self.level.D_inv, r, self.largest)
+        return u
+
+
+def smoother(level, word):
+    """Smoother of a level by its word in `choices.WORDS`."""
+    return GaussSeidel(level) if word == "gauss-seidel" else Polynomial(level, word)
+
+
+class Hierarchy:
+    """Levels on block arrays and the V-cycle over them; see `multigrid.hierarchy`."""
+
+    def __init__(self, A, index, levels, kernel, choices):
+        self.choices = choices
+        self.levels = build(A, index, levels, kernel)
+        self.smoothers = [smoother(level, choices.smoother) for level in self.levels[:-1]]
+        last = self.levels[-1]
+        self.direct = Direct(last.A, last.D, last.B) if choices.coarsest == "direct" else None
+        scalar = choices.preconditioner == "scalar"
+        self.D_inv = scalar_inverses(last.D, last.B) if scalar else last.D_inv
+        self.iterations = 0           # of the coarsest CG, over all cycles
+
+    def cycle(self, b):
+        """u (n, d), roughly A^+ b, of b (n, d): one V-cycle from zero (HOT-alg2)."""
+        b = np.ascontiguousarray(b, dtype=float)
+        sweeps, rhs = self.choices.sweeps, [b]
+        for level, smooth in zip(self.levels, self.smoothers):
+            _, r = smooth.before(rhs[-1], sweeps)
+            rhs.append(restrict(level.transfer, r))
+        u = self._coarsest(rhs.pop(), b)
+        for level, smooth in zip(self.levels[-2::-1], self.smoothers[::-1]):
+            u = smooth.after(rhs.pop(), prolong(level.transfer, u), sweeps)
+        return u
+
+    def _coarsest(self, b, load):
+        last = self.levels[-1]
+        b = times(last.B, b)
+        if self.direct:
+            return self.direct(b)
+        of = b if self.choices.stop == "residual" else self._restricted(load)
+        stop = self.choices.tolerance**2 * dot(of, times(self.D_inv, of))
+        if len(b) < SERIAL:
+            u, k = block_coarsest.conjugate_gradients(last.blocks, self.D_inv, b, stop, CAP)
+        else:
+            u, k = conjugate_gradients(lambda p: product(last.blocks, p), self.D_inv, b, stop)
+        self.iterations += k
+        return u
+
+    def _restricted(self, load):
+        for level in self.levels[:-1]:
+            load = restrict(level.transfer, load.copy())
+        return load
