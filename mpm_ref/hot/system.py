@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
+from ..core.tensor import mat, mm, put_mat
 from .diagonal import diagonal
 from .unknowns import free_part
 
@@ -55,12 +57,25 @@ class System:
 
 def constrained(H, B):
     """B H B of a block matrix, in place: only blocks of a node that is not free are changed."""
-    tied = np.flatnonzero((B != np.eye(B.shape[1])).any(axis=(1, 2)))
-    is_tied = np.zeros(len(B), dtype=bool)
-    is_tied[tied] = True
-    row = np.repeat(np.arange(len(B)), np.diff(H.indptr))
-    k = np.flatnonzero(is_tied[row])
-    H.data[k] = B[row[k]] @ H.data[k]
-    k = np.flatnonzero(is_tied[H.indices])
-    H.data[k] = H.data[k] @ B[H.indices[k]]
+    tied = (B != np.eye(B.shape[1])).any(axis=(1, 2))
+    if tied.any():
+        _project_all(H.data, H.indices, H.indptr, B, tied, tuple(range(B.shape[1])))
     return H
+
+
+@kernel
+def project(H, B, tied, like, bounds):
+    """B_i H_ij B_j in the rows bounds[0] .. bounds[1] - 1 of H = (data, indices, indptr)."""
+    data, indices, indptr = H
+    for i in range(bounds[0], bounds[1]):
+        for k in range(indptr[i], indptr[i + 1]):
+            j = indices[k]
+            if tied[i] or tied[j]:
+                B_i, B_j = mat(B, i, like), mat(B, j, like)
+                put_mat(data, k, mm(mm(B_i, mat(data, k, like)), B_j))
+
+
+@parallel
+def _project_all(data, indices, indptr, B, tied, like):
+    for c in prange(CHUNKS):
+        project((data, indices, indptr), B, tied, like, chunk(c, len(tied)))
