@@ -97,10 +97,11 @@ def test_the_same_bits_in_parallel(monkeypatch, rng):
     serial = hierarchy(c.A, c.index).cycle(b)
     for module in (block_sparse, block_sweep, block_transfer):
         monkeypatch.setattr(module, "SERIAL", 0)
+    before = numba.get_num_threads()
     set_threads(min(2, numba.config.NUMBA_NUM_THREADS))
     try:
         np.testing.assert_array_equal(hierarchy(c.A, c.index).cycle(b), serial)
         monkeypatch.setattr(block_multigrid, "SERIAL", 0)
         close(hierarchy(c.A, c.index).cycle(b), serial)
     finally:
-        set_threads(1)
+        set_threads(before)

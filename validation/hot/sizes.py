@@ -17,7 +17,7 @@ class Size(NamedTuple):
 
 
 SIZES = {
-    "hot_aluminium": Size(0.031, 0.018, None),
+    "hot_aluminium": Size(0.029, 0.016, None),
     "hot_armacat": Size(0.17, 0.1, 0.04),
     "hot_boards": Size(0.025, 0.014, 0.007),
     "hot_boxes": Size(0.045, 0.025, 0.02 / 2.48),
