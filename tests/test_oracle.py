@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -112,6 +113,9 @@ def test_the_step_that_a_run_would_take_is_recorded():
 def test_what_cannot_be_recorded_is_refused(tmp_path):
     problem = stretched()
     path = tmp_path / "golden.h5"
+    implicit = replace(problem, integrator="implicit")
+    with pytest.raises(ValueError, match=r"integrator = 'implicit': expected 'explicit'"):
+        oracle.record(implicit, path, 1)
     with pytest.raises(ValueError, match=r"steps = 0: expected at least one"):
         oracle.record(problem, path, 0)
     for name, said in (("a/b", "without a slash"), ("metal", "of its own"), ("mass", "an array")):

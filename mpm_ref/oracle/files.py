@@ -17,12 +17,15 @@ def record(problem, path, steps):
     """Run the first `steps` steps of a problem and write the golden file `path`.
 
     The problem's own arrays stay as they are; dt is its own, or the one with which it would start.
-    Raises ValueError for steps < 1, for names of bodies that cannot name arrays, and for a state
-    in which the reference's own error is too large to judge others by.
+    Raises ValueError for steps < 1, for an implicit problem, for names of bodies that cannot name
+    arrays, and for a state in which the reference's own error is too large to judge others by.
     """
     refuse_names(problem.bodies)
     if steps < 1:
         raise ValueError(f"steps = {steps}: expected at least one step to record")
+    if problem.integrator != "explicit":
+        raise ValueError(f"integrator = {problem.integrator!r}: expected 'explicit', whose stages "
+                         "are recorded; those of an implicit step are not yet")
     with replacing(path) as part, h5py.File(part, "w", libver=("v110", "v110")) as f:
         describe(f, problem)
         for k, recorded in enumerate(recording.run(problem, steps)):
