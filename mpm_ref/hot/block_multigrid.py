@@ -1,5 +1,6 @@
 """The V-cycle on block kernels: the tested twin of the path on SciPy matrices in `multigrid`."""
 
+from itertools import zip_longest
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from .block_sweep import Sweep, correct, residual, split, sweep
 from .block_transfer import Transfer, prolong, restrict, transfer
 from .coarsest import CAP, Direct, conjugate_gradients, scalar_inverses
 from .embedding import taps
-from .projectors import coarse_nodes, onto_range
+from .projectors import coarse_nodes, given_nodes, onto_range
 from .smoothers import POLYNOMIAL, dot, largest_eigenvalue, times
 
 
@@ -45,6 +46,19 @@ def build(A, index, levels, kernel):
         index, B, reach, blocks = embedding.index, B_coarse, coarse_reach(reach, w), blocks_of(A)
         D = diagonal(blocks)
     return [*built, Level(A, index, B, D, inverse_blocks(D, B), reach, blocks, None)]
+
+
+def build_given(matrices):
+    """Levels of matrices and node indices, as `multigrid.build_given`."""
+    built = []
+    for (A, index), coarser in zip_longest(matrices, matrices[1:]):
+        blocks = blocks_of(A)
+        D = diagonal(blocks)
+        B = onto_range(D)
+        to = transfer(given_nodes(index, B, coarser[1]), B) if coarser else None
+        reach = reach_of(blocks, index)
+        built.append(Level(A, index, B, D, inverse_blocks(D, B), reach, blocks, to))
+    return built
 
 
 class GaussSeidel:
@@ -102,9 +116,8 @@ def smoother(level, word):
 class Hierarchy:
     """Levels on block arrays and the V-cycle over them; see `multigrid.hierarchy`."""
 
-    def __init__(self, A, index, levels, kernel, choices):
-        self.choices = choices
-        self.levels = build(A, index, levels, kernel)
+    def __init__(self, levels, choices):
+        self.levels, self.choices = levels, choices
         self.smoothers = [smoother(level, choices.smoother) for level in self.levels[:-1]]
         last = self.levels[-1]
         self.direct = Direct(last.A, last.D, last.B) if choices.coarsest == "direct" else None

@@ -48,8 +48,14 @@ def descend(system, method, stop, rules, watch):
     direction(dv, g) -> p; learn(s, y) from an accepted step; refresh() -> whether it can do better
     after a direction was refused. `rules` bound the line search, `watch` counts.
     """
+    return iterate(system, lambda now: advanced(system, method, now, rules, watch), stop,
+                   rules.noise, watch)
+
+
+def iterate(system, advance, stop, noise, watch):
+    """As `descend`, for steps advance(`Point`) -> (`Point`, None) or (None, why there is none)."""
     now = Point(system.start.copy(), *system.evaluate(system.start))
-    progress = Progress(rules.noise)
+    progress = Progress(noise)
     for k in range(stop.iterations + 1):
         watch.residuals.append(scaled_norm(now.g, system.kappa))
         size = watch.residuals[-1] if stop.norm == "characteristic" else length(now.g)
@@ -59,11 +65,9 @@ def descend(system, method, stop, rules, watch):
         why = spent(now, size, k, progress.idle, stop)
         if why is not None:
             return progress.best, why
-        new, why = advanced(system, method, now, rules, watch)
+        now, why = advance(now)
         if why is not None:
             return progress.best, why
-        method.learn(new.dv - now.dv, new.g - now.g)
-        now = new
 
 
 def spent(now, size, k, idle, stop):
@@ -84,6 +88,8 @@ def advanced(system, method, now, rules, watch):
         p = system.free(method.direction(now.dv, now.g))
         found = search(system, now, p, rules)
         watch.backtracks += found.backtracks
+        if found.point is not None:
+            method.learn(found.point.dv - now.dv, found.point.g - now.g)
         if found.point is not None or not method.refresh():
             return found.point, found.why
         watch.refreshes += 1

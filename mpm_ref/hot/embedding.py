@@ -65,6 +65,25 @@ def embed(index, kernel="linear"):
     return Embedding(W, coarse)
 
 
+def onto(index, coarse, kernel="linear"):
+    """Weights (n, m) of nodes index (n, d) on the given coarse nodes (m, d), lexicographic.
+
+    What would hang on other nodes is left out.
+    """
+    rows, c, w = _pairs(np.asarray(index, dtype=np.int64), kernel)
+    both = np.concatenate((c, coarse))
+    low = both.min(axis=0, initial=0)
+    box = tuple(both.max(axis=0, initial=0) + 1 - low)
+    number = np.full(np.prod(box), -1)
+    number[np.ravel_multi_index(tuple((coarse - low).T), box)] = np.arange(len(coarse))
+    column = number[np.ravel_multi_index(tuple((c - low).T), box)]
+    there = column >= 0
+    entries = w[there], (rows[there], column[there])
+    W = sp.csr_array(sp.coo_array(entries, shape=(len(index), len(coarse))))
+    W.sort_indices()
+    return W
+
+
 def _pairs(index, kernel):
     """(fine node, coarse index (d,), weight) of every pair of positive weight."""
     axes = [parents(i, kernel) for i in index.T]

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .krylov import JACOBI, Rule, half, pcg
-from .multigrid import hierarchy
+from .multigrid import hierarchy, hierarchy_of
 from .projectors import diagonal_blocks, inverses, onto_range
 from .smoothers import GaussSeidel
 
@@ -20,6 +20,8 @@ class Linear(NamedTuple):
 def linearised(system, options, watch):
     """The function from dv to the `Linear` of the Hessian there, of the kind that options name."""
     at = _without_matrix if options.operator == "free" else _with_matrix
+    if options.inverse == "geometric":
+        at = _with_matrices
     return lambda dv: at(system, dv, options, watch)
 
 
@@ -39,6 +41,16 @@ def _with_matrix(system, dv, options, watch):
     with watch.part("hierarchy"):
         name, inverse = INVERSES[options.inverse](A, system.index, options, watch)
     return Linear(watch.timed("product", by_matrix(A)), watch.timed(name, inverse))
+
+
+def _with_matrices(system, dv, options, watch):
+    matrices = system.matrices(dv, options.levels)
+    if not all(np.isfinite(A.data).all() for A, _ in matrices):
+        return Linear(nowhere, nowhere)
+    with watch.part("hierarchy"):
+        cycle = _cycle_of(hierarchy_of(matrices, options.path, **options.cycle._asdict()), watch)
+    product = watch.timed("product", by_matrix(matrices[0][0]))
+    return Linear(product, watch.timed("cycle", cycle))
 
 
 def first_inverse(system, options, watch):
@@ -92,13 +104,17 @@ def _sgs(A, index, options, watch):
 def _cycle(A, index, options, watch):
     grids = hierarchy(A, index, options.levels, options.kernel, options.path,
                       **options.cycle._asdict())
+    return "cycle", _cycle_of(grids, watch)
 
+
+def _cycle_of(grids, watch):
+    """A cycle of a hierarchy; its iterations on the coarsest level are told the watch."""
     def cycle(r):
         before = grids.iterations
         u = grids.cycle(r)
         watch.coarse += grids.iterations - before
         return u
-    return "cycle", cycle
+    return cycle
 
 
 INVERSES = {"jacobi": _jacobi, "cg": _jacobi, "sgs": _sgs, "cycle": _cycle}

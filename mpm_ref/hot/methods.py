@@ -4,8 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .admm import ADMM
 from .choices import Choices, checked
-from .descent import Stop, descend
+from .descent import Stop, descend, iterate
 from .krylov import JACOBI, stiffest_tolerance
 from .lbfgs import LBFGS
 from .line_search import Rules
@@ -15,8 +16,8 @@ from .report import Solution, Watch, Watched
 
 RULES, CYCLE = Rules(), Choices()
 WORDS = {
-    "descent": ("lbfgs", "newton"),
-    "inverse": tuple(INVERSES),
+    "descent": ("lbfgs", "newton", "admm"),
+    "inverse": (*INVERSES, "geometric"),
     "operator": ("matrix", "free"),
     "jacobi": tuple(JACOBI),
     "forcing": ("energy", "L2"),
@@ -35,7 +36,7 @@ class Options:
     """
 
     method: str = "hot"                 # name in the report
-    descent: str = "lbfgs"              # quasi-Newton, or "newton"
+    descent: str = "lbfgs"              # quasi-Newton, "newton", or no descent: "admm"
     inverse: str = "cycle"              # first inverse of L-BFGS, preconditioner of Newton's CG
     operator: str = "matrix"            # "free": products with the Hessian without a matrix
     jacobi: str = "block"               # diagonal blocks as in the release, or "scalar", "none"
@@ -50,6 +51,7 @@ class Options:
     flexible: bool = False              # CG that bears a preconditioner that varies
     patience: int = 50                  # see `descent.Stop`
     search: Rules = RULES               # of the line search
+    penalty: float = 1.0                # of ADMM, over the stiffness: see `splitting`
     levels: int = 3                     # of multigrid
     kernel: str = "linear"              # of its embedding
     path: str = "blocks"                # of its implementation; "scipy" is the reference
@@ -59,16 +61,19 @@ class Options:
         for name, words in WORDS.items():
             if getattr(self, name) not in words:
                 raise ValueError(f"{name} = {getattr(self, name)!r}: expected one of {words}")
-        if not (self.eps > 0.0 and self.patience >= 1):
-            raise ValueError(f"eps = {self.eps}, patience = {self.patience}: expected eps > 0 and "
-                             "patience >= 1")
+        if not (self.eps > 0.0 and self.patience >= 1 and 0.0 < self.penalty < np.inf):
+            raise ValueError(f"eps = {self.eps}, patience = {self.patience}, penalty = "
+                             f"{self.penalty}: expected eps > 0, patience >= 1, penalty > 0")
         if min(self.window, self.rebuild, self.iterations, self.cg_iterations) < 0:
             raise ValueError("window, rebuild, iterations and cg_iterations: expected none < 0")
         checked(self.levels, self.cycle._asdict())
         if self.descent == "newton" and self.inverse == "cg":
             raise ValueError('inverse = "cg" is a first inverse of L-BFGS: expected another one as '
                              "preconditioner of Newton's CG")
-        if self.operator == "free" and self.inverse in ("cycle", "sgs"):
+        if self.descent == "admm" and (self.inverse, self.operator) != ("jacobi", "matrix"):
+            raise ValueError('descent = "admm" has a matrix of its own: expected inverse = "jacobi" '
+                             'and operator = "matrix"')
+        if self.operator == "free" and self.inverse in ("cycle", "sgs", "geometric"):
             raise ValueError(f"inverse = {self.inverse!r} needs a matrix: expected operator = "
                              '"matrix", or inverse = "jacobi" or "cg"')
 
@@ -83,6 +88,9 @@ METHODS = {options.method: options for options in (
     replace(_PN, method="pn-mgpcg", inverse="cycle"),
     replace(_PN, method="sgs-pcg", inverse="sgs"),
     replace(_PN, method="gast15", operator="free", forcing="L2", norm="L2", eps=1e-3),
+    Options("lbfgs-gmg", inverse="geometric"),
+    replace(_PN, method="pn-gmg-pcg", inverse="geometric"),
+    Options("admm", "admm", inverse="jacobi"),
 )}
 
 
@@ -91,6 +99,14 @@ def options_of(method, **changes):
     if method not in METHODS:
         raise ValueError(f"method = {method!r}: expected one of {tuple(METHODS)}")
     return replace(METHODS[method], **changes)
+
+
+def solved(system, options, stop, watch):
+    """(`Point`, why not converged or None) of a system by the method that the options describe."""
+    if options.descent == "admm":
+        admm = ADMM(system, options.penalty, options.cg_iterations, watch)
+        return iterate(system, admm.advance, stop, options.search.noise, watch)
+    return descend(system, made(system, options, watch), stop, options.search, watch)
 
 
 def made(system, options, watch):
@@ -115,5 +131,5 @@ def minimise(system, method="hot", **changes):
     with watch.part("other"), np.errstate(all="ignore"):    # what is not finite is reported
         watched = Watched(system, watch)
         stop = Stop(options.eps, options.norm, options.iterations, options.patience)
-        point, why = descend(watched, made(watched, options, watch), stop, options.search, watch)
+        point, why = solved(watched, options, stop, watch)
     return Solution(point.dv, point.E, watch.report(options.method, why))

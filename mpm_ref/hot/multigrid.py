@@ -6,6 +6,7 @@ learn of conditions through the product alone and no identity rows leak into the
 """
 
 from functools import partial
+from itertools import zip_longest
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ import scipy.sparse as sp
 from . import block_multigrid
 from .choices import checked
 from .coarsest import Direct, conjugate_gradients, scalar_inverses
-from .projectors import coarse_nodes, diagonal_blocks, inverses, onto_range
+from .projectors import coarse_nodes, diagonal_blocks, given_nodes, inverses, onto_range
 from .smoothers import POLYNOMIAL, GaussSeidel, dot, largest_eigenvalue, times
 
 
@@ -60,6 +61,17 @@ def build(A, index, levels, kernel):
     return [*built, Level(A, None, index, B, D, inverses(D, B))]
 
 
+def build_given(matrices):
+    """Levels of matrices and node indices that were made one by one, finest first."""
+    built = []
+    for (A, index), coarser in zip_longest(matrices, matrices[1:]):
+        D = diagonal_blocks(A)
+        B = onto_range(D)
+        P = prolongation(given_nodes(index, B, coarser[1]), B) if coarser else None
+        built.append(Level(A, P, index, B, D, inverses(D, B)))
+    return built
+
+
 def smoother(level, word):
     """The map r -> du, both (n d,), of a word in `choices.WORDS`."""
     if word == "gauss-seidel":
@@ -94,9 +106,8 @@ def v_cycle(levels, smoothers, b, solve, sweeps=1):
 class Hierarchy:
     """Levels on SciPy matrices and the V-cycle over them; see `hierarchy`."""
 
-    def __init__(self, A, index, levels, kernel, choices):
-        self.choices = choices
-        self.levels = build(A, index, levels, kernel)
+    def __init__(self, levels, choices):
+        self.levels, self.choices = levels, choices
         self.smoothers = [smoother(level, choices.smoother) for level in self.levels[:-1]]
         last = self.levels[-1]
         self.direct = Direct(last.A, last.D, last.B) if choices.coarsest == "direct" else None
@@ -126,7 +137,18 @@ class Hierarchy:
         return u.reshape(-1)
 
 
-PATHS = {"scipy": Hierarchy, "blocks": block_multigrid.Hierarchy}
+class Path(NamedTuple):
+    """An implementation: levels by Galerkin products, levels of given matrices, the V-cycle."""
+
+    build: callable
+    build_given: callable
+    cycle: callable
+
+
+PATHS = {
+    "scipy": Path(build, build_given, Hierarchy),
+    "blocks": Path(block_multigrid.build, block_multigrid.build_given, block_multigrid.Hierarchy),
+}
 
 
 def hierarchy(A, index, levels=3, kernel="linear", path="blocks", **choices):
@@ -140,9 +162,28 @@ def hierarchy(A, index, levels=3, kernel="linear", path="blocks", **choices):
 
     Raises ValueError for unknown words, for shapes that do not match, or a diagonal not finite.
     """
-    chosen = checked(levels, choices)
-    if path not in PATHS:
-        raise ValueError(f"path = {path!r}: expected one of {', '.join(PATHS)}")
+    chosen, made = checked(levels, choices), _path(path)
+    index = checked_matrix(A, index)
+    return made.cycle(made.build(A, index, levels, kernel), chosen)
+
+
+def hierarchy_of(matrices, path="blocks", **choices):
+    """As `hierarchy`, of pairs (A, index) that are given for every level, finest first; index c of
+    a level is where index 2 c of the one before is. Embedding is linear (HOT-methods, LBFGS-GMG).
+    """
+    chosen, made = checked(len(matrices), choices), _path(path)
+    given = [(A, checked_matrix(A, index)) for A, index in matrices]
+    return made.cycle(made.build_given(given), chosen)
+
+
+def _path(word):
+    if word not in PATHS:
+        raise ValueError(f"path = {word!r}: expected one of {', '.join(PATHS)}")
+    return PATHS[word]
+
+
+def checked_matrix(A, index):
+    """The node indices (n, d) of A as integers; raises ValueError as `hierarchy`."""
     index = np.ascontiguousarray(index, dtype=np.int64)
     n, d = index.shape
     if A.shape != (n * d, n * d) or A.blocksize != (d, d):
@@ -151,4 +192,4 @@ def hierarchy(A, index, levels=3, kernel="linear", path="blocks", **choices):
             f"expected {(n * d, n * d)} in blocks {(d, d)}")
     if not np.isfinite(A.diagonal()).all():
         raise ValueError("the matrix has a diagonal that is not finite: has the state blown up?")
-    return PATHS[path](A, index, levels, kernel, chosen)
+    return index

@@ -8,7 +8,7 @@ is decided from the weights alone, since coarse blocks of a stiff body may lose 
 import numpy as np
 import scipy.sparse as sp
 
-from .embedding import Embedding, embed
+from .embedding import Embedding, embed, onto
 
 NULL = 1e-13      # of the largest eigenvalue; round-off of B H B leaves about 1e-16
 REGULAR = 1e-8    # a determinant, of a block of mean eigenvalue 1, that cannot be round-off
@@ -64,6 +64,15 @@ def coarse_nodes(index, B, kernel):
     if not partly[free].any():
         return Embedding(W, inner.index), np.tile(np.eye(d), (len(inner.index), 1, 1))
     return Embedding(W, inner.index), onto_range((W.T @ B.reshape(-1, d * d)).reshape(-1, d, d))
+
+
+def given_nodes(index, B, coarse):
+    """Weights (n, m), linear, of nodes index (n, d) with projectors B on given coarse nodes (m, d);
+    rows of wholly held nodes are empty.
+    """
+    free = np.flatnonzero(B.any(axis=(1, 2)))
+    W = sp.coo_array(onto(index[free], coarse))
+    return sp.csr_array(sp.coo_array((W.data, (free[W.row], W.col)), (len(index), len(coarse))))
 
 
 def inverses(D, B):

@@ -18,7 +18,7 @@ class Report(NamedTuple):
     iterations: int     # accepted steps
     inner: int          # CG iterations on the finest level
     coarse: int         # CG iterations on the coarsest level of multigrid
-    capped: int         # linear solves that gave up before their tolerance
+    capped: int         # linear solves, or local steps of ADMM, short of their tolerance
     builds: int         # tangents taken: matrices assembled, or linearisations without matrix
     refreshes: int      # times the method had to start afresh after a refused direction
     evaluations: int    # passes over the particles for the energy, with the gradient or without
@@ -119,6 +119,16 @@ class Watched:
         self.watch.builds += 1
         with self.watch.part("assembly"):
             return self.system.matrix(dv)
+
+    def matrices(self, dv, levels):
+        """The Hessian and those on coarser grids, with their nodes."""
+        self.watch.builds += 1
+        with self.watch.part("assembly"):
+            return self.system.matrices(dv, levels)
+
+    def splitting(self, dv, penalty):
+        """The potential split for ADMM."""
+        return self.system.splitting(dv, penalty)
 
     def product(self, dv):
         """u -> H u on what is free, without a matrix."""

@@ -33,9 +33,7 @@ def sites_of(body, grid, stencil):
 
     A fluid, which carries J alone, gets an F with that determinant: all of them are alike to it.
     """
-    order = by_cell(body.particles.x, grid, stencil)
-    if body.particles.y.ndim == 1:
-        order = order[whole(body)[order]]
+    order = order_of(body, grid, stencil)
     n, d = len(order), grid.m.ndim
     base, s, F, V0 = np.empty((n, d), np.int64), np.empty((n, d)), np.empty((n, d, d)), np.empty(n)
     _place_all(body.particles, grid, stencil, order, (base, s, F, V0))
@@ -43,6 +41,12 @@ def sites_of(body, grid, stencil):
     slabs = np.arange(-(-grid.m.shape[0] // width) + 1)
     start = np.searchsorted(base[:, 0] // width, slabs)
     return Sites(base, s, F, V0, start, np.empty(n), np.empty((n, d, d)))
+
+
+def order_of(body, grid, stencil):
+    """The particles of `Sites` (N,): those that have not failed, by cell."""
+    order = by_cell(body.particles.x, grid, stencil)
+    return order[whole(body)[order]] if body.particles.y.ndim == 1 else order
 
 
 def whole(body):

@@ -5,12 +5,15 @@ minimises the incremental potential (HOT-eq1) under the conditions; grid to part
 and, lagged, the return map.
 """
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
+from ..core.grid import Storage
 from ..core.state import Grid
 from ..explicit import Stepper, damp, deform_body, gather, scatter
+from .geometric import Geometric, conditions_at
 from .methods import Options, minimise
 from .norms import characteristic_norms
 from .objective import Potential
@@ -30,6 +33,7 @@ class Pose(NamedTuple):
     kappa: np.ndarray               # (n,)  characteristic norms [kg m/s]
     restraint: Restraint | None
     falling: np.ndarray             # (d,)  dt g [m/s]
+    geometric: Geometric            # its grids of greater spacings
 
 
 class ImplicitStepper(Stepper):
@@ -70,21 +74,37 @@ class ImplicitStepper(Stepper):
     def pose(self, bodies, t, dt):
         """`Pose` of the step from time t [s] by dt [s]; the bodies stay as they are."""
         grid = scatter(bodies, self.storage, self.scheme, 0.0)
-        unknowns, stencil = unknowns_of(grid), self.scheme.stencil
+        unknowns, restraint = self._restrained(grid, self.conditions, t, dt)
+        stencil = self.scheme.stencil
         potential = Potential(bodies, unknowns, stencil, dt, self.gravity)
         kappa = characteristic_norms(bodies, unknowns, stencil, dt)
-        restraint = None
-        if self.conditions is not None:
-            restraint = Restraint(self.conditions, grid, unknowns, t + dt, dt)
-            unknowns = restraint.begin(unknowns, unknowns.v + dt * self.gravity)
-        return Pose(grid, unknowns, potential, kappa, restraint, dt * self.gravity)
+        geometric = Geometric(potential, partial(self.coarser, bodies, t, dt))
+        return Pose(grid, unknowns, potential, kappa, restraint, dt * self.gravity, geometric)
+
+    def coarser(self, bodies, t, dt, level):
+        """`Unknowns` of the step on a grid of 2^level dx, whose nodes meet the conditions anew; a
+        separate plane bears there as it does before the solve.
+        """
+        factor, conditions = 2**level, self.conditions
+        storage = Storage(factor * self.dx, self.scheme.stencil, len(self.gravity))
+        grid = scatter(bodies, storage, self.scheme, 0.0)
+        conditions = None if conditions is None else conditions_at(conditions, factor)
+        return self._restrained(grid, conditions, t, dt)[0]
+
+    def _restrained(self, grid, conditions, t, dt):
+        """The unknowns of a grid under conditions, and their `Restraint` or None."""
+        unknowns = unknowns_of(grid)
+        if conditions is None:
+            return unknowns, None
+        restraint = Restraint(conditions, grid, unknowns, t + dt, dt)
+        return restraint.begin(unknowns, unknowns.v + dt * self.gravity), restraint
 
     def system(self, pose):
         """`System` of a pose, for its conditions as they stand."""
         q, start = pose.unknowns, pose.unknowns.dv0
         if self.options.start == "gravity":
             start = start + free_part(q, np.broadcast_to(pose.falling, start.shape))
-        return System(pose.potential, q, pose.kappa, start)
+        return System(pose.potential, q, pose.kappa, start, pose.geometric)
 
     def solve(self, pose):
         """The increment dv (n, d) [m/s] of a pose; separate planes come and go in between."""

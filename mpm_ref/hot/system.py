@@ -5,6 +5,7 @@ import numpy as np
 from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
 from ..core.tensor import mat, mm, put_mat
 from .diagonal import diagonal
+from .splitting import Splitting
 from .unknowns import free_part
 
 
@@ -12,12 +13,12 @@ class System:
     """E(dv) for dv = dv0 + B w: values, projected gradients and Hessians (HOT-eq1, HOT-bc).
 
     kappa (n,) [kg m/s] are the characteristic norms (HOT-eq9); start (n, d) [m/s] the admissible
-    increment to begin with.
+    increment to begin with; geometric, a `geometric.Geometric`, makes the coarser `matrices`.
     """
 
-    def __init__(self, potential, unknowns, kappa, start):
+    def __init__(self, potential, unknowns, kappa, start, geometric=None):
         self.potential, self.unknowns = potential, unknowns
-        self.kappa, self.start = kappa, start
+        self.kappa, self.start, self.geometric = kappa, start, geometric
         self.index, self.n = unknowns.index, len(unknowns.m)
         self._at, self._tangent = None, None
 
@@ -43,6 +44,21 @@ class System:
     def matrix(self, dv):
         """B H B at dv as a bsr_array: rows and columns of what is held are zero."""
         return constrained(self.tangent(dv).matrix(), self.unknowns.B)
+
+    def matrices(self, dv, levels):
+        """(`matrix`, node indices) at dv on grids of 1, 2, 4, ... times the spacing, a list.
+
+        Raises ValueError where the system was made without `geometric`.
+        """
+        if self.geometric is None:
+            raise ValueError("a method with geometric multigrid on a System without coarser grids: "
+                             "expected one made with geometric = Geometric(...)")
+        modes = self.tangent(dv).modes
+        return [(self.matrix(dv), self.index), *self.geometric.matrices(modes, levels)]
+
+    def splitting(self, dv, penalty):
+        """`Splitting` of the potential that begins at dv, for ADMM."""
+        return Splitting(self.potential, dv, penalty)
 
     def product(self, dv):
         """u -> B H B u at dv, without a matrix."""

@@ -122,3 +122,33 @@ def wrong_after(stepper, setup, pose, dv):
             if not np.isfinite(a).all():
                 return f"{name} of particles not finite"
     return ""
+
+
+def record_ends(run, name, ends, scale, note=""):
+    """What the solves of an experiment say together: `ends` is a list of `End`."""
+    unsound = [f"{e.method}: {e.kind}" for e in ends if e.kind not in (CONVERGED, STOPPED)]
+    run.record(f"extremes.hot.{name}.sound", 1.0 - len(unsound) / len(ends), paper=1.0,
+               comparator="=", scale=f"{scale}, {len(ends)} solves",
+               note="share that ended converged or with a reason, within its caps, finite and at "
+                    "no higher energy" + "".join(f"; {said}" for said in unsound[:3]))
+    for method in dict.fromkeys(e.method for e in ends):
+        record_method(run, f"{name}.{method}", [e for e in ends if e.method == method], scale, note)
+
+
+def record_method(run, name, ends, scale, note):
+    """Share of one method's solves that converged, and their iterations."""
+    stopped = [e for e in ends if e.kind != CONVERGED]
+    run.record(f"extremes.hot.{name}.converged", 1.0 - len(stopped) / len(ends), paper=1.0,
+               comparator="=", scale=scale,
+               note=f"share of {len(ends)} solves at eps = {EPS:.0e} within {OUTER} iterations: the "
+                    "energy is finite and its projected Hessian positive, so that descent must "
+                    "end" + "".join(f"; not: {e.why}" for e in stopped[:2]) + (note and f"; {note}"))
+    worst = max(ends, key=lambda e: e.iterations)
+    run.record(f"extremes.hot.{name}.iterations", worst.iterations, comparator="info", scale=scale,
+               note=f"outer, at most; all solves: {sum(e.inner for e in ends)} of CG, "
+                    f"{sum(e.cpu for e in ends):.2f} s CPU")
+
+
+def table_of(run, columns, rows):
+    """Write the rows, each what was varied and its `End`."""
+    run.table("solves", (*columns, *End._fields), [(*case, *end) for *case, end in rows])

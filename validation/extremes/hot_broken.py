@@ -1,0 +1,95 @@
+"""Deformation that no matter has: inverted, collapsed, random, stretched beyond reason."""
+
+import numpy as np
+
+from ..registry import experiment
+from .hot_bodies import DX, FRAME, brick, elastic, gravity
+from .hot_solve import METHODS, STOPPED, Setup, record_ends, solve, table_of
+
+CELLS = {2: (6, 6), 3: (4, 4, 4)}
+TIMES = (1e-3, FRAME)               # [s]
+FOUND = ("one", "all")              # of the particles are broken
+BROKEN = ("inverted", "point inverted", "line", "flat", "zero", "tiny", "denormal", "random",
+          "small random")
+STRETCHED = (2.0, 3.0, 10.0)
+PARTICLE = 31                       # the one
+
+
+def gradients(name, rng, n, d):
+    """n deformation gradients (n, d, d) of a kind in BROKEN, or of a stretch."""
+    I = np.tile(np.eye(d), (n, 1, 1))
+    if not isinstance(name, str):
+        return name * I
+    if "random" in name:
+        return (0.01 if "small" in name else 1.0) * rng.normal(size=(n, d, d))
+    axes = {"inverted": [-1.0] + [1.0] * (d - 1), "point inverted": [-1.0] * d,
+            "line": [1.0] + [0.0] * (d - 1), "flat": [0.0] + [1.0] * (d - 1), "zero": [0.0] * d,
+            "tiny": [1e-6] * d, "denormal": [1e-160] * d}[name]
+    return I * np.array(axes)[:, None]
+
+
+def broken(d, E, name, found, rng):
+    """Body at rest, one or all of whose particles are deformed so."""
+    made = brick(CELLS[d], elastic(E))
+    at = [PARTICLE] if found == "one" else slice(None)
+    made.particles.F[at] = gradients(name, rng, len(made.id[at]), d)
+    return made
+
+
+def sweep(run, names):
+    """Rows (d, E, name, found, dt, `End`) of all methods."""
+    rows = []
+    for d in run.choose(quick=(2,), standard=(2, 3)):
+        for E in run.choose(quick=(1e6,), standard=(1e4, 1e6, 1e9)):
+            for name in run.progress(names, "deformations"):
+                for found in FOUND:
+                    made = broken(d, E, name, found, run.rng)
+                    for dt in TIMES:
+                        setup = Setup((made,), DX, dt, gravity(d))
+                        rows += [(d, E, name, found, dt, solve(setup, m)) for m in METHODS]
+    return rows
+
+
+@experiment("extremes.hot.broken", title="Inverted, collapsed and random deformation at the start",
+            profiles=("quick", "standard"), budget={"quick": 8, "standard": 120})
+def broken_start(run):
+    """Fixed corotated, whose energy is finite for every finite F."""
+    rows = sweep(run, BROKEN)
+    record_ends(run, "broken", [row[-1] for row in rows], "2D block of 6 x 6 cells, 144 particles "
+                "(3D: 4 x 4 x 4, 512), one particle or all")
+    table_of(run, ("d", "E", "F", "found", "dt"), rows)
+
+
+@experiment("extremes.hot.stretched", title="Stretched two to ten times, and let go",
+            profiles=("quick", "standard"), budget={"quick": 8, "standard": 300})
+def stretched(run):
+    """The energy grows with the 2 d-th power of the stretch, and is far from convex."""
+    rows = sweep(run, STRETCHED)
+    record_ends(run, "stretched", [row[-1] for row in rows], "2D block of 6 x 6 cells, 144 "
+                "particles (3D: 4 x 4 x 4, 512), one particle or all")
+    table_of(run, ("d", "E", "F", "found", "dt"), rows)
+
+
+@experiment("extremes.hot.hopeless", title="Deformation whose energy is no number",
+            profiles=("quick", "standard"), budget={"quick": 1, "standard": 1})
+def hopeless(run):
+    """An energy that overflows must end the solve at its first iterate; NaN, the run before it."""
+    made = broken(2, 1e6, 1e150, "one", run.rng)
+    ends = [solve(Setup((made,), DX, FRAME, gravity(2)), method) for method in METHODS]
+    said = sum(e.kind == STOPPED and e.iterations == 0 and "expected finite" in e.why for e in ends)
+    run.record("extremes.hot.hopeless.overflow", said / len(ends), paper=1.0, comparator="=",
+               scale="2D, one particle with F = 1e150 I, all methods",
+               note=f"share that stopped at once and said why: {ends[0].why}")
+    said = refusal(Setup((broken(2, 1e6, np.nan, "one", run.rng),), DX, FRAME, gravity(2)))
+    run.record("extremes.hot.hopeless.nan", int(f"F of particle {PARTICLE}" in said), paper=1,
+               comparator="=", scale="2D, one particle with F = NaN",
+               note=f"the run must name the particle; it said: {said}")
+
+
+def refusal(setup):
+    """What a solve says that refuses its setup."""
+    try:
+        solve(setup, "hot")
+    except ValueError as error:
+        return " ".join(str(error).split())
+    return ""
