@@ -230,12 +230,13 @@ def advective(particles, dx, reach, gravity):
 
 
 def refuse(dt, terms, step=0):
-    """Raise `TooLarge` if dt is past the bound, with all terms. Once the run has begun, only the
-    elastic and single-particle terms refuse it: whether particles cross cells is watched itself.
+    """Raise `TooLarge` if dt is past the bound, with all finite terms. Once the run has begun, only
+    the elastic and single-particle terms refuse it: whether particles cross cells is watched itself.
     """
     if dt > (terms.dt if step == 0 else min(terms.elastic, terms.single_particle)):
         raise TooLarge(
-            f"dt = {dt:.6g} s is past the stable time step {terms.dt:.3g} s at step {step} "
+            f"dt = {dt:.6g} s is past the stable time step {terms.dt:.6g} s, {dt / terms.dt:.4g} "
+            f"times it, at step {step} "
             f"({terms.sentence()}); "
             'take a smaller dt, or let the scene say unstable = "allow"'
         )

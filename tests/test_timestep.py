@@ -15,13 +15,13 @@ K = 2.0 * LAW.mu + 2.0 * LAW.lam                # at rest, d = 2
 TRANSFERS = ("mls", "apic", "pic", "flip")
 
 
-def cloud(x, transfer):
+def cloud(x, transfer, rpic=0.0):
     """Particles of 0.0025 m^2 at rest at x (N, 2), and their stepper."""
     x = np.array(x, dtype=float)
     n, V = len(x), 0.25 * DX**2
     q = particles_at(x, np.zeros((n, 2)), np.full(n, RHO * V), np.full(n, V), transfer)
     body = Body("cloud", q, LAW, NoFlow(), np.arange(n))
-    stepper = Stepper(Scheme(2, transfer), DX, 2, np.zeros(2))
+    stepper = Stepper(Scheme(2, transfer, rpic=rpic), DX, 2, np.zeros(2))
     stepper.start([body])
     return body, stepper
 
@@ -35,9 +35,9 @@ def test_one_particle_has_the_limit_of_its_recurrence(transfer, place, S):
     assert stable_dt([body], stepper).single_particle == pytest.approx(limit, rel=1e-5)
 
 
-def spectral_radius(x, transfer, factor):
+def spectral_radius(x, transfer, factor, rpic=0.0):
     """Of the linear map that one step at `factor` times the bound makes of (v, C, F) near rest."""
-    body, stepper = cloud(x, transfer)
+    body, stepper = cloud(x, transfer, rpic)
     dt = factor * stable_dt([body], stepper).single_particle
     rest = [a.copy() for a in body.particles]
     carried = ["v", "F", *(["C"] if stepper.scheme.affine else [])]
@@ -76,6 +76,13 @@ def test_one_particle_grows_past_the_bound(transfer):
     assert spectral_radius(CLOUDS["one"], transfer, 1.05) > 1.01
 
 
+@pytest.mark.parametrize("transfer", ["apic", "mls"])
+@pytest.mark.parametrize("rpic", [0.3, 1.0])
+def test_damping_moves_the_bound_of_one_particle(transfer, rpic):
+    assert spectral_radius(CLOUDS["one"], transfer, 0.99, rpic) <= 1.0 + 1e-3
+    assert spectral_radius(CLOUDS["one"], transfer, 1.05, rpic) > 1.01
+
+
 def test_largest_modulus_at_rest_is_that_of_dilation():
     assert largest_modulus((1.0, 1.0), LAW) == pytest.approx(K)
     assert largest_modulus((1.0, 1.0, 1.0), LAW) == pytest.approx(2.0 * LAW.mu + 3.0 * LAW.lam)
@@ -91,5 +98,5 @@ def test_no_wave_is_stiffer_than_the_largest_modulus(rng):
 def test_dt_past_the_bound_is_refused_with_all_terms():
     terms = stable_dt(*(lambda b, s: ([b], s))(*cloud([[0.3, 0.3]], "mls")))
     refuse(terms.dt, terms)
-    with pytest.raises(TooLarge, match=r"past the stable.*advective.*elastic.*single particle"):
+    with pytest.raises(TooLarge, match=r"past the stable.*1\.001 times.*elastic.*single particle"):
         refuse(1.001 * terms.dt, terms)

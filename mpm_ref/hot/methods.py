@@ -71,7 +71,7 @@ class Options:
             raise ValueError('inverse = "cg" is a first inverse of L-BFGS: expected another one as '
                              "preconditioner of Newton's CG")
         if self.descent == "admm" and (self.inverse, self.operator) != ("jacobi", "matrix"):
-            raise ValueError('descent = "admm" has a matrix of its own: expected inverse = "jacobi" '
+            raise ValueError('descent = "admm" has its own matrix: expected inverse = "jacobi" '
                              'and operator = "matrix"')
         if self.operator == "free" and self.inverse in ("cycle", "sgs", "geometric"):
             raise ValueError(f"inverse = {self.inverse!r} needs a matrix: expected operator = "

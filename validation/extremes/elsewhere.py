@@ -23,11 +23,11 @@ HELD = (
 @experiment("extremes.explicit.elsewhere", title="Extremes that the tests hold",
             profiles=("quick", "standard"), budget={"quick": 0.1, "standard": 0.1})
 def elsewhere(run):
-    """A pointer to each, and whether it still leads somewhere."""
+    """A pointer to each; they pass or fail with `make test`, not here."""
     for what, file, word in HELD:
         found = tests_of(file, word)
         run.record(f"extremes.explicit.elsewhere.{file}{'.' + word if word else ''}", len(found),
-                   unit="tests", comparator=">=", bound=1, scale="run by `make test`",
+                   unit="tests", comparator="info", scale="run by `make test`",
                    note=f"{what}: tests/{file}.py, {', '.join(found[:3]) or 'none'}")
 
 

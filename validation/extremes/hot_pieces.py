@@ -97,9 +97,9 @@ def fall(run):
                  if abs(share - 1.0) > 0.01]
         run.record(f"extremes.hot.fall.{start}", min(gained), paper=1.0, comparator="=",
                    tolerance=0.01, scale="2D block of 6 x 6 cells, E = 1e2 to 1e12 Pa, one step of "
-                   "1/24 s", note="least share; HOT-eq9 measures impulses by the stiffness, so that "
-                   "the weight rho dx g of a stiff node is below the tolerance 24 eps xi: started "
-                   "from zero, as printed, such a block hovers"
+                   "1/24 s", note="least share; HOT-eq9 measures impulses by the stiffness, so the "
+                   "weight of a stiff block is below the tolerance: started from zero, as "
+                   "printed, it hovers, in every step"
                    + (f"; {', '.join(still)}" if still else ""))
     run.table("shares", ("start", "E", "share", *rows[0][-1]._fields),
               [(*case, *end) for *case, end in rows])

@@ -98,11 +98,11 @@ def wrong_with(stepper, pose, dv):
 
 
 def wrong_at(system, chosen, report, dv):
-    """As `wrong_with`, for energy and gradient at the increment; conditions are those of the pose.
-    """
+    """As `wrong_with`, for energy and gradient at the increment, under the pose's conditions."""
     E, g = system.evaluate(dv)
     E0 = system.energy(system.start)
-    if np.isfinite(E0) and not E <= E0 + 1e3 * chosen.search.noise * abs(E0):
+    noise = 1e3 * chosen.search.noise * abs(E0)     # a line search may take it for none, in a step
+    if np.isfinite(E0) and not E <= E0 + noise:
         return "energy rose"
     if report.converged and not scaled_norm(g, system.kappa) <= chosen.eps:
         return "converged, but its gradient is not small"
@@ -110,8 +110,7 @@ def wrong_at(system, chosen, report, dv):
 
 
 def wrong_after(stepper, setup, pose, dv):
-    """What is not finite in the particles once they have made the step; "" if nothing. Moves them.
-    """
+    """Moves the particles by the step: what of them is not finite then; "" if nothing."""
     if not all(np.isfinite(a).all() for b in setup.bodies for a in b.particles):
         return ""                   # nor was it before
     put(pose.grid, pose.unknowns, pose.unknowns.v + dv)
@@ -138,11 +137,13 @@ def record_ends(run, name, ends, scale, note=""):
 def record_method(run, name, ends, scale, note):
     """Share of one method's solves that converged, and their iterations."""
     stopped = [e for e in ends if e.kind != CONVERGED]
+    said = "".join(f"; not: {e.why}" for e in stopped[:2])
+    said += f"; {note}" if stopped and note else ""
     run.record(f"extremes.hot.{name}.converged", 1.0 - len(stopped) / len(ends), paper=1.0,
                comparator="=", scale=scale,
-               note=f"share of {len(ends)} solves at eps = {EPS:.0e} within {OUTER} iterations: the "
-                    "energy is finite and its projected Hessian positive, so that descent must "
-                    "end" + "".join(f"; not: {e.why}" for e in stopped[:2]) + (note and f"; {note}"))
+               note=f"share of {len(ends)} solves that met eps = {EPS:.0e} in {OUTER} iterations: "
+                    "the energy is finite and its projected Hessian positive, so that descent must "
+                    f"end{said}")
     worst = max(ends, key=lambda e: e.iterations)
     run.record(f"extremes.hot.{name}.iterations", worst.iterations, comparator="info", scale=scale,
                note=f"outer, at most; all solves: {sum(e.inner for e in ends)} of CG, "

@@ -8,7 +8,7 @@ from mpm_ref.core.state import Particles
 
 from ..registry import experiment
 from .hot_bodies import elastic
-from .hot_solve import METHODS, Setup, copied, stepper_of
+from .hot_solve import METHODS, copied, stepper_of
 from .hot_stiffness import bent
 
 

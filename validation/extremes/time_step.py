@@ -14,7 +14,7 @@ from .outcome import FINISHED, REFUSED, STOPS, outcome
 DX = 0.125
 TRANSFERS = ("mls", "apic", "pic", "flip")
 UP_TO, PAST, FAR = (0.5, 0.9, 1.0), (1.02, 1.1, 1.2, 1.5, 2.0), (3.0, 10.0, 100.0)
-WITHIN = 100        # steps in which a run far past its bound must have stopped (issue A4)
+WITHIN = 100        # steps in which a run far past its bound must have stopped
 
 
 class Rung(NamedTuple):

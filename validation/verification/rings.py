@@ -43,8 +43,8 @@ def ring_collision(run):
         run.record(f"verification.rings.{transfer}.energy", float(c.total[-1]), unit="J/m",
                    paper=PUBLISHED.get(transfer), comparator="info",
                    scale=f"dx = {dx} m, theirs 0.1 m, {c.particles} particles, {c.steps} steps",
-                   note=f"of {c.total[0]:.4g} J/m at the start; the other number is what a public "
-                   "code's test holds for randomly placed particles")
+                   note=f"of {c.total[0]:.4g} J/m at the start; the other number is what the "
+                   "tests of Tesserae.jl hold for randomly placed particles")
         rows += thinned(transfer, c, SHOWN)
     run.table("energy", ("transfer", "t", "kinetic", "elastic"), rows)
     record_ranking(run, kept, dx)
