@@ -231,7 +231,8 @@ def advective(particles, dx, reach, gravity):
 
 def refuse(dt, terms, step=0):
     """Raise `TooLarge` if dt is past the bound, with all finite terms. Once the run has begun, only
-    the elastic and single-particle terms refuse it: whether particles cross cells is watched itself.
+    the elastic and single-particle terms refuse it: whether particles cross cells is watched
+    itself.
     """
     if dt > (terms.dt if step == 0 else min(terms.elastic, terms.single_particle)):
         raise TooLarge(
