@@ -157,6 +157,15 @@ def test_patience_ends_a_walk_on_the_spot():
     assert report.iterations == 4
 
 
+def test_patience_bears_a_slow_descent():
+    far = 80.0          # steps of one, each of which lowers the energy by 1e-12 of itself
+    toy = scalar(lambda x: 1.0 - 1e-12 * min(x, far), lambda x: -1e-12 if x < far else 0.0,
+                 lambda x: 1e-12)
+    report = minimise(toy, "pn-pcg", eps=1e-14).report
+    assert report.converged, report.why
+    assert report.iterations == far
+
+
 # Options.
 
 def test_default_is_hot_as_printed():

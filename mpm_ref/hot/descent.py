@@ -16,6 +16,8 @@ import numpy as np
 from .line_search import Point, search
 from .norms import length, scaled_norm
 
+ROUND_OFF = 1e-13       # of the energy; many slow steps may lower it by less than a search can tell
+
 
 class Stop(NamedTuple):
     """When to end the loop."""
@@ -49,7 +51,7 @@ def descend(system, method, stop, rules, watch):
     after a direction was refused. `rules` bound the line search, `watch` counts.
     """
     return iterate(system, lambda now: advanced(system, method, now, rules, watch), stop,
-                   rules.noise, watch)
+                   ROUND_OFF, watch)
 
 
 def iterate(system, advance, stop, noise, watch):

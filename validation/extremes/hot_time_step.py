@@ -9,8 +9,8 @@ STEPS = 5
 TIMES = (1e-6, 1e-3, FRAME)       # [s]
 CROSSED = (1.0, 3.0, 10.0)         # cells, by the swiftest particle in a step
 CELLS = {2: (16, 8), 3: (8, 4, 4)}
-NOTES = {"time_step": "", "cfl": "what takes long starts inverted: neighbours cross 10 cells in a "
-                                 "step, and the first inverse is that of the start"}
+NOTES = {"time_step": "", "cfl": "what takes long starts with J from -15 to 17, neighbours having "
+                                 "crossed 10 cells, and keeps the first inverse of that state"}
 
 
 def thrown(d, E, dt, speed):

@@ -52,7 +52,7 @@ def cost(dx, E, method, steps, **solver):
 
 
 @experiment("hot.fig20", title="A bar with a middle of growing stiffness: iterations and time",
-            profiles=("quick", "standard"), budget={"quick": 60, "standard": 1800})
+            profiles=("quick", "standard"), budget={"quick": 25, "standard": 900})
 def stiffness(run):
     """Sweep of the middle's modulus over the methods."""
     dx, steps = run.choose(quick=(0.03, 3), standard=(0.02, 12))
