@@ -254,12 +254,17 @@ def test_ctrl_c_on_a_terminal(scene, tmp_path):
     assert json.loads(done.stdout)["step"] >= 10
 
 
-def test_compilation_is_said_on_a_terminal_alone(scene):
-    process, ours = on_terminal("info", scene)
+@pytest.mark.parametrize(("command", "words"), [
+    (["info"], "52 particles"), (["oracle", "record", "--steps", "1"], "1 steps of Disk"),
+], ids=["info", "record"])
+def test_compilation_is_said_on_a_terminal_alone(scene, tmp_path, command, words):
+    if "record" in command:
+        command = [*command, "-o", tmp_path / "golden.h5"]
+    process, ours = on_terminal(*command, scene)
     said, _ = process.communicate(timeout=60)
     shown = os.read(ours, 1_000_000).decode()
     os.close(ours)
-    assert "52 particles" in said
+    assert words in said
     assert shown.startswith("\rcompiling kernels")
     assert shown.rsplit("\r", 2)[1].strip() == ""       # wiped in the end
     assert mpm_ref("info", scene).stderr == ""

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_runs import colliding
 
+from mpm_ref import store
 from mpm_ref.monitor import Unstable, check
 from mpm_ref.problem import Clock
 from mpm_ref.simulate import simulate
@@ -198,6 +199,22 @@ def test_an_unstable_run_leaves_a_good_checkpoint(tmp_path):
         assert results.step[-1] == fault.value.step
 
 
+@pytest.mark.parametrize(("name", "fault", "steps"), [
+    ("v", Unstable, [0, 20, 21]), ("F", TooLarge, [0, 20]),
+], ids=["after its first step", "before it"])
+def test_a_resumed_run_that_breaks_at_once_is_told(tmp_path, name, fault, steps):
+    out = tmp_path / "run.h5"
+    run(colliding(FIXED), out, Options(steps=20))
+    state, _ = checkpoint.load(checkpoint_of(out), colliding(FIXED))
+    getattr(state.bodies[0].particles, name)[:] *= 20.0 if name == "F" else 200.0
+    checkpoint.save(checkpoint_of(out), state, colliding(FIXED))
+    with pytest.raises(fault):
+        run(colliding(FIXED), out, RESUME)
+    with Results(out) as results:
+        assert results.step.tolist() == steps
+        assert [part["last_step"] for part in results.manifest["parts"]] == [20, steps[-1]]
+
+
 def test_a_step_past_its_bound_is_refused_before_anything_is_written(tmp_path):
     with pytest.raises(TooLarge, match="past the stable time step"):
         run(replace(unstable(), allow_unstable=False), tmp_path / "run.h5")
@@ -225,6 +242,33 @@ def test_an_overwritten_run_leaves_no_checkpoint(tmp_path):
         run(colliding(FIXED), out, Options(overwrite=True), Dies())
     assert not checkpoint_of(out).exists()
     assert run(colliding(FIXED), out, RESUME).state.step == 100
+
+
+def test_a_run_killed_while_it_overwrites_goes_on(tmp_path, monkeypatch):
+    """As soon as the new results are there, the checkpoint of the old ones is not."""
+    real = store.JournaledFile.move
+
+    def killed(file, path):
+        real(file, path)
+        raise ZeroDivisionError
+
+    out = tmp_path / "run.h5"
+    run(colliding(FIXED), out, Options(steps=50))
+    monkeypatch.setattr(store.JournaledFile, "move", killed)
+    with pytest.raises(ZeroDivisionError):
+        run(colliding(FIXED), out, Options(overwrite=True))
+    monkeypatch.undo()
+    assert run(colliding(FIXED), out, RESUME).state.step == 100
+
+
+def test_a_run_that_cannot_begin_to_overwrite_leaves_the_old_one(tmp_path, monkeypatch):
+    out = tmp_path / "run.h5"
+    run(colliding(FIXED), out, Options(steps=50))
+    before = {file: file.read_bytes() for file in tmp_path.iterdir()}
+    monkeypatch.setattr(store, "_lay_out", lambda *_: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        run(colliding(FIXED), out, Options(overwrite=True))
+    assert {file: file.read_bytes() for file in tmp_path.iterdir()} == before
 
 
 def test_files_of_different_runs_do_not_go_on(tmp_path):

@@ -17,10 +17,11 @@ from .describe import describe
 from .execute import Bar, Request, run_scene
 from .faults import one_line, options
 from .look import Machine
-from .shipped import find_scene
+from .shipped import find_scene, keep_scene
 
 app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False, add_completion=False,
-                  help="Explicit material point method: run scenes and look at the results.")
+                  help="The material point method, explicit and implicit: run scenes and look at "
+                       "the results.")
 for name, command in (("info", describe), ("plot", look.plot),
                       ("animate", look.animate), ("export", look.export),
                       ("scenes", look.scenes)):
@@ -28,14 +29,17 @@ for name, command in (("info", describe), ("plot", look.plot),
 app.add_typer(golden.app, name="oracle")
 
 
-FIELDS = f"To store, of {','.join(UNITS)}; {','.join(USUAL)}."
+FIELDS = f"To store, of {','.join(UNITS)}; default: {','.join(USUAL)}."
+EVERY = "Steps between checkpoints, default: one a minute."
+RESULTS = "Results file, default: SCENE.h5 here."
+GZIP = "Compression, 1 to 9, default: none."
 
 
 @app.callback(invoke_without_command=True)
 def version(
     show: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
 ):
-    """Explicit material point method: run scenes and look at the results."""
+    """Print the version, where no command is given."""
     if show:
         print(f"mpm-ref {__version__}")
         raise typer.Exit
@@ -44,14 +48,14 @@ def version(
 @app.command()
 def run(
     name: Annotated[str, typer.Argument(metavar="SCENE", help="A TOML file, or a shipped scene.")],
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="Results; SCENE.h5 here.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help=RESULTS)] = None,
     steps: Annotated[int | None, typer.Option(help="Stop after so many steps in all.")] = None,
-    threads: Annotated[int | None, typer.Option(help="Number of threads; all.")] = None,
+    threads: Annotated[int | None, typer.Option(help="Number of threads, default: all.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the results.")] = False,
-    checkpoint_every: Annotated[int | None, typer.Option(help="Steps; one a minute.")] = None,
+    checkpoint_every: Annotated[int | None, typer.Option(help=EVERY)] = None,
     fields: Annotated[str | None, typer.Option(help=FIELDS)] = None,
-    gzip: Annotated[int | None, typer.Option(help="Compression, 1 to 9; none.")] = None,
+    gzip: Annotated[int | None, typer.Option(help=GZIP)] = None,
     json: Machine = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar.")] = False,
 ):
@@ -63,12 +67,13 @@ def run(
     """
     with one_line():
         path = find_scene(name)
-        record = scene.load(path)
+        record, out = scene.load(path), out or Path(f"{path.stem}.h5")
         with options():
+            keep_scene(path, out)
             how = Options(steps, checkpoint_every, stored(fields, gzip), resume, overwrite,
                           record.seed)
             use_threads(threads)
-        with Bar(Request(name, out or Path(f"{path.stem}.h5"), json, quiet)) as bar:
+        with Bar(Request(name, out, json, quiet)) as bar:
             status = run_scene(scene.build(record, str(path)), bar, how)
         raise typer.Exit(status)
 

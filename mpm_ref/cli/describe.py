@@ -7,7 +7,7 @@ import typer
 from .. import scene
 from ..store import checkpoint
 from . import info
-from .faults import one_line
+from .faults import at_start, one_line
 from .shipped import find_scene, is_hdf5
 from .terminal import compiling, warn
 
@@ -36,6 +36,6 @@ def _facts(name):
 
 
 def _facts_of_scene(path):
-    with compiling():
+    with compiling(), at_start(path):
         facts = info.of_problem(scene.build(scene.load(path), str(path)))
     return facts, info.problem_lines(facts)

@@ -18,7 +18,7 @@ from ..store.running import run
 from ..store.session import AT_LIMIT, FINISHED, INTERRUPTED, TERMINATED, Watch, checkpoint_of
 from ..timestep import TooLarge
 from . import info
-from .faults import INTERRUPT, NOT_WRITTEN, UNSTABLE, end
+from .faults import INTERRUPT, NOT_WRITTEN, UNSTABLE, at_start, end
 from .terminal import COMPILING, compiling, passing, warn
 
 EXIT = {FINISHED: 0, AT_LIMIT: 0, INTERRUPTED: INTERRUPT, TERMINATED: 143}
@@ -117,10 +117,9 @@ def run_scene(problem, bar, options):
         outcome = run(problem, request.out, options, bar)
     except (Unstable, OutOfRange, TooLarge, NotWritten, KeyboardInterrupt) as fault:
         bar.close()
-        if isinstance(fault, TooLarge):
-            fault = TooLarge(f"{request.scene}: {fault}")
         if not bar.began:
-            raise fault from None
+            with at_start(request.scene):
+                raise
         _broke_off(fault, request)
     bar.close()
     if not outcome.same_code:

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 import typer
 
 from ..core.grid import OutOfRange
+from ..monitor import Unstable
 from ..scene import SceneError
 from ..store.atomic import NotWritten
 from ..store.checkpoint import BadCheckpoint
@@ -40,6 +41,17 @@ def options():
         yield
     except ValueError as fault:
         end(fault, BAD_INPUT)
+
+
+@contextmanager
+def at_start(name):
+    """Faults of a scene's first state begin with its name, as those of its text do."""
+    try:
+        yield
+    except (OutOfRange, TooLarge) as fault:
+        end(f"{name}: {fault}", BAD_INPUT)
+    except Unstable as fault:
+        end(f"{name}: {fault}", UNSTABLE)
 
 
 def end(message, status):

@@ -6,8 +6,9 @@ from typing import Annotated
 import typer
 
 from .. import oracle, scene
-from .faults import one_line, options
-from .shipped import find_scene
+from .faults import at_start, one_line, options
+from .shipped import find_scene, keep_scene
+from .terminal import compiling
 
 DEPARTS = 1      # exit status of a check that another code fails
 
@@ -19,13 +20,15 @@ def record(
     name: Annotated[str, typer.Argument(metavar="SCENE")],
     out: Annotated[Path, typer.Option("--out", "-o", help="Golden file.")] = Path("golden.h5"),
     steps: Annotated[int, typer.Option(help="Steps to record, every stage of each.")] = 3,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a golden file.")] = False,
 ):
     """Run the first steps of a scene and record every stage with the error of each number."""
     with one_line():
         path = find_scene(name)
-        problem = scene.build(scene.load(path), str(path))
-        with options():
-            oracle.record(problem, out, steps)
+        with options(), at_start(path), compiling():
+            keep_scene(path, out)
+            problem = scene.build(scene.load(path), str(path))
+            oracle.record(problem, out, steps, overwrite)
         print(f"{out}: {steps} steps of {problem.title or name}")
 
 

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from .. import plotting, scene
+from ..store.atomic import require_place
 from ..store.results import SCALARS, Results
 from ..store.vtkhdf import export_particles
 from ..store.vtkhdf_grid import export_grid
@@ -67,7 +68,10 @@ def _to_file(make, file, out, suffixes, **what):
     with options():
         if out.suffix.lower() not in suffixes:
             raise ValueError(f"--out {out}: expected a name that ends in {' or '.join(suffixes)}")
+        if out.exists() and file.exists() and out.samefile(file):
+            raise ValueError(f"--out {out}: this is the results file itself; name another file")
     with one_line(), Results(file) as results:
+        require_place(out)
         make(results, out, **what)
         print(out)
 

@@ -32,6 +32,12 @@ def find_scene(name):
                      f"scenes: {known}")
 
 
+def keep_scene(path, out):
+    """Raise ValueError if the file to write, whatever its name, is the scene at `path` itself."""
+    if Path(out).exists() and path.samefile(out):
+        raise ValueError(f"--out {out}: this is the scene itself; name another file")
+
+
 def _wrong_with(file):
     """Why a file named as HDF5 files are is no scene, nor results."""
     if not file.is_file():

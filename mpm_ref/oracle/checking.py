@@ -59,14 +59,15 @@ def keys_of(group, bodies):
             found[f"{bodies[0]}/{name}" if alone else name] = item
 
     group.visititems(visit)
-    return found
+    return {name: item for name, item in found.items() if not name.startswith("scale/")}
 
 
 def compared(steps, given, bodies, precision):
     """The `Report` over all steps and arrays, in the order of the stages."""
-    departures, missing, count, nearest = [], set(), 0, 0.0
+    departures, missing, count, nearest, found = [], set(), 0, 0.0, set()
     unknown = {name for theirs in given.values() for name in theirs
                if name.split("/")[-1] not in BESIDE}
+    unknown |= {f"step {step}" for step in given if step not in steps}
     for step in sorted(steps, key=int):
         theirs = given.get(step, {})
         for array, name in named(steps[step], bodies):
@@ -75,12 +76,13 @@ def compared(steps, given, bodies, precision):
                 missing.add(name if theirs else f"step {step}")
                 continue
             count += 1
+            found.add(step)
             departure, off = distance(steps[step], theirs, array, name, precision)
             if departure is not None:
                 departures.append(Departure(int(step), array.stage, name, **departure))
             nearest = max(nearest, off)
-    return Report(not departures and count > 0, precision, count, float(nearest),
-                  tuple(departures), tuple(sorted(missing)), tuple(sorted(unknown)))
+    return Report(not departures and count > 0, precision, (len(found), len(steps)), count,
+                  float(nearest), tuple(departures), tuple(sorted(missing)), tuple(sorted(unknown)))
 
 
 def named(group, bodies):
@@ -107,8 +109,9 @@ def distance(group, theirs, array, name, precision):
     tol = np.broadcast_to(shaped_as(group[name].attrs[f"tolerance_{precision}"] * scale, golden),
                           golden.shape)
     off = np.where(other.given, abs(other.value - golden), 0.0)
-    i = np.unravel_index(np.argmax(off / tol), off.shape)
-    if off[i] > tol[i]:
+    units = in_units(off, tol)
+    i = np.unravel_index(np.argmax(units), units.shape)
+    if units[i] > 1.0:
         return {"where": words(group, array, name, i), "golden": float(golden[i]),
                 "other": float(other.value[i]), "difference": float(off[i]),
                 "tolerance": float(tol[i])}, 0.0
@@ -116,7 +119,15 @@ def distance(group, theirs, array, name, precision):
     if beyond > tol.max():
         return {"what": f"{beyond:.3g} at a node where the golden file has 0, which is more than "
                         f"the tolerance {tol.max():.3g}"}, 0.0
-    return None, max(off[i] / tol[i], beyond / tol.max())
+    return None, max(units[i], in_units(beyond, tol.max()))
+
+
+def in_units(off, tol):
+    """Differences in units of their tolerances. Where all that enters an entry is 0 so is its
+    tolerance: no difference is 0 of it then, and any other is infinitely often.
+    """
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        return np.where(off > 0.0, off / tol, 0.0)
 
 
 def words(group, array, name, i):

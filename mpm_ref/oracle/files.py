@@ -1,25 +1,28 @@
 """Golden files, and files to check against them: HDF5 with the layout of docs/oracle.md."""
 
 import json
+from pathlib import Path
 
 import h5py
 import numpy as np
 
 from ..body import Body
-from ..store.atomic import replacing
+from ..store.atomic import replacing, require_place
 from . import recording
 from .schema import ARRAYS, BESIDE, FORMAT, key
 
 PACKED = {"compression": "gzip", "compression_opts": 9, "shuffle": True, "fletcher32": True}
 
 
-def record(problem, path, steps):
+def record(problem, path, steps, overwrite=False):
     """Run the first `steps` steps of a problem and write the golden file `path`.
 
-    The problem's own arrays stay as they are; dt is its own, or the one with which it would start.
-    Raises ValueError for steps < 1, for an implicit problem, for names of bodies that cannot name
-    arrays, and for a state in which the reference's own error is too large to judge others by.
+    The problem's own arrays stay as they are; all steps have the dt of a run's first step. Raises
+    ValueError for steps < 1, for an implicit problem, for names of bodies that cannot name arrays,
+    for a state in which the reference's own error is too large to judge others by, and where
+    `path` exists, unless it is a golden file that overwrite lets go; `Unstable`; `NotWritten`.
     """
+    require_free(path, overwrite)
     refuse_names(problem.bodies)
     if steps < 1:
         raise ValueError(f"steps = {steps}: expected at least one step to record")
@@ -30,6 +33,27 @@ def record(problem, path, steps):
         describe(f, problem)
         for k, recorded in enumerate(recording.run(problem, steps)):
             put_step(f.create_group(f"steps/{k}"), recorded)
+
+
+def require_free(path, overwrite):
+    """Raise ValueError unless nothing stands at `path`, or a golden file that may be replaced."""
+    require_place(path)
+    if not Path(path).exists():
+        return
+    if not overwrite:
+        raise ValueError(f"{path} exists: add --overwrite to replace it, or name another file")
+    if not is_golden(path):
+        raise ValueError(f"{path} is not a golden file, and only those are overwritten; remove it "
+                         "yourself, or name another file")
+
+
+def is_golden(path):
+    """Whether a file is a golden one."""
+    try:
+        with h5py.File(path, "r") as f:
+            return f.attrs.get("format") == FORMAT
+    except OSError:
+        return False
 
 
 def refuse_names(bodies):

@@ -37,10 +37,8 @@ def matched(group, theirs, array, name):
         return whole(a)
     body = name.partition("/")[0]
     a = by_particle(theirs, body, a)
-    if array.where == "pairs":
-        return by_pair(group, theirs, body, a, golden)
-    require_shape(a, golden.shape)
-    return whole(a)
+    require_particles(a, golden.shape)
+    return by_pair(group, theirs, body, a, golden) if array.where == "pairs" else whole(a)
 
 
 def whole(a):
@@ -52,6 +50,16 @@ def require_shape(a, shape):
     """Raise `Mismatch` for another shape."""
     if a.shape != tuple(shape):
         raise Mismatch(f"has shape {a.shape}, expected {tuple(shape)}")
+
+
+def require_particles(a, shape):
+    """Raise `Mismatch` for another shape, with a question where the particles are not as many."""
+    try:
+        require_shape(a, shape)
+    except Mismatch as mismatch:
+        if a.shape[:1] == tuple(shape[:1]):
+            raise
+        raise Mismatch(f"{mismatch}; is it the same scene?") from None
 
 
 def by_particle(theirs, body, a):
@@ -96,12 +104,11 @@ def require_nodes(group, nodes, found):
 
 def by_pair(group, theirs, body, a, golden):
     """Weights of the same nodes, whichever base node was taken; 0 for nodes not reached."""
-    require_shape(a, golden.shape)
     base = group[f"{body}/base"][()]
     if f"{body}/base" not in theirs:
         return whole(a)
     theirs_base = by_particle(theirs, body, theirs[f"{body}/base"][()])
-    require_shape(theirs_base, base.shape)
+    require_particles(theirs_base, base.shape)
     d = base.shape[1]
     width = round(golden.shape[1] ** (1 / d))
     offset = np.array(list(np.ndindex(*d * (width,))))

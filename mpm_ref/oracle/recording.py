@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..explicit import Stepper
-from ..timestep import stable_dt
+from ..simulate import State, next_dt, rebound, swiftest
 from . import scaling, stages
 from .twin import Twin, placed
 
@@ -117,9 +117,14 @@ def started(problem):
 
 
 def step_length(problem, stepper):
-    """The fixed dt, or the one with which a run would start."""
-    clock = problem.clock
-    return clock.dt or clock.cfl * stable_dt(problem.bodies, stepper).dt
+    """dt of a run's first step: fixed, or as the bounds, the first frame and the end let it be.
+
+    Raises `Unstable` where no adaptive dt is stable.
+    """
+    state = State(problem.bodies, frame=1)        # a run has shown its start by then
+    if problem.clock.dt is None:
+        state.bound = rebound(problem, stepper, state)
+    return next_dt(problem.clock, state, swiftest(problem, state))
 
 
 def unmirrored(seen, nodes):

@@ -25,8 +25,14 @@ class Departure:
         if self.what:
             return f"{at}: {self.what}"
         return (f"{at}: {self.where} is {self.other:.17g} where the golden file has "
-                f"{self.golden:.17g}; the difference {self.difference:.3g} is "
-                f"{self.difference / self.tolerance:.3g} times its tolerance {self.tolerance:.3g}")
+                f"{self.golden:.17g}; the difference {self.difference:.3g} is {self._excess}")
+
+    @property
+    def _excess(self):
+        """The difference against the tolerance, which is 0 where only 0 can be right."""
+        if self.tolerance == 0.0:
+            return "more than its tolerance, 0"
+        return f"{self.difference / self.tolerance:.3g} times its tolerance {self.tolerance:.3g}"
 
 
 @dataclass(frozen=True)
@@ -35,6 +41,7 @@ class Report:
 
     agrees: bool
     precision: str          # "f64" or "f32"
+    steps: tuple            # how many were given, of how many
     compared: int           # arrays
     nearest: float          # largest difference of an array that agrees, over its tolerance
     departures: tuple       # of Departure, one for each array that departs, first stage first
@@ -55,8 +62,10 @@ class Report:
         rest = f"; not given: {', '.join(self.missing)}" if self.missing else ""
         rest += f"; unknown: {', '.join(self.unknown)}" if self.unknown else ""
         if self.agrees:
-            return (f"agrees: {self.compared} arrays at {self.precision} tolerance, the largest "
-                    f"difference is {self.nearest:.2g} of its tolerance{rest}")
+            given, recorded = self.steps
+            partly = f" as far as given ({given} of {recorded} steps)" if given < recorded else ""
+            return (f"agrees{partly}: {self.compared} arrays at {self.precision} tolerance, the "
+                    f"largest difference is {self.nearest:.2g} of its tolerance{rest}")
         if not self.first:
             return f"nothing to compare{rest}"
         return (f"departs first at {self.first.sentence} ({self.precision}); "

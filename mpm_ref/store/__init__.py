@@ -61,9 +61,11 @@ def carried(body):
     return {name: a for name, a in have.items() if name in UNITS and len(a) == len(body.id)}
 
 
-def create(path, problem, fields, facts):
+def create(path, problem, fields, facts, beside=None):
     """`Writer` of a new results file with the manifest `facts`, in place of what stood at `path`.
 
+    The file `beside` belongs to what stood there: it goes first, so that a process killed in
+    between leaves no pair that does not fit. A fault before then leaves both as they are.
     Raises `InUse` while another process writes it, `NotWritten`, or ValueError for names of bodies
     that HDF5 cannot tell apart.
     """
@@ -78,6 +80,8 @@ def create(path, problem, fields, facts):
             _lay_out(h5, problem, fields)
             h5["manifest"] = json.dumps(facts, indent=1)
         file = JournaledFile(part)
+        if beside is not None:
+            Path(beside).unlink(missing_ok=True)
         file.move(path)
     finally:
         part.unlink(missing_ok=True)
@@ -131,6 +135,12 @@ class Writer:
     def path(self):
         """Path of the file."""
         return self._file.path
+
+    @property
+    def last_step(self):
+        """Steps made at the last frame, None without a frame."""
+        steps = self.h5["step"]
+        return int(steps[-1]) if len(steps) else None
 
     @property
     def manifest(self):

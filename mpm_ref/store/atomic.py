@@ -18,9 +18,10 @@ def replacing(path):
 
     Whoever reads `path`, and whatever kills the process, finds the old file or the new one. The
     file to write lies in the same folder, since only within a file system is the move atomic.
-    Raises `NotWritten` where the system refuses.
+    Raises `NotWritten` where there is no such place, or the system refuses.
     """
     path = Path(path)
+    require_place(path)
     part = part_of(path)
     try:
         yield part
@@ -50,11 +51,19 @@ def sync(path):
         os.close(handle)
 
 
-def require_space(path, size):
-    """Raise `NotWritten` unless the file system that holds `path` has `size` bytes free."""
+def require_place(path):
+    """Raise `NotWritten` unless the folder of `path` is there, and `path` is not one itself."""
     folder = Path(path).resolve().parent
     if not folder.is_dir():
         raise NotWritten(f"{path}: there is no folder {folder}; create it or name another file")
+    if Path(path).is_dir():
+        raise NotWritten(f"{path} is a folder; name a file, in it or elsewhere")
+
+
+def require_space(path, size):
+    """Raise `NotWritten` unless the file system that holds `path` has `size` bytes free."""
+    require_place(path)
+    folder = Path(path).resolve().parent
     free = shutil.disk_usage(folder).free
     if free < size + MARGIN:
         raise NotWritten(

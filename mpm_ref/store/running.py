@@ -3,11 +3,12 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..simulate import ended
-from ..timestep import refuse, stable_dt
+from ..monitor import check
+from ..simulate import State, ended, rebound
 from . import Fields, checkpoint, create, reopen
+from .atomic import require_place
 from .manifest import manifest
-from .results import Results
+from .results import BadResults, Results
 from .session import AT_LIMIT, FINISHED, Session, Watch, checkpoint_of
 
 
@@ -58,10 +59,12 @@ def run(problem, out, options=None, watch=None):
 
     SIGINT and SIGTERM end the run after the step being made, with a checkpoint. A run that becomes
     unstable raises `Unstable` or `TooLarge`; the last checkpoint, of a state that
-    passed all checks, then stands. Raises `Refused`, `BadCheckpoint`, `BadResults`, `InUse`
+    passed all checks, then stands. One that cannot even begin raises them, or `OutOfRange`, before
+    anything is written. Raises `Refused`, `BadCheckpoint`, `BadResults`, `InUse`
     or `NotWritten` where files stand in the way. The arrays of the problem's bodies are changed.
     """
     options, watch = options or Options(), watch or Watch()
+    require_place(out)
     state, same_code = _where_to_begin(problem, out, options)
     _require_same_fields(problem, out, options)
     over = _why_over(problem, state, options)
@@ -83,13 +86,26 @@ def _where_to_begin(problem, out, options):
     if Path(out).exists() and not (options.resume or options.overwrite):
         raise Refused(f"{out} exists: add --resume to continue it, --overwrite to replace it, "
                       "or name another file")
+    if Path(out).exists():
+        _require_results(out, options)
     if options.resume and path.exists():
         if not Path(out).exists():
             raise Refused(f"{out}: there are no results beside the checkpoint {path}; "
                           "put them back, or remove the checkpoint to begin anew")
         return checkpoint.load(path, problem)
-    _require_stable(problem)
+    _require_start(problem)
     return None, True
+
+
+def _require_results(out, options):
+    """Raise `Refused` or `BadResults` for a file that no run wrote: what it holds would be lost."""
+    try:
+        Results(out).close()
+    except BadResults as fault:
+        if options.resume:
+            raise
+        raise Refused(f"{out} is not a results file, or not a whole one, and only those are "
+                      "overwritten; remove it yourself, or name another file") from fault
 
 
 def _require_same_fields(problem, out, options):
@@ -118,17 +134,21 @@ def _why_over(problem, state, options):
     return AT_LIMIT if options.steps is not None and state.step >= options.steps else None
 
 
-def _require_stable(problem):
-    """Raise `TooLarge`, before anything is written, if a fixed dt is past its bound at first."""
-    if problem.clock.dt is not None and not problem.allow_unstable:
-        stepper = problem.stepper()
-        refuse(problem.clock.dt, stable_dt(problem.bodies, stepper))
+def _require_start(problem):
+    """What a run finds of its first state, before anything is written: raises `Unstable` for a
+    state that is not sound, `OutOfRange` where no grid covers it, `TooLarge` for a dt past its
+    bound.
+    """
+    stepper, state = problem.stepper(), State(problem.bodies)
+    stepper.start(state.bodies)
+    check(problem, state, 0.0)
+    stepper.storage.cover([body.particles.x for body in state.bodies])
+    rebound(problem, stepper, state)
 
 
 def _open(problem, out, options, state):
     """`Writer` of the results, new ones or those of the run that goes on."""
     if options.resume and Path(out).exists():
         return reopen(out, problem, state.frame if state else 0)
-    writer = create(out, problem, options.fields or Fields(), manifest(problem, options.seed))
-    checkpoint_of(out).unlink(missing_ok=True)
-    return writer
+    return create(out, problem, options.fields or Fields(), manifest(problem, options.seed),
+                  beside=checkpoint_of(out))

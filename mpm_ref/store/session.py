@@ -58,6 +58,7 @@ class Session:
     def loop(self, state):
         """Run from a state, or None for the start; returns why it ended, see `Outcome`."""
         part = Part(state.step if state else 0)
+        self.state, self.shown = state, self.writer.last_step
         self.saved = state.step if state else None
         try:
             with _signals(self):
