@@ -76,6 +76,16 @@ def grid_of(bodies, degree, rng):
     return Grid(m, m[..., None] * v, NONE, NONE, np.array(box.first), DX)
 
 
+def coarser_unknowns(problem, degree, level):
+    """The unknowns of a problem's particles on a grid of 2^level times the spacing, at rest."""
+    dx = 2**level * DX
+    clouds = [pairs(body.particles.x, dx, degree) for body in problem.bodies]
+    box = transfer.box_of(*clouds)
+    m = sum(transfer.mass(b.particles.m, ip, box) for b, ip in zip(problem.bodies, clouds))
+    v = np.zeros((*box.shape, len(box.shape)))
+    return unknowns_of(Grid(m, v, NONE, NONE, np.array(box.first), dx))
+
+
 def problem_of(case, spread=0.2, length=2.5):
     """A `Problem` of a case: strains of size `spread`, bodies of `length` cells."""
     rng = np.random.default_rng(0)

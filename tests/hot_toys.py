@@ -8,8 +8,9 @@ import numpy as np
 from scipy.sparse import bsr_array
 
 from mpm_ref.hot import linear
-from mpm_ref.hot.methods import options_of
+from mpm_ref.hot.methods import METHODS, options_of
 
+DESCENTS = sorted(word for word, options in METHODS.items() if options.descent != "admm")
 DT, EDGE = 0.1, 1.0
 
 
@@ -50,6 +51,9 @@ class Toy:
         H = self.dense(dv)
         full = bsr_array(H.reshape(n * d, n * d), blocksize=(d, d))
         return with_diagonal(full, n, d)
+
+    def matrices(self, dv, levels):
+        return [(self.matrix(dv), self.index)]
 
     def product(self, dv):
         self.calls["product"] += 1
@@ -199,4 +203,5 @@ def exactly(monkeypatch):
         built.append(Exact(*arguments, **more))
         return built[-1]
     monkeypatch.setattr(linear, "hierarchy", build)
+    monkeypatch.setattr(linear, "hierarchy_of", lambda matrices, *_, **__: build(*matrices[0]))
     return built

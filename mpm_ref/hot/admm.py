@@ -7,7 +7,8 @@ penalties that follow the stiffness at rest, multipliers zero at first, no relax
 and one global step per iteration, the latter by CG with Jacobi's preconditioner to a share of its
 right-hand side. Only elasticity is split: the return map stays lagged, as in all methods here.
 A first-order method: it converges linearly, and energies may rise on the way; there is no line
-search. The residual is that of the potential itself (HOT-eq9), so that all methods stop alike.
+search. For potentials that are not convex a penalty that is too small may end in a cycle, which the
+report says. The residual is that of the potential itself (HOT-eq9), so that all methods stop alike.
 """
 
 import numpy as np

@@ -50,14 +50,13 @@ def descend(system, method, stop, rules, watch):
     direction(dv, g) -> p; learn(s, y) from an accepted step; refresh() -> whether it can do better
     after a direction was refused. `rules` bound the line search, `watch` counts.
     """
-    return iterate(system, lambda now: advanced(system, method, now, rules, watch), stop,
-                   ROUND_OFF, watch)
+    return iterate(system, lambda now: advanced(system, method, now, rules, watch), stop, watch)
 
 
-def iterate(system, advance, stop, noise, watch):
+def iterate(system, advance, stop, watch):
     """As `descend`, for steps advance(`Point`) -> (`Point`, None) or (None, why there is none)."""
     now = Point(system.start.copy(), *system.evaluate(system.start))
-    progress = Progress(noise)
+    progress = Progress(ROUND_OFF)
     for k in range(stop.iterations + 1):
         watch.residuals.append(scaled_norm(now.g, system.kappa))
         size = watch.residuals[-1] if stop.norm == "characteristic" else length(now.g)
@@ -80,7 +79,7 @@ def spent(now, size, k, idle, stop):
         return f"{k} iterations, the cap, left the gradient at {size:.3g} > {stop.eps:.3g}"
     if idle >= stop.patience:
         return (f"neither energy nor gradient fell in {idle} iterations: the gradient stays at "
-                f"{size:.3g} > {stop.eps:.3g}, near the limit of round-off")
+                f"{size:.3g} > {stop.eps:.3g}, near the limit of round-off or in a cycle")
     return None
 
 

@@ -105,7 +105,7 @@ def solved(system, options, stop, watch):
     """(`Point`, why not converged or None) of a system by the method that the options describe."""
     if options.descent == "admm":
         admm = ADMM(system, options.penalty, options.cg_iterations, watch)
-        return iterate(system, admm.advance, stop, options.search.noise, watch)
+        return iterate(system, admm.advance, stop, watch)
     return descend(system, made(system, options, watch), stop, options.search, watch)
 
 

@@ -49,7 +49,7 @@ def scenes_of(d, E, steps):
 
 
 @experiment("extremes.hot.pieces", title="Resting, torn and colliding pieces",
-            profiles=("quick", "standard"), budget={"quick": 6, "standard": 120})
+            profiles=("quick", "standard"), budget={"quick": 3, "standard": 80})
 def pieces(run):
     """Runs in which contact comes and goes."""
     scenes, steps = [], run.choose(quick=8, standard=24)

@@ -57,7 +57,7 @@ def stretched(body):
 
 
 @experiment("extremes.hot.sparse", title="One particle per cell, isolated ones, dust, tiny nodes",
-            profiles=("quick", "standard"), budget={"quick": 8, "standard": 90})
+            profiles=("quick", "standard"), budget={"quick": 2, "standard": 25})
 def sparse(run):
     """One step of 1/24 s of matter that hardly holds together on the grid."""
     rows = []

@@ -32,7 +32,7 @@ def bent(d, laws, dt=FRAME):
 
 
 @experiment("extremes.hot.stiffness", title="Moduli from 1e2 to 1e12 Pa, contrasts up to 1e8",
-            profiles=("quick", "standard"), budget={"quick": 8, "standard": 60})
+            profiles=("quick", "standard"), budget={"quick": 4, "standard": 12})
 def stiffness(run):
     """A box with a soft and a stiff half, one step of 1/24 s, by all methods."""
     cases = run.choose(quick=pairs(2) + pairs(3, (1e2, 1e4, 1e12), (1.0, 1e8)),
@@ -48,7 +48,7 @@ def stiffness(run):
 
 
 @experiment("extremes.hot.poisson", title="Poisson's ratio up to 0.4999",
-            profiles=("quick", "standard"), budget={"quick": 4, "standard": 20})
+            profiles=("quick", "standard"), budget={"quick": 3, "standard": 10})
 def poisson(run):
     """The same box of one material, nearly incompressible."""
     rows = []

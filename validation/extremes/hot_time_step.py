@@ -19,7 +19,7 @@ def thrown(d, E, dt, speed):
 
 
 @experiment("extremes.hot.time_step", title="Steps of 1/24 s, and past the CFL bound",
-            profiles=("quick", "standard"), budget={"quick": 6, "standard": 60})
+            profiles=("quick", "standard"), budget={"quick": 5, "standard": 70})
 def time_step(run):
     """Runs of fixed dt; the explicit bound of the stiffest is 4e-6 s."""
     scenes = []

@@ -1,0 +1,201 @@
+"""One matrix, many preconditioners: CG with our V-cycle, with one-level methods, and with pyamg's.
+
+The matrix is the projected Hessian at the start of a step of the twisted bar. Times are CPU seconds
+of one thread, the better of two where that is quick; assembly is not in them, set-up is.
+"""
+
+from contextlib import contextmanager
+from math import log
+from time import process_time
+from typing import NamedTuple
+
+import numba
+import numpy as np
+import pyamg
+import scipy.sparse as sp
+import threadpoolctl
+
+from mpm_ref.core.jit import set_threads
+from mpm_ref.hot import block_multigrid
+from mpm_ref.hot.block_sweep import Sweep, sweep
+from mpm_ref.hot.krylov import block_jacobi, scalar_jacobi
+from mpm_ref.hot.multigrid import hierarchy
+
+from ..registry import experiment
+from .frozen import rigid_modes, twisted
+from .measured_cg import Until, cg, convergence_factor
+
+OURS = "cycle-3-direct"         # what times are relative to
+LONG = 1.0                      # CPU seconds after which a solve is not repeated
+STIFF = 1e9                     # modulus of the claim [Pa]
+GAIN = 5.0                      # over smoothed aggregation, the claim
+CYCLES = 2.0                    # of two grids over smoothed aggregation's, the claim
+
+
+def gauss_seidel(system):
+    """One symmetric sweep by block kernels."""
+    level, = block_multigrid.build(system.A, system.index, 1, "linear")
+    split = block_multigrid.GaussSeidel(level).split
+
+    def inverse(r):
+        state = Sweep(np.empty_like(r), np.zeros_like(r), np.empty_like(r))
+        sweep(split, r, state)
+        return state.u
+    return inverse
+
+
+def cycle(levels, coarsest, kernel="linear"):
+    """Our V-cycle; coarsest "pcg" is HOT's, to half of the energy norm (HOT-sec5.3-coarse)."""
+    return lambda s: hierarchy(s.A, s.index, levels, kernel, coarsest=coarsest).cycle
+
+
+def aggregation(modes=None, **options):
+    """pyamg's smoothed aggregation for the near null space modes(index), constants if None."""
+    def made(s):
+        B = None if modes is None else modes(s.index)
+        return by_pyamg(pyamg.smoothed_aggregation_solver(sp.bsr_matrix(s.A), B=B, **options))
+    return made
+
+
+def ruge_stuben(s):
+    """pyamg's classical multigrid, which knows scalars only."""
+    return by_pyamg(pyamg.ruge_stuben_solver(sp.csr_matrix(s.A)))
+
+
+def by_pyamg(solver):
+    """One V-cycle of pyamg as r (n, d) -> (n, d)."""
+    matvec = solver.aspreconditioner().matvec
+    return lambda r: matvec(r.reshape(-1)).reshape(r.shape)
+
+
+_SWEEP = ("block_gauss_seidel", {"sweep": "symmetric", "blocksize": 3})
+# Exact modes need no improvement: without it set-up is quicker, and iterations are as many.
+_RIGID = {"modes": rigid_modes, "improve_candidates": None, "presmoother": _SWEEP,
+          "postsmoother": _SWEEP}
+CASES = {
+    "jacobi-scalar": lambda s: scalar_jacobi(s.D),
+    "jacobi-block": lambda s: block_jacobi(s.D),
+    "gauss-seidel": gauss_seidel,
+    "cycle-3-pcg": cycle(3, "pcg"),
+    "cycle-3-pcg-flexible": cycle(3, "pcg"),
+    OURS: cycle(3, "direct"),
+    "cycle-4-direct": cycle(4, "direct"),
+    "cycle-3-direct-quadratic": cycle(3, "direct", "quadratic"),
+    "aggregation-rigid": aggregation(**_RIGID),
+    "aggregation-constants": aggregation(),
+    "ruge-stuben": ruge_stuben,
+}
+TWO_GRIDS = {"cycle": cycle(2, "direct"), "aggregation": aggregation(max_levels=2, **_RIGID)}
+
+
+class Cost(NamedTuple):
+    """What a solve of a case took."""
+
+    iterations: int
+    converged: bool
+    setup: float            # CPU seconds
+    solve: float            # CPU seconds
+
+    @property
+    def total(self):
+        """CPU seconds."""
+        return self.setup + self.solve
+
+
+@contextmanager
+def one_thread():
+    """Kernels and linear algebra on one thread, as pyamg is."""
+    before = numba.get_num_threads()
+    set_threads(1)
+    try:
+        with threadpoolctl.threadpool_limits(1):
+            yield
+    finally:
+        set_threads(before)
+
+
+def cost(system, case, until):
+    """`Cost` of a case."""
+    start = process_time()
+    inverse = CASES[case](system)
+    ready = process_time()
+    course = cg(system, inverse, until, case.endswith("flexible"))
+    return Cost(course.iterations, course.converged, ready - start, process_time() - ready)
+
+
+def best(system, case, until):
+    """The cheaper `Cost` of two, if one does not take long."""
+    first = cost(system, case, until)
+    return first if first.total > LONG else min(first, cost(system, case, until),
+                                                key=lambda c: c.total)
+
+
+def two_grids(system):
+    """{cycle: convergence factor} of two levels, the coarser solved exactly."""
+    return {name: convergence_factor(cg(system, make(system), Until(1e-10, 2000)))
+            for name, make in TWO_GRIDS.items()}
+
+
+@experiment("hot.preconditioners", title="CG on one matrix: our V-cycle, one-level methods, pyamg",
+            profiles=("quick", "standard"), budget={"quick": 20, "standard": 1800})
+def preconditioners(run):
+    """Sweep of the middle's modulus, and of the number of particles at one modulus."""
+    coarse, steps, cap = run.choose(quick=(0.03, 3, 1000), standard=(0.03, 6, 2000))
+    moduli = run.choose(quick=(1e5, 1e9), standard=tuple(10.0**k for k in range(5, 11)))
+    finer = run.choose(quick=(), standard=((0.02, STIFF), (0.0135, 1e5), (0.0135, STIFF)))
+    np.random.seed(run.seed)        # noqa: NPY002  pyamg draws from it to estimate eigenvalues
+    rows = []
+    with one_thread():
+        warm_up(coarse)
+        for dx, E in run.progress([*((coarse, E) for E in moduli), *finer], "matrices"):
+            system = twisted(dx, E, steps)
+            costs = {case: best(system, case, Until(cap=cap)) for case in CASES}
+            record_costs(run, system, E, costs)
+            if dx == coarse:
+                record_two_grids(run, system, E)
+            rows += [(E, system.particles, len(system.index), case, *c, c.total / costs[OURS].total)
+                     for case, c in costs.items()]
+    run.table("costs", ("E", "particles", "nodes", "case", *Cost._fields, "ratio"), rows)
+
+
+def warm_up(dx):
+    """Compile what the cases use."""
+    system = twisted(dx, 1e5, 1)
+    for case in CASES:
+        cost(system, case, Until(cap=2))
+
+
+def named(system, E):
+    """Leading part of the targets of a matrix."""
+    return f"hot.preconditioners.{system.particles}.E{E:.0e}".replace("e+0", "e").replace("+", "")
+
+
+def size(system, E):
+    """Scale of a matrix in words."""
+    return f"{system.particles} particles, {len(system.index)} free nodes, middle {E:.0e} Pa"
+
+
+def record_costs(run, system, E, costs):
+    """Total time of every case over ours, and the claim on smoothed aggregation."""
+    name, scale, ours = named(system, E), size(system, E), costs[OURS]
+    for case, c in costs.items():
+        run.record(f"{name}.{case}.time", c.total / ours.total, comparator="info", scale=scale,
+                   note=f"set-up {c.setup:.3f} s, {c.iterations} iterations {c.solve:.3f} s, over "
+                   f"{ours.total:.3f} s of ours" + ("" if c.converged else "; not converged"))
+    theirs = min(c.total for case, c in costs.items() if case.startswith("aggregation"))
+    claimed = {"comparator": ">=", "bound": GAIN} if E == STIFF else {"comparator": "info"}
+    run.record(f"{name}.gain", theirs / ours.total, scale=scale, **claimed,
+               note="time of CG with pyamg's quicker smoothed aggregation over that with our "
+               "V-cycle, set-up included")
+
+
+def record_two_grids(run, system, E):
+    """Convergence factors of two grids, and cycles that ours takes over theirs."""
+    name, scale = f"{named(system, E)}.two-grids", size(system, E)
+    factors = two_grids(system)
+    for cycle_, factor in factors.items():
+        run.record(f"{name}.{cycle_}.factor", factor, comparator="info", scale=scale,
+                   note=f"1 - {1.0 - factor:.2e}; per cycle, from CG's Ritz values")
+    run.record(f"{name}.cycles", log(factors["aggregation"]) / log(factors["cycle"]),
+               comparator="<=", bound=CYCLES, scale=scale,
+               note="cycles for an equal reduction, ours over smoothed aggregation's")

@@ -1,0 +1,135 @@
+"""Table 3: projected Newton with CG, preconditioned by symmetric Gauss-Seidel and by Jacobi.
+
+A scene runs by HOT until what it is about has begun, a contact or a pull; from there on every step
+is solved by both, from the same state, and HOT's step is taken. Where planes may let go of a node,
+the first solve is the one that counts. The paper's numbers are of whole runs at ten and more times
+the particles, so ratios are compared.
+"""
+
+from typing import NamedTuple
+
+from mpm_ref.hot.methods import minimise
+from mpm_ref.scene import build
+from mpm_ref.simulate import simulate
+
+from .. import targets
+from ..registry import experiment
+from ..verification.scenes import with_
+from .sizes import sized
+
+METHODS = {"sgs": "sgs-pcg", "jacobi": "pn-pcg"}
+SOFT_CAT = 1e6          # Young's modulus (Table 2) [Pa]
+BEGUN = {               # time at which a scene is in the middle of things [s]
+    "twist": 0.5,
+    "boxes": 0.3,
+    "donut": 0.4,
+    "armacat_soft": 0.6,
+    "armacat_stiff": 0.6,
+    "chain": 1.0,
+    "boards": 0.3,
+    "wheel": 0.3,
+    "faceless": 1.0,
+    "sauce": 0.3,
+}
+QUICK = ("boxes", "wheel", "faceless", "sauce")     # where little has to run before
+
+
+class Cost(NamedTuple):
+    """What the steps of a scene took by one method."""
+
+    scene: str
+    preconditioner: str
+    particles: int
+    steps: int
+    newton: float           # per step
+    cg: float               # per step
+    cpu: float              # seconds per step
+    converged: bool         # every step
+
+
+def scene(name, profile):
+    """The scene of a row of the table, marched by HOT, a frame every step."""
+    soft = name == "armacat_soft"
+    made = sized("hot_" + name.removesuffix("_soft").removesuffix("_stiff"), profile,
+                 integrator="hot", every=1, interval=None, unstable="allow")
+    if not soft:
+        return made
+    return with_(made, body=tuple(
+        with_(body, material=with_(body.material, E=SOFT_CAT)) if body.name == "cat" else body
+        for body in made.body))
+
+
+def states(problem, begun, steps):
+    """(state, length of its last step) of so many steps from a time on."""
+    for frame in simulate(problem):
+        if frame.t >= begun and frame.dt > 0.0:
+            yield frame.state, frame.dt
+            steps -= 1
+        if steps == 0:
+            return
+
+
+def reports(problem, begun, steps):
+    """{preconditioner: reports} of the steps that follow the `states`."""
+    stepper, found = problem.stepper(), {short: [] for short in METHODS}
+    for state, dt in states(problem, begun, steps):
+        pose = stepper.pose(state.bodies, state.t, dt)
+        for short, method in METHODS.items():
+            found[short].append(minimise(stepper.system(pose), method).report)
+    return found
+
+
+def costs(name, profile, steps):
+    """{preconditioner: `Cost`} of a row."""
+    problem = build(scene(name, profile))
+    particles = sum(len(body.id) for body in problem.bodies)
+    return {short: cost(name, short, particles, done)
+            for short, done in reports(problem, BEGUN[name], steps).items()}
+
+
+def cost(name, short, particles, done):
+    """`Cost` of some reports."""
+    n = len(done)
+    return Cost(name, short, particles, n, sum(r.iterations for r in done) / n,
+                sum(r.inner for r in done) / n, sum(sum(r.seconds.values()) for r in done) / n,
+                all(r.converged for r in done))
+
+
+@experiment("hot.table3", title="Gauss-Seidel against Jacobi as preconditioner of Newton's CG",
+            profiles=("quick", "standard"), budget={"quick": 15, "standard": 1800})
+def table3(run):
+    """CG iterations and time of both on every scene, beside the printed ones."""
+    names, steps = run.choose(quick=(QUICK, 2), standard=(tuple(BEGUN), 5))
+    reports(build(scene(names[0], "quick")), 0.0, 1)          # compiles
+    rows = {}
+    for name in run.progress(names, "scenes"):
+        rows[name] = costs(name, run.profile, steps)
+        record_row(run, name, rows[name])
+    run.record("hot.table3.fewer", min(gain(row) for row in rows.values()), comparator=">=",
+               bound=1.0, scale=f"{len(rows)} of {len(BEGUN)} rows", note="smallest ratio of CG "
+               "iterations, Jacobi over Gauss-Seidel; the paper's is above 1 in every row")
+    run.table("costs", Cost._fields, [c for row in rows.values() for c in row.values()])
+
+
+def gain(row):
+    """CG iterations by Jacobi over those by Gauss-Seidel."""
+    return row["jacobi"].cg / row["sgs"].cg
+
+
+def record_row(run, name, row):
+    """Iterations as printed and as a ratio, and the ratio of times."""
+    printed, c = targets.load(), row["sgs"]
+    scale = f"{c.particles} particles, {c.steps} steps from {BEGUN[name]:g} s on"
+    for short, cost_ in row.items():
+        run.record(f"hot.table3.{name}.{short}.cg_iters", cost_.cg, comparator="info", scale=scale,
+                   note=f"{cost_.newton:.1f} Newton steps, {cost_.cpu:.3f} CPU seconds per step"
+                   + ("" if cost_.converged else "; not every step converged"))
+
+    def paper(what):
+        return (printed[f"hot.table3.{name}.jacobi.{what}"].value
+                / printed[f"hot.table3.{name}.sgs.{what}"].value)
+    run.record(f"hot.table3.{name}.gain", gain(row), paper=paper("cg_iters"), comparator="~",
+               scale=scale, note="CG iterations, Jacobi over Gauss-Seidel")
+    run.record(f"hot.table3.{name}.time", row["jacobi"].cpu / c.cpu, paper=paper("time"),
+               comparator="info", scale=scale, note="CPU time, Jacobi over Gauss-Seidel; sweeps "
+               "here are sparse triangular solves")
