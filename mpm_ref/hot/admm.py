@@ -11,8 +11,6 @@ search. For potentials that are not convex a penalty that is too small may end i
 report says. The residual is that of the potential itself (HOT-eq9), so that all methods stop alike.
 """
 
-import numpy as np
-
 from .krylov import Rule
 from .line_search import Point
 from .linear import Linear, solve
@@ -50,7 +48,6 @@ class ADMM:
 
 
 def by_component(K, free):
-    """`Linear` of B (K x I) B for a matrix K (n, n) and the projection `free`."""
+    """`Linear` of B (K x I) for a matrix K (n, n) and the projection `free`, on u = B u."""
     inverse = (1.0 / K.diagonal())[:, None]
-    return Linear(lambda r: free(K @ np.ascontiguousarray(free(r))),
-                  lambda r: free(inverse * r))
+    return Linear(lambda u: free(K @ u), lambda r: free(inverse * r))
