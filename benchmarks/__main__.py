@@ -17,6 +17,8 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from validation.provenance import commit
+
 from .problem import block
 
 app = typer.Typer(add_completion=False, no_args_is_help=True)
@@ -111,10 +113,9 @@ def show(row):
 def save(out, rows, threads, repeats):
     """Results with what they were measured on."""
     out.parent.mkdir(parents=True, exist_ok=True)
-    commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True)
     out.write_text(json.dumps({
         "command": "python -m benchmarks " + " ".join(sys.argv[1:]),
-        "commit": commit.stdout.strip() or "unknown",
+        "commit": commit(Path(__file__).parents[1]),
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "machine": platform.machine(), "threads": threads, "repeats": repeats, "rows": rows,
     }, indent=1) + "\n")

@@ -127,15 +127,3 @@ def add_to_node(v, i, dv):
         v[i[0], i[1], i[2], 0] += dv[0]
         v[i[0], i[1], i[2], 1] += dv[1]
         v[i[0], i[1], i[2], 2] += dv[2]
-
-
-@kernel
-def put_node(v, i, u):
-    """Set the vector of node i."""
-    if len(i) == 2:
-        v[i[0], i[1], 0] = u[0]
-        v[i[0], i[1], 1] = u[1]
-    else:
-        v[i[0], i[1], i[2], 0] = u[0]
-        v[i[0], i[1], i[2], 1] = u[1]
-        v[i[0], i[1], i[2], 2] = u[2]

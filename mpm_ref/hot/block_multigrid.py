@@ -12,7 +12,7 @@ from .block_inverse import inverse_blocks
 from .block_sparse import SERIAL, Blocks, blocks_of, diagonal, product, reach_of
 from .block_sweep import Sweep, correct, residual, split, sweep
 from .block_transfer import Transfer, prolong, restrict, transfer
-from .coarsest import CAP, Direct, conjugate_gradients, scalar_inverses
+from .coarsest import CAP, conjugate_gradients, of_coarsest
 from .embedding import taps
 from .projectors import coarse_nodes, given_nodes, onto_range
 from .smoothers import POLYNOMIAL, dot, largest_eigenvalue, times
@@ -119,10 +119,7 @@ class Hierarchy:
     def __init__(self, levels, choices):
         self.levels, self.choices = levels, choices
         self.smoothers = [smoother(level, choices.smoother) for level in self.levels[:-1]]
-        last = self.levels[-1]
-        self.direct = Direct(last.A, last.D, last.B) if choices.coarsest == "direct" else None
-        scalar = choices.preconditioner == "scalar"
-        self.D_inv = scalar_inverses(last.D, last.B) if scalar else last.D_inv
+        self.direct, self.D_inv = of_coarsest(levels[-1], choices)
         self.iterations = 0           # of the coarsest CG, over all cycles
 
     def cycle(self, b):

@@ -1,8 +1,8 @@
 """Solvers of the coarsest level: conjugate gradients with HOT's inexact stop, or direct.
 
 HOT's stop is relative: sqrt(r^T D^+ r) <= tolerance sqrt(b^T D^+ b), D the diagonal, or the
-diagonal blocks, of the coarsest matrix (HOT-sec5.3-coarse). What b is reads in two ways; see `Stop`
-in `multigrid`. The inexact solve makes the V-cycle slightly non-linear; a direct one does not.
+diagonal blocks, of the coarsest matrix (HOT-sec5.3-coarse). What b is reads in two ways; see `stop`
+in `choices`. The inexact solve makes the V-cycle slightly non-linear; a direct one does not.
 """
 
 from functools import partial
@@ -93,3 +93,10 @@ def _cholesky(A):
             return la.cho_factor(A)
         except la.LinAlgError:
             shift *= 10.0
+
+
+def of_coarsest(level, choices):
+    """Direct solver of the coarsest level, or None, and the inverse diagonals of its CG."""
+    direct = Direct(level.A, level.D, level.B) if choices.coarsest == "direct" else None
+    scalar = choices.preconditioner == "scalar"
+    return direct, scalar_inverses(level.D, level.B) if scalar else level.D_inv

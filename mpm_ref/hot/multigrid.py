@@ -14,7 +14,7 @@ import scipy.sparse as sp
 
 from . import block_multigrid
 from .choices import checked
-from .coarsest import Direct, conjugate_gradients, scalar_inverses
+from .coarsest import conjugate_gradients, of_coarsest
 from .projectors import coarse_nodes, diagonal_blocks, given_nodes, inverses, onto_range
 from .smoothers import POLYNOMIAL, GaussSeidel, dot, largest_eigenvalue, times
 
@@ -109,10 +109,7 @@ class Hierarchy:
     def __init__(self, levels, choices):
         self.levels, self.choices = levels, choices
         self.smoothers = [smoother(level, choices.smoother) for level in self.levels[:-1]]
-        last = self.levels[-1]
-        self.direct = Direct(last.A, last.D, last.B) if choices.coarsest == "direct" else None
-        scalar = choices.preconditioner == "scalar"
-        self.D_inv = scalar_inverses(last.D, last.B) if scalar else last.D_inv
+        self.direct, self.D_inv = of_coarsest(levels[-1], choices)
         self.iterations = 0           # of the coarsest CG, over all cycles
 
     def cycle(self, b):

@@ -38,7 +38,7 @@ class Pose(NamedTuple):
 
 class ImplicitStepper(Stepper):
     """Advances bodies by implicit steps; used as `explicit.Stepper`. After each step `report` is
-    the solver's (see `report`), and `revisions` how often the set of bearing planes was changed.
+    the solver's (see `report`).
     """
 
     implicit = True
@@ -46,7 +46,7 @@ class ImplicitStepper(Stepper):
     def __init__(self, scheme, dx, dim, gravity, conditions=None, options=None):
         super().__init__(scheme, dx, dim, gravity, conditions)
         self.options = Options() if options is None else options
-        self.report, self.revisions = None, 0
+        self.report = None
         check_scheme(scheme)
 
     def start(self, bodies):
@@ -108,7 +108,7 @@ class ImplicitStepper(Stepper):
 
     def solve(self, pose):
         """The increment dv (n, d) [m/s] of a pose; separate planes come and go in between."""
-        for self.revisions in range(REVISIONS):
+        for _ in range(REVISIONS):
             solution = minimise(self.system(pose), self.options)
             self.report, dv = solution.report, solution.dv
             if not (pose.restraint and self._revised(pose, dv)):
