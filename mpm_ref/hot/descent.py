@@ -58,7 +58,7 @@ def iterate(system, advance, stop, watch):
     now = Point(system.start.copy(), *system.evaluate(system.start))
     progress = Progress(ROUND_OFF)
     for k in range(stop.iterations + 1):
-        watch.residuals.append(scaled_norm(now.g, system.kappa))
+        watch.note(scaled_norm(now.g, system.kappa))
         size = watch.residuals[-1] if stop.norm == "characteristic" else length(now.g)
         progress.note(now, size)
         if np.isfinite(now.E) and size <= stop.eps:

@@ -24,6 +24,7 @@ class Report(NamedTuple):
     evaluations: int    # passes over the particles for the energy, with the gradient or without
     backtracks: int     # trial steps refused by line searches
     residuals: tuple    # of the start and of every accepted step: ||g^||_2 / sqrt(n)
+    clock: tuple        # CPU seconds of the solve when each of them was known
     seconds: dict       # CPU seconds of all threads by part; their sum is the whole solve
 
 
@@ -42,7 +43,7 @@ class Watch:
         self.seconds = {}
         self.inner = self.coarse = self.capped = self.builds = self.refreshes = 0
         self.evaluations = self.backtracks = 0
-        self.residuals = []
+        self.residuals, self.clock = [], []
         self._parts, self._since = [], 0.0
 
     @contextmanager
@@ -62,6 +63,12 @@ class Watch:
             with self.part(name):
                 return function(*arguments)
         return run
+
+    def note(self, residual):
+        """Count in an iterate by the size of its gradient."""
+        self._turn()
+        self.residuals.append(residual)
+        self.clock.append(sum(self.seconds.values()))
 
     def _turn(self):
         """Book the time since the last turn on the part that was running."""
@@ -86,6 +93,7 @@ class Watch:
             evaluations=self.evaluations,
             backtracks=self.backtracks,
             residuals=tuple(self.residuals),
+            clock=tuple(self.clock),
             seconds=dict(self.seconds),
         )
 

@@ -47,6 +47,7 @@ class ImplicitStepper(Stepper):
         super().__init__(scheme, dx, dim, gravity, conditions)
         self.options = Options() if options is None else options
         self.report = None
+        self.revisions = 0          # of the planes that bear, in the last solve
         check_scheme(scheme)
 
     def start(self, bodies):
@@ -108,12 +109,13 @@ class ImplicitStepper(Stepper):
 
     def solve(self, pose):
         """The increment dv (n, d) [m/s] of a pose; separate planes come and go in between."""
-        for _ in range(REVISIONS):
+        for self.revisions in range(REVISIONS):
             solution = minimise(self.system(pose), self.options)
             self.report, dv = solution.report, solution.dv
             if not (pose.restraint and self._revised(pose, dv)):
                 return dv
             pose = pose._replace(unknowns=pose.restraint.applied(pose.unknowns))
+        self.revisions = REVISIONS
         self.report = self.report._replace(converged=False, why=f"separate planes still came or "
                                            f"went after {REVISIONS} solves")
         return dv
