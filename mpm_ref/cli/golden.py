@@ -21,6 +21,8 @@ def record(
     out: Annotated[Path, typer.Option("--out", "-o", help="Golden file.")] = Path("golden.h5"),
     steps: Annotated[int, typer.Option(help="Steps to record, every stage of each.")] = 3,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a golden file.")] = False,
+    begin: Annotated[int, typer.Option(help="Steps of the run to make before.")] = 0,
+    eps: Annotated[float | None, typer.Option(help="Tolerance of implicit steps.")] = None,
 ):
     """Run the first steps of a scene and record every stage with the error of each number."""
     with one_line():
@@ -28,7 +30,7 @@ def record(
         with options(), at_start(path), compiling():
             keep_scene(path, out)
             problem = scene.build(scene.load(path), str(path))
-            oracle.record(problem, out, steps, overwrite)
+            oracle.record(problem, out, steps, overwrite, begin, eps)
         print(f"{out}: {steps} steps of {problem.title or name}")
 
 

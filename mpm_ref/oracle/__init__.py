@@ -1,4 +1,4 @@
-"""Golden files: every stage of an explicit step, with the error of each number, to check others by.
+"""Golden files: every stage of a step, with the error of each number, to check others by.
 
     record(problem, "golden.h5", steps=3)
     write("other.h5", [{"nodes": .., "mass": .., "ball/v": ..}, ..])      # the other code's arrays

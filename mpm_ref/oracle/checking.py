@@ -5,10 +5,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from .matching import Mismatch, NotComparable, matched
+from .matching import Mismatch, NotComparable, matched, nodes_of
 from .recording import shaped_as
 from .report import Departure, Report
-from .schema import ARRAYS, BESIDE, ENERGIES, FORMAT, key
+from .schema import BESIDE, ENERGIES, EVERY, FORMAT, arrays_of, key
 
 RECORDED = "a golden file, which `mpm-ref oracle record SCENE -o FILE` writes"
 WRITTEN = "the other code's arrays in HDF5, which `mpm_ref.oracle.write` writes"
@@ -29,12 +29,12 @@ def check(golden, other, precision="auto"):
                                 f"; expected {RECORDED}")
         if "steps" not in o:
             raise NotComparable(f"{other}: it has no group 'steps'; write it with `oracle.write`")
-        bodies = list(g["bodies"])
+        bodies, arrays = list(g["bodies"]), arrays_of(g.attrs.get("integrator"))
         given = {step: keys_of(o["steps"][step], bodies) for step in o["steps"]}
         if precision == "auto":
             types = {a.dtype for theirs in given.values() for a in theirs.values()}
             precision = "f32" if np.dtype(np.float32) in types else "f64"
-        return compared(g["steps"], given, bodies, precision)
+        return compared(g["steps"], given, (arrays, bodies), precision)
 
 
 def opened(path, expected):
@@ -50,7 +50,7 @@ def opened(path, expected):
 
 def keys_of(group, bodies):
     """{key: dataset} of one step of the other file; the name of a single body may be left out."""
-    of_particles = {a.name for a in ARRAYS if a.where != "nodes"} | {"base", "id"}
+    of_particles = {a.name for a in EVERY if key(a) != a.name} | {"base", "id"}
     found = {}
 
     def visit(name, item):
@@ -59,18 +59,20 @@ def keys_of(group, bodies):
             found[f"{bodies[0]}/{name}" if alone else name] = item
 
     group.visititems(visit)
-    return {name: item for name, item in found.items() if not name.startswith("scale/")}
+    return {name: item for name, item in found.items() if not name.startswith(("scale/", "bar/"))}
 
 
-def compared(steps, given, bodies, precision):
-    """The `Report` over all steps and arrays, in the order of the stages."""
+def compared(steps, given, names, precision):
+    """The `Report` over all steps and arrays, in the order of the stages; names are the arrays
+    that there may be, and the bodies.
+    """
     departures, missing, count, nearest, found = [], set(), 0, 0.0, set()
     unknown = {name for theirs in given.values() for name in theirs
                if name.split("/")[-1] not in BESIDE}
     unknown |= {f"step {step}" for step in given if step not in steps}
     for step in sorted(steps, key=int):
         theirs = given.get(step, {})
-        for array, name in named(steps[step], bodies):
+        for array, name in named(steps[step], *names):
             unknown.discard(name)
             if name not in theirs:
                 missing.add(name if theirs else f"step {step}")
@@ -85,10 +87,10 @@ def compared(steps, given, bodies, precision):
                   float(nearest), tuple(departures), tuple(sorted(missing)), tuple(sorted(unknown)))
 
 
-def named(group, bodies):
+def named(group, arrays, bodies):
     """The arrays of a golden step in the order of the stages: pairs of `Array` and key."""
-    for array in ARRAYS:
-        for name in [key(array)] if array.where == "nodes" else [key(array, b) for b in bodies]:
+    for array in arrays:
+        for name in dict.fromkeys(key(array, body) for body in bodies):
             if name in group:
                 yield array, name
 
@@ -106,8 +108,10 @@ def distance(group, theirs, array, name, precision):
     if len(bad) or not np.isfinite(other.extra).all():
         at = words(group, array, name, tuple(bad[0])) if len(bad) else "a node that is not golden"
         return {"where": at, "what": f"{at} is not finite"}, 0.0
-    tol = np.broadcast_to(shaped_as(group[name].attrs[f"tolerance_{precision}"] * scale, golden),
-                          golden.shape)
+    tol = group[name].attrs[f"tolerance_{precision}"] * scale
+    if f"bar/{name}" in group:
+        tol = tol + group[f"bar/{name}"][()]
+    tol = np.broadcast_to(shaped_as(tol, golden), golden.shape)
     off = np.where(other.given, abs(other.value - golden), 0.0)
     units = in_units(off, tol)
     i = np.unravel_index(np.argmax(units), units.shape)
@@ -134,9 +138,12 @@ def words(group, array, name, i):
     """The entry i of an array in words: which node, particle, component."""
     if array.where == "body":
         return ENERGIES[i[0]]
+    if array.where == "step":
+        return "the sum"
     component = f" component {', '.join(map(str, i[1:]))}" if len(i) > 1 else ""
     if array.where == "nodes":
-        return f"node {tuple(group['nodes'][i[0]].tolist())}{component}"
+        level = f" of level {array.level}" if array.level else ""
+        return f"node {tuple(group[nodes_of(array)][i[0]].tolist())}{level}{component}"
     if array.where == "pairs":
         base = group[f"{name.partition('/')[0]}/base"][i[0]]
         d = len(base)

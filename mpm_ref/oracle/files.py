@@ -1,6 +1,7 @@
 """Golden files, and files to check against them: HDF5 with the layout of docs/oracle.md."""
 
 import json
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import h5py
@@ -8,31 +9,45 @@ import numpy as np
 
 from ..body import Body
 from ..store.atomic import replacing, require_place
-from . import recording
-from .schema import ARRAYS, BESIDE, FORMAT, key
+from . import implicit_recording, recording, solving
+from .schema import BESIDE, EVERY, FORMAT, NODES, arrays_of, key
 
 PACKED = {"compression": "gzip", "compression_opts": 9, "shuffle": True, "fletcher32": True}
 
 
-def record(problem, path, steps, overwrite=False):
-    """Run the first `steps` steps of a problem and write the golden file `path`.
+def record(problem, path, steps, overwrite=False, begin=0, eps=None):
+    """Record `steps` steps of a problem, after `begin` others, and write the golden file `path`.
 
-    The problem's own arrays stay as they are; all steps have the dt of a run's first step. Raises
-    ValueError for steps < 1, for an implicit problem, for names of bodies that cannot name arrays,
-    for a state in which the reference's own error is too large to judge others by, and where
-    `path` exists, unless it is a golden file that overwrite lets go; `Unstable`; `NotWritten`.
+    The problem's own arrays stay as they are; all steps have the dt of a run's next step. eps > 0
+    is the tolerance of implicit steps, by default the scene's. Raises ValueError for steps < 1, for
+    names of bodies that cannot name arrays, for a state in which the reference's own error is too
+    large to judge others by, for an implicit step that is not solved, and where `path` exists,
+    unless it is a golden file that overwrite lets go; `Unstable`; `NotWritten`.
     """
     require_free(path, overwrite)
-    refuse_names(problem.bodies)
-    if steps < 1:
-        raise ValueError(f"steps = {steps}: expected at least one step to record")
-    if problem.integrator != "explicit":
-        raise ValueError(f"integrator = {problem.integrator!r}: expected 'explicit', whose stages "
-                         "are recorded; those of an implicit step are not yet")
+    refuse_names(problem)
+    if steps < 1 or begin < 0:
+        raise ValueError(f"steps = {steps}, begin = {begin}: expected at least one step to record, "
+                         "after 0 or more")
+    problem = solved_to(problem, eps)
+    problem, state = recording.begun(problem, begin)
+    run = implicit_recording.run if problem.integrator == "implicit" else recording.run
     with replacing(path) as part, h5py.File(part, "w", libver=("v110", "v110")) as f:
         describe(f, problem)
-        for k, recorded in enumerate(recording.run(problem, steps)):
+        for k, recorded in enumerate(run(problem, steps, state)):
             put_step(f.create_group(f"steps/{k}"), recorded)
+
+
+def solved_to(problem, eps):
+    """The problem with the tolerance eps of its implicit steps. Raises ValueError for an explicit
+    one.
+    """
+    if eps is None:
+        return problem
+    if problem.integrator != "implicit":
+        raise ValueError(f"eps = {eps} with an explicit integrator: nothing is solved; leave it "
+                         "out")
+    return replace(problem, solver=replace(solving.options_of(problem), eps=eps))
 
 
 def require_free(path, overwrite):
@@ -56,9 +71,10 @@ def is_golden(path):
         return False
 
 
-def refuse_names(bodies):
+def refuse_names(problem):
     """Raise ValueError for names that are not unique, or mean something else in the file."""
-    names, taken = [body.name for body in bodies], {a.name for a in ARRAYS} | {*BESIDE, "scale"}
+    names = [body.name for body in problem.bodies]
+    taken = {a.name for a in arrays_of(problem.integrator)} | {*BESIDE, "scale", "bar"}
     if len(set(names)) < len(names) or any("/" in name or name.strip(".") == "" for name in names):
         raise ValueError(f"bodies {names}: expected a name of its own for each, without a slash")
     if taken & set(names):
@@ -75,10 +91,18 @@ def describe(f, problem):
         "gravity_on_empty": s.gravity_on_empty, "conditions": str(problem.conditions),
         "rule": "tolerance of an entry = tolerance_f64 or tolerance_f32 of its array * its scale",
     })
+    if problem.integrator == "implicit":
+        f.attrs.update(solver_attributes(solving.options_of(problem)))
     if problem.clip is not None:
         f.attrs["clip"] = np.array(problem.clip)
     for body in problem.bodies:
         put_body(f.create_group(f"bodies/{body.name}"), body)
+
+
+def solver_attributes(options):
+    """What of an implicit solve another code has to know."""
+    return {"integrator": "implicit", "options": json.dumps(asdict(options)),
+            **{name: getattr(options, name) for name in ("method", "eps", "norm", "start")}}
 
 
 def put_body(group, body):
@@ -97,9 +121,15 @@ def put_step(group, recorded):
     """One step: every array with its scale, its own error and its tolerances."""
     group.attrs.update({"t": recorded.t, "dt": recorded.dt})
     group.create_dataset("nodes", data=recorded.nodes.astype(np.int32), **PACKED)
+    for name, a in recorded.beside.items():
+        group.create_dataset(name, data=a.astype(np.int32) if name in NODES else a, **PACKED)
+    for name, a in recorded.bars.items():
+        group.create_dataset(f"bar/{name}", data=a, **PACKED)
+    if recorded.report is not None:
+        put_report(group.create_group("report"), recorded.report)
     for name, base in recorded.bases.items():
         group.create_dataset(f"{name}/base", data=base.astype(np.int32), **PACKED)
-    stages = {array.name: array for array in ARRAYS}
+    stages = {array.name: array for array in EVERY}
     for name, a in recorded.arrays.items():
         data = group.create_dataset(name, data=a.value, **PACKED)
         group.create_dataset(f"scale/{name}", data=a.scale, **PACKED)
@@ -109,6 +139,13 @@ def put_step(group, recorded):
             "error_reordered": a.reordered, "error_in_units": a.error,
             **{f"tolerance_{p}": a.tolerance(p) for p in recording.EPS},
         })
+
+
+def put_report(group, report):
+    """How the scene's method solved the step: numbers to look at, that no check compares."""
+    said = {name: a for name, a in report._asdict().items() if name not in ("clock", "seconds")}
+    group.attrs.update({name: np.array(a) if name == "residuals" else a
+                        for name, a in said.items()})
 
 
 def write(path, steps):
@@ -132,7 +169,7 @@ def write(path, steps):
 
 def refuse_key(name):
     """Raise ValueError for a key that is not in the schema."""
-    known = [array.name for array in ARRAYS]
+    known = [array.name for array in EVERY]
     if name.split("/")[-1] not in (*known, *BESIDE):
         raise ValueError(f"array {name!r}: expected one of {', '.join(known)}, for particles with "
                          f"the name of their body in front, or {', '.join(BESIDE)}")
@@ -146,8 +183,8 @@ def listed(arrays):
         raise ValueError("origin without mass: whole grids need `mass`, which tells their nodes")
     full = np.asarray(arrays["mass"]) != 0.0       # NaN counts: it must be seen
     out = {name: a for name, a in arrays.items() if name != "origin"}
-    for array in ARRAYS:
-        if array.where == "nodes" and key(array) in out:
+    for array in EVERY:
+        if array.where == "nodes" and not array.level and key(array) in out:
             out[key(array)] = np.asarray(out[key(array)])[full]
     out["nodes"] = np.argwhere(full) + np.asarray(arrays["origin"])
     return out

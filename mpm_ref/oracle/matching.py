@@ -31,14 +31,19 @@ def matched(group, theirs, array, name):
     """
     a, golden = theirs[name][()], group[name][()]
     if array.where == "nodes":
-        return by_node(group, theirs, name, a, golden)
-    if array.where == "body":
+        return by_node(group, theirs, array, a, golden)
+    if array.where in ("body", "step"):
         require_shape(a, golden.shape)
         return whole(a)
     body = name.partition("/")[0]
     a = by_particle(theirs, body, a)
     require_particles(a, golden.shape)
     return by_pair(group, theirs, body, a, golden) if array.where == "pairs" else whole(a)
+
+
+def nodes_of(array):
+    """Name of the list of nodes that an array is on."""
+    return f"nodes{array.level or ''}"
 
 
 def whole(a):
@@ -74,11 +79,13 @@ def by_particle(theirs, body, a):
     return out
 
 
-def by_node(group, theirs, name, a, golden):
+def by_node(group, theirs, array, a, golden):
     """Values on the golden nodes; sums are 0 at nodes that are not listed."""
-    if "nodes" not in theirs:
-        raise NotComparable(f"{name} is given without `nodes`: expected (M, d) integer coordinates")
-    nodes, ours = theirs["nodes"][()], group["nodes"][()]
+    name, listing = array.name, nodes_of(array)
+    if listing not in theirs:
+        raise NotComparable(f"{name} is given without `{listing}`: expected (M, d) integer "
+                            "coordinates")
+    nodes, ours = theirs[listing][()], group[listing][()]
     require_shape(a, (len(nodes), *golden.shape[1:]))
     place = {tuple(i): k for k, i in enumerate(nodes.tolist())}
     if len(place) < len(nodes):

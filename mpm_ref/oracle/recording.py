@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..explicit import Stepper
-from ..simulate import State, next_dt, rebound, swiftest
+from ..simulate import State, advance, frame_is_due, next_dt, rebound, swiftest
 from . import scaling, stages
 from .twin import Twin, placed
 
@@ -49,20 +49,41 @@ class Recorded(NamedTuple):
     nodes: np.ndarray
     bases: dict     # {body name: first node of each particle}
     arrays: dict    # {key: Golden}
+    bars: dict      # {key: what the tolerance of an implicit solve adds}
+    beside: dict    # {key: what operators of an implicit step are applied to}
+    report: object  # of an implicit solve, or None
 
 
-def run(problem, steps):
+def begun(problem, steps):
+    """(`Problem`, `State`) after so many steps of a run; the given problem's arrays stay.
+
+    Raises as a run does: `Unstable`, `TooLarge`.
+    """
+    problem = problem_of(problem, 1)
+    state = State(problem.bodies, frame=1)        # a run has shown its start by then
+    if steps:
+        stepper = problem.stepper()
+        stepper.start(problem.bodies)
+        for _ in range(steps):
+            advance(problem, stepper, state)
+            state.frame += frame_is_due(problem.clock, state)
+    return problem, state
+
+
+def run(problem, steps, state=None):
     """Yield one `Recorded` for each step; the problem's own arrays stay as they are.
 
-    Raises ValueError where the reference's own error is too large to judge others by.
+    A run stands at `state`, by default at the start of the problem. Raises ValueError where the
+    reference's own error is too large to judge others by.
     """
     ours, mirrored = (problem_of(problem, order) for order in (1, -1))
     steppers = [started(p) for p in (ours, mirrored)]
     twin, errors = Twin(problem), [{} for _ in problem.bodies]
-    dt = step_length(problem, steppers[0])
+    dt, start = step_length(problem, steppers[0], state), 0.0 if state is None else state.t
     for k in range(steps):
-        seen, contacts = stages.step(ours, ours.bodies, steppers[0], k * dt, dt)
-        other, _ = stages.step(mirrored, mirrored.bodies, steppers[1], k * dt, dt)
+        t = start + k * dt
+        seen, contacts = stages.step(ours, ours.bodies, steppers[0], t, dt)
+        other, _ = stages.step(mirrored, mirrored.bodies, steppers[1], t, dt)
         before = twin.bodies
         exact, done = twin.step(dt, seen["nodes"], contacts)
         held = placed(contacts, done.nodes.box, twin.real)
@@ -79,7 +100,7 @@ def run(problem, steps):
         errors = [{field: arrays[f"{name}/{field}"].twin for field in "xvCF"
                    if f"{name}/{field}" in arrays} for name in twin.names]
         bases = {name: seen[f"{name}/base"] for name in twin.names}
-        yield Recorded(k * dt, dt, seen["nodes"], bases, arrays)
+        yield Recorded(t, dt, seen["nodes"], bases, arrays, {}, {}, None)
 
 
 def aligned(w, base, to):
@@ -116,12 +137,11 @@ def started(problem):
     return stepper
 
 
-def step_length(problem, stepper):
-    """dt of a run's first step: fixed, or as the bounds, the first frame and the end let it be.
-
-    Raises `Unstable` where no adaptive dt is stable.
+def step_length(problem, stepper, state=None):
+    """dt of a run's next step, by default the first: fixed, or as the bounds, the next frame and
+    the end let it be. Raises `Unstable` where no adaptive dt is stable.
     """
-    state = State(problem.bodies, frame=1)        # a run has shown its start by then
+    state = replace(state or State(problem.bodies, frame=1), bodies=problem.bodies)
     if problem.clock.dt is None:
         state.bound = rebound(problem, stepper, state)
     return next_dt(problem.clock, state, swiftest(problem, state))

@@ -1,8 +1,9 @@
-"""The stages of one explicit step, in order, and the arrays of each that a backend can compare."""
+"""The stages of a step, in order, and the arrays of each that a backend can compare."""
 
 from typing import NamedTuple
 
 FORMAT = "mpm_ref golden 1"
+LEVELS = 8                          # of multigrid, the most that are recorded
 
 
 class Array(NamedTuple):
@@ -10,8 +11,9 @@ class Array(NamedTuple):
 
     name: str
     stage: str
-    where: str      # "nodes", "particles", "pairs" of both, or "body"
+    where: str      # "nodes", "particles", "pairs" of both, "body", or "step": of all nodes
     unit: str
+    level: int = 0  # of multigrid: whose nodes
 
 
 ARRAYS = (
@@ -31,13 +33,44 @@ ARRAYS = (
     Array("tau", "stress", "particles", "Pa"),
     Array("energy", "energies", "body", "J"),
 )
-SUMS = ("mass", "momentum", "force")            # zero at a node that is not listed
+MULTIGRID = tuple(array for k in range(1, LEVELS) for array in (
+    Array(f"prolonged{k}", "prolongation", "nodes", "m/s", k - 1),
+    Array(f"coarse{k}", "coarse matrix", "nodes", "kg m/s", k),
+))
+SOLVED = (
+    Array("velocity_old", "velocity", "nodes", "m/s"),
+    Array("projector", "conditions", "nodes", "1"),
+    Array("start", "conditions", "nodes", "m/s"),
+    Array("kappa", "norms", "nodes", "kg m/s"),
+    Array("E_start", "potential", "step", "J"),
+    Array("gradient_start", "potential", "nodes", "kg m/s"),
+    Array("E_trial", "potential", "step", "J"),
+    Array("gradient_trial", "potential", "nodes", "kg m/s"),
+    Array("product_start", "Hessian", "nodes", "kg m/s"),
+    Array("product_trial", "Hessian", "nodes", "kg m/s"),
+    *MULTIGRID,
+    Array("cycle", "V-cycle", "nodes", "m/s"),
+    Array("direction", "direction", "nodes", "m/s"),
+    Array("dv", "accepted step", "nodes", "m/s"),
+)
+IMPLICIT = (*ARRAYS[:3], *SOLVED, *ARRAYS[6:])
+EVERY = (*ARRAYS, *SOLVED)
+# Zero at a node that is not listed.
+SUMS = ("mass", "momentum", "force", "gradient_start", "gradient_trial", "product_start",
+        "product_trial", *(array.name for array in MULTIGRID))
 ENERGIES = ("kinetic", "elastic", "gravity")    # the entries of `energy`
 
-# Carried beside them, to find one's way: no numbers to compare.
-BESIDE = ("nodes", "base", "id")
+# Carried beside them, to find one's way and to apply operators to: no numbers to compare.
+NODES = ("nodes", *(f"nodes{k}" for k in range(1, LEVELS)))
+GIVEN = ("trial", "probe", "load", *(f"probe{k}" for k in range(1, LEVELS)))
+BESIDE = (*NODES, "base", "id", *GIVEN)
 
 
 def key(array, body=None):
     """Name of an array within a step: `mass` on nodes, `ball/x` for the particles of a body."""
-    return array.name if array.where == "nodes" else f"{body}/{array.name}"
+    return array.name if array.where in ("nodes", "step") else f"{body}/{array.name}"
+
+
+def arrays_of(integrator):
+    """The arrays of a step of an integrator, "explicit" or "implicit", in the order of stages."""
+    return IMPLICIT if integrator == "implicit" else ARRAYS

@@ -1,0 +1,176 @@
+"""The stages of one implicit step by the plain twin, in extended precision.
+
+Conditions, the nodes of the coarse levels and the accepted velocities are taken from the kernels as
+they are; all else is computed from the particles. The Hessian is a product, never a matrix, on all
+levels: coarse ones are R H P, one factor after the other.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..plain import hot, transfer
+from ..plain.flows import intact
+from ..plain.laws import energy, principal
+from ..plain.spline import bspline, pairs
+from ..plain.step import Nodes, Step, after, deform, to_particles
+from ..plain.tensors import compose, det, svd
+from . import differential
+from .twin import REAL, Twin, on
+
+DEGREE = {"linear": 1, "quadratic": 2}      # of the splines of HOT-sec4.2-kernel
+
+
+class At(NamedTuple):
+    """One body at an increment."""
+
+    A: np.ndarray           # (N, d, d)  growth
+    F: np.ndarray           # (N, d, d)  deformation gradient there
+    F_n: np.ndarray         # (N, d, d)  and before
+    modes: differential.Modes
+
+
+class SolvedTwin(Twin):
+    """The plain twin of an implicit problem, at the start of one step of dt [s]."""
+
+    def __init__(self, problem, unknowns, dt, real=REAL):
+        super().__init__(problem, real)
+        self.dt, self.unknowns = self.real(dt), unknowns
+        self.whole = [q._replace(V0=q.V0 * (1 if q.y is None else intact(q.y, q.flow)))
+                      for q in self.bodies]
+        self.clouds = [pairs(q.x, self.method.dx, self.method.degree) for q in self.bodies]
+        box = transfer.box_of(*self.clouds)
+        both = list(zip(self.bodies, self.clouds))
+        self.m = sum(transfer.mass(q.m, ip, box) for q, ip in both)
+        self.mv = sum(transfer.momentum(q.m, q.v, q.C, ip, box) for q, ip in both)
+        self.v = self.mv / np.where(self.m > 0, self.m, 1)[..., None]
+        self.box, self.B = box, unknowns.B.astype(self.real)
+
+    def over(self, u):
+        """A nodal field (n, ..) over the box; nodes outside of it carry nothing."""
+        k = self.unknowns.index - self.box.first
+        inside = ((k >= 0) & (k < self.box.shape)).all(axis=1)
+        out = np.zeros((*self.box.shape, *u.shape[1:]), self.real)
+        out[tuple(k[inside].T)] = u[inside]
+        return out
+
+    def nodal(self, a):
+        """An array over the box on the nodes (n, ..)."""
+        return on(a, self.box, self.unknowns.index)
+
+    def before(self):
+        """{key: array} as `implicit.before`, without conditions and norms."""
+        seen = {"mass": self.m, "momentum": self.mv, "velocity_old": self.v}
+        seen = {name: self.nodal(a) for name, a in seen.items()}
+        for name, ip in zip(self.names, self.clouds):
+            seen[f"{name}/base"], seen[f"{name}/weights"] = ip.node[:, 0], ip.w
+        return seen
+
+    def conditions(self):
+        """{key: array} that must follow from the kernels' projectors and increments: a projector is
+        3 B^2 - 2 B^3 of itself, and what conditions ask for has no free part.
+        """
+        B, dv0 = self.B, self.unknowns.dv0.astype(self.real)
+        B2 = np.einsum("nab,nbc->nac", B, B)
+        start = dv0 - np.einsum("nab,nb->na", B, dv0)
+        return {"projector": 3 * B2 - 2 * np.einsum("nab,nbc->nac", B2, B), "start": start}
+
+    def kappa(self):
+        """Characteristic norms (n,) [kg m/s] (HOT-eq9)."""
+        d = self.gravity.shape[0]
+        xi = [rest_stiffness(q.law, d, self.real) for q in self.bodies]
+        shares = [transfer.mass(q.m, ip, self.box) for q, ip in zip(self.bodies, self.clouds)]
+        m = self.nodal(self.m)
+        mean = self.nodal(sum(x * a for x, a in zip(xi, shares))) / np.where(m > 0, m, 1)
+        return mean * 2 * d * (2 * self.method.dx) ** (d - 1) * self.dt
+
+    def potential(self, dv):
+        """E (1,) [J] and its gradient (n, d) on what is free [kg m/s]."""
+        bodies = [(q, ip, self.box) for q, ip in zip(self.whole, self.clouds)]
+        E, g = hot.potential(bodies, self.m, self.v, self.over(dv), self.dt, self.gravity)
+        return np.array([E]), self.free(self.nodal(g))
+
+    def free(self, u):
+        """B u."""
+        return np.einsum("nab,nb->na", self.B, u)
+
+    def at(self, dv):
+        """`At` of every body at the increment dv (n, d)."""
+        return [self._at(q, ip, self.v + self.over(dv)) for q, ip in zip(self.bodies, self.clouds)]
+
+    def _at(self, q, ip, u):
+        A, F_n = hot.growth(u, self.dt, ip, self.box), as_matrices(q.F, self.gravity.shape[0])
+        F = np.einsum("pab,pbc->pac", A, F_n)
+        return At(A, F, F_n, differential.modes(F, q.law))
+
+    def product(self, ats, u):
+        """B H B u (n, d) [kg m/s]."""
+        u = self.over(self.free(u))
+        total = self.m[..., None] * u
+        for q, ip, at in zip(self.whole, self.clouds, ats):
+            dF = np.einsum("pab,pbc->pac", transfer.velocity_gradient(u, ip, self.box), at.F_n)
+            T = np.einsum("pab,pcb->pac", differential.applied(at.modes, dF), at.F_n)
+            total -= self.dt**2 * transfer.internal_force(q.V0, T, ip, self.box)
+        return self.free(self.nodal(total))
+
+    def moved(self, v):
+        """`plain.step.Step` of particles and deformation under the nodal velocities v (n, d)."""
+        grid = Nodes(self.box, self.m, self.mv, 0 * self.mv, self.v, self.over(v))
+        both = zip(self.bodies, self.clouds)
+        moved = [to_particles(q, ip, grid, self.method, self.dt) for q, ip in both]
+        moved = [self.clipped(new) for new in moved]
+        deformed = [deform(q, new.L, self.dt) for q, new in zip(self.bodies, moved)]
+        self.bodies = [after(*body) for body in zip(self.bodies, moved, deformed)]
+        return Step(self.clouds, grid, moved, deformed, self.dt)
+
+
+def as_matrices(F, d):
+    """F (N, d, d); of a fluid the multiple of I that has its determinant (N,)."""
+    if F.ndim == 3:
+        return F
+    return (F ** (1 / F.dtype.type(d)))[:, None, None] * np.eye(d, dtype=F.dtype)
+
+
+def rest_stiffness(law, d, real):
+    """||dP/dF||_F at F = I [Pa] (HOT-sec5.2)."""
+    s = np.ones((1, d), real)
+    A, (a, b) = differential.slopes(s, law), differential.quotients(s, law)
+    return np.sqrt((A * A).sum() + (a * a + b * b).sum() / 2)
+
+
+def kirchhoff_like(F, F_n, law):
+    """P (F_n)^T (N, d, d) [Pa] at F, the stress that acts on the nodes (HOT-eq2)."""
+    U, s, V = svd(F)
+    P = compose(U, principal(s, law)[1] / s, V)
+    return np.einsum("pab,pcb->pac", P, F_n)
+
+
+def density(F, law):
+    """psi (N,) of F (N, d, d) of any law."""
+    return energy(det(F), law) if type(law).__name__ == "Fluid" else energy(F, law)
+
+
+def embedding(fine, coarse, kernel):
+    """Weights (n, m) of nodes with the world indices fine (n, d) on those of the next level (m, d):
+    prod_a N(i_a/2 - c_a) (HOT-eq3), exact in floats.
+    """
+    degree = DEGREE[kernel]
+    w = np.ones((len(fine), len(coarse)))
+    for i, c in zip(fine.T, coarse.T):
+        w *= bspline((i[:, None] - 2 * c) / 2 + (degree + 1) / 2, degree)
+    return sp.coo_array(w)
+
+
+def spread(W, B, u):
+    """P u: blocks W_ic B_i (HOT-eq4)."""
+    out = np.zeros((W.shape[0], *u.shape[1:]), u.dtype)
+    np.add.at(out, W.row, W.data[:, None] * u[W.col])
+    return np.einsum("nab,nb->na", B, out)
+
+
+def collected(W, B, g):
+    """R g = P^T g (HOT-eq5)."""
+    out = np.zeros((W.shape[1], *g.shape[1:]), g.dtype)
+    np.add.at(out, W.col, W.data[:, None] * np.einsum("nab,nb->na", B, g)[W.row])
+    return out
