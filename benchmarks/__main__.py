@@ -1,5 +1,5 @@
-"""`python -m benchmarks`: ours beside Taichi and Warp on one elastic block, and what each feature
-of ours costs.
+"""`python -m benchmarks`: ours beside Taichi and Warp on one elastic block, what each feature of
+ours costs, and what an implicit step takes.
 """
 
 import json
@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
+import threadpoolctl
 import typer
 
 from validation.provenance import commit
@@ -136,6 +137,37 @@ def features(
             f"x {row['cpu_ratio']:.2f}  {row['state_bytes_per_particle']:.0f} B"
         )
     save(out, rows, threads, repeats)
+
+
+@app.command()
+def hot(
+    steps: Annotated[str, typer.Option(help="of twist, box, comma-separated")] = "twist,box",
+    threads: int = 1,
+    repeats: int = 7,
+    out: Path = Path("results/benchmarks/hot.json"),
+):
+    """CPU time of an implicit step and of each of its parts, and of pyamg on the same matrix."""
+    from mpm_ref.core.jit import set_threads
+
+    from .hot import costs
+
+    set_threads(threads)
+    with threadpoolctl.threadpool_limits(threads):
+        rows = costs(steps.split(","), repeats)
+    for row in rows:
+        typer.echo(hot_line(row))
+    save(out, rows, threads, repeats)
+
+
+def hot_line(row):
+    """One line of the table of implicit steps."""
+    size = f"{row['step']:5} {row['particles']:6} particles {row['nodes']:6} nodes  "
+    if "part" in row:
+        return size + f"{row['part']:36} {row['cpu_ns']:9.1f} ns per {row['per']}"
+    name = row["method"] if "method" in row else "CG with " + row["solver"]
+    spent = " ".join(f"{part} {1e3 * t:.1f}" for part, t in row.get("parts_s", {}).items())
+    return size + (f"{name:36} {row['cpu_s']:9.4f} s  x {row['cpu_ratio']:.2f}  "
+                   f"{row['iterations']} iterations" + ("  ms: " + spent if spent else ""))
 
 
 @app.command()

@@ -7,9 +7,10 @@ import scipy.sparse as sp
 from multigrid_matrices import case
 
 from mpm_ref.core.jit import set_threads
-from mpm_ref.hot import block_multigrid, block_sparse, block_sweep, block_transfer
+from mpm_ref.hot import block_multigrid, block_product, block_sweep, block_transfer
 from mpm_ref.hot.block_inverse import inverse_blocks
-from mpm_ref.hot.block_sparse import blocks_of, diagonal, product, reach_of
+from mpm_ref.hot.block_product import planes_of, product
+from mpm_ref.hot.block_sparse import blocks_of, diagonal, reach_of
 from mpm_ref.hot.block_sweep import Sweep, correct, residual, split, sweep
 from mpm_ref.hot.multigrid import hierarchy
 from mpm_ref.hot.projectors import diagonal_blocks, inverses, onto_range
@@ -27,7 +28,11 @@ def close(a, b, tolerance=1e-12):
 
 def test_products_diagonals_and_inverses(c, rng):
     A, u = blocks_of(c.A), rng.standard_normal(c.index.shape)
-    close(product(A, u), (c.A @ u.reshape(-1)).reshape(u.shape), 1e-14)
+    expected = (c.A @ u.reshape(-1)).reshape(u.shape)
+    close(product(planes_of(A), u), expected, 1e-14)
+    single = product(planes_of(A, np.float32), u)
+    close(single, expected, 1e-6)
+    close(single, (c.A.astype(np.float32).astype(float) @ u.reshape(-1)).reshape(u.shape), 1e-14)
     D = diagonal(A)
     np.testing.assert_array_equal(D, diagonal_blocks(c.A))
     B = onto_range(D)
@@ -70,6 +75,18 @@ def test_the_paths_are_twins(c, choices, rng):
     assert fast.iterations == slow.iterations
 
 
+@pytest.mark.parametrize("smoother", ["gauss-seidel", "chebyshev"])
+def test_the_paths_are_twins_in_single_precision(c, smoother, rng):
+    b = rng.standard_normal(c.index.shape)
+    words = {"smoother": smoother, "coarsest": "direct"}
+    slow, fast, double = (
+        hierarchy(c.A, c.index, path=path, precision=precision, **words).cycle(b)
+        for path, precision in (("scipy", "single"), ("blocks", "single"), ("blocks", "double")))
+    close(fast, slow, 1e-6)              # sweeps know the diagonal blocks in double, SciPy's do not
+    close(fast, double, 1e-5)
+    assert (fast != double).any()
+
+
 @pytest.mark.parametrize("power", [0, 2])
 def test_matrices_of_another_reach(c, power):
     A = sp.csr_array(c.A)
@@ -95,7 +112,7 @@ def test_the_same_bits_in_parallel(monkeypatch, rng):
     c = case(3, size=6)
     b = rng.standard_normal(c.index.shape)
     serial = hierarchy(c.A, c.index).cycle(b)
-    for module in (block_sparse, block_sweep, block_transfer):
+    for module in (block_product, block_sweep, block_transfer):
         monkeypatch.setattr(module, "SERIAL", 0)
     before = numba.get_num_threads()
     set_threads(min(2, numba.config.NUMBA_NUM_THREADS))

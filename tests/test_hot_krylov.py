@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from hot_toys import lattice, random_quadratic
 
+from mpm_ref.hot.block_sparse import blocks_of
 from mpm_ref.hot.krylov import (
     JACOBI,
     Rule,
@@ -119,9 +121,36 @@ def test_flexible_pcg_bears_a_preconditioner_that_varies(problem):
     assert 10 * needed(True) < needed(False)
 
 
+def test_both_paths_of_products_and_sweeps_are_twins(problem):
+    A, b, toy = problem
+    for make in (lambda path: by_matrix(A, path),
+                 lambda path: symmetric_gauss_seidel(A, toy.index, path)):
+        slow, fast = make("scipy"), make("blocks")
+        assert np.abs(fast(b) - slow(b)).max() < 1e-13 * np.abs(slow(b)).max()
+        kept, copy = fast(b), fast(b).copy()
+        fast(2.0 * b)
+        assert np.array_equal(kept, copy)           # what was handed out stays as it is
+
+
+@pytest.mark.parametrize("d", [1, 4])
+def test_products_with_blocks_that_kernels_do_not_know_are_left_to_scipy(d):
+    A = sp.bsr_array(np.arange(4.0 * d * d).reshape(2 * d, 2 * d), blocksize=(d, d))
+    u = np.linspace(-1.0, 2.0, 2 * d).reshape(2, d)
+    assert np.allclose(by_matrix(A)(u), (A.toarray() @ u.reshape(-1)).reshape(2, d))
+    with pytest.raises(ValueError, match=r"expected \(2, 2\) or \(3, 3\)"):
+        blocks_of(A)
+
+
+def test_pcg_takes_no_iteration_where_the_rule_is_met_at_zero(problem):
+    A, b, _ = problem
+    solved = pcg(by_matrix(A), b, block_jacobi(diagonal_blocks(A)), Rule(lambda size: 1.0))
+    assert (solved.iterations, solved.why) == (0, None)
+    assert not solved.x.any()
+
+
 @pytest.mark.parametrize("make", [
     lambda A, _: block_jacobi(diagonal_blocks(A)), lambda A, _: scalar_jacobi(diagonal_blocks(A)),
-    symmetric_gauss_seidel])
+    symmetric_gauss_seidel, lambda A, index: symmetric_gauss_seidel(A, index, "scipy")])
 def test_preconditioners_are_symmetric_positive_and_keep_to_what_is_free(problem, make):
     A, _, toy = problem
     inverse, rng = make(A, toy.index), np.random.default_rng(0)

@@ -1,7 +1,7 @@
 """The V-cycle: against dense algebra, against pyamg, and what it is as a map."""
 
 from functools import cache
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 import pyamg
@@ -85,12 +85,12 @@ def test_the_cycle_is_that_of_pyamg(d, rng):                           # HOT-alg
     close(grids.cycle(b).reshape(-1), u)
 
 
-@pytest.mark.parametrize("path", PATHS)
-@pytest.mark.parametrize("word", SMOOTHERS)
-def test_the_cycle_is_symmetric_positive_and_zero_where_held(d, word, path):
+@pytest.mark.parametrize(("path", "word", "precision"), [
+    *product(PATHS, SMOOTHERS, ["double"]), ("blocks", "gauss-seidel", "single")])
+def test_the_cycle_is_symmetric_positive_and_zero_where_held(d, path, word, precision):
     c = small(d)
-    M = dense(hierarchy(c.A, c.index, 3, path=path, smoother=word, coarsest="direct"),
-              c.index.shape)
+    M = dense(hierarchy(c.A, c.index, 3, path=path, smoother=word, coarsest="direct",
+                        precision=precision), c.index.shape)
     close(M, M.T, 1e-13)
     Q = free_basis(c.B)
     close(Q @ (Q.T @ M @ Q) @ Q.T, M, 1e-13)              # nothing in, nothing out where held
@@ -227,6 +227,7 @@ def test_slabs_of_one_colour_do_not_couple(d):
 @pytest.mark.parametrize(("wrong", "said"), [
     ({"path": "gpu"}, "path = 'gpu': expected one of scipy, blocks"),
     ({"smoother": "ilu"}, "smoother = 'ilu': expected one of gauss-seidel, jacobi, chebyshev"),
+    ({"precision": "half"}, "precision = 'half': expected one of double, single"),
     ({"coarse": "pcg"}, "no option 'coarse': expected one of smoother, "),
     ({"kernel": "cubic"}, "kernel = 'cubic'"),
     ({"levels": 0}, "levels = 0"),

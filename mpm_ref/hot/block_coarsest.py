@@ -1,10 +1,10 @@
-"""The twin of `coarsest.conjugate_gradients` in one kernel, for a coarsest level of few nodes."""
+"""The twin of `krylov.pcg` in one kernel, for a coarsest level of few nodes."""
 
 import numpy as np
 
 from ..core.jit import kernel
 from ..core.tensor import dot, lin, mat, mv, put_vec, vec
-from .block_sparse import row_times
+from .block_product import row_times
 
 
 @kernel
@@ -60,9 +60,10 @@ def _solve(A, D_inv, vectors, stop, cap):
     return cap
 
 
-def conjugate_gradients(A, D_inv, b, stop, cap):
-    """(u, iterations) of A u = b from u = 0 until r^T D^+ r <= stop (HOT-sec5.3-coarse); A Blocks,
-    D_inv (n, d, d), b (n, d).
+def conjugate_gradients(A, D_inv, b, enough, cap):
+    """(u, iterations) of A u = b from u = 0 until sqrt(r^T D^+ r) <= enough (HOT-sec5.3-coarse), as
+    `coarsest.by_pcg`; A Planes, D_inv (n, d, d), b (n, d).
     """
     u, p = np.zeros_like(b), np.zeros_like(b)
-    return u, _solve(A, D_inv, (u, b.copy(), np.empty_like(b), p, np.empty_like(b)), stop, cap)
+    vectors = u, b.copy(), np.empty_like(b), p, np.empty_like(b)
+    return u, _solve(A, D_inv, vectors, enough**2, cap)

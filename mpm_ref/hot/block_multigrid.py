@@ -1,5 +1,6 @@
 """The V-cycle on block kernels: the tested twin of the path on SciPy matrices in `multigrid`."""
 
+from functools import partial
 from itertools import zip_longest
 from typing import NamedTuple
 
@@ -9,13 +10,15 @@ import scipy.sparse as sp
 from . import block_coarsest
 from .block_galerkin import coarse_reach, galerkin
 from .block_inverse import inverse_blocks
-from .block_sparse import SERIAL, Blocks, blocks_of, diagonal, product, reach_of
+from .block_product import planes_of, product
+from .block_sparse import SERIAL, Blocks, blocks_of, diagonal, reach_of
 from .block_sweep import Sweep, correct, residual, split, sweep
 from .block_transfer import Transfer, prolong, restrict, transfer
-from .coarsest import CAP, conjugate_gradients, of_coarsest
+from .choices import DTYPES
+from .coarsest import CAP, by_pcg, of_coarsest, size
 from .embedding import taps
 from .projectors import coarse_nodes, given_nodes, onto_range
-from .smoothers import POLYNOMIAL, dot, largest_eigenvalue, times
+from .smoothers import POLYNOMIAL, largest_eigenvalue, times
 
 
 class Level(NamedTuple):
@@ -64,12 +67,18 @@ def build_given(matrices):
 class GaussSeidel:
     """Sweeps before and after the coarse correction, by kernels that keep their products."""
 
-    def __init__(self, level):
-        self.split = split(level.blocks, level.D_inv, level.index, level.reach)
+    def __init__(self, level, dtype=float):
+        self.split = split(level.blocks, level.D_inv, level.index, level.reach, dtype)
+
+    def __call__(self, b):
+        """The iterate of b (n, d) after one sweep from zero."""
+        self._start(b)
+        self._sweep(b, 1)
+        return self.state.u
 
     def before(self, b, sweeps):
         """(iterate, residual) of b (n, d) after sweeps from zero."""
-        self.state = Sweep(np.empty_like(b), np.zeros_like(b), np.empty_like(b))
+        self._start(b)
         self._sweep(b, sweeps)
         return self.state.u, residual(self.split, self.state)
 
@@ -79,6 +88,9 @@ class GaussSeidel:
         self._sweep(b, sweeps)
         return self.state.u
 
+    def _start(self, b):
+        self.state = Sweep(np.empty_like(b), np.zeros_like(b), np.empty_like(b))
+
     def _sweep(self, b, sweeps):
         for _ in range(sweeps):
             sweep(self.split, b, self.state)
@@ -87,12 +99,13 @@ class GaussSeidel:
 class Polynomial:
     """Jacobi or Chebyshev smoothing with products by kernel."""
 
-    def __init__(self, level, word):
+    def __init__(self, level, word, dtype=float):
         self.level, self.smooth = level, POLYNOMIAL[word]
+        self.planes = planes_of(level.blocks, dtype)
         self.largest = largest_eigenvalue(self._product, level.D_inv, level.index)
 
     def _product(self, u):
-        return product(self.level.blocks, u)
+        return product(self.planes, u)
 
     def before(self, b, sweeps):
         """(iterate, residual) of b (n, d) after sweeps from zero."""
@@ -108,9 +121,12 @@ class Polynomial:
         return u
 
 
-def smoother(level, word):
-    """Smoother of a level by its word in `choices.WORDS`."""
-    return GaussSeidel(level) if word == "gauss-seidel" else Polynomial(level, word)
+def smoother(level, choices):
+    """Smoother of a level by the words of `Choices`."""
+    dtype = DTYPES[choices.precision]
+    if choices.smoother == "gauss-seidel":
+        return GaussSeidel(level, dtype)
+    return Polynomial(level, choices.smoother, dtype)
 
 
 class Hierarchy:
@@ -118,8 +134,9 @@ class Hierarchy:
 
     def __init__(self, levels, choices):
         self.levels, self.choices = levels, choices
-        self.smoothers = [smoother(level, choices.smoother) for level in self.levels[:-1]]
+        self.smoothers = [smoother(level, choices) for level in self.levels[:-1]]
         self.direct, self.D_inv = of_coarsest(levels[-1], choices)
+        self.coarse = None if self.direct else planes_of(levels[-1].blocks)
         self.iterations = 0           # of the coarsest CG, over all cycles
 
     def cycle(self, b):
@@ -140,11 +157,11 @@ class Hierarchy:
         if self.direct:
             return self.direct(b)
         of = b if self.choices.stop == "residual" else self._restricted(load)
-        stop = self.choices.tolerance**2 * dot(of, times(self.D_inv, of))
+        enough = self.choices.tolerance * size(of, self.D_inv)
         if len(b) < SERIAL:
-            u, k = block_coarsest.conjugate_gradients(last.blocks, self.D_inv, b, stop, CAP)
+            u, k = block_coarsest.conjugate_gradients(self.coarse, self.D_inv, b, enough, CAP)
         else:
-            u, k = conjugate_gradients(lambda p: product(last.blocks, p), self.D_inv, b, stop)
+            u, k = by_pcg(partial(product, self.coarse), self.D_inv, b, enough)
         self.iterations += k
         return u
 

@@ -1,12 +1,13 @@
-"""Sparse matrices of d x d blocks as arrays that kernels read: products with vectors over nodes."""
+"""Sparse matrices of d x d blocks as arrays that kernels read."""
 
 from typing import NamedTuple
 
 import numpy as np
 
 from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
-from ..core.tensor import fill, lin, mat, mv, put_mat, put_vec, vec
+from ..core.tensor import mat, put_mat
 
+KNOWN = ((2, 2), (3, 3))     # sizes of blocks
 SERIAL = 4000     # nodes below which starting threads costs more than they save
 
 
@@ -25,39 +26,14 @@ def no_nodes(d):
 
 
 def blocks_of(A):
-    """Blocks that share the arrays of a bsr_array A, whose indices are sorted."""
+    """Blocks that share the arrays of a bsr_array A, whose indices are sorted.
+
+    Raises ValueError unless they are 2 x 2 or 3 x 3: kernels would write past the end of arrays.
+    """
+    if A.blocksize not in KNOWN:
+        raise ValueError(f"matrix in blocks of {A.blocksize}: expected (2, 2) or (3, 3), or "
+                         "path = 'scipy'")
     return Blocks(A.indptr, A.indices, A.data, no_nodes(A.blocksize[0]))
-
-
-@kernel
-def row_times(A, k, u):
-    """Row k of A times u (n, d)."""
-    s = fill(0.0, A.like.shape)
-    for e in range(A.start[k], A.start[k + 1]):
-        s = lin(1.0, s, 1.0, mv(mat(A.data, e, A.like.shape), vec(u, A.column[e], A.like.shape)))
-    return s
-
-
-@kernel
-def _times(A, u, out, bounds):
-    for i in range(bounds[0], bounds[1]):
-        put_vec(out, i, row_times(A, i, u))
-
-
-@parallel
-def _times_all(A, u, out):
-    for c in prange(CHUNKS):
-        _times(A, u, out, chunk(c, len(out)))
-
-
-def product(A, u):
-    """A u (n, d) of Blocks A and u (n, d)."""
-    out = np.empty_like(u)
-    if len(out) < SERIAL:
-        _times(A, u, out, (0, len(out)))
-    else:
-        _times_all(A, u, out)
-    return out
 
 
 @kernel

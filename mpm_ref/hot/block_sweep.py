@@ -16,8 +16,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
-from ..core.tensor import lin, mat, mv, put_mat, put_vec, vec
-from .block_sparse import SERIAL, Blocks, row_times
+from ..core.tensor import lin, mat, mv, put_vec, vec
+from .block_product import Planes, put_entries, row_times
+from .block_sparse import SERIAL
 from .smoothers import SLAB, coloured
 
 
@@ -34,12 +35,14 @@ class Split(NamedTuple):
     """A = L + D + U. Row k of L is that of order.node[k], row k of U that of node[n - 1 - k]."""
 
     order: Order
-    L: Blocks
-    U: Blocks
+    L: Planes
+    U: Planes
 
 
-def split(A, D_inv, index, reach):
-    """Split of Blocks A for nodes with world indices index (n, d), coupled over `reach` nodes."""
+def split(A, D_inv, index, reach, dtype=float):
+    """Split of Blocks A for nodes with world indices index (n, d), coupled over `reach` nodes, with
+    L and U in the given precision.
+    """
     width = max(SLAB, reach)
     node = coloured(index, width).astype(np.int32)
     place = np.empty_like(node)
@@ -48,18 +51,19 @@ def split(A, D_inv, index, reach):
     first = np.flatnonzero(np.diff(slab, prepend=slab[:1] - 1))
     second = int(np.searchsorted(slab[first] % 2, 1))
     order = Order(node, np.append(first, len(node)).astype(np.int32), second, D_inv)
-    L, U = _half(A, node, place), _half(A, node[::-1].copy(), len(node) - 1 - place)
+    L = _half(A, node, place, dtype)
+    U = _half(A, node[::-1].copy(), len(node) - 1 - place, dtype)
     return Split(order, L, U)
 
 
-def _half(A, order, place):
+def _half(A, order, place, dtype):
     """Blocks of A whose column comes before their row in `order`, in that order of rows."""
     n = len(order)
     start = np.zeros(n + 1, dtype=np.int32)
     _count_all(A, order, place, start)
     np.cumsum(start, out=start)
     column = np.empty(start[-1], dtype=np.int32)
-    half = Blocks(start, column, np.empty((start[-1], *A.data.shape[1:])), A.like)
+    half = Planes(start, column, np.empty((*A.data.shape[1:], start[-1]), dtype), A.like)
     _copy_all(A, order, place, half)
     return half
 
@@ -85,7 +89,7 @@ def _copy(A, order, place, half, bounds):
         for e in range(A.start[i], A.start[i + 1]):
             if place[A.column[e]] < k:
                 half.column[to] = A.column[e]
-                put_mat(half.data, to, mat(A.data, e, A.like.shape))
+                put_entries(half.data, to, mat(A.data, e, A.like.shape))
                 to += 1
 
 

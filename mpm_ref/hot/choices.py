@@ -2,12 +2,16 @@
 
 from typing import NamedTuple
 
+import numpy as np
+
 WORDS = {
     "smoother": ("gauss-seidel", "jacobi", "chebyshev"),
     "coarsest": ("pcg", "direct"),
     "preconditioner": ("block", "scalar"),
     "stop": ("residual", "load"),
+    "precision": ("double", "single"),
 }
+DTYPES = {"double": np.float64, "single": np.float32}
 
 
 class Choices(NamedTuple):
@@ -20,6 +24,7 @@ class Choices(NamedTuple):
     tolerance: float = 0.5            # of the coarsest CG
     stop: str = "residual"            # ... relative to the restricted residual of HOT-alg2, or to
                                       # the cycle's own right-hand side restricted, as the release
+    precision: str = "double"         # of the matrices that smoothers read; sums are in double
 
 
 def checked(levels, choices):

@@ -6,18 +6,23 @@ in `choices`. The inexact solve makes the V-cycle slightly non-linear; a direct 
 """
 
 from functools import partial
+from math import sqrt
 
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
+from threadpoolctl import ThreadpoolController
 
+from .krylov import Rule, pcg
+from .norms import dot
 from .projectors import block_diagonal
-from .smoothers import dot, times
+from .smoothers import times
 
 DENSE = 600       # unknowns up to which "direct" factorises a dense matrix
 SHIFT = 1e-14     # of its diagonal: above round-off, below all that matters
 CAP = 10_000      # iterations of conjugate gradients, as in HOT-methods
+POOLS = ThreadpoolController()     # several threads of BLAS give other bits, and spin in between
 
 
 def scalar_inverses(D, B):
@@ -32,28 +37,16 @@ def scalar_inverses(D, B):
     return B @ (inverse[:, :, None] * np.eye(d)) @ B
 
 
-def conjugate_gradients(apply, D_inv, b, stop):
-    """(u, iterations): A u = b from u = 0 until r^T D^+ r <= stop, b and u (n, d).
+def size(b, D_inv):
+    """sqrt(b^T D^+ b) [sqrt(J)] of b (n, d), in which HOT's stop is measured."""
+    return sqrt(max(0.0, dot(b, times(D_inv, b))))
 
-    Ends early where A or D^+ is not positive along the search: u is then what was reached.
-    """
-    u, r = np.zeros_like(b), b.copy()
-    z = times(D_inv, r)
-    p, rz = z.copy(), dot(r, z)
-    for k in range(CAP):
-        if not rz > stop:
-            return u, k
-        q = apply(p)
-        curvature = dot(p, q)
-        if not curvature > 0.0:
-            return u, k
-        alpha = rz / curvature
-        u += alpha * p
-        r -= alpha * q
-        z = times(D_inv, r)
-        rz, old = dot(r, z), rz
-        p = z + rz / old * p
-    return u, CAP
+
+def by_pcg(apply, D_inv, b, enough):
+    """(u, iterations): A u = b from u = 0 until sqrt(r^T D^+ r) <= enough, b and u (n, d)."""
+    rule = Rule(lambda own: enough / own, CAP)
+    solved = pcg(apply, b, partial(times, D_inv), rule)
+    return solved.x, solved.iterations
 
 
 class Direct:
@@ -71,7 +64,8 @@ class Direct:
         full = sp.csc_array(A + block_diagonal(held))
         self.B = B
         if full.shape[0] <= DENSE:
-            self.solve = partial(la.cho_solve, _cholesky(full.toarray()))
+            with POOLS.limit(limits=1):
+                self.solve = partial(la.cho_solve, _cholesky(full.toarray()))
         else:
             shifted = sp.csc_array(full + SHIFT * sp.diags_array(full.diagonal()))
             symmetric = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0,
@@ -80,7 +74,8 @@ class Direct:
 
     def __call__(self, b):
         """u (n, d) of A u = b (n, d)."""
-        u = self.solve(times(self.B, b).reshape(-1))
+        with POOLS.limit(limits=1):
+            u = self.solve(times(self.B, b).reshape(-1))
         return times(self.B, u.reshape(b.shape))
 
 

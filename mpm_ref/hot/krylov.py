@@ -66,6 +66,8 @@ def pcg(product, b, inverse, rule):
     if not rz > 0.0:
         return Solved(z, 0, None if rz == 0.0 else f"r.P r = {rz:.3g} in CG: expected > 0")
     goal = (rule.relative(sqrt(rz)) ** 2) * rz
+    if rz <= goal:
+        return Solved(x, 0, None)
     p = z.copy()
     for k in range(rule.cap):
         Ap = product(p)

@@ -1,11 +1,15 @@
 """The Hessian as a solver uses it: the product with it, and an approximate inverse of it."""
 
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
 
+from . import block_multigrid
+from .block_product import planes_of, product
+from .block_sparse import KNOWN, blocks_of
 from .krylov import JACOBI, Rule, half, pcg
-from .multigrid import hierarchy, hierarchy_of
+from .multigrid import hierarchy, hierarchy_of, on_nodes
 from .projectors import diagonal_blocks, inverses, onto_range
 from .smoothers import GaussSeidel
 
@@ -40,7 +44,7 @@ def _with_matrix(system, dv, options, watch):
         return Linear(nowhere, nowhere)
     with watch.part("hierarchy"):
         name, inverse = INVERSES[options.inverse](A, system.index, options, watch)
-    return Linear(watch.timed("product", by_matrix(A)), watch.timed(name, inverse))
+    return Linear(watch.timed("product", by_matrix(A, options.path)), watch.timed(name, inverse))
 
 
 def _with_matrices(system, dv, options, watch):
@@ -49,21 +53,22 @@ def _with_matrices(system, dv, options, watch):
         return Linear(nowhere, nowhere)
     with watch.part("hierarchy"):
         cycle = _cycle_of(hierarchy_of(matrices, options.path, **options.cycle._asdict()), watch)
-    product = watch.timed("product", by_matrix(matrices[0][0]))
-    return Linear(product, watch.timed("cycle", cycle))
+    times = watch.timed("product", by_matrix(matrices[0][0], options.path))
+    return Linear(times, watch.timed("cycle", cycle))
 
 
 def first_inverse(system, options, watch):
-    """The function from dv to the first inverse of L-BFGS: that of `linearised`, or CG with it as
-    preconditioner, to half of the energy norm (LBFGS-H; HOT-sec5.3-coarse).
+    """The function from dv to the `Linear` whose inverse is the first one of L-BFGS: that of
+    `linearised`, or CG with it as preconditioner, to half of the energy norm (LBFGS-H;
+    HOT-sec5.3-coarse).
     """
     at, rule = linearised(system, options, watch), Rule(half, options.cg_iterations)
     if options.inverse != "cg":
-        return lambda dv: at(dv).inverse
+        return at
 
     def by_cg(dv):
         linear = at(dv)
-        return lambda r: solve(linear, r, rule, watch)
+        return linear._replace(inverse=lambda r: solve(linear, r, rule, watch))
     return by_cg
 
 
@@ -76,9 +81,19 @@ def solve(linear, b, rule, watch):
     return solved.x
 
 
-def by_matrix(A):
-    """r -> A r of a bsr_array."""
-    return lambda r: (A @ r.reshape(-1)).reshape(r.shape)
+def by_matrix(A, path="blocks"):
+    """r -> A r of a bsr_array; on the path of blocks it is put in order for that at the first r.
+
+    Blocks of a size that kernels do not know are left to SciPy.
+    """
+    if not _by_kernels(A, path):
+        return on_nodes(A)
+    planes = cache(partial(planes_of, blocks_of(A)))
+    return lambda r: product(planes(), r)
+
+
+def _by_kernels(A, path):
+    return path == "blocks" and A.blocksize in KNOWN
 
 
 def nowhere(r):
@@ -86,8 +101,11 @@ def nowhere(r):
     return np.full_like(r, np.nan)
 
 
-def symmetric_gauss_seidel(A, index):
+def symmetric_gauss_seidel(A, index, path="blocks"):
     """r -> (D + U)^+ D (D + L)^+ r of A = L + D + U: one coloured sweep forth and back."""
+    if _by_kernels(A, path):
+        level, = block_multigrid.build(A, index, 1, "linear")
+        return block_multigrid.GaussSeidel(level)
     D = diagonal_blocks(A)
     sweep = GaussSeidel(A, inverses(D, onto_range(D)), index)
     return lambda r: sweep(r.reshape(-1)).reshape(r.shape)
@@ -98,7 +116,7 @@ def _jacobi(A, index, options, watch):
 
 
 def _sgs(A, index, options, watch):
-    return "sgs", symmetric_gauss_seidel(A, index)
+    return "sgs", symmetric_gauss_seidel(A, index, options.path)
 
 
 def _cycle(A, index, options, watch):

@@ -13,10 +13,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from . import block_multigrid
-from .choices import checked
-from .coarsest import conjugate_gradients, of_coarsest
+from .choices import DTYPES, checked
+from .coarsest import by_pcg, of_coarsest, size
 from .projectors import coarse_nodes, diagonal_blocks, given_nodes, inverses, onto_range
-from .smoothers import POLYNOMIAL, GaussSeidel, dot, largest_eigenvalue, times
+from .smoothers import POLYNOMIAL, GaussSeidel, largest_eigenvalue, times
 
 
 class Level(NamedTuple):
@@ -81,6 +81,15 @@ def smoother(level, word):
     return lambda r: polynomial(r.reshape(level.index.shape)).reshape(-1)
 
 
+def rounded(levels, precision):
+    """The levels, all but the coarsest with their matrix rounded to a precision."""
+    if precision == "double":
+        return levels
+    dtype = DTYPES[precision]
+    return [*(level._replace(A=level.A.astype(dtype).astype(float)) for level in levels[:-1]),
+            levels[-1]]
+
+
 def on_nodes(A):
     """The product u -> A u on vectors over nodes (n, d)."""
     return lambda u: (A @ u.reshape(-1)).reshape(u.shape)
@@ -107,7 +116,7 @@ class Hierarchy:
     """Levels on SciPy matrices and the V-cycle over them; see `hierarchy`."""
 
     def __init__(self, levels, choices):
-        self.levels, self.choices = levels, choices
+        self.levels, self.choices = rounded(levels, choices.precision), choices
         self.smoothers = [smoother(level, choices.smoother) for level in self.levels[:-1]]
         self.direct, self.D_inv = of_coarsest(levels[-1], choices)
         self.iterations = 0           # of the coarsest CG, over all cycles
@@ -128,8 +137,8 @@ class Hierarchy:
         if self.direct:
             return self.direct(b).reshape(-1)
         of = b if self.choices.stop == "residual" else load.reshape(b.shape)
-        stop = self.choices.tolerance**2 * dot(of, times(self.D_inv, of))
-        u, k = conjugate_gradients(on_nodes(last.A), self.D_inv, b, stop)
+        enough = self.choices.tolerance * size(of, self.D_inv)
+        u, k = by_pcg(on_nodes(last.A), self.D_inv, b, enough)
         self.iterations += k
         return u.reshape(-1)
 

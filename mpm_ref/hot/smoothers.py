@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
+from .norms import dot
 from .projectors import block_diagonal
 
 SLAB = 4          # nodes along the first axis that are swept in order
@@ -85,11 +86,6 @@ def largest_eigenvalue(apply, D_inv, index):
 def times(blocks, u):
     """Block-diagonal product (n, d) of blocks (n, d, d) and u (n, d)."""
     return np.einsum("iab,ib->ia", blocks, u)
-
-
-def dot(u, v):
-    """Sum of u v over nodes and components; not BLAS: the same bits for any number of threads."""
-    return np.einsum("ia,ia->", u, v)
 
 
 def jacobi(apply, D_inv, r, largest):

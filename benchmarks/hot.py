@@ -1,0 +1,160 @@
+"""What an implicit step costs, part by part, on two steps that are given.
+
+`twist` is the bar of Figure 20 with a middle of 1e9 Pa in its fourth step, 13 000 particles; `box`
+is the first step of Figure 18, 33 000 particles each stretched at random. Times are CPU seconds of
+all threads; what is compared is timed in turn, and the median of the rounds counts.
+"""
+
+from functools import partial
+from time import process_time
+from typing import NamedTuple
+
+import numpy as np
+
+from mpm_ref.hot.block_product import planes_of, product
+from mpm_ref.hot.block_sparse import blocks_of
+from mpm_ref.hot.choices import Choices
+from mpm_ref.hot.methods import minimise
+from mpm_ref.hot.multigrid import hierarchy
+from validation.hot.frozen import frozen
+from validation.hot.measured_cg import Until
+from validation.hot.one_step import Step, after
+from validation.hot.preconditioners import OURS, cost, one_thread
+from validation.hot.stiffness import bar
+from validation.hot.stretched import FRAME, stretched
+from validation.verification.scenes import with_
+
+THEIRS = "aggregation-rigid"        # pyamg's, of `validation.hot.preconditioners`
+METHODS = {                         # the first is what the others are relative to
+    "hot": ("hot", {}),
+    "hot, smoothers in single precision": ("hot", {"cycle": Choices(precision="single")}),
+    "hot-plus": ("hot-plus", {}),
+    "lbfgs-h": ("lbfgs-h", {}),
+    "pn-pcg": ("pn-pcg", {}),
+}
+
+
+class Part(NamedTuple):
+    """A function to be timed, and what its time is counted by."""
+
+    run: callable
+    per: str            # "particle" or "node"
+
+
+def twist(dx=0.0228):
+    """`Step` of the twisted bar."""
+    return after(with_(bar(dx, 1e9, "hot", 3), every=1), 3)
+
+
+def box(dx=1.0 / 16.0):
+    """`Step` of the stretched box."""
+    problem = stretched("particle", dx)
+    stepper = problem.stepper()
+    return Step(problem.bodies, stepper, stepper.pose(problem.bodies, 0.0, FRAME), FRAME, 0.0)
+
+
+STEPS = {"twist": twist, "box": box}
+
+
+def parts(step):
+    """{name: `Part`} of a step at its start."""
+    system, potential = system_of(step), step.pose.potential
+    dv, (_, g) = system.start, system.evaluate(system.start)
+    tangent, A = potential.tangent(dv), system.matrix(dv)
+    planes = planes_of(blocks_of(A))
+    grids, single = (hierarchy(A, system.index, precision=p) for p in ("double", "single"))
+    return {
+        "energy and gradient": Part(lambda: potential.evaluate(dv), "particle"),
+        "tangent": Part(lambda: potential.tangent(dv), "particle"),
+        "product without a matrix": Part(lambda: tangent.product(g), "particle"),
+        "matrix": Part(tangent.matrix, "particle"),
+        "product": Part(lambda: product(planes, g), "node"),
+        "product by SciPy": Part(lambda: A @ g.reshape(-1), "node"),
+        "hierarchy": Part(lambda: hierarchy(A, system.index), "node"),
+        "cycle": Part(lambda: grids.cycle(g), "node"),
+        "cycle, smoothers in single precision": Part(lambda: single.cycle(g), "node"),
+    }
+
+
+def system_of(step):
+    """The `System` of a step, new, so that nothing of it is known yet."""
+    return step.stepper.system(step.pose)
+
+
+def in_turn(functions, repeats):
+    """{name: results} of functions called one after the other; the first round compiles."""
+    rounds = [{name: run() for name, run in functions.items()} for _ in range(repeats + 1)]
+    return {name: [done[name] for done in rounds[1:]] for name in functions}
+
+
+def cpu(run):
+    """CPU seconds of a call."""
+    start = process_time()
+    run()
+    return process_time() - start
+
+
+def cost_rows(step, repeats):
+    """A row for every part: median ns per particle or node."""
+    found = parts(step)
+    counts = counts_of(step)
+    times = in_turn({name: partial(cpu, part.run) for name, part in found.items()}, repeats)
+    return [{"part": name, "per": part.per,
+             "cpu_ns": 1e9 * float(np.median(times[name])) / counts[part.per]}
+            for name, part in found.items()]
+
+
+def counts_of(step):
+    """Numbers of particles and nodes of a step."""
+    return {"particle": sum(len(body.id) for body in step.bodies),
+            "node": len(step.pose.unknowns.m)}
+
+
+def method_rows(step, repeats):
+    """A row for every method: median CPU seconds of the whole step and of its parts."""
+    def solve(method, changes):
+        return minimise(system_of(step), method, **changes).report
+    reports = in_turn({name: partial(solve, *words) for name, words in METHODS.items()}, repeats)
+    rows = [method_row(name, done) for name, done in reports.items()]
+    return [row | {"cpu_ratio": row["cpu_s"] / rows[0]["cpu_s"]} for row in rows]
+
+
+def method_row(name, reports):
+    """What a method took, by the median of its reports."""
+    last = reports[-1]
+    return {
+        "method": name, "converged": last.converged, "iterations": last.iterations,
+        "cg": last.inner, "evaluations": last.evaluations,
+        "cpu_s": float(np.median([sum(r.seconds.values()) for r in reports])),
+        "parts_s": {part: float(np.median([r.seconds[part] for r in reports]))
+                    for part in last.seconds},
+    }
+
+
+def solver_rows(step, repeats):
+    """CG to 1e-6 on the step's matrix with our V-cycle and with smoothed aggregation: rows with
+    median CPU seconds of set-up and solve, on one thread as pyamg is.
+    """
+    system = system_of(step)
+    A, (_, g) = system.matrix(system.start), system.evaluate(system.start)
+    matrix = frozen(A, system.index, -g, counts_of(step)["particle"])
+    np.random.seed(0)               # noqa: NPY002  pyamg draws from it to estimate eigenvalues
+    with one_thread():
+        costs = in_turn({case: partial(cost, matrix, case, Until()) for case in (OURS, THEIRS)},
+                        repeats)
+    rows = [{"solver": case, "iterations": done[-1].iterations, "converged": done[-1].converged,
+             "setup_s": float(np.median([c.setup for c in done])),
+             "cpu_s": float(np.median([c.total for c in done]))} for case, done in costs.items()]
+    return [row | {"cpu_ratio": row["cpu_s"] / rows[0]["cpu_s"]} for row in rows]
+
+
+def costs(names, repeats):
+    """All rows of the named steps."""
+    rows = []
+    for name in names:
+        step = STEPS[name]()
+        counts = counts_of(step)
+        where = {"step": name, "particles": counts["particle"], "nodes": counts["node"]}
+        for make in (cost_rows, method_rows, solver_rows):
+            rows += [where | row for row in make(step, repeats)]
+    return rows
