@@ -10,6 +10,7 @@ from hot_toys import DESCENTS, Exact, bar, exactly, quadratic, scalar, tight
 from mpm_ref.hot.descent import Stop, descend
 from mpm_ref.hot.lbfgs import LBFGS
 from mpm_ref.hot.line_search import Point, Rules, search
+from mpm_ref.hot.linear import Linear
 from mpm_ref.hot.methods import METHODS, WORDS, Options, minimise, options_of
 from mpm_ref.hot.norms import scaled_norm
 from mpm_ref.hot.report import Watch
@@ -99,7 +100,7 @@ def test_lbfgs_starts_afresh_when_what_it_learnt_points_uphill():
         def ages(r):
             trust[-1] += 1
             return -inverse(r) if len(trust) == 1 and trust[-1] > 2 else inverse(r)
-        return ages
+        return Linear(None, ages)
 
     watch = Watch()
     _, why = descend(toy, LBFGS(build, 8, 0), Stop(1e-9, "characteristic", 100, 50), Rules(), watch)

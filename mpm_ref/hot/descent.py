@@ -47,15 +47,23 @@ class Progress:
 def descend(system, method, stop, rules, watch):
     """(`Point`, why not converged or None) from system.start, for a method with
 
-    direction(dv, g) -> p; learn(s, y) from an accepted step; refresh() -> whether it can do better
-    after a direction was refused. `rules` bound the line search, `watch` counts.
+    direction(dv, g) -> p; learn(s, y, full) from an accepted step, which may be the full one;
+    refresh() -> whether it can do better after a direction was refused. `rules` bound the line
+    search, `watch` counts.
     """
-    return iterate(system, lambda now: advanced(system, method, now, rules, watch), stop, watch)
+    return iterate(system, system.start, advance_of(system, method, rules, watch), stop, watch)
 
 
-def iterate(system, advance, stop, watch):
-    """As `descend`, for steps advance(`Point`) -> (`Point`, None) or (None, why there is none)."""
-    now = Point(system.start.copy(), *system.evaluate(system.start))
+def advance_of(system, method, rules, watch):
+    """The steps of a method, for `iterate`."""
+    return lambda now: advanced(system, method, now, rules, watch)
+
+
+def iterate(system, start, advance, stop, watch):
+    """As `descend`, from start (n, d) by steps advance(`Point`) -> (`Point`, None), or (None, why
+    there is none).
+    """
+    now = Point(start.copy(), *system.evaluate(start))
     progress = Progress(ROUND_OFF)
     for k in range(stop.iterations + 1):
         watch.note(scaled_norm(now.g, system.kappa))
@@ -90,7 +98,8 @@ def advanced(system, method, now, rules, watch):
         found = search(system, now, p, rules)
         watch.backtracks += found.backtracks
         if found.point is not None:
-            method.learn(found.point.dv - now.dv, found.point.g - now.g)
+            full = found.backtracks == 0
+            method.learn(found.point.dv - now.dv, found.point.g - now.g, full)
         if found.point is not None or not method.refresh():
             return found.point, found.why
         watch.refreshes += 1

@@ -11,6 +11,10 @@ import numpy as np
 
 from .norms import dot, length
 
+RENEWALS = ("never", "shortened", "stale")
+STALE = 0.75        # of the curvature, or the inverse of that: a Hessian is taken anew
+PAYS = 8            # steps that a new Hessian costs about as much as, with its multigrid
+
 
 class Pair(NamedTuple):
     """A step and the change of the gradient along it."""
@@ -35,31 +39,52 @@ def two_loop(q, pairs, inverse):
 
 
 class LBFGS:
-    """Directions for `descent` from the last `window` pairs and the inverse that build(dv) gives.
+    """Directions for `descent` from the last `window` pairs and the first inverse, that of the
+    `linear.Linear` which build(dv) gives.
 
-    It is built at the first iterate and, if `rebuild` is not 0, after every so many steps; then
-    the pairs, which belong to the old one, are forgotten.
+    It is built at the first iterate. It is built anew after every `rebuild` steps if that is not 0,
+    and, as `renew` says, where it has been seen to be wrong (see `seen_wrong`). Then the pairs,
+    which belong to the old one, are forgotten.
     """
 
-    def __init__(self, build, window, rebuild):
-        self.build, self.rebuild = build, rebuild
+    def __init__(self, build, window, rebuild=0, renew="never"):
+        self.build, self.rebuild, self.renew = build, rebuild, renew
         self.pairs = deque(maxlen=window)
-        self.inverse, self.age = None, 0
+        self.linear, self.age = None, 0
 
     def direction(self, dv, g):
         """p (n, d) [m/s]; the first is inverse(-g)."""
-        if self.inverse is None:
-            self.inverse = self.build(dv)
-        return two_loop(-g, self.pairs, self.inverse)
+        return two_loop(-g, self.pairs, self.first(dv))
 
-    def learn(self, s, y):
-        """Take the pair of an accepted step into the window."""
+    def first(self, dv):
+        """The first inverse, built at dv if there is none."""
+        if self.linear is None:
+            self.linear = self.build(dv)
+        return self.linear.inverse
+
+    def learn(self, s, y, full=True):
+        """Take the pair of an accepted step into the window; `full` if none of it was cut."""
         self.age += 1
         curvature = dot(y, s)
         if curvature > np.finfo(float).eps * length(y) * length(s):
             self.pairs.append(Pair(s, y, 1.0 / curvature))
-        if self.rebuild and self.age % self.rebuild == 0:
+        spent = self.rebuild and self.age % self.rebuild == 0
+        if spent or (self.renew != "never" and self.seen_wrong(s, curvature, full)):
             self.refresh()
+
+    def seen_wrong(self, s, curvature, full):
+        """Whether a step shows that the first inverse is far from that of the Hessian.
+
+        "shortened": a line search cut it. "stale": it did, and not the first step of a new Hessian,
+        or the curvature y . s along a later step is not near that of the Hessian H which was
+        inverted, s . H s.
+        """
+        if self.renew == "shortened":
+            return not full
+        if not full or self.age < PAYS:
+            return not full and self.age > 1
+        then = dot(s, self.linear.product(s))
+        return not STALE * then < curvature < then / STALE
 
     def refresh(self):
         """Forget everything, so that the next direction builds its inverse anew; False if nothing
@@ -67,5 +92,5 @@ class LBFGS:
         """
         learnt = self.age > 0
         self.pairs.clear()
-        self.inverse, self.age = (None, 0) if learnt else (self.inverse, 0)
+        self.linear, self.age = (None, 0) if learnt else (self.linear, 0)
         return learnt

@@ -1,4 +1,7 @@
-"""Every method by its word: HOT, what it is compared to, and every knob (HOT-methods)."""
+"""Every method by its word: HOT, what it is compared to, and every knob (HOT-methods).
+
+"hot-plus" is ours: HOT with what `trade.hot.knobs` found to pay.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -6,9 +9,10 @@ import numpy as np
 
 from .admm import ADMM
 from .choices import Choices, checked
-from .descent import Stop, descend, iterate
+from .descent import Stop, advance_of, iterate
+from .held import held, multigrid_once
 from .krylov import JACOBI, stiffest_tolerance
-from .lbfgs import LBFGS
+from .lbfgs import LBFGS, RENEWALS
 from .line_search import Rules
 from .linear import INVERSES, first_inverse, linearised
 from .newton import Forcing, Newton
@@ -23,6 +27,7 @@ WORDS = {
     "forcing": ("energy", "L2"),
     "norm": ("characteristic", "L2"),
     "start": ("zero", "gravity"),
+    "renew": RENEWALS,
     "kernel": ("linear", "quadratic"),
     "path": ("blocks", "scipy"),
 }
@@ -43,9 +48,12 @@ class Options:
     forcing: str = "energy"             # norm that the tolerance of Newton's CG depends on
     norm: str = "characteristic"        # in which the gradient is measured, or "L2" [kg m/s]
     eps: float = 1e-7                   # its tolerance
+    cells: float = 0.0                  # error of the particles' displacement to hold [dx], with
+                                        # eps as a first guess (see `held`); 0: eps alone decides
     start: str = "zero"                 # of the increment, or "gravity": g dt (the release)
     window: int = 8                     # pairs that L-BFGS keeps
     rebuild: int = 0                    # steps after which L-BFGS takes a new Hessian; 0: never
+    renew: str = "never"                # or where a step was "shortened", or shows it "stale", too
     iterations: int = 10000             # outer, at most (the release)
     cg_iterations: int = 10000          # per linear solve, at most (the release)
     flexible: bool = False              # CG that bears a preconditioner that varies
@@ -61,6 +69,8 @@ class Options:
         for name, words in WORDS.items():
             if getattr(self, name) not in words:
                 raise ValueError(f"{name} = {getattr(self, name)!r}: expected one of {words}")
+        if not 0.0 <= self.cells < np.inf:
+            raise ValueError(f"cells = {self.cells}: expected >= 0, an error in grid spacings")
         if not (self.eps > 0.0 and self.patience >= 1 and 0.0 < self.penalty < np.inf):
             raise ValueError(f"eps = {self.eps}, patience = {self.patience}, penalty = "
                              f"{self.penalty}: expected eps > 0, patience >= 1, penalty > 0")
@@ -82,6 +92,7 @@ _PN = Options("pn-pcg", "newton", inverse="jacobi")
 METHODS = {options.method: options for options in (
     Options(),
     Options("hot-quadratic", kernel="quadratic"),
+    Options("hot-plus", renew="stale", levels=4, cycle=CYCLE._replace(coarsest="direct")),
     Options("lbfgs-h", inverse="cg"),
     _PN,
     replace(_PN, method="pn-pcg-mf", operator="free"),
@@ -103,16 +114,29 @@ def options_of(method, **changes):
 
 def solved(system, options, stop, watch):
     """(`Point`, why not converged or None) of a system by the method that the options describe."""
+    advance, inverse = steps(system, options, watch)
+    if options.cells > 0.0:
+        return held(system, advance, inverse, stop, options, watch)
+    return iterate(system, system.start, advance, stop, watch)
+
+
+def steps(system, options, watch):
+    """The steps of the method that the options describe, and the multigrid that checks its end."""
     if options.descent == "admm":
         admm = ADMM(system, options.penalty, options.cg_iterations, watch)
-        return iterate(system, admm.advance, stop, watch)
-    return descend(system, made(system, options, watch), stop, options.search, watch)
+        return admm.advance, multigrid_once(system, options, watch)
+    method = made(system, options, watch)
+    advance = advance_of(system, method, options.search, watch)
+    if options.descent == "lbfgs" and options.inverse in ("cycle", "geometric"):
+        return advance, method.first
+    return advance, multigrid_once(system, options, watch)
 
 
 def made(system, options, watch):
     """The method of `descent` that the options describe."""
     if options.descent == "lbfgs":
-        return LBFGS(first_inverse(system, options, watch), options.window, options.rebuild)
+        return LBFGS(first_inverse(system, options, watch), options.window, options.rebuild,
+                     options.renew)
     L2 = options.norm == "L2"
     tau = options.eps if L2 else stiffest_tolerance(options.eps, system.kappa)
     return Newton(linearised(system, options, watch), Forcing(options.forcing, tau),

@@ -37,7 +37,7 @@ class Newton:
         rule = Rule(self.forcing.of(g), self.cap, self.flexible)
         return solve(self.linearise(dv), -g, rule, self.watch)
 
-    def learn(self, s, y):
+    def learn(self, s, y, full=True):
         """Nothing: the next Hessian is taken where it is needed."""
 
     def refresh(self):

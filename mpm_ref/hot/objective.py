@@ -16,6 +16,7 @@ from ..core.jit import total
 from ..core.state import NONE, Grid
 from .exchange import add_forces, gradients
 from .pattern import pattern_of
+from .reach import reach
 from .response import response
 from .sites import sites_of
 from .tangent import Tangent, differentials
@@ -62,9 +63,14 @@ class Potential:
 
     def spread(self, u):
         """Velocity gradient of every particle, into sites.T, of the nodal velocities u (n, d)."""
-        self.box.v.reshape(-1, u.shape[1])[self.at] = u
+        self._place(u)
         for sites in self.sites:
             gradients(sites, self.box, self.stencil)
+
+    def reach(self, u):
+        """Largest velocity [m/s] that the nodal velocities u (n, d) give to a particle."""
+        self._place(u)
+        return max((reach(sites, self.box, self.stencil) for sites in self.sites), default=0.0)
 
     def collect(self):
         """sum_p T_p dw_ip (n, d) of the T that the sites hold."""
@@ -72,6 +78,9 @@ class Potential:
         for sites in self.sites:
             add_forces(sites, self.box, self.stencil)
         return self.box.f.reshape(-1, self.weight.shape[1])[self.at]
+
+    def _place(self, u):
+        self.box.v.reshape(-1, u.shape[1])[self.at] = u
 
     def _respond(self, dv):
         m, u = self.unknowns.m, self.unknowns.v + dv

@@ -1,6 +1,7 @@
 """What a solve has to say about itself, and the watch that counts and times while it runs."""
 
 from contextlib import contextmanager
+from math import nan
 from time import process_time
 from typing import NamedTuple
 
@@ -25,6 +26,7 @@ class Report(NamedTuple):
     backtracks: int     # trial steps refused by line searches
     residuals: tuple    # of the start and of every accepted step: ||g^||_2 / sqrt(n)
     clock: tuple        # CPU seconds of the solve when each of them was known
+    off: float          # error of the displacement, as far as it was estimated [dx]; else NaN
     seconds: dict       # CPU seconds of all threads by part; their sum is the whole solve
 
 
@@ -43,7 +45,7 @@ class Watch:
         self.seconds = {}
         self.inner = self.coarse = self.capped = self.builds = self.refreshes = 0
         self.evaluations = self.backtracks = 0
-        self.residuals, self.clock = [], []
+        self.residuals, self.clock, self.off = [], [], nan
         self._parts, self._since = [], 0.0
 
     @contextmanager
@@ -94,6 +96,7 @@ class Watch:
             backtracks=self.backtracks,
             residuals=tuple(self.residuals),
             clock=tuple(self.clock),
+            off=self.off,
             seconds=dict(self.seconds),
         )
 
@@ -121,6 +124,10 @@ class Watched:
     def free(self, u):
         """What of u (n, d) is free."""
         return self.system.free(u)
+
+    def cells(self, u):
+        """How far u moves the particles in the step, at most [dx]."""
+        return self.system.cells(u)
 
     def matrix(self, dv):
         """The Hessian on what is free, assembled [kg]."""

@@ -35,6 +35,10 @@ class System:
         """B u (n, d)."""
         return free_part(self.unknowns, u)
 
+    def cells(self, u):
+        """How far the velocities u (n, d) move the particles in the step, at most [dx]."""
+        return self.potential.reach(u) * self.potential.dt / self.unknowns.dx
+
     def tangent(self, dv):
         """The potential's `Tangent` at dv; the last one is kept."""
         if self._at is None or not np.array_equal(dv, self._at):

@@ -224,9 +224,11 @@ class Solver(Record):
     """How an implicit step is solved; as `hot.methods.Options`, the method's where not given."""
 
     eps: Positive | None = None                 # tolerance of the scaled gradient
+    cells: NotNegative | None = None            # error of displacement to hold [dx]
     start: Literal["zero", "gravity"] | None = None
     window: Natural | None = None               # pairs of L-BFGS
     rebuild: Natural | None = None              # steps between Hessians of L-BFGS
+    renew: Literal["never", "shortened", "stale"] | None = None      # Hessian of L-BFGS
     iterations: Count | None = None             # at most
     cg_iterations: Count | None = None          # of a linear solve, at most
     levels: Count | None = None                 # of multigrid

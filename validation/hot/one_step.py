@@ -18,6 +18,7 @@ class Step(NamedTuple):
     stepper: object
     pose: object
     dt: float
+    t: float            # at its start [s]
 
 
 def after(scene, steps, **solver):
@@ -28,7 +29,7 @@ def after(scene, steps, **solver):
     if state.step != steps:
         raise ValueError(f"the scene made {state.step} steps: expected {steps}")
     stepper = problem.stepper()
-    return Step(state.bodies, stepper, stepper.pose(state.bodies, state.t, dt), dt)
+    return Step(state.bodies, stepper, stepper.pose(state.bodies, state.t, dt), dt, state.t)
 
 
 def solved(step, method, **changes):

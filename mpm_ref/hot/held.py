@@ -1,0 +1,79 @@
+"""A stop by what a step hands on: by how many cells its particles are still off.
+
+The size of the gradient says little of that: at one tolerance the methods leave errors that differ
+a hundredfold (`trade.hot`). So the end of a method is checked by one more step of Newton,
+
+    H e = -g    at the iterate, about, by CG with multigrid as preconditioner,
+
+which is the error to first order, seen where it matters, on the particles:
+
+    off = SAFETY max_p |sum_i w_ip e_i| dt / dx <= cells
+
+The step is taken whatever it says. If it is too long, the method goes on with a smaller tolerance
+of the gradient. Modes of nodes of next to no mass, which the gradient's norm counts and which take
+most iterations at small tolerances, do not count here: no particle feels them.
+"""
+
+from dataclasses import replace
+
+from .descent import iterate
+from .krylov import Rule
+from .lbfgs import LBFGS
+from .line_search import search
+from .linear import Linear, first_inverse, solve
+from .norms import scaled_norm
+
+SAFETY = 3.0                # the estimate fell short of the error by less than this in nearly all
+                            # states of trade.hot.held, which says how often and by how much not
+ROUNDS = 12                 # of a method and a check, at most
+FACTORS = (1e-2, 0.5)       # by which the gradient's tolerance falls from round to round
+CHECK = Rule(lambda size: 0.02, 16, flexible=True)
+
+
+def held(system, advance, inverse, stop, options, watch):
+    """(`Point`, why not held or None) of steps advance(`Point`), as `descent.iterate` takes them.
+
+    inverse(dv) -> the preconditioner of the check at an increment; stop.eps is the first tolerance.
+    """
+    start = system.start
+    for _ in range(ROUNDS):
+        point, why = iterate(system, start, advance, stop, watch)
+        better = checked(system, point, inverse(point.dv), options.search, watch)
+        if better is None:
+            return point, None if watch.off <= options.cells else why or refused(watch.off)
+        if watch.off <= options.cells:
+            watch.note(scaled_norm(better.g, system.kappa))
+            return better, None
+        if why is not None:
+            return better, why
+        start = better.dv
+        stop = stop._replace(eps=stop.eps * factor(options.cells / watch.off))
+    return better, f"particles may still be off by {watch.off:.2g} dx after {ROUNDS} checks"
+
+
+def checked(system, point, inverse, rules, watch):
+    """The `Point` after a step of Newton, None if a line search refuses it; watch.off is how far
+    the particles of the first one may be off [dx].
+    """
+    linear = Linear(system.product(point.dv), inverse)
+    e = system.free(solve(linear, -point.g, CHECK, watch))
+    watch.off = SAFETY * system.cells(e)
+    return search(system, point, e, rules).point
+
+
+def factor(wanted):
+    """Of the gradient's tolerance, to bring the error down by a factor that is wanted."""
+    least, most = FACTORS
+    return min(max(wanted, least), most)
+
+
+def refused(off):
+    """Why a solve ends whose check cannot improve it."""
+    return (f"particles may still be off by {off:.2g} dx, and the line search refused the step "
+            "that would tell more: near the limit of round-off, or where the energy is no number")
+
+
+def multigrid_once(system, options, watch):
+    """dv -> a V-cycle of the Hessian where it is first asked for."""
+    cycle = replace(options, descent="lbfgs", inverse="cycle", operator="matrix")
+    return LBFGS(first_inverse(system, cycle, watch), window=0).first
