@@ -42,7 +42,8 @@ def draw_all(results, names=(), about=(), folder=HERE):
         about: only those which need one of these experiments; empty for all.
         folder: the package of the scripts.
 
-    Figures whose experiments have no results are left out. Returns the names of those that raised.
+    Figures whose experiments have no results are left out, and those that need unpublished states
+    which are not here. Returns the names of those that raised.
     Raises ValueError for a name that does not exist.
     """
     chosen = _choose(names, folder)
@@ -53,6 +54,8 @@ def draw_all(results, names=(), about=(), folder=HERE):
             script = importlib.import_module(f"{folder.name}.{name}")
             if _wanted(script, set(results.ids()), about):
                 _save(script, name, results)
+        except FileNotFoundError as gone:
+            tqdm.write(f"figure {name} is left out: {gone}", file=sys.stderr)
         except Exception:
             failed.append(f"figure {name}")
             tqdm.write(traceback.format_exc(), file=sys.stderr)

@@ -8,10 +8,10 @@ from multigrid_matrices import assembled, case, dense, lump, points
 from mpm_ref.hot.krylov import block_jacobi
 from mpm_ref.hot.multigrid import hierarchy
 from validation import targets
+from validation.hot.begun import PRINTED, SOFT_CAT, scene
 from validation.hot.frozen import frozen, rigid_modes
 from validation.hot.measured_cg import Until, cg, convergence_factor, spectrum
 from validation.hot.sparsity import LEVELS, galerkin, geometric, of_particles
-from validation.hot.table3 import BEGUN, SOFT_CAT, scene
 
 TIGHT = Until(1e-12, 200)
 
@@ -125,7 +125,7 @@ def test_two_particles_apart_meet_on_the_coarse_grids():
 def test_rows_of_table_3_are_the_printed_ones():
     printed = {target.split(".")[2] for target in targets.load()
                if target.startswith("hot.table3.")}
-    assert set(BEGUN) == printed
+    assert set(PRINTED) == printed
 
 
 def test_soft_cat_is_soft_alone():

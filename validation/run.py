@@ -42,6 +42,11 @@ class Run:
         self._drafts, self._tables = [], {}
         self._wall, self._cpu = time.perf_counter(), time.process_time()
 
+    @property
+    def folder(self):
+        """Where the profile's results stand."""
+        return self._setting.folder
+
     def progress(self, iterable, desc=""):
         """A bar over an iterable or a number of rounds; iterate it, or call its `update`."""
         return self._progress.inner(iterable, desc)

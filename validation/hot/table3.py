@@ -8,30 +8,12 @@ the particles, so ratios are compared.
 
 from typing import NamedTuple
 
-from mpm_ref.hot.methods import minimise
-from mpm_ref.scene import build
-from mpm_ref.simulate import simulate
-
 from .. import targets
 from ..registry import experiment
-from ..verification.scenes import with_
-from .sizes import sized
+from .begun import BEGUN, PRINTED, QUICK, begun, particles, steps
+from .one_step import solved
 
 METHODS = {"sgs": "sgs-pcg", "jacobi": "pn-pcg"}
-SOFT_CAT = 1e6          # Young's modulus (Table 2) [Pa]
-BEGUN = {               # time at which a scene is in the middle of things [s]
-    "twist": 0.5,
-    "boxes": 0.3,
-    "donut": 0.4,
-    "armacat_soft": 0.6,
-    "armacat_stiff": 0.6,
-    "chain": 1.0,
-    "boards": 0.3,
-    "wheel": 0.3,
-    "faceless": 1.0,
-    "sauce": 0.3,
-}
-QUICK = ("boxes", "wheel", "faceless", "sauce")     # where little has to run before
 
 
 class Cost(NamedTuple):
@@ -47,44 +29,20 @@ class Cost(NamedTuple):
     converged: bool         # every step
 
 
-def scene(name, profile):
-    """The scene of a row of the table, marched by HOT, a frame every step."""
-    soft = name == "armacat_soft"
-    made = sized("hot_" + name.removesuffix("_soft").removesuffix("_stiff"), profile,
-                 integrator="hot", every=1, interval=None, unstable="allow")
-    if not soft:
-        return made
-    return with_(made, body=tuple(
-        with_(body, material=with_(body.material, E=SOFT_CAT)) if body.name == "cat" else body
-        for body in made.body))
-
-
-def states(problem, begun, steps):
-    """(state, length of its last step) of so many steps from a time on."""
-    for frame in simulate(problem):
-        if frame.t >= begun and frame.dt > 0.0:
-            yield frame.state, frame.dt
-            steps -= 1
-        if steps == 0:
-            return
-
-
-def reports(problem, begun, steps):
-    """{preconditioner: reports} of the steps that follow the `states`."""
-    stepper, found = problem.stepper(), {short: [] for short in METHODS}
-    for state, dt in states(problem, begun, steps):
-        pose = stepper.pose(state.bodies, state.t, dt)
+def reports(problem, state, count):
+    """{preconditioner: reports} of the next so many steps of a state."""
+    found = {short: [] for short in METHODS}
+    for step in steps(problem, state, count):
         for short, method in METHODS.items():
-            found[short].append(minimise(stepper.system(pose), method).report)
+            found[short].append(solved(step, method).report)
     return found
 
 
-def costs(name, profile, steps):
+def costs(name, profile, count):
     """{preconditioner: `Cost`} of a row."""
-    problem = build(scene(name, profile))
-    particles = sum(len(body.id) for body in problem.bodies)
-    return {short: cost(name, short, particles, done)
-            for short, done in reports(problem, BEGUN[name], steps).items()}
+    problem, state = begun(name, profile)
+    return {short: cost(name, short, particles(problem), done)
+            for short, done in reports(problem, state, count).items()}
 
 
 def cost(name, short, particles, done):
@@ -99,14 +57,14 @@ def cost(name, short, particles, done):
             profiles=("quick", "standard"), budget={"quick": 15, "standard": 1800})
 def table3(run):
     """CG iterations and time of both on every scene, beside the printed ones."""
-    names, steps = run.choose(quick=(QUICK, 2), standard=(tuple(BEGUN), 5))
-    reports(build(scene(names[0], "quick")), 0.0, 1)          # compiles
+    names, count = run.choose(quick=(QUICK, 2), standard=(PRINTED, 5))
+    reports(*begun(names[0], "quick"), 1)                     # compiles
     rows = {}
     for name in run.progress(names, "scenes"):
-        rows[name] = costs(name, run.profile, steps)
+        rows[name] = costs(name, run.profile, count)
         record_row(run, name, rows[name])
     run.record("hot.table3.fewer", min(gain(row) for row in rows.values()), comparator=">=",
-               bound=1.0, scale=f"{len(rows)} of {len(BEGUN)} rows", note="smallest ratio of CG "
+               bound=1.0, scale=f"{len(rows)} of {len(PRINTED)} rows", note="smallest ratio of CG "
                "iterations, Jacobi over Gauss-Seidel; the paper's is above 1 in every row")
     run.table("costs", Cost._fields, [c for row in rows.values() for c in row.values()])
 

@@ -17,6 +17,7 @@ from ..verification.scenes import with_
 
 EXACT = 1e-13           # tolerance of the reference
 AGREE = 1e-6            # how near the references of two methods must be
+POINT = ("method", "eps", "cpu", "error", "cells", "iterations", "inner", "converged", "gap")
 LEVELS = (1e-1, 1e-2, 1e-3, 1e-4)       # errors at which times are read off
 
 
@@ -32,8 +33,7 @@ def equal_error(run):
     for E in run.progress(moduli, "moduli"):
         scene = with_(bar(dx, E, "pn-pcg", steps, eps=1e-9), every=1)
         rows += one_stiffness(run, after(scene, steps), E, (ladder, repeats))
-    run.table("points", ("E", "method", "eps", "cpu", "error", "cells", "iterations", "inner",
-                         "converged"), rows)
+    run.table("points", ("E", *POINT), rows)
 
 
 def one_stiffness(run, step, E, plan):
@@ -47,21 +47,25 @@ def one_stiffness(run, step, E, plan):
     name = f"trade.hot.bar.E{E:.0e}".replace("+0", "").replace("+", "")
     run.record(f"{name}.references", rms, unit="1", comparator="<=", bound=AGREE, scale=scale,
                note="difference of two references of different methods, relative to the increment")
-    rows = [(E, *point(step, exact.dv, (method, eps), repeats))
+    rows = [(E, *point(step, exact, (method, eps), repeats))
             for eps in ladder for method in METHODS]
     record_equal_eps(run, name, rows, scale)
     record_equal_error(run, name, rows, scale)
     return rows
 
 
-def point(step, exact, way, repeats):
-    """method, eps, CPU seconds (median), error, cells, iterations, inner, converged."""
+def point(step, exact, way, repeats, **caps):
+    """method, eps, CPU seconds (median), error, cells, iterations, inner, converged, gap: what is
+    left of the energy's fall, against the exact `Solution`; the caps are options.
+    """
     method, eps = way
-    solutions = [solved(step, method, eps=eps) for _ in range(repeats)]
+    solutions = [solved(step, method, eps=eps, **caps) for _ in range(repeats)]
     cpu = float(np.median([sum(s.report.seconds.values()) for s in solutions]))
-    report = solutions[0].report
-    return (method, eps, cpu, *difference(step, solutions[0].dv, exact), report.iterations,
-            report.inner, report.converged)
+    found, report = solutions[0], solutions[0].report
+    system = step.stepper.system(step.pose)
+    gap = (found.E - exact.E) / (system.energy(system.start) - exact.E)
+    return (method, eps, cpu, *difference(step, found.dv, exact.dv), report.iterations,
+            report.inner, report.converged, gap)
 
 
 def record_equal_eps(run, name, rows, scale):
@@ -76,13 +80,18 @@ def record_equal_eps(run, name, rows, scale):
 def record_equal_error(run, name, rows, scale):
     """Times for equal errors, over HOT's."""
     for level in LEVELS:
-        times = {m: time_for([r[1:5] for r in rows if r[1] == m], level) for m in METHODS}
+        times = times_for(rows, level)
         for method, seconds in times.items():
             if seconds is not None and times["hot"] is not None:
                 run.record(f"{name}.{method}.time-{level:.0e}".replace("e-0", "e-"),
                            seconds / times["hot"], unit="1", comparator="info", scale=scale,
                            note=f"CPU time for an error of {level:g} over HOT's "
                            f"{times['hot']:.3f} s, between points on a logarithmic line")
+
+
+def times_for(rows, level):
+    """{method: CPU seconds at which its error falls to a level, or None} of rows (.., *`POINT`)."""
+    return {m: time_for([r[1:5] for r in rows if r[1] == m], level) for m in METHODS}
 
 
 def time_for(points, level):

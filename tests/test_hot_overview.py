@@ -1,0 +1,131 @@
+"""States in the middle of HOT's scenes, and what their experiments make of times and errors."""
+
+import numpy as np
+import pytest
+
+from mpm_ref.scene import Body, Box, Material, Regular, Scene, Scheme, build
+from mpm_ref.simulate import SORT, simulate
+from mpm_ref.store.checkpoint import digest
+from validation import targets
+from validation.hot import begun as states
+from validation.hot.overview import ABLATION, Cost, options, overview
+from validation.trade.hot import POINT
+from validation.trade.hot_scenes import fastest, known, seconds, trust
+
+
+def falling():
+    """A block that is thrown and falls, implicitly: a few particles in two dimensions."""
+    block = Body(name="block", density=1000.0, shape=Box(lower=[0.0, 0.0], upper=[0.2, 0.2]),
+                 sampling=Regular(per_cell=2), material=Material(law="neo_hookean", E=1e5, nu=0.3))
+    return Scene(dim=2, dx=0.1, gravity=[0.0, -9.8], integrator="hot", cfl=0.6, longest=0.01,
+                 end=0.1, every=1, scheme=Scheme(transfer="apic"), body=(block,))
+
+
+@pytest.fixture
+def kept(monkeypatch, tmp_path):
+    """The scene "block", begun after 0.03 s, and an empty folder for its states."""
+    monkeypatch.setitem(states.BEGUN, "block", 0.03)
+    monkeypatch.setattr(states, "scene", lambda name, profile: falling())
+    monkeypatch.setattr(states.platformdirs, "user_cache_dir", lambda name: tmp_path)
+    return tmp_path
+
+
+def same(a, b):
+    return digest(a) == digest(b)
+
+
+def test_a_state_that_was_kept_is_the_one_marched_to(kept, monkeypatch):
+    _, state = states.begun("block", "quick")
+    assert state.t >= 0.03 > state.t - 0.01
+    assert len(list(kept.rglob("block-*.h5"))) == 1
+    monkeypatch.setattr(states, "marched", lambda *_: pytest.fail("marched again"))
+    _, again = states.begun("block", "quick")
+    assert same(state, again)
+
+
+def test_a_damaged_file_is_marched_to_again(kept):
+    _, state = states.begun("block", "quick")
+    file, = kept.rglob("block-*.h5")
+    file.write_bytes(file.read_bytes()[:-100])
+    _, again = states.begun("block", "quick")
+    assert same(state, again)
+    assert same(states.begun("block", "quick")[1], state)
+
+
+def test_a_folder_that_cannot_be_made_costs_the_march_alone(kept, monkeypatch):
+    (kept / "begun").write_text("a file in its place")
+    _, state = states.begun("block", "quick")
+    assert state.t >= 0.03
+
+
+def test_a_scene_that_ends_before_is_refused():
+    with pytest.raises(ValueError, match=r"ends at 0\.1 s, before 1 s"):
+        states.marched(build(falling()), 1.0)
+
+
+def test_old_versions_are_removed(tmp_path):
+    for k in range(6):
+        (tmp_path / "begun" / f"old{k}").mkdir(parents=True)
+    here = states.folder(tmp_path)
+    assert here.is_dir()
+    assert len(list((tmp_path / "begun").iterdir())) == states.KEPT
+
+
+def test_steps_are_those_of_the_run(kept):
+    frames = simulate(build(falling()))
+    whole = [(f.t, f.dt) for f in frames if f.t >= 0.03 - 1e-12]
+    problem, state = states.begun("block", "quick")
+    seen = [(state.t + step.dt, step.dt) for step in states.steps(problem, state, 3)]
+    np.testing.assert_array_equal(seen, whole[1:4])
+    assert state.step < SORT
+
+
+def cost(method, cpu, step, converged=True):
+    return Cost("wheel", method, step, 0.0, cpu, 5, 7, 0, 6, converged)
+
+
+def test_overview_of_steps():
+    rows = [cost("hot", 1.0, 0), cost("pn-pcg", 2.0, 0, False), cost("hot", 3.0, 1),
+            cost("pn-pcg", 12.0, 1)]
+    o = overview(rows, "pn-pcg", 10, 20)
+    assert (o.total, o.worst, o.cpu, o.capped, o.steps) == (3.5, 4.0, 7.0, 1, 2)
+    assert overview(rows, "hot", 10, 20).worst == 1.0
+
+
+def test_gast_alone_has_a_tolerance_and_caps_of_its_own():
+    caps = {"iterations": 3}
+    assert options("pn-pcg", caps) == {}
+    assert options("gast15", caps) == {"iterations": 3, "eps": 1e-3}
+
+
+def test_every_range_of_the_text_is_recorded():
+    printed = {t.removeprefix("hot.sec7_2.speedup.").rpartition(".")[0] for t in targets.load()
+               if t.startswith("hot.sec7_2.speedup.")}
+    assert {m.replace("-", "_") for m in ABLATION} == printed
+
+
+def row(method, eps, cpu, error):
+    point = dict.fromkeys(POINT, 0) | {"method": method, "eps": eps, "cpu": cpu, "error": error}
+    return "wheel", "quick", *point.values()
+
+
+def test_equal_error_is_that_of_hot_at_the_papers_tolerance():
+    rows = [row("hot", 1e-6, 1.0, 1e-1), row("hot", 1e-7, 2.0, 1e-2),
+            row("pn-pcg", 1e-6, 1.0, 1.0), row("pn-pcg", 1e-7, 1.5, 1e-1),
+            row("pn-pcg", 1e-8, 6.0, 1e-3)]
+    rows += [row(m, eps, 9.0, 1.0) for m in ("lbfgs-h", "pn-pcg-mf", "pn-mgpcg")
+             for eps in (1e-6, 1e-7)]
+    own = known(rows, 1e-6)
+    assert trust(own) == 1e-2
+    at_eps, at_error = seconds(own)
+    assert at_eps["pn-pcg"] == 1.5
+    assert at_error["pn-pcg"] == pytest.approx(3.0)      # half way, both on logarithmic scales
+    assert at_error["pn-mgpcg"] is None
+    assert fastest(own) == ("pn-pcg", "hot")
+    slower = [r if r[1:3] != ("hot", 1e-7) else (*r[:3], 2.9, *r[4:]) for r in own]
+    assert fastest(slower) == ("pn-pcg", "pn-pcg")       # a tie
+
+
+def test_no_error_is_known_better_than_the_reference():
+    rows = [row("pn-pcg", 1e-7, 1.0, 0.0), row("pn-pcg", 1e-6, 1.0, 1e-2)]
+    assert [r[4] for r in known(rows, 1e-4)] == [1e-4, 1e-2]

@@ -1,0 +1,168 @@
+"""Whole runs: what a course keeps, that it is read again, and pictures of its states."""
+
+import numpy as np
+import pytest
+
+from figures._splats import DARK, Balls, Camera, image, outward
+from figures._states import Look, states
+from mpm_ref.scene import build
+from validation.hot import course as courses
+from validation.hot import whole_runs
+from validation.hot.course import COLUMNS, FIELDS, SHOTS, course, read, run
+from validation.hot.sizes import SIZES
+from validation.registry import discover
+from validation.results import Results
+from validation.trade.hot_energy import DT, End, apart, twisted
+from validation.verification.scenes import shipped, with_
+
+
+def small(steps=3, **changes):
+    """The first steps of a bust of few particles, held at its foot and turned at its head."""
+    scene = shipped("hot_faceless", unstable="allow", dx=0.06, **changes)
+    scene = with_(scene, end=steps * scene.longest)
+    body = scene.body[0]
+    return with_(scene, body=(with_(body, sampling=with_(body.sampling, count=500)),))
+
+
+@pytest.fixture(scope="module")
+def known():
+    return run(small(), 1e3)
+
+
+def test_course_keeps_every_step_and_some_states(known):
+    assert known.facts["why"] == "end"
+    assert known.steps.shape == (3, len(COLUMNS))
+    np.testing.assert_allclose(known.column("t"), np.cumsum(known.column("dt")), rtol=1e-14)
+    np.testing.assert_allclose(known.times, np.arange(4) / 24.0, rtol=1e-14)
+    assert known.column("converged").all()
+    for name in FIELDS:
+        assert getattr(known, name).shape[:2] == (4, 500)
+        assert getattr(known, name).dtype == np.float32
+    assert np.all(known.column("solve") <= known.column("cpu"))
+
+
+def test_particles_keep_their_places_in_a_course(known):
+    body = build(small()).bodies[0]
+    np.testing.assert_array_equal(known.x[0], body.particles.x[np.argsort(body.id)]
+                                  .astype(np.float32))
+    assert np.linalg.norm(known.x[1] - known.x[0], axis=1).max() < 0.06
+
+
+def test_momentum_balances_only_with_what_the_conditions_give(known, monkeypatch):
+    assert known.column("gap").max() < 1e-13
+    monkeypatch.setattr(courses.Witness, "solve", courses.ImplicitStepper.solve)
+    assert run(small(1), 1e3).column("gap").max() > 1e-3
+
+
+def test_course_is_read_where_it_was_run(tmp_path, monkeypatch):
+    file = tmp_path / "states" / "bust.npz"
+    made = course(small(1), file, 1e3)
+    assert (file.parent / ".gitignore").read_text() == "*\n"
+    monkeypatch.setattr(courses, "run", lambda *_: pytest.fail("it is there"))
+    again = course(small(1), file, 1e3)
+    assert again.facts == made.facts
+    for a, b in zip(again[:-1], made[:-1], strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_course_of_another_scene_is_run_anew(tmp_path):
+    file = tmp_path / "bust.npz"
+    course(small(1), file, 1e3)
+    assert len(course(small(2), file, 1e3).steps) == 2
+    assert len(read(file).steps) == 2
+
+
+def test_run_out_of_patience_says_so():
+    known = run(small(), 0.0)
+    assert known.facts["why"] == "more than 0.0 CPU seconds"
+    assert len(known.steps) == 0
+
+
+def test_broken_run_is_kept_with_its_reason():
+    scene = small()
+    known = run(with_(scene, limits=with_(scene.limits, J=(0.9999, 1.0001))), 1e3)
+    assert "J is outside" in known.facts["why"]
+    assert known.times[-1] > 0.0
+
+
+def test_every_scene_has_a_whole_run():
+    found = {id for id in discover().experiments if id.startswith("hot.scenes.")}
+    assert found == {name.replace("hot_", "hot.scenes.") for name in SIZES}
+
+
+def test_table_is_thinned_to_its_ends():
+    rows = np.arange(2001.0)[:, None]
+    thin = whole_runs.thinned(rows)
+    assert len(thin) == whole_runs.ROWS
+    assert (thin[0], thin[-1]) == ([0.0], [2000.0])
+    assert whole_runs.thinned(rows[:7]) == rows[:7].tolist()
+    assert SHOTS == 12
+
+
+# Pictures
+
+CAMERA = Camera(0.0, 0.0, np.array([-2.0, -1.0]), np.array([2.0, 1.0]), 80)
+
+
+def balls(*places):
+    """Balls of radius 0.5 m, red, green, blue, .."""
+    return Balls(np.array(places, dtype=float), np.zeros((len(places), 3)),
+                 np.full(len(places), 0.5), np.eye(3)[:len(places)])
+
+
+def test_axes_of_the_camera_are_orthonormal():
+    axes = CAMERA._replace(turn=33.0, lift=21.0).axes
+    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-15)
+    np.testing.assert_array_equal(CAMERA.axes, np.eye(3))
+
+
+def test_ball_is_where_it_should_be():
+    picture = image(balls((1.0, 0.5, 0.0)), CAMERA)
+    assert picture.shape == (40, 80, 4)
+    rows, columns = np.nonzero(picture[..., 3] > 0.5)
+    assert (rows.mean() + 0.5, columns.mean() + 0.5) == pytest.approx((10.0, 60.0), abs=0.3)
+    assert picture[..., 3].sum() == pytest.approx(np.pi * 10.0**2, rel=0.02)
+    assert picture[10, 60, 0] > DARK > picture[10, 60, 1]
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_nearer_ball_hides_the_other(order):
+    two = balls((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    picture = image(Balls(*(a[::order] for a in two)), CAMERA)
+    assert picture[20, 40, 1] > picture[20, 40, 0]
+
+
+def test_normals_of_a_cloud_point_outwards():
+    x = np.stack(np.meshgrid(*3 * [np.linspace(-1.0, 1.0, 9)]), axis=-1).reshape(-1, 3)
+    n = outward(x)
+    face = (x[:, 0] == 1.0) & (abs(x[:, 1:]).max(axis=1) < 0.5)
+    assert n[face, 0].min() > 0.9       # the nearest of a lattice are not the same to all sides
+    assert np.all(n[abs(x).max(axis=1) < 0.5] == 0.0)
+
+
+def test_states_are_drawn_and_missing_ones_named(known, tmp_path):
+    results = Results(tmp_path)
+    with pytest.raises(FileNotFoundError, match=r"hot\.scenes\.faceless"):
+        states(results, "faceless", Look((0,), ("#e8a33d",)))
+    courses.write(tmp_path / "states" / "faceless.npz", known)
+    figure = states(results, "faceless", Look((0, 7), ("viridis",),
+                                              scalar=("speed", 1.0, "speed [m/s]")))
+    assert [ax.get_title() for ax in figure.axes[:2]] == ["t = 0.00 s", "t = 0.12 s"]
+    assert len(figure.axes) == 3        # with the colour bar; of a short run, the last picture
+
+
+# The trade
+
+def test_bar_of_the_trade_has_fixed_steps_and_the_count_of_the_authors():
+    scene = twisted(0.015, 40, "hot", 1e-9)
+    assert sum(body.sampling.count for body in scene.body) == 30720
+    clock = build(with_(twisted(0.06, 2, "hot", 1e-9))).clock
+    assert (clock.dt, clock.steps, clock.interval) == (DT, 2, None)
+
+
+def test_distance_from_the_answer_is_in_cells():
+    x = np.zeros((4, 3))
+    y = x.copy()
+    y[0, 2] = 0.3
+    assert apart(End(1.0, 1.0, y, 0.0, 1.0, True), End(1.0, 1.0, x, 0.0, 1.0, True), 0.1) \
+        == pytest.approx((1.5, 3.0))
