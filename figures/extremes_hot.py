@@ -9,7 +9,8 @@ from ._orders import scales
 
 NEEDS = ["extremes.hot.stiffness"]
 COLOURS = {"converged": "#cfe8cf", "stopped": "#f0c36d", "unsound": "#e07a6a"}
-METHODS = {"hot": "HOT", "lbfgs-h": "LBFGS-H", "pn-pcg": "PN-PCG", "pn-mgpcg": "PN-MGPCG"}
+METHODS = {"hot": "HOT", "hot-single": "HOT, single precision", "hot-plus": "HOT-plus",
+           "lbfgs-h": "LBFGS-H", "pn-pcg": "PN-PCG", "pn-mgpcg": "PN-MGPCG"}
 
 
 def scale(results):
@@ -18,7 +19,7 @@ def scale(results):
 
 def draw(results):
     table = results.table(NEEDS[0], "solves")
-    figure, axes = plt.subplots(2, 2, figsize=(7.6, 6.4), sharex=True, sharey=True)
+    figure, axes = plt.subplots(2, 3, figsize=(10.4, 6.4), sharex=True, sharey=True)
     for ax, (method, label) in zip(axes.flat, METHODS.items(), strict=True):
         mine = (table["d"] == 2) & (table["method"] == method)
         panel(ax, {name: a[mine] for name, a in table.items()})

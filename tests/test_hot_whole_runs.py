@@ -12,7 +12,7 @@ from validation.hot.course import COLUMNS, FIELDS, SHOTS, course, read, run
 from validation.hot.sizes import SIZES
 from validation.registry import discover
 from validation.results import Results
-from validation.trade.hot_energy import DT, End, apart, twisted
+from validation.trade.hot_energy import DT, End, Way, apart, twisted
 from validation.verification.scenes import shipped, with_
 
 
@@ -154,9 +154,9 @@ def test_states_are_drawn_and_missing_ones_named(known, tmp_path):
 # The trade
 
 def test_bar_of_the_trade_has_fixed_steps_and_the_count_of_the_authors():
-    scene = twisted(0.015, 40, "hot", 1e-9)
+    scene = twisted(0.015, 40, Way("hot", 1e-9))
     assert sum(body.sampling.count for body in scene.body) == 30720
-    clock = build(with_(twisted(0.06, 2, "hot", 1e-9))).clock
+    clock = build(with_(twisted(0.06, 2, Way("hot", 1e-9)))).clock
     assert (clock.dt, clock.steps, clock.interval) == (DT, 2, None)
 
 

@@ -138,8 +138,9 @@ def put(grid, unknowns, v):
 def check_scheme(scheme):
     """Raise ValueError where a scheme has no implicit form."""
     if scheme.transfer == "mls":
-        raise ValueError("transfer = 'mls' with an implicit integrator: expected 'apic', 'pic' or "
-                         "'flip', whose force is the gradient of an energy of the nodes")
+        raise ValueError("transfer = 'mls', the default, with an implicit integrator: expected "
+                         "'apic', 'pic' or 'flip', whose force is the gradient of an energy of the "
+                         "nodes; write scheme = { transfer = \"apic\" }")
     if scheme.mass_eps or scheme.gravity_on_empty:
         raise ValueError("mass_eps and gravity_on_empty belong to explicit NCLaw scenes: leave "
                          "them out with an implicit integrator")

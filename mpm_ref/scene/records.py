@@ -231,6 +231,7 @@ class Solver(Record):
     renew: Literal["never", "shortened", "stale"] | None = None      # Hessian of L-BFGS
     iterations: Count | None = None             # at most
     cg_iterations: Count | None = None          # of a linear solve, at most
+    flexible: bool | None = None                # CG that bears a preconditioner that varies
     levels: Count | None = None                 # of multigrid
     path: Literal["blocks", "scipy"] | None = None
 

@@ -16,7 +16,7 @@ from mpm_ref.hot.methods import METHODS as ALL
 from mpm_ref.hot.norms import scaled_norm
 from mpm_ref.hot.step import REVISIONS, ImplicitStepper, put
 
-METHODS = ("hot", "lbfgs-h", "pn-pcg", "pn-mgpcg")
+METHODS = ("hot", "hot-plus", "lbfgs-h", "pn-pcg", "pn-mgpcg")
 EPS = 1e-7                          # the paper's
 OUTER, CG = 500, 2000               # caps; no solve here is known to need a fifth of the first
 PER_SEARCH = 2 + ALL["hot"].search.cap      # evaluations, at most

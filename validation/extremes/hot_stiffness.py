@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+from mpm_ref.hot.methods import METHODS as ALL
+
 from ..registry import experiment
 from .hot_bodies import DX, FRAME, elastic, gravity, halves, shaken
 from .hot_solve import METHODS, Setup, record_ends, solve, table_of
@@ -9,6 +11,7 @@ from .hot_solve import METHODS, Setup, record_ends, solve, table_of
 SOFT = (1e2, 1e4, 1e6, 1e8, 1e10, 1e12)
 CONTRAST = (1.0, 1e2, 1e4, 1e6, 1e8)
 STIFFEST = 1e12
+SINGLE = ALL["hot"].cycle._replace(precision="single")
 RATIOS = (0.0, 0.3, 0.45, 0.49, 0.499, 0.4999)
 CELLS = {2: (16, 8), 3: (8, 4, 4)}
 
@@ -34,13 +37,16 @@ def bent(d, laws, dt=FRAME):
 @experiment("extremes.hot.stiffness", title="Moduli from 1e2 to 1e12 Pa, contrasts up to 1e8",
             profiles=("quick", "standard"), budget={"quick": 4, "standard": 12})
 def stiffness(run):
-    """A box with a soft and a stiff half, one step of 1/24 s, by all methods."""
+    """A box with a soft and a stiff half, one step of 1/24 s, by all methods, and by HOT with the
+    matrices of its smoothers in single precision.
+    """
     cases = run.choose(quick=pairs(2) + pairs(3, (1e2, 1e4, 1e12), (1.0, 1e8)),
                        standard=pairs(2) + pairs(3))
     rows = []
     for case in run.progress(cases, "pairs"):
         setup = bent(case.d, (elastic(case.E), elastic(case.E * case.contrast)))
         rows += [(*case, solve(setup, method)) for method in METHODS]
+        rows.append((*case, solve(setup, "hot", cycle=SINGLE)._replace(method="hot-single")))
     for d, cells in CELLS.items():
         record_ends(run, f"stiffness.{d}d", [end for k, *_, end in rows if k == d],
                     f"{d}D, {' x '.join(map(str, cells))} cells, {2**d} particles each")
