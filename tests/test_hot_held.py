@@ -81,6 +81,17 @@ def test_nothing_to_do_is_held_at_once(step):
     assert report.off < 1e-9
 
 
+def test_what_is_no_number_is_not_held(step):
+    """Nothing tells how far off it is."""
+    stepper, bodies = stepper_of(step[1].shape[1])
+    bodies[0].particles.F[3] = np.nan
+    broken = stepper.system(stepper.pose(bodies, 0.0, DT))
+    for word in ("hot", "pn-pcg"):
+        report = minimise(broken, word, cells=1e3).report
+        assert not report.converged
+        assert report.off == np.inf
+
+
 @pytest.mark.parametrize("cells", [-1.0, np.inf, np.nan])
 def test_impossible_errors_are_refused(cells):
     with pytest.raises(ValueError, match=r"cells = .*expected"):

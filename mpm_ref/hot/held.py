@@ -15,6 +15,9 @@ most iterations at small tolerances, do not count here: no particle feels them.
 """
 
 from dataclasses import replace
+from math import inf
+
+import numpy as np
 
 from .descent import iterate
 from .krylov import Rule
@@ -58,7 +61,7 @@ def checked(system, point, inverse, rules, watch):
     """
     linear = Linear(system.product(point.dv), inverse)
     e = system.free(solve(linear, -point.g, CHECK, watch))
-    watch.off = SAFETY * system.cells(e)
+    watch.off = SAFETY * system.cells(e) if np.isfinite(e).all() else inf
     return search(system, point, e, rules).point
 
 
