@@ -69,7 +69,15 @@ def test_what_round_off_does_not_allow_is_reported(word, step):
     report = minimise(step[0], word, cells=1e-30).report
     assert not report.converged
     assert report.off > 1e-30
-    assert "may still be off by" in report.why or "round-off" in report.why
+    assert "particles may still be off by" in report.why
+    assert "1e-30 were asked" in report.why
+
+
+def test_iterations_are_bounded_over_all_rounds(step):
+    report = minimise(step[0], "hot", eps=LOOSE, cells=1e-7, iterations=3).report
+    assert not report.converged
+    assert report.iterations <= 4       # and the step of the check
+    assert "were asked" in report.why
 
 
 def test_nothing_to_do_is_held_at_once(step):

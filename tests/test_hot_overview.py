@@ -105,7 +105,8 @@ def test_every_range_of_the_text_is_recorded():
 
 
 def row(method, eps, cpu, error):
-    point = dict.fromkeys(POINT, 0) | {"method": method, "eps": eps, "cpu": cpu, "error": error}
+    point = dict.fromkeys(POINT, 0) | {"method": method, "eps": eps, "cpu": cpu, "error": error,
+                                       "converged": True}
     return "wheel", "quick", *point.values()
 
 
@@ -124,6 +125,15 @@ def test_equal_error_is_that_of_hot_at_the_papers_tolerance():
     assert fastest(own) == ("pn-pcg", "hot")
     slower = [r if r[1:3] != ("hot", 1e-7) else (*r[:3], 2.9, *r[4:]) for r in own]
     assert fastest(slower) == ("pn-pcg", "pn-pcg")       # a tie
+
+
+def test_solves_cut_short_are_not_fast():
+    rows = [row("hot", 1e-7, 2.0, 1e-2), (*row("pn-pcg", 1e-7, 1.0, 1e-2)[:9], False, 0),
+            row("lbfgs-h", 1e-7, 3.0, 1e-3)]
+    at_eps, at_error = seconds(known(rows, 1e-6))
+    assert set(at_eps) == {"hot", "lbfgs-h"}
+    assert at_error["pn-pcg"] is None
+    assert at_error["lbfgs-h"] == 3.0       # it is below HOT's error from its first point on
 
 
 def test_no_error_is_known_better_than_the_reference():

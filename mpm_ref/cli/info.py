@@ -87,7 +87,8 @@ def method(facts):
     if facts["wave_speed"] is not None:
         return f"wave speed {facts['wave_speed']:.4g} m/s"
     solver = facts["solver"]
-    return f"implicit: {solver['method']}, eps {solver['eps']:g}"
+    held = f", to hold {solver['cells']:g} dx" if solver["cells"] else ""
+    return f"implicit: {solver['method']}, eps {solver['eps']:g}{held}"
 
 
 def step_line(facts):

@@ -70,7 +70,8 @@ class Direct:
             shifted = sp.csc_array(full + SHIFT * sp.diags_array(full.diagonal()))
             symmetric = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0,
                          "options": {"SymmetricMode": True}}
-            self.solve = spla.splu(shifted, **symmetric).solve
+            with POOLS.limit(limits=1):
+                self.solve = spla.splu(shifted, **symmetric).solve
 
     def __call__(self, b):
         """u (n, d) of A u = b (n, d)."""

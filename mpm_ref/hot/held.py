@@ -1,7 +1,7 @@
 """A stop by what a step hands on: by how many cells its particles are still off.
 
 The size of the gradient says little of that: at one tolerance the methods leave errors that differ
-a hundredfold (`trade.hot`). So the end of a method is checked by one more step of Newton,
+many times over (`trade.hot.bar`). So the end of a method is checked by one more step of Newton,
 
     H e = -g    at the iterate, about, by CG with multigrid as preconditioner,
 
@@ -15,17 +15,15 @@ most iterations at small tolerances, do not count here: no particle feels them.
 """
 
 from dataclasses import replace
-from math import inf
-
-import numpy as np
 
 from .descent import iterate
 from .krylov import Rule
-from .lbfgs import LBFGS
 from .line_search import search
 from .linear import Linear, first_inverse, solve
 from .norms import scaled_norm
 
+REFUSED = ("the line search refused the step that would tell more, near the limit of round-off or "
+           "where the energy is no number")
 SAFETY = 3.0                # the estimate falls short of the error by less than this in nearly all
                             # states; trade.hot.held says in how many, and by how much not
 ROUNDS = 12                 # of a method and a check, at most
@@ -41,28 +39,33 @@ def held(system, advance, inverse, stop, options, watch):
     """
     start = system.start
     for _ in range(ROUNDS):
+        before = len(watch.residuals)
         point, why = iterate(system, start, advance, stop, watch)
         better = checked(system, point, inverse(point.dv), options.search, watch)
         if better is None:
-            return point, None if watch.off <= options.cells else why or refused(watch.off)
-        if watch.off <= options.cells:
+            return point, short(watch.off, options, why or REFUSED)
+        if watch.off <= options.cells or why is not None:
             watch.note(scaled_norm(better.g, system.kappa))
-            return better, None
-        if why is not None:
-            return better, why
+            return better, short(watch.off, options, why)
         start = better.dv
-        stop = stop._replace(eps=stop.eps * factor(options.cells / watch.off))
-    return better, f"particles may still be off by {watch.off:.2g} dx after {ROUNDS} checks"
+        stop = stop._replace(eps=stop.eps * factor(options.cells / watch.off),
+                             iterations=stop.iterations - (len(watch.residuals) - before))
+        if stop.iterations < 0:
+            break
+    return better, short(watch.off, options, f"{options.iterations} iterations, {ROUNDS} checks")
 
 
 def checked(system, point, inverse, rules, watch):
     """The `Point` after a step of Newton, None if a line search refuses it; watch.off is how far
     the particles of the first one may be off [dx].
     """
-    linear = Linear(system.product(point.dv), inverse)
+    linear, capped = Linear(system.product(point.dv), inverse), watch.capped
     e = system.free(solve(linear, -point.g, CHECK, watch))
-    watch.off = SAFETY * system.cells(e) if np.isfinite(e).all() else inf
-    return search(system, point, e, rules).point
+    unsure = 2.0 if watch.capped > capped else 1.0      # CG ended early: e is too short
+    watch.off = unsure * SAFETY * system.cells(e)
+    found = search(system, point, e, rules)
+    watch.backtracks += found.backtracks
+    return found.point
 
 
 def factor(wanted):
@@ -71,13 +74,20 @@ def factor(wanted):
     return min(max(wanted, least), most)
 
 
-def refused(off):
-    """Why a solve ends whose check cannot improve it."""
-    return (f"particles may still be off by {off:.2g} dx, and the line search refused the step "
-            "that would tell more: near the limit of round-off, or where the energy is no number")
+def short(off, options, why):
+    """Why an error is not held, None if it is."""
+    if off <= options.cells:
+        return None
+    return f"particles may still be off by {off:.2g} dx, {options.cells:g} were asked: {why}"
 
 
 def multigrid_once(system, options, watch):
     """dv -> a V-cycle of the Hessian where it is first asked for."""
     cycle = replace(options, descent="lbfgs", inverse="cycle", operator="matrix")
-    return LBFGS(first_inverse(system, cycle, watch), window=0).first
+    kept = []
+
+    def of_first(dv):
+        if not kept:
+            kept.append(first_inverse(system, cycle, watch)(dv).inverse)
+        return kept[0]
+    return of_first

@@ -4,7 +4,7 @@ Nodes of little mass may move far without meaning, so that norms over nodes misl
 what a step hands on.
 """
 
-from math import sqrt
+from math import inf, isfinite, sqrt
 
 import numpy as np
 
@@ -15,7 +15,9 @@ from ..core.tensor import dot, fill, lin, vec
 
 @kernel
 def farthest(sites, grid, stencil, bounds):
-    """max_p |sum_i w_ip u_i|^2 of the particles bounds[0] .. bounds[1] - 1; u is grid.v."""
+    """max_p |sum_i w_ip u_i|^2 of the particles bounds[0] .. bounds[1] - 1; u is grid.v. Infinite
+    where u is no number.
+    """
     d, most = grid.m.shape, 0.0
     for p in range(bounds[0], bounds[1]):
         base, s = vec(sites.base, p, d), vec(sites.s, p, d)
@@ -24,7 +26,8 @@ def farthest(sites, grid, stencil, bounds):
             k = column(c, stencil, d)
             for l in range(len(stencil)):
                 u = lin(1.0, u, product(k, l, w), of_node(grid.v, node(base, k, l)))
-        most = max(most, dot(u, u))
+        far = dot(u, u)
+        most = max(most, far) if isfinite(far) else inf
     return most
 
 

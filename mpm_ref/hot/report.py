@@ -26,7 +26,7 @@ class Report(NamedTuple):
     backtracks: int     # trial steps refused by line searches
     residuals: tuple    # of the start and of every accepted step: ||g^||_2 / sqrt(n)
     clock: tuple        # CPU seconds of the solve when each of them was known
-    off: float          # error of the displacement, as far as it was estimated [dx]; else NaN
+    off: float          # how far particles may be off by the last check of `held` [dx]; else NaN
     seconds: dict       # CPU seconds of all threads by part; their sum is the whole solve
 
 

@@ -101,8 +101,10 @@ def describe(f, problem):
 
 def solver_attributes(options):
     """What of an implicit solve another code has to know."""
-    return {"integrator": "implicit", "options": json.dumps(asdict(options)),
-            **{name: getattr(options, name) for name in ("method", "eps", "norm", "start")}}
+    named = {"search": options.search._asdict(), "cycle": options.cycle._asdict()}
+    return {"integrator": "implicit", "options": json.dumps({**asdict(options), **named}),
+            **{name: getattr(options, name)
+               for name in ("method", "eps", "cells", "norm", "start")}}
 
 
 def put_body(group, body):

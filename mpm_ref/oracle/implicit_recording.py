@@ -24,6 +24,7 @@ from .recording import (
     step_length,
 )
 from .scales import size
+from .schema import LEVELS
 
 MULTIGRID = "cycle"     # the inverse that is a node-embedding V-cycle
 
@@ -34,6 +35,9 @@ def run(problem, steps, state=None):
     A run stands at `state`, by default at the start of the problem. Raises ValueError where a step
     is not solved, or the reference's own error is too large.
     """
+    levels = solving.options_of(problem).levels
+    if levels > LEVELS:
+        raise ValueError(f"levels = {levels}: expected at most {LEVELS}, which the oracle records")
     ours = problem_of(problem, 1)
     stepper = started(ours)
     dt, start = step_length(ours, stepper, state), 0.0 if state is None else state.t

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..explicit import Stepper
-from ..simulate import State, advance, frame_is_due, next_dt, rebound, swiftest
+from ..simulate import State, advance, ended, frame_is_due, next_dt, rebound, swiftest
 from . import scaling, stages
 from .twin import Twin, placed
 
@@ -65,6 +65,8 @@ def begun(problem, steps):
         stepper = problem.stepper()
         stepper.start(problem.bodies)
         for _ in range(steps):
+            if ended(problem.clock, state):
+                raise ValueError(f"begin after {steps} steps: the run ends after {state.step}")
             advance(problem, stepper, state)
             state.frame += frame_is_due(problem.clock, state)
     return problem, state

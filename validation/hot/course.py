@@ -1,6 +1,6 @@
 """A whole run of a scene: what every step took and came to, and the particles at some times.
 
-A course is kept in a file under the hash of its scene and of how long it was to be, so that a run
+A course is kept in a file under the hashes of its scene and of the package, so that a run
 that is asked for again is read instead, also after an interruption among several.
 """
 
@@ -17,6 +17,7 @@ from mpm_ref.monitor import Unstable
 from mpm_ref.scene import build
 from mpm_ref.scene.text import digest
 from mpm_ref.simulate import State, advance, check, ended, frame_is_due, show
+from mpm_ref.store.manifest import source_hash
 from mpm_ref.timestep import TooLarge
 
 from ..provenance import commit
@@ -38,7 +39,7 @@ class Course(NamedTuple):
     x: np.ndarray           # (shots, N, 3) [m], single precision as the next two
     speed: np.ndarray       # (shots, N) [m/s]
     stress: np.ndarray      # (shots, N) Frobenius norm of the Kirchhoff stress [Pa]
-    facts: dict             # scene (its hash), patience, end, why it ended, mass, commit
+    facts: dict             # scene and source (hashes), patience, end, why it ended, mass, commit
 
     def column(self, name):
         """One entry of `COLUMNS` at every step."""
@@ -62,7 +63,7 @@ def course(scene, file, patience):
 
     A run ends at the first step past `patience` CPU seconds; what breaks it is noted.
     """
-    key = {"scene": digest(scene), "patience": patience}
+    key = {"scene": digest(scene), "patience": patience, "source": source_hash()}
     kept = read(file)
     if kept is not None and {k: kept.facts.get(k) for k in key} == key:
         return kept

@@ -105,10 +105,10 @@ def compiled(methods):
 
 
 @experiment("hot.fig15", title="Speed-up overview: every method on every scene, over HOT's time",
-            profiles=("quick", "standard"), budget={"quick": 25, "standard": 1500})
+            profiles=("quick", "standard"), budget={"quick": 15, "standard": 750})
 def speedups(run):
     """Total and worst-step time of all methods on all scenes, beside the printed ranges."""
-    names, count = run.choose(quick=(QUICK, 2), standard=(PRINTED, 3))
+    names, count = run.choose(quick=(QUICK, 1), standard=(PRINTED, 3))
     caps = run.choose(quick={"iterations": 15, "cg_iterations": 300},
                       standard={"iterations": 30, "cg_iterations": 1000})
     compiled(METHODS)

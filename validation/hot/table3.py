@@ -54,7 +54,7 @@ def cost(name, short, particles, done):
 
 
 @experiment("hot.table3", title="Gauss-Seidel against Jacobi as preconditioner of Newton's CG",
-            profiles=("quick", "standard"), budget={"quick": 15, "standard": 1800})
+            profiles=("quick", "standard"), budget={"quick": 10, "standard": 200})
 def table3(run):
     """CG iterations and time of both on every scene, beside the printed ones."""
     names, count = run.choose(quick=(QUICK, 2), standard=(PRINTED, 5))

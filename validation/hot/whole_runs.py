@@ -1,8 +1,8 @@
 """Every scene of HOT from its start to its end, by HOT: the steps, and pictures of the states.
 
 The particles at some times are kept as ``results/<profile>/states/<scene>.npz``, which the state
-figures draw and which is not published. A scene that is there is not run again: records say at
-which commit it was; without that file it is run anew.
+figures draw and which is not published. A scene that is there, run by the same version of the
+package, is not run again: records say at which commit it was.
 """
 
 import numpy as np

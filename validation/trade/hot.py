@@ -95,10 +95,12 @@ def times_for(rows, level):
 
 
 def time_for(points, level):
-    """CPU seconds at which the error of points (method, eps, cpu, error) falls to a level, None if
-    the ladder does not hold it.
+    """CPU seconds at which the error of points (method, eps, cpu, error) falls to a level: those of
+    the first if it is below already, None if none is.
     """
     curve = [(cpu, error) for _, _, cpu, error in points]
+    if curve and curve[0][1] <= level:
+        return curve[0][0]
     for (c0, e0), (c1, e1) in pairwise(curve):
         if e1 <= level < e0:
             share = log(e0 / level) / log(e0 / e1)
