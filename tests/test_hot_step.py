@@ -179,7 +179,7 @@ def test_large_steps_are_allowed_and_follow_the_speed():
 
 
 def test_what_has_no_implicit_form_is_refused():
-    with pytest.raises(ValueError, match="transfer = 'mls' with an implicit integrator"):
+    with pytest.raises(ValueError, match="'mls', the default, with an implicit"):
         ImplicitStepper(Scheme(), DX, 2, NOTHING)
     body = block()
     driven = body._replace(particles=body.particles._replace(b=np.zeros((SIDE**2, 2))))

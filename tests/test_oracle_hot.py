@@ -4,7 +4,6 @@ The other code is the plain twin in double (or single) precision with products i
 multigrid on SciPy matrices, and Newton's method for the step.
 """
 
-import json
 from dataclasses import replace
 
 import h5py
@@ -20,7 +19,7 @@ from mpm_ref.hot.projectors import block_diagonal
 from mpm_ref.oracle import differential, recording, solving
 from mpm_ref.oracle.implicit_recording import started
 from mpm_ref.oracle.implicit_twin import SolvedTwin, embedding
-from mpm_ref.oracle.schema import IMPLICIT, LEVELS, MULTIGRID, key
+from mpm_ref.oracle.schema import IMPLICIT, MULTIGRID, key
 from mpm_ref.plain import hot
 from mpm_ref.simulate import simulate
 
@@ -287,23 +286,3 @@ def test_a_change_of_one_entry_is_caught_and_located(array, golden, checked, the
     assert first.other == a[i]
     if array.level:
         assert f"of level {array.level}" in first.where
-
-
-def test_options_are_named_in_the_file(golden):
-    with h5py.File(golden) as f:
-        options = json.loads(f.attrs["options"])
-        assert f.attrs["cells"] == 0.0
-    assert options["cycle"]["smoother"] == "gauss-seidel"
-    assert options["search"]["shrink"] == 0.5
-
-
-def test_more_levels_than_are_recorded_are_refused(problem, tmp_path):
-    many = replace(problem, solver=replace(METHODS["hot"], levels=LEVELS + 1))
-    with pytest.raises(ValueError, match=f"levels = {LEVELS + 1}: expected at most {LEVELS}"):
-        oracle.record(many, tmp_path / "golden.h5", 1, eps=EPS)
-
-
-def test_a_start_past_the_end_of_the_run_is_refused(problem, tmp_path):
-    short = replace(problem, clock=replace(problem.clock, steps=2, end=None))
-    with pytest.raises(ValueError, match="begin after 3 steps: the run ends after 2"):
-        oracle.record(short, tmp_path / "golden.h5", 1, eps=EPS, begin=3)
