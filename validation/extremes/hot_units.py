@@ -22,7 +22,7 @@ class Units(NamedTuple):
 
 SYSTEMS = {"binary": Units(2.0**5, 2.0**-3, 2.0**-40), "cgs": Units(1e2, 1.0, 1e3)}
 TRIALS = 3                      # of changes in the last digit
-FREE = ("hot", "lbfgs-h")       # of constants that carry units
+FREE = ("hot", "hot-plus", "lbfgs-h")       # of constants that carry units
 
 
 def converted(setup, units):
