@@ -1,5 +1,7 @@
 import numpy as np
 import pytest
+from command_line import SCENE, mpm_ref
+from goldens import checker, recorded
 from hypothesis import settings
 
 # Compiling a kernel may take seconds, hence no deadline; the same examples in every run.
@@ -16,3 +18,33 @@ def d(request):
 @pytest.fixture
 def rng():
     return np.random.default_rng(0)
+
+
+@pytest.fixture
+def scene(tmp_path):
+    """File of a small scene."""
+    path = tmp_path / "disk.toml"
+    path.write_text(SCENE)
+    return path
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """Results of that scene."""
+    folder = tmp_path_factory.mktemp("finished")
+    (folder / "disk.toml").write_text(SCENE)
+    done = mpm_ref("run", folder / "disk.toml", "--out", folder / "run.h5", "--quiet")
+    assert done.exit_code == 0, done.output
+    return folder / "run.h5"
+
+
+@pytest.fixture(scope="module")
+def golden(tmp_path_factory):
+    """A golden file of two disks."""
+    return recorded(tmp_path_factory.mktemp("golden"))
+
+
+@pytest.fixture
+def checked(golden, tmp_path):
+    """A function that checks arrays against the golden file."""
+    return checker(golden, tmp_path / "other.h5")

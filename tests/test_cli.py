@@ -24,22 +24,6 @@ ROOT = Path(__file__).resolve().parents[1]
 MAIN = "from mpm_ref.cli import main; main()"
 
 
-@pytest.fixture
-def scene(tmp_path):
-    path = tmp_path / "disk.toml"
-    path.write_text(SCENE)
-    return path
-
-
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("finished")
-    (folder / "disk.toml").write_text(SCENE)
-    done = mpm_ref("run", folder / "disk.toml", "--out", folder / "run.h5", "--quiet")
-    assert done.exit_code == 0, done.output
-    return folder / "run.h5"
-
-
 def test_run_says_what_is_run_and_how_it_ended(scene, tmp_path):
     done = mpm_ref("run", scene, "--out", tmp_path / "run.h5")
     assert done.exit_code == 0

@@ -16,22 +16,6 @@ from mpm_ref.store.session import checkpoint_of
 ROOT = Path(__file__).resolve().parents[1]
 
 
-@pytest.fixture
-def scene(tmp_path):
-    path = tmp_path / "disk.toml"
-    path.write_text(SCENE)
-    return path
-
-
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("finished")
-    (folder / "disk.toml").write_text(SCENE)
-    done = mpm_ref("run", folder / "disk.toml", "--out", folder / "run.h5", "--quiet")
-    assert done.exit_code == 0, done.output
-    return folder / "run.h5"
-
-
 def test_info_of_results(finished):
     done = mpm_ref("info", finished)
     for words in ("Disk: 2D", "disk 52 (x v F tau)", "5 frames, t = 0 to 0.04 s", "finished",

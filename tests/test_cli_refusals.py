@@ -23,13 +23,6 @@ STATE = SCENE.replace('shape = { type = "sphere", center = [0.5, 0.3], radius = 
     'sampling = { type = "regular", per_cell = 2 }\n', "")
 
 
-@pytest.fixture
-def scene(tmp_path):
-    path = tmp_path / "disk.toml"
-    path.write_text(SCENE)
-    return path
-
-
 @pytest.fixture(scope="module")
 def earlier(tmp_path_factory):
     folder = tmp_path_factory.mktemp("earlier")

@@ -6,7 +6,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from goldens import ON_NODES, STEPS, alone, checker, recorded, seen_by, stretched
+from goldens import ON_NODES, STEPS, alone, seen_by, stretched
 from problems import DX, JELLY, ball
 
 from mpm_ref import oracle, scene
@@ -18,16 +18,6 @@ from mpm_ref.oracle.twin import Twin
 from mpm_ref.problem import Clock, Problem
 
 ROOT = Path(__file__).resolve().parents[1]
-
-
-@pytest.fixture(scope="module")
-def golden(tmp_path_factory):
-    return recorded(tmp_path_factory.mktemp("golden"))
-
-
-@pytest.fixture
-def checked(golden, tmp_path):
-    return checker(golden, tmp_path / "other.h5")
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@
 import h5py
 import numpy as np
 import pytest
-from goldens import ON_NODES, checker
+from goldens import ON_NODES
 from problems import DX, FREE, JELLY, ball
 
 from mpm_ref import oracle
@@ -26,11 +26,6 @@ def golden(tmp_path_factory):
     path = tmp_path_factory.mktemp("golden") / "golden.h5"
     oracle.record(at_rest(), path, 1)
     return path
-
-
-@pytest.fixture
-def checked(golden, tmp_path):
-    return checker(golden, tmp_path / "other.h5")
 
 
 @pytest.fixture

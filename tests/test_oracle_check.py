@@ -6,7 +6,7 @@ import shutil
 import h5py
 import numpy as np
 import pytest
-from goldens import ON_NODES, checker, recorded, seen_by, stretched
+from goldens import ON_NODES, seen_by, stretched
 
 from mpm_ref import explicit, oracle
 from mpm_ref.core.boundary import Conditions
@@ -14,16 +14,6 @@ from mpm_ref.oracle import inner, stages
 from mpm_ref.oracle.schema import ARRAYS
 
 CHANGE = 1.0 + 1e-6
-
-
-@pytest.fixture(scope="module")
-def golden(tmp_path_factory):
-    return recorded(tmp_path_factory.mktemp("golden"))
-
-
-@pytest.fixture
-def checked(golden, tmp_path):
-    return checker(golden, tmp_path / "other.h5")
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from goldens import STEPS, checker, recorded, seen_by, stretched
+from goldens import STEPS, seen_by, stretched
 from problems import JELLY, ball
 
 from mpm_ref import oracle
@@ -22,16 +22,6 @@ from mpm_ref.problem import Clock
 from mpm_ref.simulate import simulate
 
 ROOT = Path(__file__).resolve().parents[1]
-
-
-@pytest.fixture(scope="module")
-def golden(tmp_path_factory):
-    return recorded(tmp_path_factory.mktemp("golden"))
-
-
-@pytest.fixture
-def checked(golden, tmp_path):
-    return checker(golden, tmp_path / "other.h5")
 
 
 def test_a_golden_file_agrees_with_itself(golden):

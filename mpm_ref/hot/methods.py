@@ -1,6 +1,7 @@
 """Every method by its word: HOT, what it is compared to, and every knob (HOT-methods).
 
-"hot-plus" is ours: HOT with what `trade.hot.knobs` found to pay.
+"hot-plus" is ours: HOT with four levels, the coarsest solved exactly, and a new Hessian where the
+old one is seen to be wrong; `trade.hot.knobs` and `trade.hot.energy` compare the two.
 """
 
 from dataclasses import dataclass, replace

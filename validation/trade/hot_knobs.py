@@ -54,7 +54,7 @@ def knobs(run):
     """Time of every setting over the paper's, on several scenes; and the length of the step."""
     names, ladder, tried, repeats = run.choose(
         quick=(("bar 1e9",), (1e-7, 1e-8, 1e-9), SHORT, 1),
-        standard=(("bar 1e6", "bar 1e9", "twist", "boxes", "aluminium", "faceless"),
+        standard=(("bar 1e6", "bar 1e9", "boxes", "faceless"),
                   (1e-6, 1e-7, 1e-8, 1e-9), tuple(SETTINGS), 1))
     rows, lengths = [], []
     for name in run.progress(names, "scenes"):
