@@ -15,7 +15,7 @@ help:            ## this list
 	@sed -n 's/^\([a-z-]*\): [^#]*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 14
 
 reproduce: $(READY) ## every experiment at the quick profile -> results/quick/report.html and report.md
-	$(PY) -m validation run --profile quick
+	$(PY) -m validation run --profile quick --workers $(WORKERS)
 
 test: $(READY)   ## lint and the test suite, without the tests marked `long`
 	$(PY) -m ruff check .

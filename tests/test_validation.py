@@ -18,7 +18,7 @@ from validation.targets import Target
 
 KEYS = {"target", "value", "unit", "paper", "comparator", "verdict", "scale", "seconds", "seed",
         "command", "commit", "date", "cores"}
-OPTIONAL = {"note", "bound", "cpu_seconds", "versions"}
+OPTIONAL = {"note", "bound", "cpu_seconds", "versions", "workers"}
 
 PRINTED = Target(id="nsf.table1.bread.error", value=1.2, unit="%", what="position error of bread",
                  paper_ref="Table 1", kind="error", comparator="<=", confidence="exact")

@@ -15,6 +15,7 @@ from .registry import discover, select
 from .report import write_report
 from .results import RESULTS, ROOT, Results
 from .run import Setting, run_all
+from .side_by_side import run_side_by_side
 from .status import status_table, with_status
 
 app = typer.Typer(help=__doc__, add_completion=False, no_args_is_help=True,
@@ -24,6 +25,7 @@ Profile = Annotated[
     Literal["quick", "standard", "paper"],
     typer.Option(help="quick: a minute at most each; standard: hours in all; paper: as printed")]
 Folder = Annotated[Path, typer.Option("--results", help="where results/<profile>/ stands")]
+Workers = Annotated[int, typer.Option(min=1, help="experiments at a time, sharing the cores")]
 Ids = Annotated[list[str] | None, typer.Argument(help="ids or their leading parts; none: all")]
 
 
@@ -38,7 +40,8 @@ def list_experiments(profile: Profile = "quick"):
 
 
 @app.command()
-def run(ids: Ids = None, profile: Profile = "quick", seed: int = 0, results: Folder = RESULTS):
+def run(ids: Ids = None, profile: Profile = "quick", seed: int = 0, results: Folder = RESULTS,
+        workers: Workers = 1):
     """Run experiments, draw their figures and write the report.
 
     A miss is a result; only an experiment or a figure that raises makes the exit code 1.
@@ -51,7 +54,11 @@ def run(ids: Ids = None, profile: Profile = "quick", seed: int = 0, results: Fol
         raise typer.Exit(2) from None
     folder = results / profile
     printed = targets.load()
-    failed = run_all(chosen, Setting(profile, folder, seed, printed, commit(ROOT)))
+    setting = Setting(profile, folder, seed, printed, commit(ROOT))
+    if workers > 1:
+        failed = run_side_by_side(chosen, setting, workers)
+    else:
+        failed = run_all(chosen, setting)
     undrawn = draw_all(Results(folder), about=[e.id for e in chosen])
     _write_report(folder, profile, printed)
     for name in (*failed, *undrawn):

@@ -42,6 +42,14 @@ class Progress:
         self.tick()
         self.say(f"{self.label}: {message}")
 
+    def ended(self, label, budget, message):
+        """One of several experiments that run at a time is over."""
+        self.index, self.done = self.index + 1, self.done + budget
+        self.began = time.perf_counter()
+        self.bar.set_description_str(f"[{self.index}/{self.count}]")
+        self.tick()
+        self.say(f"[{self.index}/{self.count}] {label}: {message}; {self.left():.0f} s left in all")
+
     def left(self):
         """Seconds left, from the budgets and from how fast they were spent so far."""
         elapsed = time.perf_counter() - self.started

@@ -45,6 +45,7 @@ class Record(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     bound: Bound | None = None      # end or ends of the interval that was accepted
     cpu_seconds: float = 0.0
     versions: dict[str, str] = {}
+    workers: int = 1                # experiments that shared the cores
 
 
 class Rule(NamedTuple):

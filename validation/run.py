@@ -27,6 +27,7 @@ class Setting(NamedTuple):
     seed: int = 0
     targets: Mapping = MappingProxyType({})     # the papers' printed numbers by id
     commit: str = "unknown"         # of the source that runs
+    workers: int = 1                # experiments at a time
 
 
 class Run:
@@ -104,7 +105,8 @@ class Run:
         common = {
             "seconds": round(time.perf_counter() - self._wall, 3),
             "cpu_seconds": round(time.process_time() - self._cpu, 3),
-            "seed": self.seed, "command": self._command(), **provenance(self._setting.commit)}
+            "seed": self.seed, "command": self._command(),
+            "workers": self._setting.workers, **provenance(self._setting.commit)}
         records = [Record(**draft, **common) for draft in self._drafts]
         self._write_tables()
         write_records(self._setting.folder / f"{self.experiment.id}.json", records)
@@ -165,6 +167,14 @@ def _csv(columns, rows):
     return text.getvalue().encode()
 
 
+class Outcome(NamedTuple):
+    """How an experiment went."""
+
+    id: str
+    summary: str                    # for a reader: how long, how many passed
+    raised: str | None              # what it raised, with where
+
+
 def run_all(experiments, setting):
     """Run experiments one after the other and write their results.
 
@@ -173,27 +183,28 @@ def run_all(experiments, setting):
     failed = []
     with Progress([e.seconds(setting.profile) for e in experiments]) as progress:
         for experiment in experiments:
-            if not _run_one(experiment, setting, progress):
-                failed.append(experiment.id)
+            progress.begin(experiment.id, experiment.seconds(setting.profile))
+            outcome = attempt(experiment, setting, progress)
+            if outcome.raised:
+                progress.say(outcome.raised)
+                failed.append(outcome.id)
+            progress.end(outcome.summary)
     return failed
 
 
-def _run_one(experiment, setting, progress):
-    """Whether the experiment ran to its end; what it recorded is written in any case."""
-    progress.begin(experiment.id, experiment.seconds(setting.profile))
-    run, error = Run(experiment, setting, progress), None
+def attempt(experiment, setting, progress):
+    """`Outcome` of an experiment; what it recorded is written in any case."""
+    run, raised = Run(experiment, setting, progress), None
     run.note(experiment.title)
     try:
         experiment.function(run)
-    except Exception as raised:
-        error = raised
+    except Exception as error:
+        raised = "".join(traceback.format_exception(error))
         run.fail(error)
-        progress.say("".join(traceback.format_exception(error)))
-    progress.end(_summary(run.finish(), error))
-    return error is None
+    return Outcome(experiment.id, _summary(run.finish(), raised), raised)
 
 
-def _summary(records, error):
+def _summary(records, raised):
     counts = {verdict: sum(r.verdict == verdict for r in records) for verdict in ("pass", "miss")}
-    outcome = f"FAILED ({type(error).__name__})" if error else "done"
+    outcome = "FAILED" if raised else "done"
     return f"{outcome} in {records[0].seconds:.1f} s, {counts['pass']} pass, {counts['miss']} miss"

@@ -1,0 +1,66 @@
+"""Experiments in several processes leave what they leave one after the other."""
+
+import os
+from types import MappingProxyType
+
+from validation.registry import Experiment
+from validation.results import Results
+from validation.run import Setting, run_all
+from validation.side_by_side import run_side_by_side
+
+
+def fall(run):
+    for k in run.progress(3, "heights"):
+        run.record(f"verification.fall.{k}", float(run.rng.random()), comparator="info")
+    run.table("heights", ("h",), [(1.0,)])
+
+
+def rise(run):
+    with run.progress(2, "heights") as bar:
+        bar.update(2)
+    run.record("verification.rise.error", 1.0, comparator="info")
+
+
+def breaks(run):
+    raise ArithmeticError("no ground")
+
+
+def dies(run):
+    os._exit(3)
+
+
+def tells(run):
+    run.record("verification.tells.id", os.getpid(), comparator="info")
+
+
+def toys(*functions):
+    return [Experiment(f"verification.{f.__name__}", "A toy", ("quick",), {"quick": 1.0}, f)
+            for f in functions]
+
+
+def numbers(folder, id):
+    return [(r.target, r.value, r.verdict, r.note) for r in Results(folder).records(id)]
+
+
+def test_results_are_those_of_one_process(tmp_path):
+    setting = Setting("quick", tmp_path / "one", commit="abc", targets=MappingProxyType({}))
+    assert run_all(toys(fall, rise, breaks), setting) == ["verification.breaks"]
+    apart = setting._replace(folder=tmp_path / "two")
+    assert run_side_by_side(toys(fall, rise, breaks), apart, 2) == ["verification.breaks"]
+    for id in ("verification.fall", "verification.rise", "verification.breaks"):
+        assert numbers(tmp_path / "one", id) == numbers(tmp_path / "two", id) != []
+    assert (tmp_path / "two" / "verification.fall.heights.csv").read_text() == "h\n1.0\n"
+    assert {r.workers for r in Results(tmp_path / "two").records("verification.fall")} == {2}
+
+
+def test_it_is_another_process_that_runs_them(tmp_path):
+    setting = Setting("quick", tmp_path, commit="abc")
+    assert run_side_by_side(toys(tells), setting, 2) == []
+    (_, pid, *_), = (n for n in numbers(tmp_path, "verification.tells") if n[1] is not None)
+    assert pid != os.getpid()
+
+
+def test_process_that_dies_is_a_failure(tmp_path, capsys):
+    failed = run_side_by_side(toys(dies), Setting("quick", tmp_path), 1)
+    assert failed == ["verification.dies"]
+    assert "its process ended" in capsys.readouterr().err
