@@ -44,10 +44,11 @@ def of_problem(problem):
 
 
 def solver_of(stepper):
-    """Method and tolerance of an implicit stepper, else None."""
+    """Method and tolerances of an implicit stepper, else None."""
     if not stepper.implicit:
         return None
-    return {"method": stepper.options.method, "eps": stepper.options.eps}
+    options = stepper.options
+    return {"method": options.method, "eps": options.eps, "cells": options.cells}
 
 
 def of_results(path):
