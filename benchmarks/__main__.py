@@ -171,6 +171,38 @@ def hot_line(row):
 
 
 @app.command()
+def hot_runs(
+    runs: Annotated[str, typer.Option(help="of hot_runs.RUNS, comma-separated; none: all")] = "",
+    threads: int = 1,
+    out: Path = Path("results/benchmarks/hot_runs.json"),
+):
+    """CPU time of some implicit steps of whole runs, by our variants, beside the public code's."""
+    from mpm_ref.core.jit import set_threads
+
+    from .hot_runs import RUNS, run_rows
+
+    set_threads(threads)
+    rows = []
+    with threadpoolctl.threadpool_limits(threads):
+        for name in runs.split(",") if runs else RUNS:
+            found = run_rows(name)
+            rows += found
+            for row in found:
+                typer.echo(run_line(row))
+    save(out, rows, threads, 1)
+
+
+def run_line(row):
+    """One line of the table of runs."""
+    public = "" if row["public_cpu_s"] is None else (
+        f"  x {row['cpu_s'] / row['public_cpu_s']:.2f} of the public code")
+    return (f"{row['run']:12} {row['particles']:6} particles {row['nodes']:6} nodes  "
+            f"{row['variant']:20} {row['cpu_s']:7.3f} s a step, most {row['most_cpu_s']:.3f}  "
+            f"x {row['cpu_ratio']:.2f}  iterations {row['iterations']:.1f}, most "
+            f"{row['most_iterations']}{public}")
+
+
+@app.command()
 def start(name: str, size: str = "100k", threads: int = 2):
     """Seconds to the end of the first step, and peak memory per particle, of one backend in this
     process, as JSON.

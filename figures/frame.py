@@ -14,6 +14,7 @@ import traceback
 from pathlib import Path
 
 import matplotlib as mpl
+import matplotlib.pyplot as plt
 from tqdm import tqdm
 
 from validation.record import write_whole
@@ -84,7 +85,7 @@ def _save(script, name, results):
         about = {"Source": script.NEEDS[0], "Description": caption, "Software": None}
         _write(figure, results.folder / "figures" / f"{name}.png", about)
         _write(figure, results.folder / "figures" / f"{name}.pdf", {"CreationDate": None})
-    figure.clear()
+    plt.close(figure)
 
 
 def _scale(script, results):

@@ -11,6 +11,7 @@ from validation.hot import begun as states
 from validation.hot.overview import ABLATION, Cost, options, overview
 from validation.trade.hot import POINT
 from validation.trade.hot_scenes import fastest, known, seconds, trust
+from validation.trade.hot_start import beginnings, carried
 
 
 def falling():
@@ -139,3 +140,20 @@ def test_solves_cut_short_are_not_fast():
 def test_no_error_is_known_better_than_the_reference():
     rows = [row("pn-pcg", 1e-7, 1.0, 0.0), row("pn-pcg", 1e-6, 1.0, 1e-2)]
     assert [r[4] for r in known(rows, 1e-4)] == [1e-4, 1e-2]
+
+
+def test_last_increments_are_carried_node_by_node():
+    index, dv = np.array([[0, 1], [2, 3]]), np.array([[1.0, 2.0], [3.0, 4.0]])
+    found = carried(index, dv, np.array([[2, 3], [5, 5], [0, 1]]))
+    np.testing.assert_array_equal(found, [[3.0, 4.0], [0.0, 0.0], [1.0, 2.0]])
+
+
+def test_starts_of_a_step_are_admissible(kept):
+    problem, state = states.begun("block", "quick")
+    first, second = states.steps(problem, state, 2)
+    q = second.pose.unknowns
+    begin = beginnings(second, (first.pose.unknowns.index, np.ones_like(first.pose.unknowns.v)))
+    np.testing.assert_array_equal(begin["zero"], q.dv0)
+    np.testing.assert_allclose(begin["gravity"], [[0.0, -9.8 * second.dt]] * len(q.m), rtol=1e-14)
+    assert set(np.unique(begin["last"])) <= {0.0, 1.0}
+    assert begin["last"].any()

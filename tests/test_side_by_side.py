@@ -3,10 +3,10 @@
 import os
 from types import MappingProxyType
 
-from validation.registry import Experiment
+from validation.registry import Experiment, discover
 from validation.results import Results
 from validation.run import Setting, run_all
-from validation.side_by_side import run_side_by_side
+from validation.side_by_side import known, run_side_by_side
 
 
 def fall(run):
@@ -33,9 +33,13 @@ def tells(run):
     run.record("verification.tells.id", os.getpid(), comparator="info")
 
 
-def toys(*functions):
-    return [Experiment(f"verification.{f.__name__}", "A toy", ("quick",), {"quick": 1.0}, f)
-            for f in functions]
+def toy(id):
+    function = globals()[id.removeprefix("verification.")]
+    return Experiment(id, "A toy", ("quick",), {"quick": 1.0}, function)
+
+
+def toys(*names):
+    return [toy(f"verification.{name}") for name in names]
 
 
 def numbers(folder, id):
@@ -44,23 +48,29 @@ def numbers(folder, id):
 
 def test_results_are_those_of_one_process(tmp_path):
     setting = Setting("quick", tmp_path / "one", commit="abc", targets=MappingProxyType({}))
-    assert run_all(toys(fall, rise, breaks), setting) == ["verification.breaks"]
     apart = setting._replace(folder=tmp_path / "two")
-    assert run_side_by_side(toys(fall, rise, breaks), apart, 2) == ["verification.breaks"]
-    for id in ("verification.fall", "verification.rise", "verification.breaks"):
-        assert numbers(tmp_path / "one", id) == numbers(tmp_path / "two", id) != []
+    three = toys("fall", "rise", "breaks")
+    assert run_all(three, setting) == ["verification.breaks"]
+    assert run_side_by_side(three, apart, 2, toy) == ["verification.breaks"]
+    for e in three:
+        assert numbers(tmp_path / "one", e.id) == numbers(tmp_path / "two", e.id) != []
     assert (tmp_path / "two" / "verification.fall.heights.csv").read_text() == "h\n1.0\n"
     assert {r.workers for r in Results(tmp_path / "two").records("verification.fall")} == {2}
 
 
 def test_it_is_another_process_that_runs_them(tmp_path):
     setting = Setting("quick", tmp_path, commit="abc")
-    assert run_side_by_side(toys(tells), setting, 2) == []
+    assert run_side_by_side(toys("tells"), setting, 2, toy) == []
     (_, pid, *_), = (n for n in numbers(tmp_path, "verification.tells") if n[1] is not None)
     assert pid != os.getpid()
 
 
+def test_processes_know_every_experiment():
+    experiments = discover().experiments
+    assert all(known(id) == experiment for id, experiment in experiments.items())
+
+
 def test_process_that_dies_is_a_failure(tmp_path, capsys):
-    failed = run_side_by_side(toys(dies), Setting("quick", tmp_path), 1)
+    failed = run_side_by_side(toys("dies"), Setting("quick", tmp_path), 1, toy)
     assert failed == ["verification.dies"]
     assert "its process ended" in capsys.readouterr().err

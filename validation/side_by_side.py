@@ -7,6 +7,7 @@ another experiment they are less quiet, and each record's `workers` says so.
 
 import os
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from functools import cache
 from multiprocessing import get_context
 
 import numba
@@ -16,17 +17,26 @@ from tqdm import tqdm
 from mpm_ref.core.jit import set_threads
 
 from .progress import Progress
+from .registry import discover
 from .run import attempt
 
 
-def run_side_by_side(experiments, setting, workers):
-    """As `run.run_all`, so many at a time, those that take longest first."""
+@cache
+def known(id):
+    """The experiment of that id."""
+    return discover().experiments[id]
+
+
+def run_side_by_side(experiments, setting, workers, find=known):
+    """As `run.run_all`, so many at a time, those that take longest first. Each process asks
+    find(id) for its experiments, since functions made by functions cannot be sent to it.
+    """
     longest = sorted(experiments, key=lambda e: -e.seconds(setting.profile))
     setting = setting._replace(targets=dict(setting.targets), workers=workers)
     failed = []
     with (Progress([e.seconds(setting.profile) for e in experiments]) as progress,
           ProcessPoolExecutor(workers, get_context("spawn"), take_share, (workers,)) as pool):
-        coming = {pool.submit(attempt, e, setting, Silent()): e for e in longest}
+        coming = {pool.submit(apart, find, e.id, setting): e for e in longest}
         try:
             for future in as_completed(coming):
                 experiment = coming[future]
@@ -39,6 +49,11 @@ def run_side_by_side(experiments, setting, workers):
             pool.shutdown(wait=False, cancel_futures=True)
             raise
     return failed
+
+
+def apart(find, id, setting):
+    """`Outcome` of an experiment in this process."""
+    return attempt(find(id), setting, Silent())
 
 
 def what_came(future):

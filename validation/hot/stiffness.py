@@ -12,6 +12,8 @@ from ..verification.scenes import shipped, with_
 SCENE = "hot_stiffness"
 PER_CELL = 12
 METHODS = ("hot", "lbfgs-h", "pn-pcg", "pn-pcg-mf", "pn-mgpcg")     # the five of Figure 20
+SPACINGS = (0.04, 0.03, 0.02, 0.015)        # of HOT alone [m], for how it depends on the size
+STEPS_OF_SIZES = 6
 FLAT = 3.0      # growth of HOT's iterations over the sweep that still counts as close to flat: a
                 # prototype with few nodes saw 2.5, the authors' code 1.2 with more
 
@@ -70,7 +72,24 @@ def stiffness(run):
                comparator="<=", bound=FLAT, scale=scale,
                note=f"outer iterations at E = {moduli[-1]:.0e} Pa over those at {moduli[0]:.0e} "
                "Pa; the paper calls its curve close to flat")
+    sizes(run, *run.choose(quick=((), ()), standard=(SPACINGS, (1e5, 1e9, 1e10))))
     run.table("costs", Cost._fields, list(costs.values()))
+
+
+def sizes(run, spacings, moduli):
+    """HOT's iterations at some moduli over spacings [m], and how they grow with the first one."""
+    for method in ("hot", "hot-plus"):
+        for dx in run.progress(spacings, f"sizes, {method}"):
+            found = [cost(dx, E, method, STEPS_OF_SIZES) for E in moduli]
+            per_step = [c.iterations for c, _ in found]
+            run.record(f"hot.fig20.{method}.size{found[0][1]}", per_step[-1] / per_step[0],
+                       unit="1", comparator="info", scale=f"{found[0][1]} particles, "
+                       f"{STEPS_OF_SIZES} steps, dx = {dx} m",
+                       note=f"iterations per step at {moduli[-1]:.0e} Pa over those at "
+                       f"{moduli[0]:.0e} Pa; "
+                       + ", ".join(f"{E:.0e}: {n:.1f}" for E, n in zip(moduli, per_step,
+                                                                       strict=True))
+                       + ("" if all(c.converged for c, _ in found) else "; not all converged"))
 
 
 def record_cost(run, c, hot, scale):

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mpm_ref.hot.methods import METHODS
+from mpm_ref.hot.methods import METHODS, RULES
 
 from ..hot.begun import begun, particles, steps
 from ..hot.one_step import after, difference, solved
@@ -37,6 +37,7 @@ KNOBS = {
     "renew shortened": {"renew": "shortened"},
     "renew stale": {"renew": "stale"},
     "start gravity": {"start": "gravity"},
+    "shorter trials": {"search": RULES._replace(shrink=0.2)},
 }
 SETTINGS = {name: replace(METHODS["hot"], **knob) for name, knob in KNOBS.items()}
 SETTINGS["hot-plus"] = METHODS["hot-plus"]

@@ -1,0 +1,86 @@
+"""Steps of whole runs: HOT as published and our variants, on the same states in turn.
+
+The public code of HOT was timed for this project on two cores of the kind that ours runs on, on
+scenes that are not in its release. Those here have as many particles of as stiff a material, no
+more: `public` is for orientation, and only ratios between our own variants are of one run. Times
+are CPU seconds from the particles to the accepted increment.
+"""
+
+from pathlib import Path
+from time import process_time
+from typing import NamedTuple
+
+import numpy as np
+
+from mpm_ref.hot.methods import minimise
+from mpm_ref.scene import build, load
+from mpm_ref.simulate import State
+from validation.hot.begun import begun, particles, steps
+from validation.hot.stiffness import bar
+from validation.verification.scenes import with_
+
+SCENES = Path(__file__).parent / "scenes"
+VARIANTS = {                        # the first is what the others are relative to
+    "hot": ("hot", {}),
+    "hot-plus": ("hot-plus", {}),
+    "pn-mgpcg, flexible": ("pn-mgpcg", {"flexible": True}),
+}
+
+
+class Timed(NamedTuple):
+    """Some steps of a run."""
+
+    begin: callable             # -> (`Problem`, `State` before the first of them)
+    steps: int
+    public: float | None        # CPU seconds per step of the public code on a like scene
+
+
+def started(scene):
+    """(`Problem`, `State` at its start) of a scene."""
+    problem = build(with_(scene, every=1, interval=None, unstable="allow"))
+    state = State(problem.bodies)
+    problem.stepper().start(state.bodies)
+    return problem, state
+
+
+RUNS = {
+    "drop": Timed(lambda: started(load(SCENES / "drop.toml")), 12, 1.43),
+    "sphere": Timed(lambda: started(load(SCENES / "sphere.toml")), 5, 3.1),
+    "bar": Timed(lambda: started(bar(0.015, 1e9, "hot", 40)), 12, 1.1),
+    "metal": Timed(lambda: begun("aluminium", "quick"), 8, 0.39),
+    "metal-fine": Timed(lambda: begun("aluminium", "standard"), 5, None),
+    "twist": Timed(lambda: started(bar(0.0228, 1e9, "hot", 40)), 12, None),
+}
+
+
+def run_rows(name):
+    """A row for every variant: what the steps of a run took, the first one left out, in which
+    kernels are compiled.
+    """
+    run = RUNS[name]
+    problem, state = run.begin()
+    taken = {variant: [] for variant in VARIANTS}
+    for step in steps(problem, state, run.steps + 1):
+        for variant, words in VARIANTS.items():
+            taken[variant].append(timed(step, *words))
+    where = {"run": name, "particles": particles(problem), "nodes": len(step.pose.unknowns.m),
+             "steps": run.steps, "public_cpu_s": run.public}
+    rows = [where | row_of(variant, done[1:]) for variant, done in taken.items()]
+    return [row | {"cpu_ratio": row["cpu_s"] / rows[0]["cpu_s"]} for row in rows]
+
+
+def timed(step, method, options):
+    """(CPU seconds, report) of a step's solve, from its particles on."""
+    start = process_time()
+    pose = step.stepper.pose(step.bodies, step.t, step.dt)
+    report = minimise(step.stepper.system(pose), method, **options).report
+    return process_time() - start, report
+
+
+def row_of(variant, done):
+    """What a variant took, by (CPU seconds, report) of each step."""
+    seconds, reports = zip(*done, strict=True)
+    counts = [report.iterations for report in reports]
+    return {"variant": variant, "cpu_s": float(np.mean(seconds)), "most_cpu_s": max(seconds),
+            "iterations": float(np.mean(counts)), "most_iterations": max(counts),
+            "converged": all(report.converged for report in reports)}

@@ -1,0 +1,87 @@
+"""The increment that a solve of HOT begins with: none, as printed; the fall, as the release; or
+that of the last step, which is what a run of smooth motions would suggest.
+
+The last increment is taken node by node, zero where a node had no matter, and made admissible. All
+three solve the same steps to the same tolerance, and are compared with what is nearly exact.
+"""
+
+import numpy as np
+
+from mpm_ref.hot.methods import minimise
+from mpm_ref.hot.unknowns import free_part
+
+from ..hot.begun import BEGUN, begun, particles, steps
+from ..hot.one_step import difference, solved
+from ..registry import experiment
+
+STARTS = ("zero", "gravity", "last")
+EPS, EXACT = 1e-8, 1e-10
+CAPS = {"iterations": 1000}
+COLUMNS = ("scene", "step", "start", "cpu", "iterations", "cells", "converged")
+
+
+@experiment("trade.hot.start", title="HOT: what a solve begins with",
+            profiles=("quick", "standard"), budget={"quick": 3, "standard": 300})
+def start(run):
+    """Time of each start over that of zero, scene by scene."""
+    names, count = run.choose(quick=(("sauce",), 2), standard=(tuple(BEGUN), 4))
+    rows = []
+    for name in run.progress(names, "scenes"):
+        found, scale = scene_rows(name, count)
+        rows += found
+        record_scene(run, name, found, scale)
+    run.table("solves", COLUMNS, rows)
+
+
+def scene_rows(name, count):
+    """(rows of `COLUMNS`, scale) of so many steps of a scene; the first gives the second its last
+    increment and no more.
+    """
+    problem, state = begun(name, "quick")
+    rows, last = [], None
+    for k, step in enumerate(steps(problem, state, count)):
+        exact = solved(step, "pn-mgpcg", eps=EXACT, flexible=True, **CAPS).dv
+        if last is not None:
+            rows += [(name, k, start, *solve(step, begin, exact))
+                     for start, begin in beginnings(step, last).items()]
+        last = step.pose.unknowns.index, exact
+    return rows, f"{particles(problem)} particles, {count - 1} steps, eps = {EPS:g}"
+
+
+def beginnings(step, last):
+    """{start: increment (n, d)} of a step, whose predecessor took the increments last."""
+    q = step.pose.unknowns
+    fall = np.broadcast_to(step.pose.falling, q.dv0.shape)
+    return {"zero": q.dv0, "gravity": q.dv0 + free_part(q, fall),
+            "last": q.dv0 + free_part(q, carried(*last, q.index))}
+
+
+def carried(index, dv, to):
+    """The increments dv of the nodes `index` at the nodes `to`; zero where there was none."""
+    known = dict(zip(map(tuple, index.tolist()), dv, strict=True))
+    none = np.zeros(dv.shape[1])
+    return np.array([known.get(tuple(node), none) for node in to.tolist()])
+
+
+def solve(step, begin, exact):
+    """CPU seconds, iterations, error of displacement [dx], converged of HOT from an increment."""
+    system = step.stepper.system(step.pose)
+    system.start = begin
+    found = minimise(system, "hot", eps=EPS, **CAPS)
+    r = found.report
+    return (sum(r.seconds.values()), r.iterations, difference(step, found.dv, exact)[1],
+            r.converged)
+
+
+def record_scene(run, name, rows, scale):
+    """Times of the two others over that of zero, all steps together."""
+    total = {start: sum(row[3] for row in rows if row[2] == start) for start in STARTS}
+    for start in STARTS[1:]:
+        own = [row for row in rows if row[2] == start]
+        zero = [row for row in rows if row[2] == "zero"]
+        run.record(f"trade.hot.start.{name}.{start}", total[start] / total["zero"],
+                   comparator="info", scale=scale,
+                   note=f"CPU time over that from zero, {total['zero']:.3f} s; iterations "
+                   f"{[row[4] for row in own]} for {[row[4] for row in zero]}; errors at most "
+                   f"{max(row[5] for row in own):.1e} for {max(row[5] for row in zero):.1e} dx"
+                   + ("" if all(row[6] for row in own + zero) else "; not all converged"))
