@@ -36,7 +36,8 @@ class Cost(NamedTuple):
 
 
 @experiment("hot.fig19", title="ArmaCat: geometric and node-embedding multigrid",
-            profiles=("quick", "standard"), budget={"quick": 15, "standard": 500})
+            profiles=("quick", "standard", "paper"),
+            budget={"quick": 15, "standard": 500, "paper": 14400})
 def coarse_grids(run):
     """CG by residual in one step, and by step; L-BFGS with either multigrid."""
     one = first(build(scene(CAT, "quick")))
@@ -110,7 +111,7 @@ def all_converged(costs, method):
 
 def elsewhere(run):
     """`Cost`s of L-BFGS with either multigrid on other scenes."""
-    count, costs = run.choose(quick=1, standard=5), []
+    count, costs = run.choose(quick=1, standard=5, paper=5), []
     for name in ELSEWHERE:
         problem, state = begun(name, run.profile)
         new = [cost(name, k, way, iterates(step, way, iterations=CAP))

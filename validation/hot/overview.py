@@ -105,12 +105,13 @@ def compiled(methods):
 
 
 @experiment("hot.fig15", title="Speed-up overview: every method on every scene, over HOT's time",
-            profiles=("quick", "standard"), budget={"quick": 15, "standard": 750})
+            profiles=("quick", "standard", "paper"),
+            budget={"quick": 15, "standard": 750, "paper": 36000})
 def speedups(run):
     """Total and worst-step time of all methods on all scenes, beside the printed ranges."""
-    names, count = run.choose(quick=(QUICK, 1), standard=(PRINTED, 3))
+    names, count = run.choose(quick=(QUICK, 1), standard=(PRINTED, 3), paper=(PRINTED, 3))
     caps = run.choose(quick={"iterations": 15, "cg_iterations": 300},
-                      standard={"iterations": 30, "cg_iterations": 1000})
+                      standard={"iterations": 30, "cg_iterations": 1000}, paper={})
     compiled(METHODS)
     rows, table = [], {}
     for name in run.progress(names, "scenes"):
@@ -175,7 +176,7 @@ def record_claims(run, table):
 def record_stiff(run):
     """Gast15 over HOT in the bar of Figure 20 with a stiff middle."""
     count = 3
-    dx = run.choose(quick=0.03, standard=0.02)
+    dx = run.choose(quick=0.03, standard=0.02, paper=0.0075)
     step = after(with_(bar(dx, STIFF, "hot", count), every=1), count)
     gast, hot = (solved(step, method, **options(method, {"iterations": 200})).report
                  for method in ("gast15", "hot"))
@@ -194,10 +195,12 @@ def in_words(table):
 
 
 @experiment("hot.fig11", title="Faceless: time of each step by HOT and by projected Newton",
-            profiles=("quick", "standard"), budget={"quick": 6, "standard": 300})
+            profiles=("quick", "standard", "paper"),
+            budget={"quick": 6, "standard": 300, "paper": 3600})
 def faceless(run):
     """Consecutive steps of one scene by three methods, from the same states."""
-    since, count = run.choose(quick=(BEGUN["faceless"], 10), standard=(0.0, PULLED))
+    since, count = run.choose(quick=(BEGUN["faceless"], 10), standard=(0.0, PULLED),
+                              paper=(0.0, PULLED))
     problem, state = begun("faceless", run.profile, since)
     compiled(FACELESS)
     rows = []

@@ -54,10 +54,11 @@ def cost(name, short, particles, done):
 
 
 @experiment("hot.table3", title="Gauss-Seidel against Jacobi as preconditioner of Newton's CG",
-            profiles=("quick", "standard"), budget={"quick": 10, "standard": 200})
+            profiles=("quick", "standard", "paper"),
+            budget={"quick": 10, "standard": 200, "paper": 14400})
 def table3(run):
     """CG iterations and time of both on every scene, beside the printed ones."""
-    names, count = run.choose(quick=(QUICK, 2), standard=(PRINTED, 5))
+    names, count = run.choose(quick=(QUICK, 2), standard=(PRINTED, 5), paper=(PRINTED, 5))
     reports(*begun(names[0], "quick"), 1)                     # compiles
     rows = {}
     for name in run.progress(names, "scenes"):

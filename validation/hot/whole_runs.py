@@ -5,17 +5,19 @@ figures draw and which is not published. A scene that is there, run by the same 
 package, is not run again: records say at which commit it was.
 """
 
+from math import inf
+
 import numpy as np
 
 from mpm_ref.hot.methods import METHODS
 
 from ..registry import experiment
 from .course import COLUMNS, course
-from .sizes import sized
+from .sizes import SIZES, sized
 
 METHOD = "hot"
 ROWS = 500          # of the table, at most
-PATIENCE = 900      # CPU seconds of a whole run, at most
+PATIENCE = 900      # CPU seconds of a whole run, at most, unless it is of the printed size
 BALANCE = 1e-9      # round-off of a sum over all particles and nodes, with forces that cancel
 
 
@@ -23,21 +25,27 @@ def declared(scene, seconds, quick=None):
     """The experiment ``hot.scenes.<scene>``, which takes so many seconds; `quick`: seconds of the
     motion that the quick profile runs, where it does.
     """
-    profiles = ("quick", "standard") if quick else ("standard",)
+    profiles = ["standard"] + ["quick"] * bool(quick)
+    profiles += ["paper"] * (SIZES[f"hot_{scene}"].paper is not None)
 
     @experiment(f"hot.scenes.{scene}", title=f"{scene.capitalize()}: a whole run by HOT",
-                profiles=profiles, budget={"quick": 6, "standard": seconds})
+                profiles=profiles, budget={"quick": 6, "standard": seconds, "paper": 1e5})
     def whole_run(run):
         """Runs the scene and records what its steps took."""
-        end = run.choose(quick={"end": quick}, standard={})
-        of_scene(run, scene, sized(f"hot_{scene}", "quick", unstable="allow", **end))
+        end = run.choose(quick={"end": quick}, standard={}, paper={})
+        size, patience = run.choose(quick=("quick", PATIENCE), standard=("quick", PATIENCE),
+                                    paper=("paper", inf))
+        made = sized(f"hot_{scene}", size, unstable="allow", **end)
+        of_scene(run, scene, made, patience)
     return whole_run
 
 
-def of_scene(run, name, scene):
-    """Run a scene, or read what is known of its run; records and table."""
+def of_scene(run, name, scene, patience):
+    """Run a scene, for so many CPU seconds at most, or read what is known of its run; records and
+    table.
+    """
     file = run.folder / "states" / f"{name}.npz"
-    known = course(scene, file, PATIENCE)
+    known = course(scene, file, patience)
     run.table("steps", COLUMNS, thinned(known.steps))
     record_end(run, name, known)
     record_cost(run, name, known)
