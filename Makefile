@@ -9,7 +9,7 @@ PIP   := $(PY) -m pip --disable-pip-version-check
 READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce test test-long standard figures bench learn clean
+.PHONY: help reproduce test standard figures bench learn clean
 
 help:            ## this list
 	@sed -n 's/^\([a-z-]*\): [^#]*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 14
@@ -17,12 +17,9 @@ help:            ## this list
 reproduce: $(READY) ## every experiment at the quick profile -> results/quick/report.html and report.md
 	$(PY) -m validation run --profile quick --workers $(WORKERS)
 
-test: $(READY)   ## lint and the test suite, without the tests marked `long`
+test: $(READY)   ## lint and the test suite
 	$(PY) -m ruff check .
 	$(PY) -m pytest -n $(WORKERS) --dist loadfile
-
-test-long: $(READY) ## the tests marked `long`
-	$(PY) -m pytest -m long
 
 standard: $(READY) ## every experiment at the standard profile (hours) -> results/standard
 	$(PY) -m validation run --profile standard
@@ -30,9 +27,12 @@ standard: $(READY) ## every experiment at the standard profile (hours) -> result
 figures: $(READY) ## draw the figures again from the results of PROFILE (default: quick)
 	$(PY) -m figures --profile $(PROFILE)
 
-bench: $(READY)  ## our kernels beside Taichi and Warp (installs both)
+bench: $(READY)  ## our kernels beside Taichi and Warp (installs both), features, implicit steps
 	$(PIP) install -c constraints.txt -e '.[bench]'
-	$(PY) -m benchmarks
+	$(PY) -m benchmarks blocks
+	$(PY) -m benchmarks features
+	$(PY) -m benchmarks hot
+	$(PY) -m benchmarks hot-runs
 
 # PyPI's torch for Linux is the CUDA build: about 2.7 GB of wheels. The CPU build (0.2 GB) has an
 # index of its own, which the README tells how to find: make learn TORCH_INDEX=<that address>.

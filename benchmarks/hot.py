@@ -22,7 +22,6 @@ from validation.hot.one_step import Step, after
 from validation.hot.preconditioners import OURS, cost, one_thread
 from validation.hot.stiffness import bar
 from validation.hot.stretched import FRAME, stretched
-from validation.verification.scenes import with_
 
 THEIRS = "aggregation-rigid"        # pyamg's, of `validation.hot.preconditioners`
 METHODS = {                         # the first is what the others are relative to
@@ -43,7 +42,7 @@ class Part(NamedTuple):
 
 def twist(dx=0.0228):
     """`Step` of the twisted bar."""
-    return after(with_(bar(dx, 1e9, "hot", 3), every=1), 3)
+    return after(bar(dx, 1e9, "hot", 3), 3)
 
 
 def box(dx=1.0 / 16.0):

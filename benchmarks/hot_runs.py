@@ -37,7 +37,7 @@ class Timed(NamedTuple):
 
 def started(scene):
     """(`Problem`, `State` at its start) of a scene."""
-    problem = build(with_(scene, every=1, interval=None, unstable="allow"))
+    problem = build(with_(scene, unstable="allow"))
     state = State(problem.bodies)
     problem.stepper().start(state.bodies)
     return problem, state

@@ -114,7 +114,7 @@ def check(problem, state, dt):
         astray = ~(np.isfinite(cfl) & np.isfinite(body.particles.x).all(axis=1))
         _stop_where(problem, state, body, dt, astray, "a position or velocity is not finite")
         _stop_where(problem, state, body, dt, ~(cfl <= problem.limits.cfl),
-                    f"a particle crosses more than {problem.limits.cfl:g} cells in a step")
+                    f"a particle crosses more than {problem.limits.cfl:g} dx in a step")
     if state.account is not None:
         now = energy(state.bodies, problem.gravity, problem.inertia)
         growth = problem.limits.growth + swing(dt, state.bound)

@@ -16,6 +16,7 @@ from .monitor import CHECK, Account, account, check, lost, runs_away
 from .timestep import advective, refuse, stable_dt
 
 SORT = 64        # steps between physical sorts of the particles by cell
+AHEAD = 0.01     # of a step, or of a second, over which the speed of parts is taken
 REBOUND = 10     # steps between evaluations of the stable time step
 EVEN = 1e-9      # of a step: a frame or end this near is met, whatever the sum of the steps lost
 
@@ -83,7 +84,7 @@ def advance(problem, stepper, state):
         stepper.sort(state.bodies)
     if bound_is_due(problem.clock, state):
         state.bound = rebound(problem, stepper, state)
-    dt = next_dt(problem.clock, state, swiftest(problem, state))
+    dt = next_dt(problem.clock, state, swiftest(problem, stepper, state))
     stepper.step(state.bodies, state.t, dt)
     if problem.clip is not None:
         keep_inside(state.bodies, *problem.clip)
@@ -115,12 +116,21 @@ def rebound(problem, stepper, state):
     return terms.dt
 
 
-def swiftest(problem, state):
-    """Advective bound of dt as of now [s]; an adaptive step may not wait for the next `rebound`."""
-    if problem.clock.dt is not None:
+def swiftest(problem, stepper, state):
+    """Advective bound of dt as of now [s]; an adaptive step may not wait for the next `rebound`.
+
+    An implicit step ends with the velocities that parts give, so their speed now bounds it too, as
+    in the release of HOT (HOT-dt).
+    """
+    clock = problem.clock
+    if clock.dt is not None:
         return inf
     particles = (body.particles for body in state.bodies)
-    return min(advective(q, problem.dx, 0.0, problem.gravity) for q in particles)
+    bound = min(advective(q, problem.dx, 0.0, problem.gravity) for q in particles)
+    if not stepper.implicit:
+        return bound
+    u = stepper.driven(state.bodies, state.t, AHEAD * min(next_dt(clock, state, bound), 1.0))
+    return min(bound, problem.dx / u) if u > 0.0 else bound
 
 
 def next_dt(clock, state, advective_bound):

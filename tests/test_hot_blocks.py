@@ -41,7 +41,7 @@ def test_products_diagonals_and_inverses(c, rng):
     assert reach_of(A, c.index) == 2
 
 
-def test_sweeps_keep_their_products(c, rng):
+def test_sweeps_keep_their_products(c, rng):                           # HOT-smoother
     b = np.einsum("iab,ib->ia", c.B, rng.standard_normal(c.index.shape))
     D = diagonal_blocks(c.A)
     D_inv = inverses(D, onto_range(D))

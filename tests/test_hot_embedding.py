@@ -27,7 +27,7 @@ def spline(x, kernel):
 
 
 @pytest.mark.parametrize("kernel", KERNELS)
-def test_weights_are_those_of_the_spline_at_every_pair(d, kernel, rng):
+def test_weights_are_those_of_the_spline_at_every_pair(d, kernel, rng):        # HOT-impl
     index = ragged(d, rng)
     W, coarse = embed(index, kernel)
     assert W.sum(axis=1) == pytest.approx(1.0, abs=1e-15)          # HOT-eq4: constants are kept

@@ -169,7 +169,7 @@ def test_patience_bears_a_slow_descent():
 
 # Options.
 
-def test_default_is_hot_as_printed():
+def test_default_is_hot_as_printed():                                  # HOT-alg3, HOT-smoother
     hot = METHODS["hot"]
     assert hot == Options()
     assert (hot.window, hot.levels, hot.kernel, hot.eps) == (8, 3, "linear", 1e-7)

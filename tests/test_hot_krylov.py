@@ -76,7 +76,7 @@ def test_pcg_asks_its_tolerance_with_the_energy_norm_of_the_right_hand_side(prob
     assert asked == [pytest.approx(np.sqrt(np.sum(b * inverse(b))))]
 
 
-def test_tolerance_of_newton_as_printed():
+def test_tolerance_of_newton_as_printed():                             # HOT-sec5.3-k
     assert newton_tolerance(0.01, 1e-9) == pytest.approx(0.1)       # sqrt(size)
     assert newton_tolerance(1e-9, 1e-4) == pytest.approx(1e-2)      # sqrt(tau)
     assert newton_tolerance(100.0, 1e-9) == 0.5                     # at most 1/2

@@ -143,7 +143,7 @@ def free_cycle(c, index, b):
 
 
 @pytest.mark.parametrize("path", PATHS)
-def test_the_cycle_is_the_textbook_s_in_free_coordinates(d, path, rng):
+def test_the_cycle_is_the_textbook_s_in_free_coordinates(d, path, rng):        # HOT-eq3, HOT-eq4
     c = small(d)
     b = rng.standard_normal(c.index.shape)
     u = hierarchy(c.A, c.index, 2, path=path, coarsest="direct").cycle(b)
@@ -212,7 +212,7 @@ def test_a_lone_node_hangs_on_more_coarse_nodes_than_it_fixes(d, dense_up_to, pa
     close(u[:-1], hierarchy(c.A, c.index, 3, path=path, coarsest="direct").cycle(b[:-1]))
 
 
-def test_slabs_of_one_colour_do_not_couple(d):
+def test_slabs_of_one_colour_do_not_couple(d):                         # HOT-smoother
     c = small(d)
     slab = c.index[:, 0] // SLAB
     row = np.repeat(np.arange(len(c.index)), np.diff(c.A.indptr))

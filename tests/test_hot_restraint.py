@@ -8,7 +8,7 @@ from mpm_ref.core.grid import Grid
 from mpm_ref.core.levelset import half_space, sphere
 from mpm_ref.core.motion import Motion, Steady
 from mpm_ref.core.state import NONE
-from mpm_ref.hot.restraint import BEARS, FREE, HOLDS, Restraint
+from mpm_ref.hot.restraint import BEARS, FREE, HOLDS, LETS, Restraint
 from mpm_ref.hot.unknowns import free_part, unknowns_of
 
 DX = 0.5
@@ -120,3 +120,18 @@ def test_conditions_that_touch_nothing_change_nothing():
     restraint, q = restrained([Collider(sphere((90.0, 0.0), 1.0))])
     assert not q.dv0.any()
     assert restraint.revise(q.v, q.v) == 0
+
+
+def test_a_plane_that_comes_and_goes_ends_bearing():
+    floor = Collider(half_space((0.0, 0.0), (0.0, 1.0)), "separate")
+    restraint, q = restrained([floor])
+    node = restraint.contacts.node
+    up, down = q.v.copy(), q.v.copy()
+    up[node, 1], down[node, 1] = 1.0, -1.0
+    pulled, pushed = np.zeros_like(q.v), np.zeros_like(q.v)
+    pulled[node, 1], pushed[node, 1] = -1.0, 1.0
+    restraint.revise(down, pushed)
+    changes = [(restraint.revise(up, pulled), restraint.revise(down, pushed)) for _ in range(LETS)]
+    assert all(come == len(node) for _, come in changes)
+    assert restraint.revise(up, pulled) == 0
+    assert (restraint.role == BEARS).all()

@@ -9,7 +9,7 @@ from mpm_ref.hot.lbfgs import LBFGS, Pair, two_loop
 from mpm_ref.hot.methods import METHODS, made, minimise
 from mpm_ref.hot.newton import Forcing
 from mpm_ref.hot.norms import scaled_norm
-from mpm_ref.hot.report import Watch
+from mpm_ref.hot.report import Watch, together
 
 NEWTON = sorted(word for word, options in METHODS.items() if options.descent == "newton")
 
@@ -76,7 +76,7 @@ def test_accepted_energies_never_rise():
 
 # Directions.
 
-def test_first_direction_of_hot_is_the_cycle_of_the_gradient(hierarchies):
+def test_first_direction_of_hot_is_the_cycle_of_the_gradient(hierarchies):     # HOT-alg3
     toy = bar()
     g = toy.evaluate(toy.start)[1]
     minimise(toy, "hot", iterations=1)
@@ -87,13 +87,14 @@ def test_first_direction_of_hot_is_the_cycle_of_the_gradient(hierarchies):
 
 
 def test_hot_builds_one_hierarchy_per_solve_and_cycles_once_per_iteration(hierarchies):
+    # HOT-alg3, which so pays HOT-cost once
     report = minimise(bar(), "hot").report
     assert report.builds == len(hierarchies) == 1
     assert len(hierarchies[0].calls) == report.iterations > 3
     assert report.inner == 0
 
 
-def test_two_loop_is_the_update_of_broyden_fletcher_goldfarb_and_shanno():
+def test_two_loop_is_the_update_of_broyden_fletcher_goldfarb_and_shanno():     # HOT-alg3
     rng = np.random.default_rng(0)
     H = np.diag(rng.uniform(1.0, 2.0, 6))
     inverse, pairs = H.copy(), []
@@ -130,7 +131,7 @@ def test_rebuild_takes_a_new_hessian_every_k_steps(hierarchies):
 
 
 @pytest.mark.parametrize("word", NEWTON)
-def test_newton_takes_a_hessian_per_iteration(word):
+def test_newton_takes_a_hessian_per_iteration(word):                   # HOT-alg1
     toy = bar()
     report = minimise(toy, word).report
     assert report.builds == report.iterations
@@ -164,7 +165,7 @@ def gentle():
     return toy
 
 
-def test_newton_solves_to_the_printed_tolerance():
+def test_newton_solves_to_the_printed_tolerance():                     # HOT-sec5.3-k
     toy, eps = gentle(), 1e-7
     g, A = toy.evaluate(toy.start)[1], toy.matrix(toy.start)
     inverse = block_jacobi(toy.diagonal(toy.start))
@@ -186,7 +187,7 @@ def test_newton_solves_to_the_printed_tolerance():
     assert left(10000) <= k * energy(g) < left(report.inner - 1)
 
 
-def test_lbfgs_h_solves_to_half_of_the_energy_norm():
+def test_lbfgs_h_solves_to_half_of_the_energy_norm():                  # HOT-sec5.3-coarse
     report = minimise(bar(), "lbfgs-h").report
     assert report.capped == 0
     assert report.iterations < report.inner < 10 * report.iterations
@@ -206,6 +207,8 @@ def test_report_counts_what_happened(word):
     assert report.residuals[0] == scaled_norm(bar(seed=1).evaluate(toy.start)[1], toy.kappa)
     assert {"other", "evaluate", "assembly"} <= set(report.seconds)
     assert min(report.seconds.values()) >= 0.0
+    if METHODS[word].inverse == "cycle":
+        assert {"hierarchy", "smoothing", "coarse"} <= set(report.seconds)
 
 
 def test_backtracks_are_counted():
@@ -223,3 +226,13 @@ def test_gast_measures_the_plain_gradient():
     assert np.linalg.norm(toy.evaluate(solution.dv)[1]) <= METHODS["gast15"].eps
     toy.kappa[:] = 1.0
     assert solution.report.iterations == minimise(toy, "gast15").report.iterations
+
+
+def test_reports_of_solves_in_a_row_add_up():
+    first, second = (minimise(bar(seed=seed), "hot").report for seed in (1, 2))
+    both = together([first, second])
+    assert both.iterations == first.iterations + second.iterations
+    assert both.evaluations == first.evaluations + second.evaluations
+    assert sum(both.seconds.values()) == pytest.approx(
+        sum(first.seconds.values()) + sum(second.seconds.values()))
+    assert (both.residuals, both.why) == (second.residuals, second.why)

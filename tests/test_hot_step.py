@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from mpm_ref.body import Body, particles_at
-from mpm_ref.core.boundary import Collider, Conditions
+from mpm_ref.core.boundary import Collider, Conditions, Prescribed
 from mpm_ref.core.jit import set_threads
 from mpm_ref.core.levelset import half_space
+from mpm_ref.core.motion import Motion, Steady
 from mpm_ref.energy import angular_momentum, energy, momentum
 from mpm_ref.explicit import Scheme, Stepper, scatter
 from mpm_ref.hot.methods import options_of
@@ -17,7 +18,7 @@ from mpm_ref.hot.step import ImplicitStepper
 from mpm_ref.materials import NoFlow, make_law
 from mpm_ref.monitor import Unstable
 from mpm_ref.problem import Clock, Problem
-from mpm_ref.simulate import simulate
+from mpm_ref.simulate import State, next_dt, simulate, swiftest
 
 DX, RHO, SIDE = 0.1, 1000.0, 6
 TIGHT = options_of("pn-pcg", eps=1e-11)
@@ -51,7 +52,7 @@ def stepped(body, dt, steps=1, gravity=NOTHING, conditions=None, options=TIGHT):
     return body, stepper
 
 
-def test_approaches_the_explicit_step_at_second_order_in_one_step():
+def test_approaches_the_explicit_step_at_second_order_in_one_step():   # HOT-sec3.1-seq
     def apart(dt):
         implicit, _ = stepped(block(v=squeezed), dt)
         explicit = block(v=squeezed)
@@ -172,14 +173,30 @@ def test_solve_that_does_not_converge_ends_the_run():
     assert not frames[-1].state.solve.converged
 
 
-def test_large_steps_are_allowed_and_follow_the_speed():
+def test_large_steps_are_allowed_and_follow_the_speed():               # HOT-cfl, HOT-dt
     clock = Clock(cfl=0.6, end=0.3, longest=0.05)
     frames = list(simulate(replace(problem_of(), clock=clock)))
     assert frames[-1].dt == pytest.approx(0.05)
+    slow = replace(clock, cfl=0.05)
+    first = next(f for f in simulate(replace(problem_of(), clock=slow)) if f.dt)
+    assert first.dt < 0.05
+
+
+@pytest.mark.parametrize(("low", "moves"), [((0.3, -9.0), True), ((3.0, -9.0), False)])
+def test_steps_follow_the_speed_of_what_drives_them(low, moves):       # HOT-dt
+    beyond = half_space(low, (-1.0, 0.0))
+    clock = Clock(cfl=0.5, end=1.0, longest=0.5)
+    for motion, speed in ((Motion(translation=Steady((2.0, 0.0))), 2.0), (Motion(), 0.0)):
+        held = Conditions(prescribed=(Prescribed(beyond, motion),))
+        problem = replace(problem_of(), bodies=(block(),), clock=clock, conditions=held)
+        state = State(problem.bodies)
+        dt = next_dt(clock, state, swiftest(problem, problem.stepper(), state))
+        expected = 0.5 * DX / speed if speed and moves else 0.5
+        assert dt == pytest.approx(expected)
 
 
 def test_what_has_no_implicit_form_is_refused():
-    with pytest.raises(ValueError, match="'mls', the default, with an implicit"):
+    with pytest.raises(ValueError, match="'mls' with an implicit"):
         ImplicitStepper(Scheme(), DX, 2, NOTHING)
     body = block()
     driven = body._replace(particles=body.particles._replace(b=np.zeros((SIDE**2, 2))))

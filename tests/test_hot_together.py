@@ -37,7 +37,7 @@ def answer(system):
 
 
 @pytest.mark.parametrize("word", sorted(METHODS))
-def test_every_method_finds_the_minimiser_of_a_step(system, answer, word):
+def test_every_method_finds_the_minimiser_of_a_step(system, answer, word):     # HOT-methods
     solution = minimise(system, tight(word, 1e-12), **ADMM if word == "admm" else {})
     assert answer.report.converged
     assert solution.report.converged, solution.report.why

@@ -255,3 +255,11 @@ def test_nsf_sand_has_72000_particles_of_the_given_volume():
 
 def test_nsf_metal_has_50000_particles():
     assert len(build(load(SCENES[0].parent / "nsf_metal.toml")).bodies[0].id) == 50_000
+
+
+@pytest.mark.parametrize(("integrator", "transfer"), [("explicit", "mls"), ("hot", "apic")])
+def test_transfer_where_nothing_is_said(integrator, transfer):
+    problem = build(loads(f"integrator = '{integrator}'\n" + TINY))
+    assert problem.scheme.transfer == transfer
+    particles = problem.bodies[0].particles
+    assert (particles.C is particles.L) == (transfer == "mls")

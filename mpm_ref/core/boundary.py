@@ -132,6 +132,16 @@ class Conditions:
         """Whether a part moves, and so may do work."""
         return any(part.motion.moves for part in self.parts)
 
+    def fastest(self, grid, t, dt):
+        """Largest speed [m/s] that moving parts give to nodes with mass in the step of length dt
+        that ends at time t; 0 where none moves.
+        """
+        if not self.moves:
+            return 0.0
+        nodes = nodes_with_mass(grid)
+        touches = [part.touch(nodes, t, dt) for part in self.parts if part.motion.moves]
+        return max(float(np.sqrt((touch.v**2).sum(axis=1)).max(initial=0.0)) for touch in touches)
+
     def apply(self, grid, t, dt):
         """Change the velocities of an updated grid, in the step of length dt that ends at time t.
 

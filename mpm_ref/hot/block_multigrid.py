@@ -146,12 +146,13 @@ class Hierarchy:
         for level, smooth in zip(self.levels, self.smoothers):
             _, r = smooth.before(rhs[-1], sweeps)
             rhs.append(restrict(level.transfer, r))
-        u = self._coarsest(rhs.pop(), b)
+        u = self.coarsest(rhs.pop(), b)
         for level, smooth in zip(self.levels[-2::-1], self.smoothers[::-1]):
             u = smooth.after(rhs.pop(), prolong(level.transfer, u), sweeps)
         return u
 
-    def _coarsest(self, b, load):
+    def coarsest(self, b, load):
+        """The last level's u (m, d) of its b (m, d), in a cycle for `load` (n, d)."""
         last = self.levels[-1]
         b = times(last.B, b)
         if self.direct:

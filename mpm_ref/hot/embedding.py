@@ -114,6 +114,7 @@ def width(kernel, level):
 def kernel_value(x, kernel, level):
     """Particle-grid kernel of a level at distances x from its node, in that level's own spacing
     (HOT-eq8): w_l(x) = sum_o N(o/2) w_{l-1}(2 x - o), from the quadratic B-spline on level 0.
+    Restricted forces are those of particles by its gradient (HOT-eq7).
     """
     x = np.asarray(x, dtype=float)
     if level == 0:

@@ -11,7 +11,7 @@ which is the error to first order, seen where it matters, on the particles:
 
 The step is taken whatever it says. If it is too long, the method goes on with a smaller tolerance
 of the gradient. Modes of nodes of next to no mass, which the gradient's norm counts and which take
-most iterations at small tolerances, do not count here: no particle feels them.
+most iterations at small tolerances, count for little here: particles hardly feel them.
 """
 
 from dataclasses import replace

@@ -42,9 +42,9 @@ class LBFGS:
     """Directions for `descent` from the last `window` pairs and the first inverse, that of the
     `linear.Linear` which build(dv) gives.
 
-    It is built at the first iterate. It is built anew after every `rebuild` steps if that is not 0,
-    and, as `renew` says, where it has been seen to be wrong (see `seen_wrong`). Then the pairs,
-    which belong to the old one, are forgotten.
+    It is built at the first iterate, and as it is dear (HOT-cost), no more in general. It is built
+    anew after every `rebuild` steps if that is not 0, and, as `renew` says, where it has been seen
+    to be wrong (see `seen_wrong`). Then the pairs, which belong to the old one, are forgotten.
     """
 
     def __init__(self, build, window, rebuild=0, renew="never"):

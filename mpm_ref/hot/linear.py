@@ -54,7 +54,7 @@ def _with_matrices(system, dv, options, watch):
     with watch.part("hierarchy"):
         cycle = _cycle_of(hierarchy_of(matrices, options.path, **options.cycle._asdict()), watch)
     times = watch.timed("product", by_matrix(matrices[0][0], options.path))
-    return Linear(times, watch.timed("cycle", cycle))
+    return Linear(times, watch.timed("smoothing", cycle))
 
 
 def first_inverse(system, options, watch):
@@ -122,11 +122,13 @@ def _sgs(A, index, options, watch):
 def _cycle(A, index, options, watch):
     grids = hierarchy(A, index, options.levels, options.kernel, options.path,
                       **options.cycle._asdict())
-    return "cycle", _cycle_of(grids, watch)
+    return "smoothing", _cycle_of(grids, watch)
 
 
 def _cycle_of(grids, watch):
-    """A cycle of a hierarchy; its iterations on the coarsest level are told the watch."""
+    """A cycle of a hierarchy; its iterations and time on the coarsest level are told the watch."""
+    grids.coarsest = watch.timed("coarse", grids.coarsest)
+
     def cycle(r):
         before = grids.iterations
         u = grids.cycle(r)

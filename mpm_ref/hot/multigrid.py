@@ -126,12 +126,13 @@ class Hierarchy:
         load = b.reshape(-1)
         for level in self.levels[:-1]:
             load = level.P.T @ load
-        solve = partial(self._coarsest, load=load)
         flat = np.array(b, dtype=float).reshape(-1)
-        u = v_cycle(self.levels, self.smoothers, flat, solve, self.choices.sweeps)
+        u = v_cycle(self.levels, self.smoothers, flat, lambda r: self.coarsest(r, load),
+                    self.choices.sweeps)
         return u.reshape(b.shape)
 
-    def _coarsest(self, b, load):
+    def coarsest(self, b, load):
+        """The last level's u (m d,) of its b (m d,), in a cycle for `load`, restricted (m d,)."""
         last = self.levels[-1]
         b = times(last.B, b.reshape(last.index.shape))
         if self.direct:

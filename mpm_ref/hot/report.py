@@ -30,6 +30,18 @@ class Report(NamedTuple):
     seconds: dict       # CPU seconds of all threads by part; their sum is the whole solve
 
 
+COUNTS = ("iterations", "inner", "coarse", "capped", "builds", "refreshes", "evaluations",
+          "backtracks")
+
+
+def together(reports):
+    """`Report` of solves that follow each other: counts and times of all, the rest of the last."""
+    sums = {name: sum(getattr(r, name) for r in reports) for name in COUNTS}
+    parts = dict.fromkeys(part for r in reports for part in r.seconds)
+    seconds = {part: sum(r.seconds.get(part, 0.0) for r in reports) for part in parts}
+    return reports[-1]._replace(**sums, seconds=seconds)
+
+
 class Solution(NamedTuple):
     """The accepted increment, and how it was found."""
 

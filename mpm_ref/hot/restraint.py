@@ -2,8 +2,9 @@
 
 A collider that holds a node takes all its freedom; one with a plane n . (u - v_c) = 0 takes one
 direction. "separate" is an inequality, which an active set decides: a plane bears if the node would
-go through it, and is let go if it would have to pull the node. Friction does not derive from a
-potential and is refused.
+go through it, and is let go if it would have to pull the node. Near rest a node may ask for both in
+turn without end, since solves are inexact: a plane that has been let go twice bears for the rest of
+the step. Friction does not derive from a potential and is refused.
 """
 
 import numpy as np
@@ -25,6 +26,7 @@ from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
 from ..core.tensor import dot, fill, identity, lin, mlin, norm, outer, put_mat, put_vec, vec
 
 FREE, BEARS, HOLDS = range(3)     # what a pair of node and part does
+LETS = 2                          # times that a plane is let go in a step, at most
 SLACK = 1e-9                      # of the largest speed or impulse at any node: round-off
 
 
@@ -41,6 +43,7 @@ class Restraint:
                              'friction has no potential; take integrator = "explicit"')
         self.like = tuple(range(grid.m.ndim))
         self.role = np.zeros(sum(len(touch.node) for touch in touches), dtype=np.int8)
+        self.lets = np.zeros_like(self.role)        # times that each pair has been let go
         if len(self.role):
             contacts, self.start = by_node(touches, kind, mu)
             numbers = unknowns.number.reshape(-1)[contacts.node]
@@ -68,7 +71,7 @@ class Restraint:
             return 0
         before = self.role.copy()
         slack = SLACK * float(np.abs(u).max()), SLACK * float(np.abs(g).max())
-        _revise_all(self.contacts, self.start, self.role, (u, g), slack, self.like)
+        _revise_all(self.contacts, self.start, (self.role, self.lets), (u, g), slack, self.like)
         return int(np.count_nonzero(self.role != before))
 
 
@@ -136,8 +139,11 @@ def apply(contacts, start, role, fields, like, bounds):
 
 
 @kernel
-def revise(contacts, pairs, role, u, g, slack):
-    """Let go planes that would pull; let bear planes that the node goes through."""
+def revise(contacts, pairs, state, u, g, slack):
+    """Let go planes that would pull; let bear planes that the node goes through. `state` is the
+    roles of the pairs and how often each was let go.
+    """
+    role, lets = state
     count, _ = held(contacts, pairs, role, u)
     if count > 0:
         return
@@ -146,8 +152,8 @@ def revise(contacts, pairs, role, u, g, slack):
         if contacts.kind[contacts.part[k]] != SLIP:
             if role[k] == FREE and approach(contacts, k, u) < -slack[0]:
                 role[k] = BEARS
-            elif k in planes and load(contacts, k, planes, g) < -slack[1]:
-                role[k] = FREE
+            elif k in planes and lets[k] < LETS and load(contacts, k, planes, g) < -slack[1]:
+                role[k], lets[k] = FREE, lets[k] + 1
 
 
 @parallel
@@ -166,10 +172,10 @@ def _apply_all(contacts, start, role, fields, like):
 
 
 @parallel
-def _revise_all(contacts, start, role, fields, slack, like):
+def _revise_all(contacts, start, state, fields, slack, like):
     for c in prange(CHUNKS):
         first, last = chunk(c, len(start) - 1)
         for a in range(first, last):
             i = contacts.node[start[a]]
             u, g = vec(fields[0], i, like), vec(fields[1], i, like)
-            revise(contacts, (start[a], start[a + 1]), role, u, g, slack)
+            revise(contacts, (start[a], start[a + 1]), state, u, g, slack)

@@ -17,6 +17,7 @@ from .geometric import Geometric, conditions_at
 from .methods import Options, minimise
 from .norms import characteristic_norms
 from .objective import Potential
+from .report import together
 from .restraint import Restraint
 from .system import System
 from .unknowns import Unknowns, free_part, unknowns_of
@@ -41,7 +42,7 @@ class ImplicitStepper(Stepper):
     the solver's (see `report`).
     """
 
-    implicit = True
+    implicit = True             # the particles' speed alone bounds a step (HOT-cfl, HOT-dt)
 
     def __init__(self, scheme, dx, dim, gravity, conditions=None, options=None):
         super().__init__(scheme, dx, dim, gravity, conditions)
@@ -72,6 +73,13 @@ class ImplicitStepper(Stepper):
             damp(body, self.scheme)
         return pose.grid
 
+    def driven(self, bodies, t, dt):
+        """Largest speed [m/s] that moving parts give to nodes with mass from time t to t + dt."""
+        if self.conditions is None or not self.conditions.moves:
+            return 0.0
+        grid = scatter(bodies, self.storage, self.scheme, 0.0)
+        return self.conditions.fastest(grid, t + dt, dt)
+
     def pose(self, bodies, t, dt):
         """`Pose` of the step from time t [s] by dt [s]; the bodies stay as they are."""
         grid = scatter(bodies, self.storage, self.scheme, 0.0)
@@ -100,18 +108,26 @@ class ImplicitStepper(Stepper):
         restraint = Restraint(conditions, grid, unknowns, t + dt, dt)
         return restraint.begin(unknowns, unknowns.v + dt * self.gravity), restraint
 
-    def system(self, pose):
-        """`System` of a pose, for its conditions as they stand."""
+    def system(self, pose, near=None):
+        """`System` of a pose, for its conditions as they stand. It starts where the options say,
+        or at what they admit that is nearest to an increment near (n, d) [m/s].
+        """
         q, start = pose.unknowns, pose.unknowns.dv0
-        if self.options.start == "gravity":
+        if near is not None:
+            start = start + free_part(q, near - start)
+        elif self.options.start == "gravity":
             start = start + free_part(q, np.broadcast_to(pose.falling, start.shape))
         return System(pose.potential, q, pose.kappa, start, pose.geometric)
 
     def solve(self, pose):
-        """The increment dv (n, d) [m/s] of a pose; separate planes come and go in between."""
+        """The increment dv (n, d) [m/s] of a pose; separate planes come and go in between, and each
+        solve goes on from the one before.
+        """
+        dv, reports = None, []
         for self.revisions in range(REVISIONS):
-            solution = minimise(self.system(pose), self.options)
-            self.report, dv = solution.report, solution.dv
+            solution = minimise(self.system(pose, dv), self.options)
+            reports.append(solution.report)
+            self.report, dv = together(reports), solution.dv
             if not (pose.restraint and self._revised(pose, dv)):
                 return dv
             pose = pose._replace(unknowns=pose.restraint.applied(pose.unknowns))
@@ -138,9 +154,9 @@ def put(grid, unknowns, v):
 def check_scheme(scheme):
     """Raise ValueError where a scheme has no implicit form."""
     if scheme.transfer == "mls":
-        raise ValueError("transfer = 'mls', the default, with an implicit integrator: expected "
-                         "'apic', 'pic' or 'flip', whose force is the gradient of an energy of the "
-                         "nodes; write scheme = { transfer = \"apic\" }")
+        raise ValueError("transfer = 'mls' with an implicit integrator: expected 'apic', 'pic' or "
+                         "'flip', whose force is the gradient of an energy of the nodes; write "
+                         "scheme = { transfer = \"apic\" }")
     if scheme.mass_eps or scheme.gravity_on_empty:
         raise ValueError("mass_eps and gravity_on_empty belong to explicit NCLaw scenes: leave "
                          "them out with an implicit integrator")

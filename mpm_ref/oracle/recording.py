@@ -18,6 +18,7 @@ import numpy as np
 
 from ..explicit import Stepper
 from ..simulate import State, advance, ended, frame_is_due, next_dt, rebound, swiftest
+from ..store.words import counted
 from . import scaling, stages
 from .twin import Twin, placed
 
@@ -66,22 +67,25 @@ def begun(problem, steps):
         stepper.start(problem.bodies)
         for _ in range(steps):
             if ended(problem.clock, state):
-                raise ValueError(f"begin after {steps} steps: the run ends after {state.step}")
+                break
             advance(problem, stepper, state)
             state.frame += frame_is_due(problem.clock, state)
+    if ended(problem.clock, state):
+        raise ValueError(f"begin after {steps} steps: the run ends after {state.step}")
     return problem, state
 
 
 def run(problem, steps, state=None):
     """Yield one `Recorded` for each step; the problem's own arrays stay as they are.
 
-    A run stands at `state`, by default at the start of the problem. Raises ValueError where the
-    reference's own error is too large to judge others by.
+    A run stands at `state`, by default at the start of the problem. Raises ValueError for steps
+    past its end, and where the reference's own error is too large to judge others by.
     """
     ours, mirrored = (problem_of(problem, order) for order in (1, -1))
     steppers = [started(p) for p in (ours, mirrored)]
     twin, errors = Twin(problem), [{} for _ in problem.bodies]
     dt, start = step_length(problem, steppers[0], state), 0.0 if state is None else state.t
+    refuse_past_end(problem.clock, state, dt, steps)
     for k in range(steps):
         t = start + k * dt
         seen, contacts = stages.step(ours, ours.bodies, steppers[0], t, dt)
@@ -103,6 +107,17 @@ def run(problem, steps, state=None):
                    if f"{name}/{field}" in arrays} for name in twin.names]
         bases = {name: seen[f"{name}/base"] for name in twin.names}
         yield Recorded(t, dt, seen["nodes"], bases, arrays, {}, {}, None)
+
+
+def refuse_past_end(clock, state, dt, steps):
+    """Raise ValueError if not all of so many steps of dt [s] from a state belong to the run; None
+    is its start.
+    """
+    at = State((), frame=1) if state is None else state
+    for k in range(1, steps):
+        if ended(clock, replace(at, step=at.step + k, t=at.t + k * dt)):
+            raise ValueError(f"steps = {steps}: the run ends {counted(k, 'step')} after the "
+                             f"{at.step} before them; record no more, or let the scene run longer")
 
 
 def aligned(w, base, to):
@@ -146,7 +161,7 @@ def step_length(problem, stepper, state=None):
     state = replace(state or State(problem.bodies, frame=1), bodies=problem.bodies)
     if problem.clock.dt is None:
         state.bound = rebound(problem, stepper, state)
-    return next_dt(problem.clock, state, swiftest(problem, state))
+    return next_dt(problem.clock, state, swiftest(problem, stepper, state))
 
 
 def unmirrored(seen, nodes):

@@ -77,7 +77,7 @@ def _built(scene):
         dx=scene.dx,
         clock=build_clock(scene),
         gravity=np.zeros(scene.dim) if scene.gravity is None else np.array(scene.gravity),
-        scheme=scene.scheme.explicit(),
+        scheme=scene.step_scheme,
         conditions=build_conditions(scene),
         clip=None if clip is None else (np.array(clip.lower), np.array(clip.upper)),
         limits=build_limits(scene),

@@ -35,7 +35,7 @@ def _sampled(scene, record, material, where):
 
 def _at_rest(scene, material, x, v, sizes):
     """Particles without deformation; `sizes` are their masses and volumes."""
-    particles = particles_at(x, v, *sizes, scene.scheme.transfer, fluid=not material.needs_F)
+    particles = particles_at(x, v, *sizes, scene.step_scheme.transfer, fluid=not material.needs_F)
     if not material.has_history:
         return particles
     return particles._replace(y=np.full(len(x), material.initial_y))
@@ -64,7 +64,7 @@ def _read(scene, record, material, path):
         raise SceneError(f"{path}.velocity: the file has velocities v; leave this table out")
     v = a.get("v", velocity(record.velocity, a["x"], m))
     particles = _at_rest(scene, material, a["x"], v, (m, V0))
-    if "C" in a and scene.scheme.transfer in AFFINE:
+    if "C" in a and scene.step_scheme.transfer in AFFINE:
         particles.C[:] = a["C"]
     if "y" in a and material.has_history:
         particles.y[:] = a["y"]

@@ -49,7 +49,7 @@ def build_solver(scene):
     if scene.integrator not in METHODS:
         raise SceneError(f"integrator = {scene.integrator!r}: {NAMES}")
     with at("scheme"):
-        check_scheme(scene.scheme.explicit())
+        check_scheme(scene.step_scheme)
     for name, parts in (("collider", scene.collider), ("walls", filter(None, (scene.walls,)))):
         for part in parts:
             if part.friction:

@@ -206,18 +206,21 @@ class Scheme(Record):
     """How particles and grid exchange momentum; as `explicit.Scheme`."""
 
     degree: int = 2
-    transfer: str = "mls"
+    transfer: str | None = None                 # none: "mls", of an implicit step "apic"
     flip: Share = 1.0
     rpic: Share = 0.0
     mass_eps: NotNegative = 0.0                 # [kg]
     gravity_on_empty: bool = False
 
     def __post_init__(self):
-        self.explicit()
+        self.of("explicit")
 
-    def explicit(self):
-        """The scheme of the explicit step."""
-        return ExplicitScheme(**{name: getattr(self, name) for name in self.__struct_fields__})
+    def of(self, integrator):
+        """The scheme of a step by an integrator."""
+        values = {name: getattr(self, name) for name in self.__struct_fields__}
+        if self.transfer is None:
+            values["transfer"] = "mls" if integrator == "explicit" else "apic"
+        return ExplicitScheme(**values)
 
 
 class Solver(Record):
@@ -274,3 +277,8 @@ class Scene(Record):
     walls: Walls | None = None
     clip: Clip | None = None
     limits: Limits = Limits()
+
+    @property
+    def step_scheme(self):
+        """The scheme of its steps, as `explicit.Scheme`."""
+        return self.scheme.of(self.integrator)

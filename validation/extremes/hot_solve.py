@@ -85,10 +85,11 @@ def copied(bodies):
 def wrong_with(stepper, pose, dv):
     """What a solve did that it must not do; "" if nothing."""
     r, chosen = stepper.report, stepper.options
-    searches = r.iterations + r.refreshes + 1
-    if r.iterations > chosen.iterations or r.inner > chosen.cg_iterations * searches:
+    solves = stepper.revisions + 1
+    searches = r.iterations + r.refreshes + solves
+    if r.iterations > chosen.iterations * solves or r.inner > chosen.cg_iterations * searches:
         return "more iterations than its caps"
-    if r.evaluations > 1 + PER_SEARCH * searches or stepper.revisions >= REVISIONS:
+    if r.evaluations > solves + PER_SEARCH * searches or stepper.revisions >= REVISIONS:
         return "more evaluations than its caps"
     if not np.isfinite(dv).all():
         return "increment not finite"

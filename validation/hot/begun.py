@@ -13,7 +13,18 @@ from pathlib import Path
 import platformdirs
 
 from mpm_ref.scene import build
-from mpm_ref.simulate import SORT, advance, bound_is_due, next_dt, rebound, simulate, swiftest
+from mpm_ref.simulate import (
+    SORT,
+    advance,
+    bound_is_due,
+    ended,
+    frame_is_due,
+    next_dt,
+    rebound,
+    show,
+    simulate,
+    swiftest,
+)
 from mpm_ref.store.checkpoint import BadCheckpoint, load, save
 from mpm_ref.store.manifest import scene_hash, source_hash
 
@@ -41,10 +52,10 @@ KEPT = 4                # versions of the package whose states stay on disk
 
 
 def scene(name, profile):
-    """A scene of `BEGUN` at a size, marched by HOT, a frame every step."""
+    """A scene of `BEGUN` at a size, marched by HOT."""
     soft = name == "armacat_soft"
     made = sized("hot_" + name.removesuffix("_soft").removesuffix("_stiff"), profile,
-                 integrator="hot", every=1, interval=None, unstable="allow")
+                 integrator="hot", unstable="allow")
     if not soft:
         return made
     return with_(made, body=tuple(
@@ -74,10 +85,19 @@ def marched(problem, t):
 
     Raises ValueError where the scene ends before.
     """
-    for frame in simulate(problem):
-        if frame.t >= t and frame.dt > 0.0:
-            return frame.state
-    raise ValueError(f"{problem.title}: it ends at {frame.t:g} s, before {t:g} s")
+    state, stepper = next(simulate(problem)).state, problem.stepper()
+    while state.t < t and not ended(problem.clock, state):
+        onward(problem, stepper, state)
+    if state.t < t:
+        raise ValueError(f"{problem.title}: it ends at {state.t:g} s, before {t:g} s")
+    return state
+
+
+def onward(problem, stepper, state):
+    """One step of a run; a frame that is due is counted, since steps are cut to meet the next."""
+    advance(problem, stepper, state)
+    if frame_is_due(problem.clock, state):
+        show(state, 0.0)
 
 
 def steps(problem, state, count):
@@ -88,7 +108,7 @@ def steps(problem, state, count):
     for _ in range(count):
         dt = coming(problem, stepper, state)
         yield Step(state.bodies, stepper, stepper.pose(state.bodies, state.t, dt), dt, state.t)
-        advance(problem, stepper, state)
+        onward(problem, stepper, state)
 
 
 def coming(problem, stepper, state):
@@ -97,7 +117,7 @@ def coming(problem, stepper, state):
         stepper.sort(state.bodies)
     if bound_is_due(problem.clock, state):
         state.bound = rebound(problem, stepper, state)
-    return next_dt(problem.clock, state, swiftest(problem, state))
+    return next_dt(problem.clock, state, swiftest(problem, stepper, state))
 
 
 def particles(problem):
@@ -114,8 +134,8 @@ def folder(root=None):
     try:
         here.mkdir(parents=True, exist_ok=True)
         os.utime(here)
-        versions = [d for d in root.iterdir() if d.is_dir()]
-        for old in sorted(versions, key=lambda d: d.stat().st_mtime)[:-KEPT]:
+        others = [d for d in root.iterdir() if d.is_dir() and d != here]
+        for old in sorted(others, key=lambda d: d.stat().st_mtime)[:1 - KEPT]:
             shutil.rmtree(old, ignore_errors=True)
     except OSError:
         pass                    # `begun` finds nothing there and keeps nothing

@@ -11,7 +11,6 @@ import scipy.sparse as sp
 
 from mpm_ref.hot.projectors import diagonal_blocks, inverses, onto_range
 
-from ..verification.scenes import with_
 from .one_step import after
 from .stiffness import bar
 
@@ -29,7 +28,7 @@ class Frozen(NamedTuple):
 
 def twisted(dx, E, steps):
     """`Frozen` at the start of a step of the twisted bar, after so many steps by HOT."""
-    step = after(with_(bar(dx, E, "hot", steps), every=1), steps)
+    step = after(bar(dx, E, "hot", steps), steps)
     system = step.stepper.system(step.pose)
     A, (_, g) = system.matrix(system.start), system.evaluate(system.start)
     return frozen(A, system.index, -g, sum(len(body.id) for body in step.bodies))

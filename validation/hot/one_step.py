@@ -51,13 +51,35 @@ def particle_velocities(step, dv):
     return np.concatenate(v), np.concatenate(m)
 
 
+class Errors(NamedTuple):
+    """What an increment leaves in the particles, root mean squares being over their mass."""
+
+    velocity: float         # rms, over the rms increment of the velocity
+    velocity_max: float     # largest of a particle, over the same
+    cells: float            # of the displacement, rms [dx]
+    cells_max: float        # largest of a particle [dx]
+
+
+def errors(step, dv, exact):
+    """`Errors` of an increment dv (n, d) [m/s] beside the exact one."""
+    v, m = particle_velocities(step, dv)
+    u, _ = particle_velocities(step, exact)
+    v0, _ = particle_velocities(step, np.zeros_like(dv))
+    rms, most = _spread(v - u, m)
+    length, _ = _spread(u - v0, m)
+    cells = step.dt / step.pose.grid.dx
+    return Errors(rms / length, most / length, rms * cells, most * cells)
+
+
+def _spread(v, m):
+    """Root mean square over mass, and largest, of the lengths of v (N, d)."""
+    squares = np.sum(v**2, axis=1)
+    return float(np.sqrt(m @ squares / m.sum())), float(np.sqrt(squares.max()))
+
+
 def difference(step, dv, exact):
     """Root mean square over the particles' mass of the error of their velocity increment, relative
     to that of the increment; and the largest error of their displacement in cells.
     """
-    v, m = particle_velocities(step, dv)
-    u, _ = particle_velocities(step, exact)
-    v0, _ = particle_velocities(step, np.zeros_like(dv))
-    rms = np.sqrt(m @ np.sum((v - u) ** 2, axis=1) / (m @ np.sum((u - v0) ** 2, axis=1)))
-    far = np.sqrt(np.sum((v - u) ** 2, axis=1)).max() * step.dt / step.pose.grid.dx
-    return float(rms), float(far)
+    found = errors(step, dv, exact)
+    return found.velocity, found.cells_max

@@ -1,7 +1,8 @@
 """One matrix, many preconditioners: CG with our V-cycle, with one-level methods, and with pyamg's.
 
 The matrix is the projected Hessian at the start of a step of the twisted bar. Times are CPU seconds
-of one thread, the better of two where that is quick; assembly is not in them, set-up is.
+of one thread, the better of two where that is quick; assembly is not in them, set-up is. What a new
+matrix with its hierarchy costs stands beside, in V-cycles and in iterations of CG (HOT-cost).
 """
 
 from contextlib import contextmanager
@@ -18,18 +19,24 @@ import threadpoolctl
 from mpm_ref.core.jit import set_threads
 from mpm_ref.hot import block_multigrid
 from mpm_ref.hot.block_sweep import Sweep, sweep
-from mpm_ref.hot.krylov import block_jacobi, scalar_jacobi
+from mpm_ref.hot.krylov import Rule, block_jacobi, pcg, scalar_jacobi
+from mpm_ref.hot.linear import by_matrix
 from mpm_ref.hot.multigrid import hierarchy
+from mpm_ref.hot.projectors import diagonal_blocks
 
 from ..registry import experiment
 from .frozen import rigid_modes, twisted
 from .measured_cg import Until, cg, convergence_factor
+from .one_step import after
+from .stiffness import bar
 
 OURS = "cycle-3-direct"         # what times are relative to
 LONG = 1.0                      # CPU seconds after which a solve is not repeated
 STIFF = 1e9                     # modulus of the claim [Pa]
 GAIN = 5.0                      # over smoothed aggregation, the claim
 CYCLES = 2.0                    # of two grids over smoothed aggregation's, the claim
+REPEATS = 3                     # of what a rebuild is made of, and is measured against
+RUN = 50                        # V-cycles, and iterations of CG, that are timed together
 
 
 def gauss_seidel(system):
@@ -102,6 +109,20 @@ class Cost(NamedTuple):
         return self.setup + self.solve
 
 
+class Price(NamedTuple):
+    """CPU seconds of what HOT's multigrid is made of."""
+
+    matrix: float           # projected Hessian, with what it needs of every particle
+    hierarchy: float        # from that matrix
+    cycle: float            # one V-cycle
+    iteration: float        # one of CG with Jacobi
+
+    @property
+    def rebuild(self):
+        """CPU seconds of a new matrix and its hierarchy."""
+        return self.matrix + self.hierarchy
+
+
 @contextmanager
 def one_thread():
     """Kernels and linear algebra on one thread, as pyamg is."""
@@ -130,6 +151,31 @@ def best(system, case, until):
                                                 key=lambda c: c.total)
 
 
+def least(work):
+    """(what work() gives, CPU seconds of the quickest of `REPEATS`)."""
+    seconds = []
+    for _ in range(REPEATS):
+        start = process_time()
+        made = work()
+        seconds.append(process_time() - start)
+    return made, min(seconds)
+
+
+def price(step):
+    """`Price` at the start of a step, of the hierarchy that HOT and PN-MGPCG take."""
+    def system():
+        return step.stepper.system(step.pose)       # a new one, which has no matrix yet
+
+    dv, index = system().start, system().index
+    b = -system().evaluate(dv)[1]
+    A, matrix = least(lambda: system().matrix(dv))
+    grids, made = least(lambda: hierarchy(A, index))
+    product, inverse = by_matrix(A), block_jacobi(diagonal_blocks(A))
+    _, cycles = least(lambda: [grids.cycle(b) for _ in range(RUN)])
+    solved, iterations = least(lambda: pcg(product, b, inverse, Rule(lambda size: 0.0, RUN)))
+    return Price(matrix, made, cycles / RUN, iterations / solved.iterations)
+
+
 def two_grids(system):
     """{cycle: convergence factor} of two levels, the coarser solved exactly."""
     return {name: convergence_factor(cg(system, make(system), Until(1e-10, 2000)))
@@ -155,7 +201,22 @@ def preconditioners(run):
                 record_two_grids(run, system, E)
             rows += [(E, system.particles, len(system.index), case, *c, c.total / costs[OURS].total)
                      for case, c in costs.items()]
+        record_price(run, min(dx for dx, _ in ((coarse, STIFF), *finer)), steps)
     run.table("costs", ("E", "particles", "nodes", "case", *Cost._fields, "ratio"), rows)
+
+
+def record_price(run, dx, steps):
+    """A rebuild over a V-cycle, and over an iteration of CG with Jacobi."""
+    step = after(bar(dx, STIFF, "hot", steps), steps)
+    p = price(step)
+    scale = (f"{sum(len(body.id) for body in step.bodies)} particles, {len(step.pose.unknowns.m)} "
+             f"nodes, middle {STIFF:.0e} Pa")
+    said = (f"CPU time; matrix {p.matrix:.3f} s, hierarchy {p.hierarchy:.3f} s, V-cycle "
+            f"{1e3 * p.cycle:.1f} ms, iteration {1e3 * p.iteration:.2f} ms")
+    run.record("hot.sec5.rebuild_vs_vcycle", p.rebuild / p.cycle, scale=scale, note=f"{said}; the "
+               f"hierarchy alone takes {p.hierarchy / p.cycle:.1f} V-cycles, and the print may "
+               "leave out the finest matrix")
+    run.record("hot.sec5.rebuild_vs_pcg", p.rebuild / p.iteration, scale=scale, note=said)
 
 
 def warm_up(dx):

@@ -2,8 +2,9 @@
 
 The authors' code on this bar with a middle of 1e9 Pa had after 40 steps kinetic energies between
 0.31 J and 0.55 J, by solver, at the paper's tolerance, and 0.914 J on which two solvers agreed at
-1e-9. Here the same steps, of fixed length, are made by several methods at several tolerances; the
-run that all are compared with is one at a far smaller tolerance.
+1e-9. Here the grid is coarser: the energies are others, and by how much methods differ is what can
+be compared. Several make the same steps, of fixed length, at several tolerances; the run that all
+are compared with is one at a far smaller tolerance.
 """
 
 from functools import partial

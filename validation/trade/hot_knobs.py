@@ -15,7 +15,6 @@ from ..hot.begun import begun, particles, steps
 from ..hot.one_step import after, difference, solved
 from ..hot.stiffness import bar
 from ..registry import experiment
-from ..verification.scenes import with_
 from .hot import time_for
 
 HOT = METHODS["hot"].cycle
@@ -70,7 +69,7 @@ def knobs(run):
 def made(name):
     """(`Step`, scale in words) of a bar or of one of HOT's scenes in the middle of things."""
     if name in BARS:
-        step = after(with_(bar(0.03, BARS[name], "pn-mgpcg", 6, eps=1e-9), every=1), 6)
+        step = after(bar(0.03, BARS[name], "pn-mgpcg", 6, eps=1e-9), 6)
         count = sum(len(body.id) for body in step.bodies)
     else:
         problem, state = begun(name, "quick")
