@@ -9,19 +9,32 @@ from validation.results import RESULTS, Results
 
 from .frame import draw_all
 
+Names = Annotated[list[str] | None, typer.Argument(
+    help="figures, or the experiments whose results they show; none: all")]
+Folder = Annotated[Path, typer.Option("--results", help="holds a folder for each profile")]
+
 
 def main(
-    names: Annotated[list[str] | None, typer.Argument(help="figures; none: all")] = None,
+    names: Names = None,
     profile: Literal["quick", "standard", "paper"] = "quick",
-    results: Annotated[Path, typer.Option(help="where results/<profile>/ stands")] = RESULTS,
+    folder: Folder = RESULTS,
 ):
-    """Draw the figures whose results are there, as PNG and PDF."""
+    """Draw the figures whose results are there, as PNG and PDF.
+
+    A figure that is named and cannot be drawn makes the exit code 1.
+    """
+    results = Results(folder / profile)
     try:
-        failed = draw_all(Results(results / profile), names=names or ())
+        if not results.ids():
+            raise ValueError(f"no results in {results.folder}; `python -m validation run` makes "
+                             "them")
+        drawn = draw_all(results, names=names or ())
     except ValueError as error:
         typer.echo(f"{error}", err=True)
         raise typer.Exit(2) from None
-    raise typer.Exit(int(bool(failed)))
+    for name in drawn.done:
+        typer.echo(f"drew {results.folder / 'figures' / name}.png and .pdf")
+    raise typer.Exit(int(bool(drawn.failed or (names and drawn.left))))
 
 
 if __name__ == "__main__":

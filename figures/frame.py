@@ -12,6 +12,7 @@ import sys
 import textwrap
 import traceback
 from pathlib import Path
+from typing import NamedTuple
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
@@ -28,6 +29,14 @@ STYLE = {
 }
 
 
+class Drawn(NamedTuple):
+    """What became of the figures, by name."""
+
+    done: list
+    left: list          # their results, or unpublished states, are not here
+    failed: list        # their script raised
+
+
 def names(folder=HERE):
     """Names of all figures."""
     files = (file.stem for file in folder.glob("*.py"))
@@ -39,40 +48,55 @@ def draw_all(results, names=(), about=(), folder=HERE):
 
     Args:
         results: the `Results` of a profile.
-        names: figures to draw; empty for all.
+        names: figures to draw, or experiments that they need; empty for all.
         about: only those which need one of these experiments; empty for all.
         folder: the package of the scripts.
 
-    Figures whose experiments have no results are left out, and those that need unpublished states
-    which are not here. Returns the names of those that raised.
+    Says which figures are left out, and why. Returns `Drawn`.
     Raises ValueError for a name that does not exist.
     """
     chosen = _choose(names, folder)
-    failed = []
+    drawn = Drawn([], [], [])
     mpl.use("Agg")
     for name in tqdm(chosen, desc="figures", leave=False, disable=None, file=sys.stderr):
         try:
-            script = importlib.import_module(f"{folder.name}.{name}")
-            if _wanted(script, set(results.ids()), about):
-                _save(script, name, results)
+            script = _script(name, folder)
+            if about and set(about).isdisjoint(script.NEEDS):
+                continue
+            _check_results(script, results)
+            _save(script, name, results)
+            drawn.done.append(name)
         except FileNotFoundError as gone:
+            drawn.left.append(name)
             tqdm.write(f"figure {name} is left out: {gone}", file=sys.stderr)
         except Exception:
-            failed.append(f"figure {name}")
+            drawn.failed.append(name)
             tqdm.write(traceback.format_exc(), file=sys.stderr)
-    return failed
+    return drawn
+
+
+def _script(name, folder):
+    return importlib.import_module(f"{folder.name}.{name}")
 
 
 def _choose(wanted, folder):
     known = names(folder)
-    for name in wanted:
-        if name not in known:
-            raise ValueError(f"no figure {name!r}; there are: {', '.join(known) or 'none'}")
-    return list(wanted) or known
+    chosen = [name for word in wanted for name in _named(word, known, folder)]
+    return list(dict.fromkeys(chosen)) or known
 
 
-def _wanted(script, done, about):
-    return done.issuperset(script.NEEDS) and (not about or not set(about).isdisjoint(script.NEEDS))
+def _named(word, known, folder):
+    """The figure of that name, or those which need the experiment of that id."""
+    found = [word] if word in known else [n for n in known if word in _script(n, folder).NEEDS]
+    if not found:
+        raise ValueError(f"no figure {word!r}; there are: {', '.join(known) or 'none'}")
+    return found
+
+
+def _check_results(script, results):
+    """Raises FileNotFoundError where an experiment that a script needs has no results."""
+    for id in script.NEEDS:
+        results.records(id)
 
 
 def _save(script, name, results):

@@ -1,6 +1,7 @@
 """One step of HOT's scenes, solved to a ladder of tolerances: what each method costs for the error
-it leaves in the particles, or the reference's own error where that is larger. Large marks: the
-paper's tolerance, 1e-7. Finer: more particles.
+it leaves in the particles, or the reference's own error where that is larger; solves that found
+nothing to do are left out. Large marks: the paper's tolerance, 1e-7; Gast15 has tolerances of its
+own. Finer: more particles.
 """
 
 from math import ceil
@@ -9,10 +10,14 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from ._orders import legend_below, scales, series
-from .hot_fig20 import METHODS
 from .trade_hot import PAPER
+from .trade_hot_energy import METHODS as SOME
 
 NEEDS = ["trade.hot.scenes"]
+METHODS = {**SOME, "hot-quadratic": ("HOT-quadratic", "o:"), "lbfgs-gmg": ("LBFGS-GMG", "s:"),
+           "sgs-pcg": ("SGS-PCG", "^:"), "pn-gmg-pcg": ("PN-GMG-PCG", "d:"),
+           "admm": ("ADMM", "x:"), "gast15": ("Gast15", "v:")}
+COLOURS = ("C0", "C1", "C2", "C3", "C4", "C5", "C0", "C1", "C6", "C4", "C8", "C7")
 COLUMNS = 4
 
 
@@ -36,15 +41,16 @@ def draw(results):
     for ax in axes[:, 0]:
         ax.set_ylabel("error / increment, rms", fontsize=8)
     figure.supxlabel("CPU time of the step [s]", fontsize=9)
-    legend_below(figure, axes.flat, columns=5)
+    legend_below(figure, axes.flat, columns=6)
     return figure
 
 
 def panel(ax, table, at):
     """Curves of all methods for one trial."""
     error = np.maximum(table["error"], table["least"])
-    for k, (method, (label, style)) in enumerate(METHODS.items()):
-        own = at & (table["method"] == method)
-        ax.loglog(table["cpu"][own], error[own], style, ms=3, color=f"C{k}", label=label)
+    for (method, (label, style)), colour in zip(METHODS.items(), COLOURS, strict=True):
+        own = at & (table["method"] == method) & (table["iterations"] > 0)
+        if own.any():
+            ax.loglog(table["cpu"][own], error[own], style, ms=3, color=colour, label=label)
         paper = own & (table["eps"] == PAPER)
-        ax.loglog(table["cpu"][paper], error[paper], style[0], ms=8, color=f"C{k}")
+        ax.loglog(table["cpu"][paper], error[paper], style[0], ms=8, color=colour)

@@ -13,7 +13,7 @@ REST = 1e-6     # a strain taken for none: less energy than it stores is round-o
 
 class Unstable(RuntimeError):
     """A run broke a bound: attributes reason, step, t, body, particle, cfl, J, energy say which,
-    where and when.
+    where and when, advice what may help.
     """
 
     def __init__(self, reason, **where):
@@ -23,8 +23,7 @@ class Unstable(RuntimeError):
             f"unstable at step {self.step}, t = {self.t:.6g} s: {reason}; body {self.body!r}, "
             f"particle {self.particle}: CFL number {self.cfl:.3g}, J = {self.J:.3g}, energy of "
             f"the run {self.energy:.6g} J; "
-            + ("take a smaller dt, or look at the last checkpoint" if self.step else
-               "the run cannot start from this state")
+            + (self.advice if self.step else "the run cannot start from this state")
         )
 
 
@@ -135,10 +134,23 @@ def lost(problem, state, dt, reason):
     return unstable(problem, state, body, int(np.argmax(speed(body.particles))), dt, reason)
 
 
+def advice(problem, solve):
+    """What may help a run whose last implicit step, if it was one, has the report `solve`."""
+    if solve is None or solve.converged:
+        return "take a smaller dt, or look at the last checkpoint"
+    options, key = problem.solver, "eps"
+    if options is not None and solve.iterations >= options.iterations:
+        key = "iterations"
+    elif options is not None and options.cells > 0.0:
+        key = "cells"
+    return f"give the solver a larger `{key}`, or take a smaller dt"
+
+
 def unstable(problem, state, body, p, dt, reason):
     """`Unstable` with what is to be said of particle p of a body."""
     return Unstable(
         reason,
+        advice=advice(problem, state.solve),
         step=state.step,
         t=state.t,
         body=body.name,

@@ -239,7 +239,7 @@ def test_ctrl_c_on_a_terminal(scene, tmp_path):
 
 
 @pytest.mark.parametrize(("command", "words"), [
-    (["info"], "52 particles"), (["oracle", "record", "--steps", "1"], "1 steps of Disk"),
+    (["info"], "52 particles"), (["oracle", "record", "--steps", "1"], "1 step of Disk"),
 ], ids=["info", "record"])
 def test_compilation_is_said_on_a_terminal_alone(scene, tmp_path, command, words):
     if "record" in command:

@@ -8,6 +8,7 @@ from command_line import SCENE, mpm_ref
 from mpm_ref.cli.info import of_problem, problem_lines
 from mpm_ref.cli.shipped import shipped_scenes
 from mpm_ref.scene import build, load
+from mpm_ref.simulate import simulate
 
 
 def implicit(tmp_path, solver=""):
@@ -34,6 +35,38 @@ def test_run_and_what_it_leaves(tmp_path):
     assert done.exit_code == 0, done.output
     assert "implicit: hot, eps 1e-07" in done.output
     assert json.loads(mpm_ref("info", out, "--json").stdout)["frames"] == 5
+
+
+ALLOWED = """unstable = "allow"
+solver = {{ iterations = {iterations} }}
+walls = {{ low = ["open", 3] }}
+"""
+
+
+def unsolved_of(scene):
+    """How many steps of a scene's run are not solved."""
+    solved = []
+    list(simulate(build(load(scene)), on_step=lambda state, dt: solved.append(
+        state.solve.converged)))
+    return solved.count(False)
+
+
+@pytest.mark.parametrize(("iterations", "all_solved"), [(2, False), (100, True)])
+def test_steps_that_were_not_solved_are_told(tmp_path, iterations, all_solved):
+    scene, out = implicit(tmp_path, ALLOWED.format(iterations=iterations)), tmp_path / "run.h5"
+    scene.write_text(scene.read_text().replace("dt = 0.001", "dt = 0.01"))
+    n = unsolved_of(scene)
+    assert (n == 0) is all_solved
+    said = "" if all_solved else f"mpm-ref: warning: {n} implicit steps of the run did not meet"
+    run = "run", scene, "--out", out, "--json"
+    for command in (run, ("info", out), (*run, "--resume"), ("info", out, "--json")):
+        done = mpm_ref(*command)
+        assert done.exit_code == 0
+        assert done.stderr[:len(said) or None] == said
+        assert "run" not in command or json.loads(done.stdout)["unsolved"] == n
+    facts = json.loads(done.stdout)
+    assert facts["manifest"]["parts"][0]["unsolved"] == n
+    assert len(facts["warnings"]) == (not all_solved)
 
 
 @pytest.mark.parametrize("name", sorted(shipped_scenes()))

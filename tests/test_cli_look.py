@@ -51,7 +51,7 @@ def test_scenes_are_listed():
 def test_oracle(scene, tmp_path):
     golden = tmp_path / "golden.h5"
     done = mpm_ref("oracle", "record", scene, "-o", golden, "--steps", 1)
-    assert (done.exit_code, done.stdout) == (0, f"{golden}: 1 steps of Disk\n")
+    assert (done.exit_code, done.stdout) == (0, f"{golden}: 1 step of Disk\n")
     with h5py.File(golden) as h5:
         nodes, mass = h5["steps/0/nodes"][()], h5["steps/0/mass"][()]
     for factor, code, words in ((1.0, 0, "agrees"), (1.0 + 1e-6, 1, "array mass")):

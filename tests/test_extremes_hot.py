@@ -4,14 +4,22 @@ import numpy as np
 import pytest
 
 from mpm_ref.hot import step
-from mpm_ref.hot.methods import minimise
-from validation.extremes.hot_bodies import DX, FRAME, brick, gravity, shaken
+from mpm_ref.hot.methods import METHODS, minimise
+from validation.extremes import hot_every_method as every
+from validation.extremes.hot_bodies import DX, FRAME, brick, elastic, gravity, shaken
 from validation.extremes.hot_solve import CONVERGED, STOPPED, Setup, solve
 from validation.extremes.hot_units import SYSTEMS, converted, solved
 
 
 def setup():
     return Setup(shaken((brick((3, 3)),)), DX, FRAME, gravity(2))
+
+
+class Records(dict):
+    """What an experiment records: {target: (value, note)}."""
+
+    def record(self, target, value, **given):
+        self[target] = value, given["note"]
 
 
 def spoilt(monkeypatch, change):
@@ -55,3 +63,30 @@ def test_other_units_are_the_same_problem():
     assert np.array_equal(dv_there * units.T / units.L, dv)
     wrong = converted(given, units)._replace(gravity=given.gravity)
     assert solved(wrong, "lbfgs-h")[0].residuals[0] != report.residuals[0]
+
+
+def test_every_method_is_tried_to_the_same_tolerance():
+    soft = setup()._replace(bodies=shaken((brick((3, 3), elastic(10.0)),)))
+    found = every.ends_of(soft)
+    assert [end.method for end in found] == list(METHODS)
+    assert {end.kind for end in found} == {CONVERGED}
+
+
+def test_hard_states_are_of_one_step_in_two_dimensions():
+    made = every.setups(np.random.default_rng(0))
+    assert {(s.dt, len(s.gravity)) for s in made.values()} == {(FRAME, 2)}
+    assert set(every.QUICK) < set(made)
+    J = np.linalg.det(made["inverted"].bodies[0].particles.F)
+    assert J.max() < 0.0
+    assert not np.linalg.det(made["collapsed"].bodies[0].particles.F).any()
+
+
+def test_ends_of_a_method_are_counted_by_kind():
+    good, lost = solve(setup(), "pn-pcg"), solve(setup(), "pn-pcg", iterations=1)
+    rows = [("a", good), ("b", lost), ("c", good._replace(kind="energy rose")), ("d", good)]
+    found = Records()
+    every.record_method(found, "pn-pcg", rows)
+    assert found["extremes.hot.every_method.pn-pcg.unsound"] == (1, "c: energy rose")
+    converged, note = found["extremes.hot.every_method.pn-pcg.converged"]
+    assert converged == 2
+    assert "b: 1 iterations, the cap" in note

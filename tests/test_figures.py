@@ -4,10 +4,13 @@ import importlib
 import json
 
 import pytest
+import typer
+from typer.testing import CliRunner
 
+from figures import __main__ as cli
 from figures import frame
 from figures._orders import OTHERS, TRANSFERS, scales, shared
-from figures.frame import draw_all, names
+from figures.frame import Drawn, draw_all, names
 from validation.results import Results
 
 SCALES = {"a.b.order": "8, dx = 0.1 m; twice", "a.b.end": "9, dx = 0.1 m"}
@@ -53,7 +56,7 @@ def test_picture_and_caption_carry_the_scale(results, tmp_path, monkeypatch):
     seen = []
     monkeypatch.setattr(frame, "_write", lambda figure, path, about: seen.append(
         (path.suffix, figure.texts[0].get_text(), about.get("Description"))))
-    assert draw_all(results, folder=package) == []
+    assert draw_all(results, folder=package) == Drawn(["toy"], [], [])
     said = "Scale (quick): 8 cells."
     assert seen == [(".png", said, f"A toy. {said}"), (".pdf", said, None)]
 
@@ -67,3 +70,34 @@ def test_scales_are_taken_from_the_records(results):
 def test_no_colour_of_a_transfer_stands_for_anything_else():
     assert len(set(TRANSFERS.values())) == len(TRANSFERS)
     assert not set(TRANSFERS.values()) & set(OTHERS)
+
+
+# The command line
+
+@pytest.fixture
+def invoke(tmp_path, monkeypatch):
+    """Run the command line; each of its words is what becomes of a figure of that name."""
+    app = typer.Typer()
+    app.command()(cli.main)
+    monkeypatch.setattr(cli, "draw_all", lambda results, names: Drawn(
+        *([n for n in names if n == word] for word in ("done", "left", "failed"))))
+    return lambda *words: CliRunner().invoke(app, [*words, "--results", str(tmp_path)])
+
+
+@pytest.mark.parametrize(("words", "code"), [
+    ((), 0), (("done",), 0), (("done", "left"), 1), (("done", "failed"), 1)])
+def test_named_figure_that_cannot_be_drawn_makes_exit_1(invoke, results, words, code):
+    said = invoke(*words)
+    assert said.exit_code == code
+    assert said.output.count("drew ") == words.count("done")
+
+
+def test_drawn_figure_says_where_it_is(invoke, results):
+    assert str(results.folder / "figures" / "done.png") in invoke("done").output
+
+
+def test_folder_without_results_is_refused(invoke, tmp_path):
+    said = invoke("done")
+    assert said.exit_code == 2
+    assert said.output.startswith(f"no results in {tmp_path / 'quick'}")
+    assert not (tmp_path / "quick").exists()

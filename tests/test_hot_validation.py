@@ -5,11 +5,13 @@ import pytest
 import scipy.sparse as sp
 from multigrid_matrices import assembled, case, dense, lump, points
 
+from mpm_ref.hot.embedding import embed
 from mpm_ref.hot.krylov import block_jacobi
 from mpm_ref.hot.multigrid import hierarchy
 from validation import targets
 from validation.hot.begun import PRINTED, SOFT_CAT, scene
 from validation.hot.frozen import frozen, rigid_modes
+from validation.hot.held_nodes import WAYS, cycle, found, mean_diagonal, on_free, with_held
 from validation.hot.measured_cg import Until, cg, convergence_factor, spectrum
 from validation.hot.sparsity import LEVELS, galerkin, geometric, of_particles
 
@@ -17,7 +19,7 @@ TIGHT = Until(1e-12, 200)
 
 
 @pytest.fixture(scope="module")
-def system():
+def clamped():
     """A lump in two dimensions whose lowest nodes are held."""
     c = case(2, 6, held=False)
     free = c.index[:, -1] > -2
@@ -25,7 +27,13 @@ def system():
     A = sp.bsr_array(sp.csr_array(mask @ c.A @ mask), blocksize=(2, 2))
     A.sort_indices()
     b = free[:, None] * np.random.default_rng(1).standard_normal(c.index.shape)
-    return frozen(A, c.index, b, 0)
+    return with_held(A, c.index, b, 0)
+
+
+@pytest.fixture(scope="module")
+def system(clamped):
+    """Its free nodes."""
+    return clamped.system
 
 
 def two_grid(system):
@@ -101,6 +109,51 @@ def test_convergence_factor_is_the_spectral_radius_of_the_iteration(system):
     radius = abs(np.linalg.eigvals(iteration)).max()
     assert 0.0 < radius < 1.0
     assert convergence_factor(cg(system, grids.cycle, TIGHT)) == pytest.approx(radius, rel=1e-6)
+
+
+def coarse(grids):
+    """Blocks of the second level's matrix by pairs of world indices, {(i, j): (d, d)}."""
+    level = grids.levels[1]
+    A, index = level.A, [tuple(i) for i in level.index]
+    row = np.repeat(np.arange(len(index)), np.diff(A.indptr))
+    return {(index[i], index[j]): block
+            for i, j, block in zip(row, A.indices, A.data, strict=True)}
+
+
+@pytest.mark.parametrize(("way", "size"), [("leaking", 1.0), ("leaking-scaled", None)])
+def test_leak_adds_the_identity_of_held_nodes_to_the_coarse_matrix(clamped, way, size):
+    masked, leaking = (coarse(cycle(clamped, word, 2)) for word in ("masked", way))
+    size = mean_diagonal(clamped) if size is None else size
+    W = embed(clamped.index)
+    leak = (W.W.T @ sp.diags_array(size * ~clamped.free) @ W.W).toarray()
+    none = np.zeros((2, 2))
+    for i, a in enumerate(map(tuple, W.index)):
+        for j, b in enumerate(map(tuple, W.index)):
+            more = leaking.get((a, b), none) - masked.get((a, b), none)
+            np.testing.assert_allclose(more, leak[i, j] * np.eye(2), atol=1e-12 * size)
+    assert leak.any()
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_factor_of_a_cycle_is_that_on_free_nodes(clamped, way):
+    A, shape = clamped.system.A.toarray(), clamped.system.b.shape
+    inverse = on_free(clamped, cycle(clamped, way, 2))
+    M = np.stack([inverse(e.reshape(shape)).reshape(-1) for e in np.eye(len(A))], axis=1)
+    np.testing.assert_allclose(M, M.T, atol=1e-13 * abs(M).max())
+    radius = abs(np.linalg.eigvals(np.eye(len(A)) - M @ A)).max()
+    seen = found(clamped, way, 2, rough(shape))
+    assert seen.converged
+    assert seen.factor == pytest.approx(radius, rel=1e-6)
+
+
+def test_leak_makes_two_grids_slower(clamped):
+    factors = [found(clamped, way, 2, rough(clamped.system.b.shape)).factor
+               for way in ("masked", "leaking")]
+    assert factors[0] < factors[1]
+
+
+def rough(shape):
+    return np.random.default_rng(2).standard_normal(shape)
 
 
 @pytest.mark.parametrize("kernel", ["linear", "quadratic"])

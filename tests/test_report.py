@@ -1,11 +1,12 @@
 """The report, the figures in it, and README's status table, from toy results."""
 
 import re
+from collections import Counter
 from uuid import uuid4
 
 import pytest
 
-from figures.frame import draw_all
+from figures.frame import Drawn, draw_all
 from validation import Results
 from validation.registry import Experiment
 from validation.report import chapters, write_report
@@ -108,6 +109,29 @@ def test_html_has_the_same_and_escapes(folder):
     assert not re.search(r'(src|href)="https?:', said), "the report must stand alone"
 
 
+@pytest.mark.parametrize(("target", "said"), [
+    ("hot.map.body.nu0.45.E1e5.lbfgs-h", "body, nu0.45, E1e5, lbfgs-h"),
+    ("hot.map.cheapest.0.003", "cheapest, 0.003"),
+    ("hot.map.admm.penalty-0.1.end_error", "admm, penalty-0.1, end error"),
+    ("hot.map.a0.5.n8", "a0.5, n8"),
+    ("hot.map.mls.2.1.mean", "mls, 2, 1, mean"),
+    ("hot.map.disk2.2d.E1e5.time", "disk2, 2d, E1e5, time"),
+])
+def test_words_of_an_id_are_parted_at_dots_but_not_at_decimal_points(tmp_path, target, said):
+    def numbers(run):
+        run.record(target, 1.0, comparator="info")
+
+    run_all([Experiment("hot.map", "", ("quick",), {}, numbers)], Setting("quick", tmp_path))
+    section, = chapters(Results(tmp_path), {})[0].sections
+    assert [row.what for row in section.rows] == [said]
+
+
+def test_no_two_printed_numbers_read_alike():
+    """The report shows a number's text and its place, not its id."""
+    said = Counter((t.id.split(".")[0], t.what, t.paper_ref) for t in load().values())
+    assert not [text for text, times in said.items() if times > 1]
+
+
 def test_long_table_is_linked_not_shown(folder):
     assert '<a href="nsf.long_table.long.csv">long</a>: 1000 rows' in text(folder, "report.html")
 
@@ -130,7 +154,7 @@ def scripts(tmp_path, monkeypatch):
 
 
 def test_figure_is_drawn_and_shown_under_its_experiment(folder, scripts):
-    assert draw_all(Results(folder), folder=scripts) == []
+    assert draw_all(Results(folder), folder=scripts) == Drawn(["bread"], ["unmade"], [])
     assert sorted(f.name for f in (folder / "figures").iterdir()) == ["bread.pdf", "bread.png"]
     section = chapters(Results(folder), TARGETS)[0].sections[0]
     assert section.figures[0].caption == "Error of the bread over cells."
@@ -150,14 +174,26 @@ def test_figure_is_drawn_again_with_the_same_bytes(folder, scripts):
 
 def test_figure_that_raises_is_named(folder, scripts, capsys):
     (scripts / "bad.py").write_text(FIGURE.format(name="bread").replace("Figure()", "1 / 0"))
-    assert draw_all(Results(folder), folder=scripts) == ["figure bad"]
+    assert draw_all(Results(folder), folder=scripts).failed == ["bad"]
     assert (folder / "figures" / "bread.png").exists()
     assert "ZeroDivisionError" in capsys.readouterr().err
 
 
 def test_figures_about_other_experiments_are_left(folder, scripts):
-    draw_all(Results(folder), about=["nsf.long_table"], folder=scripts)
+    drawn = draw_all(Results(folder), about=["nsf.long_table"], folder=scripts)
+    assert drawn == Drawn([], [], [])
     assert not (folder / "figures").exists()
+
+
+def test_figure_without_results_is_left_out_and_says_why(folder, scripts, capsys):
+    assert draw_all(Results(folder), names=["unmade"], folder=scripts).left == ["unmade"]
+    assert "figure unmade is left out: no results of nsf.unmade" in capsys.readouterr().err
+
+
+def test_figure_answers_to_its_experiment(folder, scripts):
+    (scripts / "butter.py").write_text(FIGURE.format(name="bread"))
+    drawn = draw_all(Results(folder), names=["bread", "nsf.bread"], folder=scripts)
+    assert drawn.done == ["bread", "butter"]
 
 
 def test_unknown_figure_is_refused(folder, scripts):

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from validation import __main__ as cli
 from validation.provenance import commit
 from validation.record import read_records, write_whole
-from validation.registry import Catalogue, Experiment
+from validation.registry import Catalogue, Experiment, nearest
 from validation.results import Results
 from validation.run import Setting, run_all
 from validation.targets import Target
@@ -245,9 +245,13 @@ def invoke(tmp_path, monkeypatch):
 
 
 def test_list(invoke):
-    said = invoke("list")
-    assert said.exit_code == 0
-    assert "verification.sound" in said.output
+    for profile, cost in (("quick", ["1", "s"]), ("paper", ["—", "A"])):
+        said = invoke("list", "--profile", profile)
+        assert said.exit_code == 0
+        header, toy, _, last = map(str.split, said.output.splitlines())
+        assert header == ["experiment", profile, "title"]
+        assert toy[:3] == ["verification.sound", *cost]
+        assert last[0] == "—:"
 
 
 def test_run_writes_results_and_report(invoke, tmp_path):
@@ -268,6 +272,22 @@ def test_unknown_id_is_one_line_and_exit_2(invoke, tmp_path):
     said = invoke("run", "verification.nothing", "--results", str(tmp_path))
     assert said.exit_code == 2
     assert said.output.startswith("no experiment 'verification.nothing'")
+
+
+@pytest.mark.parametrize(("wanted", "first"), [
+    ("fig18", "hot.fig18"), ("HOT.FIG18", "hot.fig18"), ("hot.fgi8", "hot.fig8"),
+    ("cantilever", "verification.cantilever"), ("hot.scene", "hot.scenes.twist")])
+def test_nearest_ids_are_offered_first(wanted, first):
+    ids = ["hot.fig8", "hot.fig18", "hot.fig19", "hot.scenes.twist", "verification.cantilever"]
+    assert nearest(wanted, ids)[0] == first
+    assert nearest("xyz", ids) == []
+
+
+def test_report_of_nothing_is_refused(invoke, tmp_path):
+    said = invoke("report", "--results", str(tmp_path / "nothing"))
+    assert said.exit_code == 2
+    assert said.output.startswith(f"no results in {tmp_path / 'nothing' / 'quick'}")
+    assert not (tmp_path / "nothing").exists()
 
 
 def test_broken_module_makes_exit_1(monkeypatch):

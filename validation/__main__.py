@@ -24,18 +24,20 @@ app = typer.Typer(help=__doc__, add_completion=False, no_args_is_help=True,
 Profile = Annotated[
     Literal["quick", "standard", "paper"],
     typer.Option(help="quick: a minute at most each; standard: hours in all; paper: as printed")]
-Folder = Annotated[Path, typer.Option("--results", help="where results/<profile>/ stands")]
+Folder = Annotated[Path, typer.Option("--results", help="holds a folder for each profile")]
 Workers = Annotated[int, typer.Option(min=1, help="experiments at a time, sharing the cores")]
 Ids = Annotated[list[str] | None, typer.Argument(help="ids or their leading parts; none: all")]
 
 
 @app.command("list")
 def list_experiments(profile: Profile = "quick"):
-    """All experiments, their profiles and their expected seconds."""
+    """All experiments and the seconds that each is expected to take at one profile."""
     catalogue = discover()
+    typer.echo(f"{'experiment':<44} {profile:>10}  title")
     for e in catalogue.experiments.values():
-        cost = f"{e.seconds(profile):6.0f} s" if profile in e.profiles else f"{'—':>8}"
-        typer.echo(f"{e.id:<44} {cost}  {e.title}")
+        cost = f"{e.seconds(profile):.0f} s" if profile in e.profiles else "—"
+        typer.echo(f"{e.id:<44} {cost:>10}  {e.title}")
+    typer.echo(f"—: does not run at the {profile} profile; --profile shows another one")
     raise typer.Exit(_report_broken(catalogue.broken))
 
 
@@ -59,9 +61,9 @@ def run(ids: Ids = None, profile: Profile = "quick", seed: int = 0, results: Fol
         failed = run_side_by_side(chosen, setting, workers)
     else:
         failed = run_all(chosen, setting)
-    undrawn = draw_all(Results(folder), about=[e.id for e in chosen])
+    undrawn = draw_all(Results(folder), about=[e.id for e in chosen]).failed
     _write_report(folder, profile, printed)
-    for name in (*failed, *undrawn):
+    for name in (*failed, *(f"figure {name}" for name in undrawn)):
         typer.echo(f"failed: {name}", err=True)
     raise typer.Exit(max(_report_broken(catalogue.broken), int(bool(failed or undrawn))))
 
@@ -69,7 +71,11 @@ def run(ids: Ids = None, profile: Profile = "quick", seed: int = 0, results: Fol
 @app.command()
 def report(profile: Profile = "quick", results: Folder = RESULTS):
     """Write report.html and report.md from the results there are."""
-    _write_report(results / profile, profile, targets.load())
+    folder = results / profile
+    if not Results(folder).ids():
+        typer.echo(f"no results in {folder}; `python -m validation run` makes them", err=True)
+        raise typer.Exit(2)
+    _write_report(folder, profile, targets.load())
 
 
 @app.command()

@@ -2,6 +2,7 @@
 
 import importlib
 from collections.abc import Callable
+from difflib import SequenceMatcher
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,6 +19,7 @@ GROUPS = {
 }
 PROFILES = ("quick", "standard", "paper")
 BUDGETS = {"quick": 10.0, "standard": 600.0, "paper": 3600.0}     # where none is given [s]
+NEAR, OFFERED = 0.6, 5      # likeness from which an id is offered for an unknown one; so many
 
 
 class Experiment(NamedTuple):
@@ -114,5 +116,21 @@ def _no_such(wanted, experiments, profile):
     elsewhere = [e for i, e in experiments.items() if _names(wanted, i)]
     if elsewhere:
         return f"{wanted} has no {profile} profile; it has: {', '.join(elsewhere[0].profiles)}"
-    near = ", ".join(i for i in experiments if i.startswith(wanted.split(".")[0])) or "none"
+    near = ", ".join(nearest(wanted, experiments)) or "none"
     return f"no experiment {wanted!r}; near it: {near}; see `python -m validation list`"
+
+
+def nearest(wanted, ids):
+    """The ids of which a part is like a text, whatever its case, nearest first."""
+    found = {id: _likeness(wanted.lower(), id.lower()) for id in ids}
+    near = sorted(found, key=found.get, reverse=True)
+    return [id for id in near if found[id][0] >= NEAR][:OFFERED]
+
+
+def _likeness(wanted, id):
+    """How like a text the best part of an id is, and the whole id: each in [0, 1]."""
+    words = id.split(".")
+    n = len(words)
+    parts = [".".join(words[i:j]) for i in range(n) for j in range(i + 1, n + 1)]
+    like = {part: SequenceMatcher(None, wanted, part).ratio() for part in parts}
+    return max(like.values()), like[id]

@@ -5,6 +5,7 @@ imported and nothing is computed here but ratios and counts.
 """
 
 import base64
+import re
 from collections import Counter
 from pathlib import Path
 from typing import NamedTuple
@@ -19,6 +20,7 @@ from .results import Results
 TEMPLATES = Path(__file__).parent / "templates"
 SHOWN_ROWS = 40          # of a table; a longer one is named and linked
 VERDICTS = ("pass", "miss", "info")
+PART = re.compile(r"(?:0|[^.]*[A-Za-z-]\d+)\.\d+(?![^.])|[^.]+")      # of an id; see `_words`
 
 
 class Row(NamedTuple):
@@ -153,10 +155,14 @@ def _row(record, id, target):
 
 
 def _words(record, id):
-    """What a number without a printed text measures: `verification.fall.error_x` -> `error x`."""
+    """What a number without a printed text measures: `verification.fall.error_x` -> `error x`.
+
+    Dots part the words, but for decimal points: after a 0, and after a number behind a letter or
+    a hyphen, so that `body.nu0.45` has two parts and `mls.2.1` three.
+    """
     if record.target == id:
         return "the experiment as a whole"
-    names = record.target.removeprefix(f"{id}.").split(".")
+    names = PART.findall(record.target.removeprefix(f"{id}."))
     return ", ".join(name.replace("_", " ") for name in names)
 
 

@@ -6,6 +6,7 @@ import typer
 
 from .. import scene
 from ..store import checkpoint
+from ..store.words import counted
 from . import info
 from .faults import at_start, one_line
 from .shipped import find_scene, is_hdf5
@@ -27,10 +28,11 @@ def _facts(name):
     """(facts, lines) of whatever a name stands for."""
     if not is_hdf5(name):
         return _facts_of_scene(find_scene(name))
-    if checkpoint.is_one(name):
+    if checkpoint.is_one(name) or checkpoint.is_named_so(name):
         facts = checkpoint.summary(name)
         return facts, [f"checkpoint: step {facts['step']}, t = {facts['t']:.6g} s, after "
-                       f"{facts['frames']} frames; scene sha256 {facts['scene_sha256'][:12]}"]
+                       f"{counted(facts['frames'], 'frame')}; "
+                       f"scene sha256 {facts['scene_sha256'][:12]}"]
     facts = info.of_results(name)
     return facts, info.results_lines(facts)
 

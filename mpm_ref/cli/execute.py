@@ -16,6 +16,7 @@ from ..store import checkpoint
 from ..store.atomic import NotWritten
 from ..store.running import run
 from ..store.session import AT_LIMIT, FINISHED, INTERRUPTED, TERMINATED, Watch, checkpoint_of
+from ..store.words import counted
 from ..timestep import TooLarge
 from . import info
 from .faults import INTERRUPT, NOT_WRITTEN, UNSTABLE, at_start, end
@@ -140,15 +141,17 @@ def _broke_off(fault, request):
 def _report(outcome, request, facts):
     """Say how the run ended and how to go on."""
     state = outcome.state
+    warn(info.unsolved(outcome.unsolved))
     if request.json:
         print(info.as_json({
             "why": outcome.why, "out": str(request.out), "step": state.step, "t": state.t,
-            "frames": outcome.frames, "checkpoint": str(checkpoint_of(request.out)),
+            "frames": outcome.frames, "unsolved": outcome.unsolved,
+            "checkpoint": str(checkpoint_of(request.out)),
             "state_sha256": checkpoint.digest(state), "problem": facts,
         }))
     else:
         print(f"{outcome.why}: step {state.step}, t = {state.t:.6g} s, "
-              f"{outcome.frames} frames in {request.out}")
+              f"{counted(outcome.frames, 'frame')} in {request.out}")
     if outcome.why != FINISHED:
         print(f"to go on: {how_to_resume(request)}", file=sys.stderr)
 

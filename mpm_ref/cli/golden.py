@@ -1,14 +1,16 @@
 """`mpm-ref oracle record | check`: golden files, to check other codes by (see `oracle`)."""
 
+from math import inf
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from .. import oracle, scene
+from ..store.words import counted
 from .faults import at_start, one_line, options
 from .shipped import find_scene, keep_scene
-from .terminal import compiling
+from .terminal import compiling, warn
 
 DEPARTS = 1      # exit status of a check that another code fails
 
@@ -29,9 +31,22 @@ def record(
         path = find_scene(name)
         with options(), at_start(path), compiling():
             keep_scene(path, out)
+            if eps is not None and not 0.0 < eps < inf:
+                raise ValueError(f"--eps {eps}: expected a tolerance, a finite number > 0")
             problem = scene.build(scene.load(path), str(path))
-            oracle.record(problem, out, steps, overwrite, begin, eps)
-        print(f"{out}: {steps} steps of {problem.title or name}")
+            idle = oracle.record(problem, out, steps, overwrite, begin, eps)
+        warn(nothing_to_solve(idle))
+        print(f"{out}: {counted(steps, 'step')} of {problem.title or name}")
+
+
+def nothing_to_solve(steps):
+    """The warnings about recorded steps that say nothing of a solver: one, or none."""
+    if not steps:
+        return []
+    which = ", ".join(map(str, steps))
+    return [f"nothing to solve in {'step' if len(steps) == 1 else 'steps'} {which}: dv is 0 "
+            "everywhere after 0 iterations; to say something of a solver, record later with "
+            "--begin, when something moves or bears"]
 
 
 @app.command()

@@ -4,10 +4,12 @@ import json
 from math import isfinite
 
 from ..placement import misplaced
+from ..store import manifest
 from ..store.atomic import in_words
 from ..store.manifest import scene_hash
 from ..store.results import ENERGIES, Results
 from ..store.session import checkpoint_of
+from ..store.words import counted
 from ..timestep import TimeStep, stable_dt
 
 
@@ -31,6 +33,7 @@ def of_problem(problem):
         "wave_speed": None if stepper.implicit else problem.dx / bounds.elastic,
         "dt": clock.dt,
         "cfl": None if clock.dt else clock.cfl,
+        "longest": clock.longest if isfinite(clock.longest) else None,
         "bounds": bounds._asdict(),
         "steps": clock.steps,
         "end": clock.end,
@@ -67,13 +70,23 @@ def of_results(path):
             "energy": dict(zip(ENERGIES, results.energy[-1].tolist(), strict=True)) if n else None,
             "checkpoint": str(checkpoint_of(path)) if checkpoint_of(path).exists() else None,
             "manifest": results.manifest,
+            "warnings": unsolved(manifest.unsolved(results.manifest)),
         }
+
+
+def unsolved(n):
+    """The warnings about n implicit steps of a run that were not solved: one, or none."""
+    if n == 0:
+        return []
+    return [f"{counted(n, 'implicit step')} of the run did not meet the solver's tolerance, which "
+            'unstable = "allow" lets pass: what follows may be wrong; give the solver more '
+            "`iterations`, or a larger `eps` or `cells`, or take a smaller dt"]
 
 
 def problem_lines(facts):
     """Facts of a problem in words."""
     bodies = ", ".join(f"{name} {count}" for name, count in facts["bodies"].items())
-    length = f"{facts['steps']} steps" if facts["steps"] else f"until t = {facts['end']:g} s"
+    length = counted(facts["steps"], "step") if facts["steps"] else f"until t = {facts['end']:g} s"
     memory = in_words(facts["particle_bytes"]), in_words(facts["grid_bytes"])
     return [
         f"{facts['title'] or 'untitled'}: {facts['dim']}D, {facts['particles']} particles "
@@ -97,10 +110,11 @@ def step_line(facts):
     bound = TimeStep(**facts["bounds"])
     finite = ", ".join(f"{name.replace('_', ' ')} {term:.3g} s"
                        for name, term in bound._asdict().items() if isfinite(term))
+    longest = f", longest {facts['longest']:.3g} s" if facts["longest"] else ""
     chosen = (f"fixed dt = {facts['dt']:.6g} s" if facts["dt"] else
-              f"dt adaptive, cfl {facts['cfl']:g}")
+              f"dt adaptive, cfl {facts['cfl']:g}{longest}")
     if not finite:
-        return f"{chosen}, nothing bounds it at the start"
+        return f"{chosen}, no particle bounds it at the start"
     return f"{chosen}, bound at the start {bound.dt:.3g} s ({finite})"
 
 
@@ -113,14 +127,13 @@ def results_lines(facts):
     if facts["frames"]:
         energies = ", ".join(f"{name} {value:.6g} J" for name, value in facts["energy"].items())
         first, last = facts["time"]
-        lines.append(f"{facts['frames']} frames, t = {first:g} to {last:g} s, "
-                     f"{facts['steps']} steps; at the end: {energies}")
+        lines.append(f"{counted(facts['frames'], 'frame')}, t = {first:g} to {last:g} s, "
+                     f"{counted(facts['steps'], 'step')}; at the end: {energies}")
     else:
         lines.append("no frame yet")
-    lines += [f"part: steps {part['first_step']} to {part['last_step']}, {part['why']}, "
-              f"{part['wall_s']} s, {in_words(part['peak_bytes'])}, "
-              f"state sha256 {part['state_sha256'][:12]}"
-              for part in facts["manifest"].get("parts", [])]
+    lines += [f"part: steps {part['first_step']} to {part['last_step']}, {part['wall_s']} s, "
+              f"{in_words(part['peak_bytes'])}, state sha256 {part['state_sha256'][:12]}: "
+              f"{part['why']}" for part in facts["manifest"].get("parts", [])]
     lines.append(f"checkpoint: {facts['checkpoint'] or 'none'}")
     return lines
 

@@ -5,6 +5,7 @@ from pathlib import Path
 from ..scene import SceneError
 
 HDF5 = b"\x89HDF\r\n\x1a\n"      # how such files begin
+SCENES = (".toml", ".json")      # suffixes of their files
 PACKAGE = Path(__file__).resolve().parents[1]
 
 
@@ -27,15 +28,23 @@ def find_scene(name):
     scenes = shipped_scenes()
     if name in scenes:
         return scenes[name]
+    if file.is_dir():
+        raise SceneError(f"{name}: this is a folder; expected a scene (a TOML file or a shipped "
+                         "name), or for `mpm-ref info` what `mpm-ref run` wrote")
     known = ", ".join(scenes) or "not installed"
     raise SceneError(f"{name}: there is no such file, nor a shipped scene of that name; shipped "
                      f"scenes: {known}")
 
 
 def keep_scene(path, out):
-    """Raise ValueError if the file to write, whatever its name, is the scene at `path` itself."""
+    """Raise ValueError if the file to write, whatever its name, is the scene at `path` itself, or
+    is named as scenes are.
+    """
     if Path(out).exists() and path.samefile(out):
         raise ValueError(f"--out {out}: this is the scene itself; name another file")
+    if Path(out).suffix.lower() in SCENES:
+        raise ValueError(f"--out {out}: scenes have such names, but HDF5 is to be written; name a "
+                         "file such as run.h5")
 
 
 def _wrong_with(file):

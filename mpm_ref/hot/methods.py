@@ -72,9 +72,11 @@ class Options:
                 raise ValueError(f"{name} = {getattr(self, name)!r}: expected one of {words}")
         if not 0.0 <= self.cells < np.inf:
             raise ValueError(f"cells = {self.cells}: expected >= 0, an error in grid spacings")
-        if not (self.eps > 0.0 and self.patience >= 1 and 0.0 < self.penalty < np.inf):
-            raise ValueError(f"eps = {self.eps}, patience = {self.patience}, penalty = "
-                             f"{self.penalty}: expected eps > 0, patience >= 1, penalty > 0")
+        if not self.eps > 0.0:
+            raise ValueError(f"eps = {self.eps}: expected > 0")
+        if not (self.patience >= 1 and 0.0 < self.penalty < np.inf):
+            raise ValueError(f"patience = {self.patience}, penalty = {self.penalty}: expected "
+                             "patience >= 1, penalty > 0")
         if min(self.window, self.rebuild, self.iterations, self.cg_iterations) < 0:
             raise ValueError("window, rebuild, iterations and cg_iterations: expected none < 0")
         checked(self.levels, self.cycle._asdict())

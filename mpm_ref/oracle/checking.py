@@ -5,7 +5,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from .matching import Mismatch, NotComparable, matched, nodes_of
+from .matching import Mismatch, NotComparable, matched, nodes_of, refuse_no_numbers
 from .recording import shaped_as
 from .report import Departure, Report
 from .schema import BESIDE, ENERGIES, EVERY, FORMAT, arrays_of, key
@@ -27,7 +27,7 @@ def check(golden, other, precision="auto"):
         if g.attrs.get("format") != FORMAT:
             raise NotComparable(f"{golden}: no golden file, its format is {g.attrs.get('format')!r}"
                                 f"; expected {RECORDED}")
-        if "steps" not in o:
+        if not isinstance(o.get("steps"), h5py.Group):
             raise NotComparable(f"{other}: it has no group 'steps'; write it with `oracle.write`")
         bodies, arrays = list(g["bodies"]), arrays_of(g.attrs.get("integrator"))
         given = {step: keys_of(o["steps"][step], bodies) for step in o["steps"]}
@@ -40,7 +40,8 @@ def check(golden, other, precision="auto"):
 def opened(path, expected):
     """The file, for reading; NotComparable if it is not there, not HDF5 or cut short."""
     if not Path(path).is_file():
-        raise NotComparable(f"{path}: there is no such file; expected {expected}")
+        what = "this is a folder" if Path(path).is_dir() else "there is no such file"
+        raise NotComparable(f"{path}: {what}; expected {expected}")
     try:
         return h5py.File(path, "r")
     except OSError as e:
@@ -49,17 +50,21 @@ def opened(path, expected):
 
 
 def keys_of(group, bodies):
-    """{key: dataset} of one step of the other file; the name of a single body may be left out."""
+    """{key: dataset} of one step of the other file; the name of a single body may be left out.
+    Raises NotComparable for datasets without numbers.
+    """
     of_particles = {a.name for a in EVERY if key(a) != a.name} | {"base", "id"}
     found = {}
 
     def visit(name, item):
         if isinstance(item, h5py.Dataset):
+            refuse_no_numbers(name, item)
             alone = len(bodies) == 1 and name in of_particles
             found[f"{bodies[0]}/{name}" if alone else name] = item
 
     group.visititems(visit)
-    return {name: item for name, item in found.items() if not name.startswith(("scale/", "bar/"))}
+    ours = {"scale", "bar"}.difference(bodies)          # of a golden file that is checked itself
+    return {name: item for name, item in found.items() if name.split("/")[0] not in ours}
 
 
 def compared(steps, given, names, precision):

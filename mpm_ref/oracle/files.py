@@ -10,7 +10,8 @@ import numpy as np
 from ..body import Body
 from ..store.atomic import replacing, require_place
 from . import implicit_recording, recording, solving
-from .schema import BESIDE, EVERY, FORMAT, NODES, arrays_of, key
+from .matching import refuse_no_numbers
+from .schema import BESIDE, EVERY, FORMAT, NODES, key, taken
 
 PACKED = {"compression": "gzip", "compression_opts": 9, "shuffle": True, "fletcher32": True}
 
@@ -19,10 +20,12 @@ def record(problem, path, steps, overwrite=False, begin=0, eps=None):
     """Record `steps` steps of a problem, after `begin` others, and write the golden file `path`.
 
     The problem's own arrays stay as they are; all steps have the dt of a run's next step. eps > 0
-    is the tolerance of implicit steps, by default the scene's. Raises ValueError for steps < 1, for
-    names of bodies that cannot name arrays, for a state in which the reference's own error is too
-    large to judge others by, for an implicit step that is not solved, and where `path` exists,
-    unless it is a golden file that overwrite lets go; `Unstable`; `NotWritten`.
+    is the tolerance of implicit steps, by default the scene's. Returns the numbers of implicit
+    steps that had nothing to solve, which say nothing of a solver. Raises ValueError for steps < 1
+    or past the end of the run, for names of bodies that cannot name groups, for a state in which
+    the reference's own error is too large to judge others by, for an implicit step that is not
+    solved, and where `path` exists, unless it is a golden file that overwrite lets go; `Unstable`;
+    `NotWritten`.
     """
     require_free(path, overwrite)
     refuse_names(problem)
@@ -32,18 +35,29 @@ def record(problem, path, steps, overwrite=False, begin=0, eps=None):
     problem = solved_to(problem, eps)
     problem, state = recording.begun(problem, begin)
     run = implicit_recording.run if problem.integrator == "implicit" else recording.run
+    idle = []
     with replacing(path) as part, h5py.File(part, "w", libver=("v110", "v110")) as f:
         describe(f, problem)
         for k, recorded in enumerate(run(problem, steps, state)):
             put_step(f.create_group(f"steps/{k}"), recorded)
+            idle += [k] * has_nothing_to_solve(recorded)
+    return tuple(idle)
+
+
+def has_nothing_to_solve(recorded):
+    """Whether an implicit step was solved by the increment 0 that it began with."""
+    report = recorded.report
+    return report is not None and not report.iterations and not recorded.arrays["dv"].value.any()
 
 
 def solved_to(problem, eps):
     """The problem with the tolerance eps of its implicit steps. Raises ValueError for an explicit
-    one.
+    one, or an eps that is none.
     """
     if eps is None:
         return problem
+    if not 0.0 < eps < np.inf:
+        raise ValueError(f"eps = {eps}: expected a tolerance, a finite number > 0")
     if problem.integrator != "implicit":
         raise ValueError(f"eps = {eps} with an explicit integrator: nothing is solved; leave it "
                          "out")
@@ -74,11 +88,12 @@ def is_golden(path):
 def refuse_names(problem):
     """Raise ValueError for names that are not unique, or mean something else in the file."""
     names = [body.name for body in problem.bodies]
-    taken = {a.name for a in arrays_of(problem.integrator)} | {*BESIDE, "scale", "bar"}
+    clash = sorted(taken(problem.integrator) & set(names))
     if len(set(names)) < len(names) or any("/" in name or name.strip(".") == "" for name in names):
         raise ValueError(f"bodies {names}: expected a name of its own for each, without a slash")
-    if taken & set(names):
-        raise ValueError(f"body {min(taken & set(names))!r}: this names an array; rename the body")
+    if clash:
+        raise ValueError(f"body {clash[0]!r}: this names an array, or a group, of every "
+                         f"{problem.integrator} step in the file; rename the body")
 
 
 def describe(f, problem):
@@ -159,14 +174,28 @@ def write(path, steps):
     Grid arrays are lists over `nodes`, (M, d) integer coordinates (node i lies at i dx); or whole
     grids (n1, .., nd[, d]) with `origin` (d,), the coordinates of the first node. Particles in
     another order come with `id` (N,), the number of each in the golden file. What is left out is
-    not checked. Raises ValueError for a key that no golden file has.
+    not checked. Raises ValueError for a key that no golden file has, and for what is no array of
+    numbers.
     """
+    refuse_no_list(steps)
     with replacing(path) as part, h5py.File(part, "w", libver=("v110", "v110")) as f:
         f.create_group("steps")
         for k, arrays in enumerate(steps):
             for name, a in listed(arrays or {}).items():
                 refuse_key(name)
+                refuse_no_numbers(name, np.asarray(a))
                 f.create_dataset(f"steps/{k}/{name}", data=a)
+
+
+def refuse_no_list(steps):
+    """Raise ValueError unless steps is a list of dictionaries, and None."""
+    if not isinstance(steps, list | tuple):
+        raise ValueError(f"steps is a {type(steps).__name__}: expected a list with a dictionary of "
+                         "arrays for each step")
+    for k, arrays in enumerate(steps):
+        if not (arrays is None or isinstance(arrays, dict)):
+            raise ValueError(f"steps[{k}] is a {type(arrays).__name__}: expected a dictionary of "
+                             "arrays, or None for a step that was not computed")
 
 
 def refuse_key(name):

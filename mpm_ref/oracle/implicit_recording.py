@@ -20,11 +20,12 @@ from .recording import (
     copied,
     golden,
     problem_of,
+    refuse_past_end,
     refuse_unsure,
     step_length,
 )
 from .scales import size
-from .schema import LEVELS
+from .schema import BESIDE, LEVELS
 
 MULTIGRID = "cycle"     # the inverse that is a node-embedding V-cycle
 
@@ -32,8 +33,8 @@ MULTIGRID = "cycle"     # the inverse that is a node-embedding V-cycle
 def run(problem, steps, state=None):
     """Yield one `Recorded` for each step; the problem's own arrays stay as they are.
 
-    A run stands at `state`, by default at the start of the problem. Raises ValueError where a step
-    is not solved, or the reference's own error is too large.
+    A run stands at `state`, by default at the start of the problem. Raises ValueError for steps
+    past its end, where a step is not solved, or the reference's own error is too large.
     """
     levels = solving.options_of(problem).levels
     if levels > LEVELS:
@@ -41,6 +42,7 @@ def run(problem, steps, state=None):
     ours = problem_of(problem, 1)
     stepper = started(ours)
     dt, start = step_length(ours, stepper, state), 0.0 if state is None else state.t
+    refuse_past_end(problem.clock, state, dt, steps)
     for k in range(steps):
         yield Step(ours, stepper, start + k * dt, dt).recorded(k)
 
@@ -199,7 +201,7 @@ class Step:
         """What operators were applied to, and the nodes of coarse levels."""
         fixed = {name: getattr(self.fixed, name) for name in ("trial", "probe", "load")}
         return fixed | {name: a for name, a in seen.items()
-                        if name.startswith(("nodes", "probe")) and name != "nodes"}
+                        if name in BESIDE and name != "nodes"}
 
 
 def turned(seen):

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .schema import SUMS
+from .schema import COUNTED, SUMS
 
 
 class NotComparable(ValueError):
@@ -21,6 +21,16 @@ class Other(NamedTuple):
     value: np.ndarray     # shaped as the golden array
     given: np.ndarray     # the same shape: which entries there are
     extra: np.ndarray     # what it has where the golden file has nothing, which means 0
+
+
+def refuse_no_numbers(name, a):
+    """Raise NotComparable unless an array, or a dataset, holds real numbers, and whole ones where
+    they number nodes or particles.
+    """
+    whole_ones = name.split("/")[-1] in COUNTED
+    if a.dtype.kind not in ("iu" if whole_ones else "iuf"):
+        raise NotComparable(f"array {name!r} has the type {a.dtype}: expected "
+                            f"{'whole' if whole_ones else 'real'} numbers")
 
 
 def matched(group, theirs, array, name):
@@ -72,7 +82,7 @@ def by_particle(theirs, body, a):
     if f"{body}/id" not in theirs:
         return a
     id_ = theirs[f"{body}/id"][()]
-    if len(id_) != len(a) or not np.array_equal(np.sort(id_), np.arange(len(a))):
+    if id_.shape != a.shape[:1] or not np.array_equal(np.sort(id_), np.arange(len(a))):
         raise Mismatch(f"{body}/id does not number its {len(a)} particles from 0 to {len(a) - 1}")
     out = np.empty_like(a)
     out[id_] = a
@@ -86,6 +96,9 @@ def by_node(group, theirs, array, a, golden):
         raise NotComparable(f"{name} is given without `{listing}`: expected (M, d) integer "
                             "coordinates")
     nodes, ours = theirs[listing][()], group[listing][()]
+    if nodes.shape[1:] != ours.shape[1:]:
+        raise NotComparable(f"{listing} has shape {nodes.shape}: expected (M, {ours.shape[1]}) "
+                            "integer coordinates")
     require_shape(a, (len(nodes), *golden.shape[1:]))
     place = {tuple(i): k for k, i in enumerate(nodes.tolist())}
     if len(place) < len(nodes):

@@ -3,6 +3,8 @@
 import json
 from dataclasses import asdict, dataclass
 
+from ..store.words import counted
+
 
 @dataclass(frozen=True)
 class Departure:
@@ -64,9 +66,11 @@ class Report:
         if self.agrees:
             given, recorded = self.steps
             partly = f" as far as given ({given} of {recorded} steps)" if given < recorded else ""
-            return (f"agrees{partly}: {self.compared} arrays at {self.precision} tolerance, the "
+            arrays = counted(self.compared, "array")
+            return (f"agrees{partly}: {arrays} at {self.precision} tolerance, the "
                     f"largest difference is {self.nearest:.2g} of its tolerance{rest}")
         if not self.first:
             return f"nothing to compare{rest}"
         return (f"departs first at {self.first.sentence} ({self.precision}); "
-                f"{len(self.departures)} of {self.compared} arrays depart{rest}")
+                f"{len(self.departures)} of {counted(self.compared, 'array')} "
+                f"{'departs' if len(self.departures) == 1 else 'depart'}{rest}")

@@ -63,7 +63,16 @@ ENERGIES = ("kinetic", "elastic", "gravity")    # the entries of `energy`
 # Carried beside them, to find one's way and to apply operators to: no numbers to compare.
 NODES = ("nodes", *(f"nodes{k}" for k in range(1, LEVELS)))
 GIVEN = ("trial", "probe", "load", *(f"probe{k}" for k in range(1, LEVELS)))
-BESIDE = (*NODES, "base", "id", *GIVEN)
+COUNTED = (*NODES, "base", "id")                # whole numbers
+BESIDE = (*COUNTED, *GIVEN)
+
+
+def taken(integrator):
+    """What stands beside the groups of the bodies in a step of an integrator: no body's name."""
+    on_nodes = {a.name for a in arrays_of(integrator) if a.where in ("nodes", "step")}
+    if integrator == "implicit":
+        return {*on_nodes, *NODES, *GIVEN, "scale", "bar", "report"}
+    return {*on_nodes, "nodes", "scale"}
 
 
 def key(array, body=None):

@@ -37,7 +37,7 @@ def solve(stepper, bodies, dt, S_g, t):
     report = stepper.report
     if not report.converged:
         raise ValueError(f"the implicit step was not solved: {report.why}; take a smaller dt, "
-                         "another method, or a larger eps")
+                         "another method, a larger eps, or more iterations")
     tight = replace(options, eps=CLOSER * options.eps, cells=0.0, iterations=10_000)
     pose, dv = tightly(stepper, bodies, (t, dt), tight)
     second = tightly(stepper, bodies, (t, dt), other_method(options, tight.eps))[1]

@@ -44,17 +44,18 @@ def build_solver(scene):
     """Options of the implicit method that the scene names; None for the explicit integrator."""
     if scene.integrator == "explicit":
         if scene.solver is not None:
-            raise SceneError(f'solver: given with integrator = "explicit"; {NAMES}')
+            raise SceneError('solver: given, but the integrator is "explicit"; add integrator = '
+                             '"hot", or another implicit method, or remove this table')
         return None
     if scene.integrator not in METHODS:
         raise SceneError(f"integrator = {scene.integrator!r}: {NAMES}")
     with at("scheme"):
         check_scheme(scene.step_scheme)
-    for name, parts in (("collider", scene.collider), ("walls", filter(None, (scene.walls,)))):
-        for part in parts:
-            if part.friction:
-                raise SceneError(f"{name}.friction = {part.friction}: expected 0 with an implicit "
-                                 "integrator; friction has no potential")
+    parts = {f"collider[{k}]": part for k, part in enumerate(scene.collider)}
+    for name, part in (parts | {"walls": scene.walls}).items():
+        if part is not None and part.friction:
+            raise SceneError(f"{name}.friction = {part.friction}: expected 0 with an implicit "
+                             "integrator; friction has no potential")
     return options_of(scene.integrator, **(scene.solver.given() if scene.solver else {}))
 
 

@@ -13,8 +13,9 @@ import h5py
 import numpy as np
 
 from .atomic import part_of, require_space
-from .journal import LIBVER, JournaledFile, new_hdf5
+from .journal import LIBVER, InUse, JournaledFile, in_use
 from .manifest import scene_hash
+from .words import counted
 
 FORMAT = "mpm_ref results 1"
 ROWS = 1 << 16                    # particles per chunk
@@ -72,20 +73,32 @@ def create(path, problem, fields, facts, beside=None):
     path = Path(path)
     _require_names(problem.bodies)
     require_space(path, 0)
-    if path.exists():
-        JournaledFile(path).close()          # raises if it is being written
-    part = part_of(path)
+    file = _part_to_fill(path)
     try:
-        with new_hdf5(part) as h5:
+        if path.exists():
+            JournaledFile(path).close()          # raises if it is being written
+        with h5py.File(file, "w", libver=LIBVER) as h5:
             _lay_out(h5, problem, fields)
             h5["manifest"] = json.dumps(facts, indent=1)
-        file = JournaledFile(part)
+        file.commit()
         if beside is not None:
             Path(beside).unlink(missing_ok=True)
         file.move(path)
-    finally:
-        part.unlink(missing_ok=True)
+    except BaseException:
+        part_of(path).unlink(missing_ok=True)    # before the lock is gone, and it another's
+        file.close()
+        raise
     return Writer(file)
+
+
+def _part_to_fill(path):
+    """A new file beside `path`, locked until it takes that place: of several first writers one
+    gets it.
+    """
+    try:
+        return JournaledFile(part_of(path), new=True)
+    except InUse:
+        raise in_use(path) from None
 
 
 def reopen(path, problem, frames):
@@ -95,17 +108,22 @@ def reopen(path, problem, frames):
     """
     writer = Writer(JournaledFile(path))
     try:
-        if writer.h5.attrs["scene_sha256"] != scene_hash(problem):
-            raise BadResults(f"{path} holds results of another scene; name another file, "
-                             "or overwrite it")
-        if len(writer) < frames:
-            raise BadResults(f"{path} holds {len(writer)} frames, but the checkpoint comes after "
-                             f"{frames}; give the file of that run, or start the run anew")
+        require_run(writer.h5, path, problem, frames)
         writer.truncate(frames)
     except BaseException:
         writer.close()
         raise
     return writer
+
+
+def require_run(h5, path, problem, frames):
+    """Raise `BadResults` unless a results file is of the problem's scene and has so many frames."""
+    if h5.attrs["scene_sha256"] != scene_hash(problem):
+        raise BadResults(f"{path} holds results of another scene; name another file, "
+                         "or overwrite it")
+    if len(h5["time"]) < frames:
+        raise BadResults(f"{path} holds {counted(len(h5['time']), 'frame')}, but the checkpoint "
+                         f"comes after {frames}; give the file of that run, or start the run anew")
 
 
 class Writer:

@@ -21,6 +21,7 @@ from .manifest import scene_hash, source_hash
 FORMAT = "mpm_ref checkpoint 1"
 SEAL = b"\nmpm_ref sha256 "
 SEALED = len(SEAL) + 64
+SUFFIX = ".checkpoint.h5"       # of the names of such files
 
 
 class BadCheckpoint(ValueError):
@@ -63,6 +64,11 @@ def is_one(path):
     with open(path, "rb") as file:
         file.seek(max(Path(path).stat().st_size - SEALED, 0))
         return file.read(len(SEAL)) == SEAL
+
+
+def is_named_so(path):
+    """Whether a file has the name of a checkpoint."""
+    return str(path).endswith(SUFFIX)
 
 
 def summary(path):

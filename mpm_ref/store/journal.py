@@ -49,13 +49,10 @@ class JournaledFile(io.RawIOBase):
 
     def __init__(self, path, new=False):
         self.path = Path(path)
+        self._file = _locked(self.path, new)
         try:
-            self._file = open(self.path, "w+b" if new else "r+b", buffering=0)
-        except OSError as e:
-            raise not_written(path, e) from e
-        try:
-            _lock(self._file, self.path)
             if new:
+                self._file.truncate(0)
                 journal_of(self.path).unlink(missing_ok=True)
             _apply_journal(self._file, self.path)
         except BaseException:
@@ -198,13 +195,47 @@ def journal_of(path):
     return path.with_name(f".{path.name}.journal")
 
 
+def in_use(path):
+    """`InUse` for a file."""
+    return InUse(f"{path} is being written by another process; wait for it, or write to another "
+                 "file")
+
+
+def _locked(path, new):
+    """The file at `path`, created if it is not there and `new`, with other writers locked out."""
+    while True:
+        try:
+            file = open(path, "r+b", buffering=0, opener=_create if new else None)
+        except OSError as e:
+            raise not_written(path, e) from e
+        try:
+            _lock(file, path)
+            if _stands_at(path, file):
+                return file
+        except BaseException:
+            file.close()
+            raise
+        file.close()
+
+
+def _create(path, flags):
+    return os.open(path, flags | os.O_CREAT, 0o666)
+
+
 def _lock(file, path):
     """Lock out other writers. A POSIX lock: HDF5's own locks, hence readers, do not mind it."""
     try:
         fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        raise InUse(f"{path} is being written by another process; wait for it, or write to another "
-                    "file") from None
+        raise in_use(path) from None
+
+
+def _stands_at(path, file):
+    """Whether an open file is the one at `path`: a writer that was faster may have moved it."""
+    try:
+        return os.path.samestat(os.stat(path), os.fstat(file.fileno()))
+    except FileNotFoundError:
+        return False
 
 
 def _write_at(file, data, at):

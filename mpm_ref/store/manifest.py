@@ -105,18 +105,24 @@ def now():
     return datetime.now().astimezone().isoformat(timespec="seconds")
 
 
+def unsolved(facts):
+    """Implicit steps of all parts of a manifest whose solve did not converge."""
+    return sum(part.get("unsolved", 0) for part in facts.get("parts", ()))
+
+
 @dataclass
 class Part:
     """One uninterrupted part of a run: from its start, or a checkpoint, to wherever it ended."""
 
     first_step: int
+    unsolved: int = 0
     began: str = field(default_factory=now)
     wall_start: float = field(default_factory=time.perf_counter)
     cpu_start: float = field(default_factory=time.process_time)
 
     def ended(self, why, state, digest):
-        """The entry of `parts` in the manifest: why it ended, where, what it took and the sha256 of
-        the state it ended with.
+        """The entry of `parts` in the manifest: why it ended, where, what it took, the implicit
+        steps that were not solved and the sha256 of the state it ended with.
         """
         return {
             "began": self.began,
@@ -128,5 +134,6 @@ class Part:
             "wall_s": round(time.perf_counter() - self.wall_start, 3),
             "cpu_s": round(time.process_time() - self.cpu_start, 3),
             "peak_bytes": peak_memory(),
+            "unsolved": self.unsolved,
             "state_sha256": digest,
         }

@@ -17,7 +17,10 @@ SCALARS = {                       # name -> unit, what it is, and the fields it 
     "y": ("Pa", "yield stress, where a return map changes it", ("y",)),
     "body": ("1", "number of the body", ()),
 }
-
+OTHERS = {                        # formats of files of ours -> what they are
+    "mpm_ref checkpoint 1": "a checkpoint, from which `mpm-ref run --resume` goes on",
+    "mpm_ref golden 1": "a golden file, for `mpm-ref oracle check`",
+}
 
 __all__ = ["ENERGIES", "SCALARS", "BadResults", "Results"]
 
@@ -32,8 +35,8 @@ class Results:
     def __init__(self, path):
         self.path = Path(path)
         if not self.path.is_file():
-            raise BadResults(f"{path}: there is no such file; expected a results file, as "
-                             "`mpm-ref run` writes it")
+            what = "this is a folder" if self.path.is_dir() else "there is no such file"
+            raise BadResults(f"{path}: {what}; expected a results file, as `mpm-ref run` writes it")
         try:
             recover(self.path)
             self.h5 = h5py.File(self.path, "r")
@@ -41,10 +44,11 @@ class Results:
             why = "it is empty" if self.path.stat().st_size == 0 else _first_line(e)
             raise BadResults(f"{path} cannot be read as HDF5 ({why}); expected a results file, as "
                              "`mpm-ref run` writes it: is it one, and whole?") from e
-        if self.h5.attrs.get("format") != FORMAT:
+        kind = self.h5.attrs.get("format")
+        if kind != FORMAT:
             self.close()
-            raise BadResults(f"{path} is HDF5, but not a results file of mpm_ref (format "
-                             f"{FORMAT!r}); give a file that `mpm-ref run` wrote")
+            raise BadResults(f"{path} is {OTHERS.get(kind, 'HDF5')}, but not a results file of "
+                             f"mpm_ref (format {FORMAT!r}); give a file that `mpm-ref run` wrote")
         self._read_heads()
 
     def _read_heads(self):

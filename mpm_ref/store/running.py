@@ -1,13 +1,13 @@
 """A run on files: `run(problem, "out.h5")`, to be continued bit for bit after whatever ended it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ..monitor import check
 from ..simulate import State, ended, rebound
-from . import Fields, checkpoint, create, reopen
+from . import Fields, checkpoint, create, reopen, require_run
 from .atomic import require_place
-from .manifest import manifest
+from .manifest import manifest, unsolved
 from .results import BadResults, Results
 from .session import AT_LIMIT, FINISHED, Session, Watch, checkpoint_of
 
@@ -45,13 +45,15 @@ class Options:
 @dataclass(frozen=True)
 class Outcome:
     """How a run ended: why ("finished", "step limit", "interrupted", "terminated"), the `State` it
-    ended with, frames stored, and whether it went on with the very code that began it.
+    ended with, frames stored, whether it went on with the very code that began it, and how many
+    implicit steps of all its parts were not solved, which unstable = "allow" lets pass.
     """
 
     why: str
     state: object
     frames: int
     same_code: bool
+    unsolved: int
 
 
 def run(problem, out, options=None, watch=None):
@@ -69,13 +71,13 @@ def run(problem, out, options=None, watch=None):
     _require_same_fields(problem, out, options)
     over = _why_over(problem, state, options)
     if over is not None:
-        return Outcome(over, state, state.frame, same_code)
+        return _as_it_stands(problem, out, Outcome(over, state, 0, same_code, 0))
     writer = _open(problem, out, options, state)
     try:
         session = Session(problem, writer, watch, options.steps, options.checkpoint_every)
         watch.begin(problem, state)
         why = session.loop(state)
-        return Outcome(why, session.state, len(writer), same_code)
+        return Outcome(why, session.state, len(writer), same_code, unsolved(writer.manifest))
     finally:
         writer.close()
 
@@ -83,9 +85,7 @@ def run(problem, out, options=None, watch=None):
 def _where_to_begin(problem, out, options):
     """(state of the checkpoint or None for the start, whether this very code saved it)."""
     path = checkpoint_of(out)
-    if Path(out).exists() and not (options.resume or options.overwrite):
-        raise Refused(f"{out} exists: add --resume to continue it, --overwrite to replace it, "
-                      "or name another file")
+    _require_leave(out, options)
     if Path(out).exists():
         _require_results(out, options)
     if options.resume and path.exists():
@@ -95,6 +95,13 @@ def _where_to_begin(problem, out, options):
         return checkpoint.load(path, problem)
     _require_start(problem)
     return None, True
+
+
+def _require_leave(out, options):
+    """Raise `Refused` where results stand that are neither to be continued nor replaced."""
+    if Path(out).exists() and not (options.resume or options.overwrite):
+        raise Refused(f"{out} exists: add --resume to continue it, --overwrite to replace it, "
+                      "or name another file")
 
 
 def _require_results(out, options):
@@ -134,6 +141,13 @@ def _why_over(problem, state, options):
     return AT_LIMIT if options.steps is not None and state.step >= options.steps else None
 
 
+def _as_it_stands(problem, out, outcome):
+    """The `Outcome` of a run that needs no further step, with what its results hold."""
+    with Results(out) as results:
+        require_run(results.h5, out, problem, outcome.state.frame)
+        return replace(outcome, frames=len(results), unsolved=unsolved(results.manifest))
+
+
 def _require_start(problem):
     """What a run finds of its first state, before anything is written: raises `Unstable` for a
     state that is not sound, `OutOfRange` where no grid covers it, `TooLarge` for a dt past its
@@ -150,5 +164,6 @@ def _open(problem, out, options, state):
     """`Writer` of the results, new ones or those of the run that goes on."""
     if options.resume and Path(out).exists():
         return reopen(out, problem, state.frame if state else 0)
+    _require_leave(out, options)        # another run may have begun there meanwhile
     return create(out, problem, options.fields or Fields(), manifest(problem, options.seed),
                   beside=checkpoint_of(out))

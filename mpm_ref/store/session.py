@@ -39,7 +39,7 @@ class _Stop(Exception):
 
 def checkpoint_of(out):
     """Path of the checkpoint that belongs to a results file: run.h5 -> run.checkpoint.h5."""
-    return Path(out).with_suffix(".checkpoint.h5")
+    return Path(out).with_suffix(checkpoint.SUFFIX)
 
 
 class Session:
@@ -51,13 +51,13 @@ class Session:
     def __init__(self, problem, writer, watch, steps=None, every=None):
         self.problem, self.writer, self.watch = problem, writer, watch
         self.steps, self.every = steps, every
-        self.state, self.dt, self.asked = None, 0.0, None
+        self.state, self.part, self.dt, self.asked = None, None, 0.0, None
         self.shown = self.saved = None        # steps at which a frame, a checkpoint was last stored
         self.saved_at = time.perf_counter()
 
     def loop(self, state):
         """Run from a state, or None for the start; returns why it ended, see `Outcome`."""
-        part = Part(state.step if state else 0)
+        self.part = Part(state.step if state else 0)
         self.state, self.shown = state, self.writer.last_step
         self.saved = state.step if state else None
         try:
@@ -71,14 +71,15 @@ class Session:
             why = str(stop)
         except (Unstable, TooLarge) as fault:
             self.show_last()
-            self.end(part, f"{type(fault).__name__}: {fault}")
+            self.end(f"{type(fault).__name__}: {fault}")
             raise
-        self.end(part, why)
+        self.end(why)
         return why
 
     def after_step(self, state, dt):
         """After every step; a frame that is due comes first."""
         self.state, self.dt = state, dt
+        self.part.unsolved += state.solve is not None and not state.solve.converged
         self.watch.step(state, dt)
         if not frame_is_due(self.problem.clock, state):
             self.rest()
@@ -135,10 +136,10 @@ class Session:
         checkpoint.save(checkpoint_of(self.writer.path), self.state, self.problem)
         self.saved, self.saved_at = self.state.step, time.perf_counter()
 
-    def end(self, part, why):
+    def end(self, why):
         """Enter this part of the run in the manifest."""
         facts = self.writer.manifest
-        facts["parts"].append(part.ended(why, self.state, checkpoint.digest(self.state)))
+        facts["parts"].append(self.part.ended(why, self.state, checkpoint.digest(self.state)))
         self.writer.put_manifest(facts)
 
 

@@ -63,7 +63,7 @@ def stiffness(run):
     dx, steps = run.choose(quick=(0.03, 2), standard=(0.02, 12), paper=(0.0075, 12))
     moduli = run.choose(quick=(1e5, 1e9), standard=SWEEP, paper=SWEEP)
     for method in METHODS:
-        cost(dx, moduli[0], method, 2)                        # compiles
+        cost(dx, moduli[0], method, steps)                      # compiles
     costs = {}
     for E, method in run.progress([(E, m) for E in moduli for m in METHODS], "runs"):
         costs[E, method], particles = cost(dx, E, method, steps)

@@ -1,0 +1,46 @@
+"""Bodies whose names look like something else in a golden file."""
+
+from dataclasses import replace
+
+import pytest
+from goldens import seen_by, stretched
+from goldens_hot import EPS, problem_of
+
+from mpm_ref import oracle
+from mpm_ref.oracle.schema import taken
+
+
+def named(problem, *names):
+    """The problem with its bodies renamed."""
+    return replace(problem, bodies=tuple(
+        body._replace(name=name) for body, name in zip(problem.bodies, names, strict=True)))
+
+
+@pytest.mark.parametrize("names", [("bar", "v"), ("report", "x"), ("cycle", "probe1"),
+                                   ("nodes of steel", "base")])
+def test_names_of_what_stands_elsewhere_are_taken(names, tmp_path):
+    problem = named(stretched(), *names)
+    golden, other = tmp_path / "golden.h5", tmp_path / "other.h5"
+    oracle.record(problem, golden, 2)
+    oracle.write(other, seen_by(problem))
+    report = oracle.check(golden, other)
+    assert (report.agrees, report.compared, report.missing) == (True, 48, ())
+    assert oracle.check(golden, golden).compared == 48
+
+
+@pytest.mark.parametrize("name", sorted(taken("explicit")))
+def test_names_that_clash_are_refused(name, tmp_path):
+    with pytest.raises(ValueError, match=f"body '{name}': this names an array, or a group, of ev"):
+        oracle.record(named(stretched(), name, "metal"), tmp_path / "golden.h5", 1)
+
+
+@pytest.mark.parametrize("name", ["bar", "report", "probe3", "nodes2", "dv", "load", "E_trial"])
+def test_implicit_steps_have_more(name, tmp_path):
+    with pytest.raises(ValueError, match=f"body '{name}': .* of every implicit step"):
+        oracle.record(named(problem_of(2), name, "hard"), tmp_path / "golden.h5", 1)
+
+
+def test_an_implicit_body_may_be_named_like_a_particle_array(tmp_path):
+    problem, golden = named(problem_of(2), "nodes of steel", "v"), tmp_path / "golden.h5"
+    oracle.record(problem, golden, 1, eps=EPS)
+    assert oracle.check(golden, golden).agrees

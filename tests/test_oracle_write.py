@@ -1,0 +1,53 @@
+"""What is no list of steps with arrays of numbers is refused in one sentence, where it is written
+and where it is read.
+"""
+
+import h5py
+import numpy as np
+import pytest
+from goldens import seen_by, stretched
+
+from mpm_ref import oracle
+
+
+@pytest.mark.parametrize(("steps", "said"), [
+    ({"mass": np.ones(3)}, "steps is a dict: expected a list with a dictionary of arrays"),
+    (np.ones(3), "steps is a ndarray"),
+    ([[np.ones(3)]], r"steps\[0\] is a list: expected a dictionary of arrays"),
+    ([{"mass": "heavy"}], "array 'mass' has the type <U5: expected real numbers"),
+    ([None, {"jelly/x": [1j]}], "array 'jelly/x' has the type complex128: expected real numbers"),
+    ([{"nodes": np.ones((3, 2))}], "array 'nodes' has the type float64: expected whole numbers"),
+    ([{"jelly/id": np.ones(3)}], "array 'jelly/id' has the type float64: expected whole numbers"),
+])
+def test_what_is_no_array_of_numbers_is_not_written(steps, said, tmp_path):
+    with pytest.raises(ValueError, match=said):
+        oracle.write(tmp_path / "other.h5", steps)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("name", "value", "said"), [
+    ("mass", "heavy", "array 'mass' has the type object: expected real numbers"),
+    ("nodes", [1, 2, 3], r"nodes has shape \(3,\): expected \(M, 2\) integer coordinates"),
+    ("nodes", 1.0, "array 'nodes' has the type float64: expected whole numbers"),
+])
+def test_nor_read(golden, name, value, said, tmp_path):
+    other = tmp_path / "other.h5"
+    oracle.write(other, seen_by(stretched()))
+    with h5py.File(other, "r+") as f:
+        del f[f"steps/0/{name}"]
+        f[f"steps/0/{name}"] = value
+    with pytest.raises(oracle.NotComparable, match=said):
+        oracle.check(golden, other)
+
+
+def test_an_id_that_is_one_number_departs(golden, checked):
+    theirs = seen_by(stretched())
+    theirs[0]["jelly/id"] = 1
+    assert "jelly/id does not number its" in checked(theirs).first.what
+
+
+def test_steps_that_are_no_group_are_told(golden, tmp_path):
+    with h5py.File(tmp_path / "other.h5", "w") as f:
+        f["steps"] = np.ones(3)
+    with pytest.raises(oracle.NotComparable, match="no group 'steps'"):
+        oracle.check(golden, tmp_path / "other.h5")

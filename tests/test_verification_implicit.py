@@ -1,0 +1,50 @@
+"""Runs of the implicit step's verification: what a course keeps, and that a method cannot lie."""
+
+import numpy as np
+import pytest
+
+from validation.verification import implicit as module
+from validation.verification.implicit import EPS, Course, implicit, moved, record_minimisers, rise
+
+
+class Records(dict):
+    """What an experiment records: {target: (value, note)}."""
+
+    def record(self, target, value, **given):
+        self[target] = value, given["note"]
+
+
+def test_every_method_solves_to_the_same_tolerance():
+    for method in module.METHODS:
+        options = implicit(method).options
+        assert (options.method, options.eps, options.norm) == (method, EPS, "characteristic")
+
+
+def test_course_says_which_solves_did_not_converge():
+    assert moved(implicit("pn-pcg"), 1).missed == []
+    missed = moved(implicit("pn-pcg", iterations=1), 2).missed
+    assert len(missed) == 2
+    assert "the cap" in missed[0]
+
+
+def test_rise_is_the_largest_of_a_step():
+    course = Course(np.zeros((1, 2)), np.array([4.0, 2.0, 3.0, 1.0]), [])
+    assert rise(course) == 0.25
+    assert rise(course._replace(energies=np.array([4.0, 3.0, 1.0]))) == -0.25
+
+
+def test_methods_that_end_elsewhere_or_miss_are_told(monkeypatch):
+    ways = {"pn-pcg": 0.0, "hot": 0.0, "admm": 0.5}
+    monkeypatch.setattr(module, "METHODS", ways)
+    monkeypatch.setattr(module, "implicit", lambda method: method)
+    course = Course(np.zeros((3, 2)), np.ones(2), [])
+    monkeypatch.setattr(module, "moved", lambda method, steps: course._replace(
+        x=course.x + ways[method] * module.DX, missed=["capped"] if ways[method] else []))
+    found = Records()
+    record_minimisers(found, 1, course)
+    assert found["verification.implicit.hot"][0] == 0.0
+    assert found["verification.implicit.admm"][0] == pytest.approx(0.5)
+    value, note = found["verification.implicit.missed"]
+    assert value == 1
+    assert "admm: capped" in note
+    assert "verification.implicit.pn-pcg" not in found

@@ -1,0 +1,58 @@
+"""The ways in which a step is solved at equal error: methods, each with its tolerances.
+
+All take turns, so that the load of the machine bears on all alike, and each goes down its ladder
+until a solve is cut short or slow: the next would be so too.
+"""
+
+from itertools import zip_longest
+from typing import NamedTuple
+
+from ..hot.stiffness import METHODS
+from .hot import PAPER, point
+
+SOME = (*METHODS, "hot-plus")
+ALL = (*SOME, "hot-quadratic", "lbfgs-gmg", "sgs-pcg", "pn-gmg-pcg", "admm", "gast15")
+FLEXIBLE = {"flexible": True}       # CG bears a preconditioner that varies, as a V-cycle does whose
+                                    # coarsest solve is inexact; plain CG takes thousands of
+                                    # iterations near the solution
+OPTIONS = {"pn-mgpcg": FLEXIBLE, "pn-gmg-pcg": FLEXIBLE}
+OWN = {"gast15": tuple(10.0**-k for k in range(-1, 6))}     # its tolerance is an L2 norm [kg m/s]
+CAPS = {"iterations": 300, "cg_iterations": 3000}   # of a solve; one that is cut short says so
+SLOW = 10.0                         # CPU time from which on a solve is its way's last [s]
+
+
+class Way(NamedTuple):
+    """A method, and the tolerances that it is given, largest first."""
+
+    method: str
+    ladder: tuple
+
+    @property
+    def options(self):
+        """Of its solves, beside the tolerance."""
+        return {**CAPS, **OPTIONS.get(self.method, {})}
+
+
+def ways(methods, ladder):
+    """The `Way`s of methods, on one ladder but where a method's tolerance means something else."""
+    return [Way(method, OWN.get(method, ladder)) for method in methods]
+
+
+def descended(step, exact, tried):
+    """`Point`s of all `Way`s tried, beside the exact `Solution`."""
+    found, ended = [], set()
+    for rung in zip_longest(*(way.ladder for way in tried)):
+        for way, eps in zip(tried, rung, strict=True):
+            if eps is None or way.method in ended:
+                continue
+            found.append(point(step, exact, (way.method, eps), 1, **way.options))
+            if last(found[-1]):
+                ended.add(way.method)
+    return found
+
+
+def last(p):
+    """Whether a `Point` is its way's last. HOT goes on to the paper's tolerance, at which all are
+    compared to it.
+    """
+    return (not p.converged or p.cpu > SLOW) and (p.method != "hot" or p.eps <= PAPER)
