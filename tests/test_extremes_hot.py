@@ -7,7 +7,7 @@ from mpm_ref.hot import step
 from mpm_ref.hot.methods import METHODS, minimise
 from validation.extremes import hot_every_method as every
 from validation.extremes.hot_bodies import DX, FRAME, brick, elastic, gravity, shaken
-from validation.extremes.hot_solve import CONVERGED, STOPPED, Setup, solve
+from validation.extremes.hot_solve import CONVERGED, EPS, STOPPED, Setup, solve
 from validation.extremes.hot_units import SYSTEMS, converted, solved
 
 
@@ -70,6 +70,7 @@ def test_every_method_is_tried_to_the_same_tolerance():
     found = every.ends_of(soft)
     assert [end.method for end in found] == list(METHODS)
     assert {end.kind for end in found} == {CONVERGED}
+    assert max(end.least for end in found) <= EPS
 
 
 def test_hard_states_are_of_one_step_in_two_dimensions():

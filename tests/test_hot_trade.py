@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mpm_ref.scene import Body, Box, Material, Regular, Scene, Scheme, build
+from mpm_ref.scene import Body, Box, Material, Regular, Scene, Scheme, Velocity, build
 from validation.hot.begun import BEGUN
 from validation.hot.iterates import first
 from validation.hot.one_step import Errors, difference, errors
@@ -26,9 +26,10 @@ from validation.trade.hot_ways import ALL, CAPS, SLOW, SOME, Way, descended, way
 
 @pytest.fixture(scope="module")
 def step():
-    """The first step of a block that falls: two-dimensional, a few particles."""
+    """The first step of a block that is thrown and falls: two-dimensional, a few particles."""
     block = Body(name="block", density=1000.0, shape=Box(lower=[0.0, 0.0], upper=[0.2, 0.2]),
-                 sampling=Regular(per_cell=2), material=Material(law="neo_hookean", E=1e5, nu=0.3))
+                 sampling=Regular(per_cell=2), material=Material(law="neo_hookean", E=1e5, nu=0.3),
+                 velocity=Velocity(linear=[3.0, 0.0]))
     scene = Scene(dim=2, dx=0.1, gravity=[0.0, -9.8], integrator="hot", cfl=0.6, longest=0.01,
                   end=0.1, every=1, scheme=Scheme(transfer="apic"), body=(block,))
     return first(build(scene))

@@ -146,6 +146,12 @@ def test_factor_of_a_cycle_is_that_on_free_nodes(clamped, way):
     assert seen.factor == pytest.approx(radius, rel=1e-6)
 
 
+def test_masked_cycle_is_that_of_the_free_nodes_alone(clamped):
+    alone, b = two_grid(clamped.system), clamped.system.b
+    u = on_free(clamped, cycle(clamped, "masked", 2))(b)
+    np.testing.assert_allclose(u, alone.cycle(b), atol=1e-12 * abs(u).max())
+
+
 def test_leak_makes_two_grids_slower(clamped):
     factors = [found(clamped, way, 2, rough(clamped.system.b.shape)).factor
                for way in ("masked", "leaking")]

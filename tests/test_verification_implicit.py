@@ -39,7 +39,7 @@ def test_methods_that_end_elsewhere_or_miss_are_told(monkeypatch):
     monkeypatch.setattr(module, "implicit", lambda method: method)
     course = Course(np.zeros((3, 2)), np.ones(2), [])
     monkeypatch.setattr(module, "moved", lambda method, steps: course._replace(
-        x=course.x + ways[method] * module.DX, missed=["capped"] if ways[method] else []))
+        x=ways[method] * module.DX * np.eye(3, 2), missed=["capped"] if ways[method] else []))
     found = Records()
     record_minimisers(found, 1, course)
     assert found["verification.implicit.hot"][0] == 0.0
