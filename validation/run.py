@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .kept import Kept
 from .progress import Progress
 from .provenance import provenance
 from .record import SAME_SIZE, Record, Rule, finite_ends, judge, write_records, write_whole
@@ -33,14 +34,15 @@ class Setting(NamedTuple):
 class Run:
     """Handed to an experiment: its profile, seed and random numbers; it takes records and tables.
 
-    Nothing reaches the disk before `finish`.
+    Nothing reaches the disk before `finish`, but for what is `kept`.
     """
 
     def __init__(self, experiment, setting, progress):
         self.experiment, self.profile, self.seed = experiment, setting.profile, setting.seed
         self.rng = np.random.default_rng([setting.seed, zlib.crc32(experiment.id.encode())])
         self._setting, self._progress = setting, progress
-        self._drafts, self._tables = [], {}
+        self._drafts, self._tables, self._failed = [], {}, False
+        self._kept = Kept(setting.folder / ".parts" / experiment.id, setting.commit, setting.seed)
         self._wall, self._cpu = time.perf_counter(), time.process_time()
 
     @property
@@ -51,6 +53,12 @@ class Run:
     def progress(self, iterable, desc=""):
         """A bar over an iterable or a number of rounds; iterate it, or call its `update`."""
         return self._progress.inner(iterable, desc)
+
+    def kept(self, name, make):
+        """What make() returns: numbers, texts and lists of them. If an earlier run of the same
+        commit made this part and was cut off, what that one made.
+        """
+        return self._kept.get(name, make)
 
     def choose(self, **by_profile):
         """The value for the profile at hand: `n = run.choose(quick=16, standard=64, paper=128)`."""
@@ -97,6 +105,7 @@ class Run:
 
     def fail(self, error):
         """Record that the experiment raised; what it recorded before stands."""
+        self._failed = True
         self.record(self.experiment.id, None, unit="", comparator="runs",
                     note=f"failed: {type(error).__name__}: {error}")
 
@@ -110,6 +119,8 @@ class Run:
         records = [Record(**draft, **common) for draft in self._drafts]
         self._write_tables()
         write_records(self._setting.folder / f"{self.experiment.id}.json", records)
+        if not self._failed:
+            self._kept.clear()
         return records
 
     def _command(self):

@@ -5,6 +5,7 @@ leave different errors in the particles; so times are compared at that tolerance
 HOT leaves at it, and for one error of the displacement in all scenes.
 """
 
+from functools import partial
 from math import inf
 from typing import NamedTuple
 
@@ -13,7 +14,7 @@ from ..hot.begun import BEGUN, PRINTED, begun, particles, steps
 from ..hot.one_step import Errors, errors, solved
 from ..hot.stiffness import METHODS
 from ..registry import experiment
-from .hot import PAPER, POINT, known, record_equal_eps, times_for
+from .hot import PAPER, POINT, Point, known, record_equal_eps, times_for
 from .hot_ways import ALL, OPTIONS, SLOW, SOME, descended, ways
 
 EXACT, CHECK = "pn-mgpcg", "pn-pcg"     # methods of the reference and of its check
@@ -76,7 +77,7 @@ def equal_error(run):
     trials = plan(run.profile)
     compiled(trials)
     for trial in run.progress(trials, "scenes"):
-        found, exact = ladder(trial)
+        found, exact = unpacked(run.kept(trial.name, partial(ladder, trial)))
         own = known(found, exact.least)
         times[trial] = seconds(own)
         record_trial(run, trial, own, exact)
@@ -104,6 +105,12 @@ def ladder(trial):
              f"{BEGUN[trial.scene]:g} s on")
     return found, Reference(errors(step, check.dv, exact.dv),
                             exact.report.converged and check.report.converged, scale)
+
+
+def unpacked(ladder):
+    """A `ladder` from plain lists, as it comes back from disk."""
+    found, (least, converged, scale) = ladder
+    return [Point(*p) for p in found], Reference(Errors(*least), converged, scale)
 
 
 def trust(points):
