@@ -14,7 +14,7 @@ import numpy as np
 
 from mpm_ref.hot.methods import minimise
 from mpm_ref.scene import build, load
-from mpm_ref.simulate import State
+from mpm_ref.simulate import simulate
 from validation.hot.begun import begun, particles, steps
 from validation.hot.stiffness import bar
 from validation.verification.scenes import with_
@@ -36,11 +36,9 @@ class Timed(NamedTuple):
 
 
 def started(scene):
-    """(`Problem`, `State` at its start) of a scene."""
+    """(`Problem`, `State` at its first frame) of a scene."""
     problem = build(with_(scene, unstable="allow"))
-    state = State(problem.bodies)
-    problem.stepper().start(state.bodies)
-    return problem, state
+    return problem, next(simulate(problem)).state
 
 
 RUNS = {
