@@ -113,6 +113,9 @@ def record_all(run, rows, scale):
                f"{len(silent)} are off and do not say so: "
                + (", ".join(f"{r.scene} {r.method} {r.asked:g} ({r.true:.1e})" for r in silent)
                   or "none"))
+    run.record("trade.hot.held.sound", 1.0 - len(silent) / len(by_rule), comparator=">=",
+               bound=HELD, scale=scale, note="share of the solves that were held or say that they "
+               "may not be")
     ratio = [r.true / r.off for r in by_rule if r.off > 0.0 and r.converged]
     run.record("trade.hot.held.left", float(np.median(ratio)), comparator="info", scale=scale,
                note=f"median of the error that is left over {SAFETY:g} times the length of the "
