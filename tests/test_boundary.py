@@ -124,6 +124,19 @@ def test_prescribed_region_that_follows_or_stays():
         assert np.count_nonzero(u) == 2
 
 
+@pytest.mark.parametrize(("t", "holds"), [(0.1, False), (0.2, True), (0.3, True), (0.4, False)])
+def test_prescribed_region_holds_from_one_time_to_another(t, holds):
+    slab = Prescribed(box((-0.05, -1), (0.05, 1)), Motion(Steady((1.0, 0.0))), follows=False,
+                      since=0.1, until=0.1 + 0.1 + 0.1)
+    _, u, _ = applied(grid_of(np.zeros((4, 2, 2))), prescribed=(slab,), t=t)
+    assert u[0, :, 0] == pytest.approx(1.0 if holds else 0.0)
+
+
+def test_a_time_of_holding_that_is_none_is_refused():
+    with pytest.raises(ValueError, match=r"since = 0\.3, until = 0\.2"):
+        Prescribed(box((-0.05, -1), (0.05, 1)), since=0.3, until=0.2)
+
+
 def test_prescribed_nodes_override_colliders_and_walls(d):
     pull = Motion(Steady(np.ones(d)))
     region = Prescribed(half_space(np.zeros(d), np.eye(d)[0]), pull, follows=False)

@@ -33,7 +33,7 @@ FLOORS = (
     ("simulate", "sampling", "placement"),
     ("scene",),
     ("store",),
-    ("oracle", "sweep", "plotting"),
+    ("oracle", "sweep", "plotting", "cases"),
     ("cli",),
 )
 OUTSIDE = {"validation", "figures", "benchmarks", "tests"}      # floor 9 and what tests it

@@ -147,44 +147,6 @@ def test_bad_table_is_refused(tmp_path, name, rows, said):
     assert run(tmp_path, toy)[0] == []
 
 
-def parts(folder):
-    return sorted(file.name for file in folder.rglob(".parts/*/*"))
-
-
-@pytest.mark.parametrize(("commit", "made"), [("abc", 3), ("abc+changes", 4), ("unknown", 4)])
-def test_an_experiment_that_was_cut_off_goes_on(tmp_path, commit, made):
-    calls = []
-
-    def part(i):
-        calls.append(i)
-        if len(calls) == 2:
-            raise KeyboardInterrupt
-        return [i, [0.1, "text"]]
-
-    def long(run):
-        for i in range(2):
-            assert run.kept(f"part{i}", lambda i=i: part(i)) == [i, [0.1, "text"]]
-
-    with pytest.raises(KeyboardInterrupt):
-        run(tmp_path, long, commit=commit)
-    assert parts(tmp_path) == (["part0-abc-0.json"] if commit == "abc" else [])
-    assert run(tmp_path, long, commit=commit)[0] == []
-    assert len(calls) == made
-    assert parts(tmp_path) == []
-
-
-def test_what_was_kept_is_of_one_commit_and_one_seed(tmp_path):
-    made = []
-
-    def broken(run):
-        run.kept("part", lambda: made.append(run.seed))
-        raise RuntimeError("later")
-
-    for of in ("abc", 0), ("abc", 0), ("abc", 1), ("def", 0):
-        run(tmp_path, broken, commit=of[0], seed=of[1])
-    assert made == [0, 1, 0]
-
-
 def test_random_numbers_follow_seed_and_id(tmp_path):
     drawn = {}
 

@@ -14,6 +14,7 @@ from .collide import nodes_with_mass, solve, touch, touch_wall
 from .contact import NOSLIP, PRESCRIBED, SEPARATE, SLIP, STICKY
 from .motion import STILL, Motion
 
+EVEN = 1e-9         # of a step: so far a sum of steps may miss a time
 KINDS = {"sticky": STICKY, "slip": SLIP, "separate": SEPARATE, "noslip": NOSLIP}
 
 
@@ -51,19 +52,29 @@ class Prescribed:
 
     The region goes along with the motion, unless `follows` is False: then it stays in place and
     gives its nodes the velocity of the motion. `inside` takes the nodes outside the shape instead.
+    It holds in steps that end after `since` and not after `until` [s].
     """
 
     shape: object
     motion: Motion = STILL
     inside: bool = False
     follows: bool = True
+    since: float = 0.0
+    until: float = inf
 
     rule = PRESCRIBED
     friction = 0.0
 
+    def __post_init__(self):
+        if not 0.0 <= self.since < self.until:
+            raise ValueError(f"since = {self.since}, until = {self.until}: expected times in s, "
+                             "0 <= since < until")
+
     def touch(self, nodes, t, dt):
         """The nodes it contains at time t; see `collide.touch`."""
         d = nodes.m.ndim
+        if not self.since < t - EVEN * dt <= self.until:
+            nodes = nodes._replace(flat=nodes.flat[:0])
         pose = self.motion.pose(t, dt, d)
         region = pose if self.follows else self.motion.at_rest.pose(t, dt, d)
         return touch(nodes, self.shape, self.inside, region, pose)

@@ -22,7 +22,7 @@ from ..core.jit import kernel
 class Network(NamedTuple):
     """Weights of a perceptron, layer after layer."""
 
-    sizes: tuple        # widths of the layers, inputs first, outputs last
+    sizes: np.ndarray   # widths of the layers, inputs first, outputs last; integer
     W: np.ndarray       # weights: of layer l an array (sizes[l], sizes[l + 1]), flattened
     WT: np.ndarray      # the same of the transposed arrays
     b: np.ndarray       # biases: of layer l an array (sizes[l + 1],)
@@ -30,6 +30,8 @@ class Network(NamedTuple):
 
 def network(layers):
     """`Network` of layers [(W (in, out), b (out,))]. Raises ValueError where they do not fit."""
+    if not layers:
+        raise ValueError("layers = []: expected at least one (W, b)")
     sizes = [len(layers[0][0])]
     for k, (W, b) in enumerate(layers):
         if W.ndim != 2 or b.shape != W.shape[1:] or len(W) != sizes[-1]:
@@ -41,7 +43,7 @@ def network(layers):
     flat = [np.concatenate([np.ravel(a, order=order) for a in arrays]).astype(float)
             for arrays, order in (([W for W, _ in layers], "C"), ([W for W, _ in layers], "F"),
                                   ([b for _, b in layers], "C"))]
-    return Network(tuple(sizes), *flat)
+    return Network(np.array(sizes), *flat)
 
 
 def layers_of(net):
@@ -106,8 +108,7 @@ def pull_back(net, a, output, u, spare):
 
 @kernel
 def push_forward(net, a, u, spare):
-    """The derivative of the outputs in the direction u of the inputs, into u; a as `value` left it.
-    """
+    """The outputs' derivative in the direction u of the inputs, into u; a as `value` left it."""
     w, last = 0, len(net.sizes) - 1
     for l in range(last):
         n, m = net.sizes[l], net.sizes[l + 1]

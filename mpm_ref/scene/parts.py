@@ -90,7 +90,9 @@ def _prescribed(record, dim, path):
     with at(f"{path}.region"):
         shape = level_set(record.region)
     motion = _motion(record.motion, dim, f"{path}.motion")
-    return Prescribed(shape, motion, record.inside, record.follows)
+    until = inf if record.until is None else record.until
+    with at(path):
+        return Prescribed(shape, motion, record.inside, record.follows, record.since, until)
 
 
 def _walls(record, dim):

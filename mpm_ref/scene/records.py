@@ -183,6 +183,8 @@ class Fixed(Record):
     motion: Motion = Motion()
     inside: bool = False
     follows: bool = True                        # the region moves along
+    since: Time = 0.0                           # it holds from here
+    until: Time | None = None                   # ... to here; released afterwards
     name: str = ""
 
 

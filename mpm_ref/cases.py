@@ -1,0 +1,54 @@
+"""Full-order runs of one body under different parameters, recorded step by step: the data of
+reduced models.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .rom.snapshots import Snapshots
+from .simulate import simulate
+
+
+class History(NamedTuple):
+    """One run: time levels 0 .. k, points in the body's own order."""
+
+    x: np.ndarray       # (k + 1, n, d)     position [m]
+    F: np.ndarray       # (k + 1, n, d, d)  deformation gradient
+    v: np.ndarray       # (k + 1, n, d)     velocity [m/s]
+
+
+def history(problem):
+    """`History` of a problem of one body that shows every step.
+
+    Raises ValueError for more bodies, and for a clock that shows fewer frames.
+    """
+    if len(problem.bodies) != 1:
+        raise ValueError(f"{len(problem.bodies)} bodies: expected one")
+    rows = []
+    for frame in simulate(problem):
+        if frame.state.step != frame.index:
+            raise ValueError(f"frame {frame.index} is step {frame.state.step}: expected every = 1")
+        body = frame.state.bodies[0]
+        rows.append([in_order(a, body.id) for a in
+                     (body.particles.x, body.particles.F, body.particles.v)])
+    return History(*(np.array(field) for field in zip(*rows, strict=True)))
+
+
+def in_order(a, id):
+    """A field (n, ..) with point number id[p] at place id[p]."""
+    out = np.empty_like(a)
+    out[id] = a
+    return out
+
+
+def snapshots(problems, mu):
+    """`Snapshots` of problems that differ by parameters mu (s, parameters) alone."""
+    problems = iter(problems)
+    first = next(problems)
+    body = first.bodies[0]
+    X, m, V0 = (in_order(a, body.id) for a in (body.particles.x, body.particles.m,
+                                               body.particles.V0))
+    runs = [history(first), *(history(problem) for problem in problems)]
+    return Snapshots(X, m, V0, np.asarray(mu, dtype=float), *(
+        np.stack(field) for field in zip(*runs, strict=True)), first.clock.dt)

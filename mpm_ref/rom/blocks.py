@@ -1,0 +1,45 @@
+"""Material points in blocks of the body at rest: where to look for those near the samples.
+
+A block's points lie, in motion, within L radius of its centre's image, where L bounds the stretch.
+So the points that can be near a sample are found from as many evaluations of the map as there are
+blocks, whatever the number of points.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import KDTree
+
+SAFETY = 1.5        # on the largest stretch at the centres, as a bound on that in between
+
+
+class Blocks(NamedTuple):
+    """Points by block: those of block k are order[start[k] : start[k + 1]]."""
+
+    order: np.ndarray       # (n,)
+    start: np.ndarray       # (blocks + 1,)
+    center: np.ndarray      # (blocks, d) of the blocks' points, at rest [m]
+    radius: np.ndarray      # (blocks,) largest distance of a block's point from it [m]
+
+    def near(self, map, xhat, x, distance):
+        """Indices of all points that may be within a distance [m], by the largest axis, of one of
+        the positions x (m, d).
+        """
+        at, F, _ = map.derivatives(self.center, xhat)
+        stretch = SAFETY * np.linalg.norm(F, 2, axis=(1, 2)).max()
+        gap, _ = KDTree(x).query(at, p=np.inf)
+        found = np.flatnonzero(gap <= distance + stretch * self.radius)
+        parts = [self.order[self.start[k]:self.start[k + 1]] for k in found]
+        return np.concatenate([self.order[:0], *parts])
+
+
+def blocks(X, size):
+    """`Blocks` of cubes of a size [m] of points X (n, d) at rest."""
+    _, block = np.unique(np.floor(X / size).astype(np.int64), axis=0, return_inverse=True)
+    count = np.bincount(block)
+    order = np.argsort(block, kind="stable")
+    start = np.concatenate(([0], np.cumsum(count)))
+    center = np.stack([np.bincount(block, X[:, a]) / count for a in range(X.shape[1])], axis=1)
+    far = np.linalg.norm(X - center[block], axis=1)
+    radius = np.maximum.reduceat(far[order], start[:-1])
+    return Blocks(order, start, center, radius)

@@ -1,0 +1,1 @@
+"""Training of reduced models' networks. The only part of `rom` that needs PyTorch."""

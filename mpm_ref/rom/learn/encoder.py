@@ -1,0 +1,58 @@
+"""Where latent coordinates of training snapshots come from: an encoder, or one free vector each.
+
+The encoder is a stack of one-dimensional convolutions over all coordinates in a row, halving their
+number as long as at least SHORTEST are left, and two full layers (LDM-tab1). It ties the latent
+coordinates to one sampling of the body; online it is not needed.
+"""
+
+import torch
+from torch import nn
+
+KERNEL, STRIDE, SHORTEST, FEATURES = 6, 2, 32, 32       # LDM-tab1
+
+
+def lengths(n):
+    """Lengths of a row of n values before and after each convolution of the encoder."""
+    found = [n]
+    while (found[-1] - KERNEL) // STRIDE + 1 >= SHORTEST:
+        found.append((found[-1] - KERNEL) // STRIDE + 1)
+    return found
+
+
+class Encoder(nn.Module):
+    """xhat = e(standardised displacements of all points), LDM-sec4.1-encoder."""
+
+    def __init__(self, dim, n, r):
+        super().__init__()
+        rows = lengths(dim * n)
+        self.convolutions = nn.ModuleList(nn.Conv1d(1, 1, KERNEL, STRIDE) for _ in rows[1:])
+        self.full = nn.Linear(rows[-1], FEATURES)
+        self.last = nn.Linear(FEATURES, r)
+        for layer in (*self.convolutions, self.full, self.last):
+            nn.init.xavier_uniform_(layer.weight)
+
+    def forward(self, u):
+        """Latent coordinates (s, r) of displacements u (s, n, d)."""
+        a = u.reshape(len(u), 1, -1)
+        for layer in self.convolutions:
+            a = nn.functional.elu(layer(a))
+        return self.last(nn.functional.elu(self.full(a[:, 0])))
+
+
+class Free(nn.Module):
+    """Latent coordinates as unknowns of the training, one vector for each snapshot (LDMW-eq7)."""
+
+    def __init__(self, snapshots, r):
+        super().__init__()
+        self.table = nn.Embedding(snapshots, r)
+        nn.init.normal_(self.table.weight, std=0.1)
+
+    def forward(self, index):
+        """Latent coordinates (s, r) of snapshots by number."""
+        return self.table(index)
+
+
+def codes(encoder, u, batch=64):
+    """Latent coordinates of many snapshots u (s, n, d), without gradients."""
+    with torch.no_grad():
+        return torch.cat([encoder(u[i:i + batch]) for i in range(0, len(u), batch)])

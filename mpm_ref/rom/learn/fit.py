@@ -1,0 +1,163 @@
+"""Training a decoder: seeds, schedule, checkpoints, history (LDM-appB).
+
+A training that is cut off goes on from its last checkpoint. Its numbers are then those of an
+uninterrupted one, on the same machine with the same number of threads.
+"""
+
+import json
+from dataclasses import asdict, dataclass
+from math import cos, pi
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import torch
+
+from ..snapshots import units
+from .data import batch_of, data_of
+from .encoder import Encoder, Free, codes
+from .loss import CODE, Weights, loss
+from .perceptron import HIDDEN, Perceptron, exported
+
+FASTEST, SLOWEST = 1e-3, 1e-6       # learning rates at the first and the last step (LDM-appB)
+SAVE = 20                           # epochs between checkpoints
+
+
+@dataclass(frozen=True)
+class Training:
+    """How a decoder is trained.
+
+    r latent coordinates; `latent` "encoder" (LDM-sec4.1-encoder) or "free" (LDMW-eq7); an epoch
+    shows every snapshot once, `batch` at a time, each time at `points` random points (0: all). The
+    learning rate falls from FASTEST to SLOWEST by half a cosine.
+    """
+
+    r: int
+    hidden: tuple = HIDDEN
+    latent: str = "encoder"
+    weights: Weights = CODE
+    epochs: int = 850
+    batch: int = 8
+    points: int = 0
+    seed: int = 0
+
+    def __post_init__(self):
+        for name in ("r", "epochs", "batch"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} = {getattr(self, name)}: expected at least 1")
+        if self.latent not in ("encoder", "free"):
+            raise ValueError(f"latent = {self.latent!r}: expected 'encoder' or 'free'")
+
+
+class Trained(NamedTuple):
+    """A decoder, and what it was trained on knows of it."""
+
+    decoder: object         # `rom.decoder.Decoder`
+    xhat: np.ndarray        # (s, k + 1, r) latent coordinates of the training snapshots
+    history: np.ndarray     # (epochs, 4) loss, and its terms, of each epoch
+
+
+class Session:
+    """Networks, optimiser and random numbers of a training under way."""
+
+    def __init__(self, training, snapshots):
+        torch.manual_seed(training.seed)
+        self.training, self.units = training, units(snapshots)
+        self.data = data_of(snapshots, self.units)
+        count, n, d = self.data.u.shape
+        self.f = Perceptron(d, training.r, training.hidden)
+        self.encoder = (Encoder(d, n, training.r) if training.latent == "encoder"
+                        else Free(count, training.r))
+        self.inputs = (self.data.standardised if training.latent == "encoder"
+                       else torch.arange(count))
+        weights = [*self.f.parameters(), *self.encoder.parameters()]
+        self.optimiser = torch.optim.Adam(weights, lr=FASTEST)
+        self.random = torch.Generator().manual_seed(training.seed)
+        self.history = []
+
+    @property
+    def named(self):
+        """The training's settings as one line of text."""
+        return json.dumps(asdict(self.training))
+
+    def epoch(self):
+        """Show every snapshot once."""
+        order = self.data.first[torch.randperm(len(self.data.first), generator=self.random)]
+        batches = order.split(self.training.batch)
+        done = [self.show(at, (len(self.history) + k / len(batches)) / self.training.epochs)
+                for k, at in enumerate(batches)]
+        self.history.append(torch.tensor(done).mean(dim=0).tolist())
+
+    def show(self, at, progress):
+        """One step of the optimiser on a batch of snapshots; its loss and terms."""
+        for group in self.optimiser.param_groups:
+            group["lr"] = rate(progress)
+        batch = batch_of(self.data, at, self.some_points(), self.latents)
+        self.optimiser.zero_grad()
+        total, found = loss(self.f, batch, self.data.units, self.training.weights)
+        total.backward()
+        self.optimiser.step()
+        return [total.item(), *(term.item() for term in found)]
+
+    def some_points(self):
+        """Numbers of the points that a batch is shown at."""
+        n, wanted = len(self.data.X), self.training.points
+        if not 0 < wanted < n:
+            return torch.arange(n)
+        return torch.randperm(n, generator=self.random)[:wanted]
+
+    def latents(self, numbers):
+        """Latent coordinates (s, r) of snapshots by number."""
+        return self.encoder(self.inputs[numbers])
+
+    def result(self, runs):
+        """`Trained`, of so many runs."""
+        xhat = codes(self.encoder, self.inputs).double().numpy()
+        return Trained(exported(self.f, self.units), xhat.reshape(runs, -1, self.training.r),
+                       np.array(self.history))
+
+    def save(self, path):
+        """Checkpoint, whole or not at all."""
+        part = path.with_suffix(".part")
+        torch.save({"training": self.named, "f": self.f.state_dict(),
+                    "encoder": self.encoder.state_dict(), "random": self.random.get_state(),
+                    "optimiser": self.optimiser.state_dict(), "history": self.history}, part)
+        part.replace(path)
+
+    def load(self, path):
+        """Go on from a checkpoint. Raises ValueError where it is of another training."""
+        try:
+            kept = torch.load(path, weights_only=True)
+        except Exception as error:
+            raise ValueError(f"{path} is no checkpoint that can be read ({error})") from None
+        if kept["training"] != self.named:
+            raise ValueError(f"{path} is a checkpoint of the training {kept['training']}, not of "
+                             f"{self.named}; remove it or give another folder")
+        self.f.load_state_dict(kept["f"])
+        self.encoder.load_state_dict(kept["encoder"])
+        self.optimiser.load_state_dict(kept["optimiser"])
+        self.random.set_state(kept["random"])
+        self.history = kept["history"]
+
+
+def rate(progress):
+    """Learning rate at a share of the training: half a cosine."""
+    return SLOWEST + 0.5 * (FASTEST - SLOWEST) * (1.0 + cos(pi * progress))
+
+
+def train(training, snapshots, checkpoint=None, on_epoch=None):
+    """`Trained` on the runs of `Snapshots`.
+
+    checkpoint: a file to go on from and to save to; on_epoch(history) is called after each epoch.
+    """
+    session = Session(training, snapshots)
+    path = None if checkpoint is None else Path(checkpoint)
+    if path is not None and path.exists():
+        session.load(path)
+    while len(session.history) < training.epochs:
+        session.epoch()
+        if path is not None and len(session.history) % SAVE == 0:
+            session.save(path)
+        if on_epoch is not None:
+            on_epoch(session.history)
+    return session.result(len(snapshots.x))

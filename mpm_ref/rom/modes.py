@@ -1,0 +1,81 @@
+"""Proper orthogonal decomposition as a linear manifold: x = X + sum_k xhat_k U_k(X).
+
+The r modes that leave the least square error of a set of displacements are its leading singular
+vectors. Each is a sum of snapshots, so that its gradient is the same sum of their F - I, without
+any differentiation; and the body at rest is xhat = 0. Between the points of the data, value and
+gradient of the modes are those of a linear fit to the nearest ones.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import KDTree
+
+NEAREST = 16        # points of a linear fit between the data
+SAME = 1e-9         # distance below which a point is one of the data, over the body's extent
+
+
+class Modes(NamedTuple):
+    """A linear map on the points of its data."""
+
+    X: np.ndarray       # (n, d)        points [m]
+    U: np.ndarray       # (n, d, r)     modes [m]
+    slope: np.ndarray      # (n, d, d, r)  their gradients d U_a / d X_b
+    tree: KDTree        # of X
+
+    @property
+    def dim(self):
+        """Number of axes d."""
+        return self.X.shape[1]
+
+    @property
+    def r(self):
+        """Number of latent coordinates."""
+        return self.U.shape[2]
+
+    def place(self, X, xhat):
+        """x of points X (n, d) [m]."""
+        return X + self._at(X)[0] @ xhat
+
+    def derivatives(self, X, xhat):
+        """x (n, d), F (n, d, d) and the modes at points X (n, d)."""
+        U, slope = self._at(X)
+        return X + U @ xhat, np.eye(self.dim) + slope @ xhat, U
+
+    def velocity(self, X, xhat, vhat):
+        """Sum of the modes' rates at points X (n, d) [m/s]."""
+        return self._at(X)[0] @ vhat
+
+    def _at(self, X):
+        """U and slope at points: of the data, or fitted between them."""
+        far, i = self.tree.query(X)
+        U, slope = self.U[i], self.slope[i]
+        off = far > SAME * np.ptp(self.X, axis=0).max()
+        if off.any():
+            U[off], slope[off] = self._fit(X[off])
+        return U, slope
+
+    def _fit(self, X):
+        """U and slope by moving least squares of first order."""
+        _, near = self.tree.query(X, range(1, min(NEAREST, len(self.X)) + 1))
+        arms = self.X[near] - X[:, None]
+        basis = np.concatenate([np.ones((*arms.shape[:2], 1)), arms], axis=2)
+        fit = np.einsum("ncm,nmar->ncar", np.linalg.pinv(basis), self.U[near])
+        return fit[:, 0], np.moveaxis(fit[:, 1:], 1, 2)
+
+
+def modes(X, x, F, r):
+    """The best `Modes` with r coordinates for snapshots x (s, n, d) [m], F (s, n, d, d) of points X
+    (n, d); coordinates are scaled to a root mean square of 1 over the snapshots. Raises ValueError
+    for r out of range.
+    """
+    s, n, d = x.shape
+    if not 1 <= r <= min(s, n * d):
+        raise ValueError(f"r = {r}: expected 1 .. {min(s, n * d)} modes of {s} snapshots")
+    left, sigma, right = np.linalg.svd((x - X).reshape(s, -1), full_matrices=False)
+    if not sigma[r - 1] > 0.0:
+        raise ValueError(f"r = {r}: the snapshots have only {int(np.sum(sigma > 0.0))} modes")
+    shares = left[:, :r] / np.sqrt(s)                   # of the snapshots in a scaled mode
+    U = (right[:r].T * (sigma[:r] / np.sqrt(s))).reshape(n, d, r)
+    slope = np.tensordot(F - np.eye(d), shares, axes=(0, 0))
+    return Modes(X, U, slope, KDTree(X))

@@ -1,0 +1,149 @@
+"""A trained map as a file: an npz of plain arrays with a seal, written whole or not at all.
+
+The last bytes of the file, in a zip archive its comment, are the sha256 of all bytes before them.
+They are compared before anything else of the file is read. Equal content gives equal bytes.
+"""
+
+import hashlib
+import io
+import json
+import os
+import zipfile
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from .decoder import Decoder, Units
+from .network import Network, layers_of, network
+
+FORMAT = 1
+SEAL = 64           # bytes: a sha256 in hexadecimal digits
+MAGIC = b"PK"       # what every zip archive begins with
+
+
+class Model(NamedTuple):
+    """A trained map, and what is known of its training."""
+
+    decoder: Decoder
+    xhat: np.ndarray        # (s, k + 1, r) latent coordinates of the training snapshots
+    rest: np.ndarray        # (r,) of the body at rest
+    about: dict             # settings, seed, command, commit, data, date, versions: plain values
+
+
+def save(path, model):
+    """Write a `Model`; who reads the file meanwhile, or a crash, finds the old one or the new one.
+
+    Raises ValueError for sizes that do not fit, numbers that are not finite, and an `about` with
+    more than JSON knows (of which tuples come back as lists); OSError where the system refuses.
+    """
+    arrays = arrays_of(model)
+    fault = fault_of(arrays)
+    if fault:
+        raise ValueError(f"{path} is not written: {fault}")
+    write_whole(Path(path), sealed(arrays))
+
+
+def load(path):
+    """Read what `save` wrote. Raises ValueError saying what is wrong with the file."""
+    arrays = opened(Path(path))
+    if arrays.get("format") != FORMAT:
+        raise ValueError(f"{path} has format {arrays.get('format')}, this program reads {FORMAT}; "
+                         "use the version that wrote it, or train again")
+    fault = fault_of(arrays)
+    if fault:
+        raise ValueError(f"{path} holds no trained map: {fault}; train again")
+    net = Network(arrays["sizes"], arrays["W"], None, arrays["b"])
+    units = Units(*(arrays[name] for name in Units._fields))
+    return Model(Decoder(network(layers_of(net)), units), arrays["xhat"], arrays["rest"],
+                 json.loads(str(arrays["about"])))
+
+
+def arrays_of(model):
+    """The arrays of a file by name; transposed weights are made anew on loading."""
+    net, units = model.decoder
+    try:
+        about = json.dumps(model.about, sort_keys=True, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"about: {error}; give numbers, text, lists and dicts of them") from None
+    numbers = {"W": net.W, "b": net.b, **units._asdict(), "xhat": model.xhat, "rest": model.rest}
+    return {"format": np.array(FORMAT), "about": np.array(about), "sizes": np.array(net.sizes),
+            **{name: np.array(a, dtype=float) for name, a in numbers.items()}}
+
+
+def fault_of(arrays):
+    """What is wrong with the arrays of a file, or None."""
+    missing = {"about", "sizes", "W", "b", *Units._fields, "xhat", "rest"} - set(arrays)
+    if missing:
+        return f"it lacks {', '.join(sorted(missing))}"
+    sizes = [int(n) for n in arrays["sizes"]]
+    if min(sizes, default=0) < 1 or sizes[0] <= sizes[-1]:
+        return f"layers of sizes {sizes}: expected d + r, .., d"
+    for name, shape in shapes(sizes, arrays["xhat"].shape).items():
+        if arrays[name].shape != shape:
+            return f"{name} has shape {arrays[name].shape}, expected {shape}"
+        if not np.isfinite(arrays[name]).all():
+            return f"{name} has numbers that are not finite"
+    if not (arrays["span"].min() > 0.0 and arrays["std"].min() > 0.0):
+        return "span or std has numbers that are not positive"
+    return None
+
+
+def shapes(sizes, found):
+    """Shape of each array of numbers, for layers of these sizes; xhat is found with some shape."""
+    d, r = sizes[-1], sizes[0] - sizes[-1]
+    runs_and_levels = found[:2] if len(found) == 3 else ("runs", "levels")
+    return {"W": (sum(n * m for n, m in pairwise(sizes)),), "b": (sum(sizes[1:]),),
+            **{name: (d,) for name in Units._fields},
+            "xhat": (*runs_and_levels, r), "rest": (r,)}
+
+
+def sealed(arrays):
+    """The bytes of a file."""
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)
+    with zipfile.ZipFile(buffer, "a") as archive:
+        archive.comment = bytes(SEAL)
+    content = buffer.getvalue()[:-SEAL]
+    return content + seal(content)
+
+
+def seal(content):
+    """The last bytes of a file, from those before."""
+    return hashlib.sha256(content).hexdigest().encode()
+
+
+def opened(path):
+    """The arrays of a file whose seal is intact."""
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise ValueError(f"{path} cannot be read: {error.strerror}; name a file with a trained "
+                         "map, or train one") from None
+    if not content.startswith(MAGIC):
+        raise ValueError(f"{path} is not an npz file and so holds no trained map; name another "
+                         "file, or train again")
+    if seal(content[:-SEAL]) != content[-SEAL:]:
+        raise ValueError(f"{path} is damaged, cut short or no trained map: its checksum does not "
+                         "fit; copy it again from where it came, or train again")
+    with np.load(io.BytesIO(content), allow_pickle=False) as file:
+        return dict(file)
+
+
+def write_whole(path, content):
+    """Write bytes beside their place, have the disk hold them, and move them into it."""
+    if not path.parent.is_dir():
+        raise OSError(f"{path}: there is no folder {path.parent}; create it or name another file")
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with open(part, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(part, path)
+    except OSError as error:
+        raise OSError(f"{path} could not be written: {error.strerror}; is the disk full, or the "
+                      "folder read-only?") from error
+    finally:
+        part.unlink(missing_ok=True)

@@ -1,0 +1,199 @@
+"""Trained maps as files: nothing is lost, and nothing damaged or foreign is taken for one."""
+
+import time
+from datetime import datetime, timedelta
+
+import numpy as np
+import pytest
+import rom_toys
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mpm_ref.rom import weights
+from mpm_ref.rom.weights import Model, arrays_of, load, save, sealed
+
+ABOUT = {"seed": 3, "command": "train ldm", "weights": {"F": 1.0 / 30.0, "v": 0.08},
+         "runs": [0.1, 1e-300, 2], "scene": "Ärmel \0 \n\"", "noted": None, "free": True}
+
+
+def model(dim=3, r=2, seed=0):
+    rng = np.random.default_rng(seed)
+    return Model(rom_toys.decoder(dim, r, seed), rng.normal(size=(4, 3, r)), rng.normal(size=r),
+                 ABOUT)
+
+
+def flat(model):
+    """All arrays of a model."""
+    return [*model.decoder.net, *model.decoder.units, model.xhat, model.rest]
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory):
+    path = tmp_path_factory.mktemp("saved") / "map.npz"
+    save(path, model())
+    return path
+
+
+# What is written.
+
+def test_a_model_comes_back_bit_for_bit(tmp_path, d):
+    save(tmp_path / "map.npz", model(d))
+    back = load(tmp_path / "map.npz")
+    for a, b in zip(flat(back), flat(model(d)), strict=True):
+        assert a.dtype == b.dtype
+        np.testing.assert_array_equal(a, b)
+    assert back.about == ABOUT
+    X = rom_toys.cloud(d, 10)
+    for a, b in zip(back.decoder.derivatives(X, back.rest),
+                    model(d).decoder.derivatives(X, back.rest), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_equal_content_gives_equal_bytes(saved, monkeypatch):
+    later = time.mktime((datetime.now() + timedelta(days=400)).timetuple())
+    monkeypatch.setattr(time, "time", lambda: later)
+    again = saved.with_name("again.npz")
+    save(again, model()._replace(about=dict(reversed(ABOUT.items()))))
+    assert again.read_bytes() == saved.read_bytes()
+    save(again, model()._replace(about={**ABOUT, "seed": 4}))
+    assert again.read_bytes() != saved.read_bytes()
+
+
+def test_a_file_is_a_plain_npz(saved):
+    with np.load(saved, allow_pickle=False) as file:
+        assert int(file["format"]) == weights.FORMAT
+        assert '"seed": 3' in str(file["about"])
+        np.testing.assert_array_equal(file["W"], model().decoder.net.W)
+
+
+@pytest.mark.parametrize("broken", ["os.replace", "os.fsync"])
+def test_where_the_system_refuses_the_old_file_stands(tmp_path, monkeypatch, broken):
+    path = tmp_path / "map.npz"
+    save(path, model())
+    before = path.read_bytes()
+
+    def refuse(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(broken, refuse)
+    with pytest.raises(OSError, match=r"map\.npz could not be written: No space left"):
+        save(path, model(seed=1))
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_folder_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(OSError, match=r"there is no folder .*; create it"):
+        save(tmp_path / "none" / "map.npz", model())
+
+
+# What is refused.
+
+def refused(path, said):
+    with pytest.raises(ValueError, match=said) as refusal:
+        load(path)
+    text = str(refusal.value)
+    assert text.startswith(str(path))
+    assert "\n" not in text
+    assert "; " in text         # what is wrong; what to do
+
+
+@given(place=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7))
+def test_any_flipped_bit_is_told(saved, place, bit):
+    damaged = bytearray(saved.read_bytes())
+    damaged[int(place * len(damaged))] ^= 1 << bit
+    copy = saved.with_name("damaged.npz")
+    copy.write_bytes(damaged)
+    refused(copy, "is damaged, cut short|is not an npz file")
+
+
+@given(st.floats(0, 1, exclude_max=True))
+def test_any_cut_is_told(saved, share):
+    content = saved.read_bytes()
+    copy = saved.with_name("cut.npz")
+    copy.write_bytes(content[:int(share * len(content))])
+    refused(copy, "is damaged, cut short|is not an npz file")
+
+
+@pytest.mark.parametrize("added", [b"\0", b"PK\5\6", b"0" * 64])
+def test_bytes_behind_the_end_are_told(saved, added):
+    copy = saved.with_name("longer.npz")
+    copy.write_bytes(saved.read_bytes() + added)
+    refused(copy, "is damaged")
+
+
+def test_foreign_files_are_told(tmp_path):
+    refused(tmp_path / "none.npz", "cannot be read: No such file")
+    refused(tmp_path, "cannot be read: Is a directory")
+    text = tmp_path / "text.npz"
+    text.write_text("not a map")
+    refused(text, "is not an npz file")
+    np.save(tmp_path / "one.npy", np.arange(3))
+    refused(tmp_path / "one.npy", "is not an npz file")
+    np.savez(tmp_path / "other.npz", W=np.arange(3))
+    refused(tmp_path / "other.npz", "no trained map: its checksum does not fit")
+
+
+def test_nothing_is_unpickled(tmp_path):
+    class Trap:
+        def __reduce__(self):
+            return pytest.fail, ("unpickled",)
+
+    trap = np.empty(1, dtype=object)
+    trap[0] = Trap()
+    path = tmp_path / "trap.npz"
+    path.write_bytes(sealed({**arrays_of(model()), "format": trap}))
+    with pytest.raises(ValueError, match="allow_pickle=False"):
+        load(path)
+
+
+def test_another_format_is_told(tmp_path, monkeypatch):
+    monkeypatch.setattr(weights, "FORMAT", 2)
+    save(tmp_path / "map.npz", model())
+    monkeypatch.undo()
+    refused(tmp_path / "map.npz", "has format 2, this program reads 1; use the version")
+
+
+def without(arrays, name):
+    return {key: a for key, a in arrays.items() if key != name}
+
+
+FAULTS = {
+    "lacks W, b": lambda a: without(without(a, "W"), "b"),
+    "has format None": lambda a: without(a, "format"),
+    r"W has shape \(140,\), expected \(141,\)": lambda a: {**a, "W": a["W"][1:]},
+    r"b has shape \(21,\), expected \(20,\)": lambda a: {**a, "b": np.append(a["b"], 0.0)},
+    r"low has shape \(2,\), expected \(3,\)": lambda a: {**a, "low": a["low"][:2]},
+    r"xhat has shape \(4, 3, 1\), expected \(4, 3, 2\)":
+        lambda a: {**a, "xhat": a["xhat"][..., :1]},
+    r"xhat has shape \(12, 2\), expected \('runs', 'levels', 2\)":
+        lambda a: {**a, "xhat": a["xhat"].reshape(12, 2)},
+    r"rest has shape \(3,\), expected \(2,\)": lambda a: {**a, "rest": np.zeros(3)},
+    r"layers of sizes \[3, 9, 8, 3\]": lambda a: {**a, "sizes": np.array([3, 9, 8, 3])},
+    r"layers of sizes \[5, 0, 8, 3\]": lambda a: {**a, "sizes": np.array([5, 0, 8, 3])},
+    r"layers of sizes \[\]": lambda a: {**a, "sizes": np.array([])},
+    r"layers of sizes \[5\]": lambda a: {**a, "sizes": np.array([5])},
+    "W has numbers that are not finite": lambda a: {**a, "W": np.where(a["W"] > 0, a["W"], np.nan)},
+    "xhat has numbers that are not finite": lambda a: {**a, "xhat": a["xhat"] / 0.0},
+    "span or std has numbers that are not positive": lambda a: {**a, "std": 0.0 * a["std"]},
+}
+
+
+@pytest.mark.filterwarnings("ignore:divide by zero")
+@pytest.mark.parametrize(("said", "change"), FAULTS.items(), ids=FAULTS.keys())
+def test_a_sound_file_of_something_else_is_told(tmp_path, said, change):
+    path = tmp_path / "map.npz"
+    path.write_bytes(sealed(change(arrays_of(model()))))
+    refused(path, said)
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    ({"rest": np.array([0.0, np.nan])}, "is not written: rest has numbers that are not finite"),
+    ({"xhat": np.zeros((4, 3, 5))}, r"is not written: xhat has shape \(4, 3, 5\), expected"),
+    ({"about": {"x": np.zeros(2)}}, "about: Object of type ndarray .* give numbers"),
+    ({"about": {"x": np.nan}}, "about: Out of range float"),
+])
+def test_what_could_not_be_read_is_not_written(tmp_path, change, said):
+    with pytest.raises(ValueError, match=said):
+        save(tmp_path / "map.npz", model()._replace(**change))
+    assert list(tmp_path.iterdir()) == []

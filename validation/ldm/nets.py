@@ -1,0 +1,51 @@
+"""The trained maps of LDM's experiments: which there are, and where they stand.
+
+Each is a file of weights, remade by `python -m validation.ldm.train NAME`.
+"""
+
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+from mpm_ref.rom.weights import load
+
+from .studies import GRAVITY, POKES, TORSION
+
+FOLDER = Path(__file__).parent / "weights"
+BOTH, NO_F, NO_V, NEITHER = "both", "no-F", "no-v", "neither"
+TERMS = {BOTH: (1.0, 1.0), NO_F: (0.0, 1.0), NO_V: (1.0, 0.0), NEITHER: (0.0, 0.0)}
+REPEATED = (1, 4, 7)        # latent dimensions at which the loss's terms are left out (Figure 10)
+
+
+class Net(NamedTuple):
+    """What is trained: a study's runs, and how."""
+
+    study: object
+    r: int
+    terms: str = BOTH       # of `TERMS`: shares of lambda_F and lambda_v
+    reading: str = "code"   # of `learn.loss.READINGS`
+    seed: int = 0
+    epochs: int = 400
+    points: int = 128       # shown of each snapshot
+    batch: int = 8          # snapshots
+
+
+def nets():
+    """{name: `Net`} of all experiments."""
+    found = {f"gravity-r{r}": Net(GRAVITY, r) for r in range(1, 8)}
+    for r in REPEATED:
+        found |= {f"gravity-r{r}-{terms}": Net(GRAVITY, r, terms) for terms in TERMS
+                  if terms != BOTH}
+    found["gravity-r7-printed"] = Net(GRAVITY, 7, reading="printed")
+    found |= {f"torsion-{seed}": Net(TORSION, 7, seed=seed) for seed in range(3)}
+    found["poke"] = Net(POKES, 6, epochs=100)
+    return found
+
+
+@cache
+def trained(name):
+    """`Model` of a trained map. Raises ValueError where it is missing or damaged."""
+    path = FOLDER / f"{name}.npz"
+    if not path.exists():
+        raise ValueError(f"no weights {path.name}: python -m validation.ldm.train {name}")
+    return load(path)

@@ -1,0 +1,88 @@
+"""LDM's experiments as studies: a scene, many parameters, runs to train on and runs to test on."""
+
+from math import cos, pi, sin
+from typing import NamedTuple
+
+import numpy as np
+
+from mpm_ref.cases import snapshots
+from mpm_ref.scene import build
+
+from ..verification.scenes import shipped, threads_for, with_
+
+PHI = 2.0 * pi / 3.0        # polar angle of the poke (LDM-X5)
+POKE = 0.48                 # its speed [m/s]
+
+
+class Study(NamedTuple):
+    """Parameters mu of all runs, the numbers of those that are tested, and the scene of one."""
+
+    name: str
+    mu: np.ndarray          # (runs, parameters)
+    test: tuple
+    scene: callable         # parameters of a run -> scene
+
+    @property
+    def train(self):
+        """Numbers of the runs that networks are trained on."""
+        return tuple(k for k in range(len(self.mu)) if k not in self.test)
+
+    def problem(self, k):
+        """`Problem` of a run."""
+        return build(self.scene(*self.mu[k]))
+
+    def run(self, numbers):
+        """`Snapshots` of the full-order runs of these numbers."""
+        first = self.problem(numbers[0])
+        with threads_for(first.bodies):
+            return snapshots((self.problem(k) for k in numbers), self.mu[list(numbers)])
+
+
+def drawn(count, of, seed=0):
+    """So many test runs, drawn at random."""
+    return tuple(sorted(np.random.default_rng(seed).permutation(of)[:count].tolist()))
+
+
+def fallen(g):
+    """LDM-sec5.1: the cylinder under gravity g [m/s^2]."""
+    return shipped("ldm_gravity", gravity=(0.0, 0.0, -float(g)))
+
+
+def twisted(v, w):
+    """LDM-sec5.2: the block pulled at v [m/s] and twisted at w [rad/s]."""
+    scene = shipped("ldm_torsion")
+    bottom, top = scene.fixed
+    motion = with_(top.motion, translation=with_(top.motion.translation, rate=(0.0, 0.0, float(v))),
+                   rotation=with_(top.motion.rotation, rate=float(w)))
+    return with_(scene, fixed=(bottom, with_(top, motion=motion)))
+
+
+def poked(theta):
+    """LDM-sec5.3: the cylinder poked at its rim, at an angle theta [rad]."""
+    scene = shipped("ldm_poke")
+    base, poke = scene.fixed
+    return with_(scene, fixed=(base, at_rim(poke, float(theta))))
+
+
+def at_rim(poke, theta, **times):
+    """A poke at an angle theta [rad]."""
+    R, H = scene_size(poke)
+    along = (sin(PHI) * cos(theta), sin(PHI) * sin(theta), cos(PHI))
+    rate = tuple(POKE * a for a in along)
+    region = with_(poke.region, center=(-R * cos(theta), -R * sin(theta), H))
+    motion = with_(poke.motion, translation=with_(poke.motion.translation, rate=rate))
+    return with_(poke, region=region, motion=motion, **times)
+
+
+def scene_size(poke):
+    """Radius and height of the rim that a poke at theta = 0 is on [m]."""
+    x, _, z = poke.region.center
+    return -x, z
+
+
+GRAVITY = Study("gravity", np.linspace(1.0, 10.0, 30)[:, None], drawn(6, 30), fallen)
+TORSION = Study("torsion", np.array([(v, w) for v in np.linspace(0.0, 0.6, 6)
+                                     for w in np.linspace(0.0, 2.0, 6)]), drawn(7, 36), twisted)
+POKES = Study("poke", np.arange(36)[:, None] * pi / 18.0,
+              tuple(k for k in range(36) if k % 3), poked)
+STUDIES = {study.name: study for study in (GRAVITY, TORSION, POKES)}

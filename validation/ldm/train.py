@@ -1,0 +1,73 @@
+"""`python -m validation.ldm.train NAME...`: train the maps of LDM's experiments anew.
+
+It needs PyTorch. A training that is cut off goes on from its checkpoint.
+"""
+
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import torch
+import typer
+from tqdm import tqdm
+
+from mpm_ref.rom.latent import initial
+from mpm_ref.rom.learn.fit import Training, train
+from mpm_ref.rom.learn.loss import READINGS, Weights
+from mpm_ref.rom.weights import Model, save
+
+from ..provenance import commit, provenance
+from .nets import FOLDER, TERMS, nets
+
+ROOT = Path(__file__).parents[2]
+
+
+def training(net):
+    """`Training` of a `Net`."""
+    shares, weights = TERMS[net.terms], READINGS[net.reading]
+    scaled = Weights(*(share * weight for share, weight in zip(shares, weights, strict=True)))
+    return Training(net.r, weights=scaled, epochs=net.epochs, batch=net.batch, points=net.points,
+                    seed=net.seed)
+
+
+def made(name, checkpoints, threads):
+    """`Model` of a net by name, with what is to be known of it."""
+    net = nets()[name]
+    plan, snapshots = training(net), net.study.run(net.study.train)
+    begin = time.process_time()
+    with tqdm(total=plan.epochs, desc=name) as bar:
+        def show(history):
+            bar.update(len(history) - bar.n)
+            bar.set_postfix(loss=f"{history[-1][0]:.2e}")
+        done = train(plan, snapshots, checkpoints / f"{name}.pt", show)
+    about = {"study": net.study.name, "training": asdict(plan),
+             "command": f"python -m validation.ldm.train {name}", "threads": threads,
+             "cpu_seconds": round(time.process_time() - begin, 1), "torch": torch.__version__,
+             "loss": np.asarray(done.history)[:: max(1, plan.epochs // 50)].tolist(),
+             **provenance(commit(ROOT))}
+    rest = initial(done.decoder, snapshots.X, xhat=done.xhat[:, 0].mean(axis=0)).xhat
+    return Model(done.decoder, done.xhat, rest, about)
+
+
+def main(
+    names: Annotated[list[str] | None, typer.Argument(help="of nets; none: all")] = None,
+    folder: Annotated[Path, typer.Option(help="where weights go")] = FOLDER,
+    checkpoints: Annotated[Path, typer.Option(help="what an interrupted training goes on from")]
+    = Path("results/training"),
+    threads: Annotated[int, typer.Option(help="of PyTorch")] = 1,
+):
+    """Train maps and write their weights."""
+    known = nets()
+    for name in names or known:
+        if name not in known:
+            raise typer.BadParameter(f"{name!r}: expected one of {', '.join(known)}")
+    torch.set_num_threads(threads)
+    checkpoints.mkdir(parents=True, exist_ok=True)
+    for name in names or known:
+        save(folder / f"{name}.npz", made(name, checkpoints, threads))
+
+
+if __name__ == "__main__":
+    typer.run(main)
