@@ -4,6 +4,8 @@ A training that is cut off goes on from its last checkpoint. Its numbers are the
 uninterrupted one, on the same machine with the same number of threads.
 """
 
+import hashlib
+import io
 import json
 from dataclasses import asdict, dataclass
 from math import cos, pi
@@ -14,6 +16,7 @@ import numpy as np
 import torch
 
 from ..snapshots import units
+from ..weights import SEAL, seal, write_whole
 from .data import batch_of, data_of
 from .encoder import Encoder, Free, codes
 from .loss import CODE, Weights, loss
@@ -45,6 +48,8 @@ class Training:
         for name in ("r", "epochs", "batch"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} = {getattr(self, name)}: expected at least 1")
+        if self.points < 0:
+            raise ValueError(f"points = {self.points}: expected 0, for all, or a number of them")
         if self.latent not in ("encoder", "free"):
             raise ValueError(f"latent = {self.latent!r}: expected 'encoder' or 'free'")
 
@@ -64,6 +69,7 @@ class Session:
         torch.manual_seed(training.seed)
         self.training, self.units = training, units(snapshots)
         self.data = data_of(snapshots, self.units)
+        self.of = sha256(snapshots)
         count, n, d = self.data.u.shape
         self.f = Perceptron(d, training.r, training.hidden)
         self.encoder = (Encoder(d, n, training.r) if training.latent == "encoder"
@@ -77,12 +83,12 @@ class Session:
 
     @property
     def named(self):
-        """The training's settings as one line of text."""
-        return json.dumps(asdict(self.training))
+        """The training's settings, and what it is trained on, as one line of text."""
+        return json.dumps({**asdict(self.training), "data": self.of})
 
     def epoch(self):
         """Show every snapshot once."""
-        order = self.data.first[torch.randperm(len(self.data.first), generator=self.random)]
+        order = torch.randperm(len(self.data.next), generator=self.random)
         batches = order.split(self.training.batch)
         done = [self.show(at, (len(self.history) + k / len(batches)) / self.training.epochs)
                 for k, at in enumerate(batches)]
@@ -118,18 +124,21 @@ class Session:
 
     def save(self, path):
         """Checkpoint, whole or not at all."""
-        part = path.with_suffix(".part")
+        content = io.BytesIO()
         torch.save({"training": self.named, "f": self.f.state_dict(),
                     "encoder": self.encoder.state_dict(), "random": self.random.get_state(),
-                    "optimiser": self.optimiser.state_dict(), "history": self.history}, part)
-        part.replace(path)
+                    "optimiser": self.optimiser.state_dict(), "history": self.history}, content)
+        write_whole(path, content.getvalue() + seal(content.getvalue()))
 
     def load(self, path):
-        """Go on from a checkpoint. Raises ValueError where it is of another training."""
-        try:
-            kept = torch.load(path, weights_only=True)
-        except Exception as error:
-            raise ValueError(f"{path} is no checkpoint that can be read ({error})") from None
+        """Go on from a checkpoint. Raises ValueError where it is damaged, or of another training
+        or other data.
+        """
+        content = path.read_bytes()
+        if seal(content[:-SEAL]) != content[-SEAL:]:
+            raise ValueError(f"{path} is damaged or no checkpoint: its checksum does not fit; "
+                             "remove it to train from the start")
+        kept = torch.load(io.BytesIO(content[:-SEAL]), weights_only=True)
         if kept["training"] != self.named:
             raise ValueError(f"{path} is a checkpoint of the training {kept['training']}, not of "
                              f"{self.named}; remove it or give another folder")
@@ -138,6 +147,15 @@ class Session:
         self.optimiser.load_state_dict(kept["optimiser"])
         self.random.set_state(kept["random"])
         self.history = kept["history"]
+
+
+def sha256(snapshots):
+    """Digest of all that is trained on."""
+    digest = hashlib.sha256(repr(float(snapshots.dt)).encode())
+    for a in (snapshots.X, snapshots.x, snapshots.F, snapshots.v):
+        digest.update(repr(a.shape).encode())
+        digest.update(np.ascontiguousarray(a, dtype=float))
+    return digest.hexdigest()
 
 
 def rate(progress):
@@ -152,6 +170,8 @@ def train(training, snapshots, checkpoint=None, on_epoch=None):
     """
     session = Session(training, snapshots)
     path = None if checkpoint is None else Path(checkpoint)
+    if path is not None and not path.parent.is_dir():
+        raise ValueError(f"{path}: there is no folder {path.parent}; create it or name another one")
     if path is not None and path.exists():
         session.load(path)
     while len(session.history) < training.epochs:

@@ -66,7 +66,7 @@ def squared(error):
 
 
 def loss(f, batch, units, weights):
-    """LDM-eq24 over the mean square of the displacement, and its terms."""
+    """LDM-eq24 over the variance of the displacement, and its terms."""
     found = terms(f, batch, units, weights)
     total = found[0] + weights.F * found[1] + weights.v * found[2]
     return total / units.std.square().sum(), found
