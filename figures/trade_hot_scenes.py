@@ -8,6 +8,7 @@ from math import ceil
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.ticker import NullFormatter
 
 from ._orders import legend_below, scales, series
 from .trade_hot import PAPER
@@ -54,3 +55,4 @@ def panel(ax, table, at):
             ax.loglog(table["cpu"][own], error[own], style, ms=3, color=colour, label=label)
         paper = own & (table["eps"] == PAPER)
         ax.loglog(table["cpu"][paper], error[paper], style[0], ms=8, color=colour)
+    ax.xaxis.set_minor_formatter(NullFormatter())
