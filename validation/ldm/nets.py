@@ -1,6 +1,6 @@
 """The trained maps of LDM's experiments: which there are, and where they stand.
 
-Each is a file of weights, remade by `python -m validation.ldm.train NAME`.
+Each is a file of weights, remade by `python -m validation.train NAME`.
 """
 
 from functools import cache
@@ -47,5 +47,5 @@ def trained(name):
     """`Model` of a trained map. Raises ValueError where it is missing or damaged."""
     path = FOLDER / f"{name}.npz"
     if not path.exists():
-        raise ValueError(f"no weights {path.name}: python -m validation.ldm.train {name}")
+        raise ValueError(f"no weights {path.name}: python -m validation.train {name}")
     return load(path)

@@ -64,14 +64,25 @@ def poked(theta):
     return with_(scene, fixed=(base, at_rim(poke, float(theta))))
 
 
-def at_rim(poke, theta, **times):
-    """A poke at an angle theta [rad]."""
+def poked_again(thetas):
+    """LDM-sec5.3.2: the cylinder poked at one angle after the other [rad], each time let go for as
+    long as a single poke's run lasts.
+    """
+    scene = shipped("ldm_poke")
+    base, poke = scene.fixed
+    length = scene.steps * scene.dt
+    pokes = (at_rim(poke, float(theta), k * length) for k, theta in enumerate(thetas))
+    return with_(scene, steps=scene.steps * len(thetas), fixed=(base, *pokes))
+
+
+def at_rim(poke, theta, begin=0.0):
+    """A poke at an angle theta [rad] that begins at a time [s]."""
     R, H = scene_size(poke)
     along = (sin(PHI) * cos(theta), sin(PHI) * sin(theta), cos(PHI))
-    rate = tuple(POKE * a for a in along)
+    path = with_(poke.motion.translation, rate=tuple(POKE * a for a in along), start=begin)
     region = with_(poke.region, center=(-R * cos(theta), -R * sin(theta), H))
-    motion = with_(poke.motion, translation=with_(poke.motion.translation, rate=rate))
-    return with_(poke, region=region, motion=motion, **times)
+    return with_(poke, region=region, motion=with_(poke.motion, translation=path), since=begin,
+                 until=begin + poke.until)
 
 
 def scene_size(poke):

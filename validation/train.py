@@ -1,4 +1,4 @@
-"""`python -m validation.ldm.train NAME...`: train the maps of LDM's experiments anew.
+"""`python -m validation.train NAME...`: train the maps of the reduced models' experiments anew.
 
 It needs PyTorch. A training that is cut off goes on from its checkpoint.
 """
@@ -18,10 +18,10 @@ from mpm_ref.rom.learn.fit import Training, train
 from mpm_ref.rom.learn.loss import READINGS, Weights
 from mpm_ref.rom.weights import Model, save
 
-from ..provenance import commit, provenance
-from .nets import FOLDER, TERMS, nets
+from .ldm.nets import FOLDER, TERMS, nets
+from .provenance import commit, provenance
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 
 
 def training(net):
@@ -43,7 +43,7 @@ def made(name, checkpoints, threads):
             bar.set_postfix(loss=f"{history[-1][0]:.2e}")
         done = train(plan, snapshots, checkpoints / f"{name}.pt", show)
     about = {"study": net.study.name, "training": asdict(plan),
-             "command": f"python -m validation.ldm.train {name}", "threads": threads,
+             "command": f"python -m validation.train {name}", "threads": threads,
              "cpu_seconds": round(time.process_time() - begin, 1), "torch": torch.__version__,
              "loss": np.asarray(done.history)[:: max(1, plan.epochs // 50)].tolist(),
              **provenance(commit(ROOT))}
