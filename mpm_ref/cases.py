@@ -25,6 +25,8 @@ def history(problem):
     """
     if len(problem.bodies) != 1:
         raise ValueError(f"{len(problem.bodies)} bodies: expected one")
+    if problem.clock.dt is None:
+        raise ValueError("the time step is adaptive: expected a fixed dt")
     rows = []
     for frame in simulate(problem):
         if frame.state.step != frame.index:
@@ -43,12 +45,24 @@ def in_order(a, id):
 
 
 def snapshots(problems, mu):
-    """`Snapshots` of problems that differ by parameters mu (s, parameters) alone."""
-    problems = iter(problems)
-    first = next(problems)
-    body = first.bodies[0]
-    X, m, V0 = (in_order(a, body.id) for a in (body.particles.x, body.particles.m,
-                                               body.particles.V0))
-    runs = [history(first), *(history(problem) for problem in problems)]
-    return Snapshots(X, m, V0, np.asarray(mu, dtype=float), *(
-        np.stack(field) for field in zip(*runs, strict=True)), first.clock.dt)
+    """`Snapshots` of problems that differ by parameters mu (s, parameters) alone.
+
+    Raises ValueError where their points or time steps differ.
+    """
+    rest, dt, runs = None, None, []
+    for problem in problems:
+        points = points_of(problem.bodies[0])
+        if rest is None:
+            rest, dt = points, problem.clock.dt
+        if dt != problem.clock.dt or not all(map(np.array_equal, points, rest)):
+            raise ValueError(f"run {len(runs)} has other points or another time step than run 0: "
+                             "expected runs that differ by their parameters alone")
+        runs.append(history(problem))
+    return Snapshots(*rest, np.asarray(mu, dtype=float), *(
+        np.stack(field) for field in zip(*runs, strict=True)), dt)
+
+
+def points_of(body):
+    """x (n, d) [m], m (n,) [kg] and V0 (n,) [m^d] of a body, points in its own order."""
+    q = body.particles
+    return tuple(in_order(a, body.id) for a in (q.x, q.m, q.V0))

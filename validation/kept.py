@@ -25,9 +25,9 @@ class Kept:
         try:
             return json.loads(path.read_text())
         except (OSError, ValueError):
-            made = make()
-        write_whole(path, json.dumps(made).encode())
-        return made
+            text = json.dumps(make())
+        write_whole(path, text.encode())
+        return json.loads(text)
 
     def clear(self):
         """Remove all parts."""

@@ -18,7 +18,7 @@ from mpm_ref.rom.learn.fit import Training, train
 from mpm_ref.rom.learn.loss import READINGS, Weights
 from mpm_ref.rom.weights import Model, save
 
-from .ldm.nets import FOLDER, TERMS, nets
+from .ldm.nets import FOLDER, TERMS, identity, nets
 from .provenance import commit, provenance
 
 ROOT = Path(__file__).parents[1]
@@ -42,9 +42,10 @@ def made(name, checkpoints, threads):
             bar.update(len(history) - bar.n)
             bar.set_postfix(loss=f"{history[-1][0]:.2e}")
         done = train(plan, snapshots, checkpoints / f"{name}.pt", show)
-    about = {"study": net.study.name, "training": asdict(plan),
+    about = {**identity(net), "training": asdict(plan),
              "command": f"python -m validation.train {name}", "threads": threads,
-             "cpu_seconds": round(time.process_time() - begin, 1), "torch": torch.__version__,
+             "cpu_seconds_of_last_part": round(time.process_time() - begin, 1),
+             "torch": torch.__version__,
              "loss": np.asarray(done.history)[:: max(1, plan.epochs // 50)].tolist(),
              **provenance(commit(ROOT))}
     rest = initial(done.decoder, snapshots.X, xhat=done.xhat[:, 0].mean(axis=0)).xhat
@@ -67,6 +68,7 @@ def main(
     checkpoints.mkdir(parents=True, exist_ok=True)
     for name in names or known:
         save(folder / f"{name}.npz", made(name, checkpoints, threads))
+        (checkpoints / f"{name}.pt").unlink()
 
 
 if __name__ == "__main__":

@@ -5,8 +5,8 @@
     dg/dxhat    = diag(std) df/dxhat                                           LDM-eq16
 
 f is a perceptron of the scaled reference position and the latent coordinates; its outputs are
-standardised displacements. The box low .. low + span is that of the body at rest, mean and std are
-those of the training data alone.
+standardised displacements, where the paper says positions: F is I plus what is learned. The box
+low .. low + span is that of the body at rest, mean and std are those of the training data alone.
 """
 
 from typing import NamedTuple

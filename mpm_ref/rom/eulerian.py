@@ -1,5 +1,5 @@
 """Eulerian quadrature: points at fixed places of the grid's cells, traced back into the body
-(LDM-alg4, LDM-sec3.2.1.2-cell).
+(LDM-alg4, LDM-eq20, LDM-sec3.2.1.2-cell, X-cross-11).
 """
 
 from itertools import product
@@ -40,8 +40,8 @@ class Eulerian(NamedTuple):
 
     def cloud(self, map, latent, samples):
         """X, m and V0 of the quadrature points of a step, and what is to be said of them:
-        m_q = rho / J_q V_q. A point whose preimage is not in the body carries nothing, nor does
-        one where the map is inverted.
+        m_q = rho / J_q V_q. A point whose preimage is not in the body carries nothing (LDM-X12),
+        nor does one that is far from it at first guess, or where the map is inverted.
         """
         x = self.places(map.place(self.X[samples], latent.xhat))
         start = guesses(map, latent.xhat, x, self.seeds)
@@ -52,6 +52,6 @@ class Eulerian(NamedTuple):
         upright = J > 0.0
         V0 = (self.dx / self.per_cell) ** x.shape[1] / J[upright]
         lost = np.sum(~back.found) + np.sum(~upright)
-        said = {"points": len(V0), "outside": len(x) - len(V0) - int(lost), "lost": int(lost),
-                "iterations": back.iterations}
+        said = {"points": len(V0), "far": int(np.sum(~near)), "lost": int(lost),
+                "outside": int(near.sum() - len(V0) - lost), "iterations": back.iterations}
         return back.X[inside][upright], self.rho * V0, V0, said

@@ -1,4 +1,6 @@
-"""Lagrangian quadrature: the samples' own neighbours carry mass, momentum and stress (LDM-alg3)."""
+"""Lagrangian quadrature: the samples' own neighbours carry mass, momentum and stress (LDM-alg3,
+LDM-sec3.2.1-sets).
+"""
 
 from typing import NamedTuple
 

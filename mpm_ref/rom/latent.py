@@ -1,4 +1,4 @@
-"""The reduced state, and the velocity of points that it stands for.
+"""The reduced state, and the velocity of points that it stands for (X-cross-4).
 
 vhat is fitted with dg/dxhat at the latent coordinates before they move. Which dg/dxhat turns it
 back into velocities is a choice:
@@ -46,7 +46,8 @@ def at_start(xhat, vhat=None):
 
 
 def initial(map, X, x=None, v=None, xhat=None):
-    """`Latent` that fits positions x and velocities v (n, d) of points X at the start (LDM-eq19),
+    """`Latent` that fits positions x and velocities v (n, d) of points X at the start (LDM-eq17 to
+    LDM-eq19),
     searched from xhat; without them, the body at rest.
     """
     from_here = np.zeros(map.r) if xhat is None else xhat

@@ -9,9 +9,11 @@ gradient of the modes are those of a linear fit to the nearest ones.
 from typing import NamedTuple
 
 import numpy as np
+from scipy.sparse.linalg import svds
 from scipy.spatial import KDTree
 
 NEAREST = 16        # points of a linear fit between the data
+SMALL = 500         # rows or columns up to which all singular values are computed
 SAME = 1e-9         # distance below which a point is one of the data, over the body's extent
 
 
@@ -72,10 +74,22 @@ def modes(X, x, F, r):
     s, n, d = x.shape
     if not 1 <= r <= min(s, n * d):
         raise ValueError(f"r = {r}: expected 1 .. {min(s, n * d)} modes of {s} snapshots")
-    left, sigma, right = np.linalg.svd((x - X).reshape(s, -1), full_matrices=False)
+    left, sigma, right = leading((x - X).reshape(s, -1), r)
     if not sigma[r - 1] > 0.0:
         raise ValueError(f"r = {r}: the snapshots have only {int(np.sum(sigma > 0.0))} modes")
     shares = left[:, :r] / np.sqrt(s)                   # of the snapshots in a scaled mode
     U = (right[:r].T * (sigma[:r] / np.sqrt(s))).reshape(n, d, r)
     slope = np.tensordot(F - np.eye(d), shares, axes=(0, 0))
     return Modes(X, U, slope, KDTree(X))
+
+
+def leading(A, r):
+    """The r leading singular triples of a matrix, largest first: (m, r), (r,), (r, n). Of a large
+    one by Lanczos' method, always from the same start.
+    """
+    if min(A.shape) <= SMALL:
+        U, s, Vt = np.linalg.svd(A, full_matrices=False)
+        return U[:, :r], s[:r], Vt[:r]
+    U, s, Vt = svds(A, r, v0=np.ones(min(A.shape)))
+    order = np.argsort(-s)
+    return U[:, order], s[order], Vt[order]

@@ -1,5 +1,7 @@
 """From trial states of the samples back to latent coordinates (LDM-alg6, LDM-alg7).
 
+The linear one is the nonlinear one to first order in the step (LDM-eqA1).
+
 Both are least squares over the samples, solved by QR: normal equations would square the condition
 number.
 """
@@ -23,6 +25,7 @@ class Fit(NamedTuple):
     residual: float         # root mean square over the samples, in the units of what was fitted
     rank: int               # of the matrix; below r, y is the one of least length
     iterations: int = 1
+    converged: bool = True  # its steps ended before they ran out
 
 
 def project_velocity(G, v):
@@ -40,23 +43,25 @@ def project_position(map, X, x, y):
     backtracking from y (LDM-sec3.2.3-gn); X (n, d) at rest, x (n, d) trial positions [m].
     """
     at, _, G = map.derivatives(X, y)
-    error, rank, rounds = np.sum((at - x) ** 2), map.r, 0
+    error, rank, rounds, ended = np.sum((at - x) ** 2), map.r, 0, False
     for _ in range(ITERATIONS):
         rounds += 1
         A, b = G.reshape(-1, map.r), (x - at).reshape(-1)
         step, rank = least_squares(A, b)
         fall = np.sum(b**2) - np.sum((A @ step - b) ** 2)
-        if fall <= ROUNDING * error:
+        ended = fall <= ROUNDING * error
+        if ended:
             break
         y_new, error_new = backtracked(map, X, x, (y, step), error, fall)
-        if y_new is None:
+        ended = y_new is None
+        if ended:
             break
-        done = np.abs(y_new - y).max() <= SMALL * max(1.0, np.abs(y).max())
+        ended = np.abs(y_new - y).max() <= SMALL * max(1.0, np.abs(y).max())
         y, error = y_new, error_new
-        if done:
+        if ended:
             break
         at, _, G = map.derivatives(X, y)
-    return Fit(y, float(np.sqrt(error / len(X))), rank, rounds)
+    return Fit(y, float(np.sqrt(error / len(X))), rank, rounds, bool(ended))
 
 
 def backtracked(map, X, x, line, error, fall):

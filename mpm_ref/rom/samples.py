@@ -31,7 +31,7 @@ def draw(n, count, r, dim, groups=()):
     """`Draw` of count samples for r latent coordinates in dim axes.
 
     Raises ValueError where there are not so many points, too few samples for the latent coordinates
-    (LDM-sec3.3-hyper), or fewer than the groups ask for.
+    (LDM-X14), or fewer than the groups ask for.
     """
     if not 1 <= count <= n:
         raise ValueError(f"{count} samples of {n} points: expected 1 .. {n}")

@@ -28,6 +28,7 @@ class Report(NamedTuple):
     rank: int               # of dg/dxhat at the samples
     residual: float         # rms distance of the trial velocities from the manifold [m/s]
     iterations: int         # of the nonlinear projection
+    converged: bool         # ... whether they ended before they ran out
     quadrature: dict        # what the quadrature says of itself
 
 
@@ -77,8 +78,9 @@ class Reduced:
         mass = np.full(len(X), self.quadrature.feather * m.mean())
         trial = self.body(points(self.map, latent, X, speed), mass, np.zeros(len(X)))
         self.on_grid(cloud, trial, t, dt)
-        after, fit, rounds = self.project(latent, X, trial.particles, dt)
-        return after, Report(len(X), said["points"], fit.rank, fit.residual, rounds, said)
+        after, fit, place = self.project(latent, X, trial.particles, dt)
+        return after, Report(len(X), said["points"], fit.rank, fit.residual, place.iterations,
+                             place.converged, said)
 
     def body(self, at, m, V0):
         """A `Body` of `Points`, with the stress of their F."""
@@ -88,7 +90,9 @@ class Reduced:
         return body
 
     def on_grid(self, cloud, trial, t, dt):
-        """Move the samples by the grid's velocities: their trial state (LDM-alg5)."""
+        """Move the samples by the grid's velocities: their trial state (LDM-alg5). Conditions are
+        met on the grid alone (LDM-sec3.1-bc).
+        """
         grid = scatter((cloud, trial), self.storage, self.scheme, dt)
         update(grid, self.gravity, dt)
         if self.conditions is not None:
@@ -96,10 +100,10 @@ class Reduced:
         gather(trial, grid, self.scheme, dt)
 
     def project(self, latent, X, trial, dt):
-        """`Latent`, velocity `Fit` and iterations of the position's, from trial states of X."""
+        """`Latent` and the `Fit`s of velocity and position, from trial states of X."""
         G = self.map.derivatives(X, latent.xhat)[2]
         fit = project_velocity(G, trial.v)
         if self.projection == "linear":
-            return moved(latent, latent.xhat + dt * fit.y, fit.y), fit, 0
+            return moved(latent, latent.xhat + dt * fit.y, fit.y), fit, fit._replace(iterations=0)
         place = project_position(self.map, X, trial.x, 2.0 * latent.xhat - latent.before)
-        return moved(latent, place.y, fit.y), fit, place.iterations
+        return moved(latent, place.y, fit.y), fit, place

@@ -1,4 +1,4 @@
-"""The cylinder under gravity (LDM section 5.1), full order: its settings and its deflection."""
+"""The cylinder under gravity (LDM section 5.1), full order: its deflection."""
 
 import numpy as np
 
@@ -7,23 +7,9 @@ from mpm_ref.scene import build
 from mpm_ref.simulate import simulate
 
 from ..registry import experiment
-from ..settings import record_settings
 from ..verification.scenes import shipped, threads_for, with_
 
 SCENE = "ldm_gravity"
-
-
-@experiment("ldm.settings", title="Settings of LDM's cylinder under gravity",
-            profiles=("quick", "standard"), budget={"quick": 2, "standard": 2})
-def settings(run):
-    """Settings of the scene ldm_gravity.toml."""
-    scene = shipped(SCENE)
-    material = scene.body[0].material
-    record_settings(run, SCENE, {
-        "ldm.table2.gravity.youngs": material.E, "ldm.table2.gravity.poisson": material.nu,
-        "ldm.table2.gravity.particles": len(build(scene).bodies[0].particles.x),
-        "ldm.table2.gravity.dx": scene.dx, "ldm.table2.gravity.dt": scene.dt,
-        "ldm.table2.gravity.steps": scene.steps, "ldm.sec5_1.g_max": -scene.gravity[2]})
 
 
 @experiment("ldm.cylinder", title="Deflection of LDM's cylinder under gravity",

@@ -8,15 +8,7 @@ coordinates to one sampling of the body; online it is not needed.
 import torch
 from torch import nn
 
-KERNEL, STRIDE, SHORTEST, FEATURES = 6, 2, 32, 32       # LDM-tab1
-
-
-def lengths(n):
-    """Lengths of a row of n values before and after each convolution of the encoder."""
-    found = [n]
-    while (found[-1] - KERNEL) // STRIDE + 1 >= SHORTEST:
-        found.append((found[-1] - KERNEL) // STRIDE + 1)
-    return found
+from ..architecture import FEATURES, KERNEL, STRIDE, lengths
 
 
 class Encoder(nn.Module):

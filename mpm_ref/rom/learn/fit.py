@@ -15,12 +15,13 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
+from ..architecture import HIDDEN
 from ..snapshots import units
 from ..weights import SEAL, seal, write_whole
 from .data import batch_of, data_of
 from .encoder import Encoder, Free, codes
 from .loss import CODE, Weights, loss
-from .perceptron import HIDDEN, Perceptron, exported
+from .perceptron import Perceptron, exported
 
 FASTEST, SLOWEST = 1e-3, 1e-6       # learning rates at the first and the last step (LDM-appB)
 SAVE = 20                           # epochs between checkpoints

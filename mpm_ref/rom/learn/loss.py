@@ -13,7 +13,7 @@ from .perceptron import with_derivatives
 
 
 class Weights(NamedTuple):
-    """Factors of the terms of LDM-eq24."""
+    """Factors of the terms of LDM-eq24; their units are not printed (LDM-X7)."""
 
     F: float        # lambda_F [m^2]
     v: float        # lambda_v [s^2]

@@ -6,10 +6,9 @@ import numpy as np
 import torch
 from torch import nn
 
+from ..architecture import HIDDEN
 from ..decoder import Decoder, Units
 from ..network import layers_of, network
-
-HIDDEN = (30, 30, 30, 30)       # LDM-tab1; the release of LDM's training has one more
 
 
 class Perceptron(nn.Module):

@@ -1,0 +1,85 @@
+"""What LDM prints of its experiments and networks, beside what is run here."""
+
+
+import numpy as np
+
+from mpm_ref.rom.architecture import FEATURES, HIDDEN, KERNEL, SHORTEST, STRIDE, lengths
+from mpm_ref.scene import build
+
+from ..registry import experiment
+from ..settings import record_settings
+from .nets import nets
+from .studies import GRAVITY, PHI, POKE, POKES, TORSION, poked_again
+
+SECTIONS = {"gravity": "sec5_1", "torsion": "sec5_2", "poke": "sec5_3"}
+ROWS = (1368, 1757, 3076115)        # numbers of points whose convolutions the table gives
+
+
+@experiment("ldm.settings", title="Settings of LDM's experiments and networks",
+            profiles=("quick", "standard"), budget={"quick": 5, "standard": 5})
+def settings(run):
+    """Settings of the scenes, of the studies made of them, and of the networks."""
+    for study in (GRAVITY, TORSION, POKES):
+        record_settings(run, f"ldm_{study.name}", {**of_table(study), **of_study(study)})
+    record_settings(run, "ldm_gravity", of_gravity())
+    record_settings(run, "ldm_torsion", of_torsion())
+    record_settings(run, "ldm_poke", of_poke())
+    record_settings(run, "ldm_gravity", of_networks())
+
+
+def of_table(study):
+    """Table 2."""
+    scene = study.scene(*study.mu[-1])
+    material, name = scene.body[0].material, f"ldm.table2.{study.name}"
+    return {f"{name}.youngs": material.E, f"{name}.poisson": material.nu,
+            f"{name}.particles": len(build(scene).bodies[0].particles.x), f"{name}.dx": scene.dx,
+            f"{name}.dt": scene.dt, f"{name}.steps": scene.steps,
+            f"{name}.n_train": len(study.train), f"{name}.n_test": len(study.test)}
+
+
+def of_study(study):
+    """The text's counts."""
+    name, steps = f"ldm.{SECTIONS[study.name]}", study.scene(*study.mu[0]).steps
+    return {f"{name}.n_sims": len(study.mu), f"{name}.steps": steps,
+            f"{name}.snapshots": len(study.mu) * (steps + 1), f"{name}.n_train": len(study.train),
+            f"{name}.n_test": len(study.test)}
+
+
+def of_gravity():
+    """Section 5.1."""
+    shape = GRAVITY.scene(1.0).body[0].shape
+    return {"ldm.sec5_1.radius": shape.radius, "ldm.sec5_1.height": shape.end[0] - shape.start[0],
+            "ldm.sec5_1.g_min": GRAVITY.mu.min(), "ldm.sec5_1.g_max": GRAVITY.mu.max()}
+
+
+def of_torsion():
+    """Section 5.2."""
+    shape, (v, w) = TORSION.scene(0.0, 0.0).body[0].shape, TORSION.mu.T
+    sides = np.subtract(shape.upper, shape.lower)
+    return {**dict(zip(("ldm.sec5_2.wx", "ldm.sec5_2.wy", "ldm.sec5_2.h"), sides, strict=True)),
+            "ldm.sec5_2.v_min": v.min(), "ldm.sec5_2.v_max": v.max(), "ldm.sec5_2.w_min": w.min(),
+            "ldm.sec5_2.w_max": w.max(), "ldm.sec5_2.samples_per_dim": len(set(v)),
+            "ldm.sec5_2.r": nets()["torsion-0"].r}
+
+
+def of_poke():
+    """Section 5.3."""
+    scene, again = POKES.scene(0.0), poked_again(np.zeros(10))
+    theta, trained = POKES.mu[:, 0], POKES.mu[list(POKES.train), 0]
+    return {"ldm.sec5_3.poke_speed": POKE, "ldm.sec5_3.poke_time": scene.fixed[1].until,
+            "ldm.sec5_3.phi": PHI, "ldm.sec5_3.theta_step": theta[1] - theta[0],
+            "ldm.sec5_3.theta_train_step": trained[1] - trained[0],
+            "ldm.sec5_3.duration": scene.steps * scene.dt, "ldm.sec5_3.r": nets()["poke"].r,
+            "ldm.sec5_3_2.pokes": len(again.fixed) - 1, "ldm.sec5_3_2.steps": again.steps,
+            "ldm.sec5_3_2.duration": again.steps * again.dt}
+
+
+def of_networks():
+    """Table 1, and the latent dimensions of section 5.1."""
+    rows = {n: lengths(3 * n) for n in ROWS}
+    return {"ldm.table1.encoder.kernel": KERNEL, "ldm.table1.encoder.stride": STRIDE,
+            "ldm.table1.encoder.dconv_min": SHORTEST, "ldm.table1.encoder.fc1_out": FEATURES,
+            "ldm.table1.g.layers": len(HIDDEN) + 1, "ldm.table1.g.width": HIDDEN[0],
+            **{f"ldm.table1.encoder.dconv.{n}": row[-1] for n, row in rows.items()},
+            **{f"ldm.table1.encoder.nconv.{n}": len(row) - 1 for n, row in rows.items()},
+            "ldm.fig7.r": nets()["gravity-r7-no-F"].r, "ldm.fig9.r": nets()["gravity-r4"].r}
