@@ -20,7 +20,7 @@ from mpm_ref.rom.eulerian import Eulerian
 from mpm_ref.rom.lagrangian import lagrangian
 from mpm_ref.rom.latent import initial
 from mpm_ref.rom.projection import project_position
-from mpm_ref.rom.samples import draw
+from mpm_ref.rom.samples import PER_GROUP, draw
 from mpm_ref.rom.step import Reduced
 from mpm_ref.scene import build
 from mpm_ref.shapes import level_set
@@ -133,9 +133,15 @@ def march(case, map, way, rest, seed=0):
     yield latent, None
     for k in range(clock.steps):
         t = k * clock.dt
-        pick = draw(n, way.points or n, map.r, map.dim, case.held(t) if way.points else ())
+        pick = draw(n, way.points or n, map.r, map.dim, groups(case, way, t))
         latent, report = stepper.step(latent, pick(rng), t, clock.dt)
         yield latent, report
+
+
+def groups(case, way, t):
+    """What samples must not miss; nothing where they are all points, or too few for it."""
+    held = case.held(t)
+    return held if way.points and way.points >= PER_GROUP * len(held) else ()
 
 
 def compared(cases, references, map, way, rest, seed=0):
