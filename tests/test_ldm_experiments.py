@@ -1,0 +1,83 @@
+"""What LDM's experiments make of errors, and which weights they accept."""
+
+import numpy as np
+import pytest
+
+from mpm_ref.rom.weights import Model, load, save
+from validation.ldm import nets, superres
+from validation.ldm.gravity import SAME, enough
+from validation.ldm.online import Errors
+from validation.ldm.references import mean_of, references
+from validation.ldm.studies import TORSION
+from validation.verification.scenes import with_
+
+
+def rows(**means):
+    """Rows (scheme, points, draw, error) of two draws around the means {scheme: {points: mean}}."""
+    return [(scheme, points, draw, mean + 0.01 * (2 * draw - 1), 0.0, 0.0)
+            for scheme, own in means.items() for points, mean in own.items() for draw in (0, 1)]
+
+
+def test_enough_points_are_those_from_which_all_schemes_are_as_good_as_with_all():
+    fine = {10: 3.0, 50: 1.05, 100: 1.0, 999: 1.0}
+    assert enough(rows(a=fine), 999) == 50
+    assert enough(rows(a=fine, b={**fine, 50: SAME + 0.02}), 999) == 100
+    assert enough(rows(a={**fine, 100: 2.0}), 999) == 999
+
+
+def test_the_mean_says_of_how_many_it_is():
+    mean, words = mean_of([Errors(0.01, 0.02, 0.1), Errors(0.03, 0.04, 0.3)], "draws")
+    assert mean == pytest.approx((0.02, 0.03, 0.2))
+    assert words == "mean of 2 draws, the largest 3 %"
+
+
+def test_few_references_are_spread_over_the_tests(monkeypatch):
+    short = TORSION._replace(scene=lambda v, w: with_(TORSION.scene(v, w), steps=2))
+    found = references(short, 2)
+    assert len(found.x) == 2
+    assert found.of == len(TORSION.test)
+    assert found.x[0].shape == (3, 1757, 3)
+    assert found.scale == "1757 particles, 2 steps, 2 of 7 test runs"
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Where weights are looked for; nothing is remembered."""
+    monkeypatch.setattr(nets, "FOLDER", tmp_path)
+    nets.trained.cache_clear()
+    yield tmp_path
+    nets.trained.cache_clear()
+
+
+def test_missing_weights_say_how_to_make_them(folder):
+    with pytest.raises(ValueError, match=r"gravity-r2.npz: python -m validation.train gravity-r2"):
+        nets.trained("gravity-r2")
+
+
+@pytest.mark.parametrize("key", ["scenes", "epochs", "seed"])
+def test_weights_of_another_training_are_refused(folder, key):
+    model = load(next((nets.Path(nets.__file__).parent / "weights").glob("gravity-r2.npz")))
+    assert save(folder / "gravity-r2.npz", model) is None
+    assert nets.trained("gravity-r2").decoder.r == 2
+    nets.trained.cache_clear()
+    save(folder / "gravity-r2.npz", Model(*model[:3], {**model.about, key: "other"}))
+    with pytest.raises(ValueError, match=r"of .*'other'.*: python -m validation\.train gravity-r2"):
+        nets.trained("gravity-r2")
+
+
+@pytest.mark.parametrize("name", nets.nets())
+def test_all_weights_are_here_and_of_what_is_said(name):
+    model, net = nets.trained(name), nets.nets()[name]
+    steps = net.study.scene(*net.study.mu[0]).steps
+    assert model.decoder.r == net.r
+    assert model.xhat.shape[:2] == (len(net.study.train), steps + 1)
+    assert "+changes" not in model.about["commit"]
+
+
+def test_tracers_go_with_the_full_models_own_points():
+    """Points where the full model has its own move as they do."""
+    scene = with_(TORSION.scene(0.36, 1.2), steps=3)
+    x = TORSION._replace(scene=lambda v, w: with_(TORSION.scene(v, w), steps=3)).run([0])
+    found = superres.advected(scene, x.X)
+    own = TORSION._replace(mu=np.array([[0.36, 1.2]]), scene=lambda v, w: scene).run([0]).x[0]
+    assert abs(found - own).max() < 1e-12

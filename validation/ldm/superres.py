@@ -1,0 +1,76 @@
+"""A map trained on few points runs many on a finer grid (LDM-sec5.2.1, Table 4, Figure 12)."""
+
+import numpy as np
+
+from mpm_ref.body import Body, particles_at
+from mpm_ref.cases import history
+from mpm_ref.scene import build
+
+from ..registry import experiment
+from ..verification.scenes import threads_for, with_
+from .nets import trained
+from .online import SCHEMES, Squares, Way, case, march
+from .references import share
+from .studies import TORSION
+
+FINE = 13900        # points
+REFINE = 2          # cells per cell, axis and step
+NET = "torsion-0"
+
+
+def fine(v, w):
+    """The block pulled at v [m/s] and twisted at w [rad/s], on the finer grid, in shorter steps."""
+    scene = TORSION.scene(v, w)
+    body = scene.body[0]
+    body = with_(body, sampling=with_(body.sampling, count=FINE))
+    return with_(scene, dx=scene.dx / REFINE, dt=scene.dt / REFINE, steps=scene.steps * REFINE,
+                 body=(body,))
+
+
+def advected(scene, X):
+    """x (k + 1, n, d) of points X (n, d) that go with the velocity field of a full-order run: the
+    paper's baseline. A node without mass stands still.
+    """
+    problem = build(scene)
+    n, d = X.shape
+    tracers = Body("tracers", particles_at(X, np.zeros((n, d)), np.zeros(n), np.zeros(n), "pic"),
+                   problem.bodies[0].law, problem.bodies[0].flow, np.arange(n))
+    stepper, dt, found = problem.stepper(), problem.clock.dt, [X.copy()]
+    stepper.start(problem.bodies)
+    for k in range(problem.clock.steps):
+        stepper.step((*problem.bodies, tracers), k * dt, dt)
+        found.append(tracers.particles.x.copy())
+    return np.array(found)
+
+
+@experiment("ldm.table4", title="LDM: more points than it was trained on",
+            profiles=("quick", "standard"), budget={"quick": 25, "standard": 900})
+def superresolution(run):
+    """Errors of reduced runs and of advected tracers beside fine full-order runs."""
+    schemes = run.choose(quick=SCHEMES[1:2], standard=SCHEMES)
+    tests = TORSION.test[:run.choose(quick=1, standard=None)]
+    model, sums, rows = trained(NET), {}, []
+    for k in run.progress(tests, "runs"):
+        mu = TORSION.mu[k]
+        one = case(fine(*mu))
+        with threads_for(one.problem.bodies):
+            x = history(build(fine(*mu))).x
+        found = {Way(*scheme).name: reduced(one, model, Way(*scheme)) for scheme in schemes}
+        found["baseline"] = advected(TORSION.scene(*mu), one.X)
+        for name, states in found.items():
+            every = (len(x) - 1) // (len(states) - 1)
+            own = Squares(one.X)
+            for state, reference in zip(states, x[::every], strict=True):
+                own.add(state, reference)
+            sums.setdefault(name, Squares(one.X)).sums += own.sums
+            rows.append((*mu, name, *own.errors))
+    scale = f"{FINE} particles, {len(x) - 1} steps, {len(tests)} of {len(TORSION.test)} test runs"
+    for name, total in sums.items():
+        share(run, f"ldm.table4.{name}", total.errors, scale)
+    run.table("errors", ("v", "w", "scheme", "origin", "centroid", "displacement"), rows)
+
+
+def reduced(one, model, way):
+    """x (k + 1, n, d) of a reduced run."""
+    return np.array([model.decoder.place(one.X, latent.xhat)
+                     for latent, _ in march(one, model.decoder, way, model.rest)])

@@ -1,0 +1,87 @@
+"""Errors of the four schemes on torsion and on pokes (Tables 3, 5 and 6), each beside POD."""
+
+import numpy as np
+
+from mpm_ref.cases import history
+from mpm_ref.scene import build
+
+from ..registry import experiment
+from ..verification.scenes import threads_for
+from .online import SCHEMES, Way, case
+from .references import References, mean_of, references, share
+from .studies import POKES, TORSION, poked_again
+
+SEEDS = 3           # of trainings, Table 3
+DRAWS = 3           # of random samples
+POINTS = 50
+POKED = 10          # times in a row, Table 6
+R = {"torsion": 7, "poke": 6}
+COLUMNS = ("scheme", "points", "net", "draw", "origin", "centroid", "displacement")
+
+
+@experiment("ldm.table3", title="LDM: torsion and tension",
+            profiles=("quick", "standard"), budget={"quick": 15, "standard": 900})
+def torsion(run):
+    """Errors over test runs, training seeds and draws of samples; POD of the same dimension."""
+    tests = references(TORSION, run.choose(quick=2, standard=None))
+    seeds = range(run.choose(quick=1, standard=SEEDS))
+    rows = table(run, "ldm.table3", tests, [f"torsion-{seed}" for seed in seeds])
+    run.table("errors", COLUMNS, rows)
+
+
+@experiment("ldm.table5", title="LDM: poke and recover",
+            profiles=("quick", "standard"), budget={"quick": 25, "standard": 2400})
+def pokes(run):
+    """Errors over test runs and draws of samples; POD of the same dimension."""
+    tests = references(POKES, run.choose(quick=1, standard=None))
+    run.table("errors", COLUMNS, table(run, "ldm.table5", tests, ["poke"]))
+
+
+def table(run, name, tests, nets):
+    """Record a table's errors, by scheme and number of samples; rows of all runs. At the standard
+    profile also what is beside them: POD needs all training runs.
+    """
+    schemes = run.choose(quick=SCHEMES[1:2], standard=SCHEMES)
+    draws, rows = range(run.choose(quick=1, standard=DRAWS)), []
+    for scheme in run.progress(schemes, "schemes"):
+        for points in (POINTS, None):
+            way = Way(*scheme, points)
+            found = [(net, draw, tests.errors(net, way, 1000 * draw)) for net in nets
+                     for draw in (draws if points else range(1))]
+            mean, words = mean_of([errors for *_, errors in found], "trainings and draws")
+            share(run, f"{name}.{way.name}.{points or 'all'}", mean, tests.scale, words)
+            rows += [(way.name, points or len(tests.X), net, draw, *errors)
+                     for net, draw, errors in found]
+    return rows + (beside(run, name, tests, nets, draws) if run.profile == "standard" else [])
+
+
+def beside(run, name, tests, nets, draws):
+    """Record the nearest states of the learned maps, and POD with the same samples."""
+    r = R[tests.study]
+    found = {"nearest": mean_of([tests.nearest(net) for net in nets], "")[0],
+             "pod.nearest": tests.nearest_linear(r), "pod": tests.linear(r, Way()),
+             f"pod.{POINTS}": mean_of([tests.linear(r, Way(points=POINTS), 1000 * draw)
+                                       for draw in draws], "")[0]}
+    for word, errors in found.items():
+        share(run, f"{name}.{word}", errors, tests.scale, comparator="info")
+    return [(word, POINTS if word.endswith("50") else len(tests.X), "", 0, *errors)
+            for word, errors in found.items()]
+
+
+@experiment("ldm.table6", title="LDM: ten pokes in a row",
+            profiles=("standard",), budget={"standard": 900})
+def in_a_row(run):
+    """Errors of ten pokes one after the other, on the map that was trained on single ones."""
+    scene = poked_again(run.rng.uniform(0.0, 2.0 * np.pi, POKED))
+    one = case(scene)
+    with threads_for(one.problem.bodies):
+        x = history(build(scene)).x
+    tests, rows = References(POKES.name, (one,), (x,), 1), []
+    for scheme in run.progress(SCHEMES, "schemes"):
+        for points in (POINTS, None):
+            way = Way(*scheme, points)
+            errors = tests.errors("poke", way)
+            share(run, f"ldm.table6.{way.name}.{points or 'all'}", errors, tests.scale)
+            rows.append((way.name, points or len(one.X), "poke", 0, *errors))
+    share(run, "ldm.table6.pod", tests.linear(R["poke"], Way()), tests.scale, comparator="info")
+    run.table("errors", COLUMNS, rows)
