@@ -19,6 +19,7 @@ from .studies import GRAVITY, POKES, TORSION
 FOLDER = Path(__file__).parent / "weights"
 BOTH, NO_F, NO_V, NEITHER = "both", "no-F", "no-v", "neither"
 TERMS = {BOTH: (1.0, 1.0), NO_F: (0.0, 1.0), NO_V: (1.0, 0.0), NEITHER: (0.0, 0.0)}
+SEEDS = 1                   # of trainings for torsion
 REPEATED = (7,)             # latent dimensions at which the loss's terms are left out
 
 
@@ -42,7 +43,7 @@ def nets():
         found |= {f"gravity-r{r}-{terms}": Net(GRAVITY, r, terms) for terms in TERMS
                   if terms != BOTH}
     found["gravity-r7-printed"] = Net(GRAVITY, 7, reading="printed")
-    found |= {f"torsion-{seed}": Net(TORSION, 7, seed=seed) for seed in range(3)}
+    found |= {f"torsion-{seed}": Net(TORSION, 7, seed=seed) for seed in range(SEEDS)}
     found["poke"] = Net(POKES, 6, epochs=100)
     return found
 
