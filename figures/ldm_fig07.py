@@ -12,6 +12,7 @@ SCHEMES = {"lagrangian_nonlinear": "(a) Lagrangian, nonlinear",
            "eulerian_nonlinear": "(b) Eulerian, nonlinear",
            "lagrangian_linear": "(c) Lagrangian, linear", "eulerian_linear": "(d) Eulerian, linear"}
 HIGHEST = 0.3       # end of the paper's colours [%]
+DARK = 0.2          # colours of smaller errors are dark
 
 
 def scale(results):
@@ -26,10 +27,11 @@ def draw(results):
         error = square(table, name)
         image = ax.imshow(error, origin="lower", vmin=0.0, vmax=HIGHEST, cmap="viridis")
         for (v, F), value in np.ndenumerate(error):
-            ax.text(F, v, f"{value:.3f}", ha="center", va="center", color="w", fontsize=8)
+            ax.text(F, v, f"{value:.3f}", ha="center", va="center", color="k" if value > DARK else "w", fontsize=8)
         ax.set(title=SCHEMES[name], xticks=(0, 1), xticklabels=("without F", "with F"),
-               yticks=(0, 1), yticklabels=("without v", "with v"))
+               yticks=(0, 1), yticklabels=("without v", "with v") if ax is axes[0, 0] else ("", ""))
         ax.title.set_fontsize(9)
+        ax.grid(visible=False)
     figure.colorbar(image, ax=axes, label="position error [%]", shrink=0.8)
     return figure
 
