@@ -27,7 +27,8 @@ def draw(results):
         error = square(table, name)
         image = ax.imshow(error, origin="lower", vmin=0.0, vmax=HIGHEST, cmap="viridis")
         for (v, F), value in np.ndenumerate(error):
-            ax.text(F, v, f"{value:.3f}", ha="center", va="center", color="k" if value > DARK else "w", fontsize=8)
+            ax.text(F, v, f"{value:.3f}", ha="center", va="center", fontsize=8,
+                    color="k" if value > DARK else "w")
         ax.set(title=SCHEMES[name], xticks=(0, 1), xticklabels=("without F", "with F"),
                yticks=(0, 1), yticklabels=("without v", "with v") if ax is axes[0, 0] else ("", ""))
         ax.title.set_fontsize(9)
