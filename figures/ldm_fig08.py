@@ -2,16 +2,11 @@
 the error of the nearest states of the learned map, and of POD of the same dimension.
 """
 
-import matplotlib.pyplot as plt
-
-from ._orders import legend_below, series, shared
+from ._orders import shared
+from ._schemes import curves
 
 NEEDS = ["ldm.fig8"]
-LINES = {"lagrangian_nonlinear": ("Lagrangian, nonlinear", "o-"),
-         "lagrangian_linear": ("Lagrangian, linear", "s-"),
-         "eulerian_nonlinear": ("Eulerian, nonlinear", "^-"),
-         "eulerian_linear": ("Eulerian, linear", "v-"),
-         "nearest": ("nearest state, no dynamics", "k:"), "pod": ("POD, Lagrangian, linear", "x--")}
+NEAREST = ("nearest", "nearest state, no dynamics", "k:")
 
 
 def scale(results):
@@ -19,13 +14,4 @@ def scale(results):
 
 
 def draw(results):
-    table = results.table(NEEDS[0], "errors")
-    figure, ax = plt.subplots(figsize=(6.4, 4.0))
-    found = series(table, ("scheme",))
-    for name, (label, style) in LINES.items():
-        if (name,) in found:
-            rows = found[name,]
-            ax.semilogy(table["r"][rows], 100.0 * table["origin"][rows], style, label=label)
-    ax.set(xlabel="latent dimension r", ylabel="position error [%]")
-    legend_below(figure, [ax], columns=3)
-    return figure
+    return curves(results.table(NEEDS[0], "errors"), "r", "latent dimension r", "-", (NEAREST,))

@@ -2,8 +2,8 @@
 
     A_0 = A,   Z_l = A_l W_l + b_l,   A_{l+1} = elu(Z_l),   y = A_{L-1} W_{L-1} + b_{L-1}
 
-The same numbers as `network`, to round-off, which walks point by point; about three times as fast,
-since the products are those of BLAS and the exponentials of NumPy. With the slopes D_l = elu'(Z_l)
+The same numbers as `network`, to round-off, which walks point by point; faster, since
+the products are those of BLAS and the exponentials of NumPy. With the slopes D_l = elu'(Z_l)
 = exp(min(Z_l, 0)),
 
     dy_k/dA_l = (dy_k/dA_{l+1} * D_l) W_l^T        one pass back for every output
