@@ -18,8 +18,8 @@ class History(NamedTuple):
     v: np.ndarray       # (k + 1, n, d)     velocity [m/s]
 
 
-def history(problem):
-    """`History` of a problem of one body that shows every step.
+def history(problem, every=1):
+    """`History` of a problem of one body that shows every step; of one point in so many.
 
     Raises ValueError for more bodies, and for a clock that shows fewer frames.
     """
@@ -32,7 +32,7 @@ def history(problem):
         if frame.state.step != frame.index:
             raise ValueError(f"frame {frame.index} is step {frame.state.step}: expected every = 1")
         body = frame.state.bodies[0]
-        rows.append([in_order(a, body.id) for a in
+        rows.append([in_order(a, body.id)[::every] for a in
                      (body.particles.x, body.particles.F, body.particles.v)])
     return History(*(np.array(field) for field in zip(*rows, strict=True)))
 
@@ -44,8 +44,9 @@ def in_order(a, id):
     return out
 
 
-def snapshots(problems, mu):
-    """`Snapshots` of problems that differ by parameters mu (s, parameters) alone.
+def snapshots(problems, mu, every=1):
+    """`Snapshots` of problems that differ by parameters mu (s, parameters) alone; of one point in
+    so many.
 
     Raises ValueError where their points or time steps differ.
     """
@@ -57,8 +58,8 @@ def snapshots(problems, mu):
         if dt != problem.clock.dt or not all(map(np.array_equal, points, rest)):
             raise ValueError(f"run {len(runs)} has other points or another time step than run 0: "
                              "expected runs that differ by their parameters alone")
-        runs.append(history(problem))
-    return Snapshots(*rest, np.asarray(mu, dtype=float), *(
+        runs.append(history(problem, every))
+    return Snapshots(*(a[::every] for a in rest), np.asarray(mu, dtype=float), *(
         np.stack(field) for field in zip(*runs, strict=True)), dt)
 
 

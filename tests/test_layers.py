@@ -10,8 +10,8 @@ ROOT = Path(__file__).resolve().parents[1]
 
 # Ground floor first. What stands on one line does not know each other, except within a room: names
 # in one string may import each other, without cycles. A package in PACKAGES is such a room.
-PACKAGES = {"plain", "materials", "hot", "rom", "nclaw", "shapes", "sampling", "scene", "store",
-            "oracle", "cli"}
+PACKAGES = {"plain", "materials", "hot", "rom", "reduced", "nclaw", "shapes", "sampling", "scene",
+            "store", "oracle", "cli"}
 FLOORS = (
     ("core.jit",),
     ("core.tensor",),
@@ -34,6 +34,7 @@ FLOORS = (
     ("scene",),
     ("store",),
     ("oracle", "sweep", "plotting", "cases"),
+    ("reduced",),
     ("cli",),
 )
 OUTSIDE = {"validation", "figures", "benchmarks", "tests"}      # floor 9 and what tests it

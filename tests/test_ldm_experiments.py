@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from mpm_ref.reduced.errors import Errors
 from mpm_ref.rom.weights import Model, load, save
 from validation.ldm import nets, superres
 from validation.ldm.gravity import SAME, enough
-from validation.ldm.online import Errors
 from validation.ldm.references import mean_of, references
 from validation.ldm.studies import TORSION
 from validation.verification.scenes import with_

@@ -5,9 +5,12 @@ from math import cos, pi, sin
 import numpy as np
 import pytest
 
+from mpm_ref.reduced.case import case
+from mpm_ref.reduced.errors import Squares
+from mpm_ref.reduced.march import SCHEMES, Way, march
 from mpm_ref.rom.affine import Affine
 from mpm_ref.rom.modes import modes
-from validation.ldm.online import SCHEMES, Squares, Way, case, compared, march, reconstructed
+from validation.ldm.online import compared, reconstructed
 from validation.ldm.studies import GRAVITY, PHI, POKE, POKES, STUDIES, TORSION, poked_again
 from validation.verification.scenes import shipped, with_
 

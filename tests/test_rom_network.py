@@ -139,10 +139,10 @@ def test_sizes_of_a_map(d):
 
 
 def digest():
-    """sha256 of all that a map answers, in batches and point by point, for 2000 points."""
+    """sha256 of all that a map answers, in batches and point by point, for 5000 points."""
     sha = hashlib.sha256()
     for d in (2, 3):
-        map, _, X, xhat, vhat = case(d, (30,) * 4, n=2000)
+        map, _, X, xhat, vhat = case(d, (30,) * 4, n=5000)
         for a in (*answers(map, X, xhat, vhat), *pointwise_answers(map, X, xhat, vhat)):
             sha.update(a.tobytes())
     return sha.hexdigest()
@@ -153,6 +153,13 @@ def test_any_number_of_threads_gives_the_same_bits(threads):
     count = str(threads)
     found = elsewhere(DIGEST, NUMBA_NUM_THREADS=count, OPENBLAS_NUM_THREADS=count)
     assert found == [digest(), threads]
+
+
+def test_single_precision_is_near_double(d):
+    map, _, X, xhat, vhat = case(d, (30,) * 4, n=3000)
+    for a, b in zip(answers(map.single(), X, xhat, vhat), answers(map, X, xhat, vhat), strict=True):
+        assert a.dtype == np.float64
+        assert 0.0 < abs(a - b).max() < 1e-5 * abs(b).max()
 
 
 # Weights in and out.

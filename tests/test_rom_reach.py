@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from rom_toys import cloud, decoder
 
+import mpm_ref.rom.blocks
 from mpm_ref.core.motion import rotation
 from mpm_ref.core.spline import STENCILS, base_of
 from mpm_ref.rom.affine import Affine
@@ -107,6 +108,13 @@ def body(request, d):
     return cloud(d, 50), 0.05 if d == 2 else DX
 
 
+@pytest.fixture(params=(500, 2), ids=("one level", "more levels"))
+def many(request, monkeypatch):
+    """How many blocks are not in larger ones."""
+    monkeypatch.setattr(mpm_ref.rom.blocks, "MANY", request.param)
+    return request.param
+
+
 def test_blocks_hold_every_point_once(d):
     X = cloud(d, 300)
     found = blocks(X, 2 * DX)
@@ -132,7 +140,7 @@ def test_no_point_is_farther_from_its_block_than_the_bound(moved, d):
     assert far.max() > 0.1 * bound.max()
 
 
-def test_no_point_near_a_position_is_missed(moved, body):
+def test_no_point_near_a_position_is_missed(moved, body, many):
     (map, xhat), (X, dx) = moved, body
     x = map.place(X, xhat)
     targets = x[:2] + 0.01
@@ -141,6 +149,24 @@ def test_no_point_near_a_position_is_missed(moved, body):
     found = blocks(X, CELLS * dx).near(map, xhat, targets, distance)
     assert set(np.flatnonzero(away <= distance)) <= set(found)
     assert len(set(found)) == len(found) < len(X)
+
+
+def test_larger_blocks_leave_out_blocks_that_are_far(d):
+    """Those found are as few as without them, from fewer evaluations."""
+    X, asked = cloud(d, 4000), []
+
+    class Counted(Affine):
+        def derivatives(self, X, xhat):
+            asked.append(len(X))
+            return super().derivatives(X, xhat)
+
+    map, x = Counted(d), X[:1]
+    held = blocks(X, 0.25 * DX)
+    assert held.above is not None
+    flat = held._replace(above=None)
+    found = [set(b.near(map, map.rest, x, 0.5 * DX).tolist()) for b in (flat, held)]
+    assert found[0] == found[1]
+    assert sum(asked[1:]) < 0.7 * asked[0]
 
 
 # the samples' neighbours
@@ -166,7 +192,7 @@ def every(x, rng):
 
 
 @pytest.mark.parametrize("chosen", [few, clustered, most, every])
-def test_the_support_is_all_points_that_share_a_node(moved, body, degree, chosen):
+def test_the_support_is_all_points_that_share_a_node(moved, body, degree, chosen, many):
     (map, xhat), (X, dx), n = moved, body, len(body[0])
     quadrature = lagrangian(X, np.ones(n), np.ones(n), dx, degree)
     x = map.place(X, xhat)

@@ -29,7 +29,7 @@ def training(net):
     shares, weights = TERMS[net.terms], READINGS[net.reading]
     scaled = Weights(*(share * weight for share, weight in zip(shares, weights, strict=True)))
     return Training(net.r, weights=scaled, epochs=net.epochs, batch=net.batch, points=net.points,
-                    seed=net.seed)
+                    dense=net.dense, thin=net.thin, seed=net.seed)
 
 
 def made(name, checkpoints, threads):

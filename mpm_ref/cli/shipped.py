@@ -1,4 +1,4 @@
-"""The scenes that come with the package, by their bare names."""
+"""The scenes and studies that come with the package, by their bare names."""
 
 from pathlib import Path
 
@@ -11,9 +11,18 @@ PACKAGE = Path(__file__).resolve().parents[1]
 
 def shipped_scenes():
     """{name: path} of the scenes that come with the package; none if they were not installed."""
-    places = [PACKAGE / "scenes"]
+    return _shipped("scenes")
+
+
+def shipped_studies():
+    """{name: path} of the studies that come with the package, likewise."""
+    return _shipped("studies")
+
+
+def _shipped(folder):
+    places = [PACKAGE / folder]
     if (PACKAGE.parent / "pyproject.toml").exists():          # run from a clone
-        places.append(PACKAGE.parent / "scenes")
+        places.append(PACKAGE.parent / folder)
     return {file.stem: file for place in places for file in sorted(place.glob("*.toml"))}
 
 
@@ -34,6 +43,17 @@ def find_scene(name):
     known = ", ".join(scenes) or "not installed"
     raise SceneError(f"{name}: there is no such file, nor a shipped scene of that name; shipped "
                      f"scenes: {known}")
+
+
+def find_study(name):
+    """Path of a study given by its file, or the bare name of a shipped one. Raises SceneError."""
+    if Path(name).is_file():
+        return Path(name)
+    studies = shipped_studies()
+    if name not in studies:
+        raise SceneError(f"{name}: there is no such file, nor a shipped study of that name; "
+                         f"shipped studies: {', '.join(studies) or 'not installed'}")
+    return studies[name]
 
 
 def keep_scene(path, out):

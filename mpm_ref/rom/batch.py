@@ -9,18 +9,34 @@ the products are those of BLAS and the exponentials of NumPy. With the slopes D_
     dy_k/dA_l = (dy_k/dA_{l+1} * D_l) W_l^T        one pass back for every output
     dy        = (.. (u W_0 * D_0) W_1 * D_1 ..)    one pass forward for a direction u
 
-Points are taken ROWS at a time, so that a batch stays in the cache, and a point's numbers do not
-depend on the number of threads.
+Points are taken ROWS at a time, so that a batch stays in the cache, and threads share the batches:
+a point's numbers do not depend on how many there are.
 """
 
+from concurrent.futures import ThreadPoolExecutor
+
+import numba
 import numpy as np
 
 ROWS = 1024
+WORTH = 2           # batches for which a thread is worth its start
 
 
 def batches(n):
     """Slices of n points."""
     return [slice(start, min(start + ROWS, n)) for start in range(0, n, ROWS)]
+
+
+def over(n, work):
+    """Call work(rows) for all batches of n points, on as many threads as kernels run on."""
+    parts = batches(n)
+    threads = min(len(parts) // WORTH, numba.get_num_threads())
+    if threads < 2:
+        for rows in parts:
+            work(rows)
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(work, parts))
 
 
 def forward(layers, A):

@@ -2,7 +2,7 @@
 
 A block's points lie, in motion, within L radius of its centre's image, where L bounds the stretch.
 So the points that can be near a sample are found from as many evaluations of the map as there are
-blocks, whatever the number of points.
+blocks, whatever the number of points. Many blocks' centres are points in larger blocks again.
 """
 
 from typing import NamedTuple
@@ -11,6 +11,8 @@ import numpy as np
 from scipy.spatial import KDTree
 
 SAFETY = 1.5        # on the largest stretch at the centres, as a bound on that in between
+MANY = 500          # blocks, above which their centres are in larger ones ...
+LARGER = 3.0        # ... of so many times the size
 
 
 class Blocks(NamedTuple):
@@ -20,15 +22,19 @@ class Blocks(NamedTuple):
     start: np.ndarray       # (blocks + 1,)
     center: np.ndarray      # (blocks, d) of the blocks' points, at rest [m]
     radius: np.ndarray      # (blocks,) largest distance of a block's point from it [m]
+    above: object           # `Blocks` of the centres, or None
 
-    def near(self, map, xhat, x, distance):
+    def near(self, map, xhat, x, distance, margin=0.0):
         """Indices of all points that may be within a distance [m], by the largest axis, of one of
-        the positions x (m, d).
+        the positions x (m, d); or that have points within a margin [m] at rest which may be.
         """
-        at, F, _ = map.derivatives(self.center, xhat)
-        stretch = SAFETY * np.linalg.norm(F, 2, axis=(1, 2)).max()
+        k = np.arange(len(self.center))
+        if self.above is not None:
+            k = self.above.near(map, xhat, x, distance, margin + self.radius.max())
+        at, F, _ = map.derivatives(self.center[k], xhat)
+        stretch = SAFETY * np.linalg.norm(F, 2, axis=(1, 2)).max(initial=0.0)
         gap, _ = KDTree(x).query(at, p=np.inf)
-        found = np.flatnonzero(gap <= distance + stretch * self.radius)
+        found = k[gap <= distance + stretch * (self.radius[k] + margin)]
         parts = [self.order[self.start[k]:self.start[k + 1]] for k in found]
         return np.concatenate([self.order[:0], *parts])
 
@@ -42,4 +48,5 @@ def blocks(X, size):
     center = np.stack([np.bincount(block, X[:, a]) / count for a in range(X.shape[1])], axis=1)
     far = np.linalg.norm(X - center[block], axis=1)
     radius = np.maximum.reduceat(far[order], start[:-1])
-    return Blocks(order, start, center, radius)
+    above = blocks(center, LARGER * size) if len(center) > MANY else None
+    return Blocks(order, start, center, radius, above)

@@ -21,7 +21,8 @@ class Eulerian(NamedTuple):
     rho: float          # density at rest [kg/m^d]
     distance: callable  # X (n, d) -> signed distance from the body's surface at rest [m], negative
                         # inside
-    seeds: np.ndarray   # (s, d) material points from which the search for X begins [m]
+    seeds: np.ndarray   # (s, d) material points from which, and from the samples, the search for
+                        # X begins [m]
     dx: float           # of the grid [m]
     degree: int         # of its splines
     per_cell: int = PER_CELL
@@ -44,11 +45,11 @@ class Eulerian(NamedTuple):
         nor does one that is far from it at first guess, or where the map is inverted.
         """
         x = self.places(map.place(self.X[samples], latent.xhat))
-        start = guesses(map, latent.xhat, x, self.seeds)
+        start = guesses(map, latent.xhat, x, np.concatenate([self.X[samples], self.seeds]))
         near = self.distance(start) <= FAR * self.dx
         back = preimages(map, latent.xhat, x[near], start[near], self.dx)
         inside = back.found & (self.distance(back.X) <= 0.0)
-        J = np.linalg.det(map.derivatives(back.X[inside], latent.xhat)[1])
+        J = np.linalg.det(back.F[inside])
         upright = J > 0.0
         V0 = (self.dx / self.per_cell) ** x.shape[1] / J[upright]
         lost = np.sum(~back.found) + np.sum(~upright)

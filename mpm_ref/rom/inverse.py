@@ -14,6 +14,7 @@ class Preimages(NamedTuple):
     """Solutions of g(X; xhat) = x."""
 
     X: np.ndarray           # (n, d) [m]
+    F: np.ndarray           # (n, d, d) dg/dX there
     found: np.ndarray       # (n,) bool: g(X; xhat) is x
     iterations: int
 
@@ -25,9 +26,10 @@ def preimages(map, xhat, x, X, scale):
     found. A point leaves the iteration as soon as it is found.
     """
     X, found, left = X.copy(), np.zeros(len(x), dtype=bool), np.arange(len(x))
+    F_last = np.empty((*x.shape, x.shape[1]))
     for k in range(ITERATIONS + 1):
         at, F, _ = map.derivatives(X[left], xhat)
-        error = x[left] - at
+        F_last[left], error = F, x[left] - at
         done = np.sum(error**2, axis=1) <= (CLOSE * scale) ** 2
         found[left[done]] = True
         left, error, F = left[~done], error[~done], F[~done]
@@ -36,7 +38,7 @@ def preimages(map, xhat, x, X, scale):
         if not len(left) or k == ITERATIONS:
             break
         X[left] += shortened(np.linalg.solve(F, error[..., None])[..., 0], LONGEST * scale)
-    return Preimages(X, found, k)
+    return Preimages(X, F_last, found, k)
 
 
 def shortened(step, longest):

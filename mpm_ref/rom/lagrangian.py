@@ -1,5 +1,7 @@
 """Lagrangian quadrature: the samples' own neighbours carry mass, momentum and stress (LDM-alg3,
-LDM-sec3.2.1-sets).
+LDM-sec3.2.1-sets). Neighbours are other material points, or (`Resampled`) points of another
+sampling of the body, as coarse as the quadrature allows: then a step's cost does not grow with the
+number of material points, and no map needs to be inverted.
 """
 
 from typing import NamedTuple
@@ -29,15 +31,45 @@ class Lagrangian(NamedTuple):
         if len(samples) == len(self.X):
             return samples
         x = map.place(self.X[samples], latent.xhat)
-        candidates = self.blocks.near(map, latent.xhat, x, (self.degree + 1) * self.dx)
-        here = map.place(self.X[candidates], latent.xhat)
-        near = reach(x, self.dx, self.degree).reached(here)
-        return np.union1d(candidates[near], samples)
+        return np.union1d(self.neighbours(map, latent.xhat, x), samples)
+
+    def neighbours(self, map, xhat, x):
+        """Indices of all points that share a node with a position x (m, d)."""
+        candidates = self.blocks.near(map, xhat, x, (self.degree + 1) * self.dx)
+        here = map.place(self.X[candidates], xhat)
+        return candidates[reach(x, self.dx, self.degree).reached(here)]
 
     def cloud(self, map, latent, samples):
         """X, m and V0 of the quadrature points of a step, and what is to be said of them."""
         chosen = self.support(map, latent, samples)
         return self.X[chosen], self.m[chosen], self.V0[chosen], {"points": len(chosen)}
+
+
+class Resampled(NamedTuple):
+    """Samples are material points; what carries mass is another sampling of the body."""
+
+    X: np.ndarray       # (n, d) material points at rest [m]
+    other: Lagrangian
+
+    feather = 1e-9      # mass of a sample on the grid over that of a point: no node that samples
+                        # read is empty
+
+    @property
+    def dx(self):
+        """Spacing of the grid [m]."""
+        return self.other.dx
+
+    @property
+    def degree(self):
+        """Of the grid's splines."""
+        return self.other.degree
+
+    def cloud(self, map, latent, samples):
+        """X, m and V0 of the quadrature points of a step, and what is to be said of them."""
+        x = map.place(self.X[samples], latent.xhat)
+        chosen = np.sort(self.other.neighbours(map, latent.xhat, x))
+        return (self.other.X[chosen], self.other.m[chosen], self.other.V0[chosen],
+                {"points": len(chosen)})
 
 
 def lagrangian(X, m, V0, dx, degree):

@@ -66,30 +66,53 @@ class Modes(NamedTuple):
         return fit[:, 0], np.moveaxis(fit[:, 1:], 1, 2)
 
 
+class Basis(NamedTuple):
+    """`Modes`, and the coordinates of the snapshots that they were made of."""
+
+    modes: Modes
+    xhat: np.ndarray        # (s, r)
+
+
 def modes(X, x, F, r):
     """The best `Modes` with r coordinates for snapshots x (s, n, d) [m], F (s, n, d, d) of points X
     (n, d); coordinates are scaled to a root mean square of 1 over the snapshots. Raises ValueError
     for r out of range.
     """
+    return basis(X, x, F, r).modes
+
+
+def basis(X, x, F, r, lam_F=0.0, weights=1.0):
+    """The `Basis` of r modes that leaves the least sum over snapshots s of
+    weights_s^2 (|| x_s ||^2 + lam_F || F_s ||^2) [m^2]. Raises ValueError for r out of range.
+    """
     s, n, d = x.shape
     if not 1 <= r <= min(s, n * d):
         raise ValueError(f"r = {r}: expected 1 .. {min(s, n * d)} modes of {s} snapshots")
-    left, sigma, right = leading((x - X).reshape(s, -1), r)
+    w = np.broadcast_to(np.asarray(weights, dtype=float), s)
+    left, sigma = leading(w[:, None] * measured(X, x, F, lam_F), r)
     if not sigma[r - 1] > 0.0:
         raise ValueError(f"r = {r}: the snapshots have only {int(np.sum(sigma > 0.0))} modes")
-    shares = left[:, :r] / np.sqrt(s)                   # of the snapshots in a scaled mode
-    U = (right[:r].T * (sigma[:r] / np.sqrt(s))).reshape(n, d, r)
+    shares = w[:, None] * left / np.sqrt(s)             # of the snapshots in a scaled mode
+    U = np.tensordot(x - X, shares, axes=(0, 0))
     slope = np.tensordot(F - np.eye(d), shares, axes=(0, 0))
-    return Modes(X, U, slope, KDTree(X))
+    return Basis(Modes(X, U, slope, KDTree(X)), left * np.sqrt(s) / w[:, None])
+
+
+def measured(X, x, F, lam_F):
+    """Rows (s, ..) whose length is the norm of displacements [m], with F or without."""
+    u = (x - X).reshape(len(x), -1)
+    if not lam_F:
+        return u
+    return np.hstack([u, np.sqrt(lam_F) * (F - np.eye(X.shape[1])).reshape(len(x), -1)])
 
 
 def leading(A, r):
-    """The r leading singular triples of a matrix, largest first: (m, r), (r,), (r, n). Of a large
-    one by Lanczos' method, always from the same start.
+    """The r leading left singular vectors (m, r) and values (r,) of a matrix, largest first. Of a
+    large one by Lanczos' method, always from the same start.
     """
     if min(A.shape) <= SMALL:
-        U, s, Vt = np.linalg.svd(A, full_matrices=False)
-        return U[:, :r], s[:r], Vt[:r]
-    U, s, Vt = svds(A, r, v0=np.ones(min(A.shape)))
+        U, s, _ = np.linalg.svd(A, full_matrices=False)
+        return U[:, :r], s[:r]
+    U, s, _ = svds(A, r, v0=np.ones(min(A.shape)))
     order = np.argsort(-s)
-    return U[:, order], s[order], Vt[order]
+    return U[:, order], s[order]

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import qr
 
 PER_GROUP = 5       # samples of each kinematic boundary, at least
 
@@ -22,8 +23,8 @@ class Draw(NamedTuple):
         forced = [rng.choice(group, min(self.per_group, len(group)), replace=False)
                   for group in self.groups]
         forced = np.unique(np.concatenate(forced)) if forced else np.empty(0, dtype=int)
-        free = np.setdiff1d(np.arange(self.n), forced)
-        rest = rng.choice(free, max(self.count - len(forced), 0), replace=False)
+        drawn = rng.choice(self.n, self.count, replace=False)
+        rest = drawn[~np.isin(drawn, forced)][:self.count - len(forced)]
         return np.sort(np.concatenate([forced, rest]))
 
 
@@ -46,3 +47,19 @@ def draw(n, count, r, dim, groups=()):
         raise ValueError(f"{count} samples with {PER_GROUP} for each of {len(groups)} kinematic "
                          f"boundaries: expected at least {forced}")
     return Draw(n, count, groups)
+
+
+def pivoted(G, count):
+    """Indices of so many of n points that tell latent coordinates best, from dg/dxhat there, G (n,
+    d, r): a QR factorisation with column pivoting takes the r most independent rows (Q-DEIM: Z.
+    Drmac and S. Gugercin, SIAM J. Sci. Comput. 38 (2016) A631), then those of the points left, and
+    so on.
+    """
+    left, chosen = np.arange(len(G)), []
+    while len(chosen) < min(count, len(G)):
+        rows = G[left].reshape(-1, G.shape[2])
+        order = qr(rows.T, mode="r", pivoting=True)[1][:G.shape[2]] // G.shape[1]
+        found = left[np.sort(np.unique(order))]
+        chosen += found[:count - len(chosen)].tolist()
+        left = np.setdiff1d(left, found)
+    return np.array(chosen)

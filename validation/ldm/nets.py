@@ -19,7 +19,7 @@ from .studies import GRAVITY, POKES, TORSION
 FOLDER = Path(__file__).parent / "weights"
 BOTH, NO_F, NO_V, NEITHER = "both", "no-F", "no-v", "neither"
 TERMS = {BOTH: (1.0, 1.0), NO_F: (0.0, 1.0), NO_V: (1.0, 0.0), NEITHER: (0.0, 0.0)}
-SEEDS = 1                   # of trainings for torsion
+SEEDS = 3                   # of trainings for torsion
 REPEATED = (7,)             # latent dimensions at which the loss's terms are left out
 
 
@@ -34,6 +34,8 @@ class Net(NamedTuple):
     epochs: int = 400
     points: int = 128       # shown of each snapshot
     batch: int = 8          # snapshots
+    dense: int = 0          # time levels that every epoch shows; of later ones, ...
+    thin: int = 1           # ... one in so many
 
 
 def nets():
@@ -43,8 +45,8 @@ def nets():
         found |= {f"gravity-r{r}-{terms}": Net(GRAVITY, r, terms) for terms in TERMS
                   if terms != BOTH}
     found["gravity-r7-printed"] = Net(GRAVITY, 7, reading="printed")
-    found |= {f"torsion-{seed}": Net(TORSION, 7, seed=seed) for seed in range(SEEDS)}
-    found["poke"] = Net(POKES, 6, epochs=100)
+    found |= {f"torsion-{seed}": Net(TORSION, 7, seed=seed, epochs=850) for seed in range(SEEDS)}
+    found["poke"] = Net(POKES, 6, epochs=300, dense=40, thin=4)
     return found
 
 
@@ -57,7 +59,7 @@ def trained(name):
     if not path.exists():
         raise ValueError(f"no weights {path.name}: {again}")
     model, now = load(path), identity(nets()[name])
-    was = {key: model.about.get(key) for key in now}
+    was = {key: model.about.get(key, Net._field_defaults.get(key)) for key in now}
     if was != now:
         raise ValueError(f"weights {path.name} are of {was}, now it is {now}: {again}")
     return model

@@ -5,12 +5,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.rom.modes import modes
+from mpm_ref.reduced.case import case
+from mpm_ref.rom.curved import curved
+from mpm_ref.rom.modes import basis, modes
 
 from .nets import trained
-from .online import case, compared, reconstructed
+from .online import compared, reconstructed
 from .studies import STUDIES
 
+MODES = 40          # that curved maps follow with
 ORIGIN = "from the centre of the held end"
 
 
@@ -33,23 +36,31 @@ class References(NamedTuple):
         return (f"{len(self.X)} particles, {len(self.x[0]) - 1} steps, {len(self.x)} of {self.of} "
                 "test runs")
 
+    def on(self, map, rest, way, seed=0):
+        """`Errors` of reduced runs on a map."""
+        return compared(self.cases, self.x, map, way, rest, seed)
+
+    def near(self, map, rest):
+        """`Errors` of the nearest states of a map."""
+        return reconstructed(self.X, self.x, map, rest)
+
     def errors(self, name, way, seed=0):
         """`Errors` of reduced runs on a trained map."""
         model = trained(name)
-        return compared(self.cases, self.x, model.decoder, way, model.rest, seed)
+        return self.on(model.decoder, model.rest, way, seed)
 
     def linear(self, r, way, seed=0):
         """`Errors` of reduced runs on as many POD modes."""
-        return compared(self.cases, self.x, pod(self.study, r), way, np.zeros(r), seed)
+        return self.on(pod(self.study, r), np.zeros(r), way, seed)
 
     def nearest(self, name):
         """`Errors` of the nearest states of a trained map."""
         model = trained(name)
-        return reconstructed(self.X, self.x, model.decoder, model.rest)
+        return self.near(model.decoder, model.rest)
 
     def nearest_linear(self, r):
         """`Errors` of the nearest states of as many POD modes."""
-        return reconstructed(self.X, self.x, pod(self.study, r), np.zeros(r))
+        return self.near(pod(self.study, r), np.zeros(r))
 
 
 def references(study, count=None):
@@ -70,6 +81,27 @@ def training(name):
 def pod(name, r):
     """`Modes` of the training runs of a study."""
     return modes(*training(name), r)
+
+
+@cache
+def based(name, lam_F=0.0, early=(0, 1.0)):
+    """`Basis` of the training runs of a study, in a norm with lam_F [m^2]; early = (levels, weight)
+    has the first time levels of each run weigh so much more.
+    """
+    levels, weight = early
+    X, x, F = training(name)
+    w = np.ones((len(STUDIES[name].train), len(x) // len(STUDIES[name].train)))
+    w[:, :levels] = weight
+    return basis(X, x, F, MODES, lam_F, w.ravel()), w.ravel()
+
+
+@cache
+def bent(name, r, degree, lam_F=0.0, early=(0, 1.0)):
+    """Map of r coordinates over the modes of `based`: `Modes` for degree 1, else `Curved`."""
+    found, w = based(name, lam_F, early)
+    if degree == 1:
+        return found.modes._replace(U=found.modes.U[..., :r], slope=found.modes.slope[..., :r])
+    return curved(found, r, degree, w)
 
 
 def share(run, name, errors, scale, note="", **rule):

@@ -4,8 +4,10 @@ from math import cos, pi, sin
 from typing import NamedTuple
 
 import numpy as np
+from scipy.stats.qmc import LatinHypercube, scale
 
 from mpm_ref.cases import snapshots
+from mpm_ref.sampling import Regular
 from mpm_ref.scene import build
 
 from ..verification.scenes import shipped, threads_for, with_
@@ -21,6 +23,7 @@ class Study(NamedTuple):
     mu: np.ndarray          # (runs, parameters)
     test: tuple
     scene: callable         # parameters of a run -> scene
+    every: int = 1          # one point in so many is recorded
 
     @property
     def train(self):
@@ -35,7 +38,8 @@ class Study(NamedTuple):
         """`Snapshots` of the full-order runs of these numbers."""
         first = self.problem(numbers[0])
         with threads_for(first.bodies):
-            return snapshots((self.problem(k) for k in numbers), self.mu[list(numbers)])
+            return snapshots((self.problem(k) for k in numbers), self.mu[list(numbers)],
+                             self.every)
 
 
 def drawn(count, of, seed=0):
@@ -75,6 +79,28 @@ def poked_again(thetas):
     return with_(scene, steps=scene.steps * len(thetas), fixed=(base, *pokes))
 
 
+def leaning(r, theta, phi):
+    """LDM-sec5.4: the tower's top moved at r [m/s] in a direction of angles theta and phi [rad]."""
+    scene = shipped("ldm_tower")
+    bottom, top = scene.fixed
+    along = (cos(phi) * cos(theta), cos(phi) * sin(theta), sin(phi))
+    path = with_(top.motion.translation, rate=tuple(float(r) * a for a in along))
+    return with_(scene, fixed=(bottom, with_(top, motion=with_(top.motion, translation=path))))
+
+
+def refined(scene, dx, per_cell):
+    """A scene on a grid of spacing dx [m], with so many particles per cell and axis."""
+    body = with_(scene.body[0], sampling=Regular(per_cell=per_cell))
+    return with_(scene, dx=dx, body=(body,))
+
+
+def latin(low, high, train, test, seed=0):
+    """Parameters of training runs and then test runs, a Latin hypercube each."""
+    rng = np.random.default_rng(seed)
+    return np.vstack([scale(LatinHypercube(len(low), rng=rng).random(n), low, high)
+                      for n in (train, test)])
+
+
 def at_rim(poke, theta, begin=0.0):
     """A poke at an angle theta [rad] that begins at a time [s]."""
     R, H = scene_size(poke)
@@ -96,4 +122,6 @@ TORSION = Study("torsion", np.array([(v, w) for v in np.linspace(0.0, 0.6, 6)
                                      for w in np.linspace(0.0, 2.0, 6)]), drawn(7, 36), twisted)
 POKES = Study("poke", np.arange(36)[:, None] * pi / 18.0,
               tuple(k for k in range(36) if k % 3), poked)
-STUDIES = {study.name: study for study in (GRAVITY, TORSION, POKES)}
+TOWER = Study("tower", latin((0.6, 0.0, -pi / 3.0), (0.8, pi / 2.0, -pi / 6.0), 16, 4),
+              (16, 17, 18, 19), leaning, every=16)
+STUDIES = {study.name: study for study in (GRAVITY, TORSION, POKES, TOWER)}

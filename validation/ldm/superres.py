@@ -4,12 +4,14 @@ import numpy as np
 
 from mpm_ref.body import Body, particles_at
 from mpm_ref.cases import history
+from mpm_ref.reduced.case import case
+from mpm_ref.reduced.errors import Squares
+from mpm_ref.reduced.march import SCHEMES, Way, march
 from mpm_ref.scene import build
 
 from ..registry import experiment
 from ..verification.scenes import threads_for, with_
 from .nets import trained
-from .online import SCHEMES, Squares, Way, case, march
 from .references import share
 from .studies import TORSION
 

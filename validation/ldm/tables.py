@@ -3,16 +3,19 @@
 import numpy as np
 
 from mpm_ref.cases import history
+from mpm_ref.reduced.case import case
+from mpm_ref.reduced.errors import Errors
+from mpm_ref.reduced.march import SCHEMES, Way
 from mpm_ref.scene import build
 
 from ..registry import experiment
 from ..verification.scenes import threads_for
 from .nets import SEEDS
-from .online import SCHEMES, Way, case
 from .references import References, mean_of, references, share
 from .studies import POKES, TORSION, poked_again
 
-DRAWS = 3           # of random samples
+DRAWS = {"torsion": 3, "poke": 2}    # of random samples
+TESTED = 8          # of 24 pokes
 POINTS = 50
 POKED = 10          # times in a row, Table 6
 R = {"torsion": 7, "poke": 6}
@@ -20,7 +23,7 @@ COLUMNS = ("scheme", "points", "net", "draw", "origin", "centroid", "displacemen
 
 
 @experiment("ldm.table3", title="LDM: torsion and tension",
-            profiles=("quick", "standard"), budget={"quick": 15, "standard": 900})
+            profiles=("quick", "standard"), budget={"quick": 15, "standard": 1200})
 def torsion(run):
     """Errors over test runs, training seeds and draws of samples; POD of the same dimension."""
     tests = references(TORSION, run.choose(quick=2, standard=None))
@@ -32,7 +35,7 @@ def torsion(run):
             profiles=("quick", "standard"), budget={"quick": 25, "standard": 2400})
 def pokes(run):
     """Errors over test runs and draws of samples; POD of the same dimension."""
-    tests = references(POKES, run.choose(quick=1, standard=None))
+    tests = references(POKES, run.choose(quick=1, standard=TESTED))
     run.table("errors", COLUMNS, table(run, "ldm.table5", tests, ["poke"]))
 
 
@@ -41,17 +44,23 @@ def table(run, name, tests, nets):
     profile also what is beside them: POD needs all training runs.
     """
     schemes = run.choose(quick=SCHEMES[1:2], standard=SCHEMES)
-    draws, rows = range(run.choose(quick=1, standard=DRAWS)), []
+    draws, rows = range(run.choose(quick=1, standard=DRAWS[tests.study])), []
     for scheme in run.progress(schemes, "schemes"):
         for points in (POINTS, None):
             way = Way(*scheme, points)
-            found = [(net, draw, tests.errors(net, way, 1000 * draw)) for net in nets
+            found = [(net, draw, kept(run, tests, net, way, draw)) for net in nets
                      for draw in (draws if points else range(1))]
             mean, words = mean_of([errors for *_, errors in found], "trainings and draws")
             share(run, f"{name}.{way.name}.{points or 'all'}", mean, tests.scale, words)
             rows += [(way.name, points or len(tests.X), net, draw, *errors)
                      for net, draw, errors in found]
     return rows + (beside(run, name, tests, nets, draws) if run.profile == "standard" else [])
+
+
+def kept(run, tests, net, way, draw):
+    """`Errors` of one draw of samples, kept if the experiment is cut off."""
+    return Errors(*run.kept(f"{net}.{way.name}.{way.points}.{draw}",
+                            lambda: tests.errors(net, way, 1000 * draw)))
 
 
 def beside(run, name, tests, nets, draws):
@@ -79,7 +88,7 @@ def in_a_row(run):
     for scheme in run.progress(SCHEMES, "schemes"):
         for points in (POINTS, None):
             way = Way(*scheme, points)
-            errors = tests.errors("poke", way)
+            errors = kept(run, tests, "poke", way, 0)
             share(run, f"ldm.table6.{way.name}.{points or 'all'}", errors, tests.scale)
             rows.append((way.name, points or len(one.X), "poke", 0, *errors))
     share(run, "ldm.table6.pod", tests.linear(R["poke"], Way()), tests.scale, comparator="info")

@@ -32,8 +32,9 @@ class Training:
     """How a decoder is trained.
 
     r latent coordinates; `latent` "encoder" (LDM-sec4.1-encoder) or "free" (LDMW-eq7); an epoch
-    shows every snapshot once, `batch` at a time, each time at `points` random points (0: all). The
-    learning rate falls from FASTEST to SLOWEST by half a cosine.
+    shows every snapshot once, `batch` at a time, each time at `points` random points (0: all); of
+    the time levels from `dense` on, a random one in `thin`. The learning rate falls from FASTEST to
+    SLOWEST by half a cosine.
     """
 
     r: int
@@ -43,14 +44,17 @@ class Training:
     epochs: int = 850
     batch: int = 8
     points: int = 0
+    dense: int = 0
+    thin: int = 1
     seed: int = 0
 
     def __post_init__(self):
-        for name in ("r", "epochs", "batch"):
+        for name in ("r", "epochs", "batch", "thin"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} = {getattr(self, name)}: expected at least 1")
-        if self.points < 0:
-            raise ValueError(f"points = {self.points}: expected 0, for all, or a number of them")
+        for name in ("points", "dense"):
+            if getattr(self, name) < 0:
+                raise ValueError(f"{name} = {getattr(self, name)}: expected 0 or more")
         if self.latent not in ("encoder", "free"):
             raise ValueError(f"latent = {self.latent!r}: expected 'encoder' or 'free'")
 
@@ -72,6 +76,7 @@ class Session:
         self.data = data_of(snapshots, self.units)
         self.of = sha256(snapshots)
         count, n, d = self.data.u.shape
+        self.level = torch.arange(count) % snapshots.x.shape[1]
         self.f = Perceptron(d, training.r, training.hidden)
         self.encoder = (Encoder(d, n, training.r) if training.latent == "encoder"
                         else Free(count, training.r))
@@ -88,8 +93,11 @@ class Session:
         return json.dumps({**asdict(self.training), "data": self.of})
 
     def epoch(self):
-        """Show every snapshot once."""
+        """Show every snapshot once, or those whose turn it is."""
         order = torch.randperm(len(self.data.next), generator=self.random)
+        if self.training.thin > 1:
+            turn = torch.rand(len(order), generator=self.random) * self.training.thin < 1.0
+            order = order[(turn | (self.level < self.training.dense))[order]]
         batches = order.split(self.training.batch)
         done = [self.show(at, (len(self.history) + k / len(batches)) / self.training.epochs)
                 for k, at in enumerate(batches)]

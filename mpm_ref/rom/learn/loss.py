@@ -22,7 +22,15 @@ class Weights(NamedTuple):
 PRINTED = Weights(100.0, 0.01)      # LDM-defaults-train, read as SI units
 CODE = Weights(1.0 / 30.0, 0.08)    # the same numbers in the units of the public training code:
                                     # 1000 MSE(u) + 100 MSE(F) + 8 * 10 MSE(v), means of components
-READINGS = {"printed": PRINTED, "code": CODE}
+
+
+def scaled(weights, length, time):
+    """The same shares of the terms for a body and steps that are so many times larger."""
+    return Weights(weights.F * length**2, weights.v * time**2)
+
+
+TOWER = scaled(CODE, 42.0 / 0.4, 144.0 / 24.0)      # from the cylinder's height and time step
+READINGS = {"printed": PRINTED, "code": CODE, "tower": TOWER}
 
 
 class Scales(NamedTuple):

@@ -1,0 +1,34 @@
+"""The data of a study: its runs, read from the folder where `generate` put them."""
+
+import numpy as np
+
+from ..rom.snapshots import Snapshots
+from ..store.results import Results
+from .generate import file_of, finished
+
+
+class Missing(ValueError):
+    """Runs of a study that are not there, or not finished."""
+
+
+def load(study, folder, numbers):
+    """`Snapshots` of the runs of these numbers. Raises `Missing`, and `BadResults` for files that
+    are damaged, no results, or of another scene.
+    """
+    lacking = [k for k in numbers if not finished(file_of(folder, k), study.scene(study.mu[k]))]
+    if lacking:
+        raise Missing(f"{folder} lacks {len(lacking)} of {len(numbers)} runs, the first is "
+                      f"{file_of(folder, lacking[0]).name}: mpm-ref rom generate "
+                      f"{study.path} --out {folder}")
+    body = study.base.body[0].name
+    found = [_read(file_of(folder, k), body) for k in numbers]
+    with Results(file_of(folder, numbers[0])) as results:
+        m, V0 = (results.field(body, name) for name in ("m", "V0"))
+    x, F, v = (np.stack(field) for field in zip(*found, strict=True))
+    return Snapshots(x[0, 0].copy(), m, V0, study.mu[list(numbers)], x, F, v, study.base.dt)
+
+
+def _read(path, body):
+    """x, F and v of all frames of a file."""
+    with Results(path) as results:
+        return tuple(results.field(body, name) for name in ("x", "F", "v"))

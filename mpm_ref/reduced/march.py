@@ -1,0 +1,121 @@
+"""Reduced runs: the four schemes of LDM, and ways that are cheaper or steadier, step by step."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..rom.eulerian import Eulerian
+from ..rom.lagrangian import Resampled, lagrangian
+from ..rom.latent import initial
+from ..rom.samples import PER_GROUP, draw, pivoted
+from ..rom.step import Reduced
+from ..sampling import Regular, sample
+from ..shapes.inside import solid
+from .case import distance
+
+QUADRATURES = ("lagrangian", "eulerian")
+PROJECTIONS = ("nonlinear", "linear")
+SCHEMES = tuple((q, p) for q in QUADRATURES for p in PROJECTIONS)
+ENOUGH = 4000       # points that tell where a body is at the start
+COARSE = 8          # blocks over a body's longest side, from which Eulerian points are traced back
+
+
+class Way(NamedTuple):
+    """How a reduced run is made; `points` samples, or all of them where it is None.
+
+    Samples are "redrawn" for each step (LDM-sec3.3-hyper), "kept" from the start (LDMW-sets), or
+    kept and "pivoted": those that tell the latent coordinates best at the start. The quadrature is
+    that of `SCHEMES`, or "resampled".
+    """
+
+    quadrature: str = "lagrangian"
+    projection: str = "linear"
+    points: int | None = None
+    velocity: str = "previous"
+    per_cell: int = 2           # quadrature points of a cell per axis, if they are not material
+    samples: str = "redrawn"
+
+    @property
+    def name(self):
+        """As the targets call the scheme."""
+        return f"{self.quadrature}_{self.projection}"
+
+
+def model(case, map, way):
+    """`Reduced` model of a `Case` on a map. Raises ValueError for a quadrature there is not."""
+    problem = case.problem
+    make = {"lagrangian": of_material, "eulerian": of_cells, "resampled": of_another_sampling}
+    if way.quadrature not in make:
+        raise ValueError(f"quadrature = {way.quadrature!r}: expected one of {', '.join(make)}")
+    return Reduced(map, make[way.quadrature](case, way), problem.bodies[0].law, problem.gravity,
+                   problem.conditions, way.projection, way.velocity)
+
+
+def of_material(case, way):
+    """Quadrature with the material points of a `Case`."""
+    return lagrangian(case.X, case.m, case.V0, case.problem.dx, case.problem.scheme.degree)
+
+
+def of_cells(case, way):
+    """Quadrature with points of the grid's cells."""
+    size = np.ptp(case.X, axis=0).max() / COARSE
+    seeds = np.unique(np.floor(case.X / size), axis=0, return_index=True)[1]
+    return Eulerian(case.X, case.rho, lambda X: distance(X, case.shape), case.X[seeds],
+                    case.problem.dx, case.problem.scheme.degree, way.per_cell)
+
+
+def of_another_sampling(case, way):
+    """Quadrature with another sampling of the body at rest."""
+    dx, degree = case.problem.dx, case.problem.scheme.degree
+    X, V0 = sample(Regular(per_cell=way.per_cell), solid(case.shape), dx, 0)
+    return Resampled(case.X, lagrangian(X, case.rho * V0, V0, dx, degree))
+
+
+def march(case, map, way, rest, seed=0, pick=None):
+    """Yield (`Latent`, `Report` or None) of a reduced run, the start first. rest: latent
+    coordinates near the body at rest; pick: the samples as `picked` gives them, or others.
+    """
+    stepper, clock = model(case, map, way), case.problem.clock
+    latent = start(case, map, rest)
+    pick = pick or picked(case, map, way, latent.xhat, seed)
+    yield latent, None
+    for k in range(clock.steps):
+        t = k * clock.dt
+        latent, report = stepper.step(latent, pick(t), t, clock.dt)
+        yield latent, report
+
+
+def start(case, map, rest):
+    """`Latent` of the body at rest, searched from latent coordinates near it."""
+    return initial(map, case.X[::-(-len(case.X) // ENOUGH)], xhat=rest)
+
+
+def picked(case, map, way, xhat, seed):
+    """Function of the time [s] -> indices of the samples of the step that begins then. Raises
+    ValueError for ways to choose them that there are not.
+    """
+    rng, n = np.random.default_rng(seed), len(case.X)
+
+    def drawn(t):
+        return draw(n, way.points or n, map.r, map.dim, groups(case, way, t))(rng)
+
+    if way.samples == "redrawn":
+        return drawn
+    if way.samples == "kept":
+        first = drawn(0.0)
+    elif way.samples == "pivoted":
+        forced = np.concatenate([rng.choice(group, min(PER_GROUP, len(group)), replace=False)
+                                 for group in groups(case, way, 0.0)] or [np.empty(0, dtype=int)])
+        some = np.setdiff1d(rng.choice(n, min(n, ENOUGH), replace=False), forced)
+        G = map.derivatives(case.X[some], xhat)[2]
+        best = some[pivoted(G, (way.points or n) - len(forced))]
+        first = np.union1d(best, forced)
+    else:
+        raise ValueError(f"samples = {way.samples!r}: expected redrawn, kept or pivoted")
+    return lambda t: first
+
+
+def groups(case, way, t):
+    """What samples must not miss; nothing where they are all points, or too few for it."""
+    held = case.held(t)
+    return held if way.points and way.points >= PER_GROUP * len(held) else ()

@@ -1,0 +1,211 @@
+"""A study: a scene, the parameters of many runs of it, and the reduced model to be made of them.
+
+`load` reads it from a TOML file; docs/reduced.md explains the keys.
+"""
+
+import hashlib
+import json
+import tomllib
+from difflib import get_close_matches
+from itertools import product
+from math import isfinite
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+
+from .. import scene
+from ..scene import SceneError
+from ..scene.check import check_finite
+from ..scene.error import at, joined, opened_by
+from ..scene.words import rephrase
+from .tables import LATIN, MODES, Map, Parameter, Run, Tables
+from .vary import flat, varied
+
+SAME = ("dim", "dx", "dt", "steps", "seed", "scheme", "integrator")     # in all runs of a study
+
+
+class Study(NamedTuple):
+    """Runs of one scene, numbered, some of them held out."""
+
+    path: Path
+    base: object            # the `Scene` with what is set in all runs
+    tables: Tables
+    mu: np.ndarray          # (runs, parameters)
+    test: tuple             # numbers of the runs that are held out
+
+    @property
+    def names(self):
+        """Names of the parameters."""
+        return tuple(one.name for one in self.tables.parameter)
+
+    @property
+    def train(self):
+        """Numbers of the runs that the map is made of."""
+        return tuple(k for k in range(len(self.mu)) if k not in self.test)
+
+    def scene(self, mu):
+        """The scene of a run with parameters mu (parameters,)."""
+        return varied(self.base, {one.key: one.scale * float(value) for one, value in
+                                  zip(self.tables.parameter, mu, strict=True)})
+
+    def given(self, texts):
+        """Parameters [..] of a run, from texts NAME=VALUE. Raises SceneError."""
+        found = {}
+        for text in texts:
+            name, _, value = text.partition("=")
+            if name not in self.names:
+                raise SceneError(f"{text}: expected NAME=VALUE with one of the study's parameters "
+                                 f"{', '.join(self.names)}")
+            found[name] = number(text, value)
+        for name in self.names:
+            if name not in found:
+                raise SceneError(f"the parameter {name} is not given: add --set {name}=VALUE")
+        return [found[name] for name in self.names]
+
+    def outside(self, mu):
+        """Sentences about parameters beyond the runs that the map is made of."""
+        trained = self.mu[list(self.train)]
+        for name, value, low, high in zip(self.names, mu, trained.min(axis=0), trained.max(axis=0),
+                                          strict=True):
+            if not low <= value <= high:
+                yield (f"{name} = {value:g} lies outside the range {low:g} .. {high:g} of the runs "
+                       "that the map is made of")
+
+    @property
+    def digest(self):
+        """sha256 of all runs' scenes and of which are held out: what a map is a map of."""
+        texts = [scene.canonical(self.scene(mu)) for mu in self.mu]
+        return hashlib.sha256(json.dumps([texts, self.test]).encode()).hexdigest()
+
+
+def load(path, shipped=None):
+    """The `Study` of a TOML file; shipped {name: path} are scenes that it may name. Raises
+    SceneError, which names the file and the key.
+    """
+    path = Path(path)
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as fault:
+        raise SceneError(f"{path}: cannot be read ({fault.strerror})") from None
+    except ValueError as fault:
+        raise SceneError(f"{path}: not valid TOML: {fault}") from None
+    with opened_by(str(path)):
+        tables = _checked(data)
+        mu = parameters(tables)
+        study = Study(path, _base(tables, path.parent, shipped or {}), tables, mu,
+                      held_out(len(mu), tables.test, tables.seed))
+        _require_one_body(study)
+        return study
+
+
+def number(text, value):
+    """A finite number; text is where it stands. Raises SceneError."""
+    try:
+        if isfinite(found := float(value)):
+            return found
+    except ValueError:
+        pass
+    raise SceneError(f"{text}: expected a finite number, not {value!r}")
+
+
+def _checked(data):
+    """`Tables` of plain tables."""
+    check_finite(data)
+    _require_keys(data, Tables)
+    for name, record in (("map", Map), ("run", Run)):
+        _require_keys(data.get(name), record, name)
+    parts = data.get("parameter")
+    for k, part in enumerate(parts if isinstance(parts, list) else ()):
+        _require_keys(part, Parameter, f"parameter[{k}]")
+    try:
+        tables = msgspec.convert(data, Tables)
+    except msgspec.ValidationError as fault:
+        raise SceneError(rephrase(str(fault), data)) from None
+    extra = sorted(set(data["map"]) - {"kind", "r"})
+    if tables.map.kind == MODES and extra:
+        raise SceneError(f'map.{extra[0]}: given, but the kind is "{MODES}", which is computed; '
+                         'remove it, or take kind = "network"')
+    return tables
+
+
+def _require_keys(table, record, path=""):
+    """Raise SceneError for a key of a table that its record does not know."""
+    known = record.__struct_encode_fields__
+    for key in table if isinstance(table, dict) else ():
+        if key not in known:
+            near = get_close_matches(key, known, 1)
+            hint = f"did you mean `{near[0]}`?" if near else f"the keys here are {', '.join(known)}"
+            raise SceneError(f"{joined(path, key)}: unknown key; {hint}")
+
+
+def parameters(tables):
+    """Parameters (runs, parameters) of all runs: every combination, the last one fastest; or a
+    Latin hypercube.
+    """
+    if tables.sampling != LATIN:
+        axes = []
+        for k, one in enumerate(tables.parameter):
+            with at(f"parameter[{k}]"):
+                axes.append(one.grid())
+        return np.array(list(product(*axes)))
+    for k, one in enumerate(tables.parameter):
+        if one.values is not None or one.count is not None:
+            raise SceneError(f'parameter[{k}]: expected `from` and `to` alone with sampling = '
+                             f'"{LATIN}"')
+    return latin(tables.count, [(one.start, one.stop) for one in tables.parameter], tables.seed)
+
+
+def latin(count, ends, seed):
+    """A Latin hypercube (count, parameters) in ranges (low, high): of count equal parts of each
+    range, each has one value, anywhere in it.
+    """
+    rng, (low, high) = np.random.default_rng(seed), np.transpose(ends)
+    parts = np.stack([rng.permutation(count) for _ in ends], axis=1)
+    return low + (high - low) * (parts + rng.random(parts.shape)) / count
+
+
+def held_out(runs, count, seed):
+    """Numbers of so many runs, drawn at random. Raises SceneError where none would be left."""
+    if count >= runs:
+        raise SceneError(f"test = {count}: expected fewer than the {runs} runs of the study")
+    return tuple(sorted(np.random.default_rng(seed).permutation(runs)[:count].tolist()))
+
+
+def _base(tables, folder, shipped):
+    """The scene with what is set in all runs, every step of which is shown."""
+    path = folder / tables.scene
+    if not path.is_file():
+        path = shipped.get(tables.scene)
+    if path is None:
+        raise SceneError(f"scene = {tables.scene!r}: there is no such file, nor a shipped scene of "
+                         f"that name; shipped scenes: {', '.join(shipped) or 'none'}")
+    base = scene.load(path)
+    with opened_by("set"):
+        base = varied(base, flat(tables.set) | {"every": 1, "interval": None})
+    if base.dt is None or base.steps is None:
+        raise SceneError(f"scene = {tables.scene!r}: expected one with `dt` and `steps`, so that "
+                         "all runs have the same time levels")
+    return base
+
+
+def _require_one_body(study):
+    """Raise SceneError where parameters lead nowhere, or change the particles, grid or steps."""
+    first = None
+    for mu in study.mu:
+        with opened_by("parameter"):
+            found = _kept(study.scene(mu))
+        first = first or found
+        for name, value in found.items():
+            if value != first[name]:
+                raise SceneError(f"parameter: runs differ in `{name}` of the scene, but all need "
+                                 "the same particles, grid and steps; vary gravity, a material or "
+                                 "a motion")
+
+
+def _kept(one):
+    """What must be the same in all runs, by name."""
+    bodies = {f"body[{k}].{name}": getattr(body, name) for k, body in enumerate(one.body)
+              for name in body.__struct_fields__ if name != "material"}
+    return {name: getattr(one, name) for name in SAME} | bodies

@@ -1,0 +1,125 @@
+"""The tables of a study file: one record each; docs/reduced.md explains their keys."""
+
+from typing import Annotated
+
+import numpy as np
+from msgspec import Meta, Struct, field
+
+from ..rom.architecture import HIDDEN
+from ..rom.latent import VELOCITIES
+from ..shapes.quantities import Count, Natural, PerCell, Seed
+from .march import PROJECTIONS, QUADRATURES, Way
+
+MODES, NETWORK = "modes", "network"
+GRID, LATIN = "grid", "latin"
+ENCODER, FREE = "encoder", "free"
+RESAMPLED, SAMPLES = "resampled", ("redrawn", "kept", "pivoted")       # see `march.Way`
+READINGS = ("code", "printed")      # of the loss's weights, see `rom.learn.loss`
+Word = Annotated[str, Meta(pattern=r"^\w[\w.-]*\Z", max_length=100)]
+
+
+def one_of(name, value, known):
+    """Raise ValueError unless a value is known."""
+    if value not in known:
+        raise ValueError(f"{name} = {value!r}: expected one of {', '.join(map(repr, known))}")
+
+
+class Table(Struct, frozen=True, kw_only=True):
+    """A table of a study file."""
+
+
+class Parameter(Table, rename={"start": "from", "stop": "to"}):
+    """What differs between runs: a name, its place in the scene, and its values."""
+
+    name: Word
+    key: str                                    # path into the scene (see `vary`)
+    values: Annotated[tuple[float, ...], Meta(min_length=1)] | None = None      # all of them, or
+    start: float | None = None                  # from here
+    stop: float | None = None                   # ... to here
+    count: Count | None = None                  # ... so many, evenly spaced
+    scale: float = 1.0                          # factor from the value to what the scene gets
+
+    def __post_init__(self):
+        ends = self.start is not None, self.stop is not None
+        if (self.values is not None) == any((*ends, self.count is not None)):
+            raise ValueError("a parameter needs `values`, or `from`, `to` and `count`")
+        if self.values is None and not (all(ends) and self.start < self.stop):
+            raise ValueError("a parameter without `values` needs `from` and a larger `to`")
+        if self.values is not None and len(set(self.values)) < len(self.values):
+            raise ValueError(f"values = {list(self.values)}: expected numbers that differ")
+
+    def grid(self):
+        """Its values on a grid. Raises ValueError where it does not say how many."""
+        if self.values is not None:
+            return np.array(self.values)
+        if self.count is None:
+            raise ValueError("`count` is missing: how many values on the grid?")
+        return np.linspace(self.start, self.stop, self.count)
+
+
+class Map(Table):
+    """The map: POD modes, or a network and how it is trained (see `rom.learn.fit.Training`)."""
+
+    kind: str
+    r: Count                                    # latent coordinates
+    hidden: tuple[Count, ...] = HIDDEN
+    latent: str = ENCODER
+    weights: str = READINGS[0]
+    epochs: Count = 850
+    batch: Count = 8                            # snapshots at a time
+    points: Natural = 0                         # of each, anew each time; 0: all
+    dense: Natural = 0                          # time levels that every epoch shows; of later
+    thin: Count = 1                             # ... ones, one in so many
+    seed: Seed = 0
+
+    def __post_init__(self):
+        one_of("kind", self.kind, (MODES, NETWORK))
+        one_of("latent", self.latent, (ENCODER, FREE))
+        one_of("weights", self.weights, READINGS)
+
+
+class Run(Table):
+    """How reduced runs are made (see `march.Way`)."""
+
+    quadrature: str = Way().quadrature
+    projection: str = Way().projection
+    points: Count | None = None                 # samples; none: all points
+    samples: str = Way().samples
+    per_cell: PerCell = Way().per_cell          # quadrature points per axis, not material ones
+    velocity: str = Way().velocity
+    seed: Seed = 0                              # of the samples
+
+    def __post_init__(self):
+        one_of("quadrature", self.quadrature, (*QUADRATURES, RESAMPLED))
+        one_of("samples", self.samples, SAMPLES)
+        one_of("projection", self.projection, PROJECTIONS)
+        one_of("velocity", self.velocity, VELOCITIES)
+
+    @property
+    def way(self):
+        """As `march` takes it."""
+        return Way(**{name: getattr(self, name) for name in Way._fields})
+
+
+class Tables(Table):
+    """A study file."""
+
+    scene: str                                  # a file, from the folder of this one; or shipped
+    parameter: Annotated[tuple[Parameter, ...], Meta(min_length=1)]
+    map: Map
+    title: str = ""
+    set: dict = field(default_factory=dict)     # {path: value} of the scene, in all runs
+    sampling: str = GRID                        # of the parameters
+    count: Count | None = None                  # runs of a Latin hypercube
+    test: Natural = 0                           # runs held out, drawn at random
+    seed: Seed = 0                              # of the draws
+    run: Run = Run()
+
+    def __post_init__(self):
+        one_of("sampling", self.sampling, (GRID, LATIN))
+        if (self.count is not None) != (self.sampling == LATIN):
+            raise ValueError(f'count: expected with sampling = "{LATIN}", and only there')
+        for name in ("name", "key"):
+            texts = [getattr(one, name) for one in self.parameter]
+            if len(set(texts)) < len(texts):
+                raise ValueError(f"parameter: two have the same {name}")

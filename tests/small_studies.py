@@ -1,0 +1,78 @@
+"""A small study for tests: a bar in 2D that is held at one end and bends under gravity."""
+
+from mpm_ref.reduced import dataset, maps
+from mpm_ref.reduced.generate import generate
+from mpm_ref.reduced.study import load
+from mpm_ref.store.results import Results
+
+STEPS = 8
+SCENE = f"""
+title = "Bar"
+dim = 2
+dx = 0.1
+dt = 0.01
+steps = {STEPS}
+every = 4
+gravity = [0.0, -1.0]
+scheme = {{ transfer = "pic" }}
+
+[[body]]
+name = "bar"
+density = 1000.0
+shape = {{ type = "box", lower = [0.0, 0.0], upper = [0.8, 0.2] }}
+sampling = {{ type = "regular", per_cell = 2 }}
+material = {{ law = "fixed_corotated", E = 1e4, nu = 0.3 }}
+
+[[fixed]]
+name = "wall"
+region = {{ type = "half_space", point = [0.0, 0.0], normal = [1.0, 0.0] }}
+motion = {{ translation = {{ type = "steady", rate = [0.0, 0.0] }} }}
+"""
+STUDY = """
+title = "Bars"
+scene = "bar.toml"
+test = 1
+
+[[parameter]]
+name = "g"
+key = "gravity[1]"
+scale = -1.0
+from = 1.0
+to = 4.0
+count = 4
+
+[map]
+kind = "modes"
+r = 3
+"""
+
+
+def write(folder, *edits, scene=SCENE):
+    """Path of the study in a folder, with (before, after) of some of its text."""
+    text = STUDY
+    for before, after in edits:
+        assert before in text
+        text = text.replace(before, after)
+    (folder / "bar.toml").write_text(scene)
+    (folder / "bars.toml").write_text(text)
+    return folder / "bars.toml"
+
+
+def study(folder, *edits, **scene):
+    """The `Study`."""
+    return load(write(folder, *edits, **scene))
+
+
+def modelled(folder):
+    """The folder, with a study, its runs in data/ and modes of them in map.npz."""
+    bars, data = study(folder), folder / "data"
+    data.mkdir()
+    assert all(done.well for done in generate(bars, data))
+    maps.save(folder / "map.npz", maps.linear(bars, dataset.load(bars, data, bars.train), {}))
+    return folder
+
+
+def ended(path):
+    """Why a run ended, and its frames."""
+    with Results(path) as results:
+        return results.manifest["parts"][-1]["why"], len(results)

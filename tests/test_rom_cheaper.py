@@ -1,0 +1,118 @@
+"""Quadrature points of another sampling, and samples that are kept or chosen."""
+
+import numpy as np
+import pytest
+from rom_toys import cloud
+
+from mpm_ref.reduced.case import case, distance
+from mpm_ref.reduced.march import Way, march, model, picked
+from mpm_ref.rom.affine import Affine
+from mpm_ref.rom.lagrangian import Resampled, lagrangian
+from mpm_ref.rom.latent import at_start
+from mpm_ref.rom.samples import PER_GROUP, pivoted
+from mpm_ref.scene import Box, Cylinder, Difference, Union
+from validation.ldm.nets import trained
+from validation.ldm.studies import GRAVITY, TORSION
+from validation.verification.scenes import with_
+
+DX = 0.11
+
+
+@pytest.fixture(scope="module")
+def torsion():
+    """The block, pulled and twisted, four steps."""
+    return case(with_(TORSION.scene(0.3, 1.0), steps=4))
+
+
+def test_another_sampling_that_is_the_same_gives_the_same_cloud(d, rng):
+    X, map, m = cloud(d, 400), Affine(d), rng.uniform(1.0, 2.0, 400)
+    own = lagrangian(X, m, m, DX, 2)
+    samples = rng.choice(400, 3, replace=False)
+    latent = at_start(map.rest)
+    for a, b in zip(own.cloud(map, latent, samples)[:3],
+                    Resampled(X, own).cloud(map, latent, samples)[:3], strict=True):
+        assert np.array_equal(a, b)
+
+
+def test_its_points_are_as_many_however_many_material_points_there_are(d, rng):
+    X, map = cloud(d, 400), Affine(d)
+    coarse = lagrangian(cloud(d, 200, seed=1), np.ones(200), np.ones(200), DX, 2)
+    latent = at_start(map.rest)
+    few = Resampled(X, coarse).cloud(map, latent, np.arange(3))
+    many = Resampled(np.vstack([X, X + 1e-3]), coarse).cloud(map, latent, np.arange(3))
+    assert few[3] == many[3]
+    assert 0 < few[3]["points"] < 200
+
+
+def test_another_sampling_has_the_body_s_mass(torsion):
+    quadrature = model(torsion, Affine(3), Way("resampled", per_cell=3)).quadrature
+    assert quadrature.other.m.sum() == pytest.approx(torsion.m.sum(), rel=1e-12)
+    assert len(quadrature.other.X) != len(torsion.X)
+
+
+def test_a_run_with_another_sampling_is_near_the_one_with_material_points():
+    """They differ by their quadrature alone; one point to a cell is too few."""
+    trained_map = trained("gravity-r4")
+    map, one = trained_map.decoder, case(with_(GRAVITY.scene(5.0), steps=10))
+    def end(way):
+        *_, (latent, _) = march(one, map, way, trained_map.rest)
+        return map.place(one.X, latent.xhat) - one.X
+
+    material = end(Way())
+    off = [np.linalg.norm(end(Way("resampled", per_cell=k)) - material) for k in (1, 2)]
+    size = np.linalg.norm(material)
+    assert 0.0 < off[1] < 0.1 * size
+    assert off[0] > 3.0 * off[1]
+
+
+def test_pivots_are_the_rows_that_tell_the_coordinates(rng):
+    G = 1e-3 * rng.normal(size=(50, 3, 4))
+    for k, p in enumerate((7, 12, 30, 44)):
+        G[p, k % 3, k] = 1.0
+    assert set(pivoted(G, 4)) == {7, 12, 30, 44}
+
+
+@pytest.mark.parametrize("count", [1, 3, 10, 50, 60])
+def test_pivots_are_of_the_count_and_different(count, rng):
+    found = pivoted(rng.normal(size=(50, 3, 4)), count)
+    assert len(set(found.tolist())) == len(found) == min(count, 50)
+
+
+def test_chosen_samples_are_better_conditioned_than_drawn_ones(rng):
+    G = rng.normal(size=(300, 3, 6)) * rng.exponential(size=(300, 1, 1))
+    def condition(chosen):
+        return np.linalg.cond(G[chosen].reshape(-1, 6))
+
+    drawn = [condition(rng.choice(300, 4, replace=False)) for _ in range(20)]
+    assert condition(pivoted(G, 4)) < np.median(drawn)
+
+
+@pytest.mark.parametrize("how", ["kept", "pivoted"])
+def test_samples_that_are_kept_stay_and_hold_the_boundaries(torsion, how):
+    map = Affine(3)
+    pick = picked(torsion, map, Way(points=20, samples=how), map.rest, 3)
+    assert np.array_equal(pick(0.0), pick(0.01))
+    assert len(set(pick(0.0).tolist())) == 20
+    for near in torsion.near:
+        assert np.isin(pick(0.0), near).sum() >= PER_GROUP
+
+
+def test_samples_that_are_redrawn_change(torsion):
+    map = Affine(3)
+    pick = picked(torsion, map, Way(points=20), map.rest, 3)
+    assert not np.array_equal(pick(0.0), pick(0.0))
+
+
+@pytest.mark.parametrize(("way", "said"), [(Way("lagrange"), "quadrature = 'lagrange'"),
+                                           (Way(points=20, samples="best"), "samples = 'best'")])
+def test_ways_that_there_are_not_are_refused(torsion, way, said):
+    with pytest.raises(ValueError, match=said):
+        next(march(torsion, Affine(3), way, Affine(3).rest))
+
+
+def test_distances_from_shapes_made_of_others():
+    ball = Cylinder(start=(0.0, 0.0, 0.0), end=(0.0, 0.0, 2.0), radius=1.0)
+    box = Box(lower=(0.0, -1.0, 0.0), upper=(3.0, 1.0, 2.0))
+    X = np.array([[0.5, 0.0, 1.0], [2.5, 0.0, 1.0], [-0.5, 0.0, 1.0], [-2.0, 0.0, 1.0]])
+    assert distance(X, Union(shapes=(ball, box))) == pytest.approx([-0.5, -0.5, -0.5, 1.0])
+    assert distance(X, Difference(shape=ball, minus=(box,))) == pytest.approx([0.5, 1.5, -0.5, 1.0])

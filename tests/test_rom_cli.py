@@ -1,0 +1,141 @@
+"""`mpm-ref rom generate` and `train`: what they write, say and refuse."""
+
+import shutil
+
+import h5py
+import pytest
+from command_line import assert_told, mpm_ref
+from small_studies import STEPS, ended, write
+
+from mpm_ref.cli.shipped import shipped_studies
+from mpm_ref.reduced import maps
+from mpm_ref.reduced.study import load
+
+ONE = ("--workers", 1)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Folder with a study, its runs and its map, made by the two commands."""
+    folder = tmp_path_factory.mktemp("made")
+    study = write(folder)
+    for arguments, said in ((("generate", study, "--out", folder / "data", *ONE), "0 of them"),
+                            (("train", study, "--data", folder / "data",
+                              "--out", folder / "map.npz"), "modes, r = 3, of 3 runs")):
+        done = mpm_ref("rom", *arguments)
+        assert done.exit_code == 0, done.output
+        assert said in done.stdout
+    return folder
+
+
+# generate
+
+def test_what_is_there_is_not_made_again(made):
+    before = {file: file.stat().st_mtime_ns for file in (made / "data").iterdir()}
+    done = mpm_ref("rom", "generate", made / "bars.toml", "--out", made / "data", *ONE)
+    assert done.exit_code == 0
+    assert "4 runs of bars, 4 of them already there; 1 held out" in done.stdout
+    assert {file: file.stat().st_mtime_ns for file in (made / "data").iterdir()} == before
+
+
+def test_runs_are_results_files(made):
+    done = mpm_ref("info", made / "data" / "case-002.h5")
+    assert f"{STEPS + 1} frames" in done.stdout
+    assert "(x v F)" in done.stdout
+
+
+def test_an_unstable_run_has_status_3_and_says_which(tmp_path):
+    study = write(tmp_path, ("to = 4.0\ncount = 4", "to = 1e6\ncount = 3"))
+    done = mpm_ref("rom", "generate", study, "--out", tmp_path / "data", *ONE)
+    assert_told(done, 3, "run 1 (g = 500000", "unstable")
+    assert ended(tmp_path / "data" / "case-000.h5") == ("finished", STEPS + 1)
+
+
+@pytest.mark.parametrize(("before", "after", "words"), [
+    ('transfer = "pic"', 'transfer = "apic"', "has the transfer apic"),
+    ('law = "fixed_corotated", E = 1e4, nu = 0.3',
+     'law = "hencky", E = 1e4, nu = 0.3, flow = { type = "von_mises", tau_y = 1.0 }',
+     "has plastic flow"),
+])
+def test_scenes_that_reduced_runs_do_not_know_are_refused_before_any_run(
+        tmp_path, before, after, words):
+    text = (write(tmp_path).parent / "bar.toml").read_text()
+    assert before in text
+    study = write(tmp_path, scene=text.replace(before, after))
+    assert_told(mpm_ref("rom", "generate", study, "--out", tmp_path / "data"), 2, words)
+    assert not (tmp_path / "data").exists()
+
+
+def test_data_go_into_a_folder(made, tmp_path):
+    (tmp_path / "file").write_text("x")
+    done = mpm_ref("rom", "generate", made / "bars.toml", "--out", tmp_path / "file")
+    assert_told(done, 4, "this is no folder")
+
+
+def test_a_study_that_does_not_exist_is_told_with_those_that_do():
+    assert_told(mpm_ref("rom", "generate", "none"), 2, "no such file", *shipped_studies())
+
+
+def test_ctrl_c_leaves_finished_runs(made, tmp_path, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+    monkeypatch.setattr("mpm_ref.cli.rom.generate", interrupted)
+    done = mpm_ref("rom", "generate", made / "bars.toml", "--out", tmp_path, *ONE)
+    assert_told(done, 130, "interrupted")
+
+
+# train
+
+def test_data_that_are_not_there_are_told_with_the_command_that_makes_them(made, tmp_path):
+    done = mpm_ref("rom", "train", made / "bars.toml", "--data", tmp_path,
+                   "--out", tmp_path / "map.npz")
+    assert_told(done, 2, "lacks 3 of 3 runs", "mpm-ref rom generate")
+    assert not (tmp_path / "map.npz").exists()
+
+
+def test_damaged_data_are_told(made, tmp_path):
+    shutil.copytree(made / "data", tmp_path / "data")
+    file = next(file for file in sorted((tmp_path / "data").glob("case-00?.h5"))
+                if int(file.stem[-1]) in load(made / "bars.toml").train)
+    content = bytearray(file.read_bytes())
+    with h5py.File(file) as h5:
+        at = h5["bodies/bar/F"].id.get_chunk_info(2).byte_offset
+    content[at] ^= 1
+    file.write_bytes(content)
+    done = mpm_ref("rom", "train", made / "bars.toml", "--data", tmp_path / "data",
+                   "--out", tmp_path / "map.npz")
+    assert_told(done, 2, file.name, "F of body 'bar' is damaged")
+
+
+@pytest.mark.parametrize(("options", "status", "words"), [
+    (("--out", "{}/map.npz"), 2, "exists: add --overwrite"),
+    (("--out", "{}/map.h5"), 2, "ends in .npz"),
+    (("--out", "{}/bars.toml"), 2, "this is the scene itself"),
+    (("--out", "{}/no/map.npz"), 4, "there is no folder"),
+    (("--out", "{}/other.npz", "--kind", "mode"), 2, "kind = 'mode': expected one of"),
+])
+def test_maps_are_not_written_anywhere(made, options, status, words):
+    before = (made / "map.npz").read_bytes()
+    done = mpm_ref("rom", "train", made / "bars.toml", "--data", made / "data",
+                   *(option.format(made) for option in options))
+    assert_told(done, status, words)
+    assert (made / "map.npz").read_bytes() == before
+
+
+def test_more_modes_than_the_data_have_are_refused(made, tmp_path):
+    study = write(tmp_path, ("r = 3", "r = 300"))
+    done = mpm_ref("rom", "train", study, "--data", made / "data", "--out", tmp_path / "map.npz")
+    assert_told(done, 2, "r = 300: expected 1 .. 27 modes")
+
+
+def test_a_network_is_trained_with_torch(made, tmp_path):
+    pytest.importorskip("torch")
+    study = write(tmp_path, ("r = 3", "r = 2"), ('"modes"', '"network"\nepochs = 2'))
+    out = tmp_path / "map.npz"
+    done = mpm_ref("rom", "train", study, "--data", made / "data", "--out", out)
+    assert done.exit_code == 0, done.output
+    assert "network, r = 2" in done.stdout
+    assert not out.with_suffix(".pt").exists()
+    about = maps.load(out, load(study)).about
+    assert (about["map"]["epochs"], about["threads"], len(about["loss"])) == (2, 1, 2)
+    assert about["command"].startswith(f"mpm-ref rom train {study}")

@@ -1,0 +1,233 @@
+"""`mpm-ref rom run` and `evaluate`: what they write, say and refuse."""
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+from command_line import assert_told, mpm_ref
+from small_studies import STEPS, ended, modelled, write
+
+from mpm_ref.reduced import maps, record
+from mpm_ref.reduced.case import case
+from mpm_ref.reduced.march import Way, march
+from mpm_ref.reduced.record import COUNTS, NUMBERS, VECTORS
+from mpm_ref.reduced.study import load
+from mpm_ref.scene import dumps
+from mpm_ref.store.results import Results
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Folder with a study, its runs and its map."""
+    return modelled(tmp_path_factory.mktemp("made"))
+
+
+@pytest.fixture
+def reduced(made, tmp_path):
+    """A function that makes a reduced run with some options: what is answered, and its file."""
+    def run(*options, study=made / "bars.toml", map=made / "map.npz", out=tmp_path / "run.h5"):
+        return mpm_ref("rom", "run", study, "--map", map, "--out", out, *options), out
+    return run
+
+
+# run
+
+def test_a_run_is_the_reduced_run_of_its_parameters(made, reduced):
+    done, out = reduced("--set", "g=2.5")
+    assert done.exit_code == 0, done.output
+    assert done.stderr == ""
+    bars = load(made / "bars.toml")
+    model, one = maps.load(made / "map.npz", bars), case(bars.scene([2.5]))
+    states = list(march(one, model.decoder, Way(), model.rest))
+    with Results(out) as results:
+        assert len(results) == STEPS + 1
+        assert results.manifest["reduced"]["parameters"] == {"g": 2.5}
+        for k, (latent, report) in enumerate(states):
+            x, F, _ = model.decoder.derivatives(one.X, latent.xhat)
+            np.testing.assert_allclose(results.field("bar", "x", k), x, rtol=1e-12)
+            np.testing.assert_allclose(results.field("bar", "F", k), F, atol=1e-12)
+            np.testing.assert_allclose(results.h5["reduced/xhat"][k], latent.xhat, atol=1e-12)
+            assert results.h5["reduced/rank"][k] == (report.rank if report else 0)
+        assert np.abs(results.field("bar", "v", 0)).max() == 0.0
+        step = results.field("bar", "x", 5) - results.field("bar", "x", 4)
+        np.testing.assert_allclose(results.field("bar", "v", 5), step / one.problem.clock.dt,
+                                   atol=1e-9)
+
+
+def test_what_is_known_of_each_state_is_stored_with_units(reduced):
+    _, out = reduced("--set", "g=2.5")
+    with h5py.File(out) as h5:
+        group = h5["reduced"]
+        assert set(group) == {*VECTORS, *COUNTS, *NUMBERS}
+        assert {len(series) for series in group.values()} == {STEPS + 1}
+        assert group["vhat"].attrs["unit"] == "1/s"
+        assert set(group["rank"][1:]) == {3}
+        assert set(group["points"][1:]) == {64}
+        assert group["beyond"][0] < 1e-6
+        assert 0.0 < group["beyond"][-1] < 1.0
+
+
+def test_other_commands_take_the_results(reduced, tmp_path):
+    _, out = reduced("--set", "g=2.5")
+    for command, file in (("plot", "run.png"), ("export", "run.vtkhdf")):
+        done = mpm_ref(command, out, "--out", tmp_path / file)
+        assert done.exit_code == 0, done.output
+        assert (tmp_path / file).stat().st_size > 1000
+    assert "finished" in mpm_ref("info", out).stdout
+
+
+def test_a_body_is_shown_at_more_points_than_it_was_trained_with(made, reduced, tmp_path):
+    _, coarse = reduced("--set", "g=3.5", out=tmp_path / "coarse.h5")
+    done, fine = reduced("--set", "g=3.5", "--points-out", 1000, out=tmp_path / "fine.h5")
+    assert done.exit_code == 0, done.output
+    with Results(coarse) as a, Results(fine) as b:
+        assert b.count("bar") == 1000
+        assert np.array_equal(a.h5["reduced/xhat"][()], b.h5["reduced/xhat"][()])
+        for name in ("m", "V0"):
+            assert b.field("bar", name).sum() == pytest.approx(a.field("bar", name).sum())
+        model = maps.load(made / "map.npz", load(made / "bars.toml"))
+        X, xhat = b.field("bar", "x", 0), b.h5["reduced/xhat"][-1]
+        x, F, _ = model.decoder.derivatives(X, xhat)
+        np.testing.assert_allclose(b.field("bar", "x", -1), x, atol=1e-6)
+        np.testing.assert_allclose(b.field("bar", "F", -1), F, atol=1e-6)
+        assert b.scalar("bar", "J", -1).min() > 0.9
+
+
+def test_a_run_beyond_the_training_is_warned_of(reduced):
+    done, _ = reduced("--set", "g=9")
+    assert done.exit_code == 0
+    outside, beyond = done.stderr.splitlines()
+    assert outside.startswith("mpm-ref: warning: g = 9 lies outside the range")
+    assert f"of {STEPS} steps, from step" in beyond
+    assert "times as far from the training runs" in beyond
+
+
+@pytest.mark.parametrize(("g", "words"), [
+    (1e3, "broke down in step 1: a particle crosses more than 1 dx"),
+    (1e6, "step 1, t = 0.01 s: no body is left"),
+])
+def test_a_run_that_breaks_down_has_status_3_and_keeps_what_went_before(reduced, g, words):
+    done, out = reduced("--set", f"g={g}")
+    assert done.exit_code == 3
+    assert words in done.stderr
+    why, frames = ended(out)
+    assert frames == 1
+    assert words in why
+
+
+def test_an_interrupted_run_keeps_its_frames(reduced, monkeypatch):
+    def interrupted(writer, state, problem):
+        if state.step == 3:
+            raise KeyboardInterrupt
+        show(writer, state, problem)
+
+    show = record._show
+    monkeypatch.setattr(record, "_show", interrupted)
+    done, out = reduced("--set", "g=2")
+    assert_told(done, 130, "interrupted")
+    assert ended(out) == ("interrupted", 3)
+
+
+@pytest.mark.parametrize(("options", "status", "words"), [
+    ((), 2, "add --set g=VALUE"),
+    (("--set", "h=1"), 2, "one of the study's parameters g"),
+    (("--set", "g=2", "--map", "none.npz"), 2, "none.npz cannot be read"),
+    (("--set", "g=2", "--out", "no/run.h5"), 4, "there is no folder"),
+    (("--set", "g=2", "--out", "run.toml"), 2, "scenes have such names"),
+])
+def test_what_a_run_needs_is_said(reduced, options, status, words):
+    done, out = reduced(*options)
+    assert_told(done, status, words)
+    assert not out.exists()
+
+
+def test_other_files_are_not_replaced(made, reduced, tmp_path):
+    _, out = reduced("--set", "g=2")
+    before = out.read_bytes()
+    assert_told(reduced("--set", "g=3")[0], 2, "add --overwrite")
+    assert out.read_bytes() == before
+    assert reduced("--set", "g=3", "--overwrite")[0].exit_code == 0
+    assert out.read_bytes() != before
+    out.write_text("x")
+    assert_told(reduced("--set", "g=3", "--overwrite")[0], 2, "cannot be read as HDF5")
+    assert out.read_text() == "x"
+
+
+def test_a_full_order_run_does_not_go_on_from_a_reduced_one(made, reduced, tmp_path):
+    _, out = reduced("--set", "g=2")
+    before, same = out.read_bytes(), tmp_path / "same.toml"
+    same.write_text(dumps(load(made / "bars.toml").scene([2.0])))
+    done = mpm_ref("run", same, "--out", out, "--resume")
+    assert_told(done, 2, "holds results of another scene")
+    assert out.read_bytes() == before
+
+
+def test_a_map_is_for_its_own_study(made, reduced, tmp_path):
+    done, _ = reduced("--set", "g=2", study=write(tmp_path, ("to = 4.0", "to = 5.0")))
+    assert_told(done, 2, "is a map of another study")
+
+
+def test_samples_that_do_not_suffice_are_refused(reduced, tmp_path):
+    for points, words in ((1, "expected at least 2 samples"), (500, "500 samples of 64 points")):
+        study = write(tmp_path, ("[map]", f"[run]\npoints = {points}\n[map]"))
+        assert_told(reduced("--set", "g=2", study=study)[0], 2, words)
+
+
+# evaluate
+
+def evaluate(made, *options, study="bars.toml", map="map.npz"):
+    return mpm_ref("rom", "evaluate", made / study, "--map", made / map, "--data", made / "data",
+                   *options)
+
+
+def test_errors_are_those_of_the_run_that_was_held_out(made, reduced, tmp_path):
+    done = evaluate(made, "--json", "--out", tmp_path / "errors.svg")
+    assert done.exit_code == 0, done.output
+    found = json.loads(done.stdout)
+    (number,), g = load(made / "bars.toml").test, found["runs"][0]["parameters"]["g"]
+    _, out = reduced("--set", f"g={g}")
+    with Results(out) as ours, Results(made / "data" / f"case-00{number}.h5") as full:
+        x, reference = ours.field("bar", "x"), full.field("bar", "x")
+    error = np.linalg.norm(x - reference)
+    run = found["runs"][0]["reduced"]
+    assert run["origin"] == pytest.approx(error / np.linalg.norm(reference))
+    assert run["displacement"] == pytest.approx(error / np.linalg.norm(reference - reference[0]))
+    assert found["all"]["reduced"] == pytest.approx(run)
+    assert 0.0 < found["all"]["nearest"]["displacement"] <= run["displacement"] < 0.05
+    assert (tmp_path / "errors.svg").read_text().startswith("<?xml")
+
+
+def test_the_table_has_a_row_for_each_run_and_one_for_all(made, tmp_path):
+    done = evaluate(made, "--out", tmp_path / "errors.png")
+    heading, head, *rows, picture = done.stdout.splitlines()
+    assert "[%]" in heading
+    assert head.split()[:3] == ["run", "g", "origin"]
+    assert [row.split()[0] for row in rows] == [str(load(made / "bars.toml").test[0]), "all"]
+    assert rows[0].split()[2:] == rows[1].split()[1:]
+    assert picture == str(tmp_path / "errors.png")
+
+
+@pytest.mark.parametrize(("options", "words"), [
+    (("--out", "errors.txt"), "ends in .png or .pdf or .svg"),
+    (("--data", "none"), "none lacks 1 of 1 runs"),
+    (("--map", "none.npz"), "none.npz cannot be read"),
+])
+def test_what_cannot_be_evaluated_is_said(made, options, words):
+    assert_told(evaluate(made, *options), 2, words)
+
+
+def test_without_a_run_held_out_there_is_nothing_to_evaluate(made, tmp_path):
+    write(tmp_path, ("test = 1", "test = 0"))
+    done = mpm_ref("rom", "evaluate", tmp_path / "bars.toml", "--map", made / "map.npz")
+    assert_told(done, 2, "no run is held out")
+
+
+def test_a_run_that_breaks_down_is_infinitely_off(made, tmp_path):
+    study = load(made / "bars.toml")
+    model = maps.load(made / "map.npz", study)
+    maps.save(tmp_path / "bad.npz", model._replace(decoder=model.decoder._replace(
+        slope=1e6 * model.decoder.slope)))
+    done = evaluate(made, "--json", "--out", tmp_path / "e.png", map=tmp_path / "bad.npz")
+    assert done.exit_code == 3
+    assert json.loads(done.stdout)["all"]["reduced"]["origin"] is None
