@@ -18,7 +18,7 @@ from mpm_ref.rom.learn.fit import Training, train
 from mpm_ref.rom.learn.loss import READINGS, Weights
 from mpm_ref.rom.weights import Model, save
 
-from .ldm.nets import FOLDER, TERMS, identity, nets
+from .ldm.nets import FOLDER, SHARES, identity, nets
 from .provenance import commit, provenance
 
 ROOT = Path(__file__).parents[1]
@@ -26,10 +26,10 @@ ROOT = Path(__file__).parents[1]
 
 def training(net):
     """`Training` of a `Net`."""
-    shares, weights = TERMS[net.terms], READINGS[net.reading]
+    shares, weights = SHARES[net.terms], READINGS[net.reading]
     scaled = Weights(*(share * weight for share, weight in zip(shares, weights, strict=True)))
     return Training(net.r, weights=scaled, epochs=net.epochs, batch=net.batch, points=net.points,
-                    dense=net.dense, thin=net.thin, seed=net.seed)
+                    dense=net.dense, thin=net.thin, latent=net.latent, seed=net.seed)
 
 
 def made(name, checkpoints, threads):

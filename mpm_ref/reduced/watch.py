@@ -33,7 +33,9 @@ OFF = 0.033         # [dx]; in range at most 0.030, from 0.035 on with twice the
 SEEN = 0.3          # in range at least 0.35, with ten samples for seven coordinates
 MEMORY = 0.8        # share of what was seen before in what counts as seen: a poor draw is forgiven
 LOST = 0.01         # of the quadrature points; in range none
-NONSENSE = 0.1      # of the points looked at; more that are inverted are no body
+NONSENSE = 0.1      # of the points looked at; more that are inverted are no body,
+NOWHERE = 100.0     # nor are latent coordinates so many times as far from the trained mean as any
+                    # trained ones
 
 WORDS = {
     "beyond": "the latent coordinates are {beyond:.3g} times as far from the training runs as "
@@ -42,8 +44,7 @@ WORDS = {
     "seen": "of some motion of the body the samples saw only {seen:.0%}",
     "blind": "{blind} of the latent coordinates could not be told from the samples",
     "lost": "{lost:.1%} of the quadrature points could not be traced back",
-    "inverted": "{inverted:.1%} of the points looked at are inverted or nowhere, det F down to "
-                "{J:.3g}",
+    "inverted": "{inverted:.1%} of the points looked at are inverted, det F down to {J:.3g}",
 }
 
 
@@ -61,7 +62,18 @@ class Sight(NamedTuple):
     blind: int          # r less the rank of dg/dxhat at the samples
     lost: float         # share of quadrature points that were not traced back
     J: float            # smallest det F of the points looked at
-    inverted: float     # share of them with det F <= 0, or something that is not finite
+    inverted: float     # share of them whose det F is not above 0
+    far: float          # distance of xhat from the mean of the trained ones, over their largest
+
+    @property
+    def nonsense(self):
+        """Why there is no body, in words; "" where there is one."""
+        if self.inverted > NONSENSE:
+            return f"{self.inverted:.0%} of the points looked at have no det F > 0"
+        if self.far > NOWHERE:
+            return (f"the latent coordinates are {self.far:.3g} times as far from the trained mean "
+                    "as any trained ones")
+        return ""
 
     @property
     def why(self):
@@ -94,7 +106,6 @@ class Watch(NamedTuple):
         with np.errstate(all="ignore"):
             x, F, G = self.map.derivatives(self.X, latent.xhat)
             J = np.linalg.det(F)
-            whole = (0.0 < J) & (J < np.inf) & np.isfinite(x).all(axis=1)
             misfit = float(np.sqrt(np.mean(np.sum((x - self.X) ** 2, axis=1))))
         found = {"beyond": float(self.extent.beyond(latent.xhat)), "off": misfit / self.dx,
                  "seen": 1.0, "blind": 0, "lost": 0.0}
@@ -104,7 +115,8 @@ class Watch(NamedTuple):
             found |= {"off": report.residual * self.dt / self.dx,
                       "seen": MEMORY * last.seen + (1.0 - MEMORY) * seen(G, G_samples),
                       "blind": self.map.r - report.rank, "lost": lost / (lost + report.points)}
-        return Sight(**found, J=float(J.min()), inverted=float(np.mean(~whole)))
+        return Sight(**found, J=float(J.min()), inverted=float(np.mean(~(J > 0.0))),
+                     far=float(self.extent.outlying(latent.xhat)))
 
     def least(self, latent):
         """The point X (d,) [m] with the smallest det F, or with none, and that det F."""
@@ -137,7 +149,7 @@ def watched(watch, case, way, rest, seed=0, pick=None):
     for k, (latent, report) in enumerate(march(case, watch.map, way, rest, pick=kept)):
         sight = watch.look(latent, report, case.X[taken[0]] if taken else None, sight)
         first = first or ((k, sight) if sight.why else None)
-        if sight.inverted > NONSENSE:
+        if sight.nonsense:
             raise Nonsense(sentence(watch, latent, k, sight, first))
         yield latent, report, sight
 
@@ -146,10 +158,10 @@ def sentence(watch, latent, k, sight, first):
     """Where, when and why no body is left after step k; first: (step, `Sight`) out of bounds."""
     X, J = watch.least(latent)
     place = ", ".join(f"{a:.3g}" for a in X)
-    return (f"step {k}, t = {k * watch.dt:.6g} s: no body is left, {sight.inverted:.0%} of "
-            f"{len(watch.X)} points looked at have no det F > 0 (at X = {place} m: {J:.3g}); out "
-            f"of bounds since step {first[0]}: {first[1].said}. Keep to the parameters that the "
-            "map was trained with, take more samples or a smaller dt")
+    return (f"step {k}, t = {k * watch.dt:.6g} s: no body is left, {sight.nonsense}; det F is "
+            f"least at X = {place} m, {J:.3g}; out of bounds since step {first[0]}: "
+            f"{first[1].said}. Keep to the parameters that the map was trained with, take more "
+            "samples or a smaller dt")
 
 
 def seen(G, G_samples):

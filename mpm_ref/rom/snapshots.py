@@ -31,12 +31,16 @@ class Snapshots(NamedTuple):
 
 
 def units(snapshots):
-    """`Units` of training snapshots (LDM-appB). A component that hardly varies keeps its metres."""
+    """`Units` of training snapshots (LDM-appB). A component that hardly varies is measured like the
+    one that varies most, and keeps its metres where none does.
+    """
     X, u = snapshots.X, snapshots.x - snapshots.X
     axes = tuple(range(u.ndim - 1))
     std = u.std(axis=axes)
     span = np.ptp(X, axis=0)
-    return Units(X.min(axis=0), span, u.mean(axis=axes), np.where(std > STILL * span, std, 1.0))
+    varies = std > STILL * span
+    like = std.max() if varies.any() else 1.0
+    return Units(X.min(axis=0), span, u.mean(axis=axes), np.where(varies, std, like))
 
 
 def position_error(x, reference, origin=0.0):

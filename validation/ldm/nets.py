@@ -14,11 +14,14 @@ from typing import NamedTuple
 from mpm_ref.rom.weights import load
 from mpm_ref.scene.text import canonical
 
-from .studies import GRAVITY, POKES, TORSION
+from .studies import GRAVITY, POKES, TORSION, TOWER
+from .workshop_studies import PUSHES, SHEAR3, SHEAR17
 
 FOLDER = Path(__file__).parent / "weights"
 BOTH, NO_F, NO_V, NEITHER = "both", "no-F", "no-v", "neither"
 TERMS = {BOTH: (1.0, 1.0), NO_F: (0.0, 1.0), NO_V: (1.0, 0.0), NEITHER: (0.0, 0.0)}
+WORKSHOP = "workshop"       # both, lambda_1 = 1e4 instead of lambda_F = 100 (LDMW-X3)
+SHARES = {**TERMS, WORKSHOP: (100.0, 1.0)}
 SEEDS = 3                   # of trainings for torsion
 REPEATED = (7,)             # latent dimensions at which the loss's terms are left out
 
@@ -28,7 +31,7 @@ class Net(NamedTuple):
 
     study: object
     r: int
-    terms: str = BOTH       # of `TERMS`: shares of lambda_F and lambda_v
+    terms: str = BOTH       # of `SHARES`: shares of lambda_F and lambda_v
     reading: str = "code"   # of `learn.loss.READINGS`
     seed: int = 0
     epochs: int = 400
@@ -36,6 +39,7 @@ class Net(NamedTuple):
     batch: int = 8          # snapshots
     dense: int = 0          # time levels that every epoch shows; of later ones, ...
     thin: int = 1           # ... one in so many
+    latent: str = "encoder"     # of `learn.fit.LATENTS`
 
 
 def nets():
@@ -47,6 +51,17 @@ def nets():
     found["gravity-r7-printed"] = Net(GRAVITY, 7, reading="printed")
     found |= {f"torsion-{seed}": Net(TORSION, 7, seed=seed, epochs=850) for seed in range(SEEDS)}
     found["poke"] = Net(POKES, 6, epochs=300, dense=40, thin=4)
+    found["tower"] = Net(TOWER, 6, reading="tower", latent="modes", epochs=100)
+    return found | workshop()
+
+
+def workshop():
+    """{name: `Net`} of the workshop paper, whose latent coordinates are free (LDMW-eq7)."""
+    unit = Net(SHEAR3, 1, epochs=10000, latent="free")
+    found = {f"shear3-{terms}": unit._replace(terms=terms) for terms in (NEITHER, NO_F, WORKSHOP)}
+    found["shear3-printed"] = unit._replace(terms=WORKSHOP, reading="printed")
+    found["shear17"] = unit._replace(study=SHEAR17, terms=WORKSHOP)
+    found["push"] = Net(PUSHES, 5, WORKSHOP, epochs=700, latent="free")
     return found
 
 

@@ -4,7 +4,6 @@ from math import cos, pi, sin
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats.qmc import LatinHypercube, scale
 
 from mpm_ref.cases import snapshots
 from mpm_ref.sampling import Regular
@@ -95,10 +94,16 @@ def refined(scene, dx, per_cell):
 
 
 def latin(low, high, train, test, seed=0):
-    """Parameters of training runs and then test runs, a Latin hypercube each."""
-    rng = np.random.default_rng(seed)
-    return np.vstack([scale(LatinHypercube(len(low), rng=rng).random(n), low, high)
-                      for n in (train, test)])
+    """Parameters of training runs and then test runs, a Latin hypercube each: those of SciPy,
+    whose module asks for PyTorch.
+    """
+    found = []
+    for n, rng in zip((train, test), np.random.default_rng(seed).spawn(2), strict=True):
+        u, strata = rng.uniform(size=(n, len(low))), np.tile(np.arange(1, n + 1), (len(low), 1))
+        for row in strata:
+            rng.shuffle(row)
+        found.append((strata.T - u) / n * np.subtract(high, low) + low)
+    return np.vstack(found)
 
 
 def at_rim(poke, theta, begin=0.0):

@@ -1,4 +1,5 @@
-"""Where latent coordinates of training snapshots come from: an encoder, or one free vector each.
+"""Where latent coordinates of training snapshots come from: an encoder, one free vector each, or
+known beforehand.
 
 The encoder is a stack of one-dimensional convolutions over all coordinates in a row, halving their
 number as long as at least SHORTEST are left, and two full layers (LDM-tab1). It ties the latent
@@ -42,6 +43,18 @@ class Free(nn.Module):
     def forward(self, index):
         """Latent coordinates (s, r) of snapshots by number."""
         return self.table(index)
+
+
+class Given(nn.Module):
+    """Latent coordinates that are known before the training, one vector for each snapshot."""
+
+    def __init__(self, xhat):
+        super().__init__()
+        self.register_buffer("table", torch.as_tensor(xhat, dtype=torch.float32))
+
+    def forward(self, index):
+        """Latent coordinates (s, r) of snapshots by number."""
+        return self.table[index]
 
 
 def codes(encoder, u, batch=64):

@@ -16,14 +16,16 @@ import numpy as np
 import torch
 
 from ..architecture import HIDDEN
+from ..modes import basis
 from ..snapshots import units
 from ..weights import SEAL, seal, write_whole
 from .data import batch_of, data_of
-from .encoder import Encoder, Free, codes
+from .encoder import Encoder, Free, Given, codes
 from .loss import CODE, Weights, loss
 from .perceptron import Perceptron, exported
 
 FASTEST, SLOWEST = 1e-3, 1e-6       # learning rates at the first and the last step (LDM-appB)
+LATENTS = ("encoder", "free", "modes")
 SAVE = 20                           # epochs between checkpoints
 
 
@@ -31,7 +33,8 @@ SAVE = 20                           # epochs between checkpoints
 class Training:
     """How a decoder is trained.
 
-    r latent coordinates; `latent` "encoder" (LDM-sec4.1-encoder) or "free" (LDMW-eq7); an epoch
+    r latent coordinates; `latent` "encoder" (LDM-sec4.1-encoder), "free" (LDMW-eq7), or those of
+    POD "modes" in the norm of the loss, which cost no encoder and are no unknowns; an epoch
     shows every snapshot once, `batch` at a time, each time at `points` random points (0: all); of
     the time levels from `dense` on, a random one in `thin`. The learning rate falls from FASTEST to
     SLOWEST by half a cosine.
@@ -55,8 +58,8 @@ class Training:
         for name in ("points", "dense"):
             if getattr(self, name) < 0:
                 raise ValueError(f"{name} = {getattr(self, name)}: expected 0 or more")
-        if self.latent not in ("encoder", "free"):
-            raise ValueError(f"latent = {self.latent!r}: expected 'encoder' or 'free'")
+        if self.latent not in LATENTS:
+            raise ValueError(f"latent = {self.latent!r}: expected one of {', '.join(LATENTS)}")
 
 
 class Trained(NamedTuple):
@@ -75,11 +78,10 @@ class Session:
         self.training, self.units = training, units(snapshots)
         self.data = data_of(snapshots, self.units)
         self.of = sha256(snapshots)
-        count, n, d = self.data.u.shape
+        count, _, d = self.data.u.shape
         self.level = torch.arange(count) % snapshots.x.shape[1]
         self.f = Perceptron(d, training.r, training.hidden)
-        self.encoder = (Encoder(d, n, training.r) if training.latent == "encoder"
-                        else Free(count, training.r))
+        self.encoder = encoder(training, snapshots)
         self.inputs = (self.data.standardised if training.latent == "encoder"
                        else torch.arange(count))
         weights = [*self.f.parameters(), *self.encoder.parameters()]
@@ -156,6 +158,16 @@ class Session:
         self.optimiser.load_state_dict(kept["optimiser"])
         self.random.set_state(kept["random"])
         self.history = kept["history"]
+
+
+def encoder(training, snapshots):
+    """Where the latent coordinates of a training come from."""
+    s, levels, n, d = snapshots.x.shape
+    if training.latent == "encoder":
+        return Encoder(d, n, training.r)
+    if training.latent == "free":
+        return Free(s * levels, training.r)
+    return Given(basis(snapshots.X, *snapshots.flat(), training.r, training.weights.F).xhat)
 
 
 def sha256(snapshots):

@@ -1,0 +1,146 @@
+"""Reduced runs with the two hyper-reductions of the workshop paper, beside full-order runs.
+
+Its sample points are chosen once (LDMW-sets). Which, it says of its poking test only.
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import threadpoolctl
+
+from mpm_ref.reduced.case import case
+from mpm_ref.reduced.march import Way, model
+from mpm_ref.rom.latent import initial
+from mpm_ref.rom.modes import modes
+from mpm_ref.rom.neighbours import neighbours
+from mpm_ref.rom.node_centric import node_centric, nodes_of
+
+from ..ldm.nets import trained
+from ..verification.scenes import threads_for
+
+POINT_WAY, NODE_WAY = Way("lagrangian", "linear"), Way("eulerian", "linear")
+
+
+class Fields(NamedTuple):
+    """Accumulated errors of all states, as shares: LDM-err, and its like for the other fields."""
+
+    position: float
+    velocity: float
+    defgrad: float
+
+
+class Runs(NamedTuple):
+    """Full-order runs of a study, and what reduced runs of them need to know."""
+
+    study: object
+    cases: tuple            # `Case` of each
+    full: object            # their `Snapshots`
+
+    def errors(self, map, rest, approach):
+        """`Fields` of reduced runs on a map; approach(case, map) gives a stepper, and a function of
+        the state that chooses samples.
+        """
+        sums = np.zeros((2, 3))
+        with threads_for((self.cases[0].problem.bodies[0],)), threadpoolctl.threadpool_limits(1):
+            for one, *fields in zip(self.cases, self.full.x, self.full.v, self.full.F, strict=True):
+                states = march(one, map, rest, approach)
+                for latent, *there in zip(states, *fields, strict=True):
+                    here = of_state(map, latent, one.X)
+                    sums += [[np.sum((a - b) ** 2) for a, b in zip(here, there, strict=True)],
+                             [np.sum(b**2) for b in there]]
+        return Fields(*np.sqrt(sums[0] / sums[1]).tolist())
+
+    def of_net(self, name, approach):
+        """`Fields` on a trained map."""
+        of = trained(name)
+        return self.errors(of.decoder, of.rest, approach)
+
+    @property
+    def X(self):
+        """Points (n, d) at rest [m]."""
+        return self.cases[0].X
+
+    @property
+    def scale(self):
+        """How much it is, in words."""
+        return (f"{len(self.X)} particles, {self.full.x.shape[1] - 1} steps, {len(self.cases)} of "
+                f"{len(self.study.mu)} runs")
+
+
+def runs(study, numbers):
+    """`Runs` of these numbers of a study."""
+    cases = tuple(case(study.scene(*study.mu[k])) for k in numbers)
+    return Runs(study, cases, study.run(list(numbers)))
+
+
+def pod(study, r):
+    """`Modes` of the training runs of a study, and their coordinates of the body at rest."""
+    full = study.run(study.train)
+    return modes(full.X, *full.flat(), r), np.zeros(r)
+
+
+def record(run, name, fields, scale, note="", **rule):
+    """Record `Fields` in per cent, each under its own name."""
+    for field, share in fields._asdict().items():
+        run.record(f"{name}.{field}", 100.0 * share, unit="%", scale=scale, note=note, **rule)
+
+
+def march(one, map, rest, approach):
+    """Yield the `Latent` of each time level of a reduced run."""
+    stepper, choose = approach(one, map)
+    clock, latent = one.problem.clock, initial(map, one.X, xhat=rest)
+    yield latent
+    for k in range(clock.steps):
+        latent, _ = stepper.step(latent, choose(latent), k * clock.dt, clock.dt)
+        yield latent
+
+
+def of_state(map, latent, X):
+    """x, v and F of points X in a state; the velocity is the one that was fitted."""
+    x, F, _ = map.derivatives(X, latent.xhat)
+    return x, map.velocity(X, latent.before, latent.vhat), F
+
+
+def by_points(samples, near=None):
+    """Approach #1 (LDMW-alg1): sample points, and their neighbours: those in each state, or the
+    `Neighbours` that are given.
+    """
+    def approach(one, map):
+        stepper = model(one, map, POINT_WAY)
+        if near is not None:
+            stepper = replace(stepper, quadrature=near)
+        return stepper, lambda latent: samples
+
+    return approach
+
+
+def kept(name, one, samples):
+    """`Neighbours` of sample points in all training states of a trained map (LDMW-sets)."""
+    of = trained(name)
+    points = model(one, of.decoder, POINT_WAY).quadrature
+    return neighbours(points, of.decoder, of.xhat, samples)
+
+
+def by_nodes(chosen, count=None):
+    """Approach #2 (LDMW-alg2): the nodes of points chosen at rest are sample nodes; so many of the
+    points that have all their nodes among them, or all, are samples.
+    """
+    def approach(one, map):
+        stepper = model(one, map, NODE_WAY)
+        nodes = nodes_of(one.X[chosen], stepper.quadrature.dx, stepper.quadrature.degree)
+        body = node_centric(stepper.quadrature, nodes)
+
+        def choose(latent):
+            found = body.samples(map, latent)
+            return found if count is None else found[spread(one.X[found], count)]
+
+        return replace(stepper, quadrature=body), choose
+
+    return approach
+
+
+def spread(X, count):
+    """Numbers of so many of the points X (n, 3), evenly among them from the bottom to the top."""
+    order = np.argsort(X[:, 2])
+    return np.sort(order[np.linspace(0, len(X) - 1, count).round().astype(int)])
