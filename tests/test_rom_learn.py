@@ -236,7 +236,7 @@ def test_the_rate_is_that_of_the_share_of_all_steps(monkeypatch):
 @pytest.mark.parametrize(("settings", "said"), [
     ({"r": 0}, "r = 0: expected at least 1"), ({"epochs": 0}, "epochs = 0"),
     ({"batch": -1}, "batch = -1"), ({"points": -1}, "points = -1: expected 0"),
-    ({"latent": "pca"}, "latent = 'pca': expected 'encoder' or"),
+    ({"latent": "pca"}, "latent = 'pca': expected one of encoder"),
 ])
 def test_settings_that_mean_nothing_are_refused(settings, said):
     with pytest.raises(ValueError, match=said):
