@@ -5,11 +5,13 @@ from math import cos, pi, sin
 import numpy as np
 import pytest
 
+from mpm_ref.cases import snapshots
 from mpm_ref.reduced.case import case
 from mpm_ref.reduced.errors import Squares
 from mpm_ref.reduced.march import SCHEMES, Way, march
 from mpm_ref.rom.affine import Affine
 from mpm_ref.rom.modes import modes
+from mpm_ref.scene import build
 from validation.ldm.online import compared, reconstructed
 from validation.ldm.studies import GRAVITY, PHI, POKE, POKES, STUDIES, TORSION, poked_again
 from validation.verification.scenes import shipped, with_
@@ -153,3 +155,13 @@ def test_all_pulls_drive_the_same_nodes_at_first(v):
 def test_angles_are_spread_evenly():
     assert np.diff(POKES.mu[:, 0]) == pytest.approx(pi / 18.0)
     assert np.diff(POKES.mu[list(POKES.train), 0]) == pytest.approx(pi / 6.0)
+
+
+def test_one_point_in_so_many_is_recorded():
+    problems = [build(with_(GRAVITY.scene(g), steps=2)) for g in (2.0, 3.0)]
+    again = [build(with_(GRAVITY.scene(g), steps=2)) for g in (2.0, 3.0)]
+    whole, thin = snapshots(problems, [[2.0], [3.0]]), snapshots(again, [[2.0], [3.0]], every=9)
+    for name in ("X", "m", "V0"):
+        assert np.array_equal(getattr(whole, name)[::9], getattr(thin, name))
+    for name in ("x", "F", "v"):
+        assert np.array_equal(getattr(whole, name)[:, :, ::9], getattr(thin, name))

@@ -10,7 +10,7 @@ from mpm_ref.reduced.march import Way
 from mpm_ref.rom.affine import Affine
 from mpm_ref.scene import build
 from validation.ldm import tower
-from validation.ldm.studies import TOWER, latin, refined
+from validation.ldm.studies import TOWER, latin_twice, refined
 from validation.verification.scenes import with_
 
 PRINTED = 3076115 * (0.48 / 3) ** 3     # [m^3]: points times volumes (LDM-tab2-sampling, LDM-X8)
@@ -41,7 +41,7 @@ def test_parameters_are_those_of_scipy():
     qmc = pytest.importorskip("scipy.stats.qmc")
     rng, low, high = np.random.default_rng(5), (0.0, 1.0), (2.0, 1.5)
     expected = [qmc.scale(qmc.LatinHypercube(2, rng=rng).random(n), low, high) for n in (7, 3)]
-    assert np.array_equal(latin(low, high, 7, 3, 5), np.vstack(expected))
+    assert np.array_equal(latin_twice(((0.0, 2.0), (1.0, 1.5)), 7, 3, 5), np.vstack(expected))
 
 
 def test_the_top_moves_as_it_is_told():

@@ -5,7 +5,7 @@ import pytest
 from rom_toys import cloud
 
 from mpm_ref.reduced.case import case, distance
-from mpm_ref.reduced.march import Way, march, model, picked
+from mpm_ref.reduced.march import Way, groups, march, model, picked
 from mpm_ref.rom.affine import Affine
 from mpm_ref.rom.lagrangian import Resampled, lagrangian
 from mpm_ref.rom.latent import at_start
@@ -116,3 +116,8 @@ def test_distances_from_shapes_made_of_others():
     X = np.array([[0.5, 0.0, 1.0], [2.5, 0.0, 1.0], [-0.5, 0.0, 1.0], [-2.0, 0.0, 1.0]])
     assert distance(X, Union(shapes=(ball, box))) == pytest.approx([-0.5, -0.5, -0.5, 1.0])
     assert distance(X, Difference(shape=ball, minus=(box,))) == pytest.approx([0.5, 1.5, -0.5, 1.0])
+
+
+@pytest.mark.parametrize(("points", "bound"), [(None, 0), (9, 0), (19, 0), (20, 2), (50, 2)])
+def test_boundaries_take_at_most_half_of_the_samples(torsion, points, bound):
+    assert len(groups(torsion, Way(points=points), 0.0)) == bound

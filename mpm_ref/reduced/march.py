@@ -116,6 +116,8 @@ def picked(case, map, way, xhat, seed):
 
 
 def groups(case, way, t):
-    """What samples must not miss; nothing where they are all points, or too few for it."""
+    """What samples must not miss; nothing where they are all points, or so few that these would be
+    more than half of them: what is held tells little of the body's motion.
+    """
     held = case.held(t)
-    return held if way.points and way.points >= PER_GROUP * len(held) else ()
+    return held if way.points and way.points >= 2 * PER_GROUP * len(held) else ()

@@ -154,16 +154,20 @@ def parameters(tables):
         if one.values is not None or one.count is not None:
             raise SceneError(f'parameter[{k}]: expected `from` and `to` alone with sampling = '
                              f'"{LATIN}"')
-    return latin(tables.count, [(one.start, one.stop) for one in tables.parameter], tables.seed)
+    ends = [(one.start, one.stop) for one in tables.parameter]
+    return latin(tables.count, ends, np.random.default_rng(tables.seed))
 
 
-def latin(count, ends, seed):
+def latin(count, ends, rng):
     """A Latin hypercube (count, parameters) in ranges (low, high): of count equal parts of each
-    range, each has one value, anywhere in it.
+    range, each has one value, anywhere in it. The same as SciPy's, whose module asks for PyTorch.
     """
-    rng, (low, high) = np.random.default_rng(seed), np.transpose(ends)
-    parts = np.stack([rng.permutation(count) for _ in ends], axis=1)
-    return low + (high - low) * (parts + rng.random(parts.shape)) / count
+    low, high = np.transpose(ends)
+    u = rng.uniform(size=(count, len(ends)))
+    strata = np.tile(np.arange(1, count + 1), (len(ends), 1))
+    for row in strata:
+        rng.shuffle(row)
+    return (strata.T - u) / count * (high - low) + low
 
 
 def held_out(runs, count, seed):

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm_ref.cases import snapshots
+from mpm_ref.reduced.study import latin
 from mpm_ref.sampling import Regular
 from mpm_ref.scene import build
 
@@ -93,17 +94,10 @@ def refined(scene, dx, per_cell):
     return with_(scene, dx=dx, body=(body,))
 
 
-def latin(low, high, train, test, seed=0):
-    """Parameters of training runs and then test runs, a Latin hypercube each: those of SciPy,
-    whose module asks for PyTorch.
-    """
-    found = []
-    for n, rng in zip((train, test), np.random.default_rng(seed).spawn(2), strict=True):
-        u, strata = rng.uniform(size=(n, len(low))), np.tile(np.arange(1, n + 1), (len(low), 1))
-        for row in strata:
-            rng.shuffle(row)
-        found.append((strata.T - u) / n * np.subtract(high, low) + low)
-    return np.vstack(found)
+def latin_twice(ends, train, test, seed=0):
+    """Parameters of training runs and then test runs, a Latin hypercube each."""
+    rngs = np.random.default_rng(seed).spawn(2)
+    return np.vstack([latin(n, ends, rng) for n, rng in zip((train, test), rngs, strict=True)])
 
 
 def at_rim(poke, theta, begin=0.0):
@@ -127,6 +121,6 @@ TORSION = Study("torsion", np.array([(v, w) for v in np.linspace(0.0, 0.6, 6)
                                      for w in np.linspace(0.0, 2.0, 6)]), drawn(7, 36), twisted)
 POKES = Study("poke", np.arange(36)[:, None] * pi / 18.0,
               tuple(k for k in range(36) if k % 3), poked)
-TOWER = Study("tower", latin((0.6, 0.0, -pi / 3.0), (0.8, pi / 2.0, -pi / 6.0), 16, 4),
+TOWER = Study("tower", latin_twice(((0.6, 0.8), (0.0, pi / 2.0), (-pi / 3.0, -pi / 6.0)), 16, 4),
               (16, 17, 18, 19), leaning, every=16)
 STUDIES = {study.name: study for study in (GRAVITY, TORSION, POKES, TOWER)}
