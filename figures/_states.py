@@ -47,23 +47,27 @@ def states(results, scene, look):
     for ax, k, (solid, held) in zip(axes, shots, layers, strict=True):
         ax.imshow(shone(image(solid, camera), held, camera))
         ax.set_title(f"t = {course.times[k]:.2f} s", fontsize=9)
-    if shown is not None:
-        figure.colorbar(shown, ax=axes, shrink=0.8, aspect=30, pad=0.01).set_label(look.scalar[2])
-    figure.draw_without_rendering()         # lays out, once and for all
-    figure.set_layout_engine("none")
-    return figure
+    return settled(figure, axes, shown, look.scalar and look.scalar[2])
 
 
-def panels(camera, count, columns):
+def panels(camera, count, columns, width=WIDTH):
     """A figure and as many axes as there are pictures, of their shape."""
     columns = min(columns, count)
     rows, (wide, high) = -(-count // columns), camera.high - camera.low
-    width = WIDTH / columns
     figure, axes = plt.subplots(rows, columns, squeeze=False, layout="constrained",
-                                figsize=(WIDTH, (width * high / wide + 0.3) * rows))
+                                figsize=(width, (width / columns * high / wide + 0.3) * rows))
     for ax in axes.flat:
         ax.axis("off")
     return figure, axes.flat[:count].tolist()
+
+
+def settled(figure, axes, shown, words):
+    """The figure with a colour bar of what is shown, if there is any; laid out for good."""
+    if shown is not None:
+        figure.colorbar(shown, ax=axes, shrink=0.8, aspect=30, pad=0.01).set_label(words)
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    return figure
 
 
 def known(results, scene):
@@ -118,7 +122,7 @@ def framed(layers, look):
 def layers_of(course, k, conditions, look, paint):
     """Balls of particles and colliders, and those of the regions that are prescribed."""
     ends = ends_of(course, look)
-    solid = [cloud(course.x[k].astype(float), course.body, paint(k), spacing(course))]
+    solid = [cloud(course.x[k].astype(float), course.body, paint(k), spacing(course.x[0]))]
     where = float(course.times[k]), ends, np.ptp(ends, axis=0).max() / FINENESS
     held = [Balls(*(np.zeros((0, *a.shape[1:])) for a in solid[0]))]
     if conditions is not None:
@@ -132,9 +136,9 @@ def joined(parts):
     return Balls(*(np.concatenate(a) for a in zip(*parts, strict=True)))
 
 
-def spacing(course):
-    """Median distance of a particle to the nearest at the start [m]."""
-    return float(np.median(cKDTree(course.x[0]).query(course.x[0], 2)[0][:, 1]))
+def spacing(x):
+    """Median distance of a particle (n, 3) to the nearest [m]."""
+    return float(np.median(cKDTree(x).query(x, 2)[0][:, 1]))
 
 
 def cloud(x, body, colour, spacing):

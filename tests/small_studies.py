@@ -46,6 +46,9 @@ kind = "modes"
 r = 3
 """
 
+CURVED = (("r = 3", "r = 2\nmodes = 4"), ('"modes"', '"curved"'),
+          ("[map]", '[run]\nprojection = "nonlinear"\n\n[map]'))     # edits
+
 
 def write(folder, *edits, scene=SCENE):
     """Path of the study in a folder, with (before, after) of some of its text."""
@@ -68,7 +71,7 @@ def modelled(folder):
     bars, data = study(folder), folder / "data"
     data.mkdir()
     assert all(done.well for done in generate(bars, data))
-    maps.save(folder / "map.npz", maps.linear(bars, dataset.load(bars, data, bars.train), {}))
+    maps.save(folder / "map.npz", maps.computed(bars, dataset.load(bars, data, bars.train), {}))
     return folder
 
 

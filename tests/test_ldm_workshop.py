@@ -120,9 +120,9 @@ def test_few_nodes_have_few_samples_and_few_of_these_are_used(sheared_runs):
     one, some = sheared_runs.cases[0], spread(sheared_runs.X, 6)
     map, rest = pod(SHEAR17, 1)
     _, every = by_nodes(some)(one, map)
-    assert set(some) <= set(every(at_start(rest))) < set(range(17))
+    assert set(some) <= set(every(0.0, at_start(rest))) < set(range(17))
     _, few = by_nodes(some, 6)(one, map)
-    assert len(few(at_start(rest))) == 6
+    assert len(few(0.0, at_start(rest))) == 6
 
 
 def test_samples_are_spread_from_the_bottom_to_the_top():

@@ -1,18 +1,22 @@
 """Quadrature points of another sampling, and samples that are kept or chosen."""
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 from rom_toys import cloud
 
+from mpm_ref.materials.fixed_corotated import FixedCorotated
 from mpm_ref.reduced.case import case, distance
 from mpm_ref.reduced.march import Way, groups, march, model, picked
 from mpm_ref.rom.affine import Affine
 from mpm_ref.rom.lagrangian import Resampled, lagrangian
 from mpm_ref.rom.latent import at_start
 from mpm_ref.rom.samples import PER_GROUP, pivoted
+from mpm_ref.rom.step import Reduced
 from mpm_ref.scene import Box, Cylinder, Difference, Union
 from validation.ldm.nets import trained
-from validation.ldm.studies import GRAVITY, TORSION
+from validation.ldm.studies import GRAVITY, POKES, TORSION
 from validation.verification.scenes import with_
 
 DX = 0.11
@@ -29,9 +33,9 @@ def test_another_sampling_that_is_the_same_gives_the_same_cloud(d, rng):
     own = lagrangian(X, m, m, DX, 2)
     samples = rng.choice(400, 3, replace=False)
     latent = at_start(map.rest)
-    for a, b in zip(own.cloud(map, latent, samples)[:3],
-                    Resampled(X, own).cloud(map, latent, samples)[:3], strict=True):
-        assert np.array_equal(a, b)
+    a, b = (one.cloud(map, latent, samples) for one in (own, Resampled(X, own)))
+    assert all(np.array_equal(*pair) for pair in zip((*a.at, a.m, a.V0), (*b.at, b.m, b.V0),
+                                                     strict=True))
 
 
 def test_its_points_are_as_many_however_many_material_points_there_are(d, rng):
@@ -50,6 +54,19 @@ def test_another_sampling_has_the_body_s_mass(torsion):
     assert len(quadrature.other.X) != len(torsion.X)
 
 
+def test_nodes_beyond_the_other_sampling_move_with_the_samples(d):
+    """A body that moves as one does so where half of it has no quadrature points."""
+    X, map = cloud(d, 200), Affine(d)
+    half = X[X[:, 0] < 0.5]
+    other = lagrangian(half, np.ones(len(half)), np.ones(len(half)), DX, 2)
+    vhat = np.zeros(map.r)
+    vhat[d] = 1.0                           # along the first axis
+    model = Reduced(map, Resampled(X, other), FixedCorotated(3e3, 4e3), np.zeros(d))
+    after, report = model.step(at_start(map.rest, vhat), np.arange(200), 0.0, 1e-3)
+    assert report.residual < 1e-9
+    assert after.vhat == pytest.approx(vhat, abs=1e-9)
+
+
 def test_a_run_with_another_sampling_is_near_the_one_with_material_points():
     """They differ by their quadrature alone; one point to a cell is too few."""
     trained_map = trained("gravity-r4")
@@ -65,11 +82,51 @@ def test_a_run_with_another_sampling_is_near_the_one_with_material_points():
     assert off[0] > 3.0 * off[1]
 
 
+def test_single_precision_and_near_preimages_change_little():
+    """Far less than the displacement, and not nothing."""
+    model, one = trained("gravity-r4"), case(with_(GRAVITY.scene(5.0), steps=6))
+    paper = Way("eulerian", points=30)
+    def end(**how):
+        *_, (latent, _) = march(one, model.decoder, paper._replace(**how), model.rest)
+        return model.decoder.place(one.X, latent.xhat) - one.X
+
+    exact, size = end(), np.linalg.norm(end())
+    near, single = (np.linalg.norm(end(**how) - exact) / size
+                    for how in ({"close": 1e-2}, {"close": 1e-2, "precision": "single"}))
+    assert 0.0 < near < 1e-2
+    assert 0.0 < abs(single - near) < 1e-4
+
+
+@pytest.mark.parametrize(("way", "said"), [
+    (Way(precision="half"), r"precision = 'half': expected double or single"),
+    (Way(precision="single"), r"learned maps alone have it, this is one of Affine"),
+    (Way("eulerian", precision="single"), r"learned maps alone have it"),
+])
+def test_precision_that_there_is_not(torsion, way, said):
+    with pytest.raises(ValueError, match=said):
+        model(torsion, Affine(3), way)
+
+
+def test_preimages_nearer_than_single_precision_tells_are_refused(torsion):
+    map = trained("gravity-r4").decoder
+    with pytest.raises(ValueError, match=r"close = 1e-09 dx in single precision: expected at leas"):
+        model(torsion, map, Way("eulerian", precision="single"))
+    assert model(torsion, map, Way(precision="single")).map.net.W.dtype == np.float32
+    assert model(torsion, map, Way()).map is map
+
+
 def test_pivots_are_the_rows_that_tell_the_coordinates(rng):
     G = 1e-3 * rng.normal(size=(50, 3, 4))
     for k, p in enumerate((7, 12, 30, 44)):
         G[p, k % 3, k] = 1.0
     assert set(pivoted(G, 4)) == {7, 12, 30, 44}
+
+
+def test_pivots_are_not_the_largest_rows_but_different_ones():
+    G = np.zeros((6, 1, 3))
+    G[:4, 0, 0] = 10.0, 9.0, 8.0, 7.0
+    G[4, 0, 1], G[5, 0, 2] = 2.0, 1.0
+    assert set(pivoted(G, 3)) == {0, 4, 5}
 
 
 @pytest.mark.parametrize("count", [1, 3, 10, 50, 60])
@@ -95,6 +152,37 @@ def test_samples_that_are_kept_stay_and_hold_the_boundaries(torsion, how):
     assert len(set(pick(0.0).tolist())) == 20
     for near in torsion.near:
         assert np.isin(pick(0.0), near).sum() >= PER_GROUP
+
+
+class Bulge(NamedTuple):
+    """A map of which only points near a height do anything: the first latent coordinate."""
+
+    dim = r = 3
+
+    def derivatives(self, X, xhat):
+        return X, None, np.exp(-1e4 * (X[:, 2] - xhat[0]) ** 2)[:, None, None] * np.eye(3)
+
+
+@pytest.mark.parametrize("share", [0.4, 0.6])
+def test_samples_are_pivoted_where_the_body_starts_and_hold_the_boundaries_beside(torsion, share):
+    low, high = torsion.X[:, 2].min(), torsion.X[:, 2].max()
+    height = low + share * (high - low)
+    pick = picked(torsion, Bulge(), Way(points=20, samples="pivoted"), np.full(3, height), 3)
+    chosen = pick(0.0)
+    held = sum(np.isin(chosen, near).sum() for near in torsion.near)
+    close = abs(torsion.X[chosen, 2] - height) < 0.1 * (high - low)
+    assert len(chosen) == 20
+    assert held == len(torsion.near) * PER_GROUP == 20 - close.sum()
+
+
+def test_samples_of_a_region_are_forced_while_it_holds():
+    """The patch that pokes lets go at 0.25 s; few points are near it."""
+    one, map = case(POKES.scene(0.0)), Affine(3)
+    pick = picked(one, map, Way(points=20), map.rest, 3)
+    patch = one.held(0.0)[1]
+    early, late = ([np.isin(pick(t), patch).sum() for _ in range(5)] for t in (0.0, 1.0))
+    assert min(early) >= PER_GROUP
+    assert min(late) < PER_GROUP
 
 
 def test_samples_that_are_redrawn_change(torsion):

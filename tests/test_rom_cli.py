@@ -5,7 +5,7 @@ import shutil
 import h5py
 import pytest
 from command_line import assert_told, mpm_ref
-from small_studies import STEPS, ended, write
+from small_studies import CURVED, STEPS, ended, write
 
 from mpm_ref.cli.shipped import shipped_studies
 from mpm_ref.reduced import maps
@@ -126,6 +126,20 @@ def test_more_modes_than_the_data_have_are_refused(made, tmp_path):
     study = write(tmp_path, ("r = 3", "r = 300"))
     done = mpm_ref("rom", "train", study, "--data", made / "data", "--out", tmp_path / "map.npz")
     assert_told(done, 2, "r = 300: expected 1 .. 27 modes")
+
+
+def test_a_curved_map_is_made_at_once(made, tmp_path):
+    study, out = write(tmp_path, *CURVED), tmp_path / "map.npz"
+    done = mpm_ref("rom", "train", study, "--data", made / "data", "--out", out)
+    assert done.exit_code == 0, done.output
+    assert "curved, r = 2, of 3 runs" in done.stdout
+    assert maps.load(out, load(study)).about["command"].endswith("--kind curved --threads 1")
+
+
+def test_a_study_without_the_settings_of_a_curved_map_makes_none(made, tmp_path):
+    done = mpm_ref("rom", "train", made / "bars.toml", "--data", made / "data", "--kind", "curved",
+                   "--out", tmp_path / "map.npz")
+    assert_told(done, 2, "modes = none: expected more than r = 3")
 
 
 def test_a_network_is_trained_with_torch(made, tmp_path):

@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 from command_line import assert_told, mpm_ref
-from small_studies import STEPS, ended, modelled, write
+from small_studies import CURVED, STEPS, ended, modelled, write
 
 from mpm_ref.reduced import maps, record
 from mpm_ref.reduced.case import case
@@ -127,6 +127,50 @@ def test_an_interrupted_run_keeps_its_frames(reduced, monkeypatch):
     done, out = reduced("--set", "g=2")
     assert_told(done, 130, "interrupted")
     assert ended(out) == ("interrupted", 3)
+    monkeypatch.undo()
+    again, _ = reduced("--set", "g=2")
+    assert_told(again, 2, "cut off after 3 frames", "make it again with --overwrite")
+    assert ended(out) == ("interrupted", 3)
+    assert reduced("--set", "g=2", "--overwrite")[0].exit_code == 0
+    assert ended(out) == ("finished", STEPS + 1)
+    assert "cut off" not in reduced("--set", "g=2")[0].stderr
+
+
+def test_a_run_that_was_killed_is_cut_off_too():
+    parts = {"finished": [{"why": "finished"}], "killed": [], "stopped": [{"why": "interrupted"}],
+             "broken": [{"why": "the reduced run broke down in step 3"}]}
+    found = {name: record.cut_off({"reduced": {}, "parts": rows}) for name, rows in parts.items()}
+    assert found == {"finished": False, "killed": True, "stopped": True, "broken": False}
+    assert not record.cut_off({"parts": []})
+
+
+def test_a_run_is_told_to_machines_too(made, reduced):
+    done, out = reduced("--set", "g=9", "--json")
+    assert done.exit_code == 0
+    found = json.loads(done.stdout)
+    assert (found["why"], found["out"], found["points_out"]) == ("finished", str(out), 64)
+    assert (found["step"], found["frames"], found["t"]) == (STEPS, STEPS + 1, STEPS * 0.01)
+    assert found["reduced"]["parameters"] == {"g": 9.0}
+    assert found["reduced"]["map"] == {"kind": "modes", "r": 3}
+    assert "beyond" in found["out_of_bounds"][str(STEPS)]
+
+
+def test_a_curved_map_runs_and_is_evaluated(made, reduced, tmp_path):
+    study, file = write(tmp_path, *CURVED), tmp_path / "curved.npz"
+    done = mpm_ref("rom", "train", study, "--data", made / "data", "--out", file)
+    assert done.exit_code == 0, done.output
+    done, out = reduced("--set", "g=2.5", study=study, map=file)
+    assert done.exit_code == 0, done.output
+    assert f"{STEPS} steps of curved, r = 2, 64 points" in done.stdout
+    with h5py.File(out) as h5:
+        assert h5["reduced/xhat"].shape == (STEPS + 1, 2)
+    judged = mpm_ref("rom", "evaluate", study, "--map", file, "--data", made / "data", "--json",
+                     "--out", tmp_path / "e.png")
+    assert judged.exit_code == 0, judged.output
+    errors = json.loads(judged.stdout)["all"]
+    assert 0.0 < errors["nearest"]["displacement"] <= errors["reduced"]["displacement"] < 0.1
+    assert_told(reduced("--set", "g=2.5", map=file, out=tmp_path / "b.h5")[0], 2,
+                "run.projection = 'linear': expected 'nonlinear' for a curved map")
 
 
 @pytest.mark.parametrize(("options", "status", "words"), [

@@ -77,8 +77,10 @@ def test_slopes_of_monomials(rng):
     assert slopes(y, powers) == pytest.approx(np.array([[0.0, 0.0], [0.7, 0.0], [0.0, 3 * 0.49]]))
 
 
-@pytest.mark.parametrize(("r", "degree", "said"), [(0, 2, "r = 0"), (R, 2, "r = 5"),
-                                                   (2, 1, "degree = 1")])
+@pytest.mark.parametrize(("r", "degree", "said"), [
+    (0, 2, "r = 0"), (R, 2, "r = 5"), (2, 1, "degree = 1"),
+    (2, 10, "63 monomials of 2 coordinates, but 60 snapshots"),
+])
 def test_what_leaves_nothing_to_follow_is_refused(bent, r, degree, said):
     X, x, F, _ = bent
     with pytest.raises(ValueError, match=said):
@@ -108,3 +110,14 @@ def test_a_snapshot_that_weighs_most_is_met_best(bent, rng):
         return np.linalg.norm(X + known.modes.U @ known.xhat[7] - x[7])
 
     assert off(basis(X, x, F, 3, weights=w)) < 0.05 * off(basis(X, x, F, 3))
+
+
+def test_a_bend_follows_the_snapshots_that_weigh_most(bent, rng):
+    """Half of the snapshots have other products; weights choose whose bend is met."""
+    known = basis(*bent[:3], R)
+    xhat = known.xhat.copy()
+    xhat[::2, 2:] = np.column_stack([3.0 * xhat[::2, 0] ** 2, xhat[::2, 1] ** 2, xhat[::2, 0] ** 2])
+    w = np.where(np.arange(S) % 2, 1e-4, 1.0)
+    map = curved(known._replace(xhat=xhat), 2, 2, w)
+    found = np.array([map.all(y) for y in xhat[::2, :2]])
+    assert found == pytest.approx(xhat[::2], abs=1e-3 * abs(xhat).max())

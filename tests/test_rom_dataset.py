@@ -5,7 +5,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from small_studies import STEPS, study
+from small_studies import CURVED, STEPS, study
 
 from mpm_ref.cases import snapshots
 from mpm_ref.reduced import dataset, maps
@@ -21,6 +21,8 @@ from mpm_ref.reduced.generate import (
     one_thread,
 )
 from mpm_ref.rom import modes_file, weights
+from mpm_ref.rom.curved import curved
+from mpm_ref.rom.modes import basis
 from mpm_ref.scene import build
 from mpm_ref.store import BadResults, Fields
 from mpm_ref.store.results import Results
@@ -128,7 +130,14 @@ def test_two_processes_make_the_same(made, tmp_path):
 @pytest.fixture(scope="module")
 def model(made):
     bars, folder = made
-    return maps.linear(bars, dataset.load(bars, folder, bars.train), {"command": "none"})
+    return maps.computed(bars, dataset.load(bars, folder, bars.train), {"command": "none"})
+
+
+@pytest.fixture
+def bent(made, tmp_path):
+    """The same study with a curved map, and that map."""
+    bars = study(tmp_path, *CURVED)
+    return bars, maps.computed(bars, dataset.load(bars, made[1], bars.train), {"command": "none"})
 
 
 def test_modes_hold_the_training_states_and_their_coordinates(made, model):
@@ -152,6 +161,47 @@ def test_a_map_comes_back_bit_for_bit(made, model, tmp_path):
     assert back.about["map"] == {"kind": "modes", "r": 3}
     maps.save(tmp_path / "again.npz", back)
     assert (tmp_path / "again.npz").read_bytes() == (tmp_path / "map.npz").read_bytes()
+
+
+def test_a_curved_map_is_that_of_its_settings_and_comes_back_bit_for_bit(made, bent, tmp_path):
+    bars, model = bent
+    data = dataset.load(bars, made[1], bars.train)
+    known = basis(data.X, *data.flat(), 4)
+    map = curved(known, 2, 2)
+    assert np.array_equal(model.xhat.reshape(-1, 2), known.xhat[:, :2])
+    maps.save(tmp_path / "map.npz", model)
+    back = maps.load(tmp_path / "map.npz", bars)
+    for a, b in zip((*map.modes[:3], *map[1:], model.xhat, model.rest),
+                    (*back.decoder.modes[:3], *back.decoder[1:], back.xhat, back.rest),
+                    strict=True):
+        np.testing.assert_array_equal(a, b)
+    assert np.array_equal(back.decoder.place(data.X, back.rest), data.X)
+    assert back.about == model.about
+    assert back.about["map"] == {"kind": "curved", "r": 2, "modes": 4, "degree": 2}
+
+
+def test_a_curved_map_does_not_go_with_linear_projection(made, bent, tmp_path):
+    maps.save(tmp_path / "map.npz", bent[1])
+    with pytest.raises(ValueError, match=r"run\.projection = 'linear': expected 'nonlinear'"):
+        maps.load(tmp_path / "map.npz", made[0])
+
+
+def test_what_is_no_curved_map_is_refused(bent, tmp_path):
+    _, model = bent
+    assert model.decoder.powers.tolist() == [[2, 0], [1, 1], [0, 2]]
+    for name, wrong, words in (("C", np.zeros((3, 3)), r"C has shape \(3, 3\), expected \(2, 3\)"),
+                               ("powers", np.ones((3, 1)), r"powers has shape \(3, 1\)"),
+                               ("C", np.full((2, 3), np.nan), "C has numbers that are not finite")):
+        with pytest.raises(ValueError, match=words):
+            modes_file.save(tmp_path / "x.npz", model._replace(
+                decoder=model.decoder._replace(**{name: wrong})))
+    assert not (tmp_path / "x.npz").exists()
+    _, arrays = modes_file.arrays_of(model)
+    content = {"kind": np.array("curved"), "format": np.array(1), "about": np.array("{}"), **arrays}
+    del content["powers"]
+    (tmp_path / "x.npz").write_bytes(weights.sealed(content))
+    with pytest.raises(ValueError, match="lacks powers"):
+        modes_file.load(tmp_path / "x.npz")
 
 
 def test_a_map_of_another_study_is_refused(model, tmp_path):
@@ -219,11 +269,15 @@ def test_a_network_is_trained_as_its_settings_say_and_comes_back(made, tmp_path)
     assert back.about["map"]["weights"] == "printed"
 
 
-def test_tabulated_modes_are_the_modes(model):
+@pytest.mark.parametrize("kind", ["straight", "curved"])
+def test_tabulated_modes_are_the_modes(model, bent, kind):
+    of = model if kind == "straight" else bent[1]
     X = np.random.default_rng(0).uniform((0.0, 0.0), (0.8, 0.2), (30, 2))
-    here = tabulated(model.decoder, X)
-    for a, b in zip(here.derivatives(X, model.xhat[2, 5]),
-                    model.decoder.derivatives(X, model.xhat[2, 5]), strict=True):
+    here = tabulated(of.decoder, X)
+    assert type(here) is type(of.decoder)
+    assert len(getattr(here, "modes", here).X) == 30
+    for a, b in zip(here.derivatives(X, of.xhat[2, 5]),
+                    of.decoder.derivatives(X, of.xhat[2, 5]), strict=True):
         np.testing.assert_allclose(a, b, atol=1e-12)
 
 

@@ -11,7 +11,7 @@ from rom_toys import affine, cloud, decoder
 from mpm_ref.core.spline import STENCILS, base_of
 from mpm_ref.rom.affine import Affine
 from mpm_ref.rom.eulerian import Eulerian
-from mpm_ref.rom.inverse import ITERATIONS, guesses, preimages, shortened
+from mpm_ref.rom.inverse import ITERATIONS, from_middles, guesses, preimages, shortened
 from mpm_ref.rom.latent import at_start
 
 DX, RHO = 0.125, 700.0
@@ -91,7 +91,7 @@ def test_there_and_back(d, far):
     start = np.full((300, d), 0.5) if far else guesses(map, xhat, x, cloud(d, 3, seed=1))
     back = preimages(map, xhat, x, start, DX)
     assert back.found.all()
-    assert abs(back.X - X).max() < 1e-8 * DX
+    assert abs(back.at.X - X).max() < 1e-8 * DX
     assert abs(start - X).max() > 1e-3
     assert (5 if far else 1) <= back.iterations < 0.5 * ITERATIONS
 
@@ -101,7 +101,7 @@ def test_guesses_are_not_changed_and_good_ones_are_kept(d):
     start = X.copy()
     back = preimages(map, xhat, map.place(X, xhat), start, DX)
     assert back.iterations == 0
-    assert np.array_equal(back.X, X)
+    assert np.array_equal(back.at.X, X)
     moved = X + 0.05
     kept = moved.copy()
     preimages(map, xhat, map.place(X, xhat), moved, DX)
@@ -125,6 +125,7 @@ class Fold(NamedTuple):
     """x_0 = X_0^2, the other axes stay: nothing is mapped to x_0 < 0, and F is singular at 0."""
 
     dim: int
+    r = 0
 
     def place(self, X, xhat):
         return self.derivatives(X, xhat)[0]
@@ -142,9 +143,9 @@ def test_what_has_no_preimage_is_not_found(d, rng):
     start = rng.uniform(0.1, 1.0, (n, d)) * rng.choice((-1.0, 1.0), (n, 1))
     back = preimages(Fold(d), None, x, start, 10.0 * DX)
     assert np.array_equal(back.found, x[:, 0] > 0.0)
-    at = Fold(d).place(back.X, None)
+    at = Fold(d).place(back.at.X, None)
     assert np.linalg.norm(at - x, axis=1)[back.found].max() <= 1e-8 * DX
-    assert (np.sign(back.X[:, 0]) == np.sign(start[:, 0]))[back.found].all()
+    assert (np.sign(back.at.X[:, 0]) == np.sign(start[:, 0]))[back.found].all()
     assert back.iterations == ITERATIONS
 
 
@@ -169,6 +170,43 @@ def test_steps_are_cut_to_a_length_and_keep_their_direction(d, rng):
     assert np.allclose(cut * np.maximum(length, 1.0)[:, None], step, rtol=1e-14, atol=0.0)
 
 
+def test_what_is_known_of_a_preimage_is_of_the_point_found(d):
+    """However far it is from the place: x, F and dg/dxhat belong to X, not to the place."""
+    (map, xhat), X = bent(d), cloud(d, 200)
+    x, near = map.place(X, xhat), X + np.random.default_rng(3).uniform(-2e-2, 2e-2, X.shape)
+    for close in (1e-9, 1e-3, 0.3):
+        back = preimages(map, xhat, x, near, DX, close)
+        assert back.found.all()
+        assert np.linalg.norm(back.at.x - x, axis=1).max() <= close * DX
+        for known, again in zip(back.at[1:], map.derivatives(back.at.X, xhat), strict=True):
+            assert abs(known - again).max() < 1e-13
+    assert back.iterations == 0
+    assert np.array_equal(back.at.X, near)
+
+
+def test_guesses_from_the_middles_of_cells_are_near(d):
+    """Exact for affine maps; else an error of second order in the cell's size."""
+    def off(map, xhat, half):
+        X = cloud(d, 40)[:, None] + half * np.array(list(product((-1.0, 1.0), repeat=d)))
+        x = map.place(X.reshape(-1, d), xhat).reshape(X.shape)
+        start = guesses(map, xhat, x.mean(axis=1), cloud(d, 3, seed=1))
+        return abs(from_middles(map, xhat, x, start, cloud(d, 3, seed=1), DX) - X).max()
+
+    assert off(*affine(d), 0.1) < 1e-13
+    coarse, fine = (off(*bent(d), half) for half in (0.08, 0.02))
+    assert fine < 0.1 * coarse < 0.02
+
+
+def test_where_a_middle_is_lost_its_points_are_guessed_from_the_seeds(d, rng):
+    """A cell across the fold: the middle has no preimage, half of its points have."""
+    x = rng.uniform(0.3, 0.5, (2, 4, d))
+    x[1, :, 0] = (-0.4, -0.2, 0.05, 0.1)
+    seeds = rng.uniform(0.2, 1.0, (5, d))
+    found = from_middles(Fold(d), None, x, np.full((2, d), 0.5), seeds, 10.0 * DX)
+    assert np.array_equal(found[1], guesses(Fold(d), None, x[1], seeds))
+    assert not np.allclose(found[0], guesses(Fold(d), None, x[0], seeds))
+
+
 # what they carry
 
 def carried(quadrature, map, xhat):
@@ -178,9 +216,9 @@ def carried(quadrature, map, xhat):
 
 def test_points_outside_the_body_carry_nothing(d, degree):
     (map, xhat), quadrature = bent(d), body(d, degree)
-    X, m, V0, said = carried(quadrature, map, xhat)
+    at, m, V0, said = carried(quadrature, map, xhat)
     places = quadrature.places(map.place(quadrature.X, xhat))
-    J = np.linalg.det(map.derivatives(X, xhat)[1])
+    X, J = at.X, np.linalg.det(map.derivatives(at.X, xhat)[1])
     assert inside(X).all()
     assert V0 * J == pytest.approx((DX / 2) ** d, rel=1e-13)
     assert m == pytest.approx(RHO * V0, rel=1e-15)
@@ -198,8 +236,8 @@ def test_no_place_in_the_body_is_left_out(d):
     rows = xhat.reshape(d, d + 1)
     A, b = rows[:, :d], rows[:, d]
     origin = (quadrature.places(map.place(quadrature.X, xhat)) - b) @ np.linalg.inv(A).T
-    X, _, _, said = carried(quadrature, map, xhat)
-    assert abs(X - origin[inside(origin)]).max() < 1e-12
+    at, _, _, said = carried(quadrature, map, xhat)
+    assert abs(at.X - origin[inside(origin)]).max() < 1e-12
     assert said["lost"] == 0
 
 
@@ -207,12 +245,12 @@ def test_what_cannot_be_traced_back_is_lost():
     """Beyond a fold there are places that no point is mapped to; `cloud` says so."""
     X = 0.2 + 0.2 * cloud(2, 50)
     quadrature = Eulerian(X, RHO, lambda X: np.where(X[:, 0] > 0.0, -1.0, 0.5 * DX), X[:9], DX, 2)
-    X_q, _, _, said = quadrature.cloud(Fold(2), at_start(()), np.arange(50))
+    at, _, _, said = quadrature.cloud(Fold(2), at_start(()), np.arange(50))
     places = quadrature.places(Fold(2).place(X, None))
     assert said["lost"] == (places[:, 0] < 0.0).sum() > 0
     assert said["points"] + said["lost"] == len(places)
     assert said["outside"] == said["far"] == 0
-    assert (X_q[:, 0] > 0.0).all()
+    assert (at.X[:, 0] > 0.0).all()
 
 
 def mass_errors(d, per_cell):

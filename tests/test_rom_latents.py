@@ -37,6 +37,15 @@ def test_modes_are_in_the_norm_of_the_loss_and_stay(data):
         basis(data.X, *data.flat(), R).xhat, rel=1e-2)
 
 
+def test_modes_weigh_snapshots_as_often_as_they_are_shown(data):
+    plan = training(latent="modes", dense=4, thin=3)
+    shown = np.tile(np.where(np.arange(LEVELS) < 4, 1.0, 1.0 / 3.0), RUNS)
+    expected = basis(data.X, *data.flat(), R, plan.weights.F, np.sqrt(shown)).xhat
+    found = fit.train(plan, data).xhat.reshape(-1, R)
+    assert found == pytest.approx(expected, rel=1e-5, abs=1e-6)
+    assert found != pytest.approx(basis(data.X, *data.flat(), R, plan.weights.F).xhat, rel=1e-2)
+
+
 def test_the_decoder_learns_with_given_latents(data):
     session = fit.Session(training(latent="modes"), data)
     before = [p.detach().clone() for p in session.f.parameters()]

@@ -123,8 +123,21 @@ def test_more_modes_than_displacements_are_refused(rough, d):
 
 def test_snapshots_at_rest_have_no_modes(rough):
     X, _, F = rough
-    with pytest.raises(ValueError, match="r = 1: the snapshots have only 0 modes"):
+    with pytest.raises(ValueError, match="r = 1: the snapshots hold only 0 modes"):
         modes(X, np.tile(X, (S, 1, 1)), F, 1)
+
+
+@pytest.mark.parametrize("small", [500, 2], ids=("all values", "Lanczos"))
+@pytest.mark.parametrize(("least", "held"), [(0.0, 2), (1e-12, 2), (1e-8, 3)])
+def test_modes_of_round_off_are_refused(d, rng, monkeypatch, small, least, held):
+    """Three shapes in eight snapshots, the third of a size that is round-off or is not."""
+    monkeypatch.setattr("mpm_ref.rom.modes.SMALL", small)
+    X, size = rom_toys.cloud(d, N), np.array([1.0, 0.1, least])
+    x = X + np.tensordot(size * rng.normal(size=(8, 3)), rng.normal(size=(3, N, d)), 1)
+    F = np.tile(np.eye(d), (8, N, 1, 1))
+    assert modes(X, x, F, held).r == held
+    with pytest.raises(ValueError, match=rf"r = 5: the snapshots hold only {held} modes"):
+        modes(X, x, F, 5)
 
 
 def test_sizes_of_a_map(rough, d):

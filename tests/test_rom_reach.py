@@ -209,8 +209,9 @@ def test_the_cloud_is_the_support_with_its_masses(moved, d, degree, rng):
     quadrature = lagrangian(X, m, V0, DX, degree)
     at = quadrature.support(map, at_start(xhat), samples)
     found = quadrature.cloud(map, at_start(xhat), samples)
-    assert all(np.array_equal(a, b[at]) for a, b in zip(found[:3], (X, m, V0), strict=True))
-    assert found[3] == {"points": len(at)}
+    whole = zip((found.at.X, found.m, found.V0), (X, m, V0), strict=True)
+    assert all(np.array_equal(a, b[at]) for a, b in whole)
+    assert found.said == {"points": len(at)}
 
 
 # samples

@@ -9,7 +9,7 @@ from small_studies import STEPS, study, write
 from mpm_ref.cli.shipped import shipped_scenes, shipped_studies
 from mpm_ref.reduced.march import Way
 from mpm_ref.reduced.study import load
-from mpm_ref.reduced.tables import Map, Run
+from mpm_ref.reduced.tables import KEYS, NETWORK, Map, Run
 from mpm_ref.reduced.vary import flat, varied
 from mpm_ref.scene import SceneError, canonical
 from validation.ldm.studies import STUDIES
@@ -69,6 +69,9 @@ def test_a_latin_hypercube_has_one_run_in_each_part_of_each_range(tmp_path):
         assert sorted(parts) == list(range(10))
     assert np.array_equal(study(tmp_path, *edits).mu, mu)
     assert not np.array_equal(study(tmp_path, *edits, ("test = 1", "test = 1\nseed = 1")).mu, mu)
+    orders = np.argsort(mu, axis=0).T
+    assert not np.array_equal(*orders)
+    assert all((np.diff(order) != 1).any() for order in orders)
 
 
 @pytest.mark.parametrize(("path", "value", "get"), [
@@ -125,7 +128,19 @@ def test_what_is_set_is_set_in_all_runs(tmp_path):
     ("r = 3", "r = 0", "map.r = 0: expected a whole number >= 1"),
     ("r = 3", "r = 3.5", "map.r = 3.5: expected a whole number"),
     ("r = 3", "r = 3\nepochs = 2", "map.epochs: given, but the kind is \"modes\""),
-    ('"modes"', '"mode"', "map.kind = 'mode': expected one of 'modes', 'network'"),
+    ('"modes"', '"mode"', "map.kind = 'mode': expected one of 'modes', 'curved', 'network'"),
+    ("r = 3", "r = 3\ndegree = 2", 'map.degree: given, but the kind is "modes"; remove it, or take '
+     'kind = "curved"'),
+    ('"modes"', '"network"\nmodes = 5', 'map.modes: given, but the kind is "network"'),
+    ('"modes"', '"curved"', "map.modes = none: expected more than r = 3 of a curved map"),
+    ('"modes"', '"curved"\nmodes = 3', "map.modes = 3: expected more than r = 3"),
+    ('"modes"', '"curved"\nmodes = 5\ndegree = 1', "map.degree = 1: expected a whole number >= 2"),
+    ('kind = "modes"\nr = 3', 'kind = "curved"\nr = 3\nmodes = 5\nepochs = 2\n[run]\n'
+     'projection = "nonlinear"', 'map.epochs: given, but the kind is "curved"'),
+    ('"modes"', '"curved"\nmodes = 5', "run.projection = 'linear': expected 'nonlinear' for a "
+     "curved map"),
+    ("[map]", '[run]\nprecision = "half"\n[map]', "run.precision = 'half': expected one of"),
+    ("[map]", '[run]\nclose = 0\n[map]', "run.close = 0"),
     ('"modes"', '"network"\nlatent = "a"', "map.latent = 'a': expected one of"),
     ('"modes"', '"network"\nweights = "a"', "map.weights = 'a': expected one of"),
     ("[map]", '[run]\nvelocity = "a"\n[map]', "run.velocity = 'a': expected one of"),
@@ -221,6 +236,11 @@ def test_a_run_is_made_as_the_study_says(tmp_path):
     assert set(Way._fields) == set(Run.__struct_fields__) - {"seed"}
 
 
+def test_every_key_of_a_map_belongs_to_one_kind():
+    keys = [key for kind in KEYS.values() for key in kind]
+    assert sorted(("kind", "r", *keys)) == sorted(Map.__struct_fields__)
+
+
 def test_a_network_is_trained_as_the_study_says():
     pytest.importorskip("torch")
     from mpm_ref.rom.learn.fit import Training
@@ -229,5 +249,5 @@ def test_a_network_is_trained_as_the_study_says():
     for field in fields(Training):
         if field.name not in ("r", "weights"):
             assert getattr(own, field.name) == field.default
-    assert {field.name for field in fields(Training)} == set(Map.__struct_fields__) - {"kind"}
+    assert {field.name for field in fields(Training)} == {"r", *KEYS[NETWORK]}
     assert READINGS[own.weights] == CODE

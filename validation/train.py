@@ -8,15 +8,14 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import torch
 import typer
 from tqdm import tqdm
 
-from mpm_ref.rom.latent import initial
+from mpm_ref.reduced.maps import of_trained
 from mpm_ref.rom.learn.fit import Training, train
 from mpm_ref.rom.learn.loss import READINGS, Weights
-from mpm_ref.rom.weights import Model, save
+from mpm_ref.rom.weights import save
 
 from .ldm.nets import FOLDER, SHARES, identity, nets
 from .provenance import commit, provenance
@@ -42,14 +41,11 @@ def made(name, checkpoints, threads):
             bar.update(len(history) - bar.n)
             bar.set_postfix(loss=f"{history[-1][0]:.2e}")
         done = train(plan, snapshots, checkpoints / f"{name}.pt", show)
-    about = {**identity(net), "training": asdict(plan),
-             "command": f"python -m validation.train {name}", "threads": threads,
-             "cpu_seconds_of_last_part": round(time.process_time() - begin, 1),
-             "torch": torch.__version__,
-             "loss": np.asarray(done.history)[:: max(1, plan.epochs // 50)].tolist(),
-             **provenance(commit(ROOT))}
-    rest = initial(done.decoder, snapshots.X, xhat=done.xhat[:, 0].mean(axis=0)).xhat
-    return Model(done.decoder, done.xhat, rest, about)
+    return of_trained(done, snapshots.X, {
+        **identity(net), "training": asdict(plan), "command": f"python -m validation.train {name}",
+        "threads": threads, "torch": torch.__version__,
+        "cpu_seconds_of_last_part": round(time.process_time() - begin, 1),
+        **provenance(commit(ROOT))})
 
 
 def main(

@@ -4,6 +4,7 @@ A study file names the scene, its parameters and the map; docs/reduced.md explai
 """
 
 import os
+from contextlib import contextmanager
 from math import isfinite
 from pathlib import Path
 from typing import Annotated
@@ -17,9 +18,10 @@ from ..reduced.generate import INTERRUPTED, NOT_WRITTEN, SKIPPED, UNSTABLE, gene
 from ..reduced.model import kind_of, recording, with_kind
 from ..reduced.record import Lost, record, require_leave
 from ..reduced.study import load
-from ..reduced.tables import MODES, NETWORK
+from ..reduced.tables import KEYS, NETWORK
 from ..scene import SceneError
 from ..store.atomic import NotWritten, not_written, require_place
+from ..store.session import FINISHED
 from ..store.words import counted
 from . import faults
 from .faults import end, one_line, options
@@ -53,7 +55,7 @@ def make_data(
     """
     with one_line():
         study = studied(name)
-        folder, count = out or data_of(study), {}
+        folder, count = named(out, study, "-data"), {}
         with options():
             case(study.scene(study.mu[0]))      # refuses what reduced runs do not know
         make_folder(folder)
@@ -77,17 +79,18 @@ def train(
     data: Data = None,
     out: Annotated[Path | None, typer.Option(
         "--out", "-o", help="File for the map, default: STUDY.npz.")] = None,
-    kind: Annotated[str | None, typer.Option(help="modes or network, default: as studied.")] = None,
+    kind: Annotated[str | None, typer.Option(
+        help=f"Of {', '.join(KEYS)}, default: as studied.")] = None,
     threads: Annotated[int, typer.Option(help="Of PyTorch.", min=1)] = 1,
     overwrite: Overwrite = False,
 ):
-    """Make the map of a study from its runs: POD modes at once, a network by training, which needs
-    PyTorch. A training that is cut off goes on from its checkpoint, MAP.pt.
+    """Make the map of a study from its runs: POD modes, straight or curved, at once; a network by
+    training, which needs PyTorch. A training that is cut off goes on from its checkpoint, MAP.pt.
     """
     with one_line():
         with options():
             study = with_kind(studied(name), kind)
-            out, data = out or map_of(study), data or data_of(study)
+            out, data = named(out, study, ".npz"), named(data, study, "-data")
             require_map_place(out, study, overwrite)
             if study.tables.map.kind == NETWORK:
                 maps.training()
@@ -103,9 +106,9 @@ def train(
 
 def fitted(study, snapshots, about, checkpoint, threads):
     """`Model` of a study's kind, with a bar of epochs."""
-    if study.tables.map.kind == MODES:
+    if study.tables.map.kind != NETWORK:
         with one_thread():
-            return maps.linear(study, snapshots, about)
+            return maps.computed(study, snapshots, about)
     with passing(total=study.tables.map.epochs, unit="epoch", desc=study.path.stem) as bar:
         def show(history):
             bar.update(len(history) - bar.n)
@@ -123,18 +126,17 @@ def run(
     points_out: Annotated[int | None, typer.Option(
         help="Points to show the body at, default: those of the study.", min=1)] = None,
     overwrite: Overwrite = False,
+    json: Machine = False,
 ):
     """Run the reduced model into a results file, for `mpm-ref info`, `plot`, `animate` and
     `export`. Exit status as of `mpm-ref run`: 0 done, 2 bad input, 3 the run broke down, 4 a file
-    could not be written, 130 Ctrl-C.
+    could not be written, 130 Ctrl-C; a run that was cut off is made again, with --overwrite.
     """
-    with one_line(), one_thread():
-        study = studied(name)
-        out = out or Path(f"{study.path.stem}.h5")
+    with at_work(name) as study:
+        out, file = named(out, study, ".h5"), named(map, study, ".npz")
         with options():
             keep_scene(study.path, out)
             mu = study.given(values or [])
-            file = map or map_of(study)
             made = recording(study, maps.load(file, study), mu, points_out)
             made.facts["map_sha256"] = maps.sha256(file)
             require_place(out)
@@ -147,8 +149,17 @@ def run(
         except Lost as fault:
             end(fault, faults.UNSTABLE)
         warn(astray(out_of_bounds, steps))
-        print(f"finished: {counted(steps, 'step')} of {kind_of(made.model)}, r = "
+        print(as_json(ran(made, out, out_of_bounds)) if json else
+              f"{FINISHED}: {counted(steps, 'step')} of {kind_of(made.model)}, r = "
               f"{made.model.decoder.r}, {len(made.field.X)} points in {out}")
+
+
+def ran(made, out, out_of_bounds):
+    """A `Recording` that was made, as plain values."""
+    clock = made.problem.clock
+    return {"why": FINISHED, "out": str(out), "step": clock.steps, "t": clock.steps * clock.dt,
+            "frames": clock.steps + 1, "points_out": len(made.field.X), "reduced": made.facts,
+            "out_of_bounds": {str(k): sight.why for k, sight in out_of_bounds.items()}}
 
 
 def astray(out_of_bounds, steps):
@@ -171,9 +182,8 @@ def judge(
     """Errors of reduced runs beside the full-order runs that were held out, and of the map's
     nearest states. Exit status 3 where a run broke down.
     """
-    with one_line(), one_thread():
-        study = studied(name)
-        file = map or map_of(study)
+    with at_work(name) as study:
+        file = named(map, study, ".npz")
         picture = out or file.with_suffix(".errors.png")
         with options():
             if picture.suffix.lower() not in PICTURES:
@@ -182,7 +192,7 @@ def judge(
             if not study.test:
                 raise SceneError(f"{study.path}: test = 0: no run is held out to compare with")
             model = maps.load(file, study)
-            snapshots = dataset.load(study, data or data_of(study), study.test)
+            snapshots = dataset.load(study, named(data, study, "-data"), study.test)
             runs = passing(unit="run", iterable=evaluate(study, model, snapshots),
                            total=len(study.test))
             found = list(runs)
@@ -203,14 +213,16 @@ def studied(name):
     return load(find_study(name), shipped_scenes())
 
 
-def data_of(study):
-    """Folder of a study's runs where none is given."""
-    return Path(f"{study.path.stem}-data")
+@contextmanager
+def at_work(name):
+    """The same, while reduced runs of it are made: on one thread, their faults in one line."""
+    with one_line(), one_thread():
+        yield studied(name)
 
 
-def map_of(study):
-    """File of a study's map where none is given."""
-    return Path(f"{study.path.stem}.npz")
+def named(path, study, ending):
+    """A path as it is given; else named after the study, here."""
+    return path or Path(f"{study.path.stem}{ending}")
 
 
 def make_folder(folder):

@@ -13,7 +13,7 @@ from ..store.atomic import replacing
 from .case import case
 from .errors import Errors, Squares
 from .march import march
-from .model import require_samples
+from .model import require_way
 
 REDUCED, NEAREST = "reduced", "nearest"
 
@@ -40,7 +40,7 @@ def evaluate(study, model, snapshots):
     """
     for number, mu, x in zip(study.test, snapshots.mu, snapshots.x, strict=True):
         one = case(study.scene(mu))
-        require_samples(one, model, study.tables.run)
+        require_way(one, model, study.tables.run)
         yield Held(number, mu, {
             REDUCED: course(one.X, x, reduced(one, model, study.tables.run)),
             NEAREST: course(one.X, x, nearest(one.X, x, model))})

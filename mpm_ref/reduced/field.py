@@ -10,6 +10,7 @@ from scipy.spatial import KDTree
 
 from ..body import Body
 from ..explicit import initial_stress
+from ..rom.curved import Curved
 from ..rom.latent import points, velocities
 from ..rom.modes import Modes
 from ..sampling import Poisson
@@ -36,13 +37,17 @@ class Field(NamedTuple):
 def field(map, body):
     """`Field` of a map at the points of a body at rest."""
     X = body.particles.x.copy()
-    return Field(tabulated(map, X) if isinstance(map, Modes) else map, X, body)
+    return Field(tabulated(map, X), X, body)
 
 
 def tabulated(map, X):
     """`Modes` with their values at points X (n, d), so that they are not fitted anew in each step
-    where these are not those of the data.
+    where these are not those of the data; also those of a `Curved` map. A network as it is.
     """
+    if isinstance(map, Curved):
+        return map._replace(modes=tabulated(map.modes, X))
+    if not isinstance(map, Modes):
+        return map
     slope = [map.derivatives(X, axis)[1] - np.eye(map.dim) for axis in np.eye(map.r)]
     return Modes(X, map.derivatives(X, np.zeros(map.r))[2], np.stack(slope, axis=-1), KDTree(X))
 

@@ -8,22 +8,27 @@ import msgspec
 import numpy as np
 
 from ..rom import modes_file, weights
+from ..rom.curved import curved
+from ..rom.decoder import Decoder
 from ..rom.latent import initial
 from ..rom.modes import basis
 from ..rom.weights import Model
 from ..store.manifest import source_hash, versions
-from .tables import MODES
+from .tables import CURVED, KEYS, MODES, NETWORK, require_nonlinear
 
 KEPT = 50           # epochs of which the loss is kept in the file
 
 
-def linear(study, snapshots, about):
-    """`Model` of POD modes of `Snapshots`; about: what else is to be known of it, plain values.
-    Raises ValueError for more latent coordinates than the data have modes.
+def computed(study, snapshots, about):
+    """`Model` of POD modes of `Snapshots`, straight or bent; about: what else is to be known of it,
+    plain values. Raises ValueError for more modes, or more monomials, than the data tell.
     """
-    map, xhat = basis(snapshots.X, *snapshots.flat(), study.tables.map.r)
-    return Model(map, xhat.reshape(*snapshots.x.shape[:2], map.r), np.zeros(map.r),
-                 about | identity(study))
+    how = study.tables.map
+    bent = how.kind == CURVED
+    known = basis(snapshots.X, *snapshots.flat(), how.modes if bent else how.r)
+    map = curved(known, how.r, how.degree) if bent else known.modes
+    xhat = known.xhat[:, :how.r].reshape(*snapshots.x.shape[:2], how.r)
+    return Model(map, xhat, np.zeros(how.r), about | identity(study))
 
 
 def learned(study, snapshots, about, checkpoint, on_epoch, threads):
@@ -31,14 +36,20 @@ def learned(study, snapshots, about, checkpoint, on_epoch, threads):
     `rom.learn.fit.train`. Raises ValueError without PyTorch, and for a checkpoint of another
     training.
     """
-    settings = msgspec.structs.asdict(study.tables.map)
-    del settings["kind"]
+    settings = {name: getattr(study.tables.map, name) for name in ("r", *KEYS[NETWORK])}
     drive = training()
     done = drive.fitted(settings, snapshots, checkpoint, on_epoch, threads)
-    rest = initial(done.decoder, snapshots.X, xhat=done.xhat[:, 0].mean(axis=0)).xhat
+    return of_trained(done, snapshots.X, about | identity(study) | {
+        "threads": threads, "torch": drive.version()})
+
+
+def of_trained(done, X, about):
+    """`Model` of a `rom.learn.fit.Trained` for points X (n, d) at rest [m]; the loss of some epochs
+    is added to what is to be known of it.
+    """
+    rest = initial(done.decoder, X, xhat=done.xhat[:, 0].mean(axis=0)).xhat
     loss = done.history[::max(1, len(done.history) // KEPT)].tolist()
-    return Model(done.decoder, done.xhat, rest, about | identity(study) | {
-        "threads": threads, "torch": drive.version(), "loss": loss})
+    return Model(done.decoder, done.xhat, rest, about | {"loss": loss})
 
 
 def training():
@@ -57,7 +68,8 @@ def identity(study):
     """What a map is of and how it was made: plain values."""
     map = study.tables.map
     return {"study": study.digest, "title": study.tables.title,
-            "map": {"kind": MODES, "r": map.r} if map.kind == MODES else msgspec.to_builtins(map),
+            "map": {name: value for name, value in msgspec.to_builtins(map).items()
+                    if name in ("kind", "r", *KEYS[map.kind])},
             "parameters": list(study.names),
             "mu": study.mu[list(study.train)].tolist(), "source_sha256": source_hash(),
             "versions": versions()}
@@ -65,19 +77,20 @@ def identity(study):
 
 def save(path, model):
     """Write a `Model`, whole or not at all. Raises OSError where the system refuses."""
-    kind = modes_file if hasattr(model.decoder, "slope") else weights
-    kind.save(path, model)
+    file = weights if isinstance(model.decoder, Decoder) else modes_file
+    file.save(path, model)
 
 
 def load(path, study):
-    """The `Model` of a file, of either kind. Raises ValueError for a file that is damaged or no
-    map, and for one of another study.
+    """The `Model` of a file, of any kind. Raises ValueError for a file that is damaged or no map,
+    for one of another study, and for one that the study's projection does not suit.
     """
     arrays = weights.opened(Path(path))
     model = (modes_file if modes_file.is_one(arrays) else weights).load(path)
     if model.about.get("study") != study.digest:
         raise ValueError(f"{path} is a map of another study, or of {study.path} before its scenes "
                          "or held-out runs changed; train again, or name the study it is of")
+    require_nonlinear(model.about["map"]["kind"], study.tables.run.projection)
     return model
 
 

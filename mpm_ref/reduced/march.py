@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..rom.eulerian import Eulerian
+from ..rom.inverse import CLOSE
 from ..rom.lagrangian import Resampled, lagrangian
 from ..rom.latent import initial
 from ..rom.samples import PER_GROUP, draw, pivoted
@@ -13,10 +14,12 @@ from ..sampling import Regular, sample
 from ..shapes.inside import solid
 from .case import distance
 
+PRECISIONS = ("double", "single")
 QUADRATURES = ("lagrangian", "eulerian")
 PROJECTIONS = ("nonlinear", "linear")
 SCHEMES = tuple((q, p) for q in QUADRATURES for p in PROJECTIONS)
 ENOUGH = 4000       # points that tell where a body is at the start
+SINGLE = 1e-4       # nearest that preimages can be asked for in single precision [dx]
 COARSE = 8          # blocks over a body's longest side, from which Eulerian points are traced back
 
 
@@ -34,6 +37,8 @@ class Way(NamedTuple):
     velocity: str = "previous"
     per_cell: int = 2           # quadrature points of a cell per axis, if they are not material
     samples: str = "redrawn"
+    close: float = CLOSE        # how near Eulerian points must be to their places [dx]
+    precision: str = "double"   # of a learned map, or "single"
 
     @property
     def name(self):
@@ -47,8 +52,25 @@ def model(case, map, way):
     make = {"lagrangian": of_material, "eulerian": of_cells, "resampled": of_another_sampling}
     if way.quadrature not in make:
         raise ValueError(f"quadrature = {way.quadrature!r}: expected one of {', '.join(make)}")
-    return Reduced(map, make[way.quadrature](case, way), problem.bodies[0].law, problem.gravity,
-                   problem.conditions, way.projection, way.velocity)
+    return Reduced(precise(map, way), make[way.quadrature](case, way), problem.bodies[0].law,
+                   problem.gravity, problem.conditions, way.projection, way.velocity)
+
+
+def precise(map, way):
+    """A map in the precision of a way. Raises ValueError for one that there is not, a map that has
+    only doubles, and preimages nearer than single precision can tell.
+    """
+    if way.precision == "double":
+        return map
+    if way.precision not in PRECISIONS:
+        raise ValueError(f"precision = {way.precision!r}: expected {' or '.join(PRECISIONS)}")
+    if not hasattr(map, "single"):
+        raise ValueError("precision = 'single': learned maps alone have it, this is one of "
+                         f"{type(map).__name__}")
+    if way.quadrature == "eulerian" and way.close < SINGLE:
+        raise ValueError(f"close = {way.close:g} dx in single precision: expected at least "
+                         f"{SINGLE:g}")
+    return map.single()
 
 
 def of_material(case, way):
@@ -61,7 +83,7 @@ def of_cells(case, way):
     size = np.ptp(case.X, axis=0).max() / COARSE
     seeds = np.unique(np.floor(case.X / size), axis=0, return_index=True)[1]
     return Eulerian(case.X, case.rho, lambda X: distance(X, case.shape), case.X[seeds],
-                    case.problem.dx, case.problem.scheme.degree, way.per_cell)
+                    case.problem.dx, case.problem.scheme.degree, way.per_cell, way.close)
 
 
 def of_another_sampling(case, way):
@@ -75,13 +97,17 @@ def march(case, map, way, rest, seed=0, pick=None):
     """Yield (`Latent`, `Report` or None) of a reduced run, the start first. rest: latent
     coordinates near the body at rest; pick: the samples as `picked` gives them, or others.
     """
-    stepper, clock = model(case, map, way), case.problem.clock
-    latent = start(case, map, rest)
+    stepper, latent = model(case, map, way), start(case, map, rest)
     pick = pick or picked(case, map, way, latent.xhat, seed)
     yield latent, None
+    yield from stepped(stepper, case.problem.clock, latent, lambda t, latent: pick(t))
+
+
+def stepped(stepper, clock, latent, choose):
+    """Yield (`Latent`, `Report`) after each step; choose(t, latent) gives the samples."""
     for k in range(clock.steps):
         t = k * clock.dt
-        latent, report = stepper.step(latent, pick(t), t, clock.dt)
+        latent, report = stepper.step(latent, choose(t, latent), t, clock.dt)
         yield latent, report
 
 

@@ -6,17 +6,17 @@ from ..rom.samples import draw
 from ..scene import build
 from .case import case
 from .field import field, resampled
-from .march import groups
+from .march import groups, precise
 from .record import Recording
-from .tables import MODES, NETWORK, one_of
 from .watch import watch
 
 
 def with_kind(study, kind):
-    """The study with a map of another kind; None: its own. Raises ValueError for an unknown one."""
+    """The study with a map of another kind; None: its own. Raises ValueError for an unknown one,
+    and for one that needs other settings than the study has.
+    """
     if kind is None:
         return study
-    one_of("kind", kind, (MODES, NETWORK))
     map = msgspec.structs.replace(study.tables.map, kind=kind)
     return study._replace(tables=msgspec.structs.replace(study.tables, map=map))
 
@@ -26,20 +26,23 @@ def kind_of(model):
     return model.about["map"]["kind"]
 
 
-def require_samples(one, model, run):
-    """Raise ValueError where the samples of a reduced run of a `Case` do not suffice."""
+def require_way(one, model, run):
+    """Raise ValueError where the samples of a reduced run of a `Case` do not suffice, or its map
+    has not that precision.
+    """
     n = len(one.X)
+    precise(model.decoder, run.way)
     draw(n, run.points or n, model.decoder.r, model.decoder.dim, groups(one, run.way, 0.0))
 
 
 def recording(study, model, mu, count=None):
     """`Recording` of a reduced run with parameters mu, shown at so many points of the body's shape;
-    None: at those of the study. Raises ValueError for samples that do not suffice, and for a scene
-    that reduced runs do not know.
+    None: at those of the study. Raises ValueError for samples that do not suffice, a precision that
+    the map has not, and a scene that reduced runs do not know.
     """
     scene, run = study.scene(mu), study.tables.run
     one = case(scene)
-    require_samples(one, model, run)
+    require_way(one, model, run)
     shown = one.problem if count is None else build(resampled(scene, count))
     facts = {"study": study.digest, "map": model.about["map"], "points": len(one.X),
              "parameters": dict(zip(study.names, map(float, mu), strict=True)),

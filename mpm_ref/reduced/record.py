@@ -20,6 +20,7 @@ from ..store.manifest import Part, manifest
 from ..store.results import Results
 from ..store.running import Refused
 from ..store.session import FINISHED, INTERRUPTED, checkpoint_of
+from ..store.words import counted
 from .field import Field
 from .watch import Nonsense, Watch, watched
 
@@ -59,10 +60,22 @@ def require_leave(out, overwrite):
     """Raise `Refused` where a file stands that is not to be replaced, and BadResults for one that
     is no results file.
     """
-    if Path(out).exists():
-        if not overwrite:
-            raise Refused(f"{out} exists: add --overwrite to replace it, or name another file")
-        Results(out).close()
+    if not Path(out).exists():
+        return
+    with Results(out) as results:
+        if overwrite:
+            return
+        if cut_off(results.manifest):
+            raise Refused(f"{out} holds a reduced run that was cut off after "
+                          f"{counted(len(results), 'frame')}; such runs take seconds and do not go "
+                          "on: make it again with --overwrite")
+        raise Refused(f"{out} exists: add --overwrite to replace it, or name another file")
+
+
+def cut_off(facts):
+    """Whether a manifest is that of a reduced run that was interrupted or killed."""
+    parts = facts.get("parts")
+    return "reduced" in facts and (not parts or parts[-1]["why"] == INTERRUPTED)
 
 
 def record(recording, out, on_step=None):

@@ -20,7 +20,7 @@ from ..scene import SceneError
 from ..scene.check import check_finite
 from ..scene.error import at, joined, opened_by
 from ..scene.words import rephrase
-from .tables import LATIN, MODES, Map, Parameter, Run, Tables
+from .tables import KEYS, LATIN, Map, Parameter, Run, Tables
 from .vary import flat, varied
 
 SAME = ("dim", "dx", "dt", "steps", "seed", "scheme", "integrator")     # in all runs of a study
@@ -123,10 +123,11 @@ def _checked(data):
         tables = msgspec.convert(data, Tables)
     except msgspec.ValidationError as fault:
         raise SceneError(rephrase(str(fault), data)) from None
-    extra = sorted(set(data["map"]) - {"kind", "r"})
-    if tables.map.kind == MODES and extra:
-        raise SceneError(f'map.{extra[0]}: given, but the kind is "{MODES}", which is computed; '
-                         'remove it, or take kind = "network"')
+    kind = tables.map.kind
+    for key in sorted(set(data["map"]) - {"kind", "r", *KEYS[kind]}):
+        other = next(other for other, keys in KEYS.items() if key in keys)
+        raise SceneError(f'map.{key}: given, but the kind is "{kind}"; remove it, or take '
+                         f'kind = "{other}"')
     return tables
 
 

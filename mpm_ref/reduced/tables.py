@@ -7,21 +7,34 @@ from msgspec import Meta, Struct, field
 
 from ..rom.architecture import HIDDEN
 from ..rom.latent import VELOCITIES
-from ..shapes.quantities import Count, Natural, PerCell, Seed
-from .march import PROJECTIONS, QUADRATURES, Way
+from ..shapes.quantities import Count, Natural, PerCell, Positive, Seed
+from .march import PRECISIONS, PROJECTIONS, QUADRATURES, Way
 
-MODES, NETWORK = "modes", "network"
+MODES, CURVED, NETWORK = "modes", "curved", "network"
+KEYS = {                            # of a map of each kind, beside `kind` and `r`
+    MODES: (),
+    CURVED: ("modes", "degree"),
+    NETWORK: ("hidden", "latent", "weights", "epochs", "batch", "points", "dense", "thin", "seed"),
+}
 GRID, LATIN = "grid", "latin"
 ENCODER, FREE = "encoder", "free"
 RESAMPLED, SAMPLES = "resampled", ("redrawn", "kept", "pivoted")       # see `march.Way`
 READINGS = ("code", "printed")      # of the loss's weights, see `rom.learn.loss`
 Word = Annotated[str, Meta(pattern=r"^\w[\w.-]*\Z", max_length=100)]
+Bend = Annotated[int, Meta(ge=2)]
 
 
 def one_of(name, value, known):
     """Raise ValueError unless a value is known."""
     if value not in known:
         raise ValueError(f"{name} = {value!r}: expected one of {', '.join(map(repr, known))}")
+
+
+def require_nonlinear(kind, projection):
+    """Raise ValueError for linear projection on a map that is curved."""
+    if kind == CURVED and projection != "nonlinear":
+        raise ValueError(f"run.projection = {projection!r}: expected 'nonlinear' for a curved map, "
+                         "since linear projection leaves the curve in every step")
 
 
 class Table(Struct, frozen=True, kw_only=True):
@@ -58,10 +71,14 @@ class Parameter(Table, rename={"start": "from", "stop": "to"}):
 
 
 class Map(Table):
-    """The map: POD modes, or a network and how it is trained (see `rom.learn.fit.Training`)."""
+    """The map: POD modes, straight or bent (see `rom.curved`), or a network and how it is trained
+    (see `rom.learn.fit.Training`).
+    """
 
     kind: str
     r: Count                                    # latent coordinates
+    modes: Count | None = None                  # of a curved map: those kept, r of them free
+    degree: Bend = 2                            # ... of the polynomials that the others are
     hidden: tuple[Count, ...] = HIDDEN
     latent: str = ENCODER
     weights: str = READINGS[0]
@@ -73,7 +90,10 @@ class Map(Table):
     seed: Seed = 0
 
     def __post_init__(self):
-        one_of("kind", self.kind, (MODES, NETWORK))
+        one_of("kind", self.kind, KEYS)
+        if self.kind == CURVED and (self.modes or 0) <= self.r:
+            raise ValueError(f"modes = {self.modes or 'none'}: expected more than r = {self.r} of "
+                             "a curved map, whose others follow from the first r")
         one_of("latent", self.latent, (ENCODER, FREE))
         one_of("weights", self.weights, READINGS)
 
@@ -86,6 +106,8 @@ class Run(Table):
     points: Count | None = None                 # samples; none: all points
     samples: str = Way().samples
     per_cell: PerCell = Way().per_cell          # quadrature points per axis, not material ones
+    close: Positive = Way().close               # how near Eulerian points are traced back [dx]
+    precision: str = Way().precision            # of a network
     velocity: str = Way().velocity
     seed: Seed = 0                              # of the samples
 
@@ -94,6 +116,7 @@ class Run(Table):
         one_of("samples", self.samples, SAMPLES)
         one_of("projection", self.projection, PROJECTIONS)
         one_of("velocity", self.velocity, VELOCITIES)
+        one_of("precision", self.precision, PRECISIONS)
 
     @property
     def way(self):
@@ -117,6 +140,7 @@ class Tables(Table):
 
     def __post_init__(self):
         one_of("sampling", self.sampling, (GRID, LATIN))
+        require_nonlinear(self.map.kind, self.run.projection)
         if (self.count is not None) != (self.sampling == LATIN):
             raise ValueError(f'count: expected with sampling = "{LATIN}", and only there')
         for name in ("name", "key"):

@@ -9,6 +9,7 @@ barrier in nonlinear projection-based model order reduction", J. Comput. Phys. 4
 """
 
 from itertools import combinations_with_replacement
+from math import comb
 from typing import NamedTuple
 
 import numpy as np
@@ -59,17 +60,22 @@ class Curved(NamedTuple):
 
 def curved(basis, r, degree, weights=1.0):
     """The `Curved` map of the r leading modes of a `modes.Basis`, fitted to its snapshots with
-    these weights. Raises ValueError where no modes are left to follow, or the degree is below 2.
+    these weights. Raises ValueError where no modes are left to follow, the degree is below 2, or
+    there are more monomials than snapshots.
     """
-    R = basis.modes.r
+    R, s = basis.modes.r, len(basis.xhat)
     if not 1 <= r < R:
         raise ValueError(f"r = {r} of {R} modes: expected 1 .. {R - 1}, so that others follow")
     if degree < 2:
         raise ValueError(f"degree = {degree}: expected at least 2; degree 1 is `modes`")
+    count = comb(r + degree, degree) - r - 1
+    if count > s:
+        raise ValueError(f"degree = {degree}: {count} monomials of {r} coordinates, but {s} "
+                         "snapshots to fit them to; take a smaller degree or r, or more snapshots")
     chosen = [np.bincount(c, minlength=r) for p in range(2, degree + 1)
               for c in combinations_with_replacement(range(r), p)]
     powers = np.array(chosen)
-    w = np.broadcast_to(np.asarray(weights, dtype=float), len(basis.xhat))[:, None]
+    w = np.broadcast_to(np.asarray(weights, dtype=float), s)[:, None]
     M = w * np.array([monomials(y, powers) for y in basis.xhat[:, :r]])
     normal = M.T @ M
     C = np.linalg.solve(normal + RIDGE * np.diag(np.diag(normal)), M.T @ (w * basis.xhat[:, r:]))

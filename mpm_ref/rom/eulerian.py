@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .inverse import guesses, preimages
+from .inverse import CLOSE, from_middles, guesses, preimages
+from .placed import Cloud
 from .reach import reach
 
 PER_CELL = 2        # quadrature points of a cell per axis, l
@@ -26,33 +27,47 @@ class Eulerian(NamedTuple):
     dx: float           # of the grid [m]
     degree: int         # of its splines
     per_cell: int = PER_CELL
+    close: float = CLOSE    # how near a point's image must be to its place [dx]
 
     feather = 1e-9      # mass of a sample on the grid over that of a point: no node that samples
                         # read is empty where the points miss the body's edge
 
     def places(self, x):
         """All quadrature points (n, d) [m] that share a node with samples at x."""
+        return self.cells(x).reshape(-1, self.X.shape[1])
+
+    def cells(self, x):
+        """The same by cell, (cells, l^d, d)."""
         s = (np.arange(self.per_cell) + 0.5) / self.per_cell
         first = 0.5 * (self.degree - 1)         # points with a base begin so many cells after it
         s = np.sort(s + np.ceil(first - s))
         offsets = np.array(list(product(s, repeat=x.shape[1])))
-        cells = reach(x, self.dx, self.degree).cells()
-        return (cells[:, None] + offsets).reshape(-1, x.shape[1]) * self.dx
+        return (reach(x, self.dx, self.degree).cells()[:, None] + offsets) * self.dx
 
     def cloud(self, map, latent, samples):
-        """X, m and V0 of the quadrature points of a step, and what is to be said of them:
-        m_q = rho / J_q V_q. A point whose preimage is not in the body carries nothing (LDM-X12),
-        nor does one that is far from it at first guess, or where the map is inverted.
+        """`Cloud` of a step with these samples: m_q = rho / J_q V_q. A point whose preimage is not
+        in the body carries nothing (LDM-X12), nor does one that is far from it at first guess, or
+        where the map is inverted.
         """
-        x = self.places(map.place(self.X[samples], latent.xhat))
-        start = guesses(map, latent.xhat, x, np.concatenate([self.X[samples], self.seeds]))
-        near = self.distance(start) <= FAR * self.dx
-        back = preimages(map, latent.xhat, x[near], start[near], self.dx)
-        inside = back.found & (self.distance(back.X) <= 0.0)
-        J = np.linalg.det(back.F[inside])
-        upright = J > 0.0
-        V0 = (self.dx / self.per_cell) ** x.shape[1] / J[upright]
-        lost = np.sum(~back.found) + np.sum(~upright)
-        said = {"points": len(V0), "far": int(np.sum(~near)), "lost": int(lost),
-                "outside": int(near.sum() - len(V0) - lost), "iterations": back.iterations}
-        return back.X[inside][upright], self.rho * V0, V0, said
+        x, start = self.starts(map, latent.xhat, samples)
+        far = self.distance(start) > FAR * self.dx
+        back = preimages(map, latent.xhat, x[~far], start[~far], self.dx, self.close)
+        J, inside = np.linalg.det(back.at.F), self.distance(back.at.X) <= 0.0
+        kept = back.found & inside & (J > 0.0)
+        V0 = (self.dx / self.per_cell) ** x.shape[1] / J[kept]
+        lost = np.sum(~back.found | inside & (J <= 0.0))
+        said = {"points": len(V0), "far": int(far.sum()), "lost": int(lost),
+                "outside": int(np.sum(~far) - len(V0) - lost), "iterations": back.iterations}
+        return Cloud(back.at.of(kept), self.rho * V0, V0, said)
+
+    def starts(self, map, xhat, samples):
+        """All quadrature points x (n, d) around the samples, and first guesses (n, d) of where they
+        are from [m]: cell by cell, where a cell's middle is near the body.
+        """
+        x = self.cells(map.place(self.X[samples], xhat))
+        middle, seeds = x.mean(axis=1), np.concatenate([self.X[samples], self.seeds])
+        start = guesses(map, xhat, middle, seeds)
+        near = self.distance(start) <= (FAR + 0.5 * x.shape[2]**0.5) * self.dx
+        start = np.repeat(start[:, None], x.shape[1], axis=1)
+        start[near] = from_middles(map, xhat, x[near], start[near, 0], seeds, self.dx)
+        return x.reshape(-1, x.shape[2]), start.reshape(-1, x.shape[2])

@@ -5,40 +5,49 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import KDTree
 
+from .placed import Placed, placed
+
 ITERATIONS = 20         # at most
-CLOSE = 1e-9            # distance from x at which X counts as found [of the scale]
+CLOSE = 1e-9            # distance from x at which X counts as found [of the scale] ...
+ROUGH = 1e-2            # ... where a guess is all that is wanted
 LONGEST = 1.0           # of a Newton step [of the scale]
 
 
 class Preimages(NamedTuple):
     """Solutions of g(X; xhat) = x."""
 
-    X: np.ndarray           # (n, d) [m]
-    F: np.ndarray           # (n, d, d) dg/dX there
+    at: Placed              # of the last X tried
     found: np.ndarray       # (n,) bool: g(X; xhat) is x
     iterations: int
 
 
-def preimages(map, xhat, x, X, scale):
+def preimages(map, xhat, x, X, scale, close=CLOSE):
     """`Preimages` of positions x (n, d) from guesses X (n, d) [m].
 
     scale [m], the grid's spacing, is the length of the longest step and the unit of what counts as
-    found. A point leaves the iteration as soon as it is found.
+    close. A point leaves the iteration as soon as it is found; what is known of it is of the X that
+    was found, not of the x that was asked for.
     """
-    X, found, left = X.copy(), np.zeros(len(x), dtype=bool), np.arange(len(x))
-    F_last = np.empty((*x.shape, x.shape[1]))
+    at, left = placed(map, X.copy(), xhat), np.arange(len(x))
+    found = np.zeros(len(x), dtype=bool)
     for k in range(ITERATIONS + 1):
-        at, F, _ = map.derivatives(X[left], xhat)
-        F_last[left], error = F, x[left] - at
-        done = np.sum(error**2, axis=1) <= (CLOSE * scale) ** 2
+        error = x[left] - at.x[left]
+        done = np.sum(error**2, axis=1) <= (close * scale) ** 2
         found[left[done]] = True
-        left, error, F = left[~done], error[~done], F[~done]
-        sound = np.abs(np.linalg.det(F)) > np.finfo(float).tiny
-        left, error, F = left[sound], error[sound], F[sound]
+        left, error = left[~done], error[~done]
+        sound = np.abs(np.linalg.det(at.F[left])) > np.finfo(float).tiny
+        left, error = left[sound], error[sound]
         if not len(left) or k == ITERATIONS:
             break
-        X[left] += shortened(np.linalg.solve(F, error[..., None])[..., 0], LONGEST * scale)
-    return Preimages(X, F_last, found, k)
+        at.X[left] += shortened(back(at.F[left], error[:, None])[:, 0], LONGEST * scale)
+        for known, new in zip(at, placed(map, at.X[left], xhat), strict=True):
+            known[left] = new
+    return Preimages(at, found, k)
+
+
+def back(F, steps):
+    """F^-1 (n, d, d) times steps (n, k, d), so many for each."""
+    return np.linalg.solve(F, steps.transpose(0, 2, 1)).transpose(0, 2, 1)
 
 
 def shortened(step, longest):
@@ -58,4 +67,18 @@ def guesses(map, xhat, x, seeds):
                          "map gives no body at these latent coordinates")
     seeds, at, F = seeds[sound], at[sound], F[sound]
     _, near = KDTree(at).query(x)
-    return seeds[near] + np.linalg.solve(F[near], (x - at[near])[..., None])[..., 0]
+    return seeds[near] + back(F[near], (x - at[near])[:, None])[:, 0]
+
+
+def from_middles(map, xhat, x, X, seeds, scale):
+    """First guesses (k, l, d) for positions x (k, l, d) in k cells, from guesses X (k, d) of the
+    cells' middles: these are traced back, roughly, and their F carries the rest. Where that fails,
+    those of `guesses`.
+    """
+    middle = preimages(map, xhat, x.mean(axis=1), X, scale, ROUGH)
+    sound = middle.found & (np.linalg.det(middle.at.F) > 0.0)
+    at, found = middle.at.of(sound), np.empty(x.shape)
+    found[sound] = at.X[:, None] + back(at.F, x[sound] - at.x[:, None])
+    found[~sound] = guesses(map, xhat, x[~sound].reshape(-1, x.shape[2]), seeds).reshape(
+        found[~sound].shape)
+    return found

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .blocks import Blocks, blocks
+from .placed import carried
 from .reach import reach
 
 CELLS = 2.0         # size of a block [dx]
@@ -40,9 +41,8 @@ class Lagrangian(NamedTuple):
         return candidates[reach(x, self.dx, self.degree).reached(here)]
 
     def cloud(self, map, latent, samples):
-        """X, m and V0 of the quadrature points of a step, and what is to be said of them."""
-        chosen = self.support(map, latent, samples)
-        return self.X[chosen], self.m[chosen], self.V0[chosen], {"points": len(chosen)}
+        """`Cloud` of a step with these samples."""
+        return carried(self, self.support(map, latent, samples), map, latent.xhat)
 
 
 class Resampled(NamedTuple):
@@ -65,11 +65,10 @@ class Resampled(NamedTuple):
         return self.other.degree
 
     def cloud(self, map, latent, samples):
-        """X, m and V0 of the quadrature points of a step, and what is to be said of them."""
+        """`Cloud` of a step with these samples."""
         x = map.place(self.X[samples], latent.xhat)
         chosen = np.sort(self.other.neighbours(map, latent.xhat, x))
-        return (self.other.X[chosen], self.other.m[chosen], self.other.V0[chosen],
-                {"points": len(chosen)})
+        return carried(self.other, chosen, map, latent.xhat)
 
 
 def lagrangian(X, m, V0, dx, degree):

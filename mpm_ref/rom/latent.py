@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .placed import placed
 from .projection import project_position, project_velocity
 
 VELOCITIES = ("previous", "latest", "difference", "transported")
@@ -64,8 +65,12 @@ def moved(latent, xhat, vhat):
 
 def points(map, latent, X, velocity):
     """`Points` of material points X, by a function of `velocities`."""
-    x, F, G = map.derivatives(X, latent.xhat)
-    return Points(X, x, F, velocity(X, x, G))
+    return moving(placed(map, X, latent.xhat), velocity)
+
+
+def moving(at, velocity):
+    """`Points` of `Placed` ones, by a function of `velocities`."""
+    return Points(at.X, at.x, at.F, velocity(at.X, at.x, at.G))
 
 
 def velocities(map, latent, dt, X_samples):

@@ -15,6 +15,7 @@ from scipy.spatial import KDTree
 NEAREST = 16        # points of a linear fit between the data
 SMALL = 500         # rows or columns up to which all singular values are computed
 SAME = 1e-9         # distance below which a point is one of the data, over the body's extent
+LEAST = 1e-10       # singular value over the largest one: modes below are round-off
 
 
 class Modes(NamedTuple):
@@ -76,22 +77,25 @@ class Basis(NamedTuple):
 def modes(X, x, F, r):
     """The best `Modes` with r coordinates for snapshots x (s, n, d) [m], F (s, n, d, d) of points X
     (n, d); coordinates are scaled to a root mean square of 1 over the snapshots. Raises ValueError
-    for r out of range.
+    for more modes than the snapshots hold.
     """
     return basis(X, x, F, r).modes
 
 
 def basis(X, x, F, r, lam_F=0.0, weights=1.0):
     """The `Basis` of r modes that leaves the least sum over snapshots s of
-    weights_s^2 (|| x_s ||^2 + lam_F || F_s ||^2) [m^2]. Raises ValueError for r out of range.
+    weights_s^2 (|| x_s ||^2 + lam_F || F_s ||^2) [m^2]. Raises ValueError for more modes than the
+    snapshots hold.
     """
     s, n, d = x.shape
     if not 1 <= r <= min(s, n * d):
         raise ValueError(f"r = {r}: expected 1 .. {min(s, n * d)} modes of {s} snapshots")
     w = np.broadcast_to(np.asarray(weights, dtype=float), s)
     left, sigma = leading(w[:, None] * measured(X, x, F, lam_F), r)
-    if not sigma[r - 1] > 0.0:
-        raise ValueError(f"r = {r}: the snapshots have only {int(np.sum(sigma > 0.0))} modes")
+    held = int(np.sum(sigma > LEAST * sigma[0]))
+    if held < r:
+        raise ValueError(f"r = {r}: the snapshots hold only {held} modes, more would be round-off; "
+                         "take fewer, or snapshots that differ more")
     shares = w[:, None] * left / np.sqrt(s)             # of the snapshots in a scaled mode
     U = np.tensordot(x - X, shares, axes=(0, 0))
     slope = np.tensordot(F - np.eye(d), shares, axes=(0, 0))

@@ -1,4 +1,6 @@
-"""POD modes as a file, sealed as those of `weights` are: the same `Model`, its decoder `Modes`."""
+"""POD modes as a file, straight or bent, sealed as those of `weights` are: the same `Model`, its
+decoder `Modes` or `Curved`.
+"""
 
 import json
 from pathlib import Path
@@ -6,26 +8,25 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import KDTree
 
+from .curved import Curved
 from .modes import Modes
 from .weights import Model, opened, sealed, write_whole
 
 FORMAT = 1
-KIND = "modes"
 NUMBERS = ("X", "U", "slope", "xhat", "rest")
+KINDS = {"modes": NUMBERS, "curved": (*NUMBERS, "powers", "C")}
 
 
 def save(path, model):
     """Write a `Model` of modes, whole or not at all. Raises ValueError for arrays that do not fit,
     and OSError where the system refuses.
     """
-    map = model.decoder
-    arrays = {name: np.asarray(a, dtype=float) for name, a in
-              zip(NUMBERS, (map.X, map.U, map.slope, model.xhat, model.rest), strict=True)}
-    fault = fault_of(arrays)
+    kind, arrays = arrays_of(model)
+    fault = fault_of(kind, arrays)
     if fault:
         raise ValueError(f"{path} is not written: {fault}")
     about = json.dumps(model.about, sort_keys=True, allow_nan=False)
-    write_whole(Path(path), sealed({"kind": np.array(KIND), "format": np.array(FORMAT),
+    write_whole(Path(path), sealed({"kind": np.array(kind), "format": np.array(FORMAT),
                                     "about": np.array(about), **arrays}))
 
 
@@ -34,31 +35,54 @@ def load(path):
     arrays = opened(Path(path))
     if not is_one(arrays) or arrays.get("format") != FORMAT:
         raise ValueError(f"{path} holds no modes of format {FORMAT}; make them again")
-    fault = fault_of(arrays)
+    kind = str(arrays["kind"])
+    fault = fault_of(kind, arrays)
     if fault:
         raise ValueError(f"{path} holds no modes: {fault}; make them again")
-    X, U, slope, xhat, rest = (arrays[name] for name in NUMBERS)
-    return Model(Modes(X, U, slope, KDTree(X)), xhat, rest, json.loads(str(arrays["about"])))
+    X, U, slope, xhat, rest, *bend = (arrays[name] for name in KINDS[kind])
+    map = Modes(X, U, slope, KDTree(X))
+    return Model(Curved(map, *bend) if bend else map, xhat, rest, json.loads(str(arrays["about"])))
+
+
+def arrays_of(model):
+    """Kind of a `Model` of modes, and the arrays of its file by name."""
+    map, bend = model.decoder, ()
+    if isinstance(map, Curved):
+        map, *bend = map
+    kind = "curved" if bend else "modes"
+    found = (map.X, map.U, map.slope, model.xhat, model.rest, *bend)
+    return kind, {name: np.asarray(a, dtype=int if name == "powers" else float)
+                  for name, a in zip(KINDS[kind], found, strict=True)}
 
 
 def is_one(arrays):
     """Whether the arrays of a file are those of modes."""
-    return str(arrays.get("kind")) == KIND
+    return str(arrays.get("kind")) in KINDS
 
 
-def fault_of(arrays):
+def fault_of(kind, arrays):
     """What is wrong with the arrays of a file, or None."""
-    missing = set(NUMBERS) - set(arrays)
+    missing = set(KINDS[kind]) - set(arrays)
     if missing:
         return f"it lacks {', '.join(sorted(missing))}"
     if arrays["U"].ndim != 3 or arrays["xhat"].ndim != 3:
         return "U and xhat have not three axes each"
-    n, d, r = arrays["U"].shape
-    shapes = {"X": (n, d), "slope": (n, d, d, r), "rest": (r,),
-              "xhat": (*arrays["xhat"].shape[:2], r)}
-    for name in NUMBERS:
-        if arrays[name].shape != shapes.get(name, arrays[name].shape):
-            return f"{name} has shape {arrays[name].shape}, expected {shapes[name]}"
+    for name, shape in shapes(kind, arrays).items():
+        if arrays[name].shape != shape:
+            return f"{name} has shape {arrays[name].shape}, expected {shape}"
         if not np.isfinite(arrays[name]).all():
             return f"{name} has numbers that are not finite"
     return None
+
+
+def shapes(kind, arrays):
+    """Shape of each array, as those of U, rest and C tell them."""
+    (n, d, R), r = arrays["U"].shape, arrays["xhat"].shape[2]
+    if kind == "modes":
+        r = R
+    found = {"X": (n, d), "U": (n, d, R), "slope": (n, d, d, R), "rest": (r,),
+             "xhat": (*arrays["xhat"].shape[:2], r)}
+    if kind == "curved":
+        monomials = len(arrays["powers"])
+        found |= {"powers": (monomials, r), "C": (R - r, monomials)}
+    return found

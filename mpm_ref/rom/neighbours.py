@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .latent import at_start
+from .placed import carried
 
 
 class Neighbours(NamedTuple):
@@ -25,15 +26,13 @@ class Neighbours(NamedTuple):
     feather = 0.0           # mass of a sample on the grid beyond its own
 
     def cloud(self, map, latent, samples):
-        """X, m and V0 of the points of M and N, and what is to be said of them. Raises ValueError
-        for a sample that is not in M.
-        """
+        """`Cloud` of the points of M and N. Raises ValueError for a sample that is not in M."""
         foreign = np.setdiff1d(samples, self.samples)
         if len(foreign):
             raise ValueError(f"sample {foreign[0]} is not among the {len(self.samples)} that "
                              "neighbours were found for: sample among those")
         chosen = np.union1d(self.samples, self.around)
-        return self.X[chosen], self.m[chosen], self.V0[chosen], {"points": len(chosen)}
+        return carried(self, chosen, map, latent.xhat)
 
 
 def neighbours(lagrangian, map, latents, samples):

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..core.grid import extent
 from .eulerian import PER_CELL, Eulerian
+from .inverse import CLOSE
 from .reach import bases
 
 
@@ -30,14 +31,16 @@ class NodeCentric(NamedTuple):
     dx: float
     degree: int
     per_cell: int = PER_CELL
+    close: float = CLOSE
 
     feather = Eulerian.feather
-    cloud = Eulerian.cloud
+    cloud, starts, places = Eulerian.cloud, Eulerian.starts, Eulerian.places
 
-    def places(self, x):
-        """All quadrature points (n, d) [m] that share a sample node, wherever samples x are."""
-        middle = (self.whole + 0.5 * self.degree) * self.dx
-        return Eulerian.places(self, middle)
+    def cells(self, x):
+        """All quadrature points (cells, l^d, d) [m] that share a sample node, wherever samples x
+        are.
+        """
+        return Eulerian.cells(self, (self.whole + 0.5 * self.degree) * self.dx)
 
     def samples(self, map, latent):
         """Indices of the material points that have all their nodes among the sample nodes. Raises

@@ -14,7 +14,8 @@ from ..body import Body, particles_at
 from ..core.grid import OutOfRange, Storage, update
 from ..explicit import Scheme, gather, initial_stress, scatter
 from ..materials import NoFlow
-from .latent import VELOCITIES, moved, points, velocities
+from .latent import VELOCITIES, moved, moving, velocities
+from .placed import placed
 from .projection import project_position, project_velocity
 
 PROJECTIONS = ("linear", "nonlinear")
@@ -69,16 +70,17 @@ class Reduced:
             raise OutOfRange(f"t = {t:.6g} s: latent coordinates {latent.xhat} are not finite")
         X = self.quadrature.X[samples]
         speed = velocities(self.map, latent, dt, X)[self.velocity]
-        X_q, m, V0, said = self.quadrature.cloud(self.map, latent, samples)
-        if not len(X_q):
+        at_q, m, V0, said = self.quadrature.cloud(self.map, latent, samples)
+        if not len(m):
             raise ValueError(f"t = {t:.6g} s: no quadrature point near the {len(X)} samples lies "
                              f"within the body ({said}); have the latent coordinates left the "
                              "range that the map was trained with?")
-        cloud = self.body(points(self.map, latent, X_q, speed), m, V0)
+        at = placed(self.map, X, latent.xhat)
+        cloud = self.body(moving(at_q, speed), m, V0)
         mass = np.full(len(X), self.quadrature.feather * m.mean())
-        trial = self.body(points(self.map, latent, X, speed), mass, np.zeros(len(X)))
+        trial = self.body(moving(at, speed), mass, np.zeros(len(X)))
         self.on_grid(cloud, trial, t, dt)
-        after, fit, place = self.project(latent, X, trial.particles, dt)
+        after, fit, place = self.project(latent, at, trial.particles, dt)
         return after, Report(len(X), said["points"], fit.rank, fit.residual, place.iterations,
                              place.converged, said)
 
@@ -99,11 +101,10 @@ class Reduced:
             self.conditions.apply(grid, t + dt, dt)
         gather(trial, grid, self.scheme, dt)
 
-    def project(self, latent, X, trial, dt):
-        """`Latent` and the `Fit`s of velocity and position, from trial states of X."""
-        G = self.map.derivatives(X, latent.xhat)[2]
-        fit = project_velocity(G, trial.v)
+    def project(self, latent, at, trial, dt):
+        """`Latent` and the `Fit`s of velocity and position, from trial states of samples `at`."""
+        fit = project_velocity(at.G, trial.v)
         if self.projection == "linear":
             return moved(latent, latent.xhat + dt * fit.y, fit.y), fit, fit._replace(iterations=0)
-        place = project_position(self.map, X, trial.x, 2.0 * latent.xhat - latent.before)
+        place = project_position(self.map, at.X, trial.x, 2.0 * latent.xhat - latent.before)
         return moved(latent, place.y, fit.y), fit, place

@@ -10,8 +10,7 @@ import numpy as np
 import threadpoolctl
 
 from mpm_ref.reduced.case import case
-from mpm_ref.reduced.march import Way, model
-from mpm_ref.rom.latent import initial
+from mpm_ref.reduced.march import Way, model, start, stepped
 from mpm_ref.rom.modes import modes
 from mpm_ref.rom.neighbours import neighbours
 from mpm_ref.rom.node_centric import node_centric, nodes_of
@@ -39,7 +38,7 @@ class Runs(NamedTuple):
 
     def errors(self, map, rest, approach):
         """`Fields` of reduced runs on a map; approach(case, map) gives a stepper, and a function of
-        the state that chooses samples.
+        the time and the state that chooses samples.
         """
         sums = np.zeros((2, 3))
         with threads_for((self.cases[0].problem.bodies[0],)), threadpoolctl.threadpool_limits(1):
@@ -88,11 +87,9 @@ def record(run, name, fields, scale, note="", **rule):
 
 def march(one, map, rest, approach):
     """Yield the `Latent` of each time level of a reduced run."""
-    stepper, choose = approach(one, map)
-    clock, latent = one.problem.clock, initial(map, one.X, xhat=rest)
-    yield latent
-    for k in range(clock.steps):
-        latent, _ = stepper.step(latent, choose(latent), k * clock.dt, clock.dt)
+    (stepper, choose), first = approach(one, map), start(one, map, rest)
+    yield first
+    for latent, _ in stepped(stepper, one.problem.clock, first, choose):
         yield latent
 
 
@@ -110,7 +107,7 @@ def by_points(samples, near=None):
         stepper = model(one, map, POINT_WAY)
         if near is not None:
             stepper = replace(stepper, quadrature=near)
-        return stepper, lambda latent: samples
+        return stepper, lambda t, latent: samples
 
     return approach
 
@@ -131,7 +128,7 @@ def by_nodes(chosen, count=None):
         nodes = nodes_of(one.X[chosen], stepper.quadrature.dx, stepper.quadrature.degree)
         body = node_centric(stepper.quadrature, nodes)
 
-        def choose(latent):
+        def choose(t, latent):
             found = body.samples(map, latent)
             return found if count is None else found[spread(one.X[found], count)]
 

@@ -34,7 +34,8 @@ class Training:
     """How a decoder is trained.
 
     r latent coordinates; `latent` "encoder" (LDM-sec4.1-encoder), "free" (LDMW-eq7), or those of
-    POD "modes" in the norm of the loss, which cost no encoder and are no unknowns; an epoch
+    POD "modes" in the norm of the loss, snapshots weighing as often as they are shown, which cost
+    no encoder and are no unknowns; an epoch
     shows every snapshot once, `batch` at a time, each time at `points` random points (0: all); of
     the time levels from `dense` on, a random one in `thin`. The learning rate falls from FASTEST to
     SLOWEST by half a cosine.
@@ -167,7 +168,9 @@ def encoder(training, snapshots):
         return Encoder(d, n, training.r)
     if training.latent == "free":
         return Free(s * levels, training.r)
-    return Given(basis(snapshots.X, *snapshots.flat(), training.r, training.weights.F).xhat)
+    shown = np.where(np.arange(levels) < training.dense, 1.0, 1.0 / training.thin)
+    return Given(basis(snapshots.X, *snapshots.flat(), training.r, training.weights.F,
+                       np.tile(np.sqrt(shown), s)).xhat)
 
 
 def sha256(snapshots):
