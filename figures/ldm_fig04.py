@@ -5,7 +5,7 @@ top (red) and elsewhere.
 import numpy as np
 from matplotlib.colors import to_rgb
 
-from validation.ldm.states import read
+from validation.ldm.kept_bodies import read
 
 from ._bodies import FULL, Panel, View, body, ghost, levelled, nothing, pictures
 from ._orders import scales

@@ -5,7 +5,7 @@ colours are those of cubes at rest.
 import numpy as np
 from matplotlib.colors import to_rgb
 
-from validation.ldm.states import read
+from validation.ldm.kept_bodies import read
 
 from ._bodies import FULL, REDUCED, Panel, View, body, nothing, pictures
 from ._orders import scales

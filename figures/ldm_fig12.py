@@ -5,7 +5,7 @@ from the last.
 
 import numpy as np
 
-from validation.ldm.states import read
+from validation.ldm.kept_bodies import read
 
 from ._bodies import FULL, Panel, View, away, body, nothing, pictures, shades
 from ._orders import shared

@@ -2,7 +2,7 @@
 reduced (bottom). Colours: distance from the place at rest, where it shines through.
 """
 
-from validation.ldm.states import read
+from validation.ldm.kept_bodies import read
 
 from ._bodies import Panel, View, away, body, ghost, pictures, shades
 from ._orders import scales

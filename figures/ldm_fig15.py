@@ -4,7 +4,7 @@ To the left, the speed of the top and its direction: theta, phi.
 
 import numpy as np
 
-from validation.ldm.states import read
+from validation.ldm.kept_bodies import read
 
 from ._bodies import FULL, REDUCED, Panel, View, body, nothing, pictures, side_by_side
 from ._orders import shared

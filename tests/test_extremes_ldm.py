@@ -217,15 +217,37 @@ def test_lacking_maps_do_not(net):
 
 # Files.
 
-def test_every_byte_of_a_file_is_of_one_class():
-    path = files.nets.FOLDER / f"{files.NET}.npz"
+@pytest.fixture(scope="module")
+def readers(tmp_path_factory):
+    """{kind: (file, its reader)} of the maps that are damaged."""
+    found = files.written(tmp_path_factory.mktemp("maps"), np.random.default_rng(0))
+    return dict(zip(("network", "modes", "curved"), found.items(), strict=True))
+
+
+@pytest.fixture(params=["network", "modes", "curved"])
+def reader(request, readers):
+    return readers[request.param]
+
+
+def test_maps_are_sound_before_they_are_damaged(readers):
+    models = {kind: read(path) for kind, (path, read) in readers.items()}
+    assert {kind: model.decoder.r for kind, model in models.items()} == {
+        "network": 4, "modes": 4, "curved": 2}
+    assert [type(model.decoder).__name__ for model in models.values()] == [
+        "Decoder", "Modes", "Curved"]
+
+
+@pytest.mark.parametrize(("kind", "name"), [("network", "W"), ("modes", "slope"),
+                                            ("curved", "C")])
+def test_every_byte_of_a_file_is_of_one_class(readers, kind, name):
+    path, _ = readers[kind]
     ranges = sorted(files.classes(path).values())
     assert ranges[0][0] == 0
     assert ranges[-1][1] == path.stat().st_size
     assert all(a[1] == b[0] for a, b in pairwise(ranges))
-    begin, end = files.classes(path)["W.npy, numbers"]
-    W = np.frombuffer(path.read_bytes()[begin:end])
-    assert np.array_equal(W, learned(files.NET).map.net.W)
+    begin, end = files.classes(path)[f"{name}.npy, numbers"]
+    numbers = np.frombuffer(path.read_bytes()[begin:end])
+    assert np.array_equal(np.sort(numbers), np.sort(files.opened(path)[name].ravel()))
 
 
 def test_one_bit_is_flipped():
@@ -248,10 +270,21 @@ def test_a_refusal_is_one_sentence_with_name_and_advice(tmp_path, error, clear):
     assert files.refusal(read, tmp_path / "map.npz")[0] is clear
 
 
-def test_unfit_files_are_those_that_the_loader_must_find(tmp_path):
-    model, copy = files.load(files.nets.FOLDER / f"{files.NET}.npz"), tmp_path / "copy.npz"
-    for _, what, content in files.unfit(model):
+def test_unfit_files_are_those_that_the_loader_must_find(reader, tmp_path):
+    (path, read), copy = reader, tmp_path / "copy.npz"
+    made = list(files.unfit(files.opened(path)))
+    assert {"not finite", "wrong sizes"} <= {kind for kind, *_ in made}
+    for _, what, content in made:
         copy.write_bytes(content)
-        ok, said = files.refusal(lambda: files.load(copy), copy)
+        ok, said = files.refusal(lambda: read(copy), copy)
         assert ok, what
         assert "checksum" not in said       # the seal is sound
+
+
+def test_files_with_the_seal_of_another_one_are_refused_for_it(readers, tmp_path):
+    copy = tmp_path / "copy.npz"
+    for path, read in readers.values():
+        for other, _ in readers.values():
+            copy.write_bytes(files.resealed(path, other)[2])
+            ok, said = files.refusal(lambda read=read: read(copy), copy)
+            assert (ok, "checksum" in said) == (2 * (other != path,))

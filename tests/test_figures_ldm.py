@@ -22,7 +22,7 @@ from figures import (
 )
 from figures._bodies import body, levelled, nothing, shades, side_by_side
 from figures._schemes import MARKS
-from validation.ldm.states import file_of
+from validation.ldm.kept_bodies import file_of
 from validation.results import Results
 
 mpl.use("Agg")

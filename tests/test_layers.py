@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = {"plain", "materials", "hot", "rom", "reduced", "nclaw", "shapes", "sampling", "scene",
             "store", "oracle", "cli"}
 FLOORS = (
-    ("core.jit",),
+    ("core.jit", "core.blas"),
     ("core.tensor",),
     ("core.law", "core.spectral core.deflation core.extremes", "core.spline", "core.solids"),
     ("core.stencil", "core.state"),

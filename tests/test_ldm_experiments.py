@@ -1,14 +1,18 @@
-"""What LDM's experiments make of errors, and which weights they accept."""
+"""What LDM's experiments make of errors, which weights they accept, and settings of the tower."""
 
 import numpy as np
 import pytest
 
 from mpm_ref.reduced.errors import Errors
 from mpm_ref.rom.weights import Model, load, save
-from validation.ldm import nets, superres
+from validation import targets
+from validation.ldm import nets, settings, superres
 from validation.ldm.gravity import SAME, enough
 from validation.ldm.references import mean_of, references
-from validation.ldm.studies import TORSION
+from validation.ldm.studies import TORSION, TOWER
+from validation.ldm.tower import GRIDS, scene_of
+from validation.results import Results
+from validation.run import Setting, run_all
 from validation.verification.scenes import with_
 
 
@@ -81,3 +85,34 @@ def test_tracers_go_with_the_full_models_own_points():
     found = superres.advected(scene, x.X)
     own = TORSION._replace(mu=np.array([[0.36, 1.2]]), scene=lambda v, w: scene).run([0]).x[0]
     assert abs(found - own).max() < 1e-12
+
+
+def missed(folder):
+    """Printed settings that ours are not."""
+    setting = Setting("quick", folder, targets=targets.load())
+    assert run_all([settings.settings.experiment], setting) == []
+    return {r.target for r in Results(folder).records("ldm.settings") if r.verdict == "miss"}
+
+
+@pytest.fixture
+def coarse(monkeypatch):
+    """The tower on its coarsest grid where its finest is asked for; what that misses."""
+    monkeypatch.setattr(settings, "scene_of", {max(GRIDS): scene_of(min(GRIDS))}.get)
+    return {*(f"ldm.table2.tower.{name}" for name in ("particles", "dx", "ppc_per_dim")),
+            "ldm.sec5_4.reduction_resolved"}
+
+
+def test_settings_are_the_printed_ones(tmp_path, coarse):
+    """LDM-tab2-sampling, LDM-X1, LDM-X3; but for the tower's grid."""
+    assert missed(tmp_path) == coarse
+
+
+def test_settings_of_the_tower_are_those_of_its_runs(tmp_path, coarse, monkeypatch):
+    other = TOWER._replace(mu=TOWER.mu + 0.3, test=TOWER.test[1:])
+    monkeypatch.setattr(settings, "TOWER", other)
+    monkeypatch.setattr(settings, "nets", lambda: {
+        name: net._replace(r=net.r + (name == "tower")) for name, net in nets.nets().items()})
+    counts = {f"ldm.{place}.n_{of}" for place in ("table2.tower", "sec5_4")
+              for of in ("train", "test")}
+    drawn = {f"ldm.sec5_4.{name}_max" for name in ("r", "theta", "phi")}
+    assert missed(tmp_path) == coarse | counts | drawn | {"ldm.sec5_4.r"}

@@ -7,13 +7,17 @@ import pytest
 from rom_toys import cloud
 
 from mpm_ref.materials.fixed_corotated import FixedCorotated
+from mpm_ref.reduced import march as marching
 from mpm_ref.reduced.case import case, distance
 from mpm_ref.reduced.march import Way, groups, march, model, picked
+from mpm_ref.reduced.model import require_way
+from mpm_ref.reduced.tables import Run
 from mpm_ref.rom.affine import Affine
 from mpm_ref.rom.lagrangian import Resampled, lagrangian
 from mpm_ref.rom.latent import at_start
 from mpm_ref.rom.samples import PER_GROUP, pivoted
 from mpm_ref.rom.step import Reduced
+from mpm_ref.rom.weights import Model
 from mpm_ref.scene import Box, Cylinder, Difference, Union
 from validation.ldm.nets import trained
 from validation.ldm.studies import GRAVITY, POKES, TORSION
@@ -90,11 +94,11 @@ def test_single_precision_and_near_preimages_change_little():
         *_, (latent, _) = march(one, model.decoder, paper._replace(**how), model.rest)
         return model.decoder.place(one.X, latent.xhat) - one.X
 
-    exact, size = end(), np.linalg.norm(end())
-    near, single = (np.linalg.norm(end(**how) - exact) / size
-                    for how in ({"close": 1e-2}, {"close": 1e-2, "precision": "single"}))
-    assert 0.0 < near < 1e-2
-    assert 0.0 < abs(single - near) < 1e-4
+    exact, near, single = (end(**how) for how in ({}, {"close": 1e-2},
+                                                  {"close": 1e-2, "precision": "single"}))
+    size = np.linalg.norm(exact)
+    assert 0.0 < np.linalg.norm(near - exact) < 1e-2 * size
+    assert 0.0 < np.linalg.norm(single - near) < 1e-4 * size
 
 
 @pytest.mark.parametrize(("way", "said"), [
@@ -173,6 +177,38 @@ def test_samples_are_pivoted_where_the_body_starts_and_hold_the_boundaries_besid
     close = abs(torsion.X[chosen, 2] - height) < 0.1 * (high - low)
     assert len(chosen) == 20
     assert held == len(torsion.near) * PER_GROUP == 20 - close.sum()
+
+
+def test_points_that_two_regions_hold_are_counted_once(torsion):
+    both = torsion._replace(near=2 * (torsion.near[0][:PER_GROUP],))
+    chosen = picked(both, Affine(3), Way(points=20, samples="pivoted"), Affine(3).rest, 3)(0.0)
+    assert len(set(chosen.tolist())) == len(chosen) == 20
+    assert np.isin(both.near[0], chosen).all()
+
+
+@pytest.mark.parametrize("how", ["redrawn", "kept", "pivoted"])
+@pytest.mark.parametrize(("points", "said"), [
+    (3, "3 samples in 3 axes for 12 latent coordinates: expected at least 4"),
+    (10**6, "1000000 samples of .* points: expected 1"),
+])
+def test_samples_that_do_not_suffice_are_refused_however_they_are_chosen(
+        torsion, how, points, said, monkeypatch):
+    monkeypatch.setattr(marching, "ENOUGH", 10**7)
+    with pytest.raises(ValueError, match=said):
+        picked(torsion, Affine(3), Way(points=points, samples=how), Affine(3).rest, 3)(0.0)
+
+
+@pytest.mark.parametrize(("points", "count"), [(20, 20), (None, 1757)])
+def test_no_more_are_pivoted_than_are_looked_at(torsion, points, count, monkeypatch):
+    """Nor are fewer given than were asked for; the command says so before a run."""
+    way, map = Way(points=points, samples="pivoted"), Affine(3)
+    monkeypatch.setattr(marching, "ENOUGH", 19)
+    for ask in (lambda: picked(torsion, map, way, map.rest, 3),
+                lambda: require_way(torsion, Model(map, None, None, {}), Run(**way._asdict()))):
+        with pytest.raises(ValueError, match=f"{count} samples that are pivoted: .* at most 19;"):
+            ask()
+    monkeypatch.setattr(marching, "ENOUGH", count)
+    assert len(picked(torsion, map, way._replace(points=20), map.rest, 3)(0.0)) == 20
 
 
 def test_samples_of_a_region_are_forced_while_it_holds():

@@ -274,4 +274,10 @@ def test_a_run_that_breaks_down_is_infinitely_off(made, tmp_path):
         slope=1e6 * model.decoder.slope)))
     done = evaluate(made, "--json", "--out", tmp_path / "e.png", map=tmp_path / "bad.npz")
     assert done.exit_code == 3
-    assert json.loads(done.stdout)["all"]["reduced"]["origin"] is None
+    found = json.loads(done.stdout)
+    assert found["all"]["reduced"]["origin"] is None
+    (number,), said = study.test, found["runs"][0]["broken"]["reduced"]
+    assert said.startswith("step 3: particles from ")
+    assert (f"run {number} (g = {study.mu[number, 0]:g}): the reduced run broke down in {said}"
+            in done.stderr)
+    assert evaluate(made, "--out", tmp_path / "e.png").stderr == ""

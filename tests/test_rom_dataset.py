@@ -250,25 +250,6 @@ def test_without_torch_a_network_is_refused_in_one_sentence(made, monkeypatch):
         maps.learned(made[0], None, {}, None, None, 1)
 
 
-def test_a_network_is_trained_as_its_settings_say_and_comes_back(made, tmp_path):
-    pytest.importorskip("torch")
-    from mpm_ref.rom.learn.fit import Training, train
-    from mpm_ref.rom.learn.loss import PRINTED
-    _, folder = made
-    network = '"network"\nepochs = 3\nhidden = [8, 8]\nweights = "printed"\npoints = 20'
-    bars = study(tmp_path, ('"modes"', network))
-    data, seen = dataset.load(bars, folder, bars.train), []
-    done = maps.learned(bars, data, {}, tmp_path / "map.pt", lambda h: seen.append(len(h)), 1)
-    assert seen == [1, 2, 3]
-    plain = train(Training(3, (8, 8), weights=PRINTED, epochs=3, points=20), data)
-    np.testing.assert_array_equal(done.decoder.net.W, plain.decoder.net.W)
-    assert np.array_equal(done.about["loss"], plain.history)
-    maps.save(tmp_path / "map.npz", done)
-    back = maps.load(tmp_path / "map.npz", bars)
-    np.testing.assert_array_equal(back.decoder.net.W, done.decoder.net.W)
-    assert back.about["map"]["weights"] == "printed"
-
-
 @pytest.mark.parametrize("kind", ["straight", "curved"])
 def test_tabulated_modes_are_the_modes(model, bent, kind):
     of = model if kind == "straight" else bent[1]

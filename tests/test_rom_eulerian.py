@@ -216,7 +216,7 @@ def carried(quadrature, map, xhat):
 
 def test_points_outside_the_body_carry_nothing(d, degree):
     (map, xhat), quadrature = bent(d), body(d, degree)
-    at, m, V0, said = carried(quadrature, map, xhat)
+    at, m, V0, said, _ = carried(quadrature, map, xhat)
     places = quadrature.places(map.place(quadrature.X, xhat))
     X, J = at.X, np.linalg.det(map.derivatives(at.X, xhat)[1])
     assert inside(X).all()
@@ -236,7 +236,7 @@ def test_no_place_in_the_body_is_left_out(d):
     rows = xhat.reshape(d, d + 1)
     A, b = rows[:, :d], rows[:, d]
     origin = (quadrature.places(map.place(quadrature.X, xhat)) - b) @ np.linalg.inv(A).T
-    at, _, _, said = carried(quadrature, map, xhat)
+    at, _, _, said, _ = carried(quadrature, map, xhat)
     assert abs(at.X - origin[inside(origin)]).max() < 1e-12
     assert said["lost"] == 0
 
@@ -245,7 +245,7 @@ def test_what_cannot_be_traced_back_is_lost():
     """Beyond a fold there are places that no point is mapped to; `cloud` says so."""
     X = 0.2 + 0.2 * cloud(2, 50)
     quadrature = Eulerian(X, RHO, lambda X: np.where(X[:, 0] > 0.0, -1.0, 0.5 * DX), X[:9], DX, 2)
-    at, _, _, said = quadrature.cloud(Fold(2), at_start(()), np.arange(50))
+    at, _, _, said, _ = quadrature.cloud(Fold(2), at_start(()), np.arange(50))
     places = quadrature.places(Fold(2).place(X, None))
     assert said["lost"] == (places[:, 0] < 0.0).sum() > 0
     assert said["points"] + said["lost"] == len(places)

@@ -77,3 +77,13 @@ def test_an_epoch_shows_everything_where_nothing_is_thinned(data, monkeypatch):
 def test_settings_that_mean_nothing_are_refused(wrong, said):
     with pytest.raises(ValueError, match=said):
         training(**wrong)
+
+
+def test_every_epoch_shows_a_snapshot_however_thin(data, monkeypatch):
+    shown, show = [], fit.Session.show
+    monkeypatch.setattr(fit.Session, "show", lambda self, at, progress: shown.append(at.tolist())
+                        or show(self, at, progress))
+    found = fit.train(fit.Training(R, (8,), epochs=40, thin=10**9), data)
+    assert [len(at) for at in shown] == 40 * [1]
+    assert len({at[0] for at in shown}) > 5
+    assert np.isfinite(found.history).all()

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import rom_toys
+import threadpoolctl
 
 from mpm_ref.rom.modes import modes
 from mpm_ref.rom.snapshots import displacement_error, position_error, units
@@ -198,3 +199,18 @@ def test_errors_and_the_origin(d, rng):
     assert position_error(off + far, x + far, far) == pytest.approx(position_error(off, x))
     assert displacement_error(off + far, x + far, X + far) == pytest.approx(
         displacement_error(off, x, X))
+
+
+@pytest.mark.parametrize("count", [40, 700], ids=("all", "Lanczos"))
+def test_modes_are_the_same_bits_for_any_number_of_threads(count):
+    rng = np.random.default_rng(4)
+    X = rom_toys.cloud(3, 300)
+    amplitudes, shapes = rng.normal(size=(count, 12)), rng.normal(size=(12, 300, 3))
+    x = X + 1e-2 * np.tensordot(amplitudes, shapes, axes=1)
+    F = np.eye(3) + 1e-2 * rng.normal(size=(count, 300, 3, 3))
+    found = []
+    for threads in (1, 2):
+        with threadpoolctl.threadpool_limits(threads):
+            found.append(modes(X, x, F, 6))
+    assert np.array_equal(found[0].U, found[1].U)
+    assert np.array_equal(found[0].slope, found[1].slope)

@@ -3,13 +3,15 @@
 import hashlib
 from contextlib import contextmanager
 
+import numba
 import numpy as np
 import pytest
 import rom_toys
+import threadpoolctl
 from problems import elsewhere
 
 from mpm_ref.rom import pointwise
-from mpm_ref.rom.batch import ROWS
+from mpm_ref.rom.batch import ROWS, over
 from mpm_ref.rom.decoder import Decoder, Units
 from mpm_ref.rom.network import layers_of, network
 
@@ -242,3 +244,32 @@ def test_a_perceptron_of_torch_is_exported(d):
     assert close(y, double, 1e-13)
     assert close(y, single, 1e-5)
     assert map.net.sizes.tolist() == [d + R, 30, 30, 30, 30, d]
+
+
+# threads
+
+def blas_threads():
+    """Of all BLAS libraries that are loaded."""
+    return {pool["num_threads"] for pool in threadpoolctl.threadpool_info()
+            if pool["user_api"] == "blas"}
+
+
+def test_batches_are_worked_on_with_one_thread_of_blas_each():
+    seen = []
+    with threadpoolctl.threadpool_limits(2):
+        over(5, lambda rows: seen.append(blas_threads()))
+        assert blas_threads() == {2}
+    assert seen == [{1}]
+
+
+def test_results_are_the_same_bits_for_any_number_of_threads():
+    """Of BLAS, and of the pool that shares batches; enough points for it to be used."""
+    map, X = rom_toys.decoder(3, 4), rom_toys.cloud(3, 6 * ROWS)
+    xhat, found, before = np.linspace(-0.5, 0.5, 4), [], numba.get_num_threads()
+    for threads in (1, min(2, numba.config.NUMBA_NUM_THREADS)):
+        numba.set_num_threads(threads)
+        with threadpoolctl.threadpool_limits(threads):
+            found.append((map.place(X, xhat), map.velocity(X, xhat, xhat),
+                          *map.derivatives(X, xhat)))
+    numba.set_num_threads(before)
+    assert all(np.array_equal(a, b) for a, b in zip(*found, strict=True))

@@ -233,7 +233,7 @@ def test_a_report_tells_samples_points_and_rank(d):
     assert report.points == len(model.quadrature.support(map, latent, samples))
     model = learned(d, 2, name="eulerian", projection="nonlinear")
     _, report = model.step(latent, samples, 0.0, DT)
-    at, _, _, said = model.quadrature.cloud(map, latent, samples)
+    at, _, _, said, _ = model.quadrature.cloud(map, latent, samples)
     assert report.points == len(at.X) > 0
     assert report.quadrature == said
     assert report.iterations >= 1

@@ -1,15 +1,15 @@
 """Study files: what one says, and what is refused of it, in one sentence."""
 
-from dataclasses import fields
 
 import numpy as np
 import pytest
 from small_studies import STEPS, study, write
 
 from mpm_ref.cli.shipped import shipped_scenes, shipped_studies
+from mpm_ref.reduced.maps import larger
 from mpm_ref.reduced.march import Way
 from mpm_ref.reduced.study import load
-from mpm_ref.reduced.tables import KEYS, NETWORK, Map, Run
+from mpm_ref.reduced.tables import KEYS, Map, Run
 from mpm_ref.reduced.vary import flat, varied
 from mpm_ref.scene import SceneError, canonical
 from validation.ldm.studies import STUDIES
@@ -241,13 +241,12 @@ def test_every_key_of_a_map_belongs_to_one_kind():
     assert sorted(("kind", "r", *keys)) == sorted(Map.__struct_fields__)
 
 
-def test_a_network_is_trained_as_the_study_says():
-    pytest.importorskip("torch")
-    from mpm_ref.rom.learn.fit import Training
-    from mpm_ref.rom.learn.loss import CODE, READINGS
-    own = Map(kind="network", r=2)
-    for field in fields(Training):
-        if field.name not in ("r", "weights"):
-            assert getattr(own, field.name) == field.default
-    assert {field.name for field in fields(Training)} == {"r", *KEYS[NETWORK]}
-    assert READINGS[own.weights] == CODE
+def test_a_study_may_scale_the_weights_to_its_body_and_steps(tmp_path):
+    """Without a network or PyTorch: LDM's own studies need no other weights."""
+    own = load(shipped_studies()["gravity"], shipped_scenes()).base
+    assert larger(own) == pytest.approx((1.0, 1.0))
+    assert larger(study(tmp_path).base) == pytest.approx((0.8 / 0.4, 0.01 * 144.0))
+    network = '"network"\nlatent = "modes"\nweights = "scaled"'
+    assert study(tmp_path, ('"modes"', network)).tables.map.weights == "scaled"
+    assert "weights = 'tower': expected one of 'code', 'printed', 'scaled'" in told(
+        tmp_path, ('"modes"', '"network"\nweights = "tower"'))

@@ -66,12 +66,12 @@ def test_what_is_watched_is_the_same_but_for_the_named_methods():
 
 
 def test_a_step_asks_the_map_as_often_as_its_way_says(one):
-    """All points, Lagrangian: once for the points and once for the samples, or with their
-    velocities before.
+    """All points, Lagrangian: the samples are among the points, and asked for once; velocities
+    before are asked for by each.
     """
     n = len(one.X)
-    for velocity, derivatives, place, speeds in (("previous", 2, 0, 2), ("latest", 2, 0, 0),
-                                                 ("difference", 2, 2, 0)):
+    for velocity, derivatives, place, speeds in (("previous", 1, 0, 2), ("latest", 1, 0, 0),
+                                                 ("difference", 1, 2, 0), ("transported", 2, 0, 1)):
         spent, asked, points = split(one, EXACT, Way(velocity=velocity), 3)
         assert points == n
         expected = dict(zip(EVALUATIONS, (derivatives * n, place * n, speeds * n), strict=True))

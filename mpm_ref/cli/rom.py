@@ -13,7 +13,7 @@ import typer
 
 from ..reduced import dataset, maps
 from ..reduced.case import case
-from ..reduced.evaluate import REDUCED, draw, evaluate, facts, lines, together
+from ..reduced.evaluate import REDUCED, breakdowns, draw, evaluate, facts, lines, together
 from ..reduced.generate import INTERRUPTED, NOT_WRITTEN, SKIPPED, UNSTABLE, generate, one_thread
 from ..reduced.model import kind_of, recording, with_kind
 from ..reduced.record import Lost, record, require_leave
@@ -180,7 +180,7 @@ def judge(
     json: Machine = False,
 ):
     """Errors of reduced runs beside the full-order runs that were held out, and of the map's
-    nearest states. Exit status 3 where a run broke down.
+    nearest states. Exit status 3 where a reduced run broke down, and a sentence why.
     """
     with at_work(name) as study:
         file = named(map, study, ".npz")
@@ -203,6 +203,7 @@ def judge(
                            **facts(study, found, all_runs)}))
         else:
             print("\n".join([*lines(study, found, all_runs), str(picture)]))
+        warn(breakdowns(study, found))
     raise typer.Exit(0 if isfinite(all_runs[REDUCED].origin) else faults.UNSTABLE)
 
 

@@ -12,8 +12,8 @@ import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
-from threadpoolctl import ThreadpoolController
 
+from ..core.blas import one_thread
 from .krylov import Rule, pcg
 from .norms import dot
 from .projectors import block_diagonal
@@ -22,7 +22,6 @@ from .smoothers import times
 DENSE = 600       # unknowns up to which "direct" factorises a dense matrix
 SHIFT = 1e-14     # of its diagonal: above round-off, below all that matters
 CAP = 10_000      # iterations of conjugate gradients, as in HOT-methods
-POOLS = ThreadpoolController()     # several threads of BLAS give other bits, and spin in between
 
 
 def scalar_inverses(D, B):
@@ -64,18 +63,18 @@ class Direct:
         full = sp.csc_array(A + block_diagonal(held))
         self.B = B
         if full.shape[0] <= DENSE:
-            with POOLS.limit(limits=1):
+            with one_thread():
                 self.solve = partial(la.cho_solve, _cholesky(full.toarray()))
         else:
             shifted = sp.csc_array(full + SHIFT * sp.diags_array(full.diagonal()))
             symmetric = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0,
                          "options": {"SymmetricMode": True}}
-            with POOLS.limit(limits=1):
+            with one_thread():
                 self.solve = spla.splu(shifted, **symmetric).solve
 
     def __call__(self, b):
         """u (n, d) of A u = b (n, d)."""
-        with POOLS.limit(limits=1):
+        with one_thread():
             u = self.solve(times(self.B, b).reshape(-1))
         return times(self.B, u.reshape(b.shape))
 

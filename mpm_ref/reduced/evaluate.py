@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.grid import OutOfRange
+from ..rom.placed import NoBody
 from ..rom.projection import project_position
+from ..rom.step import BREAKDOWNS
 from ..store.atomic import replacing
 from .case import case
 from .errors import Errors, Squares
@@ -16,6 +17,7 @@ from .march import march
 from .model import require_way
 
 REDUCED, NEAREST = "reduced", "nearest"
+WORDS = {REDUCED: "reduced run", NEAREST: "search of the map's nearest states"}
 
 
 class Course(NamedTuple):
@@ -24,6 +26,7 @@ class Course(NamedTuple):
     sums: np.ndarray        # what `Squares` adds up
     errors: Errors          # over all time levels; infinite where the run did not reach its end
     levels: np.ndarray      # error of each time level, of the distance from the scene's origin
+    said: str = ""          # the sentence with which it broke down
 
 
 class Held(NamedTuple):
@@ -32,6 +35,11 @@ class Held(NamedTuple):
     number: int
     mu: np.ndarray          # its parameters
     courses: dict           # {REDUCED, NEAREST: `Course`}
+
+    @property
+    def broken(self):
+        """{REDUCED, NEAREST: the sentence with which it broke down} of those that did."""
+        return {name: course.said for name, course in self.courses.items() if course.said}
 
 
 def evaluate(study, model, snapshots):
@@ -66,9 +74,12 @@ def course(X, x, positions):
     try:
         for at, reference in zip(positions, x, strict=True):
             sums.add(at, reference)
+            if not np.isfinite(sums.sums).all():
+                raise NoBody("the positions, or their squares, are not finite")
             levels.append(np.linalg.norm(at - reference) / np.linalg.norm(reference))
-    except (OutOfRange, ValueError):
-        return Course(np.full(4, inf), Errors(inf, inf, inf), np.array(levels))
+    except BREAKDOWNS as fault:
+        said = f"step {len(levels)}: {' '.join(str(fault).split())}"
+        return Course(np.full(4, inf), Errors(inf, inf, inf), np.array(levels), said)
     return Course(sums.sums, sums.errors, np.array(levels))
 
 
@@ -90,7 +101,17 @@ def facts(study, found, all_runs):
 
     return {"all": plain(all_runs), "runs": [
         {"number": one.number, "parameters": dict(zip(study.names, one.mu.tolist(), strict=True)),
-         **plain({name: course.errors for name, course in one.courses.items()})} for one in found]}
+         **plain({name: course.errors for name, course in one.courses.items()}),
+         "broken": one.broken} for one in found]}
+
+
+def breakdowns(study, found):
+    """Sentences about the courses that broke down, with their runs' parameters."""
+    for one in found:
+        of = ", ".join(f"{name} = {value:g}" for name, value in
+                       zip(study.names, one.mu, strict=True))
+        for name, said in one.broken.items():
+            yield f"run {one.number} ({of}): the {WORDS[name]} broke down in {said}"
 
 
 def lines(study, found, all_runs):

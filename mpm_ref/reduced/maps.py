@@ -13,10 +13,13 @@ from ..rom.decoder import Decoder
 from ..rom.latent import initial
 from ..rom.modes import basis
 from ..rom.weights import Model
+from ..shapes.inside import solid
 from ..store.manifest import source_hash, versions
 from .tables import CURVED, KEYS, MODES, NETWORK, require_nonlinear
 
 KEPT = 50           # epochs of which the loss is kept in the file
+SIDE, STEP = 0.4, 1.0 / 144.0       # the loss's weights "code" were made for a body whose largest
+                                    # side is so long [m], and for such steps [s]
 
 
 def computed(study, snapshots, about):
@@ -38,6 +41,7 @@ def learned(study, snapshots, about, checkpoint, on_epoch, threads):
     """
     settings = {name: getattr(study.tables.map, name) for name in ("r", *KEYS[NETWORK])}
     drive = training()
+    settings["weights"] = drive.weights(settings["weights"], *larger(study.base))
     done = drive.fitted(settings, snapshots, checkpoint, on_epoch, threads)
     return of_trained(done, snapshots.X, about | identity(study) | {
         "threads": threads, "torch": drive.version()})
@@ -50,6 +54,14 @@ def of_trained(done, X, about):
     rest = initial(done.decoder, X, xhat=done.xhat[:, 0].mean(axis=0)).xhat
     loss = done.history[::max(1, len(done.history) // KEPT)].tolist()
     return Model(done.decoder, done.xhat, rest, about | {"loss": loss})
+
+
+def larger(scene):
+    """How many times larger a scene's body and steps are than those that the loss's weights "code"
+    were made for.
+    """
+    body = solid(scene.body[0].shape)
+    return float((body.high - body.low).max()) / SIDE, scene.dt / STEP
 
 
 def training():

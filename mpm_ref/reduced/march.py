@@ -18,7 +18,7 @@ PRECISIONS = ("double", "single")
 QUADRATURES = ("lagrangian", "eulerian")
 PROJECTIONS = ("nonlinear", "linear")
 SCHEMES = tuple((q, p) for q in QUADRATURES for p in PROJECTIONS)
-ENOUGH = 4000       # points that tell where a body is at the start
+ENOUGH = 4000       # points that tell where a body is at the start, and are pivoted among
 SINGLE = 1e-4       # nearest that preimages can be asked for in single precision [dx]
 COARSE = 8          # blocks over a body's longest side, from which Eulerian points are traced back
 
@@ -27,8 +27,8 @@ class Way(NamedTuple):
     """How a reduced run is made; `points` samples, or all of them where it is None.
 
     Samples are "redrawn" for each step (LDM-sec3.3-hyper), "kept" from the start (LDMW-sets), or
-    kept and "pivoted": those that tell the latent coordinates best at the start. The quadrature is
-    that of `SCHEMES`, or "resampled".
+    kept and "pivoted": those that tell the latent coordinates best at the start, of ENOUGH points.
+    The quadrature is that of `SCHEMES`, or "resampled".
     """
 
     quadrature: str = "lagrangian"
@@ -118,27 +118,42 @@ def start(case, map, rest):
 
 def picked(case, map, way, xhat, seed):
     """Function of the time [s] -> indices of the samples of the step that begins then. Raises
-    ValueError for ways to choose them that there are not.
+    ValueError for ways to choose them that there are not, and as `drawing` does.
     """
-    rng, n = np.random.default_rng(seed), len(case.X)
-
-    def drawn(t):
-        return draw(n, way.points or n, map.r, map.dim, groups(case, way, t))(rng)
-
+    rng = np.random.default_rng(seed)
     if way.samples == "redrawn":
-        return drawn
+        return lambda t: drawing(case, map, way, t)(rng)
     if way.samples == "kept":
-        first = drawn(0.0)
+        first = drawing(case, map, way)(rng)
     elif way.samples == "pivoted":
-        forced = np.concatenate([rng.choice(group, min(PER_GROUP, len(group)), replace=False)
-                                 for group in groups(case, way, 0.0)] or [np.empty(0, dtype=int)])
-        some = np.setdiff1d(rng.choice(n, min(n, ENOUGH), replace=False), forced)
-        G = map.derivatives(case.X[some], xhat)[2]
-        best = some[pivoted(G, (way.points or n) - len(forced))]
-        first = np.union1d(best, forced)
+        first = chosen(case.X, drawing(case, map, way), lambda X: map.derivatives(X, xhat)[2], rng)
     else:
         raise ValueError(f"samples = {way.samples!r}: expected redrawn, kept or pivoted")
     return lambda t: first
+
+
+def drawing(case, map, way, t=0.0):
+    """`Draw` of the samples of the step that begins at t [s]. Raises ValueError where they do not
+    suffice, and for more to be pivoted than are looked at.
+    """
+    n = len(case.X)
+    count = way.points or n
+    if way.samples == "pivoted" and count > ENOUGH:
+        raise ValueError(f"{count} samples that are pivoted: expected at most {ENOUGH}; take fewer "
+                         'points, or samples = "kept"')
+    return draw(n, count, map.r, map.dim, groups(case, way, t))
+
+
+def chosen(X, draw, G, rng):
+    """Sorted indices of the samples of a `Draw` from points X (n, d): those of its groups at
+    random, the others pivoted by dg/dxhat, G(X).
+    """
+    forced = np.unique(np.concatenate([np.empty(0, dtype=int), *(
+        rng.choice(group, min(draw.per_group, len(group)), replace=False)
+        for group in draw.groups)]))
+    some = np.setdiff1d(rng.choice(draw.n, min(draw.n, ENOUGH), replace=False), forced)
+    best = some[pivoted(G(X[some]), draw.count - len(forced))]
+    return np.union1d(best, forced)
 
 
 def groups(case, way, t):

@@ -2,11 +2,10 @@
 
 import msgspec
 
-from ..rom.samples import draw
 from ..scene import build
 from .case import case
 from .field import field, resampled
-from .march import groups, precise
+from .march import drawing, precise
 from .record import Recording
 from .watch import watch
 
@@ -30,9 +29,8 @@ def require_way(one, model, run):
     """Raise ValueError where the samples of a reduced run of a `Case` do not suffice, or its map
     has not that precision.
     """
-    n = len(one.X)
     precise(model.decoder, run.way)
-    draw(n, run.points or n, model.decoder.r, model.decoder.dim, groups(one, run.way, 0.0))
+    drawing(one, model.decoder, run.way)
 
 
 def recording(study, model, mu, count=None):

@@ -9,11 +9,9 @@ from math import inf
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
-from ..core.grid import OutOfRange
 from ..energy import energy
 from ..monitor import Unstable, check
+from ..rom.step import BREAKDOWNS
 from ..simulate import Frame, State
 from ..store import Fields, checkpoint, create
 from ..store.manifest import Part, manifest
@@ -27,7 +25,7 @@ from .watch import Nonsense, Watch, watched
 VECTORS = {"xhat": "1", "vhat": "1/s"}                          # of the group `reduced`: units
 COUNTS = {"samples": "1", "points": "1", "rank": "1", "lost": "1"}
 NUMBERS = {"residual": "m/s", "beyond": "1", "off": "1", "seen": "1"}
-BROKEN = (OutOfRange, ValueError, np.linalg.LinAlgError, Unstable)
+BROKEN = (*BREAKDOWNS, Unstable)
 
 
 class Lost(RuntimeError):

@@ -17,9 +17,9 @@ KEYS = {                            # of a map of each kind, beside `kind` and `
     NETWORK: ("hidden", "latent", "weights", "epochs", "batch", "points", "dense", "thin", "seed"),
 }
 GRID, LATIN = "grid", "latin"
-ENCODER, FREE = "encoder", "free"
+LATENTS = ("encoder", "free", MODES)                # see `rom.learn.fit.Training`
 RESAMPLED, SAMPLES = "resampled", ("redrawn", "kept", "pivoted")       # see `march.Way`
-READINGS = ("code", "printed")      # of the loss's weights, see `rom.learn.loss`
+WEIGHTS = ("code", "printed", "scaled")             # of the loss, see `maps.larger`
 Word = Annotated[str, Meta(pattern=r"^\w[\w.-]*\Z", max_length=100)]
 Bend = Annotated[int, Meta(ge=2)]
 
@@ -80,8 +80,8 @@ class Map(Table):
     modes: Count | None = None                  # of a curved map: those kept, r of them free
     degree: Bend = 2                            # ... of the polynomials that the others are
     hidden: tuple[Count, ...] = HIDDEN
-    latent: str = ENCODER
-    weights: str = READINGS[0]
+    latent: str = LATENTS[0]
+    weights: str = WEIGHTS[0]
     epochs: Count = 850
     batch: Count = 8                            # snapshots at a time
     points: Natural = 0                         # of each, anew each time; 0: all
@@ -94,8 +94,8 @@ class Map(Table):
         if self.kind == CURVED and (self.modes or 0) <= self.r:
             raise ValueError(f"modes = {self.modes or 'none'}: expected more than r = {self.r} of "
                              "a curved map, whose others follow from the first r")
-        one_of("latent", self.latent, (ENCODER, FREE))
-        one_of("weights", self.weights, READINGS)
+        one_of("latent", self.latent, LATENTS)
+        one_of("weights", self.weights, WEIGHTS)
 
 
 class Run(Table):

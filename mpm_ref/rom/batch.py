@@ -9,14 +9,17 @@ the products are those of BLAS and the exponentials of NumPy. With the slopes D_
     dy_k/dA_l = (dy_k/dA_{l+1} * D_l) W_l^T        one pass back for every output
     dy        = (.. (u W_0 * D_0) W_1 * D_1 ..)    one pass forward for a direction u
 
-Points are taken ROWS at a time, so that a batch stays in the cache, and threads share the batches:
-a point's numbers do not depend on how many there are.
+Points are taken ROWS at a time, so that a batch stays in the cache, and threads share the batches,
+each with BLAS of its own: the numbers do not depend on the threads. On how many points share its
+batch, a point's depend to round-off.
 """
 
 from concurrent.futures import ThreadPoolExecutor
 
 import numba
 import numpy as np
+
+from ..core.blas import one_thread
 
 ROWS = 1024
 WORTH = 2           # batches for which a thread is worth its start
@@ -31,12 +34,13 @@ def over(n, work):
     """Call work(rows) for all batches of n points, on as many threads as kernels run on."""
     parts = batches(n)
     threads = min(len(parts) // WORTH, numba.get_num_threads())
-    if threads < 2:
-        for rows in parts:
-            work(rows)
-        return
-    with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(work, parts))
+    with one_thread():
+        if threads < 2:
+            for rows in parts:
+                work(rows)
+            return
+        with ThreadPoolExecutor(threads) as pool:
+            list(pool.map(work, parts))
 
 
 def forward(layers, A):

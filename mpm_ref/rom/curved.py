@@ -16,7 +16,7 @@ import numpy as np
 
 from .modes import Modes
 
-RIDGE = 1e-6        # of the fit, over the mean square of each monomial
+RIDGE = 1e-6        # of the fit, over the sum of squares of each monomial
 
 
 class Curved(NamedTuple):

@@ -80,8 +80,8 @@ class Decoder(NamedTuple):
         return self.units.std * v
 
     def single(self):
-        """The same map, its network in single precision: half the time, and errors of 1e-7 of the
-        displacements. Too coarse for `inverse`.
+        """The same map, its network in single precision: faster, with errors of round-off of the
+        displacements, below which `inverse` finds nothing.
         """
         net = self.net
         return self._replace(net=Network(net.sizes, *(a.astype(np.float32) for a in net[1:])))

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import KDTree
 
-from .placed import Placed, placed
+from .placed import NoBody, Placed, placed
 
 ITERATIONS = 20         # at most
 CLOSE = 1e-9            # distance from x at which X counts as found [of the scale] ...
@@ -58,13 +58,13 @@ def shortened(step, longest):
 
 def guesses(map, xhat, x, seeds):
     """First guesses for `preimages`: X_s + F_s^-1 (x - x_s) from the nearest of material points
-    `seeds` (s, d) that are not inverted. Raises ValueError where all are.
+    `seeds` (s, d) that are not inverted and somewhere. Raises `NoBody` where none is.
     """
     at, F, _ = map.derivatives(seeds, xhat)
-    sound = np.linalg.det(F) > 0.0
+    sound = (np.linalg.det(F) > 0.0) & np.isfinite(at).all(axis=1)
     if not sound.any():
-        raise ValueError(f"all {len(seeds)} material points asked are inverted (det F <= 0): the "
-                         "map gives no body at these latent coordinates")
+        raise NoBody(f"all {len(seeds)} material points asked are inverted (det F <= 0) or "
+                     "nowhere: the map gives no body at these latent coordinates")
     seeds, at, F = seeds[sound], at[sound], F[sound]
     _, near = KDTree(at).query(x)
     return seeds[near] + back(F[near], (x - at[near])[:, None])[:, 0]

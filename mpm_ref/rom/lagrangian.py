@@ -42,7 +42,7 @@ class Lagrangian(NamedTuple):
 
     def cloud(self, map, latent, samples):
         """`Cloud` of a step with these samples."""
-        return carried(self, self.support(map, latent, samples), map, latent.xhat)
+        return carried(self, self.support(map, latent, samples), map, latent.xhat, samples)
 
 
 class Resampled(NamedTuple):

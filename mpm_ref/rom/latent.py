@@ -13,6 +13,7 @@ back into velocities is a choice:
 * "transported": the velocity of "previous", projected on dg/dxhat at the coordinates reached.
 """
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -86,8 +87,12 @@ def velocities(map, latent, dt, X_samples):
             return previous(X, x, G)
         return (x - map.place(X, latent.before)) / dt
 
-    def transported(X, x, G):
+    @cache
+    def rates():
         _, _, G_samples = map.derivatives(X_samples, latent.xhat)
-        return G @ project_velocity(G_samples, previous(X_samples, None, None)).y
+        return project_velocity(G_samples, previous(X_samples, None, None)).y
+
+    def transported(X, x, G):
+        return G @ rates()
 
     return dict(zip(VELOCITIES, (previous, latest, difference, transported), strict=True))

@@ -12,6 +12,8 @@ import numpy as np
 from scipy.sparse.linalg import svds
 from scipy.spatial import KDTree
 
+from ..core.blas import one_thread
+
 NEAREST = 16        # points of a linear fit between the data
 SMALL = 500         # rows or columns up to which all singular values are computed
 SAME = 1e-9         # distance below which a point is one of the data, over the body's extent
@@ -91,15 +93,20 @@ def basis(X, x, F, r, lam_F=0.0, weights=1.0):
     if not 1 <= r <= min(s, n * d):
         raise ValueError(f"r = {r}: expected 1 .. {min(s, n * d)} modes of {s} snapshots")
     w = np.broadcast_to(np.asarray(weights, dtype=float), s)
-    left, sigma = leading(w[:, None] * measured(X, x, F, lam_F), r)
-    held = int(np.sum(sigma > LEAST * sigma[0]))
-    if held < r:
-        raise ValueError(f"r = {r}: the snapshots hold only {held} modes, more would be round-off; "
-                         "take fewer, or snapshots that differ more")
-    shares = w[:, None] * left / np.sqrt(s)             # of the snapshots in a scaled mode
-    U = np.tensordot(x - X, shares, axes=(0, 0))
-    slope = np.tensordot(F - np.eye(d), shares, axes=(0, 0))
+    with one_thread():
+        left, sigma = leading(w[:, None] * measured(X, x, F, lam_F), r)
+        if held(sigma) < r:
+            raise ValueError(f"r = {r}: the snapshots hold only {held(sigma)} modes, more would be "
+                             "round-off; take fewer, or snapshots that differ more")
+        shares = w[:, None] * left / np.sqrt(s)         # of the snapshots in a scaled mode
+        U = np.tensordot(x - X, shares, axes=(0, 0))
+        slope = np.tensordot(F - np.eye(d), shares, axes=(0, 0))
     return Basis(Modes(X, U, slope, KDTree(X)), left * np.sqrt(s) / w[:, None])
+
+
+def held(sigma):
+    """How many of descending singular values are more than round-off."""
+    return int(np.sum(sigma > LEAST * sigma[0]))
 
 
 def measured(X, x, F, lam_F):

@@ -32,7 +32,7 @@ class Neighbours(NamedTuple):
             raise ValueError(f"sample {foreign[0]} is not among the {len(self.samples)} that "
                              "neighbours were found for: sample among those")
         chosen = np.union1d(self.samples, self.around)
-        return carried(self, chosen, map, latent.xhat)
+        return carried(self, chosen, map, latent.xhat, samples)
 
 
 def neighbours(lagrangian, map, latents, samples):

@@ -5,6 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 
+class NoBody(ValueError):
+    """The map gives no body at the latent coordinates of a reduced run."""
+
+
 class Placed(NamedTuple):
     """n points at some latent coordinates (LDM-eq14 to LDM-eq16)."""
 
@@ -25,6 +29,7 @@ class Cloud(NamedTuple):
     m: np.ndarray           # (n,) mass [kg]
     V0: np.ndarray          # (n,) volume at rest [m^d]
     said: dict              # what the quadrature says of itself
+    samples: Placed | None = None       # the samples, where they are among the points
 
 
 def placed(map, X, xhat):
@@ -32,7 +37,10 @@ def placed(map, X, xhat):
     return Placed(X, *map.derivatives(X, xhat))
 
 
-def carried(body, chosen, map, xhat):
-    """`Cloud` of the chosen ones of points with X, m and V0."""
-    return Cloud(placed(map, body.X[chosen], xhat), body.m[chosen], body.V0[chosen],
-                 {"points": len(chosen)})
+def carried(body, chosen, map, xhat, samples=None):
+    """`Cloud` of the chosen ones of points with X, m and V0, sorted; samples: those of them that
+    are, sorted.
+    """
+    at = placed(map, body.X[chosen], xhat)
+    own = None if samples is None else at.of(np.searchsorted(chosen, samples))
+    return Cloud(at, body.m[chosen], body.V0[chosen], {"points": len(chosen)}, own)

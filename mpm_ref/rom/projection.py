@@ -10,6 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core.blas import one_thread
+
 ITERATIONS = 30             # of Gauss-Newton, at most
 HALVINGS = 30               # of a step, at most
 SUFFICIENT = 1e-4           # share of the predicted decrease that a step must reach
@@ -83,8 +85,9 @@ def least_squares(A, b):
     """The solution of least length of min || A w - b ||, by a QR factorisation of A with a
     singular value decomposition of its triangle; and the rank of A.
     """
-    Q, R = np.linalg.qr(A)
-    U, s, Vt = np.linalg.svd(R, full_matrices=False)
+    with one_thread():
+        Q, R = np.linalg.qr(A)
+        U, s, Vt = np.linalg.svd(R, full_matrices=False)
     kept = s > RANK * s[0]
     return Vt[kept].T @ ((U[:, kept].T @ (Q.T @ b)) / s[kept]), int(kept.sum())
 

@@ -15,10 +15,11 @@ from ..core.grid import OutOfRange, Storage, update
 from ..explicit import Scheme, gather, initial_stress, scatter
 from ..materials import NoFlow
 from .latent import VELOCITIES, moved, moving, velocities
-from .placed import placed
+from .placed import NoBody, placed
 from .projection import project_position, project_velocity
 
 PROJECTIONS = ("linear", "nonlinear")
+BREAKDOWNS = (NoBody, OutOfRange, np.linalg.LinAlgError)    # with which a run may end midway
 
 
 class Report(NamedTuple):
@@ -64,18 +65,18 @@ class Reduced:
 
     def step(self, latent, samples, t, dt):
         """`Latent` and `Report` after a step from time t [s] by dt [s], with the samples of these
-        indices. Raises `OutOfRange` or ValueError where the coordinates give no body.
+        indices. Raises one of BREAKDOWNS where the coordinates give no body.
         """
         if not np.isfinite(latent.xhat).all():
-            raise OutOfRange(f"t = {t:.6g} s: latent coordinates {latent.xhat} are not finite")
+            raise NoBody(f"t = {t:.6g} s: latent coordinates {latent.xhat} are not finite")
         X = self.quadrature.X[samples]
         speed = velocities(self.map, latent, dt, X)[self.velocity]
-        at_q, m, V0, said = self.quadrature.cloud(self.map, latent, samples)
+        at_q, m, V0, said, at = self.quadrature.cloud(self.map, latent, samples)
         if not len(m):
-            raise ValueError(f"t = {t:.6g} s: no quadrature point near the {len(X)} samples lies "
-                             f"within the body ({said}); have the latent coordinates left the "
-                             "range that the map was trained with?")
-        at = placed(self.map, X, latent.xhat)
+            raise NoBody(f"t = {t:.6g} s: no quadrature point near the {len(X)} samples lies "
+                         f"within the body ({said}); have the latent coordinates left the range "
+                         "that the map was trained with?")
+        at = placed(self.map, X, latent.xhat) if at is None else at
         cloud = self.body(moving(at_q, speed), m, V0)
         mass = np.full(len(X), self.quadrature.feather * m.mean())
         trial = self.body(moving(at, speed), mass, np.zeros(len(X)))

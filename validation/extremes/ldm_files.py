@@ -1,4 +1,4 @@
-"""Files of trained maps that are damaged, of the wrong sizes, or of another training."""
+"""Files of maps that are damaged, of the wrong sizes, of another kind or of another training."""
 
 import tempfile
 import zipfile
@@ -7,16 +7,34 @@ from unittest.mock import patch
 
 import numpy as np
 
-from mpm_ref.rom.weights import arrays_of, load, sealed
+from mpm_ref.rom import modes_file
+from mpm_ref.rom.curved import curved
+from mpm_ref.rom.modes import basis
+from mpm_ref.rom.weights import SEAL, Model, load, opened, sealed
 
 from ..ldm import nets
 from ..registry import experiment
 
 NET, OTHERS = "gravity-r4", ("gravity-r7", "torsion-0", "poke")
+MODES, BENT, POINTS, STATES = 4, 2, 40, 30      # of maps of modes: all, those that lead; and what
+                                                # they are made of
 BITS = 8
 HEADER = 30         # bytes of an entry of a zip archive before its name
 LENGTHS = slice(26, 30)     # where in these its lengths of name and extra field stand
 OF_ARRAY = 128      # bytes before an array's numbers
+
+
+def of_modes(model, rng):
+    """{kind: `Model` of modes} of a trained map's states at random points: straight ones, and
+    curved ones with a part of the coordinates.
+    """
+    map, latents = model.decoder, model.xhat.reshape(-1, model.decoder.r)
+    X = map.units.low + map.units.span * rng.random((POINTS, map.dim))
+    found = [map.derivatives(X, xhat) for xhat in latents[::len(latents) // STATES]]
+    known = basis(X, *(np.array(a) for a in tuple(zip(*found, strict=True))[:2]), MODES)
+    xhat, rest = known.xhat[None], np.zeros(MODES)
+    return {"modes": Model(known.modes, xhat, rest, {}),
+            "curved": Model(curved(known, BENT, 2), xhat[..., :BENT], rest[:BENT], {})}
 
 
 def classes(path):
@@ -54,25 +72,30 @@ def damages(path, count, rng):
             yield name, f"cut at {k}", content[:k]
 
 
-def unfit(model):
+def resealed(path, other):
+    """(class, what, bytes) of a file with the seal of another one."""
+    return "seal", f"that of {other.name}", path.read_bytes()[:-SEAL] + other.read_bytes()[-SEAL:]
+
+
+def unfit(arrays):
     """Yield (class, what, bytes) of files with a seal that fits, and content that does not."""
-    arrays = arrays_of(model)
 
     def put(name, k, value):
         found = arrays[name].copy()
         found.flat[k] = value
         return sealed({**arrays, name: found})
 
-    for name in ("W", "b", "low", "span", "mean", "std", "xhat", "rest"):
-        yield "not finite", f"{name} with NaN", put(name, 0, np.nan)
-        yield "not finite", f"{name} with infinity", put(name, -1, np.inf)
+    for name in (name for name, a in arrays.items() if a.ndim and name != "sizes"):
+        if arrays[name].dtype.kind == "f":
+            yield "not finite", f"{name} with NaN", put(name, 0, np.nan)
+            yield "not finite", f"{name} with infinity", put(name, -1, np.inf)
         yield "wrong sizes", f"{name} shorter", sealed({**arrays, name: arrays[name][..., :-1]})
         yield "wrong sizes", f"{name} left out", sealed(
             {key: a for key, a in arrays.items() if key != name})
-    for k in range(len(arrays["sizes"])):
+    for k in range(len(arrays.get("sizes", ()))):
         yield "wrong sizes", f"sizes[{k}] one more", put("sizes", k, arrays["sizes"][k] + 1)
     yield "wrong sizes", "of another format", put("format", 0, 99)
-    for name in ("span", "std"):
+    for name in (name for name in ("span", "std") if name in arrays):
         yield "impossible", f"{name} with zero", put(name, 0, 0.0)
 
 
@@ -97,20 +120,38 @@ def tried(run, folder):
     """Yield (group, rows (kind, what, whether it was refused, the sentence)) of all files, each
     written into a folder.
     """
-    path, copy = nets.FOLDER / f"{NET}.npz", folder / f"{NET}.npz"
+    (folder / "copies").mkdir()
+    copy, count = folder / "copies" / f"{NET}.npz", run.choose(quick=2, standard=30)
+    readers = written(folder, run.rng)
 
-    def read(content, reader):
-        copy.write_bytes(content)
-        return refusal(reader, copy)
+    def rows(name, made, read):
+        found = []
+        for kind, what, content in made:
+            copy.write_bytes(content)
+            found.append((kind, f"{name}: {what}", *refusal(lambda: read(copy), copy)))
+        return found
 
-    count = run.choose(quick=2, standard=30)
-    for group, made in (("damaged", damages(path, count, run.rng)), ("unfit", unfit(load(path)))):
-        yield group, [(kind, what, *read(content, lambda: load(copy)))
-                      for kind, what, content in made]
-    with patch.object(nets, "FOLDER", folder):
-        yield "other", [("of another training", name,
-                         *read((path.parent / f"{name}.npz").read_bytes(),
-                               lambda: nets.trained.__wrapped__(NET))) for name in OTHERS]
+    for path, read in readers.items():
+        others = [other for other in readers if other != path]
+        yield "damaged", rows(path.stem, damages(path, count, run.rng), read)
+        yield "damaged", rows(path.stem, (resealed(path, other) for other in others), read)
+        yield "unfit", rows(path.stem, unfit(opened(path)), read)
+        yield "other", rows(path.stem, [("of another kind", other.stem, other.read_bytes())
+                                        for other in others if readers[other] != read], read)
+    trainings = [("of another training", name, (nets.FOLDER / f"{name}.npz").read_bytes())
+                 for name in OTHERS]
+    with patch.object(nets, "FOLDER", copy.parent):
+        yield "other", rows(NET, trainings, lambda _: nets.trained.__wrapped__(NET))
+
+
+def written(folder, rng):
+    """{file: its reader} of a trained map, and of maps of modes that are written into a folder."""
+    net = nets.FOLDER / f"{NET}.npz"
+    readers = {net: load}
+    for kind, model in of_modes(load(net), rng).items():
+        readers[folder / f"{kind}.npz"] = modes_file.load
+        modes_file.save(folder / f"{kind}.npz", model)
+    return readers
 
 
 def refusal(read, path):

@@ -6,6 +6,7 @@ ends in one of four ways: it stopped with a sentence; the watch flagged it in so
 or it is silent: bad, and neither stopped nor flagged. No run may be silent.
 """
 
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -15,8 +16,10 @@ from mpm_ref.cases import in_order
 from mpm_ref.core.grid import OutOfRange
 from mpm_ref.monitor import Unstable
 from mpm_ref.reduced.errors import Squares
+from mpm_ref.reduced.march import drawing
 from mpm_ref.reduced.watch import Nonsense, watch, watched
 from mpm_ref.rom.modes import basis
+from mpm_ref.rom.step import BREAKDOWNS
 from mpm_ref.simulate import simulate
 
 from ..ldm.nets import trained
@@ -25,7 +28,7 @@ from ..verification.scenes import threads_for
 BAD = 5.0           # times the error that is usual for the map
 TOLERABLE = 1.0     # [%], the axis of LDM's Figure 9
 STOPPED, FLAGGED, FINE, SILENT = "stopped", "flagged", "fine", "silent"
-STOPS = (Nonsense, OutOfRange, ValueError, np.linalg.LinAlgError)
+STOPS = (Nonsense, *BREAKDOWNS)
 
 
 class Reduction(NamedTuple):
@@ -77,12 +80,15 @@ class End(NamedTuple):
 def ended(case, x, reduction, way, pick=None, keep=None):
     """`End` of a reduced run of a `Case` beside the full model's x (k + 1, n, d), or as much as
     there is of it; pick as of `march`. (`Latent`, x) of each state is appended to the list keep.
+    Of a run whose samples are refused there is the start.
     """
-    sums, sights, said = Squares(case.X), [], ""
+    said = "" if pick else refused(case, reduction.map, way)
+    sums, sights = Squares(case.X), []
     with threads_for((case.problem.bodies[0],)), threadpoolctl.threadpool_limits(1):
         seen_by = watch(case, reduction.map, reduction.xhat)
         try:
-            for latent, _, sight in watched(seen_by, case, way, reduction.rest, pick=pick):
+            states = watched(seen_by, case, way, reduction.rest, pick=pick)
+            for latent, _, sight in islice(states, 1 if said else None):
                 at = reduction.map.place(case.X, latent.xhat)
                 if len(sights) < len(x):
                     sums.add(at, x[len(sights)])
@@ -94,6 +100,15 @@ def ended(case, x, reduction, way, pick=None, keep=None):
     with np.errstate(divide="ignore"):      # a body that does not move
         error = 100.0 * sums.errors.origin
     return of_sights(sights, reduction.map.r, error, said)
+
+
+def refused(case, map, way):
+    """The sentence with which the samples of a way are refused, "" where they suffice."""
+    try:
+        drawing(case, map, way)
+    except ValueError as refusal:
+        return str(refusal)
+    return ""
 
 
 def of_sights(sights, r, error, said):

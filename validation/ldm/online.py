@@ -2,13 +2,12 @@
 
 from math import inf
 
-import numpy as np
 import threadpoolctl
 
-from mpm_ref.core.grid import OutOfRange
 from mpm_ref.reduced.errors import Errors, Squares
 from mpm_ref.reduced.march import march
 from mpm_ref.rom.projection import project_position
+from mpm_ref.rom.step import BREAKDOWNS
 
 from ..verification.scenes import threads_for
 
@@ -24,7 +23,7 @@ def compared(cases, references, map, way, rest, seed=0):
             try:
                 for (latent, _), reference in zip(states, x, strict=True):
                     sums.add(map.place(one.X, latent.xhat), reference)
-            except (OutOfRange, ValueError, np.linalg.LinAlgError):
+            except BREAKDOWNS:
                 return Errors(inf, inf, inf)
     return sums.errors
 

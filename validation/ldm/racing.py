@@ -8,10 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm_ref.cases import in_order
-from mpm_ref.core.grid import OutOfRange
+from mpm_ref.core.blas import one_thread
 from mpm_ref.reduced.case import case
 from mpm_ref.reduced.errors import Errors, Squares
 from mpm_ref.reduced.march import Way, march
+from mpm_ref.rom.step import BREAKDOWNS
 from mpm_ref.scene import Scheme, build
 from mpm_ref.simulate import State, advance
 
@@ -99,7 +100,7 @@ class Online:
             return
         try:
             (latent, report), spent = clocked(lambda: next(self.states))
-        except (OutOfRange, ValueError, np.linalg.LinAlgError):
+        except BREAKDOWNS:
             self.ended = True
             return
         self.spent.append(spent)
@@ -113,16 +114,26 @@ class Online:
         return Raced(self.way, median(self.spent), int(np.median(self.points)), self.sums.errors)
 
 
+def alone(one, at, way, x):
+    """`Raced` of a reduced run of a `Case` beside positions x (k + 1, n, d) that are known."""
+    with one_thread():
+        run = Online(one, at, way, 1)
+        for reference in x[1:]:
+            run.step(reference)
+    return run.raced()
+
+
 def race(scene, at, ways, steps):
     """What a step of the full model `Spent`, and `Raced` of each way on at = (map, rest)."""
     one, full = case(scene), Full(scene)
     every = -(-len(one.X) // TRACKED)
-    online = [Online(one, at, way, every) for way in ways]
-    for _ in range(steps):
-        full.step()
-        reference = full.positions(every)
-        for run in online:
-            run.step(reference)
+    with one_thread():
+        online = [Online(one, at, way, every) for way in ways]
+        for _ in range(steps):
+            full.step()
+            reference = full.positions(every)
+            for run in online:
+                run.step(reference)
     return median(full.spent), [run.raced() for run in online]
 
 

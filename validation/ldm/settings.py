@@ -1,6 +1,5 @@
 """What LDM prints of its experiments and networks, beside what is run here."""
 
-
 import numpy as np
 
 from mpm_ref.rom.architecture import FEATURES, HIDDEN, KERNEL, SHORTEST, STRIDE, lengths
@@ -9,9 +8,11 @@ from mpm_ref.scene import build
 from ..registry import experiment
 from ..settings import record_settings
 from .nets import nets
-from .studies import GRAVITY, PHI, POKE, POKES, TORSION, poked_again
+from .studies import GRAVITY, PHI, POKE, POKES, TORSION, TOWER, poked_again
+from .tower import GRIDS, POINTS, scene_of
 
 SECTIONS = {"gravity": "sec5_1", "torsion": "sec5_2", "poke": "sec5_3"}
+TABLE = "ldm.table2.tower"
 ROWS = (1368, 1757, 3076115)        # numbers of points whose convolutions the table gives
 
 
@@ -20,16 +21,17 @@ ROWS = (1368, 1757, 3076115)        # numbers of points whose convolutions the t
 def settings(run):
     """Settings of the scenes, of the studies made of them, and of the networks."""
     for study in (GRAVITY, TORSION, POKES):
-        record_settings(run, f"ldm_{study.name}", {**of_table(study), **of_study(study)})
+        scene = study.scene(*study.mu[-1])
+        record_settings(run, f"ldm_{study.name}", {**of_table(study, scene), **of_study(study)})
     record_settings(run, "ldm_gravity", of_gravity())
     record_settings(run, "ldm_torsion", of_torsion())
     record_settings(run, "ldm_poke", of_poke())
     record_settings(run, "ldm_gravity", of_networks())
+    tower(run)
 
 
-def of_table(study):
-    """Table 2."""
-    scene = study.scene(*study.mu[-1])
+def of_table(study, scene):
+    """Table 2: of a scene of a study."""
     material, name = scene.body[0].material, f"ldm.table2.{study.name}"
     return {f"{name}.youngs": material.E, f"{name}.poisson": material.nu,
             f"{name}.particles": len(build(scene).bodies[0].particles.x), f"{name}.dx": scene.dx,
@@ -72,6 +74,36 @@ def of_poke():
             "ldm.sec5_3.duration": scene.steps * scene.dt, "ldm.sec5_3.r": nets()["poke"].r,
             "ldm.sec5_3_2.pokes": len(again.fixed) - 1, "ldm.sec5_3_2.steps": again.steps,
             "ldm.sec5_3_2.duration": again.steps * again.dt}
+
+
+def tower(run):
+    """Table 2 and section 5.4: the tower at the paper's size, and what was drawn for its runs."""
+    large = scene_of(max(GRIDS))
+    table, notes = of_table(TOWER, large), of_tower(TOWER.scene(*TOWER.mu[0]))
+    also = {"r": "; Figure 15 prints a tenth of it (LDM-X9)"}
+    n, name, scale = table[f"{TABLE}.particles"], "ldm.sec5_4", "scenes/ldm_tower.toml"
+    table |= {f"{TABLE}.ppc_per_dim": large.body[0].sampling.per_cell,
+              f"{name}.n_train": len(TOWER.train), f"{name}.n_test": len(TOWER.test),
+              f"{name}.r": nets()["tower"].r, f"{name}.reduction_resolved": n / max(POINTS)}
+    for target, value in table.items():
+        run.record(target, value, scale=scale, note=notes.get(target, ""))
+    for target, value in (("total", n), ("reduction", n / max(POINTS))):
+        run.record(f"{name}.remark_{target}", value, scale=scale, comparator="info",
+                   note="the print contradicts its Table 2 here (LDM-X8)")
+    for parameter, drawn in zip(("r", "theta", "phi"), TOWER.mu.T, strict=True):
+        note = f"of {len(drawn)} draws, Latin hypercubes within the range{also.get(parameter, '')}"
+        run.record(f"{name}.{parameter}_min", drawn.min(), scale=scale, note=note, comparator=">=")
+        run.record(f"{name}.{parameter}_max", drawn.max(), scale=scale, note=note, comparator="<=")
+
+
+def of_tower(trained):
+    """{target: in what the tower differs from the print}, of the scene its map is trained on."""
+    small = (f"of Figure 16's largest runs; the map's training and Figure 15 have dx {trained.dx:g}"
+             f" m, {trained.body[0].sampling.per_cell} points per cell and axis")
+    return {f"{TABLE}.dx": f"{small}; printed in cm (LDM-X1)", f"{TABLE}.ppc_per_dim": small,
+            f"{TABLE}.particles": f"{small}; of our own shape, the paper's was not published",
+            f"{TABLE}.dt": "the printed fraction is lost (LDM-X3)",
+            "ldm.sec5_4.reduction_resolved": "the print's remark says ten times as much (LDM-X8)"}
 
 
 def of_networks():

@@ -1,16 +1,14 @@
 """What each choice of a reduced run costs and gives: on the tower, and on the small cylinder."""
 
 from dataclasses import dataclass
-from time import process_time
 
 import numpy as np
-import threadpoolctl
 
 from mpm_ref.reduced.case import case
 from mpm_ref.reduced.march import Way
 
 from ..ldm.nets import trained
-from ..ldm.racing import COLUMNS, race
+from ..ldm.racing import COLUMNS, Full, alone, median, race
 from ..ldm.references import References, pod, references, share
 from ..ldm.studies import GRAVITY, TORSION, TOWER
 from ..ldm.tower import FAST, NET, PAPER, scene_of
@@ -73,12 +71,15 @@ class Setting:
         return model.decoder, model.rest
 
     def measured(self, tests):
-        """Errors, and CPU seconds of a run."""
-        at, way = self.at, Way(points=self.points)
-        longer = lengthened(tests, self.longer)
-        begin = process_time()
-        errors = longer.on(*at, way)
-        return errors, (process_time() - begin) / len(tests.cases)
+        """Errors, and CPU seconds of the steps of a run."""
+        way, longer = Way(points=self.points), lengthened(tests, self.longer)
+        return longer.on(*self.at, way), steps_of(longer, self.at, way)
+
+
+def steps_of(tests, at, way):
+    """CPU seconds of the steps of a reduced run: so many times the median."""
+    one, x = tests.cases[0], tests.x[0]
+    return one.problem.clock.steps * alone(one, at, way, x).spent.cpu
 
 
 def lengthened(tests, longer):
@@ -100,7 +101,7 @@ def of_maps(run):
     tests = references(GRAVITY, run.choose(quick=1, standard=3))
     chosen = [Setting(name, r, n, k) for name in maps for r in dimensions for n in points
               for k in longer]
-    full = full_run(tests)
+    full = full_run(GRAVITY.scene(*GRAVITY.mu[GRAVITY.test[0]]))
     measured = [one.measured(tests) for one in run.progress(chosen, "settings")]
     best = front([cpu for _, cpu in measured], [errors.origin for errors, _ in measured])
     rows = [(one.map, one.r, one.points or "all", one.longer, cpu, full, *errors, int(on))
@@ -114,12 +115,12 @@ def of_maps(run):
                   "cheaper", comparator="info")
 
 
-def full_run(tests):
-    """CPU seconds of a full-order run, mean."""
-    with threadpoolctl.threadpool_limits(1):
-        begin = process_time()
-        GRAVITY.run(GRAVITY.test[:len(tests.cases)])
-        return (process_time() - begin) / len(tests.cases)
+def full_run(scene):
+    """CPU seconds of the steps of a full-order run: so many times the median."""
+    full = Full(scene)
+    for _ in range(scene.steps):
+        full.step()
+    return scene.steps * median(full.spent).cpu
 
 
 @experiment("trade.ldm.density", title="LDM: how dense Eulerian quadrature must be",
@@ -134,9 +135,8 @@ def of_density(run):
                                                                 standard=("eulerian", "resampled"))
                                    for k in dense)]
     for way in run.progress(chosen, "densities"):
-        begin = process_time()
-        errors = tests.on(model.decoder, model.rest, way)
-        cpu = (process_time() - begin) / len(tests.cases)
+        at = model.decoder, model.rest
+        errors, cpu = tests.on(*at, way), steps_of(tests, at, way)
         words = way.quadrature if way == chosen[0] else f"{way.quadrature}.{way.per_cell}"
         share(run, f"trade.ldm.density.{words}", errors, tests.scale, f"{cpu:.3g} CPU s a run",
               comparator="info")

@@ -3,16 +3,22 @@
 import torch
 
 from .fit import Training, train
-from .loss import READINGS
+from .loss import CODE, READINGS, scaled
 
 
 def fitted(settings, snapshots, checkpoint, on_epoch, threads=1):
-    """`Trained` by {name of a field of `Training`: value}, the weights by their name in READINGS,
-    on so many threads; checkpoint and on_epoch as for `train`.
+    """`Trained` by {name of a field of `Training`: value} on so many threads; checkpoint and
+    on_epoch as for `train`.
     """
     torch.set_num_threads(threads)
-    training = Training(**{**settings, "weights": READINGS[settings["weights"]]})
-    return train(training, snapshots, checkpoint, on_epoch)
+    return train(Training(**settings), snapshots, checkpoint, on_epoch)
+
+
+def weights(name, length, time):
+    """`Weights` by their name in READINGS; "scaled" are those of the code for a body and steps that
+    are so many times larger.
+    """
+    return scaled(CODE, length, time) if name == "scaled" else READINGS[name]
 
 
 def version():

@@ -96,11 +96,12 @@ class Session:
         return json.dumps({**asdict(self.training), "data": self.of})
 
     def epoch(self):
-        """Show every snapshot once, or those whose turn it is."""
+        """Show every snapshot once, or those whose turn it is, at least one."""
         order = torch.randperm(len(self.data.next), generator=self.random)
         if self.training.thin > 1:
             turn = torch.rand(len(order), generator=self.random) * self.training.thin < 1.0
-            order = order[(turn | (self.level < self.training.dense))[order]]
+            shown = order[(turn | (self.level < self.training.dense))[order]]
+            order = shown if len(shown) else order[:1]
         batches = order.split(self.training.batch)
         done = [self.show(at, (len(self.history) + k / len(batches)) / self.training.epochs)
                 for k, at in enumerate(batches)]

@@ -1,0 +1,84 @@
+"""Networks of a study: trained as its file says. Needs PyTorch."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from small_studies import study
+
+from mpm_ref.reduced import dataset, maps
+from mpm_ref.reduced.generate import generate
+from mpm_ref.reduced.tables import KEYS, LATENTS, NETWORK, WEIGHTS, Map
+
+torch = pytest.importorskip("torch")
+
+from mpm_ref.rom.learn import drive, fit  # noqa: E402
+from mpm_ref.rom.learn.fit import Training, train  # noqa: E402
+from mpm_ref.rom.learn.loss import (  # noqa: E402
+    CODE,
+    PRINTED,
+    READINGS,
+    TOWER,
+    Weights,
+    scaled,
+)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A study, and the folder with its runs."""
+    folder = tmp_path_factory.mktemp("made")
+    bars = study(folder)
+    assert all(done.well for done in generate(bars, folder))
+    return bars, folder
+
+
+def test_a_network_is_trained_as_the_study_says():
+    own = Map(kind="network", r=2)
+    for field in fields(Training):
+        if field.name not in ("r", "weights"):
+            assert getattr(own, field.name) == field.default
+    assert {field.name for field in fields(Training)} == {"r", *KEYS[NETWORK]}
+    assert READINGS[own.weights] == CODE
+
+
+def test_latents_and_weights_are_those_of_a_training():
+    assert LATENTS == fit.LATENTS
+    for name in WEIGHTS:
+        assert isinstance(drive.weights(name, 1.0, 1.0), Weights)
+    assert drive.weights("code", 100.0, 6.0) == CODE
+    assert drive.weights("scaled", 1.0, 1.0) == CODE
+    tower = drive.weights("scaled", 42.0 / 0.4, 144.0 / 24.0)
+    assert tower == TOWER != CODE
+
+
+def test_a_network_is_trained_as_its_settings_say_and_comes_back(made, tmp_path):
+    _, folder = made
+    network = '"network"\nepochs = 3\nhidden = [8, 8]\nweights = "printed"\npoints = 20'
+    bars = study(tmp_path, ('"modes"', network))
+    data, seen = dataset.load(bars, folder, bars.train), []
+    done = maps.learned(bars, data, {}, tmp_path / "map.pt", lambda h: seen.append(len(h)), 1)
+    assert seen == [1, 2, 3]
+    plain = train(Training(3, (8, 8), weights=PRINTED, epochs=3, points=20), data)
+    np.testing.assert_array_equal(done.decoder.net.W, plain.decoder.net.W)
+    assert np.array_equal(done.about["loss"], plain.history)
+    maps.save(tmp_path / "map.npz", done)
+    back = maps.load(tmp_path / "map.npz", bars)
+    np.testing.assert_array_equal(back.decoder.net.W, done.decoder.net.W)
+    assert back.about["map"]["weights"] == "printed"
+
+
+def test_a_network_is_trained_with_weights_that_fit_its_body(made, tmp_path):
+    """The bar is 0.8 m long, its steps are of 0.01 s; latent coordinates are those of modes."""
+    _, folder = made
+    network = '"network"\nepochs = 3\nhidden = [8]\nweights = "scaled"\nlatent = "modes"'
+    bars = study(tmp_path, ('"modes"', network))
+    data = dataset.load(bars, folder, bars.train)
+    done = maps.learned(bars, data, {}, None, None, 1)
+    fitting = scaled(CODE, 0.8 / 0.4, 0.01 * 144.0)
+    plain, unscaled = (train(Training(3, (8,), latent="modes", weights=w, epochs=3), data)
+                       for w in (fitting, CODE))
+    np.testing.assert_allclose(done.decoder.net.W, plain.decoder.net.W, rtol=1e-6)
+    assert not np.allclose(done.decoder.net.W, unscaled.decoder.net.W, rtol=1e-6)
+    assert done.about["map"]["weights"] == "scaled"
+    np.testing.assert_allclose(done.xhat, plain.xhat, rtol=1e-9)
