@@ -100,7 +100,7 @@ def test_choices_differ_from_the_base_in_one_thing():
     assert len(set(ways)) == len(ways)
     for way in ways:
         other = [name for name in Way._fields if getattr(way, name) != getattr(ldm.BASE, name)]
-        if set(other) != {"velocity", "close", "precision"} | set(other) & {"points", "per_cell"}:
+        if set(other) != {"velocity", "close", "precision"} | set(other) & {"points"}:
             assert len(other) <= 1 or set(other) == {"close", "precision"}
 
 

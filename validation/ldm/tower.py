@@ -13,11 +13,11 @@ from .references import share
 from .studies import TOWER, refined
 
 NET = "tower"
+SOUND = 1.5         # times the error of the paper's way, up to which a faster one counts
 GRIDS = {34: (1.44, 2), 385: (0.96, 3), 3076: (0.48, 3)}     # thousand points: dx [m], per axis
 POINTS = (25, 50)
 PAPER = Way("eulerian", "linear")
 FAST = PAPER._replace(velocity="transported", close=1e-2, precision="single")
-COARSE = FAST._replace(per_cell=1)      # enough for a body of many cells, not for a small one
 OWN = ("particles", *COLUMNS, "wall_full", "wall_fastest", "wall_per_second", "speed_up",
        "speed_up_same")
 
@@ -29,7 +29,7 @@ def scene_of(size, k=TOWER.test[0]):
 
 def ways(points):
     """The paper's schemes and cheaper ones, at numbers of samples."""
-    cheap = (FAST, COARSE, FAST._replace(quadrature="resampled"))
+    cheap = (FAST, Way("resampled", "linear"), FAST._replace(quadrature="resampled"))
     chosen = [*(Way(*scheme) for scheme in SCHEMES), *cheap]
     return [way._replace(points=n) for way in chosen for n in points]
 
@@ -74,7 +74,9 @@ def printed(run, rows):
         return
     rows = [r for r in rows if r["particles"] == rows[-1]["particles"]
             and (r["quadrature"], r["projection"]) == ("eulerian", PROJECTIONS[1])]
-    best = min((r for r in rows if r["points"] < 50), key=lambda r: r["wall"])
+    usual = next(r for r in rows if r["close"] == PAPER.close)
+    sound = [r for r in rows if r["points"] < 50 and r["origin"] <= SOUND * usual["origin"]]
+    best = min(sound, key=lambda r: r["wall"])
     way = ", ".join(f"{name} {best[name]}" for name in WAY)
     scale = f"{best['particles']} particles"
     run.record("ldm.fig16.speedup", best["speed_up"], scale=scale,

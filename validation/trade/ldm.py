@@ -11,7 +11,7 @@ from ..ldm.nets import trained
 from ..ldm.racing import COLUMNS, Full, alone, median, race
 from ..ldm.references import References, pod, references, share
 from ..ldm.studies import GRAVITY, TORSION, TOWER
-from ..ldm.tower import COARSE, FAST, NET, PAPER, scene_of
+from ..ldm.tower import FAST, NET, PAPER, scene_of
 from ..registry import experiment
 from ..verification.scenes import with_
 from .front import front
@@ -29,7 +29,7 @@ def knobs():
     """`Way`s that differ from BASE in one choice, and those of all cheap choices."""
     single = [BASE._replace(**{name: value}) for name, values in CHOICES.items()
               for value in values]
-    cheap = [way._replace(points=n) for way in (FAST, COARSE) for n in (10, 25, 50, 100)]
+    cheap = [FAST._replace(points=n) for n in (10, 25, 50, 100)]
     return [BASE, *single, BASE._replace(close=1e-2, precision="single"), *cheap]
 
 
