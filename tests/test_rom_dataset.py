@@ -191,6 +191,7 @@ def test_what_is_no_curved_map_is_refused(bent, tmp_path):
     assert model.decoder.powers.tolist() == [[2, 0], [1, 1], [0, 2]]
     for name, wrong, words in (("C", np.zeros((3, 3)), r"C has shape \(3, 3\), expected \(2, 3\)"),
                                ("powers", np.ones((3, 1)), r"powers has shape \(3, 1\)"),
+                               ("powers", np.array(2), r"powers has not two axes"),
                                ("C", np.full((2, 3), np.nan), "C has numbers that are not finite")):
         with pytest.raises(ValueError, match=words):
             modes_file.save(tmp_path / "x.npz", model._replace(

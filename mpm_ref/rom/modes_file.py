@@ -67,6 +67,8 @@ def fault_of(kind, arrays):
         return f"it lacks {', '.join(sorted(missing))}"
     if arrays["U"].ndim != 3 or arrays["xhat"].ndim != 3:
         return "U and xhat have not three axes each"
+    if kind == "curved" and arrays["powers"].ndim != 2:
+        return "powers has not two axes"
     for name, shape in shapes(kind, arrays).items():
         if arrays[name].shape != shape:
             return f"{name} has shape {arrays[name].shape}, expected {shape}"

@@ -17,6 +17,7 @@ import numpy as np
 from ..core.grid import extent
 from .eulerian import PER_CELL, Eulerian
 from .inverse import CLOSE
+from .placed import NoBody
 from .reach import bases
 
 
@@ -44,7 +45,7 @@ class NodeCentric(NamedTuple):
 
     def samples(self, map, latent):
         """Indices of the material points that have all their nodes among the sample nodes. Raises
-        ValueError where there are none, `OutOfRange` where they are nowhere.
+        `NoBody` where there are none, `OutOfRange` where they are nowhere.
         """
         x = map.place(self.X, latent.xhat)
         extent(x)
@@ -53,8 +54,8 @@ class NodeCentric(NamedTuple):
         _, number = np.unique(both, axis=0, return_inverse=True)
         found = np.flatnonzero(np.isin(number[len(self.whole):], number[:len(self.whole)]))
         if not len(found):
-            raise ValueError(f"none of the {len(at)} material points has all its nodes among the "
-                             "sample nodes: choose those near the body, where it is now")
+            raise NoBody(f"none of the {len(at)} material points has all its nodes among the "
+                         "sample nodes: choose those near the body, where it is now")
         return found
 
 
