@@ -7,9 +7,10 @@ import pytest
 from rom_toys import cloud
 
 from mpm_ref.materials.fixed_corotated import FixedCorotated
+from mpm_ref.problem import Clock
 from mpm_ref.reduced import march as marching
 from mpm_ref.reduced.case import case, distance
-from mpm_ref.reduced.march import Way, groups, march, model, picked
+from mpm_ref.reduced.march import Way, groups, march, model, picked, stepped
 from mpm_ref.reduced.model import require_way
 from mpm_ref.reduced.tables import Run
 from mpm_ref.rom.affine import Affine
@@ -245,3 +246,12 @@ def test_distances_from_shapes_made_of_others():
 @pytest.mark.parametrize(("points", "bound"), [(None, 0), (9, 0), (19, 0), (20, 2), (50, 2)])
 def test_boundaries_take_at_most_half_of_the_samples(torsion, points, bound):
     assert len(groups(torsion, Way(points=points), 0.0)) == bound
+
+
+def test_every_step_is_told_its_time_and_goes_on_from_the_last():
+    class Counted:
+        def step(self, latent, samples, t, dt):
+            return latent + 1, (latent, samples, t, dt)
+
+    states = stepped(Counted(), Clock(dt=0.25, steps=3), 0, lambda t, latent: (t, latent))
+    assert list(states) == [(k + 1, (k, (0.25 * k, k), 0.25 * k, 0.25)) for k in range(3)]

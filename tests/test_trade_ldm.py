@@ -9,10 +9,11 @@ from mpm_ref.reduced.case import case
 from mpm_ref.reduced.march import Way
 from mpm_ref.rom.affine import Affine
 from validation.ldm.nets import trained
+from validation.ldm.racing import Raced, Spent
 from validation.ldm.references import references
 from validation.ldm.studies import GRAVITY
 from validation.trade import ldm
-from validation.trade.ldm_cost import EVALUATIONS, PARTS, Clock, Watched, cost, split
+from validation.trade.ldm_cost import EVALUATIONS, PARTS, Clock, Watched, cost, paid, split
 from validation.verification.scenes import with_
 
 EXACT = Affine(3), Affine(3).rest
@@ -116,3 +117,22 @@ def test_longer_steps_meet_the_same_answer_at_their_times():
     errors, seconds = ldm.Setting("network", 4, 20, 3).measured(tests)
     assert 0.0 < errors.origin < 0.05
     assert seconds > 0.0
+
+
+def test_what_saves_nothing_is_never_paid():
+    assert paid(2.0, 30.0) == 15.0
+    assert paid(0.0, 30.0) == paid(-1.0, 30.0) == np.inf
+
+
+def test_a_run_costs_as_many_steps_as_it_has(monkeypatch):
+    tests = references(GRAVITY, 1)
+    one = Raced(Way(), Spent(9.0, 0.5), 0, None)
+    monkeypatch.setattr(ldm, "alone", lambda *_: one)
+    assert ldm.steps_of(tests, EXACT, Way()) == 0.5 * tests.cases[0].problem.clock.steps
+
+
+def test_a_run_by_itself_has_the_errors_that_it_has_among_others():
+    tests, model = references(GRAVITY, 1), trained("gravity-r4")
+    at, way = (model.decoder, model.rest), Way(points=20)
+    found = ldm.alone(tests.cases[0], at, way, tests.x[0])
+    assert found.errors == pytest.approx(tests.on(*at, way), rel=1e-3)     # which count the start
