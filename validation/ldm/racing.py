@@ -92,7 +92,8 @@ class Online:
         (self.map, rest), self.X, self.way = at, one.X[::every], way
         self.states = march(one, self.map, way, rest)
         self.sums, self.spent, self.points, self.ended = Squares(self.X), [], [], False
-        next(self.states)
+        latent, _ = next(self.states)
+        self.sums.add(self.map.place(self.X, latent.xhat), self.X)
 
     def step(self, reference):
         """One step, what it takes, and its error."""
