@@ -103,9 +103,11 @@ def march(case, map, way, rest, seed=0, pick=None):
     yield from stepped(stepper, case.problem.clock, latent, lambda t, latent: pick(t))
 
 
-def stepped(stepper, clock, latent, choose):
-    """Yield (`Latent`, `Report`) after each step; choose(t, latent) gives the samples."""
-    for k in range(clock.steps):
+def stepped(stepper, clock, latent, choose, first=0):
+    """Yield (`Latent`, `Report`) after each step from that of number `first` on; choose(t, latent)
+    gives the samples.
+    """
+    for k in range(first, clock.steps):
         t = k * clock.dt
         latent, report = stepper.step(latent, choose(t, latent), t, clock.dt)
         yield latent, report
