@@ -18,6 +18,7 @@ from figures import (
     ldm_fig14,
     ldm_fig15,
     ldm_fig16,
+    ldmw_fig01,
     ldmw_tables,
 )
 from figures._bodies import body, levelled, nothing, shades, side_by_side
@@ -40,9 +41,12 @@ STATES = {
                   "reduced": np.stack([GRID, GRID + 0.2, GRID]), "full": np.stack(3 * [GRID])},
     "ldm.fig15": {"X": GRID, "t": np.array([0.0, 1.67, 3.33]),
                   "mu": np.array([(0.66, 1.4, -0.9), (0.75, 1.1, -0.5)]),
-                  "reduced": np.zeros((2, 2, 1, 1)) + GRID, "full": np.zeros((2, 2, 1, 1)) + GRID}}
+                  "reduced": np.zeros((2, 2, 1, 1)) + GRID, "full": np.zeros((2, 2, 1, 1)) + GRID},
+    "ldmw.fig1": {"X": GRID, "mu": np.array([(1.0, 4.5, 12.5), (1.2, 9.0, 15.0)]),
+                  "reduced": np.stack([GRID + 0.1, GRID + 0.2]), "full": np.stack(2 * [GRID])}}
 DRAWN = {"ldm.fig4": (ldm_fig04, 2), "ldm.fig6": (ldm_fig06, 3), "ldm.fig11": (ldm_fig11, 3),
-         "ldm.fig12": (ldm_fig12, 4), "ldm.fig13": (ldm_fig13, 6), "ldm.fig15": (ldm_fig15, 6)}
+         "ldm.fig12": (ldm_fig12, 4), "ldm.fig13": (ldm_fig13, 6), "ldm.fig15": (ldm_fig15, 6),
+         "ldmw.fig1": (ldmw_fig01, 4)}
 
 
 @pytest.fixture
@@ -207,6 +211,15 @@ def test_fig14_numbers_steps_that_are_apart(results):
     assert gaps.min() > ldm_fig14.APART
     assert len(lines(ax)["driven"].get_xdata()) == 13
     assert "50 % of the variance" in ldm_fig14.scale(results)
+
+
+def test_pokes_of_the_workshop_are_told_with_their_errors(results):
+    recorded(results, "ldmw.fig1", "ldmw.fig1.error.1.position", "ldmw.fig1.error.1.velocity",
+             "ldmw.fig1.error.2.position")
+    assert ldmw_fig01.scale(results) == (
+        "3 particles, one run; position errors 0.5, 0.5 % from left to right")
+    assert ldmw_fig01.poked(1.25, 0.0, 15.0) == (
+        r"$\rho$ = 1.2 R, $\theta$ = 0.0°, $\phi$ = 15.0°")
 
 
 def test_fig16_needs_no_precision(results):

@@ -1,15 +1,18 @@
 """The workshop paper: its studies, its two hyper-reductions on scenes, what is recorded of them."""
 
 from math import cos, radians, sin
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from figures import _states
+from figures.frame import draw_all
 from mpm_ref.reduced.case import case
 from mpm_ref.rom.latent import at_start
 from mpm_ref.rom.weights import load, save
 from validation import targets
-from validation.ldm import nets
+from validation.ldm import kept_bodies, nets
 from validation.ldm.workshop_studies import (
     PUSHES,
     SHEAR3,
@@ -19,9 +22,10 @@ from validation.ldm.workshop_studies import (
     pushed,
     sheared,
 )
-from validation.ldmw import poke, settings, shear
+from validation.ldmw import poke, settings, shear, states
 from validation.ldmw.runs import by_nodes, by_points, kept, pod, runs, spread
 from validation.record import read_records
+from validation.results import Results
 from validation.run import Setting, run_all
 
 SHEARS = (SHEAR3, SHEAR17)
@@ -183,3 +187,44 @@ def test_all_printed_numbers_are_recorded(function, tmp_path):
 
 def test_settings_are_the_printed_ones(tmp_path):
     assert {r.verdict for r in recorded(settings.settings, tmp_path).values()} == {"pass", "info"}
+
+
+SOME = np.stack(np.meshgrid(*3 * (np.arange(1.0, 3.0),), indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def stood_in(study, numbers):
+    """`Runs` of a few points that go 1, 2, .. % too far in one of three time levels."""
+    def levels(map, rest, approach):
+        for k in range(len(numbers)):
+            yield [(3 * [(1.0 + 0.01 * (k + 1) * (level == 2)) * SOME], 3 * [SOME])
+                   for level in range(3)]
+
+    cases = (case(study.scene(*study.mu[0])),)
+    return SimpleNamespace(X=SOME, cases=cases, levels=levels,
+                           full=SimpleNamespace(mu=study.mu[list(numbers)]))
+
+
+def test_fig1_is_of_the_ends_of_test_runs(tmp_path, monkeypatch):
+    monkeypatch.setattr(states, "runs", stood_in)
+    monkeypatch.setattr(states, "kept", lambda *of: None)
+    monkeypatch.setattr(_states, "PIXELS", 40)
+    found = recorded(states.pokes, tmp_path)
+    for k in (1, 2, 3):
+        one = found[f"ldmw.fig1.error.{k}.position"]
+        assert one.value == pytest.approx(k / np.sqrt(3.0))
+        assert (one.verdict, one.scale) == (
+            "info", "8 particles, 2 steps, r = 5, 15 sample points, one run each")
+    ends = kept_bodies.read(tmp_path, "ldmw.fig1")
+    assert ends["full"] == pytest.approx(np.stack(3 * [SOME]))
+    assert ends["reduced"] == pytest.approx(np.stack([k * SOME for k in (1.01, 1.02, 1.03)]), 1e-4)
+    assert ends["mu"] == pytest.approx(PUSHES.mu[list(states.SHOWN)], 1e-3)
+    drawn = draw_all(Results(tmp_path), names=["ldmw.fig1"])
+    assert (drawn.done, drawn.left, drawn.failed) == (["ldmw_fig01"], [], [])
+
+
+def test_shown_pokes_are_tested_and_as_different_as_tests_are():
+    assert set(states.SHOWN) <= set(PUSHES.test)
+    rho = PUSHES.mu[list(states.SHOWN), 0]
+    every = PUSHES.mu[list(PUSHES.test), 0]
+    assert (np.diff(rho) > 0.0).all()
+    assert (rho[0], rho[-1]) == (every.min(), every.max())

@@ -36,19 +36,20 @@ class Runs(NamedTuple):
     cases: tuple            # `Case` of each
     full: object            # their `Snapshots`
 
-    def errors(self, map, rest, approach):
-        """`Fields` of reduced runs on a map; approach(case, map) gives a stepper, and a function of
-        the time and the state that chooses samples.
+    def levels(self, map, rest, approach):
+        """x, v and F of each time level of reduced runs on a map, and those of the full-order ones:
+        a list for each run. approach(case, map) gives a stepper, and a function of the time and the
+        state that chooses samples.
         """
-        sums = np.zeros((2, 3))
         with threads_for((self.cases[0].problem.bodies[0],)), threadpoolctl.threadpool_limits(1):
             for one, *fields in zip(self.cases, self.full.x, self.full.v, self.full.F, strict=True):
                 states = march(one, map, rest, approach)
-                for latent, *there in zip(states, *fields, strict=True):
-                    here = of_state(map, latent, one.X)
-                    sums += [[np.sum((a - b) ** 2) for a, b in zip(here, there, strict=True)],
-                             [np.sum(b**2) for b in there]]
-        return Fields(*np.sqrt(sums[0] / sums[1]).tolist())
+                yield [(of_state(map, latent, one.X), there)
+                       for latent, *there in zip(states, *fields, strict=True)]
+
+    def errors(self, map, rest, approach):
+        """`Fields` of reduced runs on a map, by `levels`."""
+        return compared(self.levels(map, rest, approach))
 
     def of_net(self, name, approach):
         """`Fields` on a trained map."""
@@ -65,6 +66,16 @@ class Runs(NamedTuple):
         """How much it is, in words."""
         return (f"{len(self.X)} particles, {self.full.x.shape[1] - 1} steps, {len(self.cases)} of "
                 f"{len(self.study.mu)} runs")
+
+
+def compared(found):
+    """`Fields` of the `levels` of runs."""
+    sums = np.zeros((2, 3))
+    for levels in found:
+        for here, there in levels:
+            sums += [[np.sum((a - b) ** 2) for a, b in zip(here, there, strict=True)],
+                     [np.sum(b**2) for b in there]]
+    return Fields(*np.sqrt(sums[0] / sums[1]).tolist())
 
 
 def runs(study, numbers):
