@@ -1,7 +1,7 @@
 """A small study for tests: a bar in 2D that is held at one end and bends under gravity."""
 
 from mpm_ref.reduced import dataset, maps
-from mpm_ref.reduced.generate import generate
+from mpm_ref.reduced.generate import FINISHED, generate
 from mpm_ref.reduced.study import load
 from mpm_ref.store.results import Results
 
@@ -66,11 +66,18 @@ def study(folder, *edits, **scene):
     return load(write(folder, *edits, **scene))
 
 
+def generated(folder, data="."):
+    """The `Study` in a folder, and the folder in it with its runs."""
+    bars, data = study(folder), folder / data
+    data.mkdir(exist_ok=True)
+    assert [(done.number, done.why) for done in generate(bars, data)] == [
+        (k, FINISHED) for k in range(4)]
+    return bars, data
+
+
 def modelled(folder):
     """The folder, with a study, its runs in data/ and modes of them in map.npz."""
-    bars, data = study(folder), folder / "data"
-    data.mkdir()
-    assert all(done.well for done in generate(bars, data))
+    bars, data = generated(folder, "data")
     maps.save(folder / "map.npz", maps.computed(bars, dataset.load(bars, data, bars.train), {}))
     return folder
 

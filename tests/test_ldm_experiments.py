@@ -1,9 +1,13 @@
 """What LDM's experiments make of errors, which weights they accept, and settings of the tower."""
 
+from contextlib import nullcontext
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from mpm_ref.reduced.errors import Errors
+from mpm_ref.reduced.march import SCHEMES, Way
 from mpm_ref.rom.weights import Model, load, save
 from validation import targets
 from validation.ldm import nets, settings, superres
@@ -85,6 +89,48 @@ def test_tracers_go_with_the_full_models_own_points():
     found = superres.advected(scene, x.X)
     own = TORSION._replace(mu=np.array([[0.36, 1.2]]), scene=lambda v, w: scene).run([0]).x[0]
     assert abs(found - own).max() < 1e-12
+
+
+@pytest.fixture
+def made_up(monkeypatch):
+    """Table 4 without its runs, two tests: x of all points grows from 1 by 1 in each coarse step;
+    the reduced run of the k-th scheme is off by (k + 1) % of x, by much more at the fine run's
+    other levels, the tracers by 5 %.
+    """
+    x = np.ones((61, 8, 3)) + 0.5 * np.arange(61)[:, None, None]
+    problem = SimpleNamespace(bodies=(), clock=SimpleNamespace(steps=60))
+    off = np.where(np.arange(61) % superres.REFINE, 7.0, 0.01)[:, None, None]
+    ways = [Way(*scheme) for scheme in SCHEMES]
+    for name, value in {
+            "TORSION": TORSION._replace(test=TORSION.test[:2]), "trained": lambda name: None,
+            "case": lambda scene: SimpleNamespace(X=x[0], problem=problem),
+            "build": lambda scene: None, "threads_for": lambda bodies: nullcontext(),
+            "history": lambda problem: SimpleNamespace(x=x),
+            "reduced": lambda one, model, way: x * (1.0 + off * (1 + ways.index(way))),
+            "advected": lambda scene, X: 1.05 * x[::superres.REFINE]}.items():
+        monkeypatch.setattr(superres, name, value)
+
+
+def test_tracers_of_table_4_are_measured_at_the_same_times_and_to_be_beaten(tmp_path, made_up):
+    setting = Setting("standard", tmp_path, targets=targets.load())
+    assert run_all([superres.superresolution.experiment], setting) == []
+    found = {r.target.rpartition(".")[2]: r for r in Results(tmp_path).records("ldm.table4")}
+    for k, scheme in enumerate(SCHEMES):
+        assert found[Way(*scheme).name].value == pytest.approx(1.0 + k)
+    baseline, gain = found["baseline"], found["gain"]
+    assert (baseline.value, baseline.verdict) == (pytest.approx(5.0), "info")
+    assert (gain.value, gain.verdict) == (pytest.approx(5.0 / 4.0), "pass")
+    assert "eulerian_linear" in gain.note
+    assert "errors of 8 points at 31 times" in gain.scale
+
+
+def test_tracers_that_are_as_good_are_not_beaten(tmp_path, made_up, monkeypatch):
+    monkeypatch.setattr(superres, "advected", lambda scene, X: 1.039 * superres.history(0).x[::2])
+    for profile, verdict in (("standard", "miss"), ("quick", None)):
+        setting = Setting(profile, tmp_path / profile, targets=targets.load())
+        assert run_all([superres.superresolution.experiment], setting) == []
+        records = Results(tmp_path / profile).records("ldm.table4")
+        assert {r.target: r.verdict for r in records}.get("ldm.table4.gain") == verdict
 
 
 def missed(folder):

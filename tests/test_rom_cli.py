@@ -79,7 +79,7 @@ def test_a_study_that_does_not_exist_is_told_with_those_that_do():
 def test_ctrl_c_leaves_finished_runs(made, tmp_path, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
-    monkeypatch.setattr("mpm_ref.cli.rom.generate", interrupted)
+    monkeypatch.setattr("mpm_ref.cli.rom_make.generate", interrupted)
     done = mpm_ref("rom", "generate", made / "bars.toml", "--out", tmp_path, *ONE)
     assert_told(done, 130, "interrupted")
 

@@ -8,7 +8,7 @@ import pytest
 from command_line import assert_told, mpm_ref
 from small_studies import CURVED, STEPS, ended, modelled, write
 
-from mpm_ref.reduced import maps, record
+from mpm_ref.reduced import maps
 from mpm_ref.reduced.case import case
 from mpm_ref.reduced.march import Way, march
 from mpm_ref.reduced.record import COUNTS, NUMBERS, VECTORS
@@ -114,34 +114,6 @@ def test_a_run_that_breaks_down_has_status_3_and_keeps_what_went_before(reduced,
     why, frames = ended(out)
     assert frames == 1
     assert words in why
-
-
-def test_an_interrupted_run_keeps_its_frames(reduced, monkeypatch):
-    def interrupted(writer, state, problem):
-        if state.step == 3:
-            raise KeyboardInterrupt
-        show(writer, state, problem)
-
-    show = record._show
-    monkeypatch.setattr(record, "_show", interrupted)
-    done, out = reduced("--set", "g=2")
-    assert_told(done, 130, "interrupted")
-    assert ended(out) == ("interrupted", 3)
-    monkeypatch.undo()
-    again, _ = reduced("--set", "g=2")
-    assert_told(again, 2, "cut off after 3 frames", "make it again with --overwrite")
-    assert ended(out) == ("interrupted", 3)
-    assert reduced("--set", "g=2", "--overwrite")[0].exit_code == 0
-    assert ended(out) == ("finished", STEPS + 1)
-    assert "cut off" not in reduced("--set", "g=2")[0].stderr
-
-
-def test_a_run_that_was_killed_is_cut_off_too():
-    parts = {"finished": [{"why": "finished"}], "killed": [], "stopped": [{"why": "interrupted"}],
-             "broken": [{"why": "the reduced run broke down in step 3"}]}
-    found = {name: record.cut_off({"reduced": {}, "parts": rows}) for name, rows in parts.items()}
-    assert found == {"finished": False, "killed": True, "stopped": True, "broken": False}
-    assert not record.cut_off({"parts": []})
 
 
 def test_a_run_is_told_to_machines_too(made, reduced):

@@ -5,7 +5,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from small_studies import CURVED, STEPS, study
+from small_studies import CURVED, STEPS, generated, study
 
 from mpm_ref.cases import snapshots
 from mpm_ref.reduced import dataset, maps
@@ -34,11 +34,7 @@ from mpm_ref.store.session import checkpoint_of
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     """A study, and the folder with its runs."""
-    folder = tmp_path_factory.mktemp("made")
-    bars = study(folder)
-    assert [(done.number, done.why) for done in generate(bars, folder)] == [
-        (k, FINISHED) for k in range(4)]
-    return bars, folder
+    return generated(tmp_path_factory.mktemp("made"))
 
 
 def test_data_are_those_of_runs_in_memory_bit_for_bit(made):
@@ -235,6 +231,8 @@ def test_what_are_no_modes_is_refused(model, tmp_path):
     for changes, words in (({"U": None}, "lacks U"), ({"rest": np.zeros(2)}, "rest has shape"),
                            ({"xhat": np.zeros(3)}, "three axes"),
                            ({"X": np.full_like(model.decoder.X, np.nan)}, "not finite"),
+                           ({"about": np.array("{")}, r"map\.npz .*about is no JSON"),
+                           ({"about": None}, r"map\.npz .*about is no JSON"),
                            ({"format": np.array(2)}, "format 1")):
         with pytest.raises(ValueError, match=words):
             modes_file.load(written(**changes))

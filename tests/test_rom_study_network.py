@@ -4,10 +4,9 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from small_studies import study
+from small_studies import generated, study
 
 from mpm_ref.reduced import dataset, maps
-from mpm_ref.reduced.generate import generate
 from mpm_ref.reduced.tables import KEYS, LATENTS, NETWORK, WEIGHTS, Map
 
 torch = pytest.importorskip("torch")
@@ -27,10 +26,7 @@ from mpm_ref.rom.learn.loss import (  # noqa: E402
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     """A study, and the folder with its runs."""
-    folder = tmp_path_factory.mktemp("made")
-    bars = study(folder)
-    assert all(done.well for done in generate(bars, folder))
-    return bars, folder
+    return generated(tmp_path_factory.mktemp("made"))
 
 
 def test_a_network_is_trained_as_the_study_says():

@@ -143,8 +143,23 @@ def test_nothing_is_unpickled(tmp_path):
     trap[0] = Trap()
     path = tmp_path / "trap.npz"
     path.write_bytes(sealed({**arrays_of(model()), "format": trap}))
-    with pytest.raises(ValueError, match="allow_pickle=False"):
-        load(path)
+    refused(path, "allow_pickle=False")
+
+
+def test_a_sealed_file_that_is_no_archive_is_told(saved):
+    content = saved.read_bytes()[:-500]
+    copy = saved.with_name("short.npz")
+    copy.write_bytes(content + weights.seal(content))
+    refused(copy, "is no archive of plain arrays")
+
+
+@pytest.mark.parametrize(("about", "said"), [
+    ('{"seed": 3', "about is no JSON"), ("", "about is no JSON"), ("[3]", "about is a list"),
+])
+def test_a_file_that_says_nothing_of_its_map_is_told(tmp_path, about, said):
+    path = tmp_path / "map.npz"
+    path.write_bytes(sealed({**arrays_of(model()), "about": np.array(about)}))
+    refused(path, said)
 
 
 def test_another_format_is_told(tmp_path, monkeypatch):

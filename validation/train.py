@@ -3,7 +3,6 @@
 It needs PyTorch. A training that is cut off goes on from its checkpoint.
 """
 
-import time
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -35,7 +34,6 @@ def made(name, checkpoints, threads):
     """`Model` of a net by name, with what is to be known of it."""
     net = nets()[name]
     plan, snapshots = training(net), net.study.run(net.study.train)
-    begin = time.process_time()
     with tqdm(total=plan.epochs, desc=name) as bar:
         def show(history):
             bar.update(len(history) - bar.n)
@@ -44,7 +42,6 @@ def made(name, checkpoints, threads):
     return of_trained(done, snapshots.X, {
         **identity(net), "training": asdict(plan), "command": f"python -m validation.train {name}",
         "threads": threads, "torch": torch.__version__,
-        "cpu_seconds_of_last_part": round(time.process_time() - begin, 1),
         **provenance(commit(ROOT))})
 
 

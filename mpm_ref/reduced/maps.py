@@ -48,12 +48,13 @@ def learned(study, snapshots, about, checkpoint, on_epoch, threads):
 
 
 def of_trained(done, X, about):
-    """`Model` of a `rom.learn.fit.Trained` for points X (n, d) at rest [m]; the loss of some epochs
-    is added to what is to be known of it.
+    """`Model` of a `rom.learn.fit.Trained` for points X (n, d) at rest [m]; what the training took
+    and the loss of some epochs are added to what is to be known of it.
     """
     rest = initial(done.decoder, X, xhat=done.xhat[:, 0].mean(axis=0)).xhat
     loss = done.history[::max(1, len(done.history) // KEPT)].tolist()
-    return Model(done.decoder, done.xhat, rest, about | {"loss": loss})
+    took = {f"{clock}_seconds": round(s, 1) for clock, s in done.cost._asdict().items()}
+    return Model(done.decoder, done.xhat, rest, about | took | {"loss": loss})
 
 
 def larger(scene):

@@ -97,17 +97,28 @@ def march(case, map, way, rest, seed=0, pick=None):
     """Yield (`Latent`, `Report` or None) of a reduced run, the start first. rest: latent
     coordinates near the body at rest; pick: the samples as `picked` gives them, or others.
     """
-    stepper, latent = model(case, map, way), start(case, map, rest)
-    pick = pick or picked(case, map, way, latent.xhat, seed)
-    yield latent, None
-    yield from stepped(stepper, case.problem.clock, latent, lambda t, latent: pick(t))
+    first = start(case, map, rest)
+    pick = pick or picked(case, map, way, first.xhat, seed)
+    yield from continued([(first, None)], case, map, way, pick)
 
 
-def stepped(stepper, clock, latent, choose, first=0):
-    """Yield (`Latent`, `Report`) after each step from that of number `first` on; choose(t, latent)
-    gives the samples.
+def continued(known, case, map, way, pick):
+    """Yield the same of a run whose first states (`Latent`, `Report` or None) are known, these too.
+    Their samples are picked again, so that those of later steps are the run's own.
     """
-    for k in range(first, clock.steps):
+    stepper, clock = model(case, map, way), case.problem.clock
+    for k, state in enumerate(known):
+        if k > 0:
+            pick((k - 1) * clock.dt)
+        yield state
+    yield from stepped(stepper, clock, known[-1][0], lambda t, latent: pick(t), len(known) - 1)
+
+
+def stepped(stepper, clock, latent, choose, begin=0):
+    """Yield (`Latent`, `Report`) after each step from step `begin` on; choose(t, latent) gives the
+    samples.
+    """
+    for k in range(begin, clock.steps):
         t = k * clock.dt
         latent, report = stepper.step(latent, choose(t, latent), t, clock.dt)
         yield latent, report

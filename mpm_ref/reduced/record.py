@@ -6,21 +6,18 @@ import json
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import inf
-from pathlib import Path
 from typing import NamedTuple
 
 from ..energy import energy
 from ..monitor import Unstable, check
 from ..rom.step import BREAKDOWNS
 from ..simulate import Frame, State
-from ..store import Fields, checkpoint, create
+from ..store import Fields, checkpoint, create, reopen
 from ..store.manifest import Part, manifest
-from ..store.results import Results
-from ..store.running import Refused
 from ..store.session import FINISHED, INTERRUPTED, checkpoint_of
-from ..store.words import counted
 from .field import Field
-from .watch import Nonsense, Watch, watched
+from .march import picked
+from .watch import Nonsense, Watch, watched, watched_on
 
 VECTORS = {"xhat": "1", "vhat": "1/s"}                          # of the group `reduced`: units
 COUNTS = {"samples": "1", "points": "1", "rank": "1", "lost": "1"}
@@ -46,7 +43,7 @@ class Recording:
 
 
 class Step(NamedTuple):
-    """A state of a reduced run; no `Report` at the start."""
+    """A state of a reduced run; no `Report` at the start, no `State` of one that is recorded."""
 
     state: State
     latent: object
@@ -54,46 +51,21 @@ class Step(NamedTuple):
     sight: object           # `watch.Sight`
 
 
-def require_leave(out, overwrite):
-    """Raise `Refused` where a file stands that is not to be replaced, and BadResults for one that
-    is no results file.
-    """
-    if not Path(out).exists():
-        return
-    with Results(out) as results:
-        if overwrite:
-            return
-        if cut_off(results.manifest):
-            raise Refused(f"{out} holds a reduced run that was cut off after "
-                          f"{counted(len(results), 'frame')}; such runs take seconds and do not go "
-                          "on: make it again with --overwrite")
-        raise Refused(f"{out} exists: add --overwrite to replace it, or name another file")
-
-
-def cut_off(facts):
-    """Whether a manifest is that of a reduced run that was interrupted or killed."""
-    parts = facts.get("parts")
-    return "reduced" in facts and (not parts or parts[-1]["why"] == INTERRUPTED)
-
-
-def record(recording, out, on_step=None):
+def record(recording, out, known=(), on_step=None):
     """Make a reduced run into the results file `out`; returns {step: `Sight`} of those out of
-    bounds (see `watch`).
+    bounds (see `watch`). known: its states that stand there, after which it goes on (see `begun`).
 
     on_step(k) is called after each step. Raises `Lost` where the run breaks down; the frames before
     then stand. Raises `NotWritten` or `InUse`.
     """
-    problem = recording.problem
-    facts = manifest(problem, recording.run.seed) | {"reduced": recording.facts}
-    marked = replace(problem, source=json.dumps([recording.facts, problem.source]))
-    writer, out_of_bounds = create(out, marked, Fields(), facts, checkpoint_of(out)), {}
+    writer, out_of_bounds = _writer(recording, out, len(known)), {}
     try:
-        series = _lay_out(writer.h5, recording.model.decoder.r)
-        with _part(writer) as part:
-            for step in steps(recording):
-                _append(series, step)
-                _show(writer, step.state, problem)
-                part.state, k = step.state, step.state.step
+        with _part(writer, max(len(known) - 1, 0)) as part:
+            for k, step in enumerate(steps(recording, known)):
+                if step.state is not None:
+                    _append(writer.h5["reduced"], step)
+                    _show(writer, step.state, recording.problem)
+                    part.state = step.state
                 if step.sight.why:
                     out_of_bounds[k] = step.sight
                 if on_step is not None:
@@ -103,18 +75,37 @@ def record(recording, out, on_step=None):
     return out_of_bounds
 
 
-def steps(recording):
-    """Yield each `Step` of a run, the start first; raises `Lost`. Inverted points are for `watch`
-    to judge: among very many, a few may be.
+def marked(recording):
+    """The problem whose source says that it is a reduced run, and which."""
+    problem = recording.problem
+    return replace(problem, source=json.dumps([recording.facts, problem.source]))
+
+
+def _writer(recording, out, frames):
+    """`Writer` of a new file, or after so many frames of one that stands."""
+    if frames:
+        writer = reopen(out, marked(recording), frames)
+        _cut(writer, frames)
+        return writer
+    facts = manifest(recording.problem, recording.run.seed) | {"reduced": recording.facts}
+    writer = create(out, marked(recording), Fields(), facts, checkpoint_of(out))
+    _lay_out(writer.h5, recording.model.decoder.r)
+    return writer
+
+
+def steps(recording, known=()):
+    """Yield each `Step` of a run, the start first, also of its states that are known; raises
+    `Lost`. Inverted points are for `watch` to judge: among very many, a few may be.
     """
     problem, run, k = recording.problem, recording.run, 0
     bounds = replace(problem, limits=replace(problem.limits, J=(-inf, inf)))
-    found = watched(recording.watch, recording.case, run.way, recording.model.rest, run.seed)
     try:
-        for latent, report, sight in found:
-            body = recording.field.at(latent, problem.clock.dt, run.velocity)
-            state = State((body,), step=k, t=k * problem.clock.dt, frame=k + 1)
-            check(bounds, state, problem.clock.dt if k else 0.0)
+        for latent, report, sight in _states(recording, known):
+            state = None
+            if k >= len(known):
+                body = recording.field.at(latent, problem.clock.dt, run.velocity)
+                state = State((body,), step=k, t=k * problem.clock.dt, frame=k + 1)
+                check(bounds, state, problem.clock.dt if k else 0.0)
             yield Step(state, latent, report, sight)
             k += 1
     except Nonsense as fault:
@@ -123,6 +114,15 @@ def steps(recording):
         raise Lost(f"the reduced run broke down in step {k}: {getattr(fault, 'reason', fault)}; "
                    "are the parameters within the studied range, are there enough samples, and is "
                    "the map good (mpm-ref rom evaluate)?") from fault
+
+
+def _states(recording, known):
+    """What `watched` yields of a run, some of whose states may be known."""
+    seen_by, case, run = recording.watch, recording.case, recording.run
+    if not known:
+        return watched(seen_by, case, run.way, recording.model.rest, run.seed)
+    pick = picked(case, seen_by.map, run.way, known[0][0].xhat, run.seed)
+    return watched_on(known, seen_by, case, run.way, pick)
 
 
 def _show(writer, state, problem):
@@ -138,11 +138,14 @@ class _Part(Part):
 
 
 @contextmanager
-def _part(writer):
-    """Enter a run in the manifest, however it ends."""
-    part, why = _Part(0), FINISHED
+def _part(writer, first_step):
+    """Enter a part of a run in the manifest, whether it finishes, is interrupted or breaks down; a
+    frame that was being written then is dropped.
+    """
+    part, why = _Part(first_step), None
     try:
         yield part
+        why = FINISHED
     except KeyboardInterrupt:
         why = INTERRUPTED
         raise
@@ -150,22 +153,29 @@ def _part(writer):
         why = str(fault)
         raise
     finally:
-        if part.state is not None:
+        if why is not None and part.state is not None:
+            _cut(writer, part.state.step + 1)
             facts = writer.manifest
             facts["parts"].append(part.ended(why, part.state, checkpoint.digest(part.state)))
             writer.put_manifest(facts)
 
 
 def _lay_out(h5, r):
-    """The empty series of the group `reduced`, by name."""
-    group, series = h5.create_group("reduced"), {}
+    """The empty series of the group `reduced`."""
+    group = h5.create_group("reduced")
     kinds = ((VECTORS, (r,), "f8"), (COUNTS, (), "i8"), (NUMBERS, (), "f8"))
     for names, shape, kind in kinds:
         for name, unit in names.items():
-            series[name] = group.create_dataset(name, (0, *shape), kind, maxshape=(None, *shape),
-                                                chunks=(64, *shape), fletcher32=True)
-            series[name].attrs["unit"] = unit
-    return series
+            series = group.create_dataset(name, (0, *shape), kind, maxshape=(None, *shape),
+                                          chunks=(64, *shape), fletcher32=True)
+            series.attrs["unit"] = unit
+
+
+def _cut(writer, frames):
+    """Keep the first so many frames, and their rows of the group `reduced`."""
+    for series in writer.h5["reduced"].values():
+        series.resize(frames, axis=0)
+    writer.truncate(frames)
 
 
 def _append(series, step):

@@ -5,22 +5,18 @@
 
 import hashlib
 import json
-import tomllib
-from difflib import get_close_matches
 from itertools import product
 from math import isfinite
 from pathlib import Path
 from typing import NamedTuple
 
-import msgspec
 import numpy as np
 
 from .. import scene
 from ..scene import SceneError
-from ..scene.check import check_finite
-from ..scene.error import at, joined, opened_by
-from ..scene.words import rephrase
-from .tables import KEYS, LATIN, Map, Parameter, Run, Tables
+from ..scene.error import at, opened_by
+from .study_file import checked, plain
+from .tables import LATIN, Tables
 from .vary import flat, varied
 
 SAME = ("dim", "dx", "dt", "steps", "seed", "scheme", "integrator")     # in all runs of a study
@@ -85,14 +81,9 @@ def load(path, shipped=None):
     SceneError, which names the file and the key.
     """
     path = Path(path)
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as fault:
-        raise SceneError(f"{path}: cannot be read ({fault.strerror})") from None
-    except ValueError as fault:
-        raise SceneError(f"{path}: not valid TOML: {fault}") from None
+    data = plain(path)
     with opened_by(str(path)):
-        tables = _checked(data)
+        tables = checked(data)
         mu = parameters(tables)
         study = Study(path, _base(tables, path.parent, shipped or {}), tables, mu,
                       held_out(len(mu), tables.test, tables.seed))
@@ -108,37 +99,6 @@ def number(text, value):
     except ValueError:
         pass
     raise SceneError(f"{text}: expected a finite number, not {value!r}")
-
-
-def _checked(data):
-    """`Tables` of plain tables."""
-    check_finite(data)
-    _require_keys(data, Tables)
-    for name, record in (("map", Map), ("run", Run)):
-        _require_keys(data.get(name), record, name)
-    parts = data.get("parameter")
-    for k, part in enumerate(parts if isinstance(parts, list) else ()):
-        _require_keys(part, Parameter, f"parameter[{k}]")
-    try:
-        tables = msgspec.convert(data, Tables)
-    except msgspec.ValidationError as fault:
-        raise SceneError(rephrase(str(fault), data)) from None
-    kind = tables.map.kind
-    for key in sorted(set(data["map"]) - {"kind", "r", *KEYS[kind]}):
-        other = next(other for other, keys in KEYS.items() if key in keys)
-        raise SceneError(f'map.{key}: given, but the kind is "{kind}"; remove it, or take '
-                         f'kind = "{other}"')
-    return tables
-
-
-def _require_keys(table, record, path=""):
-    """Raise SceneError for a key of a table that its record does not know."""
-    known = record.__struct_encode_fields__
-    for key in table if isinstance(table, dict) else ():
-        if key not in known:
-            near = get_close_matches(key, known, 1)
-            hint = f"did you mean `{near[0]}`?" if near else f"the keys here are {', '.join(known)}"
-            raise SceneError(f"{joined(path, key)}: unknown key; {hint}")
 
 
 def parameters(tables):

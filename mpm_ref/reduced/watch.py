@@ -24,7 +24,7 @@ import numpy as np
 
 from ..rom.extent import Extent, extent, motion
 from ..rom.projection import RANK
-from .march import march, picked, start
+from .march import continued, picked, start
 
 LOOKED = 64         # points of the body that are looked at, and samples
 LATENTS = 100       # training latents that the metric is a mean over
@@ -139,14 +139,20 @@ def watched(watch, case, way, rest, seed=0, pick=None):
     """Yield (`Latent`, `Report` or None, `Sight`) of a reduced run, as `march` makes it. Raises
     `Nonsense` where it has left no body, and what `march` raises.
     """
-    own = pick or picked(case, watch.map, way, start(case, watch.map, rest).xhat, seed)
+    begin = start(case, watch.map, rest)
+    pick = pick or picked(case, watch.map, way, begin.xhat, seed)
+    yield from watched_on([(begin, None)], watch, case, way, pick)
+
+
+def watched_on(known, watch, case, way, pick):
+    """Yield the same of a run whose first states are known, as `march.continued` makes it."""
     taken, sight, first = [], None, None
 
     def kept(t):
-        taken[:] = [own(t)]
+        taken[:] = [pick(t)]
         return taken[0]
 
-    for k, (latent, report) in enumerate(march(case, watch.map, way, rest, pick=kept)):
+    for k, (latent, report) in enumerate(continued(known, case, watch.map, way, kept)):
         sight = watch.look(latent, report, case.X[taken[0]] if taken else None, sight)
         first = first or ((k, sight) if sight.why else None)
         if sight.nonsense:

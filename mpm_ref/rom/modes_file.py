@@ -10,7 +10,7 @@ from scipy.spatial import KDTree
 
 from .curved import Curved
 from .modes import Modes
-from .weights import Model, opened, sealed, write_whole
+from .weights import Model, about_of, opened, sealed, write_whole
 
 FORMAT = 1
 NUMBERS = ("X", "U", "slope", "xhat", "rest")
@@ -41,7 +41,7 @@ def load(path):
         raise ValueError(f"{path} holds no modes: {fault}; make them again")
     X, U, slope, xhat, rest, *bend = (arrays[name] for name in KINDS[kind])
     map = Modes(X, U, slope, KDTree(X))
-    return Model(Curved(map, *bend) if bend else map, xhat, rest, json.loads(str(arrays["about"])))
+    return Model(Curved(map, *bend) if bend else map, xhat, rest, about_of(path, arrays))
 
 
 def arrays_of(model):

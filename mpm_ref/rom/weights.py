@@ -57,7 +57,20 @@ def load(path):
     net = Network(arrays["sizes"], arrays["W"], None, arrays["b"])
     units = Units(*(arrays[name] for name in Units._fields))
     return Model(Decoder(network(layers_of(net)), units), arrays["xhat"], arrays["rest"],
-                 json.loads(str(arrays["about"])))
+                 about_of(path, arrays))
+
+
+def about_of(path, arrays):
+    """What is known of a map, from the arrays of its file. Raises ValueError for no JSON of it."""
+    try:
+        about = json.loads(str(arrays.get("about", "")))
+    except ValueError as error:
+        raise ValueError(f"{path} says nothing of its map: about is no JSON ({error}); copy it "
+                         "again from where it came, or train again") from None
+    if not isinstance(about, dict):
+        raise ValueError(f"{path} says nothing of its map: about is a {type(about).__name__}, "
+                         "expected a JSON object; train again")
+    return about
 
 
 def arrays_of(model):
@@ -127,8 +140,12 @@ def opened(path):
     if seal(content[:-SEAL]) != content[-SEAL:]:
         raise ValueError(f"{path} is damaged, cut short or no trained map: its checksum does not "
                          "fit; copy it again from where it came, or train again")
-    with np.load(io.BytesIO(content), allow_pickle=False) as file:
-        return dict(file)
+    try:
+        with np.load(io.BytesIO(content), allow_pickle=False) as file:
+            return dict(file)
+    except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
+        raise ValueError(f"{path} is no archive of plain arrays ({error}); copy it again from "
+                         "where it came, or train again") from None
 
 
 def write_whole(path, content):

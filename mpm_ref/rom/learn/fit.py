@@ -1,7 +1,8 @@
 """Training a decoder: seeds, schedule, checkpoints, history (LDM-appB).
 
 A training that is cut off goes on from its last checkpoint. Its numbers are then those of an
-uninterrupted one, on the same machine with the same number of threads.
+uninterrupted one, on the same machine with the same number of threads; its cost is the sum over its
+parts, of each up to its last checkpoint.
 """
 
 import hashlib
@@ -19,6 +20,7 @@ from ..architecture import HIDDEN
 from ..modes import basis
 from ..snapshots import units
 from ..weights import SEAL, seal, write_whole
+from .cost import Cost, Meter
 from .data import batch_of, data_of
 from .encoder import Encoder, Free, Given, codes
 from .loss import CODE, Weights, loss
@@ -27,6 +29,7 @@ from .perceptron import Perceptron, exported
 FASTEST, SLOWEST = 1e-3, 1e-6       # learning rates at the first and the last step (LDM-appB)
 LATENTS = ("encoder", "free", "modes")
 SAVE = 20                           # epochs between checkpoints
+FORMAT = 2                          # of checkpoints
 
 
 @dataclass(frozen=True)
@@ -69,12 +72,14 @@ class Trained(NamedTuple):
     decoder: object         # `rom.decoder.Decoder`
     xhat: np.ndarray        # (s, k + 1, r) latent coordinates of the training snapshots
     history: np.ndarray     # (epochs, 4) loss, and its terms, of each epoch
+    cost: Cost              # of all parts of the training
 
 
 class Session:
     """Networks, optimiser and random numbers of a training under way."""
 
     def __init__(self, training, snapshots):
+        self.meter = Meter()
         torch.manual_seed(training.seed)
         self.training, self.units = training, units(snapshots)
         self.data = data_of(snapshots, self.units)
@@ -93,7 +98,7 @@ class Session:
     @property
     def named(self):
         """The training's settings, and what it is trained on, as one line of text."""
-        return json.dumps({**asdict(self.training), "data": self.of})
+        return json.dumps({"format": FORMAT, **asdict(self.training), "data": self.of})
 
     def epoch(self):
         """Show every snapshot once, or those whose turn it is, at least one."""
@@ -133,14 +138,15 @@ class Session:
         """`Trained`, of so many runs."""
         xhat = codes(self.encoder, self.inputs).double().numpy()
         return Trained(exported(self.f, self.units), xhat.reshape(runs, -1, self.training.r),
-                       np.array(self.history))
+                       np.array(self.history), self.meter.total)
 
     def save(self, path):
         """Checkpoint, whole or not at all."""
         content = io.BytesIO()
         torch.save({"training": self.named, "f": self.f.state_dict(),
                     "encoder": self.encoder.state_dict(), "random": self.random.get_state(),
-                    "optimiser": self.optimiser.state_dict(), "history": self.history}, content)
+                    "optimiser": self.optimiser.state_dict(), "history": self.history,
+                    "cost": tuple(self.meter.total)}, content)
         write_whole(path, content.getvalue() + seal(content.getvalue()))
 
     def load(self, path):
@@ -159,7 +165,7 @@ class Session:
         self.encoder.load_state_dict(kept["encoder"])
         self.optimiser.load_state_dict(kept["optimiser"])
         self.random.set_state(kept["random"])
-        self.history = kept["history"]
+        self.history, self.meter.before = kept["history"], Cost(*kept["cost"])
 
 
 def encoder(training, snapshots):

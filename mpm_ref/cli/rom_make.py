@@ -1,0 +1,121 @@
+"""`mpm-ref rom generate` and `train`: the data of a study, and the map that is made of them."""
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..reduced import dataset, maps
+from ..reduced.case import case
+from ..reduced.generate import INTERRUPTED, NOT_WRITTEN, SKIPPED, UNSTABLE, generate, one_thread
+from ..reduced.model import kind_of, with_kind
+from ..reduced.tables import KEYS, NETWORK
+from ..store.atomic import NotWritten, not_written, require_place
+from ..store.words import counted
+from . import faults
+from .faults import end, one_line, options
+from .rom_options import Data, Overwrite, StudyName, named, studied
+from .shipped import keep_scene
+from .terminal import passing
+
+STATUS = {UNSTABLE: faults.UNSTABLE, NOT_WRITTEN: faults.NOT_WRITTEN}
+
+
+def make_data(
+    name: StudyName,
+    out: Annotated[Path | None, typer.Option(
+        "--out", "-o", help="Folder for the runs, default: STUDY-data.")] = None,
+    workers: Annotated[int | None, typer.Option(
+        help="Processes of one thread each, default: all cores.", min=1)] = None,
+):
+    """Make the full-order runs of a study. Finished ones are left as they are, one that was cut
+    off goes on from its checkpoint; Ctrl-C whenever you like.
+    """
+    with one_line():
+        study = studied(name)
+        folder, count = named(out, study, "-data"), {}
+        with options():
+            case(study.scene(study.mu[0]))      # refuses what reduced runs do not know
+        make_folder(folder)
+        with passing(total=len(study.mu), unit="run", desc=str(folder)) as bar:
+            for done in generate(study, folder, workers or os.cpu_count() or 1):
+                if done.why == INTERRUPTED:
+                    raise KeyboardInterrupt
+                if not done.well:
+                    bar.close()
+                    end(done.said, STATUS.get(done.why, faults.BAD_INPUT))
+                count[done.why] = count.get(done.why, 0) + 1
+                bar.update()
+        there = count.get(SKIPPED, 0)
+        print(f"{folder}: {counted(len(study.mu), 'run')} of {study.path.stem}, {there} of them "
+              f"already there; {len(study.test)} held out")
+
+
+def train(
+    name: StudyName,
+    data: Data = None,
+    out: Annotated[Path | None, typer.Option(
+        "--out", "-o", help="File for the map, default: STUDY.npz.")] = None,
+    kind: Annotated[str | None, typer.Option(
+        help=f"Of {', '.join(KEYS)}, default: as studied.")] = None,
+    threads: Annotated[int, typer.Option(help="Of PyTorch.", min=1)] = 1,
+    overwrite: Overwrite = False,
+):
+    """Make the map of a study from its runs: POD modes, straight or curved, at once; a network by
+    training, which needs PyTorch. A training that is cut off goes on from its checkpoint, MAP.pt.
+    """
+    with one_line():
+        with options():
+            study = with_kind(studied(name), kind)
+            out, data = named(out, study, ".npz"), named(data, study, "-data")
+            require_map_place(out, study, overwrite)
+            if study.tables.map.kind == NETWORK:
+                maps.training()
+            snapshots = dataset.load(study, data, study.train)
+            about = {"command": f"mpm-ref rom train {name} --data {data} --out {out} "
+                                f"--kind {study.tables.map.kind} --threads {threads}"}
+            model = fitted(study, snapshots, about, out.with_suffix(".pt"), threads)
+            write(out, model)
+        out.with_suffix(".pt").unlink(missing_ok=True)
+        print(f"{out}: {kind_of(model)}, r = {model.decoder.r}, of "
+              f"{counted(len(study.train), 'run')} and {len(snapshots.X)} points")
+
+
+def fitted(study, snapshots, about, checkpoint, threads):
+    """`Model` of a study's kind, with a bar of epochs."""
+    if study.tables.map.kind != NETWORK:
+        with one_thread():
+            return maps.computed(study, snapshots, about)
+    with passing(total=study.tables.map.epochs, unit="epoch", desc=study.path.stem) as bar:
+        def show(history):
+            bar.update(len(history) - bar.n)
+            bar.set_postfix_str(f"loss {history[-1][0]:.2e}")
+        return maps.learned(study, snapshots, about, checkpoint, show, threads)
+
+
+def make_folder(folder):
+    """Make a folder for data. Raises NotWritten."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as fault:
+        raise NotWritten(f"--out {folder}: this is no folder, and none can be made there "
+                         f"({fault.strerror})") from None
+
+
+def require_map_place(out, study, overwrite):
+    """Raise ValueError or NotWritten where no map is to be written."""
+    keep_scene(study.path, out)
+    require_place(out)
+    if out.suffix != ".npz":
+        raise ValueError(f"--out {out}: expected a name that ends in .npz")
+    if out.exists() and not overwrite:
+        raise ValueError(f"{out} exists: add --overwrite to replace it, or name another file")
+
+
+def write(out, model):
+    """Write a map. Raises NotWritten."""
+    try:
+        maps.save(out, model)
+    except OSError as fault:
+        raise not_written(out, fault) from fault

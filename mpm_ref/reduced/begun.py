@@ -1,0 +1,70 @@
+"""A reduced run that was cut off, to go on bit for bit: its file has all that is needed. A state is
+its row of the group `reduced`, and the samples of steps before follow from the seed.
+"""
+
+from pathlib import Path
+from typing import NamedTuple
+
+from ..rom.latent import at_start, moved
+from ..rom.step import Report
+from ..store.manifest import scene_hash, source_hash
+from ..store.results import Results
+from ..store.running import Refused
+from ..store.session import INTERRUPTED
+from ..store.words import counted
+from .record import marked
+
+
+class Begun(NamedTuple):
+    """What a file has of a run."""
+
+    known: tuple            # (`Latent`, `Report` or None) of its frames but the run's last
+    same_code: bool         # whether the code that began it was this one
+
+
+NOTHING = Begun((), True)
+
+
+def begun(recording, out, overwrite):
+    """`Begun` of the file `out`, NOTHING where the run begins anew. Raises `Refused` where a file
+    stands that is neither to be continued nor replaced, and BadResults for one that is no results
+    file.
+    """
+    if not Path(out).exists():
+        return NOTHING
+    with Results(out) as results:
+        if overwrite:
+            return NOTHING
+        if not cut_off(results.manifest):
+            raise Refused(f"{out} exists: add --overwrite to replace it, or name another file")
+        if results.h5.attrs["scene_sha256"] != scene_hash(marked(recording)):
+            raise Refused(f"{out} holds another reduced run, cut off after "
+                          f"{counted(len(results), 'frame')}: give its study, map and options to "
+                          "go on with it, --overwrite to replace it, or name another file")
+        known = states(results)[:recording.problem.clock.steps]
+        return Begun(known, results.manifest["source_sha256"] == source_hash())
+
+
+def cut_off(facts):
+    """Whether a manifest is that of a reduced run that was interrupted or killed."""
+    parts = facts.get("parts")
+    return "reduced" in facts and (not parts or parts[-1]["why"] == INTERRUPTED)
+
+
+def states(results):
+    """(`Latent`, `Report` or None) of each frame of a reduced run."""
+    if not len(results):
+        return ()
+    rows = {name: series[:len(results)] for name, series in results.h5["reduced"].items()}
+    latent = at_start(rows["xhat"][0])
+    found = [(latent, None)]
+    for k in range(1, len(results)):
+        latent = moved(latent, rows["xhat"][k], rows["vhat"][k])
+        found.append((latent, report_of(rows, k)))
+    return tuple(found)
+
+
+def report_of(rows, k):
+    """`Report` of step k, as far as it is stored."""
+    return Report(int(rows["samples"][k]), int(rows["points"][k]), int(rows["rank"][k]),
+                  float(rows["residual"][k]), 0, True, {"lost": int(rows["lost"][k])})

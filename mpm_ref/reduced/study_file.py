@@ -1,0 +1,53 @@
+"""A study file as its tables: what it gives that they do not know is refused in one sentence."""
+
+import tomllib
+from difflib import get_close_matches
+
+import msgspec
+
+from ..scene import SceneError
+from ..scene.check import check_finite
+from ..scene.error import joined
+from ..scene.words import rephrase
+from .tables import KEYS, Map, Parameter, Run, Tables
+
+
+def plain(path):
+    """The plain tables of a TOML file. Raises SceneError, which names it."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as fault:
+        raise SceneError(f"{path}: cannot be read ({fault.strerror})") from None
+    except ValueError as fault:
+        raise SceneError(f"{path}: not valid TOML: {fault}") from None
+
+
+def checked(data):
+    """`Tables` of plain tables. Raises SceneError, which names the key."""
+    check_finite(data)
+    _require_keys(data, Tables)
+    for name, record in (("map", Map), ("run", Run)):
+        _require_keys(data.get(name), record, name)
+    parts = data.get("parameter")
+    for k, part in enumerate(parts if isinstance(parts, list) else ()):
+        _require_keys(part, Parameter, f"parameter[{k}]")
+    try:
+        tables = msgspec.convert(data, Tables)
+    except msgspec.ValidationError as fault:
+        raise SceneError(rephrase(str(fault), data)) from None
+    kind = tables.map.kind
+    for key in sorted(set(data["map"]) - {"kind", "r", *KEYS[kind]}):
+        other = next(other for other, keys in KEYS.items() if key in keys)
+        raise SceneError(f'map.{key}: given, but the kind is "{kind}"; remove it, or take '
+                         f'kind = "{other}"')
+    return tables
+
+
+def _require_keys(table, record, path=""):
+    """Raise SceneError for a key of a table that its record does not know."""
+    known = record.__struct_encode_fields__
+    for key in table if isinstance(table, dict) else ():
+        if key not in known:
+            near = get_close_matches(key, known, 1)
+            hint = f"did you mean `{near[0]}`?" if near else f"the keys here are {', '.join(known)}"
+            raise SceneError(f"{joined(path, key)}: unknown key; {hint}")

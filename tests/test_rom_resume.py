@@ -1,0 +1,176 @@
+"""`mpm-ref rom run` that was cut off goes on, and is the run that was not, bit for bit."""
+
+import json
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+from command_line import assert_told, mpm_ref
+from small_studies import STEPS, ended, modelled, write
+
+from mpm_ref.reduced import begun, maps, record
+from mpm_ref.reduced.case import case
+from mpm_ref.reduced.generate import one_thread
+from mpm_ref.reduced.march import Way, march
+from mpm_ref.reduced.study import load
+from mpm_ref.store.results import Results
+
+WAYS = {"redrawn": "points = 12", "all": "", "kept": 'points = 12\nsamples = "kept"',
+        "nonlinear": 'points = 12\nprojection = "nonlinear"\nvelocity = "difference"',
+        "eulerian": 'points = 20\nquadrature = "eulerian"\nvelocity = "transported"'}
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Folder with a study, its runs and its map."""
+    return modelled(tmp_path_factory.mktemp("made"))
+
+
+@pytest.fixture
+def reduced(made, tmp_path):
+    """A function that makes a reduced run in some way with some options: what is answered."""
+    def run(name, *options, way=WAYS["redrawn"], g=40):
+        study = write(tmp_path, ("[map]", f"[run]\n{way}\n\n[map]"))
+        return mpm_ref("rom", "run", study, "--map", made / "map.npz", "--out", tmp_path / name,
+                       "--set", f"g={g}", *options)
+    return run
+
+
+@pytest.fixture
+def cut(reduced, monkeypatch):
+    """A function that interrupts such a run while it writes a frame."""
+    def run(name, step, **how):
+        show = record._show
+
+        def interrupted(writer, state, problem):
+            if state.step == step:
+                writer.h5["time"].resize(step + 1, axis=0)
+                raise KeyboardInterrupt
+            show(writer, state, problem)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(record, "_show", interrupted)
+            return reduced(name, **how)
+    return run
+
+
+def content(path):
+    """{name: bytes} of all that a results file has of a run's states."""
+    found = {}
+    with h5py.File(path) as h5:
+        h5.visititems(lambda name, item: found.update(
+            {name: item[()].tobytes()} if hasattr(item, "shape") and name != "manifest" else {}))
+    return found
+
+
+def parts(path):
+    with Results(path) as results:
+        return [(part["first_step"], part["last_step"], part["why"])
+                for part in results.manifest["parts"]]
+
+
+def last_state(path):
+    with Results(path) as results:
+        return results.manifest["parts"][-1]["state_sha256"]
+
+
+@pytest.mark.parametrize("way", WAYS.values(), ids=WAYS.keys())
+def test_a_run_that_was_cut_off_twice_is_the_whole_one(reduced, cut, tmp_path, way):
+    whole = reduced("whole.h5", "--json", way=way)
+    assert whole.exit_code == 0, whole.output
+    for step in (4, 6):
+        assert_told_last(cut("cut.h5", step, way=way), "interrupted")
+        assert ended(tmp_path / "cut.h5") == ("interrupted", step)
+    done = reduced("cut.h5", "--json", way=way)
+    assert done.exit_code == 0, done.output
+    assert parts(tmp_path / "cut.h5") == [
+        (0, 3, "interrupted"), (3, 5, "interrupted"), (5, STEPS, "finished")]
+    assert content(tmp_path / "cut.h5") == content(tmp_path / "whole.h5")
+    assert last_state(tmp_path / "cut.h5") == last_state(tmp_path / "whole.h5")
+    found, expected = (json.loads(one.stdout)["out_of_bounds"] for one in (done, whole))
+    assert found == expected
+    assert min(map(int, found)) < 6             # one of those that were known
+    assert done.stderr == whole.stderr
+    assert_told_last(reduced("cut.h5", way=way), "exists: add --overwrite")
+
+
+def assert_told_last(done, words):
+    """That a command ended with a sentence, whatever it warned of before."""
+    assert done.exit_code != 0
+    assert words in done.stderr.splitlines()[-1]
+
+
+def test_what_is_known_of_a_file_are_the_states_of_its_run(made, reduced, tmp_path):
+    assert reduced("run.h5", g=2.5).exit_code == 0
+    bars = load(tmp_path / "bars.toml")
+    model, one = maps.load(made / "map.npz", bars), case(bars.scene([2.5]))
+    with one_thread(), Results(tmp_path / "run.h5") as results:
+        for (latent, report), (own, said) in zip(
+                begun.states(results), march(one, model.decoder, Way(points=12), model.rest),
+                strict=True):
+            assert all(np.array_equal(a, b) for a, b in zip(latent, own, strict=True))
+            assert (report and report[:4]) == (said and said[:4])
+
+
+@pytest.mark.parametrize("step", [0, 4, STEPS])
+def test_a_run_that_was_killed_goes_on(reduced, tmp_path, monkeypatch, step):
+    """As its file stands after a step: a kill leaves what was committed."""
+    def copied(writer, state, problem):
+        show(writer, state, problem)
+        assert {len(rows) for rows in writer.h5["reduced"].values()} == {len(writer)}
+        if state.step == step and writer.path.stem == "whole":
+            shutil.copy(writer.path, tmp_path / "killed.h5")
+
+    show = record._show
+    monkeypatch.setattr(record, "_show", copied)
+    assert reduced("whole.h5").exit_code == 0
+    assert parts(tmp_path / "killed.h5") == []
+    assert reduced("killed.h5").exit_code == 0
+    assert content(tmp_path / "killed.h5") == content(tmp_path / "whole.h5")
+    assert parts(tmp_path / "killed.h5")[-1][1:] == (STEPS, "finished")
+
+
+def test_a_fault_of_ours_leaves_no_finished_run(reduced, tmp_path, monkeypatch):
+    def broken(writer, state, problem):
+        if state.step == 2:
+            raise ZeroDivisionError
+        show(writer, state, problem)
+
+    show = record._show
+    with monkeypatch.context() as patch:
+        patch.setattr(record, "_show", broken)
+        with pytest.raises(ZeroDivisionError):
+            reduced("run.h5")
+    assert parts(tmp_path / "run.h5") == []
+    assert reduced("run.h5").exit_code == 0
+    assert ended(tmp_path / "run.h5") == ("finished", STEPS + 1)
+
+
+def test_another_run_does_not_go_on(reduced, cut, tmp_path):
+    cut("run.h5", 3, g=2)
+    before = (tmp_path / "run.h5").read_bytes()
+    for options, how in (((), {"g": 3}), (("--points-out", 500), {"g": 2}),
+                         ((), {"g": 2, "way": "points = 13"})):
+        assert_told(reduced("run.h5", *options, **how), 2, "holds another reduced run",
+                    "cut off after 3 frames", "--overwrite to replace it")
+    assert (tmp_path / "run.h5").read_bytes() == before
+    assert reduced("run.h5", "--overwrite", g=3).exit_code == 0
+    assert parts(tmp_path / "run.h5") == [(0, STEPS, "finished")]
+
+
+def test_a_run_begun_by_other_code_goes_on_with_a_warning(reduced, cut, tmp_path, monkeypatch):
+    cut("run.h5", 3, g=2)
+    monkeypatch.setattr(begun, "source_hash", lambda: "other")
+    done = reduced("run.h5", g=2)
+    assert done.exit_code == 0
+    assert "begun by another version of the code: it goes on, but not bit for bit" in done.stderr
+    assert ended(tmp_path / "run.h5") == ("finished", STEPS + 1)
+
+
+def test_a_run_that_was_killed_is_cut_off_too():
+    rows = {"finished": [{"why": "finished"}], "killed": [], "stopped": [{"why": "interrupted"}],
+            "broken": [{"why": "the reduced run broke down in step 3"}]}
+    found = {name: begun.cut_off({"reduced": {}, "parts": own}) for name, own in rows.items()}
+    assert found == {"finished": False, "killed": True, "stopped": True, "broken": False}
+    assert not begun.cut_off({"parts": []})
