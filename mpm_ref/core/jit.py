@@ -27,6 +27,7 @@ import shutil
 import sys
 from contextlib import contextmanager
 from pathlib import Path
+from time import time
 
 import numba
 import numpy as np
@@ -36,6 +37,7 @@ from numba.extending import overload
 
 CHUNKS = 64          # of every parallel loop and reduction
 KEPT_CACHES = 4      # compiled versions of the package kept on disk
+IN_USE = 86400.0     # [s] since a version was opened, in which it may still be
 
 _OPTIONS = {"error_model": "numpy", "cache": True}
 
@@ -60,6 +62,11 @@ def _source_hash():
     return digest.hexdigest()[:16]
 
 
+def _used(version):
+    """When a folder of compiled kernels was last opened [s]."""
+    return version.stat().st_mtime
+
+
 def _cache_dir():
     """Folder of this version's compiled kernels; older versions but a few are removed."""
     root = Path(numba.config.CACHE_DIR or platformdirs.user_cache_dir("mpm_ref")) / "kernels"
@@ -68,8 +75,9 @@ def _cache_dir():
         here.mkdir(parents=True, exist_ok=True)
         os.utime(here)
         versions = [d for d in root.iterdir() if d.is_dir()]
-        for old in sorted(versions, key=lambda d: d.stat().st_mtime)[:-KEPT_CACHES]:
-            shutil.rmtree(old, ignore_errors=True)
+        for old in sorted(versions, key=_used)[:-KEPT_CACHES]:
+            if time() - _used(old) > IN_USE:
+                shutil.rmtree(old, ignore_errors=True)
     except OSError:
         return ""          # Numba then falls back to a folder of its own, or compiles anew
     return str(here)

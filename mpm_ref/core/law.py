@@ -5,6 +5,12 @@ functions.
 in Pa. Laws register their functions here (`kirchhoff.method(FixedCorotated, ...)`), so that loops
 over particles, which know no material, can call `kirchhoff(F, law)` and be compiled for the law
 they are handed.
+
+The adjoint of a return map s, y -> s', y': `project_vjp` turns bars = (s'_bar, y'_bar) at state =
+(s, y) into (s_bar, y_bar), the bars of all parameters (the law's, then the flow's, in the order of
+their fields), and the share of the deviator that the return leaves, 1 where nothing flows.
+`gap_ratio` is (s'_i - s'_j)/(s_i - s_j) in closed form, its limit included. `units` holds because
+tau is linear in the moduli of every law: d tau / d mu is the tau of mu = 1 and no other modulus.
 """
 
 from .jit import by_type
@@ -18,3 +24,10 @@ psi_volume = by_type("psi_volume")        # (J, law) -> energy density of a law 
 pressure = by_type("pressure")            # (J, law) -> isotropic tau of a law that needs J only
 project = by_type("project")              # (s, y, dt, law, flow) -> s, y after the return map
 intact = by_type("intact")                # (y, flow) -> 1.0, or 0.0 where the material has failed
+
+# Adjoint: `X_bar` is the gradient of a scalar loss by X. See `deform_adjoint`.
+kirchhoff_vjp = by_type("kirchhoff_vjp")  # (s, T, law) -> U^T F_bar V, where T = U^T tau_bar U
+units = by_type("units")                  # (law) -> laws of one modulus 1, the others 0
+d_pressure = by_type("d_pressure")        # (J, law) -> d pressure / dJ
+project_vjp = by_type("project_vjp")      # (state, bars, dt, law, flow) -> bars, parameters, share
+gap_ratio = by_type("gap_ratio")          # (s, s_new, i, j, share, flow) -> see above

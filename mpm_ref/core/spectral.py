@@ -131,6 +131,29 @@ def d_singular(U, V, dF):
 
 
 @kernel
+def mixed(x, pairs, X):
+    """Matrix of diagonal x; of each pair i, j of X the symmetric part a and the skew part b times.
+
+    How the differential of an isotropic function acts in principal axes, and its adjoint as well.
+    pairs = ((a, b),) in 2D; in 3D those of (0, 1), (0, 2), (1, 2).
+    """
+    if len(X) == 2:
+        p, q = _mixed(pairs[0], X[0][1], X[1][0])
+        return (x[0], p), (q, x[1])
+    else:
+        p01, p10 = _mixed(pairs[0], X[0][1], X[1][0])
+        p02, p20 = _mixed(pairs[1], X[0][2], X[2][0])
+        p12, p21 = _mixed(pairs[2], X[1][2], X[2][1])
+        return (x[0], p01, p02), (p10, x[1], p12), (p20, p21, x[2])
+
+
+@kernel
+def _mixed(ab, x_ij, x_ji):
+    sym, skew = 0.5 * ab[0] * (x_ij + x_ji), 0.5 * ab[1] * (x_ij - x_ji)
+    return sym + skew, sym - skew
+
+
+@kernel
 def _spin(M, s, i, j):
     total = s[i] + s[j]
     return (M[i][j] - M[j][i]) / total if total > UNDETERMINED * s[0] else 0.0

@@ -4,11 +4,12 @@
     from_E_nu       (or build) makes it from the parameters of a scene, checked
     psi, pk1, kirchhoff, dpk1                   functions of F: energy, stresses, differential
     kirchhoff_hat, pk1_hat, dpk1_hat, pair      the same in singular values, see `principal`
-    stiffness                                   lam + 2 mu
+    stiffness, units                            lam + 2 mu; the law of each modulus alone
 
 with tau = P F^T (NSF-sec3.1-stress); and of the return maps ("flows"): `build`, `project` on
-singular values, `intact`. Elasticity: `fixed_corotated`, `hencky`, `neo_hookean`,
-`log_neo_hookean`, `fluid`. Importing this package registers them all with the names of `core.law`.
+singular values, its adjoint `project_vjp` and `gap_ratio`, `intact`. Elasticity:
+`fixed_corotated`, `hencky`, `neo_hookean`, `log_neo_hookean`, `fluid`. Importing this package
+registers them all with the names of `core.law`.
 """
 
 from ..core import law
@@ -75,25 +76,31 @@ __all__ = [
 ]
 
 _OF_LAWS = (law.psi, law.pk1, law.kirchhoff, law.dpk1, law.kirchhoff_hat,
-            principal.pk1_hat, principal.dpk1_hat, principal.pair, waves.stiffness)
+            principal.pk1_hat, principal.dpk1_hat, principal.pair, waves.stiffness, law.units)
 
 for _law, _file in ((FixedCorotated, fixed_corotated), (Hencky, hencky),
                     (NeoHookean, neo_hookean), (LogNeoHookean, log_neo_hookean), (Fluid, fluid)):
     for _function in _OF_LAWS:
         _function.method(_law, getattr(_file, _function.__name__))
+    law.kirchhoff_vjp.method(_law, principal.kirchhoff_vjp)
 law.pressure.method(Fluid, fluid.pressure)
+law.d_pressure.method(Fluid, fluid.d_pressure)
 law.psi_volume.method(Fluid, fluid.psi_volume)
 
-for _flow, _project, _intact in (
-    (NoFlow, no_flow.project, no_flow.intact),
-    (DruckerPrager, drucker_prager.project, drucker_prager.intact),
-    (VonMises, von_mises.project, von_mises.intact),
-    (Hardening, von_mises.harden, von_mises.intact),
-    (Softening, von_mises.soften, von_mises.carries),
-    (HerschelBulkley, herschel_bulkley.project, herschel_bulkley.intact),
-    (FluidProjection, fluid_projection.project, fluid_projection.intact),
-    (SnowClamp, snow_clamp.project, snow_clamp.intact),
-    (FixedCorotatedVonMises, fixed_corotated_von_mises.project, fixed_corotated_von_mises.intact),
+for _flow, _file, _project, _project_vjp, _intact in (
+    (VonMises, von_mises, von_mises.project, von_mises.project_vjp, von_mises.intact),
+    (Hardening, von_mises, von_mises.harden, von_mises.harden_vjp, von_mises.intact),
+    (Softening, von_mises, von_mises.soften, von_mises.soften_vjp, von_mises.carries),
+    *((_flow, _file, _file.project, _file.project_vjp, _file.intact) for _flow, _file in (
+        (NoFlow, no_flow),
+        (DruckerPrager, drucker_prager),
+        (HerschelBulkley, herschel_bulkley),
+        (FluidProjection, fluid_projection),
+        (SnowClamp, snow_clamp),
+        (FixedCorotatedVonMises, fixed_corotated_von_mises),
+    )),
 ):
     law.project.method(_flow, _project)
+    law.project_vjp.method(_flow, _project_vjp)
+    law.gap_ratio.method(_flow, _file.gap_ratio)
     law.intact.method(_flow, _intact)

@@ -15,8 +15,9 @@ from math import isfinite, radians, sin, sqrt
 from typing import NamedTuple
 
 from ..core.jit import kernel
-from ..core.tensor import fill, lin, norm, total_of
+from ..core.tensor import fill, lin, mul, norm, total_of
 from .log_strain import deviator, lifted, log_strain, stretches
+from .log_strain_adjoint import lifted_vjp, log_gap_ratio, log_strain_vjp, radial_vjp
 from .moduli import least_stretch
 from .no_flow import never_fails
 
@@ -58,13 +59,57 @@ def project(s, y, dt, law, flow):
     eps = log_strain(s)
     eps_hat = deviator(eps)
     size, tr = norm(eps_hat), total_of(eps)
-    dgamma = size + flow.alpha * (len(s) * law.lam + 2.0 * law.mu) / (2.0 * law.mu) * tr
+    dgamma = size + steepness(len(s), law, flow) * tr
     if tr > 0.0:
         return fill(1.0, s), y
     elif dgamma > 0.0:
         return stretches(lin(1.0, eps, -dgamma / size, eps_hat)), y
     else:
         return s, y
+
+
+@kernel
+def steepness(d, law, flow):
+    """alpha (d lam + 2 mu)/(2 mu), the cone's slope in strain."""
+    return flow.alpha * (d * law.lam + 2.0 * law.mu) / (2.0 * law.mu)
+
+
+@kernel
+def project_vjp(state, bars, dt, law, flow):
+    """Bars before the return; those of mu, lam, alpha, s_min; the share -k tr eps/|eps_hat| of the
+    deviator that is left on the cone |eps_hat| = -k tr eps, k of `steepness`.
+    """
+    s, (s_bar, y_bar) = state[0], bars
+    eps = log_strain(lifted(s, flow.s_min))
+    eps_hat = deviator(eps)
+    size, tr, k = norm(eps_hat), total_of(eps), steepness(len(s), law, flow)
+    dgamma = size + k * tr
+    if tr > 0.0:
+        return (fill(0.0, s), y_bar), (0.0, 0.0, 0.0, 0.0), 0.0
+    elif dgamma > 0.0:
+        s_new = stretches(lin(1.0, eps, -dgamma / size, eps_hat))
+        eps_bar, radius_bar = radial_vjp(eps, -k * tr, mul(s_new, s_bar), 0.0)
+        eps_bar = lin(1.0, eps_bar, -k * radius_bar, fill(1.0, s))
+        s_bar, s_min_bar = log_strain_vjp(s, eps_bar, flow.s_min)
+        moduli_and_alpha = steepness_vjp(-tr * radius_bar, len(s), law, flow)
+        return (s_bar, y_bar), (*moduli_and_alpha, s_min_bar), -k * tr / size
+    else:
+        s_bar, s_min_bar = lifted_vjp(s, s_bar, flow.s_min)
+        return (s_bar, y_bar), (0.0, 0.0, 0.0, s_min_bar), 1.0
+
+
+@kernel
+def steepness_vjp(k_bar, d, law, flow):
+    """Bars of mu, lam, alpha."""
+    of_lam = flow.alpha * d / (2.0 * law.mu)
+    of_alpha = (d * law.lam + 2.0 * law.mu) / (2.0 * law.mu)
+    return -k_bar * of_lam * law.lam / law.mu, k_bar * of_lam, k_bar * of_alpha
+
+
+@kernel
+def gap_ratio(s, s_new, i, j, share, flow):
+    """(s'_i - s'_j)/(s_i - s_j)."""
+    return log_gap_ratio(s, s_new, i, j, share, flow.s_min)
 
 
 intact = never_fails

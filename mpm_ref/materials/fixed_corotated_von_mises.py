@@ -22,10 +22,12 @@ from math import sqrt
 from typing import NamedTuple
 
 from ..core.jit import kernel
-from ..core.tensor import lin, mul, norm
+from ..core.tensor import fill, lin, mul, norm
 from .log_strain import deviator
+from .log_strain_adjoint import radial_vjp
 from .moduli import yield_radius
 from .no_flow import never_fails
+from .von_mises import radius_vjp
 
 
 class FixedCorotatedVonMises(NamedTuple):
@@ -62,6 +64,46 @@ def stretch_of(x):
 @kernel
 def _upper(x):
     return 0.5 + sqrt(max(0.25 + x, 0.0))       # x >= -1/4 but for round-off
+
+
+@kernel
+def project_vjp(state, bars, dt, law, flow):
+    """Bars before the return; those of mu, lam, tau_y; the share of dev x that is left."""
+    s, (s_bar, y_bar) = state[0], bars
+    x = lin(1.0, mul(s, s), -1.0, s)
+    x_hat = deviator(x)
+    size, radius = norm(x_hat), flow.tau_y / (2.0 * law.mu)
+    if not size > radius:
+        return bars, (0.0, 0.0, 0.0), 1.0
+    s_new = stretch_of(lin(1.0, x, radius / size - 1.0, x_hat))
+    x_bar, radius_bar = radial_vjp(x, radius, mul(s_bar, d_stretch_of(s_new)), 0.0)
+    mu_bar, tau_y_bar = radius_vjp(radius_bar, flow.tau_y, law)
+    s_bar = mul(x_bar, lin(2.0, s, -1.0, fill(1.0, s)))
+    return (s_bar, y_bar), (mu_bar, 0.0, tau_y_bar), radius / size
+
+
+@kernel
+def d_stretch_of(s):
+    """ds_k/dx_k = 1/(2 s_k - 1); 0 at s_k = 1/2, where x_k is held at its least value."""
+    if len(s) == 2:
+        return _d_upper(s[0]), _d_upper(s[1])
+    else:
+        return _d_upper(s[0]), _d_upper(s[1]), _d_upper(s[2])
+
+
+@kernel
+def _d_upper(s):
+    return 1.0 / (2.0 * s - 1.0) if s > 0.5 else 0.0
+
+
+@kernel
+def gap_ratio(s, s_new, i, j, share, flow):
+    """(s'_i - s'_j)/(s_i - s_j), from x_i - x_j = (s_i - s_j)(s_i + s_j - 1)."""
+    below = s_new[i] + s_new[j] - 1.0
+    if share == 1.0:
+        return 1.0
+    else:
+        return share * (s[i] + s[j] - 1.0) / below if below > 0.0 else 0.0
 
 
 intact = never_fails

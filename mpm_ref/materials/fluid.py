@@ -41,6 +41,12 @@ def stiffness(law):
 
 
 @kernel
+def units(law):
+    """The law of lam = 1 Pa: stress is linear in it."""
+    return (Fluid(1.0),)
+
+
+@kernel
 def psi(F, law):
     """Energy per rest volume [J/m^d]."""
     return psi_volume(det(F), law)
@@ -62,6 +68,12 @@ def pk1(F, law):
 def pressure(J, law):
     """The isotropic tau = lam J (J - 1) [Pa], positive in tension (NCLAW-eq20)."""
     return law.lam * J * (J - 1.0)
+
+
+@kernel
+def d_pressure(J, law):
+    """d pressure / dJ = lam (2 J - 1) [Pa]."""
+    return law.lam * (2.0 * J - 1.0)
 
 
 @kernel

@@ -6,9 +6,9 @@ NCLaw drops the rotation too, to which its fluid law is blind. Exponent 1/2 in 2
 from typing import NamedTuple
 
 from ..core.jit import kernel
-from ..core.tensor import fill
+from ..core.tensor import fill, lin, total_of
 from .no_flow import never_fails
-from .stretches import volume
+from .stretches import inverse, volume
 
 
 class FluidProjection(NamedTuple):
@@ -25,6 +25,24 @@ def project(s, y, dt, law, flow):
     """J^(1/d) each, y as it is; s as it is unless J > 0."""
     J = volume(s)
     return (fill(J ** (1.0 / len(s)), s) if J > 0.0 else s), y
+
+
+@kernel
+def project_vjp(state, bars, dt, law, flow):
+    """Bars before it; that of lam, 0; no deviator is left. All as it is unless J > 0."""
+    s, (s_bar, y_bar) = state[0], bars
+    J = volume(s)
+    if J > 0.0:
+        d_log_J = total_of(s_bar) * J ** (1.0 / len(s)) / len(s)
+        return (lin(d_log_J, inverse(s), 0.0, s), y_bar), (0.0,), 0.0
+    else:
+        return bars, (0.0,), 1.0
+
+
+@kernel
+def gap_ratio(s, s_new, i, j, share, flow):
+    """(s'_i - s'_j)/(s_i - s_j)."""
+    return share
 
 
 intact = never_fails

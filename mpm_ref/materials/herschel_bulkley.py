@@ -19,7 +19,7 @@ from ..core.tensor import dot, fill, lin, mul, norm, total_of
 from .log_strain import deviator
 from .moduli import not_negative, yield_radius
 from .no_flow import never_fails
-from .stretches import volume
+from .stretches import inverse, volume
 
 
 class HerschelBulkley(NamedTuple):
@@ -90,6 +90,61 @@ def roots(x):
         return sqrt(x[0]), sqrt(x[1])
     else:
         return sqrt(x[0]), sqrt(x[1]), sqrt(x[2])
+
+
+@kernel
+def project_vjp(state, bars, dt, law, flow):
+    """Bars before the relaxation; those of mu, kappa, tau_y, eta; the share of D that is left.
+
+    B stands for b_bar here, B_bar for the gradient by it.
+    """
+    s, (s_bar, y_bar) = state[0], bars
+    if not volume(s) > 0.0:
+        return bars, (0.0, 0.0, 0.0, 0.0), 1.0
+    scale = volume(s) ** (2.0 / len(s))
+    B = lin(1.0 / scale, mul(s, s), 0.0, s)
+    D = deviator(B)
+    size = law.mu * norm(D)
+    if not size > flow.tau_y:
+        return bars, (0.0, 0.0, 0.0, 0.0), 1.0
+    share = relaxed(size, dt, law, flow) / size
+    D_new = lin(share, D, 0.0, D)
+    B_new = lin(1.0, D_new, unimodular_shift(D_new, total_of(B) / len(s)), fill(1.0, s))
+    B_new_bar = lin(0.5 * sqrt(scale), mul(s_bar, inverse(roots(B_new))), 0.0, s)
+    D_new_bar = unimodular_vjp(B_new, B_new_bar)
+    size_bar, of_parameters = share_vjp(dot(D_new_bar, D), size, dt, law, flow)
+    B_bar = deviator(lin(share, D_new_bar, size_bar * law.mu * law.mu / size, D))
+    of_log_scale = dot(B_new_bar, B_new) - dot(B_bar, B)
+    s_bar = lin(2.0 / scale, mul(B_bar, s), 2.0 / len(s) * of_log_scale, inverse(s))
+    return (s_bar, y_bar), of_parameters, share
+
+
+@kernel
+def unimodular_vjp(B, B_bar):
+    """Bar of the traceless D of B = D + c I, det B = 1: sum_i (dD_i + dc)/B_i = 0 gives dc."""
+    r = inverse(B)
+    return lin(1.0, B_bar, -total_of(B_bar) / total_of(r), r)
+
+
+@kernel
+def share_vjp(share_bar, size, dt, law, flow):
+    """Bar of the size s, and of mu, kappa, tau_y, eta, of the share s_new/s = (tau_y/s) (1 - w) + w
+    with w = eta/(2 mu dt + eta) and s = mu |D|.
+    """
+    rate = 2.0 * law.mu * dt
+    flows = rate / (rate + flow.eta)            # 1 - w
+    tau_y_bar = share_bar * flows / size
+    size_bar = -tau_y_bar * flow.tau_y / size
+    w_bar = share_bar * (1.0 - flow.tau_y / size)
+    eta_bar = w_bar * flows / (rate + flow.eta)
+    mu_bar = (size_bar * size - eta_bar * flow.eta) / law.mu
+    return size_bar, (mu_bar, 0.0, tau_y_bar, eta_bar)
+
+
+@kernel
+def gap_ratio(s, s_new, i, j, share, flow):
+    """(s'_i - s'_j)/(s_i - s_j), as s'_i^2 - s'_j^2 is that share of s_i^2 - s_j^2."""
+    return share * (s[i] + s[j]) / (s_new[i] + s_new[j])
 
 
 intact = never_fails

@@ -21,6 +21,27 @@ def project(s, y, dt, law, flow):
 
 
 @kernel
+def project_vjp(state, bars, dt, law, flow):
+    """Bars as they are; none of the parameters; all of the deviator is left."""
+    return bars, no_bars(law), 1.0
+
+
+@kernel
+def no_bars(law):
+    """A 0 for every modulus of the law."""
+    if len(law) == 1:
+        return (0.0,)
+    else:
+        return 0.0, 0.0
+
+
+@kernel
+def gap_ratio(s, s_new, i, j, share, flow):
+    """1."""
+    return 1.0
+
+
+@kernel
 def never_fails(y, flow):
     """1: `intact` of every flow without damage."""
     return 1.0

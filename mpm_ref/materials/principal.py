@@ -14,8 +14,8 @@ values, so that repeated ones need no care.
 """
 
 from ..core.jit import by_type, kernel
-from ..core.spectral import eigh, svd
-from ..core.tensor import diagonal, mm, mmt, mv, scale_columns, transpose
+from ..core.spectral import eigh, mixed, svd
+from ..core.tensor import diagonal, mlin, mm, mmt, mv, scale_columns, transpose
 
 pk1_hat = by_type("pk1_hat")        # (s, law) -> principal P_i
 dpk1_hat = by_type("dpk1_hat")      # (s, law) -> A, d x d
@@ -49,15 +49,7 @@ def local_spd(s, law):
 @kernel
 def apply(A, pairs, X):
     """U^T dP V for X = U^T dF V."""
-    y = mv(A, diagonal(X))
-    if len(X) == 2:
-        p, q = _mixed(pairs[0], X[0][1], X[1][0])
-        return (y[0], p), (q, y[1])
-    else:
-        p01, p10 = _mixed(pairs[0], X[0][1], X[1][0])
-        p02, p20 = _mixed(pairs[1], X[0][2], X[2][0])
-        p12, p21 = _mixed(pairs[2], X[1][2], X[2][1])
-        return (y[0], p01, p02), (p10, y[1], p12), (p20, p21, y[2])
+    return mixed(mv(A, diagonal(X)), pairs, X)
 
 
 @kernel
@@ -74,6 +66,16 @@ def dpk1_spd(F, dF, law):
     U, s, V, _ = svd(F)
     A, pairs = local_spd(s, law)
     return mmt(mm(U, apply(A, pairs, mm(transpose(U), mm(dF, V)))), V)
+
+
+@kernel
+def kirchhoff_vjp(s, T, law):
+    """U^T F_bar V at F = U diag(s) V^T, of T = U^T tau_bar U: as tau = P F^T and d2psi/dF2 is
+    symmetric, F_bar = (d2psi/dF2) : (tau_bar F) + tau_bar^T P.
+    """
+    A, pairs = local(s, law)
+    from_F = scale_columns(transpose(T), pk1_hat(s, law))
+    return mlin(1.0, apply(A, pairs, scale_columns(T, s)), 1.0, from_F)
 
 
 @kernel
@@ -98,9 +100,3 @@ def _not_negative(w):
 @kernel
 def _at_least_zero(x):
     return 0.0 if x < 0.0 else x
-
-
-@kernel
-def _mixed(ab, x_ij, x_ji):
-    sym, skew = 0.5 * ab[0] * (x_ij + x_ji), 0.5 * ab[1] * (x_ij - x_ji)
-    return sym + skew, sym - skew

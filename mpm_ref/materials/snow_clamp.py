@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from ..core.jit import kernel
 from .log_strain import clamp
+from .log_strain_adjoint import clamp_gap_ratio, clamp_vjp
 from .no_flow import never_fails
 
 
@@ -30,6 +31,19 @@ def build(s_min, s_max):
 def project(s, y, dt, law, flow):
     """Clamped singular values, y as it is."""
     return clamp(s, flow.s_min, flow.s_max), y
+
+
+@kernel
+def project_vjp(state, bars, dt, law, flow):
+    """Bars before the clamp; those of mu, lam, s_min, s_max; a 1 for the share, not read."""
+    s_bar, low_bar, high_bar = clamp_vjp(state[0], bars[0], flow.s_min, flow.s_max)
+    return (s_bar, bars[1]), (0.0, 0.0, low_bar, high_bar), 1.0
+
+
+@kernel
+def gap_ratio(s, s_new, i, j, share, flow):
+    """(s'_i - s'_j)/(s_i - s_j)."""
+    return clamp_gap_ratio(s, i, j, flow.s_min, flow.s_max)
 
 
 intact = never_fails

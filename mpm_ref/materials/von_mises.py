@@ -11,6 +11,7 @@ from typing import NamedTuple
 from ..core.jit import kernel
 from ..core.tensor import fill
 from .log_strain import radial_return
+from .log_strain_adjoint import log_gap_ratio, radial_return_vjp
 from .moduli import least_stretch, not_negative, yield_radius
 from .no_flow import never_fails
 
@@ -62,10 +63,40 @@ def project(s, y, dt, law, flow):
 
 
 @kernel
+def project_vjp(state, bars, dt, law, flow):
+    """Bars before the return; those of mu, lam, tau_y, s_min; the share of the deviator left."""
+    s_bar, r_bar, s_min_bar, share = radial_return_vjp(
+        state[0], (bars[0], 0.0), flow.tau_y, law, flow.s_min)
+    mu_bar, tau_y_bar = radius_vjp(r_bar, flow.tau_y, law)
+    return (s_bar, bars[1]), (mu_bar, 0.0, tau_y_bar, s_min_bar), share
+
+
+@kernel
+def radius_vjp(radius_bar, tau_y, law):
+    """Bars of mu and tau_y of the radius tau_y/(2 mu) in strain."""
+    tau_y_bar = radius_bar / (2.0 * law.mu)
+    return -tau_y_bar * tau_y / law.mu, tau_y_bar
+
+
+@kernel
 def harden(s, y, dt, law, flow):
     """Singular values after the return to the yield stress y; y + 2 mu xi dgamma (NSF-F4)."""
     s, dgamma = radial_return(s, y, law, flow.s_min)
     return s, y + 2.0 * law.mu * flow.xi * dgamma
+
+
+@kernel
+def harden_vjp(state, bars, dt, law, flow):
+    """As `project_vjp`, of mu, lam, tau_y, xi, s_min; tau_y, the first y, is not read here."""
+    s, y = state
+    s_bar, y_bar = bars
+    dgamma_bar = 2.0 * law.mu * flow.xi * y_bar
+    _, dgamma = radial_return(s, y, law, flow.s_min)
+    s_bar, r_bar, s_min_bar, share = radial_return_vjp(s, (s_bar, dgamma_bar), y, law, flow.s_min)
+    mu_bar, of_radius = radius_vjp(r_bar, y, law)
+    growth = 2.0 * dgamma * y_bar
+    of_parameters = mu_bar + flow.xi * growth, 0.0, 0.0, law.mu * growth, s_min_bar
+    return (s_bar, y_bar + of_radius), of_parameters, share
 
 
 @kernel
@@ -85,6 +116,27 @@ def soften(s, y, dt, law, flow):
 def carries(y, flow):
     """1, or 0 once the yield stress of a softening particle is 0."""
     return 1.0 if y > 0.0 else 0.0
+
+
+@kernel
+def soften_vjp(state, bars, dt, law, flow):
+    """As `harden_vjp`, with theta for xi; all bars are 0 once the particle has failed."""
+    s, y = state
+    s_bar, y_bar = bars
+    _, dgamma = radial_return(s, y, law, flow.s_min)
+    if not y - flow.theta * dgamma > 0.0:
+        return (fill(0.0, s), 0.0), (0.0, 0.0, 0.0, 0.0, 0.0), 0.0
+    dgamma_bar = -flow.theta * y_bar
+    s_bar, r_bar, s_min_bar, share = radial_return_vjp(s, (s_bar, dgamma_bar), y, law, flow.s_min)
+    mu_bar, of_radius = radius_vjp(r_bar, y, law)
+    of_parameters = mu_bar, 0.0, 0.0, -dgamma * y_bar, s_min_bar
+    return (s_bar, y_bar + of_radius), of_parameters, share
+
+
+@kernel
+def gap_ratio(s, s_new, i, j, share, flow):
+    """(s'_i - s'_j)/(s_i - s_j); singular values that do not yield are not lifted."""
+    return 1.0 if share == 1.0 else log_gap_ratio(s, s_new, i, j, share, flow.s_min)
 
 
 intact = never_fails

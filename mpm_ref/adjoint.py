@@ -1,0 +1,138 @@
+"""The exact discrete adjoint of explicit steps, phase by phase and backwards.
+
+    deform -> damp -> g2p -> boundaries -> grid update -> p2g       (see `explicit`)
+
+A bar is the gradient of a loss with respect to the field of the same name; the bars of particles
+are kept in a `Particles`, with arrays that share no memory. The stress that a step reads belongs
+to the deformation before it, so its bar travels backwards as part of the state. `tape` records
+runs of many steps, and is what one usually wants.
+"""
+
+import numpy as np
+
+from .core import deform_adjoint
+from .core.boundary_adjoint import solve_adjoint
+from .core.collide import solve
+from .core.deform_adjoint import DeformBars
+from .core.grid import Storage, update
+from .core.grid_adjoint import Update, update_adjoint
+from .core.jit import CHUNKS
+from .core.order import slabs_of
+from .core.transfer_adjoint import Exchange, g2p_adjoint, p2g_adjoint
+from .explicit import damp, gather, scatter
+from .materials import NoFlow
+
+
+class StepAdjoint:
+    """Carries bars back through single steps of a `Stepper`, reusing grid storage.
+
+    Raises ValueError for a stepper whose steps it does not know.
+    """
+
+    def __init__(self, stepper):
+        if stepper.implicit:
+            raise ValueError(
+                f"a {type(stepper).__name__} is implicit: expected an explicit Stepper, the only "
+                "one that has an adjoint"
+            )
+        if stepper.conditions is not None and not hasattr(stepper.conditions, "touched"):
+            raise ValueError(
+                f"conditions of type {type(stepper.conditions).__name__} have no adjoint: "
+                "expected core.boundary.Conditions, or None"
+            )
+        self.scheme, self.gravity = stepper.scheme, stepper.gravity
+        self.conditions = stepper.conditions
+        sizes = stepper.dx, self.scheme.stencil, len(self.gravity), self.scheme.transfer == "flip"
+        self.storage, self.storage_of_bars = Storage(*sizes), Storage(*sizes)
+
+    def pull_back(self, bodies, bars, sums, t, dt):
+        """Turn bars of the state after a step into those before it, in place; returns the bar of
+        gravity (d,).
+
+        bodies hold the state before the step that began at t [s], with stress, and keep it; bars
+        has a `Particles` for each body; each of sums, (CHUNKS, parameters), gets the bars of the
+        law's and the flow's parameters added.
+        """
+        grid, free, touched = self._grid(bodies, t, dt)
+        for body, bar, parts in zip(bodies, bars, sums):
+            self._deform(body, self._velocity_gradient(body, grid, dt), bar, parts, dt)
+        return self._transfer(bodies, bars, (grid, free, touched), dt)
+
+    def _grid(self, bodies, t, dt):
+        """The grid of the step, its velocities before conditions, and what touches its nodes."""
+        scheme = self.scheme
+        grid = scatter(bodies, self.storage, scheme, dt)
+        update(grid, self.gravity, dt, scheme.mass_eps, scheme.gravity_on_empty)
+        free, touched = grid.v.copy(), ([], [], [])
+        if self.conditions is not None:
+            touched = self.conditions.touched(grid, t + dt, dt)
+            solve(*touched, grid)
+        return grid, free, touched
+
+    def _velocity_gradient(self, body, grid, dt):
+        """L of the step (N, d, d); the body keeps its own."""
+        q = body.particles
+        L = np.empty_like(q.L)
+        C = L if q.L is q.C else np.empty_like(q.C)
+        moved = body._replace(particles=q._replace(x=q.x.copy(), v=q.v.copy(), C=C, L=L))
+        gather(moved, grid, self.scheme, dt)
+        return L
+
+    def _deform(self, body, L, bar, parts, dt):
+        """Bars of F and y before the step, and of C and L, which MLS-MPM has in one."""
+        deform_body_adjoint(body, L, bar, parts, dt)
+        damp(body._replace(particles=bar), self.scheme)         # symmetric, hence its own adjoint
+        if self.scheme.transfer == "mls":
+            bar.C[:] += bar.L
+
+    def _transfer(self, bodies, bars, step, dt):
+        """From bars of x, v, C, L after the step to those of x, v, C, tau, m, V0, b before it."""
+        scheme, (grid, free, touched) = self.scheme, step
+        nodes = self.storage_of_bars.cover([body.particles.x for body in bodies])
+        how = Exchange(scheme.stencil, dt, scheme.flip, scheme.transfer == "mls")
+        for body, bar in zip(bodies, bars):
+            x = body.particles.x
+            g2p_adjoint(x, grid, bar, nodes, how, slabs_of(x, grid, scheme.stencil))
+        grid = grid._replace(v=free)
+        solve_adjoint(touched, grid, nodes)
+        options = Update(dt, scheme.mass_eps, scheme.gravity_on_empty)
+        of_gravity = update_adjoint(grid, nodes, self.gravity, options)
+        for body, bar in zip(bodies, bars):
+            p2g_adjoint(body.particles, nodes, bar, how)
+        return of_gravity
+
+
+def zero_bars(body):
+    """Bars of a body, all zero."""
+    return type(body.particles)(*(np.zeros_like(a) for a in body.particles))
+
+
+def zero_sums(body):
+    """Room for the bars of the parameters of a body's law and flow, chunk by chunk."""
+    return np.zeros((CHUNKS, len(body.law) + len(body.flow)))
+
+
+def deform_body_adjoint(body, L, bar, parts, dt):
+    """Adjoint of `explicit.deform_body` with velocity gradient L: bar.F and bar.y of the values
+    after the step become those before it, bar.L is overwritten; bar.tau is read.
+    """
+    q, law, flow, bars = body.particles, body.law, body.flow, _of_deformation(bar)
+    if q.F.ndim == 1:
+        deform_adjoint.fluid(q.F, L, bars, law, dt, parts)
+    elif isinstance(flow, NoFlow):
+        deform_adjoint.elastic(q.F, L, bars, law, dt, parts)
+    else:
+        deform_adjoint.plastic(q.F, q.y, L, bars, law, flow, dt, parts)
+
+
+def initial_stress_adjoint(body, bar, parts):
+    """Adjoint of `explicit.initial_stress`: adds to bar.F what bar.tau says of it."""
+    q, bars = body.particles, _of_deformation(bar)
+    if q.F.ndim == 1:
+        deform_adjoint.initial_pressure(q.F, bars, body.law, parts)
+    else:
+        deform_adjoint.initial_stress(q.F, q.y, bars, body.law, body.flow, parts)
+
+
+def _of_deformation(bar):
+    return DeformBars(bar.F, bar.tau, bar.L, bar.y)
