@@ -1,0 +1,1 @@
+"""Neural constitutive laws, learned from motion (NCLaw)."""

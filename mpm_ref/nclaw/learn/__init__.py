@@ -1,0 +1,1 @@
+"""Training of neural laws; the only part of `nclaw` that needs PyTorch."""

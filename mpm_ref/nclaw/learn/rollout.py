@@ -1,0 +1,61 @@
+"""Segments of a trajectory, run side by side with neural laws, and their loss (NCLAW-alg2).
+
+    tau = E(F),    x, v, C, F_trial = step(x, v, C, F, tau),    F = P(F_trial)
+
+Segments do not know each other: each restarts from what was observed.
+"""
+
+from typing import NamedTuple
+
+import torch
+
+from ..apart import nodes
+from .functions import Advance
+
+
+class Trajectory(NamedTuple):
+    """Observed states at time levels 0 .. k; tensors of doubles."""
+
+    x: torch.Tensor     # (k + 1, n, 3)    [m]
+    v: torch.Tensor     # (k + 1, n, 3)    [m/s]
+    C: torch.Tensor     # (k + 1, n, 3, 3) [1/s]
+    F: torch.Tensor     # (k + 1, n, 3, 3)
+
+    def at(self, levels):
+        """The states (b, n, ..) at b time levels."""
+        return tuple(a[levels] for a in self)
+
+
+class Laws(NamedTuple):
+    """What is learned: functions of F (n, d, d)."""
+
+    elastic: object     # -> tau [Pa]
+    plastic: object     # -> F
+
+
+def over_points(law, F):
+    """A law of F (b, n, 3, 3)."""
+    return law(F.reshape(-1, *F.shape[2:])).reshape(F.shape)
+
+
+def step(laws, world, state, on):
+    """The state (x, v, C, F) after a step."""
+    tau = over_points(laws.elastic, state[3])
+    x, v, C, F = Advance.apply(world, on, *state, tau)
+    return x, v, C, over_points(laws.plastic, F)
+
+
+def squared(laws, world, observed, starts, ends):
+    """Mean squared errors of positions [m^2], over particles and axes, summed over the steps of
+    segments from time levels `starts` to `ends`.
+    """
+    levels, total = torch.tensor(starts), 0.0
+    last, on = torch.tensor(ends), nodes(world, len(starts))
+    state = observed.at(levels)
+    for _ in range(max(end - start for start, end in zip(starts, ends, strict=True))):
+        state = step(laws, world, state, on)
+        levels = levels + 1
+        within = levels <= last
+        off = (state[0] - observed.x[torch.minimum(levels, last)]) ** 2
+        total = total + (off.mean(dim=(1, 2)) * within).sum()
+    return total
