@@ -18,8 +18,32 @@ class History(NamedTuple):
     v: np.ndarray       # (k + 1, n, d)     velocity [m/s]
 
 
+class Observed(NamedTuple):
+    """One run in full: what particles carry from step to step."""
+
+    x: np.ndarray       # (k + 1, n, d)     position [m]
+    v: np.ndarray       # (k + 1, n, d)     velocity [m/s]
+    C: np.ndarray       # (k + 1, n, d, d)  affine velocity field [1/s]
+    F: np.ndarray       # (k + 1, n, d, d)  deformation gradient
+
+
 def history(problem, every=1):
-    """`History` of a problem of one body that shows every step; of one point in so many.
+    """`History` of a problem; of one point in so many. Raises ValueError as `recorded`."""
+    return recorded(problem, History, every)
+
+
+def observed(problem):
+    """`Observed` of a problem. Raises ValueError as `recorded`, and for a body without C or F."""
+    q = problem.bodies[0].particles
+    if not q.C.ndim == q.F.ndim == 3:
+        raise ValueError(f"{problem.title!r}: a body that carries no C, or J alone: expected the "
+                         "transfer apic or mls, and a material with F")
+    return recorded(problem, Observed)
+
+
+def recorded(problem, kind, every=1):
+    """The fields of a NamedTuple `kind` over a run of a problem of one body that shows every step;
+    of one point in so many.
 
     Raises ValueError for more bodies, and for a clock that shows fewer frames.
     """
@@ -32,9 +56,9 @@ def history(problem, every=1):
         if frame.state.step != frame.index:
             raise ValueError(f"frame {frame.index} is step {frame.state.step}: expected every = 1")
         body = frame.state.bodies[0]
-        rows.append([in_order(a, body.id)[::every] for a in
-                     (body.particles.x, body.particles.F, body.particles.v)])
-    return History(*(np.array(field) for field in zip(*rows, strict=True)))
+        rows.append([in_order(getattr(body.particles, name), body.id)[::every]
+                     for name in kind._fields])
+    return kind(*(np.array(field) for field in zip(*rows, strict=True)))
 
 
 def in_order(a, id):

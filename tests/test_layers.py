@@ -24,7 +24,7 @@ FLOORS = (
     ("core.collide",),
     ("core.boundary", "core.boundary_adjoint"),
     ("core",),
-    ("materials", "plain"),
+    ("materials", "plain", "sealed", "cost"),
     ("body",),
     ("fit",),
     ("explicit", "energy"),

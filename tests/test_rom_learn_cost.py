@@ -7,8 +7,9 @@ import rom_toys
 
 torch = pytest.importorskip("torch")
 
+from mpm_ref import cost  # noqa: E402
 from mpm_ref.reduced.maps import of_trained  # noqa: E402
-from mpm_ref.rom.learn import cost, fit  # noqa: E402
+from mpm_ref.rom.learn import fit  # noqa: E402
 from mpm_ref.rom.learn.fit import Training, train  # noqa: E402
 
 

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mpm_ref.rom import weights
-from mpm_ref.rom.weights import Model, arrays_of, load, save, sealed
+from mpm_ref.rom.weights import Model, arrays_of, load, save
+from mpm_ref.sealed import seal, sealed
 
 ABOUT = {"seed": 3, "command": "train ldm", "weights": {"F": 1.0 / 30.0, "v": 0.08},
          "runs": [0.1, 1e-300, 2], "scene": "Ärmel \0 \n\"", "noted": None, "free": True}
@@ -149,7 +150,7 @@ def test_nothing_is_unpickled(tmp_path):
 def test_a_sealed_file_that_is_no_archive_is_told(saved):
     content = saved.read_bytes()[:-500]
     copy = saved.with_name("short.npz")
-    copy.write_bytes(content + weights.seal(content))
+    copy.write_bytes(content + seal(content))
     refused(copy, "is no archive of plain arrays")
 
 

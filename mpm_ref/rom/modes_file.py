@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import KDTree
 
+from ..sealed import about_of, opened, sealed, write_whole
 from .curved import Curved
 from .modes import Modes
-from .weights import Model, about_of, opened, sealed, write_whole
+from .weights import Model
 
 FORMAT = 1
 NUMBERS = ("X", "U", "slope", "xhat", "rest")

@@ -10,7 +10,8 @@ import numpy as np
 from mpm_ref.rom import modes_file
 from mpm_ref.rom.curved import curved
 from mpm_ref.rom.modes import basis
-from mpm_ref.rom.weights import SEAL, Model, load, opened, sealed
+from mpm_ref.rom.weights import Model, load
+from mpm_ref.sealed import SEAL, opened, sealed
 
 from ..ldm import nets
 from ..registry import experiment

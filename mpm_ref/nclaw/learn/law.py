@@ -1,10 +1,13 @@
 """A neural law as it is trained: invariants, a network, an answer."""
 
+import torch
 from torch import nn
 
 from ..invariants import count
+from ..weights import Trained
 from .functions import Answer, Invariants
-from .perceptron import HIDDEN, Perceptron
+from .perceptron import HIDDEN, Perceptron, layers_of
+from .rollout import Laws
 
 
 class NeuralLaw(nn.Module):
@@ -19,3 +22,14 @@ class NeuralLaw(nn.Module):
         """The answers."""
         a, R = Invariants.apply(F)
         return Answer.apply(self.net(a), F, R, self.kind)
+
+
+def neural_laws(seed, elastic, plastic, dim=3):
+    """`Laws` before training: the elastic one is drawn first, then the plastic one."""
+    torch.manual_seed(seed)
+    return Laws(NeuralLaw(elastic, dim), NeuralLaw(plastic, dim))
+
+
+def trained_of(law):
+    """`Trained` of a `NeuralLaw`."""
+    return Trained(tuple(layers_of(law.net)), law.kind)

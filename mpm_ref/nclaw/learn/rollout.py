@@ -26,6 +26,12 @@ class Trajectory(NamedTuple):
         return tuple(a[levels] for a in self)
 
 
+def trajectory_of(observed):
+    """`Trajectory` of `cases.Observed`."""
+    return Trajectory(*(torch.from_numpy(a) for a in (observed.x, observed.v, observed.C,
+                                                      observed.F)))
+
+
 class Laws(NamedTuple):
     """What is learned: functions of F (n, d, d)."""
 

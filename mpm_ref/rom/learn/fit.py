@@ -16,11 +16,11 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
+from ...cost import Cost, Meter
+from ...sealed import SEAL, seal, write_whole
 from ..architecture import HIDDEN
 from ..modes import basis
 from ..snapshots import units
-from ..weights import SEAL, seal, write_whole
-from .cost import Cost, Meter
 from .data import batch_of, data_of
 from .encoder import Encoder, Free, Given, codes
 from .loss import CODE, Weights, loss

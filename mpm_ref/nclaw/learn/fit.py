@@ -1,0 +1,155 @@
+"""Training of neural laws on one trajectory: seeds, schedule, checkpoints, history (NCLAW-eq5).
+
+A training that is cut off goes on from its last checkpoint, with the numbers of one that was not,
+on the same machine with the same number of threads.
+"""
+
+import hashlib
+import io
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import NamedTuple
+
+import torch
+
+from ...cost import Cost, Meter
+from ...sealed import SEAL, seal, write_whole
+from .rollout import squared
+
+SAVE = 5            # epochs between checkpoints
+FORMAT = 1          # of checkpoints
+
+
+class Epoch(NamedTuple):
+    """What an epoch was like."""
+
+    loss: float         # as it is trained on
+    error: float        # mean squared error of a step [m^2]
+    segments: int
+    steepness: tuple    # norms of the gradients, elastic and plastic
+
+
+class Diverged(ValueError):
+    """A loss or a gradient is not finite, or a run left its box."""
+
+
+class Session:
+    """Laws, optimisers and schedules of a training under way."""
+
+    def __init__(self, recipe, laws, world, observed):
+        self.meter = Meter()
+        self.recipe, self.laws, self.world, self.observed = recipe, laws, world, observed
+        self.of = sha256(world, observed)
+        rates = recipe.elastic_rate, recipe.plastic_rate
+        learned = [(list(law.parameters()), rate) for law, rate in zip(laws, rates, strict=True)]
+        self.parameters = [own for own, _ in learned]
+        self.optimisers = [torch.optim.Adam(own, lr=rate) for own, rate in learned if own]
+        self.schedules = [torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, recipe.epochs)
+                          for optimiser in self.optimisers]
+        self.history = []
+
+    @property
+    def named(self):
+        """The training's settings, and what it is trained on, as one line of text."""
+        return json.dumps({"format": FORMAT, **asdict(self.recipe), "data": self.of})
+
+    def epoch(self):
+        """The trajectory once, in segments, and a step of each optimiser."""
+        steps, number = len(self.observed.x) - 1, len(self.history)
+        cuts = self.recipe.teacher.restarts(steps, number, self.recipe.epochs)
+        weight = self.recipe.weight(len(cuts) - 1, steps)
+        for optimiser in self.optimisers:
+            optimiser.zero_grad()
+        error = sum(self.show(cuts[k:k + self.recipe.batch + 1], weight)
+                    for k in range(0, len(cuts) - 1, self.recipe.batch))
+        steepness = tuple(self.cut_gradients())
+        for optimiser, schedule in zip(self.optimisers, self.schedules, strict=True):
+            optimiser.step()
+            schedule.step()
+        self.history.append(Epoch(weight * error, error / steps, len(cuts) - 1, steepness))
+
+    def show(self, cuts, weight):
+        """Add the gradients of some segments; returns their squared errors."""
+        try:
+            error = squared(self.laws, self.world, self.observed, cuts[:-1], cuts[1:])
+        except ValueError as fault:
+            raise Diverged(f"epoch {len(self.history)}, steps {cuts[0]} to {cuts[-1]}: {fault}"
+                           ) from None
+        if not torch.isfinite(error):
+            raise Diverged(f"epoch {len(self.history)}, steps {cuts[0]} to {cuts[-1]}: the loss is "
+                           f"{error.item()}; try smaller rates or shorter horizons")
+        if error.requires_grad:
+            (weight * error).backward()
+        return error.item()
+
+    def cut_gradients(self):
+        """Cut each law's gradients to their norm; yields what it was."""
+        for own in self.parameters:
+            norm = torch.nn.utils.clip_grad_norm_(own, self.recipe.clip).item() if own else 0.0
+            if not norm < float("inf"):
+                raise Diverged(f"epoch {len(self.history)}: a gradient of norm {norm}; try smaller "
+                               "rates or shorter horizons")
+            yield norm
+
+    def save(self, path):
+        """Checkpoint, whole or not at all."""
+        content = io.BytesIO()
+        torch.save({"training": self.named, "history": [tuple(epoch) for epoch in self.history],
+                    "cost": tuple(self.meter.total),
+                    **{name: [one.state_dict() for one in having] for name, having in
+                       self.stateful().items()}}, content)
+        write_whole(path, content.getvalue() + seal(content.getvalue()))
+
+    def stateful(self):
+        """What a checkpoint keeps the states of."""
+        return {"laws": self.laws, "optimisers": self.optimisers, "schedules": self.schedules}
+
+    def load(self, path):
+        """Go on from a checkpoint. Raises ValueError where it is damaged, or of another training or
+        other data.
+        """
+        content = path.read_bytes()
+        if seal(content[:-SEAL]) != content[-SEAL:]:
+            raise ValueError(f"{path} is damaged or no checkpoint: its checksum does not fit; "
+                             "remove it to train from the start")
+        kept = torch.load(io.BytesIO(content[:-SEAL]), weights_only=True)
+        if kept["training"] != self.named:
+            raise ValueError(f"{path} is a checkpoint of the training {kept['training']}, not of "
+                             f"{self.named}; remove it or give another folder")
+        for name, having in self.stateful().items():
+            for one, state in zip(having, kept[name], strict=True):
+                one.load_state_dict(state)
+        self.history = [Epoch(*row) for row in kept["history"]]
+        self.meter.before = Cost(*kept["cost"])
+
+
+def sha256(world, observed):
+    """Digest of all that is trained on."""
+    digest = hashlib.sha256(repr((world.dx, world.dt, world.eps)).encode())
+    for a in (*world[2:3], *world[4:]):
+        digest.update(repr(a.shape).encode() + a.tobytes())
+    for a in observed:
+        digest.update(repr(tuple(a.shape)).encode() + a.numpy().tobytes())
+    return digest.hexdigest()
+
+
+def train(recipe, laws, world, observed, checkpoint=None, on_epoch=None):
+    """Train `rollout.Laws` in place on a `Trajectory`; returns the `Session`.
+
+    checkpoint: a file to go on from and to save to; on_epoch(history) is called after each epoch.
+    Raises `Diverged`, with the epoch and the steps.
+    """
+    session = Session(recipe, laws, world, observed)
+    path = None if checkpoint is None else Path(checkpoint)
+    if path is not None and not path.parent.is_dir():
+        raise ValueError(f"{path}: there is no folder {path.parent}; create it or name another one")
+    if path is not None and path.exists():
+        session.load(path)
+    while len(session.history) < recipe.epochs:
+        session.epoch()
+        if path is not None and len(session.history) % SAVE == 0:
+            session.save(path)
+        if on_epoch is not None:
+            on_epoch(session.history)
+    return session
