@@ -33,12 +33,17 @@ def history(problem, every=1):
 
 
 def observed(problem):
-    """`Observed` of a problem. Raises ValueError as `recorded`, and for a body without C or F."""
-    q = problem.bodies[0].particles
-    if not q.C.ndim == q.F.ndim == 3:
-        raise ValueError(f"{problem.title!r}: a body that carries no C, or J alone: expected the "
-                         "transfer apic or mls, and a material with F")
-    return recorded(problem, Observed)
+    """`Observed` of a problem; F is J^(1/d) I of a fluid that carries J alone (NCLAW-eq21). Raises
+    ValueError as `recorded`, and for a body without C.
+    """
+    if problem.bodies[0].particles.C.ndim != 3:
+        raise ValueError(f"{problem.title!r}: a body that carries no C: expected the transfer apic "
+                         "or mls")
+    found = recorded(problem, Observed)
+    if found.F.ndim == 2:
+        d = found.x.shape[-1]
+        found = found._replace(F=found.F[..., None, None] ** (1.0 / d) * np.eye(d))
+    return found
 
 
 def recorded(problem, kind, every=1):

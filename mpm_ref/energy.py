@@ -51,8 +51,12 @@ def _psi_fluid_all(particles, law, out):
 
 
 def elastic(body):
-    """Elastic energy of every particle of a body (N,) [J]; NaN or inf where the law refuses F."""
-    out = np.empty(len(body.particles.x))
+    """Elastic energy of every particle of a body (N,) [J]; NaN or inf where the law refuses F, NaN
+    of a law without energy.
+    """
+    out = np.full(len(body.particles.x), np.nan)
+    if type(body.law) not in psi.methods:
+        return out
     if body.particles.F.ndim == 1:
         _psi_fluid_all(body.particles, body.law, out)
     else:

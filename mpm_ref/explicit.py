@@ -14,6 +14,7 @@ import numpy as np
 from .body import AFFINE, permute
 from .core import deform
 from .core.grid import Storage, update
+from .core.law import returned
 from .core.order import by_cell, slabs_of
 from .core.spline import STENCILS
 from .core.transfer import g2p, p2g, rpic
@@ -161,6 +162,8 @@ def deform_body(body, dt):
         deform.fluid(particles, law, dt, like)
     elif isinstance(flow, NoFlow):
         deform.elastic(particles, law, dt, like)
+    elif type(flow) in returned.methods:
+        deform.whole(particles, law, flow, dt, like)
     else:
         deform.plastic(particles, law, flow, dt, like)
 

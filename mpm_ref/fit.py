@@ -3,13 +3,26 @@
 import numpy as np
 
 from .body import AFFINE
+from .core.law import kirchhoff_hat, returned
 from .materials import Fluid, Hardening, NoFlow, Softening
 
 
 def check_fit(body, scheme, dim):
     """Raise ValueError, in one sentence, if a body of d = dim cannot be stepped by a scheme."""
-    for wrong in (*_wrong_arrays(body, dim), *_wrong_fields(body, scheme), *_wrong_numbers(body)):
+    for wrong in (*_wrong_material(body, dim), *_wrong_arrays(body, dim),
+                  *_wrong_fields(body, scheme), *_wrong_numbers(body)):
         raise ValueError(f"body {body.name!r}: {wrong}")
+
+
+def _wrong_material(body, d):
+    for part in (body.law, body.flow):
+        if getattr(part, "dim", d) != d:
+            yield f"its {type(part).__name__} is for {part.dim} dimensions, expected {d}"
+    whole = isinstance(body.flow, NoFlow) or type(body.flow) in returned.methods
+    if not whole and type(body.law) not in kirchhoff_hat.methods:
+        law, flow = type(body.law).__name__, type(body.flow).__name__
+        yield (f"the flow {flow} acts on singular values, the law {law} is no function of them; "
+               "expected NoFlow, or a flow of F as a whole")
 
 
 def _wrong_arrays(body, d):

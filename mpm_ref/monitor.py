@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .core.law import psi
 from .energy import Energy, energy
 from .materials import stiffness
 
@@ -59,9 +60,9 @@ class Account:
 
 def account(problem, bodies):
     """`Account` of a run's first state; None where moving conditions or body forces of particles
-    put in energy that it could not know.
+    put in energy that it could not know, or a law has no energy.
     """
-    driven = any(b.particles.b.ndim > 1 for b in bodies)
+    driven = any(b.particles.b.ndim > 1 or type(b.law) not in psi.methods for b in bodies)
     if driven or (problem.conditions is not None and getattr(problem.conditions, "moves", True)):
         return None
     mass = sum(float(b.particles.m.sum()) for b in bodies)

@@ -3,7 +3,7 @@
 * advective: no part of a particle's support crosses more than a cell, dt u + dt^2 |g| < dx with
   u = |v_p| + |L_p| dx (degree + 1)/2;
 * elastic: no wave crosses more than a cell, dt c_p < dx, c_p that of `materials.waves` at the
-  current stretches;
+  current stretches; of a law without derivatives, as a learned one, that at rest;
 * viscous: none of the shipped laws has an explicit viscosity (Bingham flow is integrated
   implicitly), so it is infinite;
 * single particle: the oscillation of a particle through nodes that it has to itself must not grow
@@ -40,7 +40,7 @@ from .core.stencil import (
 from .core.tensor import dot, fill, lin, mat, mul, mv, total_of, vec
 from .explicit import scatter
 from .materials.principal import dpk1_hat
-from .materials.waves import wave_modulus
+from .materials.waves import moduli_at_rest, wave_modulus
 
 
 class TooLarge(ValueError):
@@ -121,6 +121,8 @@ def moduli(body):
     """Modulus of the fastest wave and `largest_modulus` of a body's particles, two (N,) [Pa]."""
     q = body.particles
     like = tuple(range(q.x.shape[1]))
+    if type(body.law) in moduli_at_rest.methods:
+        return tuple(np.full(len(q.x), K) for K in moduli_at_rest(body.law))
     wave, largest = np.empty(len(q.x)), np.empty(len(q.x))
     run = _all_fluid_moduli if q.F.ndim == 1 else _all_solid_moduli
     run(q.F, body.law, wave, largest, like)

@@ -1,16 +1,19 @@
 """What a poke's reduced run is off by: while it is driven, and as it swings free."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from mpm_ref.cases import snapshots
 from mpm_ref.reduced.case import case
+from mpm_ref.reduced.errors import Errors
 from mpm_ref.reduced.march import march
 from mpm_ref.rom.modes import modes
 from mpm_ref.scene import build
 from validation.ldm import poke_parts
 from validation.ldm.pairs import ALL
-from validation.ldm.poke_parts import let_go, parts, swinging
+from validation.ldm.poke_parts import Parts, let_go, parts, swinging
 from validation.ldm.references import References
 from validation.ldm.studies import POKES, poked
 from validation.verification.scenes import with_
@@ -59,7 +62,16 @@ def test_a_run_from_the_start_is_told_from_one_that_begins_later(short):
         assert errors.origin == pytest.approx((off / sum(np.sum(b**2) for _, b in pairs)) ** 0.5)
 
 
-def test_the_network_comes_first_and_alone_at_quick():
+def test_the_network_comes_first_and_alone_at_quick(monkeypatch):
     compared = poke_parts.maps()
     assert compared[0][0] == "network"
     assert [len(rest) for _, _, rest, _ in compared] == [6, *poke_parts.DIMENSIONS, 6]
+    off = Errors(0.1, 0.2, 0.3)
+    monkeypatch.setattr(poke_parts, "parts", lambda *_: Parts(off, off, off))
+    monkeypatch.setattr(poke_parts, "references", lambda *_: SimpleNamespace(scale=""))
+    rows = []
+    run = SimpleNamespace(choose=lambda quick, standard: quick, progress=lambda a, _: a,
+                          record=lambda *_, **__: None,
+                          table=lambda name, columns, found: rows.extend(found))
+    poke_parts.by_part(run)
+    assert [row[0] for row in rows] == 3 * ["network"]

@@ -3,13 +3,13 @@
     F_trial = (I + dt L) F,   F = project(F_trial),   tau = kirchhoff(F)
 
 as in NSF-alg-mpm step 3, LDM-sec2.2-Frate and NCLAW-alg1.
-Three passes, by what the law needs: J alone (no F is carried), F without a return map, F with
+Four passes, by what the law needs: J alone (no F is carried), F without a return map, F with
 one. Return maps act on the singular values: F_trial = U diag(s) V^T becomes U diag(s_new) V^T,
-and tau = U diag(kirchhoff_hat(s_new)) U^T.
+and tau = U diag(kirchhoff_hat(s_new)) U^T. The fourth is for those that act on the whole of F.
 """
 
 from .jit import CHUNKS, chunk, kernel, parallel, prange
-from .law import intact, kirchhoff, kirchhoff_hat, pressure, project
+from .law import intact, kirchhoff, kirchhoff_hat, pressure, project, returned
 from .spectral import svd
 from .tensor import det, identity, lin, mat, mlin, mm, mmt, put_mat, scale_columns
 
@@ -50,6 +50,16 @@ def deform_plastic(particles, law, flow, dt, like, bounds):
         remember(particles.y, p, y)
         tau = lin(intact(y, flow), tau, 0.0, tau)
         F, tau = mmt(scale_columns(U, s), V), mmt(scale_columns(U, tau), U)
+        put_mat(particles.F, p, F)
+        put_mat(particles.tau, p, tau)
+
+
+@kernel
+def deform_whole(particles, law, flow, dt, like, bounds):
+    """F <- returned((I + dt L) F), tau = kirchhoff(F)."""
+    for p in range(bounds[0], bounds[1]):
+        F = returned(mm(growth(particles.L, p, dt, like), mat(particles.F, p, like)), flow)
+        tau = kirchhoff(F, law)
         put_mat(particles.F, p, F)
         put_mat(particles.tau, p, tau)
 
@@ -104,6 +114,13 @@ def plastic(particles, law, flow, dt, like):
     """`deform_plastic` for all particles. `like` is any tuple of length d."""
     for c in prange(CHUNKS):
         deform_plastic(particles, law, flow, dt, like, chunk(c, len(particles.x)))
+
+
+@parallel
+def whole(particles, law, flow, dt, like):
+    """`deform_whole` for all particles. `like` is any tuple of length d."""
+    for c in prange(CHUNKS):
+        deform_whole(particles, law, flow, dt, like, chunk(c, len(particles.x)))
 
 
 @parallel

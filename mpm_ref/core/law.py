@@ -23,6 +23,7 @@ kirchhoff_hat = by_type("kirchhoff_hat")  # (s, law) -> principal Kirchhoff stre
 psi_volume = by_type("psi_volume")        # (J, law) -> energy density of a law that needs J only
 pressure = by_type("pressure")            # (J, law) -> isotropic tau of a law that needs J only
 project = by_type("project")              # (s, y, dt, law, flow) -> s, y after the return map
+returned = by_type("returned")            # (F, flow) -> F of a return map that is no function of s
 intact = by_type("intact")                # (y, flow) -> 1.0, or 0.0 where the material has failed
 
 # Adjoint: `X_bar` is the gradient of a scalar loss by X. See `deform_adjoint`.

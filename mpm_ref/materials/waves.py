@@ -25,6 +25,8 @@ from ..core.jit import by_type, kernel
 from .principal import dpk1_hat, pair
 
 stiffness = by_type("stiffness")        # (law) -> lam + 2 mu [Pa], the wave modulus at rest
+# (law) -> the same and `timestep.largest_modulus`, of a law whose derivatives are not known
+moduli_at_rest = by_type("moduli_at_rest", 0)
 
 
 @kernel

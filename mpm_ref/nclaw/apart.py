@@ -64,16 +64,25 @@ class Nodes(NamedTuple):
 
 def world(problem):
     """`World` of a problem of one body. Raises ValueError for what is not as in NCLAW-sim."""
-    walls, clip, scheme = problem.conditions.walls, problem.clip, problem.scheme
-    if problem.dim != 3 or (scheme.transfer, scheme.degree) != ("mls", 2):
-        raise ValueError(f"{problem.title!r}: expected MLS-MPM with quadratic splines in 3D")
-    if walls is None or walls.kind != "separate" or problem.conditions.parts or clip is None:
-        raise ValueError(f"{problem.title!r}: expected a box of walls of kind \"separate\" and a "
-                         "clip, nothing else")
+    walls, clip, scheme = getattr(problem.conditions, "walls", None), problem.clip, problem.scheme
+    if problem.dim != 3 or (scheme.transfer, scheme.degree, scheme.rpic) != ("mls", 2, 0.0):
+        raise ValueError(f"{problem.title!r}: expected MLS-MPM with quadratic splines in 3D, "
+                         "without damping")
+    if len(problem.bodies) != 1 or problem.clock.dt is None:
+        raise ValueError(f"{problem.title!r}: expected one body and a fixed dt")
+    if clip is None or not boxed(walls) or problem.conditions.parts:
+        raise ValueError(f"{problem.title!r}: expected a box of walls of kind \"separate\" without "
+                         "friction and a clip, nothing else")
     q = problem.bodies[0].particles
     return World(problem.dx, problem.clock.dt, np.asarray(problem.gravity, float), scheme.mass_eps,
                  np.array(walls.low), np.array(walls.high), np.asarray(clip[0], float),
                  np.asarray(clip[1], float), q.m, q.V0)
+
+
+def boxed(walls):
+    """Whether walls are those of NCLAW-sim: six that let go and do not rub."""
+    return (walls is not None and walls.kind == "separate" and not walls.friction
+            and None not in (*walls.low, *walls.high))
 
 
 def nodes(of, count):

@@ -98,16 +98,21 @@ def turn(of, R, like, bounds):
 
 @kernel
 def read(F, s, a, like, bounds):
-    """a = (s - 1, F^T F - I, det F - 1), F^T F row by row."""
-    d = len(like)
+    """`describe` of the points bounds[0] .. bounds[1] - 1."""
     for p in range(bounds[0], bounds[1]):
-        F_p = mat(F, p, like)
-        C = mm(transpose(F_p), F_p)
-        for i in range(d):
-            a[p, i] = s[p, i] - 1.0
-            for j in range(d):
-                a[p, d + d * i + j] = C[i][j] - (1.0 if i == j else 0.0)
-        a[p, d + d * d] = det(F_p) - 1.0
+        describe(mat(F, p, like), vec(s, p, like), a, p)
+
+
+@kernel
+def describe(F, s, a, p):
+    """a[p] = (s - 1, F^T F - I, det F - 1), F^T F row by row."""
+    d = len(s)
+    C = mm(transpose(F), F)
+    for i in range(d):
+        a[p, i] = s[i] - 1.0
+        for j in range(d):
+            a[p, d + d * i + j] = C[i][j] - (1.0 if i == j else 0.0)
+    a[p, d + d * d] = det(F) - 1.0
 
 
 @kernel

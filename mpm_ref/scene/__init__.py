@@ -27,6 +27,7 @@ from ..shapes import (
 from .bodies import build_body
 from .check import checked
 from .error import SceneError, opened_by
+from .material import Flow, Material
 from .parts import build_clock, build_conditions, build_limits, build_solver
 from .records import (
     Arrays,
@@ -34,10 +35,8 @@ from .records import (
     Clip,
     Collider,
     Fixed,
-    Flow,
     Keyframes,
     Limits,
-    Material,
     Motion,
     Oscillation,
     Ramps,

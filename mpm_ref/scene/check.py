@@ -69,6 +69,9 @@ def check_scene(scene):
     check_dimension(scene, scene.dim)
     for k, body in enumerate(scene.body):
         check_body(body, scene.dim, f"body[{k}]")
+        if body.material.is_neural and scene.integrator != "explicit":
+            raise SceneError(f"body[{k}].material.law = {body.material.law!r}: expected the "
+                             f'integrator "explicit"; a learned stress has no energy to minimise')
         if body.name in [other.name for other in scene.body[:k]]:
             raise SceneError(f"body[{k}].name = {body.name!r}: another body has this name")
     if scene.clip and not all(a < b for a, b in zip(scene.clip.lower, scene.clip.upper)):
@@ -81,7 +84,7 @@ def check_scene(scene):
 
 def check_body(body, dim, path):
     """Raise SceneError for a material or velocity that does not fit the dimension."""
-    with at(f"{path}.material.flow"):
+    with at(f"{path}.material" + ("" if body.material.is_neural else ".flow")):
         body.material.flowing(dim)
     angular = body.velocity.angular
     if isinstance(angular, tuple) != (dim == 3) and angular != 0.0:

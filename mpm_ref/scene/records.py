@@ -2,6 +2,7 @@
 
 Each key is explained in docs/scenes.md. A record knows what one table can get wrong by itself; what
 belongs together across tables is checked in `check`, and what a record makes is in `parts`.
+Materials stand in `material`.
 """
 
 from typing import Annotated, Literal
@@ -9,7 +10,6 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from ..explicit import Scheme as ExplicitScheme
-from ..materials import make_flow, make_law
 from ..sampling import Regular, Samplings
 from ..shapes import Analytic, Shape
 from ..shapes.quantities import (
@@ -27,55 +27,13 @@ from ..shapes.quantities import (
     Share,
     Vector,
 )
+from .material import Material
 
 Name = Annotated[str, Meta(min_length=1, max_length=100, pattern=r"^[A-Za-z0-9_. -]+\Z")]
 Time = Annotated[float, Meta(ge=-1e12, le=1e12)]                        # [s]
 Node = Annotated[int, Meta(ge=-1_000_000_000, le=1_000_000_000)]
-Number = Annotated[float, Meta(ge=-1e30, le=1e30)]
 WallNodes = Annotated[tuple[Node | Literal["open"], ...], Meta(min_length=2, max_length=3)]
 Table = Annotated[tuple[Coordinate | Vector, ...], Meta(min_length=2)]
-
-
-class Flow(Record):
-    """A return map by its name in `materials.FLOWS`, and those parameters that it takes."""
-
-    type: str
-    friction_angle: Number | None = None        # [degrees]
-    s_min: Number | None = None
-    s_max: Number | None = None
-    sigma_y: Number | None = None               # [Pa] in uniaxial tension, or
-    tau_y: Number | None = None                 # [Pa] as Frobenius norm of the deviator
-    xi: Number | None = None
-    theta: Number | None = None                 # [Pa]
-    eta: Number | None = None                   # [Pa s]
-
-
-class Material(Record):
-    """An elastic law by its name in `materials.LAWS`, those parameters it takes, a return map."""
-
-    law: str
-    E: Number | None = None                     # [Pa]
-    nu: Number | None = None
-    lam: Number | None = None                   # [Pa]
-    flow: Flow = Flow(type="none")
-
-    def __post_init__(self):
-        self.elastic()
-
-    def elastic(self):
-        """The elastic law. Raises ValueError for a name or parameter that does not fit."""
-        return make_law(self.law, **_given(self, "law", "flow"))
-
-    def flowing(self, dim):
-        """The return map in `dim` dimensions; errors as `elastic`."""
-        parameters = _given(self.flow, "type")
-        return make_flow(self.flow.type, self.elastic(), dim, **parameters)
-
-
-def _given(record, *but):
-    """The keys of a record that have a value, except some."""
-    values = {name: getattr(record, name) for name in record.__struct_fields__ if name not in but}
-    return {name: value for name, value in values.items() if value is not None}
 
 
 class Velocity(Record):

@@ -11,6 +11,8 @@ from ..shapes.quantities import Kind, Record
 from .check import checked
 from .error import SceneError, joined
 
+FILES = "file", "weights"       # keys that name a file
+
 
 def load(path):
     """The `Scene` of a TOML file; file names in it are taken from the folder of that file.
@@ -39,14 +41,15 @@ def loads(text, source="", folder="."):
 
 
 def _located(data, folder):
-    """Plain tables with the values of their keys `file` made to start at a folder."""
+    """Plain tables with the names of their files made to start at a folder."""
     if isinstance(data, list):
         return [_located(item, folder) for item in data]
     if not isinstance(data, dict):
         return data
     located = {key: _located(value, folder) for key, value in data.items()}
-    if isinstance(located.get("file"), str):
-        located["file"] = str(folder / located["file"])
+    for key in FILES:
+        if isinstance(located.get(key), str):
+            located[key] = str(folder / located[key])
     return located
 
 
@@ -110,18 +113,19 @@ def _by_content(data, path=""):
     if not isinstance(data, dict):
         return data
     tables = {key: _by_content(value, joined(path, key)) for key, value in data.items()}
-    if "file" in data:
-        tables["file"] = Path(data["file"]).name
-        tables["sha256"] = _sha256(data["file"], path)
-        if data.get("sha256") not in (None, tables["sha256"]):
-            raise SceneError(f"{path}.sha256: the file {data['file']!r} holds something else, its "
-                             f"sha256 is {tables['sha256']}")
+    for key in FILES:
+        if key in data:
+            tables[key] = Path(data[key]).name
+            tables["sha256"] = _sha256(data[key], joined(path, key))
+            if data.get("sha256") not in (None, tables["sha256"]):
+                raise SceneError(f"{path}.sha256: the file {data[key]!r} holds something else, "
+                                 f"its sha256 is {tables['sha256']}")
     return tables
 
 
-def _sha256(file, path):
+def _sha256(file, where):
     try:
         with open(file, "rb") as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest()
     except (OSError, ValueError) as fault:
-        raise SceneError(f"{path}.file = {file!r}: cannot be read ({fault})") from None
+        raise SceneError(f"{where} = {file!r}: cannot be read ({fault})") from None

@@ -15,7 +15,7 @@ import numpy as np
 from .atomic import part_of, require_space
 from .journal import LIBVER, InUse, JournaledFile, in_use
 from .manifest import scene_hash
-from .words import counted
+from .words import counted, plain
 
 FORMAT = "mpm_ref results 1"
 ROWS = 1 << 16                    # particles per chunk
@@ -240,7 +240,7 @@ def _per_frame(h5):
 
 def _in_words(record):
     """A NamedTuple of parameters as JSON."""
-    return json.dumps({"type": type(record).__name__, **record._asdict()})
+    return json.dumps(plain(record))
 
 
 def _require_names(bodies):

@@ -13,9 +13,11 @@ from functools import cache
 from pathlib import Path
 
 import numba
+import numpy as np
 import threadpoolctl
 
 from .. import __version__
+from .words import plain
 
 POOL = ("user_api", "internal_api", "version", "num_threads")
 LIBRARIES = ("numpy", "numba", "llvmlite", "scipy", "h5py", "msgspec")
@@ -30,8 +32,7 @@ def manifest(problem, seed=None):
         "scene": problem.source,
         "scene_sha256": scene_hash(problem),
         "seed": seed,
-        "source_sha256": source_hash(),
-        "versions": versions(),
+        **code(),
         "machine": machine(),
         "parts": [],
     }
@@ -42,10 +43,18 @@ def scene_hash(problem):
     without the particles.
     """
     text = problem.source or repr((
-        [(body.name, len(body.id), body.law, body.flow) for body in problem.bodies],
+        [(body.name, len(body.id), *map(_in_full, (body.law, body.flow)))
+         for body in problem.bodies],
         problem.dx, problem.clock, list(map(float, problem.gravity)), problem.scheme, problem.clip,
     ))
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _in_full(record):
+    """A record of parameters; one that holds arrays as plain values, since their text would leave
+    out most of them.
+    """
+    return plain(record) if any(isinstance(value, np.ndarray) for value in record) else record
 
 
 @cache
@@ -56,6 +65,11 @@ def source_hash():
     for file in sorted(root.rglob("*.py")):
         digest.update(file.relative_to(root).as_posix().encode() + b"\0" + file.read_bytes())
     return digest.hexdigest()
+
+
+def code():
+    """The code that computes, as facts: the hash of the package, and versions."""
+    return {"source_sha256": source_hash(), "versions": versions()}
 
 
 def versions():
@@ -116,13 +130,14 @@ class Part:
 
     first_step: int
     unsolved: int = 0
+    code: dict = field(default_factory=code)
     began: str = field(default_factory=now)
     wall_start: float = field(default_factory=time.perf_counter)
     cpu_start: float = field(default_factory=time.process_time)
 
     def ended(self, why, state, digest):
         """The entry of `parts` in the manifest: why it ended, where, what it took, the implicit
-        steps that were not solved and the sha256 of the state it ended with.
+        steps that were not solved, the sha256 of the state it ended with and the code that ran.
         """
         return {
             "began": self.began,
@@ -136,4 +151,5 @@ class Part:
             "peak_bytes": peak_memory(),
             "unsolved": self.unsolved,
             "state_sha256": digest,
+            **self.code,
         }

@@ -34,7 +34,7 @@ class Parts(NamedTuple):
 
 
 @experiment("ldm.poke-parts", title="LDM: pokes that are driven, and that swing free",
-            profiles=("quick", "standard"), budget={"quick": 40, "standard": 300})
+            profiles=("quick", "standard"), budget={"quick": 40, "standard": 400})
 def by_part(run):
     """Errors on pokes, all points: whole, driven and free, by map."""
     tests, rows = references(POKES, run.choose(quick=1, standard=2)), []

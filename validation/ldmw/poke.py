@@ -63,4 +63,4 @@ def averaged(found):
     """Mean of several `Fields`, and in words: of how many, and the largest position error."""
     worst = 100.0 * max(fields.position for fields in found)
     return (Fields(*np.mean(found, axis=0)),
-            f"mean of {len(found)} draws of sample points, the largest {worst:.3g} %")
+            f"mean of {len(found)} draws of sample points, at most {worst:.3g} % in position")

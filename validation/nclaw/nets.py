@@ -1,6 +1,6 @@
 """The trained laws of NCLaw's experiments: which there are, and where they stand.
 
-Each is a file of weights, remade by `python -m validation.nclaw.train NAME`.
+Each is a file of weights, remade by `python -m validation.train_laws NAME`.
 """
 
 import hashlib
@@ -25,11 +25,37 @@ class Net(NamedTuple):
     epochs: int = 300
     reading: str = "release"        # of `nclaw.learn.recipe`
     seed: int = 0
+    method: str = "ours"            # of `nclaw.learn.methods`
+    elastic_rate: float = 1.0
+    plastic_rate: float = 0.1
+
+
+LATER = ("method", "elastic_rate", "plastic_rate")      # told where they are not as by default
+KNOWN = {       # environment -> its law and flow; fluids keep F = J^(1/3) I
+    "jelly": ("FixedCorotated", "NoFlow"), "sand": ("Hencky", "DruckerPrager"),
+    "plasticine": ("Hencky", "VonMises"), "water": ("Fluid", "FluidProjection")}
+PLAIN = {"elastic": "PlainStress", "plastic": "PlainCorrection"}
+LABELED = {"epochs": 30, "elastic_rate": 0.1, "plastic_rate": 0.1}
 
 
 def nets():
     """{name: `Net`} of all experiments."""
-    return {name: Net(name) for name in ENVIRONMENTS}
+    return {
+        **{name: Net(name) for name in ENVIRONMENTS},
+        **{f"{name}-{method}": net for name in ENVIRONMENTS for method, net in others(name)},
+        "plasticine-no-rotation": Net("plasticine", **PLAIN, method="no rotation"),
+        "plasticine-no-undeformed": Net("plasticine", method="no undeformed")}
+
+
+def others(name):
+    """(method, `Net`) of what is compared with ours on an environment."""
+    law, flow = KNOWN[name]
+    yield "spline", Net(name, "SplineStress", "NoFlow", method="spline")
+    yield "spline-released", Net(name, "ReleasedSplineStress", "NoFlow", method="spline")
+    yield "neural", Net(name, "StretchStress", "NoFlow", method="neural")
+    yield "neural-released", Net(name, "ReleasedStretchStress", "NoFlow", method="neural")
+    yield "labeled", Net(name, **LABELED, method="labeled")
+    yield "sys-id", Net(name, law, flow, method="sys-id", elastic_rate=0.1)
 
 
 @cache
@@ -37,7 +63,7 @@ def trained(name):
     """`nclaw.weights.Laws` by name. Raises ValueError where they are missing, damaged, or of
     another training or another scene than `nets` says now.
     """
-    path, again = FOLDER / f"{name}.npz", f"python -m validation.nclaw.train {name}"
+    path, again = FOLDER / f"{name}.npz", f"python -m validation.train_laws {name}"
     if not path.exists():
         raise ValueError(f"no weights {path.name}: {again}")
     laws, now = load(path), identity(nets()[name])
@@ -50,4 +76,6 @@ def trained(name):
 def identity(net):
     """What a training is of, plain values."""
     text = canonical(environment(net.environment))
-    return {"scene": hashlib.sha256(text.encode()).hexdigest()[:16], **net._asdict()}
+    told = {name: value for name, value in net._asdict().items()
+            if name not in LATER or value != Net._field_defaults[name]}
+    return {"scene": hashlib.sha256(text.encode()).hexdigest()[:16], **told}

@@ -1,0 +1,24 @@
+"""No return map: the plastic law of baselines that know elasticity alone (NCLAW-eq13)."""
+
+from torch import nn
+
+from ...materials import NoFlow
+from ..weights import Trained
+
+NO_FLOW = NoFlow()
+
+
+class Unchanged(nn.Module):
+    """F (n, d, d) as it is; nothing is learned."""
+
+    def __init__(self, kind=NO_FLOW):
+        super().__init__()
+        self.kind = kind
+
+    def forward(self, F):
+        """F."""
+        return F
+
+    def trained(self):
+        """`Trained` without layers."""
+        return Trained((), self.kind)

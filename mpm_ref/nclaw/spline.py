@@ -1,0 +1,100 @@
+"""Cubic pieces through values at knots, the functions of the paper's baseline "spline".
+
+    y_i = f(s_i) + sum_j g(s_i s_j) s_j + h(J) J/s_i,    j != i,  J = prod s_k
+
+is P in principal stretches of an energy F(s_i) + G(s_i s_j) + H(J) summed over axes and pairs, in
+3D; f, g, h are its derivatives. Each is given by values at 21 knots, 11 on [0, 1] and 11 on [1, 10]
+evenly, in Bezier pieces (NCLAW-methods says quadratic, the authors' release has cubics). As what a
+piece is depends on the values linearly, a reading of the pieces is a constant table (`Pieces`):
+
+`fair`      Hermite cubics whose slope at a knot is that of the parabola through it and its
+            neighbours: they have a continuous derivative and are exact for parabolas.
+`released`  as the release evaluates them. Its cubics are meant so for evenly spaced knots, with
+            other slopes at the ends. But its Bernstein matrix has -1 for the +1 of the constant
+            term, and its piece is the one after that of a number up to 0.8, and that of [0.9, 1]
+            from there on: so the function jumps at 0, 0.1, .., 0.8, reads 12 of the 21 values, and
+            four of them, those at 0.8, 0.9, 1 and 1.9, wherever stretches stay above 0.8.
+
+Beyond the knots the last piece goes on.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+SIDE = 10               # intervals on each side of 1
+LARGEST = 10.0          # knot
+BERNSTEIN = np.array([[-1.0, 3.0, -3.0, 1.0], [3.0, -6.0, 3.0, 0.0], [-3.0, 3.0, 0.0, 0.0],
+                      [1.0, 0.0, 0.0, 0.0]])    # powers 3 .. 0 of Bezier points
+
+
+class Pieces(NamedTuple):
+    """How values at knots make a function: piece k, of as many breaks below x, is
+
+    sum_m c_m (x - origin_k)^m,    c = basis[k] @ values,    m = 3 .. 0
+    """
+
+    breaks: np.ndarray      # (p - 1,)
+    origins: np.ndarray     # (p,)
+    basis: np.ndarray       # (p, 4, knots)
+
+
+def knots():
+    """The 21 knots, ascending."""
+    return np.concatenate([np.linspace(0.0, 1.0, SIDE + 1),
+                           np.linspace(1.0, LARGEST, SIDE + 1)[1:]])
+
+
+def fair(x):
+    """`Pieces` with a continuous derivative, of knots x."""
+    width, slopes = np.diff(x), parabola_slopes(x)
+    at = np.eye(len(x))
+    left = at[:-1] + width[:, None] / 3.0 * slopes[:-1]
+    right = at[1:] - width[:, None] / 3.0 * slopes[1:]
+    points = np.stack([at[:-1], left, right, at[1:]], axis=1)
+    return Pieces(x[1:-1], x[:-1], in_powers(BERNSTEIN, points, width))
+
+
+def parabola_slopes(x):
+    """Matrix (knots, knots) from values to slopes at knots x."""
+    n, slopes = len(x), np.zeros((len(x), len(x)))
+    for k in range(n):
+        i = np.clip(k, 1, n - 2) + np.arange(-1, 2)
+        for m in range(3):
+            a, b = np.delete(x[i], m)
+            slopes[k, i[m]] = (2.0 * x[k] - a - b) / ((x[i[m]] - a) * (x[i[m]] - b))
+    return slopes
+
+
+def released(x):
+    """`Pieces` as the authors' release evaluates them; of knots x the middle one is 1."""
+    side, at = len(x) // 2, np.eye(len(x))
+    inner = (at[2:] - at[:-2]) / 6.0
+    left = np.vstack([(2.0 * at[0] + 2.0 * at[1] - at[2]) / 3.0, at[1:-1] + inner])
+    right = np.vstack([at[1:-1] - inner, (2.0 * at[-1] + 2.0 * at[-2] - at[-3]) / 3.0])
+    points = np.stack([at[:-1], left, right, at[1:]], axis=1)[:side]
+    wrong = BERNSTEIN * np.array([1.0, 1.0, 1.0, -1.0])[:, None]
+    return Pieces(x[:side - 1], x[:side], in_powers(wrong, points, np.diff(x)[:side]))
+
+
+def in_powers(matrix, points, width):
+    """Powers 3 .. 0 of x - origin, from those of (x - origin)/width of Bezier points."""
+    return matrix @ points / width[:, None, None] ** np.arange(3, -1, -1)[:, None]
+
+
+class SplineStress(NamedTuple):
+    """Kirchhoff stress of `fair` splines; values at knots are (21, 3), of f, g, h.
+
+    In kPa, a rate of 1 moves a value as far as the stiffness of the paper's materials asks for.
+    """
+
+    unit: float = 1e3       # of the values [Pa]
+
+
+class ReleasedSplineStress(NamedTuple):
+    """The same of `released` splines, in Pa: a rate of 1 moves them by 150 of 1e4 at most."""
+
+    unit: float = 1.0       # of the values [Pa]
+
+
+READINGS = {SplineStress: fair, ReleasedSplineStress: released}

@@ -1,0 +1,92 @@
+"""NCLaw's figures, and what their experiments keep for them."""
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+from figures import nclaw_fig02, nclaw_fig06, nclaw_loss
+from mpm_ref.materials import Fluid, NoFlow
+from validation.nclaw import curves, states, tables
+from validation.nclaw.environments import ENVIRONMENTS
+from validation.nclaw.evaluate import fresh
+from validation.nclaw.nets import Net
+from validation.nclaw.tasks import reconstruction
+from validation.nclaw.untrained import untrained
+from validation.results import Results
+from validation.run import Setting, run_all
+from validation.verification.scenes import with_
+
+mpl.use("Agg")
+
+
+@pytest.fixture
+def short(monkeypatch):
+    """Runs of few steps of water for all environments, without networks."""
+    def scene(name, *seed):
+        return with_(reconstruction("water"), steps=10, every=5)
+
+    for name in ("reconstruction", "time", "velocity"):
+        monkeypatch.setattr(states, name, scene)
+    monkeypatch.setattr(states, "SHOTS", (0, 5, 10))
+    monkeypatch.setattr(states, "trained", lambda name: name)
+    monkeypatch.setattr(states, "learned", lambda laws: lambda body: fresh(
+        body, Fluid(1e15 if laws == "sand" else 0.0), NoFlow()))
+
+
+def done(folder, experiment, profile="standard"):
+    assert run_all([experiment.experiment], Setting(profile, folder)) == []
+    return Results(folder)
+
+
+def test_training_runs_are_drawn(tmp_path, short, monkeypatch):
+    results = done(tmp_path, states.training)
+    monkeypatch.setattr(nclaw_fig06, "NAMES", ("jelly", "water"))
+    shown = [ax for ax in nclaw_fig06.draw(results).axes if ax.images]
+    assert len(shown) == 3 * 2
+    assert [ax.get_title() for ax in shown[:3]] == ["t = 0 s", "t = 0.0025 s", "t = 0.005 s"]
+    assert "1000 particles" in nclaw_fig06.scale(Results(tmp_path))
+
+
+def test_ends_beside_the_truth_are_drawn_and_recorded(tmp_path, short, monkeypatch):
+    monkeypatch.setattr(nclaw_fig02, "NAMES", ("jelly", "sand"))
+    results = done(tmp_path, states.away)
+    ours, init = (results.value("nclaw.fig2", f"nclaw.fig2.jelly.time.{word}")
+                  for word in ("ours", "init"))
+    assert 0.0 < ours == init < 1.0
+    figure = nclaw_fig02.draw(results)
+    titles = [ax.get_title() for ax in figure.axes if ax.images]
+    assert titles[:3] == ["longer: truth", "longer: ours", "longer: before training"]
+    assert titles[5] == "thrown otherwise: before training"
+    assert titles[6:12] == 6 * [""]
+
+
+def test_states_of_a_run_that_breaks_down_are_missing():
+    scene = with_(reconstruction("water"), steps=100, every=5)
+    x = states.shots(scene, lambda body: fresh(body, Fluid(1e15), NoFlow()))
+    assert x.shape == (21, 1000, 3)
+    assert np.isfinite(x[0]).all()
+    assert np.isnan(x[-1]).all()
+    assert (nclaw_fig02.whole(x[-1], x[-1]).colour == 1.0).all()
+
+
+def test_without_weights_no_curve_is_drawn(tmp_path, monkeypatch):
+    monkeypatch.setattr(curves, "known", lambda: ({}, ["no weights"]))
+    assert run_all([curves.loss.experiment], Setting("quick", tmp_path)) == ["nclaw.loss"]
+    with pytest.raises(FileNotFoundError, match="the weights were missing"):
+        nclaw_loss.draw(Results(tmp_path))
+
+
+def test_curves_of_ablations_stand_beside_ours(tmp_path, monkeypatch):
+    found = {name: Net(name) for name in ENVIRONMENTS}
+    found["plasticine-no-rotation"] = Net("plasticine")
+    monkeypatch.setattr(tables, "nets", lambda: found)
+    monkeypatch.setattr(tables, "trained", lambda name: untrained()._replace(
+        about={"errors": [1e-3, 1e-4 * len(name)]}))
+    results = done(tmp_path, curves.loss, "quick")
+    assert results.value("nclaw.loss", "nclaw.loss.ours.sand.last") == pytest.approx(4e-4)
+    assert results.value("nclaw.loss", "nclaw.loss.no-rotation.plasticine.first") == 1e-3
+    left, right = nclaw_loss.draw(results).axes
+    assert {line.get_label() for line in left.lines} == set(ENVIRONMENTS)
+    assert [line.get_label() for line in right.lines] == ["ours", "no-rotation"]
+    assert list(right.lines[1].get_ydata()) == pytest.approx([1e-3, 22e-4])
+    assert nclaw_loss.scale(results) == "2 epochs"

@@ -1,0 +1,114 @@
+"""NCLaw's tasks: scenes with the settings of the authors' release, velocities as it draws them."""
+
+import numpy as np
+import pytest
+
+from mpm_ref.problem import Clock
+from mpm_ref.scene import Mesh, Poisson, build
+from mpm_ref.shapes.inside import solid
+from validation.nclaw import shown, tasks, toys
+from validation.nclaw.environments import ENVIRONMENTS
+from validation.verification.scenes import with_
+
+DRAWN = {       # by the release's own code
+    1: ((0.05859466755, -2.23275321281, -1.76374650039),
+        (0.93549435603, 1.26997934692, 2.48310778146)),
+    7: ((0.16922732571, -0.53734504612, 0.37294358750),
+        (0.90049885473, 2.62066033619, 0.01579591370)),
+    8: ((-0.74701461468, -2.10372601701, -0.78268181818),
+        (2.60968953509, 1.17325441958, 1.31364561937)),
+}
+VOLUMES = {     # of the release's meshes: points times volume of each [m^3]
+    "armadillo": 34468 * 6.820e-7, "bunny": 33450 * 2.036e-6, "blub": 31780 * 7.432e-7,
+    "spot": 31580 * 2.284e-6,
+}
+
+
+@pytest.mark.parametrize("seed", tasks.SEEDS)
+def test_velocities_are_those_of_the_release(seed):
+    v = tasks.thrown(seed)
+    linear, angular = DRAWN[seed]
+    assert v.linear == pytest.approx(linear, abs=1e-10)
+    assert v.angular == pytest.approx(angular, abs=1e-10)
+    assert v.center == (0.5, 0.5, 0.5)
+
+
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_tasks_change_what_they_say_and_nothing_else(name):
+    first, = tasks.scenes("reconstruction", name)
+    longer, = tasks.scenes("time", name)
+    assert longer.steps == (5000 if name == "water" else 2000)
+    assert with_(longer, steps=first.steps) == first
+    for scene, seed in zip(tasks.scenes("velocity", name), (1, 7, 8), strict=True):
+        body, = scene.body
+        assert body.velocity == tasks.thrown(seed)
+        assert with_(scene, body=(with_(body, velocity=first.body[0].velocity),)) == first
+    assert (first.steps, first.every, first.dt) == (1000, 5, 5e-4)
+
+
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_other_bodies_fall_on_a_finer_grid(name):
+    scene, = tasks.scenes("geometry", name)
+    body, = scene.body
+    assert (scene.dx, scene.steps, scene.scheme.mass_eps) == (1 / 32, 2000, 0.0)
+    assert (scene.walls.low, scene.walls.high) == ((3, 3, 3), (29, 29, 29))
+    assert scene.clip.lower == 3 * ((1 if name == "jelly" else 3) / 32,)
+    assert scene.clip.upper == pytest.approx(1.0 - np.array(scene.clip.lower))
+    assert body.velocity.linear == (1.0, -1.5, -1.5)
+    assert body.velocity.angular == (1.0, 1.0, 1.0)
+    assert body.material == tasks.reconstruction(name).body[0].material
+    assert body.sampling == Poisson(count=tasks.TOYS[name].points)
+
+
+@pytest.mark.parametrize("toy", tasks.TOYS.values(), ids=lambda toy: toy.name)
+def test_stand_ins_are_as_long_and_as_large_as_the_meshes(toy):
+    body = solid(toys.toy(toy.name, toy.size))
+    size = body.high - body.low
+    assert size.max() == pytest.approx(toy.size, rel=0.09)
+    assert 0.5 * (body.high + body.low) == pytest.approx(3 * [0.5], abs=0.06)
+    assert body.volume == pytest.approx(VOLUMES[toy.name], rel=0.06)
+
+
+def test_a_mesh_of_the_users_is_taken_instead(tmp_path, monkeypatch):
+    monkeypatch.setattr(toys, "MESHES", tmp_path)
+    assert toys.said("bunny") == "a stand-in for bunny"
+    (tmp_path / "bunny.obj").write_text("v 0 0 0")
+    assert toys.toy("bunny", 0.7) == Mesh(file=str(tmp_path / "bunny.obj"), size=0.7,
+                                          center=(0.5, 0.5, 0.5))
+    assert toys.said("bunny") == "bunny"
+    assert not isinstance(toys.toy("spot", 0.7), Mesh)
+
+
+@pytest.mark.parametrize("scene", [tasks.slope(), shown.large(), shown.contact(), shown.pool()],
+                         ids=["slope", "large", "contact", "pool"])
+def test_bodies_that_are_only_looked_at_are_within_the_box(scene):
+    low, high = scene.clip.lower, scene.clip.upper
+    for body in scene.body:
+        found = solid(body.shape)
+        assert (found.low >= low).all()
+        assert (found.high <= high).all()
+
+
+def test_the_slope_pulls_down_and_along():
+    scene = tasks.slope()
+    assert scene.gravity == (0.0, -1.0, 0.866)
+    assert (scene.dx, scene.steps, scene.body[0].density) == (1 / 128, 1500, 5000.0)
+    assert not scene.body[0].velocity.moves
+
+
+def test_the_pool_holds_as_many_points_as_printed():
+    problem = build(shown.pool())
+    duck, water = problem.bodies
+    assert len(duck.particles.x) + len(water.particles.x) == 102_294
+    assert water.particles.m[0] / water.particles.V0[0] == pytest.approx(3000.0)
+    assert problem.clock == Clock(dt=5e-4, steps=3000, every=5)
+
+
+def test_toys_run_to_the_middle():
+    for body in shown.contact().body:
+        middle = np.array((0.5, 0.4, 0.5)) - np.mean(
+            [solid(body.shape).low, solid(body.shape).high], axis=0)
+        v = np.array(body.velocity.linear)
+        assert v[0] * middle[0] > 0.0
+        assert v[2] * middle[2] > 0.0
+        assert abs(v[[0, 2]]) == pytest.approx([2.0, 2.0])

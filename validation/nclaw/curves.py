@@ -1,0 +1,34 @@
+"""How the errors of NCLaw's laws fall in training, as their weights tell (the inset of section
+4.7 among them).
+"""
+
+from ..registry import experiment
+from .tables import known
+
+COLUMNS = ("method", "environment", "epoch", "error")
+
+
+@experiment("nclaw.loss", title="NCLaw: errors in training",
+            profiles=("quick", "standard"), budget={"quick": 1, "standard": 1})
+def loss(run):
+    """Mean squared errors of a step, from restarts, epoch by epoch. Raises ValueError, at last,
+    for weights that are missing or of something else.
+    """
+    found, faults = known()
+    rows = []
+    for method, own in found.items():
+        for name, laws in own.items():
+            errors = laws.about["errors"]
+            rows += [(method, name, epoch, error) for epoch, error in enumerate(errors, 1)]
+            record(run, f"nclaw.loss.{method}.{name}", errors)
+    run.table("errors", COLUMNS, rows)
+    if faults:
+        raise ValueError("; ".join(faults))
+
+
+def record(run, target, errors):
+    """Record where a training began and ended."""
+    for word, error in (("first", errors[0]), ("last", errors[-1])):
+        run.record(f"{target}.{word}", error, unit="m^2", comparator="info",
+                   scale=f"{len(errors)} epochs",
+                   note="mean over steps from restarts of the horizon of that epoch")
