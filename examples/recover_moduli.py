@@ -74,3 +74,4 @@ if __name__ == "__main__":
     print(f"true E {TRUE[0]:.6g} Pa, nu {TRUE[1]:.6g}; start {GUESS[0]:.6g} Pa, {GUESS[1]:.6g}")
     print(f"found E {E:.6g} Pa, nu {nu:.6g}, after {done.nfev} runs with gradients, "
           f"loss {done.fun:.2g} cells^2")
+    print(f"relative errors: E {abs(E / TRUE[0] - 1.0):.1e}, nu {abs(nu / TRUE[1] - 1.0):.1e}")

@@ -13,10 +13,11 @@ import numpy as np
 from .core import deform_adjoint
 from .core.boundary_adjoint import solve_adjoint
 from .core.collide import solve
-from .core.deform_adjoint import DeformBars
+from .core.deform_adjoint import DeformBars, Step
 from .core.grid import Storage, update
 from .core.grid_adjoint import Update, update_adjoint
 from .core.jit import CHUNKS
+from .core.law import kirchhoff_vjp, project_vjp
 from .core.order import slabs_of
 from .core.transfer_adjoint import Exchange, g2p_adjoint, p2g_adjoint
 from .explicit import damp, gather, scatter
@@ -40,7 +41,7 @@ class StepAdjoint:
                 f"conditions of type {type(stepper.conditions).__name__} have no adjoint: "
                 "expected core.boundary.Conditions, or None"
             )
-        self.scheme, self.gravity = stepper.scheme, stepper.gravity
+        self.scheme, self.gravity = stepper.scheme, stepper.gravity.copy()
         self.conditions = stepper.conditions
         sizes = stepper.dx, self.scheme.stencil, len(self.gravity), self.scheme.transfer == "flip"
         self.storage, self.storage_of_bars = Storage(*sizes), Storage(*sizes)
@@ -112,17 +113,28 @@ def zero_sums(body):
     return np.zeros((CHUNKS, len(body.law) + len(body.flow)))
 
 
+def require_adjoint(body):
+    """Raise ValueError unless a body's law and flow have an adjoint."""
+    for part, known in ((body.law, kirchhoff_vjp.methods), (body.flow, project_vjp.methods)):
+        if type(part) not in known:
+            raise ValueError(f"body {body.name!r}: {type(part).__name__} has no adjoint here; "
+                             f"expected one of {', '.join(sorted(c.__name__ for c in known))}")
+
+
 def deform_body_adjoint(body, L, bar, parts, dt):
     """Adjoint of `explicit.deform_body` with velocity gradient L: bar.F and bar.y of the values
     after the step become those before it, bar.L is overwritten; bar.tau is read.
+    Raises ValueError for a law or a flow without adjoint.
     """
+    require_adjoint(body)
     q, law, flow, bars = body.particles, body.law, body.flow, _of_deformation(bar)
+    step = Step(q.F, q.y, L, parts, dt)
     if q.F.ndim == 1:
-        deform_adjoint.fluid(q.F, L, bars, law, dt, parts)
+        deform_adjoint.fluid(step, bars, law)
     elif isinstance(flow, NoFlow):
-        deform_adjoint.elastic(q.F, L, bars, law, dt, parts)
+        deform_adjoint.elastic(step, bars, law)
     else:
-        deform_adjoint.plastic(q.F, q.y, L, bars, law, flow, dt, parts)
+        deform_adjoint.plastic(step, bars, law, flow)
 
 
 def initial_stress_adjoint(body, bar, parts):

@@ -8,14 +8,19 @@
 The exact gradient of the discrete run (`adjoint`), as NCLAW-eq4 and NCLAW-eq5 minimise with.
 """
 
+from collections.abc import Mapping
+from math import nan
 from typing import NamedTuple
 
 import numpy as np
 
-from .adjoint import StepAdjoint, initial_stress_adjoint, zero_bars, zero_sums
-from .explicit import Stepper
+from .adjoint import StepAdjoint, initial_stress_adjoint, require_adjoint, zero_bars, zero_sums
+from .explicit import Stepper, initial_stress
+from .materials import Hardening, Softening
 
 STATE = ("x", "v", "C", "F", "tau", "y")        # what a step reads and changes
+CONSTANT = ("m", "V0", "b")                     # what it reads only
+ROUND_OFF = 1e-6        # of a stress that was computed on another way, relative to moduli
 
 
 class Seed(NamedTuple):
@@ -30,7 +35,12 @@ class Seed(NamedTuple):
 
 
 class BodyGradient(NamedTuple):
-    """Gradient of a loss with respect to one body: its state at the start, and its constants."""
+    """Gradient of a loss with respect to one body: its state at the start, and its constants.
+
+    Hardening and softening read the y of each particle and never their tau_y, from which bodies
+    are made with y. So the gradient by their tau_y takes all y along with it: it is the sum of
+    `y`, which holds it already. It is NaN where some particle starts from another y than tau_y.
+    """
 
     x: np.ndarray       # (N, d)
     v: np.ndarray       # (N, d)
@@ -54,9 +64,10 @@ class Gradient(NamedTuple):
 class Tape:
     """Steps bodies as `stepper` does, to the bit, and remembers the way back.
 
-    The bodies must have been started (`Stepper.start`) and may not be sorted or changed between
-    steps. Every `every`-th state is kept; those between are computed anew in the backward sweep.
-    Raises ValueError for a stepper without adjoint, or every < 1.
+    The bodies must have been started (`Stepper.start`), and nothing but `step` may change them or
+    the stepper. Every `every`-th state is kept; those between are computed anew in the backward
+    sweep. Raises ValueError for a stepper, a law or a flow without adjoint, for bodies that were
+    not started, or every < 1.
     """
 
     def __init__(self, stepper, bodies, every=1):
@@ -64,10 +75,10 @@ class Tape:
             raise ValueError(f"every = {every}: expected a number of steps >= 1")
         self.stepper, self.bodies, self.every = stepper, tuple(bodies), every
         self.adjoint = StepAdjoint(stepper)
-        again = stepper.scheme, stepper.dx, len(stepper.gravity), stepper.gravity
+        again = stepper.scheme, stepper.dx, len(stepper.gravity), stepper.gravity.copy()
         self._again = Stepper(*again, stepper.conditions)
-        self._twins = tuple(_twin(body) for body in bodies)
-        self._ids = [body.id.copy() for body in bodies]
+        self._twins = tuple(map(_started_twin, self.bodies))
+        self._left = _state_of(self.bodies)         # by the last step
         self._kept, self._times = [], []
 
     @property
@@ -76,17 +87,17 @@ class Tape:
         return len(self._times)
 
     def step(self, t, dt):
-        """`Stepper.step` of the bodies; returns the grid. Raises ValueError for sorted bodies."""
-        for body, ids in zip(self.bodies, self._ids):
-            if not np.array_equal(body.id, ids):
-                raise ValueError(
-                    f"body {body.name!r} was sorted after its tape began: sort before, or start a "
-                    "tape of its own for the steps that follow"
-                )
+        """`Stepper.step` of the bodies; returns the grid. Raises ValueError for bodies or a stepper
+        that something else has changed since the step before.
+        """
+        _require_same_rules(self.stepper, self._again)
+        for body, twin, state in zip(self.bodies, self._twins, self._left):
+            _require_untouched(body, twin, state)
         if self.steps % self.every == 0:
-            self._kept.append(_state_of(self.bodies))
+            self._kept.append(self._left)
         grid = self.stepper.step(self.bodies, t, dt)
         self._times.append((t, dt))
+        self._left = _state_of(self.bodies)
         return grid
 
     def gradient(self, seeds):
@@ -122,14 +133,49 @@ class Tape:
     def _check(self, seeds):
         if not self.steps:
             raise ValueError("the tape is empty: expected at least one step before its gradient")
+        if not isinstance(seeds, Mapping):
+            raise ValueError(f"seeds: given {type(seeds).__name__}, expected a dict of a list for "
+                             "each number of steps, as {100: [Seed(x=...)]}")
         for n, of_bodies in seeds.items():
             if n not in range(self.steps + 1):
                 raise ValueError(f"seeds of step {n}: expected 0 .. {self.steps}")
-            if len(of_bodies) != len(self.bodies):
-                raise ValueError(f"{len(of_bodies)} seeds of step {n}: expected one for each of "
-                                 f"{len(self.bodies)} bodies, or None")
+            _check_kinds(len(self.bodies), of_bodies, n)
             for body, seed in zip(self.bodies, of_bodies):
                 _check_shapes(body, seed, n)
+
+
+def _require_same_rules(stepper, again):
+    same = (np.array_equal(stepper.gravity, again.gravity) and stepper.scheme == again.scheme
+            and stepper.conditions is again.conditions)
+    if not same:
+        raise ValueError("gravity, scheme or conditions of the stepper were changed after its tape "
+                         "began: start a tape of its own for the steps that follow")
+
+
+def _require_untouched(body, twin, state):
+    if not np.array_equal(body.id, twin.id):
+        raise ValueError(f"body {body.name!r} was sorted after its tape began: sort before, or "
+                         "start a tape of its own for the steps that follow")
+    known = (*zip(STATE, state), *((name, getattr(twin.particles, name)) for name in CONSTANT))
+    for name, a in known:
+        if not _same_bits(getattr(body.particles, name), a):
+            raise ValueError(f"body {body.name!r}: its {name} was changed by something else than "
+                             "the steps of its tape: start a tape of its own for the steps that "
+                             "follow, or make the change one of the stepper's conditions")
+
+
+def _same_bits(a, b):
+    return np.array_equal(a.view(np.int64), b.view(np.int64))
+
+
+def _check_kinds(count, of_bodies, n):
+    listed = isinstance(of_bodies, list | tuple) and not isinstance(of_bodies, Seed)
+    given = of_bodies if listed else [of_bodies]
+    if listed and len(given) == count and all(isinstance(seed, Seed | None) for seed in given):
+        return
+    said = ", ".join("None" if seed is None else type(seed).__name__ for seed in given)
+    raise ValueError(f"seeds of step {n}: given {f'[{said}]' if listed else said}, expected a list "
+                     f"with one Seed or None for each body, {count} in all")
 
 
 def _check_shapes(body, seed, n):
@@ -146,12 +192,25 @@ def _for_each(f, bodies):
 
 
 def _twin(body):
-    """A body with arrays of its own for what a step changes."""
+    """A body with arrays of its own."""
     q = body.particles
-    own = {name: getattr(q, name).copy() for name in (*STATE, "L")}
+    own = type(q)(*(a.copy() for a in q))
     if q.L is q.C:
-        own["L"] = own["C"]
-    return body._replace(particles=q._replace(**own))
+        own = own._replace(L=own.C)
+    return body._replace(particles=own, id=body.id.copy())
+
+
+def _started_twin(body):
+    """A twin of a body, whose stress must be that of its F, which `Stepper.start` sees to."""
+    require_adjoint(body)
+    twin = _twin(body)
+    initial_stress(twin)
+    tau = twin.particles.tau
+    size = sum(map(abs, body.law)) + abs(tau).max(initial=0.0)
+    if not abs(body.particles.tau - tau).max(initial=0.0) <= ROUND_OFF * size:
+        raise ValueError(f"body {body.name!r}: its stress tau is not that of its F: call "
+                         "Stepper.start with the bodies before their tape begins")
+    return twin
 
 
 def _state_of(bodies):
@@ -175,4 +234,7 @@ def _add(bars, seeds):
 def _result(body, bar, parts):
     total, n = parts.sum(axis=0).tolist(), len(body.law)
     of_law, of_flow = type(body.law)(*total[:n]), type(body.flow)(*total[n:])
+    if isinstance(body.flow, Hardening | Softening):
+        follows = (body.particles.y == body.flow.tau_y).all()
+        of_flow = of_flow._replace(tau_y=bar.y.sum().item() if follows else nan)
     return BodyGradient(bar.x, bar.v, bar.C, bar.F, bar.y, bar.m, bar.V0, bar.b, of_law, of_flow)

@@ -40,11 +40,11 @@ def driven(name):
     q, (law, flow, _) = scattered(name), materials(CASES[name])[name]
     bars, step, _ = seeds(q, law, flow)
     if q.F.ndim == 1:
-        deform_adjoint.fluid(q.F, q.L, bars, law, DT, step.sums)
+        deform_adjoint.fluid(step, bars, law)
     elif isinstance(flow, NoFlow):
-        deform_adjoint.elastic(q.F, q.L, bars, law, DT, step.sums)
+        deform_adjoint.elastic(step, bars, law)
     else:
-        deform_adjoint.plastic(q.F, q.y, q.L, bars, law, flow, DT, step.sums)
+        deform_adjoint.plastic(step, bars, law, flow)
     return bars, step.sums
 
 

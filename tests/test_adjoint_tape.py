@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numba
 import numpy as np
 import pytest
-from adjoint_runs import dive, impact, line_of, moved, order, seeds_of, taped
-from adjoints import H
+from adjoint_runs import along, dive, impact, line_of, loss, moved, seeds_of, splash, taped
+from adjoints import H, rate
 from problems import DT, DX, FREE, digest, elsewhere
 
 from mpm_ref.core.jit import set_threads
@@ -17,6 +17,7 @@ from mpm_ref.tape import Seed, Tape
 
 MOST = numba.config.NUMBA_NUM_THREADS
 STEPS = 100
+STATE_AT_START = ("x", "v", "C", "F", "y")
 FINE = 4e-3 * H     # small enough that no particle passes a kink of its law or its contact
 
 SHORT = """
@@ -30,8 +31,16 @@ print(json.dumps({f"{t}{k}": order(dive(t, k), (1, 3), 1e-3 * 0.5**np.arange(4))
 
 
 def test_rollout():
-    """Elastic and hardening bodies on one grid, in the whole state and all parameters."""
-    assert order(impact(), (37, STEPS), FINE) == pytest.approx(2.0, abs=0.1)
+    """Elastic and hardening bodies on one grid, in the whole state and all parameters; y goes along
+    with tau_y, as in a body that is made with another one.
+    """
+    run, rng = impact(), np.random.default_rng(0)
+    line, seeds = line_of(run, rng), seeds_of(run, (37, STEPS), rng)
+    slope = along(taped(moved(run, line, 0.0), seeds), line)
+    metal = line.bodies[1]
+    metal["y"] += metal["flow"][0]
+    order = rate(lambda h: loss(moved(run, line, h), seeds), slope, FINE)
+    assert order == pytest.approx(2.0, abs=0.1)
 
 
 def test_rollout_reaches_what_it_tests():
@@ -47,6 +56,17 @@ def test_rollout_reaches_what_it_tests():
         assert np.isfinite(bars).all()
         assert abs(bars).max() > 0.0
     assert metal.flow.xi != 0.0
+    assert metal.flow.tau_y == pytest.approx(metal.y.sum())
+    assert metal.flow.tau_y != 0.0
+
+
+def test_particles_that_start_from_other_yield_stresses_leave_that_of_the_flow_open():
+    run = impact()
+    run.bodies[1].particles.y[3] = 49.0
+    metal = taped(run, seeds_of(run, (1,), np.random.default_rng(0))).bodies[1]
+    assert np.isnan(metal.flow.tau_y)
+    assert np.isfinite(metal.y).all()
+    assert np.isfinite(metal.flow.xi)
 
 
 def test_every_transfer():
@@ -69,6 +89,13 @@ def line(run):
     return run, line_of(run, np.random.default_rng(0))
 
 
+def tape_of(run, every=1):
+    """Stepper of a run that was started, and its tape."""
+    stepper = run.stepper()
+    stepper.start(run.bodies)
+    return stepper, Tape(stepper, run.bodies, every)
+
+
 def flat(gradient):
     """All numbers of a gradient."""
     return np.concatenate([np.ravel(a) for bars in gradient.bodies for a in bars]
@@ -85,15 +112,43 @@ def test_checkpoints_change_no_bit(every):
 
 def test_a_tape_can_be_asked_twice():
     run = impact()
-    stepper = run.stepper()
-    stepper.start(run.bodies)
-    tape = Tape(stepper, run.bodies, every=2)
+    _, tape = tape_of(run, every=2)
     seeds = seeds_of(run, (3,), np.random.default_rng(0))
     for n in range(3):
         tape.step(n * DT, DT)
     state = digest(run.bodies)
     assert np.array_equal(flat(tape.gradient(seeds)), flat(tape.gradient(seeds)))
     assert digest(run.bodies) == state
+
+
+def test_the_gradient_of_a_later_tape_is_a_seed():
+    """That it begins midway, with stresses that steps have left; but the flow's tau_y is past."""
+    seeds = seeds_of(impact(), (30,), np.random.default_rng(0))
+    whole, run = taped(impact(), seeds), impact()
+    stepper, first = tape_of(run)
+    for n in range(20):
+        first.step(n * DT, DT)
+    second = Tape(stepper, run.bodies)
+    for n in range(20, 30):
+        second.step(n * DT, DT)
+    rest = second.gradient({10: seeds[30]})
+    assert np.isnan(rest.bodies[1].flow.tau_y)
+    of_start = first.gradient({20: [Seed(x=g.x, v=g.v, C=g.C, F=g.F, y=g.y) for g in rest.bodies]})
+    for found, expected in zip(of_start.bodies, whole.bodies):
+        for name in STATE_AT_START:
+            a, b = getattr(found, name), getattr(expected, name)
+            assert abs(a - b).max(initial=0.0) <= 1e-9 * abs(b).max(initial=0.0)
+
+
+def test_gravity_that_changes_after_the_run_does_not_count():
+    run = impact()
+    stepper, tape = tape_of(run, every=2)
+    for n in range(3):
+        tape.step(n * DT, DT)
+    seeds = seeds_of(run, (3,), np.random.default_rng(0))
+    before = flat(tape.gradient(seeds))
+    stepper.gravity[:] = 5.0
+    assert np.array_equal(flat(tape.gradient(seeds)), before)
 
 
 @pytest.mark.skipif(MOST < 2, reason="one core")
@@ -152,25 +207,84 @@ def test_an_implicit_stepper_is_refused():
 
 def test_sorted_bodies_are_refused():
     run = impact()
-    stepper = run.stepper()
-    stepper.start(run.bodies)
-    tape = Tape(stepper, run.bodies)
+    stepper, tape = tape_of(run)
     tape.step(0.0, DT)
     stepper.sort(run.bodies)
     with pytest.raises(ValueError, match="body 'jelly' was sorted after its tape began"):
         tape.step(DT, DT)
 
 
+def clip(a):
+    np.minimum(a, np.median(a), out=a)
+
+
+def swap(a):
+    a[[0, 1]] = a[[1, 0]]
+
+
+def grow(a):
+    a *= 1.0 + 1e-15
+
+
+@pytest.mark.parametrize("steps", [0, 1, 2])
+@pytest.mark.parametrize(("name", "change"), [
+    ("x", clip), ("x", swap), ("v", grow), ("F", grow), ("y", grow), ("m", grow),
+])
+def test_bodies_that_something_else_changes_are_refused(steps, name, change):
+    """Before the first step too, and whether the state is kept or not."""
+    run = impact()
+    _, tape = tape_of(run, every=2)
+    for n in range(steps):
+        tape.step(n * DT, DT)
+    change(getattr(run.bodies[1].particles, name))
+    with pytest.raises(ValueError, match=f"body 'metal': its {name} was changed by something else"):
+        tape.step(steps * DT, DT)
+
+
+def lighten(stepper):
+    stepper.gravity[1] = -1.6
+
+
+def lift(stepper):
+    stepper.conditions = None
+
+
+@pytest.mark.parametrize("change", [lighten, lift])
+def test_a_stepper_that_changes_is_refused(change):
+    stepper, tape = tape_of(impact())
+    tape.step(0.0, DT)
+    change(stepper)
+    with pytest.raises(ValueError, match="gravity, scheme or conditions of the stepper"):
+        tape.step(DT, DT)
+
+
+@pytest.mark.parametrize("make", [impact, splash])
+def test_bodies_that_were_not_started_are_refused(make):
+    run = make()
+    stepper = run.stepper()
+    stepper.start(run.bodies)
+    run.bodies[1].particles.F[2] *= 1.0001
+    said = f"body {run.bodies[1].name!r}: its stress tau is not that of its F: call Stepper.start"
+    with pytest.raises(ValueError, match=said):
+        Tape(stepper, run.bodies)
+    stepper.start(run.bodies)
+    Tape(stepper, run.bodies)
+
+
 @pytest.mark.parametrize(("seeds", "said"), [
     ({3: [None, None]}, r"seeds of step 3: expected 0 \.\. 1"),
-    ({1: [None]}, "1 seeds of step 1: expected one for each of 2 bodies"),
+    ([Seed()], "given list, expected a dict"),
+    ({1: [None]}, r"seeds of step 1: given \[None\], expected a list with one Seed or None"),
+    ({1: None}, "given None, expected a list with one Seed or None for each body, 2 in all"),
+    ({1: Seed()}, "given Seed, expected a list"),
+    ({1: {0: Seed(), 1: None}}, "given dict, expected a list"),
+    ({1: [None, np.zeros((3, 2))]}, r"given \[None, ndarray\], expected a list"),
+    ({1: [{"x": 1.0}, Seed()]}, r"given \[dict, Seed\], expected a list"),
+    ({0: (1.0, None)}, r"seeds of step 0: given \[float, None\], expected a list"),
     ({1: [Seed(x=np.zeros((3, 2))), None]}, r"body 'jelly': x has shape \(3, 2\), expected"),
 ])
 def test_wrong_seeds_are_refused(seeds, said):
-    run = impact()
-    stepper = run.stepper()
-    stepper.start(run.bodies)
-    tape = Tape(stepper, run.bodies)
+    _, tape = tape_of(impact())
     with pytest.raises(ValueError, match="the tape is empty"):
         tape.gradient({})
     tape.step(0.0, DT)

@@ -28,7 +28,8 @@ def test_its_gradient_is_that_of_its_loss(example, monkeypatch):
 
 
 def test_it_finds_the_moduli(example):
-    """Seen: to 1e-11."""
+    """Seen: to 1e-11, in 19 runs."""
     done, (E, nu) = example.recover()
     assert done.fun < 1e-16
-    assert (E, nu) == pytest.approx(example.TRUE, rel=1e-6)
+    assert (E, nu) == pytest.approx(example.TRUE, rel=1e-9)
+    assert done.nfev <= 40

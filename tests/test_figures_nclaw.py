@@ -71,7 +71,7 @@ def test_states_of_a_run_that_breaks_down_are_missing():
 
 def test_without_weights_no_curve_is_drawn(tmp_path, monkeypatch):
     monkeypatch.setattr(curves, "known", lambda: ({}, ["no weights"]))
-    assert run_all([curves.loss.experiment], Setting("quick", tmp_path)) == ["nclaw.loss"]
+    assert run_all([curves.loss.experiment], Setting("quick", tmp_path)) == []
     with pytest.raises(FileNotFoundError, match="the weights were missing"):
         nclaw_loss.draw(Results(tmp_path))
 

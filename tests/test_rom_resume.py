@@ -14,6 +14,7 @@ from mpm_ref.reduced.case import case
 from mpm_ref.reduced.generate import one_thread
 from mpm_ref.reduced.march import Way, march
 from mpm_ref.reduced.study import load
+from mpm_ref.store import manifest
 from mpm_ref.store.results import Results
 
 WAYS = {"redrawn": "points = 12", "all": "", "kept": 'points = 12\nsamples = "kept"',
@@ -159,13 +160,30 @@ def test_another_run_does_not_go_on(reduced, cut, tmp_path):
     assert parts(tmp_path / "run.h5") == [(0, STEPS, "finished")]
 
 
-def test_a_run_begun_by_other_code_goes_on_with_a_warning(reduced, cut, tmp_path, monkeypatch):
-    cut("run.h5", 3, g=2)
-    monkeypatch.setattr(begun, "source_hash", lambda: "other")
+@pytest.mark.parametrize("others", [[True], [False, True]])
+def test_a_run_of_other_code_goes_on_with_a_warning(reduced, cut, tmp_path, monkeypatch, others):
+    """Whether it began the run or made a part in its middle."""
+    for step, other in zip((3, 4), others):
+        with monkeypatch.context() as patch:
+            if other:
+                patch.setattr(manifest, "source_hash", lambda: "other")
+            cut("run.h5", step, g=2)
     done = reduced("run.h5", g=2)
     assert done.exit_code == 0
-    assert "begun by another version of the code: it goes on, but not bit for bit" in done.stderr
+    assert "by another version of the code: it goes on, but not bit for bit" in done.stderr
     assert ended(tmp_path / "run.h5") == ("finished", STEPS + 1)
+
+
+def test_what_made_a_run_is_known_of_all_its_parts():
+    now = manifest.code()
+    other = now | {"source_sha256": "other"}
+    older = now | {"versions": now["versions"] | {"numba": "0.1"}}
+    unrelated = now | {"versions": now["versions"] | {"h5py": "0.1"}}
+    assert begun.same_code(now | {"parts": []})
+    assert begun.same_code(now | {"parts": [now, unrelated]})
+    for part in (other, older, {}):
+        assert not begun.same_code(now | {"parts": [now, part, now]})
+    assert not begun.same_code(other | {"parts": [now]})
 
 
 def test_a_run_that_was_killed_is_cut_off_too():

@@ -17,7 +17,6 @@ PARAMETERS = 6              # without self and cls
 MANY_PARAMETERS: dict[str, str] = {
     "mpm_ref/cli/__init__.py::run": "typer: one parameter per option",
     "mpm_ref/cli/rom.py::run": "typer: one parameter per option",
-    "mpm_ref/core/deform_adjoint.py::plastic": "what a step begins with, its bars, its constants",
 }
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef

@@ -34,7 +34,6 @@ from .law import (
     units,
 )
 from .spectral import UNDETERMINED, mixed, svd
-from .state import NO_HISTORY
 from .tensor import cofactor, det, diagonal, dot, mat, mlin, mm, mmt, put_mat, transpose
 
 
@@ -50,26 +49,26 @@ class DeformBars(NamedTuple):
 class Step(NamedTuple):
     """What a step of deformation found, and the sums to which the bars of parameters are added."""
 
-    F: np.ndarray       # (N, d, d) or (N,)
+    F: np.ndarray       # (N, d, d), or (N,) of J
     y: np.ndarray       # (N,), or no history
     L: np.ndarray       # (N, d, d)
     sums: np.ndarray    # (CHUNKS, n)
     dt: float           # [s]
 
 
-def fluid(J, L, bars, law, dt, sums):
+def fluid(step, bars, law):
     """Adjoint of `deform.fluid`."""
-    _fluid(Step(J, NO_HISTORY, L, sums, dt), bars, law, _like(L))
+    _fluid(step, bars, law, _like(step.L))
 
 
-def elastic(F, L, bars, law, dt, sums):
+def elastic(step, bars, law):
     """Adjoint of `deform.elastic`."""
-    _elastic(Step(F, NO_HISTORY, L, sums, dt), bars, law, _like(L))
+    _elastic(step, bars, law, _like(step.L))
 
 
-def plastic(F, y, L, bars, law, flow, dt, sums):
+def plastic(step, bars, law, flow):
     """Adjoint of `deform.plastic`."""
-    _plastic(Step(F, y, L, sums, dt), bars, law, flow, _like(L))
+    _plastic(step, bars, law, flow, _like(step.L))
 
 
 def initial_stress(F, y, bars, law, flow, sums):

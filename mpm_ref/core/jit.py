@@ -36,8 +36,8 @@ from numba import njit, prange
 from numba.extending import overload
 
 CHUNKS = 64          # of every parallel loop and reduction
-KEPT_CACHES = 4      # compiled versions of the package kept on disk
-IN_USE = 86400.0     # [s] since a version was opened, in which it may still be
+KEPT_CACHES = 4      # compiled versions of the package that stay on disk, however old
+IN_USE = 86400.0     # [s] since a version was opened, in which it may still be in use: stays too
 
 _OPTIONS = {"error_model": "numpy", "cache": True}
 
@@ -68,7 +68,7 @@ def _used(version):
 
 
 def _cache_dir():
-    """Folder of this version's compiled kernels; older versions but a few are removed."""
+    """Folder of this version's compiled kernels; removes those of versions long unused."""
     root = Path(numba.config.CACHE_DIR or platformdirs.user_cache_dir("mpm_ref")) / "kernels"
     here = root / _source_hash()
     try:

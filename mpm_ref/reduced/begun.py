@@ -7,19 +7,21 @@ from typing import NamedTuple
 
 from ..rom.latent import at_start, moved
 from ..rom.step import Report
-from ..store.manifest import scene_hash, source_hash
+from ..store.manifest import code, scene_hash
 from ..store.results import Results
 from ..store.running import Refused
 from ..store.session import INTERRUPTED
 from ..store.words import counted
 from .record import marked
 
+COMPUTE = ("numpy", "scipy", "numba", "llvmlite")       # libraries that shape the bits
+
 
 class Begun(NamedTuple):
     """What a file has of a run."""
 
     known: tuple            # (`Latent`, `Report` or None) of its frames but the run's last
-    same_code: bool         # whether the code that began it was this one
+    same_code: bool         # whether all of it was made by this code
 
 
 NOTHING = Begun((), True)
@@ -42,13 +44,27 @@ def begun(recording, out, overwrite):
                           f"{counted(len(results), 'frame')}: give its study, map and options to "
                           "go on with it, --overwrite to replace it, or name another file")
         known = states(results)[:recording.problem.clock.steps]
-        return Begun(known, results.manifest["source_sha256"] == source_hash())
+        return Begun(known, same_code(results.manifest))
 
 
 def cut_off(facts):
     """Whether a manifest is that of a reduced run that was interrupted or killed."""
     parts = facts.get("parts")
     return "reduced" in facts and (not parts or parts[-1]["why"] == INTERRUPTED)
+
+
+def same_code(facts):
+    """Whether the run of a manifest was begun, and all its parts were made, by this code with
+    these libraries.
+    """
+    now = _made_by(code())
+    return all(_made_by(entry) == now for entry in (facts, *facts["parts"]))
+
+
+def _made_by(entry):
+    """Hash and versions, None where an entry of older code does not say."""
+    versions = entry.get("versions", {})
+    return entry.get("source_sha256"), *(versions.get(name) for name in COMPUTE)
 
 
 def states(results):

@@ -58,14 +58,18 @@ def others(name):
     yield "sys-id", Net(name, law, flow, method="sys-id", elastic_rate=0.1)
 
 
+class Untrained(ValueError):
+    """Weights are not there yet."""
+
+
 @cache
 def trained(name):
-    """`nclaw.weights.Laws` by name. Raises ValueError where they are missing, damaged, or of
-    another training or another scene than `nets` says now.
+    """`nclaw.weights.Laws` by name. Raises `Untrained` where they are missing, ValueError where
+    they are damaged, or of another training or another scene than `nets` says now.
     """
     path, again = FOLDER / f"{name}.npz", f"python -m validation.train_laws {name}"
     if not path.exists():
-        raise ValueError(f"no weights {path.name}: {again}")
+        raise Untrained(f"no weights {path.name}: {again}")
     laws, now = load(path), identity(nets()[name])
     was = {key: laws.about.get(key) for key in now}
     if was != now:
