@@ -85,8 +85,8 @@ def ran(made, out, out_of_bounds):
 def changed(before):
     """The warning about a run that has `Begun` with other code; or none."""
     if not before.same_code:
-        yield ("the run was made in part by another version of the code, or of NumPy, SciPy or Numba: "
-               "it goes on, but not bit for bit; --overwrite makes it anew")
+        yield ("the run was made in part by another version of the code, or of NumPy, SciPy or "
+               "Numba: it goes on, but not bit for bit; --overwrite makes it anew")
 
 
 def astray(out_of_bounds, steps):
