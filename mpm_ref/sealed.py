@@ -31,25 +31,43 @@ def seal(content):
     return hashlib.sha256(content).hexdigest().encode()
 
 
+def intact(content):
+    """Whether the last bytes of a file are the seal of those before."""
+    return seal(content[:-SEAL]) == content[-SEAL:]
+
+
 def opened(path):
     """The arrays of a file whose seal is intact."""
     try:
         content = path.read_bytes()
     except OSError as error:
-        raise ValueError(f"{path} cannot be read: {error.strerror}; name a file with a trained "
-                         "map, or train one") from None
+        raise ValueError(f"{path} cannot be read: {error.strerror}; name another file, or make "
+                         "this one") from None
     if not content.startswith(MAGIC):
-        raise ValueError(f"{path} is not an npz file and so holds no trained map; name another "
-                         "file, or train again")
-    if seal(content[:-SEAL]) != content[-SEAL:]:
-        raise ValueError(f"{path} is damaged, cut short or no trained map: its checksum does not "
-                         "fit; copy it again from where it came, or train again")
+        raise ValueError(f"{path} is not an npz file; name another one, or make it again")
+    if not intact(content):
+        raise ValueError(f"{path} is damaged, cut short or none of ours: its checksum does not "
+                         "fit; copy it again from where it came, or make it again")
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as file:
             return dict(file)
     except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
         raise ValueError(f"{path} is no archive of plain arrays ({error}); copy it again from "
-                         "where it came, or train again") from None
+                         "where it came, or make it again") from None
+
+
+def format_of(arrays):
+    """The format that a file names; in words where that is not one number."""
+    found = arrays.get("format")
+    return f"an array of shape {found.shape}" if np.ndim(found) else found
+
+
+def require_format(path, arrays, expected):
+    """Raise ValueError unless a file is of the expected format."""
+    found = format_of(arrays)
+    if found != expected:
+        raise ValueError(f"{path} has format {found}, this program reads {expected}; use the "
+                         "version that wrote it, or make it again")
 
 
 def write_whole(path, content):
@@ -71,13 +89,13 @@ def write_whole(path, content):
 
 
 def about_of(path, arrays):
-    """What is known of a map, from the arrays of its file. Raises ValueError for no JSON of it."""
+    """What is known of a file's making, from its arrays. Raises ValueError for no JSON of it."""
     try:
         about = json.loads(str(arrays.get("about", "")))
     except ValueError as error:
-        raise ValueError(f"{path} says nothing of its map: about is no JSON ({error}); copy it "
-                         "again from where it came, or train again") from None
+        raise ValueError(f"{path} does not say how it was made: about is no JSON ({error}); copy "
+                         "it again from where it came, or make it again") from None
     if not isinstance(about, dict):
-        raise ValueError(f"{path} says nothing of its map: about is a {type(about).__name__}, "
-                         "expected a JSON object; train again")
+        raise ValueError(f"{path} does not say how it was made: about is a "
+                         f"{type(about).__name__}, expected a JSON object; make it again")
     return about

@@ -33,3 +33,10 @@ def test_it_finds_the_moduli(example):
     assert done.fun < 1e-16
     assert (E, nu) == pytest.approx(example.TRUE, rel=1e-9)
     assert done.nfev <= 40
+
+
+def test_the_page_on_gradients_runs_as_it_is_printed(monkeypatch, capsys):
+    text = (ROOT / "docs/gradients.md").read_text(encoding="utf-8")
+    monkeypatch.chdir(ROOT)
+    exec(compile(text.split("```python\n")[1].split("```")[0], "gradients.md", "exec"), {})
+    assert "FixedCorotated(mu=-" in capsys.readouterr().out

@@ -227,6 +227,51 @@ def test_what_is_not_finite_does_not_become_a_position(of, before, name):
     assert np.isfinite(after.x[[0, 2]]).all()
 
 
+def short(states, name):
+    """`States` with one particle less in an array."""
+    return states._replace(**{name: getattr(states, name)[:, 1:].copy()})
+
+
+@pytest.mark.parametrize("name", FIELDS)
+def test_arrays_of_another_body_are_told(of, before, rng, name):
+    said = rf"^{name if name != 'tau' else 'tau'} has shape \(3, 7, 3.*\), expected \(3, 8, 3"
+    given = [before, stepped(of, before), seeds(before, rng)]
+    with pytest.raises(ValueError, match=said):
+        stepped(of, short(before, name))
+    for k in range(1 if name == "tau" else 3):
+        wrong = [short(states, name) if i == k else states for i, states in enumerate(given)]
+        with pytest.raises(ValueError, match=said):
+            pull_back(of, *wrong, nodes(of, 3))
+
+
+def test_gradients_of_fewer_bodies_are_told(of, before, rng):
+    bars = States(*(a[:2] for a in seeds(before, rng)[:4]))
+    with pytest.raises(ValueError, match=r"^x has shape \(2, 8, 3\), expected \(3, 8, 3\): "):
+        gradient(of, before, bars)
+
+
+def test_a_stress_that_is_left_out_is_told(of, before):
+    with pytest.raises(ValueError, match=r"^tau has shape \(0, 0, 0, 0\), .* or left out\?$"):
+        stepped(of, stepped(of, before))
+
+
+@pytest.mark.parametrize(("coarser", "count"), [(1.0, 2), (2.0, 3)])
+def test_storage_that_is_too_small_is_told(of, before, rng, coarser, count):
+    on = nodes(of._replace(dx=coarser * of.dx), count)
+    said = rf"^storage for {count} bodies of \d+ nodes, expected at least 3 of \d+; make it with "
+    with pytest.raises(ValueError, match=said):
+        advance(of, before, on)
+    with pytest.raises(ValueError, match=said):
+        pull_back(of, before, stepped(of, before), seeds(before, rng), on)
+
+
+def test_a_body_force_of_its_own_is_refused(before):
+    body = problem_of(before, 0).bodies[0]
+    pushed = body._replace(particles=body.particles._replace(b=np.ones((N, 3))))
+    with pytest.raises(ValueError, match=r": expected no body force but gravity; "):
+        world(replace(problem_of(before, 0), bodies=(pushed,)))
+
+
 def test_a_world_is_that_of_the_problem(before):
     of = world_of(before)
     assert (of.dx, of.dt, of.eps) == (0.05, 5e-4, 1e-7)

@@ -2,6 +2,8 @@
 PyTorch.
 """
 
+import json
+
 import numpy as np
 import pytest
 from adjoints import rate
@@ -12,9 +14,12 @@ from test_nclaw_learn import double, one_thread  # noqa: F401
 torch = pytest.importorskip("torch")
 
 from mpm_ref.core.law import kirchhoff  # noqa: E402
+from mpm_ref.materials import NoFlow  # noqa: E402
 from mpm_ref.nclaw import principal, response, spline, stretched, weights  # noqa: E402
 from mpm_ref.nclaw.invariants import invariants, rotations, spectrum  # noqa: E402
+from mpm_ref.nclaw.learn.kinds import described  # noqa: E402
 from mpm_ref.nclaw.learn.methods import METHODS, laws_of, trained_of  # noqa: E402
+from mpm_ref.nclaw.learn.stretches import ReleasedStretchLaw, StretchLaw  # noqa: E402
 from validation.nclaw.environments import ENVIRONMENTS  # noqa: E402
 from validation.nclaw.nets import identity, nets  # noqa: E402
 from validation.train_laws import begun  # noqa: E402
@@ -136,6 +141,28 @@ def test_gradient_of_an_ablation_is_exact(method, rng):
     for law in laws_of(method, 0, *ABLATIONS[method]):
         law.double()
         assert order(law, built("generic", 5, 3, rng), rng) == pytest.approx(2.0, abs=0.15)
+
+
+# What is told of laws.
+
+def told(name, change=1.0, seed=0):
+    """Of a law with its constants multiplied."""
+    elastic, plastic = ABLATIONS.get(name) or (KINDS[name], NoFlow())
+    kinds = (type(kind)(*(change * a for a in kind)) for kind in (elastic, plastic))
+    method = name if name in ABLATIONS else name.split()[-1]
+    return [described(law) for law in laws_of(method, seed, *kinds)]
+
+
+def test_no_two_laws_are_told_alike():
+    every = [str(told(name, change)) for name in (*KINDS, *ABLATIONS) for change in (1.0, 2.0)]
+    assert len(set(every)) == len(every)
+    one, other = (described(law(KINDS["neural"])) for law in (StretchLaw, ReleasedStretchLaw))
+    assert one != other
+
+
+@pytest.mark.parametrize("name", [*KINDS, *ABLATIONS])
+def test_what_is_learned_is_not_told(name):
+    assert told(name, seed=1) == told(name) == json.loads(json.dumps(told(name)))
 
 
 # The nets.

@@ -193,10 +193,14 @@ def test_laws_turn_with_the_body(d, rng):
 
 # Rollouts.
 
+def J(F):
+    return torch.det(F)[:, None, None]
+
+
 def jelly(F):
     """The law of `nclaw_toys` (NCLAW-eq12), exactly."""
-    R, J = Invariants.apply(F)[1], torch.det(F)[:, None, None]
-    return (2.0 * LAW.mu * (F - R) @ F.mT + LAW.lam * (J - 1.0) * J * torch.eye(3))
+    R = Invariants.apply(F)[1]
+    return 2.0 * LAW.mu * (F - R) @ F.mT + LAW.lam * (J(F) - 1.0) * J(F) * torch.eye(3)
 
 
 def test_with_the_exact_law_nothing_is_off(run):
@@ -214,6 +218,19 @@ def test_segments_do_not_know_each_other(run):
         together = squared(laws, *run, [0, 2, 7], [2, 7, STEPS])
         assert min(parts) > 0.0
         assert together.item() == pytest.approx(sum(parts).item(), rel=1e-6)
+
+
+def test_what_would_become_of_a_segment_after_its_end_does_not_matter(run):
+    """One that is swollen, and then more, until a law has no answer."""
+    (world, data), laws = run, neural_laws(0, *STIFF)
+    data = data._replace(F=torch.cat([2.0 * data.F[:1], data.F[1:]]))
+    broken = Laws(lambda F: torch.where(J(F) > 30.0, torch.nan, laws.elastic(F)),
+                  lambda F: torch.where(J(F) > 5.0, 2.0 * F, laws.plastic(F)))
+    together = squared(broken, world, data, [0, 1], [1, 4])
+    parts = sum(squared(broken, world, data, [a], [b]) for a, b in ((0, 1), (1, 4)))
+    assert together.item() == pytest.approx(parts.item(), rel=1e-6)
+    for a, b in zip(*(torch.autograd.grad(loss, parameters(laws)) for loss in (together, parts))):
+        assert (a - b).norm() < 1e-5 * b.norm()
 
 
 def test_errors_are_means_over_particles_and_axes(run):

@@ -15,6 +15,8 @@ torch = pytest.importorskip("torch")
 
 from mpm_ref.core.law import kirchhoff  # noqa: E402
 from mpm_ref.materials import (  # noqa: E402
+    DruckerPrager,
+    FixedCorotated,
     Fluid,
     FluidProjection,
     Hencky,
@@ -23,7 +25,9 @@ from mpm_ref.materials import (  # noqa: E402
 )
 from mpm_ref.nclaw import response  # noqa: E402
 from mpm_ref.nclaw.apart import nodes, world  # noqa: E402
+from mpm_ref.nclaw.learn import labeled  # noqa: E402
 from mpm_ref.nclaw.learn.fit import train  # noqa: E402
+from mpm_ref.nclaw.learn.kinds import described  # noqa: E402
 from mpm_ref.nclaw.learn.labeled import labels_of, train_labeled  # noqa: E402
 from mpm_ref.nclaw.learn.methods import laws_of, trained_of  # noqa: E402
 from mpm_ref.nclaw.learn.recipe import Recipe  # noqa: E402
@@ -143,6 +147,19 @@ def test_fluid_keeps_what_its_pressure_needs(rng):
     assert elastic.log_E.item() == pytest.approx(0.8 * log(100.0))
 
 
+def test_constants_that_are_not_learned_are_told():
+    """In checkpoints: which law, Poisson's ratio, which flow, and its s_min."""
+    small, large = VonMises(TAU_Y, 0.05), VonMises(2.0 * TAU_Y, 0.05)
+
+    def told(unit=UNIT, E=E, flow=small):
+        return [described(law) for law in known_laws(unit, E, flow)]
+
+    assert told(E=2.0 * E, flow=large) == told()
+    others = [told(unit=Hencky(0.4, 0.2)), told(unit=FixedCorotated(*UNIT)),
+              told(flow=VonMises(TAU_Y, 0.1)), told(flow=DruckerPrager(TAU_Y, 0.05))]
+    assert told() not in others
+
+
 def test_constants_are_found_from_motion(run):
     """Those with which the run was made; each at least twice as near as at the start."""
     laws = known_laws(UNIT, E, VonMises(START * TAU_Y, 0.05))
@@ -181,3 +198,24 @@ def test_laws_learn_their_labels(run):
     assert told[0] == told[1]
     assert told[0][-1].loss < 0.5 * told[0][0].loss
     assert told[0][-1].error < 0.5 * told[0][0].error
+
+
+def test_teaching_that_was_cut_off_goes_on_bit_for_bit(tmp_path, monkeypatch, run):
+    monkeypatch.setattr(labeled, "SAVE", 2)
+    where, epochs = run[0], []
+    labels, recipe = labels_of(run[1], TRUE, where.dt), Recipe(epochs=5)
+
+    def taught(seed, *more):
+        laws = laws_of("labeled", seed, response.Stress(1e3), response.Correction(1e-2))
+        session = train_labeled(recipe, laws, where, labels, *more)
+        return session.history, [a.tolist() for law in laws for a in law.parameters()]
+
+    def cut(history):
+        epochs.append(len(history))
+        if epochs == [1, 2, 3]:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        taught(0, tmp_path / "a.pt", cut)
+    assert taught(7, tmp_path / "a.pt", cut) == taught(0)
+    assert epochs == [1, 2, 3, 3, 4, 5]

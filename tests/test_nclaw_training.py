@@ -12,11 +12,13 @@ from mpm_ref import cost  # noqa: E402
 from mpm_ref.cases import observed  # noqa: E402
 from mpm_ref.nclaw.apart import world  # noqa: E402
 from mpm_ref.nclaw.learn import fit  # noqa: E402
+from mpm_ref.nclaw.learn.ablations import UnshiftedLaw  # noqa: E402
 from mpm_ref.nclaw.learn.fit import Diverged, Session, train  # noqa: E402
-from mpm_ref.nclaw.learn.law import neural_laws  # noqa: E402
+from mpm_ref.nclaw.learn.law import NeuralLaw, neural_laws  # noqa: E402
 from mpm_ref.nclaw.learn.recipe import Recipe  # noqa: E402
 from mpm_ref.nclaw.learn.rollout import Laws, Trajectory, trajectory_of  # noqa: E402
-from mpm_ref.nclaw.response import Correction, Stress  # noqa: E402
+from mpm_ref.nclaw.learn.unchanged import Unchanged  # noqa: E402
+from mpm_ref.nclaw.response import Correction, PlainStress, Stress  # noqa: E402
 
 STEPS = 11          # segments of 3 and 2 steps
 SHORT = Recipe(epochs=5, first=3, last=6, batch=2, elastic_rate=1e-2, plastic_rate=1e-3)
@@ -215,9 +217,9 @@ def checkpoint(tmp_path, monkeypatch, run):
     return tmp_path / "a.pt"
 
 
-def refused(path, said, run, recipe):
+def refused(path, said, run, recipe, begun=None):
     with pytest.raises(ValueError, match=said) as refusal:
-        train(recipe, laws(), *run, path)
+        train(recipe, begun or laws(), *run, path)
     text = str(refusal.value)
     assert text.startswith(str(path))
     assert "; remove it" in text
@@ -230,6 +232,22 @@ def refused(path, said, run, recipe):
 def test_a_checkpoint_of_another_recipe_is_refused(checkpoint, run, settings):
     recipe = replace(SHORT, **{"epochs": 1, **settings})
     refused(checkpoint, "is a checkpoint of the training .*, not of ", run, recipe)
+
+
+@pytest.mark.parametrize("others", [
+    {"elastic": lambda: NeuralLaw(Stress(2e5))}, {"elastic": lambda: NeuralLaw(PlainStress(1e5))},
+    {"elastic": lambda: NeuralLaw(Stress(1e5), hidden=(64, 8))},
+    {"elastic": lambda: UnshiftedLaw(Stress(1e5))}, {"plastic": lambda: Unchanged(Correction(0.1))},
+    {"plastic": lambda: NeuralLaw(Correction(0.2))}],
+    ids=["unit", "kind", "sizes", "biases", "class", "alpha"])
+def test_a_checkpoint_of_other_laws_is_refused(checkpoint, run, others):
+    begun = laws()._replace(**{part: make() for part, make in others.items()})
+    refused(checkpoint, "is a checkpoint of the training", run, replace(SHORT, epochs=1), begun)
+
+
+def test_a_checkpoint_goes_on_in_other_batches(checkpoint, run):
+    other = replace(SHORT, epochs=1, batch=SHORT.batch + 1)
+    train(other, laws(), *run, checkpoint, lambda _: pytest.fail("trained anew"))
 
 
 @pytest.mark.parametrize("name", [*Trajectory._fields, "dx", "dt", "gravity", "eps", "low", "high",

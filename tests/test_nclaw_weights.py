@@ -42,6 +42,7 @@ def refused(path, said):
     assert text.startswith(str(path))
     assert "\n" not in text
     assert "; " in text         # what is wrong; what to do
+    assert " map" not in text[len(str(path)):]      # of `rom`
 
 
 def test_laws_come_back_bit_for_bit(tmp_path, d):
@@ -91,6 +92,7 @@ def changed(**arrays):
 FAULTS = {
     "has format None, this program reads 1": without("format"),
     "has format 2, this program reads 1": changed(format=2),
+    r"has format an array of shape \(2,\), this program reads 1": changed(format=[1, 1]),
     "elastic law of kind None, expected Stress or": without("elastic_kind"),
     "elastic law of kind Correction, expected Stress or": changed(elastic_kind="Correction"),
     "plastic law of kind Sand, expected Correction or PlainCorrection": changed(

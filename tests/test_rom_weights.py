@@ -9,7 +9,7 @@ import rom_toys
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mpm_ref.rom import weights
+from mpm_ref.rom import modes_file, weights
 from mpm_ref.rom.weights import Model, arrays_of, load, save
 from mpm_ref.sealed import seal, sealed
 
@@ -132,7 +132,7 @@ def test_foreign_files_are_told(tmp_path):
     np.save(tmp_path / "one.npy", np.arange(3))
     refused(tmp_path / "one.npy", "is not an npz file")
     np.savez(tmp_path / "other.npz", W=np.arange(3))
-    refused(tmp_path / "other.npz", "no trained map: its checksum does not fit")
+    refused(tmp_path / "other.npz", "none of ours: its checksum does not fit")
 
 
 def test_nothing_is_unpickled(tmp_path):
@@ -168,6 +168,17 @@ def test_another_format_is_told(tmp_path, monkeypatch):
     save(tmp_path / "map.npz", model())
     monkeypatch.undo()
     refused(tmp_path / "map.npz", "has format 2, this program reads 1; use the version")
+
+
+@pytest.mark.parametrize("kept", [[1, 1], [1], [], "1", 1.5, None])
+def test_what_is_no_format_is_told(kept, tmp_path):
+    found = {} if kept is None else {"format": np.array(kept)}
+    path, modes = tmp_path / "map.npz", {"kind": np.array("modes")}
+    for module, arrays in ((weights, arrays_of(model())), (modes_file, modes)):
+        path.write_bytes(sealed(without(arrays, "format") | found))
+        said = r"has format .*, this program reads 1; use |holds no modes of format 1; make "
+        with pytest.raises(ValueError, match=rf"map\.npz ({said})"):
+            module.load(path)
 
 
 def without(arrays, name):

@@ -54,7 +54,7 @@ def taught(net, recipe, laws, checkpoint, show):
     observed, where = trajectory_of(trajectory(net.environment)), world(problem)
     if net.method == LABELED:
         labels = labels_of(observed, problem.bodies[0].law, where.dt)
-        return train_labeled(recipe, laws, where, labels, show)
+        return train_labeled(recipe, laws, where, labels, checkpoint, show)
     return train(recipe, laws, where, observed, checkpoint, show)
 
 

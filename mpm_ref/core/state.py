@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .jit import kernel
-from .tensor import fill, identity, mat, mlin, put_mat, vec
+from .tensor import fill, identity, lin, mat, mlin, put_mat, put_vec, trace, vec
 
 
 class Particles(NamedTuple):
@@ -86,3 +86,19 @@ def put_affine(C, p, scale, B):
     """C_p = scale B, where an affine field is carried."""
     if C.ndim == 3:
         put_mat(C, p, mlin(scale, B, 0.0, B))
+
+
+@kernel
+def put_full(a, p, A):
+    """a[p] = A for an (N, d, d) field, tr A for an isotropic one (N,)."""
+    if a.ndim == 3:
+        put_mat(a, p, A)
+    else:
+        a[p] = trace(A)
+
+
+@kernel
+def add_body_force(b, p, m, f):
+    """b_p += m f, where a body force is carried."""
+    if b.ndim == 2:
+        put_vec(b, p, lin(1.0, vec(b, p, f), m, f))

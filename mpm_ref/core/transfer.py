@@ -30,7 +30,7 @@ from .stencil import (
     weights_per_axis,
 )
 from .tensor import fill, lin, mat, mlin, mv, outer, put_mat, put_vec, transpose, vec
-from .transfer_mls3 import gather_mls3_all, scatter_mls3_color
+from .transfer_mls3 import fits, gather_mls3_all, scatter_mls3_color
 
 
 @kernel
@@ -201,17 +201,13 @@ def _damp(C, damping, like):
         damp(C, damping, like, chunk(c, len(C)))
 
 
-def _has_fast_twin(grid, stencil, mls):
-    return mls and grid.m.ndim == 3 and len(stencil) == 3
-
-
 def p2g(particles, grid, stencil, dt, slabs, mls):
     """Add mass and momentum of all particles to a zeroed grid; see `scatter` and `scatter_mls`.
 
     Slabs of one colour are far enough apart to share no node, so they run in parallel; within a
     slab particles come in a fixed order. Hence the same bits for any number of threads.
     """
-    if _has_fast_twin(grid, stencil, mls):
+    if fits(grid, stencil, mls):
         run = scatter_mls3_color
     else:
         run = _scatter_mls_color if mls else _scatter_color
@@ -223,7 +219,7 @@ def g2p(particles, grid, stencil, dt, flip, mls):
     """New velocity, position and velocity gradient of all particles; see `gather` and
     `gather_mls`.
     """
-    if _has_fast_twin(grid, stencil, mls):
+    if fits(grid, stencil, mls):
         gather_mls3_all(particles, grid, stencil, dt)
     elif mls:
         _gather_mls(particles, grid, stencil, dt)

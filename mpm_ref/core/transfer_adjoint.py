@@ -12,7 +12,7 @@ import numpy as np
 from .curvature import hessian
 from .jit import CHUNKS, chunk, kernel, parallel, prange
 from .lever import GradientForm, MlsForm, around, lever, lever_bar
-from .state import NONE, affine, body_force, full, put_affine
+from .state import NONE, add_body_force, affine, body_force, full, put_affine, put_full
 from .stencil import (
     add_to_node,
     arm,
@@ -24,7 +24,9 @@ from .stencil import (
     of_node,
     product,
 )
-from .tensor import dot, fill, inner, lin, mat, mlin, mv, outer, put_mat, put_vec, trace, vec, vm
+from .tensor import dot, fill, inner, lin, mat, mlin, mv, outer, put_vec, vec, vm
+from .transfer_adjoint_mls3 import gather_bars_mls3_all, scatter_bars_mls3_color
+from .transfer_mls3 import fits
 
 
 class Moved(NamedTuple):
@@ -158,22 +160,6 @@ def force_bar(f, i, v_i, dt):
         return of_node(f, i)
 
 
-@kernel
-def put_full(a, p, A):
-    """a[p] = A for an (N, d, d) field, tr A for an isotropic one (N,)."""
-    if a.ndim == 3:
-        put_mat(a, p, A)
-    else:
-        a[p] = trace(A)
-
-
-@kernel
-def add_body_force(b, p, m, f):
-    """b_p += m f, where a body force is carried."""
-    if b.ndim == 2:
-        put_vec(b, p, lin(1.0, vec(b, p, f), m, f))
-
-
 @parallel
 def _scatter_color(moved, grid, bars, nodes, stencil, slabs):
     for h in prange(len(slabs.start) // 2):
@@ -198,15 +184,19 @@ def g2p_adjoint(x, grid, bars, nodes, how, slabs):
     bars.v[:] *= how.flip if grid.v_old.ndim > 1 else 0.0
     if how.mls:
         bars = bars._replace(L=NONE)
+    run = scatter_bars_mls3_color if fits(grid, how.stencil, how.mls) else _scatter_color
     for color in (0, 1):
         of_color = slabs._replace(start=slabs.start[color:])
-        _scatter_color(moved, grid, bars, nodes, how.stencil, of_color)
+        run(moved, grid, bars, nodes, how.stencil, of_color)
 
 
 def p2g_adjoint(particles, nodes, bars, how):
     """Adjoint of `p2g`: from the bars `nodes` of m, v, f to those of particles; those of x, v, b,
     m, V0 are added to, those of C and tau overwritten.
     """
+    if fits(nodes, how.stencil, how.mls):
+        gather_bars_mls3_all(particles, nodes, bars, how.stencil, how.dt)
+        return
     form = GradientForm(how.dt)
     if how.mls:
         form = MlsForm(how.dt, inverse_inertia(nodes.dx, how.stencil))

@@ -22,6 +22,11 @@ from .tensor import lin, mlin, mul, mv, outer, put_vec, transpose, vec, vm
 _1, _2, _3, _4, _5, _6, _7, _8 = (np.uint64(k) for k in range(1, 9))
 
 
+def fits(grid, stencil, mls):
+    """Whether a transfer is the one that is written here."""
+    return mls and grid.m.ndim == 3 and len(stencil) == 3
+
+
 @kernel
 def scatter_mls3(particles, grid, stencil, dt, members):
     """`scatter_mls` for a quadratic stencil in 3D."""

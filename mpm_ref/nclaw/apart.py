@@ -12,12 +12,11 @@ import numpy as np
 
 from ..core.grid_adjoint import Update, update_bars
 from ..core.jit import kernel, parallel, prange
-from ..core.lever import MlsForm
 from ..core.spline import STENCILS, base_of
 from ..core.state import NO_HISTORY, NONE, Grid, Particles
-from ..core.stencil import inverse_inertia
 from ..core.tensor import identity, mat, mlin, mm, put_mat, transpose
-from ..core.transfer_adjoint import Moved, gather_bars, scatter_bars
+from ..core.transfer_adjoint import Moved
+from ..core.transfer_adjoint_mls3 import gather_bars_mls3, scatter_bars_mls3
 from ..core.transfer_mls3 import gather_mls3, scatter_mls3
 
 QUADRATIC = STENCILS[2]
@@ -53,6 +52,9 @@ class States(NamedTuple):
     tau: np.ndarray = UNKNOWN   # (b, n, 3, 3) [Pa]
 
 
+ROWS = States((3,), (3,), (3, 3), (3, 3), (3, 3))       # shapes of one particle's
+
+
 class Nodes(NamedTuple):
     """Storage of a grid for each of b bodies, flat, and of its bars; reused from step to step."""
 
@@ -74,6 +76,9 @@ def world(problem):
         raise ValueError(f"{problem.title!r}: expected a box of walls of kind \"separate\" without "
                          "friction and a clip, nothing else")
     q = problem.bodies[0].particles
+    if q.b.ndim > 1:
+        raise ValueError(f"{problem.title!r}: expected no body force but gravity; its particles "
+                         "have one each")
     return World(problem.dx, problem.clock.dt, np.asarray(problem.gravity, float), scheme.mass_eps,
                  np.array(walls.low), np.array(walls.high), np.asarray(clip[0], float),
                  np.asarray(clip[1], float), q.m, q.V0)
@@ -87,26 +92,58 @@ def boxed(walls):
 
 def nodes(of, count):
     """`Nodes` for so many bodies in a `World`."""
-    cells = np.ceil((of.upper - of.lower) / of.dx) + len(QUADRATIC)
-    most = int(np.prod(cells))
-    return Nodes(*(np.empty((count, k * most)) for k in (1, 3, 1, 3)))
+    return Nodes(*(np.empty((count, k * most_nodes(of))) for k in (1, 3, 1, 3)))
+
+
+def most_nodes(of):
+    """How many nodes a body can reach."""
+    return int(np.prod(np.ceil((of.upper - of.lower) / of.dx) + len(QUADRATIC)))
 
 
 def advance(of, before, on):
     """`States` after a step; F is (I + dt C) F. Raises ValueError for positions that are not finite
-    or beyond the clip.
+    or beyond the clip, and for arrays of other shapes than the world's.
     """
-    require_inside(of, before.x)
+    require_fit(of, on, before)
     after = States(*(np.empty_like(a) for a in before[:4]))
     _advance(of, before, after, on)
     return after
 
 
 def pull_back(of, before, after, bars, on):
-    """The gradients before a step from those after it, `States` both."""
+    """The gradients before a step from those after it, `States` both. Raises as `advance` does."""
+    require_fit(of, on, before, after, bars)
     found = States(*(np.empty_like(a) for a in before))
     _pull_back(of, before, after, bars, found, on)
     return found
+
+
+def require_fit(of, on, before, *beside):
+    """Raise ValueError where kernels would read or write beside arrays: those of `States` before a
+    step, of what is carried after it or its gradients (`beside`), and of `Nodes`.
+    """
+    require_shapes(of, before, len(before.x))
+    for states in beside:
+        require_shapes(of, states[:4], len(before.x))
+    require_nodes(of, on, len(before.x))
+    require_inside(of, before.x)
+
+
+def require_shapes(of, arrays, bodies):
+    """Raise ValueError unless arrays in the order of `States` are of so many bodies."""
+    for name, a, row in zip(States._fields, arrays, ROWS):
+        expected = (bodies, len(of.m), *row)
+        if a.shape != expected:
+            raise ValueError(f"{name} has shape {a.shape}, expected {expected}: bodies, particles "
+                             "of each, axes; is it of another body, or left out?")
+
+
+def require_nodes(of, on, bodies):
+    """Raise ValueError unless `Nodes` hold so many bodies of a `World`."""
+    most = most_nodes(of)
+    if len(on.m) < bodies or on.m.shape[1] < most:
+        raise ValueError(f"storage for {len(on.m)} bodies of {on.m.shape[1]} nodes, expected at "
+                         f"least {bodies} of {most}; make it with `nodes` of this world")
 
 
 def require_inside(of, x):
@@ -155,20 +192,19 @@ def scatter_velocities(of, particles, grid):
 @kernel
 def stop_at_walls(of, grid, held):
     """Zero, in an array like the velocities, those that go into walls."""
-    nx, ny, nz = grid.m.shape
-    for i in range(nx):
-        for j in range(ny):
-            for k in range(nz):
-                stop(of, 0, grid.origin[0] + i, grid.v[i, j, k], held[i, j, k])
-                stop(of, 1, grid.origin[1] + j, grid.v[i, j, k], held[i, j, k])
-                stop(of, 2, grid.origin[2] + k, grid.v[i, j, k], held[i, j, k])
+    for a in range(3):
+        stop_along(a, of.low[a] - grid.origin[a], of.high[a] - grid.origin[a], grid.v, held)
 
 
 @kernel
-def stop(of, a, index, v, held):
-    """Zero held[a] where v[a] goes into a wall across axis a."""
-    if (index < of.low[a] and v[a] < 0.0) or (index > of.high[a] and v[a] > 0.0):
-        held[a] = 0.0
+def stop_along(a, low, high, v, held):
+    """Zero, of nodes below low or above high along axis a, what moves on that way."""
+    for i in range(v.shape[0]):
+        for j in range(v.shape[1]):
+            for k in range(v.shape[2]):
+                index = i if a == 0 else j if a == 1 else k
+                if (index < low and v[i, j, k, a] < 0.0) or (index > high and v[i, j, k, a] > 0.0):
+                    held[i, j, k, a] = 0.0
 
 
 @kernel
@@ -209,11 +245,10 @@ def pull_back_one(of, before, after, bars, found, where):
     free = grid.v.copy()
     stop_at_walls(of, grid, free)
     stopped = Grid(grid.m, free, NONE, NONE, grid.origin, of.dx)
-    scatter_bars(Moved(particles.x, u), stopped, mine, bar, QUADRATIC, np.arange(len(of.m)))
+    scatter_bars_mls3(Moved(particles.x, u), stopped, mine, bar, QUADRATIC, np.arange(len(of.m)))
     stop_at_walls(of, grid, bar.v)
     update_one(of, grid, bar)
-    form = MlsForm(of.dt, inverse_inertia(of.dx, QUADRATIC))
-    gather_bars(particles, bar, mine, QUADRATIC, form, (0, len(of.m)))
+    gather_bars_mls3(particles, bar, mine, QUADRATIC, of.dt, (0, len(of.m)))
 
 
 @kernel

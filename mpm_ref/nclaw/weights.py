@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import materials
-from ..sealed import about_of, opened, sealed, write_whole
+from ..sealed import about_of, opened, require_format, sealed, write_whole
 from . import principal, response, spline
 from .invariants import count
 
@@ -78,9 +78,7 @@ def save(path, laws):
 def load(path):
     """Read what `save` wrote. Raises ValueError saying what is wrong with the file."""
     arrays = opened(Path(path))
-    if arrays.get("format") != FORMAT:
-        raise ValueError(f"{path} has format {arrays.get('format')}, this program reads {FORMAT}; "
-                         "use the version that wrote it, or train again")
+    require_format(path, arrays, FORMAT)
     fault = fault_of(arrays)
     if fault:
         raise ValueError(f"{path} holds no trained laws: {fault}; train again")

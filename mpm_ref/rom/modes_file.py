@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..sealed import about_of, opened, sealed, write_whole
+from ..sealed import about_of, format_of, opened, sealed, write_whole
 from .curved import Curved
 from .modes import Modes
 from .weights import Model
@@ -34,7 +34,7 @@ def save(path, model):
 def load(path):
     """Read what `save` wrote. Raises ValueError saying what is wrong with the file."""
     arrays = opened(Path(path))
-    if not is_one(arrays) or arrays.get("format") != FORMAT:
+    if not is_one(arrays) or format_of(arrays) != FORMAT:
         raise ValueError(f"{path} holds no modes of format {FORMAT}; make them again")
     kind = str(arrays["kind"])
     fault = fault_of(kind, arrays)

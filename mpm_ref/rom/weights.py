@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..sealed import about_of, opened, sealed, write_whole
+from ..sealed import about_of, opened, require_format, sealed, write_whole
 from .decoder import Decoder, Units
 from .network import Network, layers_of, network
 
@@ -39,9 +39,7 @@ def save(path, model):
 def load(path):
     """Read what `save` wrote. Raises ValueError saying what is wrong with the file."""
     arrays = opened(Path(path))
-    if arrays.get("format") != FORMAT:
-        raise ValueError(f"{path} has format {arrays.get('format')}, this program reads {FORMAT}; "
-                         "use the version that wrote it, or train again")
+    require_format(path, arrays, FORMAT)
     fault = fault_of(arrays)
     if fault:
         raise ValueError(f"{path} holds no trained map: {fault}; train again")

@@ -8,20 +8,19 @@
 """
 
 import torch
-from torch import nn
 
 from ..invariants import count
 from ..weights import Trained
 from .functions import Answer, Invariants
+from .kinds import LawOfKind
 from .perceptron import HIDDEN, Perceptron, layers_of
 
 
-class PlainLaw(nn.Module):
+class PlainLaw(LawOfKind):
     """F (n, d, d) -> answers (n, d, d) of `PlainStress` or `PlainCorrection`."""
 
     def __init__(self, kind, dim=3, hidden=HIDDEN):
-        super().__init__()
-        self.kind = kind
+        super().__init__(kind)
         self.net = Perceptron(dim * dim, dim * dim, hidden)
 
     def forward(self, F):
@@ -34,12 +33,11 @@ class PlainLaw(nn.Module):
         return Trained(tuple(layers_of(self.net)), self.kind)
 
 
-class UnshiftedLaw(nn.Module):
+class UnshiftedLaw(LawOfKind):
     """F (n, d, d) -> answers (n, d, d) of a kind of `response`, not zero at rest."""
 
     def __init__(self, kind, dim=3, hidden=HIDDEN):
-        super().__init__()
-        self.kind = kind
+        super().__init__(kind)
         self.net = Perceptron(count(dim), dim * dim, hidden, bias=True)
         one = torch.ones(dim)
         self.rest = torch.cat([one, torch.eye(dim).flatten(), one[:1]])

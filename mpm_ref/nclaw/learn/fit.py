@@ -8,17 +8,17 @@ import hashlib
 import io
 import json
 from dataclasses import asdict
-from pathlib import Path
 from typing import NamedTuple
 
 import torch
 
+from ... import checkpoints
 from ...cost import Cost, Meter
-from ...sealed import SEAL, seal, write_whole
+from .kinds import described
 from .rollout import squared
 
 SAVE = 5            # epochs between checkpoints
-FORMAT = 1          # of checkpoints
+FORMAT = 2          # of checkpoints
 
 
 class Epoch(NamedTuple):
@@ -51,8 +51,12 @@ class Session:
 
     @property
     def named(self):
-        """The training's settings, and what it is trained on, as one line of text."""
-        return json.dumps({"format": FORMAT, **asdict(self.recipe), "data": self.of})
+        """The training's settings, what is trained and on what, as one line of text; without the
+        size of a batch, with which only time and round-off change.
+        """
+        settings = {name: value for name, value in asdict(self.recipe).items() if name != "batch"}
+        return json.dumps({"format": FORMAT, **settings, "laws": [*map(described, self.laws)],
+                           "data": self.of})
 
     def epoch(self):
         """The trajectory once, in segments, and a step of each optimiser."""
@@ -99,24 +103,18 @@ class Session:
                     "cost": tuple(self.meter.total),
                     **{name: [one.state_dict() for one in having] for name, having in
                        self.stateful().items()}}, content)
-        write_whole(path, content.getvalue() + seal(content.getvalue()))
+        checkpoints.write(path, content.getvalue())
 
     def stateful(self):
         """What a checkpoint keeps the states of."""
         return {"laws": self.laws, "optimisers": self.optimisers, "schedules": self.schedules}
 
     def load(self, path):
-        """Go on from a checkpoint. Raises ValueError where it is damaged, or of another training or
-        other data.
+        """Go on from a checkpoint. Raises ValueError where it is damaged, or of another training,
+        other laws or other data.
         """
-        content = path.read_bytes()
-        if seal(content[:-SEAL]) != content[-SEAL:]:
-            raise ValueError(f"{path} is damaged or no checkpoint: its checksum does not fit; "
-                             "remove it to train from the start")
-        kept = torch.load(io.BytesIO(content[:-SEAL]), weights_only=True)
-        if kept["training"] != self.named:
-            raise ValueError(f"{path} is a checkpoint of the training {kept['training']}, not of "
-                             f"{self.named}; remove it or give another folder")
+        kept = torch.load(io.BytesIO(checkpoints.read(path)), weights_only=True)
+        checkpoints.require_same(path, kept["training"], self.named)
         for name, having in self.stateful().items():
             for one, state in zip(having, kept[name], strict=True):
                 one.load_state_dict(state)
@@ -141,15 +139,4 @@ def train(recipe, laws, world, observed, checkpoint=None, on_epoch=None):
     Raises `Diverged`, with the epoch and the steps.
     """
     session = Session(recipe, laws, world, observed)
-    path = None if checkpoint is None else Path(checkpoint)
-    if path is not None and not path.parent.is_dir():
-        raise ValueError(f"{path}: there is no folder {path.parent}; create it or name another one")
-    if path is not None and path.exists():
-        session.load(path)
-    while len(session.history) < recipe.epochs:
-        session.epoch()
-        if path is not None and len(session.history) % SAVE == 0:
-            session.save(path)
-        if on_epoch is not None:
-            on_epoch(session.history)
-    return session
+    return checkpoints.finished(session, recipe.epochs, SAVE, checkpoint, on_epoch)

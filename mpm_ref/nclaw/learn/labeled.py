@@ -11,9 +11,10 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
+from ...checkpoints import finished
 from ...core import deform
 from ...materials import NoFlow
-from .fit import Diverged, Epoch, Session
+from .fit import SAVE, Diverged, Epoch, Session
 from .sysid import axes, particles
 
 BATCH = 1000        # pairs
@@ -70,13 +71,9 @@ class LabeledSession(Session):
         return [loss.item() for loss in losses], steepness
 
 
-def train_labeled(recipe, laws, world, labels, on_epoch=None):
-    """Train `rollout.Laws` in place on `Labels` of a `World`; returns the session. `loss` of its
-    epochs is the mean squared error of tau [Pa^2], `error` that of F.
+def train_labeled(recipe, laws, world, labels, checkpoint=None, on_epoch=None):
+    """As `fit.train`, on `Labels` of a `World`. `loss` of epochs is the mean squared error of tau
+    [Pa^2], `error` that of F.
     """
     session = LabeledSession(recipe, laws, world, labels)
-    while len(session.history) < recipe.epochs:
-        session.epoch()
-        if on_epoch is not None:
-            on_epoch(session.history)
-    return session
+    return finished(session, recipe.epochs, SAVE, checkpoint, on_epoch)

@@ -1,21 +1,20 @@
 """A neural law as it is trained: invariants, a network, an answer."""
 
 import torch
-from torch import nn
 
 from ..invariants import count
 from ..weights import Trained
 from .functions import Answer, Invariants
+from .kinds import LawOfKind
 from .perceptron import HIDDEN, Perceptron, layers_of
 from .rollout import Laws
 
 
-class NeuralLaw(nn.Module):
+class NeuralLaw(LawOfKind):
     """F (n, d, d) -> answers (n, d, d) of a kind of `response` (NCLAW-alg4)."""
 
     def __init__(self, kind, dim=3, hidden=HIDDEN):
-        super().__init__()
-        self.kind = kind
+        super().__init__(kind)
         self.net = Perceptron(count(dim), dim * dim, hidden)
 
     def forward(self, F):

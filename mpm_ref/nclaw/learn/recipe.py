@@ -16,7 +16,8 @@ class Recipe:
     loss of the authors' "release" is the sum over steps of mean squared errors [m^2] times `scale`
     times segments over steps: not printed, and part of the recipe, since gradients are small beside
     the 1e-8 that Adam adds to their size. The "printed" one is the mean over steps, in m^2.
-    `batch` segments run side by side, which changes nothing but time.
+    `batch` segments run side by side, which changes nothing but time and round-off. `seed` is that
+    of the laws' start, and of the order of pairs (see `labeled`).
     """
 
     epochs: int = 300

@@ -53,15 +53,14 @@ def step(laws, world, state, on):
 
 def squared(laws, world, observed, starts, ends):
     """Mean squared errors of positions [m^2], over particles and axes, summed over the steps of
-    segments from time levels `starts` to `ends`.
+    segments from time levels `starts` to later ones, `ends`. Those that have ended go no further.
     """
-    levels, total = torch.tensor(starts), 0.0
-    last, on = torch.tensor(ends), nodes(world, len(starts))
-    state = observed.at(levels)
-    for _ in range(max(end - start for start, end in zip(starts, ends, strict=True))):
-        state = step(laws, world, state, on)
-        levels = levels + 1
-        within = levels <= last
-        off = (state[0] - observed.x[torch.minimum(levels, last)]) ** 2
-        total = total + (off.mean(dim=(1, 2)) * within).sum()
+    levels, last, total = torch.tensor(starts), torch.tensor(ends), 0.0
+    state, on = observed.at(levels), nodes(world, len(starts))
+    while len(levels):
+        state, levels = step(laws, world, state, on), levels + 1
+        total = total + ((state[0] - observed.x[levels]) ** 2).mean(dim=(1, 2)).sum()
+        under_way = levels < last
+        if not under_way.all():
+            levels, last, *state = (a[under_way] for a in (levels, last, *state))
     return total

@@ -15,6 +15,7 @@ from torch.autograd import Function
 from .. import principal
 from ..invariants import spectrum
 from ..weights import Trained
+from .kinds import LawOfKind
 from .perceptron import Perceptron, layers_of
 
 HIDDEN = (6, 6)
@@ -53,12 +54,8 @@ class PrincipalStress(Function):
         return *map(torch.from_numpy, found), None, None
 
 
-class PrincipalLaw(nn.Module):
+class PrincipalLaw(LawOfKind):
     """F (n, d, d) -> tau (n, d, d) [Pa]; `y` is in units of `kind.unit`, and isotropic."""
-
-    def __init__(self, kind):
-        super().__init__()
-        self.kind = kind
 
     def forward(self, F):
         """tau."""

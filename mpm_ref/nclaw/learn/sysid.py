@@ -88,6 +88,10 @@ class KnownStress(nn.Module):
         self.law, self.unit = type(unit), torch.tensor([*unit], dtype=torch.float64)
         self.log_E = nn.Parameter(torch.tensor(log_E, dtype=torch.float64))
 
+    def extra_repr(self):
+        """The law for E = 1 Pa."""
+        return repr(self.law(*self.unit.tolist()))
+
     def moduli(self):
         """Constants of the law [Pa]."""
         return self.log_E.exp() * self.unit
@@ -112,6 +116,10 @@ class KnownReturn(nn.Module):
         self.moduli, self.of = elastic.moduli, (elastic.law, type(flow))
         row = torch.tensor([*flow], dtype=torch.float64)
         self.log_own, self.fixed = nn.Parameter(row[:1].log()), row[1:]
+
+    def extra_repr(self):
+        """The flow, and those of its constants that are not learned."""
+        return f"{self.of[1].__name__}, {self.fixed.tolist()}"
 
     def constants(self):
         """Those of the flow."""

@@ -12,7 +12,7 @@ import numpy as np
 
 
 class Teacher(NamedTuple):
-    """Horizons [steps] at the first epoch and after the last."""
+    """Horizons [steps], at least 1, at the first epoch and after the last."""
 
     first: int = 25
     last: int = 200
@@ -24,6 +24,6 @@ class Teacher(NamedTuple):
 
     def restarts(self, steps, epoch, epochs):
         """First steps of the segments, and as the last entry the number of steps."""
-        count = min(ceil(steps / self.horizon(epoch, epochs)), steps)
+        count = ceil(steps / self.horizon(epoch, epochs))
         part = np.floor(np.linspace(0.0, count, steps, endpoint=False))
         return [0, *(1 + np.flatnonzero(np.diff(part))).tolist(), steps]

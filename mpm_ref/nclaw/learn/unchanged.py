@@ -1,19 +1,17 @@
 """No return map: the plastic law of baselines that know elasticity alone (NCLAW-eq13)."""
 
-from torch import nn
-
 from ...materials import NoFlow
 from ..weights import Trained
+from .kinds import LawOfKind
 
 NO_FLOW = NoFlow()
 
 
-class Unchanged(nn.Module):
+class Unchanged(LawOfKind):
     """F (n, d, d) as it is; nothing is learned."""
 
     def __init__(self, kind=NO_FLOW):
-        super().__init__()
-        self.kind = kind
+        super().__init__(kind)
 
     def forward(self, F):
         """F."""

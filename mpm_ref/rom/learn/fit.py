@@ -10,14 +10,13 @@ import io
 import json
 from dataclasses import asdict, dataclass
 from math import cos, pi
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import torch
 
+from ... import checkpoints
 from ...cost import Cost, Meter
-from ...sealed import SEAL, seal, write_whole
 from ..architecture import HIDDEN
 from ..modes import basis
 from ..snapshots import units
@@ -147,20 +146,14 @@ class Session:
                     "encoder": self.encoder.state_dict(), "random": self.random.get_state(),
                     "optimiser": self.optimiser.state_dict(), "history": self.history,
                     "cost": tuple(self.meter.total)}, content)
-        write_whole(path, content.getvalue() + seal(content.getvalue()))
+        checkpoints.write(path, content.getvalue())
 
     def load(self, path):
         """Go on from a checkpoint. Raises ValueError where it is damaged, or of another training
         or other data.
         """
-        content = path.read_bytes()
-        if seal(content[:-SEAL]) != content[-SEAL:]:
-            raise ValueError(f"{path} is damaged or no checkpoint: its checksum does not fit; "
-                             "remove it to train from the start")
-        kept = torch.load(io.BytesIO(content[:-SEAL]), weights_only=True)
-        if kept["training"] != self.named:
-            raise ValueError(f"{path} is a checkpoint of the training {kept['training']}, not of "
-                             f"{self.named}; remove it or give another folder")
+        kept = torch.load(io.BytesIO(checkpoints.read(path)), weights_only=True)
+        checkpoints.require_same(path, kept["training"], self.named)
         self.f.load_state_dict(kept["f"])
         self.encoder.load_state_dict(kept["encoder"])
         self.optimiser.load_state_dict(kept["optimiser"])
@@ -200,15 +193,5 @@ def train(training, snapshots, checkpoint=None, on_epoch=None):
     checkpoint: a file to go on from and to save to; on_epoch(history) is called after each epoch.
     """
     session = Session(training, snapshots)
-    path = None if checkpoint is None else Path(checkpoint)
-    if path is not None and not path.parent.is_dir():
-        raise ValueError(f"{path}: there is no folder {path.parent}; create it or name another one")
-    if path is not None and path.exists():
-        session.load(path)
-    while len(session.history) < training.epochs:
-        session.epoch()
-        if path is not None and len(session.history) % SAVE == 0:
-            session.save(path)
-        if on_epoch is not None:
-            on_epoch(session.history)
-    return session.result(len(snapshots.x))
+    return checkpoints.finished(session, training.epochs, SAVE, checkpoint, on_epoch).result(
+        len(snapshots.x))
