@@ -9,7 +9,11 @@ from small_studies import CURVED, STEPS, ended, write
 
 from mpm_ref.cli.shipped import shipped_studies
 from mpm_ref.reduced import maps
+from mpm_ref.reduced.generate import FIELDS, FINISHED, Done
 from mpm_ref.reduced.study import load
+from mpm_ref.scene import build
+from mpm_ref.store import Fields
+from mpm_ref.store.running import Options, run
 
 ONE = ("--workers", 1)
 
@@ -19,7 +23,8 @@ def made(tmp_path_factory):
     """Folder with a study, its runs and its map, made by the two commands."""
     folder = tmp_path_factory.mktemp("made")
     study = write(folder)
-    for arguments, said in ((("generate", study, "--out", folder / "data", *ONE), "0 of them"),
+    for arguments, said in ((("generate", study, "--out", folder / "data", *ONE),
+                             "made 4, continued 0, 0 were there; 1 held out"),
                             (("train", study, "--data", folder / "data",
                               "--out", folder / "map.npz"), "modes, r = 3, of 3 runs")):
         done = mpm_ref("rom", *arguments)
@@ -34,7 +39,7 @@ def test_what_is_there_is_not_made_again(made):
     before = {file: file.stat().st_mtime_ns for file in (made / "data").iterdir()}
     done = mpm_ref("rom", "generate", made / "bars.toml", "--out", made / "data", *ONE)
     assert done.exit_code == 0
-    assert "4 runs of bars, 4 of them already there; 1 held out" in done.stdout
+    assert "4 runs of bars: made 0, continued 0, 4 were there; 1 held out" in done.stdout
     assert {file: file.stat().st_mtime_ns for file in (made / "data").iterdir()} == before
 
 
@@ -76,12 +81,32 @@ def test_a_study_that_does_not_exist_is_told_with_those_that_do():
     assert_told(mpm_ref("rom", "generate", "none"), 2, "no such file", *shipped_studies())
 
 
-def test_ctrl_c_leaves_finished_runs(made, tmp_path, monkeypatch):
+def test_ctrl_c_says_how_far_it_is_and_how_to_go_on(made, tmp_path, monkeypatch):
     def interrupted(*_):
+        yield Done(0, FINISHED)
         raise KeyboardInterrupt
     monkeypatch.setattr("mpm_ref.cli.rom_make.generate", interrupted)
     done = mpm_ref("rom", "generate", made / "bars.toml", "--out", tmp_path, *ONE)
-    assert_told(done, 130, "interrupted")
+    assert_told(done, 130, "interrupted after 1 of 4 runs; the same command again goes on")
+
+
+def test_a_run_that_was_cut_off_counts_as_continued(made, tmp_path):
+    study = write(tmp_path)
+    shutil.copy(made / "data" / "case-000.h5", tmp_path)
+    bars = load(study)
+    run(build(bars.scene(bars.mu[1])), tmp_path / "case-001.h5",
+        Options(steps=3, fields=Fields(FIELDS)))
+    done = mpm_ref("rom", "generate", study, "--out", tmp_path, *ONE)
+    assert "made 2, continued 1, 1 were there; 1 held out" in done.stdout
+
+
+@pytest.mark.parametrize("edits", [
+    (("test = 1", 'test = 1\nsampling = "latin"'),),
+    (("test = 1", 'test = 1\nsampling = "latin"\ncount = 4'),),
+])
+def test_a_count_in_the_wrong_place_is_told_where_it_belongs(tmp_path, edits):
+    done = mpm_ref("rom", "generate", write(tmp_path, *edits))
+    assert_told(done, 2, "`count = N`", "beside `sampling`")
 
 
 # train
@@ -105,6 +130,19 @@ def test_damaged_data_are_told(made, tmp_path):
     done = mpm_ref("rom", "train", made / "bars.toml", "--data", tmp_path / "data",
                    "--out", tmp_path / "map.npz")
     assert_told(done, 2, file.name, "F of body 'bar' is damaged")
+
+
+@pytest.mark.parametrize("saved", [False, True])
+def test_ctrl_c_in_a_training_says_how_to_go_on(made, tmp_path, monkeypatch, saved):
+    def interrupted(study, snapshots, about, checkpoint, threads):
+        if saved:
+            checkpoint.write_bytes(b"x")
+        raise KeyboardInterrupt
+    monkeypatch.setattr("mpm_ref.cli.rom_make.fitted", interrupted)
+    done = mpm_ref("rom", "train", made / "bars.toml", "--data", made / "data",
+                   "--out", tmp_path / "map.npz")
+    assert_told(done, 130, f"goes on from {tmp_path / 'map.pt'}" if saved else
+                "before there was a checkpoint; the same command again begins anew")
 
 
 @pytest.mark.parametrize(("options", "status", "words"), [

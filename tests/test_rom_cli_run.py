@@ -8,7 +8,7 @@ import pytest
 from command_line import assert_told, mpm_ref
 from small_studies import CURVED, STEPS, ended, modelled, write
 
-from mpm_ref.reduced import maps
+from mpm_ref.reduced import maps, told
 from mpm_ref.reduced.case import case
 from mpm_ref.reduced.march import Way, march
 from mpm_ref.reduced.record import COUNTS, NUMBERS, VECTORS
@@ -95,11 +95,17 @@ def test_a_body_is_shown_at_more_points_than_it_was_trained_with(made, reduced, 
 
 
 def test_a_run_beyond_the_training_is_warned_of(reduced):
-    done, _ = reduced("--set", "g=9")
+    done, out = reduced("--set", "g=9")
     assert done.exit_code == 0
     outside, beyond = done.stderr.splitlines()
     assert outside.startswith("mpm-ref: warning: g = 9 lies outside the range")
-    assert f"of {STEPS} steps, from step" in beyond
+    with Results(out) as results:
+        found = told.told(results)
+        t = results.time[STEPS + 1 - found["out_of_bounds"]]
+    assert f"{found['out_of_bounds']} of {STEPS + 1} states, from t = {t:g} s on" in beyond
+    assert (f"reduced: bars, modes r = 3, g = 9; {found['out_of_bounds']} of {STEPS + 1} states "
+            "out of bounds") in mpm_ref("info", out).stdout.splitlines()
+    assert json.loads(mpm_ref("info", out, "--json").stdout)["reduced"] == found
     assert "times as far from the training runs" in beyond
 
 
@@ -125,6 +131,8 @@ def test_a_run_is_told_to_machines_too(made, reduced):
     assert found["reduced"]["parameters"] == {"g": 9.0}
     assert found["reduced"]["map"] == {"kind": "modes", "r": 3}
     assert "beyond" in found["out_of_bounds"][str(STEPS)]
+    with Results(out) as results:
+        assert told.told(results)["out_of_bounds"] == len(found["out_of_bounds"])
 
 
 def test_a_curved_map_runs_and_is_evaluated(made, reduced, tmp_path):
@@ -148,7 +156,11 @@ def test_a_curved_map_runs_and_is_evaluated(made, reduced, tmp_path):
 @pytest.mark.parametrize(("options", "status", "words"), [
     ((), 2, "add --set g=VALUE"),
     (("--set", "h=1"), 2, "one of the study's parameters g"),
-    (("--set", "g=2", "--map", "none.npz"), 2, "none.npz cannot be read"),
+    (("--set", "g"), 2, "g: expected NAME=VALUE"),
+    (("--set", "g=3", "--set", "g = 4"), 2, "--set g is given twice, g=3 and g=4"),
+    (("--set", "g = x"), 2, "g=x: expected a finite number"),
+    (("--set", "g=2", "--map", "none.npz"), 2, "there is no none.npz: mpm-ref rom train "),
+    (("--set", "g=2", "--map", "none.npz"), 2, "bars.toml --out none.npz"),
     (("--set", "g=2", "--out", "no/run.h5"), 4, "there is no folder"),
     (("--set", "g=2", "--out", "run.toml"), 2, "scenes have such names"),
 ])
@@ -227,7 +239,7 @@ def test_the_table_has_a_row_for_each_run_and_one_for_all(made, tmp_path):
 @pytest.mark.parametrize(("options", "words"), [
     (("--out", "errors.txt"), "ends in .png or .pdf or .svg"),
     (("--data", "none"), "none lacks 1 of 1 runs"),
-    (("--map", "none.npz"), "none.npz cannot be read"),
+    (("--map", "none.npz"), "there is no none.npz: mpm-ref rom train "),
 ])
 def test_what_cannot_be_evaluated_is_said(made, options, words):
     assert_told(evaluate(made, *options), 2, words)

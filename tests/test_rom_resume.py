@@ -41,7 +41,7 @@ def reduced(made, tmp_path):
 @pytest.fixture
 def cut(reduced, monkeypatch):
     """A function that interrupts such a run while it writes a frame."""
-    def run(name, step, **how):
+    def run(name, step, *options, **how):
         show = record._show
 
         def interrupted(writer, state, problem):
@@ -52,7 +52,7 @@ def cut(reduced, monkeypatch):
 
         with monkeypatch.context() as patch:
             patch.setattr(record, "_show", interrupted)
-            return reduced(name, **how)
+            return reduced(name, *options, **how)
     return run
 
 
@@ -81,7 +81,8 @@ def test_a_run_that_was_cut_off_twice_is_the_whole_one(reduced, cut, tmp_path, w
     whole = reduced("whole.h5", "--json", way=way)
     assert whole.exit_code == 0, whole.output
     for step in (4, 6):
-        assert_told_last(cut("cut.h5", step, way=way), "interrupted")
+        assert_told_last(cut("cut.h5", step, way=way),
+                         f"interrupted at step {step - 1} of {STEPS}; the same command again goes")
         assert ended(tmp_path / "cut.h5") == ("interrupted", step)
     done = reduced("cut.h5", "--json", way=way)
     assert done.exit_code == 0, done.output
@@ -94,6 +95,13 @@ def test_a_run_that_was_cut_off_twice_is_the_whole_one(reduced, cut, tmp_path, w
     assert min(map(int, found)) < 6             # one of those that were known
     assert done.stderr == whole.stderr
     assert_told_last(reduced("cut.h5", way=way), "exists: add --overwrite")
+
+
+def test_a_run_that_replaced_another_goes_on_without_the_option(reduced, cut):
+    assert reduced("run.h5").exit_code == 0
+    assert_told_last(cut("run.h5", 3, "--overwrite"),
+                     "at step 2 of 8; the same command without --overwrite goes on")
+    assert reduced("run.h5").exit_code == 0
 
 
 def assert_told_last(done, words):

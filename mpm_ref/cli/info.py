@@ -4,6 +4,7 @@ import json
 from math import isfinite
 
 from ..placement import misplaced
+from ..reduced import told
 from ..store import manifest
 from ..store.atomic import in_words
 from ..store.manifest import scene_hash
@@ -70,6 +71,7 @@ def of_results(path):
             "energy": dict(zip(ENERGIES, results.energy[-1].tolist(), strict=True)) if n else None,
             "checkpoint": str(checkpoint_of(path)) if checkpoint_of(path).exists() else None,
             "manifest": results.manifest,
+            "reduced": told.told(results),
             "warnings": unsolved(manifest.unsolved(results.manifest)),
         }
 
@@ -131,6 +133,8 @@ def results_lines(facts):
                      f"{counted(facts['steps'], 'step')}; at the end: {energies}")
     else:
         lines.append("no frame yet")
+    if facts["reduced"]:
+        lines.append(told.line(facts["reduced"]))
     lines += [f"part: steps {part['first_step']} to {part['last_step']}, {part['wall_s']} s, "
               f"{in_words(part['peak_bytes'])}, state sha256 {part['state_sha256'][:12]}: "
               f"{part['why']}" for part in facts["manifest"].get("parts", [])]

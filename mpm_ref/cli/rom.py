@@ -23,7 +23,17 @@ from . import faults, rom_make
 from .faults import end, options
 from .info import as_json
 from .look import Machine
-from .rom_options import Data, MapFile, Overwrite, StudyName, at_work, named
+from .rom_options import (
+    Data,
+    MapFile,
+    Overwrite,
+    StudyName,
+    assigned,
+    at_work,
+    map_of,
+    named,
+    on_interrupt,
+)
 from .shipped import keep_scene
 from .terminal import passing, warn
 
@@ -53,25 +63,40 @@ def run(
     2 bad input, 3 the run broke down, 4 a file could not be written, 130 Ctrl-C.
     """
     with at_work(name) as study:
-        out, file = named(out, study, ".h5"), named(map, study, ".npz")
+        out = named(out, study, ".h5")
         with options():
             keep_scene(study.path, out)
-            mu = study.given(values or [])
-            made = recording(study, maps.load(file, study), mu, points_out)
+            mu = study.given(assigned(values or []))
+            file, model = map_of(name, study, map)
+            made = recording(study, model, mu, points_out)
             made.facts["map_sha256"] = maps.sha256(file)
             require_place(out)
             before = begun(made, out, overwrite)
         warn([*study.outside(mu), *changed(before)])
-        steps = made.problem.clock.steps
-        try:
-            with passing(total=steps, unit="step", desc=str(out)) as bar:
-                out_of_bounds = record(made, out, before.known, lambda k: bar.update(k - bar.n))
-        except Lost as fault:
-            end(fault, faults.UNSTABLE)
-        warn(astray(out_of_bounds, steps))
+        out_of_bounds = recorded(made, out, before.known, overwrite)
+        clock = made.problem.clock
+        warn(astray(out_of_bounds, clock.steps + 1, clock.dt))
         print(as_json(ran(made, out, out_of_bounds)) if json else
-              f"{FINISHED}: {counted(steps, 'step')} of {kind_of(made.model)}, r = "
-              f"{made.model.decoder.r}, {len(made.field.X)} points in {out}")
+              f"{FINISHED}: {counted(clock.steps, 'step')} of {kind_of(model)}, r = "
+              f"{model.decoder.r}, {len(made.field.X)} points in {out}")
+
+
+def recorded(made, out, known, overwrite):
+    """Make a `Recording`, with a bar of steps; {step: `Sight`} of those out of bounds."""
+    at, steps = max(len(known) - 1, 0), made.problem.clock.steps
+    again = "the same command without --overwrite" if overwrite else "the same command again"
+
+    def show(k):
+        nonlocal at
+        at = max(at, k)
+        bar.update(k - bar.n)
+
+    try:
+        with (on_interrupt(lambda: f"at step {at} of {steps}; {again} goes on"),
+              passing(total=steps, unit="step", desc=str(out)) as bar):
+            return record(made, out, known, show)
+    except Lost as fault:
+        end(fault, faults.UNSTABLE)
 
 
 def ran(made, out, out_of_bounds):
@@ -89,12 +114,16 @@ def changed(before):
                "Numba: it goes on, but not bit for bit; --overwrite makes it anew")
 
 
-def astray(out_of_bounds, steps):
-    """The warning about a run with {step: `Sight`} out of bounds, of so many steps; or none."""
+def astray(out_of_bounds, states, dt):
+    """The warnings about a run with {step: `Sight`} out of bounds, of so many states dt [s] apart;
+    or none.
+    """
+    if 0 in out_of_bounds:
+        yield "the map does not give the body at rest: train longer, or another kind"
     if out_of_bounds:
         worst = max(out_of_bounds.values(), key=lambda sight: sight.beyond)
-        yield (f"{len(out_of_bounds)} of {steps} steps, from step {min(out_of_bounds)} on, are "
-               f"where the map has learned nothing or cannot follow; at worst {worst.said}")
+        yield (f"{len(out_of_bounds)} of {states} states, from t = {min(out_of_bounds) * dt:.6g} s "
+               f"on, are where the map has learned nothing or cannot follow; at worst {worst.said}")
 
 
 @app.command("evaluate")
@@ -110,15 +139,14 @@ def judge(
     nearest states. Exit status 3 where a reduced run broke down, and a sentence why.
     """
     with at_work(name) as study:
-        file = named(map, study, ".npz")
-        picture = out or file.with_suffix(".errors.png")
+        picture = out or named(map, study, ".npz").with_suffix(".errors.png")
         with options():
             if picture.suffix.lower() not in PICTURES:
                 raise ValueError(f"--out {picture}: expected a name that ends in "
                                  f"{' or '.join(PICTURES)}")
             if not study.test:
                 raise SceneError(f"{study.path}: test = 0: no run is held out to compare with")
-            model = maps.load(file, study)
+            _, model = map_of(name, study, map)
             snapshots = dataset.load(study, named(data, study, "-data"), study.test)
             runs = passing(unit="run", iterable=evaluate(study, model, snapshots),
                            total=len(study.test))

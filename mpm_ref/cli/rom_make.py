@@ -15,7 +15,7 @@ from ..store.atomic import NotWritten, not_written, require_place
 from ..store.words import counted
 from . import faults
 from .faults import end, one_line, options
-from .rom_options import Data, Overwrite, StudyName, named, studied
+from .rom_options import Data, Overwrite, StudyName, named, on_interrupt, studied
 from .shipped import keep_scene
 from .terminal import passing
 
@@ -34,22 +34,30 @@ def make_data(
     """
     with one_line():
         study = studied(name)
-        folder, count = named(out, study, "-data"), {}
+        folder, ended = named(out, study, "-data"), []
         with options():
             case(study.scene(study.mu[0]))      # refuses what reduced runs do not know
         make_folder(folder)
-        with passing(total=len(study.mu), unit="run", desc=str(folder)) as bar:
+        with (on_interrupt(lambda: f"after {len(ended)} of {counted(len(study.mu), 'run')}; the "
+                           "same command again goes on"),
+              passing(total=len(study.mu), unit="run", desc=str(folder)) as bar):
             for done in generate(study, folder, workers or os.cpu_count() or 1):
                 if done.why == INTERRUPTED:
                     raise KeyboardInterrupt
                 if not done.well:
                     bar.close()
                     end(done.said, STATUS.get(done.why, faults.BAD_INPUT))
-                count[done.why] = count.get(done.why, 0) + 1
+                ended.append(done)
                 bar.update()
-        there = count.get(SKIPPED, 0)
-        print(f"{folder}: {counted(len(study.mu), 'run')} of {study.path.stem}, {there} of them "
-              f"already there; {len(study.test)} held out")
+        print(f"{folder}: {counted(len(study.mu), 'run')} of {study.path.stem}: {in_sum(ended)}; "
+              f"{len(study.test)} held out")
+
+
+def in_sum(ended):
+    """How many runs were made, continued, and there before, of a `Done` of each."""
+    there = sum(done.why == SKIPPED for done in ended)
+    continued = sum(done.continued for done in ended)
+    return f"made {len(ended) - there - continued}, continued {continued}, {there} were there"
 
 
 def train(
@@ -69,17 +77,26 @@ def train(
         with options():
             study = with_kind(studied(name), kind)
             out, data = named(out, study, ".npz"), named(data, study, "-data")
+            checkpoint = out.with_suffix(".pt")
             require_map_place(out, study, overwrite)
             if study.tables.map.kind == NETWORK:
                 maps.training()
             snapshots = dataset.load(study, data, study.train)
             about = {"command": f"mpm-ref rom train {name} --data {data} --out {out} "
                                 f"--kind {study.tables.map.kind} --threads {threads}"}
-            model = fitted(study, snapshots, about, out.with_suffix(".pt"), threads)
+            with on_interrupt(lambda: resuming(checkpoint)):
+                model = fitted(study, snapshots, about, checkpoint, threads)
             write(out, model)
-        out.with_suffix(".pt").unlink(missing_ok=True)
+        checkpoint.unlink(missing_ok=True)
         print(f"{out}: {kind_of(model)}, r = {model.decoder.r}, of "
               f"{counted(len(study.train), 'run')} and {len(snapshots.X)} points")
+
+
+def resuming(checkpoint):
+    """How a training goes on that was cut off."""
+    if checkpoint.exists():
+        return f"before the map was made; the same command again goes on from {checkpoint}"
+    return "before there was a checkpoint; the same command again begins anew"
 
 
 def fitted(study, snapshots, about, checkpoint, threads):

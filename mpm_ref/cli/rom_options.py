@@ -6,10 +6,13 @@ from typing import Annotated
 
 import typer
 
+from ..reduced import maps
 from ..reduced.generate import one_thread
 from ..reduced.study import load
-from .faults import one_line
+from ..scene import SceneError
+from .faults import INTERRUPT, end, one_line
 from .shipped import find_study, shipped_scenes
+from .terminal import warn
 
 StudyName = Annotated[str, typer.Argument(metavar="STUDY", help="A TOML file, or a shipped one.")]
 Data = Annotated[Path | None, typer.Option(help="Folder of `generate`, default: STUDY-data.")]
@@ -29,6 +32,51 @@ def at_work(name):
         yield studied(name)
 
 
+@contextmanager
+def on_interrupt(say):
+    """Ctrl-C in this block ends the command; say() tells how far it is, and how to go on."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        end(f"interrupted {say()}", INTERRUPT)
+
+
 def named(path, study, ending):
     """A path as it is given; else named after the study, here."""
     return path or Path(f"{study.path.stem}{ending}")
+
+
+def assigned(texts):
+    """Texts NAME=VALUE without blanks, each name once. Raises SceneError."""
+    found = {}
+    for text in texts:
+        name, sign, value = (part.strip() for part in text.partition("="))
+        if not sign:
+            raise SceneError(f"{text}: expected NAME=VALUE")
+        if name in found:
+            raise SceneError(f"--set {name} is given twice, {found[name]} and {name}={value}: "
+                             "keep one of them")
+        found[name] = f"{name}={value}"
+    return list(found.values())
+
+
+def map_of(name, study, path):
+    """(file, `Model`) of the map of a study by that name: the file given, else the study's own,
+    with a warning where that is of another kind or dimension. Raises ValueError.
+    """
+    file = named(path, study, ".npz")
+    if not file.exists():
+        raise SceneError(f"there is no {file}: mpm-ref rom train {name}"
+                         + (f" --out {path}" if path else ""))
+    model = maps.load(file, study)
+    if path is None:
+        warn(unlike(file, study.tables.map, model))
+    return file, model
+
+
+def unlike(file, asked, model):
+    """The warning about a map of another kind or r than is asked for; or none."""
+    kind, r = model.about["map"]["kind"], model.decoder.r
+    if (kind, r) != (asked.kind, asked.r):
+        yield (f"{file} is {kind}, r = {r}, where the study's [map] says {asked.kind}, r = "
+               f"{asked.r}: train again with --overwrite, or name the map with --map")

@@ -25,7 +25,7 @@ from ..store import BadResults, Fields
 from ..store.atomic import NotWritten
 from ..store.results import Results
 from ..store.running import Options, run
-from ..store.session import FINISHED, Watch
+from ..store.session import FINISHED, Watch, checkpoint_of
 from ..timestep import TooLarge
 
 FIELDS = ("x", "F", "v")
@@ -39,6 +39,7 @@ class Done(NamedTuple):
     number: int
     why: str
     said: str = ""
+    continued: bool = False     # whether from a checkpoint
 
     @property
     def well(self):
@@ -147,6 +148,7 @@ def made(study, folder, k):
         scene = study.scene(study.mu[k])
         if finished(path, scene):
             return Done(k, SKIPPED)
+        continued = checkpoint_of(path).exists()
         outcome = run(build(scene), path, Options(fields=Fields(FIELDS), resume=True), EAR)
     except (Unstable, OutOfRange, TooLarge) as fault:
         return Done(k, UNSTABLE, f"run {k} ({said(study, study.mu[k])}): {fault}")
@@ -154,7 +156,8 @@ def made(study, folder, k):
         return Done(k, NOT_WRITTEN, str(fault))
     except (ValueError, OSError) as fault:
         return Done(k, REFUSED, str(fault))
-    return Done(k, FINISHED if outcome.why == FINISHED else INTERRUPTED)
+    why = FINISHED if outcome.why == FINISHED else INTERRUPTED
+    return Done(k, why, continued=continued)
 
 
 def finished(path, scene):

@@ -42,7 +42,8 @@ def recording(study, model, mu, count=None):
     one = case(scene)
     require_way(one, model, run)
     shown = one.problem if count is None else build(resampled(scene, count))
-    facts = {"study": study.digest, "map": model.about["map"], "points": len(one.X),
+    facts = {"study": study.digest, "name": study.path.stem, "map": model.about["map"],
+             "points": len(one.X),
              "parameters": dict(zip(study.names, map(float, mu), strict=True)),
              "run": msgspec.to_builtins(run)}
     return Recording(one, model, run, watch(one, model.decoder, model.xhat),

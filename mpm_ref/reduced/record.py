@@ -21,7 +21,7 @@ from .watch import Nonsense, Watch, watched, watched_on
 
 VECTORS = {"xhat": "1", "vhat": "1/s"}                          # of the group `reduced`: units
 COUNTS = {"samples": "1", "points": "1", "rank": "1", "lost": "1"}
-NUMBERS = {"residual": "m/s", "beyond": "1", "off": "1", "seen": "1"}
+NUMBERS = {"residual": "m/s", "beyond": "1", "off": "1", "seen": "1", "inverted": "1"}
 BROKEN = (*BREAKDOWNS, Unstable)
 
 

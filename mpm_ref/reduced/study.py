@@ -114,7 +114,7 @@ def parameters(tables):
     for k, one in enumerate(tables.parameter):
         if one.values is not None or one.count is not None:
             raise SceneError(f'parameter[{k}]: expected `from` and `to` alone with sampling = '
-                             f'"{LATIN}"')
+                             f'"{LATIN}"; `count = N` stands beside `sampling`')
     ends = [(one.start, one.stop) for one in tables.parameter]
     return latin(tables.count, ends, np.random.default_rng(tables.seed))
 

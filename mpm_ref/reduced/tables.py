@@ -142,7 +142,9 @@ class Tables(Table):
         one_of("sampling", self.sampling, (GRID, LATIN))
         require_nonlinear(self.map.kind, self.run.projection)
         if (self.count is not None) != (self.sampling == LATIN):
-            raise ValueError(f'count: expected with sampling = "{LATIN}", and only there')
+            hint = (", and only there" if self.count is not None else ": add `count = N` beside "
+                    "`sampling`, take it from [[parameter]]")
+            raise ValueError(f'count: expected with sampling = "{LATIN}"{hint}')
         for name in ("name", "key"):
             texts = [getattr(one, name) for one in self.parameter]
             if len(set(texts)) < len(texts):
