@@ -15,7 +15,7 @@ from torch import nn
 from torch.autograd import Function
 
 from ...core import deform, deform_adjoint
-from ...core.deform_adjoint import DeformBars
+from ...core.deform_adjoint import DeformBars, Step
 from ...core.jit import CHUNKS
 from ...core.state import NO_HISTORY, NONE, Particles
 from ...materials import NoFlow
@@ -54,7 +54,8 @@ class Known(Function):
             deform_adjoint.initial_stress(ctx.F, NO_HISTORY, bars, law, flow, sums)
         else:
             bars = DeformBars(G.copy(), zero, zero.copy(), NO_HISTORY)
-            deform_adjoint.plastic(ctx.F, NO_HISTORY, zero, bars, law, flow, 0.0, sums)
+            at_rest = Step(ctx.F, NO_HISTORY, zero, sums, 0.0)
+            deform_adjoint.plastic(at_rest, bars, law, flow)
         return torch.from_numpy(bars.F), torch.from_numpy(sums.sum(axis=0)), None
 
 
