@@ -48,3 +48,20 @@ def golden(tmp_path_factory):
 def checked(golden, tmp_path):
     """A function that checks arrays against the golden file."""
     return checker(golden, tmp_path / "other.h5")
+
+
+@pytest.fixture
+def one_torch_thread():
+    """PyTorch on one thread."""
+    torch = pytest.importorskip("torch")
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
+
+
+@pytest.fixture
+def double(monkeypatch):
+    """Networks of doubles read doubles."""
+    torch = pytest.importorskip("torch")
+    monkeypatch.setattr(torch.Tensor, "float", torch.Tensor.double)

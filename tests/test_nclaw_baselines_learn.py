@@ -9,7 +9,6 @@ import pytest
 from adjoints import rate
 from scipy.special import erf
 from test_nclaw_invariants import APART, REPEATED, H, built, near_rest
-from test_nclaw_learn import double, one_thread  # noqa: F401
 
 torch = pytest.importorskip("torch")
 
@@ -23,6 +22,8 @@ from mpm_ref.nclaw.learn.stretches import ReleasedStretchLaw, StretchLaw  # noqa
 from validation.nclaw.environments import ENVIRONMENTS  # noqa: E402
 from validation.nclaw.nets import identity, nets  # noqa: E402
 from validation.train_laws import begun  # noqa: E402
+
+pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
 KINDS = {"spline": spline.SplineStress(2.0), "released spline": spline.ReleasedSplineStress(2.0),
          "neural": principal.StretchStress(2.0),

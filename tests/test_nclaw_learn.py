@@ -30,19 +30,7 @@ STEPS = 9
 H = 1e-3 * 0.5 ** np.arange(5)      # of Taylor tests; the smaller, the smaller faults are seen
 STIFF = Stress(1e5), Correction(0.1)        # answers that matter, of weights that begin near one
 
-
-@pytest.fixture(autouse=True)
-def one_thread():
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
-
-
-@pytest.fixture
-def double(monkeypatch):
-    """Networks of doubles read doubles."""
-    monkeypatch.setattr(torch.Tensor, "float", torch.Tensor.double)
+pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,6 @@ import pytest
 from adjoints import rate
 from nclaw_toys import cube
 from test_nclaw_invariants import built, near_rest
-from test_nclaw_learn import one_thread  # noqa: F401
 
 torch = pytest.importorskip("torch")
 
@@ -35,6 +34,8 @@ from mpm_ref.nclaw.learn.rollout import Laws, Trajectory, step  # noqa: E402
 from mpm_ref.nclaw.learn.sysid import START, KnownReturn, KnownStress, known_laws  # noqa: E402
 from validation.nclaw.nets import nets  # noqa: E402
 from validation.train_laws import begun  # noqa: E402
+
+pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
 UNIT = Hencky(0.4, 0.3)             # of E = 1 Pa, but for what nu that would be
 LOG_E, SMALL = 2.0, 0.7             # of single stages

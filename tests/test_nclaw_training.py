@@ -23,13 +23,7 @@ from mpm_ref.nclaw.response import Correction, PlainStress, Stress  # noqa: E402
 STEPS = 11          # segments of 3 and 2 steps
 SHORT = Recipe(epochs=5, first=3, last=6, batch=2, elastic_rate=1e-2, plastic_rate=1e-3)
 
-
-@pytest.fixture(autouse=True)
-def one_thread():
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
+pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
 
 @pytest.fixture(scope="module")

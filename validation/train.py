@@ -5,7 +5,6 @@ It needs PyTorch. A training that is cut off goes on from its checkpoint.
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
 
 import torch
 import typer
@@ -18,6 +17,7 @@ from mpm_ref.rom.weights import save
 
 from .ldm.nets import FOLDER, SHARES, identity, nets
 from .provenance import commit, provenance
+from .training import KEPT, Checkpoints, Folder, Names, Threads, train_all
 
 ROOT = Path(__file__).parents[1]
 
@@ -45,23 +45,13 @@ def made(name, checkpoints, threads):
         **provenance(commit(ROOT))})
 
 
-def main(
-    names: Annotated[list[str] | None, typer.Argument(help="of nets; none: all")] = None,
-    folder: Annotated[Path, typer.Option(help="where weights go")] = FOLDER,
-    checkpoints: Annotated[Path, typer.Option(help="what an interrupted training goes on from")]
-    = Path("results/training"),
-    threads: Annotated[int, typer.Option(help="of PyTorch")] = 1,
-):
+def main(names: Names = None, folder: Folder = FOLDER, checkpoints: Checkpoints = KEPT,
+         threads: Threads = 1):
     """Train maps and write their weights."""
-    known = nets()
-    for name in names or known:
-        if name not in known:
-            raise typer.BadParameter(f"{name!r}: expected one of {', '.join(known)}")
-    torch.set_num_threads(threads)
-    checkpoints.mkdir(parents=True, exist_ok=True)
-    for name in names or known:
+    def make(name, folder, checkpoints):
         save(folder / f"{name}.npz", made(name, checkpoints, threads))
-        (checkpoints / f"{name}.pt").unlink()
+
+    train_all(names, nets(), (folder, checkpoints), threads, make)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,6 @@ It needs PyTorch. A training that is cut off goes on from its checkpoint.
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
 
 import torch
 import typer
@@ -25,6 +24,7 @@ from mpm_ref.scene import build
 from .nclaw.environments import environment, trajectory
 from .nclaw.nets import FOLDER, identity, nets
 from .provenance import commit, provenance
+from .training import KEPT, Checkpoints, Folder, Names, Threads, train_all
 
 ROOT = Path(__file__).parents[1]
 
@@ -76,24 +76,13 @@ def made(name, checkpoints, threads):
     return weights.Laws(*map(trained_of, laws), about)
 
 
-def main(
-    names: Annotated[list[str] | None, typer.Argument(help="of nets; none: all")] = None,
-    folder: Annotated[Path, typer.Option(help="where weights go")] = FOLDER,
-    checkpoints: Annotated[Path, typer.Option(help="what an interrupted training goes on from")]
-    = Path("results/training"),
-    threads: Annotated[int, typer.Option(help="of PyTorch")] = 1,
-):
+def main(names: Names = None, folder: Folder = FOLDER, checkpoints: Checkpoints = KEPT,
+         threads: Threads = 1):
     """Train laws and write their weights."""
-    known = nets()
-    for name in names or known:
-        if name not in known:
-            raise typer.BadParameter(f"{name!r}: expected one of {', '.join(known)}")
-    torch.set_num_threads(threads)
-    for place in (folder, checkpoints):
-        place.mkdir(parents=True, exist_ok=True)
-    for name in names or known:
+    def make(name, folder, checkpoints):
         weights.save(folder / f"{name}.npz", made(name, checkpoints, threads))
-        (checkpoints / f"{name}.pt").unlink(missing_ok=True)
+
+    train_all(names, nets(), (folder, checkpoints), threads, make)
 
 
 if __name__ == "__main__":
