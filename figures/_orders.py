@@ -34,6 +34,12 @@ def shared(results, id, part=""):
     return ", ".join(p for p in phrases[0] if all(p in others for others in phrases))
 
 
+def titled(results, ids, titles):
+    """What `shared` says of several experiments, each behind its panel's title."""
+    return "; ".join(f"{title}: {shared(results, id)}"
+                     for id, title in zip(ids, titles, strict=True))
+
+
 def _clauses(results, id, part):
     found = (r.scale.split("; ")[0] for r in results.records(id) if r.scale and part in r.target)
     return list(dict.fromkeys(found))

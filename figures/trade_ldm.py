@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from ._orders import OTHERS, legend_below, shared
+from ._orders import OTHERS, legend_below, titled
 
 NEEDS = ["trade.ldm.knobs", "trade.ldm.density"]
 TITLES = ("tower", "torsion")
@@ -24,8 +24,7 @@ DENSE = {"eulerian": ("Eulerian", "v-", "C4"), "resampled": ("resampled", "D--",
 
 
 def scale(results):
-    return "; ".join(f"{title}: {shared(results, id)}"
-                     for id, title in zip(NEEDS, TITLES, strict=True))
+    return titled(results, NEEDS, TITLES)
 
 
 def draw(results):

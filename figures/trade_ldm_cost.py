@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.ticker import NullLocator
 
-from ._orders import legend_below, series, shared
+from ._orders import legend_below, series, titled
 from .trade_ldm import readable
 
 NEEDS = ["trade.ldm.split", "trade.ldm.offline"]
@@ -21,8 +21,7 @@ AGAINST = {"runs_same": ("the transfer it was trained on", "s-"),
 
 
 def scale(results):
-    return "; ".join(f"{title}: {shared(results, id)}"
-                     for id, title in zip(NEEDS, TITLES, strict=True))
+    return titled(results, NEEDS, TITLES)
 
 
 def draw(results):
