@@ -230,6 +230,15 @@ def test_errors_are_means_over_particles_and_axes(run):
     assert error.item() == pytest.approx(4 * 3e-6, rel=1e-9)
 
 
+def test_errors_of_velocities_count_as_told(run):
+    """Beside those of positions, times their weight [s^2]."""
+    world, observed = run
+    moved = observed._replace(v=observed.v + torch.tensor([0.0, 0.3, 0.0]))
+    slower = observed._replace(v=torch.cat([observed.v[:1], moved.v[1:]]))
+    error = squared(Laws(jelly, lambda F: F), world, slower, [0], [4], velocity=1e-4)
+    assert error.item() == pytest.approx(4 * 1e-4 * 0.03, rel=1e-9)
+
+
 def gradients(laws, run, cuts):
     """Loss, and gradients of all weights."""
     loss = squared(laws, *run, cuts[:-1], cuts[1:])

@@ -62,7 +62,7 @@ def made(name, checkpoints, threads):
     """`nclaw.weights.Laws` of a net by name, with what is to be known of them."""
     net = nets()[name]
     recipe = Recipe(epochs=net.epochs, elastic_rate=net.elastic_rate, reading=net.reading,
-                    plastic_rate=net.plastic_rate, seed=net.seed)
+                    plastic_rate=net.plastic_rate, seed=net.seed, velocity=net.velocity)
     laws = begun(net)
     with tqdm(total=recipe.epochs, desc=name) as bar:
         def show(history):

@@ -76,7 +76,8 @@ class Session:
     def show(self, cuts, weight):
         """Add the gradients of some segments; returns their squared errors."""
         try:
-            error = squared(self.laws, self.world, self.observed, cuts[:-1], cuts[1:])
+            error = squared(self.laws, self.world, self.observed, cuts[:-1], cuts[1:],
+                            self.recipe.velocity)
         except ValueError as fault:
             raise Diverged(f"epoch {len(self.history)}, steps {cuts[0]} to {cuts[-1]}: {fault}"
                            ) from None

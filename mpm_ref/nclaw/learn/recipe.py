@@ -17,7 +17,8 @@ class Recipe:
     times segments over steps: not printed, and part of the recipe, since gradients are small beside
     the 1e-8 that Adam adds to their size. The "printed" one is the mean over steps, in m^2.
     `batch` segments run side by side, which changes nothing but time and round-off. `seed` is that
-    of the laws' start, and of the order of pairs (see `labeled`).
+    of the laws' start, and of the order of pairs (see `labeled`). `velocity` [s^2] weighs squared
+    errors of velocities beside those of positions (NCLAW-aux, printed without its value).
     """
 
     epochs: int = 300
@@ -30,6 +31,7 @@ class Recipe:
     scale: float = 1e4
     seed: int = 0
     batch: int = 8
+    velocity: float = 0.0
 
     def __post_init__(self):
         for name in ("epochs", "first", "last", "batch"):
@@ -38,6 +40,8 @@ class Recipe:
         for name in ("elastic_rate", "plastic_rate", "clip", "scale"):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"{name} = {getattr(self, name)}: expected a positive number")
+        if not 0.0 <= self.velocity < float("inf"):
+            raise ValueError(f"velocity = {self.velocity}: expected a number >= 0")
         if self.reading not in READINGS:
             raise ValueError(f"reading = {self.reading!r}: expected {' or '.join(READINGS)}")
 

@@ -51,16 +51,24 @@ def step(laws, world, state, on):
     return x, v, C, over_points(laws.plastic, F)
 
 
-def squared(laws, world, observed, starts, ends):
+def squared(laws, world, observed, starts, ends, velocity=0.0):
     """Mean squared errors of positions [m^2], over particles and axes, summed over the steps of
     segments from time levels `starts` to later ones, `ends`. Those that have ended go no further.
+    Those of velocities are added, times `velocity` [s^2].
     """
     levels, last, total = torch.tensor(starts), torch.tensor(ends), 0.0
     state, on = observed.at(levels), nodes(world, len(starts))
     while len(levels):
         state, levels = step(laws, world, state, on), levels + 1
-        total = total + ((state[0] - observed.x[levels]) ** 2).mean(dim=(1, 2)).sum()
+        total = total + mean_squared(state[0], observed.x[levels])
+        if velocity:
+            total = total + velocity * mean_squared(state[1], observed.v[levels])
         under_way = levels < last
         if not under_way.all():
             levels, last, *state = (a[under_way] for a in (levels, last, *state))
     return total
+
+
+def mean_squared(a, b):
+    """Squared differences of a, b (b, n, 3), their mean over points and axes, summed over runs."""
+    return ((a - b) ** 2).mean(dim=(1, 2)).sum()

@@ -1,0 +1,80 @@
+"""How far laws are off by themselves, not through a run (Table 5, NCLAW-appF3)."""
+
+import numpy as np
+
+from mpm_ref.body import Body, particles_at
+from mpm_ref.explicit import deform_body, initial_stress
+from mpm_ref.materials import NoFlow
+from mpm_ref.nclaw import deployed
+from mpm_ref.scene import build
+
+from ..registry import experiment
+from .environments import environment, trajectory
+from .nets import Untrained, trained
+from .tables import tell
+
+NAME, POINTS, SEED = "water", 1000, 0
+METHODS = {"ours": NAME, "labeled": f"{NAME}-labeled"}
+TERMS = {"P": "Pa^2", "Fnew": "1"}
+
+
+@experiment("nclaw.table5", title="NCLaw: the laws' own answers",
+            profiles=("quick", "standard"), budget={"quick": 10, "standard": 10})
+def table5(run):
+    """P of deformation gradients and F of trial ones, 1 000 each, drawn from water's training run:
+    mean squared errors of all components. The text does not say which run it draws from.
+    """
+    law = build(environment(NAME)).bodies[0].law
+    F, trial = drawn(trajectory(NAME), environment(NAME).dt)
+    truth = answers(law, NoFlow(), F, trial)[0], without_shear(trial)
+    waiting = []
+    for method, name in METHODS.items():
+        try:
+            laws = trained(name)
+        except Untrained as fault:
+            waiting.append(str(fault))
+            continue
+        found = answers(deployed.elastic(laws.elastic), deployed.plastic(laws.plastic), F, trial)
+        for (term, unit), a, b in zip(TERMS.items(), found, truth, strict=True):
+            run.record(f"nclaw.table5.{term}.{method}", np.mean((a - b) ** 2), unit=unit,
+                       scale=f"{POINTS} points of the training run, seed {SEED}")
+    unchanged(run, trial, truth[1])
+    tell(run, waiting)
+
+
+def unchanged(run, trial, F):
+    """Record how far off a law is that returns the trial as it is."""
+    run.record("nclaw.table5.Fnew.unchanged", np.mean((trial - F) ** 2), unit="1",
+               comparator="info", scale=f"{POINTS} points of the training run, seed {SEED}",
+               note="of a law that answers F_trial")
+
+
+def drawn(observed, dt):
+    """Deformation gradients (n, 3, 3) of random points and steps of a run, and the trial ones that
+    follow.
+    """
+    steps, points = len(observed.F) - 1, observed.F.shape[1]
+    at = np.random.default_rng(SEED).integers((steps, points), size=(POINTS, 2)).T
+    F, C = observed.F[*at], observed.C[at[0] + 1, at[1]]
+    return F, F + dt * C @ F
+
+
+def without_shear(F):
+    """J^(1/3) I of gradients F (n, 3, 3), NCLAW-eq21; that of `FluidProjection` is turned as F."""
+    return np.linalg.det(F)[:, None, None] ** (1.0 / 3.0) * np.eye(3)
+
+
+def answers(law, flow, F, trial):
+    """P (n, 3, 3) [Pa] of F and F of trial gradients (n, 3, 3) by a law and a flow."""
+    elastic, plastic = points(law, NoFlow(), F), points(law, flow, trial)
+    initial_stress(elastic)
+    deform_body(plastic, 0.0)
+    return elastic.particles.tau @ np.linalg.inv(F).mT, plastic.particles.F
+
+
+def points(law, flow, F):
+    """A `Body` at rest whose deformation gradients are F (n, 3, 3)."""
+    n = len(F)
+    still, one = np.zeros((n, 3)), np.ones(n)
+    particles = particles_at(still, still, one, one)._replace(F=F.copy())
+    return Body("points", particles, law, flow, np.arange(n))
