@@ -37,6 +37,7 @@ KNOWN = {       # environment -> its law and flow; fluids keep F = J^(1/3) I
     "jelly": ("FixedCorotated", "NoFlow"), "sand": ("Hencky", "DruckerPrager"),
     "plasticine": ("Hencky", "VonMises"), "water": ("Fluid", "FluidProjection")}
 PLAIN = {"elastic": "PlainStress", "plastic": "PlainCorrection"}
+SEEDS = (1, 2)              # beside 0
 SPEED_WEIGHT = 1e-4         # [s^2], ours: an error of 1 m/s counts as one of 0.01 m
 LABELED = {"epochs": 30, "elastic_rate": 0.1, "plastic_rate": 0.1}
 
@@ -46,6 +47,7 @@ def nets():
     return {
         **{name: Net(name) for name in ENVIRONMENTS},
         **{f"{name}-{method}": net for name in ENVIRONMENTS for method, net in others(name)},
+        **{f"{name}-seed-{seed}": Net(name, seed=seed) for name in ENVIRONMENTS for seed in SEEDS},
         "plasticine-no-rotation": Net("plasticine", **PLAIN, method="no rotation"),
         "water-velocity": Net("water", velocity=SPEED_WEIGHT),
         "plasticine-no-undeformed": Net("plasticine", method="no undeformed")}

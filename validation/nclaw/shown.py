@@ -1,5 +1,5 @@
-"""NCLaw's scenes that are only looked at (Figures 3 and 4): a large body, bodies that meet, and
-bodies of several materials.
+"""NCLaw's scenes that are only looked at (Figures 3 and 4): a large body, bodies that meet, bodies
+of several materials, and one that melts.
 
 Sizes, places, steps and densities are those of the authors' release; bodies stand for its meshes
 (see `toys`). One grid couples all.
@@ -12,19 +12,20 @@ from .environments import environment
 from .tasks import MILD, unit_cube
 from .toys import toy
 
-MANY = 1_000_000
+MANY = 0.00274                          # [m], between points of the large body: over a million
 DUCK, POOL = 8086, (64, 23, 64)         # points; of the pool along each axis
 POOL_AT, POOL_SIZE = (0.49, 0.2, 0.51), (0.85, 0.3, 0.85)      # [m]
 CORNERS = {"bunny": (0.25, 0.25), "spot": (0.25, 0.75), "bob": (0.75, 0.25), "blub": (0.75, 0.75)}
 SPEED = 2.0                             # of toys to the middle, along x and z [m/s]
 TOY_POINTS = 8000                       # ours
+CONE_POINTS = 20000                     # ours
 
 
-def large(points=MANY):
-    """A dragon of water of a million points."""
+def large(spacing=MANY):
+    """A dragon of water; points on a lattice, since a million take long to draw."""
     scene = environment("water")
     body = with_(scene.body[0], shape=toy("dragon", 0.8), velocity=MILD,
-                 sampling=Poisson(count=points))
+                 sampling=Lattice(spacing=spacing))
     return unit_cube(with_(scene, body=(body,), steps=10000), 64, 0)
 
 
@@ -52,3 +53,11 @@ def pool():
     filled = with_(water.body[0], name="pool", density=3000.0, velocity=Velocity(),
                    shape=Box(lower=lower, upper=upper), sampling=Lattice(counts=POOL))
     return unit_cube(with_(jelly, body=(duck, filled), steps=3000), 64, 3)
+
+
+def cone():
+    """Ice cream of plasticine, which rests at the start; what melts it: see `melting`."""
+    scene = environment("plasticine")
+    body = with_(scene.body[0], name="icecream", shape=toy("icecream", 0.8), velocity=Velocity(),
+                 sampling=Poisson(count=CONE_POINTS))
+    return unit_cube(with_(scene, body=(body,), steps=2000), 64, 3)
