@@ -41,6 +41,15 @@ def test_the_patch_lets_go_after_a_quarter_of_a_second():
     assert let_go(case(POKES.scene(0.0))) == 36
 
 
+def test_the_patch_is_found_wherever_it_stands():
+    scene = POKES.scene(0.0)
+    base, poke = scene.fixed
+    assert let_go(case(with_(scene, fixed=(poke, base)))) == 36
+    for count, regions in ((0, (base,)), (2, (base, poke, with_(poke, name="other")))):
+        with pytest.raises(ValueError, match=f"{count} prescribed regions let go: expected one"):
+            let_go(case(with_(scene, fixed=regions)))
+
+
 def test_no_part_is_off_on_modes_that_span_the_run(short):
     """Round-off is left: seen 2e-14."""
     found = parts(short[0], *own(short, STEPS), ALL)

@@ -43,6 +43,15 @@ def test_what_is_there_is_not_made_again(made):
     assert {file: file.stat().st_mtime_ns for file in (made / "data").iterdir()} == before
 
 
+def test_where_no_bar_is_shown_each_run_has_a_line(made):
+    done = mpm_ref("rom", "generate", made / "bars.toml", "--out", made / "data", *ONE)
+    first, *lines, last = done.stdout.splitlines()
+    assert first == f"{made / 'data'}: 4 runs of bars, 1 at a time"
+    assert lines == [f"{k + 1} of 4: {made / 'data'}/case-00{k}.h5, g = {k + 1}: was there"
+                     for k in range(4)]
+    assert last.startswith(f"{made / 'data'}: 4 runs of bars: made 0")
+
+
 def test_runs_are_results_files(made):
     done = mpm_ref("info", made / "data" / "case-002.h5")
     assert f"{STEPS + 1} frames" in done.stdout
@@ -77,6 +86,12 @@ def test_data_go_into_a_folder(made, tmp_path):
     assert_told(done, 4, "this is no folder")
 
 
+def test_a_folder_is_not_named_as_files_are(made, tmp_path):
+    done = mpm_ref("rom", "generate", made / "bars.toml", "--out", tmp_path / "data.npz", *ONE)
+    assert_told(done, 2, "data.npz: expected the name of a folder", "leave the ending out")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_study_that_does_not_exist_is_told_with_those_that_do():
     assert_told(mpm_ref("rom", "generate", "none"), 2, "no such file", *shipped_studies())
 
@@ -98,6 +113,8 @@ def test_a_run_that_was_cut_off_counts_as_continued(made, tmp_path):
         Options(steps=3, fields=Fields(FIELDS)))
     done = mpm_ref("rom", "generate", study, "--out", tmp_path, *ONE)
     assert "made 2, continued 1, 1 were there; 1 held out" in done.stdout
+    assert [line.split(": ")[-1] for line in done.stdout.splitlines()[1:-1]] == [
+        "was there", "continued", "made", "made"]
 
 
 @pytest.mark.parametrize("edits", [
@@ -177,7 +194,13 @@ def test_a_curved_map_is_made_at_once(made, tmp_path):
 def test_a_study_without_the_settings_of_a_curved_map_makes_none(made, tmp_path):
     done = mpm_ref("rom", "train", made / "bars.toml", "--data", made / "data", "--kind", "curved",
                    "--out", tmp_path / "map.npz")
-    assert_told(done, 2, "modes = none: expected more than r = 3")
+    assert_told(done, 2, "modes = none: expected more than r = 3", "bars.toml or a copy",
+                'in [map] kind = "curved" and `modes`', 'in [run] projection = "nonlinear"')
+
+
+def test_the_name_of_a_map_is_looked_at_first(made):
+    done = mpm_ref("rom", "train", made / "bars.toml", "--kind", "curved", "--out", "map.txt")
+    assert_told(done, 2, "--out map.txt: expected a name that ends in .npz\n")
 
 
 def test_a_network_is_trained_with_torch(made, tmp_path):

@@ -122,11 +122,23 @@ def test_a_run_that_breaks_down_has_status_3_and_keeps_what_went_before(reduced,
     assert words in why
 
 
+def test_a_run_that_breaks_down_is_told_to_machines_too(reduced):
+    done, out = reduced("--set", "g=1e3", "--json")
+    assert done.exit_code == 3
+    found = json.loads(done.stdout)
+    assert (found["why"], found["status"], found["out"]) == ("broke down", 3, str(out))
+    assert (found["step"], found["t"], found["frames"]) == (1, 0.01, 1)
+    assert found["reason"] in done.stderr.splitlines()[-1]
+    assert (found["reason"], found["frames"]) == ended(out)
+    assert found["reduced"]["parameters"] == {"g": 1e3}
+
+
 def test_a_run_is_told_to_machines_too(made, reduced):
     done, out = reduced("--set", "g=9", "--json")
     assert done.exit_code == 0
     found = json.loads(done.stdout)
     assert (found["why"], found["out"], found["points_out"]) == ("finished", str(out), 64)
+    assert found["status"] == 0
     assert (found["step"], found["frames"], found["t"]) == (STEPS, STEPS + 1, STEPS * 0.01)
     assert found["reduced"]["parameters"] == {"g": 9.0}
     assert found["reduced"]["map"] == {"kind": "modes", "r": 3}
@@ -163,10 +175,22 @@ def test_a_curved_map_runs_and_is_evaluated(made, reduced, tmp_path):
     (("--set", "g=2", "--map", "none.npz"), 2, "bars.toml --out none.npz"),
     (("--set", "g=2", "--out", "no/run.h5"), 4, "there is no folder"),
     (("--set", "g=2", "--out", "run.toml"), 2, "scenes have such names"),
+    (("--out", "run.npz"), 2, "--out run.npz: expected a name that ends in .h5 or .hdf5"),
 ])
 def test_what_a_run_needs_is_said(reduced, options, status, words):
     done, out = reduced(*options)
     assert_told(done, status, words)
+    assert not out.exists()
+
+
+def test_what_is_too_large_for_the_disk_is_told_before_it_is_made(reduced):
+    """Of each point x, v, F and tau in 2D, 12 numbers, at all time levels."""
+    done, out = reduced("--set", "g=2", "--points-out", 10**13)
+    size = 10**13 * 12 * 8 * (STEPS + 1) / 1e12
+    assert done.exit_code == 4
+    announced, refused = done.stderr.splitlines()
+    assert announced == f"mpm-ref: {out}: {size:.3g} TB will be written"
+    assert refused.startswith(f"mpm-ref: {out}: {size:.3g} TB needed, ")
     assert not out.exists()
 
 
@@ -237,7 +261,7 @@ def test_the_table_has_a_row_for_each_run_and_one_for_all(made, tmp_path):
 
 
 @pytest.mark.parametrize(("options", "words"), [
-    (("--out", "errors.txt"), "ends in .png or .pdf or .svg"),
+    (("--out", "errors.txt", "--map", "none.npz"), "ends in .png or .pdf or .svg"),
     (("--data", "none"), "none lacks 1 of 1 runs"),
     (("--map", "none.npz"), "there is no none.npz: mpm-ref rom train "),
 ])
@@ -264,4 +288,4 @@ def test_a_run_that_breaks_down_is_infinitely_off(made, tmp_path):
     assert said.startswith("step 3: particles from ")
     assert (f"run {number} (g = {study.mu[number, 0]:g}): the reduced run broke down in {said}"
             in done.stderr)
-    assert evaluate(made, "--out", tmp_path / "e.png").stderr == ""
+    assert evaluate(made, "--out", tmp_path / "e.png", "--overwrite").stderr == ""

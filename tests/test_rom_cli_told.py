@@ -8,6 +8,7 @@ import pytest
 from command_line import assert_told, mpm_ref
 from small_studies import modelled, write
 
+from mpm_ref.cli import rom, rom_evaluate
 from mpm_ref.cli.rom import astray
 from mpm_ref.reduced import told
 from mpm_ref.reduced.watch import Sight
@@ -58,6 +59,28 @@ def test_a_map_unlike_the_studied_one_is_warned_of_unless_named(
         assert (done.exit_code, done.stderr) == (0, "")
     write(tmp_path)
     assert mpm_ref("rom", *run, "--overwrite").stderr == ""
+
+
+def test_a_large_file_is_told_before_it_is_written(made, tmp_path, monkeypatch):
+    monkeypatch.setattr(rom, "LARGE", 64 * 12 * 8 * 9 - 1)
+    done = mpm_ref("rom", "run", made / "bars.toml", "--map", made / "map.npz", "--set", "g=2",
+                   "--out", tmp_path / "run.h5")
+    assert (done.exit_code, done.stderr) == (
+        0, f"mpm-ref: {tmp_path / 'run.h5'}: 55.3 kB will be written\n")
+    assert 55296 < (tmp_path / "run.h5").stat().st_size
+
+
+def test_a_picture_is_not_replaced(made, tmp_path, monkeypatch):
+    out = tmp_path / "e.png"
+    command = ("evaluate", made / "bars.toml", "--map", made / "map.npz", "--data", made / "data")
+    assert mpm_ref("rom", *command, "--out", out).exit_code == 0
+    before = out.stat().st_mtime_ns
+    assert mpm_ref("rom", *command, "--out", out, "--overwrite").exit_code == 0
+    assert out.stat().st_mtime_ns > before
+    monkeypatch.setattr(rom_evaluate, "evaluate", None)         # not begun
+    assert_told(mpm_ref("rom", *command, "--out", out), 2, "e.png exists: add --overwrite")
+    done = mpm_ref("rom", *command, "--out", tmp_path / "none" / "e.png")
+    assert_told(done, 4, "there is no folder")
 
 
 def test_blanks_around_a_parameter_do_not_matter(made, tmp_path):

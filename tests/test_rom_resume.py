@@ -1,6 +1,7 @@
 """`mpm-ref rom run` that was cut off goes on, and is the run that was not, bit for bit."""
 
 import json
+import re
 import shutil
 
 import h5py
@@ -20,6 +21,8 @@ from mpm_ref.store.results import Results
 WAYS = {"redrawn": "points = 12", "all": "", "kept": 'points = 12\nsamples = "kept"',
         "nonlinear": 'points = 12\nprojection = "nonlinear"\nvelocity = "difference"',
         "eulerian": 'points = 20\nquadrature = "eulerian"\nvelocity = "transported"'}
+
+KILLED = (0, None, "not ended")         # first and last step of a part, and why it ended
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +70,7 @@ def content(path):
 
 def parts(path):
     with Results(path) as results:
-        return [(part["first_step"], part["last_step"], part["why"])
+        return [(part["first_step"], part.get("last_step"), part["why"])
                 for part in results.manifest["parts"]]
 
 
@@ -134,10 +137,57 @@ def test_a_run_that_was_killed_goes_on(reduced, tmp_path, monkeypatch, step):
     show = record._show
     monkeypatch.setattr(record, "_show", copied)
     assert reduced("whole.h5").exit_code == 0
-    assert parts(tmp_path / "killed.h5") == []
+    assert parts(tmp_path / "killed.h5") == [KILLED]
+    assert re.search(r"^part: from step 0 on, began 20\S+: not ended$",
+                     mpm_ref("info", tmp_path / "killed.h5").stdout, re.MULTILINE)
     assert reduced("killed.h5").exit_code == 0
     assert content(tmp_path / "killed.h5") == content(tmp_path / "whole.h5")
-    assert parts(tmp_path / "killed.h5")[-1][1:] == (STEPS, "finished")
+    assert parts(tmp_path / "killed.h5") == [KILLED, (min(step, STEPS - 1), STEPS, "finished")]
+
+
+def test_a_part_that_was_killed_tells_the_code_that_made_it(reduced, cut, tmp_path, monkeypatch):
+    def copied(writer, state, problem):
+        show(writer, state, problem)
+        if state.step == 5:
+            shutil.copy(writer.path, tmp_path / "killed.h5")
+
+    show = record._show
+    cut("run.h5", 3, g=2)
+    with monkeypatch.context() as patch:
+        patch.setattr(manifest, "source_hash", lambda: "other")
+        patch.setattr(record, "_show", copied)
+        assert reduced("run.h5", g=2).exit_code == 0
+    assert parts(tmp_path / "killed.h5") == [(0, 2, "interrupted"), (2, None, "not ended")]
+    done = reduced("killed.h5", g=2)
+    assert done.exit_code == 0
+    assert "by another version of the code, or of NumPy, SciPy or Numba: it goes on" in done.stderr
+
+
+def test_a_run_that_was_interrupted_at_its_first_state_goes_on(reduced, cut, tmp_path):
+    assert reduced("whole.h5").exit_code == 0
+    cut("run.h5", 0)
+    assert ended(tmp_path / "run.h5") == ("interrupted", 0)
+    assert "part: from step 0 on, began " in mpm_ref("info", tmp_path / "run.h5").stdout
+    assert reduced("run.h5").exit_code == 0
+    assert content(tmp_path / "run.h5") == content(tmp_path / "whole.h5")
+
+
+def test_a_part_that_breaks_down_at_once_says_why(reduced, tmp_path, monkeypatch):
+    """In step 3 of a run that was killed after step 2."""
+    def copied(writer, state, problem):
+        show(writer, state, problem)
+        shutil.copy(writer.path, tmp_path / "killed.h5")
+
+    show = record._show
+    with monkeypatch.context() as patch:
+        patch.setattr(record, "_show", copied)
+        assert reduced("whole.h5", g=500).exit_code == 3
+    why, frames = ended(tmp_path / "whole.h5")
+    assert (why[:38], frames) == ("the reduced run broke down in step 3: ", 3)
+    assert parts(tmp_path / "killed.h5") == [KILLED]
+    assert reduced("killed.h5", g=500).exit_code == 3
+    assert parts(tmp_path / "killed.h5") == [KILLED, (2, None, why)]
+    assert_told_last(reduced("killed.h5", g=500), "exists: add --overwrite")
 
 
 def test_a_fault_of_ours_leaves_no_finished_run(reduced, tmp_path, monkeypatch):
@@ -151,7 +201,7 @@ def test_a_fault_of_ours_leaves_no_finished_run(reduced, tmp_path, monkeypatch):
         patch.setattr(record, "_show", broken)
         with pytest.raises(ZeroDivisionError):
             reduced("run.h5")
-    assert parts(tmp_path / "run.h5") == []
+    assert parts(tmp_path / "run.h5") == [KILLED]
     assert reduced("run.h5").exit_code == 0
     assert ended(tmp_path / "run.h5") == ("finished", STEPS + 1)
 
@@ -195,8 +245,10 @@ def test_what_made_a_run_is_known_of_all_its_parts():
 
 
 def test_a_run_that_was_killed_is_cut_off_too():
-    rows = {"finished": [{"why": "finished"}], "killed": [], "stopped": [{"why": "interrupted"}],
+    rows = {"finished": [{"why": "finished"}], "killed": [{"why": "not ended"}], "older": [],
+            "stopped": [{"why": "interrupted"}],
             "broken": [{"why": "the reduced run broke down in step 3"}]}
     found = {name: begun.cut_off({"reduced": {}, "parts": own}) for name, own in rows.items()}
-    assert found == {"finished": False, "killed": True, "stopped": True, "broken": False}
+    assert found == {"finished": False, "killed": True, "older": True, "stopped": True,
+                     "broken": False}
     assert not begun.cut_off({"parts": []})

@@ -50,6 +50,18 @@ def test_a_model_comes_back_bit_for_bit(tmp_path, d):
         np.testing.assert_array_equal(a, b)
 
 
+def test_sizes_may_be_short_integers(saved):
+    """Their products are not."""
+    assert 20 * 20 > np.iinfo(np.int8).max
+    big = model()._replace(decoder=rom_toys.decoder(3, 2, hidden=(20, 20)))
+    short = arrays_of(big) | {"sizes": np.array([5, 20, 20, 3], dtype=np.int8)}
+    path = saved.with_name("short.npz")
+    path.write_bytes(sealed(short))
+    X = rom_toys.cloud(3, 5)
+    np.testing.assert_array_equal(load(path).decoder.place(X, big.rest),
+                                  big.decoder.place(X, big.rest))
+
+
 def test_equal_content_gives_equal_bytes(saved, monkeypatch):
     later = time.mktime((datetime.now() + timedelta(days=400)).timetuple())
     monkeypatch.setattr(time, "time", lambda: later)
@@ -198,7 +210,18 @@ FAULTS = {
     r"rest has shape \(3,\), expected \(2,\)": lambda a: {**a, "rest": np.zeros(3)},
     r"layers of sizes \[3, 9, 8, 3\]": lambda a: {**a, "sizes": np.array([3, 9, 8, 3])},
     r"layers of sizes \[5, 0, 8, 3\]": lambda a: {**a, "sizes": np.array([5, 0, 8, 3])},
-    r"layers of sizes \[\]": lambda a: {**a, "sizes": np.array([])},
+    r"layers of sizes \[\]": lambda a: {**a, "sizes": np.array([], dtype=int)},
+    r"layers of sizes \[5, -9, 8, 3\]": lambda a: {**a, "sizes": np.array([5, -9, 8, 3])},
+    r"layers of sizes \[3, 3, .*, 3, \.\. 9999 in all\]: expected d \+ r, \.\., d;":
+        lambda a: {**a, "sizes": np.full(9999, 3)},
+    r"sizes is an array of shape \(4,\) and type float64: expected whole numbers":
+        lambda a: {**a, "sizes": a["sizes"] + 0.5},
+    r"sizes is an array of shape \(2, 2\)": lambda a: {**a, "sizes": a["sizes"].reshape(2, 2)},
+    r"sizes is an array of shape \(\)": lambda a: {**a, "sizes": np.array(5)},
+    r"sizes is an array of shape \(4,\) and type <U":
+        lambda a: {**a, "sizes": a["sizes"].astype(str)},
+    "W is of type <U.*, expected floating-point": lambda a: {**a, "W": a["W"].astype(str)},
+    "rest is of type int64": lambda a: {**a, "rest": np.zeros(2, dtype=int)},
     r"layers of sizes \[5\]": lambda a: {**a, "sizes": np.array([5])},
     "W has numbers that are not finite": lambda a: {**a, "W": np.where(a["W"] > 0, a["W"], np.nan)},
     "xhat has numbers that are not finite": lambda a: {**a, "xhat": a["xhat"] / 0.0},

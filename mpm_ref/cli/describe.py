@@ -1,4 +1,4 @@
-"""`mpm-ref info`: what a results file, a checkpoint or a scene holds."""
+"""`mpm-ref info`: what a results file, a checkpoint, a scene, a study or a map holds."""
 
 from typing import Annotated
 
@@ -7,17 +7,17 @@ import typer
 from .. import scene
 from ..store import checkpoint
 from ..store.words import counted
-from . import info
-from .faults import at_start, one_line
+from . import info, rom_info
+from .faults import at_start, one_line, options
 from .shipped import find_scene, is_hdf5
 from .terminal import compiling, warn
 
 
 def describe(
-    name: Annotated[str, typer.Argument(metavar="FILE|SCENE")],
+    name: Annotated[str, typer.Argument(metavar="FILE|SCENE|STUDY")],
     json: Annotated[bool, typer.Option("--json", help="Answer with JSON.")] = False,
 ):
-    """Say what a results file, a checkpoint or a scene holds."""
+    """Say what a results file, a checkpoint, a scene, a study or a map holds."""
     with one_line():
         facts, lines = _facts(name)
         warn(facts.get("warnings", []))
@@ -27,7 +27,7 @@ def describe(
 def _facts(name):
     """(facts, lines) of whatever a name stands for."""
     if not is_hdf5(name):
-        return _facts_of_scene(find_scene(name))
+        return _facts_of_text_or_map(name)
     if checkpoint.is_one(name) or checkpoint.is_named_so(name):
         facts = checkpoint.summary(name)
         return facts, [f"checkpoint: step {facts['step']}, t = {facts['t']:.6g} s, after "
@@ -35,6 +35,17 @@ def _facts(name):
                        f"scene sha256 {facts['scene_sha256'][:12]}"]
     facts = info.of_results(name)
     return facts, info.results_lines(facts)
+
+
+def _facts_of_text_or_map(name):
+    with compiling(), options():
+        if rom_info.is_map(name):
+            facts = rom_info.of_map(name)
+            return facts, rom_info.map_lines(facts)
+        if rom_info.is_study(name):
+            facts = rom_info.of_study(name)
+            return facts, rom_info.study_lines(facts)
+    return _facts_of_scene(find_scene(name))
 
 
 def _facts_of_scene(path):

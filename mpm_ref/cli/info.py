@@ -3,6 +3,7 @@
 import json
 from math import isfinite
 
+from ..nclaw.range import other_steps
 from ..placement import misplaced
 from ..reduced import told
 from ..store import manifest
@@ -43,7 +44,7 @@ def of_problem(problem):
                               if not (name == "C" and a is body.particles.L)),
         "grid_bytes": sum(a.nbytes for a in grid[:4]),
         "scene_sha256": scene_hash(problem),
-        "warnings": misplaced(problem),
+        "warnings": [*misplaced(problem), *other_steps(problem)],
     }
 
 
@@ -72,7 +73,8 @@ def of_results(path):
             "checkpoint": str(checkpoint_of(path)) if checkpoint_of(path).exists() else None,
             "manifest": results.manifest,
             "reduced": told.told(results),
-            "warnings": unsolved(manifest.unsolved(results.manifest)),
+            "warnings": [*unsolved(manifest.unsolved(results.manifest)),
+                         *manifest.astray(results.manifest)],
         }
 
 
@@ -135,11 +137,18 @@ def results_lines(facts):
         lines.append("no frame yet")
     if facts["reduced"]:
         lines.append(told.line(facts["reduced"]))
-    lines += [f"part: steps {part['first_step']} to {part['last_step']}, {part['wall_s']} s, "
-              f"{in_words(part['peak_bytes'])}, state sha256 {part['state_sha256'][:12]}: "
-              f"{part['why']}" for part in facts["manifest"].get("parts", [])]
+    lines += map(part_line, facts["manifest"].get("parts", []))
     lines.append(f"checkpoint: {facts['checkpoint'] or 'none'}")
     return lines
+
+
+def part_line(part):
+    """A part of a run in words; of one that has not ended, its beginning."""
+    if "last_step" not in part:
+        return f"part: from step {part['first_step']} on, began {part['began']}: {part['why']}"
+    return (f"part: steps {part['first_step']} to {part['last_step']}, {part['wall_s']} s, "
+            f"{in_words(part['peak_bytes'])}, state sha256 {part['state_sha256'][:12]}: "
+            f"{part['why']}")
 
 
 def as_json(facts):

@@ -12,6 +12,7 @@ from ..store.vtkhdf import export_particles
 from ..store.vtkhdf_grid import export_grid
 from . import info
 from .faults import one_line, options
+from .outputs import PICTURES, require_ending
 from .shipped import shipped_scenes
 
 Machine = Annotated[bool, typer.Option("--json", help="Answer with JSON.")]
@@ -31,7 +32,7 @@ def plot(
     of the particles' depth.
     """
     what = {"frame": frame, "field": field, "view": _axes(view)}
-    _to_file(plotting.save_plot, file, out, (".png", ".pdf", ".svg"), **what)
+    _to_file(plotting.save_plot, file, out, PICTURES, **what)
 
 
 def animate(
@@ -57,17 +58,20 @@ def export(
 def scenes(json: Machine = False):
     """List the scenes that come with the package."""
     with one_line():
-        found = {name: scene.load(path).title for name, path in shipped_scenes().items()}
-        lines = [f"{name:24} {title}" for name, title in found.items()]
-        print(info.as_json(found) if json else "\n".join(lines))
+        listed({name: scene.load(path).title for name, path in shipped_scenes().items()}, json)
+
+
+def listed(titles, json):
+    """Print {name: title}, a line each."""
+    lines = [f"{name:24} {title}" for name, title in titles.items()]
+    print(info.as_json(titles) if json else "\n".join(lines))
 
 
 def _to_file(make, file, out, suffixes, **what):
     """Make a file from results and name it."""
     out = out or file.with_suffix(suffixes[0])
     with options():
-        if out.suffix.lower() not in suffixes:
-            raise ValueError(f"--out {out}: expected a name that ends in {' or '.join(suffixes)}")
+        require_ending(out, suffixes)
         if out.exists() and file.exists() and out.samefile(file):
             raise ValueError(f"--out {out}: this is the results file itself; name another file")
     with one_line(), Results(file) as results:

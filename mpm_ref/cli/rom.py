@@ -1,35 +1,35 @@
-"""`mpm-ref rom generate | train | run | evaluate`: reduced models of a scene (see `reduced`).
+"""`mpm-ref rom studies | generate | train | run | evaluate`: reduced models of a scene (see
+`reduced`).
 
-A study file names the scene, its parameters and the map; docs/reduced.md explains it. The first two
-commands are in `rom_make`.
+A study file names the scene, its parameters and the map; docs/reduced.md explains it. This file has
+`run`; the other commands are in `rom_info`, `rom_make` and `rom_evaluate`.
 """
 
-from math import isfinite
+import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from ..reduced import dataset, maps
+from ..reduced import maps
 from ..reduced.begun import begun
-from ..reduced.evaluate import REDUCED, breakdowns, draw, evaluate, facts, lines, together
-from ..reduced.model import kind_of, recording
-from ..reduced.record import Lost, record
-from ..scene import SceneError
-from ..store.atomic import require_place
+from ..reduced.model import kind_of, recording, to_write
+from ..reduced.record import record
+from ..store.atomic import in_words, require_place, require_space
 from ..store.session import FINISHED
 from ..store.words import counted
-from . import faults, rom_make
+from . import faults, rom_evaluate, rom_info, rom_make
 from .faults import end, options
 from .info import as_json
 from .look import Machine
+from .outputs import HDF5, require_ending
 from .rom_options import (
-    Data,
     MapFile,
     Overwrite,
     StudyName,
     assigned,
     at_work,
+    examples,
     map_of,
     named,
     on_interrupt,
@@ -37,52 +37,78 @@ from .rom_options import (
 from .shipped import keep_scene
 from .terminal import passing, warn
 
-PICTURES = (".png", ".pdf", ".svg")
+LARGE = 1e9         # bytes of a file that are told before it is written
+BROKE = "broke down"
 
 app = typer.Typer(no_args_is_help=True, help="Reduced models of a scene: learn from many runs, "
-                  "then run with a few numbers instead of particles.")
-app.command("generate")(rom_make.make_data)
-app.command()(rom_make.train)
-Set = Annotated[list[str] | None, typer.Option("--set", help="NAME=VALUE of each parameter.")]
+                  "then run with a few numbers instead of particles.",
+                  epilog="`mpm-ref rom studies` lists the shipped studies; docs/reduced.md says "
+                  "how to write your own.")
+app.command(epilog=examples("studies"))(rom_info.studies)
+app.command("generate", epilog=examples(
+    "generate gravity_small", "generate torsion --workers 1 --out runs"))(rom_make.make_data)
+app.command(epilog=examples("train gravity_small",
+                            "train gravity --kind modes --out modes.npz"))(rom_make.train)
+Set = Annotated[list[str] | None, typer.Option(
+    "--set", help="NAME=VALUE, once for each parameter of the study.")]
 
 
-@app.command()
+@app.command(epilog=examples("run gravity_small --set g=3.3",
+                             "run torsion --set v=0.2 --set w=1.5 --out twist.h5"))
 def run(
     name: StudyName,
     values: Set = None,
     map: MapFile = None,
     out: Annotated[Path | None, typer.Option(
-        "--out", "-o", help="Results file, default: STUDY.h5.")] = None,
+        "--out", "-o", help="Results file, default: STUDY.h5 here.")] = None,
     points_out: Annotated[int | None, typer.Option(
         help="Points to show the body at, default: those of the study.", min=1)] = None,
     overwrite: Overwrite = False,
     json: Machine = False,
 ):
-    """Run the reduced model into a results file, for `mpm-ref info`, `plot`, `animate` and
-    `export`. A run that was cut off goes on, bit for bit. Exit status as of `mpm-ref run`: 0 done,
-    2 bad input, 3 the run broke down, 4 a file could not be written, 130 Ctrl-C.
+    """Run the reduced model into a results file.
+
+    `mpm-ref info`, `plot`, `animate` and `export` take the file. A run that was cut off goes on,
+    bit for bit, where the same command is given again. Exit status: 0 done, 2 bad input, 3 the run
+    broke down, 4 a file could not be written, 130 Ctrl-C.
     """
     with at_work(name) as study:
         out = named(out, study, ".h5")
         with options():
             keep_scene(study.path, out)
+            require_ending(out, HDF5)
+            require_place(out)
             mu = study.given(assigned(values or []))
             file, model = map_of(name, study, map)
+            announce(out, to_write(study, mu, points_out))
             made = recording(study, model, mu, points_out)
             made.facts["map_sha256"] = maps.sha256(file)
-            require_place(out)
             before = begun(made, out, overwrite)
         warn([*study.outside(mu), *changed(before)])
-        out_of_bounds = recorded(made, out, before.known, overwrite)
+        outcome = recorded(made, out, before.known, overwrite)
+        if json:
+            print(as_json(ran(made, out, outcome)))
+        if outcome.lost:
+            end(outcome.lost, faults.UNSTABLE)
         clock = made.problem.clock
-        warn(astray(out_of_bounds, clock.steps + 1, clock.dt))
-        print(as_json(ran(made, out, out_of_bounds)) if json else
-              f"{FINISHED}: {counted(clock.steps, 'step')} of {kind_of(model)}, r = "
-              f"{model.decoder.r}, {len(made.field.X)} points in {out}")
+        warn(astray(outcome.out_of_bounds, clock.steps + 1, clock.dt))
+        if not json:
+            print(f"{FINISHED}: {counted(clock.steps, 'step')} of {kind_of(model)}, r = "
+                  f"{model.decoder.r}, {len(made.field.X)} points in {out}")
+
+
+def announce(out, size):
+    """Say how many bytes are to be written, where they are many. Raises NotWritten where the disk
+    has not so many, those of the file that they replace included.
+    """
+    if size > LARGE:
+        print(f"mpm-ref: {out}: {in_words(size)} will be written", file=sys.stderr)
+    there = out.stat().st_size if out.exists() else 0
+    require_space(out, max(size - there, 0))
 
 
 def recorded(made, out, known, overwrite):
-    """Make a `Recording`, with a bar of steps; {step: `Sight`} of those out of bounds."""
+    """Make a `Recording`, with a bar of steps; its `Outcome`."""
     at, steps = max(len(known) - 1, 0), made.problem.clock.steps
     again = "the same command without --overwrite" if overwrite else "the same command again"
 
@@ -91,20 +117,21 @@ def recorded(made, out, known, overwrite):
         at = max(at, k)
         bar.update(k - bar.n)
 
-    try:
-        with (on_interrupt(lambda: f"at step {at} of {steps}; {again} goes on"),
-              passing(total=steps, unit="step", desc=str(out)) as bar):
-            return record(made, out, known, show)
-    except Lost as fault:
-        end(fault, faults.UNSTABLE)
+    with (on_interrupt(lambda: f"at step {at} of {steps}; {again} goes on"),
+          passing(total=steps, unit="step", desc=str(out)) as bar):
+        return record(made, out, known, show)
 
 
-def ran(made, out, out_of_bounds):
-    """A `Recording` that was made, as plain values."""
-    clock = made.problem.clock
-    return {"why": FINISHED, "out": str(out), "step": clock.steps, "t": clock.steps * clock.dt,
-            "frames": clock.steps + 1, "points_out": len(made.field.X), "reduced": made.facts,
-            "out_of_bounds": {str(k): sight.why for k, sight in out_of_bounds.items()}}
+def ran(made, out, outcome):
+    """A `Recording` that was made, or broke down, as plain values."""
+    clock, lost = made.problem.clock, outcome.lost
+    step = lost.step if lost else clock.steps
+    how = ({"why": BROKE, "reason": str(lost), "status": faults.UNSTABLE} if lost else
+           {"why": FINISHED, "status": 0})
+    return how | {
+        "out": str(out), "step": step, "t": step * clock.dt, "frames": step + (not lost),
+        "points_out": len(made.field.X), "reduced": made.facts,
+        "out_of_bounds": {str(k): sight.why for k, sight in outcome.out_of_bounds.items()}}
 
 
 def changed(before):
@@ -126,37 +153,5 @@ def astray(out_of_bounds, states, dt):
                f"on, are where the map has learned nothing or cannot follow; at worst {worst.said}")
 
 
-@app.command("evaluate")
-def judge(
-    name: StudyName,
-    map: MapFile = None,
-    data: Data = None,
-    out: Annotated[Path | None, typer.Option(
-        "--out", "-o", help="Picture of the errors over time, default: MAP.errors.png.")] = None,
-    json: Machine = False,
-):
-    """Errors of reduced runs beside the full-order runs that were held out, and of the map's
-    nearest states. Exit status 3 where a reduced run broke down, and a sentence why.
-    """
-    with at_work(name) as study:
-        picture = out or named(map, study, ".npz").with_suffix(".errors.png")
-        with options():
-            if picture.suffix.lower() not in PICTURES:
-                raise ValueError(f"--out {picture}: expected a name that ends in "
-                                 f"{' or '.join(PICTURES)}")
-            if not study.test:
-                raise SceneError(f"{study.path}: test = 0: no run is held out to compare with")
-            _, model = map_of(name, study, map)
-            snapshots = dataset.load(study, named(data, study, "-data"), study.test)
-            runs = passing(unit="run", iterable=evaluate(study, model, snapshots),
-                           total=len(study.test))
-            found = list(runs)
-        all_runs = together(found, snapshots.X)
-        draw(found, study.names, snapshots.dt, picture)
-        if json:
-            print(as_json({"study": str(study.path), "picture": str(picture),
-                           **facts(study, found, all_runs)}))
-        else:
-            print("\n".join([*lines(study, found, all_runs), str(picture)]))
-        warn(breakdowns(study, found))
-    raise typer.Exit(0 if isfinite(all_runs[REDUCED].origin) else faults.UNSTABLE)
+app.command("evaluate", epilog=examples(
+    "evaluate gravity_small", "evaluate gravity --map modes.npz --json"))(rom_evaluate.judge)

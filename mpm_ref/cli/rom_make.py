@@ -1,6 +1,7 @@
 """`mpm-ref rom generate` and `train`: the data of a study, and the map that is made of them."""
 
 import os
+from collections import Counter
 from pathlib import Path
 from typing import Annotated
 
@@ -8,40 +9,59 @@ import typer
 
 from ..reduced import dataset, maps
 from ..reduced.case import case
-from ..reduced.generate import INTERRUPTED, NOT_WRITTEN, SKIPPED, UNSTABLE, generate, one_thread
+from ..reduced.generate import (
+    INTERRUPTED,
+    NOT_WRITTEN,
+    SKIPPED,
+    UNSTABLE,
+    file_of,
+    generate,
+    one_thread,
+    said,
+)
 from ..reduced.model import kind_of, with_kind
 from ..reduced.tables import KEYS, NETWORK
 from ..store.atomic import NotWritten, not_written, require_place
 from ..store.words import counted
 from . import faults
 from .faults import end, one_line, options
+from .outputs import MAPS, require_ending, require_folder_name, require_free
 from .rom_options import Data, Overwrite, StudyName, named, on_interrupt, studied
 from .shipped import keep_scene
 from .terminal import passing
 
+MADE, CONTINUED, THERE = "made", "continued", "was there"
 STATUS = {UNSTABLE: faults.UNSTABLE, NOT_WRITTEN: faults.NOT_WRITTEN}
 
 
 def make_data(
     name: StudyName,
     out: Annotated[Path | None, typer.Option(
-        "--out", "-o", help="Folder for the runs, default: STUDY-data.")] = None,
+        "--out", "-o", help="Folder for the runs, default: STUDY-data here.")] = None,
     workers: Annotated[int | None, typer.Option(
         help="Processes of one thread each, default: all cores.", min=1)] = None,
 ):
-    """Make the full-order runs of a study. Finished ones are left as they are, one that was cut
-    off goes on from its checkpoint; Ctrl-C whenever you like.
+    """Make the full-order runs of a study.
+
+    Finished ones are left as they are, one that was cut off goes on from its checkpoint; Ctrl-C
+    whenever you like. Exit status: 0 done, 2 bad input, 3 a run became unstable, 4 a file could not
+    be written, 130 Ctrl-C.
     """
     with one_line():
         study = studied(name)
         folder, ended = named(out, study, "-data"), []
         with options():
+            require_folder_name(folder)
             case(study.scene(study.mu[0]))      # refuses what reduced runs do not know
         make_folder(folder)
+        workers = workers or os.cpu_count() or 1
         with (on_interrupt(lambda: f"after {len(ended)} of {counted(len(study.mu), 'run')}; the "
                            "same command again goes on"),
               passing(total=len(study.mu), unit="run", desc=str(folder)) as bar):
-            for done in generate(study, folder, workers or os.cpu_count() or 1):
+            if bar.disable:
+                print(f"{folder}: {counted(len(study.mu), 'run')} of {study.path.stem}, "
+                      f"{min(workers, len(study.mu))} at a time", flush=True)
+            for done in generate(study, folder, workers):
                 if done.why == INTERRUPTED:
                     raise KeyboardInterrupt
                 if not done.well:
@@ -49,36 +69,49 @@ def make_data(
                     end(done.said, STATUS.get(done.why, faults.BAD_INPUT))
                 ended.append(done)
                 bar.update()
+                if bar.disable:
+                    print(f"{len(ended)} of {len(study.mu)}: {file_of(folder, done.number)}, "
+                          f"{said(study, study.mu[done.number])}: {came(done)}", flush=True)
         print(f"{folder}: {counted(len(study.mu), 'run')} of {study.path.stem}: {in_sum(ended)}; "
               f"{len(study.test)} held out")
 
 
+def came(done):
+    """How a run came about, of a `Done` that ended well, in a word."""
+    if done.why == SKIPPED:
+        return THERE
+    return CONTINUED if done.continued else MADE
+
+
 def in_sum(ended):
     """How many runs were made, continued, and there before, of a `Done` of each."""
-    there = sum(done.why == SKIPPED for done in ended)
-    continued = sum(done.continued for done in ended)
-    return f"made {len(ended) - there - continued}, continued {continued}, {there} were there"
+    count = Counter(map(came, ended))
+    return f"made {count[MADE]}, continued {count[CONTINUED]}, {count[THERE]} were there"
 
 
 def train(
     name: StudyName,
     data: Data = None,
     out: Annotated[Path | None, typer.Option(
-        "--out", "-o", help="File for the map, default: STUDY.npz.")] = None,
+        "--out", "-o", help="File for the map, default: STUDY.npz here.")] = None,
     kind: Annotated[str | None, typer.Option(
-        help=f"Of {', '.join(KEYS)}, default: as studied.")] = None,
-    threads: Annotated[int, typer.Option(help="Of PyTorch.", min=1)] = 1,
+        help=f"Kind of the map: {', '.join(KEYS)}; default: as the study says.")] = None,
+    threads: Annotated[int, typer.Option(help="Threads of PyTorch.", min=1)] = 1,
     overwrite: Overwrite = False,
 ):
-    """Make the map of a study from its runs: POD modes, straight or curved, at once; a network by
-    training, which needs PyTorch. A training that is cut off goes on from its checkpoint, MAP.pt.
+    """Make the map of a study from its runs.
+
+    POD modes, straight or curved, are made at once; a network is trained, which needs PyTorch. A
+    training that is cut off goes on from its checkpoint, MAP.pt. Exit status: 0 done, 2 bad input,
+    4 a file could not be written, 130 Ctrl-C.
     """
     with one_line():
         with options():
-            study = with_kind(studied(name), kind)
+            study = studied(name)
             out, data = named(out, study, ".npz"), named(data, study, "-data")
             checkpoint = out.with_suffix(".pt")
             require_map_place(out, study, overwrite)
+            study = with_kind(study, kind)
             if study.tables.map.kind == NETWORK:
                 maps.training()
             snapshots = dataset.load(study, data, study.train)
@@ -123,11 +156,9 @@ def make_folder(folder):
 def require_map_place(out, study, overwrite):
     """Raise ValueError or NotWritten where no map is to be written."""
     keep_scene(study.path, out)
+    require_ending(out, MAPS)
     require_place(out)
-    if out.suffix != ".npz":
-        raise ValueError(f"--out {out}: expected a name that ends in .npz")
-    if out.exists() and not overwrite:
-        raise ValueError(f"{out} exists: add --overwrite to replace it, or name another file")
+    require_free(out, overwrite)
 
 
 def write(out, model):

@@ -14,10 +14,18 @@ from .faults import INTERRUPT, end, one_line
 from .shipped import find_study, shipped_scenes
 from .terminal import warn
 
-StudyName = Annotated[str, typer.Argument(metavar="STUDY", help="A TOML file, or a shipped one.")]
-Data = Annotated[Path | None, typer.Option(help="Folder of `generate`, default: STUDY-data.")]
-MapFile = Annotated[Path | None, typer.Option("--map", help="Map of `train`, default: STUDY.npz.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the file.")]
+StudyName = Annotated[str, typer.Argument(metavar="STUDY",
+                                          help="A TOML file, or the name of a shipped study.")]
+Data = Annotated[Path | None, typer.Option(
+    help="Folder of `generate`, default: STUDY-data here.")]
+MapFile = Annotated[Path | None, typer.Option(
+    "--map", help="Map of `train`, default: STUDY.npz here.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the file of --out.")]
+
+
+def examples(*commands):
+    """The end of a command's help: how it is typed, a line each."""
+    return "\n\n".join(["Examples:", *(f"mpm-ref rom {command}" for command in commands)])
 
 
 def studied(name):

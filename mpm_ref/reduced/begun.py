@@ -12,7 +12,7 @@ from ..store.results import Results
 from ..store.running import Refused
 from ..store.session import INTERRUPTED
 from ..store.words import counted
-from .record import marked
+from .record import UNENDED, marked
 
 COMPUTE = ("numpy", "scipy", "numba", "llvmlite")       # libraries that shape the bits
 
@@ -50,7 +50,7 @@ def begun(recording, out, overwrite):
 def cut_off(facts):
     """Whether a manifest is that of a reduced run that was interrupted or killed."""
     parts = facts.get("parts")
-    return "reduced" in facts and (not parts or parts[-1]["why"] == INTERRUPTED)
+    return "reduced" in facts and (not parts or parts[-1]["why"] in (INTERRUPTED, UNENDED))
 
 
 def same_code(facts):

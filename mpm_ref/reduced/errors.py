@@ -10,6 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+MEASURED = 1000     # points at most, evenly among a body's, that tell how far a map is off its data
+
 
 class Errors(NamedTuple):
     """Accumulated errors of the position, as shares."""
@@ -36,3 +38,14 @@ class Squares:
     def errors(self):
         """`Errors` of all states added."""
         return Errors(*(float(np.sqrt(self.sums[0] / s)) for s in self.sums[1:]))
+
+
+def misfit(map, snapshots, xhat):
+    """`Errors` of a map's states at latent coordinates xhat (s, k + 1, r) beside the `Snapshots` of
+    these runs, at MEASURED points.
+    """
+    some = slice(None, None, -(-len(snapshots.X) // MEASURED))
+    squares = Squares(snapshots.X[some])
+    for y, x in zip(np.reshape(xhat, (-1, map.r)), snapshots.flat()[0], strict=True):
+        squares.add(map.place(squares.X, y), x[some])
+    return squares.errors

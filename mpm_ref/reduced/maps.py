@@ -2,6 +2,7 @@
 
 import hashlib
 from importlib import import_module
+from math import isfinite
 from pathlib import Path
 
 import msgspec
@@ -13,8 +14,10 @@ from ..rom.decoder import Decoder
 from ..rom.latent import initial
 from ..rom.modes import basis
 from ..rom.weights import Model
+from ..sealed import opened
 from ..shapes.inside import solid
 from ..store.manifest import source_hash, versions
+from .errors import misfit
 from .tables import CURVED, KEYS, MODES, NETWORK, require_nonlinear
 
 KEPT = 50           # epochs of which the loss is kept in the file
@@ -31,7 +34,7 @@ def computed(study, snapshots, about):
     known = basis(snapshots.X, *snapshots.flat(), how.modes if bent else how.r)
     map = curved(known, how.r, how.degree) if bent else known.modes
     xhat = known.xhat[:, :how.r].reshape(*snapshots.x.shape[:2], how.r)
-    return Model(map, xhat, np.zeros(how.r), about | identity(study))
+    return measured(Model(map, xhat, np.zeros(how.r), about | identity(study)), snapshots)
 
 
 def learned(study, snapshots, about, checkpoint, on_epoch, threads):
@@ -43,8 +46,18 @@ def learned(study, snapshots, about, checkpoint, on_epoch, threads):
     drive = training()
     settings["weights"] = drive.weights(settings["weights"], *larger(study.base))
     done = drive.fitted(settings, snapshots, checkpoint, on_epoch, threads)
-    return of_trained(done, snapshots.X, about | identity(study) | {
-        "threads": threads, "torch": drive.version()})
+    return measured(of_trained(done, snapshots.X, about | identity(study) | {
+        "threads": threads, "torch": drive.version()}), snapshots)
+
+
+def measured(model, snapshots):
+    """A `Model` that also says of its fit how many points the `Snapshots` have, and how far it is
+    off them at its own latent coordinates.
+    """
+    off = misfit(model.decoder, snapshots, model.xhat)._asdict()
+    known = {name: share for name, share in off.items() if isfinite(share)}
+    return model._replace(about=model.about | {
+        "fit": {"points": len(snapshots.X), "errors": known}})
 
 
 def of_trained(done, X, about):
@@ -80,7 +93,8 @@ def training():
 def identity(study):
     """What a map is of and how it was made: plain values."""
     map = study.tables.map
-    return {"study": study.digest, "title": study.tables.title,
+    return {"study": study.digest, "name": study.path.stem, "title": study.tables.title,
+            "scene": study.tables.scene,
             "map": {name: value for name, value in msgspec.to_builtins(map).items()
                     if name in ("kind", "r", *KEYS[map.kind])},
             "parameters": list(study.names),
@@ -94,12 +108,19 @@ def save(path, model):
     file.save(path, model)
 
 
+def read(path):
+    """The `Model` of a file, of any kind and study. Raises ValueError for a file that is damaged or
+    no map.
+    """
+    arrays = opened(Path(path))
+    return (modes_file if modes_file.is_one(arrays) else weights).load(path)
+
+
 def load(path, study):
     """The `Model` of a file, of any kind. Raises ValueError for a file that is damaged or no map,
     for one of another study, and for one that the study's projection does not suit.
     """
-    arrays = weights.opened(Path(path))
-    model = (modes_file if modes_file.is_one(arrays) else weights).load(path)
+    model = read(path)
     if model.about.get("study") != study.digest:
         raise ValueError(f"{path} is a map of another study, or of {study.path} before its scenes "
                          "or held-out runs changed; train again, or name the study it is of")

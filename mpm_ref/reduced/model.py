@@ -3,10 +3,12 @@
 import msgspec
 
 from ..scene import build
+from ..store import Fields
 from .case import case
 from .field import field, resampled
 from .march import drawing, precise
 from .record import Recording
+from .tables import CURVED
 from .watch import watch
 
 
@@ -16,8 +18,21 @@ def with_kind(study, kind):
     """
     if kind is None:
         return study
-    map = msgspec.structs.replace(study.tables.map, kind=kind)
-    return study._replace(tables=msgspec.structs.replace(study.tables, map=map))
+    replace = msgspec.structs.replace
+    try:
+        map = replace(study.tables.map, kind=kind)
+        return study._replace(tables=replace(study.tables, map=map))
+    except ValueError as fault:
+        raise ValueError(f"{fault}{needed(study, kind)}") from None
+
+
+def needed(study, kind):
+    """What a study lacks for a map of a kind, if that is known, in words."""
+    if kind != CURVED:
+        return ""
+    return (f'; a curved map needs a study that says so, {study.path} or a copy: in [map] kind = '
+            f'"{CURVED}" and `modes` larger than `r`, in [run] projection = "nonlinear" '
+            "(docs/reduced.md)")
 
 
 def kind_of(model):
@@ -31,6 +46,15 @@ def require_way(one, model, run):
     """
     precise(model.decoder, run.way)
     drawing(one, model.decoder, run.way)
+
+
+def to_write(study, mu, count=None):
+    """Bytes that the points of a reduced run with parameters mu take in its file, so many of them;
+    None: those of the study. Raises ValueError for a scene that reduced runs do not know.
+    """
+    one = case(study.scene(mu))
+    point = sum(a[0].nbytes for a in Fields().of(one.problem.bodies[0]).values())
+    return (one.problem.clock.steps + 1) * (count or len(one.X)) * point
 
 
 def recording(study, model, mu, count=None):

@@ -23,10 +23,15 @@ VECTORS = {"xhat": "1", "vhat": "1/s"}                          # of the group `
 COUNTS = {"samples": "1", "points": "1", "rank": "1", "lost": "1"}
 NUMBERS = {"residual": "m/s", "beyond": "1", "off": "1", "seen": "1", "inverted": "1"}
 BROKEN = (*BREAKDOWNS, Unstable)
+UNENDED = "not ended"       # of a part of a run that goes on, or was killed
 
 
 class Lost(RuntimeError):
-    """A reduced run that gives no body any more, or an impossible one."""
+    """A reduced run that gives no body any more, or an impossible one, in a step."""
+
+    def __init__(self, said, step):
+        super().__init__(said)
+        self.step = step
 
 
 @dataclass(frozen=True)
@@ -42,6 +47,13 @@ class Recording:
     facts: dict             # what else is to be known of it, plain values
 
 
+class Outcome(NamedTuple):
+    """How a reduced run ended."""
+
+    out_of_bounds: dict     # {step: `Sight`} of its states that were out of bounds (see `watch`)
+    lost: object            # the `Lost` with which it broke down, or None
+
+
 class Step(NamedTuple):
     """A state of a reduced run; no `Report` at the start, no `State` of one that is recorded."""
 
@@ -52,13 +64,13 @@ class Step(NamedTuple):
 
 
 def record(recording, out, known=(), on_step=None):
-    """Make a reduced run into the results file `out`; returns {step: `Sight`} of those out of
-    bounds (see `watch`). known: its states that stand there, after which it goes on (see `begun`).
+    """Make a reduced run into the results file `out`; returns an `Outcome`. known: its states that
+    stand there, after which it goes on (see `begun`).
 
-    on_step(k) is called after each step. Raises `Lost` where the run breaks down; the frames before
-    then stand. Raises `NotWritten` or `InUse`.
+    on_step(k) is called after each step. Where the run breaks down, the frames before then stand.
+    Raises `NotWritten` or `InUse`.
     """
-    writer, out_of_bounds = _writer(recording, out, len(known)), {}
+    writer, out_of_bounds, lost = _writer(recording, out, len(known)), {}, None
     try:
         with _part(writer, max(len(known) - 1, 0)) as part:
             for k, step in enumerate(steps(recording, known)):
@@ -70,9 +82,11 @@ def record(recording, out, known=(), on_step=None):
                     out_of_bounds[k] = step.sight
                 if on_step is not None:
                     on_step(k)
+    except Lost as fault:
+        lost = fault
     finally:
         writer.close()
-    return out_of_bounds
+    return Outcome(out_of_bounds, lost)
 
 
 def marked(recording):
@@ -109,11 +123,11 @@ def steps(recording, known=()):
             yield Step(state, latent, report, sight)
             k += 1
     except Nonsense as fault:
-        raise Lost(str(fault)) from fault
+        raise Lost(str(fault), k) from fault
     except BROKEN as fault:
         raise Lost(f"the reduced run broke down in step {k}: {getattr(fault, 'reason', fault)}; "
                    "are the parameters within the studied range, are there enough samples, and is "
-                   "the map good (mpm-ref rom evaluate)?") from fault
+                   "the map good (mpm-ref rom evaluate)?", k) from fault
 
 
 def _states(recording, known):
@@ -136,13 +150,22 @@ class _Part(Part):
 
     state = None
 
+    @property
+    def begun(self):
+        """Its entry of `parts` in the manifest as long as it has not ended."""
+        return {"began": self.began, "why": UNENDED, "first_step": self.first_step, **self.code}
+
 
 @contextmanager
 def _part(writer, first_step):
-    """Enter a part of a run in the manifest, whether it finishes, is interrupted or breaks down; a
-    frame that was being written then is dropped.
+    """Enter a part of a run in the manifest as it begins, so that one that is killed leaves its
+    entry; and again as it finishes, is interrupted or breaks down. A frame that was being written
+    then is dropped.
     """
     part, why = _Part(first_step), None
+    facts, frames = writer.manifest, len(writer)
+    before = facts["parts"]
+    writer.put_manifest(facts | {"parts": [*before, part.begun]})
     try:
         yield part
         why = FINISHED
@@ -153,11 +176,16 @@ def _part(writer, first_step):
         why = str(fault)
         raise
     finally:
-        if why is not None and part.state is not None:
-            _cut(writer, part.state.step + 1)
-            facts = writer.manifest
-            facts["parts"].append(part.ended(why, part.state, checkpoint.digest(part.state)))
-            writer.put_manifest(facts)
+        if why is not None:
+            _cut(writer, frames if part.state is None else part.state.step + 1)
+            writer.put_manifest(facts | {"parts": [*before, _entry(part, why)]})
+
+
+def _entry(part, why):
+    """The entry of a part that ended; of one that made no state, without where it ended."""
+    if part.state is None:
+        return part.begun | {"why": why}
+    return part.ended(why, part.state, checkpoint.digest(part.state))
 
 
 def _lay_out(h5, r):

@@ -12,6 +12,7 @@ from .decoder import Decoder, Units
 from .network import Network, layers_of, network
 
 FORMAT = 1
+SHOWN = 12          # values of a list that a sentence shows
 
 
 class Model(NamedTuple):
@@ -43,7 +44,7 @@ def load(path):
     fault = fault_of(arrays)
     if fault:
         raise ValueError(f"{path} holds no trained map: {fault}; train again")
-    net = Network(arrays["sizes"], arrays["W"], None, arrays["b"])
+    net = Network(arrays["sizes"].astype(int), arrays["W"], None, arrays["b"])
     units = Units(*(arrays[name] for name in Units._fields))
     return Model(Decoder(network(layers_of(net)), units), arrays["xhat"], arrays["rest"],
                  about_of(path, arrays))
@@ -66,17 +67,35 @@ def fault_of(arrays):
     missing = {"about", "sizes", "W", "b", *Units._fields, "xhat", "rest"} - set(arrays)
     if missing:
         return f"it lacks {', '.join(sorted(missing))}"
-    sizes = [int(n) for n in arrays["sizes"]]
-    if min(sizes, default=0) < 1 or sizes[0] <= sizes[-1]:
-        return f"layers of sizes {sizes}: expected d + r, .., d"
-    for name, shape in shapes(sizes, arrays["xhat"].shape).items():
+    if fault := fault_of_sizes(arrays["sizes"]):
+        return fault
+    for name, shape in shapes(arrays["sizes"].tolist(), arrays["xhat"].shape).items():
         if arrays[name].shape != shape:
             return f"{name} has shape {arrays[name].shape}, expected {shape}"
+        if arrays[name].dtype.kind != "f":
+            return f"{name} is of type {arrays[name].dtype}, expected floating-point numbers"
         if not np.isfinite(arrays[name]).all():
             return f"{name} has numbers that are not finite"
     if not (arrays["span"].min() > 0.0 and arrays["std"].min() > 0.0):
         return "span or std has numbers that are not positive"
     return None
+
+
+def fault_of_sizes(sizes):
+    """What is wrong with the widths of layers, or None."""
+    if sizes.ndim != 1 or sizes.dtype.kind not in "iu":
+        return (f"sizes is an array of shape {sizes.shape} and type {sizes.dtype}: expected whole "
+                "numbers d + r, .., d")
+    if sizes.min(initial=1) < 1 or len(sizes) < 2 or sizes[0] <= sizes[-1]:
+        return f"layers of sizes {in_short(sizes.tolist())}: expected d + r, .., d"
+    return None
+
+
+def in_short(values):
+    """A list as text; of a long one, its first values and how many there are."""
+    if len(values) <= SHOWN:
+        return str(values)
+    return f"{str(values[:SHOWN])[:-1]}, .. {len(values)} in all]"
 
 
 def shapes(sizes, found):

@@ -4,10 +4,12 @@ A run from the start is off by both. One that begins when the patch lets go, fro
 that is nearest to the full run and with its velocity, is off by the free part alone.
 """
 
+from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
 
+from mpm_ref.reduced.case import prescribed
 from mpm_ref.reduced.errors import Squares
 from mpm_ref.reduced.march import march, model, picked, stepped
 from mpm_ref.rom.latent import initial
@@ -77,8 +79,14 @@ def add(sums, states, x):
 
 
 def let_go(one):
-    """Number of the step of a `Case` after which its patch lets go."""
-    return round(one.problem.conditions.prescribed[1].until / one.problem.clock.dt)
+    """Number of the step of a `Case` after which its patch, the only region that ever does, lets
+    go. Raises ValueError where none or several do.
+    """
+    ends = [part.until for part in prescribed(one.problem) if isfinite(part.until)]
+    if len(ends) != 1:
+        raise ValueError(f"{len(ends)} prescribed regions let go: expected one, that of a poke; "
+                         "give it, and it alone, an `until`")
+    return round(ends[0] / one.problem.clock.dt)
 
 
 def swinging(one, decoder, rest, way, x):

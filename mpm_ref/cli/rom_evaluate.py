@@ -1,0 +1,59 @@
+"""`mpm-ref rom evaluate`: how far reduced runs are off the full-order runs that were held out."""
+
+from math import isfinite
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..reduced import dataset
+from ..reduced.evaluate import REDUCED, breakdowns, draw, evaluate, facts, lines, together
+from ..scene import SceneError
+from ..store.atomic import require_place
+from . import faults
+from .faults import options
+from .info import as_json
+from .look import Machine
+from .outputs import PICTURES, require_ending, require_free
+from .rom_options import Data, MapFile, Overwrite, StudyName, at_work, map_of, named
+from .terminal import passing, warn
+
+
+def judge(
+    name: StudyName,
+    map: MapFile = None,
+    data: Data = None,
+    out: Annotated[Path | None, typer.Option(
+        "--out", "-o", help="Picture of the errors over time (png, pdf or svg), default: "
+        "MAP.errors.png.")] = None,
+    overwrite: Overwrite = False,
+    json: Machine = False,
+):
+    """Compare reduced runs with the full-order runs that were held out.
+
+    Their position errors by three measures, beside those of the map's nearest states, which no
+    reduced run on it is expected to beat. Exit status: 0 done, 2 bad input, 3 a reduced run broke
+    down, 4 a file could not be written, 130 Ctrl-C.
+    """
+    with at_work(name) as study:
+        picture = out or named(map, study, ".npz").with_suffix(".errors.png")
+        with options():
+            require_ending(picture, PICTURES)
+            require_free(picture, overwrite)
+            require_place(picture)
+            if not study.test:
+                raise SceneError(f"{study.path}: test = 0: no run is held out to compare with")
+            _, model = map_of(name, study, map)
+            snapshots = dataset.load(study, named(data, study, "-data"), study.test)
+            runs = passing(unit="run", iterable=evaluate(study, model, snapshots),
+                           total=len(study.test))
+            found = list(runs)
+        all_runs = together(found, snapshots.X)
+        draw(found, study.names, snapshots.dt, picture)
+        if json:
+            print(as_json({"study": str(study.path), "picture": str(picture),
+                           **facts(study, found, all_runs)}))
+        else:
+            print("\n".join([*lines(study, found, all_runs), str(picture)]))
+        warn(breakdowns(study, found))
+    raise typer.Exit(0 if isfinite(all_runs[REDUCED].origin) else faults.UNSTABLE)

@@ -1,0 +1,156 @@
+"""`mpm-ref info` of a study and of a map, and `mpm-ref rom studies`, the list of shipped ones."""
+
+from pathlib import Path
+
+import msgspec
+
+from ..reduced import maps
+from ..reduced.case import case
+from ..reduced.study_file import checked, plain
+from ..reduced.tables import CURVED, KEYS, MODES, NETWORK
+from ..rom.curved import Curved
+from ..rom.decoder import Decoder
+from ..scene import SceneError
+from ..sealed import MAGIC
+from ..store.words import counted
+from .faults import one_line
+from .look import Machine, listed
+from .rom_options import studied
+from .shipped import shipped_scenes, shipped_studies
+
+TABLES = {"parameter", "map"}       # of a study of reduced runs; nothing else has such
+TERMS = ("position", "F", "velocity")       # of the loss of a network
+MEASURES = {"origin": "of the distance from the scene's origin",
+            "centroid": "from the body's centroid", "displacement": "of the displacement"}
+
+
+def studies(json: Machine = False):
+    """List the studies that come with the package."""
+    with one_line():
+        listed({name: checked(plain(path)).title for name, path in shipped_studies().items()
+                if of_reduced(path)}, json)
+
+
+def is_map(name):
+    """Whether a name is that of a file that begins as maps do."""
+    if not Path(name).is_file():
+        return False
+    with open(name, "rb") as file:
+        return file.read(len(MAGIC)) == MAGIC
+
+
+def is_study(name):
+    """Whether a name is that of a study's file, or of a shipped study and no scene's."""
+    path = Path(name)
+    if not path.is_file() and name not in shipped_scenes():
+        path = shipped_studies().get(name, path)
+    return of_reduced(path)
+
+
+def of_reduced(path):
+    """Whether a path is that of a study of reduced runs, whatever is wrong with its tables."""
+    try:
+        return bool(TABLES & set(plain(path)))
+    except SceneError:
+        return False
+
+
+def of_study(name):
+    """Scene, runs, parameters, map and reduced runs of a study. Raises SceneError, and ValueError
+    for a scene that reduced runs do not know.
+    """
+    study = studied(name)
+    tables, one = study.tables, case(study.scene(study.mu[0]))
+    known = ("kind", "r", *KEYS[tables.map.kind])
+    return {
+        "study": str(study.path), "title": tables.title, "scene": tables.scene,
+        "dim": study.base.dim, "points": len(one.X), "dx": study.base.dx, "dt": study.base.dt,
+        "steps": study.base.steps, "runs": len(study.mu), "held_out": study.test,
+        "parameters": ranges(study.names, study.mu),
+        "keys": {one.name: one.key for one in tables.parameter},
+        "map": {key: value for key, value in msgspec.to_builtins(tables.map).items()
+                if key in known},
+        "run": msgspec.to_builtins(tables.run), "study_sha256": study.digest,
+    }
+
+
+def study_lines(facts):
+    """Facts of a study in words."""
+    map, run = facts["map"], facts["run"]
+    return [
+        f"{facts['study']}: a study, {facts['title'] or 'untitled'}: "
+        f"{counted(facts['runs'], 'run')} of the scene {facts['scene']}, "
+        f"{len(facts['held_out'])} held out",
+        f"{facts['dim']}D, {facts['points']} points, dx = {facts['dx']:g} m, "
+        f"{counted(facts['steps'], 'step')} of {facts['dt']:.6g} s",
+        f"parameters: {in_ranges(facts['parameters'], facts['keys'])}",
+        f"map: {map['kind']}, r = {map['r']}; reduced runs: {run['quadrature']} quadrature, "
+        f"{run['projection']} projection, {run['points'] or 'all'} points",
+    ]
+
+
+def of_map(path):
+    """What a file of `mpm-ref rom train` holds, and what it says of its making; None for what it
+    does not say. Raises ValueError for a file that is damaged or no map.
+    """
+    model = maps.read(path)
+    about, map = model.about, model.decoder
+    runs, levels, r = model.xhat.shape
+    names, loss, fit = about.get("parameters", ()), about.get("loss"), about.get("fit", {})
+    return {
+        "map": str(path), "kind": kind_of(map), "r": r, "dim": map.dim,
+        "points": fit.get("points", points_of(map)), "runs": runs, "steps": levels - 1,
+        "parameters": ranges(names, about["mu"]) if names else None,
+        "errors": fit.get("errors"), "last_loss": loss[-1] if loss else None, "about": about,
+    }
+
+
+def map_lines(facts):
+    """Facts of a map in words."""
+    points = f", {counted(facts['points'], 'point')}" if facts["points"] else ""
+    varied = f", {in_ranges(facts['parameters'])}" if facts["parameters"] else ""
+    runs = f"{counted(facts['runs'], 'run')} of {counted(facts['steps'], 'step')}"
+    lines = [f"{facts['map']}: a map, {facts['kind']}, r = {facts['r']}, {facts['dim']}D{points}"
+             f"{source(facts['about'])}", f"made of {runs}{varied}"]
+    if facts["errors"]:
+        off = ", ".join(f"{100.0 * facts['errors'][name]:.3g} % {words}"
+                        for name, words in MEASURES.items() if name in facts["errors"])
+        lines.append(f"off these runs, at its own latent coordinates, by {off}")
+    if facts["last_loss"]:
+        total, *terms = facts["last_loss"]
+        named = ", ".join(f"{name} {term:.3g}" for name, term in zip(TERMS, terms, strict=True))
+        lines.append(f"last loss kept: {total:.3g} ({named})")
+    lines.append(f"made by: {facts['about'].get('command', 'unknown')}")
+    return lines
+
+
+def source(about):
+    """The study and scene that a map says it is of, in words."""
+    names = {"study": about.get("name") or about.get("study", "")[:12], "scene": about.get("scene")}
+    return "".join(f", {what} {name}" for what, name in names.items() if name)
+
+
+def in_ranges(parameters, keys=None):
+    """{name: [least, largest]} in words, with the places in the scene."""
+    return ", ".join(f"{name} = {low:g} .. {high:g}" + (f" ({keys[name]})" if keys else "")
+                     for name, (low, high) in parameters.items())
+
+
+def kind_of(map):
+    """The kind of a map as study files name it."""
+    if isinstance(map, Decoder):
+        return NETWORK
+    return CURVED if isinstance(map, Curved) else MODES
+
+
+def points_of(map):
+    """How many points modes have; None of a network, which knows none."""
+    if isinstance(map, Decoder):
+        return None
+    return len((map.modes if isinstance(map, Curved) else map).X)
+
+
+def ranges(names, mu):
+    """{name: [least, largest]} of parameters mu (runs, parameters)."""
+    return {name: [min(values), max(values)] for name, values in
+            zip(names, zip(*map(tuple, mu), strict=True), strict=True)}
