@@ -1,5 +1,6 @@
 """`mpm-ref oracle record`: what it warns of and what it refuses."""
 
+import h5py
 import pytest
 from command_line import SCENE, assert_told, mpm_ref
 
@@ -45,3 +46,20 @@ def test_steps_past_the_end_of_the_run_are_refused(scene, tmp_path, head, length
 @pytest.mark.parametrize("eps", ["0", "-1e-9", "nan", "inf"])
 def test_a_tolerance_that_is_none_is_told(implicit, tmp_path, eps):
     assert_told(record(implicit, tmp_path, "--eps", eps), 2, f"--eps {float(eps)}: expected")
+
+
+def test_gradients_are_recorded_when_asked_for(scene, tmp_path):
+    golden = tmp_path / "golden.h5"
+    done = record(scene, tmp_path, "--begin", 2, "--steps", 1, "--adjoint")
+    assert (done.exit_code, done.stderr) == (0, "")
+    with h5py.File(golden) as f:
+        assert {"gravity_grad", "velocity_bc_grad"} < set(f["steps/0"])
+    done = mpm_ref("oracle", "check", golden, golden)
+    assert (done.exit_code, done.stdout[:7]) == (0, "agrees:")
+    assert_told(record(scene, tmp_path, "--adjoint", "--steps", 3), 2, "exists: add --overwrite")
+
+
+def test_what_has_no_gradients_is_told(implicit, scene, tmp_path):
+    assert_told(record(implicit, tmp_path, "--adjoint"), 2, "is implicit: expected an explicit St")
+    assert_told(record(scene, tmp_path, "--adjoint", "--eps", "1e-9"), 2,
+                "--adjoint with --eps 1e-09: implicit steps have no adjoint")

@@ -25,6 +25,7 @@ def record(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a golden file.")] = False,
     begin: Annotated[int, typer.Option(help="Steps of the run to make before.")] = 0,
     eps: Annotated[float | None, typer.Option(help="Tolerance of implicit steps.")] = None,
+    adjoint: Annotated[bool, typer.Option("--adjoint", help="Record gradients too.")] = False,
 ):
     """Run the first steps of a scene and record every stage with the error of each number."""
     with one_line():
@@ -33,8 +34,14 @@ def record(
             keep_scene(path, out)
             if eps is not None and not 0.0 < eps < inf:
                 raise ValueError(f"--eps {eps}: expected a tolerance, a finite number > 0")
-            problem = scene.build(scene.load(path), str(path))
-            idle = oracle.record(problem, out, steps, overwrite, begin, eps)
+            if adjoint and eps is not None:
+                raise ValueError(f"--adjoint with --eps {eps}: implicit steps have no adjoint, and "
+                                 "explicit ones solve nothing; leave one of them out")
+            problem, idle = scene.build(scene.load(path), str(path)), ()
+            if adjoint:
+                oracle.record_adjoint(problem, out, steps, overwrite, begin)
+            else:
+                idle = oracle.record(problem, out, steps, overwrite, begin, eps)
         warn(nothing_to_solve(idle))
         print(f"{out}: {counted(steps, 'step')} of {problem.title or name}")
 

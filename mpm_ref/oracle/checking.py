@@ -1,5 +1,6 @@
 """Another code's arrays against a golden file: the first stage that departs, and where."""
 
+import json
 from pathlib import Path
 
 import h5py
@@ -140,11 +141,15 @@ def in_units(off, tol):
 
 
 def words(group, array, name, i):
-    """The entry i of an array in words: which node, particle, component."""
+    """The entry i of an array in words: which node, particle, component, parameter."""
     if array.where == "body":
         return ENERGIES[i[0]]
+    if array.where == "parameters":
+        body, _, role = name.partition("/")
+        record = group.file[f"bodies/{body}"].attrs[f"{role.removesuffix('_grad')}_parameters"]
+        return f"parameter {list(json.loads(record))[i[0]]}"
     if array.where == "step":
-        return "the sum"
+        return "the sum" if group[name].size == 1 else f"component {i[0]}"
     component = f" component {', '.join(map(str, i[1:]))}" if len(i) > 1 else ""
     if array.where == "nodes":
         level = f" of level {array.level}" if array.level else ""

@@ -8,6 +8,7 @@ in principal space [Teran2005], with negative eigenvalues set to zero (HOT-alg1)
 `materials.principal`, where laws give the quotients in closed form.
 """
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -39,36 +40,44 @@ def stresses(s, law):
 
 def slopes(s, law):
     """A (N, d, d): dP_k/ds_l."""
+    return derivatives(partial(stresses, law=law), s)
+
+
+def derivatives(f, s):
+    """df_k/ds_l (N, d, d) of a function f of principal stretches s (N, d)."""
     out = np.empty((*s.shape, s.shape[1]), s.dtype)
     for l in range(s.shape[1]):
         moved = s.astype(COMPLEX[s.dtype])
         moved[:, l] += s.dtype.type(TINY) * 1j
-        out[:, :, l] = stresses(moved, law).imag / s.dtype.type(TINY)
+        out[:, :, l] = f(moved).imag / s.dtype.type(TINY)
     return out
 
 
-def mean_slope(s, law, k, l):
-    """Mean of A_kk - A_kl on the way that exchanges s_k and s_l: it is a_kl."""
+def mean_slope(f, s, k, l):
+    """Mean of A_kk - A_kl, A the `derivatives` of an isotropic f, on the way that exchanges s_k and
+    s_l: it is (f_k - f_l)/(s_k - s_l).
+    """
     total = np.zeros(len(s), s.dtype)
     points, weights = (a.astype(s.dtype) for a in np.polynomial.legendre.leggauss(POINTS))
     for t, weight in zip(points, weights / weights.sum()):
         at, way = s.copy(), (1 + t) / 2 * (s[:, l] - s[:, k])
         at[:, k] += way
         at[:, l] -= way
-        A = slopes(at, law)
+        A = derivatives(f, at)
         total += weight * (A[:, k, k] - A[:, k, l])
     return total
 
 
 def quotients(s, law):
     """a, b (N, d, d) of all pairs."""
-    P, d = stresses(s, law), s.shape[1]
+    f = partial(stresses, law=law)
+    P, d = f(s), s.shape[1]
     a, b = np.zeros((2, *s.shape, d), s.dtype)
     for k, l in zip(*np.tril_indices(d, -1)):
         gap = s[:, k] - s[:, l]
         near = abs(gap) < NEAR
         far = (P[:, k] - P[:, l]) / np.where(near, 1, gap)
-        a[:, k, l] = a[:, l, k] = np.where(near, mean_slope(s, law, k, l), far)
+        a[:, k, l] = a[:, l, k] = np.where(near, mean_slope(f, s, k, l), far)
         b[:, k, l] = b[:, l, k] = (P[:, k] + P[:, l]) / (s[:, k] + s[:, l])
     return a, b
 

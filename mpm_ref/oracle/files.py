@@ -9,7 +9,7 @@ import numpy as np
 
 from ..body import Body
 from ..store.atomic import replacing, require_place
-from . import implicit_recording, recording, solving
+from . import adjoint_recording, implicit_recording, recording, solving
 from .matching import refuse_no_numbers
 from .schema import BESIDE, EVERY, FORMAT, NODES, key, taken
 
@@ -29,12 +29,31 @@ def record(problem, path, steps, overwrite=False, begin=0, eps=None):
     """
     require_free(path, overwrite)
     refuse_names(problem)
+    run = implicit_recording.run if problem.integrator == "implicit" else recording.run
+    return put(solved_to(problem, eps), path, (steps, begin), run)
+
+
+def record_adjoint(problem, path, steps, overwrite=False, begin=0):
+    """Record explicit steps as `record` does, each with its adjoint, stage by stage backwards.
+
+    Raises ValueError as that does, and for what has no adjoint: implicit steps, positions that are
+    clipped, conditions, laws and flows without one.
+    """
+    require_free(path, overwrite)
+    refuse_names(problem)
+    adjoint_recording.require_adjoints(problem)
+    put(problem, path, (steps, begin), adjoint_recording.run)
+
+
+def put(problem, path, when, run):
+    """Write the golden file of the steps that `run` records, when = (steps, begin); returns the
+    numbers of those that had nothing to solve.
+    """
+    steps, begin = when
     if steps < 1 or begin < 0:
         raise ValueError(f"steps = {steps}, begin = {begin}: expected at least one step to record, "
                          "after 0 or more")
-    problem = solved_to(problem, eps)
     problem, state = recording.begun(problem, begin)
-    run = implicit_recording.run if problem.integrator == "implicit" else recording.run
     idle = []
     with replacing(path) as part, h5py.File(part, "w", libver=("v110", "v110")) as f:
         describe(f, problem)

@@ -42,7 +42,7 @@ def matched(group, theirs, array, name):
     a, golden = theirs[name][()], group[name][()]
     if array.where == "nodes":
         return by_node(group, theirs, array, a, golden)
-    if array.where in ("body", "step"):
+    if array.where in ("body", "parameters", "step"):
         require_shape(a, golden.shape)
         return whole(a)
     body = name.partition("/")[0]

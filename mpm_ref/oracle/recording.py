@@ -20,6 +20,7 @@ from ..explicit import Stepper
 from ..simulate import State, advance, ended, frame_is_due, next_dt, rebound, swiftest
 from ..store.words import counted
 from . import scaling, stages
+from .schema import WHERE
 from .twin import Twin, placed
 
 MARGIN = 8.0            # another code's errors against the reference's own
@@ -81,32 +82,57 @@ def run(problem, steps, state=None):
     A run stands at `state`, by default at the start of the problem. Raises ValueError for steps
     past its end, and where the reference's own error is too large to judge others by.
     """
-    ours, mirrored = (problem_of(problem, order) for order in (1, -1))
-    steppers = [started(p) for p in (ours, mirrored)]
-    twin, errors = Twin(problem), [{} for _ in problem.bodies]
-    dt, start = step_length(problem, steppers[0], state), 0.0 if state is None else state.t
-    refuse_past_end(problem.clock, state, dt, steps)
+    sides = Sides(problem, state)
+    refuse_past_end(problem.clock, state, sides.dt, steps)
     for k in range(steps):
-        t = start + k * dt
-        seen, contacts = stages.step(ours, ours.bodies, steppers[0], t, dt)
-        other, _ = stages.step(mirrored, mirrored.bodies, steppers[1], t, dt)
+        yield sides.step(k)
+
+
+class Sides:
+    """The three runs side by side, from a state on, by default the start of the problem."""
+
+    def __init__(self, problem, state=None):
+        self.runs = tuple(problem_of(problem, order) for order in (1, -1))
+        self.steppers = [started(p) for p in self.runs]
+        self.twin, self.errors = Twin(problem), [{} for _ in problem.bodies]
+        self.dt = step_length(problem, self.steppers[0], state)
+        self.start = 0.0 if state is None else state.t
+        self.last = None
+
+    def step(self, k):
+        """The `Recorded` of step k, which all runs make; `last` is how."""
+        t, twin, (ours, mirrored) = self.start + k * self.dt, self.twin, self.runs
+        seen, contacts = stages.step(ours, ours.bodies, self.steppers[0], t, self.dt)
+        other, _ = stages.step(mirrored, mirrored.bodies, self.steppers[1], t, self.dt)
         before = twin.bodies
-        exact, done = twin.step(dt, seen["nodes"], contacts)
+        exact, done = twin.step(self.dt, seen["nodes"], contacts)
         held = placed(contacts, done.nodes.box, twin.real)
-        found = scaling.of_step(twin, before, done, held, errors)
+        found = scaling.of_step(twin, before, done, held, self.errors)
+        self.last = Last(before, done, held, found, self.errors, (seen, other))
         S = scaling.listed(found, done.nodes.box, seen["nodes"])
         for name in twin.names:
             at = exact[f"{name}/base"], seen[f"{name}/base"]
             exact[f"{name}/weights"] = aligned(exact[f"{name}/weights"], *at)
             S[f"{name}/weights"] = aligned(S[f"{name}/weights"], *at)
-        other = unmirrored(other, seen["nodes"])
+        other = unmirrored(other, other["nodes"], seen["nodes"])
         arrays = {key: golden(seen[key], S[key], exact[key], other[key])
                   for key in S if key in seen}
         refuse_unsure(arrays, k)
-        errors = [{field: arrays[f"{name}/{field}"].twin for field in "xvCF"
-                   if f"{name}/{field}" in arrays} for name in twin.names]
+        self.errors = [{field: arrays[f"{name}/{field}"].twin for field in "xvCF"
+                        if f"{name}/{field}" in arrays} for name in twin.names]
         bases = {name: seen[f"{name}/base"] for name in twin.names}
-        yield Recorded(t, dt, seen["nodes"], bases, arrays, {}, {}, None)
+        return Recorded(t, self.dt, seen["nodes"], bases, arrays, {}, {}, None)
+
+
+class Last(NamedTuple):
+    """How the runs made their last step."""
+
+    before: list        # the twin's bodies before it
+    done: object        # the twin's `Step`
+    contacts: dict      # by the node's index in the twin's box
+    found: dict         # {key: scale}, grid arrays over that box
+    errors: list        # of what the bodies brought into the step, see `scales.inputs`
+    seen: tuple         # {key: array} of the kernels, and of those with particles reversed
 
 
 def refuse_past_end(clock, state, dt, steps):
@@ -164,13 +190,20 @@ def step_length(problem, stepper, state=None):
     return next_dt(problem.clock, state, swiftest(problem, stepper, state))
 
 
-def unmirrored(seen, nodes):
-    """What the reversed run saw, in the order of the other: particles, and grid arrays on nodes."""
-    place = {tuple(i): k for k, i in enumerate(seen["nodes"].tolist())}
-    at = np.array([place.get(tuple(i), -1) for i in nodes.tolist()])
-    return {key: a[::-1] if "/" in key and not key.endswith("/energy")
-            else a if "/" in key else np.where(shaped(at >= 0, a), a[at], 0)
-            for key, a in seen.items()}
+def unmirrored(seen, nodes, golden_nodes):
+    """What the reversed run saw on its nodes, in the order of the other: particles, and grid arrays
+    on the golden nodes.
+    """
+    place = {tuple(i): k for k, i in enumerate(nodes.tolist())}
+    at = np.array([place.get(tuple(i), -1) for i in golden_nodes.tolist()])
+
+    def turned(name, a):
+        where = WHERE.get(name)
+        if where == "nodes":
+            return np.where(shaped(at >= 0, a), a[at], 0)
+        return a[::-1] if where in ("particles", "pairs") else a
+
+    return {key: turned(key.split("/")[-1], a) for key, a in seen.items()}
 
 
 def shaped(mask, a):
@@ -180,7 +213,11 @@ def shaped(mask, a):
 
 def golden(value, scale, exact, other):
     """The `Golden` of one array, from the twin's and the reversed run's."""
-    scale = floored(scale)
+    return measured(value, floored(scale), exact, other)
+
+
+def measured(value, scale, exact, other):
+    """The `Golden` of one array with the scales as they are."""
     off_twin = abs(value - exact).astype(float)
     off_order = abs(value - other)
     unit = EPS["f64"] * np.maximum(scale, np.finfo(float).tiny)

@@ -11,7 +11,7 @@ class Array(NamedTuple):
 
     name: str
     stage: str
-    where: str      # "nodes", "particles", "pairs" of both, "body", or "step": of all nodes
+    where: str      # "nodes", "particles", "pairs" of both, "body", its "parameters", or "step"
     unit: str
     level: int = 0  # of multigrid: whose nodes
 
@@ -54,17 +54,45 @@ SOLVED = (
     Array("dv", "accepted step", "nodes", "m/s"),
 )
 IMPLICIT = (*ARRAYS[:3], *SOLVED, *ARRAYS[6:])
-EVERY = (*ARRAYS, *SOLVED)
+# Backwards: gradients, by these fields, of a loss [m/s] of the state after the step.
+ADJOINT = (
+    Array("F_trial_grad", "return map adjoint", "particles", "m/s"),
+    Array("y_grad", "return map adjoint", "particles", "m/(s Pa)"),
+    Array("F_strain_grad", "F trial adjoint", "particles", "m/s"),
+    Array("L_grad", "F trial adjoint", "particles", "m"),
+    Array("velocity_bc_grad", "g2p adjoint", "nodes", "1"),
+    Array("velocity_old_grad", "g2p adjoint", "nodes", "1"),
+    Array("x_g2p_grad", "g2p adjoint", "particles", "1/s"),
+    Array("velocity_grad", "boundaries adjoint", "nodes", "1"),
+    Array("mass_grad", "velocity adjoint", "nodes", "m/(s kg)"),
+    Array("momentum_grad", "velocity adjoint", "nodes", "1/kg"),
+    Array("force_grad", "velocity adjoint", "nodes", "s/kg"),
+    Array("gravity_grad", "velocity adjoint", "step", "s"),
+    Array("x_grad", "p2g adjoint", "particles", "1/s"),
+    Array("v_grad", "p2g adjoint", "particles", "1"),
+    Array("C_grad", "p2g adjoint", "particles", "m"),
+    Array("tau_grad", "p2g adjoint", "particles", "m/(s Pa)"),
+    Array("m_grad", "p2g adjoint", "particles", "m/(s kg)"),
+    Array("V0_grad", "p2g adjoint", "particles", "m/(s m^d)"),
+    Array("b_grad", "p2g adjoint", "particles", "s"),
+    Array("F_grad", "stress adjoint", "particles", "m/s"),
+    Array("law_grad", "stress adjoint", "parameters", "m/s over that of the parameter"),
+    Array("flow_grad", "stress adjoint", "parameters", "m/s over that of the parameter"),
+)
+EVERY = (*ARRAYS, *SOLVED, *ADJOINT)
+WHERE = {array.name: array.where for array in EVERY}
 # Zero at a node that is not listed.
 SUMS = ("mass", "momentum", "force", "gradient_start", "gradient_trial", "product_start",
-        "product_trial", *(array.name for array in MULTIGRID))
+        "product_trial", *(array.name for array in MULTIGRID), "velocity_bc_grad",
+        "velocity_old_grad", "velocity_grad")
 ENERGIES = ("kinetic", "elastic", "gravity")    # the entries of `energy`
 
 # Carried beside them, to find one's way and to apply operators to: no numbers to compare.
 NODES = ("nodes", *(f"nodes{k}" for k in range(1, LEVELS)))
 GIVEN = ("trial", "probe", "load", *(f"probe{k}" for k in range(1, LEVELS)))
+SEEDS = tuple(f"{name}_seed" for name in ("x", "v", "C", "F", "y"))     # of bodies
 COUNTED = (*NODES, "base", "id")                # whole numbers
-BESIDE = (*COUNTED, *GIVEN)
+BESIDE = (*COUNTED, *GIVEN, *SEEDS)
 
 
 def taken(integrator):
@@ -82,4 +110,4 @@ def key(array, body=None):
 
 def arrays_of(integrator):
     """The arrays of a step of an integrator, "explicit" or "implicit", in the order of stages."""
-    return IMPLICIT if integrator == "implicit" else ARRAYS
+    return IMPLICIT if integrator == "implicit" else (*ARRAYS, *ADJOINT)
