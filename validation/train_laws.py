@@ -1,4 +1,5 @@
-"""`python -m validation.train_laws NAME...`: train the laws of NCLaw's experiments anew.
+"""`python -m validation.train_laws NAME...`: train the laws of NCLaw's experiments anew, the graph
+networks that they are compared with, the small laws of trades and those of the filmed dough.
 
 It needs PyTorch. A training that is cut off goes on from its checkpoint.
 """
@@ -10,20 +11,24 @@ import torch
 import typer
 from tqdm import tqdm
 
-from mpm_ref.materials import make_flow, make_law
 from mpm_ref.nclaw import weights
-from mpm_ref.nclaw.apart import world
-from mpm_ref.nclaw.learn import sysid
-from mpm_ref.nclaw.learn.fit import train
-from mpm_ref.nclaw.learn.labeled import labels_of, train_labeled
-from mpm_ref.nclaw.learn.methods import LABELED, SYS_ID, laws_of, trained_of
+from mpm_ref.nclaw.gnn import weights as of_graphs
+from mpm_ref.nclaw.learn import drive
+from mpm_ref.nclaw.learn.methods import SYS_ID
 from mpm_ref.nclaw.learn.recipe import Recipe
-from mpm_ref.nclaw.learn.rollout import trajectory_of
 from mpm_ref.scene import build
 
+from .nclaw import bundle
+from .nclaw.dough import DoughNet, doughs
 from .nclaw.environments import environment, trajectory
+from .nclaw.met import bounds
 from .nclaw.nets import FOLDER, identity, nets
+from .nclaw.simulators import GraphNet
+from .nclaw.trade_nets import Small, small_nets
 from .provenance import commit, provenance
+from .train_dough import filmed_laws
+from .train_gnn import simulator
+from .train_small import bundled
 from .training import KEPT, Checkpoints, Folder, Names, Threads, train_all
 
 ROOT = Path(__file__).parents[1]
@@ -31,31 +36,15 @@ ROOT = Path(__file__).parents[1]
 
 def begun(net):
     """`Laws` of a net before training."""
-    elastic, plastic = weights.RECORDS[net.elastic], weights.RECORDS[net.plastic]
-    if net.method != SYS_ID:
-        return laws_of(net.method, net.seed, elastic(), plastic())
-    material = environment(net.environment).body[0].material
-    unit = make_law(material.law, E=1.0, nu=material.nu)
-    return sysid.known_laws(unit, material.E, begun_flow(material.flow, unit) or plastic())
-
-
-def begun_flow(flow, law):
-    """The flow of a scene with its constant at `sysid.START` of its value, or None."""
-    if flow.type == "none":
-        return None
-    scaled = {name: sysid.START * getattr(flow, name) for name in ("friction_angle", "tau_y")
-              if getattr(flow, name) is not None}
-    return make_flow(flow.type, law, 3, **scaled, s_min=flow.s_min)
+    kinds = () if net.method == SYS_ID else (
+        weights.RECORDS[net.elastic](), weights.RECORDS[net.plastic]())
+    return drive.begun(net.method, net.seed, kinds, environment(net.environment).body[0].material)
 
 
 def taught(net, recipe, laws, checkpoint, show):
     """`laws` trained as the method of a net asks for; returns the session."""
-    problem = build(environment(net.environment))
-    observed, where = trajectory_of(trajectory(net.environment)), world(problem)
-    if net.method == LABELED:
-        labels = labels_of(observed, problem.bodies[0].law, where.dt)
-        return train_labeled(recipe, laws, where, labels, checkpoint, show)
-    return train(recipe, laws, where, observed, checkpoint, show)
+    seen = build(environment(net.environment)), trajectory(net.environment)
+    return drive.taught(net.method, recipe, laws, seen, checkpoint, show)
 
 
 def made(name, checkpoints, threads):
@@ -73,16 +62,27 @@ def made(name, checkpoints, threads):
     about = {**identity(net), "recipe": asdict(recipe), "threads": threads, **took,
              "command": f"python -m validation.train_laws {name}", "torch": torch.__version__,
              "errors": [epoch.error for epoch in done.history], **provenance(commit(ROOT))}
-    return weights.Laws(*map(trained_of, laws), about)
+    stored = drive.stored(laws, about)
+    return stored._replace(about={**about, "seen": bounds(net, stored),
+                                  "dt": environment(net.environment).dt})
 
 
 def main(names: Names = None, folder: Folder = FOLDER, checkpoints: Checkpoints = KEPT,
          threads: Threads = 1):
-    """Train laws and write their weights."""
+    """Train laws and graph networks and write their weights."""
     def make(name, folder, checkpoints):
-        weights.save(folder / f"{name}.npz", made(name, checkpoints, threads))
+        path, net = folder / f"{name}.npz", known[name]
+        if isinstance(net, GraphNet):
+            of_graphs.save(path, simulator(name, net, checkpoints / f"{name}.pt", threads))
+        elif isinstance(net, Small):
+            bundle.save(path, bundled(name, net, threads))
+        elif isinstance(net, DoughNet):
+            weights.save(path, filmed_laws(name, net, checkpoints / f"{name}.pt", threads))
+        else:
+            weights.save(path, made(name, checkpoints, threads))
 
-    train_all(names, nets(), (folder, checkpoints), threads, make)
+    known = {**nets(), **small_nets(), **doughs()}
+    train_all(names, known, (folder, checkpoints), threads, make)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,8 @@
 """How the errors of NCLaw's laws fall in training, as their weights tell (the inset of section
-4.7 among them).
+4.7 among them); of graph networks, how far off they run freely.
 """
+
+from mpm_ref.nclaw.gnn.simulator import Simulator
 
 from ..registry import experiment
 from .tables import known, tell
@@ -16,6 +18,9 @@ def loss(run):
     rows = []
     for method, own in found.items():
         for name, laws in own.items():
+            if isinstance(laws, Simulator):
+                record_picked(run, f"nclaw.loss.{method}.{name}", laws.about)
+                continue
             errors = laws.about["errors"]
             rows += [(method, name, epoch, error) for epoch, error in enumerate(errors, 1)]
             record(run, f"nclaw.loss.{method}.{name}", errors)
@@ -29,3 +34,12 @@ def record(run, target, errors):
         run.record(f"{target}.{word}", error, unit="m^2", comparator="info",
                    scale=f"{len(errors)} epochs",
                    note="mean over steps from restarts of the horizon of that epoch")
+
+
+def record_picked(run, target, about):
+    """Record what a graph network was picked for."""
+    errors, checks = about["errors"], len(about["errors"])
+    run.record(f"{target}.picked", errors[about["picked"]], unit="m^2", comparator="info",
+               scale=f"{about['steps']} steps, {checks} checks",
+               note=f"the free run along the first run that it learned from, at check "
+                    f"{about['picked'] + 1}; at the last one {errors[-1]} m^2")

@@ -8,10 +8,12 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from mpm_ref.nclaw.weights import load
+from mpm_ref.nclaw import weights
+from mpm_ref.nclaw.gnn import weights as of_graphs
 from mpm_ref.scene.text import canonical
 
 from .environments import ENVIRONMENTS, environment
+from .simulators import GraphNet, simulators
 
 FOLDER = Path(__file__).parent / "weights"
 
@@ -40,13 +42,16 @@ PLAIN = {"elastic": "PlainStress", "plastic": "PlainCorrection"}
 SEEDS = (1, 2)              # beside 0
 SPEED_WEIGHT = 1e-4         # [s^2], ours: an error of 1 m/s counts as one of 0.01 m
 LABELED = {"epochs": 30, "elastic_rate": 0.1, "plastic_rate": 0.1}
+ADMISSIBLE = {"elastic": "Energetic", "plastic": "Contraction", "method": "admissible",
+              "elastic_rate": 0.1, "plastic_rate": 0.01}
 
 
 def nets():
-    """{name: `Net`} of all experiments."""
+    """{name: `Net` or `GraphNet`} of all experiments."""
     return {
         **{name: Net(name) for name in ENVIRONMENTS},
         **{f"{name}-{method}": net for name in ENVIRONMENTS for method, net in others(name)},
+        **simulators(),
         **{f"{name}-seed-{seed}": Net(name, seed=seed) for name in ENVIRONMENTS for seed in SEEDS},
         "plasticine-no-rotation": Net("plasticine", **PLAIN, method="no rotation"),
         "water-velocity": Net("water", velocity=SPEED_WEIGHT),
@@ -62,6 +67,7 @@ def others(name):
     yield "neural-released", Net(name, "ReleasedStretchStress", "NoFlow", method="neural")
     yield "labeled", Net(name, **LABELED, method="labeled")
     yield "sys-id", Net(name, law, flow, method="sys-id", elastic_rate=0.1)
+    yield "admissible", Net(name, **ADMISSIBLE)
 
 
 class Untrained(ValueError):
@@ -70,13 +76,22 @@ class Untrained(ValueError):
 
 @cache
 def trained(name):
-    """`nclaw.weights.Laws` by name. Raises `Untrained` where they are missing, ValueError where
-    they are damaged, or of another training or another scene than `nets` says now.
+    """`nclaw.weights.Laws` by name, or `nclaw.gnn.simulator.Simulator`. Raises `Untrained` where
+    they are missing, ValueError where they are damaged, or of another training or another scene
+    than `nets` says now.
+    """
+    net = nets()[name]
+    return stored(name, identity(net), (of_graphs if isinstance(net, GraphNet) else weights).load)
+
+
+def stored(name, now, load=weights.load):
+    """What a file of weights holds, by its name; now: the `identity` that it must have. Raises as
+    `trained`.
     """
     path, again = FOLDER / f"{name}.npz", f"python -m validation.train_laws {name}"
     if not path.exists():
         raise Untrained(f"no weights {path.name}: {again}")
-    laws, now = load(path), identity(nets()[name])
+    laws = load(path)
     was = {key: laws.about.get(key) for key in now}
     if was != now:
         raise ValueError(f"weights {path.name} are of {was}, now it is {now}: {again}")
@@ -85,7 +100,11 @@ def trained(name):
 
 def identity(net):
     """What a training is of, plain values."""
-    text = canonical(environment(net.environment))
     told = {name: value for name, value in net._asdict().items()
             if name not in LATER or value != Net._field_defaults[name]}
-    return {"scene": hashlib.sha256(text.encode()).hexdigest()[:16], **told}
+    return {"scene": named(environment(net.environment)), **told}
+
+
+def named(scene):
+    """A scene as a few digits of its hash."""
+    return hashlib.sha256(canonical(scene).encode()).hexdigest()[:16]

@@ -1,0 +1,56 @@
+"""The graph network [GNS] in plain NumPy: it encodes, passes messages, and decodes.
+
+    v_i = points(a_i),    e_ij = edges(b_ij)
+    m_ij = edges_k(e_ij, v_j, v_i),   w_i = points_k(v_i, sum_j m_ij),   e += m,   v += w
+    y_i = answer(v_i)
+
+for blocks k = 0, 1, ..; edge ij is from j to i. Each name is a perceptron of its own: affine maps
+with max(z, 0) between them, and all but the last one have their outputs normalised (`normalised`).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+TINY = 1e-5         # added to the variance of outputs
+
+
+class Perceptron(NamedTuple):
+    """Affine maps, and what outputs are scaled with once they are normalised."""
+
+    layers: tuple       # ((W (in, out), b (out,)), ..)
+    norm: tuple = ()    # gain and shift (out,); none: outputs are left as they are
+
+
+class Network(NamedTuple):
+    """All perceptrons."""
+
+    points: Perceptron
+    edges: Perceptron
+    blocks: tuple       # of (edges_k, points_k)
+    answer: Perceptron
+
+
+def answers(net, points, edges, graph):
+    """Answers (n, d) of a `Network` to what points (n, ..) and edges (k, ..) are told."""
+    v, e = outputs(net.points, points), outputs(net.edges, edges)
+    for of_edges, of_points in net.blocks:
+        m = outputs(of_edges, np.hstack([e, v[graph.senders], v[graph.receivers]]))
+        w = outputs(of_points, np.hstack([v, np.add.reduceat(m, graph.first)]))
+        v, e = v + w, e + m
+    return outputs(net.answer, v)
+
+
+def outputs(perceptron, a):
+    """What a `Perceptron` makes of inputs (n, in)."""
+    *inner, (W, b) = perceptron.layers
+    for V, c in inner:
+        a = np.maximum(a @ V + c, 0.0)
+    a = a @ W + b
+    return normalised(a, *perceptron.norm) if perceptron.norm else a
+
+
+def normalised(a, gain, shift):
+    """Rows without their mean over their deviation, times a gain, and a shift."""
+    a = a - a.mean(axis=1, keepdims=True)
+    return a / np.sqrt((a**2).mean(axis=1, keepdims=True) + TINY) * gain + shift

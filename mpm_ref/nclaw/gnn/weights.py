@@ -1,0 +1,126 @@
+"""A trained graph network as a file (see `sealed`); its weights are in single precision."""
+
+import json
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from ...sealed import about_of, opened, require_format, sealed, write_whole
+from .history import HISTORY, Reading, Scales
+from .network import Network, Perceptron
+from .simulator import Simulator
+
+FORMAT = "gnn 1"
+LAYERS = 3          # of each perceptron
+NUMBERS = ("radius", "dt")
+
+
+def save(path, simulator):
+    """Write a `Simulator`, whole or not at all; weights are rounded to single precision.
+
+    Raises ValueError for sizes that do not fit, numbers that are not finite or not positive, and an
+    `about` with more than JSON knows; OSError where the system refuses.
+    """
+    try:
+        about = json.dumps(simulator.about, sort_keys=True, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{path} is not written: about: {error}; give numbers, text, lists and "
+                         "dicts of them") from None
+    arrays = arrays_of(simulator) | {"format": np.array(FORMAT), "about": np.array(about)}
+    fault = fault_of(arrays)
+    if fault:
+        raise ValueError(f"{path} is not written: {fault}")
+    write_whole(Path(path), sealed(arrays))
+
+
+def load(path):
+    """Read what `save` wrote. Raises ValueError saying what is wrong with the file."""
+    arrays = opened(Path(path))
+    require_format(path, arrays, FORMAT)
+    fault = fault_of(arrays)
+    if fault:
+        raise ValueError(f"{path} holds no trained graph network: {fault}; train again")
+    radius, dt = (float(arrays[name]) for name in NUMBERS)
+    scales = Scales(*(arrays[name] for name in Scales._fields))
+    return Simulator(network_of(arrays), Reading(radius, dt, scales), about_of(path, arrays))
+
+
+def named(network):
+    """(name, `Perceptron`) of all of a network."""
+    yield "points", network.points
+    yield "edges", network.edges
+    for k, (of_edges, of_points) in enumerate(network.blocks):
+        yield f"edges_{k}", of_edges
+        yield f"points_{k}", of_points
+    yield "answer", network.answer
+
+
+def arrays_of(simulator):
+    """The arrays of a file by name."""
+    (radius, dt, scales), found = simulator.reading, {}
+    for name, perceptron in named(simulator.network):
+        for l, (W, b) in enumerate(perceptron.layers):
+            found |= {f"{name}_W{l}": W, f"{name}_b{l}": b}
+        found |= dict(zip((f"{name}_gain", f"{name}_shift"), perceptron.norm, strict=False))
+    return {**{name: np.asarray(a, np.float32) for name, a in found.items()},
+            **{name: np.asarray(a, float) for name, a in scales._asdict().items()},
+            "radius": np.array(float(radius)), "dt": np.array(float(dt))}
+
+
+def network_of(arrays):
+    """`Network` of the arrays of a file, in doubles."""
+    def perceptron(name):
+        layers = tuple((double(f"{name}_W{l}"), double(f"{name}_b{l}")) for l in range(LAYERS))
+        norm = () if name == "answer" else (double(f"{name}_gain"), double(f"{name}_shift"))
+        return Perceptron(layers, norm)
+
+    def double(name):
+        return arrays[name].astype(float)
+
+    blocks = tuple((perceptron(f"edges_{k}"), perceptron(f"points_{k}"))
+                   for k in range(blocks_of(arrays)))
+    return Network(perceptron("points"), perceptron("edges"), blocks, perceptron("answer"))
+
+
+def blocks_of(arrays):
+    """How many blocks pass messages."""
+    return sum(name.startswith("edges_") and name.endswith("_gain") and name != "edges_gain"
+               for name in arrays)
+
+
+def fault_of(arrays):
+    """What is wrong with the arrays of a file, or None."""
+    found = arrays.get("points_W0"), arrays.get("v_mean")
+    if any(a is None for a in found) or (found[0].ndim, found[1].ndim) != (2, 1):
+        return "it lacks points_W0 or v_mean, or they are no matrix and no vector"
+    shapes = shapes_of(found[0].shape[1], blocks_of(arrays), len(found[1]))
+    missing = sorted(shapes.keys() - arrays.keys())
+    if missing:
+        return f"it lacks {', '.join(missing)}"
+    strange = sorted(arrays.keys() - shapes.keys() - {"format", "about"})
+    if strange:
+        return f"it has {', '.join(strange)}, which belong to no network of {LAYERS} layers each"
+    for name, shape in shapes.items():
+        if arrays[name].shape != shape:
+            return f"{name} has shape {arrays[name].shape}, expected {shape}"
+        if arrays[name].dtype.kind != "f" or not np.isfinite(arrays[name]).all():
+            return f"{name} has entries that are not finite numbers"
+    for name in (*NUMBERS, "v_std", "a_std"):
+        if not (arrays[name] > 0.0).all():
+            return f"{name} has entries that are not positive"
+    return None
+
+
+def shapes_of(width, blocks, d):
+    """{name: shape} of the arrays of a network of so many blocks in d dimensions."""
+    found = {**dict.fromkeys(NUMBERS, ()), **dict.fromkeys(Scales._fields, (d,))}
+    ends = {"points": ((HISTORY + 2) * d, width), "edges": (d + 1, width), "answer": (width, d)}
+    for k in range(blocks):
+        ends |= {f"edges_{k}": (3 * width, width), f"points_{k}": (2 * width, width)}
+    for name, (inputs, outputs) in ends.items():
+        for l, (n, m) in enumerate(pairwise((inputs, *(LAYERS - 1) * (width,), outputs))):
+            found |= {f"{name}_W{l}": (n, m), f"{name}_b{l}": (m,)}
+        if name != "answer":
+            found |= {f"{name}_gain": (width,), f"{name}_shift": (width,)}
+    return found

@@ -1,0 +1,1 @@
+"""Training of the graph network that ours are compared with (`nclaw.gnn`)."""
