@@ -1,0 +1,142 @@
+"""Whether laws create energy: closed strain cycles of one element, and the returns of whole runs
+(see `mpm_ref.nclaw.dissipation`).
+"""
+
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from mpm_ref.cases import in_order
+from mpm_ref.energy import kinetic
+from mpm_ref.laws.compare import Broken, positions
+from mpm_ref.nclaw import deployed
+from mpm_ref.nclaw.bodies import fresh
+from mpm_ref.nclaw.dissipation import balance, loops, work
+from mpm_ref.scene import build
+
+from ..registry import experiment
+from ..verification.scenes import threads_for
+from .environments import ENVIRONMENTS, environment
+from .nets import Untrained, trained
+from .tables import tell
+
+METHODS = {"ours": "{}", "admissible": "{}-admissible"}     # and the names of their weights
+TRUE = "true"
+BOUND = TRUE, "admissible"          # laws that must not create energy
+SIZES = (0.02, 0.1)                 # of cycles
+CREATED = 1e-4      # a cycle creates energy that gives back this share of what went in and out more
+ROUND_OFF = 1e-12   # of the energy that a body is thrown with
+CYCLES = ("method", "environment", "size", "cycles", "least_share", "least_work", "creating",
+          "mean_share")
+RUNS = ("method", "environment", "steps", "taken", "created", "thrown", "why")
+
+
+class Pair(NamedTuple):
+    """What a body is made of."""
+
+    law: tuple
+    flow: tuple
+
+
+@experiment("nclaw.dissipation", title="NCLaw: energy that laws take away or create",
+            profiles=("quick", "standard"), budget={"quick": 30, "standard": 1200})
+def dissipation(run):
+    """True laws, the paper's network, and laws that thermodynamics admits, which are what its
+    conclusion leaves for later: cycles from rest, and the training runs.
+    """
+    laws, waiting = known()
+    n, steps = run.choose(quick=(20, 100), standard=(1000, 200))
+    length = run.choose(quick=50, standard=environment(ENVIRONMENTS[0]).steps)
+    closed = {size: loops(n, size, steps, run.rng) for size in SIZES}
+    cycles, runs = [], []
+    for (method, name), pair in run.progress(laws.items(), "laws"):
+        cycles += [(method, name, size, n, *cycled(pair, G)) for size, G in closed.items()]
+        found = run.kept(f"{method}.{name}", partial(returns, name, pair, length))
+        runs.append((method, name, length, *found))
+    run.table("cycles", CYCLES, cycles)
+    run.table("runs", RUNS, runs)
+    for row in cycles:
+        record_cycles(run, row, steps)
+    for row in runs:
+        record_run(run, row)
+    tell(run, waiting)
+
+
+def known():
+    """({(method, environment): `Pair`}, [which weights are not there yet])."""
+    found, waiting = {}, []
+    for name in ENVIRONMENTS:
+        body, = build(environment(name)).bodies
+        found[TRUE, name] = Pair(body.law, body.flow)
+        for method, pattern in METHODS.items():
+            try:
+                laws = trained(pattern.format(name))
+            except Untrained as fault:
+                waiting.append(str(fault))
+            else:
+                found[method, name] = Pair(deployed.elastic(laws.elastic),
+                                           deployed.plastic(laws.plastic))
+    return found, waiting
+
+
+def cycled(pair, G):
+    """The least share and work [J/m^3] of a cycle, the share of cycles that create energy, and the
+    mean share.
+    """
+    found = balance(*pair, G)
+    creating = np.mean(found.share < -CREATED)
+    return tuple(map(float, (found.share.min(), found.work.min(), creating, found.share.mean())))
+
+
+def returns(name, pair, steps):
+    """Energy that the returns of a training run take away and create [J], that of its motion at the
+    start [J], and why it ended before so many steps, if it did.
+    """
+    problem = build(environment(name, steps=steps, every=1))
+    body, found, why = fresh(problem.bodies[0], *pair), [], ""
+    thrown = float(kinetic(body.particles).sum())
+    with threads_for(problem.bodies):
+        try:
+            found += taken(body, pair.law, positions(problem, (body,)), problem.clock.dt)
+        except Broken as end:
+            why = str(end)
+    a = np.array(found)
+    return float(a[a > 0.0].sum()), float(-a[a < 0.0].sum()), thrown, why
+
+
+def taken(body, law, frames, dt):
+    """Yield what the return of each point took away in each step [J], (n,), of a body of which the
+    frames are all steps of dt [s].
+    """
+    F = np.tile(np.eye(3), (len(body.id), 1, 1))
+    V0 = in_order(body.particles.V0, body.id)
+    next(frames)
+    for _ in frames:
+        L, F_new = (in_order(getattr(body.particles, name), body.id) for name in "LF")
+        yield V0 * work(law, F_new, F + dt * L @ F)
+        F = F_new
+
+
+def record_cycles(run, row, steps):
+    """Record what cycles of a law gave."""
+    method, name, size, n, least, work, creating, _ = row
+    target = f"nclaw.dissipation.{method}.{name}.cycles.{size}"
+    scale = f"{n} cycles, {steps} steps each"
+    rule = {"comparator": "<=", "bound": 0.0} if method in BOUND else {"comparator": "info"}
+    run.record(f"{target}.least", least, scale=scale, comparator="info",
+               note=f"work of the cycle that gives back most, over what went in and out; the least "
+                    f"work is {work:.3g} J/m^3")
+    run.record(f"{target}.creating", creating, scale=scale, **rule,
+               note=f"share of cycles that give back {CREATED:g} of what went in and out more than "
+                    "was put in")
+
+
+def record_run(run, row):
+    """Record what the returns of a run took away, and what they created beside."""
+    method, name, steps, taken, created, thrown, why = row
+    target, scale = f"nclaw.dissipation.{method}.{name}.run", f"{steps} steps"
+    rule = {"comparator": "<=", "bound": ROUND_OFF} if method in BOUND else {"comparator": "info"}
+    run.record(f"{target}.taken", taken, unit="J", scale=scale, comparator="info", note=why)
+    run.record(f"{target}.created", created / thrown, scale=scale, **rule,
+               note="energy that returns added, over that of the motion at the start")

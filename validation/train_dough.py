@@ -1,0 +1,75 @@
+"""Trains the laws of NCLaw's dough on its film, for `validation.train_laws`."""
+
+from dataclasses import asdict
+from pathlib import Path
+
+import torch
+from tqdm import tqdm
+
+from mpm_ref.cases import observed
+from mpm_ref.nclaw import weights
+from mpm_ref.nclaw.apart import world
+from mpm_ref.nclaw.learn.drive import stored
+from mpm_ref.nclaw.learn.film import film_of
+from mpm_ref.nclaw.learn.fit import train
+from mpm_ref.nclaw.learn.labeled import labels_of, train_labeled
+from mpm_ref.nclaw.learn.methods import laws_of
+from mpm_ref.nclaw.learn.recipe import PRINTED, Recipe
+from mpm_ref.nclaw.learn.rollout import trajectory_of
+from mpm_ref.scene import build
+
+from .nclaw.dough import EVERY, GUESS, block, camera, film, identity, material, scene
+from .provenance import commit, provenance
+from .verification.scenes import threads_for, with_
+
+ROOT = Path(__file__).parents[1]
+WHOLE = 1.7         # horizon after the last epoch, in runs: the whole run is seen from half-way on
+LABELS = {"elastic_rate": 0.1, "plastic_rate": 0.1}
+
+
+def run_of(of=None):
+    """A `Problem` of the block, of a material, at its start, and `cases.Observed` of its run."""
+    told = with_(scene(block(), of), every=1)
+    with threads_for(build(told).bodies):
+        return build(told), observed(build(told))
+
+
+def seen():
+    """`World` and `Film` of the run: what a training is told."""
+    problem, true = run_of()
+    return world(problem), film_of(film(true.x[::EVERY]), camera(), problem.bodies[0], EVERY)
+
+
+def begun(net):
+    """`rollout.Laws` before training on the film."""
+    kinds = weights.RECORDS[net.elastic](), weights.RECORDS[net.plastic]()
+    laws = laws_of(net.method, net.seed, *kinds)
+    if net.guessed:
+        problem, run = run_of(material(**GUESS))
+        where = world(problem)
+        labels = labels_of(trajectory_of(run), problem.bodies[0].law, where.dt)
+        train_labeled(Recipe(epochs=net.guessed, seed=net.seed, **LABELS), laws, where, labels)
+    return laws
+
+
+def recipe_of(net, steps):
+    """`Recipe` of a `DoughNet` for a run of so many steps."""
+    return Recipe(epochs=net.epochs, elastic_rate=net.elastic_rate, plastic_rate=net.plastic_rate,
+                  first=net.horizon, last=round(WHOLE * steps), reading=PRINTED, seed=net.seed,
+                  velocity=net.depth)
+
+
+def filmed_laws(name, net, checkpoint, threads):
+    """`nclaw.weights.Laws` of a `DoughNet` by name, with what is to be known of them."""
+    where, film = seen()
+    recipe, laws = recipe_of(net, len(film.x) - 1), begun(net)
+    with tqdm(total=recipe.epochs, desc=name) as bar:
+        def show(history):
+            bar.update(len(history) - bar.n)
+            bar.set_postfix(error=f"{history[-1].error:.1e}")
+        done = train(recipe, laws, where, film, checkpoint, show)
+    took = {f"{clock}_seconds": round(s, 1) for clock, s in done.meter.total._asdict().items()}
+    return stored(laws, {
+        **identity(net), "recipe": asdict(recipe), "threads": threads, **took,
+        "command": f"python -m validation.train_laws {name}", "torch": torch.__version__,
+        "errors": [epoch.error for epoch in done.history], **provenance(commit(ROOT))})
