@@ -1,0 +1,113 @@
+"""What NCLaw's Figures 3, 4, 7 and 8 show: laws in bodies, numbers and company that they were not
+trained in.
+"""
+
+from functools import partial
+
+import numpy as np
+
+from mpm_ref.materials import DruckerPrager, FixedCorotated, Fluid, Hencky, VonMises
+from mpm_ref.nclaw.bodies import fresh, learned, own
+from mpm_ref.scene import build
+
+from ..ldm.kept_bodies import keep
+from ..registry import experiment
+from ..verification.scenes import threads_for, with_
+from .environments import ENVIRONMENTS, environment
+from .melting import melting
+from .nets import Untrained, trained
+from .shown import cone, contact, large, pool
+from .states import shots
+from .tasks import TOYS, geometry
+from .toys import said
+
+EACH = 4000         # kept points of a run, at most
+OF = {(FixedCorotated, None): "jelly", (Hencky, DruckerPrager): "sand",
+      (Hencky, VonMises): "plasticine", (Fluid, None): "water"}
+WORDS = ("true", "ours")
+MELTS = ("plasticine", "sand")      # before and after
+
+
+@experiment("nclaw.fig3", title="NCLaw: a million points, and four toys",
+            profiles=("standard", "paper"), budget={"standard": 900, "paper": 50000})
+def many(run):
+    """Keeps points at the start and at the end. The dragon's run is cut to 100 of 10 000 steps at
+    the standard profile.
+    """
+    dragon = with_(large(), steps=run.choose(standard=100, paper=10000))
+    show(run, {"toys": (partial(both, contact()), "bodies that meet"),
+               "dragon": (partial(both, dragon), said("dragon"))})
+
+
+@experiment("nclaw.fig4", title="NCLaw: a duck on water, and ice cream that melts",
+            profiles=("standard",), budget={"standard": 2400})
+def company(run):
+    """Keeps points at the start and at the end, of laws that share a grid."""
+    show(run, {"pool": (partial(both, pool()), f"{said('bob')} on water"),
+               "melting": (partial(melted, cone()), f"{said('icecream')}, plasticine to sand")})
+
+
+@experiment("nclaw.fig7", title="NCLaw: other bodies, Figures 7 and 8",
+            profiles=("standard",), budget={"standard": 1500})
+def bodies(run):
+    """Keeps points of task (c) at the start and half-way."""
+    halves = {name: with_(geometry(name), steps=geometry(name).steps // 2)
+              for name in ENVIRONMENTS}
+    show(run, {name: (partial(both, half), said(TOYS[name].name))
+               for name, half in halves.items()})
+
+
+def show(run, parts):
+    """Keep, and record the distance at the end of, runs with true laws and with ours: of each part
+    {name: (what makes it, words)}. Those whose laws are not trained yet are told.
+    """
+    kept = {}
+    for name, (make, words) in run.progress(parts.items(), "runs"):
+        try:
+            found = run.kept(name, make)
+        except Untrained as fault:
+            run.note(f"{name}: {fault}")
+            continue
+        kept |= {f"{name}_{word}": found[word] for word in WORDS}
+        run.record(f"{run.experiment.id}.{name}.off", found["off"], unit="m^2", comparator="info",
+                   scale=f"{found['points']} particles, {found['steps']} steps, {words}",
+                   note="mean squared distance of the last states alone")
+    keep(run, **kept)
+
+
+def both(scene):
+    """`thinned` runs of a scene with true laws and with ours. Raises `Untrained`."""
+    ends = with_(scene, every=scene.steps)
+    ours = {name: learned(trained(name)) for name in {of(body) for body in build(scene).bodies}}
+    runs = [shots(ends, own), shots(ends, lambda body: ours[of(body)](body))]
+    return thinned(runs, scene.steps)
+
+
+def melted(scene):
+    """`thinned` runs of a scene whose plasticine becomes sand. Raises `Untrained`."""
+    ends = with_(scene, every=scene.steps)
+    ours = [learned(trained(name)) for name in MELTS]
+    true = [partial(of_laws, build(environment(name)).bodies[0]) for name in MELTS]
+    with threads_for(build(scene).bodies):
+        runs = [np.array([*melting(build(ends), *laws)]) for laws in (true, ours)]
+    return thinned(runs, scene.steps)
+
+
+def thinned(runs, steps):
+    """Plain values: of two runs (frames, n, 3), at most `EACH` points each, and their distance."""
+    n = runs[0].shape[1]
+    shown = {word: x[:, ::-(-n // EACH)].round(5).tolist()
+             for word, x in zip(WORDS, runs, strict=True)}
+    return {**shown, "points": n, "steps": steps,
+            "off": float(np.mean((runs[1][-1] - runs[0][-1]) ** 2))}
+
+
+def of(body):
+    """The environment whose material a body is of."""
+    return next(name for (law, flow), name in OF.items() if isinstance(body.law, law)
+                and (flow is None or isinstance(body.flow, flow)))
+
+
+def of_laws(other, body):
+    """A body of the laws of another."""
+    return fresh(body, other.law, other.flow)

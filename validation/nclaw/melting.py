@@ -1,0 +1,63 @@
+"""A body that melts: its points change from one pair of laws to another, the lowest ones first
+(Figure 4b, NCLAW-multi).
+
+Points are ordered by their height at the start. As in the authors' release a threshold moves
+through that order from step 500 to step 1500; here it moves every `HOLD` steps. Both parts share
+one grid. Positions, velocities and deformation gradients stay as they are when a point changes.
+"""
+
+import numpy as np
+
+from mpm_ref.body import Body, particles_at
+from mpm_ref.cases import in_order
+from mpm_ref.simulate import keep_inside
+
+FIRST, LAST = 500, 1500     # steps
+HOLD = 20                   # steps between changes
+
+
+def melting(problem, before, after):
+    """Positions (n, 3) of the points of a problem's one body at the start and at each frame.
+
+    before, after: functions that make of a body the same one of other laws. Frames are multiples of
+    `HOLD` steps.
+    """
+    clock, stepper = problem.clock, problem.stepper()
+    state = whole([before(problem.bodies[0])])
+    rank = np.argsort(np.argsort(state.particles.x[:, 1]))
+    yield state.particles.x.copy()
+    for k in range(0, clock.steps, HOLD):
+        melted = rank < melted_points(k, len(rank))
+        parts = [law(part(state, which)) for law, which in ((before, ~melted), (after, melted))
+                 if which.any()]
+        stepper.start(parts)
+        stepper.sort(parts)
+        for step in range(k, k + HOLD):
+            stepper.step(parts, step * clock.dt, clock.dt)
+            keep_inside(parts, *problem.clip)
+        state = whole(parts)
+        if (k + HOLD) % clock.every == 0:
+            yield state.particles.x.copy()
+
+
+def melted_points(step, n):
+    """How many of n points have changed."""
+    return round(n * min(max((step - FIRST) / (LAST - FIRST), 0.0), 1.0))
+
+
+def part(body, which):
+    """The points of a body for which `which` (n,) is set; ids are those of the whole."""
+    q = body.particles
+    particles = particles_at(*(a[which] for a in (q.x, q.v, q.m, q.V0)))
+    particles.C[:], particles.F[:] = q.C[which], q.F[which]
+    return Body(body.name, particles, body.law, body.flow, body.id[which])
+
+
+def whole(parts):
+    """One body of all points of some parts, in their own order."""
+    ids = np.concatenate([one.id for one in parts])
+    x, v, m, V0, C, F = (in_order(np.concatenate([getattr(one.particles, name) for one in parts]),
+                                  ids) for name in ("x", "v", "m", "V0", "C", "F"))
+    particles = particles_at(x, v, m, V0)
+    particles.C[:], particles.F[:] = C, F
+    return Body(parts[0].name, particles, parts[0].law, parts[0].flow, np.arange(len(ids)))
