@@ -1,5 +1,5 @@
 """The command line `mpm-ref`: `run` and the options of all; the other commands are in `describe`,
-`look`, `golden` and `rom`.
+`look`, `golden`, `rom` and `law`.
 """
 
 from pathlib import Path
@@ -12,7 +12,7 @@ from .. import __version__, scene
 from ..core.jit import set_threads
 from ..store import UNITS, USUAL, Fields
 from ..store.running import Options
-from . import golden, look, rom
+from . import golden, law, look, rom
 from .describe import describe
 from .execute import Bar, Request, run_scene
 from .faults import one_line, options
@@ -28,6 +28,7 @@ for name, command in (("info", describe), ("plot", look.plot),
     app.command(name)(command)
 app.add_typer(golden.app, name="oracle")
 app.add_typer(rom.app, name="rom")
+app.add_typer(law.app, name="law")
 
 
 FIELDS = f"To store, of {','.join(UNITS)}; default: {','.join(USUAL)}."

@@ -99,6 +99,11 @@ class Bar(Watch):
         """Note the energies."""
         self.energies = f", E_kin {energy.kinetic:.3g}, E {energy.sum:.3g} J"
 
+    def astray(self, said):
+        """Say that a learned law is asked what it has not seen."""
+        with self.bar.external_write_mode(file=sys.stderr):
+            warn([said])
+
     def close(self):
         """Leave the bar as it is."""
         self.stack.close()

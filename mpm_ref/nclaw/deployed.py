@@ -1,20 +1,23 @@
 """The law and the flow of a body, of any laws that were trained and stored."""
 
-from . import neural, stretched
+from . import admissible, neural, stretched
 from .weights import BESIDE
 
 
 def elastic(trained):
-    """The law of a `weights.Trained` of stress: neural, in principal stretches, or an identified
-    one. Raises ValueError for what gives no stress.
+    """The law of a `weights.Trained` of stress: neural, of an energy, in principal stretches, or an
+    identified one. Raises ValueError for what gives no stress.
     """
     if type(trained.kind) not in BESIDE["elastic"]:
         return neural.elastic(trained)
-    return stretched.elastic(trained) if trained.layers else trained.kind
+    made = admissible.MADE.get(type(trained.kind), stretched.elastic)
+    return made(trained) if trained.layers else trained.kind
 
 
 def plastic(trained):
-    """The flow of a `weights.Trained` that gives F: neural, identified, or none. Raises ValueError
-    for what gives no F.
+    """The flow of a `weights.Trained` that gives F: neural, a contraction, identified, or none.
+    Raises ValueError for what gives no F.
     """
-    return trained.kind if type(trained.kind) in BESIDE["plastic"] else neural.plastic(trained)
+    if type(trained.kind) not in BESIDE["plastic"]:
+        return neural.plastic(trained)
+    return admissible.MADE[type(trained.kind)](trained) if trained.layers else trained.kind

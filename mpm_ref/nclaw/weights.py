@@ -5,6 +5,8 @@ A kind is a record of numbers, and its type says what layers (W (in, out), b (ou
     answers of `response`       GELU between them; of the invariants, without R also of F - I
     a stress of `principal`     ELU between them; from s - 1 to y, d numbers each
     a stress of `spline`        one, the values of f, g, h at knots, b = 0
+    `Energetic`                 softplus between them, no W negative; from four measures to N
+    `Contraction`               GELU between them; from three strains to a and b before softplus
     of `materials`              none, the record is the law: identified ones, and no return map
 """
 
@@ -18,6 +20,8 @@ import numpy as np
 from .. import materials
 from ..sealed import about_of, opened, require_format, sealed, write_whole
 from . import principal, response, spline
+from .contraction import ANSWERED, READ, Contraction
+from .energetic import MEASURES, Energetic
 from .invariants import count
 
 FORMAT = 1
@@ -33,10 +37,12 @@ STRETCHES, KNOTS, NO_LAYERS = {(2, 2), (3, 3)}, {(len(spline.knots()), 3)}, set(
 BESIDE = {      # of methods that ours are compared with
     "elastic": {principal.StretchStress: STRETCHES, principal.ReleasedStretchStress: STRETCHES,
                 spline.SplineStress: KNOTS, spline.ReleasedSplineStress: KNOTS,
+                Energetic: {(MEASURES, 1)},
                 materials.FixedCorotated: NO_LAYERS, materials.Hencky: NO_LAYERS,
                 materials.Fluid: NO_LAYERS},
-    "plastic": {kind: NO_LAYERS for kind in (materials.NoFlow, materials.DruckerPrager,
-                                             materials.VonMises, materials.FluidProjection)}}
+    "plastic": {Contraction: {(READ, ANSWERED)},
+                **{kind: NO_LAYERS for kind in (materials.NoFlow, materials.DruckerPrager,
+                                                materials.VonMises, materials.FluidProjection)}}}
 RECORDS = KINDS | {kind.__name__: kind for part in PARTS for kind in BESIDE[part]}
 ENDS = {name: PLAIN if name.startswith("Plain") else TURNED for name in KINDS}
 ENDS |= {kind.__name__: ends for part in PARTS for kind, ends in BESIDE[part].items()}
@@ -136,6 +142,9 @@ def fault_of_law(part, arrays):
             return f"{name} has entries that are not finite numbers"
     if arrays[f"{part}_constants"].shape != (len(RECORDS[kind]._fields),):
         return f"{part} law with constants {arrays[f'{part}_constants']}"
+    if kind == Energetic.__name__ and any((arrays[f"{part}_W{k}"] < 0.0).any()
+                                          for k in range(layers)):
+        return f"{part} law of an energy with negative weights"
     return fault_of_sizes(part, arrays, ENDS[kind])
 
 

@@ -85,7 +85,7 @@ def load(path, shipped=None):
     with opened_by(str(path)):
         tables = checked(data)
         mu = parameters(tables)
-        study = Study(path, _base(tables, path.parent, shipped or {}), tables, mu,
+        study = Study(path, base_of(tables, path.parent, shipped or {}), tables, mu,
                       held_out(len(mu), tables.test, tables.seed))
         _require_one_body(study)
         return study
@@ -138,8 +138,10 @@ def held_out(runs, count, seed):
     return tuple(sorted(np.random.default_rng(seed).permutation(runs)[:count].tolist()))
 
 
-def _base(tables, folder, shipped):
-    """The scene with what is set in all runs, every step of which is shown."""
+def base_of(tables, folder, shipped):
+    """The scene of a study's `Tables` with what is `set` in all runs, every step of which is shown;
+    shipped {name: path} are scenes that may be named. Raises SceneError.
+    """
     path = folder / tables.scene
     if not path.is_file():
         path = shipped.get(tables.scene)

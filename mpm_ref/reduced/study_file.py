@@ -25,12 +25,12 @@ def plain(path):
 def checked(data):
     """`Tables` of plain tables. Raises SceneError, which names the key."""
     check_finite(data)
-    _require_keys(data, Tables)
+    require_keys(data, Tables.__struct_encode_fields__)
     for name, record in (("map", Map), ("run", Run)):
-        _require_keys(data.get(name), record, name)
+        require_keys(data.get(name), record.__struct_encode_fields__, name)
     parts = data.get("parameter")
     for k, part in enumerate(parts if isinstance(parts, list) else ()):
-        _require_keys(part, Parameter, f"parameter[{k}]")
+        require_keys(part, Parameter.__struct_encode_fields__, f"parameter[{k}]")
     try:
         tables = msgspec.convert(data, Tables)
     except msgspec.ValidationError as fault:
@@ -43,9 +43,8 @@ def checked(data):
     return tables
 
 
-def _require_keys(table, record, path=""):
-    """Raise SceneError for a key of a table that its record does not know."""
-    known = record.__struct_encode_fields__
+def require_keys(table, known, path=""):
+    """Raise SceneError for a key of a table that is none of those known."""
     for key in table if isinstance(table, dict) else ():
         if key not in known:
             near = get_close_matches(key, known, 1)

@@ -24,7 +24,7 @@ from ..shapes import (
     Union,
     Wedge,
 )
-from .bodies import build_body
+from .bodies import build_body, seen_by
 from .check import checked
 from .error import SceneError, opened_by
 from .material import Flow, Material
@@ -85,4 +85,6 @@ def _built(scene):
         source=canonical(scene),
         integrator="explicit" if solver is None else "implicit",
         solver=solver,
+        seen={body.name: seen for k, body in enumerate(scene.body)
+              if (seen := seen_by(body, scene.dim, k)) is not None},
     )

@@ -22,6 +22,12 @@ def build_body(scene, k):
     return Body(record.name, particles, law, material.flow, np.arange(len(particles.x)))
 
 
+def seen_by(record, dim, k):
+    """What the laws of body number k have seen in training, or None; errors as of `build_body`."""
+    with at(f"body[{k}].material.weights"):
+        return record.material.seen(dim)
+
+
 def _sampled(scene, record, material, where):
     """Particles that fill the body's shape; `where` is its path and its seed."""
     path, seed = where

@@ -8,6 +8,7 @@ from msgspec import Meta
 
 from ..materials import LAWS, make_flow, make_law
 from ..nclaw import neural, weights
+from ..nclaw.range import known
 from ..shapes.quantities import Record, Sha256
 
 Number = Annotated[float, Meta(ge=-1e30, le=1e30)]
@@ -66,6 +67,12 @@ class Material(Record):
             return neural.plastic(self.trained(dim).plastic)
         parameters = _given(self.flow, "type")
         return make_flow(self.flow.type, self.elastic(), dim, **parameters)
+
+    def seen(self, dim):
+        """What its laws have seen in training (see `nclaw.range.known`); None where that is not
+        known. Raises ValueError for weights that say something else.
+        """
+        return known(self.trained().about, dim) if self.is_neural else None
 
     def trained(self, dim=None):
         """`nclaw.weights.Laws` of its file. Raises ValueError for a file that holds none, or for

@@ -124,12 +124,18 @@ def unsolved(facts):
     return sum(part.get("unsolved", 0) for part in facts.get("parts", ()))
 
 
+def astray(facts):
+    """What all parts of a manifest say of strains that learned laws had not seen."""
+    return [said for part in facts.get("parts", ()) for said in part.get("astray", ())]
+
+
 @dataclass
 class Part:
     """One uninterrupted part of a run: from its start, or a checkpoint, to wherever it ended."""
 
     first_step: int
     unsolved: int = 0
+    astray: list = field(default_factory=list)      # sentences of `nclaw.range`
     code: dict = field(default_factory=code)
     began: str = field(default_factory=now)
     wall_start: float = field(default_factory=time.perf_counter)
@@ -137,7 +143,8 @@ class Part:
 
     def ended(self, why, state, digest):
         """The entry of `parts` in the manifest: why it ended, where, what it took, the implicit
-        steps that were not solved, the sha256 of the state it ended with and the code that ran.
+        steps that were not solved, what learned laws had not seen, the sha256 of the state it
+        ended with and the code that ran.
         """
         return {
             "began": self.began,
@@ -150,6 +157,7 @@ class Part:
             "cpu_s": round(time.process_time() - self.cpu_start, 3),
             "peak_bytes": peak_memory(),
             "unsolved": self.unsolved,
+            "astray": self.astray,
             "state_sha256": digest,
             **self.code,
         }

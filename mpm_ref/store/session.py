@@ -10,6 +10,7 @@ from pathlib import Path
 
 from ..energy import energy
 from ..monitor import Unstable, check
+from ..nclaw.range import watch as range_watch
 from ..simulate import Frame, ended, frame_is_due, simulate
 from ..timestep import TooLarge
 from . import checkpoint
@@ -31,6 +32,9 @@ class Watch:
 
     def frame(self, frame, energy):
         """A frame was stored."""
+
+    def astray(self, said):
+        """A learned law is asked what it has not seen, in a sentence (see `nclaw.range`)."""
 
 
 class _Stop(Exception):
@@ -54,6 +58,7 @@ class Session:
         self.state, self.part, self.dt, self.asked = None, None, 0.0, None
         self.shown = self.saved = None        # steps at which a frame, a checkpoint was last stored
         self.saved_at = time.perf_counter()
+        self.range = range_watch(problem)
 
     def loop(self, state):
         """Run from a state, or None for the start; returns why it ended, see `Outcome`."""
@@ -81,8 +86,16 @@ class Session:
         self.state, self.dt = state, dt
         self.part.unsolved += state.solve is not None and not state.solve.converged
         self.watch.step(state, dt)
+        if self.range is not None:
+            self.tell(self.range.news(state))
         if not frame_is_due(self.problem.clock, state):
             self.rest()
+
+    def tell(self, sentences):
+        """Enter sentences about learned laws in this part of the run, and pass them on."""
+        self.part.astray += sentences
+        for said in sentences:
+            self.watch.astray(said)
 
     def show(self, frame):
         """Store a frame of the run."""

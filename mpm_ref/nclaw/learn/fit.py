@@ -61,7 +61,8 @@ class Session:
     def epoch(self):
         """The trajectory once, in segments, and a step of each optimiser."""
         steps, number = len(self.observed.x) - 1, len(self.history)
-        cuts = self.recipe.teacher.restarts(steps, number, self.recipe.epochs)
+        asked = self.recipe.teacher.restarts(steps, number, self.recipe.epochs)
+        cuts = self.observed.restarts(asked)
         weight = self.recipe.weight(len(cuts) - 1, steps)
         for optimiser in self.optimisers:
             optimiser.zero_grad()
@@ -71,7 +72,7 @@ class Session:
         for optimiser, schedule in zip(self.optimisers, self.schedules, strict=True):
             optimiser.step()
             schedule.step()
-        self.history.append(Epoch(weight * error, error / steps, len(cuts) - 1, steepness))
+        self.history.append(Epoch(weight * error, error / cuts[-1], len(cuts) - 1, steepness))
 
     def show(self, cuts, weight):
         """Add the gradients of some segments; returns their squared errors."""
@@ -134,7 +135,7 @@ def sha256(world, observed):
 
 
 def train(recipe, laws, world, observed, checkpoint=None, on_epoch=None):
-    """Train `rollout.Laws` in place on a `Trajectory`; returns the `Session`.
+    """Train `rollout.Laws` in place on a `Trajectory`, or a `Partial` one; returns the `Session`.
 
     checkpoint: a file to go on from and to save to; on_epoch(history) is called after each epoch.
     Raises `Diverged`, with the epoch and the steps.

@@ -6,6 +6,7 @@
     no rotation     ours without R
     no undeformed   ours without the shift to rest, with biases
     labeled         ours, trained by `labeled.train_labeled`
+    admissible      an energy and a contraction, which thermodynamics admits
     sys-id          the true laws, see `sysid.known_laws`
 
 All but the last are drawn from a seed, the elastic law first. Of spline and neural there is a
@@ -19,6 +20,7 @@ import torch
 from ..principal import ReleasedStretchStress, StretchStress
 from . import law
 from .ablations import PlainLaw, UnshiftedLaw
+from .admissible import ContractionLaw, EnergeticLaw
 from .rollout import Laws
 from .spline import SplineLaw
 from .stretches import ReleasedStretchLaw, StretchLaw
@@ -40,6 +42,7 @@ METHODS = {     # method -> elastic and plastic law of a kind
     "neural": (stretch_law, Unchanged),
     "no rotation": (PlainLaw, PlainLaw),
     "no undeformed": (UnshiftedLaw, UnshiftedLaw),
+    "admissible": (EnergeticLaw, ContractionLaw),
 }
 
 

@@ -25,6 +25,16 @@ class Trajectory(NamedTuple):
         """The states (b, n, ..) at b time levels."""
         return tuple(a[levels] for a in self)
 
+    def restarts(self, cuts):
+        """Where segments begin that are asked for at time levels `cuts`, and end: as asked for."""
+        return cuts
+
+    def off(self, name, a, levels):
+        """Squared errors of a field `a` (b, n, 3) at b time levels, their mean over points and
+        axes, summed over the levels.
+        """
+        return mean_squared(a, getattr(self, name)[levels])
+
 
 def trajectory_of(observed):
     """`Trajectory` of `cases.Observed`."""
@@ -60,9 +70,9 @@ def squared(laws, world, observed, starts, ends, velocity=0.0):
     state, on = observed.at(levels), nodes(world, len(starts))
     while len(levels):
         state, levels = step(laws, world, state, on), levels + 1
-        total = total + mean_squared(state[0], observed.x[levels])
+        total = total + observed.off("x", state[0], levels)
         if velocity:
-            total = total + velocity * mean_squared(state[1], observed.v[levels])
+            total = total + velocity * observed.off("v", state[1], levels)
         under_way = levels < last
         if not under_way.all():
             levels, last, *state = (a[under_way] for a in (levels, last, *state))

@@ -1,0 +1,40 @@
+"""What the commands of `mpm-ref law` have in common: their arguments, and what these stand for."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .. import scene
+from ..laws.compare import problem_of
+from ..nclaw import weights
+from ..nclaw.bodies import dim_of
+from ..scene import SceneError
+from .shipped import find_scene
+
+WeightsFile = Annotated[Path, typer.Argument(metavar="WEIGHTS",
+                                             help="File of `mpm-ref law train`.")]
+SceneName = Annotated[str, typer.Argument(metavar="SCENE",
+                                          help="A TOML file, or the name of a shipped scene.")]
+NUMBERS = (".csv",)
+
+
+def fitting(file, name, steps=None):
+    """(`weights.Laws`, `Problem`) of a file and of a scene that they fit, of so many steps if
+    given. Raises ValueError.
+    """
+    laws, path = weights.load(file), find_scene(name)
+    problem = problem_of(scene.load(path), str(path), steps)
+    if dim_of(laws) != problem.dim:
+        raise SceneError(f"{file}: its laws are for {dim_of(laws)} dimensions, but {path} has "
+                         f"dim = {problem.dim}; name another scene")
+    return laws, problem
+
+
+def other_steps(laws, problem):
+    """The warning about steps of another length than in training; or none."""
+    dt = laws.about.get("dt")
+    if dt not in (None, problem.clock.dt):
+        yield (f"the laws were trained in steps of {dt:g} s, the scene has dt = "
+               f"{problem.clock.dt:g} s: a learned return map acts once a step, so that it may "
+               "answer otherwise")

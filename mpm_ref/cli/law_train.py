@@ -1,0 +1,189 @@
+"""`mpm-ref law train`: the laws of a study, from a run of its scene."""
+
+from math import ceil, sqrt
+from pathlib import Path
+from time import perf_counter
+from typing import Annotated
+
+import typer
+
+from ..cases import observed
+from ..laws import training, trajectory
+from ..laws.compare import threads_for
+from ..laws.study import load
+from ..nclaw import weights
+from ..store.atomic import NotWritten, require_place
+from ..store.session import Watch
+from ..store.words import counted
+from . import faults
+from .faults import at_start, end, one_line, options
+from .outputs import HDF5, MAPS, require_ending, require_free
+from .rom_options import Overwrite, StudyName, on_interrupt
+from .shipped import find_study, keep_scene, shipped_scenes
+from .terminal import passing, warn
+
+SAID = 10           # lines about a training where there is no terminal
+LEAST_OFF = 1e-6    # [dx] root mean squared error of laws in their first epoch
+OF_ERRORS = {"labeled": "squared error of F"}       # of methods that follow no motion
+
+
+def train(
+    name: StudyName,
+    out: Annotated[Path | None, typer.Option(
+        "--out", "-o", help="File for the weights, default: as the study says, or STUDY.npz "
+                            "here.")] = None,
+    data: Annotated[Path | None, typer.Option(
+        help="FILE.h5 with the run to learn from, made if it is not there; default: made anew, "
+             "not kept.")] = None,
+    threads: Annotated[int, typer.Option(help="Threads of PyTorch.", min=1)] = 1,
+    overwrite: Overwrite = False,
+):
+    """Learn the laws of a study from the motion of its scene; this needs PyTorch.
+
+    A training that is cut off goes on from its checkpoint, WEIGHTS.pt. Exit status: 0 done, 2 bad
+    input, 3 the run became unstable or the training diverged, 4 a file could not be written,
+    130 Ctrl-C.
+    """
+    with one_line():
+        with options():
+            study = load(find_study(name), shipped_scenes())
+            out = out or study.file("weights") or Path(f"{study.path.stem}.npz")
+            checkpoint = study.file("checkpoint") or out.with_suffix(".pt")
+            require_outputs(study, out, data, overwrite)
+            require_place(checkpoint)
+            training.drive()
+            with at_start(study.path):
+                seen = motion(study, data)
+            laws = learned(study, seen, checkpoint, threads=threads, command=typed(
+                name, out, data, threads))
+        write(out, laws)
+        checkpoint.unlink(missing_ok=True)
+        print(f"{out}: {in_short(study, seen, laws.about['errors'])}")
+
+
+def require_outputs(study, out, data, overwrite):
+    """Raise ValueError or NotWritten where no weights, or no run, are to be written."""
+    keep_scene(study.path, out)
+    require_ending(out, MAPS)
+    require_place(out)
+    require_free(out, overwrite)
+    if data is not None:
+        if data.suffix.lower() not in HDF5:
+            raise ValueError(f"--data {data}: expected a name that ends in {' or '.join(HDF5)}")
+        require_place(data)
+
+
+def typed(name, out, data, threads):
+    """The command that trains again."""
+    kept = "" if data is None else f" --data {data}"
+    return f"mpm-ref law train {name} --out {out}{kept} --threads {threads}"
+
+
+def motion(study, data):
+    """`cases.Observed` of a study's scene: made, or of a results file, which is made if need be."""
+    problem = study.problem()
+    with threads_for(problem.bodies):
+        if data is None:
+            with passing(desc="full-order run", bar_format="{desc}", leave=False):
+                return observed(problem)
+        if not trajectory.whole(data, problem):
+            with passing(total=problem.clock.steps, unit="step", desc=str(data)) as bar:
+                made = trajectory.make(data, study.problem(), Steps(bar))
+            if made < problem.clock.steps:
+                end(f"interrupted at step {made} of {problem.clock.steps} of the run to learn "
+                    "from; the same command again goes on", faults.INTERRUPT)
+    return trajectory.read(data, problem)
+
+
+class Steps(Watch):
+    """A run on a bar of steps."""
+
+    def __init__(self, bar):
+        self.bar = bar
+
+    def step(self, state, dt):
+        """Move the bar."""
+        self.bar.update(state.step - self.bar.n)
+
+
+def learned(study, seen, checkpoint, **about):
+    """`nclaw.weights.Laws` of a study, with its progress; ends the command where it diverges."""
+    how = training.drive()
+    try:
+        with on_interrupt(lambda: resuming(checkpoint)), Epochs(study, len(seen.x) - 1) as now:
+            return training.trained(study, seen, checkpoint, now.show, **about)
+    except how.Diverged as fault:
+        left = f"; {checkpoint} is of this training: remove it when the study changes"
+        end(f"{study.path}: {fault}{left if checkpoint.exists() else ''}", faults.UNSTABLE)
+
+
+def resuming(checkpoint):
+    """How a training goes on that was cut off."""
+    if checkpoint.exists():
+        return f"before the laws were learned; the same command again goes on from {checkpoint}"
+    return "before there was a checkpoint; the same command again begins anew"
+
+
+class Epochs:
+    """A training under way, on a bar of epochs; where there is no terminal, a line now and then. A
+    context manager.
+    """
+
+    def __init__(self, study, steps):
+        self.study, self.steps, self.total = study, steps, study.tables.train.epochs
+        self.made, self.began = 0, 0.0
+
+    def __enter__(self):
+        self.bar = passing(total=self.total, unit="epoch", desc=self.study.path.stem)
+        return self
+
+    def __exit__(self, *_):
+        self.bar.close()
+
+    def show(self, history):
+        """The last epoch of a history."""
+        done, said = len(history), epoch_in_words(self.study, history[-1], self.steps)
+        self.made += 1
+        if self.made == 1:          # parts before took no time in this one; and kernels compile
+            self.bar.initial = self.bar.n = self.bar.last_print_n = done - 1
+            self.began = perf_counter()
+            warn(nothing_to_learn(self.study, history))
+        self.bar.set_postfix_str(said, refresh=False)
+        self.bar.update()
+        if self.bar.disable and (done % ceil(self.total / SAID) == 0 or done == self.total):
+            pace = (perf_counter() - self.began) / max(self.made - 1, 1)
+            left = f"; {pace * (self.total - done):.0f} s left" if self.made > 1 else ""
+            print(f"epoch {done} of {self.total}: {said}{left}", flush=True)
+
+
+def nothing_to_learn(study, history):
+    """The warning about laws that are hardly off before they have learned anything; or none."""
+    off = sqrt(history[0].error) / study.scene.dx
+    if study.tables.method not in OF_ERRORS and off < LEAST_OFF:
+        yield (f"laws that have learned nothing are off by {off:.1e} dx a step: the motion hardly "
+               "depends on stress; are points more than a cell apart, or do they never collide?")
+
+
+def epoch_in_words(study, epoch, steps):
+    """Error, loss, and what the epoch was made of."""
+    if study.tables.method in OF_ERRORS:
+        return f"loss {epoch.loss:.2e}, batches of pairs: {epoch.segments}"
+    return (f"error {epoch.error:.2e} m^2, loss {epoch.loss:.2e}, "
+            f"{counted(epoch.segments, 'segment')} of {steps / epoch.segments:.0f}")
+
+
+def in_short(study, seen, errors):
+    """What was learned from what, and the errors of the first and the last epoch."""
+    steps, points = len(seen.x) - 1, seen.x.shape[1]
+    of = OF_ERRORS.get(study.tables.method, "mean squared error of a step [m^2]")
+    return (f"{study.tables.method}, {counted(len(errors), 'epoch')} on {counted(steps, 'step')} "
+            f"of {counted(points, 'point')}; {of} {errors[0]:.3g} at first, {errors[-1]:.3g} at "
+            "last")
+
+
+def write(out, laws):
+    """Write weights. Raises NotWritten."""
+    try:
+        weights.save(out, laws)
+    except OSError as fault:
+        raise NotWritten(str(fault)) from fault

@@ -1,0 +1,1 @@
+"""Laws learned from scenes: studies and their trainings; learned laws beside the true ones."""

@@ -1,0 +1,141 @@
+"""Trained laws for other programs: layers and constants as plain arrays and words, and pairs of
+questions and answers to test an implementation by.
+
+Nothing of `weights` is needed to read them. What each kind answers is said in words that go along;
+docs/nclaw.md lists the names.
+"""
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from ..explicit import deform_body, initial_stress
+from ..materials import (
+    DruckerPrager,
+    FixedCorotated,
+    Fluid,
+    FluidProjection,
+    Hencky,
+    NoFlow,
+    VonMises,
+)
+from ..sealed import sealed, write_whole
+from . import deployed, principal, response, spline
+from .bodies import dim_of, gradients, points, stresses
+from .contraction import Contraction
+from .energetic import Energetic
+from .reading import numbers, words
+from .weights import PARTS
+
+FORMAT = "mpm_ref law 1"
+SPREAD, RANDOM, SEED = 0.1, 24, 0       # of the components of F - I in questions; how many; draw
+OF_F = ("F = U diag(s) V^T, det U = det V = +1, s descending, the last with the sign of det F; "
+        "R = U V^T")
+LAYERS = "a <- a W_l + b_l, {} between layers"
+GELU = LAYERS.format("gelu(z) = z (1 + erf(z / sqrt 2)) / 2")
+ELU = LAYERS.format("elu(z) = z where z > 0, else exp(z) - 1")
+SOFTPLUS = LAYERS.format("softplus(z) = log(1 + exp z)")
+TURNED = f"{GELU}; Y = the last a, row by row; T = (Y + Y^T) / 2"
+STRETCHES = f"{ELU}, y = the last a; tau = U diag(unit y s) U^T"
+SPLINES = ("tau = U diag(y s) U^T, y_i = f(s_i) + sum over j != i of g(s_i s_j) s_j + h(J) J/s_i; "
+           "tables[0], [1], [2] are f, g, h [Pa]: piece p, of as many breaks below x, is the sum "
+           "over m of tables[., p, m] (x - origins[p])^(3 - m)")
+KNOWN = "the law of that name in mpm_ref/materials, with these constants"
+ANSWERS = {     # kind -> what is done with what it reads
+    response.Stress: f"{TURNED}; tau = unit R T F^T",
+    response.SymmetricStress: f"{TURNED}; tau = unit R T R^T",
+    response.PlainStress: f"{TURNED}; tau = unit Y F^T",
+    response.Correction: f"{TURNED}; F = F_trial + alpha R T, R of F_trial",
+    response.PlainCorrection: f"{TURNED}; F = F_trial + alpha Y",
+    principal.ReleasedStretchStress: f"{STRETCHES}; where two stretches are equal, tau depends on "
+                                     "the axes that a decomposition picks",
+    principal.StretchStress: f"{STRETCHES}; y is the mean over all orders in which s is read, each "
+                             "y_i at the place of its s_i",
+    spline.SplineStress: SPLINES,
+    spline.ReleasedSplineStress: SPLINES,
+    Energetic: f"{SOFTPLUS}; g_k = d a_last / d (number k that is read), J = det F, b = F F^T; "
+               "tau = unit (g_0 2 (b - I) + g_1 (2 (tr(b) b - b b) - 4 I) + g_2 2 J (J - 1) I + "
+               "g_3 (J - 1) I)",
+    Contraction: f"{GELU}; (a, b) = softplus of the last a, softplus(z) = log(1 + exp z); of "
+                 "F_trial: theta = sum_i log s_i, e_i = log s_i - theta / 3; F = U diag(exp(exp(-a)"
+                 " e_i + theta' / 3)) V^T, theta' = exp(-b) theta where theta > 0, else theta",
+    NoFlow: "F = F_trial",
+    **dict.fromkeys((FixedCorotated, Hencky, Fluid, DruckerPrager, VonMises, FluidProjection),
+                    KNOWN),
+}
+
+
+def exported(laws):
+    """{"format", "dim", "decomposition", "about", "elastic", "plastic", "check"} of `weights.Laws`:
+    texts, numbers, arrays, and tables of them.
+    """
+    d = dim_of(laws)
+    return {"format": FORMAT, "dim": d, "decomposition": OF_F, "about": laws.about,
+            **{part: part_of(getattr(laws, part), d) for part in PARTS},
+            "check": checks(laws, questions(d))}
+
+
+def part_of(trained, d):
+    """What a `weights.Trained` is."""
+    kind = trained.kind
+    constants = kind._asdict()
+    if type(kind) in spline.READINGS:
+        constants = deployed.elastic(trained)._asdict()
+    else:
+        for k, (W, b) in enumerate(trained.layers):
+            constants |= {f"W{k}": W, f"b{k}": b}
+    return {"kind": type(kind).__name__, "answers": ANSWERS[type(kind)],
+            "reads": words(trained, d), **constants}
+
+
+def questions(d):
+    """Deformation gradients (n, d, d): rest, a turn, stretched, sheared, compressed; then random
+    ones, each turned at random.
+    """
+    rng = np.random.default_rng(SEED)
+    rest, turn = np.eye(d), np.eye(d)
+    turn[:2, :2] = [[0.0, -1.0], [1.0, 0.0]]
+    stretched, sheared = rest.copy(), rest.copy()
+    stretched[0, 0] += SPREAD
+    sheared[0, 1] += SPREAD
+    drawn = rest + SPREAD * rng.normal(size=(RANDOM, d, d))
+    turns = np.linalg.qr(rng.normal(size=(RANDOM, d, d)))[0]
+    turns[np.linalg.det(turns) < 0.0, :, 0] *= -1.0
+    return np.array([rest, turn, stretched, sheared, (1.0 - SPREAD) * rest, *(turns @ drawn)])
+
+
+def checks(laws, F):
+    """Questions F (n, d, d) and the answers of both laws, with what their first layers read."""
+    law, flow = deployed.elastic(laws.elastic), deployed.plastic(laws.plastic)
+    elastic, plastic = points(law, NoFlow(), F), points(law, flow, F)
+    initial_stress(elastic)
+    deform_body(plastic, 1.0)
+    return {"F": F, "elastic_read": numbers(laws.elastic, F), "tau": stresses(elastic),
+            "plastic_read": numbers(laws.plastic, F),
+            "returned": F if isinstance(flow, NoFlow) else gradients(plastic)}
+
+
+def flat(tables, path=""):
+    """{name: text, number or array} of nested tables, names joined by "_"; lists of words become
+    arrays, `about` JSON.
+    """
+    found = {}
+    for key, value in tables.items():
+        name = f"{path}_{key}" if path else key
+        if key == "about":
+            value = json.dumps(value)
+        found |= flat(value, name) if isinstance(value, dict) else {name: np.asarray(value)}
+    return found
+
+
+def write(path, tables):
+    """Write `exported` tables, JSON or npz as the name says, whole or not at all. Raises OSError
+    where the system refuses.
+    """
+    path = Path(path)
+    if path.suffix.lower() == ".json":
+        content = json.dumps(tables, indent=1, default=lambda a: a.tolist()).encode()
+    else:
+        content = sealed(flat(tables))
+    write_whole(path, content)

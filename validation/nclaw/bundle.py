@@ -1,0 +1,69 @@
+"""The laws of a small training after some of its epochs, as one file (see `mpm_ref.sealed`).
+
+Networks are trained in single precision, and stored so: they come back as they were, as doubles.
+"""
+
+import json
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from mpm_ref.nclaw.weights import PARTS, Laws, arrays_of, fault_of, trained_of
+from mpm_ref.sealed import about_of, opened, require_format, sealed, write_whole
+
+FORMAT = 1
+
+
+class Bundle(NamedTuple):
+    """Laws by epoch, and what is known of their training."""
+
+    laws: dict          # {epochs over: `mpm_ref.nclaw.weights.Laws`}, each with an about
+    about: dict         # plain values
+
+
+def save(path, bundle):
+    """Write a `Bundle`, whole or not at all. Raises ValueError for weights that single precision
+    does not hold, OSError where the system refuses.
+    """
+    about = {**bundle.about, "laws": {str(epoch): laws.about for epoch, laws in
+                                      bundle.laws.items()}}
+    arrays = {"format": np.array(FORMAT),
+              "about": np.array(json.dumps(about, sort_keys=True, allow_nan=False))}
+    for epoch, laws in bundle.laws.items():
+        for part in PARTS:
+            for name, a in arrays_of(part, getattr(laws, part)).items():
+                arrays[f"{epoch}.{name}"] = single(path, name, a)
+    write_whole(Path(path), sealed(arrays))
+
+
+def single(path, name, a):
+    """An array of a law as it is stored: weights in single precision, all else as it is."""
+    if a.dtype != float or name.endswith("_constants"):
+        return a
+    short = a.astype(np.float32)
+    if not np.array_equal(short, a):
+        raise ValueError(f"{path} is not written: {name} has more digits than single precision; "
+                         "store such laws with mpm_ref.nclaw.weights")
+    return short
+
+
+def load(path):
+    """Read what `save` wrote. Raises ValueError saying what is wrong with the file."""
+    arrays = opened(Path(path))
+    require_format(path, arrays, FORMAT)
+    about = about_of(path, arrays)
+    own = about.pop("laws", {})
+    epochs = sorted(own, key=int)
+    return Bundle({int(k): laws_of(path, arrays, k, own[k]) for k in epochs}, about)
+
+
+def laws_of(path, arrays, epoch, about):
+    """`Laws` of an epoch."""
+    start = f"{epoch}."
+    own = {name.removeprefix(start): a.astype(float) if a.dtype == np.float32 else a
+           for name, a in arrays.items() if name.startswith(start)}
+    fault = fault_of(own)
+    if fault:
+        raise ValueError(f"{path} holds no trained laws of epoch {epoch}: {fault}; train again")
+    return Laws(*(trained_of(part, own) for part in PARTS), about)

@@ -1,0 +1,94 @@
+"""The errors of small trainings (see `trade_nets`): on the run that they learned from, thrown
+otherwise, and in the body of the environment itself, of more points on a finer grid.
+"""
+
+from math import isnan
+from typing import NamedTuple
+
+import numpy as np
+
+from ..verification.scenes import with_
+from .environments import environment
+from .evaluate import compare, learned
+from .tasks import SEEDS, velocity
+from .trade_nets import bundled, small_nets
+from .waiting import there
+
+SHORT = 200         # steps, quick
+
+
+class Measured(NamedTuple):
+    """A small training, and the mean squared errors of its laws; infinite where they broke down."""
+
+    name: str
+    epoch: int
+    cpu: float          # of the training up to there [s]; without compilation
+    own: float          # on the run that it learned from, all of it seen [m^2]
+    thrown: float       # mean over other velocities, the same points and grid [m^2]
+    full: float         # on the environment's own run [m^2]; NaN: not run
+    step: int           # in which the first of these runs broke down, -1 for none
+
+    @property
+    def compared(self):
+        """The error by which trainings of other sizes compare: on the full run, if it was made."""
+        return self.own if isnan(self.full) else self.full
+
+
+def measured(run, names, full=True):
+    """[`Measured`] of trainings by name, of all epochs that were kept; full: whether also in the
+    body of the environment.
+    """
+    found = {(name, epoch): laws for name, bundle in there(run, names, bundled).items()
+             for epoch, laws in bundle.laws.items()}
+    groups = {}
+    for key in found:
+        net = small_nets()[key[0]]
+        groups.setdefault((net.environment, net.edge, net.cells), []).append(key)
+    rows = [row for keys in run.progress(groups.values(), "sizes")
+            for row in of_size(run, {key: found[key] for key in keys}, full)]
+    return sorted(rows, key=lambda row: names.index(row.name))
+
+
+def of_size(run, found, full):
+    """[`Measured`] of {(name, epoch): laws} that were trained on one scene."""
+    net = small_nets()[next(iter(found))[0]]
+    makers = [learned(laws) for laws in found.values()]
+    results = [compare(cut(run, scene), makers) for scene in scenes(net, full)]
+    rows = []
+    for k, (name, epoch) in enumerate(found):
+        own, *others = (ends[k] for ends in results)
+        whole = others.pop().error if full else np.nan
+        steps = [end[k].step for end in results if end[k].step >= 0]
+        rows.append(Measured(name, epoch, spent(name, epoch), own.error,
+                             float(np.mean([end.error for end in others])), whole,
+                             min(steps, default=-1)))
+    return rows
+
+
+def scenes(net, full):
+    """The scene that a `Small` learns from, thrown otherwise, and, if asked for, the full one."""
+    own = net.scene
+    others = [with_(own, body=(with_(own.body[0], velocity=velocity(net.environment, seed)
+                                     .body[0].velocity),)) for seed in SEEDS]
+    return [own, *others, *([environment(net.environment)] if full else [])]
+
+
+def cut(run, scene):
+    """A scene, at quick its first steps."""
+    return run.choose(quick=with_(scene, steps=SHORT), standard=scene)
+
+
+def spent(name, epoch):
+    """CPU seconds of a training up to an epoch; the first one, which compiles, counts as a usual
+    one.
+    """
+    seconds = bundled(name).about["cpu_seconds"][:epoch]
+    return float(sum(seconds[1:]) + np.median(seconds))
+
+
+def spread(found, names):
+    """The smallest and the largest error on their own run, of trainings that differ by their seed
+    alone; (NaN, NaN) where none is there.
+    """
+    errors = [row.own for row in found if row.name in names]
+    return (min(errors), max(errors)) if errors else (np.nan, np.nan)

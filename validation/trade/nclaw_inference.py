@@ -1,0 +1,166 @@
+"""What a step of a learned law costs, and the error: by the width of its networks, by the digits of
+their weights, by the length of the step.
+"""
+
+from time import process_time
+from typing import NamedTuple
+
+import numpy as np
+
+from mpm_ref.explicit import deform_body
+from mpm_ref.laws.compare import Broken, positions
+from mpm_ref.nclaw.bodies import own, points
+from mpm_ref.scene import build
+
+from ..nclaw.environments import environment
+from ..nclaw.evaluate import compare, learned
+from ..nclaw.nets import trained
+from ..nclaw.small_runs import measured
+from ..nclaw.trade_nets import BASE, OF_WIDTH, last, small_nets
+from ..registry import experiment
+from ..verification.scenes import threads_for, with_
+from .front import front
+
+NAMES = ("jelly", "plasticine")
+DIGITS = {"quick": (24, 8), "standard": (53, 24, 16, 11, 8, 6, 4)}     # bits of a number, with the
+                    # leading one: double 53, single 24, half 11, bfloat16 8
+FACTORS = {"quick": (1.0, 4.0), "standard": (0.5, 1.0, 2.0, 4.0, 5.0, 10.0)}    # of the trained dt
+EVERY = 20          # steps of the trained length between frames
+SHORT = 200         # steps, quick
+POINTS, REPEATS = 1000, 7
+STRAIN = 0.05       # of random F that the time is measured at
+
+
+class Step(NamedTuple):
+    """A run with another time step."""
+
+    environment: str
+    factor: float       # of the trained step
+    cpu: float          # of the run [s]
+    error: float        # beside the true laws with the trained step [m^2]
+    true_cpu: float     # of the true laws with this step [s]
+    true_error: float   # ... [m^2]
+
+
+def cost(law, flow):
+    """CPU seconds of both laws for one point, median."""
+    body = points(law, flow, np.eye(3) + STRAIN * np.random.default_rng(0).normal(
+        size=(POINTS, 3, 3)))
+    start, seconds = body.particles.F.copy(), []
+    with threads_for((body,)):
+        for _ in range(REPEATS + 1):
+            body.particles.F[:] = start
+            begin = process_time()
+            deform_body(body, 0.0)
+            seconds.append(process_time() - begin)
+    return float(np.median(seconds[1:])) / POINTS
+
+
+@experiment("trade.nclaw.width", title="NCLaw: error and cost by the width of the networks",
+            profiles=("quick", "standard"), budget={"quick": 10, "standard": 120})
+def width(run):
+    """Two hidden layers each; 64 wide are the paper's."""
+    names = run.choose(quick=[BASE], standard=[BASE, *OF_WIDTH])
+    found = measured(run, names, full=False)
+    found = [row for row in found if row.epoch == small_nets()[row.name].epochs]
+    body = build(small_nets()[BASE].scene).bodies[0]
+    true, rows = cost(body.law, body.flow), []
+    costs = [of_laws(last(row.name), body) for row in found]
+    best = front(costs, [row.own for row in found])
+    for row, seconds, on in zip(found, costs, best, strict=True):
+        net = small_nets()[row.name]
+        rows.append((net.width, seconds, true, row.own, row.thrown, row.cpu, int(on)))
+        run.record(f"trade.nclaw.width.{net.width}", row.own, unit="m^2", comparator="info",
+                   scale="216 particles, 100 epochs",
+                   note=f"{1e6 * seconds:.3g} us of CPU time a point and step, the true laws "
+                        f"{1e6 * true:.3g}; thrown otherwise {row.thrown:.3g} m^2")
+    run.table("widths", ("width", "cpu_point", "true_cpu_point", "own", "thrown", "cpu_training",
+                         "pareto"), rows)
+
+
+def of_laws(laws, body):
+    """`cost` of `weights.Laws`, in place of those of a body."""
+    made = learned(laws)(body)
+    return cost(made.law, made.flow)
+
+
+def rounded(laws, bits):
+    """`weights.Laws` whose weights have so many binary digits."""
+    return laws._replace(**{part: getattr(laws, part)._replace(layers=tuple(
+        tuple(shorter(a, bits) for a in layer) for layer in getattr(laws, part).layers))
+        for part in ("elastic", "plastic")})
+
+
+def shorter(a, bits):
+    """Numbers rounded to so many binary digits."""
+    mantissa, exponent = np.frexp(a)
+    return np.ldexp(np.round(mantissa * 2.0**bits), exponent - bits)
+
+
+@experiment("trade.nclaw.digits", title="NCLaw: error by the digits of the weights",
+            profiles=("quick", "standard"), budget={"quick": 10, "standard": 120})
+def digits(run):
+    """Weights alone are rounded; answers are computed in doubles."""
+    rows = []
+    for name in run.choose(quick=NAMES[:1], standard=NAMES):
+        bits = DIGITS[run.profile]
+        steps = run.choose(quick=SHORT, standard=environment(name).steps)
+        found = compare(environment(name, steps=steps, every=EVERY),
+                        [learned(rounded(trained(name), k)) for k in bits])
+        rows += [(name, k, *one) for k, one in zip(bits, found, strict=True)]
+        for k, one in zip(bits, found, strict=True):
+            run.record(f"trade.nclaw.digits.{name}.{k}", one.error, unit="m^2", comparator="info",
+                       scale=f"{steps} steps, 1000 particles", note=one.why)
+    run.table("digits", ("environment", "bits", "error", "step", "why"), rows)
+
+
+@experiment("trade.nclaw.dt", title="NCLaw: error and cost by the time step",
+            profiles=("quick", "standard"), budget={"quick": 10, "standard": 120})
+def time_step(run):
+    """Beside the true laws with the trained step, which true laws with another one also miss."""
+    rows = []
+    for name in run.choose(quick=NAMES[:1], standard=NAMES):
+        rows += of_steps(name, FACTORS[run.profile],
+                         run.choose(quick=SHORT, standard=environment(name).steps))
+    best = {name: iter(front([row.cpu for row in own], [row.error for row in own]))
+            for name in NAMES for own in [[row for row in rows if row.environment == name]]}
+    for row in rows:
+        run.record(f"trade.nclaw.dt.{row.environment}.{row.factor:g}", row.error, unit="m^2",
+                   comparator="info", scale="1000 particles", note=f"{row.cpu:.3g} CPU s a run; "
+                   f"the true laws with this step {row.true_cpu:.3g} CPU s, "
+                   f"{row.true_error:.3g} m^2")
+    run.table("steps", (*Step._fields, "pareto"),
+              [(*row, int(next(best[row.environment]))) for row in rows])
+
+
+def of_steps(name, factors, steps):
+    """`Step`s of an environment: over the time of so many steps of the trained length."""
+    scene = environment(name, steps=steps, every=EVERY)
+    x, _ = timed(scene, own)
+    rows = []
+    for factor in factors:
+        other = with_(scene, dt=factor * scene.dt, steps=round(steps / factor),
+                      every=round(EVERY / factor))
+        found = [timed(other, make) for make in (learned(trained(name)), own)]
+        rows.append(Step(name, factor, *(a for at, cpu in found for a in (cpu, error(at, x)))))
+    return rows
+
+
+def timed(scene, make):
+    """Positions in frames as far as a run goes, and CPU seconds of the run."""
+    problem, frames = build(scene), []
+    with threads_for(problem.bodies):
+        begin = process_time()
+        try:
+            for x in positions(problem, tuple(map(make, problem.bodies))):
+                frames.append(x)
+        except Broken:
+            pass
+        return frames, process_time() - begin
+
+
+def error(frames, x):
+    """Mean squared error of frames [m^2]; infinite where some are missing."""
+    if len(frames) < len(x):
+        return np.inf
+    return float(np.mean([np.mean((a - b) ** 2) for a, b in zip(frames, x, strict=True)]))
