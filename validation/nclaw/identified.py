@@ -1,4 +1,4 @@
-"""How far laws are off by themselves, not through a run (Table 5, NCLAW-appF3)."""
+"""How far laws are off by themselves, not through a run (Table 5)."""
 
 import numpy as np
 

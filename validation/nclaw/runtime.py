@@ -1,4 +1,4 @@
-"""How long NCLaw's laws take (Table 3, NCLAW-appF1): half a second of each environment."""
+"""How long NCLaw's laws take (Table 3): half a second of each environment."""
 
 from time import perf_counter, process_time
 
