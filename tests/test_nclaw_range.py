@@ -166,8 +166,8 @@ def test_bounds_and_time_step_are_read():
     {"low": [1.5, 0.8, 0.7], "high": [1.4, 1.0, 1.2]},
     {"low": [None, 0.8, 0.7], "high": [1.4, 1.0, 1.2]}])
 def test_what_are_no_bounds_is_refused(given):
-    with pytest.raises(ValueError, match=r"strains seen in training: .*; expected low and high, for "
-                                         "2 stretches and J; train again"):
+    with pytest.raises(ValueError, match=r"strains seen in training: .*; expected low and high, "
+                                         "for 2 stretches and J; train again"):
         known({"seen": given}, 2)
 
 
