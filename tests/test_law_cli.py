@@ -103,7 +103,9 @@ def test_labeled_laws_are_trained_on_answers(tmp_path):
 
 
 def test_constants_of_the_scene_are_identified(tmp_path):
-    """They begin too small, and grow."""
+    """They begin too small (see `sysid`). The modulus grows; as nothing yields yet, the yield
+    stress has no gradient.
+    """
     study = write_study(tmp_path, ("[train]", 'method = "sys-id"\n[train]'), scene=[FLOWING])
     assert train(study, tmp_path / "laws.npz").exit_code == 0
     law, flow = (trained.kind for trained in weights.load(tmp_path / "laws.npz")[:2])
@@ -111,7 +113,7 @@ def test_constants_of_the_scene_are_identified(tmp_path):
     assert (type(law), type(flow)) == (type(true.law), type(true.flow))
     assert law.mu / law.lam == pytest.approx(true.law.mu / true.law.lam)
     assert E**-0.2 < law.mu / true.law.mu < 1.0
-    assert 0.8 < flow.tau_y / true.flow.tau_y < 1.5
+    assert flow.tau_y / true.flow.tau_y == pytest.approx(0.8)
     assert mpm_ref("law", "evaluate", tmp_path / "laws.npz", tmp_path / "cube.toml").exit_code == 0
 
 

@@ -11,7 +11,7 @@ from mpm_ref.cases import in_order
 from mpm_ref.energy import kinetic
 from mpm_ref.laws.compare import Broken, positions
 from mpm_ref.nclaw import deployed
-from mpm_ref.nclaw.bodies import fresh
+from mpm_ref.nclaw.bodies import fresh, gradients
 from mpm_ref.nclaw.dissipation import balance, loops, work
 from mpm_ref.scene import build
 
@@ -113,7 +113,7 @@ def taken(body, law, frames, dt):
     V0 = in_order(body.particles.V0, body.id)
     next(frames)
     for _ in frames:
-        L, F_new = (in_order(getattr(body.particles, name), body.id) for name in "LF")
+        L, F_new = (in_order(a, body.id) for a in (body.particles.L, gradients(body)))
         yield V0 * work(law, F_new, F + dt * L @ F)
         F = F_new
 
