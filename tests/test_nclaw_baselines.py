@@ -8,6 +8,8 @@ from test_nclaw_invariants import APART, REPEATED, H, built, near_rest, turns
 from mpm_ref import materials
 from mpm_ref.core.law import kirchhoff
 from mpm_ref.nclaw import deployed, neural, principal, response, spline, stretched, weights
+from mpm_ref.nclaw.contraction import Contraction
+from mpm_ref.nclaw.energetic import Energetic
 from mpm_ref.nclaw.invariants import spectrum
 from mpm_ref.nclaw.weights import Laws, Trained
 
@@ -215,13 +217,14 @@ def beside(kind, rng):
     """`Trained` of a kind of `weights.BESIDE`; records of equal numbers are equal, their types not.
     """
     sizes = {type(MEAN): ((3, 6), (6, 3)), type(SORTED): ((3, 6), (6, 6), (6, 3)),
+             Energetic: ((4, 5), (5, 1)), Contraction: ((3, 5), (5, 2)),
              type(FAIR): ((21, 3),), type(RELEASED): ((21, 3),)}.get(type(kind), ())
-    return Trained(tuple((rng.normal(size=size), np.zeros(size[1])) for size in sizes), kind)
+    return Trained(tuple((abs(rng.normal(size=size)), np.zeros(size[1])) for size in sizes), kind)
 
 
-LAWS = {"elastic": (MEAN, SORTED, FAIR, RELEASED, materials.FixedCorotated(1.0, 2.0),
-                    materials.Hencky(1.0, 2.0), materials.Fluid(3.0)),
-        "plastic": (materials.NoFlow(), materials.DruckerPrager(0.3, 0.05),
+LAWS = {"elastic": (MEAN, SORTED, FAIR, RELEASED, Energetic(2e4), materials.Fluid(3.0),
+                    materials.FixedCorotated(1.0, 2.0), materials.Hencky(1.0, 2.0)),
+        "plastic": (materials.NoFlow(), Contraction(2e-3), materials.DruckerPrager(0.3, 0.05),
                     materials.VonMises(5.0, 0.05), materials.FluidProjection())}
 
 

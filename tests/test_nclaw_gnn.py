@@ -9,7 +9,7 @@ from gnn_toys import DT, RADIUS
 
 from mpm_ref.core.boundary import BoxWalls, nclaw_walls
 from mpm_ref.nclaw.gnn import graph as graphs
-from mpm_ref.nclaw.gnn.graph import Graph, near
+from mpm_ref.nclaw.gnn.graph import Graph, Lost, near
 from mpm_ref.nclaw.gnn.history import (
     HISTORY,
     Box,
@@ -60,7 +60,7 @@ def test_cubes_of_the_paper_have_15_neighbours_on_average():
 def test_a_crowd_is_refused(monkeypatch):
     monkeypatch.setattr(graphs, "MOST", 99)
     assert len(near(np.zeros((9, 3)), 0.1).senders) == 81
-    with pytest.raises(ValueError, match=r"^10 points with 100 edges within 0\.1 m: expected at "
+    with pytest.raises(Lost, match=r"^10 points with 100 edges within 0\.1 m: expected at "
                                          r"most 99; take fewer points, or a simulator of "):
         near(np.zeros((10, 3)), 0.1)
 
@@ -194,6 +194,6 @@ def test_a_point_that_is_lost_is_told():
     y[7, 1] = np.inf
     run = free_run(lambda *told: y, toys.reading(), frames, toys.box())
     np.testing.assert_array_equal(next(run), frames[-1])
-    with pytest.raises(ValueError, match=r"^point 7 is at \[.* inf .*\]: expected a finite place; "
+    with pytest.raises(Lost, match=r"^point 7 is at \[.* inf .*\]: expected a finite place; "
                                          r"did the simulator learn too little, or "):
         next(run)

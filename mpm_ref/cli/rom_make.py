@@ -86,7 +86,8 @@ def came(done):
 def in_sum(ended):
     """How many runs were made, continued, and there before, of a `Done` of each."""
     count = Counter(map(came, ended))
-    return f"made {count[MADE]}, continued {count[CONTINUED]}, {count[THERE]} were there"
+    made, continued, there = (count[word] for word in (MADE, CONTINUED, THERE))
+    return f"made {made}, continued {continued}, {there} were there"
 
 
 def train(

@@ -3,6 +3,7 @@
 from math import isclose
 
 from mpm_ref.laws.compare import Broken
+from mpm_ref.nclaw.gnn.graph import Lost
 
 from .simulators import start
 
@@ -23,5 +24,5 @@ def free(problem, simulator):
     for step in range(0, clock.steps + 1, clock.every):
         try:
             yield next(run)
-        except ValueError as fault:
+        except Lost as fault:
             raise Broken(step, str(fault)) from None

@@ -11,6 +11,10 @@ from scipy.spatial import cKDTree
 MOST = 1_000_000        # edges: those of 1000 points in one place
 
 
+class Lost(ValueError):
+    """Points that no run goes on from: one has no finite place, or too many are in one place."""
+
+
 class Graph(NamedTuple):
     """Edges of n points, sorted by receiver, then by sender."""
 
@@ -26,13 +30,13 @@ class Graph(NamedTuple):
 def near(x, radius):
     """`Graph` of points x (n, d) [m] that are at most a radius [m] apart.
 
-    Raises ValueError for more than MOST edges.
+    Raises `Lost` for more than MOST edges.
     """
     tree = cKDTree(x)
     count = int(tree.count_neighbors(tree, radius))
     if count > MOST:
-        raise ValueError(f"{len(x)} points with {count} edges within {radius} m: expected at most "
-                         f"{MOST}; take fewer points, or a simulator of a smaller radius")
+        raise Lost(f"{len(x)} points with {count} edges within {radius} m: expected at most "
+                   f"{MOST}; take fewer points, or a simulator of a smaller radius")
     pairs, itself = tree.query_pairs(radius, output_type="ndarray"), np.arange(len(x))
     senders = np.concatenate([pairs[:, 0], pairs[:, 1], itself])
     receivers = np.concatenate([pairs[:, 1], pairs[:, 0], itself])

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .graph import near
+from .graph import Lost, near
 from .history import Reading, begun, following, of_edges, of_points
 from .network import Network, answers
 
@@ -28,7 +28,7 @@ def free_run(answer, reading, frames, box):
     without end.
 
     answer: function of what points and edges are told, and of the graph, to (n, d).
-    Raises ValueError as `graph.near`, and for a point without a finite place.
+    Raises `Lost` as `graph.near`, and for a point without a finite place.
     """
     while True:
         x = frames[-1]
@@ -40,8 +40,8 @@ def free_run(answer, reading, frames, box):
 
 
 def require_finite(x):
-    """Raise ValueError unless all points x (n, d) have a finite place."""
+    """Raise `Lost` unless all points x (n, d) have a finite place."""
     lost = np.flatnonzero(~np.isfinite(x).all(axis=1))
     if len(lost):
-        raise ValueError(f"point {lost[0]} is at {x[lost[0]]}: expected a finite place; did the "
-                         "simulator learn too little, or is the body unlike those it learned from?")
+        raise Lost(f"point {lost[0]} is at {x[lost[0]]}: expected a finite place; did the "
+                   "simulator learn too little, or is the body unlike those it learned from?")

@@ -18,7 +18,7 @@ import torch
 
 from .... import checkpoints
 from ....cost import Cost, Meter
-from ...gnn.graph import Graph
+from ...gnn.graph import Graph, Lost
 from ...gnn.history import HISTORY, Reading
 from ...gnn.simulator import Simulator, free_run
 from ..fit import Diverged
@@ -104,7 +104,7 @@ class GraphSession:
         try:
             error = np.mean([np.mean((x - y) ** 2) for x, y in
                              zip(islice(found, len(true)), true, strict=True)])
-        except ValueError:
+        except Lost:
             return np.inf
         return error if np.isfinite(error) else np.inf
 
