@@ -39,7 +39,8 @@ def run(problem, steps, state=None):
         before = [tuple(copied(body, 1) for body in p.bodies) for p in sides.runs]
         done = sides.step(k)
         seeds = [seeds_of(problem, body, sides.dt, k) for body in before[0]]
-        arrays = backwards(sides, before, seeds, done)
+        x = [done.arrays[f"{body.name}/x"].value for body in before[0]]
+        arrays = backwards(sides, before, unclipped(problem.clip, seeds, x), done)
         refuse_kinks(arrays, k)
         beside = {f"{body.name}/{name}_seed": a for body, seed in zip(before[0], seeds)
                   for name, a in seed._asdict().items() if a is not None}
@@ -51,9 +52,17 @@ def require_adjoints(problem):
     StepAdjoint(problem.stepper())
     for body in problem.bodies:
         require_adjoint(body)
-    if problem.clip is not None:
-        raise ValueError("clip: positions that are kept inside a box have no adjoint here; record "
-                         "a scene without")
+
+
+def unclipped(clip, seeds, x):
+    """The `Seeds` of each body as the step before a clip of positions sees them: 0 for coordinates
+    that it holds. clip is (lower, upper) or None, x the positions (N, d) of each body after it.
+    """
+    if clip is None:
+        return seeds
+    lower, upper = clip
+    return [seed._replace(x=np.where((lower < at) & (at < upper), seed.x, 0.0))
+            for seed, at in zip(seeds, x)]
 
 
 def refuse_kinks(arrays, k):

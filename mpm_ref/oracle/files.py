@@ -8,6 +8,8 @@ import h5py
 import numpy as np
 
 from ..body import Body
+from ..plain.flows import FLOWS
+from ..plain.laws import LAWS
 from ..store.atomic import replacing, require_place
 from . import adjoint_recording, implicit_recording, recording, solving
 from .matching import refuse_no_numbers
@@ -28,7 +30,7 @@ def record(problem, path, steps, overwrite=False, begin=0, eps=None):
     `NotWritten`.
     """
     require_free(path, overwrite)
-    refuse_names(problem)
+    refuse_bodies(problem)
     run = implicit_recording.run if problem.integrator == "implicit" else recording.run
     return put(solved_to(problem, eps), path, (steps, begin), run)
 
@@ -36,11 +38,11 @@ def record(problem, path, steps, overwrite=False, begin=0, eps=None):
 def record_adjoint(problem, path, steps, overwrite=False, begin=0):
     """Record explicit steps as `record` does, each with its adjoint, stage by stage backwards.
 
-    Raises ValueError as that does, and for what has no adjoint: implicit steps, positions that are
-    clipped, conditions, laws and flows without one.
+    Raises ValueError as that does, and for what has no adjoint: implicit steps, conditions, laws
+    and flows without one.
     """
     require_free(path, overwrite)
-    refuse_names(problem)
+    refuse_bodies(problem)
     adjoint_recording.require_adjoints(problem)
     put(problem, path, (steps, begin), adjoint_recording.run)
 
@@ -104,8 +106,10 @@ def is_golden(path):
         return False
 
 
-def refuse_names(problem):
-    """Raise ValueError for names that are not unique, or mean something else in the file."""
+def refuse_bodies(problem):
+    """Raise ValueError for names that are not unique, or mean something else in the file, and for
+    laws and flows that the plain twin does not know.
+    """
     names = [body.name for body in problem.bodies]
     clash = sorted(taken(problem.integrator) & set(names))
     if len(set(names)) < len(names) or any("/" in name or name.strip(".") == "" for name in names):
@@ -113,6 +117,11 @@ def refuse_names(problem):
     if clash:
         raise ValueError(f"body {clash[0]!r}: this names an array, or a group, of every "
                          f"{problem.integrator} step in the file; rename the body")
+    for body in problem.bodies:
+        for part, known in ((body.law, LAWS), (body.flow, FLOWS)):
+            if type(part).__name__ not in known:
+                raise ValueError(f"body {body.name!r}: {type(part).__name__} is not known to the "
+                                 f"plain twin; expected one of {', '.join(sorted(known))}")
 
 
 def describe(f, problem):
