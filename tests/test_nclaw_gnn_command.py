@@ -49,7 +49,7 @@ def test_a_graph_network_is_trained_stored_found_and_run(places):
 
 
 def test_what_a_net_says_is_what_is_trained():
-    net = GraphNet("sand", steps=3000, width=7, batch=3, noise=1e-4, first_rate=1e-2,
+    net = GraphNet("sand", steps=3000, width=7, batch=3, noise=2e-4, first_rate=1e-2,
                    last_rate=1e-4, seed=5)
     recipe, plain = train_gnn.recipe_of(net), GraphRecipe(steps=1000)
     for name in ("steps", "width", "batch", "noise", "first_rate", "last_rate", "seed"):

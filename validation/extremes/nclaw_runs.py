@@ -168,7 +168,7 @@ def record_silent(run, found, scale):
     ways = ", ".join(f"{sum(t.kind == kind for t in found)} {kind}"
                      for kind in (STOPPED, FLAGGED, FINE))
     words = [f"{t.law}, {t.what}: {t.end.error / t.usual:.3g} times" for t in silent[:6]]
-    run.record(f"{name}.silent", len(silent), unit="runs", comparator="info",
+    run.record(f"{name}.silent", len(silent), unit="runs", paper=0, comparator="=",
                scale=f"{scale}, {len(found)} runs", note="; ".join((ways, *words)))
     for factor in BADS:
         bad = [t for t in found if t.bad(factor)]

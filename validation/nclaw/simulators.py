@@ -35,7 +35,7 @@ class GraphNet(NamedTuple):
     steps: int = 15_000
     width: int = 32
     batch: int = 1
-    noise: float = 3e-4         # [m per frame]
+    noise: float = 1e-4         # [m per frame]
     first_rate: float = 1e-3
     last_rate: float = 1e-5
     seed: int = 0

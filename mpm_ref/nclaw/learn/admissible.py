@@ -2,7 +2,8 @@
 
 What is learned of a weight of the energy is its logarithm, so that it stays positive; biases are
 free. Training starts from moduli of about `kind.unit`, and from a return that takes START of the
-strain in a step, as much as NCLAW-alg4 adds.
+strain in a step, as much as NCLAW-alg4 adds. It starts with little of r, which grows with the
+fourth power of stretches: else the first epochs take all stress away to be rid of that.
 """
 
 from itertools import pairwise
@@ -20,6 +21,7 @@ from .perceptron import Perceptron, layers_of
 
 HIDDEN = {"elastic": (16, 16), "plastic": (32, 32)}
 START = 1e-3        # a and b of the return map, at first
+SHARES = 1.0, 0.02, 1.0, 1.0        # of q, r, u, w in the energy, at first
 
 
 class Measures(Function):
@@ -87,15 +89,18 @@ class Contracted(Function):
 class GrowingConvex(nn.Module):
     """Inputs (n, inputs) -> slopes (n, inputs) of a convex function that grows with each of them.
 
-    W = exp(log_W) (in, out) of all layers, softplus between them; the last one has no bias.
+    W = exp(log_W) (in, out) of all layers, softplus between them; the last one has no bias. The
+    first layer begins with those shares of inputs.
     """
 
-    def __init__(self, inputs, hidden):
+    def __init__(self, shares, hidden):
         super().__init__()
-        sizes = inputs, *hidden, 1
+        sizes = len(shares), *hidden, 1
         self.log_W = nn.ParameterList([
             nn.Parameter(0.5 * torch.randn(n, m, dtype=torch.float64) - (log(n) if k else 0.0))
             for k, (n, m) in enumerate(pairwise(sizes))])
+        with torch.no_grad():
+            self.log_W[0] += torch.tensor(shares, dtype=torch.float64).log()[:, None]
         self.b = nn.ParameterList([nn.Parameter(torch.zeros(n, dtype=torch.float64))
                                    for n in hidden])
 
@@ -124,7 +129,7 @@ class EnergeticLaw(LawOfKind):
 
     def __init__(self, kind):
         super().__init__(kind)
-        self.net = GrowingConvex(energetic.MEASURES, HIDDEN["elastic"])
+        self.net = GrowingConvex(SHARES, HIDDEN["elastic"])
 
     def forward(self, F):
         """tau."""
