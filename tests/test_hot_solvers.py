@@ -22,14 +22,14 @@ def hierarchies(monkeypatch):
 
 @pytest.fixture(scope="module")
 def minimum():
-    """Of `bar`, by Newton's method with dense matrices."""
+    """Of `bar`, by Newton's method with dense matrices: ten times closer than `tight` asks."""
     toy = bar()
     dv = toy.start
     for _ in range(12):
         g = toy.evaluate(dv)[1].reshape(-1)
         H = toy.dense(dv).reshape(g.size, g.size)
         dv = dv - (np.linalg.pinv(H, hermitian=True) @ g).reshape(dv.shape)
-    assert scaled_norm(toy.evaluate(dv)[1], toy.kappa) < 1e-13
+    assert scaled_norm(toy.evaluate(dv)[1], toy.kappa) < 1e-12
     return dv
 
 
