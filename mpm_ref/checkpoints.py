@@ -19,7 +19,7 @@ def read(path):
     content = path.read_bytes()
     if not intact(content):
         raise ValueError(f"{path} is damaged or no checkpoint: its checksum does not fit; remove "
-                         "it to train from the start")
+                         "it to train from the start, or name another file")
     return content[:-SEAL]
 
 

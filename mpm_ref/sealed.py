@@ -6,7 +6,6 @@ They are compared before anything else of the file is read. Equal content gives 
 
 import hashlib
 import io
-import json
 import os
 import zipfile
 
@@ -56,20 +55,6 @@ def opened(path):
                          "where it came, or make it again") from None
 
 
-def format_of(arrays):
-    """The format that a file names; in words where that is not one number."""
-    found = arrays.get("format")
-    return f"an array of shape {found.shape}" if np.ndim(found) else found
-
-
-def require_format(path, arrays, expected):
-    """Raise ValueError unless a file is of the expected format."""
-    found = format_of(arrays)
-    if found != expected:
-        raise ValueError(f"{path} has format {found}, this program reads {expected}; use the "
-                         "version that wrote it, or make it again")
-
-
 def write_whole(path, content):
     """Write bytes beside their place, have the disk hold them, and move them into it."""
     if not path.parent.is_dir():
@@ -86,16 +71,3 @@ def write_whole(path, content):
                       "folder read-only?") from error
     finally:
         part.unlink(missing_ok=True)
-
-
-def about_of(path, arrays):
-    """What is known of a file's making, from its arrays. Raises ValueError for no JSON of it."""
-    try:
-        about = json.loads(str(arrays.get("about", "")))
-    except ValueError as error:
-        raise ValueError(f"{path} does not say how it was made: about is no JSON ({error}); copy "
-                         "it again from where it came, or make it again") from None
-    if not isinstance(about, dict):
-        raise ValueError(f"{path} does not say how it was made: about is a "
-                         f"{type(about).__name__}, expected a JSON object; make it again")
-    return about

@@ -182,9 +182,14 @@ def _check_shapes(body, seed, n):
     for name in STATE:
         a = getattr(seed, name, None)
         shape = getattr(body.particles, name).shape
-        if a is not None and np.shape(a) != shape:
+        if a is None:
+            continue
+        if np.shape(a) != shape:
             raise ValueError(f"seed of step {n}, body {body.name!r}: {name} has shape "
                              f"{np.shape(a)}, expected {shape}")
+        if not (np.isrealobj(a) and np.isfinite(a).all()):
+            raise ValueError(f"seed of step {n}, body {body.name!r}: {name} has entries that are "
+                             "not finite numbers; is the loss finite?")
 
 
 def _for_each(f, bodies):

@@ -290,3 +290,11 @@ def test_wrong_seeds_are_refused(seeds, said):
     tape.step(0.0, DT)
     with pytest.raises(ValueError, match=said):
         tape.gradient(seeds)
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, 1.0j])
+def test_seeds_that_are_no_finite_numbers_are_refused(wrong):
+    _, tape = tape_of(impact())
+    tape.step(0.0, DT)
+    with pytest.raises(ValueError, match="body 'jelly': x has entries that are not finite numbers"):
+        tape.gradient({1: [Seed(x=tape.bodies[0].particles.x + wrong), None]})

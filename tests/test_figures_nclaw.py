@@ -1,5 +1,7 @@
 """NCLaw's figures, and what their experiments keep for them."""
 
+import json
+
 import matplotlib as mpl
 import numpy as np
 import pytest
@@ -108,3 +110,16 @@ def test_curves_of_ablations_stand_beside_ours(tmp_path, monkeypatch):
     assert [line.get_label() for line in right.lines] == ["ours", "no-rotation"]
     assert list(right.lines[1].get_ydata()) == pytest.approx([1e-3, 22e-4])
     assert nclaw_loss.scale(results) == "2 epochs"
+
+
+def test_errors_of_labels_are_told_as_what_they_are_and_not_drawn(tmp_path, monkeypatch):
+    monkeypatch.setattr(tables, "nets", lambda: {"sand": Net("sand"), "sand-labeled": Net("sand")})
+    monkeypatch.setattr(tables, "trained", lambda name: untrained()._replace(
+        about={"errors": [1e-3, 1e-4]}))
+    results = done(tmp_path, curves.loss, "quick")
+    records = json.loads((tmp_path / "nclaw.loss.json").read_text())
+    units = {one["target"]: one["unit"] for one in records}
+    assert units["nclaw.loss.ours.sand.last"] == "m^2"
+    assert units["nclaw.loss.labeled.sand.last"] == "1"
+    axes, = nclaw_loss.draw(results).axes
+    assert [line.get_label() for line in axes.lines] == ["sand"]

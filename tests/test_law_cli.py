@@ -1,5 +1,6 @@
 """`mpm-ref law train`: weights, progress, checkpoints, the run to learn from. Needs PyTorch."""
 
+import h5py
 import numpy as np
 import pytest
 from command_line import assert_told, mpm_ref
@@ -76,6 +77,16 @@ def test_weights_say_how_they_were_made(made):
     assert about["seen"] == seen(observed(study.problem()).F)
     assert about["command"] == (f"mpm-ref law train {made / 'cubes.toml'} --out "
                                 f"{made / 'whole.npz'} --threads 1")
+
+
+def test_info_says_it(made):
+    about = weights.load(made / "whole.npz").about
+    *_, trained, met, by = mpm_ref("info", made / "whole.npz").stdout.splitlines()
+    first, last = about["errors"][0], about["errors"][-1]
+    assert trained == (f"trained on Cube, scene {about['scene_sha256'][:12]}, 4 epochs: mean "
+                       f"squared error of a step [m^2] {first:.3g} at first, {last:.3g} at last")
+    assert met.startswith("met in training: stretches 0.")
+    assert by == f"made by: {about['command']}, source sha256 {about['source_sha256'][:12]}"
 
 
 def test_progress_is_said_where_there_is_no_terminal(made):
@@ -158,7 +169,7 @@ def test_a_training_that_diverges_ends_with_status_3(tmp_path, monkeypatch):
     monkeypatch.setattr(fit, "SAVE", 1)
     study = write_study(tmp_path, ("epochs = 4", "epochs = 4\nelastic_rate = 1e12"))
     done = train(study, tmp_path / "laws.npz")
-    assert_told(done, 3, "cubes.toml: epoch 1, steps ",
+    assert_told(done, 3, "cubes.toml: epoch 2, steps ",
                 f"{tmp_path / 'laws.pt'} is of this training: remove it when the study changes")
     assert not (tmp_path / "laws.npz").exists()
     write_study(tmp_path)
@@ -179,6 +190,16 @@ def test_weights_that_cannot_be_written_lose_nothing(made, tmp_path, monkeypatch
     assert [file.name for file in tmp_path.iterdir()] == ["laws.pt"]
     assert train(made / "cubes.toml", tmp_path / "laws.npz").exit_code == 0
     assert bits(tmp_path / "laws.npz") == bits(made / "whole.npz")
+
+
+def test_a_checkpoint_that_cannot_be_written_is_told(made, tmp_path, monkeypatch):
+    def full(path, content):
+        raise OSError(f"{path} could not be written: no space left; is the disk full?")
+
+    monkeypatch.setattr(fit, "SAVE", 2)
+    monkeypatch.setattr(fit.checkpoints, "write", full)
+    assert_told(train(made / "cubes.toml", tmp_path / "laws.npz"), 4, "laws.pt could not be writ")
+    assert list(tmp_path.iterdir()) == []
 
 
 # The run to learn from.
@@ -230,6 +251,16 @@ def test_runs_of_other_scenes_and_of_fewer_fields_are_refused(made, tmp_path):
         done = train(made / "cubes.toml", tmp_path / "laws.npz", "--data", tmp_path / name)
         assert_told(done, 2, name, words)
         assert not (tmp_path / "laws.npz").exists()
+
+
+@pytest.mark.parametrize("name", ["x", "C", "F"])
+def test_a_run_that_holds_no_numbers_is_refused(made, tmp_path, name):
+    study = load(made / "cubes.toml")
+    run(study.problem(), tmp_path / "run.h5", Options(fields=Fields(("x", "v", "C", "F"))))
+    with h5py.File(tmp_path / "run.h5", "r+") as file:
+        file[f"bodies/cube/{name}"][7, 5] = np.nan
+    done = train(made / "cubes.toml", tmp_path / "laws.npz", "--data", tmp_path / "run.h5")
+    assert_told(done, 2, f"run.h5: {name} of particle 5 after step 7 is [", "make the run again")
 
 
 def test_a_run_that_becomes_unstable_has_status_3(tmp_path):

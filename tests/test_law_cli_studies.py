@@ -142,6 +142,17 @@ def test_a_checkpoint_in_no_folder_is_told_before_the_run(tmp_path):
     assert_told(train(tmp_path, edit), 4, "laws.pt: there is no folder")
 
 
+@pytest.mark.parametrize(("checkpoint", "words"), [
+    ("laws.npz", "laws.npz: this is the file of the weights; name another one"),
+    ("../{}/cubes.toml", "cubes.toml: this is the file of the study"),
+    ("run.h5", "run.h5: this is the file of the run to learn from")])
+def test_a_checkpoint_takes_no_other_file_s_place(tmp_path, checkpoint, words):
+    """It is removed when the weights are there."""
+    edit = "[train]", f'checkpoint = "{checkpoint.format(tmp_path.name)}"\n[train]'
+    assert_told(train(tmp_path, edit, options=("--data", tmp_path / "run.h5")), 2, words)
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["cube.toml", "cubes.toml"]
+
+
 def test_studies_of_reduced_models_are_refused():
     assert_told(mpm_ref("law", "train", "gravity_small"), 2, "gravity_small.toml: ", "unknown key")
 

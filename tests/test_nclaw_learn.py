@@ -97,6 +97,7 @@ def test_the_recipe_is_that_of_the_paper():
     *(({name: value}, f"^{name} = {value}: expected a positive number$")
       for name in ("elastic_rate", "plastic_rate", "clip", "scale") for value in (0.0, -1.0)),
     ({"clip": float("nan")}, "^clip = nan: expected a positive number$"),
+    *(({"seed": seed}, f"^seed = {seed}: expected 0 .. 4294967295$") for seed in (-1, 2**32)),
     ({"reading": "both"}, "^reading = 'both': expected release or printed$"),
 ])
 def test_settings_that_mean_nothing_are_refused(settings, said):

@@ -258,8 +258,7 @@ def test_weights_belong_to_the_hash_of_a_scene(folder):
 @pytest.mark.parametrize(("old", "new", "said"), [
     ('"laws.npz"', '"none.npz"', r"body\[0\].material: .*none.npz cannot be read: No such file"),
     ('"laws.npz"', '"broken.npz"', r"body\[0\].material: .*broken.npz is damaged"),
-    ('"laws.npz"', '"solid.npz"', r"material.weights = .*elastic law is for dim = 3, expected "
-                                  "dim = 2"),
+    ('"laws.npz"', '"solid.npz"', r"weights = .*its laws are for dim = 3, expected dim = 2"),
     (', weights = "laws.npz"', "", "law 'neural': missing parameter weights"),
     ('"laws.npz"', '"laws.npz", E = 1e5', "law 'neural': unknown parameter E; all that it takes"),
     ('"laws.npz"', '"laws.npz", flow = { type = "snow_clamp" }', "unknown parameter flow"),

@@ -162,6 +162,15 @@ def test_ctrl_c_in_a_training_says_how_to_go_on(made, tmp_path, monkeypatch, sav
                 "before there was a checkpoint; the same command again begins anew")
 
 
+def test_a_checkpoint_that_cannot_be_written_is_told(made, tmp_path, monkeypatch):
+    def full(study, snapshots, about, checkpoint, threads):
+        raise OSError(f"{checkpoint} could not be written: no space left; is the disk full?")
+    monkeypatch.setattr("mpm_ref.cli.rom_make.fitted", full)
+    done = mpm_ref("rom", "train", made / "bars.toml", "--data", made / "data",
+                   "--out", tmp_path / "map.npz")
+    assert_told(done, 4, "map.pt could not be written: no space left")
+
+
 @pytest.mark.parametrize(("options", "status", "words"), [
     (("--out", "{}/map.npz"), 2, "exists: add --overwrite"),
     (("--out", "{}/map.h5"), 2, "ends in .npz"),

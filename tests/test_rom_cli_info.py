@@ -18,6 +18,7 @@ from mpm_ref.reduced.study import load
 from mpm_ref.rom import weights
 from mpm_ref.rom.snapshots import displacement_error, position_error
 from mpm_ref.rom.weights import Model
+from mpm_ref.sealed import sealed
 
 LDM = Path(__file__).parents[1] / "validation" / "ldm" / "weights"
 
@@ -91,8 +92,8 @@ def test_what_is_no_map_is_told(made, tmp_path):
     damaged[100] ^= 1
     (tmp_path / "map.npz").write_bytes(damaged)
     assert_told(mpm_ref("info", tmp_path / "map.npz"), 2, "map.npz is damaged")
-    laws = LDM.parents[1] / "nclaw" / "weights" / "jelly.npz"
-    assert_told(mpm_ref("info", laws), 2, "jelly.npz holds no trained map: it lacks ")
+    (tmp_path / "map.npz").write_bytes(sealed({"format": np.array(1), "xhat": np.ones((1, 2, 3))}))
+    assert_told(mpm_ref("info", tmp_path / "map.npz"), 2, "map.npz holds no trained map: it lacks ")
 
 
 # info of a study

@@ -20,10 +20,11 @@ from mpm_ref.reduced.generate import (
     generate,
     one_thread,
 )
-from mpm_ref.rom import modes_file, weights
+from mpm_ref.rom import modes_file
 from mpm_ref.rom.curved import curved
 from mpm_ref.rom.modes import basis
 from mpm_ref.scene import build
+from mpm_ref.sealed import sealed
 from mpm_ref.store import BadResults, Fields
 from mpm_ref.store.results import Results
 from mpm_ref.store.running import Options, run
@@ -196,7 +197,7 @@ def test_what_is_no_curved_map_is_refused(bent, tmp_path):
     _, arrays = modes_file.arrays_of(model)
     content = {"kind": np.array("curved"), "format": np.array(1), "about": np.array("{}"), **arrays}
     del content["powers"]
-    (tmp_path / "x.npz").write_bytes(weights.sealed(content))
+    (tmp_path / "x.npz").write_bytes(sealed(content))
     with pytest.raises(ValueError, match="lacks powers"):
         modes_file.load(tmp_path / "x.npz")
 
@@ -224,7 +225,7 @@ def test_what_are_no_modes_is_refused(model, tmp_path):
                   "X": map.X, "U": map.U, "slope": map.slope, "xhat": model.xhat,
                   "rest": model.rest} | changes
         path = tmp_path / "map.npz"
-        path.write_bytes(weights.sealed({k: a for k, a in arrays.items() if a is not None}))
+        path.write_bytes(sealed({k: a for k, a in arrays.items() if a is not None}))
         return path
 
     assert modes_file.load(written()).decoder.r == 3

@@ -44,6 +44,15 @@ def options():
 
 
 @contextmanager
+def writing():
+    """Errors of the system, of parts that know no `NotWritten`, are that."""
+    try:
+        yield
+    except OSError as fault:
+        raise NotWritten(str(fault)) from fault
+
+
+@contextmanager
 def at_start(name):
     """Faults of a scene's first state begin with its name, as those of its text do."""
     try:

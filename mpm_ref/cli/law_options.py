@@ -17,6 +17,7 @@ WeightsFile = Annotated[Path, typer.Argument(metavar="WEIGHTS",
 SceneName = Annotated[str, typer.Argument(metavar="SCENE",
                                           help="A TOML file, or the name of a shipped scene.")]
 NUMBERS = (".csv",)
+OF_ERRORS = {"labeled": "squared error of F"}       # of methods that follow no motion
 
 
 def fitting(file, name, steps=None):
@@ -29,6 +30,11 @@ def fitting(file, name, steps=None):
         raise SceneError(f"{file}: its laws are for {dim_of(laws)} dimensions, but {path} has "
                          f"dim = {problem.dim}; name another scene")
     return laws, problem
+
+
+def of_errors(method):
+    """What the errors of a training's epochs are of, in words."""
+    return OF_ERRORS.get(method, "mean squared error of a step [m^2]")
 
 
 def other_steps(laws, problem):

@@ -11,9 +11,9 @@ from ..laws.numbers import write_curves
 from ..laws.pictures import draw
 from ..nclaw import deployed, weights
 from ..nclaw.export import exported, write
-from ..store.atomic import NotWritten, require_place
+from ..store.atomic import require_place
 from ..store.words import counted
-from .faults import one_line, options
+from .faults import one_line, options, writing
 from .law_options import NUMBERS, WeightsFile, fitting, other_steps
 from .outputs import PICTURES, require_ending, require_free
 from .rom_options import Overwrite
@@ -42,10 +42,8 @@ def export(
                 raise ValueError(f"--out {out}: these are the weights; name another file")
             require_free(out, overwrite)
             tables = exported(laws)
-        try:
+        with writing():
             write(out, tables)
-        except OSError as fault:
-            raise NotWritten(str(fault)) from fault
         said = ", ".join(f"{part} {described(getattr(laws, part))}" for part in weights.PARTS)
         print(f"{out}: {said}; {counted(len(tables['check']['F']), 'question')} with answers")
 

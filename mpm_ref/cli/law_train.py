@@ -12,11 +12,12 @@ from ..laws import training, trajectory
 from ..laws.compare import threads_for
 from ..laws.study import load
 from ..nclaw import weights
-from ..store.atomic import NotWritten, require_place
+from ..store.atomic import require_place
 from ..store.session import Watch
 from ..store.words import counted
-from . import faults
-from .faults import at_start, end, one_line, options
+from . import faults, made
+from .faults import at_start, end, one_line, options, writing
+from .law_options import OF_ERRORS, of_errors
 from .outputs import HDF5, MAPS, require_ending, require_free
 from .rom_options import Overwrite, StudyName, on_interrupt
 from .shipped import find_study, keep_scene, shipped_scenes
@@ -24,7 +25,6 @@ from .terminal import passing, warn
 
 SAID = 10           # lines about a training where there is no terminal
 LEAST_OFF = 1e-6    # [dx] root mean squared error of laws in their first epoch
-OF_ERRORS = {"labeled": "squared error of F"}       # of methods that follow no motion
 
 
 def train(
@@ -50,13 +50,15 @@ def train(
             out = out or study.file("weights") or Path(f"{study.path.stem}.npz")
             checkpoint = study.file("checkpoint") or out.with_suffix(".pt")
             require_outputs(study, out, data, overwrite)
-            require_place(checkpoint)
+            require_checkpoint(checkpoint, study.path, out, data)
             training.drive()
             with at_start(study.path):
                 seen = motion(study, data)
-            laws = learned(study, seen, checkpoint, threads=threads, command=typed(
-                name, out, data, threads))
-        write(out, laws)
+            with writing():
+                laws = learned(study, seen, checkpoint, threads=threads, command=typed(
+                    name, out, data, threads))
+        with writing():
+            weights.save(out, laws)
         checkpoint.unlink(missing_ok=True)
         print(f"{out}: {in_short(study, seen, laws.about['errors'])}")
 
@@ -71,6 +73,18 @@ def require_outputs(study, out, data, overwrite):
         if data.suffix.lower() not in HDF5:
             raise ValueError(f"--data {data}: expected a name that ends in {' or '.join(HDF5)}")
         require_place(data)
+
+
+def require_checkpoint(checkpoint, study, out, data):
+    """Raise ValueError or NotWritten where no checkpoint is to be written: it is removed when the
+    weights are there.
+    """
+    require_place(checkpoint)
+    others = {"study": study, "weights": out, "run to learn from": data}
+    for word, other in others.items():
+        if other is not None and checkpoint.resolve() == other.resolve():
+            raise ValueError(f"checkpoint {checkpoint}: this is the file of the {word}; name "
+                             "another one")
 
 
 def typed(name, out, data, threads):
@@ -175,15 +189,7 @@ def epoch_in_words(study, epoch, steps):
 def in_short(study, seen, errors):
     """What was learned from what, and the errors of the first and the last epoch."""
     steps, points = len(seen.x) - 1, seen.x.shape[1]
-    of = OF_ERRORS.get(study.tables.method, "mean squared error of a step [m^2]")
     return (f"{study.tables.method}, {counted(len(errors), 'epoch')} on {counted(steps, 'step')} "
-            f"of {counted(points, 'point')}; {of} {errors[0]:.3g} at first, {errors[-1]:.3g} at "
-            "last")
+            f"of {counted(points, 'point')}; {of_errors(study.tables.method)} "
+            f"{made.ends(errors)}")
 
-
-def write(out, laws):
-    """Write weights. Raises NotWritten."""
-    try:
-        weights.save(out, laws)
-    except OSError as fault:
-        raise NotWritten(str(fault)) from fault

@@ -1,7 +1,5 @@
 """`mpm-ref info` of a study and of a map, and `mpm-ref rom studies`, the list of shipped ones."""
 
-from pathlib import Path
-
 import msgspec
 
 from ..reduced import maps
@@ -11,12 +9,11 @@ from ..reduced.tables import CURVED, KEYS, MODES, NETWORK
 from ..rom.curved import Curved
 from ..rom.decoder import Decoder
 from ..scene import SceneError
-from ..sealed import MAGIC
 from ..store.words import counted
 from .faults import one_line
 from .look import Machine, listed
 from .rom_options import studied
-from .shipped import shipped_scenes, shipped_studies
+from .shipped import shipped_studies
 
 TABLES = {"parameter", "map"}       # of a study of reduced runs; nothing else has such
 TERMS = ("position", "F", "velocity")       # of the loss of a network
@@ -28,26 +25,10 @@ def studies(json: Machine = False):
     """List the studies that come with the package."""
     with one_line():
         listed({name: checked(plain(path)).title for name, path in shipped_studies().items()
-                if of_reduced(path)}, json)
+                if is_study(path)}, json)
 
 
-def is_map(name):
-    """Whether a name is that of a file that begins as maps do."""
-    if not Path(name).is_file():
-        return False
-    with open(name, "rb") as file:
-        return file.read(len(MAGIC)) == MAGIC
-
-
-def is_study(name):
-    """Whether a name is that of a study's file, or of a shipped study and no scene's."""
-    path = Path(name)
-    if not path.is_file() and name not in shipped_scenes():
-        path = shipped_studies().get(name, path)
-    return of_reduced(path)
-
-
-def of_reduced(path):
+def is_study(path):
     """Whether a path is that of a study of reduced runs, whatever is wrong with its tables."""
     try:
         return bool(TABLES & set(plain(path)))

@@ -24,7 +24,7 @@ from ..reduced.tables import KEYS, NETWORK
 from ..store.atomic import NotWritten, not_written, require_place
 from ..store.words import counted
 from . import faults
-from .faults import end, one_line, options
+from .faults import end, one_line, options, writing
 from .outputs import MAPS, require_ending, require_folder_name, require_free
 from .rom_options import Data, Overwrite, StudyName, named, on_interrupt, studied
 from .shipped import keep_scene
@@ -118,7 +118,7 @@ def train(
             snapshots = dataset.load(study, data, study.train)
             about = {"command": f"mpm-ref rom train {name} --data {data} --out {out} "
                                 f"--kind {study.tables.map.kind} --threads {threads}"}
-            with on_interrupt(lambda: resuming(checkpoint)):
+            with writing(), on_interrupt(lambda: resuming(checkpoint)):
                 model = fitted(study, snapshots, about, checkpoint, threads)
             write(out, model)
         checkpoint.unlink(missing_ok=True)

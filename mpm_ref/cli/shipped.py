@@ -56,6 +56,14 @@ def find_study(name):
     return studies[name]
 
 
+def study_named(name):
+    """The path of a file; else of a shipped study of that name, which no scene has; else the name
+    as a path.
+    """
+    path = Path(name)
+    return path if path.is_file() or name in shipped_scenes() else shipped_studies().get(name, path)
+
+
 def keep_scene(path, out):
     """Raise ValueError if the file to write, whatever its name, is the scene at `path` itself, or
     is named as scenes are.

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from ..cases import Observed
-from ..store import Fields, require_run
+from ..store import BadResults, Fields, require_run
 from ..store.results import Results
 from ..store.running import Options, run
 
@@ -34,12 +34,25 @@ def make(path, problem, watch=None):
 
 def read(path, problem):
     """`cases.Observed` of a results file that is `whole`. Raises BadResults for one that lacks a
-    field.
+    field, or whose numbers are not all finite.
     """
     body, d = problem.bodies[0].name, problem.dim
     with Results(path) as results:
-        x, v, C = (results.field(body, name) for name in FIELDS[:3])
-        if results.has(body, J_ALONE):
-            J = results.field(body, J_ALONE)
-            return Observed(x, v, C, J[..., None, None] ** (1.0 / d) * np.eye(d))
-        return Observed(x, v, C, results.field(body, FIELDS[3]))
+        found = {name: results.field(body, name) for name in FIELDS[:3]}
+        last = J_ALONE if results.has(body, J_ALONE) else FIELDS[3]
+        found[last] = results.field(body, last)
+    require_finite(path, found)
+    J = found.pop(J_ALONE, None)
+    if J is not None:
+        found["F"] = J[..., None, None] ** (1.0 / d) * np.eye(d)
+    return Observed(**found)
+
+
+def require_finite(path, fields):
+    """Raise BadResults unless {name: field (k + 1, n, ..)} are finite numbers."""
+    for name, a in fields.items():
+        lost = np.argwhere(~np.isfinite(a))
+        if len(lost):
+            k, p = lost[0][:2]
+            raise BadResults(f"{path}: {name} of particle {p} after step {k} is {a[k, p]}: "
+                             "expected finite numbers to learn from; make the run again")

@@ -1,4 +1,4 @@
-"""Trained laws as a file (see `sealed`): an elastic and a plastic law, layers and kinds.
+"""Trained laws as a file (see `archive`): an elastic and a plastic law, layers and kinds.
 
 A kind is a record of numbers, and its type says what layers (W (in, out), b (out,)) are for:
 
@@ -10,15 +10,13 @@ A kind is a record of numbers, and its type says what layers (W (in, out), b (ou
     of `materials`              none, the record is the law: identified ones, and no return map
 """
 
-import json
 from itertools import pairwise
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from .. import materials
-from ..sealed import about_of, opened, require_format, sealed, write_whole
+from ..archive import read, stated, write
 from . import principal, response, spline
 from .contraction import ANSWERED, READ, Contraction
 from .energetic import MEASURES, Energetic
@@ -67,28 +65,16 @@ def save(path, laws):
     """Write `Laws`, whole or not at all. Raises ValueError for numbers that are not finite, sizes
     that do not fit and an `about` with more than JSON knows, OSError where the system refuses.
     """
-    try:
-        about = json.dumps(laws.about, sort_keys=True, allow_nan=False)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{path} is not written: about: {error}; give numbers, text, lists and "
-                         "dicts of them") from None
-    arrays = {"format": np.array(FORMAT), "about": np.array(about)}
+    arrays = stated(path, FORMAT, laws.about)
     for part in PARTS:
         arrays |= arrays_of(part, getattr(laws, part))
-    fault = fault_of(arrays)
-    if fault:
-        raise ValueError(f"{path} is not written: {fault}")
-    write_whole(Path(path), sealed(arrays))
+    write(path, arrays, fault_of)
 
 
 def load(path):
     """Read what `save` wrote. Raises ValueError saying what is wrong with the file."""
-    arrays = opened(Path(path))
-    require_format(path, arrays, FORMAT)
-    fault = fault_of(arrays)
-    if fault:
-        raise ValueError(f"{path} holds no trained laws: {fault}; train again")
-    return Laws(*(trained_of(part, arrays) for part in PARTS), about_of(path, arrays))
+    arrays, about = read(path, FORMAT, fault_of, "trained laws")
+    return Laws(*(trained_of(part, arrays) for part in PARTS), about)
 
 
 def arrays_of(part, law):

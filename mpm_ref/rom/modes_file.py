@@ -1,14 +1,15 @@
-"""POD modes as a file, straight or bent, sealed as those of `weights` are: the same `Model`, its
+"""POD modes as a file, straight or bent, as those of `weights` are: the same `Model`, its
 decoder `Modes` or `Curved`.
 """
 
-import json
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..sealed import about_of, format_of, opened, sealed, write_whole
+from ..archive import about_of, format_of, stated, write
+from ..sealed import opened
 from .curved import Curved
 from .modes import Modes
 from .weights import Model
@@ -19,16 +20,12 @@ KINDS = {"modes": NUMBERS, "curved": (*NUMBERS, "powers", "C")}
 
 
 def save(path, model):
-    """Write a `Model` of modes, whole or not at all. Raises ValueError for arrays that do not fit,
-    and OSError where the system refuses.
+    """Write a `Model` of modes, whole or not at all. Raises ValueError for arrays that do not fit
+    and an `about` with more than JSON knows, OSError where the system refuses.
     """
     kind, arrays = arrays_of(model)
-    fault = fault_of(kind, arrays)
-    if fault:
-        raise ValueError(f"{path} is not written: {fault}")
-    about = json.dumps(model.about, sort_keys=True, allow_nan=False)
-    write_whole(Path(path), sealed({"kind": np.array(kind), "format": np.array(FORMAT),
-                                    "about": np.array(about), **arrays}))
+    write(path, {"kind": np.array(kind), **stated(path, FORMAT, model.about), **arrays},
+          partial(fault_of, kind))
 
 
 def load(path):

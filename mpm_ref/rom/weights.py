@@ -1,13 +1,11 @@
-"""A trained map as a file (see `sealed`)."""
+"""A trained map as a file (see `archive`)."""
 
-import json
 from itertools import pairwise
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from ..sealed import about_of, opened, require_format, sealed, write_whole
+from ..archive import read, stated, write
 from .decoder import Decoder, Units
 from .network import Network, layers_of, network
 
@@ -25,40 +23,26 @@ class Model(NamedTuple):
 
 
 def save(path, model):
-    """Write a `Model`; who reads the file meanwhile, or a crash, finds the old one or the new one.
-
-    Raises ValueError for sizes that do not fit, numbers that are not finite, and an `about` with
-    more than JSON knows (of which tuples come back as lists); OSError where the system refuses.
+    """Write a `Model`, whole or not at all. Raises ValueError for sizes that do not fit, numbers
+    that are not finite and an `about` with more than JSON knows, OSError where the system refuses.
     """
-    arrays = arrays_of(model)
-    fault = fault_of(arrays)
-    if fault:
-        raise ValueError(f"{path} is not written: {fault}")
-    write_whole(Path(path), sealed(arrays))
+    write(path, stated(path, FORMAT, model.about) | arrays_of(model), fault_of)
 
 
 def load(path):
     """Read what `save` wrote. Raises ValueError saying what is wrong with the file."""
-    arrays = opened(Path(path))
-    require_format(path, arrays, FORMAT)
-    fault = fault_of(arrays)
-    if fault:
-        raise ValueError(f"{path} holds no trained map: {fault}; train again")
+    arrays, about = read(path, FORMAT, fault_of, "trained map")
     net = Network(arrays["sizes"].astype(int), arrays["W"], None, arrays["b"])
     units = Units(*(arrays[name] for name in Units._fields))
     return Model(Decoder(network(layers_of(net)), units), arrays["xhat"], arrays["rest"],
-                 about_of(path, arrays))
+                 about)
 
 
 def arrays_of(model):
-    """The arrays of a file by name; transposed weights are made anew on loading."""
+    """The numbers of a file by name; transposed weights are made anew on loading."""
     net, units = model.decoder
-    try:
-        about = json.dumps(model.about, sort_keys=True, allow_nan=False)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"about: {error}; give numbers, text, lists and dicts of them") from None
     numbers = {"W": net.W, "b": net.b, **units._asdict(), "xhat": model.xhat, "rest": model.rest}
-    return {"format": np.array(FORMAT), "about": np.array(about), "sizes": np.array(net.sizes),
+    return {"sizes": np.array(net.sizes),
             **{name: np.array(a, dtype=float) for name, a in numbers.items()}}
 
 

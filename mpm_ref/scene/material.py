@@ -7,12 +7,14 @@ from typing import Annotated
 from msgspec import Meta
 
 from ..materials import LAWS, make_flow, make_law
-from ..nclaw import neural, weights
+from ..nclaw import admissible, deployed, neural, weights
+from ..nclaw.bodies import dim_of
 from ..nclaw.range import known
 from ..shapes.quantities import Record, Sha256
 
 Number = Annotated[float, Meta(ge=-1e30, le=1e30)]
 NEURAL = "neural"       # the law whose parameters are a file
+LEARNED = *neural.STRESSES, *neural.CORRECTIONS, *admissible.MADE       # kinds that it may hold
 
 
 class Flow(Record):
@@ -58,13 +60,13 @@ class Material(Record):
     def elastic(self):
         """The elastic law. Raises ValueError for a name or parameter that does not fit."""
         if self.is_neural:
-            return neural.elastic(self.trained().elastic)
+            return deployed.elastic(self.trained().elastic)
         return make_law(self.law, **_given(self, "law", "flow"))
 
     def flowing(self, dim):
         """The return map in `dim` dimensions; errors as `elastic`."""
         if self.is_neural:
-            return neural.plastic(self.trained(dim).plastic)
+            return deployed.plastic(self.trained(dim).plastic)
         parameters = _given(self.flow, "type")
         return make_flow(self.flow.type, self.elastic(), dim, **parameters)
 
@@ -86,12 +88,20 @@ class Material(Record):
         if self.weights is None:
             raise ValueError(f"law {NEURAL!r}: missing parameter weights, a file of trained laws")
         laws = weights.load(self.weights)
-        for part in weights.PARTS:
-            of = neural.dim_of(len(getattr(laws, part).layers[0][0]))
-            if dim not in (None, of):
-                raise ValueError(f"weights = {self.weights!r}: its {part} law is for dim = {of}, "
-                                 f"expected dim = {dim}")
+        self._require_kinds(laws)
+        if dim not in (None, dim_of(laws)):
+            raise ValueError(f"weights = {self.weights!r}: its laws are for dim = {dim_of(laws)}, "
+                             f"expected dim = {dim}")
         return laws
+
+    def _require_kinds(self, laws):
+        for part in weights.PARTS:
+            kind = type(getattr(laws, part).kind)
+            if kind not in LEARNED:
+                raise ValueError(
+                    f"weights = {self.weights!r}: its {part} law is of kind {kind.__name__}; "
+                    'expected networks as of the methods "ours" or "admissible"; `mpm-ref law '
+                    "evaluate` runs any, and identified constants can be written here")
 
 
 def _given(record, *but):

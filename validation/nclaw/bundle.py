@@ -1,16 +1,16 @@
-"""The laws of a small training after some of its epochs, as one file (see `mpm_ref.sealed`).
+"""The laws of a small training after some of its epochs, as one file (see `mpm_ref.archive`).
 
 Networks are trained in single precision, and stored so: they come back as they were, as doubles.
 """
 
-import json
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from mpm_ref.archive import about_of, require_format, stated
 from mpm_ref.nclaw.weights import PARTS, Laws, arrays_of, fault_of, trained_of
-from mpm_ref.sealed import about_of, opened, require_format, sealed, write_whole
+from mpm_ref.sealed import opened, sealed, write_whole
 
 FORMAT = 1
 
@@ -24,12 +24,11 @@ class Bundle(NamedTuple):
 
 def save(path, bundle):
     """Write a `Bundle`, whole or not at all. Raises ValueError for weights that single precision
-    does not hold, OSError where the system refuses.
+    does not hold and an `about` with more than JSON knows, OSError where the system refuses.
     """
     about = {**bundle.about, "laws": {str(epoch): laws.about for epoch, laws in
                                       bundle.laws.items()}}
-    arrays = {"format": np.array(FORMAT),
-              "about": np.array(json.dumps(about, sort_keys=True, allow_nan=False))}
+    arrays = stated(path, FORMAT, about)
     for epoch, laws in bundle.laws.items():
         for part in PARTS:
             for name, a in arrays_of(part, getattr(laws, part)).items():

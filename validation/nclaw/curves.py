@@ -5,15 +5,20 @@
 from mpm_ref.nclaw.gnn.simulator import Simulator
 
 from ..registry import experiment
+from .met import LABELED
 from .tables import known, tell
 
+STEP = {"unit": "m^2", "note": "mean over steps from restarts of the horizon of that epoch"}
+ANSWER = {"unit": "1", "note": "mean squared error of F after the return map, over pairs"}
 COLUMNS = ("method", "environment", "epoch", "error")
 
 
 @experiment("nclaw.loss", title="NCLaw: errors in training",
             profiles=("quick", "standard"), budget={"quick": 1, "standard": 1})
 def loss(run):
-    """Mean squared errors of a step, from restarts, epoch by epoch."""
+    """Mean squared errors of a step, from restarts, epoch by epoch; of "labeled" laws, which follow
+    no motion, first and last error of F alone.
+    """
     found, waiting = known()
     rows = []
     for method, own in found.items():
@@ -21,19 +26,19 @@ def loss(run):
             if isinstance(laws, Simulator):
                 record_picked(run, f"nclaw.loss.{method}.{name}", laws.about)
                 continue
-            errors = laws.about["errors"]
-            rows += [(method, name, epoch, error) for epoch, error in enumerate(errors, 1)]
-            record(run, f"nclaw.loss.{method}.{name}", errors)
+            errors, of = laws.about["errors"], ANSWER if method == LABELED else STEP
+            record(run, f"nclaw.loss.{method}.{name}", errors, of)
+            if of is STEP:
+                rows += [(method, name, epoch, error) for epoch, error in enumerate(errors, 1)]
     run.table("errors", COLUMNS, rows)
     tell(run, waiting)
 
 
-def record(run, target, errors):
-    """Record where a training began and ended."""
+def record(run, target, errors, of):
+    """Record where a training began and ended; of: unit and note."""
     for word, error in (("first", errors[0]), ("last", errors[-1])):
-        run.record(f"{target}.{word}", error, unit="m^2", comparator="info",
-                   scale=f"{len(errors)} epochs",
-                   note="mean over steps from restarts of the horizon of that epoch")
+        run.record(f"{target}.{word}", error, comparator="info", scale=f"{len(errors)} epochs",
+                   **of)
 
 
 def record_picked(run, target, about):

@@ -15,9 +15,9 @@ from mpm_ref.simulate import simulate
 
 from ..registry import experiment
 from ..settings import record_settings
-from ..verification.scenes import mean, shipped, threads_for, with_
+from ..verification.scenes import mean, shipped, threads_for
+from .environments import ENVIRONMENTS, environment
 
-ENVIRONMENTS = ("jelly", "sand", "plasticine", "water")
 CARRIED = ("x", "v", "C", "F", "y")         # what a particle carries from step to step
 AXES = "xyz"
 
@@ -76,7 +76,7 @@ def final(name):
 
     The fixed step is not compared with its bound here, which changes no bit.
     """
-    problem = build(with_(shipped(f"nclaw_{name}"), unstable="allow", every=None))
+    problem = build(environment(name, every=None))
     with threads_for(problem.bodies):
         for frame in simulate(problem):
             body = frame.state.bodies[0]

@@ -1,12 +1,10 @@
-"""A trained graph network as a file (see `sealed`); its weights are in single precision."""
+"""A trained graph network as a file (see `archive`); its weights are in single precision."""
 
-import json
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 
-from ...sealed import about_of, opened, require_format, sealed, write_whole
+from ...archive import read, stated, write
 from .history import HISTORY, Reading, Scales
 from .network import Network, Perceptron
 from .simulator import Simulator
@@ -22,28 +20,15 @@ def save(path, simulator):
     Raises ValueError for sizes that do not fit, numbers that are not finite or not positive, and an
     `about` with more than JSON knows; OSError where the system refuses.
     """
-    try:
-        about = json.dumps(simulator.about, sort_keys=True, allow_nan=False)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{path} is not written: about: {error}; give numbers, text, lists and "
-                         "dicts of them") from None
-    arrays = arrays_of(simulator) | {"format": np.array(FORMAT), "about": np.array(about)}
-    fault = fault_of(arrays)
-    if fault:
-        raise ValueError(f"{path} is not written: {fault}")
-    write_whole(Path(path), sealed(arrays))
+    write(path, arrays_of(simulator) | stated(path, FORMAT, simulator.about), fault_of)
 
 
 def load(path):
     """Read what `save` wrote. Raises ValueError saying what is wrong with the file."""
-    arrays = opened(Path(path))
-    require_format(path, arrays, FORMAT)
-    fault = fault_of(arrays)
-    if fault:
-        raise ValueError(f"{path} holds no trained graph network: {fault}; train again")
+    arrays, about = read(path, FORMAT, fault_of, "trained graph network")
     radius, dt = (float(arrays[name]) for name in NUMBERS)
     scales = Scales(*(arrays[name] for name in Scales._fields))
-    return Simulator(network_of(arrays), Reading(radius, dt, scales), about_of(path, arrays))
+    return Simulator(network_of(arrays), Reading(radius, dt, scales), about)
 
 
 def named(network):
@@ -57,7 +42,7 @@ def named(network):
 
 
 def arrays_of(simulator):
-    """The arrays of a file by name."""
+    """The numbers of a file by name."""
     (radius, dt, scales), found = simulator.reading, {}
     for name, perceptron in named(simulator.network):
         for l, (W, b) in enumerate(perceptron.layers):

@@ -19,6 +19,7 @@ from .rollout import squared
 
 SAVE = 5            # epochs between checkpoints
 FORMAT = 2          # of checkpoints
+LESS = "Try smaller rates, a smaller unit or shorter horizons"
 
 
 class Epoch(NamedTuple):
@@ -48,6 +49,11 @@ class Session:
         self.schedules = [torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, recipe.epochs)
                           for optimiser in self.optimisers]
         self.history = []
+
+    @property
+    def number(self):
+        """Of the epoch under way, counted from 1."""
+        return len(self.history) + 1
 
     @property
     def named(self):
@@ -80,11 +86,11 @@ class Session:
             error = squared(self.laws, self.world, self.observed, cuts[:-1], cuts[1:],
                             self.recipe.velocity)
         except ValueError as fault:
-            raise Diverged(f"epoch {len(self.history)}, steps {cuts[0]} to {cuts[-1]}: {fault}"
+            raise Diverged(f"epoch {self.number}, steps {cuts[0]} to {cuts[-1]}: {fault} {LESS}"
                            ) from None
         if not torch.isfinite(error):
-            raise Diverged(f"epoch {len(self.history)}, steps {cuts[0]} to {cuts[-1]}: the loss is "
-                           f"{error.item()}; try smaller rates or shorter horizons")
+            raise Diverged(f"epoch {self.number}, steps {cuts[0]} to {cuts[-1]}: the loss is "
+                           f"{error.item()}. {LESS}")
         if error.requires_grad:
             (weight * error).backward()
         return error.item()
@@ -94,8 +100,7 @@ class Session:
         for own in self.parameters:
             norm = torch.nn.utils.clip_grad_norm_(own, self.recipe.clip).item() if own else 0.0
             if not norm < float("inf"):
-                raise Diverged(f"epoch {len(self.history)}: a gradient of norm {norm}; try smaller "
-                               "rates or shorter horizons")
+                raise Diverged(f"epoch {self.number}: a gradient of norm {norm}. {LESS}")
             yield norm
 
     def save(self, path):

@@ -62,7 +62,7 @@ class LabeledSession(Session):
         losses = [((law(asked) - told) ** 2).mean() for law, asked, told in
                   zip(self.laws, (labels.F, labels.trial), (labels.tau, labels.F_new), strict=True)]
         if not all(map(torch.isfinite, losses)):
-            raise Diverged(f"epoch {len(self.history)}: the loss is "
+            raise Diverged(f"epoch {self.number}: the loss is "
                            f"{[loss.item() for loss in losses]}; try smaller rates")
         sum(losses).backward()
         steepness = tuple(self.cut_gradients())

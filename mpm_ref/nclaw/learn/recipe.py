@@ -6,6 +6,7 @@ from .teacher import Teacher
 
 RELEASE, PRINTED = "release", "printed"
 READINGS = (RELEASE, PRINTED)
+SEEDS = 2**32       # that PyTorch tells apart
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,8 @@ class Recipe:
                 raise ValueError(f"{name} = {getattr(self, name)}: expected a positive number")
         if not 0.0 <= self.velocity < float("inf"):
             raise ValueError(f"velocity = {self.velocity}: expected a number >= 0")
+        if not 0 <= self.seed < SEEDS:
+            raise ValueError(f"seed = {self.seed}: expected 0 .. {SEEDS - 1}")
         if self.reading not in READINGS:
             raise ValueError(f"reading = {self.reading!r}: expected {' or '.join(READINGS)}")
 

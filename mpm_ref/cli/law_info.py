@@ -1,0 +1,140 @@
+"""`mpm-ref info` of learned laws, as weights and as the layers that other programs are handed."""
+
+import json
+from itertools import count, takewhile
+
+import numpy as np
+
+from ..archive import about_of, require_format
+from ..nclaw import export, spline, weights
+from ..nclaw.bodies import dim_of
+from ..store.words import counted
+from . import made
+from .law_options import of_errors
+
+LAYERS = "mpm_ref law"          # what the format of layers begins with
+OF_MARKS = "squared distance of marks in images [px^2]"
+SPLINES = {kind.__name__ for kind in spline.READINGS}
+
+
+def is_one(arrays):
+    """Whether the arrays of a file are those of laws or of their layers, of any format."""
+    return "elastic_kind" in arrays
+
+
+def is_exported(arrays):
+    """Whether they are layers."""
+    return str(arrays.get("format")).startswith(LAYERS)
+
+
+def of_laws(path):
+    """What a file of weights holds, and what it says of its making. Raises ValueError for a file
+    that is damaged or holds no laws.
+    """
+    laws = weights.load(path)
+    found = {part: part_of(type(law.kind).__name__, [a for layer in law.layers for a in layer],
+                           law.kind._asdict())
+             for part, law in zip(weights.PARTS, laws[:2], strict=True)}
+    return {"laws": str(path), "dim": dim_of(laws), **found, **of_training(laws.about)}
+
+
+def in_text(path):
+    """The arrays of layers as JSON, by the names that they have in an npz file; None for any other
+    file. Raises ValueError for lists that are no arrays.
+    """
+    if path.suffix.lower() != ".json" or not path.is_file():
+        return None
+    try:
+        found = json.loads(path.read_bytes())
+    except ValueError:
+        return None
+    if not isinstance(found, dict) or not is_exported(found):
+        return None
+    try:
+        return export.flat(found)
+    except ValueError as error:
+        raise ValueError(f"{path} holds no layers of laws: {error}; export them again") from None
+
+
+def of_layers(path, arrays):
+    """The same of a file of `mpm-ref law export`, from its arrays."""
+    require_format(path, arrays, export.FORMAT)
+    needed = {"dim", "check_F", *(f"{part}_kind" for part in weights.PARTS)}
+    if missing := sorted(needed - set(arrays)):
+        raise ValueError(f"{path} holds no layers of laws: it lacks {', '.join(missing)}; export "
+                         "them again")
+    return {"layers": str(path), "dim": int(arrays["dim"]), "questions": len(arrays["check_F"]),
+            **{part: of_arrays(part, arrays) for part in weights.PARTS},
+            **of_training(about_of(path, arrays))}
+
+
+def of_arrays(part, arrays):
+    """What a law is, from the arrays of layers."""
+    own = {name.removeprefix(f"{part}_"): a for name, a in arrays.items() if name.startswith(part)}
+    depth = len(list(takewhile(lambda k: f"W{k}" in own, count())))
+    layers = [own[f"{name}{k}"] for k in range(depth) for name in "Wb"]
+    scalars = {name: float(a) for name, a in own.items() if a.ndim == 0 and a.dtype.kind in "fiu"}
+    return part_of(str(own["kind"]), layers or [own[name] for name in own if name == "tables"],
+                   scalars)
+
+
+def part_of(kind, learned, constants):
+    """What a law is, as plain values; learned: W and b of its layers in turn, or tables of splines.
+
+    Weights are counted with biases, unless these are all zero: such a law has none.
+    """
+    widths = [] if kind in SPLINES else [len(W) for W in learned[::2]] + [
+        len(b) for b in learned[-1:]]
+    return {"kind": kind, "widths": widths, "constants": constants,
+            "weights": sum(a.size for a in learned if a.ndim > 1 or a.any())}
+
+
+def of_training(about):
+    """What a file says of the training of its laws; None for what it does not say."""
+    recipe, errors = about.get("recipe", {}), about.get("errors")
+    return {"method": about.get("method"), "dt": about.get("dt"), "seen": about.get("seen"),
+            "epochs": len(errors) if errors else recipe.get("epochs"), "errors": errors,
+            "about": about}
+
+
+def lines(facts):
+    """Facts of laws in words."""
+    file, what = (facts["laws"], "learned laws") if "laws" in facts else (
+        facts["layers"], f"layers of learned laws, {counted(facts['questions'], 'question')} with "
+                         "answers")
+    method = f', method "{facts["method"]}"' if facts["method"] else ""
+    dt = f", for steps of {facts['dt']:g} s" if facts["dt"] else ""
+    yield f"{file}: {what}, {facts['dim']}D{method}{dt}"
+    for part in weights.PARTS:
+        yield f"{part}: {part_line(facts[part])}"
+    if facts["epochs"]:
+        yield f"trained on {made.source(facts['about'])}, {training_line(facts)}"
+    if facts["seen"]:
+        yield seen_line(facts["seen"])
+    yield made.by(facts["about"])
+
+
+def part_line(part):
+    """A law in words."""
+    said = [part["kind"]]
+    if part["kind"] in SPLINES:
+        said.append(f"splines of {counted(part['weights'], 'number')}")
+    elif part["widths"]:
+        said += [f"layers {'-'.join(map(str, part['widths']))}", f"{part['weights']} weights"]
+    return ", ".join(said + [f"{name} = {value:g}" for name, value in part["constants"].items()])
+
+
+def training_line(facts):
+    """The length of a training and how far off its laws were, in words."""
+    epochs = counted(facts["epochs"], "epoch")
+    if not facts["errors"]:
+        return epochs
+    of = OF_MARKS if "camera" in facts["about"] else of_errors(facts["method"])
+    return f"{epochs}: {of} {made.ends(facts['errors'])}"
+
+
+def seen_line(bounds):
+    """The strains that were met in training, in words (see `nclaw.seen`)."""
+    low, high = (np.array(bounds[end]) for end in ("low", "high"))
+    return (f"met in training: stretches {low[:-1].min():.3g} .. {high[:-1].max():.3g}, "
+            f"J {low[-1]:.3g} .. {high[-1]:.3g}")
