@@ -6,10 +6,10 @@ import rom_toys
 
 torch = pytest.importorskip("torch")
 
-from mpm_ref.rom.learn import fit, loss  # noqa: E402
+from mpm_ref.rom.architecture import lengths  # noqa: E402
+from mpm_ref.rom.learn import fit, loss, schedule  # noqa: E402
 from mpm_ref.rom.learn.data import batch_of, data_of  # noqa: E402
-from mpm_ref.rom.learn.encoder import lengths  # noqa: E402
-from mpm_ref.rom.learn.fit import Session, Training, rate, train  # noqa: E402
+from mpm_ref.rom.learn.fit import Session, Training, train  # noqa: E402
 from mpm_ref.rom.learn.loss import CODE, PRINTED, Weights, terms  # noqa: E402
 from mpm_ref.rom.learn.perceptron import Perceptron, imported  # noqa: E402
 from mpm_ref.rom.snapshots import Snapshots, displacement_error  # noqa: E402
@@ -176,7 +176,7 @@ def kind(request):
 
 
 def test_training_lowers_every_term(kind, monkeypatch):
-    monkeypatch.setattr(fit, "FASTEST", 1e-2)
+    monkeypatch.setattr(schedule, "FASTEST", 1e-2)
     snapshots = stretching()
     found = train(training(epochs=100, seed=1, **kind), snapshots)
     assert found.history.shape == (100, 4)
@@ -220,14 +220,15 @@ def test_the_exported_decoder_is_the_trained_one(kind):
 
 
 def test_the_rate_falls_from_the_fastest_to_the_slowest():
-    found = [rate(a) for a in np.linspace(0.0, 1.0, 9)]
+    found = [schedule.cosine(a) for a in np.linspace(0.0, 1.0, 9)]
     assert (found[0], found[-1]) == pytest.approx((1e-3, 1e-6))
     assert (np.diff(found) < 0.0).all()
 
 
 def test_the_rate_is_that_of_the_share_of_all_steps(monkeypatch):
     progress = []
-    monkeypatch.setattr(fit, "rate", lambda share: progress.append(share) or 0.0)
+    monkeypatch.setitem(schedule.SCHEDULES, "cosine",
+                        lambda share: progress.append(share) or 0.0)
     one, seven = (train(training(epochs=k), stretching()).decoder.net.W for k in (1, 7))
     assert progress[3:] == pytest.approx(np.arange(21) / 21)      # three batches in an epoch
     assert np.array_equal(one, seven)

@@ -44,13 +44,7 @@ class Decoder(NamedTuple):
 
     def place(self, X, xhat):
         """x = g(X; xhat) of points X (n, d) [m]."""
-        layers, y = layers_of(self.net), np.empty(X.shape)
-
-        def work(rows):
-            y[rows] = forward(layers, self._inputs(X[rows], xhat))[0]
-
-        over(len(X), work)
-        return X + self.units.mean + self.units.std * y
+        return X + self.units.mean + self.units.std * outputs(*self, X, xhat)
 
     def derivatives(self, X, xhat):
         """x (n, d), F (n, d, d) and dg/dxhat (n, d, r) [m] of points X (n, d)."""
@@ -58,7 +52,7 @@ class Decoder(NamedTuple):
         y, dy = np.empty((n, d)), np.empty((n, d, d + self.r))
 
         def work(rows):
-            y[rows], slopes = forward(layers, self._inputs(X[rows], xhat))
+            y[rows], slopes = forward(layers, inputs(*self, X[rows], xhat))
             for k in range(d):
                 dy[rows, k] = backward(layers, slopes, k)
 
@@ -73,7 +67,7 @@ class Decoder(NamedTuple):
         along = np.concatenate([np.zeros(self.dim), vhat]).astype(self.net.W.dtype)
 
         def work(rows):
-            _, slopes = forward(layers, self._inputs(X[rows], xhat))
+            _, slopes = forward(layers, inputs(*self, X[rows], xhat))
             v[rows] = directional(layers, slopes, along)
 
         over(len(X), work)
@@ -86,9 +80,24 @@ class Decoder(NamedTuple):
         net = self.net
         return self._replace(net=Network(net.sizes, *(a.astype(np.float32) for a in net[1:])))
 
-    def _inputs(self, X, xhat):
-        """Scaled reference positions and latent coordinates (n, d + r)."""
-        A = np.empty((len(X), self.dim + self.r), dtype=self.net.W.dtype)
-        A[:, :self.dim] = (X - self.units.low) / self.units.span
-        A[:, self.dim:] = xhat
-        return A
+
+def inputs(net, units, X, y):
+    """What a network takes of points X (n, d): scaled positions at rest, and the coordinates y of
+    the state, which are the same for all; (n, d + len(y)).
+    """
+    d = len(units.low)
+    A = np.empty((len(X), net.sizes[0]), dtype=net.W.dtype)
+    A[:, :d] = (X - units.low) / units.span
+    A[:, d:] = y
+    return A
+
+
+def outputs(net, units, X, y):
+    """Standardised outputs (n, k) of a network at points X (n, d) and coordinates y."""
+    layers, found = layers_of(net), np.empty((len(X), net.sizes[-1]))
+
+    def work(rows):
+        found[rows] = forward(layers, inputs(net, units, X[rows], y))[0]
+
+    over(len(X), work)
+    return found

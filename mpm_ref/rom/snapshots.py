@@ -6,7 +6,7 @@ import numpy as np
 
 from .decoder import Units
 
-STILL = 1e-12       # of the body's span: standard deviation of a component that does not vary
+STILL = 1e-12       # standard deviation of a component that does not vary, over its size
 
 
 class Snapshots(NamedTuple):
@@ -17,8 +17,8 @@ class Snapshots(NamedTuple):
     V0: np.ndarray      # (n,)                  volume at rest [m^d]
     mu: np.ndarray      # (s, parameters)       what differs between runs
     x: np.ndarray       # (s, k + 1, n, d)      position [m]
-    F: np.ndarray       # (s, k + 1, n, d, d)   deformation gradient
-    v: np.ndarray       # (s, k + 1, n, d)      velocity [m/s]
+    F: np.ndarray       # (s, k + 1, n, d, d)   deformation gradient; None: unknown
+    v: np.ndarray       # (s, k + 1, n, d)      velocity [m/s]; None: unknown
     dt: float           #                       length of a step [s]
 
     def of(self, runs):
@@ -36,11 +36,16 @@ def units(snapshots):
     """
     X, u = snapshots.X, snapshots.x - snapshots.X
     axes = tuple(range(u.ndim - 1))
-    std = u.std(axis=axes)
     span = np.ptp(X, axis=0)
-    varies = std > STILL * span
-    like = std.max() if varies.any() else 1.0
-    return Units(X.min(axis=0), span, u.mean(axis=axes), np.where(varies, std, like))
+    return Units(X.min(axis=0), span, u.mean(axis=axes), measures(u.std(axis=axes), span))
+
+
+def measures(std, size):
+    """What components of standard deviations std (k,) are measured in; one that hardly varies,
+    against a size (k,) or one for all, like the one that varies most, or in 1 where none does.
+    """
+    varies = std > STILL * size
+    return np.where(varies, std, std.max() if varies.any() else 1.0)
 
 
 def position_error(x, reference, origin=0.0):

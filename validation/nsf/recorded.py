@@ -1,4 +1,7 @@
-"""Settings of the sand column and the metal block that NSF prints (NSF-X1, NSF-X11)."""
+"""Settings of NSF's scenes: table 1 and section 6, as far as they are printed (NSF-X1 to NSF-X18).
+
+What differs between runs of a scene (E, xi, angles) is that of the studies, not of the scenes.
+"""
 
 from mpm_ref.scene import build
 
@@ -6,23 +9,62 @@ from ..registry import experiment
 from ..settings import record_settings
 from ..verification.scenes import shipped
 
-ROUNDED = 0.01      # dx = 1/150 is printed with two digits, 0.0067
+ROUNDED = 0.01      # dx = 1/150 and 1/160 are printed with two digits, 0.0067 and 0.0063
+NAMES = ("bread", "cake", "sand", "metal", "toothpaste", "jelly", "ball")
+PARTICLES = {       # where the scene has the printed number
+    "bread": ("table1.bread.particles", "bread.particles"),
+    "cake": ("table1.cake.particles", "cake.particles"),
+    "sand": ("sand.particles_text",),                   # NSF-X1
+    "toothpaste": ("toothpaste.particles_text",),       # NSF-X2
+    "jelly": ("table1.jelly.particles", "jelly.particles"),
+}
+STAND_INS = {       # where the shape is not published, and ours has nearly as many
+    "metal": ("metal.particles", "a block with particles of the paper's size: the shape of its "
+              "metal frame is not published"),
+    "ball": ("table1.ball.particles", "a sphere with 32 tentacles: the ball's mesh is not "
+             "published"),
+}
 
 
-@experiment("nsf.settings", title="Settings of NSF's sand column and metal block",
-            profiles=("quick", "standard"), budget={"quick": 5, "standard": 5})
+@experiment("nsf.settings", title="Settings of NSF's scenes",
+            profiles=("quick", "standard"), budget={"quick": 10, "standard": 10})
 def settings(run):
-    """Settings of the scenes nsf_sand.toml and nsf_metal.toml."""
-    sand, metal = shipped("nsf_sand"), shipped("nsf_metal")
-    record_settings(run, "nsf_sand", {
-        "nsf.sand.particles_text": particles(sand), "nsf.table1.sand.dx": sand.dx,
-        "nsf.table1.sand.dt": sand.dt}, nsf_table1_sand_dx=ROUNDED)
-    record_settings(run, "nsf_metal", {
-        "nsf.table1.metal.dx": metal.dx, "nsf.table1.metal.dt": metal.dt,
-        "nsf.table1.metal.tau_y": metal.body[0].material.flow.tau_y})
-    run.record("nsf.metal.particles", particles(metal), scale="scenes/nsf_metal.toml",
-               note="a block with particles of the paper's size: the shape of its metal frame is "
-               "not published")
+    """Settings of the scenes nsf_*.toml."""
+    for name in NAMES:
+        scene = shipped(f"nsf_{name}")
+        dx = f"nsf.table1.{name}.dx"
+        record_settings(run, f"nsf_{name}", printed(name, scene),
+                        **{dx.replace(".", "_"): ROUNDED})
+        if name in STAND_INS:
+            target, note = STAND_INS[name]
+            run.record(f"nsf.{target}", particles(scene), scale=f"scenes/nsf_{name}.toml",
+                       note=note)
+
+
+def printed(name, scene):
+    """{target id: our value} of a scene's printed settings."""
+    found = {f"nsf.table1.{name}.dx": scene.dx, f"nsf.table1.{name}.dt": scene.dt}
+    found |= {f"nsf.{target}": particles(scene) for target in PARTICLES.get(name, ())}
+    return found | {f"nsf.{target}": value for target, value in own(name, scene).items()}
+
+
+def own(name, scene):
+    """{target id without "nsf.": value} of what only this scene has."""
+    material = scene.body[0].material
+    flow = material.flow
+    match name:
+        case "cake":
+            return {"table1.cake.tau_y": flow.tau_y, "table1.cake.theta": flow.theta,
+                    "cake.steps_full": scene.steps}
+        case "metal":
+            return {"table1.metal.tau_y": flow.tau_y, "metal.steps_full": scene.steps}
+        case "toothpaste":
+            return {"table1.toothpaste.tau_y": flow.sigma_y, "table1.toothpaste.eta": flow.eta,
+                    "fig11.angle": scene.collider[0].motion.angle}
+        case "jelly" | "ball":
+            return {f"table1.{name}.E": material.E}
+        case _:
+            return {}
 
 
 def particles(scene):

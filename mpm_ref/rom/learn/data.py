@@ -12,7 +12,7 @@ class Data(NamedTuple):
 
     X: torch.Tensor         # (n, d)
     u: torch.Tensor         # (s, n, d)     displacement [m]
-    F: torch.Tensor         # (s, n, d, d)
+    F: torch.Tensor         # (s, n, d, d)  None, like v: unknown
     v: torch.Tensor         # (s, n, d)     velocity [m/s]
     next: torch.Tensor      # (s,)          number of the successor; of a run's last one, its own
     units: Scales
@@ -29,13 +29,14 @@ def data_of(snapshots, units, dtype=torch.float32):
     def tensor(a):
         return torch.as_tensor(a, dtype=dtype).contiguous()
 
+    def flat(a):
+        return None if a is None else tensor(a.reshape(runs * levels, *a.shape[2:]))
+
     runs, levels = snapshots.x.shape[:2]
-    x, F = snapshots.flat()
     number = torch.arange(runs * levels).reshape(runs, levels)
     following = torch.cat([number[:, 1:], number[:, -1:]], dim=1).reshape(-1)
-    return Data(tensor(snapshots.X), tensor(x - snapshots.X), tensor(F),
-                tensor(snapshots.v.reshape(x.shape)), following,
-                Scales(*map(tensor, units)), snapshots.dt)
+    return Data(tensor(snapshots.X), flat(snapshots.x - snapshots.X), flat(snapshots.F),
+                flat(snapshots.v), following, Scales(*map(tensor, units)), snapshots.dt)
 
 
 def batch_of(data, at, points, latents):
@@ -43,17 +44,19 @@ def batch_of(data, at, points, latents):
     none, and an error of velocity of zero (LDM-eq24): no rates, and a velocity of zero to meet.
 
     latents(numbers) gives latent coordinates (s, r); each row of the batch is one point of one
-    snapshot.
+    snapshot. Where F and v are unknown, so are the batch's, and no successor is looked at.
     """
-    after = data.next[at]
-    xhat = latents(torch.cat([at, after]))
-    now, later = xhat[:len(at)], xhat[len(at):]
+    X = data.X[points].repeat(len(at), 1)
     def rows(a):
         return a[at][:, points].flatten(0, 1)
 
     def each(a):
         return a.repeat_interleave(len(points), dim=0)
 
+    if data.F is None:
+        return Batch(X, rows(data.u), None, None, each(latents(at)), None)
+    after = data.next[at]
+    xhat = latents(torch.cat([at, after]))
+    now, later = xhat[:len(at)], xhat[len(at):]
     v = (data.v[after] * (after != at)[:, None, None])[:, points].flatten(0, 1)
-    return Batch(data.X[points].repeat(len(at), 1), rows(data.u), rows(data.F), v,
-                 each(now), each((later - now) / data.dt))
+    return Batch(X, rows(data.u), rows(data.F), v, each(now), each((later - now) / data.dt))

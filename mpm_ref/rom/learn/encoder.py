@@ -1,35 +1,43 @@
 """Where latent coordinates of training snapshots come from: an encoder, one free vector each, or
 known beforehand.
 
-The encoder is a stack of one-dimensional convolutions over all coordinates in a row, halving their
-number as long as at least SHORTEST are left, and two full layers (LDM-tab1). It ties the latent
-coordinates to one sampling of the body; online it is not needed.
+The encoder is a stack of one-dimensional convolutions and two full layers (LDM-tab1, NSF-encoder;
+see `architecture`). It ties the latent coordinates to one sampling of the body; online it is not
+needed.
 """
+
+from itertools import pairwise
 
 import torch
 from torch import nn
 
-from ..architecture import FEATURES, KERNEL, STRIDE, lengths
+from ..architecture import FEATURES, KERNEL
 
 
 class Encoder(nn.Module):
-    """xhat = e(standardised displacements of all points), LDM-sec4.1-encoder."""
+    """xhat = e(standardised displacements of all points), LDM-sec4.1-encoder, NSF-encoder: of one
+    row of values, or one for each axis, as the `Stack` has it.
 
-    def __init__(self, dim, n, r):
+    Latent coordinates are the last layer's plain sums; the public training code of NSF's precursor
+    has an ELU on them, and stops its convolutions earlier.
+    """
+
+    def __init__(self, stack, r):
         super().__init__()
-        rows = lengths(dim * n)
-        self.convolutions = nn.ModuleList(nn.Conv1d(1, 1, KERNEL, STRIDE) for _ in rows[1:])
-        self.full = nn.Linear(rows[-1], FEATURES)
+        self.rows = stack.rows[0]
+        self.convolutions = nn.ModuleList(nn.Conv1d(n, m, KERNEL, stack.stride)
+                                          for n, m in pairwise(stack.rows))
+        self.full = nn.Linear(stack.rows[-1] * stack.lengths[-1], FEATURES)
         self.last = nn.Linear(FEATURES, r)
         for layer in (*self.convolutions, self.full, self.last):
             nn.init.xavier_uniform_(layer.weight)
 
     def forward(self, u):
         """Latent coordinates (s, r) of displacements u (s, n, d)."""
-        a = u.reshape(len(u), 1, -1)
+        a = u.reshape(len(u), -1, self.rows).transpose(1, 2)
         for layer in self.convolutions:
             a = nn.functional.elu(layer(a))
-        return self.last(nn.functional.elu(self.full(a[:, 0])))
+        return self.last(nn.functional.elu(self.full(a.flatten(1))))
 
 
 class Free(nn.Module):

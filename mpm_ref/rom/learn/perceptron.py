@@ -1,4 +1,4 @@
-"""The decoder in torch: the same numbers as `rom.decoder`, with gradients for its weights."""
+"""Networks in torch: the same numbers as `rom.network`, with gradients for their weights."""
 
 from itertools import pairwise
 
@@ -12,17 +12,19 @@ from ..network import layers_of, network
 
 
 class Perceptron(nn.Module):
-    """f of `rom.decoder`: scaled (X, xhat) to standardised displacements."""
+    """f of `rom.decoder` and `rom.field`: scaled (X, xhat) to standardised displacements, or to as
+    many other outputs as told; for fields that depend on parameters, xhat stands for both.
+    """
 
-    def __init__(self, dim, r, hidden=HIDDEN):
+    def __init__(self, dim, r, hidden=HIDDEN, outputs=None):
         super().__init__()
-        self.dim, self.r = dim, r
-        self.layers = nn.ModuleList(nn.Linear(n, m) for n, m in pairwise((dim + r, *hidden, dim)))
+        self.layers = nn.ModuleList(nn.Linear(n, m) for n, m in
+                                    pairwise((dim + r, *hidden, outputs or dim)))
         for layer in self.layers:
             nn.init.xavier_uniform_(layer.weight)           # LDM-appB
 
     def forward(self, X, xhat):
-        """Outputs (n, d) of scaled positions X (n, d) and latent coordinates xhat (n, r)."""
+        """Outputs (n, k) of scaled positions X (n, d) and latent coordinates xhat (n, r)."""
         a = torch.cat([X, xhat], dim=-1)
         for layer in self.layers[:-1]:
             a = nn.functional.elu(layer(a))
@@ -38,19 +40,23 @@ def with_derivatives(f, X, xhat):
     return y, *(torch.stack(parts, dim=1) for parts in zip(*pulled, strict=True))
 
 
+def weights_of(f):
+    """The `Network` of a trained perceptron."""
+    return network([(layer.weight.detach().double().numpy().T, layer.bias.detach().double().numpy())
+                    for layer in f.layers])
+
+
 def exported(f, units):
     """The `Decoder` of a trained perceptron."""
-    layers = [(layer.weight.detach().double().numpy().T, layer.bias.detach().double().numpy())
-              for layer in f.layers]
-    return Decoder(network(layers), Units(*(np.asarray(a, dtype=float) for a in units)))
+    return Decoder(weights_of(f), Units(*(np.asarray(a, dtype=float) for a in units)))
 
 
-def imported(decoder):
-    """The `Perceptron` of a `Decoder`, in double precision."""
-    sizes = decoder.net.sizes
-    f = Perceptron(decoder.dim, decoder.r, [int(n) for n in sizes[1:-1]]).double()
+def imported(map):
+    """The `Perceptron` of a `Decoder` or a `Field`, in double precision."""
+    first, *hidden, last = map.net.sizes.tolist()
+    f = Perceptron(map.dim, first - map.dim, hidden, last).double()
     with torch.no_grad():
-        for layer, (W, b) in zip(f.layers, layers_of(decoder.net), strict=True):
+        for layer, (W, b) in zip(f.layers, layers_of(map.net), strict=True):
             layer.weight.copy_(torch.from_numpy(W.T.copy()))
             layer.bias.copy_(torch.from_numpy(b.copy()))
     return f

@@ -1,0 +1,69 @@
+"""A scene as NSF's reduced runs see it: the points of all its bodies in one list, whatever they are
+made of; and the full-order runs that its fields are made of.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..rom.histories import Histories
+from ..rom.inferred import Matter
+from ..rom.symmetric import values
+from ..scene import build
+from ..simulate import simulate
+
+
+class Whole(NamedTuple):
+    """One run of a scene."""
+
+    problem: object         # `Problem`
+    X: np.ndarray           # (n, d) points at the start [m]
+    matter: Matter          # of these points
+
+
+def whole(scene):
+    """`Whole` of a scene. Raises ValueError for what NSF's reduced runs do not know: a transfer
+    other than apic, a fluid, forces of single particles, a box that clips.
+    """
+    problem = build(scene)
+    particles = [body.particles for body in problem.bodies]
+    unknown = {f"the transfer {problem.scheme.transfer}": problem.scheme.transfer != "apic",
+               "a fluid, which has no shear stress": any(p.F.ndim == 1 for p in particles),
+               "forces of single particles": any(p.b.ndim > 1 for p in particles),
+               "a box that clips": problem.clip is not None}
+    for what in (name for name, has in unknown.items() if has):
+        raise ValueError(f"the scene {problem.title!r} has {what}: reduced runs with inferred "
+                         "stress know none")
+    X, v, m, V0 = (at_once(problem.bodies, name) for name in ("x", "v", "m", "V0"))
+    return Whole(problem, X, Matter(m, V0, v))
+
+
+def at_once(bodies, name):
+    """A field of all bodies' particles, each body's in the order in which it was sampled."""
+    return np.concatenate([getattr(body.particles, name)[np.argsort(body.id)] for body in bodies])
+
+
+def history(scene, mu, kind=np.float64):
+    """`Histories` of one run with parameters mu, of all its steps; stored as numbers of a kind.
+
+    Raises ValueError as `whole` does and where the time step is adaptive; `Unstable` and `TooLarge`
+    as `simulate` does.
+    """
+    one = whole(scene)
+    clock, (n, d) = one.problem.clock, one.X.shape
+    if clock.dt is None:
+        raise ValueError("the time step is adaptive: expected a fixed dt")
+    levels = clock.steps + 1
+    x, C = (np.empty((1, levels, n, k), kind) for k in (d, d * d))
+    tau = np.empty((1, levels, n, d * (d + 1) // 2), kind)
+    seen = 0
+    for frame in simulate(one.problem):
+        bodies = frame.state.bodies
+        x[0, seen] = at_once(bodies, "x")
+        tau[0, seen] = values(at_once(bodies, "tau"))
+        C[0, seen] = at_once(bodies, "C").reshape(n, -1)
+        seen += 1
+    if seen != levels:
+        raise ValueError(f"the scene shows {seen} of {levels} time levels: expected every = 1")
+    return Histories(one.X, one.matter.m, one.matter.V0, one.matter.v[None],
+                     np.array(mu, dtype=float)[None], x, tau, C, clock.dt)

@@ -1,0 +1,192 @@
+"""Position, stress and affine field of material points as sums of fixed modes, whose coefficients
+are smooth functions of a few latent coordinates: NSF's three fields without networks.
+
+    x_p   = X_p + sum_k a_k(xhat) U_kp,       a_k = xhat_k for k < r                      NSF-eq8
+    tau_p = sum_k s_k(xhat, mu) T_kp                                       NSF-eq9, NSF-mu-dep
+    C_p   = sum_k c_k(xhat) B_kp                                                      NSF-sec4.4
+
+Modes are the proper orthogonal ones of each field's snapshots, coefficients `radial` functions
+through theirs. They are made by linear algebra alone, and a point costs a product with as many
+numbers as there are modes, where the networks of the paper cost some millions of operations. They
+are known at the points of the data only, which are named by their numbers.
+"""
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from ..core.blas import one_thread
+from .radial import Radial, through
+from .symmetric import tensor
+
+LEAST = 1e-13           # square of a singular value over the largest: modes below are round-off
+
+
+class Part(NamedTuple):
+    """A field as a sum of modes."""
+
+    modes: np.ndarray       # (n, k, R) of k values at n points
+    coefficients: Radial    # (R,) of latent coordinates, and of parameters if it has any
+
+    def at(self, points, y):
+        """Its values (m, k) at points of these numbers."""
+        return self.modes[points] @ self.coefficients.value(y)
+
+
+class Cells(NamedTuple):
+    """Points in blocks of the body at rest, and how far modes can take them apart."""
+
+    order: np.ndarray       # (n,) points of block b: order[start[b] : start[b + 1]]
+    start: np.ndarray       # (blocks + 1,)
+    middle: np.ndarray      # (blocks,) number of a point in the middle of each
+    rest: np.ndarray        # (blocks,) largest distance of a point from it along an axis [m]
+    spread: np.ndarray      # (blocks, R) ... of their displacements in each mode, per coefficient
+
+    def near(self, x, at, a, distance):
+        """Numbers of all points that may be within a distance [m], by the largest axis, of one of
+        the positions x (m, d), where the middles lie `at` (blocks, d) with coefficients a (R,).
+        """
+        gap, _ = KDTree(x).query(at, p=np.inf)
+        found = np.flatnonzero(gap <= distance + self.rest + self.spread @ np.abs(a))
+        parts = [self.order[self.start[b]:self.start[b + 1]] for b in found]
+        return np.concatenate([self.order[:0], *parts])
+
+
+class Spanned(NamedTuple):
+    """The three fields at the points of their data, in a run with parameters mu."""
+
+    X: np.ndarray           # (n, d) at rest [m]
+    U: np.ndarray           # (n, d, R) modes of the displacement; coefficients [m]
+    bend: Radial | None     # coefficients of the modes beyond the first r; None: there are none
+    tau: Part               # values of `symmetric`
+    C: Part | None          # None: no affine field
+    mu: np.ndarray          # (parameters,) that the stress depends on
+    cells: Cells
+
+    @property
+    def dim(self):
+        """Number of axes d."""
+        return self.X.shape[1]
+
+    @property
+    def r(self):
+        """Number of latent coordinates."""
+        return self.U.shape[2] if self.bend is None else len(self.bend.unit)
+
+    def all(self, xhat):
+        """Coefficients (R,) of all modes of the displacement."""
+        return xhat if self.bend is None else np.concatenate([xhat, self.bend.value(xhat)])
+
+    def rates(self, xhat):
+        """Their derivatives (R, r)."""
+        own = np.eye(self.r)
+        return own if self.bend is None else np.vstack([own, self.bend.slope(xhat)])
+
+    def place(self, points, xhat):
+        """x (m, d) [m] of points of these numbers."""
+        return self.X[points] + self.U[points] @ self.all(xhat)
+
+    def derivatives(self, points, xhat):
+        """x (m, d), None (no gradient is known in between points), and dg/dxhat (m, d, r)."""
+        U = self.U[points]
+        return self.X[points] + U @ self.all(xhat), None, U @ self.rates(xhat)
+
+    def stress(self, points, xhat):
+        """Kirchhoff stress (m, d, d) [Pa]."""
+        return tensor(self.tau.at(points, np.concatenate([xhat, self.mu])), self.dim)
+
+    def affine(self, points, xhat):
+        """C (m, d, d) [1/s]."""
+        if self.C is None:
+            return np.zeros((len(points), self.dim, self.dim))
+        return self.C.at(points, xhat).reshape(-1, self.dim, self.dim)
+
+    def near(self, xhat, x, distance):
+        """Numbers of all points that may be within a distance [m], by the largest axis, of one of
+        the positions x (m, d).
+        """
+        at = self.place(self.cells.middle, xhat)
+        return self.cells.near(x, at, self.all(xhat), distance)
+
+    def of(self, mu):
+        """The fields in a run with other parameters."""
+        return self._replace(mu=np.array(mu, dtype=float))
+
+
+class Sizes(NamedTuple):
+    """Numbers of latent coordinates and of modes."""
+
+    r: int
+    modes: int = 20         # of the displacement, the first r of them free
+    tau: int = 40
+    C: int = 40             # 0: no affine field
+    weight: float = 1.0     # of parameters beside latent coordinates: spread for spread
+
+
+def spanned(histories, sizes, size, follows=True):
+    """`Spanned` fields of `Histories` (their first run's parameters), and the latent coordinates
+    (s, k + 1, r) of the snapshots; size [m] of blocks.
+
+    follows: whether the stress depends on the parameters too. Raises ValueError for more modes than
+    the snapshots hold.
+    """
+    s, levels, n, d = histories.x.shape
+    u = (histories.x - histories.X).reshape(s * levels, -1)
+    U, a = modes_of(u, sizes.modes, "modes")
+    xhat, mu = a[:, :sizes.r], np.repeat(histories.mu, levels, axis=0)
+    unit = np.full(sizes.r, np.sqrt(np.mean(xhat[:, 0] ** 2)))
+    own = mu[:, :mu.shape[1] if follows else 0]
+    units = np.concatenate([unit, spread_of(own) / sizes.weight])
+    bend = through(xhat, a[:, sizes.r:], unit) if sizes.modes > sizes.r else None
+    tau = part(histories.tau, sizes.tau, np.hstack([xhat, own]), units, "tau")
+    C = part(histories.C, sizes.C, xhat, unit, "C") if sizes.C else None
+    U = np.ascontiguousarray(U.reshape(n, d, -1))
+    fields = Spanned(histories.X, U, bend, tau, C, own[0], cells(histories.X, U, size))
+    return fields, xhat.reshape(s, levels, -1)
+
+
+def part(snapshots, count, y, unit, name):
+    """`Part` with so many modes of snapshots (s, levels, n, k) at coordinates y (s levels, q)."""
+    n, k = snapshots.shape[2:]
+    modes, a = modes_of(snapshots.reshape(len(y), -1), count, name)
+    return Part(np.ascontiguousarray(modes.reshape(n, k, -1)), through(y, a, unit))
+
+
+def spread_of(mu):
+    """Standard deviation of each parameter; 1 where it does not vary."""
+    spread = mu.std(axis=0)
+    return np.where(spread > 0.0, spread, 1.0)
+
+
+def modes_of(A, count, name):
+    """The `count` leading orthonormal modes (N, count) of rows A (m, N), and the rows' coefficients
+    (m, count), from the rows' products: there are far fewer rows than columns. Raises ValueError
+    for more modes than the rows hold.
+    """
+    with one_thread():
+        square, vectors = np.linalg.eigh(A @ A.T)
+        square, vectors = square[::-1], vectors[:, ::-1]
+        held = int(np.sum(square > LEAST * square[0])) if square[0] > 0.0 else 0
+        if not 1 <= count <= held:
+            raise ValueError(f"{name} = {count}: expected 1 .. {held}, as many modes as the "
+                             f"{len(A)} snapshots hold")
+        sigma = np.sqrt(square[:count])
+        return (A.T @ vectors[:, :count]) / sigma, vectors[:, :count] * sigma
+
+
+def cells(X, U, size):
+    """`Cells` of cubes of a size [m] of points X (n, d) with modes U (n, d, R)."""
+    _, block = np.unique(np.floor(X / size).astype(np.int64), axis=0, return_inverse=True)
+    order = np.argsort(block, kind="stable")
+    count = np.bincount(block)
+    start = np.concatenate(([0], np.cumsum(count)))
+    center = np.stack([np.bincount(block, X[:, a]) / count for a in range(X.shape[1])], axis=1)
+    off = np.linalg.norm(X - center[block], axis=1)
+    middle = np.array([order[b:e][np.argmin(off[order[b:e]])]
+                       for b, e in pairwise(start)])
+    rest = np.abs(X - X[middle[block]]).max(axis=1)
+    spread = np.abs(U - U[middle[block]]).max(axis=1)
+    return Cells(order, start, middle, np.maximum.reduceat(rest[order], start[:-1]),
+                 np.maximum.reduceat(spread[order], start[:-1], axis=0))

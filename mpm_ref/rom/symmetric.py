@@ -1,0 +1,19 @@
+"""Symmetric tensors as their independent values: the upper triangle row by row."""
+
+import numpy as np
+
+
+def values(a):
+    """(.., d (d + 1) / 2) of symmetric tensors a (.., d, d): 11, 12, 22, or 11, 12, 13, 22, 23,
+    33.
+    """
+    return a[(..., *np.triu_indices(a.shape[-1]))]
+
+
+def tensor(a, d):
+    """Symmetric tensors (.., d, d) of their values."""
+    rows, columns = np.triu_indices(d)
+    full = np.empty((*a.shape[:-1], d, d))
+    full[..., rows, columns] = a
+    full[..., columns, rows] = a
+    return full
