@@ -5,6 +5,7 @@ made of; and the full-order runs that its fields are made of.
 from typing import NamedTuple
 
 import numpy as np
+from msgspec.structs import replace
 
 from ..rom.histories import Histories
 from ..rom.inferred import Matter
@@ -49,21 +50,17 @@ def history(scene, mu, kind=np.float64):
     Raises ValueError as `whole` does and where the time step is adaptive; `Unstable` and `TooLarge`
     as `simulate` does.
     """
-    one = whole(scene)
+    one = whole(replace(scene, every=1, interval=None))
     clock, (n, d) = one.problem.clock, one.X.shape
     if clock.dt is None:
         raise ValueError("the time step is adaptive: expected a fixed dt")
     levels = clock.steps + 1
     x, C = (np.empty((1, levels, n, k), kind) for k in (d, d * d))
     tau = np.empty((1, levels, n, d * (d + 1) // 2), kind)
-    seen = 0
     for frame in simulate(one.problem):
         bodies = frame.state.bodies
-        x[0, seen] = at_once(bodies, "x")
-        tau[0, seen] = values(at_once(bodies, "tau"))
-        C[0, seen] = at_once(bodies, "C").reshape(n, -1)
-        seen += 1
-    if seen != levels:
-        raise ValueError(f"the scene shows {seen} of {levels} time levels: expected every = 1")
+        x[0, frame.index] = at_once(bodies, "x")
+        tau[0, frame.index] = values(at_once(bodies, "tau"))
+        C[0, frame.index] = at_once(bodies, "C").reshape(n, -1)
     return Histories(one.X, one.matter.m, one.matter.V0, one.matter.v[None],
                      np.array(mu, dtype=float)[None], x, tau, C, clock.dt)

@@ -11,6 +11,7 @@ numbers as there are modes, where the networks of the paper cost some millions o
 are known at the points of the data only, which are named by their numbers.
 """
 
+from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -18,10 +19,11 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..core.blas import one_thread
-from .radial import Radial, through
+from .radial import SMOOTHING, Radial, through
 from .symmetric import tensor
 
 LEAST = 1e-13           # square of a singular value over the largest: modes below are round-off
+COLUMNS = 20000         # of snapshots at a time
 
 
 class Part(NamedTuple):
@@ -123,6 +125,7 @@ class Sizes(NamedTuple):
     tau: int = 40
     C: int = 40             # 0: no affine field
     weight: float = 1.0     # of parameters beside latent coordinates: spread for spread
+    smoothing: float = SMOOTHING    # of coefficients as functions of latent coordinates
 
 
 def spanned(histories, sizes, size, follows=True):
@@ -139,19 +142,22 @@ def spanned(histories, sizes, size, follows=True):
     unit = np.full(sizes.r, np.sqrt(np.mean(xhat[:, 0] ** 2)))
     own = mu[:, :mu.shape[1] if follows else 0]
     units = np.concatenate([unit, spread_of(own) / sizes.weight])
-    bend = through(xhat, a[:, sizes.r:], unit) if sizes.modes > sizes.r else None
-    tau = part(histories.tau, sizes.tau, np.hstack([xhat, own]), units, "tau")
-    C = part(histories.C, sizes.C, xhat, unit, "C") if sizes.C else None
+    fit = partial(through, smoothing=sizes.smoothing)
+    bend = fit(xhat, a[:, sizes.r:], unit) if sizes.modes > sizes.r else None
+    tau = part(histories.tau, sizes.tau, "tau", lambda a: fit(np.hstack([xhat, own]), a, units))
+    C = part(histories.C, sizes.C, "C", lambda a: fit(xhat, a, unit)) if sizes.C else None
     U = np.ascontiguousarray(U.reshape(n, d, -1))
     fields = Spanned(histories.X, U, bend, tau, C, own[0], cells(histories.X, U, size))
     return fields, xhat.reshape(s, levels, -1)
 
 
-def part(snapshots, count, y, unit, name):
-    """`Part` with so many modes of snapshots (s, levels, n, k) at coordinates y (s levels, q)."""
-    n, k = snapshots.shape[2:]
-    modes, a = modes_of(snapshots.reshape(len(y), -1), count, name)
-    return Part(np.ascontiguousarray(modes.reshape(n, k, -1)), through(y, a, unit))
+def part(snapshots, count, name, fit):
+    """`Part` with so many modes of snapshots (s, levels, n, k), whose coefficients (s levels, R)
+    are made functions by `fit`.
+    """
+    s, levels, n, k = snapshots.shape
+    modes, a = modes_of(snapshots.reshape(s * levels, n * k), count, name)
+    return Part(np.ascontiguousarray(modes.reshape(n, k, -1)), fit(a))
 
 
 def spread_of(mu):
@@ -162,18 +168,24 @@ def spread_of(mu):
 
 def modes_of(A, count, name):
     """The `count` leading orthonormal modes (N, count) of rows A (m, N), and the rows' coefficients
-    (m, count), from the rows' products: there are far fewer rows than columns. Raises ValueError
-    for more modes than the rows hold.
+    (m, count), from the rows' products: there are far fewer rows than columns. Sums are of doubles
+    whatever the rows are. Raises ValueError for more modes than the rows hold.
     """
+    blocks = [slice(k, k + COLUMNS) for k in range(0, A.shape[1], COLUMNS)]
     with one_thread():
-        square, vectors = np.linalg.eigh(A @ A.T)
+        products = np.zeros((len(A), len(A)))
+        for block in blocks:
+            some = A[:, block].astype(float)
+            products += some @ some.T
+        square, vectors = np.linalg.eigh(products)
         square, vectors = square[::-1], vectors[:, ::-1]
         held = int(np.sum(square > LEAST * square[0])) if square[0] > 0.0 else 0
         if not 1 <= count <= held:
             raise ValueError(f"{name} = {count}: expected 1 .. {held}, as many modes as the "
                              f"{len(A)} snapshots hold")
         sigma = np.sqrt(square[:count])
-        return (A.T @ vectors[:, :count]) / sigma, vectors[:, :count] * sigma
+        found = [A[:, block].astype(float).T @ vectors[:, :count] / sigma for block in blocks]
+    return np.concatenate(found), vectors[:, :count] * sigma
 
 
 def cells(X, U, size):

@@ -1,0 +1,136 @@
+"""Scenes as reduced runs with inferred stress see them, and such runs beside the full ones."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from mpm_ref import scene
+from mpm_ref.reduced.inferring import Plan, drawn, infer
+from mpm_ref.reduced.vary import varied
+from mpm_ref.reduced.whole import history, whole
+from mpm_ref.rom.histories import joined
+from mpm_ref.rom.spanned import Sizes, spanned
+
+TOML = """
+title = "two disks"
+dim = 2
+dx = 0.05
+dt = 1e-3
+steps = 30
+gravity = [0.0, -9.8]
+scheme = { transfer = "apic" }
+
+[[body]]
+name = "hard"
+density = 1000.0
+shape = { type = "sphere", center = [0.3, 0.3], radius = 0.15 }
+sampling = { type = "regular", per_cell = 2 }
+material = { law = "fixed_corotated", E = 1e5, nu = 0.3 }
+velocity = { linear = [2.0, 0.0] }
+
+[[body]]
+name = "soft"
+density = 500.0
+shape = { type = "sphere", center = [0.65, 0.32], radius = 0.15 }
+sampling = { type = "regular", per_cell = 2 }
+material = { law = "hencky", E = 5e4, nu = 0.3, flow = { type = "von_mises", tau_y = 2e3 } }
+"""
+SPEEDS = (1.6, 2.0, 2.4)
+
+
+@pytest.fixture(scope="module")
+def disks(tmp_path_factory):
+    """The scene of a speed of the first disk [m/s]."""
+    path = tmp_path_factory.mktemp("disks") / "disks.toml"
+    path.write_text(TOML)
+    base = scene.load(path)
+    return lambda v, **changes: varied(base, {"body.hard.velocity.linear[0]": v, **changes})
+
+
+@pytest.fixture(scope="module")
+def runs(disks):
+    """Histories of some speeds."""
+    return joined([history(disks(v), [v]) for v in SPEEDS])
+
+
+def test_points_of_all_bodies_are_in_one_list(disks, runs):
+    one = whole(disks(2.0))
+    hard, soft = (body.particles for body in one.problem.bodies)
+    n = len(hard.x)
+    assert len(one.X) == n + len(soft.x) == len(runs.X)
+    assert np.array_equal(one.X, np.concatenate([hard.x, soft.x]))
+    assert np.array_equal(one.matter.m, np.concatenate([hard.m, soft.m]))
+    assert np.array_equal(one.matter.v[:n], np.tile([2.0, 0.0], (n, 1)))
+    assert not one.matter.v[n:].any()
+
+
+def test_a_history_is_that_of_the_full_run(disks, runs):
+    assert runs.x.shape == (3, 31, len(runs.X), 2)
+    assert runs.mu.tolist() == [[1.6], [2.0], [2.4]]
+    assert np.array_equal(runs.x[:, 0], np.tile(runs.X, (3, 1, 1)))
+    v = np.diff(runs.x, axis=1) / runs.dt
+    assert np.abs(v[1, 0, 0] - [2.0, -9.8e-3]).max() < 1e-9
+    assert not runs.tau[:, 0].any()
+    assert np.abs(runs.tau[:, -1]).max() > 100.0
+    assert np.abs(runs.C[:, -1]).max() > 0.1
+    single = history(disks(2.0), [2.0], np.float32)
+    assert single.x.dtype == np.float32
+    assert np.abs(single.x[0] - runs.x[1]).max() < 1e-6
+
+
+def test_a_reduced_run_follows_the_full_one(disks, runs):
+    v = 1.8
+    full = history(disks(v), [v]).x[0]
+    fields, xhat = spanned(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
+    n = len(runs.X)
+
+    def worst(plan):
+        found = [fields.place(np.arange(n), at.xhat) for _, at, _ in
+                 infer(whole(disks(v)), fields, plan, xhat[:, 0].mean(axis=0))]
+        return max(np.abs(x - reference).max()
+                   for x, reference in zip(found, full, strict=True))
+
+    moved = np.abs(full[-1] - full[0]).max()
+    assert worst(Plan((drawn(n, n, 0),))) < 0.05 * moved
+    assert worst(Plan((drawn(n, 12, 0),))) < 0.1 * moved
+    assert worst(Plan((drawn(n, 12, 0),), inversion="linear")) < 0.15 * moved
+
+
+def test_times_of_longer_steps(disks, runs):
+    fields, xhat = spanned(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
+    plan = Plan((drawn(len(runs.X), 12, 0),), faster=1.5)
+    times = [t for t, *_ in infer(whole(disks(2.0)), fields, plan, xhat[1, 0])]
+    assert len(times) == 21
+    assert np.allclose(np.diff(times), 1.5e-3, rtol=1e-12)
+
+
+def test_samples_switch_in_time():
+    early, late = drawn(40, 7, 0), drawn(40, 3, 1, since=0.5)
+    plan = Plan((early, late))
+    assert plan.at(0.0) is early[1]
+    assert plan.at(0.499) is early[1]
+    assert plan.at(0.5) is late[1]
+    assert len(late[1]) == 3
+    assert all(a < b for a, b in pairwise(early[1]))
+
+
+def test_more_samples_than_points_are_refused():
+    with pytest.raises(ValueError, match=r"41 samples of 40 points: expected 1 \.\. 40"):
+        drawn(40, 41, 0)
+
+
+@pytest.mark.parametrize(("changes", "what"), [
+    ({"scheme": {"transfer": "pic"}}, "the transfer pic"),
+    ({"scheme": {"transfer": "mls"}}, "the transfer mls"),
+    ({"clip": {"lower": [0.0, 0.0], "upper": [1.0, 1.0]}}, "a box that clips"),
+    ({"body.soft.material": {"law": "fluid", "lam": 1e5}}, "a fluid"),
+])
+def test_what_reduced_runs_do_not_know_is_refused(disks, changes, what):
+    with pytest.raises(ValueError, match=f"has {what}.*know none"):
+        whole(disks(2.0, **changes))
+
+
+def test_a_history_needs_a_fixed_step(disks):
+    with pytest.raises(ValueError, match="adaptive: expected a fixed dt"):
+        history(disks(2.0, dt=None, steps=None, end=0.01), [2.0])
