@@ -11,4 +11,7 @@ coordinates xhat (LDM-eq14). It is any object with
 `decoder` is the learned one, `modes` the linear one that is the honest baseline, `affine` an exact
 one for tests. Which points are looked at, and how latent coordinates follow from them, is for
 `samples`, `lagrangian`, `eulerian`, `projection` and `step`, which know no more of a map than this.
+
+Where plasticity or a tear leaves F behind, stress and affine field are fields of their own (NSF):
+`inferred` is the step, `learned` and `spanned` are such fields, as networks and as sums of modes.
 """

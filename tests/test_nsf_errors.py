@@ -1,0 +1,75 @@
+"""Fields of NSF's studies and reduced runs on them, at the coarse grid of the quick profile."""
+
+import numpy as np
+import pytest
+
+from mpm_ref.core.grid import OutOfRange
+from validation.nsf import errors, tested
+from validation.nsf.studies import jelly, sand
+
+TEST = 0.45
+
+
+@pytest.fixture(scope="module")
+def cube():
+    """The jelly cube at half the resolution."""
+    return tested.tested(jelly(2))
+
+
+def test_coarse_grids_keep_particles_to_a_cell_and_waves_to_a_step():
+    fine, coarse = jelly().run(0.3), jelly(2).run(0.3)
+    assert (coarse.dx, coarse.dt, coarse.steps) == (2 * fine.dx, 2 * fine.dt, fine.steps // 2)
+    assert [body.sampling.count for body in coarse.body] == [500, 750]
+    assert coarse.body[0].velocity.linear[0] == 0.3
+
+
+def test_a_longer_study_has_more_steps_of_the_scene():
+    assert (sand().run(30.0).steps, sand(3).run(30.0).steps) == (300, 100)
+    assert len(sand().train) == 16
+    assert not set(sand().train) & set(sand().test)
+
+
+def test_reduced_runs_beat_the_nearest_run_and_not_the_nearest_states(cube):
+    every = cube.errors(TEST, len(cube.runs.X))
+    nearest, taken = cube.nearest(TEST), cube.next_run(TEST)
+    assert nearest.origin <= every.errors.origin < 0.1 * taken.origin
+    assert every.errors.origin < every.errors.centroid < every.errors.displacement
+    assert 0.0 < every.stress < 0.5
+    assert every.points == len(cube.runs.X)
+
+
+def test_the_affine_field_is_worth_its_modes(cube):
+    without = tested.refitted(cube, cube.study.sizes._replace(C=0), follows=False)
+    some = [one.errors(TEST, 50).errors.origin for one in (without, cube)]
+    assert some[0] > 5.0 * some[1]
+    assert without.xhat == pytest.approx(cube.xhat, abs=1e-9)
+
+
+def test_draws_differ_and_repeat(cube):
+    a, b, again = (cube.errors(TEST, 40, draw) for draw in (0, 1, 0))
+    assert a == again
+    assert a.errors != b.errors
+
+
+def test_longer_steps_are_compared_where_times_meet(cube):
+    longer = cube.errors(TEST, 50, faster=1.5)
+    assert longer.errors.origin < 0.0035       # 0.0038 where states between levels are compared
+
+
+def test_a_run_that_breaks_down_is_infinitely_off(cube, monkeypatch):
+    def broken(*_):
+        raise OutOfRange("far away")
+        yield
+
+    monkeypatch.setattr(tested, "infer", broken)
+    found = cube.errors(TEST, 50)
+    assert found.errors == tested.NOWHERE
+    assert found.stress == np.inf
+
+
+def test_rows_are_told_by_their_columns(cube):
+    rows = errors.rows_of(cube, "modal", 50, (0, 1))
+    assert len(rows) == 2
+    assert all(len(row) == len(errors.COLUMNS) for row in rows)
+    assert errors.mean(rows, "samples") == 50.0
+    assert "1250 particles, 60 steps, 3 runs and 1 tests, dx and dt 2 times as long" in cube.scale
