@@ -7,6 +7,7 @@ import rom_toys
 from field_toys import MU, Q, latents, networks
 
 from mpm_ref.rom.inference import infer
+from mpm_ref.rom.inferred import Inferred, Matter, Position
 from mpm_ref.rom.learned import learned
 from mpm_ref.rom.projection import project_position
 
@@ -97,3 +98,21 @@ def test_points_and_parameters_that_do_not_fit_are_refused():
         learned(rom_toys.cloud(3, 20), networks(3, Q), MU[:1], SIZE)
     with pytest.raises(ValueError, match=r"mu of shape \(\): expected \(2,\)"):
         fields(3).of(31.0)
+
+
+def test_a_step_on_networks_moves_samples_as_when_all_points_are_stepped(d):
+    n, dt = 600, 1e-3
+    one, xhat = fields(d, n=n), latents()
+    matter = Matter(np.full(n, 2.0), np.full(n, 1e-3), np.zeros((n, d)))
+    span = np.ptp(one.place(np.arange(n), xhat), axis=0).max()
+    stepper = Inferred(one, matter, span / 16, 2, np.zeros(d))
+    at, samples = Position(xhat, xhat - 0.01), np.array([5, 71, 300])
+    points = stepper.integration(xhat, samples)
+    assert len(points) < n
+    few, everything = (stepper.moved(stepper.inferred(at, N, dt), np.searchsorted(N, samples),
+                                     0.0, dt) for N in (points, np.arange(n)))
+    assert np.abs(everything - one.place(samples, xhat)).max() > 1e-4 * span
+    np.testing.assert_allclose(few, everything, rtol=0.0, atol=1e-12 * np.abs(everything).max())
+    after, report = stepper.step(at, samples, 0.0, dt)
+    assert np.array_equal(after.before, xhat)
+    assert (report.samples, report.points, report.rank) == (3, len(points), field_toys.R)
