@@ -1,3 +1,5 @@
+import sys
+
 import numpy as np
 import pytest
 from command_line import SCENE, mpm_ref
@@ -13,6 +15,14 @@ settings.load_profile("mpm_ref")
 def d(request):
     """Space dimension."""
     return request.param
+
+
+@pytest.fixture(autouse=True)
+def no_figure_stays_open():
+    """Matplotlib warns of more than 20, and which tests share a process is up to pytest-xdist."""
+    yield
+    if "matplotlib.pyplot" in sys.modules:
+        sys.modules["matplotlib.pyplot"].close("all")
 
 
 @pytest.fixture
