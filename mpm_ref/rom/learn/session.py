@@ -77,7 +77,7 @@ class Session:
         return [total.item(), *(term.item() for term in found)]
 
     def error(self, at):
-        """Loss of a batch of snapshots, and its terms."""
+        """Loss of a batch of snapshots, and its terms: for the kinds of training to say."""
         raise NotImplementedError
 
     def some_points(self):
