@@ -214,3 +214,19 @@ def test_states_of_a_full_run_differ():
     X, matter = body(30, 2)
     states = full_run(X, matter, 2)
     assert all(np.abs(a[0] - b[0]).max() > 1e-4 for a, b in pairwise(states))
+
+
+@pytest.mark.parametrize("inversion", ["nonlinear", "linear"])
+def test_a_sample_of_weight_two_counts_as_two(d, inversion, rng):
+    X, matter = body(40, d)
+    stepper = model(Free(X, np.eye(d)), matter, inversion=inversion)
+    some = np.arange(0, 40, 5)
+    x = X[some] + 0.1 * rng.normal(size=(8, d))
+    twice = np.concatenate([some[:1], some])
+    weight = np.array([2.0, *np.ones(7)])
+    rest = Affine(d).rest
+    weighed, _ = stepper.inverted((some, weight), x, rest, DT)
+    repeated, _ = stepper.inverted((twice, None), np.concatenate([x[:1], x]), rest, DT)
+    plain, _ = stepper.inverted((some, None), x, rest, DT)
+    assert np.abs(weighed - repeated).max() < 1e-9
+    assert np.abs(weighed - plain).max() > 1e-4

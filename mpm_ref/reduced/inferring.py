@@ -4,21 +4,34 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..rom.cubature import CANDIDATES, cubature
 from ..rom.inferred import Inferred, Position, nearest
 
 ENOUGH = 4000       # points that tell where a body is at the start
 
 
+class Chosen(NamedTuple):
+    """Samples from a time on."""
+
+    since: float                    # [s]
+    points: np.ndarray              # numbers, sorted
+    w: np.ndarray | None = None     # weights; None: they count all the same
+
+
 class Plan(NamedTuple):
     """How a reduced run is made."""
 
-    samples: tuple          # (since [s], numbers of points, sorted), in order of time (NSF-sec5.4)
+    samples: tuple          # of `Chosen`, in order of time (NSF-sec5.4)
     faster: float = 1.0     # length of a step over that of the scene
     inversion: str = "nonlinear"
 
     def at(self, t):
-        """The samples of the step that begins at t [s]."""
-        return [chosen for since, chosen in self.samples if since <= t][-1]
+        """The `Chosen` samples of the step that begins at t [s]."""
+        return [one for one in self.samples if one.since <= t][-1]
+
+    def steps(self, clock):
+        """How many steps the run takes until the scene's `Clock` ends."""
+        return round(clock.steps / self.faster)
 
 
 def model(whole, fields, inversion="nonlinear"):
@@ -32,20 +45,46 @@ def infer(whole, fields, plan, start):
     """Yield (t [s], `Position`, `Report` or None) of a reduced run until the scene ends, the start
     first, which is searched from latent coordinates near it.
     """
+    yield from continued([(begin(whole, fields, start), None)], whole, fields, plan)
+
+
+def begin(whole, fields, near):
+    """`Position` of a `Whole` scene at the start, searched from latent coordinates near it."""
+    some = np.arange(0, len(whole.X), -(-len(whole.X) // ENOUGH))
+    return Position(nearest(fields, some, whole.X[some], near))
+
+
+def continued(known, whole, fields, plan):
+    """Yield the same of a run whose first states (`Position`, `Report` or None) are known, these
+    too.
+    """
     stepper, clock = model(whole, fields, plan.inversion), whole.problem.clock
     dt = plan.faster * clock.dt
-    some = np.arange(0, len(whole.X), -(-len(whole.X) // ENOUGH))
-    at = Position(nearest(fields, some, whole.X[some], start))
-    yield 0.0, at, None
-    for k in range(round(clock.steps / plan.faster)):
-        at, report = stepper.step(at, plan.at(k * dt), k * dt, dt)
+    for k, (at, report) in enumerate(known):
+        yield k * dt, at, report
+    for k in range(len(known) - 1, plan.steps(clock)):
+        chosen = plan.at(k * dt)
+        at, report = stepper.step(at, chosen.points, k * dt, dt, chosen.w)
         yield (k + 1) * dt, at, report
 
 
-def drawn(n, count, seed, since=0.0):
-    """Samples drawn once and kept (NSF-sec5.4): (since [s], sorted numbers of `count` of n points).
-    Raises ValueError where there are not so many.
+def drawn(among, count, seed, since=0.0):
+    """`Chosen` samples that are drawn once and kept (NSF-sec5.4), `count` of `among`: how many
+    points there are, or the numbers of those to draw from. Raises ValueError where there are not so
+    many.
     """
-    if not 1 <= count <= n:
-        raise ValueError(f"{count} samples of {n} points: expected 1 .. {n}")
-    return since, np.sort(np.random.default_rng(seed).choice(n, count, replace=False))
+    numbers = np.arange(among) if np.ndim(among) == 0 else among
+    if not 1 <= count <= len(numbers):
+        raise ValueError(f"{count} samples of {len(numbers)} points: expected 1 .. {len(numbers)}")
+    some = np.random.default_rng(seed).choice(numbers, count, replace=False)
+    return Chosen(since, np.sort(some))
+
+
+def weighed(fields, among, count, seed, since=0.0):
+    """`Chosen` samples with weights, at most `count` of random candidates of `among` (as of
+    `drawn`), by `rom.cubature` of `Spanned` fields. Raises ValueError for too few.
+    """
+    most = among if np.ndim(among) == 0 else len(among)
+    some = drawn(among, min(CANDIDATES, most), seed).points
+    found = cubature(fields.U, fields.r, some, count)
+    return Chosen(since, found.points, found.w)

@@ -44,17 +44,21 @@ def at_once(bodies, name):
     return np.concatenate([getattr(body.particles, name)[np.argsort(body.id)] for body in bodies])
 
 
-def history(scene, mu, kind=np.float64):
-    """`Histories` of one run with parameters mu, of all its steps; stored as numbers of a kind.
+def history(scene, mu, kind=np.float64, every=1):
+    """`Histories` of one run with parameters mu, of each step or of one in `every`; stored as
+    numbers of a kind.
 
-    Raises ValueError as `whole` does and where the time step is adaptive; `Unstable` and `TooLarge`
-    as `simulate` does.
+    Raises ValueError as `whole` does, where the time step is adaptive, and where `every` does not
+    divide the number of steps; `Unstable` and `TooLarge` as `simulate` does.
     """
-    one = whole(replace(scene, every=1, interval=None))
+    one = whole(replace(scene, every=every, interval=None))
     clock, (n, d) = one.problem.clock, one.X.shape
     if clock.dt is None:
         raise ValueError("the time step is adaptive: expected a fixed dt")
-    levels = clock.steps + 1
+    if clock.steps % every:
+        raise ValueError(f"one in {every} of {clock.steps} steps: expected a divisor of the steps, "
+                         "so that the last is one of them")
+    levels = clock.steps // every + 1
     x, C = (np.empty((1, levels, n, k), kind) for k in (d, d * d))
     tau = np.empty((1, levels, n, d * (d + 1) // 2), kind)
     for frame in simulate(one.problem):
@@ -63,4 +67,4 @@ def history(scene, mu, kind=np.float64):
         tau[0, frame.index] = values(at_once(bodies, "tau"))
         C[0, frame.index] = at_once(bodies, "C").reshape(n, -1)
     return Histories(one.X, one.matter.m, one.matter.V0, one.matter.v[None],
-                     np.array(mu, dtype=float)[None], x, tau, C, clock.dt)
+                     np.array(mu, dtype=float)[None], x, tau, C, every * clock.dt)

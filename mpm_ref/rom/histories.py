@@ -8,7 +8,9 @@ import numpy as np
 
 
 class Histories(NamedTuple):
-    """s runs of n points over k steps; time levels 0 .. k, points in the scene's own order."""
+    """s runs of n points at time levels 0 .. k, a step or several apart; points in the scene's own
+    order.
+    """
 
     X: np.ndarray       # (n, d)                    at the start [m]
     m: np.ndarray       # (n,)                      mass [kg]
@@ -18,7 +20,7 @@ class Histories(NamedTuple):
     x: np.ndarray       # (s, k + 1, n, d)          position [m]
     tau: np.ndarray     # (s, k + 1, n, d(d+1)/2)   Kirchhoff stress [Pa], values of `symmetric`
     C: np.ndarray       # (s, k + 1, n, d d)        affine velocity field [1/s]
-    dt: float           #                           length of a step [s]
+    dt: float           #                           time between levels [s]
 
     def of(self, runs):
         """The histories of some runs."""
@@ -27,7 +29,12 @@ class Histories(NamedTuple):
 
 
 def joined(runs):
-    """`Histories` of several of the same points, one after the other."""
-    first = runs[0]
-    return first._replace(**{name: np.concatenate([getattr(run, name) for run in runs])
-                             for name in ("v", "mu", "x", "tau", "C")})
+    """`Histories` of several of the same points, one after the other. Of an iterator no run is
+    kept beside what is made of it.
+    """
+    first, fields = None, {name: [] for name in ("v", "mu", "x", "tau", "C")}
+    for run in runs:
+        first = first or run._replace(**dict.fromkeys(fields))
+        for name, parts in fields.items():
+            parts.append(getattr(run, name))
+    return first._replace(**{name: np.concatenate(fields.pop(name)) for name in list(fields)})

@@ -82,17 +82,18 @@ class Inferred:
         self.scheme = Scheme(self.degree, "apic")
         self.storage = Storage(self.dx, self.scheme.stencil, self.fields.dim)
 
-    def step(self, at, samples, t, dt):
+    def step(self, at, samples, t, dt, w=None):
         """`Position` and `Report` after a step from time t [s] by dt [s], with the samples of these
-        numbers, sorted. Raises `NoBody` where latent coordinates are not finite, and
-        `core.grid.OutOfRange` where positions are not, or are far apart.
+        numbers, sorted, that count by weights w (m,), or all the same. Raises `NoBody` where latent
+        coordinates are not finite, and `core.grid.OutOfRange` where positions are not, or are far
+        apart.
         """
         if not np.isfinite(at.xhat).all():
             raise NoBody(f"t = {t:.6g} s: latent coordinates {at.xhat} are not finite")
         points = self.integration(at.xhat, samples)
         cloud = self.inferred(at, points, dt)
         trial = self.moved(cloud, np.searchsorted(points, samples), t, dt)
-        xhat, fit = self.inverted(samples, trial, at.xhat, dt)
+        xhat, fit = self.inverted((samples, w), trial, at.xhat, dt)
         return Position(xhat, at.xhat), Report(len(samples), len(points), fit.rank, fit.residual,
                                                fit.iterations, fit.converged)
 
@@ -132,15 +133,39 @@ class Inferred:
         return trial.x
 
     def inverted(self, samples, x, xhat, dt):
-        """Latent coordinates whose positions of the samples are nearest to x (m, d), and the `Fit`
-        (NSF-eq10).
+        """Latent coordinates whose positions of the samples (numbers, weights) are nearest to
+        x (m, d), and the `Fit` (NSF-eq10).
         """
+        points, w = samples
+        fields = self.fields if w is None else Weighed(self.fields, np.sqrt(w)[:, None])
+        x = x if w is None else fields.root * x
         if self.inversion == "nonlinear":
-            fit = project_position(self.fields, samples, x, xhat)
+            fit = project_position(fields, points, x, xhat)
             return fit.y, fit
-        here, _, G = self.fields.derivatives(samples, xhat)
+        here, _, G = fields.derivatives(points, xhat)
         fit = project_velocity(G, (x - here) / dt)
         return xhat + dt * fit.y, fit._replace(residual=dt * fit.residual)
+
+
+class Weighed(NamedTuple):
+    """Places of samples times the roots of their weights, so that squares count by these."""
+
+    fields: object
+    root: np.ndarray        # (m, 1)
+
+    @property
+    def r(self):
+        """Number of latent coordinates."""
+        return self.fields.r
+
+    def place(self, points, xhat):
+        """sqrt(w) x (m, d) [m]."""
+        return self.root * self.fields.place(points, xhat)
+
+    def derivatives(self, points, xhat):
+        """sqrt(w) x, None, and sqrt(w) dg/dxhat (m, d, r)."""
+        x, _, G = self.fields.derivatives(points, xhat)
+        return self.root * x, None, self.root[..., None] * G
 
 
 def nearest(fields, points, x, xhat):

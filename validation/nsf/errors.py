@@ -31,7 +31,7 @@ def cube(run):
     run.record("nsf.jelly.r", one.study.sizes.r, scale=one.scale)
     if run.profile == "standard":
         run.record("nsf.jelly.particles", len(one.runs.X), scale=one.scale)
-    rows += without_affine(run, "nsf.jelly", one)
+    rows += without_affine(run, "nsf.jelly", one) + map_alone(run, "nsf.jelly", one)
     run.table("errors", COLUMNS, rows)
 
 
@@ -57,28 +57,52 @@ def column(run):
 
 def measured(run, name, one, draws):
     """Record the errors of a study; rows of all runs."""
-    study = one.study
-    few = rows_of(one, "modal", study.samples, draws)
-    every = rows_of(one, "modal", len(one.runs.X), (0,))
-    longer = rows_of(one, "modal", study.samples, (0,), FASTER)
-    share(run, f"{name}.error", few, one.scale, f"{study.samples} samples")
-    share(run, f"{name}.all", every, one.scale, "all particles are samples", comparator="info")
-    share(run, f"{name}.faster", longer, one.scale, f"steps {FASTER} times as long, "
-          f"{study.samples} samples", comparator="info")
+    few = rows_of(one, "modal", one.study.samples, draws)
+    share(run, f"{name}.error", few, one.scale, f"{one.study.samples} samples")
+    known(run, name, one)
+    few += by_cubature(run, f"{name}.cubature", one, one.study.samples, draws)
+    return few + compared(run, name, one) + longer(run, name, one)
+
+
+def compared(run, name, one):
+    """Record errors where all particles are samples, and of the stress; their rows."""
+    rows = rows_of(one, "modal", len(one.runs.X), (0,))
+    share(run, f"{name}.all", rows, one.scale, "all particles are samples", comparator="info")
+    run.record(f"{name}.stress", 100.0 * mean(rows, "stress"), unit="%", scale=one.scale,
+               comparator="info", note="of the Kirchhoff stress, all particles and times; all "
+               "particles are samples")
+    return rows
+
+
+def longer(run, name, one):
+    """Record the errors with longer steps; their rows."""
+    rows = rows_of(one, "modal", one.study.samples, (0,), FASTER)
+    share(run, f"{name}.faster", rows, one.scale, f"steps {FASTER} times as long, "
+          f"{one.study.samples} samples", comparator="info")
+    return rows
+
+
+def known(run, name, one):
+    """Record how far the nearest states and the nearest training run are off."""
     for word, found, note in (("nearest", one.nearest, "nearest states that the fields know"),
                               ("next_run", one.next_run, "the training run whose parameter is "
                                "nearest, taken as it is")):
-        errors = Errors(*np.mean([found(value) for value in study.test], axis=0))
+        errors = Errors(*np.mean([found(value) for value in one.study.test], axis=0))
         said(run, f"{name}.{word}", errors, one.scale, note, comparator="info")
-    run.record(f"{name}.stress", 100.0 * mean(few, "stress"), unit="%", scale=one.scale,
-               comparator="info", note="of the Kirchhoff stress, all particles and times")
-    return few + every + longer
 
 
 def without_affine(run, name, one):
     """Record the same without the affine field C: PIC."""
     without = refitted(one, one.study.sizes._replace(C=0), one.study.follows)
     return beside(run, f"{name}.no_affine", without, "no-affine", "no affine field")
+
+
+def map_alone(run, name, one):
+    """Record errors of the model that knows the map alone, which the paper compares with."""
+    rows = rows_of(one._replace(map_alone=True), "map-alone", one.study.samples, (0,))
+    share(run, f"{name}.baseline_error", rows, one.scale, "stress of the map's gradient, no affine "
+          "field (NSF-X12)")
+    return rows
 
 
 def beside(run, name, one, word, note):
@@ -88,9 +112,17 @@ def beside(run, name, one, word, note):
     return rows
 
 
-def rows_of(one, word, count, draws, faster=1.0):
+def by_cubature(run, name, one, count, draws):
+    """Record errors with samples that have weights by cubature; their rows."""
+    rows = rows_of(one, "cubature", count, draws, weighed=True)
+    share(run, name, rows, one.scale, f"at most {count} samples with weights by cubature, of "
+          "random candidates", comparator="info")
+    return rows
+
+
+def rows_of(one, word, count, draws, faster=1.0, weighed=False):
     """A row for each test and draw."""
-    found = [(value, draw, one.errors(value, count, draw, faster))
+    found = [(value, draw, one.errors(value, count, draw, faster, weighed))
              for value in one.study.test for draw in draws]
     return [(word, value, count, draw, faster, *got.errors, got.stress, got.points)
             for value, draw, got in found]

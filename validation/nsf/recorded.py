@@ -19,8 +19,8 @@ PARTICLES = {       # where the scene has the printed number
     "jelly": ("table1.jelly.particles", "jelly.particles"),
 }
 STAND_INS = {       # where the shape is not published, and ours has nearly as many
-    "metal": ("metal.particles", "a block with particles of the paper's size: the shape of its "
-              "metal frame is not published"),
+    "metal": ("metal.particles", "a lattice of beams with particles of the paper's size: the "
+              "shape of its metal frame is not published"),
     "ball": ("table1.ball.particles", "a sphere with 32 tentacles: the ball's mesh is not "
              "published"),
 }

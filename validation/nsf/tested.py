@@ -6,8 +6,9 @@ import numpy as np
 
 from mpm_ref.core.grid import OutOfRange
 from mpm_ref.reduced.errors import Errors, Squares
-from mpm_ref.reduced.inferring import Plan, drawn, infer
+from mpm_ref.reduced.inferring import Plan, infer
 from mpm_ref.reduced.whole import history, whole
+from mpm_ref.rom.deformed import deformed
 from mpm_ref.rom.histories import joined
 from mpm_ref.rom.inferred import nearest
 from mpm_ref.rom.placed import NoBody
@@ -35,6 +36,7 @@ class Tested(NamedTuple):
     xhat: np.ndarray        # (s, k + 1, r) of the training runs
     runs: object            # `Histories` of training
     tests: dict             # {value: `Histories` of a run}
+    map_alone: bool = False     # whether stress is that of the map's gradient, without affine field
 
     @property
     def scale(self):
@@ -47,12 +49,18 @@ class Tested(NamedTuple):
 
     def of(self, value):
         """The fields in a run with this value."""
-        return self.fields.of([value] if self.study.follows else [])
+        fields = self.fields.of([value] if self.study.follows else [])
+        if self.map_alone:
+            return deformed(fields, whole(self.study.run(value)).problem.bodies)
+        return fields
 
-    def errors(self, value, count, draw=0, faster=1.0):
-        """`Found` of a reduced run with so many samples; infinite where it breaks down."""
+    def errors(self, value, count, draw=0, faster=1.0, weighed=False):
+        """`Found` of a reduced run with so many samples, drawn or weighed by cubature; infinite
+        where it breaks down.
+        """
         fields, test, one = self.of(value), self.tests[value], whole(self.study.run(value))
-        plan = Plan((drawn(len(one.X), count, draw),), faster)
+        by = self.fields if weighed else None
+        plan = Plan(self.study.chosen(one, count, draw, by), faster)
         squares, stress, points = Squares(one.X), np.zeros(2), []
         everything = np.arange(len(one.X))
         try:
@@ -92,8 +100,10 @@ class Tested(NamedTuple):
 
 def tested(study):
     """`Tested` of a study: makes its runs, and fields of them."""
-    runs = joined([history(study.run(value), [value], np.float32) for value in study.train])
-    tests = {value: history(study.run(value), [value]) for value in study.test}
+    def made(value):
+        return history(study.run(value), [value], np.float32, study.spacing)
+
+    runs, tests = joined(map(made, study.train)), {value: made(value) for value in study.test}
     return refitted(Tested(study, None, None, runs, tests), study.sizes, study.follows)
 
 

@@ -1,0 +1,66 @@
+"""Few samples with weights that tell the coordinates of a motion which they do not resolve.
+
+Samples tell latent coordinates by least squares (NSF-eq10). With all points, motions along further
+modes of the displacement leave no trace in them, as modes are orthogonal. With few they do, and
+step by step the trace becomes a drift. So points p and weights w_p >= 0 are sought with
+
+    sum_p w_p U_kp . U_lp = sum over all points of the same = delta_kl,    k <= r,  l <= R
+
+as [An2008] does for forces: one by one, the point first that lessens what is left most, all weights
+anew each time by non-negative least squares.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import nnls
+
+from ..core.blas import one_thread
+
+ROUNDS = 25         # in which points are found, about as many in each
+CANDIDATES = 1500   # random points that samples are chosen from
+
+
+class Cubature(NamedTuple):
+    """Samples with weights."""
+
+    points: np.ndarray      # (s,) numbers, sorted
+    w: np.ndarray           # (s,) > 0, of mean 1
+    misfit: float           # || what is left || / || right side ||
+
+
+def cubature(U, r, among, count):
+    """`Cubature` of at most `count` of the points `among`, for modes U (n, d, R), orthonormal over
+    all points, of which the first r are asked for. Raises ValueError for too few points.
+    """
+    among = np.asarray(among)
+    if not r <= count * U.shape[1]:
+        raise ValueError(f"{count} samples for {r} latent coordinates: expected at least "
+                         f"{-(-r // U.shape[1])}")
+    A = np.einsum("pdk,pdl->klp", U[among][:, :, :r], U[among]).reshape(-1, len(among))
+    b = np.eye(r, U.shape[2]).ravel()
+    with one_thread():
+        chosen, w = chosen_of(A, b, min(count, len(among)))
+    points, kept = among[chosen], w > 0.0
+    order = np.argsort(points[kept])
+    left = np.linalg.norm(A[:, chosen] @ w - b) / np.linalg.norm(b)
+    return Cubature(points[kept][order], (w[kept] / w[kept].mean())[order], float(left))
+
+
+def chosen_of(A, b, count):
+    """Columns of A (m, n), at most `count`, and their weights >= 0, with A w = b as nearly as the
+    search finds.
+    """
+    length, chosen, w, left = np.linalg.norm(A, axis=0), [], np.zeros(0), b
+    length = np.where(length > 0.0, length, np.inf)
+    at_once = -(-count // ROUNDS)
+    while len(chosen) < count:
+        gain = A.T @ left / length
+        gain[chosen] = -np.inf
+        best = np.argsort(gain)[::-1][:min(at_once, count - len(chosen))]
+        if gain[best[0]] <= 1e-12 * np.linalg.norm(b):
+            break
+        chosen += best.tolist()
+        w, _ = nnls(A[:, chosen], b)
+        left = b - A[:, chosen] @ w
+    return np.array(chosen), w

@@ -1,0 +1,65 @@
+"""Samples with weights."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from mpm_ref.rom.cubature import cubature
+
+N, R_FREE = 400, 3
+
+
+@pytest.fixture(scope="module")
+def modes():
+    """Orthonormal smooth modes (n, 2, 8) of points in a square."""
+    rng = np.random.default_rng(0)
+    x = rng.random((N, 2))
+    waves = [np.cos(np.pi * (i * x[:, 0] + j * x[:, 1]) + i) for i in range(3) for j in range(3)]
+    U = np.stack([np.stack(pair, axis=1) for pair in pairwise(waves)], axis=2)
+    Q, _ = np.linalg.qr(U.reshape(2 * N, -1))
+    return Q.reshape(N, 2, -1)
+
+
+def off(U, points, w):
+    """How far weighted products are from those of all points, in units of the free modes."""
+    products = np.einsum("p,pdk,pdl->kl", w, U[points][:, :, :R_FREE], U[points])
+    products *= R_FREE / np.trace(products[:, :R_FREE])
+    return np.linalg.norm(products - np.eye(R_FREE, U.shape[2]))
+
+
+def test_weights_beat_none(modes):
+    found = cubature(modes, R_FREE, np.arange(N), 20)
+    assert len(found.points) <= 20
+    assert (found.w > 0.0).all()
+    assert found.w.mean() == pytest.approx(1.0)
+    assert (np.diff(found.points) > 0).all()
+    rng = np.random.default_rng(1)
+    others = [off(modes, rng.choice(N, 20, replace=False), np.ones(20)) for _ in range(20)]
+    assert off(modes, found.points, found.w) < 0.1 * min(others)
+
+
+def test_what_is_left_is_told(modes):
+    found = cubature(modes, R_FREE, np.arange(N), 6)
+    assert found.misfit > 0.05
+    finer = cubature(modes, R_FREE, np.arange(N), 40)
+    assert finer.misfit < 1e-6
+
+
+def test_a_motion_along_other_modes_leaves_no_trace(modes):
+    """Least squares with the weights, of a motion in the modes beyond the free ones."""
+    found = cubature(modes, R_FREE, np.arange(N), 40)
+    root = np.sqrt(found.w)[:, None, None]
+    A = (root * modes[found.points][:, :, :R_FREE]).reshape(-1, R_FREE)
+    b = (root[..., 0] * modes[found.points][:, :, R_FREE:].sum(axis=2)).ravel()
+    assert np.abs(np.linalg.lstsq(A, b, rcond=None)[0]).max() < 1e-5
+
+
+def test_only_points_that_are_offered_are_taken(modes):
+    among = np.arange(100, 200)
+    assert np.isin(cubature(modes, R_FREE, among, 20).points, among).all()
+
+
+def test_too_few_samples(modes):
+    with pytest.raises(ValueError, match="1 samples for 3 latent coordinates: expected at least 2"):
+        cubature(modes, R_FREE, np.arange(N), 1)

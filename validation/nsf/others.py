@@ -1,0 +1,102 @@
+"""Errors of reduced runs with inferred stress: bread, cake, metal frame, toothpaste and ball
+(Table 1, sections 6.1 to 6.5), with fields of modes in place of networks.
+"""
+
+from ..registry import experiment
+from .errors import (
+    COLUMNS,
+    by_cubature,
+    compared,
+    known,
+    longer,
+    map_alone,
+    mean,
+    rows_of,
+    share,
+    without_affine,
+)
+from .studies import ball, bread, cake, metal, toothpaste
+from .tested import tested
+
+DRAWS = 3               # of samples
+
+
+@experiment("nsf.metal", title="NSF: a metal frame is squeezed and let go",
+            profiles=("quick", "standard"), budget={"quick": 40, "standard": 1500})
+def frame(run):
+    """Errors with 50, 30 and 20 samples (section 6.3)."""
+    counted(run, "nsf.metal", metal, (50, 30, 20))
+
+
+@experiment("nsf.toothpaste", title="NSF: toothpaste on a brush",
+            profiles=("quick", "standard"), budget={"quick": 40, "standard": 1500})
+def paste(run):
+    """Errors with 50, 30 and 15 samples (Figures 10 and 11)."""
+    counted(run, "nsf.toothpaste", toothpaste, (50, 30, 15))
+
+
+@experiment("nsf.bread", title="NSF: a slice of bread is torn",
+            profiles=("quick", "standard"), budget={"quick": 40, "standard": 1800})
+def slice_of_bread(run):
+    """Errors with 450 samples, and of the deformation-only model (Figure 5)."""
+    beside_the_map(run, "nsf.bread", prepared(run, bread, train=6))
+
+
+@experiment("nsf.ball", title="NSF: a squishy ball falls onto an incline",
+            profiles=("quick", "standard"), budget={"quick": 40, "standard": 900})
+def squishy(run):
+    """Errors with 300 samples, and of the deformation-only model (Figure 13)."""
+    beside_the_map(run, "nsf.ball", prepared(run, ball))
+
+
+@experiment("nsf.cake", title="NSF: a cake is cut",
+            profiles=("quick", "standard"), budget={"quick": 60, "standard": 3600})
+def cut(run):
+    """Errors with 700 samples in the middle, and 400 in the second half (section 6.1)."""
+    one = prepared(run, cake, train=5)
+    rows = rows_of(one, "modal", one.study.samples, draws(run))
+    share(run, "nsf.cake.error", rows, one.scale, "700, then 400 samples in the middle")
+    points = run.choose(quick="nsf.cake.points", standard="nsf.cake.integration_particles")
+    run.record(points, mean(rows, "points"), scale=one.scale,
+               **run.choose(quick={"comparator": "info"}, standard={}))
+    rows += by_cubature(run, "nsf.cake.cubature", one, one.study.samples, draws(run))
+    run.table("errors", COLUMNS, rows + finished(run, "nsf.cake", one))
+
+
+def prepared(run, study, **few):
+    """`Tested` of a study at a run's profile; few: its settings at the quick one."""
+    return tested(run.choose(quick=lambda: study(3, **few), standard=study)())
+
+
+def draws(run):
+    """Of samples."""
+    return range(run.choose(quick=1, standard=DRAWS))
+
+
+def counted(run, name, study, counts):
+    """Record errors with several numbers of samples."""
+    one, rows = prepared(run, study, train=5), []
+    for count in counts:
+        found = rows_of(one, "modal", count, draws(run))
+        share(run, f"{name}.error.{count}", found, one.scale, f"{count} samples")
+        rows += found + by_cubature(run, f"{name}.cubature.{count}", one, count, draws(run))
+    run.table("errors", COLUMNS, rows + compared(run, name, one) + finished(run, name, one))
+
+
+def beside_the_map(run, name, one):
+    """Record errors, and those of the map alone."""
+    study = one.study
+    few = rows_of(one, "modal", study.samples, draws(run))
+    share(run, f"{name}.error", few, one.scale, f"{study.samples} samples")
+    few += by_cubature(run, f"{name}.cubature", one, study.samples, draws(run))
+    rows = few + compared(run, name, one) + map_alone(run, name, one)
+    run.table("errors", COLUMNS, rows + finished(run, name, one))
+
+
+def finished(run, name, one):
+    """Record settings, and errors without the affine field, with longer steps, and of what is known
+    without a run; rows of the runs.
+    """
+    run.record(f"{name}.r", one.study.sizes.r, scale=one.scale)
+    known(run, name, one)
+    return longer(run, name, one) + without_affine(run, name, one)
