@@ -5,11 +5,16 @@ A caller puts what `stated` gives among its arrays, where the bytes of its files
 """
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 
 from .sealed import opened, sealed, write_whole
+
+KINDS = {       # a format without its number -> the files that have it
+    "": "maps, laws or stress fields", "gnn": "graph networks",
+    "mpm_ref law": "layers of exported laws"}
 
 
 def stated(path, format, about):
@@ -42,7 +47,7 @@ def read(path, format, fault_of, what):
     Raises ValueError for a file that is damaged, of another format, or has a fault.
     """
     arrays = opened(Path(path))
-    require_format(path, arrays, format)
+    require_format(path, arrays, format, what)
     if fault := fault_of(arrays):
         raise ValueError(f"{path} holds no {what}: {fault}; train again")
     return arrays, about_of(path, arrays)
@@ -54,12 +59,24 @@ def format_of(arrays):
     return f"an array of shape {found.shape}" if np.ndim(found) else found
 
 
-def require_format(path, arrays, expected):
-    """Raise ValueError unless a file is of the expected format."""
+def kind_of(format):
+    """The kind of files that have a format, in words; None for none of ours."""
+    found = re.fullmatch(r"(.*?) ?\d+", str(format))
+    return KINDS.get(found[1]) if found else None
+
+
+def require_format(path, arrays, expected, what):
+    """Raise ValueError unless a file is of the expected format; what: in words, what was asked
+    for.
+    """
     found = format_of(arrays)
-    if found != expected:
-        raise ValueError(f"{path} has format {found}, this program reads {expected}; use the "
-                         "version that wrote it, or make it again")
+    if found == expected:
+        return
+    if kind_of(found) not in (None, kind_of(expected)):
+        raise ValueError(f"{path} holds no {what}, format {expected}: its format, {found}, is that "
+                         f"of {kind_of(found)}; name another file")
+    raise ValueError(f"{path} has format {found}, this program reads {expected}; use the version "
+                     "that wrote it, or make it again")
 
 
 def about_of(path, arrays):

@@ -48,6 +48,20 @@ def test_a_fault_is_told_on_writing_and_on_reading(tmp_path):
         read(path, 2, lambda found: "it lacks x", "toys")
 
 
+@pytest.mark.parametrize(("format", "asked", "said"), [
+    ("gnn 2", 1, "holds no toys, format 1: its format, gnn 2, is that of graph networks; name "),
+    ("mpm_ref law 1", "gnn 1", "holds no toys, format gnn 1: .*, is that of layers of exported l"),
+    (1, "gnn 1", "holds no toys, format gnn 1: its format, 1, is that of maps, laws or stress f"),
+    ("gnn 2", "gnn 1", "has format gnn 2, this program reads gnn 1; use the version that wrote"),
+    ("cake 7", 1, "has format cake 7, this program reads 1; "),
+])
+def test_files_of_another_kind_are_told_as_such(tmp_path, format, asked, said):
+    path = tmp_path / "a.npz"
+    write(path, stated(path, format, {}), lambda found: None)
+    with pytest.raises(ValueError, match=rf"a\.npz {said}"):
+        read(path, asked, lambda found: None, "toys")
+
+
 @pytest.mark.parametrize("save", [modes_file.save, bundle.save])
 def test_what_json_does_not_know_is_refused_with_the_file(tmp_path, save):
     about = {"x": np.zeros(2)}

@@ -90,7 +90,7 @@ def test_states_of_a_run_that_breaks_down_are_missing():
 
 
 def test_without_weights_no_curve_is_drawn(tmp_path, monkeypatch):
-    monkeypatch.setattr(curves, "known", lambda: ({}, ["no weights"]))
+    monkeypatch.setattr(curves, "known", lambda run: {})
     assert run_all([curves.loss.experiment], Setting("quick", tmp_path)) == []
     with pytest.raises(FileNotFoundError, match="the weights were missing"):
         nclaw_loss.draw(Results(tmp_path))
@@ -123,3 +123,18 @@ def test_errors_of_labels_are_told_as_what_they_are_and_not_drawn(tmp_path, monk
     assert units["nclaw.loss.labeled.sand.last"] == "1"
     axes, = nclaw_loss.draw(results).axes
     assert [line.get_label() for line in axes.lines] == ["sand"]
+
+
+def test_errors_with_velocities_in_them_are_told_and_not_drawn(tmp_path, monkeypatch):
+    """Those of a training that says what its errors are of are as all others."""
+    more = {"water-velocity": {}, "sand-velocity": {"errors_of": "positions"}}
+    monkeypatch.setattr(tables, "nets", lambda: {name: Net(name.split("-")[0]) for name in more})
+    monkeypatch.setattr(tables, "trained", lambda name: untrained()._replace(about={
+        "errors": [1e-3, 1e-4], "recipe": {"velocity": 1e-4}, **more[name]}))
+    results = done(tmp_path, curves.loss, "quick")
+    notes = {r.target: r.note for r in results.records("nclaw.loss")}
+    told = "the loss's term of velocities is in it"
+    assert told in notes["nclaw.loss.velocity.water.last"]
+    assert told not in notes["nclaw.loss.velocity.sand.last"]
+    table = results.table("nclaw.loss", "errors")
+    assert set(table["environment"]) == {"sand"}

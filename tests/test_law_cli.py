@@ -84,7 +84,8 @@ def test_info_says_it(made):
     *_, trained, met, by = mpm_ref("info", made / "whole.npz").stdout.splitlines()
     first, last = about["errors"][0], about["errors"][-1]
     assert trained == (f"trained on Cube, scene {about['scene_sha256'][:12]}, 4 epochs: mean "
-                       f"squared error of a step [m^2] {first:.3g} at first, {last:.3g} at last")
+                       f"squared error of a step [m^2] {first:.3g} at first, over up to 5 steps "
+                       f"from a restart; {last:.3g} at last, over up to 9")
     assert met.startswith("met in training: stretches 0.")
     assert by == f"made by: {about['command']}, source sha256 {about['source_sha256'][:12]}"
 
@@ -97,8 +98,8 @@ def test_progress_is_said_where_there_is_no_terminal(made):
     assert epochs[1].endswith(" s left")
     assert ", 4 segments of 5" in epochs[0]
     assert last == (f"{made / 'whole.npz'}: ours, 4 epochs on {STEPS} steps of 27 points; mean "
-                    f"squared error of a step [m^2] {errors[0]:.3g} at first, {errors[-1]:.3g} at "
-                    "last")
+                    f"squared error of a step [m^2] {errors[0]:.3g} at first, over up to 5 steps "
+                    f"from a restart; {errors[-1]:.3g} at last, over up to 9")
 
 
 def test_labeled_laws_are_trained_on_answers(tmp_path):
@@ -108,9 +109,10 @@ def test_labeled_laws_are_trained_on_answers(tmp_path):
     laws = methods.laws_of("labeled", 0, *study.tables.records)
     session = train_labeled(study.tables.train, laws, world(problem), labels)
     done = train(study.path, tmp_path / "laws.npz")
-    assert "labeled, 4 epochs on 20 steps of 27 points; squared error of F " in done.stdout
-    assert weights.load(tmp_path / "laws.npz").about["errors"] == [
-        epoch.error for epoch in session.history]
+    errors = weights.load(tmp_path / "laws.npz").about["errors"]
+    assert done.stdout.endswith("labeled, 4 epochs on 20 steps of 27 points; squared error of F "
+                                f"{errors[0]:.3g} at first, {errors[-1]:.3g} at last\n")
+    assert errors == [epoch.error for epoch in session.history]
 
 
 def test_constants_of_the_scene_are_identified(tmp_path):

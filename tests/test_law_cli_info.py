@@ -21,6 +21,7 @@ COMMITTED = sorted(path for path in NCLAW.glob("*.npz") if "-gnn" not in path.st
 KNOTS = len(spline.knots())
 ABOUT = {"command": "learn", "title": "Cube", "scene_sha256": 64 * "a", "dt": 5e-4,
          "errors": [0.5, 0.25, 0.125], "source_sha256": 64 * "b"}
+RECIPE = {"first": 10, "last": 50, "epochs": 3}
 
 
 def lines(*words):
@@ -45,7 +46,9 @@ def test_the_laws_of_the_experiments_say_what_they_know(path):
     assert plastic.startswith(f"plastic: {about['plastic']}")
     assert trained.startswith(f"trained on {about['environment']}, scene {about['scene'][:12]}, "
                               f"{about['epochs']} epochs: ")
-    assert trained.endswith(f" {errors[0]:.3g} at first, {errors[-1]:.3g} at last")
+    first, last = f"{errors[0]:.3g} at first", f"{errors[-1]:.3g} at last"
+    assert trained.endswith(f" of F {first}, {last}" if about.get("method") == "labeled" else
+                            f" {first}, over up to 25 steps from a restart; {last}, over up to 200")
     assert [line.split(":")[0] for line in met] == ["met in training"] * ("seen" in about)
     assert by == f"made by: {about['command']}, commit {about['commit']}, {about['date']}"
     assert facts(path)["about"] == about
@@ -83,12 +86,30 @@ def test_laws_say_what_the_command_wrote_of_them(tmp_path):
 
 
 @pytest.mark.parametrize(("more", "of"), [
-    ({"method": "labeled"}, "squared error of F"),
-    ({"method": "ours", "camera": [1.0]}, "squared distance of marks in images [px^2]"),
+    ({"method": "labeled", "recipe": RECIPE}, "squared error of F"),
+    ({"method": "ours", "camera": [1.0], "recipe": RECIPE},
+     "squared distance of marks in images [px^2]"),
 ])
 def test_errors_say_what_they_are_of(tmp_path, more, of):
     laws = random_laws(2)._replace(about=ABOUT | more)
-    assert f" 3 epochs: {of} 0.5 at first" in lines(saved(tmp_path, laws))[3]
+    assert lines(saved(tmp_path, laws))[3].endswith(
+        f" 3 epochs: {of} 0.5 at first, 0.125 at last")
+
+
+def test_errors_of_other_horizons_say_so(tmp_path):
+    """After 2 of 3 epochs the horizon has come 3/4 of its way (NCLAW-train)."""
+    laws = random_laws(2)._replace(about=ABOUT | {"method": "ours", "recipe": RECIPE})
+    assert lines(saved(tmp_path, laws))[3].endswith(
+        "a step [m^2] 0.5 at first, over up to 10 steps from a restart; 0.125 at last, over up to "
+        "40")
+
+
+def test_errors_with_velocities_in_them_say_so(tmp_path):
+    """Files that name what errors are of have them of that alone."""
+    about = ABOUT | {"method": "ours", "recipe": {"velocity": 1e-4}}
+    for more, said in (({}, ", with the term of velocities,"), ({"errors_of": "positions"}, "")):
+        laws = random_laws(2)._replace(about=about | more)
+        assert f" a step [m^2]{said} 0.5 at first, " in lines(saved(tmp_path, laws))[3]
 
 
 def test_laws_without_layers_say_their_constants(tmp_path):

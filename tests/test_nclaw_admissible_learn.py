@@ -80,13 +80,13 @@ def test_remainder_is_of_second_order_in_the_weights(laws, run, turned):
     flat = [a for some in own for a in some]
     start = [a.detach().clone() for a in flat]
     way = [on * torch.randn_like(a) for some, on in zip(own, turned, strict=True) for a in some]
-    slopes = torch.autograd.grad(squared(laws, *run, [0], [STEPS]), flat)
+    slopes = torch.autograd.grad(squared(laws, *run, [0], [STEPS]).loss, flat)
 
     def loss(h):
         with torch.no_grad():
             for a, first, da in zip(flat, start, way, strict=True):
                 a[:] = first + h * da
-            return squared(laws, *run, [0], [STEPS]).item()
+            return squared(laws, *run, [0], [STEPS]).loss.item()
 
     slope = sum((g * da).sum() for g, da in zip(slopes, way, strict=True)).item()
     assert rate(loss, slope, H) == pytest.approx(2.0, abs=0.1)

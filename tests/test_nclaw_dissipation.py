@@ -1,6 +1,7 @@
 """Energy that laws take away or create: the balance of paths, and the experiment."""
 
 from itertools import pairwise
+from types import SimpleNamespace
 
 import admissible_toys as toys
 import neural_toys
@@ -13,6 +14,7 @@ from mpm_ref.nclaw import neural, response
 from mpm_ref.nclaw.dissipation import balance, first_piola, loops, returned, work
 from validation.nclaw import dissipation, nets
 from validation.nclaw.dissipation import CREATED, Pair
+from validation.nclaw.environments import ENVIRONMENTS
 from validation.results import Results
 from validation.run import Setting, run_all
 
@@ -97,7 +99,7 @@ def test_a_return_that_adds_strain_is_told(closed):
 # The experiment.
 
 def results(tmp_path, monkeypatch, laws):
-    monkeypatch.setattr(dissipation, "known", lambda: (laws, ["no weights a.npz: train"]))
+    monkeypatch.setattr(dissipation, "known", lambda run: laws)
     monkeypatch.setattr(dissipation, "SIZES", (0.1,))
     failed = run_all([dissipation.dissipation.experiment],
                      Setting("quick", tmp_path))
@@ -119,7 +121,6 @@ def test_the_experiment_tells_laws_apart(tmp_path, monkeypatch):
     assert records[name("admissible.plasticine")].verdict == "pass"
     assert records["nclaw.dissipation.admissible.plasticine.run.created"].verdict == "pass"
     assert records["nclaw.dissipation.admissible.plasticine.run.taken"].value > 0.0
-    assert records["nclaw.dissipation.untrained"].note == "no weights a.npz: train"
     assert [row[0] for row in found.rows("nclaw.dissipation", "cycles")[1]] == [
         "true", "ours", "admissible"]
 
@@ -131,10 +132,19 @@ def test_laws_that_must_not_create_energy_miss_if_they_do(tmp_path, monkeypatch)
     assert records["nclaw.dissipation.admissible.jelly.cycles.0.1.creating"].verdict == "miss"
 
 
-def test_known_laws_are_true_and_trained_ones():
-    laws, waiting = dissipation.known()
-    assert {method for method, _ in laws} >= {"true", "ours"}
-    assert len(laws) + len(waiting) == 3 * 4
+def test_known_laws_are_true_and_trained_ones(monkeypatch):
+    def trained(name):
+        if name == "sand-admissible":
+            raise nets.Untrained("no weights sand-admissible.npz: train")
+        return nets.trained("jelly")
+
+    run, said = SimpleNamespace(experiment=dissipation.dissipation.experiment), []
+    run.record = lambda target, value, **more: said.append((target, value, more["note"]))
+    monkeypatch.setattr(dissipation, "trained", trained)
+    laws = dissipation.known(run)
+    assert laws.keys() == {(method, name) for method in ("true", "ours", "admissible")
+                           for name in ENVIRONMENTS} - {("admissible", "sand")}
+    assert said == [("nclaw.dissipation.untrained", 1, "no weights sand-admissible.npz: train")]
     assert laws["true", "water"] == (Fluid(laws["true", "water"].law.lam), FluidProjection())
 
 

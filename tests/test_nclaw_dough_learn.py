@@ -61,7 +61,7 @@ def test_with_the_true_laws_noise_is_left(true, seen):
     (problem, run), (where, film) = true, seen
     assert film.weight.sum() == dough.EVERY * (1 + dough.FRAMES)
     with torch.no_grad():
-        error = squared(exact(problem), where, film, [0], [STEPS]).item()
+        error = squared(exact(problem), where, film, [0], [STEPS]).loss.item()
     marks = dough.film(run.x[::dough.EVERY])
     frames = slice(1, 1 + STEPS // dough.EVERY)
     noise = marks.places - project(dough.camera(), run.x[::dough.EVERY][:, marks.points])
@@ -73,7 +73,7 @@ def test_velocities_count_in_depth_alone(true, seen):
     """And of all points, at every step."""
     (problem, run), (where, film) = true, seen
     with torch.no_grad():
-        with_it, without = (squared(exact(problem), where, film, [0], [STEPS], weight).item()
+        with_it, without = (squared(exact(problem), where, film, [0], [STEPS], weight).loss.item()
                             for weight in (3.0, 0.0))
     depth = (run.v[1:STEPS + 1, :, 2] ** 2).mean(axis=1).sum()
     assert with_it - without == pytest.approx(3.0 * depth, rel=1e-6)
@@ -120,13 +120,13 @@ def test_gradient_is_exact(seen):
     start = [a.detach().clone() for a in own]
     torch.manual_seed(1)
     way = [torch.randn_like(a) for a in own]
-    slopes = torch.autograd.grad(squared(laws, where, film, [0], [STEPS], 1.0), own)
+    slopes = torch.autograd.grad(squared(laws, where, film, [0], [STEPS], 1.0).loss, own)
 
     def loss(h):
         with torch.no_grad():
             for a, first, da in zip(own, start, way, strict=True):
                 a[:] = first + h * da
-            return squared(laws, where, film, [0], [STEPS], 1.0).item()
+            return squared(laws, where, film, [0], [STEPS], 1.0).loss.item()
 
     slope = sum((g * da).sum() for g, da in zip(slopes, way, strict=True)).item()
     assert rate(loss, slope, H) == pytest.approx(2.0, abs=0.1)

@@ -10,7 +10,7 @@ from mpm_ref.nclaw.gnn.simulator import Simulator
 from mpm_ref.nclaw.gnn.weights import save
 from mpm_ref.scene import build
 from validation import targets
-from validation.nclaw import curves, nets, simulators, tables, trajectories
+from validation.nclaw import curves, errors, nets, simulators, tables, trajectories
 from validation.nclaw.environments import ENVIRONMENTS
 from validation.nclaw.evaluate import Broken, Found, compare, own, positions
 from validation.nclaw.free import free
@@ -174,7 +174,7 @@ def trained_ones(monkeypatch):
         return still()._replace(about={"errors": [0.3, None, 0.1, 0.2], "picked": 2, "steps": 40})
 
     monkeypatch.setattr(tables, "trained", found)
-    monkeypatch.setattr(tables, "compare", lambda scene, laws, goes_on: [
+    monkeypatch.setattr(errors, "compare", lambda scene, laws, goes_on: [
         Found(float(next(count))) for _ in laws])
 
 
@@ -214,7 +214,7 @@ def test_what_was_picked_is_recorded(tmp_path, trained_ones):
 
 def test_table_6_is_of_1_10_and_100_runs_of_water(tmp_path, trained_ones, monkeypatch):
     monkeypatch.setattr(trajectories, "trained", lambda name: still()._replace(about={"of": name}))
-    monkeypatch.setattr(tables, "compare", lambda scene, laws, goes_on: [
+    monkeypatch.setattr(errors, "compare", lambda scene, laws, goes_on: [
         Found(2.0 * ("gnn" in one.about["of"]) + len(one.about["of"])) for one in laws])
     found = recorded(tmp_path, trajectories.table6)
     assert {target: one.value for target, one in found.items() if target != "nclaw.table6"} == {
@@ -234,7 +234,7 @@ def test_table_6_tells_what_is_not_trained_and_runs_nothing(tmp_path, trained_on
         raise nets.Untrained(f"no weights {name}.npz")
 
     monkeypatch.setattr(trajectories, "trained", missing)
-    monkeypatch.setattr(tables, "compare", lambda *args: pytest.fail("ran"))
+    monkeypatch.setattr(errors, "compare", lambda *args: pytest.fail("ran"))
     found = recorded(tmp_path, trajectories.table6)
     assert found.keys() <= {"nclaw.table6", "nclaw.table6.untrained"}
     assert found["nclaw.table6.untrained"].value == 4

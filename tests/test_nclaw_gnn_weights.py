@@ -3,6 +3,7 @@
 import gnn_toys as toys
 import numpy as np
 import pytest
+from damaged import assert_damage_is_told, changed, refused, without
 from neural_toys import laws
 
 from mpm_ref.nclaw import weights as of_laws
@@ -17,15 +18,6 @@ def numbers(simulator):
     gains = [a for _, one in named(simulator.network) for a in one.norm]
     return layers + gains, [*simulator.reading.scales, simulator.reading.radius,
                             simulator.reading.dt]
-
-
-def refused(path, said):
-    with pytest.raises(ValueError, match=said) as refusal:
-        load(path)
-    text = str(refusal.value)
-    assert text.startswith(str(path))
-    assert "\n" not in text
-    assert "; " in text
 
 
 def test_a_simulator_comes_back_in_single_precision(tmp_path, d):
@@ -47,17 +39,8 @@ def test_what_came_back_is_written_alike(tmp_path):
     assert (tmp_path / "one.npz").read_bytes() == (tmp_path / "other.npz").read_bytes()
 
 
-def without(*names):
-    return lambda a: {key: value for key, value in a.items() if key not in names}
-
-
-def changed(**arrays):
-    return lambda a: {**a, **{name: np.array(change(a[name]) if callable(change) else change)
-                              for name, change in arrays.items()}}
-
-
 FAULTS = {
-    "has format 1, this program reads gnn 1": changed(format=1),
+    "holds no trained graph network, format gnn 1: its format, 1, is that of": changed(format=1),
     "it lacks points_W0 or v_mean": without("points_W0"),
     "or they are no matrix and no vector": changed(v_mean=0.0),
     "it lacks answer_b2, edges_1_W0": without("answer_b2", "edges_1_W0"),
@@ -81,26 +64,21 @@ def test_a_sound_file_of_something_else_is_told(tmp_path, said, change):
     path = tmp_path / "gnn.npz"
     whole = arrays_of(toys.simulator()) | {"format": np.array(FORMAT), "about": np.array("{}")}
     path.write_bytes(sealed(change(whole)))
-    refused(path, said)
+    refused(load, path, said)
 
 
 def test_laws_and_simulators_are_not_taken_for_each_other(tmp_path):
     path = tmp_path / "a.npz"
     of_laws.save(path, laws(3))
-    refused(path, "has format 1, this program reads gnn 1")
+    refused(load, path, "its format, 1, is that of maps, laws or stress fields; name another file")
     save(path, toys.simulator())
-    with pytest.raises(ValueError, match="has format gnn 1, this program reads 1"):
+    with pytest.raises(ValueError, match=r"a\.npz holds no trained laws, format 1: its "
+                                         "format, gnn 1, is that of graph networks; name another"):
         of_laws.load(path)
 
 
 def test_damaged_files_are_told(tmp_path):
-    path = tmp_path / "gnn.npz"
-    refused(path, "cannot be read: No such file")
-    save(path, toys.simulator())
-    content = bytearray(path.read_bytes())
-    content[len(content) // 2] ^= 1
-    path.write_bytes(content)
-    refused(path, "is damaged, cut short")
+    assert_damage_is_told(load, lambda path: save(path, toys.simulator()), tmp_path / "gnn.npz")
 
 
 @pytest.mark.parametrize(("change", "said"), [

@@ -194,17 +194,18 @@ def jelly(F):
 
 def test_with_the_exact_law_nothing_is_off(run):
     """NCLAW-alg2 is NCLAW-alg1 then; a law that is a little off is told."""
-    error = squared(Laws(jelly, lambda F: F), *run, [0, 3], [3, STEPS])
+    error = squared(Laws(jelly, lambda F: F), *run, [0, 3], [3, STEPS]).loss
     assert error < 1e-26
-    assert squared(Laws(lambda F: 1.01 * jelly(F), lambda F: F), *run, [0, 3], [3, STEPS]) > 1e-16
+    stiffer = Laws(lambda F: 1.01 * jelly(F), lambda F: F)
+    assert squared(stiffer, *run, [0, 3], [3, STEPS]).loss > 1e-16
 
 
 def test_segments_do_not_know_each_other(run):
     """Nor how many run beside them, or how long those are."""
     laws = neural_laws(0, *STIFF)
     with torch.no_grad():
-        parts = [squared(laws, *run, [a], [b]) for a, b in ((0, 2), (2, 7), (7, STEPS))]
-        together = squared(laws, *run, [0, 2, 7], [2, 7, STEPS])
+        parts = [squared(laws, *run, [a], [b]).loss for a, b in ((0, 2), (2, 7), (7, STEPS))]
+        together = squared(laws, *run, [0, 2, 7], [2, 7, STEPS]).loss
         assert min(parts) > 0.0
         assert together.item() == pytest.approx(sum(parts).item(), rel=1e-6)
 
@@ -215,8 +216,8 @@ def test_what_would_become_of_a_segment_after_its_end_does_not_matter(run):
     data = data._replace(F=torch.cat([2.0 * data.F[:1], data.F[1:]]))
     broken = Laws(lambda F: torch.where(J(F) > 30.0, torch.nan, laws.elastic(F)),
                   lambda F: torch.where(J(F) > 5.0, 2.0 * F, laws.plastic(F)))
-    together = squared(broken, world, data, [0, 1], [1, 4])
-    parts = sum(squared(broken, world, data, [a], [b]) for a, b in ((0, 1), (1, 4)))
+    together = squared(broken, world, data, [0, 1], [1, 4]).loss
+    parts = sum(squared(broken, world, data, [a], [b]).loss for a, b in ((0, 1), (1, 4)))
     assert together.item() == pytest.approx(parts.item(), rel=1e-6)
     for a, b in zip(*(torch.autograd.grad(loss, parameters(laws)) for loss in (together, parts))):
         assert (a - b).norm() < 1e-5 * b.norm()
@@ -228,21 +229,22 @@ def test_errors_are_means_over_particles_and_axes(run):
     state = Laws(jelly, lambda F: F)
     error = squared(state, world, moved._replace(x=torch.cat([observed.x[:1], moved.x[1:]])),
                     [0], [4])
-    assert error.item() == pytest.approx(4 * 3e-6, rel=1e-9)
+    assert error.loss.item() == pytest.approx(4 * 3e-6, rel=1e-9)
 
 
 def test_errors_of_velocities_count_as_told(run):
-    """Beside those of positions, times their weight [s^2]."""
+    """In the loss, beside those of positions, times their weight [s^2]."""
     world, observed = run
     moved = observed._replace(v=observed.v + torch.tensor([0.0, 0.3, 0.0]))
     slower = observed._replace(v=torch.cat([observed.v[:1], moved.v[1:]]))
-    error = squared(Laws(jelly, lambda F: F), world, slower, [0], [4], velocity=1e-4)
-    assert error.item() == pytest.approx(4 * 1e-4 * 0.03, rel=1e-9)
+    found = squared(Laws(jelly, lambda F: F), world, slower, [0], [4], velocity=1e-4)
+    assert found.loss.item() == pytest.approx(4 * 1e-4 * 0.03, rel=1e-9)
+    assert found.positions < 1e-26
 
 
 def gradients(laws, run, cuts):
     """Loss, and gradients of all weights."""
-    loss = squared(laws, *run, cuts[:-1], cuts[1:])
+    loss = squared(laws, *run, cuts[:-1], cuts[1:]).loss
     return loss, torch.autograd.grad(loss, parameters(laws))
 
 
@@ -264,7 +266,7 @@ def test_remainder_is_of_second_order_in_the_weights(run, kind):
             with torch.no_grad():
                 for a, first, da in zip(parameters(laws), start, direction):
                     a[:] = first + h * da
-                return squared(laws, *run, cuts[:-1], cuts[1:]).item()
+                return squared(laws, *run, cuts[:-1], cuts[1:]).loss.item()
 
         slope = sum((g * da).sum() for g, da in zip(slopes, direction)).item()
         assert rate(loss, slope, H) == pytest.approx(2.0, abs=0.1)

@@ -49,7 +49,7 @@ def ones(whole):
 def gradients(data, where, cuts, velocity=0.0):
     """The loss of segments, and its gradients."""
     made = laws()
-    loss = squared(made, where, data, cuts[:-1], cuts[1:], velocity)
+    loss = squared(made, where, data, cuts[:-1], cuts[1:], velocity).loss
     loss.backward()
     return loss.item(), [a.grad.clone() for law in made for a in law.parameters()]
 

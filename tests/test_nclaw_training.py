@@ -1,5 +1,6 @@
 """Training of neural laws: epochs, batches, checkpoints, and what goes wrong. Needs PyTorch."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -64,6 +65,24 @@ def test_what_an_epoch_says(run, reading):
     for epoch in session.history:
         factor = 1e4 * epoch.segments if reading == "release" else 1.0
         assert epoch.loss == pytest.approx(factor * epoch.error, rel=1e-12)
+
+
+def test_errors_are_of_positions_whatever_velocities_weigh(run):
+    """Their term is in the loss alone, in proportion to its weight."""
+    none, one, two = (first_gradients(replace(SHORT, velocity=weight), laws(), run)[1]
+                      for weight in (0.0, 1e-4, 2e-4))
+    assert none.error == one.error == two.error > 0.0
+    assert one.loss > 1.001 * none.loss
+    assert two.loss - none.loss == pytest.approx(2.0 * (one.loss - none.loss), rel=1e-9)
+
+
+def test_a_training_says_what_its_errors_are_of(run):
+    """Checkpoints with a term of velocities that do not say it had that in their errors."""
+    for weight in (0.0, 1e-4):
+        session = Session(replace(SHORT, velocity=weight), laws(), *run)
+        assert ("errors_of" in json.loads(session.named)) == (weight > 0.0)
+    session.epoch()
+    assert session.known == {"errors": [session.history[0].error], "errors_of": "positions"}
 
 
 def first_gradients(recipe, laws, run):

@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import rom_toys
+from damaged import assert_damage_is_told, changed, refused, without
 
 from mpm_ref.nclaw import response, weights
 from mpm_ref.nclaw.weights import KINDS, PARTS, Laws, Trained, arrays_of, load, save
@@ -33,16 +34,6 @@ def file_of(laws):
     return {"format": np.array(weights.FORMAT), "about": np.array("{}"),
             **{name: a for part in PARTS for name, a in
                arrays_of(part, getattr(laws, part)).items()}}
-
-
-def refused(path, said):
-    with pytest.raises(ValueError, match=said) as refusal:
-        load(path)
-    text = str(refusal.value)
-    assert text.startswith(str(path))
-    assert "\n" not in text
-    assert "; " in text         # what is wrong; what to do
-    assert " map" not in text[len(str(path)):]      # of `rom`
 
 
 def test_laws_come_back_bit_for_bit(tmp_path, d):
@@ -79,15 +70,6 @@ def test_equal_content_gives_equal_bytes(tmp_path):
 
 
 # What is refused.
-
-def without(*names):
-    return lambda a: {key: value for key, value in a.items() if key not in names}
-
-
-def changed(**arrays):
-    return lambda a: {**a, **{name: np.array(change(a[name]) if callable(change) else change)
-                              for name, change in arrays.items()}}
-
 
 FAULTS = {
     "has format None, this program reads 1": without("format"),
@@ -127,22 +109,12 @@ FAULTS = {
 def test_a_sound_file_of_something_else_is_told(tmp_path, said, change):
     path = tmp_path / "laws.npz"
     path.write_bytes(sealed(change(file_of(laws()))))
-    refused(path, said)
+    assert " map" not in refused(load, path, said).removeprefix(str(path))      # of `rom`
 
 
 def test_damaged_files_are_told(tmp_path):
     """`sealed` sees to it; its own tests are those of `rom.weights`."""
-    path = tmp_path / "laws.npz"
-    refused(path, "cannot be read: No such file")
-    save(path, laws())
-    content = bytearray(path.read_bytes())
-    content[len(content) // 2] ^= 1
-    path.write_bytes(content)
-    refused(path, "is damaged, cut short")
-    path.write_bytes(content[:100])
-    refused(path, "is damaged, cut short")
-    path.write_text("no archive")
-    refused(path, "is not an npz file")
+    assert_damage_is_told(load, lambda path: save(path, laws()), tmp_path / "laws.npz")
 
 
 def with_first(law, W, b):

@@ -57,8 +57,8 @@ def of_race(one, monkeypatch, fault):
 
 def of_record(one, monkeypatch, fault):
     monkeypatch.setattr(record, "watched", lambda *_: broken(fault))
-    recording = SimpleNamespace(problem=one.problem, run=SimpleNamespace(way=None, seed=0),
-                                watch=None, case=one, model=SimpleNamespace(rest=None))
+    recording = record.Recording(one, SimpleNamespace(rest=None), SimpleNamespace(way=None, seed=0),
+                                 watch=None, field=None, problem=one.problem, facts={})
     with pytest.raises(record.Lost, match="broke down in step 0: ") as lost:
         list(record.steps(recording))
     return str(lost.value)

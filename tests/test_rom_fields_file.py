@@ -7,6 +7,7 @@ import field_toys
 import numpy as np
 import pytest
 import rom_toys
+from damaged import changed, refused, without
 from field_toys import MU, Q, latents, networks
 
 from mpm_ref.archive import stated
@@ -54,15 +55,6 @@ def test_equal_content_gives_equal_bytes(tmp_path):
 
 # What is refused.
 
-def refused(path, said):
-    with pytest.raises(ValueError, match=said) as refusal:
-        load(path)
-    text = str(refusal.value)
-    assert text.startswith(str(path))
-    assert "\n" not in text
-    assert "; " in text         # what is wrong; what to do
-
-
 @pytest.mark.parametrize("place", [0.001, 0.3, 0.6, 0.9, 0.999])
 def test_a_flipped_bit_and_a_cut_are_told(tmp_path, place):
     path = tmp_path / "fields.npz"
@@ -70,31 +62,28 @@ def test_a_flipped_bit_and_a_cut_are_told(tmp_path, place):
     content = path.read_bytes()
     k = int(place * len(content))
     path.write_bytes(content[:k] + bytes([content[k] ^ 4]) + content[k + 1:])
-    refused(path, "is damaged, cut short|is not an npz file")
+    refused(load, path, "is damaged, cut short|is not an npz file")
     path.write_bytes(content[:k])
-    refused(path, "is damaged, cut short|is not an npz file")
+    refused(load, path, "is damaged, cut short|is not an npz file")
 
 
 def test_a_file_of_another_kind_is_told(tmp_path):
     own = model()
     weights.save(tmp_path / "map.npz", weights.Model(own.g, own.xhat, own.rest, ABOUT))
-    refused(tmp_path / "map.npz", "holds no three networks of stress fields: g: it lacks W, b, low")
+    refused(load, tmp_path / "map.npz",
+            "holds no three networks of stress fields: g: it lacks W, b, low")
     save(tmp_path / "fields.npz", own)
     with pytest.raises(ValueError, match="holds no trained map: it lacks W, b"):
         weights.load(tmp_path / "fields.npz")
 
 
-def without(arrays, name):
-    return {key: a for key, a in arrays.items() if key != name}
-
-
 FAULTS = {
-    "has format None": lambda a: without(a, "format"),
-    "has format 2, this program reads 1": lambda a: {**a, "format": np.array(2)},
-    "about is no JSON": lambda a: without(a, "about"),
+    "has format None": without("format"),
+    "has format 2, this program reads 1": changed(format=2),
+    "about is no JSON": without("about"),
     r"g: W has shape \(149,\), expected \(150,\)": lambda a: {**a, "g.W": a["g.W"][1:]},
-    "g: it lacks rest": lambda a: without(a, "g.rest"),
-    "h: it lacks mu_std": lambda a: without(a, "h.mu_std"),
+    "g: it lacks rest": without("g.rest"),
+    "h: it lacks mu_std": without("h.mu_std"),
     r"h: b has shape \(25,\), expected \(24,\)": lambda a: {**a, "h.b": np.append(a["h.b"], 0.0)},
     r"l: mean has shape \(8,\), expected \(9,\)": lambda a: {**a, "l.mean": a["l.mean"][1:]},
     "l: low or mu_mean has not one axis": lambda a: {**a, "l.low": np.array(0.0)},
@@ -116,7 +105,7 @@ FAULTS = {
 def test_a_sound_file_of_something_else_is_told(tmp_path, said, change):
     path = tmp_path / "fields.npz"
     path.write_bytes(sealed(change(file_of(model()))))
-    refused(path, said)
+    refused(load, path, said)
 
 
 @pytest.mark.parametrize(("change", "said"), [
@@ -131,3 +120,16 @@ def test_what_could_not_be_read_is_not_written(tmp_path, change, said):
     with pytest.raises(ValueError, match=said):
         save(tmp_path / "fields.npz", model()._replace(**change))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_single_precision_holds_is_stored_so(tmp_path):
+    """As weights are that were trained in it; on loading all is double."""
+    own = model()
+    net = own.h.net._replace(**{name: getattr(own.h.net, name).astype(np.float32).astype(float)
+                                for name in ("W", "WT", "b")})
+    arrays = arrays_of(own._replace(h=own.h._replace(net=net)))
+    assert (arrays["h.W"].dtype, arrays["l.W"].dtype) == (np.float32, float)
+    save(tmp_path / "fields.npz", own._replace(h=own.h._replace(net=net)))
+    back = load(tmp_path / "fields.npz")
+    assert back.h.net.W.dtype == back.xhat.dtype == float
+    assert np.array_equal(back.h.net.W, net.W)

@@ -85,6 +85,16 @@ def test_rates_are_those_printed_in_equal_shares():
     assert schedule.steps(0.0) == 1e-3
 
 
+def test_a_warm_start_rises_to_its_rate_and_falls_from_there():
+    found = [schedule.warm(k / 1000) for k in range(1001)]
+    top = int(np.argmax(found))
+    assert (found[0], found[top]) == (0.0, pytest.approx(schedule.FAST))
+    assert top == 1000 * schedule.SOON
+    assert (np.diff(found[:top + 1]) > 0.0).all()
+    assert (np.diff(found[top:]) < 0.0).all()
+    assert found[-1] == pytest.approx(schedule.SLOWEST)
+
+
 def test_rates_are_asked_for_in_every_step(monkeypatch):
     shares = []
     monkeypatch.setitem(schedule.SCHEDULES, "steps", lambda share: shares.append(share) or 0.0)
@@ -240,7 +250,7 @@ def test_a_loss_that_is_not_finite_ends_the_training(of):
 @pytest.mark.parametrize(("settings", "said"), [
     ({"epochs": 0}, "epochs = 0: expected at least 1"), ({"batch": 0}, "batch = 0"),
     ({"points": -1}, "points = -1: expected 0 or more"),
-    ({"schedule": "linear"}, "schedule = 'linear': expected one of cosine, steps"),
+    ({"schedule": "linear"}, "schedule = 'linear': expected one of cosine, steps, warm"),
 ])
 def test_settings_that_mean_nothing_are_refused(settings, said):
     for made in (lambda: FieldTraining((4,), **settings), lambda: Training(2, **settings)):

@@ -32,15 +32,16 @@ def made(tmp_path_factory):
 def test_a_network_is_trained_as_the_study_says():
     own = Map(kind="network", r=2)
     for field in fields(Training):
-        if field.name not in ("r", "weights", "schedule"):
+        if field.name not in ("r", "weights", "schedule", "beside"):
             assert getattr(own, field.name) == field.default
-    assert {field.name for field in fields(Training)} == {"r", "schedule", *KEYS[NETWORK]}
-    assert Training(2).schedule == "cosine"         # the other one is for NSF's fields
+    others = {"r", "schedule", "beside"}
+    assert {field.name for field in fields(Training)} == others | {*KEYS[NETWORK]}
+    assert (Training(2).schedule, Training(2).beside) == ("cosine", 0.0)    # others: NSF's fields
     assert READINGS[own.weights] == CODE
 
 
 def test_latents_and_weights_are_those_of_a_training():
-    assert {*LATENTS, "encoder-nsf"} == set(fit.LATENTS)
+    assert {*LATENTS, "encoder-nsf", "directions"} == set(fit.LATENTS)
     for name in WEIGHTS:
         assert isinstance(drive.weights(name, 1.0, 1.0), Weights)
     assert drive.weights("code", 100.0, 6.0) == CODE

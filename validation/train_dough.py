@@ -72,4 +72,4 @@ def filmed_laws(name, net, checkpoint, threads):
     return stored(laws, {
         **identity(net), "recipe": asdict(recipe), "threads": threads, **took,
         "command": f"python -m validation.train_laws {name}", "torch": torch.__version__,
-        "errors": [epoch.error for epoch in done.history], **provenance(commit(ROOT))})
+        **done.known, **provenance(commit(ROOT))})

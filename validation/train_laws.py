@@ -61,7 +61,7 @@ def made(name, checkpoints, threads):
     took = {f"{clock}_seconds": round(s, 1) for clock, s in done.meter.total._asdict().items()}
     about = {**identity(net), "recipe": asdict(recipe), "threads": threads, **took,
              "command": f"python -m validation.train_laws {name}", "torch": torch.__version__,
-             "errors": [epoch.error for epoch in done.history], **provenance(commit(ROOT))}
+             **done.known, **provenance(commit(ROOT))}
     stored = drive.stored(laws, about)
     return stored._replace(about={**about, "seen": bounds(net, stored),
                                   "dt": environment(net.environment).dt})

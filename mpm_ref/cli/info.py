@@ -1,7 +1,7 @@
 """What a problem or a results file is, in numbers: for people as lines, for machines as a dict."""
 
 import json
-from math import isfinite
+from math import isfinite, isnan
 
 from ..nclaw.range import other_steps
 from ..placement import misplaced
@@ -129,7 +129,7 @@ def results_lines(facts):
     lines = [f"{facts['title'] or 'untitled'}: {facts['dim']}D, dx = {facts['dx']:g} m, "
              f"bodies: {bodies}"]
     if facts["frames"]:
-        energies = ", ".join(f"{name} {value:.6g} J" for name, value in facts["energy"].items())
+        energies = ", ".join(energy_in_words(*one) for one in facts["energy"].items())
         first, last = facts["time"]
         lines.append(f"{counted(facts['frames'], 'frame')}, t = {first:g} to {last:g} s, "
                      f"{counted(facts['steps'], 'step')}; at the end: {energies}")
@@ -140,6 +140,11 @@ def results_lines(facts):
     lines += map(part_line, facts["manifest"].get("parts", []))
     lines.append(f"checkpoint: {facts['checkpoint'] or 'none'}")
     return lines
+
+
+def energy_in_words(name, value):
+    """An energy [J]; one that is NaN, as that of laws without energy, is not known."""
+    return f"{name} unknown" if isnan(value) else f"{name} {value:.6g} J"
 
 
 def part_line(part):

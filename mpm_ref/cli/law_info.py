@@ -10,10 +10,11 @@ from ..nclaw import export, spline, weights
 from ..nclaw.bodies import dim_of
 from ..store.words import counted
 from . import made
-from .law_options import of_errors
+from .law_options import horizons, of_errors
 
 LAYERS = "mpm_ref law"          # what the format of layers begins with
 OF_MARKS = "squared distance of marks in images [px^2]"
+WITH_VELOCITIES = ", with the term of velocities,"
 SPLINES = {kind.__name__ for kind in spline.READINGS}
 
 
@@ -58,7 +59,7 @@ def in_text(path):
 
 def of_layers(path, arrays):
     """The same of a file of `mpm-ref law export`, from its arrays."""
-    require_format(path, arrays, export.FORMAT)
+    require_format(path, arrays, export.FORMAT, "layers of laws")
     needed = {"dim", "check_F", *(f"{part}_kind" for part in weights.PARTS)}
     if missing := sorted(needed - set(arrays)):
         raise ValueError(f"{path} holds no layers of laws: it lacks {', '.join(missing)}; export "
@@ -129,8 +130,11 @@ def training_line(facts):
     epochs = counted(facts["epochs"], "epoch")
     if not facts["errors"]:
         return epochs
-    of = OF_MARKS if "camera" in facts["about"] else of_errors(facts["method"])
-    return f"{epochs}: {of} {made.ends(facts['errors'])}"
+    about, method = facts["about"], facts["method"]
+    filmed, more = "camera" in about, WITH_VELOCITIES if weights.mixed(about) else ""
+    over = () if filmed else horizons(method, about.get("recipe", {}), facts["epochs"])
+    return (f"{epochs}: {OF_MARKS if filmed else of_errors(method)}{more} "
+            f"{made.ends(facts['errors'], over)}")
 
 
 def seen_line(bounds):

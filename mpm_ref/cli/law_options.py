@@ -9,6 +9,7 @@ from .. import scene
 from ..laws.compare import problem_of
 from ..nclaw import weights
 from ..nclaw.bodies import dim_of
+from ..nclaw.learn.teacher import Teacher
 from ..scene import SceneError
 from .shipped import find_scene
 
@@ -35,6 +36,16 @@ def fitting(file, name, steps=None):
 def of_errors(method):
     """What the errors of a training's epochs are of, in words."""
     return OF_ERRORS.get(method, "mean squared error of a step [m^2]")
+
+
+def horizons(method, recipe, epochs):
+    """The longest runs from a restart in the first and the last of some epochs [steps]; none of
+    methods that follow no motion, nor where a recipe, plain values, does not say.
+    """
+    if method in OF_ERRORS or not {"first", "last", "epochs"} <= recipe.keys():
+        return ()
+    teacher = Teacher(recipe["first"], recipe["last"])
+    return tuple(teacher.horizon(k, recipe["epochs"]) for k in (0, epochs - 1))
 
 
 def other_steps(laws, problem):

@@ -1,5 +1,6 @@
 """`mpm-ref law train`: the laws of a study, from a run of its scene."""
 
+from dataclasses import asdict
 from math import ceil, sqrt
 from pathlib import Path
 from time import perf_counter
@@ -17,7 +18,7 @@ from ..store.session import Watch
 from ..store.words import counted
 from . import faults, made
 from .faults import at_start, end, one_line, options, writing
-from .law_options import OF_ERRORS, of_errors
+from .law_options import OF_ERRORS, horizons, of_errors
 from .outputs import HDF5, MAPS, require_ending, require_free
 from .rom_options import Overwrite, StudyName, on_interrupt
 from .shipped import find_study, keep_scene, shipped_scenes
@@ -188,8 +189,8 @@ def epoch_in_words(study, epoch, steps):
 
 def in_short(study, seen, errors):
     """What was learned from what, and the errors of the first and the last epoch."""
-    steps, points = len(seen.x) - 1, seen.x.shape[1]
-    return (f"{study.tables.method}, {counted(len(errors), 'epoch')} on {counted(steps, 'step')} "
-            f"of {counted(points, 'point')}; {of_errors(study.tables.method)} "
-            f"{made.ends(errors)}")
+    steps, points, method = len(seen.x) - 1, seen.x.shape[1], study.tables.method
+    over = horizons(method, asdict(study.tables.train), len(errors))
+    return (f"{method}, {counted(len(errors), 'epoch')} on {counted(steps, 'step')} of "
+            f"{counted(points, 'point')}; {of_errors(method)} {made.ends(errors, over)}")
 

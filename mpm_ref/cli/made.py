@@ -1,9 +1,15 @@
 """What weights say of their making, their `about`, in words."""
 
 
-def ends(errors):
-    """The first and the last of some errors."""
-    return f"{errors[0]:.3g} at first, {errors[-1]:.3g} at last"
+def ends(errors, horizons=()):
+    """The first and the last of some errors, and over how many steps from a restart they are, where
+    that is given: errors of other horizons do not compare.
+    """
+    first, last = f"{errors[0]:.3g} at first", f"{errors[-1]:.3g} at last"
+    if not horizons:
+        return f"{first}, {last}"
+    return (f"{first}, over up to {horizons[0]:.0f} steps from a restart; {last}, over up to "
+            f"{horizons[1]:.0f}")
 
 
 def source(about):

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from ..reduced.nsf import networks
 from ..rom import modes_file
 from ..sealed import MAGIC, opened
 from . import graph_info, law_info, rom_info
@@ -18,13 +19,13 @@ def is_npz(name):
 
 
 def of_npz(name):
-    """(facts, lines) of a map, of laws, of their layers or of a graph network.
+    """(facts, lines) of a map, of stress fields, of laws, of their layers or of a graph network.
 
     Raises ValueError for a file that is damaged or none of these.
     """
     path = Path(name)
     arrays = opened(path)
-    if modes_file.is_one(arrays) or "xhat" in arrays:
+    if modes_file.is_one(arrays) or networks.is_one(arrays) or "xhat" in arrays:
         facts = rom_info.of_map(path)
         return facts, rom_info.map_lines(facts)
     if graph_info.is_one(arrays):

@@ -94,7 +94,7 @@ def run(
         warn(astray(outcome.out_of_bounds, clock.steps + 1, clock.dt))
         if not json:
             print(f"{FINISHED}: {counted(clock.steps, 'step')} of {kind_of(model)}, r = "
-                  f"{model.decoder.r}, {len(made.field.X)} points in {out}")
+                  f"{model.decoder.r}, {made.count} points in {out}")
 
 
 def announce(out, size):
@@ -130,7 +130,7 @@ def ran(made, out, outcome):
            {"why": FINISHED, "status": 0})
     return how | {
         "out": str(out), "step": step, "t": step * clock.dt, "frames": step + (not lost),
-        "points_out": len(made.field.X), "reduced": made.facts,
+        "points_out": made.count, "reduced": made.facts,
         "out_of_bounds": {str(k): sight.why for k, sight in outcome.out_of_bounds.items()}}
 
 

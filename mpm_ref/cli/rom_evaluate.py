@@ -8,6 +8,8 @@ import typer
 
 from ..reduced import dataset
 from ..reduced.evaluate import REDUCED, breakdowns, draw, evaluate, facts, lines, together
+from ..reduced.nsf import evaluate as nsf
+from ..reduced.tables import NSF
 from ..scene import SceneError
 from ..store.atomic import require_place
 from . import faults
@@ -45,15 +47,19 @@ def judge(
                 raise SceneError(f"{study.path}: test = 0: no run is held out to compare with")
             _, model = map_of(name, study, map)
             snapshots = dataset.load(study, named(data, study, "-data"), study.test)
-            runs = passing(unit="run", iterable=evaluate(study, model, snapshots),
+            inferred = study.tables.model == NSF
+            compare = nsf.evaluate if inferred else evaluate
+            runs = passing(unit="run", iterable=compare(study, model, snapshots),
                            total=len(study.test))
             found = list(runs)
         all_runs = together(found, snapshots.X)
         draw(found, study.names, snapshots.dt, picture)
         if json:
+            stress = {"stress": nsf.stress_facts(found)} if inferred else {}
             print(as_json({"study": str(study.path), "picture": str(picture),
-                           **facts(study, found, all_runs)}))
+                           **facts(study, found, all_runs), **stress}))
         else:
-            print("\n".join([*lines(study, found, all_runs), str(picture)]))
+            stress = nsf.stress_lines(found) if inferred else ()
+            print("\n".join([*lines(study, found, all_runs), *stress, str(picture)]))
         warn(breakdowns(study, found))
     raise typer.Exit(0 if isfinite(all_runs[REDUCED].origin) else faults.UNSTABLE)

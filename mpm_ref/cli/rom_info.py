@@ -3,13 +3,15 @@
 import msgspec
 
 from ..reduced import maps
-from ..reduced.case import case
+from ..reduced.model import known_of
+from ..reduced.nsf.networks import Networks
 from ..reduced.study_file import checked, plain
-from ..reduced.tables import CURVED, KEYS, MODES, NETWORK
+from ..reduced.tables import CURVED, MODES, NETWORK
 from ..rom.curved import Curved
 from ..rom.decoder import Decoder
 from ..scene import SceneError
 from ..store.words import counted
+from . import rom_nsf_info as nsf
 from .faults import one_line
 from .look import Machine, listed
 from .rom_options import studied
@@ -41,30 +43,32 @@ def of_study(name):
     for a scene that reduced runs do not know.
     """
     study = studied(name)
-    tables, one = study.tables, case(study.scene(study.mu[0]))
-    known = ("kind", "r", *KEYS[tables.map.kind])
+    tables, one = study.tables, known_of(study, study.mu[0])
     return {
         "study": str(study.path), "title": tables.title, "scene": tables.scene,
         "dim": study.base.dim, "points": len(one.X), "dx": study.base.dx, "dt": study.base.dt,
         "steps": study.base.steps, "runs": len(study.mu), "held_out": study.test,
         "parameters": ranges(study.names, study.mu),
         "keys": {one.name: one.key for one in tables.parameter},
-        "map": {key: value for key, value in msgspec.to_builtins(tables.map).items()
-                if key in known},
+        "map": tables.map.settings,
         "run": msgspec.to_builtins(tables.run), "study_sha256": study.digest,
+        **nsf.of_study(study),
     }
 
 
 def study_lines(facts):
     """Facts of a study in words."""
     map, run = facts["map"], facts["run"]
+    inferred = "model" in facts
     return [
         f"{facts['study']}: a study, {facts['title'] or 'untitled'}: "
         f"{counted(facts['runs'], 'run')} of the scene {facts['scene']}, "
         f"{len(facts['held_out'])} held out",
         f"{facts['dim']}D, {facts['points']} points, dx = {facts['dx']:g} m, "
-        f"{counted(facts['steps'], 'step')} of {facts['dt']:.6g} s",
+        f"{counted(facts['steps'], 'step')} of {facts['dt']:.6g} s"
+        f"{nsf.kept(facts) if inferred else ''}",
         f"parameters: {in_ranges(facts['parameters'], facts['keys'])}",
+        nsf.learned(facts) if inferred else
         f"map: {map['kind']}, r = {map['r']}; reduced runs: {run['quadrature']} quadrature, "
         f"{run['projection']} projection, {run['points'] or 'all'} points",
     ]
@@ -83,6 +87,7 @@ def of_map(path):
         "points": fit.get("points", points_of(map)), "runs": runs, "steps": levels - 1,
         "parameters": ranges(names, about["mu"]) if names else None,
         "errors": fit.get("errors"), "last_loss": loss[-1] if loss else None, "about": about,
+        **nsf.of_fields(about, levels),
     }
 
 
@@ -90,9 +95,14 @@ def map_lines(facts):
     """Facts of a map in words."""
     points = f", {counted(facts['points'], 'point')}" if facts["points"] else ""
     varied = f", {in_ranges(facts['parameters'])}" if facts["parameters"] else ""
-    runs = f"{counted(facts['runs'], 'run')} of {counted(facts['steps'], 'step')}"
-    lines = [f"{facts['map']}: a map, {facts['kind']}, r = {facts['r']}, {facts['dim']}D{points}"
+    inferred = "model" in facts
+    what = "stress fields" if inferred else "a map"
+    each = counted(facts["states"], "state") if inferred else counted(facts["steps"], "step")
+    runs = f"{counted(facts['runs'], 'run')} of {each}"
+    lines = [f"{facts['map']}: {what}, {facts['kind']}, r = {facts['r']}, {facts['dim']}D{points}"
              f"{source(facts['about'])}", f"made of {runs}{varied}"]
+    if inferred:
+        lines += nsf.making(facts["about"])
     if facts["errors"]:
         off = ", ".join(f"{100.0 * facts['errors'][name]:.3g} % {words}"
                         for name, words in MEASURES.items() if name in facts["errors"])
@@ -119,14 +129,14 @@ def in_ranges(parameters, keys=None):
 
 def kind_of(map):
     """The kind of a map as study files name it."""
-    if isinstance(map, Decoder):
+    if isinstance(map, Decoder | Networks):
         return NETWORK
     return CURVED if isinstance(map, Curved) else MODES
 
 
 def points_of(map):
     """How many points modes have; None of a network, which knows none."""
-    if isinstance(map, Decoder):
+    if isinstance(map, Decoder | Networks):
         return None
     return len((map.modes if isinstance(map, Curved) else map).X)
 

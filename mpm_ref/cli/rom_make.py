@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from ..reduced import dataset, maps
-from ..reduced.case import case
 from ..reduced.generate import (
     INTERRUPTED,
     NOT_WRITTEN,
@@ -19,7 +18,7 @@ from ..reduced.generate import (
     one_thread,
     said,
 )
-from ..reduced.model import kind_of, with_kind
+from ..reduced.model import kind_of, known_of, with_kind
 from ..reduced.tables import KEYS, NETWORK
 from ..store.atomic import NotWritten, not_written, require_place
 from ..store.words import counted
@@ -52,7 +51,7 @@ def make_data(
         folder, ended = named(out, study, "-data"), []
         with options():
             require_folder_name(folder)
-            case(study.scene(study.mu[0]))      # refuses what reduced runs do not know
+            known_of(study, study.mu[0])        # refuses what reduced runs do not know
         make_folder(folder)
         workers = workers or os.cpu_count() or 1
         with (on_interrupt(lambda: f"after {len(ended)} of {counted(len(study.mu), 'run')}; the "
@@ -121,7 +120,7 @@ def train(
             with writing(), on_interrupt(lambda: resuming(checkpoint)):
                 model = fitted(study, snapshots, about, checkpoint, threads)
             write(out, model)
-        checkpoint.unlink(missing_ok=True)
+        maps.forget(checkpoint)
         print(f"{out}: {kind_of(model)}, r = {model.decoder.r}, of "
               f"{counted(len(study.train), 'run')} and {len(snapshots.X)} points")
 
@@ -138,7 +137,7 @@ def fitted(study, snapshots, about, checkpoint, threads):
     if study.tables.map.kind != NETWORK:
         with one_thread():
             return maps.computed(study, snapshots, about)
-    with passing(total=study.tables.map.epochs, unit="epoch", desc=study.path.stem) as bar:
+    with passing(total=study.tables.map.total, unit="epoch", desc=study.path.stem) as bar:
         def show(history):
             bar.update(len(history) - bar.n)
             bar.set_postfix_str(f"loss {history[-1][0]:.2e}")

@@ -1,23 +1,17 @@
 """Laws of a study, trained on a run of its scene, and what is to be known of them."""
 
 from dataclasses import asdict
-from importlib import import_module
 
 from .. import scene
+from ..learning import part
 from ..nclaw.seen import seen
 from ..store.manifest import source_hash, versions
 
 
 def drive():
     """The part of the package that trains laws. Raises ValueError without PyTorch."""
-    try:
-        return import_module("mpm_ref.nclaw.learn.drive")
-    except ModuleNotFoundError as fault:
-        if fault.name != "torch":
-            raise
-        raise ValueError('laws are trained with PyTorch, which is not installed: pip install '
-                         '"mpm_ref[learn]", or `make learn` in the repository; laws that were '
-                         'trained run, export and plot without it') from None
+    return part("nclaw.learn.drive", "laws are trained",
+                "laws that were trained run, export and plot without it")
 
 
 def trained(study, observed, checkpoint=None, on_epoch=None, **about):
@@ -33,8 +27,8 @@ def trained(study, observed, checkpoint=None, on_epoch=None, **about):
     done = how.taught(study.tables.method, recipe, laws, (problem, observed), checkpoint, on_epoch)
     took = {f"{clock}_seconds": round(s, 1) for clock, s in done.meter.total._asdict().items()}
     return how.stored(laws, {
-        **about, **identity(study), **took, "seen": seen(observed.F), "torch": how.version(),
-        "errors": [epoch.error for epoch in done.history]})
+        **about, **identity(study), **took, **done.known, "seen": seen(observed.F),
+        "torch": how.version()})
 
 
 def identity(study):

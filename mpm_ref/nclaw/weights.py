@@ -77,6 +77,13 @@ def load(path):
     return Laws(*(trained_of(part, arrays) for part in PARTS), about)
 
 
+def mixed(about):
+    """Whether the errors of epochs in an `about` have the loss's term of velocities in them: such
+    files are older than `errors_of`, which says what errors are of.
+    """
+    return bool(about.get("recipe", {}).get("velocity")) and "errors_of" not in about
+
+
 def arrays_of(part, law):
     """The arrays of a law by name."""
     found = {f"{part}_kind": np.array(type(law.kind).__name__),

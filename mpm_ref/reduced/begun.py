@@ -12,7 +12,9 @@ from ..store.results import Results
 from ..store.running import Refused
 from ..store.session import INTERRUPTED
 from ..store.words import counted
+from .nsf.recording import states as positions
 from .record import UNENDED, marked
+from .tables import NSF
 
 COMPUTE = ("numpy", "scipy", "numba", "llvmlite")       # libraries that shape the bits
 
@@ -20,7 +22,8 @@ COMPUTE = ("numpy", "scipy", "numba", "llvmlite")       # libraries that shape t
 class Begun(NamedTuple):
     """What a file has of a run."""
 
-    known: tuple            # (`Latent`, `Report` or None) of its frames but the run's last
+    known: tuple            # (`Latent`, `Report` or None) of its frames but the run's last; of
+                            # NSF's model (`Position`, `Report` or None)
     same_code: bool         # whether all of it was made by this code
 
 
@@ -43,7 +46,8 @@ def begun(recording, out, overwrite):
             raise Refused(f"{out} holds another reduced run, cut off after "
                           f"{counted(len(results), 'frame')}: give its study, map and options to "
                           "go on with it, --overwrite to replace it, or name another file")
-        known = states(results)[:recording.problem.clock.steps]
+        read = positions if recording.facts.get("model") == NSF else states
+        known = read(results)[:recording.problem.clock.steps]
         return Begun(known, same_code(results.manifest))
 
 

@@ -5,6 +5,8 @@ import numpy as np
 from ..rom.snapshots import Snapshots
 from ..store.results import Results
 from .generate import file_of, finished
+from .nsf.dataset import histories
+from .tables import NSF
 
 
 class Missing(ValueError):
@@ -12,14 +14,16 @@ class Missing(ValueError):
 
 
 def load(study, folder, numbers):
-    """`Snapshots` of the runs of these numbers. Raises `Missing`, and `BadResults` for files that
-    are damaged, no results, or of another scene.
+    """`Snapshots` of the runs of these numbers, or for NSF's model `Histories`. Raises `Missing`,
+    and `BadResults` for files that are damaged, no results, or of another scene.
     """
     lacking = [k for k in numbers if not finished(file_of(folder, k), study.scene(study.mu[k]))]
     if lacking:
         raise Missing(f"{folder} lacks {len(lacking)} of {len(numbers)} runs, the first is "
                       f"{file_of(folder, lacking[0]).name}: mpm-ref rom generate "
                       f"{study.path} --out {folder}")
+    if study.tables.model == NSF:
+        return histories(study, folder, numbers)
     body = study.base.body[0].name
     found = [_read(file_of(folder, k), body) for k in numbers]
     with Results(file_of(folder, numbers[0])) as results:

@@ -25,7 +25,8 @@ class Course(NamedTuple):
 
     sums: np.ndarray        # what `Squares` adds up
     errors: Errors          # over all time levels; infinite where the run did not reach its end
-    levels: np.ndarray      # error of each time level, of the distance from the scene's origin
+    levels: np.ndarray      # error of each time level, of the distance from the scene's origin; NaN
+                            # of those between longer steps
     said: str = ""          # the sentence with which it broke down
 
 
@@ -35,6 +36,8 @@ class Held(NamedTuple):
     number: int
     mu: np.ndarray          # its parameters
     courses: dict           # {REDUCED, NEAREST: `Course`}
+    stress: dict | None = None      # {REDUCED, NEAREST: (2,) sums of squares of the stress off, and
+                                    # of the stress}, where it has a field of its own
 
     @property
     def broken(self):
@@ -142,7 +145,8 @@ def draw(found, names, dt, out):
                           zip(names, one.mu, strict=True))
         for name, style in ((REDUCED, "-"), (NEAREST, ":")):
             levels = one.courses[name].levels
-            axes.plot(dt * np.arange(len(levels)), 100.0 * levels, style, color=f"C{k % 10}",
+            known = np.flatnonzero(np.isfinite(levels))
+            axes.plot(dt * known, 100.0 * levels[known], style, color=f"C{k % 10}",
                       label=words if name == REDUCED else None)
     axes.set(xlabel="t [s]", ylabel="position error [%]", title="reduced runs; dotted: the map's "
              "nearest states")

@@ -27,8 +27,10 @@ from ..store.results import Results
 from ..store.running import Options, run
 from ..store.session import FINISHED, Watch, checkpoint_of
 from ..timestep import TooLarge
+from .tables import LDM, NSF
 
 FIELDS = ("x", "F", "v")
+STORED = {LDM: FIELDS, NSF: ("x", "C", "tau")}      # of particles, in all frames
 SKIPPED, INTERRUPTED = "skipped", "interrupted"
 UNSTABLE, NOT_WRITTEN, REFUSED = "unstable", "not written", "refused"
 
@@ -149,7 +151,7 @@ def made(study, folder, k):
         if finished(path, scene):
             return Done(k, SKIPPED)
         continued = checkpoint_of(path).exists()
-        outcome = run(build(scene), path, Options(fields=Fields(FIELDS), resume=True), EAR)
+        outcome = run(build(scene), path, options(study, k), EAR)
     except (Unstable, OutOfRange, TooLarge) as fault:
         return Done(k, UNSTABLE, f"run {k} ({said(study, study.mu[k])}): {fault}")
     except NotWritten as fault:
@@ -158,6 +160,14 @@ def made(study, folder, k):
         return Done(k, REFUSED, str(fault))
     why = FINISHED if outcome.why == FINISHED else INTERRUPTED
     return Done(k, why, continued=continued)
+
+
+def options(study, k):
+    """How run number k is recorded."""
+    model, facts = study.tables.model, {}
+    if model == NSF:
+        facts = {"parameters": dict(zip(study.names, study.mu[k].tolist(), strict=True))}
+    return Options(fields=Fields(STORED[model]), resume=True, facts=facts)
 
 
 def finished(path, scene):

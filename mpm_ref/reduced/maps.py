@@ -1,24 +1,27 @@
 """Maps of a study: made of its data, and read from their files."""
 
 import hashlib
-from importlib import import_module
+from functools import partial
 from math import isfinite
 from pathlib import Path
 
-import msgspec
 import numpy as np
 
-from ..rom import modes_file, weights
+from ..learning import part
+from ..rom import modes_file, spanned_file, weights
 from ..rom.curved import curved
 from ..rom.decoder import Decoder
 from ..rom.latent import initial
 from ..rom.modes import basis
+from ..rom.spanned import Spanned
 from ..rom.weights import Model
 from ..sealed import opened
 from ..shapes.inside import solid
 from ..store.manifest import source_hash, versions
 from .errors import misfit
-from .tables import CURVED, KEYS, MODES, NETWORK, require_nonlinear
+from .nsf import fields as nsf
+from .nsf import networks
+from .tables import CURVED, KEYS, LDM, MODES, NETWORK, NSF, require_nonlinear
 
 KEPT = 50           # epochs of which the loss is kept in the file
 SIDE, STEP = 0.4, 1.0 / 144.0       # the loss's weights "code" were made for a body whose largest
@@ -26,10 +29,15 @@ SIDE, STEP = 0.4, 1.0 / 144.0       # the loss's weights "code" were made for a 
 
 
 def computed(study, snapshots, about):
-    """`Model` of POD modes of `Snapshots`, straight or bent; about: what else is to be known of it,
-    plain values. Raises ValueError for more modes, or more monomials, than the data tell.
+    """`Model` of POD modes of `Snapshots`, straight or bent, or of NSF's fields of `Histories`;
+    about: what else is to be known of it, plain values. Raises ValueError for more modes, or more
+    monomials, than the data tell.
     """
     how = study.tables.map
+    if study.tables.model == NSF:
+        fields, xhat = nsf.made(study, snapshots)
+        model = Model(fields, xhat, xhat[:, 0].mean(axis=0), about | identity(study))
+        return measured(model, snapshots, nsf.misfit)
     bent = how.kind == CURVED
     known = basis(snapshots.X, *snapshots.flat(), how.modes if bent else how.r)
     map = curved(known, how.r, how.degree) if bent else known.modes
@@ -38,10 +46,12 @@ def computed(study, snapshots, about):
 
 
 def learned(study, snapshots, about, checkpoint, on_epoch, threads):
-    """`Model` of a network trained on `Snapshots`; checkpoint and on_epoch as for
-    `rom.learn.fit.train`. Raises ValueError without PyTorch, and for a checkpoint of another
-    training.
+    """`Model` of a network trained on `Snapshots`, or of NSF's on `Histories`; checkpoint and
+    on_epoch as for `rom.learn.fit.train`, the one a folder for NSF. Raises ValueError without
+    PyTorch, and for a checkpoint of another training.
     """
+    if study.tables.model == NSF:
+        return inferred(study, snapshots, about, checkpoint, on_epoch, threads)
     settings = {name: getattr(study.tables.map, name) for name in ("r", *KEYS[NETWORK])}
     drive = training()
     settings["weights"] = drive.weights(settings["weights"], *larger(study.base))
@@ -50,7 +60,23 @@ def learned(study, snapshots, about, checkpoint, on_epoch, threads):
         "threads": threads, "torch": drive.version()}), snapshots)
 
 
-def measured(model, snapshots):
+def inferred(study, histories, about, folder, on_epoch, threads):
+    """`Model` of NSF's three networks trained on `Histories`, as `learned` has it."""
+    how = about | identity(study) | {"threads": threads, "torch": training().version()}
+    fitted = partial(training("rom.learn.drive_fields").fitted, threads=threads)
+    model = networks.trained(fitted, study.tables.map, histories, folder, on_epoch)
+    return measured(model._replace(about=how | model.about), histories, nsf.misfit)
+
+
+def forget(checkpoint):
+    """Remove the checkpoint of a training that is done: a file, or the folder of NSF's."""
+    if checkpoint.is_dir():
+        networks.forget(checkpoint)
+    else:
+        checkpoint.unlink(missing_ok=True)
+
+
+def measured(model, snapshots, misfit=misfit):
     """A `Model` that also says of its fit how many points the `Snapshots` have, and how far it is
     off them at its own latent coordinates.
     """
@@ -78,34 +104,31 @@ def larger(scene):
     return float((body.high - body.low).max()) / SIDE, scene.dt / STEP
 
 
-def training():
-    """The part of the package that trains networks. Raises ValueError without PyTorch."""
-    try:
-        return import_module("mpm_ref.rom.learn.drive")
-    except ModuleNotFoundError as fault:
-        if fault.name != "torch":
-            raise
-        raise ValueError('a network is trained with PyTorch, which is not installed: pip install '
-                         '"mpm_ref[learn]", or `make learn` in the repository; or make modes, '
-                         f'which need none: --kind {MODES}') from None
+def training(name="rom.learn.drive"):
+    """A part of the package that trains networks. Raises ValueError without PyTorch."""
+    return part(name, "a network is trained",
+                f"or make modes, which need none: --kind {MODES}")
 
 
 def identity(study):
     """What a map is of and how it was made: plain values."""
-    map = study.tables.map
     return {"study": study.digest, "name": study.path.stem, "title": study.tables.title,
-            "scene": study.tables.scene,
-            "map": {name: value for name, value in msgspec.to_builtins(map).items()
-                    if name in ("kind", "r", *KEYS[map.kind])},
+            "scene": study.tables.scene, "map": study.tables.map.settings,
             "parameters": list(study.names),
             "mu": study.mu[list(study.train)].tolist(), "source_sha256": source_hash(),
-            "versions": versions()}
+            "versions": versions(), **model_of(study)}
+
+
+def model_of(study):
+    """{"model": name} of a study of another model than LDM's, whose files do not say."""
+    model = study.tables.model
+    return {} if model == LDM else {"model": model}
 
 
 def save(path, model):
     """Write a `Model`, whole or not at all. Raises OSError where the system refuses."""
-    file = weights if isinstance(model.decoder, Decoder) else modes_file
-    file.save(path, model)
+    files = {Decoder: weights, Spanned: spanned_file, networks.Networks: networks}
+    files.get(type(model.decoder), modes_file).save(path, model)
 
 
 def read(path):
@@ -113,7 +136,8 @@ def read(path):
     no map.
     """
     arrays = opened(Path(path))
-    return (modes_file if modes_file.is_one(arrays) else weights).load(path)
+    known = (file for file in (modes_file, spanned_file, networks) if file.is_one(arrays))
+    return next(known, weights).load(path)
 
 
 def load(path, study):
@@ -124,7 +148,8 @@ def load(path, study):
     if model.about.get("study") != study.digest:
         raise ValueError(f"{path} is a map of another study, or of {study.path} before its scenes "
                          "or held-out runs changed; train again, or name the study it is of")
-    require_nonlinear(model.about["map"]["kind"], study.tables.run.projection)
+    if study.tables.model == LDM:
+        require_nonlinear(model.about["map"]["kind"], study.tables.run.projection)
     return model
 
 

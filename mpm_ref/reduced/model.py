@@ -3,13 +3,15 @@
 import msgspec
 
 from ..scene import build
-from ..store import Fields
 from .case import case
 from .field import field, resampled
+from .maps import model_of
 from .march import drawing, precise
+from .nsf import recording as nsf
 from .record import Recording
-from .tables import CURVED
+from .tables import CURVED, NSF
 from .watch import watch
+from .whole import whole
 
 
 def with_kind(study, kind):
@@ -28,7 +30,7 @@ def with_kind(study, kind):
 
 def needed(study, kind):
     """What a study lacks for a map of a kind, if that is known, in words."""
-    if kind != CURVED:
+    if kind != CURVED or study.tables.model == NSF:
         return ""
     return (f'; a curved map needs a study that says so, {study.path} or a copy: in [map] kind = '
             f'"{CURVED}" and `modes` larger than `r`, in [run] projection = "nonlinear" '
@@ -48,27 +50,41 @@ def require_way(one, model, run):
     drawing(one, model.decoder, run.way)
 
 
+def known_of(study, mu):
+    """What the study's reduced model knows of the run with parameters mu: a `Case`, or a `Whole`.
+    Raises ValueError for a scene that reduced runs do not know.
+    """
+    return (whole if study.tables.model == NSF else case)(study.scene(mu))
+
+
 def to_write(study, mu, count=None):
     """Bytes that the points of a reduced run with parameters mu take in its file, so many of them;
     None: those of the study. Raises ValueError for a scene that reduced runs do not know.
     """
-    one = case(study.scene(mu))
-    point = sum(a[0].nbytes for a in Fields().of(one.problem.bodies[0]).values())
-    return (one.problem.clock.steps + 1) * (count or len(one.X)) * point
+    one, stored = known_of(study, mu), Recording.stored
+    steps = one.problem.clock.steps
+    if study.tables.model == NSF:
+        steps, stored = round(steps / study.tables.run.faster), nsf.Recording.stored
+    point = sum(a[0].nbytes for a in stored.of(one.problem.bodies[0]).values())
+    return (steps + 1) * (count or len(one.X)) * point
 
 
 def recording(study, model, mu, count=None):
     """`Recording` of a reduced run with parameters mu, shown at so many points of the body's shape;
     None: at those of the study. Raises ValueError for samples that do not suffice, a precision that
-    the map has not, and a scene that reduced runs do not know.
+    the map has not, points that it does not know, and a scene that reduced runs do not know.
     """
-    scene, run = study.scene(mu), study.tables.run
-    one = case(scene)
-    require_way(one, model, run)
-    shown = one.problem if count is None else build(resampled(scene, count))
+    one, run = known_of(study, mu), study.tables.run
     facts = {"study": study.digest, "name": study.path.stem, "map": model.about["map"],
              "points": len(one.X),
              "parameters": dict(zip(study.names, map(float, mu), strict=True)),
-             "run": msgspec.to_builtins(run)}
+             "run": msgspec.to_builtins(run), **model_of(study)}
+    if study.tables.model == NSF:
+        if count is not None:
+            raise ValueError(f"--points-out {count}: reduced runs with inferred stress are shown "
+                             f"at their own {len(one.X)} points; leave it out")
+        return nsf.recording(one, model, mu, run, facts)
+    require_way(one, model, run)
+    shown = one.problem if count is None else build(resampled(study.scene(mu), count))
     return Recording(one, model, run, watch(one, model.decoder, model.xhat),
                      field(model.decoder, shown.bodies[0]), shown, facts)

@@ -1,5 +1,16 @@
 """A reduced run into a results file, as full-order runs have them (see `store`), and beside the
 particles what is known of each state: the group `reduced`, a row for each frame.
+
+What is recorded is any object with
+
+    problem, facts, run             of the points shown; what is to be known of the run; its options
+    r, count                        numbers of latent coordinates, and of points shown
+    series, stored                  series of the group; `Fields` of particles
+    states(known)                   (latent, report, sight) of all states, as a run yields them
+    bodies(latent)                  the bodies in a state
+    row(step)                       {name of a series: value} of a `Step`
+
+of which `Recording` is one, and that of `nsf.recording` another.
 """
 
 import json
@@ -46,6 +57,38 @@ class Recording:
     problem: object         # of these points: its source, clock and limits
     facts: dict             # what else is to be known of it, plain values
 
+    series = VECTORS, COUNTS, NUMBERS
+    stored = Fields()
+
+    @property
+    def r(self):
+        """Number of latent coordinates."""
+        return self.model.decoder.r
+
+    @property
+    def count(self):
+        """Number of points shown."""
+        return len(self.field.X)
+
+    def states(self, known):
+        """Yield (`Latent`, `Report` or None, `Sight`) of each state, those known too."""
+        if not known:
+            return watched(self.watch, self.case, self.run.way, self.model.rest, self.run.seed)
+        pick = picked(self.case, self.watch.map, self.run.way, known[0][0].xhat, self.run.seed)
+        return watched_on(known, self.watch, self.case, self.run.way, pick)
+
+    def bodies(self, latent):
+        """The body in a state."""
+        return (self.field.at(latent, self.problem.clock.dt, self.run.velocity),)
+
+    def row(self, step):
+        """Of a `Step`; at the start nothing is reported."""
+        known = {**step.latent._asdict(), **step.sight._asdict(), "lost": 0}
+        if step.report is not None:
+            lost = step.report.quadrature.get("lost", 0)
+            known |= {**step.report._asdict(), "lost": lost}
+        return known
+
 
 class Outcome(NamedTuple):
     """How a reduced run ended."""
@@ -75,7 +118,7 @@ def record(recording, out, known=(), on_step=None):
         with _part(writer, max(len(known) - 1, 0)) as part:
             for k, step in enumerate(steps(recording, known)):
                 if step.state is not None:
-                    _append(writer.h5["reduced"], step)
+                    _append(writer.h5["reduced"], recording.row(step))
                     _show(writer, step.state, recording.problem)
                     part.state = step.state
                 if step.sight.why:
@@ -102,8 +145,8 @@ def _writer(recording, out, frames):
         _cut(writer, frames)
         return writer
     facts = manifest(recording.problem, recording.run.seed) | {"reduced": recording.facts}
-    writer = create(out, marked(recording), Fields(), facts, checkpoint_of(out))
-    _lay_out(writer.h5, recording.model.decoder.r)
+    writer = create(out, marked(recording), recording.stored, facts, checkpoint_of(out))
+    _lay_out(writer.h5, recording.series, recording.r)
     return writer
 
 
@@ -111,14 +154,14 @@ def steps(recording, known=()):
     """Yield each `Step` of a run, the start first, also of its states that are known; raises
     `Lost`. Inverted points are for `watch` to judge: among very many, a few may be.
     """
-    problem, run, k = recording.problem, recording.run, 0
+    problem, k = recording.problem, 0
     bounds = replace(problem, limits=replace(problem.limits, J=(-inf, inf)))
     try:
-        for latent, report, sight in _states(recording, known):
+        for latent, report, sight in recording.states(known):
             state = None
             if k >= len(known):
-                body = recording.field.at(latent, problem.clock.dt, run.velocity)
-                state = State((body,), step=k, t=k * problem.clock.dt, frame=k + 1)
+                bodies = recording.bodies(latent)
+                state = State(bodies, step=k, t=k * problem.clock.dt, frame=k + 1)
                 check(bounds, state, problem.clock.dt if k else 0.0)
             yield Step(state, latent, report, sight)
             k += 1
@@ -130,19 +173,11 @@ def steps(recording, known=()):
                    "the map good (mpm-ref rom evaluate)?", k) from fault
 
 
-def _states(recording, known):
-    """What `watched` yields of a run, some of whose states may be known."""
-    seen_by, case, run = recording.watch, recording.case, recording.run
-    if not known:
-        return watched(seen_by, case, run.way, recording.model.rest, run.seed)
-    pick = picked(case, seen_by.map, run.way, known[0][0].xhat, run.seed)
-    return watched_on(known, seen_by, case, run.way, pick)
-
-
 def _show(writer, state, problem):
     """Append a state as a frame."""
     dt = problem.clock.dt if state.step else 0.0
-    writer.append(Frame(state.step, state.t, dt, state), energy(state.bodies, problem.gravity))
+    now = energy(state.bodies, problem.gravity, problem.inertia)
+    writer.append(Frame(state.step, state.t, dt, state), now)
 
 
 class _Part(Part):
@@ -188,15 +223,14 @@ def _entry(part, why):
     return part.ended(why, part.state, checkpoint.digest(part.state))
 
 
-def _lay_out(h5, r):
-    """The empty series of the group `reduced`."""
+def _lay_out(h5, series, r):
+    """The empty series of the group `reduced`: {name: unit} of vectors (r,), counts, numbers."""
     group = h5.create_group("reduced")
-    kinds = ((VECTORS, (r,), "f8"), (COUNTS, (), "i8"), (NUMBERS, (), "f8"))
-    for names, shape, kind in kinds:
+    for names, shape, kind in zip(series, ((r,), (), ()), ("f8", "i8", "f8"), strict=True):
         for name, unit in names.items():
-            series = group.create_dataset(name, (0, *shape), kind, maxshape=(None, *shape),
-                                          chunks=(64, *shape), fletcher32=True)
-            series.attrs["unit"] = unit
+            data = group.create_dataset(name, (0, *shape), kind, maxshape=(None, *shape),
+                                        chunks=(64, *shape), fletcher32=True)
+            data.attrs["unit"] = unit
 
 
 def _cut(writer, frames):
@@ -206,15 +240,10 @@ def _cut(writer, frames):
     writer.truncate(frames)
 
 
-def _append(series, step):
-    """A row of each series; zeros for what a step reports before the first. They stand with the
-    frame's commit.
+def _append(series, row):
+    """A value of each series; zeros for what is not known before the first step. They stand with
+    the frame's commit.
     """
-    rows = {**step.latent._asdict(), **step.sight._asdict()}
-    if step.report is not None:
-        rows |= {**step.report._asdict(), "lost": step.report.quadrature.get("lost", 0)}
-    else:
-        rows["lost"] = 0
     for name, dataset in series.items():
         dataset.resize(len(dataset) + 1, axis=0)
-        dataset[-1] = rows.get(name, 0)
+        dataset[-1] = row.get(name, 0)

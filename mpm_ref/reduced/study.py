@@ -15,11 +15,13 @@ import numpy as np
 from .. import scene
 from ..scene import SceneError
 from ..scene.error import at, opened_by
+from .nsf.levels import every
 from .study_file import checked, plain
-from .tables import LATIN, Tables
+from .tables import LATIN, LDM, NSF, Runs
 from .vary import flat, varied
 
-SAME = ("dim", "dx", "dt", "steps", "seed", "scheme", "integrator")     # in all runs of a study
+SAME = ("dim", "dx", "dt", "steps", "every", "seed", "scheme", "integrator")    # in all runs
+FREE = {LDM: ("material",), NSF: ("material", "velocity")}      # of a body, from run to run
 
 
 class Study(NamedTuple):
@@ -27,7 +29,7 @@ class Study(NamedTuple):
 
     path: Path
     base: object            # the `Scene` with what is set in all runs
-    tables: Tables
+    tables: Runs            # `Tables` of its model
     mu: np.ndarray          # (runs, parameters)
     test: tuple             # numbers of the runs that are held out
 
@@ -85,8 +87,8 @@ def load(path, shipped=None):
     with opened_by(str(path)):
         tables = checked(data)
         mu = parameters(tables)
-        study = Study(path, base_of(tables, path.parent, shipped or {}), tables, mu,
-                      held_out(len(mu), tables.test, tables.seed))
+        base = base_of(tables, path.parent, shipped or {}, SHOWN[tables.model])
+        study = Study(path, base, tables, mu, held_out(len(mu), tables.test, tables.seed))
         _require_one_body(study)
         return study
 
@@ -138,9 +140,18 @@ def held_out(runs, count, seed):
     return tuple(sorted(np.random.default_rng(seed).permutation(runs)[:count].tolist()))
 
 
-def base_of(tables, folder, shipped):
-    """The scene of a study's `Tables` with what is `set` in all runs, every step of which is shown;
-    shipped {name: path} are scenes that may be named. Raises SceneError.
+def each(base, changes):
+    """Steps from one frame to the next, where every one is shown."""
+    return 1
+
+
+SHOWN = {LDM: each, NSF: every}
+
+
+def base_of(tables, folder, shipped, spacing=each):
+    """The scene of a study's `Tables` with what is `set` in all runs; shipped {name: path} are
+    scenes that may be named, spacing a function of the scene and changes as `each` is. Raises
+    SceneError.
     """
     path = folder / tables.scene
     if not path.is_file():
@@ -150,7 +161,8 @@ def base_of(tables, folder, shipped):
                          f"that name; shipped scenes: {', '.join(shipped) or 'none'}")
     base = scene.load(path)
     with opened_by("set"):
-        base = varied(base, flat(tables.set) | {"every": 1, "interval": None})
+        changes = flat(tables.set)
+        base = varied(base, changes | {"every": spacing(base, changes), "interval": None})
     if base.dt is None or base.steps is None:
         raise SceneError(f"scene = {tables.scene!r}: expected one with `dt` and `steps`, so that "
                          "all runs have the same time levels")
@@ -162,7 +174,7 @@ def _require_one_body(study):
     first = None
     for mu in study.mu:
         with opened_by("parameter"):
-            found = _kept(study.scene(mu))
+            found = _kept(study.scene(mu), FREE[study.tables.model])
         first = first or found
         for name, value in found.items():
             if value != first[name]:
@@ -171,8 +183,8 @@ def _require_one_body(study):
                                  "a motion")
 
 
-def _kept(one):
-    """What must be the same in all runs, by name."""
+def _kept(one, free):
+    """What must be the same in all runs, by name; not what is free of a body."""
     bodies = {f"body[{k}].{name}": getattr(body, name) for k, body in enumerate(one.body)
-              for name in body.__struct_fields__ if name != "material"}
+              for name in body.__struct_fields__ if name not in free}
     return {name: getattr(one, name) for name in SAME} | bodies

@@ -9,7 +9,11 @@ from ..scene import SceneError
 from ..scene.check import check_finite
 from ..scene.error import joined
 from ..scene.words import rephrase
-from .tables import KEYS, Map, Parameter, Run, Tables
+from . import tables as ldm
+from .nsf import tables as nsf
+from .tables import LDM, NSF, Parameter
+
+MODELS = {LDM: (ldm.Tables, ldm.Map, ldm.Run), NSF: (nsf.Tables, nsf.Fields, nsf.Run)}
 
 
 def plain(path):
@@ -23,21 +27,25 @@ def plain(path):
 
 
 def checked(data):
-    """`Tables` of plain tables. Raises SceneError, which names the key."""
+    """`Tables` of plain tables, those of its model. Raises SceneError, which names the key."""
     check_finite(data)
-    require_keys(data, Tables.__struct_encode_fields__)
-    for name, record in (("map", Map), ("run", Run)):
+    model = data.get("model", LDM)
+    if not isinstance(model, str) or model not in MODELS:
+        raise SceneError(f"model = {model!r}: expected one of {', '.join(map(repr, MODELS))}")
+    whole, *parts = MODELS[model]
+    require_keys(data, whole.__struct_encode_fields__)
+    for name, record in zip(("map", "run"), parts, strict=True):
         require_keys(data.get(name), record.__struct_encode_fields__, name)
-    parts = data.get("parameter")
-    for k, part in enumerate(parts if isinstance(parts, list) else ()):
+    varied = data.get("parameter")
+    for k, part in enumerate(varied if isinstance(varied, list) else ()):
         require_keys(part, Parameter.__struct_encode_fields__, f"parameter[{k}]")
     try:
-        tables = msgspec.convert(data, Tables)
+        tables = msgspec.convert(data, whole)
     except msgspec.ValidationError as fault:
         raise SceneError(rephrase(str(fault), data)) from None
-    kind = tables.map.kind
-    for key in sorted(set(data["map"]) - {"kind", "r", *KEYS[kind]}):
-        other = next(other for other, keys in KEYS.items() if key in keys)
+    kind, known = tables.map.kind, tables.map.keys
+    for key in sorted(set(data["map"]) - {"kind", "r", *known[kind]}):
+        other = next(other for other, keys in known.items() if key in keys)
         raise SceneError(f'map.{key}: given, but the kind is "{kind}"; remove it, or take '
                          f'kind = "{other}"')
     return tables

@@ -1,15 +1,16 @@
 """The tables of a study file: one record each; docs/reduced.md explains their keys."""
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
-from msgspec import Meta, Struct, field
+from msgspec import Meta, Struct, field, to_builtins
 
 from ..rom.architecture import HIDDEN
 from ..rom.latent import VELOCITIES
 from ..shapes.quantities import Count, Natural, PerCell, Positive, Seed
 from .march import PRECISIONS, PROJECTIONS, QUADRATURES, Way
 
+LDM, NSF = "ldm", "nsf"             # reduced models; tables of the second are in `nsf.tables`
 MODES, CURVED, NETWORK = "modes", "curved", "network"
 KEYS = {                            # of a map of each kind, beside `kind` and `r`
     MODES: (),
@@ -70,13 +71,29 @@ class Parameter(Table, rename={"start": "from", "stop": "to"}):
         return np.linspace(self.start, self.stop, self.count)
 
 
-class Map(Table):
+class Kinds(Table):
+    """What is learned, of one of several kinds, each with keys of its own."""
+
+    keys: ClassVar[dict]                        # {kind: names of its keys, beside `kind` and `r`}
+    kind: str
+    r: Count                                    # latent coordinates
+
+    def __post_init__(self):
+        one_of("kind", self.kind, self.keys)
+
+    @property
+    def settings(self):
+        """{key: value} of the keys of its kind, plain values."""
+        known = ("kind", "r", *self.keys[self.kind])
+        return {key: value for key, value in to_builtins(self).items() if key in known}
+
+
+class Map(Kinds, kw_only=True):
     """The map: POD modes, straight or bent (see `rom.curved`), or a network and how it is trained
     (see `rom.learn.fit.Training`).
     """
 
-    kind: str
-    r: Count                                    # latent coordinates
+    keys = KEYS
     modes: Count | None = None                  # of a curved map: those kept, r of them free
     degree: Bend = 2                            # ... of the polynomials that the others are
     hidden: tuple[Count, ...] = HIDDEN
@@ -89,8 +106,13 @@ class Map(Table):
     thin: Count = 1                             # ... ones, one in so many
     seed: Seed = 0
 
+    @property
+    def total(self):
+        """Epochs of a training."""
+        return self.epochs
+
     def __post_init__(self):
-        one_of("kind", self.kind, KEYS)
+        super().__post_init__()
         if self.kind == CURVED and (self.modes or 0) <= self.r:
             raise ValueError(f"modes = {self.modes or 'none'}: expected more than r = {self.r} of "
                              "a curved map, whose others follow from the first r")
@@ -124,23 +146,21 @@ class Run(Table):
         return Way(**{name: getattr(self, name) for name in Way._fields})
 
 
-class Tables(Table):
-    """A study file."""
+class Runs(Table):
+    """A study file, but for what is learned and how reduced runs are made."""
 
     scene: str                                  # a file, from the folder of this one; or shipped
     parameter: Annotated[tuple[Parameter, ...], Meta(min_length=1)]
-    map: Map
+    model: str = LDM
     title: str = ""
     set: dict = field(default_factory=dict)     # {path: value} of the scene, in all runs
     sampling: str = GRID                        # of the parameters
     count: Count | None = None                  # runs of a Latin hypercube
     test: Natural = 0                           # runs held out, drawn at random
     seed: Seed = 0                              # of the draws
-    run: Run = Run()
 
     def __post_init__(self):
         one_of("sampling", self.sampling, (GRID, LATIN))
-        require_nonlinear(self.map.kind, self.run.projection)
         if (self.count is not None) != (self.sampling == LATIN):
             hint = (", and only there" if self.count is not None else ": add `count = N` beside "
                     "`sampling`, take it from [[parameter]]")
@@ -149,3 +169,14 @@ class Tables(Table):
             texts = [getattr(one, name) for one in self.parameter]
             if len(set(texts)) < len(texts):
                 raise ValueError(f"parameter: two have the same {name}")
+
+
+class Tables(Runs, kw_only=True):
+    """A study file of LDM's reduced model."""
+
+    map: Map
+    run: Run = Run()
+
+    def __post_init__(self):
+        require_nonlinear(self.map.kind, self.run.projection)
+        super().__post_init__()

@@ -1,5 +1,7 @@
 """What a results file tells of the reduced run in it."""
 
+from .nsf import watch as nsf
+from .tables import NSF
 from .watch import Sight
 
 
@@ -12,7 +14,8 @@ def told(results):
         return None
     n = len(results)
     rows = {name: series[:n] for name, series in results.h5["reduced"].items()}
-    out = sum(bool(sight(rows, k).why) for k in range(n))
+    look = nsf.sight if facts.get("model") == NSF else sight
+    out = sum(bool(look(rows, k).why) for k in range(n))
     return facts | {"states": n, "out_of_bounds": out}
 
 

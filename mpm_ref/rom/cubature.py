@@ -6,8 +6,8 @@ step by step the trace becomes a drift. So points p and weights w_p >= 0 are sou
 
     sum_p w_p U_kp . U_lp = sum over all points of the same = delta_kl,    k <= r,  l <= R
 
-as [An2008] does for forces: one by one, the point first that lessens what is left most, all weights
-anew each time by non-negative least squares.
+as [AnKimJames2008] does for forces: one by one, the point first that lessens what is left most, all
+weights anew each time by non-negative least squares.
 """
 
 from typing import NamedTuple

@@ -1,7 +1,8 @@
 """NSF's three networks as a file (see `archive`).
 
 The arrays of position, stress and affine field begin with "g.", "h." and "l."; those of g are the
-ones of `weights`.
+ones of `weights`. Arrays that single precision holds exactly, as it does trained weights, are
+stored so.
 """
 
 from itertools import pairwise
@@ -43,7 +44,8 @@ def save(path, model):
 
 def load(path):
     """Read what `save` wrote. Raises ValueError saying what is wrong with the file."""
-    arrays, about = archive.read(path, FORMAT, fault_of, WHAT)
+    stored, about = archive.read(path, FORMAT, fault_of, WHAT)
+    arrays = {name: a.astype(float) if a.dtype.kind == "f" else a for name, a in stored.items()}
     own = part(arrays, "g")
     return Model(*networks_of(arrays), own["xhat"], own["rest"], about)
 
@@ -52,7 +54,16 @@ def arrays_of(model):
     """The numbers of a file by name."""
     parts = {"g": weights.arrays_of(weights.Model(model.g, model.xhat, model.rest, model.about)),
              "h": arrays_of_field(model.h), "l": arrays_of_field(model.l)}
-    return {f"{name}.{key}": a for name, own in parts.items() for key, a in own.items()}
+    return {f"{name}.{key}": compact(a) for name, own in parts.items() for key, a in own.items()}
+
+
+def compact(a):
+    """An array, in single precision where that loses nothing."""
+    if a.dtype.kind != "f":
+        return a
+    with np.errstate(over="ignore"):
+        single = a.astype(np.float32)
+    return single if np.array_equal(single, a) else a
 
 
 def arrays_of_field(field):

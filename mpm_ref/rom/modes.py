@@ -89,19 +89,47 @@ def basis(X, x, F, r, lam_F=0.0, weights=1.0):
     weights_s^2 (|| x_s ||^2 + lam_F || F_s ||^2) [m^2]. Raises ValueError for more modes than the
     snapshots hold.
     """
+    w, left = decomposed(X, x, F, r, lam_F, weights)
+    with one_thread():
+        shares = w[:, None] * left / np.sqrt(len(x))    # of the snapshots in a scaled mode
+        U = np.tensordot(x - X, shares, axes=(0, 0))
+        slope = np.tensordot(F - np.eye(X.shape[1]), shares, axes=(0, 0))
+    return Basis(Modes(X, U, slope, KDTree(X)), scaled(w, left))
+
+
+def directions(X, x, r):
+    """U (n, d, r) [m] of the r leading modes of snapshots x (s, n, d) [m], and the snapshots'
+    coordinates (s, r), all scaled by one number: the first has a root mean square of 1, and a mode
+    moves points by as much as any other that has its coordinate. No gradient is asked for. Raises
+    ValueError for more modes than the snapshots hold.
+    """
+    _, left = decomposed(X, x, None, r, 0.0, 1.0)
+    with one_thread():
+        U = np.tensordot(x - X, left, axes=(0, 0))      # as long as singular values
+        sigma = np.sqrt(np.sum(U**2, axis=(0, 1)))
+        unit = sigma[0] / np.sqrt(len(x))
+    return U / sigma * unit, left * sigma / unit
+
+
+def scaled(w, left):
+    """Coordinates (s, r) of snapshots with weights w (s,) from their left singular vectors."""
+    return left * np.sqrt(len(left)) / w[:, None]
+
+
+def decomposed(X, x, F, r, lam_F, weights):
+    """Weights (s,) and the r leading left singular vectors (s, r) of weighted snapshots. Raises
+    ValueError for more than they hold.
+    """
     s, n, d = x.shape
     if not 1 <= r <= min(s, n * d):
         raise ValueError(f"r = {r}: expected 1 .. {min(s, n * d)} modes of {s} snapshots")
     w = np.broadcast_to(np.asarray(weights, dtype=float), s)
     with one_thread():
         left, sigma = leading(w[:, None] * measured(X, x, F, lam_F), r)
-        if held(sigma) < r:
-            raise ValueError(f"r = {r}: the snapshots hold only {held(sigma)} modes, more would be "
-                             "round-off; take fewer, or snapshots that differ more")
-        shares = w[:, None] * left / np.sqrt(s)         # of the snapshots in a scaled mode
-        U = np.tensordot(x - X, shares, axes=(0, 0))
-        slope = np.tensordot(F - np.eye(d), shares, axes=(0, 0))
-    return Basis(Modes(X, U, slope, KDTree(X)), left * np.sqrt(s) / w[:, None])
+    if held(sigma) < r:
+        raise ValueError(f"r = {r}: the snapshots hold only {held(sigma)} modes, more would be "
+                         "round-off; take fewer, or snapshots that differ more")
+    return w, left
 
 
 def held(sigma):

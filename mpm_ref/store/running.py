@@ -1,6 +1,6 @@
 """A run on files: `run(problem, "out.h5")`, to be continued bit for bit after whatever ended it."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ..monitor import check
@@ -24,7 +24,8 @@ class Options:
     checkpoints, None for one a minute; fields: what is stored (`Fields`), None for the usual, or
     what a resumed run began with, and nothing else is taken for that; resume: go on from the
     checkpoint beside the results, or begin where there is none; overwrite: replace the results of
-    an earlier run; seed: of the scene, for the manifest.
+    an earlier run; seed: of the scene, for the manifest; facts: what else that is to say, plain
+    values by name.
     """
 
     steps: int | None = None
@@ -33,6 +34,7 @@ class Options:
     resume: bool = False
     overwrite: bool = False
     seed: int | None = None
+    facts: dict = field(default_factory=dict)
 
     def __post_init__(self):
         for name in ("steps", "checkpoint_every"):
@@ -165,5 +167,5 @@ def _open(problem, out, options, state):
     if options.resume and Path(out).exists():
         return reopen(out, problem, state.frame if state else 0)
     _require_leave(out, options)        # another run may have begun there meanwhile
-    return create(out, problem, options.fields or Fields(), manifest(problem, options.seed),
-                  beside=checkpoint_of(out))
+    facts = manifest(problem, options.seed) | options.facts
+    return create(out, problem, options.fields or Fields(), facts, beside=checkpoint_of(out))

@@ -50,7 +50,7 @@ def single(path, name, a):
 def load(path):
     """Read what `save` wrote. Raises ValueError saying what is wrong with the file."""
     arrays = opened(Path(path))
-    require_format(path, arrays, FORMAT)
+    require_format(path, arrays, FORMAT, "laws of a small training")
     about = about_of(path, arrays)
     own = about.pop("laws", {})
     epochs = sorted(own, key=int)

@@ -3,12 +3,15 @@
 """
 
 from mpm_ref.nclaw.gnn.simulator import Simulator
+from mpm_ref.nclaw.weights import mixed
 
 from ..registry import experiment
 from .met import LABELED
-from .tables import known, tell
+from .tables import known
 
 STEP = {"unit": "m^2", "note": "mean over steps from restarts of the horizon of that epoch"}
+MIXED = {"unit": "m^2", "note": f"{STEP['note']}; the loss's term of velocities is in it, which "
+                                "the training did not tell apart"}
 ANSWER = {"unit": "1", "note": "mean squared error of F after the return map, over pairs"}
 COLUMNS = ("method", "environment", "epoch", "error")
 
@@ -16,22 +19,27 @@ COLUMNS = ("method", "environment", "epoch", "error")
 @experiment("nclaw.loss", title="NCLaw: errors in training",
             profiles=("quick", "standard"), budget={"quick": 1, "standard": 1})
 def loss(run):
-    """Mean squared errors of a step, from restarts, epoch by epoch; of "labeled" laws, which follow
-    no motion, first and last error of F alone.
+    """Mean squared errors of positions after a step, from restarts, epoch by epoch; of "labeled"
+    laws, which follow no motion, and where velocities are mixed in, first and last error alone.
     """
-    found, waiting = known()
     rows = []
-    for method, own in found.items():
+    for method, own in known(run).items():
         for name, laws in own.items():
             if isinstance(laws, Simulator):
                 record_picked(run, f"nclaw.loss.{method}.{name}", laws.about)
                 continue
-            errors, of = laws.about["errors"], ANSWER if method == LABELED else STEP
+            errors, of = laws.about["errors"], kind_of(method, laws.about)
             record(run, f"nclaw.loss.{method}.{name}", errors, of)
             if of is STEP:
                 rows += [(method, name, epoch, error) for epoch, error in enumerate(errors, 1)]
     run.table("errors", COLUMNS, rows)
-    tell(run, waiting)
+
+
+def kind_of(method, about):
+    """What the errors of a training are: unit and note."""
+    if method == LABELED:
+        return ANSWER
+    return MIXED if mixed(about) else STEP
 
 
 def record(run, target, errors, of):

@@ -18,8 +18,8 @@ from mpm_ref.scene import build
 from ..registry import experiment
 from ..verification.scenes import threads_for
 from .environments import ENVIRONMENTS, environment
-from .nets import Untrained, trained
-from .tables import tell
+from .nets import trained
+from .waiting import there
 
 METHODS = {"ours": "{}", "admissible": "{}-admissible"}     # and the names of their weights
 TRUE = "true"
@@ -45,7 +45,7 @@ def dissipation(run):
     """True laws, the paper's network, and laws that thermodynamics admits, which are what its
     conclusion leaves for later: cycles from rest, and the training runs.
     """
-    laws, waiting = known()
+    laws = known(run)
     n, steps = run.choose(quick=(20, 100), standard=(1000, 200))
     length = run.choose(quick=50, standard=environment(ENVIRONMENTS[0]).steps)
     closed = {size: loops(n, size, steps, run.rng) for size in SIZES}
@@ -60,24 +60,17 @@ def dissipation(run):
         record_cycles(run, row, steps)
     for row in runs:
         record_run(run, row)
-    tell(run, waiting)
 
 
-def known():
-    """({(method, environment): `Pair`}, [which weights are not there yet])."""
-    found, waiting = {}, []
-    for name in ENVIRONMENTS:
-        body, = build(environment(name)).bodies
-        found[TRUE, name] = Pair(body.law, body.flow)
-        for method, pattern in METHODS.items():
-            try:
-                laws = trained(pattern.format(name))
-            except Untrained as fault:
-                waiting.append(str(fault))
-            else:
-                found[method, name] = Pair(deployed.elastic(laws.elastic),
-                                           deployed.plastic(laws.plastic))
-    return found, waiting
+def known(run):
+    """{(method, environment): `Pair`}; records which weights are not there yet."""
+    names = {(method, name): pattern.format(name) for name in ENVIRONMENTS
+             for method, pattern in METHODS.items()}
+    laws = there(run, names.values(), trained)
+    true = {(TRUE, name): build(environment(name)).bodies[0] for name in ENVIRONMENTS}
+    return {**{key: Pair(body.law, body.flow) for key, body in true.items()},
+            **{key: Pair(deployed.elastic(laws[name].elastic), deployed.plastic(laws[name].plastic))
+               for key, name in names.items() if name in laws}}
 
 
 def cycled(pair, G):

@@ -25,10 +25,9 @@ from .dough import (
     star,
     trained,
 )
-from .nets import Untrained
 from .states import shots
-from .tables import tell
 from .untrained import untrained
+from .waiting import there
 
 BODIES = {"block": block, "star": star}
 COLUMNS = ("laws", "pixels", "block", "star", "broken")
@@ -53,24 +52,19 @@ def dough(run):
     """
     truth = {name: shots(scene(shape()), own) for name, shape in BODIES.items()}
     marks = film(truth["block"])
-    laws, waiting = contestants()
+    laws = contestants(run)
     rows = [row(name, law, truth, marks) for name, law in run.progress(laws.items(), "laws")]
     record_settings(run, marks, truth["block"])
     for one in rows:
         record(run, one, len(truth["star"][0]))
     run.table("errors", COLUMNS, rows)
-    tell(run, waiting)
 
 
-def contestants():
-    """({name: what makes a body of other laws}, [which weights are not there yet])."""
-    found, waiting = {"true": own, "guess": guessed, "init": learned(untrained())}, []
-    for name in doughs():
-        try:
-            found[name] = learned(trained(name))
-        except Untrained as fault:
-            waiting.append(str(fault))
-    return found, waiting
+def contestants(run):
+    """{name: what makes a body of other laws}; records which weights are not there yet."""
+    laws = there(run, doughs(), trained)
+    return {"true": own, "guess": guessed, "init": learned(untrained()),
+            **{name: learned(one) for name, one in laws.items()}}
 
 
 def guessed(body):

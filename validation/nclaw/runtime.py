@@ -11,8 +11,9 @@ from mpm_ref.scene import build
 from ..registry import experiment
 from ..verification.scenes import threads_for, with_
 from .environments import ENVIRONMENTS, environment
-from .nets import Untrained, trained
-from .tables import PRINTED, tell
+from .errors import PRINTED
+from .nets import trained
+from .waiting import there
 
 REPEATS = 3
 COLUMNS = ("environment", "laws", "wall", "cpu")
@@ -25,21 +26,16 @@ def table3(run):
     """Ours beside the true laws, in turn, on the threads that are given; for orientation, since the
     paper's machine is another.
     """
-    steps, rows, waiting = run.choose(quick=20, standard=1000), [], []
-    for name in run.progress(ENVIRONMENTS, "environments"):
+    steps, rows = run.choose(quick=20, standard=1000), []
+    for name, found in run.progress(there(run, ENVIRONMENTS, trained).items(), "environments"):
         scene = environment(name, steps=steps, every=steps)
-        try:
-            laws = {"ours": learned(trained(name)), "true": own}
-        except Untrained as fault:
-            waiting.append(str(fault))
-            continue
+        laws = {"ours": learned(found), "true": own}
         for law in laws.values():
             took(with_(scene, steps=1, every=1), law)       # compiles
         times = [{word: took(scene, law) for word, law in laws.items()} for _ in range(REPEATS)]
         rows += [(name, word, *one[word]) for one in times for word in laws]
         record(run, name, times, steps)
     run.table("times", COLUMNS, rows)
-    tell(run, waiting)
 
 
 def took(scene, law):

@@ -26,7 +26,7 @@ class Epoch(NamedTuple):
     """What an epoch was like."""
 
     loss: float         # as it is trained on
-    error: float        # mean squared error of a step [m^2]
+    error: float        # mean squared error of positions after a step [m^2]
     segments: int
     steepness: tuple    # norms of the gradients, elastic and plastic
 
@@ -37,6 +37,8 @@ class Diverged(ValueError):
 
 class Session:
     """Laws, optimisers and schedules of a training under way."""
+
+    of_errors = "positions"         # what errors of epochs are of
 
     def __init__(self, recipe, laws, world, observed):
         self.meter = Meter()
@@ -61,8 +63,15 @@ class Session:
         size of a batch, with which only time and round-off change.
         """
         settings = {name: value for name, value in asdict(self.recipe).items() if name != "batch"}
+        if self.recipe.velocity:        # an error without a name has velocities in it
+            settings["errors_of"] = self.of_errors
         return json.dumps({"format": FORMAT, **settings, "laws": [*map(described, self.laws)],
                            "data": self.of})
+
+    @property
+    def known(self):
+        """The errors of all epochs and what they are of: plain values, for an `about`."""
+        return {"errors": [epoch.error for epoch in self.history], "errors_of": self.of_errors}
 
     def epoch(self):
         """The trajectory once, in segments, and a step of each optimiser."""
@@ -72,28 +81,31 @@ class Session:
         weight = self.recipe.weight(len(cuts) - 1, steps)
         for optimiser in self.optimisers:
             optimiser.zero_grad()
-        error = sum(self.show(cuts[k:k + self.recipe.batch + 1], weight)
-                    for k in range(0, len(cuts) - 1, self.recipe.batch))
+        shown = [self.show(cuts[k:k + self.recipe.batch + 1], weight)
+                 for k in range(0, len(cuts) - 1, self.recipe.batch)]
+        loss, error = map(sum, zip(*shown, strict=True))
         steepness = tuple(self.cut_gradients())
         for optimiser, schedule in zip(self.optimisers, self.schedules, strict=True):
             optimiser.step()
             schedule.step()
-        self.history.append(Epoch(weight * error, error / cuts[-1], len(cuts) - 1, steepness))
+        self.history.append(Epoch(weight * loss, error / cuts[-1], len(cuts) - 1, steepness))
 
     def show(self, cuts, weight):
-        """Add the gradients of some segments; returns their squared errors."""
+        """Add the gradients of some segments; returns their loss, not weighed yet, and the part of
+        it that is of positions.
+        """
         try:
-            error = squared(self.laws, self.world, self.observed, cuts[:-1], cuts[1:],
+            found = squared(self.laws, self.world, self.observed, cuts[:-1], cuts[1:],
                             self.recipe.velocity)
         except ValueError as fault:
             raise Diverged(f"epoch {self.number}, steps {cuts[0]} to {cuts[-1]}: {fault} {LESS}"
                            ) from None
-        if not torch.isfinite(error):
+        if not torch.isfinite(found.loss):
             raise Diverged(f"epoch {self.number}, steps {cuts[0]} to {cuts[-1]}: the loss is "
-                           f"{error.item()}. {LESS}")
-        if error.requires_grad:
-            (weight * error).backward()
-        return error.item()
+                           f"{found.loss.item()}. {LESS}")
+        if found.loss.requires_grad:
+            (weight * found.loss).backward()
+        return found.loss.item(), found.positions.item()
 
     def cut_gradients(self):
         """Cut each law's gradients to their norm; yields what it was."""

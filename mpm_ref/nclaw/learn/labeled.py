@@ -41,6 +41,8 @@ def labels_of(observed, law, dt):
 class LabeledSession(Session):
     """Laws, optimisers and schedules of a training on `Labels`."""
 
+    of_errors = "F"
+
     def epoch(self):
         """All pairs once."""
         number, count = len(self.history), len(self.observed.F)

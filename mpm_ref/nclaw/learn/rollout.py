@@ -61,22 +61,30 @@ def step(laws, world, state, on):
     return x, v, C, over_points(laws.plastic, F)
 
 
+class Squared(NamedTuple):
+    """Squared errors of segments."""
+
+    loss: torch.Tensor          # what is learned from [m^2]
+    positions: torch.Tensor     # its part that is of positions, without a gradient [m^2]
+
+
 def squared(laws, world, observed, starts, ends, velocity=0.0):
-    """Mean squared errors of positions [m^2], over particles and axes, summed over the steps of
-    segments from time levels `starts` to later ones, `ends`. Those that have ended go no further.
-    Those of velocities are added, times `velocity` [s^2].
+    """`Squared`: mean squared errors of positions, over particles and axes, summed over the steps
+    of segments from time levels `starts` to later ones, `ends`. Those that have ended go no
+    further. In the loss those of velocities are added, times `velocity` [s^2].
     """
-    levels, last, total = torch.tensor(starts), torch.tensor(ends), 0.0
+    levels, last, total, positions = torch.tensor(starts), torch.tensor(ends), 0.0, 0.0
     state, on = observed.at(levels), nodes(world, len(starts))
     while len(levels):
         state, levels = step(laws, world, state, on), levels + 1
-        total = total + observed.off("x", state[0], levels)
+        off = observed.off("x", state[0], levels)
+        total, positions = total + off, positions + off.detach()
         if velocity:
             total = total + velocity * observed.off("v", state[1], levels)
         under_way = levels < last
         if not under_way.all():
             levels, last, *state = (a[under_way] for a in (levels, last, *state))
-    return total
+    return Squared(total, positions)
 
 
 def mean_squared(a, b):

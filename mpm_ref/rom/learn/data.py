@@ -48,7 +48,7 @@ def batch_of(data, at, points, latents):
     """
     X = data.X[points].repeat(len(at), 1)
     def rows(a):
-        return a[at][:, points].flatten(0, 1)
+        return a[at[:, None], points].flatten(0, 1)
 
     def each(a):
         return a.repeat_interleave(len(points), dim=0)

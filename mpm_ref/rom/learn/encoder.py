@@ -54,11 +54,14 @@ class Free(nn.Module):
 
 
 class Given(nn.Module):
-    """Latent coordinates that are known before the training, one vector for each snapshot."""
+    """Latent coordinates that are known before the training, one vector for each snapshot; and
+    perhaps the modes (n, d, r) that they are of [m].
+    """
 
-    def __init__(self, xhat):
+    def __init__(self, xhat, modes=None):
         super().__init__()
         self.register_buffer("table", torch.as_tensor(xhat, dtype=torch.float32))
+        self.modes = None if modes is None else torch.as_tensor(modes, dtype=torch.float32)
 
     def forward(self, index):
         """Latent coordinates (s, r) of snapshots by number."""

@@ -12,14 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-from torch.nn.functional import mse_loss
+from torch.nn.functional import mse_loss, pad
 
 from ... import checkpoints
 from ...cost import Cost
 from ..field import Field, field_units
 from . import session
 from .perceptron import Perceptron, weights_of
-from .session import SAVE, require_sound, sha256
+from .session import SAVE, require_sound, saving, sha256
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,8 @@ class FieldTraining:
 
     `follows`: it depends on the parameters of a run too (NSF-mu-dep). An epoch shows every snapshot
     once, `batch` at a time, each time at `points` random points (0: all). Learning rates are those
-    of a `schedule` over all epochs.
+    of a `schedule` over all epochs. beside: values are shown at latent coordinates near theirs,
+    each time at others, with normal differences of standard deviations up to this one: it smooths.
     """
 
     hidden: tuple
@@ -38,9 +39,10 @@ class FieldTraining:
     points: int = 0
     seed: int = 0
     schedule: str = "steps"
+    beside: float = 0.0
 
     def __post_init__(self):
-        require_sound(self, ("epochs", "batch"), ("points",))
+        require_sound(self, ("epochs", "batch"), ("points", "beside"))
 
 
 class Observed(NamedTuple):
@@ -72,7 +74,7 @@ class Session(session.Session):
         self.X = single((observed.X - self.units.low) / self.units.span)
         scaled = np.repeat((mu - self.units.mu_mean) / self.units.mu_std, levels, axis=0)
         xhat = observed.xhat.reshape(runs * levels, -1)
-        self.states = single(np.hstack([xhat, scaled]))
+        self.states, self.r = single(np.hstack([xhat, scaled])), xhat.shape[1]
         self.values = observed.values.reshape(runs * levels, n, k)
         d, inputs = observed.X.shape[1], self.states.shape[1]
         self.f = Perceptron(d, inputs, training.hidden, k)
@@ -80,9 +82,11 @@ class Session(session.Session):
 
     def error(self, at):
         """Mean squared error of a batch of snapshots; it has no terms."""
-        points = self.some_points()
+        points, states = self.some_points(), self.states[at]
+        if self.training.beside:
+            states = states + pad(self.away(len(at), self.r), (0, states.shape[1] - self.r))
         found = self.f(self.X[points].repeat(len(at), 1),
-                       self.states[at].repeat_interleave(len(points), dim=0))
+                       states.repeat_interleave(len(points), dim=0))
         return mse_loss(found, self.standardised(at, points)), ()
 
     def standardised(self, at, points):
@@ -106,6 +110,6 @@ def train(training, observed, checkpoint=None, on_epoch=None):
 
     Raises ValueError where values are not finite, `session.Diverged` where a loss is not.
     """
-    done = checkpoints.finished(Session(training, observed), training.epochs, SAVE, checkpoint,
-                                on_epoch)
+    done = checkpoints.finished(Session(training, observed), training.epochs,
+                                saving(training.epochs, SAVE), checkpoint, on_epoch)
     return done.result()

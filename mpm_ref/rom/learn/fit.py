@@ -9,16 +9,17 @@ import torch
 from ... import checkpoints
 from ...cost import Cost
 from ..architecture import ENCODERS, HIDDEN
-from ..modes import basis
+from ..modes import basis, directions
 from ..snapshots import units
 from . import session
 from .data import batch_of, data_of
 from .encoder import Encoder, Free, Given, codes
 from .loss import CODE, Weights, loss
 from .perceptron import Perceptron, exported
-from .session import SAVE, require_known, require_sound, sha256
+from .session import SAVE, require_known, require_sound, saving, sha256
 
-LATENTS = (*ENCODERS, "free", "modes")
+DIRECTIONS = "directions"
+LATENTS = (*ENCODERS, "free", "modes", DIRECTIONS)
 
 
 @dataclass(frozen=True)
@@ -27,9 +28,14 @@ class Training:
 
     r latent coordinates; `latent` "encoder" (LDM-sec4.1-encoder), "encoder-nsf" (NSF-encoder),
     "free" (LDMW-eq7), or those of POD "modes" in the norm of the loss, snapshots weighing as often
-    as they are shown, which cost no encoder and are no unknowns; an epoch shows every snapshot
+    as they are shown, which cost no encoder and are no unknowns, or of their "directions", all in
+    one unit of length; an epoch shows every snapshot
     once, `batch` at a time, each time at `points` random points (0: all); of the time levels from
     `dense` on, a random one in `thin`. Learning rates are those of a `schedule` over all epochs.
+
+    beside: snapshots are shown displaced along the directions, each time by others, of normal
+    coordinates with standard deviations up to this one. What the map is like in all directions is
+    in no snapshot: dg/dxhat of the weak ones is then that of the modes, and not of the error.
     """
 
     r: int
@@ -43,9 +49,10 @@ class Training:
     thin: int = 1
     seed: int = 0
     schedule: str = "cosine"
+    beside: float = 0.0
 
     def __post_init__(self):
-        require_sound(self, ("r", "epochs", "batch", "thin"), ("points", "dense"))
+        require_sound(self, ("r", "epochs", "batch", "thin"), ("points", "dense", "beside"))
         require_known("latent", self.latent, LATENTS)
 
 
@@ -87,7 +94,11 @@ class Session(session.Session):
 
     def error(self, at):
         """Loss of a batch of snapshots, and its terms."""
-        batch = batch_of(self.data, at, self.some_points(), self.latents)
+        points = self.some_points()
+        batch = batch_of(self.data, at, points, self.latents)
+        if self.training.beside:
+            batch = displaced(batch, self.away(len(at), self.training.r),
+                              self.encoder.modes[points])
         return loss(self.f, batch, self.data.units, self.training.weights)
 
     def latents(self, numbers):
@@ -101,12 +112,23 @@ class Session(session.Session):
                        np.array(self.history), self.meter.total)
 
 
+def displaced(batch, away, modes):
+    """A `Batch` of s snapshots at m points, moved along modes (m, d, r) by coordinates (s, r)."""
+    u = torch.einsum("mdr,sr->smd", modes, away).flatten(0, 1)
+    return batch._replace(u=batch.u + u,
+                          xhat=batch.xhat + away.repeat_interleave(len(modes), dim=0))
+
+
 def require_derivatives(training, snapshots):
     """Raise ValueError where a training asks for F and v of snapshots that have none."""
     asks = training.weights.F or training.weights.v or training.latent == "modes"
     if snapshots.F is None and asks:
         raise ValueError(f"snapshots of positions alone, for latent = {training.latent!r} and "
                          f"{training.weights}: expected weights of 0, and other latents than modes")
+    if training.beside and (training.latent != DIRECTIONS or any(training.weights)):
+        raise ValueError(f"beside = {training.beside:g}, with latent = {training.latent!r} and "
+                         f"{training.weights}: expected latent = {DIRECTIONS!r} and weights of 0, "
+                         "since displacements alone are known beside the snapshots")
 
 
 def encoder(training, snapshots):
@@ -116,6 +138,9 @@ def encoder(training, snapshots):
         return Encoder(ENCODERS[training.latent](d, n), training.r)
     if training.latent == "free":
         return Free(s * levels, training.r)
+    if training.latent == DIRECTIONS:
+        modes, xhat = directions(snapshots.X, snapshots.x.reshape(s * levels, n, d), training.r)
+        return Given(xhat, modes)
     shown = np.where(np.arange(levels) < training.dense, 1.0, 1.0 / training.thin)
     return Given(basis(snapshots.X, *snapshots.flat(), training.r, training.weights.F,
                        np.tile(np.sqrt(shown), s)).xhat)
@@ -127,6 +152,6 @@ def train(training, snapshots, checkpoint=None, on_epoch=None):
     checkpoint: a file to go on from and to save to; on_epoch(history) is called after each epoch.
     Raises `session.Diverged`.
     """
-    done = checkpoints.finished(Session(training, snapshots), training.epochs, SAVE, checkpoint,
-                                on_epoch)
+    done = checkpoints.finished(Session(training, snapshots), training.epochs,
+                                saving(training.epochs, SAVE), checkpoint, on_epoch)
     return done.result(len(snapshots.x))

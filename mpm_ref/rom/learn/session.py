@@ -17,7 +17,8 @@ from ... import checkpoints
 from ...cost import Cost, Meter
 from .schedule import SCHEDULES
 
-SAVE = 20                           # epochs between checkpoints
+SAVE = 20                           # epochs between checkpoints, but of a long training ...
+PARTS = 200                         # ... so many checkpoints in all
 FORMAT = 3                          # of checkpoints
 
 
@@ -86,6 +87,13 @@ class Session:
             return torch.arange(self.points)
         return torch.randperm(self.points, generator=self.random)[:self.training.points]
 
+    def away(self, snapshots, r):
+        """Coordinates (snapshots, r) to show these beside their own, normal with deviations of up
+        to `training.beside`.
+        """
+        far = self.training.beside * torch.rand(snapshots, 1, generator=self.random)
+        return far * torch.randn(snapshots, r, generator=self.random)
+
     def save(self, path):
         """Checkpoint, whole or not at all."""
         content = io.BytesIO()
@@ -106,6 +114,11 @@ class Session:
         self.optimiser.load_state_dict(kept["optimiser"])
         self.random.set_state(kept["random"])
         self.history, self.meter.before = kept["history"], Cost(*kept["cost"])
+
+
+def saving(epochs, least):
+    """Epochs between the checkpoints of a training of so many: no fewer than the least."""
+    return max(least, epochs // PARTS)
 
 
 def require_sound(training, counts, or_zero):

@@ -1,0 +1,118 @@
+"""A reduced run with inferred stress, to be recorded (see `reduced.record`)."""
+
+from dataclasses import dataclass, replace
+from math import ceil
+
+import numpy as np
+
+from ...body import Body, particles_at
+from ...materials import NoFlow
+from ...rom.extent import Extent
+from ...rom.inferred import Position, Report
+from ...store import Fields
+from ..inferring import Plan, begin, continued, drawn
+from ..whole import Whole
+from .fields import of_run
+from .watch import look, trained
+
+VECTORS = {"xhat": "1"}                         # of the group `reduced`: units
+COUNTS = {"samples": "1", "points": "1", "rank": "1"}
+NUMBERS = {"residual": "m", "beyond": "1"}
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A reduced run to be recorded."""
+
+    whole: Whole
+    fields: object          # of this run
+    rest: np.ndarray        # (r,) latent coordinates near the start
+    extent: Extent          # of the training latents
+    run: object             # `tables.Run`
+    problem: object         # the scene's, with the clock of the reduced run
+    facts: dict             # what else is to be known of it, plain values
+
+    series = VECTORS, COUNTS, NUMBERS
+    stored = Fields(("x", "v", "C", "tau"))
+
+    @property
+    def r(self):
+        """Number of latent coordinates."""
+        return self.fields.r
+
+    @property
+    def count(self):
+        """Number of points shown."""
+        return len(self.whole.X)
+
+    def states(self, known):
+        """Yield (`Position`, `Report` or None, `Sight`) of each state, those known too."""
+        known = known or [(begin(self.whole, self.fields, self.rest), None)]
+        plan = plan_of(self.run, len(self.whole.X), self.fields)
+        for _, at, report in continued(known, self.whole, self.fields, plan):
+            yield at, report, look(self.extent, at, report)
+
+    def bodies(self, at):
+        """The bodies in a state. They have no law: of a stress that is inferred no strain and no
+        elastic energy is known.
+        """
+        everything, fields, matter = np.arange(self.count), self.fields, self.whole.matter
+        x, v = fields.place(everything, at.xhat), matter.v
+        if at.before is not None:
+            v = (x - fields.place(everything, at.before)) / self.problem.clock.dt
+        tau, C = (field(everything, at.xhat) for field in (fields.stress, fields.affine))
+        ends = np.cumsum([len(body.id) for body in self.problem.bodies])
+        own = zip(self.problem.bodies, np.split(everything, ends[:-1]), strict=True)
+        return tuple(body_of(body.name, x[p], v[p], matter, (p, tau[p], C[p])) for body, p in own)
+
+    def row(self, step):
+        """Of a `Step`; at the start nothing is reported."""
+        reported = {} if step.report is None else step.report._asdict()
+        return {"xhat": step.latent.xhat, **reported, "beyond": step.sight.beyond}
+
+
+def body_of(name, x, v, matter, rest):
+    """A `Body` at x (n, d) with velocity v, of points with (numbers, stress, affine field)."""
+    points, tau, C = rest
+    particles = particles_at(x, v, matter.m[points], matter.V0[points], transfer="apic")
+    return Body(name, particles._replace(tau=tau, C=C), None, NoFlow(), np.arange(len(points)))
+
+
+def plan_of(run, n, fields):
+    """`Plan` of a study's `Run` for n points. Raises ValueError for samples that do not suffice, or
+    are more than there are points.
+    """
+    count = n if run.points is None else run.points
+    if count * fields.dim < fields.r:
+        raise ValueError(f"{count} samples for {fields.r} latent coordinates: expected at least "
+                         f"{ceil(fields.r / fields.dim)}; give `points` of [run] more")
+    return Plan((drawn(n, count, run.seed),), run.faster, run.inversion)
+
+
+def recording(whole, model, mu, run, facts):
+    """`Recording` of a reduced run with parameters mu on the fields of a `Model`. Raises ValueError
+    as `plan_of` does, and for steps that are longer than the run.
+    """
+    fields, clock = of_run(model.decoder, whole, mu), whole.problem.clock
+    plan = plan_of(run, len(whole.X), fields)
+    if not plan.steps(clock):
+        raise ValueError(f"faster = {run.faster:g}: expected at most {clock.steps}, the steps of "
+                         "the scene")
+    own = replace(clock, dt=run.faster * clock.dt, steps=plan.steps(clock), every=1)
+    return Recording(whole, fields, model.rest, trained(fields, model.xhat), run,
+                     replace(whole.problem, clock=own), facts)
+
+
+def states(results):
+    """(`Position`, `Report` or None) of each frame of a reduced run."""
+    n = len(results)
+    rows = {name: series[:n] for name, series in results.h5["reduced"].items()}
+    found = [(Position(rows["xhat"][k], rows["xhat"][k - 1] if k else None),
+              report_of(rows, k) if k else None) for k in range(n)]
+    return tuple(found)
+
+
+def report_of(rows, k):
+    """`Report` of step k, as far as it is stored."""
+    counts = (int(rows[name][k]) for name in COUNTS)
+    return Report(*counts, float(rows["residual"][k]), 0, True)

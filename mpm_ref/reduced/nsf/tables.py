@@ -1,0 +1,82 @@
+"""The tables of a study file with model = "nsf", as far as they differ from LDM's;
+docs/reduced.md explains their keys.
+"""
+
+from typing import Annotated, ClassVar
+
+from msgspec import Meta
+
+from ...rom.inferred import INVERSIONS
+from ...rom.spanned import Sizes
+from ...shapes.quantities import Count, Natural, NotNegative, Positive, Seed
+from ..inferring import Plan
+from ..tables import MODES, NETWORK, Kinds, Runs, Table, one_of
+
+NUMBERS = ("modes", "tau", "C", "weight", "smoothing")     # of `Sizes`
+KEYS = {                            # of fields of each kind, beside `kind` and `r`
+    MODES: (*NUMBERS, "told"),
+    NETWORK: ("told", "beta", "latent", "schedule", "epochs", "field_epochs", "batch", "points",
+              "seed"),
+}
+LATENTS, SCHEDULES = ("encoder-nsf", "free", MODES), ("steps", "cosine")    # see `rom.learn`
+SIZES = Sizes._field_defaults
+Factors = Annotated[tuple[Count, ...], Meta(min_length=3, max_length=3)]
+
+
+class Fields(Kinds):
+    """The fields: sums of modes (see `rom.spanned`), or networks and how they are trained (see
+    `rom.learn.drive_fields`).
+    """
+
+    keys: ClassVar[dict] = KEYS
+    modes: Count = SIZES["modes"]               # of the displacement, r of them free
+    tau: Count = SIZES["tau"]                   # of the stress
+    C: Natural = SIZES["C"]                     # of the affine field; 0: there is none
+    told: bool = True                           # whether the stress is told the parameters
+    weight: Positive = SIZES["weight"]          # of these beside latent coordinates
+    smoothing: NotNegative = SIZES["smoothing"]
+    beta: Factors = (16, 16, 16)                # widths of hidden layers over numbers of values
+    latent: str = LATENTS[0]
+    schedule: str = SCHEDULES[0]                # of learning rates
+    epochs: Count = 1500                        # of the position
+    field_epochs: Count = 3000                  # of the stress, and of the affine field
+    batch: Count = 32                           # snapshots at a time
+    points: Natural = 0                         # of each, anew each time; 0: all
+    seed: Seed = 0
+
+    def __post_init__(self):
+        super().__post_init__()
+        one_of("latent", self.latent, LATENTS)
+        one_of("schedule", self.schedule, SCHEDULES)
+        if self.kind == MODES and self.modes < self.r:
+            raise ValueError(f"modes = {self.modes}: expected at least r = {self.r} modes of the "
+                             "displacement, whose first coefficients are the latent coordinates")
+
+    @property
+    def sizes(self):
+        """As `spanned` takes them."""
+        return Sizes(**{name: getattr(self, name) for name in ("r", *NUMBERS)})
+
+    @property
+    def total(self):
+        """Epochs of all stages."""
+        return self.epochs + 2 * self.field_epochs
+
+
+class Run(Table):
+    """How reduced runs are made (see `inferring.Plan`)."""
+
+    points: Count | None = None                 # samples, drawn once; none: all points
+    seed: Seed = 0                              # of that draw
+    faster: Positive = Plan(()).faster          # length of a step over that of the scene
+    inversion: str = Plan(()).inversion
+
+    def __post_init__(self):
+        one_of("inversion", self.inversion, INVERSIONS)
+
+
+class Tables(Runs, kw_only=True):
+    """A study file with model = "nsf"."""
+
+    map: Fields
+    run: Run = Run()

@@ -1,0 +1,27 @@
+"""A training of NSF's three networks from plain settings, as a file has them."""
+
+from dataclasses import replace
+
+import torch
+
+from . import stages
+
+
+def fitted(settings, histories, folder, on_epoch, threads=1):
+    """`Stages` by {name: value} as `plan` takes them, on so many threads; folder and on_epoch as
+    for `stages.train`.
+    """
+    torch.set_num_threads(threads)
+    return stages.train(plan(settings, histories.X.shape[1]), histories, folder, on_epoch)
+
+
+def plan(settings, dim):
+    """The printed `Plan` with other numbers: r, told (whether the stress is told the parameters),
+    beta, latent, epochs of the position, field_epochs of the other two; batch, points, seed and
+    schedule of all three.
+    """
+    printed = stages.printed(dim, settings["r"], settings["beta"], settings["told"])
+    how = {name: settings[name] for name in ("batch", "points", "seed", "schedule")}
+    g = replace(printed.g, epochs=settings["epochs"], latent=settings["latent"], **how)
+    return stages.Plan(g, *(replace(own, epochs=settings["field_epochs"], **how)
+                            for own in (printed.h, printed.l)))

@@ -1,0 +1,37 @@
+"""What learns is imported when it is asked for; without PyTorch one sentence says so."""
+
+import sys
+
+import pytest
+
+from mpm_ref.laws import training
+from mpm_ref.learning import part
+from mpm_ref.reduced import maps
+
+
+@pytest.mark.parametrize(("asked", "said"), [
+    (training.drive, 'laws are trained with PyTorch, which is not installed: pip install '
+                     '"mpm_ref[learn]", or `make learn` in the repository; laws that were trained '
+                     'run, export and plot without it'),
+    (maps.training, 'a network is trained with PyTorch, which is not installed: pip install '
+                    '"mpm_ref[learn]", or `make learn` in the repository; or make modes, which '
+                    'need none: --kind modes'),
+])
+def test_without_pytorch_one_sentence_says_what_to_do(monkeypatch, asked, said):
+    monkeypatch.setitem(sys.modules, "torch", None)
+    for name in [name for name in sys.modules if ".learn." in name]:
+        monkeypatch.delitem(sys.modules, name)
+    with pytest.raises(ValueError, match="PyTorch") as refusal:
+        asked()
+    assert str(refusal.value) == said
+
+
+def test_another_module_that_is_missing_is_named():
+    with pytest.raises(ModuleNotFoundError, match=r"mpm_ref\.nclaw\.learn\.unheard"):
+        part("nclaw.learn.unheard", "it is made", "")
+
+
+def test_with_pytorch_the_part_is_there():
+    pytest.importorskip("torch")
+    assert training.drive().__name__ == "mpm_ref.nclaw.learn.drive"
+    assert maps.training().__name__ == "mpm_ref.rom.learn.drive"

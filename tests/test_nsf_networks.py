@@ -1,0 +1,158 @@
+"""Trained networks of NSF's scenes: which weights are taken for them, what they cost, and the
+experiment on them; the training itself is in test_nsf_networks_learn.py.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from field_toys import R, networks
+
+from mpm_ref.reduced.errors import Errors
+from mpm_ref.reduced.whole import whole
+from mpm_ref.rom.fields_file import Model, save
+from mpm_ref.rom.spanned import Sizes
+from validation import targets
+from validation.nsf import networks as kept
+from validation.nsf import networks_runs as runs
+from validation.nsf.networks import Net, Part, Untrained, fields_of, identity, nets, trained
+from validation.nsf.studies import jelly
+from validation.nsf.tested import Found
+from validation.results import Results
+from validation.run import Setting, run_all
+
+STUDY = jelly(4)._replace(train=(0.3, 0.5), sizes=Sizes(r=R), samples=20)
+NET = Net(STUDY, Part(4, 2, 0.1), Part(5, 2, 0.0), Part(6, 2, 0.0))
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder of weights where only those of a small study belong."""
+    monkeypatch.setattr(kept, "FOLDER", tmp_path)
+    for module in (kept, runs):
+        monkeypatch.setattr(module, "nets", lambda: {"jelly": NET})
+    trained.cache_clear()
+    yield tmp_path
+    trained.cache_clear()
+
+
+def model(net=NET):
+    """Networks drawn at random that say they are a net's."""
+    rng = np.random.default_rng(0)
+    return Model(*networks(3), rng.normal(size=(2, 31, R)), rng.normal(size=R), identity(net))
+
+
+def test_the_networks_are_those_of_two_scenes_with_the_printed_latent_coordinates():
+    printed = targets.load()
+    assert {*nets()} == {"jelly", "metal"}
+    for name, net in nets().items():
+        assert net.study.sizes.r == printed[f"nsf.table1.{name}.r"].value
+    assert [net.study.follows for net in nets().values()] == [False, True]
+
+
+@pytest.mark.usefixtures("folder")
+def test_missing_weights_say_how_they_are_made():
+    with pytest.raises(Untrained, match=r"no weights jelly.npz: python -m validation.train_fields "
+                                        "jelly"):
+        trained("jelly")
+
+
+def test_weights_come_back_as_fields_of_the_scene(folder):
+    save(folder / "jelly.npz", model())
+    fields = fields_of(trained("jelly"), STUDY)
+    X, xhat, some = whole(STUDY.run(0.45)).X, np.array([0.2, -0.1, 0.4]), np.array([3, 40])
+    assert np.array_equal(fields.X, X)
+    assert fields.place(some, xhat) == pytest.approx(model().g.place(X[some], xhat))
+    assert fields.stress(some, xhat)[:, 0, 2] == pytest.approx(
+        model().h.values(X[some], xhat)[:, 2])
+
+
+@pytest.mark.parametrize("change", [
+    {"study": STUDY._replace(train=(0.3, 0.4))}, {"study": STUDY._replace(every=8)},
+    {"study": STUDY._replace(follows=True)}, {"study": STUDY._replace(sizes=Sizes(r=R + 1))},
+    {"g": Part(4, 2, 0.2)}, {"h": Part(5, 3, 0.0)}, {"l": Part(7, 2, 0.0)}, {"batch": 4},
+    {"points": 9}, {"latent": "free"}, {"schedule": "steps"}, {"seed": 1}],
+    ids=lambda change: next(iter(change)))
+def test_weights_of_another_training_are_refused(folder, change):
+    save(folder / "jelly.npz", model(NET._replace(**change)))
+    with pytest.raises(ValueError, match=r"weights jelly.npz are of .*, now it is .*: python -m "
+                                         "validation.train_fields jelly"):
+        trained("jelly")
+
+
+def test_damaged_weights_are_refused(folder):
+    save(folder / "jelly.npz", model())
+    content = (folder / "jelly.npz").read_bytes()
+    (folder / "jelly.npz").write_bytes(content[:3000] + b"?" + content[3001:])
+    with pytest.raises(ValueError, match="is damaged"):
+        trained("jelly")
+
+
+def test_weights_that_lie_there_are_those_of_their_nets():
+    """What is committed fits what is asked for; 2 MB at most each."""
+    for file in kept.FOLDER.glob("*.npz"):
+        assert trained(file.stem).g.r == nets()[file.stem].study.sizes.r
+        assert file.stat().st_size <= 2e6
+
+
+# The experiment.
+
+def recorded(folder):
+    """{id without "nsf.networks.": `Record`} of the experiment, which must not fail."""
+    setting = Setting("standard", folder / "out", targets=targets.load())
+    assert run_all([runs.networks.experiment], setting) == []
+    return {r.target.removeprefix("nsf.networks."): r
+            for r in Results(folder / "out").records("nsf.networks")}
+
+
+def test_without_weights_there_are_costs_and_the_command(folder):
+    found = recorded(folder)
+    assert found["untrained"].value == 1
+    assert "python -m validation.train_fields jelly" in found["untrained"].note
+    assert found["jelly.weights"].value == (6 * 4 + 4 * 16 + 4 * 3 + 6 * 5 + 4 * 25 + 5 * 6
+                                            + 6 * 6 + 4 * 36 + 6 * 9)
+    assert found["jelly.operations"].value == 2 * found["jelly.weights"].value
+    assert "jelly.all" not in found
+
+
+def test_the_printed_networks_of_jelly_are_those_of_table_1(folder, monkeypatch):
+    """By hand: 5 x 96, 5 x 384 and 5 x 576."""
+    monkeypatch.setattr(runs, "nets", lambda: {"jelly": nets()["jelly"]})
+    assert recorded(folder)["jelly.weights.printed"].value == 37_920 + 595_200 + 1_336_896
+
+
+@dataclass
+class Ready:
+    """Stands for `Tested`: known errors, of each draw others."""
+
+    study: object
+    tests: object
+    fields: object
+
+    def errors(self, value, count, draw):
+        """Errors that tell their draw."""
+        return Found(Errors(0.01 * (draw + 1), 0.02, 0.03), 0.2, float(count))
+
+    def nearest(self, value):
+        """Of the nearest states."""
+        return Errors(0.001, 0.002, 0.003)
+
+
+def test_errors_are_means_in_per_cent(folder, monkeypatch):
+    save(folder / "jelly.npz", model())
+
+    def ready(model, study):
+        fields = fields_of(model, study)
+        test = type("History", (), {"X": fields.X, "x": np.zeros((1, 31, 1, 3))})
+        return Ready(study, {0.45: test}, fields)
+
+    monkeypatch.setattr(runs, "tested_on", ready)
+    found = recorded(folder)
+    assert found["jelly"].value == pytest.approx(5.5)           # mean of 1 .. 10 %
+    assert "the largest 10 %" in found["jelly"].note
+    assert found["jelly.all"].value == pytest.approx(1.0)
+    assert found["jelly.nearest"].value == pytest.approx(0.1)
+    assert found["jelly.stress"].value == pytest.approx(20.0)
+    assert "2 runs and 1 tests, dx and dt 4 times as long; r = 3, widths 4, 5 and 6" in (
+        found["jelly"].scale)
+    assert "untrained" not in found

@@ -1,0 +1,97 @@
+"""What studies with model = "nsf" may not say, and what `mpm-ref rom` refuses of them; the shipped
+study beside the experiment.
+"""
+
+import pytest
+from command_line import assert_told, mpm_ref
+from small_nsf_studies import SCENE, modelled, write
+
+from mpm_ref.cli.shipped import shipped_scenes, shipped_studies
+from mpm_ref.reduced.study import load
+from validation.nsf.studies import jelly
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Folder with a study, its runs and its fields."""
+    return modelled(tmp_path_factory.mktemp("made"))
+
+
+def reduced(made, out, *options, study="pairs.toml"):
+    """What is answered where a reduced run is asked for."""
+    return mpm_ref("rom", "run", made / study, "--map", made / "fields.npz", "--out", out,
+                   "--set", "v=2", *options)
+
+
+@pytest.mark.parametrize(("edit", "words"), [
+    (('model = "nsf"', 'model = "nfs"'), "model = 'nfs': expected one of 'ldm', 'nsf'"),
+    (('model = "nsf"', "model = [1]"), "model = [1]: expected one of"),
+    (('model = "nsf"', ""), "unknown key"),
+    (("r = 3", "r = 3\ndegree = 2"), "map.degree: unknown key"),
+    (("r = 3", "r = 6"), "modes = 5: expected at least r = 6"),
+    (('kind = "modes"', 'kind = "curved"'), "kind = 'curved': expected one of"),
+    (('kind = "modes"', 'kind = "network"'), 'map.C: given, but the kind is "network"'),
+    (("r = 3", "r = 3\nbeta = [8, 8, 8]"), 'map.beta: given, but the kind is "modes"'),
+    (("smoothing = 1e-6", "smoothing = -1.0"), "smoothing"),
+    (("points = 20", 'inversion = "newton"'), "inversion = 'newton': expected one of"),
+    (("points = 20", 'samples = "kept"'), "run.samples: unknown key"),
+    (("points = 20", "faster = 0.0"), "faster"),
+    (("[map]", "[set]\nevery = 3\n[map]"), "every = 3: expected a divisor of steps = 16"),
+    (("[map]", "[set]\ninterval = 0.01\n[map]"), "interval = 0.01: expected `every`"),
+    (('key = "body.hard.velocity.linear[0]"', 'key = "body.hard.density"'),
+     "runs differ in `body[0].density`"),
+])
+def test_a_study_with_a_fault_is_refused_in_a_sentence(tmp_path, edit, words):
+    for command in (("info",), ("rom", "generate"), ("rom", "evaluate")):
+        assert_told(mpm_ref(*command, write(tmp_path, edit)), 2, "pairs.toml: ", words)
+    assert not (tmp_path / "pairs-data").exists()
+
+
+@pytest.mark.parametrize(("before", "after", "words"), [
+    ('transfer = "apic"', 'transfer = "pic"', "has the transfer pic"),
+    ('law = "fixed_corotated", E = 1e5, nu = 0.3', 'law = "fluid", lam = 1e5', "has a fluid"),
+])
+def test_scenes_that_reduced_runs_do_not_know_are_refused_before_any_run(
+        tmp_path, before, after, words):
+    assert before in SCENE
+    study = write(tmp_path, scene=SCENE.replace(before, after))
+    assert_told(mpm_ref("rom", "generate", study, "--out", tmp_path / "data"), 2, words)
+    assert not (tmp_path / "data").exists()
+
+
+@pytest.mark.parametrize(("edit", "words"), [
+    (("points = 20", "points = 1"), "1 samples for 3 latent coordinates: expected at least 2"),
+    (("points = 20", "points = 999"), "999 samples of "),
+    (("points = 20", "faster = 99.0"), "faster = 99: expected at most 16"),
+    (("to = 2.4", "to = 2.5"), "is a map of another study"),
+])
+def test_what_a_run_cannot_be_made_with_is_refused(made, tmp_path, edit, words):
+    done = reduced(made, tmp_path / "run.h5", study=write(tmp_path, edit))
+    assert_told(done, 2, words)
+    assert not (tmp_path / "run.h5").exists()
+
+
+def test_fields_of_modes_are_shown_at_their_own_points(made, tmp_path):
+    done = reduced(made, tmp_path / "run.h5", "--points-out", 100)
+    assert_told(done, 2, "--points-out 100: reduced runs with inferred stress ", "leave it out")
+    assert not (tmp_path / "run.h5").exists()
+
+
+def test_more_modes_than_the_runs_hold_are_refused(made, tmp_path):
+    study = write(tmp_path, ("tau = 8", "tau = 80"))
+    done = mpm_ref("rom", "train", study, "--data", made / "data", "--out", tmp_path / "f.npz")
+    assert_told(done, 2, "tau = 80: expected 1 .. ")
+    assert not (tmp_path / "f.npz").exists()
+
+
+# Shipped studies.
+
+def test_the_papers_study_has_the_runs_of_the_experiment():
+    shipped, experiment = load(shipped_studies()["jelly"], shipped_scenes()), jelly()
+    assert shipped.mu[list(shipped.train), 0].tolist() == list(experiment.train)
+    assert shipped.mu[list(shipped.test), 0].tolist() == list(experiment.test)
+    assert shipped.tables.map.sizes == experiment.sizes
+    assert shipped.tables.map.told == experiment.follows
+    assert shipped.tables.run.points == experiment.samples
+    for value in (0.3, 0.45):
+        assert shipped.scene([value]) == experiment.run(value)

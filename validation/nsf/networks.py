@@ -1,0 +1,92 @@
+"""The trained networks of NSF's experiments: which there are, how they are made, and where they
+stand.
+
+Latent coordinates are those of POD modes, in one unit of length: an encoder has to be learned, and
+nothing says what a map is like beside its snapshots, where a reduced run soon is. Here the position
+is also trained on snapshots that are moved along the modes. Each is a file of weights, remade by
+`python -m validation.train_fields NAME`.
+"""
+
+import hashlib
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+from mpm_ref.reduced.whole import whole
+from mpm_ref.rom.architecture import DEPTH
+from mpm_ref.rom.fields_file import load
+from mpm_ref.rom.learned import learned
+from mpm_ref.scene.text import canonical
+
+from ..nclaw.nets import Untrained
+from .studies import Study, jelly, metal
+from .tested import BLOCK
+
+FOLDER = Path(__file__).parent / "weights"
+DISPLACED, BLURRED = 0.1, 0.01      # `Part.beside` of the position, and of what is not known there
+
+
+class Part(NamedTuple):
+    """One of the three networks."""
+
+    width: int              # of its hidden layers, of which there are DEPTH (NSF-arch)
+    epochs: int             # of its training
+    beside: float           # how far from the snapshots, in latent coordinates, it is shown them
+
+    @property
+    def hidden(self):
+        """Widths of the hidden layers."""
+        return (self.width,) * DEPTH
+
+
+class Net(NamedTuple):
+    """What is trained: a study's runs, and how."""
+
+    study: Study
+    g: Part                         # position
+    h: Part                         # stress
+    l: Part                         # affine field
+    batch: int = 16                 # snapshots
+    points: int = 32                # shown of each snapshot
+    latent: str = "directions"      # of `learn.fit.LATENTS`
+    schedule: str = "warm"          # of `learn.schedule`
+    seed: int = 0
+
+
+def nets():
+    """{name: `Net`} of all scenes that have networks."""
+    return {"jelly": Net(jelly(), Part(64, 5000, DISPLACED), Part(64, 3000, BLURRED),
+                         Part(64, 1500, BLURRED)),
+            "metal": Net(metal(2), Part(64, 2500, DISPLACED), Part(64, 1800, BLURRED),
+                         Part(64, 1000, BLURRED))}
+
+
+@cache
+def trained(name):
+    """`fields_file.Model` of a scene. Raises `Untrained` where it is missing, ValueError where it
+    is damaged, or of another training or other scenes than `nets` says now.
+    """
+    path, again = FOLDER / f"{name}.npz", f"python -m validation.train_fields {name}"
+    if not path.exists():
+        raise Untrained(f"no weights {path.name}: {again}")
+    model, now = load(path), identity(nets()[name])
+    was = {key: model.about.get(key) for key in now}
+    if was != now:
+        raise ValueError(f"weights {path.name} are of {was}, now it is {now}: {again}")
+    return model
+
+
+def identity(net):
+    """What a training is of: the runs' scenes, and how it is made; plain values."""
+    texts = "".join(canonical(net.study.run(value)) for value in net.study.train)
+    parts = {name: dict(getattr(net, name)._asdict()) for name in "ghl"}
+    return {"scenes": hashlib.sha256(texts.encode()).hexdigest()[:16], "r": net.study.sizes.r,
+            "follows": net.study.follows, "spacing": net.study.spacing, **parts,
+            **{name: getattr(net, name) for name in Net._fields if name not in ("study", *"ghl")}}
+
+
+def fields_of(model, study):
+    """`LearnedFields` of a `fields_file.Model` in the first run of a study."""
+    one = whole(study.run(study.train[0]))
+    mu = [study.train[0]] if study.follows else []
+    return learned(one.X, (model.g, model.h, model.l), mu, BLOCK * one.problem.dx)
