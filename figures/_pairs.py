@@ -19,12 +19,19 @@ def sides(kept, rows):
         true, ours = (kept[f"{name}_{word}"].astype(float) for word in ("true", "ours"))
         titles = ("", "", "") if found else ("start", "ours", "truth")
         for x, title in zip((true[0], ours[-1], true[-1]), titles, strict=True):
-            found.append(Panel(dyed(x, true[0]), nothing(), title, "" if len(found) % 3 else words))
+            said = title if np.isfinite(x).any() else f"{title}\nbroke down".strip()
+            found.append(Panel(dyed(x, true[0]), nothing(), said,
+                               "" if len(found) % 3 else words))
     return found
 
 
 def dyed(x, start):
-    """Balls of points x (n, 3), y upwards, with the colours of their heights at the start."""
+    """Balls of points x (n, 3), y upwards, with the colours of their heights at the start; none of
+    points that have no place any more.
+    """
+    placed = np.isfinite(x).all(axis=1)
     share = (start[:, 1] - start[:, 1].min()) / np.ptp(start[:, 1])
     colour = LOW + share[:, None] * (HIGH - LOW)
-    return cloud(x, np.zeros(len(x)), colour, spacing(start))
+    if not placed.any():
+        return nothing()
+    return cloud(x[placed], np.zeros(placed.sum()), colour[placed], spacing(start))

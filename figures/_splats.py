@@ -60,8 +60,10 @@ def outward(x):
 
 
 def image(balls, camera):
-    """RGBA picture (h, w, 4) of balls; at least one."""
+    """RGBA picture (h, w, 4) of balls; nothing to be seen where there are none."""
     depth, normal, colour = buffers(balls, camera)
+    if not len(balls.x):
+        return coarsened(np.zeros((*depth.shape, 4)))
     seen = np.isfinite(depth)
     light = np.clip(normal @ (LIGHT / np.linalg.norm(LIGHT)), 0.0, 1.0)
     bright = DARK + (1.0 - DARK) * light

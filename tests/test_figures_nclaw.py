@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from figures import nclaw_fig02, nclaw_fig03, nclaw_fig06, nclaw_loss
+from figures._bodies import View, pictures
+from figures._pairs import sides
 from mpm_ref.materials import Fluid, NoFlow
 from validation.nclaw import curves, elsewhere, states, tables
 from validation.nclaw.environments import ENVIRONMENTS
@@ -138,3 +140,18 @@ def test_errors_with_velocities_in_them_are_told_and_not_drawn(tmp_path, monkeyp
     assert told not in notes["nclaw.loss.velocity.sand.last"]
     table = results.table("nclaw.loss", "errors")
     assert set(table["environment"]) == {"sand"}
+
+
+def test_a_body_that_broke_down_leaves_its_place_empty():
+    true = np.random.default_rng(0).random((2, 50, 3))
+    ours = true.copy()
+    ours[-1] = np.nan
+    ours[-1, :20] = 0.5
+    gone = np.full_like(ours, np.nan)
+    panels = sides({"a_true": true, "a_ours": ours, "b_true": true, "b_ours": gone},
+                   {"a": "one", "b": "other"})
+    assert [len(panel.solid.x) for panel in panels] == [50, 20, 50, 50, 0, 50]
+    assert [panel.title for panel in panels] == ["start", "ours", "truth", "", "broke down", ""]
+    figure = pictures(panels, View(3, 2.0))
+    shown = [np.ptp(ax.images[0].get_array()) > 0.0 for ax in figure.axes]
+    assert shown == [True, True, True, True, False, True]
