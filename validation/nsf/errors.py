@@ -9,11 +9,10 @@ from mpm_ref.reduced.errors import Errors
 
 from ..registry import experiment
 from .studies import jelly, sand
-from .tested import refitted, tested
+from .tested import FASTER, refitted, tested
 
 ORIGIN = "from the corner of the unit box that scenes stand in"
 MODAL = "fields of modes, no networks"
-FASTER = 1.5            # longer steps at deployment
 DRAWS = 10              # of samples
 COLUMNS = ("fields", "value", "samples", "draw", "faster", "origin", "centroid", "displacement",
            "stress", "points")

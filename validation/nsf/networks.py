@@ -23,7 +23,7 @@ from .studies import Study, jelly, metal
 from .tested import BLOCK
 
 FOLDER = Path(__file__).parent / "weights"
-DISPLACED, BLURRED = 0.1, 0.01      # `Part.beside` of the position, and of what is not known there
+DISPLACED, BLURRED = 0.03, 0.01     # `Part.beside` of the position, and of what is not known there
 
 
 class Part(NamedTuple):
@@ -55,10 +55,10 @@ class Net(NamedTuple):
 
 def nets():
     """{name: `Net`} of all scenes that have networks."""
-    return {"jelly": Net(jelly(), Part(64, 5000, DISPLACED), Part(64, 3000, BLURRED),
+    return {"jelly": Net(jelly(), Part(64, 3500, DISPLACED), Part(64, 3000, BLURRED),
                          Part(64, 1500, BLURRED)),
-            "metal": Net(metal(2), Part(64, 2500, DISPLACED), Part(64, 1800, BLURRED),
-                         Part(64, 1000, BLURRED))}
+            "metal": Net(metal(2), Part(64, 1500, DISPLACED), Part(64, 1200, BLURRED),
+                         Part(64, 500, BLURRED))}
 
 
 @cache

@@ -17,6 +17,7 @@ from mpm_ref.rom.symmetric import values
 
 BLOCK = 3.0             # size of blocks of points [dx]
 SOME = 4000             # points that tell the nearest state
+FASTER = 1.5            # longer steps at deployment
 NOWHERE = Errors(np.inf, np.inf, np.inf)
 
 

@@ -1,0 +1,164 @@
+"""How long reduced runs with inferred stress take, and what they hold, beside our own full-order
+run on the same threads (appendix C and Figure 18 of the paper).
+
+The printed speed-ups count a step that is 1.5 times as long (NSF-X6): both are recorded, and where
+the time of either goes. Fields are those of modes, of three training runs only: how long a step
+takes does not depend on what is in them.
+"""
+
+from collections import deque
+from time import perf_counter
+
+import numpy as np
+
+from mpm_ref.explicit import deform_body
+from mpm_ref.reduced.inferring import begin
+from mpm_ref.reduced.whole import whole
+from mpm_ref.rom.inferred import Inferred
+from mpm_ref.simulate import simulate
+
+from ..registry import experiment
+from ..verification.scenes import with_
+from .studies import cake, metal
+from .tested import FASTER, tested
+
+INFO = {"comparator": "info"}
+REPEATS, WARM = 3, 3        # timings; steps before them
+STAGES = ("integration", "inferred", "moved", "inverted")
+COLUMNS = ("scene", "samples", "inversion", "points", "full", "deform", *STAGES, "reduced")
+STUDIES = {"metal": (metal, (30, 10)), "cake": (cake, (700, 100))}
+
+
+class Clocked(Inferred):
+    """The reduced model, which keeps the seconds of its stages."""
+
+    def begin(self):
+        """Forget what was spent."""
+        self.spent = dict.fromkeys(STAGES, 0.0)
+
+    def clocked(self, stage, *given):
+        """What a stage gives."""
+        start = perf_counter()
+        found = getattr(super(), stage)(*given)
+        self.spent[stage] += perf_counter() - start
+        return found
+
+    def integration(self, *given):
+        """As `Inferred`, clocked."""
+        return self.clocked("integration", *given)
+
+    def inferred(self, *given):
+        """As `Inferred`, clocked."""
+        return self.clocked("inferred", *given)
+
+    def moved(self, *given):
+        """As `Inferred`, clocked."""
+        return self.clocked("moved", *given)
+
+    def inverted(self, *given):
+        """As `Inferred`, clocked."""
+        return self.clocked("inverted", *given)
+
+
+@experiment("nsf.speed", title="NSF: time beside the full-order run",
+            profiles=("quick", "standard"), budget={"quick": 20, "standard": 600})
+def speed(run):
+    """Metal frame and cake: time of a step and where it goes; bytes held."""
+    steps, rows = run.choose(quick=20, standard=100), []
+    for name, (study, counts) in run.progress(STUDIES.items(), "scenes"):
+        small = study(run.choose(quick=3, standard=1), train=3)
+        one = tested(small._replace(test=small.test[1:2]))
+        rows += of_scene(run, name, one, counts, steps)
+    run.table("times", COLUMNS, rows)
+
+
+def of_scene(run, name, one, counts, steps):
+    """Record times and bytes of a scene; a row for each number of samples and inversion."""
+    full, rows = whole_steps(one, steps), []
+    for count in counts:
+        for inversion in ("nonlinear", "linear"):
+            found = [reduced_steps(one, count, inversion, steps) for _ in range(REPEATS)]
+            spent = {key: float(np.median([f[key] for f in found])) for key in found[0]}
+            rows.append((name, count, inversion, spent["points"], *full,
+                         *(spent[stage] for stage in STAGES), spent["reduced"]))
+    record_times(run, name, one, rows, steps)
+    record_bytes(run, name, one)
+    return rows
+
+
+def whole_steps(one, steps):
+    """Seconds of a full-order step, and of its update of deformation: singular values, return map
+    and stress; medians.
+    """
+    scene = one.study.run(one.study.test[0])
+    problem = whole(with_(scene, steps=steps, every=steps, interval=None)).problem
+    deque(simulate(whole(with_(scene, steps=WARM, every=WARM, interval=None)).problem), maxlen=0)
+    took = []
+    for _ in range(REPEATS):
+        start = perf_counter()
+        *_, last = simulate(problem)
+        took.append((perf_counter() - start) / steps)
+    dt, deform = problem.clock.dt, []
+    for _ in range(2 * REPEATS):
+        start = perf_counter()
+        for body in last.state.bodies:
+            deform_body(body, dt)
+        deform.append(perf_counter() - start)
+    return float(np.median(took)), float(np.median(deform))
+
+
+def reduced_steps(one, count, inversion, steps):
+    """{what: seconds of a reduced step; of its stages}, and integration points; means."""
+    value = one.study.test[0]
+    scene, fields = whole(one.study.run(value)), one.of(value)
+    problem = scene.problem
+    stepper = Clocked(fields, scene.matter, problem.dx, problem.scheme.degree, problem.gravity,
+                      problem.conditions, inversion)
+    samples = one.study.chosen(scene, count, 0)[0].points
+    stepper.begin()
+    at, dt, points = begin(scene, fields, one.xhat[:, 0].mean(axis=0)), problem.clock.dt, []
+    for k in range(WARM + steps):
+        if k == WARM:
+            stepper.begin()
+            start = perf_counter()
+        at, report = stepper.step(at, samples, k * dt, dt)
+        points.append(report.points)
+    took = {stage: spent / steps for stage, spent in stepper.spent.items()}
+    return took | {"reduced": (perf_counter() - start) / steps, "points": float(np.mean(points))}
+
+
+def record_times(run, name, one, rows, steps):
+    """Record speed-ups, shares and times of a scene's rows; the printed ones are of the first."""
+    scale = f"{len(one.fields.X)} particles, {steps} steps, the first of a run"
+    printed = run.choose(quick=INFO, standard={})
+    (_, count, _, points, full, deform, *stages, reduced), n = rows[0], len(one.fields.X)
+    note = f"{count} samples, Gauss-Newton; median of {REPEATS}"
+    for target, value, rule in (
+            (f"nsf.appC.{name}.speedup_per_step", full / reduced, printed),
+            (f"nsf.{name}.speedup", FASTER * full / reduced, printed)):
+        run.record(target, value, unit="x", scale=scale, note=note, **rule)
+    for target, value in (("full", 100.0 * full), ("reduced_mpm", 100.0 * stages[2]),
+                          ("network", 100.0 * (reduced - stages[2]))):
+        run.record(f"nsf.appC.{name}.{target}", value, unit="s/100 frames", scale=scale,
+                   note=f"{note}; printed: a graphics processor", **INFO)
+    for target, value in (("particle_share", points / n), ("runtime_share", stages[2] / full)):
+        run.record(f"nsf.appC.{name}.{target}", 100.0 * value, unit="%", scale=scale, note=note,
+                   **INFO)
+    run.record(f"nsf.speed.{name}.deform", 100.0 * deform / full, unit="%", scale=scale, **INFO,
+               note="of the full-order step: singular values, return map and stress, which a "
+                    "reduced run skips")
+    for _, count, inversion, points, *_, reduced in rows:
+        run.record(f"nsf.speed.{name}.{inversion}.{count}", full / reduced, unit="x", scale=scale,
+                   note=f"at equal step; {count} samples, {points:.0f} integration points; "
+                        f"{1e3 * reduced:.3g} ms a step beside {1e3 * full:.3g} ms", **INFO)
+
+
+def record_bytes(run, name, one):
+    """Record the bytes of the fields, and of the particles of a full-order run."""
+    fields, problem = one.fields, whole(one.study.run(one.study.test[0])).problem
+    held = sum(a.nbytes for a in (fields.X, fields.U, fields.tau.modes, fields.C.modes))
+    particles = sum(a.nbytes for body in problem.bodies for a in body.particles)
+    for word, value, note in (("fields", held, "positions and modes; of doubles"),
+                              ("particles", particles, "of a full-order run, without the grid")):
+        run.record(f"nsf.speed.{name}.bytes.{word}", value, unit="B", note=note,
+                   scale=f"{len(fields.X)} particles", **INFO)
