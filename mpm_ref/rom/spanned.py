@@ -19,6 +19,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..core.blas import one_thread
+from .combine import combined
 from .radial import SMOOTHING, Radial, through
 from .symmetric import tensor
 
@@ -34,7 +35,7 @@ class Part(NamedTuple):
 
     def at(self, points, y):
         """Its values (m, k) at points of these numbers."""
-        return self.modes[points] @ self.coefficients.value(y)
+        return combined(self.modes, points, self.coefficients.value(y))
 
 
 class Cells(NamedTuple):
@@ -88,12 +89,11 @@ class Spanned(NamedTuple):
 
     def place(self, points, xhat):
         """x (m, d) [m] of points of these numbers."""
-        return self.X[points] + self.U[points] @ self.all(xhat)
+        return self.X[points] + combined(self.U, points, self.all(xhat))
 
     def derivatives(self, points, xhat):
         """x (m, d), None (no gradient is known in between points), and dg/dxhat (m, d, r)."""
-        U = self.U[points]
-        return self.X[points] + U @ self.all(xhat), None, U @ self.rates(xhat)
+        return self.place(points, xhat), None, self.U[points] @ self.rates(xhat)
 
     def stress(self, points, xhat):
         """Kirchhoff stress (m, d, d) [Pa]."""

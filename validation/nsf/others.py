@@ -22,60 +22,63 @@ DRAWS = 3               # of samples
 
 
 @experiment("nsf.metal", title="NSF: a metal frame is squeezed and let go",
-            profiles=("quick", "standard"), budget={"quick": 40, "standard": 1500})
+            budget={"quick": 20, "standard": 1500, "paper": 7200})
 def frame(run):
     """Errors with 50, 30 and 20 samples (section 6.3)."""
-    counted(run, "nsf.metal", metal, (50, 30, 20))
+    counted(run, "nsf.metal", prepared(run, metal, 1, train=5), (50, 30, 20))
 
 
 @experiment("nsf.toothpaste", title="NSF: toothpaste on a brush",
-            profiles=("quick", "standard"), budget={"quick": 40, "standard": 1500})
+            budget={"quick": 20, "standard": 1500, "paper": 7200})
 def paste(run):
     """Errors with 50, 30 and 15 samples (Figures 10 and 11)."""
-    counted(run, "nsf.toothpaste", toothpaste, (50, 30, 15))
+    counted(run, "nsf.toothpaste", prepared(run, toothpaste, train=5), (50, 30, 15))
 
 
 @experiment("nsf.bread", title="NSF: a slice of bread is torn",
-            profiles=("quick", "standard"), budget={"quick": 40, "standard": 1800})
+            budget={"quick": 20, "standard": 600, "paper": 7200})
 def slice_of_bread(run):
     """Errors with 450 samples, and of the deformation-only model (Figure 5)."""
     beside_the_map(run, "nsf.bread", prepared(run, bread, train=6))
 
 
 @experiment("nsf.ball", title="NSF: a squishy ball falls onto an incline",
-            profiles=("quick", "standard"), budget={"quick": 40, "standard": 900})
+            budget={"quick": 20, "standard": 600, "paper": 7200})
 def squishy(run):
     """Errors with 300 samples, and of the deformation-only model (Figure 13)."""
     beside_the_map(run, "nsf.ball", prepared(run, ball))
 
 
 @experiment("nsf.cake", title="NSF: a cake is cut",
-            profiles=("quick", "standard"), budget={"quick": 60, "standard": 3600})
+            budget={"quick": 20, "standard": 900, "paper": 7200})
 def cut(run):
     """Errors with 700 samples in the middle, and 400 in the second half (section 6.1)."""
     one = prepared(run, cake, train=5)
     rows = rows_of(one, "modal", one.study.samples, draws(run))
     share(run, "nsf.cake.error", rows, one.scale, "700, then 400 samples in the middle")
-    points = run.choose(quick="nsf.cake.points", standard="nsf.cake.integration_particles")
-    run.record(points, mean(rows, "points"), scale=one.scale,
-               **run.choose(quick={"comparator": "info"}, standard={}))
+    whole = run.profile == "paper"
+    run.record("nsf.cake.integration_particles" if whole else "nsf.cake.points",
+               mean(rows, "points"), scale=one.scale, **({} if whole else {"comparator": "info"}))
     rows += by_cubature(run, "nsf.cake.cubature", one, one.study.samples, draws(run))
     run.table("errors", COLUMNS, rows + finished(run, "nsf.cake", one))
 
 
-def prepared(run, study, **few):
-    """`Tested` of a study at a run's profile; few: its settings at the quick one."""
-    return tested(run.choose(quick=lambda: study(3, **few), standard=study)())
+def prepared(run, study, standard=2, **few):
+    """`Tested` of a study at a run's profile; standard: how much coarser its grid is at the standard
+    one; few: its settings at the quick one.
+    """
+    return tested(run.choose(quick=lambda: study(3, **few), standard=lambda: study(standard),
+                             paper=study)())
 
 
 def draws(run):
     """Of samples."""
-    return range(run.choose(quick=1, standard=DRAWS))
+    return range(run.choose(quick=1, standard=DRAWS, paper=DRAWS))
 
 
-def counted(run, name, study, counts):
+def counted(run, name, one, counts):
     """Record errors with several numbers of samples."""
-    one, rows = prepared(run, study, train=5), []
+    rows = []
     for count in counts:
         found = rows_of(one, "modal", count, draws(run))
         share(run, f"{name}.error.{count}", found, one.scale, f"{count} samples")
