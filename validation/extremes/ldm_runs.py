@@ -168,5 +168,5 @@ def record_silent(run, name, trials, scale, note=""):
 
 def table_of(run, trials):
     """Write the trials as a table."""
-    run.table("runs", (*Trial._fields[:-1], "kind", *End._fields),
+    run.table("runs", (*Trial._fields[:-1], "kind", *trials[0].end._fields),
               [(*t[:-1], t.kind, *t.end) for t in trials])

@@ -64,7 +64,7 @@ def cut(run):
 
 
 def prepared(run, study, standard=2, **few):
-    """`Tested` of a study at a run's profile; standard: how much coarser its grid is at the standard
+    """`Tested` of a study at a profile; standard: how much coarser its grid is at the standard
     one; few: its settings at the quick one.
     """
     return tested(run.choose(quick=lambda: study(3, **few), standard=lambda: study(standard),

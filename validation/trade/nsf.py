@@ -1,0 +1,103 @@
+"""What a reduced run with inferred stress costs and gives: by its samples, and by its time step."""
+
+from collections import deque
+
+import numpy as np
+
+from mpm_ref.core.blas import one_thread
+from mpm_ref.reduced.inferring import Plan, infer
+from mpm_ref.reduced.whole import whole
+from mpm_ref.rom.step import BREAKDOWNS
+from mpm_ref.simulate import simulate
+
+from ..extremes.nsf_runs import scenes
+from ..extremes.outcome import outcome
+from ..ldm.racing import clocked
+from ..nsf.errors import COLUMNS, mean, rows_of, share
+from ..registry import experiment
+from ..verification.scenes import with_
+from .front import front
+
+COUNTS = {"quick": (10, 50), "standard": (5, 10, 20, 30, 50, 100, 200, 400)}
+DRAWS = {"quick": 2, "standard": 5}
+WAYS = {"random": False, "cubature": True}      # whether samples have weights
+FACTORS = (1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 10.0)    # of the scene's step
+WORDS = "the full-order run {:.3g} CPU s, the reduced one {:.3g}"
+
+
+@experiment("trade.nsf.samples", title="NSF: error and cost by number and kind of samples",
+            profiles=("quick", "standard"), budget={"quick": 15, "standard": 300})
+def of_samples(run):
+    """Samples drawn at random, beside samples with weights by cubature; several draws."""
+    rows = []
+    for name, one in scenes(run):
+        full, found = full_cpu(one), []
+        settings = [(word, count) for count in COUNTS[run.profile] for word in WAYS]
+        for word, count in run.progress([*settings, ("random", len(one.fields.X))], name):
+            found.append(of_setting(run, one, f"{name}.{word}", count, full))
+        best = front([cpu for _, cpu in found], [mean(own, "origin") for own, _ in found])
+        rows += [(name, *row, cpu, full, int(on))
+                 for (own, cpu), on in zip(found, best, strict=True) for row in own]
+    run.table("samples", ("scene", *COLUMNS, "cpu", "cpu_full", "pareto"), rows)
+
+
+def of_setting(run, one, words, count, full):
+    """Record the errors with so many samples; rows of all runs, and CPU seconds of one."""
+    word = words.rpartition(".")[2]
+    draws = range(DRAWS[run.profile] if count < len(one.fields.X) else 1)
+    rows = rows_of(one, word, count, draws, weighed=WAYS[word])
+    cpu = reduced_cpu(one, count, WAYS[word], run.choose(quick=1, standard=3))
+    share(run, f"trade.nsf.samples.{words}.{count}", rows, one.scale, f"{count} samples, {word}; "
+          f"of the stress {100.0 * mean(rows, 'stress'):.3g} %; {mean(rows, 'points'):.0f} "
+          f"integration points; {WORDS.format(full, cpu)}", comparator="info")
+    return rows, cpu
+
+
+def full_cpu(one):
+    """CPU seconds of the steps of the full-order run of the first test."""
+    scene = one.study.run(one.study.test[0])
+    problem = whole(with_(scene, every=scene.steps, interval=None)).problem
+    return clocked(lambda: deque(simulate(problem), maxlen=0))[1].cpu
+
+
+def reduced_cpu(one, count, weighed, repeats):
+    """Median of the CPU seconds of reduced runs of the first test; infinite where they break down.
+    Samples are chosen before.
+    """
+    value = one.study.test[0]
+    scene, fields = whole(one.study.run(value)), one.of(value)
+    plan = Plan(one.study.chosen(scene, count, 0, one.fields if weighed else None))
+    start = one.xhat[:, 0].mean(axis=0)
+    try:
+        with one_thread():
+            found = [clocked(lambda: deque(infer(scene, fields, plan, start), maxlen=0))[1].cpu
+                     for _ in range(repeats)]
+    except BREAKDOWNS:
+        return np.inf
+    return float(np.median(found))
+
+
+@experiment("trade.nsf.dt", title="NSF: error by the length of the step",
+            profiles=("quick", "standard"), budget={"quick": 15, "standard": 120})
+def of_steps(run):
+    """Until a run breaks down; beside them, how the full-order run with this step ends."""
+    rows = []
+    for name, one in scenes(run):
+        draws = range(run.choose(quick=1, standard=3))
+        for factor in run.progress(FACTORS, name):
+            found = rows_of(one, "modal", one.study.samples, draws, factor)
+            said = full_end(one.study.run(one.study.test[0]), factor)
+            share(run, f"trade.nsf.dt.{name}.{factor:g}", found, one.scale, f"steps {factor:g} "
+                  f"times as long, {one.study.samples} samples; the full-order run: {said}",
+                  comparator="info")
+            rows += [(name, *row, said) for row in found]
+            if not all(np.isfinite(row[COLUMNS.index("origin")]) for row in found):
+                break
+    run.table("steps", ("scene", *COLUMNS, "full"), rows)
+
+
+def full_end(scene, factor):
+    """How a full-order run with a step so many times as long ends, a word of `outcome`."""
+    steps = round(scene.steps / factor)
+    longer = with_(scene, dt=factor * scene.dt, steps=steps, every=steps, interval=None)
+    return outcome(whole(longer).problem).kind

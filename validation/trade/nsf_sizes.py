@@ -1,0 +1,84 @@
+"""What the sizes of NSF's fields of modes give, and the memory they take beside that of the
+full-order run's particles.
+"""
+
+import numpy as np
+
+from mpm_ref.reduced.whole import whole
+
+from ..extremes.nsf_runs import scenes
+from ..nsf.errors import COLUMNS, mean, rows_of, share
+from ..nsf.tested import refitted
+from ..registry import experiment
+
+LEVELS = {          # one at a time, from the study's own
+    "quick": {"r": (3,), "modes": (10,), "tau": (10,), "C": (10,), "smoothing": (1.0,)},
+    "standard": {"r": (2, 3, 4, 6, 8), "modes": (8, 12, 40), "tau": (5, 10, 20, 80),
+                 "C": (5, 10, 20, 80), "smoothing": (1e-8, 1e-6, 1e-4, 1e-2, 1.0, 100.0)}}
+OWN = ("scene", "knob", "r", "modes", "tau", "C", "smoothing", *COLUMNS[1:], "bytes", "bytes_full")
+
+
+@experiment("trade.nsf.sizes", title="NSF: error and memory by latent coordinates and modes",
+            profiles=("quick", "standard"), budget={"quick": 15, "standard": 300})
+def of_sizes(run):
+    """Latent coordinates, modes of each field, smoothing, and modes in single precision."""
+    rows = []
+    for name, one in scenes(run):
+        full = particle_bytes(one.study)
+        for knob, value, changed in run.progress(changes(one, LEVELS[run.profile]), name):
+            rows += of_change(run, f"{name}.{knob}.{value}", changed(), full)
+    run.table("sizes", OWN, rows)
+
+
+def changes(one, levels):
+    """[(knob, value, function that gives a `Tested`)] of all changes, the study's own sizes first
+    and modes in single precision last.
+    """
+    def refit(knob, value):
+        return lambda: refitted(one, one.study.sizes._replace(**{knob: value}), one.study.follows)
+
+    found = [(knob, f"{value:g}", refit(knob, value)) for knob, values in levels.items()
+             for value in values if value != getattr(one.study.sizes, knob)]
+    return [("own", "sizes", lambda: one), *found,
+            ("precision", "single", lambda: one._replace(fields=single(one.fields)))]
+
+
+def of_change(run, words, one, full):
+    """Record errors and bytes of a `Tested`; rows of its runs."""
+    name, knob, _ = words.split(".", 2)
+    size, sizes = nbytes(one.fields), one.study.sizes
+    rows = rows_of(one, knob, one.study.samples, range(run.choose(quick=1, standard=3)))
+    share(run, f"trade.nsf.sizes.{words}", rows, one.scale, f"of the stress "
+          f"{100.0 * mean(rows, 'stress'):.3g} %; {size / 1e6:.3g} MB of fields, the particles of "
+          f"the full-order run {full / 1e6:.3g} MB", comparator="info")
+    return [(name, knob, sizes.r, sizes.modes, sizes.tau, sizes.C, sizes.smoothing, *row[1:], size,
+             full) for row in rows]
+
+
+def single(fields):
+    """`Spanned` fields whose modes are stored in single precision; sums are of doubles."""
+    def shorter(part):
+        return part and part._replace(modes=part.modes.astype(np.float32))
+
+    return fields._replace(U=fields.U.astype(np.float32), tau=shorter(fields.tau),
+                           C=shorter(fields.C))
+
+
+def nbytes(record):
+    """Bytes of all arrays of nested records, each counted once."""
+    return sum(a.nbytes for a in {id(a): a for a in arrays_of(record)}.values())
+
+
+def arrays_of(record):
+    """Yield the arrays of nested records."""
+    for a in record:
+        if isinstance(a, np.ndarray):
+            yield a
+        elif isinstance(a, tuple):
+            yield from arrays_of(a)
+
+
+def particle_bytes(study):
+    """Bytes of the particles' arrays of a full-order run."""
+    problem = whole(study.run(study.test[0])).problem
+    return sum(nbytes(body.particles) for body in problem.bodies)
