@@ -22,14 +22,14 @@ DRAWS = 3               # of samples
 
 
 @experiment("nsf.metal", title="NSF: a metal frame is squeezed and let go",
-            budget={"quick": 20, "standard": 1500, "paper": 7200})
+            budget={"quick": 20, "standard": 600, "paper": 7200})
 def frame(run):
     """Errors with 50, 30 and 20 samples (section 6.3)."""
-    counted(run, "nsf.metal", prepared(run, metal, 1, train=5), (50, 30, 20))
+    counted(run, "nsf.metal", prepared(run, metal, train=5), (50, 30, 20))
 
 
 @experiment("nsf.toothpaste", title="NSF: toothpaste on a brush",
-            budget={"quick": 20, "standard": 1500, "paper": 7200})
+            budget={"quick": 20, "standard": 600, "paper": 7200})
 def paste(run):
     """Errors with 50, 30 and 15 samples (Figures 10 and 11)."""
     counted(run, "nsf.toothpaste", prepared(run, toothpaste, train=5), (50, 30, 15))
@@ -63,11 +63,9 @@ def cut(run):
     run.table("errors", COLUMNS, rows + finished(run, "nsf.cake", one))
 
 
-def prepared(run, study, standard=2, **few):
-    """`Tested` of a study at a profile; standard: how much coarser its grid is at the standard
-    one; few: its settings at the quick one.
-    """
-    return tested(run.choose(quick=lambda: study(3, **few), standard=lambda: study(standard),
+def prepared(run, study, **few):
+    """`Tested` of a study at a run's profile; few: its settings at the quick one."""
+    return tested(run.choose(quick=lambda: study(3, **few), standard=lambda: study(2),
                              paper=study)())
 
 
