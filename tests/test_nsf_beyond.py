@@ -1,0 +1,51 @@
+"""Bread with other weak elements, and sand past its training."""
+
+import numpy as np
+import pytest
+
+from mpm_ref.reduced.whole import whole
+from validation.nsf import beyond, tested
+from validation.nsf.studies import bread
+
+
+@pytest.fixture(scope="module")
+def slice_of_bread():
+    return tested.tested(bread(4, train=3)._replace(test=(beyond.E,)))
+
+
+def boxes(scene):
+    """Lower and upper ends of the weak boxes along x."""
+    return np.array([[box.lower[0], box.upper[0]] for box in scene.body[1].shape.shapes])
+
+
+def test_weak_boxes_are_shifted_in_both_bodies_and_stay_between_the_ends():
+    base = bread(2).run(beyond.E)
+    mild, rough = (beyond.shifted(base, scale, 0) for scale in (0.08, 0.3))
+    for scene in (mild, rough):
+        assert scene.body[0].shape.minus == scene.body[1].shape.shapes
+        assert (boxes(scene)[:, 0] > 0.4 - 1e-12).all()
+        assert (boxes(scene)[:, 1] < 0.6 + 1e-12).all()
+        assert np.allclose(np.ptp(boxes(scene), axis=1), 0.025)
+    off = [np.abs(boxes(scene) - boxes(base)).max() for scene in (mild, rough)]
+    assert 0.005 < off[0] <= 0.02
+    assert off[1] > 2.0 * off[0]
+    assert beyond.shifted(base, 0.08, 0) == mild
+    assert beyond.shifted(base, 0.08, 1) != mild
+
+
+def test_points_are_in_the_order_of_training(slice_of_bread):
+    one = slice_of_bread
+    scene = beyond.shifted(one.study.run(beyond.E), 0.3, 0)
+    assert not np.array_equal(whole(scene).X, one.runs.X)
+    test = beyond.other(one, scene)
+    assert np.abs(test.X - one.runs.X).max() < 1e-12
+    assert np.abs(test.x[0, 0] - one.runs.X).max() < 1e-6
+    usual = one.tests[beyond.E]
+    assert test.x.shape == usual.x.shape
+    assert np.abs(test.x[0, -1] - usual.x[0, -1]).max() > 1e-3
+
+
+def test_other_points_are_refused(slice_of_bread):
+    scene = bread(5).run(beyond.E)
+    with pytest.raises(ValueError, match="expected the same slice"):
+        beyond.other(slice_of_bread, scene)
