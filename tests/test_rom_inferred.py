@@ -230,3 +230,13 @@ def test_a_sample_of_weight_two_counts_as_two(d, inversion, rng):
     plain, _ = stepper.inverted((some, None), x, rest, DT)
     assert np.abs(weighed - repeated).max() < 1e-9
     assert np.abs(weighed - plain).max() > 1e-4
+
+
+def test_samples_without_a_place_after_the_step_are_told(d):
+    X, matter = body(40, d)
+    fields = Free(X, np.eye(d))
+    fields.stress = lambda points, xhat: np.full((len(points), d, d), np.nan)
+    stepper = model(fields, matter)
+    with pytest.raises(NoBody, match="t = 0 s: 8 of 8 samples have no finite place after the step, "
+                                     "the first is point 0"):
+        stepper.step(Position(Affine(d).rest), np.arange(0, 40, 5), 0.0, DT)

@@ -85,14 +85,18 @@ class Inferred:
     def step(self, at, samples, t, dt, w=None):
         """`Position` and `Report` after a step from time t [s] by dt [s], with the samples of these
         numbers, sorted, that count by weights w (m,), or all the same. Raises `NoBody` where latent
-        coordinates are not finite, and `core.grid.OutOfRange` where positions are not, or are far
-        apart.
+        coordinates or the samples' positions after the step are not finite, and
+        `core.grid.OutOfRange` where positions before it are not, or are far apart.
         """
         if not np.isfinite(at.xhat).all():
             raise NoBody(f"t = {t:.6g} s: latent coordinates {at.xhat} are not finite")
         points = self.integration(at.xhat, samples)
         cloud = self.inferred(at, points, dt)
         trial = self.moved(cloud, np.searchsorted(points, samples), t, dt)
+        lost = samples[~np.isfinite(trial).all(axis=1)]
+        if len(lost):
+            raise NoBody(f"t = {t:.6g} s: {len(lost)} of {len(samples)} samples have no finite "
+                         f"place after the step, the first is point {lost[0]}; are the fields damaged?")
         xhat, fit = self.inverted((samples, w), trial, at.xhat, dt)
         return Position(xhat, at.xhat), Report(len(samples), len(points), fit.rank, fit.residual,
                                                fit.iterations, fit.converged)

@@ -24,8 +24,8 @@ from .ldm_runs import End as LdmEnd
 from .ldm_runs import Trial
 
 ERRORS = "errors of the displacement"
-GONE = 10.0     # times as far from the trained mean as any trained latent coordinates: here runs are
-                # ended, as the grid of a body that flies apart takes gigabytes
+GONE = 10.0     # times as far from the trained mean as any trained latent coordinates: runs are
+                # ended here, as the grid of a body that flies apart takes gigabytes
 
 
 def studies(run):
@@ -56,7 +56,8 @@ class End(NamedTuple):
     flags: str              # what was ever out of bounds
     beyond: float           # largest
     rank: int               # smallest
-    off: float              # largest rms distance of trial positions from the manifold [dx]
+    off: float              # largest rms distance of trial positions from the manifold; NaN where
+                            # they were not finite [dx]
     said: str               # the sentence with which it stopped, "" if it ran to its end
 
     kind = LdmEnd.kind
@@ -95,7 +96,7 @@ class Bench:
         errors = np.array([found.errors.displacement, found.errors.origin, share(stress)])
         whole_run = len(states) == scene.problem.clock.steps + 1
         return End(*(100.0 * (errors if whole_run else np.full(3, np.inf))),
-                   *of_sights(sights, one.fields.r), max(off, default=np.nan), said)
+                   *of_sights(sights, one.fields.r), float(np.max(off, initial=0.0)), said)
 
     def inferred(self, scene, fields, chosen):
         """Yield what `infer` does of a `Whole` scene, until latent coordinates are GONE."""

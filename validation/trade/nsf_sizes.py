@@ -12,7 +12,7 @@ from ..nsf.tested import refitted
 from ..registry import experiment
 
 LEVELS = {          # one at a time, from the study's own
-    "quick": {"r": (3,), "modes": (10,), "tau": (10,), "C": (10,), "smoothing": (1.0,)},
+    "quick": {"r": (3,), "tau": (10,), "C": (10,), "smoothing": (1.0,)},
     "standard": {"r": (2, 3, 4, 6, 8), "modes": (8, 12, 40), "tau": (5, 10, 20, 80),
                  "C": (5, 10, 20, 80), "smoothing": (1e-8, 1e-6, 1e-4, 1e-2, 1.0, 100.0)}}
 OWN = ("scene", "knob", "r", "modes", "tau", "C", "smoothing", *COLUMNS[1:], "bytes", "bytes_full")
