@@ -96,7 +96,8 @@ class Inferred:
         lost = samples[~np.isfinite(trial).all(axis=1)]
         if len(lost):
             raise NoBody(f"t = {t:.6g} s: {len(lost)} of {len(samples)} samples have no finite "
-                         f"place after the step, the first is point {lost[0]}; are the fields damaged?")
+                         f"place after the step, the first is point {lost[0]}; are the fields "
+                         "damaged?")
         xhat, fit = self.inverted((samples, w), trial, at.xhat, dt)
         return Position(xhat, at.xhat), Report(len(samples), len(points), fit.rank, fit.residual,
                                                fit.iterations, fit.converged)
