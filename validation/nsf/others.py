@@ -64,9 +64,12 @@ def cut(run):
 
 
 def prepared(run, study, **few):
-    """`Tested` of a study at a run's profile; few: its settings at the quick one."""
-    return tested(run.choose(quick=lambda: study(3, **few), standard=lambda: study(2),
-                             paper=study)())
+    """`Tested` of a study at a run's profile; few: its settings at the quick one, which has one
+    test.
+    """
+    quick = study(3, **few)
+    return tested(run.choose(quick=quick._replace(test=quick.test[:1]), standard=study(2),
+                             paper=study()))
 
 
 def draws(run):
@@ -75,9 +78,9 @@ def draws(run):
 
 
 def counted(run, name, one, counts):
-    """Record errors with several numbers of samples."""
+    """Record errors with several numbers of samples, the most alone at the quick profile."""
     rows = []
-    for count in counts:
+    for count in run.choose(quick=counts[:1], standard=counts, paper=counts):
         found = rows_of(one, "modal", count, draws(run))
         share(run, f"{name}.error.{count}", found, one.scale, f"{count} samples")
         rows += found + by_cubature(run, f"{name}.cubature.{count}", one, count, draws(run))

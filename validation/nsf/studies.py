@@ -39,7 +39,7 @@ class Study(NamedTuple):
         base = shipped(self.scene)
         bodies = {f"body.{body.name}.sampling.count": round(body.sampling.count / self.coarser**3)
                   for body in base.body if isinstance(body.sampling, Poisson)}
-        steps = (self.steps or base.steps) // self.coarser
+        steps = (self.steps or base.steps) // self.coarser // self.spacing * self.spacing
         return varied(base, {self.key: float(value), **bodies, "dx": base.dx * self.coarser,
                              "dt": base.dt * self.coarser, "steps": steps})
 
