@@ -25,3 +25,8 @@ def test_a_point_has_the_same_bits_alone_as_among_others():
     modes, a = rng.normal(size=(300, 9, 40)), rng.normal(size=40)
     alone = [combined(modes, [p], a)[0] for p in range(300)]
     assert np.array_equal(combined(modes, np.arange(300), a), alone)
+
+
+def test_another_number_of_coefficients_is_refused():
+    with pytest.raises(ValueError, match="3 coefficients for 2 modes: expected as many"):
+        combined(np.ones((5, 3, 2)), np.arange(2), np.ones(3))

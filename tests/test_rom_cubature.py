@@ -63,3 +63,16 @@ def test_only_points_that_are_offered_are_taken(modes):
 def test_too_few_samples(modes):
     with pytest.raises(ValueError, match="1 samples for 3 latent coordinates: expected at least 2"):
         cubature(modes, R_FREE, np.arange(N), 1)
+
+
+def test_no_more_points_are_kept_than_there_are_products(modes):
+    found = cubature(modes, R_FREE, np.arange(N), 200)
+    assert len(found.points) <= R_FREE * modes.shape[2] - R_FREE * (R_FREE - 1) // 2
+    assert found.misfit < 1e-6
+
+
+def test_points_where_modes_vanish_are_refused(modes):
+    still = modes.copy()
+    still[:50] = 0.0
+    with pytest.raises(ValueError, match="0 points of 50 have a weight, too few for 3 latent"):
+        cubature(still, R_FREE, np.arange(50), 20)

@@ -8,7 +8,11 @@ from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
 
 
 def combined(modes, points, a):
-    """sum_r modes[points, :, r] a_r (m, k), of modes (n, k, R) with coefficients a (R,)."""
+    """sum_r modes[points, :, r] a_r (m, k), of modes (n, k, R) with coefficients a (R,). Raises
+    ValueError for another number of coefficients than of modes.
+    """
+    if len(a) != modes.shape[2]:
+        raise ValueError(f"{len(a)} coefficients for {modes.shape[2]} modes: expected as many")
     out = np.empty((len(points), modes.shape[1]))
     _combine(modes, np.asarray(points), np.ascontiguousarray(a), out)
     return out

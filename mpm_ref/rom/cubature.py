@@ -31,7 +31,9 @@ class Cubature(NamedTuple):
 
 def cubature(U, r, among, count):
     """`Cubature` of at most `count` of the points `among`, for modes U (n, d, R), orthonormal over
-    all points, of which the first r are asked for. Raises ValueError for too few points.
+    all points, of which the first r are asked for. There are r R - r (r - 1) / 2 different
+    products, and no more points are kept. Raises ValueError for too few points, RuntimeError where
+    the least squares do not end.
     """
     among = np.asarray(among)
     if not r <= count * U.shape[1]:
@@ -42,6 +44,9 @@ def cubature(U, r, among, count):
     with one_thread():
         chosen, w = chosen_of(A, b, min(count, len(among)))
     points, kept = among[chosen], w > 0.0
+    if kept.sum() * U.shape[1] < r:
+        raise ValueError(f"{kept.sum()} points of {len(among)} have a weight, too few for {r} "
+                         "latent coordinates: do the modes vanish at all of them?")
     order = np.argsort(points[kept])
     left = np.linalg.norm(A[:, chosen] @ w - b) / np.linalg.norm(b)
     return Cubature(points[kept][order], (w[kept] / w[kept].mean())[order], float(left))
@@ -63,4 +68,4 @@ def chosen_of(A, b, count):
         chosen += best.tolist()
         w, _ = nnls(A[:, chosen], b)
         left = b - A[:, chosen] @ w
-    return np.array(chosen), w
+    return np.array(chosen, dtype=int), w

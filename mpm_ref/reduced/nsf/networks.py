@@ -1,5 +1,6 @@
 """NSF's three networks as what a study's reduced model is made of: trained, and as files."""
 
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -51,10 +52,11 @@ def trained(fitted, map, histories, folder, on_epoch):
 
 
 def forget(folder):
-    """Remove the checkpoints of stages, and their folder."""
+    """Remove the checkpoints of stages, and their folder if nothing else is in it."""
     for stage in STAGES:
         (folder / f"{stage}.pt").unlink(missing_ok=True)
-    folder.rmdir()
+    with suppress(OSError):
+        folder.rmdir()
 
 
 def is_one(arrays):
