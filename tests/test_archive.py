@@ -8,15 +8,17 @@ import pytest
 from mpm_ref.archive import read, stated, write
 from mpm_ref.nclaw import weights as of_laws
 from mpm_ref.nclaw.gnn import weights as of_graphs
-from mpm_ref.rom import modes_file
+from mpm_ref.rom import fields_file, modes_file
 from mpm_ref.rom import weights as of_maps
 from mpm_ref.rom.modes import Modes
 from mpm_ref.rom.weights import Model
 from validation.nclaw import bundle
+from validation.nclaw.trade_nets import small_nets
 
 VALIDATION = Path(__file__).parents[1] / "validation"
-COMMITTED = [(of_graphs if "-gnn" in path.stem else module, path)
-             for module, folder in ((of_maps, "ldm"), (of_laws, "nclaw"))
+COMMITTED = [(of_graphs if "-gnn" in path.stem else bundle if path.stem in small_nets() else module,
+              path)
+             for module, folder in ((of_maps, "ldm"), (of_laws, "nclaw"), (fields_file, "nsf"))
              for path in sorted((VALIDATION / folder / "weights").glob("*.npz"))]
 
 

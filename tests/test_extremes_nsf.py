@@ -233,9 +233,9 @@ def test_a_run_that_leaves_all_trained_states_is_ended(bench, monkeypatch):
     assert (end.error, end.said, end.steps) == (np.inf, "", len(own) - 1)
 
 
-def test_stress_that_is_not_finite_is_told_by_how_far_off_trial_positions_are(bench):
+def test_stress_that_is_not_finite_ends_a_run(bench):
     spoilt = damage.damaged(bench.one.fields, "tau.coefficients.w", 0.5, "NaN")
     end = bench.trial("NaN", bench.drawn(40), spoilt).end
     assert not np.isfinite(end.error)
-    assert np.isnan(end.off)
+    assert (end.steps, "40 of 40 samples have no finite place" in end.said) == (0, True)
     assert 0.0 < bench.tests[0].off < 1.0

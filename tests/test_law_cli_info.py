@@ -15,9 +15,13 @@ from mpm_ref.nclaw import spline, weights
 from mpm_ref.nclaw.gnn import weights as of_graphs
 from mpm_ref.nclaw.weights import Laws, Trained
 from mpm_ref.sealed import sealed
+from validation.nclaw.dough import doughs
+from validation.nclaw.nets import nets
 
 NCLAW = Path(__file__).parents[1] / "validation" / "nclaw" / "weights"
-COMMITTED = sorted(path for path in NCLAW.glob("*.npz") if "-gnn" not in path.stem)
+COMMITTED = sorted(path for path in NCLAW.glob("*.npz")
+                   if path.stem in nets() and "-gnn" not in path.stem)
+FILMED = sorted(path for path in NCLAW.glob("*.npz") if path.stem in doughs())
 KNOTS = len(spline.knots())
 ABOUT = {"command": "learn", "title": "Cube", "scene_sha256": 64 * "a", "dt": 5e-4,
          "errors": [0.5, 0.25, 0.125], "source_sha256": 64 * "b"}
@@ -52,6 +56,14 @@ def test_the_laws_of_the_experiments_say_what_they_know(path):
     assert [line.split(":")[0] for line in met] == ["met in training"] * ("seen" in about)
     assert by == f"made by: {about['command']}, commit {about['commit']}, {about['date']}"
     assert facts(path)["about"] == about
+
+
+@pytest.mark.parametrize("path", FILMED, ids=lambda path: path.stem)
+def test_laws_learned_from_a_film_say_what_their_errors_are(path):
+    about, (*_, trained, by) = weights.load(path).about, lines(path)
+    assert trained.startswith(f"trained on scene {about['scene'][:12]}, {about['epochs']} epochs: "
+                              "squared distance of marks in images [px^2]")
+    assert by == f"made by: {about['command']}, commit {about['commit']}, {about['date']}"
 
 
 def test_widths_and_weights_are_those_of_the_layers():
