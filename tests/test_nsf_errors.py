@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from mpm_ref.core.grid import OutOfRange
+from mpm_ref.reduced.whole import whole
+from mpm_ref.rom.deformed import Deformed
 from validation.nsf import errors, tested
-from validation.nsf.studies import jelly, sand
+from validation.nsf.studies import bread, cake, jelly, metal, sand, toothpaste
 
 TEST = 0.45
 
@@ -27,6 +29,30 @@ def test_a_longer_study_has_more_steps_of_the_scene():
     assert (sand().run(30.0).steps, sand(3).run(30.0).steps) == (300, 100)
     assert len(sand().train) == 16
     assert not set(sand().train) & set(sand().test)
+
+
+def test_cake_is_sampled_in_the_middle_and_by_fewer_later():
+    study = cake(3, train=3)
+    one = whole(study.run(15.0))
+    early, late = study.chosen(one, study.samples, 0)
+    assert (len(early.points), len(late.points)) == (700, 400)
+    assert (early.since, late.since) == (0.0, pytest.approx(0.256, rel=0.01))
+    middle = 0.5 * (one.X.min(axis=0) + one.X.max(axis=0))
+    away = np.linalg.norm((one.X - middle)[:, :2], axis=1) / one.problem.dx
+    assert away[early.points].max() <= 2.0 < away.max()
+    everything, = study.chosen(one, len(one.X), 0)
+    assert np.array_equal(everything.points, np.arange(len(one.X)))
+
+
+def test_the_map_alone_does_not_know_the_stress(cube):
+    alone = cube._replace(map_alone=True)
+    assert isinstance(alone.of(TEST), Deformed)
+    assert alone.errors(TEST, 50).errors.origin > 2.0 * cube.errors(TEST, 50).errors.origin
+
+
+def test_snapshots_are_a_divisor_of_the_steps_apart():
+    for study in (bread(3, train=3), metal(2), toothpaste(3)):
+        assert study.run(study.test[0]).steps % study.spacing == 0
 
 
 def test_reduced_runs_beat_the_nearest_run_and_not_the_nearest_states(cube):

@@ -9,6 +9,7 @@ from mpm_ref import scene
 from mpm_ref.reduced.inferring import Plan, drawn, infer, weighed
 from mpm_ref.reduced.vary import varied
 from mpm_ref.reduced.whole import history, whole
+from mpm_ref.rom.cubature import cubature
 from mpm_ref.rom.histories import joined
 from mpm_ref.rom.spanned import Sizes, spanned
 
@@ -79,6 +80,15 @@ def test_a_history_is_that_of_the_full_run(disks, runs):
     assert np.abs(single.x[0] - runs.x[1]).max() < 1e-6
 
 
+def test_a_history_of_one_step_in_several(disks, runs):
+    thin = history(disks(2.0), [2.0], every=5)
+    for name in ("x", "tau", "C"):
+        assert np.array_equal(getattr(thin, name)[0], getattr(runs, name)[1, ::5])
+    assert thin.dt == pytest.approx(5.0 * runs.dt)
+    with pytest.raises(ValueError, match="one in 7 of 30 steps: expected a divisor of the steps"):
+        history(disks(2.0), [2.0], every=7)
+
+
 def test_a_reduced_run_follows_the_full_one(disks, runs):
     v = 1.8
     full = history(disks(v), [v]).x[0]
@@ -129,6 +139,7 @@ def test_weighed_samples_are_better_than_drawn_ones(disks, runs):
 
     by = weighed(fields, n, 8, 0)
     assert len(by.points) <= 8
+    assert np.array_equal(by.w, cubature(fields.U, 3, np.arange(n), 8).w)
     assert worst(by) < np.median([worst(drawn(n, 8, seed)) for seed in range(5)])
 
 
