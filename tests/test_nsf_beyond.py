@@ -49,3 +49,12 @@ def test_other_points_are_refused(slice_of_bread):
     scene = bread(5).run(beyond.E)
     with pytest.raises(ValueError, match="expected the same slice"):
         beyond.other(slice_of_bread, scene)
+
+
+@pytest.mark.parametrize(("shift", "side", "end"), [(1.0, "upper", 0.6), (-1.0, "lower", 0.4)])
+def test_a_box_goes_no_farther_than_the_held_ends(shift, side, end):
+    box = bread(2).run(beyond.E).body[1].shape.shapes[0]
+    gone = beyond.moved(box, shift)
+    assert getattr(gone, side)[0] == pytest.approx(end)
+    assert gone.upper[0] - gone.lower[0] == pytest.approx(box.upper[0] - box.lower[0])
+    assert gone.lower[1:] == pytest.approx(box.lower[1:])
