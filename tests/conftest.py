@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from command_line import SCENE, mpm_ref
 from goldens import checker, recorded
+from hidden_torch import hide
 from hypothesis import settings
 
 # Compiling a kernel may take seconds, hence no deadline; the same examples in every run.
@@ -75,3 +76,9 @@ def double(monkeypatch):
     """Networks of doubles read doubles."""
     torch = pytest.importorskip("torch")
     monkeypatch.setattr(torch.Tensor, "float", torch.Tensor.double)
+
+
+@pytest.fixture
+def without_torch(monkeypatch):
+    """As if PyTorch were not installed."""
+    hide(monkeypatch)

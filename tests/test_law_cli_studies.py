@@ -1,6 +1,5 @@
 """Law studies: what a file may say, and what `mpm-ref law train` refuses before it trains."""
 
-import sys
 
 import pytest
 from command_line import assert_told, mpm_ref
@@ -20,14 +19,6 @@ def train(folder, *edits, scene=(), options=()):
 
 def of_method(method):
     return "[train]", f'method = "{method}"\n[train]'
-
-
-@pytest.fixture
-def without_torch(monkeypatch):
-    """As if PyTorch were not installed."""
-    monkeypatch.setitem(sys.modules, "torch", None)
-    for name in [name for name in sys.modules if name.startswith("mpm_ref.nclaw.learn.")]:
-        monkeypatch.delitem(sys.modules, name)
 
 
 def test_shipped_studies_load():

@@ -1,9 +1,11 @@
 """What learns is imported when it is asked for; without PyTorch one sentence says so."""
 
-import sys
+import importlib
 
 import pytest
+from hidden_torch import hide
 
+from mpm_ref import rom
 from mpm_ref.laws import training
 from mpm_ref.learning import part
 from mpm_ref.reduced import maps
@@ -17,10 +19,7 @@ from mpm_ref.reduced import maps
                     '"mpm_ref[learn]", or `make learn` in the repository; or make modes, which '
                     'need none: --kind modes'),
 ])
-def test_without_pytorch_one_sentence_says_what_to_do(monkeypatch, asked, said):
-    monkeypatch.setitem(sys.modules, "torch", None)
-    for name in [name for name in sys.modules if ".learn." in name]:
-        monkeypatch.delitem(sys.modules, name)
+def test_without_pytorch_one_sentence_says_what_to_do(without_torch, asked, said):
     with pytest.raises(ValueError, match="PyTorch") as refusal:
         asked()
     assert str(refusal.value) == said
@@ -35,3 +34,15 @@ def test_with_pytorch_the_part_is_there():
     pytest.importorskip("torch")
     assert training.drive().__name__ == "mpm_ref.nclaw.learn.drive"
     assert maps.training().__name__ == "mpm_ref.rom.learn.drive"
+
+
+def test_what_is_taken_away_for_a_test_comes_back():
+    pytest.importorskip("torch")
+    fit = importlib.import_module("mpm_ref.rom.learn.fit")
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        hide(monkeypatch)
+        assert not hasattr(rom.learn, "fit")
+        with pytest.raises(ValueError, match="PyTorch"):
+            maps.training()
+        assert importlib.import_module("mpm_ref.rom.learn.schedule")
+    assert rom.learn.fit is fit is importlib.import_module("mpm_ref.rom.learn.fit")

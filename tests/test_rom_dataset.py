@@ -1,6 +1,5 @@
 """Data of a study, made and read; maps made of them, written and read."""
 
-import sys
 from collections import Counter
 
 import numpy as np
@@ -242,10 +241,7 @@ def test_what_are_no_modes_is_refused(model, tmp_path):
     assert not (tmp_path / "x.npz").exists()
 
 
-def test_without_torch_a_network_is_refused_in_one_sentence(made, monkeypatch):
-    monkeypatch.setitem(sys.modules, "torch", None)
-    for name in [name for name in sys.modules if name.startswith("mpm_ref.rom.learn")]:
-        monkeypatch.delitem(sys.modules, name)
+def test_without_torch_a_network_is_refused_in_one_sentence(made, without_torch):
     with pytest.raises(ValueError, match=r'pip install "mpm_ref\[learn\]"'):
         maps.learned(made[0], None, {}, None, None, 1)
 
