@@ -107,10 +107,12 @@ def test_a_step_on_networks_moves_samples_as_when_all_points_are_stepped(d):
     span = np.ptp(one.place(np.arange(n), xhat), axis=0).max()
     stepper = Inferred(one, matter, span / 16, 2, np.zeros(d))
     at, samples = Position(xhat, xhat - 0.01), np.array([5, 71, 300])
-    points = stepper.integration(xhat, samples)
+    points, x = stepper.integration(xhat, samples)
+    np.testing.assert_allclose(x, one.place(points, xhat), rtol=0.0, atol=1e-14 * span)
     assert len(points) < n
-    few, everything = (stepper.moved(stepper.inferred(at, N, dt), np.searchsorted(N, samples),
-                                     0.0, dt) for N in (points, np.arange(n)))
+    whole = np.concatenate([samples, np.setdiff1d(np.arange(n), samples)])
+    few, everything = (stepper.moved(stepper.inferred(at, N, one.place(N, xhat), dt), 3, 0.0, dt)
+                       for N in (points, whole))
     assert np.abs(everything - one.place(samples, xhat)).max() > 1e-4 * span
     np.testing.assert_allclose(few, everything, rtol=0.0, atol=1e-12 * np.abs(everything).max())
     after, report = stepper.step(at, samples, 0.0, dt)

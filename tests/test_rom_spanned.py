@@ -110,8 +110,23 @@ def test_points_by_their_numbers(made):
     assert np.array_equal(fields.derivatives(some, y)[2], fields.derivatives(ALL, y)[2][some])
 
 
-def test_no_point_that_is_near_is_overlooked(made, rng):
+def test_modes_in_single_precision_tell_the_same_to_it(made, d):
     fields, xhat = made
+    rounded, y = fields.single(), xhat[1, 4]
+    assert [modes.dtype for modes in (rounded.U, rounded.tau.modes, rounded.C.modes)] == [
+        np.float32] * 3
+    pairs = [*((getattr(one, name)(ALL, y) for one in (fields, rounded))
+               for name in ("place", "stress", "affine")),
+             [one.derivatives(ALL, y)[2] for one in (fields, rounded)]]
+    for exact, near in map(tuple, pairs):
+        assert 0.0 < np.abs(near - exact).max() < 1e-6 * np.abs(exact).max()
+        assert near.dtype == float
+
+
+@pytest.mark.parametrize("digits", ["double", "single"])
+def test_no_point_that_is_near_is_overlooked(made, digits):
+    fields, xhat = made
+    fields = fields.single() if digits == "single" else fields
     for y in (xhat[0, 0], xhat[3, -1], 3.0 * xhat[3, -1]):
         x = fields.place(ALL, y)
         for distance in (0.02, 0.1):

@@ -90,32 +90,33 @@ class Inferred:
         """
         if not np.isfinite(at.xhat).all():
             raise NoBody(f"t = {t:.6g} s: latent coordinates {at.xhat} are not finite")
-        points = self.integration(at.xhat, samples)
-        cloud = self.inferred(at, points, dt)
-        trial = self.moved(cloud, np.searchsorted(points, samples), t, dt)
+        points, x = self.integration(at.xhat, samples)
+        cloud = self.inferred(at, points, x, dt)
+        trial = self.moved(cloud, len(samples), t, dt)
         lost = samples[~np.isfinite(trial).all(axis=1)]
         if len(lost):
             raise NoBody(f"t = {t:.6g} s: {len(lost)} of {len(samples)} samples have no finite "
                          f"place after the step, the first is point {lost[0]}; are the fields "
                          "damaged?")
-        xhat, fit = self.inverted((samples, w), trial, at.xhat, dt)
+        xhat, fit = self.inverted(samples, w, trial, at.xhat, dt)
         return Position(xhat, at.xhat), Report(len(samples), len(points), fit.rank, fit.residual,
                                                fit.iterations, fit.converged)
 
     def integration(self, xhat, samples):
-        """Numbers of the points N that share a node with a sample, the samples among them
-        (NSF-sec5.4).
+        """Numbers (m,) of the points N that share a node with a sample (NSF-sec5.4), the samples
+        first, and their positions (m, d) [m].
         """
-        if len(samples) == len(self.body.m):
-            return samples
         x = self.fields.place(samples, xhat)
+        if len(samples) == len(self.body.m):
+            return samples, x
         some = self.fields.near(xhat, x, (self.degree + 1) * self.dx)
+        some = some[~among(some, samples)]
         here = self.fields.place(some, xhat)
-        return np.union1d(some[reach(x, self.dx, self.degree).reached(here)], samples)
+        reached = reach(x, self.dx, self.degree).reached(here)
+        return np.concatenate([samples, some[reached]]), np.concatenate([x, here[reached]])
 
-    def inferred(self, at, points, dt):
-        """`Body` of points with all that a step asks of them (NSF-sec5.1)."""
-        x = self.fields.place(points, at.xhat)
+    def inferred(self, at, points, x, dt):
+        """`Body` of points at x (m, d) with all that a step asks of them (NSF-sec5.1)."""
         if at.before is None:
             v = self.body.v[points]
         else:
@@ -125,23 +126,22 @@ class Inferred:
         particles.C[:] = self.fields.affine(points, at.xhat)
         return Body("inferred", particles, None, NoFlow(), points)
 
-    def moved(self, cloud, samples, t, dt):
-        """Positions (m, d) [m] of the cloud's points of these numbers after a step on the grid."""
+    def moved(self, cloud, count, t, dt):
+        """Positions (count, d) [m] of the cloud's first points after a step on the grid."""
         grid = scatter((cloud,), self.storage, self.scheme, dt)
         update(grid, self.gravity, dt)
         if self.conditions is not None:
             self.conditions.apply(grid, t + dt, dt)
         own = cloud.particles
-        trial = particles_at(own.x[samples], own.v[samples], own.m[samples], own.V0[samples],
+        trial = particles_at(own.x[:count], own.v[:count], own.m[:count], own.V0[:count],
                              transfer="pic")
         gather(cloud._replace(particles=trial), grid, self.scheme, dt)
         return trial.x
 
-    def inverted(self, samples, x, xhat, dt):
-        """Latent coordinates whose positions of the samples (numbers, weights) are nearest to
-        x (m, d), and the `Fit` (NSF-eq10).
+    def inverted(self, points, w, x, xhat, dt):
+        """Latent coordinates whose positions of the samples of these numbers, that count by weights
+        w (m,) or all the same, are nearest to x (m, d), and the `Fit` (NSF-eq10).
         """
-        points, w = samples
         fields = self.fields if w is None else Weighed(self.fields, np.sqrt(w)[:, None])
         x = x if w is None else fields.root * x
         if self.inversion == "nonlinear":
@@ -171,6 +171,12 @@ class Weighed(NamedTuple):
         """sqrt(w) x, None, and sqrt(w) dg/dxhat (m, d, r)."""
         x, _, G = self.fields.derivatives(points, xhat)
         return self.root * x, None, self.root[..., None] * G
+
+
+def among(points, some):
+    """Whether each of the points (m,) is one of some (k,), which are sorted."""
+    at = np.minimum(np.searchsorted(some, points), len(some) - 1)
+    return some[at] == points
 
 
 def nearest(fields, points, x, xhat):

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.grid import OutOfRange, extent
+from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
 
 MOST = 1e9          # bases in a box
 
@@ -28,9 +29,10 @@ class Reach(NamedTuple):
 
     def reached(self, x):
         """Whether each of the points x (n, d) [m] shares a node with a sample."""
-        k = bases(x, self.dx, self.degree) - self.origin
-        inside = np.all((k >= 0) & (k < self.flag.shape), axis=1)
-        return inside & self.flag[tuple(np.where(inside[:, None], k, 0).T)]
+        found = np.empty(len(x), dtype=bool)
+        _look_up(self.flag.ravel(), np.array(self.flag.shape), self.origin, x, self.dx,
+                 0.5 * (self.degree - 1), found)
+        return found
 
     def cells(self):
         """The marked bases (n, d), in order."""
@@ -50,10 +52,29 @@ def reach(x, dx, degree):
     if np.prod((high - low) / dx + 2 * degree + 1) > MOST:
         raise OutOfRange(f"samples from {low} to {high} m, {dx} m apart on the grid: have the "
                          "latent coordinates left the range that the map was trained with?")
-    base = np.unique(bases(x, dx, degree), axis=0)
+    base = bases(x, dx, degree)
     origin = base.min(axis=0) - degree
     shape = base.max(axis=0) + degree + 1 - origin
-    flag = np.zeros(shape, dtype=bool)
-    for offset in product(range(-degree, degree + 1), repeat=x.shape[1]):
-        flag[tuple((base + offset - origin).T)] = True
-    return Reach(flag, origin, dx, degree)
+    flag = np.zeros(np.prod(shape), dtype=bool)
+    strides = np.append(np.cumprod(shape[:0:-1])[::-1], 1)
+    offsets = np.array([*product(range(-degree, degree + 1), repeat=x.shape[1])])
+    flag[np.add.outer((base - origin) @ strides, offsets @ strides)] = True
+    return Reach(flag.reshape(shape), origin, dx, degree)
+
+
+@parallel
+def _look_up(flag, shape, origin, x, dx, shift, found):
+    for c in prange(CHUNKS):
+        look_up(flag, shape, origin, x, dx, shift, found, chunk(c, len(x)))
+
+
+@kernel
+def look_up(flag, shape, origin, x, dx, shift, found, bounds):
+    """Whether the bases of some points are flagged; those out of the box are not."""
+    for i in range(bounds[0], bounds[1]):
+        at, inside = 0, True
+        for a in range(len(shape)):
+            k = np.floor(x[i, a] / dx - shift) - origin[a]
+            inside = inside and 0 <= k < shape[a]
+            at = at * shape[a] + (np.int64(k) if inside else 0)
+        found[i] = inside and flag[at]

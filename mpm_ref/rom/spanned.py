@@ -116,6 +116,16 @@ class Spanned(NamedTuple):
         """The fields in a run with other parameters."""
         return self._replace(mu=np.array(mu, dtype=float))
 
+    def single(self):
+        """The fields with modes in single precision, of which half as much must be read; sums are
+        of doubles as before.
+        """
+        U, cells = self.U.astype(np.float32), self.cells
+        parts = [part and part._replace(modes=part.modes.astype(np.float32))
+                 for part in (self.tau, self.C)]
+        return self._replace(U=U, tau=parts[0], C=parts[1],
+                             cells=cells._replace(spread=spreads(U, *cells[:3])))
+
 
 class Sizes(NamedTuple):
     """Numbers of latent coordinates and of modes."""
@@ -198,7 +208,14 @@ def cells(X, U, size):
     off = np.linalg.norm(X - center[block], axis=1)
     middle = np.array([order[b:e][np.argmin(off[order[b:e]])]
                        for b, e in pairwise(start)])
-    rest = np.abs(X - X[middle[block]]).max(axis=1)
-    spread = np.abs(U - U[middle[block]]).max(axis=1)
-    return Cells(order, start, middle, np.maximum.reduceat(rest[order], start[:-1]),
-                 np.maximum.reduceat(spread[order], start[:-1], axis=0))
+    rest = spreads(X[..., None], order, start, middle)[:, 0]
+    return Cells(order, start, middle, rest, spreads(U, order, start, middle))
+
+
+def spreads(U, order, start, middle):
+    """Largest difference (blocks, R) of values U (n, d, R) along an axis from those of the middle
+    of a block.
+    """
+    block = np.repeat(np.arange(len(middle)), np.diff(start))
+    far = np.abs(U[order] - U[middle][block]).max(axis=1).astype(float)
+    return np.maximum.reduceat(far, start[:-1], axis=0)
