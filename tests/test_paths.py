@@ -188,6 +188,28 @@ def test_softening_element_fails_and_carries_nothing(rng):
     assert not element.q.tau.any()
 
 
+def test_softening_in_log_strain_on_fixed_corotated_is_the_mix_of_the_public_code(rng):
+    """The strain returns as with Hencky; the stress is the law's own, and not on that surface."""
+    elements = []
+    for own in (FC, HENCKY):
+        flow = make_flow("von_mises_softening", own, 3, tau_y=0.4, theta=0.3)
+        elements.append(Element(own, flow, rng, y=0.4))
+    mixed, pure = elements
+    for _ in range(40):
+        mixed.step(stretch(0.005))
+        pure.step(stretch(0.005))
+    assert 0.0 < pure.q.y[0] < 0.4
+    assert mixed.q.y == pytest.approx(pure.q.y, rel=1e-12)
+    s, of_pure = (np.linalg.svd(one.q.F[0])[1] for one in elements)
+    assert s == pytest.approx(of_pure, rel=1e-12)
+    F = mixed.q.F[0]
+    U, s, Vt = np.linalg.svd(F)
+    J = np.linalg.det(F)
+    tau = 2.0 * FC.mu * (F - U @ Vt) @ F.T + FC.lam * (J - 1.0) * J * np.eye(3)
+    assert np.abs(mixed.q.tau[0] - tau).max() < EPS
+    assert abs(deviatoric(mixed.tau) / mixed.q.y[0] - 1.0) > 1e-3
+
+
 def test_sand_in_uniaxial_compression_slides_along_the_cone(rng):
     """Volume is elastic, so that tr tau is known; dev tau stays on the cone once it is reached."""
     flow = make_flow("drucker_prager", HENCKY, 3, friction_angle=20.0)

@@ -47,13 +47,15 @@ LAWS = {
 
 SOLIDS = FixedCorotated, Hencky, NeoHookean, LogNeoHookean
 
-# Return maps in log strain are for Hencky; fixed corotated has its own von Mises (X-cross-13).
+# Return maps in log strain are for Hencky; fixed corotated has its own von Mises (X-cross-13). One
+# exception: the public code of NSF's cake softens in log strain and takes the stress from fixed
+# corotated elasticity, which then does not end on the yield surface.
 FLOWS = {
     "none": FlowEntry(no_flow.build, (*SOLIDS, Fluid)),
     "drucker_prager": FlowEntry(drucker_prager.build, (Hencky,)),
     "von_mises": FlowEntry(von_mises.build, (Hencky,)),
     "von_mises_hardening": FlowEntry(von_mises.build_hardening, (Hencky,)),
-    "von_mises_softening": FlowEntry(von_mises.build_softening, (Hencky,)),
+    "von_mises_softening": FlowEntry(von_mises.build_softening, (Hencky, FixedCorotated)),
     "herschel_bulkley": FlowEntry(herschel_bulkley.build, (NeoHookean,)),
     "fluid_projection": FlowEntry(fluid_projection.build, (Fluid,)),
     "snow_clamp": FlowEntry(snow_clamp.build, SOLIDS),
