@@ -1,19 +1,22 @@
 """NCLaw, Figure 2 (a) and (b): ends of runs for longer, and thrown otherwise; from left to right
-the truth, ours (empty where it broke down), ours before training. Colours: distance from the truth.
+the start, the truth, ours, baselines as far as they are trained, ours before training (a thin layer
+on the floor, or broken down). Colours: distance from the truth; grey: the start.
 """
 
 import numpy as np
+from matplotlib.colors import to_rgb
 
 from validation.ldm.kept_bodies import read
 
-from ._bodies import Panel, View, away, nothing, pictures, shades
+from ._bodies import GHOST, Panel, View, away, nothing, pictures, shades
 from ._orders import shared
+from ._pairs import TITLES, present, titled
 from ._states import cloud, spacing
 
 NEEDS = ["nclaw.fig2"]
 NAMES = ("jelly", "sand", "plasticine", "water")
 TASKS = {"time": "longer", "velocity": "thrown otherwise"}
-WORDS = {"true": "truth", "ours": "ours", "init": "before training"}
+WORDS = ("start", "true", "ours", "neural", "gnn", "init")
 TOP = 0.3           # end of the colours [m]
 
 
@@ -23,19 +26,25 @@ def scale(results):
 
 def draw(results):
     kept, found = read(results.folder, NEEDS[0]), []
-    for name in NAMES:
-        for task, said in TASKS.items():
-            runs = {word: kept[f"{name}_{task}_{word}"].astype(float) for word in WORDS}
-            for word, x in runs.items():
-                paint, shown = shades(away(x, runs["true"]), top=TOP)
-                title = "" if found[5:] else f"{said}: {WORDS[word]}"
-                side = name if (task, word) == ("time", "true") else ""
-                found.append(Panel(whole(x, paint), nothing(), title, side))
-    return pictures(found, View(6, 11.0), shown, "distance from the truth [m]")
+    rows = {f"{name}_{task}": f"{name}, {said}" for task, said in TASKS.items() for name in NAMES}
+    words = present(kept, rows, WORDS)
+    shown = shades(np.zeros(1), top=TOP)[1]
+    for row, said in rows.items():
+        for word in words:
+            title = "" if found[len(words) - 1:] else TITLES[word]
+            panel = drawn(kept, row, word)._replace(side=said if word == words[0] else "")
+            found.append(panel._replace(title=f"{title}\n{panel.title}".strip()))
+    return pictures(found, View(len(words), 1.6 * len(words)), shown, "distance from the truth [m]")
 
 
-def whole(x, colour):
-    """Balls of points x (n, 3); of a run that broke down a white one, in the middle of the box."""
-    if np.isfinite(x).all():
-        return cloud(x, np.zeros(len(x)), colour, spacing(x))
-    return cloud(np.full((1, 3), 0.5), np.zeros(1), np.ones((1, 3)), 0.01)
+def drawn(kept, row, word):
+    """The panel of a law in a row, with what is to be said if there is nothing to be seen."""
+    if f"{row}_{word}" not in kept:
+        return Panel(nothing(), nothing(), "not trained")
+    x, true = (kept[f"{row}_{of}"].astype(float) for of in (word, "true"))
+    if not np.isfinite(x).all():
+        return Panel(nothing(), nothing(), titled("", x))
+    paint = shades(away(x, true), top=TOP)[0]
+    if word == "start":
+        paint[:] = to_rgb(GHOST)
+    return Panel(cloud(x, np.zeros(len(x)), paint, spacing(true)), nothing())

@@ -1,12 +1,12 @@
-"""NCLaw, Figures 7 and 8: bodies of task (c); from left to right the start, ours half-way, the
-truth there. Colours: height at the start.
+"""NCLaw, Figures 2 (c), 7 and 8: bodies of task (c); from left to right the start, ours half-way,
+the baseline "neural" there, if it was kept, and the truth. Colours: height at the start.
 """
 
 from validation.ldm.kept_bodies import read
 
 from ._bodies import View, pictures
 from ._orders import shared
-from ._pairs import sides
+from ._pairs import present, sides
 
 NEEDS = ["nclaw.fig7"]
 ROWS = {name: name for name in ("jelly", "sand", "plasticine", "water")}
@@ -17,4 +17,7 @@ def scale(results):
 
 
 def draw(results):
-    return pictures(sides(read(results.folder, NEEDS[0]), ROWS), View(3, 9.0))
+    kept = read(results.folder, NEEDS[0])
+    words = present(kept, ROWS, ("ours", "neural"))
+    columns = 2 + len(words)
+    return pictures(sides(kept, ROWS, words), View(columns, 3.0 * columns))

@@ -137,6 +137,14 @@ def deform_body_adjoint(body, L, bar, parts, dt):
         deform_adjoint.plastic(step, bars, law, flow)
 
 
+def clip_adjoint(positions, bars, low, high):
+    """Adjoint of a clip to the box low .. high, (d,) each: bar.x of each body becomes 0 for the
+    coordinates that it holds. positions: x (N, d) of each body after it.
+    """
+    for x, bar in zip(positions, bars):
+        bar.x[(x <= low) | (x >= high)] = 0.0
+
+
 def initial_stress_adjoint(body, bar, parts):
     """Adjoint of `explicit.initial_stress`: adds to bar.F what bar.tau says of it."""
     q, bars = body.particles, _of_deformation(bar)

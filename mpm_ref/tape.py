@@ -14,7 +14,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .adjoint import StepAdjoint, initial_stress_adjoint, require_adjoint, zero_bars, zero_sums
+from .adjoint import (
+    StepAdjoint,
+    clip_adjoint,
+    initial_stress_adjoint,
+    require_adjoint,
+    zero_bars,
+    zero_sums,
+)
 from .explicit import Stepper, initial_stress
 from .materials import Hardening, Softening
 
@@ -66,14 +73,18 @@ class Tape:
 
     The bodies must have been started (`Stepper.start`), and nothing but `step` may change them or
     the stepper. Every `every`-th state is kept; those between are computed anew in the backward
-    sweep. Raises ValueError for a stepper, a law or a flow without adjoint, for bodies that were
-    not started, or every < 1.
+    sweep. clip: the box (low, high), (d,) each [m], into which positions are clipped after each
+    step, or None; that of a `Problem` is no part of its stepper, and is to be given here.
+
+    Raises ValueError for a stepper, a law or a flow without adjoint, for bodies that were not
+    started, for a clip that is no box of d axes, or every < 1.
     """
 
-    def __init__(self, stepper, bodies, every=1):
+    def __init__(self, stepper, bodies, every=1, clip=None):
         if every < 1:
             raise ValueError(f"every = {every}: expected a number of steps >= 1")
         self.stepper, self.bodies, self.every = stepper, tuple(bodies), every
+        self.clip = None if clip is None else _box(clip, len(stepper.gravity))
         self.adjoint = StepAdjoint(stepper)
         again = stepper.scheme, stepper.dx, len(stepper.gravity), stepper.gravity.copy()
         self._again = Stepper(*again, stepper.conditions)
@@ -87,15 +98,15 @@ class Tape:
         return len(self._times)
 
     def step(self, t, dt):
-        """`Stepper.step` of the bodies; returns the grid. Raises ValueError for bodies or a stepper
-        that something else has changed since the step before.
+        """`Stepper.step` of the bodies, and the clip; returns the grid. Raises ValueError for
+        bodies or a stepper that something else has changed since the step before.
         """
         _require_same_rules(self.stepper, self._again)
         for body, twin, state in zip(self.bodies, self._twins, self._left):
             _require_untouched(body, twin, state)
         if self.steps % self.every == 0:
             self._kept.append(self._left)
-        grid = self.stepper.step(self.bodies, t, dt)
+        grid = self._advance(self.stepper, self.bodies, t, dt)
         self._times.append((t, dt))
         self._left = _state_of(self.bodies)
         return grid
@@ -108,17 +119,27 @@ class Tape:
         """
         self._check(seeds)
         bars, sums = _for_each(zero_bars, self._twins), _for_each(zero_sums, self._twins)
-        gravity = np.zeros(len(self.stepper.gravity))
+        gravity, after = np.zeros(len(self.stepper.gravity)), self._left
         _add(bars, seeds.get(self.steps))
         for k in reversed(range(len(self._kept))):
             states = self._states_from(k)
             for n in reversed(range(k * self.every, k * self.every + len(states))):
-                _restore(self._twins, states.pop())
+                if self.clip is not None:
+                    clip_adjoint((arrays[0] for arrays in after), bars, *self.clip)
+                after = states.pop()
+                _restore(self._twins, after)
                 gravity += self.adjoint.pull_back(self._twins, bars, sums, *self._times[n])
                 _add(bars, seeds.get(n))
         for twin, bar, parts in zip(self._twins, bars, sums):
             initial_stress_adjoint(twin, bar, parts)
         return Gradient(tuple(map(_result, self._twins, bars, sums)), gravity)
+
+    def _advance(self, stepper, bodies, t, dt):
+        grid = stepper.step(bodies, t, dt)
+        if self.clip is not None:
+            for body in bodies:
+                np.clip(body.particles.x, *self.clip, out=body.particles.x)
+        return grid
 
     def _states_from(self, k):
         """States before the steps from the k-th that was kept up to the next one."""
@@ -126,7 +147,7 @@ class Tape:
         _restore(self._twins, states[0])
         stop = min((k + 1) * self.every, self.steps)
         for t, dt in self._times[k * self.every : stop - 1]:
-            self._again.step(self._twins, t, dt)
+            self._advance(self._again, self._twins, t, dt)
             states.append(_state_of(self._twins))
         return states
 
@@ -142,6 +163,15 @@ class Tape:
             _check_kinds(len(self.bodies), of_bodies, n)
             for body, seed in zip(self.bodies, of_bodies):
                 _check_shapes(body, seed, n)
+
+
+def _box(clip, d):
+    """(low, high) of a clip, copied."""
+    box = np.array(clip, dtype=float)
+    if box.shape != (2, d) or not (box[0] < box[1]).all():
+        raise ValueError(f"clip = {clip}: expected (low, high), two positions with {d} coordinates "
+                         "each, low < high")
+    return box
 
 
 def _require_same_rules(stepper, again):

@@ -5,27 +5,38 @@ from typing import NamedTuple
 import numpy as np
 from adjoints import pairing, rate
 from clouds import AFFINE
+from constitutive import rotations
 from problems import DT, DX, JELLY, METAL, ball, moving
 
 from mpm_ref.core.boundary import BoxWalls, Collider, Conditions
 from mpm_ref.core.motion import Motion, Oscillation, Steady
 from mpm_ref.core.solids import half_space
 from mpm_ref.explicit import Scheme, Stepper
-from mpm_ref.materials import Fluid, NoFlow, make_flow
+from mpm_ref.materials import Fluid, NoFlow, make_flow, make_law
+from mpm_ref.simulate import keep_inside
 from mpm_ref.tape import STATE, Seed, Tape
 
 CONSTANTS = ("m", "V0", "b")
 SIZE = {"x": 0.05 * DX, "v": 0.3, "C": 1.0, "F": 0.01, "tau": 0.0, "y": 5.0, "b": 1.0}
+NCLAW = {       # law, flow and their constants in scenes/nclaw_*.toml; DT needs sand that is softer
+    "jelly": (("fixed_corotated", {"E": 1e5, "nu": 0.2}), None),
+    "sand": (("hencky", {"E": 1e5, "nu": 0.2}),
+             ("drucker_prager", {"friction_angle": 25.0, "s_min": 0.05})),
+    "plasticine": (("hencky", {"E": 3e5, "nu": 0.25}),
+                   ("von_mises", {"tau_y": 5e3, "s_min": 0.05})),
+    "water": (("fluid", {"E": 1e5, "nu": 0.3}), ("fluid_projection", {})),
+}
 WEIGHT = {"x": 1 / DX, "v": 1.0, "C": 0.01, "F": 1.0, "tau": 1e-4, "y": 0.01}    # of losses
 
 
 class Run(NamedTuple):
-    """Bodies at the start, and what steps them."""
+    """Bodies at the start, what steps them, and the box that positions are clipped to."""
 
     bodies: tuple
     scheme: Scheme
     gravity: np.ndarray
     conditions: Conditions
+    clip: tuple | None = None
 
     def stepper(self):
         """A new stepper."""
@@ -77,6 +88,30 @@ def dive(transfer="flip", degree=3):
     return Run((body,), scheme, np.array((0.0, -9.8)), Conditions((floor,)))
 
 
+def thrown(name, d, deformed):
+    """MLS in walls of NCLAW-sim: a spinning ball of a material of NCLaw, at rest with F = I or
+    `deformed`, hits the lower wall within 100 steps.
+    """
+    (law, moduli), flow = NCLAW[name]
+    law = make_law(law, **moduli)
+    flow = NoFlow() if flow is None else make_flow(flow[0], law, d, **flow[1])
+    center, v = np.array((0.31, 0.17, 0.32)[:d]), (0.3, -2.0, 0.1)[:d]
+    body = moving(ball(name, center, law, flow, radius=1.6 if d == 2 else 1.1), v, 4.0)
+    if deformed:
+        body = body._replace(particles=body.particles._replace(F=strains(len(body.id), d)))
+    walls = BoxWalls((3, 2, None)[:d], (9, None, 8)[:d], "separate")
+    return Run((body,), Scheme(2, mass_eps=1e-7, gravity_on_empty=True),
+               np.array((0.0, -9.8, 0.0)[:d]), Conditions(walls=walls))
+
+
+def strains(n, d):
+    """Random F (n, d, d), of which every second has two singular values that are equal."""
+    rng = np.random.default_rng(0)
+    s = np.exp(0.06 * rng.normal(size=(n, d)) - 0.03)
+    s[::2, 1] = s[::2, 0]
+    return rotations(rng, n, d) * s[:, None, :] @ rotations(rng, n, d)
+
+
 class Line(NamedTuple):
     """A direction in all that a gradient is taken of: a record of fields for each body."""
 
@@ -126,6 +161,8 @@ def loss(run, seeds):
             value += pairing(seed, (getattr(body.particles, name) for name in STATE))
         if n < max(seeds):
             stepper.step(run.bodies, n * DT, DT)
+            if run.clip is not None:
+                keep_inside(run.bodies, *run.clip)
     return value
 
 
@@ -133,7 +170,7 @@ def taped(run, seeds, every=1):
     """The gradient of that loss; it changes the bodies too."""
     stepper = run.stepper()
     stepper.start(run.bodies)
-    tape = Tape(stepper, run.bodies, every)
+    tape = Tape(stepper, run.bodies, every, run.clip)
     for n in range(max(seeds)):
         tape.step(n * DT, DT)
     return tape.gradient(seeds)

@@ -1,10 +1,14 @@
 """What the command line says of files that are something else, and of keys that do not fit."""
 
 import json
+from math import inf, nan
+from pathlib import Path
 
 import pytest
 from command_line import SCENE, assert_told, mpm_ref
 
+from mpm_ref.cli.execute import Bar, Request
+from mpm_ref.energy import Energy
 from mpm_ref.store.session import checkpoint_of
 
 HOT = 'integrator = "hot"\n' + SCENE.replace("dt = 0.001", "dt = 0.01")
@@ -52,6 +56,17 @@ def test_results_are_not_named_like_scenes(scene, tmp_path, name):
         done = mpm_ref(*command, scene, "--out", tmp_path / name)
         assert_told(done, 2, f"--out {tmp_path / name}: scenes have such names")
     assert not (tmp_path / name).exists()
+
+
+# the bar
+
+@pytest.mark.parametrize(("energy", "said"), [
+    (Energy(2.0, 1.0, -0.5), ", E_kin 2, E 2.5 J"), (Energy(2.0, nan, -0.5), ", E_kin 2 J"),
+    (Energy(inf, nan, -0.5), "")], ids=["known", "law without energy", "none"])
+def test_energies_that_are_not_finite_are_left_out_of_the_bar(energy, said):
+    bar = Bar(Request("disk", Path("run.h5")))
+    bar.frame(None, energy)
+    assert bar.energies == said
 
 
 # one of a thing, and what broke

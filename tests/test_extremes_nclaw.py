@@ -33,12 +33,12 @@ from validation.extremes.nclaw_runs import (
 from validation.extremes.nclaw_time_step import longer
 from validation.nclaw import met as met_of
 from validation.nclaw.environments import environment
-from validation.nclaw.nets import Net, Untrained
+from validation.nclaw.nets import Net
 from validation.nclaw.small_runs import Measured
 from validation.nclaw.trade_nets import Small
 from validation.nclaw.untrained import untrained
-from validation.nclaw.waiting import there
 from validation.verification.scenes import with_
+from validation.waiting import Untrained, there
 
 GOOD = End(1e-4, 1000, -1, "", 0.1, -1, 0.9, "")
 WIDE = {"low": [0.0, -9.0, -9.0, -99.0], "high": [9.0, 9.0, 9.0, 99.0]}

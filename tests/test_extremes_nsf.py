@@ -7,6 +7,7 @@ import pytest
 from small_toys import Records
 
 from mpm_ref.reduced.nsf.watch import Sight
+from mpm_ref.rom.placed import NoBody
 from mpm_ref.rom.spanned import Sizes
 from validation.extremes import nsf_beyond as beyond
 from validation.extremes import nsf_damage as damage
@@ -180,6 +181,24 @@ def test_files_of_fields_are_refused_where_damaged(bench):
         f"extremes.nsf.damage.files.{name}": 1.0 for name in ("damaged", "unfit")}
 
 
+def test_damaged_files_are_those_of_the_scene_that_is_named(monkeypatch):
+    """Not of the last one."""
+    filed = []
+    one, other = (SimpleNamespace(fields=SimpleNamespace(r=r)) for r in (5, 6))
+    monkeypatch.setattr(damage, "scenes", lambda run: [(damage.FILED, one), ("jelly", other)])
+    monkeypatch.setattr(damage, "Bench", lambda *_: SimpleNamespace(
+        count=40, drawn=lambda count: count, trial=lambda what, *_: trial(what=what)))
+    monkeypatch.setattr(damage, "damaged", lambda *_: None)
+    monkeypatch.setattr(damage, "refitted", lambda one, sizes, follows: (one, sizes, follows))
+    monkeypatch.setattr(damage, "record_files", lambda run, *given: filed.append(given))
+    run = Records()
+    run.profile, run.rng = "quick", np.random.default_rng(0)
+    monkeypatch.setattr(damage, "SHOWN", {"quick": ("U",)})
+    damage.damage(run)
+    assert filed == [(damage.FILED, (one, Sizes(5, *damage.SMALL), True))]
+    assert damage.FILED in runs.studies(run)
+
+
 def test_what_passes_is_recorded_with_its_largest_error():
     found = Records()
     run = SimpleNamespace(profile="quick", record=found.record)
@@ -221,6 +240,27 @@ def test_a_breakdown_is_recorded_with_its_step():
     assert "within the trained steps 0.5; above 1 first in step 2" in note
     assert found["extremes.nsf.long.jelly.kinetic"][0] == 0.6
     assert "the full-order run 0.5, at its most 1" in found["extremes.nsf.long.jelly.kinetic"][1]
+
+
+def test_a_run_without_a_start_is_recorded(bench, monkeypatch):
+    """It breaks down in the search of its first state."""
+    def broken(*_):
+        raise NoBody("no such body")
+
+    monkeypatch.setattr("mpm_ref.reduced.inferring.begin", broken)
+    own, said = long.reduced_run(bench, STUDY.run(0.4), bench.drawn(40))
+    assert (own, said) == ({}, "no such body")
+    found = Records()
+    long.record_end(found, "jelly", (own, said), ({0: (0.0, 1.0)}, ""), 1)
+    assert found == {"extremes.nsf.long.jelly.steps": (-1, "no such body")}
+
+
+def test_a_full_order_run_without_a_start_is_recorded():
+    found = Records()
+    long.record_end(found, "jelly", ({0: (0.1, 0.0, 1.0)}, ""), ({}, "the step is too large"), 1)
+    assert found["extremes.nsf.long.jelly.steps"] == (
+        0, "to its end; the full-order run the step is too large")
+    assert {*found} == {f"extremes.nsf.long.jelly.{name}" for name in ("steps", "beyond")}
 
 
 def test_a_run_that_leaves_all_trained_states_is_ended(bench, monkeypatch):

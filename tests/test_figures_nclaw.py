@@ -1,24 +1,21 @@
 """NCLaw's figures, and what their experiments keep for them."""
 
-import json
-
 import matplotlib as mpl
 import numpy as np
 import pytest
 
-from figures import nclaw_fig02, nclaw_fig03, nclaw_fig06, nclaw_loss
+from figures import nclaw_fig02, nclaw_fig03, nclaw_fig06, nclaw_fig07
 from figures._bodies import View, pictures
 from figures._pairs import sides
 from mpm_ref.materials import Fluid, NoFlow
-from validation.nclaw import curves, elsewhere, states, tables
-from validation.nclaw.environments import ENVIRONMENTS
+from mpm_ref.nclaw.gnn.simulator import Simulator
+from validation.nclaw import elsewhere, states
 from validation.nclaw.evaluate import fresh
-from validation.nclaw.nets import Net, Untrained
 from validation.nclaw.tasks import reconstruction
-from validation.nclaw.untrained import untrained
 from validation.results import Results
 from validation.run import Setting, run_all
 from validation.verification.scenes import with_
+from validation.waiting import Untrained
 
 mpl.use("Agg")
 
@@ -52,16 +49,52 @@ def test_training_runs_are_drawn(tmp_path, short, monkeypatch):
 
 
 def test_ends_beside_the_truth_are_drawn_and_recorded(tmp_path, short, monkeypatch):
-    monkeypatch.setattr(nclaw_fig02, "NAMES", ("jelly", "sand"))
+    """Graph networks as far as they are trained; what is not there is told."""
+    def trained(name):
+        if name in ("sand-gnn", "jelly-gnn"):
+            raise Untrained(f"no weights {name}")
+        return name
+
+    monkeypatch.setattr(states, "trained", trained)
+    monkeypatch.setattr(nclaw_fig02, "NAMES", ("jelly", "water"))
     results = done(tmp_path, states.away)
-    ours, init = (results.value("nclaw.fig2", f"nclaw.fig2.jelly.time.{word}")
-                  for word in ("ours", "init"))
-    assert 0.0 < ours == init < 1.0
+    found = {r.target: r for r in results.records("nclaw.fig2")}
+    ours, init, neural = (found[f"nclaw.fig2.jelly.time.{word}"].value
+                          for word in ("ours", "init", "neural"))
+    assert 0.0 < ours == init == neural < 1.0
+    assert found["nclaw.fig2.untrained"].note == "no weights jelly-gnn; no weights sand-gnn"
+    assert "nclaw.fig2.jelly.time.gnn" not in found
     figure = nclaw_fig02.draw(results)
+    shown = [ax for ax in figure.axes if ax.images]
+    assert [ax.get_title() for ax in shown[:6]] == [
+        "start", "truth", "ours", "neural", "gnn\nnot trained", "before training"]
+    assert [ax.get_title() for ax in shown[6:]] == 18 * [""]
+    assert shown[6].texts[0].get_text() == "water, longer"
+
+
+def test_a_law_that_breaks_down_has_no_picture(tmp_path, short, monkeypatch):
+    monkeypatch.setattr(states, "ENVIRONMENTS", ("sand",))
+    monkeypatch.setattr(nclaw_fig02, "NAMES", ("sand",))
+    for name in ("time", "velocity"):
+        monkeypatch.setattr(states, name, lambda *of: with_(reconstruction("water"), steps=100))
+    figure = nclaw_fig02.draw(done(tmp_path, states.away))
     titles = [ax.get_title() for ax in figure.axes if ax.images]
-    assert titles[:3] == ["longer: truth", "longer: ours", "longer: before training"]
-    assert titles[5] == "thrown otherwise: before training"
-    assert titles[6:12] == 6 * [""]
+    assert titles[2] == "ours\nbroke down"
+    assert titles[8] == "broke down"
+
+
+def test_a_graph_network_runs_through_all_its_frames(monkeypatch):
+    scene, asked = with_(reconstruction("water"), steps=20), []
+
+    def frames(problem, law):
+        asked.append(problem.clock.every)
+        yield from (np.full((2, 3), float(k)) for k in range(1 + 20 // asked[-1]))
+
+    monkeypatch.setattr(states, "frames", frames)
+    simulator = object.__new__(Simulator)
+    assert states.ends(scene, simulator)[:, 0, 0].tolist() == [0.0, 4.0]
+    assert states.ends(scene, states.own)[:, 0, 0].tolist() == [0.0, 1.0]
+    assert asked == [5, 20]
 
 
 def test_runs_beside_the_truth_are_drawn_as_far_as_trained(tmp_path, short, monkeypatch):
@@ -76,7 +109,7 @@ def test_runs_beside_the_truth_are_drawn_as_far_as_trained(tmp_path, short, monk
     monkeypatch.setattr(elsewhere, "learned", lambda name: elsewhere.own if name == "water"
                         else untrained_yet(name))
     results = done(tmp_path, elsewhere.many)
-    assert results.value("nclaw.fig3", "nclaw.fig3.toys.off") == 0.0
+    assert results.value("nclaw.fig3", "nclaw.fig3.toys.ours") == 0.0
     assert "no weights sand" in str(results.records("nclaw.fig3"))
     shown = [ax for ax in nclaw_fig03.draw(results).axes if ax.images]
     assert [ax.get_title() for ax in shown] == ["start", "ours", "truth"]
@@ -88,58 +121,6 @@ def test_states_of_a_run_that_breaks_down_are_missing():
     assert x.shape == (21, 1000, 3)
     assert np.isfinite(x[0]).all()
     assert np.isnan(x[-1]).all()
-    assert (nclaw_fig02.whole(x[-1], x[-1]).colour == 1.0).all()
-
-
-def test_without_weights_no_curve_is_drawn(tmp_path, monkeypatch):
-    monkeypatch.setattr(curves, "known", lambda run: {})
-    assert run_all([curves.loss.experiment], Setting("quick", tmp_path)) == []
-    with pytest.raises(FileNotFoundError, match="the weights were missing"):
-        nclaw_loss.draw(Results(tmp_path))
-
-
-def test_curves_of_ablations_stand_beside_ours(tmp_path, monkeypatch):
-    found = {name: Net(name) for name in ENVIRONMENTS}
-    found["plasticine-no-rotation"] = Net("plasticine")
-    monkeypatch.setattr(tables, "nets", lambda: found)
-    monkeypatch.setattr(tables, "trained", lambda name: untrained()._replace(
-        about={"errors": [1e-3, 1e-4 * len(name)]}))
-    results = done(tmp_path, curves.loss, "quick")
-    assert results.value("nclaw.loss", "nclaw.loss.ours.sand.last") == pytest.approx(4e-4)
-    assert results.value("nclaw.loss", "nclaw.loss.no-rotation.plasticine.first") == 1e-3
-    left, right = nclaw_loss.draw(results).axes
-    assert {line.get_label() for line in left.lines} == set(ENVIRONMENTS)
-    assert [line.get_label() for line in right.lines] == ["ours", "no-rotation"]
-    assert list(right.lines[1].get_ydata()) == pytest.approx([1e-3, 22e-4])
-    assert nclaw_loss.scale(results) == "2 epochs"
-
-
-def test_errors_of_labels_are_told_as_what_they_are_and_not_drawn(tmp_path, monkeypatch):
-    monkeypatch.setattr(tables, "nets", lambda: {"sand": Net("sand"), "sand-labeled": Net("sand")})
-    monkeypatch.setattr(tables, "trained", lambda name: untrained()._replace(
-        about={"errors": [1e-3, 1e-4]}))
-    results = done(tmp_path, curves.loss, "quick")
-    records = json.loads((tmp_path / "nclaw.loss.json").read_text())
-    units = {one["target"]: one["unit"] for one in records}
-    assert units["nclaw.loss.ours.sand.last"] == "m^2"
-    assert units["nclaw.loss.labeled.sand.last"] == "1"
-    axes, = nclaw_loss.draw(results).axes
-    assert [line.get_label() for line in axes.lines] == ["sand"]
-
-
-def test_errors_with_velocities_in_them_are_told_and_not_drawn(tmp_path, monkeypatch):
-    """Those of a training that says what its errors are of are as all others."""
-    more = {"water-velocity": {}, "sand-velocity": {"errors_of": "positions"}}
-    monkeypatch.setattr(tables, "nets", lambda: {name: Net(name.split("-")[0]) for name in more})
-    monkeypatch.setattr(tables, "trained", lambda name: untrained()._replace(about={
-        "errors": [1e-3, 1e-4], "recipe": {"velocity": 1e-4}, **more[name]}))
-    results = done(tmp_path, curves.loss, "quick")
-    notes = {r.target: r.note for r in results.records("nclaw.loss")}
-    told = "the loss's term of velocities is in it"
-    assert told in notes["nclaw.loss.velocity.water.last"]
-    assert told not in notes["nclaw.loss.velocity.sand.last"]
-    table = results.table("nclaw.loss", "errors")
-    assert set(table["environment"]) == {"sand"}
 
 
 def test_a_body_that_broke_down_leaves_its_place_empty():
@@ -155,3 +136,28 @@ def test_a_body_that_broke_down_leaves_its_place_empty():
     figure = pictures(panels, View(3, 2.0))
     shown = [np.ptp(ax.images[0].get_array()) > 0.0 for ax in figure.axes]
     assert shown == [True, True, True, True, False, True]
+
+
+def test_baselines_stand_between_ours_and_the_truth_if_they_were_kept():
+    x = np.random.default_rng(0).random((2, 50, 3))
+    kept = {"a_true": x, "a_ours": x, "a_neural": x + 1.0, "b_true": x, "b_ours": x}
+    panels = sides(kept, {"a": "one", "b": "other", "c": "not kept"}, ("ours", "neural"))
+    assert [panel.title for panel in panels] == ["start", "ours", "neural", "truth", "", "", ""]
+    assert [panel.side for panel in panels] == ["one", "", "", "", "other", "", ""]
+    assert panels[2].solid.x == pytest.approx(panels[1].solid.x + 1.0)
+
+
+def test_bodies_of_task_c_are_run_with_baselines(tmp_path, monkeypatch):
+    """Each beside the truth, as far from it as its laws are."""
+    monkeypatch.setattr(elsewhere, "ENVIRONMENTS", ("water",))
+    monkeypatch.setattr(elsewhere, "geometry", lambda name: with_(reconstruction(name), steps=20))
+    monkeypatch.setattr(elsewhere, "trained", lambda name: name)
+    monkeypatch.setattr(elsewhere, "learned", lambda name: elsewhere.own if name == "water"
+                        else lambda body: fresh(body, Fluid(0.0), NoFlow()))
+    results = done(tmp_path, elsewhere.bodies)
+    found = {r.target: r for r in results.records("nclaw.fig7")}
+    assert found["nclaw.fig7.water.ours"].value == 0.0
+    assert 0.0 < found["nclaw.fig7.water.neural"].value < 1.0
+    assert "middles are 0 m apart" in found["nclaw.fig7.water.ours"].note
+    titles = [ax.get_title() for ax in nclaw_fig07.draw(results).axes]
+    assert titles == ["start", "ours", "neural", "truth"]

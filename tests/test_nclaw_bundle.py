@@ -10,9 +10,10 @@ from mpm_ref.scene import build
 from mpm_ref.sealed import sealed
 from validation.nclaw import bundle, nets, trade_nets
 from validation.nclaw.bundle import Bundle
-from validation.nclaw.nets import Untrained
+from validation.nclaw.environments import ENVIRONMENTS
 from validation.nclaw.trade_nets import Small, bundled, identity, small_nets
 from validation.nclaw.untrained import untrained
+from validation.waiting import Untrained
 
 
 @pytest.fixture
@@ -33,6 +34,13 @@ def test_each_training_is_of_a_name_of_its_own():
     assert len(set(small_nets().values())) == len(small_nets())
     assert not {*small_nets()} & {*nets.nets()}
     assert {*trade_nets.SEEDS} <= {*trade_nets.OF_TRAINING}
+
+
+def test_epochs_are_kept_of_all_materials():
+    found = {net.environment: name for name, net in trade_nets.OF_EPOCHS.items()}
+    assert found == {name: f"small-{name}-epochs" for name in ENVIRONMENTS}
+    assert {(net.epochs, net.kept) for net in trade_nets.OF_EPOCHS.values()} == {
+        (300, (10, 20, 30, 50, 75, 100, 150, 200))}
 
 
 @pytest.mark.parametrize("name", [name for name, net in small_nets().items()

@@ -17,6 +17,7 @@ from validation.nclaw.dissipation import CREATED, Pair
 from validation.nclaw.environments import ENVIRONMENTS
 from validation.results import Results
 from validation.run import Setting, run_all
+from validation.waiting import Untrained
 
 JELLY, CLAY = FixedCorotated(4e4, 3e4), Hencky(1.2e5, 1.2e5)
 YIELD = VonMises(5e3, 0.05)
@@ -135,7 +136,7 @@ def test_laws_that_must_not_create_energy_miss_if_they_do(tmp_path, monkeypatch)
 def test_known_laws_are_true_and_trained_ones(monkeypatch):
     def trained(name):
         if name == "sand-admissible":
-            raise nets.Untrained("no weights sand-admissible.npz: train")
+            raise Untrained("no weights sand-admissible.npz: train")
         return nets.trained("jelly")
 
     run, said = SimpleNamespace(experiment=dissipation.dissipation.experiment), []

@@ -20,6 +20,7 @@ from validation.nclaw.tasks import SEEDS, reconstruction
 from validation.results import Results
 from validation.run import Setting, run_all
 from validation.verification.scenes import with_
+from validation.waiting import Untrained
 
 CENTER = (0.5, 0.5, 0.5)
 
@@ -152,7 +153,7 @@ def test_weights_of_graph_networks_are_found_by_name(folder):
 
 
 def test_weights_that_are_not_there_or_of_another_training_are_told(folder):
-    with pytest.raises(nets.Untrained, match=r"^no weights sand-gnn-10\.npz: python -m "
+    with pytest.raises(Untrained, match=r"^no weights sand-gnn-10\.npz: python -m "
                                              r"validation\.train_laws sand-gnn-10$"):
         trained("sand-gnn-10")
     about = identity(nets.nets()["sand-gnn"])
@@ -170,7 +171,7 @@ def trained_ones(monkeypatch):
 
     def found(name):
         if not name.endswith("gnn"):
-            raise nets.Untrained(f"no weights {name}.npz")
+            raise Untrained(f"no weights {name}.npz")
         return still()._replace(about={"errors": [0.3, None, 0.1, 0.2], "picked": 2, "steps": 40})
 
     monkeypatch.setattr(tables, "trained", found)
@@ -231,7 +232,7 @@ def test_table_6_is_of_1_10_and_100_runs_of_water(tmp_path, trained_ones, monkey
 
 def test_table_6_tells_what_is_not_trained_and_runs_nothing(tmp_path, trained_ones, monkeypatch):
     def missing(name):
-        raise nets.Untrained(f"no weights {name}.npz")
+        raise Untrained(f"no weights {name}.npz")
 
     monkeypatch.setattr(trajectories, "trained", missing)
     monkeypatch.setattr(errors, "compare", lambda *args: pytest.fail("ran"))

@@ -58,6 +58,22 @@ def test_what_melts_moves_otherwise(scene, monkeypatch):
     assert np.abs(ends[1] - ends[0]).max() > 1e-4
 
 
+def nowhere(body):
+    """A body whose stress is not a number."""
+    return elsewhere.fresh(body, body.law._replace(mu=np.nan), body.flow)
+
+
+def test_a_run_that_breaks_down_has_frames_of_nan(scene, monkeypatch):
+    """As many as were asked for, from the first change on."""
+    monkeypatch.setattr(melting, "FIRST", 10)
+    monkeypatch.setattr(melting, "LAST", 30)
+    whole = [*melting.melting(build(scene), own, own)]
+    found = [*melting.melting(build(scene), own, nowhere)]
+    assert len(found) == len(whole)
+    assert np.array_equal(found[:2], whole[:2])
+    assert np.isnan(found[2:]).all()
+
+
 @pytest.mark.parametrize(("step", "share"), [(0, 0.0), (500, 0.0), (1000, 0.5), (2000, 1.0)])
 def test_the_threshold_moves_as_in_the_release(step, share):
     assert melting.melted_points(step, 1000) == 1000 * share

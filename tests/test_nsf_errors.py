@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from small_toys import Records
 
 from mpm_ref.core.grid import OutOfRange
 from mpm_ref.reduced.whole import whole
@@ -73,7 +74,7 @@ def test_the_affine_field_is_worth_its_modes(cube):
 
 def test_draws_differ_and_repeat(cube):
     a, b, again = (cube.errors(TEST, 40, draw) for draw in (0, 1, 0))
-    assert a == again
+    assert a._replace(misfit=None) == again._replace(misfit=None)      # NaN of no weights
     assert a.errors != b.errors
 
 
@@ -89,8 +90,35 @@ def test_a_run_that_breaks_down_is_infinitely_off(cube, monkeypatch):
 
     monkeypatch.setattr(tested, "infer", broken)
     found = cube.errors(TEST, 50)
-    assert found.errors == tested.NOWHERE
+    assert found.errors == (np.inf, np.inf, np.inf)
     assert found.stress == np.inf
+    assert np.isnan(found.points)
+
+
+def test_samples_that_weights_keep_are_counted(cube):
+    one = whole(cube.study.run(TEST))
+    chosen, = cube.study.chosen(one, 50, 0, cube.fields)
+    found, drawn = (cube.errors(TEST, 50, weighed=weighed) for weighed in (True, False))
+    assert (found.kept, found.misfit) == (len(chosen.points), chosen.misfit)
+    assert found.kept < drawn.kept == 50
+    assert 1e-3 < found.misfit < 1.0
+    assert np.isnan(drawn.misfit)
+    later = cube._replace(study=cube.study._replace(later=20))
+    both = later.study.chosen(one, 50, 0, cube.fields)
+    found = later.errors(TEST, 50, weighed=True)
+    assert found.kept == np.mean([len(own.points) for own in both])
+    assert found.misfit == both[1].misfit > both[0].misfit
+
+
+def test_records_of_weighted_samples_say_how_many_there_are(cube):
+    records = Records()
+    row, = errors.by_cubature(records, "nsf.jelly.cubature", cube, 20, (0,))
+    found = cube.errors(TEST, 20, weighed=True)
+    assert row[errors.COLUMNS.index("kept")] == found.kept
+    value, note = records["nsf.jelly.cubature"]
+    assert value == 100.0 * found.errors.origin
+    assert (f"at most 20 samples with weights by cubature, of random candidates; {found.kept:g} "
+            f"kept, whose weights leave {found.misfit:.2g} of the modes' products") in note
 
 
 def test_rows_are_told_by_their_columns(cube):

@@ -2,8 +2,6 @@
 experiment on them; the training itself is in test_nsf_networks_learn.py.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 from field_toys import R, networks
@@ -15,11 +13,12 @@ from mpm_ref.rom.spanned import Sizes
 from validation import targets
 from validation.nsf import networks as kept
 from validation.nsf import networks_runs as runs
-from validation.nsf.networks import Net, Part, Untrained, fields_of, identity, nets, trained
+from validation.nsf import tested
+from validation.nsf.networks import Net, Part, fields_of, identity, nets, trained
 from validation.nsf.studies import jelly
-from validation.nsf.tested import Found
 from validation.results import Results
 from validation.run import Setting, run_all
+from validation.waiting import Untrained
 
 STUDY = jelly(4)._replace(train=(0.3, 0.5), sizes=Sizes(r=R), samples=20)
 NET = Net(STUDY, Part(4, 2, 0.1), Part(5, 2, 0.0), Part(6, 2, 0.0))
@@ -121,17 +120,12 @@ def test_the_printed_networks_of_jelly_are_those_of_table_1(folder, monkeypatch)
     assert recorded(folder)["jelly.weights.printed"].value == 37_920 + 595_200 + 1_336_896
 
 
-@dataclass
-class Ready:
-    """Stands for `Tested`: known errors, of each draw others."""
+class Ready(tested.Tested):
+    """`Tested` with known errors, of each draw others."""
 
-    study: object
-    tests: object
-    fields: object
-
-    def errors(self, value, count, draw):
+    def errors(self, value, count, draw, *_):
         """Errors that tell their draw."""
-        return Found(Errors(0.01 * (draw + 1), 0.02, 0.03), 0.2, float(count))
+        return tested.Found(Errors(0.01 * (draw + 1), 0.02, 0.03), 0.2, float(count), count, np.nan)
 
     def nearest(self, value):
         """Of the nearest states."""
@@ -144,15 +138,21 @@ def test_errors_are_means_in_per_cent(folder, monkeypatch):
     def ready(model, study):
         fields = fields_of(model, study)
         test = type("History", (), {"X": fields.X, "x": np.zeros((1, 31, 1, 3))})
-        return Ready(study, {0.45: test}, fields)
+        return Ready(study, fields, model.xhat, None, {0.45: test})
 
     monkeypatch.setattr(runs, "tested_on", ready)
     found = recorded(folder)
     assert found["jelly"].value == pytest.approx(5.5)           # mean of 1 .. 10 %
-    assert "the largest 10 %" in found["jelly"].note
+    assert found["jelly"].note == (
+        "20 samples; mean of 10, the largest 10 %; trained networks; from the corner of the unit "
+        "box that scenes stand in; from the centroid 2 %, of the displacement 3 %")
     assert found["jelly.all"].value == pytest.approx(1.0)
     assert found["jelly.nearest"].value == pytest.approx(0.1)
     assert found["jelly.stress"].value == pytest.approx(20.0)
     assert "2 runs and 1 tests, dx and dt 4 times as long; r = 3, widths 4, 5 and 6" in (
         found["jelly"].scale)
     assert "untrained" not in found
+    table = Results(folder / "out").table("nsf.networks", "errors")
+    assert table["draw"].tolist() == [*range(10), 0]
+    assert (table["points"] == table["samples"]).all()
+    assert {*table["scene"]} == {"jelly"}

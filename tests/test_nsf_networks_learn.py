@@ -48,6 +48,21 @@ def test_runs_are_those_of_the_study_at_its_spacing():
     assert runs.x[1] == pytest.approx(alone.x[0, ::2], abs=1e-6)
 
 
+def test_no_run_is_kept_beside_what_is_made_of_it(monkeypatch):
+    """They are joined one by one, each before the next is made."""
+    made, kept = [], []
+    monkeypatch.setattr(train_fields, "history", lambda scene, mu, *_: made.append(*mu) or mu)
+
+    def joined(runs):
+        for run in runs:
+            kept.append(*run)
+            assert kept == made
+
+    monkeypatch.setattr(train_fields, "joined", joined)
+    train_fields.runs_of(STUDY)
+    assert kept == [0.3, 0.5]
+
+
 def test_the_command_writes_weights_that_are_taken(places):
     train_fields.main(["jelly"], *places)
     model = trained("jelly")

@@ -137,9 +137,10 @@ def test_weighed_samples_are_better_than_drawn_ones(disks, runs):
         return max(np.abs(fields.place(np.arange(n), at.xhat) - x).max()
                    for (_, at, _), x in zip(found, full, strict=True))
 
-    by = weighed(fields, n, 8, 0)
+    by, known = weighed(fields, n, 8, 0), cubature(fields.U, 3, np.arange(n), 8)
     assert len(by.points) <= 8
-    assert np.array_equal(by.w, cubature(fields.U, 3, np.arange(n), 8).w)
+    assert np.array_equal(by.w, known.w)
+    assert by.misfit == known.misfit
     assert worst(by) < np.median([worst(drawn(n, 8, seed)) for seed in range(5)])
 
 

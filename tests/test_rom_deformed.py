@@ -80,3 +80,20 @@ def test_each_body_has_its_own_gradient_and_law():
     assert np.array_equal(both.place(some, y), fields.place(some, y))
     assert not both.affine(some, y).any()
     assert (both.dim, both.r) == (2, 2)
+
+
+@pytest.mark.parametrize(("d", "n"), [(2, 1), (2, 2), (3, 3)])
+def test_a_body_of_too_few_points_is_refused(d, n):
+    """One has no neighbours at all; two tell nothing across the line through them."""
+    X = np.concatenate([points(d), 5.0 + points(d)[:n]])
+    fields, _ = spanned(stretched(X, len(X) - n, SOFT), Sizes(r=2, modes=2, tau=3, C=3), 0.3,
+                        follows=False)
+    with pytest.raises(ValueError, match=rf"^points in the body 'one': {n}, which tell no "
+                       rf"gradient of the map: expected at least {d + 1}; sample the body"):
+        deformed(fields, [body(X[:-n], SOFT), body(X[-n:], HARD)])
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_as_few_points_as_can_be_tell_gradients(d):
+    X, A = np.vstack([np.zeros(d), np.eye(d)]), np.random.default_rng(1).normal(size=(d, d, 4))
+    assert np.abs(gradients(X, np.einsum("ijr,nj->nir", A, X)) - A).max() < 1e-12

@@ -135,6 +135,41 @@ def test_all_weights_are_rounded():
                zip(rounded(laws, 24).elastic.layers, laws.elastic.layers, strict=True))
 
 
+def weights_of(*numbers):
+    """Laws of two layers of these weights each, and biases of zero."""
+    layer = np.array([numbers]), np.zeros(len(numbers))
+    return weights.Laws(*[weights.Trained((layer, layer), None)] * 2, {})
+
+
+@pytest.mark.parametrize(("numbers", "exponent"), [
+    ((0.5, 0.75, -0.5, 0.625), 1), ((0.5, 0.25, -1.5, 1.0), 2),
+    ((0.0, 0.5, 2.0**-15, 0.5), 4), ((0.0, 0.5, 2.0**-16, 0.5), 5)])
+def test_weights_take_digits_and_an_exponent_of_their_range(numbers, exponent):
+    """16 weights: of 1, 3, 15 and 16 exponents, and one value for zero."""
+    assert inference.size_of(weights_of(*numbers), 8) == 16 * (8 + exponent) / 8
+
+
+def test_the_front_of_digits_is_of_error_and_bytes(monkeypatch):
+    """Fewer digits with the same error are better."""
+    errors = iter((2.0, 1.0, 1.0, 3.0))
+    monkeypatch.setattr(inference, "NAMES", ("jelly",))
+    monkeypatch.setattr(inference, "DIGITS", {"standard": (24, 16, 11, 8)})
+    monkeypatch.setattr(inference, "trained", lambda name: untrained())
+    monkeypatch.setattr(inference, "compare", lambda scene, laws: [
+        Found(next(errors), -1, "lost" if k == 3 else "") for k, _ in enumerate(laws)])
+    records = Records()
+    inference.digits(records)
+    columns, rows = records["digits"]
+    found = [dict(zip(columns, row, strict=True)) for row in rows]
+    assert [row["pareto"] for row in found] == [0, 0, 1, 1]
+    sizes = [row["bytes"] for row in found]
+    assert sizes == sorted(sizes, reverse=True)
+    assert sizes[0] - sizes[1] == 11008 * 8 / 8
+    assert records["trade.nclaw.digits.jelly.16"] == (1.0, f"weights of {sizes[1]:.0f} bytes")
+    assert records["trade.nclaw.digits.jelly.8"] == (
+        3.0, f"weights of {sizes[3]:.0f} bytes; {inference.BEST}; lost")
+
+
 def test_wider_networks_cost_more():
     body = build(Small().scene).bodies[0]
     cheap = inference.cost(body.law, body.flow)

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from mpm_ref.reduced.errors import Errors
 from mpm_ref.rom.placed import NoBody
 from mpm_ref.rom.spanned import Sizes
 from validation.extremes import nsf_runs
@@ -52,10 +53,16 @@ def test_each_kind_of_samples_is_run_and_all_particles(one, results, monkeypatch
         expected = one.errors(TEST, 30, 1, weighed=weighed)
         assert table["origin"][row] == pytest.approx(expected.errors.origin)
         assert table["points"][row] == pytest.approx(expected.points)
+        assert table["kept"][row] == expected.kept
     assert (table["cpu"] > 0.0).all()
     assert len(set(table["cpu_full"])) == 1
-    judged = {r.comparator for r in found.records("trade.nsf.samples")}
-    assert judged == {"info"}
+    records = {r.target: r for r in found.records("trade.nsf.samples")}
+    assert {r.comparator for r in records.values()} == {"info"}
+    assert {*records} == {"trade.nsf.samples", f"trade.nsf.samples.jelly.random.{n}", *(
+        f"trade.nsf.samples.jelly.{way}.{count}" for way in nsf.WAYS for count in (5, 30))}
+    told = {way: records[f"trade.nsf.samples.jelly.{way}.30"].note for way in nsf.WAYS}
+    assert "30 samples, random; of the stress" in told["random"]
+    assert f"30 samples, cubature, {expected.kept:g} kept, whose weights" in told["cubature"]
 
 
 def test_a_run_that_breaks_down_has_no_time(one, monkeypatch):
@@ -78,7 +85,7 @@ def test_steps_grow_until_a_run_breaks_down(one, results, monkeypatch):
         asked.append(faster)
         good = faster < 2.0
         return tested.Found(
-            tested.NOWHERE._replace(origin=0.1) if good else tested.NOWHERE, 0.2, 30.0)
+            Errors(0.1 if good else np.inf, np.inf, np.inf), 0.2, 30.0, 40.0, np.nan)
 
     monkeypatch.setattr(type(one), "errors", errors)
     monkeypatch.setattr(nsf, "full_end", lambda scene, factor: f"end {factor:g}")
@@ -124,7 +131,7 @@ def test_changes_are_one_at_a_time_and_leave_out_the_own_sizes(one):
     assert found[2][2]().study.sizes == STUDY.sizes._replace(smoothing=1.0)
 
 
-def test_sizes_are_told_with_their_bytes(one, results, monkeypatch):
+def test_sizes_are_told_with_their_bytes(one, results, monkeypatch, tmp_path):
     monkeypatch.setattr(nsf_sizes, "LEVELS", {"quick": {"r": (2,), "C": (4,)}})
     table = results(nsf_sizes.of_sizes).table("trade.nsf.sizes", "sizes")
     assert table["knob"].tolist() == ["own", "r", "C", "precision"]
@@ -133,6 +140,9 @@ def test_sizes_are_told_with_their_bytes(one, results, monkeypatch):
     assert table["bytes"][2] < table["bytes"][0]
     assert table["bytes_full"][0] == nsf_sizes.particle_bytes(STUDY)
     assert table["origin"][1] > table["origin"][0]
+    targets = {r.target for r in Results(tmp_path).records("trade.nsf.sizes")}
+    assert targets == {"trade.nsf.sizes", *(f"trade.nsf.sizes.jelly.{words}" for words in (
+        "own.sizes", "r.2", "C.4", "precision.single"))}
 
 
 def test_the_two_scenes_have_a_test_each_in_the_quick_profile():

@@ -18,7 +18,7 @@ from mpm_ref.nclaw.learn.methods import SYS_ID
 from mpm_ref.nclaw.learn.recipe import Recipe
 from mpm_ref.scene import build
 
-from .nclaw import bundle
+from .nclaw import bundle, diverged
 from .nclaw.dough import DoughNet, doughs
 from .nclaw.environments import environment, trajectory
 from .nclaw.met import bounds
@@ -48,28 +48,52 @@ def taught(net, recipe, laws, checkpoint, show):
 
 
 def made(name, checkpoints, threads):
-    """`nclaw.weights.Laws` of a net by name, with what is to be known of them."""
-    net = nets()[name]
+    """`nclaw.weights.Laws` of a net by name, with what is to be known of them; of a training that
+    diverges, that alone: plain values.
+    """
+    net, path = nets()[name], checkpoints / f"{name}.pt"
     recipe = Recipe(epochs=net.epochs, elastic_rate=net.elastic_rate, reading=net.reading,
                     plastic_rate=net.plastic_rate, seed=net.seed, velocity=net.velocity)
-    laws = begun(net)
+    laws, errors = begun(net), []
     with tqdm(total=recipe.epochs, desc=name) as bar:
         def show(history):
+            errors[:] = [epoch.error for epoch in history]
             bar.update(len(history) - bar.n)
             bar.set_postfix(error=f"{history[-1].error:.1e}", segments=history[-1].segments)
-        done = taught(net, recipe, laws, checkpoints / f"{name}.pt", show)
+        try:
+            done = taught(net, recipe, laws, path, show)
+        except drive.Diverged as fault:
+            if path.exists() and not errors:    # it went on from there: errors before are not known
+                path.unlink()
+                return made(name, checkpoints, threads)
+            return {**known_of(name, recipe, threads), "errors": errors, "stopped": str(fault)}
     took = {f"{clock}_seconds": round(s, 1) for clock, s in done.meter.total._asdict().items()}
-    about = {**identity(net), "recipe": asdict(recipe), "threads": threads, **took,
-             "command": f"python -m validation.train_laws {name}", "torch": torch.__version__,
-             **done.known, **provenance(commit(ROOT))}
+    about = {**known_of(name, recipe, threads), **took, **done.known}
     stored = drive.stored(laws, about)
     return stored._replace(about={**about, "seen": bounds(net, stored),
                                   "dt": environment(net.environment).dt})
 
 
+def known_of(name, recipe, threads):
+    """What is to be known of any training: plain values."""
+    return {**identity(nets()[name]), "recipe": asdict(recipe), "threads": threads,
+            "command": f"python -m validation.train_laws {name}", "torch": torch.__version__,
+            **provenance(commit(ROOT))}
+
+
+def written(path, found):
+    """Write what `made` found: weights, or beside them how far a training came."""
+    if isinstance(found, weights.Laws):
+        weights.save(path, found)
+        diverged.beside(path).unlink(missing_ok=True)
+    else:
+        kept = diverged.keep(path, found)
+        typer.echo(f"{path.stem} diverged: {found['stopped']}\nits errors: {kept}", err=True)
+
+
 def main(names: Names = None, folder: Folder = FOLDER, checkpoints: Checkpoints = KEPT,
          threads: Threads = 1):
-    """Train laws and graph networks and write their weights."""
+    """Train laws and graph networks and write their weights; of trainings that diverge, errors."""
     def make(name, folder, checkpoints):
         path, net = folder / f"{name}.npz", known[name]
         if isinstance(net, GraphNet):
@@ -79,7 +103,7 @@ def main(names: Names = None, folder: Folder = FOLDER, checkpoints: Checkpoints 
         elif isinstance(net, DoughNet):
             weights.save(path, filmed_laws(name, net, checkpoints / f"{name}.pt", threads))
         else:
-            weights.save(path, made(name, checkpoints, threads))
+            written(path, made(name, checkpoints, threads))
 
     known = {**nets(), **small_nets(), **doughs()}
     train_all(names, known, (folder, checkpoints), threads, make)

@@ -7,6 +7,7 @@ Exit status: 0 finished, or stopped at --steps; 2 the scene, the options or the 
 import sys
 from contextlib import ExitStack
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 
 from ..core.grid import OutOfRange
@@ -96,8 +97,10 @@ class Bar(Watch):
         self.bar.initial = self.bar.n = self.bar.last_print_n = self.done(state)
 
     def frame(self, frame, energy):
-        """Note the energies."""
-        self.energies = f", E_kin {energy.kinetic:.3g}, E {energy.sum:.3g} J"
+        """Note the energies that are finite: of a law without energy the sum is not."""
+        known = {"E_kin": energy.kinetic, "E": energy.sum}
+        said = [f"{name} {value:.3g}" for name, value in known.items() if isfinite(value)]
+        self.energies = f", {', '.join(said)} J" if said else ""
 
     def astray(self, said):
         """Say that a learned law is asked what it has not seen."""

@@ -16,6 +16,7 @@ class Chosen(NamedTuple):
     since: float                    # [s]
     points: np.ndarray              # numbers, sorted
     w: np.ndarray | None = None     # weights; None: they count all the same
+    misfit: float = np.nan          # of the weights (see `rom.cubature`)
 
 
 class Plan(NamedTuple):
@@ -87,4 +88,4 @@ def weighed(fields, among, count, seed, since=0.0):
     most = among if np.ndim(among) == 0 else len(among)
     some = drawn(among, min(CANDIDATES, most), seed).points
     found = cubature(fields.U, fields.r, some, count)
-    return Chosen(since, found.points, found.w)
+    return Chosen(since, found.points, found.w, found.misfit)

@@ -22,8 +22,8 @@ NEIGHBOURS = 26         # of a point, in 3D those of a lattice; in 2D 8
 LEAST = 1e-10           # of a spread over the largest: across a plane there is no gradient
 
 
-class Of(NamedTuple):
-    """Points of one body."""
+class Portion(NamedTuple):
+    """The points of one body, and their law."""
 
     first: int
     last: int           # the number after its last
@@ -35,7 +35,12 @@ class Deformed(NamedTuple):
 
     map: Spanned
     D: np.ndarray       # (n, d, d, R) dU/dX of modes [1/m]
-    bodies: tuple       # of `Of`
+    bodies: tuple       # of `Portion`
+
+    @property
+    def X(self):
+        """Points (n, d) at rest [m]."""
+        return self.map.X
 
     @property
     def dim(self):
@@ -89,16 +94,30 @@ def elastic(F, law):
 
 
 def deformed(map, bodies):
-    """`Deformed` of `Spanned` fields, whose points are those of a problem's bodies in order."""
+    """`Deformed` of `Spanned` fields, whose points are those of a problem's bodies in order. Raises
+    ValueError for a body with too few points to tell a gradient.
+    """
+    for body in bodies:
+        require_neighbours(body.name, len(body.id), map.dim)
     ends = np.cumsum([0] + [len(body.id) for body in bodies])
-    of = tuple(Of(*pair, body.law) for pair, body in zip(pairwise(ends), bodies, strict=True))
-    D = [gradients(map.X[one.first:one.last], map.U[one.first:one.last]) for one in of]
-    return Deformed(map, np.concatenate(D), of)
+    portions = tuple(Portion(*pair, body.law)
+                     for pair, body in zip(pairwise(ends), bodies, strict=True))
+    D = [gradients(map.X[own.first:own.last], map.U[own.first:own.last]) for own in portions]
+    return Deformed(map, np.concatenate(D), portions)
+
+
+def require_neighbours(name, n, d):
+    """Raise ValueError unless a body of n points in d dimensions has neighbours along all axes."""
+    if n <= d:
+        raise ValueError(f"points in the body {name!r}: {n}, which tell no gradient of the map: "
+                         f"expected at least {d + 1}; sample the body more finely, or take fields "
+                         "that know the stress")
 
 
 def gradients(X, U):
     """dU/dX (n, d, d, R), of component and axis, of modes U (n, d, R) at points X (n, d): planes
-    through each point that fit its neighbours with least squares, nearer ones counting more.
+    through each point that fit its neighbours with least squares, nearer ones counting more;
+    n > d.
     """
     n, d = X.shape
     away, near = KDTree(X).query(X, min(n, 1 + (NEIGHBOURS if d == 3 else 8)))

@@ -30,8 +30,8 @@ class Reach(NamedTuple):
     def reached(self, x):
         """Whether each of the points x (n, d) [m] shares a node with a sample."""
         found = np.empty(len(x), dtype=bool)
-        _look_up(self.flag.ravel(), np.array(self.flag.shape), self.origin, x, self.dx,
-                 0.5 * (self.degree - 1), found)
+        _look_up(Flags(self.flag.ravel(), np.array(self.flag.shape), self.origin, self.dx,
+                       0.5 * (self.degree - 1)), x, found)
         return found
 
     def cells(self):
@@ -62,19 +62,29 @@ def reach(x, dx, degree):
     return Reach(flag.reshape(shape), origin, dx, degree)
 
 
+class Flags(NamedTuple):
+    """`Reach` for kernels."""
+
+    flag: np.ndarray        # (n1 .. nd,) bool
+    shape: np.ndarray       # (d,)
+    origin: np.ndarray      # (d,)
+    dx: float               # [m]
+    shift: float            # of a base from its point, in cells
+
+
 @parallel
-def _look_up(flag, shape, origin, x, dx, shift, found):
+def _look_up(box, x, found):
     for c in prange(CHUNKS):
-        look_up(flag, shape, origin, x, dx, shift, found, chunk(c, len(x)))
+        look_up(box, x, found, chunk(c, len(x)))
 
 
 @kernel
-def look_up(flag, shape, origin, x, dx, shift, found, bounds):
+def look_up(box, x, found, bounds):
     """Whether the bases of some points are flagged; those out of the box are not."""
     for i in range(bounds[0], bounds[1]):
         at, inside = 0, True
-        for a in range(len(shape)):
-            k = np.floor(x[i, a] / dx - shift) - origin[a]
-            inside = inside and 0 <= k < shape[a]
-            at = at * shape[a] + (np.int64(k) if inside else 0)
-        found[i] = inside and flag[at]
+        for a in range(len(box.shape)):
+            k = np.floor(x[i, a] / box.dx - box.shift) - box.origin[a]
+            inside = inside and 0 <= k < box.shape[a]
+            at = at * box.shape[a] + (np.int64(k) if inside else 0)
+        found[i] = inside and box.flag[at]

@@ -3,9 +3,9 @@
 from mpm_ref.nclaw.bodies import learned
 
 from ..nclaw.trade_nets import OF_EPOCHS, bundled
-from ..nclaw.waiting import there
 from ..registry import experiment
 from ..verification.scenes import with_
+from ..waiting import there
 from .nclaw_runs import EVERY, SHORT, Law, Setup, record_silent, table_of, trials
 from .nclaw_strain import thrown
 from .nclaw_time_step import longer
@@ -16,7 +16,7 @@ EPOCHS = {"quick": (10,), "standard": None}             # None: all that were ke
 
 
 @experiment("extremes.nclaw.epochs", title="NCLaw: laws of unfinished trainings",
-            profiles=("quick", "standard"), budget={"quick": 10, "standard": 400})
+            profiles=("quick", "standard"), budget={"quick": 10, "standard": 800})
 def epochs(run):
     """How far runs go by epoch, material, time step and throw; small trainings."""
     names = run.choose(quick=list(OF_EPOCHS)[:1], standard=list(OF_EPOCHS))

@@ -21,8 +21,8 @@ from mpm_ref.scene import build
 from ..nclaw.environments import ENVIRONMENTS, environment
 from ..nclaw.met import met_by
 from ..nclaw.nets import trained
-from ..nclaw.waiting import there
 from ..verification.scenes import threads_for
+from ..waiting import there
 
 BAD = 3.0           # times the mean squared error that is usual for the law
 BADS = 2.0, BAD, 5.0, 10.0

@@ -18,6 +18,7 @@ from .nsf_runs import GONE, Bench, scenes
 ROWS = 100          # of a run
 COLUMNS = ("scene", "samples", "step", "beyond", "distance", "full_distance", "kinetic",
            "full_kinetic")
+WORDS = {"distance": "rms displacement", "kinetic": "kinetic energy"}
 
 
 @experiment("extremes.nsf.long", title="NSF: ten times the trained time",
@@ -78,23 +79,34 @@ def kinetic(m, v):
 
 
 def record_end(run, name, reduced, full, trained):
-    """Record how far a run came and where it went; trained: steps of the training runs."""
+    """Record how far a run came, -1 without a start, and where it went; trained: steps of the
+    training runs.
+    """
     (own, said), (frames, stopped) = reduced, full
     id, scale = f"extremes.nsf.long.{name}", f"{name}, {LONGER} times {trained} steps"
-    far = np.array([one[0] for one in own.values()])
-    left = np.flatnonzero(~(far <= 1.0))
-    run.record(f"{id}.steps", max(own), unit="steps", comparator="info", scale=scale,
+    run.record(f"{id}.steps", max(own, default=-1), unit="steps", comparator="info", scale=scale,
                note=said or "to its end; the full-order run " + (stopped or "too"))
+    if own:
+        record_beyond(run, id, np.array([one[0] for one in own.values()]), scale, trained)
+    both = set(own) & set(frames)
+    if both:
+        record_state(run, id, (own, frames), scale, max(both))
+
+
+def record_beyond(run, id, far, scale, trained):
+    """Record how far the latent coordinates of each step were from the trained ones."""
+    left = np.flatnonzero(~(far <= 1.0))
     run.record(f"{id}.beyond", far.max(), comparator="info", scale=scale,
                note="largest distance of the latent coordinates from the trained ones, over their "
                     f"gap; within the trained steps {far[:trained + 1].max():.3g}; above 1 first "
                     + (f"in step {left[0]}" if len(left) else "never"))
+
+
+def record_state(run, id, both, scale, last):
+    """Record displacement and kinetic energy in the last step that both runs have."""
+    own, frames = both
     for k, what, unit in ((0, "distance", "m"), (1, "kinetic", "J")):
-        last = max(set(own) & set(frames))
         peak = max(one[k] for one in frames.values())
         run.record(f"{id}.{what}", own[last][k + 1], unit=unit, comparator="info", scale=scale,
                    note=f"{WORDS[what]} in step {last}; the full-order run {frames[last][k]:.3g}, "
                         f"at its most {peak:.3g}")
-
-
-WORDS = {"distance": "rms displacement", "kinetic": "kinetic energy"}

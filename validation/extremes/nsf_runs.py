@@ -100,7 +100,7 @@ class Bench:
 
     def inferred(self, scene, fields, chosen):
         """Yield what `infer` does of a `Whole` scene, until latent coordinates are GONE."""
-        for state in infer(scene, fields, Plan((chosen,)), self.one.xhat[:, 0].mean(axis=0)):
+        for state in infer(scene, fields, Plan((chosen,)), self.one.rest):
             yield state
             if self.extent.outlying(state[1].xhat) > GONE:
                 return

@@ -6,8 +6,10 @@ from mpm_ref.nclaw.gnn.simulator import Simulator
 from mpm_ref.nclaw.weights import mixed
 
 from ..registry import experiment
+from .diverged import diverged
 from .met import LABELED
-from .tables import known
+from .nets import nets
+from .tables import known, method_of
 
 STEP = {"unit": "m^2", "note": "mean over steps from restarts of the horizon of that epoch"}
 MIXED = {"unit": "m^2", "note": f"{STEP['note']}; the loss's term of velocities is in it, which "
@@ -30,9 +32,28 @@ def loss(run):
                 continue
             errors, of = laws.about["errors"], kind_of(method, laws.about)
             record(run, f"nclaw.loss.{method}.{name}", errors, of)
-            if of is STEP:
-                rows += [(method, name, epoch, error) for epoch, error in enumerate(errors, 1)]
-    run.table("errors", COLUMNS, rows)
+            rows += rows_of(method, name, errors, of)
+    run.table("errors", COLUMNS, rows + of_diverged(run))
+
+
+def of_diverged(run):
+    """Rows of the trainings that diverged; records how far they came."""
+    rows = []
+    for name, net in nets().items():
+        about = diverged(name)
+        if about is None:
+            continue
+        method, errors = method_of(name, net), about["errors"]
+        run.record(f"nclaw.loss.{method}.{net.environment}.epochs", len(errors), unit="epochs",
+                   comparator="info", scale=f"of {net.epochs} epochs",
+                   note=f"the training diverged: {about['stopped']}")
+        rows += rows_of(method, net.environment, errors, kind_of(method, about))
+    return rows
+
+
+def rows_of(method, name, errors, of):
+    """Rows of the table, if the errors are those of a step."""
+    return [(method, name, epoch, error) for epoch, error in enumerate(errors, 1) if of is STEP]
 
 
 def kind_of(method, about):

@@ -17,9 +17,9 @@ from mpm_ref.scene import build
 
 from ..registry import experiment
 from ..verification.scenes import threads_for
+from ..waiting import there
 from .environments import ENVIRONMENTS, environment
 from .nets import trained
-from .waiting import there
 
 METHODS = {"ours": "{}", "admissible": "{}-admissible"}     # and the names of their weights
 TRUE = "true"

@@ -9,7 +9,9 @@ from mpm_ref.materials import make_flow
 from mpm_ref.nclaw.bodies import fresh, learned, own
 from mpm_ref.nclaw.camera import project
 
+from ..ldm.kept_bodies import keep
 from ..registry import experiment
+from ..waiting import there
 from .dough import (
     DROP,
     EVERY,
@@ -27,7 +29,6 @@ from .dough import (
 )
 from .states import shots
 from .untrained import untrained
-from .waiting import there
 
 BODIES = {"block": block, "star": star}
 COLUMNS = ("laws", "pixels", "block", "star", "broken")
@@ -48,12 +49,16 @@ class Row(NamedTuple):
             profiles=("quick", "standard"), budget={"quick": 15, "standard": 15})
 def dough(run):
     """Trained laws beside a wrong guess, laws before training, and the true ones, which see the
-    noise of the camera alone.
+    noise of the camera alone. Keeps the points at the start, half-way and at the end.
     """
-    truth = {name: shots(scene(shape()), own) for name, shape in BODIES.items()}
-    marks = film(truth["block"])
     laws = contestants(run)
-    rows = [row(name, law, truth, marks) for name, law in run.progress(laws.items(), "laws")]
+    runs = {name: {body: shots(scene(shape()), law) for body, shape in BODIES.items()}
+            for name, law in run.progress(laws.items(), "laws")}
+    truth = runs["true"]
+    marks = film(truth["block"])
+    rows = [row(name, found, truth, marks) for name, found in runs.items()]
+    keep(run, **{f"{body}_{name}": x[::(len(x) - 1) // 2] for name, found in runs.items()
+                 for body, x in found.items()})
     record_settings(run, marks, truth["block"])
     for one in rows:
         record(run, one, len(truth["star"][0]))
@@ -75,9 +80,8 @@ def guessed(body):
                                       s_min=of.flow.s_min))
 
 
-def row(name, law, truth, marks):
-    """`Row` of laws."""
-    found = {body: shots(scene(shape()), law) for body, shape in BODIES.items()}
+def row(name, found, truth, marks):
+    """`Row` of laws whose frames of both bodies were found."""
     seen = project(camera(), found["block"][:, marks.points])
     off = {body: apart(x, truth[body]) for body, x in found.items()}
     broken = " and ".join(body for body, x in found.items() if np.isnan(x).any())

@@ -13,18 +13,19 @@ from mpm_ref.scene import build
 from ..ldm.kept_bodies import keep
 from ..registry import experiment
 from ..verification.scenes import threads_for, with_
+from ..waiting import Untrained
 from .environments import ENVIRONMENTS, environment
 from .melting import melting
-from .nets import Untrained, trained
+from .nets import trained
 from .shown import cone, contact, large, pool
-from .states import shots
+from .states import NETS, shots
 from .tasks import TOYS, geometry
 from .toys import said
 
 EACH = 4000         # kept points of a run, at most
 OF = {(FixedCorotated, None): "jelly", (Hencky, DruckerPrager): "sand",
       (Hencky, VonMises): "plasticine", (Fluid, None): "water"}
-WORDS = ("true", "ours")
+WORDS = ("ours",)                   # what stands beside the truth; of `states.NETS`
 MELTS = ("plasticine", "sand")      # before and after
 
 
@@ -48,17 +49,17 @@ def company(run):
 
 
 @experiment("nclaw.fig7", title="NCLaw: other bodies, Figures 7 and 8",
-            profiles=("standard",), budget={"standard": 1500})
+            profiles=("standard",), budget={"standard": 2200})
 def bodies(run):
-    """Keeps points of task (c) at the start and half-way."""
+    """Keeps points of task (c) at the start and half-way; graph networks are for smaller bodies."""
     halves = {name: with_(geometry(name), steps=geometry(name).steps // 2)
               for name in ENVIRONMENTS}
-    show(run, {name: (partial(both, half), said(TOYS[name].name))
+    show(run, {name: (partial(both, half, ("ours", "neural")), said(TOYS[name].name))
                for name, half in halves.items()})
 
 
 def show(run, parts):
-    """Keep, and record the distance at the end of, runs with true laws and with ours: of each part
+    """Keep, and record the distance at the end of, runs of true laws and of others: of each part
     {name: (what makes it, words)}. Those whose laws are not trained yet are told.
     """
     kept = {}
@@ -68,18 +69,24 @@ def show(run, parts):
         except Untrained as fault:
             run.note(f"{name}: {fault}")
             continue
-        kept |= {f"{name}_{word}": found[word] for word in WORDS}
-        run.record(f"{run.experiment.id}.{name}.off", found["off"], unit="m^2", comparator="info",
-                   scale=f"{found['points']} particles, {found['steps']} steps, {words}",
-                   note="mean squared distance of the last states alone")
+        kept |= {f"{name}_{word}": x for word, x in found["x"].items()}
+        for word, off in found["off"].items():
+            run.record(f"{run.experiment.id}.{name}.{word}", off, unit="m^2", comparator="info",
+                       scale=f"{found['points']} particles, {found['steps']} steps, {words}",
+                       note="mean squared distance of the last states alone; their middles are "
+                            f"{found['middle'][word]:.3g} m apart")
     keep(run, **kept)
 
 
-def both(scene):
-    """`thinned` runs of a scene with true laws and with ours. Raises `Untrained`."""
+def both(scene, words=WORDS):
+    """`thinned` runs of a scene with true laws and with those of some words. Raises `Untrained`."""
     ends = with_(scene, every=scene.steps)
-    ours = {name: learned(trained(name)) for name in {of(body) for body in build(scene).bodies}}
-    runs = [shots(ends, own), shots(ends, lambda body: ours[of(body)](body))]
+    names = {of(body) for body in build(scene).bodies}
+    laws = {word: {name: learned(trained(NETS[word].format(name))) for name in names}
+            for word in words}
+    runs = {"true": shots(ends, own)}
+    for word, mine in laws.items():
+        runs[word] = shots(ends, lambda body, mine=mine: mine[of(body)](body))
     return thinned(runs, scene.steps)
 
 
@@ -89,17 +96,22 @@ def melted(scene):
     ours = [learned(trained(name)) for name in MELTS]
     true = [partial(of_laws, build(environment(name)).bodies[0]) for name in MELTS]
     with threads_for(build(scene).bodies):
-        runs = [np.array([*melting(build(ends), *laws)]) for laws in (true, ours)]
+        runs = {word: np.array([*melting(build(ends), *laws)])
+                for word, laws in (("true", true), ("ours", ours))}
     return thinned(runs, scene.steps)
 
 
 def thinned(runs, steps):
-    """Plain values: of two runs (frames, n, 3), at most `EACH` points each, and their distance."""
-    n = runs[0].shape[1]
-    shown = {word: x[:, ::-(-n // EACH)].round(5).tolist()
-             for word, x in zip(WORDS, runs, strict=True)}
-    return {**shown, "points": n, "steps": steps,
-            "off": float(np.mean((runs[1][-1] - runs[0][-1]) ** 2))}
+    """Plain values: of runs {word: (frames, n, 3)}, at most `EACH` points each; how far others end
+    from the true one, point by point [m^2] and in their middles [m].
+    """
+    n, last = runs["true"].shape[1], {word: x[-1] for word, x in runs.items()}
+    true = last.pop("true")
+    middle = {word: x.mean(axis=0) - true.mean(axis=0) for word, x in last.items()}
+    return {"x": {word: x[:, ::-(-n // EACH)].round(5).tolist() for word, x in runs.items()},
+            "points": n, "steps": steps,
+            "off": {word: float(np.mean((x - true) ** 2)) for word, x in last.items()},
+            "middle": {word: float(np.linalg.norm(gap)) for word, gap in middle.items()}}
 
 
 def of(body):

@@ -1,9 +1,8 @@
 """NCLaw's Tables 4 and 7: errors of one environment, which Tables 1 and 2 have too.
 
-They are recorded with those, from the same runs. Table 4 (plasticine, "more recent comparison") has
-a column of the simulator of Li & Farimani (2022), which is another paper's. Table 7 (water,
-"auxiliary loss") has laws that were trained without and with a term of velocities in the loss,
-whose weight is not printed; the errors are those of positions.
+They are recorded with those, from the same runs. Table 4 is of plasticine ("more recent
+comparison"). Table 7 (water, "auxiliary loss") has laws that were trained without and with a term
+of velocities in the loss, whose weight is not printed; the errors are those of positions.
 """
 
 from typing import NamedTuple
@@ -33,4 +32,3 @@ def record_excerpts(run, rows):
             for (_, task), some in grouped(mine).items():
                 record_mean(run, f"{table}.{task}.{column}", some,
                             nets().get(f"{environment}-{method}"))
-    run.note(NOT_RUN)

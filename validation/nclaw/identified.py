@@ -9,9 +9,9 @@ from mpm_ref.nclaw import deployed
 from mpm_ref.scene import build
 
 from ..registry import experiment
+from ..waiting import there
 from .environments import environment, trajectory
 from .nets import trained
-from .waiting import there
 
 NAME, POINTS, SEED = "water", 1000, 0
 METHODS = {NAME: "ours", f"{NAME}-labeled": "labeled"}      # of weights

@@ -10,6 +10,7 @@ import numpy as np
 
 from mpm_ref.body import Body, particles_at
 from mpm_ref.cases import in_order
+from mpm_ref.core.grid import OutOfRange
 from mpm_ref.simulate import keep_inside
 
 FIRST, LAST = 500, 1500     # steps
@@ -17,11 +18,22 @@ HOLD = 20                   # steps between changes
 
 
 def melting(problem, before, after):
-    """Positions (n, 3) of the points of a problem's one body at the start and at each frame.
+    """Positions (n, 3) of the points of a problem's one body at the start and at each frame; NaN
+    from where it breaks down on.
 
     before, after: functions that make of a body the same one of other laws. Frames are multiples of
     `HOLD` steps.
     """
+    missing = 1 + problem.clock.steps // problem.clock.every
+    for x in as_far(problem, before, after):
+        missing -= 1
+        yield x
+    for _ in range(missing):
+        yield np.full_like(x, np.nan)
+
+
+def as_far(problem, before, after):
+    """`melting` as far as every point has a finite place."""
     clock, stepper = problem.clock, problem.stepper()
     state = whole([before(problem.bodies[0])])
     rank = np.argsort(np.argsort(state.particles.x[:, 1]))
@@ -30,14 +42,25 @@ def melting(problem, before, after):
         melted = rank < melted_points(k, len(rank))
         parts = [law(part(state, which)) for law, which in ((before, ~melted), (after, melted))
                  if which.any()]
-        stepper.start(parts)
-        stepper.sort(parts)
-        for step in range(k, k + HOLD):
-            stepper.step(parts, step * clock.dt, clock.dt)
-            keep_inside(parts, *problem.clip)
+        try:
+            hold(problem, stepper, parts, k)
+        except OutOfRange:
+            return
         state = whole(parts)
+        if not np.isfinite(state.particles.x).all():
+            return
         if (k + HOLD) % clock.every == 0:
             yield state.particles.x.copy()
+
+
+def hold(problem, stepper, parts, k):
+    """Move parts from step k on until points change again. Raises `OutOfRange`."""
+    dt = problem.clock.dt
+    stepper.start(parts)
+    stepper.sort(parts)
+    for step in range(k, k + HOLD):
+        stepper.step(parts, step * dt, dt)
+        keep_inside(parts, *problem.clip)
 
 
 def melted_points(step, n):

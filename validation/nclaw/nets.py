@@ -12,6 +12,7 @@ from mpm_ref.nclaw import weights
 from mpm_ref.nclaw.gnn import weights as of_graphs
 from mpm_ref.scene.text import canonical
 
+from ..waiting import Untrained
 from .environments import ENVIRONMENTS, environment
 from .simulators import GraphNet, simulators
 
@@ -68,10 +69,6 @@ def others(name):
     yield "labeled", Net(name, **LABELED, method="labeled")
     yield "sys-id", Net(name, law, flow, method="sys-id", elastic_rate=0.1)
     yield "admissible", Net(name, **ADMISSIBLE)
-
-
-class Untrained(ValueError):
-    """Weights are not there yet."""
 
 
 @cache

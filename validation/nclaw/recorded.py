@@ -1,7 +1,7 @@
-"""The four training environments: their settings, and the states that they end in.
+"""The states that the four training environments end in.
 
-The final states are recorded for later comparison, of our runs with each other and with other
-codes; NCLaw's own are in single precision and not published.
+They are recorded for later comparison, of our runs with each other and with other codes; NCLaw's
+own are in single precision and not published.
 """
 
 import hashlib
@@ -14,48 +14,11 @@ from mpm_ref.scene import build
 from mpm_ref.simulate import simulate
 
 from ..registry import experiment
-from ..settings import record_settings
-from ..verification.scenes import mean, shipped, threads_for
+from ..verification.scenes import mean, threads_for
 from .environments import ENVIRONMENTS, environment
 
 CARRIED = ("x", "v", "C", "F", "y")         # what a particle carries from step to step
 AXES = "xyz"
-
-
-@experiment("nclaw.settings", title="Settings of NCLaw's environments that its text prints",
-            profiles=("quick", "standard"), budget={"quick": 1, "standard": 1})
-def settings(run):
-    """Settings of the scenes nclaw_*.toml."""
-    scenes = {name: shipped(f"nclaw_{name}") for name in ENVIRONMENTS}
-    jelly = scenes["jelly"]
-    low, high = jelly.body[0].shape.lower, jelly.body[0].shape.upper
-    points = len(build(jelly).bodies[0].particles.x)
-    cells = round(1.0 / jelly.dx)
-    record_settings(run, "nclaw_jelly", {
-        "nclaw.sec4_1.train_points": points, "nclaw.sec4_1.steps": jelly.steps,
-        "nclaw.sec4_1.dt": jelly.dt, "nclaw.sec4_1.materials": len(scenes),
-        "nclaw.appD1.cube_edge": high[0] - low[0], "nclaw.appD1.grid_per_dim": cells,
-        "nclaw.appD1.dx": jelly.dx, "nclaw.appD1.gravity": jelly.gravity[1],
-        "nclaw.appD1.bc_threshold": jelly.walls.low[0],
-        "nclaw.appF1.real_time": jelly.steps * jelly.dt, "nclaw.appF1.steps_ours": jelly.steps})
-    record_release(run, scenes)
-
-
-def record_release(run, scenes):
-    """Constants that the text leaves out and the authors' release sets."""
-    of = {name: scene.body[0].material for name, scene in scenes.items()}
-    v = scenes["jelly"].body[0].velocity
-    record_settings(run, "nclaw_*", {
-        "nclaw.ext.jello.E": of["jelly"].E, "nclaw.ext.jello.nu": of["jelly"].nu,
-        "nclaw.ext.sand.E": of["sand"].E, "nclaw.ext.sand.nu": of["sand"].nu,
-        "nclaw.ext.sand.friction_deg": of["sand"].flow.friction_angle,
-        "nclaw.ext.plasticine.E": of["plasticine"].E,
-        "nclaw.ext.plasticine.nu": of["plasticine"].nu,
-        "nclaw.ext.plasticine.yield_stress": of["plasticine"].flow.tau_y,
-        "nclaw.ext.water.E": of["water"].E, "nclaw.ext.water.nu": of["water"].nu,
-        "nclaw.ext.rho": scenes["jelly"].body[0].density,
-        **{f"nclaw.ext.vlin.{a}": u for a, u in zip(AXES, v.linear, strict=True)},
-        **{f"nclaw.ext.vang.{a}": w for a, w in zip(AXES, v.angular, strict=True)}})
 
 
 @experiment("nclaw.environments", title="Final states of NCLaw's four environments",

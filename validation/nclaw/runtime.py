@@ -1,63 +1,91 @@
-"""How long NCLaw's laws take (Table 3): half a second of each environment."""
+"""How long NCLaw's laws and graph networks take (Table 3): half a second of each environment."""
 
 from time import perf_counter, process_time
 
 import numpy as np
 
-from mpm_ref.laws.compare import positions
-from mpm_ref.nclaw.bodies import learned, own
+from mpm_ref.laws.compare import Broken
+from mpm_ref.nclaw.bodies import own
 from mpm_ref.scene import build
 
 from ..registry import experiment
 from ..verification.scenes import threads_for, with_
+from ..waiting import there
 from .environments import ENVIRONMENTS, environment
-from .errors import PRINTED
-from .nets import trained
-from .waiting import there
+from .errors import PRINTED, ready
+from .evaluate import frames
+from .nets import nets, trained
+from .simulators import GraphNet, named
 
-REPEATS = 3
+REPEATS = {"quick": 3, "standard": 10}
+TRUE = "true"
+METHODS = {"ours": "{}", "gnn": named("{}", 1)}     # and the names of their weights
 COLUMNS = ("environment", "laws", "wall", "cpu")
 NOTE = "median wall time of {} runs in turn, start not counted; printed: on a graphics processor"
+LOST = "broke down, so that no time stands here"
 
 
 @experiment("nclaw.table3", title="NCLaw: times of runs",
-            profiles=("quick", "standard"), budget={"quick": 15, "standard": 90})
+            profiles=("quick", "standard"), budget={"quick": 15, "standard": 500})
 def table3(run):
-    """Ours beside the true laws, in turn, on the threads that are given; for orientation, since the
-    paper's machine is another.
+    """Ours and graph networks beside the true laws, in turn, on the threads that are given; for
+    orientation, since the paper's machine is another.
     """
     steps, rows = run.choose(quick=20, standard=1000), []
-    for name, found in run.progress(there(run, ENVIRONMENTS, trained).items(), "environments"):
-        scene = environment(name, steps=steps, every=steps)
-        laws = {"ours": learned(found), "true": own}
-        for law in laws.values():
-            took(with_(scene, steps=1, every=1), law)       # compiles
-        times = [{word: took(scene, law) for word, law in laws.items()} for _ in range(REPEATS)]
-        rows += [(name, word, *one[word]) for one in times for word in laws]
-        record(run, name, times, steps)
+    names = [pattern.format(name) for name in ENVIRONMENTS for pattern in METHODS.values()]
+    found = there(run, names, trained)
+    for name in run.progress(ENVIRONMENTS, "environments"):
+        laws = methods(name, found)
+        if laws:
+            times = timed(environment(name, steps=steps), {**laws, TRUE: own},
+                          REPEATS[run.profile])
+            rows += [(name, word, *one) for word, some in times.items() for one in some]
+            for word in laws:
+                record(run, (name, word), times, steps)
     run.table("times", COLUMNS, rows)
 
 
+def methods(name, found):
+    """{method: what `frames` runs} of an environment, of those whose weights are found."""
+    weights = {word: pattern.format(name) for word, pattern in METHODS.items()}
+    return {word: ready(found[key]) for word, key in weights.items() if key in found}
+
+
+def timed(scene, laws, repeats):
+    """{name: [(wall, CPU)]} [s] of runs of a scene by {name: law}, in turn."""
+    for law in laws.values():
+        took(with_(scene, steps=scene.every), law)      # compiles
+    turns = [{word: took(scene, law) for word, law in laws.items()} for _ in range(repeats)]
+    return {word: [one[word] for one in turns] for word in laws}
+
+
 def took(scene, law):
-    """Wall and CPU time [s] of a run."""
+    """Wall and CPU time [s] of a run; NaN of one that broke down."""
     problem = build(scene)
-    bodies = tuple(map(law, problem.bodies))
     with threads_for(problem.bodies):
-        run = positions(problem, bodies)
+        run = frames(problem, law)
         next(run)
         wall, cpu = perf_counter(), process_time()
-        for _ in run:
-            pass
+        try:
+            for _ in run:
+                pass
+        except Broken:
+            return np.nan, np.nan
         return perf_counter() - wall, process_time() - cpu
 
 
-def record(run, name, times, steps):
-    """Record the time of ours, and how many times that of the true laws it is."""
-    wall, cpu = np.median([one["ours"] for one in times], axis=0)
-    scale = f"1000 particles, {steps} steps"
-    target = f"nclaw.table3.ours.{PRINTED[name]}"
-    run.record(target, wall, comparator="info", scale=scale, note=NOTE.format(REPEATS))
-    run.record(f"{target}.cpu", cpu / (1000 * steps), unit="s", comparator="info", scale=scale,
-               note="CPU time of a step, per particle")
-    run.record(f"{target}.over_true", cpu / np.median([one["true"][1] for one in times]), unit="1",
-               comparator="info", scale=scale, note="CPU time, beside the true laws")
+def record(run, key, times, steps):
+    """Record the time of a method in an environment, and how many times that of the true laws it
+    is; key: their names.
+    """
+    (name, word), scale = key, f"1000 particles, {steps} steps"
+    wall, cpu = np.median(times[word], axis=0)
+    net = nets()[METHODS[word].format(name)]
+    words = [NOTE.format(len(times[word])), net.said if isinstance(net, GraphNet) else "",
+             "" if np.isfinite(wall) else LOST]
+    target, rule = f"nclaw.table3.{word}.{PRINTED[name]}", {"comparator": "info", "scale": scale}
+    run.record(target, wall, note="; ".join(filter(None, words)), **rule)
+    run.record(f"{target}.cpu", cpu / (1000 * steps), unit="s",
+               note="CPU time of a step, per particle", **rule)
+    run.record(f"{target}.over_true", cpu / np.median(times[TRUE], axis=0)[1], unit="1",
+               note="CPU time, beside the true laws", **rule)

@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..verification.scenes import with_
+from ..waiting import there
 from .environments import environment
 from .evaluate import compare, learned
 from .tasks import SEEDS, velocity
 from .trade_nets import bundled, small_nets
-from .waiting import there
 
 SHORT = 200         # steps, quick
 

@@ -4,18 +4,22 @@ them.
 
 import numpy as np
 
+from mpm_ref.nclaw.gnn.simulator import Simulator
 from mpm_ref.scene import build
 
 from ..ldm.kept_bodies import keep
 from ..registry import experiment
 from ..verification.scenes import threads_for, with_
+from ..waiting import there
 from .environments import ENVIRONMENTS
-from .evaluate import Broken, learned, own, positions
+from .evaluate import Broken, frames, learned, own
 from .nets import trained
 from .tasks import SEEDS, reconstruction, time, velocity
 from .untrained import untrained
 
 SHOTS = (0, 250, 500, 750, 1000)        # steps, of Figure 6
+NETS = {"ours": "{}", "neural": "{}-neural", "gnn": "{}-gnn", "admissible": "{}-admissible"}
+BESIDE = ("ours", "neural", "gnn")      # of Figure 2
 
 
 @experiment("nclaw.fig6", title="NCLaw: the four training runs",
@@ -32,39 +36,59 @@ def training(run):
 
 
 @experiment("nclaw.fig2", title="NCLaw: laws beside the truth, for longer and thrown otherwise",
-            profiles=("standard",), budget={"standard": 120})
+            profiles=("standard",), budget={"standard": 400})
 def away(run):
-    """Keeps the points of each environment at the end of tasks (a) and (b): true, ours, ours before
-    training.
+    """Keeps the points of each environment at the start and at the end of tasks (a) and (b): true,
+    ours, baselines as far as they are trained, ours before training.
     """
-    beside, found = {"ours": trained, "init": lambda name: untrained()}, {}
+    nets = [NETS[word].format(name) for name in ENVIRONMENTS for word in BESIDE]
+    laws, found = there(run, nets, trained), {}
     for name in run.progress(ENVIRONMENTS, "environments"):
+        beside = contestants(name, laws)
         for task, scene in (("time", time(name)), ("velocity", velocity(name, SEEDS[0]))):
-            at_end = with_(scene, every=scene.steps)
-            ends = {"true": shots(at_end, own)[-1]}
-            ends |= {word: shots(at_end, learned(laws(name)))[-1]
-                     for word, laws in beside.items()}
-            record(run, f"nclaw.fig2.{name}.{task}", ends, scene.steps)
-            found |= {f"{name}_{task}_{word}": x for word, x in ends.items()}
+            runs = {word: ends(scene, law) for word, law in beside.items()}
+            last = {word: x[-1] for word, x in runs.items()}
+            record(run, f"nclaw.fig2.{name}.{task}", last, scene.steps)
+            shown = {"start": runs["true"][0], **last}
+            found |= {f"{name}_{task}_{word}": x for word, x in shown.items()}
     keep(run, **found)
 
 
+def contestants(name, laws):
+    """{word: what `shots` takes} of an environment, of those laws of `nets` that are there."""
+    own_nets = {word: laws.get(NETS[word].format(name)) for word in BESIDE}
+    return {"true": own,
+            **{word: one if isinstance(one, Simulator) else learned(one)
+               for word, one in own_nets.items() if one is not None},
+            "init": learned(untrained())}
+
+
+def ends(scene, law):
+    """Positions (2, n, 3) of a scene with a law at the start and at the end; a graph network needs
+    all frames in between.
+    """
+    every = scene.every if isinstance(law, Simulator) else scene.steps
+    return shots(with_(scene, every=every), law)[[0, -1]]
+
+
 def shots(scene, law):
-    """Positions (k, n, 3) of a scene's frames with a law; NaN from where it breaks down on."""
+    """Positions (k, n, 3) of a scene's frames with a law, as of `evaluate.frames`; NaN from where
+    it breaks down on.
+    """
     problem, found = build(scene), []
     with threads_for(problem.bodies):
         try:
-            found += positions(problem, tuple(map(law, problem.bodies)))
+            found += frames(problem, law)
         except Broken:
             missing = 1 + scene.steps // scene.every - len(found)
             found += missing * [np.full_like(found[0], np.nan)]
     return np.array(found)
 
 
-def record(run, target, ends, steps):
-    """Record how far from the truth runs end."""
-    for word in ("ours", "init"):
-        off = np.mean((ends[word] - ends["true"]) ** 2)
-        run.record(f"{target}.{word}", off, unit="m^2", comparator="info",
-                   scale=f"{len(ends['true'])} particles, {steps} steps",
-                   note="mean squared distance of the last states alone")
+def record(run, target, last, steps):
+    """Record how far from the truth runs end, of last positions (n, 3) by word."""
+    for word, x in last.items():
+        if word != "true":
+            run.record(f"{target}.{word}", np.mean((x - last["true"]) ** 2), unit="m^2",
+                       comparator="info", scale=f"{len(x)} particles, {steps} steps",
+                       note="mean squared distance of the last states alone")

@@ -13,9 +13,10 @@ from mpm_ref.scene import Walls
 from mpm_ref.scene.text import canonical
 
 from ..verification.scenes import with_
+from ..waiting import Untrained
 from .bundle import load
-from .environments import environment
-from .nets import FOLDER, Untrained
+from .environments import ENVIRONMENTS, environment
+from .nets import FOLDER
 from .observation import Seen
 
 WALL = 0.1          # distance of the walls from the sides of the unit cube [m]
@@ -57,7 +58,7 @@ class Small(NamedTuple):
 
 
 OF_EPOCHS = {f"small-{name}-epochs": Small(name, epochs=300, kept=KEPT[:-1])
-             for name in ("jelly", "plasticine")}
+             for name in ENVIRONMENTS}
 OF_TRAINING = {
     "small": Small(),
     "small-seed-1": Small(seed=1), "small-seed-2": Small(seed=2),

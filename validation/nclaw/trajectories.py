@@ -1,10 +1,10 @@
 """How well graph networks run away from what they learned, of 1, 10 and 100 runs (Table 6)."""
 
 from ..registry import experiment
+from ..waiting import there
 from .errors import COLUMNS, errors, record_mean
 from .nets import nets, trained
 from .simulators import COUNTS, named
-from .waiting import there
 
 WATER, TASK = "water", "velocity"
 METHODS = {named(WATER, count): f"gnn.{count}" for count in COUNTS} | {WATER: "ours.1"}

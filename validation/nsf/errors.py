@@ -8,6 +8,7 @@ import numpy as np
 from mpm_ref.reduced.errors import Errors
 
 from ..registry import experiment
+from .states import keep_states
 from .studies import jelly, sand
 from .tested import FASTER, refitted, tested
 
@@ -15,7 +16,7 @@ ORIGIN = "from the corner of the unit box that scenes stand in"
 MODAL = "fields of modes, no networks"
 DRAWS = 10              # of samples
 COLUMNS = ("fields", "value", "samples", "draw", "faster", "origin", "centroid", "displacement",
-           "stress", "points")
+           "stress", "points", "kept", "misfit")
 
 
 @experiment("nsf.jelly", title="NSF: a jelly cube hits a jelly wall",
@@ -31,6 +32,7 @@ def cube(run):
     if run.profile == "standard":
         run.record("nsf.jelly.particles", len(one.runs.X), scale=one.scale)
     rows += without_affine(run, "nsf.jelly", one) + map_alone(run, "nsf.jelly", one)
+    keep_states(run, one, one.study.test, ("map",))
     run.table("errors", COLUMNS, rows)
 
 
@@ -51,6 +53,7 @@ def column(run):
     blind = refitted(one, one.study.sizes, follows=False)
     rows += beside(run, "nsf.sand.blind", blind, "blind",
                    "the stress is not told the angle of friction (NSF-mu-dep)")
+    keep_states(run, one, one.study.test[::3])
     run.table("errors", COLUMNS, rows)
 
 
@@ -115,15 +118,21 @@ def by_cubature(run, name, one, count, draws):
     """Record errors with samples that have weights by cubature; their rows."""
     rows = rows_of(one, "cubature", count, draws, weighed=True)
     share(run, name, rows, one.scale, f"at most {count} samples with weights by cubature, of "
-          "random candidates", comparator="info")
+          f"random candidates; {weights(rows)}", comparator="info")
     return rows
+
+
+def weights(rows):
+    """Of samples with weights: how many there are, and how far off the weights are; in words."""
+    return (f"{mean(rows, 'kept'):.4g} kept, whose weights leave {mean(rows, 'misfit'):.2g} of the "
+            "modes' products, on average")
 
 
 def rows_of(one, word, count, draws, faster=1.0, weighed=False):
     """A row for each test and draw."""
     found = [(value, draw, one.errors(value, count, draw, faster, weighed))
              for value in one.study.test for draw in draws]
-    return [(word, value, count, draw, faster, *got.errors, got.stress, got.points)
+    return [(word, value, count, draw, faster, *got.errors, *got[1:])
             for value, draw, got in found]
 
 
@@ -133,15 +142,17 @@ def mean(rows, column):
 
 
 def share(run, name, rows, scale, note, **rule):
-    """Record the mean error of rows, in per cent, and the largest."""
+    """Record the mean error of rows, in per cent, and the largest; rule: as of `said`."""
     errors = Errors(*(mean(rows, column) for column in Errors._fields))
     worst = 100.0 * max(row[COLUMNS.index("origin")] for row in rows)
     said(run, name, errors, scale, f"{note}; mean of {len(rows)}, the largest {worst:.3g} %",
          **rule)
 
 
-def said(run, name, errors, scale, note, **rule):
-    """Record `Errors` in per cent: the paper's, which depends on the origin, and others beside."""
+def said(run, name, errors, scale, note, fields=MODAL, **rule):
+    """Record `Errors` in per cent: the paper's, which depends on the origin, and others beside;
+    fields: what they are, in words.
+    """
     origin, centroid, displacement = (100.0 * error for error in errors)
-    run.record(name, origin, unit="%", scale=scale, note=f"{note}; {MODAL}; {ORIGIN}; from the "
+    run.record(name, origin, unit="%", scale=scale, note=f"{note}; {fields}; {ORIGIN}; from the "
                f"centroid {centroid:.3g} %, of the displacement {displacement:.3g} %", **rule)

@@ -12,15 +12,15 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+from mpm_ref.reduced.nsf.fields import BLOCK
 from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.architecture import DEPTH
 from mpm_ref.rom.fields_file import load
 from mpm_ref.rom.learned import learned
 from mpm_ref.scene.text import canonical
 
-from ..nclaw.nets import Untrained
+from ..waiting import Untrained
 from .studies import Study, jelly, metal
-from .tested import BLOCK
 
 FOLDER = Path(__file__).parent / "weights"
 DISPLACED, BLURRED = 0.03, 0.01     # `Part.beside` of the position, and of what is not known there

@@ -11,17 +11,15 @@ from mpm_ref.reduced.whole import history
 from mpm_ref.rom.architecture import DEPTH
 
 from .. import targets
-from ..nclaw.waiting import there
 from ..registry import experiment
-from .errors import ORIGIN
+from ..waiting import there
+from .errors import COLUMNS, DRAWS, mean, rows_of, said, share
 from .networks import fields_of, nets, trained
 from .tested import Tested
 
-DRAWS = 10              # of samples
 DIM = 3
 OUTPUTS = {"g": 3, "h": 6, "l": 9}
-COLUMNS = ("scene", "value", "samples", "draw", "origin", "centroid", "displacement", "stress",
-           "points")
+TRAINED = {"fields": "trained networks", "comparator": "info"}
 
 
 @experiment("nsf.networks", title="NSF: reduced runs on trained networks",
@@ -32,17 +30,19 @@ def networks(run):
     """
     known = nets()
     for name, net in known.items():
-        cost(run, f"nsf.networks.{name}", net)
+        cost(run, name, net)
     rows = []
     for name, model in there(run, list(known), trained).items():
         one = tested_on(model, known[name].study)
         rows += of_scene(run, name, one, scale_of(known[name], one))
-    run.table("errors", COLUMNS, rows)
+    run.table("errors", ("scene", *COLUMNS[1:]), rows)
 
 
-def cost(run, id, net):
-    """Record the weights of a `Net` and operations at a point, and those of the printed widths."""
-    name, printed = id.rpartition(".")[2], targets.load()
+def cost(run, name, net):
+    """Record the weights of a scene's `Net` and operations at a point, and those of the printed
+    widths.
+    """
+    id, printed = f"nsf.networks.{name}", targets.load()
     for word, widths in (("", {own: getattr(net, own).width for own in OUTPUTS}),
                          (".printed", {own: int(printed[f"nsf.table1.{name}.mlp.{own}.width"].value)
                                        for own in OUTPUTS})):
@@ -69,53 +69,21 @@ def tested_on(model, study):
 
 def scale_of(net, one):
     """In words."""
-    study, test = one.study, next(iter(one.tests.values()))
-    coarse = "" if study.coarser == 1 else f", dx and dt {study.coarser} times as long"
-    return (f"{len(test.X)} particles, {test.x.shape[1] - 1} steps, {len(study.train)} runs and "
-            f"{len(study.test)} tests{coarse}; r = {study.sizes.r}, widths {net.g.width}, "
-            f"{net.h.width} and {net.l.width}")
+    return f"{one.size}, widths {net.g.width}, {net.h.width} and {net.l.width}"
 
 
 def of_scene(run, name, one, scale):
     """Record the errors of a scene's reduced runs; their rows."""
-    few, every = one.study.samples, len(one.fields.X)
-    drawn = rows_of(run, name, one, few, DRAWS)
-    all_points = rows_of(run, name, one, every, 1)
-    id = f"nsf.networks.{name}"
-    said(run, id, mean_of(drawn), scale, f"{few} samples; mean of {len(drawn)}, the largest "
-         f"{100.0 * max(row[COLUMNS.index('origin')] for row in drawn):.3g} %")
-    said(run, f"{id}.all", mean_of(all_points), scale, "all particles are samples")
+    id, few = f"nsf.networks.{name}", one.study.samples
+    drawn, every = (
+        [row for draw in run.progress(range(draws), f"{name}, {count} samples")
+         for row in rows_of(one, name, count, (draw,))]
+        for count, draws in ((few, DRAWS), (len(one.fields.X), 1)))
+    share(run, id, drawn, scale, f"{few} samples", **TRAINED)
+    share(run, f"{id}.all", every, scale, "all particles are samples", **TRAINED)
     nearest = [one.nearest(value) for value in run.progress(one.study.test, f"{name}, nearest")]
     said(run, f"{id}.nearest", Errors(*np.mean(nearest, axis=0)), scale,
-         "nearest states that the networks know")
-    run.record(f"{id}.stress", 100.0 * float(np.mean(column(drawn, "stress"))), unit="%",
-               comparator="info", scale=scale, note=f"{few} samples; of the Kirchhoff stress, all "
-               "particles and times")
-    return drawn + all_points
-
-
-def rows_of(run, name, one, count, draws):
-    """A row for each test and draw."""
-    cases = [(value, draw) for value in one.study.test for draw in range(draws)]
-    found = [(value, draw, one.errors(value, count, draw))
-             for value, draw in run.progress(cases, f"{name}, {count} samples")]
-    return [(name, value, count, draw, *got.errors, got.stress, got.points)
-            for value, draw, got in found]
-
-
-def column(rows, name):
-    """Of rows."""
-    return [row[COLUMNS.index(name)] for row in rows]
-
-
-def mean_of(rows):
-    """Mean `Errors` of rows."""
-    return Errors(*(float(np.mean(column(rows, name))) for name in Errors._fields))
-
-
-def said(run, id, errors, scale, note):
-    """Record `Errors` in per cent: the paper's, which depends on the origin, and others beside."""
-    origin, centroid, displacement = (100.0 * error for error in errors)
-    run.record(id, origin, unit="%", comparator="info", scale=scale, note=f"{note}; trained "
-               f"networks; {ORIGIN}; from the centroid {centroid:.3g} %, of the displacement "
-               f"{displacement:.3g} %")
+         "nearest states that the networks know", **TRAINED)
+    run.record(f"{id}.stress", 100.0 * mean(drawn, "stress"), unit="%", comparator="info",
+               scale=scale, note=f"{few} samples; of the Kirchhoff stress, all particles and times")
+    return drawn + every

@@ -15,6 +15,7 @@ from .errors import (
     share,
     without_affine,
 )
+from .states import keep_states
 from .studies import ball, bread, cake, metal, toothpaste
 from .tested import tested
 
@@ -25,14 +26,18 @@ DRAWS = 3               # of samples
             budget={"quick": 20, "standard": 600, "paper": 7200})
 def frame(run):
     """Errors with 50, 30 and 20 samples (section 6.3)."""
-    counted(run, "nsf.metal", prepared(run, metal, train=5), (50, 30, 20))
+    one = prepared(run, metal, train=5)
+    counted(run, "nsf.metal", one, (50, 30, 20))
+    keep_states(run, one, one.study.test[::3], ("stress",))
 
 
 @experiment("nsf.toothpaste", title="NSF: toothpaste on a brush",
             budget={"quick": 20, "standard": 600, "paper": 7200})
 def paste(run):
     """Errors with 50, 30 and 15 samples (Figures 10 and 11)."""
-    counted(run, "nsf.toothpaste", prepared(run, toothpaste, train=5), (50, 30, 15))
+    one = prepared(run, toothpaste, train=5)
+    counted(run, "nsf.toothpaste", one, (50, 30, 15))
+    keep_states(run, one, one.study.test)
 
 
 @experiment("nsf.bread", title="NSF: a slice of bread is torn",
@@ -61,6 +66,7 @@ def cut(run):
                mean(rows, "points"), scale=one.scale, **({} if whole else {"comparator": "info"}))
     rows += by_cubature(run, "nsf.cake.cubature", one, one.study.samples, draws(run))
     run.table("errors", COLUMNS, rows + finished(run, "nsf.cake", one))
+    keep_states(run, one, one.study.test)
 
 
 def prepared(run, study, **few):
@@ -94,6 +100,7 @@ def beside_the_map(run, name, one):
     share(run, f"{name}.error", few, one.scale, f"{study.samples} samples")
     few += by_cubature(run, f"{name}.cubature", one, study.samples, draws(run))
     rows = few + compared(run, name, one) + map_alone(run, name, one)
+    keep_states(run, one, study.test[1:2] or study.test, ("map",))
     run.table("errors", COLUMNS, rows + finished(run, name, one))
 
 

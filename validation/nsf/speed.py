@@ -116,7 +116,7 @@ def reduced_steps(one, count, inversion, steps):
                       problem.conditions, inversion)
     samples = one.study.chosen(scene, count, 0)[0].points
     stepper.begin()
-    at, dt, points = begin(scene, fields, one.xhat[:, 0].mean(axis=0)), problem.clock.dt, []
+    at, dt, points = begin(scene, fields, one.rest), problem.clock.dt, []
     for k in range(WARM + steps):
         if k == WARM:
             stepper.begin()

@@ -4,21 +4,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.core.grid import OutOfRange
 from mpm_ref.reduced.errors import Errors, Squares
 from mpm_ref.reduced.inferring import Plan, infer
+from mpm_ref.reduced.nsf.evaluate import closest, course, level_of, share
+from mpm_ref.reduced.nsf.fields import BLOCK
 from mpm_ref.reduced.whole import history, whole
 from mpm_ref.rom.deformed import deformed
 from mpm_ref.rom.histories import joined
-from mpm_ref.rom.inferred import nearest
-from mpm_ref.rom.placed import NoBody
 from mpm_ref.rom.spanned import spanned
-from mpm_ref.rom.symmetric import values
 
-BLOCK = 3.0             # size of blocks of points [dx]
-SOME = 4000             # points that tell the nearest state
 FASTER = 1.5            # longer steps at deployment
-NOWHERE = Errors(np.inf, np.inf, np.inf)
 
 
 class Found(NamedTuple):
@@ -26,7 +21,9 @@ class Found(NamedTuple):
 
     errors: Errors          # NSF-eq11: of all points at all times but the first
     stress: float           # of the Kirchhoff stress, over its norm, likewise
-    points: float           # integration points, mean over the steps
+    points: float           # integration points, mean over the steps; NaN where it broke down
+    kept: float             # samples; of sets that follow each other, the mean
+    misfit: float           # of their weights, the largest (see `rom.cubature`); NaN without
 
 
 class Tested(NamedTuple):
@@ -42,11 +39,21 @@ class Tested(NamedTuple):
     @property
     def scale(self):
         """In words."""
-        runs, sizes, times = self.runs, self.study.sizes, self.study.coarser
-        coarse = "" if times == 1 else f", dx and dt {times} times as long"
-        return (f"{len(runs.X)} particles, {runs.x.shape[1] - 1} steps, {len(runs.mu)} runs and "
-                f"{len(self.tests)} tests{coarse}; r = {sizes.r}, modes {sizes.modes}, {sizes.tau} "
-                f"of stress, {sizes.C} of C")
+        sizes = self.study.sizes
+        return f"{self.size}, modes {sizes.modes}, {sizes.tau} of stress, {sizes.C} of C"
+
+    @property
+    def size(self):
+        """The same without what the fields are made of."""
+        study, test = self.study, next(iter(self.tests.values()))
+        coarse = "" if study.coarser == 1 else f", dx and dt {study.coarser} times as long"
+        return (f"{len(test.X)} particles, {test.x.shape[1] - 1} steps, {len(study.train)} runs "
+                f"and {len(self.tests)} tests{coarse}; r = {study.sizes.r}")
+
+    @property
+    def rest(self):
+        """Latent coordinates (r,) near those of the start."""
+        return self.xhat[:, 0].mean(axis=0)
 
     def of(self, value):
         """The fields in a run with this value."""
@@ -60,34 +67,29 @@ class Tested(NamedTuple):
         where it breaks down.
         """
         fields, test, one = self.of(value), self.tests[value], whole(self.study.run(value))
-        by = self.fields if weighed else None
-        plan = Plan(self.study.chosen(one, count, draw, by), faster)
-        squares, stress, points = Squares(one.X), np.zeros(2), []
-        everything = np.arange(len(one.X))
-        try:
-            for t, at, report in infer(one, fields, plan, self.xhat[:, 0].mean(axis=0)):
-                k = t / test.dt
-                if report is None or abs(k - round(k)) > 1e-6:
-                    continue
-                k = round(k)
-                squares.add(fields.place(everything, at.xhat), test.x[0, k])
-                tau = values(fields.stress(everything, at.xhat))
-                stress += np.sum((tau - test.tau[0, k]) ** 2), np.sum(test.tau[0, k] ** 2)
-                points.append(report.points)
-        except (NoBody, OutOfRange, np.linalg.LinAlgError):
-            return Found(NOWHERE, np.inf, np.nan)
-        return Found(squares.errors, float(np.sqrt(stress[0] / stress[1])), float(np.mean(points)))
+        sets = self.study.chosen(one, count, draw, self.fields if weighed else None)
+        points = []
+
+        def states():
+            for t, at, report in infer(one, fields, Plan(sets, faster), self.rest):
+                level = level_of(t / test.dt)
+                if level:
+                    points.append(report.points)
+                yield level, at.xhat
+
+        found, stress = course(fields, test.x[0], test.tau[0], states())
+        return Found(found.errors, share(stress), np.nan if found.said else float(np.mean(points)),
+                     float(np.mean([len(own.points) for own in sets])),
+                     float(np.max([own.misfit for own in sets])))
 
     def nearest(self, value):
         """`Errors` of the nearest states that the fields know: no run on them is expected to beat
         them.
         """
-        test, y = self.tests[value], self.xhat[:, 0].mean(axis=0)
-        some = np.arange(0, len(test.X), -(-len(test.X) // SOME))
-        squares, everything = Squares(test.X), np.arange(len(test.X))
-        for x in test.x[0, 1:]:
-            y = nearest(self.fields, some, x[some], y)
-            squares.add(self.fields.place(everything, y), x)
+        X, x = self.tests[value].X, self.tests[value].x[0, 1:]
+        squares, everything = Squares(X), np.arange(len(X))
+        for level, xhat in closest(self.fields, x, self.rest):
+            squares.add(self.fields.place(everything, xhat), x[level])
         return squares.errors
 
     def next_run(self, value):

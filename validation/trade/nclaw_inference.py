@@ -2,6 +2,7 @@
 their weights, by the length of the step.
 """
 
+from math import ceil, log2
 from time import process_time
 from typing import NamedTuple
 
@@ -10,6 +11,7 @@ import numpy as np
 from mpm_ref.explicit import deform_body
 from mpm_ref.laws.compare import Broken, positions
 from mpm_ref.nclaw.bodies import own, points
+from mpm_ref.nclaw.weights import PARTS
 from mpm_ref.scene import build
 
 from ..nclaw.environments import environment
@@ -29,6 +31,7 @@ EVERY = 20          # steps of the trained length between frames
 SHORT = 200         # steps, quick
 POINTS, REPEATS = 1000, 7
 STRAIN = 0.05       # of random F that the time is measured at
+BEST = "nothing is better and smaller"
 
 
 class Step(NamedTuple):
@@ -88,7 +91,7 @@ def rounded(laws, bits):
     """`weights.Laws` whose weights have so many binary digits."""
     return laws._replace(**{part: getattr(laws, part)._replace(layers=tuple(
         tuple(shorter(a, bits) for a in layer) for layer in getattr(laws, part).layers))
-        for part in ("elastic", "plastic")})
+        for part in PARTS})
 
 
 def shorter(a, bits):
@@ -97,21 +100,34 @@ def shorter(a, bits):
     return np.ldexp(np.round(mantissa * 2.0**bits), exponent - bits)
 
 
-@experiment("trade.nclaw.digits", title="NCLaw: error by the digits of the weights",
+def size_of(laws, bits):
+    """Bytes of the weights of `weights.Laws` of so many digits: each with a sign in place of the
+    leading one, and an exponent as wide as theirs and zero need. Biases that are zero take none.
+    """
+    a = np.concatenate([a.ravel() for part in PARTS for layer in getattr(laws, part).layers
+                        for a in layer if a.any()])
+    exponents = np.frexp(a[a != 0.0])[1]
+    return a.size * (bits + ceil(log2(np.ptp(exponents) + 2))) / 8
+
+
+@experiment("trade.nclaw.digits", title="NCLaw: error and size by the digits of the weights",
             profiles=("quick", "standard"), budget={"quick": 10, "standard": 120})
 def digits(run):
-    """Weights alone are rounded; answers are computed in doubles."""
-    rows = []
+    """Weights alone are rounded; answers are computed in doubles, so that no time is saved."""
+    rows, bits = [], DIGITS[run.profile]
     for name in run.choose(quick=NAMES[:1], standard=NAMES):
-        bits = DIGITS[run.profile]
         steps = run.choose(quick=SHORT, standard=environment(name).steps)
-        found = compare(environment(name, steps=steps, every=EVERY),
-                        [learned(rounded(trained(name), k)) for k in bits])
-        rows += [(name, k, *one) for k, one in zip(bits, found, strict=True)]
-        for k, one in zip(bits, found, strict=True):
+        laws = [rounded(trained(name), k) for k in bits]
+        found = compare(environment(name, steps=steps, every=EVERY), [*map(learned, laws)])
+        sizes = [size_of(one, k) for one, k in zip(laws, bits, strict=True)]
+        best = front(sizes, [one.error for one in found])
+        for k, size, one, on in zip(bits, sizes, found, best, strict=True):
+            rows.append((name, k, size, *one, int(on)))
+            words = f"weights of {size:.0f} bytes", BEST if on else "", one.why
             run.record(f"trade.nclaw.digits.{name}.{k}", one.error, unit="m^2", comparator="info",
-                       scale=f"{steps} steps, 1000 particles", note=one.why)
-    run.table("digits", ("environment", "bits", "error", "step", "why"), rows)
+                       scale=f"{steps} steps, 1000 particles",
+                       note="; ".join(filter(None, words)))
+    run.table("digits", ("environment", "bits", "bytes", "error", "step", "why", "pareto"), rows)
 
 
 @experiment("trade.nclaw.dt", title="NCLaw: error and cost by the time step",

@@ -1,6 +1,7 @@
 """What a reduced run with inferred stress costs and gives: by its samples, and by its time step."""
 
 from collections import deque
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from mpm_ref.simulate import simulate
 from ..extremes.nsf_runs import scenes
 from ..extremes.outcome import outcome
 from ..ldm.racing import clocked
-from ..nsf.errors import COLUMNS, mean, rows_of, share
+from ..nsf.errors import COLUMNS, mean, rows_of, share, weights
 from ..registry import experiment
 from ..verification.scenes import with_
 from .front import front
@@ -25,6 +26,14 @@ FACTORS = (1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 10.0)    # of the scene's step
 WORDS = "the full-order run {:.3g} CPU s, the reduced one {:.3g}"
 
 
+class Sampling(NamedTuple):
+    """Samples of a scene's runs."""
+
+    scene: str
+    way: str            # of WAYS
+    count: int          # at most
+
+
 @experiment("trade.nsf.samples", title="NSF: error and cost by number and kind of samples",
             profiles=("quick", "standard"), budget={"quick": 15, "standard": 300})
 def of_samples(run):
@@ -32,24 +41,27 @@ def of_samples(run):
     rows = []
     for name, one in scenes(run):
         full, found = full_cpu(one), []
-        settings = [(word, count) for count in COUNTS[run.profile] for word in WAYS]
-        for word, count in run.progress([*settings, ("random", len(one.fields.X))], name):
-            found.append(of_setting(run, one, f"{name}.{word}", count, full))
+        settings = [Sampling(name, way, count) for count in COUNTS[run.profile] for way in WAYS]
+        every = Sampling(name, "random", len(one.fields.X))
+        for sampling in run.progress([*settings, every], name):
+            found.append(of_sampling(run, one, sampling, full))
         best = front([cpu for _, cpu in found], [mean(own, "origin") for own, _ in found])
         rows += [(name, *row, cpu, full, int(on))
                  for (own, cpu), on in zip(found, best, strict=True) for row in own]
     run.table("samples", ("scene", *COLUMNS, "cpu", "cpu_full", "pareto"), rows)
 
 
-def of_setting(run, one, words, count, full):
-    """Record the errors with so many samples; rows of all runs, and CPU seconds of one."""
-    word = words.rpartition(".")[2]
+def of_sampling(run, one, sampling, full):
+    """Record the errors with a `Sampling`; rows of all runs, and CPU seconds of one."""
+    scene, way, count = sampling
     draws = range(DRAWS[run.profile] if count < len(one.fields.X) else 1)
-    rows = rows_of(one, word, count, draws, weighed=WAYS[word])
-    cpu = reduced_cpu(one, count, WAYS[word], run.choose(quick=1, standard=3))
-    share(run, f"trade.nsf.samples.{words}.{count}", rows, one.scale, f"{count} samples, {word}; "
-          f"of the stress {100.0 * mean(rows, 'stress'):.3g} %; {mean(rows, 'points'):.0f} "
-          f"integration points; {WORDS.format(full, cpu)}", comparator="info")
+    rows = rows_of(one, way, count, draws, weighed=WAYS[way])
+    cpu = reduced_cpu(one, count, WAYS[way], run.choose(quick=1, standard=3))
+    words = f"{way}, {weights(rows)}" if WAYS[way] else way
+    share(run, f"trade.nsf.samples.{scene}.{way}.{count}", rows, one.scale, f"{count} samples, "
+          f"{words}; of the stress {100.0 * mean(rows, 'stress'):.3g} %; "
+          f"{mean(rows, 'points'):.0f} integration points; {WORDS.format(full, cpu)}",
+          comparator="info")
     return rows, cpu
 
 
@@ -67,10 +79,9 @@ def reduced_cpu(one, count, weighed, repeats):
     value = one.study.test[0]
     scene, fields = whole(one.study.run(value)), one.of(value)
     plan = Plan(one.study.chosen(scene, count, 0, one.fields if weighed else None))
-    start = one.xhat[:, 0].mean(axis=0)
     try:
         with one_thread():
-            found = [clocked(lambda: deque(infer(scene, fields, plan, start), maxlen=0))[1].cpu
+            found = [clocked(lambda: deque(infer(scene, fields, plan, one.rest), maxlen=0))[1].cpu
                      for _ in range(repeats)]
     except BREAKDOWNS:
         return np.inf

@@ -2,6 +2,9 @@
 full-order run's particles.
 """
 
+from collections.abc import Callable
+from typing import NamedTuple
+
 import numpy as np
 
 from mpm_ref.reduced.whole import whole
@@ -18,6 +21,14 @@ LEVELS = {          # one at a time, from the study's own
 OWN = ("scene", "knob", "r", "modes", "tau", "C", "smoothing", *COLUMNS[1:], "bytes", "bytes_full")
 
 
+class Change(NamedTuple):
+    """Fields that differ from the study's in one way."""
+
+    knob: str
+    value: str
+    made: Callable      # () -> `Tested`
+
+
 @experiment("trade.nsf.sizes", title="NSF: error and memory by latent coordinates and modes",
             profiles=("quick", "standard"), budget={"quick": 15, "standard": 300})
 def of_sizes(run):
@@ -25,30 +36,28 @@ def of_sizes(run):
     rows = []
     for name, one in scenes(run):
         full = particle_bytes(one.study)
-        for knob, value, changed in run.progress(changes(one, LEVELS[run.profile]), name):
-            rows += of_change(run, f"{name}.{knob}.{value}", changed(), full)
+        for change in run.progress(changes(one, LEVELS[run.profile]), name):
+            rows += of_change(run, name, change, full)
     run.table("sizes", OWN, rows)
 
 
 def changes(one, levels):
-    """[(knob, value, function that gives a `Tested`)] of all changes, the study's own sizes first
-    and modes in single precision last.
-    """
+    """[`Change`] of all changes, the study's own sizes first and modes in single precision last."""
     def refit(knob, value):
         return lambda: refitted(one, one.study.sizes._replace(**{knob: value}), one.study.follows)
 
-    found = [(knob, f"{value:g}", refit(knob, value)) for knob, values in levels.items()
+    found = [Change(knob, f"{value:g}", refit(knob, value)) for knob, values in levels.items()
              for value in values if value != getattr(one.study.sizes, knob)]
-    return [("own", "sizes", lambda: one), *found,
-            ("precision", "single", lambda: one._replace(fields=single(one.fields)))]
+    return [Change("own", "sizes", lambda: one), *found,
+            Change("precision", "single", lambda: one._replace(fields=single(one.fields)))]
 
 
-def of_change(run, words, one, full):
-    """Record errors and bytes of a `Tested`; rows of its runs."""
-    name, knob, _ = words.split(".", 2)
+def of_change(run, name, change, full):
+    """Record errors and bytes of a scene's fields with a `Change`; rows of its runs."""
+    one, knob = change.made(), change.knob
     size, sizes = nbytes(one.fields), one.study.sizes
     rows = rows_of(one, knob, one.study.samples, range(run.choose(quick=1, standard=3)))
-    share(run, f"trade.nsf.sizes.{words}", rows, one.scale, f"of the stress "
+    share(run, f"trade.nsf.sizes.{name}.{knob}.{change.value}", rows, one.scale, "of the stress "
           f"{100.0 * mean(rows, 'stress'):.3g} %; {size / 1e6:.3g} MB of fields, the particles of "
           f"the full-order run {full / 1e6:.3g} MB", comparator="info")
     return [(name, knob, sizes.r, sizes.modes, sizes.tau, sizes.C, sizes.smoothing, *row[1:], size,

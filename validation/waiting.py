@@ -1,6 +1,8 @@
 """Weights that experiments need, and what they say of those that are not there yet."""
 
-from .nets import Untrained
+
+class Untrained(ValueError):
+    """Weights are not there yet."""
 
 
 def there(run, names, load):

@@ -1,0 +1,47 @@
+"""NCLaw, Figure 4 (c) and (d): dough, on synthetic observations: the block that was filmed, and a
+star, half-way and at the end; from left to right the truth, ours, laws that thermodynamics admits,
+the wrong guess that ours begin with. Colours: distance from the truth.
+"""
+
+import numpy as np
+
+from validation.ldm.kept_bodies import read
+
+from ._bodies import Panel, View, away, nothing, pictures, shades
+from ._orders import scales
+from ._pairs import present, titled
+from ._states import cloud, spacing
+
+NEEDS = ["nclaw.dough"]
+BODIES = {"block": "(c) block", "star": "(d) star"}
+WORDS = {"true": "truth", "dough": "ours", "dough-admissible": "admissible", "guess": "guess"}
+TIMES = {1: "half-way", 2: "at the end"}
+TOP = 0.02          # end of the colours [m]
+
+
+def scale(results):
+    return scales(results, NEEDS[0], ".star")
+
+
+def draw(results):
+    kept, found = read(results.folder, NEEDS[0]), []
+    words = present(kept, BODIES, WORDS)
+    shown = shades(np.zeros(1), top=TOP)[1]
+    for body, said in BODIES.items():
+        for k, when in TIMES.items():
+            for word in words:
+                title = "" if found[len(words) - 1:] else WORDS[word]
+                side = f"{said}, {when}" if word == words[0] else ""
+                found.append(drawn(kept, (body, word, k), title)._replace(side=side))
+    return pictures(found, View(len(words), 2.2 * len(words), 12.0, 10.0), shown,
+                    "distance from the truth [m]")
+
+
+def drawn(kept, which, title):
+    """The panel of a body with a law at a kept time."""
+    body, word, k = which
+    x, true = (kept[f"{body}_{of}"].astype(float) for of in (word, "true"))
+    if not np.isfinite(x[k]).all():
+        return Panel(nothing(), nothing(), titled(title, x[k]))
+    paint = shades(away(x[k], true[k]), top=TOP)[0]
+    return Panel(cloud(x[k], np.zeros(len(x[k])), paint, spacing(true[0])), nothing(), title)

@@ -1,0 +1,16 @@
+"""NSF, Figure 10: toothpaste on brushes of several inclinations [degrees]: full order, and reduced
+below each. From left to right: time.
+"""
+
+from ._orders import shared
+from ._reduced import beside
+
+NEEDS = ["nsf.toothpaste"]
+
+
+def scale(results):
+    return shared(results, NEEDS[0])
+
+
+def draw(results):
+    return beside(results, NEEDS[0], choice=slice(None))

@@ -1,0 +1,66 @@
+"""How few points a reduced run must be left with to pay: counts and shares, on made-up times."""
+
+import numpy as np
+import pytest
+
+from mpm_ref.reduced.whole import whole
+from validation.nsf import breakeven
+from validation.nsf.breakeven import Cost, kinds
+from validation.nsf.studies import jelly
+from validation.results import Results
+from validation.run import Setting, run_all
+
+SMALL = breakeven.Scene(jelly, (5, 7, 11), 0.25)
+
+
+def test_a_reduced_step_on_the_even_share_takes_as_long():
+    cost = Cost(particle=3.0, grid=1.0, fields=5.0)
+    share = cost.share(1.0)
+    assert share * (cost.grid + cost.fields) == cost.particle
+    assert cost.faster(share) == 1.0
+    assert cost.faster(cost.share(10.0)) == pytest.approx(10.0)
+    assert cost.faster(0.1) == pytest.approx(5.0)
+
+
+@pytest.fixture(scope="module")
+def own():
+    """The jelly cube with few points."""
+    return whole(jelly(4).run(0.4))
+
+
+def test_products_are_counted_by_layer(own):
+    found = {word: (products, fields) for word, products, fields
+             in kinds(own, SMALL, np.random.default_rng(0))}
+    by_hand = [9 * w + 4 * w * w + w * k for w, k in zip(SMALL.widths, (3, 6, 9), strict=True)]
+    assert found["printed"][0] == 2 * by_hand[0] + by_hand[1] + by_hand[2]
+    assert found["modes"][0] == found["modes-single"][0] == 720
+    assert [*found] == ["printed", *(f"networks-{w}" for w in breakeven.SWEEP), "modes",
+                        "modes-single"]
+
+
+def test_fields_answer_all_that_a_step_asks(own):
+    points, xhat = np.array([0, 3, 7]), np.full(6, 0.1)
+    for _, _, fields in kinds(own, SMALL, np.random.default_rng(0)):
+        shapes = [getattr(fields, name)(points, xhat).shape
+                  for name in ("place", "stress", "affine")]
+        assert shapes == [(3, 3), (3, 3, 3), (3, 3, 3)]
+        assert all(np.isfinite(getattr(fields, name)(points, xhat)).all()
+                   for name in ("place", "stress", "affine"))
+
+
+def test_records_follow_from_times(tmp_path, monkeypatch):
+    """One second a point, 2 a particle, of which half is not on the grid."""
+    n = len(whole(jelly(3).run(0.4)).X)
+    monkeypatch.setattr(breakeven, "SCENES", {"jelly": SMALL})
+    monkeypatch.setattr(breakeven, "seconds_of_a_point", lambda fields, count: 1.0)
+    monkeypatch.setattr(breakeven, "whole_steps", lambda one, steps: (2.0 * n, 1.0 * n))
+    assert not run_all([breakeven.breakeven.experiment], Setting("quick", tmp_path))
+    results = Results(tmp_path)
+    found = {r.target: r.value for r in results.records("nsf.breakeven")}
+    for word in ("printed", "networks-64", "modes"):
+        assert found[f"nsf.breakeven.jelly.{word}.even"] == pytest.approx(100.0)
+        assert found[f"nsf.breakeven.jelly.{word}.ten"] == pytest.approx(10.0)
+        assert found[f"nsf.breakeven.jelly.{word}.speedup"] == pytest.approx(4.0)
+    table = results.table("nsf.breakeven", "shares")
+    assert len(table["fields"]) == 7
+    assert table["bound"] == pytest.approx(table["products"] / found["nsf.breakeven.rate"])

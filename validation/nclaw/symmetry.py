@@ -1,0 +1,62 @@
+"""How far the stress of laws is from symmetric: tau = R T F^T is where T and S of F = R S commute
+(NCLAW-X5).
+"""
+
+import numpy as np
+
+from mpm_ref.explicit import initial_stress
+from mpm_ref.laws.compare import positions
+from mpm_ref.materials import NoFlow
+from mpm_ref.nclaw.bodies import gradients, own, points, stresses
+from mpm_ref.scene import build
+
+from ..registry import experiment
+from ..verification.scenes import threads_for
+from .dissipation import BOUND, known
+from .environments import ENVIRONMENTS, environment
+
+ROUND_OFF = 1e-12       # of the size of the stress
+COLUMNS = ("method", "environment", "skew", "median", "most")
+
+
+@experiment("nclaw.symmetry", title="NCLaw: how symmetric the stress of laws is",
+            profiles=("quick", "standard"), budget={"quick": 20, "standard": 20})
+def symmetry(run):
+    """Of the deformation gradients of all points in frames of the training runs."""
+    laws, rows, every = known(run), [], run.choose(quick=50, standard=5)
+    F = {name: met(name, every) for name in run.progress(ENVIRONMENTS, "environments")}
+    for (method, name), pair in laws.items():
+        skew, size = split(pair.law, F[name])
+        of_each = skew[size > 0.0] / size[size > 0.0]
+        whole = np.sqrt(np.mean(skew**2) / np.mean(size**2))
+        rows.append((method, name, whole, np.median(of_each), of_each.max()))
+        record(run, rows[-1], len(size))
+    run.table("skew", COLUMNS, rows)
+
+
+def met(name, every):
+    """Deformation gradients (n, 3, 3) that the true law of an environment meets, one step in so
+    many.
+    """
+    problem = build(environment(name, every=every))
+    body = own(problem.bodies[0])
+    with threads_for(problem.bodies):
+        return np.concatenate([gradients(body).copy() for _ in positions(problem, (body,))])
+
+
+def split(law, F):
+    """Norms [Pa] (n,) of the skew part of a law's Kirchhoff stress, and of all of it."""
+    body = points(law, NoFlow(), F)
+    initial_stress(body)
+    tau = stresses(body)
+    return (np.linalg.norm(a, axis=(1, 2)) for a in (0.5 * (tau - tau.mT), tau))
+
+
+def record(run, row, n):
+    """Record the skew part of a law's stress at n states."""
+    method, name, whole, median, most = row
+    rule = {"comparator": "<=", "bound": ROUND_OFF} if method in BOUND else {"comparator": "info"}
+    run.record(f"nclaw.symmetry.{method}.{name}", whole, unit="1",
+               scale=f"{n} states of the training run", **rule,
+               note="root mean square of the skew part of tau over that of tau; of single states "
+                    f"{median:.2g} in the median, {most:.2g} at most")

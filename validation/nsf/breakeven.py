@@ -1,0 +1,170 @@
+"""How few points a reduced run must be left with to pay: the time that its fields take for a point,
+beside the time that a full-order step takes for a particle (section 6, appendix C of the paper).
+
+A reduced step on a share s of the particles takes at least s n (f + g): f for the fields of a point
+(its place now and a step ago, stress, affine field), g for its part of the step on the grid, which
+is that of the full-order step without singular values, return map and stress. So it is p / (s (f +
+g)) times faster at best, where p is the full-order step's time for a particle. Finding the points
+and the inversion come on top; `nsf.speed` has them.
+
+Fields are of random numbers: no time depends on what they say.
+"""
+
+from itertools import pairwise
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+
+from mpm_ref.reduced.nsf.fields import BLOCK
+from mpm_ref.reduced.whole import whole
+from mpm_ref.rom.architecture import DEPTH
+from mpm_ref.rom.decoder import Decoder, Units
+from mpm_ref.rom.field import Field, FieldUnits
+from mpm_ref.rom.learned import learned
+from mpm_ref.rom.network import network
+from mpm_ref.rom.radial import Radial
+from mpm_ref.rom.spanned import Part, Sizes, Spanned, cells
+
+from ..registry import experiment
+from .speed import whole_steps
+from .studies import cake, metal
+from .tested import Tested
+
+INFO = {"comparator": "info"}
+REPEATS = 5
+SWEEP = (16, 32, 64, 128)               # widths of all three networks
+CENTRES = 600                           # of radial functions: 12 runs of 50 snapshots
+INPUTS, OUTPUTS = 9, (3, 6, 9)          # a point and six latent coordinates; of g, h and l
+
+
+class Scene(NamedTuple):
+    """What is printed of a scene."""
+
+    study: object
+    widths: tuple           # of g, h and l
+    share: float            # of the particles that are integration points
+
+
+SCENES = {"metal": Scene(metal, (96, 288, 432), 0.09), "cake": Scene(cake, (144, 384, 576), 0.067)}
+COLUMNS = ("scene", "fields", "products", "point", "bound", "particle", "grid", "even", "ten",
+           "printed_share", "speedup")
+
+
+@experiment("nsf.breakeven", title="NSF: how few points must be left for a reduced run to pay",
+            profiles=("quick", "standard"), budget={"quick": 20, "standard": 120})
+def breakeven(run):
+    """Shares of integration points at which a reduced step takes as long as a full-order one, and a
+    tenth of it, for networks of several widths and for modes.
+    """
+    rate, rows = products_per_second(run.choose(quick=256, standard=1024)), []
+    for name, scene in run.progress(SCENES.items(), "scenes"):
+        study = scene.study(run.choose(quick=3, standard=1))
+        full, deform = whole_steps(Tested(study, None, None, None, None),
+                                   run.choose(quick=10, standard=50))
+        own = whole(study.run(study.test[0]))
+        n = len(own.X)
+        for word, products, fields in kinds(own, scene, run.rng):
+            f = seconds_of_a_point(fields, round(scene.share * n))
+            cost = Cost(full / n, (full - deform) / n, f)
+            rows.append((name, word, products, f, products / rate, cost.particle, cost.grid,
+                         cost.share(1.0), cost.share(10.0), scene.share, cost.faster(scene.share)))
+            recorded(run, f"nsf.breakeven.{name}.{word}", rows[-1], n)
+    run.record("nsf.breakeven.rate", rate, unit="1/s", **INFO,
+               note="products, each with a sum, of a matrix product in double precision")
+    run.table("shares", COLUMNS, rows)
+
+
+class Cost(NamedTuple):
+    """Seconds of a step for a particle or point."""
+
+    particle: float         # of a full-order step
+    grid: float             # ... of its part on the grid
+    fields: float           # of a reduced one
+
+    def faster(self, share):
+        """How many times as fast a reduced step on a share of the particles is, at best."""
+        return self.particle / (share * (self.fields + self.grid))
+
+    def share(self, times):
+        """The share of particles at which it is so many times as fast."""
+        return self.faster(1.0) / times
+
+
+def kinds(own, scene, rng):
+    """Yield (word, products that a point takes, fields) of a `Whole` scene."""
+    for word, widths in [("printed", scene.widths), *((f"networks-{w}", (w, w, w)) for w in SWEEP)]:
+        nets = networks(widths, own.X, rng)
+        place, stress, affine = (net[0].W.size for net in nets)
+        yield (word, 2 * place + stress + affine,
+               learned(own.X, nets, (), BLOCK * own.problem.dx))
+    fields, sizes = modes(own, rng), Sizes(6)
+    products = 2 * 3 * sizes.modes + 6 * sizes.tau + 9 * sizes.C
+    yield "modes", products, fields
+    yield "modes-single", products, fields.single()
+
+
+def networks(widths, X, rng):
+    """Position, stress and affine field as networks of random weights."""
+    low, span = X.min(axis=0), np.ptp(X, axis=0)
+    nets = [network([(rng.normal(size=(a, b)) / np.sqrt(a), np.zeros(b))
+                     for a, b in pairwise((INPUTS, *(width,) * DEPTH, k))])
+            for width, k in zip(widths, OUTPUTS, strict=True)]
+    plain = [FieldUnits(low, span, np.zeros(k), np.ones(k), np.zeros(0), np.ones(0))
+             for k in OUTPUTS[1:]]
+    return (Decoder(nets[0], Units(low, span, np.zeros(3), 1e-3 * span)), Field(nets[1], plain[0]),
+            Field(nets[2], plain[1]))
+
+
+def modes(own, rng):
+    """`Spanned` fields of random modes, of usual `Sizes`."""
+    sizes, n = Sizes(6), len(own.X)
+
+    def radial(k):
+        return Radial(rng.normal(size=(CENTRES, sizes.r)), np.ones(sizes.r),
+                      rng.normal(size=(CENTRES, k)), np.zeros((1 + sizes.r, k)))
+
+    U = rng.normal(size=(n, 3, sizes.modes))
+    tau, C = (Part(rng.normal(size=(n, k, R)), radial(R))
+              for k, R in ((6, sizes.tau), (9, sizes.C)))
+    return Spanned(own.X, U, radial(sizes.modes - sizes.r), tau, C, np.zeros(0),
+                   cells(own.X, U, BLOCK * own.problem.dx))
+
+
+def seconds_of_a_point(fields, count):
+    """Seconds of all that a step asks of the fields at `count` points, for each; the median."""
+    points, xhat, took = np.arange(count), np.linspace(-0.1, 0.1, fields.r), []
+    for _ in range(1 + REPEATS):
+        start = perf_counter()
+        fields.place(points, xhat)
+        fields.place(points, 0.9 * xhat)
+        fields.stress(points, xhat)
+        fields.affine(points, xhat)
+        took.append((perf_counter() - start) / count)
+    return float(np.median(took[1:]))
+
+
+def products_per_second(size):
+    """Of a matrix product in double precision, on all threads; the best of several."""
+    A, took = np.ones((size, size)), []
+    for _ in range(1 + REPEATS):
+        start = perf_counter()
+        A @ A
+        took.append(perf_counter() - start)
+    return size**3 / min(took)
+
+
+def recorded(run, target, row, n):
+    """Record the shares of a row."""
+    of = dict(zip(COLUMNS, row, strict=True))
+    note = (f"{of['products']:.3g} products and {1e6 * of['point']:.3g} us a point "
+            f"(at least {1e6 * of['bound']:.2g} us at the rate of a matrix product), full-order "
+            f"{1e6 * of['particle']:.3g} us a particle; finding points and inversion left out")
+    scale = f"{n} particles"
+    for word, value, unit in (("even", 100.0 * of["even"], "%"), ("ten", 100.0 * of["ten"], "%"),
+                              ("speedup", of["speedup"], "x")):
+        said = {"even": "share of points at which both take as long", "ten": "... a tenth",
+                "speedup": f"at best, with the printed share of {100.0 * of['printed_share']:.3g} "
+                           "% of the particles"}[word]
+        run.record(f"{target}.{word}", value, unit=unit, scale=scale, note=f"{said}; {note}",
+                   **INFO)

@@ -1,0 +1,72 @@
+"""What NSF's state figures show: reduced runs beside full-order ones at some times."""
+
+import numpy as np
+
+from mpm_ref.reduced.inferring import Plan, infer
+from mpm_ref.reduced.nsf.evaluate import level_of
+from mpm_ref.reduced.whole import whole
+from mpm_ref.rom.step import BREAKDOWNS
+from mpm_ref.rom.symmetric import tensor
+
+from ..ldm.kept_bodies import keep
+
+SHOTS = 3               # times, evenly spaced, the last among them
+MOST = 4000             # points shown of a body
+
+
+def keep_states(run, one, values, also=()):
+    """Keep points of the full-order runs with these parameters and of reduced ones, and of the
+    training runs at the ends of the range, at `SHOTS` times. also: "map", reduced runs on the map
+    alone; "stress", sizes |tau| [Pa] of the Kirchhoff stress.
+    """
+    n = len(one.runs.X)
+    shown = np.arange(0, n, -(-n // MOST))
+    found = {"values": np.array([f"{value:g}" for value in values]), "levels": levels_of(one.runs)}
+    for value in values:
+        ways = {"ours": one} | ({"map": one._replace(map_alone=True)} if "map" in also else {})
+        found |= of_history(f"{value:g}_true", one.tests[value], 0, shown)
+        for word, own in ways.items():
+            found |= of_run(f"{value:g}_{word}", own, value, shown)
+    for word, k in (("first", 0), ("last", -1)):
+        found |= of_history(word, one.runs, k, shown)
+    keep(run, **{name: a for name, a in found.items()
+                 if "stress" in also or not name.endswith("_tau")})
+
+
+def levels_of(histories):
+    """Numbers of the states that are shown."""
+    last = histories.x.shape[1] - 1
+    return np.array([round(last * (k + 1) / SHOTS) for k in range(SHOTS)])
+
+
+def of_history(name, histories, k, shown):
+    """{NAME: points (SHOTS, m, d), NAME_tau: sizes (SHOTS, m)} of run k."""
+    levels, d = levels_of(histories), histories.X.shape[1]
+    tau = tensor(histories.tau[k, levels][:, shown].astype(float), d)
+    return {name: histories.x[k, levels][:, shown], f"{name}_tau": sizes(tau)}
+
+
+def of_run(name, one, value, shown):
+    """The same of a reduced run with the study's samples, those of the first draw; NaN from where
+    it breaks down.
+    """
+    test, scene, fields = one.tests[value], whole(one.study.run(value)), one.of(value)
+    levels = levels_of(test).tolist()
+    x = np.full((SHOTS, len(shown), fields.dim), np.nan)
+    tau = np.full(x.shape[:2], np.nan)
+    plan = Plan(one.study.chosen(scene, one.study.samples, 0))
+    try:
+        for t, at, _ in infer(scene, fields, plan, one.rest):
+            level = level_of(t / test.dt)
+            if level in levels:
+                k = levels.index(level)
+                x[k] = fields.place(shown, at.xhat)
+                tau[k] = sizes(fields.stress(shown, at.xhat))
+    except BREAKDOWNS:
+        pass
+    return {name: x, f"{name}_tau": tau}
+
+
+def sizes(tau):
+    """Frobenius norms (..,) of tensors (.., d, d)."""
+    return np.linalg.norm(tau, axis=(-2, -1))
