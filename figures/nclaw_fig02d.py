@@ -12,12 +12,13 @@ from ._bodies import View, pictures
 from ._orders import shared
 from ._pairs import sides
 from ._splats import Balls
+from ._states import joined
 
 NEEDS = ["nclaw.slope"]
 NAMES = ("water", "jelly", "sand", "plasticine")
 WORDS = ("ours", "admissible")
-FINENESS = 40       # of the floor: points along its longer side
-FLOOR = np.array([0.56, 0.64, 0.75])
+FINENESS = 90       # of the floor: points along its longer side
+FLOOR = np.array([0.7, 0.77, 0.86])
 VIEW = View(4, 10.0, turn=60.0, lift=12.0)
 
 
@@ -29,7 +30,7 @@ def draw(results):
     kept = read(results.folder, NEEDS[0])
     found = sides(kept, {name: name for name in NAMES}, WORDS)
     floor = floor_of(found)
-    return pictures([panel._replace(solid=turned(panel.solid), ghost=turned(floor))
+    return pictures([panel._replace(solid=turned(joined([panel.solid, floor])))
                      for panel in found], VIEW)
 
 
@@ -42,12 +43,13 @@ def turned(balls):
 
 
 def floor_of(found):
-    """Balls of the part of the floor that bodies are above."""
+    """Balls right below the part of the floor that bodies are above."""
     x = np.concatenate([panel.solid.x for panel in found])
     low, high = x.min(axis=0), x.max(axis=0)
     apart = np.ptp(x[:, ::2], axis=0).max() / FINENESS
-    along, across = (np.arange(low[k], high[k] + apart, apart) for k in (0, 2))
+    along, across = (np.arange(low[k], high[k] + 1.5 * apart, apart) for k in (0, 2))
     X, Z = (a.ravel() for a in np.meshgrid(along, across))
-    places = np.stack([X, np.full(len(X), slope().walls.low[1] * slope().dx), Z], axis=1)
-    return Balls(places, np.tile([0.0, 1.0, 0.0], (len(X), 1)), np.full(len(X), 0.75 * apart),
+    radius, floor = 0.75 * apart, slope().walls.low[1] * slope().dx
+    places = np.stack([X, np.full(len(X), floor - radius), Z], axis=1)
+    return Balls(places, np.tile([0.0, 1.0, 0.0], (len(X), 1)), np.full(len(X), radius),
                  np.tile(FLOOR, (len(X), 1)))

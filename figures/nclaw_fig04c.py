@@ -1,13 +1,14 @@
 """NCLaw, Figure 4 (c) and (d): dough, on synthetic observations: the block that was filmed, and a
-star, half-way and at the end; from left to right the truth, ours, laws that thermodynamics admits,
-the wrong guess that ours begin with. Colours: distance from the truth.
+star, half-way and at the end; from left to right the start, the truth, ours, laws that
+thermodynamics admits, the wrong guess that ours begin with. Colours: distance from the truth.
 """
 
 import numpy as np
+from matplotlib.colors import to_rgb
 
 from validation.ldm.kept_bodies import read
 
-from ._bodies import Panel, View, away, nothing, pictures, shades
+from ._bodies import GHOST, Panel, View, away, nothing, pictures, shades
 from ._orders import scales
 from ._pairs import present, titled
 from ._states import cloud, spacing
@@ -20,7 +21,8 @@ TOP = 0.02          # end of the colours [m]
 
 
 def scale(results):
-    return scales(results, NEEDS[0], ".star")
+    block, star = (scales(results, NEEDS[0], part) for part in ("depth_speed", ".star"))
+    return f"block: {block}; star: {star}"
 
 
 def draw(results):
@@ -29,19 +31,23 @@ def draw(results):
     shown = shades(np.zeros(1), top=TOP)[1]
     for body, said in BODIES.items():
         for k, when in TIMES.items():
+            title = "" if found else "start"
+            found.append(drawn(kept, (body, "true", 0), title)._replace(side=f"{said}, {when}"))
             for word in words:
-                title = "" if found[len(words) - 1:] else WORDS[word]
-                side = f"{said}, {when}" if word == words[0] else ""
-                found.append(drawn(kept, (body, word, k), title)._replace(side=side))
-    return pictures(found, View(len(words), 2.2 * len(words), 12.0, 10.0), shown,
+                title = "" if found[1 + len(words):] else WORDS[word]
+                found.append(drawn(kept, (body, word, k), title))
+    columns = 1 + len(words)
+    return pictures(found, View(columns, 2.0 * columns, 12.0, 10.0), shown,
                     "distance from the truth [m]")
 
 
 def drawn(kept, which, title):
-    """The panel of a body with a law at a kept time."""
+    """The panel of a body with a law at a kept time; grey at the start."""
     body, word, k = which
     x, true = (kept[f"{body}_{of}"].astype(float) for of in (word, "true"))
     if not np.isfinite(x[k]).all():
         return Panel(nothing(), nothing(), titled(title, x[k]))
     paint = shades(away(x[k], true[k]), top=TOP)[0]
+    if k == 0:
+        paint[:] = to_rgb(GHOST)
     return Panel(cloud(x[k], np.zeros(len(x[k])), paint, spacing(true[0])), nothing(), title)

@@ -26,7 +26,7 @@ LOST = "broke down, so that no time stands here"
 
 
 @experiment("nclaw.table3", title="NCLaw: times of runs",
-            profiles=("quick", "standard"), budget={"quick": 15, "standard": 500})
+            profiles=("quick", "standard"), budget={"quick": 15, "standard": 1200})
 def table3(run):
     """Ours and graph networks beside the true laws, in turn, on the threads that are given; for
     orientation, since the paper's machine is another.

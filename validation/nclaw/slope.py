@@ -14,11 +14,11 @@ from .tasks import slope
 from .toys import said
 
 WORDS = ("ours", "admissible")
-FEW, SHORT = 3000, 40           # points and steps, quick
+FEW, SHORT = 1000, 550          # points and steps, quick: until it has reached the floor
 
 
 @experiment("nclaw.slope", title="NCLaw: an inclined plane, task (d)",
-            profiles=("quick", "standard"), budget={"quick": 15, "standard": 2400})
+            profiles=("quick", "standard"), budget={"quick": 25, "standard": 2400})
 def inclined(run):
     """Keeps points at the start and at the end, of water, and of the other materials in its place;
     all as dense.
