@@ -58,6 +58,16 @@ def test_trainings_are_run_side_by_side(folder, monkeypatch):
     assert note == "no weights small-edge-8.npz: python -m validation.train_laws small-edge-8"
 
 
+def test_a_training_that_stopped_is_told(monkeypatch):
+    gone = SimpleNamespace(laws={}, about={"stopped": "epoch 4, step 3: no place"})
+    monkeypatch.setattr(small_runs, "there", lambda run, names, load: {"small-gap-400": gone})
+    notes = []
+    records = Records()
+    records.note = notes.append
+    assert measured(records, ["small-gap-400"]) == []
+    assert notes == ["small-gap-400: the training stopped in epoch 4, step 3: no place"]
+
+
 def test_scenes_are_of_the_training_s_size_but_the_last():
     found = small_runs.scenes(Small("plasticine"), full=True)
     assert [scene.body[0].sampling.counts[0] for scene in found] == [6, 6, 6, 6, 10]

@@ -38,7 +38,11 @@ def measured(run, names, full=True):
     """[`Measured`] of trainings by name, of all epochs that were kept; full: whether also in the
     body of the environment.
     """
-    found = {(name, epoch): laws for name, bundle in there(run, names, bundled).items()
+    bundles = there(run, names, bundled)
+    for name, bundle in bundles.items():
+        if bundle.about.get("stopped"):
+            run.note(f"{name}: the training stopped in {bundle.about['stopped']}")
+    found = {(name, epoch): laws for name, bundle in bundles.items()
              for epoch, laws in bundle.laws.items()}
     groups = {}
     for key in found:
