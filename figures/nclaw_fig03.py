@@ -5,7 +5,7 @@ ours at the end, the truth there. Colours: height at the start.
 from validation.ldm.kept_bodies import read
 
 from ._bodies import View, pictures
-from ._orders import shared
+from ._orders import scales
 from ._pairs import sides
 
 NEEDS = ["nclaw.fig3"]
@@ -13,7 +13,7 @@ ROWS = {"dragon": "a dragon of water", "toys": "four toys of jelly"}
 
 
 def scale(results):
-    return shared(results, NEEDS[0])
+    return scales(results, NEEDS[0])
 
 
 def draw(results):

@@ -89,6 +89,8 @@ def test_rounding_takes_less_room_and_keeps_zeros(tmp_path):
     assert rounded < 0.75 * plain
     assert kept_bodies.rounded(np.array([0.0, 1.0])).tolist() == [0.0, 1.0]
     assert kept_bodies.rounded(np.zeros(3)).tolist() == [0.0, 0.0, 0.0]
+    gone = kept_bodies.rounded(np.array([np.nan, 1.0, np.inf]))
+    assert np.array_equal(gone, [np.nan, 1.0, np.inf], equal_nan=True)
     assert kept_bodies.rounded(np.zeros((2, 0))).shape == (2, 0)
 
 

@@ -17,10 +17,10 @@ def keep(run, **arrays):
 
 
 def rounded(a):
-    """Floats to so many `BITS`, as what is zero takes no room; other numbers as they are."""
+    """Floats to so many `BITS`, as what is zero takes no room; NaN and integers as they are."""
     if a.dtype.kind != "f":
         return a
-    largest = np.max(np.abs(a), initial=0.0)
+    largest = np.max(np.abs(a), initial=0.0, where=np.isfinite(a))
     unit = 2.0 ** (np.floor(np.log2(largest)) - BITS) if largest else 1.0
     return (np.round(a / unit) * unit).astype(np.float32)
 
