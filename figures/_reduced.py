@@ -7,17 +7,11 @@ import numpy as np
 from validation.ldm.kept_bodies import read
 
 from ._bodies import Panel, View, body, nothing, pictures, shades
-from ._orders import shared
 from ._states import spacing
 
 WORDS = {"true": "full order", "ours": "reduced", "map": "map alone"}
 COLOURS = {"true": "#e9e9ec", "ours": "#e8b53d", "map": "#c46a5a"}
 TOP = 0.98          # quantile of the stresses at which the colours end
-
-
-def scale(results, id):
-    """How large the run was."""
-    return shared(results, id)
 
 
 def beside(results, id, words=("true", "ours"), choice=slice(1), turn=25.0, lift=15.0):
@@ -27,12 +21,7 @@ def beside(results, id, words=("true", "ours"), choice=slice(1), turn=25.0, lift
         for word in words:
             side = f"{value}: {WORDS[word]}"
             found += row(kept[f"{value}_{word}"], COLOURS[word], side)
-    return pictures(found, View(found_columns(kept), 8.0, turn, lift))
-
-
-def found_columns(kept):
-    """Number of times."""
-    return len(kept["levels"])
+    return pictures(found, View(len(kept["levels"]), 8.0, turn, lift))
 
 
 def row(x, colour, side):
@@ -60,7 +49,7 @@ def stresses(results, id, turn=25.0, lift=15.0):
         apart = spacing(x[0])
         found += [Panel(*drawn(one, colour, apart), "", "" if k else WORDS[word])
                   for k, (one, colour) in enumerate(zip(x, paint, strict=True))]
-    return pictures(found, View(found_columns(kept), 8.0, turn, lift), shown, r"$|\tau|$")
+    return pictures(found, View(len(kept["levels"]), 8.0, turn, lift), shown, r"$|\tau|$")
 
 
 def ends(results, id, turn=25.0, lift=15.0):
@@ -68,4 +57,4 @@ def ends(results, id, turn=25.0, lift=15.0):
     kept = read(results.folder, id)
     found = [panel for word in ("first", "last")
              for panel in row(kept[word], COLOURS["true"], f"{word} of training")]
-    return pictures(found, View(found_columns(kept), 8.0, turn, lift))
+    return pictures(found, View(len(kept["levels"]), 8.0, turn, lift))

@@ -13,4 +13,4 @@ def scale(results):
 
 
 def draw(results):
-    return beside(results, NEEDS[0], ("true", "ours", "map"), slice(1, 2), turn=0.0, lift=75.0)
+    return beside(results, NEEDS[0], ("true", "ours", "map"), turn=0.0, lift=75.0)

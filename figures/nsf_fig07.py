@@ -13,4 +13,4 @@ def scale(results):
 
 
 def draw(results):
-    return beside(results, NEEDS[0], choice=slice(None, None, 3))
+    return beside(results, NEEDS[0], choice=slice(None))

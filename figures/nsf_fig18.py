@@ -8,7 +8,7 @@ import numpy as np
 from ._orders import legend_below, scales
 
 NEEDS = ["nsf.speed"]
-PARTS = {"integration": "finding the points", "inferred": "position, stress, affine field",
+PARTS = {"integration": "finding and placing points", "inferred": "velocity, stress, affine field",
          "moved": "step of the grid", "inverted": "inversion"}
 
 

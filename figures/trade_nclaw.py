@@ -48,7 +48,7 @@ def draw(results):
 
 
 def trainings(ax, table):
-    """A curve for each training of several epochs, a mark for each other one."""
+    """A curve for each training of several epochs, a mark for each of the others."""
     error = np.where(np.isnan(table["full"]), table["own"], table["full"])
     x, looks, seen = table["cpu"], cycle(zip(MARKS, cycle(OTHERS))), set()
     for (name,), rows in series(table, ("environment",)).items():

@@ -1,6 +1,5 @@
 """Law studies: what a file may say, and what `mpm-ref law train` refuses before it trains."""
 
-
 import pytest
 from command_line import assert_told, mpm_ref
 from small_laws import DT, E, write_study

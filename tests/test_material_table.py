@@ -85,8 +85,14 @@ def test_bad_flows_are_refused_in_a_sentence(name, parameters, said):
 def test_flows_of_log_strain_are_refused_on_other_laws():
     """X-cross-13."""
     for name in ("drucker_prager", "von_mises", "von_mises_hardening"):
-        with pytest.raises(ValueError, match="FixedCorotated: expected Hencky, in whose strain"):
+        with pytest.raises(ValueError, match="FixedCorotated: expected Hencky, which it is"):
             make_flow(name, LAW["fixed_corotated"], 3, **CASES[name].parameters)
+
+
+@pytest.mark.parametrize("law", ["neo_hookean", "log_neo_hookean", "fluid"])
+def test_softening_is_for_hencky_and_fixed_corotated_alone(law):
+    with pytest.raises(ValueError, match="expected Hencky or FixedCorotated, which it is written"):
+        make_flow("von_mises_softening", LAW[law], 3, tau_y=1.0, theta=0.1)
 
 
 def test_flow_in_four_dimensions_is_refused():

@@ -52,8 +52,8 @@ def test_records_follow_from_times(tmp_path, monkeypatch):
     """One second a point, 2 a particle, of which half is not on the grid."""
     n = len(whole(jelly(3).run(0.4)).X)
     monkeypatch.setattr(breakeven, "SCENES", {"jelly": SMALL})
-    monkeypatch.setattr(breakeven, "seconds_of_a_point", lambda fields, count: 1.0)
-    monkeypatch.setattr(breakeven, "whole_steps", lambda one, steps: (2.0 * n, 1.0 * n))
+    monkeypatch.setattr(breakeven, "seconds_of_a_point", lambda fields, points: 1.0)
+    monkeypatch.setattr(breakeven, "whole_steps", lambda study, steps: (2.0 * n, 1.0 * n))
     assert not run_all([breakeven.breakeven.experiment], Setting("quick", tmp_path))
     results = Results(tmp_path)
     found = {r.target: r.value for r in results.records("nsf.breakeven")}

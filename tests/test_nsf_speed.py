@@ -85,7 +85,7 @@ def test_integration_points_are_those_of_the_reduced_run(one, steps):
 
 @pytest.mark.usefixtures("clock")
 def test_a_full_step_and_its_update_of_bodies(one):
-    assert speed.whole_steps(one, 10) == (FULL, BODIES * DEFORM)
+    assert speed.whole_steps(STUDY, 10) == (FULL, BODIES * DEFORM)
 
 
 @pytest.fixture

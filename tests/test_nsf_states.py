@@ -1,5 +1,6 @@
 """What NSF's state figures show, and the figures themselves."""
 
+import importlib
 from types import SimpleNamespace
 
 import matplotlib as mpl
@@ -84,6 +85,34 @@ def test_a_row_for_each_way_and_a_column_for_each_time(results):
         "0.45: full order", "0.45: reduced", "0.45: map alone"]
     assert len(_reduced.ends(results, ID).axes) == 6
     assert len(_reduced.stresses(results, ID).axes) == 7        # with a colour bar
+
+
+@pytest.mark.parametrize(("number", "values", "also", "sides"), [
+    ("01", 3, (), ["{0}: full order", "{0}: reduced", "{1}: full order", "{1}: reduced",
+                   "{2}: full order", "{2}: reduced"]),
+    ("05", 1, ("map",), ["{0}: full order", "{0}: reduced", "{0}: map alone"]),
+    ("07", 2, (), ["{0}: full order", "{0}: reduced", "{1}: full order", "{1}: reduced"]),
+    ("08", 2, ("stress",), ["{0}: full order", "{0}: reduced", "{1}: full order", "{1}: reduced"]),
+    ("09", 2, ("stress",), ["full order", "reduced"]),
+    ("10", 2, (), ["{0}: full order", "{0}: reduced", "{1}: full order", "{1}: reduced"]),
+    ("12", 1, ("map",), ["{0}: full order", "{0}: reduced", "{0}: map alone"]),
+    ("13", 1, ("map",), ["{0}: full order", "{0}: reduced", "{0}: map alone"]),
+    ("15", 1, ("map",), ["first of training", "last of training"]),
+    ("16", 2, (), ["first of training", "last of training"])])
+def test_figures_show_all_that_experiments_keep(number, values, also, sides, tmp_path, rng):
+    """A row for each parameter kept (of the stress, for one) and each way."""
+    script = importlib.import_module(f"figures.nsf_fig{number}")
+    names, x = [f"{0.1 * k:g}" for k in range(1, values + 1)], rng.uniform(size=(3, 40, 3))
+    words = ["true", "ours", *(["map"] if "map" in also else [])]
+    kept = {"values": np.array(names), "levels": np.arange(3), "first": x, "last": x}
+    kept |= {f"{name}_{word}": x for name in names for word in words}
+    if "stress" in also:
+        kept |= {f"{name}_{word}_tau": x[..., 0] for name in names for word in words}
+    states.keep(SimpleNamespace(folder=tmp_path, experiment=SimpleNamespace(id=script.NEEDS[0])),
+                **kept)
+    axes = script.draw(SimpleNamespace(folder=tmp_path)).axes
+    found = [ax.texts[0].get_text() for ax in axes if ax.texts and ax.texts[0].get_text()]
+    assert found == [side.format(*names) for side in sides]
 
 
 def test_a_run_that_broke_down_is_an_empty_panel():

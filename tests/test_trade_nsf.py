@@ -114,13 +114,13 @@ def test_bytes_of_particles_are_those_of_both_bodies(one):
 
 
 def test_single_precision_halves_the_modes_and_hardly_changes_errors(one):
-    short = one._replace(fields=nsf_sizes.single(one.fields))
+    short = one._replace(fields=one.fields.single())
     halves = sum(a.nbytes for a in (one.fields.U, one.fields.tau.modes, one.fields.C.modes)) // 2
     assert nsf_sizes.nbytes(one.fields) - nsf_sizes.nbytes(short.fields) == halves
     errors = [own.errors(TEST, 40).errors.origin for own in (one, short)]
     assert errors[0] == pytest.approx(errors[1], rel=1e-3)
     assert errors[0] != errors[1]
-    assert nsf_sizes.single(one.fields._replace(C=None)).C is None
+    assert one.fields._replace(C=None).single().C is None
 
 
 def test_changes_are_one_at_a_time_and_leave_out_the_own_sizes(one):

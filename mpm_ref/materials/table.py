@@ -33,7 +33,7 @@ class FlowEntry(NamedTuple):
     """How a scene file makes a flow."""
 
     build: Callable         # its keyword parameters are those of the scene; `dim` is added
-    laws: tuple             # the laws in whose strain it is written
+    laws: tuple             # the laws that it is written for
 
 
 # name in scene files -> function of the scene's parameters
@@ -118,7 +118,7 @@ def make_flow(name, law, dim, /, **parameters):
     if not isinstance(law, laws):
         raise ValueError(
             f"flow {name!r} on the law {type(law).__name__}: expected "
-            f"{' or '.join(c.__name__ for c in laws)}, in whose strain it is written"
+            f"{' or '.join(c.__name__ for c in laws)}, which it is written for"
         )
     return _built(build, f"flow {name!r}", parameters, dim)
 

@@ -56,7 +56,9 @@ def record(run, scale, values):
 
 
 def of_environment(scene, materials):
-    """Section 4.1 and Appendix D.1: of one of so many scenes."""
+    """Section 4.1 and Appendix D.1: of one of so many scenes, whose walls, in cells from the
+    origin, are as far from both ends of the box.
+    """
     low, high = scene.body[0].shape.lower, scene.body[0].shape.upper
     walls = scene.walls
     return {

@@ -43,7 +43,8 @@ def table1(run):
             budget={"quick": 20, "standard": 5000, "paper": 10000})
 def table2(run):
     """All methods that are trained, beside one true run of each task; graph networks are not in
-    task (c) (see `errors.fits`), variants of ours at the paper's profile alone.
+    task (c) (see `errors.fits`), seeds, ablations and released readings at the paper's profile
+    alone.
     """
     tasks = ("time", "velocity", "geometry")
     contest(run, run.choose(quick=("velocity",), standard=tasks, paper=tasks))

@@ -29,7 +29,6 @@ from mpm_ref.rom.spanned import Part, Sizes, Spanned, cells
 from ..registry import experiment
 from .speed import whole_steps
 from .studies import cake, metal
-from .tested import Tested
 
 INFO = {"comparator": "info"}
 REPEATS = 5
@@ -47,8 +46,21 @@ class Scene(NamedTuple):
 
 
 SCENES = {"metal": Scene(metal, (96, 288, 432), 0.09), "cake": Scene(cake, (144, 384, 576), 0.067)}
-COLUMNS = ("scene", "fields", "products", "point", "bound", "particle", "grid", "even", "ten",
-           "printed_share", "speedup")
+
+class Row(NamedTuple):
+    """Fields of a kind in a scene."""
+
+    scene: str
+    fields: str
+    products: int           # that they take for a point
+    point: float            # seconds that they take for one
+    bound: float            # ... that as many products of a matrix product take
+    particle: float         # ... of a full-order step for a particle
+    grid: float             # ... of its part on the grid
+    even: float             # share of points at which a reduced step takes as long, at best
+    ten: float              # ... a tenth
+    printed_share: float
+    speedup: float          # at that share, at best
 
 
 @experiment("nsf.breakeven", title="NSF: how few points must be left for a reduced run to pay",
@@ -60,19 +72,20 @@ def breakeven(run):
     rate, rows = products_per_second(run.choose(quick=256, standard=1024)), []
     for name, scene in run.progress(SCENES.items(), "scenes"):
         study = scene.study(run.choose(quick=3, standard=1))
-        full, deform = whole_steps(Tested(study, None, None, None, None),
-                                   run.choose(quick=10, standard=50))
+        full, deform = whole_steps(study, run.choose(quick=10, standard=50))
         own = whole(study.run(study.test[0]))
         n = len(own.X)
         for word, products, fields in kinds(own, scene, run.rng):
-            f = seconds_of_a_point(fields, round(scene.share * n))
+            points = np.sort(run.rng.choice(n, round(scene.share * n), replace=False))
+            f = seconds_of_a_point(fields, points)
             cost = Cost(full / n, (full - deform) / n, f)
-            rows.append((name, word, products, f, products / rate, cost.particle, cost.grid,
-                         cost.share(1.0), cost.share(10.0), scene.share, cost.faster(scene.share)))
-            recorded(run, f"nsf.breakeven.{name}.{word}", rows[-1], n)
+            rows.append(Row(name, word, products, f, products / rate, cost.particle, cost.grid,
+                            cost.share(1.0), cost.share(10.0), scene.share,
+                            cost.faster(scene.share)))
+            recorded(run, rows[-1], n)
     run.record("nsf.breakeven.rate", rate, unit="1/s", **INFO,
                note="products, each with a sum, of a matrix product in double precision")
-    run.table("shares", COLUMNS, rows)
+    run.table("shares", Row._fields, rows)
 
 
 class Cost(NamedTuple):
@@ -131,16 +144,18 @@ def modes(own, rng):
                    cells(own.X, U, BLOCK * own.problem.dx))
 
 
-def seconds_of_a_point(fields, count):
-    """Seconds of all that a step asks of the fields at `count` points, for each; the median."""
-    points, xhat, took = np.arange(count), np.linspace(-0.1, 0.1, fields.r), []
+def seconds_of_a_point(fields, points):
+    """Seconds of all that a step asks of the fields at points, for each; the median. Points are
+    scattered at random: in a run they lie together around samples, so that some are read faster.
+    """
+    xhat, took = np.linspace(-0.1, 0.1, fields.r), []
     for _ in range(1 + REPEATS):
         start = perf_counter()
         fields.place(points, xhat)
         fields.place(points, 0.9 * xhat)
         fields.stress(points, xhat)
         fields.affine(points, xhat)
-        took.append((perf_counter() - start) / count)
+        took.append((perf_counter() - start) / len(points))
     return float(np.median(took[1:]))
 
 
@@ -154,17 +169,15 @@ def products_per_second(size):
     return size**3 / min(took)
 
 
-def recorded(run, target, row, n):
-    """Record the shares of a row."""
-    of = dict(zip(COLUMNS, row, strict=True))
-    note = (f"{of['products']:.3g} products and {1e6 * of['point']:.3g} us a point "
-            f"(at least {1e6 * of['bound']:.2g} us at the rate of a matrix product), full-order "
-            f"{1e6 * of['particle']:.3g} us a particle; finding points and inversion left out")
-    scale = f"{n} particles"
-    for word, value, unit in (("even", 100.0 * of["even"], "%"), ("ten", 100.0 * of["ten"], "%"),
-                              ("speedup", of["speedup"], "x")):
-        said = {"even": "share of points at which both take as long", "ten": "... a tenth",
-                "speedup": f"at best, with the printed share of {100.0 * of['printed_share']:.3g} "
-                           "% of the particles"}[word]
-        run.record(f"{target}.{word}", value, unit=unit, scale=scale, note=f"{said}; {note}",
-                   **INFO)
+def recorded(run, row, n):
+    """Record the shares of a `Row`."""
+    note = (f"{row.products:.3g} products and {1e6 * row.point:.3g} us a point "
+            f"(at least {1e6 * row.bound:.2g} us at the rate of a matrix product), full-order "
+            f"{1e6 * row.particle:.3g} us a particle; finding points and inversion left out")
+    for word, value, unit, said in (
+            ("even", 100.0 * row.even, "%", "share of points at which both take as long"),
+            ("ten", 100.0 * row.ten, "%", "share at which a reduced step takes a tenth"),
+            ("speedup", row.speedup, "x", "at best, with the printed share of "
+             f"{100.0 * row.printed_share:.3g} % of the particles")):
+        run.record(f"nsf.breakeven.{row.scene}.{row.fields}.{word}", value, unit=unit,
+                   scale=f"{n} particles", note=f"{said}; {note}", **INFO)

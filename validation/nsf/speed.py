@@ -74,7 +74,7 @@ def speed(run):
 
 def of_scene(run, name, one, counts, steps):
     """Record times and bytes of a scene; a row for each number of samples and inversion."""
-    full, rows = whole_steps(one, steps), []
+    full, rows = whole_steps(one.study, steps), []
     for count in counts:
         for inversion in ("nonlinear", "linear"):
             found = [reduced_steps(one, count, inversion, steps) for _ in range(REPEATS)]
@@ -86,11 +86,11 @@ def of_scene(run, name, one, counts, steps):
     return rows
 
 
-def whole_steps(one, steps):
+def whole_steps(study, steps):
     """Seconds of a full-order step, and of its update of deformation: singular values, return map
     and stress; medians.
     """
-    scene = one.study.run(one.study.test[0])
+    scene = study.run(study.test[0])
     problem = whole(with_(scene, steps=steps, every=steps, interval=None)).problem
     deque(simulate(whole(with_(scene, steps=WARM, every=WARM, interval=None)).problem), maxlen=0)
     took = []

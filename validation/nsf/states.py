@@ -11,7 +11,7 @@ from mpm_ref.rom.symmetric import tensor
 from ..ldm.kept_bodies import keep
 
 SHOTS = 3               # times, evenly spaced, the last among them
-MOST = 4000             # points shown of a body
+MOST = 4000             # points shown of a scene
 
 
 def keep_states(run, one, values, also=()):

@@ -49,7 +49,7 @@ def changes(one, levels):
     found = [Change(knob, f"{value:g}", refit(knob, value)) for knob, values in levels.items()
              for value in values if value != getattr(one.study.sizes, knob)]
     return [Change("own", "sizes", lambda: one), *found,
-            Change("precision", "single", lambda: one._replace(fields=single(one.fields)))]
+            Change("precision", "single", lambda: one._replace(fields=one.fields.single()))]
 
 
 def of_change(run, name, change, full):
@@ -62,15 +62,6 @@ def of_change(run, name, change, full):
           f"the full-order run {full / 1e6:.3g} MB", comparator="info")
     return [(name, knob, sizes.r, sizes.modes, sizes.tau, sizes.C, sizes.smoothing, *row[1:], size,
              full) for row in rows]
-
-
-def single(fields):
-    """`Spanned` fields whose modes are stored in single precision; sums are of doubles."""
-    def shorter(part):
-        return part and part._replace(modes=part.modes.astype(np.float32))
-
-    return fields._replace(U=fields.U.astype(np.float32), tau=shorter(fields.tau),
-                           C=shorter(fields.C))
 
 
 def nbytes(record):
