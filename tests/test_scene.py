@@ -199,7 +199,7 @@ def test_every_parameter_of_the_tables_is_a_key():
 def test_all_scenes_are_here():
     asked = {"nclaw_jelly", "nclaw_sand", "nclaw_plasticine", "nclaw_water", "ldm_gravity",
              "ldm_torsion", "ldm_poke", "ldm_tower", "nsf_sand", "nsf_metal", "nsf_bread",
-             "nsf_cake", "nsf_toothpaste", "nsf_jelly", "nsf_ball", "colliding_disks",
+             "nsf_shear", "nsf_cake", "nsf_toothpaste", "nsf_jelly", "nsf_ball", "colliding_disks",
              "cantilever", "dam_break", "column_collapse", "incline", "hello", "hot_stiffness",
              "hot_twist", "hot_boxes", "hot_donut", "hot_armacat", "hot_chain", "hot_boards",
              "hot_wheel", "hot_faceless", "hot_sauce", "hot_aluminium"}

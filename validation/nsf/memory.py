@@ -1,0 +1,127 @@
+"""What latent coordinates of position and stress together give (`rom.joint`), beside those of
+positions alone: a block that is sheared to and fro, whose places say little of its stress, and the
+sand column, which flows one way.
+"""
+
+from functools import partial
+
+import numpy as np
+
+from mpm_ref.reduced.inferring import drawn
+from mpm_ref.reduced.nsf.evaluate import closest, course, level_of, share
+from mpm_ref.reduced.nsf.fields import BLOCK
+from mpm_ref.reduced.whole import history, whole
+from mpm_ref.rom.histories import joined
+from mpm_ref.rom.inferred import Inferred, Position
+from mpm_ref.rom.joint import Joint, Stacked, joint
+from mpm_ref.rom.projection import project_position
+from mpm_ref.rom.spanned import Sizes, spanned
+from mpm_ref.rom.symmetric import tensor
+
+from ..registry import experiment
+from .studies import Study, sand
+
+INFO = {"comparator": "info"}
+COLUMNS = ("scene", "latent", "value", "samples", "displacement", "stress")
+NEAREST = 0         # samples of the nearest states, which are no run
+
+
+def shear():
+    """The block with several amplitudes."""
+    return Study("nsf_shear", "fixed.top.motion.translation.amplitude[0]", (0.02, 0.03, 0.04),
+                 (0.025, 0.035), Sizes(r=4, modes=20, tau=40, C=20, smoothing=1e-2), 40,
+                 follows=False, every=15)
+
+
+@experiment("nsf.memory", title="NSF: latent coordinates of position and stress together",
+            profiles=("quick", "standard"), budget={"quick": 40, "standard": 300})
+def memory(run):
+    """Errors of the displacement and of the stress, with few samples and with all particles."""
+    column = run.choose(quick=partial(sand, 3, 4), standard=partial(sand, 2, 8))()
+    column = column._replace(follows=False, test=column.test[1:3], sizes=column.sizes._replace(
+        smoothing=1e-2))
+    rows = []
+    for name, study in run.progress({"shear": shear(), "sand": column}.items(), "scenes"):
+        runs = joined(made(study, value) for value in study.train)
+        tests = {value: made(study, value)
+                 for value in study.test[:run.choose(quick=1, standard=2)]}
+        for word, kind in (("position", of_positions), ("joint", of_both)):
+            found = [(name, word, *row) for value, test in tests.items()
+                     for row in kind(study, value, runs, test)]
+            recorded(run, f"nsf.memory.{name}.{word}", found, study,
+                     next(iter(tests.values())))
+            rows += found
+    run.table("errors", COLUMNS, rows)
+
+
+def made(study, value):
+    """`Histories` of a run."""
+    return history(study.run(value), [value], every=study.spacing)
+
+
+def of_positions(study, value, runs, test):
+    """Rows (value, samples, errors) of a test, with latent coordinates of positions."""
+    one = whole(study.run(value))
+    fields, xhat = spanned(runs, study.sizes, BLOCK * one.problem.dx, follows=False)
+    rest = xhat[:, 0].mean(axis=0)
+    yield value, NEAREST, *errors(fields, test, closest(fields, test.x[0], rest))
+    for samples in (study.samples, len(one.X)):
+        found = states(one, Inferred, fields, rest, samples, test.dt)
+        yield value, samples, *errors(fields, test, found)
+
+
+def of_both(study, value, runs, test):
+    """The same with joint ones."""
+    one = whole(study.run(value))
+    fields, xhat, scale = joint(runs, study.sizes, BLOCK * one.problem.dx)
+    rest, body = xhat[:, 0].mean(axis=0), one.problem.bodies[0]
+    stepper = partial(Joint, law=body.law, flow=body.flow, scale=scale)
+    both = Stacked(fields, scale, 1.0)
+    yield value, NEAREST, *errors(fields, test, nearest(both, test, rest))
+    for samples in (study.samples, len(one.X)):
+        found = states(one, stepper, fields, rest, samples, test.dt)
+        yield value, samples, *errors(fields, test, found)
+
+
+def nearest(both, test, xhat):
+    """Yield (level, latent coordinates) of the states nearest in position and stress."""
+    everything, d = np.arange(len(test.X)), test.X.shape[1]
+    for level, (x, tau) in enumerate(zip(test.x[0], test.tau[0], strict=True)):
+        target = both.of(x, tensor(tau, d))
+        xhat = project_position(both, everything, target, xhat).y
+        yield level, xhat
+
+
+def states(one, kind, fields, rest, samples, apart):
+    """Yield (level or None, latent coordinates) of a reduced run of a kind of stepper, from those
+    at rest; levels are `apart` [s].
+    """
+    problem, clock = one.problem, one.problem.clock
+    stepper = kind(fields, one.matter, problem.dx, problem.scheme.degree, problem.gravity,
+                   problem.conditions)
+    some = drawn(len(one.X), samples, 0).points
+    at = Position(rest)
+    for k in range(clock.steps + 1):
+        yield level_of(k * clock.dt / apart), at.xhat
+        if k < clock.steps:
+            at, _ = stepper.step(at, some, k * clock.dt, clock.dt)
+
+
+def errors(fields, test, found):
+    """Errors of the displacement and of the stress, over their norms."""
+    of_motion, of_stress = course(fields, test.x[0], test.tau[0], found)
+    return of_motion.errors.displacement, share(of_stress)
+
+
+def recorded(run, target, rows, study, test):
+    """Record the errors of a scene and kind of latent coordinates, means over tests."""
+    n, levels = len(test.X), test.x.shape[1] - 1
+    scale = (f"{n} particles, {levels} states kept, {len(study.train)} runs and "
+             f"{len(rows) // 3} tests; r = {study.sizes.r}")
+    for word, count, note in (("nearest", NEAREST, "nearest states that the fields know"),
+                              ("few", study.samples, f"{study.samples} samples, one draw"),
+                              ("all", n, "all particles are samples")):
+        of = np.mean([row[4:] for row in rows if row[3] == count], axis=0)
+        for kind, value in zip(("displacement", "stress"), of, strict=True):
+            run.record(f"{target}.{word}.{kind}", 100.0 * value, unit="%", scale=scale, note=note,
+                       **INFO)
