@@ -1,6 +1,7 @@
 """Errors of NCLaw's small trainings in rows: of what each did not see, or saw wrong."""
 
 import numpy as np
+from matplotlib.ticker import NullFormatter
 
 from ._states import settled
 
@@ -29,6 +30,7 @@ def dots(ax, table, words):
     ax.plot(table["thrown"][shown], y, "ko", ms=5, fillstyle="none", label="thrown otherwise")
     ax.set_yticks(y, [words[k] for k in shown], fontsize=7)
     ax.set(xscale="log", xlabel="error [m²]")
+    ax.xaxis.set_minor_formatter(NullFormatter())
     ax.invert_yaxis()
 
 
