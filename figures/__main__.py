@@ -26,8 +26,8 @@ def main(
     results = Results(folder / profile)
     try:
         if not results.ids():
-            raise ValueError(f"no results in {results.folder}; `python -m validation run` makes "
-                             "them")
+            raise ValueError(f"no results in {results.folder}; make them by `python -m validation "
+                             f"run ID --profile {profile}`, or give the --profile of others")
         drawn = draw_all(results, names=names or ())
     except ValueError as error:
         typer.echo(f"{error}", err=True)

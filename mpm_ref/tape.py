@@ -157,6 +157,9 @@ class Tape:
         if not isinstance(seeds, Mapping):
             raise ValueError(f"seeds: given {type(seeds).__name__}, expected a dict of a list for "
                              "each number of steps, as {100: [Seed(x=...)]}")
+        if not seeds:
+            raise ValueError("seeds: given none, expected the loss's gradient after at least one "
+                             "number of steps, as {100: [Seed(x=...)]}")
         for n, of_bodies in seeds.items():
             if n not in range(self.steps + 1):
                 raise ValueError(f"seeds of step {n}: expected 0 .. {self.steps}")

@@ -273,7 +273,7 @@ def test_bodies_that_were_not_started_are_refused(make):
 
 @pytest.mark.parametrize(("seeds", "said"), [
     ({3: [None, None]}, r"seeds of step 3: expected 0 \.\. 1"),
-    ([Seed()], "given list, expected a dict"),
+    ([Seed()], "given list, expected a dict"), ({}, "given none, expected the loss's gradient"),
     ({1: [None]}, r"seeds of step 1: given \[None\], expected a list with one Seed or None"),
     ({1: None}, "given None, expected a list with one Seed or None for each body, 2 in all"),
     ({1: Seed()}, "given Seed, expected a list"),

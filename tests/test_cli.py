@@ -2,6 +2,7 @@ import json
 import os
 import pty
 import re
+import runpy
 import signal
 import subprocess
 import sys
@@ -13,6 +14,7 @@ import pytest
 from command_line import SCENE, assert_told, mpm_ref
 from small_runs import colliding
 
+from mpm_ref import __version__
 from mpm_ref.cli.execute import Bar, Request
 from mpm_ref.simulate import State
 from mpm_ref.store import atomic
@@ -37,6 +39,14 @@ def test_run_says_what_is_run_and_how_it_ended(scene, tmp_path):
         assert results.step.tolist() == [0, 10, 20, 30, 40]
         assert results.manifest["seed"] == 5
         assert json.loads(results.manifest["scene"])["dx"] == 0.05
+
+
+def test_the_package_is_the_command(monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["mpm_ref", "--version"])
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_module("mpm_ref", run_name="__main__")
+    assert ended.value.code == 0
+    assert __version__ in capsys.readouterr().out
 
 
 def test_an_adaptive_step_is_said(scene):

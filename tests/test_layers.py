@@ -40,6 +40,7 @@ FLOORS = (
     ("reduced",),
     ("laws",),
     ("cli",),
+    ("__main__",),
 )
 OUTSIDE = {"validation", "figures", "benchmarks", "tests"}      # floor 9 and what tests it
 TRAINING = ("rom", "nclaw")                                     # the only files that know torch
