@@ -110,7 +110,7 @@ class Inferred:
         if len(samples) == len(self.body.m):
             return samples, x
         some = self.fields.near(xhat, x, (self.degree + 1) * self.dx)
-        some = np.sort(some[~among(some, samples)])
+        some = some[~among(some, samples)]
         here = self.fields.place(some, xhat)
         reached = reach(x, self.dx, self.degree).reached(here)
         return np.concatenate([samples, some[reached]]), np.concatenate([x, here[reached]])
