@@ -126,13 +126,17 @@ class Inferred:
         particles.C[:] = self.fields.affine(points, at.xhat)
         return Body("inferred", particles, None, NoFlow(), points)
 
-    def moved(self, cloud, count, t, dt):
-        """Positions (count, d) [m] of the cloud's first points after a step on the grid."""
+    def grid(self, cloud, t, dt):
+        """`Grid` of the cloud's points after a step on it."""
         grid = scatter((cloud,), self.storage, self.scheme, dt)
         update(grid, self.gravity, dt)
         if self.conditions is not None:
             self.conditions.apply(grid, t + dt, dt)
-        own = cloud.particles
+        return grid
+
+    def moved(self, cloud, count, t, dt):
+        """Positions (count, d) [m] of the cloud's first points after a step on the grid."""
+        grid, own = self.grid(cloud, t, dt), cloud.particles
         trial = particles_at(own.x[:count], own.v[:count], own.m[:count], own.V0[:count],
                              transfer="pic")
         gather(cloud._replace(particles=trial), grid, self.scheme, dt)

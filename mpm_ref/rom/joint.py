@@ -20,8 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..body import Body, particles_at
-from ..core.grid import update
-from ..explicit import deform_body, gather, scatter
+from ..explicit import deform_body, gather
 from ..materials import Hardening, Hencky, Softening
 from .inferred import Inferred
 from .projection import project_position
@@ -116,11 +115,7 @@ class Joint(Inferred):
 
     def moved(self, cloud, count, t, dt):
         """As `Inferred.moved`; keeps the samples' stresses after the step for `inverted`."""
-        grid = scatter((cloud,), self.storage, self.scheme, dt)
-        update(grid, self.gravity, dt)
-        if self.conditions is not None:
-            self.conditions.apply(grid, t + dt, dt)
-        own = cloud.particles
+        grid, own = self.grid(cloud, t, dt), cloud.particles
         trial = particles_at(own.x[:count], own.v[:count], own.m[:count], own.V0[:count], "apic")
         trial.F[:] = stretch_of(own.tau[:count], self.law)
         body = Body("samples", trial, self.law, self.flow, np.arange(count))
