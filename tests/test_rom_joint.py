@@ -68,6 +68,13 @@ def test_places_that_have_two_stresses_are_told_apart(runs):
     assert off(alone, xhat) > 0.5
 
 
+def test_fields_meet_the_places_they_are_made_of(runs):
+    fields, xhat, _ = joint(runs, SIZES._replace(modes=2, tau=1, C=1), 0.3)
+    for level in (3, 11):
+        x = fields.place(np.arange(N), xhat[1, level])
+        assert np.abs(x - runs.x[1, level]).max() < 1e-9
+
+
 def test_scales_are_root_mean_squares(runs):
     _, _, scale = joint(runs, SIZES._replace(modes=2, tau=1, C=1), 0.3)
     assert scale.x == pytest.approx(np.sqrt(np.mean((runs.x - runs.X) ** 2)))
