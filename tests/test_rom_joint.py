@@ -130,6 +130,19 @@ def test_samples_carry_the_stress_of_their_fields_through_the_step(runs, d):
     assert np.abs(stepper.tau - tau[:5]).max() > 4e-5
 
 
+def test_samples_with_weights_are_refused(runs):
+    fields, xhat, scale = joint(runs, SIZES._replace(modes=2, tau=1, C=1), 0.3)
+    stepper = stepper_of(Joint, fields, law=LAW, flow=NoFlow(), scale=scale)
+    at, some = Position(xhat[1, 3], xhat[1, 3]), np.arange(0, N, 3)
+    with pytest.raises(ValueError, match="samples with weights: expected samples that all count"):
+        stepper.step(at, some, 0.0, 1e-3, np.ones(len(some)))
+
+
+def test_runs_without_stress_are_refused(runs):
+    with pytest.raises(ValueError, match="stresses of 0 Pa, root mean square: expected some"):
+        joint(runs._replace(tau=0.0 * runs.tau), SIZES, 0.3)
+
+
 @pytest.mark.parametrize(("law", "flow"), [
     (NeoHookean(1.0, 1.0), NoFlow()),
     (LAW, make_flow("von_mises_hardening", LAW, 3, tau_y=1.0, xi=0.1))])

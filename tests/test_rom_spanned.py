@@ -121,6 +121,10 @@ def test_modes_in_single_precision_tell_the_same_to_it(made, d):
     for exact, near in map(tuple, pairs):
         assert 0.0 < np.abs(near - exact).max() < 1e-6 * np.abs(exact).max()
         assert near.dtype == float
+    order, start, middle, _, spread = rounded.cells
+    for b, own in enumerate(np.split(order, start[1:-1])):
+        apart = np.abs(rounded.U[own] - rounded.U[middle[b]]).max(axis=(0, 1))
+        assert np.array_equal(spread[b], apart)         # bounds hold of the modes as they are
 
 
 @pytest.mark.parametrize("digits", ["double", "single"])

@@ -42,12 +42,16 @@ class Scale(NamedTuple):
 def joint(histories, sizes, size, share=SHARE):
     """`Spanned` fields of `Histories` whose latent coordinates are shared by displacement and
     stress, the latent coordinates (s, k + 1, r) of the snapshots, and their `Scale`; size [m] of
-    blocks. Raises ValueError for more modes than the snapshots hold.
+    blocks. Raises ValueError for more modes than the snapshots hold, and where nothing moves or
+    nothing is stressed.
     """
     s, levels, n, d = histories.x.shape
     u = (histories.x - histories.X).reshape(s * levels, -1)
     tau = histories.tau.reshape(s * levels, -1)
     scale = Scale(*(float(np.sqrt(np.mean(a.astype(float) ** 2))) for a in (u, tau)))
+    if not min(scale) > 0.0:
+        raise ValueError(f"snapshots with displacements of {scale.x:g} m and stresses of "
+                         f"{scale.tau:g} Pa, root mean square: expected some of both")
     V, xhat = modes_of(np.hstack([u / scale.x, share * tau / scale.tau]), sizes.r, "r")
     U = scale.x * V[:n * d]
     unit = np.full(sizes.r, np.sqrt(np.mean(xhat[:, 0] ** 2)))
@@ -126,8 +130,12 @@ class Joint(Inferred):
 
     def inverted(self, points, w, x, xhat, dt):
         """Latent coordinates whose positions and stresses of the samples are nearest to x (m, d)
-        and to those that `moved` kept, and the `Fit`; weights w are not known here.
+        and to those that `moved` kept, and the `Fit` (NSF-eq10 with stress beside position). Raises
+        ValueError for samples with weights.
         """
+        if w is not None:
+            raise ValueError("samples with weights: expected samples that all count the same; "
+                             "weights are made for positions alone")
         both = Stacked(self.fields, self.scale, self.weight)
         fit = project_position(both, points, both.of(x, self.tau), xhat)
         return fit.y, fit

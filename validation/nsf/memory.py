@@ -37,11 +37,8 @@ def shear():
             profiles=("quick", "standard"), budget={"quick": 40, "standard": 300})
 def memory(run):
     """Errors of the displacement and of the stress, with few samples and with all particles."""
-    column = run.choose(quick=partial(sand, 3, 4), standard=partial(sand, 2, 8))()
-    column = column._replace(follows=False, test=column.test[1:3], sizes=column.sizes._replace(
-        smoothing=1e-2))
     rows = []
-    for name, study in run.progress({"shear": shear(), "sand": column}.items(), "scenes"):
+    for name, study in run.progress(studies(run).items(), "scenes"):
         runs = joined(made(study, value) for value in study.train)
         tests = {value: made(study, value)
                  for value in study.test[:run.choose(quick=1, standard=2)]}
@@ -52,6 +49,14 @@ def memory(run):
                      next(iter(tests.values())))
             rows += found
     run.table("errors", COLUMNS, rows)
+
+
+def studies(run):
+    """{name: study} at a run's profile."""
+    column = run.choose(quick=partial(sand, 3, 4), standard=partial(sand, 2, 8))()
+    sizes = column.sizes._replace(smoothing=1e-2)
+    return {"shear": shear(),
+            "sand": column._replace(follows=False, test=column.test[1:3], sizes=sizes)}
 
 
 def made(study, value):
