@@ -1,0 +1,43 @@
+"""`python -m validation.bounds NAME...`: tell weights of NCLaw's experiments that are older than
+the bounds of strains which strains their training met, so that runs can say where they leave them.
+
+It needs no PyTorch: the last epoch's segments run again. What was learned stays to the bit.
+"""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mpm_ref.nclaw import weights
+
+from .nclaw.environments import environment
+from .nclaw.met import bounds
+from .nclaw.nets import FOLDER, Net, nets, trained
+from .provenance import commit
+
+ROOT = Path(__file__).parents[1]
+
+
+def told(name):
+    """The `weights.Laws` of a net by name, with `seen` and `dt` in what is known of them. Errors as
+    of `nets.trained`.
+    """
+    net, laws = nets()[name], trained(name)
+    return laws._replace(about={
+        **laws.about, "seen": bounds(net, laws), "dt": environment(net.environment).dt,
+        "seen_by": f"python -m validation.bounds {name}, {commit(ROOT)}"})
+
+
+def main(names: Annotated[list[str], typer.Argument(help="of nets with laws")]):
+    """Write the files of those weights again, with the bounds."""
+    laws = [name for name, net in nets().items() if isinstance(net, Net)]
+    for name in names:
+        if name not in laws:
+            raise typer.BadParameter(f"{name!r}: expected one of {', '.join(laws)}")
+    for name in names:
+        weights.save(FOLDER / f"{name}.npz", told(name))
+
+
+if __name__ == "__main__":
+    typer.run(main)
