@@ -49,3 +49,9 @@ def permute(body, order):
         if carried and not (name == "L" and a is body.particles.C):
             a[:] = a[order]
     body.id[:] = body.id[order]
+
+
+def keep_inside(bodies, low, high):
+    """Clip positions to a box, velocities unchanged (NCLaw)."""
+    for body in bodies:
+        np.clip(body.particles.x, low, high, out=body.particles.x)

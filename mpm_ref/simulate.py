@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from math import ceil, inf
 from typing import NamedTuple
 
-import numpy as np
-
+from .body import keep_inside
 from .core.grid import OutOfRange
 from .monitor import CHECK, Account, account, check, lost, runs_away
 from .timestep import advective, refuse, stable_dt
@@ -170,9 +169,3 @@ def frame_is_due(clock, state):
     if clock.interval is not None:
         return state.t >= state.frame * clock.interval * (1.0 - EVEN)
     return False
-
-
-def keep_inside(bodies, low, high):
-    """Clip positions to a box, velocities unchanged (NCLaw)."""
-    for body in bodies:
-        np.clip(body.particles.x, low, high, out=body.particles.x)

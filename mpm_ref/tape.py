@@ -22,6 +22,7 @@ from .adjoint import (
     zero_bars,
     zero_sums,
 )
+from .body import keep_inside
 from .explicit import Stepper, initial_stress
 from .materials import Hardening, Softening
 
@@ -137,8 +138,7 @@ class Tape:
     def _advance(self, stepper, bodies, t, dt):
         grid = stepper.step(bodies, t, dt)
         if self.clip is not None:
-            for body in bodies:
-                np.clip(body.particles.x, *self.clip, out=body.particles.x)
+            keep_inside(bodies, *self.clip)
         return grid
 
     def _states_from(self, k):

@@ -12,12 +12,13 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
+from ..body import keep_inside
 from ..cases import in_order
 from ..core.grid import OutOfRange
 from ..nclaw.bodies import own
 from ..reduced.generate import one_thread
 from ..scene import SceneError, build
-from ..simulate import SORT, keep_inside, last_step
+from ..simulate import SORT, last_step
 
 FEW = 5000      # particles, up to which a second thread would wait more than it works
 

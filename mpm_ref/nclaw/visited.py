@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from ..body import keep_inside
 from ..core.grid import OutOfRange
 from .bodies import carried, gradients
 from .learn.teacher import Teacher
@@ -55,12 +56,11 @@ def segment(problem, stepper, body, steps):
             stepper.step((body,), 0.0, dt)
         except OutOfRange:
             break
-        q = body.particles
         if problem.clip is not None:
-            np.clip(q.x, *problem.clip, out=q.x)
+            keep_inside((body,), *problem.clip)
         with np.errstate(invalid="ignore", over="ignore"):
             row = extremes(measures(gradients(body)))
-        if not (np.abs(row).max() <= LARGEST and np.isfinite(q.x).all()):
+        if not (np.abs(row).max() <= LARGEST and np.isfinite(body.particles.x).all()):
             break
         found.append(row)
     return found

@@ -6,7 +6,7 @@ seeds that the file holds, in which another code's adjoint begins.
 
 import numpy as np
 
-from ..adjoint import StepAdjoint, require_adjoint
+from ..adjoint import StepAdjoint, clip_adjoint, require_adjoint
 from . import adjoint_stages
 from .adjoint_material import Seeds
 from .adjoint_twin import Backwards, Stage
@@ -60,9 +60,9 @@ def unclipped(clip, seeds, x):
     """
     if clip is None:
         return seeds
-    lower, upper = clip
-    return [seed._replace(x=np.where((lower < at) & (at < upper), seed.x, 0.0))
-            for seed, at in zip(seeds, x)]
+    seeds = [seed._replace(x=seed.x.copy()) for seed in seeds]
+    clip_adjoint(x, seeds, *clip)
+    return seeds
 
 
 def refuse_kinks(arrays, k):

@@ -3,6 +3,7 @@
 import numpy as np
 
 from .. import explicit
+from ..body import keep_inside
 from ..core import boundary
 from ..core.contact import PRESCRIBED
 from ..energy import energy
@@ -60,7 +61,7 @@ def advance(problem, body, grid, dt, seen):
     F = q.F.copy()
     explicit.gather(body, grid, problem.scheme, dt)
     if problem.clip is not None:
-        np.clip(q.x, *problem.clip, out=q.x)
+        keep_inside((body,), *problem.clip)
     if q.F.ndim == 3:
         seen[f"{name}/F_trial"] = inner.trial(F, q.L, dt)
     explicit.deform_body(body, dt)

@@ -3,6 +3,7 @@
 """
 
 from functools import partial
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -19,9 +20,9 @@ from ..registry import experiment
 from ..verification.scenes import threads_for
 from ..waiting import there
 from .environments import ENVIRONMENTS, environment
-from .nets import trained
+from .nets import trained, weights_of
 
-METHODS = {"ours": "{}", "admissible": "{}-admissible"}     # and the names of their weights
+METHODS = ("ours", "admissible")
 TRUE = "true"
 BOUND = TRUE, "admissible"          # laws that must not create energy
 SIZES = (0.02, 0.1)                 # of cycles
@@ -64,8 +65,8 @@ def dissipation(run):
 
 def known(run):
     """{(method, environment): `Pair`}; records which weights are not there yet."""
-    names = {(method, name): pattern.format(name) for name in ENVIRONMENTS
-             for method, pattern in METHODS.items()}
+    names = {(method, name): weights_of(method, name)
+             for name, method in product(ENVIRONMENTS, METHODS)}
     laws = there(run, names.values(), trained)
     true = {(TRUE, name): build(environment(name)).bodies[0] for name in ENVIRONMENTS}
     return {**{key: Pair(body.law, body.flow) for key, body in true.items()},

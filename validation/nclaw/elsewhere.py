@@ -16,16 +16,16 @@ from ..verification.scenes import threads_for, with_
 from ..waiting import Untrained
 from .environments import ENVIRONMENTS, environment
 from .melting import melting
-from .nets import trained
+from .nets import trained, weights_of
 from .shown import cone, contact, large, pool
-from .states import NETS, shots
+from .states import shots
 from .tasks import TOYS, geometry
 from .toys import said
 
 EACH = 4000         # kept points of a run, at most
 OF = {(FixedCorotated, None): "jelly", (Hencky, DruckerPrager): "sand",
       (Hencky, VonMises): "plasticine", (Fluid, None): "water"}
-WORDS = ("ours",)                   # what stands beside the truth; of `states.NETS`
+WORDS = ("ours",)                   # what stands beside the truth; methods of `nets.weights_of`
 MELTS = ("plasticine", "sand")      # before and after
 
 
@@ -82,7 +82,7 @@ def both(scene, words=WORDS):
     """`thinned` runs of a scene with true laws and with those of some words. Raises `Untrained`."""
     ends = with_(scene, every=scene.steps)
     names = {of(body) for body in build(scene).bodies}
-    laws = {word: {name: learned(trained(NETS[word].format(name))) for name in names}
+    laws = {word: {name: learned(trained(weights_of(word, name))) for name in names}
             for word in words}
     runs = {"true": shots(ends, own)}
     for word, mine in laws.items():

@@ -59,6 +59,11 @@ def nets():
         "plasticine-no-undeformed": Net("plasticine", method="no undeformed")}
 
 
+def weights_of(method, name):
+    """The name in `nets` of what a method trains on an environment, its first seed and one run."""
+    return name if method == "ours" else f"{name}-{method}"
+
+
 def others(name):
     """(method, `Net`) of what is compared with ours on an environment."""
     law, flow = KNOWN[name]

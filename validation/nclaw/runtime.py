@@ -14,12 +14,12 @@ from ..waiting import there
 from .environments import ENVIRONMENTS, environment
 from .errors import PRINTED, ready
 from .evaluate import frames
-from .nets import nets, trained
-from .simulators import GraphNet, named
+from .nets import nets, trained, weights_of
+from .simulators import GraphNet
 
 REPEATS = {"quick": 3, "standard": 10}
 TRUE = "true"
-METHODS = {"ours": "{}", "gnn": named("{}", 1)}     # and the names of their weights
+METHODS = ("ours", "gnn")
 COLUMNS = ("environment", "laws", "wall", "cpu")
 NOTE = "median wall time of {} runs in turn, start not counted; printed: on a graphics processor"
 LOST = "broke down, so that no time stands here"
@@ -32,7 +32,7 @@ def table3(run):
     orientation, since the paper's machine is another.
     """
     steps, rows = run.choose(quick=20, standard=1000), []
-    names = [pattern.format(name) for name in ENVIRONMENTS for pattern in METHODS.values()]
+    names = [weights_of(word, name) for name in ENVIRONMENTS for word in METHODS]
     found = there(run, names, trained)
     for name in run.progress(ENVIRONMENTS, "environments"):
         laws = methods(name, found)
@@ -47,8 +47,8 @@ def table3(run):
 
 def methods(name, found):
     """{method: what `frames` runs} of an environment, of those whose weights are found."""
-    weights = {word: pattern.format(name) for word, pattern in METHODS.items()}
-    return {word: ready(found[key]) for word, key in weights.items() if key in found}
+    names = {word: weights_of(word, name) for word in METHODS}
+    return {word: ready(found[key]) for word, key in names.items() if key in found}
 
 
 def timed(scene, laws, repeats):
@@ -80,7 +80,7 @@ def record(run, key, times, steps):
     """
     (name, word), scale = key, f"1000 particles, {steps} steps"
     wall, cpu = np.median(times[word], axis=0)
-    net = nets()[METHODS[word].format(name)]
+    net = nets()[weights_of(word, name)]
     words = [NOTE.format(len(times[word])), net.said if isinstance(net, GraphNet) else "",
              "" if np.isfinite(wall) else LOST]
     target, rule = f"nclaw.table3.{word}.{PRINTED[name]}", {"comparator": "info", "scale": scale}

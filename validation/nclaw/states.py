@@ -13,12 +13,11 @@ from ..verification.scenes import threads_for, with_
 from ..waiting import there
 from .environments import ENVIRONMENTS
 from .evaluate import Broken, frames, learned, own
-from .nets import trained
+from .nets import trained, weights_of
 from .tasks import SEEDS, reconstruction, time, velocity
 from .untrained import untrained
 
 SHOTS = (0, 250, 500, 750, 1000)        # steps, of Figure 6
-NETS = {"ours": "{}", "neural": "{}-neural", "gnn": "{}-gnn", "admissible": "{}-admissible"}
 BESIDE = ("ours", "neural", "gnn")      # of Figure 2
 
 
@@ -41,8 +40,8 @@ def away(run):
     """Keeps the points of each environment at the start and at the end of tasks (a) and (b): true,
     ours, baselines as far as they are trained, ours before training.
     """
-    nets = [NETS[word].format(name) for name in ENVIRONMENTS for word in BESIDE]
-    laws, found = there(run, nets, trained), {}
+    names = [weights_of(word, name) for name in ENVIRONMENTS for word in BESIDE]
+    laws, found = there(run, names, trained), {}
     for name in run.progress(ENVIRONMENTS, "environments"):
         beside = contestants(name, laws)
         for task, scene in (("time", time(name)), ("velocity", velocity(name, SEEDS[0]))):
@@ -56,7 +55,7 @@ def away(run):
 
 def contestants(name, laws):
     """{word: what `shots` takes} of an environment, of those laws of `nets` that are there."""
-    own_nets = {word: laws.get(NETS[word].format(name)) for word in BESIDE}
+    own_nets = {word: laws.get(weights_of(word, name)) for word in BESIDE}
     return {"true": own,
             **{word: one if isinstance(one, Simulator) else learned(one)
                for word, one in own_nets.items() if one is not None},
