@@ -20,7 +20,7 @@ PRINTED = {"jelly": "jello", "sand": "sand", "plasticine": "plasticine", "water"
 OURS = "ours"
 METHODS = ("spline", "neural", "gnn", "ours-init", "ours", "labeled", "sys-id")     # printed ones
 REPAIRED, RELEASED = ("spline", "neural"), "-released"      # the printed numbers are of the latter
-# methods that are in task (c) at standard: no seeds, ablations, released readings
+# methods that are in task (c) at standard: no seeds, no ablations
 LARGE = (OURS, "velocity", "admissible", "spline", "neural", "labeled", "sys-id")
 INFO = {"comparator": "info"}
 COLUMNS = ("method", "environment", "task", "draw", "error", "step", "why")
@@ -71,8 +71,8 @@ def fits(laws, task):
 
 
 def worth(run, method, task):
-    """Whether a method is run in a task: other seeds, ablations and released readings are not in
-    task (c), whose bodies stand for others and take minutes a run, unless at the paper's profile.
+    """Whether a method is run in a task: other seeds and ablations are not in task (c), whose
+    bodies stand for others and take minutes a run, unless at the paper's profile.
     """
     return task != "geometry" or run.profile == "paper" or method in LARGE
 

@@ -1,0 +1,52 @@
+"""Errors of readings as released: which experiment has them, beside which printed numbers."""
+
+import pytest
+
+from validation import targets
+from validation.nclaw import errors, nets, tables
+from validation.nclaw.evaluate import Found
+from validation.results import Results
+from validation.run import Setting, run_all
+
+ERROR = 0.125
+NAMES = ("jelly", "jelly-spline", "jelly-spline-released", "sand-neural-released")
+
+
+@pytest.fixture
+def found(monkeypatch, tmp_path):
+    """What an experiment records of errors that are all `ERROR`: {target: `Record`}."""
+    monkeypatch.setattr(errors, "compare", lambda scene, laws, goes_on: [Found(ERROR)] * len(laws))
+    monkeypatch.setattr(errors, "learned", lambda laws: laws)
+    monkeypatch.setattr(tables, "trained", lambda name: name)
+    monkeypatch.setattr(tables, "nets", lambda: {n: nets.Net(n.split("-")[0]) for n in NAMES})
+
+    def of(experiment):
+        failed = run_all([experiment], Setting("standard", tmp_path, targets=targets.load()))
+        assert failed == []
+        return {r.target: r for r in Results(tmp_path).records(experiment.id)}
+
+    return of
+
+
+def test_they_are_judged_by_the_printed_errors(found):
+    records = found(tables.released.experiment)
+    assert {target: (r.paper, r.verdict) for target, r in records.items() if r.value == ERROR} == {
+        "nclaw.table1.spline-released.jello": (0.24, "pass"),
+        "nclaw.table2.spline-released.jello.time": (0.26, "pass"),
+        "nclaw.table2.spline-released.jello.velocity": (0.24, "pass"),
+        "nclaw.table1.neural-released.sand": (0.012, "miss"),
+        "nclaw.table2.neural-released.sand.time": (0.047, "pass"),
+        "nclaw.table2.neural-released.sand.velocity": (0.0062, "miss")}
+
+
+def test_the_tables_have_the_repaired_ones(found):
+    records = found(tables.table1.experiment)
+    assert {target for target, r in records.items() if r.value == ERROR} == {
+        "nclaw.table1.ours.jello", "nclaw.table1.spline.jello"}
+
+
+def test_the_largest_of_ours_is_generally_below_a_thousandth(found, monkeypatch):
+    assert "nclaw.sec4_2.recon_ours_lt" not in found(tables.table1.experiment)
+    monkeypatch.setattr(tables, "nets", lambda: {n: nets.Net(n) for n in tables.ENVIRONMENTS})
+    record = found(tables.table1.experiment)["nclaw.sec4_2.recon_ours_lt"]
+    assert (record.value, record.paper, record.verdict) == (ERROR, 0.001, "miss")
