@@ -97,6 +97,8 @@ def test_a_row_for_each_way_and_a_column_for_each_time(results):
     ("10", 2, (), ["{0}: full order", "{0}: reduced", "{1}: full order", "{1}: reduced"]),
     ("12", 1, ("map",), ["{0}: full order", "{0}: reduced", "{0}: map alone"]),
     ("13", 1, ("map",), ["{0}: full order", "{0}: reduced", "{0}: map alone"]),
+    ("14", 2, (), ["{0}: full order", "{0}: reduced", "{1}: full order", "{1}: reduced"]),
+    ("17", 2, (), ["{0}: full order", "{0}: reduced", "{1}: full order", "{1}: reduced"]),
     ("15", 1, ("map",), ["first of training", "last of training"]),
     ("16", 2, (), ["first of training", "last of training"])])
 def test_figures_show_all_that_experiments_keep(number, values, also, sides, tmp_path, rng):

@@ -12,6 +12,7 @@ from mpm_ref.reduced.whole import history, whole
 from ..registry import experiment
 from ..verification.scenes import with_
 from .errors import COLUMNS, mean, rows_of, share
+from .states import keep_runs, keep_states
 from .studies import bread, sand
 from .tested import tested
 
@@ -26,16 +27,17 @@ FREE = (0.4, 0.6)       # what is not held of the slice, along x [m]
             budget={"quick": 20, "standard": 300, "paper": 3600})
 def weak(run):
     """The weak boxes are shifted along the pull, each by a random share of the slice's width; what
-    the paper perturbs is not printed.
+    the paper perturbs is not printed. Keeps the last draw of both.
     """
     one = tested(run.choose(quick=lambda: bread(3, train=6), standard=lambda: bread(2),
                             paper=bread)()._replace(test=(E,)))
-    rows = []
+    rows, kept = [], {}
     for name, scale in SCALES.items():
         found = []
         for seed in range(run.choose(quick=1, standard=SEEDS, paper=SEEDS)):
             test = other(one, shifted(one.study.run(E), scale, seed))
-            found += rows_of(one._replace(tests={E: test}), name, one.study.samples, (seed,))
+            kept[name] = one._replace(tests={E: test}), E
+            found += rows_of(kept[name][0], name, one.study.samples, (seed,))
         run.record(f"nsf.appB.bread.{name}.perturb", 100.0 * scale, unit="%", scale=one.scale)
         share(run, f"nsf.appB.bread.{name}.error", found, one.scale,
               f"weak boxes shifted by {100 * scale:g} % of the slice's width at most, E = {E:g}")
@@ -43,6 +45,7 @@ def weak(run):
     usual = rows_of(one, "trained", one.study.samples, (0,))
     share(run, "nsf.fig14.trained", usual, one.scale, "weak boxes of training", comparator="info")
     run.table("errors", COLUMNS, rows + usual)
+    keep_runs(run, kept)
 
 
 @experiment("nsf.fig17", title="NSF: sand steeper than all that was trained",
@@ -62,6 +65,7 @@ def steep(run):
     run.record("nsf.fig17.stress.55", 100.0 * mean(found[55.0], "stress"), unit="%",
                scale=one.scale, comparator="info", note="of the Kirchhoff stress")
     run.table("errors", COLUMNS, [row for rows in found.values() for row in rows])
+    keep_states(run, one, ANGLES)
 
 
 def shifted(scene, scale, seed):

@@ -15,18 +15,24 @@ MOST = 4000             # points shown of a scene
 
 
 def keep_states(run, one, values, also=()):
-    """Keep points of the full-order runs with these parameters and of reduced ones, and of the
-    training runs at the ends of the range, at `SHOTS` times. also: "map", reduced runs on the map
-    alone; "stress", sizes |tau| [Pa] of the Kirchhoff stress.
+    """`keep_runs` of the tests of a `Tested` with these parameters."""
+    keep_runs(run, {f"{value:g}": (one, value) for value in values}, also)
+
+
+def keep_runs(run, tests, also=()):
+    """Keep points of full-order runs and of reduced ones, and of the training runs at the ends of
+    the range, at `SHOTS` times. tests: {name: (`Tested`, parameter)}, all of the same training.
+    also: "map", reduced runs on the map alone; "stress", sizes |tau| [Pa] of the Kirchhoff stress.
     """
+    one, _ = next(iter(tests.values()))
     n = len(one.runs.X)
     shown = np.arange(0, n, -(-n // MOST))
-    found = {"values": np.array([f"{value:g}" for value in values]), "levels": levels_of(one.runs)}
-    for value in values:
+    found = {"values": np.array(list(tests)), "levels": levels_of(one.runs)}
+    for name, (one, value) in tests.items():
         ways = {"ours": one} | ({"map": one._replace(map_alone=True)} if "map" in also else {})
-        found |= of_history(f"{value:g}_true", one.tests[value], 0, shown)
+        found |= of_history(f"{name}_true", one.tests[value], 0, shown)
         for word, own in ways.items():
-            found |= of_run(f"{value:g}_{word}", own, value, shown)
+            found |= of_run(f"{name}_{word}", own, value, shown)
     for word, k in (("first", 0), ("last", -1)):
         found |= of_history(word, one.runs, k, shown)
     keep(run, **{name: a for name, a in found.items()
