@@ -1,0 +1,77 @@
+"""A map at more points than it was trained at, beside the full-order run of these (Figure 6)."""
+
+from types import SimpleNamespace
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+from figures import nsf_fig06
+from validation.nsf import boost
+from validation.nsf.studies import jelly
+from validation.results import Results
+from validation.run import Setting, run_all
+from validation.waiting import Untrained
+
+mpl.use("Agg")
+
+
+def stretched(X, xhat):
+    """The body, stretched along x by 1 + xhat."""
+    return X * np.array([1.0 + xhat[0], 1.0, 1.0])
+
+
+@pytest.fixture
+def recorded(rng, tmp_path):
+    """{target: value} of a map, of bodies that are stretched by 0.1, 0.2 and 0.3; and results."""
+    xhat = [np.array([0.1 * k]) for k in range(4)]
+    few, many = (SimpleNamespace(X=X, x=np.array([[stretched(X, y) for y in xhat]]))
+                 for X in (rng.uniform(1.0, 2.0, (50, 3)), rng.uniform(1.0, 2.0, (200, 3))))
+
+    def of(place):
+        found = {}
+        run = SimpleNamespace(profile="quick", folder=tmp_path,
+                              experiment=SimpleNamespace(id="nsf.fig6"),
+                              record=lambda id, value, **rule: found.update({id[9:]: value}))
+        boost.compared(run, SimpleNamespace(place=place), few, many, xhat)
+        return found
+
+    return of
+
+
+def test_a_map_that_is_right_everywhere_has_no_error(recorded):
+    found = recorded(stretched)
+    assert found["resolution_boost"] == 4.0
+    assert [found["few"], found["many"]] == pytest.approx([0.0, 0.0])
+    assert found["nearest"] > 1.0
+
+
+def test_errors_are_of_the_displacement_at_all_times(recorded):
+    found = recorded(lambda X, xhat: stretched(X, 1.5 * xhat))
+    assert [found["few"], found["many"]] == pytest.approx([50.0, 50.0])
+
+
+def test_the_grid_stays_and_points_are_more():
+    scene = jelly(4).run(0.45)
+    more = boost.finer(scene, 8)
+    assert more.dx == scene.dx
+    assert [body.sampling.count for body in more.body] == [
+        8 * body.sampling.count for body in scene.body]
+    assert boost.states(scene).x.shape[1] == 1 + boost.SHOTS
+
+
+def test_a_figure_of_three_rows(recorded, tmp_path):
+    recorded(stretched)
+    axes = nsf_fig06.draw(SimpleNamespace(folder=tmp_path)).axes
+    assert [ax.texts[0].get_text() for ax in axes[::3]] == [
+        "points of the training", "networks, more points", "full order, more points"]
+
+
+def test_without_weights_it_says_how_they_are_made(tmp_path, monkeypatch):
+    def missing(name):
+        raise Untrained(f"no weights {name}.npz")
+
+    monkeypatch.setattr(boost, "trained", missing)
+    assert run_all([boost.boost.experiment], Setting("quick", tmp_path)) == []
+    assert {r.target for r in Results(tmp_path).records("nsf.fig6")} == {
+        "nsf.fig6", "nsf.fig6.untrained"}
