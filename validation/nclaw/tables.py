@@ -60,7 +60,7 @@ def released(run):
     """
     tasks = run.choose(quick=("reconstruction",),
                        standard=("reconstruction", "time", "velocity"))
-    laws = known(run, as_released=True)
+    laws = known(run, names_of(as_released=True))
     rows = errors(run, laws, tasks) if laws else []
     first = [row for row in rows if row.task == "reconstruction"]
     record(run, "nclaw.table1", first, as_printed)
@@ -71,7 +71,7 @@ def released(run):
 
 def contest(run, tasks):
     """Record the errors of all methods, and what is not trained yet; returns their `Row`s."""
-    laws = known(run)
+    laws = known(run, names_of(as_released=False))
     rows = errors(run, laws, tasks) if laws else []
     record(run, run.experiment.id, rows, as_printed, tasks)
     record_excerpts(run, rows)
@@ -79,10 +79,16 @@ def contest(run, tasks):
     return rows
 
 
-def known(run, as_released=False):
-    """{method: {environment: laws}} of what is trained, as released or not; records what is not."""
-    names = [name for name in nets() if name.endswith(RELEASED) is as_released]
-    found = {}
+def names_of(as_released):
+    """The names in `nets` of readings as released, or of all else."""
+    return [name for name in nets() if name.endswith(RELEASED) is as_released]
+
+
+def known(run, names=None):
+    """{method: {environment: laws}} of those of the named nets, or of all, that are trained;
+    records which are not.
+    """
+    names, found = nets() if names is None else names, {}
     for name, laws in there(run, names, trained).items():
         net = nets()[name]
         found.setdefault(method_of(name, net), {})[net.environment] = laws
