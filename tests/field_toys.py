@@ -4,6 +4,7 @@
 import numpy as np
 import rom_toys
 
+from mpm_ref.rom.features import count
 from mpm_ref.rom.field import Field, FieldUnits
 from mpm_ref.rom.histories import Histories
 from mpm_ref.rom.network import network
@@ -12,21 +13,24 @@ from mpm_ref.rom.symmetric import values
 R = 3
 Q = 2               # parameters
 MU = np.array([31.0, 0.7])
+HIDDEN = (11, 7)
 
 
-def field(dim, outputs, q=0, seed=0, hidden=(11, 7)):
+def field(dim, outputs, q=0, seed=0, octaves=0):
     """A `Field` of points of the unit box, with units of its own for every input and output."""
     rng = np.random.default_rng(seed)
     units = FieldUnits(np.full(dim, -0.1), np.full(dim, 1.3), rng.normal(size=outputs),
                        rng.uniform(0.5, 2.0, outputs), rng.normal(size=q) * 30.0,
                        rng.uniform(5.0, 10.0, q))
-    return Field(network(rom_toys.layers((dim + R + q, *hidden, outputs), seed)), units)
+    sizes = (count(dim, octaves) + R + q, *HIDDEN, outputs)
+    return Field(network(rom_toys.layers(sizes, seed)), units, octaves)
 
 
-def networks(dim, q=0, seed=0):
-    """Position, stress, which depends on q parameters, and affine field."""
-    return (rom_toys.decoder(dim, R, seed), field(dim, dim * (dim + 1) // 2, q, seed + 1),
-            field(dim, dim * dim, 0, seed + 2))
+def networks(dim, q=0, seed=0, octaves=0):
+    """Position, stress, which depends on q parameters, and affine field, of so many octaves."""
+    return (rom_toys.decoder(dim, R, seed),
+            field(dim, dim * (dim + 1) // 2, q, seed + 1, octaves),
+            field(dim, dim * dim, 0, seed + 2, octaves))
 
 
 def latents(seed=0):

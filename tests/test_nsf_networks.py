@@ -43,10 +43,20 @@ def model(net=NET):
 
 def test_the_networks_are_those_of_two_scenes_with_the_printed_latent_coordinates():
     printed = targets.load()
-    assert {*nets()} == {"jelly", "metal"}
+    assert {*nets()} == {"jelly", "metal", "jelly-waves", "metal-waves"}
     for name, net in nets().items():
-        assert net.study.sizes.r == printed[f"nsf.table1.{name}.r"].value
-    assert [net.study.follows for net in nets().values()] == [False, True]
+        scene = name.removesuffix(kept.WAVES)
+        assert net.study.sizes.r == printed[f"nsf.table1.{scene}.r"].value
+        assert net.study.follows is (scene == "metal")
+
+
+def test_features_are_those_of_stress_and_affine_field_alone():
+    known = nets()
+    for name in ("jelly", "metal"):
+        net, waves = known[name], known[f"{name}-waves"]
+        assert (waves.g, waves.h.octaves, waves.l.octaves) == (net.g, 3, 3)
+        assert identity(net)["h"] == {"width": 64, "epochs": net.h.epochs, "beside": net.h.beside}
+        assert identity(waves)["h"] == identity(net)["h"] | {"octaves": 3}
 
 
 @pytest.mark.usefixtures("folder")

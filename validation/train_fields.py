@@ -35,7 +35,8 @@ def plan_of(net):
     follows = {"h": net.study.follows, "l": False}
     g = Training(net.study.sizes.r, net.g.hidden, net.latent, POSITION, net.g.epochs,
                  beside=net.g.beside, **how)
-    return Plan(g, *(FieldTraining(own.hidden, follows[name], own.epochs, beside=own.beside, **how)
+    return Plan(g, *(FieldTraining(own.hidden, follows[name], own.epochs, beside=own.beside,
+                                   octaves=own.octaves, **how)
                      for name, own in (("h", net.h), ("l", net.l))))
 
 

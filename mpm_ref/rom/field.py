@@ -1,20 +1,21 @@
 """A learned field over the material points of a body: stress or affine velocity (NSF-eq9,
 NSF-sec4.4).
 
-    values(X; xhat, mu) = mean + std f((X - low) / span, xhat, (mu - mu_mean) / mu_std)
+    values(X; xhat, mu) = mean + std f(Z, xhat, (mu - mu_mean) / mu_std),    Z = (X - low) / span
 
-f is a perceptron with standardised outputs. The field may depend on the problem's parameters mu
-beside the latent coordinates (NSF-mu-dep): where runs with different parameters start from the same
-state, xhat cannot tell them apart. What the values are of is not known here; see `symmetric` for
-those of a stress.
+f is a perceptron with standardised outputs, of Z or of the `features` of Z. The field may depend on
+the problem's parameters mu beside the latent coordinates (NSF-mu-dep): where runs with different
+parameters start from the same state, xhat cannot tell them apart. What the values are of is not
+known here; see `symmetric` for those of a stress.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from .decoder import outputs
-from .network import Network
+from .batch import forward, over
+from .features import count, features
+from .network import Network, layers_of
 from .snapshots import measures
 
 
@@ -30,10 +31,11 @@ class FieldUnits(NamedTuple):
 
 
 class Field(NamedTuple):
-    """A perceptron with sizes (d + r + q, .., k), and its units."""
+    """A perceptron with sizes (d (1 + 2 octaves) + r + q, .., k), and its units."""
 
     net: Network
     units: FieldUnits
+    octaves: int = 0        # of `features`
 
     @property
     def dim(self):
@@ -48,7 +50,7 @@ class Field(NamedTuple):
     @property
     def r(self):
         """Number of latent coordinates."""
-        return int(self.net.sizes[0]) - self.dim - self.parameters
+        return int(self.net.sizes[0]) - count(self.dim, self.octaves) - self.parameters
 
     @property
     def outputs(self):
@@ -61,7 +63,14 @@ class Field(NamedTuple):
 
     def values(self, X, xhat, mu=()):
         """Values (n, k) at points X (n, d) [m]. Raises ValueError as `coordinates` does."""
-        y = outputs(self.net, self.units, X, self.coordinates(xhat, mu))
+        state, layers = self.coordinates(xhat, mu), layers_of(self.net)
+        y = np.empty((len(X), self.outputs))
+
+        def work(rows):
+            Z = features((X[rows] - self.units.low) / self.units.span, self.octaves)
+            y[rows] = forward(layers, np.hstack([Z, np.tile(state, (len(Z), 1))]))[0]
+
+        over(len(X), work)
         return self.units.mean + self.units.std * y
 
     def coordinates(self, xhat, mu=()):

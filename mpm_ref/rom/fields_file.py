@@ -69,7 +69,7 @@ def compact(a):
 def arrays_of_field(field):
     """The numbers of a `Field` by name."""
     numbers = {"W": field.net.W, "b": field.net.b, **field.units._asdict()}
-    return {"sizes": np.array(field.net.sizes),
+    return {"sizes": np.array(field.net.sizes), "octaves": np.array(field.octaves),
             **{name: np.array(a, dtype=float) for name, a in numbers.items()}}
 
 
@@ -83,8 +83,8 @@ def networks_of(arrays):
     """`Decoder`, `Field` and `Field` from the arrays of a file."""
     g, h, l = (part(arrays, name) for name in "ghl")
     return (Decoder(network_of(g), Units(*(g[name] for name in Units._fields))),
-            *(Field(network_of(own), FieldUnits(*(own[name] for name in FieldUnits._fields)))
-              for own in (h, l)))
+            *(Field(network_of(own), FieldUnits(*(own[name] for name in FieldUnits._fields)),
+                    int(own.get("octaves", 0))) for own in (h, l)))
 
 
 def network_of(own):
@@ -111,6 +111,9 @@ def fault_of_field(own):
     if sizes.ndim != 1 or sizes.dtype.kind not in "iu" or len(sizes) < 2 or sizes.min() < 1:
         return (f"sizes is an array of shape {sizes.shape} and type {sizes.dtype}: expected whole "
                 "numbers d + r + q, .., k, of 1 or more")
+    octaves = own.get("octaves", np.array(0))       # files without are older than features
+    if octaves.shape != () or octaves.dtype.kind not in "iu" or octaves < 0:
+        return f"octaves is {octaves}: expected a whole number of 0 or more"
     if own["low"].ndim != 1 or own["mu_mean"].ndim != 1:
         return "low or mu_mean has not one axis"
     for name, shape in shapes(sizes.tolist(), len(own["low"]), len(own["mu_mean"])).items():

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
+from .features import fill as fill_features
 from .network import value
 from .pointwise import derive, inputs, scratch
 from .symmetric import tensor
@@ -25,6 +26,7 @@ class Flat(NamedTuple):
     span: np.ndarray
     mean: np.ndarray
     std: np.ndarray
+    octaves: int        # of `features`; those of a position have none
 
 
 def infer(g, h, l, X, xhat, mu=()):
@@ -36,10 +38,20 @@ def infer(g, h, l, X, xhat, mu=()):
     out = (np.empty((n, d)), np.empty((n, d, d)), np.empty((n, d, g.r)),
            np.empty((n, h.outputs)), np.empty((n, l.outputs)))
     at = (X, np.asarray(xhat, dtype=float), *(f.coordinates(xhat, f.own(mu)) for f in (h, l)))
-    networks = (Flat(*f.net, *f.units[:4]) for f in (g, h, l))
+    networks = (Flat(*f.net, *f.units[:4], getattr(f, "octaves", 0)) for f in (g, h, l))
     _infer_all(*networks, at, out, tuple(scratch(f.net) for f in (g, h, l)))
     x, _, G, tau, C = out
     return x, G, tensor(tau, d), C.reshape(n, d, d)
+
+
+@kernel
+def encoded(f, X, state, p, a):
+    """Features of the scaled reference position, latent coordinates and parameters, into a."""
+    d = len(f.low)
+    inputs(f, X, state[:0], p, a)
+    fill_features(a, d, f.octaves)
+    k = d * (1 + 2 * f.octaves)
+    a[k:k + len(state)] = state
 
 
 @kernel
@@ -47,7 +59,7 @@ def fill(f, at, y, a, bounds):
     """y_p = mean + std f(X_p, state), at = (X, state)."""
     X, state = at
     for p in range(bounds[0], bounds[1]):
-        inputs(f, X, state, p, a[0])
+        encoded(f, X, state, p, a[0])
         value(f, a)
         for k in range(len(f.mean)):
             y[p, k] = f.mean[k] + f.std[k] * a[-3, k]

@@ -23,6 +23,7 @@ from ..waiting import Untrained
 from .studies import Study, jelly, metal
 
 FOLDER = Path(__file__).parent / "weights"
+WAVES, OCTAVES = "-waves", 3        # names of nets with features, and these
 DISPLACED, BLURRED = 0.03, 0.01     # `Part.beside` of the position, and of what is not known there
 
 
@@ -32,6 +33,7 @@ class Part(NamedTuple):
     width: int              # of its hidden layers, of which there are DEPTH (NSF-arch)
     epochs: int             # of its training
     beside: float           # how far from the snapshots, in latent coordinates, it is shown them
+    octaves: int = 0        # of the features of places (`rom.features`), not of a position's
 
     @property
     def hidden(self):
@@ -54,11 +56,14 @@ class Net(NamedTuple):
 
 
 def nets():
-    """{name: `Net`} of all scenes that have networks."""
-    return {"jelly": Net(jelly(), Part(64, 3500, DISPLACED), Part(64, 3000, BLURRED),
-                         Part(64, 1500, BLURRED)),
-            "metal": Net(metal(2), Part(64, 1500, DISPLACED), Part(64, 1200, BLURRED),
-                         Part(64, 500, BLURRED))}
+    """{name: `Net`} of all scenes that have networks; "-waves" with features in h and l."""
+    plain = {"jelly": Net(jelly(), Part(64, 3500, DISPLACED), Part(64, 3000, BLURRED),
+                          Part(64, 1500, BLURRED)),
+             "metal": Net(metal(2), Part(64, 1500, DISPLACED), Part(64, 1200, BLURRED),
+                          Part(64, 500, BLURRED))}
+    return plain | {f"{name}{WAVES}": net._replace(h=net.h._replace(octaves=OCTAVES),
+                                                  l=net.l._replace(octaves=OCTAVES))
+                    for name, net in plain.items()}
 
 
 @cache
@@ -79,10 +84,15 @@ def trained(name):
 def identity(net):
     """What a training is of: the runs' scenes, and how it is made; plain values."""
     texts = "".join(canonical(net.study.run(value)) for value in net.study.train)
-    parts = {name: dict(getattr(net, name)._asdict()) for name in "ghl"}
+    parts = {name: told(getattr(net, name)) for name in "ghl"}
     return {"scenes": hashlib.sha256(texts.encode()).hexdigest()[:16], "r": net.study.sizes.r,
             "follows": net.study.follows, "spacing": net.study.spacing, **parts,
             **{name: getattr(net, name) for name in Net._fields if name not in ("study", *"ghl")}}
+
+
+def told(part):
+    """A `Part` as plain values; without octaves where there are none."""
+    return {name: value for name, value in part._asdict().items() if name != "octaves" or value}
 
 
 def fields_of(model, study):

@@ -8,13 +8,14 @@ import numpy as np
 
 from mpm_ref.reduced.errors import Errors
 from mpm_ref.reduced.whole import history
+from mpm_ref.rom import features
 from mpm_ref.rom.architecture import DEPTH
 
 from .. import targets
 from ..registry import experiment
 from ..waiting import there
 from .errors import COLUMNS, DRAWS, mean, rows_of, said, share
-from .networks import fields_of, nets, trained
+from .networks import WAVES, Part, fields_of, nets, trained
 from .tested import Tested
 
 DIM = 3
@@ -42,22 +43,28 @@ def cost(run, name, net):
     """Record the weights of a scene's `Net` and operations at a point, and those of the printed
     widths.
     """
-    id, printed = f"nsf.networks.{name}", targets.load()
-    for word, widths in (("", {own: getattr(net, own).width for own in OUTPUTS}),
-                         (".printed", {own: int(printed[f"nsf.table1.{name}.mlp.{own}.width"].value)
-                                       for own in OUTPUTS})):
-        count = sum(weights(net.study, own, width) for own, width in widths.items())
-        note = f"hidden layers {DEPTH} x " + ", ".join(f"{w} ({own})" for own, w in widths.items())
+    id, of_ours = f"nsf.networks.{name}", {own: getattr(net, own) for own in OUTPUTS}
+    for word, parts in (("", of_ours), (".printed", printed(name.removesuffix(WAVES)))):
+        count = sum(weights(net.study, own, part) for own, part in parts.items())
+        note = f"hidden layers {DEPTH} x " + ", ".join(f"{part.width} ({own})"
+                                                       for own, part in parts.items())
         run.record(f"{id}.weights{word}", count, unit="1", comparator="info", note=note)
         run.record(f"{id}.operations{word}", 2 * count, unit="1", comparator="info",
                    note=f"{note}; products and sums of all three networks at a point, without "
                         "derivatives")
 
 
-def weights(study, own, width):
-    """Number of weights, without biases, of one network with hidden layers so wide."""
-    inputs = DIM + study.sizes.r + (own == "h" and study.follows)
-    return sum(n * m for n, m in pairwise((inputs, *(width,) * DEPTH, OUTPUTS[own])))
+def printed(scene):
+    """{network: `Part`} with the printed widths of a scene."""
+    known = targets.load()
+    return {own: Part(int(known[f"nsf.table1.{scene}.mlp.{own}.width"].value), 0, 0.0)
+            for own in OUTPUTS}
+
+
+def weights(study, own, part):
+    """Number of weights, without biases, of one network as a `Part` says."""
+    inputs = features.count(DIM, part.octaves) + study.sizes.r + (own == "h" and study.follows)
+    return sum(n * m for n, m in pairwise((inputs, *part.hidden, OUTPUTS[own])))
 
 
 def tested_on(model, study):

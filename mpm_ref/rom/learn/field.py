@@ -30,6 +30,7 @@ class FieldTraining:
     once, `batch` at a time, each time at `points` random points (0: all). Learning rates are those
     of a `schedule` over all epochs. beside: values are shown at latent coordinates near theirs,
     each time at others, with normal differences of standard deviations up to this one: it smooths.
+    octaves: of the `features` of places.
     """
 
     hidden: tuple
@@ -40,9 +41,10 @@ class FieldTraining:
     seed: int = 0
     schedule: str = "steps"
     beside: float = 0.0
+    octaves: int = 0
 
     def __post_init__(self):
-        require_sound(self, ("epochs", "batch"), ("points", "beside"))
+        require_sound(self, ("epochs", "batch"), ("points", "beside", "octaves"))
 
 
 class Observed(NamedTuple):
@@ -77,7 +79,7 @@ class Session(session.Session):
         self.states, self.r = single(np.hstack([xhat, scaled])), xhat.shape[1]
         self.values = observed.values.reshape(runs * levels, n, k)
         d, inputs = observed.X.shape[1], self.states.shape[1]
-        self.f = Perceptron(d, inputs, training.hidden, k)
+        self.f = Perceptron(d, inputs, training.hidden, k, training.octaves)
         self.learn(f=self.f)
 
     def error(self, at):
@@ -96,8 +98,8 @@ class Session(session.Session):
 
     def result(self):
         """`Fitted`."""
-        return Fitted(Field(weights_of(self.f), self.units), np.array(self.history)[:, 0],
-                      self.meter.total)
+        trained = Field(weights_of(self.f), self.units, self.training.octaves)
+        return Fitted(trained, np.array(self.history)[:, 0], self.meter.total)
 
 
 def single(a):

@@ -1,6 +1,7 @@
 """Networks in torch: the same numbers as `rom.network`, with gradients for their weights."""
 
 from itertools import pairwise
+from math import pi
 
 import numpy as np
 import torch
@@ -8,6 +9,7 @@ from torch import nn
 
 from ..architecture import HIDDEN
 from ..decoder import Decoder, Units
+from ..features import count
 from ..network import layers_of, network
 
 
@@ -16,19 +18,27 @@ class Perceptron(nn.Module):
     many other outputs as told; for fields that depend on parameters, xhat stands for both.
     """
 
-    def __init__(self, dim, r, hidden=HIDDEN, outputs=None):
+    def __init__(self, dim, r, hidden=HIDDEN, outputs=None, octaves=0):
         super().__init__()
-        self.layers = nn.ModuleList(nn.Linear(n, m) for n, m in
-                                    pairwise((dim + r, *hidden, outputs or dim)))
+        self.octaves = octaves
+        self.layers = nn.ModuleList(nn.Linear(n, m) for n, m in pairwise(
+            (count(dim, octaves) + r, *hidden, outputs or dim)))
         for layer in self.layers:
             nn.init.xavier_uniform_(layer.weight)           # LDM-appB
 
     def forward(self, X, xhat):
         """Outputs (n, k) of scaled positions X (n, d) and latent coordinates xhat (n, r)."""
-        a = torch.cat([X, xhat], dim=-1)
+        a = torch.cat([self.features(X), xhat], dim=-1)
         for layer in self.layers[:-1]:
             a = nn.functional.elu(layer(a))
         return self.layers[-1](a)
+
+
+    def features(self, X):
+        """As `rom.features`."""
+        waves = [wave(2.0**o * pi * X) for o in range(self.octaves)
+                 for wave in (torch.sin, torch.cos)]
+        return torch.cat([X, *waves], dim=-1)
 
 
 def with_derivatives(f, X, xhat):
@@ -54,7 +64,8 @@ def exported(f, units):
 def imported(map):
     """The `Perceptron` of a `Decoder` or a `Field`, in double precision."""
     first, *hidden, last = map.net.sizes.tolist()
-    f = Perceptron(map.dim, first - map.dim, hidden, last).double()
+    octaves = getattr(map, "octaves", 0)
+    f = Perceptron(map.dim, first - count(map.dim, octaves), hidden, last, octaves).double()
     with torch.no_grad():
         for layer, (W, b) in zip(f.layers, layers_of(map.net), strict=True):
             layer.weight.copy_(torch.from_numpy(W.T.copy()))
