@@ -1,5 +1,7 @@
 """NCLaw's figures, and what their experiments keep for them."""
 
+from types import SimpleNamespace
+
 import matplotlib as mpl
 import numpy as np
 import pytest
@@ -161,3 +163,18 @@ def test_bodies_of_task_c_are_run_with_baselines(tmp_path, monkeypatch):
     assert "middles are 0 m apart" in found["nclaw.fig7.water.ours"].note
     titles = [ax.get_title() for ax in nclaw_fig07.draw(results).axes]
     assert titles == ["start", "ours", "neural", "truth"]
+
+
+def test_runs_that_broke_down_are_told(tmp_path):
+    notes = {}
+    run = SimpleNamespace(
+        experiment=SimpleNamespace(id="e"), folder=tmp_path, kept=lambda name, make: make(),
+        progress=lambda items, said: items,
+        record=lambda target, value, note, **rule: notes.update({target: note}))
+    x = np.zeros((2, 5, 3))
+    runs = {"true": x, "ours": x, "init": np.full_like(x, np.nan)}
+    states.record(run, "s", {word: own[-1] for word, own in runs.items()}, 10)
+    elsewhere.show(run, {"a": (lambda: elsewhere.thinned(runs, 10), "five points")})
+    assert [target for target, note in notes.items() if note == states.BROKEN] == [
+        "s.init", "e.a.init"]
+    assert len(notes) == 4

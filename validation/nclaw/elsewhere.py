@@ -3,6 +3,7 @@ trained in.
 """
 
 from functools import partial
+from math import isfinite
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from .environments import ENVIRONMENTS, environment
 from .melting import melting
 from .nets import trained, weights_of
 from .shown import cone, contact, large, pool
-from .states import shots
+from .states import BROKEN, DISTANCE, shots
 from .tasks import TOYS, geometry
 from .toys import said
 
@@ -71,10 +72,10 @@ def show(run, parts):
             continue
         kept |= {f"{name}_{word}": x for word, x in found["x"].items()}
         for word, off in found["off"].items():
+            apart = f"{DISTANCE}; their middles are {found['middle'][word]:.3g} m apart"
             run.record(f"{run.experiment.id}.{name}.{word}", off, unit="m^2", comparator="info",
                        scale=f"{found['points']} particles, {found['steps']} steps, {words}",
-                       note="mean squared distance of the last states alone; their middles are "
-                            f"{found['middle'][word]:.3g} m apart")
+                       note=apart if isfinite(off) else BROKEN)
     keep(run, **kept)
 
 
