@@ -113,10 +113,10 @@ def test_what_knows_the_laws_does_not_hide_the_others(tmp_path, monkeypatch):
 
 
 def test_what_is_kept_must_be_of_that_training(folder):
-    assert diverged.diverged(GONE) is None
+    assert diverged.diverged(GONE, nets.identity(nets.nets()[GONE])) is None
     path = lost(folder, seed=7)
     with pytest.raises(ValueError, match=r"is of .*'seed': 7.*now it is .*'seed': 0.*train_laws"):
-        diverged.diverged(GONE)
+        diverged.diverged(GONE, nets.identity(nets.nets()[GONE]))
     path.write_text(json.dumps({"errors": []})[:-1])
     with pytest.raises(ValueError, match=f"{GONE}.diverged.json is damaged"):
-        diverged.diverged(GONE)
+        diverged.diverged(GONE, nets.identity(nets.nets()[GONE]))

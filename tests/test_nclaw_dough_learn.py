@@ -11,7 +11,7 @@ from mpm_ref.nclaw.camera import project  # noqa: E402
 from mpm_ref.nclaw.contraction import Contraction  # noqa: E402
 from mpm_ref.nclaw.energetic import Energetic  # noqa: E402
 from mpm_ref.nclaw.learn.film import film_of  # noqa: E402
-from mpm_ref.nclaw.learn.fit import train  # noqa: E402
+from mpm_ref.nclaw.learn.fit import Diverged, Epoch, train  # noqa: E402
 from mpm_ref.nclaw.learn.methods import laws_of  # noqa: E402
 from mpm_ref.nclaw.learn.recipe import Recipe  # noqa: E402
 from mpm_ref.nclaw.learn.rollout import Laws, squared  # noqa: E402
@@ -19,7 +19,9 @@ from mpm_ref.nclaw.learn.sysid import KnownReturn, KnownStress  # noqa: E402
 from mpm_ref.nclaw.learn.teacher import Teacher  # noqa: E402
 from validation import train_dough  # noqa: E402
 from validation.nclaw import dough  # noqa: E402
+from validation.nclaw.diverged import diverged  # noqa: E402
 from validation.train_laws import main  # noqa: E402
+from validation.waiting import Untrained  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
@@ -154,3 +156,21 @@ def test_the_command_writes_weights_that_are_taken(tmp_path, monkeypatch):
     assert len(laws.about["errors"]) == 1
     assert laws.about["command"] == "python -m validation.train_laws dough"
     assert world(train_dough.run_of()[0]).dt == pytest.approx(1.0 / 2880.0)
+
+
+def test_errors_of_a_training_that_diverges_are_kept(tmp_path, monkeypatch):
+    """And told where the others' errors are."""
+    def diverging(recipe, laws, where, film, checkpoint, show):
+        show([Epoch(1.0, 1e-3, 1, (1.0, 1.0))])
+        raise Diverged("epoch 2: gone")
+
+    net = dough.doughs()["dough-free"]._replace(guessed=0)
+    monkeypatch.setattr("validation.train_laws.doughs", lambda: {"dough-free": net})
+    monkeypatch.setattr("validation.nclaw.nets.FOLDER", tmp_path)
+    monkeypatch.setattr(train_dough, "train", diverging)
+    main(["dough-free"], tmp_path, tmp_path / "checkpoints")
+    found = diverged("dough-free", dough.identity(net))
+    assert (found["errors"], found["stopped"]) == ([1e-3], "epoch 2: gone")
+    dough.trained.cache_clear()
+    with pytest.raises(Untrained, match=r"no weights dough-free.npz: its training diverged"):
+        dough.trained("dough-free")

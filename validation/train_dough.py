@@ -11,7 +11,7 @@ from mpm_ref.nclaw import weights
 from mpm_ref.nclaw.apart import world
 from mpm_ref.nclaw.learn.drive import stored
 from mpm_ref.nclaw.learn.film import film_of
-from mpm_ref.nclaw.learn.fit import train
+from mpm_ref.nclaw.learn.fit import Diverged, train
 from mpm_ref.nclaw.learn.labeled import labels_of, train_labeled
 from mpm_ref.nclaw.learn.methods import laws_of
 from mpm_ref.nclaw.learn.recipe import PRINTED, Recipe
@@ -60,16 +60,22 @@ def recipe_of(net, steps):
 
 
 def filmed_laws(name, net, checkpoint, threads):
-    """`nclaw.weights.Laws` of a `DoughNet` by name, with what is to be known of them."""
+    """`nclaw.weights.Laws` of a `DoughNet` by name, with what is to be known of them; of a training
+    that diverges, that alone: plain values.
+    """
     where, film = seen()
-    recipe, laws = recipe_of(net, len(film.x) - 1), begun(net)
+    recipe, laws, errors = recipe_of(net, len(film.x) - 1), begun(net), []
+    about = {**identity(net), "recipe": asdict(recipe), "threads": threads,
+             "command": f"python -m validation.train_laws {name}", "torch": torch.__version__,
+             **provenance(commit(ROOT))}
     with tqdm(total=recipe.epochs, desc=name) as bar:
         def show(history):
+            errors[:] = [epoch.error for epoch in history]
             bar.update(len(history) - bar.n)
             bar.set_postfix(error=f"{history[-1].error:.1e}")
-        done = train(recipe, laws, where, film, checkpoint, show)
+        try:
+            done = train(recipe, laws, where, film, checkpoint, show)
+        except Diverged as fault:
+            return {**about, "errors": errors, "stopped": str(fault)}
     took = {f"{clock}_seconds": round(s, 1) for clock, s in done.meter.total._asdict().items()}
-    return stored(laws, {
-        **identity(net), "recipe": asdict(recipe), "threads": threads, **took,
-        "command": f"python -m validation.train_laws {name}", "torch": torch.__version__,
-        **done.known, **provenance(commit(ROOT))})
+    return stored(laws, {**about, **took, **done.known})

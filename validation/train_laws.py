@@ -54,12 +54,14 @@ def made(name, checkpoints, threads):
     net, path = nets()[name], checkpoints / f"{name}.pt"
     recipe = Recipe(epochs=net.epochs, elastic_rate=net.elastic_rate, reading=net.reading,
                     plastic_rate=net.plastic_rate, seed=net.seed, velocity=net.velocity)
-    laws, errors = begun(net), []
+    laws, errors, steps = begun(net), [], environment(net.environment).steps
     with tqdm(total=recipe.epochs, desc=name) as bar:
         def show(history):
             errors[:] = [epoch.error for epoch in history]
             bar.update(len(history) - bar.n)
-            bar.set_postfix(error=f"{history[-1].error:.1e}", segments=history[-1].segments)
+            now = history[-1]
+            bar.set_postfix(loss=f"{now.loss:.1e}", error=f"{now.error:.1e}",
+                            horizon=round(steps / now.segments))
         try:
             done = taught(net, recipe, laws, path, show)
         except drive.Diverged as fault:
@@ -101,7 +103,7 @@ def main(names: Names = None, folder: Folder = FOLDER, checkpoints: Checkpoints 
         elif isinstance(net, Small):
             bundle.save(path, bundled(name, net, threads))
         elif isinstance(net, DoughNet):
-            weights.save(path, filmed_laws(name, net, checkpoints / f"{name}.pt", threads))
+            written(path, filmed_laws(name, net, checkpoints / f"{name}.pt", threads))
         else:
             written(path, made(name, checkpoints, threads))
 

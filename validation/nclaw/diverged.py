@@ -19,18 +19,18 @@ def keep(weights, about):
 
 def beside(weights):
     """The path that belongs to a file of weights."""
-    return weights.with_suffix(".diverged.json")
+    return weights.with_suffix(nets.DIVERGED)
 
 
-def diverged(name):
-    """What is known of a training of `nets` that diverged: plain values, "errors" of its epochs and
-    "stopped", a sentence; None where nothing is kept. Raises ValueError for a file that cannot be
-    read, or of another training or another scene than `nets` says now.
+def diverged(name, now):
+    """What is known of a training that diverged, by its name and `identity`: plain values, "errors"
+    of its epochs and "stopped", a sentence; None where nothing is kept. Raises ValueError for a
+    file that cannot be read, or of another training or another scene.
     """
     path = beside(nets.FOLDER / f"{name}.npz")
     if not path.exists():
         return None
-    now, again = nets.identity(nets.nets()[name]), f"python -m validation.train_laws {name}"
+    again = f"python -m validation.train_laws {name}"
     try:
         about = json.loads(path.read_text())
     except ValueError as fault:

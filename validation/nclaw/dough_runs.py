@@ -12,6 +12,7 @@ from mpm_ref.nclaw.camera import project
 from ..ldm.kept_bodies import keep
 from ..registry import experiment
 from ..waiting import there
+from .diverged import diverged
 from .dough import (
     DROP,
     EVERY,
@@ -22,6 +23,7 @@ from .dough import (
     camera,
     doughs,
     film,
+    identity,
     material,
     scene,
     star,
@@ -68,6 +70,12 @@ def dough(run):
 def contestants(run):
     """{name: what makes a body of other laws}; records which weights are not there yet."""
     laws = there(run, doughs(), trained)
+    for name, net in doughs().items():
+        about = diverged(name, identity(net))
+        if about is not None:
+            run.record(f"nclaw.dough.{name}.epochs", len(about["errors"]), unit="epochs",
+                       comparator="info", scale=f"of {net.epochs} epochs",
+                       note=f"the training diverged: {about['stopped']}")
     return {"true": own, "guess": guessed, "init": learned(untrained()),
             **{name: learned(one) for name, one in laws.items()}}
 

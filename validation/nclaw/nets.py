@@ -17,6 +17,7 @@ from .environments import ENVIRONMENTS, environment
 from .simulators import GraphNet, simulators
 
 FOLDER = Path(__file__).parent / "weights"
+DIVERGED = ".diverged.json"     # beside weights that there are not
 
 
 class Net(NamedTuple):
@@ -92,7 +93,8 @@ def stored(name, now, load=weights.load):
     """
     path, again = FOLDER / f"{name}.npz", f"python -m validation.train_laws {name}"
     if not path.exists():
-        raise Untrained(f"no weights {path.name}: {again}")
+        gone = "its training diverged, " if path.with_suffix(DIVERGED).exists() else ""
+        raise Untrained(f"no weights {path.name}: {gone}{again}")
     laws = load(path)
     was = {key: laws.about.get(key) for key in now}
     if was != now:

@@ -114,7 +114,6 @@ def of_graphs(simulator, scene):
     """Section 4.1, Appendices F.1 and F.4: of a trained graph network, beside a scene."""
     dt = simulator.reading.dt
     return {
-        "nclaw.sec4_1.trajectories": simulator.about["runs"],
         "nclaw.sec4_1.gnn_step_factor": dt / scene.dt,
         "nclaw.appF1.steps_gnn": scene.steps * scene.dt / dt,
         "nclaw.appF4.data_ratio": COUNTS[-1] / COUNTS[0]}

@@ -75,8 +75,8 @@ def width(run):
         rows.append((net.width, seconds, true, row.own, row.thrown, row.cpu, int(on)))
         run.record(f"trade.nclaw.width.{net.width}", row.own, unit="m^2", comparator="info",
                    scale="216 particles, 100 epochs",
-                   note=f"{1e6 * seconds:.3g} us of CPU time a point and step, the true laws "
-                        f"{1e6 * true:.3g}; thrown otherwise {row.thrown:.3g} m^2")
+                   note=f"{1e6 * seconds:.3g} us of CPU time for both laws of a point, without "
+                        f"the grid, the true laws {1e6 * true:.3g}; thrown otherwise {row.thrown:.3g} m^2")
     run.table("widths", ("width", "cpu_point", "true_cpu_point", "own", "thrown", "cpu_training",
                          "pareto"), rows)
 
