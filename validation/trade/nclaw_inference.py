@@ -76,7 +76,8 @@ def width(run):
         run.record(f"trade.nclaw.width.{net.width}", row.own, unit="m^2", comparator="info",
                    scale="216 particles, 100 epochs",
                    note=f"{1e6 * seconds:.3g} us of CPU time for both laws of a point, without "
-                        f"the grid, the true laws {1e6 * true:.3g}; thrown otherwise {row.thrown:.3g} m^2")
+                        f"the grid, the true laws {1e6 * true:.3g}; thrown otherwise "
+                        f"{row.thrown:.3g} m^2")
     run.table("widths", ("width", "cpu_point", "true_cpu_point", "own", "thrown", "cpu_training",
                          "pareto"), rows)
 
