@@ -20,7 +20,7 @@ drive_fields = pytest.importorskip("mpm_ref.rom.learn.drive_fields")
 
 NETWORK = ('kind = "modes"\nr = 3\nmodes = 5\ntau = 8\nC = 8\nsmoothing = 1e-6',
            'kind = "network"\nr = 3\nbeta = [3, 2, 2]\nlatent = "free"\nepochs = 40\n'
-           "field_epochs = 20\nbatch = 4\npoints = 24\nseed = 1")
+           "field_epochs = 20\noctaves = 1\nbatch = 4\npoints = 24\nseed = 1")
 
 
 @pytest.fixture(scope="module")
@@ -62,6 +62,7 @@ def test_a_plan_is_the_printed_one_with_the_studys_numbers(study):
     assert (plan.g.hidden, plan.h.hidden, plan.l.hidden) == (5 * (6,), 5 * (6,), 5 * (8,))
     assert (plan.g.r, plan.g.latent, plan.g.epochs) == (3, "free", 40)
     assert [(own.follows, own.epochs) for own in (plan.h, plan.l)] == [(True, 20), (False, 20)]
+    assert [own.octaves for own in (plan.h, plan.l)] == [1, 1]
     assert {(own.batch, own.points, own.seed, own.schedule) for own in plan} == {
         (4, 24, 1, "steps")}
 

@@ -15,8 +15,8 @@ from ..tables import MODES, NETWORK, Kinds, Runs, Table, one_of
 NUMBERS = ("modes", "tau", "C", "weight", "smoothing")     # of `Sizes`
 KEYS = {                            # of fields of each kind, beside `kind` and `r`
     MODES: (*NUMBERS, "told"),
-    NETWORK: ("told", "beta", "latent", "schedule", "epochs", "field_epochs", "batch", "points",
-              "seed"),
+    NETWORK: ("told", "beta", "octaves", "latent", "schedule", "epochs", "field_epochs", "batch",
+              "points", "seed"),
 }
 LATENTS, SCHEDULES = ("encoder-nsf", "free", MODES), ("steps", "cosine")    # see `rom.learn`
 SIZES = Sizes._field_defaults
@@ -36,6 +36,7 @@ class Fields(Kinds):
     weight: Positive = SIZES["weight"]          # of these beside latent coordinates
     smoothing: NotNegative = SIZES["smoothing"]
     beta: Factors = (16, 16, 16)                # widths of hidden layers over numbers of values
+    octaves: Natural = 0                        # of sines and cosines of places (`rom.features`)
     latent: str = LATENTS[0]
     schedule: str = SCHEDULES[0]                # of learning rates
     epochs: Count = 1500                        # of the position

@@ -17,11 +17,11 @@ def fitted(settings, histories, folder, on_epoch, threads=1):
 
 def plan(settings, dim):
     """The printed `Plan` with other numbers: r, told (whether the stress is told the parameters),
-    beta, latent, epochs of the position, field_epochs of the other two; batch, points, seed and
-    schedule of all three.
+    beta, latent, epochs of the position, octaves and field_epochs of the other two; batch, points,
+    seed and schedule of all three.
     """
     printed = stages.printed(dim, settings["r"], settings["beta"], settings["told"])
     how = {name: settings[name] for name in ("batch", "points", "seed", "schedule")}
     g = replace(printed.g, epochs=settings["epochs"], latent=settings["latent"], **how)
-    return stages.Plan(g, *(replace(own, epochs=settings["field_epochs"], **how)
-                            for own in (printed.h, printed.l)))
+    how |= {"epochs": settings["field_epochs"], "octaves": settings["octaves"]}
+    return stages.Plan(g, *(replace(own, **how) for own in (printed.h, printed.l)))
