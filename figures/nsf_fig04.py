@@ -3,18 +3,16 @@ see one of these; a sheared block in 2D with three samples, and the cake, seen f
 """
 
 import matplotlib.pyplot as plt
-import numpy as np
 
 from validation.ldm.kept_bodies import read
 
 from ._orders import legend_below, scales
 
 NEEDS = ["nsf.fig4"]
-COLOURS = {"points": "0.85", "integration": "#e8b53d", "sample": "#b3282d"}
-NAMES = {"points": "particles P", "integration": "integration points N", "sample": "samples S"}
+COLOURS = {"x": "0.85", "integration": "#e8b53d", "sample": "#b3282d"}
+NAMES = {"x": "particles P", "integration": "integration points N", "sample": "samples S"}
 SIZES = {"block": (6, 12, 40), "cake": (1, 2, 6)}       # of what is shown, by area
 VIEW = {"block": (0, 1), "cake": (0, 2)}                # axes to the right and up
-NODES = ("block",)      # where nodes are shown
 
 
 def scale(results):
@@ -33,12 +31,11 @@ def draw(results):
 def shown(ax, kept, name):
     """Points of a scene, those that matter on top."""
     right, up = VIEW[name]
-    x, everything = kept[f"{name}_x"], np.ones(len(kept[f"{name}_x"]), dtype=bool)
     for word, size in zip(COLOURS, SIZES[name], strict=True):
-        some = kept.get(f"{name}_{word}", everything)
-        ax.scatter(x[some, right], x[some, up], size, COLOURS[word], lw=0, label=NAMES[word])
-    if name in NODES:
-        nodes = kept[f"{name}_dx"] * kept[f"{name}_nodes"]
+        x = kept[f"{name}_{word}"]
+        ax.scatter(x[:, right], x[:, up], size, COLOURS[word], lw=0, label=NAMES[word])
+    if f"{name}_nodes" in kept:
+        nodes = kept[f"{name}_nodes"]
         ax.scatter(nodes[:, right], nodes[:, up], 30, "0.1", marker="+", lw=0.8, zorder=3,
                    label="nodes I")
     ax.set(aspect="equal", xlabel="m", title=name)

@@ -17,10 +17,11 @@ GIVEN = {"low": [0.5] * 4, "high": [1.5] * 4}
 def folder(tmp_path, monkeypatch):
     """A folder with weights that know of no bounds, in which the command works."""
     laws = load(nets.FOLDER / "jelly.npz")
+    monkeypatch.setattr(bounds, "FOLDER", tmp_path)
     about = {key: value for key, value in laws.about.items() if key not in ADDED}
     weights.save(tmp_path / "jelly.npz", laws._replace(about=about))
-    monkeypatch.setattr(bounds, "FOLDER", tmp_path)
-    monkeypatch.setattr(bounds, "trained", lambda name: load(tmp_path / f"{name}.npz"))
+    monkeypatch.setattr(nets, "FOLDER", tmp_path)
+    monkeypatch.setattr(bounds, "trained", nets.trained.__wrapped__)
     return tmp_path
 
 
@@ -39,6 +40,23 @@ def test_what_was_learned_stays_to_the_bit(folder, monkeypatch):
         for a, b in zip(was, now, strict=True):
             np.testing.assert_array_equal(a[0], b[0])
             np.testing.assert_array_equal(a[1], b[1])
+
+
+def test_bounds_that_are_known_stay(folder, monkeypatch):
+    monkeypatch.setattr(bounds, "bounds", lambda net, laws: GIVEN)
+    bounds.main(["jelly"])
+    before = (folder / "jelly.npz").read_bytes()
+    with pytest.raises(typer.BadParameter, match="jelly knows its bounds already"):
+        bounds.main(["jelly"])
+    assert (folder / "jelly.npz").read_bytes() == before
+
+
+def test_missing_weights_are_told_before_any_are_written(folder, monkeypatch):
+    monkeypatch.setattr(bounds, "bounds", lambda net, laws: GIVEN)
+    before = (folder / "jelly.npz").read_bytes()
+    with pytest.raises(typer.BadParameter, match=r"sand\.npz"):
+        bounds.main(["jelly", "sand"])
+    assert (folder / "jelly.npz").read_bytes() == before
 
 
 @pytest.mark.parametrize("name", ["jelly-gnn", "jell"])

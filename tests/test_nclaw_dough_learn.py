@@ -161,8 +161,13 @@ def test_the_command_writes_weights_that_are_taken(tmp_path, monkeypatch):
 def test_errors_of_a_training_that_diverges_are_kept(tmp_path, monkeypatch):
     """And told where the others' errors are."""
     def diverging(recipe, laws, where, film, checkpoint, show):
-        show([Epoch(1.0, 1e-3, 1, (1.0, 1.0))])
+        """None is shown of a training that goes on from a checkpoint, and diverges at once."""
+        if not checkpoint.exists():
+            show([Epoch(1.0, 1e-3, 1, (1.0, 1.0))])
         raise Diverged("epoch 2: gone")
+
+    (tmp_path / "checkpoints").mkdir()
+    (tmp_path / "checkpoints" / "dough-free.pt").write_text("an epoch")
 
     net = dough.doughs()["dough-free"]._replace(guessed=0)
     monkeypatch.setattr("validation.train_laws.doughs", lambda: {"dough-free": net})

@@ -92,7 +92,8 @@ def test_networks_are_evaluated_and_described(made, tmp_path):
     what, of, sizes, losses, *_ = mpm_ref("info", made / "nets.npz").stdout.splitlines()
     assert "nets.npz: stress fields, network, r = 3, 2D" in what
     assert of.startswith("made of 3 runs of 9 states")
-    assert sizes == "factors of width 3, 2, 2; the stress is told the parameters"
+    assert sizes == ("factors of width 3, 2, 2, octaves of sines and cosines: 1; the stress is "
+                     "told the parameters")
     assert losses.startswith("last losses: ")
     assert "factors of width 3, 2, 2" in mpm_ref("info", made / "pairs.toml").stdout
 

@@ -20,10 +20,16 @@ ROOT = Path(__file__).parents[1]
 
 
 def told(name):
-    """The `weights.Laws` of a net by name, with `seen` and `dt` in what is known of them. Errors as
-    of `nets.trained`.
+    """The `weights.Laws` of a net by name, with `seen` and `dt` in what is known of them. Raises
+    BadParameter for weights that are not there, are damaged, or have bounds already.
     """
-    net, laws = nets()[name], trained(name)
+    net = nets()[name]
+    try:
+        laws = trained(name)
+    except ValueError as fault:
+        raise typer.BadParameter(str(fault)) from None
+    if "seen" in laws.about:
+        raise typer.BadParameter(f"{name} knows its bounds already: name another")
     return laws._replace(about={
         **laws.about, "seen": bounds(net, laws), "dt": environment(net.environment).dt,
         "seen_by": f"python -m validation.bounds {name}, {commit(ROOT)}"})
@@ -35,8 +41,8 @@ def main(names: Annotated[list[str], typer.Argument(help="of nets with laws")]):
     for name in names:
         if name not in laws:
             raise typer.BadParameter(f"{name!r}: expected one of {', '.join(laws)}")
-    for name in names:
-        weights.save(FOLDER / f"{name}.npz", told(name))
+    for name, own in [(name, told(name)) for name in names]:
+        weights.save(FOLDER / f"{name}.npz", own)
 
 
 if __name__ == "__main__":

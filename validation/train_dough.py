@@ -76,6 +76,9 @@ def filmed_laws(name, net, checkpoint, threads):
         try:
             done = train(recipe, laws, where, film, checkpoint, show)
         except Diverged as fault:
+            if checkpoint.exists() and not errors:      # those before are not known
+                checkpoint.unlink()
+                return filmed_laws(name, net, checkpoint, threads)
             return {**about, "errors": errors, "stopped": str(fault)}
     took = {f"{clock}_seconds": round(s, 1) for clock, s in done.meter.total._asdict().items()}
     return stored(laws, {**about, **took, **done.known})

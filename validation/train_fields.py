@@ -36,7 +36,7 @@ def plan_of(net):
     g = Training(net.study.sizes.r, net.g.hidden, net.latent, POSITION, net.g.epochs,
                  beside=net.g.beside, **how)
     return Plan(g, *(FieldTraining(own.hidden, follows[name], own.epochs, beside=own.beside,
-                                   octaves=own.octaves, **how)
+                                   octaves=net.octaves, **how)
                      for name, own in (("h", net.h), ("l", net.l))))
 
 

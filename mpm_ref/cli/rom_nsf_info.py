@@ -45,6 +45,7 @@ def sizes(map):
     """Numbers of modes or widths of networks, and what the stress is told, in words."""
     told = f"the stress is{'' if map['told'] else ' not'} told the parameters"
     if map["kind"] == NETWORK:
-        return f"factors of width {', '.join(str(one) for one in map['beta'])}; {told}"
+        waves = f", octaves of sines and cosines: {map['octaves']}" if map["octaves"] else ""
+        return f"factors of width {', '.join(str(one) for one in map['beta'])}{waves}; {told}"
     modes = ", ".join(f"{map[name]} of {what}" for name, what in OF.items() if map[name])
     return f"modes: {modes}; {told}"

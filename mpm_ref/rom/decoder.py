@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .batch import backward, directional, forward, over
+from .features import count, features
 from .network import Network, layers_of
 
 
@@ -81,23 +82,23 @@ class Decoder(NamedTuple):
         return self._replace(net=Network(net.sizes, *(a.astype(np.float32) for a in net[1:])))
 
 
-def inputs(net, units, X, y):
-    """What a network takes of points X (n, d): scaled positions at rest, and the coordinates y of
-    the state, which are the same for all; (n, d + len(y)).
+def inputs(net, units, X, y, octaves=0):
+    """What a network takes of points X (n, d): scaled positions at rest, or their `features`, and
+    the coordinates y of the state, which are the same for all; (n, d (1 + 2 octaves) + len(y)).
     """
-    d = len(units.low)
+    k = count(len(units.low), octaves)
     A = np.empty((len(X), net.sizes[0]), dtype=net.W.dtype)
-    A[:, :d] = (X - units.low) / units.span
-    A[:, d:] = y
+    A[:, :k] = features((X - units.low) / units.span, octaves)
+    A[:, k:] = y
     return A
 
 
-def outputs(net, units, X, y):
+def outputs(net, units, X, y, octaves=0):
     """Standardised outputs (n, k) of a network at points X (n, d) and coordinates y."""
     layers, found = layers_of(net), np.empty((len(X), net.sizes[-1]))
 
     def work(rows):
-        found[rows] = forward(layers, inputs(net, units, X[rows], y))[0]
+        found[rows] = forward(layers, inputs(net, units, X[rows], y, octaves))[0]
 
     over(len(X), work)
     return found

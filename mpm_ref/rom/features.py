@@ -21,15 +21,21 @@ def count(d, octaves):
 
 def features(Z, octaves):
     """What scaled places Z (n, d) become: (n, d (1 + 2 octaves))."""
+    if octaves == 0:
+        return Z
     waves = [wave(2.0**o * pi * Z) for o in range(octaves) for wave in (np.sin, np.cos)]
     return np.concatenate([Z, *waves], axis=1)
 
 
 @kernel
 def fill(a, d, octaves):
-    """The same of one place, whose d numbers stand at the start of a."""
+    """The same of one place, whose d numbers stand at the start of a; returns how many there are
+    then.
+    """
+    k = d
     for o in range(octaves):
-        k = d * (1 + 2 * o)
         for i in range(d):
             a[k + i] = sin(2.0**o * pi * a[i])
             a[k + d + i] = cos(2.0**o * pi * a[i])
+        k += 2 * d
+    return k

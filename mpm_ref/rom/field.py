@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .batch import forward, over
-from .features import count, features
-from .network import Network, layers_of
+from .decoder import outputs
+from .features import count
+from .network import Network
 from .snapshots import measures
 
 
@@ -63,14 +63,7 @@ class Field(NamedTuple):
 
     def values(self, X, xhat, mu=()):
         """Values (n, k) at points X (n, d) [m]. Raises ValueError as `coordinates` does."""
-        state, layers = self.coordinates(xhat, mu), layers_of(self.net)
-        y = np.empty((len(X), self.outputs))
-
-        def work(rows):
-            Z = features((X[rows] - self.units.low) / self.units.span, self.octaves)
-            y[rows] = forward(layers, np.hstack([Z, np.tile(state, (len(Z), 1))]))[0]
-
-        over(len(X), work)
+        y = outputs(self.net, self.units, X, self.coordinates(xhat, mu), self.octaves)
         return self.units.mean + self.units.std * y
 
     def coordinates(self, xhat, mu=()):

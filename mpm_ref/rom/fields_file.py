@@ -13,6 +13,7 @@ import numpy as np
 from .. import archive
 from . import weights
 from .decoder import Decoder, Units
+from .features import count
 from .field import Field, FieldUnits
 from .learned import misfit
 from .network import Network, layers_of, network
@@ -110,12 +111,16 @@ def fault_of_field(own):
     sizes = own["sizes"]
     if sizes.ndim != 1 or sizes.dtype.kind not in "iu" or len(sizes) < 2 or sizes.min() < 1:
         return (f"sizes is an array of shape {sizes.shape} and type {sizes.dtype}: expected whole "
-                "numbers d + r + q, .., k, of 1 or more")
+                "numbers of 1 or more, into each layer and out of the last")
     octaves = own.get("octaves", np.array(0))       # files without are older than features
     if octaves.shape != () or octaves.dtype.kind not in "iu" or octaves < 0:
         return f"octaves is {octaves}: expected a whole number of 0 or more"
     if own["low"].ndim != 1 or own["mu_mean"].ndim != 1:
         return "low or mu_mean has not one axis"
+    read = count(len(own["low"]), int(octaves)) + len(own["mu_mean"])
+    if sizes[0] <= read:
+        return (f"its first layer reads {sizes[0]} numbers, of which places and parameters are "
+                f"{read}: expected latent coordinates too")
     for name, shape in shapes(sizes.tolist(), len(own["low"]), len(own["mu_mean"])).items():
         if own[name].shape != shape:
             return f"{name} has shape {own[name].shape}, expected {shape}"

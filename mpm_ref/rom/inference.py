@@ -47,10 +47,8 @@ def infer(g, h, l, X, xhat, mu=()):
 @kernel
 def encoded(f, X, state, p, a):
     """Features of the scaled reference position, latent coordinates and parameters, into a."""
-    d = len(f.low)
     inputs(f, X, state[:0], p, a)
-    fill_features(a, d, f.octaves)
-    k = d * (1 + 2 * f.octaves)
+    k = fill_features(a, len(f.low), f.octaves)
     a[k:k + len(state)] = state
 
 

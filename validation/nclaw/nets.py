@@ -93,8 +93,9 @@ def stored(name, now, load=weights.load):
     """
     path, again = FOLDER / f"{name}.npz", f"python -m validation.train_laws {name}"
     if not path.exists():
-        gone = "its training diverged, " if path.with_suffix(DIVERGED).exists() else ""
-        raise Untrained(f"no weights {path.name}: {gone}{again}")
+        gone = path.with_suffix(DIVERGED)
+        why = f"its training diverged ({gone.name}); to try again: " if gone.exists() else ""
+        raise Untrained(f"no weights {path.name}: {why}{again}")
     laws = load(path)
     was = {key: laws.about.get(key) for key in now}
     if was != now:

@@ -41,7 +41,7 @@ def settings(run):
     found = there(run, (JELLY, GRAPHS), trained)
     if JELLY in found:
         record(run, f"weights {JELLY}.npz", {**of_networks(found[JELLY]),
-                                             **of_training(found[JELLY].about["recipe"])})
+                                             **of_training(found[JELLY].about)})
     if GRAPHS in found:
         record(run, f"weights {GRAPHS}.npz", of_graphs(found[GRAPHS], jelly))
     record(run, "validation/nclaw/tasks.py", of_tasks(jelly))
@@ -103,11 +103,13 @@ def of_networks(laws):
                                   for part in parts for W, b in part.layers)}
 
 
-def of_training(recipe):
-    """Appendix D.2: of the recipe of trained laws."""
+def of_training(about):
+    """Section 4.1, Appendix D.2: of the training of laws, which name one scene, one run of it."""
+    recipe = about["recipe"]
     printed = {"lr_elastic": "elastic_rate", "lr_plastic": "plastic_rate", "epochs": "epochs",
                "grad_clip": "clip", "teacher_start": "first", "teacher_end": "last"}
-    return {f"nclaw.appD2.{theirs}": recipe[ours] for theirs, ours in printed.items()}
+    return {"nclaw.sec4_1.trajectories": len([about["scene"]]),
+            **{f"nclaw.appD2.{theirs}": recipe[ours] for theirs, ours in printed.items()}}
 
 
 def of_graphs(simulator, scene):

@@ -18,7 +18,7 @@ from .tasks import SEEDS, reconstruction, time, velocity
 from .untrained import untrained
 
 SHOTS = (0, 250, 500, 750, 1000)        # steps, of Figure 6
-DISTANCE = "mean squared distance of the last states alone"
+DISTANCE = "mean squared error of an axis, of the last states alone"
 BROKEN = "it broke down before: some points have no finite place"
 BESIDE = ("ours", "neural", "gnn")      # of Figure 2
 

@@ -33,7 +33,6 @@ class Part(NamedTuple):
     width: int              # of its hidden layers, of which there are DEPTH (NSF-arch)
     epochs: int             # of its training
     beside: float           # how far from the snapshots, in latent coordinates, it is shown them
-    octaves: int = 0        # of the features of places (`rom.features`), not of a position's
 
     @property
     def hidden(self):
@@ -53,6 +52,7 @@ class Net(NamedTuple):
     latent: str = "directions"      # of `learn.fit.LATENTS`
     schedule: str = "warm"          # of `learn.schedule`
     seed: int = 0
+    octaves: int = 0                # of the features of places (`rom.features`) that h and l read
 
 
 def nets():
@@ -61,9 +61,7 @@ def nets():
                           Part(64, 1500, BLURRED)),
              "metal": Net(metal(2), Part(64, 1500, DISPLACED), Part(64, 1200, BLURRED),
                           Part(64, 500, BLURRED))}
-    return plain | {f"{name}{WAVES}": net._replace(h=net.h._replace(octaves=OCTAVES),
-                                                  l=net.l._replace(octaves=OCTAVES))
-                    for name, net in plain.items()}
+    return plain | {f"{name}{WAVES}": net._replace(octaves=OCTAVES) for name, net in plain.items()}
 
 
 @cache
@@ -84,15 +82,12 @@ def trained(name):
 def identity(net):
     """What a training is of: the runs' scenes, and how it is made; plain values."""
     texts = "".join(canonical(net.study.run(value)) for value in net.study.train)
-    parts = {name: told(getattr(net, name)) for name in "ghl"}
+    parts = {name: dict(getattr(net, name)._asdict()) for name in "ghl"}
     return {"scenes": hashlib.sha256(texts.encode()).hexdigest()[:16], "r": net.study.sizes.r,
             "follows": net.study.follows, "spacing": net.study.spacing, **parts,
-            **{name: getattr(net, name) for name in Net._fields if name not in ("study", *"ghl")}}
-
-
-def told(part):
-    """A `Part` as plain values; without octaves where there are none."""
-    return {name: value for name, value in part._asdict().items() if name != "octaves" or value}
+            **{name: getattr(net, name) for name in Net._fields
+               if name not in ("study", "octaves", *"ghl")},
+            **({"octaves": net.octaves} if net.octaves else {})}
 
 
 def fields_of(model, study):

@@ -15,7 +15,7 @@ from .. import targets
 from ..registry import experiment
 from ..waiting import there
 from .errors import COLUMNS, DRAWS, mean, rows_of, said, share
-from .networks import WAVES, Part, fields_of, nets, trained
+from .networks import WAVES, fields_of, nets, trained
 from .tested import Tested
 
 DIM = 3
@@ -43,11 +43,13 @@ def cost(run, name, net):
     """Record the weights of a scene's `Net` and operations at a point, and those of the printed
     widths.
     """
-    id, of_ours = f"nsf.networks.{name}", {own: getattr(net, own) for own in OUTPUTS}
-    for word, parts in (("", of_ours), (".printed", printed(name.removesuffix(WAVES)))):
-        count = sum(weights(net.study, own, part) for own, part in parts.items())
-        note = f"hidden layers {DEPTH} x " + ", ".join(f"{part.width} ({own})"
-                                                       for own, part in parts.items())
+    id, of_ours = f"nsf.networks.{name}", {own: getattr(net, own).width for own in OUTPUTS}
+    for word, widths, octaves in (("", of_ours, net.octaves),
+                                  (".printed", printed(name.removesuffix(WAVES)), 0)):
+        count = sum(weights(net.study, own, width, octaves if own != "g" else 0)
+                    for own, width in widths.items())
+        note = (f"hidden layers {DEPTH} x " + ", ".join(f"{w} ({own})" for own, w in widths.items())
+                + said_of(octaves))
         run.record(f"{id}.weights{word}", count, unit="1", comparator="info", note=note)
         run.record(f"{id}.operations{word}", 2 * count, unit="1", comparator="info",
                    note=f"{note}; products and sums of all three networks at a point, without "
@@ -55,16 +57,20 @@ def cost(run, name, net):
 
 
 def printed(scene):
-    """{network: `Part`} with the printed widths of a scene."""
+    """{network: printed width} of a scene."""
     known = targets.load()
-    return {own: Part(int(known[f"nsf.table1.{scene}.mlp.{own}.width"].value), 0, 0.0)
-            for own in OUTPUTS}
+    return {own: int(known[f"nsf.table1.{scene}.mlp.{own}.width"].value) for own in OUTPUTS}
 
 
-def weights(study, own, part):
-    """Number of weights, without biases, of one network as a `Part` says."""
-    inputs = features.count(DIM, part.octaves) + study.sizes.r + (own == "h" and study.follows)
-    return sum(n * m for n, m in pairwise((inputs, *part.hidden, OUTPUTS[own])))
+def said_of(octaves):
+    """What fields read beside places, in words."""
+    return f", {octaves} octaves of sines and cosines of places (h, l)" if octaves else ""
+
+
+def weights(study, own, width, octaves=0):
+    """Number of weights, without biases, of one network with hidden layers so wide."""
+    inputs = features.count(DIM, octaves) + study.sizes.r + (own == "h" and study.follows)
+    return sum(n * m for n, m in pairwise((inputs, *(width,) * DEPTH, OUTPUTS[own])))
 
 
 def tested_on(model, study):
@@ -76,7 +82,8 @@ def tested_on(model, study):
 
 def scale_of(net, one):
     """In words."""
-    return f"{one.size}, widths {net.g.width}, {net.h.width} and {net.l.width}"
+    widths = f"widths {net.g.width}, {net.h.width} and {net.l.width}"
+    return f"{one.size}, {widths}{said_of(net.octaves)}"
 
 
 def of_scene(run, name, one, scale):

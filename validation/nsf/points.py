@@ -13,13 +13,14 @@ from .memory import shear
 from .studies import cake
 
 FEW = 3             # samples of the block, so that their nodes can be told apart
-MOST = 8000         # points kept of a scene
+MOST = 8000         # points kept of a scene, but samples and integration points, which all are
+FLAT = 2            # axes of a scene whose nodes are kept
 
 
 @experiment("nsf.fig4", title="NSF: samples, nodes and integration points",
             profiles=("quick", "standard"), budget={"quick": 15, "standard": 60})
 def sets(run):
-    """Keeps the points of a state half-way, and which are samples and integration points, of a
+    """Keeps the points of a state half-way, the samples and integration points among them, of a
     block in 2D, with the nodes of its samples, and of the cake.
     """
     pie = cake(run.choose(quick=3, standard=2))
@@ -30,10 +31,16 @@ def sets(run):
         dx, degree = one.problem.dx, one.problem.scheme.degree
         near, nodes = reach(x[samples], dx, degree).reached(x), nodes_of(x[samples], dx, degree)
         record(run, f"nsf.fig4.{name}", samples, nodes, near)
-        shown = {"x": x, "integration": near, "sample": np.isin(np.arange(len(x)), samples)}
-        kept |= {f"{name}_{word}": a[::-(-len(x) // MOST)] for word, a in shown.items()}
-        kept |= {f"{name}_nodes": nodes, f"{name}_dx": np.array(dx)}
+        kept |= {f"{name}_{word}": some for word, some in
+                 (("x", thinned(x)), ("integration", x[near]), ("sample", x[samples]))}
+        if x.shape[1] == FLAT:
+            kept[f"{name}_nodes"] = dx * nodes
     keep(run, **kept)
+
+
+def thinned(x):
+    """At most `MOST` of points x (n, d)."""
+    return x[::-(-len(x) // MOST)]
 
 
 def half_way(study):

@@ -24,17 +24,16 @@ def keep_runs(run, tests, also=()):
     the range, at `SHOTS` times. tests: {name: (`Tested`, parameter)}, all of the same training.
     also: "map", reduced runs on the map alone; "stress", sizes |tau| [Pa] of the Kirchhoff stress.
     """
-    one, _ = next(iter(tests.values()))
-    n = len(one.runs.X)
-    shown = np.arange(0, n, -(-n // MOST))
-    found = {"values": np.array(list(tests)), "levels": levels_of(one.runs)}
+    runs = next(iter(tests.values()))[0].runs
+    shown = np.arange(0, len(runs.X), -(-len(runs.X) // MOST))
+    found = {"values": np.array(list(tests)), "levels": levels_of(runs)}
     for name, (one, value) in tests.items():
         ways = {"ours": one} | ({"map": one._replace(map_alone=True)} if "map" in also else {})
         found |= of_history(f"{name}_true", one.tests[value], 0, shown)
         for word, own in ways.items():
             found |= of_run(f"{name}_{word}", own, value, shown)
     for word, k in (("first", 0), ("last", -1)):
-        found |= of_history(word, one.runs, k, shown)
+        found |= of_history(word, runs, k, shown)
     keep(run, **{name: a for name, a in found.items()
                  if "stress" in also or not name.endswith("_tau")})
 

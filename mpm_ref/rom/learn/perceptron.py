@@ -33,7 +33,6 @@ class Perceptron(nn.Module):
             a = nn.functional.elu(layer(a))
         return self.layers[-1](a)
 
-
     def features(self, X):
         """As `rom.features`."""
         waves = [wave(2.0**o * pi * X) for o in range(self.octaves)

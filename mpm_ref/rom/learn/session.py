@@ -20,6 +20,7 @@ from .schedule import SCHEDULES
 SAVE = 20                           # epochs between checkpoints, but of a long training ...
 PARTS = 200                         # ... so many checkpoints in all
 FORMAT = 3                          # of checkpoints
+LATER = ("octaves",)                # settings that older ones do not name; none of them is 0 there
 
 
 class Diverged(ValueError):
@@ -51,7 +52,9 @@ class Session:
     @property
     def named(self):
         """The training's settings, and what it is trained on, as one line of text."""
-        return json.dumps({"format": FORMAT, **asdict(self.training), "data": self.of})
+        settings = {name: value for name, value in asdict(self.training).items()
+                    if name not in LATER or value}
+        return json.dumps({"format": FORMAT, **settings, "data": self.of})
 
     def order(self):
         """Numbers of the snapshots that an epoch shows, at random."""
