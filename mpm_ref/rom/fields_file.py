@@ -70,7 +70,8 @@ def compact(a):
 def arrays_of_field(field):
     """The numbers of a `Field` by name."""
     numbers = {"W": field.net.W, "b": field.net.b, **field.units._asdict()}
-    return {"sizes": np.array(field.net.sizes), "octaves": np.array(field.octaves),
+    waves = {"octaves": np.array(field.octaves)} if field.octaves else {}
+    return {"sizes": np.array(field.net.sizes), **waves,
             **{name: np.array(a, dtype=float) for name, a in numbers.items()}}
 
 
@@ -112,7 +113,7 @@ def fault_of_field(own):
     if sizes.ndim != 1 or sizes.dtype.kind not in "iu" or len(sizes) < 2 or sizes.min() < 1:
         return (f"sizes is an array of shape {sizes.shape} and type {sizes.dtype}: expected whole "
                 "numbers of 1 or more, into each layer and out of the last")
-    octaves = own.get("octaves", np.array(0))       # files without are older than features
+    octaves = own.get("octaves", np.array(0))
     if octaves.shape != () or octaves.dtype.kind not in "iu" or octaves < 0:
         return f"octaves is {octaves}: expected a whole number of 0 or more"
     if own["low"].ndim != 1 or own["mu_mean"].ndim != 1:
