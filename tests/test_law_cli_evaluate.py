@@ -2,6 +2,7 @@
 
 import csv
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,8 @@ from mpm_ref.scene import build, load
 from mpm_ref.simulate import simulate
 
 FRAMES = 1 + STEPS // EVERY
+SCENES = Path(__file__).parents[1] / "scenes"
+NETS = Path(__file__).parents[1] / "validation" / "nclaw" / "weights"
 STIFF = 3e7             # [Pa] too stiff for the step
 
 
@@ -140,3 +143,28 @@ def test_what_an_evaluation_needs_is_said_first(
 def test_a_scene_that_does_not_exist_is_told_with_those_that_do(tmp_path):
     done = mpm_ref("law", "evaluate", saved(tmp_path, identified()), "none")
     assert_told(done, 2, "nor a shipped scene of that name", "nclaw_jelly")
+
+
+NARROW = {"low": [0.999] * 4, "high": [1.001] * 4}
+WIDE = {"low": [0.0] * 4, "high": [9.0] * 4}
+
+
+@pytest.mark.parametrize(("seen", "times"), [(NARROW, 1), (WIDE, 0), (None, 0)],
+                         ids=["narrow", "wide", "unknown"])
+def test_strains_that_were_never_met_are_told_once(tmp_path, seen, times):
+    laws = identified()
+    about = laws.about if seen is None else laws.about | {"seen": seen}
+    done = evaluate(tmp_path, laws._replace(about=about))
+    words = " ".join(done.stderr.split())
+    assert words.count("are outside what its learned law has seen in training") == times
+    assert done.exit_code == 0
+
+
+def test_two_learned_laws_are_told(tmp_path):
+    text, weights = (SCENES / "nclaw_jelly.toml").read_text(), NETS / "jelly.npz"
+    true = 'law = "fixed_corotated", E = 1e5, nu = 0.2'
+    assert true in text
+    (tmp_path / "own.toml").write_text(text.replace(true, f'law = "neural", weights = "{weights}"'))
+    done = mpm_ref("law", "evaluate", weights, tmp_path / "own.toml", "--steps", 5)
+    assert "this compares two learned laws; name the scene" in " ".join(done.stderr.split())
+    assert done.exit_code == 0

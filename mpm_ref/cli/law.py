@@ -5,6 +5,7 @@ A study file names the scene, the method and its recipe; docs/nclaw.md explains 
 commands are in `law_train` and `law_show`.
 """
 
+import sys
 from math import inf, isfinite, sqrt
 from pathlib import Path
 from typing import Annotated
@@ -13,13 +14,13 @@ import typer
 
 from ..laws.compare import Broken, beside
 from ..laws.numbers import write_errors
-from ..nclaw.bodies import learned
+from ..laws.watched import Watched
 from ..store.atomic import require_place
 from ..store.words import counted
 from . import faults, law_show, law_train
 from .faults import end, one_line, options
 from .info import as_json
-from .law_options import NUMBERS, SceneName, WeightsFile, fitting, other_steps
+from .law_options import NUMBERS, SceneName, WeightsFile, fitting, not_true, other_steps
 from .look import Machine
 from .outputs import require_ending
 from .rom_options import on_interrupt
@@ -51,7 +52,7 @@ def evaluate(
                 require_ending(out, NUMBERS)
                 require_place(out)
             laws, problem = fitting(file, name, steps)
-            warn(other_steps(laws, problem))
+            warn([*other_steps(laws, problem), *not_true(problem)])
             errors, found = compared(problem, laws, name)
         facts = facts_of(errors, found, problem)
         if out is not None:
@@ -70,10 +71,14 @@ app.command()(law_show.plot)
 def compared(problem, laws, name):
     """(error of each frame [m^2], `Found`) of both runs, with a bar of frames."""
     errors, found, total = [], None, 1 + problem.clock.steps // problem.clock.every
+    watched = Watched(laws, problem)
     try:
         with (on_interrupt(lambda: f"after {len(errors)} of {counted(total, 'frame')}"),
               passing(unit="frame", total=total, desc=problem.title or name) as bar):
-            for error, found in beside(problem, learned(laws)):
+            for error, found in beside(problem, watched.made):
+                if found.step < 0:
+                    with bar.external_write_mode(file=sys.stderr):
+                        warn(watched.news(len(errors)))
                 errors.append(error)
                 bar.set_postfix_str(f"error {found.error:.2e} m^2", refresh=False)
                 bar.update()

@@ -48,6 +48,15 @@ def horizons(method, recipe, epochs):
     return tuple(teacher.horizon(k, recipe["epochs"]) for k in (0, epochs - 1))
 
 
+def not_true(problem):
+    """The warnings about bodies whose law in the scene is a learned one, which says what it has
+    met.
+    """
+    for name in problem.seen:
+        yield (f"body {name!r} has a learned law in the scene: this compares two learned laws; "
+               "name the scene of the true one")
+
+
 def other_steps(laws, problem):
     """The warning about steps of another length than in training; or none."""
     dt = laws.about.get("dt")
