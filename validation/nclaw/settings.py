@@ -1,7 +1,8 @@
 """What NCLaw and its release print of environments, networks, trainings and tasks, beside what is
 run here.
 
-Not here: what was weighed, kneaded and filmed for the dough, and what other papers used.
+Not here: what was weighed, kneaded and filmed for the dough, what other papers used, and that laws
+learn from one trajectory, which nothing here could have otherwise.
 """
 
 from math import prod
@@ -41,7 +42,7 @@ def settings(run):
     found = there(run, (JELLY, GRAPHS), trained)
     if JELLY in found:
         record(run, f"weights {JELLY}.npz", {**of_networks(found[JELLY]),
-                                             **of_training(found[JELLY].about)})
+                                             **of_training(found[JELLY].about["recipe"])})
     if GRAPHS in found:
         record(run, f"weights {GRAPHS}.npz", of_graphs(found[GRAPHS], jelly))
     record(run, "validation/nclaw/tasks.py", of_tasks(jelly))
@@ -103,13 +104,11 @@ def of_networks(laws):
                                   for part in parts for W, b in part.layers)}
 
 
-def of_training(about):
-    """Section 4.1, Appendix D.2: of the training of laws, which name one scene, one run of it."""
-    recipe = about["recipe"]
+def of_training(recipe):
+    """Appendix D.2: of the recipe of trained laws."""
     printed = {"lr_elastic": "elastic_rate", "lr_plastic": "plastic_rate", "epochs": "epochs",
                "grad_clip": "clip", "teacher_start": "first", "teacher_end": "last"}
-    return {"nclaw.sec4_1.trajectories": len([about["scene"]]),
-            **{f"nclaw.appD2.{theirs}": recipe[ours] for theirs, ours in printed.items()}}
+    return {f"nclaw.appD2.{theirs}": recipe[ours] for theirs, ours in printed.items()}
 
 
 def of_graphs(simulator, scene):

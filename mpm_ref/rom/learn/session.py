@@ -20,7 +20,7 @@ from .schedule import SCHEDULES
 SAVE = 20                           # epochs between checkpoints, but of a long training ...
 PARTS = 200                         # ... so many checkpoints in all
 FORMAT = 3                          # of checkpoints
-LATER = ("octaves",)                # settings that older ones do not name; none of them is 0 there
+LATER = ("octaves",)                # settings older ones do not name; told where they are not 0
 
 
 class Diverged(ValueError):
