@@ -219,6 +219,11 @@ def test_arrays_of_something_else_are_told(tmp_path):
                 " has a, b, c, d, ..; name a file of `mpm-ref rom train`")
 
 
+def test_laws_of_several_epochs_are_told_as_such():
+    assert_told(mpm_ref("info", NCLAW / "small-water-epochs.npz"), 2, "holds the laws of several "
+                "epochs, 10, 20, 30, 50, 75, 100, 150, 200, 300, of a training")
+
+
 # law studies
 
 def test_a_law_study_says_what_is_learned_from_what(tmp_path):

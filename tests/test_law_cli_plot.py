@@ -178,6 +178,17 @@ def test_lines_are_dotted_beyond_what_training_saw(tmp_path, monkeypatch):
     assert words == ["truth", "learned", "learned, beyond the strains of training"]
 
 
+def test_lines_say_where_strains_of_training_end(tmp_path):
+    """Strains are whole steps of 0.1 / STEPS; stretches were seen up to 1.05 and down to 0.9."""
+    bounds = seen(np.array([np.eye(3), np.diag([1.05, 1.0, 1.0]), np.diag([1.0, 1.0, 0.9])]))
+    stretched, pressed, *_ = plot(tmp_path, identified()._replace(about={"seen": bounds})
+                                  ).stdout.splitlines()
+    assert stretched.startswith("uniaxial to +0.1")
+    assert stretched.endswith("; at 0.0525 beyond the strains of training")
+    assert pressed.startswith("uniaxial to -0.1")
+    assert "beyond" not in pressed
+
+
 def test_weights_that_do_not_know_are_drawn_without(tmp_path, monkeypatch):
     drawn, words, figure = lines_of(monkeypatch, tmp_path, identified())
     assert set(drawn) == {"uniaxial", "shear", "volumetric"}

@@ -43,9 +43,10 @@ def model(net=NET):
 
 def test_the_networks_are_those_of_two_scenes_with_the_printed_latent_coordinates():
     printed = targets.load()
-    assert {*nets()} == {"jelly", "metal", "jelly-waves", "metal-waves"}
+    assert {*nets()} == {"jelly", "metal", "jelly-waves", "metal-waves", "jelly-seed-1",
+                         "jelly-seed-2"}
     for name, net in nets().items():
-        scene = name.removesuffix(kept.WAVES)
+        scene = name.split("-")[0]
         assert net.study.sizes.r == printed[f"nsf.table1.{scene}.r"].value
         assert net.study.follows is (scene == "metal")
 
@@ -57,6 +58,12 @@ def test_features_are_those_of_stress_and_affine_field_alone():
         assert waves == net._replace(octaves=3)
         assert "octaves" not in identity(net)
         assert identity(waves) == identity(net) | {"octaves": 3}
+
+
+def test_seeds_differ_in_the_seed_alone():
+    known = nets()
+    for seed in (1, 2):
+        assert known[f"jelly-seed-{seed}"] == known["jelly"]._replace(seed=seed)
 
 
 @pytest.mark.usefixtures("folder")

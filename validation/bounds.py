@@ -38,9 +38,10 @@ def told(name):
 def main(names: Annotated[list[str], typer.Argument(help="of nets with laws")]):
     """Write the files of those weights again, with the bounds."""
     laws = [name for name, net in nets().items() if isinstance(net, Net)]
+    there = [name for name in laws if (FOLDER / f"{name}.npz").exists()]
     for name in names:
         if name not in laws:
-            raise typer.BadParameter(f"{name!r}: expected one of {', '.join(laws)}")
+            raise typer.BadParameter(f"{name!r}: expected one of {', '.join(there)}")
     for name, own in [(name, told(name)) for name in names]:
         weights.save(FOLDER / f"{name}.npz", own)
 

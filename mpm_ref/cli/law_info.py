@@ -13,6 +13,7 @@ from . import made
 from .law_options import horizons, of_errors
 
 LAYERS = "mpm_ref law"          # what the format of layers begins with
+AFTER = ".elastic_kind"         # what follows the epoch in such a file
 OF_MARKS = "squared distance of marks in images [px^2]"
 WITH_VELOCITIES = ", with the term of velocities,"
 SPLINES = {kind.__name__ for kind in spline.READINGS}
@@ -21,6 +22,11 @@ SPLINES = {kind.__name__ for kind in spline.READINGS}
 def is_one(arrays):
     """Whether the arrays of a file are those of laws or of their layers, of any format."""
     return "elastic_kind" in arrays
+
+
+def epochs_of(arrays):
+    """The epochs of laws that a file has of several, in words and in order; none of other files."""
+    return sorted((name.removesuffix(AFTER) for name in arrays if name.endswith(AFTER)), key=int)
 
 
 def is_exported(arrays):

@@ -108,5 +108,7 @@ def line(curve):
     off = f"off by at most {100.0 * curve.off:.3g} % of it" if isfinite(curve.off) else (
         f"the learned law breaks down at strain {curve.broken:.4g}" if curve.broken is not None
         else f"the learned law gives up to {abs(curve.learned).max():.4g} Pa")
+    beyond = "" if curve.beyond is None else (
+        f"; at {curve.beyond:.3g} beyond the strains of training")
     return (f"{curve.path.name} to {end:+g}: {curve.path.symbol} up to "
-            f"{abs(curve.truth).max():.4g} Pa, {off}")
+            f"{abs(curve.truth).max():.4g} Pa, {off}{beyond}")

@@ -35,6 +35,10 @@ def of_npz(name):
         facts = law_info.of_layers(path, arrays) if law_info.is_exported(arrays) else (
             law_info.of_laws(path))
         return facts, law_info.lines(facts)
+    if epochs := law_info.epochs_of(arrays):
+        raise ValueError(f"{path} holds the laws of several epochs, {', '.join(epochs)}, of a "
+                         "training of the validation suite; expected those of one, as `mpm-ref law "
+                         "train` writes them")
     names = sorted(arrays)
     more = ", .." if len(names) > SHOWN else ""
     raise ValueError(f"{path} holds no map, no laws and no graph network: it has "

@@ -28,6 +28,12 @@ class Curve(NamedTuple):
         return float(np.abs(self.learned - self.truth).max() / largest) if largest > 0.0 else nan
 
     @property
+    def beyond(self):
+        """The first strain of the path that training has not seen, or None."""
+        outside = () if self.seen is None else np.flatnonzero(~self.seen)
+        return float(self.path.strain[outside[0]]) if len(outside) else None
+
+    @property
     def broken(self):
         """The strain at which the learned law first gives no finite stress, or None."""
         at = np.flatnonzero(~np.isfinite(self.learned))

@@ -16,6 +16,8 @@ from .nets import trained
 NAME, POINTS, SEED = "water", 1000, 0
 METHODS = {NAME: "ours", f"{NAME}-labeled": "labeled"}      # of weights
 TERMS = {"P": "Pa^2", "Fnew": "1"}
+RULES = {"P": {"comparator": "info", "note": "the printed number has no unit: not judged"},
+         "Fnew": {}}
 
 
 @experiment("nclaw.table5", title="NCLaw: the laws' own answers",
@@ -31,7 +33,7 @@ def table5(run):
         found = answers(deployed.elastic(laws.elastic), deployed.plastic(laws.plastic), F, trial)
         for (term, unit), a, b in zip(TERMS.items(), found, truth, strict=True):
             run.record(f"nclaw.table5.{term}.{METHODS[name]}", np.mean((a - b) ** 2), unit=unit,
-                       scale=f"{POINTS} points of the training run, seed {SEED}")
+                       scale=f"{POINTS} points of the training run, seed {SEED}", **RULES[term])
     unchanged(run, trial, truth[1])
 
 

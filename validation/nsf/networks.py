@@ -23,7 +23,8 @@ from ..waiting import Untrained
 from .studies import Study, jelly, metal
 
 FOLDER = Path(__file__).parent / "weights"
-WAVES, OCTAVES = "-waves", 3        # names of nets with features, and these
+OCTAVES = 3                         # of features
+SEEDS = 1, 2                        # other than 0, of the first scene
 DISPLACED, BLURRED = 0.03, 0.01     # `Part.beside` of the position, and of what is not known there
 
 
@@ -56,12 +57,16 @@ class Net(NamedTuple):
 
 
 def nets():
-    """{name: `Net`} of all scenes that have networks; "-waves" with features in h and l."""
+    """{name: `Net`} of all scenes that have networks, whose names begin with the scene's; "-waves"
+    with features in h and l.
+    """
     plain = {"jelly": Net(jelly(), Part(64, 3500, DISPLACED), Part(64, 3000, BLURRED),
                           Part(64, 1500, BLURRED)),
              "metal": Net(metal(2), Part(64, 1500, DISPLACED), Part(64, 1200, BLURRED),
                           Part(64, 500, BLURRED))}
-    return plain | {f"{name}{WAVES}": net._replace(octaves=OCTAVES) for name, net in plain.items()}
+    return (plain
+            | {f"{name}-waves": net._replace(octaves=OCTAVES) for name, net in plain.items()}
+            | {f"jelly-seed-{seed}": plain["jelly"]._replace(seed=seed) for seed in SEEDS})
 
 
 @cache

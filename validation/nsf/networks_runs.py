@@ -15,7 +15,7 @@ from .. import targets
 from ..registry import experiment
 from ..waiting import there
 from .errors import COLUMNS, DRAWS, mean, rows_of, said, share
-from .networks import WAVES, fields_of, nets, trained
+from .networks import fields_of, nets, trained
 from .tested import Tested
 
 DIM = 3
@@ -45,7 +45,7 @@ def cost(run, name, net):
     """
     id, of_ours = f"nsf.networks.{name}", {own: getattr(net, own).width for own in OUTPUTS}
     for word, widths, octaves in (("", of_ours, net.octaves),
-                                  (".printed", printed(name.removesuffix(WAVES)), 0)):
+                                  (".printed", printed(name.split("-")[0]), 0)):
         count = sum(weights(net.study, own, width, octaves if own != "g" else 0)
                     for own, width in widths.items())
         note = (f"hidden layers {DEPTH} x " + ", ".join(f"{w} ({own})" for own, w in widths.items())
