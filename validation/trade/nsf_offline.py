@@ -1,0 +1,96 @@
+"""What NSF's fields cost before the first reduced run, and when that is paid back."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mpm_ref.reduced.whole import history
+from mpm_ref.rom.histories import joined
+
+from ..ldm.racing import clocked
+from ..nsf.networks import fields_of, trained
+from ..nsf.studies import jelly, metal
+from ..nsf.tested import Tested, refitted
+from ..registry import experiment
+from ..waiting import Untrained
+from .nsf import full_cpu, reduced_cpu
+
+INFO = {"comparator": "info", "unit": "s"}
+COLUMNS = ("scene", "fields", "runs", "making", "full", "reduced", "pays_after")
+
+
+class Bill(NamedTuple):
+    """CPU seconds of fields of one kind."""
+
+    runs: float         # of all training runs
+    making: float       # of the fields of them
+    full: float         # of a full-order run
+    reduced: float      # of a reduced run; infinite where it broke down
+
+    @property
+    def pays_after(self):
+        """Runs after which reduced ones, with all that was before them, have cost less; infinite
+        where a reduced run takes longer.
+        """
+        saved = self.full - self.reduced
+        return (self.runs + self.making) / saved if saved > 0.0 else np.inf
+
+
+def studies(run):
+    """{name: `Study`}: at the standard profile at the printed resolution, all training runs."""
+    return run.choose(quick=lambda: {"jelly": jelly(4), "metal": metal(4, train=4)},
+                      standard=lambda: {"jelly": jelly(), "metal": metal()})()
+
+
+@experiment("trade.nsf.offline", title="NSF: the cost before the first reduced run",
+            profiles=("quick", "standard"), budget={"quick": 15, "standard": 400})
+def offline(run):
+    """Fields of modes, and at the standard profile the jelly cube's trained networks, whose file
+    knows what training took; the usual number of samples, drawn at random.
+    """
+    rows = []
+    for name, study in run.progress(studies(run).items(), "scenes"):
+        one, bill = of_modes(study, run.choose(quick=1, standard=3))
+        rows.append(told(run, name, "modes", one, bill))
+        if run.profile == "standard" and name == "jelly":
+            rows += of_networks(run, name, one, bill)
+    run.table("bills", COLUMNS, rows)
+
+
+def of_modes(study, repeats):
+    """`Tested` of a study on fields of modes, and their `Bill`."""
+    def made(value):
+        return history(study.run(value), [value], np.float32, study.spacing)
+
+    tests = {study.test[0]: made(study.test[0])}        # first, as it compiles what is missing
+    runs, spent = clocked(lambda: joined(map(made, study.train)))
+    bare = Tested(study, None, None, runs, tests)
+    one, made_in = clocked(lambda: refitted(bare, study.sizes, study.follows))
+    return one, Bill(spent.cpu, made_in.cpu, full_cpu(one),
+                     reduced_cpu(one, study.samples, False, repeats))
+
+
+def of_networks(run, name, one, bill):
+    """Record what a scene's trained networks cost, of the same runs; rows: one, or none where they
+    are not trained.
+    """
+    try:
+        model = trained(name)
+    except Untrained as fault:
+        run.note(str(fault))
+        return []
+    other = one._replace(fields=fields_of(model, one.study), xhat=model.xhat)
+    training = sum(model.about["cpu_seconds"].values())
+    return [told(run, name, "networks", other, bill._replace(
+        making=training, reduced=reduced_cpu(other, one.study.samples, False, 1)))]
+
+
+def told(run, name, kind, one, bill):
+    """Record a `Bill`; its row."""
+    id, scale = f"trade.nsf.offline.{name}.{kind}", f"{one.size}, {one.study.samples} samples"
+    for word, value in bill._asdict().items():
+        run.record(f"{id}.{word}", value, scale=scale, note="CPU seconds", **INFO)
+    run.record(f"{id}.pays_after", bill.pays_after, unit="1", comparator="info", scale=scale,
+               note="reduced runs until training runs and fields are paid back; infinite where a "
+                    "reduced run takes longer than the full one")
+    return (name, kind, *bill, bill.pays_after)
