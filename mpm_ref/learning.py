@@ -1,6 +1,16 @@
 """The parts of the package that learn, which alone need PyTorch: imported when asked for."""
 
 from importlib import import_module
+from typing import NamedTuple
+
+DEVICES = "cpu", "cuda"
+
+
+class Machine(NamedTuple):
+    """What a training runs on."""
+
+    threads: int = 1        # of PyTorch
+    device: str = "cpu"     # of DEVICES
 
 
 def part(name, what, instead):

@@ -5,6 +5,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
+from mpm_ref.learning import Machine  # noqa: E402
 from mpm_ref.reduced.whole import history  # noqa: E402
 from mpm_ref.rom.histories import joined  # noqa: E402
 from mpm_ref.rom.learn import session  # noqa: E402
@@ -80,7 +81,7 @@ def test_the_command_writes_weights_that_are_taken(places):
 
 def test_a_training_that_was_cut_off_goes_on(places, monkeypatch):
     """In the second stage; the weights are those of a training in one go."""
-    whole = train_fields.made("jelly", places[1] / "whole", 1)
+    whole = train_fields.made("jelly", places[1] / "whole", Machine())
     monkeypatch.setattr("mpm_ref.rom.learn.fit.SAVE", 2)
     monkeypatch.setattr("mpm_ref.rom.learn.field.SAVE", 2)
     show, seen = train_fields.Work.show, []

@@ -104,13 +104,13 @@ def test_a_training_that_was_cut_off_goes_on_from_its_stages(made, study, tmp_pa
     learn, command = drive_fields.fitted, (
         "train", made / "pairs.toml", "--data", made / "data", "--out", tmp_path / "nets.npz")
 
-    def fitted(settings, histories, folder, on_epoch, threads):
+    def fitted(settings, histories, folder, on_epoch, machine):
         def shown(stage, history):
             seen.append((stage, len(history)))
             if len(seen) == 50:
                 raise KeyboardInterrupt
             on_epoch(stage, history)
-        return learn(settings, histories, folder, shown, threads)
+        return learn(settings, histories, folder, shown, machine)
 
     monkeypatch.setattr(drive_fields, "fitted", fitted)
     done = mpm_ref("rom", *command)

@@ -7,6 +7,7 @@ import pytest
 from small_studies import CURVED, STEPS, generated, study
 
 from mpm_ref.cases import snapshots
+from mpm_ref.learning import Machine
 from mpm_ref.reduced import dataset, maps
 from mpm_ref.reduced.field import resampled, tabulated
 from mpm_ref.reduced.generate import (
@@ -243,7 +244,7 @@ def test_what_are_no_modes_is_refused(model, tmp_path):
 
 def test_without_torch_a_network_is_refused_in_one_sentence(made, without_torch):
     with pytest.raises(ValueError, match=r'pip install "mpm_ref\[learn\]"'):
-        maps.learned(made[0], None, {}, None, None, 1)
+        maps.learned(made[0], None, {}, None, None, Machine())
 
 
 @pytest.mark.parametrize("kind", ["straight", "curved"])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from small_studies import generated, study
 
+from mpm_ref.learning import Machine
 from mpm_ref.reduced import dataset, maps
 from mpm_ref.reduced.tables import KEYS, LATENTS, NETWORK, WEIGHTS, Map
 
@@ -55,7 +56,8 @@ def test_a_network_is_trained_as_its_settings_say_and_comes_back(made, tmp_path)
     network = '"network"\nepochs = 3\nhidden = [8, 8]\nweights = "printed"\npoints = 20'
     bars = study(tmp_path, ('"modes"', network))
     data, seen = dataset.load(bars, folder, bars.train), []
-    done = maps.learned(bars, data, {}, tmp_path / "map.pt", lambda h: seen.append(len(h)), 1)
+    done = maps.learned(bars, data, {}, tmp_path / "map.pt", lambda h: seen.append(len(h)),
+                        Machine())
     assert seen == [1, 2, 3]
     plain = train(Training(3, (8, 8), weights=PRINTED, epochs=3, points=20), data)
     np.testing.assert_array_equal(done.decoder.net.W, plain.decoder.net.W)
@@ -72,7 +74,7 @@ def test_a_network_is_trained_with_weights_that_fit_its_body(made, tmp_path):
     network = '"network"\nepochs = 3\nhidden = [8]\nweights = "scaled"\nlatent = "modes"'
     bars = study(tmp_path, ('"modes"', network))
     data = dataset.load(bars, folder, bars.train)
-    done = maps.learned(bars, data, {}, None, None, 1)
+    done = maps.learned(bars, data, {}, None, None, Machine())
     fitting = scaled(CODE, 0.8 / 0.4, 0.01 * 144.0)
     plain, unscaled = (train(Training(3, (8,), latent="modes", weights=w, epochs=3), data)
                        for w in (fitting, CODE))

@@ -10,14 +10,16 @@ import torch
 import typer
 from tqdm import tqdm
 
+from mpm_ref.learning import DEVICES, Machine
 from mpm_ref.reduced.maps import of_trained
+from mpm_ref.rom.learn.device import device_of
 from mpm_ref.rom.learn.fit import Training, train
 from mpm_ref.rom.learn.loss import READINGS, Weights
 from mpm_ref.rom.weights import save
 
 from .ldm.nets import FOLDER, SHARES, identity, nets
 from .provenance import commit, provenance
-from .training import KEPT, Checkpoints, Folder, Names, Threads, train_all
+from .training import KEPT, Checkpoints, Device, Folder, Names, Threads, train_all
 
 ROOT = Path(__file__).parents[1]
 
@@ -30,7 +32,7 @@ def training(net):
                     dense=net.dense, thin=net.thin, latent=net.latent, seed=net.seed)
 
 
-def made(name, checkpoints, threads):
+def made(name, checkpoints, machine):
     """`Model` of a net by name, with what is to be known of it."""
     net = nets()[name]
     plan, snapshots = training(net), net.study.run(net.study.train)
@@ -38,18 +40,19 @@ def made(name, checkpoints, threads):
         def show(history):
             bar.update(len(history) - bar.n)
             bar.set_postfix(loss=f"{history[-1][0]:.2e}")
-        done = train(plan, snapshots, checkpoints / f"{name}.pt", show)
+        done = train(plan, snapshots, checkpoints / f"{name}.pt", show, device_of(machine.device))
     return of_trained(done, snapshots.X, {
         **identity(net), "training": asdict(plan), "command": f"python -m validation.train {name}",
-        "threads": threads, "torch": torch.__version__,
-        **provenance(commit(ROOT))})
+        **machine._asdict(), "torch": torch.__version__, **provenance(commit(ROOT))})
 
 
 def main(names: Names = None, folder: Folder = FOLDER, checkpoints: Checkpoints = KEPT,
-         threads: Threads = 1):
+         threads: Threads = 1, device: Device = DEVICES[0]):
     """Train maps and write their weights."""
+    machine = Machine(threads, device)
+
     def make(name, folder, checkpoints):
-        save(folder / f"{name}.npz", made(name, checkpoints, threads))
+        save(folder / f"{name}.npz", made(name, checkpoints, machine))
 
     train_all(names, nets(), (folder, checkpoints), threads, make)
 

@@ -13,16 +13,18 @@ import typer
 from tqdm import tqdm
 
 from mpm_ref.cost import Cost
+from mpm_ref.learning import DEVICES, Machine
 from mpm_ref.reduced.whole import history
 from mpm_ref.rom.fields_file import save
 from mpm_ref.rom.histories import joined
+from mpm_ref.rom.learn.device import device_of
 from mpm_ref.rom.learn.field import FieldTraining
 from mpm_ref.rom.learn.fit import Training
 from mpm_ref.rom.learn.stages import POSITION, Plan, train
 
 from .nsf.networks import FOLDER, identity, nets
 from .provenance import commit, provenance
-from .training import KEPT, Checkpoints, Folder, Names, Threads, train_all
+from .training import KEPT, Checkpoints, Device, Folder, Names, Threads, train_all
 
 ROOT = Path(__file__).parents[1]
 SHOWN = 50          # epochs of which the loss is kept in the file
@@ -68,20 +70,21 @@ class Work:
         self.bar.set_postfix(stage=stage, loss=f"{np.ravel(losses[-1])[0]:.1e}")
 
 
-def made(name, checkpoints, threads):
+def made(name, checkpoints, machine):
     """`fields_file.Model` of a net by name, with what is to be known of it."""
     net = nets()[name]
     checkpoints.mkdir(parents=True, exist_ok=True)
     runs = runs_of(net.study)
     with tqdm(total=Work.total(net), desc=name, unit_scale=True) as bar:
-        done = train(plan_of(net), runs, checkpoints, Work(net, bar).show)
+        done = train(plan_of(net), runs, checkpoints, Work(net, bar).show,
+                     device_of(machine.device))
     stages = done._asdict().items()
     took = {f"{clock}_seconds": {stage: round(getattr(own.cost, clock), 1) for stage, own in stages}
             for clock in Cost._fields}
     plan = {stage: asdict(own) for stage, own in plan_of(net)._asdict().items()}
     return done.model({
         **identity(net), "plan": plan, "errors": errors_of(done.model({}), runs),
-        "losses": losses(done), **took, "threads": threads, "torch": torch.__version__,
+        "losses": losses(done), **took, **machine._asdict(), "torch": torch.__version__,
         "command": f"python -m validation.train_fields {name}", **provenance(commit(ROOT))})
 
 
@@ -111,11 +114,13 @@ def losses(done):
 
 
 def main(names: Names = None, folder: Folder = FOLDER, checkpoints: Checkpoints = KEPT,
-         threads: Threads = 1):
+         threads: Threads = 1, device: Device = DEVICES[0]):
     """Train networks and write their weights."""
+    machine = Machine(threads, device)
+
     def make(name, folder, checkpoints):
         kept = checkpoints / f"fields-{name}"
-        save(folder / f"{name}.npz", made(name, kept, threads))
+        save(folder / f"{name}.npz", made(name, kept, machine))
         rmtree(kept)
 
     train_all(names, nets(), (folder, checkpoints), threads, make)

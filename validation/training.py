@@ -6,10 +6,13 @@ from typing import Annotated
 import torch
 import typer
 
+from mpm_ref.learning import DEVICES
+
 Names = Annotated[list[str] | None, typer.Argument(help="of nets; none: all")]
 Folder = Annotated[Path, typer.Option(help="where weights go")]
 Checkpoints = Annotated[Path, typer.Option(help="what an interrupted training goes on from")]
 Threads = Annotated[int, typer.Option(help="of PyTorch")]
+Device = Annotated[str, typer.Option(help=f"where networks are trained: {', '.join(DEVICES)}")]
 KEPT = Path("results/training")
 
 

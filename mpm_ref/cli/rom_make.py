@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ..learning import DEVICES, Machine
 from ..reduced import dataset, maps
 from ..reduced.generate import (
     INTERRUPTED,
@@ -97,6 +98,8 @@ def train(
     kind: Annotated[str | None, typer.Option(
         help=f"Kind of the map: {', '.join(KEYS)}; default: as the study says.")] = None,
     threads: Annotated[int, typer.Option(help="Threads of PyTorch.", min=1)] = 1,
+    device: Annotated[str, typer.Option(
+        help=f"Where a network is trained: {', '.join(DEVICES)}.")] = DEVICES[0],
     overwrite: Overwrite = False,
 ):
     """Make the map of a study from its runs.
@@ -112,17 +115,32 @@ def train(
             checkpoint = out.with_suffix(".pt")
             require_map_place(out, study, overwrite)
             study = with_kind(study, kind)
-            if study.tables.map.kind == NETWORK:
-                maps.training()
+            require_device(study.tables.map.kind, device)
             snapshots = dataset.load(study, data, study.train)
             about = {"command": f"mpm-ref rom train {name} --data {data} --out {out} "
-                                f"--kind {study.tables.map.kind} --threads {threads}"}
+                                f"--kind {study.tables.map.kind} {typed(Machine(threads, device))}"}
             with writing(), on_interrupt(lambda: resuming(checkpoint)):
-                model = fitted(study, snapshots, about, checkpoint, threads)
+                model = fitted(study, snapshots, about, checkpoint, Machine(threads, device))
             write(out, model)
         maps.forget(checkpoint)
         print(f"{out}: {kind_of(model)}, r = {model.decoder.r}, of "
               f"{counted(len(study.train), 'run')} and {len(snapshots.X)} points")
+
+
+def require_device(kind, device):
+    """Raise ValueError for a kind of map that is not made on such a device, and where there is
+    none, or no PyTorch.
+    """
+    if kind == NETWORK:
+        maps.training("rom.learn.device").device_of(device)
+    elif device != DEVICES[0]:
+        raise ValueError(f"--device {device}: {kind} are made on the processor; leave it out")
+
+
+def typed(machine):
+    """The options of a `Machine` as they are typed."""
+    device = "" if machine.device == DEVICES[0] else f" --device {machine.device}"
+    return f"--threads {machine.threads}{device}"
 
 
 def resuming(checkpoint):
@@ -132,7 +150,7 @@ def resuming(checkpoint):
     return "before there was a checkpoint; the same command again begins anew"
 
 
-def fitted(study, snapshots, about, checkpoint, threads):
+def fitted(study, snapshots, about, checkpoint, machine):
     """`Model` of a study's kind, with a bar of epochs."""
     if study.tables.map.kind != NETWORK:
         with one_thread():
@@ -141,7 +159,7 @@ def fitted(study, snapshots, about, checkpoint, threads):
         def show(history):
             bar.update(len(history) - bar.n)
             bar.set_postfix_str(f"loss {history[-1][0]:.2e}")
-        return maps.learned(study, snapshots, about, checkpoint, show, threads)
+        return maps.learned(study, snapshots, about, checkpoint, show, machine)
 
 
 def make_folder(folder):

@@ -45,25 +45,25 @@ def computed(study, snapshots, about):
     return measured(Model(map, xhat, np.zeros(how.r), about | identity(study)), snapshots)
 
 
-def learned(study, snapshots, about, checkpoint, on_epoch, threads):
-    """`Model` of a network trained on `Snapshots`, or of NSF's on `Histories`; checkpoint and
-    on_epoch as for `rom.learn.fit.train`, the one a folder for NSF. Raises ValueError without
-    PyTorch, and for a checkpoint of another training.
+def learned(study, snapshots, about, checkpoint, on_epoch, machine):
+    """`Model` of a network trained on `Snapshots`, or of NSF's on `Histories`, on a
+    `learning.Machine`; checkpoint and on_epoch as for `rom.learn.fit.train`, the one a folder for
+    NSF. Raises ValueError without PyTorch, and for a checkpoint of another training.
     """
     if study.tables.model == NSF:
-        return inferred(study, snapshots, about, checkpoint, on_epoch, threads)
+        return inferred(study, snapshots, about, checkpoint, on_epoch, machine)
     settings = {name: getattr(study.tables.map, name) for name in ("r", *KEYS[NETWORK])}
     drive = training()
     settings["weights"] = drive.weights(settings["weights"], *larger(study.base))
-    done = drive.fitted(settings, snapshots, checkpoint, on_epoch, threads)
-    return measured(of_trained(done, snapshots.X, about | identity(study) | {
-        "threads": threads, "torch": drive.version()}), snapshots)
+    done = drive.fitted(settings, snapshots, checkpoint, on_epoch, machine)
+    return measured(of_trained(done, snapshots.X, about | identity(study) | machine._asdict() | {
+        "torch": drive.version()}), snapshots)
 
 
-def inferred(study, histories, about, folder, on_epoch, threads):
+def inferred(study, histories, about, folder, on_epoch, machine):
     """`Model` of NSF's three networks trained on `Histories`, as `learned` has it."""
-    how = about | identity(study) | {"threads": threads, "torch": training().version()}
-    fitted = partial(training("rom.learn.drive_fields").fitted, threads=threads)
+    how = about | identity(study) | machine._asdict() | {"torch": training().version()}
+    fitted = partial(training("rom.learn.drive_fields").fitted, machine=machine)
     model = networks.trained(fitted, study.tables.map, histories, folder, on_epoch)
     return measured(model._replace(about=how | model.about), histories, nsf.misfit)
 

@@ -32,7 +32,7 @@ class Networks(NamedTuple):
 
 def trained(fitted, map, histories, folder, on_epoch):
     """`Model` of networks trained by `fitted`, a function as `rom.learn.drive_fields` has it
-    without threads, with the settings of a `tables.Fields` on `Histories`.
+    without machine, with the settings of a `tables.Fields` on `Histories`.
 
     folder: for checkpoints of the stages, made where it is not; on_epoch(history) is called after
     each epoch of any, with as many entries as epochs so far.

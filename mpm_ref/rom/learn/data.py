@@ -24,10 +24,10 @@ class Data(NamedTuple):
         return (self.u - self.units.mean) / self.units.std
 
 
-def data_of(snapshots, units, dtype=torch.float32):
-    """`Data` of `Snapshots`."""
+def data_of(snapshots, units, dtype=torch.float32, device="cpu"):
+    """`Data` of `Snapshots`, on a device but for `next`: numbers are chosen on the processor."""
     def tensor(a):
-        return torch.as_tensor(a, dtype=dtype).contiguous()
+        return torch.as_tensor(a, dtype=dtype, device=device).contiguous()
 
     def flat(a):
         return None if a is None else tensor(a.reshape(runs * levels, *a.shape[2:]))
@@ -58,5 +58,6 @@ def batch_of(data, at, points, latents):
     after = data.next[at]
     xhat = latents(torch.cat([at, after]))
     now, later = xhat[:len(at)], xhat[len(at):]
-    v = (data.v[after] * (after != at)[:, None, None])[:, points].flatten(0, 1)
+    goes_on = (after != at).to(data.v.device)
+    v = (data.v[after] * goes_on[:, None, None])[:, points].flatten(0, 1)
     return Batch(X, rows(data.u), rows(data.F), v, each(now), each((later - now) / data.dt))

@@ -2,16 +2,20 @@
 
 import torch
 
+from ...learning import Machine
+from .device import device_of
 from .fit import Training, train
 from .loss import CODE, READINGS, scaled
 
+MACHINE = Machine()
 
-def fitted(settings, snapshots, checkpoint, on_epoch, threads=1):
-    """`Trained` by {name of a field of `Training`: value} on so many threads; checkpoint and
-    on_epoch as for `train`.
+
+def fitted(settings, snapshots, checkpoint, on_epoch, machine=MACHINE):
+    """`Trained` by {name of a field of `Training`: value} on a `Machine`; checkpoint and on_epoch
+    as for `train`. Raises ValueError for a device that is not there.
     """
-    torch.set_num_threads(threads)
-    return train(Training(**settings), snapshots, checkpoint, on_epoch)
+    torch.set_num_threads(machine.threads)
+    return train(Training(**settings), snapshots, checkpoint, on_epoch, device_of(machine.device))
 
 
 def weights(name, length, time):

@@ -5,14 +5,17 @@ from dataclasses import replace
 import torch
 
 from . import stages
+from .device import device_of
+from .drive import MACHINE
 
 
-def fitted(settings, histories, folder, on_epoch, threads=1):
-    """`Stages` by {name: value} as `plan` takes them, on so many threads; folder and on_epoch as
-    for `stages.train`.
+def fitted(settings, histories, folder, on_epoch, machine=MACHINE):
+    """`Stages` by {name: value} as `plan` takes them, on a `Machine`; folder and on_epoch as for
+    `stages.train`. Raises ValueError for a device that is not there.
     """
-    torch.set_num_threads(threads)
-    return stages.train(plan(settings, histories.X.shape[1]), histories, folder, on_epoch)
+    torch.set_num_threads(machine.threads)
+    return stages.train(plan(settings, histories.X.shape[1]), histories, folder, on_epoch,
+                        device_of(machine.device))
 
 
 def plan(settings, dim):

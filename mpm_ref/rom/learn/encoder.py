@@ -61,7 +61,8 @@ class Given(nn.Module):
     def __init__(self, xhat, modes=None):
         super().__init__()
         self.register_buffer("table", torch.as_tensor(xhat, dtype=torch.float32))
-        self.modes = None if modes is None else torch.as_tensor(modes, dtype=torch.float32)
+        self.register_buffer("modes", None if modes is None else torch.as_tensor(
+            modes, dtype=torch.float32), persistent=False)
 
     def forward(self, index):
         """Latent coordinates (s, r) of snapshots by number."""

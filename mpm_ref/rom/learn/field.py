@@ -68,15 +68,15 @@ class Fitted(NamedTuple):
 class Session(session.Session):
     """A field under training."""
 
-    def __init__(self, training, observed):
+    def __init__(self, training, observed, device="cpu"):
         runs, levels, n, k = observed.values.shape
-        super().__init__(training, sha256(observed.dt, observed[:4]), runs * levels, n)
+        super().__init__(training, sha256(observed.dt, observed[:4]), runs * levels, n, device)
         mu = observed.mu[:, :observed.mu.shape[1] if training.follows else 0]
         self.units = field_units(observed.X, observed.values, mu)
-        self.X = single((observed.X - self.units.low) / self.units.span)
+        self.X = self.single((observed.X - self.units.low) / self.units.span)
         scaled = np.repeat((mu - self.units.mu_mean) / self.units.mu_std, levels, axis=0)
         xhat = observed.xhat.reshape(runs * levels, -1)
-        self.states, self.r = single(np.hstack([xhat, scaled])), xhat.shape[1]
+        self.states, self.r = self.single(np.hstack([xhat, scaled])), xhat.shape[1]
         self.values = observed.values.reshape(runs * levels, n, k)
         d, inputs = observed.X.shape[1], self.states.shape[1]
         self.f = Perceptron(d, inputs, training.hidden, k, training.octaves)
@@ -94,7 +94,11 @@ class Session(session.Session):
     def standardised(self, at, points):
         """Values (s m, k) of snapshots at points, in the field's units."""
         values = self.values[at.numpy()[:, None], points.numpy()]
-        return single((values - self.units.mean) / self.units.std).flatten(0, 1)
+        return self.single((values - self.units.mean) / self.units.std).flatten(0, 1)
+
+    def single(self, a):
+        """An array as a tensor of single precision."""
+        return torch.as_tensor(a, dtype=torch.float32, device=self.device)
 
     def result(self):
         """`Fitted`."""
@@ -102,16 +106,11 @@ class Session(session.Session):
         return Fitted(trained, np.array(self.history)[:, 0], self.meter.total)
 
 
-def single(a):
-    """An array as a tensor of single precision."""
-    return torch.as_tensor(a, dtype=torch.float32)
-
-
-def train(training, observed, checkpoint=None, on_epoch=None):
-    """`Fitted` to `Observed` values; checkpoint and on_epoch as for `fit.train`.
+def train(training, observed, checkpoint=None, on_epoch=None, device="cpu"):
+    """`Fitted` to `Observed` values; checkpoint, on_epoch and device as for `fit.train`.
 
     Raises ValueError where values are not finite, `session.Diverged` where a loss is not.
     """
-    done = checkpoints.finished(Session(training, observed), training.epochs,
+    done = checkpoints.finished(Session(training, observed, device), training.epochs,
                                 saving(training.epochs, SAVE), checkpoint, on_epoch)
     return done.result()

@@ -68,19 +68,19 @@ class Trained(NamedTuple):
 class Session(session.Session):
     """A decoder and its latent coordinates under training."""
 
-    def __init__(self, training, snapshots):
+    def __init__(self, training, snapshots, device="cpu"):
         require_derivatives(training, snapshots)
         s, levels, n, d = snapshots.x.shape
         known = snapshots.X, snapshots.x, snapshots.F, snapshots.v
         super().__init__(training, sha256(snapshots.dt, [a for a in known if a is not None]),
-                         s * levels, n)
+                         s * levels, n, device)
         self.units = units(snapshots)
-        self.data = data_of(snapshots, self.units)
+        self.data = data_of(snapshots, self.units, device=device)
         self.level = torch.arange(self.snapshots) % levels
         self.f = Perceptron(d, training.r, training.hidden)
         self.encoder = encoder(training, snapshots)
         self.inputs = (self.data.standardised if training.latent in ENCODERS
-                       else torch.arange(self.snapshots))
+                       else torch.arange(self.snapshots, device=device))
         self.learn(f=self.f, encoder=self.encoder)
 
     def order(self):
@@ -107,7 +107,7 @@ class Session(session.Session):
 
     def result(self, runs):
         """`Trained`, of so many runs."""
-        xhat = codes(self.encoder, self.inputs).double().numpy()
+        xhat = codes(self.encoder, self.inputs).cpu().double().numpy()
         return Trained(exported(self.f, self.units), xhat.reshape(runs, -1, self.training.r),
                        np.array(self.history), self.meter.total)
 
@@ -146,12 +146,12 @@ def encoder(training, snapshots):
                        np.tile(np.sqrt(shown), s)).xhat)
 
 
-def train(training, snapshots, checkpoint=None, on_epoch=None):
+def train(training, snapshots, checkpoint=None, on_epoch=None, device="cpu"):
     """`Trained` on the runs of `Snapshots`.
 
-    checkpoint: a file to go on from and to save to; on_epoch(history) is called after each epoch.
-    Raises `session.Diverged`.
+    checkpoint: a file to go on from and to save to; on_epoch(history) is called after each epoch;
+    device: a `torch.device`, or its name. Raises `session.Diverged`.
     """
-    done = checkpoints.finished(Session(training, snapshots), training.epochs,
+    done = checkpoints.finished(Session(training, snapshots, device), training.epochs,
                                 saving(training.epochs, SAVE), checkpoint, on_epoch)
     return done.result(len(snapshots.x))

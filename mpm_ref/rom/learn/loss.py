@@ -62,7 +62,7 @@ def terms(f, batch, units, weights):
         y = f(X, batch.xhat)
         return squared(units.std * y + units.mean - batch.u), y.new_zeros(()), y.new_zeros(())
     y, dX, dxhat = with_derivatives(f, X, batch.xhat)
-    identity = torch.eye(y.shape[1], dtype=y.dtype)
+    identity = torch.eye(y.shape[1], dtype=y.dtype, device=y.device)
     F = identity + units.std[:, None] * dX / units.span
     v = units.std * torch.einsum("nkr,nr->nk", dxhat, batch.vhat)
     return squared(units.std * y + units.mean - batch.u), squared(F - batch.F), squared(v - batch.v)

@@ -51,8 +51,8 @@ def with_derivatives(f, X, xhat):
 
 def weights_of(f):
     """The `Network` of a trained perceptron."""
-    return network([(layer.weight.detach().double().numpy().T, layer.bias.detach().double().numpy())
-                    for layer in f.layers])
+    return network([(layer.weight.detach().cpu().double().numpy().T,
+                     layer.bias.detach().cpu().double().numpy()) for layer in f.layers])
 
 
 def exported(f, units):

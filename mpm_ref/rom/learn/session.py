@@ -31,21 +31,23 @@ class Session:
     """Networks, optimiser and random numbers of a training under way.
 
     `training` has the fields schedule, epochs, batch, points and seed; `of` is a digest of what is
-    trained on, so many snapshots of so many points. A subclass says what it learns (`learn`) and
-    what the error is of (`error`).
+    trained on, so many snapshots of so many points; networks and data are on `device`, random
+    numbers and what they choose are not. A subclass says what it learns (`learn`) and what the
+    error is of (`error`).
     """
 
-    def __init__(self, training, of, snapshots, points):
+    def __init__(self, training, of, snapshots, points, device):
         self.meter = Meter()
         torch.manual_seed(training.seed)
         self.training, self.of = training, of
         self.snapshots, self.points = snapshots, points
+        self.device = device
         self.random = torch.Generator().manual_seed(training.seed)
         self.history = []
 
     def learn(self, **networks):
         """Have these networks' weights as unknowns."""
-        self.networks = networks
+        self.networks = {name: net.to(self.device) for name, net in networks.items()}
         self.optimiser = torch.optim.Adam(
             [own for net in networks.values() for own in net.parameters()])
 
@@ -95,7 +97,7 @@ class Session:
         to `training.beside`.
         """
         far = self.training.beside * torch.rand(snapshots, 1, generator=self.random)
-        return far * torch.randn(snapshots, r, generator=self.random)
+        return (far * torch.randn(snapshots, r, generator=self.random)).to(self.device)
 
     def save(self, path):
         """Checkpoint, whole or not at all."""
@@ -110,7 +112,8 @@ class Session:
         """Go on from a checkpoint. Raises ValueError where it is damaged, or of another training
         or other data.
         """
-        kept = torch.load(io.BytesIO(checkpoints.read(path)), weights_only=True)
+        kept = torch.load(io.BytesIO(checkpoints.read(path)), map_location="cpu",
+                          weights_only=True)
         checkpoints.require_same(path, kept["training"], self.named)
         for name, net in self.networks.items():
             net.load_state_dict(kept[name])

@@ -60,16 +60,16 @@ def printed(dim, r, betas, follows=False):
                 FieldTraining(widths[1], follows, epochs), FieldTraining(widths[2], epochs=epochs))
 
 
-def train(plan, histories, folder=None, on_epoch=None):
+def train(plan, histories, folder=None, on_epoch=None, device="cpu"):
     """`Stages` of a `Plan` on `Histories`.
 
     folder: where each stage goes on from its checkpoint and saves it, a stage that is done too;
-    on_epoch(stage, history) is called after each epoch. Raises ValueError where data are not
-    finite, `session.Diverged` where a loss is not.
+    on_epoch(stage, history) is called after each epoch; device as for `fit.train`. Raises
+    ValueError where data are not finite, `session.Diverged` where a loss is not.
     """
     def asked(name):
         return (None if folder is None else Path(folder) / f"{name}.pt",
-                None if on_epoch is None else partial(on_epoch, name))
+                None if on_epoch is None else partial(on_epoch, name), device)
 
     g = fit.train(plan.g, positions(histories), *asked("g"))
     known = Observed(histories.X, g.xhat, histories.mu, histories.tau, histories.dt)
