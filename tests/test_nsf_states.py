@@ -87,6 +87,18 @@ def test_a_row_for_each_way_and_a_column_for_each_time(results):
     assert len(_reduced.stresses(results, ID).axes) == 7        # with a colour bar
 
 
+def test_points_that_fly_away_are_left_out(rng):
+    """A run may lose points; the box of the full-order runs and ROOM of its longest side stay."""
+    x = rng.uniform(size=(30, 3)) * (1.0, 0.2, 0.2)
+    x[:2] = [[0.0, 0.0, 0.0], [1.0, 0.2, 0.2]]
+    ends = _reduced.room(x)
+    assert ends == pytest.approx(np.array([[-0.4, -0.4, -0.4], [1.4, 0.6, 0.6]]))
+    gone = np.concatenate([x, [[1.39, 0.0, 0.0], [1.41, 0.0, 0.0], [0.0, -5.0, 0.0]]])
+    solid, _ = _reduced.drawn(gone, "#ffffff", 0.1, ends)
+    assert len(solid.x) == 31
+    assert len(_reduced.drawn(x + 10.0, "#ffffff", 0.1, ends)[0].x) == 0
+
+
 @pytest.mark.parametrize(("number", "values", "also", "sides"), [
     ("01", 3, (), ["{0}: full order", "{0}: reduced", "{1}: full order", "{1}: reduced",
                    "{2}: full order", "{2}: reduced"]),
