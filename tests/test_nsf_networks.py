@@ -140,9 +140,10 @@ def test_the_printed_networks_of_jelly_are_those_of_table_1(folder, monkeypatch)
 class Ready(tested.Tested):
     """`Tested` with known errors, of each draw others."""
 
-    def errors(self, value, count, draw, *_):
-        """Errors that tell their draw."""
-        return tested.Found(Errors(0.01 * (draw + 1), 0.02, 0.03), 0.2, float(count), count, np.nan)
+    def errors(self, value, count, draw, faster, weighed):
+        """Errors that tell their draw, and whether samples have weights."""
+        error = (0.001 if weighed else 0.01) * (draw + 1)
+        return tested.Found(Errors(error, 0.02, 0.03), 0.2, float(count), count, np.nan)
 
     def nearest(self, value):
         """Of the nearest states."""
@@ -159,17 +160,39 @@ def test_errors_are_means_in_per_cent(folder, monkeypatch):
 
     monkeypatch.setattr(runs, "tested_on", ready)
     found = recorded(folder)
-    assert found["jelly"].value == pytest.approx(5.5)           # mean of 1 .. 10 %
+    assert found["jelly"].value == pytest.approx(2.0)           # mean of 1, 2, 3 %
     assert found["jelly"].note == (
-        "20 samples; mean of 10, the largest 10 %; trained networks; from the corner of the unit "
+        "20 samples; mean of 3, the largest 3 %; trained networks; from the corner of the unit "
         "box that scenes stand in; from the centroid 2 %, of the displacement 3 %")
+    assert found["jelly.cubature"].value == pytest.approx(0.2)
     assert found["jelly.all"].value == pytest.approx(1.0)
     assert found["jelly.nearest"].value == pytest.approx(0.1)
-    assert found["jelly.stress"].value == pytest.approx(20.0)
-    assert "2 runs and 1 tests, dx and dt 4 times as long; r = 3, widths 4, 5 and 6" in (
+    for words in ("stress", "cubature.stress", "all.stress"):
+        assert found[f"jelly.{words}"].value == pytest.approx(20.0)
+    assert "2 runs and 1 tests, dx and dt 4 times as long; r = 3, widths 4, 5 and 6, seed 0" in (
         found["jelly"].scale)
     assert "untrained" not in found
     table = Results(folder / "out").table("nsf.networks", "errors")
-    assert table["draw"].tolist() == [*range(10), 0]
+    assert table["draw"].tolist() == [0, 1, 2, 0, 1, 2, 0]
     assert (table["points"] == table["samples"]).all()
     assert {*table["scene"]} == {"jelly"}
+
+
+def test_weights_of_samples_are_those_of_modes_of_the_same_runs(folder):
+    """The networks know no modes."""
+    save(folder / "jelly.npz", model())
+    one, plain = runs.tested_on(trained("jelly"), STUDY), tested.tested(STUDY)
+    scene = whole(STUDY.run(0.45))
+    asked = []
+    spied = STUDY.__class__.chosen
+    expected, = spied(STUDY, scene, 20, 1, plain.fields)
+
+    class Spy(STUDY.__class__):
+        def chosen(self, *given):
+            asked.append(spied(self, *given))
+            return asked[-1]
+
+    one._replace(study=Spy(*STUDY)).errors(0.45, 20, 1, weighed=True)
+    (found,), = asked
+    assert np.array_equal(found.points, expected.points)
+    assert found.w == pytest.approx(expected.w)

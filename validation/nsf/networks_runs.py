@@ -7,27 +7,27 @@ from itertools import pairwise
 import numpy as np
 
 from mpm_ref.reduced.errors import Errors
-from mpm_ref.reduced.whole import history
 from mpm_ref.rom import features
 from mpm_ref.rom.architecture import DEPTH
 
 from .. import targets
 from ..registry import experiment
 from ..waiting import there
-from .errors import COLUMNS, DRAWS, mean, rows_of, said, share
+from .errors import COLUMNS, mean, rows_of, said, share, weights
 from .networks import fields_of, nets, trained
-from .tested import Tested
+from .tested import tested
 
-DIM = 3
+DIM, DRAWS = 3, 3
 OUTPUTS = {"g": 3, "h": 6, "l": 9}
+WEIGHED = "samples with weights"
 TRAINED = {"fields": "trained networks", "comparator": "info"}
 
 
 @experiment("nsf.networks", title="NSF: reduced runs on trained networks",
-            profiles=("standard",), budget={"standard": 1500})
+            profiles=("standard",), budget={"standard": 2400})
 def networks(run):
-    """Errors with few samples and all particles, of the scenes whose networks are trained; weights
-    and operations of these and of the printed widths.
+    """Errors with few samples, drawn or with weights, and all particles, of the scenes whose
+    networks are trained; weights and operations of these and of the printed widths.
     """
     known = nets()
     for name, net in known.items():
@@ -46,7 +46,7 @@ def cost(run, name, net):
     id, of_ours = f"nsf.networks.{name}", {own: getattr(net, own).width for own in OUTPUTS}
     for word, widths, octaves in (("", of_ours, net.octaves),
                                   (".printed", printed(name.split("-")[0]), 0)):
-        count = sum(weights(net.study, own, width, octaves if own != "g" else 0)
+        count = sum(weights_of(net.study, own, width, octaves if own != "g" else 0)
                     for own, width in widths.items())
         note = (f"hidden layers {DEPTH} x " + ", ".join(f"{w} ({own})" for own, w in widths.items())
                 + said_of(octaves))
@@ -67,37 +67,41 @@ def said_of(octaves):
     return f", {octaves} octaves of sines and cosines of places (h, l)" if octaves else ""
 
 
-def weights(study, own, width, octaves=0):
+def weights_of(study, own, width, octaves=0):
     """Number of weights, without biases, of one network with hidden layers so wide."""
     inputs = features.count(DIM, octaves) + study.sizes.r + (own == "h" and study.follows)
     return sum(n * m for n, m in pairwise((inputs, *(width,) * DEPTH, OUTPUTS[own])))
 
 
 def tested_on(model, study):
-    """`Tested` of a study's held-out runs on trained networks; its training runs are not made."""
-    tests = {value: history(study.run(value), [value], every=study.spacing)
-             for value in study.test}
-    return Tested(study, fields_of(model, study), model.xhat, None, tests)
+    """`Tested` of a study on trained networks; modes are of the same training runs."""
+    one = tested(study)
+    return one._replace(fields=fields_of(model, study), xhat=model.xhat, modes=one.fields)
 
 
 def scale_of(net, one):
     """In words."""
     widths = f"widths {net.g.width}, {net.h.width} and {net.l.width}"
-    return f"{one.size}, {widths}{said_of(net.octaves)}"
+    return f"{one.size}, {widths}{said_of(net.octaves)}, seed {net.seed}"
 
 
 def of_scene(run, name, one, scale):
     """Record the errors of a scene's reduced runs; their rows."""
     id, few = f"nsf.networks.{name}", one.study.samples
-    drawn, every = (
-        [row for draw in run.progress(range(draws), f"{name}, {count} samples")
-         for row in rows_of(one, name, count, (draw,))]
-        for count, draws in ((few, DRAWS), (len(one.fields.X), 1)))
-    share(run, id, drawn, scale, f"{few} samples", **TRAINED)
-    share(run, f"{id}.all", every, scale, "all particles are samples", **TRAINED)
+    drawn, weighed, every = (
+        [row for draw in run.progress(range(draws), f"{name}, {words}")
+         for row in rows_of(one, name, count, (draw,), weighed=words == WEIGHED)]
+        for words, count, draws in (("samples", few, DRAWS), (WEIGHED, few, DRAWS),
+                                    ("all particles", len(one.fields.X), 1)))
+    for own, rows, note in (
+            ("", drawn, f"{few} samples"),
+            (".cubature", weighed, f"at most {few} samples with weights by cubature of modes of "
+             f"the same runs; {weights(weighed)}"),
+            (".all", every, "all particles are samples")):
+        share(run, f"{id}{own}", rows, scale, note, **TRAINED)
+        run.record(f"{id}{own}.stress", 100.0 * mean(rows, "stress"), unit="%", comparator="info",
+                   scale=scale, note=f"{note}; of the Kirchhoff stress, all particles and times")
     nearest = [one.nearest(value) for value in run.progress(one.study.test, f"{name}, nearest")]
     said(run, f"{id}.nearest", Errors(*np.mean(nearest, axis=0)), scale,
          "nearest states that the networks know", **TRAINED)
-    run.record(f"{id}.stress", 100.0 * mean(drawn, "stress"), unit="%", comparator="info",
-               scale=scale, note=f"{few} samples; of the Kirchhoff stress, all particles and times")
-    return drawn + every
+    return drawn + weighed + every

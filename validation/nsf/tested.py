@@ -35,6 +35,7 @@ class Tested(NamedTuple):
     runs: object            # `Histories` of training
     tests: dict             # {value: `Histories` of a run}
     map_alone: bool = False     # whether stress is that of the map's gradient, without affine field
+    modes: object = None        # `Spanned` by which samples get weights; None: the fields
 
     @property
     def scale(self):
@@ -67,7 +68,7 @@ class Tested(NamedTuple):
         where it breaks down.
         """
         fields, test, one = self.of(value), self.tests[value], whole(self.study.run(value))
-        sets = self.study.chosen(one, count, draw, self.fields if weighed else None)
+        sets = self.study.chosen(one, count, draw, (self.modes or self.fields) if weighed else None)
         points = []
 
         def states():
