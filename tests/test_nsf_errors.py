@@ -65,6 +65,13 @@ def test_reduced_runs_beat_the_nearest_run_and_not_the_nearest_states(cube):
     assert every.points == len(cube.runs.X)
 
 
+def test_the_next_run_is_the_one_of_the_nearest_value(cube):
+    """Runs are of 0.3, 0.4 and 0.5: that of 0.4 is not off itself."""
+    itself = cube.runs._replace(x=cube.runs.x[1:2])
+    for value in (0.36, 0.44):
+        assert cube._replace(tests={value: itself}).next_run(value).origin == 0.0
+
+
 def test_the_affine_field_is_worth_its_modes(cube):
     without = tested.refitted(cube, cube.study.sizes._replace(C=0), follows=False)
     some = [one.errors(TEST, 50).errors.origin for one in (without, cube)]

@@ -88,6 +88,23 @@ def test_a_full_step_and_its_update_of_bodies(one):
     assert speed.whole_steps(STUDY, 10) == (FULL, BODIES * DEFORM)
 
 
+def test_full_steps_are_all_from_the_start(monkeypatch):
+    """Not from where the last repeat ended."""
+    begun = []
+
+    def run(problem):
+        begun.append([body.particles.x.copy() for body in problem.bodies])
+        yield from simulate(problem)
+
+    monkeypatch.setattr(speed, "simulate", run)
+    speed.whole_steps(STUDY, 5)
+    rest = [body.particles.x for body in whole(STUDY.run(STUDY.test[0])).problem.bodies]
+    assert len(begun) == 1 + speed.REPEATS
+    for bodies in begun:
+        for x, X in zip(bodies, rest, strict=True):
+            assert np.array_equal(x, X)
+
+
 @pytest.fixture
 def recorded(one, clock, tmp_path, monkeypatch):
     """{id: `Record`} and the table of the experiment on the small study, with all particles and

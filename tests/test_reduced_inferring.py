@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from mpm_ref import scene
-from mpm_ref.reduced.inferring import Plan, drawn, infer, weighed
+from mpm_ref.reduced.inferring import (
+    Chosen,
+    Plan,
+    begin,
+    drawn,
+    infer,
+    require_sound,
+    weighed,
+)
 from mpm_ref.reduced.vary import varied
 from mpm_ref.reduced.whole import history, whole
 from mpm_ref.rom.cubature import cubature
@@ -125,6 +133,28 @@ def test_samples_switch_in_time():
     assert all(a < b for a, b in pairwise(early.points))
 
 
+def test_a_run_takes_the_samples_of_its_time(disks, runs):
+    """From half-way on others, and fewer; the states go on from those before."""
+    fields, xhat = spanned(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
+    one, n = whole(disks(2.0)), len(runs.X)
+    early, late = drawn(n, 12, 0), drawn(n, 9, 1, since=0.015)
+    both, first = ([(at.xhat, report) for _, at, report in infer(one, fields, plan, xhat[1, 0])]
+                   for plan in (Plan((early, late)), Plan((early,))))
+    assert [report.samples for _, report in both[1:]] == 15 * [12] + 15 * [9]
+    assert np.array_equal(both[15][0], first[15][0])
+    assert not np.array_equal(both[16][0], first[16][0])
+
+
+def test_the_start_is_searched(disks, runs):
+    """From latent coordinates a tenth of a radius off."""
+    fields, xhat = spanned(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
+    one, near = whole(disks(2.0)), xhat[1, 0] + 0.1 * np.abs(xhat).max()
+    everything = np.arange(len(one.X))
+    off = [np.abs(fields.place(everything, at) - one.X).max()
+           for at in (near, begin(one, fields, near).xhat)]
+    assert off[1] < 1e-3 * off[0]
+
+
 def test_weighed_samples_are_better_than_drawn_ones(disks, runs):
     """With so few, motion that the modes do not resolve disturbs those that are drawn."""
     v = 1.8
@@ -147,6 +177,23 @@ def test_weighed_samples_are_better_than_drawn_ones(disks, runs):
 def test_more_samples_than_points_are_refused():
     with pytest.raises(ValueError, match=r"41 samples of 40 points: expected 1 \.\. 40"):
         drawn(40, 41, 0)
+
+
+@pytest.mark.parametrize(("points", "w", "words"), [
+    ([], None, "samples"), ([3, 2], None, "sorted, each once"), ([2, 2], None, "each once"),
+    ([-1, 2], None, r"some of 0 \.\. 39"), ([2, 40], None, r"some of 0 \.\. 39"),
+    ([2, 3], [0.0, 0.0], "not all 0"), ([2, 3], [1.0, -1.0], "none negative"),
+    ([2, 3], [1.0, np.nan], "finite numbers")])
+def test_samples_and_weights_that_mean_nothing_are_refused(points, w, words):
+    w = None if w is None else np.array(w)
+    with pytest.raises(ValueError, match=words):
+        require_sound((Chosen(0.0, np.array(points, dtype=int), w),), 40)
+
+
+def test_samples_are_there_from_the_start_on(disks, runs):
+    fields, xhat = spanned(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
+    with pytest.raises(ValueError, match="samples from a later time on: expected some"):
+        list(infer(whole(disks(2.0)), fields, Plan((drawn(40, 12, 0, 0.01),)), xhat[1, 0]))
 
 
 @pytest.mark.parametrize(("changes", "what"), [

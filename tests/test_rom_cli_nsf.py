@@ -119,6 +119,18 @@ def test_the_stress_is_told_the_parameters_where_the_study_says_so(made, tmp_pat
     assert maps.read(out).decoder.mu.shape == (0,)
 
 
+def test_fields_of_a_single_run_ignore_its_parameter(tmp_path):
+    """They are told a parameter that does not vary, and are asked in a run with another."""
+    study = write(tmp_path, ("from = 1.6\nto = 2.4\ncount = 4", "values = [1.7, 2.4]"))
+    data, out = tmp_path / "data", tmp_path / "fields.npz"
+    for command in (("generate", study, "--out", data),
+                    ("train", study, "--data", data, "--out", out)):
+        assert mpm_ref("rom", *command).exit_code == 0
+    done = mpm_ref("rom", "evaluate", study, "--map", out, "--data", data, "--out",
+                   tmp_path / "e.png", "--json")
+    assert json.loads(done.stdout)["stress"]["all"]["nearest"] < 2.0
+
+
 # run
 
 @pytest.mark.parametrize(("way", "plan"), [
@@ -237,6 +249,7 @@ def test_longer_steps_are_compared_where_they_meet_the_states_kept(made, tmp_pat
     error = json.loads(evaluated(1.5).stdout)["all"]["reduced"]["origin"]
     assert 0.0 < error < 0.01
     assert_told(evaluated(1.01), 2, "faster = 1.01: expected steps of which some end at a state")
+    assert_told(evaluated(20.0), 2, "faster = 20: expected at most 16, the steps of the scene")
 
 
 def test_a_run_that_breaks_down_is_infinitely_off(made, pairs, tmp_path):

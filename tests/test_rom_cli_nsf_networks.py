@@ -1,6 +1,7 @@
 """Stress fields as networks by `mpm-ref rom train`, and runs on them: what needs PyTorch."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -65,6 +66,15 @@ def test_a_plan_is_the_printed_one_with_the_studys_numbers(study):
     assert [own.octaves for own in (plan.h, plan.l)] == [1, 1]
     assert {(own.batch, own.points, own.seed, own.schedule) for own in plan} == {
         (4, 24, 1, "steps")}
+
+
+def test_latent_coordinates_of_modes_are_in_one_unit_and_can_be_trained(made, study):
+    """Positions alone are known: no norm of the loss with gradients."""
+    plan = drive_fields.plan({**study.tables.map.settings, "latent": "modes"}, 2)
+    assert plan.g.latent == "directions"
+    data = histories(study, made / "data", study.train)
+    found = stages.fit.train(replace(plan.g, epochs=1), stages.positions(data))
+    assert found.xhat.shape == (*data.x.shape[:2], 3)
 
 
 def test_a_run_is_one_on_the_networks(made, study, tmp_path):

@@ -36,6 +36,13 @@ def reduced(made, out, *options, study="pairs.toml"):
     (("points = 20", 'inversion = "newton"'), "inversion = 'newton': expected one of"),
     (("points = 20", 'samples = "kept"'), "run.samples: unknown key"),
     (("points = 20", "faster = 0.0"), "faster"),
+    (("points = 20", "faster = 1e-9"), "run.faster = 1e-09: expected a number >= 0.01"),
+    (('kind = "modes"\nr = 3\nmodes = 5\ntau = 8\nC = 8\nsmoothing = 1e-6',
+      'kind = "network"\nr = 3\noctaves = 100000'), "octaves"),
+    (('kind = "modes"\nr = 3\nmodes = 5\ntau = 8\nC = 8\nsmoothing = 1e-6',
+      'kind = "network"\nr = 3\nbeta = [100000, 8, 8]'), "beta"),
+    (("[map]", "[set]\nevery = 0\n[map]"),
+     "every = 0: expected 1 or more steps from one kept state"),
     (("[map]", "[set]\nevery = 3\n[map]"), "every = 3: expected a divisor of steps = 16"),
     (("[map]", "[set]\ninterval = 0.01\n[map]"), "interval = 0.01: expected `every`"),
     (('key = "body.hard.velocity.linear[0]"', 'key = "body.hard.density"'),
@@ -63,6 +70,7 @@ def test_scenes_that_reduced_runs_do_not_know_are_refused_before_any_run(
     (("points = 20", "points = 1"), "1 samples for 3 latent coordinates: expected at least 2"),
     (("points = 20", "points = 999"), "999 samples of "),
     (("points = 20", "faster = 99.0"), "faster = 99: expected at most 16"),
+    (("points = 20", "points = 20\nfaster = 20.0"), "faster = 20: expected at most 16"),
     (("to = 2.4", "to = 2.5"), "is a map of another study"),
 ])
 def test_what_a_run_cannot_be_made_with_is_refused(made, tmp_path, edit, words):

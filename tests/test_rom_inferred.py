@@ -34,11 +34,19 @@ def body(n, d, seed=0, length=1.0):
     return X, Matter(800.0 * V0, V0, v)
 
 
-def full_run(X, matter, degree, dt=DT, steps=STEPS, law=LAW):
+class Wind:
+    """Nodes that are blown more strongly as time goes on."""
+
+    def apply(self, grid, t, dt):
+        """At the end t [s] of a step of length dt [s]."""
+        grid.v[..., 0] += 1e3 * t * dt
+
+
+def full_run(X, matter, degree, dt=DT, steps=STEPS, law=LAW, conditions=None):
     """States x, v, tau, C of the full model with APIC, the start first."""
     q = particles_at(X, matter.v, matter.m, matter.V0, transfer="apic")
     whole = Body("full", q, law, NoFlow(), np.arange(len(X)))
-    stepper = Stepper(Scheme(degree, "apic"), DX, X.shape[1], GRAVITY[:X.shape[1]])
+    stepper = Stepper(Scheme(degree, "apic"), DX, X.shape[1], GRAVITY[:X.shape[1]], conditions)
     stepper.start((whole,))
     states = [tuple(a.copy() for a in (q.x, q.v, q.tau, q.C))]
     for k in range(steps):
@@ -116,6 +124,18 @@ def test_is_the_full_step_where_every_position_is_a_coordinate(d, degree):
         assert (report.samples, report.points, report.rank) == (30, 30, 30 * d)
         assert report.residual < 1e-12
         assert report.converged
+
+
+def test_boundaries_are_those_of_the_full_step_in_time(d):
+    X, matter = body(30, d)
+    still, blown = (full_run(X, matter, 2, conditions=wind)[-1][0] for wind in (None, Wind()))
+    assert np.abs(blown - still).max() > 1e-4
+    stepper = model(Remembered(full_run(X, matter, 2, conditions=Wind())), matter,
+                    conditions=Wind())
+    at = Position(X.ravel())
+    for k in range(STEPS):
+        at, _ = stepper.step(at, np.arange(30), k * DT, DT)
+    assert np.abs(at.xhat.reshape(30, d) - blown).max() < 1e-12
 
 
 def test_samples_move_as_when_all_points_are_stepped(d, degree, rng):

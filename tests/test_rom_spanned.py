@@ -191,10 +191,45 @@ def test_values_that_contradict_each_other_are_met_in_the_middle(rng):
     assert through(y, f, np.ones(2)).value(y[0]) == pytest.approx(f[0] + 0.5, abs=1e-4)
 
 
-def test_a_coordinate_that_does_not_vary_says_nothing(rng):
-    y = np.hstack([rng.normal(size=(12, 1)), np.zeros((12, 1))])
-    found = through(y, 2.0 * y[:, :1], np.ones(2))
-    assert found.value(np.array([0.5, 0.0])) == pytest.approx(1.0, abs=1e-6)
+def test_parameters_weigh_as_told(runs):
+    """Spread for spread: twice the weight is half the unit."""
+    for weight in (1.0, 2.0):
+        fields, _ = spanned(runs, Sizes(r=2, modes=3, tau=2, C=1, weight=weight), 0.3)
+        assert fields.tau.coefficients.unit[2:] == pytest.approx(runs.mu.std(axis=0) / weight)
+
+
+@pytest.mark.parametrize("constant", [0.0, 0.3, 0.45, 1.7])
+def test_a_coordinate_that_does_not_vary_says_nothing(rng, constant):
+    """Such as a parameter of one run, wherever it is asked later."""
+    y = np.hstack([rng.normal(size=(12, 1)), np.full((12, 1), constant)])
+    found = through(y, 2.0 * y[:, :1] + 3.0, np.ones(2))
+    for other in (constant, constant + 0.1, 5.0):
+        at = np.array([0.5, other])
+        assert found.value(at) == pytest.approx(4.0, abs=1e-6)
+        assert found.slope(at) == pytest.approx(np.array([[2.0, 0.0]]), abs=1e-5)
+
+
+def test_coordinates_that_say_the_same_share_it(rng):
+    """Two parameters of which one follows from the other."""
+    for k in range(20):
+        slope, start = 0.3 + 0.17 * k, 0.1 * k
+        y = rng.normal(size=(12, 1)) @ [[1.0, slope]] + [0.0, start]
+        found = through(y, y[:, :1], np.ones(2))
+        assert found.value(np.array([0.5, 0.5 * slope + start])) == pytest.approx(0.5, abs=1e-6)
+        assert np.abs(found.tail).max() < 10.0
+
+
+def test_smoothing_meets_values_less_and_bends_less(rng):
+    y = np.linspace(-1.0, 1.0, 21)[:, None]
+    values = y + 0.1 * rng.normal(size=y.shape)
+    off, bends = zip(*((np.abs([found.value(one) - b for one, b in zip(y, values)]).max(),
+                        np.abs(found.w).max())
+                       for found in (through(y, values, np.ones(1), s) for s in (0.0, 1e-2, 1e3))))
+    assert off[0] < 1e-9 < off[1] < off[2]
+    assert bends[0] > bends[1] > bends[2]
+    line = np.polynomial.Polynomial.fit(y[:, 0], values[:, 0], 1)
+    smooth = through(y, values, np.ones(1), 1e9)
+    assert smooth.value(np.array([0.4])) == pytest.approx(line(0.4), abs=1e-6)
 
 
 def test_what_radial_functions_refuse():

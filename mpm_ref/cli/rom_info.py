@@ -87,7 +87,7 @@ def of_map(path):
         "points": fit.get("points", points_of(map)), "runs": runs, "steps": levels - 1,
         "parameters": ranges(names, about["mu"]) if names else None,
         "errors": fit.get("errors"), "last_loss": loss[-1] if loss else None, "about": about,
-        **nsf.of_fields(about, levels),
+        **nsf.of_fields(map, levels),
     }
 
 

@@ -1,6 +1,10 @@
 """`mpm-ref info` of a study and of fields with model = "nsf": what differs from LDM's."""
 
+import numpy as np
+
+from ..reduced.nsf.networks import Networks
 from ..reduced.tables import NETWORK, NSF
+from ..rom.spanned import Spanned
 
 OF = {"modes": "the displacement", "tau": "the stress", "C": "the affine field"}
 
@@ -12,11 +16,12 @@ def of_study(study):
     return {"model": NSF, "every": study.base.every}
 
 
-def of_fields(about, levels):
-    """Further facts of fields, from what they say of their making and the states of each run, whose
-    steps they do not know; none of a map of another model.
+def of_fields(fields, levels):
+    """Further facts of fields from the states of each run, whose steps they do not know; none of a
+    map of another model.
     """
-    return {"model": NSF, "states": levels, "steps": None} if about.get("model") == NSF else {}
+    inferred = isinstance(fields, Networks | Spanned)
+    return {"model": NSF, "states": levels, "steps": None} if inferred else {}
 
 
 def kept(facts):
@@ -34,11 +39,15 @@ def learned(facts):
 
 
 def making(about):
-    """What fields say of their making, a line each."""
-    yield sizes(about["map"])
+    """What fields say of their making, a line each; trainings of experiments have no study, and
+    keep the losses of several epochs.
+    """
+    if "map" in about:
+        yield sizes(about["map"])
     if "losses" in about:
-        losses = zip(OF.values(), about["losses"].values(), strict=True)
-        yield "last losses: " + ", ".join(f"{loss:.3g} of {what}" for what, loss in losses)
+        losses = zip(OF.values(), about["losses"].values(), strict=False)
+        yield "last losses: " + ", ".join(f"{np.ravel(loss)[-1]:.3g} of {what}"
+                                          for what, loss in losses)
 
 
 def sizes(map):

@@ -59,6 +59,7 @@ def continued(known, whole, fields, plan):
     """Yield the same of a run whose first states (`Position`, `Report` or None) are known, these
     too.
     """
+    require_sound(plan.samples, len(whole.X))
     stepper, clock = model(whole, fields, plan.inversion), whole.problem.clock
     dt = plan.faster * clock.dt
     for k, (at, report) in enumerate(known):
@@ -67,6 +68,21 @@ def continued(known, whole, fields, plan):
         chosen = plan.at(k * dt)
         at, report = stepper.step(at, chosen.points, k * dt, dt, chosen.w)
         yield (k + 1) * dt, at, report
+
+
+def require_sound(sets, n):
+    """Raise ValueError unless samples are there from the start on, each a point of n once and in
+    order, with weights of which some are positive and none is negative.
+    """
+    if not sets or sets[0].since > 0.0:
+        raise ValueError("samples from a later time on: expected some from the start on")
+    for one in sets:
+        points, w = np.asarray(one.points), one.w
+        if not len(points) or points[0] < 0 or points[-1] >= n or (np.diff(points) < 1).any():
+            raise ValueError(f"samples {points}: expected some of 0 .. {n - 1}, sorted, each once")
+        if w is not None and not (np.isfinite(w).all() and (w >= 0.0).all() and w.any()):
+            raise ValueError(f"weights {w} of samples: expected finite numbers, none negative and "
+                             "not all 0")
 
 
 def drawn(among, count, seed, since=0.0):

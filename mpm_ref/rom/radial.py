@@ -8,6 +8,7 @@ chosen, and its derivative is as cheap as its value. (H. Wendland, Scattered Dat
 contradict each other: they are met up to a smoothing.
 """
 
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
@@ -41,7 +42,8 @@ class Radial(NamedTuple):
 
 
 def through(y, values, unit, smoothing=SMOOTHING):
-    """`Radial` through values (s, k) at coordinates y (s, q), measured in unit (q,).
+    """`Radial` through values (s, k) at coordinates y (s, q), measured in unit (q,). A coordinate
+    that does not vary says nothing, then and later: it is measured in an infinite unit.
 
     Raises ValueError for fewer centres than the linear part has unknowns, and where they are not
     finite.
@@ -52,19 +54,22 @@ def through(y, values, unit, smoothing=SMOOTHING):
                          f"{q + 1}")
     if not (np.isfinite(y).all() and np.isfinite(values).all()):
         raise ValueError("a snapshot's coordinates or values are not finite; generate it again")
+    unit = np.where(np.ptp(y, axis=0) > 0.0, unit, np.inf)
     centers = y / unit
     away = np.linalg.norm(centers[:, None] - centers, axis=2)
     P = np.hstack([np.ones((s, 1)), centers])
     A = np.block([[away**3 + smoothing * np.eye(s), P], [P.T, np.zeros((q + 1, q + 1))]])
     b = np.vstack([values, np.zeros((q + 1, values.shape[1]))])
     with one_thread():
-        found = solved(A, b)
-    return Radial(centers, np.asarray(unit, dtype=float), found[:s], found[s:])
+        found = solved(A, b, np.linalg.matrix_rank(P) < q + 1)
+    return Radial(centers, unit, found[:s], found[s:])
 
 
-def solved(A, b):
-    """The solution of A w = b; of least length where a coordinate does not vary."""
-    try:
-        return np.linalg.solve(A, b)
-    except np.linalg.LinAlgError:
-        return np.linalg.lstsq(A, b, rcond=None)[0]
+def solved(A, b, dependent):
+    """The solution of A w = b; of least length where coordinates depend on each other, and where
+    centres meet without smoothing.
+    """
+    if not dependent:
+        with suppress(np.linalg.LinAlgError):
+            return np.linalg.solve(A, b)
+    return np.linalg.lstsq(A, b, rcond=None)[0]

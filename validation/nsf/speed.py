@@ -91,14 +91,14 @@ def whole_steps(study, steps):
     and stress; medians.
     """
     scene = study.run(study.test[0])
-    problem = whole(with_(scene, steps=steps, every=steps, interval=None)).problem
     deque(simulate(whole(with_(scene, steps=WARM, every=WARM, interval=None)).problem), maxlen=0)
-    took = []
+    took, deform = [], []
     for _ in range(REPEATS):
+        problem = whole(with_(scene, steps=steps, every=steps, interval=None)).problem
         start = perf_counter()
         *_, last = simulate(problem)
         took.append((perf_counter() - start) / steps)
-    dt, deform = problem.clock.dt, []
+    dt = problem.clock.dt
     for _ in range(2 * REPEATS):
         start = perf_counter()
         for body in last.state.bodies:

@@ -18,7 +18,7 @@ from ..evaluate import NEAREST, REDUCED, Course, Held
 from ..inferring import ENOUGH, infer
 from ..whole import whole
 from .fields import of_run
-from .recording import plan_of
+from .recording import plan_of, require_step
 
 EVEN = 1e-6         # of a level: a state so near to one is compared with it
 
@@ -40,10 +40,14 @@ def evaluate(study, model, histories):
 
 
 def require_levels(study):
-    """Raise ValueError where no step of a reduced run ends at a state kept."""
+    """Raise ValueError where no step of a reduced run ends at a state kept but the first, and for
+    steps that are longer than the run.
+    """
     faster, base = study.tables.run.faster, study.base
+    require_step(faster, base.steps)
     steps = np.arange(1, round(base.steps / faster) + 1)
-    if not any(level_of(step * faster / base.every) for step in steps):
+    levels = [level_of(step * faster / base.every) for step in steps]
+    if not any(level and level <= base.steps // base.every for level in levels):
         raise ValueError(f"faster = {faster:g}: expected steps of which some end at a state kept, "
                          f"one every {base.every} steps of the scene; take a simple fraction such "
                          "as 1.5 or 2")

@@ -11,7 +11,9 @@ def every(base, changes):
     if own["interval"] is not None:
         raise SceneError(f"interval = {own['interval']}: expected `every`, steps from one kept "
                          "state to the next, in the scene or in [set]")
-    every, steps = own["every"] or 1, own["steps"]
+    every, steps = 1 if own["every"] is None else own["every"], own["steps"]
+    if every == 0:
+        raise SceneError("every = 0: expected 1 or more steps from one kept state to the next")
     if isinstance(every, int) and isinstance(steps, int) and steps % every:
         raise SceneError(f"every = {every}: expected a divisor of steps = {steps}, so that the "
                          "states kept are as far apart as each other; change one of the two")

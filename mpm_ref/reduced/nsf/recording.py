@@ -89,15 +89,19 @@ def plan_of(run, n, fields):
     return Plan((drawn(n, count, run.seed),), run.faster, run.inversion)
 
 
+def require_step(faster, steps):
+    """Raise ValueError for steps that are longer than a run of so many steps of the scene."""
+    if faster > steps:
+        raise ValueError(f"faster = {faster:g}: expected at most {steps}, the steps of the scene")
+
+
 def recording(whole, model, mu, run, facts):
     """`Recording` of a reduced run with parameters mu on the fields of a `Model`. Raises ValueError
-    as `plan_of` does, and for steps that are longer than the run.
+    as `plan_of` and `require_step` do.
     """
     fields, clock = of_run(model.decoder, whole, mu), whole.problem.clock
     plan = plan_of(run, len(whole.X), fields)
-    if not plan.steps(clock):
-        raise ValueError(f"faster = {run.faster:g}: expected at most {clock.steps}, the steps of "
-                         "the scene")
+    require_step(run.faster, clock.steps)
     own = replace(clock, dt=run.faster * clock.dt, steps=plan.steps(clock), every=1)
     return Recording(whole, fields, model.rest, trained(fields, model.xhat), run,
                      replace(whole.problem, clock=own), facts)

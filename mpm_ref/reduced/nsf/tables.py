@@ -20,7 +20,10 @@ KEYS = {                            # of fields of each kind, beside `kind` and 
 }
 LATENTS, SCHEDULES = ("encoder-nsf", "free", MODES), ("steps", "cosine")    # see `rom.learn`
 SIZES = Sizes._field_defaults
-Factors = Annotated[tuple[Count, ...], Meta(min_length=3, max_length=3)]
+Width = Annotated[int, Meta(ge=1, le=1000)]
+Factors = Annotated[tuple[Width, ...], Meta(min_length=3, max_length=3)]
+Octaves = Annotated[int, Meta(ge=0, le=16)]
+Step = Annotated[float, Meta(ge=0.01)]
 
 
 class Fields(Kinds):
@@ -36,7 +39,7 @@ class Fields(Kinds):
     weight: Positive = SIZES["weight"]          # of these beside latent coordinates
     smoothing: NotNegative = SIZES["smoothing"]
     beta: Factors = (16, 16, 16)                # widths of hidden layers over numbers of values
-    octaves: Natural = 0                        # of sines and cosines of places (`rom.features`)
+    octaves: Octaves = 0                        # of sines and cosines of places (`rom.features`)
     latent: str = LATENTS[0]
     schedule: str = SCHEDULES[0]                # of learning rates
     epochs: Count = 1500                        # of the position
@@ -69,7 +72,7 @@ class Run(Table):
 
     points: Count | None = None                 # samples, drawn once; none: all points
     seed: Seed = 0                              # of that draw
-    faster: Positive = Plan(()).faster          # length of a step over that of the scene
+    faster: Step = Plan(()).faster              # length of a step over that of the scene
     inversion: str = Plan(()).inversion
 
     def __post_init__(self):

@@ -7,6 +7,7 @@ import torch
 from . import stages
 from .device import device_of
 from .drive import MACHINE
+from .fit import DIRECTIONS
 
 
 def fitted(settings, histories, folder, on_epoch, machine=MACHINE):
@@ -20,11 +21,12 @@ def fitted(settings, histories, folder, on_epoch, machine=MACHINE):
 
 def plan(settings, dim):
     """The printed `Plan` with other numbers: r, told (whether the stress is told the parameters),
-    beta, latent, epochs of the position, octaves and field_epochs of the other two; batch, points,
-    seed and schedule of all three.
+    beta, latent ("modes": in one unit of length), epochs of the position, octaves and field_epochs
+    of the other two; batch, points, seed and schedule of all three.
     """
     printed = stages.printed(dim, settings["r"], settings["beta"], settings["told"])
     how = {name: settings[name] for name in ("batch", "points", "seed", "schedule")}
-    g = replace(printed.g, epochs=settings["epochs"], latent=settings["latent"], **how)
+    latent = DIRECTIONS if settings["latent"] == "modes" else settings["latent"]
+    g = replace(printed.g, epochs=settings["epochs"], latent=latent, **how)
     how |= {"epochs": settings["field_epochs"], "octaves": settings["octaves"]}
     return stages.Plan(g, *(replace(own, **how) for own in (printed.h, printed.l)))
