@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
+from mpm_ref.reduced.inferring import infer
+from mpm_ref.reduced.nsf import watch
 from mpm_ref.reduced.whole import whole
+from mpm_ref.rom.placed import NoBody
 from validation.nsf import beyond, tested
 from validation.nsf.studies import bread
 
@@ -58,3 +61,29 @@ def test_a_box_goes_no_farther_than_the_held_ends(shift, side, end):
     assert getattr(gone, side)[0] == pytest.approx(end)
     assert gone.upper[0] - gone.lower[0] == pytest.approx(box.upper[0] - box.lower[0])
     assert gone.lower[1:] == pytest.approx(box.lower[1:])
+
+
+def test_the_farthest_state_is_that_of_the_whole_run(slice_of_bread, monkeypatch):
+    """A run with the value of training stays near it; where it breaks down, what it reached
+    counts.
+    """
+    one, value = slice_of_bread, slice_of_bread.study.train[1]
+    seen = []
+
+    def look(extent, at, report):
+        seen.append(watch.look(extent, at, report))
+        return seen[-1]
+
+    monkeypatch.setattr(beyond, "look", look)
+    far = beyond.farthest(one, value)
+    assert len(seen) == whole(one.study.run(value)).problem.clock.steps + 1
+    assert far == max(sight.beyond for sight in seen)
+
+    def breaks(*given):
+        for k, state in enumerate(infer(*given)):
+            if k == 3:
+                raise NoBody("gone")
+            yield state
+
+    monkeypatch.setattr(beyond, "infer", breaks)
+    assert beyond.farthest(one, value) == max(sight.beyond for sight in seen[:3])

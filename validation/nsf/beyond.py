@@ -2,12 +2,17 @@
 friction is past all that was trained (Figure 17).
 """
 
+from contextlib import suppress
 from functools import partial
 
 import numpy as np
 from scipy.spatial import KDTree
 
+from mpm_ref.reduced.inferring import Plan, infer
+from mpm_ref.reduced.nsf.watch import look, trained
+from mpm_ref.reduced.watch import BEYOND
 from mpm_ref.reduced.whole import history, whole
+from mpm_ref.rom.step import BREAKDOWNS
 
 from ..registry import experiment
 from ..verification.scenes import with_
@@ -64,8 +69,22 @@ def steep(run):
           comparator="info")
     run.record("nsf.fig17.stress.55", 100.0 * mean(found[55.0], "stress"), unit="%",
                scale=one.scale, comparator="info", note="of the Kirchhoff stress")
+    for value in ANGLES:
+        run.record(f"nsf.fig17.beyond.{value:g}", farthest(one, value), scale=one.scale,
+                   comparator="info", note="largest distance of a state's latent coordinates from "
+                   f"trained ones, over their largest gap; out of bounds above {BEYOND:g}")
     run.table("errors", COLUMNS, [row for rows in found.values() for row in rows])
     keep_states(run, one, ANGLES)
+
+
+def farthest(one, value):
+    """Largest `Sight.beyond` of the states of a reduced run with the study's samples."""
+    scene, extent, found = whole(one.study.run(value)), trained(one.fields, one.xhat), []
+    plan = Plan(one.study.chosen(scene, one.study.samples, 0))
+    with suppress(*BREAKDOWNS):
+        for _, at, report in infer(scene, one.of(value), plan, one.rest):
+            found.append(look(extent, at, report).beyond)
+    return max(found)
 
 
 def shifted(scene, scale, seed):
