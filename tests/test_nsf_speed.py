@@ -151,7 +151,9 @@ def test_records_are_ratios_and_shares_of_the_table(one, recorded):
         "nsf.speed.jelly.deform": 100.0 * BODIES * DEFORM / FULL,
         "nsf.speed.jelly.bytes.fields": sum(a.nbytes for a in (
             one.fields.X, one.fields.U, one.fields.tau.modes, one.fields.C.modes)),
-        "nsf.speed.jelly.bytes.particles": particle_bytes(STUDY)})
+        "nsf.speed.jelly.bytes.particles": particle_bytes(STUDY),
+        "nsf.jelly.mem_reduced": 1e-9 * records["nsf.speed.jelly.bytes.fields"].value,
+        "nsf.jelly.mem_full": 1e-9 * particle_bytes(STUDY)})
     assert {r.comparator for r in records.values()} == {"info"}
     points = table["points"][2]
     assert f"{FEW} samples, {points:.0f} integration points" in (
