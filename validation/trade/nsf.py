@@ -35,7 +35,7 @@ class Sampling(NamedTuple):
 
 
 @experiment("trade.nsf.samples", title="NSF: error and cost by number and kind of samples",
-            profiles=("quick", "standard"), budget={"quick": 15, "standard": 300})
+            profiles=("quick", "standard"), budget={"quick": 15, "standard": 1100})
 def of_samples(run):
     """Samples drawn at random, beside samples with weights by cubature; several draws."""
     rows = []
