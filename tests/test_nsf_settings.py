@@ -39,6 +39,17 @@ def test_stand_ins_have_nearly_the_printed_number_of_particles():
         assert ours == pytest.approx(paper.value, rel=1e-3)
 
 
+def test_studies_and_networks_are_the_printed_ones(tmp_path):
+    found = records(tmp_path)
+    for name in recorded.NAMES:
+        assert {f"nsf.table1.{name}.r", f"nsf.appA.{name}.train", f"nsf.table1.{name}.mlp.h.width"
+                } <= found.keys()
+    assert found["nsf.cake.steps_reduced"].value == 213
+    assert found["nsf.cake.samples_second"].value == 400
+    assert found["nsf.appD.lr.4"].value == 5e-5
+    assert "nsf.jelly.samples" not in found         # of its own experiment
+
+
 def test_other_settings_miss(tmp_path, monkeypatch):
     def changed(name):
         scene = shipped(name)

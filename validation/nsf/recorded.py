@@ -1,6 +1,6 @@
 """Settings of NSF's scenes: table 1 and section 6, as far as they are printed (NSF-X1 to NSF-X18).
 
-What differs between runs of a scene (E, xi, angles) is that of the studies, not of the scenes.
+What differs between runs of a scene (E, xi, angles) is that of the studies (`studied`).
 """
 
 from mpm_ref.scene import build
@@ -8,6 +8,7 @@ from mpm_ref.scene import build
 from ..registry import experiment
 from ..settings import record_settings
 from ..verification.scenes import shipped
+from .studied import of_networks, of_studies
 
 ROUNDED = 0.01      # dx = 1/150 and 1/160 are printed with two digits, 0.0067 and 0.0063
 NAMES = ("bread", "cake", "sand", "metal", "toothpaste", "jelly", "ball")
@@ -29,7 +30,7 @@ STAND_INS = {       # where the shape is not published, and ours has nearly as m
 @experiment("nsf.settings", title="Settings of NSF's scenes",
             profiles=("quick", "standard"), budget={"quick": 10, "standard": 10})
 def settings(run):
-    """Settings of the scenes nsf_*.toml."""
+    """Settings of the scenes nsf_*.toml, of the studies of them, and of the networks."""
     for name in NAMES:
         scene = shipped(f"nsf_{name}")
         dx = f"nsf.table1.{name}.dx"
@@ -39,6 +40,10 @@ def settings(run):
             target, note = STAND_INS[name]
             run.record(f"nsf.{target}", particles(scene), scale=f"scenes/nsf_{name}.toml",
                        note=note)
+    for values, of in ((of_studies(), "studies of the standard profile at the printed resolution"),
+                       (of_networks(), "rom/architecture.py, rom/learn/schedule.py")):
+        for target, value in values.items():
+            run.record(target, value, scale=of)
 
 
 def printed(name, scene):
