@@ -1,0 +1,84 @@
+"""NSF: where a speed-up comes from, on a small study and a clock that the test winds."""
+
+import numpy as np
+import pytest
+
+from mpm_ref.rom.spanned import Sizes
+from validation.nsf import factors, tested
+from validation.nsf.factors import Way
+from validation.nsf.studies import jelly
+from validation.results import Results
+from validation.run import Setting, run_all
+
+STUDY = jelly(4)._replace(train=(0.3, 0.5), test=(0.35, 0.4), samples=40,
+                          sizes=Sizes(r=3, modes=8, tau=12, C=12, smoothing=1e-4))
+DRAWN, WEIGHED, LONGER = Way(30, False, 1.0), Way(12, True, 1.0), Way(30, False, 2.0)
+
+
+@pytest.fixture(scope="module")
+def one():
+    """The small study."""
+    return tested.tested(STUDY)
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """Every state takes a second; states of full-order runs, of which the last one is kept alone,
+    take 50.
+    """
+    now = [0.0]
+
+    def passing(work, spent):
+        def run(*given):
+            for state in work(*given):
+                now[0] += spent
+                yield state
+        return run
+
+    monkeypatch.setattr(factors, "infer", passing(factors.infer, 1.0))
+    monkeypatch.setattr(factors, "simulate", passing(factors.simulate, 50.0))
+    monkeypatch.setattr(factors, "perf_counter", lambda: now[0])
+
+
+@pytest.mark.usefixtures("clock")
+def test_whole_runs_are_clocked_each_from_its_start(one):
+    steps = STUDY.run(0.35).steps
+    full, reduced = factors.taken(one, (DRAWN, LONGER), 3)
+    assert full == 100.0                        # the first state and the last
+    assert reduced == [steps + 1, steps // 2 + 1]
+
+
+def test_samples_of_a_way_are_drawn_or_weighed(one):
+    (drawn,), (weighed,) = (factors.plan_of(one, way).samples for way in (DRAWN, WEIGHED))
+    assert (len(drawn.points), drawn.w) == (30, None)
+    assert len(weighed.points) <= 12
+    assert (weighed.w > 0.0).all()
+    assert factors.plan_of(one, LONGER).faster == 2.0
+
+
+def test_ways_have_names_that_differ():
+    for ways in factors.WAYS.values():
+        assert len({way.words for way in ways}) == len(ways)
+    assert WEIGHED.words == "weighed.12.1"
+
+
+@pytest.mark.usefixtures("clock")
+def test_errors_and_times_are_recorded(one, tmp_path, monkeypatch):
+    monkeypatch.setattr(factors, "metal", lambda *_, **__: STUDY)
+    monkeypatch.setattr(factors, "tested", lambda study: one._replace(
+        study=study, tests={value: one.tests[value] for value in study.test}))
+    monkeypatch.setattr(factors, "WAYS", {"quick": (DRAWN, WEIGHED)})
+    assert not run_all([factors.factors.experiment], Setting("quick", tmp_path))
+    found = Results(tmp_path)
+    table = found.table("nsf.factors", "ways")
+    for k, way in enumerate((DRAWN, WEIGHED)):
+        expected = one.errors(0.4, way.samples, 0, 1.0, way.weighed)
+        assert table["error"][k] == table["largest"][k] == pytest.approx(expected.errors.origin)
+        assert table["displacement"][k] == pytest.approx(expected.errors.displacement)
+        assert table["stress"][k] == pytest.approx(expected.stress)
+        assert table["kept"][k] == expected.kept
+    assert table["speedup"] == pytest.approx(100.0 / table["reduced"])
+    records = {r.target: r for r in found.records("nsf.factors")}
+    assert records["nsf.factors.drawn.30.1.error"].value == pytest.approx(100.0 * table["error"][0])
+    assert records["nsf.factors.drawn.30.1.speedup"].value == table["speedup"][0]
+    assert np.isfinite(table["points"]).all()
