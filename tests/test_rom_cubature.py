@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from mpm_ref.rom.cubature import cubature
+from mpm_ref.rom.cubature import cubature, misfit
 
 N, R_FREE = 400, 3
 
@@ -44,6 +44,22 @@ def test_what_is_left_is_told(modes):
     assert found.misfit > 0.05
     finer = cubature(modes, R_FREE, np.arange(N), 40)
     assert finer.misfit < 1e-6
+
+
+def test_points_without_weights_leave_more_the_fewer_they_are(modes):
+    """All leave nothing; of few it is what the best weight, looked for by trial, leaves."""
+    assert misfit(modes, R_FREE, np.arange(N)) < 1e-12
+    few, more = (np.random.default_rng(0).choice(N, count, replace=False) for count in (5, 100))
+    found = [misfit(modes, R_FREE, points) for points in (more, few, few[:1])]
+    assert 0.0 < found[0] < found[1] < found[2] < 1.0
+    products = np.einsum("pdk,pdl->kl", modes[few][..., :R_FREE], modes[few])
+    wanted = np.eye(R_FREE, modes.shape[2])
+    best = min(np.linalg.norm(scale * products - wanted) for scale in np.geomspace(1e-2, 1e4, 4000))
+    assert found[1] == pytest.approx(best / np.linalg.norm(wanted), rel=1e-4)
+
+
+def test_modes_that_vanish_at_points_leave_all(modes):
+    assert misfit(np.zeros_like(modes), R_FREE, np.arange(3)) == 1.0
 
 
 def test_a_motion_along_other_modes_leaves_no_trace(modes):

@@ -42,15 +42,15 @@ class Wind:
         grid.v[..., 0] += 1e3 * t * dt
 
 
-def full_run(X, matter, degree, dt=DT, steps=STEPS, law=LAW, conditions=None):
+def full_run(X, matter, degree, steps=STEPS, conditions=None):
     """States x, v, tau, C of the full model with APIC, the start first."""
     q = particles_at(X, matter.v, matter.m, matter.V0, transfer="apic")
-    whole = Body("full", q, law, NoFlow(), np.arange(len(X)))
+    whole = Body("full", q, LAW, NoFlow(), np.arange(len(X)))
     stepper = Stepper(Scheme(degree, "apic"), DX, X.shape[1], GRAVITY[:X.shape[1]], conditions)
     stepper.start((whole,))
     states = [tuple(a.copy() for a in (q.x, q.v, q.tau, q.C))]
     for k in range(steps):
-        stepper.step((whole,), k * dt, dt)
+        stepper.step((whole,), k * DT, DT)
         states.append(tuple(a.copy() for a in (q.x, q.v, q.tau, q.C)))
     return states
 

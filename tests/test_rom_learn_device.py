@@ -91,9 +91,10 @@ def test_devices_that_are_not_there_are_told(monkeypatch, name, words):
 
 
 @pytest.mark.parametrize(("options", "words"), [
-    (("--kind", "network", "--device", "cuda"), "PyTorch finds no graphics processor here"),
-    (("--kind", "network", "--device", "gpu"), "device 'gpu': expected one of cpu, cuda"),
-    (("--device", "cuda"), "--device cuda: modes are made on the processor; leave it out")])
+    (("--kind", "network", "--threads", "cuda"), "PyTorch finds no graphics processor here"),
+    (("--kind", "network", "--threads", "gpu"), "--threads gpu: expected 1 or more, or cuda"),
+    (("--threads", "0"), "--threads 0: expected 1 or more, or cuda"),
+    (("--threads", "cuda"), "--threads cuda: modes are made on the processor; leave it out")])
 def test_they_are_told_before_data_are_read(tmp_path, monkeypatch, options, words):
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
     study, _ = generated(tmp_path)

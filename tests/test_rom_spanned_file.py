@@ -85,7 +85,8 @@ N = len(ALL)
     ({"rest": np.zeros(2, dtype=int)}, "rest is of type int64"),
     ({"cells__order": np.arange(N, dtype=float)}, "cells.order is of type float64"),
     ({"rest": np.array([0.0, np.nan])}, "rest has numbers that are not finite"),
-    ({"bend__unit": np.zeros(2)}, "a unit of coefficients is not positive"),
+    ({"bend__unit": np.zeros(2)}, "bend.unit has numbers that are not positive"),
+    ({"bend__unit": np.array([1.0, np.inf])}, "bend.unit is infinite of coordinates that vary"),
     ({"cells__order": np.zeros(N, dtype=int)}, "do not hold each point once"),
     ({"kind": np.array("modes")}, "its kind is modes"),
 ])

@@ -84,7 +84,7 @@ def run(
             made = recording(study, model, mu, points_out)
             made.facts["map_sha256"] = maps.sha256(file)
             before = begun(made, out, overwrite)
-        warn([*study.outside(mu), *changed(before)])
+        warn([*study.outside(mu), *made.doubts, *changed(before)])
         outcome = recorded(made, out, before.known, overwrite)
         if json:
             print(as_json(ran(made, out, outcome)))

@@ -90,6 +90,15 @@ def in_sum(ended):
     return f"made {made}, continued {continued}, {there} were there"
 
 
+def machine_of(text):
+    """`Machine` of what is typed: a number of threads, or a device. Raises ValueError."""
+    if text in DEVICES[1:]:
+        return Machine(device=text)
+    if not text.isdecimal() or int(text) < 1:
+        raise ValueError(f"--threads {text}: expected 1 or more, or {DEVICES[1]}")
+    return Machine(int(text))
+
+
 def train(
     name: StudyName,
     data: Data = None,
@@ -97,9 +106,8 @@ def train(
         "--out", "-o", help="File for the map, default: STUDY.npz here.")] = None,
     kind: Annotated[str | None, typer.Option(
         help=f"Kind of the map: {', '.join(KEYS)}; default: as the study says.")] = None,
-    threads: Annotated[int, typer.Option(help="Threads of PyTorch.", min=1)] = 1,
-    device: Annotated[str, typer.Option(
-        help=f"Where a network is trained: {', '.join(DEVICES)}.")] = DEVICES[0],
+    threads: Annotated[str, typer.Option(
+        metavar="N|cuda", help="Threads of PyTorch; cuda: a graphics processor.")] = "1",
     overwrite: Overwrite = False,
 ):
     """Make the map of a study from its runs.
@@ -110,17 +118,17 @@ def train(
     """
     with one_line():
         with options():
-            study = studied(name)
+            study, machine = studied(name), machine_of(threads)
             out, data = named(out, study, ".npz"), named(data, study, "-data")
             checkpoint = out.with_suffix(".pt")
             require_map_place(out, study, overwrite)
             study = with_kind(study, kind)
-            require_device(study.tables.map.kind, device)
+            require_device(study.tables.map.kind, machine.device)
             snapshots = dataset.load(study, data, study.train)
             about = {"command": f"mpm-ref rom train {name} --data {data} --out {out} "
-                                f"--kind {study.tables.map.kind} {typed(Machine(threads, device))}"}
+                                f"--kind {study.tables.map.kind} {typed(machine)}"}
             with writing(), on_interrupt(lambda: resuming(checkpoint)):
-                model = fitted(study, snapshots, about, checkpoint, Machine(threads, device))
+                model = fitted(study, snapshots, about, checkpoint, machine)
             write(out, model)
         maps.forget(checkpoint)
         print(f"{out}: {kind_of(model)}, r = {model.decoder.r}, of "
@@ -134,13 +142,12 @@ def require_device(kind, device):
     if kind == NETWORK:
         maps.training("rom.learn.device").device_of(device)
     elif device != DEVICES[0]:
-        raise ValueError(f"--device {device}: {kind} are made on the processor; leave it out")
+        raise ValueError(f"--threads {device}: {kind} are made on the processor; leave it out")
 
 
 def typed(machine):
-    """The options of a `Machine` as they are typed."""
-    device = "" if machine.device == DEVICES[0] else f" --device {machine.device}"
-    return f"--threads {machine.threads}{device}"
+    """The option of a `Machine` as it is typed."""
+    return f"--threads {machine.threads if machine.device == DEVICES[0] else machine.device}"
 
 
 def resuming(checkpoint):

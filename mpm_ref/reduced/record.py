@@ -6,6 +6,7 @@ What is recorded is any object with
     problem, facts, run             of the points shown; what is to be known of the run; its options
     r, count                        numbers of latent coordinates, and of points shown
     series, stored                  series of the group; `Fields` of particles
+    doubts                          warnings before the run
     states(known)                   (latent, report, sight) of all states, as a run yields them
     bodies(latent)                  the bodies in a state
     row(step)                       {name of a series: value} of a `Step`
@@ -59,6 +60,7 @@ class Recording:
 
     series = VECTORS, COUNTS, NUMBERS
     stored = Fields()
+    doubts = ()
 
     @property
     def r(self):

@@ -52,6 +52,15 @@ def cubature(U, r, among, count):
     return Cubature(points[kept][order], (w[kept] / w[kept].mean())[order], float(left))
 
 
+def misfit(U, r, points):
+    """What points of the same weight, the best one, leave of the products: as `Cubature.misfit`,
+    between 0 and 1.
+    """
+    found, wanted = np.einsum("pdk,pdl->kl", U[points][:, :, :r], U[points]), np.eye(r, U.shape[2])
+    scale = np.sum(found * wanted) / max(np.sum(found**2), np.finfo(float).tiny)
+    return float(np.linalg.norm(scale * found - wanted) / np.linalg.norm(wanted))
+
+
 def chosen_of(A, b, count):
     """Columns of A (m, n), at most `count`, and their weights >= 0, with A w = b as nearly as the
     search finds.

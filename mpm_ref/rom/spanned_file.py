@@ -103,9 +103,11 @@ def fault_of_numbers(arrays):
             return f"{name} has shape {arrays[name].shape}, expected {shape}"
         if arrays[name].dtype.kind != ("i" if name in WHOLE else "f"):
             return f"{name} is of type {arrays[name].dtype}"
-        if name.endswith(".unit"):      # infinite of a coordinate that says nothing
+        if name.endswith(".unit"):
             if not (arrays[name] > 0.0).all():
                 return f"{name} has numbers that are not positive"
+            if arrays[name.replace("unit", "centers")][:, np.isinf(arrays[name])].any():
+                return f"{name} is infinite of coordinates that vary"
         elif not np.isfinite(arrays[name]).all():
             return f"{name} has numbers that are not finite"
     return None

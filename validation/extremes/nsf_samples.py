@@ -6,34 +6,48 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from mpm_ref.reduced.inferring import Chosen
+from mpm_ref.reduced.nsf.watch import SPARSE
+from mpm_ref.rom.cubature import misfit
 
 from ..registry import experiment
-from .ldm_runs import FLAGGED, STOPPED, record_silent, table_of
+from .ldm_runs import FLAGGED, SILENT, STOPPED, record_silent, table_of
+from .nsf_beyond import is_bad
 from .nsf_runs import ERRORS, Bench, scenes
 
 COUNTS = {"quick": (1, 3), "standard": (1, 2, 3, 4, 6, 10, 20)}
 TOGETHER = {"quick": (10, 100), "standard": (2, 10, 50, 200)}
 DRAWS = {"quick": 1, "standard": 3}
+LEFT = "map", "what", "samples", "left", "error", "kind"
 
 
 @experiment("extremes.nsf.samples", title="NSF: too few samples, and samples in one corner",
             profiles=("quick", "standard"), budget={"quick": 15, "standard": 250})
 def samples(run):
     """No sampling may spoil a run without a word."""
-    found, short = [], []
+    found, short, left = [], [], []
     for name, one in scenes(run):
-        bench, X = Bench(name, one), one.fields.X
-        few = [bench.trial(f"draw {draw}", bench.drawn(count, draw))
-               for count in run.progress(COUNTS[run.profile], f"{name}, numbers")
-               for draw in range(DRAWS[run.profile])]
-        short += [t for t in few if t.points * X.shape[1] < one.fields.r]
-        found += few
-        found += [bench.trial(f"at the {place} corner", clustered(X, corner, count))
-                  for place, corner in corners(X).items() for count in TOGETHER[run.profile]]
+        bench, fields = Bench(name, one), one.fields
+        for what, chosen in run.progress(sets_of(bench, run.profile), f"{name}, sets"):
+            found.append(bench.trial(what, chosen))
+            left.append(misfit(fields.U, fields.r, chosen.points))
+            if len(chosen.points) * fields.dim < fields.r:
+                short.append(found[-1])
     record_all(run, found)
     record_short(run, short)
+    record_told(run, found, left)
     record_silent(run, "extremes.nsf.samples", found, ERRORS)
+    run.table("left", LEFT, [(t.map, t.what, t.points, share, t.end.error, t.kind)
+                             for t, share in zip(found, left, strict=True)])
     table_of(run, found)
+
+
+def sets_of(bench, profile):
+    """[(name, `Chosen`)] of samples: few, and many in a corner."""
+    X = bench.one.fields.X
+    return [*((f"draw {draw}", bench.drawn(count, draw)) for count in COUNTS[profile]
+              for draw in range(DRAWS[profile])),
+            *((f"at the {place} corner", clustered(X, corner, count))
+              for place, corner in corners(X).items() for count in TOGETHER[profile])]
 
 
 def corners(X):
@@ -55,6 +69,21 @@ def record_all(run, trials):
                    note="; ".join(filter(None, (
                        t.kind, f"with as many samples as usual {t.usual:.3g} %",
                        f"rank at least {t.end.rank}", t.end.said))))
+
+
+def record_told(run, trials, left):
+    """Record the share of the bad runs that are told before they begin, by what their samples leave
+    of the modes' products, and of those among them that nothing tells later.
+    """
+    told = {True: [], False: []}
+    for t, share in zip(trials, left, strict=True):
+        told[is_bad(t)].append((share > SPARSE, t.kind))
+    bad, good = ([tells for tells, _ in told[wrong]] for wrong in (True, False))
+    silent = [tells for tells, kind in told[True] if kind == SILENT]
+    run.record("extremes.nsf.samples.told", sum(bad) / max(len(bad), 1), comparator="info",
+               scale=f"{len(trials)} runs", note=f"share of the {len(bad)} bad runs whose samples "
+               f"leave more than {SPARSE:g} of the products; so do those of {sum(silent)} of the "
+               f"{len(silent)} silent ones, and of {sum(good)} of the {len(good)} that are good")
 
 
 def record_short(run, trials):

@@ -13,7 +13,7 @@ from ...store import Fields
 from ..inferring import Plan, begin, continued, drawn
 from ..whole import Whole
 from .fields import of_run
-from .watch import look, trained
+from .watch import look, sparse, trained
 
 VECTORS = {"xhat": "1"}                         # of the group `reduced`: units
 COUNTS = {"samples": "1", "points": "1", "rank": "1"}
@@ -44,6 +44,11 @@ class Recording:
     def count(self):
         """Number of points shown."""
         return len(self.whole.X)
+
+    @property
+    def doubts(self):
+        """The warnings before the run."""
+        return sparse(self.fields, plan_of(self.run, self.count, self.fields).samples[0].points)
 
     def states(self, known):
         """Yield (`Position`, `Report` or None, `Sight`) of each state, those known too."""

@@ -7,8 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...rom.cubature import misfit
 from ...rom.extent import extent, motion
+from ...rom.spanned import Spanned
 from ..watch import BEYOND, LATENTS, LOOKED, WORDS, some
+
+SPARSE = 0.74       # of `rom.cubature.misfit`, from runs of jelly cube and metal frame
 
 
 class Sight(NamedTuple):
@@ -36,6 +40,17 @@ def trained(fields, xhat):
     points, latents = some(np.arange(len(fields.X)), LOOKED), some(
         xhat.reshape(-1, fields.r), LATENTS)
     return extent(xhat, motion(fields, points, latents))
+
+
+def sparse(fields, samples):
+    """The warning, before a run, about samples that tell too little; or none. Networks know no
+    modes: nothing is said of their samples.
+    """
+    left = misfit(fields.U, fields.r, samples) if isinstance(fields, Spanned) else 0.0
+    if left > SPARSE:
+        yield (f"the {len(samples)} samples leave {100.0 * left:.0f} % of the products of the "
+               f"modes, and most runs whose samples left more than {100.0 * SPARSE:.0f} % went "
+               "wrong (docs/nsf.md); give `points` of [run] more, or another seed")
 
 
 def look(extent, at, report):

@@ -1,0 +1,68 @@
+"""Samples that tell too little of a reduced run with inferred stress: warned of before it."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from command_line import mpm_ref
+from small_nsf_studies import modelled
+from small_toys import Records
+
+from mpm_ref.reduced import maps
+from mpm_ref.reduced.inferring import drawn
+from mpm_ref.reduced.nsf import watch
+from mpm_ref.rom.cubature import misfit
+from validation.extremes import nsf_samples as samples
+from validation.extremes.ldm_runs import BAD, Trial
+from validation.extremes.nsf_runs import Bench, End
+
+GOOD = End(2.0, 0.2, 15.0, 30, -1, "", 0.4, 5, 0.01, "")
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Folder with a study, its runs and its fields."""
+    return modelled(tmp_path_factory.mktemp("made"))
+
+
+def test_they_are_told_by_the_command(made, tmp_path, monkeypatch):
+    fields = maps.read(made / "fields.npz").decoder
+    left = misfit(fields.U, 3, drawn(len(fields.X), 20, 0).points)
+    for bound, warned in ((0.99 * left, True), (1.01 * left, False)):
+        monkeypatch.setattr(watch, "SPARSE", bound)
+        done = mpm_ref("rom", "run", made / "pairs.toml", "--map", made / "fields.npz", "--out",
+                       tmp_path / "run.h5", "--set", "v=2", "--overwrite")
+        assert done.exit_code == 0
+        assert (f"the 20 samples leave {100.0 * left:.0f} % of the products of the modes, and most"
+                in done.stderr) is warned
+
+
+def test_of_networks_nothing_is_known():
+    assert not list(watch.sparse(SimpleNamespace(r=3), np.arange(1)))
+
+
+def trial(error=2.0, flags=""):
+    return Trial("jelly", "draw 0", "inferred", 40, 2.0, GOOD._replace(error=error, flags=flags))
+
+
+def test_bad_runs_that_their_samples_tell_are_counted():
+    """Two of three bad ones, one of two silent ones, one of two good ones."""
+    bad = 1.01 * BAD * 2.0
+    found = [trial(bad), trial(bad), trial(bad, "beyond"), trial(), trial()]
+    records = Records()
+    samples.record_told(records, found, [0.9, 0.1, 0.8, 0.9, 0.2])
+    share, note = records["extremes.nsf.samples.told"]
+    assert share == pytest.approx(2 / 3)
+    assert "share of the 3 bad runs" in note
+    assert "those of 1 of the 2 silent ones, and of 1 of the 2 that are good" in note
+
+
+def test_sets_are_few_drawn_ones_and_corners(rng):
+    fields = SimpleNamespace(X=rng.uniform(size=(150, 3)))
+    bench = SimpleNamespace(one=SimpleNamespace(fields=fields))
+    bench.drawn = lambda count, draw=0: Bench.drawn(bench, count, draw)
+    found = samples.sets_of(bench, "quick")
+    assert [(what, len(chosen.points)) for what, chosen in found] == [
+        ("draw 0", 1), ("draw 0", 3), *((f"at the {place} corner", count)
+                                        for place in ("lower", "upper") for count in (10, 100))]
+    assert np.array_equal(found[1][1].points, drawn(150, 3, 0).points)
