@@ -5,13 +5,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from command_line import mpm_ref
-from small_nsf_studies import modelled
+from small_nsf_studies import modelled, write
 from small_toys import Records
 
 from mpm_ref.reduced import maps
-from mpm_ref.reduced.inferring import drawn
+from mpm_ref.reduced.inferring import Chosen, Plan, drawn, infer, weighed
 from mpm_ref.reduced.nsf import watch
+from mpm_ref.reduced.nsf.recording import plan_of
+from mpm_ref.reduced.study import load
+from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.cubature import misfit
+from mpm_ref.store.results import Results
 from validation.extremes import nsf_samples as samples
 from validation.extremes.ldm_runs import BAD, Trial
 from validation.extremes.nsf_runs import Bench, End
@@ -37,8 +41,35 @@ def test_they_are_told_by_the_command(made, tmp_path, monkeypatch):
                 in done.stderr) is warned
 
 
+def test_a_run_on_samples_with_weights_is_that_of_their_plan(made, tmp_path):
+    """By `rom run` and by `rom evaluate`; of networks there are none."""
+    study, out = write(tmp_path, ("points = 20", "points = 9\nseed = 2\nweighed = true")), (
+        tmp_path / "run.h5")
+    done = mpm_ref("rom", "run", study, "--map", made / "fields.npz", "--out", out, "--set", "v=2")
+    assert done.exit_code == 0, done.output
+    model, one = maps.read(made / "fields.npz"), whole(load(study).scene([2.0]))
+    fields = model.decoder.of([2.0])
+    chosen = weighed(fields, len(one.X), 9, 2)
+    *_, (_, last, report) = infer(one, fields, Plan((chosen,)), model.rest)
+    with Results(out) as results:
+        assert np.array_equal(results.h5["reduced/xhat"][-1], last.xhat)
+        assert results.h5["reduced/samples"][-1] == report.samples == len(chosen.points) <= 9
+    assert "9 points at most, with weights" in mpm_ref("info", study).stdout
+    errors = mpm_ref("rom", "evaluate", study, "--map", made / "fields.npz", "--data",
+                     made / "data", "--out", tmp_path / "e.png", "--json")
+    assert errors.exit_code == 0, errors.output
+    with pytest.raises(ValueError, match="weighed = true: weights of samples are told by modes"):
+        plan_of(load(study).tables.run, 40, SimpleNamespace(dim=2, r=3))
+
+
 def test_of_networks_nothing_is_known():
-    assert not list(watch.sparse(SimpleNamespace(r=3), np.arange(1)))
+    assert not list(watch.sparse(SimpleNamespace(r=3), drawn(40, 1, 0)))
+
+
+def test_weights_tell_what_they_leave():
+    for left, count in ((0.9, 1), (0.1, 0)):
+        one = Chosen(0.0, np.arange(4), np.ones(4), left)
+        assert len(list(watch.sparse(SimpleNamespace(r=3), one))) == count
 
 
 def trial(error=2.0, flags=""):

@@ -33,6 +33,7 @@ def reduced(made, out, *options, study="pairs.toml"):
     (('kind = "modes"', 'kind = "network"'), 'map.C: given, but the kind is "network"'),
     (("r = 3", "r = 3\nbeta = [8, 8, 8]"), 'map.beta: given, but the kind is "modes"'),
     (("smoothing = 1e-6", "smoothing = -1.0"), "smoothing"),
+    (("points = 20", "weighed = true"), "weighed = true: expected `points` beside it"),
     (("points = 20", 'inversion = "newton"'), "inversion = 'newton': expected one of"),
     (("points = 20", 'samples = "kept"'), "run.samples: unknown key"),
     (("points = 20", "faster = 0.0"), "faster"),

@@ -35,7 +35,8 @@ def learned(facts):
     map, run = facts["map"], facts["run"]
     longer = f", steps {run['faster']:g} times as long" if run["faster"] != 1.0 else ""
     return (f"stress fields: {map['kind']}, r = {map['r']}, {sizes(map)}; reduced runs: "
-            f"{run['inversion']} inversion, {run['points'] or 'all'} points{longer}")
+            f"{run['inversion']} inversion, {run['points'] or 'all'} points"
+            f"{' at most, with weights' if run['weighed'] else ''}{longer}")
 
 
 def making(about):

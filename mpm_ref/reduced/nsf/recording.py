@@ -9,8 +9,9 @@ from ...body import Body, particles_at
 from ...materials import NoFlow
 from ...rom.extent import Extent
 from ...rom.inferred import Position, Report
+from ...rom.spanned import Spanned
 from ...store import Fields
-from ..inferring import Plan, begin, continued, drawn
+from ..inferring import Plan, begin, continued, drawn, weighed
 from ..whole import Whole
 from .fields import of_run
 from .watch import look, sparse, trained
@@ -29,6 +30,7 @@ class Recording:
     rest: np.ndarray        # (r,) latent coordinates near the start
     extent: Extent          # of the training latents
     run: object             # `tables.Run`
+    plan: Plan
     problem: object         # the scene's, with the clock of the reduced run
     facts: dict             # what else is to be known of it, plain values
 
@@ -48,13 +50,12 @@ class Recording:
     @property
     def doubts(self):
         """The warnings before the run."""
-        return sparse(self.fields, plan_of(self.run, self.count, self.fields).samples[0].points)
+        return sparse(self.fields, self.plan.samples[0])
 
     def states(self, known):
         """Yield (`Position`, `Report` or None, `Sight`) of each state, those known too."""
         known = known or [(begin(self.whole, self.fields, self.rest), None)]
-        plan = plan_of(self.run, len(self.whole.X), self.fields)
-        for _, at, report in continued(known, self.whole, self.fields, plan):
+        for _, at, report in continued(known, self.whole, self.fields, self.plan):
             yield at, report, look(self.extent, at, report)
 
     def bodies(self, at):
@@ -85,13 +86,17 @@ def body_of(name, x, v, matter, rest):
 
 def plan_of(run, n, fields):
     """`Plan` of a study's `Run` for n points. Raises ValueError for samples that do not suffice, or
-    are more than there are points.
+    are more than there are points, and for weights of samples without modes.
     """
     count = n if run.points is None else run.points
     if count * fields.dim < fields.r:
         raise ValueError(f"{count} samples for {fields.r} latent coordinates: expected at least "
                          f"{ceil(fields.r / fields.dim)}; give `points` of [run] more")
-    return Plan((drawn(n, count, run.seed),), run.faster, run.inversion)
+    if run.weighed and not isinstance(fields, Spanned):
+        raise ValueError("weighed = true: weights of samples are told by modes, which networks "
+                         "have not; leave it out, or make fields of modes")
+    chosen = weighed(fields, n, count, run.seed) if run.weighed else drawn(n, count, run.seed)
+    return Plan((chosen,), run.faster, run.inversion)
 
 
 def require_step(faster, steps):
@@ -108,7 +113,7 @@ def recording(whole, model, mu, run, facts):
     plan = plan_of(run, len(whole.X), fields)
     require_step(run.faster, clock.steps)
     own = replace(clock, dt=run.faster * clock.dt, steps=plan.steps(clock), every=1)
-    return Recording(whole, fields, model.rest, trained(fields, model.xhat), run,
+    return Recording(whole, fields, model.rest, trained(fields, model.xhat), run, plan,
                      replace(whole.problem, clock=own), facts)
 
 

@@ -72,11 +72,15 @@ class Run(Table):
 
     points: Count | None = None                 # samples, drawn once; none: all points
     seed: Seed = 0                              # of that draw
+    weighed: bool = False                       # whether they have weights, and are at most so many
     faster: Step = Plan(()).faster              # length of a step over that of the scene
     inversion: str = Plan(()).inversion
 
     def __post_init__(self):
         one_of("inversion", self.inversion, INVERSIONS)
+        if self.weighed and self.points is None:
+            raise ValueError("weighed = true: expected `points` beside it, how many samples there "
+                             "may be")
 
 
 class Tables(Runs, kw_only=True):

@@ -42,11 +42,13 @@ def trained(fields, xhat):
     return extent(xhat, motion(fields, points, latents))
 
 
-def sparse(fields, samples):
-    """The warning, before a run, about samples that tell too little; or none. Networks know no
-    modes: nothing is said of their samples.
+def sparse(fields, chosen):
+    """The warning, before a run, about `Chosen` samples that tell too little; or none. Networks
+    know no modes: nothing is said of their samples.
     """
-    left = misfit(fields.U, fields.r, samples) if isinstance(fields, Spanned) else 0.0
+    left, samples = chosen.misfit, chosen.points        # of weights; NaN without
+    if chosen.w is None and isinstance(fields, Spanned):
+        left = misfit(fields.U, fields.r, samples)
     if left > SPARSE:
         yield (f"the {len(samples)} samples leave {100.0 * left:.0f} % of the products of the "
                f"modes, and most runs whose samples left more than {100.0 * SPARSE:.0f} % went "
