@@ -8,7 +8,7 @@ from command_line import mpm_ref
 from small_nsf_studies import modelled, write
 from small_toys import Records
 
-from mpm_ref.reduced import maps
+from mpm_ref.reduced import inferring, maps
 from mpm_ref.reduced.inferring import Chosen, Plan, drawn, infer, weighed
 from mpm_ref.reduced.nsf import watch
 from mpm_ref.reduced.nsf.recording import plan_of
@@ -41,8 +41,9 @@ def test_they_are_told_by_the_command(made, tmp_path, monkeypatch):
                 in done.stderr) is warned
 
 
-def test_a_run_on_samples_with_weights_is_that_of_their_plan(made, tmp_path):
-    """By `rom run` and by `rom evaluate`; of networks there are none."""
+def test_a_run_on_samples_with_weights_is_that_of_their_plan(made, tmp_path, monkeypatch):
+    """By `rom run` and by `rom evaluate`; of networks there are none. The seed draws candidates."""
+    monkeypatch.setattr(inferring, "CANDIDATES", 40)
     study, out = write(tmp_path, ("points = 20", "points = 9\nseed = 2\nweighed = true")), (
         tmp_path / "run.h5")
     done = mpm_ref("rom", "run", study, "--map", made / "fields.npz", "--out", out, "--set", "v=2")
