@@ -15,6 +15,7 @@ from validation.nsf import networks as kept
 from validation.nsf import networks_runs as runs
 from validation.nsf import tested
 from validation.nsf.networks import Net, Part, fields_of, identity, nets, trained
+from validation.nsf.studied import STUDIES
 from validation.nsf.studies import jelly
 from validation.results import Results
 from validation.run import Setting, run_all
@@ -41,14 +42,14 @@ def model(net=NET):
     return Model(*networks(3), rng.normal(size=(2, 31, R)), rng.normal(size=R), identity(net))
 
 
-def test_the_networks_are_those_of_two_scenes_with_the_printed_latent_coordinates():
+def test_the_networks_are_those_of_all_scenes_with_the_printed_latent_coordinates():
     printed = targets.load()
-    assert {*nets()} == {"jelly", "metal", "jelly-waves", "metal-waves", "jelly-seed-1",
-                         "jelly-seed-2"}
+    assert {*nets()} == {"jelly", "metal", "jelly-seed-1", "jelly-seed-2",
+                         *(f"{name}-waves" for name in STUDIES)}
     for name, net in nets().items():
         scene = name.split("-")[0]
         assert net.study.sizes.r == printed[f"nsf.table1.{scene}.r"].value
-        assert net.study.follows is (scene == "metal")
+        assert net.study.follows is (scene in ("bread", "metal", "sand"))
 
 
 def test_features_are_those_of_stress_and_affine_field_alone():

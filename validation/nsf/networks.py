@@ -20,9 +20,10 @@ from mpm_ref.rom.learned import learned
 from mpm_ref.scene.text import canonical
 
 from ..waiting import Untrained
-from .studies import Study, jelly, metal
+from .studies import Study, ball, bread, cake, jelly, metal, sand, toothpaste
 
 FOLDER = Path(__file__).parent / "weights"
+WIDTH = 64                          # of hidden layers
 OCTAVES = 3                         # of features
 SEEDS = 1, 2                        # other than 0, of the first scene
 DISPLACED, BLURRED = 0.03, 0.01     # `Part.beside` of the position, and of what is not known there
@@ -57,16 +58,22 @@ class Net(NamedTuple):
 
 
 def nets():
-    """{name: `Net`} of all scenes that have networks, whose names begin with the scene's; "-waves"
-    with features in h and l.
+    """{name: `Net`} of all scenes, whose names begin with the scene's; "-waves" with features in h
+    and l.
     """
-    plain = {"jelly": Net(jelly(), Part(64, 3500, DISPLACED), Part(64, 3000, BLURRED),
-                          Part(64, 1500, BLURRED)),
-             "metal": Net(metal(2), Part(64, 1500, DISPLACED), Part(64, 1200, BLURRED),
-                          Part(64, 500, BLURRED))}
+    plain = {"jelly": wide(jelly(), 3500, 3000, 1500), "metal": wide(metal(2), 1500, 1200, 500)}
+    others = {"ball": wide(ball(2), 5000, 4500, 2000), "bread": wide(bread(2), 3300, 3300, 1200),
+              "cake": wide(cake(2), 5500, 5000, 2000), "sand": wide(sand(2), 1100, 1000, 400),
+              "toothpaste": wide(toothpaste(2), 1800, 1800, 700)}
     return (plain
-            | {f"{name}-waves": net._replace(octaves=OCTAVES) for name, net in plain.items()}
+            | {f"{name}-waves": own._replace(octaves=OCTAVES)
+               for name, own in (plain | others).items()}
             | {f"jelly-seed-{seed}": plain["jelly"]._replace(seed=seed) for seed in SEEDS})
+
+
+def wide(study, g, h, l):
+    """`Net` of a study, with so many epochs of each network."""
+    return Net(study, Part(WIDTH, g, DISPLACED), Part(WIDTH, h, BLURRED), Part(WIDTH, l, BLURRED))
 
 
 @cache
