@@ -54,7 +54,8 @@ def test_no_run_is_kept_beside_what_is_made_of_it(monkeypatch):
     made, kept = [], []
     monkeypatch.setattr(train_fields, "history", lambda scene, mu, *_: made.append(*mu) or mu)
 
-    def joined(runs):
+    def joined(runs, count):
+        assert count == len(STUDY.train)
         for run in runs:
             kept.append(*run)
             assert kept == made

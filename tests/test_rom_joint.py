@@ -53,7 +53,7 @@ def to_and_fro(d, reach):
 @pytest.fixture
 def runs(d):
     """Histories of three runs."""
-    return joined(to_and_fro(d, reach) for reach in (0.8, 1.0, 1.2))
+    return joined([to_and_fro(d, reach) for reach in (0.8, 1.0, 1.2)])
 
 
 def test_places_that_have_two_stresses_are_told_apart(runs):

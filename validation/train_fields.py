@@ -45,8 +45,8 @@ def plan_of(net):
 def runs_of(study):
     """`Histories` of a study's training runs."""
     values = tqdm(study.train, desc="runs")
-    return joined(history(study.run(value), [value], np.float32, study.spacing)
-                  for value in values)
+    return joined((history(study.run(value), [value], np.float32, study.spacing)
+                   for value in values), len(study.train))
 
 
 class Work:

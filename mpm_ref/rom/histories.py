@@ -6,6 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..held import empty
+
+PLAIN, FIELDS = ("v", "mu"), ("x", "tau", "C")      # what each run has of its own
+
 
 class Histories(NamedTuple):
     """s runs of n points at time levels 0 .. k, a step or several apart; points in the scene's own
@@ -28,13 +32,23 @@ class Histories(NamedTuple):
                              C=self.C[runs])
 
 
-def joined(runs):
-    """`Histories` of several of the same points, one after the other. Of an iterator no run is
-    kept beside what is made of it.
+def room(one, runs):
+    """`Histories` of so many runs like one of them, without values yet."""
+    fields = {name: getattr(one, name) for name in FIELDS}
+    return one._replace(
+        **{name: np.empty((runs, *getattr(one, name).shape[1:])) for name in PLAIN},
+        **{name: empty((runs, *known.shape[1:]), known.dtype) for name, known in fields.items()})
+
+
+def joined(runs, count=None):
+    """`Histories` of single ones of the same points, one after the other: of an iterator, of which
+    no run is kept beside what is made of it, there must be `count`. Raises ValueError for another
+    number, and OSError as `held.empty` does.
     """
-    first, fields = None, {name: [] for name in ("v", "mu", "x", "tau", "C")}
-    for run in runs:
-        first = first or run._replace(**dict.fromkeys(fields))
-        for name, parts in fields.items():
-            parts.append(getattr(run, name))
-    return first._replace(**{name: np.concatenate(fields.pop(name)) for name in list(fields)})
+    found = None
+    numbers = range(len(runs) if count is None else count)
+    for k, run in zip(numbers, runs, strict=True):
+        found = found or room(run, len(numbers))
+        for name in (*PLAIN, *FIELDS):
+            getattr(found, name)[k] = getattr(run, name)[0]
+    return found

@@ -146,8 +146,8 @@ def spanned(histories, sizes, size, follows=True):
     the snapshots hold.
     """
     s, levels, n, d = histories.x.shape
-    u = (histories.x - histories.X).reshape(s * levels, -1)
-    U, a = modes_of(u, sizes.modes, "modes")
+    x = histories.x.reshape(s * levels, -1)
+    U, a = modes_of(x, sizes.modes, "modes", histories.X.ravel())
     xhat, mu = a[:, :sizes.r], np.repeat(histories.mu, levels, axis=0)
     unit = np.full(sizes.r, np.sqrt(np.mean(xhat[:, 0] ** 2)))
     own = mu[:, :mu.shape[1] if follows else 0]
@@ -176,16 +176,21 @@ def spread_of(mu):
     return np.where(spread > 0.0, spread, 1.0)
 
 
-def modes_of(A, count, name):
-    """The `count` leading orthonormal modes (N, count) of rows A (m, N), and the rows' coefficients
-    (m, count), from the rows' products: there are far fewer rows than columns. Sums are of doubles
-    whatever the rows are. Raises ValueError for more modes than the rows hold.
+def modes_of(A, count, name, origin=None):
+    """The `count` leading orthonormal modes (N, count) of rows A (m, N), less an origin (N,) if one
+    is given, and the rows' coefficients (m, count), from the rows' products: there are far fewer
+    rows than columns. Sums are of doubles whatever the rows are, of which some columns at a time
+    are read. Raises ValueError for more modes than the rows hold.
     """
-    blocks = [slice(k, k + COLUMNS) for k in range(0, A.shape[1], COLUMNS)]
+    def columns():
+        for k in range(0, A.shape[1], COLUMNS):
+            block = slice(k, k + COLUMNS)
+            some = A[:, block].astype(float)
+            yield some if origin is None else some - origin[block]
+
     with one_thread():
         products = np.zeros((len(A), len(A)))
-        for block in blocks:
-            some = A[:, block].astype(float)
+        for some in columns():
             products += some @ some.T
         square, vectors = np.linalg.eigh(products)
         square, vectors = square[::-1], vectors[:, ::-1]
@@ -194,7 +199,7 @@ def modes_of(A, count, name):
             raise ValueError(f"{name} = {count}: expected 1 .. {held}, as many modes as the "
                              f"{len(A)} snapshots hold")
         sigma = np.sqrt(square[:count])
-        found = [A[:, block].astype(float).T @ vectors[:, :count] / sigma for block in blocks]
+        found = [some.T @ vectors[:, :count] / sigma for some in columns()]
     return np.concatenate(found), vectors[:, :count] * sigma
 
 

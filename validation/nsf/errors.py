@@ -14,7 +14,7 @@ from .tested import FASTER, refitted, tested
 
 ORIGIN = "from the corner of the unit box that scenes stand in"
 MODAL = "fields of modes, no networks"
-DRAWS = 10              # of samples
+DRAWS, FEW = 10, 3      # of samples; of as many particles as are printed
 COLUMNS = ("fields", "value", "samples", "draw", "faster", "origin", "centroid", "displacement",
            "stress", "points", "kept", "misfit")
 
@@ -37,14 +37,15 @@ def cube(run):
 
 
 @experiment("nsf.sand", title="NSF: a sand column collapses",
-            profiles=("quick", "standard"), budget={"quick": 30, "standard": 600})
+            budget={"quick": 30, "standard": 600, "paper": 10000})
 def column(run):
     """Errors with 150 samples and all particles, without the affine field, with fewer latent
     coordinates, and where the stress is not told the angle; beside the nearest states and the
     nearest training run.
     """
-    one = tested(sand(run.choose(quick=3, standard=2), run.choose(quick=4, standard=16)))
-    rows = measured(run, "nsf.sand", one, range(run.choose(quick=1, standard=DRAWS)))
+    one = tested(sand(run.choose(quick=3, standard=2, paper=1),
+                      run.choose(quick=4, standard=16, paper=16)))
+    rows = measured(run, "nsf.sand", one, range(run.choose(quick=1, standard=DRAWS, paper=FEW)))
     run.record("nsf.sand.samples", one.study.samples, scale=one.scale)
     run.record("nsf.sand.r", one.study.sizes.r, scale=one.scale)
     rows += without_affine(run, "nsf.sand", one)

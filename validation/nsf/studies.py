@@ -81,7 +81,7 @@ def sand(coarser=1, train=16):
     return Study("nsf_sand", "body.sand.material.flow.friction_angle",
                  tuple(np.linspace(21.0, 38.5, train)), (23.0, 27.5, 32.0, 36.5),
                  Sizes(r=6, smoothing=1.0), 150,
-                 follows=True, coarser=coarser, steps=300)
+                 follows=True, coarser=coarser, steps=300, every=2)
 
 
 def metal(coarser=1, train=12):

@@ -107,7 +107,8 @@ def tested(study):
     def made(value):
         return history(study.run(value), [value], np.float32, study.spacing)
 
-    runs, tests = joined(map(made, study.train)), {value: made(value) for value in study.test}
+    runs = joined(map(made, study.train), len(study.train))
+    tests = {value: made(value) for value in study.test}
     return refitted(Tested(study, None, None, runs, tests), study.sizes, study.follows)
 
 

@@ -63,7 +63,7 @@ def of_modes(study, repeats):
         return history(study.run(value), [value], np.float32, study.spacing)
 
     tests = {study.test[0]: made(study.test[0])}        # first, as it compiles what is missing
-    runs, spent = clocked(lambda: joined(map(made, study.train)))
+    runs, spent = clocked(lambda: joined(map(made, study.train), len(study.train)))
     bare = Tested(study, None, None, runs, tests)
     one, made_in = clocked(lambda: refitted(bare, study.sizes, study.follows))
     return one, Bill(spent.cpu, made_in.cpu, full_cpu(one),

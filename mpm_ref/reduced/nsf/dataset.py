@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ...held import empty
 from ...rom.histories import Histories
 from ...rom.symmetric import values
 from ...store.results import Results
@@ -11,13 +12,14 @@ from ..whole import whole
 
 def histories(study, folder, numbers, kind=np.float32):
     """`Histories` of the finished runs of these numbers, stored as numbers of a kind; dt is from
-    one of the states kept to the next. Raises ValueError as `whole` does, and `BadResults`.
+    one of the states kept to the next. Raises ValueError as `whole` does, OSError as
+    `held.empty` does, and `BadResults`.
     """
     runs = [whole(study.scene(study.mu[k])) for k in numbers]
     base, (n, d) = study.base, runs[0].X.shape
     levels = base.steps // base.every + 1
-    x, C = (np.empty((len(runs), levels, n, k), kind) for k in (d, d * d))
-    tau = np.empty((len(runs), levels, n, d * (d + 1) // 2), kind)
+    x, C = (empty((len(runs), levels, n, k), kind) for k in (d, d * d))
+    tau = empty((len(runs), levels, n, d * (d + 1) // 2), kind)
     for run, k in enumerate(numbers):
         with Results(file_of(folder, k)) as results:
             for level in range(levels):
