@@ -1,7 +1,8 @@
 """NSF: position error of reduced runs with inferred stress. Left: by the number of samples, drawn
-at random or with weights by cubature; a mark is the mean over draws and tests, a bar goes from the
-smallest to the largest; the dotted line is where all particles are samples. Right: by the length of
-the step over that of the scene. Runs that broke down are left out.
+at random or with weights by cubature, or by that of cells whose points have such weights; a mark is
+the mean over draws and tests, a bar goes from the smallest to the largest; the dotted line is where
+all particles are samples. Right: by the length of the step over that of the scene. Runs that broke
+down are left out.
 """
 
 import matplotlib.pyplot as plt
@@ -13,7 +14,7 @@ from .trade_ldm import readable
 NEEDS = ["trade.nsf.samples", "trade.nsf.dt"]
 TITLES = ("samples", "time step")
 COLOURS = {"jelly": "C0", "metal": "C3"}
-WAYS = {"random": "o-", "cubature": "s--"}
+WAYS = {"random": "o-", "cubature": "s--", "cells": "^:"}
 
 
 def scale(results):
@@ -29,7 +30,7 @@ def draw(results):
         ax.set(xscale="log", yscale="log")
         readable(ax.xaxis)
     readable(axes[0].yaxis, (1.0, 2.0, 5.0))
-    axes[0].set(xlabel="samples, at most", ylabel="position error [%]")
+    axes[0].set(xlabel="samples, or cells of these, at most", ylabel="position error [%]")
     axes[1].set_xlabel("step over that of the scene")
     legend_below(figure, axes)
     return figure

@@ -2,7 +2,10 @@
 
 import numpy as np
 import pytest
+from small_toys import Records
 
+from mpm_ref.reduced.inferring import clustered
+from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.spanned import Sizes
 from validation.nsf import factors, tested
 from validation.nsf.factors import Way
@@ -12,7 +15,9 @@ from validation.run import Setting, run_all
 
 STUDY = jelly(4)._replace(train=(0.3, 0.5), test=(0.35, 0.4), samples=40,
                           sizes=Sizes(r=3, modes=8, tau=12, C=12, smoothing=1e-4))
-DRAWN, WEIGHED, LONGER = Way(30, False, 1.0), Way(12, True, 1.0), Way(30, False, 2.0)
+DRAWN, WEIGHED, LONGER, CELLS = (
+    Way(30, factors.DRAWN, 1.0), Way(12, factors.WEIGHED, 1.0), Way(30, factors.DRAWN, 2.0),
+    Way(4, factors.CELLS, 1.0))
 
 
 @pytest.fixture(scope="module")
@@ -49,11 +54,25 @@ def test_whole_runs_are_clocked_each_from_its_start(one):
 
 
 def test_samples_of_a_way_are_drawn_or_weighed(one):
-    (drawn,), (weighed,) = (factors.plan_of(one, way).samples for way in (DRAWN, WEIGHED))
+    (drawn,), (weighed,), (cells,) = (factors.plan_of(one, way).samples
+                                      for way in (DRAWN, WEIGHED, CELLS))
     assert (len(drawn.points), drawn.w) == (30, None)
     assert len(weighed.points) <= 12
     assert (weighed.w > 0.0).all()
+    scene = whole(STUDY.run(0.35))
+    expected = clustered(one.fields, scene.problem, len(scene.X), 4, 0)
+    assert np.array_equal(cells.points, expected.points)
+    assert not np.array_equal(weighed.points, cells.points)
     assert factors.plan_of(one, LONGER).faster == 2.0
+
+
+def test_samples_with_weights_are_anywhere(one):
+    """Those that are drawn are of the study's column, and others later."""
+    study = one.study._replace(column=2.0, later=10)
+    for way in (DRAWN, WEIGHED, CELLS):
+        own = way.of(one._replace(study=study)).study
+        assert (own.column, own.later) == ((2.0, 10) if way is DRAWN else (None, None))
+        assert own.cells is (way is CELLS)
 
 
 def test_ways_have_names_that_differ():
@@ -64,21 +83,32 @@ def test_ways_have_names_that_differ():
 
 @pytest.mark.usefixtures("clock")
 def test_errors_and_times_are_recorded(one, tmp_path, monkeypatch):
-    monkeypatch.setattr(factors, "metal", lambda *_, **__: STUDY)
+    monkeypatch.setattr(factors, "studies", lambda run: {"metal": STUDY, "cake": STUDY})
     monkeypatch.setattr(factors, "tested", lambda study: one._replace(
         study=study, tests={value: one.tests[value] for value in study.test}))
-    monkeypatch.setattr(factors, "WAYS", {"quick": (DRAWN, WEIGHED)})
+    monkeypatch.setattr(factors, "WAYS", {("quick", "metal"): (DRAWN, WEIGHED),
+                                          ("quick", "cake"): (CELLS,)})
     assert not run_all([factors.factors.experiment], Setting("quick", tmp_path))
     found = Results(tmp_path)
     table = found.table("nsf.factors", "ways")
-    for k, way in enumerate((DRAWN, WEIGHED)):
-        expected = one.errors(0.4, way.samples, 0, 1.0, way.weighed)
+    assert table["scene"].tolist() == ["metal", "metal", "cake"]
+    for k, way in enumerate((DRAWN, WEIGHED, CELLS)):
+        expected = way.of(one).errors(0.4, way.samples, 0, 1.0, way is not DRAWN)
         assert table["error"][k] == table["largest"][k] == pytest.approx(expected.errors.origin)
         assert table["displacement"][k] == pytest.approx(expected.errors.displacement)
         assert table["stress"][k] == pytest.approx(expected.stress)
         assert table["kept"][k] == expected.kept
     assert table["speedup"] == pytest.approx(100.0 / table["reduced"])
     records = {r.target: r for r in found.records("nsf.factors")}
-    assert records["nsf.factors.drawn.30.1.error"].value == pytest.approx(100.0 * table["error"][0])
-    assert records["nsf.factors.drawn.30.1.speedup"].value == table["speedup"][0]
+    start = "nsf.factors.metal.drawn.30.1"
+    assert records[f"{start}.error"].value == pytest.approx(100.0 * table["error"][0])
+    assert records[f"{start}.speedup"].value == table["speedup"][0]
     assert np.isfinite(table["points"]).all()
+    note = records["nsf.factors.cake.cells.4.1.speedup"].note
+    assert note.startswith(f"{table['kept'][2]:g} samples with weights in few cells, steps 1 times")
+
+
+def test_the_cake_is_smoother():
+    found = factors.studies(Records())
+    assert [found[name].sizes.smoothing for name in ("metal", "cake")] == [1e-2, 1.0]
+    assert {(Records.profile, name) for name in found} <= {*factors.WAYS}

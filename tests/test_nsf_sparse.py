@@ -9,7 +9,7 @@ from small_nsf_studies import modelled, write
 from small_toys import Records
 
 from mpm_ref.reduced import inferring, maps
-from mpm_ref.reduced.inferring import Chosen, Plan, drawn, infer, weighed
+from mpm_ref.reduced.inferring import Chosen, Plan, clustered, drawn, infer, weighed
 from mpm_ref.reduced.nsf import watch
 from mpm_ref.reduced.nsf.recording import plan_of
 from mpm_ref.reduced.study import load
@@ -41,26 +41,33 @@ def test_they_are_told_by_the_command(made, tmp_path, monkeypatch):
                 in done.stderr) is warned
 
 
-def test_a_run_on_samples_with_weights_is_that_of_their_plan(made, tmp_path, monkeypatch):
+@pytest.mark.parametrize(("asked", "pick", "words"), [
+    ("points = 9\nseed = 2\nweighed = true", lambda fields, one: weighed(fields, len(one.X), 9, 2),
+     "9 points at most, with weights"),
+    ("cells = 4\nseed = 2", lambda fields, one: clustered(fields, one.problem, len(one.X), 4, 2),
+     "points of 4 cells at most, with weights")])
+def test_a_run_on_samples_with_weights_is_that_of_their_plan(made, tmp_path, monkeypatch, asked,
+                                                             pick, words):
     """By `rom run` and by `rom evaluate`; of networks there are none. The seed draws candidates."""
     monkeypatch.setattr(inferring, "CANDIDATES", 40)
-    study, out = write(tmp_path, ("points = 20", "points = 9\nseed = 2\nweighed = true")), (
-        tmp_path / "run.h5")
+    monkeypatch.setattr(inferring, "CELLS", 12)
+    study, out = write(tmp_path, ("points = 20", asked)), tmp_path / "run.h5"
     done = mpm_ref("rom", "run", study, "--map", made / "fields.npz", "--out", out, "--set", "v=2")
     assert done.exit_code == 0, done.output
     model, one = maps.read(made / "fields.npz"), whole(load(study).scene([2.0]))
     fields = model.decoder.of([2.0])
-    chosen = weighed(fields, len(one.X), 9, 2)
+    chosen = pick(fields, one)
     *_, (_, last, report) = infer(one, fields, Plan((chosen,)), model.rest)
     with Results(out) as results:
         assert np.array_equal(results.h5["reduced/xhat"][-1], last.xhat)
-        assert results.h5["reduced/samples"][-1] == report.samples == len(chosen.points) <= 9
-    assert "9 points at most, with weights" in mpm_ref("info", study).stdout
+        assert results.h5["reduced/samples"][-1] == report.samples == len(chosen.points)
+    assert words in mpm_ref("info", study).stdout
     errors = mpm_ref("rom", "evaluate", study, "--map", made / "fields.npz", "--data",
                      made / "data", "--out", tmp_path / "e.png", "--json")
     assert errors.exit_code == 0, errors.output
-    with pytest.raises(ValueError, match="weighed = true: weights of samples are told by modes"):
-        plan_of(load(study).tables.run, 40, SimpleNamespace(dim=2, r=3))
+    said = f"{asked.splitlines()[0 if 'cells' in asked else -1]}: weights of samples are told by"
+    with pytest.raises(ValueError, match=said):
+        plan_of(load(study).tables.run, one.problem, SimpleNamespace(dim=2, r=3, X=one.X))
 
 
 def test_of_networks_nothing_is_known():

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from mpm_ref import scene
+from mpm_ref.reduced import inferring
 from mpm_ref.reduced.inferring import (
     Chosen,
     Plan,
     begin,
+    clustered,
     drawn,
     infer,
     require_sound,
@@ -19,6 +21,7 @@ from mpm_ref.reduced.vary import varied
 from mpm_ref.reduced.whole import history, whole
 from mpm_ref.rom.cubature import cubature
 from mpm_ref.rom.histories import joined
+from mpm_ref.rom.reach import bases
 from mpm_ref.rom.spanned import Sizes, spanned
 
 TOML = """
@@ -172,6 +175,39 @@ def test_weighed_samples_are_better_than_drawn_ones(disks, runs):
     assert np.array_equal(by.w, known.w)
     assert by.misfit == known.misfit
     assert worst(by) < np.median([worst(drawn(n, 8, seed)) for seed in range(5)])
+
+
+def test_samples_of_few_cells_have_the_nodes_of_each_other(disks, runs):
+    """So that a step on them asks for fewer points than on as many that lie anywhere."""
+    fields, xhat = spanned(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
+    scene, n = whole(disks(1.8)), len(runs.X)
+    few = clustered(fields, scene.problem, n, 3, 0)
+    base = bases(scene.X, scene.problem.dx, scene.problem.scheme.degree)
+    assert len(np.unique(base[few.points], axis=0)) <= 3 < len(few.points)
+    assert few.misfit < weighed(fields, n, 3, 0).misfit
+    rest = xhat[:, 0].mean(axis=0)
+    points = [np.mean([report.points for _, _, report in list(
+        infer(scene, fields, Plan((chosen,)), rest))[1:]])
+        for chosen in (few, drawn(n, len(few.points), 0))]
+    assert points[0] < points[1]
+
+
+def test_samples_of_cells_are_some_of_those_asked_for(disks, runs):
+    fields, _ = spanned(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
+    among = np.arange(10, len(runs.X), 2)
+    found = clustered(fields, whole(disks(1.8)).problem, among, 5, 0, since=0.5)
+    assert np.isin(found.points, among).all()
+    assert found.since == 0.5
+
+
+def test_cells_are_those_of_random_candidates(disks, runs, monkeypatch):
+    monkeypatch.setattr(inferring, "CELLS", 4)
+    fields, _ = spanned(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
+    problem, n = whole(disks(1.8)).problem, len(runs.X)
+    base = [tuple(one) for one in bases(runs.X, problem.dx, problem.scheme.degree)]
+    for seed in range(3):
+        offered = {base[p] for p in drawn(n, 4, seed).points}
+        assert {base[p] for p in clustered(fields, problem, n, 4, seed).points} <= offered
 
 
 def test_more_samples_than_points_are_refused():

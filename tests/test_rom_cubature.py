@@ -92,3 +92,53 @@ def test_points_where_modes_vanish_are_refused(modes):
     still[:50] = 0.0
     with pytest.raises(ValueError, match="0 points of 50 have a weight, too few for 3 latent"):
         cubature(still, R_FREE, np.arange(50), 20)
+
+
+# Cell by cell.
+
+CELL = np.arange(N) // 8    # of points next to each other in the list
+
+
+def test_points_are_those_of_so_many_cells(modes):
+    found = cubature(modes, R_FREE, np.arange(N), 4, CELL)
+    assert len({*CELL[found.points]}) <= 4 < len(found.points)
+    assert (found.w > 0.0).all()
+    assert found.w.mean() == pytest.approx(1.0)
+    assert (np.diff(found.points) > 0).all()
+
+
+def test_points_of_a_cell_leave_less_than_one_of_it(modes):
+    for count in (2, 4, 8):
+        alone, all = (cubature(modes, R_FREE, np.arange(N), count, cell).misfit
+                      for cell in (None, CELL))
+        assert all < alone
+
+
+def test_cells_of_one_point_are_points(modes):
+    one, other = (cubature(modes, R_FREE, np.arange(N), 20, cell) for cell in (None, np.arange(N)))
+    assert np.array_equal(one.points, other.points)
+    assert one.w == pytest.approx(other.w)
+
+
+def test_cells_are_taken_of_the_points_that_are_offered(modes):
+    among = np.flatnonzero(np.isin(CELL, (3, 7, 11)))
+    own = np.unique(CELL[among], return_inverse=True)[1]
+    found = cubature(modes, R_FREE, among, 20, own)
+    assert {*CELL[found.points]} <= {3, 7, 11}
+
+
+def test_the_best_cell_comes_first(modes):
+    """By hand: of all single cells the one whose points, each for itself, lie most along what is
+    wanted; others are not looked at.
+    """
+    A = np.einsum("pdk,pdl->klp", modes[:, :, :R_FREE], modes).reshape(-1, N)
+    along = np.maximum(A.T @ np.eye(R_FREE, modes.shape[2]).ravel(), 0.0)
+    worth = [np.linalg.norm(along[CELL == k]) / np.linalg.norm(A[:, CELL == k])
+             for k in range(N // 8)]
+    found = cubature(modes, R_FREE, np.arange(N), 1, CELL)
+    assert {*CELL[found.points]} == {int(np.argmax(worth))}
+
+
+def test_cells_where_modes_vanish_are_refused(modes):
+    with pytest.raises(ValueError, match="0 points of 400 have a weight"):
+        cubature(np.zeros_like(modes), R_FREE, np.arange(N), 3, CELL)

@@ -50,7 +50,8 @@ def test_each_kind_of_samples_is_run_and_all_particles(one, results, monkeypatch
                             for draw in (0, 1))}
     for word, weighed in nsf.WAYS.items():
         row = (table["fields"] == word) & (table["samples"] == 30) & (table["draw"] == 1)
-        expected = one.errors(TEST, 30, 1, weighed=weighed)
+        own = one._replace(study=STUDY._replace(cells=word == "cells"))
+        expected = own.errors(TEST, 30, 1, weighed=weighed)
         assert table["origin"][row] == pytest.approx(expected.errors.origin)
         assert table["points"][row] == pytest.approx(expected.points)
         assert table["kept"][row] == expected.kept
@@ -62,7 +63,9 @@ def test_each_kind_of_samples_is_run_and_all_particles(one, results, monkeypatch
         f"trade.nsf.samples.jelly.{way}.{count}" for way in nsf.WAYS for count in (5, 30))}
     told = {way: records[f"trade.nsf.samples.jelly.{way}.30"].note for way in nsf.WAYS}
     assert "30 samples, random; of the stress" in told["random"]
-    assert f"30 samples, cubature, {expected.kept:g} kept, whose weights" in told["cubature"]
+    assert f"30 cells, cubature of their points, {expected.kept:g} kept, whose" in told["cells"]
+    kept = one.errors(TEST, 30, 0, weighed=True).kept, one.errors(TEST, 30, 1, weighed=True).kept
+    assert f"30 samples, cubature, {np.mean(kept):g} kept, whose weights" in told["cubature"]
 
 
 def test_a_run_that_breaks_down_has_no_time(one, monkeypatch):

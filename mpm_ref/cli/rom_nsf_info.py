@@ -35,8 +35,15 @@ def learned(facts):
     map, run = facts["map"], facts["run"]
     longer = f", steps {run['faster']:g} times as long" if run["faster"] != 1.0 else ""
     return (f"stress fields: {map['kind']}, r = {map['r']}, {sizes(map)}; reduced runs: "
-            f"{run['inversion']} inversion, {run['points'] or 'all'} points"
-            f"{' at most, with weights' if run['weighed'] else ''}{longer}")
+            f"{run['inversion']} inversion, {samples(run)}{longer}")
+
+
+def samples(run):
+    """Which points are samples, in words."""
+    if run.get("cells"):
+        return f"points of {run['cells']} cells at most, with weights"
+    return (f"{run['points'] or 'all'} points"
+            f"{' at most, with weights' if run['weighed'] else ''}")
 
 
 def making(about):

@@ -6,8 +6,10 @@ import numpy as np
 
 from ..rom.cubature import CANDIDATES, cubature
 from ..rom.inferred import Inferred, Position, nearest
+from ..rom.reach import bases
 
 ENOUGH = 4000       # points that tell where a body is at the start
+CELLS = 400         # those of so many random points are candidates
 
 
 class Chosen(NamedTuple):
@@ -104,4 +106,18 @@ def weighed(fields, among, count, seed, since=0.0):
     most = among if np.ndim(among) == 0 else len(among)
     some = drawn(among, min(CANDIDATES, most), seed).points
     found = cubature(fields.U, fields.r, some, count)
+    return Chosen(since, found.points, found.w, found.misfit)
+
+
+def clustered(fields, problem, among, count, seed, since=0.0):
+    """`Chosen` samples with weights as of `weighed`, in at most `count` cells, those of random
+    candidates: points that have the same nodes at rest. Raises ValueError for too few.
+    """
+    numbers = np.arange(among) if np.ndim(among) == 0 else among
+    base = bases(fields.X[numbers], problem.dx, problem.scheme.degree)
+    _, cell = np.unique(base, axis=0, return_inverse=True)
+    middle = drawn(len(numbers), min(CELLS, len(numbers)), seed).points
+    offered = np.flatnonzero(np.isin(cell, cell[middle]))
+    _, own = np.unique(cell[offered], return_inverse=True)
+    found = cubature(fields.U, fields.r, numbers[offered], count, own)
     return Chosen(since, found.points, found.w, found.misfit)

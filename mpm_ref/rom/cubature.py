@@ -7,7 +7,8 @@ step by step the trace becomes a drift. So points p and weights w_p >= 0 are sou
     sum_p w_p U_kp . U_lp = sum over all points of the same = delta_kl,    k <= r,  l <= R
 
 as [AnKimJames2008] does for forces: one by one, the point first that lessens what is left most, all
-weights anew each time by non-negative least squares.
+weights anew each time by non-negative least squares. Or cell by cell with all points of each: those
+that share their nodes ask for the same others around them, so more of them cost a step little.
 """
 
 from typing import NamedTuple
@@ -29,20 +30,21 @@ class Cubature(NamedTuple):
     misfit: float           # || what is left || / || right side ||
 
 
-def cubature(U, r, among, count):
+def cubature(U, r, among, count, cell=None):
     """`Cubature` of at most `count` of the points `among`, for modes U (n, d, R), orthonormal over
     all points, of which the first r are asked for. There are r R - r (r - 1) / 2 different
-    products, and no more points are kept. Raises ValueError for too few points, RuntimeError where
-    the least squares do not end.
+    products, and no more points are kept. cell: the number of the cell of each of them, 0 and on;
+    then of points in at most `count` cells. Raises ValueError for too few points, RuntimeError
+    where the least squares do not end.
     """
     among = np.asarray(among)
-    if not r <= count * U.shape[1]:
+    if cell is None and not r <= count * U.shape[1]:
         raise ValueError(f"{count} samples for {r} latent coordinates: expected at least "
                          f"{-(-r // U.shape[1])}")
     A = np.einsum("pdk,pdl->klp", U[among][:, :, :r], U[among]).reshape(-1, len(among))
     b = np.eye(r, U.shape[2]).ravel()
     with one_thread():
-        chosen, w = chosen_of(A, b, min(count, len(among)))
+        chosen, w = chosen_of(A, b, count, cell)
     points, kept = among[chosen], w > 0.0
     if kept.sum() * U.shape[1] < r:
         raise ValueError(f"{kept.sum()} points of {len(among)} have a weight, too few for {r} "
@@ -61,20 +63,39 @@ def misfit(U, r, points):
     return float(np.linalg.norm(scale * found - wanted) / np.linalg.norm(wanted))
 
 
-def chosen_of(A, b, count):
-    """Columns of A (m, n), at most `count`, and their weights >= 0, with A w = b as nearly as the
-    search finds.
+def chosen_of(A, b, count, cell=None):
+    """Columns of A (m, n), at most `count` or those of so many cells, and their weights >= 0, with
+    A w = b as nearly as the search finds.
     """
-    length, chosen, w, left = np.linalg.norm(A, axis=0), [], np.zeros(0), b
-    length = np.where(length > 0.0, length, np.inf)
+    parts = np.arange(A.shape[1])[:, None] if cell is None else members(cell)
+    length = np.linalg.norm(A, axis=0)
+    taken, chosen, w, left = [], np.zeros(0, dtype=int), np.zeros(0), b
+    count = min(count, len(parts))
     at_once = -(-count // ROUNDS)
-    while len(chosen) < count:
-        gain = A.T @ left / length
-        gain[chosen] = -np.inf
-        best = np.argsort(gain)[::-1][:min(at_once, count - len(chosen))]
+    while len(taken) < count:
+        gain = gains(A.T @ left, length, cell)
+        gain[taken] = -np.inf
+        best = np.argsort(gain)[::-1][:min(at_once, count - len(taken))]
         if gain[best[0]] <= 1e-12 * np.linalg.norm(b):
             break
-        chosen += best.tolist()
+        taken += best.tolist()
+        chosen = np.concatenate([parts[k] for k in taken])
         w, _ = nnls(A[:, chosen], b)
         left = b - A[:, chosen] @ w
-    return np.array(chosen, dtype=int), w
+    return chosen, w
+
+
+def gains(along, length, cell):
+    """What columns of these lengths (n,), or cells of them, are worth that lie `along` (n,) what is
+    left: their component, and of a cell's that of all that are of use, over the length of all.
+    """
+    if cell is None:
+        return along / np.where(length > 0.0, length, np.inf)
+    use, whole = (np.bincount(cell, a**2) for a in (np.maximum(along, 0.0), length))
+    return np.sqrt(use / np.where(whole > 0.0, whole, np.inf))
+
+
+def members(cell):
+    """Numbers of the columns of each cell."""
+    order = np.argsort(cell, kind="stable")
+    return np.split(order, np.cumsum(np.bincount(cell))[:-1])

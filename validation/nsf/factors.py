@@ -1,5 +1,5 @@
-"""Where a speed-up of reduced runs comes from, and what each part of it costs in error: the metal
-frame at the printed resolution, whole runs, both on the same threads.
+"""Where a speed-up of reduced runs comes from, and what each part of it costs in error: metal frame
+and cake at the printed resolution, whole runs, both on the same threads.
 
 Fewer samples, samples with weights in place of drawn ones, and longer steps. Fields are those of
 all training runs; what singular values and return map take of a full step is told by `speed`.
@@ -19,47 +19,77 @@ from mpm_ref.simulate import simulate
 from ..registry import experiment
 from ..verification.scenes import with_
 from .errors import mean, rows_of
-from .studies import metal
+from .studies import cake, metal
 from .tested import FASTER, tested
 
 REPEATS = 3
-COLUMNS = ("samples", "weighed", "faster", "kept", "points", "error", "largest", "displacement",
+DRAWN, WEIGHED, CELLS = "drawn", "weighed", "cells"     # kinds of samples
+KINDS = {DRAWN: "{:g} samples drawn", WEIGHED: "{:g} samples with weights",
+         CELLS: "{:g} samples with weights in few cells"}
+COLUMNS = ("samples", "kind", "faster", "kept", "points", "error", "largest", "displacement",
            "stress", "full", "reduced", "speedup")
 
 
 class Way(NamedTuple):
     """How reduced runs are made."""
 
-    samples: int            # at most
-    weighed: bool           # whether they have weights by cubature
+    samples: int            # at most; of CELLS as many cells
+    kind: str               # of KINDS
     faster: float           # length of a step over that of the scene
 
     @property
     def words(self):
         """As a part of an id."""
-        return f"{'weighed' if self.weighed else 'drawn'}.{self.samples}.{self.faster:g}"
+        return f"{self.kind}.{self.samples}.{self.faster:g}"
+
+    def of(self, one):
+        """`Tested` with samples of this kind, whose weights are of samples anywhere."""
+        study = one.study
+        if self.kind != DRAWN:
+            study = study._replace(column=None, later=None, cells=self.kind == CELLS)
+        return one._replace(study=study)
 
 
-WAYS = {"quick": (Way(30, False, 1.0), Way(10, True, 3.0)),
-        "standard": (Way(50, False, 1.0), Way(30, False, 1.0), Way(30, False, FASTER),
-                     Way(20, True, 1.0), Way(10, True, 1.0), Way(10, True, FASTER),
-                     Way(10, True, 2.0), Way(10, True, 3.0), Way(10, True, 4.0))}
+WAYS = {("quick", "metal"): (Way(30, DRAWN, 1.0), Way(10, WEIGHED, 3.0)),
+        ("quick", "cake"): (Way(10, CELLS, 1.0),),
+        ("standard", "metal"): (
+            Way(50, DRAWN, 1.0), Way(30, DRAWN, 1.0), Way(30, DRAWN, FASTER), Way(20, WEIGHED, 1.0),
+            Way(10, WEIGHED, 1.0), Way(10, WEIGHED, FASTER), Way(10, WEIGHED, 2.0),
+            Way(10, WEIGHED, 3.0), Way(10, WEIGHED, 4.0), Way(5, CELLS, 1.0), Way(5, CELLS, 2.0)),
+        ("standard", "cake"): (
+            Way(700, DRAWN, 1.0), Way(700, DRAWN, FASTER), Way(20, WEIGHED, 1.0),
+            Way(20, CELLS, 1.0), Way(8, CELLS, 1.0), Way(8, CELLS, FASTER), Way(8, CELLS, 2.0))}
 
 
 @experiment("nsf.factors", title="NSF: where a speed-up comes from",
-            profiles=("quick", "standard"), budget={"quick": 20, "standard": 600})
+            profiles=("quick", "standard"), budget={"quick": 40, "standard": 1500})
 def factors(run):
     """Errors over two tests, one draw; times of the first, medians of runs in turn."""
-    study = run.choose(quick=lambda: metal(4, train=4), standard=metal)()
-    one = tested(study._replace(test=study.test[1:run.choose(quick=2, standard=3)]))
-    ways = WAYS[run.profile]
+    rows = [(name, *row) for name, study in studies(run).items()
+            for row in of_scene(run, name, study._replace(
+                test=study.test[1:run.choose(quick=2, standard=3)]))]
+    run.table("ways", ("scene", *COLUMNS), rows)
+
+
+def studies(run):
+    """{name: `Study`}: metal frame and cake, whose fields are smoother here than where samples are
+    many.
+    """
+    frame, whole_cake = run.choose(quick=lambda: (metal(4, train=4), cake(4, train=3)),
+                                   standard=lambda: (metal(), cake()))()
+    return {"metal": frame,
+            "cake": whole_cake._replace(sizes=whole_cake.sizes._replace(smoothing=1.0))}
+
+
+def of_scene(run, name, study):
+    """Record all ways of a scene; their rows."""
+    one, ways, rows = tested(study), WAYS[run.profile, name], []
     full, reduced = taken(one, ways, run.choose(quick=1, standard=REPEATS))
-    rows = []
-    for way, seconds in run.progress(list(zip(ways, reduced, strict=True)), "errors"):
-        found = rows_of(one, way.words, way.samples, (0,), way.faster, way.weighed)
+    for way, seconds in run.progress(list(zip(ways, reduced, strict=True)), f"{name}, errors"):
+        found = rows_of(way.of(one), way.words, way.samples, (0,), way.faster, way.kind != DRAWN)
         rows.append((*way, *row_of(found), full, seconds, full / seconds))
-        record(run, one, way, rows[-1])
-    run.table("ways", COLUMNS, rows)
+        record(run, f"nsf.factors.{name}.{way.words}", one, rows[-1])
+    return rows
 
 
 def taken(one, ways, repeats):
@@ -80,7 +110,8 @@ def taken(one, ways, repeats):
 def plan_of(one, way):
     """`Plan` of a `Way`."""
     scene = whole(one.study.run(one.study.test[0]))
-    sets = one.study.chosen(scene, way.samples, 0, one.fields if way.weighed else None)
+    by = None if way.kind == DRAWN else one.fields
+    sets = way.of(one).study.chosen(scene, way.samples, 0, by)
     return Plan(sets, way.faster)
 
 
@@ -107,12 +138,11 @@ def row_of(found):
             mean(found, "displacement"), mean(found, "stress"))
 
 
-def record(run, one, way, row):
+def record(run, id, one, row):
     """Record error and speed-up of a `Way`, with what belongs to them."""
     known = dict(zip(COLUMNS, row, strict=True))
-    id, kind = f"nsf.factors.{way.words}", "with weights" if way.weighed else "drawn"
-    note = (f"{known['kept']:g} samples {kind}, steps {way.faster:g} times as long, "
-            f"{known['points']:.0f} integration points")
+    note = (f"{KINDS[known['kind']].format(known['kept'])}, steps {known['faster']:g} times as "
+            f"long, {known['points']:.0f} integration points")
     run.record(f"{id}.error", 100.0 * known["error"], unit="%", comparator="info", scale=one.scale,
                note=f"{note}; the largest {100.0 * known['largest']:.3g} %, of the displacement "
                     f"{100.0 * known['displacement']:.3g} %, of the stress "

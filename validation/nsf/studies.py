@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.reduced.inferring import drawn, weighed
+from mpm_ref.reduced.inferring import clustered, drawn, weighed
 from mpm_ref.reduced.vary import varied
 from mpm_ref.rom.spanned import Sizes
 from mpm_ref.scene import Poisson
@@ -33,6 +33,7 @@ class Study(NamedTuple):
     every: int = 1          # steps of the scene between the snapshots that fields are made of
     column: float | None = None     # radius of the upright one that samples are drawn from [dx]
     later: int | None = None        # |S| in the second half, if another
+    cells: bool = False     # whether samples with weights are those of so many cells
 
     def run(self, value):
         """The scene of a run."""
@@ -51,13 +52,14 @@ class Study(NamedTuple):
     def chosen(self, one, count, draw, fields=None):
         """Sample sets of a run of a `Whole` scene, as of `inferring.Plan`: `count` points drawn at
         random, of a column in the middle if the study has one, and others half-way; by cubature of
-        fields if these are given.
+        fields if these are given, point by point or cell by cell.
         """
         among = np.arange(len(one.X))
         if self.column is not None and count < len(among):
             off = one.X - 0.5 * (one.X.min(axis=0) + one.X.max(axis=0))
             among = np.flatnonzero(np.hypot(*off.T[:2]) <= self.column * one.problem.dx)
-        pick = drawn if fields is None else partial(weighed, fields)
+        by = partial(clustered, fields, one.problem) if self.cells else partial(weighed, fields)
+        pick = drawn if fields is None else by
         sets = [pick(among, count, draw)]
         if self.later is not None and count == self.samples:
             clock = one.problem.clock

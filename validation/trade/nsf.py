@@ -20,8 +20,11 @@ from ..verification.scenes import with_
 from .front import front
 
 COUNTS = {"quick": (10, 50), "standard": (5, 10, 20, 30, 50, 100, 200, 400)}
+CELLS = "cells"         # the points of so many
 DRAWS = {"quick": 2, "standard": 5}
-WAYS = {"random": False, "cubature": True}      # whether samples have weights
+WAYS = {"random": False, "cubature": True, CELLS: True}     # whether samples have weights
+SAID = {"random": "samples, random", "cubature": "samples, cubature",
+        CELLS: "cells, cubature of their points"}
 FACTORS = (1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 10.0)    # of the scene's step
 WORDS = "the full-order run {:.3g} CPU s, the reduced one {:.3g}"
 
@@ -37,7 +40,9 @@ class Sampling(NamedTuple):
 @experiment("trade.nsf.samples", title="NSF: error and cost by number and kind of samples",
             profiles=("quick", "standard"), budget={"quick": 15, "standard": 1100})
 def of_samples(run):
-    """Samples drawn at random, beside samples with weights by cubature; several draws."""
+    """Samples drawn at random, beside samples with weights by cubature, point by point or cell by
+    cell; several draws.
+    """
     rows = []
     for name, one in scenes(run):
         full, found = full_cpu(one), []
@@ -54,12 +59,13 @@ def of_samples(run):
 def of_sampling(run, one, sampling, full):
     """Record the errors with a `Sampling`; rows of all runs, and CPU seconds of one."""
     scene, way, count = sampling
+    one = one._replace(study=one.study._replace(cells=way == CELLS))
     draws = range(DRAWS[run.profile] if count < len(one.fields.X) else 1)
     rows = rows_of(one, way, count, draws, weighed=WAYS[way])
     cpu = reduced_cpu(one, count, WAYS[way], run.choose(quick=1, standard=3))
-    words = f"{way}, {weights(rows)}" if WAYS[way] else way
-    share(run, f"trade.nsf.samples.{scene}.{way}.{count}", rows, one.scale, f"{count} samples, "
-          f"{words}; of the stress {100.0 * mean(rows, 'stress'):.3g} %; "
+    what = SAID[way] + (f", {weights(rows)}" if WAYS[way] else "")
+    share(run, f"trade.nsf.samples.{scene}.{way}.{count}", rows, one.scale, f"{count} {what}; "
+          f"of the stress {100.0 * mean(rows, 'stress'):.3g} %; "
           f"{mean(rows, 'points'):.0f} integration points; {WORDS.format(full, cpu)}",
           comparator="info")
     return rows, cpu

@@ -32,7 +32,7 @@ def evaluate(study, model, histories):
         mu, data = histories.mu[k], (histories.x[k], histories.tau[k])
         one = whole(study.scene(mu))
         fields = of_run(model.decoder, one, mu)
-        plan = plan_of(study.tables.run, len(one.X), fields)
+        plan = plan_of(study.tables.run, one.problem, fields)
         found = {REDUCED: course(fields, *data, reduced(one, fields, plan, model.rest, study)),
                  NEAREST: course(fields, *data, closest(fields, data[0], model.rest))}
         yield Held(number, mu, {name: own[0] for name, own in found.items()},

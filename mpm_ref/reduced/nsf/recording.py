@@ -11,7 +11,7 @@ from ...rom.extent import Extent
 from ...rom.inferred import Position, Report
 from ...rom.spanned import Spanned
 from ...store import Fields
-from ..inferring import Plan, begin, continued, drawn, weighed
+from ..inferring import Plan, begin, clustered, continued, drawn, weighed
 from ..whole import Whole
 from .fields import of_run
 from .watch import look, sparse, trained
@@ -84,19 +84,29 @@ def body_of(name, x, v, matter, rest):
     return Body(name, particles._replace(tau=tau, C=C), None, NoFlow(), np.arange(len(points)))
 
 
-def plan_of(run, n, fields):
-    """`Plan` of a study's `Run` for n points. Raises ValueError for samples that do not suffice, or
+def plan_of(run, problem, fields):
+    """`Plan` of a study's `Run` of a `Problem`. Raises ValueError as `chosen` does."""
+    return Plan((chosen(run, problem, fields),), run.faster, run.inversion)
+
+
+def chosen(run, problem, fields):
+    """`Chosen` samples of a study's `Run`. Raises ValueError for samples that do not suffice, or
     are more than there are points, and for weights of samples without modes.
     """
+    n = len(fields.X)
     count = n if run.points is None else run.points
     if count * fields.dim < fields.r:
         raise ValueError(f"{count} samples for {fields.r} latent coordinates: expected at least "
                          f"{ceil(fields.r / fields.dim)}; give `points` of [run] more")
-    if run.weighed and not isinstance(fields, Spanned):
-        raise ValueError("weighed = true: weights of samples are told by modes, which networks "
+    if not (run.weighed or run.cells):
+        return drawn(n, count, run.seed)
+    if not isinstance(fields, Spanned):
+        asked = "weighed = true" if run.weighed else f"cells = {run.cells}"
+        raise ValueError(f"{asked}: weights of samples are told by modes, which networks "
                          "have not; leave it out, or make fields of modes")
-    chosen = weighed(fields, n, count, run.seed) if run.weighed else drawn(n, count, run.seed)
-    return Plan((chosen,), run.faster, run.inversion)
+    if run.weighed:
+        return weighed(fields, n, count, run.seed)
+    return clustered(fields, problem, n, run.cells, run.seed)
 
 
 def require_step(faster, steps):
@@ -110,7 +120,7 @@ def recording(whole, model, mu, run, facts):
     as `plan_of` and `require_step` do.
     """
     fields, clock = of_run(model.decoder, whole, mu), whole.problem.clock
-    plan = plan_of(run, len(whole.X), fields)
+    plan = plan_of(run, whole.problem, fields)
     require_step(run.faster, clock.steps)
     own = replace(clock, dt=run.faster * clock.dt, steps=plan.steps(clock), every=1)
     return Recording(whole, fields, model.rest, trained(fields, model.xhat), run, plan,

@@ -73,6 +73,7 @@ class Run(Table):
     points: Count | None = None                 # samples, drawn once; none: all points
     seed: Seed = 0                              # of that draw
     weighed: bool = False                       # whether they have weights, and are at most so many
+    cells: Count | None = None                  # of all samples, which then have weights, at most
     faster: Step = Plan(()).faster              # length of a step over that of the scene
     inversion: str = Plan(()).inversion
 
@@ -81,6 +82,9 @@ class Run(Table):
         if self.weighed and self.points is None:
             raise ValueError("weighed = true: expected `points` beside it, how many samples there "
                              "may be")
+        if self.cells is not None and (self.weighed or self.points is not None):
+            raise ValueError(f"cells = {self.cells}: samples are points of so many cells and have "
+                             "weights; expected neither `points` nor `weighed` beside it")
 
 
 class Tables(Runs, kw_only=True):
