@@ -15,10 +15,15 @@ from mpm_ref.reduced.nsf.recording import plan_of
 from mpm_ref.reduced.study import load
 from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.cubature import misfit
-from mpm_ref.store.results import Results
+from mpm_ref.rom.spanned import Sizes
+from mpm_ref.store.results import Results as Stored
 from validation.extremes import nsf_samples as samples
 from validation.extremes.ldm_runs import BAD, Trial
 from validation.extremes.nsf_runs import Bench, End
+from validation.nsf import tested
+from validation.nsf.studies import jelly
+from validation.results import Results
+from validation.run import Setting, run_all
 
 GOOD = End(2.0, 0.2, 15.0, 30, -1, "", 0.4, 5, 0.01, "")
 
@@ -58,7 +63,7 @@ def test_a_run_on_samples_with_weights_is_that_of_their_plan(made, tmp_path, mon
     fields = model.decoder.of([2.0])
     chosen = pick(fields, one)
     *_, (_, last, report) = infer(one, fields, Plan((chosen,)), model.rest)
-    with Results(out) as results:
+    with Stored(out) as results:
         assert np.array_equal(results.h5["reduced/xhat"][-1], last.xhat)
         assert results.h5["reduced/samples"][-1] == report.samples == len(chosen.points)
     assert words in mpm_ref("info", study).stdout
@@ -89,7 +94,7 @@ def test_bad_runs_that_their_samples_tell_are_counted():
     bad = 1.01 * BAD * 2.0
     found = [trial(bad), trial(bad), trial(bad, "beyond"), trial(), trial()]
     records = Records()
-    samples.record_told(records, found, [0.9, 0.1, 0.8, 0.9, 0.2])
+    samples.record_told(records, "extremes.nsf.samples", found, [0.9, 0.1, 0.8, 0.9, 0.2])
     share, note = records["extremes.nsf.samples.told"]
     assert share == pytest.approx(2 / 3)
     assert "share of the 3 bad runs" in note
@@ -105,3 +110,28 @@ def test_sets_are_few_drawn_ones_and_corners(rng):
         ("draw 0", 1), ("draw 0", 3), *((f"at the {place} corner", count)
                                         for place in ("lower", "upper") for count in (10, 100))]
     assert np.array_equal(found[1][1].points, drawn(150, 3, 0).points)
+
+
+def test_scenes_that_the_bound_has_not_seen_are_judged_by_it(tmp_path, monkeypatch):
+    """Others than those that it was chosen by, on samples anywhere; few, none in a corner."""
+    study = jelly(4)._replace(train=(0.3, 0.5), test=(0.4,), samples=40,
+                              sizes=Sizes(r=5, modes=8, tau=12, C=12, smoothing=1e-4))
+    monkeypatch.setattr(samples, "others", lambda run: {"cube": study})
+    assert not run_all([samples.unseen.experiment], Setting("quick", tmp_path))
+    found = Results(tmp_path)
+    table = found.table("extremes.nsf.unseen", "left")
+    assert list(zip(table["map"], table["what"], table["samples"], strict=True)) == [
+        ("cube", "draw 0", 1), ("cube", "draw 0", 3)]
+    one = tested.tested(study)
+    for count, left in zip((1, 3), table["left"], strict=True):
+        points = drawn(len(one.fields.X), count, 0).points
+        assert left == pytest.approx(misfit(one.fields.U, 5, points))
+    records = {r.target: r for r in found.records("extremes.nsf.unseen")}
+    assert {"extremes.nsf.unseen.told", "extremes.nsf.unseen.silent",
+            "extremes.nsf.unseen.cube.3.draw-0"} <= {*records}
+
+
+def test_they_are_other_scenes_with_samples_anywhere():
+    studies = samples.others(Records())
+    assert {*studies}.isdisjoint({"jelly", "metal"})
+    assert {(study.column, study.later) for study in studies.values()} == {(None, None)}

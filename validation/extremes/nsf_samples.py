@@ -9,6 +9,8 @@ from mpm_ref.reduced.inferring import Chosen
 from mpm_ref.reduced.nsf.watch import SPARSE
 from mpm_ref.rom.cubature import misfit
 
+from ..nsf.studies import ball, bread, cake, sand
+from ..nsf.tested import tested
 from ..registry import experiment
 from .ldm_runs import FLAGGED, SILENT, STOPPED, record_silent, table_of
 from .nsf_beyond import is_bad
@@ -28,14 +30,49 @@ def samples(run):
     for name, one in scenes(run):
         bench, fields = Bench(name, one), one.fields
         for what, chosen in run.progress(sets_of(bench, run.profile), f"{name}, sets"):
-            found.append(bench.trial(what, chosen))
-            left.append(misfit(fields.U, fields.r, chosen.points))
+            judge(bench, what, chosen, found, left)
             if len(chosen.points) * fields.dim < fields.r:
                 short.append(found[-1])
-    record_all(run, found)
     record_short(run, short)
-    record_told(run, found, left)
-    record_silent(run, "extremes.nsf.samples", found, ERRORS)
+    record_judged(run, "extremes.nsf.samples", found, left)
+
+
+@experiment("extremes.nsf.unseen", title="NSF: too few samples in scenes that the bound has not "
+            "seen", profiles=("quick", "standard"), budget={"quick": 30, "standard": 600})
+def unseen(run):
+    """Whether what samples leave of the products tells bad runs of scenes by which its bound was
+    not chosen.
+    """
+    found, left = [], []
+    for name, study in run.progress(others(run).items(), "scenes"):
+        bench = Bench(name, tested(study))
+        for what, chosen in run.progress(list(few(bench, run.profile)), f"{name}, sets"):
+            judge(bench, what, chosen, found, left)
+    record_judged(run, "extremes.nsf.unseen", found, left)
+
+
+def others(run):
+    """{name: `Study`} of the scenes by which the bound was not chosen, whose samples are anywhere;
+    but toothpaste, of which nearly all runs are bad.
+    """
+    found = run.choose(quick=lambda: {"ball": ball(4), "sand": sand(4, train=4)},
+                       standard=lambda: {"ball": ball(2), "sand": sand(2), "bread": bread(2),
+                                         "cake": cake(2)})()
+    return {name: study._replace(test=study.test[:2], column=None, later=None)
+            for name, study in found.items()}
+
+
+def judge(bench, what, chosen, found, left):
+    """Add the `Trial` of a run on `Chosen` samples, and what these leave of the products."""
+    found.append(bench.trial(what, chosen))
+    left.append(misfit(bench.one.fields.U, bench.one.fields.r, chosen.points))
+
+
+def record_judged(run, id, found, left):
+    """Record `Trial`s, and what their samples left."""
+    record_all(run, id, found)
+    record_told(run, id, found, left)
+    record_silent(run, id, found, ERRORS)
     run.table("left", LEFT, [(t.map, t.what, t.points, share, t.end.error, t.kind)
                              for t, share in zip(found, left, strict=True)])
     table_of(run, found)
@@ -44,10 +81,15 @@ def samples(run):
 def sets_of(bench, profile):
     """[(name, `Chosen`)] of samples: few, and many in a corner."""
     X = bench.one.fields.X
-    return [*((f"draw {draw}", bench.drawn(count, draw)) for count in COUNTS[profile]
-              for draw in range(DRAWS[profile])),
+    return [*few(bench, profile),
             *((f"at the {place} corner", clustered(X, corner, count))
               for place, corner in corners(X).items() for count in TOGETHER[profile])]
+
+
+def few(bench, profile):
+    """(name, `Chosen`) of few samples each."""
+    return ((f"draw {draw}", bench.drawn(count, draw)) for count in COUNTS[profile]
+            for draw in range(DRAWS[profile]))
 
 
 def corners(X):
@@ -60,18 +102,18 @@ def clustered(X, place, count):
     return Chosen(0.0, np.sort(KDTree(X).query(place, count)[1]))
 
 
-def record_all(run, trials):
-    """Record the error of every run."""
+def record_all(run, id, trials):
+    """Record the error of every run of an experiment."""
     for t in trials:
         words = t.what.replace(" ", "-")
-        run.record(f"extremes.nsf.samples.{t.map}.{t.points}.{words}", t.end.error, unit="%",
+        run.record(f"{id}.{t.map}.{t.points}.{words}", t.end.error, unit="%",
                    comparator="info", scale=f"{t.map}, {ERRORS}",
                    note="; ".join(filter(None, (
                        t.kind, f"with as many samples as usual {t.usual:.3g} %",
                        f"rank at least {t.end.rank}", t.end.said))))
 
 
-def record_told(run, trials, left):
+def record_told(run, id, trials, left):
     """Record the share of the bad runs that are told before they begin, by what their samples leave
     of the modes' products, and of those among them that nothing tells later.
     """
@@ -80,7 +122,7 @@ def record_told(run, trials, left):
         told[is_bad(t)].append((share > SPARSE, t.kind))
     bad, good = ([tells for tells, _ in told[wrong]] for wrong in (True, False))
     silent = [tells for tells, kind in told[True] if kind == SILENT]
-    run.record("extremes.nsf.samples.told", sum(bad) / max(len(bad), 1), comparator="info",
+    run.record(f"{id}.told", sum(bad) / max(len(bad), 1), comparator="info",
                scale=f"{len(trials)} runs", note=f"share of the {len(bad)} bad runs whose samples "
                f"leave more than {SPARSE:g} of the products; so do those of {sum(silent)} of the "
                f"{len(silent)} silent ones, and of {sum(good)} of the {len(good)} that are good")
