@@ -53,6 +53,7 @@ def test_records_follow_from_times(tmp_path, monkeypatch):
     n = len(whole(jelly(3).run(0.4)).X)
     monkeypatch.setattr(breakeven, "SCENES", {"jelly": SMALL})
     monkeypatch.setattr(breakeven, "seconds_of_a_point", lambda fields, points: 1.0)
+    monkeypatch.setattr(breakeven, "passes", lambda fields, points: (2.0, 6.0))
     monkeypatch.setattr(breakeven, "whole_steps", lambda study, steps: (2.0 * n, 1.0 * n))
     assert not run_all([breakeven.breakeven.experiment], Setting("quick", tmp_path))
     results = Results(tmp_path)
@@ -61,6 +62,29 @@ def test_records_follow_from_times(tmp_path, monkeypatch):
         assert found[f"nsf.breakeven.jelly.{word}.even"] == pytest.approx(100.0)
         assert found[f"nsf.breakeven.jelly.{word}.ten"] == pytest.approx(10.0)
         assert found[f"nsf.breakeven.jelly.{word}.speedup"] == pytest.approx(4.0)
+    nets = ["printed", *(f"networks-{width}" for width in breakeven.SWEEP)]
+    assert results.table("nsf.breakeven", "twins")["fields"].tolist() == nets
+    assert {found[f"nsf.breakeven.jelly.{word}.twin"] for word in nets} == {3.0}
     table = results.table("nsf.breakeven", "shares")
     assert len(table["fields"]) == 7
     assert table["bound"] == pytest.approx(table["products"] / found["nsf.breakeven.rate"])
+
+
+def test_both_passes_are_of_the_same_points(own, monkeypatch):
+    """Each is clocked by itself, on what the other has too."""
+    fields = next(fields for _, _, fields in kinds(own, SMALL, np.random.default_rng(0)))
+    made = []
+    monkeypatch.setattr(breakeven, "seconds", lambda work: made.append(work()) or 12.0)
+    asked = []
+    monkeypatch.setattr(breakeven, "infer", lambda *given: asked.append(given))
+    assert breakeven.passes(fields, np.array([0, 3, 7])) == (4.0, 4.0)
+    (g, h, l, X, xhat), = asked
+    assert (g, h, l) == (fields.g, fields.h, fields.l)
+    assert np.array_equal(X, fields.X[[0, 3, 7]])
+    assert np.array_equal(xhat, breakeven.latent(fields))
+
+
+def test_seconds_are_a_median_and_the_first_call_is_not_counted(monkeypatch):
+    ticks = iter(np.cumsum([0.0, 100.0, 1.0, 1.0, 1.0, 5.0, 1.0, 2.0, 1.0, 3.0, 1.0, 4.0]))
+    monkeypatch.setattr(breakeven, "perf_counter", lambda: next(ticks))
+    assert breakeven.seconds(lambda: None) == 3.0

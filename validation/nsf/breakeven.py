@@ -21,7 +21,8 @@ from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.architecture import DEPTH
 from mpm_ref.rom.decoder import Decoder, Units
 from mpm_ref.rom.field import Field, FieldUnits
-from mpm_ref.rom.learned import learned
+from mpm_ref.rom.inference import infer
+from mpm_ref.rom.learned import LearnedFields, learned
 from mpm_ref.rom.network import network
 from mpm_ref.rom.radial import Radial
 from mpm_ref.rom.spanned import Part, Sizes, Spanned, cells
@@ -35,7 +36,7 @@ REPEATS = 5
 SWEEP = (16, 32, 64, 128)               # widths of all three networks
 CENTRES = 600                           # of radial functions: 12 runs of 50 snapshots
 INPUTS, OUTPUTS = 9, (3, 6, 9)          # a point and six latent coordinates; of g, h and l
-
+TWINS = "scene", "fields", "layers", "points"
 
 class Scene(NamedTuple):
     """What is printed of a scene."""
@@ -46,6 +47,7 @@ class Scene(NamedTuple):
 
 
 SCENES = {"metal": Scene(metal, (96, 288, 432), 0.09), "cake": Scene(cake, (144, 384, 576), 0.067)}
+
 
 class Row(NamedTuple):
     """Fields of a kind in a scene."""
@@ -69,7 +71,7 @@ def breakeven(run):
     """Shares of integration points at which a reduced step takes as long as a full-order one, and a
     tenth of it, for networks of several widths and for modes.
     """
-    rate, rows = products_per_second(run.choose(quick=256, standard=1024)), []
+    rate, rows, twins = products_per_second(run.choose(quick=256, standard=1024)), [], []
     for name, scene in run.progress(SCENES.items(), "scenes"):
         study = scene.study(run.choose(quick=3, standard=1))
         full, deform = whole_steps(study, run.choose(quick=10, standard=50))
@@ -83,9 +85,13 @@ def breakeven(run):
                             cost.share(1.0), cost.share(10.0), scene.share,
                             cost.faster(scene.share)))
             recorded(run, rows[-1], n)
+            if isinstance(fields, LearnedFields):
+                twins.append((name, word, *passes(fields, points)))
+    record_twins(run, twins)
     run.record("nsf.breakeven.rate", rate, unit="1/s", **INFO,
                note="products, each with a sum, of a matrix product in double precision")
     run.table("shares", Row._fields, rows)
+    run.table("twins", TWINS, twins)
 
 
 class Cost(NamedTuple):
@@ -148,14 +154,44 @@ def seconds_of_a_point(fields, points):
     """Seconds of all that a step asks of the fields at points, for each; the median. Points are
     scattered at random: in a run they lie together around samples, so that some are read faster.
     """
-    xhat, took = np.linspace(-0.1, 0.1, fields.r), []
-    for _ in range(1 + REPEATS):
-        start = perf_counter()
+    xhat = latent(fields)
+
+    def asked():
         fields.place(points, xhat)
         fields.place(points, 0.9 * xhat)
         fields.stress(points, xhat)
         fields.affine(points, xhat)
-        took.append((perf_counter() - start) / len(points))
+
+    return seconds(asked) / len(points)
+
+
+def passes(fields, points):
+    """Seconds for a point of networks' positions with their derivatives, stress and affine field:
+    layer by layer, and point by point in one compiled pass (`rom.inference`).
+    """
+    xhat, X = latent(fields), fields.X[points]
+
+    def layers():
+        fields.derivatives(points, xhat)
+        fields.stress(points, xhat)
+        fields.affine(points, xhat)
+
+    return (seconds(layers) / len(points),
+            seconds(lambda: infer(fields.g, fields.h, fields.l, X, xhat)) / len(points))
+
+
+def latent(fields):
+    """Latent coordinates (r,) to ask at."""
+    return np.linspace(-0.1, 0.1, fields.r)
+
+
+def seconds(work):
+    """Of a call, after a first one; the median of REPEATS."""
+    took = []
+    for _ in range(1 + REPEATS):
+        start = perf_counter()
+        work()
+        took.append(perf_counter() - start)
     return float(np.median(took[1:]))
 
 
@@ -167,6 +203,15 @@ def products_per_second(size):
         A @ A
         took.append(perf_counter() - start)
     return size**3 / min(took)
+
+
+def record_twins(run, twins):
+    """Record how many times as long networks take point by point as layer by layer."""
+    for name, word, layers, points in twins:
+        run.record(f"nsf.breakeven.{name}.{word}.twin", points / layers, unit="x", **INFO,
+                   note=f"positions with derivatives, stress and affine field in one compiled "
+                        f"pass {1e6 * points:.3g} us a point, layer by layer "
+                        f"{1e6 * layers:.3g} us")
 
 
 def recorded(run, row, n):
