@@ -72,12 +72,15 @@ def test_a_full_disk_is_told_before_anything_is_written(monkeypatch, tmp_path):
 
 
 def test_fields_of_them_are_the_same(monkeypatch):
-    runs = [histories(runs=1)._replace(mu=np.array([[mu]])) for mu in (1.0, 2.0, 3.0)]
+    runs = [histories(runs=1)._replace(mu=np.array([[mu]]), v=np.full((1, 12, 2), mu))
+            for mu in (1.0, 2.0, 3.0)]
     runs = [run._replace(x=run.x * run.mu[0], tau=run.tau * run.mu[0]) for run in runs]
     known = joined(runs)
     fields, xhat = spanned(known, SIZES, 0.3)
     monkeypatch.setattr(held, "LARGEST", 0)
     far = joined(iter(runs), 3)
+    for name in ("v", "mu"):
+        assert np.array_equal(getattr(far, name), [getattr(run, name)[0] for run in runs])
     for name in ("x", "tau", "C"):
         assert mapped(getattr(far, name))
         assert np.array_equal(getattr(far, name), getattr(known, name))

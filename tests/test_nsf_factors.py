@@ -108,7 +108,8 @@ def test_errors_and_times_are_recorded(one, tmp_path, monkeypatch):
     assert note.startswith(f"{table['kept'][2]:g} samples with weights in few cells, steps 1 times")
 
 
-def test_the_cake_is_smoother():
+def test_the_cake_is_smoother_and_has_more_modes():
     found = factors.studies(Records())
     assert [found[name].sizes.smoothing for name in ("metal", "cake")] == [1e-2, 1.0]
+    assert [found[name].sizes.modes for name in ("metal", "cake")] == [20, 80]
     assert {(Records.profile, name) for name in found} <= {*factors.WAYS}

@@ -174,6 +174,7 @@ def test_weighed_samples_are_better_than_drawn_ones(disks, runs):
     assert len(by.points) <= 8
     assert np.array_equal(by.w, known.w)
     assert by.misfit == known.misfit
+    assert weighed(fields, n, 8, 0, since=0.5).since == 0.5
     assert worst(by) < np.median([worst(drawn(n, 8, seed)) for seed in range(5)])
 
 
