@@ -25,7 +25,7 @@ FLOORS = (
     ("core.collide",),
     ("core.boundary", "core.boundary_adjoint"),
     ("core",),
-    ("materials", "plain", "sealed archive", "cost", "learning", "held"),
+    ("materials", "plain", "sealed archive", "cost", "learning", "mapped"),
     ("body", "checkpoints"),
     ("fit",),
     ("explicit", "energy"),

@@ -73,11 +73,15 @@ def test_records_follow_from_times(tmp_path, monkeypatch):
 def test_both_passes_are_of_the_same_points(own, monkeypatch):
     """Each is clocked by itself, on what the other has too."""
     fields = next(fields for _, _, fields in kinds(own, SMALL, np.random.default_rng(0)))
-    made = []
+    made, layers = [], []
+    for name in ("derivatives", "stress", "affine"):
+        monkeypatch.setattr(type(fields), name,
+                            lambda self, points, xhat, name=name: layers.append((name, *points)))
     monkeypatch.setattr(breakeven, "seconds", lambda work: made.append(work()) or 12.0)
     asked = []
     monkeypatch.setattr(breakeven, "infer", lambda *given: asked.append(given))
     assert breakeven.passes(fields, np.array([0, 3, 7])) == (4.0, 4.0)
+    assert layers == [(name, 0, 3, 7) for name in ("derivatives", "stress", "affine")]
     (g, h, l, X, xhat), = asked
     assert (g, h, l) == (fields.g, fields.h, fields.l)
     assert np.array_equal(X, fields.X[[0, 3, 7]])

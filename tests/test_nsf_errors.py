@@ -5,7 +5,7 @@ import pytest
 from small_toys import Records
 
 from mpm_ref.core.grid import OutOfRange
-from mpm_ref.reduced.inferring import clustered
+from mpm_ref.reduced.inferring import of_cells
 from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.deformed import Deformed
 from validation.nsf import errors, tested
@@ -120,11 +120,11 @@ def test_samples_that_weights_keep_are_counted(cube):
 
 def test_samples_of_a_study_may_be_those_of_cells(cube):
     one = whole(cube.study.run(TEST))
-    chosen, = cube.study._replace(cells=True).chosen(one, 5, 1, cube.fields)
-    expected = clustered(cube.fields, one.problem, len(one.X), 5, 1)
+    chosen, = cube.study._replace(by_cell=True).chosen(one, 5, 1, cube.fields)
+    expected = of_cells(cube.fields, one.problem, len(one.X), 5, 1)
     assert np.array_equal(chosen.points, expected.points)
     assert np.array_equal(chosen.w, expected.w)
-    plain, = cube.study._replace(cells=True).chosen(one, 5, 1)
+    plain, = cube.study._replace(by_cell=True).chosen(one, 5, 1)
     assert plain.w is None
 
 

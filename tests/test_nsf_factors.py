@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from small_toys import Records
 
-from mpm_ref.reduced.inferring import clustered
+from mpm_ref.reduced.inferring import of_cells
 from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.spanned import Sizes
 from validation.nsf import factors, tested
@@ -60,7 +60,7 @@ def test_samples_of_a_way_are_drawn_or_weighed(one):
     assert len(weighed.points) <= 12
     assert (weighed.w > 0.0).all()
     scene = whole(STUDY.run(0.35))
-    expected = clustered(one.fields, scene.problem, len(scene.X), 4, 0)
+    expected = of_cells(one.fields, scene.problem, len(scene.X), 4, 0)
     assert np.array_equal(cells.points, expected.points)
     assert not np.array_equal(weighed.points, cells.points)
     assert factors.plan_of(one, LONGER).faster == 2.0
@@ -72,7 +72,7 @@ def test_samples_with_weights_are_anywhere(one):
     for way in (DRAWN, WEIGHED, CELLS):
         own = way.of(one._replace(study=study)).study
         assert (own.column, own.later) == ((2.0, 10) if way is DRAWN else (None, None))
-        assert own.cells is (way is CELLS)
+        assert own.by_cell is (way is CELLS)
 
 
 def test_ways_have_names_that_differ():
@@ -105,7 +105,8 @@ def test_errors_and_times_are_recorded(one, tmp_path, monkeypatch):
     assert records[f"{start}.speedup"].value == table["speedup"][0]
     assert np.isfinite(table["points"]).all()
     note = records["nsf.factors.cake.cells.4.1.speedup"].note
-    assert note.startswith(f"{table['kept'][2]:g} samples with weights in few cells, steps 1 times")
+    assert note.startswith("4 cells of samples with weights at most, "
+                           f"{table['kept'][2]:g} samples on average, steps 1 times")
 
 
 def test_the_cake_is_smoother_and_has_more_modes():

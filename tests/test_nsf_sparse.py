@@ -9,7 +9,7 @@ from small_nsf_studies import modelled, write
 from small_toys import Records
 
 from mpm_ref.reduced import inferring, maps
-from mpm_ref.reduced.inferring import Chosen, Plan, clustered, drawn, infer, weighed
+from mpm_ref.reduced.inferring import Chosen, Plan, drawn, infer, of_cells, weighed
 from mpm_ref.reduced.nsf import watch
 from mpm_ref.reduced.nsf.recording import plan_of
 from mpm_ref.reduced.study import load
@@ -49,13 +49,13 @@ def test_they_are_told_by_the_command(made, tmp_path, monkeypatch):
 @pytest.mark.parametrize(("asked", "pick", "words"), [
     ("points = 9\nseed = 2\nweighed = true", lambda fields, one: weighed(fields, len(one.X), 9, 2),
      "9 points at most, with weights"),
-    ("cells = 4\nseed = 2", lambda fields, one: clustered(fields, one.problem, len(one.X), 4, 2),
+    ("cells = 4\nseed = 2", lambda fields, one: of_cells(fields, one.problem, len(one.X), 4, 2),
      "points of 4 cells at most, with weights")])
 def test_a_run_on_samples_with_weights_is_that_of_their_plan(made, tmp_path, monkeypatch, asked,
                                                              pick, words):
     """By `rom run` and by `rom evaluate`; of networks there are none. The seed draws candidates."""
     monkeypatch.setattr(inferring, "CANDIDATES", 40)
-    monkeypatch.setattr(inferring, "CELLS", 12)
+    monkeypatch.setattr(inferring, "OFFERED", 12)
     study, out = write(tmp_path, ("points = 20", asked)), tmp_path / "run.h5"
     done = mpm_ref("rom", "run", study, "--map", made / "fields.npz", "--out", out, "--set", "v=2")
     assert done.exit_code == 0, done.output
@@ -94,7 +94,8 @@ def test_bad_runs_that_their_samples_tell_are_counted():
     bad = 1.01 * BAD * 2.0
     found = [trial(bad), trial(bad), trial(bad, "beyond"), trial(), trial()]
     records = Records()
-    samples.record_told(records, "extremes.nsf.samples", found, [0.9, 0.1, 0.8, 0.9, 0.2])
+    samples.record_told(records, "extremes.nsf.samples",
+                        list(zip(found, [0.9, 0.1, 0.8, 0.9, 0.2], strict=True)))
     share, note = records["extremes.nsf.samples.told"]
     assert share == pytest.approx(2 / 3)
     assert "share of the 3 bad runs" in note
@@ -121,11 +122,10 @@ def test_scenes_that_the_bound_has_not_seen_are_judged_by_it(tmp_path, monkeypat
     found = Results(tmp_path)
     table = found.table("extremes.nsf.unseen", "left")
     assert list(zip(table["map"], table["what"], table["samples"], strict=True)) == [
-        ("cube", "draw 0", 1), ("cube", "draw 0", 3)]
+        ("cube", "draw 0", 3)]
     one = tested.tested(study)
-    for count, left in zip((1, 3), table["left"], strict=True):
-        points = drawn(len(one.fields.X), count, 0).points
-        assert left == pytest.approx(misfit(one.fields.U, 5, points))
+    points = drawn(len(one.fields.X), 3, 0).points
+    assert table["left"] == pytest.approx([misfit(one.fields.U, 5, points)])
     records = {r.target: r for r in found.records("extremes.nsf.unseen")}
     assert {"extremes.nsf.unseen.told", "extremes.nsf.unseen.silent",
             "extremes.nsf.unseen.cube.3.draw-0"} <= {*records}

@@ -11,9 +11,9 @@ from mpm_ref.reduced.inferring import (
     Chosen,
     Plan,
     begin,
-    clustered,
     drawn,
     infer,
+    of_cells,
     require_sound,
     weighed,
 )
@@ -182,7 +182,7 @@ def test_samples_of_few_cells_have_the_nodes_of_each_other(disks, runs):
     """So that a step on them asks for fewer points than on as many that lie anywhere."""
     fields, xhat = spanned(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
     scene, n = whole(disks(1.8)), len(runs.X)
-    few = clustered(fields, scene.problem, n, 3, 0)
+    few = of_cells(fields, scene.problem, n, 3, 0)
     base = bases(scene.X, scene.problem.dx, scene.problem.scheme.degree)
     assert len(np.unique(base[few.points], axis=0)) <= 3 < len(few.points)
     assert few.misfit < weighed(fields, n, 3, 0).misfit
@@ -196,19 +196,19 @@ def test_samples_of_few_cells_have_the_nodes_of_each_other(disks, runs):
 def test_samples_of_cells_are_some_of_those_asked_for(disks, runs):
     fields, _ = spanned(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
     among = np.arange(10, len(runs.X), 2)
-    found = clustered(fields, whole(disks(1.8)).problem, among, 5, 0, since=0.5)
+    found = of_cells(fields, whole(disks(1.8)).problem, among, 5, 0, since=0.5)
     assert np.isin(found.points, among).all()
     assert found.since == 0.5
 
 
 def test_cells_are_those_of_random_candidates(disks, runs, monkeypatch):
-    monkeypatch.setattr(inferring, "CELLS", 4)
+    monkeypatch.setattr(inferring, "OFFERED", 4)
     fields, _ = spanned(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
     problem, n = whole(disks(1.8)).problem, len(runs.X)
     base = [tuple(one) for one in bases(runs.X, problem.dx, problem.scheme.degree)]
     for seed in range(3):
         offered = {base[p] for p in drawn(n, 4, seed).points}
-        assert {base[p] for p in clustered(fields, problem, n, 4, seed).points} <= offered
+        assert {base[p] for p in of_cells(fields, problem, n, 4, seed).points} <= offered
 
 
 def test_more_samples_than_points_are_refused():
@@ -238,9 +238,10 @@ def test_samples_are_there_from_the_start_on(disks, runs):
     ({"scheme": {"transfer": "mls"}}, "the transfer mls"),
     ({"clip": {"lower": [0.0, 0.0], "upper": [1.0, 1.0]}}, "a box that clips"),
     ({"body.soft.material": {"law": "fluid", "lam": 1e5}}, "a fluid"),
+    ({"integrator": "hot"}, "the implicit integrator"),
 ])
 def test_what_reduced_runs_do_not_know_is_refused(disks, changes, what):
-    with pytest.raises(ValueError, match=f"has {what}.*know none"):
+    with pytest.raises(ValueError, match=f"has {what}: reduced runs .* expect "):
         whole(disks(2.0, **changes))
 
 

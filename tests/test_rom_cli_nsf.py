@@ -264,7 +264,7 @@ def test_a_run_that_breaks_down_is_infinitely_off(made, pairs, tmp_path):
     assert found["all"]["reduced"]["origin"] is found["stress"]["all"]["reduced"] is None
     assert found["stress"]["runs"][0]["nearest"] > 1e3
     said = found["runs"][0]["broken"]["reduced"]
-    assert said.startswith("step 3: samples from ")
+    assert said == "step 1: a particle crosses more than 1 dx in a step"
     assert (f"run {number} (v = {pairs.mu[number, 0]:g}): the reduced run broke down in {said}"
             in done.stderr)
 

@@ -35,7 +35,7 @@ def reduced(made, out, *options, study="pairs.toml"):
     (("smoothing = 1e-6", "smoothing = -1.0"), "smoothing"),
     (("points = 20", "weighed = true"), "weighed = true: expected `points` beside it"),
     (("points = 20", "points = 20\ncells = 5"), "cells = 5: samples are points of so many cells"),
-    (("points = 20", "cells = 5\nweighed = true"), "weighed = true: expected `points` beside it"),
+    (("points = 20", "cells = 5\nweighed = true"), "neither `points` nor `weighed`"),
     (("points = 20", "points = 20\nweighed = true\ncells = 5"), "neither `points` nor `weighed`"),
     (("points = 20", "cells = 0"), "cells"),
     (("points = 20", 'inversion = "newton"'), "inversion = 'newton': expected one of"),

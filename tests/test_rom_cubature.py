@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from mpm_ref.rom.cubature import cubature, misfit
+from mpm_ref.rom.cubature import cubature, gains, misfit
 
 N, R_FREE = 400, 3
 
@@ -109,9 +109,9 @@ def test_points_are_those_of_so_many_cells(modes):
 
 def test_points_of_a_cell_leave_less_than_one_of_it(modes):
     for count in (2, 4, 8):
-        alone, all = (cubature(modes, R_FREE, np.arange(N), count, cell).misfit
-                      for cell in (None, CELL))
-        assert all < alone
+        alone, whole = (cubature(modes, R_FREE, np.arange(N), count, cell).misfit
+                        for cell in (None, CELL))
+        assert whole < alone
 
 
 def test_cells_of_one_point_are_points(modes):
@@ -127,18 +127,14 @@ def test_cells_are_taken_of_the_points_that_are_offered(modes):
     assert {*CELL[found.points]} <= {3, 7, 11}
 
 
-def test_the_best_cell_comes_first(modes):
-    """By hand: of all single cells the one whose points, each for itself, lie most along what is
-    wanted; others are not looked at.
-    """
-    A = np.einsum("pdk,pdl->klp", modes[:, :, :R_FREE], modes).reshape(-1, N)
-    along = np.maximum(A.T @ np.eye(R_FREE, modes.shape[2]).ravel(), 0.0)
-    worth = [np.linalg.norm(along[CELL == k]) / np.linalg.norm(A[:, CELL == k])
-             for k in range(N // 8)]
-    found = cubature(modes, R_FREE, np.arange(N), 1, CELL)
-    assert {*CELL[found.points]} == {int(np.argmax(worth))}
+def test_a_cell_is_worth_the_part_of_it_that_is_of_use():
+    """By hand: components 3, 4 and -12 of columns 5, 12 and 13 long."""
+    found = gains(np.array([3.0, 4.0, -12.0]), np.array([5.0, 12.0, 13.0]), np.array([0, 0, 1]))
+    assert found == pytest.approx([5.0 / 13.0, 0.0])
+    alone = gains(np.array([3.0, 4.0, -12.0]), np.array([5.0, 12.0, 0.0]), None)
+    assert alone == pytest.approx([0.6, 1.0 / 3.0, 0.0])
 
 
 def test_cells_where_modes_vanish_are_refused(modes):
-    with pytest.raises(ValueError, match="0 points of 400 have a weight"):
+    with pytest.raises(ValueError, match=r"0 points of 400 have a weight.*more cells"):
         cubature(np.zeros_like(modes), R_FREE, np.arange(N), 3, CELL)

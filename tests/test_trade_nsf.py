@@ -50,7 +50,7 @@ def test_each_kind_of_samples_is_run_and_all_particles(one, results, monkeypatch
                             for draw in (0, 1))}
     for word, weighed in nsf.WAYS.items():
         row = (table["fields"] == word) & (table["samples"] == 30) & (table["draw"] == 1)
-        own = one._replace(study=STUDY._replace(cells=word == "cells"))
+        own = one._replace(study=STUDY._replace(by_cell=word == "cells"))
         expected = own.errors(TEST, 30, 1, weighed=weighed)
         assert table["origin"][row] == pytest.approx(expected.errors.origin)
         assert table["points"][row] == pytest.approx(expected.points)

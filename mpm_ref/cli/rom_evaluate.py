@@ -46,7 +46,8 @@ def judge(
             if not study.test:
                 raise SceneError(f"{study.path}: test = 0: no run is held out to compare with")
             _, model = map_of(name, study, map)
-            snapshots = dataset.load(study, named(data, study, "-data"), study.test)
+            with faults.writing():
+                snapshots = dataset.load(study, named(data, study, "-data"), study.test)
             inferred = study.tables.model == NSF
             compare = nsf.evaluate if inferred else evaluate
             runs = passing(unit="run", iterable=compare(study, model, snapshots),

@@ -124,7 +124,8 @@ def train(
             require_map_place(out, study, overwrite)
             study = with_kind(study, kind)
             require_device(study.tables.map.kind, machine.device)
-            snapshots = dataset.load(study, data, study.train)
+            with writing():
+                snapshots = dataset.load(study, data, study.train)
             about = {"command": f"mpm-ref rom train {name} --data {data} --out {out} "
                                 f"--kind {study.tables.map.kind} {typed(machine)}"}
             with writing(), on_interrupt(lambda: resuming(checkpoint)):

@@ -70,7 +70,7 @@ def assigned(texts):
 
 def map_of(name, study, path):
     """(file, `Model`) of the map of a study by that name: the file given, else the study's own,
-    with a warning where that is of another kind or dimension. Raises ValueError.
+    with a warning where that was made otherwise than the study says. Raises ValueError.
     """
     file = named(path, study, ".npz")
     if not file.exists():
@@ -83,8 +83,17 @@ def map_of(name, study, path):
 
 
 def unlike(file, asked, model):
-    """The warning about a map of another kind or r than is asked for; or none."""
-    kind, r = model.about["map"]["kind"], model.decoder.r
+    """The warning about a map of another kind or r than is asked for, or else of other settings; or
+    none.
+    """
+    made, now = model.about["map"], asked.settings
+    kind, r = made["kind"], model.decoder.r
+    others = [key for key in now if made.get(key, now[key]) != now[key]]
     if (kind, r) != (asked.kind, asked.r):
-        yield (f"{file} is {kind}, r = {r}, where the study's [map] says {asked.kind}, r = "
-               f"{asked.r}: train again with --overwrite, or name the map with --map")
+        found, wanted = f"{kind}, r = {r}", f"{asked.kind}, r = {asked.r}"
+    elif others:
+        found, wanted = (", ".join(f"{key} = {of[key]}" for key in others) for of in (made, now))
+    else:
+        return
+    yield (f"{file} is {found}, where the study's [map] says {wanted}: train again with "
+           "--overwrite, or name the map with --map")

@@ -15,7 +15,8 @@ class Missing(ValueError):
 
 def load(study, folder, numbers):
     """`Snapshots` of the runs of these numbers, or for NSF's model `Histories`. Raises `Missing`,
-    and `BadResults` for files that are damaged, no results, or of another scene.
+    `BadResults` for files that are damaged, no results, or of another scene, and OSError as
+    `mapped.empty` does.
     """
     lacking = [k for k in numbers if not finished(file_of(folder, k), study.scene(study.mu[k]))]
     if lacking:

@@ -9,7 +9,8 @@ from ..rom.inferred import Inferred, Position, nearest
 from ..rom.reach import bases
 
 ENOUGH = 4000       # points that tell where a body is at the start
-CELLS = 400         # those of so many random points are candidates
+WITHIN = 1e-9       # of a step: one that ends so little after the scene is made
+OFFERED = 400       # cells of so many random points are candidates
 
 
 class Chosen(NamedTuple):
@@ -33,8 +34,8 @@ class Plan(NamedTuple):
         return [one for one in self.samples if one.since <= t][-1]
 
     def steps(self, clock):
-        """How many steps the run takes until the scene's `Clock` ends."""
-        return round(clock.steps / self.faster)
+        """How many steps the run takes within the scene's `Clock`."""
+        return int(clock.steps / self.faster * (1.0 + WITHIN))
 
 
 def model(whole, fields, inversion="nonlinear"):
@@ -87,12 +88,17 @@ def require_sound(sets, n):
                              "not all 0")
 
 
+def numbers_of(among):
+    """Numbers of points: of all, of which there are so many, or those given."""
+    return np.arange(among) if np.ndim(among) == 0 else among
+
+
 def drawn(among, count, seed, since=0.0):
     """`Chosen` samples that are drawn once and kept (NSF-sec5.4), `count` of `among`: how many
     points there are, or the numbers of those to draw from. Raises ValueError where there are not so
     many.
     """
-    numbers = np.arange(among) if np.ndim(among) == 0 else among
+    numbers = numbers_of(among)
     if not 1 <= count <= len(numbers):
         raise ValueError(f"{count} samples of {len(numbers)} points: expected 1 .. {len(numbers)}")
     some = np.random.default_rng(seed).choice(numbers, count, replace=False)
@@ -103,20 +109,19 @@ def weighed(fields, among, count, seed, since=0.0):
     """`Chosen` samples with weights, at most `count` of random candidates of `among` (as of
     `drawn`), by `rom.cubature` of `Spanned` fields. Raises ValueError for too few.
     """
-    most = among if np.ndim(among) == 0 else len(among)
-    some = drawn(among, min(CANDIDATES, most), seed).points
+    some = drawn(among, min(CANDIDATES, len(numbers_of(among))), seed).points
     found = cubature(fields.U, fields.r, some, count)
     return Chosen(since, found.points, found.w, found.misfit)
 
 
-def clustered(fields, problem, among, count, seed, since=0.0):
+def of_cells(fields, problem, among, count, seed, since=0.0):
     """`Chosen` samples with weights as of `weighed`, in at most `count` cells, those of random
     candidates: points that have the same nodes at rest. Raises ValueError for too few.
     """
-    numbers = np.arange(among) if np.ndim(among) == 0 else among
+    numbers = numbers_of(among)
     base = bases(fields.X[numbers], problem.dx, problem.scheme.degree)
     _, cell = np.unique(base, axis=0, return_inverse=True)
-    middle = drawn(len(numbers), min(CELLS, len(numbers)), seed).points
+    middle = drawn(len(numbers), min(OFFERED, len(numbers)), seed).points
     offered = np.flatnonzero(np.isin(cell, cell[middle]))
     _, own = np.unique(cell[offered], return_inverse=True)
     found = cubature(fields.U, fields.r, numbers[offered], count, own)

@@ -170,9 +170,11 @@ def steps(recording, known=()):
     except Nonsense as fault:
         raise Lost(str(fault), k) from fault
     except BROKEN as fault:
+        faster = getattr(recording.run, "faster", 1.0)
+        longer = f", and are steps {faster:g} times as long too long" if faster > 1.0 else ""
         raise Lost(f"the reduced run broke down in step {k}: {getattr(fault, 'reason', fault)}; "
                    "are the parameters within the studied range, are there enough samples, and is "
-                   "the map good (mpm-ref rom evaluate)?", k) from fault
+                   f"the map good (mpm-ref rom evaluate){longer}?", k) from fault
 
 
 def _show(writer, state, problem):

@@ -23,18 +23,22 @@ class Whole(NamedTuple):
 
 
 def whole(scene):
-    """`Whole` of a scene. Raises ValueError for what NSF's reduced runs do not know: a transfer
-    other than apic, a fluid, forces of single particles, a box that clips.
+    """`Whole` of a scene. Raises ValueError for what NSF's reduced runs do not know: an implicit
+    integrator, a transfer other than apic, a fluid, forces of single particles, a box that clips.
     """
     problem = build(scene)
     particles = [body.particles for body in problem.bodies]
-    unknown = {f"the transfer {problem.scheme.transfer}": problem.scheme.transfer != "apic",
-               "a fluid, which has no shear stress": any(p.F.ndim == 1 for p in particles),
-               "forces of single particles": any(p.b.ndim > 1 for p in particles),
-               "a box that clips": problem.clip is not None}
-    for what in (name for name, has in unknown.items() if has):
+    unknown = (
+        (problem.integrator != "explicit", f"the {problem.integrator} integrator",
+         'integrator = "explicit", whose step they make'),
+        (problem.scheme.transfer != "apic", f"the transfer {problem.scheme.transfer}",
+         'scheme.transfer = "apic", whose affine field is one of theirs'),
+        (any(p.F.ndim == 1 for p in particles), "a fluid", "solids, which have a shear stress"),
+        (any(p.b.ndim > 1 for p in particles), "forces of single particles", "gravity alone"),
+        (problem.clip is not None, "a box that clips", "none"))
+    for what, expected in ((what, expected) for has, what, expected in unknown if has):
         raise ValueError(f"the scene {problem.title!r} has {what}: reduced runs with inferred "
-                         "stress know none")
+                         f"stress expect {expected}")
     X, v, m, V0 = (at_once(problem.bodies, name) for name in ("x", "v", "m", "V0"))
     return Whole(problem, X, Matter(m, V0, v))
 

@@ -47,8 +47,9 @@ def cubature(U, r, among, count, cell=None):
         chosen, w = chosen_of(A, b, count, cell)
     points, kept = among[chosen], w > 0.0
     if kept.sum() * U.shape[1] < r:
+        more = "do the modes vanish at all of them?" if cell is None else "expected more cells"
         raise ValueError(f"{kept.sum()} points of {len(among)} have a weight, too few for {r} "
-                         "latent coordinates: do the modes vanish at all of them?")
+                         f"latent coordinates: {more}")
     order = np.argsort(points[kept])
     left = np.linalg.norm(A[:, chosen] @ w - b) / np.linalg.norm(b)
     return Cubature(points[kept][order], (w[kept] / w[kept].mean())[order], float(left))

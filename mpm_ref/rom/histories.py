@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..held import empty
+from ..mapped import empty
 
 PLAIN, FIELDS = ("v", "mu"), ("x", "tau", "C")      # what each run has of its own
 
@@ -36,19 +36,33 @@ def room(one, runs):
     """`Histories` of so many runs like one of them, without values yet."""
     fields = {name: getattr(one, name) for name in FIELDS}
     return one._replace(
-        **{name: np.empty((runs, *getattr(one, name).shape[1:])) for name in PLAIN},
+        **{name: np.empty_like(getattr(one, name), shape=(runs, *getattr(one, name).shape[1:]))
+           for name in PLAIN},
         **{name: empty((runs, *known.shape[1:]), known.dtype) for name, known in fields.items()})
 
 
 def joined(runs, count=None):
     """`Histories` of single ones of the same points, one after the other: of an iterator, of which
     no run is kept beside what is made of it, there must be `count`. Raises ValueError for another
-    number, and OSError as `held.empty` does.
+    number, or other histories than the first, and OSError as `mapped.empty` does.
     """
-    found = None
-    numbers = range(len(runs) if count is None else count)
-    for k, run in zip(numbers, runs, strict=True):
-        found = found or room(run, len(numbers))
+    count, found, k = len(runs) if count is None else count, None, -1
+    for k, run in enumerate(runs):
+        found = found or room(run, count)
+        require_like(run, found, k)
         for name in (*PLAIN, *FIELDS):
             getattr(found, name)[k] = getattr(run, name)[0]
+    if not 0 < k + 1 == count:
+        raise ValueError(f"{k + 1} runs: expected {count or 'some'}")
     return found
+
+
+def require_like(run, found, k):
+    """Raise ValueError unless the history of run k is a single one and fits `Histories`."""
+    if k >= len(found.mu):
+        raise ValueError(f"more than {len(found.mu)} runs: expected so many")
+    for name in (*PLAIN, *FIELDS):
+        own, known = getattr(run, name), getattr(found, name)
+        if (own.shape, own.dtype) != ((1, *known.shape[1:]), known.dtype):
+            raise ValueError(f"{name} of run {k}: {own.dtype} of shape {own.shape}; expected "
+                             f"{known.dtype} of shape {(1, *known.shape[1:])}, as in the first")

@@ -26,29 +26,31 @@ LEFT = "map", "what", "samples", "left", "error", "kind"
             profiles=("quick", "standard"), budget={"quick": 15, "standard": 250})
 def samples(run):
     """No sampling may spoil a run without a word."""
-    found, short, left = [], [], []
+    found, short = [], []
     for name, one in scenes(run):
-        bench, fields = Bench(name, one), one.fields
+        bench = Bench(name, one)
         for what, chosen in run.progress(sets_of(bench, run.profile), f"{name}, sets"):
-            judge(bench, what, chosen, found, left)
-            if len(chosen.points) * fields.dim < fields.r:
-                short.append(found[-1])
+            found.append(judged(bench, what, chosen))
+            if not suffices(bench, chosen):
+                short.append(found[-1][0])
     record_short(run, short)
-    record_judged(run, "extremes.nsf.samples", found, left)
+    record_judged(run, "extremes.nsf.samples", found)
 
 
 @experiment("extremes.nsf.unseen", title="NSF: too few samples in scenes that the bound has not "
             "seen", profiles=("quick", "standard"), budget={"quick": 30, "standard": 600})
 def unseen(run):
     """Whether what samples leave of the products tells bad runs of scenes by which its bound was
-    not chosen.
+    not chosen. Samples with fewer equations than latent coordinates are left out: `mpm-ref rom`
+    refuses them.
     """
-    found, left = [], []
+    found = []
     for name, study in run.progress(others(run).items(), "scenes"):
         bench = Bench(name, tested(study))
-        for what, chosen in run.progress(list(few(bench, run.profile)), f"{name}, sets"):
-            judge(bench, what, chosen, found, left)
-    record_judged(run, "extremes.nsf.unseen", found, left)
+        sets = [(what, chosen) for what, chosen in few(bench, run.profile)
+                if suffices(bench, chosen)]
+        found += [judged(bench, *own) for own in run.progress(sets, f"{name}, sets")]
+    record_judged(run, "extremes.nsf.unseen", found)
 
 
 def others(run):
@@ -62,20 +64,26 @@ def others(run):
             for name, study in found.items()}
 
 
-def judge(bench, what, chosen, found, left):
-    """Add the `Trial` of a run on `Chosen` samples, and what these leave of the products."""
-    found.append(bench.trial(what, chosen))
-    left.append(misfit(bench.one.fields.U, bench.one.fields.r, chosen.points))
+def judged(bench, what, chosen):
+    """The `Trial` of a run on `Chosen` samples, and what these leave of the products."""
+    fields = bench.one.fields
+    return bench.trial(what, chosen), misfit(fields.U, fields.r, chosen.points)
 
 
-def record_judged(run, id, found, left):
-    """Record `Trial`s, and what their samples left."""
-    record_all(run, id, found)
-    record_told(run, id, found, left)
-    record_silent(run, id, found, ERRORS)
-    run.table("left", LEFT, [(t.map, t.what, t.points, share, t.end.error, t.kind)
-                             for t, share in zip(found, left, strict=True)])
-    table_of(run, found)
+def suffices(bench, chosen):
+    """Whether `Chosen` samples have as many equations as there are latent coordinates."""
+    return len(chosen.points) * bench.one.fields.dim >= bench.one.fields.r
+
+
+def record_judged(run, id, found):
+    """Record (`Trial`, what its samples left)."""
+    trials = [trial for trial, _ in found]
+    record_all(run, id, trials)
+    record_told(run, id, found)
+    record_silent(run, id, trials, ERRORS)
+    run.table("left", LEFT, [(t.map, t.what, t.points, left, t.end.error, t.kind)
+                             for t, left in found])
+    table_of(run, trials)
 
 
 def sets_of(bench, profile):
@@ -113,17 +121,17 @@ def record_all(run, id, trials):
                        f"rank at least {t.end.rank}", t.end.said))))
 
 
-def record_told(run, id, trials, left):
-    """Record the share of the bad runs that are told before they begin, by what their samples leave
-    of the modes' products, and of those among them that nothing tells later.
+def record_told(run, id, found):
+    """Record the share of the bad runs of (`Trial`, what its samples left) that are told before
+    they begin, and of those among them that nothing tells later.
     """
     told = {True: [], False: []}
-    for t, share in zip(trials, left, strict=True):
-        told[is_bad(t)].append((share > SPARSE, t.kind))
+    for t, left in found:
+        told[is_bad(t)].append((left > SPARSE, t.kind))
     bad, good = ([tells for tells, _ in told[wrong]] for wrong in (True, False))
     silent = [tells for tells, kind in told[True] if kind == SILENT]
     run.record(f"{id}.told", sum(bad) / max(len(bad), 1), comparator="info",
-               scale=f"{len(trials)} runs", note=f"share of the {len(bad)} bad runs whose samples "
+               scale=f"{len(found)} runs", note=f"share of the {len(bad)} bad runs whose samples "
                f"leave more than {SPARSE:g} of the products; so do those of {sum(silent)} of the "
                f"{len(silent)} silent ones, and of {sum(good)} of the {len(good)} that are good")
 

@@ -36,7 +36,7 @@ REPEATS = 5
 SWEEP = (16, 32, 64, 128)               # widths of all three networks
 CENTRES = 600                           # of radial functions: 12 runs of 50 snapshots
 INPUTS, OUTPUTS = 9, (3, 6, 9)          # a point and six latent coordinates; of g, h and l
-TWINS = "scene", "fields", "layers", "points"
+TWINS = "scene", "fields", "by_layer", "by_point"      # seconds of a point
 
 class Scene(NamedTuple):
     """What is printed of a scene."""
@@ -207,11 +207,11 @@ def products_per_second(size):
 
 def record_twins(run, twins):
     """Record how many times as long networks take point by point as layer by layer."""
-    for name, word, layers, points in twins:
-        run.record(f"nsf.breakeven.{name}.{word}.twin", points / layers, unit="x", **INFO,
+    for name, word, by_layer, by_point in twins:
+        run.record(f"nsf.breakeven.{name}.{word}.twin", by_point / by_layer, unit="x", **INFO,
                    note=f"positions with derivatives, stress and affine field in one compiled "
-                        f"pass {1e6 * points:.3g} us a point, layer by layer "
-                        f"{1e6 * layers:.3g} us")
+                        f"pass {1e6 * by_point:.3g} us a point, layer by layer "
+                        f"{1e6 * by_layer:.3g} us")
 
 
 def recorded(run, row, n):

@@ -14,7 +14,7 @@ from .tested import FASTER, refitted, tested
 
 ORIGIN = "from the corner of the unit box that scenes stand in"
 MODAL = "fields of modes, no networks"
-DRAWS, FEW = 10, 3      # of samples; of as many particles as are printed
+DRAWS, FEW = 10, 3      # of samples; at the printed resolution
 COLUMNS = ("fields", "value", "samples", "draw", "faster", "origin", "centroid", "displacement",
            "stress", "points", "kept", "misfit")
 

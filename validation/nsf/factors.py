@@ -24,8 +24,8 @@ from .tested import FASTER, tested
 
 REPEATS = 3
 DRAWN, WEIGHED, CELLS = "drawn", "weighed", "cells"     # kinds of samples
-KINDS = {DRAWN: "{:g} samples drawn", WEIGHED: "{:g} samples with weights",
-         CELLS: "{:g} samples with weights in few cells"}
+KINDS = {DRAWN: "samples drawn", WEIGHED: "samples with weights at most",
+         CELLS: "cells of samples with weights at most"}
 COLUMNS = ("samples", "kind", "faster", "kept", "points", "error", "largest", "displacement",
            "stress", "full", "reduced", "speedup")
 
@@ -46,7 +46,7 @@ class Way(NamedTuple):
         """`Tested` with samples of this kind, whose weights are of samples anywhere."""
         study = one.study
         if self.kind != DRAWN:
-            study = study._replace(column=None, later=None, cells=self.kind == CELLS)
+            study = study._replace(column=None, later=None, by_cell=self.kind == CELLS)
         return one._replace(study=study)
 
 
@@ -73,8 +73,8 @@ def factors(run):
 
 
 def studies(run):
-    """{name: `Study`}: metal frame and cake; of the cut at the printed resolution more modes are
-    needed, and that they are smoother.
+    """{name: `Study`}: metal frame and cake, the latter with more and smoother modes than `studies`
+    has for the coarse grid.
     """
     frame, whole_cake = run.choose(quick=lambda: (metal(4, train=4), cake(4, train=3)),
                                    standard=lambda: (metal(), cake()))()
@@ -142,8 +142,8 @@ def row_of(found):
 def record(run, id, one, row):
     """Record error and speed-up of a `Way`, with what belongs to them."""
     known = dict(zip(COLUMNS, row, strict=True))
-    note = (f"{KINDS[known['kind']].format(known['kept'])}, steps {known['faster']:g} times as "
-            f"long, {known['points']:.0f} integration points")
+    note = (f"{known['samples']} {KINDS[known['kind']]}, {known['kept']:g} samples on average, "
+            f"steps {known['faster']:g} times as long, {known['points']:.0f} integration points")
     run.record(f"{id}.error", 100.0 * known["error"], unit="%", comparator="info", scale=one.scale,
                note=f"{note}; the largest {100.0 * known['largest']:.3g} %, of the displacement "
                     f"{100.0 * known['displacement']:.3g} %, of the stress "

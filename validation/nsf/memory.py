@@ -39,7 +39,7 @@ def memory(run):
     """Errors of the displacement and of the stress, with few samples and with all particles."""
     rows = []
     for name, study in run.progress(studies(run).items(), "scenes"):
-        runs = joined([made(study, value) for value in study.train])
+        runs = joined((made(study, value) for value in study.train), len(study.train))
         tests = {value: made(study, value)
                  for value in study.test[:run.choose(quick=1, standard=2)]}
         for word, kind in (("position", of_positions), ("joint", of_both)):

@@ -24,7 +24,7 @@ TRAINED = {"fields": "trained networks", "comparator": "info"}
 
 
 @experiment("nsf.networks", title="NSF: reduced runs on trained networks",
-            profiles=("standard",), budget={"standard": 2400})
+            profiles=("standard",), budget={"standard": 4500})
 def networks(run):
     """Errors with few samples, drawn or with weights, and all particles, of the scenes whose
     networks are trained; weights and operations of these and of the printed widths.

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.reduced.inferring import clustered, drawn, weighed
+from mpm_ref.reduced.inferring import drawn, of_cells, weighed
 from mpm_ref.reduced.vary import varied
 from mpm_ref.rom.spanned import Sizes
 from mpm_ref.scene import Poisson
@@ -33,7 +33,7 @@ class Study(NamedTuple):
     every: int = 1          # steps of the scene between the snapshots that fields are made of
     column: float | None = None     # radius of the upright one that samples are drawn from [dx]
     later: int | None = None        # |S| in the second half, if another
-    cells: bool = False     # whether samples with weights are those of so many cells
+    by_cell: bool = False   # whether samples with weights are those of so many cells
 
     def run(self, value):
         """The scene of a run."""
@@ -58,7 +58,7 @@ class Study(NamedTuple):
         if self.column is not None and count < len(among):
             off = one.X - 0.5 * (one.X.min(axis=0) + one.X.max(axis=0))
             among = np.flatnonzero(np.hypot(*off.T[:2]) <= self.column * one.problem.dx)
-        by = partial(clustered, fields, one.problem) if self.cells else partial(weighed, fields)
+        by = partial(of_cells, fields, one.problem) if self.by_cell else partial(weighed, fields)
         pick = drawn if fields is None else by
         sets = [pick(among, count, draw)]
         if self.later is not None and count == self.samples:
@@ -78,7 +78,8 @@ def jelly(coarser=1):
 def sand(coarser=1, train=16):
     """A column of sand with several angles of friction: 16 runs from 21 to 38.5 degrees and 4 tests
     as in appendices A and B; which angles are tested is not printed. In the 100 steps of the
-    authors' script it has hardly begun to spread, and all angles look the same: it falls longer.
+    authors' script it has hardly begun to spread, and all angles look the same: it falls longer. At
+    the printed resolution every second step is kept, so that as many snapshots are.
     """
     return Study("nsf_sand", "body.sand.material.flow.friction_angle",
                  tuple(np.linspace(21.0, 38.5, train)), (23.0, 27.5, 32.0, 36.5),

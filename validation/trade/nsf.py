@@ -38,7 +38,7 @@ class Sampling(NamedTuple):
 
 
 @experiment("trade.nsf.samples", title="NSF: error and cost by number and kind of samples",
-            profiles=("quick", "standard"), budget={"quick": 15, "standard": 1100})
+            profiles=("quick", "standard"), budget={"quick": 15, "standard": 1700})
 def of_samples(run):
     """Samples drawn at random, beside samples with weights by cubature, point by point or cell by
     cell; several draws.
@@ -59,7 +59,7 @@ def of_samples(run):
 def of_sampling(run, one, sampling, full):
     """Record the errors with a `Sampling`; rows of all runs, and CPU seconds of one."""
     scene, way, count = sampling
-    one = one._replace(study=one.study._replace(cells=way == CELLS))
+    one = one._replace(study=one.study._replace(by_cell=way == CELLS))
     draws = range(DRAWS[run.profile] if count < len(one.fields.X) else 1)
     rows = rows_of(one, way, count, draws, weighed=WAYS[way])
     cpu = reduced_cpu(one, count, WAYS[way], run.choose(quick=1, standard=3))

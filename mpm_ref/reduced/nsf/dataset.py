@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...held import empty
+from ...mapped import empty
 from ...rom.histories import Histories
 from ...rom.symmetric import values
 from ...store.results import Results
@@ -13,7 +13,7 @@ from ..whole import whole
 def histories(study, folder, numbers, kind=np.float32):
     """`Histories` of the finished runs of these numbers, stored as numbers of a kind; dt is from
     one of the states kept to the next. Raises ValueError as `whole` does, OSError as
-    `held.empty` does, and `BadResults`.
+    `mapped.empty` does, and `BadResults`.
     """
     runs = [whole(study.scene(study.mu[k])) for k in numbers]
     base, (n, d) = study.base, runs[0].X.shape

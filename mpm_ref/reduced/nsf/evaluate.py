@@ -15,7 +15,7 @@ from ...rom.step import BREAKDOWNS
 from ...rom.symmetric import values
 from ..errors import Errors, Squares
 from ..evaluate import NEAREST, REDUCED, Course, Held
-from ..inferring import ENOUGH, infer
+from ..inferring import ENOUGH, Plan, infer
 from ..whole import whole
 from .fields import of_run
 from .recording import plan_of, require_step
@@ -45,7 +45,7 @@ def require_levels(study):
     """
     faster, base = study.tables.run.faster, study.base
     require_step(faster, base.steps)
-    steps = np.arange(1, round(base.steps / faster) + 1)
+    steps = np.arange(1, Plan((), faster).steps(base) + 1)
     levels = [level_of(step * faster / base.every) for step in steps]
     if not any(level and level <= base.steps // base.every for level in levels):
         raise ValueError(f"faster = {faster:g}: expected steps of which some end at a state kept, "
@@ -59,10 +59,23 @@ def level_of(time):
 
 
 def reduced(one, fields, plan, rest, study):
-    """Yield (level or None, latent coordinates) of each state of a reduced run of a `Whole`."""
-    every = study.base.every * study.base.dt
+    """Yield (level or None, latent coordinates) of each state of a reduced run of a `Whole`. Raises
+    `NoBody` where a point crosses more cells in a step than the scene allows, where a run that is
+    recorded ends too.
+    """
+    every, most = study.base.every * study.base.dt, one.problem.limits.cfl
+    everything, before = np.arange(len(fields.X)), None
     for t, at, _ in infer(one, fields, plan, rest):
+        x = fields.place(everything, at.xhat)
+        if before is not None and not farthest(x - before) <= most * one.problem.dx:
+            raise NoBody(f"a particle crosses more than {most:g} dx in a step")
+        before = x
         yield level_of(t / every), at.xhat
+
+
+def farthest(u):
+    """Largest length of displacements u (n, d)."""
+    return np.sqrt(np.max(np.sum(u**2, axis=1)))
 
 
 def closest(fields, x, xhat):

@@ -11,7 +11,7 @@ from ...rom.extent import Extent
 from ...rom.inferred import Position, Report
 from ...rom.spanned import Spanned
 from ...store import Fields
-from ..inferring import Plan, begin, clustered, continued, drawn, weighed
+from ..inferring import Plan, begin, continued, drawn, of_cells, weighed
 from ..whole import Whole
 from .fields import of_run
 from .watch import look, sparse, trained
@@ -106,7 +106,7 @@ def chosen(run, problem, fields):
                          "have not; leave it out, or make fields of modes")
     if run.weighed:
         return weighed(fields, n, count, run.seed)
-    return clustered(fields, problem, n, run.cells, run.seed)
+    return of_cells(fields, problem, n, run.cells, run.seed)
 
 
 def require_step(faster, steps):

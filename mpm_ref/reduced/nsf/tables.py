@@ -79,12 +79,12 @@ class Run(Table):
 
     def __post_init__(self):
         one_of("inversion", self.inversion, INVERSIONS)
-        if self.weighed and self.points is None:
-            raise ValueError("weighed = true: expected `points` beside it, how many samples there "
-                             "may be")
         if self.cells is not None and (self.weighed or self.points is not None):
             raise ValueError(f"cells = {self.cells}: samples are points of so many cells and have "
                              "weights; expected neither `points` nor `weighed` beside it")
+        if self.weighed and self.points is None:
+            raise ValueError("weighed = true: expected `points` beside it, how many samples there "
+                             "may be")
 
 
 class Tables(Runs, kw_only=True):
