@@ -146,7 +146,8 @@ def test_damaged_data_are_told(made, tmp_path):
     file.write_bytes(content)
     done = mpm_ref("rom", "train", made / "bars.toml", "--data", tmp_path / "data",
                    "--out", tmp_path / "map.npz")
-    assert_told(done, 2, file.name, "F of body 'bar' is damaged")
+    assert_told(done, 2, file.name, "F of body 'bar' is damaged",
+                f"remove the file, and make it again: mpm-ref rom generate {made / 'bars.toml'}")
 
 
 @pytest.mark.parametrize("saved", [False, True])

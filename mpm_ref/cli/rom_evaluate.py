@@ -33,8 +33,8 @@ def judge(
 ):
     """Compare reduced runs with the full-order runs that were held out.
 
-    Their position errors by three measures, beside those of the map's nearest states, which no
-    reduced run on it is expected to beat. Exit status: 0 done, 2 bad input, 3 a reduced run broke
+    Their position errors by three measures, beside those of the map's nearest states, which reduced
+    runs on it seldom beat. Exit status: 0 done, 2 bad input, 3 a reduced run broke
     down, 4 a file could not be written, 130 Ctrl-C.
     """
     with at_work(name) as study:

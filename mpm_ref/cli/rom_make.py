@@ -21,7 +21,7 @@ from ..reduced.generate import (
 )
 from ..reduced.model import kind_of, known_of, with_kind
 from ..reduced.tables import KEYS, NETWORK
-from ..store.atomic import NotWritten, not_written, require_place
+from ..store.atomic import NotWritten, require_place
 from ..store.words import counted
 from . import faults
 from .faults import end, one_line, options, writing
@@ -189,7 +189,5 @@ def require_map_place(out, study, overwrite):
 
 def write(out, model):
     """Write a map. Raises NotWritten."""
-    try:
+    with writing():
         maps.save(out, model)
-    except OSError as fault:
-        raise not_written(out, fault) from fault

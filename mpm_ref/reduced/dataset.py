@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..rom.snapshots import Snapshots
-from ..store.results import Results
+from ..store.results import BadResults, Results
 from .generate import file_of, finished
 from .nsf.dataset import histories
 from .tables import NSF
@@ -18,11 +18,20 @@ def load(study, folder, numbers):
     `BadResults` for files that are damaged, no results, or of another scene, and OSError as
     `mapped.empty` does.
     """
-    lacking = [k for k in numbers if not finished(file_of(folder, k), study.scene(study.mu[k]))]
-    if lacking:
-        raise Missing(f"{folder} lacks {len(lacking)} of {len(numbers)} runs, the first is "
-                      f"{file_of(folder, lacking[0]).name}: mpm-ref rom generate "
-                      f"{study.path} --out {folder}")
+    again = f"mpm-ref rom generate {study.path} --out {folder}"
+    try:
+        lacking = [k for k in numbers
+                   if not finished(file_of(folder, k), study.scene(study.mu[k]))]
+        if lacking:
+            raise Missing(f"{folder} lacks {len(lacking)} of {len(numbers)} runs, the first is "
+                          f"{file_of(folder, lacking[0]).name}: {again}")
+        return _load(study, folder, numbers)
+    except BadResults as fault:
+        raise BadResults(f"{fault}; remove the file, and make it again: {again}") from fault
+
+
+def _load(study, folder, numbers):
+    """The same of runs that are there."""
     if study.tables.model == NSF:
         return histories(study, folder, numbers)
     body = study.base.body[0].name

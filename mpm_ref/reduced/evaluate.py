@@ -1,5 +1,6 @@
 """Reduced runs of a study beside the full-order runs that were held out, and beside the nearest
-states of the map, which no reduced run on it is expected to beat.
+states of the map, which reduced runs on it seldom beat: the search for them goes on from each time
+to the next.
 """
 
 from math import inf

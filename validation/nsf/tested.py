@@ -84,8 +84,8 @@ class Tested(NamedTuple):
                      float(np.max([own.misfit for own in sets])))
 
     def nearest(self, value):
-        """`Errors` of the nearest states that the fields know: no run on them is expected to beat
-        them.
+        """`Errors` of the nearest states that the fields know, as far as a search finds them that
+        goes on from each time to the next.
         """
         X, x = self.tests[value].X, self.tests[value].x[0, 1:]
         squares, everything = Squares(X), np.arange(len(X))
