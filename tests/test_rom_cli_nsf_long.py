@@ -4,12 +4,14 @@ otherwise than the study says.
 
 import json
 
+import numpy as np
 import pytest
 from command_line import mpm_ref
 from small_nsf_studies import modelled, write
 
 from mpm_ref.problem import Clock
 from mpm_ref.reduced.inferring import Plan
+from mpm_ref.reduced.nsf.evaluate import farthest
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +38,11 @@ def test_a_run_that_goes_too_fast_has_no_errors(made, tmp_path):
     plain = mpm_ref("rom", "run", made / "pairs.toml", "--map", fields, "--set", f"v={v}", "--out",
                     tmp_path / "plain.h5")
     assert "too long" not in plain.stderr
+
+
+def test_the_farthest_point_counts():
+    assert farthest(np.array([[-3.0, -4.0], [0.0, 1.0]])) == 5.0
+    assert np.isnan(farthest(np.array([[np.nan, 0.0], [0.0, 1.0]])))
 
 
 def test_errors_of_a_run_beyond_its_limit_are_infinite(made, tmp_path, monkeypatch):
