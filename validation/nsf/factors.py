@@ -59,7 +59,7 @@ WAYS = {("quick", "metal"): (Way(30, DRAWN, 1.0), Way(10, WEIGHED, 3.0)),
         ("standard", "cake"): (
             Way(700, DRAWN, 1.0), Way(700, DRAWN, FASTER), Way(20, WEIGHED, 1.0),
             Way(20, CELLS, 1.0), Way(20, CELLS, 2.0), Way(8, CELLS, 1.0), Way(8, CELLS, FASTER),
-            Way(8, CELLS, 2.0))}
+            Way(8, CELLS, 2.0), Way(8, CELLS, 3.0), Way(8, CELLS, 4.0))}
 
 
 @experiment("nsf.factors", title="NSF: where a speed-up comes from",
