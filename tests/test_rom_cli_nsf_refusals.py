@@ -26,9 +26,13 @@ def reduced(made, out, *options, study="pairs.toml"):
 @pytest.mark.parametrize(("edit", "words"), [
     (('model = "nsf"', 'model = "nfs"'), "model = 'nfs': expected one of 'ldm', 'nsf'"),
     (('model = "nsf"', "model = [1]"), "model = [1]: expected one of"),
-    (('model = "nsf"', ""), "unknown key"),
-    (("r = 3", "r = 3\ndegree = 2"), "map.degree: unknown key"),
+    (('model = "nsf"', ""), 'map.tau: unknown key; it is one of model = "nsf"'),
+    (("r = 3", "r = 3\ndegree = 2"), 'map.degree: unknown key; it is one of model = "ldm"'),
     (("r = 3", "r = 6"), "modes = 5: expected at least r = 6"),
+    (("modes = 5", "modes = 28"), "map.modes = 28: expected at most 27, as many as states are kept "
+     "of 3 training runs of 16 steps"),
+    (("tau = 8", "tau = 28"), "map.tau = 28: expected at most 27"),
+    (("C = 8", "C = 28"), "map.C = 28: expected at most 27"),
     (('kind = "modes"', 'kind = "curved"'), "kind = 'curved': expected one of"),
     (('kind = "modes"', 'kind = "network"'), 'map.C: given, but the kind is "network"'),
     (("r = 3", "r = 3\nbeta = [8, 8, 8]"), 'map.beta: given, but the kind is "modes"'),
@@ -91,9 +95,9 @@ def test_fields_of_modes_are_shown_at_their_own_points(made, tmp_path):
 
 
 def test_more_modes_than_the_runs_hold_are_refused(made, tmp_path):
-    study = write(tmp_path, ("tau = 8", "tau = 80"))
+    study = write(tmp_path, ("tau = 8", "tau = 27"))
     done = mpm_ref("rom", "train", study, "--data", made / "data", "--out", tmp_path / "f.npz")
-    assert_told(done, 2, "tau = 80: expected 1 .. ")
+    assert_told(done, 2, "tau = 27: expected 1 .. ")
     assert not (tmp_path / "f.npz").exists()
 
 

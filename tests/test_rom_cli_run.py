@@ -285,7 +285,7 @@ def test_a_run_that_breaks_down_is_infinitely_off(made, tmp_path):
     found = json.loads(done.stdout)
     assert found["all"]["reduced"]["origin"] is None
     (number,), said = study.test, found["runs"][0]["broken"]["reduced"]
-    assert said.startswith("step 3: particles from ")
+    assert said == "step 2: a particle crosses more than 1 dx in a step"
     assert (f"run {number} (g = {study.mu[number, 0]:g}): the reduced run broke down in {said}"
             in done.stderr)
     assert evaluate(made, "--out", tmp_path / "e.png", "--overwrite").stderr == ""

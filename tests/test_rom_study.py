@@ -52,6 +52,11 @@ def test_runs_differ_by_their_parameters_and_show_every_step(tmp_path):
     assert sorted((*bars.test, *bars.train)) == [0, 1, 2, 3]
 
 
+def test_a_network_may_have_more_latent_coordinates_than_there_are_states(tmp_path):
+    bars = study(tmp_path, ('kind = "modes"\nr = 3', 'kind = "network"\nr = 100'))
+    assert bars.tables.map.r == 100
+
+
 def test_two_parameters_make_every_pair_the_last_one_fastest(tmp_path):
     second = '[[parameter]]\nname = "E"\nkey = "body.bar.material.E"\nvalues = [1e4, 3e4]\n\n[map]'
     bars = study(tmp_path, ("[map]", second), ("count = 4", "count = 2"))
@@ -127,6 +132,10 @@ def test_what_is_set_is_set_in_all_runs(tmp_path):
     ("r = 3", "", "map.r: this key is missing"),
     ("r = 3", "r = 0", "map.r = 0: expected a whole number >= 1"),
     ("r = 3", "r = 3.5", "map.r = 3.5: expected a whole number"),
+    ("r = 3", "r = 100", f"map.r = 100: expected at most {3 * (STEPS + 1)}, as many as states are "
+     "kept of 3 training runs"),
+    ("r = 3", "r = 3\ntau = 8", 'map.tau: unknown key; it is one of model = "nsf": say so at the '
+     "top of the study, or remove it"),
     ("r = 3", "r = 3\nepochs = 2", "map.epochs: given, but the kind is \"modes\""),
     ('"modes"', '"mode"', "map.kind = 'mode': expected one of 'modes', 'curved', 'network'"),
     ("r = 3", "r = 3\ndegree = 2", 'map.degree: given, but the kind is "modes"; remove it, or take '

@@ -59,9 +59,29 @@ def evaluate(study, model, snapshots):
 
 
 def reduced(one, model, run):
-    """Yield the positions (n, d) of a reduced run of a `Case`."""
+    """Yield the positions (n, d) of a reduced run of a `Case`. Raises `NoBody` as `require_slow`
+    does.
+    """
+    before = None
     for latent, _ in march(one, model.decoder, run.way, model.rest, run.seed):
-        yield model.decoder.place(one.X, latent.xhat)
+        x = model.decoder.place(one.X, latent.xhat)
+        require_slow(x, before, one.problem)
+        before = x
+        yield x
+
+
+def require_slow(x, before, problem):
+    """Raise `NoBody` where a point crosses more cells in a step than the scene allows, where a run
+    that is recorded ends too; x (n, d) after the step, and before it, None at the start.
+    """
+    most = problem.limits.cfl
+    if before is not None and not farthest(x - before) <= most * problem.dx:
+        raise NoBody(f"a particle crosses more than {most:g} dx in a step")
+
+
+def farthest(u):
+    """Largest length of displacements u (n, d)."""
+    return np.sqrt(np.max(np.sum(u**2, axis=1)))
 
 
 def nearest(X, x, model):

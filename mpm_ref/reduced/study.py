@@ -17,10 +17,11 @@ from ..scene import SceneError
 from ..scene.error import at, opened_by
 from .nsf.levels import every
 from .study_file import checked, plain
-from .tables import LATIN, LDM, NSF, Runs
+from .tables import LATIN, LDM, NETWORK, NSF, Runs
 from .vary import flat, varied
 
 SAME = ("dim", "dx", "dt", "steps", "every", "seed", "scheme", "integrator")    # in all runs
+SUMMED = ("modes", "tau", "C")      # numbers of modes, of maps and fields that are sums of them
 FREE = {LDM: ("material",), NSF: ("material", "velocity")}      # of a body, from run to run
 
 
@@ -90,6 +91,7 @@ def load(path, shipped=None):
         base = base_of(tables, path.parent, shipped or {}, SHOWN[tables.model])
         study = Study(path, base, tables, mu, held_out(len(mu), tables.test, tables.seed))
         _require_one_body(study)
+        _require_states(study)
         return study
 
 
@@ -181,6 +183,18 @@ def _require_one_body(study):
                 raise SceneError(f"parameter: runs differ in `{name}` of the scene, but all need "
                                  "the same particles, grid and steps; vary gravity, a material or "
                                  "a motion")
+
+
+def _require_states(study):
+    """Raise SceneError for more modes than the training runs keep states."""
+    base, map, runs = study.base, study.tables.map, len(study.train)
+    states = runs * (base.steps // base.every + 1)
+    for name in ("r", *SUMMED) if map.kind != NETWORK else ():
+        count = getattr(map, name, None) or 0
+        if count > states:
+            raise SceneError(f"map.{name} = {count}: expected at most {states}, as many as states "
+                             f"are kept of {runs} training runs of {base.steps} steps; keep more "
+                             "of them (`every` of the scene), or take fewer modes")
 
 
 def _kept(one, free):

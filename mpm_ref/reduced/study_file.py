@@ -2,6 +2,7 @@
 
 import tomllib
 from difflib import get_close_matches
+from types import MappingProxyType
 
 import msgspec
 
@@ -32,10 +33,10 @@ def checked(data):
     model = data.get("model", LDM)
     if not isinstance(model, str) or model not in MODELS:
         raise SceneError(f"model = {model!r}: expected one of {', '.join(map(repr, MODELS))}")
-    whole, *parts = MODELS[model]
-    require_keys(data, whole.__struct_encode_fields__)
-    for name, record in zip(("map", "run"), parts, strict=True):
-        require_keys(data.get(name), record.__struct_encode_fields__, name)
+    whole = MODELS[model][0]
+    for k, path in enumerate(("", "map", "run")):
+        known = {name: records[k].__struct_encode_fields__ for name, records in MODELS.items()}
+        require_keys(data.get(path) if path else data, known.pop(model), path, known)
     varied = data.get("parameter")
     for k, part in enumerate(varied if isinstance(varied, list) else ()):
         require_keys(part, Parameter.__struct_encode_fields__, f"parameter[{k}]")
@@ -51,10 +52,19 @@ def checked(data):
     return tables
 
 
-def require_keys(table, known, path=""):
-    """Raise SceneError for a key of a table that is none of those known."""
+def require_keys(table, known, path="", elsewhere=MappingProxyType({})):
+    """Raise SceneError for a key of a table that is none of those known; elsewhere: {model: keys}
+    of the same table of other models.
+    """
     for key in table if isinstance(table, dict) else ():
         if key not in known:
-            near = get_close_matches(key, known, 1)
-            hint = f"did you mean `{near[0]}`?" if near else f"the keys here are {', '.join(known)}"
-            raise SceneError(f"{joined(path, key)}: unknown key; {hint}")
+            raise SceneError(f"{joined(path, key)}: unknown key; {hint(key, known, elsewhere)}")
+
+
+def hint(key, known, elsewhere):
+    """What may have been meant by an unknown key."""
+    for model, keys in elsewhere.items():
+        if key in keys:
+            return f'it is one of model = "{model}": say so at the top of the study, or remove it'
+    near = get_close_matches(key, known, 1)
+    return f"did you mean `{near[0]}`?" if near else f"the keys here are {', '.join(known)}"

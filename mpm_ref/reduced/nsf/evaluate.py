@@ -14,7 +14,7 @@ from ...rom.placed import NoBody
 from ...rom.step import BREAKDOWNS
 from ...rom.symmetric import values
 from ..errors import Errors, Squares
-from ..evaluate import NEAREST, REDUCED, Course, Held
+from ..evaluate import NEAREST, REDUCED, Course, Held, require_slow
 from ..inferring import ENOUGH, Plan, infer
 from ..whole import whole
 from .fields import of_run
@@ -27,30 +27,31 @@ def evaluate(study, model, histories):
     """Yield a `Held` of each run of `Histories`, those of `study.test`. Raises ValueError for
     samples that do not suffice, and steps that end at none of the states kept.
     """
-    require_levels(study)
+    levels = levels_of(study)
     for k, number in enumerate(study.test):
         mu, data = histories.mu[k], (histories.x[k], histories.tau[k])
         one = whole(study.scene(mu))
         fields = of_run(model.decoder, one, mu)
         plan = plan_of(study.tables.run, one.problem, fields)
         found = {REDUCED: course(fields, *data, reduced(one, fields, plan, model.rest, study)),
-                 NEAREST: course(fields, *data, closest(fields, data[0], model.rest))}
+                 NEAREST: course(fields, *data, only(levels, closest(fields, data[0], model.rest)))}
         yield Held(number, mu, {name: own[0] for name, own in found.items()},
                    {name: own[1] for name, own in found.items()})
 
 
-def require_levels(study):
-    """Raise ValueError where no step of a reduced run ends at a state kept but the first, and for
-    steps that are longer than the run.
+def levels_of(study):
+    """Numbers of the states kept at which a step of a reduced run ends. Raises ValueError where
+    there are none but the start, and for steps that are longer than the run.
     """
     faster, base = study.tables.run.faster, study.base
     require_step(faster, base.steps)
-    steps = np.arange(1, Plan((), faster).steps(base) + 1)
-    levels = [level_of(step * faster / base.every) for step in steps]
-    if not any(level and level <= base.steps // base.every for level in levels):
+    ends = range(Plan((), faster).steps(base) + 1)
+    levels = {level_of(step * faster / base.every) for step in ends} - {None}
+    if not any(0 < level <= base.steps // base.every for level in levels):
         raise ValueError(f"faster = {faster:g}: expected steps of which some end at a state kept, "
                          f"one every {base.every} steps of the scene; take a simple fraction such "
                          "as 1.5 or 2")
+    return levels
 
 
 def level_of(time):
@@ -60,22 +61,21 @@ def level_of(time):
 
 def reduced(one, fields, plan, rest, study):
     """Yield (level or None, latent coordinates) of each state of a reduced run of a `Whole`. Raises
-    `NoBody` where a point crosses more cells in a step than the scene allows, where a run that is
-    recorded ends too.
+    `NoBody` as `require_slow` does.
     """
-    every, most = study.base.every * study.base.dt, one.problem.limits.cfl
+    every = study.base.every * study.base.dt
     everything, before = np.arange(len(fields.X)), None
     for t, at, _ in infer(one, fields, plan, rest):
         x = fields.place(everything, at.xhat)
-        if before is not None and not farthest(x - before) <= most * one.problem.dx:
-            raise NoBody(f"a particle crosses more than {most:g} dx in a step")
+        require_slow(x, before, one.problem)
         before = x
         yield level_of(t / every), at.xhat
 
 
-def farthest(u):
-    """Largest length of displacements u (n, d)."""
-    return np.sqrt(np.max(np.sum(u**2, axis=1)))
+def only(levels, states):
+    """Yield the same states (level, latent coordinates), None in place of other levels."""
+    for level, xhat in states:
+        yield level if level in levels else None, xhat
 
 
 def closest(fields, x, xhat):
