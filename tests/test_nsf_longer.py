@@ -1,0 +1,90 @@
+"""NSF: full-order runs with longer steps, on a small study."""
+
+from math import inf
+
+import numpy as np
+import pytest
+
+from mpm_ref.reduced.whole import history
+from mpm_ref.rom.histories import Histories
+from mpm_ref.rom.placed import NoBody
+from validation.nsf import longer
+from validation.nsf.studies import jelly, metal
+from validation.results import Results
+from validation.run import Setting, run_all
+
+STUDY = jelly(4)._replace(test=(0.3, 0.35, 0.4), every=8)
+FACTORS = (1.0, 1.5, 2.0, 20.0)
+
+
+@pytest.fixture(autouse=True)
+def factors(monkeypatch):
+    """Few of them."""
+    monkeypatch.setattr(longer, "FACTORS", FACTORS)
+
+
+def test_steps_are_longer_and_end_within_the_scene():
+    scene = STUDY.run(0.35)
+    for factor in FACTORS:
+        own = longer.stretched(scene, factor)
+        assert own.dt == factor * scene.dt
+        assert scene.steps - factor < factor * own.steps <= scene.steps
+
+
+def test_errors_are_those_beside_the_scenes_own_steps():
+    same, between, twice, refused = longer.ends_of(STUDY, 0.35)
+    assert max(*same.errors, same.stress) < 1e-6        # states are compared in single precision
+    assert 0.0 < between.errors.origin < twice.errors.origin < 0.05
+    scene = STUDY.run(0.35)
+    ours = history(longer.stretched(scene, 2.0), [0.35])
+    theirs = history(scene, [0.35], np.float32, STUDY.spacing)
+    x, reference = ours.x[0, ::STUDY.spacing // 2][1:], theirs.x[0, 1:]
+    assert len(x) == len(reference)
+    assert twice.errors.origin == pytest.approx(
+        np.linalg.norm(x - reference) / np.linalg.norm(reference))
+    tau, reference = ours.tau[0, ::STUDY.spacing // 2][1:], theirs.tau[0, 1:]
+    assert twice.stress == pytest.approx(np.linalg.norm(tau - reference)
+                                         / np.linalg.norm(reference))
+    assert refused.errors.origin == refused.stress == inf
+    assert "crosses more than 1 dx in a step" in refused.said
+
+
+def test_times_are_medians_of_runs_in_turn(monkeypatch):
+    spent, order = iter([4.0, 3.0, 2.0, 6.0, 1.0, 2.5, 5.0, 9.0, 2.0]), []
+
+    def seconds(made):
+        order.append(made)
+        return next(spent)
+
+    monkeypatch.setattr(longer, "FACTORS", (1.0, 1.5, 2.0))
+    monkeypatch.setattr(longer, "seconds", seconds)
+    assert longer.taken(STUDY.run(0.35), 3) == [5.0, 3.0, 2.0]
+    assert len(order) == 9
+
+
+@pytest.mark.parametrize(("study", "words"), [
+    (STUDY, "a particle crosses more than 1 dx"), (metal(4), "past the stable time step")])
+def test_a_run_that_ends_before_its_time_took_for_ever(study, words):
+    scene = longer.stretched(study.run(study.test[0]), 20.0)
+    assert longer.of_run(scene) == inf
+    with pytest.raises(NoBody, match=words):
+        list(longer.states(Histories(*9 * [None])._replace(dt=1.0), scene))
+
+
+def test_errors_and_times_are_recorded(tmp_path, monkeypatch):
+    monkeypatch.setattr(longer, "metal", lambda coarser: STUDY)
+    monkeypatch.setattr(longer, "cake", lambda coarser: STUDY)
+    monkeypatch.setattr(longer, "taken", lambda scene, repeats: [8.0, 6.0, 4.0, inf])
+    assert not run_all([longer.longer.experiment], Setting("quick", tmp_path))
+    found = Results(tmp_path)
+    table = found.table("nsf.longer", "steps")
+    assert table["scene"].tolist() == 4 * ["metal"] + 4 * ["cake"]
+    assert table["faster"].tolist() == 2 * list(FACTORS)
+    expected = longer.ends_of(STUDY, 0.35)
+    assert table["error"].tolist() == pytest.approx(
+        2 * [one.errors.origin for one in expected], rel=1e-6)
+    assert table["speedup"].tolist() == pytest.approx(2 * [1.0, 8.0 / 6.0, 2.0, 0.0])
+    records = {r.target: r for r in found.records("nsf.longer")}
+    assert records["nsf.longer.cake.2.speedup"].value == 2.0
+    assert "crosses more than 1 dx in a step" in records["nsf.longer.metal.20.error"].note
+    assert "of the displacement" in records["nsf.longer.metal.2.error"].note
