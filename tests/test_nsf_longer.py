@@ -84,6 +84,8 @@ def test_errors_and_times_are_recorded(tmp_path, monkeypatch):
     assert table["error"].tolist() == pytest.approx(
         2 * [one.errors.origin for one in expected], rel=1e-6)
     assert table["speedup"].tolist() == pytest.approx(2 * [1.0, 8.0 / 6.0, 2.0, 0.0])
+    assert table["displacement"].tolist() == pytest.approx(
+        2 * [one.errors.displacement for one in expected], rel=1e-6)
     records = {r.target: r for r in found.records("nsf.longer")}
     assert records["nsf.longer.cake.2.speedup"].value == 2.0
     assert "crosses more than 1 dx in a step" in records["nsf.longer.metal.20.error"].note

@@ -1,0 +1,70 @@
+"""NSF: Gauss-Newton and its first step alone, on a small study."""
+
+import pytest
+from small_toys import Records
+
+from mpm_ref.rom.spanned import Sizes
+from validation import targets
+from validation.nsf import inversion, tested
+from validation.nsf.studies import jelly
+from validation.results import Results
+from validation.run import Setting, run_all
+
+STUDY = jelly(4)._replace(train=(0.3, 0.5), test=(0.35, 0.4), samples=40,
+                          sizes=Sizes(r=3, modes=8, tau=12, C=12, smoothing=1e-4))
+
+
+@pytest.fixture(scope="module")
+def one():
+    """The small study."""
+    return tested.tested(STUDY)
+
+
+@pytest.mark.parametrize("faster", [1.0, 1.5])
+def test_gauss_newton_is_how_runs_are_usually_inverted(one, faster):
+    found, usual = inversion.of_run(one, 0.4, "nonlinear", faster), one.errors(0.4, 40, 0, faster)
+    assert (found.errors, found.stress) == (usual.errors, usual.stress)
+    least, median, most = found.iterations
+    assert 1 < least <= median <= most
+
+
+def test_its_first_step_alone_is_another_run_and_near(one):
+    found, usual = (inversion.of_run(one, 0.4, kind, 1.0) for kind in ("linear", "nonlinear"))
+    assert found.iterations == (1.0, 1.0, 1.0)
+    assert found.errors != usual.errors
+    assert found.errors.origin == pytest.approx(usual.errors.origin, rel=1.0)
+
+
+def test_errors_and_iterations_are_recorded(one, tmp_path, monkeypatch):
+    monkeypatch.setattr(inversion, "jelly", lambda coarser: STUDY)
+    monkeypatch.setattr(inversion, "metal", lambda coarser, train: STUDY._replace(test=(0.4,)))
+    monkeypatch.setattr(inversion, "tested", lambda study: one._replace(study=study))
+    assert not run_all([inversion.inversion.experiment], Setting("quick", tmp_path, targets=targets.load()))
+    found = Results(tmp_path)
+    table = found.table("nsf.inversion", "runs")
+    assert list(zip(table["scene"], table["value"], table["inversion"], table["faster"],
+                    strict=True)) == [
+        (name, value, kind, faster) for name, values in (("jelly", (0.35, 0.4)), ("metal", (0.4,)))
+        for kind in ("nonlinear", "linear") for faster in (1.0, 1.5) for value in values]
+    expected = inversion.of_run(one, 0.4, "linear", 1.5)
+    last = [table[name][-1] for name in inversion.COLUMNS[4:]]
+    assert last == pytest.approx([*expected.errors, expected.stress, *expected.iterations])
+    records = {r.target: r for r in found.records("nsf.inversion")}
+    assert records["nsf.inversion.jelly.linear.1.error"].value == pytest.approx(
+        50.0 * sum(table["origin"][4:6]))
+    _, medians, most = zip(*(inversion.of_run(one, value, "nonlinear", 1.0).iterations
+                             for value in STUDY.test), strict=True)
+    assert records["nsf.sec5_3.gn_lo"].value == min(medians)
+    assert records["nsf.sec5_3.gn_hi"].value == max(medians)
+    assert f"the most in any step {max(most):g}" in records["nsf.sec5_3.gn_lo"].note
+
+
+def test_printed_numbers_are_of_gauss_newton_with_the_scenes_own_steps():
+    run, rows = Records(), [("a", 0.0, "linear", 1.0, *4 * [0.0], 1.0, 1.0, 1.0),
+                         ("a", 0.0, "nonlinear", 1.5, *4 * [0.0], 9.0, 9.0, 9.0),
+                         ("a", 0.0, "nonlinear", 1.0, *4 * [0.0], 2.0, 3.0, 7.0),
+                         ("b", 0.0, "nonlinear", 1.0, *4 * [0.0], 3.0, 5.0, 6.0)]
+    inversion.counts(run, rows, "")
+    assert [value for value, _ in run.values()] == [3.0, 5.0]
+    assert list(run) == ["nsf.sec5_3.gn_lo", "nsf.sec5_3.gn_hi"]
+
