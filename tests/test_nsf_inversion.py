@@ -39,7 +39,8 @@ def test_errors_and_iterations_are_recorded(one, tmp_path, monkeypatch):
     monkeypatch.setattr(inversion, "jelly", lambda coarser: STUDY)
     monkeypatch.setattr(inversion, "metal", lambda coarser, train: STUDY._replace(test=(0.4,)))
     monkeypatch.setattr(inversion, "tested", lambda study: one._replace(study=study))
-    assert not run_all([inversion.inversion.experiment], Setting("quick", tmp_path, targets=targets.load()))
+    setting = Setting("quick", tmp_path, targets=targets.load())
+    assert not run_all([inversion.inversion.experiment], setting)
     found = Results(tmp_path)
     table = found.table("nsf.inversion", "runs")
     assert list(zip(table["scene"], table["value"], table["inversion"], table["faster"],
