@@ -121,7 +121,7 @@ def toothpaste(coarser=1, train=12):
     """
     return Study("nsf_toothpaste", "collider.brush.motion.angle",
                  tuple(np.linspace(0.0, 15.0, train)), (2.0, 5.0, 7.1, 12.0),
-                 Sizes(r=6, modes=40, smoothing=1e-3), 50,
+                 Sizes(r=6, modes=40, smoothing=1e-5), 50,
                  follows=False, coarser=coarser, every=5)
 
 
