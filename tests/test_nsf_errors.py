@@ -73,6 +73,16 @@ def test_the_next_run_is_the_one_of_the_nearest_value(cube):
         assert cube._replace(tests={value: itself}).next_run(value).origin == 0.0
 
 
+def test_tests_that_are_a_training_run_are_counted(cube):
+    itself = cube.runs._replace(x=cube.runs.x[1:2])
+    study, run = cube.study._replace(test=(0.36, TEST)), Records()
+    errors.known(run, "a", cube._replace(study=study, tests=cube.tests | {0.36: itself}))
+    value, note = run["a.next_run"]
+    assert "in 1 of 2 tests it is the very same run" in note
+    assert value == pytest.approx(50.0 * cube.next_run(TEST).origin)
+    assert "very same" not in run["a.nearest"][1]
+
+
 def test_the_affine_field_is_worth_its_modes(cube):
     without = tested.refitted(cube, cube.study.sizes._replace(C=0), follows=False)
     some = [one.errors(TEST, 50).errors.origin for one in (without, cube)]

@@ -86,12 +86,18 @@ def longer(run, name, one):
 
 
 def known(run, name, one):
-    """Record how far the nearest states and the nearest training run are off."""
-    for word, found, note in (("nearest", one.nearest, "nearest states that the fields know"),
-                              ("next_run", one.next_run, "the training run whose parameter is "
-                               "nearest, taken as it is")):
-        errors = Errors(*np.mean([found(value) for value in one.study.test], axis=0))
-        said(run, f"{name}.{word}", errors, one.scale, note, comparator="info")
+    """Record how far the nearest states and the nearest training run are off, and in how many tests
+    that run is the very same: where a surface lies between two nodes, they do not feel.
+    """
+    nearest, next_run = ([found(value) for value in one.study.test]
+                         for found in (one.nearest, one.next_run))
+    same = sum(errors.origin == 0.0 for errors in next_run)
+    for word, found, note in (
+            ("nearest", nearest, "nearest states that the fields know"),
+            ("next_run", next_run, "the training run whose parameter is nearest, taken as it is; "
+             f"in {same} of {len(next_run)} tests it is the very same run")):
+        said(run, f"{name}.{word}", Errors(*np.mean(found, axis=0)), one.scale, note,
+             comparator="info")
 
 
 def without_affine(run, name, one):
