@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from mpm_ref.rom import spanned as module
 from mpm_ref.rom.histories import Histories, joined
 from mpm_ref.rom.radial import through
-from mpm_ref.rom.spanned import Sizes, spanned
+from mpm_ref.rom.spanned import Sizes, modes_of, spanned
 from mpm_ref.rom.symmetric import tensor, values
 
 LEVELS, N, DT = 9, 60, 0.01
@@ -237,3 +238,24 @@ def test_what_radial_functions_refuse():
         through(np.zeros((3, 3)), np.zeros((3, 1)), np.ones(3))
     with pytest.raises(ValueError, match="not finite"):
         through(np.full((5, 1), np.nan), np.zeros((5, 1)), np.ones(1))
+
+
+def test_modes_that_are_known_are_not_found_again(runs, monkeypatch):
+    """And the fields are the same to the last bit; of another number they are found."""
+    sizes, known, found = Sizes(r=2, modes=3, tau=2, C=1), {}, []
+    whole, xhat = spanned(runs, sizes, 0.3, known=known)
+
+    def finding(A, count, name, origin=None):
+        found.append(name)
+        return modes_of(A, count, name, origin)
+
+    monkeypatch.setattr(module, "modes_of", finding)
+    fewer, _ = spanned(runs, sizes._replace(r=1, C=0), 0.3, follows=False, known=known)
+    assert found == []
+    again, at = spanned(runs, sizes, 0.3, known=known)
+    assert np.array_equal(at, xhat)
+    for ours, theirs in ((again.U, whole.U), (again.tau.modes, whole.tau.modes),
+                         (again.C.modes, whole.C.modes), (fewer.tau.modes, whole.tau.modes)):
+        assert np.array_equal(ours, theirs)
+    spanned(runs, sizes._replace(modes=2), 0.3, known=known)
+    assert found == ["modes"]

@@ -138,36 +138,47 @@ class Sizes(NamedTuple):
     smoothing: float = SMOOTHING    # of coefficients as functions of latent coordinates
 
 
-def spanned(histories, sizes, size, follows=True):
+def spanned(histories, sizes, size, follows=True, known=None):
     """`Spanned` fields of `Histories` (their first run's parameters), and the latent coordinates
     (s, k + 1, r) of the snapshots; size [m] of blocks.
 
-    follows: whether the stress depends on the parameters too. Raises ValueError for more modes than
-    the snapshots hold.
+    follows: whether the stress depends on the parameters too; known: {(name, count): modes and
+    coefficients} of these histories, kept from one call to the next. Raises ValueError for more
+    modes than the snapshots hold.
     """
     s, levels, n, d = histories.x.shape
-    x = histories.x.reshape(s * levels, -1)
-    U, a = modes_of(x, sizes.modes, "modes", histories.X.ravel())
+    x, known = histories.x.reshape(s * levels, -1), {} if known is None else known
+    U, a = once(known, x, sizes.modes, "modes", histories.X.ravel())
     xhat, mu = a[:, :sizes.r], np.repeat(histories.mu, levels, axis=0)
     unit = np.full(sizes.r, np.sqrt(np.mean(xhat[:, 0] ** 2)))
     own = mu[:, :mu.shape[1] if follows else 0]
     units = np.concatenate([unit, spread_of(own) / sizes.weight])
     fit = partial(through, smoothing=sizes.smoothing)
     bend = fit(xhat, a[:, sizes.r:], unit) if sizes.modes > sizes.r else None
-    tau = part(histories.tau, sizes.tau, "tau", lambda a: fit(np.hstack([xhat, own]), a, units))
-    C = part(histories.C, sizes.C, "C", lambda a: fit(xhat, a, unit)) if sizes.C else None
+    find = partial(part, known)
+    tau = find(histories.tau, sizes.tau, "tau", lambda a: fit(np.hstack([xhat, own]), a, units))
+    C = find(histories.C, sizes.C, "C", lambda a: fit(xhat, a, unit)) if sizes.C else None
     U = np.ascontiguousarray(U.reshape(n, d, -1))
     fields = Spanned(histories.X, U, bend, tau, C, own[0], cells(histories.X, U, size))
     return fields, xhat.reshape(s, levels, -1)
 
 
-def part(snapshots, count, name, fit):
+def part(known, snapshots, count, name, fit):
     """`Part` with so many modes of snapshots (s, levels, n, k), whose coefficients (s levels, R)
-    are made functions by `fit`.
+    are made functions by `fit`; known: as of `once`.
     """
     s, levels, n, k = snapshots.shape
-    modes, a = modes_of(snapshots.reshape(s * levels, n * k), count, name)
+    modes, a = once(known, snapshots.reshape(s * levels, n * k), count, name)
     return Part(np.ascontiguousarray(modes.reshape(n, k, -1)), fit(a))
+
+
+def once(known, A, count, name, origin=None):
+    """What `modes_of` gives: what is known, {(name, count): modes and coefficients}, is not found
+    again, and what is found is put there.
+    """
+    if (name, count) not in known:
+        known[name, count] = modes_of(A, count, name, origin)
+    return known[name, count]
 
 
 def spread_of(mu):

@@ -36,6 +36,7 @@ class Tested(NamedTuple):
     tests: dict             # {value: `Histories` of a run}
     map_alone: bool = False     # whether stress is that of the map's gradient, without affine field
     modes: object = None        # `Spanned` by which samples get weights; None: the fields
+    known: dict | None = None   # modes of the runs, kept from one fit to the next
 
     @property
     def scale(self):
@@ -109,12 +110,12 @@ def tested(study):
 
     runs = joined(map(made, study.train), len(study.train))
     tests = {value: made(value) for value in study.test}
-    return refitted(Tested(study, None, None, runs, tests), study.sizes, study.follows)
+    return refitted(Tested(study, None, None, runs, tests, known={}), study.sizes, study.follows)
 
 
 def refitted(one, sizes, follows):
     """The same runs with other fields."""
     block = BLOCK * whole(one.study.run(one.study.train[0])).problem.dx
-    fields, xhat = spanned(one.runs, sizes, block, follows)
+    fields, xhat = spanned(one.runs, sizes, block, follows, one.known)
     return one._replace(study=one.study._replace(sizes=sizes, follows=follows), fields=fields,
                         xhat=xhat)
