@@ -14,7 +14,17 @@ from validation import targets
 from validation.nsf import networks as kept
 from validation.nsf import networks_runs as runs
 from validation.nsf import tested
-from validation.nsf.networks import Net, Part, fields_of, identity, nets, trained
+from validation.nsf.networks import (
+    NARROW,
+    Net,
+    Part,
+    fields_of,
+    identity,
+    narrow,
+    net_of,
+    nets,
+    trained,
+)
 from validation.nsf.studied import STUDIES
 from validation.nsf.studies import jelly
 from validation.results import Results
@@ -108,7 +118,7 @@ def test_damaged_weights_are_refused(folder):
 def test_weights_that_lie_there_are_those_of_their_nets():
     """What is committed fits what is asked for; 2 MB at most each."""
     for file in kept.FOLDER.glob("*.npz"):
-        assert trained(file.stem).g.r == nets()[file.stem].study.sizes.r
+        assert trained(file.stem).g.r == net_of(file.stem).study.sizes.r
         assert file.stat().st_size <= 2e6
 
 

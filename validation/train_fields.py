@@ -22,7 +22,7 @@ from mpm_ref.rom.learn.field import FieldTraining
 from mpm_ref.rom.learn.fit import Training
 from mpm_ref.rom.learn.stages import POSITION, Plan, train
 
-from .nsf.networks import FOLDER, identity, nets
+from .nsf.networks import FOLDER, identity, narrow, net_of, nets
 from .provenance import commit, provenance
 from .training import KEPT, Checkpoints, Device, Folder, Names, Threads, train_all
 
@@ -72,7 +72,7 @@ class Work:
 
 def made(name, checkpoints, machine):
     """`fields_file.Model` of a net by name, with what is to be known of it."""
-    net = nets()[name]
+    net = net_of(name)
     checkpoints.mkdir(parents=True, exist_ok=True)
     runs = runs_of(net.study)
     with tqdm(total=Work.total(net), desc=name, unit_scale=True) as bar:
@@ -123,7 +123,7 @@ def main(names: Names = None, folder: Folder = FOLDER, checkpoints: Checkpoints 
         save(folder / f"{name}.npz", made(name, kept, machine))
         rmtree(kept)
 
-    train_all(names, nets(), (folder, checkpoints), threads, make)
+    train_all(names, nets() | narrow(), (folder, checkpoints), threads, make)
 
 
 if __name__ == "__main__":

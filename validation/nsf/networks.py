@@ -26,6 +26,7 @@ FOLDER = Path(__file__).parent / "weights"
 WIDTH = 64                          # of hidden layers
 OCTAVES = 3                         # of features
 SEEDS = 1, 2                        # other than 0, of the first scene
+NARROW = 16, 32                     # of the first scene with features, beside WIDTH
 DISPLACED, BLURRED = 0.03, 0.01     # `Part.beside` of the position, and of what is not known there
 
 
@@ -76,15 +77,27 @@ def wide(study, g, h, l):
     return Net(study, Part(WIDTH, g, DISPLACED), Part(WIDTH, h, BLURRED), Part(WIDTH, l, BLURRED))
 
 
+def narrow():
+    """{name: `Net`} of the jelly cube with features and NARROW widths, trained for as long."""
+    own = nets()["jelly-waves"]
+    return {f"jelly-waves-{width}": own._replace(**{
+        name: getattr(own, name)._replace(width=width) for name in "ghl"}) for width in NARROW}
+
+
+def net_of(name):
+    """`Net` of a name, of `nets` or `narrow`. Raises KeyError for another."""
+    return nets().get(name) or narrow()[name]
+
+
 @cache
 def trained(name):
     """`fields_file.Model` of a scene. Raises `Untrained` where it is missing, ValueError where it
-    is damaged, or of another training or other scenes than `nets` says now.
+    is damaged, or of another training or other scenes than `net_of` says now.
     """
     path, again = FOLDER / f"{name}.npz", f"python -m validation.train_fields {name}"
     if not path.exists():
         raise Untrained(f"no weights {path.name}: {again}")
-    model, now = load(path), identity(nets()[name])
+    model, now = load(path), identity(net_of(name))
     was = {key: model.about.get(key) for key in now}
     if was != now:
         raise ValueError(f"weights {path.name} are of {was}, now it is {now}: {again}")
