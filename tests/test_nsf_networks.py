@@ -15,12 +15,10 @@ from validation.nsf import networks as kept
 from validation.nsf import networks_runs as runs
 from validation.nsf import tested
 from validation.nsf.networks import (
-    NARROW,
     Net,
     Part,
     fields_of,
     identity,
-    narrow,
     net_of,
     nets,
     trained,
