@@ -29,10 +29,10 @@ def reduced(made, out, *options, study="pairs.toml"):
     (('model = "nsf"', ""), 'map.tau: unknown key; it is one of model = "nsf"'),
     (("r = 3", "r = 3\ndegree = 2"), 'map.degree: unknown key; it is one of model = "ldm"'),
     (("r = 3", "r = 6"), "modes = 5: expected at least r = 6"),
-    (("modes = 5", "modes = 28"), "map.modes = 28: expected at most 27, as many as states are kept "
-     "of 3 training runs of 16 steps"),
-    (("tau = 8", "tau = 28"), "map.tau = 28: expected at most 27"),
-    (("C = 8", "C = 28"), "map.C = 28: expected at most 27"),
+    (("modes = 5", "modes = 28"), "map.modes = 28: the 3 training runs keep 27 states, which hold "
+     "no more modes"),
+    (("tau = 8", "tau = 28"), "map.tau = 28: the 3 training runs keep 27 states"),
+    (("C = 8", "C = 28"), "map.C = 28: the 3 training runs keep 27 states"),
     (('kind = "modes"', 'kind = "curved"'), "kind = 'curved': expected one of"),
     (('kind = "modes"', 'kind = "network"'), 'map.C: given, but the kind is "network"'),
     (("r = 3", "r = 3\nbeta = [8, 8, 8]"), 'map.beta: given, but the kind is "modes"'),
@@ -45,6 +45,8 @@ def reduced(made, out, *options, study="pairs.toml"):
     (("points = 20", 'inversion = "newton"'), "inversion = 'newton': expected one of"),
     (("points = 20", 'samples = "kept"'), "run.samples: unknown key"),
     (("points = 20", "faster = 0.0"), "faster"),
+    (("points = 20", "faster = 16.5"), "run.faster = 16.5: expected at most 16, the steps of the"),
+    (("smoothing = 1e-6", "weights = 1.0"), "map.weights: unknown key; did you mean `weight`?"),
     (("points = 20", "faster = 1e-9"), "run.faster = 1e-09: expected a number >= 0.01"),
     (('kind = "modes"\nr = 3\nmodes = 5\ntau = 8\nC = 8\nsmoothing = 1e-6',
       'kind = "network"\nr = 3\noctaves = 100000'), "octaves"),

@@ -132,8 +132,9 @@ def test_what_is_set_is_set_in_all_runs(tmp_path):
     ("r = 3", "", "map.r: this key is missing"),
     ("r = 3", "r = 0", "map.r = 0: expected a whole number >= 1"),
     ("r = 3", "r = 3.5", "map.r = 3.5: expected a whole number"),
-    ("r = 3", "r = 100", f"map.r = 100: expected at most {3 * (STEPS + 1)}, as many as states are "
-     "kept of 3 training runs"),
+    ("r = 3", "r = 100", f"map.r = 100: the 3 training runs keep {3 * (STEPS + 1)} states, which "
+     "hold no more modes than that; set `r` to less"),
+    ("r = 3", "r = 3\nweight = 1.0", "map.weight: unknown key; did you mean `weights`?"),
     ("r = 3", "r = 3\ntau = 8", 'map.tau: unknown key; it is one of model = "nsf": say so at the '
      "top of the study, or remove it"),
     ("r = 3", "r = 3\nepochs = 2", "map.epochs: given, but the kind is \"modes\""),

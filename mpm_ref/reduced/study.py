@@ -92,6 +92,7 @@ def load(path, shipped=None):
         study = Study(path, base, tables, mu, held_out(len(mu), tables.test, tables.seed))
         _require_one_body(study)
         _require_states(study)
+        _require_step(study)
         return study
 
 
@@ -192,9 +193,17 @@ def _require_states(study):
     for name in ("r", *SUMMED) if map.kind != NETWORK else ():
         count = getattr(map, name, None) or 0
         if count > states:
-            raise SceneError(f"map.{name} = {count}: expected at most {states}, as many as states "
-                             f"are kept of {runs} training runs of {base.steps} steps; keep more "
-                             "of them (`every` of the scene), or take fewer modes")
+            raise SceneError(f"map.{name} = {count}: the {runs} training runs keep {states} "
+                             "states, which hold no more modes than that; set "
+                             f"`{name}` to less, or take more runs")
+
+
+def _require_step(study):
+    """Raise SceneError for reduced steps that are longer than the scene."""
+    faster, steps = getattr(study.tables.run, "faster", 1.0), study.base.steps
+    if faster > steps:
+        raise SceneError(f"run.faster = {faster:g}: expected at most {steps}, the steps of the "
+                         "scene")
 
 
 def _kept(one, free):

@@ -2,7 +2,6 @@
 
 import tomllib
 from difflib import get_close_matches
-from types import MappingProxyType
 
 import msgspec
 
@@ -35,8 +34,9 @@ def checked(data):
         raise SceneError(f"model = {model!r}: expected one of {', '.join(map(repr, MODELS))}")
     whole = MODELS[model][0]
     for k, path in enumerate(("", "map", "run")):
-        known = {name: records[k].__struct_encode_fields__ for name, records in MODELS.items()}
-        require_keys(data.get(path) if path else data, known.pop(model), path, known)
+        others = {name: records[k].__struct_encode_fields__ for name, records in MODELS.items()}
+        own = others.pop(model)
+        require_keys(data.get(path) if path else data, own, path, others)
     varied = data.get("parameter")
     for k, part in enumerate(varied if isinstance(varied, list) else ()):
         require_keys(part, Parameter.__struct_encode_fields__, f"parameter[{k}]")
@@ -52,19 +52,21 @@ def checked(data):
     return tables
 
 
-def require_keys(table, known, path="", elsewhere=MappingProxyType({})):
+def require_keys(table, known, path="", elsewhere=None):
     """Raise SceneError for a key of a table that is none of those known; elsewhere: {model: keys}
     of the same table of other models.
     """
     for key in table if isinstance(table, dict) else ():
         if key not in known:
-            raise SceneError(f"{joined(path, key)}: unknown key; {hint(key, known, elsewhere)}")
+            meant = hint(key, known, elsewhere or {})
+            raise SceneError(f"{joined(path, key)}: unknown key; {meant}")
 
 
 def hint(key, known, elsewhere):
     """What may have been meant by an unknown key."""
+    if near := get_close_matches(key, known, 1):
+        return f"did you mean `{near[0]}`?"
     for model, keys in elsewhere.items():
         if key in keys:
             return f'it is one of model = "{model}": say so at the top of the study, or remove it'
-    near = get_close_matches(key, known, 1)
-    return f"did you mean `{near[0]}`?" if near else f"the keys here are {', '.join(known)}"
+    return f"the keys here are {', '.join(known)}"

@@ -87,7 +87,7 @@ def longer(run, name, one):
 
 def known(run, name, one):
     """Record how far the nearest states and the nearest training run are off, and in how many tests
-    that run is the very same: where a surface lies between two nodes, they do not feel.
+    that run is the very same, as the grid feels a solid only where it passes a node.
     """
     nearest, next_run = ([found(value) for value in one.study.test]
                          for found in (one.nearest, one.next_run))
@@ -139,7 +139,7 @@ def rows_of(one, word, count, draws, faster=1.0, weighed=False):
     """A row for each test and draw."""
     found = [(value, draw, one.errors(value, count, draw, faster, weighed))
              for value in one.study.test for draw in draws]
-    return [(word, value, count, draw, faster, *got.errors, *got[1:])
+    return [(word, value, count, draw, faster, *got.errors, *got[1:5])
             for value, draw, got in found]
 
 

@@ -1,5 +1,7 @@
 """Full-order runs with longer steps, as far as they go: what longer steps of reduced runs are to be
 seen beside, as a full-order run with them is faster too.
+
+Bounds of the time step, which are sufficient and not needed everywhere, do not end them.
 """
 
 from math import inf
@@ -15,7 +17,6 @@ from mpm_ref.reduced.nsf.evaluate import course, level_of, share
 from mpm_ref.reduced.whole import at_once, history, whole
 from mpm_ref.rom.placed import NoBody
 from mpm_ref.simulate import simulate
-from mpm_ref.timestep import TooLarge
 
 from ..registry import experiment
 from ..verification.scenes import with_
@@ -23,15 +24,17 @@ from .factors import REPEATS, seconds
 from .studies import cake, metal
 
 FACTORS = (1.0, 1.25, 1.5, 2.0, 3.0)        # of the scene's step
-COLUMNS = ("scene", "faster", "error", "largest", "displacement", "stress", "seconds", "speedup")
+COLUMNS = ("scene", "value", "faster", "states", "origin", "displacement", "stress", "seconds",
+           "speedup")                       # times are those of the first test
 
 
-class Found(NamedTuple):
-    """Errors of a full-order run; infinite where it ended before its time."""
+class Ended(NamedTuple):
+    """How a full-order run ended."""
 
-    errors: Errors
-    stress: float
-    said: str               # how it ended then
+    states: int             # that were compared
+    errors: Errors          # infinite where it ended before its time
+    stress: float           # of the Kirchhoff stress, over its norm; likewise
+    said: str               # why it ended then
 
 
 class Itself(NamedTuple):
@@ -49,7 +52,7 @@ class Itself(NamedTuple):
 
 
 @experiment("nsf.longer", title="NSF: full-order runs with longer steps",
-            profiles=("quick", "standard"), budget={"quick": 10, "standard": 400})
+            profiles=("quick", "standard"), budget={"quick": 10, "standard": 500})
 def longer(run):
     """Metal frame and cake: errors over two tests beside the runs with the scene's own steps; times
     of the first, medians of runs in turn.
@@ -59,17 +62,19 @@ def longer(run):
     for name, study in zip(("metal", "cake"), studies, strict=True):
         values = study.test[1:run.choose(quick=2, standard=3)]
         spent = taken(study.run(values[0]), run.choose(quick=1, standard=REPEATS))
-        found = run.progress([ends_of(study, value) for value in values], f"{name}, errors")
-        for factor, time, *own in zip(FACTORS, spent, *found, strict=True):
-            rows.append((name, *row_of(factor, own), time, spent[0] / time))
-            record(run, study, rows[-1], own)
+        ended = run.progress([ends_of(study, value) for value in values], f"{name}, errors")
+        for factor, time, *own in zip(FACTORS, spent, *ended, strict=True):
+            record(run, f"nsf.longer.{name}.{factor:g}", own, (time, spent[0]), scale_of(study))
+            rows += [(name, value, factor, one.states, one.errors.origin, one.errors.displacement,
+                      one.stress, time, spent[0] / time)
+                     for value, one in zip(values, own, strict=True)]
     run.table("steps", COLUMNS, rows)
 
 
 def stretched(scene, factor):
     """The scene with steps so many times as long, each of which is a frame."""
     return with_(scene, dt=factor * scene.dt, steps=Plan((), factor).steps(scene), every=1,
-                 interval=None)
+                 interval=None, unstable="allow")
 
 
 def taken(scene, repeats):
@@ -78,29 +83,29 @@ def taken(scene, repeats):
     """
     still = [with_(own, every=own.steps) for own in (stretched(scene, one) for one in FACTORS)]
     with one_thread():
-        found = [[of_run(one) for one in still] for _ in range(repeats)]
-    return np.median(found, axis=0).tolist()
+        spent = [[of_run(one) for one in still] for _ in range(repeats)]
+    return np.median(spent, axis=0).tolist()
 
 
 def of_run(scene):
     """Wall seconds of a run; infinite where it ends before its time."""
     try:
         return seconds(lambda: simulate(whole(scene).problem))
-    except (Unstable, TooLarge):
+    except Unstable:
         return inf
 
 
 def ends_of(study, value):
-    """`Found` of runs with steps of FACTORS of the test with a value, in their order."""
+    """`Ended` of runs with steps of FACTORS of the test with a value, in their order."""
     scene = study.run(value)
     test = history(scene, [value], np.float32, study.spacing)
-    return [found(test, stretched(scene, factor)) for factor in FACTORS]
+    return [end_of(test, stretched(scene, factor)) for factor in FACTORS]
 
 
-def found(test, scene):
-    """`Found` of the run of a scene beside the states of a `Histories`."""
+def end_of(test, scene):
+    """`Ended` of the run of a scene beside the states of a `Histories`."""
     own, stress = course(Itself(test.X), test.x[0], test.tau[0], states(test, scene))
-    return Found(own.errors, share(stress), own.said)
+    return Ended(int(np.isfinite(own.levels[1:]).sum()), own.errors, share(stress), own.said)
 
 
 def states(test, scene):
@@ -110,29 +115,33 @@ def states(test, scene):
     try:
         for frame in simulate(whole(scene).problem):
             yield level_of(frame.t / test.dt), frame.state.bodies
-    except (Unstable, TooLarge) as fault:
-        raise NoBody(getattr(fault, "reason", fault)) from fault
+    except Unstable as fault:
+        raise NoBody(fault.reason) from fault
 
 
-def row_of(factor, own):
-    """Length of the steps and errors: the mean, the largest, of the displacement, of the stress."""
-    origins = [one.errors.origin for one in own]
-    return (factor, float(np.mean(origins)), max(origins),
-            float(np.mean([one.errors.displacement for one in own])),
-            float(np.mean([one.stress for one in own])))
+def scale_of(study):
+    """What is run, in words."""
+    one = whole(study.run(study.test[1]))
+    coarse = f", dx and dt {study.coarser} times as long" if study.coarser > 1 else ""
+    return f"{len(one.X)} particles, {one.problem.clock.steps} steps{coarse}"
 
 
-def record(run, study, row, own):
-    """Record error and time of the runs with steps of one length, of which `own` are `Found`."""
-    known = dict(zip(COLUMNS, row, strict=True))
-    start = f"nsf.longer.{known['scene']}.{known['faster']:g}"
-    said = "; ".join(sorted({one.said for one in own if one.said}))
-    how = f"ends in {said}" if said else (
-        f"of the displacement {100.0 * known['displacement']:.3g} %, of the stress "
-        f"{100.0 * known['stress']:.3g} %")
-    scale = f"{len(own)} tests" + (f", dx and dt {study.coarser} times as long"
-                                   if study.coarser > 1 else "")
-    run.record(f"{start}.error", 100.0 * known["error"], unit="%", comparator="info", scale=scale,
-               note=f"full-order run, steps {known['faster']:g} times as long; {how}")
-    run.record(f"{start}.speedup", known["speedup"], unit="x", comparator="info", scale=scale,
-               note=f"of wall time: {known['seconds']:.3g} s")
+def record(run, start, own, times, scale):
+    """Record the mean error of runs with steps of one length that ended as they should, and how
+    many times faster the first is; own: their `Ended`, times: wall seconds with these steps, and
+    with the scene's.
+    """
+    good, said = [one for one in own if not one.said], {one.said for one in own if one.said}
+    ended = f"; {len(own) - len(good)} end in {' and '.join(sorted(said))}" if said else ""
+    note = f"full-order run, {len(good)} of {len(own)} tests{ended}"
+    if good:
+        origin, displacement, stress = np.mean(
+            [(one.errors.origin, one.errors.displacement, one.stress) for one in good], axis=0)
+        run.record(f"{start}.error", 100.0 * origin, unit="%", comparator="info", scale=scale,
+                   note=f"{note}; {good[0].states} states; of the displacement "
+                        f"{100.0 * displacement:.3g} %, of the stress {100.0 * stress:.3g} %")
+    else:
+        run.record(f"{start}.ended", len(own), comparator="info", scale=scale, note=note)
+    if np.isfinite(times[0]):
+        run.record(f"{start}.speedup", times[1] / times[0], unit="x", comparator="info",
+                   scale=scale, note=f"of wall time of the first test: {times[0]:.3g} s")

@@ -11,6 +11,7 @@ from mpm_ref.reduced.nsf.fields import BLOCK
 from mpm_ref.reduced.whole import history, whole
 from mpm_ref.rom.deformed import deformed
 from mpm_ref.rom.histories import joined
+from mpm_ref.rom.inferred import INVERSIONS
 from mpm_ref.rom.spanned import spanned
 
 FASTER = 1.5            # longer steps at deployment
@@ -24,6 +25,7 @@ class Found(NamedTuple):
     points: float           # integration points, mean over the steps; NaN where it broke down
     kept: float             # samples; of sets that follow each other, the mean
     misfit: float           # of their weights, the largest (see `rom.cubature`); NaN without
+    iterations: tuple = ()  # of Gauss-Newton, one number for each step
 
 
 class Tested(NamedTuple):
@@ -36,7 +38,8 @@ class Tested(NamedTuple):
     tests: dict             # {value: `Histories` of a run}
     map_alone: bool = False     # whether stress is that of the map's gradient, without affine field
     modes: object = None        # `Spanned` by which samples get weights; None: the fields
-    known: dict | None = None   # modes of the runs, kept from one fit to the next
+    known: dict | None = None   # modes of `runs`, kept from one fit to the next
+    inversion: str = INVERSIONS[0]
 
     @property
     def scale(self):
@@ -70,19 +73,20 @@ class Tested(NamedTuple):
         """
         fields, test, one = self.of(value), self.tests[value], whole(self.study.run(value))
         sets = self.study.chosen(one, count, draw, (self.modes or self.fields) if weighed else None)
-        points = []
+        points, iterations = [], []
 
         def states():
-            for t, at, report in infer(one, fields, Plan(sets, faster), self.rest):
+            for t, at, report in infer(one, fields, Plan(sets, faster, self.inversion), self.rest):
                 level = level_of(t / test.dt)
                 if level:
                     points.append(report.points)
+                iterations.extend(() if report is None else (report.iterations,))
                 yield level, at.xhat
 
         found, stress = course(fields, test.x[0], test.tau[0], states())
         return Found(found.errors, share(stress), np.nan if found.said else float(np.mean(points)),
                      float(np.mean([len(own.points) for own in sets])),
-                     float(np.max([own.misfit for own in sets])))
+                     float(np.max([own.misfit for own in sets])), tuple(iterations))
 
     def nearest(self, value):
         """`Errors` of the nearest states that the fields know, as far as a search finds them that
