@@ -78,15 +78,19 @@ def test_scenes_that_reduced_runs_do_not_know_are_refused_before_any_run(
 
 
 @pytest.mark.parametrize(("edit", "words"), [
-    (("points = 20", "points = 1"), "1 samples for 3 latent coordinates: expected at least 2"),
-    (("points = 20", "points = 999"), "999 samples of "),
+    (("points = 20", "points = 1"), "points = 1: expected 2 .. "),
+    (("points = 20", "points = 999"), "points = 999: expected 2 .. "),
     (("points = 20", "faster = 99.0"), "faster = 99: expected at most 16"),
     (("points = 20", "points = 20\nfaster = 20.0"), "faster = 20: expected at most 16"),
     (("to = 2.4", "to = 2.5"), "is a map of another study"),
 ])
 def test_what_a_run_cannot_be_made_with_is_refused(made, tmp_path, edit, words):
-    done = reduced(made, tmp_path / "run.h5", study=write(tmp_path, edit))
-    assert_told(done, 2, words)
+    study = write(tmp_path, edit)
+    assert_told(reduced(made, tmp_path / "run.h5", study=study), 2, words)
+    if "points" in words or "faster" in words:      # known before data are made
+        for command in (("info",), ("rom", "generate")):
+            assert_told(mpm_ref(*command, study), 2, words)
+        assert not (tmp_path / "pairs-data").exists()
     assert not (tmp_path / "run.h5").exists()
 
 

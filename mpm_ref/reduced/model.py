@@ -52,9 +52,14 @@ def require_way(one, model, run):
 
 def known_of(study, mu):
     """What the study's reduced model knows of the run with parameters mu: a `Case`, or a `Whole`.
-    Raises ValueError for a scene that reduced runs do not know.
+    Raises ValueError for a scene that reduced runs do not know, and with `Whole` for samples that
+    do not suffice.
     """
-    return (whole if study.tables.model == NSF else case)(study.scene(mu))
+    if study.tables.model != NSF:
+        return case(study.scene(mu))
+    one = whole(study.scene(mu))
+    nsf.require_samples(study.tables.run, one.X, study.tables.map.r)
+    return one
 
 
 def to_write(study, mu, count=None):

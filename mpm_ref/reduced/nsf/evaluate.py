@@ -18,7 +18,7 @@ from ..evaluate import NEAREST, REDUCED, Course, Held, require_slow
 from ..inferring import ENOUGH, Plan, infer
 from ..whole import whole
 from .fields import of_run
-from .recording import plan_of, require_step
+from .recording import plan_of
 
 EVEN = 1e-6         # of a level: a state so near to one is compared with it
 
@@ -41,10 +41,9 @@ def evaluate(study, model, histories):
 
 def levels_of(study):
     """Numbers of the states kept at which a step of a reduced run ends. Raises ValueError where
-    there are none but the start, and for steps that are longer than the run.
+    there are none but the start.
     """
     faster, base = study.tables.run.faster, study.base
-    require_step(faster, base.steps)
     ends = range(Plan((), faster).steps(base) + 1)
     levels = {level_of(step * faster / base.every) for step in ends} - {None}
     if not any(0 < level <= base.steps // base.every for level in levels):

@@ -90,14 +90,12 @@ def plan_of(run, problem, fields):
 
 
 def chosen(run, problem, fields):
-    """`Chosen` samples of a study's `Run`. Raises ValueError for samples that do not suffice, or
-    are more than there are points, and for weights of samples without modes.
+    """`Chosen` samples of a study's `Run`. Raises ValueError as `require_samples` does, and for
+    weights of samples without modes.
     """
     n = len(fields.X)
     count = n if run.points is None else run.points
-    if count * fields.dim < fields.r:
-        raise ValueError(f"{count} samples for {fields.r} latent coordinates: expected at least "
-                         f"{ceil(fields.r / fields.dim)}; give `points` of [run] more")
+    require_samples(run, fields.X, fields.r)
     if not (run.weighed or run.cells):
         return drawn(n, count, run.seed)
     if not isinstance(fields, Spanned):
@@ -109,19 +107,22 @@ def chosen(run, problem, fields):
     return of_cells(fields, problem, n, run.cells, run.seed)
 
 
-def require_step(faster, steps):
-    """Raise ValueError for steps that are longer than a run of so many steps of the scene."""
-    if faster > steps:
-        raise ValueError(f"faster = {faster:g}: expected at most {steps}, the steps of the scene")
+def require_samples(run, X, r):
+    """Raise ValueError where the samples of a study's `Run` of points X (n, d) do not suffice for r
+    latent coordinates, or are more than there are points.
+    """
+    (n, d), count = X.shape, run.points
+    if count is not None and not ceil(r / d) <= count <= n:
+        raise ValueError(f"points = {count}: expected {ceil(r / d)} .. {n} samples, of {n} points "
+                         f"and for {r} latent coordinates; change `points` of [run]")
 
 
 def recording(whole, model, mu, run, facts):
     """`Recording` of a reduced run with parameters mu on the fields of a `Model`. Raises ValueError
-    as `plan_of` and `require_step` do.
+    as `plan_of` does.
     """
     fields, clock = of_run(model.decoder, whole, mu), whole.problem.clock
     plan = plan_of(run, whole.problem, fields)
-    require_step(run.faster, clock.steps)
     own = replace(clock, dt=run.faster * clock.dt, steps=plan.steps(clock), every=1)
     return Recording(whole, fields, model.rest, trained(fields, model.xhat), run, plan,
                      replace(whole.problem, clock=own), facts)
