@@ -26,6 +26,7 @@ def places(tmp_path, monkeypatch):
     monkeypatch.setattr(kept, "FOLDER", tmp_path / "weights")
     for module in (kept, train_fields):
         monkeypatch.setattr(module, "nets", lambda: {"jelly": NET})
+        monkeypatch.setattr(module, "narrow", dict)
     trained.cache_clear()
     yield tmp_path / "weights", tmp_path / "checkpoints"
     trained.cache_clear()
