@@ -57,7 +57,8 @@ def reduced(made, out, *options, study="pairs.toml"):
     (("[map]", "[set]\nevery = 3\n[map]"), "every = 3: expected a divisor of steps = 16"),
     (("[map]", "[set]\ninterval = 0.01\n[map]"), "interval = 0.01: expected `every`"),
     (('key = "body.hard.velocity.linear[0]"', 'key = "body.hard.density"'),
-     "runs differ in `body[0].density`"),
+     "runs differ in `body[0].density` of the scene, but all need the same particles, grid and "
+     "steps; vary gravity, a material, a motion or a velocity at the start"),
 ])
 def test_a_study_with_a_fault_is_refused_in_a_sentence(tmp_path, edit, words):
     for command in (("info",), ("rom", "generate"), ("rom", "evaluate")):

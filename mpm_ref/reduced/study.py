@@ -22,6 +22,8 @@ from .vary import flat, varied
 
 SAME = ("dim", "dx", "dt", "steps", "every", "seed", "scheme", "integrator")    # in all runs
 SUMMED = ("modes", "tau", "C")      # numbers of modes, of maps and fields that are sums of them
+VARIED = {LDM: 'gravity, a material or a motion; with model = "nsf" a velocity at the start too',
+          NSF: "gravity, a material, a motion or a velocity at the start"}
 FREE = {LDM: ("material",), NSF: ("material", "velocity")}      # of a body, from run to run
 
 
@@ -182,8 +184,8 @@ def _require_one_body(study):
         for name, value in found.items():
             if value != first[name]:
                 raise SceneError(f"parameter: runs differ in `{name}` of the scene, but all need "
-                                 "the same particles, grid and steps; vary gravity, a material or "
-                                 "a motion")
+                                 "the same particles, grid and steps; vary "
+                                 f"{VARIED[study.tables.model]}")
 
 
 def _require_states(study):
