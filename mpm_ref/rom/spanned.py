@@ -147,7 +147,7 @@ def spanned(histories, sizes, size, follows=True, known=None):
     modes than the snapshots hold.
     """
     s, levels, n, d = histories.x.shape
-    x, known = histories.x.reshape(s * levels, -1), {} if known is None else known
+    x = histories.x.reshape(s * levels, -1)
     U, a = once(known, x, sizes.modes, "modes", histories.X.ravel())
     xhat, mu = a[:, :sizes.r], np.repeat(histories.mu, levels, axis=0)
     unit = np.full(sizes.r, np.sqrt(np.mean(xhat[:, 0] ** 2)))
@@ -155,7 +155,7 @@ def spanned(histories, sizes, size, follows=True, known=None):
     units = np.concatenate([unit, spread_of(own) / sizes.weight])
     fit = partial(through, smoothing=sizes.smoothing)
     bend = fit(xhat, a[:, sizes.r:], unit) if sizes.modes > sizes.r else None
-    find = partial(part, known)
+    find = partial(part, known=known)
     tau = find(histories.tau, sizes.tau, "tau", lambda a: fit(np.hstack([xhat, own]), a, units))
     C = find(histories.C, sizes.C, "C", lambda a: fit(xhat, a, unit)) if sizes.C else None
     U = np.ascontiguousarray(U.reshape(n, d, -1))
@@ -163,7 +163,7 @@ def spanned(histories, sizes, size, follows=True, known=None):
     return fields, xhat.reshape(s, levels, -1)
 
 
-def part(known, snapshots, count, name, fit):
+def part(snapshots, count, name, fit, known=None):
     """`Part` with so many modes of snapshots (s, levels, n, k), whose coefficients (s levels, R)
     are made functions by `fit`; known: as of `once`.
     """
@@ -173,9 +173,11 @@ def part(known, snapshots, count, name, fit):
 
 
 def once(known, A, count, name, origin=None):
-    """What `modes_of` gives: what is known, {(name, count): modes and coefficients}, is not found
-    again, and what is found is put there.
+    """What `modes_of` gives: what is known, {(name, count): modes and coefficients} or None, is not
+    found again, and what is found is put there.
     """
+    if known is None:
+        return modes_of(A, count, name, origin)
     if (name, count) not in known:
         known[name, count] = modes_of(A, count, name, origin)
     return known[name, count]
