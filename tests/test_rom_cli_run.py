@@ -252,7 +252,7 @@ def test_errors_are_those_of_the_run_that_was_held_out(made, reduced, tmp_path):
 
 def test_the_table_has_a_row_for_each_run_and_one_for_all(made, tmp_path):
     done = evaluate(made, "--out", tmp_path / "errors.png")
-    heading, head, *rows, picture = done.stdout.splitlines()
+    heading, head, *rows, _, _, _, picture = done.stdout.splitlines()
     assert "[%]" in heading
     assert head.split()[:3] == ["run", "g", "origin"]
     assert [row.split()[0] for row in rows] == [str(load(made / "bars.toml").test[0]), "all"]

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from ..reduced import dataset
+from ..reduced import dataset, nearby
 from ..reduced.evaluate import REDUCED, breakdowns, draw, evaluate, facts, lines, together
 from ..reduced.nsf import evaluate as nsf
 from ..reduced.tables import NSF
@@ -34,8 +34,9 @@ def judge(
     """Compare reduced runs with the full-order runs that were held out.
 
     Their position errors by three measures, beside those of the map's nearest states, which reduced
-    runs on it seldom beat. Exit status: 0 done, 2 bad input, 3 a reduced run broke
-    down, 4 a file could not be written, 130 Ctrl-C.
+    runs on it seldom beat, and of the training run with the nearest parameters, which they should.
+    Exit status: 0 done, 2 bad input, 3 a reduced run broke down, 4 a file could not be written, 130
+    Ctrl-C.
     """
     with at_work(name) as study:
         picture = out or named(map, study, ".npz").with_suffix(".errors.png")
@@ -46,8 +47,10 @@ def judge(
             if not study.test:
                 raise SceneError(f"{study.path}: test = 0: no run is held out to compare with")
             _, model = map_of(name, study, map)
+            folder = named(data, study, "-data")
             with faults.writing():
-                snapshots = dataset.load(study, named(data, study, "-data"), study.test)
+                snapshots = dataset.load(study, folder, study.test)
+                trained = list(nearby.nearby(study, folder, snapshots))
             inferred = study.tables.model == NSF
             compare = nsf.evaluate if inferred else evaluate
             runs = passing(unit="run", iterable=compare(study, model, snapshots),
@@ -58,9 +61,11 @@ def judge(
         if json:
             stress = {"stress": nsf.stress_facts(found)} if inferred else {}
             print(as_json({"study": str(study.path), "picture": str(picture),
-                           **facts(study, found, all_runs), **stress}))
+                           **facts(study, found, all_runs), "nearby": nearby.facts(trained),
+                           **stress}))
         else:
             stress = nsf.stress_lines(found) if inferred else ()
-            print("\n".join([*lines(study, found, all_runs), *stress, str(picture)]))
+            print("\n".join([*lines(study, found, all_runs), *nearby.lines(trained), *stress,
+                             str(picture)]))
         warn(breakdowns(study, found))
     raise typer.Exit(0 if isfinite(all_runs[REDUCED].origin) else faults.UNSTABLE)
