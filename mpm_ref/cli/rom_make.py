@@ -20,7 +20,8 @@ from ..reduced.generate import (
     said,
 )
 from ..reduced.model import kind_of, known_of, with_kind
-from ..reduced.tables import KEYS, NETWORK
+from ..reduced.nsf.hints import hints
+from ..reduced.tables import KEYS, NETWORK, NSF
 from ..store.atomic import NotWritten, require_place
 from ..store.words import counted
 from . import faults
@@ -28,7 +29,7 @@ from .faults import end, one_line, options, writing
 from .outputs import MAPS, require_ending, require_folder_name, require_free
 from .rom_options import Data, Overwrite, StudyName, named, on_interrupt, studied
 from .shipped import keep_scene
-from .terminal import passing
+from .terminal import passing, warn
 
 MADE, CONTINUED, THERE = "made", "continued", "was there"
 STATUS = {UNSTABLE: faults.UNSTABLE, NOT_WRITTEN: faults.NOT_WRITTEN}
@@ -126,6 +127,8 @@ def train(
             require_device(study.tables.map.kind, machine.device)
             with writing():
                 snapshots = dataset.load(study, data, study.train)
+            if study.tables.model == NSF:
+                warn(hints(study))
             about = {"command": f"mpm-ref rom train {name} --data {data} --out {out} "
                                 f"--kind {study.tables.map.kind} {typed(machine)}"}
             with writing(), on_interrupt(lambda: resuming(checkpoint)):
