@@ -178,7 +178,7 @@ def test_errors_are_means_in_per_cent(folder, monkeypatch):
     assert found["jelly.nearest"].value == pytest.approx(0.1)
     for words in ("stress", "cubature.stress", "all.stress"):
         assert found[f"jelly.{words}"].value == pytest.approx(20.0)
-    assert "2 runs and 1 tests, dx and dt 4 times as long; r = 3, widths 4, 5 and 6, seed 0" in (
+    assert "2 runs and 1 test, dx and dt 4 times as long; r = 3, widths 4, 5 and 6, seed 0" in (
         found["jelly"].scale)
     assert "untrained" not in found
     table = Results(folder / "out").table("nsf.networks", "errors")

@@ -13,6 +13,7 @@ from mpm_ref.rom.deformed import deformed
 from mpm_ref.rom.histories import joined
 from mpm_ref.rom.inferred import INVERSIONS
 from mpm_ref.rom.spanned import spanned
+from mpm_ref.store.words import counted
 
 FASTER = 1.5            # longer steps at deployment
 
@@ -52,8 +53,10 @@ class Tested(NamedTuple):
         """The same without what the fields are made of."""
         study, test = self.study, next(iter(self.tests.values()))
         coarse = "" if study.coarser == 1 else f", dx and dt {study.coarser} times as long"
-        return (f"{len(test.X)} particles, {test.x.shape[1] - 1} steps, {len(study.train)} runs "
-                f"and {len(self.tests)} tests{coarse}; r = {study.sizes.r}")
+        return (f"{len(test.X)} particles, {study.run(study.test[0]).steps} steps, "
+                f"{counted(test.x.shape[1] - 1, 'state')} kept, "
+                f"{counted(len(study.train), 'run')} and {counted(len(self.tests), 'test')}"
+                f"{coarse}; r = {study.sizes.r}")
 
     @property
     def rest(self):
