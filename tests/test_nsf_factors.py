@@ -78,7 +78,7 @@ def test_samples_with_weights_are_anywhere(one):
 def test_ways_have_names_that_differ():
     for ways in factors.WAYS.values():
         assert len({way.words for way in ways}) == len(ways)
-    assert WEIGHED.words == "weighed.12.1"
+    assert WEIGHED.words == "weighed.12.x1"
 
 
 @pytest.mark.usefixtures("clock")
@@ -86,6 +86,7 @@ def test_errors_and_times_are_recorded(one, tmp_path, monkeypatch):
     monkeypatch.setattr(factors, "studies", lambda run: {"metal": STUDY, "cake": STUDY})
     monkeypatch.setattr(factors, "tested", lambda study: one._replace(
         study=study, tests={value: one.tests[value] for value in study.test}))
+    monkeypatch.setattr(factors, "PRINTED", {"metal": WEIGHED, "cake": DRAWN})
     monkeypatch.setattr(factors, "WAYS", {("quick", "metal"): (DRAWN, WEIGHED),
                                           ("quick", "cake"): (CELLS,)})
     assert not run_all([factors.factors.experiment], Setting("quick", tmp_path))
@@ -100,11 +101,14 @@ def test_errors_and_times_are_recorded(one, tmp_path, monkeypatch):
         assert table["kept"][k] == expected.kept
     assert table["speedup"] == pytest.approx(100.0 / table["reduced"])
     records = {r.target: r for r in found.records("nsf.factors")}
-    start = "nsf.factors.metal.drawn.30.1"
+    start = "nsf.factors.metal.drawn.30.x1"
     assert records[f"{start}.error"].value == pytest.approx(100.0 * table["error"][0])
     assert records[f"{start}.speedup"].value == table["speedup"][0]
     assert np.isfinite(table["points"]).all()
-    note = records["nsf.factors.cake.cells.4.1.speedup"].note
+    assert records["nsf.metal.time_full"].value == 100.0
+    assert records["nsf.metal.time_reduced"].value == table["reduced"][1]
+    assert "nsf.cake.time_full" not in records
+    note = records["nsf.factors.cake.cells.4.x1.speedup"].note
     assert note.startswith("4 cells of samples with weights at most, "
                            f"{table['kept'][2]:g} samples on average, steps 1 times")
 

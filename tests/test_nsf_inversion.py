@@ -62,7 +62,7 @@ def test_errors_and_iterations_are_recorded(one, tmp_path, monkeypatch):
     last = [table[name][-1] for name in inversion.COLUMNS[5:]]
     assert last == pytest.approx([*expected.errors, expected.stress, 1.0, 1.0, 1.0])
     records = {r.target: r for r in found.records("nsf.inversion")}
-    assert records["nsf.inversion.jelly.linear.1.error"].value == pytest.approx(
+    assert records["nsf.inversion.jelly.linear.x1.error"].value == pytest.approx(
         50.0 * sum(table["origin"][4:6]))
     _, medians, most = zip(*(inversion.spread(own) for own in
                              inversion.runs_of(one, "nonlinear", 1.0, (0,)).values()),

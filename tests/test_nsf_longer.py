@@ -106,13 +106,13 @@ def test_errors_and_times_are_recorded(tmp_path, monkeypatch):
         assert table[name].tolist() == pytest.approx(2 * own, rel=1e-6)
     assert table["speedup"].tolist() == pytest.approx(2 * [1.0, 8.0 / 6.0, 2.0, 0.0])
     records = {r.target: r for r in found.records("nsf.longer")}
-    assert records["nsf.longer.cake.2.speedup"].value == 2.0
-    assert records["nsf.longer.metal.2.error"].value == pytest.approx(
+    assert records["nsf.longer.cake.x2.speedup"].value == 2.0
+    assert records["nsf.longer.metal.x2.error"].value == pytest.approx(
         100.0 * expected[2].errors.origin)
-    assert records["nsf.longer.metal.20.ended"].value == 1
-    assert "crosses more than 1 dx in a step" in records["nsf.longer.metal.20.ended"].note
-    assert not {"nsf.longer.metal.20.error", "nsf.longer.metal.20.speedup"} & set(records)
-    assert "dx and dt 4 times as long" in records["nsf.longer.cake.2.error"].scale
+    assert records["nsf.longer.metal.x20.ended"].value == 1
+    assert "crosses more than 1 dx in a step" in records["nsf.longer.metal.x20.ended"].note
+    assert not {"nsf.longer.metal.x20.error", "nsf.longer.metal.x20.speedup"} & set(records)
+    assert "dx and dt 4 times as long" in records["nsf.longer.cake.x2.error"].scale
 
 
 def test_runs_that_broke_down_are_in_no_mean():

@@ -121,9 +121,11 @@ def recorded(one, clock, tmp_path, monkeypatch):
         return one
 
     monkeypatch.setattr(speed, "STUDIES", {"jelly": (small, (N, FEW))})
+    monkeypatch.setattr(speed, "sand", small)
     monkeypatch.setattr(speed, "tested", made)
     assert not run_all([speed.speed.experiment], Setting("quick", tmp_path))
-    assert asked == [(3, 3), STUDY._replace(test=STUDY.test[1:])]
+    assert asked == [(3, 3), STUDY._replace(test=STUDY.test[1:]),
+                     (3, 3), STUDY._replace(test=STUDY.test[:1], steps=speed.HELD)]
     results = Results(tmp_path)
     return ({r.target: r for r in results.records("nsf.speed") if r.target != "nsf.speed"},
             results.table("nsf.speed", "times"))
@@ -139,8 +141,15 @@ def test_records_are_ratios_and_shares_of_the_table(one, recorded):
     assert (table["reduced"] == reduced).all()
     names = {f"nsf.speed.jelly.{inversion}.{count}": FULL / reduced
              for count in (N, FEW) for inversion in ("nonlinear", "linear")}
+    fields = sum(a.nbytes for a in (one.fields.X, one.fields.U, one.fields.tau.modes,
+                                    one.fields.C.modes))
+    particles = particle_bytes(STUDY)
+    held = {name: value for scene in ("jelly", "sand") for name, value in (
+        (f"nsf.speed.{scene}.bytes.fields", fields), (f"nsf.{scene}.mem_reduced", 1e-9 * fields),
+        (f"nsf.speed.{scene}.bytes.particles", particles),
+        (f"nsf.{scene}.mem_full", 1e-9 * particles))}
     found = {target: one.value for target, one in records.items()}
-    assert found == pytest.approx(names | {
+    assert found == pytest.approx(names | held | {
         "nsf.appC.jelly.speedup_per_step": FULL / reduced,
         "nsf.jelly.speedup": 1.5 * FULL / reduced,
         "nsf.appC.jelly.full": 100.0 * FULL,
@@ -148,12 +157,7 @@ def test_records_are_ratios_and_shares_of_the_table(one, recorded):
         "nsf.appC.jelly.network": 100.0 * (reduced - SPENT["moved"]),
         "nsf.appC.jelly.particle_share": 100.0,
         "nsf.appC.jelly.runtime_share": 100.0 * SPENT["moved"] / FULL,
-        "nsf.speed.jelly.deform": 100.0 * BODIES * DEFORM / FULL,
-        "nsf.speed.jelly.bytes.fields": sum(a.nbytes for a in (
-            one.fields.X, one.fields.U, one.fields.tau.modes, one.fields.C.modes)),
-        "nsf.speed.jelly.bytes.particles": particle_bytes(STUDY),
-        "nsf.jelly.mem_reduced": 1e-9 * records["nsf.speed.jelly.bytes.fields"].value,
-        "nsf.jelly.mem_full": 1e-9 * particle_bytes(STUDY)})
+        "nsf.speed.jelly.deform": 100.0 * BODIES * DEFORM / FULL})
     assert {r.comparator for r in records.values()} == {"info"}
     points = table["points"][2]
     assert f"{FEW} samples, {points:.0f} integration points" in (

@@ -75,6 +75,18 @@ def test_chapter_counts(folder):
     assert chapter.overruled == 1
 
 
+def test_a_number_that_repeats_another_is_told_beside_it(folder):
+    """And is not missing, unless that one is."""
+    more = {t.id: t for t in (
+        target("nsf.bread.again", again="nsf.table1.bread"), target("nsf.jelly.again",
+                                                                    again="nsf.table1.jelly"))}
+    chapter, = chapters(Results(folder), TARGETS | more)
+    assert [t.id for t in chapter.missing] == ["nsf.table1.jelly", "nsf.jelly.again"]
+    words = [row.what for section in chapter.sections for row in section.rows]
+    assert "the bread (Table 1; Table 1: 1.2 %)" in words
+    assert "the cake (Table 1)" in words
+
+
 def test_printed_number_counts_for_its_paper(tmp_path):
     def other(run):
         run.record("nsf.table1.bread", 1.0)

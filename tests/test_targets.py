@@ -111,6 +111,22 @@ def test_an_id_given_twice_is_refused(tmp_path):
         targets.load(write(tmp_path, GOOD, GOOD))
 
 
+AGAIN = GOOD.replace("toy.a", "toy.b").replace("}", ', again = "toy.a"}')
+
+
+def test_a_number_may_repeat_another(tmp_path):
+    assert targets.load(write(tmp_path, AGAIN, GOOD))["toy.b"].again == "toy.a"
+
+
+@pytest.mark.parametrize("other", [
+    GOOD.replace("toy.a", "toy.c"), GOOD.replace('"m"', '"s"'), GOOD.replace("setting", "time"),
+    GOOD.replace("}", ', again = "toy.b"}')], ids=["missing", "unit", "kind", "repeats"])
+def test_a_number_repeats_one_of_its_kind_that_repeats_none(tmp_path, other):
+    with pytest.raises(ValueError, match=r"'toy\.b': again = 'toy\.a'; expected the id of .* kind "
+                                         r"\(setting\) and unit \(m\)"):
+        targets.load(write(tmp_path, AGAIN, other))
+
+
 def test_an_unknown_key_of_the_file_is_refused(tmp_path):
     with pytest.raises(ValueError, match=r"toy\.toml: .*`count`"):
         targets.load(write(tmp_path, GOOD, head='paper = "toy"\ncount = 1'))

@@ -83,12 +83,28 @@ def test_all_is_recorded(tmp_path, monkeypatch):
     assert not run_all([nsf_offline.offline.experiment], Setting("quick", tmp_path))
     found = Results(tmp_path)
     records = {r.target.split(".")[-1]: r for r in found.records("trade.nsf.offline")}
-    assert {*records} == {"offline", *Bill._fields, "pays_after"}
+    trainings = {"train_time_lo", "train_time_hi"}
+    assert {*records} == {"offline", *Bill._fields, "pays_after", *trainings}
     assert records["pays_after"].value == 1.0
     assert records["runs"].unit == "s"
     assert "40 samples" in records["runs"].scale
     table = found.table("trade.nsf.offline", "bills")
     assert [float(table[word][0]) for word in Bill._fields] == [2.0, 4.0, 10.0, 4.0]
+
+
+def test_the_shortest_and_the_longest_training_are_told(monkeypatch):
+    def known(name):
+        if name == "metal":
+            raise Untrained(f"no weights {name}.npz")
+        h = 7200.0 if name == "sand-waves" else 90.0
+        return SimpleNamespace(about={"cpu_seconds": {"g": 90.0, "h": h}})
+
+    monkeypatch.setattr(nsf_offline, "trained", known)
+    run, drafts = recording()
+    run.experiment = nsf_offline.offline.experiment
+    nsf_offline.trainings(run)
+    assert drafts == {"trade.nsf.offline.untrained": 1, "nsf.sec7.train_time_lo": 0.05,
+                      "nsf.sec7.train_time_hi": 2.025}
 
 
 def test_the_printed_resolution_is_that_of_the_standard_profile():

@@ -101,18 +101,28 @@ def _environment():
 
 def chapters(results, targets):
     """A `Chapter` per group that has results or printed numbers."""
-    figures = _figures(results.folder)
-    sections = [_section(results, id, figures.get(id, []), targets)
+    figures, known = _figures(results.folder), printed(targets)
+    sections = [_section(results, id, figures.get(id, []), known)
                 for id in sorted({*results.ids(), *figures})]
     done = {r.target for id in results.ids() for r in results.records(id)}
     made = [_chapter(key, sections, targets.values(), done) for key in GROUPS]
     return [c for c in made if c.sections or c.missing or c.settings]
 
 
+def printed(targets):
+    """{id: (`Target`, where it is printed, and as what elsewhere)}."""
+    repeated = {}
+    for target in targets.values():
+        repeated.setdefault(target.again, []).append(
+            f"{target.paper_ref}: {quantity(target.value, target.unit)}")
+    return {id: (target, "; ".join([target.paper_ref, *repeated.get(id, [])]))
+            for id, target in targets.items()}
+
+
 def _chapter(key, sections, targets, done):
     counts = Counter(row.verdict for s in sections for row in s.rows if row.key == key)
     targets = [t for t in targets if _group(t.id) == key]
-    left = [t for t in targets if t.id not in done and not overruled(t)]
+    left = [t for t in targets if done.isdisjoint((t.id, t.again)) and not overruled(t)]
     return Chapter(key, GROUPS[key], counts, [s for s in sections if _group(s.id) == key],
                    missing=[t for t in left if t.kind != "setting"],
                    settings=[t for t in left if t.kind == "setting"],
@@ -128,10 +138,11 @@ def overruled(target):
     return target.id.split(".")[1] == "printed"
 
 
-def _section(results, id, figures, targets):
+def _section(results, id, figures, known):
     records = results.records(id) if id in results.ids() else []
+    numbers = [r for r in records if not _is_remark(r, id)]
     return Section(id, [r.note for r in records if _is_remark(r, id)],
-                   [_row(r, id, targets.get(r.target)) for r in records if not _is_remark(r, id)],
+                   [_row(r, id, *known.get(r.target, (None, ""))) for r in numbers],
                    [_table(results, id, name) for name in results.tables(id)], figures,
                    made=_made(records[0]) if records else "no results")
 
@@ -145,9 +156,9 @@ def _made(record):
             f"{record.command}")
 
 
-def _row(record, id, target):
+def _row(record, id, target, where):
     key = _group(target.id if target else id)
-    what = f"{target.what} ({target.paper_ref})" if target else _words(record, id)
+    what = f"{target.what} ({where})" if target else _words(record, id)
     doubt = f" ({target.confidence})" if target and target.confidence != "exact" else ""
     return Row(key, what, quantity(record.paper, record.unit) + doubt, rule(record),
                quantity(record.value, record.unit), ratio(record), record.verdict, record.scale,

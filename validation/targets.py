@@ -37,6 +37,7 @@ class Target(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     comparator: Literal["=", "<=", ">=", "~"]
     confidence: Literal["exact", "derived", "ocr-uncertain", "external", "contradicted"]
     conditions: str = ""
+    again: str = ""         # the id of the number that is recorded, where this one repeats it
 
 
 class TargetFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -50,7 +51,8 @@ def load(folder: Path = FOLDER) -> dict[str, Target]:
     """All targets by id, file by file.
 
     Raises ValueError, naming file, id and key, for an unknown or missing key, a value of the
-    wrong type, a number that is not finite, an id of another paper, or an id given twice.
+    wrong type, a number that is not finite, an id of another paper, an id given twice, or a number
+    that repeats none of its kind.
     """
     found: dict[str, Target] = {}
     for path in sorted(folder.glob("*.toml")):
@@ -58,7 +60,21 @@ def load(folder: Path = FOLDER) -> dict[str, Target]:
             if target.id in found:
                 raise ValueError(f"{path.name}: target {target.id!r} is given twice; drop one")
             found[target.id] = target
+    for target in found.values():
+        require_again(target, found)
     return found
+
+
+def require_again(target, found):
+    """Raise ValueError unless a target repeats none, or one of its own kind and unit that does
+    not repeat another.
+    """
+    own = found.get(target.again)
+    if target.again and (own is None or own.again
+                         or (own.kind, own.unit) != (target.kind, target.unit)):
+        raise ValueError(f"target {target.id!r}: again = {target.again!r}; expected the id of a "
+                         f"number of the same kind ({target.kind}) and unit ({target.unit}) that "
+                         "repeats no other")
 
 
 def read(path: Path) -> list[Target]:

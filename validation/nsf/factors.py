@@ -22,7 +22,7 @@ from .errors import mean, rows_of
 from .studies import cake, metal
 from .tested import FASTER, tested
 
-REPEATS = 3
+REPEATS = DRAWS = 3
 DRAWN, WEIGHED, CELLS = "drawn", "weighed", "cells"     # kinds of samples
 KINDS = {DRAWN: "samples drawn", WEIGHED: "samples with weights at most",
          CELLS: "cells of samples with weights at most"}
@@ -40,7 +40,7 @@ class Way(NamedTuple):
     @property
     def words(self):
         """As a part of an id."""
-        return f"{self.kind}.{self.samples}.{self.faster:g}"
+        return f"{self.kind}.{self.samples}.x{self.faster:g}"
 
     def of(self, one):
         """`Tested` with samples of this kind, whose weights are of samples anywhere."""
@@ -62,10 +62,13 @@ WAYS = {("quick", "metal"): (Way(30, DRAWN, 1.0), Way(10, WEIGHED, 3.0)),
             Way(8, CELLS, 2.0), Way(8, CELLS, 3.0), Way(8, CELLS, 4.0))}
 
 
+PRINTED = {"metal": Way(30, DRAWN, FASTER), "cake": Way(700, DRAWN, FASTER)}   # of NSF's times
+
+
 @experiment("nsf.factors", title="NSF: where a speed-up comes from",
             profiles=("quick", "standard"), budget={"quick": 40, "standard": 1500})
 def factors(run):
-    """Errors over two tests, one draw; times of the first, medians of runs in turn."""
+    """Errors over two tests and several draws; times of the first, medians of runs in turn."""
     rows = [(name, *row) for name, study in studies(run).items()
             for row in of_scene(run, name, study._replace(
                 test=study.test[1:run.choose(quick=2, standard=3)]))]
@@ -85,11 +88,14 @@ def studies(run):
 def of_scene(run, name, study):
     """Record all ways of a scene; their rows."""
     one, ways, rows = tested(study), WAYS[run.profile, name], []
+    draws = range(run.choose(quick=1, standard=DRAWS))
     full, reduced = taken(one, ways, run.choose(quick=1, standard=REPEATS))
     for way, seconds in run.progress(list(zip(ways, reduced, strict=True)), f"{name}, errors"):
-        found = rows_of(way.of(one), way.words, way.samples, (0,), way.faster, way.kind != DRAWN)
+        found = rows_of(way.of(one), way.words, way.samples, draws, way.faster, way.kind != DRAWN)
         rows.append((*way, *row_of(found), full, seconds, full / seconds))
         record(run, f"nsf.factors.{name}.{way.words}", one, rows[-1])
+        if way == PRINTED[name]:
+            record_seconds(run, name, one, rows[-1])
     return rows
 
 
@@ -151,3 +157,12 @@ def record(run, id, one, row):
     run.record(f"{id}.speedup", known["speedup"], unit="x", comparator="info", scale=one.scale,
                note=f"{note}; {known['reduced']:.3g} s beside {known['full']:.3g} s of the "
                     "full-order run")
+
+
+def record_seconds(run, name, one, row):
+    """Record the seconds of whole runs beside the printed ones."""
+    known = dict(zip(COLUMNS, row, strict=True))
+    for word, key in (("time_full", "full"), ("time_reduced", "reduced")):
+        run.record(f"nsf.{name}.{word}", known[key], unit="s", comparator="info", scale=one.scale,
+                   note=f"{known['samples']} {KINDS[known['kind']]}, steps of the reduced run "
+                        f"{known['faster']:g} times as long; printed: a graphics processor")

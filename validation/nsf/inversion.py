@@ -32,7 +32,7 @@ def inversion(run):
                 found = runs_of(one, kind, faster, draws)
                 rows += [(name, *which, kind, faster, *own.errors, own.stress, *spread(own))
                          for which, own in found.items()]
-                record(run, f"nsf.inversion.{name}.{kind}.{faster:g}", one.scale,
+                record(run, f"nsf.inversion.{name}.{kind}.x{faster:g}", one.scale,
                        list(found.values()))
     counts(run, rows, "; ".join(scales))
     run.table("runs", COLUMNS, rows)

@@ -64,7 +64,7 @@ def longer(run):
         spent = taken(study.run(values[0]), run.choose(quick=1, standard=REPEATS))
         ended = run.progress([ends_of(study, value) for value in values], f"{name}, errors")
         for factor, time, *own in zip(FACTORS, spent, *ended, strict=True):
-            record(run, f"nsf.longer.{name}.{factor:g}", own, (time, spent[0]), scale_of(study))
+            record(run, f"nsf.longer.{name}.x{factor:g}", own, (time, spent[0]), scale_of(study))
             rows += [(name, value, factor, one.states, one.errors.origin, one.errors.displacement,
                       one.stress, time, spent[0] / time)
                      for value, one in zip(values, own, strict=True)]

@@ -19,11 +19,12 @@ from mpm_ref.simulate import simulate
 
 from ..registry import experiment
 from ..verification.scenes import with_
-from .studies import cake, metal
+from .studies import cake, metal, sand
 from .tested import FASTER, tested
 
 INFO = {"comparator": "info"}
 REPEATS, WARM = 3, 3        # timings; steps before them
+HELD = 120                  # steps of the sand, whose bytes alone are told
 STAGES = ("integration", "inferred", "moved", "inverted")
 COLUMNS = ("scene", "samples", "inversion", "points", "full", "deform", *STAGES, "reduced")
 STUDIES = {"metal": (metal, (30, 10)), "cake": (cake, (700, 100))}
@@ -63,12 +64,14 @@ class Clocked(Inferred):
 @experiment("nsf.speed", title="NSF: time beside the full-order run",
             profiles=("quick", "standard"), budget={"quick": 20, "standard": 600})
 def speed(run):
-    """Metal frame and cake: time of a step and where it goes; bytes held."""
+    """Metal frame and cake: time of a step and where it goes; bytes held, by sand too."""
     steps, rows = run.choose(quick=20, standard=100), []
     for name, (study, counts) in run.progress(STUDIES.items(), "scenes"):
         small = study(run.choose(quick=3, standard=1), train=3)
         one = tested(small._replace(test=small.test[1:2]))
         rows += of_scene(run, name, one, counts, steps)
+    column = sand(run.choose(quick=3, standard=1), train=3)
+    record_bytes(run, "sand", tested(column._replace(test=column.test[:1], steps=HELD)))
     run.table("times", COLUMNS, rows)
 
 

@@ -104,7 +104,7 @@ def of_steps(run):
         for factor in run.progress(FACTORS, name):
             found = rows_of(one, "modal", one.study.samples, draws, factor)
             said = full_end(one.study.run(one.study.test[0]), factor)
-            share(run, f"trade.nsf.dt.{name}.{factor:g}", found, one.scale, f"steps {factor:g} "
+            share(run, f"trade.nsf.dt.{name}.x{factor:g}", found, one.scale, f"steps {factor:g} "
                   f"times as long, {one.study.samples} samples; the full-order run: {said}",
                   comparator="info")
             rows += [(name, *row, said) for row in found]

@@ -8,11 +8,11 @@ from mpm_ref.reduced.whole import history
 from mpm_ref.rom.histories import joined
 
 from ..ldm.racing import clocked
-from ..nsf.networks import fields_of, trained
+from ..nsf.networks import fields_of, nets, trained
 from ..nsf.studies import jelly, metal
 from ..nsf.tested import Tested, refitted
 from ..registry import experiment
-from ..waiting import Untrained
+from ..waiting import Untrained, there
 from .nsf import full_cpu, reduced_cpu
 
 INFO = {"comparator": "info", "unit": "s"}
@@ -55,6 +55,7 @@ def offline(run):
         if run.profile == "standard" and name == "jelly":
             rows += of_networks(run, name, one, bill)
     run.table("bills", COLUMNS, rows)
+    trainings(run)
 
 
 def of_modes(study, repeats):
@@ -83,6 +84,18 @@ def of_networks(run, name, one, bill):
     training = sum(model.about["cpu_seconds"].values())
     return [told(run, name, "networks", other, bill._replace(
         making=training, reduced=reduced_cpu(other, one.study.samples, False, 1)))]
+
+
+def trainings(run):
+    """Record what the shortest and the longest training took, of all networks that are there."""
+    hours = {name: sum(model.about["cpu_seconds"].values()) / 3600.0
+             for name, model in there(run, list(nets()), trained).items()}
+    for word, end in (("lo", min), ("hi", max)):
+        name = end(hours, key=hours.get, default=None)
+        if name is not None:
+            run.record(f"nsf.sec7.train_time_{word}", hours[name], unit="h", comparator="info",
+                       note=f"CPU hours, {name}, as its weights tell; printed: of wider networks "
+                            "on a graphics processor")
 
 
 def told(run, name, kind, one, bill):
