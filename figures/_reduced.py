@@ -9,8 +9,9 @@ from validation.ldm.kept_bodies import read
 from ._bodies import Panel, View, body, nothing, pictures, shades
 from ._states import spacing
 
-WORDS = {"true": "full order", "ours": "reduced", "map": "map alone"}
-COLOURS = {"true": "#e9e9ec", "ours": "#e8b53d", "map": "#c46a5a"}
+WORDS = {"true": "full order", "ours": "reduced", "map": "map alone",
+         "weighed": "with weights"}
+COLOURS = {"true": "#e9e9ec", "ours": "#e8b53d", "map": "#c46a5a", "weighed": "#7fb069"}
 TOP = 0.98          # quantile of the stresses at which the colours end
 ROOM = 0.4          # around the full-order runs, of their longest side: points beyond are left out
 

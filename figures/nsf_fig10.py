@@ -1,5 +1,5 @@
 """NSF, Figure 10: toothpaste on brushes of several inclinations [degrees]: full order, and reduced
-below each. From left to right: time.
+below each, on samples drawn at random and on such with weights. From left to right: time.
 """
 
 from ._orders import shared
@@ -13,4 +13,4 @@ def scale(results):
 
 
 def draw(results):
-    return beside(results, NEEDS[0], choice=slice(None))
+    return beside(results, NEEDS[0], ("true", "ours", "weighed"), slice(None))

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from figures import _reduced, nsf_fig18
+from mpm_ref.reduced.inferring import Plan, infer
+from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.placed import NoBody
 from mpm_ref.rom.symmetric import tensor
 from validation.ldm.kept_bodies import read
@@ -55,6 +57,17 @@ def test_stress_is_kept_where_it_is_asked_for(cube, run):
     states.keep_states(run, cube, (TEST,))
     assert {*read(run.folder, ID)} == {"values", "levels", "first", "last", "0.45_true",
                                        "0.45_ours"}
+
+
+def test_a_run_on_samples_with_weights_is_kept_where_it_is_asked_for(cube, run):
+    states.keep_states(run, cube, (TEST,), ("weighed",))
+    kept = read(run.folder, ID)
+    assert "0.45_map" not in kept
+    scene, shown = whole(cube.study.run(TEST)), np.arange(len(cube.runs.X))
+    plan = Plan(cube.study.chosen(scene, cube.study.samples, 0, cube.fields))
+    *_, (_, last, _) = infer(scene, cube.of(TEST), plan, cube.rest)
+    assert kept["0.45_weighed"][-1] == pytest.approx(cube.fields.place(shown, last.xhat), abs=1e-6)
+    assert np.abs(kept["0.45_weighed"] - kept["0.45_ours"]).max() > 1e-4
 
 
 def test_a_run_that_breaks_down_has_no_place_from_then_on(cube, monkeypatch):
@@ -106,7 +119,8 @@ def test_points_that_fly_away_are_left_out(rng):
     ("07", 2, (), ["{0}: full order", "{0}: reduced", "{1}: full order", "{1}: reduced"]),
     ("08", 2, ("stress",), ["{0}: full order", "{0}: reduced", "{1}: full order", "{1}: reduced"]),
     ("09", 2, ("stress",), ["full order", "reduced"]),
-    ("10", 2, (), ["{0}: full order", "{0}: reduced", "{1}: full order", "{1}: reduced"]),
+    ("10", 2, ("weighed",), ["{0}: full order", "{0}: reduced", "{0}: with weights",
+                             "{1}: full order", "{1}: reduced", "{1}: with weights"]),
     ("12", 1, ("map",), ["{0}: full order", "{0}: reduced", "{0}: map alone"]),
     ("13", 1, ("map",), ["{0}: full order", "{0}: reduced", "{0}: map alone"]),
     ("14", 2, (), ["{0}: full order", "{0}: reduced", "{1}: full order", "{1}: reduced"]),
@@ -117,7 +131,7 @@ def test_figures_show_all_that_experiments_keep(number, values, also, sides, tmp
     """A row for each parameter kept (of the stress, for one) and each way."""
     script = importlib.import_module(f"figures.nsf_fig{number}")
     names, x = [f"{0.1 * k:g}" for k in range(1, values + 1)], rng.uniform(size=(3, 40, 3))
-    words = ["true", "ours", *(["map"] if "map" in also else [])]
+    words = ["true", "ours", *(word for word in states.WAYS if word in also)]
     kept = {"values": np.array(names), "levels": np.arange(3), "first": x, "last": x}
     kept |= {f"{name}_{word}": x for name in names for word in words}
     if "stress" in also:

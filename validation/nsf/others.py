@@ -37,7 +37,7 @@ def paste(run):
     """Errors with 50, 30 and 15 samples (Figures 10 and 11)."""
     one = prepared(run, toothpaste, train=5)
     counted(run, "nsf.toothpaste", one, (50, 30, 15))
-    keep_states(run, one, one.study.test)
+    keep_states(run, one, one.study.test, ("weighed",))
 
 
 @experiment("nsf.bread", title="NSF: a slice of bread is torn",

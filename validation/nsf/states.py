@@ -11,6 +11,7 @@ from mpm_ref.rom.symmetric import tensor
 from ..ldm.kept_bodies import keep
 
 SHOTS = 3               # times, evenly spaced, the last among them
+WAYS = "map", "weighed"     # of reduced runs, beside the usual one
 MOST = 4000             # points shown of a scene
 
 
@@ -22,16 +23,17 @@ def keep_states(run, one, values, also=()):
 def keep_runs(run, tests, also=()):
     """Keep points of full-order runs and of reduced ones, and of the training runs at the ends of
     the range, at `SHOTS` times. tests: {name: (`Tested`, parameter)}, all of the same training.
-    also: "map", reduced runs on the map alone; "stress", sizes |tau| [Pa] of the Kirchhoff stress.
+    also: "map", reduced runs on the map alone; "weighed", such with weighted samples; "stress",
+    sizes |tau| [Pa] of the Kirchhoff stress.
     """
     runs = next(iter(tests.values()))[0].runs
     shown = np.arange(0, len(runs.X), -(-len(runs.X) // MOST))
     found = {"values": np.array(list(tests)), "levels": levels_of(runs)}
     for name, (one, value) in tests.items():
-        ways = {"ours": one} | ({"map": one._replace(map_alone=True)} if "map" in also else {})
         found |= of_history(f"{name}_true", one.tests[value], 0, shown)
-        for word, own in ways.items():
-            found |= of_run(f"{name}_{word}", own, value, shown)
+        for word in ("ours", *(word for word in WAYS if word in also)):
+            own = one._replace(map_alone=word == "map")
+            found |= of_run(f"{name}_{word}", own, value, shown, word == "weighed")
     for word, k in (("first", 0), ("last", -1)):
         found |= of_history(word, runs, k, shown)
     keep(run, **{name: a for name, a in found.items()
@@ -51,15 +53,15 @@ def of_history(name, histories, k, shown):
     return {name: histories.x[k, levels][:, shown], f"{name}_tau": sizes(tau)}
 
 
-def of_run(name, one, value, shown):
-    """The same of a reduced run with the study's samples, those of the first draw; NaN from where
-    it breaks down.
+def of_run(name, one, value, shown, weighed=False):
+    """The same of a reduced run with as many samples as the study has, drawn or weighed by
+    cubature, those of the first draw; NaN from where it breaks down.
     """
     test, scene, fields = one.tests[value], whole(one.study.run(value)), one.of(value)
     levels = levels_of(test).tolist()
     x = np.full((SHOTS, len(shown), fields.dim), np.nan)
     tau = np.full(x.shape[:2], np.nan)
-    plan = Plan(one.study.chosen(scene, one.study.samples, 0))
+    plan = Plan(one.study.chosen(scene, one.study.samples, 0, one.fields if weighed else None))
     try:
         for t, at, _ in infer(scene, fields, plan, one.rest):
             level = level_of(t / test.dt)
