@@ -66,8 +66,8 @@ def test_a_run_on_samples_with_weights_is_kept_where_it_is_asked_for(cube, run):
     scene, shown = whole(cube.study.run(TEST)), np.arange(len(cube.runs.X))
     plan = Plan(cube.study.chosen(scene, cube.study.samples, 0, cube.fields))
     *_, (_, last, _) = infer(scene, cube.of(TEST), plan, cube.rest)
-    assert kept["0.45_weighed"][-1] == pytest.approx(cube.fields.place(shown, last.xhat), abs=1e-6)
-    assert np.abs(kept["0.45_weighed"] - kept["0.45_ours"]).max() > 1e-4
+    assert kept["0.45_weighed"][-1] == pytest.approx(cube.fields.place(shown, last.xhat), abs=1e-4)
+    assert np.abs(kept["0.45_weighed"] - kept["0.45_ours"]).max() > 1e-3
 
 
 def test_a_run_that_breaks_down_has_no_place_from_then_on(cube, monkeypatch):
