@@ -154,7 +154,7 @@ def test_rows_are_told_by_their_columns(cube):
     assert len(rows) == 2
     assert all(len(row) == len(errors.COLUMNS) for row in rows)
     assert errors.mean(rows, "samples") == 50.0
-    assert cube.scale.startswith("1250 particles, 60 steps, 60 states kept, 3 runs and 1 test, dx "
+    assert cube.scale.startswith("1250 particles, 60 steps, all kept, 3 runs and 1 test, dx "
                                  "and dt 2 times as long; r = ")
 
 
@@ -164,4 +164,4 @@ def test_steps_are_told_beside_the_states_that_are_kept(cube):
     kept = some._replace(x=some.x[:, ::6], tau=some.tau[:, ::6], C=some.C[:, ::6])
     study = cube.study._replace(every=12, test=(0.45, 0.35))
     one = cube._replace(study=study, tests={0.45: kept, 0.35: kept})
-    assert one.size.startswith("1250 particles, 60 steps, 10 states kept, 3 runs and 2 tests, ")
+    assert one.size.startswith("1250 particles, 60 steps, one in 6 kept, 3 runs and 2 tests, ")

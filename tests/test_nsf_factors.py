@@ -75,6 +75,11 @@ def test_samples_with_weights_are_anywhere(one):
         assert own.by_cell is (way is CELLS)
 
 
+def test_the_printed_ways_are_among_those_of_the_standard_profile():
+    for name, way in factors.PRINTED.items():
+        assert way in factors.WAYS["standard", name]
+
+
 def test_ways_have_names_that_differ():
     for ways in factors.WAYS.values():
         assert len({way.words for way in ways}) == len(ways)

@@ -10,15 +10,16 @@ import small_nsf_studies
 import small_studies
 from command_line import mpm_ref
 
-from mpm_ref.reduced import dataset
-from mpm_ref.reduced.errors import Errors
-from mpm_ref.reduced.nearby import Nearby, facts, lines, nearest_run
+from mpm_ref.reduced import dataset, nearby
+from mpm_ref.reduced.errors import Squares
+from mpm_ref.reduced.nearby import Nearby, facts, lines, nearest_runs
 from mpm_ref.reduced.study import load
 
+LDM = small_studies, "bars.toml", "map.npz", 0
+NSF = small_nsf_studies, "pairs.toml", "fields.npz", 1
 
-@pytest.fixture(scope="module", params=[
-    (small_studies, "bars.toml", "map.npz", 0), (small_nsf_studies, "pairs.toml", "fields.npz", 1),
-], ids=["ldm", "nsf"])
+
+@pytest.fixture(scope="module", params=[LDM, NSF], ids=["ldm", "nsf"])
 def made(request, tmp_path_factory):
     """Folder with a study, its runs and its map; the study's file, the map, and the first of the
     levels that count.
@@ -27,41 +28,76 @@ def made(request, tmp_path_factory):
     return module.modelled(tmp_path_factory.mktemp(module.__name__)), study, map, first
 
 
-def evaluated(made, data, *options):
-    folder, study, map, _ = made
-    done = mpm_ref("rom", "evaluate", folder / study, "--map", folder / map, "--data", data,
+def evaluated(made, data, *options, study=None):
+    folder, name, map, _ = made
+    done = mpm_ref("rom", "evaluate", study or folder / name, "--map", folder / map, "--data", data,
                    "--overwrite", *options)
     assert done.exit_code == 0, done.output
     return done.stdout
 
 
-def test_its_errors_are_those_of_its_states_beside_the_run_held_out(made, tmp_path):
-    folder, name, _, first = made
+def errors(X, x, reference):
+    """Of positions (k, n, d), by hand."""
+    off = np.linalg.norm(x - reference)
+    return {name: off / np.linalg.norm(reference - of) for name, of in
+            {"origin": 0.0, "centroid": X.mean(axis=0), "displacement": X}.items()}
+
+
+def expected(made, levels):
+    """Number of the run held out, of the nearest training run, and its errors, by hand."""
+    folder, name, *_ = made
     study = load(folder / name)
     (number,) = study.test
-    taken = nearest_run(study, number)
-    assert abs(study.mu[taken] - study.mu[number]) == min(
-        abs(study.mu[k] - study.mu[number]) for k in study.train)
+    both = {k: dataset.load(study, folder / "data", (number, k)) for k in study.train}
+    near = np.abs(study.mu[list(study.train), 0] - study.mu[number, 0])
+    found = {k: errors(both[k].X, *both[k].x[::-1, levels].astype(float))
+             for k, away in zip(study.train, near, strict=True) if away < near.min() + 1e-6}
+    taken = min(found, key=lambda k: found[k]["origin"])
+    return number, taken, found[taken]
+
+
+def test_its_errors_are_those_of_its_states_beside_the_run_held_out(made, tmp_path):
+    folder, *_, first = made
+    number, taken, own = expected(made, slice(first, None))
     out = tmp_path / "e.png"
-    own, = json.loads(evaluated(made, folder / "data", "--json", "--out", out))["nearby"]
-    both = dataset.load(study, folder / "data", (number, taken))
-    reference, x = both.x[:, first:].astype(float)
-    error = np.linalg.norm(x - reference)
-    assert (own["number"], own["training_run"]) == (number, taken)
-    assert own["origin"] == pytest.approx(error / np.linalg.norm(reference), rel=1e-6)
-    assert own["displacement"] == pytest.approx(
-        error / np.linalg.norm(reference - both.X), rel=1e-6)
-    row = f"{number:>13}{taken:>13}{100.0 * own['origin']:>13.3g}"
-    assert row in evaluated(made, folder / "data", "--out", out)
+    found = json.loads(evaluated(made, folder / "data", "--json", "--out", out))["nearby"]
+    assert found["all"] == pytest.approx(own, rel=1e-6)
+    assert found["runs"] == [{"number": number, "training_run": taken, **found["all"]}]
+    heading = "position errors [%] of the training run with the nearest parameters"
+    told = evaluated(made, folder / "data", "--out", out).splitlines()
+    at, = (k for k, line in enumerate(told) if line.startswith(heading))
+    shares = [f"{100.0 * share:.3g}" for share in own.values()]
+    assert [row.split() for row in told[at + 1:at + 4]] == [
+        ["run", "training", "run", "origin", "centroid", "displaced"],
+        [str(number), str(taken), *shares], ["all", *shares]]
 
 
-def test_without_its_data_it_is_left_out(made, tmp_path):
+@pytest.mark.parametrize("made", [NSF], indirect=True)
+def test_longer_steps_are_compared_at_the_same_states(made, tmp_path):
+    """Of three steps of 1.5 two end between states of NSF's small study, two steps apart."""
+    folder = made[0]
+    study = small_nsf_studies.write(tmp_path, ("points = 20", "points = 20\nfaster = 1.5"))
+    number, taken, own = expected(made, [3, 6])
+    found = json.loads(evaluated(made, folder / "data", "--json", "--out", tmp_path / "e.png",
+                                 study=study))["nearby"]
+    assert found["all"] == pytest.approx(own, rel=1e-6)
+    assert [(one["number"], one["training_run"]) for one in found["runs"]] == [(number, taken)]
+
+
+@pytest.mark.parametrize("damaged", [False, True])
+def test_without_its_data_it_is_left_out(made, tmp_path, damaged):
     folder, name, *_ = made
     study = load(folder / name)
     (number,) = study.test
     shutil.copy(folder / "data" / f"case-{number:03d}.h5", tmp_path)
-    own, = json.loads(evaluated(made, tmp_path, "--json", "--out", tmp_path / "e.png"))["nearby"]
-    assert own == {"number": number, "training_run": nearest_run(study, number)}
+    for k in study.train if damaged else ():
+        (tmp_path / f"case-{k:03d}.h5").write_bytes(b"no results")
+    out = tmp_path / "e.png"
+    found = json.loads(evaluated(made, tmp_path, "--json", "--out", out))["nearby"]
+    taken = nearest_runs(study, number)[0]
+    assert found == {"all": None, "runs": [{"number": number, "training_run": taken}]}
+    assert [str(number), str(taken), "no", "data"] in [
+        row.split() for row in evaluated(made, tmp_path, "--out", out).splitlines()]
 
 
 def test_parameters_are_measured_in_their_ranges():
@@ -70,16 +106,34 @@ def test_parameters_are_measured_in_their_ranges():
     """
     mu = np.array([[0.0, 5.0, 0.0], [1.0, 5.0, 1000.0], [0.1, 5.0, 600.0], [0.9, 5.0, 400.0]])
     study = SimpleNamespace(mu=mu, train=(1, 0), test=(2, 3))
-    assert (nearest_run(study, 2), nearest_run(study, 3)) == (0, 1)
+    assert (nearest_runs(study, 2), nearest_runs(study, 3)) == ([0], [1])
 
 
-def test_a_table_has_a_row_for_each():
-    found = [Nearby(3, 1, Errors(0.01, 0.02, 0.5)), Nearby(4, 2, None)]
-    heading, *rows = lines(found)
-    assert "[%]" in heading
-    assert [row.split() for row in rows] == [
-        ["run", "of", "origin", "centroid", "displacement"], ["3", "1", "1", "2", "50"],
-        ["4", "2", "no", "data", "no", "data", "no", "data"]]
-    assert facts(found) == [
-        {"number": 3, "training_run": 1, "origin": 0.01, "centroid": 0.02, "displacement": 0.5},
-        {"number": 4, "training_run": 2}]
+def test_of_runs_that_are_equally_near_the_better_one_is_taken(monkeypatch):
+    """Up to round-off: 0.1 + 0.2 is no 0.3."""
+    study = SimpleNamespace(mu=np.array([[0.1], [0.1 + 0.2], [0.5], [0.9]]), train=(0, 2, 3),
+                            test=(1,))
+    snapshots = SimpleNamespace(X=None, x=[None])
+    off = {0: 3.0, 2: 2.0, 3: 1.0}
+    monkeypatch.setattr(nearby, "_squares", lambda study, folder, k, X, x: SimpleNamespace(
+        errors=SimpleNamespace(origin=off[k])))
+    assert nearest_runs(study, 1) == [0, 2]
+    assert [one.taken for one in nearby.nearby(study, "", snapshots)] == [2]
+    off[2] = 4.0
+    assert [one.taken for one in nearby.nearby(study, "", snapshots)] == [0]
+
+
+def test_all_runs_are_one_where_all_have_data(rng):
+    X, x = rng.uniform(size=(5, 2)), rng.uniform(size=(2, 2, 5, 2))
+    found = []
+    for k in range(2):
+        squares = Squares(X)
+        squares.add(*x[k])
+        found.append(Nearby(k, 7, squares))
+    every = facts(found)
+    assert every["all"] == pytest.approx(errors(X, x[:, 0], x[:, 1]))
+    assert [row.split()[0] for row in lines(found)[2:]] == ["0", "1", "all"]
+    some = [found[0], Nearby(3, 2, None)]
+    assert facts(some) == {"all": None, "runs": [
+        every["runs"][0], {"number": 3, "training_run": 2}]}
+    assert [row.split()[:3] for row in lines(some)[3:]] == [["3", "2", "no"]]

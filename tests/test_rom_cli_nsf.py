@@ -293,7 +293,7 @@ def test_info_knows_study_fields_and_results(made, pairs, reduced):
     with h5py.File(out) as h5:
         points = h5["reduced/points"][1:].mean()
     assert 20 < points <= n
-    assert (f"reduced: pairs, modes r = 3, v = 2; a step has 20 samples and {points:.4g} points "
-            "on average; 0 of 17 states out of bounds") in said
+    assert (f"reduced: pairs, modes r = 3, v = 2; a step has 20 samples and {points:.4g} "
+            "integration points on average; 0 of 17 states out of bounds") in said
     assert "hard" in said
     assert "(x v C tau)" in said

@@ -103,9 +103,10 @@ def test_a_run_beyond_the_training_is_warned_of(reduced):
         found = told.told(results)
         t = results.time[STEPS + 1 - found["out_of_bounds"]]
     assert f"{found['out_of_bounds']} of {STEPS + 1} states, from t = {t:g} s on" in beyond
-    assert (f"reduced: bars, modes r = 3, g = 9; a step has {found['samples']:.4g} samples and "
-            f"{found['points']:.4g} points on average; {found['out_of_bounds']} of {STEPS + 1} "
-            "states out of bounds") in mpm_ref("info", out).stdout.splitlines()
+    said = (f"reduced: bars, modes r = 3, g = 9; a step has {found['mean_samples']:.4g} samples "
+            f"and {found['mean_points']:.4g} integration points on average; "
+            f"{found['out_of_bounds']} of {STEPS + 1} states out of bounds")
+    assert said in mpm_ref("info", out).stdout.splitlines()
     assert json.loads(mpm_ref("info", out, "--json").stdout)["reduced"] == found
     assert "times as far from the training runs" in beyond
 

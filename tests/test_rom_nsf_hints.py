@@ -21,7 +21,7 @@ def test_a_hint_is_given_where_matter_flows_and_modes_are_hardly_smoothed(
         tmp_path, edits, scene, told):
     found = list(hints(load(write(tmp_path, *edits, scene=scene))))
     assert len(found) == told
-    assert all("1e-08, and soft flows" in one for one in found)
+    assert all("1e-08 is for elastic matter, and that of soft flows" in one for one in found)
 
 
 def test_it_is_said_before_the_fields_are_made(tmp_path):
@@ -30,4 +30,4 @@ def test_it_is_said_before_the_fields_are_made(tmp_path):
                folder / "bare.npz")
     done = mpm_ref(*command)
     assert done.exit_code == 0, done.output
-    assert "mpm-ref: warning: map.smoothing = 1e-08, and soft flows" in done.stderr
+    assert "mpm-ref: warning: map.smoothing = 1e-08 is for elastic" in done.stderr

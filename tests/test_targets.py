@@ -120,10 +120,11 @@ def test_a_number_may_repeat_another(tmp_path):
 
 @pytest.mark.parametrize("other", [
     GOOD.replace("toy.a", "toy.c"), GOOD.replace('"m"', '"s"'), GOOD.replace("setting", "time"),
-    GOOD.replace("}", ', again = "toy.b"}')], ids=["missing", "unit", "kind", "repeats"])
+    GOOD.replace("}", ', again = "toy.b"}'), GOOD.replace("1.5", "1.7")],
+    ids=["missing", "unit", "kind", "repeats", "value"])
 def test_a_number_repeats_one_of_its_kind_that_repeats_none(tmp_path, other):
     with pytest.raises(ValueError, match=r"'toy\.b': again = 'toy\.a'; expected the id of .* kind "
-                                         r"\(setting\) and unit \(m\)"):
+                                         r"\(setting\), unit \(m\) .* value \(1\.5\)"):
         targets.load(write(tmp_path, AGAIN, other))
 
 

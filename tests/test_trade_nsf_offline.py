@@ -94,7 +94,7 @@ def test_all_is_recorded(tmp_path, monkeypatch):
 
 def test_the_shortest_and_the_longest_training_are_told(monkeypatch):
     def known(name):
-        if name == "metal":
+        if name == "metal-waves":
             raise Untrained(f"no weights {name}.npz")
         h = 7200.0 if name == "sand-waves" else 90.0
         return SimpleNamespace(about={"cpu_seconds": {"g": 90.0, "h": h}})

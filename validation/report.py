@@ -110,11 +110,12 @@ def chapters(results, targets):
 
 
 def printed(targets):
-    """{id: (`Target`, where it is printed, and as what elsewhere)}."""
+    """{id: (`Target`, in words where it is printed, and what stands where it is printed again)}."""
     repeated = {}
     for target in targets.values():
-        repeated.setdefault(target.again, []).append(
-            f"{target.paper_ref}: {quantity(target.value, target.unit)}")
+        if target.again:
+            repeated.setdefault(target.again, []).append(
+                f"{target.paper_ref}: {quantity(target.value, target.unit)}")
     return {id: (target, "; ".join([target.paper_ref, *repeated.get(id, [])]))
             for id, target in targets.items()}
 

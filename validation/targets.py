@@ -23,6 +23,7 @@ from typing import Literal
 import msgspec
 
 FOLDER = Path(__file__).parent / "targets"
+ROUNDED = 0.1       # of a printed number: how far another print of it may be off
 
 
 class Target(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -61,20 +62,21 @@ def load(folder: Path = FOLDER) -> dict[str, Target]:
                 raise ValueError(f"{path.name}: target {target.id!r} is given twice; drop one")
             found[target.id] = target
     for target in found.values():
-        require_again(target, found)
+        if target.again:
+            require_again(target, found.get(target.again))
     return found
 
 
-def require_again(target, found):
-    """Raise ValueError unless a target repeats none, or one of its own kind and unit that does
-    not repeat another.
+def require_again(target, own):
+    """Raise ValueError unless a target, which repeats another, and that one, `own`, are of one kind
+    and unit and nearly the same, and `own` repeats no other.
     """
-    own = found.get(target.again)
-    if target.again and (own is None or own.again
-                         or (own.kind, own.unit) != (target.kind, target.unit)):
-        raise ValueError(f"target {target.id!r}: again = {target.again!r}; expected the id of a "
-                         f"number of the same kind ({target.kind}) and unit ({target.unit}) that "
-                         "repeats no other")
+    same = own is not None and (own.kind, own.unit) == (target.kind, target.unit)
+    if not same or own.again or not math.isclose(own.value, target.value, rel_tol=ROUNDED):
+        raise ValueError(f"{target.id.split('.')[0]}, target {target.id!r}: again = "
+                         f"{target.again!r}; expected the id of a number that repeats no other, of "
+                         f"the same kind ({target.kind}), unit ({target.unit}) and, but for "
+                         f"rounding, value ({target.value})")
 
 
 def read(path: Path) -> list[Target]:

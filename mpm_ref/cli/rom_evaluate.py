@@ -34,7 +34,7 @@ def judge(
     """Compare reduced runs with the full-order runs that were held out.
 
     Their position errors by three measures, beside those of the map's nearest states, which reduced
-    runs on it seldom beat, and of the training run with the nearest parameters, which they should.
+    runs on it seldom beat, and of the training run with the nearest parameters, taken as it is.
     Exit status: 0 done, 2 bad input, 3 a reduced run broke down, 4 a file could not be written, 130
     Ctrl-C.
     """
@@ -50,12 +50,12 @@ def judge(
             folder = named(data, study, "-data")
             with faults.writing():
                 snapshots = dataset.load(study, folder, study.test)
-                trained = list(nearby.nearby(study, folder, snapshots))
             inferred = study.tables.model == NSF
             compare = nsf.evaluate if inferred else evaluate
             runs = passing(unit="run", iterable=compare(study, model, snapshots),
                            total=len(study.test))
             found = list(runs)
+            trained = list(nearby.nearby(study, folder, snapshots))
         all_runs = together(found, snapshots.X)
         draw(found, study.names, snapshots.dt, picture)
         if json:

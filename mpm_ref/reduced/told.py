@@ -9,7 +9,8 @@ from .watch import Sight
 
 def told(results):
     """What is known of the reduced run of `Results`, with the number of its states that were out
-    of bounds, and the means of samples and of points of a step; None of a full-order run.
+    of bounds, and the means of samples and of integration points of a step; None of a full-order
+    run.
     """
     facts = results.manifest.get("reduced")
     if facts is None or "reduced" not in results.h5:
@@ -18,7 +19,7 @@ def told(results):
     rows = {name: series[:n] for name, series in results.h5["reduced"].items()}
     look = nsf.sight if facts.get("model") == NSF else sight
     out = sum(bool(look(rows, k).why) for k in range(n))
-    means = {name: float(np.mean(rows[name][1:])) if n > 1 else None
+    means = {f"mean_{name}": float(np.mean(rows[name][1:])) if n > 1 else None
              for name in ("samples", "points")}
     return facts | {"states": n, "out_of_bounds": out} | means
 
@@ -36,7 +37,8 @@ def line(found):
     """The same in words."""
     name = found.get("name", found["study"][:12])
     parameters = ", ".join(f"{key} = {value:g}" for key, value in found["parameters"].items())
-    step = "" if found["points"] is None else (
-        f"a step has {found['samples']:.4g} samples and {found['points']:.4g} points on average; ")
+    step = "" if found["mean_points"] is None else (
+        f"a step has {found['mean_samples']:.4g} samples and {found['mean_points']:.4g} "
+        "integration points on average; ")
     return (f"reduced: {name}, {found['map']['kind']} r = {found['map']['r']}, {parameters}; "
             f"{step}{found['out_of_bounds']} of {found['states']} states out of bounds")

@@ -53,8 +53,8 @@ class Tested(NamedTuple):
         """The same without what the fields are made of."""
         study, test = self.study, next(iter(self.tests.values()))
         coarse = "" if study.coarser == 1 else f", dx and dt {study.coarser} times as long"
-        return (f"{len(test.X)} particles, {study.run(study.test[0]).steps} steps, "
-                f"{counted(test.x.shape[1] - 1, 'state')} kept, "
+        kept = "all" if study.spacing == 1 else f"one in {study.spacing}"
+        return (f"{len(test.X)} particles, {study.run(study.test[0]).steps} steps, {kept} kept, "
                 f"{counted(len(study.train), 'run')} and {counted(len(self.tests), 'test')}"
                 f"{coarse}; r = {study.sizes.r}")
 

@@ -87,15 +87,18 @@ def of_networks(run, name, one, bill):
 
 
 def trainings(run):
-    """Record what the shortest and the longest training took, of all networks that are there."""
+    """Record what the shortest and the longest training took, of the seven scenes' networks with
+    features.
+    """
+    names = [name for name in nets() if name.endswith("-waves")]
     hours = {name: sum(model.about["cpu_seconds"].values()) / 3600.0
-             for name, model in there(run, list(nets()), trained).items()}
+             for name, model in there(run, names, trained).items()}
     for word, end in (("lo", min), ("hi", max)):
         name = end(hours, key=hours.get, default=None)
         if name is not None:
             run.record(f"nsf.sec7.train_time_{word}", hours[name], unit="h", comparator="info",
-                       note=f"CPU hours, {name}, as its weights tell; printed: of wider networks "
-                            "on a graphics processor")
+                       note=f"{name}, CPU hours that its weights tell; printed: hours of wider "
+                            "networks on a graphics processor")
 
 
 def told(run, name, kind, one, bill):
