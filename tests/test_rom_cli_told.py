@@ -22,6 +22,14 @@ def made(tmp_path_factory):
     return modelled(tmp_path_factory.mktemp("made"))
 
 
+def test_a_run_without_a_step_has_no_means():
+    found = {"name": "bars", "map": {"kind": "modes", "r": 3}, "parameters": {"g": 2.0}, "states": 1,
+             "out_of_bounds": 0, "mean_samples": None, "mean_points": None}
+    assert told.line(found) == "reduced: bars, modes r = 3, g = 2; 0 of 1 states out of bounds"
+    some = told.line(found | {"mean_samples": 20.0, "mean_points": 101.25})
+    assert "g = 2; a step has 20 samples and 101.2 integration points on average; 0 of 1" in some
+
+
 def test_states_out_of_bounds_are_counted_and_the_first_is_told():
     out, off = WELL._replace(beyond=2.0), WELL._replace(off=0.5)
     assert list(astray({}, 16, 0.1)) == []
