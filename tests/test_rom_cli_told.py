@@ -23,8 +23,9 @@ def made(tmp_path_factory):
 
 
 def test_a_run_without_a_step_has_no_means():
-    found = {"name": "bars", "map": {"kind": "modes", "r": 3}, "parameters": {"g": 2.0}, "states": 1,
-             "out_of_bounds": 0, "mean_samples": None, "mean_points": None}
+    found = {"study": "ab", "name": "bars", "map": {"kind": "modes", "r": 3},
+             "parameters": {"g": 2.0}, "states": 1, "out_of_bounds": 0, "mean_samples": None,
+             "mean_points": None}
     assert told.line(found) == "reduced: bars, modes r = 3, g = 2; 0 of 1 states out of bounds"
     some = told.line(found | {"mean_samples": 20.0, "mean_points": 101.25})
     assert "g = 2; a step has 20 samples and 101.2 integration points on average; 0 of 1" in some
