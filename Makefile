@@ -9,7 +9,7 @@ PIP   := $(PY) -m pip --disable-pip-version-check
 READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce test standard figures bench learn clean
+.PHONY: help reproduce test docs standard figures bench learn clean
 
 help:            ## this list
 	@sed -n 's/^\([a-z-]*\): [^#]*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 14
@@ -20,6 +20,15 @@ reproduce: $(READY) ## every experiment at the quick profile -> results/quick/re
 test: $(READY)   ## lint and the test suite
 	$(PY) -m ruff check .
 	$(PY) -m pytest -n $(WORKERS) --dist loadfile
+
+# Notebooks run when their code changes; make docs NOTEBOOKS=off shows them without results.
+NOTEBOOKS ?= cache
+SITE      := docs/_build/html
+
+docs: $(READY)   ## the documentation site -> docs/_build/html/index.html; warnings are errors
+	$(PIP) install -c constraints.txt -e '.[docs]'
+	MPM_REF_NOTEBOOKS=$(NOTEBOOKS) $(PY) -m sphinx -q -W --keep-going -n -j $(WORKERS) docs $(SITE)
+	$(PY) docs/check_links.py $(SITE)
 
 standard: $(READY) ## every experiment at the standard profile (hours) -> results/standard
 	$(PY) -m validation run --profile standard
@@ -51,8 +60,8 @@ learn: $(READY)  ## add PyTorch (CPU build) for what trains; see README before
 	fi
 	$(PIP) install $(TORCH_FROM) -c constraints.txt -e '.[learn]'
 
-clean:           ## remove caches and the quick results (the environment .venv stays)
-	rm -rf results/quick .pytest_cache .ruff_cache .hypothesis
+clean:           ## remove caches, the site and the quick results (the environment .venv stays)
+	rm -rf docs/_build results/quick .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(PY):

@@ -14,8 +14,8 @@
   dt^2 V0 K/m times S, S - 1/(2 D) and 1/D is at most 2, 2 and 4 for PIC and FLIP, APIC and
   MLS-MPM; RPIC damping z makes it S - (1 - z)/(2 - z)/D and 2 (2 - z) for the last two.
   It is the limit of an isolated particle, and no cloud of particles has a smaller one: derived in
-  docs/timestep.md. Linear splines have no such limit (S is infinite at a node); for them m_p/m_i
-  with the nodes' masses stands for 1/w_ip, and the bound is necessary, not sufficient.
+  docs/explanation/timestep.md. Linear splines have no such limit (S is infinite at a node); for
+  them m_p/m_i with the nodes' masses stands for 1/w_ip, and the bound is necessary, not sufficient.
 """
 
 from math import inf

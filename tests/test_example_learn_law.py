@@ -43,7 +43,7 @@ def test_its_gradient_is_that_of_its_loss(short):
 
 
 def test_the_start_has_a_gradient_too(short):
-    """As docs/gradients.md says: here by the velocity of one particle."""
+    """As docs/howto/gradients.md says: here by the velocity of one particle."""
     torch = pytest.importorskip("torch")
     torch.manual_seed(0)
     law, seen = short.SmallLaw(), short.Seen(short.thrown())
@@ -79,7 +79,7 @@ def test_without_pytorch_one_sentence_says_so(monkeypatch, without_torch):
 
 
 def test_the_page_on_gradients_runs_as_it_is_printed(monkeypatch, one_torch_thread):
-    text = (ROOT / "docs/gradients.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs/howto/gradients.md").read_text(encoding="utf-8")
     monkeypatch.chdir(ROOT)
     shown = {}
     exec(compile(text.split("```python\n")[2].split("```")[0], "gradients.md", "exec"), shown)

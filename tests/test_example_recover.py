@@ -36,7 +36,7 @@ def test_it_finds_the_moduli(example):
 
 
 def test_the_page_on_gradients_runs_as_it_is_printed(monkeypatch, capsys):
-    text = (ROOT / "docs/gradients.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs/howto/gradients.md").read_text(encoding="utf-8")
     monkeypatch.chdir(ROOT)
     exec(compile(text.split("```python\n")[1].split("```")[0], "gradients.md", "exec"), {})
     assert "FixedCorotated(mu=-" in capsys.readouterr().out

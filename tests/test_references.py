@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from validation.citations import KEY, LOOSE, ROOT, cited_keys, files
+from validation.citations import KEY, LOOSE, ROOT, cited_keys, documentation, files
 
 FOLDERS = ("mpm_ref", "validation", "figures", "benchmarks", "tests")
 ENTRY = re.compile(r"^- \*\*\[(\w+)\]\*\* ", re.MULTILINE)
@@ -45,7 +45,7 @@ def test_every_cited_key_is_listed():
 
 
 def test_every_key_cited_in_the_documentation_is_listed():
-    text = "".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs").glob("*.md"))
+    text = "".join(page.read_text(encoding="utf-8") for page in documentation())
     assert {m[1] or m[2] for m in KEY.finditer(text)} <= set(listed())
 
 

@@ -8,7 +8,7 @@ from mpm_ref import materials, scene
 from mpm_ref.scene import build, loads
 from mpm_ref.shapes.quantities import Record
 
-TEXT = (Path(__file__).parents[1] / "docs" / "scenes.md").read_text()
+TEXT = (Path(__file__).parents[1] / "docs/reference/scenes.md").read_text()
 RECORDS = [record for record in vars(scene).values()
            if isinstance(record, type) and issubclass(record, Record)]
 BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```", TEXT, re.MULTILINE | re.DOTALL)

@@ -55,6 +55,14 @@ def files(root: Path, folder: str, pattern: str) -> list[Path]:
     return [path for path in found if path.relative_to(root).as_posix() not in ABOUT]
 
 
+def documentation(root: Path = ROOT) -> list[Path]:
+    """The pages of the documentation that people write: those of the site that git tracks."""
+    generated = {"_build", "api", "generated"}
+    names = {"cli.md", "equations.md"}
+    return [page for page in sorted((root / "docs").rglob("*.md"))
+            if page.name not in names and generated.isdisjoint(page.relative_to(root).parts)]
+
+
 def ids_of(root: Path, path: Path) -> list[Citation]:
     """The ids one file names."""
     text = path.read_text(encoding="utf-8")

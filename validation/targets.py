@@ -12,7 +12,7 @@ confidence: how sure the number is.
     exact          as printed           derived        follows from other printed numbers
     ocr-uncertain  print or unit damaged or missing, our reading
     external       from the authors' public release, not in the text
-    contradicted   another printed number disagrees; the ruling is an issue in docs/equations.md
+    contradicted   another printed number disagrees; the ruling is an issue in docs/equations.toml
 """
 
 import math

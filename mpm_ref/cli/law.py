@@ -1,8 +1,8 @@
 """`mpm-ref law train | evaluate | export | plot`: laws learned from the motion of a scene (see
 `laws`).
 
-A study file names the scene, the method and its recipe; docs/nclaw.md explains it. The other
-commands are in `law_train` and `law_show`.
+A study file names the scene, the method and its recipe; docs/reference/studies.md explains it.
+The other commands are in `law_train` and `law_show`.
 """
 
 import sys

@@ -30,7 +30,8 @@ def export(
 ):
     """Write layers as plain arrays, with words on their use, and answers to test another program.
 
-    docs/nclaw.md lists the names. Exit status: 0 done, 2 bad input, 4 a file could not be written.
+    docs/reference/studies.md lists the names. Exit status: 0 done, 2 bad input, 4 a file could
+    not be written.
     """
     with one_line():
         with options():

@@ -1,8 +1,8 @@
 """Conditions on the velocities of the grid: colliders, prescribed nodes, walls counted in nodes.
 
 A node carries the condition of a part if it has mass and its signed distance to the part is at
-most 1e-9 cells: the wall is the zero contour of the level set (docs/boundaries.md). Where several
-parts meet, all their conditions are satisfied at once (see `contact`).
+most 1e-9 cells: the wall is the zero contour of the level set (docs/explanation/boundaries.md).
+Where several parts meet, all their conditions are satisfied at once (see `contact`).
 """
 
 from dataclasses import dataclass

@@ -1,6 +1,6 @@
 """A law study: a scene, and the laws to be learned from its motion.
 
-`load` reads it from a TOML file; docs/nclaw.md explains the keys.
+`load` reads it from a TOML file; docs/reference/studies.md explains the keys.
 """
 
 from pathlib import Path

@@ -1,5 +1,6 @@
-"""The tables of a law study: which laws are learned, how, and where they go; docs/nclaw.md explains
-their keys.
+"""The tables of a law study: which laws are learned, how, and where they go.
+
+docs/reference/studies.md explains their keys.
 """
 
 from dataclasses import fields

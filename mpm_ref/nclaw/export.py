@@ -2,7 +2,7 @@
 questions and answers to test an implementation by.
 
 Nothing of `weights` is needed to read them. What each kind answers is said in words that go along;
-docs/nclaw.md lists the names.
+docs/reference/studies.md lists the names.
 """
 
 import json

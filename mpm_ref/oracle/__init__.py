@@ -5,7 +5,7 @@
     report = check("golden.h5", "other.h5")
     print(report)                  # "agrees: ..", or the first stage that departs and where
 
-docs/oracle.md has the layout of the files and the rule for the tolerances.
+docs/reference/golden-files.md has the layout of the files and the rule for the tolerances.
 """
 
 from .checking import check

@@ -1,4 +1,7 @@
-"""Golden files, and files to check against them: HDF5 with the layout of docs/oracle.md."""
+"""Golden files, and files to check against them: HDF5.
+
+docs/reference/golden-files.md has the layout.
+"""
 
 import json
 from dataclasses import asdict, replace

@@ -7,7 +7,7 @@ LEVELS = 8                          # of multigrid, the most that are recorded
 
 
 class Array(NamedTuple):
-    """One array of a golden file. docs/oracle.md explains each."""
+    """One array of a golden file. docs/reference/golden-files.md explains each."""
 
     name: str
     stage: str

@@ -2,7 +2,7 @@
 
 Which nodes a collider contains, its normal and its velocity there, are data: a `Contact`. So any
 shape and motion is covered; where a level set is zero is tested apart. The rules are those of
-docs/boundaries.md, written as one small minimisation per node.
+docs/explanation/boundaries.md, written as one small minimisation per node.
 """
 
 from itertools import combinations

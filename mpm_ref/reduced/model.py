@@ -34,7 +34,7 @@ def needed(study, kind):
         return ""
     return (f'; a curved map needs a study that says so, {study.path} or a copy: in [map] kind = '
             f'"{CURVED}" and `modes` larger than `r`, in [run] projection = "nonlinear" '
-            "(docs/reduced.md)")
+            "(docs/reference/studies.md)")
 
 
 def kind_of(model):

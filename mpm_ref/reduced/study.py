@@ -1,6 +1,6 @@
 """A study: a scene, the parameters of many runs of it, and the reduced model to be made of them.
 
-`load` reads it from a TOML file; docs/reduced.md explains the keys.
+`load` reads it from a TOML file; docs/reference/studies.md explains the keys.
 """
 
 import hashlib

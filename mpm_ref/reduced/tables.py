@@ -1,4 +1,4 @@
-"""The tables of a study file: one record each; docs/reduced.md explains their keys."""
+"""The tables of a study file: one record each; docs/reference/studies.md explains their keys."""
 
 from typing import Annotated, ClassVar
 

@@ -1,7 +1,7 @@
 """Points that fill a solid, and the volume each stands for.
 
 Records describe a sampling as scene files do; `sample` carries one out. What each sampling is good
-for: docs/scenes.md.
+for: docs/reference/scenes.md.
 """
 
 from functools import singledispatch

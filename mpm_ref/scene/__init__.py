@@ -3,7 +3,7 @@
     scene = load("scenes/hello.toml")           # or Scene(dim=2, dx=0.05, body=(Body(...),), ...)
     problem = build(scene)                      # for simulate.simulate
 
-The keys of the file are the fields of the records; docs/scenes.md explains each of them.
+The keys of the file are the fields of the records; docs/reference/scenes.md explains each of them.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """The tables of a scene file: one record each, with the names, units and bounds of their keys.
 
-Each key is explained in docs/scenes.md. A record knows what one table can get wrong by itself; what
-belongs together across tables is checked in `check`, and what a record makes is in `parts`.
+Each key is explained in docs/reference/scenes.md. A record knows what one table can get wrong by
+itself; what belongs together across tables is checked in `check`, and what a record makes is in `parts`.
 Materials stand in `material`.
 """
 

@@ -64,7 +64,7 @@ def record_ladder(run, ends, scale):
         run.record(f"extremes.explicit.cfl_ladder.{transfer}.stable_to", stable_to(mine),
                    comparator=">=", bound=1.0, scale=scale,
                    note="largest tried multiple of the bound up to which all runs end; 1 by "
-                        "docs/timestep.md; the rung after it broke")
+                        "docs/explanation/timestep.md; the rung after it broke")
         past = [e for r, e in mine.items() if r.factor > 1.0 and not r.allowed]
         run.record(f"extremes.explicit.cfl_ladder.{transfer}.refused",
                    sum(e.kind == REFUSED and e.step == 0 for e in past) / len(past), paper=1.0,

@@ -4,7 +4,7 @@ learn from.
 The paper trains them on 1, 10 and 100 runs, "as much as possible" as [GNS], and says no more. The
 first run is the one that laws learn from; the others are thrown like those of task (b), from other
 seeds. Frames are 5 steps apart. What is smaller here than in [GNS], and by how much, stands in
-docs/nclaw.md.
+docs/explanation/nclaw.md.
 """
 
 from typing import NamedTuple

@@ -1,5 +1,5 @@
 """The tables of a study file with model = "nsf", as far as they differ from LDM's;
-docs/reduced.md explains their keys.
+docs/reference/studies.md explains their keys.
 """
 
 from typing import Annotated, ClassVar

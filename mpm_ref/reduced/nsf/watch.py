@@ -52,7 +52,7 @@ def sparse(fields, chosen):
     if left > SPARSE:
         yield (f"the {len(samples)} samples leave {100.0 * left:.0f} % of the products of the "
                f"modes, and most runs whose samples left more than {100.0 * SPARSE:.0f} % went "
-               "wrong (docs/nsf.md); give [run] more of them, or another seed")
+               "wrong (docs/howto/reduced-model.md); give [run] more of them, or another seed")
 
 
 def look(extent, at, report):

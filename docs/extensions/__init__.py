@@ -1,0 +1,1 @@
+"""Extensions of Sphinx for this site: generated pages, docstrings, links to source, formulas."""
