@@ -1,6 +1,6 @@
 """Check the built site: every internal link and anchor leads somewhere, nothing is fetched.
 
-    python docs/check_links.py docs/_build/html
+`python docs/check_links.py FOLDER` prints the problems; the exit status says whether there are any.
 """
 
 import re

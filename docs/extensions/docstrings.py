@@ -1,4 +1,4 @@
-"""Docstrings are Markdown; Sphinx reads reStructuredText: translate, and list the fields of records.
+"""Docstrings are Markdown; Sphinx reads reStructuredText: translate, and list fields of records.
 
 Of Markdown the docstrings use paragraphs, lists, `code` and indented blocks. Asterisks and
 underscores are those of formulas, not emphasis. A paragraph whose lines are formulas, or are
@@ -63,9 +63,16 @@ def item(text, markers):
 
 def inline(token):
     """Text of a paragraph, with all that reStructuredText would read as markup escaped."""
-    return "".join(f"\\ ``{part.content}``\\ " if part.type == "code_inline" and part.content.strip()
-                   else "\n" if part.type == "softbreak" else SPECIAL.sub(r"\\\1", part.content)
-                   for part in token.children)
+    return "".join(map(piece, token.children))
+
+
+def piece(part):
+    """One piece of a paragraph: code, the end of a line, or text."""
+    if part.type == "softbreak":
+        return "\n"
+    if part.type == "code_inline" and part.content.strip():
+        return f"\\ ``{part.content}``\\ "
+    return SPECIAL.sub(r"\\\1", part.content)
 
 
 def fields(cls):

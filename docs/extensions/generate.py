@@ -68,7 +68,8 @@ def module_page(name, modules):
     parts = [name, "=" * len(name), "", f".. automodule:: {name}", "   :members:", ""]
     children = [m for m in modules if m.rpartition(".")[0] == name]
     if children:
-        parts += [".. toctree::", "   :maxdepth: 1", "   :caption: Modules", "", *(f"   {m}" for m in children), ""]
+        parts += [".. toctree::", "   :maxdepth: 1", "   :caption: Modules", "",
+                  *(f"   {m}" for m in children), ""]
     return "\n".join(parts)
 
 

@@ -55,7 +55,7 @@ def address(file, line=1):
 
 
 def line_of(file, name=""):
-    """First line of a definition, written `function` or `Class::method`; None where there is none."""
+    """First line of a definition, `function` or `Class::method`; None where there is none."""
     if not (ROOT / file).is_file():
         return None
     return spans(file).get(name) if name else 1

@@ -42,8 +42,8 @@ BROKE = "broke down"
 
 app = typer.Typer(no_args_is_help=True, help="Reduced models of a scene: learn from many runs, "
                   "then run with a few numbers instead of particles.",
-                  epilog="`mpm-ref rom studies` lists the shipped studies; docs/reference/studies.md "
-                  "says how to write your own.")
+                  epilog="`mpm-ref rom studies` lists the shipped studies; "
+                  "docs/reference/studies.md says how to write your own.")
 app.command(epilog=examples("studies"))(rom_info.studies)
 app.command("generate", epilog=examples(
     "generate gravity_small", "generate torsion --workers 1 --out runs"))(rom_make.make_data)

@@ -1,8 +1,8 @@
 """The tables of a scene file: one record each, with the names, units and bounds of their keys.
 
 Each key is explained in docs/reference/scenes.md. A record knows what one table can get wrong by
-itself; what belongs together across tables is checked in `check`, and what a record makes is in `parts`.
-Materials stand in `material`.
+itself; what belongs together across tables is checked in `check`, and what a record makes is in
+`parts`. Materials stand in `material`.
 """
 
 from typing import Annotated, Literal

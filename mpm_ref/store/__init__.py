@@ -1,8 +1,9 @@
 """Results of a run in one HDF5 file: frames stream into it, each wholly or not at all.
 
 The schema is in docs/reference/files.md. A frame stands once `Writer.append` returns, whatever
-happens to the process afterwards (see `journal`). Particles are stored in the order in which their body was
-sampled, so that row p is the same particle in every frame. `results` reads the files.
+happens to the process afterwards (see `journal`). Particles are stored in the order in which
+their body was sampled, so that row p is the same particle in every frame. `results` reads the
+files.
 """
 
 import json

@@ -74,7 +74,8 @@ def record_failures(run, points, scale):
     run.record(f"{name}.broken_unrefused_linear", linear, unit="settings", comparator="info",
                scale=scale, note="the same for linear splines, whose bound is necessary only "
                "(docs/explanation/timestep.md): next to a node a particle's share of the mass goes "
-               "to zero, and with it the time step, for less steps than lie between two looks at the bound")
+               "to zero, and with it the time step, for less steps than lie between two looks "
+               "at the bound")
     run.record(f"{name}.told", sum(p.end in STOPS for p in broken), paper=len(broken),
                unit="settings", comparator="=", scale=scale,
                note="broken runs that ended with the sentence of a limit")
