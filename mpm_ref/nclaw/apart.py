@@ -10,13 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.grid_adjoint import Update, update_bars
+from ..core.adjoint.grid import Update, update_bars
+from ..core.adjoint.transfer import Moved
+from ..core.adjoint.transfer_mls3 import gather_bars_mls3, scatter_bars_mls3
 from ..core.jit import kernel, parallel, prange
 from ..core.spline import STENCILS, base_of
 from ..core.state import NO_HISTORY, NONE, Grid, Particles
 from ..core.tensor import identity, mat, mlin, mm, put_mat, transpose
-from ..core.transfer_adjoint import Moved
-from ..core.transfer_adjoint_mls3 import gather_bars_mls3, scatter_bars_mls3
 from ..core.transfer_mls3 import gather_mls3, scatter_mls3
 
 QUADRATIC = STENCILS[2]

@@ -29,7 +29,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.deform_adjoint import back, within
+from ..core.adjoint.deform import back, within
 from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
 from ..core.spectral import UNDETERMINED, mixed
 from ..core.tensor import (

@@ -8,12 +8,12 @@ import numpy as np
 
 from .. import explicit
 from ..adjoint import deform_body_adjoint, initial_stress_adjoint, zero_bars, zero_sums
-from ..core.boundary_adjoint import solve_adjoint
+from ..core.adjoint.boundary import solve_adjoint
+from ..core.adjoint.grid import Update, update_adjoint
+from ..core.adjoint.transfer import Exchange, g2p_adjoint, p2g_adjoint
 from ..core.collide import solve
 from ..core.grid import Storage
-from ..core.grid_adjoint import Update, update_adjoint
 from ..core.order import slabs_of
-from ..core.transfer_adjoint import Exchange, g2p_adjoint, p2g_adjoint
 from . import inner
 
 CARRIED = ("x", "v", "C", "tau", "m", "V0", "b")        # by what p2g reads

@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..explicit import scatter
-from ..hot.block_transfer import prolong
 from ..hot.linear import by_matrix
 from ..hot.methods import made
-from ..hot.multigrid import hierarchy
+from ..hot.multigrid.blocks.transfer import prolong
+from ..hot.multigrid.hierarchy import hierarchy
 from ..hot.report import Watch
 from ..hot.step import put
 from . import inner, stages

@@ -8,7 +8,7 @@ import pytest
 from deform_bars import DT, apart, materials, named, seeds, states
 from problems import elsewhere
 
-from mpm_ref.core import deform_adjoint
+from mpm_ref.core.adjoint import deform
 from mpm_ref.core.jit import set_threads
 from mpm_ref.materials import NoFlow
 
@@ -40,11 +40,11 @@ def driven(name):
     q, (law, flow, _) = scattered(name), materials(CASES[name])[name]
     bars, step, _ = seeds(q, law, flow)
     if q.F.ndim == 1:
-        deform_adjoint.fluid(step, bars, law)
+        deform.fluid(step, bars, law)
     elif isinstance(flow, NoFlow):
-        deform_adjoint.elastic(step, bars, law)
+        deform.elastic(step, bars, law)
     else:
-        deform_adjoint.plastic(step, bars, law, flow)
+        deform.plastic(step, bars, law, flow)
     return bars, step.sums
 
 
@@ -53,9 +53,9 @@ def at_start(name):
     q, (law, flow, _) = scattered(name), materials(CASES[name])[name]
     bars, step, _ = seeds(q, law, flow)
     if q.F.ndim == 1:
-        deform_adjoint.initial_pressure(q.F, bars, law, step.sums)
+        deform.initial_pressure(q.F, bars, law, step.sums)
     else:
-        deform_adjoint.initial_stress(q.F, q.y, bars, law, flow, step.sums)
+        deform.initial_stress(q.F, q.y, bars, law, flow, step.sums)
     return bars, step.sums
 
 

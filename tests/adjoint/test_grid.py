@@ -6,11 +6,11 @@ import pytest
 from adjoints import H, like_grid, pairing, rate
 from grids import DX, floor, grid_of, random_grid
 
+from mpm_ref.core.adjoint.boundary import solve_adjoint
+from mpm_ref.core.adjoint.grid import Update, update_adjoint
 from mpm_ref.core.boundary import BoxWalls, Collider, Conditions, Prescribed
-from mpm_ref.core.boundary_adjoint import solve_adjoint
 from mpm_ref.core.collide import solve
 from mpm_ref.core.grid import Storage, update
-from mpm_ref.core.grid_adjoint import Update, update_adjoint
 from mpm_ref.core.jit import set_threads
 from mpm_ref.core.motion import Motion, Steady
 from mpm_ref.core.solids import half_space, sphere

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from mpm_ref.core.adjoint.transfer import MlsForm, Moved, gather_bars, scatter_bars
+from mpm_ref.core.adjoint.transfer_mls3 import gather_bars_mls3, scatter_bars_mls3
 from mpm_ref.core.spline import STENCILS
 from mpm_ref.core.state import NO_HISTORY, NONE, Grid, Particles
 from mpm_ref.core.stencil import inverse_inertia
-from mpm_ref.core.transfer_adjoint import MlsForm, Moved, gather_bars, scatter_bars
-from mpm_ref.core.transfer_adjoint_mls3 import gather_bars_mls3, scatter_bars_mls3
 
 QUADRATIC, DX, DT, N, NODES = STENCILS[2], 0.05, 1e-2, 40, 9
 ORIGIN = np.array((3, -5, 7))

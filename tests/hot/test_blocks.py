@@ -7,14 +7,14 @@ import scipy.sparse as sp
 from multigrid_matrices import case
 
 from mpm_ref.core.jit import set_threads
-from mpm_ref.hot import block_multigrid, block_product, block_sweep, block_transfer
-from mpm_ref.hot.block_inverse import inverse_blocks
-from mpm_ref.hot.block_product import planes_of, product
-from mpm_ref.hot.block_sparse import blocks_of, diagonal, reach_of
-from mpm_ref.hot.block_sweep import Sweep, correct, residual, split, sweep
-from mpm_ref.hot.multigrid import hierarchy
-from mpm_ref.hot.projectors import diagonal_blocks, inverses, onto_range
-from mpm_ref.hot.smoothers import GaussSeidel
+from mpm_ref.hot.multigrid import blocks
+from mpm_ref.hot.multigrid.blocks.inverse import inverse_blocks
+from mpm_ref.hot.multigrid.blocks.product import planes_of, product
+from mpm_ref.hot.multigrid.blocks.sparse import blocks_of, diagonal, reach_of
+from mpm_ref.hot.multigrid.blocks.sweep import Sweep, correct, residual, split, sweep
+from mpm_ref.hot.multigrid.hierarchy import hierarchy
+from mpm_ref.hot.multigrid.projectors import diagonal_blocks, inverses, onto_range
+from mpm_ref.hot.multigrid.smoothers import GaussSeidel
 
 
 @pytest.fixture(scope="module", params=(2, 3), ids=("2d", "3d"))
@@ -112,13 +112,13 @@ def test_the_same_bits_in_parallel(monkeypatch, rng):
     c = case(3, size=6)
     b = rng.standard_normal(c.index.shape)
     serial = hierarchy(c.A, c.index).cycle(b)
-    for module in (block_product, block_sweep, block_transfer):
+    for module in (blocks.product, blocks.sweep, blocks.transfer):
         monkeypatch.setattr(module, "SERIAL", 0)
     before = numba.get_num_threads()
     set_threads(min(2, numba.config.NUMBA_NUM_THREADS))
     try:
         np.testing.assert_array_equal(hierarchy(c.A, c.index).cycle(b), serial)
-        monkeypatch.setattr(block_multigrid, "SERIAL", 0)
+        monkeypatch.setattr(blocks.hierarchy, "SERIAL", 0)
         close(hierarchy(c.A, c.index).cycle(b), serial)
     finally:
         set_threads(before)

@@ -6,8 +6,8 @@ import pytest
 import scipy.sparse as sp
 from multigrid_matrices import Case, case, conditioned, dense, free_basis
 
-from mpm_ref.hot.multigrid import hierarchy
-from mpm_ref.hot.projectors import diagonal_blocks
+from mpm_ref.hot.multigrid.hierarchy import hierarchy
+from mpm_ref.hot.multigrid.projectors import diagonal_blocks
 
 SIZE = {2: 9, 3: 2}
 

@@ -5,7 +5,7 @@ import pytest
 from hot_cases import CASES, problem_of
 
 from mpm_ref.hot.diagonal import diagonal
-from mpm_ref.hot.projectors import diagonal_blocks
+from mpm_ref.hot.multigrid.projectors import diagonal_blocks
 
 
 @pytest.mark.parametrize("case", [CASES[0], CASES[2]], ids=lambda case: case.name)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from multigrid_matrices import NORMAL
 
-from mpm_ref.hot.embedding import TAPS, embed, kernel_value, width
-from mpm_ref.hot.projectors import coarse_nodes, inverses, onto_range
+from mpm_ref.hot.multigrid.embedding import TAPS, embed, kernel_value, width
+from mpm_ref.hot.multigrid.projectors import coarse_nodes, inverses, onto_range
 
 KERNELS = ("linear", "quadratic")
 

@@ -10,11 +10,11 @@ from hot_steps import walls as walls_of
 from multigrid_matrices import dense, free_basis
 
 from mpm_ref.core.boundary import Conditions
-from mpm_ref.hot import geometric
-from mpm_ref.hot.embedding import embed, onto
-from mpm_ref.hot.geometric import Geometric, conditions_at
 from mpm_ref.hot.methods import minimise, options_of
-from mpm_ref.hot.multigrid import PATHS, hierarchy, hierarchy_of
+from mpm_ref.hot.multigrid import geometric
+from mpm_ref.hot.multigrid.embedding import embed, onto
+from mpm_ref.hot.multigrid.geometric import Geometric, conditions_at
+from mpm_ref.hot.multigrid.hierarchy import PATHS, hierarchy, hierarchy_of
 from mpm_ref.hot.system import System
 
 WORDS = ("lbfgs-gmg", "pn-gmg-pcg")

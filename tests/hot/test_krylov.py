@@ -5,7 +5,6 @@ import pytest
 import scipy.sparse as sp
 from hot_toys import lattice, random_quadratic
 
-from mpm_ref.hot.block_sparse import blocks_of
 from mpm_ref.hot.krylov import (
     JACOBI,
     Rule,
@@ -18,7 +17,8 @@ from mpm_ref.hot.krylov import (
     stiffest_tolerance,
 )
 from mpm_ref.hot.linear import by_matrix, symmetric_gauss_seidel
-from mpm_ref.hot.projectors import diagonal_blocks
+from mpm_ref.hot.multigrid.blocks.sparse import blocks_of
+from mpm_ref.hot.multigrid.projectors import diagonal_blocks
 
 
 def tight(size):

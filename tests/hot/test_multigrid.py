@@ -9,10 +9,10 @@ import pytest
 import scipy.sparse as sp
 from multigrid_matrices import case, dense, free_basis
 
-from mpm_ref.hot import coarsest
-from mpm_ref.hot.embedding import embed
-from mpm_ref.hot.multigrid import hierarchy
-from mpm_ref.hot.smoothers import SLAB, coloured
+from mpm_ref.hot.multigrid import coarsest
+from mpm_ref.hot.multigrid.embedding import embed
+from mpm_ref.hot.multigrid.hierarchy import hierarchy
+from mpm_ref.hot.multigrid.smoothers import SLAB, coloured
 
 PATHS = ("scipy", "blocks")
 SMOOTHERS = ("gauss-seidel", "jacobi", "chebyshev")

@@ -7,8 +7,8 @@ from constitutive import rate
 from hot_cases import CASES, DEGREES, DT, over, plain_bodies, problem_of
 
 from mpm_ref.core.jit import set_threads
-from mpm_ref.hot import exchange
-from mpm_ref.hot.objective import Potential
+from mpm_ref.hot import transfer
+from mpm_ref.hot.potential import Potential
 from mpm_ref.materials import Softening
 from mpm_ref.plain import hot
 
@@ -87,15 +87,15 @@ def test_the_fast_exchange_equals_the_plain_one(rng):
     q = problem_of(CASES[2])
     sites, box, stencil = q.potential.sites[0], q.potential.box, q.potential.stencil
     box.v[:] = rng.normal(size=box.v.shape)
-    exchange.gradients(sites, box, stencil)
+    transfer.gradients(sites, box, stencil)
     T = sites.T.copy()
-    exchange.gather(sites, box, stencil, (0, len(T)))
+    transfer.gather(sites, box, stencil, (0, len(T)))
     assert np.abs(sites.T - T).max() <= 1e-14 * np.abs(T).max()
     box.f[:] = 0.0
-    exchange.add_forces(sites, box, stencil)
+    transfer.add_forces(sites, box, stencil)
     f = box.f.copy()
     box.f[:] = 0.0
-    exchange.scatter(sites, box, stencil, (0, len(T)))
+    transfer.scatter(sites, box, stencil, (0, len(T)))
     assert np.abs(box.f - f).max() <= 1e-14 * np.abs(f).max()
 
 

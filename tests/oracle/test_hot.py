@@ -13,9 +13,9 @@ import scipy.sparse as sp
 from goldens_hot import EPS, STEPS, bodies_at, problem_of, steps_of
 
 from mpm_ref import oracle
-from mpm_ref.hot import multigrid
 from mpm_ref.hot.methods import METHODS
-from mpm_ref.hot.projectors import block_diagonal
+from mpm_ref.hot.multigrid import hierarchy
+from mpm_ref.hot.multigrid.projectors import block_diagonal
 from mpm_ref.oracle import differential, recording, solving
 from mpm_ref.oracle.implicit_recording import started
 from mpm_ref.oracle.implicit_twin import SolvedTwin, embedding
@@ -188,12 +188,12 @@ def test_what_any_method_accepts_is_within_the_bar(problem, golden, checked, wor
 
 def leaky(A, index, **options):
     """Identity rows for what is held, left in the matrix of which coarse ones are made."""
-    grids = multigrid.hierarchy(A, index, **options)
+    grids = hierarchy.hierarchy(A, index, **options)
     free = [np.tile(np.eye(index.shape[1]), (len(level.index), 1, 1)) for level in grids.levels]
     A = A + block_diagonal(np.abs(A.data).max() * (free[0] - grids.levels[0].B))
     for k, (fine, coarse) in enumerate(zip(grids.levels, grids.levels[1:])):
         W = sp.csr_array(embedding(fine.index, coarse.index, "linear"))
-        A = multigrid.galerkin(A, multigrid.prolongation(W, free[k]))
+        A = hierarchy.galerkin(A, hierarchy.prolongation(W, free[k]))
         grids.levels[k] = fine._replace(B=free[k])
         grids.levels[k + 1] = coarse._replace(A=A)
     return grids
@@ -221,7 +221,7 @@ def wrong_kappa(monkeypatch):
 
 
 def twice_smoothed(A, index, **options):
-    return multigrid.hierarchy(A, index, sweeps=2, **options)
+    return hierarchy.hierarchy(A, index, sweeps=2, **options)
 
 
 def wrong_levels(made):

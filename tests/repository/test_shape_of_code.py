@@ -9,7 +9,7 @@ ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = ("mpm_ref", "validation", "figures", "benchmarks", "tests")
 FILES = sorted(file for folder in FOLDERS for file in (ROOT / folder).rglob("*.py"))
 
-FILE_LINES = 300
+FILE_LINES = 400
 FUNCTION_LINES = 60         # without the docstring
 PARAMETERS = 6              # without self and cls
 
@@ -108,7 +108,7 @@ def test_list_of_many_parameters_is_current():
 # The checks themselves.
 
 @pytest.mark.parametrize(("text", "said"), [
-    ("\n" * 301, "301 lines"),
+    ("\n" * 401, "401 lines"),
     ("def f():\n" + "    x = 1\n" * 60, "61 lines"),
     ("def f(a, b, c, d, *, e, g, h):\n    pass\n", "7 parameters"),
     ("def f():\n    def g(a, b, c, d, e, f, g):\n        pass\n", "f.g: 7 parameters"),

@@ -3,10 +3,10 @@
 import numpy as np
 from clouds import AFFINE, DX, cloud, deep, scattered
 
+from mpm_ref.core.adjoint.transfer import Exchange, g2p_adjoint, p2g_adjoint
 from mpm_ref.core.order import slabs_of
 from mpm_ref.core.state import Particles
 from mpm_ref.core.transfer import g2p
-from mpm_ref.core.transfer_adjoint import Exchange, g2p_adjoint, p2g_adjoint
 
 DT, FLIP = 0.03, 0.9
 H = 1e-2 * 0.5 ** np.arange(5)      # of Taylor tests; a displacement is at most H cells or so

@@ -13,8 +13,8 @@ from constitutive import LAW, rate, rotations, transpose
 from flows import CASES, setting
 
 from mpm_ref.core import deform
-from mpm_ref.core import deform_adjoint as adjoint
-from mpm_ref.core.deform_adjoint import DeformBars, Step
+from mpm_ref.core.adjoint import deform as adjoint
+from mpm_ref.core.adjoint.deform import DeformBars, Step
 from mpm_ref.core.jit import CHUNKS
 from mpm_ref.core.law import project_vjp
 from mpm_ref.core.state import NO_HISTORY, NONE, Particles

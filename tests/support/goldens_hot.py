@@ -10,7 +10,7 @@ from mpm_ref.core.boundary import Collider, Conditions
 from mpm_ref.core.levelset import half_space
 from mpm_ref.explicit import Scheme
 from mpm_ref.hot.methods import Options
-from mpm_ref.hot.multigrid import hierarchy
+from mpm_ref.hot.multigrid.hierarchy import hierarchy
 from mpm_ref.oracle import implicit, recording, solving
 from mpm_ref.oracle.implicit_recording import started
 from mpm_ref.oracle.implicit_twin import SolvedTwin, embedding, spread

@@ -4,7 +4,7 @@ What is trained is the logarithm of Young's modulus and that of the return map's
 stress or slope of the cone; Poisson's ratio stays as it is. As in the authors' release log E starts
 at START of its value (1e5 Pa at 1e4), yield stress and friction angle at START of theirs. There
 these two are trained without a logarithm, and the return map has a modulus of its own, of which
-nothing can be known beside a yield stress. Adjoints are those of `core.deform_adjoint`.
+nothing can be known beside a yield stress. Adjoints are those of `core.adjoint.deform`.
 """
 
 from math import log
@@ -14,8 +14,9 @@ import torch
 from torch import nn
 from torch.autograd import Function
 
-from ...core import deform, deform_adjoint
-from ...core.deform_adjoint import DeformBars, Step
+from ...core import deform
+from ...core.adjoint import deform as deform_adjoint
+from ...core.adjoint.deform import DeformBars, Step
 from ...core.jit import CHUNKS
 from ...core.state import NO_HISTORY, NONE, Particles
 from ...materials import NoFlow

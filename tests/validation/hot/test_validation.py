@@ -5,9 +5,9 @@ import pytest
 import scipy.sparse as sp
 from multigrid_matrices import assembled, case, dense, lump, points
 
-from mpm_ref.hot.embedding import embed
 from mpm_ref.hot.krylov import block_jacobi
-from mpm_ref.hot.multigrid import hierarchy
+from mpm_ref.hot.multigrid.embedding import embed
+from mpm_ref.hot.multigrid.hierarchy import hierarchy
 from validation import targets
 from validation.hot.begun import PRINTED, SOFT_CAT, scene
 from validation.hot.frozen import frozen, rigid_modes

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
-from ..core.tensor import fill, lin, mat, mv, put_vec, vec
-from .block_sparse import SERIAL, no_nodes
+from ....core.jit import CHUNKS, chunk, kernel, parallel, prange
+from ....core.tensor import fill, lin, mat, mv, put_vec, vec
+from .sparse import SERIAL, no_nodes
 
 
 class Weights(NamedTuple):

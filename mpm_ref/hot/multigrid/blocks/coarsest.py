@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from ..core.jit import kernel
-from ..core.tensor import dot, lin, mat, mv, put_vec, vec
-from .block_product import row_times
+from ....core.jit import kernel
+from ....core.tensor import dot, lin, mat, mv, put_vec, vec
+from .product import row_times
 
 
 @kernel

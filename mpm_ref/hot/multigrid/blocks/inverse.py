@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from ..core.jit import kernel
-from ..core.tensor import cofactor, det, mat, mlin, put_mat, trace, transpose
-from .projectors import inverses, surely_regular
+from ....core.jit import kernel
+from ....core.tensor import cofactor, det, mat, mlin, put_mat, trace, transpose
+from ..projectors import inverses, surely_regular
 
 
 @kernel

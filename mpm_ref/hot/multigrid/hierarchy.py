@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from . import block_multigrid
-from .choices import DTYPES, checked
+from ..choices import DTYPES, checked
+from .blocks import hierarchy as block_hierarchy
 from .coarsest import by_pcg, of_coarsest, size
 from .projectors import coarse_nodes, diagonal_blocks, given_nodes, inverses, onto_range
 from .smoothers import POLYNOMIAL, GaussSeidel, largest_eigenvalue, times
@@ -154,7 +154,8 @@ class Path(NamedTuple):
 
 PATHS = {
     "scipy": Path(build, build_given, Hierarchy),
-    "blocks": Path(block_multigrid.build, block_multigrid.build_given, block_multigrid.Hierarchy),
+    "blocks": Path(block_hierarchy.build, block_hierarchy.build_given,
+                   block_hierarchy.Hierarchy),
 }
 
 

@@ -1,6 +1,6 @@
 """Second derivatives of the weights w_ip with respect to the position of the particle."""
 
-from .jit import kernel
+from ..jit import kernel
 
 
 @kernel

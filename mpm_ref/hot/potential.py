@@ -14,12 +14,12 @@ import numpy as np
 
 from ..core.jit import total
 from ..core.state import NONE, Grid
-from .exchange import add_forces, gradients
 from .pattern import pattern_of
+from .quadrature import sites_of
 from .reach import reach
 from .response import response
-from .sites import sites_of
 from .tangent import Tangent, differentials
+from .transfer import add_forces, gradients
 
 
 class Potential:

@@ -20,9 +20,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .deform import growth, recall, remember
-from .jit import CHUNKS, chunk, kernel, parallel, prange
-from .law import (
+from ..deform import growth, recall, remember
+from ..jit import CHUNKS, chunk, kernel, parallel, prange
+from ..law import (
     d_pressure,
     gap_ratio,
     intact,
@@ -33,8 +33,8 @@ from .law import (
     project_vjp,
     units,
 )
-from .spectral import UNDETERMINED, mixed, svd
-from .tensor import cofactor, det, diagonal, dot, mat, mlin, mm, mmt, put_mat, transpose
+from ..spectral import UNDETERMINED, mixed, svd
+from ..tensor import cofactor, det, diagonal, dot, mat, mlin, mm, mmt, put_mat, transpose
 
 
 class DeformBars(NamedTuple):

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from .norms import dot
+from ..norms import dot
 from .projectors import block_diagonal
 
 SLAB = 4          # nodes along the first axis that are swept in order

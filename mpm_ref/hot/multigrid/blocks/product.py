@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
-from ..core.tensor import fill, lin, mat, mv, put_vec, vec
-from .block_sparse import SERIAL
+from ....core.jit import CHUNKS, chunk, kernel, parallel, prange
+from ....core.tensor import fill, lin, mat, mv, put_vec, vec
+from .sparse import SERIAL
 
 
 class Planes(NamedTuple):

@@ -13,9 +13,9 @@ import scipy.linalg as la
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from ..core.blas import one_thread
-from .krylov import Rule, pcg
-from .norms import dot
+from ...core.blas import one_thread
+from ..krylov import Rule, pcg
+from ..norms import dot
 from .projectors import block_diagonal
 from .smoothers import times
 

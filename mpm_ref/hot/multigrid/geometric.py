@@ -15,13 +15,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .assembly import assembled
-from .modes import Modes
-from .objective import box_of
-from .pattern import Pattern, pattern_of
-from .sites import order_of, sites_of
-from .system import constrained
-from .unknowns import Unknowns
+from ..assembly import assembled
+from ..modes import Modes
+from ..pattern import Pattern, pattern_of
+from ..potential import box_of
+from ..quadrature import order_of, sites_of
+from ..system import constrained
+from ..unknowns import Unknowns
 
 
 class Space(NamedTuple):

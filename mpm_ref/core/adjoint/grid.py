@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .grid import flattened
-from .jit import CHUNKS, chunk, kernel, parallel, prange
+from ..grid import flattened
+from ..jit import CHUNKS, chunk, kernel, parallel, prange
 
 
 class Update(NamedTuple):

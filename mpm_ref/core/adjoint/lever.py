@@ -10,10 +10,10 @@ derivative is that from above.
 
 from typing import NamedTuple
 
+from ..jit import by_type, kernel
+from ..stencil import arm, gradient, locate, product, slopes_per_axis, weights_per_axis
+from ..tensor import dot, lin, mv
 from .curvature import curvatures_per_axis, hessian
-from .jit import by_type, kernel
-from .stencil import arm, gradient, locate, product, slopes_per_axis, weights_per_axis
-from .tensor import dot, lin, mv
 
 
 class Splines(NamedTuple):

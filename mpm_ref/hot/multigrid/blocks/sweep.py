@@ -15,11 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
-from ..core.tensor import lin, mat, mv, put_vec, vec
-from .block_product import Planes, put_entries, row_times
-from .block_sparse import SERIAL
-from .smoothers import SLAB, coloured
+from ....core.jit import CHUNKS, chunk, kernel, parallel, prange
+from ....core.tensor import lin, mat, mv, put_vec, vec
+from ..smoothers import SLAB, coloured
+from .product import Planes, put_entries, row_times
+from .sparse import SERIAL
 
 
 class Order(NamedTuple):

@@ -9,11 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .curvature import hessian
-from .jit import CHUNKS, chunk, kernel, parallel, prange
-from .lever import GradientForm, MlsForm, around, lever, lever_bar
-from .state import NONE, add_body_force, affine, body_force, full, put_affine, put_full
-from .stencil import (
+from ..jit import CHUNKS, chunk, kernel, parallel, prange
+from ..state import NONE, add_body_force, affine, body_force, full, put_affine, put_full
+from ..stencil import (
     add_to_node,
     arm,
     column,
@@ -24,9 +22,11 @@ from .stencil import (
     of_node,
     product,
 )
-from .tensor import dot, fill, inner, lin, mat, mlin, mv, outer, put_vec, vec, vm
-from .transfer_adjoint_mls3 import gather_bars_mls3_all, scatter_bars_mls3_color
-from .transfer_mls3 import fits
+from ..tensor import dot, fill, inner, lin, mat, mlin, mv, outer, put_vec, vec, vm
+from ..transfer_mls3 import fits
+from .curvature import hessian
+from .lever import GradientForm, MlsForm, around, lever, lever_bar
+from .transfer_mls3 import gather_bars_mls3_all, scatter_bars_mls3_color
 
 
 class Moved(NamedTuple):

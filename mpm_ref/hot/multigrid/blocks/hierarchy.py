@@ -7,18 +7,18 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from . import block_coarsest
-from .block_galerkin import coarse_reach, galerkin
-from .block_inverse import inverse_blocks
-from .block_product import planes_of, product
-from .block_sparse import SERIAL, Blocks, blocks_of, diagonal, reach_of
-from .block_sweep import Sweep, correct, residual, split, sweep
-from .block_transfer import Transfer, prolong, restrict, transfer
-from .choices import DTYPES
-from .coarsest import CAP, by_pcg, of_coarsest, size
-from .embedding import taps
-from .projectors import coarse_nodes, given_nodes, onto_range
-from .smoothers import POLYNOMIAL, largest_eigenvalue, times
+from ...choices import DTYPES
+from ..coarsest import CAP, by_pcg, of_coarsest, size
+from ..embedding import taps
+from ..projectors import coarse_nodes, given_nodes, onto_range
+from ..smoothers import POLYNOMIAL, largest_eigenvalue, times
+from . import coarsest
+from .galerkin import coarse_reach, galerkin
+from .inverse import inverse_blocks
+from .product import planes_of, product
+from .sparse import SERIAL, Blocks, blocks_of, diagonal, reach_of
+from .sweep import Sweep, correct, residual, split, sweep
+from .transfer import Transfer, prolong, restrict, transfer
 
 
 class Level(NamedTuple):
@@ -160,7 +160,7 @@ class Hierarchy:
         of = b if self.choices.stop == "residual" else self._restricted(load)
         enough = self.choices.tolerance * size(of, self.D_inv)
         if len(b) < SERIAL:
-            u, k = block_coarsest.conjugate_gradients(self.coarse, self.D_inv, b, enough, CAP)
+            u, k = coarsest.conjugate_gradients(self.coarse, self.D_inv, b, enough, CAP)
         else:
             u, k = by_pcg(partial(product, self.coarse), self.D_inv, b, enough)
         self.iterations += k

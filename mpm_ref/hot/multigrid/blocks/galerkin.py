@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
-from ..core.tensor import mat, mlin, put_mat, transpose
-from .block_sparse import Blocks, find
+from ....core.jit import CHUNKS, chunk, kernel, parallel, prange
+from ....core.tensor import mat, mlin, put_mat, transpose
+from .sparse import Blocks, find
 
 
 class Stencil(NamedTuple):

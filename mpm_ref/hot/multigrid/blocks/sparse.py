@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
-from ..core.tensor import mat, put_mat
+from ....core.jit import CHUNKS, chunk, kernel, parallel, prange
+from ....core.tensor import mat, put_mat
 
 KNOWN = ((2, 2), (3, 3))     # sizes of blocks
 SERIAL = 4000     # nodes below which starting threads costs more than they save
