@@ -14,7 +14,7 @@ from mpm_ref import oracle
 from mpm_ref.adjoint import StepAdjoint, initial_stress_adjoint, zero_sums
 from mpm_ref.explicit import Scheme
 from mpm_ref.materials import Hencky, HerschelBulkley, NeoHookean, make_flow
-from mpm_ref.oracle import adjoint_recording, adjoint_stages, recording, stages
+from mpm_ref.oracle import adjoint_recording, adjoint_stages, kernel_stages, recording
 from mpm_ref.oracle.schema import ADJOINT, WHERE, key
 from mpm_ref.problem import Problem
 
@@ -51,7 +51,7 @@ def test_the_stages_end_in_the_adjoint_of_the_step_to_the_bit(run):
     stepper = recording.started(problem)
     before = tuple(recording.copied(body, 1) for body in problem.bodies)
     seeds = [adjoint_recording.seeds_of(problem, body, STEP, 0) for body in before]
-    after, _ = stages.step(problem, problem.bodies, stepper, 0.0, STEP)
+    after, _ = kernel_stages.step(problem, problem.bodies, stepper, 0.0, STEP)
     seen = adjoint_stages.step(problem, before, after, seeds, (0.0, STEP))
     bars = [adjoint_stages.seeded(*pair) for pair in zip(before, seeds)]
     sums = [zero_sums(body) for body in before]

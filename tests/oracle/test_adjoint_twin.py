@@ -21,16 +21,16 @@ from mpm_ref.materials import (
     Softening,
     VonMises,
 )
-from mpm_ref.oracle import adjoint_laws, adjoint_walls
+from mpm_ref.oracle import adjoint_boundary, adjoint_laws
 from mpm_ref.oracle.adjoint_clouds import curvature
 from mpm_ref.oracle.known import given, known
 from mpm_ref.oracle.rough import einsum
-from mpm_ref.plain import walls
+from mpm_ref.plain import boundary
+from mpm_ref.plain.boundary import Contact
 from mpm_ref.plain.flows import project
 from mpm_ref.plain.laws import kirchhoff
 from mpm_ref.plain.spline import pairs
 from mpm_ref.plain.step import Matter, Method
-from mpm_ref.plain.walls import Contact
 
 REAL, DT, STEP = np.longdouble, 1e-3, np.longdouble(1e-6)
 JELLY, SAND, PASTE, WATER = (FixedCorotated(4.0, 6.0), Hencky(4.0, 6.0), NeoHookean(4.0, 6.0),
@@ -141,15 +141,15 @@ WALLS = {
 @pytest.mark.parametrize("case", WALLS)
 def test_bars_of_walls_are_their_derivatives(case, rng):
     v, bar, dv = np.array([-0.4, -1.0, 0.7], REAL), *rng.normal(size=(2, 3)).astype(REAL)
-    ours = bar @ adjoint_walls.matrix(v, WALLS[case]) @ dv
-    assert abs(ours - slope(lambda h: bar @ walls.meet(v + h * dv, WALLS[case]))) <= 1e-12
+    ours = bar @ adjoint_boundary.matrix(v, WALLS[case]) @ dv
+    assert abs(ours - slope(lambda h: bar @ boundary.meet(v + h * dv, WALLS[case]))) <= 1e-12
 
 
 def test_bars_of_a_node_have_scales_that_see_a_kink(rng):
     """A node that is just about to stick."""
     rubs = [contact((0, 1, 0), (0, 0, 0), "separate", 0.5)]
     bar, S = rng.normal(size=(1, 3)).astype(REAL), np.ones(1, REAL)
-    found = [adjoint_walls.before(np.array([[t, -1.0, 0.0]], REAL), S, {(0,): rubs}, (bar, S))[1]
+    found = [adjoint_boundary.before(np.array([[t, -1.0, 0.0]], REAL), S, {(0,): rubs}, (bar, S))[1]
              for t in (0.9, 0.5 + 1e-7)]
     assert found[0] < 10.0
     assert found[1] > 1e4

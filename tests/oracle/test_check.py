@@ -10,7 +10,7 @@ from goldens import ON_NODES, seen_by, stretched
 
 from mpm_ref import explicit, oracle
 from mpm_ref.core.boundary import Conditions
-from mpm_ref.oracle import inner, stages
+from mpm_ref.oracle import kernel_stages
 from mpm_ref.oracle.schema import ARRAYS
 
 CHANGE = 1.0 + 1e-6
@@ -48,7 +48,7 @@ def harder(monkeypatch):
 
 
 MUTATIONS = {
-    "weights": ("weights", scaled(inner, "weights", lambda _, r: (r[0], CHANGE * r[1]))),
+    "weights": ("weights", scaled(kernel_stages, "weights", lambda _, r: (r[0], CHANGE * r[1]))),
     "mass": ("mass", scaled(explicit, "p2g", lambda a, _: times(a[1].m))),
     "momentum": ("momentum", scaled(explicit, "p2g", lambda a, _: times(a[1].v))),
     "force": ("force", harder),
@@ -57,11 +57,11 @@ MUTATIONS = {
     "g2p v": ("v", scaled(explicit, "g2p", lambda a, _: times(a[0].v))),
     "g2p x": ("x", scaled(explicit, "g2p", lambda a, _: times(a[0].x))),
     "g2p C": ("C", scaled(explicit, "g2p", lambda a, _: times(a[0].C))),
-    "F trial": ("F_trial", scaled(inner, "trial", lambda _, r: CHANGE * r)),
+    "F trial": ("F_trial", scaled(kernel_stages, "trial", lambda _, r: CHANGE * r)),
     "return map": ("F", scaled(explicit, "deform_body", lambda a, _: times(a[0].particles.F))),
     "history": ("y", scaled(explicit, "deform_body", lambda a, _: times(a[0].particles.y))),
     "stress": ("tau", scaled(explicit, "deform_body", lambda a, _: times(a[0].particles.tau))),
-    "energy": ("energy", scaled(stages, "energy", lambda _, r: CHANGE * np.array(r))),
+    "energy": ("energy", scaled(kernel_stages, "energy", lambda _, r: CHANGE * np.array(r))),
 }
 
 

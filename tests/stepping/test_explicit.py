@@ -8,9 +8,9 @@ from mpm_ref.core.solids import half_space, sphere
 from mpm_ref.energy import angular_momentum, energy, momentum
 from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.materials import NoFlow
+from mpm_ref.oracle.kernel_stages import contacts
+from mpm_ref.oracle.plain_twin import Twin
 from mpm_ref.oracle.recording import problem_of
-from mpm_ref.oracle.stages import contacts
-from mpm_ref.oracle.twin import Twin
 
 STEPS = 10
 

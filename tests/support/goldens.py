@@ -5,7 +5,7 @@ from problems import DX, FREE, JELLY, ball, moving, two_disks
 
 from mpm_ref import oracle
 from mpm_ref.materials import NoFlow
-from mpm_ref.oracle import recording, stages
+from mpm_ref.oracle import kernel_stages, recording
 from mpm_ref.oracle.schema import ARRAYS
 from mpm_ref.problem import Clock, Problem
 
@@ -26,7 +26,8 @@ def seen_by(problem, steps=STEPS, order=1):
     """What the kernels compute, as another code would hand it in."""
     problem = recording.problem_of(problem, order)
     stepper, dt = recording.started(problem), problem.clock.dt
-    steps = [stages.step(problem, problem.bodies, stepper, k * dt, dt)[0] for k in range(steps)]
+    steps = [kernel_stages.step(problem, problem.bodies, stepper, k * dt, dt)[0]
+             for k in range(steps)]
     return [seen | {f"{b.name}/id": b.id for b in problem.bodies} for seen in steps]
 
 

@@ -8,12 +8,12 @@ from mpm_ref.core.boundary import Collider, Conditions
 from mpm_ref.core.solids import half_space
 from mpm_ref.explicit import Scheme
 from mpm_ref.materials import NoFlow
-from mpm_ref.oracle import adjoint_recording, adjoint_stages, recording, scaling, stages
+from mpm_ref.oracle import adjoint_recording, adjoint_stages, kernel_stages, recording, scaling
 from mpm_ref.oracle.adjoint_material import Seeds
 from mpm_ref.oracle.adjoint_twin import Backwards, Stage
+from mpm_ref.oracle.plain_twin import Twin, on, placed
 from mpm_ref.oracle.recording import copied
 from mpm_ref.oracle.schema import WHERE
-from mpm_ref.oracle.twin import Twin, on, placed
 from mpm_ref.problem import Clock, Problem
 
 STEPS, STEP = 2, 1e-3
@@ -53,7 +53,7 @@ def seen_by(problem, steps=STEPS, order=1):
     for k in range(steps):
         before = tuple(copied(body, 1) for body in problem.bodies)
         seeds = [turned(adjoint_recording.seeds_of(problem, body, dt, k), order) for body in before]
-        seen, _ = stages.step(problem, problem.bodies, stepper, k * dt, dt)
+        seen, _ = kernel_stages.step(problem, problem.bodies, stepper, k * dt, dt)
         back = adjoint_stages.step(problem, before, seen, seeds, (k * dt, dt))
         out.append(seen | back | {f"{b.name}/id": b.id for b in problem.bodies})
     return out
@@ -70,7 +70,7 @@ def twin_steps(problem, real, steps=STEPS):
     stepper = recording.started(ours)
     for k in range(steps):
         seeds = [adjoint_recording.seeds_of(problem, body, dt, k) for body in ours.bodies]
-        seen, contacts = stages.step(ours, ours.bodies, stepper, k * dt, dt)
+        seen, contacts = kernel_stages.step(ours, ours.bodies, stepper, k * dt, dt)
         before = twin.bodies
         _, done = twin.step(dt, seen["nodes"], contacts)
         held, errors = placed(contacts, done.nodes.box, real), [{} for _ in before]

@@ -11,7 +11,7 @@ from mpm_ref.core.levelset import half_space
 from mpm_ref.explicit import Scheme
 from mpm_ref.hot.methods import Options
 from mpm_ref.hot.multigrid.hierarchy import hierarchy
-from mpm_ref.oracle import implicit, recording, solving
+from mpm_ref.oracle import accepted_step, implicit_stages, recording
 from mpm_ref.oracle.implicit_recording import started
 from mpm_ref.oracle.implicit_twin import SolvedTwin, embedding, spread
 from mpm_ref.problem import Clock, Problem
@@ -73,8 +73,8 @@ def step_of(problem, golden, k, real=np.float64):
         product = twin.product(twin.at(dv.astype(real)), probe.astype(real))
         seen |= {f"E_{name}": E, f"gradient_{name}": g, f"product_{name}": product}
     seen |= multigrid(step, system, load)
-    options = solving.other_method(stepper.options, golden.attrs["eps"])
-    pose, dv = solving.accepted_by(stepper, posed.bodies, (t, dt), options)
+    options = accepted_step.other_method(stepper.options, golden.attrs["eps"])
+    pose, dv = accepted_step.accepted_by(stepper, posed.bodies, (t, dt), options)
     seen["dv"] = dv
     after = twin.seen(twin.moved((pose.unknowns.v + dv).astype(real)), system.index)
     return seen | {key: a for key, a in after.items() if "/" in key}
@@ -87,7 +87,7 @@ def multigrid(step, system, load):
     seen = {"cycle": grids.cycle(load)}
     g = system.evaluate(system.start)[1]
     options = Options(path="scipy")
-    seen["direction"] = implicit.direction(system, A, g, options)
+    seen["direction"] = implicit_stages.direction(system, A, g, options)
     for k, (fine, coarse) in enumerate(zip(grids.levels, grids.levels[1:]), 1):
         W = embedding(fine.index, coarse.index, "linear")
         u = given(step, k)

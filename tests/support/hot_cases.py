@@ -108,7 +108,7 @@ def over(problem, u):
 
 
 def plain_bodies(problem, degree):
-    """Particles, pairs and box for `plain.hot`."""
+    """Particles, pairs and box for `plain.potential`."""
     box = transfer.Box(problem.grid.origin, problem.grid.m.shape)
     return [(twin(b.particles, b.law), pairs(b.particles.x, DX, degree), box)
             for b in problem.bodies]

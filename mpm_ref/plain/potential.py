@@ -43,7 +43,7 @@ def internal_force(q, A, ip, box):
     return transfer.internal_force(q.V0, S, ip, box)
 
 
-def potential(bodies, m, v, dv, dt, gravity):
+def evaluate(bodies, m, v, dv, dt, gravity):
     """E(dv) [J] (HOT-eq1), and g = dE/d dv = m dv - dt f - dt m b (.., d) [kg m/s].
 
     bodies are triples of particles, `Pairs` and the box; m, v are masses and velocities over it.

@@ -16,11 +16,11 @@ from mpm_ref import oracle
 from mpm_ref.hot.methods import METHODS
 from mpm_ref.hot.multigrid import hierarchy
 from mpm_ref.hot.multigrid.projectors import block_diagonal
-from mpm_ref.oracle import differential, recording, solving
+from mpm_ref.oracle import accepted_step, differential, recording
 from mpm_ref.oracle.implicit_recording import started
 from mpm_ref.oracle.implicit_twin import SolvedTwin, embedding
 from mpm_ref.oracle.schema import IMPLICIT, MULTIGRID, key
-from mpm_ref.plain import hot
+from mpm_ref.plain import potential
 from mpm_ref.simulate import simulate
 
 CHANGE = 1e-6
@@ -179,7 +179,7 @@ def test_what_any_method_accepts_is_within_the_bar(problem, golden, checked, wor
     stepper = started(posed)
     for eps, agrees in ((EPS, True), (1e5 * EPS, False)):
         options = replace(METHODS[word], eps=eps)
-        _, dv = solving.accepted_by(stepper, posed.bodies, (0.0, dt), options)
+        _, dv = accepted_step.accepted_by(stepper, posed.bodies, (0.0, dt), options)
         report = checked([{"nodes": nodes, "dv": dv}])
         assert report.agrees is agrees, str(report)
 
@@ -230,8 +230,8 @@ def wrong_levels(made):
 
 
 WRONG = {
-    "no dt in the force": ("potential", lambda m: scaled(m, hot, "internal_force", 0.5)),
-    "energy": ("potential", lambda m: scaled(m, hot, "elastic", 1 + CHANGE)),
+    "no dt in the force": ("potential", lambda m: scaled(m, potential, "internal_force", 0.5)),
+    "energy": ("potential", lambda m: scaled(m, potential, "elastic", 1 + CHANGE)),
     "Hessian": ("Hessian", lambda m: scaled(m, differential, "applied", 1 + CHANGE)),
     "no projection": ("Hessian", unprojected),
     "norm": ("norms", wrong_kappa),

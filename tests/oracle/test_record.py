@@ -12,9 +12,9 @@ from problems import DX, JELLY, ball
 from mpm_ref import oracle, scene
 from mpm_ref.explicit import Scheme
 from mpm_ref.materials import Fluid, NoFlow
-from mpm_ref.oracle import matching, recording, stages
+from mpm_ref.oracle import comparison, kernel_stages, recording
+from mpm_ref.oracle.plain_twin import Twin
 from mpm_ref.oracle.schema import ARRAYS
-from mpm_ref.oracle.twin import Twin
 from mpm_ref.problem import Clock, Problem
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -145,7 +145,7 @@ def twin_steps(real):
     twin, ours = Twin(problem, real), recording.problem_of(problem, 1)
     stepper, out = recording.started(ours), []
     for k in range(STEPS):
-        seen, contacts = stages.step(ours, ours.bodies, stepper, k * dt, dt)
+        seen, contacts = kernel_stages.step(ours, ours.bodies, stepper, k * dt, dt)
         out.append(twin.step(dt, seen["nodes"], contacts)[0] | {"nodes": seen["nodes"]})
     return out
 
@@ -209,7 +209,7 @@ def test_a_base_node_that_round_off_moves_agrees(rng):
     w[0, 0] = 0.0
     group = {"b/base": base, "b/weights": w.reshape(2, 9)}
     other = dict(zip(group, shifted(base, group["b/weights"])))
-    found = matching.by_pair(group, other, "b", other["b/weights"], group["b/weights"])
+    found = comparison.by_pair(group, other, "b", other["b/weights"], group["b/weights"])
     assert np.array_equal(found.value, group["b/weights"])
     assert not found.extra.any()
     w[0, 0] = 0.5

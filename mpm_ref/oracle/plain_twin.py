@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..plain import walls
+from ..plain import boundary
 from ..plain.laws import kirchhoff
 from ..plain.step import Matter, Method, after, energies, step, stress
 
@@ -22,7 +22,7 @@ class Twin:
     def step(self, dt, nodes, contacts):
         """Advance by dt [s]: what was seen, with grid arrays on the given nodes, and the `Step`."""
         def conditions(v, m, box):
-            return walls.conditioned(v, placed(contacts, box, self.real))
+            return boundary.conditioned(v, placed(contacts, box, self.real))
 
         done = step(self.bodies, self.method, self.gravity, self.real(dt), conditions)
         done = done._replace(moved=[self.clipped(new) for new in done.moved])

@@ -1,38 +1,38 @@
 """How nodal velocities after the boundary conditions change with those before, in any floating
-type: along one direction after the other, in the branch that `plain.walls` takes.
+type: along one direction after the other, in the branch that `plain.boundary` takes.
 """
 
 import numpy as np
 
-from ..plain import walls
+from ..plain import boundary
 from .scales import LARGEST, STEP, size
 
 
 def matrix(v, contacts):
-    """du/dv (d, d) of u = `plain.walls.meet`(v, contacts)."""
+    """du/dv (d, d) of u = `plain.boundary.meet`(v, contacts)."""
     for kinds in (("prescribed",), ("prescribed", "sticky")):
-        if walls.of_kind(contacts, v, *kinds):
+        if boundary.of_kind(contacts, v, *kinds):
             return np.zeros((len(v), len(v)), v.dtype)
-    planes = walls.nearest(v, contacts)
+    planes = boundary.nearest(v, contacts)
     if planes is None:
         return np.zeros((len(v), len(v)), v.dtype)
     return np.stack([rubbed(v, planes, e) for e in np.eye(len(v), dtype=v.dtype)], axis=1)
 
 
 def rubbed(v, planes, e):
-    """The change of `plain.walls.rub`(v, planes) as v moves along e (d,)."""
+    """The change of `plain.boundary.rub`(v, planes) as v moves along e (d,)."""
     still = [c._replace(v=0 * v) for c in planes]
-    u, du = v + walls.change(v, planes), e + walls.change(e, still)
-    loads = walls.loads(v, planes)
+    u, du = v + boundary.change(v, planes), e + boundary.change(e, still)
+    loads = boundary.loads(v, planes)
     grips = [c.mu * abs(l) for c, l in zip(planes, loads)]
-    dgrips = [c.mu * np.sign(l) * dl for c, l, dl in zip(planes, loads, walls.loads(e, still))]
+    dgrips = [c.mu * np.sign(l) * dl for c, l, dl in zip(planes, loads, boundary.loads(e, still))]
     grip = sum(grips)
     if not grip > 0:
         return du
     drift = sum(g * c.v for g, c in zip(grips, planes)) / grip
     turning = sum(dg * (c.v - drift) for dg, c in zip(dgrips, planes)) / grip
-    t, dt = ((a + walls.change(a, still)) for a in (u - drift, du - turning))
-    speed = walls.length(t)
+    t, dt = ((a + boundary.change(a, still)) for a in (u - drift, du - turning))
+    speed = boundary.length(t)
     if grip >= speed:
         return du - dt
     slower = sum(dgrips) / speed - grip * (t @ dt) / speed**3

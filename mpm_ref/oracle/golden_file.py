@@ -11,8 +11,8 @@ from ..body import Body
 from ..plain.flows import FLOWS
 from ..plain.laws import LAWS
 from ..store.atomic import replacing, require_place
-from . import adjoint_recording, implicit_recording, recording, solving
-from .matching import refuse_no_numbers
+from . import accepted_step, adjoint_recording, implicit_recording, recording
+from .comparison import refuse_no_numbers
 from .schema import BESIDE, EVERY, FORMAT, NODES, key, taken
 
 PACKED = {"compression": "gzip", "compression_opts": 9, "shuffle": True, "fletcher32": True}
@@ -82,7 +82,7 @@ def solved_to(problem, eps):
     if problem.integrator != "implicit":
         raise ValueError(f"eps = {eps} with an explicit integrator: nothing is solved; leave it "
                          "out")
-    return replace(problem, solver=replace(solving.options_of(problem), eps=eps))
+    return replace(problem, solver=replace(accepted_step.options_of(problem), eps=eps))
 
 
 def require_free(path, overwrite):
@@ -135,7 +135,7 @@ def describe(f, problem):
         "rule": "tolerance of an entry = tolerance_f64 or tolerance_f32 of its array * its scale",
     })
     if problem.integrator == "implicit":
-        f.attrs.update(solver_attributes(solving.options_of(problem)))
+        f.attrs.update(solver_attributes(accepted_step.options_of(problem)))
     if problem.clip is not None:
         f.attrs["clip"] = np.array(problem.clip)
     for body in problem.bodies:

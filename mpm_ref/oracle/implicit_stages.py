@@ -15,7 +15,7 @@ from ..hot.multigrid.blocks.transfer import prolong
 from ..hot.multigrid.hierarchy import hierarchy
 from ..hot.report import Watch
 from ..hot.step import put
-from . import inner, stages
+from . import kernel_stages
 
 SEED = 20200
 STRAIN = 0.01       # of a step by the test increment, about
@@ -99,7 +99,7 @@ def at_particles(bodies, store, scheme):
     """Weights, and the first nodes that particles reach."""
     grid, seen = scatter(bodies, store, scheme, 0.0), {}
     for body in bodies:
-        base, w = inner.weights(body.particles.x, grid, scheme.stencil)
+        base, w = kernel_stages.weights(body.particles.x, grid, scheme.stencil)
         seen[f"{body.name}/base"], seen[f"{body.name}/weights"] = base, w
     return seen
 
@@ -142,5 +142,5 @@ def after(problem, bodies, pose, v, dt):
     put(pose.grid, pose.unknowns, v)
     seen = {}
     for body in bodies:
-        stages.advance(problem, body, pose.grid, dt, seen)
+        kernel_stages.advance(problem, body, pose.grid, dt, seen)
     return seen

@@ -8,7 +8,7 @@ import numpy as np
 from ..hot.choices import Choices
 from ..hot.methods import METHODS, Options
 from . import sampled
-from .implicit import after
+from .implicit_stages import after
 from .scales import size
 
 CLOSER = 1e-3       # the golden increment's tolerance, of the scene's

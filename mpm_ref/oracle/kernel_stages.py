@@ -6,9 +6,12 @@ from .. import explicit
 from ..body import keep_inside
 from ..core import boundary
 from ..core.contact import PRESCRIBED
+from ..core.deform import growth
+from ..core.jit import kernel
+from ..core.stencil import column, columns, locate, product, weights_per_axis
+from ..core.tensor import mat, mm, put_mat, vec
 from ..energy import energy
-from ..plain.walls import Contact
-from . import inner
+from ..plain.boundary import Contact
 
 KINDS = {PRESCRIBED: "prescribed", **{number: name for name, number in boundary.KINDS.items()}}
 
@@ -41,7 +44,7 @@ def apart(bodies, store, scheme, seen):
     seen["nodes"] = np.argwhere(full) + grid.origin
     seen["mass"], seen["momentum"] = grid.m[full], grid.v[full]
     for body in bodies:
-        base, w = inner.weights(body.particles.x, grid, scheme.stencil)
+        base, w = weights(body.particles.x, grid, scheme.stencil)
         seen[f"{body.name}/base"], seen[f"{body.name}/weights"] = base, w
     grid = explicit.scatter([at_rest(body) for body in bodies], store, scheme, 1.0)
     seen["force"] = (grid.v if grid.f.ndim == 1 else grid.f)[full]
@@ -63,7 +66,7 @@ def advance(problem, body, grid, dt, seen):
     if problem.clip is not None:
         keep_inside((body,), *problem.clip)
     if q.F.ndim == 3:
-        seen[f"{name}/F_trial"] = inner.trial(F, q.L, dt)
+        seen[f"{name}/F_trial"] = trial(F, q.L, dt)
     explicit.deform_body(body, dt)
     seen[f"{name}/L"] = q.L.copy()               # under MLS-MPM the array of C, damped next
     explicit.damp(body, problem.scheme)
@@ -88,3 +91,43 @@ def contacts(conditions, grid, t, dt):
             contact = Contact(n, v, KINDS[rule], friction)
             found.setdefault(tuple(map(int, i)), []).append(contact)
     return found
+
+
+# What the kernels compute in a step and do not store: weights and trial deformation.
+
+@kernel
+def _weights(x, grid, stencil, base, w):
+    d = grid.m.shape
+    for p in range(len(x)):
+        first, s = locate(vec(x, p, d), grid, stencil)
+        per_axis = weights_per_axis(s, stencil)
+        for a in range(len(first)):
+            base[p, a] = first[a] + grid.origin[a]
+        for c in range(columns(s, stencil)):
+            k = column(c, stencil, d)
+            for l in range(len(stencil)):
+                w[p, c * len(stencil) + l] = product(k, l, per_axis)
+
+
+@kernel
+def _trial(F, L, dt, like, out):
+    for p in range(len(F)):
+        put_mat(out, p, mm(growth(L, p, dt, like), mat(F, p, like)))
+
+
+def weights(x, grid, stencil):
+    """First node (N, d) that each particle at x reaches, and all its weights (N, (degree + 1)^d).
+
+    Nodes are in order, the last axis fastest.
+    """
+    base = np.empty(x.shape, dtype=np.int64)
+    w = np.empty((len(x), len(stencil) ** x.shape[1]))
+    _weights(x, grid, stencil, base, w)
+    return base, w
+
+
+def trial(F, L, dt):
+    """(I + dt L) F of all particles (N, d, d)."""
+    out = np.empty_like(F)
+    _trial(F, L, dt, tuple(range(F.shape[1])), out)
+    return out
