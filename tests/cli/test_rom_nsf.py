@@ -19,7 +19,7 @@ from mpm_ref.reduced.nsf.fields import BLOCK
 from mpm_ref.reduced.study import load
 from mpm_ref.reduced.tables import NSF
 from mpm_ref.reduced.whole import history, whole
-from mpm_ref.rom.spanned import Sizes, spanned
+from mpm_ref.rom.fields.pod_fields import Sizes, spanned
 from mpm_ref.rom.symmetric import values
 from mpm_ref.scene import build
 from mpm_ref.store.results import Results

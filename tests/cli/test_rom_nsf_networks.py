@@ -12,7 +12,7 @@ from mpm_ref.reduced import maps
 from mpm_ref.reduced.nsf.dataset import histories
 from mpm_ref.reduced.nsf.networks import Networks
 from mpm_ref.reduced.study import load
-from mpm_ref.rom.learned import learned
+from mpm_ref.rom.fields.network import learned
 from mpm_ref.store.results import Results
 
 torch = pytest.importorskip("torch")

@@ -13,8 +13,7 @@ from mpm_ref.reduced.case import case
 from mpm_ref.reduced.evaluate import NEAREST, REDUCED, Held, breakdowns, course
 from mpm_ref.reduced.march import Way
 from mpm_ref.reduced.watch import watch, watched
-from mpm_ref.rom.inverse import guesses
-from mpm_ref.rom.placed import NoBody
+from mpm_ref.rom.kinematics import NoBody, guesses
 from validation.extremes import ldm_runs
 from validation.ldm import online
 from validation.ldm.racing import Online

@@ -13,10 +13,10 @@ from mpm_ref.reduced.case import case, distance
 from mpm_ref.reduced.march import Way, groups, march, model, picked, stepped
 from mpm_ref.reduced.model import require_way
 from mpm_ref.reduced.tables import Run
-from mpm_ref.rom.affine import Affine
-from mpm_ref.rom.lagrangian import Resampled, lagrangian
+from mpm_ref.rom.fields.affine import Affine
 from mpm_ref.rom.latent import at_start
-from mpm_ref.rom.samples import PER_GROUP, pivoted
+from mpm_ref.rom.quadrature.lagrangian import Resampled, lagrangian
+from mpm_ref.rom.sampling import PER_GROUP, pivoted
 from mpm_ref.rom.step import Reduced
 from mpm_ref.rom.weights import Model
 from mpm_ref.scene import Box, Cylinder, Difference, Union

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mpm_ref.rom.combine import combined
+from mpm_ref.rom.fields.pod_fields import combined
 
 
 @pytest.mark.parametrize("count", [1, 3, 4, 6, 41])

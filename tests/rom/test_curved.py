@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import rom_toys
 
-from mpm_ref.rom.curved import curved, monomials, slopes
-from mpm_ref.rom.modes import basis, modes
+from mpm_ref.rom.fields.pod import basis, modes
+from mpm_ref.rom.fields.polynomial_manifold import curved, monomials, slopes
 
 N, S, R = 30, 60, 5     # points, snapshots, modes
 

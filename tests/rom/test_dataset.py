@@ -21,8 +21,8 @@ from mpm_ref.reduced.generate import (
     one_thread,
 )
 from mpm_ref.rom import modes_file
-from mpm_ref.rom.curved import curved
-from mpm_ref.rom.modes import basis
+from mpm_ref.rom.fields.pod import basis
+from mpm_ref.rom.fields.polynomial_manifold import curved
 from mpm_ref.scene import build
 from mpm_ref.sealed import sealed
 from mpm_ref.store import BadResults, Fields

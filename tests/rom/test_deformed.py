@@ -6,9 +6,9 @@ import pytest
 from mpm_ref.body import Body, particles_at
 from mpm_ref.materials import NoFlow, fixed_corotated
 from mpm_ref.plain import laws
-from mpm_ref.rom.deformed import deformed, elastic, gradients
-from mpm_ref.rom.histories import Histories
-from mpm_ref.rom.spanned import Sizes, spanned
+from mpm_ref.rom.fields.elastic import deformed, elastic, gradients
+from mpm_ref.rom.fields.pod_fields import Sizes, spanned
+from mpm_ref.rom.snapshots import Histories
 
 SOFT, HARD = fixed_corotated.from_E_nu(1.0, 0.3), fixed_corotated.from_E_nu(20.0, 0.2)
 

@@ -9,10 +9,10 @@ import pytest
 from rom_toys import affine, cloud, decoder
 
 from mpm_ref.core.spline import STENCILS, base_of
-from mpm_ref.rom.affine import Affine
-from mpm_ref.rom.eulerian import Eulerian
-from mpm_ref.rom.inverse import ITERATIONS, from_middles, guesses, preimages, shortened
+from mpm_ref.rom.fields.affine import Affine
+from mpm_ref.rom.kinematics import ITERATIONS, from_middles, guesses, preimages, shortened
 from mpm_ref.rom.latent import at_start
+from mpm_ref.rom.quadrature.eulerian import Eulerian
 
 DX, RHO = 0.125, 700.0
 RADIUS = 0.45           # of the disk or ball that is the body, around the middle of the unit box

@@ -6,18 +6,17 @@ import rom_toys
 from field_toys import MU, Q, field, latents, networks
 
 from mpm_ref.core.jit import kernel
-from mpm_ref.rom.batch import ROWS
-from mpm_ref.rom.features import count, features, fill
+from mpm_ref.rom.fields.perceptron import ROWS, count, features
 from mpm_ref.rom.fields_file import Model, load, save
-from mpm_ref.rom.inference import infer
 from mpm_ref.rom.symmetric import tensor
+from validation.nsf.pointwise_networks import fill_features, infer
 
 OCTAVES = 3
 
 
 @kernel
 def filled(a, d, octaves):
-    fill(a, d, octaves)
+    fill_features(a, d, octaves)
 
 
 def test_features_of_a_place():

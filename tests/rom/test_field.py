@@ -10,12 +10,11 @@ import pytest
 import rom_toys
 from field_toys import MU, Q, latents, networks, plain
 
-from mpm_ref.rom.architecture import hidden, nsf_lengths, row_per_axis
-from mpm_ref.rom.batch import ROWS
-from mpm_ref.rom.field import field_units
-from mpm_ref.rom.inference import infer
-from mpm_ref.rom.network import layers_of
+from mpm_ref.rom.fields.architecture import hidden, nsf_lengths, row_per_axis
+from mpm_ref.rom.fields.perceptron import ROWS, layers_of
+from mpm_ref.rom.snapshots import field_units
 from mpm_ref.rom.symmetric import tensor, values
+from validation.nsf.pointwise_networks import infer
 
 ROUND_OFF = 1e-13       # of the largest entry; seen: 2.2e-15
 TARGETS = Path(__file__).parents[3] / "shared" / "papers" / "targets-nsf.toml"

@@ -13,8 +13,8 @@ from field_toys import MU, Q, latents, networks
 from mpm_ref.archive import stated
 from mpm_ref.rom import fields_file, weights
 from mpm_ref.rom.fields_file import Model, arrays_of, load, save
-from mpm_ref.rom.inference import infer
 from mpm_ref.sealed import sealed
+from validation.nsf.pointwise_networks import infer
 
 ABOUT = {"seed": 3, "command": "train nsf", "betas": [48, 64, 64]}
 

@@ -9,10 +9,10 @@ from mpm_ref.body import Body, particles_at
 from mpm_ref.core.grid import OutOfRange
 from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.materials import FixedCorotated, NoFlow
-from mpm_ref.rom.affine import Affine
-from mpm_ref.rom.blocks import blocks
+from mpm_ref.rom.fields.affine import Affine
+from mpm_ref.rom.fields.blocks import blocks
 from mpm_ref.rom.inferred import Inferred, Matter, Position, nearest
-from mpm_ref.rom.placed import NoBody
+from mpm_ref.rom.kinematics import NoBody
 
 DX, DT, STEPS = 0.17, 0.004, 5
 LAW = FixedCorotated(3e3, 4e3)

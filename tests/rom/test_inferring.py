@@ -20,9 +20,9 @@ from mpm_ref.reduced.inferring import (
 from mpm_ref.reduced.vary import varied
 from mpm_ref.reduced.whole import history, whole
 from mpm_ref.rom.cubature import cubature
-from mpm_ref.rom.histories import joined
-from mpm_ref.rom.reach import bases
-from mpm_ref.rom.spanned import Sizes, spanned
+from mpm_ref.rom.fields.pod_fields import Sizes, spanned
+from mpm_ref.rom.quadrature.stencil_overlap import bases
+from mpm_ref.rom.snapshots import joined
 
 TOML = """
 title = "two disks"

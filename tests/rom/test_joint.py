@@ -7,10 +7,10 @@ from mpm_ref.body import Body, particles_at
 from mpm_ref.core.motion import rotation
 from mpm_ref.explicit import deform_body
 from mpm_ref.materials import Hencky, NeoHookean, NoFlow, make_flow
-from mpm_ref.rom.histories import Histories, joined
+from mpm_ref.rom.fields.joint_latent import Joint, Stacked, joint, stretch_of
+from mpm_ref.rom.fields.pod_fields import Sizes, spanned
 from mpm_ref.rom.inferred import Inferred, Matter, Position
-from mpm_ref.rom.joint import Joint, Stacked, joint, stretch_of
-from mpm_ref.rom.spanned import Sizes, spanned
+from mpm_ref.rom.snapshots import Histories, joined
 from mpm_ref.rom.symmetric import values
 
 LAW = Hencky(3e3, 4e3)

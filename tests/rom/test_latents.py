@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from rom_toys import cloud
 
-from mpm_ref.rom.modes import basis, directions
+from mpm_ref.rom.fields.pod import basis, directions
 from mpm_ref.rom.snapshots import Snapshots
 
 torch = pytest.importorskip("torch")

@@ -6,7 +6,7 @@ import rom_toys
 
 torch = pytest.importorskip("torch")
 
-from mpm_ref.rom.architecture import lengths  # noqa: E402
+from mpm_ref.rom.fields.architecture import lengths  # noqa: E402
 from mpm_ref.rom.learn import fit, loss, schedule  # noqa: E402
 from mpm_ref.rom.learn.data import batch_of, data_of  # noqa: E402
 from mpm_ref.rom.learn.fit import Session, Training, train  # noqa: E402

@@ -10,7 +10,7 @@ import rom_toys
 torch = pytest.importorskip("torch")
 
 from mpm_ref.rom import fields_file  # noqa: E402
-from mpm_ref.rom.architecture import row_per_axis  # noqa: E402
+from mpm_ref.rom.fields.architecture import row_per_axis  # noqa: E402
 from mpm_ref.rom.learn import field, fit, schedule, session, stages  # noqa: E402
 from mpm_ref.rom.learn.encoder import Encoder  # noqa: E402
 from mpm_ref.rom.learn.field import FieldTraining, Observed  # noqa: E402

@@ -6,10 +6,10 @@ import pytest
 import rom_toys
 from field_toys import MU, Q, latents, networks
 
-from mpm_ref.rom.inference import infer
+from mpm_ref.rom.fields.network import learned
 from mpm_ref.rom.inferred import Inferred, Matter, Position
-from mpm_ref.rom.learned import learned
 from mpm_ref.rom.projection import project_position
+from validation.nsf.pointwise_networks import infer
 
 POINTS = np.array([7, 3, 190, 3])
 SIZE = 0.2

@@ -5,7 +5,7 @@ import pytest
 import rom_toys
 import threadpoolctl
 
-from mpm_ref.rom.modes import modes
+from mpm_ref.rom.fields.pod import modes
 from mpm_ref.rom.snapshots import displacement_error, position_error, units
 
 ROUND_OFF = 4e-14       # of the largest entry; seen: 3.8e-15
@@ -132,7 +132,7 @@ def test_snapshots_at_rest_have_no_modes(rough):
 @pytest.mark.parametrize(("least", "held"), [(0.0, 2), (1e-12, 2), (1e-8, 3)])
 def test_modes_of_round_off_are_refused(d, rng, monkeypatch, small, least, held):
     """Three shapes in eight snapshots, the third of a size that is round-off or is not."""
-    monkeypatch.setattr("mpm_ref.rom.modes.SMALL", small)
+    monkeypatch.setattr("mpm_ref.rom.fields.pod.SMALL", small)
     X, size = rom_toys.cloud(d, N), np.array([1.0, 0.1, least])
     x = X + np.tensordot(size * rng.normal(size=(8, 3)), rng.normal(size=(3, N, d)), 1)
     F = np.tile(np.eye(d), (8, N, 1, 1))

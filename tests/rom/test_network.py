@@ -10,10 +10,9 @@ import rom_toys
 import threadpoolctl
 from problems import elsewhere
 
-from mpm_ref.rom import pointwise
-from mpm_ref.rom.batch import ROWS, over
-from mpm_ref.rom.decoder import Decoder, Units
-from mpm_ref.rom.network import layers_of, network
+from mpm_ref.rom.fields.network import Decoder, Units
+from mpm_ref.rom.fields.perceptron import ROWS, layers_of, network, over
+from validation.nsf import pointwise_networks
 
 R = 3
 HIDDEN = {"none": (), "one": (7,), "uneven": (12, 5, 9), "four of 30": (30,) * 4,
@@ -107,8 +106,8 @@ def answers(map, X, xhat, vhat):
 
 def pointwise_answers(map, X, xhat, vhat):
     """The same, point by point."""
-    return (pointwise.places(map, X, xhat), *pointwise.derivatives(map, X, xhat),
-            pointwise.velocities(map, X, xhat, vhat))
+    return (pointwise_networks.places(map, X, xhat), *pointwise_networks.derivatives(map, X, xhat),
+            pointwise_networks.velocities(map, X, xhat, vhat))
 
 
 def test_batches_equal_points(d, hidden):

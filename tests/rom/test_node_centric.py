@@ -7,12 +7,12 @@ import pytest
 from rom_toys import cloud
 
 from mpm_ref.core.grid import OutOfRange
-from mpm_ref.rom.affine import Affine
-from mpm_ref.rom.eulerian import Eulerian
+from mpm_ref.rom.fields.affine import Affine
 from mpm_ref.rom.latent import at_start
-from mpm_ref.rom.neighbours import neighbours
-from mpm_ref.rom.node_centric import node_centric, nodes_of, whole_stencils
-from mpm_ref.rom.reach import bases
+from mpm_ref.rom.quadrature.eulerian import Eulerian
+from mpm_ref.rom.quadrature.lagrangian import neighbours
+from mpm_ref.rom.quadrature.node_centric import node_centric, nodes_of, whole_stencils
+from mpm_ref.rom.quadrature.stencil_overlap import bases
 from mpm_ref.rom.step import Reduced
 from tests.rom.test_step import (
     DT,

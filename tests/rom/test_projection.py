@@ -6,8 +6,8 @@ import rom_toys
 from rom_toys import Bent, Watched
 from scipy import linalg
 
+from mpm_ref.rom.fields.pod import modes
 from mpm_ref.rom.latent import at_start, initial, moved, points, velocities
-from mpm_ref.rom.modes import modes
 from mpm_ref.rom.projection import backtracked, least_squares, project_position, project_velocity
 
 R, N = 3, 50

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from rom_toys import cloud, decoder
 
-import mpm_ref.rom.blocks
 from mpm_ref.core.motion import rotation
 from mpm_ref.core.spline import STENCILS, base_of
-from mpm_ref.rom.affine import Affine
-from mpm_ref.rom.blocks import SAFETY, blocks
-from mpm_ref.rom.lagrangian import CELLS, lagrangian
+from mpm_ref.rom.fields import blocks as block_module
+from mpm_ref.rom.fields.affine import Affine
+from mpm_ref.rom.fields.blocks import SAFETY, blocks
 from mpm_ref.rom.latent import at_start
-from mpm_ref.rom.reach import reach
-from mpm_ref.rom.samples import PER_GROUP, draw
+from mpm_ref.rom.quadrature.lagrangian import CELLS, lagrangian
+from mpm_ref.rom.quadrature.stencil_overlap import reach
+from mpm_ref.rom.sampling import PER_GROUP, draw
 
 DX = 0.11
 
@@ -111,7 +111,7 @@ def body(request, d):
 @pytest.fixture(params=(500, 2), ids=("one level", "more levels"))
 def many(request, monkeypatch):
     """How many blocks are not in larger ones."""
-    monkeypatch.setattr(mpm_ref.rom.blocks, "MANY", request.param)
+    monkeypatch.setattr(block_module, "MANY", request.param)
     return request.param
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from mpm_ref.rom import spanned as module
-from mpm_ref.rom.histories import Histories, joined
-from mpm_ref.rom.radial import through
-from mpm_ref.rom.spanned import Sizes, modes_of, spanned
+from mpm_ref.rom.fields import pod_fields as module
+from mpm_ref.rom.fields.pod_fields import Sizes, modes_of, spanned
+from mpm_ref.rom.fields.radial_basis import through
+from mpm_ref.rom.snapshots import Histories, joined
 from mpm_ref.rom.symmetric import tensor, values
 
 LEVELS, N, DT = 9, 60, 0.01

@@ -8,8 +8,8 @@ import pytest
 
 from mpm_ref.archive import stated
 from mpm_ref.rom import modes_file, spanned_file, weights
-from mpm_ref.rom.histories import joined
-from mpm_ref.rom.spanned import Sizes, spanned
+from mpm_ref.rom.fields.pod_fields import Sizes, spanned
+from mpm_ref.rom.snapshots import joined
 from mpm_ref.rom.spanned_file import arrays_of, load, save
 from mpm_ref.rom.weights import Model
 from mpm_ref.sealed import sealed

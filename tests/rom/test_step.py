@@ -11,12 +11,12 @@ from rom_toys import cloud, decoder
 from mpm_ref.body import Body, particles_at
 from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.materials import FixedCorotated, NoFlow
-from mpm_ref.rom.affine import Affine
-from mpm_ref.rom.eulerian import Eulerian
-from mpm_ref.rom.lagrangian import lagrangian
+from mpm_ref.rom.fields.affine import Affine
+from mpm_ref.rom.fields.pod import modes
 from mpm_ref.rom.latent import at_start
-from mpm_ref.rom.modes import modes
-from mpm_ref.rom.samples import draw
+from mpm_ref.rom.quadrature.eulerian import Eulerian
+from mpm_ref.rom.quadrature.lagrangian import lagrangian
+from mpm_ref.rom.sampling import draw
 from mpm_ref.rom.step import Reduced
 
 DX, DT, STEPS, RHO = 0.17, 0.01, 6, 800.0

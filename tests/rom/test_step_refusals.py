@@ -5,9 +5,9 @@ import pytest
 from rom_toys import cloud
 
 from mpm_ref.core.grid import OutOfRange
-from mpm_ref.rom.affine import Affine
+from mpm_ref.rom.fields.affine import Affine
+from mpm_ref.rom.kinematics import NoBody
 from mpm_ref.rom.latent import at_start
-from mpm_ref.rom.placed import NoBody
 from mpm_ref.rom.step import Reduced
 from tests.rom.test_step import DT, GRAVITY, LAW, learned, quadrature, swinging
 

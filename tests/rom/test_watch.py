@@ -10,9 +10,9 @@ from mpm_ref.reduced import watch as watching
 from mpm_ref.reduced.case import case
 from mpm_ref.reduced.march import Way, march
 from mpm_ref.reduced.watch import MEMORY, Nonsense, Sight, Watch, seen, watch, watched
-from mpm_ref.rom.extent import extent
+from mpm_ref.rom.extrapolation import extent
+from mpm_ref.rom.fields.pod import basis
 from mpm_ref.rom.latent import at_start
-from mpm_ref.rom.modes import basis
 from mpm_ref.rom.step import Report
 from validation.ldm.studies import GRAVITY
 from validation.verification.scenes import with_

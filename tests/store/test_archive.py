@@ -10,7 +10,7 @@ from mpm_ref.nclaw import weights as of_laws
 from mpm_ref.nclaw.gnn import weights as of_graphs
 from mpm_ref.rom import fields_file, modes_file
 from mpm_ref.rom import weights as of_maps
-from mpm_ref.rom.modes import Modes
+from mpm_ref.rom.fields.pod import Modes
 from mpm_ref.rom.weights import Model
 from validation.nclaw import bundle
 from validation.nclaw.trade_nets import small_nets

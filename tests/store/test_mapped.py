@@ -10,8 +10,8 @@ import pytest
 from field_toys import histories
 
 from mpm_ref import mapped
-from mpm_ref.rom.histories import joined
-from mpm_ref.rom.spanned import Sizes, spanned
+from mpm_ref.rom.fields.pod_fields import Sizes, spanned
+from mpm_ref.rom.snapshots import joined
 
 SHAPE = 3, 5
 SIZES = Sizes(r=1, modes=2, tau=1, C=2)

@@ -4,10 +4,9 @@
 import numpy as np
 import rom_toys
 
-from mpm_ref.rom.features import count
-from mpm_ref.rom.field import Field, FieldUnits
-from mpm_ref.rom.histories import Histories
-from mpm_ref.rom.network import network
+from mpm_ref.rom.fields.network import Field, FieldUnits
+from mpm_ref.rom.fields.perceptron import count, network
+from mpm_ref.rom.snapshots import Histories
 from mpm_ref.rom.symmetric import values
 
 R = 3

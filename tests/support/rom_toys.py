@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.rom.affine import Affine
-from mpm_ref.rom.decoder import Decoder, Units
-from mpm_ref.rom.network import network
+from mpm_ref.rom.fields.affine import Affine
+from mpm_ref.rom.fields.network import Decoder, Units
+from mpm_ref.rom.fields.perceptron import network
 from mpm_ref.rom.snapshots import Snapshots
 
 MEAN, STD = np.array([0.02, -0.03, 0.01]), np.array([0.12, 0.08, 0.1])     # [m], by axis

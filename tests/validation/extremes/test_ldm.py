@@ -9,7 +9,7 @@ import pytest
 from mpm_ref.reduced.case import case
 from mpm_ref.reduced.march import Way
 from mpm_ref.reduced.watch import Sight
-from mpm_ref.rom.modes import basis
+from mpm_ref.rom.fields.pod import basis
 from validation.extremes import ldm_files as files
 from validation.extremes import ldm_long as long
 from validation.extremes import ldm_singular as singular

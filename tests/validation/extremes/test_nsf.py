@@ -7,8 +7,8 @@ import pytest
 from small_toys import Records
 
 from mpm_ref.reduced.nsf.watch import Sight
-from mpm_ref.rom.placed import NoBody
-from mpm_ref.rom.spanned import Sizes
+from mpm_ref.rom.fields.pod_fields import Sizes
+from mpm_ref.rom.kinematics import NoBody
 from validation.extremes import nsf_beyond as beyond
 from validation.extremes import nsf_damage as damage
 from validation.extremes import nsf_long as long

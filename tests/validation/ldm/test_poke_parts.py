@@ -9,7 +9,7 @@ from mpm_ref.cases import snapshots
 from mpm_ref.reduced.case import case
 from mpm_ref.reduced.errors import Errors
 from mpm_ref.reduced.march import march
-from mpm_ref.rom.modes import modes
+from mpm_ref.rom.fields.pod import modes
 from mpm_ref.scene import build
 from validation.ldm import poke_parts
 from validation.ldm.pairs import ALL

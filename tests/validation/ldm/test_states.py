@@ -9,7 +9,7 @@ from figures import _states
 from figures.frame import draw_all
 from mpm_ref.reduced.case import case
 from mpm_ref.reduced.errors import Errors
-from mpm_ref.rom.affine import Affine
+from mpm_ref.rom.fields.affine import Affine
 from validation import targets
 from validation.ldm import kept_bodies, pairs, states
 from validation.ldm.studies import POKES, TORSION, TOWER, fallen, leaning, twisted

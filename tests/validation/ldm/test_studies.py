@@ -9,8 +9,8 @@ from mpm_ref.cases import snapshots
 from mpm_ref.reduced.case import case
 from mpm_ref.reduced.errors import Squares
 from mpm_ref.reduced.march import SCHEMES, Way, march
-from mpm_ref.rom.affine import Affine
-from mpm_ref.rom.modes import modes
+from mpm_ref.rom.fields.affine import Affine
+from mpm_ref.rom.fields.pod import modes
 from mpm_ref.scene import build
 from validation.ldm.online import compared, reconstructed
 from validation.ldm.studies import GRAVITY, PHI, POKE, POKES, STUDIES, TORSION, poked_again

@@ -9,8 +9,8 @@ import pytest
 from mpm_ref.reduced.case import case
 from mpm_ref.reduced.errors import Errors
 from mpm_ref.reduced.march import Way, march
-from mpm_ref.rom.affine import Affine
-from mpm_ref.rom.placed import NoBody
+from mpm_ref.rom.fields.affine import Affine
+from mpm_ref.rom.kinematics import NoBody
 from mpm_ref.scene import build
 from validation.ldm import tower
 from validation.ldm.racing import COLUMNS, Full, Raced, Spent, clocked, fastest, median, race

@@ -6,7 +6,7 @@ import pytest
 from mpm_ref.reduced.inferring import infer
 from mpm_ref.reduced.nsf import watch
 from mpm_ref.reduced.whole import whole
-from mpm_ref.rom.placed import NoBody
+from mpm_ref.rom.kinematics import NoBody
 from validation.nsf import beyond, tested
 from validation.nsf.studies import bread
 

@@ -7,7 +7,7 @@ from small_toys import Records
 from mpm_ref.core.grid import OutOfRange
 from mpm_ref.reduced.inferring import of_cells
 from mpm_ref.reduced.whole import whole
-from mpm_ref.rom.deformed import Deformed
+from mpm_ref.rom.fields.elastic import Deformed
 from validation.nsf import errors, tested
 from validation.nsf.studies import bread, cake, jelly, metal, sand, toothpaste
 

@@ -6,7 +6,7 @@ from small_toys import Records
 
 from mpm_ref.reduced.inferring import of_cells
 from mpm_ref.reduced.whole import whole
-from mpm_ref.rom.spanned import Sizes
+from mpm_ref.rom.fields.pod_fields import Sizes
 from validation.nsf import factors, tested
 from validation.nsf.factors import Way
 from validation.nsf.studies import jelly

@@ -5,7 +5,7 @@ from small_toys import Records
 
 from mpm_ref.reduced.inferring import Plan, infer
 from mpm_ref.reduced.whole import whole
-from mpm_ref.rom.spanned import Sizes
+from mpm_ref.rom.fields.pod_fields import Sizes
 from validation import targets
 from validation.nsf import inversion, tested
 from validation.nsf.studies import jelly

@@ -8,8 +8,8 @@ from small_toys import Records
 
 from mpm_ref.reduced.errors import Errors
 from mpm_ref.reduced.whole import history
-from mpm_ref.rom.histories import Histories
-from mpm_ref.rom.placed import NoBody
+from mpm_ref.rom.kinematics import NoBody
+from mpm_ref.rom.snapshots import Histories
 from validation.nsf import longer
 from validation.nsf.studies import jelly, metal
 from validation.results import Results

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mpm_ref.rom.spanned import Sizes
+from mpm_ref.rom.fields.pod_fields import Sizes
 from validation.nsf import memory
 from validation.results import Results
 from validation.run import Setting, run_all

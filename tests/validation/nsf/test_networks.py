@@ -8,8 +8,8 @@ from field_toys import R, networks
 
 from mpm_ref.reduced.errors import Errors
 from mpm_ref.reduced.whole import whole
+from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.fields_file import Model, save
-from mpm_ref.rom.spanned import Sizes
 from validation import targets
 from validation.nsf import networks as kept
 from validation.nsf import networks_runs as runs

@@ -8,7 +8,7 @@ import pytest
 
 from figures import nsf_fig04
 from mpm_ref.reduced.whole import whole
-from mpm_ref.rom.reach import reach
+from mpm_ref.rom.quadrature.stencil_overlap import reach
 from validation.ldm.kept_bodies import keep, read
 from validation.nsf import points
 from validation.results import Results

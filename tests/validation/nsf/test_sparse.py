@@ -15,7 +15,7 @@ from mpm_ref.reduced.nsf.recording import plan_of
 from mpm_ref.reduced.study import load
 from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.cubature import misfit
-from mpm_ref.rom.spanned import Sizes
+from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.store.results import Results as Stored
 from validation.extremes import nsf_samples as samples
 from validation.extremes.ldm_runs import BAD, Trial

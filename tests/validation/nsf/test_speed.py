@@ -9,8 +9,8 @@ import pytest
 
 from mpm_ref.reduced.inferring import Plan, infer
 from mpm_ref.reduced.whole import whole
+from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.inferred import Inferred
-from mpm_ref.rom.spanned import Sizes
 from mpm_ref.simulate import simulate
 from validation.nsf import speed, tested
 from validation.nsf.studies import jelly

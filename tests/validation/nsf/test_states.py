@@ -10,7 +10,7 @@ import pytest
 from figures import _reduced, nsf_fig18
 from mpm_ref.reduced.inferring import Plan, infer
 from mpm_ref.reduced.whole import whole
-from mpm_ref.rom.placed import NoBody
+from mpm_ref.rom.kinematics import NoBody
 from mpm_ref.rom.symmetric import tensor
 from validation.ldm.kept_bodies import read
 from validation.nsf import states, tested

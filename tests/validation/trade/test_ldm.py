@@ -7,7 +7,7 @@ import pytest
 
 from mpm_ref.reduced.case import case
 from mpm_ref.reduced.march import Way
-from mpm_ref.rom.affine import Affine
+from mpm_ref.rom.fields.affine import Affine
 from validation.ldm.nets import trained
 from validation.ldm.racing import Raced, Spent
 from validation.ldm.references import references

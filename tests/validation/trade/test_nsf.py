@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mpm_ref.reduced.errors import Errors
-from mpm_ref.rom.placed import NoBody
-from mpm_ref.rom.spanned import Sizes
+from mpm_ref.rom.fields.pod_fields import Sizes
+from mpm_ref.rom.kinematics import NoBody
 from validation.extremes import nsf_runs
 from validation.extremes.outcome import FINISHED
 from validation.nsf import tested

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mpm_ref.rom.spanned import Sizes
+from mpm_ref.rom.fields.pod_fields import Sizes
 from validation.ldm.racing import Spent
 from validation.nsf.studies import jelly
 from validation.results import Results

@@ -5,8 +5,8 @@ import pytest
 from field_toys import R, networks
 
 from mpm_ref.reduced.errors import Errors
+from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.fields_file import Model
-from mpm_ref.rom.spanned import Sizes
 from validation.nsf import tested
 from validation.nsf.networks import Net, Part, fields_of, narrow, net_of, nets
 from validation.nsf.studies import jelly

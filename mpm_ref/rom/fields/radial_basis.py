@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.blas import one_thread
+from ...core.blas import one_thread
 
 SMOOTHING = 1e-8        # on the diagonal, coordinates measured so that their spread is about 1
 

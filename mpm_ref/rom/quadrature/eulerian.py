@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .inverse import CLOSE, from_middles, guesses, preimages
-from .placed import Cloud
-from .reach import reach
+from ..kinematics import CLOSE, from_middles, guesses, preimages
+from . import Cloud
+from .stencil_overlap import reach
 
 PER_CELL = 2        # quadrature points of a cell per axis, l
 FAR = 1.0           # distance of a first guess from the body at which its point is not in it [dx]

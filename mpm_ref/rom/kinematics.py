@@ -1,16 +1,41 @@
-"""Which material point is where: X with g(X; xhat) = x, by Newton's method (LDM-alg4, step 3)."""
+"""Kinematics of points on a deformation map, and its inverse.
+
+`placed` evaluates position x, deformation gradient F and dg/dxhat of material points X together
+(LDM-eq14 to LDM-eq16). `preimages` finds the material point X with g(X; xhat) = x by Newton's
+method (LDM-alg4, step 3), from first guesses of `guesses` or `from_middles`.
+"""
 
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import KDTree
 
-from .placed import NoBody, Placed, placed
-
 ITERATIONS = 20         # at most
 CLOSE = 1e-9            # distance from x at which X counts as found [of the scale] ...
 ROUGH = 1e-2            # ... where a guess is all that is wanted
 LONGEST = 1.0           # of a Newton step [of the scale]
+
+
+class NoBody(ValueError):
+    """The map gives no body at the latent coordinates of a reduced run."""
+
+
+class Placed(NamedTuple):
+    """n points at some latent coordinates (LDM-eq14 to LDM-eq16)."""
+
+    X: np.ndarray           # (n, d)    at rest [m]
+    x: np.ndarray           # (n, d)    position [m]
+    F: np.ndarray           # (n, d, d) deformation gradient
+    G: np.ndarray           # (n, d, r) dg/dxhat [m]
+
+    def of(self, chosen):
+        """Those of some numbers, or of a mask (n,)."""
+        return Placed(*(a[chosen] for a in self))
+
+
+def placed(map, X, xhat):
+    """`Placed` points X (n, d) at latent coordinates."""
+    return Placed(X, *map.derivatives(X, xhat))
 
 
 class Preimages(NamedTuple):

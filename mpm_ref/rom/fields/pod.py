@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse.linalg import svds
 from scipy.spatial import KDTree
 
-from ..core.blas import one_thread
+from ...core.blas import one_thread
 
 NEAREST = 16        # points of a linear fit between the data
 SMALL = 500         # rows or columns up to which all singular values are computed

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .modes import Modes
+from .pod import Modes
 
 RIDGE = 1e-6        # of the fit, over the sum of squares of each monomial
 

@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..body import Body, particles_at
-from ..explicit import initial_stress
-from ..materials import NoFlow
-from .spanned import Spanned
+from ...body import Body, particles_at
+from ...explicit import initial_stress
+from ...materials import NoFlow
+from .pod_fields import Spanned
 
 NEIGHBOURS = 26         # of a point, in 3D those of a lattice; in 2D 8
 LEAST = 1e-10           # of a spread over the largest: across a plane there is no gradient

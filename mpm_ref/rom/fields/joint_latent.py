@@ -19,14 +19,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..body import Body, particles_at
-from ..explicit import deform_body, gather
-from ..materials import Hardening, Hencky, Softening
-from .inferred import Inferred
-from .projection import project_position
-from .radial import through
-from .spanned import Spanned, cells, modes_of, part
-from .symmetric import values
+from ...body import Body, particles_at
+from ...explicit import deform_body, gather
+from ...materials import Hardening, Hencky, Softening
+from ..inferred import Inferred
+from ..projection import project_position
+from ..symmetric import values
+from .pod_fields import Spanned, cells, modes_of, part
+from .radial_basis import through
 
 SHARE = 0.3         # of the stress in the modes, over that of the displacement
 WEIGHT = 0.03       # of the stress in the inversion: more, and what it says of a step drowns motion

@@ -14,11 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.grid import extent
+from ...core.grid import extent
+from ..kinematics import CLOSE, NoBody
 from .eulerian import PER_CELL, Eulerian
-from .inverse import CLOSE
-from .placed import NoBody
-from .reach import bases
+from .stencil_overlap import bases
 
 
 class NodeCentric(NamedTuple):

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.grid import OutOfRange, extent
-from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
+from ...core.grid import OutOfRange, extent
+from ...core.jit import CHUNKS, chunk, kernel, parallel, prange
 
 MOST = 1e9          # bases in a box
 
