@@ -7,7 +7,7 @@ from adjoints import rate
 from nclaw_toys import DT, problem_of, random_like, states, world_of
 from problems import digest
 
-from mpm_ref.nclaw import apart
+from mpm_ref.nclaw import batched_step
 from mpm_ref.tape import Seed, Tape
 
 STEPS = 60
@@ -54,18 +54,18 @@ def test_a_taped_run_is_the_run(every):
 
 @pytest.mark.parametrize("place", ["low", "high"])
 def test_gradients_are_those_of_bodies_apart(place, rng):
-    """`nclaw.apart` has an adjoint of its own of a step with its clip, in 3D."""
+    """`nclaw.batched_step` has an adjoint of its own of a step with its clip, in 3D."""
     before, problem = states((place,), 12), problem_of(states((place,), 12), 0)
     of, stepper, q = world_of(before), problem.stepper(), problem.bodies[0].particles
     stepper.start(problem.bodies)
     before = before._replace(tau=q.tau[None].copy())
     tape = Tape(stepper, problem.bodies, clip=problem.clip)
     tape.step(0.0, DT)
-    after = apart.advance(of, before, apart.nodes(of, 1))
+    after = batched_step.advance(of, before, batched_step.nodes(of, 1))
     assert ((q.x == problem.clip[0]) | (q.x == problem.clip[1])).any()
     assert q.x == pytest.approx(after.x[0], abs=1e-14)
     bars = random_like(after, rng)
-    expected = apart.pull_back(of, before, after, bars, apart.nodes(of, 1))
+    expected = batched_step.pull_back(of, before, after, bars, batched_step.nodes(of, 1))
     found, = tape.gradient({1: [Seed(*(a[0] for a in bars[:4]))]}).bodies
     for name in "xvC":
         a, b = getattr(found, name), getattr(expected, name)[0]

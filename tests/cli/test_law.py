@@ -10,14 +10,14 @@ torch = pytest.importorskip("torch")
 
 from mpm_ref.cases import observed  # noqa: E402
 from mpm_ref.cli import law_train  # noqa: E402
-from mpm_ref.laws import tables  # noqa: E402
-from mpm_ref.laws.study import load  # noqa: E402
-from mpm_ref.nclaw import weights  # noqa: E402
-from mpm_ref.nclaw.apart import world  # noqa: E402
-from mpm_ref.nclaw.learn import fit, methods  # noqa: E402
-from mpm_ref.nclaw.learn.labeled import labels_of, train_labeled  # noqa: E402
-from mpm_ref.nclaw.learn.rollout import trajectory_of  # noqa: E402
-from mpm_ref.nclaw.seen import seen  # noqa: E402
+from mpm_ref.materials.learned import weights  # noqa: E402
+from mpm_ref.materials.learned.strain_range import seen  # noqa: E402
+from mpm_ref.nclaw.batched_step import world  # noqa: E402
+from mpm_ref.nclaw.study import tables  # noqa: E402
+from mpm_ref.nclaw.study.study import load  # noqa: E402
+from mpm_ref.nclaw.train import fit, methods  # noqa: E402
+from mpm_ref.nclaw.train.labeled import labels_of, train_labeled  # noqa: E402
+from mpm_ref.nclaw.train.rollout import trajectory_of  # noqa: E402
 from mpm_ref.scene import digest  # noqa: E402
 from mpm_ref.store import Fields  # noqa: E402
 from mpm_ref.store.running import Options, run  # noqa: E402

@@ -12,10 +12,11 @@ from small_laws import identified, saved
 
 from mpm_ref.cli import law_show
 from mpm_ref.materials import NoFlow
-from mpm_ref.nclaw import export, principal, response, spline, weights
-from mpm_ref.nclaw.contraction import Contraction
-from mpm_ref.nclaw.energetic import Energetic
-from mpm_ref.nclaw.weights import Laws, Trained
+from mpm_ref.materials.learned import principal, response, spline, weights
+from mpm_ref.materials.learned.contraction import Contraction
+from mpm_ref.materials.learned.energetic import Energetic
+from mpm_ref.materials.learned.weights import Laws, Trained
+from mpm_ref.nclaw import export
 
 gelu = np.vectorize(lambda z: 0.5 * z * (1.0 + erf(z / sqrt(2.0))))
 SIZES = {"Energetic": (4, 6, 1), "Contraction": (3, 6, 2), "StretchStress": (3, 6, 5, 3),

@@ -11,9 +11,9 @@ from neural_toys import laws as random_laws
 from small_laws import DT, DX, FLOWING, STEPS, E, identified, saved, write_study
 
 from mpm_ref.materials import NoFlow, VonMises
-from mpm_ref.nclaw import spline, weights
+from mpm_ref.materials.learned import spline, weights
+from mpm_ref.materials.learned.weights import Laws, Trained
 from mpm_ref.nclaw.gnn import weights as of_graphs
-from mpm_ref.nclaw.weights import Laws, Trained
 from mpm_ref.sealed import sealed
 from validation.nclaw.dough import doughs
 from validation.nclaw.nets import nets

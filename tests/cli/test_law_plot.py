@@ -12,13 +12,14 @@ from matplotlib.figure import Figure
 from small_laws import DT, FLOWING, NO_FLOW, NU, E, identified, saved, write_scene
 
 from mpm_ref.cli import law_show
-from mpm_ref.laws import pictures
-from mpm_ref.laws.curves import curves
 from mpm_ref.materials import FluidProjection, VonMises, make_law
-from mpm_ref.nclaw import deployed, paths
-from mpm_ref.nclaw.response import Correction
-from mpm_ref.nclaw.seen import seen, within
-from mpm_ref.nclaw.weights import Trained
+from mpm_ref.materials.learned import learned_flow, learned_law
+from mpm_ref.materials.learned.response import Correction
+from mpm_ref.materials.learned.strain_range import seen, within
+from mpm_ref.materials.learned.weights import Trained
+from mpm_ref.nclaw import paths
+from mpm_ref.nclaw.study import pictures
+from mpm_ref.nclaw.study.curves import curves
 
 mpl.use("Agg")
 
@@ -97,8 +98,8 @@ def test_a_return_map_acts_once_a_step():
     """A correction that adds ALPHA e1 e1^T to F, step by step, at rest."""
     W, b, alpha = np.zeros((13, 9)), np.zeros(9), 1e-4
     b[0] = 1.0
-    flow = deployed.plastic(Trained(((W, b),), Correction(alpha)))
-    law = deployed.elastic(identified().elastic)
+    flow = learned_flow(Trained(((W, b),), Correction(alpha)))
+    law = learned_law(identified().elastic)
     for steps in (3, 6):
         still = paths.path("still", paths.kinds(3)["shear"], (0.0, 0.0), steps)
         found = paths.course(law, flow, still, DT)

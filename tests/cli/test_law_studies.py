@@ -5,10 +5,10 @@ from command_line import assert_told, mpm_ref
 from small_laws import DT, E, write_study
 
 from mpm_ref.cli.shipped import shipped_scenes, shipped_studies
-from mpm_ref.laws import tables
-from mpm_ref.laws.study import load
-from mpm_ref.nclaw.learn.recipe import Recipe
-from mpm_ref.nclaw.weights import RECORDS
+from mpm_ref.materials.learned.weights import RECORDS
+from mpm_ref.nclaw.study import tables
+from mpm_ref.nclaw.study.study import load
+from mpm_ref.nclaw.train.recipe import Recipe
 
 
 def train(folder, *edits, scene=(), options=()):

@@ -13,7 +13,7 @@ from figures import (
     trade_nclaw_inference,
 )
 from figures._dots import named
-from mpm_ref.nclaw.range import BEYOND
+from mpm_ref.nclaw.strain_watch import BEYOND
 from validation.extremes.nclaw_runs import BAD
 from validation.nclaw.observation import Seen
 from validation.nclaw.trade_nets import BASE, SEEDS, small_nets

@@ -7,10 +7,10 @@ from adjoints import rate
 from admissible_toys import tuples
 
 from mpm_ref.core.law import kirchhoff, psi, returned
-from mpm_ref.nclaw import contraction, energetic, weights
+from mpm_ref.materials.learned import contraction, energetic, weights
+from mpm_ref.materials.learned.contraction import Contraction
+from mpm_ref.materials.learned.invariants import spectrum
 from mpm_ref.nclaw.bodies import points
-from mpm_ref.nclaw.contraction import Contraction
-from mpm_ref.nclaw.invariants import spectrum
 from mpm_ref.sealed import sealed
 from mpm_ref.timestep import moduli
 from tests.nclaw.test_invariants import REPEATED, built, turns

@@ -15,16 +15,16 @@ torch = pytest.importorskip("torch")
 
 from mpm_ref.cases import observed  # noqa: E402
 from mpm_ref.core.law import kirchhoff, returned  # noqa: E402
-from mpm_ref.nclaw import deployed  # noqa: E402
-from mpm_ref.nclaw.apart import world  # noqa: E402
-from mpm_ref.nclaw.contraction import Contraction  # noqa: E402
-from mpm_ref.nclaw.energetic import Energetic  # noqa: E402
-from mpm_ref.nclaw.learn.admissible import START  # noqa: E402
-from mpm_ref.nclaw.learn.fit import train  # noqa: E402
-from mpm_ref.nclaw.learn.methods import laws_of, trained_of  # noqa: E402
-from mpm_ref.nclaw.learn.recipe import Recipe  # noqa: E402
-from mpm_ref.nclaw.learn.rollout import squared, trajectory_of  # noqa: E402
-from mpm_ref.nclaw.weights import Laws, load, save  # noqa: E402
+from mpm_ref.materials.learned import learned_flow, learned_law  # noqa: E402
+from mpm_ref.materials.learned.contraction import Contraction  # noqa: E402
+from mpm_ref.materials.learned.energetic import Energetic  # noqa: E402
+from mpm_ref.materials.learned.weights import Laws, load, save  # noqa: E402
+from mpm_ref.nclaw.batched_step import world  # noqa: E402
+from mpm_ref.nclaw.train.admissible_laws import START  # noqa: E402
+from mpm_ref.nclaw.train.fit import train  # noqa: E402
+from mpm_ref.nclaw.train.methods import laws_of, trained_of  # noqa: E402
+from mpm_ref.nclaw.train.recipe import Recipe  # noqa: E402
+from mpm_ref.nclaw.train.rollout import squared, trajectory_of  # noqa: E402
 from validation.nclaw.nets import nets  # noqa: E402
 from validation.train_laws import begun  # noqa: E402
 
@@ -96,7 +96,7 @@ def test_remainder_is_of_second_order_in_the_weights(laws, run, turned):
 def test_stored_laws_answer_as_the_trained_ones(laws, tmp_path, rng):
     save(tmp_path / "laws.npz", Laws(*map(trained_of, laws), {}))
     back, F = load(tmp_path / "laws.npz"), strained(rng)
-    law, flow = deployed.elastic(back.elastic), deployed.plastic(back.plastic)
+    law, flow = learned_law(back.elastic), learned_flow(back.plastic)
     with torch.no_grad():
         tau, left = (own(torch.from_numpy(F)).numpy() for own in laws)
     found = np.array([kirchhoff(tuples(A), law) for A in F])
@@ -108,7 +108,7 @@ def test_stored_laws_answer_as_the_trained_ones(laws, tmp_path, rng):
 def test_training_begins_near_its_unit_and_with_little_flow(rng):
     net = nets()["plasticine-admissible"]
     laws = begun(net)
-    law = deployed.elastic(trained_of(laws.elastic))
+    law = learned_law(trained_of(laws.elastic))
     assert (net.elastic, net.plastic) == ("Energetic", "Contraction")
     assert 0.1 < law.mu / Energetic().unit < 10.0
     F = torch.from_numpy(strained(rng))

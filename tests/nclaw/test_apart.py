@@ -14,7 +14,7 @@ from mpm_ref.core.boundary import Collider, Conditions, nclaw_walls
 from mpm_ref.core.jit import set_threads
 from mpm_ref.core.solids import half_space
 from mpm_ref.explicit import Scheme
-from mpm_ref.nclaw.apart import States, advance, nodes, pull_back, world
+from mpm_ref.nclaw.batched_step import States, advance, nodes, pull_back, world
 from mpm_ref.problem import Clock
 from mpm_ref.simulate import keep_inside
 

@@ -6,11 +6,20 @@ from adjoints import rate
 
 from mpm_ref import materials
 from mpm_ref.core.law import kirchhoff
-from mpm_ref.nclaw import deployed, neural, principal, response, spline, stretched, weights
-from mpm_ref.nclaw.contraction import Contraction
-from mpm_ref.nclaw.energetic import Energetic
-from mpm_ref.nclaw.invariants import spectrum
-from mpm_ref.nclaw.weights import Laws, Trained
+from mpm_ref.materials.learned import (
+    learned_flow,
+    learned_law,
+    principal,
+    principal_laws,
+    response,
+    spline,
+    weights,
+)
+from mpm_ref.materials.learned.contraction import Contraction
+from mpm_ref.materials.learned.energetic import Energetic
+from mpm_ref.materials.learned.invariants import spectrum
+from mpm_ref.materials.learned.network import NeuralFlow
+from mpm_ref.materials.learned.weights import Laws, Trained
 from tests.nclaw.test_invariants import APART, REPEATED, H, built, near_rest, turns
 
 X = spline.knots()
@@ -86,7 +95,7 @@ def test_splines_hold_fixed_corotated_exactly(rng):
     """f = 2 mu (x - 1), g = 0, h = lam (x - 1)."""
     F = near_rest(20, 3, rng)
     values = np.stack([2.0 * MU * (X - 1.0), 0.0 * X, LAM * (X - 1.0)], axis=1) / FAIR.unit
-    law = stretched.elastic(Trained(((values, np.zeros(3)),), FAIR))
+    law = principal_laws.elastic(Trained(((values, np.zeros(3)),), FAIR))
     expected = stresses(F, materials.FixedCorotated(MU, LAM))
     assert stresses(F, law) == pytest.approx(expected, abs=1e-11)
 
@@ -95,7 +104,7 @@ def test_splines_read_areas(rng):
     """g alone: of 2 x - 3 P_i = sum_j (2 s_i s_j - 3) s_j."""
     s = np.array([1.3, 1.1, 0.7])
     values = np.stack([0.0 * X, 2.0 * X - 3.0, 0.0 * X], axis=1) / FAIR.unit
-    law = stretched.elastic(Trained(((values, np.zeros(3)),), FAIR))
+    law = principal_laws.elastic(Trained(((values, np.zeros(3)),), FAIR))
     y = [sum((2.0 * s[i] * s[j] - 3.0) * s[j] for j in range(3) if j != i) for i in range(3)]
     assert np.diagonal(stresses(np.diag(s)[None], law)[0]) == pytest.approx(y * s)
 
@@ -116,13 +125,13 @@ def test_sorted_network_is_that_of_numpy(rng):
     of = spectrum(F)
     y = SORTED.unit * plain(layers, of.s)
     expected = of.U @ ((y * of.s)[:, :, None] * of.U.transpose(0, 2, 1))
-    assert stresses(F, stretched.elastic(Trained(layers, SORTED))) == pytest.approx(expected)
+    assert stresses(F, principal_laws.elastic(Trained(layers, SORTED))) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("s", [(1.2, 1.2, 0.9), (1.2, 0.9, 0.9), (1.1, 1.1, 1.1)])
 def test_mean_over_orders_is_isotropic(s, rng):
     """tau(Q F Q') = Q tau(F) Q^T, where stretches are equal too."""
-    law = stretched.elastic(Trained(network(rng), MEAN))
+    law = principal_laws.elastic(Trained(network(rng), MEAN))
     Q, P = turns(5, 3, rng), turns(5, 3, rng)
     tau = stresses(np.diag(s)[None], law)
     expected = Q @ tau @ Q.transpose(0, 2, 1)
@@ -134,7 +143,7 @@ def test_mean_over_orders_is_the_mean(rng):
     y = np.zeros(3)
     for order in ([0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]):
         y[order] += MEAN.unit * plain(layers, s[order]) / 6.0
-    tau = stresses(np.diag(s)[None], stretched.elastic(Trained(layers, MEAN)))
+    tau = stresses(np.diag(s)[None], principal_laws.elastic(Trained(layers, MEAN)))
     assert tau[0] == pytest.approx(np.diag(y * s), abs=1e-12)
 
 
@@ -144,21 +153,21 @@ def test_mean_over_orders_is_the_mean(rng):
 ])
 def test_laws_of_other_kinds_are_refused(trained, said):
     with pytest.raises(ValueError, match=said):
-        stretched.elastic(trained)
+        principal_laws.elastic(trained)
 
 
 def test_every_stored_law_has_a_law_and_a_flow(rng):
     layers = ((rng.normal(size=(13, 9)), np.zeros(9)),)
-    assert isinstance(deployed.elastic(beside(FAIR, rng)), stretched.Splines)
-    assert isinstance(deployed.elastic(beside(SORTED, rng)), stretched.Network)
-    assert isinstance(deployed.plastic(Trained(layers, response.Correction())), neural.NeuralFlow)
-    for kind, made in ((materials.Hencky(1.0, 2.0), deployed.elastic),
-                       (materials.VonMises(1.0, 0.05), deployed.plastic),
-                       (materials.NoFlow(), deployed.plastic)):
+    assert isinstance(learned_law(beside(FAIR, rng)), principal_laws.Splines)
+    assert isinstance(learned_law(beside(SORTED, rng)), principal_laws.Network)
+    assert isinstance(learned_flow(Trained(layers, response.Correction())), NeuralFlow)
+    for kind, made in ((materials.Hencky(1.0, 2.0), learned_law),
+                       (materials.VonMises(1.0, 0.05), learned_flow),
+                       (materials.NoFlow(), learned_flow)):
         assert made(Trained((), kind)) is kind
-    for kind, made in ((materials.VonMises(1.0, 0.05), deployed.elastic),
-                       (response.Correction(), deployed.elastic),
-                       (materials.Hencky(1.0, 2.0), deployed.plastic)):
+    for kind, made in ((materials.VonMises(1.0, 0.05), learned_law),
+                       (response.Correction(), learned_law),
+                       (materials.Hencky(1.0, 2.0), learned_flow)):
         with pytest.raises(ValueError, match=type(kind).__name__):
             made(Trained((), kind))
 

@@ -15,11 +15,11 @@ torch = pytest.importorskip("torch")
 
 from mpm_ref.core.law import kirchhoff  # noqa: E402
 from mpm_ref.materials import NoFlow  # noqa: E402
-from mpm_ref.nclaw import principal, response, spline, stretched, weights  # noqa: E402
-from mpm_ref.nclaw.invariants import invariants, rotations, spectrum  # noqa: E402
-from mpm_ref.nclaw.learn.kinds import described  # noqa: E402
-from mpm_ref.nclaw.learn.methods import METHODS, laws_of, trained_of  # noqa: E402
-from mpm_ref.nclaw.learn.stretches import ReleasedStretchLaw, StretchLaw  # noqa: E402
+from mpm_ref.materials.learned import principal, principal_laws, response, spline, weights  # noqa: E402
+from mpm_ref.materials.learned.invariants import invariants, rotations, spectrum  # noqa: E402
+from mpm_ref.nclaw.train.kinds import described  # noqa: E402
+from mpm_ref.nclaw.train.methods import METHODS, laws_of, trained_of  # noqa: E402
+from mpm_ref.nclaw.train.principal_laws import ReleasedStretchLaw, StretchLaw  # noqa: E402
 from validation.nclaw.environments import ENVIRONMENTS  # noqa: E402
 from validation.nclaw.nets import Net, identity, nets  # noqa: E402
 from validation.train_laws import begun  # noqa: E402
@@ -97,7 +97,7 @@ def test_gradient_by_weights_is_exact(name, rng):
 @pytest.mark.parametrize("name", KINDS)
 def test_stored_law_answers_as_the_trained_one(name, rng):
     law = law_of(name, rng)
-    stored = stretched.elastic(trained_of(law))
+    stored = principal_laws.elastic(trained_of(law))
     for stretches in APART:
         F = built(stretches, 4, 3, rng)
         tau = [kirchhoff(tuple(map(tuple, A.tolist())), stored) for A in F]

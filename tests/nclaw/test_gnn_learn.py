@@ -12,13 +12,13 @@ torch = pytest.importorskip("torch")
 from mpm_ref.nclaw.gnn.graph import Graph, near  # noqa: E402
 from mpm_ref.nclaw.gnn.history import HISTORY, begun, of_edges, of_points  # noqa: E402
 from mpm_ref.nclaw.gnn.network import answers  # noqa: E402
-from mpm_ref.nclaw.learn.gnn.examples import (  # noqa: E402
+from mpm_ref.nclaw.gnn.train.examples import (  # noqa: E402
     example,
     run_of,
     scales_of,
     walk,
 )
-from mpm_ref.nclaw.learn.gnn.network import GraphNetwork, exported  # noqa: E402
+from mpm_ref.nclaw.gnn.train.network import GraphNetwork, exported  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 

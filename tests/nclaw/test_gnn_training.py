@@ -13,13 +13,13 @@ from gnn_toys import DT, RADIUS
 torch = pytest.importorskip("torch")
 
 from mpm_ref.nclaw.gnn.simulator import Simulator  # noqa: E402
+from mpm_ref.nclaw.gnn.train import fit  # noqa: E402
+from mpm_ref.nclaw.gnn.train.examples import example, run_of  # noqa: E402
+from mpm_ref.nclaw.gnn.train.fit import GraphSession, train  # noqa: E402
+from mpm_ref.nclaw.gnn.train.network import exported  # noqa: E402
+from mpm_ref.nclaw.gnn.train.recipe import GraphRecipe  # noqa: E402
 from mpm_ref.nclaw.gnn.weights import load, save  # noqa: E402
-from mpm_ref.nclaw.learn.fit import Diverged  # noqa: E402
-from mpm_ref.nclaw.learn.gnn import fit  # noqa: E402
-from mpm_ref.nclaw.learn.gnn.examples import example, run_of  # noqa: E402
-from mpm_ref.nclaw.learn.gnn.fit import GraphSession, train  # noqa: E402
-from mpm_ref.nclaw.learn.gnn.network import exported  # noqa: E402
-from mpm_ref.nclaw.learn.gnn.recipe import GraphRecipe  # noqa: E402
+from mpm_ref.nclaw.train.fit import Diverged  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 

@@ -6,7 +6,7 @@ import pytest
 from damaged import assert_damage_is_told, changed, refused, without
 from neural_toys import laws
 
-from mpm_ref.nclaw import weights as of_laws
+from mpm_ref.materials.learned import weights as of_laws
 from mpm_ref.nclaw.gnn.network import Perceptron
 from mpm_ref.nclaw.gnn.weights import FORMAT, arrays_of, load, named, save
 from mpm_ref.sealed import sealed

@@ -8,7 +8,7 @@ import pytest
 from adjoints import rate
 
 from mpm_ref.core.jit import set_threads
-from mpm_ref.nclaw.invariants import count, invariants, pull_back, rotations, spectrum
+from mpm_ref.materials.learned.invariants import count, invariants, pull_back, rotations, spectrum
 
 MOST = numba.config.NUMBA_NUM_THREADS
 H = 1e-2 * 0.5 ** np.arange(5)

@@ -15,15 +15,15 @@ from tests.nclaw.test_invariants import near_rest, turns
 torch = pytest.importorskip("torch")
 
 from mpm_ref.cases import observed  # noqa: E402
-from mpm_ref.nclaw.apart import world  # noqa: E402
-from mpm_ref.nclaw.learn.fit import Session  # noqa: E402
-from mpm_ref.nclaw.learn.functions import Invariants  # noqa: E402
-from mpm_ref.nclaw.learn.law import NeuralLaw, neural_laws, trained_of  # noqa: E402
-from mpm_ref.nclaw.learn.perceptron import Perceptron, layers_of  # noqa: E402
-from mpm_ref.nclaw.learn.recipe import Recipe  # noqa: E402
-from mpm_ref.nclaw.learn.rollout import Laws, squared, trajectory_of  # noqa: E402
-from mpm_ref.nclaw.learn.teacher import Teacher  # noqa: E402
-from mpm_ref.nclaw.response import Correction, Stress, SymmetricStress  # noqa: E402
+from mpm_ref.materials.learned.response import Correction, Stress, SymmetricStress  # noqa: E402
+from mpm_ref.nclaw.batched_step import world  # noqa: E402
+from mpm_ref.nclaw.train.autograd import Invariants  # noqa: E402
+from mpm_ref.nclaw.train.fit import Session  # noqa: E402
+from mpm_ref.nclaw.train.neural_laws import NeuralLaw, neural_laws, trained_of  # noqa: E402
+from mpm_ref.nclaw.train.perceptron import Perceptron, layers_of  # noqa: E402
+from mpm_ref.nclaw.train.recipe import Recipe  # noqa: E402
+from mpm_ref.nclaw.train.rollout import Laws, squared, trajectory_of  # noqa: E402
+from mpm_ref.nclaw.train.teacher import Teacher  # noqa: E402
 from mpm_ref.scene import build  # noqa: E402
 from validation.nclaw.environments import environment, trajectory  # noqa: E402
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mpm_ref.nclaw.neural import NeuralStress
+from mpm_ref.materials.learned.network import NeuralStress
 from mpm_ref.scene import build, loads
 from mpm_ref.simulate import simulate
 from validation.nclaw.nets import FOLDER

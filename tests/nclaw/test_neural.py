@@ -18,7 +18,7 @@ from mpm_ref.energy import energy
 from mpm_ref.explicit import Scheme, deform_body, initial_stress
 from mpm_ref.fit import check_fit
 from mpm_ref.materials import Hencky, NoFlow, make_flow
-from mpm_ref.nclaw import neural, response, weights
+from mpm_ref.materials.learned import network, response, weights
 from mpm_ref.problem import Clock, Problem
 from mpm_ref.scene import SceneError, build, canonical, digest, load, loads
 from mpm_ref.simulate import simulate
@@ -64,8 +64,8 @@ material = { law = "fixed_corotated", E = 1e5, nu = 0.3 }
 def answers(of, F):
     """Of a `weights.Trained`, as compiled; F (n, d, d)."""
     stress = type(of.kind) in STRESSES
-    law = neural.elastic(of) if stress else neural.plastic(of)
-    name = neural.kirchhoff if stress else neural.respond
+    law = network.elastic(of) if stress else network.plastic(of)
+    name = network.kirchhoff if stress else network.respond
     return np.array([name(tuple(map(tuple, F_p.tolist())), law) for F_p in F])
 
 
@@ -74,14 +74,14 @@ def body_of(laws, F):
     n, d = F.shape[:2]
     q = particles_at(np.zeros((n, d)), np.zeros((n, d)), np.ones(n), np.ones(n))
     q.F[:] = F
-    return Body("b", q, neural.elastic(laws.elastic), neural.plastic(laws.plastic), np.arange(n))
+    return Body("b", q, network.elastic(laws.elastic), network.plastic(laws.plastic), np.arange(n))
 
 
 def mixed():
     """A learned block beside a classical one that hits it, on one grid."""
     made = neural_toys.laws(2)
     left = block("left", (0.3, 0.5), (0.0, 0.0))
-    left = left._replace(law=neural.elastic(made.elastic), flow=neural.plastic(made.plastic))
+    left = left._replace(law=network.elastic(made.elastic), flow=network.plastic(made.plastic))
     right = block("right", (0.5, 0.5), (-1.0, 0.0))
     return Problem((left, right), DX, Clock(dt=1e-3, steps=10, every=5), np.zeros(2), Scheme())
 
@@ -110,7 +110,7 @@ def test_answers_are_those_of_plain_numpy(d, kind, hidden, bias):
                          ids=lambda kind: type(kind).__name__)
 def test_answers_are_those_of_the_law_that_was_trained(d, kind):
     torch = pytest.importorskip("torch")
-    from mpm_ref.nclaw.learn.law import NeuralLaw, trained_of
+    from mpm_ref.nclaw.train.neural_laws import NeuralLaw, trained_of
     torch.manual_seed(3)
     law, F = NeuralLaw(kind, d), deformations(d)
     with torch.no_grad():
@@ -146,9 +146,9 @@ def test_what_is_not_finite_gives_nan(d):
 
 def test_answers_of_the_wrong_kind_are_refused():
     with pytest.raises(ValueError, match="kind Correction: expected Stress or"):
-        neural.elastic(trained(response.Correction(), 2))
+        network.elastic(trained(response.Correction(), 2))
     with pytest.raises(ValueError, match="kind Stress: expected Correction or"):
-        neural.plastic(trained(response.Stress(), 2))
+        network.plastic(trained(response.Stress(), 2))
 
 
 # what a step makes of them
@@ -179,7 +179,7 @@ def test_a_learned_return_map_goes_with_a_classical_law():
 @pytest.mark.parametrize("seed", range(3))
 def test_stiffness_at_rest_is_that_of_small_strains(d, seed):
     of, h = trained(response.Stress(UNIT), d, seed=seed), 1e-4
-    law = neural.elastic(of)
+    law = network.elastic(of)
     wave = max(plain(of, np.diag(1.0 + step * axis))[k, k] / step
                for k, axis in enumerate(np.eye(d)) for step in (h, -h))
     assert law.wave == pytest.approx(max(wave, 0.0), rel=1e-2)
@@ -240,10 +240,10 @@ def test_weights_belong_to_the_hash_of_a_problem_made_in_python():
 def test_a_scene_takes_both_laws_from_its_file(folder):
     body = build(load(folder / "scene.toml")).bodies[0]
     laws = neural_toys.laws(2)
-    assert isinstance(body.law, neural.NeuralStress)
-    assert isinstance(body.flow, neural.NeuralCorrection)
-    assert np.array_equal(body.law.W, neural.elastic(laws.elastic).W)
-    assert np.array_equal(body.flow.W, neural.plastic(laws.plastic).W)
+    assert isinstance(body.law, network.NeuralStress)
+    assert isinstance(body.flow, network.NeuralCorrection)
+    assert np.array_equal(body.law.W, network.elastic(laws.elastic).W)
+    assert np.array_equal(body.flow.W, network.plastic(laws.plastic).W)
 
 
 def test_weights_belong_to_the_hash_of_a_scene(folder):

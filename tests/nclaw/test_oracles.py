@@ -23,16 +23,16 @@ from mpm_ref.materials import (  # noqa: E402
     VonMises,
     make_law,
 )
-from mpm_ref.nclaw import response  # noqa: E402
-from mpm_ref.nclaw.apart import nodes, world  # noqa: E402
-from mpm_ref.nclaw.learn import labeled  # noqa: E402
-from mpm_ref.nclaw.learn.fit import train  # noqa: E402
-from mpm_ref.nclaw.learn.kinds import described  # noqa: E402
-from mpm_ref.nclaw.learn.labeled import labels_of, train_labeled  # noqa: E402
-from mpm_ref.nclaw.learn.methods import laws_of, trained_of  # noqa: E402
-from mpm_ref.nclaw.learn.recipe import Recipe  # noqa: E402
-from mpm_ref.nclaw.learn.rollout import Laws, Trajectory, step  # noqa: E402
-from mpm_ref.nclaw.learn.sysid import START, KnownReturn, KnownStress, known_laws  # noqa: E402
+from mpm_ref.materials.learned import response  # noqa: E402
+from mpm_ref.nclaw.batched_step import nodes, world  # noqa: E402
+from mpm_ref.nclaw.train import labeled  # noqa: E402
+from mpm_ref.nclaw.train.fit import train  # noqa: E402
+from mpm_ref.nclaw.train.kinds import described  # noqa: E402
+from mpm_ref.nclaw.train.labeled import labels_of, train_labeled  # noqa: E402
+from mpm_ref.nclaw.train.methods import laws_of, trained_of  # noqa: E402
+from mpm_ref.nclaw.train.recipe import Recipe  # noqa: E402
+from mpm_ref.nclaw.train.rollout import Laws, Trajectory, step  # noqa: E402
+from mpm_ref.nclaw.train.sysid import START, KnownReturn, KnownStress, known_laws  # noqa: E402
 from validation.nclaw.nets import nets  # noqa: E402
 from validation.train_laws import begun  # noqa: E402
 

@@ -11,14 +11,14 @@ from nclaw_toys import cube
 from mpm_ref.body import Body, particles_at, permute
 from mpm_ref.cases import observed
 from mpm_ref.materials import FixedCorotated, Fluid, NoFlow
+from mpm_ref.materials.learned import weights
+from mpm_ref.materials.learned.strain_range import measures, seen
 from mpm_ref.monitor import CHECK
 from mpm_ref.nclaw import range as watching
-from mpm_ref.nclaw import weights
 from mpm_ref.nclaw.bodies import fresh, own
-from mpm_ref.nclaw.learn.recipe import Recipe
-from mpm_ref.nclaw.range import BEYOND, Watch, beyond, known, look, other_steps, watch
-from mpm_ref.nclaw.seen import measures, seen
-from mpm_ref.nclaw.visited import LARGEST, cuts_of, met
+from mpm_ref.nclaw.strain_watch import BEYOND, Watch, beyond, known, look, other_steps, watch
+from mpm_ref.nclaw.train.recipe import Recipe
+from mpm_ref.nclaw.train.strains import LARGEST, cuts_of, met
 from mpm_ref.problem import Clock, Problem
 from mpm_ref.scene import SceneError, build, load
 from mpm_ref.simulate import State

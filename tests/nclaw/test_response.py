@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mpm_ref.nclaw.invariants import count, invariants, rotations, spectrum
-from mpm_ref.nclaw.response import (
+from mpm_ref.materials.learned.invariants import count, invariants, rotations, spectrum
+from mpm_ref.materials.learned.response import (
     ALPHA,
     Bars,
     Correction,

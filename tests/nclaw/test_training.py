@@ -11,15 +11,15 @@ torch = pytest.importorskip("torch")
 
 from mpm_ref import cost  # noqa: E402
 from mpm_ref.cases import observed  # noqa: E402
-from mpm_ref.nclaw.apart import world  # noqa: E402
-from mpm_ref.nclaw.learn import fit  # noqa: E402
-from mpm_ref.nclaw.learn.ablations import UnshiftedLaw  # noqa: E402
-from mpm_ref.nclaw.learn.fit import Diverged, Session, train  # noqa: E402
-from mpm_ref.nclaw.learn.law import NeuralLaw, neural_laws  # noqa: E402
-from mpm_ref.nclaw.learn.recipe import Recipe  # noqa: E402
-from mpm_ref.nclaw.learn.rollout import Laws, Trajectory, trajectory_of  # noqa: E402
-from mpm_ref.nclaw.learn.unchanged import Unchanged  # noqa: E402
-from mpm_ref.nclaw.response import Correction, PlainStress, Stress  # noqa: E402
+from mpm_ref.materials.learned.response import Correction, PlainStress, Stress  # noqa: E402
+from mpm_ref.nclaw.batched_step import world  # noqa: E402
+from mpm_ref.nclaw.train import fit  # noqa: E402
+from mpm_ref.nclaw.train.ablations import UnshiftedLaw  # noqa: E402
+from mpm_ref.nclaw.train.fit import Diverged, Session, train  # noqa: E402
+from mpm_ref.nclaw.train.neural_laws import NeuralLaw, neural_laws  # noqa: E402
+from mpm_ref.nclaw.train.recipe import Recipe  # noqa: E402
+from mpm_ref.nclaw.train.rollout import Laws, Trajectory, trajectory_of  # noqa: E402
+from mpm_ref.nclaw.train.unchanged import Unchanged  # noqa: E402
 
 STEPS = 11          # segments of 3 and 2 steps
 SHORT = Recipe(epochs=5, first=3, last=6, batch=2, elastic_rate=1e-2, plastic_rate=1e-3)

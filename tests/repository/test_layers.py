@@ -10,8 +10,8 @@ ROOT = Path(__file__).resolve().parents[2]
 
 # Ground floor first. What stands on one line does not know each other, except within a room: names
 # in one string may import each other, without cycles. A package in PACKAGES is such a room.
-PACKAGES = {"plain", "materials", "hot", "rom", "reduced", "nclaw", "laws", "shapes", "sampling",
-            "scene", "store", "oracle", "cli"}
+PACKAGES = {"plain", "materials", "materials.learned", "hot", "rom", "reduced", "nclaw",
+            "nclaw.study", "shapes", "sampling", "scene", "store", "oracle", "cli"}
 FLOORS = (
     ("core.jit", "core.blas"),
     ("core.tensor",),
@@ -26,6 +26,7 @@ FLOORS = (
     ("core.boundary", "core.adjoint.boundary"),
     ("core core.adjoint",),
     ("materials", "plain", "sealed archive", "cost", "learning", "mapped"),
+    ("materials.learned",),
     ("body", "checkpoints"),
     ("fit",),
     ("explicit", "energy"),
@@ -38,7 +39,7 @@ FLOORS = (
     ("store",),
     ("oracle", "sweep", "plotting", "cases"),
     ("reduced",),
-    ("laws",),
+    ("nclaw.study",),
     ("cli",),
     ("__main__",),
 )
@@ -93,8 +94,9 @@ def own(target, package_modules, package):
 
 def floor(name):
     """(floor, room on that floor) of a module, or None."""
-    top = name.split(".")[0]
-    entry = top if top in PACKAGES else name
+    parts = name.split(".")
+    rooms = (".".join(parts[:k]) for k in range(len(parts), 0, -1))
+    entry = next((room for room in rooms if room in PACKAGES), name)
     return next(((k, room) for k, rooms in enumerate(FLOORS) for room in rooms
                  if any(fnmatchcase(entry, pattern) for pattern in room.split())), None)
 

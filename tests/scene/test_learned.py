@@ -6,13 +6,13 @@ import pytest
 from command_line import assert_told, mpm_ref
 from small_laws import STEPS, E, identified, saved, write_scene
 
-from mpm_ref.laws.compare import positions
 from mpm_ref.materials import NoFlow
-from mpm_ref.nclaw.admissible import ContractionFlow, EnergyLaw
+from mpm_ref.materials.learned.admissible import ContractionFlow, EnergyLaw
+from mpm_ref.materials.learned.principal import StretchStress
+from mpm_ref.materials.learned.spline import SplineStress, knots
+from mpm_ref.materials.learned.weights import Laws, Trained, load
 from mpm_ref.nclaw.bodies import learned
-from mpm_ref.nclaw.principal import StretchStress
-from mpm_ref.nclaw.spline import SplineStress, knots
-from mpm_ref.nclaw.weights import Laws, Trained, load
+from mpm_ref.nclaw.study.compare import positions
 from mpm_ref.scene import SceneError, build
 from mpm_ref.scene import load as load_scene
 from mpm_ref.store.results import Results

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mpm_ref.archive import read, stated, write
-from mpm_ref.nclaw import weights as of_laws
+from mpm_ref.materials.learned import weights as of_laws
 from mpm_ref.nclaw.gnn import weights as of_graphs
 from mpm_ref.rom import fields_file, modes_file
 from mpm_ref.rom import weights as of_maps

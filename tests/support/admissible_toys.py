@@ -6,10 +6,10 @@ import numpy as np
 from neural_toys import singular
 from scipy.special import erf
 
-from mpm_ref.nclaw import admissible
-from mpm_ref.nclaw.contraction import Contraction
-from mpm_ref.nclaw.energetic import Energetic
-from mpm_ref.nclaw.weights import Laws, Trained
+from mpm_ref.materials.learned import admissible
+from mpm_ref.materials.learned.contraction import Contraction
+from mpm_ref.materials.learned.energetic import Energetic
+from mpm_ref.materials.learned.weights import Laws, Trained
 
 ENERGY, RETURN = (4, 6, 5, 1), (3, 7, 5, 2)
 UNIT, STRAIN = 1e4, 1e-2

@@ -8,7 +8,7 @@ from mpm_ref.body import Body, particles_at
 from mpm_ref.core.boundary import Conditions, nclaw_walls
 from mpm_ref.explicit import Scheme
 from mpm_ref.materials import FixedCorotated, NoFlow
-from mpm_ref.nclaw.apart import States, world
+from mpm_ref.nclaw.batched_step import States, world
 from mpm_ref.problem import Clock, Problem
 
 DX, DT = 0.05, 5e-4

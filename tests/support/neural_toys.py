@@ -5,8 +5,8 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import erf
 
-from mpm_ref.nclaw import response, weights
-from mpm_ref.nclaw.invariants import count
+from mpm_ref.materials.learned import response, weights
+from mpm_ref.materials.learned.invariants import count
 
 STRESSES = response.Stress, response.SymmetricStress, response.PlainStress
 CORRECTIONS = response.Correction, response.PlainCorrection

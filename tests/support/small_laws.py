@@ -3,7 +3,7 @@ of 27 points that is thrown into a corner of NCLaw's box.
 """
 
 from mpm_ref.materials import NoFlow, make_law
-from mpm_ref.nclaw.weights import Laws, Trained, save
+from mpm_ref.materials.learned.weights import Laws, Trained, save
 
 STEPS, EVERY, DT, DX = 20, 5, 5e-4, 0.05
 E, NU = 1e5, 0.2

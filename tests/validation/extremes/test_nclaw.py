@@ -7,9 +7,9 @@ import pytest
 from small_toys import Records
 
 from mpm_ref.materials import Fluid, NoFlow
+from mpm_ref.materials.learned.strain_range import seen
 from mpm_ref.nclaw.bodies import fresh, learned
-from mpm_ref.nclaw.range import Sight
-from mpm_ref.nclaw.seen import seen
+from mpm_ref.nclaw.strain_watch import Sight
 from mpm_ref.scene import build
 from validation.extremes import nclaw_epochs, nclaw_long, nclaw_runs, nclaw_strain
 from validation.extremes import nclaw_observed as observed

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import typer
 
-from mpm_ref.nclaw import weights
-from mpm_ref.nclaw.weights import load
+from mpm_ref.materials.learned import weights
+from mpm_ref.materials.learned.weights import load
 from validation import bounds
 from validation.nclaw import nets
 

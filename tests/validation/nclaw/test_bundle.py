@@ -5,7 +5,7 @@ import pytest
 from neural_toys import trained as law
 from small_toys import known
 
-from mpm_ref.nclaw import response, weights
+from mpm_ref.materials.learned import response, weights
 from mpm_ref.scene import build
 from mpm_ref.sealed import sealed
 from validation.nclaw import bundle, nets, trade_nets

@@ -4,7 +4,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from mpm_ref.nclaw.learn.fit import Diverged, Epoch  # noqa: E402
+from mpm_ref.nclaw.train.fit import Diverged, Epoch  # noqa: E402
 from validation import train_laws  # noqa: E402
 from validation.nclaw import nets  # noqa: E402
 from validation.nclaw.diverged import beside, diverged  # noqa: E402

@@ -6,17 +6,17 @@ from adjoints import rate
 
 torch = pytest.importorskip("torch")
 
-from mpm_ref.nclaw.apart import world  # noqa: E402
+from mpm_ref.materials.learned.contraction import Contraction  # noqa: E402
+from mpm_ref.materials.learned.energetic import Energetic  # noqa: E402
+from mpm_ref.nclaw.batched_step import world  # noqa: E402
 from mpm_ref.nclaw.camera import project  # noqa: E402
-from mpm_ref.nclaw.contraction import Contraction  # noqa: E402
-from mpm_ref.nclaw.energetic import Energetic  # noqa: E402
-from mpm_ref.nclaw.learn.film import film_of  # noqa: E402
-from mpm_ref.nclaw.learn.fit import Diverged, Epoch, train  # noqa: E402
-from mpm_ref.nclaw.learn.methods import laws_of  # noqa: E402
-from mpm_ref.nclaw.learn.recipe import Recipe  # noqa: E402
-from mpm_ref.nclaw.learn.rollout import Laws, squared  # noqa: E402
-from mpm_ref.nclaw.learn.sysid import KnownReturn, KnownStress  # noqa: E402
-from mpm_ref.nclaw.learn.teacher import Teacher  # noqa: E402
+from mpm_ref.nclaw.train.fit import Diverged, Epoch, train  # noqa: E402
+from mpm_ref.nclaw.train.image_observations import film_of  # noqa: E402
+from mpm_ref.nclaw.train.methods import laws_of  # noqa: E402
+from mpm_ref.nclaw.train.recipe import Recipe  # noqa: E402
+from mpm_ref.nclaw.train.rollout import Laws, squared  # noqa: E402
+from mpm_ref.nclaw.train.sysid import KnownReturn, KnownStress  # noqa: E402
+from mpm_ref.nclaw.train.teacher import Teacher  # noqa: E402
 from validation import train_dough  # noqa: E402
 from validation.nclaw import dough  # noqa: E402
 from validation.nclaw.diverged import diverged  # noqa: E402

@@ -7,7 +7,7 @@ import pytest
 
 from mpm_ref.cases import in_order
 from mpm_ref.materials import Fluid, NoFlow
-from mpm_ref.nclaw.response import Correction, Stress
+from mpm_ref.materials.learned.response import Correction, Stress
 from mpm_ref.scene import build
 from mpm_ref.simulate import SORT, simulate
 from validation import targets
@@ -115,7 +115,7 @@ def test_untrained_laws_are_as_many_numbers_as_printed():
 
 def test_untrained_laws_are_those_that_pytorch_draws():
     pytest.importorskip("torch")
-    law = pytest.importorskip("mpm_ref.nclaw.learn.law")
+    law = pytest.importorskip("mpm_ref.nclaw.train.neural_laws")
     for seed in (0, 3):
         for theirs, ours in zip(law.neural_laws(seed, Stress(), Correction()), untrained(seed)[:2],
                                 strict=True):

@@ -7,8 +7,8 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from mpm_ref.nclaw.learn.gnn.examples import run_of  # noqa: E402
-from mpm_ref.nclaw.learn.gnn.recipe import GraphRecipe  # noqa: E402
+from mpm_ref.nclaw.gnn.train.examples import run_of  # noqa: E402
+from mpm_ref.nclaw.gnn.train.recipe import GraphRecipe  # noqa: E402
 from validation import train_gnn, train_laws  # noqa: E402
 from validation.nclaw import nets  # noqa: E402
 from validation.nclaw.evaluate import compare  # noqa: E402

@@ -4,8 +4,8 @@
 import numpy as np
 import pytest
 
-from mpm_ref.laws.compare import positions
 from mpm_ref.nclaw.bodies import own
+from mpm_ref.nclaw.study.compare import positions
 from mpm_ref.scene import build
 from validation.nclaw import elsewhere, melting, shown
 from validation.nclaw.environments import ENVIRONMENTS, environment

@@ -7,14 +7,14 @@ from nclaw_toys import cube
 torch = pytest.importorskip("torch")
 
 from mpm_ref.cases import Observed, observed  # noqa: E402
-from mpm_ref.nclaw.apart import world  # noqa: E402
-from mpm_ref.nclaw.learn import fit  # noqa: E402
-from mpm_ref.nclaw.learn.fit import Diverged, train  # noqa: E402
-from mpm_ref.nclaw.learn.law import neural_laws  # noqa: E402
-from mpm_ref.nclaw.learn.partial import Partial  # noqa: E402
-from mpm_ref.nclaw.learn.recipe import Recipe  # noqa: E402
-from mpm_ref.nclaw.learn.rollout import Trajectory, squared, trajectory_of  # noqa: E402
-from mpm_ref.nclaw.response import Correction, Stress  # noqa: E402
+from mpm_ref.materials.learned.response import Correction, Stress  # noqa: E402
+from mpm_ref.nclaw.batched_step import world  # noqa: E402
+from mpm_ref.nclaw.train import fit  # noqa: E402
+from mpm_ref.nclaw.train.fit import Diverged, train  # noqa: E402
+from mpm_ref.nclaw.train.neural_laws import neural_laws  # noqa: E402
+from mpm_ref.nclaw.train.observations import Partial  # noqa: E402
+from mpm_ref.nclaw.train.recipe import Recipe  # noqa: E402
+from mpm_ref.nclaw.train.rollout import Trajectory, squared, trajectory_of  # noqa: E402
 from validation import train_small  # noqa: E402
 from validation.nclaw.observation import Seen  # noqa: E402
 from validation.nclaw.trade_nets import Small, identity  # noqa: E402

@@ -8,7 +8,7 @@ import pytest
 from neural_toys import deformations, plain, trained
 
 from mpm_ref.materials import FixedCorotated, Fluid
-from mpm_ref.nclaw import neural, response
+from mpm_ref.materials.learned import network, response
 from validation.nclaw import symmetry
 from validation.nclaw.environments import ENVIRONMENTS
 from validation.results import Results
@@ -17,7 +17,7 @@ from validation.run import Setting, run_all
 
 def test_the_skew_part_is_that_of_the_paper_s_stress():
     of, F = trained(response.Stress(neural_toys.UNIT), 3), deformations(3)
-    skew, size = symmetry.split(neural.elastic(of), F)
+    skew, size = symmetry.split(network.elastic(of), F)
     tau = np.array([plain(of, one) for one in F])
     assert size == pytest.approx(np.linalg.norm(tau, axis=(1, 2)), rel=1e-9)
     expected = np.sqrt(sum((tau[:, a, b] - tau[:, b, a]) ** 2 for a, b in ((0, 1), (0, 2), (1, 2)))
@@ -27,7 +27,7 @@ def test_the_skew_part_is_that_of_the_paper_s_stress():
 
 
 @pytest.mark.parametrize("law", [
-    neural.elastic(trained(response.SymmetricStress(neural_toys.UNIT), 3)),
+    network.elastic(trained(response.SymmetricStress(neural_toys.UNIT), 3)),
     FixedCorotated(4e4, 3e4), Fluid(5e4)], ids=["learned", "jelly", "water"])
 def test_other_stresses_are_symmetric(law):
     skew, size = symmetry.split(law, deformations(3))

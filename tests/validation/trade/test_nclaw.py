@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small_toys import Records, known
 
-from mpm_ref.nclaw import weights
+from mpm_ref.materials.learned import weights
 from mpm_ref.scene import build
 from validation.nclaw import bundle, small_runs, trade_nets
 from validation.nclaw.evaluate import Found
