@@ -14,7 +14,7 @@ from mpm_ref.materials import FixedCorotated, Fluid, NoFlow
 from mpm_ref.materials.learned import weights
 from mpm_ref.materials.learned.strain_range import measures, seen
 from mpm_ref.monitor import CHECK
-from mpm_ref.nclaw import range as watching
+from mpm_ref.nclaw import strain_watch as watching
 from mpm_ref.nclaw.bodies import fresh, own
 from mpm_ref.nclaw.strain_watch import BEYOND, Watch, beyond, known, look, other_steps, watch
 from mpm_ref.nclaw.train.recipe import Recipe
