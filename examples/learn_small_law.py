@@ -19,7 +19,7 @@ from mpm_ref.cases import observed
 from mpm_ref.core.boundary import Conditions, nclaw_walls
 from mpm_ref.explicit import Scheme
 from mpm_ref.materials import NoFlow, make_law
-from mpm_ref.nclaw.apart import nodes, world
+from mpm_ref.nclaw.batched_step import nodes, world
 from mpm_ref.problem import Clock, Problem
 
 try:
@@ -28,8 +28,8 @@ except ModuleNotFoundError:
     raise SystemExit('this example learns with PyTorch, which is not installed: pip install '
                      '"mpm_ref[learn]", or `make learn` in the repository') from None
 
-from mpm_ref.nclaw.learn.rollout import Laws, step, trajectory_of
-from mpm_ref.nclaw.learn.sysid import KnownStress
+from mpm_ref.nclaw.train.rollout import Laws, step, trajectory_of
+from mpm_ref.nclaw.train.sysid import KnownStress
 
 DX, DT, STEPS, SEEN = 0.05, 1e-3, 60, (15, 30, 45, 60)
 SPACING, RHO, E, NU = 0.05, 1000.0, 1e5, 0.3        # [m], [kg/m^3], [Pa]

@@ -10,7 +10,7 @@ broke down are left out.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from mpm_ref.nclaw.range import BEYOND
+from mpm_ref.nclaw.strain_watch import BEYOND
 from validation.extremes.nclaw_runs import BAD
 
 from ._orders import scales, series

@@ -10,16 +10,16 @@ runs of many steps, and is what one usually wants.
 
 import numpy as np
 
-from .core import deform_adjoint
-from .core.boundary_adjoint import solve_adjoint
+from .core.adjoint import deform as deform_adjoint
+from .core.adjoint.boundary import solve_adjoint
+from .core.adjoint.deform import DeformBars, Step
+from .core.adjoint.grid import Update, update_adjoint
+from .core.adjoint.transfer import Exchange, g2p_adjoint, p2g_adjoint
 from .core.collide import solve
-from .core.deform_adjoint import DeformBars, Step
 from .core.grid import Storage, update
-from .core.grid_adjoint import Update, update_adjoint
 from .core.jit import CHUNKS
 from .core.law import kirchhoff_vjp, project_vjp
 from .core.order import slabs_of
-from .core.transfer_adjoint import Exchange, g2p_adjoint, p2g_adjoint
 from .explicit import damp, gather, scatter
 from .materials import NoFlow
 

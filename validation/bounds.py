@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from mpm_ref.nclaw import weights
+from mpm_ref.materials.learned import weights
 
 from .nclaw.environments import environment
 from .nclaw.met import bounds

@@ -21,7 +21,8 @@ LINK = re.compile(r"\b(?:mpm_ref|validation|figures|tests|scenes)/[\w/.-]+\.(?:p
 # files that are about ids and keys, and so name some without resting on them
 ABOUT = {
     "validation/citations.py", "validation/equations.py", "validation/targets.py",
-    "tests/test_equations.py", "tests/test_references.py", "tests/test_targets.py",
+    "tests/repository/test_equations.py", "tests/repository/test_references.py",
+    "tests/validation/common/test_targets.py",
 }
 
 

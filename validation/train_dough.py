@@ -7,15 +7,15 @@ import torch
 from tqdm import tqdm
 
 from mpm_ref.cases import observed
-from mpm_ref.nclaw import weights
-from mpm_ref.nclaw.apart import world
-from mpm_ref.nclaw.learn.drive import stored
-from mpm_ref.nclaw.learn.film import film_of
-from mpm_ref.nclaw.learn.fit import Diverged, train
-from mpm_ref.nclaw.learn.labeled import labels_of, train_labeled
-from mpm_ref.nclaw.learn.methods import laws_of
-from mpm_ref.nclaw.learn.recipe import PRINTED, Recipe
-from mpm_ref.nclaw.learn.rollout import trajectory_of
+from mpm_ref.materials.learned import weights
+from mpm_ref.nclaw.batched_step import world
+from mpm_ref.nclaw.train.fit import Diverged, train
+from mpm_ref.nclaw.train.image_observations import film_of
+from mpm_ref.nclaw.train.labeled import labels_of, train_labeled
+from mpm_ref.nclaw.train.methods import laws_of
+from mpm_ref.nclaw.train.recipe import PRINTED, Recipe
+from mpm_ref.nclaw.train.rollout import trajectory_of
+from mpm_ref.nclaw.train.train import stored
 from mpm_ref.scene import build
 
 from .nclaw.dough import EVERY, GUESS, block, camera, film, identity, material, scene
@@ -60,8 +60,8 @@ def recipe_of(net, steps):
 
 
 def filmed_laws(name, net, checkpoint, threads):
-    """`nclaw.weights.Laws` of a `DoughNet` by name, with what is to be known of them; of a training
-    that diverges, that alone: plain values.
+    """`learned.weights.Laws` of a `DoughNet` by name, with what is to be known of them; of a
+    training that diverges, that alone: plain values.
     """
     where, film = seen()
     recipe, laws, errors = recipe_of(net, len(film.x) - 1), begun(net), []

@@ -7,9 +7,9 @@ from pathlib import Path
 import torch
 from tqdm import tqdm
 
-from mpm_ref.nclaw.learn.gnn.examples import run_of
-from mpm_ref.nclaw.learn.gnn.fit import train
-from mpm_ref.nclaw.learn.gnn.recipe import GraphRecipe
+from mpm_ref.nclaw.gnn.train.examples import run_of
+from mpm_ref.nclaw.gnn.train.fit import train
+from mpm_ref.nclaw.gnn.train.recipe import GraphRecipe
 
 from .nclaw.nets import identity
 from .nclaw.simulators import scenes_of, shown

@@ -11,11 +11,11 @@ import torch
 import typer
 from tqdm import tqdm
 
-from mpm_ref.nclaw import weights
+from mpm_ref.materials.learned import weights
 from mpm_ref.nclaw.gnn import weights as of_graphs
-from mpm_ref.nclaw.learn import drive
-from mpm_ref.nclaw.learn.methods import SYS_ID
-from mpm_ref.nclaw.learn.recipe import Recipe
+from mpm_ref.nclaw.train import train
+from mpm_ref.nclaw.train.methods import SYS_ID
+from mpm_ref.nclaw.train.recipe import Recipe
 from mpm_ref.scene import build
 
 from .nclaw import bundle, diverged
@@ -38,17 +38,17 @@ def begun(net):
     """`Laws` of a net before training."""
     kinds = () if net.method == SYS_ID else (
         weights.RECORDS[net.elastic](), weights.RECORDS[net.plastic]())
-    return drive.begun(net.method, net.seed, kinds, environment(net.environment).body[0].material)
+    return train.begun(net.method, net.seed, kinds, environment(net.environment).body[0].material)
 
 
 def taught(net, recipe, laws, checkpoint, show):
     """`laws` trained as the method of a net asks for; returns the session."""
     seen = build(environment(net.environment)), trajectory(net.environment)
-    return drive.taught(net.method, recipe, laws, seen, checkpoint, show)
+    return train.taught(net.method, recipe, laws, seen, checkpoint, show)
 
 
 def made(name, checkpoints, threads):
-    """`nclaw.weights.Laws` of a net by name, with what is to be known of them; of a training that
+    """`learned.weights.Laws` of a net by name, with what is to be known of them; of a training that
     diverges, that alone: plain values.
     """
     net, path = nets()[name], checkpoints / f"{name}.pt"
@@ -64,14 +64,14 @@ def made(name, checkpoints, threads):
                             horizon=round(steps / now.segments))
         try:
             done = taught(net, recipe, laws, path, show)
-        except drive.Diverged as fault:
+        except train.Diverged as fault:
             if path.exists() and not errors:    # it went on from there: errors before are not known
                 path.unlink()
                 return made(name, checkpoints, threads)
             return {**known_of(name, recipe, threads), "errors": errors, "stopped": str(fault)}
     took = {f"{clock}_seconds": round(s, 1) for clock, s in done.meter.total._asdict().items()}
     about = {**known_of(name, recipe, threads), **took, **done.known}
-    stored = drive.stored(laws, about)
+    stored = train.stored(laws, about)
     return stored._replace(about={**about, "seen": bounds(net, stored),
                                   "dt": environment(net.environment).dt})
 

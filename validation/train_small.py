@@ -10,16 +10,16 @@ import torch
 from tqdm import tqdm
 
 from mpm_ref.cases import observed
-from mpm_ref.nclaw import weights
-from mpm_ref.nclaw.apart import world
+from mpm_ref.materials.learned import weights
+from mpm_ref.materials.learned.response import Correction, Stress
+from mpm_ref.nclaw.batched_step import world
 from mpm_ref.nclaw.bodies import learned
-from mpm_ref.nclaw.learn.fit import Diverged, train
-from mpm_ref.nclaw.learn.law import NeuralLaw, trained_of
-from mpm_ref.nclaw.learn.partial import Partial
-from mpm_ref.nclaw.learn.recipe import Recipe
-from mpm_ref.nclaw.learn.rollout import Laws, trajectory_of
-from mpm_ref.nclaw.response import Correction, Stress
-from mpm_ref.nclaw.visited import cuts_of, met
+from mpm_ref.nclaw.train.fit import Diverged, train
+from mpm_ref.nclaw.train.neural_laws import NeuralLaw, trained_of
+from mpm_ref.nclaw.train.observations import Partial
+from mpm_ref.nclaw.train.recipe import Recipe
+from mpm_ref.nclaw.train.rollout import Laws, trajectory_of
+from mpm_ref.nclaw.train.strains import cuts_of, met
 from mpm_ref.scene import build
 
 from .nclaw.bundle import Bundle

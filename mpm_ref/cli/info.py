@@ -3,7 +3,7 @@
 import json
 from math import isfinite, isnan
 
-from ..nclaw.range import other_steps
+from ..nclaw.strain_watch import other_steps
 from ..placement import misplaced
 from ..reduced import told
 from ..store import manifest

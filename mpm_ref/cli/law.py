@@ -12,9 +12,9 @@ from typing import Annotated
 
 import typer
 
-from ..laws.compare import Broken, beside
-from ..laws.numbers import write_errors
-from ..laws.watched import Watched
+from ..nclaw.study.compare import Broken, beside
+from ..nclaw.study.numbers import write_errors
+from ..nclaw.study.watched import Watched
 from ..store.atomic import require_place
 from ..store.words import counted
 from . import faults, law_show, law_train

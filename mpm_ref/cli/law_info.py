@@ -6,7 +6,8 @@ from itertools import count, takewhile
 import numpy as np
 
 from ..archive import about_of, require_format
-from ..nclaw import export, spline, weights
+from ..materials.learned import spline, weights
+from ..nclaw import export
 from ..nclaw.bodies import dim_of
 from ..store.words import counted
 from . import made
@@ -144,7 +145,7 @@ def training_line(facts):
 
 
 def seen_line(bounds):
-    """The strains that were met in training, in words (see `nclaw.seen`)."""
+    """The strains that were met in training, in words (see `learned.strain_range`)."""
     low, high = (np.array(bounds[end]) for end in ("low", "high"))
     return (f"met in training: stretches {low[:-1].min():.3g} .. {high[:-1].max():.3g}, "
             f"J {low[-1]:.3g} .. {high[-1]:.3g}")

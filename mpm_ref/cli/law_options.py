@@ -6,10 +6,10 @@ from typing import Annotated
 import typer
 
 from .. import scene
-from ..laws.compare import problem_of
-from ..nclaw import weights
+from ..materials.learned import weights
 from ..nclaw.bodies import dim_of
-from ..nclaw.learn.teacher import Teacher
+from ..nclaw.study.compare import problem_of
+from ..nclaw.train.teacher import Teacher
 from ..scene import SceneError
 from .shipped import find_scene
 

@@ -6,11 +6,11 @@ from typing import Annotated
 
 import typer
 
-from ..laws.curves import curves, paths_for
-from ..laws.numbers import write_curves
-from ..laws.pictures import draw
-from ..nclaw import deployed, weights
+from ..materials.learned import learned_flow, learned_law, weights
 from ..nclaw.export import exported, write
+from ..nclaw.study.curves import curves, paths_for
+from ..nclaw.study.numbers import write_curves
+from ..nclaw.study.pictures import draw
 from ..store.atomic import require_place
 from ..store.words import counted
 from .faults import one_line, options, writing
@@ -98,7 +98,7 @@ def require_outputs(out, csv):
 def beside_truth(laws, problem, strain, steps):
     """[`Curve`] of trained laws beside those of a problem's bodies."""
     body, dt = problem.bodies[0], problem.clock.dt
-    learned = deployed.elastic(laws.elastic), deployed.plastic(laws.plastic)
+    learned = learned_law(laws.elastic), learned_flow(laws.plastic)
     paths = paths_for((body.flow, learned[1]), problem.dim, strain, steps)
     return curves((body.law, body.flow), learned, paths, dt, laws.about.get("seen"))
 

@@ -2,9 +2,9 @@
 
 from dataclasses import asdict
 
-from ..laws.study import load
-from ..laws.tables import SYS_ID
-from ..nclaw.weights import PARTS
+from ..materials.learned.weights import PARTS
+from ..nclaw.study.study import load
+from ..nclaw.study.tables import SYS_ID
 from ..reduced.study_file import plain
 from ..scene import SceneError
 from ..store.words import counted

@@ -9,10 +9,10 @@ from typing import Annotated
 import typer
 
 from ..cases import observed
-from ..laws import training, trajectory
-from ..laws.compare import threads_for
-from ..laws.study import load
-from ..nclaw import weights
+from ..materials.learned import weights
+from ..nclaw.study import training, trajectory
+from ..nclaw.study.compare import threads_for
+from ..nclaw.study.study import load
 from ..store.atomic import require_place
 from ..store.session import Watch
 from ..store.words import counted
@@ -122,7 +122,7 @@ class Steps(Watch):
 
 
 def learned(study, seen, checkpoint, **about):
-    """`nclaw.weights.Laws` of a study, with its progress; ends the command where it diverges."""
+    """`learned.weights.Laws` of a study, with its progress; ends the command where it diverges."""
     how = training.drive()
     try:
         with on_interrupt(lambda: resuming(checkpoint)), Epochs(study, len(seen.x) - 1) as now:

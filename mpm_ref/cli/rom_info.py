@@ -7,8 +7,8 @@ from ..reduced.model import known_of
 from ..reduced.nsf.networks import Networks
 from ..reduced.study_file import checked, plain
 from ..reduced.tables import CURVED, MODES, NETWORK
-from ..rom.curved import Curved
-from ..rom.decoder import Decoder
+from ..rom.fields.network import Decoder
+from ..rom.fields.polynomial_manifold import Curved
 from ..scene import SceneError
 from ..store.words import counted
 from . import rom_nsf_info as nsf

@@ -4,7 +4,7 @@ import numpy as np
 
 from ..reduced.nsf.networks import Networks
 from ..reduced.tables import NETWORK, NSF
-from ..rom.spanned import Spanned
+from ..rom.fields.pod_fields import Spanned
 
 OF = {"modes": "the displacement", "tau": "the stress", "C": "the affine field"}
 

@@ -17,8 +17,8 @@ from .deflation import (
     turned,
     unit_or_last,
 )
-from .extremes import is_finite, is_moderate, moderate, not_a_number, rescaled
 from .jit import kernel, leaf
+from .scaling import is_finite, is_moderate, moderate, not_a_number, rescaled
 from .tensor import (
     cofactor,
     cross,

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .multigrid.projectors import inverses, onto_range
+from .multigrid.smoothers import times
 from .norms import dot
-from .projectors import inverses, onto_range
-from .smoothers import times
 
 
 class Rule(NamedTuple):

@@ -5,13 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import block_multigrid
-from .block_product import planes_of, product
-from .block_sparse import KNOWN, blocks_of
 from .krylov import JACOBI, Rule, half, pcg
-from .multigrid import hierarchy, hierarchy_of, on_nodes
-from .projectors import diagonal_blocks, inverses, onto_range
-from .smoothers import GaussSeidel
+from .multigrid.blocks import hierarchy as block_hierarchy
+from .multigrid.blocks.product import planes_of, product
+from .multigrid.blocks.sparse import KNOWN, blocks_of
+from .multigrid.hierarchy import hierarchy, hierarchy_of, on_nodes
+from .multigrid.projectors import diagonal_blocks, inverses, onto_range
+from .multigrid.smoothers import GaussSeidel
 
 
 class Linear(NamedTuple):
@@ -104,8 +104,8 @@ def nowhere(r):
 def symmetric_gauss_seidel(A, index, path="blocks"):
     """r -> (D + U)^+ D (D + L)^+ r of A = L + D + U: one coloured sweep forth and back."""
     if _by_kernels(A, path):
-        level, = block_multigrid.build(A, index, 1, "linear")
-        return block_multigrid.GaussSeidel(level)
+        level, = block_hierarchy.build(A, index, 1, "linear")
+        return block_hierarchy.GaussSeidel(level)
     D = diagonal_blocks(A)
     sweep = GaussSeidel(A, inverses(D, onto_range(D)), index)
     return lambda r: sweep(r.reshape(-1)).reshape(r.shape)

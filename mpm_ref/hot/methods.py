@@ -11,7 +11,7 @@ import numpy as np
 from .admm import ADMM
 from .choices import Choices, checked
 from .descent import Stop, advance_of, iterate
-from .held import held, multigrid_once
+from .displacement_stop import held, multigrid_once
 from .krylov import JACOBI, stiffest_tolerance
 from .lbfgs import LBFGS, RENEWALS
 from .line_search import Rules

@@ -13,12 +13,12 @@ import numpy as np
 from ..core.grid import Storage
 from ..core.state import Grid
 from ..explicit import Stepper, damp, deform_body, gather, scatter
-from .geometric import Geometric, conditions_at
+from .constraints import Restraint
 from .methods import Options, minimise
+from .multigrid.geometric import Geometric, conditions_at
 from .norms import characteristic_norms
-from .objective import Potential
+from .potential import Potential
 from .report import together
-from .restraint import Restraint
 from .system import System
 from .unknowns import Unknowns, free_part, unknowns_of
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from ..body import Body, particles_at
 from ..materials import Material
-from . import deployed, neural
+from ..materials.learned import learned_flow, learned_law, network
 
 
 def fresh(body, law, flow):
@@ -40,14 +40,14 @@ def learned(laws):
     """What makes bodies of trained `weights.Laws`. Raises ValueError for what is no stress and no
     return map.
     """
-    elastic, plastic = deployed.elastic(laws.elastic), deployed.plastic(laws.plastic)
+    elastic, plastic = learned_law(laws.elastic), learned_flow(laws.plastic)
     return lambda body: fresh(body, elastic, plastic)
 
 
 def dim_of(laws):
     """Number of space dimensions of `weights.Laws`; 3 of those that are for any."""
-    found = [neural.dim_of(len(law.layers[0][0])) for law in laws[:2]
-             if type(law.kind) in (*neural.STRESSES, *neural.CORRECTIONS)]
+    found = [network.dim_of(len(law.layers[0][0])) for law in laws[:2]
+             if type(law.kind) in (*network.STRESSES, *network.CORRECTIONS)]
     return found[0] if found else 3
 
 

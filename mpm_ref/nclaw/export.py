@@ -20,13 +20,13 @@ from ..materials import (
     NoFlow,
     VonMises,
 )
+from ..materials.learned import learned_flow, learned_law, principal, response, spline
+from ..materials.learned.contraction import Contraction
+from ..materials.learned.energetic import Energetic
+from ..materials.learned.inputs import numbers, words
+from ..materials.learned.weights import PARTS
 from ..sealed import sealed, write_whole
-from . import deployed, principal, response, spline
 from .bodies import dim_of, gradients, points, stresses
-from .contraction import Contraction
-from .energetic import Energetic
-from .reading import numbers, words
-from .weights import PARTS
 
 FORMAT = "mpm_ref law 1"
 SPREAD, RANDOM, SEED = 0.1, 24, 0       # of the components of F - I in questions; how many; draw
@@ -81,7 +81,7 @@ def part_of(trained, d):
     kind = trained.kind
     constants = kind._asdict()
     if type(kind) in spline.READINGS:
-        constants = deployed.elastic(trained)._asdict()
+        constants = learned_law(trained)._asdict()
     else:
         for k, (W, b) in enumerate(trained.layers):
             constants |= {f"W{k}": W, f"b{k}": b}
@@ -107,7 +107,7 @@ def questions(d):
 
 def checks(laws, F):
     """Questions F (n, d, d) and the answers of both laws, with what their first layers read."""
-    law, flow = deployed.elastic(laws.elastic), deployed.plastic(laws.plastic)
+    law, flow = learned_law(laws.elastic), learned_flow(laws.plastic)
     elastic, plastic = points(law, NoFlow(), F), points(law, flow, F)
     initial_stress(elastic)
     deform_body(plastic, 1.0)

@@ -8,9 +8,8 @@
 docs/reference/golden-files.md has the layout of the files and the rule for the tolerances.
 """
 
-from .checking import check
-from .files import record, record_adjoint, write
-from .matching import NotComparable
+from .comparison import NotComparable, check
+from .golden_file import record, record_adjoint, write
 from .report import Departure, Report
 
 __all__ = ["Departure", "NotComparable", "Report", "check", "record", "record_adjoint", "write"]

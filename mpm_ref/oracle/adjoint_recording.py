@@ -10,6 +10,7 @@ from ..adjoint import StepAdjoint, clip_adjoint, require_adjoint
 from . import adjoint_stages
 from .adjoint_material import Seeds
 from .adjoint_twin import Backwards, Stage
+from .plain_twin import on
 from .recording import (
     MARGIN,
     UNSURE,
@@ -22,7 +23,6 @@ from .recording import (
 )
 from .scales import size
 from .schema import WHERE
-from .twin import on
 
 SEED = 20270
 

@@ -8,13 +8,13 @@ import numpy as np
 
 from .. import explicit
 from ..adjoint import deform_body_adjoint, initial_stress_adjoint, zero_bars, zero_sums
-from ..core.boundary_adjoint import solve_adjoint
+from ..core.adjoint.boundary import solve_adjoint
+from ..core.adjoint.grid import Update, update_adjoint
+from ..core.adjoint.transfer import Exchange, g2p_adjoint, p2g_adjoint
 from ..core.collide import solve
 from ..core.grid import Storage
-from ..core.grid_adjoint import Update, update_adjoint
 from ..core.order import slabs_of
-from ..core.transfer_adjoint import Exchange, g2p_adjoint, p2g_adjoint
-from . import inner
+from . import kernel_stages
 
 CARRIED = ("x", "v", "C", "tau", "m", "V0", "b")        # by what p2g reads
 
@@ -79,7 +79,7 @@ def deform(body, L, bar_and_sums, how, seen):
     q = body.particles
     if q.F.ndim == 3:
         trial = type(bar)(*(a.copy() for a in bar))
-        there = body._replace(particles=q._replace(F=inner.trial(q.F, L, dt)))
+        there = body._replace(particles=q._replace(F=kernel_stages.trial(q.F, L, dt)))
         deform_body_adjoint(there, np.zeros_like(L), trial, zero_sums(body), dt)
         seen[f"{name}/F_trial_grad"] = trial.F
     deform_body_adjoint(body, L, bar, parts, dt)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..plain import transfer
 from ..plain.step import isotropic
-from . import adjoint_sums, adjoint_walls, scales
+from . import adjoint_boundary, adjoint_sums, scales
 from .adjoint_clouds import cloud
 from .adjoint_material import returned, stressed
 from .adjoint_sums import Gathered, Scattered
@@ -118,7 +118,7 @@ class Backwards:
     def conditioned(self, of_v):
         """Bars of v_i before the conditions."""
         v, d = self.stage.done.nodes.v_free, len(self.box.shape)
-        value, S = adjoint_walls.before(v, self.stage.found["velocity"], self.stage.contacts,
+        value, S = adjoint_boundary.before(v, self.stage.found["velocity"], self.stage.contacts,
                                         (of_v.value, size(of_v.S, d)))
         return given(value, S)
 

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from . import implicit, sampled, scales, scaling, solving
+from . import accepted_step, implicit_stages, sampled, scales, scaling
 from .implicit_scales import Scales
 from .implicit_twin import SolvedTwin, collected, embedding, spread
 from .recording import (
@@ -36,7 +36,7 @@ def run(problem, steps, state=None):
     A run stands at `state`, by default at the start of the problem. Raises ValueError for steps
     past its end, where a step is not solved, or the reference's own error is too large.
     """
-    levels = solving.options_of(problem).levels
+    levels = accepted_step.options_of(problem).levels
     if levels > LEVELS:
         raise ValueError(f"levels = {levels}: expected at most {LEVELS}, which the oracle records")
     ours = problem_of(problem, 1)
@@ -66,16 +66,16 @@ class Side:
 
     def grids(self, options):
         """The hierarchy at the start."""
-        return implicit.grids_of(self.A, self.system.index, options)
+        return implicit_stages.grids_of(self.A, self.system.index, options)
 
     def seen(self, fixed, grids, options):
         """{key: array} of all stages before the solve."""
-        seen = implicit.before(self.problem, self.bodies, self.stepper, self.pose)
-        seen |= implicit.of_potential(self.system, fixed)
+        seen = implicit_stages.before(self.problem, self.bodies, self.stepper, self.pose)
+        seen |= implicit_stages.of_potential(self.system, fixed)
         if grids is not None:
-            seen |= implicit.of_multigrid(grids, fixed)
+            seen |= implicit_stages.of_multigrid(grids, fixed)
         if options.descent != "admm":
-            seen["direction"] = implicit.direction(self.system, self.A, self.g, options)
+            seen["direction"] = implicit_stages.direction(self.system, self.A, self.g, options)
         return seen
 
 
@@ -95,7 +95,8 @@ class Step:
         options = self.options
         if options.inverse == MULTIGRID:
             self.grids = self.ours.grids(options)
-        self.fixed = implicit.draw(self.ours.system, self.grids.levels[1:] if self.grids else ())
+        coarse = self.grids.levels[1:] if self.grids else ()
+        self.fixed = implicit_stages.draw(self.ours.system, coarse)
         twin = SolvedTwin(self.problem, self.ours.pose.unknowns, self.dt)
         seen, exact, S = self.before_solve(twin)
         other = self.by_the_other_side()
@@ -107,7 +108,8 @@ class Step:
             if name in seen:
                 exact[name] = other[name]
         arrays = {name: golden(seen[name], S[name], exact[name], other[name]) for name in S}
-        solved = solving.solve(self.stepper, self.ours.bodies, self.dt, S["gradient_start"], self.t)
+        solved = accepted_step.solve(self.stepper, self.ours.bodies, self.dt, S["gradient_start"],
+                                     self.t)
         arrays["dv"] = Golden(solved.dv, solved.S, solved.near, solved.second, 0.0)
         following, bars = self.after_solve(twin, solved)
         arrays |= following
@@ -137,11 +139,11 @@ class Step:
         A, options = self.ours.A, self.options
         if self.grids is not None:
             S["cycle"] = sampled.scale(
-                lambda A, b: implicit.grids_of(A, system.index, options).cycle(b),
+                lambda A, b: implicit_stages.grids_of(A, system.index, options).cycle(b),
                 system, A, fixed.load, size(fixed.load))
         if "direction" in seen:
             S["direction"] = sampled.scale(
-                lambda A, g: implicit.direction(system, A, g, options),
+                lambda A, g: implicit_stages.direction(system, A, g, options),
                 system, A, self.ours.g, S["gradient_start"])
         return seen, exact, S
 
@@ -179,10 +181,10 @@ class Step:
         """{key: `Golden`} and bars of what follows from the accepted velocities."""
         problem, bodies, dt = self.problem, self.problem.bodies, self.dt
         v = solved.pose.unknowns.v + solved.dv
-        bars = solving.bars(problem, lambda: [copied(body, 1) for body in bodies],
-                            solved.pose, solved, dt)
-        mirrored = implicit.after(problem, self.mirrored.bodies, self.mirrored.pose, v, dt)
-        seen = implicit.after(problem, bodies, solved.pose, v, dt)
+        bars = accepted_step.bars(problem, lambda: [copied(body, 1) for body in bodies],
+                                  solved.pose, solved, dt)
+        mirrored = implicit_stages.after(problem, self.mirrored.bodies, self.mirrored.pose, v, dt)
+        seen = implicit_stages.after(problem, bodies, solved.pose, v, dt)
         before, S_of = twin.bodies, Scales(twin)
         done = twin.moved(v)
         grid = {"velocity_bc": size(done.nodes.v, done.nodes.m.ndim) + twin.over(solved.S),

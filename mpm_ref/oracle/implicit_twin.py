@@ -10,14 +10,14 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from ..plain import hot, transfer
+from ..plain import potential, transfer
 from ..plain.flows import intact
 from ..plain.laws import energy, principal
 from ..plain.spline import bspline, pairs
 from ..plain.step import Nodes, Step, after, deform, to_particles
 from ..plain.tensors import compose, det, svd
 from . import differential
-from .twin import REAL, Twin, on
+from .plain_twin import REAL, Twin, on
 
 DEGREE = {"linear": 1, "quadratic": 2}      # of the splines of HOT-sec4.2-kernel
 
@@ -88,7 +88,7 @@ class SolvedTwin(Twin):
     def potential(self, dv):
         """E (1,) [J] and its gradient (n, d) on what is free [kg m/s]."""
         bodies = [(q, ip, self.box) for q, ip in zip(self.whole, self.clouds)]
-        E, g = hot.potential(bodies, self.m, self.v, self.over(dv), self.dt, self.gravity)
+        E, g = potential.evaluate(bodies, self.m, self.v, self.over(dv), self.dt, self.gravity)
         return np.array([E]), self.free(self.nodal(g))
 
     def free(self, u):
@@ -100,7 +100,7 @@ class SolvedTwin(Twin):
         return [self._at(q, ip, self.v + self.over(dv)) for q, ip in zip(self.bodies, self.clouds)]
 
     def _at(self, q, ip, u):
-        A, F_n = hot.growth(u, self.dt, ip, self.box), as_matrices(q.F, self.gravity.shape[0])
+        A, F_n = potential.growth(u, self.dt, ip, self.box), as_matrices(q.F, self.gravity.shape[0])
         F = np.einsum("pab,pbc->pac", A, F_n)
         return At(A, F, F_n, differential.modes(F, q.law))
 

@@ -19,9 +19,9 @@ import numpy as np
 from ..explicit import Stepper
 from ..simulate import State, advance, ended, frame_is_due, next_dt, rebound, swiftest
 from ..store.words import counted
-from . import scaling, stages
+from . import kernel_stages, scaling
+from .plain_twin import Twin, placed
 from .schema import WHERE
-from .twin import Twin, placed
 
 MARGIN = 8.0            # another code's errors against the reference's own
 EPS = {"f64": float(np.finfo(np.float64).eps), "f32": float(np.finfo(np.float32).eps)}
@@ -102,8 +102,8 @@ class Sides:
     def step(self, k):
         """The `Recorded` of step k, which all runs make; `last` is how."""
         t, twin, (ours, mirrored) = self.start + k * self.dt, self.twin, self.runs
-        seen, contacts = stages.step(ours, ours.bodies, self.steppers[0], t, self.dt)
-        other, _ = stages.step(mirrored, mirrored.bodies, self.steppers[1], t, self.dt)
+        seen, contacts = kernel_stages.step(ours, ours.bodies, self.steppers[0], t, self.dt)
+        other, _ = kernel_stages.step(mirrored, mirrored.bodies, self.steppers[1], t, self.dt)
         before = twin.bodies
         exact, done = twin.step(self.dt, seen["nodes"], contacts)
         held = placed(contacts, done.nodes.box, twin.real)

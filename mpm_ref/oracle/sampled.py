@@ -23,8 +23,8 @@ import scipy.sparse as sp
 
 from ..hot.krylov import Rule, pcg
 from ..hot.linear import by_matrix
-from ..hot.multigrid import hierarchy
-from ..hot.projectors import diagonal_blocks
+from ..hot.multigrid.hierarchy import hierarchy
+from ..hot.multigrid.projectors import diagonal_blocks
 from .scales import size
 
 MOVE = 2.0**-36         # of the scales

@@ -4,8 +4,8 @@ import numpy as np
 
 from ..plain import transfer
 from . import scales
+from .plain_twin import on
 from .scales import size
-from .twin import on
 
 EPS = float(np.finfo(np.float64).eps)
 

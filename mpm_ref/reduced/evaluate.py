@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..rom.placed import NoBody
+from ..rom.kinematics import NoBody
 from ..rom.projection import project_position
 from ..rom.step import BREAKDOWNS
 from ..store.atomic import replacing

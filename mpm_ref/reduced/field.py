@@ -10,9 +10,9 @@ from scipy.spatial import KDTree
 
 from ..body import Body
 from ..explicit import initial_stress
-from ..rom.curved import Curved
+from ..rom.fields.pod import Modes
+from ..rom.fields.polynomial_manifold import Curved
 from ..rom.latent import points, velocities
-from ..rom.modes import Modes
 from ..sampling import Poisson
 
 

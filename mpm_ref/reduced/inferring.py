@@ -6,7 +6,7 @@ import numpy as np
 
 from ..rom.cubature import CANDIDATES, cubature
 from ..rom.inferred import Inferred, Position, nearest
-from ..rom.reach import bases
+from ..rom.quadrature.stencil_overlap import bases
 
 ENOUGH = 4000       # points that tell where a body is at the start
 WITHIN = 1e-9       # of a step: one that ends so little after the scene is made

@@ -9,11 +9,11 @@ import numpy as np
 
 from ..learning import part
 from ..rom import modes_file, spanned_file, weights
-from ..rom.curved import curved
-from ..rom.decoder import Decoder
+from ..rom.fields.network import Decoder
+from ..rom.fields.pod import basis
+from ..rom.fields.pod_fields import Spanned
+from ..rom.fields.polynomial_manifold import curved
 from ..rom.latent import initial
-from ..rom.modes import basis
-from ..rom.spanned import Spanned
 from ..rom.weights import Model
 from ..sealed import opened
 from ..shapes.inside import solid

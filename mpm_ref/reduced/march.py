@@ -4,11 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..rom.eulerian import Eulerian
-from ..rom.inverse import CLOSE
-from ..rom.lagrangian import Resampled, lagrangian
+from ..rom.kinematics import CLOSE
 from ..rom.latent import initial
-from ..rom.samples import PER_GROUP, draw, pivoted
+from ..rom.quadrature.eulerian import Eulerian
+from ..rom.quadrature.lagrangian import Resampled, lagrangian
+from ..rom.sampling import PER_GROUP, draw, pivoted
 from ..rom.step import Reduced
 from ..sampling import Regular, sample
 from ..shapes.inside import solid

@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from msgspec import Meta, Struct, field, to_builtins
 
-from ..rom.architecture import HIDDEN
+from ..rom.fields.architecture import HIDDEN
 from ..rom.latent import VELOCITIES
 from ..shapes.quantities import Count, Natural, PerCell, Positive, Seed
 from .march import PRECISIONS, PROJECTIONS, QUADRATURES, Way
@@ -89,8 +89,8 @@ class Kinds(Table):
 
 
 class Map(Kinds, kw_only=True):
-    """The map: POD modes, straight or bent (see `rom.curved`), or a network and how it is trained
-    (see `rom.learn.fit.Training`).
+    """The map: POD modes, straight or bent (see `rom.fields.polynomial_manifold`), or a
+    network and how it is trained (see `rom.learn.fit.Training`).
     """
 
     keys = KEYS

@@ -3,7 +3,7 @@
 Nothing in a reduced step fails where the map knows nothing: it goes on, smooth and wrong. What
 tells it, from a few points and what the step reports, in each state:
 
-    beyond      how far the latent coordinates are from the trained ones (`rom.extent`)
+    beyond      how far the latent coordinates are from the trained ones (`rom.extrapolation`)
     off         how far the step took the samples off the map's states, in cells: forces that the
                 map cannot follow, and time steps that are too long. At the start, how far the body
                 is from where it should be: a map of another body
@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..rom.extent import Extent, extent, motion
+from ..rom.extrapolation import Extent, extent, motion
 from ..rom.projection import RANK
 from .march import continued, picked, start
 

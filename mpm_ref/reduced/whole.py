@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from msgspec.structs import replace
 
-from ..rom.histories import Histories
 from ..rom.inferred import Matter
+from ..rom.snapshots import Histories
 from ..rom.symmetric import values
 from ..scene import build
 from ..simulate import simulate

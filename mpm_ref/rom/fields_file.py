@@ -12,11 +12,8 @@ import numpy as np
 
 from .. import archive
 from . import weights
-from .decoder import Decoder, Units
-from .features import count
-from .field import Field, FieldUnits
-from .learned import misfit
-from .network import Network, layers_of, network
+from .fields.network import Decoder, Field, FieldUnits, Units, misfit
+from .fields.perceptron import Network, count, layers_of, network
 
 FORMAT = 1
 WHAT = "three networks of stress fields"
@@ -91,7 +88,7 @@ def networks_of(arrays):
 
 def network_of(own):
     """`Network` from its arrays; transposed weights are made anew."""
-    return network(layers_of(Network(own["sizes"].astype(int), own["W"], None, own["b"])))
+    return network(layers_of(Network(own["sizes"].astype(int), own["W"], own["b"])))
 
 
 def fault_of(arrays):

@@ -25,9 +25,9 @@ from ..body import Body, particles_at
 from ..core.grid import Storage, update
 from ..explicit import Scheme, gather, scatter
 from ..materials import NoFlow
-from .placed import NoBody
+from .kinematics import NoBody
 from .projection import project_position, project_velocity
-from .reach import reach
+from .quadrature.stencil_overlap import reach
 
 INVERSIONS = ("nonlinear", "linear")
 

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .placed import placed
+from .kinematics import placed
 from .projection import project_position, project_velocity
 
 VELOCITIES = ("previous", "latest", "difference", "transported")

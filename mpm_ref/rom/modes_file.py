@@ -10,8 +10,8 @@ from scipy.spatial import KDTree
 
 from ..archive import about_of, format_of, stated, write
 from ..sealed import opened
-from .curved import Curved
-from .modes import Modes
+from .fields.pod import Modes
+from .fields.polynomial_manifold import Curved
 from .weights import Model
 
 FORMAT = 1

@@ -1,12 +1,20 @@
-"""What a reduced model learns from: full-order runs of one body, all points at all steps."""
+"""Training data of reduced models: full-order runs, all points at all stored time levels.
+
+`Snapshots` of one body, with deformation gradient and velocity, are what a deformation map is made
+from (LDM). `Histories` of all points of a scene, with stress and affine field, are what the three
+fields of NSF are made from. `units` and `field_units` are the scales that networks standardise
+them by.
+"""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from .decoder import Units
+from ..mapped import empty
+from .fields.network import FieldUnits, Units
 
 STILL = 1e-12       # standard deviation of a component that does not vary, over its size
+PLAIN, FIELDS = ("v", "mu"), ("x", "tau", "C")      # what each run has of its own
 
 
 class Snapshots(NamedTuple):
@@ -30,6 +38,63 @@ class Snapshots(NamedTuple):
         return self.x.reshape(-1, *self.X.shape), self.F.reshape(-1, *self.F.shape[2:])
 
 
+class Histories(NamedTuple):
+    """s runs of n points at time levels 0 .. k, a step or several apart; points in the scene's own
+    order.
+    """
+
+    X: np.ndarray       # (n, d)                    at the start [m]
+    m: np.ndarray       # (n,)                      mass [kg]
+    V0: np.ndarray      # (n,)                      volume at rest [m^d]
+    v: np.ndarray       # (s, n, d)                 velocity at the start [m/s]
+    mu: np.ndarray      # (s, parameters)           what differs between runs
+    x: np.ndarray       # (s, k + 1, n, d)          position [m]
+    tau: np.ndarray     # (s, k + 1, n, d(d+1)/2)   Kirchhoff stress [Pa], values of `symmetric`
+    C: np.ndarray       # (s, k + 1, n, d d)        affine velocity field [1/s]
+    dt: float           #                           time between levels [s]
+
+    def of(self, runs):
+        """The histories of some runs."""
+        return self._replace(v=self.v[runs], mu=self.mu[runs], x=self.x[runs], tau=self.tau[runs],
+                             C=self.C[runs])
+
+
+def room(one, runs):
+    """`Histories` of so many runs like one of them, without values yet."""
+    fields = {name: getattr(one, name) for name in FIELDS}
+    return one._replace(
+        **{name: np.empty_like(getattr(one, name), shape=(runs, *getattr(one, name).shape[1:]))
+           for name in PLAIN},
+        **{name: empty((runs, *known.shape[1:]), known.dtype) for name, known in fields.items()})
+
+
+def joined(runs, count=None):
+    """`Histories` of single ones of the same points, one after the other: of an iterator, of which
+    no run is kept beside what is made of it, there must be `count`. Raises ValueError for another
+    number, or other histories than the first, and OSError as `mapped.empty` does.
+    """
+    count, found, k = len(runs) if count is None else count, None, -1
+    for k, run in enumerate(runs):
+        found = found or room(run, count)
+        require_like(run, found, k)
+        for name in (*PLAIN, *FIELDS):
+            getattr(found, name)[k] = getattr(run, name)[0]
+    if not 0 < k + 1 == count:
+        raise ValueError(f"{k + 1} runs: expected {count or 'some'}")
+    return found
+
+
+def require_like(run, found, k):
+    """Raise ValueError unless the history of run k is a single one and fits `Histories`."""
+    if k >= len(found.mu):
+        raise ValueError(f"more than {len(found.mu)} runs: expected so many")
+    for name in (*PLAIN, *FIELDS):
+        own, known = getattr(run, name), getattr(found, name)
+        if (own.shape, own.dtype) != ((1, *known.shape[1:]), known.dtype):
+            raise ValueError(f"{name} of run {k}: {own.dtype} of shape {own.shape}; expected "
+                             f"{known.dtype} of shape {(1, *known.shape[1:])}, as in the first")
+
+
 def units(snapshots):
     """`Units` of training snapshots (LDM-appB). A component that hardly varies is measured like the
     one that varies most, and keeps its metres where none does.
@@ -38,6 +103,23 @@ def units(snapshots):
     axes = tuple(range(u.ndim - 1))
     span = np.ptp(X, axis=0)
     return Units(X.min(axis=0), span, u.mean(axis=axes), measures(u.std(axis=axes), span))
+
+
+def field_units(X, values, mu):
+    """`FieldUnits` of points X (n, d) with training values (s, levels, n, k), of s runs with
+    parameters mu (s, q) that the field depends on. Runs are looked at one by one, so that they need
+    not be in memory. A value that hardly varies is measured like the one that varies most, a
+    parameter that does not vary in 1. Raises ValueError where a run is not finite.
+    """
+    for k, run in enumerate(values):
+        if not np.isfinite(run).all():
+            raise ValueError(f"run {k}: the training values are not all finite; generate it again")
+    mean = np.mean([run.mean(axis=(0, 1), dtype=float) for run in values], axis=0)
+    square = np.mean([np.mean((run - mean) ** 2, axis=(0, 1)) for run in values], axis=0)
+    largest = max(np.abs(run).max() for run in values)
+    mu_std = [measures(own.std(keepdims=True), np.abs(own).max())[0] for own in mu.T]
+    return FieldUnits(X.min(axis=0), np.ptp(X, axis=0), mean, measures(np.sqrt(square), largest),
+                      mu.mean(axis=0), np.array(mu_std))
 
 
 def measures(std, size):

@@ -7,8 +7,8 @@ Names of arrays are those of the records, with a dot between: "tau.modes", "tau.
 import numpy as np
 
 from .. import archive
-from .radial import Radial
-from .spanned import Cells, Part, Spanned
+from .fields.pod_fields import Cells, Part, Spanned
+from .fields.radial_basis import Radial
 from .weights import Model
 
 FORMAT = 1

@@ -14,8 +14,8 @@ from ..body import Body, particles_at
 from ..core.grid import OutOfRange, Storage, update
 from ..explicit import Scheme, gather, initial_stress, scatter
 from ..materials import NoFlow
+from .kinematics import NoBody, placed
 from .latent import VELOCITIES, moved, moving, velocities
-from .placed import NoBody, placed
 from .projection import project_position, project_velocity
 
 PROJECTIONS = ("linear", "nonlinear")

@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..archive import read, stated, write
-from .decoder import Decoder, Units
-from .network import Network, layers_of, network
+from .fields.network import Decoder, Units
+from .fields.perceptron import Network, layers_of, network
 
 FORMAT = 1
 SHOWN = 12          # values of a list that a sentence shows
@@ -32,7 +32,7 @@ def save(path, model):
 def load(path):
     """Read what `save` wrote. Raises ValueError saying what is wrong with the file."""
     arrays, about = read(path, FORMAT, fault_of, "trained map")
-    net = Network(arrays["sizes"].astype(int), arrays["W"], None, arrays["b"])
+    net = Network(arrays["sizes"].astype(int), arrays["W"], arrays["b"])
     units = Units(*(arrays[name] for name in Units._fields))
     return Model(Decoder(network(layers_of(net)), units), arrays["xhat"], arrays["rest"],
                  about)

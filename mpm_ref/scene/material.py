@@ -7,14 +7,14 @@ from typing import Annotated
 from msgspec import Meta
 
 from ..materials import LAWS, make_flow, make_law
-from ..nclaw import admissible, deployed, neural, weights
+from ..materials.learned import admissible, learned_flow, learned_law, network, weights
 from ..nclaw.bodies import dim_of
-from ..nclaw.range import known
+from ..nclaw.strain_watch import known
 from ..shapes.quantities import Record, Sha256
 
 Number = Annotated[float, Meta(ge=-1e30, le=1e30)]
 NEURAL = "neural"       # the law whose parameters are a file
-LEARNED = *neural.STRESSES, *neural.CORRECTIONS, *admissible.MADE       # kinds that it may hold
+LEARNED = *network.STRESSES, *network.CORRECTIONS, *admissible.MADE       # kinds that it may hold
 
 
 class Flow(Record):
@@ -60,24 +60,24 @@ class Material(Record):
     def elastic(self):
         """The elastic law. Raises ValueError for a name or parameter that does not fit."""
         if self.is_neural:
-            return deployed.elastic(self.trained().elastic)
+            return learned_law(self.trained().elastic)
         return make_law(self.law, **_given(self, "law", "flow"))
 
     def flowing(self, dim):
         """The return map in `dim` dimensions; errors as `elastic`."""
         if self.is_neural:
-            return deployed.plastic(self.trained(dim).plastic)
+            return learned_flow(self.trained(dim).plastic)
         parameters = _given(self.flow, "type")
         return make_flow(self.flow.type, self.elastic(), dim, **parameters)
 
     def seen(self, dim):
-        """What its laws have seen in training (see `nclaw.range.known`); None where that is not
+        """What its laws saw in training (see `nclaw.strain_watch.known`); None where that is not
         known. Raises ValueError for weights that say something else.
         """
         return known(self.trained().about, dim) if self.is_neural else None
 
     def trained(self, dim=None):
-        """`nclaw.weights.Laws` of its file. Raises ValueError for a file that holds none, or for
+        """`learned.weights.Laws` of its file. Raises ValueError for a file that holds none, or for
         other dimensions, and for keys beside it.
         """
         beside = [*_given(self, "law", "weights", "sha256", "flow")]

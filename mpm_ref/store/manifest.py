@@ -135,7 +135,7 @@ class Part:
 
     first_step: int
     unsolved: int = 0
-    astray: list = field(default_factory=list)      # sentences of `nclaw.range`
+    astray: list = field(default_factory=list)      # sentences of `nclaw.strain_watch`
     code: dict = field(default_factory=code)
     began: str = field(default_factory=now)
     wall_start: float = field(default_factory=time.perf_counter)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ..energy import energy
 from ..monitor import Unstable, check
-from ..nclaw.range import watch as range_watch
+from ..nclaw.strain_watch import watch as range_watch
 from ..simulate import Frame, ended, frame_is_due, simulate
 from ..timestep import TooLarge
 from . import checkpoint
@@ -34,7 +34,7 @@ class Watch:
         """A frame was stored."""
 
     def astray(self, said):
-        """A learned law is asked what it has not seen, in a sentence (see `nclaw.range`)."""
+        """A learned law is asked what it has not seen, in a sentence (see `nclaw.strain_watch`)."""
 
 
 class _Stop(Exception):

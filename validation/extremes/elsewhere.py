@@ -7,16 +7,16 @@ from ..results import ROOT
 
 # What, and the test file with a word that names of tests in it must contain.
 HELD = (
-    ("affine fields are reproduced by G2P after P2G", "test_transfer", "affine"),
-    ("partition of unity, gradients that sum to zero, at cell faces", "test_spline", "unity"),
-    ("the SPD-projected differential", "test_materials", "projected"),
-    ("Taylor tests of energy, force and differential", "test_materials", "derivative"),
-    ("the same bits for any number of threads and layer", "test_determinism", "threads"),
-    ("the same bits across a restart", "test_resume", "bit"),
-    ("singular values that coincide, vanish or overflow", "test_spectral", "svd"),
-    ("laws at degenerate deformation", "test_material_extremes", ""),
-    ("hostile scenes end in one line", "test_scene_errors", ""),
-    ("kill, full disk, damaged files", "test_journal", ""),
+    ("affine fields are reproduced by G2P after P2G", "core/test_transfer", "affine"),
+    ("partition of unity, gradients that sum to zero, at cell faces", "core/test_spline", "unity"),
+    ("the SPD-projected differential", "materials/test_materials", "projected"),
+    ("Taylor tests of energy, force and differential", "materials/test_materials", "derivative"),
+    ("the same bits for any number of threads and layer", "core/test_determinism", "threads"),
+    ("the same bits across a restart", "store/test_resume", "bit"),
+    ("singular values that coincide, vanish or overflow", "core/test_spectral", "svd"),
+    ("laws at degenerate deformation", "materials/test_material_extremes", ""),
+    ("hostile scenes end in one line", "scene/test_errors", ""),
+    ("kill, full disk, damaged files", "store/test_journal", ""),
 )
 
 

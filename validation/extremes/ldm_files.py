@@ -8,8 +8,8 @@ from unittest.mock import patch
 import numpy as np
 
 from mpm_ref.rom import modes_file
-from mpm_ref.rom.curved import curved
-from mpm_ref.rom.modes import basis
+from mpm_ref.rom.fields.pod import basis
+from mpm_ref.rom.fields.polynomial_manifold import curved
 from mpm_ref.rom.weights import Model, load
 from mpm_ref.sealed import SEAL, opened, sealed
 

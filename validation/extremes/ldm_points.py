@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from mpm_ref.reduced.march import SCHEMES, Way
-from mpm_ref.rom.modes import held, measured
+from mpm_ref.rom.fields.pod import held, measured
 
 from ..ldm.studies import GRAVITY, TORSION
 from ..registry import experiment

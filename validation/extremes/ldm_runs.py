@@ -18,7 +18,7 @@ from mpm_ref.monitor import Unstable
 from mpm_ref.reduced.errors import Squares
 from mpm_ref.reduced.march import drawing
 from mpm_ref.reduced.watch import Nonsense, watch, watched
-from mpm_ref.rom.modes import basis
+from mpm_ref.rom.fields.pod import basis
 from mpm_ref.rom.step import BREAKDOWNS
 from mpm_ref.simulate import simulate
 

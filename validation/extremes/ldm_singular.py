@@ -3,9 +3,9 @@
 import numpy as np
 
 from mpm_ref.reduced.march import SCHEMES, Way
-from mpm_ref.rom.decoder import Decoder
-from mpm_ref.rom.modes import Modes
-from mpm_ref.rom.network import layers_of, network
+from mpm_ref.rom.fields.network import Decoder
+from mpm_ref.rom.fields.perceptron import layers_of, network
+from mpm_ref.rom.fields.pod import Modes
 
 from ..ldm.studies import GRAVITY
 from ..registry import experiment

@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm_ref.energy import kinetic
-from mpm_ref.laws.compare import Broken, positions
 from mpm_ref.monitor import volume_ratio
 from mpm_ref.nclaw.bodies import own
-from mpm_ref.nclaw.range import look
+from mpm_ref.nclaw.strain_watch import look
+from mpm_ref.nclaw.study.compare import Broken, positions
 from mpm_ref.scene import build
 
 from ..registry import experiment

@@ -1,5 +1,5 @@
 """Runs of learned laws at their extremes: how each ended, beside the same run of the true laws, and
-what the watch of strains said (see `mpm_ref.nclaw.range`).
+what the watch of strains said (see `mpm_ref.nclaw.strain_watch`).
 
 A run is bad where its error is above BAD times that of the run that the law was trained on, made
 again. It ends in one of four ways: it stopped, since a point has no finite place any more; it was
@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.laws.compare import Broken, positions
 from mpm_ref.nclaw.bodies import learned, own
-from mpm_ref.nclaw.range import look
+from mpm_ref.nclaw.strain_watch import look
+from mpm_ref.nclaw.study.compare import Broken, positions
 from mpm_ref.scene import build
 
 from ..nclaw.environments import ENVIRONMENTS, environment

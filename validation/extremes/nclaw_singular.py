@@ -12,10 +12,10 @@ import numpy as np
 
 from mpm_ref.core.spectral import UNDETERMINED
 from mpm_ref.explicit import deform_body, initial_stress
+from mpm_ref.materials.learned.invariants import spectrum
+from mpm_ref.materials.learned.strain_range import measures
 from mpm_ref.nclaw.bodies import gradients, points, stresses
-from mpm_ref.nclaw.invariants import spectrum
-from mpm_ref.nclaw.range import BEYOND, beyond
-from mpm_ref.nclaw.seen import measures
+from mpm_ref.nclaw.strain_watch import BEYOND, beyond
 from mpm_ref.scene import build
 
 from ..nclaw.environments import environment

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from mpm_ref.rom import spanned_file
-from mpm_ref.rom.spanned import Sizes
+from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.weights import Model
 from mpm_ref.sealed import opened
 

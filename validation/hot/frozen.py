@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from mpm_ref.hot.projectors import diagonal_blocks, inverses, onto_range
+from mpm_ref.hot.multigrid.projectors import diagonal_blocks, inverses, onto_range
 
 from .one_step import after
 from .stiffness import bar

@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from mpm_ref.hot.multigrid import hierarchy
-from mpm_ref.hot.projectors import block_diagonal, diagonal_blocks, onto_range
+from mpm_ref.hot.multigrid.hierarchy import hierarchy
+from mpm_ref.hot.multigrid.projectors import block_diagonal, diagonal_blocks, onto_range
 
 from ..registry import experiment
 from .begun import begun, steps

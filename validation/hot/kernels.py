@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mpm_ref.hot.embedding import kernel_value, width
+from mpm_ref.hot.multigrid.embedding import kernel_value, width
 
 from ..registry import experiment
 

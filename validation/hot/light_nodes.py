@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import cholesky, eigh, solve_triangular
 
-from mpm_ref.hot.multigrid import hierarchy
+from mpm_ref.hot.multigrid.hierarchy import hierarchy
 
 from ..registry import experiment
 from .one_step import Step, after, difference, solved

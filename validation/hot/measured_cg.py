@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import eigvalsh_tridiagonal
 
+from mpm_ref.hot.multigrid.smoothers import times
 from mpm_ref.hot.norms import dot
-from mpm_ref.hot.smoothers import times
 
 
 class Until(NamedTuple):

@@ -17,12 +17,12 @@ import scipy.sparse as sp
 import threadpoolctl
 
 from mpm_ref.core.jit import set_threads
-from mpm_ref.hot import block_multigrid
-from mpm_ref.hot.block_sweep import Sweep, sweep
 from mpm_ref.hot.krylov import Rule, block_jacobi, pcg, scalar_jacobi
 from mpm_ref.hot.linear import by_matrix
-from mpm_ref.hot.multigrid import hierarchy
-from mpm_ref.hot.projectors import diagonal_blocks
+from mpm_ref.hot.multigrid.blocks import hierarchy as block_hierarchy
+from mpm_ref.hot.multigrid.blocks.sweep import Sweep, sweep
+from mpm_ref.hot.multigrid.hierarchy import hierarchy
+from mpm_ref.hot.multigrid.projectors import diagonal_blocks
 
 from ..registry import experiment
 from .frozen import rigid_modes, twisted
@@ -41,8 +41,8 @@ RUN = 50                        # V-cycles, and iterations of CG, that are timed
 
 def gauss_seidel(system):
     """One symmetric sweep by block kernels."""
-    level, = block_multigrid.build(system.A, system.index, 1, "linear")
-    split = block_multigrid.GaussSeidel(level).split
+    level, = block_hierarchy.build(system.A, system.index, 1, "linear")
+    split = block_hierarchy.GaussSeidel(level).split
 
     def inverse(r):
         state = Sweep(np.empty_like(r), np.zeros_like(r), np.empty_like(r))

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from mpm_ref.hot.embedding import embed
+from mpm_ref.hot.multigrid.embedding import embed
 from mpm_ref.scene import build
 
 from ..registry import experiment

@@ -1,9 +1,10 @@
 """Beyond the paper: maps that need no training by gradients, and samples that are chosen.
 
-A curved map is POD with further modes that follow from the first (`rom.curved`): one linear solve
-after the singular value decomposition. Beside it stand POD and the trained network of the same
-latent dimension, on the same test runs. Nonlinear projection is what it needs: over a step, linear
-projection leaves the curve by dt^2 / 2 g''(vhat, vhat).
+A curved map is POD with further modes that follow from the first
+(`rom.fields.polynomial_manifold`): one linear solve after the singular value decomposition. Beside
+it stand POD and the trained network of the same latent dimension, on the same test runs. Nonlinear
+projection is what it needs: over a step, linear projection leaves the curve by dt^2 / 2 g''(vhat,
+vhat).
 """
 
 import numpy as np

@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm_ref.reduced.case import case
-from mpm_ref.rom.curved import curved
-from mpm_ref.rom.modes import basis, modes
+from mpm_ref.rom.fields.pod import basis, modes
+from mpm_ref.rom.fields.polynomial_manifold import curved
 
 from .nets import trained
 from .online import compared, reconstructed

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mpm_ref.rom.architecture import FEATURES, HIDDEN, KERNEL, SHORTEST, STRIDE, lengths
+from mpm_ref.rom.fields.architecture import FEATURES, HIDDEN, KERNEL, SHORTEST, STRIDE, lengths
 from mpm_ref.scene import build
 
 from ..registry import experiment

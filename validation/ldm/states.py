@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from mpm_ref.reduced.case import case, prescribed
 from mpm_ref.reduced.march import picked
-from mpm_ref.rom.samples import PER_GROUP
+from mpm_ref.rom.sampling import PER_GROUP
 
 from ..registry import experiment
 from .kept_bodies import keep

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mpm_ref.rom.samples import draw
+from mpm_ref.rom.sampling import draw
 
 from ..ldm.nets import trained
 from ..ldm.online import reconstructed

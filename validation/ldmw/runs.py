@@ -11,9 +11,9 @@ import threadpoolctl
 
 from mpm_ref.reduced.case import case
 from mpm_ref.reduced.march import Way, model, start, stepped
-from mpm_ref.rom.modes import modes
-from mpm_ref.rom.neighbours import neighbours
-from mpm_ref.rom.node_centric import node_centric, nodes_of
+from mpm_ref.rom.fields.pod import modes
+from mpm_ref.rom.quadrature.lagrangian import neighbours
+from mpm_ref.rom.quadrature.node_centric import node_centric, nodes_of
 
 from ..ldm.nets import trained
 from ..verification.scenes import threads_for

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mpm_ref.rom.architecture import HIDDEN
+from mpm_ref.rom.fields.architecture import HIDDEN
 from mpm_ref.scene import build
 
 from ..ldm.nets import SHARES, nets

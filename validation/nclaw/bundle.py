@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm_ref.archive import about_of, require_format, stated
-from mpm_ref.nclaw.weights import PARTS, Laws, arrays_of, fault_of, trained_of
+from mpm_ref.materials.learned.weights import PARTS, Laws, arrays_of, fault_of, trained_of
 from mpm_ref.sealed import opened, sealed, write_whole
 
 FORMAT = 1
@@ -18,7 +18,7 @@ FORMAT = 1
 class Bundle(NamedTuple):
     """Laws by epoch, and what is known of their training."""
 
-    laws: dict          # {epochs over: `mpm_ref.nclaw.weights.Laws`}, each with an about
+    laws: dict          # {epochs over: `learned.weights.Laws`}, each with an about
     about: dict         # plain values
 
 
@@ -43,7 +43,7 @@ def single(path, name, a):
     short = a.astype(np.float32)
     if not np.array_equal(short, a):
         raise ValueError(f"{path} is not written: {name} has more digits than single precision; "
-                         "store such laws with mpm_ref.nclaw.weights")
+                         "store such laws with mpm_ref.materials.learned.weights")
     return short
 
 

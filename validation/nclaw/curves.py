@@ -2,8 +2,8 @@
 4.7 among them); of graph networks, how far off they run freely.
 """
 
+from mpm_ref.materials.learned.weights import mixed
 from mpm_ref.nclaw.gnn.simulator import Simulator
-from mpm_ref.nclaw.weights import mixed
 
 from ..registry import experiment
 from .diverged import diverged

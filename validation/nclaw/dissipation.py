@@ -10,10 +10,10 @@ import numpy as np
 
 from mpm_ref.cases import in_order
 from mpm_ref.energy import kinetic
-from mpm_ref.laws.compare import Broken, positions
-from mpm_ref.nclaw import deployed
+from mpm_ref.materials.learned import learned_flow, learned_law
 from mpm_ref.nclaw.bodies import fresh, gradients
 from mpm_ref.nclaw.dissipation import balance, loops, work
+from mpm_ref.nclaw.study.compare import Broken, positions
 from mpm_ref.scene import build
 
 from ..registry import experiment
@@ -70,7 +70,7 @@ def known(run):
     laws = there(run, names.values(), trained)
     true = {(TRUE, name): build(environment(name)).bodies[0] for name in ENVIRONMENTS}
     return {**{key: Pair(body.law, body.flow) for key, body in true.items()},
-            **{key: Pair(deployed.elastic(laws[name].elastic), deployed.plastic(laws[name].plastic))
+            **{key: Pair(learned_law(laws[name].elastic), learned_flow(laws[name].plastic))
                for key, name in names.items() if name in laws}}
 
 

@@ -11,9 +11,9 @@ training in task (a) are of that corner in good part, which `goes_on` is for.
 
 import numpy as np
 
-from mpm_ref.laws.compare import Broken, Follower, Found, positions
 from mpm_ref.nclaw.bodies import fresh, learned, own
 from mpm_ref.nclaw.gnn.simulator import Simulator
+from mpm_ref.nclaw.study.compare import Broken, Follower, Found, positions
 from mpm_ref.scene import build
 
 from ..verification.scenes import threads_for

@@ -2,8 +2,8 @@
 
 from math import isclose
 
-from mpm_ref.laws.compare import Broken
 from mpm_ref.nclaw.gnn.graph import Lost
+from mpm_ref.nclaw.study.compare import Broken
 
 from .simulators import start
 

@@ -5,7 +5,7 @@ import numpy as np
 from mpm_ref.body import Body, particles_at
 from mpm_ref.explicit import deform_body, initial_stress
 from mpm_ref.materials import NoFlow
-from mpm_ref.nclaw import deployed
+from mpm_ref.materials.learned import learned_flow, learned_law
 from mpm_ref.scene import build
 
 from ..registry import experiment
@@ -30,7 +30,7 @@ def table5(run):
     F, trial = drawn(trajectory(NAME), environment(NAME).dt)
     truth = answers(law, NoFlow(), F, trial)[0], without_shear(trial)
     for name, laws in there(run, METHODS, trained).items():
-        found = answers(deployed.elastic(laws.elastic), deployed.plastic(laws.plastic), F, trial)
+        found = answers(learned_law(laws.elastic), learned_flow(laws.plastic), F, trial)
         for (term, unit), a, b in zip(TERMS.items(), found, truth, strict=True):
             run.record(f"nclaw.table5.{term}.{METHODS[name]}", np.mean((a - b) ** 2), unit=unit,
                        scale=f"{POINTS} points of the training run, seed {SEED}", **RULES[term])

@@ -5,8 +5,8 @@ their training, made again as far as it needs to be, shows.
 from functools import cache
 
 from mpm_ref.nclaw.bodies import learned
-from mpm_ref.nclaw.learn.recipe import Recipe
-from mpm_ref.nclaw.visited import cuts_of, met
+from mpm_ref.nclaw.train.recipe import Recipe
+from mpm_ref.nclaw.train.strains import cuts_of, met
 from mpm_ref.scene import build
 
 from ..verification.scenes import threads_for
@@ -18,7 +18,7 @@ LABELED = "labeled"     # the method that runs no segments
 
 @cache
 def met_by(name):
-    """Bounds (see `mpm_ref.nclaw.seen`) of the laws of `nets` by name; errors as of `trained`."""
+    """Bounds (see `learned.strain_range`) of the laws of `nets` by name; errors as of `trained`."""
     laws = trained(name)
     return laws.about["seen"] if "seen" in laws.about else bounds(nets()[name], laws)
 

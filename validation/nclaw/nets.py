@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from mpm_ref.nclaw import weights
+from mpm_ref.materials.learned import weights
 from mpm_ref.nclaw.gnn import weights as of_graphs
 from mpm_ref.scene.text import canonical
 
@@ -24,12 +24,12 @@ class Net(NamedTuple):
     """What is trained on an environment, and how."""
 
     environment: str
-    elastic: str = "Stress"         # kind of answer, of `nclaw.response`
+    elastic: str = "Stress"         # kind of answer, of `learned.response`
     plastic: str = "Correction"
     epochs: int = 300
-    reading: str = "release"        # of `nclaw.learn.recipe`
+    reading: str = "release"        # of `nclaw.train.recipe`
     seed: int = 0
-    method: str = "ours"            # of `nclaw.learn.methods`
+    method: str = "ours"            # of `nclaw.train.methods`
     elastic_rate: float = 1.0
     plastic_rate: float = 0.1
     velocity: float = 0.0           # weight of velocities in the loss [s^2]
@@ -79,7 +79,7 @@ def others(name):
 
 @cache
 def trained(name):
-    """`nclaw.weights.Laws` by name, or `nclaw.gnn.simulator.Simulator`. Raises `Untrained` where
+    """`learned.weights.Laws` by name, or `nclaw.gnn.simulator.Simulator`. Raises `Untrained` where
     they are missing, ValueError where they are damaged, or of another training or another scene
     than `nets` says now.
     """

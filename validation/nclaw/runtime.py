@@ -4,8 +4,8 @@ from time import perf_counter, process_time
 
 import numpy as np
 
-from mpm_ref.laws.compare import Broken
 from mpm_ref.nclaw.bodies import own
+from mpm_ref.nclaw.study.compare import Broken
 from mpm_ref.scene import build
 
 from ..registry import experiment

@@ -9,7 +9,7 @@ from math import prod
 
 import numpy as np
 
-from mpm_ref.nclaw.weights import PARTS
+from mpm_ref.materials.learned.weights import PARTS
 from mpm_ref.sampling import points
 from mpm_ref.scene import build
 from mpm_ref.shapes.inside import solid

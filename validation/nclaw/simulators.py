@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm_ref.cases import in_order
-from mpm_ref.laws.compare import positions
 from mpm_ref.nclaw.bodies import own
 from mpm_ref.nclaw.gnn.history import box_of
+from mpm_ref.nclaw.study.compare import positions
 from mpm_ref.scene import build
 from mpm_ref.store.words import counted
 
@@ -28,7 +28,7 @@ FIRST_SEED = 100            # of the second run; those of task (b) are 1, 7 and 
 
 
 class GraphNet(NamedTuple):
-    """A graph network that is trained on an environment, and how (`nclaw.learn.gnn.recipe`)."""
+    """A graph network that is trained on an environment, and how (`nclaw.gnn.train.recipe`)."""
 
     environment: str
     runs: int = 1

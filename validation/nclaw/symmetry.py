@@ -5,9 +5,9 @@
 import numpy as np
 
 from mpm_ref.explicit import initial_stress
-from mpm_ref.laws.compare import positions
 from mpm_ref.materials import NoFlow
 from mpm_ref.nclaw.bodies import gradients, own, points, stresses
+from mpm_ref.nclaw.study.compare import positions
 from mpm_ref.scene import build
 
 from ..registry import experiment

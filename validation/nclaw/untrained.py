@@ -11,15 +11,17 @@ from math import sqrt
 
 import numpy as np
 
-from mpm_ref.nclaw.response import Correction, Stress
-from mpm_ref.nclaw.weights import Laws, Trained
+from mpm_ref.materials.learned.response import Correction, Stress
+from mpm_ref.materials.learned.weights import Laws, Trained
 
 SIZES = (13, 64, 64, 9)
 BITS = 24
 
 
 def untrained(seed=0, elastic=None, plastic=None):
-    """`nclaw.weights.Laws` of a seed, the elastic law drawn first; answers of `nclaw.response`."""
+    """`learned.weights.Laws` of a seed, the elastic law drawn first; with answers of
+    `learned.response`.
+    """
     draws = np.random.RandomState(seed)
     kinds = Stress() if elastic is None else elastic, Correction() if plastic is None else plastic
     laws = [Trained(tuple(layers(draws)), kind) for kind in kinds]

@@ -18,14 +18,12 @@ import numpy as np
 
 from mpm_ref.reduced.nsf.fields import BLOCK
 from mpm_ref.reduced.whole import whole
-from mpm_ref.rom.architecture import DEPTH
-from mpm_ref.rom.decoder import Decoder, Units
-from mpm_ref.rom.field import Field, FieldUnits
-from mpm_ref.rom.inference import infer
-from mpm_ref.rom.learned import LearnedFields, learned
-from mpm_ref.rom.network import network
-from mpm_ref.rom.radial import Radial
-from mpm_ref.rom.spanned import Part, Sizes, Spanned, cells
+from mpm_ref.rom.fields.architecture import DEPTH
+from mpm_ref.rom.fields.network import Decoder, Field, FieldUnits, LearnedFields, Units, learned
+from mpm_ref.rom.fields.perceptron import network
+from mpm_ref.rom.fields.pod_fields import Part, Sizes, Spanned, cells
+from mpm_ref.rom.fields.radial_basis import Radial
+from validation.nsf.pointwise_networks import infer
 
 from ..registry import experiment
 from .speed import whole_steps
@@ -167,7 +165,7 @@ def seconds_of_a_point(fields, points):
 
 def passes(fields, points):
     """Seconds for a point of networks' positions with their derivatives, stress and affine field:
-    layer by layer, and point by point in one compiled pass (`rom.inference`).
+    layer by layer, and point by point in one compiled pass (`pointwise_networks`).
     """
     xhat, X = latent(fields), fields.X[points]
 

@@ -1,6 +1,6 @@
 """Errors of reduced runs with inferred stress: jelly cube and sand column (Table 1, Figures 7 and
-12, appendix B), with fields that are spans of modes (`mpm_ref/rom/spanned.py`) in place of the
-paper's networks.
+12, appendix B), with fields that are spans of modes (`mpm_ref/rom/fields/pod_fields.py`) in
+place of the paper's networks.
 """
 
 import numpy as np

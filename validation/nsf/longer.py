@@ -15,7 +15,7 @@ from mpm_ref.reduced.errors import Errors
 from mpm_ref.reduced.inferring import Plan
 from mpm_ref.reduced.nsf.evaluate import course, level_of, share
 from mpm_ref.reduced.whole import at_once, history, whole
-from mpm_ref.rom.placed import NoBody
+from mpm_ref.rom.kinematics import NoBody
 from mpm_ref.simulate import simulate
 
 from ..registry import experiment

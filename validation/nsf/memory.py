@@ -1,6 +1,6 @@
-"""What latent coordinates of position and stress together give (`rom.joint`), beside those of
-positions alone: a block that is sheared to and fro, whose places say little of its stress, and the
-sand column, which flows one way.
+"""What latent coordinates of position and stress together give (`rom.fields.joint_latent`), beside
+those of positions alone: a block that is sheared to and fro, whose places say little of its stress,
+and the sand column, which flows one way.
 """
 
 from functools import partial
@@ -11,11 +11,11 @@ from mpm_ref.reduced.inferring import drawn
 from mpm_ref.reduced.nsf.evaluate import closest, course, level_of, share
 from mpm_ref.reduced.nsf.fields import BLOCK
 from mpm_ref.reduced.whole import history, whole
-from mpm_ref.rom.histories import joined
+from mpm_ref.rom.fields.joint_latent import Joint, Stacked, joint
+from mpm_ref.rom.fields.pod_fields import Sizes, spanned
 from mpm_ref.rom.inferred import Inferred, Position
-from mpm_ref.rom.joint import Joint, Stacked, joint
 from mpm_ref.rom.projection import project_position
-from mpm_ref.rom.spanned import Sizes, spanned
+from mpm_ref.rom.snapshots import joined
 from mpm_ref.rom.symmetric import tensor
 
 from ..registry import experiment

@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 from mpm_ref.reduced.nsf.fields import BLOCK
 from mpm_ref.reduced.whole import whole
-from mpm_ref.rom.architecture import DEPTH
+from mpm_ref.rom.fields.architecture import DEPTH
+from mpm_ref.rom.fields.network import learned
 from mpm_ref.rom.fields_file import load
-from mpm_ref.rom.learned import learned
 from mpm_ref.scene.text import canonical
 
 from ..waiting import Untrained
@@ -55,7 +55,7 @@ class Net(NamedTuple):
     latent: str = "directions"      # of `learn.fit.LATENTS`
     schedule: str = "warm"          # of `learn.schedule`
     seed: int = 0
-    octaves: int = 0                # of the features of places (`rom.features`) that h and l read
+    octaves: int = 0                # of the Fourier features that h and l read
 
 
 def nets():

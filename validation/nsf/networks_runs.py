@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 
 from mpm_ref.reduced.errors import Errors
-from mpm_ref.rom import features
-from mpm_ref.rom.architecture import DEPTH
+from mpm_ref.rom.fields import perceptron
+from mpm_ref.rom.fields.architecture import DEPTH
 
 from .. import targets
 from ..registry import experiment
@@ -69,7 +69,7 @@ def said_of(octaves):
 
 def weights_of(study, own, width, octaves=0):
     """Number of weights, without biases, of one network with hidden layers so wide."""
-    inputs = features.count(DIM, octaves) + study.sizes.r + (own == "h" and study.follows)
+    inputs = perceptron.count(DIM, octaves) + study.sizes.r + (own == "h" and study.follows)
     return sum(n * m for n, m in pairwise((inputs, *(width,) * DEPTH, OUTPUTS[own])))
 
 

@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 
 from mpm_ref.reduced.whole import history, whole
-from mpm_ref.rom.reach import bases, reach
+from mpm_ref.rom.quadrature.stencil_overlap import bases, reach
 
 from ..ldm.kept_bodies import keep
 from ..registry import experiment

@@ -4,7 +4,7 @@ as they are printed.
 
 from mpm_ref.reduced.inferring import Plan
 from mpm_ref.reduced.whole import whole
-from mpm_ref.rom import architecture
+from mpm_ref.rom.fields import architecture
 from mpm_ref.rom.learn.schedule import PRINTED
 
 from .. import targets

@@ -12,7 +12,7 @@ import numpy as np
 
 from mpm_ref.reduced.inferring import drawn, of_cells, weighed
 from mpm_ref.reduced.vary import varied
-from mpm_ref.rom.spanned import Sizes
+from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.scene import Poisson
 
 from ..verification.scenes import shipped

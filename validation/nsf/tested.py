@@ -9,10 +9,10 @@ from mpm_ref.reduced.inferring import Plan, infer
 from mpm_ref.reduced.nsf.evaluate import closest, course, level_of, share
 from mpm_ref.reduced.nsf.fields import BLOCK
 from mpm_ref.reduced.whole import history, whole
-from mpm_ref.rom.deformed import deformed
-from mpm_ref.rom.histories import joined
+from mpm_ref.rom.fields.elastic import deformed
+from mpm_ref.rom.fields.pod_fields import spanned
 from mpm_ref.rom.inferred import INVERSIONS
-from mpm_ref.rom.spanned import spanned
+from mpm_ref.rom.snapshots import joined
 from mpm_ref.store.words import counted
 
 FASTER = 1.5            # longer steps at deployment

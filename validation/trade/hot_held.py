@@ -1,4 +1,5 @@
-"""The stop by what a step hands on (`mpm_ref.hot.held`), tried on scenes it was not fitted to.
+"""The stop by what a step hands on (`mpm_ref.hot.displacement_stop`), tried on other
+scenes than those it was fitted to.
 
 Its safety factor was chosen on the bar of Figure 20, the wheel and the aluminium sheets, its cap on
 CG on the first steps of donut and chain in the middle of things; here are other scenes, and later
@@ -11,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.hot.held import SAFETY
+from mpm_ref.hot.displacement_stop import SAFETY
 
 from ..hot.begun import BEGUN, begun, particles, steps
 from ..hot.one_step import difference, solved

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm_ref.explicit import deform_body
-from mpm_ref.laws.compare import Broken, positions
+from mpm_ref.materials.learned.weights import PARTS
 from mpm_ref.nclaw.bodies import own, points
-from mpm_ref.nclaw.weights import PARTS
+from mpm_ref.nclaw.study.compare import Broken, positions
 from mpm_ref.scene import build
 
 from ..nclaw.environments import environment

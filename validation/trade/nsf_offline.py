@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm_ref.reduced.whole import history
-from mpm_ref.rom.histories import joined
+from mpm_ref.rom.snapshots import joined
 
 from ..ldm.racing import clocked
 from ..nsf.networks import fields_of, nets, trained

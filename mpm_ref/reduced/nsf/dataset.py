@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...mapped import empty
-from ...rom.histories import Histories
+from ...rom.snapshots import Histories
 from ...rom.symmetric import values
 from ...store.results import Results
 from ..generate import file_of

@@ -10,7 +10,7 @@ from math import inf, nan
 import numpy as np
 
 from ...rom.inferred import nearest
-from ...rom.placed import NoBody
+from ...rom.kinematics import NoBody
 from ...rom.step import BREAKDOWNS
 from ...rom.symmetric import values
 from ..errors import Errors, Squares

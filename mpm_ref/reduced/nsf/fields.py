@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ...rom.learned import learned
-from ...rom.spanned import spanned
+from ...rom.fields.network import learned
+from ...rom.fields.pod_fields import spanned
 from ..errors import MEASURED, Squares
 from .networks import Networks
 

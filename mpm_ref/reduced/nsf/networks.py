@@ -5,15 +5,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ...rom import fields_file
-from ...rom.decoder import Decoder
-from ...rom.field import Field
+from ...rom.fields.network import Decoder, Field
 from ...rom.weights import Model
 
 STAGES = "ghl"
 
 
 class Networks(NamedTuple):
-    """The three fields; they know no points (see `rom.learned`)."""
+    """The three fields; they know no points (see `rom.fields.network`)."""
 
     g: Decoder      # position
     h: Field        # stress

@@ -7,9 +7,9 @@ import numpy as np
 
 from ...body import Body, particles_at
 from ...materials import NoFlow
-from ...rom.extent import Extent
+from ...rom.extrapolation import Extent
+from ...rom.fields.pod_fields import Spanned
 from ...rom.inferred import Position, Report
-from ...rom.spanned import Spanned
 from ...store import Fields
 from ..inferring import Plan, begin, continued, drawn, of_cells, weighed
 from ..whole import Whole

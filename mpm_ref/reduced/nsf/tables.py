@@ -6,8 +6,8 @@ from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
+from ...rom.fields.pod_fields import Sizes
 from ...rom.inferred import INVERSIONS
-from ...rom.spanned import Sizes
 from ...shapes.quantities import Count, Natural, NotNegative, Positive, Seed
 from ..inferring import Plan
 from ..tables import MODES, NETWORK, Kinds, Runs, Table, one_of
@@ -27,8 +27,8 @@ Step = Annotated[float, Meta(ge=0.01)]
 
 
 class Fields(Kinds):
-    """The fields: sums of modes (see `rom.spanned`), or networks and how they are trained (see
-    `rom.learn.drive_fields`).
+    """The fields: sums of modes (see `rom.fields.pod_fields`), or networks and how they are
+    trained (see `rom.learn.drive_fields`).
     """
 
     keys: ClassVar[dict] = KEYS
@@ -39,7 +39,7 @@ class Fields(Kinds):
     weight: Positive = SIZES["weight"]          # of these beside latent coordinates
     smoothing: NotNegative = SIZES["smoothing"]
     beta: Factors = (16, 16, 16)                # widths of hidden layers over numbers of values
-    octaves: Octaves = 0                        # of sines and cosines of places (`rom.features`)
+    octaves: Octaves = 0                        # of Fourier features (see `rom.fields.perceptron`)
     latent: str = LATENTS[0]
     schedule: str = SCHEDULES[0]                # of learning rates
     epochs: Count = 1500                        # of the position

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...rom.cubature import misfit
-from ...rom.extent import extent, motion
-from ...rom.spanned import Spanned
+from ...rom.extrapolation import extent, motion
+from ...rom.fields.pod_fields import Spanned
 from ..watch import BEYOND, LATENTS, LOOKED, WORDS, some
 
 SPARSE = 0.74       # of `rom.cubature.misfit`, from runs of jelly cube and metal frame

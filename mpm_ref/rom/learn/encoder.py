@@ -11,7 +11,7 @@ from itertools import pairwise
 import torch
 from torch import nn
 
-from ..architecture import FEATURES, KERNEL
+from ..fields.architecture import FEATURES, KERNEL
 
 
 class Encoder(nn.Module):

@@ -16,7 +16,8 @@ from torch.nn.functional import mse_loss, pad
 
 from ... import checkpoints
 from ...cost import Cost
-from ..field import Field, field_units
+from ..fields.network import Field
+from ..snapshots import field_units
 from . import session
 from .perceptron import Perceptron, weights_of
 from .session import SAVE, require_sound, saving, sha256

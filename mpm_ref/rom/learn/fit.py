@@ -8,8 +8,8 @@ import torch
 
 from ... import checkpoints
 from ...cost import Cost
-from ..architecture import ENCODERS, HIDDEN
-from ..modes import basis, directions
+from ..fields.architecture import ENCODERS, HIDDEN
+from ..fields.pod import basis, directions
 from ..snapshots import units
 from . import session
 from .data import batch_of, data_of
@@ -59,7 +59,7 @@ class Training:
 class Trained(NamedTuple):
     """A decoder, and what it was trained on knows of it."""
 
-    decoder: object         # `rom.decoder.Decoder`
+    decoder: object         # `rom.fields.network.Decoder`
     xhat: np.ndarray        # (s, k + 1, r) latent coordinates of the training snapshots
     history: np.ndarray     # (epochs, 4) loss, and its terms, of each epoch
     cost: Cost              # of all parts of the training

@@ -1,4 +1,4 @@
-"""Networks in torch: the same numbers as `rom.network`, with gradients for their weights."""
+"""Networks in torch: the numbers of `fields.perceptron`, with gradients for their weights."""
 
 from itertools import pairwise
 from math import pi
@@ -7,15 +7,14 @@ import numpy as np
 import torch
 from torch import nn
 
-from ..architecture import HIDDEN
-from ..decoder import Decoder, Units
-from ..features import count
-from ..network import layers_of, network
+from ..fields.architecture import HIDDEN
+from ..fields.network import Decoder, Units
+from ..fields.perceptron import count, layers_of, network
 
 
 class Perceptron(nn.Module):
-    """f of `rom.decoder` and `rom.field`: scaled (X, xhat) to standardised displacements, or to as
-    many other outputs as told; for fields that depend on parameters, xhat stands for both.
+    """f of `rom.fields.network`: scaled (X, xhat) to standardised displacements, or to as many
+    other outputs as told; for fields that depend on parameters, xhat stands for both.
     """
 
     def __init__(self, dim, r, hidden=HIDDEN, outputs=None, octaves=0):
@@ -34,7 +33,7 @@ class Perceptron(nn.Module):
         return self.layers[-1](a)
 
     def features(self, X):
-        """As `rom.features`."""
+        """As `rom.fields.perceptron`."""
         waves = [wave(2.0**o * pi * X) for o in range(self.octaves)
                  for wave in (torch.sin, torch.cos)]
         return torch.cat([X, *waves], dim=-1)

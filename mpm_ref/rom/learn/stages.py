@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from ..architecture import hidden
+from ..fields.architecture import hidden
 from ..fields_file import Model
 from ..snapshots import Snapshots
 from . import field, fit

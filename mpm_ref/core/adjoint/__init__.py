@@ -1,0 +1,1 @@
+"""Adjoints of the kernels of `core`: each file has the name of the file it differentiates."""

@@ -1,0 +1,203 @@
+"""Adjoint of the transfers: gradients of a loss carried back through g2p and through p2g.
+
+A bar is the gradient of the loss with respect to the field of the same name; bars of particles are
+kept in a `Particles`, those of nodes in a `Grid`. What the transfer gathers its adjoint scatters,
+and the other way round. Names as in `transfer`; a_ip is the `lever` of a pair.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..jit import CHUNKS, chunk, kernel, parallel, prange
+from ..state import NONE, add_body_force, affine, body_force, full, put_affine, put_full
+from ..stencil import (
+    add_to_node,
+    arm,
+    column,
+    columns,
+    gradient,
+    inverse_inertia,
+    node,
+    of_node,
+    product,
+)
+from ..tensor import dot, fill, inner, lin, mat, mlin, mv, outer, put_vec, vec, vm
+from ..transfer_mls3 import fits
+from .curvature import hessian
+from .lever import GradientForm, MlsForm, around, lever, lever_bar
+from .transfer_mls3 import gather_bars_mls3_all, scatter_bars_mls3_color
+
+
+class Moved(NamedTuple):
+    """What g2p moved: positions before the step, and the bars of sum_i w_ip v_i."""
+
+    x: np.ndarray       # (N, d)
+    u: np.ndarray       # (N, d)
+
+
+class Exchange(NamedTuple):
+    """How particles and grid exchange momentum in one step."""
+
+    stencil: tuple
+    dt: float       # [s]
+    flip: float     # share of FLIP; used where the grid carries v_old
+    mls: bool
+
+
+@kernel
+def scatter_bars(moved, grid, bars, nodes, stencil, members):
+    """Adjoint of `gather` and `gather_mls` for the particles in `members`.
+
+    With bars C_p, L_p after the step, bars.v = flip v'_p and U_ip = u_p + D^-1 C_p r_ip:
+    v_i += w_ip U_ip + L_p dw_ip,   v_old_i -= w_ip flip v'_p
+    x_p += sum_i (v_i . U_ip - v_old_i . flip v'_p) dw_ip - w_ip (D^-1 C_p)^T v_i
+                 + (d^2 w_ip/dx_p^2) L_p^T v_i
+    """
+    d = grid.m.shape
+    D_inv = inverse_inertia(grid.dx, stencil)
+    for p in members:
+        base, splines = around(vec(moved.x, p, d), grid, stencil)
+        x, u, lag = vec(bars.x, p, d), vec(moved.u, p, d), vec(bars.v, p, d)
+        B = affine(bars.C, p, d)
+        B = mlin(D_inv, B, 0.0, B)
+        for c in range(columns(x, stencil)):
+            k = column(c, stencil, d)
+            for l in range(len(stencil)):
+                i = node(base, k, l)
+                w_ip, v_i = product(k, l, splines.w), of_node(grid.v, i)
+                U_ip = lin(1.0, u, 1.0, mv(B, arm(k, l, splines.s, grid.dx)))
+                add_to_node(nodes.v, i, lin(w_ip, U_ip, 1.0, stretch(bars.L, p, k, l, splines)))
+                add_old(nodes.v_old, i, -w_ip, lag)
+                along = dot(v_i, U_ip) - dot(old(grid.v_old, i, d), lag)
+                x = lin(1.0, x, along, gradient(k, l, splines.w, splines.dw, grid.dx))
+                turned = stretch_bar(bars.L, p, v_i, k, l, splines)
+                x = lin(1.0, x, 1.0, lin(-w_ip, vm(v_i, B), 1.0, turned))
+        put_vec(bars.x, p, x)
+
+
+@kernel
+def stretch(L, p, k, l, splines):
+    """L_p dw_ip, or zero where L is C (MLS)."""
+    if L.ndim == 3:
+        return mv(mat(L, p, splines.s), gradient(k, l, splines.w, splines.dw, splines.dx))
+    else:
+        return fill(0.0, splines.s)
+
+
+@kernel
+def stretch_bar(L, p, v_i, k, l, splines):
+    """(d^2 w_ip/dx_p^2) L_p^T v_i, or zero where L is C (MLS)."""
+    if L.ndim == 3:
+        return mv(hessian(k, l, splines), vm(v_i, mat(L, p, v_i)))
+    else:
+        return fill(0.0, v_i)
+
+
+@kernel
+def old(v_old, i, like):
+    """v_old_i, or zero where it is not carried."""
+    if v_old.ndim == 1:
+        return fill(0.0, like)
+    else:
+        return of_node(v_old, i)
+
+
+@kernel
+def add_old(v_old, i, w, v):
+    """v_old_i += w v, where it is carried."""
+    if v_old.ndim > 1:
+        add_to_node(v_old, i, lin(w, v, 0.0, v))
+
+
+@kernel
+def gather_bars(particles, nodes, bars, stencil, form, bounds):
+    """Adjoint of `scatter` and `scatter_mls` for the particles bounds[0] .. bounds[1] - 1.
+
+    With phi_ip = m_i + v_i . (v_p + C_p r_ip) + f_i . b_p, where m_i, v_i, f_i are bars of nodes:
+    x_p += sum_i m_p phi_ip dw_ip - m_p w_ip C_p^T v_i - V0_p (da_ip/dx_p)^T tau_p^T f_i
+    v_p += sum_i w_ip m_p v_i,   m_p += sum_i w_ip phi_ip,   V0_p -= tau_p : sum_i f_i a_ip^T
+    b_p += sum_i w_ip m_p f_i    (added to)
+    C_p = sum_i w_ip m_p v_i r_ip^T,   tau_p = -V0_p sum_i f_i a_ip^T       (overwritten)
+    """
+    d = nodes.m.shape
+    for p in range(bounds[0], bounds[1]):
+        base, splines = around(vec(particles.x, p, d), nodes, stencil)
+        m, V0, x = particles.m[p], particles.V0[p], vec(bars.x, p, d)
+        v, C = vec(particles.v, p, d), affine(particles.C, p, d)
+        b, tau = body_force(particles.b, p, d), full(particles.tau, p, d)
+        mass, mv_p, f_p = 0.0, fill(0.0, d), fill(0.0, d)
+        B, T = outer(f_p, f_p), outer(f_p, f_p)
+        for c in range(columns(x, stencil)):
+            k = column(c, stencil, d)
+            for l in range(len(stencil)):
+                i = node(base, k, l)
+                w_ip, r_ip = product(k, l, splines.w), arm(k, l, splines.s, nodes.dx)
+                v_i = of_node(nodes.v, i)
+                f_i = force_bar(nodes.f, i, v_i, form.dt)
+                phi = nodes.m[i] + dot(v_i, lin(1.0, v, 1.0, mv(C, r_ip))) + dot(f_i, b)
+                mass += w_ip * phi
+                mv_p, f_p = lin(1.0, mv_p, w_ip, v_i), lin(1.0, f_p, w_ip, f_i)
+                B = mlin(1.0, B, w_ip, outer(v_i, r_ip))
+                T = mlin(1.0, T, 1.0, outer(f_i, lever(k, l, splines, form)))
+                x = lin(1.0, x, m * phi, gradient(k, l, splines.w, splines.dw, nodes.dx))
+                x = lin(1.0, x, -V0, lever_bar(k, l, splines, vm(f_i, tau), form))
+        put_vec(bars.x, p, lin(1.0, x, -m, vm(mv_p, C)))
+        put_vec(bars.v, p, lin(1.0, vec(bars.v, p, d), m, mv_p))
+        put_affine(bars.C, p, m, B)
+        put_full(bars.tau, p, mlin(-V0, T, 0.0, T))
+        add_body_force(bars.b, p, m, f_p)
+        bars.m[p] += mass
+        bars.V0[p] -= inner(tau, T)
+
+
+@kernel
+def force_bar(f, i, v_i, dt):
+    """Bar of the force: dt times that of the momentum, unless the grid carries forces apart."""
+    if f.ndim == 1:
+        return lin(dt, v_i, 0.0, v_i)
+    else:
+        return of_node(f, i)
+
+
+@parallel
+def _scatter_color(moved, grid, bars, nodes, stencil, slabs):
+    for h in prange(len(slabs.start) // 2):
+        members = slabs.order[slabs.start[2 * h] : slabs.start[2 * h + 1]]
+        scatter_bars(moved, grid, bars, nodes, stencil, members)
+
+
+@parallel
+def _gather(particles, nodes, bars, stencil, form):
+    for c in prange(CHUNKS):
+        gather_bars(particles, nodes, bars, stencil, form, chunk(c, len(particles.x)))
+
+
+def g2p_adjoint(x, grid, bars, nodes, how, slabs):
+    """Adjoint of `g2p` of particles at x (N, d): bars of x, v, C, L after it add to those of nodes
+    (v, v_old) and become those of x and v before it.
+
+    Slabs of one colour run in parallel (see `p2g`). Under MLS the bar of C is that of L too, and
+    bars.L is not read.
+    """
+    moved = Moved(x, bars.v + how.dt * bars.x)
+    bars.v[:] *= how.flip if grid.v_old.ndim > 1 else 0.0
+    if how.mls:
+        bars = bars._replace(L=NONE)
+    run = scatter_bars_mls3_color if fits(grid, how.stencil, how.mls) else _scatter_color
+    for color in (0, 1):
+        of_color = slabs._replace(start=slabs.start[color:])
+        run(moved, grid, bars, nodes, how.stencil, of_color)
+
+
+def p2g_adjoint(particles, nodes, bars, how):
+    """Adjoint of `p2g`: from the bars `nodes` of m, v, f to those of particles; those of x, v, b,
+    m, V0 are added to, those of C and tau overwritten.
+    """
+    if fits(nodes, how.stencil, how.mls):
+        gather_bars_mls3_all(particles, nodes, bars, how.stencil, how.dt)
+        return
+    form = GradientForm(how.dt)
+    if how.mls:
+        form = MlsForm(how.dt, inverse_inertia(nodes.dx, how.stencil))
+    _gather(particles, nodes, bars, how.stencil, form)

@@ -1,0 +1,1 @@
+"""Node-embedding multigrid: a text on SciPy matrices, and in `blocks` its fast twin."""

@@ -1,0 +1,1 @@
+"""The V-cycle on kernels of d x d blocks, tested against the text in `multigrid`."""

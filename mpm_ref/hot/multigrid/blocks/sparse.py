@@ -1,0 +1,90 @@
+"""Sparse matrices of d x d blocks as arrays that kernels read."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ....core.jit import CHUNKS, chunk, kernel, parallel, prange
+from ....core.tensor import mat, put_mat
+
+KNOWN = ((2, 2), (3, 3))     # sizes of blocks
+SERIAL = 4000     # nodes below which starting threads costs more than they save
+
+
+class Blocks(NamedTuple):
+    """Rows of blocks, as in scipy.sparse.bsr_array: row i is data[start[i] : start[i + 1]]."""
+
+    start: np.ndarray      # (n + 1,)     int32
+    column: np.ndarray     # (k,)         int32
+    data: np.ndarray       # (k, d, d)
+    like: np.ndarray       # no elements, d axes: the dimension, where kernels need to know it
+
+
+def no_nodes(d):
+    """An array of d axes and no elements, to tell kernels the dimension: its shape is a d-tuple."""
+    return np.empty((0,) * d)
+
+
+def blocks_of(A):
+    """Blocks that share the arrays of a bsr_array A, whose indices are sorted.
+
+    Raises ValueError unless they are 2 x 2 or 3 x 3: kernels would write past the end of arrays.
+    """
+    if A.blocksize not in KNOWN:
+        raise ValueError(f"matrix in blocks of {A.blocksize}: expected (2, 2) or (3, 3), or "
+                         "path = 'scipy'")
+    return Blocks(A.indptr, A.indices, A.data, no_nodes(A.blocksize[0]))
+
+
+@kernel
+def find(A, i, j):
+    """Place of block (i, j) in A, whose rows are sorted; -1 if it is not stored."""
+    low, high = A.start[i], A.start[i + 1]
+    while low < high:
+        middle = (low + high) // 2
+        if A.column[middle] < j:
+            low = middle + 1
+        else:
+            high = middle
+    if low < A.start[i + 1] and A.column[low] == j:
+        return low
+    return -1
+
+
+@kernel
+def _diagonal(A, D):
+    for i in range(len(D)):
+        e = find(A, i, i)
+        if e >= 0:
+            put_mat(D, i, mat(A.data, e, A.like.shape))
+
+
+def diagonal(A):
+    """Diagonal blocks (n, d, d) of A; zero where one is not stored."""
+    d = A.like.ndim
+    D = np.zeros((len(A.start) - 1, d, d))
+    _diagonal(A, D)
+    return D
+
+
+@kernel
+def _reach(A, index, bounds):
+    reach = 0
+    for i in range(bounds[0], bounds[1]):
+        for e in range(A.start[i], A.start[i + 1]):
+            for a in range(index.shape[1]):
+                reach = max(reach, abs(index[A.column[e], a] - index[i, a]))
+    return reach
+
+
+@parallel
+def _reaches(A, index, reach):
+    for c in prange(CHUNKS):
+        reach[c] = _reach(A, index, chunk(c, len(index)))
+
+
+def reach_of(A, index):
+    """Largest distance along an axis, in nodes, between two nodes that A couples."""
+    reach = np.zeros(CHUNKS, dtype=np.int64)
+    _reaches(A, index, reach)
+    return int(reach.max())

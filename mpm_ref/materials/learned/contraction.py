@@ -1,0 +1,205 @@
+"""A return map that contracts the logarithmic strain, and so never adds to an elastic energy; 3D.
+
+Of a trial F = U diag(exp eps) V^T, with e = dev eps and theta = tr eps, it leaves U diag(exp eps')
+V^T:
+
+    e' = exp(-a) e,    theta' = exp(-b) theta where theta > 0, else theta
+    a, b = softplus(network(x)),    x = log(1 + (|e|, max(theta, 0), max(-theta, 0))/strain)
+
+It is a function of F that turns with the body, is isotropic, and leaves rest alone. Yielding at a
+radius r is a = max(0, log(|e|/r)), and sand's at a share of -theta alike (NCLAW-eq19, NCLAW-eq16):
+in these numbers both surfaces are straight lines.
+
+Why it dissipates, with any energy that grows with q, r, u and w (`energetic`). The strain goes
+first from (e, theta) to (e', theta), then to (e', theta'). On the first way, where e shrinks by a
+factor h,
+
+    q = exp(2 theta/3) sum_i exp(2 h e_i) + .., and r with -e_i, are convex in h and flat at h = 0
+
+as sum_i e_i = 0: they fall as h does, and u and w stay. On the second way theta > 0 falls; with
+A = sum_i exp(2 e_i)/3 >= 1, dq/dtheta = 2 A exp(2 theta/3) - 2 > 0, of r alike, and (J - 1)^2 and
+J - 1 - log J grow with J > 1. So psi falls on both, and with the rate of plastic deformation l_p =
+-d(eps)/dt in principal axes
+
+    tau : l_p = -dpsi/dt >= 0,    psi(trial) - psi(returned) = integral of tau : l_p >= 0
+
+point by point and step by step, whatever the networks are. Compressed matter keeps its volume: at
+theta < 0 and e != 0 a way to theta = 0 may first go uphill.
+"""
+
+from math import exp, log1p
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core.adjoint.deform import back, within
+from ...core.jit import CHUNKS, chunk, kernel, parallel, prange
+from ...core.spectral import UNDETERMINED, mixed
+from ...core.tensor import (
+    diagonal,
+    dot,
+    fill,
+    lin,
+    mat,
+    mmt,
+    mul,
+    norm,
+    put_mat,
+    put_vec,
+    scale_columns,
+    total_of,
+    vec,
+)
+from ..log_strain import deviator, log_strain, stretches
+from ..log_strain_adjoint import log_gap_ratio
+from ..stretches import inverse
+from .principal import pull_back_stretches
+
+READ, ANSWERED = 3, 2
+LIKE = (0, 1, 2)        # any tuple of length 3
+
+
+class Contraction(NamedTuple):
+    """Deformation gradient of less logarithmic strain."""
+
+    strain: float = 1e-3        # below which strains are read as they are, above by their logarithm
+
+
+def strains_of(of, kind):
+    """x (n, 3) of a `Spectrum`; NaN unless det F > 0."""
+    x = np.empty_like(of.s)
+    _strains(of.s, kind.strain, x)
+    return x
+
+
+def pull_back_strains(x_bar, of, kind):
+    """Gradient of F (n, 3, 3) from that of x (n, 3)."""
+    s_bar = np.empty_like(of.s)
+    _pull_strains(x_bar, of.s, kind.strain, s_bar)
+    return pull_back_stretches(s_bar, of)
+
+
+def contracted(c, of):
+    """F (n, 3, 3) after the return, of c = (a, b) (n, 2) and the `Spectrum` of the trial."""
+    F = np.empty_like(of.U)
+    _contracted(c, of, F)
+    return F
+
+
+def pull_back(G, c, of):
+    """Gradients of c (n, 2), and of the trial F (n, 3, 3) at fixed c, from that of F, G."""
+    c_bar, F_bar = np.empty_like(c), np.empty_like(of.U)
+    _pull(G, c, of, c_bar, F_bar)
+    return c_bar, F_bar
+
+
+@kernel
+def read(s, strain):
+    """x of singular values s."""
+    eps = log_strain(s)
+    theta = total_of(eps)
+    return (log1p(norm(deviator(eps)) / strain), log1p(max(theta, 0.0) / strain),
+            log1p(max(-theta, 0.0) / strain))
+
+
+@kernel
+def read_bars(x_bar, s, strain):
+    """Bar of s from that of x; 0 of |e| where e = 0, which has a kink."""
+    eps = log_strain(s)
+    e, theta = deviator(eps), total_of(eps)
+    size = norm(e)
+    of_size = x_bar[0] / (strain + size) / size if size > 0.0 else 0.0
+    of_theta = x_bar[1] / (strain + theta) if theta > 0.0 else -x_bar[2] / (strain - theta)
+    return mul(lin(of_size, e, of_theta, fill(1.0, e)), inverse(s))
+
+
+@kernel
+def left(s, a, b):
+    """Singular values after the return."""
+    eps = log_strain(s)
+    theta = total_of(eps)
+    kept = exp(-b) * theta if theta > 0.0 else theta
+    return stretches(lin(exp(-a), deviator(eps), kept / len(s), fill(1.0, s)))
+
+
+@kernel
+def left_bars(s, s_new, s_new_bar, a, b):
+    """Bars of s, a, b from that of `left`."""
+    eps = log_strain(s)
+    theta, bar = total_of(eps), mul(s_new, s_new_bar)
+    opened, mean, share = theta > 0.0, total_of(bar) / len(s), exp(-a)
+    kept = exp(-b) if opened else 1.0
+    a_bar = -share * dot(bar, deviator(eps))
+    b_bar = -kept * theta * mean if opened else 0.0
+    s_bar = mul(lin(share, deviator(bar), kept * mean, fill(1.0, s)), inverse(s))
+    return s_bar, a_bar, b_bar
+
+
+@kernel
+def pairs_of(s, s_new, share):
+    """What `mixed` needs of every pair."""
+    return (pair(s, s_new, 0, 1, share), pair(s, s_new, 0, 2, share), pair(s, s_new, 1, 2, share))
+
+
+@kernel
+def pair(s, s_new, i, j, share):
+    """(s'_i - s'_j)/(s_i - s_j), where a share of the deviator is left, and the same of sums."""
+    total = s[i] + s[j]
+    skew = (s_new[i] + s_new[j]) / total if total > UNDETERMINED * s[0] else 0.0
+    return log_gap_ratio(s, s_new, i, j, share, 0.0), skew
+
+
+@kernel
+def read_all(s, strain, x, bounds):
+    """x of the points bounds[0] .. bounds[1] - 1."""
+    for p in range(bounds[0], bounds[1]):
+        put_vec(x, p, read(vec(s, p, LIKE), strain))
+
+
+@kernel
+def pull_read(x_bar, s, strain, s_bar, bounds):
+    """Bars of s of the points bounds[0] .. bounds[1] - 1."""
+    for p in range(bounds[0], bounds[1]):
+        put_vec(s_bar, p, read_bars(vec(x_bar, p, LIKE), vec(s, p, LIKE), strain))
+
+
+@kernel
+def contract(c, of, F, bounds):
+    """F after the return of the points bounds[0] .. bounds[1] - 1."""
+    for p in range(bounds[0], bounds[1]):
+        s = left(vec(of.s, p, LIKE), c[p, 0], c[p, 1])
+        put_mat(F, p, mmt(scale_columns(mat(of.U, p, LIKE), s), mat(of.V, p, LIKE)))
+
+
+@kernel
+def pull(G, c, of, bars, bounds):
+    """bars = (c_bar, F_bar) of the points bounds[0] .. bounds[1] - 1."""
+    for p in range(bounds[0], bounds[1]):
+        U, s, V = mat(of.U, p, LIKE), vec(of.s, p, LIKE), mat(of.V, p, LIKE)
+        X, s_new = within(U, mat(G, p, LIKE), V), left(s, c[p, 0], c[p, 1])
+        s_bar, bars[0][p, 0], bars[0][p, 1] = left_bars(s, s_new, diagonal(X), c[p, 0], c[p, 1])
+        put_mat(bars[1], p, back(U, mixed(s_bar, pairs_of(s, s_new, exp(-c[p, 0])), X), V))
+
+
+@parallel
+def _strains(s, strain, x):
+    for c in prange(CHUNKS):
+        read_all(s, strain, x, chunk(c, len(s)))
+
+
+@parallel
+def _pull_strains(x_bar, s, strain, s_bar):
+    for c in prange(CHUNKS):
+        pull_read(x_bar, s, strain, s_bar, chunk(c, len(s)))
+
+
+@parallel
+def _contracted(c, of, F):
+    for k in prange(CHUNKS):
+        contract(c, of, F, chunk(k, len(F)))
+
+
+@parallel
+def _pull(G, c, of, c_bar, F_bar):
+    for k in prange(CHUNKS):
+        pull(G, c, of, (c_bar, F_bar), chunk(k, len(G)))

@@ -1,0 +1,141 @@
+"""What a neural law is told of a deformation gradient, and what comes back of it.
+
+With F = U diag(s) V^T, all of proper rotations, a law reads (NCLAW-alg4, NCLAW-input-norm)
+
+    a = (s - 1, F^T F - I, det F - 1),    d + d^2 + 1 numbers, 13 in 3D
+
+which rotations R* F leave alone (NCLAW-eq22 to NCLAW-eq30) and which vanish at F = I. Its answer is
+turned by R = U V^T. Pulled back, a gradient a' of a, and R' of R, is
+
+    F' = U (diag(s') + X) V^T + F (C' + C'^T) + J' cof F,    X_ij = (M_ij - M_ji)/(s_i + s_j)
+
+with M = U^T R' V (`spectral.d_rotation` is its own transpose): U and V alone are never read, so
+that repeated singular values need no care. There s' counts the values as they are sorted.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core.jit import CHUNKS, chunk, kernel, parallel, prange
+from ...core.spectral import d_rotation, svd
+from ...core.tensor import cofactor, det, diag, mat, mlin, mm, mmt, put_mat, put_vec, transpose, vec
+
+
+class Spectrum(NamedTuple):
+    """F = U diag(s) V^T of many points; see `spectral.svd`."""
+
+    U: np.ndarray       # (n, d, d)
+    s: np.ndarray       # (n, d)
+    V: np.ndarray       # (n, d, d)
+
+
+def count(d):
+    """How many numbers a law reads in d dimensions."""
+    return d + d * d + 1
+
+
+def spectrum(F):
+    """`Spectrum` of F (n, d, d); NaN where F is not finite."""
+    n, d, _ = F.shape
+    found = Spectrum(np.empty((n, d, d)), np.empty((n, d)), np.empty((n, d, d)))
+    _spectra(F, found, tuple(range(d)))
+    return found
+
+
+def rotations(of):
+    """R = U V^T (n, d, d) of a `Spectrum`."""
+    R = np.empty_like(of.U)
+    _turn(of, R, tuple(range(R.shape[1])))
+    return R
+
+
+def invariants(F, of):
+    """a (n, count(d)) of F (n, d, d) with its `Spectrum`."""
+    n, d, _ = F.shape
+    a = np.empty((n, count(d)))
+    _read(F, of.s, a, tuple(range(d)))
+    return a
+
+
+def pull_back(F, of, a_bar, R_bar):
+    """Gradient (n, d, d) with respect to F, of gradients a_bar (n, count(d)) and R_bar (n, d, d);
+    zero where F leaves R undetermined.
+    """
+    F_bar = np.empty_like(F)
+    _pull(F, of, (a_bar, R_bar), F_bar, tuple(range(F.shape[1])))
+    return F_bar
+
+
+@kernel
+def decompose(F, of, like, bounds):
+    """Singular value decompositions of the points bounds[0] .. bounds[1] - 1."""
+    for p in range(bounds[0], bounds[1]):
+        U, s, V, _ = svd(mat(F, p, like))
+        put_mat(of.U, p, U)
+        put_vec(of.s, p, s)
+        put_mat(of.V, p, V)
+
+
+@kernel
+def turn(of, R, like, bounds):
+    """R = U V^T of the points bounds[0] .. bounds[1] - 1."""
+    for p in range(bounds[0], bounds[1]):
+        put_mat(R, p, mmt(mat(of.U, p, like), mat(of.V, p, like)))
+
+
+@kernel
+def read(F, s, a, like, bounds):
+    """`describe` of the points bounds[0] .. bounds[1] - 1."""
+    for p in range(bounds[0], bounds[1]):
+        describe(mat(F, p, like), vec(s, p, like), a, p)
+
+
+@kernel
+def describe(F, s, a, p):
+    """a[p] = (s - 1, F^T F - I, det F - 1), F^T F row by row."""
+    d = len(s)
+    C = mm(transpose(F), F)
+    for i in range(d):
+        a[p, i] = s[i] - 1.0
+        for j in range(d):
+            a[p, d + d * i + j] = C[i][j] - (1.0 if i == j else 0.0)
+    a[p, d + d * d] = det(F) - 1.0
+
+
+@kernel
+def pull(F, of, bars, F_bar, like, bounds):
+    """F_bar of the points bounds[0] .. bounds[1] - 1, from bars = (a_bar, R_bar)."""
+    d, (a_bar, R_bar) = len(like), bars
+    for p in range(bounds[0], bounds[1]):
+        F_p, U, V = mat(F, p, like), mat(of.U, p, like), mat(of.V, p, like)
+        own = mmt(mm(U, diag(vec(a_bar, p, like))), V)
+        spin = d_rotation(U, vec(of.s, p, like), V, mat(R_bar, p, like))
+        C_bar = mat(a_bar[p, d:d + d * d].reshape(1, d, d), 0, like)
+        stretch = mm(F_p, mlin(1.0, C_bar, 1.0, transpose(C_bar)))
+        size = mlin(a_bar[p, d + d * d], cofactor(F_p), 1.0, stretch)
+        put_mat(F_bar, p, mlin(1.0, mlin(1.0, own, 1.0, spin), 1.0, size))
+
+
+@parallel
+def _spectra(F, of, like):
+    for c in prange(CHUNKS):
+        decompose(F, of, like, chunk(c, len(F)))
+
+
+@parallel
+def _turn(of, R, like):
+    for c in prange(CHUNKS):
+        turn(of, R, like, chunk(c, len(R)))
+
+
+@parallel
+def _read(F, s, a, like):
+    for c in prange(CHUNKS):
+        read(F, s, a, like, chunk(c, len(F)))
+
+
+@parallel
+def _pull(F, of, bars, F_bar, like):
+    for c in prange(CHUNKS):
+        pull(F, of, bars, F_bar, like, chunk(c, len(F)))

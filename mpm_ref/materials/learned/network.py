@@ -1,0 +1,219 @@
+"""Trained laws as a material: what kernels are compiled for, without PyTorch, in doubles.
+
+    tau = answer(net(a), F, R),    F' = answer(net'(a'), F_trial, R')
+
+with a of `invariants` and the answers of `response` (NCLAW-alg2, NCLAW-alg4), point by point:
+
+    a_0 = a,   a_{l+1} = gelu(a_l W_l + b_l),   y = a_{L-1} W_{L-1} + b_{L-1}
+
+gelu(z) = z (1 + erf(z / sqrt 2)) / 2. Rows are walked so that a sum over inputs adds vectors of
+outputs: no sum is reordered, and the compiler may use vector registers all the same.
+
+No energy belongs to such a stress. How stiff it is, is known at rest alone, from differences.
+"""
+
+from math import erf, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import law as names
+from ...core.jit import kernel
+from ...core.spectral import svd
+from ...core.tensor import mat, mmt
+from ..no_flow import never_fails
+from ..waves import moduli_at_rest, stiffness
+from . import response
+from .invariants import count, describe
+from .response import answer
+
+STEP = 1e-6             # of the differences at rest
+ROOT = sqrt(0.5)
+
+
+class NeuralLaw(NamedTuple):
+    """F -> tau [Pa], with the answer of a kind of `response`: a class of its own for each."""
+
+    sizes: np.ndarray   # widths of the layers, inputs first, outputs last; integer
+    W: np.ndarray       # weights: of layer l an array (sizes[l], sizes[l + 1]), flattened
+    b: np.ndarray       # biases: of layer l an array (sizes[l + 1],)
+    unit: float         # of the network's answer [Pa]
+    wave: float         # at rest: modulus of a compression wave, lam + 2 mu [Pa], 0 if negative
+    largest: float      # ... and the most that any velocity gradient meets [Pa]
+
+    @property
+    def dim(self):
+        """Number of space dimensions."""
+        return dim_of(self.sizes[0])
+
+
+class NeuralStress(NeuralLaw):
+    """As `response.Stress`."""
+
+
+class NeuralSymmetricStress(NeuralLaw):
+    """As `response.SymmetricStress`."""
+
+
+class NeuralPlainStress(NeuralLaw):
+    """As `response.PlainStress`."""
+
+
+class NeuralFlow(NamedTuple):
+    """F_trial -> F, a return map of the whole deformation gradient; classes as of `NeuralLaw`."""
+
+    sizes: np.ndarray
+    W: np.ndarray
+    b: np.ndarray
+    alpha: float        # what the network's answer is multiplied with
+
+    @property
+    def dim(self):
+        """Number of space dimensions."""
+        return dim_of(self.sizes[0])
+
+
+class NeuralCorrection(NeuralFlow):
+    """As `response.Correction`."""
+
+
+class NeuralPlainCorrection(NeuralFlow):
+    """As `response.PlainCorrection`."""
+
+
+STRESSES = {response.Stress: NeuralStress, response.SymmetricStress: NeuralSymmetricStress,
+            response.PlainStress: NeuralPlainStress}
+CORRECTIONS = {response.Correction: NeuralCorrection,
+               response.PlainCorrection: NeuralPlainCorrection}
+
+
+def dim_of(inputs):
+    """Number of space dimensions of a law that reads so many numbers."""
+    return {inputs_of(d): d for d in (2, 3) for inputs_of in (count, squared)}[int(inputs)]
+
+
+def squared(d):
+    """How many numbers a law reads that is told F alone."""
+    return d * d
+
+
+def elastic(trained):
+    """`NeuralLaw` of a `weights.Trained`. Raises ValueError for one that gives no stress."""
+    law = _made(STRESSES, trained, 0.0, 0.0)
+    wave, largest = moduli_of(law)
+    return law._replace(wave=wave, largest=largest)
+
+
+def plastic(trained):
+    """`NeuralFlow` of a `weights.Trained`. Raises ValueError for one that gives no F."""
+    return _made(CORRECTIONS, trained)
+
+
+def _made(classes, trained, *more):
+    try:
+        kind = classes[type(trained.kind)]
+    except KeyError:
+        raise ValueError(f"answers of kind {type(trained.kind).__name__}: expected "
+                         f"{' or '.join(known.__name__ for known in classes)}") from None
+    return kind(*network(trained.layers), *trained.kind, *more)
+
+
+def network(layers):
+    """sizes, W, b of layers [(W (in, out), b (out,))]."""
+    sizes = [len(layers[0][0]), *(len(b) for _, b in layers)]
+    W, b = (np.concatenate([np.ravel(a) for a in arrays]).astype(float)
+            for arrays in zip(*layers, strict=True))
+    return np.array(sizes), W, b
+
+
+def moduli_of(law):
+    """`NeuralLaw.wave` and `NeuralLaw.largest`, of its tangents at rest: along the stiffest axis,
+    and the norm of the whole map from strains to stresses. Pull and push differ, since singular
+    values are read in their order.
+    """
+    d = law.dim
+    rest, strains = np.eye(d), np.eye(d * d).reshape(-1, d, d)
+    tau = stress_of(rest, law)
+    tangents = [np.array([(stress_of(rest + h * e, law) - tau).ravel() for e in strains]) / h
+                for h in (STEP, -STEP)]
+    along = max(float(np.diag(tangent)[:: d + 1].max()) for tangent in tangents)
+    return max(along, 0.0), max(float(np.linalg.norm(tangent, 2)) for tangent in tangents)
+
+
+def stress_of(F, law):
+    """tau (d, d) of one F (d, d)."""
+    return np.array(kirchhoff(tuple(map(tuple, F.tolist())), law))
+
+
+@kernel
+def gelu(z):
+    """z times the normal distribution's share below z."""
+    return 0.5 * z * (1.0 + erf(ROOT * z))
+
+
+@kernel
+def outputs(a, sizes, W, b):
+    """What a network makes of inputs a."""
+    w, k, last = 0, 0, len(sizes) - 1
+    for l in range(last):
+        n, m = sizes[l], sizes[l + 1]
+        z = b[k:k + m].copy()
+        for i in range(n):
+            a_i, row = a[i], W[w + i * m:w + (i + 1) * m]
+            for j in range(m):
+                z[j] += a_i * row[j]
+        if l < last - 1:
+            for j in range(m):
+                z[j] = gelu(z[j])
+        a, w, k = z, w + n * m, k + m
+    return a
+
+
+@kernel
+def unturned(F, sizes, W, b):
+    """The network's Y at F, and R; NaN where F is not finite."""
+    d = len(F)
+    U, s, V, _ = svd(F)
+    a = np.empty((1, d + d * d + 1))
+    describe(F, s, a, 0)
+    if sizes[0] == d * d:
+        for i in range(d):
+            for j in range(d):
+                a[0, d * i + j] = F[i][j] - (1.0 if i == j else 0.0)
+    return mat(outputs(a[0], sizes, W, b).reshape(1, d, d), 0, F), mmt(U, V)
+
+
+@kernel
+def respond(F, law):
+    """The answer of a law or a flow at F."""
+    Y, R = unturned(F, law.sizes, law.W, law.b)
+    return answer(Y, F, R, law)
+
+
+@kernel
+def kirchhoff(F, law):
+    """tau = P F^T."""
+    return respond(F, law)
+
+
+@kernel
+def wave(law):
+    """lam + 2 mu at rest [Pa]."""
+    return law.wave
+
+
+@kernel
+def at_rest(law):
+    """`NeuralLaw.wave` and `NeuralLaw.largest` [Pa]."""
+    return law.wave, law.largest
+
+
+for _kind, _class in STRESSES.items():
+    answer.method(_class, answer.methods[_kind])
+    names.kirchhoff.method(_class, kirchhoff)
+    stiffness.method(_class, wave)
+    moduli_at_rest.method(_class, at_rest)
+for _kind, _class in CORRECTIONS.items():
+    answer.method(_class, answer.methods[_kind])
+    names.returned.method(_class, respond)
+    names.intact.method(_class, never_fails)

@@ -1,0 +1,153 @@
+"""Trained laws as a file (see `archive`): an elastic and a plastic law, layers and kinds.
+
+A kind is a record of numbers, and its type says what layers (W (in, out), b (out,)) are for:
+
+    answers of `response`       GELU between them; of the invariants, without R also of F - I
+    a stress of `principal`     ELU between them; from s - 1 to y, d numbers each
+    a stress of `spline`        one, the values of f, g, h at knots, b = 0
+    `Energetic`                 softplus between them, no W negative; from four measures to N
+    `Contraction`               GELU between them; from three strains to a and b before softplus
+    of `materials`              none, the record is the law: identified ones, and no return map
+"""
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from ... import materials
+from ...archive import read, stated, write
+from . import principal, response, spline
+from .contraction import ANSWERED, READ, Contraction
+from .energetic import MEASURES, Energetic
+from .invariants import count
+
+FORMAT = 1
+PARTS = ("elastic", "plastic")
+KINDS = {kind.__name__: kind for kind in (response.Stress, response.SymmetricStress,
+                                          response.PlainStress, response.Correction,
+                                          response.PlainCorrection)}
+ANSWERS = {"elastic": ("Stress", "SymmetricStress", "PlainStress"),
+           "plastic": ("Correction", "PlainCorrection")}
+TURNED = {(count(d), d * d) for d in (2, 3)}        # numbers into the first layer, out of the last
+PLAIN = TURNED | {(d * d, d * d) for d in (2, 3)}
+STRETCHES, KNOTS, NO_LAYERS = {(2, 2), (3, 3)}, {(len(spline.knots()), 3)}, set()
+BESIDE = {      # of methods that ours are compared with
+    "elastic": {principal.StretchStress: STRETCHES, principal.ReleasedStretchStress: STRETCHES,
+                spline.SplineStress: KNOTS, spline.ReleasedSplineStress: KNOTS,
+                Energetic: {(MEASURES, 1)},
+                materials.FixedCorotated: NO_LAYERS, materials.Hencky: NO_LAYERS,
+                materials.Fluid: NO_LAYERS},
+    "plastic": {Contraction: {(READ, ANSWERED)},
+                **{kind: NO_LAYERS for kind in (materials.NoFlow, materials.DruckerPrager,
+                                                materials.VonMises, materials.FluidProjection)}}}
+RECORDS = KINDS | {kind.__name__: kind for part in PARTS for kind in BESIDE[part]}
+ENDS = {name: PLAIN if name.startswith("Plain") else TURNED for name in KINDS}
+ENDS |= {kind.__name__: ends for part in PARTS for kind, ends in BESIDE[part].items()}
+
+
+class Trained(NamedTuple):
+    """A law: layers ((W (in, out), b (out,)), ..), which may be none, and its kind."""
+
+    layers: tuple
+    kind: tuple             # a NamedTuple of RECORDS
+
+
+class Laws(NamedTuple):
+    """Two trained laws, and what is known of their training."""
+
+    elastic: Trained        # F -> tau [Pa]
+    plastic: Trained        # trial F -> F
+    about: dict             # plain values
+
+
+def save(path, laws):
+    """Write `Laws`, whole or not at all. Raises ValueError for numbers that are not finite, sizes
+    that do not fit and an `about` with more than JSON knows, OSError where the system refuses.
+    """
+    arrays = stated(path, FORMAT, laws.about)
+    for part in PARTS:
+        arrays |= arrays_of(part, getattr(laws, part))
+    write(path, arrays, fault_of)
+
+
+def load(path):
+    """Read what `save` wrote. Raises ValueError saying what is wrong with the file."""
+    arrays, about = read(path, FORMAT, fault_of, "trained laws")
+    return Laws(*(trained_of(part, arrays) for part in PARTS), about)
+
+
+def mixed(about):
+    """Whether the errors of epochs in an `about` have the loss's term of velocities in them: such
+    files are older than `errors_of`, which says what errors are of.
+    """
+    return bool(about.get("recipe", {}).get("velocity")) and "errors_of" not in about
+
+
+def arrays_of(part, law):
+    """The arrays of a law by name."""
+    found = {f"{part}_kind": np.array(type(law.kind).__name__),
+             f"{part}_constants": np.array(law.kind, dtype=float)}
+    for k, (W, b) in enumerate(law.layers):
+        found |= {f"{part}_W{k}": np.asarray(W, float), f"{part}_b{k}": np.asarray(b, float)}
+    return found
+
+
+def trained_of(part, arrays):
+    """`Trained` from the arrays of a file."""
+    kind = RECORDS[str(arrays[f"{part}_kind"])]
+    layers = tuple((arrays[f"{part}_W{k}"], arrays[f"{part}_b{k}"])
+                   for k in range(depth(part, arrays)))
+    return Trained(layers, kind(*arrays[f"{part}_constants"].tolist()))
+
+
+def depth(part, arrays):
+    """How many layers a law has."""
+    return sum(name.startswith(f"{part}_W") for name in arrays)
+
+
+def fault_of(arrays):
+    """What is wrong with the arrays of a file, or None."""
+    for part in PARTS:
+        fault = fault_of_law(part, arrays)
+        if fault:
+            return fault
+    read = [arrays[f"{part}_W0"].shape[0] for part in PARTS
+            if str(arrays[f"{part}_kind"]) in ANSWERS[part]]
+    if len(set(read)) > 1:
+        return f"laws that read {read[0]} and {read[1]} numbers, expected as many"
+    return None
+
+
+def fault_of_law(part, arrays):
+    """What is wrong with a law, or None."""
+    kind = str(arrays.get(f"{part}_kind"))
+    known = *ANSWERS[part], *(record.__name__ for record in BESIDE[part])
+    if kind not in known:
+        return f"{part} law of kind {kind}, expected {' or '.join(known)}"
+    layers = depth(part, arrays)
+    names = [f"{part}_{what}{k}" for k in range(layers) for what in "Wb"]
+    missing = [name for name in (*names, f"{part}_constants") if name not in arrays]
+    if missing or (ENDS[kind] and not layers):
+        return f"{part} law without {', '.join(missing) or 'layers'}"
+    for name in (*names, f"{part}_constants"):
+        if arrays[name].dtype != float or not np.isfinite(arrays[name]).all():
+            return f"{name} has entries that are not finite numbers"
+    if arrays[f"{part}_constants"].shape != (len(RECORDS[kind]._fields),):
+        return f"{part} law with constants {arrays[f'{part}_constants']}"
+    if kind == Energetic.__name__ and any((arrays[f"{part}_W{k}"] < 0.0).any()
+                                          for k in range(layers)):
+        return f"{part} law of an energy with negative weights"
+    return fault_of_sizes(part, arrays, ENDS[kind])
+
+
+def fault_of_sizes(part, arrays, ends):
+    """What is wrong with the sizes of a law's layers, or None; ends: those that they may have."""
+    layers = range(depth(part, arrays))
+    sizes = [arrays[f"{part}_W{k}"].shape for k in layers]
+    if (any(len(size) != 2 for size in sizes) or any(a[1] != b[0] for a, b in pairwise(sizes))
+            or (sizes and (sizes[0][0], sizes[-1][1]) not in ends)):
+        return f"{part} law with layers of sizes {sizes}"
+    if any(arrays[f"{part}_b{k}"].shape != (sizes[k][1],) for k in layers):
+        return f"{part} law with biases that do not fit"
+    return None

@@ -1,0 +1,95 @@
+"""The graph network [GNS] as it is trained; single precision. See `gnn.network`.
+
+Weights are drawn from a normal distribution of variance 1/inputs, cut at two deviations; biases
+begin at zero. What an edge tells the first layer of its perceptron about its ends is found point by
+point, then carried to the edges: the same sum, of fewer products.
+"""
+
+from itertools import pairwise
+
+import torch
+from torch import nn
+
+from .. import network
+from ..history import HISTORY
+from ..weights import LAYERS
+
+
+class Perceptron(nn.Module):
+    """Affine maps with max(z, 0) between them, then a normalisation unless `norm` is False."""
+
+    def __init__(self, inputs, width, outputs, norm=True):
+        super().__init__()
+        sizes = (inputs, *(LAYERS - 1) * (width,), outputs)
+        self.layers = nn.ModuleList([nn.Linear(n, m) for n, m in pairwise(sizes)])
+        for layer in self.layers:
+            deviation = layer.in_features**-0.5
+            nn.init.trunc_normal_(layer.weight, std=deviation, a=-2 * deviation, b=2 * deviation)
+            nn.init.zeros_(layer.bias)
+        self.norm = nn.LayerNorm(outputs, eps=network.TINY) if norm else nn.Identity()
+
+    def forward(self, a):
+        """Outputs (n, outputs) of inputs (n, inputs)."""
+        return self.onward(self.layers[0](a))
+
+    def onward(self, z):
+        """Outputs of what the first layer gives (n, width)."""
+        for layer in self.layers[1:]:
+            z = layer(torch.relu(z))
+        return self.norm(z)
+
+
+class Block(nn.Module):
+    """One passing of messages."""
+
+    def __init__(self, width):
+        super().__init__()
+        self.edges = Perceptron(3 * width, width, width)
+        self.points = Perceptron(2 * width, width, width)
+
+    def forward(self, v, e, senders, receivers):
+        """v (n, width) and e (k, width) after it."""
+        first = self.edges.layers[0]
+        own, sent, received = first.weight.split(v.shape[1], dim=1)
+        z = nn.functional.linear(e, own, first.bias)
+        for weight, ends in ((sent, senders), (received, receivers)):
+            z = z + nn.functional.linear(v, weight).index_select(0, ends)
+        m = self.edges.onward(z)
+        gathered = torch.zeros_like(v).index_add(0, receivers, m)
+        return v + self.points(torch.cat([v, gathered], dim=1)), e + m
+
+
+class GraphNetwork(nn.Module):
+    """What points (n, ..) and edges (k, ..) are told -> answers (n, d)."""
+
+    def __init__(self, dim=3, width=128, blocks=10):
+        super().__init__()
+        self.points = Perceptron((HISTORY + 2) * dim, width, width)
+        self.edges = Perceptron(dim + 1, width, width)
+        self.blocks = nn.ModuleList([Block(width) for _ in range(blocks)])
+        self.answer = Perceptron(width, width, dim, norm=False)
+
+    def forward(self, points, edges, graph):
+        """The answers; graph: `Graph` of tensors."""
+        v, e = self.points(points), self.edges(edges)
+        for block in self.blocks:
+            v, e = block(v, e, *graph)
+        return self.answer(v)
+
+
+def exported(net):
+    """`gnn.network.Network` of a `GraphNetwork`, in doubles."""
+    blocks = tuple((plain(block.edges), plain(block.points)) for block in net.blocks)
+    return network.Network(plain(net.points), plain(net.edges), blocks, plain(net.answer))
+
+
+def plain(perceptron):
+    """`gnn.network.Perceptron` of a `Perceptron`."""
+    layers = tuple((double(layer.weight).T.copy(), double(layer.bias))
+                   for layer in perceptron.layers)
+    return network.Perceptron(layers, tuple(map(double, perceptron.norm.parameters())))
+
+
+def double(parameter):
+    """A parameter as an array of doubles, a copy."""
+    return parameter.detach().double().numpy().copy()

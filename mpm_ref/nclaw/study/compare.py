@@ -1,0 +1,137 @@
+"""A run of a scene by other laws beside the run by its own (NCLAW-eval).
+
+A frame's error is the mean over points and axes of (x - x_true)^2; a run's that over its frames,
+the first one, which is zero, included. Runs go side by side, none is kept.
+
+A run breaks down where a coordinate of a point is not a number any more.
+"""
+
+from contextlib import nullcontext
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+
+from ...body import keep_inside
+from ...cases import in_order
+from ...core.grid import OutOfRange
+from ...reduced.generate import one_thread
+from ...scene import SceneError, build
+from ...simulate import SORT, last_step
+from ..bodies import own
+
+FEW = 5000      # particles, up to which a second thread would wait more than it works
+
+
+class Broken(ValueError):
+    """A run does not go on: attributes step and why."""
+
+    def __init__(self, step, why):
+        self.step, self.why = step, why
+        super().__init__(f"step {step}: {why}")
+
+
+class Found(NamedTuple):
+    """What became of a run."""
+
+    error: float            # [m^2]; infinite if it broke down, unless it goes on
+    step: int = -1          # in which it broke down
+    why: str = ""
+
+
+class Follower:
+    """A run beside the true one, and the sum of the errors of its frames."""
+
+    def __init__(self, frames, corner):
+        self.frames, self.corner = frames, corner
+        self.total, self.count, self.broken = 0.0, 0, None
+
+    def follow(self, x):
+        """The error of the next frame [m^2], where the true one is x."""
+        error = float(np.mean((self.place() - x) ** 2))
+        self.total += error
+        self.count += 1
+        return error
+
+    def place(self):
+        """Positions in the next frame; the corner for all points of a run that broke down."""
+        if self.broken is None:
+            try:
+                return next(self.frames)
+            except Broken as end:
+                self.broken = end
+        return self.corner
+
+    def found(self):
+        """`Found` so far."""
+        broken = () if self.broken is None else (self.broken.step, self.broken.why)
+        return Found(self.total / self.count, *broken)
+
+
+def beside(problem, law):
+    """Yield (error of a frame [m^2], `Found` so far) of a run of a problem by another law: a
+    function that makes a body of it, see `nclaw.bodies.learned`. Errors are infinite from where it
+    breaks down. Raises `Broken` where the problem's own laws break down.
+    """
+    with threads_for(problem.bodies):
+        run = Follower(positions(problem, tuple(map(law, problem.bodies))), np.inf)
+        for x in positions(problem, tuple(map(own, problem.bodies))):
+            yield run.follow(x), run.found()
+
+
+def threads_for(bodies):
+    """A context of one thread where there are few particles; bits do not depend on it."""
+    few = sum(len(body.id) for body in bodies) <= FEW
+    return one_thread() if few else nullcontext()
+
+
+def positions(problem, bodies):
+    """Positions (n, d) of all points at the start and at each frame, bodies one after the other, in
+    their own order. The run is that of `simulate`, not stopped for its energy or its speed; raises
+    `Broken` where a point has no finite place.
+    """
+    clock, stepper = problem.clock, problem.stepper()
+    stepper.start(bodies)
+    yield placed(bodies)
+    for k in range(clock.steps):
+        try:
+            if k % SORT == 0:
+                stepper.sort(bodies)
+            stepper.step(bodies, k * clock.dt, clock.dt)
+        except OutOfRange as error:
+            raise Broken(k, str(error)) from None
+        if problem.clip is not None:
+            keep_inside(bodies, *problem.clip)
+        if (k + 1) % clock.every == 0:
+            x = placed(bodies)
+            if not np.isfinite(x).all():
+                p = int(np.argwhere(~np.isfinite(x))[0, 0])
+                raise Broken(k + 1, f"particle {p} has position {x[p]}")
+            yield x
+
+
+def placed(bodies):
+    """Positions (n, d) of the points of bodies."""
+    return np.concatenate([in_order(body.particles.x, body.id) for body in bodies])
+
+
+def problem_of(scene, source, steps=None):
+    """The `Problem` of a scene that `positions` runs: explicit steps of fixed length, of one
+    material; so many, if given. Frames are those of the scene, else all steps. Raises SceneError.
+    """
+    if scene.integrator != "explicit" or scene.dt is None:
+        raise SceneError(f'{source}: expected the integrator "explicit" and a fixed `dt`, so that '
+                         "both runs take the same steps")
+    if scene.interval is not None:
+        raise SceneError(f"{source}: interval = {scene.interval}: expected frames by `every`")
+    steps = steps or last_step(build(scene, source).clock)
+    require_one_material(scene, source)
+    return build(msgspec.structs.replace(scene, steps=steps, end=None,
+                                         every=min(scene.every or 1, steps)), source)
+
+
+def require_one_material(scene, source):
+    """Raise SceneError where bodies of a scene differ in their material."""
+    if any(body.material != scene.body[0].material for body in scene.body):
+        raise SceneError(f"{source}: its bodies are of several materials, expected one, in whose "
+                         "place the learned laws stand")

@@ -1,0 +1,160 @@
+"""Laws that thermodynamics admits, as they are trained (`energetic`, `contraction`); in doubles.
+
+What is learned of a weight of the energy is its logarithm, so that it stays positive; biases are
+free. Training starts from moduli of about `kind.unit`, and from a return that takes START of the
+strain in a step, as much as NCLAW-alg4 adds. It starts with little of r, which grows with the
+fourth power of stretches: else the first epochs take all stress away to be rid of that.
+"""
+
+from itertools import pairwise
+from math import log
+
+import torch
+from torch import nn
+from torch.autograd import Function
+
+from ...materials.learned import contraction, energetic
+from ...materials.learned.invariants import spectrum
+from ...materials.learned.weights import Trained
+from .kinds import LawOfKind
+from .perceptron import Perceptron, layers_of
+
+HIDDEN = {"elastic": (16, 16), "plastic": (32, 32)}
+START = 1e-3        # a and b of the return map, at first
+SHARES = 1.0, 0.02, 1.0, 1.0        # of q, r, u, w in the energy, at first
+
+
+class Measures(Function):
+    """F (n, 3, 3) -> q, r, u, w (n, 4)."""
+
+    @staticmethod
+    def forward(ctx, F):
+        """The measures."""
+        ctx.F = F.contiguous().numpy()
+        return torch.from_numpy(energetic.measures_of(ctx.F))
+
+    @staticmethod
+    def backward(ctx, m_bar):
+        """Gradient of F."""
+        return torch.from_numpy(energetic.pull_back_measures(m_bar.contiguous().numpy(), ctx.F))
+
+
+class EnergyStress(Function):
+    """Slopes g (n, 4) of an energy and F (n, 3, 3) -> tau (n, 3, 3)."""
+
+    @staticmethod
+    def forward(ctx, g, F):
+        """tau."""
+        ctx.of = g.contiguous().numpy(), F.contiguous().numpy()
+        return torch.from_numpy(energetic.stresses(*ctx.of))
+
+    @staticmethod
+    def backward(ctx, G):
+        """Gradients of g, and of F at fixed g."""
+        return tuple(map(torch.from_numpy, energetic.pull_back(G.contiguous().numpy(), *ctx.of)))
+
+
+class Strains(Function):
+    """Trial F (n, 3, 3) and its `Spectrum` -> what a `Contraction` reads (n, 3)."""
+
+    @staticmethod
+    def forward(ctx, F, of, kind):
+        """x."""
+        ctx.of = of, kind
+        return torch.from_numpy(contraction.strains_of(of, kind))
+
+    @staticmethod
+    def backward(ctx, x_bar):
+        """Gradient of F."""
+        found = contraction.pull_back_strains(x_bar.contiguous().numpy(), *ctx.of)
+        return torch.from_numpy(found), None, None
+
+
+class Contracted(Function):
+    """c = (a, b) (n, 2), trial F (n, 3, 3) and its `Spectrum` -> F (n, 3, 3)."""
+
+    @staticmethod
+    def forward(ctx, c, F, of):
+        """F."""
+        ctx.of = c.contiguous().numpy(), of
+        return torch.from_numpy(contraction.contracted(*ctx.of))
+
+    @staticmethod
+    def backward(ctx, G):
+        """Gradients of c, and of F at fixed c."""
+        found = contraction.pull_back(G.contiguous().numpy(), *ctx.of)
+        return *map(torch.from_numpy, found), None
+
+
+class GrowingConvex(nn.Module):
+    """Inputs (n, inputs) -> slopes (n, inputs) of a convex function that grows with each of them.
+
+    W = exp(log_W) (in, out) of all layers, softplus between them; the last one has no bias. The
+    first layer begins with those shares of inputs.
+    """
+
+    def __init__(self, shares, hidden):
+        super().__init__()
+        sizes = len(shares), *hidden, 1
+        self.log_W = nn.ParameterList([
+            nn.Parameter(0.5 * torch.randn(n, m, dtype=torch.float64) - (log(n) if k else 0.0))
+            for k, (n, m) in enumerate(pairwise(sizes))])
+        with torch.no_grad():
+            self.log_W[0] += torch.tensor(shares, dtype=torch.float64).log()[:, None]
+        self.b = nn.ParameterList([nn.Parameter(torch.zeros(n, dtype=torch.float64))
+                                   for n in hidden])
+
+    def forward(self, m):
+        """The slopes."""
+        *inner, last = (log_W.exp() for log_W in self.log_W)
+        a, grown = m, []
+        for W, b in zip(inner, self.b, strict=True):
+            z = a @ W + b
+            a = nn.functional.softplus(z)
+            grown.append(torch.sigmoid(z))
+        g = last.T
+        for W, growth in zip(reversed(inner), reversed(grown), strict=True):
+            g = (g * growth) @ W.T
+        return g
+
+    def layers(self):
+        """[(W (in, out), b (out,))] as arrays."""
+        biases = [*self.b, torch.zeros(1, dtype=torch.float64)]
+        return tuple((log_W.detach().exp().numpy().copy(), b.detach().numpy().copy())
+                     for log_W, b in zip(self.log_W, biases, strict=True))
+
+
+class EnergeticLaw(LawOfKind):
+    """F (n, 3, 3) -> tau (n, 3, 3) [Pa] of an energy."""
+
+    def __init__(self, kind):
+        super().__init__(kind)
+        self.net = GrowingConvex(SHARES, HIDDEN["elastic"])
+
+    def forward(self, F):
+        """tau."""
+        return self.kind.unit * EnergyStress.apply(self.net(Measures.apply(F)), F)
+
+    def trained(self):
+        """`Trained` of the law."""
+        return Trained(self.net.layers(), self.kind)
+
+
+class ContractionLaw(LawOfKind):
+    """Trial F (n, 3, 3) -> F (n, 3, 3) of less strain."""
+
+    def __init__(self, kind):
+        super().__init__(kind)
+        self.net = Perceptron(contraction.READ, contraction.ANSWERED, HIDDEN["plastic"], bias=True)
+        self.net.double()
+        nn.init.constant_(self.net.layers[-1].bias, log(START))
+
+    def forward(self, F):
+        """F after the return."""
+        of = spectrum(F.detach().numpy())
+        c = nn.functional.softplus(self.net(Strains.apply(F, of, self.kind)))
+        return Contracted.apply(c, F, of)
+
+    def trained(self):
+        """`Trained` of the law."""
+        return Trained(tuple(layers_of(self.net)), self.kind)

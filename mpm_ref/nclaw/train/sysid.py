@@ -1,0 +1,144 @@
+"""The true laws with their constants trained, the paper's oracle "sys-id" (NCLAW-eq4).
+
+What is trained is the logarithm of Young's modulus and that of the return map's own constant, yield
+stress or slope of the cone; Poisson's ratio stays as it is. As in the authors' release log E starts
+at START of its value (1e5 Pa at 1e4), yield stress and friction angle at START of theirs. There
+these two are trained without a logarithm, and the return map has a modulus of its own, of which
+nothing can be known beside a yield stress. Adjoints are those of `core.adjoint.deform`.
+"""
+
+from math import log
+
+import numpy as np
+import torch
+from torch import nn
+from torch.autograd import Function
+
+from ...core import deform
+from ...core.adjoint import deform as deform_adjoint
+from ...core.adjoint.deform import DeformBars, Step
+from ...core.jit import CHUNKS
+from ...core.state import NO_HISTORY, NONE, Particles
+from ...materials import NoFlow
+from ...materials.learned.weights import Trained
+from .rollout import Laws
+from .unchanged import Unchanged
+
+START = 0.8
+
+
+class Known(Function):
+    """F (n, d, d), constants (c,) of a law, then of a flow -> tau, or F after the return map.
+
+    of: types of law and flow; with NoFlow it is tau.
+    """
+
+    @staticmethod
+    def forward(ctx, F, constants, of):
+        """tau or F."""
+        law, flow = ctx.records = records(constants.tolist(), of)
+        ctx.F, like = F.contiguous().numpy(), axes(F)
+        q = particles(ctx.F.copy(), np.zeros(F.shape))
+        if isinstance(flow, NoFlow):
+            deform.initial_stress(q, law, flow, like)
+            return torch.from_numpy(q.tau)
+        deform.plastic(q, law, flow, 0.0, like)
+        return torch.from_numpy(q.F)
+
+    @staticmethod
+    def backward(ctx, G):
+        """Gradients of F and of the constants."""
+        (law, flow), G, zero = ctx.records, G.contiguous().numpy(), np.zeros(G.shape)
+        sums = np.zeros((CHUNKS, len(law) + len(flow)))
+        if isinstance(flow, NoFlow):
+            bars = DeformBars(zero, G, zero, NO_HISTORY)
+            deform_adjoint.initial_stress(ctx.F, NO_HISTORY, bars, law, flow, sums)
+        else:
+            bars = DeformBars(G.copy(), zero, zero.copy(), NO_HISTORY)
+            at_rest = Step(ctx.F, NO_HISTORY, zero, sums, 0.0)
+            deform_adjoint.plastic(at_rest, bars, law, flow)
+        return torch.from_numpy(bars.F), torch.from_numpy(sums.sum(axis=0)), None
+
+
+def axes(F):
+    """A tuple of length d."""
+    return tuple(range(F.shape[-1]))
+
+
+def particles(F, tau):
+    """`Particles` at rest, of which deformation reads F and changes F and tau."""
+    still, at = np.zeros_like(F), np.zeros(F.shape[:2])
+    return Particles(at, at, still, still, F, tau, at[:, 0].copy(), at[:, 0].copy(), NO_HISTORY,
+                     NONE)
+
+
+def records(constants, of):
+    """The law and the flow of constants in a row."""
+    law, flow = of
+    moduli = len(law._fields)
+    return law(*constants[:moduli]), flow(*constants[moduli:])
+
+
+class KnownStress(nn.Module):
+    """F (n, d, d) -> tau (n, d, d) of a law with a learned log E.
+
+    unit: the law's record for E = 1 Pa; log_E: where it begins.
+    """
+
+    def __init__(self, unit, log_E):
+        super().__init__()
+        self.law, self.unit = type(unit), torch.tensor([*unit], dtype=torch.float64)
+        self.log_E = nn.Parameter(torch.tensor(log_E, dtype=torch.float64))
+
+    def extra_repr(self):
+        """The law for E = 1 Pa."""
+        return repr(self.law(*self.unit.tolist()))
+
+    def moduli(self):
+        """Constants of the law [Pa]."""
+        return self.log_E.exp() * self.unit
+
+    def forward(self, F):
+        """tau."""
+        return Known.apply(F, self.moduli(), (self.law, NoFlow))
+
+    def trained(self):
+        """`Trained` without layers: the law's record."""
+        return Trained((), self.law(*self.moduli().tolist()))
+
+
+class KnownReturn(nn.Module):
+    """F (n, d, d) -> F after the return map of a flow whose first constant, if any, is learned.
+
+    elastic: the `KnownStress` whose moduli it reads; flow: its record as it begins.
+    """
+
+    def __init__(self, elastic, flow):
+        super().__init__()
+        self.moduli, self.of = elastic.moduli, (elastic.law, type(flow))
+        row = torch.tensor([*flow], dtype=torch.float64)
+        self.log_own, self.fixed = nn.Parameter(row[:1].log()), row[1:]
+
+    def extra_repr(self):
+        """The flow, and those of its constants that are not learned."""
+        return f"{self.of[1].__name__}, {self.fixed.tolist()}"
+
+    def constants(self):
+        """Those of the flow."""
+        return torch.cat([self.log_own.exp(), self.fixed])
+
+    def forward(self, F):
+        """F after the return map."""
+        return Known.apply(F, torch.cat([self.moduli(), self.constants()]), self.of)
+
+    def trained(self):
+        """`Trained` without layers: the flow's record."""
+        return Trained((), self.of[1](*self.constants().tolist()))
+
+
+def known_laws(unit, E, flow):
+    """`Laws` before training: unit is the record of the law for 1 Pa, E its true modulus [Pa], flow
+    the record of the return map as it begins.
+    """
+    elastic = KnownStress(unit, START * log(E))
+    return Laws(elastic, Unchanged() if isinstance(flow, NoFlow) else KnownReturn(elastic, flow))

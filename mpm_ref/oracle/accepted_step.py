@@ -1,0 +1,119 @@
+"""The accepted step: solved tightly, with a bar for all that the scene's own tolerance admits."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..hot.choices import Choices
+from ..hot.methods import METHODS, Options
+from . import sampled
+from .implicit_stages import after
+from .scales import size
+
+CLOSER = 1e-3       # the golden increment's tolerance, of the scene's
+ROOM = 2.0          # others may be so much farther off than the two methods seen
+FAR = 4.0           # bars: two solutions farther apart are not the same minimum
+
+
+class Solved(NamedTuple):
+    """The accepted increment of a step."""
+
+    dv: np.ndarray          # (n, d) [m/s]  to CLOSER times the tolerance
+    S: np.ndarray           # (n,)          its scale of round-off [m/s]
+    bar: np.ndarray         # (n,)          how far the tolerance lets others be from it [m/s]
+    near: float             # largest distance of what the scene's method accepts
+    second: float           # and of what another method finds
+    samples: list           # increments that the tolerance admits, one standard deviation each
+    factor: float           # from deviations to bars
+    report: object          # of the scene's method
+    pose: object            # whose planes bear as in the end
+
+
+def solve(stepper, bodies, dt, S_g, t):
+    """`Solved` of a step from time t. Raises ValueError where the step is not solved."""
+    options = stepper.options
+    pose, accepted = accepted_by(stepper, bodies, (t, dt), options)
+    report = stepper.report
+    if not report.converged:
+        raise ValueError(f"the implicit step was not solved: {report.why}; take a smaller dt, "
+                         "another method, a larger eps, or more iterations")
+    tight = replace(options, eps=CLOSER * options.eps, cells=0.0, iterations=10_000)
+    pose, dv = tightly(stepper, bodies, (t, dt), tight)
+    second = tightly(stepper, bodies, (t, dt), other_method(options, tight.eps))[1]
+    system = stepper.system(pose)
+    A = system.matrix(dv)
+    weight, factor = sampled.admitted(options, pose.kappa, A)
+    samples = sampled.increments(system, A, weight, 1)
+    bar = factor * sampled.spread_of([size(s) for s in samples])
+    rounded = sampled.increments(system, A, S_g, 2)
+    S = size(dv) + sampled.spread_of([size(s) for s in rounded])
+    near, again = (abs(u - dv) for u in (accepted, second))
+    worst = max(ratio(size(off), bar + 8 * np.finfo(float).eps * S) for off in (near, again))
+    if worst > FAR:
+        raise ValueError(f"two solutions of the step are {worst:.2g} times farther apart than its "
+                         f"tolerance eps = {options.eps:.3g} explains; take a smaller dt")
+    bar, factor = max(ROOM * worst, 1.0) * bar, max(ROOM * worst, 1.0) * factor
+    return Solved(dv, S, bar, float(near.max()), float(again.max()), samples, factor, report, pose)
+
+
+def tightly(stepper, bodies, when, options):
+    """`accepted_by`, for options whose tolerance is far below the scene's. Raises ValueError where
+    it is not met.
+    """
+    found = accepted_by(stepper, bodies, when, options)
+    if not stepper.report.converged:
+        raise ValueError(f"{options.method} did not solve the step to {options.eps:.2g}, which the "
+                         f"oracle needs: {stepper.report.why}; record to a larger eps")
+    return found
+
+
+def accepted_by(stepper, bodies, when, options):
+    """(`Pose` as its planes bear in the end, increment) that a method accepts."""
+    before, stepper.options = stepper.options, options
+    try:
+        pose = stepper.pose(bodies, *when)
+        dv = stepper.solve(pose)
+    finally:
+        stepper.options = before
+    if pose.restraint is not None:
+        pose = pose._replace(unknowns=pose.restraint.applied(pose.unknowns))
+    return pose, dv
+
+
+def other_method(options, eps):
+    """`Options` of a method that is not akin to that of the options: Newton beside L-BFGS and ADMM,
+    L-BFGS beside Newton. The coarsest level is solved directly: CG bears no V-cycle that varies.
+    """
+    word = "hot" if options.descent == "newton" else "pn-mgpcg"
+    other = replace(METHODS[word], path=options.path, start=options.start,
+                    cycle=Choices(coarsest="direct"))
+    if options.norm == "L2":
+        return replace(other, norm="L2", eps=eps)
+    return replace(other, eps=eps)
+
+
+def ratio(a, b):
+    """Largest a / b."""
+    return float((a / np.maximum(b, np.finfo(float).tiny)).max())
+
+
+def bars(problem, copies, pose, solved, dt):
+    """{key: bar} of what follows from the accepted velocities: the deviations of each admitted
+    increment, carried through grid to particles, return map and stress.
+
+    copies() are the bodies before that.
+    """
+    v = pose.unknowns.v + solved.dv
+    here = after(problem, copies(), pose, v, dt)
+    moves = {key: [] for key in here}
+    for s in solved.samples:
+        there = after(problem, copies(), pose, v + s, dt)
+        for key, a in there.items():
+            moves[key].append(size((a - here[key])[:, None]))
+    return {key: solved.factor * sampled.spread_of(m) for key, m in moves.items()}
+
+
+def options_of(problem):
+    """The options of an implicit problem's solver."""
+    return Options() if problem.solver is None else problem.solver

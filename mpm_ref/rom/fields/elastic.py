@@ -1,0 +1,132 @@
+"""The model that NSF is compared with: a deformation map alone, as LDM has (NSF-X12).
+
+    tau_p = tau(F_p),    F_p = dg/dX = I + sum_k a_k(xhat) dU_k/dX,    no affine field
+
+Where plasticity has acted, or a body is torn between two points, that is not the stress of the full
+model. The gradients of modes are those of the planes that fit them best at a point's nearest
+neighbours of the same body.
+"""
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from ...body import Body, particles_at
+from ...explicit import initial_stress
+from ...materials import NoFlow
+from .pod_fields import Spanned
+
+NEIGHBOURS = 26         # of a point, in 3D those of a lattice; in 2D 8
+LEAST = 1e-10           # of a spread over the largest: across a plane there is no gradient
+
+
+class Portion(NamedTuple):
+    """The points of one body, and their law."""
+
+    first: int
+    last: int           # the number after its last
+    law: tuple
+
+
+class Deformed(NamedTuple):
+    """Fields (see `inferred`) of which the map alone is known."""
+
+    map: Spanned
+    D: np.ndarray       # (n, d, d, R) dU/dX of modes [1/m]
+    bodies: tuple       # of `Portion`
+
+    @property
+    def X(self):
+        """Points (n, d) at rest [m]."""
+        return self.map.X
+
+    @property
+    def dim(self):
+        """Number of axes d."""
+        return self.map.dim
+
+    @property
+    def r(self):
+        """Number of latent coordinates."""
+        return self.map.r
+
+    def place(self, points, xhat):
+        """x (m, d) [m] of points of these numbers."""
+        return self.map.place(points, xhat)
+
+    def derivatives(self, points, xhat):
+        """x (m, d), F (m, d, d) and dg/dxhat (m, d, r)."""
+        x, _, G = self.map.derivatives(points, xhat)
+        return x, self.F(points, xhat), G
+
+    def F(self, points, xhat):
+        """Deformation gradients (m, d, d) of the map."""
+        return np.eye(self.dim) + self.D[points] @ self.map.all(xhat)
+
+    def stress(self, points, xhat):
+        """Kirchhoff stress (m, d, d) [Pa]."""
+        tau, F = np.empty((len(points), self.dim, self.dim)), self.F(points, xhat)
+        for body in self.bodies:
+            own = (points >= body.first) & (points < body.last)
+            tau[own] = elastic(F[own], body.law)
+        return tau
+
+    def affine(self, points, xhat):
+        """C (m, d, d) [1/s]: none."""
+        return np.zeros((len(points), self.dim, self.dim))
+
+    def near(self, xhat, x, distance):
+        """Numbers of all points that may be within a distance [m], by the largest axis, of one of
+        the positions x (m, d).
+        """
+        return self.map.near(xhat, x, distance)
+
+
+def elastic(F, law):
+    """Kirchhoff stress (m, d, d) [Pa] of deformation gradients (m, d, d), without plasticity."""
+    m, d = F.shape[:2]
+    particles = particles_at(np.zeros((m, d)), np.zeros((m, d)), np.ones(m), np.ones(m), "pic")
+    particles.F[:] = F
+    initial_stress(Body("deformed", particles, law, NoFlow(), np.arange(m)))
+    return particles.tau
+
+
+def deformed(map, bodies):
+    """`Deformed` of `Spanned` fields, whose points are those of a problem's bodies in order. Raises
+    ValueError for a body with too few points to tell a gradient.
+    """
+    for body in bodies:
+        require_neighbours(body.name, len(body.id), map.dim)
+    ends = np.cumsum([0] + [len(body.id) for body in bodies])
+    portions = tuple(Portion(*pair, body.law)
+                     for pair, body in zip(pairwise(ends), bodies, strict=True))
+    D = [gradients(map.X[own.first:own.last], map.U[own.first:own.last]) for own in portions]
+    return Deformed(map, np.concatenate(D), portions)
+
+
+def require_neighbours(name, n, d):
+    """Raise ValueError unless a body of n points in d dimensions has neighbours along all axes."""
+    if n <= d:
+        raise ValueError(f"points in the body {name!r}: {n}, which tell no gradient of the map: "
+                         f"expected at least {d + 1}; sample the body more finely, or take fields "
+                         "that know the stress")
+
+
+def gradients(X, U):
+    """dU/dX (n, d, d, R), of component and axis, of modes U (n, d, R) at points X (n, d): planes
+    through each point that fit its neighbours with least squares, nearer ones counting more;
+    n > d.
+    """
+    n, d = X.shape
+    away, near = KDTree(X).query(X, min(n, 1 + (NEIGHBOURS if d == 3 else 8)))
+    arms = X[near] - X[:, None]
+    w = 1.0 / np.maximum(away, away[:, -1:] * 1e-3) ** 2
+    w[:, 0] = 0.0
+    spread = np.einsum("nk,nki,nkj->nij", w, arms, arms)
+    slope = (w[:, :, None] * arms) @ np.linalg.pinv(spread, rcond=LEAST, hermitian=True)
+    D = np.zeros((n, d, d, U.shape[2]))
+    for k in range(1, near.shape[1]):
+        D += (U[near[:, k]] - U)[:, :, None] * slope[:, k, None, :, None]
+    return D

@@ -1,0 +1,152 @@
+"""Latent coordinates of position and stress together, for matter that remembers more than where it
+is. Beyond the paper, which leaves path dependence for later work (section 7).
+
+A metal that is sheared to and fro has been in every place with several stresses, so that NSF's
+fields, whose latent coordinates are told from positions alone, answer some mean of these. Here
+latent coordinates are the coefficients of modes that both share, and both are asked for:
+
+    [(x_p - X_p) / x_0, tau_p / tau_0] = sum_k xhat_k [U_kp / x_0, T_kp / tau_0] + the rest
+    min_y sum_p |g(X_p; y) - x_p|^2 / x_0^2 + w^2 |h(X_p; y) - tau_p|^2 / tau_0^2
+
+x_p are the samples' positions after the step, as before. tau_p are their stresses after it, by the
+material's own law: stress tells the elastic strain of Hencky's law, the velocity gradient stretches
+it over the step, and the return map takes some back. So samples, and they alone, need singular
+values and a return map again.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ...body import Body, particles_at
+from ...explicit import deform_body, gather
+from ...materials import Hardening, Hencky, Softening
+from ..inferred import Inferred
+from ..projection import project_position
+from ..symmetric import values
+from .pod_fields import Spanned, cells, modes_of, part
+from .radial_basis import through
+
+SHARE = 0.3         # of the stress in the modes, over that of the displacement
+WEIGHT = 0.03       # of the stress in the inversion: more, and what it says of a step drowns motion
+
+
+class Scale(NamedTuple):
+    """What positions and stresses are measured in: root mean squares over the snapshots."""
+
+    x: float            # of a displacement's value [m]
+    tau: float          # of a stress's value [Pa]
+
+
+def joint(histories, sizes, size, share=SHARE):
+    """`Spanned` fields of `Histories` whose latent coordinates are shared by displacement and
+    stress, the latent coordinates (s, k + 1, r) of the snapshots, and their `Scale`; size [m] of
+    blocks. Raises ValueError for more modes than the snapshots hold, and where nothing moves or
+    nothing is stressed.
+    """
+    s, levels, n, d = histories.x.shape
+    u = (histories.x - histories.X).reshape(s * levels, -1)
+    tau = histories.tau.reshape(s * levels, -1)
+    scale = Scale(*(float(np.sqrt(np.mean(a.astype(float) ** 2))) for a in (u, tau)))
+    if not min(scale) > 0.0:
+        raise ValueError(f"snapshots with displacements of {scale.x:g} m and stresses of "
+                         f"{scale.tau:g} Pa, root mean square: expected some of both")
+    V, xhat = modes_of(np.hstack([u / scale.x, share * tau / scale.tau]), sizes.r, "r")
+    U = scale.x * V[:n * d]
+    unit = np.full(sizes.r, np.sqrt(np.mean(xhat[:, 0] ** 2)))
+
+    def fit(a):
+        return through(xhat, a, unit, sizes.smoothing)
+
+    bend = None
+    if sizes.modes > sizes.r:
+        rest, a = modes_of(u - xhat @ U.T, sizes.modes - sizes.r, "modes")
+        U, bend = np.hstack([U, rest]), fit(a)
+    U = np.ascontiguousarray(U.reshape(n, d, -1))
+    fields = Spanned(histories.X, U, bend, part(histories.tau, sizes.tau, "tau", fit),
+                     part(histories.C, sizes.C, "C", fit) if sizes.C else None, np.zeros(0),
+                     cells(histories.X, U, size))
+    return fields, xhat.reshape(s, levels, -1), scale
+
+
+class Stacked(NamedTuple):
+    """Place and stress of points as one vector each, over what they are measured in."""
+
+    fields: Spanned
+    scale: Scale
+    weight: float
+
+    @property
+    def r(self):
+        """Number of latent coordinates."""
+        return self.fields.r
+
+    def of(self, x, tau):
+        """Places x (m, d) [m] and stresses tau (m, d, d) [Pa] as vectors (m, d + d (d + 1)/2)."""
+        return np.hstack([x / self.scale.x, self.weight * values(tau) / self.scale.tau])
+
+    def place(self, points, xhat):
+        """These of points of these numbers."""
+        return self.of(self.fields.place(points, xhat), self.fields.stress(points, xhat))
+
+    def derivatives(self, points, xhat):
+        """These, None, and their derivatives (m, d + d (d + 1)/2, r)."""
+        x, _, G = self.fields.derivatives(points, xhat)
+        tau = self.fields.tau
+        H = tau.modes[points] @ tau.coefficients.slope(xhat)
+        both = np.concatenate([G / self.scale.x, self.weight * H / self.scale.tau], axis=1)
+        return self.of(x, self.fields.stress(points, xhat)), None, both
+
+
+@dataclass
+class Joint(Inferred):
+    """Advances latent coordinates of position and stress. All points are of one material: law and
+    flow. Raises ValueError for a law other than Hencky's, or a flow with a history of its own.
+    """
+
+    law: object = None
+    flow: object = None
+    scale: Scale = None
+    weight: float = WEIGHT
+
+    def __post_init__(self):
+        super().__post_init__()
+        if not isinstance(self.law, Hencky) or isinstance(self.flow, Hardening | Softening):
+            raise ValueError(f"joint latent coordinates of {type(self.law).__name__} with "
+                             f"{type(self.flow).__name__}: expected Hencky's law, whose stress "
+                             "tells the elastic strain, and a flow without hardening or softening")
+
+    def moved(self, cloud, count, t, dt):
+        """As `Inferred.moved`; keeps the samples' stresses after the step for `inverted`."""
+        grid, own = self.grid(cloud, t, dt), cloud.particles
+        trial = particles_at(own.x[:count], own.v[:count], own.m[:count], own.V0[:count], "apic")
+        trial.F[:] = stretch_of(own.tau[:count], self.law)
+        body = Body("samples", trial, self.law, self.flow, np.arange(count))
+        gather(body, grid, self.scheme, dt)
+        deform_body(body, dt)
+        self.tau = trial.tau
+        return trial.x
+
+    def inverted(self, points, w, x, xhat, dt):
+        """Latent coordinates whose positions and stresses of the samples are nearest to x (m, d)
+        and to those that `moved` kept, and the `Fit` (NSF-eq10 with stress beside position). Raises
+        ValueError for samples with weights.
+        """
+        if w is not None:
+            raise ValueError("samples with weights: expected samples that all count the same; "
+                             "weights are made for positions alone")
+        both = Stacked(self.fields, self.scale, self.weight)
+        fit = project_position(both, points, both.of(x, self.tau), xhat)
+        return fit.y, fit
+
+
+def stretch_of(tau, law):
+    """Elastic left stretches (m, d, d) whose Kirchhoff stresses by Hencky's law are tau (m, d, d)
+    [Pa]: exp of (tau - lam tr(tau) / (2 mu + d lam) I) / (2 mu).
+    """
+    d = tau.shape[1]
+    pressure = law.lam * np.trace(tau, axis1=1, axis2=2) / (2.0 * law.mu + d * law.lam)
+    strain = (tau - pressure[:, None, None] * np.eye(d)) / (2.0 * law.mu)
+    size, axes = np.linalg.eigh(strain)
+    return np.einsum("pij,pj,pkj->pik", axes, np.exp(size), axes)

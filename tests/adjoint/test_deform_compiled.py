@@ -1,0 +1,131 @@
+"""The compiled adjoint of a step of deformation: as the plain text, for any number of threads, and
+as torch's automatic differentiation of the formulas.
+"""
+
+import numba
+import numpy as np
+import pytest
+from deform_bars import DT, apart, materials, named, seeds, states
+from problems import elsewhere
+
+from mpm_ref.core.adjoint import deform
+from mpm_ref.core.jit import set_threads
+from mpm_ref.materials import NoFlow
+
+CASES = {"von_mises_hardening": 3, "none on fixed_corotated": 3, "fluid of J": 2}
+N = 150             # more particles than chunks
+CODE = f"""
+import json
+import numpy as np
+from deform_bars import gradients, materials
+from tests.adjoint.test_deform_compiled import scattered
+found = {{}}
+for name, d in {CASES!r}.items():
+    law, flow, _ = materials(d)[name]
+    of_q = gradients(scattered(name), law, flow)
+    found[name] = {{key: np.asarray(g).tolist() for key, g in of_q.items()}}
+print(json.dumps(found))
+"""
+
+
+def scattered(name):
+    """Random states of a case."""
+    d = CASES[name]
+    rng = np.random.default_rng(4)
+    return states(rng, np.exp(0.2 * rng.standard_normal((N, d))), materials(d)[name])
+
+
+def driven(name):
+    """bars, sums of the parallel drivers."""
+    q, (law, flow, _) = scattered(name), materials(CASES[name])[name]
+    bars, step, _ = seeds(q, law, flow)
+    if q.F.ndim == 1:
+        deform.fluid(step, bars, law)
+    elif isinstance(flow, NoFlow):
+        deform.elastic(step, bars, law)
+    else:
+        deform.plastic(step, bars, law, flow)
+    return bars, step.sums
+
+
+def at_start(name):
+    """bars, sums of the stress of the states as they stand."""
+    q, (law, flow, _) = scattered(name), materials(CASES[name])[name]
+    bars, step, _ = seeds(q, law, flow)
+    if q.F.ndim == 1:
+        deform.initial_pressure(q.F, bars, law, step.sums)
+    else:
+        deform.initial_stress(q.F, q.y, bars, law, flow, step.sums)
+    return bars, step.sums
+
+
+def bits(bars, sums):
+    return [a.tobytes() for a in (*bars, sums)]
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return elsewhere(CODE, NUMBA_DISABLE_JIT="1")
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_as_the_plain_text(plain, name):
+    law, flow, _ = materials(CASES[name])[name]
+    expected = {key: np.array(g) for key, g in plain[name].items()}
+    assert max(apart(named(*driven(name), law, flow), expected).values()) < 1e-13
+
+
+@pytest.mark.skipif(numba.config.NUMBA_NUM_THREADS < 2, reason="one core")
+@pytest.mark.parametrize("name", CASES)
+def test_threads_do_not_change_a_bit(name):
+    try:
+        set_threads(1)
+        one = bits(*driven(name)), bits(*at_start(name))
+        set_threads(2)
+        assert (bits(*driven(name)), bits(*at_start(name))) == one
+    finally:
+        set_threads(min(2, numba.config.NUMBA_NUM_THREADS))
+
+
+# Automatic differentiation, which needs singular values that differ.
+
+def torch_step(torch, q, law, flow):
+    """Leaves of the graph by name, and F, tau, y after the step."""
+    given = {name: getattr(q, name) for name in ("F", "L", "y")} | law._asdict() | flow._asdict()
+    x = {name: torch.tensor(a, dtype=torch.float64, requires_grad=True)
+         for name, a in given.items()}
+    F = (torch.eye(q.L.shape[1], dtype=torch.float64) + DT * x["L"]) @ x["F"]
+    U, s, Vh = torch.linalg.svd(F)
+    step = torch_fixed_corotated if isinstance(flow, NoFlow) else torch_hardening
+    return x, step(torch, x, F, (U, s, Vh))
+
+
+def torch_fixed_corotated(torch, x, F, svd):
+    """NSF-eq12."""
+    J = torch.linalg.det(F)[:, None, None]
+    volumetric = x["lam"] * (J - 1) * J * torch.eye(F.shape[1], dtype=F.dtype)
+    return F, 2 * x["mu"] * (F - svd[0] @ svd[2]) @ F.mT + volumetric, x["y"]
+
+
+def torch_hardening(torch, x, F, svd):
+    """NSF-eq13 and NSF-F4."""
+    U, s, Vh = svd
+    eps = torch.log(s)
+    mean = eps.mean(dim=1, keepdim=True)
+    size = (eps - mean).norm(dim=1)
+    dgamma = torch.relu(size - x["y"] / (2 * x["mu"]))
+    eps = mean + (1 - dgamma / size)[:, None] * (eps - mean)
+    tau = 2 * x["mu"] * eps + x["lam"] * eps.sum(dim=1, keepdim=True)
+    y = x["y"] + 2 * x["mu"] * x["xi"] * dgamma
+    return U * eps.exp()[:, None] @ Vh, U * tau[:, None] @ U.mT, y
+
+
+@pytest.mark.parametrize("name", ["von_mises_hardening", "none on fixed_corotated"])
+def test_as_automatic_differentiation(name):
+    torch = pytest.importorskip("torch")
+    q, (law, flow, _) = scattered(name), materials(CASES[name])[name]
+    x, after = torch_step(torch, q, law, flow)
+    sum((a * torch.tensor(w)).sum() for a, w in zip(after, q.weights)).backward()
+    expected = {key: np.zeros(a.shape) if a.grad is None else a.grad.numpy()
+                for key, a in x.items()}
+    assert max(apart(named(*driven(name), law, flow), expected).values()) < 1e-10

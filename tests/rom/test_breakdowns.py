@@ -1,0 +1,129 @@
+"""A reduced run that gives no body breaks down, with a sentence; a mistake in the code does not
+pass for it.
+"""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mpm_ref.core.grid import OutOfRange
+from mpm_ref.reduced import record
+from mpm_ref.reduced.case import case
+from mpm_ref.reduced.evaluate import NEAREST, REDUCED, Held, breakdowns, course
+from mpm_ref.reduced.march import Way
+from mpm_ref.reduced.watch import watch, watched
+from mpm_ref.rom.kinematics import NoBody, guesses
+from validation.extremes import ldm_runs
+from validation.ldm import online
+from validation.ldm.racing import Online
+from validation.ldm.studies import GRAVITY
+from validation.verification.scenes import with_
+
+FAULTS = [NoBody("no body"), OutOfRange("nowhere"), np.linalg.LinAlgError("singular")]
+X = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+
+
+def broken(fault, *states):
+    """Yield states, then raise."""
+    yield from states
+    raise fault
+
+
+@pytest.fixture(scope="module")
+def one():
+    return case(with_(GRAVITY.scene(5.0), steps=2))
+
+
+# each place where runs are made: a function of what the run raises -> the sentence, or what stands
+# for it
+
+def of_course(one, monkeypatch, fault):
+    return course(X, np.stack(3 * [X + 2.0]), broken(fault, X + 1.0)).said
+
+
+def of_compared(one, monkeypatch, fault):
+    monkeypatch.setattr(online, "march", lambda *_: broken(fault))
+    return online.compared([one], [one.X[None]], None, None, None).origin == np.inf
+
+
+def of_race(one, monkeypatch, fault):
+    run = object.__new__(Online)
+    run.ended, run.states = False, broken(fault)
+    run.step(X)
+    return run.ended
+
+
+def of_record(one, monkeypatch, fault):
+    monkeypatch.setattr(record, "watched", lambda *_: broken(fault))
+    recording = record.Recording(one, SimpleNamespace(rest=None), SimpleNamespace(way=None, seed=0),
+                                 watch=None, field=None, problem=one.problem, facts={})
+    with pytest.raises(record.Lost, match="broke down in step 0: ") as lost:
+        list(record.steps(recording))
+    return str(lost.value)
+
+
+def of_extremes(one, monkeypatch, fault):
+    net, way = ldm_runs.learned("gravity-r4"), Way(points=20)
+    start = next(watched(watch(one, net.map, net.xhat), one, way, net.rest))
+    monkeypatch.setattr(ldm_runs, "watched", lambda *_, **__: broken(fault, start))
+    return ldm_runs.ended(one, [one.X], net, way).said
+
+
+PLACES = [of_course, of_compared, of_race, of_record, of_extremes]
+
+
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: type(fault).__name__)
+def test_a_breakdown_ends_a_run(one, monkeypatch, place, fault):
+    said = place(one, monkeypatch, fault)
+    assert said
+    assert said is True or str(fault) in said
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_a_mistake_does_not_pass_for_a_breakdown(one, monkeypatch, place):
+    with pytest.raises(ValueError, match="shapes differ"):
+        place(one, monkeypatch, ValueError("shapes differ"))
+
+
+def test_states_and_levels_of_different_numbers_are_a_mistake():
+    with pytest.raises(ValueError, match="zip"):
+        course(X, np.stack(3 * [X + 2.0]), [X + 1.0, X + 1.0])
+
+
+def test_a_course_that_broke_down_is_infinitely_off_and_says_when_and_why():
+    found = course(X, np.stack(3 * [X + 2.0]), broken(NoBody("no\n  body"), X + 1.0))
+    assert found.said == "step 1: no body"
+    assert np.isinf([*found.errors, *found.sums]).all()
+    assert len(found.levels) == 1
+    sound = course(X, np.stack(3 * [X + 2.0]), 3 * [X + 1.0])
+    assert sound.said == ""
+    assert np.isfinite(sound.errors).all()
+
+
+@pytest.mark.parametrize("far", [np.nan, np.inf, 1e200])
+def test_positions_that_are_no_numbers_are_a_breakdown(far):
+    with np.errstate(all="ignore"):
+        found = course(X, np.stack(3 * [X + 2.0]), [X, X + far, X])
+    assert found.said == "step 1: the positions, or their squares, are not finite"
+
+
+def test_a_breakdown_is_told_with_the_parameters_of_its_run():
+    good, bad = (course(X, np.stack([X + 2.0]), states)
+                 for states in ([X], broken(NoBody("no body"))))
+    found = [Held(2, np.array([3.0, 0.5]), {REDUCED: good, NEAREST: good}),
+             Held(7, np.array([4.0, 0.5]), {REDUCED: bad, NEAREST: good})]
+    said = list(breakdowns(SimpleNamespace(names=("g", "E")), found))
+    assert said == ["run 7 (g = 4, E = 0.5): the reduced run broke down in step 0: no body"]
+
+
+@pytest.mark.parametrize("far", [0.0, np.inf])
+def test_a_map_that_is_inverted_or_nowhere_at_all_seeds_gives_no_body(far):
+    class Bad:
+        def derivatives(self, X, xhat):
+            F = np.tile(np.eye(2) if far else np.diag([1.0, -1.0]), (len(X), 1, 1))
+            return X + far, F, None
+
+    with pytest.raises(NoBody, match="all 3 material points asked are inverted"):
+        guesses(Bad(), None, X, X)

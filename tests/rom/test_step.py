@@ -1,0 +1,276 @@
+"""Reduced steps against steps of the full model."""
+
+import hashlib
+
+import numpy as np
+import pytest
+from grids import positions
+from problems import elsewhere
+from rom_toys import cloud, decoder
+
+from mpm_ref.body import Body, particles_at
+from mpm_ref.explicit import Scheme, Stepper
+from mpm_ref.materials import FixedCorotated, NoFlow
+from mpm_ref.rom.fields.affine import Affine
+from mpm_ref.rom.fields.pod import modes
+from mpm_ref.rom.latent import at_start
+from mpm_ref.rom.quadrature.eulerian import Eulerian
+from mpm_ref.rom.quadrature.lagrangian import lagrangian
+from mpm_ref.rom.sampling import draw
+from mpm_ref.rom.step import Reduced
+
+DX, DT, STEPS, RHO = 0.17, 0.01, 6, 800.0
+LAW = FixedCorotated(3e3, 4e3)
+GRAVITY = np.array([1.0, -9.8, 3.0])
+
+
+@pytest.fixture(params=(2, 3), ids=("quadratic", "cubic"))
+def degree(request):
+    """Of the splines."""
+    return request.param
+
+
+# steps on an exact manifold
+
+class Stirred:
+    """All nodes move by an affine field that changes with time."""
+
+    def __init__(self, d):
+        rng = np.random.default_rng(5)
+        self.L, self.turn, self.c = rng.normal(size=(d, d)), rng.normal(size=(d, d)), GRAVITY[:d]
+
+    def apply(self, grid, t, dt):
+        """v_i = (2 L + 20 t turn) x_i + t c."""
+        grid.v[:] = positions(grid) @ (2.0 * self.L + 20.0 * t * self.turn).T + t * self.c
+
+
+def weights(n, d):
+    """Masses [kg] and volumes at rest [m^d] of n points."""
+    V0 = np.random.default_rng(2).uniform(0.5, 1.5, n) / n
+    return RHO * V0, V0
+
+
+def full(X, x, v, F=None):
+    """Body of the full model in a state."""
+    q = particles_at(x, v, *weights(*X.shape), "pic")
+    return Body("full", q if F is None else q._replace(F=F.copy()), LAW, NoFlow(),
+                np.arange(len(X)))
+
+
+def full_steps(body, conditions, gravity, degree, steps=STEPS):
+    """The body's particles after explicit steps."""
+    stepper = Stepper(Scheme(degree, "pic"), DX, len(gravity), gravity, conditions)
+    stepper.start([body])
+    for k in range(steps):
+        stepper.step([body], k * DT, DT)
+    return body.particles
+
+
+def distance(X):
+    """Signed distance, in the largest norm, from the surface of the unit box [m]."""
+    return np.max(abs(X - 0.5), axis=1) - 0.5
+
+
+def quadrature(name, X, degree):
+    """Quadrature of a body of points X that fill the unit box."""
+    if name == "eulerian":
+        return Eulerian(X, RHO, distance, X[::4], DX, degree)
+    return lagrangian(X, *weights(*X.shape), DX, degree)
+
+
+def reduced_steps(model, latent, count, steps=STEPS):
+    """Latent state after steps with `count` samples, drawn anew each time."""
+    n, rng = len(model.quadrature.X), np.random.default_rng(7)
+    chosen = draw(n, count, model.map.r, model.map.dim)
+    for k in range(steps):
+        latent, report = model.step(latent, chosen(rng), k * DT, DT)
+        assert report.rank == model.map.r
+    return latent
+
+
+def largest_difference(map, latent, X, particles):
+    """Of x, v and F of a reduced state from those of the full model's particles."""
+    x, F, _ = map.derivatives(X, latent.xhat)
+    v = map.velocity(X, latent.before, latent.vhat)
+    pairs = zip((x, v, F), (particles.x, particles.v, particles.F), strict=True)
+    return max(abs(a - b).max() for a, b in pairs)
+
+
+@pytest.mark.parametrize("projection", ["linear", "nonlinear"])
+@pytest.mark.parametrize("name", ["lagrangian", "eulerian"])
+def test_a_stirred_body_moves_as_in_the_full_model(d, degree, name, projection):
+    X, map, conditions = cloud(d, 150), Affine(d), Stirred(d)
+    particles = full_steps(full(X, X, 0.0 * X), conditions, GRAVITY[:d], degree)
+    model = Reduced(map, quadrature(name, X, degree), LAW, GRAVITY[:d], conditions,
+                    projection=projection)
+    latent = reduced_steps(model, at_start(map.rest), 12)
+    assert abs(particles.F - np.eye(d)).max() > 0.1
+    assert largest_difference(map, latent, X, particles) < 1e-12
+
+
+@pytest.mark.parametrize("projection", ["linear", "nonlinear"])
+@pytest.mark.parametrize("name", ["lagrangian", "eulerian"])
+def test_a_thrown_body_falls_as_in_the_full_model(d, degree, name, projection):
+    """The grid decides here; Eulerian samples also read nodes that no quadrature point reaches."""
+    X, map, v = cloud(d, 150), Affine(d), np.array([2.0, 4.0, -3.0])[:d]
+    particles = full_steps(full(X, X, np.tile(v, (150, 1))), None, GRAVITY[:d], degree)
+    model = Reduced(map, quadrature(name, X, degree), LAW, GRAVITY[:d],
+                    projection=projection)
+    thrown = np.hstack([np.zeros((d, d)), v[:, None]]).ravel()
+    latent = reduced_steps(model, at_start(map.rest, thrown), 12)
+    assert abs(particles.x - X).max() > DX
+    assert largest_difference(map, latent, X, particles) < 1e-12
+
+
+# single steps from a stressed state
+
+def anything(d, n=18):
+    """A linear map on n points that reaches every position and velocity, and a stressed state."""
+    X, rng = cloud(d, n), np.random.default_rng(1)
+    x = X + 0.1 * rng.uniform(-1.0, 1.0, (n * d, n, d))
+    F = np.eye(d) + 0.2 * rng.uniform(-1.0, 1.0, (n * d, n, d, d))
+    map = modes(X, x, F, n * d)
+    U = map.derivatives(X, np.zeros(n * d))[2].reshape(n * d, n * d)
+    xhat = np.linalg.solve(U, (x[0] - X).ravel())
+    return map, at_start(xhat, rng.normal(size=n * d))
+
+
+@pytest.mark.parametrize("projection", ["linear", "nonlinear"])
+def test_a_step_that_nothing_restrains_is_one_of_the_full_model(d, degree, projection):
+    map, latent = anything(d)
+    X, gravity, every = map.X, GRAVITY[:d], np.arange(len(map.X))
+    x, F, G = map.derivatives(X, latent.xhat)
+    v = G @ latent.vhat
+    particles = full_steps(full(X, x, v, F), None, gravity, degree, steps=1)
+    relaxed = full_steps(full(X, x, v), None, gravity, degree, steps=1)
+    model = Reduced(map, quadrature("lagrangian", X, degree), LAW, gravity,
+                    projection=projection)
+    after, report = model.step(latent, every, 0.0, DT)
+    size = abs(particles.v).max()
+    assert report.rank == map.r
+    assert report.residual < 1e-13 * size
+    assert abs(particles.v - relaxed.v).max() > 0.01 * size          # the stress acts
+    assert abs(G @ after.vhat - particles.v).max() < 1e-13 * size
+    assert abs(map.place(X, after.xhat) - particles.x).max() < 1e-14
+
+
+class Watched(Reduced):
+    """Keeps the trial velocities of the samples."""
+
+    def project(self, latent, X, trial, dt):
+        """Of `Reduced`."""
+        self.trial = trial.v.copy()
+        return super().project(latent, X, trial, dt)
+
+
+class Recorded:
+    """Keeps the nodes' masses and velocities."""
+
+    def apply(self, grid, t, dt):
+        """Nothing is changed."""
+        self.m, self.v = grid.m.copy(), grid.v.copy()
+
+
+def swinging(d):
+    """A learned map, and a stressed state with velocities."""
+    rng = np.random.default_rng(3)
+    return decoder(d, 4), at_start(rng.uniform(-1.0, 1.0, 4), rng.normal(size=4))
+
+
+def learned(d, degree, n=400, **options):
+    """A model of a body with a learned map."""
+    body = quadrature(options.pop("name", "lagrangian"), cloud(d, n), degree)
+    return Watched(swinging(d)[0], body, LAW, GRAVITY[:d], **options)
+
+
+def test_neighbours_are_enough_for_the_samples(d, degree):
+    """The same bits as with all points, from a share of them."""
+    model, (_, latent) = learned(d, degree), swinging(d)
+    model.step(latent, np.arange(400), 0.0, DT)
+    everywhere = model.trial
+    samples = np.sort(np.argsort(np.linalg.norm(cloud(d, 400) - 0.1, axis=1))[:4])
+    _, report = model.step(latent, samples, 0.0, DT)
+    assert report.points < 400
+    assert np.array_equal(model.trial, everywhere[samples])
+
+
+def test_gravity_gives_the_grid_its_momentum(d, degree):
+    """Mass is that of the points, momentum grows by m g dt in the second step, whatever the stress;
+    the points' velocities are those that were fitted at the start of the first.
+    """
+    grid = Recorded()
+    model, (map, latent) = learned(d, degree, conditions=grid), swinging(d)
+    X, m, every = model.quadrature.X, model.quadrature.m, np.arange(400)
+    later, _ = model.step(latent, every, 0.0, DT)
+    model.step(later, every, DT, DT)
+    before = m[:, None] * map.velocity(X, latent.xhat, later.vhat)
+    after = grid.m[..., None] * grid.v
+    gained = after.sum(axis=tuple(range(d))) - before.sum(axis=0)
+    assert grid.m.sum() == pytest.approx(m.sum(), rel=1e-13)
+    assert abs(gained - m.sum() * GRAVITY[:d] * DT).max() < 1e-13 * abs(after).sum()
+
+
+def test_on_a_linear_manifold_all_velocities_are_one(d):
+    """Under stress and with rotation, over several steps."""
+    X, map = cloud(d, 150), Affine(d)
+    rate = np.random.default_rng(4).normal(size=map.r)
+    found = []
+    for velocity in ("previous", "latest", "difference", "transported"):
+        model = Reduced(map, quadrature("lagrangian", X, 2), LAW, GRAVITY[:d],
+                        velocity=velocity)
+        found.append(reduced_steps(model, at_start(map.rest, rate), 40).xhat)
+    assert abs(found[0] - map.rest).max() > 0.05
+    assert abs(np.array(found) - found[0]).max() < 1e-13
+
+
+# what is said
+
+def test_a_report_tells_samples_points_and_rank(d):
+    (map, latent), samples = swinging(d), np.array([3, 80, 200, 390])
+    model = learned(d, 2)
+    _, report = model.step(latent, samples, 0.0, DT)
+    assert (report.samples, report.rank, report.iterations) == (4, 4, 0)
+    assert report.points == len(model.quadrature.support(map, latent, samples))
+    model = learned(d, 2, name="eulerian", projection="nonlinear")
+    _, report = model.step(latent, samples, 0.0, DT)
+    at, _, _, said, _ = model.quadrature.cloud(map, latent, samples)
+    assert report.points == len(at.X) > 0
+    assert report.quadrature == said
+    assert report.iterations >= 1
+
+
+def test_samples_that_do_not_tell_all_coordinates_show_in_the_rank(d):
+    """Points in a plane determine d of the d + 1 entries of every row."""
+    X, map = cloud(d, 150), Affine(d)
+    X[:6, -1] = 0.5
+    model = Reduced(map, quadrature("lagrangian", X, 2), LAW, GRAVITY[:d])
+    _, report = model.step(at_start(map.rest), np.arange(6), 0.0, DT)
+    assert report.rank == d * d < map.r
+
+
+# threads
+
+def digests():
+    """sha256 of the latent state after steps of both quadratures."""
+    sha = hashlib.sha256()
+    for name in ("lagrangian", "eulerian"):
+        model = learned(3, 2, name=name, projection="nonlinear")
+        for a in reduced_steps(model, swinging(3)[1], 40, steps=3):
+            sha.update(a.tobytes())
+    return sha.hexdigest()
+
+
+THREADS = """
+import json
+from mpm_ref.core.jit import set_threads
+from tests.rom.test_step import digests
+found = []
+for n in (1, 2):
+    set_threads(n)
+    found.append(digests())
+print(json.dumps(found))
+"""
+
+
+def test_the_bits_do_not_depend_on_the_number_of_threads():
+    assert elsewhere(THREADS, NUMBA_NUM_THREADS="2") == 2 * [digests()]

@@ -1,0 +1,266 @@
+"""What a reduced run is watched for: each look by itself, and the run that leaves no body."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+import rom_toys
+
+from mpm_ref.reduced import watch as watching
+from mpm_ref.reduced.case import case
+from mpm_ref.reduced.march import Way, march
+from mpm_ref.reduced.watch import MEMORY, Nonsense, Sight, Watch, seen, watch, watched
+from mpm_ref.rom.extrapolation import extent
+from mpm_ref.rom.fields.pod import basis
+from mpm_ref.rom.latent import at_start
+from mpm_ref.rom.step import Report
+from validation.ldm.studies import GRAVITY
+from validation.verification.scenes import with_
+
+WELL = Sight(beyond=0.3, off=0.01, seen=0.9, blind=0, lost=0.0, J=0.8, inverted=0.0, far=0.9)
+DX, DT = 0.1, 0.02
+
+
+def report(map, residual=0.0, rank=None, lost=0):
+    return Report(9, 30, map.r if rank is None else rank, residual, 1, True, {"lost": lost})
+
+
+@pytest.fixture
+def toy(d, rng):
+    """`Watch` of an affine map with two runs of training latents, and coordinates of one."""
+    map, xhat = rom_toys.affine(d)
+    runs = map.rest + 0.1 * rng.normal(size=(2, 5, map.r))
+    runs[0, 0] = xhat
+    return Watch(map, rom_toys.cloud(d, 20), extent(runs, np.eye(map.r)), DX, DT), xhat
+
+
+# What samples see.
+
+def test_points_see_all_of_their_own_motion(d, rng):
+    G = rng.normal(size=(8, d, 4))
+    assert seen(G, G) == pytest.approx(1.0, rel=1e-12)
+    assert seen(G, 0.3 * G) == pytest.approx(0.3, rel=1e-12)
+    assert seen(G, np.concatenate([G, G])) == pytest.approx(1.0, rel=1e-12)
+
+
+def test_the_least_counts_whatever_the_coordinates(rng):
+    G = rng.normal(size=(30, 3, 4))
+    A = np.diag([1.0, 1e-3, 30.0, 2.0]) @ np.linalg.qr(rng.normal(size=(4, 4)))[0]
+    shares = np.array([0.8, 0.2, 0.5, 1.5])
+    assert seen(G @ A, G @ np.diag(shares) @ A) <= 0.2 * (1.0 + 1e-9)
+    assert seen(G @ A, G[:3] @ A) == pytest.approx(seen(G, G[:3]), rel=1e-8)
+    orthogonal = np.linalg.qr(G.reshape(-1, 4))[0].reshape(G.shape)
+    assert seen(orthogonal, orthogonal * shares) == pytest.approx(0.2, rel=1e-9)
+
+
+def test_a_motion_that_no_sample_makes_is_not_seen(rng):
+    G = rng.normal(size=(8, 3, 4))
+    still = G.copy()
+    still[..., 1] = 0.0
+    assert seen(G, still) < 1e-12
+    assert seen(G, G[:1]) == 0.0                    # three equations for four coordinates
+
+
+def test_directions_that_move_nothing_need_not_be_seen(rng):
+    G = rng.normal(size=(8, 3, 2))
+    wide = np.concatenate([G, G[..., :1], np.zeros((8, 3, 1))], axis=2)
+    assert seen(wide, wide[:2]) == pytest.approx(seen(G, G[:2]), rel=1e-9)
+
+
+@pytest.mark.parametrize("broken", [np.nan, np.inf])
+def test_what_is_not_finite_is_not_seen(rng, broken):
+    G = rng.normal(size=(8, 3, 2))
+    assert seen(np.where(G > 1.0, broken, G), G) == 0.0
+
+
+# A look.
+
+def test_a_state_of_the_training_is_well(toy):
+    watch, xhat = toy
+    found = watch.look(at_start(xhat), report(watch.map), rom_toys.cloud(watch.map.dim, 30, 1),
+                       WELL)
+    J = np.linalg.det(watch.map.derivatives(watch.X, xhat)[1])
+    assert found.beyond < 1e-12
+    assert found.J == pytest.approx(J.min())
+    assert (found.off, found.blind, found.lost, found.inverted) == (0.0, 0, 0.0, 0.0)
+    assert found.why == ()
+    assert found.said == ""
+
+
+def test_at_the_start_the_body_must_be_where_it_is_at_rest(toy):
+    watch, xhat = toy
+    assert watch.look(at_start(watch.map.rest)).off < 1e-12
+    moved = np.linalg.norm(watch.map.place(watch.X, xhat) - watch.X, axis=1)
+    found = watch.look(at_start(xhat))
+    assert found.off == pytest.approx(np.sqrt(np.mean(moved**2)) / DX)
+    assert found.why == ("off",)
+    assert found.seen == 1.0
+
+
+def test_reports_are_read(toy):
+    watch, xhat = toy
+    samples = rom_toys.cloud(watch.map.dim, 30, 1)
+    found = watch.look(at_start(xhat), report(watch.map, 0.4, watch.map.r - 2, 10), samples, WELL)
+    assert found.off == pytest.approx(0.4 * DT / DX)
+    assert found.blind == 2
+    assert found.lost == pytest.approx(10 / 40)
+    assert found.why == ("off", "blind", "lost")
+
+
+def test_a_poor_draw_is_forgiven_and_many_are_not(toy):
+    watch, xhat = toy
+    one, sight, count = watch.X[:1], WELL, 0
+    first = watch.look(at_start(xhat), report(watch.map), one, WELL)
+    assert first.seen == pytest.approx(MEMORY * WELL.seen)     # of one point nothing is told
+    assert first.why == ()
+    while not sight.why:
+        sight, count = watch.look(at_start(xhat), report(watch.map), one, sight), count + 1
+    assert sight.why == ("seen",)
+    assert 3 <= count <= 9
+
+
+def test_far_latents_and_inverted_points_are_told(toy):
+    watch, xhat = toy
+    map = watch.map
+    far = xhat.copy()
+    far[map.dim] += 10.0                            # a shift along the first axis
+    found = watch.look(at_start(far), report(map), rom_toys.cloud(map.dim, 30, 1), WELL)
+    assert found.beyond > 5.0
+    assert found.why == ("beyond",)
+    assert found.nonsense == ""
+    far[map.dim] *= 1000.0
+    assert "times as far from the trained mean" in watch.look(at_start(far)).nonsense
+    turned = xhat.copy()
+    turned[:map.dim] *= -1.0                        # a mirror
+    found = watch.look(at_start(turned), report(map), rom_toys.cloud(map.dim, 30, 1), WELL)
+    assert found.inverted == 1.0
+    assert found.J < 0.0
+    assert found.nonsense == "100% of the points looked at have no det F > 0"
+    assert "inverted" in found.why
+
+
+@pytest.mark.parametrize("broken", [np.nan, np.inf])
+def test_latents_that_are_no_numbers_are_nonsense(toy, broken):
+    watch, xhat = toy
+    found = watch.look(at_start(np.where(xhat == xhat[0], broken, xhat)),
+                       report(watch.map, broken), watch.X[:9], WELL)
+    assert found.nonsense
+    assert {"beyond", "off"} <= set(found.why)
+
+
+@pytest.mark.parametrize(("changes", "name", "said"), [
+    ({"beyond": 1.6}, "beyond", "1.6 times as far from the training runs"),
+    ({"off": 0.05}, "off", "0.05 cells"), ({"seen": 0.25}, "seen", "saw only 25%"),
+    ({"blind": 1}, "blind", "1 of the latent coordinates"), ({"lost": 0.02}, "lost", "2.0%"),
+    ({"inverted": 0.03, "J": -0.1}, "inverted", "det F down to -0.1"),
+    ({"beyond": np.nan}, "beyond", "nan times"),
+])
+def test_each_bound_is_told_by_itself(changes, name, said):
+    found = WELL._replace(**changes)
+    assert found.why == (name,)
+    assert said in found.said
+    assert WELL.why == ()
+    assert found.nonsense == ""
+
+
+def test_a_look_costs_few_points_however_many_there_are(d, rng):
+    map, xhat = rom_toys.affine(d)
+    asked = []
+
+    class Counted(NamedTuple):
+        dim: int = d
+        r: int = map.r
+
+        def derivatives(self, X, xhat):
+            asked.append(len(X))
+            return map.derivatives(X, xhat)
+
+    runs = map.rest + 0.1 * rng.normal(size=(2, 300, map.r))
+    scene = with_(GRAVITY.scene(1.0), steps=1)
+    body = case(scene)._replace(X=rom_toys.cloud(d, 5000))
+    made = watch(body, Counted(), runs)
+    assert sum(asked) <= watching.LATENTS * watching.LOOKED
+    asked.clear()
+    made.look(at_start(xhat), report(map), rom_toys.cloud(d, 3000), WELL)
+    assert sum(asked) <= 2 * watching.LOOKED
+
+
+def test_training_latents_that_do_not_differ_are_refused(d):
+    map, xhat = rom_toys.affine(d)
+    with pytest.raises(ValueError, match="do not differ"):
+        watch(case(GRAVITY.scene(1.0))._replace(X=rom_toys.cloud(d, 30)), map,
+              np.tile(xhat, (2, 3, 1)))
+
+
+# A run.
+
+@pytest.fixture(scope="module")
+def fall():
+    """`Case` of a short fall, and the `Basis` of two modes of two such."""
+    short = GRAVITY._replace(scene=lambda g: with_(GRAVITY.scene(g), steps=4))
+    full = short.run([20, 29])
+    made = basis(full.X, *full.flat(), 2)
+    return case(short.scene(*short.mu[29])), made.modes, made.xhat.reshape(2, 5, 2)
+
+
+class Turned(NamedTuple):
+    """A map whose far end is inverted wherever the body has moved."""
+
+    map: object
+
+    @property
+    def dim(self):
+        return self.map.dim
+
+    @property
+    def r(self):
+        return self.map.r
+
+    def place(self, X, xhat):
+        return self.map.place(X, xhat)
+
+    def velocity(self, X, xhat, vhat):
+        return self.map.velocity(X, xhat, vhat)
+
+    def derivatives(self, X, xhat):
+        x, F, G = self.map.derivatives(X, xhat)
+        if np.abs(xhat).max() > 0.5:
+            F[X[:, 0] > 0.3] *= -1.0
+        return x, F, G
+
+
+def test_a_watched_run_is_the_run_and_is_well(fall):
+    one, modes, xhat = fall
+    way, rest = Way(points=20), np.zeros(2)
+    plain = list(march(one, modes, way, rest, seed=3))
+    seen_too = list(watched(watch(one, modes, xhat), one, way, rest, seed=3))
+    for (latent, own), (same, its, sight) in zip(plain, seen_too, strict=True):
+        assert np.array_equal(latent.xhat, same.xhat)
+        assert own == its
+        assert sight.why == ()
+        assert sight.beyond < 1.0
+
+
+def test_samples_of_others_choice_are_taken_and_looked_at(fall):
+    one, modes, xhat = fall
+    near = np.argsort(one.X[:, 0])[:20]                 # all at the end that is held
+    states = list(watched(watch(one, modes, xhat), one, Way(points=20), np.zeros(2),
+                          pick=lambda t: near))
+    assert [r.samples for _, r, _ in states[1:]] == [20] * 4
+    shares = [sight.seen for *_, sight in states]
+    assert shares[0] == 1.0
+    assert (np.diff(shares) < -0.05).all()              # far less is seen in each step
+
+
+def test_where_no_body_is_left_the_run_stops_and_says_where_when_and_why(fall):
+    one, modes, xhat = fall
+    looked, states = watch(one, Turned(modes), xhat), []
+    with pytest.raises(Nonsense) as stop:
+        states.extend(watched(looked, one, Way(points=20), np.zeros(2)))
+    said, k = str(stop.value), len(states)
+    assert 1 <= k <= 4
+    assert said.startswith(f"step {k}, t = {k * looked.dt:.6g} s: no body is left, ")
+    assert "\n" not in said
+    assert float(said.split("X = ")[1].split(",")[0]) > 0.3
+    assert f"out of bounds since step {k}: " in said
+    assert "are inverted, det F down to -" in said

@@ -1,0 +1,52 @@
+"""A golden file of two disks under stress, and another code that is our own, stage by stage."""
+
+import numpy as np
+from problems import DX, FREE, JELLY, ball, moving, two_disks
+
+from mpm_ref import oracle
+from mpm_ref.materials import NoFlow
+from mpm_ref.oracle import kernel_stages, recording
+from mpm_ref.oracle.schema import ARRAYS
+from mpm_ref.problem import Clock, Problem
+
+STEPS = 2
+ON_NODES = [a.name for a in ARRAYS if a.where == "nodes"]
+
+
+def stretched():
+    """Two disks under stress from the first step on."""
+    problem = two_disks()
+    for body in problem.bodies:
+        body.particles.F[:] *= 0.99
+        body.particles.C[:] = np.random.default_rng(0).normal(size=body.particles.C.shape)
+    return problem
+
+
+def seen_by(problem, steps=STEPS, order=1):
+    """What the kernels compute, as another code would hand it in."""
+    problem = recording.problem_of(problem, order)
+    stepper, dt = recording.started(problem), problem.clock.dt
+    steps = [kernel_stages.step(problem, problem.bodies, stepper, k * dt, dt)[0]
+             for k in range(steps)]
+    return [seen | {f"{b.name}/id": b.id for b in problem.bodies} for seen in steps]
+
+
+def recorded(folder):
+    """Path of a golden file of the disks."""
+    oracle.record(stretched(), folder / "golden.h5", STEPS)
+    return folder / "golden.h5"
+
+
+def checker(golden, path):
+    """A function that checks arrays against a golden file, by way of a file at `path`."""
+    def check(steps, **how):
+        oracle.write(path, steps)
+        return oracle.check(golden, path, **how)
+    return check
+
+
+def alone(scheme, law=JELLY, **fields):
+    """One spinning disk without conditions."""
+    body = moving(ball("jelly", (0.31, 0.13), law, NoFlow(), transfer=scheme.transfer), 1.0, 5.0)
+    body = body._replace(particles=body.particles._replace(**fields))
+    return Problem((body,), DX, Clock(dt=1e-3, steps=9), np.array([0.0, -9.8]), scheme, FREE)

@@ -1,0 +1,114 @@
+"""Random bodies on one grid, as the tests of the implicit step need them, and their plain twins."""
+
+from typing import NamedTuple
+
+import numpy as np
+from clouds import DX, twin
+from constitutive import LAW, states
+
+from mpm_ref.body import Body, particles_at
+from mpm_ref.core.grid import Grid
+from mpm_ref.core.spline import STENCILS
+from mpm_ref.core.state import NONE
+from mpm_ref.hot.potential import Potential
+from mpm_ref.hot.unknowns import Unknowns, unknowns_of
+from mpm_ref.materials import NoFlow
+from mpm_ref.plain import transfer
+from mpm_ref.plain.spline import pairs
+
+DT = 0.3
+SPEED = 0.1 * DX / DT       # strains of a step are about 0.1
+
+
+class Case(NamedTuple):
+    """Dimension, degree of the splines, and the law of each body; bodies overlap."""
+
+    d: int
+    degree: int
+    laws: tuple
+
+    @property
+    def name(self):
+        return f"{self.d}d-degree{self.degree}-" + "-".join(self.laws)
+
+
+# What is compiled costs seconds: each law once, the paper's one in both dimensions.
+CASES = (
+    Case(2, 2, ("fixed_corotated", "neo_hookean")),
+    Case(3, 2, ("hencky", "fluid")),
+    Case(3, 2, ("fixed_corotated",)),
+)
+DEGREES = (Case(2, 1, ("fixed_corotated",)), Case(2, 3, ("fixed_corotated",)))
+
+
+class Problem(NamedTuple):
+    """A potential, and what it was made of."""
+
+    potential: Potential
+    bodies: tuple
+    unknowns: Unknowns
+    grid: Grid
+    gravity: np.ndarray
+    dv: np.ndarray          # (n, d), random
+    w: np.ndarray           # (n, d), another one
+
+
+def body_of(name, d, rng, spread=0.2, length=2.5):
+    """A strained body of random particles in a box of 2.5 cells, or longer on the first axis."""
+    n = round(12 * length)
+    x = rng.uniform(0.0, 2.5, (n, d))
+    x[:, 0] *= length / 2.5
+    x = DX * (x - 3.0)
+    m, V0 = rng.uniform(0.5, 2.0, n), rng.uniform(0.5, 2.0, n) * 1e-2
+    q = particles_at(x, np.zeros((n, d)), m, V0, "pic", fluid=name == "fluid")
+    F = states(rng, n, d, spread)
+    q.F[:] = np.linalg.det(F) if name == "fluid" else F
+    return Body(name, q, LAW[name], NoFlow(), np.arange(n))
+
+
+def grid_of(bodies, degree, rng):
+    """The mass of all bodies, and random velocities of size SPEED, on a box with a rim to spare."""
+    clouds = [pairs(body.particles.x, DX, degree) for body in bodies]
+    box = transfer.box_of(*clouds)
+    box = transfer.Box(box.first - 1, tuple(k + 2 for k in box.shape))
+    m = sum(transfer.mass(b.particles.m, ip, box) for b, ip in zip(bodies, clouds))
+    v = SPEED * rng.normal(size=(*box.shape, len(box.shape)))
+    return Grid(m, m[..., None] * v, NONE, NONE, np.array(box.first), DX)
+
+
+def coarser_unknowns(problem, degree, level):
+    """The unknowns of a problem's particles on a grid of 2^level times the spacing, at rest."""
+    dx = 2**level * DX
+    clouds = [pairs(body.particles.x, dx, degree) for body in problem.bodies]
+    box = transfer.box_of(*clouds)
+    m = sum(transfer.mass(b.particles.m, ip, box) for b, ip in zip(problem.bodies, clouds))
+    v = np.zeros((*box.shape, len(box.shape)))
+    return unknowns_of(Grid(m, v, NONE, NONE, np.array(box.first), dx))
+
+
+def problem_of(case, spread=0.2, length=2.5):
+    """A `Problem` of a case: strains of size `spread`, bodies of `length` cells."""
+    rng = np.random.default_rng(0)
+    bodies = tuple(body_of(name, case.d, rng, spread, length) for name in case.laws)
+    for k, body in enumerate(bodies):
+        body.particles.x[:, 0] += k * DX
+    grid = grid_of(bodies, case.degree, rng)
+    unknowns = unknowns_of(grid)
+    gravity = rng.normal(size=case.d) * SPEED / DT
+    dv, w = SPEED * rng.normal(size=(2, *unknowns.v.shape))
+    potential = Potential(bodies, unknowns, STENCILS[case.degree], DT, gravity)
+    return Problem(potential, bodies, unknowns, grid, gravity, dv, w)
+
+
+def over(problem, u):
+    """A nodal field (n, d) as an array over the box."""
+    out = np.zeros(problem.grid.v.shape)
+    out[problem.unknowns.number >= 0] = u
+    return out
+
+
+def plain_bodies(problem, degree):
+    """Particles, pairs and box for `plain.potential`."""
+    box = transfer.Box(problem.grid.origin, problem.grid.m.shape)
+    return [(twin(b.particles, b.law), pairs(b.particles.x, DX, degree), box)
+            for b in problem.bodies]

@@ -1,0 +1,290 @@
+"""The judge of reduced runs at their extremes: it must notice what is wrong, and only that."""
+
+from itertools import pairwise
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mpm_ref.reduced.case import case
+from mpm_ref.reduced.march import Way
+from mpm_ref.reduced.watch import Sight
+from mpm_ref.rom.fields.pod import basis
+from validation.extremes import ldm_files as files
+from validation.extremes import ldm_long as long
+from validation.extremes import ldm_singular as singular
+from validation.extremes.ldm_points import MU, Bench
+from validation.extremes.ldm_runs import (
+    BAD,
+    FINE,
+    FLAGGED,
+    SILENT,
+    STOPPED,
+    TOLERABLE,
+    End,
+    Trial,
+    ended,
+    full,
+    learned,
+    linear,
+    of_sights,
+    record_silent,
+)
+from validation.extremes.ldm_time_step import record_reach, with_usual
+from validation.ldm.studies import GRAVITY, TORSION
+from validation.verification.scenes import with_
+
+GOOD = End(0.3, 30, -1, "", 0.4, 0.01, 0.9, 4, 0.0, 0.7, "")
+WELL = Sight(beyond=0.3, off=0.01, seen=0.9, blind=0, lost=0.0, J=0.8, inverted=0.0, far=0.9)
+
+
+class Records(dict):
+    """What an experiment records: {target: (value, note, rule)}."""
+
+    def record(self, target, value, note="", **rule):
+        self[target] = value, note, rule
+
+
+def trial(end, usual=0.3, **changes):
+    return Trial("map", "what", "scheme", 10, usual, end._replace(**changes))
+
+
+# The four ends.
+
+@pytest.mark.parametrize(("changes", "kind"), [
+    ({}, FINE), ({"error": 0.999 * BAD * 0.3}, FINE), ({"error": 1.001 * BAD * 0.3}, SILENT),
+    ({"error": np.nan}, SILENT), ({"error": np.inf}, SILENT),
+    ({"error": 50.0, "flags": "beyond"}, FLAGGED),
+    ({"error": 50.0, "flags": "beyond", "said": "no body"}, STOPPED),
+    ({"error": 50.0, "said": "no body"}, STOPPED), ({"flags": "seen"}, FLAGGED)])
+def test_a_run_ends_in_one_of_four_ways(changes, kind):
+    assert GOOD._replace(**changes).kind(0.3) == kind
+
+
+def test_small_errors_are_not_bad_however_good_the_map_is():
+    assert GOOD._replace(error=0.99 * TOLERABLE).kind(0.001) == FINE
+    assert GOOD._replace(error=1.01 * TOLERABLE).kind(0.001) == SILENT
+
+
+def test_the_extremes_of_a_run_are_kept():
+    sights = [WELL, WELL._replace(off=0.05, J=0.5), WELL._replace(beyond=4.0, seen=0.2, blind=1),
+              WELL]
+    end = of_sights(sights, 4, 0.7, "gone")
+    assert end == End(0.7, 3, 1, "off beyond seen blind", 4.0, 0.05, 0.2, 3, 0.0, 0.5, "gone")
+    assert of_sights([WELL], 4, 0.7, "").first == -1
+
+
+def test_silent_runs_are_counted_named_and_a_miss():
+    found = Records()
+    record_silent(found, "x", [trial(GOOD), trial(GOOD, error=9.0), trial(GOOD, flags="off"),
+                               trial(GOOD, error=9.0, flags="off"),
+                               trial(GOOD, error=9.0, said="no")], "some")
+    value, note, rule = found["x.silent"]
+    assert (value, rule["paper"], rule["comparator"]) == (1, 0, "=")
+    assert "1 stopped, 2 flagged, 1 fine" in note
+    assert "map, what, scheme with 10: 9 %" in note
+    assert found["x.misses"][0] == pytest.approx(1.0 / 3.0)
+
+
+# Runs.
+
+def test_a_full_order_run_that_breaks_down_is_kept_as_far_as_it_went():
+    scene = GRAVITY.scene(50.0)
+    x, said = full(case(scene).problem)
+    assert 5 < len(x) < scene.steps
+    assert said.startswith("unstable at step")
+    whole, nothing = full(case(with_(GRAVITY.scene(1.0), steps=3)).problem)
+    assert (len(whole), nothing) == (4, "")
+
+
+@pytest.fixture(scope="module")
+def net():
+    return learned("gravity-r4")
+
+
+def fallen(net, g, way=None, pick=None):
+    one = case(GRAVITY.scene(g))
+    return ended(one, full(one.problem)[0], net, way or Way(points=50), pick)
+
+
+def test_the_watch_knows_the_trained_range(net):
+    inside, outside = fallen(net, MU["gravity"][0]), fallen(net, 20.0)
+    assert inside.kind(0.3) == FINE
+    assert inside.error < 0.5
+    assert inside.beyond < 1.0
+    assert outside.kind(0.3) == FLAGGED
+    assert outside.error > 2.0
+    assert "beyond" in outside.flags
+
+
+def test_samples_in_one_place_are_told(net):
+    near = np.argsort(case(GRAVITY.scene(1.0)).X[:, 0])[:50]
+    found = fallen(net, 7.5, pick=lambda t: near)
+    assert found.error > 5.0
+    assert found.flags == "seen"
+
+
+def test_too_few_samples_are_refused_before_the_first_step(net):
+    found = fallen(net, 5.0, Way(points=1))
+    assert (found.kind(0.3), found.steps) == (STOPPED, 0)
+    assert "expected at least 2 samples" in found.said
+
+
+def test_the_map_of_another_body_is_told_at_the_start(net):
+    one = case(with_(TORSION.scene(0.3, 1.0), steps=2))
+    found = ended(one, full(one.problem)[0], net, Way(points=50))
+    assert found.first == 0
+    assert "off" in found.flags
+
+
+def test_modes_are_a_reduction_with_the_latents_of_their_runs():
+    short = GRAVITY._replace(scene=lambda g: with_(GRAVITY.scene(g), steps=3)).run([9, 20])
+    pod = linear(short, 2)
+    found = basis(short.X, *short.flat(), 2)
+    assert np.array_equal(pod.xhat[1, 3], found.xhat[-1])
+    back = pod.map.place(short.X, pod.xhat[1, 3])
+    assert np.linalg.norm(back - short.x[1, 3]) < 0.05 * np.linalg.norm(short.x[1, 3] - short.X)
+
+
+def test_a_run_is_made_once_for_each_way(net, monkeypatch):
+    made = []
+    monkeypatch.setattr("validation.extremes.ldm_points.beside", lambda *_: (
+        SimpleNamespace(X=np.zeros((99, 3))), None, ""))
+    monkeypatch.setattr("validation.extremes.ldm_points.ended",
+                        lambda case, x, net, way: made.append(way) or GOOD)
+    bench = Bench(net)
+    assert bench.trial("few", Way(points=7)).points == 7
+    assert bench.trial("all", Way()).points == 99
+    assert bench.trial("all", Way()).usual == GOOD.error
+    assert made == [Way(), Way(points=7)]
+
+
+# Time steps.
+
+def test_what_is_usual_is_the_trained_step_s_worst():
+    found = with_usual([(1, trial(GOOD, error=0.2)), (1, trial(GOOD, error=0.4)),
+                        (2, trial(GOOD, error=0.9))])
+    assert [t.usual for _, t in found] == [0.4] * 3
+
+
+def test_how_far_runs_go_ends_at_the_first_that_does_not():
+    found = Records()
+    runs = [(1, trial(GOOD)), (2, trial(GOOD)), (3, trial(GOOD, flags="off")), (5, trial(GOOD)),
+            (10, trial(GOOD, said="no"))]
+    record_reach(found, runs, {(1.0, 1): True, (1.0, 2): False, (1.0, 3): True})
+    assert found["extremes.ldm.dt.fine"][0] == 2
+    value, note, rule = found["extremes.ldm.dt.going"]
+    assert (value, rule["bound"]) == (5, 1.0)
+    assert "full-order runs do up to 1" in note
+
+
+# Long runs.
+
+def test_energy_is_that_of_the_state_and_distance_that_of_the_points(net):
+    one = case(with_(GRAVITY.scene(2.0), steps=6))
+    states, X = [], one.X
+    ended(one, full(one.problem)[0], net, Way(points=50), keep=states)
+    E = long.energies(one, net.map, Way(), [latent for latent, _ in states])
+    height = 2.0 * one.m @ states[0][1][:, 2]
+    assert E[0] == pytest.approx(height, abs=0.05)          # no motion, hardly any strain
+    assert (np.diff(E)[1:] < 0.0).all()                     # PIC loses energy
+    assert long.distance(X + np.array([0.3, 0.0, 0.4]), X) == pytest.approx(0.5)
+
+
+# Singular maps.
+
+def test_redundant_maps_do_what_the_sound_one_does(net, rng):
+    X = case(GRAVITY.scene(1.0)).X[::50]
+    short = GRAVITY._replace(scene=lambda g: with_(GRAVITY.scene(g), steps=3)).run([9, 20])
+    pod = linear(short, 4)
+    made = singular.redundant(net, pod, singular.NEAR["standard"], rng)
+    for reduction, rank in made:
+        of = pod if hasattr(reduction.map, "U") else net
+        for xhat, wide in zip(of.xhat[0], reduction.xhat[0], strict=True):
+            assert np.allclose(reduction.map.place(X, wide), of.map.place(X, xhat), atol=1e-15)
+        G = reduction.map.derivatives(X, reduction.rest)[2].reshape(-1, 5)
+        s = np.linalg.svd(G, compute_uv=False)
+        assert np.sum(s > singular.RANKED * s[0]) == rank
+    assert {rank for _, rank in made} == {4, 5}
+
+
+def test_lacking_maps_do_not(net):
+    X = case(GRAVITY.scene(1.0)).X[::50]
+    for reduction in singular.lacking(net):
+        G = reduction.map.derivatives(X, net.rest)[2].reshape(-1, 4)
+        assert np.linalg.matrix_rank(G, tol=1e-12) == 3
+
+
+# Files.
+
+@pytest.fixture(scope="module")
+def readers(tmp_path_factory):
+    """{kind: (file, its reader)} of the maps that are damaged."""
+    found = files.written(tmp_path_factory.mktemp("maps"), np.random.default_rng(0))
+    return dict(zip(("network", "modes", "curved"), found.items(), strict=True))
+
+
+@pytest.fixture(params=["network", "modes", "curved"])
+def reader(request, readers):
+    return readers[request.param]
+
+
+def test_maps_are_sound_before_they_are_damaged(readers):
+    models = {kind: read(path) for kind, (path, read) in readers.items()}
+    assert {kind: model.decoder.r for kind, model in models.items()} == {
+        "network": 4, "modes": 4, "curved": 2}
+    assert [type(model.decoder).__name__ for model in models.values()] == [
+        "Decoder", "Modes", "Curved"]
+
+
+@pytest.mark.parametrize(("kind", "name"), [("network", "W"), ("modes", "slope"),
+                                            ("curved", "C")])
+def test_every_byte_of_a_file_is_of_one_class(readers, kind, name):
+    path, _ = readers[kind]
+    ranges = sorted(files.classes(path).values())
+    assert ranges[0][0] == 0
+    assert ranges[-1][1] == path.stat().st_size
+    assert all(a[1] == b[0] for a, b in pairwise(ranges))
+    begin, end = files.classes(path)[f"{name}.npy, numbers"]
+    numbers = np.frombuffer(path.read_bytes()[begin:end])
+    assert np.array_equal(np.sort(numbers), np.sort(files.opened(path)[name].ravel()))
+
+
+def test_one_bit_is_flipped():
+    content = bytes(range(40))
+    damaged = files.flipped(content, 7, 3)
+    changed = [a ^ b for a, b in zip(content, damaged, strict=True)]
+    assert changed[7] == 8
+    assert sum(map(bool, changed)) == 1
+
+
+@pytest.mark.parametrize(("error", "clear"), [
+    (ValueError("map.npz is damaged; train again"), True), (ValueError("is damaged; again"), False),
+    (ValueError("map.npz is damaged"), False), (ValueError("map.npz\nis damaged; again"), False),
+    (KeyError("map.npz; W"), False), (None, False)])
+def test_a_refusal_is_one_sentence_with_name_and_advice(tmp_path, error, clear):
+    def read():
+        if error:
+            raise error
+
+    assert files.refusal(read, tmp_path / "map.npz")[0] is clear
+
+
+def test_unfit_files_are_those_that_the_loader_must_find(reader, tmp_path):
+    (path, read), copy = reader, tmp_path / "copy.npz"
+    made = list(files.unfit(files.opened(path)))
+    assert {"not finite", "wrong sizes"} <= {kind for kind, *_ in made}
+    for _, what, content in made:
+        copy.write_bytes(content)
+        ok, said = files.refusal(lambda: read(copy), copy)
+        assert ok, what
+        assert "checksum" not in said       # the seal is sound
+
+
+def test_files_with_the_seal_of_another_one_are_refused_for_it(readers, tmp_path):
+    copy = tmp_path / "copy.npz"
+    for path, read in readers.values():
+        for other, _ in readers.values():
+            copy.write_bytes(files.resealed(path, other)[2])
+            ok, said = files.refusal(lambda read=read: read(copy), copy)
+            assert (ok, "checksum" in said) == (2 * (other != path,))

@@ -1,0 +1,139 @@
+"""The tower: its size, and the race of full and reduced models."""
+
+from time import sleep
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mpm_ref.reduced.case import case
+from mpm_ref.reduced.errors import Errors
+from mpm_ref.reduced.march import Way, march
+from mpm_ref.rom.fields.affine import Affine
+from mpm_ref.rom.kinematics import NoBody
+from mpm_ref.scene import build
+from validation.ldm import tower
+from validation.ldm.racing import COLUMNS, Full, Raced, Spent, clocked, fastest, median, race
+from validation.ldm.studies import TOWER, latin_twice, refined
+from validation.verification.scenes import with_
+
+EXACT = Affine(3), Affine(3).rest       # a map that is exact for affine motions
+PRINTED = 3076115 * (0.48 / 3) ** 3     # [m^3]: points times volumes (LDM-tab2-sampling, LDM-X8)
+
+
+@pytest.fixture
+def small():
+    """A tower of few points and steps."""
+    return with_(refined(TOWER.scene(0.7, 0.3, -0.8), 2.88, 2), steps=3)
+
+
+def test_the_tower_has_the_printed_volume():
+    body = build(TOWER.scene(0.7, 0.3, -0.8)).bodies[0]
+    assert body.particles.V0.sum() == pytest.approx(PRINTED, rel=0.02)
+
+
+def test_parameters_are_within_their_ranges_and_fill_them():
+    low, high = np.array((0.6, 0.0, -np.pi / 3)), np.array((0.8, np.pi / 2, -np.pi / 6))
+    for numbers in (TOWER.train, TOWER.test):
+        share = (TOWER.mu[list(numbers)] - low) / (high - low)
+        strata = np.sort((share * len(numbers)).astype(int), axis=0)
+        assert (strata == np.arange(len(numbers))[:, None]).all()
+
+
+def test_parameters_are_those_of_scipy():
+    qmc = pytest.importorskip("scipy.stats.qmc")
+    rng, low, high = np.random.default_rng(5), (0.0, 1.0), (2.0, 1.5)
+    expected = [qmc.scale(qmc.LatinHypercube(2, rng=rng).random(n), low, high) for n in (7, 3)]
+    assert np.array_equal(latin_twice(((0.0, 2.0), (1.0, 1.5)), 7, 3, 5), np.vstack(expected))
+
+
+def test_the_top_moves_as_it_is_told():
+    _, top = TOWER.scene(0.5, 0.0, -np.pi / 6).fixed
+    assert top.motion.translation.rate == pytest.approx((0.5 * np.cos(np.pi / 6), 0.0, -0.25))
+
+
+def test_a_race_measures_every_way(small):
+    ways = [Way("resampled", points=30), Way("eulerian", points=30)]
+    full, found = race(small, EXACT, ways, 3)
+    assert min(full) > 0.0
+    for one, way in zip(found, ways, strict=True):
+        assert one.way == way
+        assert min(one.spent) > 0.0
+        assert 0 < one.points < 20000
+        assert 0.0 < one.errors.origin < 0.1
+
+
+def test_a_run_that_breaks_down_has_no_error(small, monkeypatch):
+    sound, lost = (Way("resampled", points=n) for n in (30, 29))
+
+    def breaking(one, map, way, rest):
+        for k, state in enumerate(march(one, map, way, rest)):
+            if way == lost and k == 2:
+                raise NoBody("none is left")
+            yield state
+
+    monkeypatch.setattr("validation.ldm.racing.march", breaking)
+    _, (broken, fine) = race(small, EXACT, [lost, sound], 2)
+    assert broken.errors.origin == broken.spent.wall == np.inf
+    assert np.isfinite(fine.errors.origin)
+
+
+def test_a_race_with_too_few_samples_is_a_mistake(small):
+    with pytest.raises(ValueError, match="2 samples in 3 axes for 12 latent coordinates"):
+        race(small, EXACT, [Way("resampled", points=2)], 1)
+
+
+def test_the_fastest_transfer_is_measured(small):
+    assert min(fastest(small)) > 0.0
+
+
+def test_tracked_points_are_in_their_own_order(small):
+    full = Full(small)
+    start = full.positions(7)
+    full.step()
+    assert np.array_equal(start, case(small).X[::7])
+    assert np.abs(full.positions(7) - start).max() < 0.1
+
+
+def test_time_is_counted_while_a_step_runs():
+    def idle():
+        sleep(0.02)
+        return "done"
+
+    found, spent = clocked(idle)
+    assert found == "done"
+    assert spent.wall >= 0.02 > spent.cpu >= 0.0
+    assert median([Spent(1.0, 5.0), Spent(9.0, 6.0), Spent(2.0, 40.0)]) == (2.0, 6.0)
+
+
+def test_a_row_tells_the_way_in_order():
+    one = Raced(tower.FAST._replace(points=25), Spent(0.1, 0.2), 300, Errors(1.0, 2.0, 3.0))
+    row = dict(zip(COLUMNS, one.row, strict=True))
+    assert (row["quadrature"], row["points"], row["precision"]) == ("eulerian", 25, "single")
+    assert (row["wall"], row["cpu"]) == (0.1, 0.2)
+    assert (row["quadrature_points"], row["origin"]) == (300, 1.0)
+    assert one._replace(way=Way()).row[2] == "all"
+
+
+def test_ways_have_names_of_their_own():
+    names = [Raced(way, None, 0, None).words for way in tower.ways((25, 50))]
+    assert names[:2] == ["lagrangian-nonlinear-25", "lagrangian-nonlinear-50"]
+    assert "eulerian-linear-25-transported-0.01-single" in names
+    assert len(set(names)) == len(names)
+
+
+def test_what_the_paper_prints_is_of_the_fastest_eulerian_run_below_fifty_samples():
+    def row(quadrature, points, wall, close=1e-9, error=1.0):
+        way = Way(quadrature, "linear", points, close=close)
+        raced = Raced(way, Spent(wall, 0.0), 1000 * points, Errors(error, 0.0, 0.0))
+        times = 8.0, 4.0, 24 * wall, 4.0 / wall, 8.0 / wall
+        return dict(zip(tower.OWN, (7, *raced.row, *times), strict=True))
+
+    said = {}
+    run = SimpleNamespace(profile="standard",
+                          record=lambda name, value, **words: said.update({name: value}))
+    tower.printed(run, [row("eulerian", 25, 0.5), row("eulerian", 25, 0.25, 1e-2),
+                        row("eulerian", 25, 0.03, 1e-2, 2.0), row("eulerian", 50, 0.1),
+                        row("resampled", 25, 0.01)])
+    assert said == {"ldm.fig16.speedup": 16.0, "ldm.fig16.realtime": 6.0,
+                    "ldm.sec5_4.quadrature_points": 50000}

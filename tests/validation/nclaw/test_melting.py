@@ -1,0 +1,94 @@
+"""Bodies that change their laws as they go, and whose laws they are."""
+
+
+import numpy as np
+import pytest
+
+from mpm_ref.nclaw.bodies import own
+from mpm_ref.nclaw.study.compare import positions
+from mpm_ref.scene import build
+from validation.nclaw import elsewhere, melting, shown
+from validation.nclaw.environments import ENVIRONMENTS, environment
+from validation.nclaw.tasks import unit_cube
+from validation.verification.scenes import with_
+
+STEPS, EVERY = 60, 20
+
+
+@pytest.fixture
+def scene():
+    """A small cube of plasticine."""
+    cube = environment("plasticine")
+    few = with_(cube.body[0], sampling=with_(cube.body[0].sampling, counts=(4, 4, 4)))
+    return unit_cube(with_(shown.cone(), body=(few,), steps=STEPS, every=EVERY), 10, 1)
+
+
+def fluffy(body):
+    """A body of next to no stress."""
+    return elsewhere.fresh(body, body.law._replace(mu=1e-3, lam=1e-3), body.flow)
+
+
+def test_a_body_that_does_not_change_is_run_as_ever(scene):
+    """But for round-off of another order of sums."""
+    plain = [*positions(build(scene), tuple(map(own, build(scene).bodies)))]
+    same = [*melting.melting(build(scene), own, own)]
+    assert len(plain) == len(same) == 1 + STEPS // EVERY
+    assert np.allclose(plain, same, atol=1e-12)
+
+
+def test_the_lowest_points_change_first(scene, monkeypatch):
+    """Half-way, and all after the last step; how many is told by the step alone."""
+    monkeypatch.setattr(melting, "FIRST", 0)
+    monkeypatch.setattr(melting, "LAST", 40)
+    seen = []
+
+    def after(body):
+        seen.append(body.id.copy())
+        return own(body)
+
+    start, *_ = melting.melting(build(scene), own, after)
+    assert [len(ids) for ids in seen] == [32, 64]
+    assert start[seen[0], 1].max() <= np.delete(start[:, 1], seen[0]).min()
+
+
+def test_what_melts_moves_otherwise(scene, monkeypatch):
+    monkeypatch.setattr(melting, "FIRST", -1)
+    monkeypatch.setattr(melting, "LAST", 0)
+    ends = [[*melting.melting(build(scene), own, after)][-1] for after in (own, fluffy)]
+    assert np.abs(ends[1] - ends[0]).max() > 1e-4
+
+
+def nowhere(body):
+    """A body whose stress is not a number."""
+    return elsewhere.fresh(body, body.law._replace(mu=np.nan), body.flow)
+
+
+def test_a_run_that_breaks_down_has_frames_of_nan(scene, monkeypatch):
+    """As many as were asked for, from the first change on."""
+    monkeypatch.setattr(melting, "FIRST", 10)
+    monkeypatch.setattr(melting, "LAST", 30)
+    whole = [*melting.melting(build(scene), own, own)]
+    found = [*melting.melting(build(scene), own, nowhere)]
+    assert len(found) == len(whole)
+    assert np.array_equal(found[:2], whole[:2])
+    assert np.isnan(found[2:]).all()
+
+
+@pytest.mark.parametrize(("step", "share"), [(0, 0.0), (500, 0.0), (1000, 0.5), (2000, 1.0)])
+def test_the_threshold_moves_as_in_the_release(step, share):
+    assert melting.melted_points(step, 1000) == 1000 * share
+
+
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_materials_are_known_by_their_laws(name):
+    assert elsewhere.of(build(environment(name)).bodies[0]) == name
+
+
+def test_parts_make_the_whole(scene):
+    """Whatever their order."""
+    body = own(build(scene).bodies[0])
+    body.particles.F[:] += np.arange(64)[:, None, None]
+    which = np.random.default_rng(0).random(64) < 0.4
+    again = melting.whole([melting.part(body, ~which), melting.part(body, which)])
+    assert np.array_equal(again.particles.F, body.particles.F)
+    assert np.array_equal(again.id, np.arange(64))

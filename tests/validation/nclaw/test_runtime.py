@@ -1,0 +1,93 @@
+"""NCLaw's Table 3: which runs are timed, and what is recorded of their times."""
+
+import numpy as np
+import pytest
+
+from mpm_ref.nclaw.bodies import own
+from mpm_ref.nclaw.gnn.simulator import Simulator
+from tests.validation.nclaw.test_gnn_evaluate import still, water
+from validation import targets
+from validation.nclaw import runtime
+from validation.nclaw.simulators import simulators
+from validation.nclaw.untrained import untrained
+from validation.results import Results
+from validation.run import Setting, run_all
+from validation.waiting import Untrained
+
+REPEATS = 10
+
+
+@pytest.fixture
+def runs(monkeypatch):
+    """Weights of sand and its graph network are there. What was run, as (law, steps); a run of ours
+    takes k seconds, k its number, of a graph network three times, of the true laws half of that.
+    """
+    asked = []
+
+    def found(name):
+        if not name.startswith("sand"):
+            raise Untrained(f"no weights {name}.npz")
+        return still() if name.endswith("gnn") else untrained()
+
+    def took(scene, law):
+        word = "true" if law is own else "gnn" if isinstance(law, Simulator) else "ours"
+        asked.append((word, scene.steps))
+        k = sum(one == (word, 1000) for one in asked)
+        return k * {"true": 0.5, "ours": 1.0, "gnn": 3.0}[word], 10.0 * k
+
+    monkeypatch.setattr(runtime, "trained", found)
+    monkeypatch.setattr(runtime, "took", took)
+    return asked
+
+
+def recorded(folder):
+    setting = Setting("standard", folder, targets=targets.load())
+    assert run_all([runtime.table3.experiment], setting) == []
+    return {r.target: r for r in Results(folder).records("nclaw.table3")}
+
+
+def test_laws_and_graph_networks_are_timed_in_turn(tmp_path, runs):
+    """Each first in a run that compiles, which is not counted."""
+    recorded(tmp_path)
+    words = ("ours", "gnn", "true")
+    assert runs == [*((word, 5) for word in words),
+                    *((word, 1000) for _ in range(REPEATS) for word in words)]
+
+
+def test_medians_stand_beside_the_printed_times(tmp_path, runs):
+    found = recorded(tmp_path)
+    ours, gnn = (found[f"nclaw.table3.{word}.sand"] for word in ("ours", "gnn"))
+    assert (ours.value, ours.paper, ours.verdict) == (5.5, 2.55, "info")
+    assert (gnn.value, gnn.paper, gnn.verdict) == (16.5, 2.1, "info")
+    assert f"of {REPEATS} runs" in ours.note
+    assert gnn.note.endswith(simulators()["sand-gnn"].said)
+    assert found["nclaw.table3.gnn.sand.cpu"].value == pytest.approx(55.0 / 1e6)
+    assert found["nclaw.table3.gnn.sand.over_true"].value == 1.0
+
+
+def test_what_is_not_trained_is_told_and_not_run(tmp_path, runs):
+    found = recorded(tmp_path)
+    assert found["nclaw.table3.untrained"].value == 6
+    assert not {target for target in found if target.endswith(("jello", "water"))}
+
+
+@pytest.mark.parametrize("law", [own, still()], ids=["laws", "graph network"])
+def test_a_run_takes_time(law):
+    wall, cpu = runtime.took(water(5), law)
+    assert 0.0 < wall < 60.0
+    assert 0.0 < cpu
+
+
+def test_a_run_that_breaks_down_has_no_time():
+    assert np.isnan(runtime.took(water(15), still(a=np.inf))).all()
+
+
+def test_times_of_runs_that_break_down_are_not_recorded(tmp_path, runs, monkeypatch):
+    timed = runtime.took
+    monkeypatch.setattr(runtime, "took", lambda scene, law: (
+        (np.nan, np.nan) if isinstance(law, Simulator) else timed(scene, law)))
+    found = recorded(tmp_path)
+    assert found["nclaw.table3.gnn.sand"].value is None
+    assert runtime.LOST in found["nclaw.table3.gnn.sand"].note
+    assert found["nclaw.table3.ours.sand"].value == 5.5
+    assert runtime.LOST not in found["nclaw.table3.ours.sand"].note

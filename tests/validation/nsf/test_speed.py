@@ -1,0 +1,165 @@
+"""Time of NSF's reduced runs beside the full-order run, on a clock that the tests wind: none of
+them depends on how long anything takes.
+"""
+
+from itertools import islice
+
+import numpy as np
+import pytest
+
+from mpm_ref.reduced.inferring import Plan, infer
+from mpm_ref.reduced.whole import whole
+from mpm_ref.rom.fields.pod_fields import Sizes
+from mpm_ref.rom.inferred import Inferred
+from mpm_ref.simulate import simulate
+from validation.nsf import speed, tested
+from validation.nsf.studies import jelly
+from validation.results import Results
+from validation.run import Setting, run_all
+from validation.trade.nsf_sizes import particle_bytes
+
+STUDY = jelly(4)._replace(train=(0.3, 0.5), test=(0.35, 0.4), samples=40,
+                          sizes=Sizes(r=3, modes=8, tau=12, C=12, smoothing=1e-4))
+SPENT = dict(zip(speed.STAGES, (1.0, 2.0, 4.0, 8.0), strict=True))      # [s] each time
+FULL, DEFORM = 64.0, 16.0           # [s] of a step, of the update of a body
+BODIES = 2
+N, FEW = 156, 2                     # particles of both, and so few samples that some are left out
+
+
+@pytest.fixture(scope="module")
+def one():
+    """The small study."""
+    return tested.tested(STUDY._replace(test=STUDY.test[1:]))
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """Time that passes in stages of a reduced step, in full-order runs and in updates of bodies
+    alone.
+    """
+    now = [0.0]
+
+    def passing(work, spent):
+        def done(*given):
+            now[0] += spent
+            return work(*given)
+        return done
+
+    def run(problem):
+        now[0] += FULL * problem.clock.steps
+        yield from simulate(problem)
+
+    for stage, spent in SPENT.items():
+        monkeypatch.setattr(Inferred, stage, passing(getattr(Inferred, stage), spent))
+    monkeypatch.setattr(speed, "deform_body", passing(speed.deform_body, DEFORM))
+    monkeypatch.setattr(speed, "simulate", run)
+    monkeypatch.setattr(speed, "perf_counter", lambda: now[0])
+
+
+@pytest.mark.usefixtures("clock")
+@pytest.mark.parametrize("inversion", ["nonlinear", "linear"])
+def test_stages_add_up_to_the_step(one, inversion):
+    """Exactly: whole seconds are added. Steps of the warm-up are in neither."""
+    found = speed.reduced_steps(one, 40, inversion, 5)
+    assert {stage: found[stage] for stage in SPENT} == SPENT
+    assert found["reduced"] == sum(SPENT.values())
+
+
+def test_stages_are_parts_of_the_step(one):
+    """On the real clock, up to the round-off of their sums."""
+    found = speed.reduced_steps(one, 40, "nonlinear", 5)
+    assert all(found[stage] > 0.0 for stage in speed.STAGES)
+    assert sum(found[stage] for stage in speed.STAGES) <= found["reduced"] * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("steps", [1, 5])
+def test_integration_points_are_those_of_the_reduced_run(one, steps):
+    """The mean over all steps, of the warm-up too; with all particles, all."""
+    scene = whole(one.study.run(0.4))
+    run = infer(scene, one.of(0.4), Plan(one.study.chosen(scene, FEW, 0)), one.rest)
+    reports = [report.points for _, _, report in islice(run, 1, 1 + speed.WARM + steps)]
+    assert FEW < min(reports) < max(reports) <= N
+    for count, points in ((FEW, np.mean(reports)), (N, N)):
+        assert speed.reduced_steps(one, count, "nonlinear", steps)["points"] == points
+
+
+@pytest.mark.usefixtures("clock")
+def test_a_full_step_and_its_update_of_bodies(one):
+    assert speed.whole_steps(STUDY, 10) == (FULL, BODIES * DEFORM)
+
+
+def test_full_steps_are_all_from_the_start(monkeypatch):
+    """Not from where the last repeat ended."""
+    begun = []
+
+    def run(problem):
+        begun.append([body.particles.x.copy() for body in problem.bodies])
+        yield from simulate(problem)
+
+    monkeypatch.setattr(speed, "simulate", run)
+    speed.whole_steps(STUDY, 5)
+    rest = [body.particles.x for body in whole(STUDY.run(STUDY.test[0])).problem.bodies]
+    assert len(begun) == 1 + speed.REPEATS
+    for bodies in begun:
+        for x, X in zip(bodies, rest, strict=True):
+            assert np.array_equal(x, X)
+
+
+@pytest.fixture
+def recorded(one, clock, tmp_path, monkeypatch):
+    """{id: `Record`} and the table of the experiment on the small study, with all particles and
+    with few.
+    """
+    asked = []
+
+    def small(coarser, train):
+        asked.append((coarser, train))
+        return STUDY
+
+    def made(study):
+        asked.append(study)
+        return one
+
+    monkeypatch.setattr(speed, "STUDIES", {"jelly": (small, (N, FEW))})
+    monkeypatch.setattr(speed, "sand", small)
+    monkeypatch.setattr(speed, "tested", made)
+    assert not run_all([speed.speed.experiment], Setting("quick", tmp_path))
+    assert asked == [(3, 3), STUDY._replace(test=STUDY.test[1:]),
+                     (3, 3), STUDY._replace(test=STUDY.test[:1], steps=speed.HELD)]
+    results = Results(tmp_path)
+    return ({r.target: r for r in results.records("nsf.speed") if r.target != "nsf.speed"},
+            results.table("nsf.speed", "times"))
+
+
+def test_records_are_ratios_and_shares_of_the_table(one, recorded):
+    records, table = recorded
+    assert [*zip(table["samples"], table["inversion"], strict=True)] == [
+        (N, "nonlinear"), (N, "linear"), (FEW, "nonlinear"), (FEW, "linear")]
+    for name, spent in {**SPENT, "full": FULL, "deform": BODIES * DEFORM}.items():
+        assert (table[name] == spent).all()
+    reduced = sum(SPENT.values())
+    assert (table["reduced"] == reduced).all()
+    names = {f"nsf.speed.jelly.{inversion}.{count}": FULL / reduced
+             for count in (N, FEW) for inversion in ("nonlinear", "linear")}
+    fields = sum(a.nbytes for a in (one.fields.X, one.fields.U, one.fields.tau.modes,
+                                    one.fields.C.modes))
+    particles = particle_bytes(STUDY)
+    held = {name: value for scene in ("jelly", "sand") for name, value in (
+        (f"nsf.speed.{scene}.bytes.fields", fields), (f"nsf.{scene}.mem_reduced", 1e-9 * fields),
+        (f"nsf.speed.{scene}.bytes.particles", particles),
+        (f"nsf.{scene}.mem_full", 1e-9 * particles))}
+    found = {target: one.value for target, one in records.items()}
+    assert found == pytest.approx(names | held | {
+        "nsf.appC.jelly.speedup_per_step": FULL / reduced,
+        "nsf.jelly.speedup": 1.5 * FULL / reduced,
+        "nsf.appC.jelly.full": 100.0 * FULL,
+        "nsf.appC.jelly.reduced_mpm": 100.0 * SPENT["moved"],
+        "nsf.appC.jelly.network": 100.0 * (reduced - SPENT["moved"]),
+        "nsf.appC.jelly.particle_share": 100.0,
+        "nsf.appC.jelly.runtime_share": 100.0 * SPENT["moved"] / FULL,
+        "nsf.speed.jelly.deform": 100.0 * BODIES * DEFORM / FULL})
+    assert {r.comparator for r in records.values()} == {"info"}
+    points = table["points"][2]
+    assert f"{FEW} samples, {points:.0f} integration points" in (
+        records[f"nsf.speed.jelly.nonlinear.{FEW}"].note)
+    assert FEW < points < N == table["points"][0]

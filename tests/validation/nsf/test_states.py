@@ -1,0 +1,162 @@
+"""What NSF's state figures show, and the figures themselves."""
+
+import importlib
+from types import SimpleNamespace
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+from figures import _reduced, nsf_fig18
+from mpm_ref.reduced.inferring import Plan, infer
+from mpm_ref.reduced.whole import whole
+from mpm_ref.rom.kinematics import NoBody
+from mpm_ref.rom.symmetric import tensor
+from validation.ldm.kept_bodies import read
+from validation.nsf import states, tested
+from validation.nsf.studies import jelly
+
+mpl.use("Agg")
+TEST, ID = 0.45, "nsf.jelly"
+
+
+@pytest.fixture(scope="module")
+def cube():
+    """The jelly cube at half the resolution."""
+    return tested.tested(jelly(2))
+
+
+@pytest.fixture
+def run(tmp_path):
+    """What an experiment is told of its run."""
+    return SimpleNamespace(folder=tmp_path, experiment=SimpleNamespace(id=ID))
+
+
+def test_states_are_those_of_both_runs_at_the_same_times(cube, run, monkeypatch):
+    monkeypatch.setattr(states, "MOST", 100)
+    states.keep_states(run, cube, (TEST,), ("map", "stress"))
+    kept = read(run.folder, ID)
+    x, last = cube.tests[TEST].x[0], cube.tests[TEST].x.shape[1] - 1
+    assert kept["values"].tolist() == ["0.45"]
+    assert kept["levels"].tolist() == [round(last / 3), round(2 * last / 3), last]
+    shown = np.arange(0, len(cube.runs.X), -(-len(cube.runs.X) // 100))
+    assert len(shown) <= 100
+    assert kept["0.45_true"] == pytest.approx(x[kept["levels"]][:, shown], abs=1e-4)
+    own, alone = (np.abs(kept[f"0.45_{word}"] - kept["0.45_true"]).max()
+                  for word in ("ours", "map"))
+    assert 1e-4 < own < 0.3 * alone
+    tau = tensor(cube.tests[TEST].tau[0, -1, shown].astype(float), 3)
+    size = np.sqrt(np.sum(tau**2, axis=(1, 2)))
+    assert kept["0.45_true_tau"][-1] == pytest.approx(size, abs=1e-3 * size.max())
+    assert kept["0.45_ours_tau"].shape == (3, len(shown))
+    for word, k in (("first", 0), ("last", -1)):
+        assert kept[word] == pytest.approx(cube.runs.x[k, kept["levels"]][:, shown], abs=1e-4)
+
+
+def test_stress_is_kept_where_it_is_asked_for(cube, run):
+    states.keep_states(run, cube, (TEST,))
+    assert {*read(run.folder, ID)} == {"values", "levels", "first", "last", "0.45_true",
+                                       "0.45_ours"}
+
+
+def test_a_run_on_samples_with_weights_is_kept_where_it_is_asked_for(cube, run):
+    states.keep_states(run, cube, (TEST,), ("weighed",))
+    kept = read(run.folder, ID)
+    assert "0.45_map" not in kept
+    scene, shown = whole(cube.study.run(TEST)), np.arange(len(cube.runs.X))
+    plan = Plan(cube.study.chosen(scene, cube.study.samples, 0, cube.fields))
+    *_, (_, last, _) = infer(scene, cube.of(TEST), plan, cube.rest)
+    assert kept["0.45_weighed"][-1] == pytest.approx(cube.fields.place(shown, last.xhat), abs=1e-4)
+    assert np.abs(kept["0.45_weighed"] - kept["0.45_ours"]).max() > 1e-3
+
+
+def test_a_run_that_breaks_down_has_no_place_from_then_on(cube, monkeypatch):
+    infer, test = states.infer, cube.tests[TEST]
+
+    def breaks(*given):
+        for t, at, report in infer(*given):
+            if t > 0.5 * test.dt * (test.x.shape[1] - 1):
+                raise NoBody("gone")
+            yield t, at, report
+
+    monkeypatch.setattr(states, "infer", breaks)
+    found = states.of_run("one", cube, TEST, np.arange(5))
+    assert [np.isfinite(found["one"][k]).all() for k in range(3)] == [True, False, False]
+
+
+@pytest.fixture
+def results(cube, run):
+    """Results with kept states."""
+    states.keep_states(run, cube, (TEST,), ("map", "stress"))
+    return SimpleNamespace(folder=run.folder)
+
+
+def test_a_row_for_each_way_and_a_column_for_each_time(results):
+    figure = _reduced.beside(results, ID, ("true", "ours", "map"))
+    assert len(figure.axes) == 9
+    assert [ax.texts[0].get_text() for ax in figure.axes[::3]] == [
+        "0.45: full order", "0.45: reduced", "0.45: map alone"]
+    assert len(_reduced.ends(results, ID).axes) == 6
+    assert len(_reduced.stresses(results, ID).axes) == 7        # with a colour bar
+
+
+def test_points_that_fly_away_are_left_out(rng):
+    """A run may lose points; the box of the full-order runs and ROOM of its longest side stay."""
+    x = rng.uniform(size=(30, 3)) * (1.0, 0.2, 0.2)
+    x[:2] = [[0.0, 0.0, 0.0], [1.0, 0.2, 0.2]]
+    ends = _reduced.room(x)
+    assert ends == pytest.approx(np.array([[-0.4, -0.4, -0.4], [1.4, 0.6, 0.6]]))
+    gone = np.concatenate([x, [[1.39, 0.0, 0.0], [1.41, 0.0, 0.0], [0.0, -5.0, 0.0]]])
+    solid, _ = _reduced.drawn(gone, "#ffffff", 0.1, ends)
+    assert len(solid.x) == 31
+    assert len(_reduced.drawn(x + 10.0, "#ffffff", 0.1, ends)[0].x) == 0
+
+
+@pytest.mark.parametrize(("number", "values", "also", "sides"), [
+    ("01", 3, (), ["{0}: full order", "{0}: reduced", "{1}: full order", "{1}: reduced",
+                   "{2}: full order", "{2}: reduced"]),
+    ("05", 1, ("map",), ["{0}: full order", "{0}: reduced", "{0}: map alone"]),
+    ("07", 2, (), ["{0}: full order", "{0}: reduced", "{1}: full order", "{1}: reduced"]),
+    ("08", 2, ("stress",), ["{0}: full order", "{0}: reduced", "{1}: full order", "{1}: reduced"]),
+    ("09", 2, ("stress",), ["full order", "reduced"]),
+    ("10", 2, ("weighed",), ["{0}: full order", "{0}: reduced", "{0}: with weights",
+                             "{1}: full order", "{1}: reduced", "{1}: with weights"]),
+    ("12", 1, ("map",), ["{0}: full order", "{0}: reduced", "{0}: map alone"]),
+    ("13", 1, ("map",), ["{0}: full order", "{0}: reduced", "{0}: map alone"]),
+    ("14", 2, (), ["{0}: full order", "{0}: reduced", "{1}: full order", "{1}: reduced"]),
+    ("17", 2, (), ["{0}: full order", "{0}: reduced", "{1}: full order", "{1}: reduced"]),
+    ("15", 1, ("map",), ["first of training", "last of training"]),
+    ("16", 2, (), ["first of training", "last of training"])])
+def test_figures_show_all_that_experiments_keep(number, values, also, sides, tmp_path, rng):
+    """A row for each parameter kept (of the stress, for one) and each way."""
+    script = importlib.import_module(f"figures.nsf_fig{number}")
+    names, x = [f"{0.1 * k:g}" for k in range(1, values + 1)], rng.uniform(size=(3, 40, 3))
+    words = ["true", "ours", *(word for word in states.WAYS if word in also)]
+    kept = {"values": np.array(names), "levels": np.arange(3), "first": x, "last": x}
+    kept |= {f"{name}_{word}": x for name in names for word in words}
+    if "stress" in also:
+        kept |= {f"{name}_{word}_tau": x[..., 0] for name in names for word in words}
+    states.keep(SimpleNamespace(folder=tmp_path, experiment=SimpleNamespace(id=script.NEEDS[0])),
+                **kept)
+    axes = script.draw(SimpleNamespace(folder=tmp_path)).axes
+    found = [ax.texts[0].get_text() for ax in axes if ax.texts and ax.texts[0].get_text()]
+    assert found == [side.format(*names) for side in sides]
+
+
+def test_a_run_that_broke_down_is_an_empty_panel():
+    gone, _ = _reduced.drawn(np.full((4, 3), np.nan), "white", 0.1)
+    assert len(gone.x) == 0
+
+
+def test_time_shares_are_of_the_most_samples_and_gauss_newton():
+    stages = {"integration": 3e-3, "inferred": 2e-3, "moved": 1e-3, "inverted": 1e-3}
+    rows = [("metal", 10, "nonlinear", 1.0), ("metal", 30, "linear", 2.0),
+            ("metal", 30, "nonlinear", 4.0), ("cake", 700, "nonlinear", 8.0)]
+    table = {"scene": np.array([r[0] for r in rows]), "samples": np.array([r[1] for r in rows]),
+             "inversion": np.array([r[2] for r in rows]),
+             "reduced": np.array([1e-3 * r[3] for r in rows])}
+    table |= {name: np.full(4, value) for name, value in stages.items()}
+    cake, metal = nsf_fig18.draw(SimpleNamespace(table=lambda id, name: table)).axes
+    assert cake.get_title() == "cake, 700 samples: 8 ms a step"
+    assert metal.get_title() == "metal, 30 samples: 4 ms a step"
+    assert cake.patches[0].r == pytest.approx(np.sqrt(2.0) * metal.patches[0].r)
