@@ -107,9 +107,10 @@ def translate(app, what, name, thing, options, lines):
     lines[:] = to_rest(text).splitlines()
 
 
-def skip_field(app, what, name, thing, skip, options):
-    """Leave out the fields of records as members: they are listed with their comments."""
-    if type(thing).__name__ in ("_tuplegetter", "member_descriptor", "getset_descriptor"):
+def skip_member(app, what, name, thing, skip, options):
+    """Leave out names of other packages, and fields of records, which are listed apart."""
+    foreign = not (getattr(thing, "__module__", None) or "mpm_ref").startswith("mpm_ref")
+    if foreign or type(thing).__name__ in ("_tuplegetter", "member_descriptor"):
         return True
     return None
 
@@ -117,5 +118,5 @@ def skip_field(app, what, name, thing, skip, options):
 def setup(app):
     """Translate docstrings before autodoc shows them."""
     app.connect("autodoc-process-docstring", translate)
-    app.connect("autodoc-skip-member", skip_field)
+    app.connect("autodoc-skip-member", skip_member)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -8,6 +8,7 @@ tests, experiments and scenes those that some page links to.
 import ast
 import html
 import re
+import shutil
 from functools import cache
 from pathlib import Path
 
@@ -43,6 +44,7 @@ class SourceRole(ReferenceRole):
             logger.warning("no such source: %s", self.target, location=self.get_location(),
                            type="source")
             return [nodes.literal(self.rawtext, self.title)], []
+        self.env.note_dependency(ROOT / file)
         up = "../" * self.env.docname.count("/")
         literal = nodes.literal("", self.title)
         return [nodes.reference(self.rawtext, "", literal, internal=True,
@@ -79,11 +81,22 @@ def write_pages(app, exception):
     """Write the pages of all sources once the site is built."""
     if exception or app.builder.format != "html":
         return
+    remove_old(app)
     package = {p.relative_to(ROOT).as_posix() for p in (ROOT / "mpm_ref").rglob("*.py")}
     for file in sorted(package | linked(app.outdir)):
         target = Path(app.outdir, FOLDER, f"{file}.html")
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_text(page(file), encoding="utf-8")
+
+
+def remove_old(app):
+    """Remove pages of an earlier build whose documents or sources are gone."""
+    outdir = Path(app.outdir)
+    shutil.rmtree(outdir / FOLDER, ignore_errors=True)
+    for page in outdir.glob("*/**/*.html"):
+        name = page.relative_to(outdir).with_suffix("").as_posix()
+        if not name.startswith("_") and name not in app.env.all_docs:
+            page.unlink()
 
 
 def page(file):
