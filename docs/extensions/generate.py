@@ -20,7 +20,7 @@ from validation.status import status_table
 DOCS = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "mpm_ref"
 PAPERS = ("hot", "ldm", "ldmw", "nclaw", "nsf")
-COLUMNS = ("what", "printed", "measured", "verdict", "scale")
+COLUMNS = ("what", "printed; accepted", "measured", "verdict", "scale")
 
 
 def write_all(app, config):
@@ -119,14 +119,14 @@ def result_pages():
 
 
 def numbers(key, made):
-    """Printed numbers beside ours, experiment by experiment."""
+    """Printed numbers beside ours, experiment by experiment, with the notes of those missed."""
     parts = []
     for profile, groups in made.items():
-        sections = [(s, [row for row in s.rows if row.paper != "—"])
-                    for s in groups[key].sections]
-        for section, rows in sections:
+        for section in groups[key].sections:
+            rows = [row for row in section.rows if row.paper != "—"]
             if rows:
-                parts += [f"### {section.id} ({profile})", "", *table(rows), ""]
+                parts += [f"### {section.id} ({profile})", "", *map(cell, section.remarks), "",
+                          *table(rows), "", *notes(rows), ""]
     missing = made["standard"][key].missing
     if missing:
         parts += ["### Not measured", "", *(f"- {cell(t.what)} ({cell(t.paper_ref)})"
@@ -135,13 +135,23 @@ def numbers(key, made):
 
 
 def table(rows):
-    """A Markdown table of records."""
-    yield "| " + " | ".join(COLUMNS) + " |"
-    yield "|" + "---|" * len(COLUMNS)
+    """A Markdown table of records; a scale that all share stands before it."""
+    scales = {row.scale for row in rows}
+    columns = COLUMNS if len(scales) > 1 else COLUMNS[:-1]
+    if len(scales) == 1:
+        yield from (f"Scale: {cell(scales.pop())}.", "")
+    yield "| " + " | ".join(columns) + " |"
+    yield "|" + "---|" * len(columns)
     for row in rows:
         printed = f"{row.paper}; {row.rule}" if row.rule else row.paper
-        yield "| " + " | ".join(cell(text) for text in
-                                (row.what, printed, row.ours, row.verdict, row.scale)) + " |"
+        values = (row.what, printed, row.ours, row.verdict, row.scale)
+        yield "| " + " | ".join(cell(text) for text in values[:len(columns)]) + " |"
+
+
+def notes(rows):
+    """The notes of missed numbers, each text once."""
+    missed = {row.note: row.what for row in reversed(rows) if row.verdict == "miss" and row.note}
+    return [f"- *Missed:* {cell(what)}: {cell(note)}" for note, what in reversed(missed.items())]
 
 
 # --- tutorials

@@ -1,0 +1,89 @@
+"""The parts of the documentation site that need no Sphinx: pages, docstrings, links to sources."""
+
+import re
+import sys
+
+import pytest
+
+from validation.citations import ROOT, documentation, exists
+
+sys.path.insert(0, str(ROOT / "docs"))
+
+from check_links import main as check
+from extensions import docstrings, generate
+
+SOURCE = re.compile(r"\{source\}`(?:[^`<]*<)?([^`>]+)>?`")
+
+
+def test_sources_that_pages_link_to_exist():
+    links = [(page.name, m[1]) for page in documentation()
+             for m in SOURCE.finditer(page.read_text(encoding="utf-8"))]
+    assert len(links) > 10
+    assert not [link for link in links if not exists(ROOT, link[1])]
+
+
+def test_every_module_has_a_page_and_every_package_leads_to_its_modules():
+    pages = generate.api_pages()
+    assert ".. automodule:: mpm_ref.core.transfer" in pages[
+        "reference/api/mpm_ref.core.transfer.rst"]
+    assert "\n   mpm_ref.core.transfer\n" in pages["reference/api/mpm_ref.core.rst"]
+    assert "(mpm_ref.core.transfer.rst)" in pages["reference/api/index.md"]
+
+
+def test_the_command_line_page_has_every_command():
+    page = generate.cli_page()
+    for command in ("run", "info", "oracle record", "rom train", "law export"):
+        assert f"`mpm-ref {command}`" in page
+
+
+def test_results_show_printed_and_measured_numbers():
+    pages = generate.result_pages()
+    for paper in generate.PAPERS:
+        page = pages[f"results/generated/{paper}.md"]
+        assert page.count("| pass |") + page.count("| miss |") > 10
+
+
+def test_formulas_keep_their_lines_and_signs():
+    text = docstrings.to_rest("Sums.\n\nm_i += sum_p w_ip m_p\nv_i = p_i/m_i * 2  # NSF-eq6")
+    assert text.split("\n\n")[:3] == [
+        "Sums.", "::", "   m_i += sum_p w_ip m_p\n   v_i = p_i/m_i * 2  # NSF-eq6"]
+
+
+def test_text_is_escaped_and_code_is_marked():
+    assert docstrings.to_rest("Weights w_ip of `dx`, |v| * 2.").strip() == (
+        "Weights w\\_ip of \\ ``dx``\\ , \\|v\\| \\* 2.")
+
+
+def test_lists_become_lists():
+    assert docstrings.to_rest("- one\n  more\n- two").split() == ["-", "one", "more", "-", "two"]
+
+
+def test_fields_are_listed_with_their_comments():
+    from mpm_ref.core.state import Particles
+    names = [name for name, _, comment in docstrings.fields(Particles) if comment]
+    assert names[:2] == ["x", "v"]
+
+
+@pytest.fixture
+def site(tmp_path):
+    """A page with a dead link, a dead anchor and an address of another host."""
+    (tmp_path / "a.html").write_text('<h1 id="top"></h1><a href="b.html">b</a>'
+                                     '<a href="#top">top</a><a href="https://x.org">x</a>')
+    return tmp_path
+
+
+def test_links_that_lead_somewhere_pass(site):
+    (site / "b.html").write_text("<p>")
+    assert not check(site)
+
+
+@pytest.mark.parametrize(("addition", "problem"), [
+    ('<a href="c.html">c</a>', "c.html: no such file"),
+    ('<a href="a.html#none">c</a>', "no such anchor"),
+    ('<script src="https://x.org/a.js"></script>', "fetches https://x.org/a.js"),
+    ('<link rel="stylesheet" href="//x.org/a.css">', "fetches //x.org/a.css"),
+])
+def test_dead_links_and_requests_are_named(site, capsys, addition, problem):
+    (site / "b.html").write_text(addition)
+    assert check(site)
+    assert problem in capsys.readouterr().out
