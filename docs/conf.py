@@ -62,6 +62,7 @@ html_theme_options = {
     "show_toc_level": 2,
     "show_nav_level": 1,
     "navigation_depth": 3,
+    "collapse_navigation": True,
     "navigation_with_keys": False,
     "navbar_align": "left",
     "secondary_sidebar_items": ["page-toc"],
