@@ -138,11 +138,17 @@ def summary(source: Source, citations: Citations) -> str:
 
 def table(head: str, entries: dict[str, Entry], source: Source, citations: Citations) -> str:
     """One table of entries."""
-    rows = [head, "|---|---|---|---|"]
+    rows = ["```{table}", ":widths: 14 46 20 20", "", head, "|---|---|---|---|"]
     for i, entry in entries.items():
         code, tests = (links(some, names(source, i)) for some in citations)
-        rows.append(f"| {i} | `{entry.says}` | {code or waiting(entry, source)} | {tests} |")
-    return "\n".join(rows) + "\n"
+        rows.append(f'| <span id="{i}"></span>{i} | {escaped(entry.says)} '
+                    f"| {code or waiting(entry, source)} | {tests} |")
+    return "\n".join((*rows, "```")) + "\n"
+
+
+def escaped(text: str) -> str:
+    """Text with nothing that Markdown reads as markup."""
+    return "".join(f"\\{c}" if c in "\\*_<>[]{}$`" else c for c in text)
 
 
 def waiting(entry: Entry, source: Source) -> str:

@@ -11,8 +11,12 @@ import io
 import re
 import textwrap
 import tokenize
+from functools import cache
 
 from markdown_it import MarkdownIt
+
+from validation import equations
+from validation.citations import ID as IDS
 
 MARKDOWN = MarkdownIt("zero").enable(["code", "fence", "list", "backticks"])
 FORMULA = re.compile(r"^[A-Za-z]\S*(?: \S+){0,2} (?:[-+*/]?=|->) \S", re.MULTILINE)
@@ -72,7 +76,20 @@ def piece(part):
         return "\n"
     if part.type == "code_inline" and part.content.strip():
         return f"\\ ``{part.content}``\\ "
-    return SPECIAL.sub(r"\\\1", part.content)
+    return IDS.sub(link, SPECIAL.sub(r"\\\1", part.content))
+
+
+def link(match):
+    """An id of the equation index as a link to it, from a page of `reference/api`."""
+    if match[0] not in equation_ids():
+        return match[0]
+    return f"\\ `{match[0]} <../equations.html#{match[0]}>`__\\ "
+
+
+@cache
+def equation_ids():
+    """The ids of the equation index."""
+    return set(equations.read().entries)
 
 
 def fields(cls):

@@ -57,7 +57,7 @@ def test_code_and_tests_cite_only_known_ids(source, cited):
 
 def test_the_page_lists_every_id_with_links_to_what_cites_it(source, cited):
     page = equations.render(source, cited)
-    assert not [i for i in source.entries if f"| {i} |" not in page]
+    assert not [i for i in source.entries if f"</span>{i} |" not in page]
     links = set(re.findall(r"\{source\}`[^`<]+ <([^`>]+)>`", page))
     assert links == {c.link for c in (*cited.carried, *cited.checked)
                      if c.source in source.entries}
@@ -139,4 +139,4 @@ def test_a_malformed_entry_is_refused_by_name():
 
 def test_a_row_shows_links_or_who_will_bring_it():
     source = Source({"HOT-eq1": Entry("B", "E(dv)")}, {"B": "B: HOT"}, [])
-    assert "| HOT-eq1 | `E(dv)` | B: HOT |  |" in equations.render(source, Citations([], []))
+    assert "HOT-eq1 | E(dv) | B: HOT |  |" in equations.render(source, Citations([], []))
