@@ -138,7 +138,7 @@ def summary(source: Source, citations: Citations) -> str:
 
 def table(head: str, entries: dict[str, Entry], source: Source, citations: Citations) -> str:
     """One table of entries."""
-    rows = ["```{table}", ":widths: 14 46 20 20", "", head, "|---|---|---|---|"]
+    rows = ["```{table}", ":class: equations", "", head, "|---|---|---|---|"]
     for i, entry in entries.items():
         code, tests = (links(some, names(source, i)) for some in citations)
         rows.append(f'| <span id="{i}"></span>{i} | {escaped(entry.says)} '

@@ -51,7 +51,8 @@ def blocks(tokens):
         elif token.type == "inline":
             lines += item(inline(token), markers)
         elif token.type in ("code_block", "fence"):
-            lines += [f"{indent}::", "", textwrap.indent(token.content, indent + "   "), ""]
+            code = re.sub(" {4,}#", "   #", token.content)        # citations at the end of a line
+            lines += [f"{indent}::", "", textwrap.indent(code, indent + "   "), ""]
     return lines
 
 
