@@ -16,7 +16,7 @@ from mpm_ref.hot.methods import minimise
 from mpm_ref.hot.multigrid.blocks.product import planes_of, product
 from mpm_ref.hot.multigrid.blocks.sparse import blocks_of
 from mpm_ref.hot.multigrid.hierarchy import hierarchy
-from validation.hot.frozen import frozen
+from validation.hot.linear_system import frozen
 from validation.hot.measured_cg import Until
 from validation.hot.one_step import Step, after
 from validation.hot.preconditioners import OURS, cost, one_thread

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from validation.results import RESULTS, Results
+from validation.common.results import RESULTS, Results
 
 from .frame import draw_all
 

@@ -9,14 +9,14 @@ import typer
 
 from figures.frame import draw_all
 
-from . import targets
-from .provenance import commit
-from .registry import discover, select
-from .report import write_report
-from .results import RESULTS, ROOT, Results
-from .run import Setting, run_all
-from .side_by_side import run_side_by_side
-from .status import status_table, with_status
+from .common import targets
+from .common.parallel import run_side_by_side
+from .common.provenance import commit
+from .common.registry import discover, select
+from .common.report import write_report
+from .common.results import RESULTS, ROOT, Results
+from .common.run import Setting, run_all
+from .common.status import status_table, with_status
 
 app = typer.Typer(help=__doc__, add_completion=False, no_args_is_help=True,
                   pretty_exceptions_enable=False)

@@ -16,7 +16,7 @@ from mpm_ref.materials.learned.weights import Laws, Trained
 from mpm_ref.nclaw.gnn import weights as of_graphs
 from mpm_ref.sealed import sealed
 from validation.nclaw.dough import doughs
-from validation.nclaw.nets import nets
+from validation.nclaw.trained_laws import nets
 
 NCLAW = Path(__file__).parents[2] / "validation" / "nclaw" / "weights"
 COMMITTED = sorted(path for path in NCLAW.glob("*.npz")

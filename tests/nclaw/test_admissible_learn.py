@@ -25,8 +25,8 @@ from mpm_ref.nclaw.train.fit import train  # noqa: E402
 from mpm_ref.nclaw.train.methods import laws_of, trained_of  # noqa: E402
 from mpm_ref.nclaw.train.recipe import Recipe  # noqa: E402
 from mpm_ref.nclaw.train.rollout import squared, trajectory_of  # noqa: E402
-from validation.nclaw.nets import nets  # noqa: E402
-from validation.train_laws import begun  # noqa: E402
+from validation.nclaw.trained_laws import nets  # noqa: E402
+from validation.training.nclaw import begun  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 

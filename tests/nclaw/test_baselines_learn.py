@@ -21,8 +21,8 @@ from mpm_ref.nclaw.train.kinds import described  # noqa: E402
 from mpm_ref.nclaw.train.methods import METHODS, laws_of, trained_of  # noqa: E402
 from mpm_ref.nclaw.train.principal_laws import ReleasedStretchLaw, StretchLaw  # noqa: E402
 from validation.nclaw.environments import ENVIRONMENTS  # noqa: E402
-from validation.nclaw.nets import Net, identity, nets  # noqa: E402
-from validation.train_laws import begun  # noqa: E402
+from validation.nclaw.trained_laws import Net, identity, nets  # noqa: E402
+from validation.training.nclaw import begun  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 

@@ -12,12 +12,12 @@ from mpm_ref.materials import FixedCorotated, Fluid, FluidProjection, Hencky, No
 from mpm_ref.materials.learned import network, response
 from mpm_ref.nclaw.dissipation import balance, first_piola, loops, returned, work
 from tests.nclaw.test_admissible import energies, strained
-from validation.nclaw import dissipation, nets
+from validation.common.results import Results
+from validation.common.run import Setting, run_all
+from validation.common.weights_needed import Untrained
+from validation.nclaw import dissipation, trained_laws
 from validation.nclaw.dissipation import CREATED, Pair
 from validation.nclaw.environments import ENVIRONMENTS
-from validation.results import Results
-from validation.run import Setting, run_all
-from validation.waiting import Untrained
 
 JELLY, CLAY = FixedCorotated(4e4, 3e4), Hencky(1.2e5, 1.2e5)
 YIELD = VonMises(5e3, 0.05)
@@ -137,7 +137,7 @@ def test_known_laws_are_true_and_trained_ones(monkeypatch):
     def trained(name):
         if name == "sand-admissible":
             raise Untrained("no weights sand-admissible.npz: train")
-        return nets.trained("jelly")
+        return trained_laws.trained("jelly")
 
     run, said = SimpleNamespace(experiment=dissipation.dissipation.experiment), []
     run.record = lambda target, value, **more: said.append((target, value, more["note"]))
@@ -151,8 +151,8 @@ def test_known_laws_are_true_and_trained_ones(monkeypatch):
 
 def test_old_weights_keep_their_identity():
     """Those of jelly were written before there were admissible laws."""
-    assert nets.trained("jelly").about["environment"] == "jelly"
+    assert trained_laws.trained("jelly").about["environment"] == "jelly"
     for name in ("jelly-admissible", "water-admissible"):
-        told = nets.identity(nets.nets()[name])
+        told = trained_laws.identity(trained_laws.nets()[name])
         assert (told["elastic"], told["plastic"]) == ("Energetic", "Contraction")
         assert (told["elastic_rate"], told["plastic_rate"]) == (0.1, 0.01)

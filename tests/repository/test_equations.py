@@ -5,9 +5,9 @@ from collections import Counter
 
 import pytest
 
-from validation import equations
-from validation.citations import ID, LINK, ROOT, exists
-from validation.equations import Citations, Entry, Source
+from validation.common import equations
+from validation.common.citations import ID, LINK, ROOT, exists
+from validation.common.equations import Citations, Entry, Source
 
 # formulas, algorithms, rules and defaults; issues
 COUNTS = {"LDM": (60, 17), "LDMW": (16, 8), "NSF": (35, 18), "NCLAW": (57, 17), "HOT": (27, 18),
@@ -57,7 +57,7 @@ def test_code_and_tests_cite_only_known_ids(source, cited):
 
 def test_the_page_is_what_the_generator_writes(source, cited):
     page = (ROOT / equations.PAGE).read_text(encoding="utf-8")
-    assert page == equations.render(source, cited), "run `python -m validation.equations`"
+    assert page == equations.render(source, cited), "run `python -m validation.common.equations`"
 
 
 def test_links_and_ids_in_the_documentation_lead_somewhere(source):

@@ -198,7 +198,7 @@ def toy(tmp_path, **files):
     ({"problem": "from . import simulate", "simulate": ""}, "problem imports simulate"),
     ({"core/spline": "from .scaling import x", "core/scaling": ""}, "core.spline imports"),
     ({"explicit": "import torch"}, "explicit imports torch"),
-    ({"explicit": "import validation.run"}, "explicit imports validation"),
+    ({"explicit": "import validation.common.run"}, "explicit imports validation"),
     ({"explicit": "def f():\n    import scipy.sparse"}, "inside a function"),
     ({"materials/a": "from ..unheard import x", "unheard": ""}, "materials.a imports unheard"),
     ({"explicit": "from .core.new import x", "core/new": ""}, "explicit imports core.new"),

@@ -20,7 +20,7 @@ from mpm_ref.rom.sampling import PER_GROUP, pivoted
 from mpm_ref.rom.step import Reduced
 from mpm_ref.rom.weights import Model
 from mpm_ref.scene import Box, Cylinder, Difference, Union
-from validation.ldm.nets import trained
+from validation.ldm.networks import trained
 from validation.ldm.studies import GRAVITY, POKES, TORSION
 from validation.verification.scenes import with_
 

@@ -13,7 +13,7 @@ from mpm_ref.rom import weights as of_maps
 from mpm_ref.rom.fields.pod import Modes
 from mpm_ref.rom.weights import Model
 from validation.nclaw import bundle
-from validation.nclaw.trade_nets import small_nets
+from validation.nclaw.small_trainings import small_nets
 
 VALIDATION = Path(__file__).parents[2] / "validation"
 COMMITTED = [(of_graphs if "-gnn" in path.stem else bundle if path.stem in small_nets() else module,

@@ -9,8 +9,8 @@ from mpm_ref.reduced.case import case
 from mpm_ref.reduced.march import Way, model
 from mpm_ref.rom.latent import points, velocities
 
+from ..common.registry import experiment
 from ..ldm.studies import GRAVITY
-from ..registry import experiment
 from ..verification.scenes import with_
 from .ldm_runs import Trial, ended, full, learned, record_silent, table_of
 

@@ -22,7 +22,7 @@ from mpm_ref.rom.fields.pod import basis
 from mpm_ref.rom.step import BREAKDOWNS
 from mpm_ref.simulate import simulate
 
-from ..ldm.nets import trained
+from ..ldm.networks import trained
 from ..verification.scenes import threads_for
 
 BAD = 5.0           # times the error that is usual for the map

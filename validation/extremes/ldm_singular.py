@@ -7,8 +7,8 @@ from mpm_ref.rom.fields.network import Decoder
 from mpm_ref.rom.fields.perceptron import layers_of, network
 from mpm_ref.rom.fields.pod import Modes
 
+from ..common.registry import experiment
 from ..ldm.studies import GRAVITY
-from ..registry import experiment
 from .ldm_points import Bench
 from .ldm_runs import learned, linear, record_silent, table_of
 

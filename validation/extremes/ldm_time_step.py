@@ -3,8 +3,8 @@
 from mpm_ref.reduced.case import case
 from mpm_ref.reduced.march import SCHEMES, Way
 
+from ..common.registry import experiment
 from ..ldm.studies import GRAVITY
-from ..registry import experiment
 from ..verification.scenes import with_
 from .ldm_range import beside
 from .ldm_runs import FINE, Trial, ended, full, learned, record_silent, table_of

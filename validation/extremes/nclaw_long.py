@@ -11,7 +11,7 @@ from mpm_ref.nclaw.strain_watch import look
 from mpm_ref.nclaw.study.compare import Broken, positions
 from mpm_ref.scene import build
 
-from ..registry import experiment
+from ..common.registry import experiment
 from ..verification.scenes import threads_for
 from .nclaw_runs import laws, scene_for
 

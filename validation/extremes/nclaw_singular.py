@@ -18,8 +18,8 @@ from mpm_ref.nclaw.bodies import gradients, points, stresses
 from mpm_ref.nclaw.strain_watch import BEYOND, beyond
 from mpm_ref.scene import build
 
+from ..common.registry import experiment
 from ..nclaw.environments import environment
-from ..registry import experiment
 from .nclaw_runs import laws
 
 SAME = 1e-13        # of an answer, times how near R is to undetermined: as good as the same

@@ -10,7 +10,7 @@ from mpm_ref.rom.step import BREAKDOWNS
 from mpm_ref.simulate import simulate
 from mpm_ref.timestep import TooLarge
 
-from ..registry import experiment
+from ..common.registry import experiment
 from ..verification.scenes import with_
 from .ldm_long import LONGER, distance
 from .nsf_runs import GONE, Bench, scenes

@@ -18,8 +18,8 @@ from mpm_ref.reduced.whole import history, whole
 from mpm_ref.rom.step import BREAKDOWNS
 from mpm_ref.timestep import TooLarge
 
+from ..nsf.reduced_runs import tested
 from ..nsf.studies import jelly, metal
-from ..nsf.tested import tested
 from .ldm_runs import End as LdmEnd
 from .ldm_runs import Trial
 

@@ -9,9 +9,9 @@ from mpm_ref.reduced.inferring import Chosen
 from mpm_ref.reduced.nsf.watch import SPARSE
 from mpm_ref.rom.cubature import misfit
 
+from ..common.registry import experiment
+from ..nsf.reduced_runs import tested
 from ..nsf.studies import ball, bread, cake, sand
-from ..nsf.tested import tested
-from ..registry import experiment
 from .ldm_runs import FLAGGED, SILENT, STOPPED, record_silent, table_of
 from .nsf_beyond import is_bad
 from .nsf_runs import ERRORS, Bench, scenes

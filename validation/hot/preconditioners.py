@@ -24,8 +24,8 @@ from mpm_ref.hot.multigrid.blocks.sweep import Sweep, sweep
 from mpm_ref.hot.multigrid.hierarchy import hierarchy
 from mpm_ref.hot.multigrid.projectors import diagonal_blocks
 
-from ..registry import experiment
-from .frozen import rigid_modes, twisted
+from ..common.registry import experiment
+from .linear_system import rigid_modes, twisted
 from .measured_cg import Until, cg, convergence_factor
 from .one_step import after
 from .stiffness import bar

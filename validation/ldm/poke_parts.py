@@ -14,12 +14,12 @@ from mpm_ref.reduced.errors import Squares
 from mpm_ref.reduced.march import march, model, picked, stepped
 from mpm_ref.rom.latent import initial
 
-from ..registry import experiment
-from .beyond import DRIVEN, LAM_F
-from .nets import trained
-from .pairs import ALL
+from ..common.registry import experiment
+from .networks import trained
+from .paired_runs import ALL
 from .references import bent, pod, references, share
 from .studies import POKES
+from .untrained_maps import DRIVEN, LAM_F
 
 DIMENSIONS = (6, 12, 24, 48)        # of POD
 CUBIC = 3

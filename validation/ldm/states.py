@@ -11,10 +11,10 @@ from mpm_ref.reduced.case import case, prescribed
 from mpm_ref.reduced.march import picked
 from mpm_ref.rom.sampling import PER_GROUP
 
-from ..registry import experiment
-from .kept_bodies import keep
-from .nets import trained
-from .pairs import ALL, SHOWN_WAY, beside, pair, positions
+from ..common.registry import experiment
+from .networks import trained
+from .paired_runs import ALL, SHOWN_WAY, beside, pair, positions
+from .published_bodies import keep
 from .references import share
 from .studies import POKES, TORSION, TOWER, fallen, leaning, poked, twisted
 from .superres import REFINE, advected, fine

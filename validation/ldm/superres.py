@@ -9,9 +9,9 @@ from mpm_ref.reduced.errors import Squares
 from mpm_ref.reduced.march import SCHEMES, Way, march
 from mpm_ref.scene import build
 
-from ..registry import experiment
+from ..common.registry import experiment
 from ..verification.scenes import threads_for, with_
-from .nets import trained
+from .networks import trained
 from .references import share
 from .studies import TORSION
 

@@ -8,9 +8,9 @@ from mpm_ref.reduced.errors import Errors
 from mpm_ref.reduced.march import SCHEMES, Way
 from mpm_ref.scene import build
 
-from ..registry import experiment
+from ..common.registry import experiment
 from ..verification.scenes import threads_for
-from .nets import SEEDS
+from .networks import SEEDS
 from .references import References, mean_of, references, share
 from .studies import POKES, TORSION, poked_again
 

@@ -15,7 +15,7 @@ from mpm_ref.rom.fields.pod import modes
 from mpm_ref.rom.quadrature.lagrangian import neighbours
 from mpm_ref.rom.quadrature.node_centric import node_centric, nodes_of
 
-from ..ldm.nets import trained
+from ..ldm.networks import trained
 from ..verification.scenes import threads_for
 
 POINT_WAY, NODE_WAY = Way("lagrangian", "linear"), Way("eulerian", "linear")

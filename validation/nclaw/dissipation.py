@@ -16,11 +16,11 @@ from mpm_ref.nclaw.dissipation import balance, loops, work
 from mpm_ref.nclaw.study.compare import Broken, positions
 from mpm_ref.scene import build
 
-from ..registry import experiment
+from ..common.registry import experiment
+from ..common.weights_needed import there
 from ..verification.scenes import threads_for
-from ..waiting import there
 from .environments import ENVIRONMENTS, environment
-from .nets import trained, weights_of
+from .trained_laws import trained, weights_of
 
 METHODS = ("ours", "admissible")
 TRUE = "true"

@@ -7,14 +7,14 @@ import numpy as np
 
 from mpm_ref.nclaw.gnn.simulator import Simulator
 
-from .. import targets
+from ..common import targets
 from ..verification.scenes import with_
 from .environments import ENVIRONMENTS
 from .evaluate import Found, compare, learned
-from .nets import nets
 from .simulators import GraphNet
+from .stand_in_bodies import has_mesh, said
 from .tasks import TOYS, scenes
-from .toys import has_mesh, said
+from .trained_laws import nets
 
 PRINTED = {"jelly": "jello", "sand": "sand", "plasticine": "plasticine", "water": "water"}
 OURS = "ours"

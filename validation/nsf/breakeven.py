@@ -25,7 +25,7 @@ from mpm_ref.rom.fields.pod_fields import Part, Sizes, Spanned, cells
 from mpm_ref.rom.fields.radial_basis import Radial
 from validation.nsf.pointwise_networks import infer
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .speed import whole_steps
 from .studies import cake, metal
 

@@ -18,7 +18,7 @@ from mpm_ref.reduced.whole import at_once, history, whole
 from mpm_ref.rom.kinematics import NoBody
 from mpm_ref.simulate import simulate
 
-from ..registry import experiment
+from ..common.registry import experiment
 from ..verification.scenes import with_
 from .factors import REPEATS, seconds
 from .studies import cake, metal

@@ -18,7 +18,7 @@ from mpm_ref.rom.projection import project_position
 from mpm_ref.rom.snapshots import joined
 from mpm_ref.rom.symmetric import tensor
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .studies import Study, sand
 
 INFO = {"comparator": "info"}

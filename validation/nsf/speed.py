@@ -17,10 +17,10 @@ from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.inferred import Inferred
 from mpm_ref.simulate import simulate
 
-from ..registry import experiment
+from ..common.registry import experiment
 from ..verification.scenes import with_
+from .reduced_runs import FASTER, tested
 from .studies import cake, metal, sand
-from .tested import FASTER, tested
 
 INFO = {"comparator": "info"}
 REPEATS, WARM = 3, 3        # timings; steps before them

@@ -8,7 +8,7 @@ from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.step import BREAKDOWNS
 from mpm_ref.rom.symmetric import tensor
 
-from ..ldm.kept_bodies import keep
+from ..ldm.published_bodies import keep
 
 SHOTS = 3               # times, evenly spaced, the last among them
 WAYS = "map", "weighed"     # of reduced runs, beside the usual one

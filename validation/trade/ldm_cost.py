@@ -10,11 +10,11 @@ from mpm_ref.reduced import march
 from mpm_ref.reduced.case import case
 from mpm_ref.scene import build
 
-from ..ldm.nets import trained
-from ..ldm.racing import fastest, race
+from ..common.registry import experiment
+from ..ldm.networks import trained
 from ..ldm.studies import STUDIES, TOWER
+from ..ldm.timing import fastest, race
 from ..ldm.tower import FAST, GRIDS, NET, PAPER, scene_of
-from ..registry import experiment
 
 EVALUATIONS = ("derivatives", "place", "velocity")
 PARTS = ("network", "quadrature", "grid", "projection", "rest")

@@ -14,12 +14,12 @@ from mpm_ref.nclaw.bodies import own, points
 from mpm_ref.nclaw.study.compare import Broken, positions
 from mpm_ref.scene import build
 
+from ..common.registry import experiment
 from ..nclaw.environments import environment
 from ..nclaw.evaluate import compare, learned
-from ..nclaw.nets import trained
 from ..nclaw.small_runs import measured
-from ..nclaw.trade_nets import BASE, OF_WIDTH, last, small_nets
-from ..registry import experiment
+from ..nclaw.small_trainings import BASE, OF_WIDTH, last, small_nets
+from ..nclaw.trained_laws import trained
 from ..verification.scenes import threads_for, with_
 from .front import front
 

@@ -11,11 +11,11 @@ from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.step import BREAKDOWNS
 from mpm_ref.simulate import simulate
 
+from ..common.registry import experiment
 from ..extremes.nsf_runs import scenes
 from ..extremes.outcome import outcome
-from ..ldm.racing import clocked
+from ..ldm.timing import clocked
 from ..nsf.errors import COLUMNS, mean, rows_of, share, weights
-from ..registry import experiment
 from ..verification.scenes import with_
 from .front import front
 

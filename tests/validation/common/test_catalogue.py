@@ -4,8 +4,8 @@ from uuid import uuid4
 
 import pytest
 
-from validation import registry
-from validation.registry import Experiment, discover, select
+from validation.common import registry
+from validation.common.registry import Experiment, discover, select
 
 
 @pytest.mark.parametrize(("fields", "said"), [

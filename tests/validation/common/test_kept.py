@@ -2,8 +2,8 @@
 
 import pytest
 
-from validation.registry import Experiment
-from validation.run import Setting, run_all
+from validation.common.registry import Experiment
+from validation.common.run import Setting, run_all
 
 
 def run(folder, function, **setting):

@@ -8,12 +8,12 @@ import pytest
 
 from figures.frame import Drawn, draw_all
 from validation import Results
-from validation.registry import Experiment
-from validation.report import chapters, write_report
-from validation.results import RESULTS, ROOT
-from validation.run import Setting, run_all
-from validation.status import BEGIN, END, status_table, with_status
-from validation.targets import Target, load
+from validation.common.registry import Experiment
+from validation.common.report import chapters, write_report
+from validation.common.results import RESULTS, ROOT
+from validation.common.run import Setting, run_all
+from validation.common.status import BEGIN, END, status_table, with_status
+from validation.common.targets import Target, load
 
 
 def target(id, kind="error", **fields):
@@ -158,20 +158,21 @@ def test_report_without_results_lists_what_is_missing(tmp_path):
 def scripts(tmp_path, monkeypatch):
     """A package of figure scripts with a name of its own."""
     package = tmp_path / f"drawn_{uuid4().hex}"
-    package.mkdir()
+    (package / "nsf").mkdir(parents=True)
     monkeypatch.syspath_prepend(tmp_path)
     for name in ("bread", "unmade"):
-        (package / f"{name}.py").write_text(FIGURE.format(name=name))
+        (package / "nsf" / f"{name}.py").write_text(FIGURE.format(name=name))
     return package
 
 
 def test_figure_is_drawn_and_shown_under_its_experiment(folder, scripts):
-    assert draw_all(Results(folder), folder=scripts) == Drawn(["bread"], ["unmade"], [])
-    assert sorted(f.name for f in (folder / "figures").iterdir()) == ["bread.pdf", "bread.png"]
+    assert draw_all(Results(folder), folder=scripts) == Drawn(["nsf_bread"], ["nsf_unmade"], [])
+    names = sorted(f.name for f in (folder / "figures").iterdir())
+    assert names == ["nsf_bread.pdf", "nsf_bread.png"]
     section = chapters(Results(folder), TARGETS)[0].sections[0]
     assert section.figures[0].caption == "Error of the bread over cells."
     assert 'src="data:image/png;base64,iVBOR' in text(folder, "report.html")
-    assert "![bread](figures/bread.png)" in text(folder, "report.md")
+    assert "![nsf_bread](figures/nsf_bread.png)" in text(folder, "report.md")
 
 
 def test_figure_is_drawn_again_with_the_same_bytes(folder, scripts):
@@ -180,14 +181,15 @@ def test_figure_is_drawn_again_with_the_same_bytes(folder, scripts):
         return {f.name: f.read_bytes() for f in (folder / "figures").iterdir()}
 
     first = drawn()
-    assert b"CreationDate" not in first["bread.pdf"]
+    assert b"CreationDate" not in first["nsf_bread.pdf"]
     assert drawn() == first
 
 
 def test_figure_that_raises_is_named(folder, scripts, capsys):
-    (scripts / "bad.py").write_text(FIGURE.format(name="bread").replace("Figure()", "1 / 0"))
-    assert draw_all(Results(folder), folder=scripts).failed == ["bad"]
-    assert (folder / "figures" / "bread.png").exists()
+    script = FIGURE.format(name="bread").replace("Figure()", "1 / 0")
+    (scripts / "nsf" / "bad.py").write_text(script)
+    assert draw_all(Results(folder), folder=scripts).failed == ["nsf_bad"]
+    assert (folder / "figures" / "nsf_bread.png").exists()
     assert "ZeroDivisionError" in capsys.readouterr().err
 
 
@@ -198,18 +200,18 @@ def test_figures_about_other_experiments_are_left(folder, scripts):
 
 
 def test_figure_without_results_is_left_out_and_says_why(folder, scripts, capsys):
-    assert draw_all(Results(folder), names=["unmade"], folder=scripts).left == ["unmade"]
-    assert "figure unmade is left out: no results of nsf.unmade" in capsys.readouterr().err
+    assert draw_all(Results(folder), names=["nsf_unmade"], folder=scripts).left == ["nsf_unmade"]
+    assert "figure nsf_unmade is left out: no results of nsf.unmade" in capsys.readouterr().err
 
 
 def test_figure_answers_to_its_experiment(folder, scripts):
-    (scripts / "butter.py").write_text(FIGURE.format(name="bread"))
-    drawn = draw_all(Results(folder), names=["bread", "nsf.bread"], folder=scripts)
-    assert drawn.done == ["bread", "butter"]
+    (scripts / "nsf" / "butter.py").write_text(FIGURE.format(name="bread"))
+    drawn = draw_all(Results(folder), names=["nsf_bread", "nsf.bread"], folder=scripts)
+    assert drawn.done == ["nsf_bread", "nsf_butter"]
 
 
 def test_unknown_figure_is_refused(folder, scripts):
-    with pytest.raises(ValueError, match="no figure 'cake'; there are: bread, unmade"):
+    with pytest.raises(ValueError, match="no figure 'cake'; there are: nsf_bread, nsf_unmade"):
         draw_all(Results(folder), names=["cake"], folder=scripts)
 
 

@@ -3,10 +3,10 @@
 import os
 from types import MappingProxyType
 
-from validation.registry import Experiment, discover
-from validation.results import Results
-from validation.run import Setting, run_all
-from validation.side_by_side import known, run_side_by_side
+from validation.common.parallel import known, run_side_by_side
+from validation.common.registry import Experiment, discover
+from validation.common.results import Results
+from validation.common.run import Setting, run_all
 
 
 def fall(run):

@@ -9,12 +9,12 @@ import pytest
 from typer.testing import CliRunner
 
 from validation import __main__ as cli
-from validation.provenance import commit
-from validation.record import read_records, write_whole
-from validation.registry import Catalogue, Experiment, nearest
-from validation.results import Results
-from validation.run import Setting, run_all
-from validation.targets import Target
+from validation.common.provenance import commit
+from validation.common.record import read_records, write_whole
+from validation.common.registry import Catalogue, Experiment, nearest
+from validation.common.results import Results
+from validation.common.run import Setting, run_all
+from validation.common.targets import Target
 
 KEYS = {"target", "value", "unit", "paper", "comparator", "verdict", "scale", "seconds", "seed",
         "command", "commit", "date", "cores"}

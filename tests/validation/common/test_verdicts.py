@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from validation.record import Rule, judge
+from validation.common.record import Rule, judge
 
 
 @pytest.mark.parametrize(("value", "rule", "verdict"), [

@@ -11,6 +11,7 @@ from mpm_ref.materials.learned.strain_range import seen
 from mpm_ref.nclaw.bodies import fresh, learned
 from mpm_ref.nclaw.strain_watch import Sight
 from mpm_ref.scene import build
+from validation.common.weights_needed import Untrained, there
 from validation.extremes import nclaw_epochs, nclaw_long, nclaw_runs, nclaw_strain
 from validation.extremes import nclaw_observed as observed
 from validation.extremes.nclaw_runs import (
@@ -31,14 +32,13 @@ from validation.extremes.nclaw_runs import (
     trials,
 )
 from validation.extremes.nclaw_time_step import longer
-from validation.nclaw import met as met_of
+from validation.nclaw import strain_bounds as met_of
 from validation.nclaw.environments import environment
-from validation.nclaw.nets import Net
+from validation.nclaw.initial_laws import untrained
 from validation.nclaw.small_runs import Measured
-from validation.nclaw.trade_nets import Small
-from validation.nclaw.untrained import untrained
+from validation.nclaw.small_trainings import Small
+from validation.nclaw.trained_laws import Net
 from validation.verification.scenes import with_
-from validation.waiting import Untrained, there
 
 GOOD = End(1e-4, 1000, -1, "", 0.1, -1, 0.9, "")
 WIDE = {"low": [0.0, -9.0, -9.0, -99.0], "high": [9.0, 9.0, 9.0, 99.0]}

@@ -11,7 +11,7 @@ from mpm_ref.nclaw.bodies import learned
 from mpm_ref.scene import build
 from validation.extremes import nclaw_singular as singular
 from validation.nclaw.environments import environment
-from validation.nclaw.nets import trained
+from validation.nclaw.trained_laws import trained
 
 
 @pytest.fixture(scope="module")

@@ -9,16 +9,16 @@ from small_toys import Records
 from mpm_ref.reduced.nsf.watch import Sight
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.kinematics import NoBody
+from validation.common.results import Results
+from validation.common.run import Setting, run_all
 from validation.extremes import nsf_beyond as beyond
 from validation.extremes import nsf_damage as damage
 from validation.extremes import nsf_long as long
 from validation.extremes import nsf_runs as runs
 from validation.extremes import nsf_samples as samples
 from validation.extremes.ldm_runs import BAD, FINE, FLAGGED, SILENT, STOPPED, TOLERABLE, Trial
-from validation.nsf import tested
+from validation.nsf import reduced_runs
 from validation.nsf.studies import jelly
-from validation.results import Results
-from validation.run import Setting, run_all
 from validation.verification.scenes import with_
 
 STUDY = jelly(4)._replace(train=(0.3, 0.5), test=(0.4,), samples=40,
@@ -29,7 +29,7 @@ GOOD = runs.End(2.0, 0.2, 15.0, 30, -1, "", 0.4, 5, 0.01, "")
 @pytest.fixture(scope="module")
 def bench():
     """The small study."""
-    return runs.Bench("jelly", tested.tested(STUDY))
+    return runs.Bench("jelly", reduced_runs.tested(STUDY))
 
 
 def trial(end=GOOD, what="0.4", points=40, **changes):
@@ -176,7 +176,7 @@ def test_files_of_fields_are_refused_where_damaged(bench):
     found = Records()
     run = SimpleNamespace(rng=np.random.default_rng(0), choose=lambda **by: 1,
                           record=found.record)
-    damage.record_files(run, "jelly", tested.refitted(bench.one, STUDY.sizes, follows=True))
+    damage.record_files(run, "jelly", reduced_runs.refitted(bench.one, STUDY.sizes, follows=True))
     assert {id: value for id, (value, _) in found.items()} == {
         f"extremes.nsf.damage.files.{name}": 1.0 for name in ("damaged", "unfit")}
 

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from figures._splats import DARK, Balls, Camera, image, outward
-from figures._states import Look, states
+from figures.common.splats import DARK, Balls, Camera, image, outward
+from figures.common.state_panels import Look, states
 from mpm_ref.scene import build
-from validation.hot import course as courses
+from validation.common.registry import discover
+from validation.common.results import Results
+from validation.hot import run_history as courses
 from validation.hot import whole_runs
-from validation.hot.course import COLUMNS, FIELDS, SHOTS, course, read, run
+from validation.hot.run_history import COLUMNS, FIELDS, SHOTS, course, read, run
 from validation.hot.sizes import SIZES
-from validation.registry import discover
-from validation.results import Results
 from validation.trade.hot_energy import DT, End, Way, apart, twisted
 from validation.verification.scenes import shipped, with_
 

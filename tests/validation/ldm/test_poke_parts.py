@@ -12,7 +12,7 @@ from mpm_ref.reduced.march import march
 from mpm_ref.rom.fields.pod import modes
 from mpm_ref.scene import build
 from validation.ldm import poke_parts
-from validation.ldm.pairs import ALL
+from validation.ldm.paired_runs import ALL
 from validation.ldm.poke_parts import Parts, let_go, parts, swinging
 from validation.ldm.references import References
 from validation.ldm.studies import POKES, poked

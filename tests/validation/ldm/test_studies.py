@@ -12,7 +12,7 @@ from mpm_ref.reduced.march import SCHEMES, Way, march
 from mpm_ref.rom.fields.affine import Affine
 from mpm_ref.rom.fields.pod import modes
 from mpm_ref.scene import build
-from validation.ldm.online import compared, reconstructed
+from validation.ldm.reduced_runs import compared, reconstructed
 from validation.ldm.studies import GRAVITY, PHI, POKE, POKES, STUDIES, TORSION, poked_again
 from validation.verification.scenes import shipped, with_
 

@@ -6,13 +6,13 @@ import pytest
 from mpm_ref.nclaw.bodies import own
 from mpm_ref.nclaw.gnn.simulator import Simulator
 from tests.validation.nclaw.test_gnn_evaluate import still, water
-from validation import targets
+from validation.common import targets
+from validation.common.results import Results
+from validation.common.run import Setting, run_all
+from validation.common.weights_needed import Untrained
 from validation.nclaw import runtime
+from validation.nclaw.initial_laws import untrained
 from validation.nclaw.simulators import simulators
-from validation.nclaw.untrained import untrained
-from validation.results import Results
-from validation.run import Setting, run_all
-from validation.waiting import Untrained
 
 REPEATS = 10
 

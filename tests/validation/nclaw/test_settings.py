@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from validation import targets
+from validation.common import targets
+from validation.common.results import Results
+from validation.common.run import Setting, run_all
+from validation.common.weights_needed import Untrained
 from validation.nclaw import settings
-from validation.results import Results
-from validation.run import Setting, run_all
 from validation.verification.scenes import shipped, with_
-from validation.waiting import Untrained
 
 ELSEWHERE = {       # in other experiments, with what they are settings of
     *(f"nclaw.table6.{row}.trajectories" for row in ("gnn.1", "gnn.10", "gnn.100", "ours.1")),

@@ -9,10 +9,10 @@ from neural_toys import deformations, plain, trained
 
 from mpm_ref.materials import FixedCorotated, Fluid
 from mpm_ref.materials.learned import network, response
+from validation.common.results import Results
+from validation.common.run import Setting, run_all
 from validation.nclaw import symmetry
 from validation.nclaw.environments import ENVIRONMENTS
-from validation.results import Results
-from validation.run import Setting, run_all
 
 
 def test_the_skew_part_is_that_of_the_paper_s_stress():

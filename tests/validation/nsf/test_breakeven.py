@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from mpm_ref.reduced.whole import whole
+from validation.common.results import Results
+from validation.common.run import Setting, run_all
 from validation.nsf import breakeven
 from validation.nsf.breakeven import Cost, kinds
 from validation.nsf.studies import jelly
-from validation.results import Results
-from validation.run import Setting, run_all
 
 SMALL = breakeven.Scene(jelly, (5, 7, 11), 0.25)
 

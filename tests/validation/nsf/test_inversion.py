@@ -6,11 +6,11 @@ from small_toys import Records
 from mpm_ref.reduced.inferring import Plan, infer
 from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.fields.pod_fields import Sizes
-from validation import targets
-from validation.nsf import inversion, tested
+from validation.common import targets
+from validation.common.results import Results
+from validation.common.run import Setting, run_all
+from validation.nsf import inversion, reduced_runs
 from validation.nsf.studies import jelly
-from validation.results import Results
-from validation.run import Setting, run_all
 
 STUDY = jelly(4)._replace(train=(0.3, 0.5), test=(0.35, 0.4), samples=40,
                           sizes=Sizes(r=3, modes=8, tau=12, C=12, smoothing=1e-4))
@@ -19,7 +19,7 @@ STUDY = jelly(4)._replace(train=(0.3, 0.5), test=(0.35, 0.4), samples=40,
 @pytest.fixture(scope="module")
 def one():
     """The small study."""
-    return tested.tested(STUDY)
+    return reduced_runs.tested(STUDY)
 
 
 @pytest.mark.parametrize("faster", [1.0, 1.5])

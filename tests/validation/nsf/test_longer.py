@@ -10,10 +10,10 @@ from mpm_ref.reduced.errors import Errors
 from mpm_ref.reduced.whole import history
 from mpm_ref.rom.kinematics import NoBody
 from mpm_ref.rom.snapshots import Histories
+from validation.common.results import Results
+from validation.common.run import Setting, run_all
 from validation.nsf import longer
 from validation.nsf.studies import jelly, metal
-from validation.results import Results
-from validation.run import Setting, run_all
 from validation.verification.scenes import with_
 
 STUDY = jelly(4)._replace(test=(0.3, 0.35, 0.4), every=8)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from mpm_ref.rom.fields.pod_fields import Sizes
+from validation.common.results import Results
+from validation.common.run import Setting, run_all
 from validation.nsf import memory
-from validation.results import Results
-from validation.run import Setting, run_all
 
 STUDY = memory.shear()._replace(train=(0.02, 0.04), test=(0.03, 0.035), steps=600,
                                 sizes=Sizes(r=4, modes=8, tau=20, C=10, smoothing=1e-2))

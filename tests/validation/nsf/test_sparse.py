@@ -17,13 +17,13 @@ from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.cubature import misfit
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.store.results import Results as Stored
+from validation.common.results import Results
+from validation.common.run import Setting, run_all
 from validation.extremes import nsf_samples as samples
 from validation.extremes.ldm_runs import BAD, Trial
 from validation.extremes.nsf_runs import Bench, End
-from validation.nsf import tested
+from validation.nsf import reduced_runs
 from validation.nsf.studies import jelly
-from validation.results import Results
-from validation.run import Setting, run_all
 
 GOOD = End(2.0, 0.2, 15.0, 30, -1, "", 0.4, 5, 0.01, "")
 
@@ -123,7 +123,7 @@ def test_scenes_that_the_bound_has_not_seen_are_judged_by_it(tmp_path, monkeypat
     table = found.table("extremes.nsf.unseen", "left")
     assert list(zip(table["map"], table["what"], table["samples"], strict=True)) == [
         ("cube", "draw 0", 3)]
-    one = tested.tested(study)
+    one = reduced_runs.tested(study)
     points = drawn(len(one.fields.X), 3, 0).points
     assert table["left"] == pytest.approx([misfit(one.fields.U, 5, points)])
     records = {r.target: r for r in found.records("extremes.nsf.unseen")}

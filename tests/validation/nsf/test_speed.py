@@ -12,10 +12,10 @@ from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.inferred import Inferred
 from mpm_ref.simulate import simulate
-from validation.nsf import speed, tested
+from validation.common.results import Results
+from validation.common.run import Setting, run_all
+from validation.nsf import reduced_runs, speed
 from validation.nsf.studies import jelly
-from validation.results import Results
-from validation.run import Setting, run_all
 from validation.trade.nsf_sizes import particle_bytes
 
 STUDY = jelly(4)._replace(train=(0.3, 0.5), test=(0.35, 0.4), samples=40,
@@ -29,7 +29,7 @@ N, FEW = 156, 2                     # particles of both, and so few samples that
 @pytest.fixture(scope="module")
 def one():
     """The small study."""
-    return tested.tested(STUDY._replace(test=STUDY.test[1:]))
+    return reduced_runs.tested(STUDY._replace(test=STUDY.test[1:]))
 
 
 @pytest.fixture

@@ -8,12 +8,12 @@ import pytest
 from mpm_ref.reduced.errors import Errors
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.kinematics import NoBody
+from validation.common.results import Results
+from validation.common.run import Setting, run_all
 from validation.extremes import nsf_runs
 from validation.extremes.outcome import FINISHED
-from validation.nsf import tested
+from validation.nsf import reduced_runs
 from validation.nsf.studies import jelly
-from validation.results import Results
-from validation.run import Setting, run_all
 from validation.trade import nsf, nsf_sizes
 
 STUDY = jelly(4)._replace(train=(0.3, 0.5), test=(0.4,), samples=40,
@@ -24,7 +24,7 @@ TEST = 0.4
 @pytest.fixture(scope="module")
 def one():
     """The small study."""
-    return tested.tested(STUDY)
+    return reduced_runs.tested(STUDY)
 
 
 @pytest.fixture
@@ -87,7 +87,7 @@ def test_steps_grow_until_a_run_breaks_down(one, results, monkeypatch):
     def errors(self, value, count, draw, faster, weighed):
         asked.append(faster)
         good = faster < 2.0
-        return tested.Found(
+        return reduced_runs.Found(
             Errors(0.1 if good else np.inf, np.inf, np.inf), 0.2, 30.0, 40.0, np.nan)
 
     monkeypatch.setattr(type(one), "errors", errors)
