@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-FOLDERS = ("mpm_ref", "validation", "figures", "benchmarks", "tests")
+FOLDERS = ("mpm_ref", "validation", "figures", "benchmarks", "examples", "tests")
 FILES = sorted(file for folder in FOLDERS for file in (ROOT / folder).rglob("*.py"))
 
 FILE_LINES = 400
