@@ -18,7 +18,7 @@ import threadpoolctl
 
 from mpm_ref.core.jit import set_threads
 from mpm_ref.hot.krylov import Rule, block_jacobi, pcg, scalar_jacobi
-from mpm_ref.hot.linear import by_matrix
+from mpm_ref.hot.linearization import by_matrix
 from mpm_ref.hot.multigrid.blocks import hierarchy as block_hierarchy
 from mpm_ref.hot.multigrid.blocks.sweep import Sweep, sweep
 from mpm_ref.hot.multigrid.hierarchy import hierarchy

@@ -10,11 +10,11 @@ from math import log10
 
 import numpy as np
 
+from mpm_ref.hot.assembly import pattern_of
 from mpm_ref.hot.krylov import newton_tolerance
 from mpm_ref.hot.methods import METHODS
 from mpm_ref.hot.multigrid.embedding import embed
 from mpm_ref.hot.norms import surface
-from mpm_ref.hot.pattern import pattern_of
 from mpm_ref.scene import build, load
 from mpm_ref.timestep import advective
 

@@ -8,7 +8,7 @@ three solve the same steps to the same tolerance, and are compared with what is 
 import numpy as np
 
 from mpm_ref.hot.methods import minimise
-from mpm_ref.hot.unknowns import free_part
+from mpm_ref.hot.system import free_part
 
 from ..common.registry import experiment
 from ..hot.one_step import difference, solved
