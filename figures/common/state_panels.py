@@ -8,7 +8,7 @@ from matplotlib.colors import Normalize, to_rgb
 from scipy.spatial import cKDTree
 
 from mpm_ref.core.levelset import distances, normals
-from mpm_ref.scene.parts import build_conditions
+from mpm_ref.scene.builder import build_conditions
 from validation.hot.run_history import read
 from validation.hot.sizes import sized
 

@@ -14,14 +14,23 @@ from ..nclaw.study import training, trajectory
 from ..nclaw.study.compare import threads_for
 from ..nclaw.study.study import load
 from ..store.atomic import require_place
-from ..store.session import Watch
+from ..store.running import Watch
 from ..store.words import counted
-from . import faults, made
-from .faults import at_start, end, one_line, options, writing
-from .law_options import OF_ERRORS, horizons, of_errors
-from .outputs import HDF5, MAPS, require_ending, require_free
-from .rom_options import Overwrite, StudyName, on_interrupt
-from .shipped import find_study, keep_scene, shipped_scenes
+from . import provenance
+from .catalogue import find_study, keep_scene, shipped_scenes
+from .errors import INTERRUPT, UNSTABLE, at_start, end, one_line, options, writing
+from .options import (
+    HDF5,
+    MAPS,
+    OF_ERRORS,
+    Overwrite,
+    StudyName,
+    horizons,
+    of_errors,
+    on_interrupt,
+    require_ending,
+    require_free,
+)
 from .terminal import passing, warn
 
 SAID = 10           # lines about a training where there is no terminal
@@ -106,7 +115,7 @@ def motion(study, data):
                 made = trajectory.make(data, study.problem(), Steps(bar))
             if made < problem.clock.steps:
                 end(f"interrupted at step {made} of {problem.clock.steps} of the run to learn "
-                    "from; the same command again goes on", faults.INTERRUPT)
+                    "from; the same command again goes on", INTERRUPT)
     return trajectory.read(data, problem)
 
 
@@ -129,7 +138,7 @@ def learned(study, seen, checkpoint, **about):
             return training.trained(study, seen, checkpoint, now.show, **about)
     except how.Diverged as fault:
         left = f"; {checkpoint} is of this training: remove it when the study changes"
-        end(f"{study.path}: {fault}{left if checkpoint.exists() else ''}", faults.UNSTABLE)
+        end(f"{study.path}: {fault}{left if checkpoint.exists() else ''}", UNSTABLE)
 
 
 def resuming(checkpoint):
@@ -192,5 +201,5 @@ def in_short(study, seen, errors):
     steps, points, method = len(seen.x) - 1, seen.x.shape[1], study.tables.method
     over = horizons(method, asdict(study.tables.train), len(errors))
     return (f"{method}, {counted(len(errors), 'epoch')} on {counted(steps, 'step')} of "
-            f"{counted(points, 'point')}; {of_errors(method)} {made.ends(errors, over)}")
+            f"{counted(points, 'point')}; {of_errors(method)} {provenance.ends(errors, over)}")
 

@@ -25,7 +25,7 @@ from ..materials.learned.contraction import Contraction
 from ..materials.learned.energetic import Energetic
 from ..materials.learned.inputs import numbers, words
 from ..materials.learned.weights import PARTS
-from ..sealed import sealed, write_whole
+from ..store.weights_file import sealed, write_whole
 from .bodies import dim_of, gradients, points, stresses
 
 FORMAT = "mpm_ref law 1"

@@ -9,8 +9,7 @@ from ..rom.latent import at_start, moved
 from ..rom.step import Report
 from ..store.manifest import code, scene_hash
 from ..store.results import Results
-from ..store.running import Refused
-from ..store.session import INTERRUPTED
+from ..store.running import INTERRUPTED, Refused
 from ..store.words import counted
 from .nsf.recording import states as positions
 from .record import UNENDED, marked

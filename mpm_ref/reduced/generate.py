@@ -21,11 +21,10 @@ import threadpoolctl
 from ..core.grid import OutOfRange
 from ..monitor import Unstable
 from ..scene import build, digest
-from ..store import BadResults, Fields
 from ..store.atomic import NotWritten
-from ..store.results import Results
-from ..store.running import Options, run
-from ..store.session import FINISHED, Watch, checkpoint_of
+from ..store.results import BadResults, Results
+from ..store.running import FINISHED, Options, Watch, checkpoint_of, run
+from ..store.writer import Fields
 from ..timestep import TooLarge
 from .tables import LDM, NSF
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ..learning import part
 from ..rom import modes_file, spanned_file, weights
 from ..rom.fields.network import Decoder
 from ..rom.fields.pod import basis
@@ -15,9 +14,10 @@ from ..rom.fields.pod_fields import Spanned
 from ..rom.fields.polynomial_manifold import curved
 from ..rom.latent import initial
 from ..rom.weights import Model
-from ..sealed import opened
 from ..shapes.inside import solid
 from ..store.manifest import source_hash, versions
+from ..store.weights_file import opened
+from ..training import part
 from .errors import misfit
 from .nsf import fields as nsf
 from .nsf import networks

@@ -24,9 +24,10 @@ from ..energy import energy
 from ..monitor import Unstable, check
 from ..rom.step import BREAKDOWNS
 from ..simulate import Frame, State
-from ..store import Fields, checkpoint, create, reopen
+from ..store import checkpoint
 from ..store.manifest import Part, manifest
-from ..store.session import FINISHED, INTERRUPTED, checkpoint_of
+from ..store.running import FINISHED, INTERRUPTED, checkpoint_of
+from ..store.writer import Fields, create, reopen
 from .field import Field
 from .march import picked
 from .watch import Nonsense, Watch, watched, watched_on

@@ -14,11 +14,11 @@ import numpy as np
 
 from .. import scene
 from ..scene import SceneError
-from ..scene.error import at, opened_by
+from ..scene.messages import at, opened_by
+from ..scene.overrides import flat, varied
 from .nsf.levels import every
 from .study_file import checked, plain
 from .tables import LATIN, LDM, NETWORK, NSF, Runs
-from .vary import flat, varied
 
 SAME = ("dim", "dx", "dt", "steps", "every", "seed", "scheme", "integrator")    # in all runs
 SUMMED = ("modes", "tau", "C")      # numbers of modes, of maps and fields that are sums of them

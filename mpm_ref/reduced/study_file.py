@@ -6,9 +6,8 @@ from difflib import get_close_matches
 import msgspec
 
 from ..scene import SceneError
-from ..scene.check import check_finite
-from ..scene.error import joined
-from ..scene.words import rephrase
+from ..scene.messages import joined, rephrase
+from ..scene.validate import check_finite
 from . import tables as ldm
 from .nsf import tables as nsf
 from .tables import LDM, NSF, Parameter

@@ -19,9 +19,8 @@ from mpm_ref.nclaw.train import fit, methods  # noqa: E402
 from mpm_ref.nclaw.train.labeled import labels_of, train_labeled  # noqa: E402
 from mpm_ref.nclaw.train.rollout import trajectory_of  # noqa: E402
 from mpm_ref.scene import digest  # noqa: E402
-from mpm_ref.store import Fields  # noqa: E402
-from mpm_ref.store.running import Options, run  # noqa: E402
-from mpm_ref.store.session import checkpoint_of  # noqa: E402
+from mpm_ref.store.running import Options, checkpoint_of, run  # noqa: E402
+from mpm_ref.store.writer import Fields  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 

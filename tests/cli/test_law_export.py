@@ -10,7 +10,6 @@ import rom_toys
 from command_line import assert_told, mpm_ref
 from small_laws import identified, saved
 
-from mpm_ref.cli import law_show
 from mpm_ref.materials import NoFlow
 from mpm_ref.materials.learned import principal, response, spline, weights
 from mpm_ref.materials.learned.contraction import Contraction
@@ -255,7 +254,7 @@ def test_files_that_stand_are_kept(tmp_path):
 ])
 def test_what_an_export_needs_is_said_first(tmp_path, monkeypatch, options, status, words):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(law_show, "exported", None)
+    monkeypatch.setattr("mpm_ref.cli.law.exported", None)
     assert_told(mpm_ref("law", "export", saved(tmp_path, identified()), *options), status, words)
 
 

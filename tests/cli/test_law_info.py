@@ -14,7 +14,7 @@ from mpm_ref.materials import NoFlow, VonMises
 from mpm_ref.materials.learned import spline, weights
 from mpm_ref.materials.learned.weights import Laws, Trained
 from mpm_ref.nclaw.gnn import weights as of_graphs
-from mpm_ref.sealed import sealed
+from mpm_ref.store.weights_file import sealed
 from validation.nclaw.dough import doughs
 from validation.nclaw.trained_laws import nets
 

@@ -11,7 +11,6 @@ from command_line import assert_told, mpm_ref
 from matplotlib.figure import Figure
 from small_laws import DT, FLOWING, NO_FLOW, NU, E, identified, saved, write_scene
 
-from mpm_ref.cli import law_show
 from mpm_ref.materials import FluidProjection, VonMises, make_law
 from mpm_ref.materials.learned import learned_flow, learned_law
 from mpm_ref.materials.learned.response import Correction
@@ -220,6 +219,6 @@ def test_pictures_are_what_their_names_say(tmp_path, ending, begins):
 ])
 def test_what_a_picture_needs_is_said_first(tmp_path, monkeypatch, options, status, words):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(law_show, "beside_truth", None)
+    monkeypatch.setattr("mpm_ref.cli.law.beside_truth", None)
     assert_told(plot(tmp_path, identified(), *options), status, words)
     assert sorted(file.name for file in tmp_path.iterdir()) == ["cube.toml", "laws.npz"]

@@ -12,13 +12,13 @@ from small_studies import CURVED, STEPS, modelled, write
 from typer.main import get_command
 
 from mpm_ref.cli import rom
-from mpm_ref.cli.shipped import shipped_studies
+from mpm_ref.cli.catalogue import shipped_studies
 from mpm_ref.reduced import dataset, errors, maps
 from mpm_ref.reduced.study import load
 from mpm_ref.rom import weights
 from mpm_ref.rom.snapshots import displacement_error, position_error
 from mpm_ref.rom.weights import Model
-from mpm_ref.sealed import sealed
+from mpm_ref.store.weights_file import sealed
 
 LDM = Path(__file__).parents[2] / "validation" / "ldm" / "weights"
 

@@ -5,9 +5,9 @@ import pytest
 from command_line import assert_told, mpm_ref
 from small_nsf_studies import modelled
 
-from mpm_ref import mapped
 from mpm_ref.reduced.nsf import dataset
 from mpm_ref.reduced.study import load
+from mpm_ref.store import memmap
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +32,7 @@ def test_snapshots_without_room_end_the_command(made, tmp_path, monkeypatch, com
 def test_snapshots_may_lie_in_files(made, monkeypatch):
     pairs = load(made / "pairs.toml")
     known = dataset.histories(pairs, made / "data", pairs.train)
-    monkeypatch.setattr(mapped, "LARGEST", 0)
+    monkeypatch.setattr(memmap, "LARGEST", 0)
     far = dataset.histories(pairs, made / "data", pairs.train)
     for name in ("x", "tau", "C"):
         assert isinstance(getattr(far, name).base, np.memmap)

@@ -8,7 +8,7 @@ import pytest
 from command_line import assert_told, mpm_ref
 from small_studies import modelled, write
 
-from mpm_ref.cli import rom, rom_evaluate
+from mpm_ref.cli import rom
 from mpm_ref.cli.rom import astray
 from mpm_ref.reduced import told
 from mpm_ref.reduced.watch import Sight
@@ -86,7 +86,7 @@ def test_a_picture_is_not_replaced(made, tmp_path, monkeypatch):
     before = out.stat().st_mtime_ns
     assert mpm_ref("rom", *command, "--out", out, "--overwrite").exit_code == 0
     assert out.stat().st_mtime_ns > before
-    monkeypatch.setattr(rom_evaluate, "evaluate", None)         # not begun
+    monkeypatch.setattr(rom, "evaluate", None)         # not begun
     assert_told(mpm_ref("rom", *command, "--out", out), 2, "e.png exists: add --overwrite")
     done = mpm_ref("rom", *command, "--out", tmp_path / "none" / "e.png")
     assert_told(done, 4, "there is no folder")

@@ -11,7 +11,7 @@ from mpm_ref.materials.learned import contraction, energetic, weights
 from mpm_ref.materials.learned.contraction import Contraction
 from mpm_ref.materials.learned.invariants import spectrum
 from mpm_ref.nclaw.bodies import points
-from mpm_ref.sealed import sealed
+from mpm_ref.store.weights_file import sealed
 from mpm_ref.timestep import moduli
 from tests.nclaw.test_invariants import REPEATED, built, turns
 

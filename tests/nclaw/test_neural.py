@@ -13,10 +13,9 @@ from problems import digest as digest_of
 from small_runs import block
 
 from mpm_ref.adjoint import deform_body_adjoint, zero_bars, zero_sums
-from mpm_ref.body import Body, particles_at
+from mpm_ref.body import Body, check_fit, particles_at
 from mpm_ref.energy import energy
 from mpm_ref.explicit import Scheme, deform_body, initial_stress
-from mpm_ref.fit import check_fit
 from mpm_ref.materials import Hencky, NoFlow, make_flow
 from mpm_ref.materials.learned import network, response, weights
 from mpm_ref.problem import Clock, Problem

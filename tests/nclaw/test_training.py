@@ -9,7 +9,7 @@ from nclaw_toys import cube
 
 torch = pytest.importorskip("torch")
 
-from mpm_ref import cost  # noqa: E402
+from mpm_ref import training  # noqa: E402
 from mpm_ref.cases import observed  # noqa: E402
 from mpm_ref.materials.learned.response import Correction, PlainStress, Stress  # noqa: E402
 from mpm_ref.nclaw.batched_step import world  # noqa: E402
@@ -207,8 +207,8 @@ def test_a_training_that_was_cut_off_goes_on_bit_for_bit(tmp_path, monkeypatch, 
 
 def test_the_cost_is_that_of_all_parts(tmp_path, monkeypatch, run):
     now = [0.0]
-    monkeypatch.setattr(cost, "process_time", lambda: 10.0 + 2.0 * now[0])
-    monkeypatch.setattr(cost, "perf_counter", lambda: 30.0 + 3.0 * now[0])
+    monkeypatch.setattr(training, "process_time", lambda: 10.0 + 2.0 * now[0])
+    monkeypatch.setattr(training, "perf_counter", lambda: 30.0 + 3.0 * now[0])
     monkeypatch.setattr(fit, "SAVE", 2)
 
     def second(history):

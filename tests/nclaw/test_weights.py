@@ -9,7 +9,7 @@ from damaged import assert_damage_is_told, changed, refused, without
 
 from mpm_ref.materials.learned import response, weights
 from mpm_ref.materials.learned.weights import KINDS, PARTS, Laws, Trained, arrays_of, load, save
-from mpm_ref.sealed import sealed
+from mpm_ref.store.weights_file import sealed
 
 ABOUT = {"seed": 3, "command": "train jelly", "errors": [0.1, 1e-300], "scene": "Ärmel", "of": None}
 STRESS, CORRECTION = response.Stress(2.5), response.Correction()

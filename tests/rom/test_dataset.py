@@ -7,7 +7,6 @@ import pytest
 from small_studies import CURVED, STEPS, generated, study
 
 from mpm_ref.cases import snapshots
-from mpm_ref.learning import Machine
 from mpm_ref.reduced import dataset, maps
 from mpm_ref.reduced.field import resampled, tabulated
 from mpm_ref.reduced.generate import (
@@ -24,11 +23,11 @@ from mpm_ref.rom import modes_file
 from mpm_ref.rom.fields.pod import basis
 from mpm_ref.rom.fields.polynomial_manifold import curved
 from mpm_ref.scene import build
-from mpm_ref.sealed import sealed
-from mpm_ref.store import BadResults, Fields
-from mpm_ref.store.results import Results
-from mpm_ref.store.running import Options, run
-from mpm_ref.store.session import checkpoint_of
+from mpm_ref.store.results import BadResults, Results
+from mpm_ref.store.running import Options, checkpoint_of, run
+from mpm_ref.store.weights_file import sealed
+from mpm_ref.store.writer import Fields
+from mpm_ref.training import Machine
 
 # Data.
 

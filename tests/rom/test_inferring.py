@@ -17,12 +17,12 @@ from mpm_ref.reduced.inferring import (
     require_sound,
     weighed,
 )
-from mpm_ref.reduced.vary import varied
 from mpm_ref.reduced.whole import history, whole
 from mpm_ref.rom.cubature import cubature
 from mpm_ref.rom.fields.pod_fields import Sizes, spanned
 from mpm_ref.rom.quadrature.stencil_overlap import bases
 from mpm_ref.rom.snapshots import joined
+from mpm_ref.scene.overrides import varied
 
 TOML = """
 title = "two disks"

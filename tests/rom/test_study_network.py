@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from small_studies import generated, study
 
-from mpm_ref.learning import Machine
 from mpm_ref.reduced import dataset, maps
 from mpm_ref.reduced.tables import KEYS, LATENTS, NETWORK, WEIGHTS, Map
+from mpm_ref.training import Machine
 
 torch = pytest.importorskip("torch")
 

@@ -11,7 +11,7 @@ from mpm_ref.rom import modes_file
 from mpm_ref.rom.fields.pod import basis
 from mpm_ref.rom.fields.polynomial_manifold import curved
 from mpm_ref.rom.weights import Model, load
-from mpm_ref.sealed import SEAL, opened, sealed
+from mpm_ref.store.weights_file import SEAL, opened, sealed
 
 from ..common.registry import experiment
 from ..ldm import networks

@@ -10,7 +10,7 @@ import numpy as np
 from mpm_ref.rom import spanned_file
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.weights import Model
-from mpm_ref.sealed import opened
+from mpm_ref.store.weights_file import opened
 
 from ..common.registry import experiment
 from ..nsf.reduced_runs import refitted

@@ -15,7 +15,7 @@ from mpm_ref.energy import energy, momentum
 from mpm_ref.hot.step import ImplicitStepper
 from mpm_ref.monitor import Unstable
 from mpm_ref.scene import build
-from mpm_ref.scene.text import digest
+from mpm_ref.scene.toml import digest
 from mpm_ref.simulate import State, advance, check, ended, frame_is_due, show
 from mpm_ref.store.manifest import source_hash
 from mpm_ref.timestep import TooLarge

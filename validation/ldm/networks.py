@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from mpm_ref.rom.weights import load
-from mpm_ref.scene.text import canonical
+from mpm_ref.scene.toml import canonical
 
 from .studies import GRAVITY, POKES, TORSION, TOWER
 from .workshop_studies import PUSHES, SHEAR3, SHEAR17

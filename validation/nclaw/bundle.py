@@ -1,4 +1,4 @@
-"""The laws of a small training after some of its epochs, as one file (see `mpm_ref.archive`).
+"""The laws of a small training after some of its epochs, in one file.
 
 Networks are trained in single precision, and stored so: they come back as they were, as doubles.
 """
@@ -8,9 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.archive import about_of, require_format, stated
 from mpm_ref.materials.learned.weights import PARTS, Laws, arrays_of, fault_of, trained_of
-from mpm_ref.sealed import opened, sealed, write_whole
+from mpm_ref.store.weights_file import about_of, opened, require_format, sealed, stated, write_whole
 
 FORMAT = 1
 

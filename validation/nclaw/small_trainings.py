@@ -10,7 +10,7 @@ from functools import cache
 from typing import NamedTuple
 
 from mpm_ref.scene import Walls
-from mpm_ref.scene.text import canonical
+from mpm_ref.scene.toml import canonical
 
 from ..common.weights_needed import Untrained
 from ..verification.scenes import with_

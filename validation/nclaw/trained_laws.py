@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from mpm_ref.materials.learned import weights
 from mpm_ref.nclaw.gnn import weights as of_graphs
-from mpm_ref.scene.text import canonical
+from mpm_ref.scene.toml import canonical
 
 from ..common.weights_needed import Untrained
 from .environments import ENVIRONMENTS, environment

@@ -17,7 +17,7 @@ from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.fields.architecture import DEPTH
 from mpm_ref.rom.fields.network import learned
 from mpm_ref.rom.fields_file import load
-from mpm_ref.scene.text import canonical
+from mpm_ref.scene.toml import canonical
 
 from ..common.weights_needed import Untrained
 from .studies import Study, ball, bread, cake, jelly, metal, sand, toothpaste

@@ -7,9 +7,9 @@ from scipy.spatial import KDTree
 
 from mpm_ref.reduced.errors import Squares
 from mpm_ref.reduced.nsf.evaluate import closest
-from mpm_ref.reduced.vary import varied
 from mpm_ref.reduced.whole import history
 from mpm_ref.scene import Poisson
+from mpm_ref.scene.overrides import varied
 
 from ..common.registry import experiment
 from ..common.weights_needed import there

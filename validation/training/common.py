@@ -6,7 +6,7 @@ from typing import Annotated
 import torch
 import typer
 
-from mpm_ref.learning import DEVICES
+from mpm_ref.training import DEVICES
 
 Names = Annotated[list[str] | None, typer.Argument(help="of nets; none: all")]
 Folder = Annotated[Path, typer.Option(help="where weights go")]

@@ -12,8 +12,6 @@ import torch
 import typer
 from tqdm import tqdm
 
-from mpm_ref.cost import Cost
-from mpm_ref.learning import DEVICES, Machine
 from mpm_ref.reduced.whole import history
 from mpm_ref.rom.fields_file import save
 from mpm_ref.rom.learn.device import device_of
@@ -21,6 +19,7 @@ from mpm_ref.rom.learn.field import FieldTraining
 from mpm_ref.rom.learn.fit import Training
 from mpm_ref.rom.learn.stages import POSITION, Plan, train
 from mpm_ref.rom.snapshots import joined
+from mpm_ref.training import DEVICES, Cost, Machine
 
 from ..common.provenance import commit, provenance
 from ..nsf.networks import FOLDER, identity, narrow, net_of, nets

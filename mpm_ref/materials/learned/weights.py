@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ... import materials
-from ...archive import read, stated, write
+from ...store.weights_file import read, stated, write
 from . import principal, response, spline
 from .contraction import ANSWERED, READ, Contraction
 from .energetic import MEASURES, Energetic

@@ -10,7 +10,7 @@ from ...materials.learned.weights import BESIDE, PARTS
 from ...reduced.study import base_of
 from ...reduced.study_file import plain
 from ...scene import Scene, SceneError, build
-from ...scene.error import opened_by
+from ...scene.messages import opened_by
 from ..batched_step import world
 from .tables import SYS_ID, Tables, checked
 

@@ -11,9 +11,8 @@ from ...materials.learned.weights import PARTS, RECORDS
 from ...reduced.study_file import require_keys
 from ...reduced.tables import one_of
 from ...scene import SceneError
-from ...scene.check import check_finite
-from ...scene.error import at
-from ...scene.words import rephrase
+from ...scene.messages import at, rephrase
+from ...scene.validate import check_finite
 from ..train.recipe import Recipe
 
 SYS_ID = "sys-id"

@@ -3,9 +3,9 @@
 from dataclasses import asdict
 
 from ... import scene
-from ...learning import part
 from ...materials.learned.strain_range import seen
 from ...store.manifest import source_hash, versions
+from ...training import part
 
 
 def drive():

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 
 from ...cases import Observed
-from ...store import BadResults, Fields, require_run
-from ...store.results import Results
+from ...store.results import BadResults, Results
 from ...store.running import Options, run
+from ...store.writer import Fields, require_run
 
 FIELDS = ("x", "v", "C", "F")
 J_ALONE = "J"

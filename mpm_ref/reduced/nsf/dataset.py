@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from ...mapped import empty
 from ...rom.snapshots import Histories
 from ...rom.symmetric import values
+from ...store.memmap import empty
 from ...store.results import Results
 from ..generate import file_of
 from ..whole import whole

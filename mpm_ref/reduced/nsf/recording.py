@@ -10,7 +10,7 @@ from ...materials import NoFlow
 from ...rom.extrapolation import Extent
 from ...rom.fields.pod_fields import Spanned
 from ...rom.inferred import Position, Report
-from ...store import Fields
+from ...store.writer import Fields
 from ..inferring import Plan, begin, continued, drawn, of_cells, weighed
 from ..whole import Whole
 from .fields import of_run

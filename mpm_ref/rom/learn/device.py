@@ -6,7 +6,7 @@ everywhere; what is computed of them differs in rounding.
 
 import torch
 
-from ...learning import DEVICES
+from ...training import DEVICES
 
 
 def device_of(name):

@@ -2,7 +2,7 @@
 
 import torch
 
-from ...learning import Machine
+from ...training import Machine
 from .device import device_of
 from .fit import Training, train
 from .loss import CODE, READINGS, scaled

@@ -14,8 +14,7 @@ import numpy as np
 import torch
 from torch.nn.functional import mse_loss, pad
 
-from ... import checkpoints
-from ...cost import Cost
+from ...training import Cost, train_epochs
 from ..fields.network import Field
 from ..snapshots import field_units
 from . import session
@@ -112,6 +111,6 @@ def train(training, observed, checkpoint=None, on_epoch=None, device="cpu"):
 
     Raises ValueError where values are not finite, `session.Diverged` where a loss is not.
     """
-    done = checkpoints.finished(Session(training, observed, device), training.epochs,
+    done = train_epochs(Session(training, observed, device), training.epochs,
                                 saving(training.epochs, SAVE), checkpoint, on_epoch)
     return done.result()

@@ -6,8 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
-from ... import checkpoints
-from ...cost import Cost
+from ...training import Cost, train_epochs
 from ..fields.architecture import ENCODERS, HIDDEN
 from ..fields.pod import basis, directions
 from ..snapshots import units
@@ -152,6 +151,6 @@ def train(training, snapshots, checkpoint=None, on_epoch=None, device="cpu"):
     checkpoint: a file to go on from and to save to; on_epoch(history) is called after each epoch;
     device: a `torch.device`, or its name. Raises `session.Diverged`.
     """
-    done = checkpoints.finished(Session(training, snapshots, device), training.epochs,
+    done = train_epochs(Session(training, snapshots, device), training.epochs,
                                 saving(training.epochs, SAVE), checkpoint, on_epoch)
     return done.result(len(snapshots.x))

@@ -13,8 +13,8 @@ from dataclasses import asdict
 import numpy as np
 import torch
 
-from ... import checkpoints
-from ...cost import Cost, Meter
+from ...store import weights_file
+from ...training import Cost, Meter
 from .schedule import SCHEDULES
 
 SAVE = 20                           # epochs between checkpoints, but of a long training ...
@@ -106,15 +106,15 @@ class Session:
                     "optimiser": self.optimiser.state_dict(), "history": self.history,
                     "cost": tuple(self.meter.total),
                     **{name: net.state_dict() for name, net in self.networks.items()}}, content)
-        checkpoints.write(path, content.getvalue())
+        weights_file.write_sealed(path, content.getvalue())
 
     def load(self, path):
         """Go on from a checkpoint. Raises ValueError where it is damaged, or of another training
         or other data.
         """
-        kept = torch.load(io.BytesIO(checkpoints.read(path)), map_location="cpu",
+        kept = torch.load(io.BytesIO(weights_file.read_sealed(path)), map_location="cpu",
                           weights_only=True)
-        checkpoints.require_same(path, kept["training"], self.named)
+        weights_file.require_same_training(path, kept["training"], self.named)
         for name, net in self.networks.items():
             net.load_state_dict(kept[name])
         self.optimiser.load_state_dict(kept["optimiser"])

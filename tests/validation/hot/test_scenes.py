@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mpm_ref.placement import misplaced
+from mpm_ref.preflight import misplaced
 from mpm_ref.scene import build
 from mpm_ref.simulate import simulate
 from validation.common import targets

@@ -7,7 +7,7 @@ from small_toys import known
 
 from mpm_ref.materials.learned import response, weights
 from mpm_ref.scene import build
-from mpm_ref.sealed import sealed
+from mpm_ref.store.weights_file import sealed
 from validation.common.weights_needed import Untrained
 from validation.nclaw import bundle, small_trainings, trained_laws
 from validation.nclaw.bundle import Bundle

@@ -5,11 +5,11 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from mpm_ref.learning import Machine  # noqa: E402
 from mpm_ref.reduced.whole import history  # noqa: E402
 from mpm_ref.rom.fields.pod_fields import Sizes  # noqa: E402
 from mpm_ref.rom.learn import session  # noqa: E402
 from mpm_ref.rom.snapshots import joined  # noqa: E402
+from mpm_ref.training import Machine  # noqa: E402
 from validation.nsf import networks as kept  # noqa: E402
 from validation.nsf.networks import Net, Part, fields_of, trained  # noqa: E402
 from validation.nsf.studies import jelly  # noqa: E402

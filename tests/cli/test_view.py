@@ -9,9 +9,9 @@ from matplotlib.colors import to_rgba
 from PIL import Image
 
 from mpm_ref import oracle, plotting
-from mpm_ref.cli.shipped import find_scene, shipped_scenes
+from mpm_ref.cli.catalogue import find_scene, shipped_scenes
 from mpm_ref.store.results import Results
-from mpm_ref.store.session import checkpoint_of
+from mpm_ref.store.running import checkpoint_of
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import msgspec
 
 from ..shapes.quantities import Kind, Record
-from .check import checked
-from .error import SceneError, joined
+from .messages import SceneError, joined
+from .validate import checked
 
 FILES = "file", "weights"       # keys that name a file
 

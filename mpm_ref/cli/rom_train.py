@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from ..learning import DEVICES, Machine
 from ..reduced import dataset, maps
 from ..reduced.generate import (
     INTERRUPTED,
@@ -24,15 +23,26 @@ from ..reduced.nsf.hints import hints
 from ..reduced.tables import KEYS, NETWORK, NSF
 from ..store.atomic import NotWritten, require_place
 from ..store.words import counted
-from . import faults
-from .faults import end, one_line, options, writing
-from .outputs import MAPS, require_ending, require_folder_name, require_free
-from .rom_options import Data, Overwrite, StudyName, named, on_interrupt, studied
-from .shipped import keep_scene
+from ..training import DEVICES, Machine
+from . import errors
+from .catalogue import keep_scene
+from .errors import end, one_line, options, writing
+from .options import (
+    MAPS,
+    Data,
+    Overwrite,
+    StudyName,
+    named,
+    on_interrupt,
+    require_ending,
+    require_folder_name,
+    require_free,
+    studied,
+)
 from .terminal import passing, warn
 
 MADE, CONTINUED, THERE = "made", "continued", "was there"
-STATUS = {UNSTABLE: faults.UNSTABLE, NOT_WRITTEN: faults.NOT_WRITTEN}
+STATUS = {UNSTABLE: errors.UNSTABLE, NOT_WRITTEN: errors.NOT_WRITTEN}
 
 
 def make_data(
@@ -67,7 +77,7 @@ def make_data(
                     raise KeyboardInterrupt
                 if not done.well:
                     bar.close()
-                    end(done.said, STATUS.get(done.why, faults.BAD_INPUT))
+                    end(done.said, STATUS.get(done.why, errors.BAD_INPUT))
                 ended.append(done)
                 bar.update()
                 if bar.disable:

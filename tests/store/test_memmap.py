@@ -8,10 +8,10 @@ import tempfile
 import numpy as np
 import pytest
 from field_toys import histories
+from mpm_ref.rom.histories import joined
 
-from mpm_ref import mapped
 from mpm_ref.rom.fields.pod_fields import Sizes, spanned
-from mpm_ref.rom.snapshots import joined
+from mpm_ref.store import memmap
 
 SHAPE = 3, 5
 SIZES = Sizes(r=1, modes=2, tau=1, C=2)
@@ -20,7 +20,7 @@ SIZES = Sizes(r=1, modes=2, tau=1, C=2)
 @pytest.fixture
 def small(monkeypatch):
     """All arrays count as large."""
-    monkeypatch.setattr(mapped, "LARGEST", 0)
+    monkeypatch.setattr(memmap, "LARGEST", 0)
 
 
 def in_file(a):
@@ -31,19 +31,19 @@ def in_file(a):
 
 
 def test_small_arrays_are_in_memory():
-    a = mapped.empty(SHAPE, np.float32)
+    a = memmap.empty(SHAPE, np.float32)
     assert (a.shape, a.dtype, in_file(a)) == (SHAPE, np.float32, False)
 
 
 def test_the_size_counts_in_bytes(monkeypatch):
-    monkeypatch.setattr(mapped, "LARGEST", 60)
-    assert not in_file(mapped.empty(SHAPE, np.float32))
-    assert in_file(mapped.empty(SHAPE, np.float64))
+    monkeypatch.setattr(memmap, "LARGEST", 60)
+    assert not in_file(memmap.empty(SHAPE, np.float32))
+    assert in_file(memmap.empty(SHAPE, np.float64))
 
 
 @pytest.mark.usefixtures("small")
 def test_large_ones_are_arrays_as_others_are():
-    a = mapped.empty(SHAPE, np.float32)
+    a = memmap.empty(SHAPE, np.float32)
     assert in_file(a)
     assert type(a) is np.ndarray
     a[:] = np.arange(15.0).reshape(SHAPE)
@@ -53,7 +53,7 @@ def test_large_ones_are_arrays_as_others_are():
 @pytest.mark.usefixtures("small")
 def test_no_file_stays(tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    a = mapped.empty(SHAPE, np.float32)
+    a = memmap.empty(SHAPE, np.float32)
     a[:] = 1.0
     del a
     assert not [*tmp_path.iterdir()]
@@ -65,19 +65,19 @@ def test_a_full_disk_is_told_before_anything_is_written(monkeypatch, tmp_path, n
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(mapped, name, full)
+    monkeypatch.setattr(memmap, name, full)
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     with pytest.raises(OSError, match=r"no file for 5.59e-08 GiB of snapshots \(No space left on "
                                       r"device\): expected as much room in "
                                       + re.escape(str(tmp_path)) + "; set TMPDIR"):
-        mapped.empty(SHAPE, np.float32)
+        memmap.empty(SHAPE, np.float32)
 
 
 def test_room_is_taken_on_the_disk():
     if not hasattr(os, "posix_fallocate"):
         pytest.skip("the system reserves no room")
     with tempfile.TemporaryFile() as file:
-        mapped.reserve(file, 2**20)
+        memmap.reserve(file, 2**20)
         assert os.fstat(file.fileno()).st_size == 2**20
         assert os.fstat(file.fileno()).st_blocks * 512 >= 2**20
 
@@ -90,11 +90,11 @@ def test_disks_that_cannot_reserve_are_tried(monkeypatch, number, known):
     monkeypatch.setattr(os, "posix_fallocate", broken, raising=False)
     with tempfile.TemporaryFile() as file:
         if known:
-            mapped.reserve(file, 100)
+            memmap.reserve(file, 100)
             assert os.fstat(file.fileno()).st_size == 100
         else:
             with pytest.raises(OSError, match="no"):
-                mapped.reserve(file, 100)
+                memmap.reserve(file, 100)
 
 
 def test_fields_of_them_are_the_same(monkeypatch):
@@ -103,7 +103,7 @@ def test_fields_of_them_are_the_same(monkeypatch):
     runs = [run._replace(x=run.x * run.mu[0], tau=run.tau * run.mu[0]) for run in runs]
     known = joined(runs)
     fields, xhat = spanned(known, SIZES, 0.3)
-    monkeypatch.setattr(mapped, "LARGEST", 0)
+    monkeypatch.setattr(memmap, "LARGEST", 0)
     far = joined(iter(runs), 3)
     for name in ("v", "mu"):
         assert np.array_equal(getattr(far, name), [getattr(run, name)[0] for run in runs])

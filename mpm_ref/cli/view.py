@@ -8,14 +8,12 @@ import typer
 from .. import plotting, scene
 from ..store.atomic import require_place
 from ..store.results import SCALARS, Results
-from ..store.vtkhdf import export_particles
-from ..store.vtkhdf_grid import export_grid
-from . import info
-from .faults import one_line, options
-from .outputs import PICTURES, require_ending
-from .shipped import shipped_scenes
+from ..store.vtkhdf import export_grid, export_particles
+from .catalogue import shipped_scenes
+from .errors import one_line, options
+from .options import PICTURES, Json, require_ending
+from .terminal import print_titles
 
-Machine = Annotated[bool, typer.Option("--json", help="Answer with JSON.")]
 ResultsFile = Annotated[Path, typer.Argument(metavar="FILE", help="A results file.")]
 Scalar = Annotated[str, typer.Option(help=f"Colour: {', '.join(SCALARS)}.")]
 View = Annotated[str | None, typer.Option(help="Axes to the right and up, such as xz.")]
@@ -55,16 +53,11 @@ def export(
     _to_file(export_grid if grid else export_particles, file, out, (".vtkhdf", ".hdf"))
 
 
-def scenes(json: Machine = False):
+def scenes(json: Json = False):
     """List the scenes that come with the package."""
     with one_line():
-        listed({name: scene.load(path).title for name, path in shipped_scenes().items()}, json)
-
-
-def listed(titles, json):
-    """Print {name: title}, a line each."""
-    lines = [f"{name:24} {title}" for name, title in titles.items()]
-    print(info.as_json(titles) if json else "\n".join(lines))
+        titles = {name: scene.load(path).title for name, path in shipped_scenes().items()}
+        print_titles(titles, json)
 
 
 def _to_file(make, file, out, suffixes, **what):

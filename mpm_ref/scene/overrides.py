@@ -9,8 +9,8 @@ from difflib import get_close_matches
 
 import msgspec
 
-from ..scene import SceneError
-from ..scene.check import checked
+from .messages import SceneError
+from .validate import checked
 
 STEP = re.compile(r"\[([^\[\]]+)\]|([^.\[\]]+)")
 

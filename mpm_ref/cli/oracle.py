@@ -8,8 +8,8 @@ import typer
 
 from .. import oracle, scene
 from ..store.words import counted
-from .faults import at_start, one_line, options
-from .shipped import find_scene, keep_scene
+from .catalogue import find_scene, keep_scene
+from .errors import at_start, one_line, options
 from .terminal import compiling, warn
 
 DEPARTS = 1      # exit status of a check that another code fails

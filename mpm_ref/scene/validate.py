@@ -11,10 +11,9 @@ import numpy as np
 
 from ..shapes import Mesh
 from ..shapes.quantities import Vector
-from .error import SceneError, at, joined
-from .parts import build_clock, build_conditions, build_limits, build_solver
+from .builder import build_clock, build_conditions, build_limits, build_solver
+from .messages import SceneError, at, joined, rephrase, shown
 from .records import Scene
-from .words import rephrase, shown
 
 
 def checked(data, source=""):

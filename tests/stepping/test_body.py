@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from mpm_ref.body import Body, particles_at, permute
+from mpm_ref.body import Body, check_fit, particles_at, permute
 from mpm_ref.core import jit
 from mpm_ref.explicit import Scheme, Stepper
-from mpm_ref.fit import check_fit
 from mpm_ref.materials import NoFlow, make_flow, make_law
 
 ELASTIC = make_law("hencky", E=1e4, nu=0.3)

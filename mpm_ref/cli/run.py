@@ -9,25 +9,92 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
+from typing import Annotated
 
+import threadpoolctl
+import typer
+
+from .. import scene
 from ..core.grid import OutOfRange
+from ..core.jit import set_threads
 from ..monitor import Unstable
 from ..simulate import last_step
-from ..store import checkpoint
+from ..store import checkpoint, running
 from ..store.atomic import NotWritten
-from ..store.running import run
-from ..store.session import AT_LIMIT, FINISHED, INTERRUPTED, TERMINATED, Watch, checkpoint_of
+from ..store.results import UNITS, USUAL
+from ..store.running import (
+    AT_LIMIT,
+    FINISHED,
+    INTERRUPTED,
+    TERMINATED,
+    Options,
+    Watch,
+    checkpoint_of,
+)
 from ..store.words import counted
+from ..store.writer import Fields
 from ..timestep import TooLarge
 from . import info
-from .faults import INTERRUPT, NOT_WRITTEN, UNSTABLE, at_start, end
-from .terminal import COMPILING, compiling, passing, warn
+from .catalogue import find_scene, keep_scene
+from .errors import INTERRUPT, NOT_WRITTEN, UNSTABLE, at_start, end, one_line, options
+from .options import Json
+from .terminal import COMPILING, as_json, compiling, passing, warn
 
+FIELDS = f"To store, of {','.join(UNITS)}; default: {','.join(USUAL)}."
+EVERY = "Steps between checkpoints, default: one a minute."
+RESULTS = "Results file, default: SCENE.h5 here."
+GZIP = "Compression, 1 to 9, default: none."
 EXIT = {FINISHED: 0, AT_LIMIT: 0, INTERRUPTED: INTERRUPT, TERMINATED: 143}
 # The bar takes what the rest leaves of the line.
 LINE = "{{percentage:3.0f}}%|{{bar}}| {done} [{{elapsed}}<{{remaining}}{{postfix}}]"
 STEPS = LINE.format(done="{n}/{total:g} steps")
 SECONDS = LINE.format(done="t {n:.4g}/{total:g} s")
+
+
+def run(
+    name: Annotated[str, typer.Argument(metavar="SCENE", help="A TOML file, or a shipped scene.")],
+    out: Annotated[Path | None, typer.Option("--out", "-o", help=RESULTS)] = None,
+    steps: Annotated[int | None, typer.Option(help="Stop after so many steps in all.")] = None,
+    threads: Annotated[int | None, typer.Option(help="Number of threads, default: all.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the results.")] = False,
+    checkpoint_every: Annotated[int | None, typer.Option(help=EVERY)] = None,
+    fields: Annotated[str | None, typer.Option(help=FIELDS)] = None,
+    gzip: Annotated[int | None, typer.Option(help=GZIP)] = None,
+    json: Json = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar.")] = False,
+):
+    """Run a scene into a results file.
+
+    Ctrl-C ends the run after the step being made, with a checkpoint; after that, or whatever else
+    ends it, --resume continues bit for bit. Exit status: 0 done, 2 bad input, 3 the run became
+    unstable, 4 a file could not be written, 130 Ctrl-C, 143 terminated.
+    """
+    with one_line():
+        path = find_scene(name)
+        record, out = scene.load(path), out or Path(f"{path.stem}.h5")
+        with options():
+            keep_scene(path, out)
+            how = Options(steps, checkpoint_every, stored(fields, gzip), resume, overwrite,
+                          record.seed)
+            use_threads(threads)
+        with Bar(Request(name, out, json, quiet)) as bar:
+            status = run_scene(scene.build(record, str(path)), bar, how)
+        raise typer.Exit(status)
+
+
+def stored(fields, gzip):
+    """`Fields` of the two options; None where neither is given. Raises ValueError."""
+    if fields is None and gzip is None:
+        return None
+    return Fields(USUAL if fields is None else tuple(fields.split(",")), gzip or 0)
+
+
+def use_threads(n):
+    """Let kernels and BLAS use n threads; None leaves it at all cores. Raises ValueError."""
+    if n is not None:
+        set_threads(n)
+        threadpoolctl.threadpool_limits(n)
 
 
 @dataclass(frozen=True)
@@ -123,7 +190,7 @@ def run_scene(problem, bar, options):
     """Run a problem as asked; returns the exit status. Faults of the input are raised."""
     request = bar.request
     try:
-        outcome = run(problem, request.out, options, bar)
+        outcome = running.run(problem, request.out, options, bar)
     except (Unstable, OutOfRange, TooLarge, NotWritten, KeyboardInterrupt) as fault:
         bar.close()
         if not bar.began:
@@ -151,7 +218,7 @@ def _report(outcome, request, facts):
     state = outcome.state
     warn(info.unsolved(outcome.unsolved))
     if request.json:
-        print(info.as_json({
+        print(as_json({
             "why": outcome.why, "out": str(request.out), "step": state.step, "t": state.t,
             "frames": outcome.frames, "unsolved": outcome.unsolved,
             "checkpoint": str(checkpoint_of(request.out)),

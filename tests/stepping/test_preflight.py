@@ -10,7 +10,7 @@ from small_runs import DX, block, colliding
 from mpm_ref.core import motion
 from mpm_ref.core.boundary import BoxWalls, Collider, Conditions, Prescribed
 from mpm_ref.core.levelset import box, half_space
-from mpm_ref.placement import misplaced
+from mpm_ref.preflight import misplaced
 from mpm_ref.scene import build, load, loads
 
 SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.toml"))

@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mpm_ref.archive import read, stated, write
 from mpm_ref.materials.learned import weights as of_laws
 from mpm_ref.nclaw.gnn import weights as of_graphs
 from mpm_ref.rom import fields_file, modes_file
 from mpm_ref.rom import weights as of_maps
 from mpm_ref.rom.fields.pod import Modes
 from mpm_ref.rom.weights import Model
+from mpm_ref.store.weights_file import read, stated, write
 from validation.nclaw import bundle
 from validation.nclaw.small_trainings import small_nets
 
