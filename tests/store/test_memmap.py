@@ -8,7 +8,7 @@ import tempfile
 import numpy as np
 import pytest
 from field_toys import histories
-from mpm_ref.rom.histories import joined
+from mpm_ref.rom.snapshots import joined
 
 from mpm_ref.rom.fields.pod_fields import Sizes, spanned
 from mpm_ref.store import memmap
