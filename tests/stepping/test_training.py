@@ -26,8 +26,8 @@ def test_without_pytorch_one_sentence_says_what_to_do(without_torch, asked, said
 
 
 def test_another_module_that_is_missing_is_named():
-    with pytest.raises(ModuleNotFoundError, match=r"mpm_ref\.nclaw\.learn\.unheard"):
-        part("nclaw.learn.unheard", "it is made", "")
+    with pytest.raises(ModuleNotFoundError, match=r"mpm_ref\.nclaw\.train\.unheard"):
+        part("nclaw.train.unheard", "it is made", "")
 
 
 def test_with_pytorch_the_part_is_there():

@@ -8,9 +8,9 @@ import tempfile
 import numpy as np
 import pytest
 from field_toys import histories
-from mpm_ref.rom.snapshots import joined
 
 from mpm_ref.rom.fields.pod_fields import Sizes, spanned
+from mpm_ref.rom.snapshots import joined
 from mpm_ref.store import memmap
 
 SHAPE = 3, 5
