@@ -5,6 +5,7 @@ imported and nothing is computed here but ratios and counts.
 """
 
 import base64
+import io
 import re
 from collections import Counter
 from pathlib import Path
@@ -19,6 +20,8 @@ from .results import Results
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
 SHOWN_ROWS = 40          # of a table; a longer one is named and linked
+PREVIEW_WIDTH = 960      # [pixels] of a figure in report.html, which links to the drawn file
+PREVIEW_QUALITY = 45     # of its WebP compression, 0 to 100
 VERDICTS = ("pass", "miss", "info")
 PART = re.compile(r"(?:0|[^.]*[A-Za-z-]\d+)\.\d+(?![^.])|[^.]+")      # of an id; see `_words`
 
@@ -48,7 +51,7 @@ class Table(NamedTuple):
 
 
 class Figure(NamedTuple):
-    """A drawn figure; `data` is the PNG in base64, `path` its file relative to the report."""
+    """A drawn figure: `path` is relative to the report, `data` is a smaller WebP in base64."""
 
     name: str
     path: str
@@ -214,9 +217,19 @@ def _figures(folder):
     for file in sorted((Path(folder) / "figures").glob("*.png")):
         with Image.open(file) as image:
             owner, caption = image.text["Source"], image.text["Description"]
-        data = base64.b64encode(file.read_bytes()).decode()
+            data = base64.b64encode(preview(image)).decode()
         found.setdefault(owner, []).append(Figure(file.stem, f"figures/{file.name}", caption, data))
     return found
+
+
+def preview(image):
+    """Return a picture as WebP bytes, at most PREVIEW_WIDTH pixels wide."""
+    width = min(image.width, PREVIEW_WIDTH)
+    size = width, round(image.height * width / image.width)
+    buffer = io.BytesIO()
+    image.convert("RGB").resize(size, Image.Resampling.LANCZOS).save(
+        buffer, "WEBP", quality=PREVIEW_QUALITY, method=6)
+    return buffer.getvalue()
 
 
 def machine(results):

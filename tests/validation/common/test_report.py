@@ -1,15 +1,18 @@
 """The report, the figures in it, and README's status table, from toy results."""
 
+import io
 import re
 from collections import Counter
 from uuid import uuid4
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from figures.frame import Drawn, draw_all
 from validation import Results
 from validation.common.registry import Experiment
-from validation.common.report import chapters, write_report
+from validation.common.report import chapters, preview, write_report
 from validation.common.results import RESULTS, ROOT
 from validation.common.run import Setting, run_all
 from validation.common.status import BEGIN, END, status_table, with_status
@@ -171,8 +174,25 @@ def test_figure_is_drawn_and_shown_under_its_experiment(folder, scripts):
     assert names == ["nsf_bread.pdf", "nsf_bread.png"]
     section = chapters(Results(folder), TARGETS)[0].sections[0]
     assert section.figures[0].caption == "Error of the bread over cells."
-    assert 'src="data:image/png;base64,iVBOR' in text(folder, "report.html")
+    page = text(folder, "report.html")
+    assert '<a href="figures/nsf_bread.png"><img src="data:image/webp;base64,UklGR' in page
     assert "![nsf_bread](figures/nsf_bread.png)" in text(folder, "report.md")
+
+
+def test_preview_of_a_large_figure_is_small_and_keeps_its_shape():
+    noise = np.random.default_rng(0).integers(0, 255, (600, 1920, 3), dtype=np.uint8)
+    with Image.open(io.BytesIO(preview(Image.fromarray(noise)))) as image:
+        assert (image.format, image.size) == ("WEBP", (960, 300))
+    with Image.open(io.BytesIO(preview(Image.new("RGBA", (300, 200))))) as image:
+        assert image.size == (300, 200)
+
+
+def test_rows_carry_what_the_filter_reads(folder):
+    page = text(folder, "report.html")
+    assert '<div class="chapter" data-group="nsf">' in page
+    assert '<option value="nsf">NSF</option>' in page
+    assert Counter(re.findall(r'<tr data-verdict="(\w+)">', page)) == {"pass": 2, "miss": 1}
+    assert '<a href="#nsf.bread">nsf.bread</a>' in page
 
 
 def test_figure_is_drawn_again_with_the_same_bytes(folder, scripts):
