@@ -12,9 +12,8 @@ import typer
 from .. import scene
 from ..nclaw.strain_watch import other_steps
 from ..preflight import misplaced
-from ..reduced import told
-from ..reduced.nsf import networks
 from ..rom import modes_file
+from ..rom.study import nsf_networks, summary
 from ..store import checkpoint, manifest
 from ..store.atomic import in_words
 from ..store.manifest import scene_hash
@@ -86,7 +85,7 @@ def of_results(path):
             "energy": dict(zip(ENERGIES, results.energy[-1].tolist(), strict=True)) if n else None,
             "checkpoint": str(checkpoint_of(path)) if checkpoint_of(path).exists() else None,
             "manifest": results.manifest,
-            "reduced": told.told(results),
+            "reduced": summary.told(results),
             "warnings": [*unsolved(manifest.unsolved(results.manifest)),
                          *manifest.astray(results.manifest)],
         }
@@ -150,7 +149,7 @@ def results_lines(facts):
     else:
         lines.append("no frame yet")
     if facts["reduced"]:
-        lines.append(told.line(facts["reduced"]))
+        lines.append(summary.line(facts["reduced"]))
     lines += map(part_line, facts["manifest"].get("parts", []))
     lines.append(f"checkpoint: {facts['checkpoint'] or 'none'}")
     return lines
@@ -236,7 +235,7 @@ def of_npz(name):
     """
     path = Path(name)
     arrays = opened(path)
-    if modes_file.is_one(arrays) or networks.is_one(arrays) or "xhat" in arrays:
+    if modes_file.is_one(arrays) or nsf_networks.is_one(arrays) or "xhat" in arrays:
         facts = rom_info.of_map(path)
         return facts, rom_info.map_lines(facts)
     if law_info.is_graph_network(arrays):

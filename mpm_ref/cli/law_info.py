@@ -13,7 +13,7 @@ from ..nclaw.bodies import dim_of
 from ..nclaw.gnn import weights as gnn_weights
 from ..nclaw.study.study import load
 from ..nclaw.study.tables import SYS_ID
-from ..reduced.study_file import plain
+from ..rom.study.study_file import plain
 from ..scene import SceneError
 from ..store.weights_file import about_of, require_format
 from ..store.words import counted

@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from ..cases import observed
 from ..materials.learned import weights
 from ..nclaw.study import training, trajectory
 from ..nclaw.study.compare import threads_for
@@ -16,6 +15,7 @@ from ..nclaw.study.study import load
 from ..store.atomic import require_place
 from ..store.running import Watch
 from ..store.words import counted
+from ..trajectories import observed
 from . import provenance
 from .catalogue import find_study, keep_scene, shipped_scenes
 from .errors import INTERRUPT, UNSTABLE, at_start, end, one_line, options, writing
@@ -104,7 +104,7 @@ def typed(name, out, data, threads):
 
 
 def motion(study, data):
-    """`cases.Observed` of a study's scene: made, or of a results file, which is made if need be."""
+    """`Observed` of a study's scene: made, or of a results file, which is made if need be."""
     problem = study.problem()
     with threads_for(problem.bodies):
         if data is None:

@@ -11,9 +11,9 @@ from ..materials.learned import weights
 from ..nclaw.bodies import dim_of
 from ..nclaw.study.compare import problem_of
 from ..nclaw.train.teacher import Teacher
-from ..reduced import maps
-from ..reduced.generate import one_thread
-from ..reduced.study import load
+from ..rom.study import reduce
+from ..rom.study.generate import one_thread
+from ..rom.study.study import load
 from ..scene import SceneError
 from .catalogue import find_scene, find_study, shipped_scenes
 from .errors import INTERRUPT, end, one_line
@@ -161,7 +161,7 @@ def map_of(name, study, path):
     if not file.exists():
         raise SceneError(f"there is no {file}: mpm-ref rom train {name}"
                          + (f" --out {path}" if path else ""))
-    model = maps.load(file, study)
+    model = reduce.load(file, study)
     if path is None:
         warn(unlike(file, study.tables.map, model))
     return file, model

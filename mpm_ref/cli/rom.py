@@ -1,5 +1,5 @@
 """`mpm-ref rom studies | generate | train | run | evaluate`: reduced models of a scene (see
-`reduced`).
+`rom.study`).
 
 A study file names the scene, its parameters and the map; docs/reduced.md explains it. `rom_train`
 has the commands `generate` and `train`, `rom_info` has `studies`.
@@ -12,13 +12,13 @@ from typing import Annotated
 
 import typer
 
-from ..reduced import dataset, maps, nearby
-from ..reduced.begun import begun
-from ..reduced.evaluate import REDUCED, breakdowns, draw, evaluate, facts, lines, together
-from ..reduced.model import kind_of, recording, to_write
-from ..reduced.nsf import evaluate as nsf
-from ..reduced.record import record
-from ..reduced.tables import NSF
+from ..rom.study import baselines, dataset, reduce
+from ..rom.study import nsf_evaluate as nsf
+from ..rom.study.evaluate import REDUCED, breakdowns, draw, evaluate, facts, lines, together
+from ..rom.study.model import kind_of, recording, to_write
+from ..rom.study.record import record
+from ..rom.study.resume import begun
+from ..rom.study.tables import NSF
 from ..scene import SceneError
 from ..store.atomic import in_words, require_place, require_space
 from ..store.running import FINISHED
@@ -90,7 +90,7 @@ def run(
             file, model = map_of(name, study, map)
             announce(out, to_write(study, mu, points_out))
             made = recording(study, model, mu, points_out)
-            made.facts["map_sha256"] = maps.sha256(file)
+            made.facts["map_sha256"] = reduce.sha256(file)
             before = begun(made, out, overwrite)
         warn([*study.outside(mu), *made.doubts, *changed(before)])
         outcome = recorded(made, out, before.known, overwrite)
@@ -197,17 +197,17 @@ def judge(
             runs = passing(unit="run", iterable=compare(study, model, snapshots),
                            total=len(study.test))
             found = list(runs)
-            trained = list(nearby.nearby(study, folder, snapshots))
+            trained = list(baselines.nearby(study, folder, snapshots))
         all_runs = together(found, snapshots.X)
         draw(found, study.names, snapshots.dt, picture)
         if json:
             stress = {"stress": nsf.stress_facts(found)} if inferred else {}
             print(as_json({"study": str(study.path), "picture": str(picture),
-                           **facts(study, found, all_runs), "nearby": nearby.facts(trained),
+                           **facts(study, found, all_runs), "nearby": baselines.facts(trained),
                            **stress}))
         else:
             stress = nsf.stress_lines(found) if inferred else ()
-            print("\n".join([*lines(study, found, all_runs), *nearby.lines(trained), *stress,
+            print("\n".join([*lines(study, found, all_runs), *baselines.lines(trained), *stress,
                              str(picture)]))
         warn(breakdowns(study, found))
     raise typer.Exit(0 if isfinite(all_runs[REDUCED].origin) else UNSTABLE)

@@ -3,14 +3,14 @@
 import msgspec
 import numpy as np
 
-from ..reduced import maps
-from ..reduced.model import known_of
-from ..reduced.nsf.networks import Networks
-from ..reduced.study_file import checked, plain
-from ..reduced.tables import CURVED, MODES, NETWORK, NSF
 from ..rom.fields.network import Decoder
 from ..rom.fields.pod_fields import Spanned
 from ..rom.fields.polynomial_manifold import Curved
+from ..rom.study import reduce
+from ..rom.study.model import known_of
+from ..rom.study.nsf_networks import Networks
+from ..rom.study.study_file import checked, plain
+from ..rom.study.tables import CURVED, MODES, NETWORK, NSF
 from ..scene import SceneError
 from ..store.words import counted
 from .catalogue import shipped_studies
@@ -79,7 +79,7 @@ def of_map(path):
     """What a file of `mpm-ref rom train` holds, and what it says of its making; None for what it
     does not say. Raises ValueError for a file that is damaged or no map.
     """
-    model = maps.read(path)
+    model = reduce.read(path)
     about, map = model.about, model.decoder
     runs, levels, r = model.xhat.shape
     names, loss, fit = about.get("parameters", ()), about.get("loss"), about.get("fit", {})

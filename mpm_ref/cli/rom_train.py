@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from ..reduced import dataset, maps
-from ..reduced.generate import (
+from ..rom.study import dataset, reduce
+from ..rom.study.generate import (
     INTERRUPTED,
     NOT_WRITTEN,
     SKIPPED,
@@ -18,9 +18,9 @@ from ..reduced.generate import (
     one_thread,
     said,
 )
-from ..reduced.model import kind_of, known_of, with_kind
-from ..reduced.nsf.hints import hints
-from ..reduced.tables import KEYS, NETWORK, NSF
+from ..rom.study.model import kind_of, known_of, with_kind
+from ..rom.study.nsf_hints import hints
+from ..rom.study.tables import KEYS, NETWORK, NSF
 from ..store.atomic import NotWritten, require_place
 from ..store.words import counted
 from ..training import DEVICES, Machine
@@ -144,7 +144,7 @@ def train(
             with writing(), on_interrupt(lambda: resuming(checkpoint)):
                 model = fitted(study, snapshots, about, checkpoint, machine)
             write(out, model)
-        maps.forget(checkpoint)
+        reduce.forget(checkpoint)
         print(f"{out}: {kind_of(model)}, r = {model.decoder.r}, of "
               f"{counted(len(study.train), 'run')} and {len(snapshots.X)} points")
 
@@ -154,7 +154,7 @@ def require_device(kind, device):
     none, or no PyTorch.
     """
     if kind == NETWORK:
-        maps.training("rom.learn.device").device_of(device)
+        reduce.training("rom.train.device").device_of(device)
     elif device != DEVICES[0]:
         raise ValueError(f"--threads {device}: {kind} are made on the processor; leave it out")
 
@@ -175,12 +175,12 @@ def fitted(study, snapshots, about, checkpoint, machine):
     """`Model` of a study's kind, with a bar of epochs."""
     if study.tables.map.kind != NETWORK:
         with one_thread():
-            return maps.computed(study, snapshots, about)
+            return reduce.computed(study, snapshots, about)
     with passing(total=study.tables.map.total, unit="epoch", desc=study.path.stem) as bar:
         def show(history):
             bar.update(len(history) - bar.n)
             bar.set_postfix_str(f"loss {history[-1][0]:.2e}")
-        return maps.learned(study, snapshots, about, checkpoint, show, machine)
+        return reduce.learned(study, snapshots, about, checkpoint, show, machine)
 
 
 def make_folder(folder):
@@ -203,4 +203,4 @@ def require_map_place(out, study, overwrite):
 def write(out, model):
     """Write a map. Raises NotWritten."""
     with writing():
-        maps.save(out, model)
+        reduce.save(out, model)

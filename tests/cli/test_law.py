@@ -8,7 +8,6 @@ from small_laws import FLOWING, STEPS, E, write_study
 
 torch = pytest.importorskip("torch")
 
-from mpm_ref.cases import observed  # noqa: E402
 from mpm_ref.cli import law_train  # noqa: E402
 from mpm_ref.materials.learned import weights  # noqa: E402
 from mpm_ref.materials.learned.strain_range import seen  # noqa: E402
@@ -21,6 +20,7 @@ from mpm_ref.nclaw.train.rollout import trajectory_of  # noqa: E402
 from mpm_ref.scene import digest  # noqa: E402
 from mpm_ref.store.running import Options, checkpoint_of, run  # noqa: E402
 from mpm_ref.store.writer import Fields  # noqa: E402
+from mpm_ref.trajectories import observed  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 

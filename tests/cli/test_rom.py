@@ -8,9 +8,9 @@ from command_line import assert_told, mpm_ref
 from small_studies import CURVED, STEPS, ended, write
 
 from mpm_ref.cli.catalogue import shipped_studies
-from mpm_ref.reduced import maps
-from mpm_ref.reduced.generate import FIELDS, FINISHED, Done
-from mpm_ref.reduced.study import load
+from mpm_ref.rom.study import reduce
+from mpm_ref.rom.study.generate import FIELDS, FINISHED, Done
+from mpm_ref.rom.study.study import load
 from mpm_ref.scene import build
 from mpm_ref.store.running import Options, run
 from mpm_ref.store.writer import Fields
@@ -198,7 +198,7 @@ def test_a_curved_map_is_made_at_once(made, tmp_path):
     done = mpm_ref("rom", "train", study, "--data", made / "data", "--out", out)
     assert done.exit_code == 0, done.output
     assert "curved, r = 2, of 3 runs" in done.stdout
-    assert maps.load(out, load(study)).about["command"].endswith("--kind curved --threads 1")
+    assert reduce.load(out, load(study)).about["command"].endswith("--kind curved --threads 1")
 
 
 def test_a_study_without_the_settings_of_a_curved_map_makes_none(made, tmp_path):
@@ -221,6 +221,6 @@ def test_a_network_is_trained_with_torch(made, tmp_path):
     assert done.exit_code == 0, done.output
     assert "network, r = 2" in done.stdout
     assert not out.with_suffix(".pt").exists()
-    about = maps.load(out, load(study)).about
+    about = reduce.load(out, load(study)).about
     assert (about["map"]["epochs"], about["threads"], len(about["loss"])) == (2, 1, 2)
     assert about["command"].startswith(f"mpm-ref rom train {study}")

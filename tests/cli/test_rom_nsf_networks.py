@@ -8,16 +8,16 @@ import pytest
 from command_line import assert_told, mpm_ref
 from small_nsf_studies import modelled, write
 
-from mpm_ref.reduced import maps
-from mpm_ref.reduced.nsf.dataset import histories
-from mpm_ref.reduced.nsf.networks import Networks
-from mpm_ref.reduced.study import load
 from mpm_ref.rom.fields.network import learned
+from mpm_ref.rom.study import reduce
+from mpm_ref.rom.study.nsf_dataset import histories
+from mpm_ref.rom.study.nsf_networks import Networks
+from mpm_ref.rom.study.study import load
 from mpm_ref.store.results import Results
 
 torch = pytest.importorskip("torch")
-stages = pytest.importorskip("mpm_ref.rom.learn.stages")
-drive_fields = pytest.importorskip("mpm_ref.rom.learn.drive_fields")
+stages = pytest.importorskip("mpm_ref.rom.train.stages")
+drive_fields = pytest.importorskip("mpm_ref.rom.train.settings_fields")
 
 NETWORK = ('kind = "modes"\nr = 3\nmodes = 5\ntau = 8\nC = 8\nsmoothing = 1e-6',
            'kind = "network"\nr = 3\nbeta = [3, 2, 2]\nlatent = "free"\nepochs = 40\n'
@@ -46,7 +46,7 @@ def test_networks_are_those_of_the_three_stages(made, study):
     data = histories(study, made / "data", study.train)
     plan = drive_fields.plan(study.tables.map.settings, 2)
     own = stages.train(plan, data)
-    model = maps.load(made / "nets.npz", study)
+    model = reduce.load(made / "nets.npz", study)
     assert isinstance(model.decoder, Networks)
     for ours, theirs in zip(model.decoder, (own.g.decoder, own.h.field, own.l.field), strict=True):
         assert np.array_equal(ours.net.W, theirs.net.W)
@@ -82,7 +82,7 @@ def test_a_run_is_one_on_the_networks(made, study, tmp_path):
     done = mpm_ref("rom", "run", made / "pairs.toml", "--map", made / "nets.npz", "--out", out,
                    "--set", "v=1.9", "--json")
     assert done.exit_code in (0, 3), done.output
-    model = maps.load(made / "nets.npz", study)
+    model = reduce.load(made / "nets.npz", study)
     with Results(out) as results:
         X = np.concatenate([results.field(body, "x", 0) for body in ("hard", "soft")])
         xhat, mu = results.h5["reduced/xhat"][0], [1.9]
@@ -130,5 +130,5 @@ def test_a_training_that_was_cut_off_goes_on_from_its_stages(made, study, tmp_pa
     assert again.exit_code == 0, again.output
     assert seen[50] == ("h", 1)
     assert not (tmp_path / "nets.pt").exists()
-    ours, theirs = (maps.load(folder / "nets.npz", study) for folder in (tmp_path, made))
+    ours, theirs = (reduce.load(folder / "nets.npz", study) for folder in (tmp_path, made))
     assert np.array_equal(ours.decoder.l.net.W, theirs.decoder.l.net.W)

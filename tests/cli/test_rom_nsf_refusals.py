@@ -7,7 +7,7 @@ from command_line import assert_told, mpm_ref
 from small_nsf_studies import SCENE, modelled, write
 
 from mpm_ref.cli.catalogue import shipped_scenes, shipped_studies
-from mpm_ref.reduced.study import load
+from mpm_ref.rom.study.study import load
 from validation.nsf.studies import jelly
 
 

@@ -13,7 +13,6 @@ from tests.nclaw.test_invariants import REPEATED, built
 
 torch = pytest.importorskip("torch")
 
-from mpm_ref.cases import observed  # noqa: E402
 from mpm_ref.core.law import kirchhoff, returned  # noqa: E402
 from mpm_ref.materials.learned import learned_flow, learned_law  # noqa: E402
 from mpm_ref.materials.learned.contraction import Contraction  # noqa: E402
@@ -25,6 +24,7 @@ from mpm_ref.nclaw.train.fit import train  # noqa: E402
 from mpm_ref.nclaw.train.methods import laws_of, trained_of  # noqa: E402
 from mpm_ref.nclaw.train.recipe import Recipe  # noqa: E402
 from mpm_ref.nclaw.train.rollout import squared, trajectory_of  # noqa: E402
+from mpm_ref.trajectories import observed  # noqa: E402
 from validation.nclaw.trained_laws import nets  # noqa: E402
 from validation.training.nclaw import begun  # noqa: E402
 

@@ -9,7 +9,6 @@ from command_line import assert_told, mpm_ref
 from nclaw_toys import cube
 
 from mpm_ref.body import Body, particles_at, permute
-from mpm_ref.cases import observed
 from mpm_ref.materials import FixedCorotated, Fluid, NoFlow
 from mpm_ref.materials.learned import weights
 from mpm_ref.materials.learned.strain_range import measures, seen
@@ -23,6 +22,7 @@ from mpm_ref.problem import Clock, Problem
 from mpm_ref.scene import SceneError, build, load
 from mpm_ref.simulate import State
 from mpm_ref.store.results import Results
+from mpm_ref.trajectories import observed
 
 BOUNDS = {"low": [0.9, 0.8, 0.7], "high": [1.4, 1.0, 1.2], "dt": None}     # 2D: s_0, s_1, J
 SCENE = """

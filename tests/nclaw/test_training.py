@@ -10,7 +10,6 @@ from nclaw_toys import cube
 torch = pytest.importorskip("torch")
 
 from mpm_ref import training  # noqa: E402
-from mpm_ref.cases import observed  # noqa: E402
 from mpm_ref.materials.learned.response import Correction, PlainStress, Stress  # noqa: E402
 from mpm_ref.nclaw.batched_step import world  # noqa: E402
 from mpm_ref.nclaw.train import fit  # noqa: E402
@@ -20,6 +19,7 @@ from mpm_ref.nclaw.train.neural_laws import NeuralLaw, neural_laws  # noqa: E402
 from mpm_ref.nclaw.train.recipe import Recipe  # noqa: E402
 from mpm_ref.nclaw.train.rollout import Laws, Trajectory, trajectory_of  # noqa: E402
 from mpm_ref.nclaw.train.unchanged import Unchanged  # noqa: E402
+from mpm_ref.trajectories import observed  # noqa: E402
 
 STEPS = 11          # segments of 3 and 2 steps
 SHORT = Recipe(epochs=5, first=3, last=6, batch=2, elastic_rate=1e-2, plastic_rate=1e-3)

@@ -10,7 +10,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 # Ground floor first. What stands on one line does not know each other, except within a room: names
 # in one string may import each other, without cycles. A package in PACKAGES is such a room.
-PACKAGES = {"plain", "materials", "materials.learned", "hot", "rom", "reduced", "nclaw",
+PACKAGES = {"plain", "materials", "materials.learned", "hot", "rom", "rom.study", "nclaw",
             "nclaw.study", "shapes", "sampling", "scene", "oracle", "cli"}
 FLOORS = (
     ("core.jit", "core.blas"),
@@ -37,8 +37,8 @@ FLOORS = (
     ("simulate", "sampling", "preflight"),
     ("scene",),
     ("store store.*",),     # but for its modules on lower floors
-    ("oracle", "sweep", "plotting", "cases"),
-    ("reduced",),
+    ("oracle", "sweep", "plotting", "trajectories"),
+    ("rom.study",),
     ("nclaw.study",),
     ("cli",),
     ("__main__",),

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from mpm_ref.core.grid import OutOfRange
-from mpm_ref.reduced import record
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.evaluate import NEAREST, REDUCED, Held, breakdowns, course
-from mpm_ref.reduced.march import Way
-from mpm_ref.reduced.watch import watch, watched
 from mpm_ref.rom.kinematics import NoBody, guesses
+from mpm_ref.rom.study import record
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.evaluate import NEAREST, REDUCED, Held, breakdowns, course
+from mpm_ref.rom.study.run import Way
+from mpm_ref.rom.study.watch import watch, watched
 from validation.extremes import ldm_runs
 from validation.ldm import reduced_runs
 from validation.ldm.studies import GRAVITY

@@ -8,16 +8,16 @@ from rom_toys import cloud
 
 from mpm_ref.materials.fixed_corotated import FixedCorotated
 from mpm_ref.problem import Clock
-from mpm_ref.reduced import march as marching
-from mpm_ref.reduced.case import case, distance
-from mpm_ref.reduced.march import Way, groups, march, model, picked, stepped
-from mpm_ref.reduced.model import require_way
-from mpm_ref.reduced.tables import Run
 from mpm_ref.rom.fields.affine import Affine
 from mpm_ref.rom.latent import at_start
 from mpm_ref.rom.quadrature.lagrangian import Resampled, lagrangian
 from mpm_ref.rom.sampling import PER_GROUP, pivoted
 from mpm_ref.rom.step import Reduced
+from mpm_ref.rom.study import run as marching
+from mpm_ref.rom.study.case import case, distance
+from mpm_ref.rom.study.model import require_way
+from mpm_ref.rom.study.run import Way, groups, march, model, picked, stepped
+from mpm_ref.rom.study.tables import Run
 from mpm_ref.rom.weights import Model
 from mpm_ref.scene import Box, Cylinder, Difference, Union
 from validation.ldm.networks import trained

@@ -57,7 +57,7 @@ def test_one_pass_equals_batches(d):
 
 def test_torch_reads_the_same_features(d):
     torch = pytest.importorskip("torch")
-    from mpm_ref.rom.learn.perceptron import imported
+    from mpm_ref.rom.train.perceptron import imported
     one, X, xhat = field(d, 6, octaves=OCTAVES), rom_toys.cloud(d, 30), latents()
     Z = torch.from_numpy((X - one.units.low) / one.units.span)
     y = imported(one)(Z, torch.from_numpy(xhat).repeat(len(X), 1)).detach().numpy()

@@ -8,8 +8,8 @@ from mpm_ref.rom.fields.pod import basis, directions
 from mpm_ref.rom.snapshots import Snapshots
 
 torch = pytest.importorskip("torch")
-fit = pytest.importorskip("mpm_ref.rom.learn.fit")
-field = pytest.importorskip("mpm_ref.rom.learn.field")
+fit = pytest.importorskip("mpm_ref.rom.train.decoder")
+field = pytest.importorskip("mpm_ref.rom.train.field")
 
 N, RUNS, LEVELS, R = 12, 3, 10, 2
 

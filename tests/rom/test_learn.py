@@ -7,12 +7,12 @@ import rom_toys
 torch = pytest.importorskip("torch")
 
 from mpm_ref.rom.fields.architecture import lengths  # noqa: E402
-from mpm_ref.rom.learn import fit, loss, schedule  # noqa: E402
-from mpm_ref.rom.learn.data import batch_of, data_of  # noqa: E402
-from mpm_ref.rom.learn.fit import Session, Training, train  # noqa: E402
-from mpm_ref.rom.learn.loss import CODE, PRINTED, Weights, terms  # noqa: E402
-from mpm_ref.rom.learn.perceptron import Perceptron, imported  # noqa: E402
 from mpm_ref.rom.snapshots import Snapshots, displacement_error  # noqa: E402
+from mpm_ref.rom.train import decoder, loss, schedule  # noqa: E402
+from mpm_ref.rom.train.data import batch_of, data_of  # noqa: E402
+from mpm_ref.rom.train.decoder import Session, Training, train  # noqa: E402
+from mpm_ref.rom.train.loss import CODE, PRINTED, Weights, terms  # noqa: E402
+from mpm_ref.rom.train.perceptron import Perceptron, imported  # noqa: E402
 
 LEVELS = np.arange(5)
 ALL = Weights(1.0, 1.0)
@@ -248,7 +248,7 @@ def test_settings_that_mean_nothing_are_refused(settings, said):
 
 @pytest.mark.parametrize("save", [1, 3])
 def test_a_training_that_was_cut_off_goes_on_bit_for_bit(tmp_path, monkeypatch, kind, save):
-    monkeypatch.setattr(fit, "SAVE", save)
+    monkeypatch.setattr(decoder, "SAVE", save)
     whole, epochs = train(training(**kind), stretching()), []
 
     def cut(history):
@@ -266,7 +266,7 @@ def test_a_training_that_was_cut_off_goes_on_bit_for_bit(tmp_path, monkeypatch, 
 
 @pytest.fixture
 def checkpoint(tmp_path, monkeypatch):
-    monkeypatch.setattr(fit, "SAVE", 1)
+    monkeypatch.setattr(decoder, "SAVE", 1)
     train(training(epochs=1), stretching(), tmp_path / "a.pt")
     return tmp_path / "a.pt"
 

@@ -8,9 +8,9 @@ import rom_toys
 torch = pytest.importorskip("torch")
 
 from mpm_ref import training  # noqa: E402
-from mpm_ref.reduced.maps import of_trained  # noqa: E402
-from mpm_ref.rom.learn import fit  # noqa: E402
-from mpm_ref.rom.learn.fit import Training, train  # noqa: E402
+from mpm_ref.rom.study.reduce import of_trained  # noqa: E402
+from mpm_ref.rom.train import decoder  # noqa: E402
+from mpm_ref.rom.train.decoder import Training, train  # noqa: E402
 
 
 @pytest.fixture
@@ -19,7 +19,7 @@ def clock(monkeypatch):
     now = SimpleNamespace(t=0.0)
     monkeypatch.setattr(training, "process_time", lambda: 10.0 + 2.0 * now.t)
     monkeypatch.setattr(training, "perf_counter", lambda: 30.0 + 3.0 * now.t)
-    monkeypatch.setattr(fit, "SAVE", 1)
+    monkeypatch.setattr(decoder, "SAVE", 1)
     return now
 
 

@@ -13,11 +13,11 @@ from small_studies import generated
 
 torch = pytest.importorskip("torch")
 
-from mpm_ref.rom.learn import field, fit  # noqa: E402
-from mpm_ref.rom.learn.device import device_of  # noqa: E402
-from mpm_ref.rom.learn.field import FieldTraining, Observed  # noqa: E402
-from mpm_ref.rom.learn.fit import Training  # noqa: E402
-from mpm_ref.rom.learn.stages import POSITION, positions  # noqa: E402
+from mpm_ref.rom.train import decoder, field  # noqa: E402
+from mpm_ref.rom.train.decoder import Training  # noqa: E402
+from mpm_ref.rom.train.device import device_of  # noqa: E402
+from mpm_ref.rom.train.field import FieldTraining, Observed  # noqa: E402
+from mpm_ref.rom.train.stages import POSITION, positions  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 DATA, META = field_toys.histories(), "meta"
@@ -28,7 +28,7 @@ POSITIONS = {"encoder": {"latent": "encoder-nsf"}, "free": {"latent": "free"},
 def of_position(device, **settings):
     """A session of NSF's first stage."""
     training = Training(1, (4, 4), weights=POSITION, points=5, **settings)
-    return fit.Session(training, positions(DATA), device)
+    return decoder.Session(training, positions(DATA), device)
 
 
 def of_stress(device):
@@ -39,7 +39,7 @@ def of_stress(device):
 
 def of_gradients(device, latent):
     """A session of LDM, whose loss has F and velocities."""
-    return fit.Session(Training(2, (4, 4), latent, points=5), rom_toys.snapshots(2), device)
+    return decoder.Session(Training(2, (4, 4), latent, points=5), rom_toys.snapshots(2), device)
 
 
 MADE = {**{name: (of_position, how) for name, how in POSITIONS.items()}, "stress": (of_stress, {}),

@@ -11,12 +11,12 @@ torch = pytest.importorskip("torch")
 
 from mpm_ref.rom import fields_file  # noqa: E402
 from mpm_ref.rom.fields.architecture import row_per_axis  # noqa: E402
-from mpm_ref.rom.learn import field, fit, schedule, session, stages  # noqa: E402
-from mpm_ref.rom.learn.encoder import Encoder  # noqa: E402
-from mpm_ref.rom.learn.field import FieldTraining, Observed  # noqa: E402
-from mpm_ref.rom.learn.fit import Training  # noqa: E402
-from mpm_ref.rom.learn.stages import POSITION, Plan, positions, printed  # noqa: E402
 from mpm_ref.rom.snapshots import position_error  # noqa: E402
+from mpm_ref.rom.train import decoder, field, schedule, session, stages  # noqa: E402
+from mpm_ref.rom.train.decoder import Training  # noqa: E402
+from mpm_ref.rom.train.encoder import Encoder  # noqa: E402
+from mpm_ref.rom.train.field import FieldTraining, Observed  # noqa: E402
+from mpm_ref.rom.train.stages import POSITION, Plan, positions, printed  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 DATA = field_toys.histories()
@@ -148,7 +148,7 @@ def norm_of(a):
 def test_the_latents_of_later_stages_are_those_of_the_first():
     """They are no unknowns: h and l change nothing of g and of them."""
     whole, data = stages.train(plan(3), DATA), observed()
-    alone = fit.train(plan(3).g, positions(DATA))
+    alone = decoder.train(plan(3).g, positions(DATA))
     assert bits(whole.g.xhat, *whole.g.decoder.net) == bits(alone.xhat, *alone.decoder.net)
     under_way, before = field.Session(plan(3).h, data), data.xhat.copy()
     assert not under_way.states.requires_grad
@@ -199,7 +199,7 @@ def test_three_stages_are_one_file(tmp_path):
 
 def test_a_training_that_was_cut_off_goes_on_bit_for_bit(tmp_path, monkeypatch):
     """In the second stage; the first is read from its checkpoint, and not made again."""
-    monkeypatch.setattr(fit, "SAVE", 2)
+    monkeypatch.setattr(decoder, "SAVE", 2)
     monkeypatch.setattr(field, "SAVE", 2)
     whole, seen = stages.train(plan(6, points=7), DATA), []
 
@@ -237,7 +237,7 @@ def test_a_checkpoint_of_another_training_is_refused(tmp_path, monkeypatch):
 @pytest.mark.parametrize("of", ["g", "h"])
 def test_a_loss_that_is_not_finite_ends_the_training(of):
     """The one before is kept: no weight of it is spoilt."""
-    under_way = (fit.Session(plan().g, positions(DATA)) if of == "g"
+    under_way = (decoder.Session(plan().g, positions(DATA)) if of == "g"
                  else field.Session(plan().h, observed()))
     with torch.no_grad():
         under_way.f.layers[0].weight[0, 0] = np.inf
@@ -261,12 +261,12 @@ def test_settings_that_mean_nothing_are_refused(settings, said):
 @pytest.mark.parametrize("settings", [{}, {"weights": POSITION, "latent": "modes"}])
 def test_positions_alone_train_no_error_of_gradients(settings):
     with pytest.raises(ValueError, match="snapshots of positions alone, for latent"):
-        fit.train(Training(2, (4,), epochs=1, **settings), positions(DATA))
+        decoder.train(Training(2, (4,), epochs=1, **settings), positions(DATA))
 
 
 def test_positions_alone_give_the_decoder_that_all_gives():
     """What the loss does not ask for does not matter."""
     whole = rom_toys.snapshots(2)
-    one, other = (fit.train(Training(2, (6,), "encoder-nsf", POSITION, 3), data)
+    one, other = (decoder.train(Training(2, (6,), "encoder-nsf", POSITION, 3), data)
                   for data in (whole, whole._replace(F=None, v=None)))
     assert one.decoder.net.W == pytest.approx(other.decoder.net.W, rel=1e-4, abs=1e-6)

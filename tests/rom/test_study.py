@@ -6,10 +6,10 @@ import pytest
 from small_studies import STEPS, study, write
 
 from mpm_ref.cli.catalogue import shipped_scenes, shipped_studies
-from mpm_ref.reduced.maps import larger
-from mpm_ref.reduced.march import Way
-from mpm_ref.reduced.study import load
-from mpm_ref.reduced.tables import KEYS, Map, Run
+from mpm_ref.rom.study.reduce import larger
+from mpm_ref.rom.study.run import Way
+from mpm_ref.rom.study.study import load
+from mpm_ref.rom.study.tables import KEYS, Map, Run
 from mpm_ref.scene import SceneError, canonical
 from mpm_ref.scene.overrides import flat, varied
 from validation.ldm.studies import STUDIES

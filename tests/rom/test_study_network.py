@@ -6,22 +6,15 @@ import numpy as np
 import pytest
 from small_studies import generated, study
 
-from mpm_ref.reduced import dataset, maps
-from mpm_ref.reduced.tables import KEYS, LATENTS, NETWORK, WEIGHTS, Map
+from mpm_ref.rom.study import dataset, reduce
+from mpm_ref.rom.study.tables import KEYS, LATENTS, NETWORK, WEIGHTS, Map
 from mpm_ref.training import Machine
 
 torch = pytest.importorskip("torch")
 
-from mpm_ref.rom.learn import drive, fit  # noqa: E402
-from mpm_ref.rom.learn.fit import Training, train  # noqa: E402
-from mpm_ref.rom.learn.loss import (  # noqa: E402
-    CODE,
-    PRINTED,
-    READINGS,
-    TOWER,
-    Weights,
-    scaled,
-)
+from mpm_ref.rom.train import decoder, settings  # noqa: E402
+from mpm_ref.rom.train.decoder import Training, train  # noqa: E402
+from mpm_ref.rom.train.loss import CODE, PRINTED, READINGS, TOWER, Weights, scaled  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -42,12 +35,12 @@ def test_a_network_is_trained_as_the_study_says():
 
 
 def test_latents_and_weights_are_those_of_a_training():
-    assert {*LATENTS, "encoder-nsf", "directions"} == set(fit.LATENTS)
+    assert {*LATENTS, "encoder-nsf", "directions"} == set(decoder.LATENTS)
     for name in WEIGHTS:
-        assert isinstance(drive.weights(name, 1.0, 1.0), Weights)
-    assert drive.weights("code", 100.0, 6.0) == CODE
-    assert drive.weights("scaled", 1.0, 1.0) == CODE
-    tower = drive.weights("scaled", 42.0 / 0.4, 144.0 / 24.0)
+        assert isinstance(settings.weights(name, 1.0, 1.0), Weights)
+    assert settings.weights("code", 100.0, 6.0) == CODE
+    assert settings.weights("scaled", 1.0, 1.0) == CODE
+    tower = settings.weights("scaled", 42.0 / 0.4, 144.0 / 24.0)
     assert tower == TOWER != CODE
 
 
@@ -56,14 +49,14 @@ def test_a_network_is_trained_as_its_settings_say_and_comes_back(made, tmp_path)
     network = '"network"\nepochs = 3\nhidden = [8, 8]\nweights = "printed"\npoints = 20'
     bars = study(tmp_path, ('"modes"', network))
     data, seen = dataset.load(bars, folder, bars.train), []
-    done = maps.learned(bars, data, {}, tmp_path / "map.pt", lambda h: seen.append(len(h)),
+    done = reduce.learned(bars, data, {}, tmp_path / "map.pt", lambda h: seen.append(len(h)),
                         Machine())
     assert seen == [1, 2, 3]
     plain = train(Training(3, (8, 8), weights=PRINTED, epochs=3, points=20), data)
     np.testing.assert_array_equal(done.decoder.net.W, plain.decoder.net.W)
     assert np.array_equal(done.about["loss"], plain.history)
-    maps.save(tmp_path / "map.npz", done)
-    back = maps.load(tmp_path / "map.npz", bars)
+    reduce.save(tmp_path / "map.npz", done)
+    back = reduce.load(tmp_path / "map.npz", bars)
     np.testing.assert_array_equal(back.decoder.net.W, done.decoder.net.W)
     assert back.about["map"]["weights"] == "printed"
 
@@ -74,7 +67,7 @@ def test_a_network_is_trained_with_weights_that_fit_its_body(made, tmp_path):
     network = '"network"\nepochs = 3\nhidden = [8]\nweights = "scaled"\nlatent = "modes"'
     bars = study(tmp_path, ('"modes"', network))
     data = dataset.load(bars, folder, bars.train)
-    done = maps.learned(bars, data, {}, None, None, Machine())
+    done = reduce.learned(bars, data, {}, None, None, Machine())
     fitting = scaled(CODE, 0.8 / 0.4, 0.01 * 144.0)
     plain, unscaled = (train(Training(3, (8,), latent="modes", weights=w, epochs=3), data)
                        for w in (fitting, CODE))

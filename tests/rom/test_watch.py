@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 import rom_toys
 
-from mpm_ref.reduced import watch as watching
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.march import Way, march
-from mpm_ref.reduced.watch import MEMORY, Nonsense, Sight, Watch, seen, watch, watched
 from mpm_ref.rom.extrapolation import extent
 from mpm_ref.rom.fields.pod import basis
 from mpm_ref.rom.latent import at_start
 from mpm_ref.rom.step import Report
+from mpm_ref.rom.study import watch as watching
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.run import Way, march
+from mpm_ref.rom.study.watch import MEMORY, Nonsense, Sight, Watch, seen, watch, watched
 from validation.ldm.studies import GRAVITY
 from validation.verification.scenes import with_
 

@@ -7,7 +7,7 @@ from hidden_torch import hide
 
 from mpm_ref import rom
 from mpm_ref.nclaw.study import training
-from mpm_ref.reduced import maps
+from mpm_ref.rom.study import reduce
 from mpm_ref.training import part
 
 
@@ -15,7 +15,7 @@ from mpm_ref.training import part
     (training.drive, 'laws are trained with PyTorch, which is not installed: pip install '
                      '"mpm_ref[learn]", or `make learn` in the repository; laws that were trained '
                      'run, export and plot without it'),
-    (maps.training, 'a network is trained with PyTorch, which is not installed: pip install '
+    (reduce.training, 'a network is trained with PyTorch, which is not installed: pip install '
                     '"mpm_ref[learn]", or `make learn` in the repository; or make modes, which '
                     'need none: --kind modes'),
 ])
@@ -33,16 +33,16 @@ def test_another_module_that_is_missing_is_named():
 def test_with_pytorch_the_part_is_there():
     pytest.importorskip("torch")
     assert training.drive().__name__ == "mpm_ref.nclaw.train.train"
-    assert maps.training().__name__ == "mpm_ref.rom.learn.drive"
+    assert reduce.training().__name__ == "mpm_ref.rom.train.settings"
 
 
 def test_what_is_taken_away_for_a_test_comes_back():
     pytest.importorskip("torch")
-    fit = importlib.import_module("mpm_ref.rom.learn.fit")
+    fit = importlib.import_module("mpm_ref.rom.train.decoder")
     with pytest.MonkeyPatch.context() as monkeypatch:
         hide(monkeypatch)
-        assert not hasattr(rom.learn, "fit")
+        assert not hasattr(rom.train, "decoder")
         with pytest.raises(ValueError, match="PyTorch"):
-            maps.training()
-        assert importlib.import_module("mpm_ref.rom.learn.schedule")
-    assert rom.learn.fit is fit is importlib.import_module("mpm_ref.rom.learn.fit")
+            reduce.training()
+        assert importlib.import_module("mpm_ref.rom.train.schedule")
+    assert rom.train.decoder is fit is importlib.import_module("mpm_ref.rom.train.decoder")

@@ -5,9 +5,9 @@
 import numpy as np
 
 from mpm_ref.energy import energy
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.march import Way, model
 from mpm_ref.rom.latent import points, velocities
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.run import Way, model
 
 from ..common.registry import experiment
 from ..ldm.studies import GRAVITY

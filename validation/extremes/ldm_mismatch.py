@@ -2,8 +2,8 @@
 checksum stands in the way.
 """
 
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.march import Way
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.run import Way
 
 from ..common.registry import experiment
 from ..ldm.studies import GRAVITY, POKES, TORSION

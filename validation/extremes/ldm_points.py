@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.spatial import KDTree
 
-from mpm_ref.reduced.march import SCHEMES, Way
 from mpm_ref.rom.fields.pod import held, measured
+from mpm_ref.rom.study.run import SCHEMES, Way
 
 from ..common.registry import experiment
 from ..ldm.studies import GRAVITY, TORSION

@@ -4,8 +4,8 @@ from functools import cache
 
 import numpy as np
 
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.march import SCHEMES, Way
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.run import SCHEMES, Way
 
 from ..common.registry import experiment
 from ..ldm.studies import GRAVITY, STUDIES, TORSION

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from mpm_ref.reduced.march import SCHEMES, Way
 from mpm_ref.rom.fields.network import Decoder
 from mpm_ref.rom.fields.perceptron import layers_of, network
 from mpm_ref.rom.fields.pod import Modes
+from mpm_ref.rom.study.run import SCHEMES, Way
 
 from ..common.registry import experiment
 from ..ldm.studies import GRAVITY

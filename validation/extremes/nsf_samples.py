@@ -5,9 +5,9 @@ coordinate and below, and on samples in one corner.
 import numpy as np
 from scipy.spatial import KDTree
 
-from mpm_ref.reduced.inferring import Chosen
-from mpm_ref.reduced.nsf.watch import SPARSE
 from mpm_ref.rom.cubature import misfit
+from mpm_ref.rom.study.nsf_run import Chosen
+from mpm_ref.rom.study.nsf_watch import SPARSE
 
 from ..common.registry import experiment
 from ..nsf.reduced_runs import tested

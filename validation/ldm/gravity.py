@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from mpm_ref.reduced.march import PROJECTIONS, SCHEMES, Way
 from mpm_ref.rom.latent import VELOCITIES
+from mpm_ref.rom.study.run import PROJECTIONS, SCHEMES, Way
 
 from ..common.registry import experiment
 from .networks import BOTH, REPEATED, TERMS

@@ -4,13 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.cases import in_order
 from mpm_ref.core.blas import one_thread
-from mpm_ref.reduced.case import Case, case
-from mpm_ref.reduced.errors import Errors, Squares
-from mpm_ref.reduced.march import Way, march
+from mpm_ref.rom.study.case import Case, case
+from mpm_ref.rom.study.errors import Errors, Squares
+from mpm_ref.rom.study.run import Way, march
 from mpm_ref.scene import build
 from mpm_ref.simulate import simulate
+from mpm_ref.trajectories import in_order
 
 from ..verification.scenes import threads_for
 from .networks import trained

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.reduced.case import prescribed
-from mpm_ref.reduced.errors import Squares
-from mpm_ref.reduced.march import march, model, picked, stepped
 from mpm_ref.rom.latent import initial
+from mpm_ref.rom.study.case import prescribed
+from mpm_ref.rom.study.errors import Squares
+from mpm_ref.rom.study.run import march, model, picked, stepped
 
 from ..common.registry import experiment
 from .networks import trained

@@ -4,10 +4,10 @@ from math import inf
 
 import threadpoolctl
 
-from mpm_ref.reduced.errors import Errors, Squares
-from mpm_ref.reduced.march import march
 from mpm_ref.rom.projection import project_position
 from mpm_ref.rom.step import BREAKDOWNS
+from mpm_ref.rom.study.errors import Errors, Squares
+from mpm_ref.rom.study.run import march
 
 from ..verification.scenes import threads_for
 

@@ -7,9 +7,9 @@ from math import asin, atan2
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mpm_ref.reduced.case import case, prescribed
-from mpm_ref.reduced.march import picked
 from mpm_ref.rom.sampling import PER_GROUP
+from mpm_ref.rom.study.case import case, prescribed
+from mpm_ref.rom.study.run import picked
 
 from ..common.registry import experiment
 from .networks import trained

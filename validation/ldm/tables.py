@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from mpm_ref.cases import history
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.errors import Errors
-from mpm_ref.reduced.march import SCHEMES, Way
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.errors import Errors
+from mpm_ref.rom.study.run import SCHEMES, Way
 from mpm_ref.scene import build
+from mpm_ref.trajectories import history
 
 from ..common.registry import experiment
 from ..verification.scenes import threads_for

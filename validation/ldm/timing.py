@@ -7,14 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.cases import in_order
 from mpm_ref.core.blas import one_thread
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.errors import Errors, Squares
-from mpm_ref.reduced.march import Way, march
 from mpm_ref.rom.step import BREAKDOWNS
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.errors import Errors, Squares
+from mpm_ref.rom.study.run import Way, march
 from mpm_ref.scene import Scheme, build
 from mpm_ref.simulate import State, advance
+from mpm_ref.trajectories import in_order
 
 from ..verification.scenes import with_
 

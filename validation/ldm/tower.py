@@ -3,7 +3,7 @@
 The map is trained on one in sixteen of 34 thousand points on a grid three times as coarse.
 """
 
-from mpm_ref.reduced.march import PROJECTIONS, SCHEMES, Way
+from mpm_ref.rom.study.run import PROJECTIONS, SCHEMES, Way
 from mpm_ref.scene import build
 
 from ..common.registry import experiment

@@ -9,7 +9,7 @@ vhat).
 
 import numpy as np
 
-from mpm_ref.reduced.march import PROJECTIONS, Way
+from mpm_ref.rom.study.run import PROJECTIONS, Way
 
 from ..common.registry import experiment
 from .networks import trained

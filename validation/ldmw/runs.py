@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 import threadpoolctl
 
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.march import Way, model, start, stepped
 from mpm_ref.rom.fields.pod import modes
 from mpm_ref.rom.quadrature.lagrangian import neighbours
 from mpm_ref.rom.quadrature.node_centric import node_centric, nodes_of
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.run import Way, model, start, stepped
 
 from ..ldm.networks import trained
 from ..verification.scenes import threads_for

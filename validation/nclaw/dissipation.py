@@ -8,13 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.cases import in_order
 from mpm_ref.energy import kinetic
 from mpm_ref.materials.learned import learned_flow, learned_law
 from mpm_ref.nclaw.bodies import fresh, gradients
 from mpm_ref.nclaw.dissipation import balance, loops, work
 from mpm_ref.nclaw.study.compare import Broken, positions
 from mpm_ref.scene import build
+from mpm_ref.trajectories import in_order
 
 from ..common.registry import experiment
 from ..common.weights_needed import there

@@ -5,7 +5,7 @@ place of the paper's networks.
 
 import numpy as np
 
-from mpm_ref.reduced.errors import Errors
+from mpm_ref.rom.study.errors import Errors
 
 from ..common.registry import experiment
 from .reduced_runs import FASTER, refitted, tested

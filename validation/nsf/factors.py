@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm_ref.core.blas import one_thread
-from mpm_ref.reduced.inferring import Plan, infer
-from mpm_ref.reduced.whole import whole
+from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.nsf_run import Plan, infer
 from mpm_ref.simulate import simulate
 
 from ..common.registry import experiment

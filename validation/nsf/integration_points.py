@@ -4,8 +4,8 @@ from itertools import product
 
 import numpy as np
 
-from mpm_ref.reduced.whole import history, whole
 from mpm_ref.rom.quadrature.stencil_overlap import bases, reach
+from mpm_ref.rom.study.nsf_case import history, whole
 
 from ..common.registry import experiment
 from ..ldm.published_bodies import keep

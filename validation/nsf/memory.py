@@ -7,15 +7,15 @@ from functools import partial
 
 import numpy as np
 
-from mpm_ref.reduced.inferring import drawn
-from mpm_ref.reduced.nsf.evaluate import closest, course, level_of, share
-from mpm_ref.reduced.nsf.fields import BLOCK
-from mpm_ref.reduced.whole import history, whole
 from mpm_ref.rom.fields.joint_latent import Joint, Stacked, joint
 from mpm_ref.rom.fields.pod_fields import Sizes, spanned
 from mpm_ref.rom.inferred import Inferred, Position
 from mpm_ref.rom.projection import project_position
 from mpm_ref.rom.snapshots import joined
+from mpm_ref.rom.study.nsf_case import history, whole
+from mpm_ref.rom.study.nsf_evaluate import closest, course, level_of, share
+from mpm_ref.rom.study.nsf_fields import BLOCK
+from mpm_ref.rom.study.nsf_run import drawn
 from mpm_ref.rom.symmetric import tensor
 
 from ..common.registry import experiment

@@ -12,11 +12,11 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from mpm_ref.reduced.nsf.fields import BLOCK
-from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.fields.architecture import DEPTH
 from mpm_ref.rom.fields.network import learned
 from mpm_ref.rom.fields_file import load
+from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.nsf_fields import BLOCK
 from mpm_ref.scene.toml import canonical
 
 from ..common.weights_needed import Untrained

@@ -6,9 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from mpm_ref.reduced.errors import Errors
 from mpm_ref.rom.fields import perceptron
 from mpm_ref.rom.fields.architecture import DEPTH
+from mpm_ref.rom.study.errors import Errors
 
 from ..common import targets
 from ..common.registry import experiment

@@ -4,15 +4,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.reduced.errors import Errors, Squares
-from mpm_ref.reduced.inferring import Plan, infer
-from mpm_ref.reduced.nsf.evaluate import closest, course, level_of, share
-from mpm_ref.reduced.nsf.fields import BLOCK
-from mpm_ref.reduced.whole import history, whole
 from mpm_ref.rom.fields.elastic import deformed
 from mpm_ref.rom.fields.pod_fields import spanned
 from mpm_ref.rom.inferred import INVERSIONS
 from mpm_ref.rom.snapshots import joined
+from mpm_ref.rom.study.errors import Errors, Squares
+from mpm_ref.rom.study.nsf_case import history, whole
+from mpm_ref.rom.study.nsf_evaluate import closest, course, level_of, share
+from mpm_ref.rom.study.nsf_fields import BLOCK
+from mpm_ref.rom.study.nsf_run import Plan, infer
 from mpm_ref.store.words import counted
 
 FASTER = 1.5            # longer steps at deployment

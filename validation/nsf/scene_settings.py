@@ -41,7 +41,7 @@ def settings(run):
             run.record(f"nsf.{target}", particles(scene), scale=f"scenes/nsf_{name}.toml",
                        note=note)
     for values, of in ((of_studies(), "studies of the standard profile at the printed resolution"),
-                       (of_networks(), "rom/architecture.py, rom/learn/schedule.py")):
+                       (of_networks(), "rom/architecture.py, rom/train/schedule.py")):
         for target, value in values.items():
             run.record(target, value, scale=of)
 

@@ -12,9 +12,9 @@ from time import perf_counter
 import numpy as np
 
 from mpm_ref.explicit import deform_body
-from mpm_ref.reduced.inferring import begin
-from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.inferred import Inferred
+from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.nsf_run import begin
 from mpm_ref.simulate import simulate
 
 from ..common.registry import experiment

@@ -2,10 +2,10 @@
 as they are printed.
 """
 
-from mpm_ref.reduced.inferring import Plan
-from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.fields import architecture
-from mpm_ref.rom.learn.schedule import PRINTED
+from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.nsf_run import Plan
+from mpm_ref.rom.train.schedule import PRINTED
 
 from ..common import targets
 from .reduced_runs import FASTER

@@ -5,9 +5,9 @@ full-order run of these points on the same grid, and beside what the nearest tra
 import numpy as np
 from scipy.spatial import KDTree
 
-from mpm_ref.reduced.errors import Squares
-from mpm_ref.reduced.nsf.evaluate import closest
-from mpm_ref.reduced.whole import history
+from mpm_ref.rom.study.errors import Squares
+from mpm_ref.rom.study.nsf_case import history
+from mpm_ref.rom.study.nsf_evaluate import closest
 from mpm_ref.scene import Poisson
 from mpm_ref.scene.overrides import varied
 

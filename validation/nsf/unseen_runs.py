@@ -8,11 +8,11 @@ from functools import partial
 import numpy as np
 from scipy.spatial import KDTree
 
-from mpm_ref.reduced.inferring import Plan, infer
-from mpm_ref.reduced.nsf.watch import look, trained
-from mpm_ref.reduced.watch import BEYOND
-from mpm_ref.reduced.whole import history, whole
 from mpm_ref.rom.step import BREAKDOWNS
+from mpm_ref.rom.study.nsf_case import history, whole
+from mpm_ref.rom.study.nsf_run import Plan, infer
+from mpm_ref.rom.study.nsf_watch import look, trained
+from mpm_ref.rom.study.watch import BEYOND
 
 from ..common.registry import experiment
 from ..verification.scenes import with_

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.march import Way
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.run import Way
 
 from ..common.registry import experiment
 from ..ldm.networks import trained

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.reduced.whole import history
 from mpm_ref.rom.snapshots import joined
+from mpm_ref.rom.study.nsf_case import history
 
 from ..common.registry import experiment
 from ..common.weights_needed import Untrained, there

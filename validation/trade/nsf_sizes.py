@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.reduced.whole import whole
+from mpm_ref.rom.study.nsf_case import whole
 
 from ..common.registry import experiment
 from ..extremes.nsf_runs import scenes

@@ -6,7 +6,6 @@ from pathlib import Path
 import torch
 from tqdm import tqdm
 
-from mpm_ref.cases import observed
 from mpm_ref.materials.learned import weights
 from mpm_ref.nclaw.batched_step import world
 from mpm_ref.nclaw.train.fit import Diverged, train
@@ -17,6 +16,7 @@ from mpm_ref.nclaw.train.recipe import PRINTED, Recipe
 from mpm_ref.nclaw.train.rollout import trajectory_of
 from mpm_ref.nclaw.train.train import stored
 from mpm_ref.scene import build
+from mpm_ref.trajectories import observed
 
 from ..common.provenance import commit, provenance
 from ..nclaw.dough import EVERY, GUESS, block, camera, film, identity, material, scene
@@ -28,7 +28,7 @@ LABELS = {"elastic_rate": 0.1, "plastic_rate": 0.1}
 
 
 def run_of(of=None):
-    """A `Problem` of the block, of a material, at its start, and `cases.Observed` of its run."""
+    """A `Problem` of the block, of a material, at its start, and `Observed` of its run."""
     told = with_(scene(block(), of), every=1)
     with threads_for(build(told).bodies):
         return build(told), observed(build(told))

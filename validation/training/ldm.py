@@ -10,10 +10,10 @@ import torch
 import typer
 from tqdm import tqdm
 
-from mpm_ref.reduced.maps import of_trained
-from mpm_ref.rom.learn.device import device_of
-from mpm_ref.rom.learn.fit import Training, train
-from mpm_ref.rom.learn.loss import READINGS, Weights
+from mpm_ref.rom.study.reduce import of_trained
+from mpm_ref.rom.train.decoder import Training, train
+from mpm_ref.rom.train.device import device_of
+from mpm_ref.rom.train.loss import READINGS, Weights
 from mpm_ref.rom.weights import save
 from mpm_ref.training import DEVICES, Machine
 

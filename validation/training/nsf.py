@@ -12,13 +12,13 @@ import torch
 import typer
 from tqdm import tqdm
 
-from mpm_ref.reduced.whole import history
 from mpm_ref.rom.fields_file import save
-from mpm_ref.rom.learn.device import device_of
-from mpm_ref.rom.learn.field import FieldTraining
-from mpm_ref.rom.learn.fit import Training
-from mpm_ref.rom.learn.stages import POSITION, Plan, train
 from mpm_ref.rom.snapshots import joined
+from mpm_ref.rom.study.nsf_case import history
+from mpm_ref.rom.train.decoder import Training
+from mpm_ref.rom.train.device import device_of
+from mpm_ref.rom.train.field import FieldTraining
+from mpm_ref.rom.train.stages import POSITION, Plan, train
 from mpm_ref.training import DEVICES, Cost, Machine
 
 from ..common.provenance import commit, provenance

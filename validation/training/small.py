@@ -9,7 +9,6 @@ from time import process_time
 import torch
 from tqdm import tqdm
 
-from mpm_ref.cases import observed
 from mpm_ref.materials.learned import weights
 from mpm_ref.materials.learned.response import Correction, Stress
 from mpm_ref.nclaw.batched_step import world
@@ -21,6 +20,7 @@ from mpm_ref.nclaw.train.recipe import Recipe
 from mpm_ref.nclaw.train.rollout import Laws, trajectory_of
 from mpm_ref.nclaw.train.strains import cuts_of, met
 from mpm_ref.scene import build
+from mpm_ref.trajectories import observed
 
 from ..common.provenance import commit, provenance
 from ..nclaw.bundle import Bundle
@@ -33,14 +33,14 @@ BATCH = 40          # segments side by side: all of the first epoch
 
 
 def run_of(net):
-    """`cases.Observed` of the run that a `Small` learns from, all steps."""
+    """`Observed` of the run that a `Small` learns from, all steps."""
     problem = build(with_(net.scene, every=1))
     with threads_for(problem.bodies):
         return observed(problem)
 
 
 def shown(net, true):
-    """What a training is given of a run: (`cases.Observed`, `Trajectory` or `Partial` of it)."""
+    """What a training is given of a run: (`Observed`, `Trajectory` or `Partial` of it)."""
     if net.seen.all:
         return true, trajectory_of(true)
     found, weight = observed_by(net.seen, true, net.scene.dt, net.seed)

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ...materials.learned.weights import BESIDE, PARTS
-from ...reduced.study import base_of
-from ...reduced.study_file import plain
+from ...rom.study.study import base_of
+from ...rom.study.study_file import plain
 from ...scene import Scene, SceneError, build
 from ...scene.messages import opened_by
 from ..batched_step import world

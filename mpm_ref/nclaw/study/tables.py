@@ -8,8 +8,8 @@ import msgspec
 from msgspec import Struct, field
 
 from ...materials.learned.weights import PARTS, RECORDS
-from ...reduced.study_file import require_keys
-from ...reduced.tables import one_of
+from ...rom.study.study_file import require_keys
+from ...rom.study.tables import one_of
 from ...scene import SceneError
 from ...scene.messages import at, rephrase
 from ...scene.validate import check_finite

@@ -15,7 +15,7 @@ def drive():
 
 
 def trained(study, observed, checkpoint=None, on_epoch=None, **about):
-    """`learned.weights.Laws` of a study from its run, `cases.Observed`.
+    """`learned.weights.Laws` of a study from its run, `Observed`.
 
     checkpoint and on_epoch: as for `nclaw.train.fit.train`; about: what else is to be known, with
     the `threads` of PyTorch. Raises ValueError without PyTorch and for a checkpoint of another

@@ -21,7 +21,7 @@ LARGEST = 100.0     # stretch or J, above which a segment has broken down
 def met(problem, observed, law, cuts):
     """Bounds as of `seen.seen`.
 
-    problem: a `Problem` of one body, at its start; observed: `cases.Observed` of its run, all
+    problem: a `Problem` of one body, at its start; observed: `Observed` of its run, all
     steps; law: what makes the body of learned laws (`bodies.learned`); cuts: time levels at which
     segments begin, and the last one. Of segments that break down there is what came before.
     """

@@ -44,7 +44,7 @@ def begun_flow(flow, law):
 def taught(method, recipe, laws, seen, checkpoint=None, on_epoch=None):
     """The session that trained `laws`, in place, as a method asks for.
 
-    seen: a `Problem` of one body at its start, and the `cases.Observed` of its run; checkpoint and
+    seen: a `Problem` of one body at its start, and the `Observed` of its run; checkpoint and
     on_epoch as for `fit.train`. Raises `Diverged`.
     """
     problem, observed = seen

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from small_toys import Records
 
-from mpm_ref.reduced.nsf.watch import Sight
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.kinematics import NoBody
+from mpm_ref.rom.study.nsf_watch import Sight
 from validation.common.results import Results
 from validation.common.run import Setting, run_all
 from validation.extremes import nsf_beyond as beyond
@@ -247,7 +247,7 @@ def test_a_run_without_a_start_is_recorded(bench, monkeypatch):
     def broken(*_):
         raise NoBody("no such body")
 
-    monkeypatch.setattr("mpm_ref.reduced.inferring.begin", broken)
+    monkeypatch.setattr("mpm_ref.rom.study.nsf_run.begin", broken)
     own, said = long.reduced_run(bench, STUDY.run(0.4), bench.drawn(40))
     assert (own, said) == ({}, "no such body")
     found = Records()

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mpm_ref.reduced.errors import Errors
-from mpm_ref.reduced.march import SCHEMES, Way
+from mpm_ref.rom.study.errors import Errors
+from mpm_ref.rom.study.run import SCHEMES, Way
 from mpm_ref.rom.weights import Model, load, save
 from validation.common import targets
 from validation.common.results import Results

@@ -7,9 +7,9 @@ import pytest
 
 from figures.common import state_panels
 from figures.frame import draw_all
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.errors import Errors
 from mpm_ref.rom.fields.affine import Affine
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.errors import Errors
 from validation.common import targets
 from validation.common.results import Results
 from validation.common.run import Setting, run_all

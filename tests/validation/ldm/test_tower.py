@@ -6,11 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.errors import Errors
-from mpm_ref.reduced.march import Way, march
 from mpm_ref.rom.fields.affine import Affine
 from mpm_ref.rom.kinematics import NoBody
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.errors import Errors
+from mpm_ref.rom.study.run import Way, march
 from mpm_ref.scene import build
 from validation.ldm import tower
 from validation.ldm.studies import TOWER, latin_twice, refined

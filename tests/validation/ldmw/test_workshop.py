@@ -8,8 +8,8 @@ import pytest
 
 from figures.common import state_panels
 from figures.frame import draw_all
-from mpm_ref.reduced.case import case
 from mpm_ref.rom.latent import at_start
+from mpm_ref.rom.study.case import case
 from mpm_ref.rom.weights import load, save
 from validation.common import targets
 from validation.common.record import read_records

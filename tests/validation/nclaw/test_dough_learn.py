@@ -31,7 +31,7 @@ H = 1e-3 * 0.5 ** np.arange(5)
 
 @pytest.fixture(scope="module")
 def true():
-    """`Problem` and `cases.Observed` of the block."""
+    """`Problem` and `Observed` of the block."""
     return dough.run_of()
 
 

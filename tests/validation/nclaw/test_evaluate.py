@@ -5,11 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mpm_ref.cases import in_order
 from mpm_ref.materials import Fluid, NoFlow
 from mpm_ref.materials.learned.response import Correction, Stress
 from mpm_ref.scene import build
 from mpm_ref.simulate import SORT, simulate
+from mpm_ref.trajectories import in_order
 from validation.common import targets
 from validation.common.results import Results
 from validation.common.run import Setting, run_all

@@ -6,7 +6,6 @@ from nclaw_toys import cube
 
 torch = pytest.importorskip("torch")
 
-from mpm_ref.cases import Observed, observed  # noqa: E402
 from mpm_ref.materials.learned.response import Correction, Stress  # noqa: E402
 from mpm_ref.nclaw.batched_step import world  # noqa: E402
 from mpm_ref.nclaw.train import fit  # noqa: E402
@@ -15,6 +14,7 @@ from mpm_ref.nclaw.train.neural_laws import neural_laws  # noqa: E402
 from mpm_ref.nclaw.train.observations import Partial  # noqa: E402
 from mpm_ref.nclaw.train.recipe import Recipe  # noqa: E402
 from mpm_ref.nclaw.train.rollout import Trajectory, squared, trajectory_of  # noqa: E402
+from mpm_ref.trajectories import Observed, observed  # noqa: E402
 from validation.nclaw.observation import Seen  # noqa: E402
 from validation.nclaw.small_trainings import Small, identity  # noqa: E402
 from validation.training import small  # noqa: E402

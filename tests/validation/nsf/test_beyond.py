@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from mpm_ref.reduced.inferring import infer
-from mpm_ref.reduced.nsf import watch
-from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.kinematics import NoBody
+from mpm_ref.rom.study import nsf_watch
+from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.nsf_run import infer
 from validation.nsf import reduced_runs, unseen_runs
 from validation.nsf.studies import bread
 
@@ -71,7 +71,7 @@ def test_the_farthest_state_is_that_of_the_whole_run(slice_of_bread, monkeypatch
     seen = []
 
     def look(extent, at, report):
-        seen.append(watch.look(extent, at, report))
+        seen.append(nsf_watch.look(extent, at, report))
         return seen[-1]
 
     monkeypatch.setattr(unseen_runs, "look", look)

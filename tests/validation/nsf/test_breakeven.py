@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mpm_ref.reduced.whole import whole
+from mpm_ref.rom.study.nsf_case import whole
 from validation.common.results import Results
 from validation.common.run import Setting, run_all
 from validation.nsf import breakeven

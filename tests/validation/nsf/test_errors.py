@@ -5,9 +5,9 @@ import pytest
 from small_toys import Records
 
 from mpm_ref.core.grid import OutOfRange
-from mpm_ref.reduced.inferring import of_cells
-from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.fields.elastic import Deformed
+from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.nsf_run import of_cells
 from validation.nsf import errors, reduced_runs
 from validation.nsf.studies import bread, cake, jelly, metal, sand, toothpaste
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from small_toys import Records
 
-from mpm_ref.reduced.inferring import of_cells
-from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.fields.pod_fields import Sizes
+from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.nsf_run import of_cells
 from validation.common.results import Results
 from validation.common.run import Setting, run_all
 from validation.nsf import factors, reduced_runs

@@ -3,9 +3,9 @@
 import pytest
 from small_toys import Records
 
-from mpm_ref.reduced.inferring import Plan, infer
-from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.fields.pod_fields import Sizes
+from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.nsf_run import Plan, infer
 from validation.common import targets
 from validation.common.results import Results
 from validation.common.run import Setting, run_all

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from small_toys import Records
 
-from mpm_ref.reduced.errors import Errors
-from mpm_ref.reduced.whole import history
 from mpm_ref.rom.kinematics import NoBody
 from mpm_ref.rom.snapshots import Histories
+from mpm_ref.rom.study.errors import Errors
+from mpm_ref.rom.study.nsf_case import history
 from validation.common.results import Results
 from validation.common.run import Setting, run_all
 from validation.nsf import longer

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from field_toys import R, networks
 
-from mpm_ref.reduced.errors import Errors
-from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.fields_file import Model, save
+from mpm_ref.rom.study.errors import Errors
+from mpm_ref.rom.study.nsf_case import whole
 from validation.common import targets
 from validation.common.results import Results
 from validation.common.run import Setting, run_all

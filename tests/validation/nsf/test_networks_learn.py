@@ -5,10 +5,10 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from mpm_ref.reduced.whole import history  # noqa: E402
 from mpm_ref.rom.fields.pod_fields import Sizes  # noqa: E402
-from mpm_ref.rom.learn import session  # noqa: E402
 from mpm_ref.rom.snapshots import joined  # noqa: E402
+from mpm_ref.rom.study.nsf_case import history  # noqa: E402
+from mpm_ref.rom.train import session  # noqa: E402
 from mpm_ref.training import Machine  # noqa: E402
 from validation.nsf import networks as kept  # noqa: E402
 from validation.nsf.networks import Net, Part, fields_of, trained  # noqa: E402
@@ -84,8 +84,8 @@ def test_the_command_writes_weights_that_are_taken(places):
 def test_a_training_that_was_cut_off_goes_on(places, monkeypatch):
     """In the second stage; the weights are those of a training in one go."""
     whole = nsf.made("jelly", places[1] / "whole", Machine())
-    monkeypatch.setattr("mpm_ref.rom.learn.fit.SAVE", 2)
-    monkeypatch.setattr("mpm_ref.rom.learn.field.SAVE", 2)
+    monkeypatch.setattr("mpm_ref.rom.train.decoder.SAVE", 2)
+    monkeypatch.setattr("mpm_ref.rom.train.field.SAVE", 2)
     show, seen = nsf.Work.show, []
 
     def cut(self, stage, losses):

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from figures.nsf import fig04
-from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.quadrature.stencil_overlap import reach
+from mpm_ref.rom.study.nsf_case import whole
 from validation.common.results import Results
 from validation.common.run import Setting, run_all
 from validation.ldm.published_bodies import keep, read

@@ -8,14 +8,13 @@ from command_line import mpm_ref
 from small_nsf_studies import modelled, write
 from small_toys import Records
 
-from mpm_ref.reduced import inferring, maps
-from mpm_ref.reduced.inferring import Chosen, Plan, drawn, infer, of_cells, weighed
-from mpm_ref.reduced.nsf import watch
-from mpm_ref.reduced.nsf.recording import plan_of
-from mpm_ref.reduced.study import load
-from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.cubature import misfit
 from mpm_ref.rom.fields.pod_fields import Sizes
+from mpm_ref.rom.study import nsf_run, nsf_watch, reduce
+from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.nsf_record import plan_of
+from mpm_ref.rom.study.nsf_run import Chosen, Plan, drawn, infer, of_cells, weighed
+from mpm_ref.rom.study.study import load
 from mpm_ref.store.results import Results as Stored
 from validation.common.results import Results
 from validation.common.run import Setting, run_all
@@ -35,10 +34,10 @@ def made(tmp_path_factory):
 
 
 def test_they_are_told_by_the_command(made, tmp_path, monkeypatch):
-    fields = maps.read(made / "fields.npz").decoder
+    fields = reduce.read(made / "fields.npz").decoder
     left = misfit(fields.U, 3, drawn(len(fields.X), 20, 0).points)
     for bound, warned in ((0.99 * left, True), (1.01 * left, False)):
-        monkeypatch.setattr(watch, "SPARSE", bound)
+        monkeypatch.setattr(nsf_watch, "SPARSE", bound)
         done = mpm_ref("rom", "run", made / "pairs.toml", "--map", made / "fields.npz", "--out",
                        tmp_path / "run.h5", "--set", "v=2", "--overwrite")
         assert done.exit_code == 0
@@ -54,12 +53,12 @@ def test_they_are_told_by_the_command(made, tmp_path, monkeypatch):
 def test_a_run_on_samples_with_weights_is_that_of_their_plan(made, tmp_path, monkeypatch, asked,
                                                              pick, words):
     """By `rom run` and by `rom evaluate`; of networks there are none. The seed draws candidates."""
-    monkeypatch.setattr(inferring, "CANDIDATES", 40)
-    monkeypatch.setattr(inferring, "OFFERED", 12)
+    monkeypatch.setattr(nsf_run, "CANDIDATES", 40)
+    monkeypatch.setattr(nsf_run, "OFFERED", 12)
     study, out = write(tmp_path, ("points = 20", asked)), tmp_path / "run.h5"
     done = mpm_ref("rom", "run", study, "--map", made / "fields.npz", "--out", out, "--set", "v=2")
     assert done.exit_code == 0, done.output
-    model, one = maps.read(made / "fields.npz"), whole(load(study).scene([2.0]))
+    model, one = reduce.read(made / "fields.npz"), whole(load(study).scene([2.0]))
     fields = model.decoder.of([2.0])
     chosen = pick(fields, one)
     *_, (_, last, report) = infer(one, fields, Plan((chosen,)), model.rest)
@@ -76,13 +75,13 @@ def test_a_run_on_samples_with_weights_is_that_of_their_plan(made, tmp_path, mon
 
 
 def test_of_networks_nothing_is_known():
-    assert not list(watch.sparse(SimpleNamespace(r=3), drawn(40, 1, 0)))
+    assert not list(nsf_watch.sparse(SimpleNamespace(r=3), drawn(40, 1, 0)))
 
 
 def test_weights_tell_what_they_leave():
     for left, count in ((0.9, 1), (0.1, 0)):
         one = Chosen(0.0, np.arange(4), np.ones(4), left)
-        assert len(list(watch.sparse(SimpleNamespace(r=3), one))) == count
+        assert len(list(nsf_watch.sparse(SimpleNamespace(r=3), one))) == count
 
 
 def trial(error=2.0, flags=""):

@@ -7,10 +7,10 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from mpm_ref.reduced.inferring import Plan, infer
-from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.inferred import Inferred
+from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.nsf_run import Plan, infer
 from mpm_ref.simulate import simulate
 from validation.common.results import Results
 from validation.common.run import Setting, run_all

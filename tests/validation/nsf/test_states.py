@@ -9,9 +9,9 @@ import pytest
 
 from figures.common import reduced
 from figures.nsf import fig18
-from mpm_ref.reduced.inferring import Plan, infer
-from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.kinematics import NoBody
+from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.nsf_run import Plan, infer
 from mpm_ref.rom.symmetric import tensor
 from validation.ldm.published_bodies import read
 from validation.nsf import reduced_runs, states

@@ -5,9 +5,9 @@ from time import process_time
 import numpy as np
 import pytest
 
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.march import Way
 from mpm_ref.rom.fields.affine import Affine
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.run import Way
 from validation.ldm.networks import trained
 from validation.ldm.references import references
 from validation.ldm.studies import GRAVITY

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mpm_ref.reduced.errors import Errors
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.kinematics import NoBody
+from mpm_ref.rom.study.errors import Errors
 from validation.common.results import Results
 from validation.common.run import Setting, run_all
 from validation.extremes import nsf_runs

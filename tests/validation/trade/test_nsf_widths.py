@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from field_toys import R, networks
 
-from mpm_ref.reduced.errors import Errors
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.fields_file import Model
+from mpm_ref.rom.study.errors import Errors
 from validation.common.results import Results
 from validation.common.run import Setting, run_all
 from validation.common.weights_needed import Untrained
