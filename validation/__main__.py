@@ -17,9 +17,11 @@ from .common.report import write_report
 from .common.results import RESULTS, ROOT, Results
 from .common.run import Setting, run_all
 from .common.status import status_table, with_status
+from .fingerprint.command import app as fingerprint
 
 app = typer.Typer(help=__doc__, add_completion=False, no_args_is_help=True,
                   pretty_exceptions_enable=False)
+app.add_typer(fingerprint, name="fingerprint")
 
 Profile = Annotated[
     Literal["quick", "standard", "paper"],
