@@ -1,8 +1,8 @@
 """All cases: one list, in the order in which they run."""
 
-from . import adjoints, implicit, laws, ldm, nsf, scenes
+from . import adjoints, implicit, laws, ldm, nsf, oracle, scenes, training
 
-MODULES = (scenes, implicit, ldm, nsf, laws, adjoints)
+MODULES = (scenes, implicit, ldm, nsf, laws, adjoints, training, oracle)
 
 
 def cases():

@@ -1,0 +1,70 @@
+"""All that the cases need of mpm_ref's trainings, which need PyTorch; see `library`."""
+
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from mpm_ref.cases import observed, snapshots
+from mpm_ref.laws import study as law_study
+from mpm_ref.laws.training import trained
+from mpm_ref.learning import Machine, part
+from mpm_ref.nclaw.gnn.history import box_of
+from mpm_ref.reduced.maps import learned
+from mpm_ref.reduced.study import load
+from mpm_ref.reduced.whole import history
+from mpm_ref.rom.histories import joined
+from mpm_ref.scene import build
+
+from .library import ROOT, problem, scene_names
+
+SCENES = {name: ROOT / "scenes" / f"{name}.toml" for name in scene_names()}
+
+
+@contextmanager
+def study_file(text):
+    """Write the text of a study into a file of its own for as long as the block runs."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "study.toml"
+        path.write_text(text, encoding="utf-8")
+        yield path
+
+
+def law(text):
+    """Return the weights of both laws of a law study after its training."""
+    with study_file(text) as path:
+        study = law_study.load(path, SCENES)
+        laws = trained(study, observed(study.problem()), threads=1)
+    return {"elastic": laws[0], "plastic": laws[1]}
+
+
+def graph(scene, values, frames, recipe):
+    """Return a graph network after a training on every so many steps of a scene, and its error."""
+    of = problem(scene, values)
+    box, dt = box_of(of.conditions.walls, of.dx), frames * of.clock.dt
+    x, v, *_ = observed(of)
+    run = part("nclaw.learn.gnn.examples", "", "").run_of(x[::frames], v[0], dt, box)
+    kind = part("nclaw.learn.gnn.recipe", "", "").GraphRecipe
+    session = part("nclaw.learn.gnn.fit", "", "").train(kind(**recipe), [run], dt)
+    network, reading, _ = session.simulator({})
+    return {"network": network, "reading": reading, "history": session.history}
+
+
+def ldm(text):
+    """Return the map, latent coordinates and coordinates at rest of a study's training."""
+    with study_file(text) as path:
+        of = load(path, SCENES)
+        runs = snapshots((build(of.scene(of.mu[k])) for k in of.train), of.mu[list(of.train)])
+        model = learned(of, runs, {}, path.with_suffix(".pt"), lambda history: None, Machine())
+    map, xhat, rest, _ = model
+    return {"latent": xhat, "rest": rest, "derivatives": map.derivatives(runs.X, rest)}
+
+
+def nsf(text):
+    """Return three networks, latent coordinates and coordinates at rest of a study's training."""
+    with study_file(text) as path:
+        of = load(path, SCENES)
+        runs = joined((history(of.scene(of.mu[k]), of.mu[k], every=of.base.every)
+                       for k in of.train), len(of.train))
+        model = learned(of, runs, {}, path.parent / "stages", lambda history: None, Machine())
+    fields, xhat, rest, _ = model
+    return {"latent": xhat, "rest": rest, "networks": tuple(fields)}
