@@ -3,7 +3,7 @@
 from functools import partial
 
 from .library import adjoint_of, problem
-from .recording import Case
+from .recording import RunCase
 
 SCENES = {          # name: (scene, steps, dt [s])
     "elastic 2D": ("hello", 20, 5e-4),
@@ -19,8 +19,9 @@ SCENES = {          # name: (scene, steps, dt [s])
 
 
 def cases():
-    """Return a `Case` of each."""
-    return [Case(f"adjoint {name}", partial(run, *what)) for name, what in SCENES.items()]
+    """Return a `RunCase` of each scene."""
+    return [RunCase(f"adjoint {name}", partial(run, *arguments))
+            for name, arguments in SCENES.items()]
 
 
 def run(name, steps, dt, values=None):

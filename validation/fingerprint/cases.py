@@ -6,5 +6,5 @@ MODULES = (scenes, implicit, ldm, nsf, laws, adjoints, training, oracle)
 
 
 def cases():
-    """Return all `Case`s."""
+    """Return all `RunCase`s."""
     return [case for module in MODULES for case in module.cases()]

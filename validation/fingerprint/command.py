@@ -12,7 +12,7 @@ from .recording import entries_of, read, selected, write
 
 MOST = 6            # labels shown of a case that differs
 
-app = typer.Typer(help="Record what runs of every kind end with, to the bit, and compare.",
+app = typer.Typer(help="Record the results of runs of every kind, to the bit, and compare them.",
                   no_args_is_help=True)
 
 File = Annotated[Path, typer.Argument(help="JSON file of fingerprints")]
@@ -31,12 +31,12 @@ def record(file: File, only: Only = None):
 @app.command()
 def check(file: File, only: Only = None):
     """Run all cases and compare them with a record. Exits with 1 where anything differs."""
-    known = read(file)
-    for sentence in of_machines(known["machine"], machine()):
+    reference = read(file)
+    for sentence in of_machines(reference["machine"], machine()):
         typer.echo(f"another machine: {sentence}", err=True)
     chosen = selected(cases(), only)
     names = {case.name for case in chosen}
-    recorded = {name: entry for name, entry in known["cases"].items()
+    recorded = {name: entry for name, entry in reference["cases"].items()
                 if only is None or name in names}
     entries = entries_of(chosen, show)
     differences = compare(recorded, entries)
@@ -56,7 +56,7 @@ def list_cases(only: Only = None):
 
 
 def show(name, entry):
-    """Print the CPU seconds of a case, and what is wrong with it."""
+    """Print the CPU seconds of a case, and its exception or dependence on threads."""
     seconds = " ".join(f"{s:7.2f}" for s in entry["seconds"])
     typer.echo(f"{seconds} s  {name}")
     if entry["raises"] is not None:

@@ -1,4 +1,4 @@
-"""Which fingerprints of two records differ."""
+"""Comparison of two records of fingerprints."""
 
 RAISES = "one of the two raises an exception"
 
@@ -8,31 +8,30 @@ def differing(one, other):
     return [label for label in {**one, **other} if one.get(label) != other.get(label)]
 
 
-def compare(recorded, found):
+def compare(recorded, computed):
     """Return {case: labels or sentences} of the cases that differ between two {case: entry}.
 
     An entry has `values`, the fingerprint, and `raises`, the exception or None. Two entries that
     raise agree, whatever they raise. A case that was not recorded, or is gone, differs.
     """
     differences = {}
-    for name in {**recorded, **found}:
-        if name not in found:
+    for name in {**recorded, **computed}:
+        if name not in computed:
             differences[name] = ["the case is missing"]
         elif name not in recorded:
             differences[name] = ["the case was not recorded"]
-        elif labels := of_entries(recorded[name], found[name]):
+        elif labels := of_entries(recorded[name], computed[name]):
             differences[name] = labels
     return differences
 
 
 def of_entries(one, other):
-    """Return what differs between two entries of the same case."""
+    """Return the labels or sentences in which two entries of a case differ."""
     raised = [entry["raises"] is not None for entry in (one, other)]
     if all(raised):
         return []
     if any(raised):
-        told = one["raises"] or other["raises"]
-        return [f"{RAISES}: {told}"]
+        return [f"{RAISES}: {one['raises'] or other['raises']}"]
     return differing(one["values"], other["values"])
 
 

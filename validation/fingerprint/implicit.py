@@ -3,7 +3,7 @@
 from functools import partial
 
 from .library import problem, simulated, solvers, with_solver
-from .recording import Case
+from .recording import RunCase
 
 METHODS = ("hot", "hot-quadratic", "hot-plus", "lbfgs-h", "pn-pcg", "pn-pcg-mf", "pn-mgpcg",
            "sgs-pcg", "gast15", "lbfgs-gmg", "pn-gmg-pcg", "admm")
@@ -24,16 +24,16 @@ STEPS = 4
 
 
 def cases():
-    """Return a `Case` of each method on each setup, and of variants of HOT on the bar."""
-    known = dict(zip(METHODS, solvers(), strict=True))
-    found = [Case(f"implicit {setup} {name}", partial(run, setup, options, {}))
-             for setup in SETUPS for name, options in known.items()]
-    found += [Case(f"implicit bar hot {name}", partial(run, "bar", known["hot"], changes))
+    """Return a `RunCase` of each method on each setup, and of variants of HOT on the bar."""
+    methods = dict(zip(METHODS, solvers(), strict=True))
+    runs = [RunCase(f"implicit {setup} {name}", partial(run, setup, options, {}))
+             for setup in SETUPS for name, options in methods.items()]
+    runs += [RunCase(f"implicit bar hot {name}", partial(run, "bar", methods["hot"], changes))
               for name, changes in VARIANTS.items()]
-    return found
+    return runs
 
 
 def run(setup, options, changes):
-    """Return what a setup ends with after some steps by a method."""
+    """Return the state of a setup after some steps by a method."""
     name, values = SETUPS[setup]
     return simulated(with_solver(problem(name, values), options, **changes), STEPS)

@@ -4,7 +4,7 @@ from functools import partial
 
 from . import library_nclaw as nclaw
 from .library import simulated
-from .recording import Case
+from .recording import RunCase
 
 FRAMES = 3          # of 5 steps each
 LAWS = {            # weights: environment
@@ -22,19 +22,19 @@ SCENE = "nclaw_{}".format
 
 
 def cases():
-    """Return a `Case` of each kind of learned law."""
-    found = [Case(f"law {name}", partial(nclaw.of_law, name, SCENE(environment), FRAMES))
+    """Return a `RunCase` of each kind of learned law."""
+    runs = [RunCase(f"law {name}", partial(nclaw.of_law, name, SCENE(environment), FRAMES))
              for name, environment in LAWS.items()]
-    found += [Case(f"law of a scene {name}", partial(by_scene, name, SCENE(environment)))
+    runs += [RunCase(f"law of a scene {name}", partial(by_scene, name, SCENE(environment)))
               for name, environment in BY_SCENE.items()]
-    found += [Case(f"law graph {name}", partial(nclaw.of_graph, name, SCENE(environment), 2))
+    runs += [RunCase(f"law graph {name}", partial(nclaw.of_graph, name, SCENE(environment), 2))
               for name, environment in GRAPHS.items()]
-    found += [Case(f"law paths {name}", partial(nclaw.of_paths, name, SCENE(environment), 10))
+    runs += [RunCase(f"law paths {name}", partial(nclaw.of_paths, name, SCENE(environment), 10))
               for name, environment in PATHS.items()]
-    found.append(Case("law batched steps", partial(nclaw.of_batches, SCENE("jelly"), 3, 10)))
-    return found
+    runs.append(RunCase("law batched steps", partial(nclaw.of_batches, SCENE("jelly"), 3, 10)))
+    return runs
 
 
 def by_scene(name, scene):
-    """Return what a scene ends with whose material is a file of weights."""
+    """Return the state after a run of a scene whose material is a file of weights."""
     return simulated(nclaw.by_scene(name, scene), 10)

@@ -3,13 +3,13 @@
 from functools import partial
 
 from . import library_rom as rom
-from .recording import Case
+from .recording import RunCase
 
 STEPS = 10
 POINTS = 60
 SCHEMES = [(quadrature, projection) for quadrature in ("lagrangian", "eulerian")
            for projection in ("linear", "nonlinear")]
-WAYS = {            # of runs on a network
+OPTIONS = {         # of runs on a network
     "all points": {},
     "resampled": {"quadrature": "resampled"},
     "kept": {"points": POINTS, "samples": "kept"},
@@ -23,44 +23,44 @@ NETWORKS = {"gravity-r4": "ldm_gravity", "torsion-0": "ldm_torsion", "poke": "ld
 
 
 def cases():
-    """Return a `Case` of each kind of reduced run."""
-    found = [Case("ldm pod data", rom.data_of_pod)]
+    """Return a `RunCase` of each kind of reduced run."""
+    runs = [RunCase("ldm pod data", rom.data_of_pod)]
     for quadrature, projection in SCHEMES:
-        way = {"quadrature": quadrature, "projection": projection, "points": POINTS}
-        found.append(Case(f"ldm pod {quadrature} {projection}", partial(on_pod, way)))
-        found.append(Case(f"ldm network {quadrature} {projection}",
-                          partial(on_network, "gravity-r4", way)))
-    found.append(Case("ldm polynomial lagrangian nonlinear", on_polynomial))
-    found += [Case(f"ldm network {name}", partial(on_network, "gravity-r4", way))
-              for name, way in WAYS.items()]
-    found += [Case(f"ldm network {net}", partial(on_network, net, {"points": POINTS}))
+        options = {"quadrature": quadrature, "projection": projection, "points": POINTS}
+        runs.append(RunCase(f"ldm pod {quadrature} {projection}", partial(on_pod, options)))
+        runs.append(RunCase(f"ldm network {quadrature} {projection}",
+                          partial(on_network, "gravity-r4", options)))
+    runs.append(RunCase("ldm polynomial lagrangian nonlinear", on_polynomial))
+    runs += [RunCase(f"ldm network {name}", partial(on_network, "gravity-r4", options))
+              for name, options in OPTIONS.items()]
+    runs += [RunCase(f"ldm network {net}", partial(on_network, net, {"points": POINTS}))
               for net in NETWORKS if net != "gravity-r4"]
-    found += [Case("ldm network neighbours", neighbours), Case("ldm network nodes", nodes)]
-    return found
+    runs += [RunCase("ldm network neighbours", neighbours), RunCase("ldm network nodes", nodes)]
+    return runs
 
 
-def on_pod(way):
+def on_pod(options):
     """Return a run on POD modes."""
-    return rom.ldm(rom.small_case(), *rom.pod(), way, STEPS)
+    return rom.ldm(rom.small_setup(), *rom.pod(), options, STEPS)
 
 
 def on_polynomial():
     """Return a run on a polynomial manifold over POD modes."""
-    way = {"projection": "nonlinear", "points": POINTS}
-    return rom.ldm(rom.small_case(), *rom.polynomial(2, 5, 2), way, STEPS)
+    options = {"projection": "nonlinear", "points": POINTS}
+    return rom.ldm(rom.small_setup(), *rom.polynomial(2, 5, 2), options, STEPS)
 
 
-def on_network(net, way):
+def on_network(net, options):
     """Return a run on a stored network of the scene that it was trained for."""
-    return rom.ldm(rom.case_of(NETWORKS[net]), *rom.network(net), way, STEPS)
+    return rom.ldm(rom.setup_of(NETWORKS[net]), *rom.network(net), options, STEPS)
 
 
 def neighbours():
-    """Return a run with samples chosen once and their neighbours."""
-    return rom.ldm_by_neighbours(rom.case_of("ldm_gravity"), *rom.network("gravity-r4"), POINTS,
+    """Return a run with samples chosen once and the points near them."""
+    return rom.ldm_by_neighbours(rom.setup_of("ldm_gravity"), *rom.network("gravity-r4"), POINTS,
                                  STEPS)
 
 
 def nodes():
     """Return a run with the node-centric quadrature."""
-    return rom.ldm_by_nodes(rom.case_of("ldm_gravity"), *rom.network("gravity-r4"), 200, STEPS)
+    return rom.ldm_by_nodes(rom.setup_of("ldm_gravity"), *rom.network("gravity-r4"), 200, STEPS)

@@ -1,6 +1,6 @@
-"""All that the cases need of mpm_ref, as plain functions and by position where that is possible.
+"""Calls of mpm_ref that the cases need, as plain functions and by position where possible.
 
-This is the only module of the package that imports mpm_ref: names that change there change here.
+Only the modules `library*` import mpm_ref: names that change there change here.
 Records are unpacked or listed by position, so that renamed fields need no change at all.
 """
 
@@ -13,12 +13,16 @@ import numpy as np
 
 from mpm_ref.core.blas import one_thread
 from mpm_ref.core.jit import set_threads
-from mpm_ref.energy import angular_momentum, energy, momentum
+from mpm_ref.energy import angular_momentum
+from mpm_ref.energy import energy
+from mpm_ref.energy import momentum
 from mpm_ref.hot.methods import METHODS
-from mpm_ref.reduced.vary import varied
-from mpm_ref.scene import build, load
+from mpm_ref.scene.overrides import varied
+from mpm_ref.scene import build
+from mpm_ref.scene import load
 from mpm_ref.simulate import simulate
-from mpm_ref.tape import Seed, Tape
+from mpm_ref.tape import Seed
+from mpm_ref.tape import Tape
 
 ROOT = Path(__file__).parents[2]
 PARTICLES = ("x", "v", "C", "L", "F", "tau", "m", "V0", "y", "b")
@@ -37,35 +41,35 @@ def threads(count):
 
 
 def scene_names():
-    """Return the names of all shipped scenes."""
+    """Return the names of all scenes of the repository."""
     return sorted(path.stem for path in (ROOT / "scenes").glob("*.toml"))
 
 
 def scene(name, **values):
-    """Return a shipped scene with values {path: value} put into it."""
-    shipped = load(ROOT / "scenes" / f"{name}.toml")
-    return varied(shipped, values) if values else shipped
+    """Return a scene with values {path: value} put into it."""
+    base = load(ROOT / "scenes" / f"{name}.toml")
+    return varied(base, values) if values else base
 
 
 def problem(name, values=None):
-    """Return the problem of a shipped scene with values {path: value} put into it."""
+    """Return the problem of a scene with values {path: value} put into it."""
     return build(scene(name, **(values or {})))
 
 
 def state_of(bodies):
-    """Return {label: array} of all that the particles of bodies carry, in the order stored."""
-    found = {}
+    """Return {label: array} of all arrays of the particles of bodies, in the order stored."""
+    state = {}
     for k, (_, particles, _, _, number) in enumerate(bodies):
         arrays = dict(zip(PARTICLES, particles, strict=True)) | {"number": number}
-        found |= {f"body {k} {label}": array for label, array in arrays.items()}
-    return found
+        state |= {f"body {k} {label}": array for label, array in arrays.items()}
+    return state
 
 
 class _Enough(Exception):
     """Ends a run."""
 
 
-def simulated(of, steps):
+def simulated(problem, steps):
     """Return the state, energies, momenta and solver's report of a problem after some steps."""
     def stop(state, dt):
         if state.step >= steps:
@@ -73,20 +77,20 @@ def simulated(of, steps):
 
     last = None
     try:
-        for frame in simulate(of, on_step=stop):
+        for frame in simulate(problem, on_step=stop):
             last = frame.state
     except _Enough:
         pass
     bodies = last.bodies
     return state_of(bodies) | {
         "step": last.step, "t": last.t, "stable dt": last.bound,
-        "energy": energy(bodies, of.gravity, of.inertia), "momentum": momentum(bodies),
-        "angular momentum": angular_momentum(bodies, of.inertia),
+        "energy": energy(bodies, problem.gravity, problem.inertia), "momentum": momentum(bodies),
+        "angular momentum": angular_momentum(bodies, problem.inertia),
         "solver": report_of(last.solve)}
 
 
 def report_of(solve):
-    """Return the counts and residuals of an implicit step's report, without times and words."""
+    """Return the counts and residuals of an implicit step's report, without times and text."""
     if solve is None:
         return ()
     _, converged, _, *counts, residuals, _, off, _ = solve
@@ -98,21 +102,21 @@ def solvers():
     return tuple(METHODS.values())
 
 
-def with_solver(of, options, **changes):
+def with_solver(problem, options, **changes):
     """Return a problem solved by a method's options with changes."""
-    return replace(of, integrator="implicit", solver=replace(options, **changes))
+    return replace(problem, integrator="implicit", solver=replace(options, **changes))
 
 
-def adjoint_of(of, steps, dt):
+def adjoint_of(problem, steps, dt):
     """Return the state after some explicit steps, and all gradients of a loss of it.
 
     The loss is sum |x|^2/2 + |v|^2/2 + |F|^2/2, so that its gradients are x, v and F.
     """
-    stepper = of.stepper()
-    stepper.start(of.bodies)
-    stepper.sort(of.bodies)
-    tape = Tape(stepper, of.bodies, every=3, clip=of.clip)
+    stepper = problem.stepper()
+    stepper.start(problem.bodies)
+    stepper.sort(problem.bodies)
+    tape = Tape(stepper, problem.bodies, every=3, clip=problem.clip)
     for n in range(steps):
         tape.step(n * dt, dt)
-    seeds = [Seed(x=q.x.copy(), v=q.v.copy(), F=q.F.copy()) for _, q, *_ in of.bodies]
-    return state_of(of.bodies) | {"gradient": tape.gradient({steps: seeds})}
+    seeds = [Seed(x=q.x.copy(), v=q.v.copy(), F=q.F.copy()) for _, q, *_ in problem.bodies]
+    return state_of(problem.bodies) | {"gradient": tape.gradient({steps: seeds})}

@@ -1,18 +1,20 @@
-"""All that the cases need of mpm_ref's trainings, which need PyTorch; see `library`."""
+"""Calls of mpm_ref's trainings, which need PyTorch; see `library`."""
 
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from mpm_ref.cases import observed, snapshots
-from mpm_ref.laws import study as law_study
-from mpm_ref.laws.training import trained
-from mpm_ref.learning import Machine, part
+from mpm_ref.cases import observed
+from mpm_ref.cases import snapshots
+from mpm_ref.learning import Machine
+from mpm_ref.learning import part
 from mpm_ref.nclaw.gnn.history import box_of
+from mpm_ref.nclaw.study import study as law_study
+from mpm_ref.nclaw.study.training import trained
 from mpm_ref.reduced.maps import learned
 from mpm_ref.reduced.study import load
 from mpm_ref.reduced.whole import history
-from mpm_ref.rom.histories import joined
+from mpm_ref.rom.snapshots import joined
 from mpm_ref.scene import build
 
 from .library import ROOT, problem, scene_names
@@ -38,13 +40,13 @@ def law(text):
 
 
 def graph(scene, values, frames, recipe):
-    """Return a graph network after a training on every so many steps of a scene, and its error."""
-    of = problem(scene, values)
-    box, dt = box_of(of.conditions.walls, of.dx), frames * of.clock.dt
-    x, v, *_ = observed(of)
-    run = part("nclaw.learn.gnn.examples", "", "").run_of(x[::frames], v[0], dt, box)
-    kind = part("nclaw.learn.gnn.recipe", "", "").GraphRecipe
-    session = part("nclaw.learn.gnn.fit", "", "").train(kind(**recipe), [run], dt)
+    """Return a graph network trained on every `frames`-th step of a scene, and its error."""
+    world = problem(scene, values)
+    box, dt = box_of(world.conditions.walls, world.dx), frames * world.clock.dt
+    x, v, *_ = observed(world)
+    run = part("nclaw.gnn.train.examples", "", "").run_of(x[::frames], v[0], dt, box)
+    kind = part("nclaw.gnn.train.recipe", "", "").GraphRecipe
+    session = part("nclaw.gnn.train.fit", "", "").train(kind(**recipe), [run], dt)
     network, reading, _ = session.simulator({})
     return {"network": network, "reading": reading, "history": session.history}
 
@@ -52,19 +54,20 @@ def graph(scene, values, frames, recipe):
 def ldm(text):
     """Return the map, latent coordinates and coordinates at rest of a study's training."""
     with study_file(text) as path:
-        of = load(path, SCENES)
-        runs = snapshots((build(of.scene(of.mu[k])) for k in of.train), of.mu[list(of.train)])
-        model = learned(of, runs, {}, path.with_suffix(".pt"), lambda history: None, Machine())
-    map, xhat, rest, _ = model
-    return {"latent": xhat, "rest": rest, "derivatives": map.derivatives(runs.X, rest)}
+        study = load(path, SCENES)
+        runs = snapshots((build(study.scene(study.mu[k])) for k in study.train),
+                         study.mu[list(study.train)])
+        model = learned(study, runs, {}, path.with_suffix(".pt"), lambda history: None, Machine())
+    decoder, xhat, rest, _ = model
+    return {"latent": xhat, "rest": rest, "derivatives": decoder.derivatives(runs.X, rest)}
 
 
 def nsf(text):
     """Return three networks, latent coordinates and coordinates at rest of a study's training."""
     with study_file(text) as path:
-        of = load(path, SCENES)
-        runs = joined((history(of.scene(of.mu[k]), of.mu[k], every=of.base.every)
-                       for k in of.train), len(of.train))
-        model = learned(of, runs, {}, path.parent / "stages", lambda history: None, Machine())
+        study = load(path, SCENES)
+        runs = joined((history(study.scene(study.mu[k]), study.mu[k], every=study.base.every)
+                       for k in study.train), len(study.train))
+        model = learned(study, runs, {}, path.parent / "stages", lambda history: None, Machine())
     fields, xhat, rest, _ = model
     return {"latent": xhat, "rest": rest, "networks": tuple(fields)}

@@ -3,7 +3,7 @@
 from functools import partial
 
 from . import library_rom as rom
-from .recording import Case
+from .recording import RunCase
 
 STEPS = 20
 MODES = {
@@ -26,13 +26,14 @@ SHEAR = ("nsf_shear", "fixed.top.motion.translation.amplitude[0]", (0.02, 0.03, 
 
 
 def cases():
-    """Return a `Case` of each kind of reduced run."""
-    found = [Case("nsf modes data", rom.data_of_modes)]
-    found += [Case(f"nsf modes {name}", partial(on_modes, *what)) for name, what in MODES.items()]
-    found += [Case(f"nsf networks {name}", partial(rom.nsf_networks, name, *what))
-              for name, what in NETWORKS.items()]
-    found.append(Case("nsf joint", partial(rom.nsf_joint, *SHEAR)))
-    return found
+    """Return a `RunCase` of each kind of reduced run."""
+    runs = [RunCase("nsf modes data", rom.data_of_modes)]
+    runs += [RunCase(f"nsf modes {name}", partial(on_modes, *arguments))
+             for name, arguments in MODES.items()]
+    runs += [RunCase(f"nsf networks {name}", partial(rom.nsf_networks, name, *arguments))
+             for name, arguments in NETWORKS.items()]
+    runs.append(RunCase("nsf joint", partial(rom.nsf_joint, *SHEAR)))
+    return runs
 
 
 def on_modes(samples, count, options=None):

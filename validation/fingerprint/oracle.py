@@ -8,7 +8,7 @@ from functools import partial
 from .implicit import METHODS, SETUPS
 from .library import problem, solvers, with_solver
 from .library_oracle import golden
-from .recording import Case
+from .recording import RunCase
 
 EXPLICIT = {"explicit 2D": ("hello", {}), "explicit plastic 3D": ("nclaw_plasticine", {
     "body[0].sampling.counts": [4, 4, 4]}), "explicit fluid": ("dam_break", {"dx": 0.01143})}
@@ -17,12 +17,12 @@ ADJOINT = {"adjoint 2D": EXPLICIT["explicit 2D"], "adjoint plastic 3D": EXPLICIT
 
 
 def cases():
-    """Return a `Case` of each kind of golden file."""
-    found = [Case(f"oracle {name}", partial(of_scene, "steps", *what))
-             for name, what in EXPLICIT.items()]
-    found += [Case(f"oracle {name}", partial(of_scene, "adjoint", *what))
-              for name, what in ADJOINT.items()]
-    return [*found, Case("oracle implicit", implicit)]
+    """Return a `RunCase` of each kind of golden file."""
+    runs = [RunCase(f"oracle {name}", partial(of_scene, "steps", *arguments))
+             for name, arguments in EXPLICIT.items()]
+    runs += [RunCase(f"oracle {name}", partial(of_scene, "adjoint", *arguments))
+              for name, arguments in ADJOINT.items()]
+    return [*runs, RunCase("oracle implicit", implicit)]
 
 
 def of_scene(kind, name, values):

@@ -1,4 +1,4 @@
-"""Runs cases, each under several numbers of threads, and stores what they end with."""
+"""Runs of cases, each under several numbers of threads, and files of their fingerprints."""
 
 import json
 from collections.abc import Callable
@@ -16,8 +16,8 @@ THREADS = (1, 2)
 FORMAT = 1
 
 
-class Case(NamedTuple):
-    """A run, by its name; `run()` returns {label: nested values} of what it ends with."""
+class RunCase(NamedTuple):
+    """A named run; `run()` returns its results as {label: nested values}."""
 
     name: str
     run: Callable
@@ -49,7 +49,7 @@ def entries_of(cases, show=lambda name, entry: None):
 
 
 def attempt(case, count):
-    """Return the fingerprint of a case under a number of threads, or what it raised."""
+    """Return the fingerprint of a case under a number of threads, or the exception."""
     values, raises, start = {}, None, process_time()
     try:
         with threads(count):

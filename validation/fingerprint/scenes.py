@@ -1,9 +1,9 @@
-"""Every shipped scene, and explicit schemes, laws and return maps that no shipped scene has."""
+"""Runs of every scene, and of explicit schemes, laws and return maps that no scene has."""
 
 from functools import partial
 
 from .library import problem, scene_names, simulated
-from .recording import Case
+from .recording import RunCase
 
 STEPS = 400
 OTHER_STEPS = {     # of scenes whose steps take long, or that collide late
@@ -25,18 +25,18 @@ OTHERS = 100        # steps of runs of `hello` with other schemes and materials
 
 
 def cases():
-    """Return a `Case` of each shipped scene, and of `hello` with other schemes and materials."""
-    found = [Case(f"scene {name}", partial(run, name, OTHER_STEPS.get(name, STEPS)))
+    """Return a `RunCase` of each scene, and of `hello` with other schemes and materials."""
+    runs = [RunCase(f"scene {name}", partial(run, name, OTHER_STEPS.get(name, STEPS)))
              for name in scene_names()]
     for name, keys in SCHEMES.items():
         values = {f"scheme.{key}": value for key, value in keys.items()}
-        found.append(Case(f"scheme {name}", partial(run, "hello", OTHERS, values)))
+        runs.append(RunCase(f"scheme {name}", partial(run, "hello", OTHERS, values)))
     for name, material in MATERIALS.items():
         values = {"body[0].material": material}
-        found.append(Case(f"material {name}", partial(run, "hello", OTHERS, values)))
-    return found
+        runs.append(RunCase(f"material {name}", partial(run, "hello", OTHERS, values)))
+    return runs
 
 
 def run(name, steps, values=None):
-    """Return what a scene with other values ends with after some steps."""
+    """Return the state after some steps of a scene with other values."""
     return simulated(problem(name, values), steps)

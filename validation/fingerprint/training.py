@@ -6,7 +6,7 @@ A training without PyTorch raises; compare records that were both made with it.
 from functools import partial
 
 from . import library_learn as learn
-from .recording import Case
+from .recording import RunCase
 
 METHODS = ("ours", "labeled", "spline", "neural", "no rotation", "no undeformed", "admissible",
            "sys-id")
@@ -77,12 +77,12 @@ points = 64
 
 
 def cases():
-    """Return a `Case` of each training."""
-    found = [Case(f"training law {method}", partial(learn.law, LAW.format(method)))
+    """Return a `RunCase` of each training."""
+    runs = [RunCase(f"training law {method}", partial(learn.law, LAW.format(method)))
              for method in METHODS]
-    found.append(Case("training graph", partial(learn.graph, "nclaw_jelly", SMALL, 5, GRAPH)))
-    found += [Case(f"training ldm {latent}", partial(learn.ldm, LDM.format(latent)))
+    runs.append(RunCase("training graph", partial(learn.graph, "nclaw_jelly", SMALL, 5, GRAPH)))
+    runs += [RunCase(f"training ldm {latent}", partial(learn.ldm, LDM.format(latent)))
               for latent in ("encoder", "free", "modes")]
-    found += [Case(f"training nsf {latent}", partial(learn.nsf, NSF.format(octaves, latent)))
+    runs += [RunCase(f"training nsf {latent}", partial(learn.nsf, NSF.format(octaves, latent)))
               for octaves, latent in ((0, "encoder-nsf"), (2, "modes"))]
-    return found
+    return runs

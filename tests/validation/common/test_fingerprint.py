@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from validation.fingerprint import command
 from validation.fingerprint.compare import compare, differing, of_machines
 from validation.fingerprint.digest import fingerprint
-from validation.fingerprint.recording import Case, entries_of, read, selected, write
+from validation.fingerprint.recording import RunCase, entries_of, read, selected, write
 
 
 class Pair(NamedTuple):
@@ -24,7 +24,7 @@ class Couple(NamedTuple):
 
 
 def case(value):
-    return Case("one", lambda: {"x": value})
+    return RunCase("one", lambda: {"x": value})
 
 
 def raising():
@@ -71,8 +71,8 @@ def entry(values, raises=None):
 
 def test_compare_names_what_differs():
     recorded = {"a": entry({"x": "1", "v": "2"}), "b": entry({"x": "1"}), "c": entry({})}
-    found = {"a": entry({"x": "1", "v": "3"}), "b": entry({"x": "1"}), "d": entry({})}
-    assert compare(recorded, found) == {"a": ["v"], "c": ["the case is missing"],
+    entries = {"a": entry({"x": "1", "v": "3"}), "b": entry({"x": "1"}), "d": entry({})}
+    assert compare(recorded, entries) == {"a": ["v"], "c": ["the case is missing"],
                                         "d": ["the case was not recorded"]}
 
 
@@ -87,16 +87,16 @@ def test_machines_differ_by_fact():
 
 
 def test_a_case_that_raises_is_an_entry():
-    found = entries_of([Case("one", raising), case(np.ones(2))._replace(name="two")])
-    assert found["one"]["raises"] == "ValueError: broken"
-    assert found["two"]["raises"] is None
-    assert found["two"]["threads_differ"] == []
+    entries = entries_of([RunCase("one", raising), case(np.ones(2))._replace(name="two")])
+    assert entries["one"]["raises"] == "ValueError: broken"
+    assert entries["two"]["raises"] is None
+    assert entries["two"]["threads_differ"] == []
 
 
 def test_what_threads_change_is_named():
     counter = iter((0.1, 0.2))
-    found = entries_of([Case("one", lambda: {"x": next(counter), "y": 1.0})])
-    assert found["one"]["threads_differ"] == ["x"]
+    entries = entries_of([RunCase("one", lambda: {"x": next(counter), "y": 1.0})])
+    assert entries["one"]["threads_differ"] == ["x"]
 
 
 def test_a_record_is_read_back_and_others_are_refused(tmp_path):
@@ -111,9 +111,9 @@ def test_a_record_is_read_back_and_others_are_refused(tmp_path):
 
 
 def test_cases_are_selected_by_pattern():
-    known = [Case("hot a", None), Case("nsf b", None)]
-    assert selected(known, "hot*") == known[:1]
-    assert selected(known) == known
+    runs = [RunCase("hot a", None), RunCase("nsf b", None)]
+    assert selected(runs, "hot*") == runs[:1]
+    assert selected(runs) == runs
 
 
 def test_check_names_a_case_that_differs(tmp_path, monkeypatch):
