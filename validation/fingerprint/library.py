@@ -13,16 +13,12 @@ import numpy as np
 
 from mpm_ref.core.blas import one_thread
 from mpm_ref.core.jit import set_threads
-from mpm_ref.energy import angular_momentum
-from mpm_ref.energy import energy
-from mpm_ref.energy import momentum
+from mpm_ref.energy import angular_momentum, energy, momentum
 from mpm_ref.hot.methods import METHODS
+from mpm_ref.scene import build, load
 from mpm_ref.scene.overrides import varied
-from mpm_ref.scene import build
-from mpm_ref.scene import load
 from mpm_ref.simulate import simulate
-from mpm_ref.tape import Seed
-from mpm_ref.tape import Tape
+from mpm_ref.tape import Seed, Tape
 
 ROOT = Path(__file__).parents[2]
 PARTICLES = ("x", "v", "C", "L", "F", "tau", "m", "V0", "y", "b")

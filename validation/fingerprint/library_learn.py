@@ -4,18 +4,16 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from mpm_ref.cases import observed
-from mpm_ref.cases import snapshots
-from mpm_ref.learning import Machine
-from mpm_ref.learning import part
 from mpm_ref.nclaw.gnn.history import box_of
 from mpm_ref.nclaw.study import study as law_study
 from mpm_ref.nclaw.study.training import trained
-from mpm_ref.reduced.maps import learned
-from mpm_ref.reduced.study import load
-from mpm_ref.reduced.whole import history
 from mpm_ref.rom.snapshots import joined
+from mpm_ref.rom.study.nsf_case import history
+from mpm_ref.rom.study.reduce import learned
+from mpm_ref.rom.study.study import load
 from mpm_ref.scene import build
+from mpm_ref.training import Machine, part
+from mpm_ref.trajectories import observed, snapshots
 
 from .library import ROOT, problem, scene_names
 

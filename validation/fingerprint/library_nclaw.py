@@ -4,17 +4,15 @@ from itertools import islice
 
 import numpy as np
 
-from mpm_ref.cases import in_order
 from mpm_ref.materials.learned import weights
 from mpm_ref.nclaw import batched_step
 from mpm_ref.nclaw.bodies import learned
-from mpm_ref.nclaw.dissipation import balance
-from mpm_ref.nclaw.dissipation import loops
+from mpm_ref.nclaw.dissipation import balance, loops
 from mpm_ref.nclaw.gnn import weights as gnn_weights
 from mpm_ref.nclaw.gnn.history import box_of
-from mpm_ref.nclaw.paths import course
-from mpm_ref.nclaw.paths import cycles
+from mpm_ref.nclaw.paths import course, cycles
 from mpm_ref.nclaw.study.compare import positions
+from mpm_ref.trajectories import in_order
 
 from .library import ROOT, problem, state_of
 

@@ -6,8 +6,7 @@ from tempfile import TemporaryDirectory
 import h5py
 import numpy as np
 
-from mpm_ref.oracle import record
-from mpm_ref.oracle import record_adjoint
+from mpm_ref.oracle import record, record_adjoint
 
 WRITE = {"steps": record, "adjoint": record_adjoint}
 

@@ -7,39 +7,27 @@ from itertools import islice
 import numba
 import numpy as np
 
-from mpm_ref.cases import snapshots
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.inferring import Plan
-from mpm_ref.reduced.inferring import drawn
-from mpm_ref.reduced.inferring import infer
-from mpm_ref.reduced.inferring import of_cells
-from mpm_ref.reduced.inferring import weighed
-from mpm_ref.reduced.maps import computed
-from mpm_ref.reduced.march import Way
-from mpm_ref.reduced.march import march
-from mpm_ref.reduced.march import start
-from mpm_ref.reduced.march import stepped
-from mpm_ref.reduced.march import model as reduced_step
-from mpm_ref.reduced.nsf.fields import BLOCK
-from mpm_ref.reduced.study import load as load_study
-from mpm_ref.reduced.whole import history
-from mpm_ref.reduced.whole import whole
-from mpm_ref.rom import fields_file
-from mpm_ref.rom import weights
+from mpm_ref.rom import fields_file, weights
 from mpm_ref.rom.fields.elastic import deformed
-from mpm_ref.rom.fields.joint_latent import Joint
-from mpm_ref.rom.fields.joint_latent import joint
+from mpm_ref.rom.fields.joint_latent import Joint, joint
 from mpm_ref.rom.fields.network import learned
 from mpm_ref.rom.fields.pod import basis
-from mpm_ref.rom.fields.pod_fields import Sizes
-from mpm_ref.rom.fields.pod_fields import spanned
+from mpm_ref.rom.fields.pod_fields import Sizes, spanned
 from mpm_ref.rom.fields.polynomial_manifold import curved
 from mpm_ref.rom.inferred import Position
 from mpm_ref.rom.quadrature.lagrangian import neighbours
-from mpm_ref.rom.quadrature.node_centric import node_centric
-from mpm_ref.rom.quadrature.node_centric import nodes_of
+from mpm_ref.rom.quadrature.node_centric import node_centric, nodes_of
 from mpm_ref.rom.snapshots import joined
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.nsf_case import history, whole
+from mpm_ref.rom.study.nsf_fields import BLOCK
+from mpm_ref.rom.study.nsf_run import Plan, drawn, infer, of_cells, weighed
+from mpm_ref.rom.study.reduce import computed
+from mpm_ref.rom.study.run import Way, march, start, stepped
+from mpm_ref.rom.study.run import model as reduced_step
+from mpm_ref.rom.study.study import load as load_study
 from mpm_ref.scene import build
+from mpm_ref.trajectories import snapshots
 
 from .library import ROOT, scene, scene_names
 
