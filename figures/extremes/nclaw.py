@@ -10,7 +10,7 @@ broke down are left out.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from mpm_ref.nclaw.strain_watch import BEYOND
+from mpm_ref.nclaw.strain_watch import MAX_EXCESS
 from validation.extremes.nclaw_runs import BAD
 
 from ..common.orders import scales, series
@@ -52,7 +52,7 @@ def strains(ax, table):
         ax.plot(table["beyond"][rows], over_usual(table)[rows], "o", color=COLOURS[name], ms=4,
                 fillstyle="none", label=name)
     ax.axhline(BAD, color="0.5", lw=1)
-    ax.axvline(BEYOND, color="0.5", lw=1)
+    ax.axvline(MAX_EXCESS, color="0.5", lw=1)
     ax.set_xscale("symlog", linthresh=SMALL)
     ax.set_xlim(-0.2 * SMALL, 1.5 * ax.dataLim.x1)
     ax.set(yscale="log", xlabel="distance of strains from those of training, in their width",
@@ -70,7 +70,7 @@ def rates(ax, table):
             label = words if group == "chosen" else f"{words}: other laws"
             ax.plot(table["beyond"][rows], share, f"{mark}{dash}", color="k", ms=4,
                     fillstyle="none", label=label)
-    ax.axvline(BEYOND, color="0.5", lw=1)
+    ax.axvline(MAX_EXCESS, color="0.5", lw=1)
     ax.set(xlabel="bound", ylabel="share", ylim=(-0.05, 1.05))
 
 

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from .. import scene
-from ..nclaw.strain_watch import other_steps
+from ..nclaw.strain_watch import time_step_warnings
 from ..preflight import misplaced
 from ..rom import modes_file
 from ..rom.study import nsf_networks, summary
@@ -57,7 +57,7 @@ def of_problem(problem):
                               if not (name == "C" and a is body.particles.L)),
         "grid_bytes": sum(a.nbytes for a in grid[:4]),
         "scene_sha256": scene_hash(problem),
-        "warnings": [*misplaced(problem), *other_steps(problem)],
+        "warnings": [*misplaced(problem), *time_step_warnings(problem)],
     }
 
 

@@ -14,11 +14,11 @@ import typer
 
 from ..materials.learned import learned_flow, learned_law, weights
 from ..nclaw.export import exported, write
+from ..nclaw.strain_watch import ComparisonWatch
 from ..nclaw.study.compare import Broken, beside
 from ..nclaw.study.curves import curves, paths_for
 from ..nclaw.study.numbers import write_curves, write_errors
 from ..nclaw.study.pictures import draw
-from ..nclaw.study.watched import Watched
 from ..store.atomic import require_place
 from ..store.words import counted
 from . import law_train
@@ -80,11 +80,11 @@ def evaluate(
 def compared(problem, laws, name):
     """(error of each frame [m^2], `Found`) of both runs, with a bar of frames."""
     errors, found, total = [], None, 1 + problem.clock.steps // problem.clock.every
-    watched = Watched(laws, problem)
+    watched = ComparisonWatch(laws, problem)
     try:
         with (on_interrupt(lambda: f"after {len(errors)} of {counted(total, 'frame')}"),
               passing(unit="frame", total=total, desc=problem.title or name) as bar):
-            for error, found in beside(problem, watched.made):
+            for error, found in beside(problem, watched.body):
                 if found.step < 0:
                     with bar.external_write_mode(file=sys.stderr):
                         warn(watched.news(len(errors)))
@@ -153,7 +153,7 @@ def export(
 
 
 def described(trained):
-    """A `weights.Trained` in words: its kind and the sizes of its layers."""
+    """A `LawWeights` in words: its kind and the sizes of its layers."""
     sizes = [len(W) for W, _ in trained.layers] + [len(b) for _, b in trained.layers[-1:]]
     return f"{type(trained.kind).__name__} {'-'.join(map(str, sizes))}".strip()
 

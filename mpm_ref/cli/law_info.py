@@ -7,9 +7,8 @@ from itertools import count, takewhile
 import numpy as np
 
 from ..materials.learned import spline, weights
-from ..materials.learned.weights import PARTS
+from ..materials.learned.weights import PARTS, dim_of
 from ..nclaw import export
-from ..nclaw.bodies import dim_of
 from ..nclaw.gnn import weights as gnn_weights
 from ..nclaw.study.study import load
 from ..nclaw.study.tables import SYS_ID

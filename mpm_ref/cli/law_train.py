@@ -131,7 +131,7 @@ class Steps(Watch):
 
 
 def learned(study, seen, checkpoint, **about):
-    """`learned.weights.Laws` of a study, with its progress; ends the command where it diverges."""
+    """`LearnedLaws` of a study, with its progress; ends the command where it diverges."""
     how = training.drive()
     try:
         with on_interrupt(lambda: resuming(checkpoint)), Epochs(study, len(seen.x) - 1) as now:

@@ -8,7 +8,7 @@ import typer
 
 from .. import scene
 from ..materials.learned import weights
-from ..nclaw.bodies import dim_of
+from ..materials.learned.weights import dim_of
 from ..nclaw.study.compare import problem_of
 from ..nclaw.train.teacher import Teacher
 from ..rom.study import reduce
@@ -55,7 +55,7 @@ OF_ERRORS = {"labeled": "squared error of F"}       # of methods that follow no 
 
 
 def fitting(file, name, steps=None):
-    """(`weights.Laws`, `Problem`) of a file and of a scene that they fit, of so many steps if
+    """(`LearnedLaws`, `Problem`) of a file and of a scene that they fit, of so many steps if
     given. Raises ValueError.
     """
     laws, path = weights.load(file), find_scene(name)

@@ -24,7 +24,14 @@ from ..shapes import (
     Union,
     Wedge,
 )
-from .builder import build_body, build_clock, build_conditions, build_limits, build_solver, seen_by
+from .builder import (
+    build_body,
+    build_clock,
+    build_conditions,
+    build_limits,
+    build_solver,
+    strain_bounds,
+)
 from .messages import SceneError, opened_by
 from .records import (
     Arrays,
@@ -85,6 +92,6 @@ def _built(scene):
         source=canonical(scene),
         integrator="explicit" if solver is None else "implicit",
         solver=solver,
-        seen={body.name: seen for k, body in enumerate(scene.body)
-              if (seen := seen_by(body, scene.dim, k)) is not None},
+        strain_bounds={body.name: bounds for k, body in enumerate(scene.body)
+                       if (bounds := strain_bounds(body, scene.dim, k)) is not None},
     )

@@ -40,10 +40,12 @@ def build_body(scene, k):
     return Body(record.name, particles, law, material.flow, np.arange(len(particles.x)))
 
 
-def seen_by(record, dim, k):
-    """What the laws of body number k have seen in training, or None; errors as of `build_body`."""
+def strain_bounds(record, dim, k):
+    """Return the strains that the laws of body number k met in training, or None; errors as of
+    `build_body`.
+    """
     with at(f"body[{k}].material.weights"):
-        return record.material.seen(dim)
+        return record.material.strain_bounds(dim)
 
 
 def _sampled(scene, record, material, where):

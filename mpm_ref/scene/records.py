@@ -10,9 +10,10 @@ from msgspec import Meta
 
 from ..explicit import Scheme as ExplicitScheme
 from ..materials import LAWS, make_flow, make_law
-from ..materials.learned import admissible, learned_flow, learned_law, network, weights
-from ..nclaw.bodies import dim_of
-from ..nclaw.strain_watch import known
+from ..materials.learned import learned_flow, learned_law, weights
+from ..materials.learned.strain_range import stored_bounds
+from ..materials.learned.table import TABLES
+from ..materials.learned.weights import dim_of
 from ..sampling import Regular, Samplings
 from ..shapes import Analytic, Shape
 from ..shapes.quantities import (
@@ -38,7 +39,6 @@ WallNodes = Annotated[tuple[Node | Literal["open"], ...], Meta(min_length=2, max
 Table = Annotated[tuple[Coordinate | Vector, ...], Meta(min_length=2)]
 Number = Annotated[float, Meta(ge=-1e30, le=1e30)]
 NEURAL = "neural"       # the law whose parameters are a file
-LEARNED = *network.STRESSES, *network.CORRECTIONS, *admissible.MADE       # kinds that it may hold
 
 
 class Flow(Record):
@@ -94,14 +94,15 @@ class Material(Record):
         parameters = _given(self.flow, "type")
         return make_flow(self.flow.type, self.elastic(), dim, **parameters)
 
-    def seen(self, dim):
-        """What its laws saw in training (see `nclaw.strain_watch.known`); None where that is not
-        known. Raises ValueError for weights that say something else.
+    def strain_bounds(self, dim):
+        """Return the strains that its laws met in training, as `stored_bounds` does, or None.
+
+        Raises ValueError for weights that say something else.
         """
-        return known(self.trained().about, dim) if self.is_neural else None
+        return stored_bounds(self.trained().about, dim) if self.is_neural else None
 
     def trained(self, dim=None):
-        """`learned.weights.Laws` of its file. Raises ValueError for a file that holds none, or for
+        """`LearnedLaws` of its file. Raises ValueError for a file that holds none, or for
         other dimensions, and for keys beside it.
         """
         beside = [*_given(self, "law", "weights", "sha256", "flow")]
@@ -121,7 +122,7 @@ class Material(Record):
     def _require_kinds(self, laws):
         for part in weights.PARTS:
             kind = type(getattr(laws, part).kind)
-            if kind not in LEARNED:
+            if not TABLES[part][kind].in_scenes:
                 raise ValueError(
                     f"weights = {self.weights!r}: its {part} law is of kind {kind.__name__}; "
                     'expected networks as of the methods "ours" or "admissible"; `mpm-ref law '

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from ..energy import energy
 from ..monitor import Unstable, check
-from ..nclaw.strain_watch import watch as range_watch
+from ..nclaw.strain_watch import strain_watch as range_watch
 from ..simulate import Frame, State, ended, frame_is_due, rebound, simulate
 from ..timestep import TooLarge
 from . import checkpoint

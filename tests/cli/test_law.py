@@ -10,7 +10,7 @@ torch = pytest.importorskip("torch")
 
 from mpm_ref.cli import law_train  # noqa: E402
 from mpm_ref.materials.learned import weights  # noqa: E402
-from mpm_ref.materials.learned.strain_range import seen  # noqa: E402
+from mpm_ref.materials.learned.strain_range import strain_bounds  # noqa: E402
 from mpm_ref.nclaw.batched_step import world  # noqa: E402
 from mpm_ref.nclaw.study import tables  # noqa: E402
 from mpm_ref.nclaw.study.study import load  # noqa: E402
@@ -73,7 +73,7 @@ def test_weights_say_how_they_were_made(made):
     assert (about["method"], about["dt"], about["threads"]) == ("ours", 5e-4, 1)
     assert about["recipe"]["epochs"] == len(about["errors"]) == 4
     assert about["torch"] == torch.__version__
-    assert about["seen"] == seen(observed(study.problem()).F)
+    assert about["seen"] == strain_bounds(observed(study.problem()).F)
     assert about["command"] == (f"mpm-ref law train {made / 'cubes.toml'} --out "
                                 f"{made / 'whole.npz'} --threads 1")
 

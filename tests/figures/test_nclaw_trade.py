@@ -11,7 +11,7 @@ from figures.extremes import nclaw as extremes_nclaw
 from figures.extremes import nclaw_epochs
 from figures.trade import nclaw as trade_nclaw
 from figures.trade import nclaw_inference
-from mpm_ref.nclaw.strain_watch import BEYOND
+from mpm_ref.nclaw.strain_watch import MAX_EXCESS
 from validation.extremes.nclaw_runs import BAD
 from validation.nclaw.observation import Seen
 from validation.nclaw.small_trainings import BASE, SEEDS, small_nets
@@ -145,7 +145,7 @@ def test_runs_stand_by_how_far_they_leave_the_training(extremes):
     assert len(found["sand"].get_xydata()) == 0
     level, upright = extremes[0].lines[-2:]
     assert list(level.get_ydata()) == [BAD, BAD]
-    assert list(upright.get_xdata()) == [BEYOND, BEYOND]
+    assert list(upright.get_xdata()) == [MAX_EXCESS, MAX_EXCESS]
 
 
 def test_rates_are_shares_of_good_and_of_bad_runs(extremes):

@@ -78,7 +78,7 @@ def test_work_is_energy_and_what_returns_take(pair, closed):
 
 def test_a_stress_without_energy_creates_some():
     """What a loop takes it gives back the other way round: half of them create."""
-    law = network.elastic(neural_toys.trained(response.Stress(1e4), 3))
+    law = network.build_law(neural_toys.trained(response.Stress(1e4), 3))
     G = loops(30, 0.1, 100, np.random.default_rng(0))
     one, other = balance(law, NoFlow(), G), balance(law, NoFlow(), G[::-1])
     assert one.work == pytest.approx(-other.work, rel=1e-6, abs=1e-9 * one.moved.max())
@@ -91,7 +91,7 @@ def test_a_return_that_adds_strain_is_told(closed):
     grown = neural_toys.trained(response.Correction(), 3, hidden=())
     W = np.zeros((13, 9))
     W[[3, 7, 11], [0, 4, 8]] = 20.0         # F' = F + alpha R diag(20 (C - I)): more of the same
-    flow = network.plastic(grown._replace(layers=((W, np.zeros(9)),)))
+    flow = network.build_flow(grown._replace(layers=((W, np.zeros(9)),)))
     found = balance(CLAY, flow, closed)
     assert found.taken.max() < 0.0
     assert found.share.min() < -CREATED
@@ -110,7 +110,7 @@ def results(tmp_path, monkeypatch, laws):
 
 
 def test_the_experiment_tells_laws_apart(tmp_path, monkeypatch):
-    stress = network.elastic(neural_toys.trained(response.Stress(1e4), 3))
+    stress = network.build_law(neural_toys.trained(response.Stress(1e4), 3))
     records, found = results(tmp_path, monkeypatch, {
         ("true", "jelly"): Pair(JELLY, NoFlow()), ("ours", "jelly"): Pair(stress, NoFlow()),
         ("admissible", "plasticine"): Pair(*toys.deployed(shift=2.0))})
@@ -127,7 +127,7 @@ def test_the_experiment_tells_laws_apart(tmp_path, monkeypatch):
 
 
 def test_laws_that_must_not_create_energy_miss_if_they_do(tmp_path, monkeypatch):
-    stress = network.elastic(neural_toys.trained(response.Stress(1e4), 3))
+    stress = network.build_law(neural_toys.trained(response.Stress(1e4), 3))
     records, _ = results(tmp_path, monkeypatch, {
         ("admissible", "jelly"): Pair(stress, NoFlow())})
     assert records["nclaw.dissipation.admissible.jelly.cycles.0.1.creating"].verdict == "miss"

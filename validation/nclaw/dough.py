@@ -114,7 +114,7 @@ def film(x):
 
 @cache
 def trained(name):
-    """`learned.weights.Laws` of `doughs` by name; errors as of `nets.trained`."""
+    """`LearnedLaws` of `doughs` by name; errors as of `nets.trained`."""
     return stored(name, identity(doughs()[name]))
 
 

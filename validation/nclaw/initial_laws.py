@@ -12,20 +12,20 @@ from math import sqrt
 import numpy as np
 
 from mpm_ref.materials.learned.response import Correction, Stress
-from mpm_ref.materials.learned.weights import Laws, Trained
+from mpm_ref.materials.learned.weights import LawWeights, LearnedLaws
 
 SIZES = (13, 64, 64, 9)
 BITS = 24
 
 
 def untrained(seed=0, elastic=None, plastic=None):
-    """`learned.weights.Laws` of a seed, the elastic law drawn first; with answers of
+    """`LearnedLaws` of a seed, the elastic law drawn first; with answers of
     `learned.response`.
     """
     draws = np.random.RandomState(seed)
     kinds = Stress() if elastic is None else elastic, Correction() if plastic is None else plastic
-    laws = [Trained(tuple(layers(draws)), kind) for kind in kinds]
-    return Laws(*laws, {"seed": seed, "epochs": 0})
+    laws = [LawWeights(tuple(layers(draws)), kind) for kind in kinds]
+    return LearnedLaws(*laws, {"seed": seed, "epochs": 0})
 
 
 def layers(draws):

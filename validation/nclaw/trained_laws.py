@@ -79,7 +79,7 @@ def others(name):
 
 @cache
 def trained(name):
-    """`learned.weights.Laws` by name, or `nclaw.gnn.simulator.Simulator`. Raises `Untrained` where
+    """`LearnedLaws` by name, or `nclaw.gnn.simulator.Simulator`. Raises `Untrained` where
     they are missing, ValueError where they are damaged, or of another training or another scene
     than `nets` says now.
     """

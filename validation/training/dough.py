@@ -42,7 +42,7 @@ def seen():
 
 def begun(net):
     """`rollout.Laws` before training on the film."""
-    kinds = weights.RECORDS[net.elastic](), weights.RECORDS[net.plastic]()
+    kinds = weights.RESPONSES[net.elastic](), weights.RESPONSES[net.plastic]()
     laws = laws_of(net.method, net.seed, *kinds)
     if net.guessed:
         problem, run = run_of(material(**GUESS))
@@ -60,7 +60,7 @@ def recipe_of(net, steps):
 
 
 def filmed_laws(name, net, checkpoint, threads):
-    """`learned.weights.Laws` of a `DoughNet` by name, with what is to be known of them; of a
+    """`LearnedLaws` of a `DoughNet` by name, with what is to be known of them; of a
     training that diverges, that alone: plain values.
     """
     where, film = seen()

@@ -37,7 +37,7 @@ ROOT = Path(__file__).parents[2]
 def begun(net):
     """`Laws` of a net before training."""
     kinds = () if net.method == SYS_ID else (
-        weights.RECORDS[net.elastic](), weights.RECORDS[net.plastic]())
+        weights.RESPONSES[net.elastic](), weights.RESPONSES[net.plastic]())
     return train.begun(net.method, net.seed, kinds, environment(net.environment).body[0].material)
 
 
@@ -48,7 +48,7 @@ def taught(net, recipe, laws, checkpoint, show):
 
 
 def made(name, checkpoints, threads):
-    """`learned.weights.Laws` of a net by name, with what is to be known of them; of a training that
+    """`LearnedLaws` of a net by name, with what is to be known of them; of a training that
     diverges, that alone: plain values.
     """
     net, path = nets()[name], checkpoints / f"{name}.pt"
@@ -85,7 +85,7 @@ def known_of(name, recipe, threads):
 
 def written(path, found):
     """Write what `made` found: weights, or beside them how far a training came."""
-    if isinstance(found, weights.Laws):
+    if isinstance(found, weights.LearnedLaws):
         weights.save(path, found)
         diverged.beside(path).unlink(missing_ok=True)
     else:

@@ -76,9 +76,9 @@ class Keeper:
         self.since = process_time()
 
     def stored(self, epoch):
-        """`weights.Laws` as they are."""
+        """`LearnedLaws` as they are."""
         net, recipe, laws, (seen, data) = self.of
-        made = weights.Laws(*map(trained_of, laws), {})
+        made = weights.LearnedLaws(*map(trained_of, laws), {})
         cuts = data.restarts(cuts_of(recipe, len(seen.x) - 1, epoch))
         bounds = met(build(net.taken), seen, learned(made), cuts)
         return made._replace(about={"seen": bounds, "dt": net.scene.dt})

@@ -3,7 +3,7 @@
 import torch
 
 from ...materials import Fluid, FluidProjection, NoFlow, make_flow, make_law
-from ...materials.learned.weights import Laws
+from ...materials.learned.weights import LearnedLaws
 from ..batched_step import world
 from . import sysid
 from .fit import Diverged, train
@@ -56,8 +56,8 @@ def taught(method, recipe, laws, seen, checkpoint=None, on_epoch=None):
 
 
 def stored(laws, about):
-    """`weights.Laws` of laws that were trained."""
-    return Laws(*map(trained_of, laws), about)
+    """`LearnedLaws` of laws that were trained."""
+    return LearnedLaws(*map(trained_of, laws), about)
 
 
 def use_threads(n):

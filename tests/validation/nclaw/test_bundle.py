@@ -121,7 +121,7 @@ def test_a_training_that_kept_nothing_is_a_file_too(tmp_path):
 
 
 def test_doubles_are_refused(tmp_path):
-    exact = weights.Laws(law(response.Stress(), 3), law(response.Correction(), 3), {})
+    exact = weights.LearnedLaws(law(response.Stress(), 3), law(response.Correction(), 3), {})
     with pytest.raises(ValueError, match=r"a\.npz is not written: elastic_W0 has more digits than"):
         bundle.save(tmp_path / "a.npz", Bundle({1: exact}, {}))
     assert not list(tmp_path.iterdir())

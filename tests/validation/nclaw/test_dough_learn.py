@@ -31,14 +31,14 @@ H = 1e-3 * 0.5 ** np.arange(5)
 
 @pytest.fixture(scope="module")
 def true():
-    """`Problem` and `Observed` of the block."""
-    return dough.run_of()
+    """`Problem` and `cases.Observed` of the block."""
+    return dough_training.run_of()
 
 
 @pytest.fixture(scope="module")
 def seen():
     """`World` and `Film` of the block."""
-    return dough.seen()
+    return dough_training.seen()
 
 
 def exact(problem):
@@ -92,7 +92,7 @@ def test_the_state_is_known_at_the_start_alone(true, seen):
 def test_horizons_grow_to_the_whole_run(seen):
     net = dough.doughs()["dough"]
     steps = len(seen[1].x) - 1
-    recipe = dough.recipe_of(net, steps)
+    recipe = dough_training.recipe_of(net, steps)
     ends = [seen[1].restarts(recipe.teacher.restarts(steps, epoch, net.epochs))
             for epoch in range(net.epochs)]
     assert all(start == 0 and len(rest) == 1 for start, *rest in ends)
@@ -155,7 +155,7 @@ def test_the_command_writes_weights_that_are_taken(tmp_path, monkeypatch):
     assert laws.elastic.kind._fields == ("unit",)
     assert len(laws.about["errors"]) == 1
     assert laws.about["command"] == "python -m validation.training.nclaw dough"
-    assert world(dough.run_of()[0]).dt == pytest.approx(1.0 / 2880.0)
+    assert world(dough_training.run_of()[0]).dt == pytest.approx(1.0 / 2880.0)
 
 
 def test_errors_of_a_training_that_diverges_are_kept(tmp_path, monkeypatch):

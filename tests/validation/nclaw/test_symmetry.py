@@ -17,7 +17,7 @@ from validation.nclaw.environments import ENVIRONMENTS
 
 def test_the_skew_part_is_that_of_the_paper_s_stress():
     of, F = trained(response.Stress(neural_toys.UNIT), 3), deformations(3)
-    skew, size = symmetry.split(network.elastic(of), F)
+    skew, size = symmetry.split(network.build_law(of), F)
     tau = np.array([plain(of, one) for one in F])
     assert size == pytest.approx(np.linalg.norm(tau, axis=(1, 2)), rel=1e-9)
     expected = np.sqrt(sum((tau[:, a, b] - tau[:, b, a]) ** 2 for a, b in ((0, 1), (0, 2), (1, 2)))
@@ -27,7 +27,7 @@ def test_the_skew_part_is_that_of_the_paper_s_stress():
 
 
 @pytest.mark.parametrize("law", [
-    network.elastic(trained(response.SymmetricStress(neural_toys.UNIT), 3)),
+    network.build_law(trained(response.SymmetricStress(neural_toys.UNIT), 3)),
     FixedCorotated(4e4, 3e4), Fluid(5e4)], ids=["learned", "jelly", "water"])
 def test_other_stresses_are_symmetric(law):
     skew, size = symmetry.split(law, deformations(3))

@@ -148,7 +148,7 @@ def test_all_weights_are_rounded():
 def weights_of(*numbers):
     """Laws of two layers of these weights each, and biases of zero."""
     layer = np.array([numbers]), np.zeros(len(numbers))
-    return weights.Laws(*[weights.Trained((layer, layer), None)] * 2, {})
+    return weights.LearnedLaws(*[weights.LawWeights((layer, layer), None)] * 2, {})
 
 
 @pytest.mark.parametrize(("numbers", "exponent"), [
