@@ -5,7 +5,7 @@ from command_line import assert_told, mpm_ref
 from small_laws import DT, E, write_study
 
 from mpm_ref.cli.catalogue import shipped_scenes, shipped_studies
-from mpm_ref.materials.learned.weights import KINDS
+from mpm_ref.materials.learned.table import KINDS
 from mpm_ref.nclaw.study import tables
 from mpm_ref.nclaw.study.study import load
 from mpm_ref.nclaw.train.recipe import Recipe

@@ -19,7 +19,7 @@ from ...store.weights_file import read, stated, write
 from .energetic import Energetic
 from .network import dim_of_inputs
 from .response import CORRECTIONS, STRESSES
-from .table import TABLES
+from .table import KINDS, TABLES
 
 FORMAT = 1
 PARTS = tuple(TABLES)       # of a file: "elastic", "plastic"
@@ -86,7 +86,7 @@ def law_arrays(part, law):
 
 def law_from_arrays(part, arrays):
     """`LawWeights` from the arrays of a file."""
-    kind = RESPONSES[str(arrays[f"{part}_kind"])]
+    kind = KINDS[str(arrays[f"{part}_kind"])]
     layers = tuple((arrays[f"{part}_W{k}"], arrays[f"{part}_b{k}"])
                    for k in range(depth(part, arrays)))
     return LawWeights(layers, kind(*arrays[f"{part}_constants"].tolist()))
@@ -124,7 +124,7 @@ def fault_of_law(part, arrays):
     for name in (*names, f"{part}_constants"):
         if arrays[name].dtype != float or not np.isfinite(arrays[name]).all():
             return f"{name} has entries that are not finite numbers"
-    if arrays[f"{part}_constants"].shape != (len(RESPONSES[kind]._fields),):
+    if arrays[f"{part}_constants"].shape != (len(KINDS[kind]._fields),):
         return f"{part} law with constants {arrays[f'{part}_constants']}"
     if kind == Energetic.__name__ and any((arrays[f"{part}_W{k}"] < 0.0).any()
                                           for k in range(layers)):
