@@ -201,10 +201,11 @@ def training_lines(about):
 
 
 def sizes_text(map):
-    """Numbers of modes or widths of networks, and what the stress is told, in words."""
-    told = f"the stress is{'' if map['told'] else ' not'} told the parameters"
+    """Return the numbers of modes or widths of networks, and whether the stress sees mu."""
+    sees = "sees" if map["stress_sees_parameters"] else "does not see"
+    sees = f"the stress {sees} the parameters"
     if map["kind"] == NETWORK:
         waves = f", octaves of sines and cosines: {map['octaves']}" if map["octaves"] else ""
-        return f"factors of width {', '.join(str(one) for one in map['beta'])}{waves}; {told}"
+        return f"factors of width {', '.join(str(one) for one in map['beta'])}{waves}; {sees}"
     modes = ", ".join(f"{map[name]} of {what}" for name, what in OF.items() if map[name])
-    return f"modes: {modes}; {told}"
+    return f"modes: {modes}; {sees}"

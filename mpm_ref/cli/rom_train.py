@@ -154,7 +154,7 @@ def require_device(kind, device):
     none, or no PyTorch.
     """
     if kind == NETWORK:
-        reduce.training("rom.train.device").device_of(device)
+        reduce.training().device_of(device)
     elif device != DEVICES[0]:
         raise ValueError(f"--threads {device}: {kind} are made on the processor; leave it out")
 

@@ -110,9 +110,9 @@ def test_fields_are_those_of_the_training_runs(made, pairs):
     assert model.about["fit"]["errors"]["origin"] == pytest.approx(off, rel=1e-4)
 
 
-def test_the_stress_is_told_the_parameters_where_the_study_says_so(made, tmp_path):
+def test_the_stress_sees_the_parameters_where_the_study_says_so(made, tmp_path):
     out = tmp_path / "fields.npz"
-    study = write(tmp_path, ("r = 3", "r = 3\ntold = false"))
+    study = write(tmp_path, ("r = 3", "r = 3\nstress_sees_parameters = false"))
     done = mpm_ref("rom", "train", study, "--data", made / "data", "--out", out)
     assert done.exit_code == 0, done.output
     assert reduce.read(made / "fields.npz").decoder.mu.shape == (1,)
@@ -120,7 +120,7 @@ def test_the_stress_is_told_the_parameters_where_the_study_says_so(made, tmp_pat
 
 
 def test_fields_of_a_single_run_ignore_its_parameter(tmp_path):
-    """They are told a parameter that does not vary, and are asked in a run with another."""
+    """They see a parameter that does not vary, and are asked in a run with another."""
     study = write(tmp_path, ("from = 1.6\nto = 2.4\ncount = 4", "values = [1.7, 2.4]"))
     data, out = tmp_path / "data", tmp_path / "fields.npz"
     for command in (("generate", study, "--out", data),
@@ -273,8 +273,8 @@ def test_a_run_that_breaks_down_is_infinitely_off(made, pairs, tmp_path):
 
 def test_info_knows_study_fields_and_results(made, pairs, reduced):
     study, n = made / "pairs.toml", len(whole(pairs.base).X)
-    modes = ("modes: 5 of the displacement, 8 of the stress, 8 of the affine field; the stress is "
-             "told the parameters")
+    modes = ("modes: 5 of the displacement, 8 of the stress, 8 of the affine field; the stress "
+             "sees the parameters")
     assert mpm_ref("info", study).stdout.splitlines() == [
         f"{study}: a study, Two disks: 4 runs of the scene disks.toml, 1 held out",
         f"2D, {n} points, dx = 0.1 m, {STEPS} steps of 0.002 s, one in 2 kept",

@@ -25,9 +25,9 @@ FLOORS = (
     ("core.boundary",),
     ("core.adjoint.boundary",),
     ("core core.adjoint",),
-    ("materials", "plain", "training",
-     "store.atomic"),
+    ("materials", "plain", "store.atomic"),
     ("body", "store.weights_file", "store.memmap"),
+    ("training",),
     ("materials.learned",),
     ("explicit", "energy"),
     ("timestep", "monitor", "adjoint"),
@@ -44,7 +44,7 @@ FLOORS = (
     ("__main__",),
 )
 OUTSIDE = {"validation", "figures", "benchmarks", "tests"}      # floor 9 and what tests it
-TRAINING = ("rom", "nclaw")                                     # the only files that know torch
+TRAINING = ("rom", "nclaw", "training")                         # the only files that know torch
 LATE = {"torch", "matplotlib", "vtk", "trimesh", "taichi", "warp", "PIL"}   # also in functions
 
 

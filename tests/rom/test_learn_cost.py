@@ -10,7 +10,7 @@ torch = pytest.importorskip("torch")
 from mpm_ref import training  # noqa: E402
 from mpm_ref.rom.study.reduce import of_trained  # noqa: E402
 from mpm_ref.rom.train import decoder  # noqa: E402
-from mpm_ref.rom.train.decoder import Training, train  # noqa: E402
+from mpm_ref.rom.train.decoder import DecoderTraining, train_decoder  # noqa: E402
 
 
 @pytest.fixture
@@ -30,7 +30,7 @@ def trained(clock, path, until=None):
         if len(history) == until:
             raise KeyboardInterrupt
 
-    return train(Training(2, (6,), epochs=7), rom_toys.snapshots(2), path, on_epoch)
+    return train_decoder(DecoderTraining(2, (6,), epochs=7), rom_toys.snapshots(2), path, on_epoch)
 
 
 def test_the_cost_of_a_training_is_that_of_all_its_parts(clock, tmp_path):

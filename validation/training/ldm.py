@@ -11,9 +11,9 @@ import typer
 from tqdm import tqdm
 
 from mpm_ref.rom.study.reduce import of_trained
-from mpm_ref.rom.train.decoder import Training, train
-from mpm_ref.rom.train.device import device_of
-from mpm_ref.rom.train.loss import READINGS, Weights
+from mpm_ref.rom.train.decoder import DecoderTraining, train_decoder
+from mpm_ref.rom.train.loss import READINGS, LossWeights
+from mpm_ref.rom.train.settings import device_of
 from mpm_ref.rom.weights import save
 from mpm_ref.training import DEVICES, Machine
 
@@ -25,11 +25,12 @@ ROOT = Path(__file__).parents[2]
 
 
 def training(net):
-    """`Training` of a `Net`."""
+    """`DecoderTraining` of a `Net`."""
     shares, weights = SHARES[net.terms], READINGS[net.reading]
-    scaled = Weights(*(share * weight for share, weight in zip(shares, weights, strict=True)))
-    return Training(net.r, weights=scaled, epochs=net.epochs, batch=net.batch, points=net.points,
-                    dense=net.dense, thin=net.thin, latent=net.latent, seed=net.seed)
+    scaled = LossWeights(*(share * weight for share, weight in zip(shares, weights, strict=True)))
+    return DecoderTraining(net.r, weights=scaled, epochs=net.epochs, batch=net.batch,
+                           points=net.points, dense=net.dense, every=net.thin, latent=net.latent,
+                           seed=net.seed)
 
 
 def made(name, checkpoints, machine):
@@ -40,7 +41,8 @@ def made(name, checkpoints, machine):
         def show(history):
             bar.update(len(history) - bar.n)
             bar.set_postfix(loss=f"{history[-1][0]:.2e}")
-        done = train(plan, snapshots, checkpoints / f"{name}.pt", show, device_of(machine.device))
+        done = train_decoder(plan, snapshots, checkpoints / f"{name}.pt", show,
+                             device_of(machine.device))
     return of_trained(done, snapshots.X, {
         **identity(net), "training": asdict(plan),
         "command": f"python -m validation.training.ldm {name}",

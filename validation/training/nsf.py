@@ -15,10 +15,10 @@ from tqdm import tqdm
 from mpm_ref.rom.fields_file import save
 from mpm_ref.rom.snapshots import joined
 from mpm_ref.rom.study.nsf_case import history
-from mpm_ref.rom.train.decoder import Training
-from mpm_ref.rom.train.device import device_of
+from mpm_ref.rom.train.decoder import DecoderTraining
 from mpm_ref.rom.train.field import FieldTraining
-from mpm_ref.rom.train.stages import POSITION, Plan, train
+from mpm_ref.rom.train.settings import device_of
+from mpm_ref.rom.train.stages import POSITION, StagePlan, train_stages
 from mpm_ref.training import DEVICES, Cost, Machine
 
 from ..common.provenance import commit, provenance
@@ -31,14 +31,14 @@ LEVELS = 12         # time levels of each run that errors are of, about
 
 
 def plan_of(net):
-    """`Plan` of a `Net`."""
+    """`StagePlan` of a `Net`."""
     how = {name: getattr(net, name) for name in ("batch", "points", "schedule", "seed")}
     follows = {"h": net.study.follows, "l": False}
-    g = Training(net.study.sizes.r, net.g.hidden, net.latent, POSITION, net.g.epochs,
-                 beside=net.g.beside, **how)
-    return Plan(g, *(FieldTraining(own.hidden, follows[name], own.epochs, beside=own.beside,
-                                   octaves=net.octaves, **how)
-                     for name, own in (("h", net.h), ("l", net.l))))
+    g = DecoderTraining(net.study.sizes.r, net.g.hidden, net.latent, POSITION, net.g.epochs,
+                        jitter=net.g.beside, **how)
+    return StagePlan(g, *(FieldTraining(own.hidden, follows[name], own.epochs, jitter=own.beside,
+                                        octaves=net.octaves, **how)
+                          for name, own in (("h", net.h), ("l", net.l))))
 
 
 def runs_of(study):
@@ -75,8 +75,8 @@ def made(name, checkpoints, machine):
     checkpoints.mkdir(parents=True, exist_ok=True)
     runs = runs_of(net.study)
     with tqdm(total=Work.total(net), desc=name, unit_scale=True) as bar:
-        done = train(plan_of(net), runs, checkpoints, Work(net, bar).show,
-                     device_of(machine.device))
+        done = train_stages(plan_of(net), runs, checkpoints, Work(net, bar).show,
+                            device_of(machine.device))
     stages = done._asdict().items()
     took = {f"{clock}_seconds": {stage: round(getattr(own.cost, clock), 1) for stage, own in stages}
             for clock in Cost._fields}

@@ -15,7 +15,7 @@ def made(study, histories):
     the states kept. Raises ValueError for more modes than these hold.
     """
     map = study.tables.map
-    return spanned(histories, map.sizes, BLOCK * study.base.dx, map.told)
+    return spanned(histories, map.sizes, BLOCK * study.base.dx, map.stress_sees_parameters)
 
 
 def of_run(fields, whole, mu):

@@ -30,7 +30,7 @@ class Networks(NamedTuple):
 
 
 def trained(fitted, map, histories, folder, on_epoch):
-    """`Model` of networks trained by `fitted`, a function as `rom.train.settings_fields` has it
+    """`Model` of networks trained by `fitted`, a function as `rom.train.settings.fit_stages`
     without machine, with the settings of a `tables.Fields` on `Histories`.
 
     folder: for checkpoints of the stages, made where it is not; on_epoch(history) is called after

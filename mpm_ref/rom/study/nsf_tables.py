@@ -14,9 +14,9 @@ from .tables import MODES, NETWORK, Kinds, Runs, Table, one_of
 
 NUMBERS = ("modes", "tau", "C", "weight", "smoothing")     # of `Sizes`
 KEYS = {                            # of fields of each kind, beside `kind` and `r`
-    MODES: (*NUMBERS, "told"),
-    NETWORK: ("told", "beta", "octaves", "latent", "schedule", "epochs", "field_epochs", "batch",
-              "points", "seed"),
+    MODES: (*NUMBERS, "stress_sees_parameters"),
+    NETWORK: ("stress_sees_parameters", "beta", "octaves", "latent", "schedule", "epochs",
+              "field_epochs", "batch", "points", "seed"),
 }
 LATENTS, SCHEDULES = ("encoder-nsf", "free", MODES), ("steps", "cosine")    # see `rom.train`
 SIZES = Sizes._field_defaults
@@ -28,14 +28,14 @@ Step = Annotated[float, Meta(ge=0.01)]
 
 class Fields(Kinds):
     """The fields: sums of modes (see `rom.fields.pod_fields`), or networks and how they are
-    trained (see `rom.train.settings_fields`).
+    trained (see `rom.train.settings.stage_plan`).
     """
 
     keys: ClassVar[dict] = KEYS
     modes: Count = SIZES["modes"]               # of the displacement, r of them free
     tau: Count = SIZES["tau"]                   # of the stress
     C: Natural = SIZES["C"]                     # of the affine field; 0: there is none
-    told: bool = True                           # whether the stress is told the parameters
+    stress_sees_parameters: bool = True         # whether it is a function of them (NSF-mu-dep)
     weight: Positive = SIZES["weight"]          # of these beside latent coordinates
     smoothing: NotNegative = SIZES["smoothing"]
     beta: Factors = (16, 16, 16)                # widths of hidden layers over numbers of values

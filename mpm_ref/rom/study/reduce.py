@@ -47,23 +47,23 @@ def computed(study, snapshots, about):
 
 def learned(study, snapshots, about, checkpoint, on_epoch, machine):
     """`Model` of a network trained on `Snapshots`, or of NSF's on `Histories`, on a
-    `learning.Machine`; checkpoint and on_epoch as for `train.decoder.train`, the one a folder for
-    NSF. Raises ValueError without PyTorch, and for a checkpoint of another training.
+    `learning.Machine`; checkpoint and on_epoch as for `train.decoder.train_decoder`, the one a
+    folder for NSF. Raises ValueError without PyTorch, and for a checkpoint of another training.
     """
     if study.tables.model == NSF:
         return inferred(study, snapshots, about, checkpoint, on_epoch, machine)
     settings = {name: getattr(study.tables.map, name) for name in ("r", *KEYS[NETWORK])}
-    drive = training()
-    settings["weights"] = drive.weights(settings["weights"], *larger(study.base))
-    done = drive.fitted(settings, snapshots, checkpoint, on_epoch, machine)
+    train = training()
+    settings["weights"] = train.loss_weights(settings["weights"], *larger(study.base))
+    done = train.fit_decoder(settings, snapshots, checkpoint, on_epoch, machine)
     return measured(of_trained(done, snapshots.X, about | identity(study) | machine._asdict() | {
-        "torch": drive.version()}), snapshots)
+        "torch": train.torch_version()}), snapshots)
 
 
 def inferred(study, histories, about, folder, on_epoch, machine):
     """`Model` of NSF's three networks trained on `Histories`, as `learned` has it."""
-    how = about | identity(study) | machine._asdict() | {"torch": training().version()}
-    fitted = partial(training("rom.train.settings_fields").fitted, machine=machine)
+    how = about | identity(study) | machine._asdict() | {"torch": training().torch_version()}
+    fitted = partial(training().fit_stages, machine=machine)
     model = nsf_networks.trained(fitted, study.tables.map, histories, folder, on_epoch)
     return measured(model._replace(about=how | model.about), histories, nsf.misfit)
 
@@ -87,8 +87,8 @@ def measured(model, snapshots, misfit=misfit):
 
 
 def of_trained(done, X, about):
-    """`Model` of a `train.decoder.Trained` for points X (n, d) at rest [m]; what the training took
-    and the loss of some epochs are added to what is to be known of it.
+    """`Model` of a `train.decoder.TrainedDecoder` for points X (n, d) at rest [m]; what the
+    training took and the loss of some epochs are added to what is to be known of it.
     """
     rest = initial(done.decoder, X, xhat=done.xhat[:, 0].mean(axis=0)).xhat
     loss = done.history[::max(1, len(done.history) // KEPT)].tolist()
@@ -104,9 +104,9 @@ def larger(scene):
     return float((body.high - body.low).max()) / SIDE, scene.dt / STEP
 
 
-def training(name="rom.train.settings"):
-    """A part of the package that trains networks. Raises ValueError without PyTorch."""
-    return part(name, "a network is trained",
+def training():
+    """Return `rom.train.settings`, which trains networks. Raises ValueError without PyTorch."""
+    return part("rom.train.settings", "a network is trained",
                 f"or make modes, which need none: --kind {MODES}")
 
 

@@ -15,7 +15,8 @@ MODES, CURVED, NETWORK = "modes", "curved", "network"
 KEYS = {                            # of a map of each kind, beside `kind` and `r`
     MODES: (),
     CURVED: ("modes", "degree"),
-    NETWORK: ("hidden", "latent", "weights", "epochs", "batch", "points", "dense", "thin", "seed"),
+    NETWORK: ("hidden", "latent", "weights", "epochs", "batch", "points", "dense", "every",
+              "seed"),
 }
 GRID, LATIN = "grid", "latin"
 LATENTS = ("encoder", "free", MODES)                # see `rom.train.decoder.Training`
@@ -103,7 +104,7 @@ class Map(Kinds, kw_only=True):
     batch: Count = 8                            # snapshots at a time
     points: Natural = 0                         # of each, anew each time; 0: all
     dense: Natural = 0                          # time levels that every epoch shows; of later
-    thin: Count = 1                             # ... ones, one in so many
+    every: Count = 1                            # ... ones, one in `every`
     seed: Seed = 0
 
     @property

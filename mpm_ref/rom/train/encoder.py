@@ -1,5 +1,5 @@
-"""Where latent coordinates of training snapshots come from: an encoder, one free vector each, or
-known beforehand.
+"""Sources of the latent coordinates of training snapshots: an encoder, one unknown vector for each
+snapshot, or vectors that are known beforehand.
 
 The encoder is a stack of one-dimensional convolutions and two full layers (LDM-tab1, NSF-encoder;
 see `architecture`). It ties the latent coordinates to one sampling of the body; online it is not
@@ -33,14 +33,14 @@ class Encoder(nn.Module):
             nn.init.xavier_uniform_(layer.weight)
 
     def forward(self, u):
-        """Latent coordinates (s, r) of displacements u (s, n, d)."""
+        """Return the latent coordinates (s, r) of displacements u (s, n, d)."""
         a = u.reshape(len(u), -1, self.rows).transpose(1, 2)
         for layer in self.convolutions:
             a = nn.functional.elu(layer(a))
         return self.last(nn.functional.elu(self.full(a.flatten(1))))
 
 
-class Free(nn.Module):
+class LatentTable(nn.Module):
     """Latent coordinates as unknowns of the training, one vector for each snapshot (LDMW-eq7)."""
 
     def __init__(self, snapshots, r):
@@ -49,11 +49,11 @@ class Free(nn.Module):
         nn.init.normal_(self.table.weight, std=0.1)
 
     def forward(self, index):
-        """Latent coordinates (s, r) of snapshots by number."""
+        """Return the latent coordinates (s, r) of snapshots by number."""
         return self.table(index)
 
 
-class Given(nn.Module):
+class FixedLatents(nn.Module):
     """Latent coordinates that are known before the training, one vector for each snapshot; and
     perhaps the modes (n, d, r) that they are of [m].
     """
@@ -65,11 +65,11 @@ class Given(nn.Module):
             modes, dtype=torch.float32), persistent=False)
 
     def forward(self, index):
-        """Latent coordinates (s, r) of snapshots by number."""
+        """Return the latent coordinates (s, r) of snapshots by number."""
         return self.table[index]
 
 
-def codes(encoder, u, batch=64):
-    """Latent coordinates of many snapshots u (s, n, d), without gradients."""
+def encode(encoder, u, batch=64):
+    """Return the latent coordinates of many snapshots u (s, n, d), without gradients."""
     with torch.no_grad():
         return torch.cat([encoder(u[i:i + batch]) for i in range(0, len(u), batch)])

@@ -8,24 +8,24 @@ PRINTED = (1e-3, 5e-4, 2e-4, 1e-4, 5e-5)    # one after the other, as many epoch
 
 
 def cosine(progress):
-    """From FASTEST to SLOWEST by half a cosine."""
-    return down(FASTEST, progress)
+    """Return the rate that falls from FASTEST to SLOWEST by half a cosine."""
+    return half_cosine(FASTEST, progress)
 
 
 def warm(progress):
-    """Up to FAST in equal steps, and from there to SLOWEST by half a cosine."""
+    """Return the rate that rises to FAST in equal steps, and falls to SLOWEST by half a cosine."""
     if progress < SOON:
         return FAST * progress / SOON
-    return down(FAST, (progress - SOON) / (1.0 - SOON))
+    return half_cosine(FAST, (progress - SOON) / (1.0 - SOON))
 
 
-def down(fastest, share):
-    """From a rate to SLOWEST by half a cosine, of which a share is done."""
+def half_cosine(fastest, share):
+    """Return the rate after a share of half a cosine from `fastest` to SLOWEST."""
     return SLOWEST + 0.5 * (fastest - SLOWEST) * (1.0 + cos(pi * share))
 
 
 def steps(progress):
-    """Down the rates of PRINTED in equal shares."""
+    """Return the rates of PRINTED one after the other, in equal shares."""
     return PRINTED[int(progress * len(PRINTED))]
 
 

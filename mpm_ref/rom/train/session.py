@@ -1,153 +1,133 @@
-"""What all trainings of networks share: seeds, batches, rates, checkpoints, history.
+"""Batches, learning rates and random numbers of a training of networks.
 
-A training that is cut off goes on from its last checkpoint. Its numbers are then those of an
-uninterrupted one, on the same machine with the same number of threads; its cost is the sum over its
-parts, of each up to its last checkpoint.
+A training that is cut off goes on from its last checkpoint (see `training`). Its numbers are then
+those of an uninterrupted one, on the same machine with the same number of threads; its cost is the
+sum over its parts, of each up to its last checkpoint.
 """
 
-import hashlib
-import io
 import json
 from dataclasses import asdict
 
-import numpy as np
 import torch
 
-from ...store import weights_file
-from ...training import Cost, Meter
+from ... import training
+from ...training import Diverged
 from .schedule import SCHEDULES
 
 SAVE = 20                           # epochs between checkpoints, but of a long training ...
-PARTS = 200                         # ... so many checkpoints in all
-FORMAT = 3                          # of checkpoints
-LATER = ("octaves",)                # settings older ones do not name; told where they are not 0
+PARTS = 200                         # ... this many checkpoints in all
+FORMAT = 4                          # of checkpoints
 
 
-class Diverged(ValueError):
-    """A loss is not finite."""
-
-
-class Session:
+class NetworkSession(training.Session):
     """Networks, optimiser and random numbers of a training under way.
 
-    `training` has the fields schedule, epochs, batch, points and seed; `of` is a digest of what is
-    trained on, so many snapshots of so many points; networks and data are on `device`, random
-    numbers and what they choose are not. A subclass says what it learns (`learn`) and what the
-    error is of (`error`).
+    `settings` has the fields schedule, epochs, batch, points and seed; `data` is a digest of the
+    training data, of `snapshots` snapshots at `points` points. Networks and data are on `device`;
+    random numbers, and what they choose, are on the processor. A subclass names the networks
+    (`learn`) and computes the error (`error`).
     """
 
-    def __init__(self, training, of, snapshots, points, device):
-        self.meter = Meter()
-        torch.manual_seed(training.seed)
-        self.training, self.of = training, of
+    def __init__(self, settings, data, snapshots, points, device):
+        super().__init__()
+        torch.manual_seed(settings.seed)
+        self.settings, self.data_digest = settings, data
         self.snapshots, self.points = snapshots, points
         self.device = device
-        self.random = torch.Generator().manual_seed(training.seed)
-        self.history = []
+        self.random = torch.Generator().manual_seed(settings.seed)
 
     def learn(self, **networks):
-        """Have these networks' weights as unknowns."""
+        """Take the weights of these networks as the unknowns."""
         self.networks = {name: net.to(self.device) for name, net in networks.items()}
         self.optimiser = torch.optim.Adam(
-            [own for net in networks.values() for own in net.parameters()])
+            [weights for net in networks.values() for weights in net.parameters()])
 
     @property
-    def named(self):
-        """The training's settings, and what it is trained on, as one line of text."""
-        settings = {name: value for name, value in asdict(self.training).items()
-                    if name not in LATER or value}
-        return json.dumps({"format": FORMAT, **settings, "data": self.of})
+    def description(self):
+        """The training's settings and the digest of its data, as one line of text."""
+        return json.dumps({"format": FORMAT, **asdict(self.settings), "data": self.data_digest})
+
+    def states(self):
+        """Return {name: objects with `state_dict` and `load_state_dict`} of a checkpoint."""
+        return {"random": [GeneratorState(self.random)], "optimiser": [self.optimiser],
+                **{name: [net] for name, net in self.networks.items()}}
 
     def order(self):
-        """Numbers of the snapshots that an epoch shows, at random."""
+        """Return the numbers of the snapshots that an epoch shows, in random order."""
         return torch.randperm(self.snapshots, generator=self.random)
 
     def epoch(self):
         """Show the snapshots of an epoch, a batch at a time."""
-        batches = self.order().split(self.training.batch)
-        done = [self.show(at, (len(self.history) + k / len(batches)) / self.training.epochs)
-                for k, at in enumerate(batches)]
-        self.history.append(torch.tensor(done).mean(dim=0).tolist())
+        batches = self.order().split(self.settings.batch)
+        rows = [self.show(batch, (len(self.history) + k / len(batches)) / self.settings.epochs)
+                for k, batch in enumerate(batches)]
+        self.history.append(torch.tensor(rows).mean(dim=0).tolist())
 
-    def show(self, at, progress):
-        """One step of the optimiser on a batch of snapshots; its loss and terms."""
+    def show(self, batch, progress):
+        """Make one step of the optimiser on a batch of snapshots (numbers); return its loss and
+        terms. Raises `Diverged`.
+        """
         for group in self.optimiser.param_groups:
-            group["lr"] = SCHEDULES[self.training.schedule](progress)
+            group["lr"] = SCHEDULES[self.settings.schedule](progress)
         self.optimiser.zero_grad()
-        total, found = self.error(at)
+        total, terms = self.error(batch)
         if not torch.isfinite(total):
             raise Diverged(f"epoch {len(self.history) + 1}: the loss is {total.item()}. Are the "
                            "data finite? If so, try smaller layers or another seed")
         total.backward()
         self.optimiser.step()
-        return [total.item(), *(term.item() for term in found)]
+        return [total.item(), *(term.item() for term in terms)]
 
-    def error(self, at):
-        """Loss of a batch of snapshots, and its terms: for the kinds of training to say."""
+    def error(self, batch):
+        """Return the loss of a batch of snapshots, and its terms."""
         raise NotImplementedError
 
-    def some_points(self):
-        """Numbers of the points that a batch is shown at."""
-        if not 0 < self.training.points < self.points:
+    def draw_points(self):
+        """Return the numbers of the points that a batch is shown at."""
+        if not 0 < self.settings.points < self.points:
             return torch.arange(self.points)
-        return torch.randperm(self.points, generator=self.random)[:self.training.points]
+        return torch.randperm(self.points, generator=self.random)[:self.settings.points]
 
-    def away(self, snapshots, r):
-        """Coordinates (snapshots, r) to show these beside their own, normal with deviations of up
-        to `training.beside`.
+    def draw_jitter(self, snapshots, r):
+        """Return differences of latent coordinates (snapshots, r), normal with deviations of up to
+        `settings.jitter`.
         """
-        far = self.training.beside * torch.rand(snapshots, 1, generator=self.random)
-        return (far * torch.randn(snapshots, r, generator=self.random)).to(self.device)
-
-    def save(self, path):
-        """Checkpoint, whole or not at all."""
-        content = io.BytesIO()
-        torch.save({"training": self.named, "random": self.random.get_state(),
-                    "optimiser": self.optimiser.state_dict(), "history": self.history,
-                    "cost": tuple(self.meter.total),
-                    **{name: net.state_dict() for name, net in self.networks.items()}}, content)
-        weights_file.write_sealed(path, content.getvalue())
-
-    def load(self, path):
-        """Go on from a checkpoint. Raises ValueError where it is damaged, or of another training
-        or other data.
-        """
-        kept = torch.load(io.BytesIO(weights_file.read_sealed(path)), map_location="cpu",
-                          weights_only=True)
-        weights_file.require_same_training(path, kept["training"], self.named)
-        for name, net in self.networks.items():
-            net.load_state_dict(kept[name])
-        self.optimiser.load_state_dict(kept["optimiser"])
-        self.random.set_state(kept["random"])
-        self.history, self.meter.before = kept["history"], Cost(*kept["cost"])
+        size = self.settings.jitter * torch.rand(snapshots, 1, generator=self.random)
+        return (size * torch.randn(snapshots, r, generator=self.random)).to(self.device)
 
 
-def saving(epochs, least):
-    """Epochs between the checkpoints of a training of so many: no fewer than the least."""
+class GeneratorState:
+    """The state of a random number generator, as a checkpoint stores it."""
+
+    def __init__(self, generator):
+        self.generator = generator
+
+    def state_dict(self):
+        """Return the state."""
+        return self.generator.get_state()
+
+    def load_state_dict(self, state):
+        """Set the state."""
+        self.generator.set_state(state)
+
+
+def checkpoint_interval(epochs, least):
+    """Return the epochs between the checkpoints of a training of `epochs`: at least `least`."""
     return max(least, epochs // PARTS)
 
 
-def require_sound(training, counts, or_zero):
-    """Raise ValueError unless the named settings of a training are at least 1, others 0 or more,
-    and its schedule is known.
+def require_valid(settings, counts, non_negative):
+    """Raise ValueError unless the settings named in `counts` are at least 1, those in
+    `non_negative` 0 or more, and the schedule exists.
     """
-    for names, least, said in ((counts, 1, "at least 1"), (or_zero, 0, "0 or more")):
+    for names, least, expected in ((counts, 1, "at least 1"), (non_negative, 0, "0 or more")):
         for name in names:
-            if getattr(training, name) < least:
-                raise ValueError(f"{name} = {getattr(training, name)}: expected {said}")
-    require_known("schedule", training.schedule, SCHEDULES)
+            if getattr(settings, name) < least:
+                raise ValueError(f"{name} = {getattr(settings, name)}: expected {expected}")
+    require_one_of("schedule", settings.schedule, SCHEDULES)
 
 
-def require_known(name, value, known):
-    """Raise ValueError unless a value is one of those known."""
-    if value not in known:
-        raise ValueError(f"{name} = {value!r}: expected one of {', '.join(known)}")
-
-
-def sha256(dt, arrays):
-    """Digest of what is trained on: the length of a step [s], and arrays."""
-    digest = hashlib.sha256(repr(float(dt)).encode())
-    for a in arrays:
-        digest.update(f"{a.shape} {a.dtype}".encode())
-        digest.update(np.ascontiguousarray(a))
-    return digest.hexdigest()
+def require_one_of(name, value, allowed):
+    """Raise ValueError unless a value is one of those allowed."""
+    if value not in allowed:
+        raise ValueError(f"{name} = {value!r}: expected one of {', '.join(allowed)}")

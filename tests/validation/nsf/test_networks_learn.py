@@ -35,9 +35,9 @@ def places(tmp_path, monkeypatch):
 def test_the_plan_is_that_of_the_net():
     net = NET._replace(study=STUDY._replace(follows=True))
     g, h, l = nsf.plan_of(net)
-    assert (g.r, g.hidden, g.latent, g.epochs, g.beside) == (3, (8,) * 5, "directions", 6, 0.1)
-    assert (h.hidden, h.follows, h.epochs, h.beside) == ((6,) * 5, True, 5, 0.01)
-    assert (l.hidden, l.follows, l.epochs, l.beside) == ((5,) * 5, False, 4, 0.0)
+    assert (g.r, g.hidden, g.latent, g.epochs, g.jitter) == (3, (8,) * 5, "directions", 6, 0.1)
+    assert (h.hidden, h.follows, h.epochs, h.jitter) == ((6,) * 5, True, 5, 0.01)
+    assert (l.hidden, l.follows, l.epochs, l.jitter) == ((5,) * 5, False, 4, 0.0)
     assert {(own.batch, own.points, own.schedule) for own in (g, h, l)} == {(8, 16, "warm")}
     assert not any(g.weights)
 
@@ -149,7 +149,7 @@ def kept_model(stages, xhat):
 
 
 def test_a_long_training_has_few_checkpoints():
-    assert [session.saving(epochs, 20) for epochs in (6, 4000, 5000)] == [20, 20, 25]
+    assert [session.checkpoint_interval(epochs, 20) for epochs in (6, 4000, 5000)] == [20, 20, 25]
 
 
 def test_runs_are_joined_in_single_precision():
