@@ -101,7 +101,7 @@ class FieldSession(NetworkSession):
         return torch.as_tensor(a, dtype=torch.float32, device=self.device)
 
     def result(self):
-        """Return `TrainedField`."""
+        """Return the `TrainedField`."""
         field = Field(network_of(self.f), self.units, self.settings.octaves)
         return TrainedField(field, np.array(self.history)[:, 0], self.meter.total)
 
