@@ -11,7 +11,7 @@ from figures import __main__ as cli
 from figures import frame
 from figures.common.orders import OTHERS, TRANSFERS, scales, shared
 from figures.frame import Drawn, draw_all, names
-from validation.common.results import Results
+from validation.common.results import ProfileResults
 
 SCALES = {"a.b.order": "8, dx = 0.1 m; twice", "a.b.end": "9, dx = 0.1 m"}
 RECORDS = [{"target": target, "value": 1.0, "unit": "1", "paper": None, "comparator": "info",
@@ -36,7 +36,7 @@ def draw(results):
 def results(tmp_path):
     (tmp_path / "quick").mkdir()
     (tmp_path / "quick" / "a.b.json").write_text(json.dumps(RECORDS))
-    return Results(tmp_path / "quick")
+    return ProfileResults(tmp_path / "quick")
 
 
 @pytest.mark.parametrize("name", names())

@@ -12,7 +12,7 @@ from figures.common.bodies import body, levelled, nothing, shades, side_by_side
 from figures.common.schemes import MARKS
 from figures.ldm import fig04, fig06, fig10, fig11, fig12, fig13, fig14, fig15, fig16
 from figures.ldmw import fig01, tables
-from validation.common.results import Results
+from validation.common.results import ProfileResults
 from validation.ldm.published_bodies import file_of
 
 mpl.use("Agg")
@@ -40,7 +40,7 @@ DRAWN = {"ldm.fig4": (fig04, 2), "ldm.fig6": (fig06, 3), "ldm.fig11": (fig11, 3)
 
 @pytest.fixture
 def results(tmp_path):
-    return Results(tmp_path)
+    return ProfileResults(tmp_path)
 
 
 def recorded(results, id, *targets, **more):

@@ -11,8 +11,8 @@ from figures.common.pairs import sides
 from figures.nclaw import fig02, fig03, fig06, fig07
 from mpm_ref.materials import Fluid, NoFlow
 from mpm_ref.nclaw.gnn.simulator import Simulator
-from validation.common.results import Results
-from validation.common.run import Setting, run_all
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.common.weights_needed import Untrained
 from validation.nclaw import other_bodies, states
 from validation.nclaw.evaluate import fresh
@@ -37,8 +37,8 @@ def short(monkeypatch):
 
 
 def done(folder, experiment, profile="standard"):
-    assert run_all([experiment.experiment], Setting(profile, folder)) == []
-    return Results(folder)
+    assert run_all([experiment.experiment], RunSetting(profile, folder)) == []
+    return ProfileResults(folder)
 
 
 def test_training_runs_are_drawn(tmp_path, short, monkeypatch):
@@ -47,7 +47,7 @@ def test_training_runs_are_drawn(tmp_path, short, monkeypatch):
     shown = [ax for ax in fig06.draw(results).axes if ax.images]
     assert len(shown) == 3 * 2
     assert [ax.get_title() for ax in shown[:3]] == ["t = 0 s", "t = 0.0025 s", "t = 0.005 s"]
-    assert "1000 particles" in fig06.scale(Results(tmp_path))
+    assert "1000 particles" in fig06.scale(ProfileResults(tmp_path))
 
 
 def test_ends_beside_the_truth_are_drawn_and_recorded(tmp_path, short, monkeypatch):

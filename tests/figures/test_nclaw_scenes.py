@@ -9,8 +9,8 @@ import pytest
 from figures.common.bodies import nothing
 from figures.nclaw import fig02d, fig04c
 from mpm_ref.materials import Fluid, NoFlow
-from validation.common.results import Results
-from validation.common.run import Setting, run_all
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.ldm.published_bodies import keep
 from validation.nclaw import other_bodies, slope
 from validation.nclaw.environments import ENVIRONMENTS, environment
@@ -23,7 +23,7 @@ mpl.use("Agg")
 def kept(folder, id, **arrays):
     """Results that hold points of an experiment."""
     keep(SimpleNamespace(folder=folder, experiment=SimpleNamespace(id=id)), **arrays)
-    return Results(folder)
+    return ProfileResults(folder)
 
 
 def titles(figure):
@@ -49,8 +49,8 @@ def test_the_slope_is_run_with_true_laws_ours_and_admissible_ones(tmp_path, monk
     monkeypatch.setattr(other_bodies, "learned", lambda name: other_bodies.own
                         if name == "water-admissible"
                         else lambda body: fresh(body, Fluid(0.0), NoFlow()))
-    assert run_all([slope.inclined.experiment], Setting("quick", tmp_path)) == []
-    results = Results(tmp_path)
+    assert run_all([slope.inclined.experiment], RunSetting("quick", tmp_path)) == []
+    results = ProfileResults(tmp_path)
     found = {r.target: r for r in results.records("nclaw.slope")}
     assert not [target for target in found if "jelly" in target]
     assert found["nclaw.slope.water.admissible"].value == 0.0

@@ -12,8 +12,8 @@ from mpm_ref.materials import FixedCorotated, Fluid, FluidProjection, Hencky, No
 from mpm_ref.materials.learned import network, response
 from mpm_ref.nclaw.dissipation import balance, first_piola, loops, returned, work
 from tests.nclaw.test_admissible import energies, strained
-from validation.common.results import Results
-from validation.common.run import Setting, run_all
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.common.weights_needed import Untrained
 from validation.nclaw import dissipation, trained_laws
 from validation.nclaw.dissipation import CREATED, Pair
@@ -103,9 +103,9 @@ def results(tmp_path, monkeypatch, laws):
     monkeypatch.setattr(dissipation, "known", lambda run: laws)
     monkeypatch.setattr(dissipation, "SIZES", (0.1,))
     failed = run_all([dissipation.dissipation.experiment],
-                     Setting("quick", tmp_path))
+                     RunSetting("quick", tmp_path))
     assert not failed
-    found = Results(tmp_path)
+    found = ProfileResults(tmp_path)
     return {r.target: r for r in found.records("nclaw.dissipation")}, found
 
 

@@ -29,6 +29,7 @@ ROOT = Path(__file__).resolve().parents[2]
 TODO = ROOT / "tests" / "support" / "data" / "names_todo.txt"
 BUILTINS = {name for name in dir(builtins) if not name.startswith("_")} - {
     "copyright", "credits", "exit", "help", "license", "quit"}      # the interactive prompt's
+RECORD_IDS = {"id"}         # `record.id` shadows nothing: attribute access alone reaches it
 SHADOWING = ("parameter", "function", "class", "field", "key", "module", "variable")
 CALLED_BY_USERS = ("__init__", "__new__", "__call__")       # dunder methods whose parameters count
 
@@ -194,7 +195,8 @@ def broken(path, tree, records):
         advice = banned(one.kind, one.name)
         if advice:
             yield Violation(path, one.line, f"banned {one.kind}", one.qualified, advice)
-        if one.name in BUILTINS and one.kind in SHADOWING:
+        exempt = one.kind in ("field", "key") and one.name in RECORD_IDS
+        if one.name in BUILTINS and one.kind in SHADOWING and not exempt:
             yield Violation(path, one.line, f"builtin {one.kind}", one.qualified,
                             "it shadows a builtin")
         text = ast.get_docstring(one.node) if one.node is not None else None

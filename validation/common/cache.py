@@ -1,7 +1,7 @@
-"""Parts of a long experiment, kept on disk while it runs: one that is cut off goes on where it was.
+"""The cache of a long experiment: finished parts stay on disk for an interrupted run.
 
-A part belongs to a commit and a seed. Source with changes has no name of its own, so that nothing
-is kept of it; and all parts are removed once the experiment has ended well.
+A part belongs to a commit and a seed. Nothing is cached for a working tree with changes, which no
+commit names. All parts are removed once the experiment has ended well.
 """
 
 import json
@@ -10,15 +10,15 @@ import shutil
 from .record import write_whole
 
 
-class Kept:
-    """The parts of one experiment, in a folder; `commit` and `seed` say of what."""
+class Cache:
+    """The finished parts of one experiment, in a folder; they belong to a commit and a seed."""
 
     def __init__(self, folder, commit, seed):
         self._folder, self._of = folder, f"{commit}-{seed}"
         self._named = commit != "unknown" and not commit.endswith("+changes")
 
     def get(self, name, make):
-        """What make() returned when the part was made: numbers, texts, lists of them."""
+        """Return the cached part, or make(): numbers, texts, lists of them."""
         path = self._folder / f"{name}-{self._of}.json"
         if not self._named:
             return make()

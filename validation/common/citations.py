@@ -1,4 +1,4 @@
-"""Where code cites its sources: formulas by id (`NSF-eq6`), other works by key (`[MLS]`).
+"""Find citations in the code: formulas by id (`NSF-eq6`), other works by key (`[MLS]`).
 
 The convention stands at the top of REFERENCES.md. A citation belongs to the innermost function or
 class around it, or to the file, and is written as a link: `path`, `path::function` or
@@ -75,11 +75,12 @@ def keys_of(root: Path, path: Path) -> list[Citation]:
     return attributed(root, path, text, found)
 
 
-def attributed(root: Path, path: Path, text: str, found: list[tuple[int, str]]) -> list[Citation]:
-    """Citations of the (line, source) pairs found in a file, each with its definition's name."""
+def attributed(root: Path, path: Path, text: str,
+               mentions: list[tuple[int, str]]) -> list[Citation]:
+    """Citations of the (line, source) pairs of a file, each with its definition's name."""
     spans = definitions(ast.parse(text, str(path))) if path.suffix == ".py" else []
     relative = path.relative_to(root).as_posix()
-    return [Citation(source, relative, owner(spans, line), line) for line, source in found]
+    return [Citation(source, relative, owner(spans, line), line) for line, source in mentions]
 
 
 def definitions(tree: ast.AST, prefix: str = "") -> list[tuple[int, int, str]]:
@@ -102,7 +103,7 @@ def owner(spans: list[tuple[int, int, str]], line: int) -> str:
 
 
 def exists(root: Path, link: str) -> bool:
-    """Whether the file of a link is there and defines the name the link gives."""
+    """Return whether the file of a link exists and defines the name the link gives."""
     file, _, name = link.partition("::")
     path = root / file
     if not path.is_file() or not name:

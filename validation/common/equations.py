@@ -123,7 +123,7 @@ def render(source: Source, citations: Citations) -> str:
 
 
 def summary(source: Source, citations: Citations) -> str:
-    """How many ids each carrier has, and how many of them code and tests cite."""
+    """Count the ids of each carrier, and those that code and tests cite."""
     carried, checked = (covered(source, some) for some in citations)
     names = {"definition": "definition only", **source.milestones, "ruling": "issue and ruling"}
     rows = ["| carrier | ids | cited by code | by tests or experiments |", "|---|---|---|---|"]
@@ -138,12 +138,12 @@ def table(head: str, entries: dict[str, Entry], source: Source, citations: Citat
     rows = [head, "|---|---|---|---|"]
     for i, entry in entries.items():
         code, tests = (links(some, names(source, i)) for some in citations)
-        rows.append(f"| {i} | `{entry.says}` | {code or waiting(entry, source)} | {tests} |")
+        rows.append(f"| {i} | `{entry.says}` | {code or pending(entry, source)} | {tests} |")
     return "\n".join(rows) + "\n"
 
 
-def waiting(entry: Entry, source: Source) -> str:
-    """What stands where no code is cited."""
+def pending(entry: Entry, source: Source) -> str:
+    """Return the text for an id that no code cites."""
     return {"definition": "definition only", "ruling": "", **source.milestones}[entry.by]
 
 

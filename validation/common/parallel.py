@@ -1,4 +1,4 @@
-"""Experiments side by side: as many processes as are asked for share the cores evenly.
+"""Run experiments in parallel: the processes share the cores evenly.
 
 Kernels are compiled by one core whatever the number of threads, so that two experiments at a time
 take not much more than half the time of one after the other. Timings are CPU seconds; beside
@@ -16,27 +16,29 @@ from tqdm import tqdm
 
 from mpm_ref.core.jit import set_threads
 
-from .progress import Progress
+from .progress import SuiteProgress
 from .registry import discover
 from .run import attempt
 
 
 @cache
-def known(id):
-    """The experiment of that id."""
-    return discover().experiments[id]
+def experiment_of(experiment_id):
+    """Return the experiment of that id."""
+    return discover().experiments[experiment_id]
 
 
-def run_side_by_side(experiments, setting, workers, find=known):
-    """As `run.run_all`, so many at a time, those that take longest first. Each process asks
-    find(id) for its experiments, since functions made by functions cannot be sent to it.
+def run_side_by_side(experiments, setting, workers, find=experiment_of):
+    """Run experiments like `run.run_all`, `workers` at a time, the longest first.
+
+    Each process calls find(id) for its experiments, since a function that another function made
+    cannot be sent to a process.
     """
     longest = sorted(experiments, key=lambda e: -e.seconds(setting.profile))
     setting = setting._replace(targets=dict(setting.targets), workers=workers)
     failed = []
-    with (Progress([e.seconds(setting.profile) for e in experiments]) as progress,
+    with (SuiteProgress([e.seconds(setting.profile) for e in experiments]) as progress,
           ProcessPoolExecutor(workers, get_context("spawn"), take_share, (workers,)) as pool):
-        coming = {pool.submit(apart, find, e.id, setting): e for e in longest}
+        coming = {pool.submit(attempt_in_process, find, e.id, setting): e for e in longest}
         try:
             for future in as_completed(coming):
                 experiment = coming[future]
@@ -51,9 +53,9 @@ def run_side_by_side(experiments, setting, workers, find=known):
     return failed
 
 
-def apart(find, id, setting):
-    """`Outcome` of an experiment in this process."""
-    return attempt(find(id), setting, Silent())
+def attempt_in_process(find, experiment_id, setting):
+    """Return the `ExperimentOutcome` of an experiment that runs in this process."""
+    return attempt(find(experiment_id), setting, Silent())
 
 
 def what_came(future):
@@ -73,9 +75,9 @@ def take_share(workers):
 
 
 class Silent:
-    """Stands for a `Progress` in a process that has no place on the terminal."""
+    """A `SuiteProgress` for a process that has no place on the terminal."""
 
     def inner(self, iterable, desc):
-        """As `Progress.inner`, without a bar."""
+        """Iterate like `SuiteProgress.inner`, without a bar."""
         items = range(iterable) if isinstance(iterable, int) else iterable
         return tqdm(items, desc=desc, disable=True)

@@ -11,7 +11,7 @@ import time
 from tqdm import tqdm
 
 
-class Progress:
+class SuiteProgress:
     """Bars for a list of experiments with budgets [s]; a context manager."""
 
     def __init__(self, budgets):

@@ -1,4 +1,4 @@
-"""Where a number comes from: source, versions, date, machine."""
+"""The origin of a number: source, versions, date, machine."""
 
 import os
 import platform

@@ -25,7 +25,7 @@ SAME_SIZE = 3.0
 ROUND_OFF = 1e-9
 
 
-class Record(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+class Measurement(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """A value beside the printed or analytic one; `results/<profile>/<id>.json` lists them."""
 
     target: str                     # id of the number, of the paper's target where there is one
@@ -48,8 +48,8 @@ class Record(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     workers: int = 1                # experiments that shared the cores
 
 
-class Rule(NamedTuple):
-    """How a value is judged; fields that a comparator does not use must stay None."""
+class Criterion(NamedTuple):
+    """The rule by which a value is judged; fields that a comparator does not use must stay None."""
 
     comparator: str
     paper: float | None = None
@@ -154,7 +154,7 @@ def write_records(path, records):
 def read_records(path):
     """Read what `write_records` wrote. Raises ValueError naming the file and the field at fault."""
     try:
-        return msgspec.json.decode(Path(path).read_bytes(), type=list[Record])
+        return msgspec.json.decode(Path(path).read_bytes(), type=list[Measurement])
     except msgspec.DecodeError as error:
         raise ValueError(f"{path} is not a list of records: {error}; run the experiment again") \
             from error

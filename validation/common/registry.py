@@ -1,4 +1,4 @@
-"""Which experiments there are: the decorator that declares one, and the search for all of them."""
+"""The catalogue of experiments: the decorator that declares one and the search for all."""
 
 import importlib
 from collections.abc import Callable
@@ -36,15 +36,16 @@ class Experiment(NamedTuple):
         return self.budget.get(profile, BUDGETS[profile])
 
 
-def experiment(id, *, title, profiles=PROFILES, budget=None):
-    """Declare the decorated function `f(run)` to be the experiment `id`.
+def experiment(experiment_id, *, title, profiles=PROFILES, budget=None):
+    """Declare the decorated function `f(run)` to be the experiment of that id.
 
     Raises ValueError for a group or a profile that does not exist.
     """
-    _check_names(id, (*profiles, *(budget or {})))
+    _check_names(experiment_id, (*profiles, *(budget or {})))
 
     def declare(function):
-        function.experiment = Experiment(id, title, tuple(profiles), dict(budget or {}), function)
+        function.experiment = Experiment(
+            experiment_id, title, tuple(profiles), dict(budget or {}), function)
         return function
 
     return declare

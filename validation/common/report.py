@@ -14,9 +14,9 @@ from typing import NamedTuple
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from PIL import Image
 
-from .record import Record, write_whole
+from .record import Measurement, write_whole
 from .registry import GROUPS
-from .results import Results
+from .results import ProfileResults
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
 SHOWN_ROWS = 40          # of a table; a longer one is named and linked
@@ -26,7 +26,7 @@ VERDICTS = ("pass", "miss", "info")
 PART = re.compile(r"(?:0|[^.]*[A-Za-z-]\d+)\.\d+(?![^.])|[^.]+")      # of an id; see `_words`
 
 
-class Row(NamedTuple):
+class ReportRow(NamedTuple):
     """One record, as the reader sees it; `key` is the paper or group for which it counts."""
 
     key: str
@@ -40,7 +40,7 @@ class Row(NamedTuple):
     note: str
 
 
-class Table(NamedTuple):
+class ReportTable(NamedTuple):
     """A table of an experiment; rows stay empty where there are too many to show."""
 
     name: str
@@ -60,14 +60,14 @@ class Figure(NamedTuple):
 
 
 class Section(NamedTuple):
-    """One experiment."""
+    """One experiment in the report."""
 
     id: str
     remarks: list
     rows: list
     tables: list
     figures: list
-    made: str
+    provenance: str
 
 
 class Chapter(NamedTuple):
@@ -84,8 +84,8 @@ class Chapter(NamedTuple):
 
 def write_report(folder, profile, targets):
     """Write report.html and report.md into `folder`; returns their paths."""
-    content = {"profile": profile, "chapters": chapters(Results(folder), targets),
-               "machine": machine(Results(folder)), "verdicts": VERDICTS}
+    content = {"profile": profile, "chapters": chapters(ProfileResults(folder), targets),
+               "machine": machine(ProfileResults(folder)), "verdicts": VERDICTS}
     paths = []
     for name in ("report.html", "report.md"):
         text = _environment().get_template(f"{name}.jinja").render(content)
@@ -138,7 +138,7 @@ def _group(id):
 
 
 def overruled(target):
-    """Whether a printed value is kept for the record only, a ruling having replaced it."""
+    """Return whether a printed value is kept for the record only, a ruling having replaced it."""
     return target.id.split(".")[1] == "printed"
 
 
@@ -148,14 +148,14 @@ def _section(results, id, figures, known):
     return Section(id, [r.note for r in records if _is_remark(r, id)],
                    [_row(r, id, *known.get(r.target, (None, ""))) for r in numbers],
                    [_table(results, id, name) for name in results.tables(id)], figures,
-                   made=_made(records[0]) if records else "no results")
+                   provenance=_provenance(records[0]) if records else "no results")
 
 
 def _is_remark(record, id):
     return record.target == id and record.comparator == "info"
 
 
-def _made(record):
+def _provenance(record):
     return (f"{record.seconds:.1f} s, {record.date}, commit {record.commit}, seed {record.seed}: "
             f"{record.command}")
 
@@ -164,7 +164,7 @@ def _row(record, id, target, where):
     key = _group(target.id if target else id)
     what = f"{target.what} ({where})" if target else _words(record, id)
     doubt = f" ({target.confidence})" if target and target.confidence != "exact" else ""
-    return Row(key, what, quantity(record.paper, record.unit) + doubt, rule(record),
+    return ReportRow(key, what, quantity(record.paper, record.unit) + doubt, rule(record),
                quantity(record.value, record.unit), ratio(record), record.verdict, record.scale,
                record.note)
 
@@ -189,7 +189,7 @@ def quantity(value, unit):
 
 
 def rule(record):
-    """What was accepted, in signs."""
+    """Return the accepted range as text."""
     if isinstance(record.bound, tuple):
         low, high = (f"{end:.4g}" for end in record.bound)
         return f"{low} … {high}" if low != high else f"= {low}"
@@ -208,7 +208,7 @@ def ratio(record):
 def _table(results, id, name):
     columns, rows = results.rows(id, name)
     shown = rows if len(rows) <= SHOWN_ROWS else []
-    return Table(name, f"{id}.{name}.csv", columns, shown, len(rows))
+    return ReportTable(name, f"{id}.{name}.csv", columns, shown, len(rows))
 
 
 def _figures(folder):
@@ -241,7 +241,7 @@ def machine(results):
             "versions": _distinct(first, "versions")}
 
 
-def _distinct(records: list[Record], field):
+def _distinct(records: list[Measurement], field):
     values = [getattr(r, field) for r in records]
     texts = [", ".join(f"{k} {v}" for k, v in x.items()) if isinstance(x, dict) else str(x)
              for x in values]

@@ -11,8 +11,8 @@ ROOT = Path(__file__).resolve().parents[2]
 RESULTS = ROOT / "results"
 
 
-class Results:
-    """What the experiments of one profile left in a folder."""
+class ProfileResults:
+    """The records and tables of one profile, in a folder."""
 
     def __init__(self, folder):
         self.folder = Path(folder)
@@ -21,34 +21,36 @@ class Results:
         """Ids of the experiments with results."""
         return sorted(file.stem for file in self.folder.glob("*.json"))
 
-    def records(self, id):
+    def records(self, experiment):
         """All `Record`s of an experiment. Raises FileNotFoundError where it has not been run."""
-        file = self.folder / f"{id}.json"
+        file = self.folder / f"{experiment}.json"
         if not file.exists():
-            raise FileNotFoundError(f"no results of {id} in {self.folder}; run the experiment")
+            raise FileNotFoundError(f"no results of {experiment} in {self.folder}; "
+                                    "run the experiment")
         return read_records(file)
 
-    def value(self, id, target):
-        """The value that experiment `id` recorded for one target; KeyError where there is none."""
-        for record in self.records(id):
+    def value(self, experiment, target):
+        """The value that an experiment recorded for one target; KeyError where there is none."""
+        for record in self.records(experiment):
             if record.target == target:
                 return record.value
-        raise KeyError(f"{id} recorded no {target}")
+        raise KeyError(f"{experiment} recorded no {target}")
 
-    def tables(self, id):
+    def tables(self, experiment):
         """Names of the tables that an experiment wrote."""
-        names = (file.stem.removeprefix(f"{id}.") for file in self.folder.glob(f"{id}.*.csv"))
+        files = self.folder.glob(f"{experiment}.*.csv")
+        names = (file.stem.removeprefix(f"{experiment}.") for file in files)
         return sorted(name for name in names if "." not in name)
 
-    def rows(self, id, name):
+    def rows(self, experiment, name):
         """A table as its list of column names and its rows of text."""
-        with open(self.folder / f"{id}.{name}.csv", newline="") as file:
+        with open(self.folder / f"{experiment}.{name}.csv", newline="") as file:
             header, *rows = csv.reader(file)
         return header, rows
 
-    def table(self, id, name):
+    def table(self, experiment, name):
         """A table as {column: array}, numbers where the whole column is numeric, text otherwise."""
-        header, rows = self.rows(id, name)
+        header, rows = self.rows(experiment, name)
         return {column: _array([row[k] for row in rows]) for k, column in enumerate(header)}
 
 

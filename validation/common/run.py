@@ -14,14 +14,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .cache import Kept
-from .progress import Progress
+from .cache import Cache
+from .progress import SuiteProgress
 from .provenance import provenance
-from .record import SAME_SIZE, Record, Rule, finite_ends, judge, write_records, write_whole
+from .record import (
+    SAME_SIZE,
+    Criterion,
+    Measurement,
+    finite_ends,
+    judge,
+    write_records,
+    write_whole,
+)
 
 
-class Setting(NamedTuple):
-    """What all experiments of one run share."""
+class RunSetting(NamedTuple):
+    """The settings that all experiments of one run share."""
 
     profile: str
     folder: Path                    # where results go
@@ -34,7 +42,7 @@ class Setting(NamedTuple):
 class Run:
     """Handed to an experiment: its profile, seed and random numbers; it takes records and tables.
 
-    Nothing reaches the disk before `finish`, but for what is `kept`.
+    Nothing reaches the disk before `finish`, but for what is `cached`.
     """
 
     def __init__(self, experiment, setting, progress):
@@ -42,23 +50,23 @@ class Run:
         self.rng = np.random.default_rng([setting.seed, zlib.crc32(experiment.id.encode())])
         self._setting, self._progress = setting, progress
         self._drafts, self._tables, self._failed = [], {}, False
-        self._kept = Kept(setting.folder / ".parts" / experiment.id, setting.commit, setting.seed)
+        self._cache = Cache(setting.folder / ".parts" / experiment.id, setting.commit, setting.seed)
         self._wall, self._cpu = time.perf_counter(), time.process_time()
 
     @property
     def folder(self):
-        """Where the profile's results stand."""
+        """The folder of the profile's results."""
         return self._setting.folder
 
     def progress(self, iterable, desc=""):
         """A bar over an iterable or a number of rounds; iterate it, or call its `update`."""
         return self._progress.inner(iterable, desc)
 
-    def kept(self, name, make):
-        """What make() returns: numbers, texts and lists of them. If an earlier run of the same
-        commit made this part and was cut off, what that one made.
+    def cached(self, name, make):
+        """Return make(): numbers, texts and lists of them; or the value that an interrupted run of
+        the same commit has cached.
         """
-        return self._kept.get(name, make)
+        return self._cache.get(name, make)
 
     def choose(self, **by_profile):
         """The value for the profile at hand: `n = run.choose(quick=16, standard=64, paper=128)`."""
@@ -116,11 +124,11 @@ class Run:
             "cpu_seconds": round(time.process_time() - self._cpu, 3),
             "seed": self.seed, "command": self._command(),
             "workers": self._setting.workers, **provenance(self._setting.commit)}
-        records = [Record(**draft, **common) for draft in self._drafts]
+        records = [Measurement(**draft, **common) for draft in self._drafts]
         self._write_tables()
         write_records(self._setting.folder / f"{self.experiment.id}.json", records)
         if not self._failed:
-            self._kept.clear()
+            self._cache.clear()
         return records
 
     def _command(self):
@@ -142,10 +150,10 @@ def _rule(target, given, printed):
     if printed is None:
         if "comparator" not in given:
             raise ValueError(f"{target} is no printed target: comparator= must be given")
-        return Rule(**given)
+        return Criterion(**given)
     if given.get("paper", printed.value) != printed.value:
         raise ValueError(f"{target}: paper = {given['paper']}, but it prints {printed.value}")
-    return Rule(**{"comparator": printed.comparator, **given, "paper": printed.value})
+    return Criterion(**{"comparator": printed.comparator, **given, "paper": printed.value})
 
 
 def _unit(target, unit, printed):
@@ -178,8 +186,8 @@ def _csv(columns, rows):
     return text.getvalue().encode()
 
 
-class Outcome(NamedTuple):
-    """How an experiment went."""
+class ExperimentOutcome(NamedTuple):
+    """The outcome of an experiment."""
 
     id: str
     summary: str                    # for a reader: how long, how many passed
@@ -192,7 +200,7 @@ def run_all(experiments, setting):
     Returns the ids of those that raised; the others ran all the same.
     """
     failed = []
-    with Progress([e.seconds(setting.profile) for e in experiments]) as progress:
+    with SuiteProgress([e.seconds(setting.profile) for e in experiments]) as progress:
         for experiment in experiments:
             progress.begin(experiment.id, experiment.seconds(setting.profile))
             outcome = attempt(experiment, setting, progress)
@@ -212,7 +220,7 @@ def attempt(experiment, setting, progress):
     except Exception as error:
         raised = "".join(traceback.format_exception(error))
         run.fail(error)
-    return Outcome(experiment.id, _summary(run.finish(), raised), raised)
+    return ExperimentOutcome(experiment.id, _summary(run.finish(), raised), raised)
 
 
 def _summary(records, raised):

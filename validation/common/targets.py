@@ -67,12 +67,13 @@ def load(folder: Path = FOLDER) -> dict[str, Target]:
     return found
 
 
-def require_again(target, own):
-    """Raise ValueError unless a target, which repeats another, and that one, `own`, are of one kind
-    and unit and nearly the same, and `own` repeats no other.
+def require_again(target, original):
+    """Raise ValueError unless a target agrees with the number that it repeats: the same kind and
+    unit, nearly the same value, and the original repeats no other.
     """
-    same = own is not None and (own.kind, own.unit) == (target.kind, target.unit)
-    if not same or own.again or not math.isclose(own.value, target.value, rel_tol=ROUNDED):
+    same = original is not None and (original.kind, original.unit) == (target.kind, target.unit)
+    same = same and math.isclose(original.value, target.value, rel_tol=ROUNDED)
+    if not same or original.again:
         raise ValueError(f"{target.id.split('.')[0]}, target {target.id!r}: again = "
                          f"{target.again!r}; expected the id of a number that repeats no other, of "
                          f"the same kind ({target.kind}), unit ({target.unit}) and, but for "

@@ -59,7 +59,7 @@ def table(run, name, tests, nets):
 
 def kept(run, tests, net, way, draw):
     """`Errors` of one draw of samples, kept if the experiment is cut off."""
-    return Errors(*run.kept(f"{net}.{way.name}.{way.points}.{draw}",
+    return Errors(*run.cached(f"{net}.{way.name}.{way.points}.{draw}",
                             lambda: tests.errors(net, way, 1000 * draw)))
 
 

@@ -53,7 +53,7 @@ def dissipation(run):
     cycles, runs = [], []
     for (method, name), pair in run.progress(laws.items(), "laws"):
         cycles += [(method, name, size, n, *cycled(pair, G)) for size, G in closed.items()]
-        found = run.kept(f"{method}.{name}", partial(returns, name, pair, length))
+        found = run.cached(f"{method}.{name}", partial(returns, name, pair, length))
         runs.append((method, name, length, *found))
     run.table("cycles", CYCLES, cycles)
     run.table("runs", RUNS, runs)

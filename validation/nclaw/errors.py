@@ -51,7 +51,7 @@ def errors(run, laws, tasks, goes_on=False):
             for draw, scene in enumerate(scenes(task, name) if able else ()):
                 if run.profile == "quick":
                     scene = with_(scene, steps=SHORT)
-                found = run.kept(f"{task}.{name}.{draw}",
+                found = run.cached(f"{task}.{name}.{draw}",
                                  partial(compare, scene, [*map(ready, able.values())], goes_on))
                 rows += [Row(method, name, task, draw, *Found(*one))
                          for method, one in zip(able, found, strict=True)]

@@ -66,7 +66,7 @@ def show(run, parts):
     kept = {}
     for name, (make, words) in run.progress(parts.items(), "runs"):
         try:
-            found = run.kept(name, make)
+            found = run.cached(name, make)
         except Untrained as fault:
             run.note(f"{name}: {fault}")
             continue

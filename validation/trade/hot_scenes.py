@@ -77,7 +77,7 @@ def equal_error(run):
     trials = plan(run.profile)
     compiled(trials)
     for trial in run.progress(trials, "scenes"):
-        found, exact = unpacked(run.kept(trial.name, partial(ladder, trial)))
+        found, exact = unpacked(run.cached(trial.name, partial(ladder, trial)))
         own = known(found, exact.least)
         times[trial] = seconds(own)
         record_trial(run, trial, own, exact)

@@ -1,4 +1,4 @@
-"""What the trainings of the experiments have in common: which to make, where they go."""
+"""Common options of the training commands, and the loop over the trainings."""
 
 from pathlib import Path
 from typing import Annotated
@@ -16,16 +16,16 @@ Device = Annotated[str, typer.Option(help=f"where networks are trained: {', '.jo
 KEPT = Path("results/training")
 
 
-def train_all(names, known, places, threads, make):
-    """Call make(name, folder, checkpoints) for the names, or for all that are known; places are
+def train_all(names, trainings, places, threads, make):
+    """Call make(name, folder, checkpoints) for the names, or for all `trainings`; places are
     those two folders. The checkpoint NAME.pt goes when it is done.
     """
-    for name in names or known:
-        if name not in known:
-            raise typer.BadParameter(f"{name!r}: expected one of {', '.join(known)}")
+    for name in names or trainings:
+        if name not in trainings:
+            raise typer.BadParameter(f"{name!r}: expected one of {', '.join(trainings)}")
     torch.set_num_threads(threads)
     for place in places:
         place.mkdir(parents=True, exist_ok=True)
-    for name in names or known:
+    for name in names or trainings:
         make(name, *places)
         (places[1] / f"{name}.pt").unlink(missing_ok=True)

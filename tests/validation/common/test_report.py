@@ -10,11 +10,11 @@ import pytest
 from PIL import Image
 
 from figures.frame import Drawn, draw_all
-from validation import Results
+from validation import ProfileResults
 from validation.common.registry import Experiment
 from validation.common.report import chapters, preview, write_report
 from validation.common.results import RESULTS, ROOT
-from validation.common.run import Setting, run_all
+from validation.common.run import RunSetting, run_all
 from validation.common.status import BEGIN, END, status_table, with_status
 from validation.common.targets import Target, load
 
@@ -61,7 +61,8 @@ def folder(tmp_path):
     """Results of a toy experiment."""
     toys = [Experiment(f"nsf.{f.__name__}", "Bread of NSF", ("quick",), {}, f)
             for f in (bread, long_table)]
-    assert run_all(toys, Setting("quick", tmp_path / "quick", targets=TARGETS, commit="abc")) == []
+    setting = RunSetting("quick", tmp_path / "quick", targets=TARGETS, commit="abc")
+    assert run_all(toys, setting) == []
     return tmp_path / "quick"
 
 
@@ -71,7 +72,7 @@ def text(folder, name, targets=TARGETS):
 
 
 def test_chapter_counts(folder):
-    chapter, = chapters(Results(folder), TARGETS)
+    chapter, = chapters(ProfileResults(folder), TARGETS)
     assert chapter.counts == {"pass": 2, "miss": 1}
     assert [t.id for t in chapter.missing] == ["nsf.table1.jelly"]
     assert [t.id for t in chapter.settings] == ["nsf.table1.dt"]
@@ -83,7 +84,7 @@ def test_a_number_that_repeats_another_is_told_beside_it(folder):
     more = {t.id: t for t in (
         target("nsf.bread.again", again="nsf.table1.bread"), target("nsf.jelly.again",
                                                                     again="nsf.table1.jelly"))}
-    chapter, = chapters(Results(folder), TARGETS | more)
+    chapter, = chapters(ProfileResults(folder), TARGETS | more)
     assert [t.id for t in chapter.missing] == ["nsf.table1.jelly", "nsf.jelly.again"]
     words = [row.what for section in chapter.sections for row in section.rows]
     assert "the bread (Table 1; Table 1: 1.2 %)" in words
@@ -95,9 +96,9 @@ def test_printed_number_counts_for_its_paper(tmp_path):
         run.record("nsf.table1.bread", 1.0)
         run.record("trade.other.time", 1.0, comparator="info", unit="s")
 
-    setting = Setting("quick", tmp_path, targets=TARGETS)
+    setting = RunSetting("quick", tmp_path, targets=TARGETS)
     run_all([Experiment("trade.other", "Cost", ("quick",), {}, other)], setting)
-    trade, nsf = chapters(Results(tmp_path), TARGETS)
+    trade, nsf = chapters(ProfileResults(tmp_path), TARGETS)
     assert (trade.counts, nsf.counts) == ({"info": 1}, {"pass": 1})
     assert "nsf.table1.bread" not in [t.id for t in nsf.missing]
 
@@ -136,8 +137,8 @@ def test_words_of_an_id_are_parted_at_dots_but_not_at_decimal_points(tmp_path, t
     def numbers(run):
         run.record(target, 1.0, comparator="info")
 
-    run_all([Experiment("hot.map", "", ("quick",), {}, numbers)], Setting("quick", tmp_path))
-    section, = chapters(Results(tmp_path), {})[0].sections
+    run_all([Experiment("hot.map", "", ("quick",), {}, numbers)], RunSetting("quick", tmp_path))
+    section, = chapters(ProfileResults(tmp_path), {})[0].sections
     assert [row.what for row in section.rows] == [said]
 
 
@@ -169,10 +170,11 @@ def scripts(tmp_path, monkeypatch):
 
 
 def test_figure_is_drawn_and_shown_under_its_experiment(folder, scripts):
-    assert draw_all(Results(folder), folder=scripts) == Drawn(["nsf_bread"], ["nsf_unmade"], [])
+    drawn = draw_all(ProfileResults(folder), folder=scripts)
+    assert drawn == Drawn(["nsf_bread"], ["nsf_unmade"], [])
     names = sorted(f.name for f in (folder / "figures").iterdir())
     assert names == ["nsf_bread.pdf", "nsf_bread.png"]
-    section = chapters(Results(folder), TARGETS)[0].sections[0]
+    section = chapters(ProfileResults(folder), TARGETS)[0].sections[0]
     assert section.figures[0].caption == "Error of the bread over cells."
     page = text(folder, "report.html")
     assert '<a href="figures/nsf_bread.png"><img src="data:image/webp;base64,UklGR' in page
@@ -197,7 +199,7 @@ def test_rows_carry_what_the_filter_reads(folder):
 
 def test_figure_is_drawn_again_with_the_same_bytes(folder, scripts):
     def drawn():
-        draw_all(Results(folder), folder=scripts)
+        draw_all(ProfileResults(folder), folder=scripts)
         return {f.name: f.read_bytes() for f in (folder / "figures").iterdir()}
 
     first = drawn()
@@ -208,35 +210,36 @@ def test_figure_is_drawn_again_with_the_same_bytes(folder, scripts):
 def test_figure_that_raises_is_named(folder, scripts, capsys):
     script = FIGURE.format(name="bread").replace("Figure()", "1 / 0")
     (scripts / "nsf" / "bad.py").write_text(script)
-    assert draw_all(Results(folder), folder=scripts).failed == ["nsf_bad"]
+    assert draw_all(ProfileResults(folder), folder=scripts).failed == ["nsf_bad"]
     assert (folder / "figures" / "nsf_bread.png").exists()
     assert "ZeroDivisionError" in capsys.readouterr().err
 
 
 def test_figures_about_other_experiments_are_left(folder, scripts):
-    drawn = draw_all(Results(folder), about=["nsf.long_table"], folder=scripts)
+    drawn = draw_all(ProfileResults(folder), about=["nsf.long_table"], folder=scripts)
     assert drawn == Drawn([], [], [])
     assert not (folder / "figures").exists()
 
 
 def test_figure_without_results_is_left_out_and_says_why(folder, scripts, capsys):
-    assert draw_all(Results(folder), names=["nsf_unmade"], folder=scripts).left == ["nsf_unmade"]
+    drawn = draw_all(ProfileResults(folder), names=["nsf_unmade"], folder=scripts)
+    assert drawn.left == ["nsf_unmade"]
     assert "figure nsf_unmade is left out: no results of nsf.unmade" in capsys.readouterr().err
 
 
 def test_figure_answers_to_its_experiment(folder, scripts):
     (scripts / "nsf" / "butter.py").write_text(FIGURE.format(name="bread"))
-    drawn = draw_all(Results(folder), names=["nsf_bread", "nsf.bread"], folder=scripts)
+    drawn = draw_all(ProfileResults(folder), names=["nsf_bread", "nsf.bread"], folder=scripts)
     assert drawn.done == ["nsf_bread", "nsf_butter"]
 
 
 def test_unknown_figure_is_refused(folder, scripts):
     with pytest.raises(ValueError, match="no figure 'cake'; there are: nsf_bread, nsf_unmade"):
-        draw_all(Results(folder), names=["cake"], folder=scripts)
+        draw_all(ProfileResults(folder), names=["cake"], folder=scripts)
 
 
 def test_status_table(folder):
-    assert status_table(Results(folder), TARGETS).splitlines()[2:] == [
+    assert status_table(ProfileResults(folder), TARGETS).splitlines()[2:] == [
         "| NSF | `nsf.bread` | 2 pass, 1 miss |", "| NSF |  | not yet: 1 printed result |"]
 
 
@@ -249,7 +252,7 @@ def test_status_is_put_between_the_markers():
 
 def test_readme_is_current():
     """Where results are published, README shows them: `python -m validation status --write`."""
-    published = Results(RESULTS / "standard")
+    published = ProfileResults(RESULTS / "standard")
     if published.ids():
         readme = (ROOT / "README.md").read_text(encoding="utf-8")
         assert readme == with_status(readme, status_table(published, load()))

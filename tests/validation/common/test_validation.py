@@ -12,8 +12,8 @@ from validation import __main__ as cli
 from validation.common.provenance import commit
 from validation.common.record import read_records, write_whole
 from validation.common.registry import Catalogue, Experiment, nearest
-from validation.common.results import Results
-from validation.common.run import Setting, run_all
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.common.targets import Target
 
 KEYS = {"target", "value", "unit", "paper", "comparator", "verdict", "scale", "seconds", "seed",
@@ -31,8 +31,8 @@ def make(function):
 
 def run(folder, *functions, **setting):
     """Run toy experiments; returns the ids that failed, and the results."""
-    failed = run_all([make(f) for f in functions], Setting("quick", folder, **setting))
-    return failed, Results(folder)
+    failed = run_all([make(f) for f in functions], RunSetting("quick", folder, **setting))
+    return failed, ProfileResults(folder)
 
 
 def numbers(results, id):
@@ -211,7 +211,7 @@ def test_damaged_results_are_named(tmp_path):
 
 def test_missing_results_are_named(tmp_path):
     with pytest.raises(FileNotFoundError, match=r"no results of verification\.toy"):
-        Results(tmp_path).records("verification.toy")
+        ProfileResults(tmp_path).records("verification.toy")
 
 
 def test_commit_says_whether_the_source_is_changed(tmp_path):

@@ -9,8 +9,8 @@ from small_toys import Records
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.kinematics import NoBody
 from mpm_ref.rom.study.nsf_watch import Sight
-from validation.common.results import Results
-from validation.common.run import Setting, run_all
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.extremes import nsf_beyond as beyond
 from validation.extremes import nsf_damage as damage
 from validation.extremes import nsf_long as long
@@ -100,8 +100,8 @@ def test_runs_inside_and_outside_are_told_apart(tmp_path, monkeypatch):
     monkeypatch.setattr(runs, "studies", lambda run: {"jelly": STUDY})
     monkeypatch.setattr(beyond, "OUTSIDE", {"jelly": {"quick": (1.0, 50.0)}})
     monkeypatch.setattr(beyond, "INSIDE", {"jelly": (0.35,)})
-    assert not run_all([beyond.beyond.experiment], Setting("quick", tmp_path))
-    results, id = Results(tmp_path), "extremes.nsf.beyond"
+    assert not run_all([beyond.beyond.experiment], RunSetting("quick", tmp_path))
+    results, id = ProfileResults(tmp_path), "extremes.nsf.beyond"
     table = results.table(id, "runs")
     assert table["what"].tolist() == [0.4, 0.35, 1.0]
     assert table["beyond"].argmax() == 2

@@ -7,7 +7,7 @@ from figures.common.splats import DARK, Balls, Camera, image, outward
 from figures.common.state_panels import Look, states
 from mpm_ref.scene import build
 from validation.common.registry import discover
-from validation.common.results import Results
+from validation.common.results import ProfileResults
 from validation.hot import run_history as courses
 from validation.hot import whole_runs
 from validation.hot.run_history import COLUMNS, FIELDS, SHOTS, course, read, run
@@ -141,7 +141,7 @@ def test_normals_of_a_cloud_point_outwards():
 
 
 def test_states_are_drawn_and_missing_ones_named(known, tmp_path):
-    results = Results(tmp_path)
+    results = ProfileResults(tmp_path)
     with pytest.raises(FileNotFoundError, match=r"hot\.scenes\.faceless"):
         states(results, "faceless", Look((0,), ("#e8a33d",)))
     courses.write(tmp_path / "states" / "faceless.npz", known)

@@ -10,8 +10,8 @@ from mpm_ref.rom.study.errors import Errors
 from mpm_ref.rom.study.run import SCHEMES, Way
 from mpm_ref.rom.weights import Model, load, save
 from validation.common import targets
-from validation.common.results import Results
-from validation.common.run import Setting, run_all
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.ldm import networks, settings, superres
 from validation.ldm.gravity import SAME, enough
 from validation.ldm.references import mean_of, references
@@ -112,9 +112,9 @@ def made_up(monkeypatch):
 
 
 def test_tracers_of_table_4_are_measured_at_the_same_times_and_to_be_beaten(tmp_path, made_up):
-    setting = Setting("standard", tmp_path, targets=targets.load())
+    setting = RunSetting("standard", tmp_path, targets=targets.load())
     assert run_all([superres.superresolution.experiment], setting) == []
-    found = {r.target.rpartition(".")[2]: r for r in Results(tmp_path).records("ldm.table4")}
+    found = {r.target.rpartition(".")[2]: r for r in ProfileResults(tmp_path).records("ldm.table4")}
     for k, scheme in enumerate(SCHEMES):
         assert found[Way(*scheme).name].value == pytest.approx(1.0 + k)
     baseline, gain = found["baseline"], found["gain"]
@@ -127,17 +127,17 @@ def test_tracers_of_table_4_are_measured_at_the_same_times_and_to_be_beaten(tmp_
 def test_tracers_that_are_as_good_are_not_beaten(tmp_path, made_up, monkeypatch):
     monkeypatch.setattr(superres, "advected", lambda scene, X: 1.039 * superres.history(0).x[::2])
     for profile, verdict in (("standard", "miss"), ("quick", None)):
-        setting = Setting(profile, tmp_path / profile, targets=targets.load())
+        setting = RunSetting(profile, tmp_path / profile, targets=targets.load())
         assert run_all([superres.superresolution.experiment], setting) == []
-        records = Results(tmp_path / profile).records("ldm.table4")
+        records = ProfileResults(tmp_path / profile).records("ldm.table4")
         assert {r.target: r.verdict for r in records}.get("ldm.table4.gain") == verdict
 
 
 def missed(folder):
     """Printed settings that ours are not."""
-    setting = Setting("quick", folder, targets=targets.load())
+    setting = RunSetting("quick", folder, targets=targets.load())
     assert run_all([settings.settings.experiment], setting) == []
-    return {r.target for r in Results(folder).records("ldm.settings") if r.verdict == "miss"}
+    return {r.target for r in ProfileResults(folder).records("ldm.settings") if r.verdict == "miss"}
 
 
 @pytest.fixture

@@ -11,8 +11,8 @@ from mpm_ref.rom.fields.affine import Affine
 from mpm_ref.rom.study.case import case
 from mpm_ref.rom.study.errors import Errors
 from validation.common import targets
-from validation.common.results import Results
-from validation.common.run import Setting, run_all
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.ldm import paired_runs, published_bodies, states
 from validation.ldm.studies import POKES, TORSION, TOWER, fallen, leaning, twisted
 from validation.ldm.superres import fine
@@ -141,8 +141,8 @@ def judged(name, folder, monkeypatch):
     monkeypatch.setattr(states, "advected", lambda scene, X: np.stack((scene.steps + 1) * [SOME]))
     monkeypatch.setattr(states, "positions", lambda scene: [SOME])
     declared = getattr(states, name).experiment
-    assert run_all([declared], Setting("standard", folder, targets=targets.load())) == []
-    records = Results(folder).records(declared.id)
+    assert run_all([declared], RunSetting("standard", folder, targets=targets.load())) == []
+    records = ProfileResults(folder).records(declared.id)
     return {r.target: r.verdict for r in records if r.paper is not None}
 
 
@@ -153,7 +153,7 @@ def test_figures_are_drawn_from_what_experiments_leave(name, tmp_path, monkeypat
     missed = {target for target, verdict in found.items() if verdict == "miss"}
     assert missed == MISSED.get(name, set())
     assert len(found) == MADE[name]
-    drawn = draw_all(Results(tmp_path), names=[getattr(states, name).experiment.id])
+    drawn = draw_all(ProfileResults(tmp_path), names=[getattr(states, name).experiment.id])
     assert (drawn.left, drawn.failed) == ([], [])
     assert len(drawn.done) == 1 + (name == "poke")
 
@@ -170,7 +170,7 @@ def test_what_is_recorded_is_of_the_scenes_that_ran(name, tmp_path, monkeypatch)
 def test_tracers_are_measured_as_the_reduced_run_is(tmp_path, monkeypatch):
     """Figure 12: the same points and times, and the reduced run must be the better."""
     judged("superresolution", tmp_path, monkeypatch)
-    found = {r.target: r for r in Results(tmp_path).records("ldm.fig12")}
+    found = {r.target: r for r in ProfileResults(tmp_path).records("ldm.fig12")}
     reduced, baseline, gain = (found[f"ldm.fig12.{name}"]
                                for name in ("reduced_high", "baseline", "gain"))
     x = np.arange(31)[:, None, None] * 0.01 + SOME
@@ -183,7 +183,7 @@ def test_tracers_are_measured_as_the_reduced_run_is(tmp_path, monkeypatch):
 
 def test_samples_are_near_what_is_held(tmp_path):
     """LDM-sec3.3-hyper."""
-    setting = Setting("quick", tmp_path, targets=targets.load())
+    setting = RunSetting("quick", tmp_path, targets=targets.load())
     assert run_all([states.sampled.experiment], setting) == []
     found = published_bodies.read(tmp_path, "ldm.fig4")
     z = found["X"][found["samples"], 2]

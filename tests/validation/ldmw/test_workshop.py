@@ -13,8 +13,8 @@ from mpm_ref.rom.study.case import case
 from mpm_ref.rom.weights import load, save
 from validation.common import targets
 from validation.common.record import read_records
-from validation.common.results import Results
-from validation.common.run import Setting, run_all
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.ldm import networks, published_bodies
 from validation.ldm.workshop_studies import PUSHES, SHEAR3, SHEAR17, TOP, WORKSHOP, pushed, sheared
 from validation.ldmw import poke, settings, shear, states
@@ -160,7 +160,7 @@ def test_weights_of_another_training_are_refused(tmp_path, monkeypatch, key, val
 def recorded(function, folder):
     """{target: `Record`} of an experiment at the quick profile."""
     one = function.experiment
-    assert run_all([one], Setting("quick", folder, targets=targets.load())) == []
+    assert run_all([one], RunSetting("quick", folder, targets=targets.load())) == []
     return {record.target: record for record in read_records(folder / f"{one.id}.json")}
 
 
@@ -210,7 +210,7 @@ def test_fig1_is_of_the_ends_of_test_runs(tmp_path, monkeypatch):
     assert ends["full"] == pytest.approx(np.stack(3 * [SOME]))
     assert ends["reduced"] == pytest.approx(np.stack([k * SOME for k in (1.01, 1.02, 1.03)]), 1e-4)
     assert ends["mu"] == pytest.approx(PUSHES.mu[list(states.SHOWN)], 1e-3)
-    drawn = draw_all(Results(tmp_path), names=["ldmw.fig1"])
+    drawn = draw_all(ProfileResults(tmp_path), names=["ldmw.fig1"])
     assert (drawn.done, drawn.left, drawn.failed) == (["ldmw_fig01"], [], [])
 
 

@@ -6,8 +6,8 @@ import matplotlib as mpl
 import pytest
 
 from figures.nclaw import loss
-from validation.common.results import Results
-from validation.common.run import Setting, run_all
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.nclaw import curves, diverged, tables, trained_laws
 from validation.nclaw.environments import ENVIRONMENTS
 from validation.nclaw.initial_laws import untrained
@@ -25,8 +25,8 @@ def folder(tmp_path, monkeypatch):
 
 
 def done(folder, experiment):
-    assert run_all([experiment.experiment], Setting("quick", folder)) == []
-    return Results(folder)
+    assert run_all([experiment.experiment], RunSetting("quick", folder)) == []
+    return ProfileResults(folder)
 
 
 def lost(folder, **changes):
@@ -39,9 +39,9 @@ def lost(folder, **changes):
 
 def test_without_weights_no_curve_is_drawn(tmp_path, monkeypatch):
     monkeypatch.setattr(curves, "known", lambda run: {})
-    assert run_all([curves.loss.experiment], Setting("quick", tmp_path)) == []
+    assert run_all([curves.loss.experiment], RunSetting("quick", tmp_path)) == []
     with pytest.raises(FileNotFoundError, match="the weights were missing"):
-        loss.draw(Results(tmp_path))
+        loss.draw(ProfileResults(tmp_path))
 
 
 def test_curves_of_ablations_stand_beside_ours(tmp_path, monkeypatch):

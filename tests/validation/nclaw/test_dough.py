@@ -7,8 +7,8 @@ from mpm_ref.nclaw.bodies import own
 from mpm_ref.nclaw.camera import filmed, front, pinhole, project
 from mpm_ref.scene import build, dumps, loads
 from validation.common import targets
-from validation.common.results import Results
-from validation.common.run import Setting, run_all
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.nclaw import dough, dough_runs, trained_laws
 from validation.nclaw.states import shots
 from validation.verification.scenes import with_
@@ -89,9 +89,9 @@ def test_the_experiment_says_how_far_laws_are_off(tmp_path, monkeypatch):
     monkeypatch.setattr(trained_laws, "FOLDER", tmp_path)
     monkeypatch.setattr(dough_runs, "scene", short)
     dough.trained.cache_clear()
-    setting = Setting("quick", tmp_path, targets=targets.load())
+    setting = RunSetting("quick", tmp_path, targets=targets.load())
     assert not run_all([dough_runs.dough.experiment], setting)
-    results = Results(tmp_path)
+    results = ProfileResults(tmp_path)
     found = {r.target: r for r in results.records("nclaw.dough")}
     noise = found["nclaw.dough.true.pixels"].value
     assert noise == pytest.approx(dough.NOISE * 2.0**0.5, rel=0.1)

@@ -11,8 +11,8 @@ from mpm_ref.scene import build
 from mpm_ref.simulate import SORT, simulate
 from mpm_ref.trajectories import in_order
 from validation.common import targets
-from validation.common.results import Results
-from validation.common.run import Setting, run_all
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.common.weights_needed import Untrained
 from validation.nclaw import errors, evaluate, tables, trained_laws
 from validation.nclaw.environments import ENVIRONMENTS
@@ -171,9 +171,9 @@ def made_up(monkeypatch):
 
 
 def recorded(folder, experiment, profile="standard"):
-    setting = Setting(profile, folder, targets=targets.load())
+    setting = RunSetting(profile, folder, targets=targets.load())
     failed = run_all([experiment.experiment], setting)
-    return failed, {r.target: r for r in Results(folder).records(experiment.experiment.id)}
+    return failed, {r.target: r for r in ProfileResults(folder).records(experiment.experiment.id)}
 
 
 def test_table_1_has_the_mean_and_the_sample_deviation_of_four(tmp_path, made_up):
@@ -224,7 +224,8 @@ def test_tables_4_and_7_have_rows_of_table_1(tmp_path, beside):
         "nclaw.table7.reconstruction.without": (3.0, 2.0e-5),
         "nclaw.table7.reconstruction.with": (4.0, 1.3e-5)}
     assert found["nclaw.table7.reconstruction.with"].verdict == "miss"
-    assert sum("another paper's" in r.note for r in Results(tmp_path).records("nclaw.table1")) == 1
+    records = ProfileResults(tmp_path).records("nclaw.table1")
+    assert sum("another paper's" in r.note for r in records) == 1
 
 
 def test_tables_4_and_7_have_rows_of_table_2(tmp_path, beside):
@@ -246,7 +247,8 @@ def test_tables_4_and_7_have_rows_of_table_2(tmp_path, beside):
         assert found[f"{table}.geometry.{next(iter(columns))}"].verdict == "info"
         assert found[f"{table}.time.{column}"].verdict == "miss"
         assert "mean of 3 velocities" in found[f"{table}.velocity.{column}"].scale
-    assert not any("another paper's" in r.note for r in Results(tmp_path).records("nclaw.table2"))
+    records = ProfileResults(tmp_path).records("nclaw.table2")
+    assert not any("another paper's" in r.note for r in records)
 
 
 def test_table_4_says_the_size_of_its_graph_network(tmp_path, beside, monkeypatch):

@@ -10,8 +10,8 @@ from mpm_ref.nclaw.gnn.simulator import Simulator
 from mpm_ref.nclaw.gnn.weights import save
 from mpm_ref.scene import build
 from validation.common import targets
-from validation.common.results import Results
-from validation.common.run import Setting, run_all
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.common.weights_needed import Untrained
 from validation.nclaw import curves, errors, gnn_runs, simulators, tables, trained_laws
 from validation.nclaw.environments import ENVIRONMENTS
@@ -180,9 +180,9 @@ def trained_ones(monkeypatch):
 
 
 def recorded(folder, experiment, profile="standard"):
-    setting = Setting(profile, folder, targets=targets.load())
+    setting = RunSetting(profile, folder, targets=targets.load())
     assert run_all([experiment.experiment], setting) == []
-    return {r.target: r for r in Results(folder).records(experiment.experiment.id)}
+    return {r.target: r for r in ProfileResults(folder).records(experiment.experiment.id)}
 
 
 def test_table_1_has_their_row_and_says_what_was_smaller(tmp_path, trained_ones):

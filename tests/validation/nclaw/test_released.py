@@ -3,8 +3,8 @@
 import pytest
 
 from validation.common import targets
-from validation.common.results import Results
-from validation.common.run import Setting, run_all
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.nclaw import errors, tables, trained_laws
 from validation.nclaw.evaluate import Found
 
@@ -22,9 +22,9 @@ def found(monkeypatch, tmp_path):
         n: trained_laws.Net(n.split("-")[0]) for n in NAMES})
 
     def of(experiment):
-        failed = run_all([experiment], Setting("standard", tmp_path, targets=targets.load()))
+        failed = run_all([experiment], RunSetting("standard", tmp_path, targets=targets.load()))
         assert failed == []
-        return {r.target: r for r in Results(tmp_path).records(experiment.id)}
+        return {r.target: r for r in ProfileResults(tmp_path).records(experiment.id)}
 
     return of
 

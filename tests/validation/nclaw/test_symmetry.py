@@ -9,8 +9,8 @@ from neural_toys import deformations, plain, trained
 
 from mpm_ref.materials import FixedCorotated, Fluid
 from mpm_ref.materials.learned import network, response
-from validation.common.results import Results
-from validation.common.run import Setting, run_all
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.nclaw import symmetry
 from validation.nclaw.environments import ENVIRONMENTS
 
@@ -53,8 +53,8 @@ def test_what_must_be_symmetric_is_judged(tmp_path, monkeypatch):
         (method, name): law for method in ("ours", "admissible") for name in ENVIRONMENTS[:1]})
     monkeypatch.setattr(symmetry, "met", lambda name, every: None)
     monkeypatch.setattr(symmetry, "split", lambda law, F: np.array([[3.0, 0.0], [5.0, 12.0]]))
-    assert run_all([symmetry.symmetry.experiment], Setting("standard", tmp_path)) == []
-    found = {r.target: r for r in Results(tmp_path).records("nclaw.symmetry")}
+    assert run_all([symmetry.symmetry.experiment], RunSetting("standard", tmp_path)) == []
+    found = {r.target: r for r in ProfileResults(tmp_path).records("nclaw.symmetry")}
     ours, admissible = (found[f"nclaw.symmetry.{word}.jelly"] for word in ("ours", "admissible"))
     assert ours.value == pytest.approx(3.0 / 13.0)
     assert "0.3 in the median, 0.6 at most" in ours.note

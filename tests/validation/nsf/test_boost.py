@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from figures.nsf import fig06
-from validation.common.results import Results
-from validation.common.run import Setting, run_all
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.common.weights_needed import Untrained
 from validation.nsf import super_resolution
 from validation.nsf.studies import jelly
@@ -72,6 +72,6 @@ def test_without_weights_it_says_how_they_are_made(tmp_path, monkeypatch):
         raise Untrained(f"no weights {name}.npz")
 
     monkeypatch.setattr(super_resolution, "trained", missing)
-    assert run_all([super_resolution.boost.experiment], Setting("quick", tmp_path)) == []
-    assert {r.target for r in Results(tmp_path).records("nsf.fig6")} == {
+    assert run_all([super_resolution.boost.experiment], RunSetting("quick", tmp_path)) == []
+    assert {r.target for r in ProfileResults(tmp_path).records("nsf.fig6")} == {
         "nsf.fig6", "nsf.fig6.untrained"}

@@ -7,8 +7,8 @@ from small_toys import Records
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.study.nsf_case import whole
 from mpm_ref.rom.study.nsf_run import of_cells
-from validation.common.results import Results
-from validation.common.run import Setting, run_all
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.nsf import factors, reduced_runs
 from validation.nsf.factors import Way
 from validation.nsf.studies import jelly
@@ -94,8 +94,8 @@ def test_errors_and_times_are_recorded(one, tmp_path, monkeypatch):
     monkeypatch.setattr(factors, "PRINTED", {"metal": WEIGHED, "cake": DRAWN})
     monkeypatch.setattr(factors, "WAYS", {("quick", "metal"): (DRAWN, WEIGHED),
                                           ("quick", "cake"): (CELLS,)})
-    assert not run_all([factors.factors.experiment], Setting("quick", tmp_path))
-    found = Results(tmp_path)
+    assert not run_all([factors.factors.experiment], RunSetting("quick", tmp_path))
+    found = ProfileResults(tmp_path)
     table = found.table("nsf.factors", "ways")
     assert table["scene"].tolist() == ["metal", "metal", "cake"]
     for k, way in enumerate((DRAWN, WEIGHED, CELLS)):

@@ -7,8 +7,8 @@ from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.study.nsf_case import whole
 from mpm_ref.rom.study.nsf_run import Plan, infer
 from validation.common import targets
-from validation.common.results import Results
-from validation.common.run import Setting, run_all
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.nsf import inversion, reduced_runs
 from validation.nsf.studies import jelly
 
@@ -50,9 +50,9 @@ def test_errors_and_iterations_are_recorded(one, tmp_path, monkeypatch):
     monkeypatch.setattr(inversion, "jelly", lambda coarser: STUDY)
     monkeypatch.setattr(inversion, "metal", lambda coarser, train: STUDY._replace(test=(0.4,)))
     monkeypatch.setattr(inversion, "tested", lambda study: one._replace(study=study))
-    setting = Setting("quick", tmp_path, targets=targets.load())
+    setting = RunSetting("quick", tmp_path, targets=targets.load())
     assert not run_all([inversion.inversion.experiment], setting)
-    found = Results(tmp_path)
+    found = ProfileResults(tmp_path)
     table = found.table("nsf.inversion", "runs")
     assert list(zip(table["scene"], table["value"], table["inversion"], table["faster"],
                     strict=True)) == [

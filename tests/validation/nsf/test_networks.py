@@ -11,8 +11,8 @@ from mpm_ref.rom.fields_file import Model, save
 from mpm_ref.rom.study.errors import Errors
 from mpm_ref.rom.study.nsf_case import whole
 from validation.common import targets
-from validation.common.results import Results
-from validation.common.run import Setting, run_all
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.common.weights_needed import Untrained
 from validation.nsf import networks as kept
 from validation.nsf import networks_runs as runs
@@ -116,10 +116,10 @@ def test_weights_that_lie_there_are_those_of_their_nets():
 
 def recorded(folder):
     """{id without "nsf.networks.": `Record`} of the experiment, which must not fail."""
-    setting = Setting("standard", folder / "out", targets=targets.load())
+    setting = RunSetting("standard", folder / "out", targets=targets.load())
     assert run_all([runs.networks.experiment], setting) == []
     return {r.target.removeprefix("nsf.networks."): r
-            for r in Results(folder / "out").records("nsf.networks")}
+            for r in ProfileResults(folder / "out").records("nsf.networks")}
 
 
 def test_without_weights_there_are_costs_and_the_command(folder):
@@ -173,7 +173,7 @@ def test_errors_are_means_in_per_cent(folder, monkeypatch):
     assert "2 runs and 1 test, dx and dt 4 times as long; r = 3, widths 4, 5 and 6, seed 0" in (
         found["jelly"].scale)
     assert "untrained" not in found
-    table = Results(folder / "out").table("nsf.networks", "errors")
+    table = ProfileResults(folder / "out").table("nsf.networks", "errors")
     assert table["draw"].tolist() == [0, 1, 2, 0, 1, 2, 0]
     assert (table["points"] == table["samples"]).all()
     assert {*table["scene"]} == {"jelly"}

@@ -9,8 +9,8 @@ import pytest
 from figures.nsf import fig04
 from mpm_ref.rom.quadrature.stencil_overlap import reach
 from mpm_ref.rom.study.nsf_case import whole
-from validation.common.results import Results
-from validation.common.run import Setting, run_all
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.ldm.published_bodies import keep, read
 from validation.nsf import integration_points
 
@@ -51,9 +51,9 @@ def test_all_samples_and_integration_points_are_kept_though_others_are_thinned(
         tmp_path, monkeypatch):
     monkeypatch.setattr(integration_points, "MOST", 100)
     monkeypatch.setattr(integration_points, "half_way", half)
-    failed = run_all([integration_points.sets.experiment], Setting("quick", tmp_path))
+    failed = run_all([integration_points.sets.experiment], RunSetting("quick", tmp_path))
     assert failed == []
-    found = {r.target: r.value for r in Results(tmp_path).records("nsf.fig4")}
+    found = {r.target: r.value for r in ProfileResults(tmp_path).records("nsf.fig4")}
     kept = read(tmp_path, "nsf.fig4")
     for name in ("block", "cake"):
         assert len(kept[f"{name}_sample"]) == found[f"nsf.fig4.{name}.samples"]

@@ -3,8 +3,8 @@
 import pytest
 
 from validation.common import targets
-from validation.common.results import Results
-from validation.common.run import Setting, run_all
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.nsf import scene_settings
 from validation.verification.scenes import shipped, with_
 
@@ -13,9 +13,9 @@ SMALL = ("bread", "cake", "jelly")      # filled in a moment
 
 
 def records(folder):
-    setting = Setting("quick", folder, targets=targets.load())
+    setting = RunSetting("quick", folder, targets=targets.load())
     assert run_all([scene_settings.settings.experiment], setting) == []
-    return {r.target: r for r in Results(folder).records("nsf.settings")
+    return {r.target: r for r in ProfileResults(folder).records("nsf.settings")
             if r.target != "nsf.settings"}
 
 

@@ -17,7 +17,7 @@ from mpm_ref.rom.study.nsf_run import Chosen, Plan, drawn, infer, of_cells, weig
 from mpm_ref.rom.study.study import load
 from mpm_ref.store.results import Results as Stored
 from validation.common.results import Results
-from validation.common.run import Setting, run_all
+from validation.common.run import RunSetting, run_all
 from validation.extremes import nsf_samples as samples
 from validation.extremes.ldm_runs import BAD, Trial
 from validation.extremes.nsf_runs import Bench, End
@@ -117,7 +117,7 @@ def test_scenes_that_the_bound_has_not_seen_are_judged_by_it(tmp_path, monkeypat
     study = jelly(4)._replace(train=(0.3, 0.5), test=(0.4,), samples=40,
                               sizes=Sizes(r=5, modes=8, tau=12, C=12, smoothing=1e-4))
     monkeypatch.setattr(samples, "others", lambda run: {"cube": study})
-    assert not run_all([samples.unseen.experiment], Setting("quick", tmp_path))
+    assert not run_all([samples.unseen.experiment], RunSetting("quick", tmp_path))
     found = Results(tmp_path)
     table = found.table("extremes.nsf.unseen", "left")
     assert list(zip(table["map"], table["what"], table["samples"], strict=True)) == [

@@ -12,8 +12,8 @@ from mpm_ref.rom.inferred import Inferred
 from mpm_ref.rom.study.nsf_case import whole
 from mpm_ref.rom.study.nsf_run import Plan, infer
 from mpm_ref.simulate import simulate
-from validation.common.results import Results
-from validation.common.run import Setting, run_all
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.nsf import reduced_runs, speed
 from validation.nsf.studies import jelly
 from validation.trade.nsf_sizes import particle_bytes
@@ -123,10 +123,10 @@ def recorded(one, clock, tmp_path, monkeypatch):
     monkeypatch.setattr(speed, "STUDIES", {"jelly": (small, (N, FEW))})
     monkeypatch.setattr(speed, "sand", small)
     monkeypatch.setattr(speed, "tested", made)
-    assert not run_all([speed.speed.experiment], Setting("quick", tmp_path))
+    assert not run_all([speed.speed.experiment], RunSetting("quick", tmp_path))
     assert asked == [(3, 3), STUDY._replace(test=STUDY.test[1:]),
                      (3, 3), STUDY._replace(test=STUDY.test[:1], steps=speed.HELD)]
-    results = Results(tmp_path)
+    results = ProfileResults(tmp_path)
     return ({r.target: r for r in results.records("nsf.speed") if r.target != "nsf.speed"},
             results.table("nsf.speed", "times"))
 

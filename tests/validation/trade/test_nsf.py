@@ -8,8 +8,8 @@ import pytest
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.kinematics import NoBody
 from mpm_ref.rom.study.errors import Errors
-from validation.common.results import Results
-from validation.common.run import Setting, run_all
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.extremes import nsf_runs
 from validation.extremes.outcome import FINISHED
 from validation.nsf import reduced_runs
@@ -29,13 +29,13 @@ def one():
 
 @pytest.fixture
 def results(one, tmp_path, monkeypatch):
-    """A function that runs an experiment on the small study alone, and gives its `Results`."""
+    """A function that runs an experiment on the small study alone; returns `ProfileResults`."""
     monkeypatch.setattr(nsf_runs, "studies", lambda run: {"jelly": STUDY})
     monkeypatch.setattr(nsf_runs, "tested", lambda study: one)
 
     def made(function):
-        assert not run_all([function.experiment], Setting("quick", tmp_path))
-        return Results(tmp_path)
+        assert not run_all([function.experiment], RunSetting("quick", tmp_path))
+        return ProfileResults(tmp_path)
     return made
 
 
@@ -143,7 +143,7 @@ def test_sizes_are_told_with_their_bytes(one, results, monkeypatch, tmp_path):
     assert table["bytes"][2] < table["bytes"][0]
     assert table["bytes_full"][0] == nsf_sizes.particle_bytes(STUDY)
     assert table["origin"][1] > table["origin"][0]
-    targets = {r.target for r in Results(tmp_path).records("trade.nsf.sizes")}
+    targets = {r.target for r in ProfileResults(tmp_path).records("trade.nsf.sizes")}
     assert targets == {"trade.nsf.sizes", *(f"trade.nsf.sizes.jelly.{words}" for words in (
         "own.sizes", "r.2", "C.4", "precision.single"))}
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mpm_ref.rom.fields.pod_fields import Sizes
-from validation.common.results import Results
-from validation.common.run import Setting, run_all
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.common.weights_needed import Untrained
 from validation.ldm.timing import Spent
 from validation.nsf.studies import jelly
@@ -80,8 +80,8 @@ def recording():
 @pytest.mark.usefixtures("counted")
 def test_all_is_recorded(tmp_path, monkeypatch):
     monkeypatch.setattr(nsf_offline, "studies", lambda run: {"jelly": STUDY})
-    assert not run_all([nsf_offline.offline.experiment], Setting("quick", tmp_path))
-    found = Results(tmp_path)
+    assert not run_all([nsf_offline.offline.experiment], RunSetting("quick", tmp_path))
+    found = ProfileResults(tmp_path)
     records = {r.target.split(".")[-1]: r for r in found.records("trade.nsf.offline")}
     trainings = {"train_time_lo", "train_time_hi"}
     assert {*records} == {"offline", *Bill._fields, "pays_after", *trainings}

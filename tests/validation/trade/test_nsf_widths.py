@@ -7,8 +7,8 @@ from field_toys import R, networks
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.fields_file import Model
 from mpm_ref.rom.study.errors import Errors
-from validation.common.results import Results
-from validation.common.run import Setting, run_all
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.common.weights_needed import Untrained
 from validation.nsf import reduced_runs
 from validation.nsf.networks import Net, Part, fields_of, narrow, net_of, nets
@@ -49,8 +49,8 @@ def recorded(tmp_path, monkeypatch):
 
     def recorded(*lacking):
         recorded.lacking = lacking
-        assert run_all([nsf_widths.of_widths.experiment], Setting("standard", tmp_path)) == []
-        found = Results(tmp_path)
+        assert run_all([nsf_widths.of_widths.experiment], RunSetting("standard", tmp_path)) == []
+        found = ProfileResults(tmp_path)
         start = "trade.nsf.widths."
         return ({r.target.removeprefix(start): r for r in found.records(start[:-1])},
                 found.table(start[:-1], "widths"))

@@ -3,13 +3,13 @@
 import pytest
 
 from validation.common.registry import Experiment
-from validation.common.run import Setting, run_all
+from validation.common.run import RunSetting, run_all
 
 
 def run(folder, function, **setting):
     """Run a toy experiment; returns whether it failed."""
     toy = Experiment("verification.toy", "A toy", ("quick",), {"quick": 1.0}, function)
-    return run_all([toy], Setting("quick", folder, **setting))
+    return run_all([toy], RunSetting("quick", folder, **setting))
 
 
 def parts(folder):
@@ -28,7 +28,7 @@ def test_an_experiment_that_was_cut_off_goes_on(tmp_path, commit, made):
 
     def long(run):
         for i in range(2):
-            assert run.kept(f"part{i}", lambda i=i: part(i)) == [i, [0.1, "text"]]
+            assert run.cached(f"part{i}", lambda i=i: part(i)) == [i, [0.1, "text"]]
 
     with pytest.raises(KeyboardInterrupt):
         run(tmp_path, long, commit=commit)
@@ -42,7 +42,7 @@ def test_what_was_kept_is_of_one_commit_and_one_seed(tmp_path):
     made = []
 
     def broken(run):
-        run.kept("part", lambda: made.append(run.seed))
+        run.cached("part", lambda: made.append(run.seed))
         raise RuntimeError("later")
 
     for of in ("abc", 0), ("abc", 0), ("abc", 1), ("def", 0):
