@@ -16,7 +16,7 @@ from mpm_ref.rom.study.nsf_record import plan_of
 from mpm_ref.rom.study.nsf_run import Chosen, Plan, drawn, infer, of_cells, weighed
 from mpm_ref.rom.study.study import load
 from mpm_ref.store.results import Results as Stored
-from validation.common.results import Results
+from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.extremes import nsf_samples as samples
 from validation.extremes.ldm_runs import BAD, Trial
@@ -118,7 +118,7 @@ def test_scenes_that_the_bound_has_not_seen_are_judged_by_it(tmp_path, monkeypat
                               sizes=Sizes(r=5, modes=8, tau=12, C=12, smoothing=1e-4))
     monkeypatch.setattr(samples, "others", lambda run: {"cube": study})
     assert not run_all([samples.unseen.experiment], RunSetting("quick", tmp_path))
-    found = Results(tmp_path)
+    found = ProfileResults(tmp_path)
     table = found.table("extremes.nsf.unseen", "left")
     assert list(zip(table["map"], table["what"], table["samples"], strict=True)) == [
         ("cube", "draw 0", 3)]
