@@ -73,7 +73,7 @@ def toy(root, **files):
     ("Out = Annotated[str, typer.Option('--found')]", "banned option", "--found"),
     ("def step(map): pass", "builtin parameter", "step(map)"),
     ("def range(): pass", "builtin function", "range"),
-    ("class A:\n    id: int", "builtin field", "A.id"),
+    ("class A:\n    map: int", "builtin field", "A.map"),
     ("class A(Struct):\n    set: dict", "builtin key", "A.set"),
     ("class TimeoutError(Exception): pass", "builtin class", "TimeoutError"),
     ("input = open_file()", "builtin variable", "input"),
