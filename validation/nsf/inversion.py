@@ -4,7 +4,7 @@ takes from the latent coordinates before the step.
 
 import numpy as np
 
-from mpm_ref.rom.inferred import INVERSIONS
+from mpm_ref.rom.projection import INVERSIONS
 
 from ..common.registry import experiment
 from .reduced_runs import FASTER, tested

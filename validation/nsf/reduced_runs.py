@@ -6,7 +6,7 @@ import numpy as np
 
 from mpm_ref.rom.fields.elastic import deformed
 from mpm_ref.rom.fields.pod_fields import spanned
-from mpm_ref.rom.inferred import INVERSIONS
+from mpm_ref.rom.projection import INVERSIONS
 from mpm_ref.rom.snapshots import joined
 from mpm_ref.rom.study.errors import Errors, Squares
 from mpm_ref.rom.study.nsf_case import history, whole

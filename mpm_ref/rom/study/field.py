@@ -13,7 +13,8 @@ from ...explicit import initial_stress
 from ...sampling import Poisson
 from ..fields.pod import Modes
 from ..fields.polynomial_manifold import Curved
-from ..latent import points, velocities
+from ..kinematics import evaluate
+from ..latent import velocities
 
 
 class Field(NamedTuple):
@@ -27,9 +28,9 @@ class Field(NamedTuple):
         """The body in a reduced state: x, v, F and the stress that follows; velocity is one of
         `rom.latent.VELOCITIES`, dt [s] the step that led here.
         """
-        speed = velocities(self.map, latent, dt, self.X)[velocity]
-        now = points(self.map, latent, self.X, speed)
-        body = self.body._replace(particles=self.body.particles._replace(x=now.x, v=now.v, F=now.F))
+        now = evaluate(self.map, self.X, latent.xhat)
+        v = velocities(self.map, latent, dt, self.X)[velocity](now)
+        body = self.body._replace(particles=self.body.particles._replace(x=now.x, v=v, F=now.F))
         initial_stress(body)
         return body
 

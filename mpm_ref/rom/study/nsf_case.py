@@ -9,8 +9,8 @@ from msgspec.structs import replace
 
 from ...scene import build
 from ...simulate import simulate
-from ..inferred import Matter
 from ..snapshots import Histories
+from ..step import MaterialPoints
 from ..symmetric import values
 
 
@@ -19,7 +19,7 @@ class Whole(NamedTuple):
 
     problem: object         # `Problem`
     X: np.ndarray           # (n, d) points at the start [m]
-    matter: Matter          # of these points
+    matter: MaterialPoints  # of these points
 
 
 def whole(scene):
@@ -40,7 +40,7 @@ def whole(scene):
         raise ValueError(f"the scene {problem.title!r} has {what}: reduced runs with inferred "
                          f"stress expect {expected}")
     X, v, m, V0 = (at_once(problem.bodies, name) for name in ("x", "v", "m", "V0"))
-    return Whole(problem, X, Matter(m, V0, v))
+    return Whole(problem, X, MaterialPoints(m, V0, v))
 
 
 def at_once(bodies, name):

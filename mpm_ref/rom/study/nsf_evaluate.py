@@ -9,8 +9,8 @@ from math import inf, nan
 
 import numpy as np
 
-from ..inferred import nearest
 from ..kinematics import NoBody
+from ..latent import nearest
 from ..step import BREAKDOWNS
 from ..symmetric import values
 from .errors import Errors, Squares

@@ -10,7 +10,8 @@ from ...materials import NoFlow
 from ...store.writer import Fields
 from ..extrapolation import Extent
 from ..fields.pod_fields import Spanned
-from ..inferred import Position, Report
+from ..latent import Latent
+from ..step import Report
 from .nsf_case import Whole
 from .nsf_fields import of_run
 from .nsf_run import Plan, begin, continued, drawn, of_cells, weighed
@@ -53,7 +54,7 @@ class Recording:
         return sparse(self.fields, self.plan.samples[0])
 
     def states(self, known):
-        """Yield (`Position`, `Report` or None, `Sight`) of each state, those known too."""
+        """Yield (`Latent`, `Report` or None, `Sight`) of each state, those known too."""
         known = known or [(begin(self.whole, self.fields, self.rest), None)]
         for _, at, report in continued(known, self.whole, self.fields, self.plan):
             yield at, report, look(self.extent, at, report)
@@ -129,10 +130,10 @@ def recording(whole, model, mu, run, facts):
 
 
 def states(results):
-    """(`Position`, `Report` or None) of each frame of a reduced run."""
+    """(`Latent`, `Report` or None) of each frame of a reduced run."""
     n = len(results)
     rows = {name: series[:n] for name, series in results.h5["reduced"].items()}
-    found = [(Position(rows["xhat"][k], rows["xhat"][k - 1] if k else None),
+    found = [(Latent(rows["xhat"][k], before=rows["xhat"][k - 1] if k else None),
               report_of(rows, k) if k else None) for k in range(n)]
     return tuple(found)
 
@@ -140,4 +141,4 @@ def states(results):
 def report_of(rows, k):
     """`Report` of step k, as far as it is stored."""
     counts = (int(rows[name][k]) for name in COUNTS)
-    return Report(*counts, float(rows["residual"][k]), 0, True)
+    return Report(*counts, float(rows["residual"][k]), 0, True, {})

@@ -5,8 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..cubature import CANDIDATES, cubature
-from ..inferred import Inferred, Position, nearest
+from ..latent import Latent, nearest
 from ..quadrature.stencil_overlap import bases
+from ..step import nsf_stepper
 
 ENOUGH = 4000       # points that tell where a body is at the start
 WITHIN = 1e-9       # of a step: one that ends so little after the scene is made
@@ -39,27 +40,27 @@ class Plan(NamedTuple):
 
 
 def model(whole, fields, inversion="nonlinear"):
-    """`Inferred` model of a `Whole` scene."""
+    """NSF's `ReducedStepper` of a `Whole` scene."""
     problem = whole.problem
-    return Inferred(fields, whole.matter, problem.dx, problem.scheme.degree, problem.gravity,
-                    problem.conditions, inversion)
+    return nsf_stepper(fields, whole.matter, problem.dx, problem.scheme.degree, problem.gravity,
+                       problem.conditions, inversion)
 
 
 def infer(whole, fields, plan, start):
-    """Yield (t [s], `Position`, `Report` or None) of a reduced run until the scene ends, the start
+    """Yield (t [s], `Latent`, `Report` or None) of a reduced run until the scene ends, the start
     first, which is searched from latent coordinates near it.
     """
     yield from continued([(begin(whole, fields, start), None)], whole, fields, plan)
 
 
 def begin(whole, fields, near):
-    """`Position` of a `Whole` scene at the start, searched from latent coordinates near it."""
+    """`Latent` of a `Whole` scene at the start, searched from latent coordinates near it."""
     some = np.arange(0, len(whole.X), -(-len(whole.X) // ENOUGH))
-    return Position(nearest(fields, some, whole.X[some], near))
+    return Latent(nearest(fields, some, whole.X[some], near))
 
 
 def continued(known, whole, fields, plan):
-    """Yield the same of a run whose first states (`Position`, `Report` or None) are known, these
+    """Yield the same of a run whose first states (`Latent`, `Report` or None) are known, these
     too.
     """
     require_sound(plan.samples, len(whole.X))

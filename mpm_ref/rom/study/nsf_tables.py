@@ -8,7 +8,7 @@ from msgspec import Meta
 
 from ...shapes.quantities import Count, Natural, NotNegative, Positive, Seed
 from ..fields.pod_fields import Sizes
-from ..inferred import INVERSIONS
+from ..projection import INVERSIONS
 from .nsf_run import Plan
 from .tables import MODES, NETWORK, Kinds, Runs, Table, one_of
 

@@ -56,7 +56,7 @@ def sparse(fields, chosen):
 
 
 def look(extent, at, report):
-    """`Sight` of a `Position`, reached by a step with a `Report`; None at the start."""
+    """`Sight` of a `Latent`, reached by a step with a `Report`; None at the start."""
     blind = 0 if report is None else len(at.xhat) - report.rank
     return Sight(float(extent.beyond(at.xhat)), blind)
 

@@ -9,7 +9,7 @@ from ...store.manifest import code, scene_hash
 from ...store.results import Results
 from ...store.running import INTERRUPTED, Refused
 from ...store.words import counted
-from ..latent import at_start, moved
+from ..latent import start_state
 from ..step import Report
 from .nsf_record import states as positions
 from .record import UNENDED, marked
@@ -22,7 +22,7 @@ class Begun(NamedTuple):
     """What a file has of a run."""
 
     known: tuple            # (`Latent`, `Report` or None) of its frames but the run's last; of
-                            # NSF's model (`Position`, `Report` or None)
+                            # NSF's model without rates
     same_code: bool         # whether all of it was made by this code
 
 
@@ -75,10 +75,10 @@ def states(results):
     if not len(results):
         return ()
     rows = {name: series[:len(results)] for name, series in results.h5["reduced"].items()}
-    latent = at_start(rows["xhat"][0])
+    latent = start_state(rows["xhat"][0])
     found = [(latent, None)]
     for k in range(1, len(results)):
-        latent = moved(latent, rows["xhat"][k], rows["vhat"][k])
+        latent = latent.advance(rows["xhat"][k], rows["vhat"][k])
         found.append((latent, report_of(rows, k)))
     return tuple(found)
 

@@ -11,7 +11,7 @@ from ..latent import initial
 from ..quadrature.eulerian import Eulerian
 from ..quadrature.lagrangian import Resampled, lagrangian
 from ..sampling import PER_GROUP, draw, pivoted
-from ..step import Reduced
+from ..step import ldm_stepper
 from .case import distance
 
 PRECISIONS = ("double", "single")
@@ -47,13 +47,15 @@ class Way(NamedTuple):
 
 
 def model(case, map, way):
-    """`Reduced` model of a `Case` on a map. Raises ValueError for a quadrature there is not."""
+    """Return LDM's `ReducedStepper` of a `Case` on a map. Raises ValueError for a quadrature that
+    does not exist.
+    """
     problem = case.problem
     make = {"lagrangian": of_material, "eulerian": of_cells, "resampled": of_another_sampling}
     if way.quadrature not in make:
         raise ValueError(f"quadrature = {way.quadrature!r}: expected one of {', '.join(make)}")
-    return Reduced(precise(map, way), make[way.quadrature](case, way), problem.bodies[0].law,
-                   problem.gravity, problem.conditions, way.projection, way.velocity)
+    return ldm_stepper(precise(map, way), make[way.quadrature](case, way), problem.bodies[0].law,
+                       problem.gravity, problem.conditions, way.projection, way.velocity)
 
 
 def precise(map, way):

@@ -8,7 +8,7 @@ import pytest
 
 from figures.common import state_panels
 from figures.frame import draw_all
-from mpm_ref.rom.latent import at_start
+from mpm_ref.rom.latent import start_state
 from mpm_ref.rom.study.case import case
 from mpm_ref.rom.weights import load, save
 from validation.common import targets
@@ -116,9 +116,9 @@ def test_few_nodes_have_few_samples_and_few_of_these_are_used(sheared_runs):
     one, some = sheared_runs.cases[0], spread(sheared_runs.X, 6)
     map, rest = pod(SHEAR17, 1)
     _, every = by_nodes(some)(one, map)
-    assert set(some) <= set(every(0.0, at_start(rest))) < set(range(17))
+    assert set(some) <= set(every(0.0, start_state(rest))) < set(range(17))
     _, few = by_nodes(some, 6)(one, map)
-    assert len(few(0.0, at_start(rest))) == 6
+    assert len(few(0.0, start_state(rest))) == 6
 
 
 def test_samples_are_spread_from_the_bottom_to_the_top():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mpm_ref.rom.fields.pod_fields import Sizes
-from mpm_ref.rom.inferred import Inferred
+from mpm_ref.rom.step import ReducedStepper
 from mpm_ref.rom.study.nsf_case import whole
 from mpm_ref.rom.study.nsf_run import Plan, infer
 from mpm_ref.simulate import simulate
@@ -50,7 +50,8 @@ def clock(monkeypatch):
         yield from simulate(problem)
 
     for stage, spent in SPENT.items():
-        monkeypatch.setattr(Inferred, stage, passing(getattr(Inferred, stage), spent))
+        method = speed.STAGES[stage]
+        monkeypatch.setattr(ReducedStepper, method, passing(getattr(ReducedStepper, method), spent))
     monkeypatch.setattr(speed, "deform_body", passing(speed.deform_body, DEFORM))
     monkeypatch.setattr(speed, "simulate", run)
     monkeypatch.setattr(speed, "perf_counter", lambda: now[0])
