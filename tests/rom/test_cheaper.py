@@ -117,7 +117,7 @@ def test_preimages_nearer_than_single_precision_tells_are_refused(torsion):
     with pytest.raises(ValueError, match=r"close = 1e-09 dx in single precision: expected at leas"):
         model(torsion, map, Way("eulerian", precision="single"))
     assert model(torsion, map, Way(precision="single")).field.g.net.W.dtype == np.float32
-    assert model(torsion, map, Way()).map is map
+    assert model(torsion, map, Way()).field.g is map
 
 
 def test_pivots_are_the_rows_that_tell_the_coordinates(rng):

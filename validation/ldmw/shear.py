@@ -54,8 +54,9 @@ def forceless(approach):
     """An approach whose material resists nothing."""
     def softened(one, map):
         stepper, choose = approach(one, map)
-        law = type(stepper.law)(*np.zeros(len(stepper.law)).tolist())
-        return replace(stepper, law=law), choose
+        field = stepper.field
+        law = type(field.law)(*np.zeros(len(field.law)).tolist())
+        return replace(stepper, field=field._replace(law=law)), choose
 
     return softened
 

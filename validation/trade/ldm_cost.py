@@ -77,7 +77,8 @@ def split(one, at, way, steps=STEPS):
             return timed(X, *args)
         return call
 
-    stepper.map = Watched(stepper.map, EVALUATIONS, counted)
+    field = stepper.field
+    stepper.field = field._replace(g=Watched(field.g, EVALUATIONS, counted))
     stepper.quadrature = Watched(stepper.quadrature, ("cloud",),
                                  lambda name, method: clock.part("quadrature", method))
     stepper.on_grid = clock.part("grid", stepper.on_grid)
