@@ -69,23 +69,23 @@ def velocities(field, latent, dt, samples, v0=None):
     dt [s] with these points as samples. v0: velocities (n, d) [m/s] of numbered points at the
     start, which "difference" takes there; without them, those of the rates.
     """
-    def latest(at):
-        return at.G @ latent.vhat
+    def latest(state):
+        return state.G @ latent.vhat
 
-    def previous(at):
-        return field.velocity(at.points, latent.fitted_at, latent.vhat)
+    def previous(state):
+        return field.velocity(state.points, latent.fitted_at, latent.vhat)
 
-    def difference(at):
+    def difference(state):
         if latent.before is None:
-            return previous(at) if v0 is None else v0[at.points]
-        return (at.x - field.place(at.points, latent.before)) / dt
+            return previous(state) if v0 is None else v0[state.points]
+        return (state.x - field.place(state.points, latent.before)) / dt
 
     @cache
     def rates():
         _, _, G = field.derivatives(samples, latent.xhat)
         return project_velocity(G, field.velocity(samples, latent.fitted_at, latent.vhat)).y
 
-    def transported(at):
-        return at.G @ rates()
+    def transported(state):
+        return state.G @ rates()
 
     return dict(zip(VELOCITIES, (previous, latest, difference, transported), strict=True))

@@ -57,17 +57,18 @@ class RateProjection:
             raise ValueError(f"projection = {self.kind!r}: expected one of "
                              + ", ".join(PROJECTIONS))
 
-    def __call__(self, field, latent, at, trial, dt, weights=None):
+    def __call__(self, field, latent, samples, trial, dt, weights=None):
         """Return `Projected` from the `Kinematics` of samples and their trial particles. Raises
         ValueError for samples with weights.
         """
         if weights is not None:
             raise ValueError("samples with weights: expected samples that all count the same; "
                              "weights are for the inversion of positions")
-        fit = project_velocity(at.G, trial.v)
+        fit = project_velocity(samples.G, trial.v)
         if self.kind == "linear":
             return Projected(latent.xhat + dt * fit.y, fit.y, fit._replace(iterations=0))
-        place = project_position(field, at.points, trial.x, 2.0 * latent.xhat - latent.fitted_at)
+        guess = 2.0 * latent.xhat - latent.fitted_at
+        place = project_position(field, samples.points, trial.x, guess)
         return Projected(place.y, fit.y, fit._replace(iterations=place.iterations,
                                                       converged=place.converged))
 
@@ -86,11 +87,11 @@ class PositionInversion:
         if self.kind not in INVERSIONS:
             raise ValueError(f"inversion = {self.kind!r}: expected " + " or ".join(INVERSIONS))
 
-    def __call__(self, field, latent, at, trial, dt, weights=None):
+    def __call__(self, field, latent, samples, trial, dt, weights=None):
         """Return `Projected` from the `Kinematics` of samples and their trial particles; samples
         count by weights (m,), or all the same.
         """
-        x, points = trial.x, at.points
+        x, points = trial.x, samples.points
         if weights is not None:
             field = WeightedField(field, np.sqrt(weights)[:, None])
             x = field.root * x

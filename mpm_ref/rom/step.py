@@ -132,15 +132,15 @@ class ReducedStepper:
         return (self.body(cloud.points, latent, velocity, (cloud.m, cloud.V0)),
                 self.body(cloud.samples, latent, velocity, (mass, np.zeros(count))))
 
-    def body(self, at, latent, velocity, sizes):
+    def body(self, state, latent, velocity, sizes):
         """Return a `Body` of points with these masses and volumes, with the velocity, stress and
         affine field that a step starts from (NSF-sec5.1).
         """
-        particles = particles_at(at.x, velocity(at), *sizes, transfer=self.transfer)
-        particles.tau[:] = self.field.stress(at.points, latent.xhat, at.F)
+        particles = particles_at(state.x, velocity(state), *sizes, transfer=self.transfer)
+        particles.tau[:] = self.field.stress(state.points, latent.xhat, state.F)
         if self.transfer == "apic":
-            particles.C[:] = self.field.affine(at.points, latent.xhat)
-        return Body("reduced", particles, None, NoFlow(), np.arange(len(at.x)))
+            particles.C[:] = self.field.affine(state.points, latent.xhat)
+        return Body("reduced", particles, None, NoFlow(), np.arange(len(state.x)))
 
     def on_grid(self, body, samples, t, dt):
         """Return the samples' particles after a step on the grid: their trial state (LDM-alg5)."""
@@ -158,9 +158,9 @@ class ReducedStepper:
             self.conditions.apply(grid, t + dt, dt)
         return grid
 
-    def project(self, latent, at, trial, dt, weights=None):
+    def project(self, latent, samples, trial, dt, weights=None):
         """Return `projection.Projected` from the samples' `Kinematics` and trial particles."""
-        return self.projection(self.field, latent, at, trial, dt, weights)
+        return self.projection(self.field, latent, samples, trial, dt, weights)
 
 
 def ldm_stepper(g, quadrature, law, gravity, conditions=None, projection="linear",

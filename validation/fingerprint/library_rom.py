@@ -9,12 +9,12 @@ import numpy as np
 
 from mpm_ref.rom import fields_file, weights
 from mpm_ref.rom.fields.elastic import deformed
-from mpm_ref.rom.fields.joint_latent import Joint, joint
+from mpm_ref.rom.fields.joint_latent import joint, joint_stepper
 from mpm_ref.rom.fields.network import learned
 from mpm_ref.rom.fields.pod import basis
 from mpm_ref.rom.fields.pod_fields import Sizes, spanned
 from mpm_ref.rom.fields.polynomial_manifold import curved
-from mpm_ref.rom.inferred import Position
+from mpm_ref.rom.latent import Latent
 from mpm_ref.rom.quadrature.lagrangian import neighbours
 from mpm_ref.rom.quadrature.node_centric import node_centric, nodes_of
 from mpm_ref.rom.snapshots import joined
@@ -118,7 +118,7 @@ def ldm_by_nodes(setup, decoder, rest, count, steps):
     grid = stepper.quadrature
     quadrature = node_centric(grid, nodes_of(setup.X[chosen], grid.dx, grid.degree))
     run = from_start(setup, decoder, rest, replace(stepper, quadrature=quadrature),
-                     lambda t, latent: quadrature.samples(decoder, latent))
+                     lambda t, latent: quadrature.samples(decoder, latent.xhat))
     return summary(setup, decoder, run, steps)
 
 
@@ -202,6 +202,7 @@ def nsf(setup, fields, rest, plan, factor=1.0, inversion="nonlinear"):
     chosen, steps = plan
     run = infer(setup, fields, Plan((chosen,), factor, inversion), rest)
     times, states, reports = zip(*islice(run, steps + 1), strict=True)
+    reports = [report and report[:6] for report in reports]
     return {"t": times, "latent": np.array([state[0] for state in states]), "reports": reports,
             "fields": values_of(fields, states[-1][0])}
 
@@ -227,13 +228,11 @@ def nsf_joint(name, key, train, values, sizes, plan):
 def joint_run(setup, fields, rest, scale, plan):
     """Return latent coordinates, reports and last fields of steps of position and stress."""
     problem, (chosen, steps) = setup.problem, plan
-    _, _, law, flow, _ = problem.bodies[0]
-    stepper = Joint(fields, setup.matter, problem.dx, problem.scheme.degree, problem.gravity,
-                    problem.conditions, law=law, flow=flow, scale=scale)
-    states, reports, dt = [Position(rest)], [], problem.clock.dt
+    stepper = joint_stepper(fields, setup.matter, problem, scale)
+    states, reports, dt = [Latent(rest)], [], problem.clock.dt
     for k in range(steps):
         state, report = stepper.step(states[-1], chosen.points, k * dt, dt)
         states.append(state)
-        reports.append(report)
+        reports.append(report[:6])
     return {"latent": np.array([state[0] for state in states]), "reports": reports,
             "fields": values_of(fields, states[-1][0])}

@@ -109,7 +109,7 @@ class JointInversion:
     scale: Scale
     weight: float = WEIGHT
 
-    def __call__(self, field, latent, at, trial, dt, weights=None):
+    def __call__(self, field, latent, samples, trial, dt, weights=None):
         """Return `Projected` from the `Kinematics` of samples and their trial particles. Raises
         ValueError for samples with weights.
         """
@@ -117,7 +117,7 @@ class JointInversion:
             raise ValueError("samples with weights: expected samples that all count the same; "
                              "weights are made for positions alone")
         both = Stacked(field, self.scale, self.weight)
-        fit = project_position(both, at.points, both.of(trial.x, trial.tau), latent.xhat)
+        fit = project_position(both, samples.points, both.of(trial.x, trial.tau), latent.xhat)
         return Projected(fit.y, None, fit)
 
 
