@@ -163,19 +163,19 @@ class ReducedStepper:
         return self.projection(self.field, latent, samples, trial, dt, weights)
 
 
-def ldm_stepper(g, quadrature, law, gravity, conditions=None, projection="linear",
-                velocity="previous"):
+def ldm_stepper(g, quadrature, law, gravity, projection="linear", **options):
     """Return the `ReducedStepper` of LDM (LDM-alg2) on a deformation map g of a body of an elastic
-    law; projection: see `projection.RateProjection`.
+    law; projection: see `projection.RateProjection`; options: conditions and velocity.
     """
     return ReducedStepper(ElasticMap(g, law), quadrature, RateProjection(projection), gravity,
-                          conditions, "pic", velocity)
+                          transfer="pic", **options)
 
 
-def nsf_stepper(fields, material, dx, degree, gravity, conditions=None, inversion="nonlinear"):
+def nsf_stepper(fields, material, dx, degree, gravity, inversion="nonlinear", **options):
     """Return the `ReducedStepper` of NSF (NSF-sec5.2) on fields of `MaterialPoints`, on a grid of
-    spacing dx [m] with splines of a degree; inversion: see `projection.PositionInversion`.
+    spacing dx [m] with splines of a degree; inversion: see `projection.PositionInversion`; options:
+    conditions.
     """
     quadrature = NumberedPoints(material.m, material.V0, dx, degree)
-    return ReducedStepper(fields, quadrature, PositionInversion(inversion), gravity, conditions,
-                          "apic", "difference", material.v)
+    return ReducedStepper(fields, quadrature, PositionInversion(inversion), gravity,
+                          transfer="apic", velocity="difference", v0=material.v, **options)

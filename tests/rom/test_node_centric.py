@@ -96,7 +96,7 @@ def test_on_an_exact_manifold_a_run_is_the_full_models(d, degree, projection):
     conditions, gravity = Stirred(d), GRAVITY[:d]
     particles = full_steps(full(X, X, 0.0 * X), conditions, gravity, degree, steps)
     body = node_centric(eulerian(X, degree), block(d, degree))
-    model = ldm_stepper(map, body, LAW, gravity, conditions, projection=projection)
+    model = ldm_stepper(map, body, LAW, gravity, projection, conditions=conditions)
     latent, seen = start_state(map.rest), []
     for k in range(steps):
         samples = body.samples(map, latent.xhat)

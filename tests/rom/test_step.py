@@ -102,8 +102,8 @@ def largest_difference(map, latent, X, particles):
 def test_a_stirred_body_moves_as_in_the_full_model(d, degree, name, projection):
     X, map, conditions = cloud(d, 150), Affine(d), Stirred(d)
     particles = full_steps(full(X, X, 0.0 * X), conditions, GRAVITY[:d], degree)
-    model = ldm_stepper(map, quadrature(name, X, degree), LAW, GRAVITY[:d], conditions,
-                    projection=projection)
+    model = ldm_stepper(map, quadrature(name, X, degree), LAW, GRAVITY[:d],
+                        projection=projection, conditions=conditions)
     latent = reduced_steps(model, start_state(map.rest), 12)
     assert abs(particles.F - np.eye(d)).max() > 0.1
     assert largest_difference(map, latent, X, particles) < 1e-12

@@ -43,7 +43,7 @@ def model(whole, fields, inversion="nonlinear"):
     """NSF's `ReducedStepper` of a `Whole` scene."""
     problem = whole.problem
     return nsf_stepper(fields, whole.matter, problem.dx, problem.scheme.degree, problem.gravity,
-                       problem.conditions, inversion)
+                       inversion, conditions=problem.conditions)
 
 
 def infer(whole, fields, plan, start):

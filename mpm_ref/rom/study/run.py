@@ -55,7 +55,8 @@ def model(case, map, way):
     if way.quadrature not in make:
         raise ValueError(f"quadrature = {way.quadrature!r}: expected one of {', '.join(make)}")
     return ldm_stepper(precise(map, way), make[way.quadrature](case, way), problem.bodies[0].law,
-                       problem.gravity, problem.conditions, way.projection, way.velocity)
+                       problem.gravity, way.projection, conditions=problem.conditions,
+                       velocity=way.velocity)
 
 
 def precise(map, way):
