@@ -18,7 +18,7 @@ import numpy as np
 import threadpoolctl
 import typer
 
-from validation.provenance import commit
+from validation.common.provenance import commit
 
 from .problem import block
 

@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.hot.choices import Choices
 from mpm_ref.hot.methods import minimise
 from mpm_ref.hot.multigrid.blocks.product import planes_of, product
 from mpm_ref.hot.multigrid.blocks.sparse import blocks_of
 from mpm_ref.hot.multigrid.hierarchy import hierarchy
-from validation.hot.frozen import frozen
+from mpm_ref.hot.multigrid.options import Choices
+from validation.hot.linear_system import frozen
 from validation.hot.measured_cg import Until
 from validation.hot.one_step import Step, after
 from validation.hot.preconditioners import OURS, cost, one_thread

@@ -15,12 +15,12 @@ from math import log
 import numpy as np
 
 from mpm_ref.body import Body, particles_at
-from mpm_ref.cases import observed
 from mpm_ref.core.boundary import Conditions, nclaw_walls
 from mpm_ref.explicit import Scheme
 from mpm_ref.materials import NoFlow, make_law
 from mpm_ref.nclaw.batched_step import nodes, world
 from mpm_ref.problem import Clock, Problem
+from mpm_ref.trajectories import observed
 
 try:
     import torch

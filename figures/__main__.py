@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from validation.results import RESULTS, Results
+from validation.common.results import RESULTS, ProfileResults
 
 from .frame import draw_all
 
@@ -23,7 +23,7 @@ def main(
 
     A figure that is named and cannot be drawn makes the exit code 1.
     """
-    results = Results(folder / profile)
+    results = ProfileResults(folder / profile)
     try:
         if not results.ids():
             raise ValueError(f"no results in {results.folder}; make them by `python -m validation "

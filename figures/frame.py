@@ -1,9 +1,10 @@
 """The frame of all figures.
 
-A figure is a module ``figures/<name>.py``. Its docstring is the caption, ``NEEDS`` lists the ids of
-the experiments whose results it reads (the report shows it under the first), ``draw(results)``
-returns a matplotlib Figure and ``scale(results)`` says how large the runs were, which is written
-under the figure and its caption. It computes nothing that an experiment did not record.
+Figure ``<paper>_<name>`` is the module ``figures/<paper>/<name>.py``. Its docstring is the caption,
+``NEEDS`` lists the ids of the experiments whose results it reads (the report shows it under the
+first), ``draw(results)`` returns a matplotlib Figure and ``scale(results)`` says how large the runs
+were, which is written under the figure and its caption. It computes nothing that an experiment did
+not record.
 """
 
 import importlib
@@ -18,7 +19,7 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 from tqdm import tqdm
 
-from validation.record import write_whole
+from validation.common.record import write_whole
 
 HERE = Path(__file__).parent
 LETTERS = 18         # of the note on the scale, per inch
@@ -39,8 +40,9 @@ class Drawn(NamedTuple):
 
 def names(folder=HERE):
     """Names of all figures."""
-    files = (file.stem for file in folder.glob("*.py"))
-    return sorted(name for name in files if name != "frame" and not name.startswith("_"))
+    files = (file for file in folder.glob("*/*.py") if not file.stem.startswith("_"))
+    return sorted(f"{file.parent.name}_{file.stem}" for file in files
+                  if file.parent.name != "common")
 
 
 def draw_all(results, names=(), about=(), folder=HERE):
@@ -76,7 +78,8 @@ def draw_all(results, names=(), about=(), folder=HERE):
 
 
 def _script(name, folder):
-    return importlib.import_module(f"{folder.name}.{name}")
+    paper, _, stem = name.partition("_")
+    return importlib.import_module(f"{folder.name}.{paper}.{stem}")
 
 
 def _choose(wanted, folder):

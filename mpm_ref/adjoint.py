@@ -15,7 +15,7 @@ from .core.adjoint.boundary import solve_adjoint
 from .core.adjoint.deform import DeformBars, Step
 from .core.adjoint.grid import Update, update_adjoint
 from .core.adjoint.transfer import Exchange, g2p_adjoint, p2g_adjoint
-from .core.collide import solve
+from .core.boundary import solve
 from .core.grid import Storage, update
 from .core.jit import CHUNKS
 from .core.law import kirchhoff_vjp, project_vjp

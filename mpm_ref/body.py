@@ -1,10 +1,12 @@
-"""A body: particles of one material, in arrays of their own."""
+"""A body: particles of one material in arrays; and the check that a scheme can step it."""
 
 from typing import NamedTuple
 
 import numpy as np
 
+from .core.law import kirchhoff_hat, returned
 from .core.state import NO_HISTORY, NONE, Particles
+from .materials import Fluid, Hardening, NoFlow, Softening
 
 AFFINE = ("apic", "mls")      # transfers that carry C
 
@@ -55,3 +57,64 @@ def keep_inside(bodies, low, high):
     """Clip positions to a box, velocities unchanged (NCLaw)."""
     for body in bodies:
         np.clip(body.particles.x, low, high, out=body.particles.x)
+
+
+def check_fit(body, scheme, dim):
+    """Raise ValueError, in one sentence, if a body of d = dim cannot be stepped by a scheme."""
+    for wrong in (*_wrong_material(body, dim), *_wrong_arrays(body, dim),
+                  *_wrong_fields(body, scheme), *_wrong_numbers(body)):
+        raise ValueError(f"body {body.name!r}: {wrong}")
+
+
+def _wrong_material(body, d):
+    for part in (body.law, body.flow):
+        if getattr(part, "dim", d) != d:
+            yield f"its {type(part).__name__} is for {part.dim} dimensions, expected {d}"
+    whole = isinstance(body.flow, NoFlow) or type(body.flow) in returned.methods
+    if not whole and type(body.law) not in kirchhoff_hat.methods:
+        law, flow = type(body.law).__name__, type(body.flow).__name__
+        yield (f"the flow {flow} acts on singular values, the law {law} is no function of them; "
+               "expected NoFlow, or a flow of F as a whole")
+
+
+def _wrong_arrays(body, d):
+    q, n = body.particles, len(body.particles.x)
+    if n == 0:
+        yield "it has no particles; expected at least one"
+    shapes = {"x": (n, d), "v": (n, d), "L": (n, d, d), "m": (n,), "V0": (n,)}
+    for name, shape in shapes.items():
+        if getattr(q, name).shape != shape:
+            yield f"{name} has shape {getattr(q, name).shape}, expected {shape}"
+    if body.id.shape != (n,):
+        yield f"id has shape {body.id.shape}, expected {(n,)}"
+
+
+def _wrong_fields(body, scheme):
+    q, n, transfer = body.particles, len(body.particles.x), scheme.transfer
+    if (q.C.ndim == 3) != (transfer in AFFINE):
+        has, needs = ("a", "none") if q.C.ndim == 3 else ("no", "one")
+        yield f"it carries {has} C, the transfer {transfer!r} needs {needs}; see particles_at"
+    elif (q.L is q.C) != (transfer == "mls"):
+        yield f"L must be the same array as C for 'mls', and only then; transfer is {transfer!r}"
+    fluid = isinstance(body.law, Fluid) and isinstance(body.flow, NoFlow)
+    if q.F.shape not in (q.L.shape, (n,)) or (q.F.ndim == 1) > fluid:
+        yield f"F has shape {q.F.shape}, expected {q.L.shape}, or ({n},) for a fluid without flow"
+    if q.tau.shape != q.F.shape:
+        yield f"tau has shape {q.tau.shape}, expected that of F, {q.F.shape}"
+    if isinstance(body.flow, Hardening | Softening) and q.y.shape != (n,):
+        flow = type(body.flow).__name__
+        yield f"the flow {flow} changes y, which has shape {q.y.shape}, expected ({n},)"
+
+
+def _wrong_numbers(body):
+    q = body.particles
+    for name in ("x", "v", "F", "m", "V0", "C", "y", "b"):
+        a = getattr(q, name)
+        if not np.isfinite(a).all():
+            p = int(np.argwhere(~np.isfinite(a))[0][0])
+            yield f"{name} of particle {body.id[p]} is {a[p]}, expected finite numbers"
+    for name in ("m", "V0"):
+        a = getattr(q, name)
+        if not (a > 0.0).all():
+            p = int(np.argmin(a > 0.0))
+            yield f"{name} of particle {body.id[p]} is {a[p]}, expected a positive number"

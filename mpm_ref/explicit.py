@@ -11,14 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .body import AFFINE, permute
+from .body import AFFINE, check_fit, permute
 from .core import deform
 from .core.grid import Storage, update
 from .core.law import returned
 from .core.order import by_cell, slabs_of
 from .core.spline import STENCILS
 from .core.transfer import g2p, p2g, rpic
-from .fit import check_fit
 from .materials import NoFlow
 
 TRANSFERS = ("pic", "flip", "apic", "mls")

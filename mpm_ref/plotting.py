@@ -12,7 +12,7 @@ import numpy as np
 
 from .core.levelset import distances
 from .scene import SceneError, loads
-from .scene.parts import build_conditions
+from .scene.builder import build_conditions
 from .store.atomic import replacing
 from .store.results import SCALARS, BadResults
 

@@ -62,7 +62,7 @@ class Problem:
     source: str = ""                    # canonical text of the scene, "" if built in Python
     integrator: str = "explicit"        # or "implicit"
     solver: Options | None = None       # of an implicit step; None: HOT's
-    seen: dict = field(default_factory=dict)    # {body: bounds of `nclaw.strain_watch`}
+    strain_bounds: dict = field(default_factory=dict)   # {body: strains of its laws' training}
 
     def __post_init__(self):
         if not self.bodies:

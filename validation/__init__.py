@@ -6,9 +6,9 @@ One experiment is one function in ``validation/<group>/``, made known by `experi
 records is judged in `record`, kept in ``results/<profile>/`` and put together by `report`.
 """
 
-from .record import Record
-from .registry import experiment
-from .results import Results
-from .run import Run
+from .common.record import Measurement
+from .common.registry import experiment
+from .common.results import ProfileResults
+from .common.run import Run
 
-__all__ = ["Record", "Results", "Run", "experiment"]
+__all__ = ["Measurement", "ProfileResults", "Run", "experiment"]

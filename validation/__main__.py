@@ -9,17 +9,19 @@ import typer
 
 from figures.frame import draw_all
 
-from . import targets
-from .provenance import commit
-from .registry import discover, select
-from .report import write_report
-from .results import RESULTS, ROOT, Results
-from .run import Setting, run_all
-from .side_by_side import run_side_by_side
-from .status import status_table, with_status
+from .common import targets
+from .common.parallel import run_side_by_side
+from .common.provenance import commit
+from .common.registry import discover, select
+from .common.report import write_report
+from .common.results import RESULTS, ROOT, ProfileResults
+from .common.run import RunSetting, run_all
+from .common.status import status_table, with_status
+from .fingerprint.command import app as fingerprint
 
 app = typer.Typer(help=__doc__, add_completion=False, no_args_is_help=True,
                   pretty_exceptions_enable=False)
+app.add_typer(fingerprint, name="fingerprint")
 
 Profile = Annotated[
     Literal["quick", "standard", "paper"],
@@ -56,12 +58,12 @@ def run(ids: Ids = None, profile: Profile = "quick", seed: int = 0, results: Fol
         raise typer.Exit(2) from None
     folder = results / profile
     printed = targets.load()
-    setting = Setting(profile, folder, seed, printed, commit(ROOT))
+    setting = RunSetting(profile, folder, seed, printed, commit(ROOT))
     if workers > 1:
         failed = run_side_by_side(chosen, setting, workers)
     else:
         failed = run_all(chosen, setting)
-    undrawn = draw_all(Results(folder), about=[e.id for e in chosen]).failed
+    undrawn = draw_all(ProfileResults(folder), about=[e.id for e in chosen]).failed
     _write_report(folder, profile, printed)
     for name in (*failed, *(f"figure {name}" for name in undrawn)):
         typer.echo(f"failed: {name}", err=True)
@@ -72,7 +74,7 @@ def run(ids: Ids = None, profile: Profile = "quick", seed: int = 0, results: Fol
 def report(profile: Profile = "quick", results: Folder = RESULTS):
     """Write report.html and report.md from the results there are."""
     folder = results / profile
-    if not Results(folder).ids():
+    if not ProfileResults(folder).ids():
         typer.echo(f"no results in {folder}; `python -m validation run` makes them", err=True)
         raise typer.Exit(2)
     _write_report(folder, profile, targets.load())
@@ -81,7 +83,7 @@ def report(profile: Profile = "quick", results: Folder = RESULTS):
 @app.command()
 def status(profile: Profile = "standard", results: Folder = RESULTS, write: bool = False):
     """Print README's status table, or write it into README.md."""
-    table = status_table(Results(results / profile), targets.load())
+    table = status_table(ProfileResults(results / profile), targets.load())
     if not write:
         typer.echo(table)
         return

@@ -15,8 +15,8 @@ from functools import cache
 
 from markdown_it import MarkdownIt
 
-from validation import equations
-from validation.citations import ID as IDS
+from validation.common import equations
+from validation.common.citations import ID as IDS
 
 MARKDOWN = MarkdownIt("zero").enable(["code", "fence", "list", "backticks"])
 FORMULA = re.compile(r"^[A-Za-z]\S*(?: \S+){0,2} (?:[-+*/]?=|->) \S", re.MULTILINE)

@@ -11,11 +11,11 @@ from pathlib import Path
 import typer.cli
 import typer.main
 
-from validation import equations, targets
-from validation.citations import ROOT
-from validation.report import chapters
-from validation.results import RESULTS, Results
-from validation.status import status_table
+from validation.common import equations, targets
+from validation.common.citations import ROOT
+from validation.common.report import chapters
+from validation.common.results import RESULTS, ProfileResults
+from validation.common.status import status_table
 
 DOCS = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "mpm_ref"
@@ -111,10 +111,10 @@ def cli_page():
 def result_pages():
     """{path: text}: a page of numbers for each paper, and the list of all experiments."""
     printed = targets.load()
-    made = {profile: {c.key: c for c in chapters(Results(RESULTS / profile), printed)}
+    made = {profile: {c.key: c for c in chapters(ProfileResults(RESULTS / profile), printed)}
             for profile in ("standard", "paper")}
     pages = {f"results/generated/{key}.md": numbers(key, made) for key in PAPERS}
-    table = status_table(Results(RESULTS / "standard"), printed)
+    table = status_table(ProfileResults(RESULTS / "standard"), printed)
     return {**pages, "results/generated/experiments.md": table + "\n"}
 
 

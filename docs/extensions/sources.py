@@ -19,7 +19,7 @@ from pygments.lexers import get_lexer_for_filename
 from sphinx.util import logging
 from sphinx.util.docutils import ReferenceRole
 
-from validation.citations import ROOT, definitions
+from validation.common.citations import ROOT, definitions
 
 FOLDER = "source"
 PAGE = """<!doctype html>

@@ -1,18 +1,31 @@
-"""What a problem or a results file is, in numbers: for people as lines, for machines as a dict."""
+"""`mpm-ref info`: describe results, a checkpoint, a scene, a study, a model or learned laws.
 
-import json
+Each kind of file gives facts, a dict for machines, and lines, which say the same to people.
+"""
+
 from math import isfinite, isnan
+from pathlib import Path
+from typing import Annotated
 
-from ..nclaw.strain_watch import other_steps
-from ..placement import misplaced
-from ..reduced import told
-from ..store import manifest
+import typer
+
+from .. import scene
+from ..nclaw.strain_watch import time_step_warnings
+from ..preflight import misplaced
+from ..rom import modes_file
+from ..rom.study import nsf_networks, summary
+from ..store import checkpoint, manifest
 from ..store.atomic import in_words
 from ..store.manifest import scene_hash
 from ..store.results import ENERGIES, Results
-from ..store.session import checkpoint_of
+from ..store.running import checkpoint_of
+from ..store.weights_file import MAGIC, opened
 from ..store.words import counted
 from ..timestep import TimeStep, stable_dt
+from . import law_info, rom_info
+from .catalogue import find_scene, is_hdf5, study_named
+from .errors import at_start, one_line, options
+from .terminal import as_json, compiling, warn
 
 
 def of_problem(problem):
@@ -44,7 +57,7 @@ def of_problem(problem):
                               if not (name == "C" and a is body.particles.L)),
         "grid_bytes": sum(a.nbytes for a in grid[:4]),
         "scene_sha256": scene_hash(problem),
-        "warnings": [*misplaced(problem), *other_steps(problem)],
+        "warnings": [*misplaced(problem), *time_step_warnings(problem)],
     }
 
 
@@ -72,7 +85,7 @@ def of_results(path):
             "energy": dict(zip(ENERGIES, results.energy[-1].tolist(), strict=True)) if n else None,
             "checkpoint": str(checkpoint_of(path)) if checkpoint_of(path).exists() else None,
             "manifest": results.manifest,
-            "reduced": told.told(results),
+            "reduced": summary.told(results),
             "warnings": [*unsolved(manifest.unsolved(results.manifest)),
                          *manifest.astray(results.manifest)],
         }
@@ -136,7 +149,7 @@ def results_lines(facts):
     else:
         lines.append("no frame yet")
     if facts["reduced"]:
-        lines.append(told.line(facts["reduced"]))
+        lines.append(summary.line(facts["reduced"]))
     lines += map(part_line, facts["manifest"].get("parts", []))
     lines.append(f"checkpoint: {facts['checkpoint'] or 'none'}")
     return lines
@@ -156,16 +169,88 @@ def part_line(part):
             f"{part['why']}")
 
 
-def as_json(facts):
-    """Facts as JSON that every reader takes: numbers that are not finite become null."""
-    return json.dumps(_finite(facts), indent=1)
+def describe(
+    name: Annotated[str, typer.Argument(metavar="FILE|SCENE|STUDY")],
+    json: Annotated[bool, typer.Option("--json", help="Answer with JSON.")] = False,
+):
+    """Say what results, a checkpoint, a scene, a study, a map or learned laws hold."""
+    with one_line():
+        facts, lines = _facts(name)
+        warn(facts.get("warnings", []))
+        print(as_json(facts) if json else "\n".join(lines))
 
 
-def _finite(value):
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    if isinstance(value, float) and not abs(value) < float("inf"):
-        return None
-    return value
+def _facts(name):
+    """(facts, lines) of whatever a name stands for."""
+    if not is_hdf5(name):
+        return _facts_of_npz_or_text(name)
+    if checkpoint.is_one(name) or checkpoint.is_named_so(name):
+        facts = checkpoint.summary(name)
+        return facts, [f"checkpoint: step {facts['step']}, t = {facts['t']:.6g} s, after "
+                       f"{counted(facts['frames'], 'frame')}; "
+                       f"scene sha256 {facts['scene_sha256'][:12]}"]
+    facts = of_results(name)
+    return facts, results_lines(facts)
+
+
+def _facts_of_npz_or_text(name):
+    with compiling(), options():
+        if is_npz(name):
+            return of_npz(name)
+        study = study_named(name)
+        if rom_info.is_study(study):
+            facts = rom_info.of_study(name)
+            return facts, rom_info.study_lines(facts)
+        if law_info.is_law_study(study):
+            facts = law_info.of_law_study(study)
+            return facts, law_info.law_study_lines(facts)
+        layers = law_info.in_text(Path(name))
+        if layers is not None:
+            facts = law_info.of_layers(name, layers)
+            return facts, law_info.laws_lines(facts)
+    return _facts_of_scene(find_scene(name))
+
+
+def _facts_of_scene(path):
+    with compiling(), at_start(path):
+        facts = of_problem(scene.build(scene.load(path), str(path)))
+    return facts, problem_lines(facts)
+
+
+SHOWN = 4           # names of arrays that a sentence shows
+
+
+def is_npz(name):
+    """Whether a name is that of a file that begins as npz files do."""
+    if not Path(name).is_file():
+        return False
+    with open(name, "rb") as file:
+        return file.read(len(MAGIC)) == MAGIC
+
+
+def of_npz(name):
+    """(facts, lines) of a map, of stress fields, of laws, of their layers or of a graph network.
+
+    Raises ValueError for a file that is damaged or none of these.
+    """
+    path = Path(name)
+    arrays = opened(path)
+    if modes_file.is_one(arrays) or nsf_networks.is_one(arrays) or "xhat" in arrays:
+        facts = rom_info.of_map(path)
+        return facts, rom_info.map_lines(facts)
+    if law_info.is_graph_network(arrays):
+        facts = law_info.of_graph_network(path)
+        return facts, law_info.graph_network_lines(facts)
+    if law_info.has_laws(arrays):
+        facts = law_info.of_layers(path, arrays) if law_info.is_exported(arrays) else (
+            law_info.of_laws(path))
+        return facts, law_info.laws_lines(facts)
+    if epochs := law_info.epochs_of(arrays):
+        raise ValueError(f"{path} holds the laws of several epochs, {', '.join(epochs)}, of a "
+                         "training of the validation suite; expected those of one, as `mpm-ref law "
+                         "train` writes them")
+    names = sorted(arrays)
+    more = ", .." if len(names) > SHOWN else ""
+    raise ValueError(f"{path} holds no map, no laws and no graph network: it has "
+                     f"{', '.join(names[:SHOWN])}{more}; name a file of `mpm-ref rom train`, "
+                     "`mpm-ref law train` or `mpm-ref law export`")

@@ -2,7 +2,7 @@
 `laws`).
 
 A study file names the scene, the method and its recipe; docs/reference/studies.md explains it.
-The other commands are in `law_train` and `law_show`.
+`law_train` has the command `train`.
 """
 
 import sys
@@ -12,19 +12,32 @@ from typing import Annotated
 
 import typer
 
+from ..materials.learned import learned_flow, learned_law, weights
+from ..nclaw.export import exported, write
+from ..nclaw.strain_watch import ComparisonWatch
 from ..nclaw.study.compare import Broken, beside
-from ..nclaw.study.numbers import write_errors
-from ..nclaw.study.watched import Watched
+from ..nclaw.study.curves import curves, paths_for
+from ..nclaw.study.numbers import write_curves, write_errors
+from ..nclaw.study.pictures import draw
 from ..store.atomic import require_place
 from ..store.words import counted
-from . import faults, law_show, law_train
-from .faults import end, one_line, options
-from .info import as_json
-from .law_options import NUMBERS, SceneName, WeightsFile, fitting, not_true, other_steps
-from .look import Machine
-from .outputs import require_ending
-from .rom_options import on_interrupt
-from .terminal import passing, warn
+from . import law_train
+from .errors import UNSTABLE, end, one_line, options, writing
+from .options import (
+    NUMBERS,
+    PICTURES,
+    Json,
+    Overwrite,
+    SceneName,
+    WeightsFile,
+    fitting,
+    not_true,
+    on_interrupt,
+    other_steps,
+    require_ending,
+    require_free,
+)
+from .terminal import as_json, passing, warn
 
 app = typer.Typer(no_args_is_help=True, help="Laws learned from the motion of a scene: train them, "
                   "put them beside the true ones, hand them to other programs.")
@@ -39,7 +52,7 @@ def evaluate(
         help="Of both runs, default: as the scene says.", min=1)] = None,
     out: Annotated[Path | None, typer.Option(
         "--out", "-o", help="FILE.csv for the error of each frame.")] = None,
-    json: Machine = False,
+    json: Json = False,
 ):
     """Run a scene with its own laws and with learned ones, side by side: how far do they part?
 
@@ -61,21 +74,17 @@ def evaluate(
             print(as_json({"weights": str(file), "scene": name, "csv": out and str(out), **facts}))
         else:
             print("\n".join([*lines(facts, problem), *([str(out)] if out else [])]))
-    raise typer.Exit(0 if isfinite(found.error) else faults.UNSTABLE)
-
-
-app.command()(law_show.export)
-app.command()(law_show.plot)
+    raise typer.Exit(0 if isfinite(found.error) else UNSTABLE)
 
 
 def compared(problem, laws, name):
     """(error of each frame [m^2], `Found`) of both runs, with a bar of frames."""
     errors, found, total = [], None, 1 + problem.clock.steps // problem.clock.every
-    watched = Watched(laws, problem)
+    watched = ComparisonWatch(laws, problem)
     try:
         with (on_interrupt(lambda: f"after {len(errors)} of {counted(total, 'frame')}"),
               passing(unit="frame", total=total, desc=problem.title or name) as bar):
-            for error, found in beside(problem, watched.made):
+            for error, found in beside(problem, watched.body):
                 if found.step < 0:
                     with bar.external_write_mode(file=sys.stderr):
                         warn(watched.news(len(errors)))
@@ -83,7 +92,7 @@ def compared(problem, laws, name):
                 bar.set_postfix_str(f"error {found.error:.2e} m^2", refresh=False)
                 bar.update()
     except Broken as fault:
-        end(f"{name}: its own laws break down in {fault}", faults.UNSTABLE)
+        end(f"{name}: its own laws break down in {fault}", UNSTABLE)
     return errors, found
 
 
@@ -111,3 +120,101 @@ def lines(facts, problem):
     largest = facts["largest"]
     yield (f"in the last of them {sound['last']:.3g} m^2; at most {largest['error']:.3g} m^2, at "
            f"t = {largest['frame'] * clock.every * clock.dt:g} s")
+
+
+LAYERS = (".npz", ".json")
+
+
+@app.command()
+def export(
+    file: WeightsFile,
+    out: Annotated[Path | None, typer.Option(
+        "--out", "-o", help="FILE.npz or FILE.json, default: WEIGHTS.layers.npz.")] = None,
+    overwrite: Overwrite = False,
+):
+    """Write layers as plain arrays, with words on their use, and answers to test another program.
+
+    docs/reference/studies.md lists the names. Exit status: 0 done, 2 bad input, 4 a file could not
+    be written.
+    """
+    with one_line():
+        with options():
+            laws = weights.load(file)
+            out = out or file.with_suffix(".layers.npz")
+            require_ending(out, LAYERS)
+            require_place(out)
+            if out.exists() and out.samefile(file):
+                raise ValueError(f"--out {out}: these are the weights; name another file")
+            require_free(out, overwrite)
+            tables = exported(laws)
+        with writing():
+            write(out, tables)
+        said = ", ".join(f"{part} {described(getattr(laws, part))}" for part in weights.PARTS)
+        print(f"{out}: {said}; {counted(len(tables['check']['F']), 'question')} with answers")
+
+
+def described(trained):
+    """A `LawWeights` in words: its kind and the sizes of its layers."""
+    sizes = [len(W) for W, _ in trained.layers] + [len(b) for _, b in trained.layers[-1:]]
+    return f"{type(trained.kind).__name__} {'-'.join(map(str, sizes))}".strip()
+
+
+@app.command()
+def plot(
+    file: WeightsFile,
+    against: Annotated[str, typer.Option(metavar="SCENE", help="Scene with the true laws.")],
+    out: Annotated[Path | None, typer.Option(
+        "--out", "-o", help="FILE.png, .pdf or .svg, default: WEIGHTS.curves.png.")] = None,
+    csv: Annotated[Path | None, typer.Option(help="FILE.csv for the numbers.")] = None,
+    strain: Annotated[float, typer.Option(help="Largest, above 0 and below 1.")] = 0.1,
+    steps: Annotated[int, typer.Option(help="From rest to it, of the scene's dt.", min=1)] = 200,
+):
+    """Draw stress-strain curves of learned laws beside the true ones, along one-element paths.
+
+    Uniaxial, simple shear, volumetric; where something flows, also loading and unloading. Exit
+    status: 0 done, 2 bad input, 4 a file could not be written.
+    """
+    with one_line():
+        with options():
+            laws, problem = fitting(file, against)
+            out = out or file.with_suffix(".curves.png")
+            require_outputs(out, csv)
+            if not 0.0 < strain < 1.0:
+                raise ValueError(f"--strain {strain:g}: expected a number above 0 and below 1")
+            warn(other_steps(laws, problem))
+            found = beside_truth(laws, problem, strain, steps)
+        draw(found, f"{file.name} against {problem.title or against}: {steps} steps of "
+             f"{problem.clock.dt:g} s to a strain of {strain:g}", out)
+        if csv is not None:
+            write_curves(found, csv)
+        print("\n".join([*map(line, found), str(out), *([str(csv)] if csv else [])]))
+
+
+def require_outputs(out, csv):
+    """Raise ValueError or NotWritten where no picture, or no numbers, are to be written."""
+    require_ending(out, PICTURES)
+    require_place(out)
+    if csv is not None:
+        if csv.suffix.lower() not in NUMBERS:
+            raise ValueError(f"--csv {csv}: expected a name that ends in {NUMBERS[0]}")
+        require_place(csv)
+
+
+def beside_truth(laws, problem, strain, steps):
+    """[`Curve`] of trained laws beside those of a problem's bodies."""
+    body, dt = problem.bodies[0], problem.clock.dt
+    learned = learned_law(laws.elastic), learned_flow(laws.plastic)
+    paths = paths_for((body.flow, learned[1]), problem.dim, strain, steps)
+    return curves((body.law, body.flow), learned, paths, dt, laws.about.get("seen"))
+
+
+def line(curve):
+    """How far a learned law is off along a path, in words."""
+    end = curve.path.strain[abs(curve.path.strain).argmax()]
+    off = f"off by at most {100.0 * curve.off:.3g} % of it" if isfinite(curve.off) else (
+        f"the learned law breaks down at strain {curve.broken:.4g}" if curve.broken is not None
+        else f"the learned law gives up to {abs(curve.learned).max():.4g} Pa")
+    beyond = "" if curve.beyond is None else (
+        f"; at {curve.beyond:.3g} beyond the strains of training")
+    return (f"{curve.path.name} to {end:+g}: {curve.path.symbol} up to "
+            f"{abs(curve.truth).max():.4g} Pa, {off}{beyond}")

@@ -1,17 +1,24 @@
-"""`mpm-ref info` of learned laws, as weights and as the layers that other programs are handed."""
+"""`mpm-ref info` of learned laws, their exported layers, graph networks and law studies."""
 
 import json
+from dataclasses import asdict
 from itertools import count, takewhile
 
 import numpy as np
 
-from ..archive import about_of, require_format
 from ..materials.learned import spline, weights
+from ..materials.learned.weights import PARTS, dim_of
 from ..nclaw import export
-from ..nclaw.bodies import dim_of
+from ..nclaw.gnn import weights as gnn_weights
+from ..nclaw.study.study import load
+from ..nclaw.study.tables import SYS_ID
+from ..rom.study.study_file import plain
+from ..scene import SceneError
+from ..store.weights_file import about_of, require_format
 from ..store.words import counted
-from . import made
-from .law_options import horizons, of_errors
+from . import provenance
+from .catalogue import shipped_scenes
+from .options import OF_ERRORS, horizons, of_errors
 
 LAYERS = "mpm_ref law"          # what the format of layers begins with
 AFTER = ".elastic_kind"         # what follows the epoch in such a file
@@ -20,7 +27,7 @@ WITH_VELOCITIES = ", with the term of velocities,"
 SPLINES = {kind.__name__ for kind in spline.READINGS}
 
 
-def is_one(arrays):
+def has_laws(arrays):
     """Whether the arrays of a file are those of laws or of their layers, of any format."""
     return "elastic_kind" in arrays
 
@@ -105,7 +112,7 @@ def of_training(about):
             "about": about}
 
 
-def lines(facts):
+def laws_lines(facts):
     """Facts of laws in words."""
     file, what = (facts["laws"], "learned laws") if "laws" in facts else (
         facts["layers"], f"layers of learned laws, {counted(facts['questions'], 'question')} with "
@@ -116,10 +123,10 @@ def lines(facts):
     for part in weights.PARTS:
         yield f"{part}: {part_line(facts[part])}"
     if facts["epochs"]:
-        yield f"trained on {made.source(facts['about'])}, {training_line(facts)}"
+        yield f"trained on {provenance.source(facts['about'])}, {training_line(facts)}"
     if facts["seen"]:
         yield seen_line(facts["seen"])
-    yield made.by(facts["about"])
+    yield provenance.by(facts["about"])
 
 
 def part_line(part):
@@ -141,7 +148,7 @@ def training_line(facts):
     filmed, more = "camera" in about, WITH_VELOCITIES if weights.mixed(about) else ""
     over = () if filmed else horizons(method, about.get("recipe", {}), facts["epochs"])
     return (f"{epochs}: {OF_MARKS if filmed else of_errors(method)}{more} "
-            f"{made.ends(facts['errors'], over)}")
+            f"{provenance.ends(facts['errors'], over)}")
 
 
 def seen_line(bounds):
@@ -149,3 +156,96 @@ def seen_line(bounds):
     low, high = (np.array(bounds[end]) for end in ("low", "high"))
     return (f"met in training: stretches {low[:-1].min():.3g} .. {high[:-1].max():.3g}, "
             f"J {low[-1]:.3g} .. {high[-1]:.3g}")
+
+
+def is_graph_network(arrays):
+    """Whether the arrays of a file are those of a graph network, of any format."""
+    return str(arrays.get("format")).startswith(gnn_weights.FORMAT.split()[0])
+
+
+def of_graph_network(path):
+    """What a file of weights holds, and what it says of its making. Raises ValueError for a file
+    that is damaged or no graph network.
+    """
+    network, reading, about = gnn_weights.load(path)
+    return {
+        "graph_network": str(path), "dim": len(reading.scales.v_mean),
+        "width": network.points.layers[0][0].shape[1], "blocks": len(network.blocks),
+        "weights": sum(a.size for _, one in gnn_weights.named(network)
+                       for a in (*(a for layer in one.layers for a in layer), *one.norm)),
+        "radius": reading.radius, "dt": reading.dt,
+        "runs": about.get("runs"), "steps": about.get("recipe", about).get("steps"),
+        "errors": about.get("errors"), "picked": about.get("picked"), "about": about,
+    }
+
+
+def graph_network_lines(facts):
+    """Facts of a graph network in words."""
+    about = facts["about"]
+    yield (f"{facts['graph_network']}: a graph network, {facts['dim']}D, {facts['width']} wide, "
+           f"{counted(facts['blocks'], 'block')}, {facts['weights']} weights and biases")
+    yield f"frames {facts['dt']:g} s apart, neighbours within {facts['radius']:g} m"
+    if facts["runs"] and facts["steps"]:
+        yield (f"trained on {counted(facts['runs'], 'run')} of {provenance.source(about)}: "
+               f"{counted(facts['steps'], 'step')} of Adam")
+    if facts["errors"] and facts["picked"] is not None:
+        first, kept = (error_text(facts["errors"][k]) for k in (0, facts["picked"]))
+        yield f"mean squared error of a free run [m^2]: {first} at first, {kept} of what is kept"
+    yield provenance.by(about)
+
+
+def error_text(error):
+    """The error of a free run; None is that of one that broke down."""
+    return "inf" if error is None else f"{error:.3g}"
+
+
+OWN = {"scene", "method", "laws", "train"}      # keys that no scene has
+
+
+def is_law_study(path):
+    """Whether a path is that of a law study, whatever is wrong with its tables, of all files but
+    studies of reduced runs.
+    """
+    try:
+        return bool(OWN & set(plain(path)))
+    except SceneError:
+        return False
+
+
+def of_law_study(path):
+    """Scene, method, laws and recipe of a study. Raises SceneError."""
+    study = load(path, shipped_scenes())
+    tables, scene, problem = study.tables, study.scene, study.problem()
+    records = tables.records or (problem.bodies[0].law, problem.bodies[0].flow)
+    return {
+        "law_study": str(study.path), "title": tables.title, "scene": tables.scene,
+        "dim": problem.dim, "points": len(problem.bodies[0].id), "dx": scene.dx, "dt": scene.dt,
+        "steps": scene.steps, "method": tables.method,
+        "laws": {part: {"kind": type(record).__name__, "constants": record._asdict()}
+                 for part, record in zip(PARTS, records, strict=True)},
+        "recipe": asdict(tables.train),
+        "files": {name: str(study.file(name)) for name in ("weights", "checkpoint")
+                  if study.file(name)},
+    }
+
+
+def law_study_lines(facts):
+    """Facts of a law study in words."""
+    recipe, method = facts["recipe"], facts["method"]
+    yield (f"{facts['law_study']}: a law study, {facts['title'] or 'untitled'}: laws of the scene "
+           f'{facts["scene"]}, method "{method}"')
+    yield (f"{facts['dim']}D, {counted(facts['points'], 'point')}, dx = {facts['dx']:g} m, "
+           f"{counted(facts['steps'], 'step')} of {facts['dt']:g} s")
+    laws = "; ".join(f"{part} {law_line(law)}" for part, law in facts["laws"].items())
+    yield f"{'constants of' if method == SYS_ID else 'laws'}: {laws}"
+    horizon = "" if method in OF_ERRORS else (
+        f", horizon {recipe['first']} .. {recipe['last']} steps")
+    yield (f"training: {counted(recipe['epochs'], 'epoch')}{horizon}, rates "
+           f"{recipe['elastic_rate']:g} (elastic) and {recipe['plastic_rate']:g} (plastic), seed "
+           f"{recipe['seed']}")
+
+
+def law_line(law):
+    """A law in words."""
+    return ", ".join([law["kind"], *(f"{name} = {value:g}" for name, value in
+                                     law["constants"].items())])

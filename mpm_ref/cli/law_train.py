@@ -8,20 +8,29 @@ from typing import Annotated
 
 import typer
 
-from ..cases import observed
 from ..materials.learned import weights
 from ..nclaw.study import training, trajectory
 from ..nclaw.study.compare import threads_for
 from ..nclaw.study.study import load
 from ..store.atomic import require_place
-from ..store.session import Watch
+from ..store.running import Watch
 from ..store.words import counted
-from . import faults, made
-from .faults import at_start, end, one_line, options, writing
-from .law_options import OF_ERRORS, horizons, of_errors
-from .outputs import HDF5, MAPS, require_ending, require_free
-from .rom_options import Overwrite, StudyName, on_interrupt
-from .shipped import find_study, keep_scene, shipped_scenes
+from ..trajectories import observed
+from . import provenance
+from .catalogue import find_study, keep_scene, shipped_scenes
+from .errors import INTERRUPT, UNSTABLE, at_start, end, one_line, options, writing
+from .options import (
+    HDF5,
+    MAPS,
+    OF_ERRORS,
+    Overwrite,
+    StudyName,
+    horizons,
+    of_errors,
+    on_interrupt,
+    require_ending,
+    require_free,
+)
 from .terminal import passing, warn
 
 SAID = 10           # lines about a training where there is no terminal
@@ -95,7 +104,7 @@ def typed(name, out, data, threads):
 
 
 def motion(study, data):
-    """`cases.Observed` of a study's scene: made, or of a results file, which is made if need be."""
+    """`Observed` of a study's scene: made, or of a results file, which is made if need be."""
     problem = study.problem()
     with threads_for(problem.bodies):
         if data is None:
@@ -106,7 +115,7 @@ def motion(study, data):
                 made = trajectory.make(data, study.problem(), Steps(bar))
             if made < problem.clock.steps:
                 end(f"interrupted at step {made} of {problem.clock.steps} of the run to learn "
-                    "from; the same command again goes on", faults.INTERRUPT)
+                    "from; the same command again goes on", INTERRUPT)
     return trajectory.read(data, problem)
 
 
@@ -122,14 +131,14 @@ class Steps(Watch):
 
 
 def learned(study, seen, checkpoint, **about):
-    """`learned.weights.Laws` of a study, with its progress; ends the command where it diverges."""
+    """`LearnedLaws` of a study, with its progress; ends the command where it diverges."""
     how = training.drive()
     try:
         with on_interrupt(lambda: resuming(checkpoint)), Epochs(study, len(seen.x) - 1) as now:
             return training.trained(study, seen, checkpoint, now.show, **about)
     except how.Diverged as fault:
         left = f"; {checkpoint} is of this training: remove it when the study changes"
-        end(f"{study.path}: {fault}{left if checkpoint.exists() else ''}", faults.UNSTABLE)
+        end(f"{study.path}: {fault}{left if checkpoint.exists() else ''}", UNSTABLE)
 
 
 def resuming(checkpoint):
@@ -192,5 +201,5 @@ def in_short(study, seen, errors):
     steps, points, method = len(seen.x) - 1, seen.x.shape[1], study.tables.method
     over = horizons(method, asdict(study.tables.train), len(errors))
     return (f"{method}, {counted(len(errors), 'epoch')} on {counted(steps, 'step')} of "
-            f"{counted(points, 'point')}; {of_errors(method)} {made.ends(errors, over)}")
+            f"{counted(points, 'point')}; {of_errors(method)} {provenance.ends(errors, over)}")
 

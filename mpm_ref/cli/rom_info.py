@@ -1,21 +1,22 @@
-"""`mpm-ref info` of a study and of a map, and `mpm-ref rom studies`, the list of shipped ones."""
+"""`mpm-ref info` of a study and of a reduced model, and `mpm-ref rom studies`."""
 
 import msgspec
+import numpy as np
 
-from ..reduced import maps
-from ..reduced.model import known_of
-from ..reduced.nsf.networks import Networks
-from ..reduced.study_file import checked, plain
-from ..reduced.tables import CURVED, MODES, NETWORK
 from ..rom.fields.network import Decoder
+from ..rom.fields.pod_fields import Spanned
 from ..rom.fields.polynomial_manifold import Curved
+from ..rom.study import reduce
+from ..rom.study.model import known_of
+from ..rom.study.nsf_networks import Networks
+from ..rom.study.study_file import checked, plain
+from ..rom.study.tables import CURVED, MODES, NETWORK, NSF
 from ..scene import SceneError
 from ..store.words import counted
-from . import rom_nsf_info as nsf
-from .faults import one_line
-from .look import Machine, listed
-from .rom_options import studied
-from .shipped import shipped_studies
+from .catalogue import shipped_studies
+from .errors import one_line
+from .options import Json, studied
+from .terminal import print_titles
 
 TABLES = {"parameter", "map"}       # of a study of reduced runs; nothing else has such
 TERMS = ("position", "F", "velocity")       # of the loss of a network
@@ -23,10 +24,10 @@ MEASURES = {"origin": "of the distance from the scene's origin",
             "centroid": "from the body's centroid", "displacement": "of the displacement"}
 
 
-def studies(json: Machine = False):
+def studies(json: Json = False):
     """List the studies that come with the package."""
     with one_line():
-        listed({name: checked(plain(path)).title for name, path in shipped_studies().items()
+        print_titles({name: checked(plain(path)).title for name, path in shipped_studies().items()
                 if is_study(path)}, json)
 
 
@@ -52,7 +53,7 @@ def of_study(name):
         "keys": {one.name: one.key for one in tables.parameter},
         "map": tables.map.settings,
         "run": msgspec.to_builtins(tables.run), "study_sha256": study.digest,
-        **nsf.of_study(study),
+        **inferred_study_facts(study),
     }
 
 
@@ -66,9 +67,9 @@ def study_lines(facts):
         f"{len(facts['held_out'])} held out",
         f"{facts['dim']}D, {facts['points']} points, dx = {facts['dx']:g} m, "
         f"{counted(facts['steps'], 'step')} of {facts['dt']:.6g} s"
-        f"{nsf.kept(facts) if inferred else ''}",
+        f"{stored_states(facts) if inferred else ''}",
         f"parameters: {in_ranges(facts['parameters'], facts['keys'])}",
-        nsf.learned(facts) if inferred else
+        fields_line(facts) if inferred else
         f"map: {map['kind']}, r = {map['r']}; reduced runs: {run['quadrature']} quadrature, "
         f"{run['projection']} projection, {run['points'] or 'all'} points",
     ]
@@ -78,7 +79,7 @@ def of_map(path):
     """What a file of `mpm-ref rom train` holds, and what it says of its making; None for what it
     does not say. Raises ValueError for a file that is damaged or no map.
     """
-    model = maps.read(path)
+    model = reduce.read(path)
     about, map = model.about, model.decoder
     runs, levels, r = model.xhat.shape
     names, loss, fit = about.get("parameters", ()), about.get("loss"), about.get("fit", {})
@@ -87,7 +88,7 @@ def of_map(path):
         "points": fit.get("points", points_of(map)), "runs": runs, "steps": levels - 1,
         "parameters": ranges(names, about["mu"]) if names else None,
         "errors": fit.get("errors"), "last_loss": loss[-1] if loss else None, "about": about,
-        **nsf.of_fields(map, levels),
+        **inferred_fields_facts(map, levels),
     }
 
 
@@ -102,7 +103,7 @@ def map_lines(facts):
     lines = [f"{facts['map']}: {what}, {facts['kind']}, r = {facts['r']}, {facts['dim']}D{points}"
              f"{source(facts['about'])}", f"made of {runs}{varied}"]
     if inferred:
-        lines += nsf.making(facts["about"])
+        lines += training_lines(facts["about"])
     if facts["errors"]:
         off = ", ".join(f"{100.0 * facts['errors'][name]:.3g} % {words}"
                         for name, words in MEASURES.items() if name in facts["errors"])
@@ -145,3 +146,66 @@ def ranges(names, mu):
     """{name: [least, largest]} of parameters mu (runs, parameters)."""
     return {name: [min(values), max(values)] for name, values in
             zip(names, zip(*map(tuple, mu), strict=True), strict=True)}
+
+
+OF = {"modes": "the displacement", "tau": "the stress", "C": "the affine field"}
+
+
+def inferred_study_facts(study):
+    """Further facts of a study; none of another model."""
+    if study.tables.model != NSF:
+        return {}
+    return {"model": NSF, "every": study.base.every}
+
+
+def inferred_fields_facts(fields, levels):
+    """Further facts of fields from the states of each run, whose steps they do not know; none of a
+    map of another model.
+    """
+    inferred = isinstance(fields, Networks | Spanned)
+    return {"model": NSF, "states": levels, "steps": None} if inferred else {}
+
+
+def stored_states(facts):
+    """Which states of a run a study keeps, in words."""
+    every = facts["every"]
+    return f", one in {every} kept" if every > 1 else ""
+
+
+def fields_line(facts):
+    """Fields and reduced runs of a study in words."""
+    map, run = facts["map"], facts["run"]
+    longer = f", steps {run['faster']:g} times as long" if run["faster"] != 1.0 else ""
+    return (f"stress fields: {map['kind']}, r = {map['r']}, {sizes_text(map)}; reduced runs: "
+            f"{run['inversion']} inversion, {samples_text(run)}{longer}")
+
+
+def samples_text(run):
+    """Which points are samples, in words."""
+    if run.get("cells"):
+        return f"points of {run['cells']} cells at most, with weights"
+    return (f"{run['points'] or 'all'} points"
+            f"{' at most, with weights' if run['weighed'] else ''}")
+
+
+def training_lines(about):
+    """What fields say of their making, a line each; trainings of experiments have no study, and
+    keep the losses of several epochs.
+    """
+    if "map" in about:
+        yield sizes_text(about["map"])
+    if "losses" in about:
+        losses = zip(OF.values(), about["losses"].values(), strict=False)
+        yield "last losses: " + ", ".join(f"{np.ravel(loss)[-1]:.3g} of {what}"
+                                          for what, loss in losses)
+
+
+def sizes_text(map):
+    """Return the numbers of modes or widths of networks, and whether the stress sees mu."""
+    sees = "sees" if map["stress_sees_parameters"] else "does not see"
+    sees = f"the stress {sees} the parameters"
+    if map["kind"] == NETWORK:
+        waves = f", octaves of sines and cosines: {map['octaves']}" if map["octaves"] else ""
+        return f"factors of width {', '.join(str(one) for one in map['beta'])}{waves}; {sees}"
+    modes = ", ".join(f"{map[name]} of {what}" for name, what in OF.items() if map[name])
+    return f"modes: {modes}; {sees}"

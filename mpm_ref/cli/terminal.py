@@ -1,5 +1,6 @@
-"""What is said on the error channel besides faults: notes that pass, progress, warnings."""
+"""Output of commands: JSON, lists of titles, progress bars and warnings."""
 
+import json
 import shutil
 import sys
 from contextlib import contextmanager
@@ -31,3 +32,24 @@ def warn(sentences):
     """Say warnings, a line each."""
     for sentence in sentences:
         print(f"mpm-ref: warning: {sentence}", file=sys.stderr)
+
+
+def as_json(facts):
+    """Facts as JSON that every reader takes: numbers that are not finite become null."""
+    return json.dumps(_finite(facts), indent=1)
+
+
+def _finite(value):
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    if isinstance(value, float) and not abs(value) < float("inf"):
+        return None
+    return value
+
+
+def print_titles(titles, machine_readable):
+    """Print {name: title}, a line each or as JSON."""
+    lines = [f"{name:24} {title}" for name, title in titles.items()]
+    print(as_json(titles) if machine_readable else "\n".join(lines))

@@ -3,20 +3,30 @@
 A node carries the condition of a part if it has mass and its signed distance to the part is at
 most 1e-9 cells: the wall is the zero contour of the level set (docs/explanation/boundaries.md).
 Where several parts meet, all their conditions are satisfied at once (see `contact`).
+
+    Collider, Prescribed, BoxWalls    parts; `Conditions` is all those of a scene
+    touch, touch_wall                 the nodes of one part, with its normal and velocity: a `Touch`
+    solve                             new velocities of all nodes touched, and each part's impulse
 """
 
 from dataclasses import dataclass
 from math import inf
+from typing import NamedTuple
 
 import numpy as np
 
-from .collide import nodes_with_mass, solve, touch, touch_wall
-from .contact import NOSLIP, PRESCRIBED, SEPARATE, SLIP, STICKY
+from .contact import NOSLIP, PRESCRIBED, SEPARATE, SLIP, STICKY, Contacts, meet
+from .jit import CHUNKS, chunk, kernel, parallel, prange
+from .levelset import distances, normals
 from .motion import STILL, Motion
+from .tensor import lin, mat, mv, put_vec, vec, vm
 
+ON = 1e-9     # cells: a node this near to the surface is on it, so that rounding moves no wall
 EVEN = 1e-9         # of a step: so far a sum of steps may miss a time
 KINDS = {"sticky": STICKY, "slip": SLIP, "separate": SEPARATE, "noslip": NOSLIP}
 
+
+# conditions as a scene states them
 
 @dataclass(frozen=True)
 class Collider:
@@ -41,7 +51,7 @@ class Collider:
         return KINDS[self.kind]
 
     def touch(self, nodes, t, dt):
-        """The nodes it contains at time t; see `collide.touch`."""
+        """The nodes it contains at time t; see `touch`."""
         pose = self.motion.pose(t, dt, nodes.m.ndim)
         return touch(nodes, self.shape, self.inside, pose, pose)
 
@@ -71,7 +81,7 @@ class Prescribed:
                              "0 <= since < until")
 
     def touch(self, nodes, t, dt):
-        """The nodes it contains at time t; see `collide.touch`."""
+        """The nodes it contains at time t; see `touch`."""
         d = nodes.m.ndim
         if not self.since < t - EVEN * dt <= self.until:
             nodes = nodes._replace(flat=nodes.flat[:0])
@@ -107,7 +117,7 @@ class BoxWalls:
         return KINDS[self.kind]
 
     def touches(self, grid):
-        """The nodes of each wall, low before high, axis by axis; see `collide.touch_wall`."""
+        """The nodes of each wall, low before high, axis by axis; see `touch_wall`."""
         if len(self.low) != grid.m.ndim:
             raise ValueError(f"walls from {self.low} to {self.high} in {grid.m.ndim}D: expected "
                              f"{grid.m.ndim} limits each")
@@ -183,3 +193,170 @@ def _check(kind, friction):
         raise ValueError(f"friction = {friction}: expected a finite number >= 0")
     if friction and kind not in ("slip", "separate"):
         raise ValueError(f"friction = {friction} with kind {kind!r}: only slip and separate rub")
+
+
+# the nodes of each part, and one velocity for each that satisfies all parts
+
+class Nodes(NamedTuple):
+    """Some nodes of a grid, by their index in its flattened arrays."""
+
+    flat: np.ndarray      # (A,)
+    m: np.ndarray         # (n1, .., nd)  for its shape
+    origin: np.ndarray    # (d,)          index of the first node, counted from the world's origin
+    dx: float             # [m]
+
+
+class Touch(NamedTuple):
+    """The nodes that one part contains."""
+
+    node: np.ndarray      # (K,)    index in the grid's flattened arrays
+    n: np.ndarray         # (K, d)  outward normal of the part
+    v: np.ndarray         # (K, d)  velocity of the part there [m/s]
+
+
+def nodes_with_mass(grid):
+    """`Nodes` of a grid that have mass."""
+    flat = np.flatnonzero(grid.m.reshape(-1) > 0.0)
+    return Nodes(flat, grid.m, grid.origin, float(grid.dx))
+
+
+def touch(nodes, shape, inside, region, pose):
+    """The nodes inside a shape placed by the pose `region`, or outside of it for a container.
+
+    Their velocities are those of the rigid motion `pose`, the same one where the region follows it.
+    """
+    d = nodes.m.ndim
+    X = np.empty((len(nodes.flat), d))
+    _pull_back_all(nodes, region, X)
+    side = -1.0 if inside else 1.0
+    near = np.flatnonzero(side * distances(X, shape) <= ON * nodes.dx)
+    n, v = side * normals(X[near], shape), np.empty((len(near), d))
+    nodes = nodes._replace(flat=nodes.flat[near])
+    _carry_all(nodes, region, pose, n, v)
+    return Touch(nodes.flat, n, v)
+
+
+def touch_wall(grid, axis, limit, below):
+    """The nodes with mass whose index on an axis is < limit (below), or > limit, from the origin.
+
+    Nodes are counted in integers. A limit of None is no wall.
+    """
+    shape, first = grid.m.shape, int(grid.origin[axis])
+    start, stop = 0, shape[axis]
+    if limit is None:
+        stop = 0
+    elif below:
+        stop = min(max(limit - first, 0), stop)
+    else:
+        start = min(max(limit + 1 - first, 0), stop)
+    slab = np.moveaxis(grid.m, axis, 0)[start:stop]
+    i, *others = np.nonzero(slab > 0.0)
+    others.insert(axis, i + start)
+    n = np.zeros((len(i), len(shape)))
+    n[:, axis] = 1.0 if below else -1.0
+    return Touch(np.ravel_multi_index(others, shape), n, np.zeros_like(n))
+
+
+def solve(touches, kind, mu, grid):
+    """Change grid.v to satisfy all parts at once; returns the impulse of each, (P, d) [kg m/s].
+
+    touches has one `Touch` for each part, kind its rule (see `contact`), mu its friction.
+    """
+    d = grid.m.ndim
+    if not touches:
+        return np.zeros((0, d))
+    J = np.zeros((CHUNKS, len(touches), d))
+    contacts, start = by_node(touches, kind, mu)
+    if len(contacts.node):
+        _settle_all(contacts, start, grid.v.reshape(-1, d), grid.m.shape)
+        _add_all_impulses(contacts, grid.m.reshape(-1), J)
+    return J.sum(axis=0)
+
+
+def by_node(touches, kind, mu):
+    """`Contacts` by node, those of the a-th node touched being start[a] .. start[a + 1] - 1. At a
+    node the larger friction comes first, to which ties between planes go.
+    """
+    order = sorted(range(len(touches)), key=lambda p: -mu[p])
+    rows = [touches[p] for p in order]
+    node = np.concatenate([row.node for row in rows])
+    part = np.repeat(order, [len(row.node) for row in rows])
+    sort = np.argsort(node, kind="stable")
+    n = np.concatenate([row.n for row in rows])[sort]
+    v = np.concatenate([row.v for row in rows])[sort]
+    node, kind, mu = node[sort], np.asarray(kind), np.asarray(mu, dtype=float)
+    first = np.flatnonzero(node[1:] != node[:-1]) + 1
+    start = np.concatenate(([0], first, [len(node)]))
+    return Contacts(node, part[sort], n, v, np.zeros_like(v), kind, mu), start
+
+
+@kernel
+def place(nodes, k, n):
+    """Position of the k-th of the nodes, of a grid of shape n [m]."""
+    i, o, dx = nodes.flat[k], nodes.origin, nodes.dx
+    if len(n) == 2:
+        return (o[0] + i // n[1]) * dx, (o[1] + i % n[1]) * dx
+    else:
+        j = i // n[2]
+        return (o[0] + j // n[1]) * dx, (o[1] + j % n[1]) * dx, (o[2] + i % n[2]) * dx
+
+
+@kernel
+def pull_back(nodes, region, X, bounds):
+    """X_k = origin + R^T (x_k - center): the nodes in the frame of a shape that has moved."""
+    d = nodes.m.shape
+    origin, center, R = vec(region.origin, 0, d), vec(region.center, 0, d), mat(region.R, 0, d)
+    for k in range(bounds[0], bounds[1]):
+        r = lin(1.0, place(nodes, k, d), -1.0, center)
+        put_vec(X, k, lin(1.0, origin, 1.0, vm(r, R)))
+
+
+@kernel
+def carry(nodes, region, pose, n, v, bounds):
+    """n_k <- R n_k, and v_k = v + W (x_k - center), the velocity of the motion at the nodes."""
+    d = nodes.m.shape
+    R, center, W = mat(region.R, 0, d), vec(pose.center, 0, d), mat(pose.W, 0, d)
+    for k in range(bounds[0], bounds[1]):
+        r = lin(1.0, place(nodes, k, d), -1.0, center)
+        put_vec(n, k, mv(R, vec(n, k, d)))
+        put_vec(v, k, lin(1.0, vec(pose.v, 0, d), 1.0, mv(W, r)))
+
+
+@kernel
+def settle(contacts, start, v, like, bounds):
+    """Velocities of the nodes bounds[0] .. bounds[1] - 1 of those in contact."""
+    for a in range(bounds[0], bounds[1]):
+        i = contacts.node[start[a]]
+        put_vec(v, i, meet(contacts, (start[a], start[a + 1]), vec(v, i, like)))
+
+
+@kernel
+def add_impulses(contacts, m, J, bounds):
+    """J_part += m_i dv of the pairs bounds[0] .. bounds[1] - 1."""
+    for k in range(bounds[0], bounds[1]):
+        for a in range(J.shape[1]):
+            J[contacts.part[k], a] += m[contacts.node[k]] * contacts.dv[k, a]
+
+
+@parallel
+def _pull_back_all(nodes, region, X):
+    for c in prange(CHUNKS):
+        pull_back(nodes, region, X, chunk(c, len(X)))
+
+
+@parallel
+def _carry_all(nodes, region, pose, n, v):
+    for c in prange(CHUNKS):
+        carry(nodes, region, pose, n, v, chunk(c, len(n)))
+
+
+@parallel
+def _settle_all(contacts, start, v, like):
+    for c in prange(CHUNKS):
+        settle(contacts, start, v, like, chunk(c, len(start) - 1))
+
+
+@parallel
+def _add_all_impulses(contacts, m, J):
+    for c in prange(CHUNKS):
+        add_impulses(contacts, m, J[c], chunk(c, len(contacts.node)))

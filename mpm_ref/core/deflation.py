@@ -5,7 +5,7 @@ conditioned eigenvector, however close the other two are [Scherzinger2008]. With
 vector split off, what remains lies in the plane across it, where singular values and eigenvalues
 are sums and differences of two lengths. No sweeps, no tolerances.
 
-The largest entry of an input is 0 or moderate (see `extremes`), so that the fourth powers below
+The largest entry of an input is 0 or moderate (see `scaling`), so that the fourth powers below
 stay in the range of floats.
 """
 

@@ -26,7 +26,7 @@ project = by_type("project")              # (s, y, dt, law, flow) -> s, y after 
 returned = by_type("returned")            # (F, flow) -> F of a return map that is no function of s
 intact = by_type("intact")                # (y, flow) -> 1.0, or 0.0 where the material has failed
 
-# Adjoint: `X_bar` is the gradient of a scalar loss by X. See `deform_adjoint`.
+# Adjoint: `X_bar` is the gradient of a scalar loss by X. See `core.adjoint.deform`.
 kirchhoff_vjp = by_type("kirchhoff_vjp")  # (s, T, law) -> U^T F_bar V, where T = U^T tau_bar U
 units = by_type("units")                  # (law) -> laws of one modulus 1, the others 0
 d_pressure = by_type("d_pressure")        # (J, law) -> d pressure / dJ

@@ -8,6 +8,9 @@ All particles of a cell reach the same nodes, so that their blocks are summed up
 matrix, of which the blocks with j >= i suffice: nodes are numbered in the order of the stencil, and
 the matrix is mirrored in the end, which makes it symmetric to the bit. Slabs of cells write to rows
 of their own nodes only (see `core.order`).
+
+`pattern_of` finds which blocks there are; `diagonal` computes the diagonal blocks alone, for
+methods that do without the matrix.
 """
 
 from typing import NamedTuple
@@ -16,11 +19,10 @@ import numpy as np
 from scipy.sparse import bsr_array
 
 from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
-from ..core.stencil import column, columns, gradient, slopes_per_axis, weights_per_axis
-from ..core.tensor import mat, mlin, mm, mmt, outer, put_mat, put_vec, vec
+from ..core.stencil import column, columns, gradient, node, slopes_per_axis, weights_per_axis
+from ..core.tensor import mat, mlin, mm, mmt, mv, outer, put_mat, put_vec, transpose, vec
 from ..materials.principal import apply
-from .modes import pairs_of
-from .pattern import strides
+from .quadrature import pairs_of
 
 
 class Matrix(NamedTuple):
@@ -217,3 +219,133 @@ def _assemble_color(sites, modes, stencil, dx, matrix, color):
 def _complete_all(data, pattern, m):
     for c in prange(CHUNKS):
         complete(data, pattern, m, chunk(c, len(m)))
+
+
+# sparsity: one block for every pair of nodes that a particle can reach
+
+
+class Pattern(NamedTuple):
+    """Block sparsity of n rows; o numbers the (2 q + 1)^d offsets of nodes within reach of splines
+    of degree q, first axis slowest.
+    """
+
+    indptr: np.ndarray     # (n + 1,)        first block of each row
+    indices: np.ndarray    # (blocks,)       column of each block, ascending in a row
+    block: np.ndarray      # (n, offsets)    block of a row and an offset; -1 where there is none
+    degree: int
+
+
+def pattern_of(number, degree):
+    """`Pattern` of the nodes that `number` (n1, .., nd) numbers; it is -1 where there is none."""
+    d, width = number.ndim, 2 * degree + 1
+    padded = np.pad(number, degree, constant_values=-1)
+    node = np.flatnonzero(padded.reshape(-1) >= 0)
+    hop = strides(padded.shape) @ (np.indices(d * (width,)).reshape(d, -1) - degree)
+    indptr = np.zeros(len(node) + 1, dtype=np.int32)
+    _count_all(padded.reshape(-1), node, hop, indptr)
+    np.cumsum(indptr, out=indptr)
+    indices = np.empty(indptr[-1], dtype=np.int32)
+    block = np.empty((len(node), len(hop)), dtype=np.int32)
+    _place_all(padded.reshape(-1), node, hop, Pattern(indptr, indices, block, degree))
+    return Pattern(indptr, indices, block, degree)
+
+
+def strides(shape):
+    """Numbers of entries from one to the next along each axis of a C-ordered array."""
+    return np.concatenate((np.cumprod(shape[:0:-1])[::-1], [1])).astype(np.int64)
+
+
+@kernel
+def count(number, node, hop, indptr, bounds):
+    """indptr[i + 1] = blocks of row i, for the rows bounds[0] .. bounds[1] - 1."""
+    for i in range(bounds[0], bounds[1]):
+        for o in range(len(hop)):
+            if number[node[i] + hop[o]] >= 0:
+                indptr[i + 1] += 1
+
+
+@kernel
+def place(number, node, hop, pattern, bounds):
+    """Columns and block numbers of the rows bounds[0] .. bounds[1] - 1."""
+    for i in range(bounds[0], bounds[1]):
+        k = pattern.indptr[i]
+        for o in range(len(hop)):
+            column = number[node[i] + hop[o]]
+            pattern.block[i, o] = -1
+            if column >= 0:
+                pattern.indices[k] = column
+                pattern.block[i, o] = k
+                k += 1
+
+
+@parallel
+def _count_all(number, node, hop, indptr):
+    for c in prange(CHUNKS):
+        count(number, node, hop, indptr, chunk(c, len(node)))
+
+
+@parallel
+def _place_all(number, node, hop, pattern):
+    for c in prange(CHUNKS):
+        place(number, node, hop, pattern, chunk(c, len(node)))
+
+
+# diagonal blocks without the matrix
+
+
+def diagonal(bodies, unknowns, stencil):
+    """Diagonal blocks (n, d, d) [kg] of the Hessian of bodies, pairs of `Sites` and `Modes`.
+
+        H_ii = m_i I + sum_p h_ip,    h_ip e_b = U Y_b (W^T dw_ip),    Y_b = apply(A, pairs, X_b)
+
+    with X_b = (U^T e_b) (W^T dw_ip)^T: the response of particle p (see `quadrature.Modes`) to node
+    i moving along axis b.
+    """
+    d = unknowns.number.ndim
+    D = unknowns.m[:, None, None] * np.eye(d)
+    for sites, modes in bodies:
+        for color in (0, 1):
+            _add_color(sites, modes, stencil, unknowns, D, color)
+    return 0.5 * (D + np.swapaxes(D, 1, 2))
+
+
+@kernel
+def add(sites, modes, stencil, unknowns, D, bounds):
+    """Add the blocks of the particles bounds[0] .. bounds[1] - 1."""
+    like = unknowns.number.shape
+    for p in range(bounds[0], bounds[1]):
+        base, s = vec(sites.base, p, like), vec(sites.s, p, like)
+        w, dw = weights_per_axis(s, stencil), slopes_per_axis(s, stencil)
+        U, A, pairs = mat(modes.U, p, like), mat(modes.A, p, like), pairs_of(modes.ab, p, like)
+        W_T = transpose(mat(modes.W, p, like))
+        for c in range(columns(s, stencil)):
+            k = column(c, stencil, like)
+            for l in range(len(stencil)):
+                i = unknowns.number[node(base, k, l)]
+                if i >= 0:
+                    h_ip = block(U, A, pairs, mv(W_T, gradient(k, l, w, dw, unknowns.dx)))
+                    put_mat(D, i, mlin(1.0, mat(D, i, like), 1.0, h_ip))
+
+
+@kernel
+def block(U, A, pairs, x):
+    """h_ip, for x = W^T dw_ip."""
+    if len(x) == 2:
+        rows = moved(U, A, pairs, U[0], x), moved(U, A, pairs, U[1], x)
+    else:
+        rows = (moved(U, A, pairs, U[0], x), moved(U, A, pairs, U[1], x),
+                moved(U, A, pairs, U[2], x))
+    return transpose(rows)
+
+
+@kernel
+def moved(U, A, pairs, e, x):
+    """U apply(A, pairs, e x^T) x."""
+    return mv(U, mv(apply(A, pairs, outer(e, x)), x))
+
+
+@parallel
+def _add_color(sites, modes, stencil, unknowns, D, color):
+    for h in prange((len(sites.slab) - color) // 2):
+        a = 2 * h + color
+        add(sites, modes, stencil, unknowns, D, (sites.slab[a], sites.slab[a + 1]))

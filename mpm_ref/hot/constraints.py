@@ -9,7 +9,7 @@ the step. Friction does not derive from a potential and is refused.
 
 import numpy as np
 
-from ..core.collide import by_node
+from ..core.boundary import by_node
 from ..core.contact import (
     PARALLEL,
     SLIP,

@@ -19,7 +19,7 @@ from dataclasses import replace
 from .descent import iterate
 from .krylov import Rule
 from .line_search import search
-from .linear import Linear, first_inverse, solve
+from .linearization import Linear, first_inverse, solve
 from .norms import scaled_norm
 
 REFUSED = ("the line search refused the step that would tell more, near the limit of round-off or "

@@ -40,7 +40,7 @@ def two_loop(q, pairs, inverse):
 
 class LBFGS:
     """Directions for `descent` from the last `window` pairs and the first inverse, that of the
-    `linear.Linear` which build(dv) gives.
+    `linearization.Linear` which build(dv) gives.
 
     It is built at the first iterate, and as it is dear (HOT-cost), no more in general. It is built
     anew after every `rebuild` steps if that is not 0, and, as `renew` says, where it has been seen

@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .admm import ADMM
-from .choices import Choices, checked
 from .descent import Stop, advance_of, iterate
 from .displacement_stop import held, multigrid_once
 from .krylov import JACOBI, stiffest_tolerance
 from .lbfgs import LBFGS, RENEWALS
 from .line_search import Rules
-from .linear import INVERSES, first_inverse, linearised
+from .linearization import INVERSES, first_inverse, linearised
+from .multigrid.options import Choices, checked
 from .newton import Forcing, Newton
 from .report import Solution, Watch, Watched
 
@@ -50,7 +50,8 @@ class Options:
     norm: str = "characteristic"        # in which the gradient is measured, or "L2" [kg m/s]
     eps: float = 1e-7                   # its tolerance
     cells: float = 0.0                  # error of the particles' displacement to hold [dx], with
-                                        # eps as a first guess (see `held`); 0: eps alone decides
+                                        # eps as a first guess (see `displacement_stop`);
+                                        # 0: eps alone decides
     start: str = "zero"                 # of the increment, or "gravity": g dt (the release)
     window: int = 8                     # pairs that L-BFGS keeps
     rebuild: int = 0                    # steps after which L-BFGS takes a new Hessian; 0: never
@@ -60,7 +61,7 @@ class Options:
     flexible: bool = False              # CG that bears a preconditioner that varies
     patience: int = 50                  # see `descent.Stop`
     search: Rules = RULES               # of the line search
-    penalty: float = 1.0                # of ADMM, over the stiffness: see `splitting`
+    penalty: float = 1.0                # of ADMM, over the stiffness: see `Splitting`
     levels: int = 3                     # of multigrid
     kernel: str = "linear"              # of its embedding
     path: str = "blocks"                # of its implementation; "scipy" is the reference

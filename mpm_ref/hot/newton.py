@@ -1,7 +1,7 @@
 """Inexact projected Newton: each direction by CG on the Hessian of the iterate (HOT-alg1)."""
 
 from .krylov import Rule, newton_tolerance
-from .linear import solve
+from .linearization import solve
 from .norms import length
 
 

@@ -2,24 +2,46 @@
 
     E(dv) = sum_i m_i |dv_i|^2 / 2 + sum_p V0_p psi(F_p) - dt sum_i m_i b . (v_i + dv_i)    HOT-eq1
     g_i   = m_i dv_i + dt sum_p V0_p P_p (F_p^n)^T dw_ip - dt m_i b                         HOT-eq2
-    F_p   = (I + dt sum_i (v_i + dv_i) dw_ip^T) F_p^n
+    F_p   = (I + dt L_p) F_p^n,    L_p = sum_i (v_i + dv_i) dw_ip^T
 
 with the gravity b; heights are counted from the nodes at the start of the step. F_p^n is elastic:
 return maps are lagged (HOT-sec3.1-seq). Where g = 0, m_i dv_i / dt is the force after the step.
+
+The Hessian is an operator or a matrix (HOT-sec3.1-seq):
+
+    (H u)_i = m_i u_i + sum_p T_p dw_ip,    T_p = dt^2 V0_p [dP/dF : (L_p F_p^n)] (F_p^n)^T
+
+with L_p = sum_i u_i dw_ip^T. T_p is computed in principal space, see `quadrature.Modes`.
 """
 
 from functools import cached_property
+from math import inf
 
 import numpy as np
 
-from ..core.jit import total
+from ..core import law as laws
+from ..core.jit import CHUNKS, by_type, chunk, kernel, parallel, prange, total
+from ..core.spectral import rotation, svd
 from ..core.state import NONE, Grid
-from .pattern import pattern_of
-from .quadrature import sites_of
-from .reach import reach
-from .response import response
-from .tangent import Tangent, differentials
-from .transfer import add_forces, gradients
+from ..core.tensor import (
+    dot,
+    identity,
+    inner,
+    mat,
+    mlin,
+    mm,
+    mmt,
+    put_mat,
+    scale_columns,
+    total_of,
+    transpose,
+)
+from ..materials import FixedCorotated, Fluid, Hencky, LogNeoHookean, NeoHookean, fluid, hencky
+from ..materials.log_strain import log_strain
+from ..materials.principal import apply, local, local_spd
+from .assembly import assembled, pattern_of
+from .quadrature import Modes, pairs_of, sites_of
+from .transfer import add_forces, gradients, reach
 
 
 class Potential:
@@ -98,3 +120,142 @@ def box_of(unknowns):
     shape = unknowns.number.shape
     u, f = np.zeros((2, *shape, len(shape)))
     return Grid(np.zeros(shape), u, f, NONE, unknowns.origin, unknowns.dx)
+
+
+# energy and stress of particles at the end of the step:
+#
+#     psi_p = V0_p psi(F_p),    T_p = dt V0_p P(F_p) (F_p^n)^T
+#
+# T_p is the derivative of psi_p with respect to L_p [J s]; HOT-eq2 sums T_p dw_ip.
+
+
+energy_and_stress = by_type("energy_and_stress")      # (F, law) -> psi, P, at the cost of P alone
+
+
+@kernel
+def moved(L, dt, F):
+    """(I + dt L) F."""
+    return mm(mlin(1.0, identity(F), dt, L), F)
+
+
+@kernel
+def respond(sites, law, dt, like, bounds):
+    """psi_p and T_p of the particles bounds[0] .. bounds[1] - 1; before, T_p holds L_p."""
+    for p in range(bounds[0], bounds[1]):
+        F_n = mat(sites.F, p, like)
+        psi, P = energy_and_stress(moved(mat(sites.T, p, like), dt, F_n), law)
+        sites.psi[p] = sites.V0[p] * psi
+        put_mat(sites.T, p, mlin(dt * sites.V0[p], mmt(P, F_n), 0.0, F_n))
+
+
+@kernel
+def by_rotation(F, law):
+    """psi, P of the fixed corotated law from one polar decomposition (NCLAW-eq12)."""
+    D = mlin(1.0, F, -1.0, rotation(F))
+    psi = law.mu * inner(D, D) + fluid.psi(F, law)
+    return psi, mlin(2.0 * law.mu, D, 1.0, fluid.pk1(F, law))
+
+
+@kernel
+def by_stretches(F, law):
+    """psi, P of the Hencky law from one singular value decomposition (NSF-eq13)."""
+    U, s, V, _ = svd(F)
+    psi = inf
+    if s[len(s) - 1] > 0.0:
+        eps = log_strain(s)
+        psi = law.mu * dot(eps, eps) + 0.5 * law.lam * total_of(eps) * total_of(eps)
+    return psi, mmt(scale_columns(U, hencky.pk1_hat(s, law)), V)
+
+
+@kernel
+def apart(F, law):
+    """psi, P of a law that needs no decomposition."""
+    return laws.psi(F, law), laws.pk1(F, law)
+
+
+energy_and_stress.method(FixedCorotated, by_rotation)
+energy_and_stress.method(Hencky, by_stretches)
+for _law in (NeoHookean, LogNeoHookean, Fluid):
+    energy_and_stress.method(_law, apart)
+
+
+@parallel
+def _respond_all(sites, law, dt, like):
+    for c in prange(CHUNKS):
+        respond(sites, law, dt, like, chunk(c, len(sites.psi)))
+
+
+def response(sites, law, dt):
+    """`respond` for all particles of a body."""
+    _respond_all(sites, law, dt, tuple(range(sites.F.shape[1])))
+
+
+# the Hessian
+
+
+class Tangent:
+    """Hessian H = d2E/d dv2 [kg] of a `Potential` at one dv, which knows no conditions."""
+
+    def __init__(self, potential, modes):
+        self.potential, self.modes = potential, modes
+
+    def product(self, u):
+        """H u (n, d), without a matrix."""
+        self.potential.spread(u)
+        for sites, modes in zip(self.potential.sites, self.modes):
+            _stress_all(sites, modes, tuple(range(u.shape[1])))
+        return self.potential.collect() + self.potential.unknowns.m[:, None] * u
+
+    def matrix(self):
+        """H as a bsr_array of blocks (d, d), symmetric to the bit; a row has a block for every node
+        in the stencil of 5^d (for quadratic splines) nodes around its own.
+        """
+        q = self.potential
+        return assembled(tuple(zip(q.sites, self.modes)), q.unknowns, q.pattern)
+
+
+def differentials(sites, law, dt, projected):
+    """`Modes` at the velocity gradients L that sites.T holds."""
+    n, d = sites.s.shape
+    square = (np.empty((n, d, d)) for _ in range(3))
+    modes = Modes(*square, np.empty((n, d * (d - 1) // 2, 2)))
+    _differentiate_all(sites, law, (dt, projected), modes, tuple(range(d)))
+    return modes
+
+
+@kernel
+def differentiate(sites, law, options, modes, like, bounds):
+    """`Modes` of the particles bounds[0] .. bounds[1] - 1; options are dt and projected."""
+    dt, projected = options
+    for p in range(bounds[0], bounds[1]):
+        F_n = mat(sites.F, p, like)
+        U, s, V, _ = svd(moved(mat(sites.T, p, like), dt, F_n))
+        A, pairs = local_spd(s, law) if projected else local(s, law)
+        scale = dt * dt * sites.V0[p]
+        put_mat(modes.U, p, U)
+        put_mat(modes.W, p, mm(F_n, V))
+        put_mat(modes.A, p, mlin(scale, A, 0.0, A))
+        for k in range(len(pairs)):
+            modes.ab[p, k, 0], modes.ab[p, k, 1] = scale * pairs[k][0], scale * pairs[k][1]
+
+
+@kernel
+def stress(sites, modes, like, bounds):
+    """T_p of the particles bounds[0] .. bounds[1] - 1; before, T_p holds L_p."""
+    for p in range(bounds[0], bounds[1]):
+        U, W = mat(modes.U, p, like), mat(modes.W, p, like)
+        X = mm(transpose(U), mm(mat(sites.T, p, like), W))
+        Y = apply(mat(modes.A, p, like), pairs_of(modes.ab, p, like), X)
+        put_mat(sites.T, p, mmt(mm(U, Y), W))
+
+
+@parallel
+def _differentiate_all(sites, law, options, modes, like):
+    for c in prange(CHUNKS):
+        differentiate(sites, law, options, modes, like, chunk(c, len(sites.T)))
+
+
+@parallel
+def _stress_all(sites, modes, like):
+    for c in prange(CHUNKS):
+        stress(sites, modes, like, chunk(c, len(sites.T)))

@@ -1,5 +1,7 @@
-"""What of the particles does not change during an implicit step: where they are, what they
-are made of, and in which order they write to the grid.
+"""The particles as quadrature points of an implicit step: what stays the same while it is solved.
+
+`Sites` holds the positions, rest volumes and old deformation gradients; `Modes` the differential of
+the stress at the current iterate.
 
 Particles are taken sorted by cell. Cells come first axis slowest, so that slabs (see `core.order`)
 are runs of them, and all particles of a cell, which share their nodes, follow each other.
@@ -100,3 +102,37 @@ def _place_all(particles, grid, stencil, order, out):
 def _ask_all(y, flow, out):
     for c in prange(CHUNKS):
         ask(y, flow, out, chunk(c, len(y)))
+
+
+# the differential of the stress
+
+
+class Modes(NamedTuple):
+    """Differential of the stress of N particles in principal space, in the order of their `Sites`.
+
+    With F_p = U diag(s) V^T and W = F_p^n V, a velocity gradient L changes the stress that acts on
+    the nodes by
+
+        T = U Y W^T,    Y = apply(A, pairs, U^T L W)
+
+    of `materials.principal`. A and pairs, here times dt^2 V0_p, may have their negative eigenvalues
+    set to zero (HOT-alg1), so that the Hessian is positive semi-definite.
+    """
+
+    U: np.ndarray       # (N, d, d)
+    W: np.ndarray       # (N, d, d)
+    A: np.ndarray       # (N, d, d)           [kg m^2]
+    ab: np.ndarray      # (N, d(d-1)/2, 2)    a and b of the pairs [kg m^2]
+
+
+@kernel
+def pairs_of(ab, p, like):
+    """The pairs of particle p: ((a_01, b_01),) in 2D; those of (0, 1), (0, 2), (1, 2) in 3D."""
+    if len(like) == 2:
+        return ((ab[p, 0, 0], ab[p, 0, 1]),)
+    else:
+        return (
+            (ab[p, 0, 0], ab[p, 0, 1]),
+            (ab[p, 1, 0], ab[p, 1, 1]),
+            (ab[p, 2, 0], ab[p, 2, 1]),
+        )

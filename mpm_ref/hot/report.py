@@ -26,7 +26,8 @@ class Report(NamedTuple):
     backtracks: int     # trial steps refused by line searches
     residuals: tuple    # of the start and of every accepted step: ||g^||_2 / sqrt(n)
     clock: tuple        # CPU seconds of the solve when each of them was known
-    off: float          # how far particles may be off by the last check of `held` [dx]; else NaN
+    off: float          # estimate of the particles' error by the last check of
+                        # `displacement_stop` [dx]; else NaN
     seconds: dict       # CPU seconds of all threads by part; their sum is the whole solve
 
 
@@ -117,7 +118,7 @@ class Watched:
     """A `System` whose calls are counted and timed; same names, same values."""
 
     def __init__(self, system, watch):
-        self.system, self.watch = system, watch
+        self.system, self.watch, self.potential = system, watch, system.potential
         self.start, self.index, self.kappa, self.n = (
             system.start, system.index, system.kappa, system.n)
 
@@ -152,10 +153,6 @@ class Watched:
         self.watch.builds += 1
         with self.watch.part("assembly"):
             return self.system.matrices(dv, levels)
-
-    def splitting(self, dv, penalty):
-        """The potential split for ADMM."""
-        return self.system.splitting(dv, penalty)
 
     def product(self, dv):
         """u -> H u on what is free, without a matrix."""

@@ -19,8 +19,7 @@ from .multigrid.geometric import Geometric, conditions_at
 from .norms import characteristic_norms
 from .potential import Potential
 from .report import together
-from .system import System
-from .unknowns import Unknowns, free_part, unknowns_of
+from .system import System, Unknowns, free_part, unknowns_of
 
 REVISIONS = 20      # of the planes that bear, at most: after that, nodes stay as they are
 

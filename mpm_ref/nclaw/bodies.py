@@ -4,7 +4,7 @@ import numpy as np
 
 from ..body import Body, particles_at
 from ..materials import Material
-from ..materials.learned import learned_flow, learned_law, network
+from ..materials.learned import learned_flow, learned_law
 
 
 def fresh(body, law, flow):
@@ -37,18 +37,11 @@ def own(body):
 
 
 def learned(laws):
-    """What makes bodies of trained `weights.Laws`. Raises ValueError for what is no stress and no
+    """What makes bodies of trained `LearnedLaws`. Raises ValueError for what is no stress and no
     return map.
     """
     elastic, plastic = learned_law(laws.elastic), learned_flow(laws.plastic)
     return lambda body: fresh(body, elastic, plastic)
-
-
-def dim_of(laws):
-    """Number of space dimensions of `weights.Laws`; 3 of those that are for any."""
-    found = [network.dim_of(len(law.layers[0][0])) for law in laws[:2]
-             if type(law.kind) in (*network.STRESSES, *network.CORRECTIONS)]
-    return found[0] if found else 3
 
 
 def points(law, flow, F):

@@ -6,6 +6,7 @@ docs/reference/studies.md lists the names.
 """
 
 import json
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -20,15 +21,24 @@ from ..materials import (
     NoFlow,
     VonMises,
 )
-from ..materials.learned import learned_flow, learned_law, principal, response, spline
+from ..materials.learned import (
+    contraction,
+    energetic,
+    learned_flow,
+    learned_law,
+    response,
+    spline,
+)
 from ..materials.learned.contraction import Contraction
 from ..materials.learned.energetic import Energetic
-from ..materials.learned.inputs import numbers, words
-from ..materials.learned.weights import PARTS
-from ..sealed import sealed, write_whole
-from .bodies import dim_of, gradients, points, stresses
+from ..materials.learned.invariants import invariants, spectrum
+from ..materials.learned.stretch_network import ReleasedStretchStress, StretchStress
+from ..materials.learned.weights import PARTS, dim_of
+from ..store.weights_file import sealed, write_whole
+from .bodies import gradients, points, stresses
 
 FORMAT = "mpm_ref law 1"
+THETA = "theta = sum_i log s_i"
 SPREAD, RANDOM, SEED = 0.1, 24, 0       # of the components of F - I in questions; how many; draw
 OF_F = ("F = U diag(s) V^T, det U = det V = +1, s descending, the last with the sign of det F; "
         "R = U V^T")
@@ -48,10 +58,10 @@ ANSWERS = {     # kind -> what is done with what it reads
     response.PlainStress: f"{TURNED}; tau = unit Y F^T",
     response.Correction: f"{TURNED}; F = F_trial + alpha R T, R of F_trial",
     response.PlainCorrection: f"{TURNED}; F = F_trial + alpha Y",
-    principal.ReleasedStretchStress: f"{STRETCHES}; where two stretches are equal, tau depends on "
-                                     "the axes that a decomposition picks",
-    principal.StretchStress: f"{STRETCHES}; y is the mean over all orders in which s is read, each "
-                             "y_i at the place of its s_i",
+    ReleasedStretchStress: f"{STRETCHES}; where two stretches are equal, tau depends on "
+                           "the axes that a decomposition picks",
+    StretchStress: f"{STRETCHES}; y is the mean over all orders in which s is read, each "
+                   "y_i at the place of its s_i",
     spline.SplineStress: SPLINES,
     spline.ReleasedSplineStress: SPLINES,
     Energetic: f"{SOFTPLUS}; g_k = d a_last / d (number k that is read), J = det F, b = F F^T; "
@@ -67,7 +77,7 @@ ANSWERS = {     # kind -> what is done with what it reads
 
 
 def exported(laws):
-    """{"format", "dim", "decomposition", "about", "elastic", "plastic", "check"} of `weights.Laws`:
+    """{"format", "dim", "decomposition", "about", "elastic", "plastic", "check"} of `LearnedLaws`:
     texts, numbers, arrays, and tables of them.
     """
     d = dim_of(laws)
@@ -76,17 +86,17 @@ def exported(laws):
             "check": checks(laws, questions(d))}
 
 
-def part_of(trained, d):
-    """What a `weights.Trained` is."""
-    kind = trained.kind
+def part_of(weights, d):
+    """Return the table of a law: its kind, what it reads and answers, its constants and layers."""
+    kind = weights.kind
     constants = kind._asdict()
     if type(kind) in spline.READINGS:
-        constants = learned_law(trained)._asdict()
+        constants = learned_law(weights)._asdict()
     else:
-        for k, (W, b) in enumerate(trained.layers):
+        for k, (W, b) in enumerate(weights.layers):
             constants |= {f"W{k}": W, f"b{k}": b}
     return {"kind": type(kind).__name__, "answers": ANSWERS[type(kind)],
-            "reads": words(trained, d), **constants}
+            "reads": input_labels(weights, d), **constants}
 
 
 def questions(d):
@@ -111,8 +121,8 @@ def checks(laws, F):
     elastic, plastic = points(law, NoFlow(), F), points(law, flow, F)
     initial_stress(elastic)
     deform_body(plastic, 1.0)
-    return {"F": F, "elastic_read": numbers(laws.elastic, F), "tau": stresses(elastic),
-            "plastic_read": numbers(laws.plastic, F),
+    return {"F": F, "elastic_read": input_values(laws.elastic, F), "tau": stresses(elastic),
+            "plastic_read": input_values(laws.plastic, F),
             "returned": F if isinstance(flow, NoFlow) else gradients(plastic)}
 
 
@@ -139,3 +149,54 @@ def write(path, tables):
     else:
         content = sealed(flat(tables))
     write_whole(path, content)
+
+
+def input_labels(weights, d):
+    """Return words (inputs) for what the first layer of `LawWeights` reads in d dimensions; none
+    without a network.
+    """
+    kind = weights.kind
+    if isinstance(kind, Energetic):
+        return ["|F|^2 - 3 - 2 log J", "|cof F|^2 - 3 - 4 log J", "(J - 1)^2", "J - 1 - log J"]
+    if isinstance(kind, Contraction):
+        parts = "|log s - theta / 3|", "max(theta, 0)", "max(-theta, 0)"
+        return [f"log(1 + {part} / strain), {THETA}" for part in parts]
+    if isinstance(kind, StretchStress | ReleasedStretchStress):
+        return stretch_labels(d)
+    if not weights.layers or len(weights.layers) == 1:
+        return []
+    if reads_gradient(weights, d):
+        return [f"F_{index}" for index in component_labels(d)]
+    return [*stretch_labels(d), *(f"(F^T F)_{index}" for index in component_labels(d)), "det F - 1"]
+
+
+def stretch_labels(d):
+    """Return words for the stretches, in descending order, without their value at rest."""
+    return [f"s_{i} - 1" for i in range(d)]
+
+
+def component_labels(d):
+    """Return words for the components of a matrix, row by row, without those of I."""
+    return [f"{i}{j} - 1" if i == j else f"{i}{j}" for i, j in product(range(d), repeat=2)]
+
+
+def reads_gradient(weights, d):
+    """Return whether a network reads F - I, and no invariants."""
+    return len(weights.layers[0][0]) == d * d
+
+
+def input_values(weights, F):
+    """Return the numbers (n, inputs) that the first layer of `LawWeights` reads at F (n, d, d)."""
+    n, d, _ = F.shape
+    kind, of = weights.kind, spectrum(F)
+    if not input_labels(weights, d):
+        return np.empty((n, 0))
+    if isinstance(kind, Energetic):
+        return energetic.measures_of(F)
+    if isinstance(kind, Contraction):
+        return contraction.strains_of(of, kind)
+    if isinstance(kind, StretchStress | ReleasedStretchStress):
+        return of.s - 1.0
+    if reads_gradient(weights, d):
+        return (F - np.eye(d)).reshape(n, -1)
+    return invariants(F, of)

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..hot.choices import Choices
 from ..hot.methods import METHODS, Options
+from ..hot.multigrid.options import Choices
 from . import sampled
 from .implicit_stages import after
 from .scales import size

@@ -11,7 +11,7 @@ from ..adjoint import deform_body_adjoint, initial_stress_adjoint, zero_bars, ze
 from ..core.adjoint.boundary import solve_adjoint
 from ..core.adjoint.grid import Update, update_adjoint
 from ..core.adjoint.transfer import Exchange, g2p_adjoint, p2g_adjoint
-from ..core.collide import solve
+from ..core.boundary import solve
 from ..core.grid import Storage
 from ..core.order import slabs_of
 from . import kernel_stages

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..explicit import scatter
-from ..hot.linear import by_matrix
+from ..hot.linearization import by_matrix
 from ..hot.methods import made
 from ..hot.multigrid.blocks.transfer import prolong
 from ..hot.multigrid.hierarchy import hierarchy

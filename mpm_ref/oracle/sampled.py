@@ -22,7 +22,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..hot.krylov import Rule, pcg
-from ..hot.linear import by_matrix
+from ..hot.linearization import by_matrix
 from ..hot.multigrid.hierarchy import hierarchy
 from ..hot.multigrid.projectors import diagonal_blocks
 from .scales import size

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import archive
+from ..store import weights_file
 from . import weights
 from .fields.network import Decoder, Field, FieldUnits, Units, misfit
 from .fields.perceptron import Network, count, layers_of, network
@@ -36,13 +36,13 @@ def save(path, model):
     other, numbers that are not finite and an `about` with more than JSON knows, OSError where the
     system refuses.
     """
-    stated = archive.stated(path, FORMAT, model.about)
-    archive.write(path, stated | arrays_of(model), fault_of)
+    stated = weights_file.stated(path, FORMAT, model.about)
+    weights_file.write(path, stated | arrays_of(model), fault_of)
 
 
 def load(path):
     """Read what `save` wrote. Raises ValueError saying what is wrong with the file."""
-    stored, about = archive.read(path, FORMAT, fault_of, WHAT)
+    stored, about = weights_file.read(path, FORMAT, fault_of, WHAT)
     arrays = {name: a.astype(float) if a.dtype.kind == "f" else a for name, a in stored.items()}
     own = part(arrays, "g")
     return Model(*networks_of(arrays), own["xhat"], own["rest"], about)

@@ -1,13 +1,13 @@
-"""The reduced state, and the velocity of points that it stands for (X-cross-4).
+"""The reduced state, and the velocity of points that follows from it (X-cross-4).
 
-vhat is fitted with dg/dxhat at the latent coordinates before they move. Which dg/dxhat turns it
-back into velocities is a choice:
+In LDM, rates vhat are fitted with dg/dxhat at the latent coordinates before they move. Which
+dg/dxhat turns them back into velocities is a choice; NSF keeps no rates:
 
-* "previous": dg/dxhat at the coordinates it was fitted with. The velocity that the grid gave is
-  what the next step starts from, projected, no more.
-* "latest": at the coordinates reached, as LDM-alg3 and LDM-alg4 are printed. Over a step it adds
-  dt g''(vhat, vhat) to the velocity, an acceleration that no force causes and that does not vanish
-  with dt.
+* "previous": dg/dxhat at the coordinates that the rates were fitted at. The velocity that the grid
+  gave is what the next step starts from, projected, no more.
+* "latest": dg/dxhat at the coordinates reached, as LDM-alg3 and LDM-alg4 are printed. Over a step
+  it adds dt g''(vhat, vhat) to the velocity, an acceleration that no force causes and that does not
+  vanish with dt.
 * "difference": (x_n - x_{n-1}) / dt, as NSF has it. After a linear projection it adds half of what
   "latest" adds; after a nonlinear one, nothing along the manifold.
 * "transported": the velocity of "previous", projected on dg/dxhat at the coordinates reached.
@@ -18,7 +18,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .kinematics import placed
 from .projection import project_position, project_velocity
 
 VELOCITIES = ("previous", "latest", "difference", "transported")
@@ -27,72 +26,66 @@ VELOCITIES = ("previous", "latest", "difference", "transported")
 class Latent(NamedTuple):
     """Reduced state between two steps."""
 
-    xhat: np.ndarray        # (r,) latent coordinates
-    vhat: np.ndarray        # (r,) their rates [1/s]
-    before: np.ndarray      # (r,) coordinates that vhat was fitted at; at the start, xhat
+    xhat: np.ndarray                    # (r,) latent coordinates
+    vhat: np.ndarray | None = None      # (r,) their rates [1/s]; None in a model without rates
+    before: np.ndarray | None = None    # (r,) coordinates a step ago, which vhat was fitted at;
+                                        # None at the start
+
+    @property
+    def fitted_at(self):
+        """Latent coordinates (r,) that the rates were fitted at: at the start, the present ones."""
+        return self.xhat if self.before is None else self.before
+
+    def advance(self, xhat, vhat=None):
+        """Return the `Latent` after a step that reached xhat, with rates fitted before it."""
+        return Latent(xhat, vhat, self.xhat)
 
 
-class Points(NamedTuple):
-    """Kinematics of points, from latent coordinates alone (LDM-eq14 to LDM-eq16)."""
-
-    X: np.ndarray           # (n, d)    at rest [m]
-    x: np.ndarray           # (n, d)    position [m]
-    F: np.ndarray           # (n, d, d) deformation gradient
-    v: np.ndarray           # (n, d)    velocity [m/s]
-
-
-def at_start(xhat, vhat=None):
-    """`Latent` of a body that starts from latent coordinates, at rest where no rates are given."""
+def start_state(xhat, vhat=None):
+    """Return the `Latent` of a body that starts from latent coordinates, at rest without rates."""
     xhat = np.array(xhat, dtype=float)
-    return Latent(xhat, np.zeros_like(xhat) if vhat is None else np.array(vhat, float), xhat.copy())
+    return Latent(xhat, np.zeros_like(xhat) if vhat is None else np.array(vhat, dtype=float))
 
 
-def initial(map, X, x=None, v=None, xhat=None):
-    """`Latent` that fits positions x and velocities v (n, d) of points X at the start (LDM-eq17 to
-    LDM-eq19),
-    searched from xhat; without them, the body at rest.
+def nearest(field, points, x, xhat):
+    """Return the latent coordinates whose positions of points are nearest to x (n, d) [m], searched
+    from xhat.
     """
-    from_here = np.zeros(map.r) if xhat is None else xhat
-    fit = project_position(map, X, X if x is None else x, from_here).y
+    return project_position(field, points, x, xhat).y
+
+
+def initial(g, X, x=None, v=None, xhat=None):
+    """Return the `Latent` that fits positions x and velocities v (n, d) of points X at the start
+    (LDM-eq17 to LDM-eq19), searched from xhat; without them, the body at rest.
+    """
+    fit = nearest(g, X, X if x is None else x, np.zeros(g.r) if xhat is None else xhat)
     if v is None:
-        return at_start(fit)
-    return at_start(fit, project_velocity(map.derivatives(X, fit)[2], v).y)
+        return start_state(fit)
+    return start_state(fit, project_velocity(g.derivatives(X, fit)[2], v).y)
 
 
-def moved(latent, xhat, vhat):
-    """`Latent` after a step that reached xhat with rates fitted at the coordinates before."""
-    return Latent(xhat, vhat, latent.xhat)
+def velocities(field, latent, dt, samples, v0=None):
+    """Return {name: function of `Kinematics` -> v (n, d) [m/s]} of VELOCITIES, in a step of length
+    dt [s] with these points as samples. v0: velocities (n, d) [m/s] of numbered points at the
+    start, which "difference" takes there; without them, those of the rates.
+    """
+    def latest(state):
+        return state.G @ latent.vhat
 
+    def previous(state):
+        return field.velocity(state.points, latent.fitted_at, latent.vhat)
 
-def points(map, latent, X, velocity):
-    """`Points` of material points X, by a function of `velocities`."""
-    return moving(placed(map, X, latent.xhat), velocity)
-
-
-def moving(at, velocity):
-    """`Points` of `Placed` ones, by a function of `velocities`."""
-    return Points(at.X, at.x, at.F, velocity(at.X, at.x, at.G))
-
-
-def velocities(map, latent, dt, X_samples):
-    """{name: function (X, x, G) -> v} of VELOCITIES, in a step of length dt [s]."""
-    def latest(X, x, G):
-        return G @ latent.vhat
-
-    def previous(X, x, G):
-        return map.velocity(X, latent.before, latent.vhat)
-
-    def difference(X, x, G):
-        if np.array_equal(latent.before, latent.xhat):
-            return previous(X, x, G)
-        return (x - map.place(X, latent.before)) / dt
+    def difference(state):
+        if latent.before is None:
+            return previous(state) if v0 is None else v0[state.points]
+        return (state.x - field.place(state.points, latent.before)) / dt
 
     @cache
     def rates():
-        _, _, G_samples = map.derivatives(X_samples, latent.xhat)
-        return project_velocity(G_samples, previous(X_samples, None, None)).y
+        _, _, G = field.derivatives(samples, latent.xhat)
+        return project_velocity(G, field.velocity(samples, latent.fitted_at, latent.vhat)).y
 
-    def transported(X, x, G):
-        return G @ rates()
+    def transported(state):
+        return state.G @ rates()
 
     return dict(zip(VELOCITIES, (previous, latest, difference, transported), strict=True))

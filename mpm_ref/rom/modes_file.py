@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..archive import about_of, format_of, stated, write
-from ..sealed import opened
+from ..store.weights_file import about_of, format_of, opened, stated, write
 from .fields.pod import Modes
 from .fields.polynomial_manifold import Curved
 from .weights import Model

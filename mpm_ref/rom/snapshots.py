@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..mapped import empty
+from ..store.memmap import empty
 from .fields.network import FieldUnits, Units
 
 STILL = 1e-12       # standard deviation of a component that does not vary, over its size

@@ -6,7 +6,7 @@ Names of arrays are those of the records, with a dot between: "tau.modes", "tau.
 
 import numpy as np
 
-from .. import archive
+from ..store import weights_file
 from .fields.pod_fields import Cells, Part, Spanned
 from .fields.radial_basis import Radial
 from .weights import Model
@@ -34,12 +34,13 @@ def save(path, model):
     """Write a `Model` of fields, whole or not at all. Raises ValueError for arrays that do not fit
     and an `about` with more than JSON knows, OSError where the system refuses.
     """
-    archive.write(path, archive.stated(path, FORMAT, model.about) | arrays_of(model), fault_of)
+    stated = weights_file.stated(path, FORMAT, model.about)
+    weights_file.write(path, stated | arrays_of(model), fault_of)
 
 
 def load(path):
     """Read what `save` wrote. Raises ValueError saying what is wrong with the file."""
-    arrays, about = archive.read(path, FORMAT, fault_of, KIND)
+    arrays, about = weights_file.read(path, FORMAT, fault_of, KIND)
     tau, C, bend = (function(arrays, name) for name in FUNCTIONS.values())
     fields = Spanned(arrays["X"], arrays["U"], bend, Part(arrays["tau.modes"], tau),
                      C and Part(arrays["C.modes"], C), arrays["mu"], record(Cells, arrays, "cells"))

@@ -1,8 +1,19 @@
-"""One step of a reduced model: kinematics at a few points, the grid, projection (LDM-alg2).
+"""One step of a reduced model: kinematics at a few points, the grid, projection.
 
-    samples -> quadrature points -> p2g -> grid update -> boundaries -> g2p -> projection
+    quadrature points -> p2g -> grid update -> boundaries -> g2p at samples -> projection
 
-The middle is a step of the full model (`explicit`), on fewer points.
+The middle is a step of the full model (`explicit`), on fewer points. What is before and after it
+are options, of which the two methods are choices:
+
+               LDM (LDM-alg2)                       NSF (NSF-sec5.2)
+    field      a map, stress from its F             position, stress and affine field
+    quadrature Lagrangian or Eulerian               points that share a node with a sample
+    transfer   PIC                                  APIC
+    velocity   dg/dxhat vhat (see `latent`)         difference of positions over the step
+    projection of velocities, then positions        of positions (NSF-eq10)
+
+`ldm_stepper` and `nsf_stepper` make them. In NSF there is no deformation gradient, no return map
+and no singular value decomposition: the material's memory is in the fields.
 """
 
 from dataclasses import dataclass
@@ -12,100 +23,159 @@ import numpy as np
 
 from ..body import Body, particles_at
 from ..core.grid import OutOfRange, Storage, update
-from ..explicit import Scheme, gather, initial_stress, scatter
+from ..explicit import Scheme, gather, scatter
 from ..materials import NoFlow
-from .kinematics import NoBody, placed
-from .latent import VELOCITIES, moved, moving, velocities
-from .projection import project_position, project_velocity
+from .fields import ReducedField
+from .fields.elastic import ElasticMap
+from .kinematics import NoBody
+from .latent import VELOCITIES, velocities
+from .projection import PositionInversion, RateProjection
+from .quadrature import Quadrature
+from .quadrature.lagrangian import NumberedPoints
 
-PROJECTIONS = ("linear", "nonlinear")
 BREAKDOWNS = (NoBody, OutOfRange, np.linalg.LinAlgError)    # with which a run may end midway
 
 
+class MaterialPoints(NamedTuple):
+    """All material points P of a reduced run, of one body or several."""
+
+    m: np.ndarray       # (n,) mass [kg]
+    V0: np.ndarray      # (n,) volume at rest [m^d]
+    v: np.ndarray       # (n, d) velocity at the start [m/s]
+
+
 class Report(NamedTuple):
-    """What a reduced step did."""
+    """Counts and residual of a reduced step."""
 
     samples: int
     points: int             # quadrature points that carried mass
     rank: int               # of dg/dxhat at the samples
-    residual: float         # rms distance of the trial velocities from the manifold [m/s]
-    iterations: int         # of the nonlinear projection
-    converged: bool         # ... whether they ended before they ran out
-    quadrature: dict        # what the quadrature says of itself
+    residual: float         # rms distance of the samples' trial states from the manifold: of their
+                            # velocities [m/s] where rates are fitted, else of their positions [m]
+    iterations: int         # of Gauss-Newton; 0 of a linear projection of rates
+    converged: bool         # whether they ended before they ran out
+    quadrature: dict        # counts of the quadrature
 
 
 @dataclass
-class Reduced:
+class ReducedStepper:
     """Advances latent coordinates by steps; `step` keeps no state but the grid's storage.
 
-    The spacing of the grid and the degree of its splines are the quadrature's, the transfer is
-    PIC. projection is "linear" (LDM-alg7) or "nonlinear" (LDM-alg6); velocity one of `latent`.
-    Raises ValueError for a name that does not exist and a gravity of another dimension.
+    The spacing of the grid and the degree of its splines are the quadrature's. velocity is one of
+    `latent.VELOCITIES`; v0 the velocities that "difference" takes at the start. dt may differ from
+    that of the data (NSF-sec5.1). Raises ValueError for a velocity that does not exist and a
+    gravity of another dimension.
     """
 
-    map: object
-    quadrature: object
-    law: tuple                  # the elastic law's parameters (see materials)
+    field: ReducedField
+    quadrature: Quadrature
+    projection: object          # `projection.RateProjection` or `PositionInversion`
     gravity: np.ndarray         # (d,) [m/s^2]
     conditions: object = None   # with apply(grid, t, dt); see core.boundary
-    projection: str = "linear"
+    transfer: str = "pic"       # or "apic", with the field's affine velocity field
     velocity: str = "previous"
+    v0: np.ndarray | None = None
 
     def __post_init__(self):
+        d = self.field.dim
         self.gravity = np.asarray(self.gravity, dtype=float)
-        if self.gravity.shape != (self.map.dim,) or not np.isfinite(self.gravity).all():
-            raise ValueError(f"gravity = {self.gravity}: expected {self.map.dim} finite numbers, "
-                             "in m/s^2")
-        for name, known in (("projection", PROJECTIONS), ("velocity", VELOCITIES)):
-            if getattr(self, name) not in known:
-                raise ValueError(f"{name} = {getattr(self, name)!r}: expected one of "
-                                 + ", ".join(known))
-        self.scheme = Scheme(self.quadrature.degree, "pic")
-        self.storage = Storage(self.quadrature.dx, self.scheme.stencil, self.map.dim)
+        if self.gravity.shape != (d,) or not np.isfinite(self.gravity).all():
+            raise ValueError(f"gravity = {self.gravity}: expected {d} finite numbers, in m/s^2")
+        if self.velocity not in VELOCITIES:
+            raise ValueError(f"velocity = {self.velocity!r}: expected one of "
+                             + ", ".join(VELOCITIES))
+        self.scheme = Scheme(self.quadrature.degree, self.transfer)
+        self.storage = Storage(self.quadrature.dx, self.scheme.stencil, d)
 
-    def step(self, latent, samples, t, dt):
-        """`Latent` and `Report` after a step from time t [s] by dt [s], with the samples of these
-        indices. Raises one of BREAKDOWNS where the coordinates give no body.
+    def step(self, latent, samples, t, dt, weights=None):
+        """Return the `Latent` and `Report` after a step from time t [s] by dt [s].
+
+        samples (m,) are numbers of material points, sorted; weights (m,) of them are for
+        `PositionInversion` alone. Raises one of BREAKDOWNS where the coordinates give no body.
         """
         if not np.isfinite(latent.xhat).all():
             raise NoBody(f"t = {t:.6g} s: latent coordinates {latent.xhat} are not finite")
-        X = self.quadrature.X[samples]
-        speed = velocities(self.map, latent, dt, X)[self.velocity]
-        at_q, m, V0, said, at = self.quadrature.cloud(self.map, latent, samples)
-        if not len(m):
-            raise NoBody(f"t = {t:.6g} s: no quadrature point near the {len(X)} samples lies "
-                         f"within the body ({said}); have the latent coordinates left the range "
-                         "that the map was trained with?")
-        at = placed(self.map, X, latent.xhat) if at is None else at
-        cloud = self.body(moving(at_q, speed), m, V0)
-        mass = np.full(len(X), self.quadrature.feather * m.mean())
-        trial = self.body(moving(at, speed), mass, np.zeros(len(X)))
-        self.on_grid(cloud, trial, t, dt)
-        after, fit, place = self.project(latent, at, trial.particles, dt)
-        return after, Report(len(X), said["points"], fit.rank, fit.residual, place.iterations,
-                             place.converged, said)
+        cloud = self.cloud(latent, samples)
+        if not len(cloud.m):
+            raise NoBody(f"t = {t:.6g} s: no quadrature point near the {len(samples)} samples lies "
+                         f"within the body ({cloud.report}); have the latent coordinates left the "
+                         "range that the map was trained with?")
+        body, carriers = self.bodies(cloud, latent, dt)
+        trial = self.on_grid(body, carriers, t, dt)
+        lost = samples[~np.isfinite(trial.x).all(axis=1)]
+        if len(lost):
+            raise NoBody(f"t = {t:.6g} s: {len(lost)} of {len(samples)} samples have no finite "
+                         f"place after the step, the first is point {lost[0]}; are the fields "
+                         "damaged?")
+        xhat, vhat, fit = self.project(latent, cloud.samples, trial, dt, weights)
+        report = Report(len(samples), cloud.report["points"], fit.rank, fit.residual,
+                        fit.iterations, fit.converged, cloud.report)
+        return latent.advance(xhat, vhat), report
 
-    def body(self, at, m, V0):
-        """A `Body` of `Points`, with the stress of their F."""
-        particles = particles_at(at.x, at.v, m, V0, transfer="pic")._replace(F=at.F)
-        body = Body("reduced", particles, self.law, NoFlow(), np.arange(len(m)))
-        initial_stress(body)
-        return body
+    def cloud(self, latent, samples):
+        """Return the `quadrature.Cloud` of a state with these samples."""
+        return self.quadrature.cloud(self.field, latent.xhat, samples)
 
-    def on_grid(self, cloud, trial, t, dt):
-        """Move the samples by the grid's velocities: their trial state (LDM-alg5). Conditions are
-        met on the grid alone (LDM-sec3.1-bc).
+    def bodies(self, cloud, latent, dt):
+        """Return the `Body` of the quadrature points of a `Cloud`, and that of the samples: these
+        carry mass where they are no quadrature points.
         """
-        grid = scatter((cloud, trial), self.storage, self.scheme, dt)
+        velocity = velocities(self.field, latent, dt, cloud.samples.points, self.v0)[self.velocity]
+        count, feather = len(cloud.samples.x), self.quadrature.feather
+        if not feather:
+            nothing = np.zeros(count)
+            x = cloud.samples.x
+            samples = particles_at(x, np.zeros_like(x), nothing, nothing, transfer="pic")
+            return (self.body(cloud.points, latent, velocity, (cloud.m, cloud.V0)),
+                    Body("samples", samples, None, NoFlow(), np.arange(count)))
+        mass = np.full(count, feather * cloud.m.mean())
+        return (self.body(cloud.points, latent, velocity, (cloud.m, cloud.V0)),
+                self.body(cloud.samples, latent, velocity, (mass, np.zeros(count))))
+
+    def body(self, state, latent, velocity, sizes):
+        """Return a `Body` of points with these masses and volumes, with the velocity, stress and
+        affine field that a step starts from (NSF-sec5.1).
+        """
+        particles = particles_at(state.x, velocity(state), *sizes, transfer=self.transfer)
+        particles.tau[:] = self.field.stress(state.points, latent.xhat, state.F)
+        if self.transfer == "apic":
+            particles.C[:] = self.field.affine(state.points, latent.xhat)
+        return Body("reduced", particles, None, NoFlow(), np.arange(len(state.x)))
+
+    def on_grid(self, body, samples, t, dt):
+        """Return the samples' particles after a step on the grid: their trial state (LDM-alg5)."""
+        gather(samples, self.grid(body, samples, t, dt), self.scheme, dt)
+        return samples.particles
+
+    def grid(self, body, samples, t, dt):
+        """Return the `Grid` of these bodies after a step on it. Conditions are met on the grid
+        alone (LDM-sec3.1-bc).
+        """
+        bodies = (body, samples) if self.quadrature.feather else (body,)
+        grid = scatter(bodies, self.storage, self.scheme, dt)
         update(grid, self.gravity, dt)
         if self.conditions is not None:
             self.conditions.apply(grid, t + dt, dt)
-        gather(trial, grid, self.scheme, dt)
+        return grid
 
-    def project(self, latent, at, trial, dt):
-        """`Latent` and the `Fit`s of velocity and position, from trial states of samples `at`."""
-        fit = project_velocity(at.G, trial.v)
-        if self.projection == "linear":
-            return moved(latent, latent.xhat + dt * fit.y, fit.y), fit, fit._replace(iterations=0)
-        place = project_position(self.map, at.X, trial.x, 2.0 * latent.xhat - latent.before)
-        return moved(latent, place.y, fit.y), fit, place
+    def project(self, latent, samples, trial, dt, weights=None):
+        """Return `projection.Projected` from the samples' `Kinematics` and trial particles."""
+        return self.projection(self.field, latent, samples, trial, dt, weights)
+
+
+def ldm_stepper(g, quadrature, law, gravity, projection="linear", **options):
+    """Return the `ReducedStepper` of LDM (LDM-alg2) on a deformation map g of a body of an elastic
+    law; projection: see `projection.RateProjection`; options: conditions and velocity.
+    """
+    return ReducedStepper(ElasticMap(g, law), quadrature, RateProjection(projection), gravity,
+                          transfer="pic", **options)
+
+
+def nsf_stepper(fields, material, dx, degree, gravity, inversion="nonlinear", **options):
+    """Return the `ReducedStepper` of NSF (NSF-sec5.2) on fields of `MaterialPoints`, on a grid of
+    spacing dx [m] with splines of a degree; inversion: see `projection.PositionInversion`; options:
+    conditions.
+    """
+    quadrature = NumberedPoints(material.m, material.V0, dx, degree)
+    return ReducedStepper(fields, quadrature, PositionInversion(inversion), gravity,
+                          transfer="apic", velocity="difference", v0=material.v, **options)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..archive import read, stated, write
+from ..store.weights_file import read, stated, write
 from .fields.network import Decoder, Units
 from .fields.perceptron import Network, layers_of, network
 

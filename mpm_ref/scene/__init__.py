@@ -24,19 +24,25 @@ from ..shapes import (
     Union,
     Wedge,
 )
-from .bodies import build_body, seen_by
-from .check import checked
-from .error import SceneError, opened_by
-from .material import Flow, Material
-from .parts import build_clock, build_conditions, build_limits, build_solver
+from .builder import (
+    build_body,
+    build_clock,
+    build_conditions,
+    build_limits,
+    build_solver,
+    strain_bounds,
+)
+from .messages import SceneError, opened_by
 from .records import (
     Arrays,
     Body,
     Clip,
     Collider,
     Fixed,
+    Flow,
     Keyframes,
     Limits,
+    Material,
     Motion,
     Oscillation,
     Ramps,
@@ -47,7 +53,8 @@ from .records import (
     Velocity,
     Walls,
 )
-from .text import canonical, digest, dumps, load, loads
+from .toml import canonical, digest, dumps, load, loads
+from .validate import checked
 
 __all__ = [
     "Arrays", "Body", "Box", "Capsule", "Clip", "Collider", "Cylinder", "Difference", "Fixed",
@@ -85,6 +92,6 @@ def _built(scene):
         source=canonical(scene),
         integrator="explicit" if solver is None else "implicit",
         solver=solver,
-        seen={body.name: seen for k, body in enumerate(scene.body)
-              if (seen := seen_by(body, scene.dim, k)) is not None},
+        strain_bounds={body.name: bounds for k, body in enumerate(scene.body)
+                       if (bounds := strain_bounds(body, scene.dim, k)) is not None},
     )

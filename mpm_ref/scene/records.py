@@ -1,8 +1,8 @@
 """The tables of a scene file: one record each, with the names, units and bounds of their keys.
 
-Each key is explained in docs/reference/scenes.md. A record knows what one table can get wrong by
-itself; what belongs together across tables is checked in `check`, and what a record makes is in
-`parts`. Materials stand in `material`.
+Each key is explained in docs/reference/scenes.md. A record checks what one table can get wrong by
+itself; `validate` checks what belongs together across tables, and `builder` makes objects of
+records.
 """
 
 from typing import Annotated, Literal
@@ -10,6 +10,11 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from ..explicit import Scheme as ExplicitScheme
+from ..materials import LAWS, make_flow, make_law
+from ..materials.learned import learned_flow, learned_law, weights
+from ..materials.learned.strain_range import stored_bounds
+from ..materials.learned.table import TABLES
+from ..materials.learned.weights import dim_of
 from ..sampling import Regular, Samplings
 from ..shapes import Analytic, Shape
 from ..shapes.quantities import (
@@ -27,13 +32,108 @@ from ..shapes.quantities import (
     Share,
     Vector,
 )
-from .material import Material
 
 Name = Annotated[str, Meta(min_length=1, max_length=100, pattern=r"^[A-Za-z0-9_. -]+\Z")]
 Time = Annotated[float, Meta(ge=-1e12, le=1e12)]                        # [s]
 Node = Annotated[int, Meta(ge=-1_000_000_000, le=1_000_000_000)]
 WallNodes = Annotated[tuple[Node | Literal["open"], ...], Meta(min_length=2, max_length=3)]
 Table = Annotated[tuple[Coordinate | Vector, ...], Meta(min_length=2)]
+Number = Annotated[float, Meta(ge=-1e30, le=1e30)]
+NEURAL = "neural"       # the law whose parameters are a file
+
+
+class Flow(Record):
+    """A return map by its name in `materials.FLOWS`, and those parameters that it takes."""
+
+    type: str
+    friction_angle: Number | None = None        # [degrees]
+    s_min: Number | None = None
+    s_max: Number | None = None
+    sigma_y: Number | None = None               # [Pa] in uniaxial tension, or
+    tau_y: Number | None = None                 # [Pa] as Frobenius norm of the deviator
+    xi: Number | None = None
+    theta: Number | None = None                 # [Pa]
+    eta: Number | None = None                   # [Pa s]
+
+
+class Material(Record):
+    """An elastic law by its name in `materials.LAWS`, those parameters it takes, a return map; or
+    "neural", and the file that holds both.
+    """
+
+    law: str
+    E: Number | None = None                     # [Pa]
+    nu: Number | None = None
+    lam: Number | None = None                   # [Pa]
+    weights: str | None = None                  # file of trained laws (see learned.weights)
+    sha256: Sha256 | None = None                # of what that file must hold
+    flow: Flow = Flow(type="none")
+
+    def __post_init__(self):
+        if self.law == NEURAL:
+            self.trained()
+        elif self.law in LAWS:
+            self.elastic()
+        else:
+            raise ValueError(f"law {self.law!r}: expected one of {', '.join((*LAWS, NEURAL))}")
+
+    @property
+    def is_neural(self):
+        """Whether its laws are learned."""
+        return self.law == NEURAL
+
+    def elastic(self):
+        """The elastic law. Raises ValueError for a name or parameter that does not fit."""
+        if self.is_neural:
+            return learned_law(self.trained().elastic)
+        return make_law(self.law, **_given(self, "law", "flow"))
+
+    def flowing(self, dim):
+        """The return map in `dim` dimensions; errors as `elastic`."""
+        if self.is_neural:
+            return learned_flow(self.trained(dim).plastic)
+        parameters = _given(self.flow, "type")
+        return make_flow(self.flow.type, self.elastic(), dim, **parameters)
+
+    def strain_bounds(self, dim):
+        """Return the strains that its laws met in training, as `stored_bounds` does, or None.
+
+        Raises ValueError for weights that say something else.
+        """
+        return stored_bounds(self.trained().about, dim) if self.is_neural else None
+
+    def trained(self, dim=None):
+        """`LearnedLaws` of its file. Raises ValueError for a file that holds none, or for
+        other dimensions, and for keys beside it.
+        """
+        beside = [*_given(self, "law", "weights", "sha256", "flow")]
+        beside += ["flow"] if self.flow != Flow(type="none") else []
+        if beside:
+            raise ValueError(f"law {NEURAL!r}: unknown parameter {', '.join(beside)}; all that it "
+                             "takes is `weights`, which hold the return map too")
+        if self.weights is None:
+            raise ValueError(f"law {NEURAL!r}: missing parameter weights, a file of trained laws")
+        laws = weights.load(self.weights)
+        self._require_kinds(laws)
+        if dim not in (None, dim_of(laws)):
+            raise ValueError(f"weights = {self.weights!r}: its laws are for dim = {dim_of(laws)}, "
+                             f"expected dim = {dim}")
+        return laws
+
+    def _require_kinds(self, laws):
+        for part in weights.PARTS:
+            kind = type(getattr(laws, part).kind)
+            if not TABLES[part][kind].in_scenes:
+                raise ValueError(
+                    f"weights = {self.weights!r}: its {part} law is of kind {kind.__name__}; "
+                    'expected networks as of the methods "ours" or "admissible"; `mpm-ref law '
+                    "evaluate` runs any, and identified constants can be written here")
+
+
+def _given(record, *but):
+    """The keys of a record that have a value, except some."""
+    values = {name: getattr(record, name) for name in record.__struct_fields__ if name not in but}
+    return {name: value for name, value in values.items() if value is not None}
 
 
 class Velocity(Record):

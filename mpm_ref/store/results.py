@@ -1,4 +1,8 @@
-"""Reads a results file, finished or not: frames, energies, and what follows from the fields."""
+"""Read a results file, finished or not: frames, energies, and quantities that follow from fields.
+
+docs/reference/files.md has the schema. Particles are stored in the order in which their body was
+sampled, so that row p is the same particle in every frame. `writer` writes such files.
+"""
 
 import json
 from pathlib import Path
@@ -6,9 +10,15 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from . import ENERGIES, FORMAT, UNITS, BadResults
 from .journal import recover
 
+FORMAT = "mpm_ref results 1"
+UNITS = {                         # of what may be stored of particles in every frame
+    "x": "m", "v": "m/s", "C": "1/s", "L": "1/s", "F": "1", "J": "1", "tau": "Pa", "y": "Pa",
+}
+USUAL = ("x", "v", "F", "tau")
+CLOCK = {"time": ("f8", "s"), "dt": ("f8", "s"), "step": ("i8", "1")}
+ENERGIES = ("kinetic", "elastic", "gravity")
 SCALARS = {                       # name -> unit, what it is, and the fields it follows from
     "speed": ("m/s", "magnitude of the velocity", ("v",)),
     "J": ("1", "volume ratio det F", ("F",)),
@@ -22,7 +32,8 @@ OTHERS = {                        # formats of files of ours -> what they are
     "mpm_ref golden 1": "a golden file, for `mpm-ref oracle check`",
 }
 
-__all__ = ["ENERGIES", "SCALARS", "BadResults", "Results"]
+class BadResults(ValueError):
+    """A file is not a results file that can be read, or continued."""
 
 
 class Results:

@@ -8,8 +8,7 @@ from grids import DX, floor, grid_of, random_grid
 
 from mpm_ref.core.adjoint.boundary import solve_adjoint
 from mpm_ref.core.adjoint.grid import Update, update_adjoint
-from mpm_ref.core.boundary import BoxWalls, Collider, Conditions, Prescribed
-from mpm_ref.core.collide import solve
+from mpm_ref.core.boundary import BoxWalls, Collider, Conditions, Prescribed, solve
 from mpm_ref.core.grid import Storage, update
 from mpm_ref.core.jit import set_threads
 from mpm_ref.core.motion import Motion, Steady

@@ -22,7 +22,7 @@ from adjoints import (
 from clouds import Case, cloud, scattered
 from problems import elsewhere
 
-from mpm_ref.core.adjoint.curvature import curvatures
+from mpm_ref.core.adjoint.shape_gradient import curvatures
 from mpm_ref.core.jit import set_threads
 from mpm_ref.core.spline import STENCILS, slopes
 from mpm_ref.core.transfer import rpic

@@ -15,12 +15,12 @@ from command_line import SCENE, assert_told, mpm_ref
 from small_runs import colliding
 
 from mpm_ref import __version__
-from mpm_ref.cli.execute import Bar, Request
+from mpm_ref.cli.run import Bar, Request
 from mpm_ref.simulate import State
 from mpm_ref.store import atomic
 from mpm_ref.store.checkpoint import BadCheckpoint, summary
 from mpm_ref.store.results import Results
-from mpm_ref.store.session import checkpoint_of
+from mpm_ref.store.running import checkpoint_of
 
 ROOT = Path(__file__).resolve().parents[2]
 MAIN = "from mpm_ref.cli import main; main()"

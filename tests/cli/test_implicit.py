@@ -5,8 +5,8 @@ import json
 import pytest
 from command_line import SCENE, mpm_ref
 
+from mpm_ref.cli.catalogue import shipped_scenes
 from mpm_ref.cli.info import of_problem, problem_lines
-from mpm_ref.cli.shipped import shipped_scenes
 from mpm_ref.scene import build, load
 from mpm_ref.simulate import simulate
 

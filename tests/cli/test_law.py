@@ -8,10 +8,9 @@ from small_laws import FLOWING, STEPS, E, write_study
 
 torch = pytest.importorskip("torch")
 
-from mpm_ref.cases import observed  # noqa: E402
 from mpm_ref.cli import law_train  # noqa: E402
 from mpm_ref.materials.learned import weights  # noqa: E402
-from mpm_ref.materials.learned.strain_range import seen  # noqa: E402
+from mpm_ref.materials.learned.strain_range import strain_bounds  # noqa: E402
 from mpm_ref.nclaw.batched_step import world  # noqa: E402
 from mpm_ref.nclaw.study import tables  # noqa: E402
 from mpm_ref.nclaw.study.study import load  # noqa: E402
@@ -19,9 +18,9 @@ from mpm_ref.nclaw.train import fit, methods  # noqa: E402
 from mpm_ref.nclaw.train.labeled import labels_of, train_labeled  # noqa: E402
 from mpm_ref.nclaw.train.rollout import trajectory_of  # noqa: E402
 from mpm_ref.scene import digest  # noqa: E402
-from mpm_ref.store import Fields  # noqa: E402
-from mpm_ref.store.running import Options, run  # noqa: E402
-from mpm_ref.store.session import checkpoint_of  # noqa: E402
+from mpm_ref.store.running import Options, checkpoint_of, run  # noqa: E402
+from mpm_ref.store.writer import Fields  # noqa: E402
+from mpm_ref.trajectories import observed  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
@@ -74,7 +73,7 @@ def test_weights_say_how_they_were_made(made):
     assert (about["method"], about["dt"], about["threads"]) == ("ours", 5e-4, 1)
     assert about["recipe"]["epochs"] == len(about["errors"]) == 4
     assert about["torch"] == torch.__version__
-    assert about["seen"] == seen(observed(study.problem()).F)
+    assert about["seen"] == strain_bounds(observed(study.problem()).F)
     assert about["command"] == (f"mpm-ref law train {made / 'cubes.toml'} --out "
                                 f"{made / 'whole.npz'} --threads 1")
 

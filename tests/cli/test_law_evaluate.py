@@ -9,10 +9,10 @@ import pytest
 from command_line import assert_told, mpm_ref
 from small_laws import DT, DX, EVERY, FLOWING, STEPS, E, identified, saved, write_scene
 
-from mpm_ref.cases import in_order
 from mpm_ref.cli import law
 from mpm_ref.scene import build, load
 from mpm_ref.simulate import simulate
+from mpm_ref.trajectories import in_order
 
 FRAMES = 1 + STEPS // EVERY
 SCENES = Path(__file__).parents[2] / "scenes"

@@ -10,12 +10,11 @@ import rom_toys
 from command_line import assert_told, mpm_ref
 from small_laws import identified, saved
 
-from mpm_ref.cli import law_show
 from mpm_ref.materials import NoFlow
-from mpm_ref.materials.learned import principal, response, spline, weights
+from mpm_ref.materials.learned import response, spline, stretch_network, weights
 from mpm_ref.materials.learned.contraction import Contraction
 from mpm_ref.materials.learned.energetic import Energetic
-from mpm_ref.materials.learned.weights import Laws, Trained
+from mpm_ref.materials.learned.weights import LawWeights, LearnedLaws
 from mpm_ref.nclaw import export
 
 gelu = np.vectorize(lambda z: 0.5 * z * (1.0 + erf(z / sqrt(2.0))))
@@ -27,7 +26,8 @@ PAIRS = [       # of kinds that are trained together
     (response.Stress(2e4), response.Correction(0.1)),
     (response.SymmetricStress(2e4), response.Correction(0.1)),
     (response.PlainStress(2e4), response.PlainCorrection(0.1)),
-    (principal.StretchStress(2e4), NoFlow()), (principal.ReleasedStretchStress(2e4), NoFlow()),
+    (stretch_network.StretchStress(2e4), NoFlow()),
+    (stretch_network.ReleasedStretchStress(2e4), NoFlow()),
     (spline.SplineStress(), NoFlow()), (spline.ReleasedSplineStress(1e3), NoFlow()),
     (Energetic(), Contraction(2e-3))]
 
@@ -43,18 +43,18 @@ def elu(z):
 def trained(kind, seed):
     """A law with random layers."""
     if isinstance(kind, NoFlow):
-        return Trained((), kind)
+        return LawWeights((), kind)
     if type(kind) in spline.READINGS:
         values = np.random.default_rng(seed).normal(size=(len(KNOTS), 3))
-        return Trained(((values, np.zeros(3)),), kind)
+        return LawWeights(((values, np.zeros(3)),), kind)
     layers = rom_toys.layers(SIZES.get(type(kind).__name__, (13, 8, 6, 9)), seed)
     if isinstance(kind, Energetic):
         layers = [(abs(W), b) for W, b in layers]
-    return Trained(tuple(layers), kind)
+    return LawWeights(tuple(layers), kind)
 
 
 def laws_of(elastic, plastic):
-    return Laws(trained(elastic, 1), trained(plastic, 2), {"seed": 1})
+    return LearnedLaws(trained(elastic, 1), trained(plastic, 2), {"seed": 1})
 
 
 # An implementation that knows the file alone.
@@ -209,7 +209,7 @@ def test_questions_are_about_more_than_rest():
 
 
 def test_every_kind_is_put_into_words():
-    assert set(export.ANSWERS) == set(weights.RECORDS.values())
+    assert set(export.ANSWERS) == set(weights.RESPONSES.values())
 
 
 def test_words_name_each_number_in_its_order(tmp_path):
@@ -255,7 +255,7 @@ def test_files_that_stand_are_kept(tmp_path):
 ])
 def test_what_an_export_needs_is_said_first(tmp_path, monkeypatch, options, status, words):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(law_show, "exported", None)
+    monkeypatch.setattr("mpm_ref.cli.law.exported", None)
     assert_told(mpm_ref("law", "export", saved(tmp_path, identified()), *options), status, words)
 
 

@@ -12,11 +12,11 @@ from small_laws import DT, DX, FLOWING, STEPS, E, identified, saved, write_study
 
 from mpm_ref.materials import NoFlow, VonMises
 from mpm_ref.materials.learned import spline, weights
-from mpm_ref.materials.learned.weights import Laws, Trained
+from mpm_ref.materials.learned.weights import LawWeights, LearnedLaws
 from mpm_ref.nclaw.gnn import weights as of_graphs
-from mpm_ref.sealed import sealed
+from mpm_ref.store.weights_file import sealed
 from validation.nclaw.dough import doughs
-from validation.nclaw.nets import nets
+from validation.nclaw.trained_laws import nets
 
 NCLAW = Path(__file__).parents[2] / "validation" / "nclaw" / "weights"
 COMMITTED = sorted(path for path in NCLAW.glob("*.npz")
@@ -148,8 +148,8 @@ def test_layers_say_what_the_weights_say(tmp_path, name, weights):
 
 
 def test_splines_say_how_many_numbers_they_have(tmp_path):
-    values = Trained(((np.ones((KNOTS, 3)), np.zeros(3)),), spline.SplineStress())
-    path = saved(tmp_path, Laws(values, Trained((), NoFlow()), {}))
+    values = LawWeights(((np.ones((KNOTS, 3)), np.zeros(3)),), spline.SplineStress())
+    path = saved(tmp_path, LearnedLaws(values, LawWeights((), NoFlow()), {}))
     assert lines(path)[1] == f"elastic: SplineStress, splines of {3 * KNOTS} numbers, unit = 1000"
     assert mpm_ref("law", "export", path).exit_code == 0
     with np.load(tmp_path / "laws.layers.npz") as file:

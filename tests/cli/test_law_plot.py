@@ -11,12 +11,11 @@ from command_line import assert_told, mpm_ref
 from matplotlib.figure import Figure
 from small_laws import DT, FLOWING, NO_FLOW, NU, E, identified, saved, write_scene
 
-from mpm_ref.cli import law_show
 from mpm_ref.materials import FluidProjection, VonMises, make_law
 from mpm_ref.materials.learned import learned_flow, learned_law
 from mpm_ref.materials.learned.response import Correction
-from mpm_ref.materials.learned.strain_range import seen, within
-from mpm_ref.materials.learned.weights import Trained
+from mpm_ref.materials.learned.strain_range import strain_bounds, within_bounds
+from mpm_ref.materials.learned.weights import LawWeights
 from mpm_ref.nclaw import paths
 from mpm_ref.nclaw.study import pictures
 from mpm_ref.nclaw.study.curves import curves
@@ -98,7 +97,7 @@ def test_a_return_map_acts_once_a_step():
     """A correction that adds ALPHA e1 e1^T to F, step by step, at rest."""
     W, b, alpha = np.zeros((13, 9)), np.zeros(9), 1e-4
     b[0] = 1.0
-    flow = learned_flow(Trained(((W, b),), Correction(alpha)))
+    flow = learned_flow(LawWeights(((W, b),), Correction(alpha)))
     law = learned_law(identified().elastic)
     for steps in (3, 6):
         still = paths.path("still", paths.kinds(3)["shear"], (0.0, 0.0), steps)
@@ -126,7 +125,7 @@ def test_fluids_carry_j_alone():
 def test_a_law_that_breaks_down_is_told_with_the_strain(tmp_path):
     W = np.zeros((13, 9))
     W[12, 0] = 1e3                          # of det F - 1
-    endless = Trained(((W, np.zeros(9)),), Correction(1e308))
+    endless = LawWeights(((W, np.zeros(9)),), Correction(1e308))
     said = plot(tmp_path, identified()._replace(plastic=endless)).stdout.splitlines()
     assert said[0].endswith(f"the learned law breaks down at strain {0.1 / STEPS:.4g}")
     assert (tmp_path / "laws.curves.png").exists()
@@ -136,17 +135,18 @@ def test_a_law_that_breaks_down_is_told_with_the_strain(tmp_path):
 
 def test_bounds_are_those_of_stretches_and_volumes():
     F = np.array([np.diag([1.2, 1.0, 0.9]), np.diag([1.0, 1.1, 1.0])])
-    bounds = seen(F[:, None])
+    bounds = strain_bounds(F[:, None])
     assert bounds["low"] == pytest.approx([1.1, 1.0, 0.9, 1.08])
     assert bounds["high"] == pytest.approx([1.2, 1.0, 1.0, 1.1])
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     asked = np.array([turn @ F[0], np.diag([1.15, 1.0, 0.95]), np.diag([1.3, 1.0, 0.9]),
                       np.diag([1.2, 1.0, 1.0]), np.full((3, 3), np.nan)])
-    assert within(asked, bounds).tolist() == [True, True, False, False, False]
+    assert within_bounds(asked, bounds).tolist() == [True, True, False, False, False]
 
 
 def test_what_training_saw_is_marked(tmp_path):
-    bounds = seen(np.array([np.eye(3), np.diag([1.05, 1.0, 1.0]), np.diag([1.0, 1.0, 0.9])]))
+    F = np.eye(3), np.diag([1.05, 1.0, 1.0]), np.diag([1.0, 1.0, 0.9])
+    bounds = strain_bounds(np.array(F))
     laws = identified()._replace(about={"seen": bounds})
     (up, down, *_), _ = table(tmp_path, laws)
     assert (up["seen"] == (up["strain"] < 0.0501)).all()
@@ -168,7 +168,8 @@ def lines_of(monkeypatch, folder, laws, **how):
 
 
 def test_lines_are_dotted_beyond_what_training_saw(tmp_path, monkeypatch):
-    bounds = seen(np.array([np.eye(3), np.diag([1.05, 1.0, 1.0]), np.diag([1.0, 1.0, 0.9])]))
+    F = np.eye(3), np.diag([1.05, 1.0, 1.0]), np.diag([1.0, 1.0, 0.9])
+    bounds = strain_bounds(np.array(F))
     laws = identified()._replace(about={"seen": bounds})
     drawn, words, _ = lines_of(monkeypatch, tmp_path, laws)
     (solid, inside), (dotted, outside), (_, down), (_, beyond) = drawn["uniaxial"]
@@ -181,7 +182,8 @@ def test_lines_are_dotted_beyond_what_training_saw(tmp_path, monkeypatch):
 
 def test_lines_say_where_strains_of_training_end(tmp_path):
     """Strains are whole steps of 0.1 / STEPS; stretches were seen up to 1.05 and down to 0.9."""
-    bounds = seen(np.array([np.eye(3), np.diag([1.05, 1.0, 1.0]), np.diag([1.0, 1.0, 0.9])]))
+    F = np.eye(3), np.diag([1.05, 1.0, 1.0]), np.diag([1.0, 1.0, 0.9])
+    bounds = strain_bounds(np.array(F))
     stretched, pressed, *_ = plot(tmp_path, identified()._replace(about={"seen": bounds})
                                   ).stdout.splitlines()
     assert stretched.startswith("uniaxial to +0.1")
@@ -220,6 +222,6 @@ def test_pictures_are_what_their_names_say(tmp_path, ending, begins):
 ])
 def test_what_a_picture_needs_is_said_first(tmp_path, monkeypatch, options, status, words):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(law_show, "beside_truth", None)
+    monkeypatch.setattr("mpm_ref.cli.law.beside_truth", None)
     assert_told(plot(tmp_path, identified(), *options), status, words)
     assert sorted(file.name for file in tmp_path.iterdir()) == ["cube.toml", "laws.npz"]

@@ -4,8 +4,8 @@ import pytest
 from command_line import assert_told, mpm_ref
 from small_laws import DT, E, write_study
 
-from mpm_ref.cli.shipped import shipped_scenes, shipped_studies
-from mpm_ref.materials.learned.weights import RECORDS
+from mpm_ref.cli.catalogue import shipped_scenes, shipped_studies
+from mpm_ref.materials.learned.table import KINDS
 from mpm_ref.nclaw.study import tables
 from mpm_ref.nclaw.study.study import load
 from mpm_ref.nclaw.train.recipe import Recipe
@@ -35,7 +35,7 @@ def test_each_method_has_usual_kinds(tmp_path, method):
     kinds = tables.KINDS[method]
     assert [type(record).__name__ for record in study.tables.records] == [
         known[0] for known in kinds]
-    assert {name for known in kinds for name in known} <= set(RECORDS)
+    assert {name for known in kinds for name in known} <= set(KINDS)
 
 
 def test_a_study_says_kinds_constants_and_recipe(tmp_path):

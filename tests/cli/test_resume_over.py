@@ -5,7 +5,7 @@ import shutil
 import pytest
 from command_line import SCENE, assert_told, mpm_ref
 
-from mpm_ref.store.session import checkpoint_of
+from mpm_ref.store.running import checkpoint_of
 
 
 @pytest.fixture

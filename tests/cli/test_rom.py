@@ -7,13 +7,13 @@ import pytest
 from command_line import assert_told, mpm_ref
 from small_studies import CURVED, STEPS, ended, write
 
-from mpm_ref.cli.shipped import shipped_studies
-from mpm_ref.reduced import maps
-from mpm_ref.reduced.generate import FIELDS, FINISHED, Done
-from mpm_ref.reduced.study import load
+from mpm_ref.cli.catalogue import shipped_studies
+from mpm_ref.rom.study import reduce
+from mpm_ref.rom.study.generate import FIELDS, FINISHED, Done
+from mpm_ref.rom.study.study import load
 from mpm_ref.scene import build
-from mpm_ref.store import Fields
 from mpm_ref.store.running import Options, run
+from mpm_ref.store.writer import Fields
 
 ONE = ("--workers", 1)
 
@@ -100,7 +100,7 @@ def test_ctrl_c_says_how_far_it_is_and_how_to_go_on(made, tmp_path, monkeypatch)
     def interrupted(*_):
         yield Done(0, FINISHED)
         raise KeyboardInterrupt
-    monkeypatch.setattr("mpm_ref.cli.rom_make.generate", interrupted)
+    monkeypatch.setattr("mpm_ref.cli.rom_train.generate", interrupted)
     done = mpm_ref("rom", "generate", made / "bars.toml", "--out", tmp_path, *ONE)
     assert_told(done, 130, "interrupted after 1 of 4 runs; the same command again goes on")
 
@@ -156,7 +156,7 @@ def test_ctrl_c_in_a_training_says_how_to_go_on(made, tmp_path, monkeypatch, sav
         if saved:
             checkpoint.write_bytes(b"x")
         raise KeyboardInterrupt
-    monkeypatch.setattr("mpm_ref.cli.rom_make.fitted", interrupted)
+    monkeypatch.setattr("mpm_ref.cli.rom_train.fitted", interrupted)
     done = mpm_ref("rom", "train", made / "bars.toml", "--data", made / "data",
                    "--out", tmp_path / "map.npz")
     assert_told(done, 130, f"goes on from {tmp_path / 'map.pt'}" if saved else
@@ -166,7 +166,7 @@ def test_ctrl_c_in_a_training_says_how_to_go_on(made, tmp_path, monkeypatch, sav
 def test_a_checkpoint_that_cannot_be_written_is_told(made, tmp_path, monkeypatch):
     def full(study, snapshots, about, checkpoint, threads):
         raise OSError(f"{checkpoint} could not be written: no space left; is the disk full?")
-    monkeypatch.setattr("mpm_ref.cli.rom_make.fitted", full)
+    monkeypatch.setattr("mpm_ref.cli.rom_train.fitted", full)
     done = mpm_ref("rom", "train", made / "bars.toml", "--data", made / "data",
                    "--out", tmp_path / "map.npz")
     assert_told(done, 4, "map.pt could not be written: no space left")
@@ -198,7 +198,7 @@ def test_a_curved_map_is_made_at_once(made, tmp_path):
     done = mpm_ref("rom", "train", study, "--data", made / "data", "--out", out)
     assert done.exit_code == 0, done.output
     assert "curved, r = 2, of 3 runs" in done.stdout
-    assert maps.load(out, load(study)).about["command"].endswith("--kind curved --threads 1")
+    assert reduce.load(out, load(study)).about["command"].endswith("--kind curved --threads 1")
 
 
 def test_a_study_without_the_settings_of_a_curved_map_makes_none(made, tmp_path):
@@ -221,6 +221,6 @@ def test_a_network_is_trained_with_torch(made, tmp_path):
     assert done.exit_code == 0, done.output
     assert "network, r = 2" in done.stdout
     assert not out.with_suffix(".pt").exists()
-    about = maps.load(out, load(study)).about
+    about = reduce.load(out, load(study)).about
     assert (about["map"]["epochs"], about["threads"], len(about["loss"])) == (2, 1, 2)
     assert about["command"].startswith(f"mpm-ref rom train {study}")

@@ -12,13 +12,13 @@ from small_studies import CURVED, STEPS, modelled, write
 from typer.main import get_command
 
 from mpm_ref.cli import rom
-from mpm_ref.cli.shipped import shipped_studies
-from mpm_ref.reduced import dataset, errors, maps
-from mpm_ref.reduced.study import load
+from mpm_ref.cli.catalogue import shipped_studies
 from mpm_ref.rom import weights
 from mpm_ref.rom.snapshots import displacement_error, position_error
+from mpm_ref.rom.study import dataset, errors, reduce
+from mpm_ref.rom.study.study import load
 from mpm_ref.rom.weights import Model
-from mpm_ref.sealed import sealed
+from mpm_ref.store.weights_file import sealed
 
 LDM = Path(__file__).parents[2] / "validation" / "ldm" / "weights"
 
@@ -46,7 +46,7 @@ def test_a_map_says_what_it_is_of_and_what_made_it(made, tmp_path, edits, head):
 
 def test_the_errors_of_a_map_are_those_over_its_training_runs(made):
     found = json.loads(mpm_ref("info", made / "map.npz", "--json").stdout)
-    bars, model = load(made / "bars.toml"), maps.read(made / "map.npz")
+    bars, model = load(made / "bars.toml"), reduce.read(made / "map.npz")
     data = dataset.load(bars, made / "data", bars.train)
     x = np.array([model.decoder.place(data.X, y) for y in model.xhat.reshape(-1, 3)])
     reference = data.flat()[0]

@@ -10,10 +10,10 @@ import small_nsf_studies
 import small_studies
 from command_line import mpm_ref
 
-from mpm_ref.reduced import dataset, nearby
-from mpm_ref.reduced.errors import Squares
-from mpm_ref.reduced.nearby import Nearby, facts, lines, nearest_runs
-from mpm_ref.reduced.study import load
+from mpm_ref.rom.study import baselines, dataset
+from mpm_ref.rom.study.baselines import Nearby, facts, lines, nearest_runs
+from mpm_ref.rom.study.errors import Squares
+from mpm_ref.rom.study.study import load
 
 LDM = small_studies, "bars.toml", "map.npz", 0
 NSF = small_nsf_studies, "pairs.toml", "fields.npz", 1
@@ -115,12 +115,12 @@ def test_of_runs_that_are_equally_near_the_better_one_is_taken(monkeypatch):
                             test=(1,))
     snapshots = SimpleNamespace(X=None, x=[None])
     off = {0: 3.0, 2: 2.0, 3: 1.0}
-    monkeypatch.setattr(nearby, "_squares", lambda study, folder, k, X, x: SimpleNamespace(
+    monkeypatch.setattr(baselines, "_squares", lambda study, folder, k, X, x: SimpleNamespace(
         errors=SimpleNamespace(origin=off[k])))
     assert nearest_runs(study, 1) == [0, 2]
-    assert [one.taken for one in nearby.nearby(study, "", snapshots)] == [2]
+    assert [one.taken for one in baselines.nearby(study, "", snapshots)] == [2]
     off[2] = 4.0
-    assert [one.taken for one in nearby.nearby(study, "", snapshots)] == [0]
+    assert [one.taken for one in baselines.nearby(study, "", snapshots)] == [0]
 
 
 def test_all_runs_are_one_where_all_have_data(rng):

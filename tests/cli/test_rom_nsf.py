@@ -11,15 +11,15 @@ from command_line import assert_told, mpm_ref
 from small_nsf_studies import EVERY, RUNS, STEPS, modelled, write
 from small_studies import ended
 
-from mpm_ref.reduced import maps, record, told
-from mpm_ref.reduced.generate import options
-from mpm_ref.reduced.inferring import Plan, drawn, infer
-from mpm_ref.reduced.nsf.dataset import histories
-from mpm_ref.reduced.nsf.fields import BLOCK
-from mpm_ref.reduced.study import load
-from mpm_ref.reduced.tables import NSF
-from mpm_ref.reduced.whole import history, whole
 from mpm_ref.rom.fields.pod_fields import Sizes, spanned
+from mpm_ref.rom.study import record, reduce, summary
+from mpm_ref.rom.study.generate import options
+from mpm_ref.rom.study.nsf_case import history, whole
+from mpm_ref.rom.study.nsf_dataset import histories
+from mpm_ref.rom.study.nsf_fields import BLOCK
+from mpm_ref.rom.study.nsf_run import Plan, drawn, infer
+from mpm_ref.rom.study.study import load
+from mpm_ref.rom.study.tables import NSF
 from mpm_ref.rom.symmetric import values
 from mpm_ref.scene import build
 from mpm_ref.store.results import Results
@@ -97,7 +97,7 @@ def test_runs_of_other_states_kept_are_not_taken(made, tmp_path):
 # train
 
 def test_fields_are_those_of_the_training_runs(made, pairs):
-    model = maps.load(made / "fields.npz", pairs)
+    model = reduce.load(made / "fields.npz", pairs)
     data = histories(pairs, made / "data", pairs.train)
     fields, xhat = spanned(data, Sizes(3, 5, 8, 8, smoothing=1e-6), BLOCK * 0.1)
     assert np.array_equal(model.xhat, xhat)
@@ -110,17 +110,17 @@ def test_fields_are_those_of_the_training_runs(made, pairs):
     assert model.about["fit"]["errors"]["origin"] == pytest.approx(off, rel=1e-4)
 
 
-def test_the_stress_is_told_the_parameters_where_the_study_says_so(made, tmp_path):
+def test_the_stress_sees_the_parameters_where_the_study_says_so(made, tmp_path):
     out = tmp_path / "fields.npz"
-    study = write(tmp_path, ("r = 3", "r = 3\ntold = false"))
+    study = write(tmp_path, ("r = 3", "r = 3\nstress_sees_parameters = false"))
     done = mpm_ref("rom", "train", study, "--data", made / "data", "--out", out)
     assert done.exit_code == 0, done.output
-    assert maps.read(made / "fields.npz").decoder.mu.shape == (1,)
-    assert maps.read(out).decoder.mu.shape == (0,)
+    assert reduce.read(made / "fields.npz").decoder.mu.shape == (1,)
+    assert reduce.read(out).decoder.mu.shape == (0,)
 
 
 def test_fields_of_a_single_run_ignore_its_parameter(tmp_path):
-    """They are told a parameter that does not vary, and are asked in a run with another."""
+    """They see a parameter that does not vary, and are asked in a run with another."""
     study = write(tmp_path, ("from = 1.6\nto = 2.4\ncount = 4", "values = [1.7, 2.4]"))
     data, out = tmp_path / "data", tmp_path / "fields.npz"
     for command in (("generate", study, "--out", data),
@@ -142,7 +142,7 @@ def test_a_run_is_the_reduced_run_of_its_parameters(made, reduced, tmp_path, way
     done, out = reduced("--set", "v=1.9", study=write(tmp_path, ("points = 20", way)))
     pairs = load(made / "pairs.toml")
     assert (done.exit_code, done.stderr) == (0, "")
-    model, one = maps.load(made / "fields.npz", pairs), whole(pairs.scene([1.9]))
+    model, one = reduce.load(made / "fields.npz", pairs), whole(pairs.scene([1.9]))
     (count, seed, *how), n, fields = plan, len(one.X), model.decoder.of([1.9])
     plan = Plan((drawn(n, count or n, seed),), *how)
     states = list(infer(one, fields, plan, model.rest))
@@ -201,7 +201,7 @@ def test_states_that_the_fields_have_not_learned_are_warned_of(reduced):
     assert "v = 9 lies outside the range" in outside
     assert "times as far from the training runs" in beyond
     with Results(out) as results:
-        found = told.told(results)
+        found = summary.told(results)
         assert found["out_of_bounds"] == np.sum(results.h5["reduced/beyond"][()] > 1.5) > 0
     assert f"{found['out_of_bounds']} of {STEPS + 1} states" in beyond
 
@@ -253,9 +253,9 @@ def test_longer_steps_are_compared_where_they_meet_the_states_kept(made, tmp_pat
 
 
 def test_a_run_that_breaks_down_is_infinitely_off(made, pairs, tmp_path):
-    model, bad = maps.load(made / "fields.npz", pairs), tmp_path / "bad.npz"
+    model, bad = reduce.load(made / "fields.npz", pairs), tmp_path / "bad.npz"
     tau = model.decoder.tau
-    maps.save(bad, model._replace(decoder=model.decoder._replace(
+    reduce.save(bad, model._replace(decoder=model.decoder._replace(
         tau=tau._replace(modes=1e6 * tau.modes))))
     done = mpm_ref("rom", "evaluate", made / "pairs.toml", "--map", bad, "--data", made / "data",
                    "--out", tmp_path / "e.png", "--json")
@@ -273,8 +273,8 @@ def test_a_run_that_breaks_down_is_infinitely_off(made, pairs, tmp_path):
 
 def test_info_knows_study_fields_and_results(made, pairs, reduced):
     study, n = made / "pairs.toml", len(whole(pairs.base).X)
-    modes = ("modes: 5 of the displacement, 8 of the stress, 8 of the affine field; the stress is "
-             "told the parameters")
+    modes = ("modes: 5 of the displacement, 8 of the stress, 8 of the affine field; the stress "
+             "sees the parameters")
     assert mpm_ref("info", study).stdout.splitlines() == [
         f"{study}: a study, Two disks: 4 runs of the scene disks.toml, 1 held out",
         f"2D, {n} points, dx = 0.1 m, {STEPS} steps of 0.002 s, one in 2 kept",

@@ -10,12 +10,12 @@ from command_line import mpm_ref
 from small_nsf_studies import modelled, write
 
 from mpm_ref.problem import Clock
-from mpm_ref.reduced import maps
-from mpm_ref.reduced.evaluate import NEAREST, REDUCED, farthest
-from mpm_ref.reduced.inferring import Plan
-from mpm_ref.reduced.nsf.dataset import histories
-from mpm_ref.reduced.nsf.evaluate import evaluate
-from mpm_ref.reduced.study import load
+from mpm_ref.rom.study import reduce
+from mpm_ref.rom.study.evaluate import NEAREST, REDUCED, farthest
+from mpm_ref.rom.study.nsf_dataset import histories
+from mpm_ref.rom.study.nsf_evaluate import evaluate
+from mpm_ref.rom.study.nsf_run import Plan
+from mpm_ref.rom.study.study import load
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +55,7 @@ def test_errors_of_a_run_beyond_its_limit_are_infinite(made, tmp_path, monkeypat
                "--out", tmp_path / "e.png", "--json", "--overwrite")
     good = json.loads(mpm_ref(*command).stdout)
     assert good["all"]["reduced"]["origin"] < 0.01
-    monkeypatch.setattr("mpm_ref.reduced.evaluate.farthest", lambda u: float("nan"))
+    monkeypatch.setattr("mpm_ref.rom.study.evaluate.farthest", lambda u: float("nan"))
     done = mpm_ref(*command)
     assert done.exit_code == 3
     found = json.loads(done.stdout)
@@ -67,7 +67,7 @@ def test_errors_of_a_run_beyond_its_limit_are_infinite(made, tmp_path, monkeypat
 def test_nearest_states_are_compared_at_the_times_of_longer_steps(made, tmp_path):
     study = load(write(tmp_path, ("points = 20", "points = 20\nfaster = 4.0")))
     runs = histories(study, made / "data", study.test, float)
-    (held,) = evaluate(study, maps.load(made / "fields.npz", study), runs)
+    (held,) = evaluate(study, reduce.load(made / "fields.npz", study), runs)
     for name in (REDUCED, NEAREST):
         assert np.flatnonzero(np.isfinite(held.courses[name].levels)).tolist() == [0, 2, 4, 6, 8]
 

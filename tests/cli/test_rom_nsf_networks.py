@@ -8,16 +8,16 @@ import pytest
 from command_line import assert_told, mpm_ref
 from small_nsf_studies import modelled, write
 
-from mpm_ref.reduced import maps
-from mpm_ref.reduced.nsf.dataset import histories
-from mpm_ref.reduced.nsf.networks import Networks
-from mpm_ref.reduced.study import load
 from mpm_ref.rom.fields.network import learned
+from mpm_ref.rom.study import reduce
+from mpm_ref.rom.study.nsf_dataset import histories
+from mpm_ref.rom.study.nsf_networks import Networks
+from mpm_ref.rom.study.study import load
 from mpm_ref.store.results import Results
 
 torch = pytest.importorskip("torch")
-stages = pytest.importorskip("mpm_ref.rom.learn.stages")
-drive_fields = pytest.importorskip("mpm_ref.rom.learn.drive_fields")
+stages = pytest.importorskip("mpm_ref.rom.train.stages")
+settings = pytest.importorskip("mpm_ref.rom.train.settings")
 
 NETWORK = ('kind = "modes"\nr = 3\nmodes = 5\ntau = 8\nC = 8\nsmoothing = 1e-6',
            'kind = "network"\nr = 3\nbeta = [3, 2, 2]\nlatent = "free"\nepochs = 40\n'
@@ -44,9 +44,9 @@ def study(made):
 
 def test_networks_are_those_of_the_three_stages(made, study):
     data = histories(study, made / "data", study.train)
-    plan = drive_fields.plan(study.tables.map.settings, 2)
-    own = stages.train(plan, data)
-    model = maps.load(made / "nets.npz", study)
+    plan = settings.stage_plan(study.tables.map.settings, 2)
+    own = stages.train_stages(plan, data)
+    model = reduce.load(made / "nets.npz", study)
     assert isinstance(model.decoder, Networks)
     for ours, theirs in zip(model.decoder, (own.g.decoder, own.h.field, own.l.field), strict=True):
         assert np.array_equal(ours.net.W, theirs.net.W)
@@ -59,7 +59,7 @@ def test_networks_are_those_of_the_three_stages(made, study):
 
 
 def test_a_plan_is_the_printed_one_with_the_studys_numbers(study):
-    plan = drive_fields.plan(study.tables.map.settings, 2)
+    plan = settings.stage_plan(study.tables.map.settings, 2)
     assert (plan.g.hidden, plan.h.hidden, plan.l.hidden) == (5 * (6,), 5 * (6,), 5 * (8,))
     assert (plan.g.r, plan.g.latent, plan.g.epochs) == (3, "free", 40)
     assert [(own.follows, own.epochs) for own in (plan.h, plan.l)] == [(True, 20), (False, 20)]
@@ -70,10 +70,10 @@ def test_a_plan_is_the_printed_one_with_the_studys_numbers(study):
 
 def test_latent_coordinates_of_modes_are_in_one_unit_and_can_be_trained(made, study):
     """Positions alone are known: no norm of the loss with gradients."""
-    plan = drive_fields.plan({**study.tables.map.settings, "latent": "modes"}, 2)
+    plan = settings.stage_plan({**study.tables.map.settings, "latent": "modes"}, 2)
     assert plan.g.latent == "directions"
     data = histories(study, made / "data", study.train)
-    found = stages.fit.train(replace(plan.g, epochs=1), stages.positions(data))
+    found = stages.train_decoder(replace(plan.g, epochs=1), stages.position_snapshots(data))
     assert found.xhat.shape == (*data.x.shape[:2], 3)
 
 
@@ -82,7 +82,7 @@ def test_a_run_is_one_on_the_networks(made, study, tmp_path):
     done = mpm_ref("rom", "run", made / "pairs.toml", "--map", made / "nets.npz", "--out", out,
                    "--set", "v=1.9", "--json")
     assert done.exit_code in (0, 3), done.output
-    model = maps.load(made / "nets.npz", study)
+    model = reduce.load(made / "nets.npz", study)
     with Results(out) as results:
         X = np.concatenate([results.field(body, "x", 0) for body in ("hard", "soft")])
         xhat, mu = results.h5["reduced/xhat"][0], [1.9]
@@ -102,8 +102,8 @@ def test_networks_are_evaluated_and_described(made, tmp_path):
     what, of, sizes, losses, *_ = mpm_ref("info", made / "nets.npz").stdout.splitlines()
     assert "nets.npz: stress fields, network, r = 3, 2D" in what
     assert of.startswith("made of 3 runs of 9 states")
-    assert sizes == ("factors of width 3, 2, 2, octaves of sines and cosines: 1; the stress is "
-                     "told the parameters")
+    assert sizes == ("factors of width 3, 2, 2, octaves of sines and cosines: 1; the stress "
+                     "sees the parameters")
     assert losses.startswith("last losses: ")
     assert "factors of width 3, 2, 2" in mpm_ref("info", made / "pairs.toml").stdout
 
@@ -111,7 +111,7 @@ def test_networks_are_evaluated_and_described(made, tmp_path):
 def test_a_training_that_was_cut_off_goes_on_from_its_stages(made, study, tmp_path, monkeypatch):
     seen = []
 
-    learn, command = drive_fields.fitted, (
+    learn, command = settings.fit_stages, (
         "train", made / "pairs.toml", "--data", made / "data", "--out", tmp_path / "nets.npz")
 
     def fitted(settings, histories, folder, on_epoch, machine):
@@ -122,7 +122,7 @@ def test_a_training_that_was_cut_off_goes_on_from_its_stages(made, study, tmp_pa
             on_epoch(stage, history)
         return learn(settings, histories, folder, shown, machine)
 
-    monkeypatch.setattr(drive_fields, "fitted", fitted)
+    monkeypatch.setattr(settings, "fit_stages", fitted)
     done = mpm_ref("rom", *command)
     assert_told(done, 130, f"the same command again goes on from {tmp_path / 'nets.pt'}")
     assert seen[-1] == ("h", 10)
@@ -130,5 +130,5 @@ def test_a_training_that_was_cut_off_goes_on_from_its_stages(made, study, tmp_pa
     assert again.exit_code == 0, again.output
     assert seen[50] == ("h", 1)
     assert not (tmp_path / "nets.pt").exists()
-    ours, theirs = (maps.load(folder / "nets.npz", study) for folder in (tmp_path, made))
+    ours, theirs = (reduce.load(folder / "nets.npz", study) for folder in (tmp_path, made))
     assert np.array_equal(ours.decoder.l.net.W, theirs.decoder.l.net.W)

@@ -6,8 +6,8 @@ import pytest
 from command_line import assert_told, mpm_ref
 from small_nsf_studies import SCENE, modelled, write
 
-from mpm_ref.cli.shipped import shipped_scenes, shipped_studies
-from mpm_ref.reduced.study import load
+from mpm_ref.cli.catalogue import shipped_scenes, shipped_studies
+from mpm_ref.rom.study.study import load
 from validation.nsf.studies import jelly
 
 
@@ -115,7 +115,7 @@ def test_the_papers_study_has_the_runs_of_the_experiment():
     assert shipped.mu[list(shipped.train), 0].tolist() == list(experiment.train)
     assert shipped.mu[list(shipped.test), 0].tolist() == list(experiment.test)
     assert shipped.tables.map.sizes == experiment.sizes
-    assert shipped.tables.map.told == experiment.follows
+    assert shipped.tables.map.stress_sees_parameters == experiment.follows
     assert shipped.tables.run.points == experiment.samples
     for value in (0.3, 0.45):
         assert shipped.scene([value]) == experiment.run(value)

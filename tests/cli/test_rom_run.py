@@ -8,11 +8,11 @@ import pytest
 from command_line import assert_told, mpm_ref
 from small_studies import CURVED, STEPS, ended, modelled, write
 
-from mpm_ref.reduced import maps, told
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.march import Way, march
-from mpm_ref.reduced.record import COUNTS, NUMBERS, VECTORS
-from mpm_ref.reduced.study import load
+from mpm_ref.rom.study import reduce, summary
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.record import COUNTS, NUMBERS, VECTORS
+from mpm_ref.rom.study.run import Way, march
+from mpm_ref.rom.study.study import load
 from mpm_ref.scene import dumps
 from mpm_ref.store.results import Results
 
@@ -38,7 +38,7 @@ def test_a_run_is_the_reduced_run_of_its_parameters(made, reduced):
     assert done.exit_code == 0, done.output
     assert done.stderr == ""
     bars = load(made / "bars.toml")
-    model, one = maps.load(made / "map.npz", bars), case(bars.scene([2.5]))
+    model, one = reduce.load(made / "map.npz", bars), case(bars.scene([2.5]))
     states = list(march(one, model.decoder, Way(), model.rest))
     with Results(out) as results:
         assert len(results) == STEPS + 1
@@ -86,7 +86,7 @@ def test_a_body_is_shown_at_more_points_than_it_was_trained_with(made, reduced, 
         assert np.array_equal(a.h5["reduced/xhat"][()], b.h5["reduced/xhat"][()])
         for name in ("m", "V0"):
             assert b.field("bar", name).sum() == pytest.approx(a.field("bar", name).sum())
-        model = maps.load(made / "map.npz", load(made / "bars.toml"))
+        model = reduce.load(made / "map.npz", load(made / "bars.toml"))
         X, xhat = b.field("bar", "x", 0), b.h5["reduced/xhat"][-1]
         x, F, _ = model.decoder.derivatives(X, xhat)
         np.testing.assert_allclose(b.field("bar", "x", -1), x, atol=1e-6)
@@ -100,7 +100,7 @@ def test_a_run_beyond_the_training_is_warned_of(reduced):
     outside, beyond = done.stderr.splitlines()
     assert outside.startswith("mpm-ref: warning: g = 9 lies outside the range")
     with Results(out) as results:
-        found = told.told(results)
+        found = summary.told(results)
         t = results.time[STEPS + 1 - found["out_of_bounds"]]
     assert f"{found['out_of_bounds']} of {STEPS + 1} states, from t = {t:g} s on" in beyond
     said = (f"reduced: bars, modes r = 3, g = 9; a step has {found['mean_samples']:.4g} samples "
@@ -146,7 +146,7 @@ def test_a_run_is_told_to_machines_too(made, reduced):
     assert found["reduced"]["map"] == {"kind": "modes", "r": 3}
     assert "beyond" in found["out_of_bounds"][str(STEPS)]
     with Results(out) as results:
-        assert told.told(results)["out_of_bounds"] == len(found["out_of_bounds"])
+        assert summary.told(results)["out_of_bounds"] == len(found["out_of_bounds"])
 
 
 def test_a_curved_map_runs_and_is_evaluated(made, reduced, tmp_path):
@@ -280,8 +280,8 @@ def test_without_a_run_held_out_there_is_nothing_to_evaluate(made, tmp_path):
 
 def test_a_run_that_breaks_down_is_infinitely_off(made, tmp_path):
     study = load(made / "bars.toml")
-    model = maps.load(made / "map.npz", study)
-    maps.save(tmp_path / "bad.npz", model._replace(decoder=model.decoder._replace(
+    model = reduce.load(made / "map.npz", study)
+    reduce.save(tmp_path / "bad.npz", model._replace(decoder=model.decoder._replace(
         slope=1e6 * model.decoder.slope)))
     done = evaluate(made, "--json", "--out", tmp_path / "e.png", map=tmp_path / "bad.npz")
     assert done.exit_code == 3

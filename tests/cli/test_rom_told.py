@@ -8,10 +8,10 @@ import pytest
 from command_line import assert_told, mpm_ref
 from small_studies import modelled, write
 
-from mpm_ref.cli import rom, rom_evaluate
+from mpm_ref.cli import rom
 from mpm_ref.cli.rom import astray
-from mpm_ref.reduced import told
-from mpm_ref.reduced.watch import Sight
+from mpm_ref.rom.study import summary
+from mpm_ref.rom.study.watch import Sight
 
 WELL = Sight(beyond=0.3, off=0.01, seen=0.9, blind=0, lost=0.0, J=0.8, inverted=0.0, far=0.9)
 
@@ -26,8 +26,8 @@ def test_a_run_without_a_step_has_no_means():
     found = {"study": "ab", "name": "bars", "map": {"kind": "modes", "r": 3},
              "parameters": {"g": 2.0}, "states": 1, "out_of_bounds": 0, "mean_samples": None,
              "mean_points": None}
-    assert told.line(found) == "reduced: bars, modes r = 3, g = 2; 0 of 1 states out of bounds"
-    some = told.line(found | {"mean_samples": 20.0, "mean_points": 101.25})
+    assert summary.line(found) == "reduced: bars, modes r = 3, g = 2; 0 of 1 states out of bounds"
+    some = summary.line(found | {"mean_samples": 20.0, "mean_points": 101.25})
     assert "g = 2; a step has 20 samples and 101.2 integration points on average; 0 of 1" in some
 
 
@@ -48,7 +48,7 @@ def test_each_bound_that_is_stored_is_counted():
     changes = {"beyond": 9.0, "off": 1.0, "seen": 0.1, "lost": 10, "rank": 1, "inverted": 0.5}
     for k, (name, value) in enumerate(changes.items(), 1):
         rows[name][k] = value
-    assert [told.sight(rows, k).why for k in range(7)] == [
+    assert [summary.sight(rows, k).why for k in range(7)] == [
         (), ("beyond",), ("off",), ("seen",), ("lost",), ("blind",), ("inverted",)]
 
 
@@ -86,7 +86,7 @@ def test_a_picture_is_not_replaced(made, tmp_path, monkeypatch):
     before = out.stat().st_mtime_ns
     assert mpm_ref("rom", *command, "--out", out, "--overwrite").exit_code == 0
     assert out.stat().st_mtime_ns > before
-    monkeypatch.setattr(rom_evaluate, "evaluate", None)         # not begun
+    monkeypatch.setattr(rom, "evaluate", None)         # not begun
     assert_told(mpm_ref("rom", *command, "--out", out), 2, "e.png exists: add --overwrite")
     done = mpm_ref("rom", *command, "--out", tmp_path / "none" / "e.png")
     assert_told(done, 4, "there is no folder")

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from command_line import SCENE, assert_told, mpm_ref
 
-from mpm_ref.cli.execute import Bar, Request
+from mpm_ref.cli.run import Bar, Request
 from mpm_ref.energy import Energy
-from mpm_ref.store.session import checkpoint_of
+from mpm_ref.store.running import checkpoint_of
 
 HOT = 'integrator = "hot"\n' + SCENE.replace("dt = 0.001", "dt = 0.01")
 FLOOR = """

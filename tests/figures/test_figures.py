@@ -9,9 +9,9 @@ from typer.testing import CliRunner
 
 from figures import __main__ as cli
 from figures import frame
-from figures._orders import OTHERS, TRANSFERS, scales, shared
+from figures.common.orders import OTHERS, TRANSFERS, scales, shared
 from figures.frame import Drawn, draw_all, names
-from validation.results import Results
+from validation.common.results import ProfileResults
 
 SCALES = {"a.b.order": "8, dx = 0.1 m; twice", "a.b.end": "9, dx = 0.1 m"}
 RECORDS = [{"target": target, "value": 1.0, "unit": "1", "paper": None, "comparator": "info",
@@ -36,12 +36,12 @@ def draw(results):
 def results(tmp_path):
     (tmp_path / "quick").mkdir()
     (tmp_path / "quick" / "a.b.json").write_text(json.dumps(RECORDS))
-    return Results(tmp_path / "quick")
+    return ProfileResults(tmp_path / "quick")
 
 
 @pytest.mark.parametrize("name", names())
 def test_script_is_whole(name):
-    script = importlib.import_module(f"figures.{name}")
+    script = importlib.import_module("figures." + name.replace("_", ".", 1))
     assert script.__doc__
     assert script.NEEDS
     assert callable(script.draw)
@@ -50,13 +50,13 @@ def test_script_is_whole(name):
 
 def test_picture_and_caption_carry_the_scale(results, tmp_path, monkeypatch):
     package = tmp_path / "toy_figures"
-    package.mkdir()
-    (package / "toy.py").write_text(SCRIPT)
+    (package / "hot").mkdir(parents=True)
+    (package / "hot" / "toy.py").write_text(SCRIPT)
     monkeypatch.syspath_prepend(tmp_path)
     seen = []
     monkeypatch.setattr(frame, "_write", lambda figure, path, about: seen.append(
         (path.suffix, figure.texts[0].get_text(), about.get("Description"))))
-    assert draw_all(results, folder=package) == Drawn(["toy"], [], [])
+    assert draw_all(results, folder=package) == Drawn(["hot_toy"], [], [])
     said = "Scale (quick): 8 cells."
     assert seen == [(".png", said, f"A toy. {said}"), (".pdf", said, None)]
 

@@ -7,24 +7,13 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from figures import (
-    _states,
-    ldm_fig04,
-    ldm_fig06,
-    ldm_fig10,
-    ldm_fig11,
-    ldm_fig12,
-    ldm_fig13,
-    ldm_fig14,
-    ldm_fig15,
-    ldm_fig16,
-    ldmw_fig01,
-    ldmw_tables,
-)
-from figures._bodies import body, levelled, nothing, shades, side_by_side
-from figures._schemes import MARKS
-from validation.ldm.kept_bodies import file_of
-from validation.results import Results
+from figures.common import state_panels
+from figures.common.bodies import body, levelled, nothing, shades, side_by_side
+from figures.common.schemes import MARKS
+from figures.ldm import fig04, fig06, fig10, fig11, fig12, fig13, fig14, fig15, fig16
+from figures.ldmw import fig01, tables
+from validation.common.results import ProfileResults
+from validation.ldm.published_bodies import file_of
 
 mpl.use("Agg")
 SCHEMES = ("lagrangian_nonlinear", "eulerian_nonlinear", "lagrangian_linear", "eulerian_linear")
@@ -44,14 +33,14 @@ STATES = {
                   "reduced": np.zeros((2, 2, 1, 1)) + GRID, "full": np.zeros((2, 2, 1, 1)) + GRID},
     "ldmw.fig1": {"X": GRID, "mu": np.array([(1.0, 4.5, 12.5), (1.2, 9.0, 15.0)]),
                   "reduced": np.stack([GRID + 0.1, GRID + 0.2]), "full": np.stack(2 * [GRID])}}
-DRAWN = {"ldm.fig4": (ldm_fig04, 2), "ldm.fig6": (ldm_fig06, 3), "ldm.fig11": (ldm_fig11, 3),
-         "ldm.fig12": (ldm_fig12, 4), "ldm.fig13": (ldm_fig13, 6), "ldm.fig15": (ldm_fig15, 6),
-         "ldmw.fig1": (ldmw_fig01, 4)}
+DRAWN = {"ldm.fig4": (fig04, 2), "ldm.fig6": (fig06, 3), "ldm.fig11": (fig11, 3),
+         "ldm.fig12": (fig12, 4), "ldm.fig13": (fig13, 6), "ldm.fig15": (fig15, 6),
+         "ldmw.fig1": (fig01, 4)}
 
 
 @pytest.fixture
 def results(tmp_path):
-    return Results(tmp_path)
+    return ProfileResults(tmp_path)
 
 
 def recorded(results, id, *targets, **more):
@@ -76,7 +65,7 @@ def lines(ax):
 
 @pytest.mark.parametrize("id", STATES)
 def test_states_are_drawn_from_what_is_kept(results, id, monkeypatch):
-    monkeypatch.setattr(_states, "PIXELS", 60)
+    monkeypatch.setattr(state_panels, "PIXELS", 60)
     script, panels = DRAWN[id]
     file_of(results.folder, id).parent.mkdir()
     np.savez(file_of(results.folder, id), **STATES[id])
@@ -93,23 +82,23 @@ def test_states_that_are_not_here_say_so(results, id):
 
 
 def test_bodies_stand_upright():
-    view = ldm_fig15.VIEW._replace(lift=0.0)
-    axes = _states.framed([body(GRID, "w", 1.0)], view).axes
+    view = fig15.VIEW._replace(lift=0.0)
+    axes = state_panels.framed([body(GRID, "w", 1.0)], view).axes
     assert body(np.array([(0.0, 0.0, 1.0)]), "w", 1.0).x @ axes[1] == pytest.approx(1.0)
     assert np.linalg.det(body(np.eye(3), "w", 1.0).x) == pytest.approx(1.0)     # no mirror
 
 
 def test_second_body_is_beside_the_first():
-    view, one = ldm_fig15.VIEW, body(GRID, "w", 1.0)
+    view, one = fig15.VIEW, body(GRID, "w", 1.0)
     both = side_by_side(one, one, view)
-    along = both.x @ _states.framed([one], view).axes[0]
+    along = both.x @ state_panels.framed([one], view).axes[0]
     assert len(both.x) == 2 * len(GRID)
     assert along[:len(GRID)].max() < along[len(GRID):].min()
 
 
 def test_levelled_balls_keep_their_places_in_the_picture():
-    view, balls = ldm_fig15.VIEW, body(GRID, "w", 1.0)
-    axes = _states.framed([balls], view).axes
+    view, balls = fig15.VIEW, body(GRID, "w", 1.0)
+    axes = state_panels.framed([balls], view).axes
     flat = levelled(balls, view)
     np.testing.assert_allclose(flat.x @ axes[:2].T, balls.x @ axes[:2].T, atol=1e-12)
     assert np.ptp(flat.x @ axes[2]) < 0.01 * np.ptp(balls.x @ axes[2])
@@ -126,14 +115,14 @@ def test_colours_go_from_nothing_to_the_largest():
 def test_cubes_have_two_colours_and_turn_at_their_faces():
     X = np.array([(0.1, 0.1, 0.1), (0.9, 0.1, 0.1), (1.3, 0.1, 0.1), (1.3, 1.2, 0.1),
                   (0.0, 0.0, 0.0), (0.0, 0.0, 4.0)])
-    paint = ldm_fig11.chequered(X)
+    paint = fig11.chequered(X)
     assert (paint[0] == paint[1]).all()
     assert (paint[0] != paint[2]).any()
     assert (paint[0] == paint[3]).all()
 
 
 def test_motions_of_the_tower_are_told():
-    assert ldm_fig15.motion(0.75, np.pi / 3, -np.pi / 6) == "0.75 m/s, 60°, \N{MINUS SIGN}30°"
+    assert fig15.motion(0.75, np.pi / 3, -np.pi / 6) == "0.75 m/s, 60°, \N{MINUS SIGN}30°"
 
 
 # Curves
@@ -144,7 +133,7 @@ def test_fig10_has_a_curve_of_each_loss_and_marks_what_broke(results):
           [(scheme, points, r, loss, "inf" if points < 10 and r == 4 else r / points, 0.1, 0.2)
            for scheme in SCHEMES for r, losses in LOSSES.items() for loss in losses
            for points in (100, -(-r // 3), 10)])
-    figure = ldm_fig10.draw(results)
+    figure = fig10.draw(results)
     assert [ax.get_title()[:3] for ax in figure.axes] == ["(a)", "(b)", "(c)", "(d)"]
     for ax in figure.axes:
         found = lines(ax)
@@ -174,7 +163,7 @@ def of_sizes(sizes):
 
 def test_fig16_has_a_panel_for_each_size(results):
     table(results, "ldm.fig16", "ways", WAYS, of_sizes((34, 385)))
-    figure = ldm_fig16.draw(results)
+    figure = fig16.draw(results)
     assert [ax.get_title() for ax in figure.axes] == ["34 particles", "385 particles"]
     for ax in figure.axes:
         found = lines(ax)
@@ -189,11 +178,11 @@ def test_fig16_has_a_panel_for_each_size(results):
 
 def test_fig16_tells_ways_apart(results):
     table(results, "ldm.fig16", "ways", WAYS, of_sizes((34,)))
-    ax = ldm_fig16.draw(results).axes[0]
+    ax = fig16.draw(results).axes[0]
     found = [line for name, line in lines(ax).items() if "samples" in name]
     looks = {(line.get_marker(), line.get_color(), line.get_fillstyle()) for line in found}
     assert len(looks) == len(found) == 16
-    assert not {ldm_fig16.look("resampled_linear", k)[1] for k in (1, 2)} & {
+    assert not {fig16.look("resampled_linear", k)[1] for k in (1, 2)} & {
         mark for _, mark in MARKS.values()}
 
 
@@ -202,39 +191,39 @@ def test_fig14_numbers_steps_that_are_apart(results):
     recorded(results, "ldm.fig13", "ldm.fig13.error", "ldm.fig14.return", "ldm.fig14.plane")
     table(results, "ldm.fig13", "latent", ("step", "t", "pc1", "pc2", "driven"),
           [(k, 0.1 * k, np.cos(a), np.sin(a), int(k <= 12)) for k, a in enumerate(turn)])
-    ax = ldm_fig14.draw(results).axes[0]
+    ax = fig14.draw(results).axes[0]
     said = sorted(int(text.get_text()) for text in ax.texts)
     assert said[:2] == [0, 12]
     places = np.array([(np.cos(turn[k]), np.sin(turn[k])) for k in said]) / 2.0
     gaps = np.linalg.norm(places[:, None] - places, axis=2)[np.triu_indices(len(said), 1)]
-    assert 10 < len(said) < 2.0 * np.pi / 2.0 / ldm_fig14.APART
-    assert gaps.min() > ldm_fig14.APART
+    assert 10 < len(said) < 2.0 * np.pi / 2.0 / fig14.APART
+    assert gaps.min() > fig14.APART
     assert len(lines(ax)["driven"].get_xdata()) == 13
-    assert "50 % of the variance" in ldm_fig14.scale(results)
+    assert "50 % of the variance" in fig14.scale(results)
 
 
 def test_pokes_of_the_workshop_are_told_with_their_errors(results):
     recorded(results, "ldmw.fig1", "ldmw.fig1.error.1.position", "ldmw.fig1.error.1.velocity",
              "ldmw.fig1.error.2.position")
-    assert ldmw_fig01.scale(results) == (
+    assert fig01.scale(results) == (
         "3 particles, one run; position errors 0.5, 0.5 % from left to right")
-    assert ldmw_fig01.poked(1.25, 0.0, 15.0) == (
+    assert fig01.poked(1.25, 0.0, 15.0) == (
         r"$\rho$ = 1.2 R, $\theta$ = 0.0°, $\phi$ = 15.0°")
 
 
 def test_fig16_needs_no_precision(results):
     table(results, "ldm.fig16", "ways", [name if name != "precision" else "other" for name in WAYS],
           of_sizes((34,)))
-    assert {line.get_fillstyle() for name, line in lines(ldm_fig16.draw(results).axes[0]).items()
+    assert {line.get_fillstyle() for name, line in lines(fig16.draw(results).axes[0]).items()
             if "samples" in name} == {"none"}
 
 
 def test_workshop_tables_stand_beside_what_is_printed(results):
-    for id, rows in ldmw_tables.ROWS.items():
+    for id, rows in tables.ROWS.items():
         recorded(results, id, *(f"{id}.{row}.{field}" for row in rows
-                                for field in ldmw_tables.FIELDS))
-    for ax, id in zip(ldmw_tables.draw(results).axes, ldmw_tables.NEEDS, strict=True):
-        found, rows = lines(ax), len(ldmw_tables.ROWS[id])
+                                for field in tables.FIELDS))
+    for ax, id in zip(tables.draw(results).axes, tables.NEEDS, strict=True):
+        found, rows = lines(ax), len(tables.ROWS[id])
         assert set(found) == {"position", "velocity", "deformation gradient"}
         assert found["velocity"].get_ydata() == pytest.approx([0.5] * rows)
         bars = [line for line in ax.lines if line.get_label().startswith("_")]

@@ -6,7 +6,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from figures import trade_ldm, trade_ldm_cost
+from figures.trade import ldm, ldm_cost
 
 mpl.use("Agg")
 USUAL = {"quadrature": "eulerian", "projection": "linear", "points": 50, "velocity": "previous",
@@ -22,7 +22,7 @@ DENSE = {"quadrature": ["lagrangian", "eulerian", "eulerian", "resampled"],
 PARTS = {"particles": 2 * [34e3] + 2 * [3.08e6], "way": 2 * ["paper", "cheap"],
          "cpu": [0.1, 0.05, 0.2, 0.1],
          **{name: np.array([0.1, 0.05, 0.2, 0.1]) * share for name, share in
-            zip(trade_ldm_cost.PARTS, (0.5, 0.2, 0.1, 0.05, 0.15), strict=True)}}
+            zip(ldm_cost.PARTS, (0.5, 0.2, 0.1, 0.05, 0.15), strict=True)}}
 PAYS = {"particles": [34e3, 384e3, 3.08e6], "runs_same": [np.inf, 64.0, 6.0],
         "runs": [np.inf, np.inf, 16.0]}
 
@@ -44,7 +44,7 @@ def tower():
     """Axes of the tower and of torsion."""
     rows = [USUAL | way for way in WAYS]
     ways = {name: [row[name] for row in rows] for name in USUAL}
-    return trade_ldm.draw(made(ways=ways, densities=DENSE)).axes
+    return ldm.draw(made(ways=ways, densities=DENSE)).axes
 
 
 def test_numbers_of_samples_are_curves_and_other_choices_marks(tower):
@@ -80,7 +80,7 @@ def test_torsion_is_by_density_beside_material_points(tower):
 
 def test_small_differences_stay_small():
     ways = {name: 2 * [value] for name, value in USUAL.items()} | {"origin": [0.002, 0.0021]}
-    for ax in trade_ldm.draw(made(ways=ways, densities=DENSE)).axes:
+    for ax in ldm.draw(made(ways=ways, densities=DENSE)).axes:
         low, high = ax.get_ylim()
         assert high / low > 3.9
 
@@ -88,13 +88,13 @@ def test_small_differences_stay_small():
 @pytest.fixture(scope="module")
 def cost():
     """Axes of the parts of a step and of the runs until training has paid."""
-    return trade_ldm_cost.draw(made(parts=PARTS, pays=PAYS)).axes
+    return ldm_cost.draw(made(parts=PARTS, pays=PAYS)).axes
 
 
 def test_parts_are_stacked_to_the_whole(cost):
     stacks = cost[0].containers
     assert [bars.get_label() for bars in stacks] == [words for words, *_ in
-                                                    trade_ldm_cost.PARTS.values()]
+                                                    ldm_cost.PARTS.values()]
     assert [bar.get_height() for bar in stacks[0]] == pytest.approx([50.0, 25.0, 100.0, 50.0])
     assert [bar.get_y() + bar.get_height() for bar in stacks[-1]] == pytest.approx(
         [100.0, 50.0, 200.0, 100.0])
@@ -119,6 +119,6 @@ def test_where_training_never_pays_is_said(cost):
 
 def test_training_that_never_pays_at_all_is_drawn():
     pays = {"particles": [34e3], "runs_same": [np.inf], "runs": [np.inf]}
-    ax = trade_ldm_cost.draw(made(parts=PARTS, pays=pays)).axes[1]
+    ax = ldm_cost.draw(made(parts=PARTS, pays=pays)).axes[1]
     assert [text.get_text() for text in ax.texts] == ["never"]
     assert ax.get_ylim() == (1.0, 100.0)

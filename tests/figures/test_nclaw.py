@@ -6,18 +6,18 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from figures import nclaw_fig02, nclaw_fig03, nclaw_fig06, nclaw_fig07
-from figures._bodies import View, pictures
-from figures._pairs import sides
+from figures.common.bodies import View, pictures
+from figures.common.pairs import sides
+from figures.nclaw import fig02, fig03, fig06, fig07
 from mpm_ref.materials import Fluid, NoFlow
 from mpm_ref.nclaw.gnn.simulator import Simulator
-from validation.nclaw import elsewhere, states
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
+from validation.common.weights_needed import Untrained
+from validation.nclaw import other_bodies, states
 from validation.nclaw.evaluate import fresh
 from validation.nclaw.tasks import reconstruction
-from validation.results import Results
-from validation.run import Setting, run_all
 from validation.verification.scenes import with_
-from validation.waiting import Untrained
 
 mpl.use("Agg")
 
@@ -37,17 +37,17 @@ def short(monkeypatch):
 
 
 def done(folder, experiment, profile="standard"):
-    assert run_all([experiment.experiment], Setting(profile, folder)) == []
-    return Results(folder)
+    assert run_all([experiment.experiment], RunSetting(profile, folder)) == []
+    return ProfileResults(folder)
 
 
 def test_training_runs_are_drawn(tmp_path, short, monkeypatch):
     results = done(tmp_path, states.training)
-    monkeypatch.setattr(nclaw_fig06, "NAMES", ("jelly", "water"))
-    shown = [ax for ax in nclaw_fig06.draw(results).axes if ax.images]
+    monkeypatch.setattr(fig06, "NAMES", ("jelly", "water"))
+    shown = [ax for ax in fig06.draw(results).axes if ax.images]
     assert len(shown) == 3 * 2
     assert [ax.get_title() for ax in shown[:3]] == ["t = 0 s", "t = 0.0025 s", "t = 0.005 s"]
-    assert "1000 particles" in nclaw_fig06.scale(Results(tmp_path))
+    assert "1000 particles" in fig06.scale(ProfileResults(tmp_path))
 
 
 def test_ends_beside_the_truth_are_drawn_and_recorded(tmp_path, short, monkeypatch):
@@ -58,7 +58,7 @@ def test_ends_beside_the_truth_are_drawn_and_recorded(tmp_path, short, monkeypat
         return name
 
     monkeypatch.setattr(states, "trained", trained)
-    monkeypatch.setattr(nclaw_fig02, "NAMES", ("jelly", "water"))
+    monkeypatch.setattr(fig02, "NAMES", ("jelly", "water"))
     results = done(tmp_path, states.away)
     found = {r.target: r for r in results.records("nclaw.fig2")}
     ours, init, neural = (found[f"nclaw.fig2.jelly.time.{word}"].value
@@ -66,7 +66,7 @@ def test_ends_beside_the_truth_are_drawn_and_recorded(tmp_path, short, monkeypat
     assert 0.0 < ours == init == neural < 1.0
     assert found["nclaw.fig2.untrained"].note == "no weights jelly-gnn; no weights sand-gnn"
     assert "nclaw.fig2.jelly.time.gnn" not in found
-    figure = nclaw_fig02.draw(results)
+    figure = fig02.draw(results)
     shown = [ax for ax in figure.axes if ax.images]
     assert [ax.get_title() for ax in shown[:6]] == [
         "start", "truth", "ours", "neural", "gnn\nnot trained", "before training"]
@@ -76,10 +76,10 @@ def test_ends_beside_the_truth_are_drawn_and_recorded(tmp_path, short, monkeypat
 
 def test_a_law_that_breaks_down_has_no_picture(tmp_path, short, monkeypatch):
     monkeypatch.setattr(states, "ENVIRONMENTS", ("sand",))
-    monkeypatch.setattr(nclaw_fig02, "NAMES", ("sand",))
+    monkeypatch.setattr(fig02, "NAMES", ("sand",))
     for name in ("time", "velocity"):
         monkeypatch.setattr(states, name, lambda *of: with_(reconstruction("water"), steps=100))
-    figure = nclaw_fig02.draw(done(tmp_path, states.away))
+    figure = fig02.draw(done(tmp_path, states.away))
     titles = [ax.get_title() for ax in figure.axes if ax.images]
     assert titles[2] == "ours\nbroke down"
     assert titles[8] == "broke down"
@@ -105,15 +105,15 @@ def test_runs_beside_the_truth_are_drawn_as_far_as_trained(tmp_path, short, monk
         raise Untrained(f"no weights {name}")
 
     water = with_(reconstruction("water"), steps=10)
-    monkeypatch.setattr(elsewhere, "contact", lambda: water)
-    monkeypatch.setattr(elsewhere, "large", lambda: with_(reconstruction("sand"), steps=10))
-    monkeypatch.setattr(elsewhere, "trained", lambda name: name)
-    monkeypatch.setattr(elsewhere, "learned", lambda name: elsewhere.own if name == "water"
+    monkeypatch.setattr(other_bodies, "contact", lambda: water)
+    monkeypatch.setattr(other_bodies, "large", lambda: with_(reconstruction("sand"), steps=10))
+    monkeypatch.setattr(other_bodies, "trained", lambda name: name)
+    monkeypatch.setattr(other_bodies, "learned", lambda name: other_bodies.own if name == "water"
                         else untrained_yet(name))
-    results = done(tmp_path, elsewhere.many)
+    results = done(tmp_path, other_bodies.many)
     assert results.value("nclaw.fig3", "nclaw.fig3.toys.ours") == 0.0
     assert "no weights sand" in str(results.records("nclaw.fig3"))
-    shown = [ax for ax in nclaw_fig03.draw(results).axes if ax.images]
+    shown = [ax for ax in fig03.draw(results).axes if ax.images]
     assert [ax.get_title() for ax in shown] == ["start", "ours", "truth"]
 
 
@@ -151,17 +151,18 @@ def test_baselines_stand_between_ours_and_the_truth_if_they_were_kept():
 
 def test_bodies_of_task_c_are_run_with_baselines(tmp_path, monkeypatch):
     """Each beside the truth, as far from it as its laws are."""
-    monkeypatch.setattr(elsewhere, "ENVIRONMENTS", ("water",))
-    monkeypatch.setattr(elsewhere, "geometry", lambda name: with_(reconstruction(name), steps=20))
-    monkeypatch.setattr(elsewhere, "trained", lambda name: name)
-    monkeypatch.setattr(elsewhere, "learned", lambda name: elsewhere.own if name == "water"
+    monkeypatch.setattr(other_bodies, "ENVIRONMENTS", ("water",))
+    monkeypatch.setattr(other_bodies, "geometry",
+                        lambda name: with_(reconstruction(name), steps=20))
+    monkeypatch.setattr(other_bodies, "trained", lambda name: name)
+    monkeypatch.setattr(other_bodies, "learned", lambda name: other_bodies.own if name == "water"
                         else lambda body: fresh(body, Fluid(0.0), NoFlow()))
-    results = done(tmp_path, elsewhere.bodies)
+    results = done(tmp_path, other_bodies.bodies)
     found = {r.target: r for r in results.records("nclaw.fig7")}
     assert found["nclaw.fig7.water.ours"].value == 0.0
     assert 0.0 < found["nclaw.fig7.water.neural"].value < 1.0
     assert "middles are 0 m apart" in found["nclaw.fig7.water.ours"].note
-    titles = [ax.get_title() for ax in nclaw_fig07.draw(results).axes]
+    titles = [ax.get_title() for ax in fig07.draw(results).axes]
     assert titles == ["start", "ours", "neural", "truth"]
 
 
@@ -174,7 +175,7 @@ def test_runs_that_broke_down_are_told(tmp_path):
     x = np.zeros((2, 5, 3))
     runs = {"true": x, "ours": x, "init": np.full_like(x, np.nan)}
     states.record(run, "s", {word: own[-1] for word, own in runs.items()}, 10)
-    elsewhere.show(run, {"a": (lambda: elsewhere.thinned(runs, 10), "five points")})
+    other_bodies.show(run, {"a": (lambda: other_bodies.thinned(runs, 10), "five points")})
     assert [target for target, note in notes.items() if note == states.BROKEN] == [
         "s.init", "e.a.init"]
     assert len(notes) == 4

@@ -6,16 +6,16 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from figures import nclaw_fig02d, nclaw_fig04c
-from figures._bodies import nothing
+from figures.common.bodies import nothing
+from figures.nclaw import fig02d, fig04c
 from mpm_ref.materials import Fluid, NoFlow
-from validation.ldm.kept_bodies import keep
-from validation.nclaw import elsewhere, slope
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
+from validation.ldm.published_bodies import keep
+from validation.nclaw import other_bodies, slope
 from validation.nclaw.environments import ENVIRONMENTS, environment
 from validation.nclaw.evaluate import fresh
 from validation.nclaw.tasks import reconstruction
-from validation.results import Results
-from validation.run import Setting, run_all
 
 mpl.use("Agg")
 
@@ -23,7 +23,7 @@ mpl.use("Agg")
 def kept(folder, id, **arrays):
     """Results that hold points of an experiment."""
     keep(SimpleNamespace(folder=folder, experiment=SimpleNamespace(id=id)), **arrays)
-    return Results(folder)
+    return ProfileResults(folder)
 
 
 def titles(figure):
@@ -45,24 +45,24 @@ def test_the_slope_is_run_with_true_laws_ours_and_admissible_ones(tmp_path, monk
     monkeypatch.setattr(slope, "slope", lambda: reconstruction("water"))
     monkeypatch.setattr(slope, "FEW", 60)
     monkeypatch.setattr(slope, "SHORT", 20)
-    monkeypatch.setattr(elsewhere, "trained", lambda name: name)
-    monkeypatch.setattr(elsewhere, "learned", lambda name: elsewhere.own
+    monkeypatch.setattr(other_bodies, "trained", lambda name: name)
+    monkeypatch.setattr(other_bodies, "learned", lambda name: other_bodies.own
                         if name == "water-admissible"
                         else lambda body: fresh(body, Fluid(0.0), NoFlow()))
-    assert run_all([slope.inclined.experiment], Setting("quick", tmp_path)) == []
-    results = Results(tmp_path)
+    assert run_all([slope.inclined.experiment], RunSetting("quick", tmp_path)) == []
+    results = ProfileResults(tmp_path)
     found = {r.target: r for r in results.records("nclaw.slope")}
     assert not [target for target in found if "jelly" in target]
     assert found["nclaw.slope.water.admissible"].value == 0.0
     assert 0.0 < found["nclaw.slope.water.ours"].value < 1.0
     assert found["nclaw.slope.water.ours"].scale.startswith("60 particles, 20 steps, ")
-    assert titles(nclaw_fig02d.draw(results)) == ["start", "ours", "admissible", "truth"]
+    assert titles(fig02d.draw(results)) == ["start", "ours", "admissible", "truth"]
 
 
 def test_gravity_points_down_in_the_picture():
     g = np.array([[0.0, -1.0, 0.866]])
     balls = nothing()._replace(x=g, n=np.array([[0.0, 1.0, 0.0]]))
-    turned = nclaw_fig02d.turned(balls)
+    turned = fig02d.turned(balls)
     assert turned.x == pytest.approx(np.array([[0.0, -np.linalg.norm(g), 0.0]]), abs=1e-12)
     assert turned.n @ turned.x[0] == pytest.approx(-1.0)     # as far as along the floor's own
 
@@ -70,14 +70,14 @@ def test_gravity_points_down_in_the_picture():
 def test_the_floor_is_under_the_bodies(tmp_path):
     x = np.random.default_rng(0).uniform((0.4, 0.03, 0.2), (0.6, 0.1, 0.7), (2, 40, 3))
     results = kept(tmp_path, "nclaw.slope", water_true=x, water_ours=x, water_admissible=x)
-    panels = nclaw_fig02d.sides({"water_true": x, "water_ours": x}, {"water": "water"})
-    balls = nclaw_fig02d.floor_of(panels)
+    panels = fig02d.sides({"water_true": x, "water_ours": x}, {"water": "water"})
+    balls = fig02d.floor_of(panels)
     floor = balls.x
     assert floor[:, 1] + balls.radius == pytest.approx(3.0 / 128.0)
     for axis in (0, 2):
         assert floor[:, axis].min() <= x[..., axis].min()
         assert floor[:, axis].max() >= x[..., axis].max()
-    assert len(titles(nclaw_fig02d.draw(results))) == 4
+    assert len(titles(fig02d.draw(results))) == 4
 
 
 # The dough.
@@ -88,7 +88,7 @@ def test_the_dough_is_drawn_half_way_and_at_the_end(tmp_path):
     gone = np.full_like(x, np.nan)
     results = kept(tmp_path, "nclaw.dough", block_true=x, star_true=x, block_dough=x, star_dough=x,
                    block_guess=gone, star_guess=x)
-    figure = nclaw_fig04c.draw(results)
+    figure = fig04c.draw(results)
     assert titles(figure)[:5] == ["start", "truth", "ours", "guess\nbroke down", ""]
     assert titles(figure)[5:] == ["", "", "broke down", *8 * [""]]
     sides = [text.get_text() for ax in figure.axes for text in ax.texts if text.get_text()]
@@ -98,9 +98,9 @@ def test_the_dough_is_drawn_half_way_and_at_the_end(tmp_path):
 
 def test_colours_are_distances_from_the_truth_at_that_time():
     x = np.random.default_rng(0).random((3, 30, 3))
-    far = x + nclaw_fig04c.TOP * np.arange(3)[:, None, None]
+    far = x + fig04c.TOP * np.arange(3)[:, None, None]
     at = {"block_true": x, "block_dough": far}
-    same, end = (nclaw_fig04c.drawn(at, ("block", word, 2), "").solid.colour
+    same, end = (fig04c.drawn(at, ("block", word, 2), "").solid.colour
                  for word in ("true", "dough"))
     assert end[0] == pytest.approx(mpl.colormaps["viridis"](1.0)[:3])
     assert same[0] == pytest.approx(mpl.colormaps["viridis"](0.0)[:3])

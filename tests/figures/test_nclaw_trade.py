@@ -6,17 +6,15 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from figures import (
-    extremes_nclaw,
-    extremes_nclaw_epochs,
-    trade_nclaw,
-    trade_nclaw_inference,
-)
-from figures._dots import named
-from mpm_ref.nclaw.strain_watch import BEYOND
+from figures.common.dots import named
+from figures.extremes import nclaw as extremes_nclaw
+from figures.extremes import nclaw_epochs
+from figures.trade import nclaw as trade_nclaw
+from figures.trade import nclaw_inference
+from mpm_ref.nclaw.strain_watch import MAX_EXCESS
 from validation.extremes.nclaw_runs import BAD
 from validation.nclaw.observation import Seen
-from validation.nclaw.trade_nets import BASE, SEEDS, small_nets
+from validation.nclaw.small_trainings import BASE, SEEDS, small_nets
 
 mpl.use("Agg")
 
@@ -111,7 +109,7 @@ def test_steps_stand_by_their_cost():
              "error": [2e-4, 1e-4, np.inf], "true_cpu": [0.4, 0.2, 0.1],
              "true_error": [0.0, 2e-5, np.inf], "pareto": [0, 1, 0]}
     digits = {"environment": ["jelly"] * 2, "bits": [53, 8], "error": [2e-4, 3e-4]}
-    left, right = axes_of(trade_nclaw_inference, dt_steps=steps, digits_digits=digits)
+    left, right = axes_of(nclaw_inference, dt_steps=steps, digits_digits=digits)
     assert labelled(left)["jelly, learned"].get_ydata()[:2] == pytest.approx([2e-4, 1e-4])
     assert labelled(left)["jelly, true laws"].get_xdata()[0] == pytest.approx(0.2)
     assert [text.get_text() for text in left.texts] == ["1", "2", "2"]
@@ -147,7 +145,7 @@ def test_runs_stand_by_how_far_they_leave_the_training(extremes):
     assert len(found["sand"].get_xydata()) == 0
     level, upright = extremes[0].lines[-2:]
     assert list(level.get_ydata()) == [BAD, BAD]
-    assert list(upright.get_xdata()) == [BEYOND, BEYOND]
+    assert list(upright.get_xdata()) == [MAX_EXCESS, MAX_EXCESS]
 
 
 def test_rates_are_shares_of_good_and_of_bad_runs(extremes):
@@ -172,7 +170,7 @@ def test_unfinished_trainings_are_by_epoch_and_faults_in_words():
     seen = sights((BASE, "small-gap-100"), ("gap", "outliers"))
     density = trainings(("small-density-2",), (), gap=[0], outliers=[0.0], own=[7.0])
     faults = {key: [*seen[key], *density[key]] for key in seen}
-    first, second, last = axes_of(extremes_nclaw_epochs, epochs_runs=table, observed_trainings={
+    first, second, last = axes_of(nclaw_epochs, epochs_runs=table, observed_trainings={
         **faults, "density": [1.0, 1.0, 2.0]})
     curve, lost, broken = first.lines
     assert curve.get_xydata() == pytest.approx(np.array([[10.0, 2.0], [300.0, 1.0]]))

@@ -6,8 +6,9 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from figures import extremes_nsf, trade_nsf
-from mpm_ref.reduced.watch import BEYOND
+from figures.extremes import nsf as extremes_nsf
+from figures.trade import nsf as trade_nsf
+from mpm_ref.rom.study.watch import BEYOND
 from validation.extremes.ldm_runs import BAD
 
 mpl.use("Agg")

@@ -12,15 +12,13 @@ from scipy.optimize import minimize
 from mpm_ref.core.law import pk1, psi
 from mpm_ref.core.spectral import svd
 from mpm_ref.core.tensor import mat
-from mpm_ref.hot.admm import ADMM
+from mpm_ref.hot.admm import ADMM, Splitting, isotropic, prox, residual
 from mpm_ref.hot.line_search import Point
 from mpm_ref.hot.methods import minimise
 from mpm_ref.hot.norms import rest_stiffness
-from mpm_ref.hot.proximal import prox, residual
+from mpm_ref.hot.potential import Tangent
 from mpm_ref.hot.report import Watch
-from mpm_ref.hot.splitting import Splitting, isotropic
 from mpm_ref.hot.system import System
-from mpm_ref.hot.tangent import Tangent
 
 
 def penalty(law, d):

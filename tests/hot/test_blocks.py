@@ -8,9 +8,8 @@ from multigrid_matrices import case
 
 from mpm_ref.core.jit import set_threads
 from mpm_ref.hot.multigrid import blocks
-from mpm_ref.hot.multigrid.blocks.inverse import inverse_blocks
 from mpm_ref.hot.multigrid.blocks.product import planes_of, product
-from mpm_ref.hot.multigrid.blocks.sparse import blocks_of, diagonal, reach_of
+from mpm_ref.hot.multigrid.blocks.sparse import blocks_of, diagonal, inverse_blocks, reach_of
 from mpm_ref.hot.multigrid.blocks.sweep import Sweep, correct, residual, split, sweep
 from mpm_ref.hot.multigrid.hierarchy import hierarchy
 from mpm_ref.hot.multigrid.projectors import diagonal_blocks, inverses, onto_range

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hot_cases import CASES, problem_of
 
-from mpm_ref.hot.diagonal import diagonal
+from mpm_ref.hot.assembly import diagonal
 from mpm_ref.hot.multigrid.projectors import diagonal_blocks
 
 

@@ -10,7 +10,7 @@ from hot_toys import DESCENTS, Exact, bar, exactly, quadratic, scalar, tight
 from mpm_ref.hot.descent import Stop, descend
 from mpm_ref.hot.lbfgs import LBFGS
 from mpm_ref.hot.line_search import Point, Rules, search
-from mpm_ref.hot.linear import Linear
+from mpm_ref.hot.linearization import Linear
 from mpm_ref.hot.methods import METHODS, WORDS, Options, minimise, options_of
 from mpm_ref.hot.norms import scaled_norm
 from mpm_ref.hot.report import Watch

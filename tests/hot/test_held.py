@@ -9,7 +9,7 @@ from hot_cases import CASES, DEGREES, over, plain_bodies, problem_of
 from hot_steps import DT, stepper_of
 
 from mpm_ref.hot.lbfgs import LBFGS, PAYS
-from mpm_ref.hot.linear import Linear
+from mpm_ref.hot.linearization import Linear
 from mpm_ref.hot.methods import METHODS, minimise, options_of
 from mpm_ref.plain import transfer
 

@@ -9,7 +9,7 @@ from hot_cases import CASES, DEGREES, DT, problem_of
 from scipy.sparse import block_diag, bsr_array, csr_array
 
 from mpm_ref.core.jit import set_threads
-from mpm_ref.hot.pattern import pattern_of
+from mpm_ref.hot.assembly import pattern_of
 from mpm_ref.plain.spline import pairs
 
 MOST = numba.config.NUMBA_NUM_THREADS

@@ -16,7 +16,7 @@ from mpm_ref.hot.krylov import (
     scalar_jacobi,
     stiffest_tolerance,
 )
-from mpm_ref.hot.linear import by_matrix, symmetric_gauss_seidel
+from mpm_ref.hot.linearization import by_matrix, symmetric_gauss_seidel
 from mpm_ref.hot.multigrid.blocks.sparse import blocks_of
 from mpm_ref.hot.multigrid.projectors import diagonal_blocks
 

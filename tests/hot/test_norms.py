@@ -17,7 +17,7 @@ from mpm_ref.hot.norms import (
     surface,
 )
 from mpm_ref.hot.potential import Potential
-from mpm_ref.hot.unknowns import unknowns_of
+from mpm_ref.hot.system import unknowns_of
 from mpm_ref.materials import NoFlow, make_law
 from mpm_ref.plain.spline import pairs
 

@@ -9,7 +9,7 @@ from mpm_ref.core.levelset import half_space, sphere
 from mpm_ref.core.motion import Motion, Steady
 from mpm_ref.core.state import NONE
 from mpm_ref.hot.constraints import BEARS, FREE, HOLDS, LETS, Restraint
-from mpm_ref.hot.unknowns import free_part, unknowns_of
+from mpm_ref.hot.system import free_part, unknowns_of
 
 DX = 0.5
 

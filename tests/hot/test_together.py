@@ -7,9 +7,9 @@ import pytest
 from hot_cases import CASES, coarser_unknowns, problem_of
 from hot_toys import lattice, tight
 
-from mpm_ref.hot.choices import Choices
 from mpm_ref.hot.methods import METHODS, minimise, options_of
 from mpm_ref.hot.multigrid.geometric import Geometric
+from mpm_ref.hot.multigrid.options import Choices
 from mpm_ref.hot.norms import characteristic_norms
 from mpm_ref.hot.system import System
 

@@ -11,7 +11,7 @@ from mpm_ref.materials.learned import contraction, energetic, weights
 from mpm_ref.materials.learned.contraction import Contraction
 from mpm_ref.materials.learned.invariants import spectrum
 from mpm_ref.nclaw.bodies import points
-from mpm_ref.sealed import sealed
+from mpm_ref.store.weights_file import sealed
 from mpm_ref.timestep import moduli
 from tests.nclaw.test_invariants import REPEATED, built, turns
 
@@ -153,7 +153,7 @@ def test_an_energy_that_falls_with_strain_would_be_told(rng):
     """The check above sees a negative weight."""
     of = toys.energetic()
     broken = of._replace(layers=((-of.layers[0][0], of.layers[0][1]), *of.layers[1:]))
-    law, flow = toys.admissible.elastic(broken), toys.deployed()[1]
+    law, flow = energetic.build_law(broken), toys.deployed()[1]
     F = strained(rng)
     assert (energies(law, after(flow, F)) > energies(law, F)).all()
 
@@ -233,7 +233,7 @@ def test_a_file_of_negative_weights_is_refused(tmp_path):
     path, made = tmp_path / "laws.npz", toys.laws()
     arrays = {"format": np.array(weights.FORMAT), "about": np.array("{}"),
               **{name: a for part in weights.PARTS for name, a in
-                 weights.arrays_of(part, getattr(made, part)).items()}}
+                 weights.law_arrays(part, getattr(made, part)).items()}}
     path.write_bytes(sealed(arrays))
     assert weights.load(path).elastic.kind == made.elastic.kind
     arrays["elastic_W1"] = arrays["elastic_W1"] - 1.0

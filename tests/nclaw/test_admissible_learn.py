@@ -13,20 +13,20 @@ from tests.nclaw.test_invariants import REPEATED, built
 
 torch = pytest.importorskip("torch")
 
-from mpm_ref.cases import observed  # noqa: E402
 from mpm_ref.core.law import kirchhoff, returned  # noqa: E402
 from mpm_ref.materials.learned import learned_flow, learned_law  # noqa: E402
 from mpm_ref.materials.learned.contraction import Contraction  # noqa: E402
 from mpm_ref.materials.learned.energetic import Energetic  # noqa: E402
-from mpm_ref.materials.learned.weights import Laws, load, save  # noqa: E402
+from mpm_ref.materials.learned.weights import LearnedLaws, load, save  # noqa: E402
 from mpm_ref.nclaw.batched_step import world  # noqa: E402
 from mpm_ref.nclaw.train.admissible_laws import START  # noqa: E402
 from mpm_ref.nclaw.train.fit import train  # noqa: E402
 from mpm_ref.nclaw.train.methods import laws_of, trained_of  # noqa: E402
 from mpm_ref.nclaw.train.recipe import Recipe  # noqa: E402
 from mpm_ref.nclaw.train.rollout import squared, trajectory_of  # noqa: E402
-from validation.nclaw.nets import nets  # noqa: E402
-from validation.train_laws import begun  # noqa: E402
+from mpm_ref.trajectories import observed  # noqa: E402
+from validation.nclaw.trained_laws import nets  # noqa: E402
+from validation.training.nclaw import begun  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
@@ -94,7 +94,7 @@ def test_remainder_is_of_second_order_in_the_weights(laws, run, turned):
 
 
 def test_stored_laws_answer_as_the_trained_ones(laws, tmp_path, rng):
-    save(tmp_path / "laws.npz", Laws(*map(trained_of, laws), {}))
+    save(tmp_path / "laws.npz", LearnedLaws(*map(trained_of, laws), {}))
     back, F = load(tmp_path / "laws.npz"), strained(rng)
     law, flow = learned_law(back.elastic), learned_flow(back.plastic)
     with torch.no_grad():

@@ -10,21 +10,22 @@ from mpm_ref.materials.learned import (
     learned_flow,
     learned_law,
     principal,
-    principal_laws,
     response,
     spline,
+    stretch_network,
     weights,
 )
 from mpm_ref.materials.learned.contraction import Contraction
 from mpm_ref.materials.learned.energetic import Energetic
 from mpm_ref.materials.learned.invariants import spectrum
 from mpm_ref.materials.learned.network import NeuralFlow
-from mpm_ref.materials.learned.weights import Laws, Trained
+from mpm_ref.materials.learned.table import TABLES
+from mpm_ref.materials.learned.weights import LawWeights, LearnedLaws
 from tests.nclaw.test_invariants import APART, REPEATED, H, built, near_rest, turns
 
 X = spline.knots()
 FAIR, RELEASED = spline.SplineStress(2.0), spline.ReleasedSplineStress(2.0)
-MEAN, SORTED = principal.StretchStress(2.0), principal.ReleasedStretchStress(2.0)
+MEAN, SORTED = stretch_network.StretchStress(2.0), stretch_network.ReleasedStretchStress(2.0)
 MU, LAM = 3.0, 2.0
 
 
@@ -95,7 +96,7 @@ def test_splines_hold_fixed_corotated_exactly(rng):
     """f = 2 mu (x - 1), g = 0, h = lam (x - 1)."""
     F = near_rest(20, 3, rng)
     values = np.stack([2.0 * MU * (X - 1.0), 0.0 * X, LAM * (X - 1.0)], axis=1) / FAIR.unit
-    law = principal_laws.elastic(Trained(((values, np.zeros(3)),), FAIR))
+    law = spline.build_law(LawWeights(((values, np.zeros(3)),), FAIR))
     expected = stresses(F, materials.FixedCorotated(MU, LAM))
     assert stresses(F, law) == pytest.approx(expected, abs=1e-11)
 
@@ -104,7 +105,7 @@ def test_splines_read_areas(rng):
     """g alone: of 2 x - 3 P_i = sum_j (2 s_i s_j - 3) s_j."""
     s = np.array([1.3, 1.1, 0.7])
     values = np.stack([0.0 * X, 2.0 * X - 3.0, 0.0 * X], axis=1) / FAIR.unit
-    law = principal_laws.elastic(Trained(((values, np.zeros(3)),), FAIR))
+    law = spline.build_law(LawWeights(((values, np.zeros(3)),), FAIR))
     y = [sum((2.0 * s[i] * s[j] - 3.0) * s[j] for j in range(3) if j != i) for i in range(3)]
     assert np.diagonal(stresses(np.diag(s)[None], law)[0]) == pytest.approx(y * s)
 
@@ -125,13 +126,14 @@ def test_sorted_network_is_that_of_numpy(rng):
     of = spectrum(F)
     y = SORTED.unit * plain(layers, of.s)
     expected = of.U @ ((y * of.s)[:, :, None] * of.U.transpose(0, 2, 1))
-    assert stresses(F, principal_laws.elastic(Trained(layers, SORTED))) == pytest.approx(expected)
+    law = stretch_network.build_law(LawWeights(layers, SORTED))
+    assert stresses(F, law) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("s", [(1.2, 1.2, 0.9), (1.2, 0.9, 0.9), (1.1, 1.1, 1.1)])
 def test_mean_over_orders_is_isotropic(s, rng):
     """tau(Q F Q') = Q tau(F) Q^T, where stretches are equal too."""
-    law = principal_laws.elastic(Trained(network(rng), MEAN))
+    law = stretch_network.build_law(LawWeights(network(rng), MEAN))
     Q, P = turns(5, 3, rng), turns(5, 3, rng)
     tau = stresses(np.diag(s)[None], law)
     expected = Q @ tau @ Q.transpose(0, 2, 1)
@@ -143,33 +145,29 @@ def test_mean_over_orders_is_the_mean(rng):
     y = np.zeros(3)
     for order in ([0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]):
         y[order] += MEAN.unit * plain(layers, s[order]) / 6.0
-    tau = stresses(np.diag(s)[None], principal_laws.elastic(Trained(layers, MEAN)))
+    tau = stresses(np.diag(s)[None], stretch_network.build_law(LawWeights(layers, MEAN)))
     assert tau[0] == pytest.approx(np.diag(y * s), abs=1e-12)
 
 
-@pytest.mark.parametrize(("trained", "said"), [
-    (Trained((), response.Stress()), "kind Stress: expected splines or a network"),
-    (Trained((), MEAN), r"sizes \[\]: expected three"),
-])
-def test_laws_of_other_kinds_are_refused(trained, said):
-    with pytest.raises(ValueError, match=said):
-        principal_laws.elastic(trained)
+def test_a_network_of_other_layers_is_refused():
+    with pytest.raises(ValueError, match=r"sizes \[\]: expected three"):
+        stretch_network.build_law(LawWeights((), MEAN))
 
 
 def test_every_stored_law_has_a_law_and_a_flow(rng):
     layers = ((rng.normal(size=(13, 9)), np.zeros(9)),)
-    assert isinstance(learned_law(beside(FAIR, rng)), principal_laws.Splines)
-    assert isinstance(learned_law(beside(SORTED, rng)), principal_laws.Network)
-    assert isinstance(learned_flow(Trained(layers, response.Correction())), NeuralFlow)
+    assert isinstance(learned_law(beside(FAIR, rng)), spline.SplineLaw)
+    assert isinstance(learned_law(beside(SORTED, rng)), stretch_network.StretchNetworkLaw)
+    assert isinstance(learned_flow(LawWeights(layers, response.Correction())), NeuralFlow)
     for kind, made in ((materials.Hencky(1.0, 2.0), learned_law),
                        (materials.VonMises(1.0, 0.05), learned_flow),
                        (materials.NoFlow(), learned_flow)):
-        assert made(Trained((), kind)) is kind
+        assert made(LawWeights((), kind)) is kind
     for kind, made in ((materials.VonMises(1.0, 0.05), learned_law),
                        (response.Correction(), learned_law),
                        (materials.Hencky(1.0, 2.0), learned_flow)):
         with pytest.raises(ValueError, match=type(kind).__name__):
-            made(Trained((), kind))
+            made(LawWeights((), kind))
 
 
 # The adjoint.
@@ -223,12 +221,12 @@ def test_ratios_are_exact_but_for_small_gaps():
 # Files.
 
 def beside(kind, rng):
-    """`Trained` of a kind of `weights.BESIDE`; records of equal numbers are equal, their types not.
-    """
+    """`LawWeights` of a kind; records of equal numbers are equal, their types not."""
     sizes = {type(MEAN): ((3, 6), (6, 3)), type(SORTED): ((3, 6), (6, 6), (6, 3)),
              Energetic: ((4, 5), (5, 1)), Contraction: ((3, 5), (5, 2)),
              type(FAIR): ((21, 3),), type(RELEASED): ((21, 3),)}.get(type(kind), ())
-    return Trained(tuple((abs(rng.normal(size=size)), np.zeros(size[1])) for size in sizes), kind)
+    layers = tuple((abs(rng.normal(size=size)), np.zeros(size[1])) for size in sizes)
+    return LawWeights(layers, kind)
 
 
 LAWS = {"elastic": (MEAN, SORTED, FAIR, RELEASED, Energetic(2e4), materials.Fluid(3.0),
@@ -239,10 +237,11 @@ LAWS = {"elastic": (MEAN, SORTED, FAIR, RELEASED, Energetic(2e4), materials.Flui
 
 def test_every_law_that_is_compared_comes_back_from_a_file(tmp_path, rng):
     assert {part: {type(kind) for kind in kinds} for part, kinds in LAWS.items()} == {
-        part: set(kinds) for part, kinds in weights.BESIDE.items()}
+        part: set(kinds) - {*response.STRESSES, *response.CORRECTIONS}
+        for part, kinds in TABLES.items()}
     for elastic in LAWS["elastic"]:
         for plastic in LAWS["plastic"]:
-            laws = Laws(beside(elastic, rng), beside(plastic, rng), {})
+            laws = LearnedLaws(beside(elastic, rng), beside(plastic, rng), {})
             weights.save(tmp_path / "laws.npz", laws)
             back = weights.load(tmp_path / "laws.npz")
             assert (back.elastic.kind, back.plastic.kind) == (elastic, plastic)
@@ -254,12 +253,13 @@ def test_every_law_that_is_compared_comes_back_from_a_file(tmp_path, rng):
 
 
 @pytest.mark.parametrize(("elastic", "said"), [
-    (Trained(((np.zeros((20, 3)), np.zeros(3)),), FAIR), r"layers of sizes \[\(20, 3\)\]"),
-    (Trained((), FAIR), "without layers"),
-    (Trained(((np.zeros((3, 3)), np.zeros(3)),), materials.Hencky(1.0, 2.0)), "layers of sizes"),
-    (Trained((), materials.VonMises(5.0, 0.05)), "elastic law of kind VonMises, expected Stress"),
-    (Trained((), materials.Hencky(1.0, np.nan)), "entries that are not finite"),
+    (LawWeights(((np.zeros((20, 3)), np.zeros(3)),), FAIR), r"layers of sizes \[\(20, 3\)\]"),
+    (LawWeights((), FAIR), "without layers"),
+    (LawWeights(((np.zeros((3, 3)), np.zeros(3)),), materials.Hencky(1.0, 2.0)), "layers of sizes"),
+    (LawWeights((), materials.VonMises(5.0, 0.05)), "elastic law of kind VonMises, expected"),
+    (LawWeights((), materials.Hencky(1.0, np.nan)), "entries that are not finite"),
 ])
 def test_layers_that_a_kind_has_not_are_refused(tmp_path, elastic, said):
     with pytest.raises(ValueError, match=said):
-        weights.save(tmp_path / "laws.npz", Laws(elastic, Trained((), materials.NoFlow()), {}))
+        weights.save(tmp_path / "laws.npz",
+                     LearnedLaws(elastic, LawWeights((), materials.NoFlow()), {}))

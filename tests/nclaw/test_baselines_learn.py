@@ -15,20 +15,26 @@ torch = pytest.importorskip("torch")
 
 from mpm_ref.core.law import kirchhoff  # noqa: E402
 from mpm_ref.materials import NoFlow  # noqa: E402
-from mpm_ref.materials.learned import principal, principal_laws, response, spline, weights  # noqa: E402
+from mpm_ref.materials.learned import (  # noqa: E402
+    learned_law,
+    response,
+    spline,
+    stretch_network,
+    weights,
+)
 from mpm_ref.materials.learned.invariants import invariants, rotations, spectrum  # noqa: E402
 from mpm_ref.nclaw.train.kinds import described  # noqa: E402
 from mpm_ref.nclaw.train.methods import METHODS, laws_of, trained_of  # noqa: E402
 from mpm_ref.nclaw.train.principal_laws import ReleasedStretchLaw, StretchLaw  # noqa: E402
 from validation.nclaw.environments import ENVIRONMENTS  # noqa: E402
-from validation.nclaw.nets import Net, identity, nets  # noqa: E402
-from validation.train_laws import begun  # noqa: E402
+from validation.nclaw.trained_laws import Net, identity, nets  # noqa: E402
+from validation.training.nclaw import begun  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
 KINDS = {"spline": spline.SplineStress(2.0), "released spline": spline.ReleasedSplineStress(2.0),
-         "neural": principal.StretchStress(2.0),
-         "released neural": principal.ReleasedStretchStress(2.0)}
+         "neural": stretch_network.StretchStress(2.0),
+         "released neural": stretch_network.ReleasedStretchStress(2.0)}
 ABLATIONS = {"no rotation": (response.PlainStress(2.0), response.PlainCorrection(0.3)),
              "no undeformed": (response.Stress(2.0), response.Correction(0.3))}
 
@@ -97,7 +103,7 @@ def test_gradient_by_weights_is_exact(name, rng):
 @pytest.mark.parametrize("name", KINDS)
 def test_stored_law_answers_as_the_trained_one(name, rng):
     law = law_of(name, rng)
-    stored = principal_laws.elastic(trained_of(law))
+    stored = learned_law(trained_of(law))
     for stretches in APART:
         F = built(stretches, 4, 3, rng)
         tau = [kirchhoff(tuple(map(tuple, A.tolist())), stored) for A in F]
@@ -187,7 +193,7 @@ def test_no_two_nets_are_told_alike():
 def test_every_net_begins_and_is_stored(name, tmp_path):
     """With the method and the kinds that it names."""
     net = nets()[name]
-    stored = weights.Laws(*map(trained_of, begun(net)), identity(net))
+    stored = weights.LearnedLaws(*map(trained_of, begun(net)), identity(net))
     weights.save(tmp_path / "laws.npz", stored)
     back = weights.load(tmp_path / "laws.npz")
     kinds = [type(law.kind).__name__ for law in (back.elastic, back.plastic)]

@@ -12,12 +12,12 @@ from mpm_ref.materials import FixedCorotated, Fluid, FluidProjection, Hencky, No
 from mpm_ref.materials.learned import network, response
 from mpm_ref.nclaw.dissipation import balance, first_piola, loops, returned, work
 from tests.nclaw.test_admissible import energies, strained
-from validation.nclaw import dissipation, nets
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
+from validation.common.weights_needed import Untrained
+from validation.nclaw import dissipation, trained_laws
 from validation.nclaw.dissipation import CREATED, Pair
 from validation.nclaw.environments import ENVIRONMENTS
-from validation.results import Results
-from validation.run import Setting, run_all
-from validation.waiting import Untrained
 
 JELLY, CLAY = FixedCorotated(4e4, 3e4), Hencky(1.2e5, 1.2e5)
 YIELD = VonMises(5e3, 0.05)
@@ -78,7 +78,7 @@ def test_work_is_energy_and_what_returns_take(pair, closed):
 
 def test_a_stress_without_energy_creates_some():
     """What a loop takes it gives back the other way round: half of them create."""
-    law = network.elastic(neural_toys.trained(response.Stress(1e4), 3))
+    law = network.build_law(neural_toys.trained(response.Stress(1e4), 3))
     G = loops(30, 0.1, 100, np.random.default_rng(0))
     one, other = balance(law, NoFlow(), G), balance(law, NoFlow(), G[::-1])
     assert one.work == pytest.approx(-other.work, rel=1e-6, abs=1e-9 * one.moved.max())
@@ -91,7 +91,7 @@ def test_a_return_that_adds_strain_is_told(closed):
     grown = neural_toys.trained(response.Correction(), 3, hidden=())
     W = np.zeros((13, 9))
     W[[3, 7, 11], [0, 4, 8]] = 20.0         # F' = F + alpha R diag(20 (C - I)): more of the same
-    flow = network.plastic(grown._replace(layers=((W, np.zeros(9)),)))
+    flow = network.build_flow(grown._replace(layers=((W, np.zeros(9)),)))
     found = balance(CLAY, flow, closed)
     assert found.taken.max() < 0.0
     assert found.share.min() < -CREATED
@@ -103,14 +103,14 @@ def results(tmp_path, monkeypatch, laws):
     monkeypatch.setattr(dissipation, "known", lambda run: laws)
     monkeypatch.setattr(dissipation, "SIZES", (0.1,))
     failed = run_all([dissipation.dissipation.experiment],
-                     Setting("quick", tmp_path))
+                     RunSetting("quick", tmp_path))
     assert not failed
-    found = Results(tmp_path)
+    found = ProfileResults(tmp_path)
     return {r.target: r for r in found.records("nclaw.dissipation")}, found
 
 
 def test_the_experiment_tells_laws_apart(tmp_path, monkeypatch):
-    stress = network.elastic(neural_toys.trained(response.Stress(1e4), 3))
+    stress = network.build_law(neural_toys.trained(response.Stress(1e4), 3))
     records, found = results(tmp_path, monkeypatch, {
         ("true", "jelly"): Pair(JELLY, NoFlow()), ("ours", "jelly"): Pair(stress, NoFlow()),
         ("admissible", "plasticine"): Pair(*toys.deployed(shift=2.0))})
@@ -127,7 +127,7 @@ def test_the_experiment_tells_laws_apart(tmp_path, monkeypatch):
 
 
 def test_laws_that_must_not_create_energy_miss_if_they_do(tmp_path, monkeypatch):
-    stress = network.elastic(neural_toys.trained(response.Stress(1e4), 3))
+    stress = network.build_law(neural_toys.trained(response.Stress(1e4), 3))
     records, _ = results(tmp_path, monkeypatch, {
         ("admissible", "jelly"): Pair(stress, NoFlow())})
     assert records["nclaw.dissipation.admissible.jelly.cycles.0.1.creating"].verdict == "miss"
@@ -137,7 +137,7 @@ def test_known_laws_are_true_and_trained_ones(monkeypatch):
     def trained(name):
         if name == "sand-admissible":
             raise Untrained("no weights sand-admissible.npz: train")
-        return nets.trained("jelly")
+        return trained_laws.trained("jelly")
 
     run, said = SimpleNamespace(experiment=dissipation.dissipation.experiment), []
     run.record = lambda target, value, **more: said.append((target, value, more["note"]))
@@ -151,8 +151,8 @@ def test_known_laws_are_true_and_trained_ones(monkeypatch):
 
 def test_old_weights_keep_their_identity():
     """Those of jelly were written before there were admissible laws."""
-    assert nets.trained("jelly").about["environment"] == "jelly"
+    assert trained_laws.trained("jelly").about["environment"] == "jelly"
     for name in ("jelly-admissible", "water-admissible"):
-        told = nets.identity(nets.nets()[name])
+        told = trained_laws.identity(trained_laws.nets()[name])
         assert (told["elastic"], told["plastic"]) == ("Energetic", "Contraction")
         assert (told["elastic_rate"], told["plastic_rate"]) == (0.1, 0.01)

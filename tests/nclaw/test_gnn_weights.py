@@ -9,7 +9,7 @@ from neural_toys import laws
 from mpm_ref.materials.learned import weights as of_laws
 from mpm_ref.nclaw.gnn.network import Perceptron
 from mpm_ref.nclaw.gnn.weights import FORMAT, arrays_of, load, named, save
-from mpm_ref.sealed import sealed
+from mpm_ref.store.weights_file import sealed
 
 
 def numbers(simulator):

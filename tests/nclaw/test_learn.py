@@ -14,7 +14,6 @@ from tests.nclaw.test_invariants import near_rest, turns
 
 torch = pytest.importorskip("torch")
 
-from mpm_ref.cases import observed  # noqa: E402
 from mpm_ref.materials.learned.response import Correction, Stress, SymmetricStress  # noqa: E402
 from mpm_ref.nclaw.batched_step import world  # noqa: E402
 from mpm_ref.nclaw.train.autograd import Invariants  # noqa: E402
@@ -25,6 +24,7 @@ from mpm_ref.nclaw.train.recipe import Recipe  # noqa: E402
 from mpm_ref.nclaw.train.rollout import Laws, squared, trajectory_of  # noqa: E402
 from mpm_ref.nclaw.train.teacher import Teacher  # noqa: E402
 from mpm_ref.scene import build  # noqa: E402
+from mpm_ref.trajectories import observed  # noqa: E402
 from validation.nclaw.environments import environment, trajectory  # noqa: E402
 
 STEPS = 9

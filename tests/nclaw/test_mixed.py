@@ -6,7 +6,7 @@ import pytest
 from mpm_ref.materials.learned.network import NeuralStress
 from mpm_ref.scene import build, loads
 from mpm_ref.simulate import simulate
-from validation.nclaw.nets import FOLDER
+from validation.nclaw.trained_laws import FOLDER
 
 STEPS, DT = 60, 5e-4
 NEAR = 0.05         # of what the impact does, which the law was not trained on; it is 0.025 off

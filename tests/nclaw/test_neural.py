@@ -13,10 +13,9 @@ from problems import digest as digest_of
 from small_runs import block
 
 from mpm_ref.adjoint import deform_body_adjoint, zero_bars, zero_sums
-from mpm_ref.body import Body, particles_at
+from mpm_ref.body import Body, check_fit, particles_at
 from mpm_ref.energy import energy
 from mpm_ref.explicit import Scheme, deform_body, initial_stress
-from mpm_ref.fit import check_fit
 from mpm_ref.materials import Hencky, NoFlow, make_flow
 from mpm_ref.materials.learned import network, response, weights
 from mpm_ref.problem import Clock, Problem
@@ -62,9 +61,9 @@ material = { law = "fixed_corotated", E = 1e5, nu = 0.3 }
 
 
 def answers(of, F):
-    """Of a `weights.Trained`, as compiled; F (n, d, d)."""
+    """Of a `LawWeights`, as compiled; F (n, d, d)."""
     stress = type(of.kind) in STRESSES
-    law = network.elastic(of) if stress else network.plastic(of)
+    law = network.build_law(of) if stress else network.build_flow(of)
     name = network.kirchhoff if stress else network.respond
     return np.array([name(tuple(map(tuple, F_p.tolist())), law) for F_p in F])
 
@@ -74,14 +73,15 @@ def body_of(laws, F):
     n, d = F.shape[:2]
     q = particles_at(np.zeros((n, d)), np.zeros((n, d)), np.ones(n), np.ones(n))
     q.F[:] = F
-    return Body("b", q, network.elastic(laws.elastic), network.plastic(laws.plastic), np.arange(n))
+    law, flow = network.build_law(laws.elastic), network.build_flow(laws.plastic)
+    return Body("b", q, law, flow, np.arange(n))
 
 
 def mixed():
     """A learned block beside a classical one that hits it, on one grid."""
     made = neural_toys.laws(2)
     left = block("left", (0.3, 0.5), (0.0, 0.0))
-    left = left._replace(law=network.elastic(made.elastic), flow=network.plastic(made.plastic))
+    left = left._replace(law=network.build_law(made.elastic), flow=network.build_flow(made.plastic))
     right = block("right", (0.5, 0.5), (-1.0, 0.0))
     return Problem((left, right), DX, Clock(dt=1e-3, steps=10, every=5), np.zeros(2), Scheme())
 
@@ -146,9 +146,9 @@ def test_what_is_not_finite_gives_nan(d):
 
 def test_answers_of_the_wrong_kind_are_refused():
     with pytest.raises(ValueError, match="kind Correction: expected Stress or"):
-        network.elastic(trained(response.Correction(), 2))
+        network.build_law(trained(response.Correction(), 2))
     with pytest.raises(ValueError, match="kind Stress: expected Correction or"):
-        network.plastic(trained(response.Stress(), 2))
+        network.build_flow(trained(response.Stress(), 2))
 
 
 # what a step makes of them
@@ -179,13 +179,13 @@ def test_a_learned_return_map_goes_with_a_classical_law():
 @pytest.mark.parametrize("seed", range(3))
 def test_stiffness_at_rest_is_that_of_small_strains(d, seed):
     of, h = trained(response.Stress(UNIT), d, seed=seed), 1e-4
-    law = network.elastic(of)
+    law = network.build_law(of)
     wave = max(plain(of, np.diag(1.0 + step * axis))[k, k] / step
                for k, axis in enumerate(np.eye(d)) for step in (h, -h))
     assert law.wave == pytest.approx(max(wave, 0.0), rel=1e-2)
     dilated = abs(np.trace(plain(of, (1.0 + h) * np.eye(d)))) / (d * h)
     assert law.largest >= (1.0 - 1e-2) * max(wave, dilated)
-    body = body_of(weights.Laws(of, trained(response.Correction(), d), {}), deformations(d))
+    body = body_of(weights.LearnedLaws(of, trained(response.Correction(), d), {}), deformations(d))
     assert all((K == value).all() for K, value in zip(moduli(body), (law.wave, law.largest)))
 
 
@@ -242,8 +242,8 @@ def test_a_scene_takes_both_laws_from_its_file(folder):
     laws = neural_toys.laws(2)
     assert isinstance(body.law, network.NeuralStress)
     assert isinstance(body.flow, network.NeuralCorrection)
-    assert np.array_equal(body.law.W, network.elastic(laws.elastic).W)
-    assert np.array_equal(body.flow.W, network.plastic(laws.plastic).W)
+    assert np.array_equal(body.law.W, network.build_law(laws.elastic).W)
+    assert np.array_equal(body.flow.W, network.build_flow(laws.plastic).W)
 
 
 def test_weights_belong_to_the_hash_of_a_scene(folder):

@@ -33,8 +33,8 @@ from mpm_ref.nclaw.train.methods import laws_of, trained_of  # noqa: E402
 from mpm_ref.nclaw.train.recipe import Recipe  # noqa: E402
 from mpm_ref.nclaw.train.rollout import Laws, Trajectory, step  # noqa: E402
 from mpm_ref.nclaw.train.sysid import START, KnownReturn, KnownStress, known_laws  # noqa: E402
-from validation.nclaw.nets import nets  # noqa: E402
-from validation.train_laws import begun  # noqa: E402
+from validation.nclaw.trained_laws import nets  # noqa: E402
+from validation.training.nclaw import begun  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 

@@ -9,20 +9,31 @@ from command_line import assert_told, mpm_ref
 from nclaw_toys import cube
 
 from mpm_ref.body import Body, particles_at, permute
-from mpm_ref.cases import observed
 from mpm_ref.materials import FixedCorotated, Fluid, NoFlow
 from mpm_ref.materials.learned import weights
-from mpm_ref.materials.learned.strain_range import measures, seen
+from mpm_ref.materials.learned.strain_range import (
+    excess,
+    stored_bounds,
+    strain_bounds,
+    strain_measures,
+)
 from mpm_ref.monitor import CHECK
 from mpm_ref.nclaw import strain_watch as watching
 from mpm_ref.nclaw.bodies import fresh, own
-from mpm_ref.nclaw.strain_watch import BEYOND, Watch, beyond, known, look, other_steps, watch
+from mpm_ref.nclaw.strain_watch import (
+    MAX_EXCESS,
+    StrainWatch,
+    strain_report,
+    strain_watch,
+    time_step_warnings,
+)
 from mpm_ref.nclaw.train.recipe import Recipe
 from mpm_ref.nclaw.train.strains import LARGEST, cuts_of, met
 from mpm_ref.problem import Clock, Problem
 from mpm_ref.scene import SceneError, build, load
 from mpm_ref.simulate import State
 from mpm_ref.store.results import Results
+from mpm_ref.trajectories import observed
 
 BOUNDS = {"low": [0.9, 0.8, 0.7], "high": [1.4, 1.0, 1.2], "dt": None}     # 2D: s_0, s_1, J
 SCENE = """
@@ -46,7 +57,7 @@ material = {{ law = "neural", weights = "laws.npz" }}
 
 def out(*rows):
     """How far strains (s_0, s_1, J) are out of BOUNDS."""
-    return beyond(np.array(rows), BOUNDS)
+    return excess(np.array(rows), BOUNDS)
 
 
 def body(*F, name="one"):
@@ -72,39 +83,39 @@ def test_distances_are_shares_of_the_width_on_either_side():
 def test_inverted_points_are_infinitely_far_unless_training_saw_some():
     assert out([1.0, -0.9, -0.9], [1.0, 0.0, 0.0]).tolist() == [np.inf, np.inf]
     wide = {"low": [0.9, -1.0, -1.0], "high": [1.4, 1.0, 1.2]}
-    assert beyond(np.array([[1.0, -0.9, -0.9]]), wide).tolist() == [0.0]
+    assert excess(np.array([[1.0, -0.9, -0.9]]), wide).tolist() == [0.0]
 
 
 @pytest.mark.parametrize("a", [np.nan, np.inf])
 def test_what_is_not_finite_is_infinitely_far(a):
     F = np.eye(2)
     F[0, 1] = a
-    sight = look(body(np.eye(2), F), BOUNDS)
-    assert (sight.particle, sight.beyond, sight.count, sight.n) == (1, np.inf, 1, 2)
+    sight = strain_report(body(np.eye(2), F), BOUNDS)
+    assert (sight.particle, sight.excess, sight.count, sight.n) == (1, np.inf, 1, 2)
 
 
 def test_laws_that_saw_rest_alone_have_narrow_bounds():
-    rest = seen(np.eye(2)[None])
-    assert beyond(measures(np.eye(2)[None]), rest).tolist() == [0.0]
-    assert beyond(measures(1.001 * np.eye(2)[None]), rest)[0] > 1e5
+    rest = strain_bounds(np.eye(2)[None])
+    assert excess(strain_measures(np.eye(2)[None]), rest).tolist() == [0.0]
+    assert excess(strain_measures(1.001 * np.eye(2)[None]), rest)[0] > 1e5
 
 
 def test_the_farthest_point_is_named_by_its_own_number():
     far, near = np.diag([1.8, 0.9]), np.diag([1.5, 0.9])
     one = body(np.eye(2), near, far)
     permute(one, np.array([2, 0, 1]))
-    sight = look(one, BOUNDS)
-    assert (sight.particle, sight.count, sight.astray) == (2, 1, True)
+    sight = strain_report(one, BOUNDS)
+    assert (sight.particle, sight.count, sight.out_of_range) == (2, 1, True)
     assert sight.measures == pytest.approx((1.8, 0.9, 1.62))
     assert sight.J == sight.measures[-1]
-    assert not look(body(np.eye(2), near), BOUNDS).astray
-    assert 0.0 < look(body(np.eye(2), near), BOUNDS).beyond <= BEYOND
+    assert not strain_report(body(np.eye(2), near), BOUNDS).out_of_range
+    assert 0.0 < strain_report(body(np.eye(2), near), BOUNDS).excess <= MAX_EXCESS
 
 
 def test_fluids_that_carry_J_are_looked_at():
     q = particles_at(np.zeros((1, 2)), np.zeros((1, 2)), np.ones(1), np.ones(1), fluid=True)
     q.F[:] = 0.49
-    sight = look(Body("f", q, Fluid(1.0), NoFlow(), np.arange(1)), BOUNDS)
+    sight = strain_report(Body("f", q, Fluid(1.0), NoFlow(), np.arange(1)), BOUNDS)
     assert sight.measures == pytest.approx((0.7, 0.7, 0.49))
 
 
@@ -115,7 +126,7 @@ def far_body(name="one"):
 
 
 def test_a_run_says_it_once_for_each_body():
-    sight = Watch({"one": BOUNDS, "two": BOUNDS})
+    sight = StrainWatch({"one": BOUNDS, "two": BOUNDS})
     first = sight.news(State((far_body(), body(np.eye(2), name="two")), step=CHECK, t=0.5))
     assert len(first) == 1
     assert first[0] == (
@@ -130,34 +141,34 @@ def test_a_run_says_it_once_for_each_body():
 
 
 def test_a_run_is_looked_at_now_and_then():
-    sight = Watch({"one": BOUNDS})
+    sight = StrainWatch({"one": BOUNDS})
     assert sight.news(State((far_body(),), step=CHECK - 1)) == []
     assert sight.news(State((far_body(),), step=CHECK)) != []
 
 
 def test_bodies_of_other_laws_are_not_looked_at(monkeypatch):
-    sight = Watch({"two": BOUNDS})
+    sight = StrainWatch({"two": BOUNDS})
     assert sight.news(State((far_body(), body(np.eye(2), name="two")), step=CHECK)) == []
 
 
 def test_without_learned_laws_nothing_watches():
     problem = cube(3)
-    assert watch(problem) is None
-    problem.seen["one"] = BOUNDS
-    assert isinstance(watch(problem), Watch)
+    assert strain_watch(problem) is None
+    problem.strain_bounds["one"] = BOUNDS
+    assert isinstance(strain_watch(problem), StrainWatch)
 
 
 # what weights say
 
 def test_weights_that_say_nothing_are_no_bounds():
-    assert known({"scene": "x"}, 3) is None
+    assert stored_bounds({"scene": "x"}, 3) is None
 
 
 def test_bounds_and_time_step_are_read():
     about = {"seen": {"low": [0.9, 0.8, 0.7], "high": [1.4, 1.0, 1.2]}, "dt": 5e-4}
-    assert known(about, 2) == {**BOUNDS, "dt": 5e-4}
+    assert stored_bounds(about, 2) == {**BOUNDS, "dt": 5e-4}
     del about["dt"]
-    assert known(about, 2) == BOUNDS
+    assert stored_bounds(about, 2) == BOUNDS
 
 
 @pytest.mark.parametrize("given", [
@@ -168,13 +179,13 @@ def test_bounds_and_time_step_are_read():
 def test_what_are_no_bounds_is_refused(given):
     with pytest.raises(ValueError, match=r"strains seen in training: .*; expected low and high, "
                                          "for 2 stretches and J; train again"):
-        known({"seen": given}, 2)
+        stored_bounds({"seen": given}, 2)
 
 
 @pytest.mark.parametrize("dt", ["fast", -1.0, 0.0, [1.0]])
 def test_what_is_no_time_step_is_refused(dt):
     with pytest.raises(ValueError, match=r"time step of training: .*; expected a number above 0"):
-        known({"seen": {"low": [0.9, 0.8, 0.7], "high": [1.4, 1.0, 1.2]}, "dt": dt}, 2)
+        stored_bounds({"seen": {"low": [0.9, 0.8, 0.7], "high": [1.4, 1.0, 1.2]}, "dt": dt}, 2)
 
 
 @pytest.mark.parametrize(("clock", "said"), [
@@ -182,8 +193,8 @@ def test_what_is_no_time_step_is_refused(dt):
     (Clock(steps=1), ["an adaptive one"])])
 def test_other_time_steps_are_told(clock, said):
     problem = Problem((body(np.eye(2)),), 0.1, clock, np.zeros(2),
-                      seen={"one": {**BOUNDS, "dt": 1e-3}, "two": BOUNDS})
-    found = list(other_steps(problem))
+                      strain_bounds={"one": {**BOUNDS, "dt": 1e-3}, "two": BOUNDS})
+    found = list(time_step_warnings(problem))
     assert len(found) == len(said)
     assert all("trained in steps of 0.001 s" in one and words in one
                for one, words in zip(found, said, strict=True))
@@ -199,7 +210,7 @@ def soft(one):
 def test_what_is_met_is_of_the_run_and_of_segments():
     """With the true laws, segments are the run; with others they strain otherwise."""
     run = observed(cube(40))
-    alone = seen(run.F)
+    alone = strain_bounds(run.F)
     same = met(cube(40), run, own, [0, 5, 40])
     assert all(same[end] == pytest.approx(alone[end]) for end in alone)
     other = met(cube(40), run, soft, [0, 40])
@@ -213,7 +224,7 @@ def test_segments_begin_in_the_observed_state():
     """The short one of the late run strains otherwise than the long one."""
     run = observed(cube(40))
     late, whole, alone = met(cube(40), run, soft, [30, 40]), met(cube(40), run, soft, [0, 40]), \
-        seen(run.F)
+        strain_bounds(run.F)
     assert late["high"][0] > 1.01 * alone["high"][0]
     assert late["low"] == alone["low"]
     assert whole["low"][-1] < 0.95 * alone["low"][-1]
@@ -224,10 +235,10 @@ def test_segments_that_break_down_count_as_far_as_they_went():
     found = met(cube(12), run, lambda one: fresh(one, FixedCorotated(4e6, 3e6), one.flow),
                 [0, 12])
     assert max(map(abs, found["low"] + found["high"])) <= LARGEST
-    assert found["high"][0] > 1.1 * seen(run.F)["high"][0]
+    assert found["high"][0] > 1.1 * strain_bounds(run.F)["high"][0]
     hopeless = met(cube(12), run, lambda one: fresh(one, FixedCorotated(1e200, 1e200), one.flow),
                    [0, 12])
-    assert hopeless == seen(run.F)
+    assert hopeless == strain_bounds(run.F)
 
 
 def test_frames_that_were_not_seen_are_left_out():
@@ -258,8 +269,8 @@ def made(folder, about, speed=-3.0):
 
 def test_a_scene_takes_bounds_from_its_weights(tmp_path):
     scene = made(tmp_path, {"seen": NARROW, "dt": 1e-3})
-    assert build(load(scene)).seen == {"learned": {**NARROW, "dt": 1e-3}}
-    assert build(load(made(tmp_path, {}))).seen == {}
+    assert build(load(scene)).strain_bounds == {"learned": {**NARROW, "dt": 1e-3}}
+    assert build(load(made(tmp_path, {}))).strain_bounds == {}
     with pytest.raises(SceneError, match=r"body\[0\].material.weights.*strains seen in training"):
         build(load(made(tmp_path, {"seen": {"low": [1.0]}})))
 
@@ -289,7 +300,7 @@ def test_another_time_step_is_told_before_the_run(tmp_path):
 
 
 def test_a_run_without_learned_laws_is_never_looked_at(tmp_path, monkeypatch):
-    monkeypatch.setattr(watching, "look", None)
+    monkeypatch.setattr(watching, "strain_report", None)
     text = SCENE.format(speed=-3.0).replace('law = "neural", weights = "laws.npz"',
                                             'law = "fixed_corotated", E = 1e5, nu = 0.3')
     (tmp_path / "scene.toml").write_text(text)

@@ -9,8 +9,7 @@ from nclaw_toys import cube
 
 torch = pytest.importorskip("torch")
 
-from mpm_ref import cost  # noqa: E402
-from mpm_ref.cases import observed  # noqa: E402
+from mpm_ref import training  # noqa: E402
 from mpm_ref.materials.learned.response import Correction, PlainStress, Stress  # noqa: E402
 from mpm_ref.nclaw.batched_step import world  # noqa: E402
 from mpm_ref.nclaw.train import fit  # noqa: E402
@@ -20,6 +19,7 @@ from mpm_ref.nclaw.train.neural_laws import NeuralLaw, neural_laws  # noqa: E402
 from mpm_ref.nclaw.train.recipe import Recipe  # noqa: E402
 from mpm_ref.nclaw.train.rollout import Laws, Trajectory, trajectory_of  # noqa: E402
 from mpm_ref.nclaw.train.unchanged import Unchanged  # noqa: E402
+from mpm_ref.trajectories import observed  # noqa: E402
 
 STEPS = 11          # segments of 3 and 2 steps
 SHORT = Recipe(epochs=5, first=3, last=6, batch=2, elastic_rate=1e-2, plastic_rate=1e-3)
@@ -207,8 +207,8 @@ def test_a_training_that_was_cut_off_goes_on_bit_for_bit(tmp_path, monkeypatch, 
 
 def test_the_cost_is_that_of_all_parts(tmp_path, monkeypatch, run):
     now = [0.0]
-    monkeypatch.setattr(cost, "process_time", lambda: 10.0 + 2.0 * now[0])
-    monkeypatch.setattr(cost, "perf_counter", lambda: 30.0 + 3.0 * now[0])
+    monkeypatch.setattr(training, "process_time", lambda: 10.0 + 2.0 * now[0])
+    monkeypatch.setattr(training, "perf_counter", lambda: 30.0 + 3.0 * now[0])
     monkeypatch.setattr(fit, "SAVE", 2)
 
     def second(history):

@@ -8,20 +8,29 @@ import rom_toys
 from damaged import assert_damage_is_told, changed, refused, without
 
 from mpm_ref.materials.learned import response, weights
-from mpm_ref.materials.learned.weights import KINDS, PARTS, Laws, Trained, arrays_of, load, save
-from mpm_ref.sealed import sealed
+from mpm_ref.materials.learned.table import KINDS
+from mpm_ref.materials.learned.weights import (
+    PARTS,
+    LawWeights,
+    LearnedLaws,
+    law_arrays,
+    load,
+    save,
+)
+from mpm_ref.store.weights_file import sealed
 
 ABOUT = {"seed": 3, "command": "train jelly", "errors": [0.1, 1e-300], "scene": "Ärmel", "of": None}
 STRESS, CORRECTION = response.Stress(2.5), response.Correction()
+RESPONSES = {"elastic": response.STRESSES, "plastic": response.CORRECTIONS}
 SIZES = {2: (7, 8, 4), 3: (13, 8, 6, 9)}        # numbers read, .., answered
 
 
 def law(kind, d=3, seed=0):
-    return Trained(tuple(rom_toys.layers(SIZES[d], seed)), kind)
+    return LawWeights(tuple(rom_toys.layers(SIZES[d], seed)), kind)
 
 
 def laws(d=3, elastic=STRESS, plastic=CORRECTION):
-    return Laws(law(elastic, d), law(plastic, d, seed=1), ABOUT)
+    return LearnedLaws(law(elastic, d), law(plastic, d, seed=1), ABOUT)
 
 
 def flat(laws):
@@ -33,7 +42,7 @@ def file_of(laws):
     """The arrays that are written."""
     return {"format": np.array(weights.FORMAT), "about": np.array("{}"),
             **{name: a for part in PARTS for name, a in
-               arrays_of(part, getattr(laws, part)).items()}}
+               law_arrays(part, getattr(laws, part)).items()}}
 
 
 def test_laws_come_back_bit_for_bit(tmp_path, d):
@@ -50,16 +59,16 @@ def test_laws_come_back_bit_for_bit(tmp_path, d):
 
 @pytest.mark.parametrize("part", PARTS)
 def test_every_kind_of_answer_comes_back(tmp_path, part):
-    for name in weights.ANSWERS[part]:
-        kind = KINDS[name](0.3)
+    for record in RESPONSES[part]:
+        kind = record(0.3)
         save(tmp_path / "laws.npz", laws(**{part: kind}))
         assert getattr(load(tmp_path / "laws.npz"), part).kind == kind
 
 
 def test_every_kind_is_a_stress_or_a_deformation_gradient():
-    assert sorted(KINDS) == sorted(name for names in weights.ANSWERS.values() for name in names)
+    kinds = {*response.STRESSES, *response.CORRECTIONS}
     own = {kind for kind in response.answer.methods if kind.__module__ == response.__name__}
-    assert set(KINDS.values()) == own
+    assert kinds == own == {KINDS[kind.__name__] for kind in kinds}
 
 
 def test_equal_content_gives_equal_bytes(tmp_path):
@@ -98,7 +107,7 @@ FAULTS = {
     "elastic law with biases that do not fit": changed(elastic_b1=lambda b: b[1:]),
     "laws that read 13 and 7 numbers": lambda a: {
         **{name: b for name, b in a.items() if not name.startswith("plastic")},
-        **arrays_of("plastic", law(response.Correction(), 2))},
+        **law_arrays("plastic", law(response.Correction(), 2))},
     "about is no JSON": without("about"),
     "about is a list": changed(about="[3]"),
 }
@@ -128,7 +137,7 @@ def with_first(law, W, b):
      "elastic_W0 has entries that are not finite numbers"),
     ({"plastic": law(response.Stress())}, "plastic law of kind Stress"),
     ({"plastic": law(response.Correction(), 2)}, "laws that read 13 and 7 numbers"),
-    ({"elastic": Trained((), response.Stress())}, "elastic law without layers"),
+    ({"elastic": LawWeights((), response.Stress())}, "elastic law without layers"),
 ])
 def test_what_could_not_be_read_is_not_written(tmp_path, change, said):
     with pytest.raises(ValueError, match=rf"laws\.npz is not written: {said}"):

@@ -5,9 +5,9 @@ from collections import Counter
 
 import pytest
 
-from validation import equations
-from validation.citations import ID, LINK, ROOT, documentation, exists
-from validation.equations import Citations, Entry, Source
+from validation.common import equations
+from validation.common.citations import ID, LINK, ROOT, documentation, exists
+from validation.common.equations import Citations, Entry, Source
 
 # formulas, algorithms, rules and defaults; issues
 COUNTS = {"LDM": (60, 17), "LDMW": (16, 8), "NSF": (35, 18), "NCLAW": (57, 17), "HOT": (27, 18),

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from validation.citations import KEY, LOOSE, ROOT, cited_keys, documentation, files
+from validation.common.citations import KEY, LOOSE, ROOT, cited_keys, documentation, files
 
 FOLDERS = ("mpm_ref", "validation", "figures", "benchmarks", "tests")
 ENTRY = re.compile(r"^- \*\*\[(\w+)\]\*\* ", re.MULTILINE)

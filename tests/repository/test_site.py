@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from validation.citations import ROOT, documentation, exists
+from validation.common.citations import ROOT, documentation, exists
 
 sys.path.insert(0, str(ROOT / "docs"))
 

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from mpm_ref.core.grid import OutOfRange
-from mpm_ref.reduced import record
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.evaluate import NEAREST, REDUCED, Held, breakdowns, course
-from mpm_ref.reduced.march import Way
-from mpm_ref.reduced.watch import watch, watched
 from mpm_ref.rom.kinematics import NoBody, guesses
+from mpm_ref.rom.study import record
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.evaluate import NEAREST, REDUCED, Held, breakdowns, course
+from mpm_ref.rom.study.run import Way
+from mpm_ref.rom.study.watch import watch, watched
 from validation.extremes import ldm_runs
-from validation.ldm import online
-from validation.ldm.racing import Online
+from validation.ldm import reduced_runs
 from validation.ldm.studies import GRAVITY
+from validation.ldm.timing import Online
 from validation.verification.scenes import with_
 
 FAULTS = [NoBody("no body"), OutOfRange("nowhere"), np.linalg.LinAlgError("singular")]
@@ -43,8 +43,8 @@ def of_course(one, monkeypatch, fault):
 
 
 def of_compared(one, monkeypatch, fault):
-    monkeypatch.setattr(online, "march", lambda *_: broken(fault))
-    return online.compared([one], [one.X[None]], None, None, None).origin == np.inf
+    monkeypatch.setattr(reduced_runs, "march", lambda *_: broken(fault))
+    return reduced_runs.compared([one], [one.X[None]], None, None, None).origin == np.inf
 
 
 def of_race(one, monkeypatch, fault):

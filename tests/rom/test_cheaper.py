@@ -8,19 +8,19 @@ from rom_toys import cloud
 
 from mpm_ref.materials.fixed_corotated import FixedCorotated
 from mpm_ref.problem import Clock
-from mpm_ref.reduced import march as marching
-from mpm_ref.reduced.case import case, distance
-from mpm_ref.reduced.march import Way, groups, march, model, picked, stepped
-from mpm_ref.reduced.model import require_way
-from mpm_ref.reduced.tables import Run
 from mpm_ref.rom.fields.affine import Affine
-from mpm_ref.rom.latent import at_start
+from mpm_ref.rom.latent import start_state
 from mpm_ref.rom.quadrature.lagrangian import Resampled, lagrangian
 from mpm_ref.rom.sampling import PER_GROUP, pivoted
-from mpm_ref.rom.step import Reduced
+from mpm_ref.rom.step import ldm_stepper
+from mpm_ref.rom.study import run as marching
+from mpm_ref.rom.study.case import case, distance
+from mpm_ref.rom.study.model import require_way
+from mpm_ref.rom.study.run import Way, groups, march, model, picked, stepped
+from mpm_ref.rom.study.tables import Run
 from mpm_ref.rom.weights import Model
 from mpm_ref.scene import Box, Cylinder, Difference, Union
-from validation.ldm.nets import trained
+from validation.ldm.networks import trained
 from validation.ldm.studies import GRAVITY, POKES, TORSION
 from validation.verification.scenes import with_
 
@@ -37,20 +37,20 @@ def test_another_sampling_that_is_the_same_gives_the_same_cloud(d, rng):
     X, map, m = cloud(d, 400), Affine(d), rng.uniform(1.0, 2.0, 400)
     own = lagrangian(X, m, m, DX, 2)
     samples = rng.choice(400, 3, replace=False)
-    latent = at_start(map.rest)
-    a, b = (one.cloud(map, latent, samples) for one in (own, Resampled(X, own)))
-    assert all(np.array_equal(*pair) for pair in zip((*a.at, a.m, a.V0), (*b.at, b.m, b.V0),
+    xhat = map.rest
+    a, b = (one.cloud(map, xhat, samples) for one in (own, Resampled(X, own)))
+    assert all(np.array_equal(*pair) for pair in zip((*a.points, a.m, a.V0), (*b.points, b.m, b.V0),
                                                      strict=True))
 
 
 def test_its_points_are_as_many_however_many_material_points_there_are(d, rng):
     X, map = cloud(d, 400), Affine(d)
     coarse = lagrangian(cloud(d, 200, seed=1), np.ones(200), np.ones(200), DX, 2)
-    latent = at_start(map.rest)
-    few = Resampled(X, coarse).cloud(map, latent, np.arange(3))
-    many = Resampled(np.vstack([X, X + 1e-3]), coarse).cloud(map, latent, np.arange(3))
-    assert few[3] == many[3]
-    assert 0 < few[3]["points"] < 200
+    xhat = map.rest
+    few = Resampled(X, coarse).cloud(map, xhat, np.arange(3))
+    many = Resampled(np.vstack([X, X + 1e-3]), coarse).cloud(map, xhat, np.arange(3))
+    assert few.report == many.report
+    assert 0 < few.report["points"] < 200
 
 
 def test_another_sampling_has_the_body_s_mass(torsion):
@@ -66,8 +66,8 @@ def test_nodes_beyond_the_other_sampling_move_with_the_samples(d):
     other = lagrangian(half, np.ones(len(half)), np.ones(len(half)), DX, 2)
     vhat = np.zeros(map.r)
     vhat[d] = 1.0                           # along the first axis
-    model = Reduced(map, Resampled(X, other), FixedCorotated(3e3, 4e3), np.zeros(d))
-    after, report = model.step(at_start(map.rest, vhat), np.arange(200), 0.0, 1e-3)
+    model = ldm_stepper(map, Resampled(X, other), FixedCorotated(3e3, 4e3), np.zeros(d))
+    after, report = model.step(start_state(map.rest, vhat), np.arange(200), 0.0, 1e-3)
     assert report.residual < 1e-9
     assert after.vhat == pytest.approx(vhat, abs=1e-9)
 
@@ -116,8 +116,8 @@ def test_preimages_nearer_than_single_precision_tells_are_refused(torsion):
     map = trained("gravity-r4").decoder
     with pytest.raises(ValueError, match=r"close = 1e-09 dx in single precision: expected at leas"):
         model(torsion, map, Way("eulerian", precision="single"))
-    assert model(torsion, map, Way(precision="single")).map.net.W.dtype == np.float32
-    assert model(torsion, map, Way()).map is map
+    assert model(torsion, map, Way(precision="single")).field.g.net.W.dtype == np.float32
+    assert model(torsion, map, Way()).field.g is map
 
 
 def test_pivots_are_the_rows_that_tell_the_coordinates(rng):

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from small_studies import CURVED, STEPS, generated, study
 
-from mpm_ref.cases import snapshots
-from mpm_ref.learning import Machine
-from mpm_ref.reduced import dataset, maps
-from mpm_ref.reduced.field import resampled, tabulated
-from mpm_ref.reduced.generate import (
+from mpm_ref.rom import modes_file
+from mpm_ref.rom.fields.pod import basis
+from mpm_ref.rom.fields.polynomial_manifold import curved
+from mpm_ref.rom.study import dataset, reduce
+from mpm_ref.rom.study.field import resampled, tabulated
+from mpm_ref.rom.study.generate import (
     EAR,
     FINISHED,
     INTERRUPTED,
@@ -20,15 +21,13 @@ from mpm_ref.reduced.generate import (
     generate,
     one_thread,
 )
-from mpm_ref.rom import modes_file
-from mpm_ref.rom.fields.pod import basis
-from mpm_ref.rom.fields.polynomial_manifold import curved
 from mpm_ref.scene import build
-from mpm_ref.sealed import sealed
-from mpm_ref.store import BadResults, Fields
-from mpm_ref.store.results import Results
-from mpm_ref.store.running import Options, run
-from mpm_ref.store.session import checkpoint_of
+from mpm_ref.store.results import BadResults, Results
+from mpm_ref.store.running import Options, checkpoint_of, run
+from mpm_ref.store.weights_file import sealed
+from mpm_ref.store.writer import Fields
+from mpm_ref.training import Machine
+from mpm_ref.trajectories import snapshots
 
 # Data.
 
@@ -127,14 +126,14 @@ def test_two_processes_make_the_same(made, tmp_path):
 @pytest.fixture(scope="module")
 def model(made):
     bars, folder = made
-    return maps.computed(bars, dataset.load(bars, folder, bars.train), {"command": "none"})
+    return reduce.computed(bars, dataset.load(bars, folder, bars.train), {"command": "none"})
 
 
 @pytest.fixture
 def bent(made, tmp_path):
     """The same study with a curved map, and that map."""
     bars = study(tmp_path, *CURVED)
-    return bars, maps.computed(bars, dataset.load(bars, made[1], bars.train), {"command": "none"})
+    return bars, reduce.computed(bars, dataset.load(bars, made[1], bars.train), {"command": "none"})
 
 
 def test_modes_hold_the_training_states_and_their_coordinates(made, model):
@@ -149,14 +148,14 @@ def test_modes_hold_the_training_states_and_their_coordinates(made, model):
 
 
 def test_a_map_comes_back_bit_for_bit(made, model, tmp_path):
-    maps.save(tmp_path / "map.npz", model)
-    back = maps.load(tmp_path / "map.npz", made[0])
+    reduce.save(tmp_path / "map.npz", model)
+    back = reduce.load(tmp_path / "map.npz", made[0])
     for a, b in zip((*model.decoder[:3], model.xhat, model.rest),
                     (*back.decoder[:3], back.xhat, back.rest), strict=True):
         np.testing.assert_array_equal(a, b)
     assert back.about == model.about
     assert back.about["map"] == {"kind": "modes", "r": 3}
-    maps.save(tmp_path / "again.npz", back)
+    reduce.save(tmp_path / "again.npz", back)
     assert (tmp_path / "again.npz").read_bytes() == (tmp_path / "map.npz").read_bytes()
 
 
@@ -166,8 +165,8 @@ def test_a_curved_map_is_that_of_its_settings_and_comes_back_bit_for_bit(made, b
     known = basis(data.X, *data.flat(), 4)
     map = curved(known, 2, 2)
     assert np.array_equal(model.xhat.reshape(-1, 2), known.xhat[:, :2])
-    maps.save(tmp_path / "map.npz", model)
-    back = maps.load(tmp_path / "map.npz", bars)
+    reduce.save(tmp_path / "map.npz", model)
+    back = reduce.load(tmp_path / "map.npz", bars)
     for a, b in zip((*map.modes[:3], *map[1:], model.xhat, model.rest),
                     (*back.decoder.modes[:3], *back.decoder[1:], back.xhat, back.rest),
                     strict=True):
@@ -178,9 +177,9 @@ def test_a_curved_map_is_that_of_its_settings_and_comes_back_bit_for_bit(made, b
 
 
 def test_a_curved_map_does_not_go_with_linear_projection(made, bent, tmp_path):
-    maps.save(tmp_path / "map.npz", bent[1])
+    reduce.save(tmp_path / "map.npz", bent[1])
     with pytest.raises(ValueError, match=r"run\.projection = 'linear': expected 'nonlinear'"):
-        maps.load(tmp_path / "map.npz", made[0])
+        reduce.load(tmp_path / "map.npz", made[0])
 
 
 def test_what_is_no_curved_map_is_refused(bent, tmp_path):
@@ -203,19 +202,19 @@ def test_what_is_no_curved_map_is_refused(bent, tmp_path):
 
 
 def test_a_map_of_another_study_is_refused(model, tmp_path):
-    maps.save(tmp_path / "map.npz", model)
+    reduce.save(tmp_path / "map.npz", model)
     with pytest.raises(ValueError, match=r"map\.npz is a map of another study"):
-        maps.load(tmp_path / "map.npz", study(tmp_path, ("to = 4.0", "to = 5.0")))
+        reduce.load(tmp_path / "map.npz", study(tmp_path, ("to = 4.0", "to = 5.0")))
 
 
 @pytest.mark.parametrize("damage", [lambda b: b[:-100], lambda b: b[:500] + b"?" + b[501:],
                                     lambda b: b"", lambda b: b"x = 1"])
 def test_a_damaged_map_is_refused(made, model, tmp_path, damage):
-    maps.save(tmp_path / "map.npz", model)
+    reduce.save(tmp_path / "map.npz", model)
     content = (tmp_path / "map.npz").read_bytes()
     (tmp_path / "map.npz").write_bytes(damage(content))
     with pytest.raises(ValueError, match=r"map\.npz is (damaged|not an npz)"):
-        maps.load(tmp_path / "map.npz", made[0])
+        reduce.load(tmp_path / "map.npz", made[0])
 
 
 def test_what_are_no_modes_is_refused(model, tmp_path):
@@ -244,7 +243,7 @@ def test_what_are_no_modes_is_refused(model, tmp_path):
 
 def test_without_torch_a_network_is_refused_in_one_sentence(made, without_torch):
     with pytest.raises(ValueError, match=r'pip install "mpm_ref\[learn\]"'):
-        maps.learned(made[0], None, {}, None, None, Machine())
+        reduce.learned(made[0], None, {}, None, None, Machine())
 
 
 @pytest.mark.parametrize("kind", ["straight", "curved"])

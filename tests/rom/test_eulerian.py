@@ -10,8 +10,7 @@ from rom_toys import affine, cloud, decoder
 
 from mpm_ref.core.spline import STENCILS, base_of
 from mpm_ref.rom.fields.affine import Affine
-from mpm_ref.rom.kinematics import ITERATIONS, from_middles, guesses, preimages, shortened
-from mpm_ref.rom.latent import at_start
+from mpm_ref.rom.kinematics import ITERATIONS, guesses, guesses_by_cell, preimages, shorten
 from mpm_ref.rom.quadrature.eulerian import Eulerian
 
 DX, RHO = 0.125, 700.0
@@ -90,8 +89,8 @@ def test_there_and_back(d, far):
     x = map.place(X, xhat)
     start = np.full((300, d), 0.5) if far else guesses(map, xhat, x, cloud(d, 3, seed=1))
     back = preimages(map, xhat, x, start, DX)
-    assert back.found.all()
-    assert abs(back.at.X - X).max() < 1e-8 * DX
+    assert back.converged.all()
+    assert abs(back.points.points - X).max() < 1e-8 * DX
     assert abs(start - X).max() > 1e-3
     assert (5 if far else 1) <= back.iterations < 0.5 * ITERATIONS
 
@@ -101,7 +100,7 @@ def test_guesses_are_not_changed_and_good_ones_are_kept(d):
     start = X.copy()
     back = preimages(map, xhat, map.place(X, xhat), start, DX)
     assert back.iterations == 0
-    assert np.array_equal(back.at.X, X)
+    assert np.array_equal(back.points.points, X)
     moved = X + 0.05
     kept = moved.copy()
     preimages(map, xhat, map.place(X, xhat), moved, DX)
@@ -142,10 +141,10 @@ def test_what_has_no_preimage_is_not_found(d, rng):
     x = rng.uniform(0.1, 1.0, (n, d)) * np.where(np.arange(n) % 3 == 0, -1.0, 1.0)[:, None]
     start = rng.uniform(0.1, 1.0, (n, d)) * rng.choice((-1.0, 1.0), (n, 1))
     back = preimages(Fold(d), None, x, start, 10.0 * DX)
-    assert np.array_equal(back.found, x[:, 0] > 0.0)
-    at = Fold(d).place(back.at.X, None)
-    assert np.linalg.norm(at - x, axis=1)[back.found].max() <= 1e-8 * DX
-    assert (np.sign(back.at.X[:, 0]) == np.sign(start[:, 0]))[back.found].all()
+    assert np.array_equal(back.converged, x[:, 0] > 0.0)
+    at = Fold(d).place(back.points.points, None)
+    assert np.linalg.norm(at - x, axis=1)[back.converged].max() <= 1e-8 * DX
+    assert (np.sign(back.points.points[:, 0]) == np.sign(start[:, 0]))[back.converged].all()
     assert back.iterations == ITERATIONS
 
 
@@ -155,16 +154,16 @@ def test_from_a_point_with_a_singular_gradient_nothing_is_found(d, rng):
     start = rng.uniform(0.2, 1.0, (30, d))
     start[::4, 0] = 0.0
     back = preimages(Fold(d), None, x, start, DX)
-    assert np.array_equal(back.found, start[:, 0] != 0.0)
+    assert np.array_equal(back.converged, start[:, 0] != 0.0)
     flat = Affine(d).rest
     flat[0] = 0.0
-    assert not preimages(Affine(d), flat, x, start, DX).found.any()
+    assert not preimages(Affine(d), flat, x, start, DX).converged.any()
 
 
 def test_steps_are_cut_to_a_length_and_keep_their_direction(d, rng):
     step = rng.normal(size=(50, d))
     step[0], length = 0.0, np.linalg.norm(step, axis=1)
-    cut = shortened(step, 1.0)
+    cut = shorten(step, 1.0)
     assert np.array_equal(cut[length <= 1.0], step[length <= 1.0])
     assert np.linalg.norm(cut[length > 1.0], axis=1) == pytest.approx(1.0, rel=1e-14)
     assert np.allclose(cut * np.maximum(length, 1.0)[:, None], step, rtol=1e-14, atol=0.0)
@@ -176,12 +175,13 @@ def test_what_is_known_of_a_preimage_is_of_the_point_found(d):
     x, near = map.place(X, xhat), X + np.random.default_rng(3).uniform(-2e-2, 2e-2, X.shape)
     for close in (1e-9, 1e-3, 0.3):
         back = preimages(map, xhat, x, near, DX, close)
-        assert back.found.all()
-        assert np.linalg.norm(back.at.x - x, axis=1).max() <= close * DX
-        for known, again in zip(back.at[1:], map.derivatives(back.at.X, xhat), strict=True):
+        assert back.converged.all()
+        assert np.linalg.norm(back.points.x - x, axis=1).max() <= close * DX
+        once_more = map.derivatives(back.points.points, xhat)
+        for known, again in zip(back.points[1:], once_more, strict=True):
             assert abs(known - again).max() < 1e-13
     assert back.iterations == 0
-    assert np.array_equal(back.at.X, near)
+    assert np.array_equal(back.points.points, near)
 
 
 def test_guesses_from_the_middles_of_cells_are_near(d):
@@ -190,7 +190,7 @@ def test_guesses_from_the_middles_of_cells_are_near(d):
         X = cloud(d, 40)[:, None] + half * np.array(list(product((-1.0, 1.0), repeat=d)))
         x = map.place(X.reshape(-1, d), xhat).reshape(X.shape)
         start = guesses(map, xhat, x.mean(axis=1), cloud(d, 3, seed=1))
-        return abs(from_middles(map, xhat, x, start, cloud(d, 3, seed=1), DX) - X).max()
+        return abs(guesses_by_cell(map, xhat, x, start, cloud(d, 3, seed=1), DX) - X).max()
 
     assert off(*affine(d), 0.1) < 1e-13
     coarse, fine = (off(*bent(d), half) for half in (0.08, 0.02))
@@ -202,7 +202,7 @@ def test_where_a_middle_is_lost_its_points_are_guessed_from_the_seeds(d, rng):
     x = rng.uniform(0.3, 0.5, (2, 4, d))
     x[1, :, 0] = (-0.4, -0.2, 0.05, 0.1)
     seeds = rng.uniform(0.2, 1.0, (5, d))
-    found = from_middles(Fold(d), None, x, np.full((2, d), 0.5), seeds, 10.0 * DX)
+    found = guesses_by_cell(Fold(d), None, x, np.full((2, d), 0.5), seeds, 10.0 * DX)
     assert np.array_equal(found[1], guesses(Fold(d), None, x[1], seeds))
     assert not np.allclose(found[0], guesses(Fold(d), None, x[0], seeds))
 
@@ -211,14 +211,14 @@ def test_where_a_middle_is_lost_its_points_are_guessed_from_the_seeds(d, rng):
 
 def carried(quadrature, map, xhat):
     """`cloud` with all material points as samples."""
-    return quadrature.cloud(map, at_start(xhat), np.arange(len(quadrature.X)))
+    return quadrature.cloud(map, xhat, np.arange(len(quadrature.X)))
 
 
 def test_points_outside_the_body_carry_nothing(d, degree):
     (map, xhat), quadrature = bent(d), body(d, degree)
-    at, m, V0, said, _ = carried(quadrature, map, xhat)
+    at, m, V0, _, said = carried(quadrature, map, xhat)
     places = quadrature.places(map.place(quadrature.X, xhat))
-    X, J = at.X, np.linalg.det(map.derivatives(at.X, xhat)[1])
+    X, J = at.points, np.linalg.det(map.derivatives(at.points, xhat)[1])
     assert inside(X).all()
     assert V0 * J == pytest.approx((DX / 2) ** d, rel=1e-13)
     assert m == pytest.approx(RHO * V0, rel=1e-15)
@@ -236,8 +236,8 @@ def test_no_place_in_the_body_is_left_out(d):
     rows = xhat.reshape(d, d + 1)
     A, b = rows[:, :d], rows[:, d]
     origin = (quadrature.places(map.place(quadrature.X, xhat)) - b) @ np.linalg.inv(A).T
-    at, _, _, said, _ = carried(quadrature, map, xhat)
-    assert abs(at.X - origin[inside(origin)]).max() < 1e-12
+    at, _, _, _, said = carried(quadrature, map, xhat)
+    assert abs(at.points - origin[inside(origin)]).max() < 1e-12
     assert said["lost"] == 0
 
 
@@ -245,12 +245,12 @@ def test_what_cannot_be_traced_back_is_lost():
     """Beyond a fold there are places that no point is mapped to; `cloud` says so."""
     X = 0.2 + 0.2 * cloud(2, 50)
     quadrature = Eulerian(X, RHO, lambda X: np.where(X[:, 0] > 0.0, -1.0, 0.5 * DX), X[:9], DX, 2)
-    at, _, _, said, _ = quadrature.cloud(Fold(2), at_start(()), np.arange(50))
+    at, _, _, _, said = quadrature.cloud(Fold(2), np.zeros(0), np.arange(50))
     places = quadrature.places(Fold(2).place(X, None))
     assert said["lost"] == (places[:, 0] < 0.0).sum() > 0
     assert said["points"] + said["lost"] == len(places)
     assert said["outside"] == said["far"] == 0
-    assert (at.X[:, 0] > 0.0).all()
+    assert (at.points[:, 0] > 0.0).all()
 
 
 def mass_errors(d, per_cell):

@@ -57,10 +57,10 @@ def test_one_pass_equals_batches(d):
 
 def test_torch_reads_the_same_features(d):
     torch = pytest.importorskip("torch")
-    from mpm_ref.rom.learn.perceptron import imported
+    from mpm_ref.rom.train.perceptron import perceptron_of
     one, X, xhat = field(d, 6, octaves=OCTAVES), rom_toys.cloud(d, 30), latents()
     Z = torch.from_numpy((X - one.units.low) / one.units.span)
-    y = imported(one)(Z, torch.from_numpy(xhat).repeat(len(X), 1)).detach().numpy()
+    y = perceptron_of(one)(Z, torch.from_numpy(xhat).repeat(len(X), 1)).detach().numpy()
     found = one.units.mean + one.units.std * y
     np.testing.assert_allclose(found, one.values(X, xhat), rtol=1e-12)
 

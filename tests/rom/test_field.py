@@ -90,14 +90,14 @@ def test_the_affine_field_may_depend_on_parameters_and_the_stress_not(d):
 @GIVEN
 def test_one_pass_equals_torch(d, q):
     torch = pytest.importorskip("torch")
-    from mpm_ref.rom.learn.perceptron import imported
+    from mpm_ref.rom.train.perceptron import perceptron_of
     (g, h, l), X, xhat, mu = networks(d, q), rom_toys.cloud(d, 30), latents(), MU[:q]
     x, G, tau, C = infer(g, h, l, X, xhat, mu)
 
     def rows(field, y):
         scaled = torch.from_numpy((X - field.units.low) / field.units.span)
         mean, std = map(torch.from_numpy, field.units[2:4])
-        return mean + std * imported(field)(scaled, y.repeat(len(X), 1))
+        return mean + std * perceptron_of(field)(scaled, y.repeat(len(X), 1))
 
     def places(y):
         return torch.from_numpy(X) + rows(g, y)

@@ -10,10 +10,9 @@ import rom_toys
 from damaged import changed, refused, without
 from field_toys import MU, Q, latents, networks
 
-from mpm_ref.archive import stated
 from mpm_ref.rom import fields_file, weights
 from mpm_ref.rom.fields_file import Model, arrays_of, load, save
-from mpm_ref.sealed import sealed
+from mpm_ref.store.weights_file import sealed, stated
 from validation.nsf.pointwise_networks import infer
 
 ABOUT = {"seed": 3, "command": "train nsf", "betas": [48, 64, 64]}

@@ -11,8 +11,10 @@ from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.materials import FixedCorotated, NoFlow
 from mpm_ref.rom.fields.affine import Affine
 from mpm_ref.rom.fields.blocks import blocks
-from mpm_ref.rom.inferred import Inferred, Matter, Position, nearest
-from mpm_ref.rom.kinematics import NoBody
+from mpm_ref.rom.kinematics import Kinematics, NoBody
+from mpm_ref.rom.latent import Latent, nearest
+from mpm_ref.rom.quadrature import Cloud
+from mpm_ref.rom.step import MaterialPoints, nsf_stepper
 
 DX, DT, STEPS = 0.17, 0.004, 5
 LAW = FixedCorotated(3e3, 4e3)
@@ -26,12 +28,12 @@ def degree(request):
 
 
 def body(n, d, seed=0, length=1.0):
-    """Positions and `Matter` of n points in a box of unit sides but for its length."""
+    """Positions and `MaterialPoints` of n points in a box of unit sides but for its length."""
     rng = np.random.default_rng(seed)
     X, v = rng.uniform(size=(n, d)), rng.normal(size=(n, d))
     X[:, 0] *= length
     V0 = rng.uniform(0.5, 1.5, n) / n
-    return X, Matter(800.0 * V0, V0, v)
+    return X, MaterialPoints(800.0 * V0, V0, v)
 
 
 class Wind:
@@ -74,7 +76,7 @@ class Remembered:
         G = np.eye(self.r).reshape(self.n, self.dim, self.r)
         return self.place(points, xhat), None, G[points]
 
-    def stress(self, points, xhat):
+    def stress(self, points, xhat, F=None):
         return self.of(xhat)[2][points]
 
     def affine(self, points, xhat):
@@ -99,7 +101,7 @@ class Free:
     def derivatives(self, points, xhat):
         return self.map.derivatives(self.X[points], xhat)
 
-    def stress(self, points, xhat):
+    def stress(self, points, xhat, F=None):
         return np.zeros((len(points), self.dim, self.dim))
 
     def affine(self, points, xhat):
@@ -111,13 +113,26 @@ class Free:
 
 
 def model(fields, matter, degree=2, gravity=GRAVITY, **options):
-    return Inferred(fields, matter, DX, degree, np.asarray(gravity)[:fields.dim], **options)
+    return nsf_stepper(fields, matter, DX, degree, np.asarray(gravity)[:fields.dim], **options)
+
+
+def cloud_of(stepper, points, x, count):
+    """A `Cloud` of points of these numbers at x (n, d), of which the first are samples."""
+    body = stepper.quadrature
+    return Cloud(Kinematics(points, x), body.m[points], body.V0[points],
+                 Kinematics(points[:count], x[:count]), {"points": len(points)})
+
+
+def after_grid(stepper, latent, points, x, count, dt=DT):
+    """Positions of the first points after a step of all on the grid."""
+    body, samples = stepper.bodies(cloud_of(stepper, points, x, count), latent, dt)
+    return stepper.on_grid(body, samples, 0.0, dt).x
 
 
 def test_is_the_full_step_where_every_position_is_a_coordinate(d, degree):
     X, matter = body(30, d)
     states = full_run(X, matter, degree)
-    stepper, at = model(Remembered(states), matter, degree), Position(X.ravel())
+    stepper, at = model(Remembered(states), matter, degree), Latent(X.ravel())
     for k, (x, *_) in enumerate(states[1:]):
         at, report = stepper.step(at, np.arange(30), k * DT, DT)
         assert np.abs(at.xhat.reshape(30, d) - x).max() < 1e-12
@@ -132,7 +147,7 @@ def test_boundaries_are_those_of_the_full_step_in_time(d):
     assert np.abs(blown - still).max() > 1e-4
     stepper = model(Remembered(full_run(X, matter, 2, conditions=Wind())), matter,
                     conditions=Wind())
-    at = Position(X.ravel())
+    at = Latent(X.ravel())
     for k in range(STEPS):
         at, _ = stepper.step(at, np.arange(30), k * DT, DT)
     assert np.abs(at.xhat.reshape(30, d) - blown).max() < 1e-12
@@ -141,16 +156,16 @@ def test_boundaries_are_those_of_the_full_step_in_time(d):
 def test_samples_move_as_when_all_points_are_stepped(d, degree, rng):
     X, matter = body(400, d, length=8.0)
     fields = Remembered(full_run(X, matter, degree, steps=1))
-    stepper, at = model(fields, matter, degree), Position(X.ravel())
+    stepper, at = model(fields, matter, degree), Latent(X.ravel())
     samples = np.sort(rng.choice(400, 3, replace=False))
-    points, x = stepper.integration(X.ravel(), samples)
+    points, x = stepper.quadrature.integration_points(fields, X.ravel(), samples)
     assert np.array_equal(x, X[points])
     assert np.array_equal(points[:3], samples)
     assert len(points) < 400
 
     def moved(some):
         """Samples after a step of some points, the samples first."""
-        return stepper.moved(stepper.inferred(at, some, X[some], DT), 3, 0.0, DT)
+        return after_grid(stepper, at, some, X[some], 3)
 
     everything = moved(np.concatenate([samples, np.setdiff1d(np.arange(400), samples)]))
     assert np.abs(moved(points) - everything).max() < 1e-14
@@ -167,7 +182,8 @@ def test_integration_points_are_those_that_share_a_node(d, degree, rng):
     nodes = [{tuple(b + o) for o in np.ndindex(*(degree + 1,) * d)} for b in first]
     wanted = set.union(*(nodes[p] for p in samples))
     expected = [p for p in range(300) if nodes[p] & wanted]
-    assert np.sort(stepper.integration(X.ravel(), samples)[0]).tolist() == expected
+    points, _ = stepper.quadrature.integration_points(stepper.field, X.ravel(), samples)
+    assert np.sort(points).tolist() == expected
 
 
 @pytest.mark.parametrize("faster", [1.0, 2.5])
@@ -177,7 +193,7 @@ def test_free_affine_motion_is_exact_with_steps_of_any_length(d, faster, inversi
     L, c = rng.normal(size=(d, d)), rng.normal(size=d)
     matter = matter._replace(v=X @ L.T + c)
     stepper = model(Free(X, L), matter, gravity=np.zeros(3), inversion=inversion)
-    at, samples = Position(Affine(d).rest), np.arange(0, 500, 60)
+    at, samples = Latent(Affine(d).rest), np.arange(0, 500, 60)
     for k in range(4):
         at, report = stepper.step(at, samples, k * faster * DT, faster * DT)
     x = X + 4 * faster * DT * matter.v
@@ -192,7 +208,7 @@ def test_without_the_affine_field_that_motion_is_damped(d, rng):
     matter = matter._replace(v=X @ L.T)
     fields = Free(X, L)
     fields.affine = lambda points, xhat: np.zeros((len(points), d, d))
-    at = Position(Affine(d).rest)
+    at = Latent(Affine(d).rest)
     stepper = model(fields, matter, gravity=np.zeros(3))
     for k in range(2):
         at, _ = stepper.step(at, np.arange(500), k * DT, DT)
@@ -205,9 +221,11 @@ def test_velocity_is_a_difference_over_the_step_and_prescribed_at_the_start(d):
     fields = Free(X, np.eye(d))
     stepper = model(fields, matter)
     y = Affine(d).rest
-    first = stepper.inferred(Position(y), np.array([3, 7]), X[[3, 7]], 0.5)
-    assert np.array_equal(first.particles.v, matter.v[[3, 7]])
-    later = stepper.inferred(Position(1.5 * y, y), np.array([3, 7]), 1.5 * X[[3, 7]], 0.5)
+    some = np.array([3, 7])
+    first, _ = stepper.bodies(cloud_of(stepper, some, X[some], 2), Latent(y), 0.5)
+    assert np.array_equal(first.particles.v, matter.v[some])
+    later, _ = stepper.bodies(cloud_of(stepper, some, 1.5 * X[some], 2),
+                              Latent(1.5 * y, before=y), 0.5)
     assert np.allclose(later.particles.v, X[[3, 7]], rtol=1e-14)
 
 
@@ -223,9 +241,9 @@ def test_latent_coordinates_that_are_lost_end_a_run(d):
     stepper = model(Free(X, np.eye(d)), matter)
     lost = np.full(d * (d + 1), np.nan)
     with pytest.raises(NoBody, match="not finite"):
-        stepper.step(Position(lost), np.arange(5), 0.0, DT)
+        stepper.step(Latent(lost), np.arange(5), 0.0, DT)
     with pytest.raises(OutOfRange):
-        stepper.step(Position(1e12 * Affine(d).rest), np.arange(5), 0.0, DT)
+        stepper.step(Latent(1e12 * Affine(d).rest), np.arange(5), 0.0, DT)
 
 
 def test_unknown_inversion_is_refused():
@@ -249,9 +267,14 @@ def test_a_sample_of_weight_two_counts_as_two(d, inversion, rng):
     twice = np.concatenate([some[:1], some])
     weight = np.array([2.0, *np.ones(7)])
     rest = Affine(d).rest
-    weighed, _ = stepper.inverted(some, weight, x, rest, DT)
-    repeated, _ = stepper.inverted(twice, None, np.concatenate([x[:1], x]), rest, DT)
-    plain, _ = stepper.inverted(some, None, x, rest, DT)
+
+    def inverted(points, x, weights=None):
+        """Latent coordinates of samples that the grid has taken to x."""
+        trial = particles_at(x, 0.0 * x, np.ones(len(x)), np.ones(len(x)), "pic")
+        return stepper.project(Latent(rest), Kinematics(points, x), trial, DT, weights).xhat
+
+    weighed, repeated = inverted(some, x, weight), inverted(twice, np.concatenate([x[:1], x]))
+    plain = inverted(some, x)
     assert np.abs(weighed - repeated).max() < 1e-9
     assert np.abs(weighed - plain).max() > 1e-4
 
@@ -259,8 +282,8 @@ def test_a_sample_of_weight_two_counts_as_two(d, inversion, rng):
 def test_samples_without_a_place_after_the_step_are_told(d):
     X, matter = body(40, d)
     fields = Free(X, np.eye(d))
-    fields.stress = lambda points, xhat: np.full((len(points), d, d), np.nan)
+    fields.stress = lambda points, xhat, F=None: np.full((len(points), d, d), np.nan)
     stepper = model(fields, matter)
     with pytest.raises(NoBody, match="t = 0 s: 8 of 8 samples have no finite place after the step, "
                                      "the first is point 0"):
-        stepper.step(Position(Affine(d).rest), np.arange(0, 40, 5), 0.0, DT)
+        stepper.step(Latent(Affine(d).rest), np.arange(0, 40, 5), 0.0, DT)

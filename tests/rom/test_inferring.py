@@ -6,8 +6,13 @@ import numpy as np
 import pytest
 
 from mpm_ref import scene
-from mpm_ref.reduced import inferring
-from mpm_ref.reduced.inferring import (
+from mpm_ref.rom.cubature import cubature
+from mpm_ref.rom.fields.pod_fields import Sizes, spanned
+from mpm_ref.rom.quadrature.stencil_overlap import bases
+from mpm_ref.rom.snapshots import joined
+from mpm_ref.rom.study import nsf_run
+from mpm_ref.rom.study.nsf_case import history, whole
+from mpm_ref.rom.study.nsf_run import (
     Chosen,
     Plan,
     begin,
@@ -17,12 +22,7 @@ from mpm_ref.reduced.inferring import (
     require_sound,
     weighed,
 )
-from mpm_ref.reduced.vary import varied
-from mpm_ref.reduced.whole import history, whole
-from mpm_ref.rom.cubature import cubature
-from mpm_ref.rom.fields.pod_fields import Sizes, spanned
-from mpm_ref.rom.quadrature.stencil_overlap import bases
-from mpm_ref.rom.snapshots import joined
+from mpm_ref.scene.overrides import varied
 
 TOML = """
 title = "two disks"
@@ -202,7 +202,7 @@ def test_samples_of_cells_are_some_of_those_asked_for(disks, runs):
 
 
 def test_cells_are_those_of_random_candidates(disks, runs, monkeypatch):
-    monkeypatch.setattr(inferring, "OFFERED", 4)
+    monkeypatch.setattr(nsf_run, "OFFERED", 4)
     fields, _ = spanned(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
     problem, n = whole(disks(1.8)).problem, len(runs.X)
     base = [tuple(one) for one in bases(runs.X, problem.dx, problem.scheme.degree)]

@@ -7,13 +7,21 @@ from mpm_ref.body import Body, particles_at
 from mpm_ref.core.motion import rotation
 from mpm_ref.explicit import deform_body
 from mpm_ref.materials import Hencky, NeoHookean, NoFlow, make_flow
-from mpm_ref.rom.fields.joint_latent import Joint, Stacked, joint, stretch_of
+from mpm_ref.rom.fields.joint_latent import (
+    JointInversion,
+    JointStepper,
+    Stacked,
+    joint,
+    stretch_of,
+)
 from mpm_ref.rom.fields.pod_fields import Sizes, spanned
-from mpm_ref.rom.inferred import Inferred, Matter, Position
+from mpm_ref.rom.latent import Latent
+from mpm_ref.rom.quadrature.lagrangian import NumberedPoints
 from mpm_ref.rom.snapshots import Histories, joined
+from mpm_ref.rom.step import MaterialPoints, nsf_stepper
 from mpm_ref.rom.symmetric import values
 
-LAW = Hencky(3e3, 4e3)
+LAW, NO_FLOW = Hencky(3e3, 4e3), NoFlow()
 LEVELS, N = 17, 50
 SIZES = Sizes(r=2, modes=4, tau=4, C=2, smoothing=1e-8)
 
@@ -93,19 +101,25 @@ def test_derivatives_by_differences(runs, rng):
     assert errors[0] < 1e-9 or 3.5 < errors[0] / errors[1] < 4.5
 
 
-def stepper_of(kind, fields, **options):
-    """A model of the points at rest."""
-    d = fields.dim
-    matter = Matter(np.ones(N), np.full(N, 1.0 / N), np.zeros((N, d)))
-    return kind(fields, matter, 0.4, 2, np.zeros(d), **options)
+def material(d):
+    """The points at rest."""
+    return MaterialPoints(np.ones(N), np.full(N, 1.0 / N), np.zeros((N, d)))
+
+
+def stepper_of(fields, scale, law=LAW, flow=NO_FLOW, weight=0.03):
+    """A model of the points with joint latent coordinates."""
+    own, d = material(fields.dim), fields.dim
+    quadrature = NumberedPoints(own.m, own.V0, 0.4, 2)
+    return JointStepper(fields, quadrature, JointInversion(scale, weight), np.zeros(d), None,
+                        "apic", "difference", own.v, law=law, flow=flow)
 
 
 def test_without_weight_the_stress_has_no_say(runs):
     fields, xhat, scale = joint(runs, SIZES._replace(modes=2, tau=1, C=1), 0.3)
-    at, some = Position(xhat[1, 3], xhat[1, 3]), np.arange(0, N, 3)
-    plain, _ = stepper_of(Inferred, fields).step(at, some, 0.0, 1e-3)
-    options = {"law": LAW, "flow": NoFlow(), "scale": scale}
-    none, with_it = (stepper_of(Joint, fields, weight=w, **options).step(at, some, 0.0, 1e-3)[0]
+    at, some = Latent(xhat[1, 3], before=xhat[1, 3]), np.arange(0, N, 3)
+    d = fields.dim
+    plain, _ = nsf_stepper(fields, material(d), 0.4, 2, np.zeros(d)).step(at, some, 0.0, 1e-3)
+    none, with_it = (stepper_of(fields, scale, weight=w).step(at, some, 0.0, 1e-3)[0]
                      for w in (1e-9, 1.0))
     assert np.abs(fields.place(some, none.xhat) - fields.place(some, plain.xhat)).max() < 1e-9
     assert np.abs(with_it.xhat - none.xhat).max() > 1e-6
@@ -116,24 +130,25 @@ def test_samples_carry_the_stress_of_their_fields_through_the_step(runs, d):
     square of its angle, 2e-10, times moduli of 1e4 Pa.
     """
     fields, _, scale = joint(runs, SIZES._replace(modes=2, tau=1, C=1), 0.3)
-    stepper = stepper_of(Joint, fields, law=LAW, flow=make_flow("von_mises", LAW, d, tau_y=1e9),
-                         scale=scale)
+    stepper = stepper_of(fields, scale, flow=make_flow("von_mises", LAW, d, tau_y=1e9))
     X, omega, dt = runs.X, 2.0, 1e-5
     spin = np.zeros((d, d))
     spin[0, 1], spin[1, 0] = -omega, omega
     tau = np.tile(np.diag([2.0, -1.0, 0.5][:d]), (N, 1, 1))
     q = particles_at(X, X @ spin.T, np.full(N, 1e6), np.full(N, 1e-9), transfer="apic")
     q.C[:], q.tau[:] = spin, tau
-    stepper.moved(Body("b", q, LAW, NoFlow(), np.arange(N)), 5, 0.0, dt)
+    first = particles_at(X[:5], 0.0 * X[:5], np.zeros(5), np.zeros(5), transfer="pic")
+    trial = stepper.on_grid(Body("b", q, LAW, NoFlow(), np.arange(N)),
+                            Body("samples", first, None, NoFlow(), np.arange(5)), 0.0, dt)
     R = rotation(omega * dt, None if d == 2 else (0.0, 0.0, 1.0))
-    assert np.abs(stepper.tau - R @ tau[:5] @ R.T).max() < 4e-6
-    assert np.abs(stepper.tau - tau[:5]).max() > 4e-5
+    assert np.abs(trial.tau - R @ tau[:5] @ R.T).max() < 4e-6
+    assert np.abs(trial.tau - tau[:5]).max() > 4e-5
 
 
 def test_samples_with_weights_are_refused(runs):
     fields, xhat, scale = joint(runs, SIZES._replace(modes=2, tau=1, C=1), 0.3)
-    stepper = stepper_of(Joint, fields, law=LAW, flow=NoFlow(), scale=scale)
-    at, some = Position(xhat[1, 3], xhat[1, 3]), np.arange(0, N, 3)
+    stepper = stepper_of(fields, scale)
+    at, some = Latent(xhat[1, 3], before=xhat[1, 3]), np.arange(0, N, 3)
     with pytest.raises(ValueError, match="samples with weights: expected samples that all count"):
         stepper.step(at, some, 0.0, 1e-3, np.ones(len(some)))
 
@@ -149,4 +164,4 @@ def test_runs_without_stress_are_refused(runs):
 def test_other_materials_are_refused(runs, law, flow):
     fields, _, scale = joint(runs, SIZES._replace(modes=2, tau=1, C=1), 0.3)
     with pytest.raises(ValueError, match="expected Hencky's law, whose stress tells"):
-        stepper_of(Joint, fields, law=law, flow=flow, scale=scale)
+        stepper_of(fields, scale, law, flow)

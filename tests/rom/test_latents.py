@@ -8,8 +8,9 @@ from mpm_ref.rom.fields.pod import basis, directions
 from mpm_ref.rom.snapshots import Snapshots
 
 torch = pytest.importorskip("torch")
-fit = pytest.importorskip("mpm_ref.rom.learn.fit")
-field = pytest.importorskip("mpm_ref.rom.learn.field")
+decoder = pytest.importorskip("mpm_ref.rom.train.decoder")
+loss = pytest.importorskip("mpm_ref.rom.train.loss")
+field = pytest.importorskip("mpm_ref.rom.train.field")
 
 N, RUNS, LEVELS, R = 12, 3, 10, 2
 
@@ -26,36 +27,36 @@ def data(rng):
 
 
 def training(**settings):
-    return fit.Training(R, hidden=(8,), epochs=2, batch=4, points=5, **settings)
+    return decoder.DecoderTraining(R, hidden=(8,), epochs=2, batch=4, points=5, **settings)
 
 
 def test_modes_are_in_the_norm_of_the_loss_and_stay(data):
     plan = training(latent="modes")
     expected = basis(data.X, *data.flat(), R, plan.weights.F).xhat
-    done = fit.train(plan, data)
+    done = decoder.train_decoder(plan, data)
     assert done.xhat.reshape(-1, R) == pytest.approx(expected, rel=1e-6)
     assert done.xhat.reshape(-1, R) != pytest.approx(
         basis(data.X, *data.flat(), R).xhat, rel=1e-2)
 
 
 def test_modes_weigh_snapshots_as_often_as_they_are_shown(data):
-    plan = training(latent="modes", dense=4, thin=3)
+    plan = training(latent="modes", dense=4, every=3)
     shown = np.tile(np.where(np.arange(LEVELS) < 4, 1.0, 1.0 / 3.0), RUNS)
     expected = basis(data.X, *data.flat(), R, plan.weights.F, np.sqrt(shown)).xhat
-    found = fit.train(plan, data).xhat.reshape(-1, R)
+    found = decoder.train_decoder(plan, data).xhat.reshape(-1, R)
     assert found == pytest.approx(expected, rel=1e-5, abs=1e-6)
     assert found != pytest.approx(basis(data.X, *data.flat(), R, plan.weights.F).xhat, rel=1e-2)
 
 
 def test_the_decoder_learns_with_given_latents(data):
-    session = fit.Session(training(latent="modes"), data)
+    session = decoder.DecoderSession(training(latent="modes"), data)
     before = [p.detach().clone() for p in session.f.parameters()]
     session.epoch()
     assert all(not torch.equal(a, b) for a, b in zip(before, session.f.parameters(), strict=True))
 
 
 def test_early_levels_are_always_shown_and_later_ones_in_their_turn(data, monkeypatch):
-    session, shown = fit.Session(training(dense=4, thin=3), data), []
+    session, shown = decoder.DecoderSession(training(dense=4, every=3), data), []
     monkeypatch.setattr(session, "show", lambda at, progress: shown.append(at) or [0.0] * 4)
     for _ in range(40):
         session.epoch()
@@ -66,14 +67,14 @@ def test_early_levels_are_always_shown_and_later_ones_in_their_turn(data, monkey
 
 
 def test_an_epoch_shows_everything_where_nothing_is_thinned(data, monkeypatch):
-    session, shown = fit.Session(training(), data), []
+    session, shown = decoder.DecoderSession(training(), data), []
     monkeypatch.setattr(session, "show", lambda at, progress: shown.append(at) or [0.0] * 4)
     session.epoch()
     assert sorted(torch.cat(shown).tolist()) == list(range(RUNS * LEVELS))
 
 
 @pytest.mark.parametrize(("wrong", "said"), [({"latent": "codes"}, "latent = 'codes'"),
-                                             ({"thin": 0}, "thin = 0"),
+                                             ({"every": 0}, "every = 0"),
                                              ({"dense": -1}, "dense = -1")])
 def test_settings_that_mean_nothing_are_refused(wrong, said):
     with pytest.raises(ValueError, match=said):
@@ -81,10 +82,11 @@ def test_settings_that_mean_nothing_are_refused(wrong, said):
 
 
 def test_every_epoch_shows_a_snapshot_however_thin(data, monkeypatch):
-    shown, show = [], fit.Session.show
-    monkeypatch.setattr(fit.Session, "show", lambda self, at, progress: shown.append(at.tolist())
+    shown, show = [], decoder.DecoderSession.show
+    monkeypatch.setattr(decoder.DecoderSession, "show", lambda self, at,
+                        progress: shown.append(at.tolist())
                         or show(self, at, progress))
-    found = fit.train(fit.Training(R, (8,), epochs=40, thin=10**9), data)
+    found = decoder.train_decoder(decoder.DecoderTraining(R, (8,), epochs=40, every=10**9), data)
     assert [len(at) for at in shown] == 40 * [1]
     assert len({at[0] for at in shown}) > 5
     assert np.isfinite(found.history).all()
@@ -92,7 +94,7 @@ def test_every_epoch_shows_a_snapshot_however_thin(data, monkeypatch):
 
 # Directions, and states beside the snapshots.
 
-NONE = fit.Weights(0.0, 0.0)
+NONE = loss.LossWeights(0.0, 0.0)
 
 
 def beside(**settings):
@@ -111,7 +113,7 @@ def test_directions_are_the_modes_in_one_unit(data):
 
 
 def test_directions_ask_for_positions_alone_and_stay(data):
-    found = fit.train(beside(beside=0.3), data._replace(F=None, v=None)).xhat
+    found = decoder.train_decoder(beside(jitter=0.3), data._replace(F=None, v=None)).xhat
     assert found.reshape(-1, R) == pytest.approx(
         directions(data.X, data.x.reshape(-1, N, 3), R)[1], rel=1e-5, abs=1e-6)
 
@@ -119,12 +121,12 @@ def test_directions_ask_for_positions_alone_and_stay(data):
 def shown(monkeypatch, data, far):
     """The batch of two snapshots, known displacements and coordinates of them."""
     batches = []
-    monkeypatch.setattr(fit, "loss", lambda f, batch, *_: batches.append(batch) or (0.0, ()))
-    under_way = fit.Session(beside(beside=far), data)
+    monkeypatch.setattr(decoder, "loss", lambda f, batch, *_: batches.append(batch) or (0.0, ()))
+    under_way = decoder.DecoderSession(beside(jitter=far), data)
     state = under_way.random.get_state()
     under_way.error(torch.tensor([7, 21]))
     under_way.random.set_state(state)
-    points = under_way.some_points().numpy()
+    points = under_way.draw_points().numpy()
     U, xhat = directions(data.X, data.x.reshape(-1, N, 3), R)
     u = (data.x - data.X).reshape(-1, N, 3)[[7, 21]][:, points]
     return batches[0], U[points], u, xhat[[7, 21]]
@@ -147,8 +149,8 @@ def test_without_a_distance_snapshots_are_shown_as_they_are(monkeypatch, data):
 
 
 def test_the_distance_is_that_of_the_training(data):
-    under_way = fit.Session(beside(beside=0.5), data)
-    away = under_way.away(20_000, R).numpy()
+    under_way = decoder.DecoderSession(beside(jitter=0.5), data)
+    away = under_way.draw_jitter(20_000, R).numpy()
     assert away.std() == pytest.approx(0.5 / np.sqrt(3.0), rel=0.03)    # of uniform deviations
     assert np.abs(away.mean(axis=0)).max() < 0.01
 
@@ -156,9 +158,9 @@ def test_the_distance_is_that_of_the_training(data):
 def test_values_of_a_field_are_shown_beside_theirs_in_coordinates_alone(data):
     """Parameters stay as they are, and so do the values."""
     xhat = np.zeros((RUNS, LEVELS, R))
-    seen = field.Observed(data.X, xhat, data.mu.astype(float), data.x, data.dt)
-    plan = field.FieldTraining((4,), True, 1, 4, beside=0.5)
-    under_way, found = field.Session(plan, seen), []
+    seen = field.FieldData(data.X, xhat, data.mu.astype(float), data.x, data.dt)
+    plan = field.FieldTraining((4,), True, 1, 4, jitter=0.5)
+    under_way, found = field.FieldSession(plan, seen), []
     under_way.f.register_forward_pre_hook(lambda _, given: found.append(given[1]))
     under_way.error(torch.tensor([3, 28]))
     states = found[0].detach().numpy().reshape(2, N, R + 1)
@@ -168,12 +170,12 @@ def test_values_of_a_field_are_shown_beside_theirs_in_coordinates_alone(data):
 
 
 @pytest.mark.parametrize("settings", [
-    {"latent": "modes", "weights": NONE}, {"latent": "directions", "weights": fit.CODE}])
+    {"latent": "modes", "weights": NONE}, {"latent": "directions", "weights": loss.CODE}])
 def test_nothing_but_displacements_is_known_beside_snapshots(data, settings):
-    with pytest.raises(ValueError, match=r"beside = 0.5, .*: expected latent = 'directions' and"):
-        fit.train(training(beside=0.5, **settings), data)
+    with pytest.raises(ValueError, match=r"jitter = 0.5, .*: expected latent = 'directions' and"):
+        decoder.train_decoder(training(jitter=0.5, **settings), data)
 
 
 def test_a_distance_below_zero_is_refused():
-    with pytest.raises(ValueError, match=r"beside = -0.1: expected 0 or more"):
-        beside(beside=-0.1)
+    with pytest.raises(ValueError, match=r"jitter = -0.1: expected 0 or more"):
+        beside(jitter=-0.1)

@@ -7,16 +7,22 @@ import rom_toys
 torch = pytest.importorskip("torch")
 
 from mpm_ref.rom.fields.architecture import lengths  # noqa: E402
-from mpm_ref.rom.learn import fit, loss, schedule  # noqa: E402
-from mpm_ref.rom.learn.data import batch_of, data_of  # noqa: E402
-from mpm_ref.rom.learn.fit import Session, Training, train  # noqa: E402
-from mpm_ref.rom.learn.loss import CODE, PRINTED, Weights, terms  # noqa: E402
-from mpm_ref.rom.learn.perceptron import Perceptron, imported  # noqa: E402
 from mpm_ref.rom.snapshots import Snapshots, displacement_error  # noqa: E402
+from mpm_ref.rom.train import decoder, loss, schedule  # noqa: E402
+from mpm_ref.rom.train.decoder import DecoderSession, DecoderTraining, train_decoder  # noqa: E402
+from mpm_ref.rom.train.loss import (  # noqa: E402
+    CODE,
+    PRINTED,
+    LossWeights,
+    batch_of,
+    tensors_of,
+    terms,
+)
+from mpm_ref.rom.train.perceptron import FieldPerceptron, perceptron_of  # noqa: E402
 
 LEVELS = np.arange(5)
-ALL = Weights(1.0, 1.0)
-PLACE = Weights(0.0, 0.0)
+ALL = LossWeights(1.0, 1.0)
+PLACE = LossWeights(0.0, 0.0)
 KINDS = {"encoder": {}, "free": {"latent": "free"}, "some points": {"points": 7}}
 
 
@@ -45,14 +51,14 @@ def known(dim):
     map, (start, rates) = rom_toys.decoder(dim, 2), np.random.default_rng(0).normal(size=(2, 2, 2))
     snapshots, xhat = straight(map, 0.5 * start, 20.0 * rates)
     table = torch.from_numpy(xhat.reshape(-1, 2))
-    return map, data_of(snapshots, map.units, torch.float64), lambda numbers: table[numbers]
+    return map, tensors_of(snapshots, map.units, torch.float64), lambda numbers: table[numbers]
 
 
 def batch(dim):
     """A network of doubles, a `Batch` of the data that it makes itself, and its units."""
     map, data, latents = known(dim)
     points = torch.arange(0, 15, 2)
-    return imported(map), batch_of(data, torch.arange(10), points, latents), data.units
+    return perceptron_of(map), batch_of(data, torch.arange(10), points, latents), data.units
 
 
 def shifted(batch):
@@ -77,7 +83,7 @@ def test_terms_are_means_of_squared_lengths(d):
     f, own, scales = batch(d)
     expected = [0.01 * d, 0.04 * d * d, 9.0 * d]
     assert [a.item() for a in terms(f, shifted(own), scales, ALL)] == pytest.approx(expected)
-    total, found = loss.loss(f, shifted(own), scales, Weights(2.0, 0.5))
+    total, found = loss.loss(f, shifted(own), scales, LossWeights(2.0, 0.5))
     assert [a.item() for a in found] == pytest.approx(expected)
     scale = float(np.sum(rom_toys.STD[:d] ** 2))
     assert total.item() == pytest.approx((0.01 * d + 0.08 * d * d + 4.5 * d) / scale)
@@ -85,7 +91,7 @@ def test_terms_are_means_of_squared_lengths(d):
 
 def test_a_batch_pairs_each_snapshot_with_its_successor(d):
     _, data, latents = known(d)
-    assert data.next.tolist() == [1, 2, 3, 4, 4, 6, 7, 8, 9, 9]
+    assert data.successor.tolist() == [1, 2, 3, 4, 4, 6, 7, 8, 9, 9]
     found = batch_of(data, torch.tensor([6, 4]), torch.tensor([3, 1]), latents)
     for row, (k, p) in enumerate([(6, 3), (6, 1), (4, 3), (4, 1)]):       # snapshot, point
         rate, v = (latents(k + 1) - latents(k)) / rom_toys.DT, data.v[k + 1, p]
@@ -107,7 +113,7 @@ def test_gradients_flow_through_the_derivatives(d, name):
 def test_a_decoder_learns_from_one_term_alone(d, term):
     _, own, scales = batch(d)
     torch.manual_seed(0)
-    f = Perceptron(d, 2, (12, 12)).double()
+    f = FieldPerceptron(d, 2, (12, 12)).double()
     optimiser = torch.optim.Adam(f.parameters(), lr=1e-2)
     errors = []
     for _ in range(150):
@@ -149,7 +155,7 @@ def test_lengths_of_the_encoder_are_those_of_the_paper(points, last, count):
 
 def test_a_decoder_has_the_papers_number_of_weights():
     """LDM-tab1, d = 3, r = 6."""
-    assert sum(a.numel() for a in Perceptron(3, 6).parameters()) == 3183
+    assert sum(a.numel() for a in FieldPerceptron(3, 6).parameters()) == 3183
 
 
 # Training.
@@ -162,7 +168,7 @@ def stretching(runs=3):
 
 
 def training(**kw):
-    return Training(**{"r": 2, "hidden": (8, 8), "epochs": 7, "batch": 5, **kw})
+    return DecoderTraining(**{"r": 2, "hidden": (8, 8), "epochs": 7, "batch": 5, **kw})
 
 
 def bits(trained):
@@ -178,7 +184,7 @@ def kind(request):
 def test_training_lowers_every_term(kind, monkeypatch):
     monkeypatch.setattr(schedule, "FASTEST", 1e-2)
     snapshots = stretching()
-    found = train(training(epochs=100, seed=1, **kind), snapshots)
+    found = train_decoder(training(epochs=100, seed=1, **kind), snapshots)
     assert found.history.shape == (100, 4)
     assert found.xhat.shape == (3, 5, 2)
     assert (found.history[-1] < [0.1, 0.1, 0.4, 0.1] * found.history[0]).all()
@@ -188,11 +194,11 @@ def test_training_lowers_every_term(kind, monkeypatch):
 
 
 def test_the_same_seed_gives_the_same_numbers(kind):
-    first = bits(train(training(**kind), stretching()))
+    first = bits(train_decoder(training(**kind), stretching()))
     torch.rand(3)
-    assert bits(train(training(**kind), stretching())) == first
-    assert bits(train(training(seed=1, **kind), stretching()))[1] != first[1]
-    shown = [Session(training(seed=k, points=7), stretching()).some_points() for k in (0, 1)]
+    assert bits(train_decoder(training(**kind), stretching())) == first
+    assert bits(train_decoder(training(seed=1, **kind), stretching()))[1] != first[1]
+    shown = [DecoderSession(training(seed=k, points=7), stretching()).draw_points() for k in (0, 1)]
     assert not torch.equal(*shown)
 
 
@@ -201,7 +207,7 @@ def test_units_are_those_of_the_training_runs():
     snapshots = stretching(4)
     held = snapshots._replace(x=snapshots.x.copy())
     held.x[1] *= 3.0
-    one, other = (train(training(), s.of([0, 2, 3])) for s in (snapshots, held))
+    one, other = (train_decoder(training(), s.of([0, 2, 3])) for s in (snapshots, held))
     assert bits(one) == bits(other)
     u = (snapshots.x - snapshots.X)[[0, 2, 3]].reshape(-1, 2)
     expected = (snapshots.X.min(axis=0), np.ptp(snapshots.X, axis=0), u.mean(axis=0), u.std(axis=0))
@@ -209,7 +215,7 @@ def test_units_are_those_of_the_training_runs():
 
 
 def test_the_exported_decoder_is_the_trained_one(kind):
-    session, X = Session(training(**kind), stretching()), stretching().X
+    session, X = DecoderSession(training(**kind), stretching()), stretching().X
     session.epoch()
     found, scales = session.result(3), session.data.units
     xhat = session.latents(torch.tensor([6])).detach()
@@ -229,7 +235,7 @@ def test_the_rate_is_that_of_the_share_of_all_steps(monkeypatch):
     progress = []
     monkeypatch.setitem(schedule.SCHEDULES, "cosine",
                         lambda share: progress.append(share) or 0.0)
-    one, seven = (train(training(epochs=k), stretching()).decoder.net.W for k in (1, 7))
+    one, seven = (train_decoder(training(epochs=k), stretching()).decoder.net.W for k in (1, 7))
     assert progress[3:] == pytest.approx(np.arange(21) / 21)      # three batches in an epoch
     assert np.array_equal(one, seven)
 
@@ -248,8 +254,8 @@ def test_settings_that_mean_nothing_are_refused(settings, said):
 
 @pytest.mark.parametrize("save", [1, 3])
 def test_a_training_that_was_cut_off_goes_on_bit_for_bit(tmp_path, monkeypatch, kind, save):
-    monkeypatch.setattr(fit, "SAVE", save)
-    whole, epochs = train(training(**kind), stretching()), []
+    monkeypatch.setattr(decoder, "SAVE", save)
+    whole, epochs = train_decoder(training(**kind), stretching()), []
 
     def cut(history):
         epochs.append(len(history))
@@ -257,23 +263,24 @@ def test_a_training_that_was_cut_off_goes_on_bit_for_bit(tmp_path, monkeypatch, 
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        train(training(**kind), stretching(), tmp_path / "a.pt", cut)
+        train_decoder(training(**kind), stretching(), tmp_path / "a.pt", cut)
     torch.rand(3)
-    assert bits(train(training(**kind), stretching(), tmp_path / "a.pt", cut)) == bits(whole)
+    assert bits(train_decoder(training(**kind), stretching(), tmp_path / "a.pt",
+                              cut)) == bits(whole)
     assert epochs[5:] == list(range(5 // save * save + 1, 8))
     assert [file.name for file in tmp_path.iterdir()] == ["a.pt"]
 
 
 @pytest.fixture
 def checkpoint(tmp_path, monkeypatch):
-    monkeypatch.setattr(fit, "SAVE", 1)
-    train(training(epochs=1), stretching(), tmp_path / "a.pt")
+    monkeypatch.setattr(decoder, "SAVE", 1)
+    train_decoder(training(epochs=1), stretching(), tmp_path / "a.pt")
     return tmp_path / "a.pt"
 
 
 def refused(path, said, data, **settings):
     with pytest.raises(ValueError, match=said) as refusal:
-        train(training(**{"epochs": 1, **settings}), data, path)
+        train_decoder(training(**{"epochs": 1, **settings}), data, path)
     assert "\n" not in str(refusal.value)
 
 

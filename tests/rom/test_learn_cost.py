@@ -7,19 +7,19 @@ import rom_toys
 
 torch = pytest.importorskip("torch")
 
-from mpm_ref import cost  # noqa: E402
-from mpm_ref.reduced.maps import of_trained  # noqa: E402
-from mpm_ref.rom.learn import fit  # noqa: E402
-from mpm_ref.rom.learn.fit import Training, train  # noqa: E402
+from mpm_ref import training  # noqa: E402
+from mpm_ref.rom.study.reduce import of_trained  # noqa: E402
+from mpm_ref.rom.train import decoder  # noqa: E402
+from mpm_ref.rom.train.decoder import DecoderTraining, train_decoder  # noqa: E402
 
 
 @pytest.fixture
 def clock(monkeypatch):
     """Time that stands still but for what is added to `t`; each epoch is saved."""
     now = SimpleNamespace(t=0.0)
-    monkeypatch.setattr(cost, "process_time", lambda: 10.0 + 2.0 * now.t)
-    monkeypatch.setattr(cost, "perf_counter", lambda: 30.0 + 3.0 * now.t)
-    monkeypatch.setattr(fit, "SAVE", 1)
+    monkeypatch.setattr(training, "process_time", lambda: 10.0 + 2.0 * now.t)
+    monkeypatch.setattr(training, "perf_counter", lambda: 30.0 + 3.0 * now.t)
+    monkeypatch.setattr(decoder, "SAVE", 1)
     return now
 
 
@@ -30,7 +30,7 @@ def trained(clock, path, until=None):
         if len(history) == until:
             raise KeyboardInterrupt
 
-    return train(Training(2, (6,), epochs=7), rom_toys.snapshots(2), path, on_epoch)
+    return train_decoder(DecoderTraining(2, (6,), epochs=7), rom_toys.snapshots(2), path, on_epoch)
 
 
 def test_the_cost_of_a_training_is_that_of_all_its_parts(clock, tmp_path):
@@ -44,6 +44,6 @@ def test_the_cost_of_a_training_is_that_of_all_its_parts(clock, tmp_path):
 
 def test_the_file_of_a_map_says_what_its_training_took(clock, tmp_path):
     data = rom_toys.snapshots(2)
-    done = trained(clock, tmp_path / "a.pt")._replace(cost=cost.Cost(12.34, 56.78))
+    done = trained(clock, tmp_path / "a.pt")._replace(cost=training.Cost(12.34, 56.78))
     about = of_trained(done, data.X, {"seed": 3}).about
     assert (about["cpu_seconds"], about["wall_seconds"], about["seed"]) == (12.3, 56.8, 3)

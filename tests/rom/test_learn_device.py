@@ -13,33 +13,35 @@ from small_studies import generated
 
 torch = pytest.importorskip("torch")
 
-from mpm_ref.rom.learn import field, fit  # noqa: E402
-from mpm_ref.rom.learn.device import device_of  # noqa: E402
-from mpm_ref.rom.learn.field import FieldTraining, Observed  # noqa: E402
-from mpm_ref.rom.learn.fit import Training  # noqa: E402
-from mpm_ref.rom.learn.stages import POSITION, positions  # noqa: E402
+from mpm_ref.rom.train import decoder, field  # noqa: E402
+from mpm_ref.rom.train.decoder import DecoderTraining  # noqa: E402
+from mpm_ref.rom.train.field import FieldData, FieldTraining  # noqa: E402
+from mpm_ref.rom.train.settings import device_of  # noqa: E402
+from mpm_ref.rom.train.stages import POSITION, position_snapshots  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 DATA, META = field_toys.histories(), "meta"
 POSITIONS = {"encoder": {"latent": "encoder-nsf"}, "free": {"latent": "free"},
-             "directions": {"latent": "directions", "beside": 0.1}}
+             "directions": {"latent": "directions", "jitter": 0.1}}
 
 
 def of_position(device, **settings):
     """A session of NSF's first stage."""
-    training = Training(1, (4, 4), weights=POSITION, points=5, **settings)
-    return fit.Session(training, positions(DATA), device)
+    training = DecoderTraining(1, (4, 4), weights=POSITION, points=5, **settings)
+    return decoder.DecoderSession(training, position_snapshots(DATA), device)
 
 
 def of_stress(device):
     """A session of NSF's second stage, with all that it can have."""
-    seen = Observed(DATA.X, np.ones((*DATA.x.shape[:2], 1)), DATA.mu, DATA.tau, DATA.dt)
-    return field.Session(FieldTraining((4,), True, points=5, beside=0.1, octaves=2), seen, device)
+    seen = FieldData(DATA.X, np.ones((*DATA.x.shape[:2], 1)), DATA.mu, DATA.tau, DATA.dt)
+    return field.FieldSession(FieldTraining((4,), True, points=5, jitter=0.1, octaves=2), seen,
+                              device)
 
 
 def of_gradients(device, latent):
     """A session of LDM, whose loss has F and velocities."""
-    return fit.Session(Training(2, (4, 4), latent, points=5), rom_toys.snapshots(2), device)
+    return decoder.DecoderSession(DecoderTraining(2, (4, 4), latent, points=5),
+                                  rom_toys.snapshots(2), device)
 
 
 MADE = {**{name: (of_position, how) for name, how in POSITIONS.items()}, "stress": (of_stress, {}),
@@ -70,11 +72,11 @@ def test_what_is_shown_does_not_depend_on_the_device(make, how):
     """Random numbers are drawn on the processor."""
     here, there = make("cpu", **how), make(META, **how)
     for _ in range(3):
-        for draw in ("order", "some_points"):
+        for draw in ("order", "draw_points"):
             a, b = (getattr(session, draw)() for session in (here, there))
             assert b.device.type == "cpu"
             assert a.tolist() == b.tolist()
-        here.away(2, 1), there.away(2, 1)
+        here.draw_jitter(2, 1), there.draw_jitter(2, 1)
 
 
 def test_the_processor_is_always_there():

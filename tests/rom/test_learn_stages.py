@@ -11,28 +11,28 @@ torch = pytest.importorskip("torch")
 
 from mpm_ref.rom import fields_file  # noqa: E402
 from mpm_ref.rom.fields.architecture import row_per_axis  # noqa: E402
-from mpm_ref.rom.learn import field, fit, schedule, session, stages  # noqa: E402
-from mpm_ref.rom.learn.encoder import Encoder  # noqa: E402
-from mpm_ref.rom.learn.field import FieldTraining, Observed  # noqa: E402
-from mpm_ref.rom.learn.fit import Training  # noqa: E402
-from mpm_ref.rom.learn.stages import POSITION, Plan, positions, printed  # noqa: E402
 from mpm_ref.rom.snapshots import position_error  # noqa: E402
+from mpm_ref.rom.train import decoder, field, schedule, session, stages  # noqa: E402
+from mpm_ref.rom.train.decoder import DecoderTraining  # noqa: E402
+from mpm_ref.rom.train.encoder import Encoder  # noqa: E402
+from mpm_ref.rom.train.field import FieldData, FieldTraining  # noqa: E402
+from mpm_ref.rom.train.stages import POSITION, StagePlan, position_snapshots, printed_plan  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 DATA = field_toys.histories()
 
 
 def plan(epochs=40, follows=True, **more):
-    g = Training(1, (8, 8), "encoder-nsf", POSITION, epochs, 4, schedule="steps", **more)
+    g = DecoderTraining(1, (8, 8), "encoder-nsf", POSITION, epochs, 4, schedule="steps", **more)
     h = FieldTraining((8, 8), follows, epochs, 4, **more)
-    return Plan(g, h, FieldTraining((8, 8), False, epochs, 4, **more))
+    return StagePlan(g, h, FieldTraining((8, 8), False, epochs, 4, **more))
 
 
 def observed(data=DATA):
     """Stresses, with latent coordinates as a first stage might find them."""
     xhat = np.broadcast_to(np.linspace(-1.0, 1.0, data.x.shape[1])[:, None],
                            (*data.x.shape[:2], 1))
-    return Observed(data.X, xhat, data.mu, data.tau, data.dt)
+    return FieldData(data.X, xhat, data.mu, data.tau, data.dt)
 
 
 def bits(*arrays):
@@ -98,12 +98,12 @@ def test_a_warm_start_rises_to_its_rate_and_falls_from_there():
 def test_rates_are_asked_for_in_every_step(monkeypatch):
     shares = []
     monkeypatch.setitem(schedule.SCHEDULES, "steps", lambda share: shares.append(share) or 0.0)
-    field.train(FieldTraining((4,), epochs=3, batch=8), observed())      # 15 snapshots
+    field.train_field(FieldTraining((4,), epochs=3, batch=8), observed())      # 15 snapshots
     assert shares == pytest.approx(np.arange(6) / 6)
 
 
 def test_the_papers_plan():
-    found = printed(3, 6, (48, 64, 64), follows=True)
+    found = printed_plan(3, 6, (48, 64, 64), follows=True)
     assert [own.hidden for own in found] == [(144,) * 5, (384,) * 5, (576,) * 5]
     assert [own.epochs for own in found] == [1500, 3000, 3000]
     assert [own.batch for own in found] == [32] * 3
@@ -116,7 +116,7 @@ def test_the_papers_plan():
 
 @pytest.mark.usefixtures("fast")
 def test_the_loss_of_every_stage_falls():
-    done = stages.train(plan(200), DATA)
+    done = stages.train_stages(plan(200), DATA)
     assert done.g.history[-1, 0] < 0.03 * done.g.history[0, 0]
     for fitted in (done.h, done.l):
         assert fitted.history.shape == (200,)
@@ -130,7 +130,7 @@ def test_the_loss_of_every_stage_falls():
 @pytest.mark.usefixtures("fast")
 def test_only_its_parameter_tells_the_stress_of_runs_apart_that_move_alike():
     """NSF-mu-dep: positions are the same in all runs, so are latents, and the stress is not."""
-    knows, does_not = (field.train(FieldTraining((16, 16), follows, 300, 4), observed())
+    knows, does_not = (field.train_field(FieldTraining((16, 16), follows, 300, 4), observed())
                        for follows in (True, False))
     assert does_not.field.parameters == 0
     xhat = observed().xhat[0, 4]
@@ -147,11 +147,11 @@ def norm_of(a):
 
 def test_the_latents_of_later_stages_are_those_of_the_first():
     """They are no unknowns: h and l change nothing of g and of them."""
-    whole, data = stages.train(plan(3), DATA), observed()
-    alone = fit.train(plan(3).g, positions(DATA))
+    whole, data = stages.train_stages(plan(3), DATA), observed()
+    alone = decoder.train_decoder(plan(3).g, position_snapshots(DATA))
     assert bits(whole.g.xhat, *whole.g.decoder.net) == bits(alone.xhat, *alone.decoder.net)
-    under_way, before = field.Session(plan(3).h, data), data.xhat.copy()
-    assert not under_way.states.requires_grad
+    under_way, before = field.FieldSession(plan(3).h, data), data.xhat.copy()
+    assert not under_way.variables.requires_grad
     assert {*under_way.networks} == {"f"}
     under_way.epoch()
     np.testing.assert_array_equal(data.xhat, before)
@@ -160,11 +160,11 @@ def test_the_latents_of_later_stages_are_those_of_the_first():
 
 def test_the_loss_is_the_mean_squared_error_of_standardised_values():
     """By hand, at some points of two snapshots, with the field as it is exported."""
-    under_way = field.Session(FieldTraining((8,), True, points=5), observed())
+    under_way = field.FieldSession(FieldTraining((8,), True, points=5), observed())
     state = under_way.random.get_state()
     total, terms = under_way.error(torch.tensor([7, 2]))            # run 1, level 2; run 0, level 2
     under_way.random.set_state(state)
-    points = under_way.some_points().numpy()
+    points = under_way.draw_points().numpy()
     under_way.history = [[0.0]]
     found = under_way.result().field
     left = [(found.values(DATA.X[points], observed().xhat[run, 2], DATA.mu[run])
@@ -174,21 +174,21 @@ def test_the_loss_is_the_mean_squared_error_of_standardised_values():
 
 
 def test_the_same_seed_gives_the_same_numbers():
-    first = all_of(stages.train(plan(2), DATA))
+    first = all_of(stages.train_stages(plan(2), DATA))
     torch.rand(3)
-    assert all_of(stages.train(plan(2), DATA)) == first
-    assert all_of(stages.train(plan(2, seed=1), DATA))[1] != first[1]
+    assert all_of(stages.train_stages(plan(2), DATA)) == first
+    assert all_of(stages.train_stages(plan(2, seed=1), DATA))[1] != first[1]
 
 
 def test_stored_single_precision_is_trained_on_as_it_is(rng):
     """Values are standardised in double precision, batch by batch."""
     data = observed()._replace(values=DATA.tau.astype(np.float32))
-    found = field.train(FieldTraining((4,), epochs=2), data).field.units
+    found = field.train_field(FieldTraining((4,), epochs=2), data).field.units
     assert found.mean == pytest.approx(DATA.tau.mean(axis=(0, 1, 2)), rel=1e-6)
 
 
 def test_three_stages_are_one_file(tmp_path):
-    done = stages.train(plan(2), DATA).model({"seed": 0})
+    done = stages.train_stages(plan(2), DATA).model({"seed": 0})
     fields_file.save(tmp_path / "fields.npz", done)
     back = fields_file.load(tmp_path / "fields.npz")
     assert bits(back.xhat, back.rest, *back.h.net) == bits(done.xhat, done.rest, *done.h.net)
@@ -199,9 +199,9 @@ def test_three_stages_are_one_file(tmp_path):
 
 def test_a_training_that_was_cut_off_goes_on_bit_for_bit(tmp_path, monkeypatch):
     """In the second stage; the first is read from its checkpoint, and not made again."""
-    monkeypatch.setattr(fit, "SAVE", 2)
+    monkeypatch.setattr(decoder, "SAVE", 2)
     monkeypatch.setattr(field, "SAVE", 2)
-    whole, seen = stages.train(plan(6, points=7), DATA), []
+    whole, seen = stages.train_stages(plan(6, points=7), DATA), []
 
     def cut(stage, history):
         seen.append((stage, len(history)))
@@ -209,9 +209,9 @@ def test_a_training_that_was_cut_off_goes_on_bit_for_bit(tmp_path, monkeypatch):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        stages.train(plan(6, points=7), DATA, tmp_path, cut)
+        stages.train_stages(plan(6, points=7), DATA, tmp_path, cut)
     torch.rand(3)
-    assert all_of(stages.train(plan(6, points=7), DATA, tmp_path, cut)) == all_of(whole)
+    assert all_of(stages.train_stages(plan(6, points=7), DATA, tmp_path, cut)) == all_of(whole)
     assert seen[11:] == [("h", 5), ("h", 6), *(("l", k) for k in range(1, 7))]
     assert sorted(file.name for file in tmp_path.iterdir()) == ["g.pt", "h.pt", "l.pt"]
 
@@ -222,23 +222,23 @@ def test_a_training_that_was_cut_off_goes_on_bit_for_bit(tmp_path, monkeypatch):
 def test_a_checkpoint_of_other_data_is_refused(tmp_path, monkeypatch, change):
     monkeypatch.setattr(field, "SAVE", 1)
     training = FieldTraining((4,), epochs=1)
-    field.train(training, observed(), tmp_path / "h.pt")
+    field.train_field(training, observed(), tmp_path / "h.pt")
     with pytest.raises(ValueError, match="is a checkpoint of the training"):
-        field.train(training, observed()._replace(**change), tmp_path / "h.pt")
+        field.train_field(training, observed()._replace(**change), tmp_path / "h.pt")
 
 
 def test_a_checkpoint_of_another_training_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(field, "SAVE", 1)
-    field.train(FieldTraining((4,), epochs=1), observed(), tmp_path / "h.pt")
+    field.train_field(FieldTraining((4,), epochs=1), observed(), tmp_path / "h.pt")
     with pytest.raises(ValueError, match="is a checkpoint of the training"):
-        field.train(FieldTraining((4,), True, epochs=1), observed(), tmp_path / "h.pt")
+        field.train_field(FieldTraining((4,), True, epochs=1), observed(), tmp_path / "h.pt")
 
 
 @pytest.mark.parametrize("of", ["g", "h"])
 def test_a_loss_that_is_not_finite_ends_the_training(of):
     """The one before is kept: no weight of it is spoilt."""
-    under_way = (fit.Session(plan().g, positions(DATA)) if of == "g"
-                 else field.Session(plan().h, observed()))
+    under_way = (decoder.DecoderSession(plan().g, position_snapshots(DATA)) if of == "g"
+                 else field.FieldSession(plan().h, observed()))
     with torch.no_grad():
         under_way.f.layers[0].weight[0, 0] = np.inf
     with pytest.raises(session.Diverged, match=r"epoch 1: the loss is (nan|inf)\. Are the data"):
@@ -253,7 +253,7 @@ def test_a_loss_that_is_not_finite_ends_the_training(of):
     ({"schedule": "linear"}, "schedule = 'linear': expected one of cosine, steps, warm"),
 ])
 def test_settings_that_mean_nothing_are_refused(settings, said):
-    for made in (lambda: FieldTraining((4,), **settings), lambda: Training(2, **settings)):
+    for made in (lambda: FieldTraining((4,), **settings), lambda: DecoderTraining(2, **settings)):
         with pytest.raises(ValueError, match=said):
             made()
 
@@ -261,12 +261,13 @@ def test_settings_that_mean_nothing_are_refused(settings, said):
 @pytest.mark.parametrize("settings", [{}, {"weights": POSITION, "latent": "modes"}])
 def test_positions_alone_train_no_error_of_gradients(settings):
     with pytest.raises(ValueError, match="snapshots of positions alone, for latent"):
-        fit.train(Training(2, (4,), epochs=1, **settings), positions(DATA))
+        decoder.train_decoder(DecoderTraining(2, (4,), epochs=1, **settings),
+                              position_snapshots(DATA))
 
 
 def test_positions_alone_give_the_decoder_that_all_gives():
     """What the loss does not ask for does not matter."""
     whole = rom_toys.snapshots(2)
-    one, other = (fit.train(Training(2, (6,), "encoder-nsf", POSITION, 3), data)
+    one, other = (decoder.train_decoder(DecoderTraining(2, (6,), "encoder-nsf", POSITION, 3), data)
                   for data in (whole, whole._replace(F=None, v=None)))
     assert one.decoder.net.W == pytest.approx(other.decoder.net.W, rel=1e-4, abs=1e-6)

@@ -7,8 +7,10 @@ import rom_toys
 from field_toys import MU, Q, latents, networks
 
 from mpm_ref.rom.fields.network import learned
-from mpm_ref.rom.inferred import Inferred, Matter, Position
+from mpm_ref.rom.latent import Latent
 from mpm_ref.rom.projection import project_position
+from mpm_ref.rom.step import MaterialPoints, nsf_stepper
+from tests.rom.test_inferred import after_grid
 from validation.nsf.pointwise_networks import infer
 
 POINTS = np.array([7, 3, 190, 3])
@@ -103,15 +105,15 @@ def test_points_and_parameters_that_do_not_fit_are_refused():
 def test_a_step_on_networks_moves_samples_as_when_all_points_are_stepped(d):
     n, dt = 600, 1e-3
     one, xhat = fields(d, n=n), latents()
-    matter = Matter(np.full(n, 2.0), np.full(n, 1e-3), np.zeros((n, d)))
+    matter = MaterialPoints(np.full(n, 2.0), np.full(n, 1e-3), np.zeros((n, d)))
     span = np.ptp(one.place(np.arange(n), xhat), axis=0).max()
-    stepper = Inferred(one, matter, span / 16, 2, np.zeros(d))
-    at, samples = Position(xhat, xhat - 0.01), np.array([5, 71, 300])
-    points, x = stepper.integration(xhat, samples)
+    stepper = nsf_stepper(one, matter, span / 16, 2, np.zeros(d))
+    at, samples = Latent(xhat, before=xhat - 0.01), np.array([5, 71, 300])
+    points, x = stepper.quadrature.integration_points(one, xhat, samples)
     np.testing.assert_allclose(x, one.place(points, xhat), rtol=0.0, atol=1e-14 * span)
     assert len(points) < n
     whole = np.concatenate([samples, np.setdiff1d(np.arange(n), samples)])
-    few, everything = (stepper.moved(stepper.inferred(at, N, one.place(N, xhat), dt), 3, 0.0, dt)
+    few, everything = (after_grid(stepper, at, N, one.place(N, xhat), 3, dt)
                        for N in (points, whole))
     assert np.abs(everything - one.place(samples, xhat)).max() > 1e-4 * span
     np.testing.assert_allclose(few, everything, rtol=0.0, atol=1e-12 * np.abs(everything).max())

@@ -204,12 +204,12 @@ def doubles(torch):
 
 def test_derivatives_equal_torch(d, hidden):
     torch = pytest.importorskip("torch")
-    from mpm_ref.rom.learn.perceptron import imported, with_derivatives
+    from mpm_ref.rom.train.perceptron import perceptron_of, with_derivatives
     map, _, X, xhat, _ = case(d, hidden)
     low, span, mean, std = map.units
     inputs = torch.from_numpy((X - low) / span), torch.from_numpy(xhat).repeat(len(X), 1)
     with doubles(torch):
-        y, dX, dxhat = (a.detach().numpy() for a in with_derivatives(imported(map), *inputs))
+        y, dX, dxhat = (a.detach().numpy() for a in with_derivatives(perceptron_of(map), *inputs))
     x, F, G = map.derivatives(X, xhat)
     assert close(x, X + mean + std * y)
     assert close(F, np.eye(d) + std[:, None] * dX / span)
@@ -218,10 +218,10 @@ def test_derivatives_equal_torch(d, hidden):
 
 def test_weights_survive_the_way_to_torch_and_back(d, hidden):
     torch = pytest.importorskip("torch")
-    from mpm_ref.rom.learn.perceptron import exported, imported
+    from mpm_ref.rom.train.perceptron import decoder_of, perceptron_of
     map = case(d, hidden)[0]
     with doubles(torch):
-        back = exported(imported(map), map.units)
+        back = decoder_of(perceptron_of(map), map.units)
     assert all(np.array_equal(a, b) for a, b in zip(map.net, back.net, strict=True))
     assert all(np.array_equal(a, b) for a, b in zip(map.units, back.units, strict=True))
 
@@ -229,12 +229,12 @@ def test_weights_survive_the_way_to_torch_and_back(d, hidden):
 def test_a_perceptron_of_torch_is_exported(d):
     """In double precision to round-off, in its own single precision to that one's."""
     torch = pytest.importorskip("torch")
-    from mpm_ref.rom.learn.perceptron import Perceptron, exported
+    from mpm_ref.rom.train.perceptron import FieldPerceptron, decoder_of
     torch.manual_seed(0)
-    f = Perceptron(d, R)
+    f = FieldPerceptron(d, R)
     units = case(d, ())[0].units
     X, xhat = rom_toys.cloud(d, 50), np.array([0.3, -0.8, 0.1])
-    map = exported(f, units)
+    map = decoder_of(f, units)
     y = (map.place(units.low + units.span * X, xhat) - units.low - units.span * X
          - units.mean) / units.std
     inputs = torch.from_numpy(X), torch.from_numpy(xhat).repeat(50, 1)

@@ -8,12 +8,12 @@ from rom_toys import cloud
 
 from mpm_ref.core.grid import OutOfRange
 from mpm_ref.rom.fields.affine import Affine
-from mpm_ref.rom.latent import at_start
+from mpm_ref.rom.latent import start_state
 from mpm_ref.rom.quadrature.eulerian import Eulerian
 from mpm_ref.rom.quadrature.lagrangian import neighbours
 from mpm_ref.rom.quadrature.node_centric import node_centric, nodes_of, whole_stencils
 from mpm_ref.rom.quadrature.stencil_overlap import bases
-from mpm_ref.rom.step import Reduced
+from mpm_ref.rom.step import ldm_stepper
 from tests.rom.test_step import (
     DT,
     DX,
@@ -21,13 +21,13 @@ from tests.rom.test_step import (
     LAW,
     RHO,
     Stirred,
-    Watched,
     distance,
     full,
     full_steps,
     largest_difference,
     quadrature,
     swinging,
+    watched,
 )
 
 
@@ -53,7 +53,7 @@ def test_samples_are_the_points_of_which_all_nodes_are_sample_nodes(d, degree):
     map, latent = swinging(d)
     X = cloud(d, 400)
     nodes = np.concatenate([block(d, degree), [[40] * d, [-7] * d]])
-    found = node_centric(eulerian(X, degree), nodes).samples(map, latent)
+    found = node_centric(eulerian(X, degree), nodes).samples(map, latent.xhat)
     known = set(rows(nodes))
     x = map.place(X, latent.xhat)
     expected = [p for p in range(400) if set(rows(nodes_of(x[p:p + 1], DX, degree))) <= known]
@@ -96,10 +96,10 @@ def test_on_an_exact_manifold_a_run_is_the_full_models(d, degree, projection):
     conditions, gravity = Stirred(d), GRAVITY[:d]
     particles = full_steps(full(X, X, 0.0 * X), conditions, gravity, degree, steps)
     body = node_centric(eulerian(X, degree), block(d, degree))
-    model = Reduced(map, body, LAW, gravity, conditions, projection=projection)
-    latent, seen = at_start(map.rest), []
+    model = ldm_stepper(map, body, LAW, gravity, projection, conditions=conditions)
+    latent, seen = start_state(map.rest), []
     for k in range(steps):
-        samples = body.samples(map, latent)
+        samples = body.samples(map, latent.xhat)
         seen.append(tuple(samples))
         latent, report = model.step(latent, samples, k * DT, DT)
         assert report.rank == map.r
@@ -112,7 +112,7 @@ def trial(body, samples):
     """Trial velocities of samples after a step under stress and gravity, on a learned map."""
     d = body.X.shape[1]
     map, latent = swinging(d)
-    model = Watched(map, body, LAW, GRAVITY[:d])
+    model = watched(ldm_stepper(map, body, LAW, GRAVITY[:d]))
     model.step(latent, samples, 0.0, DT)
     return model.trial
 
@@ -125,7 +125,7 @@ def test_where_nodes_are_the_samples_own_it_is_the_eulerian_quadrature(d, degree
     samples = np.argsort(np.linalg.norm(X - 0.4, axis=1))[:5]
     nodes = nodes_of(map.place(X[samples], latent.xhat), DX, degree)
     body = node_centric(inner, nodes)
-    assert set(samples) <= set(body.samples(map, latent))
+    assert set(samples) <= set(body.samples(map, latent.xhat))
     assert np.array_equal(trial(body, samples), trial(inner, samples))
 
 
@@ -135,7 +135,7 @@ def test_with_all_nodes_it_is_near_the_material_point_approach(d):
     samples = np.flatnonzero(np.abs(X - 0.5).max(axis=1) < 0.2)
     nodes = nodes_of(map.place(X, latent.xhat), DX, 2)
     body = node_centric(eulerian(X, 2), nodes)
-    assert np.array_equal(body.samples(map, latent), np.arange(4000))
+    assert np.array_equal(body.samples(map, latent.xhat), np.arange(4000))
     even = quadrature("lagrangian", X, 2)
     even = even._replace(m=np.full(4000, RHO / 4000), V0=np.full(4000, 1.0 / 4000))
     ours, theirs = (trial(of, samples) for of in (body, even))
@@ -160,16 +160,16 @@ def test_neighbours_of_all_states_are_enough_at_each(d, degree):
     kept = neighbours(inner, map, latents, samples)
     assert not set(kept.samples) & set(kept.around)
     for xhat in latents:
-        latent = at_start(xhat, np.ones(map.r))
-        support = inner.support(map, latent, samples)
+        latent = start_state(xhat, np.ones(map.r))
+        support = inner.support(map, latent.xhat, samples)
         assert set(support) <= {*kept.samples, *kept.around}
         found = []
         for body in (kept, inner):
-            model = Watched(map, body, LAW, GRAVITY[:d])
+            model = watched(ldm_stepper(map, body, LAW, GRAVITY[:d]))
             model.step(latent, samples, 0.0, DT)
             found.append(model.trial)
         assert np.array_equal(*found)
-    fewest = min(len(inner.support(map, at_start(xhat), samples)) for xhat in latents)
+    fewest = min(len(inner.support(map, xhat, samples)) for xhat in latents)
     assert fewest < len(kept.samples) + len(kept.around)
 
 
@@ -191,17 +191,17 @@ def test_sample_nodes_away_from_the_body_are_said_to_be(d):
     map, latent = swinging(d)
     body = node_centric(eulerian(cloud(d, 50), 2), block(d, 2, low=60))
     with pytest.raises(ValueError, match="none of the 50 material points"):
-        body.samples(map, latent)
+        body.samples(map, latent.xhat)
     with pytest.raises(OutOfRange):
-        body.samples(map, at_start(np.full(map.r, np.nan)))
+        body.samples(map, np.full(map.r, np.nan))
 
 
 def test_neighbours_of_other_samples_or_of_no_state_are_refused(d):
     (map, latents), X = states(d), cloud(d, 60)
     inner = quadrature("lagrangian", X, 2)
     kept = neighbours(inner, map, latents, [3, 5])
-    model = Reduced(map, kept, LAW, GRAVITY[:d])
+    model = ldm_stepper(map, kept, LAW, GRAVITY[:d])
     with pytest.raises(ValueError, match="sample 4 is not among the 2"):
-        model.step(at_start(latents[0]), np.array([3, 4]), 0.0, DT)
+        model.step(start_state(latents[0]), np.array([3, 4]), 0.0, DT)
     with pytest.raises(ValueError, match="no latent coordinates"):
         neighbours(inner, map, latents[:0], [3, 5])

@@ -4,8 +4,8 @@ import pytest
 from command_line import mpm_ref
 from small_nsf_studies import SCENE, modelled, write
 
-from mpm_ref.reduced.nsf.hints import hints
-from mpm_ref.reduced.study import load
+from mpm_ref.rom.study.nsf_hints import hints
+from mpm_ref.rom.study.study import load
 
 BARE, SMOOTH = ("smoothing = 1e-6\n", ""), "smoothing = 1e-6"
 ELASTIC = SCENE.replace(', flow = { type = "von_mises", tau_y = 2e3 }', "")

@@ -7,8 +7,9 @@ from rom_toys import Bent, Watched
 from scipy import linalg
 
 from mpm_ref.rom.fields.pod import modes
-from mpm_ref.rom.latent import at_start, initial, moved, points, velocities
-from mpm_ref.rom.projection import backtracked, least_squares, project_position, project_velocity
+from mpm_ref.rom.kinematics import evaluate
+from mpm_ref.rom.latent import initial, start_state, velocities
+from mpm_ref.rom.projection import least_squares, line_search, project_position, project_velocity
 
 R, N = 3, 50
 STEPS = 0.04 * 0.5 ** np.arange(5)      # [s]
@@ -171,7 +172,7 @@ def test_steps_that_go_too_far_are_cut():
 def test_a_line_that_only_rises_is_left_at_its_start(d, X):
     map, y = linear(d), path(0.0)
     x = map.place(X, y)
-    assert backtracked(map, X, x, (y, np.ones(R)), 0.0, 1.0) == (None, 0.0)
+    assert line_search(map, X, x, (y, np.ones(R)), 0.0, 1.0) == (None, 0.0)
 
 
 @pytest.mark.parametrize("off", [0.0, 0.1], ids=["along the manifold", "off it"])
@@ -194,7 +195,8 @@ def test_the_start_is_recovered_with_its_velocities(map, X):
     start = initial(map, X, x, v, xhat=path(0.2))
     assert start.xhat == pytest.approx(path(0.0), abs=1e-12)
     assert start.vhat == pytest.approx(vhat, abs=1e-11)
-    assert np.array_equal(start.before, start.xhat)
+    assert start.before is None
+    assert start.fitted_at is start.xhat
 
 
 def test_without_more_said_a_body_starts_at_rest(d, X):
@@ -207,33 +209,33 @@ def test_without_more_said_a_body_starts_at_rest(d, X):
 
 def test_states_share_no_memory():
     xhat, vhat = np.zeros(R), np.ones(R)
-    start = at_start(xhat, vhat)
+    start = start_state(xhat, vhat)
     xhat += 1.0
     vhat += 1.0
     start.xhat[0] = 5.0
     assert start.xhat.tolist() == [5.0, 0.0, 0.0]
-    assert not start.before.any()
     assert np.array_equal(start.vhat, np.ones(R))
 
 
 def after(dt, xhat=None):
     """The state after a step of length dt, by the linear projection unless told."""
-    start = at_start(path(0.0))
-    return moved(start, start.xhat + dt * near(R) if xhat is None else xhat, near(R))
+    start = start_state(path(0.0))
+    return start.advance(start.xhat + dt * near(R) if xhat is None else xhat, near(R))
 
 
 def speeds(map, latent, X, dt):
     """{name: v (n, d)} of all choices."""
-    return {name: points(map, latent, X, v).v
-            for name, v in velocities(map, latent, dt, X).items()}
+    at = evaluate(map, X, latent.xhat)
+    return {name: v(at) for name, v in velocities(map, latent, dt, X).items()}
 
 
 def test_points_are_where_the_latent_coordinates_say(map, X):
     latent = after(0.1)
-    at = points(map, latent, X, velocities(map, latent, 0.1, X)["previous"])
-    x, F, _ = map.derivatives(X, latent.xhat)
-    assert all(np.array_equal(a, b) for a, b in zip(at[:3], (X, x, F), strict=True))
-    assert at.v == pytest.approx(map.velocity(X, path(0.0), near(R)), abs=1e-15)
+    at = evaluate(map, X, latent.xhat)
+    v = velocities(map, latent, 0.1, X)["previous"](at)
+    x, F, G = map.derivatives(X, latent.xhat)
+    assert all(np.array_equal(a, b) for a, b in zip(at, (X, x, F, G), strict=True))
+    assert v == pytest.approx(map.velocity(X, path(0.0), near(R)), abs=1e-15)
 
 
 def test_velocities_agree_on_a_linear_map(d, X):
@@ -242,7 +244,7 @@ def test_velocities_agree_on_a_linear_map(d, X):
 
 
 def test_velocities_agree_before_the_first_step(map, X):
-    for found in speeds(map, at_start(path(0.0), near(R)), X, 0.1).values():
+    for found in speeds(map, start_state(path(0.0), near(R)), X, 0.1).values():
         assert found == pytest.approx(map.velocity(X, path(0.0), near(R)), abs=1e-14)
 
 

@@ -11,7 +11,6 @@ from mpm_ref.core.spline import STENCILS, base_of
 from mpm_ref.rom.fields import blocks as block_module
 from mpm_ref.rom.fields.affine import Affine
 from mpm_ref.rom.fields.blocks import SAFETY, blocks
-from mpm_ref.rom.latent import at_start
 from mpm_ref.rom.quadrature.lagrangian import CELLS, lagrangian
 from mpm_ref.rom.quadrature.stencil_overlap import reach
 from mpm_ref.rom.sampling import PER_GROUP, draw
@@ -198,7 +197,7 @@ def test_the_support_is_all_points_that_share_a_node(moved, body, degree, chosen
     x = map.place(X, xhat)
     samples = np.sort(chosen(x, np.random.default_rng(n)))
     expected = np.flatnonzero(sharing(x, x[samples], dx, degree))
-    assert np.array_equal(quadrature.support(map, at_start(xhat), samples), expected)
+    assert np.array_equal(quadrature.support(map, xhat, samples), expected)
     assert len(samples) < len(expected) or chosen is every
     assert len(expected) < n or chosen is not clustered
 
@@ -207,11 +206,11 @@ def test_the_cloud_is_the_support_with_its_masses(moved, d, degree, rng):
     (map, xhat), X, samples = moved, cloud(d, 300), np.array([7, 40, 41])
     m, V0 = rng.uniform(1.0, 2.0, (2, 300))
     quadrature = lagrangian(X, m, V0, DX, degree)
-    at = quadrature.support(map, at_start(xhat), samples)
-    found = quadrature.cloud(map, at_start(xhat), samples)
-    whole = zip((found.at.X, found.m, found.V0), (X, m, V0), strict=True)
+    at = quadrature.support(map, xhat, samples)
+    found = quadrature.cloud(map, xhat, samples)
+    whole = zip((found.points.points, found.m, found.V0), (X, m, V0), strict=True)
     assert all(np.array_equal(a, b[at]) for a, b in whole)
-    assert found.said == {"points": len(at)}
+    assert found.report == {"points": len(at)}
 
 
 # samples

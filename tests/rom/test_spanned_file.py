@@ -6,13 +6,12 @@ What a seal tells of a file is tested with `weights`, whose files are sealed by 
 import numpy as np
 import pytest
 
-from mpm_ref.archive import stated
 from mpm_ref.rom import modes_file, spanned_file, weights
 from mpm_ref.rom.fields.pod_fields import Sizes, spanned
 from mpm_ref.rom.snapshots import joined
 from mpm_ref.rom.spanned_file import arrays_of, load, save
 from mpm_ref.rom.weights import Model
-from mpm_ref.sealed import sealed
+from mpm_ref.store.weights_file import sealed, stated
 from tests.rom.test_spanned import ALL, bent
 
 ABOUT = {"command": "train", "map": {"kind": "modes", "r": 2}}

@@ -1,5 +1,6 @@
 """Reduced steps against steps of the full model."""
 
+import dataclasses
 import hashlib
 
 import numpy as np
@@ -13,11 +14,11 @@ from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.materials import FixedCorotated, NoFlow
 from mpm_ref.rom.fields.affine import Affine
 from mpm_ref.rom.fields.pod import modes
-from mpm_ref.rom.latent import at_start
+from mpm_ref.rom.latent import start_state
 from mpm_ref.rom.quadrature.eulerian import Eulerian
 from mpm_ref.rom.quadrature.lagrangian import lagrangian
 from mpm_ref.rom.sampling import draw
-from mpm_ref.rom.step import Reduced
+from mpm_ref.rom.step import ReducedStepper, ldm_stepper
 
 DX, DT, STEPS, RHO = 0.17, 0.01, 6, 800.0
 LAW = FixedCorotated(3e3, 4e3)
@@ -81,17 +82,17 @@ def quadrature(name, X, degree):
 def reduced_steps(model, latent, count, steps=STEPS):
     """Latent state after steps with `count` samples, drawn anew each time."""
     n, rng = len(model.quadrature.X), np.random.default_rng(7)
-    chosen = draw(n, count, model.map.r, model.map.dim)
+    chosen = draw(n, count, model.field.r, model.field.dim)
     for k in range(steps):
         latent, report = model.step(latent, chosen(rng), k * DT, DT)
-        assert report.rank == model.map.r
+        assert report.rank == model.field.r
     return latent
 
 
 def largest_difference(map, latent, X, particles):
     """Of x, v and F of a reduced state from those of the full model's particles."""
     x, F, _ = map.derivatives(X, latent.xhat)
-    v = map.velocity(X, latent.before, latent.vhat)
+    v = map.velocity(X, latent.fitted_at, latent.vhat)
     pairs = zip((x, v, F), (particles.x, particles.v, particles.F), strict=True)
     return max(abs(a - b).max() for a, b in pairs)
 
@@ -101,9 +102,9 @@ def largest_difference(map, latent, X, particles):
 def test_a_stirred_body_moves_as_in_the_full_model(d, degree, name, projection):
     X, map, conditions = cloud(d, 150), Affine(d), Stirred(d)
     particles = full_steps(full(X, X, 0.0 * X), conditions, GRAVITY[:d], degree)
-    model = Reduced(map, quadrature(name, X, degree), LAW, GRAVITY[:d], conditions,
-                    projection=projection)
-    latent = reduced_steps(model, at_start(map.rest), 12)
+    model = ldm_stepper(map, quadrature(name, X, degree), LAW, GRAVITY[:d],
+                        projection=projection, conditions=conditions)
+    latent = reduced_steps(model, start_state(map.rest), 12)
     assert abs(particles.F - np.eye(d)).max() > 0.1
     assert largest_difference(map, latent, X, particles) < 1e-12
 
@@ -114,10 +115,10 @@ def test_a_thrown_body_falls_as_in_the_full_model(d, degree, name, projection):
     """The grid decides here; Eulerian samples also read nodes that no quadrature point reaches."""
     X, map, v = cloud(d, 150), Affine(d), np.array([2.0, 4.0, -3.0])[:d]
     particles = full_steps(full(X, X, np.tile(v, (150, 1))), None, GRAVITY[:d], degree)
-    model = Reduced(map, quadrature(name, X, degree), LAW, GRAVITY[:d],
+    model = ldm_stepper(map, quadrature(name, X, degree), LAW, GRAVITY[:d],
                     projection=projection)
     thrown = np.hstack([np.zeros((d, d)), v[:, None]]).ravel()
-    latent = reduced_steps(model, at_start(map.rest, thrown), 12)
+    latent = reduced_steps(model, start_state(map.rest, thrown), 12)
     assert abs(particles.x - X).max() > DX
     assert largest_difference(map, latent, X, particles) < 1e-12
 
@@ -132,7 +133,7 @@ def anything(d, n=18):
     map = modes(X, x, F, n * d)
     U = map.derivatives(X, np.zeros(n * d))[2].reshape(n * d, n * d)
     xhat = np.linalg.solve(U, (x[0] - X).ravel())
-    return map, at_start(xhat, rng.normal(size=n * d))
+    return map, start_state(xhat, rng.normal(size=n * d))
 
 
 @pytest.mark.parametrize("projection", ["linear", "nonlinear"])
@@ -143,7 +144,7 @@ def test_a_step_that_nothing_restrains_is_one_of_the_full_model(d, degree, proje
     v = G @ latent.vhat
     particles = full_steps(full(X, x, v, F), None, gravity, degree, steps=1)
     relaxed = full_steps(full(X, x, v), None, gravity, degree, steps=1)
-    model = Reduced(map, quadrature("lagrangian", X, degree), LAW, gravity,
+    model = ldm_stepper(map, quadrature("lagrangian", X, degree), LAW, gravity,
                     projection=projection)
     after, report = model.step(latent, every, 0.0, DT)
     size = abs(particles.v).max()
@@ -154,13 +155,13 @@ def test_a_step_that_nothing_restrains_is_one_of_the_full_model(d, degree, proje
     assert abs(map.place(X, after.xhat) - particles.x).max() < 1e-14
 
 
-class Watched(Reduced):
+class Watched(ReducedStepper):
     """Keeps the trial velocities of the samples."""
 
-    def project(self, latent, X, trial, dt):
-        """Of `Reduced`."""
+    def project(self, latent, at, trial, dt, weights=None):
+        """Of `ReducedStepper`."""
         self.trial = trial.v.copy()
-        return super().project(latent, X, trial, dt)
+        return super().project(latent, at, trial, dt, weights)
 
 
 class Recorded:
@@ -171,16 +172,21 @@ class Recorded:
         self.m, self.v = grid.m.copy(), grid.v.copy()
 
 
+def watched(stepper):
+    """A `Watched` one with the options of a stepper."""
+    return Watched(*(getattr(stepper, option.name) for option in dataclasses.fields(stepper)))
+
+
 def swinging(d):
     """A learned map, and a stressed state with velocities."""
     rng = np.random.default_rng(3)
-    return decoder(d, 4), at_start(rng.uniform(-1.0, 1.0, 4), rng.normal(size=4))
+    return decoder(d, 4), start_state(rng.uniform(-1.0, 1.0, 4), rng.normal(size=4))
 
 
 def learned(d, degree, n=400, **options):
     """A model of a body with a learned map."""
     body = quadrature(options.pop("name", "lagrangian"), cloud(d, n), degree)
-    return Watched(swinging(d)[0], body, LAW, GRAVITY[:d], **options)
+    return watched(ldm_stepper(swinging(d)[0], body, LAW, GRAVITY[:d], **options))
 
 
 def test_neighbours_are_enough_for_the_samples(d, degree):
@@ -216,9 +222,9 @@ def test_on_a_linear_manifold_all_velocities_are_one(d):
     rate = np.random.default_rng(4).normal(size=map.r)
     found = []
     for velocity in ("previous", "latest", "difference", "transported"):
-        model = Reduced(map, quadrature("lagrangian", X, 2), LAW, GRAVITY[:d],
+        model = ldm_stepper(map, quadrature("lagrangian", X, 2), LAW, GRAVITY[:d],
                         velocity=velocity)
-        found.append(reduced_steps(model, at_start(map.rest, rate), 40).xhat)
+        found.append(reduced_steps(model, start_state(map.rest, rate), 40).xhat)
     assert abs(found[0] - map.rest).max() > 0.05
     assert abs(np.array(found) - found[0]).max() < 1e-13
 
@@ -230,12 +236,12 @@ def test_a_report_tells_samples_points_and_rank(d):
     model = learned(d, 2)
     _, report = model.step(latent, samples, 0.0, DT)
     assert (report.samples, report.rank, report.iterations) == (4, 4, 0)
-    assert report.points == len(model.quadrature.support(map, latent, samples))
+    assert report.points == len(model.quadrature.support(map, latent.xhat, samples))
     model = learned(d, 2, name="eulerian", projection="nonlinear")
     _, report = model.step(latent, samples, 0.0, DT)
-    at, _, _, said, _ = model.quadrature.cloud(map, latent, samples)
-    assert report.points == len(at.X) > 0
-    assert report.quadrature == said
+    cloud = model.quadrature.cloud(map, latent.xhat, samples)
+    assert report.points == len(cloud.points.x) > 0
+    assert report.quadrature == cloud.report
     assert report.iterations >= 1
 
 
@@ -243,8 +249,8 @@ def test_samples_that_do_not_tell_all_coordinates_show_in_the_rank(d):
     """Points in a plane determine d of the d + 1 entries of every row."""
     X, map = cloud(d, 150), Affine(d)
     X[:6, -1] = 0.5
-    model = Reduced(map, quadrature("lagrangian", X, 2), LAW, GRAVITY[:d])
-    _, report = model.step(at_start(map.rest), np.arange(6), 0.0, DT)
+    model = ldm_stepper(map, quadrature("lagrangian", X, 2), LAW, GRAVITY[:d])
+    _, report = model.step(start_state(map.rest), np.arange(6), 0.0, DT)
     assert report.rank == d * d < map.r
 
 

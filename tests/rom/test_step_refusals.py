@@ -7,8 +7,8 @@ from rom_toys import cloud
 from mpm_ref.core.grid import OutOfRange
 from mpm_ref.rom.fields.affine import Affine
 from mpm_ref.rom.kinematics import NoBody
-from mpm_ref.rom.latent import at_start
-from mpm_ref.rom.step import Reduced
+from mpm_ref.rom.latent import start_state
+from mpm_ref.rom.step import ldm_stepper
 from tests.rom.test_step import DT, GRAVITY, LAW, learned, quadrature, swinging
 
 
@@ -23,14 +23,14 @@ def test_names_that_do_not_exist_are_refused(d):
 def test_gravity_of_another_dimension_or_no_number_is_refused(d, gravity):
     X = cloud(d, 150)
     with pytest.raises(ValueError, match=f"expected {d} finite numbers"):
-        Reduced(Affine(d), quadrature("lagrangian", X, 2), LAW, gravity[:d])
+        ldm_stepper(Affine(d), quadrature("lagrangian", X, 2), LAW, gravity[:d])
 
 
 def test_samples_out_of_the_body_are_no_silent_nothing(d):
     """A body of which nothing is left carries no mass: the step says so."""
     model = learned(d, 2, name="eulerian")
     gone = model.quadrature._replace(distance=lambda X: np.ones(len(X)))
-    model = Reduced(model.map, gone, LAW, GRAVITY[:d])
+    model = ldm_stepper(model.field.g, gone, LAW, GRAVITY[:d])
     with pytest.raises(NoBody, match="no quadrature point near the 9 samples"):
         model.step(swinging(d)[1], np.arange(9), 0.0, DT)
 
@@ -38,6 +38,6 @@ def test_samples_out_of_the_body_are_no_silent_nothing(d):
 @pytest.mark.parametrize(("far", "fault"), [(1e9, OutOfRange), (np.nan, NoBody)])
 def test_latent_coordinates_that_ran_away_are_said_to_be(d, far, fault):
     X, map = cloud(d, 150), Affine(d)
-    model = Reduced(map, quadrature("lagrangian", X, 2), LAW, GRAVITY[:d])
+    model = ldm_stepper(map, quadrature("lagrangian", X, 2), LAW, GRAVITY[:d])
     with pytest.raises(fault):
-        model.step(at_start(map.rest + far * np.arange(map.r)), np.arange(9), 0.0, DT)
+        model.step(start_state(map.rest + far * np.arange(map.r)), np.arange(9), 0.0, DT)

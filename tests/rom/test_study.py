@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 from small_studies import STEPS, study, write
 
-from mpm_ref.cli.shipped import shipped_scenes, shipped_studies
-from mpm_ref.reduced.maps import larger
-from mpm_ref.reduced.march import Way
-from mpm_ref.reduced.study import load
-from mpm_ref.reduced.tables import KEYS, Map, Run
-from mpm_ref.reduced.vary import flat, varied
+from mpm_ref.cli.catalogue import shipped_scenes, shipped_studies
+from mpm_ref.rom.study.reduce import larger
+from mpm_ref.rom.study.run import Way
+from mpm_ref.rom.study.study import load
+from mpm_ref.rom.study.tables import KEYS, Map, Run
 from mpm_ref.scene import SceneError, canonical
+from mpm_ref.scene.overrides import flat, varied
 from validation.ldm.studies import STUDIES
 
 

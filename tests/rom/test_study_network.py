@@ -6,22 +6,15 @@ import numpy as np
 import pytest
 from small_studies import generated, study
 
-from mpm_ref.learning import Machine
-from mpm_ref.reduced import dataset, maps
-from mpm_ref.reduced.tables import KEYS, LATENTS, NETWORK, WEIGHTS, Map
+from mpm_ref.rom.study import dataset, reduce
+from mpm_ref.rom.study.tables import KEYS, LATENTS, NETWORK, WEIGHTS, Map
+from mpm_ref.training import Machine
 
 torch = pytest.importorskip("torch")
 
-from mpm_ref.rom.learn import drive, fit  # noqa: E402
-from mpm_ref.rom.learn.fit import Training, train  # noqa: E402
-from mpm_ref.rom.learn.loss import (  # noqa: E402
-    CODE,
-    PRINTED,
-    READINGS,
-    TOWER,
-    Weights,
-    scaled,
-)
+from mpm_ref.rom.train import decoder, settings  # noqa: E402
+from mpm_ref.rom.train.decoder import DecoderTraining, train_decoder  # noqa: E402
+from mpm_ref.rom.train.loss import CODE, PRINTED, READINGS, TOWER, LossWeights, scale_weights  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -32,22 +25,23 @@ def made(tmp_path_factory):
 
 def test_a_network_is_trained_as_the_study_says():
     own = Map(kind="network", r=2)
-    for field in fields(Training):
-        if field.name not in ("r", "weights", "schedule", "beside"):
+    for field in fields(DecoderTraining):
+        if field.name not in ("r", "weights", "schedule", "jitter"):
             assert getattr(own, field.name) == field.default
-    others = {"r", "schedule", "beside"}
-    assert {field.name for field in fields(Training)} == others | {*KEYS[NETWORK]}
-    assert (Training(2).schedule, Training(2).beside) == ("cosine", 0.0)    # others: NSF's fields
+    others = {"r", "schedule", "jitter"}
+    assert {field.name for field in fields(DecoderTraining)} == others | {*KEYS[NETWORK]}
+    # others: NSF's fields
+    assert (DecoderTraining(2).schedule, DecoderTraining(2).jitter) == ("cosine", 0.0)
     assert READINGS[own.weights] == CODE
 
 
 def test_latents_and_weights_are_those_of_a_training():
-    assert {*LATENTS, "encoder-nsf", "directions"} == set(fit.LATENTS)
+    assert {*LATENTS, "encoder-nsf", "directions"} == set(decoder.LATENTS)
     for name in WEIGHTS:
-        assert isinstance(drive.weights(name, 1.0, 1.0), Weights)
-    assert drive.weights("code", 100.0, 6.0) == CODE
-    assert drive.weights("scaled", 1.0, 1.0) == CODE
-    tower = drive.weights("scaled", 42.0 / 0.4, 144.0 / 24.0)
+        assert isinstance(settings.loss_weights(name, 1.0, 1.0), LossWeights)
+    assert settings.loss_weights("code", 100.0, 6.0) == CODE
+    assert settings.loss_weights("scaled", 1.0, 1.0) == CODE
+    tower = settings.loss_weights("scaled", 42.0 / 0.4, 144.0 / 24.0)
     assert tower == TOWER != CODE
 
 
@@ -56,14 +50,14 @@ def test_a_network_is_trained_as_its_settings_say_and_comes_back(made, tmp_path)
     network = '"network"\nepochs = 3\nhidden = [8, 8]\nweights = "printed"\npoints = 20'
     bars = study(tmp_path, ('"modes"', network))
     data, seen = dataset.load(bars, folder, bars.train), []
-    done = maps.learned(bars, data, {}, tmp_path / "map.pt", lambda h: seen.append(len(h)),
+    done = reduce.learned(bars, data, {}, tmp_path / "map.pt", lambda h: seen.append(len(h)),
                         Machine())
     assert seen == [1, 2, 3]
-    plain = train(Training(3, (8, 8), weights=PRINTED, epochs=3, points=20), data)
+    plain = train_decoder(DecoderTraining(3, (8, 8), weights=PRINTED, epochs=3, points=20), data)
     np.testing.assert_array_equal(done.decoder.net.W, plain.decoder.net.W)
     assert np.array_equal(done.about["loss"], plain.history)
-    maps.save(tmp_path / "map.npz", done)
-    back = maps.load(tmp_path / "map.npz", bars)
+    reduce.save(tmp_path / "map.npz", done)
+    back = reduce.load(tmp_path / "map.npz", bars)
     np.testing.assert_array_equal(back.decoder.net.W, done.decoder.net.W)
     assert back.about["map"]["weights"] == "printed"
 
@@ -74,10 +68,11 @@ def test_a_network_is_trained_with_weights_that_fit_its_body(made, tmp_path):
     network = '"network"\nepochs = 3\nhidden = [8]\nweights = "scaled"\nlatent = "modes"'
     bars = study(tmp_path, ('"modes"', network))
     data = dataset.load(bars, folder, bars.train)
-    done = maps.learned(bars, data, {}, None, None, Machine())
-    fitting = scaled(CODE, 0.8 / 0.4, 0.01 * 144.0)
-    plain, unscaled = (train(Training(3, (8,), latent="modes", weights=w, epochs=3), data)
-                       for w in (fitting, CODE))
+    done = reduce.learned(bars, data, {}, None, None, Machine())
+    fitting = scale_weights(CODE, 0.8 / 0.4, 0.01 * 144.0)
+    plain, unscaled = (
+        train_decoder(DecoderTraining(3, (8,), latent="modes", weights=w, epochs=3), data)
+        for w in (fitting, CODE))
     np.testing.assert_allclose(done.decoder.net.W, plain.decoder.net.W, rtol=1e-6)
     assert not np.allclose(done.decoder.net.W, unscaled.decoder.net.W, rtol=1e-6)
     assert done.about["map"]["weights"] == "scaled"

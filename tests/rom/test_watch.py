@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 import rom_toys
 
-from mpm_ref.reduced import watch as watching
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.march import Way, march
-from mpm_ref.reduced.watch import MEMORY, Nonsense, Sight, Watch, seen, watch, watched
 from mpm_ref.rom.extrapolation import extent
 from mpm_ref.rom.fields.pod import basis
-from mpm_ref.rom.latent import at_start
+from mpm_ref.rom.latent import start_state
 from mpm_ref.rom.step import Report
+from mpm_ref.rom.study import watch as watching
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.run import Way, march
+from mpm_ref.rom.study.watch import MEMORY, Nonsense, Sight, Watch, seen, watch, watched
 from validation.ldm.studies import GRAVITY
 from validation.verification.scenes import with_
 
@@ -77,7 +77,7 @@ def test_what_is_not_finite_is_not_seen(rng, broken):
 
 def test_a_state_of_the_training_is_well(toy):
     watch, xhat = toy
-    found = watch.look(at_start(xhat), report(watch.map), rom_toys.cloud(watch.map.dim, 30, 1),
+    found = watch.look(start_state(xhat), report(watch.map), rom_toys.cloud(watch.map.dim, 30, 1),
                        WELL)
     J = np.linalg.det(watch.map.derivatives(watch.X, xhat)[1])
     assert found.beyond < 1e-12
@@ -89,9 +89,9 @@ def test_a_state_of_the_training_is_well(toy):
 
 def test_at_the_start_the_body_must_be_where_it_is_at_rest(toy):
     watch, xhat = toy
-    assert watch.look(at_start(watch.map.rest)).off < 1e-12
+    assert watch.look(start_state(watch.map.rest)).off < 1e-12
     moved = np.linalg.norm(watch.map.place(watch.X, xhat) - watch.X, axis=1)
-    found = watch.look(at_start(xhat))
+    found = watch.look(start_state(xhat))
     assert found.off == pytest.approx(np.sqrt(np.mean(moved**2)) / DX)
     assert found.why == ("off",)
     assert found.seen == 1.0
@@ -100,7 +100,8 @@ def test_at_the_start_the_body_must_be_where_it_is_at_rest(toy):
 def test_reports_are_read(toy):
     watch, xhat = toy
     samples = rom_toys.cloud(watch.map.dim, 30, 1)
-    found = watch.look(at_start(xhat), report(watch.map, 0.4, watch.map.r - 2, 10), samples, WELL)
+    known = report(watch.map, 0.4, watch.map.r - 2, 10)
+    found = watch.look(start_state(xhat), known, samples, WELL)
     assert found.off == pytest.approx(0.4 * DT / DX)
     assert found.blind == 2
     assert found.lost == pytest.approx(10 / 40)
@@ -110,11 +111,11 @@ def test_reports_are_read(toy):
 def test_a_poor_draw_is_forgiven_and_many_are_not(toy):
     watch, xhat = toy
     one, sight, count = watch.X[:1], WELL, 0
-    first = watch.look(at_start(xhat), report(watch.map), one, WELL)
+    first = watch.look(start_state(xhat), report(watch.map), one, WELL)
     assert first.seen == pytest.approx(MEMORY * WELL.seen)     # of one point nothing is told
     assert first.why == ()
     while not sight.why:
-        sight, count = watch.look(at_start(xhat), report(watch.map), one, sight), count + 1
+        sight, count = watch.look(start_state(xhat), report(watch.map), one, sight), count + 1
     assert sight.why == ("seen",)
     assert 3 <= count <= 9
 
@@ -124,15 +125,15 @@ def test_far_latents_and_inverted_points_are_told(toy):
     map = watch.map
     far = xhat.copy()
     far[map.dim] += 10.0                            # a shift along the first axis
-    found = watch.look(at_start(far), report(map), rom_toys.cloud(map.dim, 30, 1), WELL)
+    found = watch.look(start_state(far), report(map), rom_toys.cloud(map.dim, 30, 1), WELL)
     assert found.beyond > 5.0
     assert found.why == ("beyond",)
     assert found.nonsense == ""
     far[map.dim] *= 1000.0
-    assert "times as far from the trained mean" in watch.look(at_start(far)).nonsense
+    assert "times as far from the trained mean" in watch.look(start_state(far)).nonsense
     turned = xhat.copy()
     turned[:map.dim] *= -1.0                        # a mirror
-    found = watch.look(at_start(turned), report(map), rom_toys.cloud(map.dim, 30, 1), WELL)
+    found = watch.look(start_state(turned), report(map), rom_toys.cloud(map.dim, 30, 1), WELL)
     assert found.inverted == 1.0
     assert found.J < 0.0
     assert found.nonsense == "100% of the points looked at have no det F > 0"
@@ -142,7 +143,7 @@ def test_far_latents_and_inverted_points_are_told(toy):
 @pytest.mark.parametrize("broken", [np.nan, np.inf])
 def test_latents_that_are_no_numbers_are_nonsense(toy, broken):
     watch, xhat = toy
-    found = watch.look(at_start(np.where(xhat == xhat[0], broken, xhat)),
+    found = watch.look(start_state(np.where(xhat == xhat[0], broken, xhat)),
                        report(watch.map, broken), watch.X[:9], WELL)
     assert found.nonsense
     assert {"beyond", "off"} <= set(found.why)
@@ -181,7 +182,7 @@ def test_a_look_costs_few_points_however_many_there_are(d, rng):
     made = watch(body, Counted(), runs)
     assert sum(asked) <= watching.LATENTS * watching.LOOKED
     asked.clear()
-    made.look(at_start(xhat), report(map), rom_toys.cloud(d, 3000), WELL)
+    made.look(start_state(xhat), report(map), rom_toys.cloud(d, 3000), WELL)
     assert sum(asked) <= 2 * watching.LOOKED
 
 

@@ -10,10 +10,9 @@ from damaged import changed, refused, without
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mpm_ref.archive import stated
 from mpm_ref.rom import modes_file, weights
 from mpm_ref.rom.weights import Model, arrays_of, load, save
-from mpm_ref.sealed import seal, sealed
+from mpm_ref.store.weights_file import seal, sealed, stated
 
 ABOUT = {"seed": 3, "command": "train ldm", "weights": {"F": 1.0 / 30.0, "v": 0.08},
          "runs": [0.1, 1e-300, 2], "scene": "Ärmel \0 \n\"", "noted": None, "free": True}

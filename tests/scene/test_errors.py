@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from mpm_ref import sampling, shapes
 from mpm_ref.sampling import poisson
 from mpm_ref.scene import SceneError, build, loads
-from mpm_ref.scene.check import checked
-from mpm_ref.scene.parts import build_conditions
+from mpm_ref.scene.builder import build_conditions
+from mpm_ref.scene.validate import checked
 from mpm_ref.shapes.inside import solid
 
 RICH = tomllib.loads((Path(__file__).parents[1] / "support/data" / "rich.toml").read_text())

@@ -7,10 +7,11 @@ from command_line import assert_told, mpm_ref
 from small_laws import STEPS, E, identified, saved, write_scene
 
 from mpm_ref.materials import NoFlow
-from mpm_ref.materials.learned.admissible import ContractionFlow, EnergyLaw
-from mpm_ref.materials.learned.principal import StretchStress
+from mpm_ref.materials.learned.contraction import ContractionFlow
+from mpm_ref.materials.learned.energetic import EnergyLaw
 from mpm_ref.materials.learned.spline import SplineStress, knots
-from mpm_ref.materials.learned.weights import Laws, Trained, load
+from mpm_ref.materials.learned.stretch_network import StretchStress
+from mpm_ref.materials.learned.weights import LawWeights, LearnedLaws, load
 from mpm_ref.nclaw.bodies import learned
 from mpm_ref.nclaw.study.compare import positions
 from mpm_ref.scene import SceneError, build
@@ -18,9 +19,9 @@ from mpm_ref.scene import load as load_scene
 from mpm_ref.store.results import Results
 
 MATERIAL = f'law = "fixed_corotated", E = {E}, nu = 0.2', 'law = "neural", weights = "laws.npz"'
-NO_RETURN = Trained((), NoFlow())
-STRETCHES = Trained(((np.ones((3, 3)), np.zeros(3)),), StretchStress())
-SPLINES = Trained(((np.ones((len(knots()), 3)), np.zeros(3)),), SplineStress())
+NO_RETURN = LawWeights((), NoFlow())
+STRETCHES = LawWeights(((np.ones((3, 3)), np.zeros(3)),), StretchStress())
+SPLINES = LawWeights(((np.ones((len(knots()), 3)), np.zeros(3)),), SplineStress())
 
 
 @pytest.fixture
@@ -30,10 +31,10 @@ def scene(tmp_path):
 
 
 @pytest.mark.parametrize(("laws", "kind"), [
-    (Laws(STRETCHES, NO_RETURN, {}), "elastic law is of kind StretchStress"),
-    (Laws(SPLINES, NO_RETURN, {}), "elastic law is of kind SplineStress"),
+    (LearnedLaws(STRETCHES, NO_RETURN, {}), "elastic law is of kind StretchStress"),
+    (LearnedLaws(SPLINES, NO_RETURN, {}), "elastic law is of kind SplineStress"),
     (identified(), "elastic law is of kind FixedCorotated"),
-    (Laws(admissible_toys.energetic(), NO_RETURN, {}), "plastic law is of kind NoFlow"),
+    (LearnedLaws(admissible_toys.energetic(), NO_RETURN, {}), "plastic law is of kind NoFlow"),
 ], ids=lambda value: value if isinstance(value, str) else "")
 def test_laws_that_are_no_material_are_told_by_their_kind(scene, laws, kind):
     saved(scene.parent, laws)

@@ -9,9 +9,9 @@ import pytest
 
 from mpm_ref import materials, scene
 from mpm_ref.scene import SceneError, build, canonical, digest, dumps, load, loads
-from mpm_ref.scene.check import checked
-from mpm_ref.scene.material import Flow, Material
-from validation import targets
+from mpm_ref.scene.records import Flow, Material
+from mpm_ref.scene.validate import checked
+from validation.common import targets
 
 SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.toml"))
 SMALL = [file for file in SCENES    # built in a moment; those of HOT are in test_hot_scenes

@@ -7,10 +7,10 @@ import pytest
 from problems import DT, DX, METAL, ball, moving, two_disks
 
 from mpm_ref import simulate
-from mpm_ref.cases import History, Observed, history, observed, recorded
 from mpm_ref.explicit import Scheme
 from mpm_ref.materials import NoFlow, make_flow, make_law
 from mpm_ref.problem import Clock, Problem
+from mpm_ref.trajectories import History, Observed, history, observed, recorded
 
 STEPS = 5
 

@@ -8,10 +8,11 @@ from pathlib import Path
 import pytest
 from small_runs import colliding
 
-from mpm_ref.store import Fields, atomic, create, journal, running
+from mpm_ref.store import atomic, journal, running
 from mpm_ref.store.journal import InUse, JournaledFile
 from mpm_ref.store.results import Results
 from mpm_ref.store.running import Refused, run
+from mpm_ref.store.writer import Fields, create
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -21,15 +22,15 @@ import sys, time
 from pathlib import Path
 sys.path.insert(0, "tests/support")
 from small_runs import colliding
-from mpm_ref import store
+from mpm_ref.store import writer
 from mpm_ref.store.running import run
-out, lay_out = Path(sys.argv[1]), store._lay_out
+out, lay_out = Path(sys.argv[1]), writer._lay_out
 def slow(*arguments):
     lay_out(*arguments)
     out.with_suffix(".began").touch()
     while not out.with_suffix(".go").exists():
         time.sleep(0.01)
-store._lay_out = slow
+writer._lay_out = slow
 print(run(colliding(), out).frames)
 """
 

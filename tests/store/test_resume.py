@@ -12,15 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_runs import colliding
 
-from mpm_ref import store
 from mpm_ref.monitor import Unstable, check
 from mpm_ref.problem import Clock
 from mpm_ref.simulate import simulate
-from mpm_ref.store import BadResults, checkpoint
+from mpm_ref.store import checkpoint, writer
 from mpm_ref.store.checkpoint import digest
-from mpm_ref.store.results import Results
-from mpm_ref.store.running import Options, Refused, run
-from mpm_ref.store.session import Watch, checkpoint_of
+from mpm_ref.store.results import BadResults, Results
+from mpm_ref.store.running import Options, Refused, Watch, checkpoint_of, run
 from mpm_ref.timestep import TooLarge
 
 TESTS = Path(__file__).resolve().parents[1]
@@ -246,7 +244,7 @@ def test_an_overwritten_run_leaves_no_checkpoint(tmp_path):
 
 def test_a_run_killed_while_it_overwrites_goes_on(tmp_path, monkeypatch):
     """As soon as the new results are there, the checkpoint of the old ones is not."""
-    real = store.JournaledFile.move
+    real = writer.JournaledFile.move
 
     def killed(file, path):
         real(file, path)
@@ -254,7 +252,7 @@ def test_a_run_killed_while_it_overwrites_goes_on(tmp_path, monkeypatch):
 
     out = tmp_path / "run.h5"
     run(colliding(FIXED), out, Options(steps=50))
-    monkeypatch.setattr(store.JournaledFile, "move", killed)
+    monkeypatch.setattr(writer.JournaledFile, "move", killed)
     with pytest.raises(ZeroDivisionError):
         run(colliding(FIXED), out, Options(overwrite=True))
     monkeypatch.undo()
@@ -265,7 +263,7 @@ def test_a_run_that_cannot_begin_to_overwrite_leaves_the_old_one(tmp_path, monke
     out = tmp_path / "run.h5"
     run(colliding(FIXED), out, Options(steps=50))
     before = {file: file.read_bytes() for file in tmp_path.iterdir()}
-    monkeypatch.setattr(store, "_lay_out", lambda *_: 1 / 0)
+    monkeypatch.setattr(writer, "_lay_out", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         run(colliding(FIXED), out, Options(overwrite=True))
     assert {file: file.read_bytes() for file in tmp_path.iterdir()} == before

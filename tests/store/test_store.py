@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from small_runs import ENERGY, block, colliding, frame_of, state_of
 
-from mpm_ref import store
-from mpm_ref.store import UNITS, BadResults, Fields, atomic, create, reopen
+from mpm_ref.store import atomic, writer
 from mpm_ref.store.atomic import NotWritten
 from mpm_ref.store.manifest import Part, manifest, scene_hash, source_hash
-from mpm_ref.store.results import SCALARS, Results
+from mpm_ref.store.results import SCALARS, UNITS, BadResults, Results
+from mpm_ref.store.writer import Fields, create, reopen
 
 
 def written(path, problem, states, fields=None):
@@ -184,7 +184,7 @@ def test_a_full_disk_keeps_the_frames_before(results, problem, monkeypatch):
 
 
 def test_nothing_is_left_of_a_file_that_could_not_begin(tmp_path, problem, monkeypatch):
-    monkeypatch.setattr(store, "_lay_out", lambda *_: 1 / 0)
+    monkeypatch.setattr(writer, "_lay_out", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         create(tmp_path / "run.h5", problem, Fields(), {})
     assert not list(tmp_path.iterdir())

@@ -5,10 +5,9 @@ import numpy as np
 import pytest
 from small_runs import ENERGY, block, colliding, frame_of, state_of
 
-from mpm_ref.store import BadResults, Fields, create
-from mpm_ref.store.results import Results
-from mpm_ref.store.vtkhdf import export_particles
-from mpm_ref.store.vtkhdf_grid import export_grid
+from mpm_ref.store.results import BadResults, Results
+from mpm_ref.store.vtkhdf import export_grid, export_particles
+from mpm_ref.store.writer import Fields, create
 
 ULP = 2.0**-23        # of single precision
 

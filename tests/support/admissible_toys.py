@@ -6,40 +6,39 @@ import numpy as np
 from neural_toys import singular
 from scipy.special import erf
 
-from mpm_ref.materials.learned import admissible
-from mpm_ref.materials.learned.contraction import Contraction
-from mpm_ref.materials.learned.energetic import Energetic
-from mpm_ref.materials.learned.weights import Laws, Trained
+from mpm_ref.materials.learned.contraction import Contraction, build_flow
+from mpm_ref.materials.learned.energetic import Energetic, build_law
+from mpm_ref.materials.learned.weights import LawWeights, LearnedLaws
 
 ENERGY, RETURN = (4, 6, 5, 1), (3, 7, 5, 2)
 UNIT, STRAIN = 1e4, 1e-2
 
 
 def energetic(seed=0):
-    """`Trained` of an energy."""
+    """`LawWeights` of an energy."""
     rng = np.random.default_rng(seed)
     layers = [(rng.lognormal(size=(n, m)) / np.sqrt(n), rng.normal(size=m))
               for n, m in pairwise(ENERGY)]
     layers[-1] = layers[-1][0], np.zeros(1)
-    return Trained(tuple(layers), Energetic(UNIT))
+    return LawWeights(tuple(layers), Energetic(UNIT))
 
 
 def contraction(seed=1, shift=0.0):
-    """`Trained` of a return map that takes more with the shift."""
+    """`LawWeights` of a return map that takes more with the shift."""
     rng = np.random.default_rng(seed)
     layers = [(rng.normal(size=(n, m)), rng.normal(size=m)) for n, m in pairwise(RETURN)]
     layers[-1] = layers[-1][0], layers[-1][1] + shift
-    return Trained(tuple(layers), Contraction(STRAIN))
+    return LawWeights(tuple(layers), Contraction(STRAIN))
 
 
 def laws(seed=0):
-    """`weights.Laws` of both."""
-    return Laws(energetic(seed), contraction(seed + 1), {})
+    """`LearnedLaws` of both."""
+    return LearnedLaws(energetic(seed), contraction(seed + 1), {})
 
 
 def deployed(seed=0, shift=0.0):
     """Law and flow as runs have them."""
-    return admissible.elastic(energetic(seed)), admissible.plastic(contraction(seed + 1, shift))
+    return build_law(energetic(seed)), build_flow(contraction(seed + 1, shift))
 
 
 def softplus(z):

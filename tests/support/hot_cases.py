@@ -11,7 +11,7 @@ from mpm_ref.core.grid import Grid
 from mpm_ref.core.spline import STENCILS
 from mpm_ref.core.state import NONE
 from mpm_ref.hot.potential import Potential
-from mpm_ref.hot.unknowns import Unknowns, unknowns_of
+from mpm_ref.hot.system import Unknowns, unknowns_of
 from mpm_ref.materials import NoFlow
 from mpm_ref.plain import transfer
 from mpm_ref.plain.spline import pairs

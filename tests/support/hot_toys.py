@@ -7,7 +7,7 @@ their stretch beyond the length, held nodes and nodes that slip along an oblique
 import numpy as np
 from scipy.sparse import bsr_array
 
-from mpm_ref.hot import linear
+from mpm_ref.hot import linearization
 from mpm_ref.hot.methods import METHODS, options_of
 
 DESCENTS = sorted(word for word, options in METHODS.items() if options.descent != "admm")
@@ -205,6 +205,7 @@ def exactly(monkeypatch):
     def build(*arguments, **more):
         built.append(Exact(*arguments, **more))
         return built[-1]
-    monkeypatch.setattr(linear, "hierarchy", build)
-    monkeypatch.setattr(linear, "hierarchy_of", lambda matrices, *_, **__: build(*matrices[0]))
+    monkeypatch.setattr(linearization, "hierarchy", build)
+    monkeypatch.setattr(linearization, "hierarchy_of",
+                        lambda matrices, *_, **__: build(*matrices[0]))
     return built

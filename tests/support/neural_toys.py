@@ -15,17 +15,17 @@ UNIT = 1e4          # [Pa]
 
 
 def trained(kind, d, hidden=HIDDEN, bias=0.0, seed=0):
-    """`weights.Trained` of Xavier's size."""
+    """`LawWeights` of Xavier's size."""
     rng, sizes = np.random.default_rng(seed), (count(d), *hidden, d * d)
     layers = tuple((rng.normal(size=(n, m)) * np.sqrt(2.0 / (n + m)), bias * rng.normal(size=m))
                    for n, m in pairwise(sizes))
-    return weights.Trained(layers, kind)
+    return weights.LawWeights(layers, kind)
 
 
 def laws(d, unit=UNIT):
-    """`weights.Laws` that hardly flow."""
+    """`LearnedLaws` that hardly flow."""
     plastic = trained(response.Correction(), d, seed=1)
-    return weights.Laws(trained(response.Stress(unit), d), plastic, {})
+    return weights.LearnedLaws(trained(response.Stress(unit), d), plastic, {})
 
 
 def singular(F):
@@ -39,7 +39,7 @@ def singular(F):
 
 
 def plain(of, F):
-    """The answer of `weights.Trained` at one F (d, d), by the formulas of the paper."""
+    """The answer of `LawWeights` at one F (d, d), by the formulas of the paper."""
     d, (U, s, V) = len(F), singular(F)
     a = np.concatenate([s - 1.0, (F.T @ F - np.eye(d)).ravel(), [np.linalg.det(F) - 1.0]])
     for W, b in of.layers[:-1]:

@@ -3,7 +3,7 @@ of 27 points that is thrown into a corner of NCLaw's box.
 """
 
 from mpm_ref.materials import NoFlow, make_law
-from mpm_ref.materials.learned.weights import Laws, Trained, save
+from mpm_ref.materials.learned.weights import LawWeights, LearnedLaws, save
 
 STEPS, EVERY, DT, DX = 20, 5, 5e-4, 0.05
 E, NU = 1e5, 0.2
@@ -60,8 +60,8 @@ def _write(path, text, edits):
 
 
 def identified(E=E, name="fixed_corotated", flow=NO_FLOW):
-    """`weights.Laws` without layers: a law of materials, and a flow."""
-    return Laws(Trained((), make_law(name, E=E, nu=NU)), Trained((), flow), {})
+    """`LearnedLaws` without layers: a law of materials, and a flow."""
+    return LearnedLaws(LawWeights((), make_law(name, E=E, nu=NU)), LawWeights((), flow), {})
 
 
 def saved(folder, laws, name="laws.npz"):

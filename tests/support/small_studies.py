@@ -1,8 +1,8 @@
 """A small study for tests: a bar in 2D that is held at one end and bends under gravity."""
 
-from mpm_ref.reduced import dataset, maps
-from mpm_ref.reduced.generate import FINISHED, generate
-from mpm_ref.reduced.study import load
+from mpm_ref.rom.study import dataset, reduce
+from mpm_ref.rom.study.generate import FINISHED, generate
+from mpm_ref.rom.study.study import load
 from mpm_ref.store.results import Results
 
 STEPS = 8
@@ -78,7 +78,7 @@ def generated(folder, data="."):
 def modelled(folder):
     """The folder, with a study, its runs in data/ and modes of them in map.npz."""
     bars, data = generated(folder, "data")
-    maps.save(folder / "map.npz", maps.computed(bars, dataset.load(bars, data, bars.train), {}))
+    reduce.save(folder / "map.npz", reduce.computed(bars, dataset.load(bars, data, bars.train), {}))
     return folder
 
 

@@ -3,7 +3,7 @@
 from types import SimpleNamespace
 
 from validation.nclaw.bundle import Bundle
-from validation.nclaw.untrained import untrained
+from validation.nclaw.initial_laws import untrained
 
 
 class Records(dict):

@@ -5,7 +5,7 @@ import numpy as np
 from mpm_ref.energy import energy
 from mpm_ref.materials import make_law
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .blocks import STILL, bounds, problem, square, steps
 from .outcome import FINISHED, UNFIT, outcome
 

@@ -5,7 +5,7 @@ import numpy as np
 from mpm_ref.energy import momentum
 from mpm_ref.explicit import Scheme
 
-from ..registry import experiment
+from ..common.registry import experiment
 from ..verification.convergence import rms
 from .blocks import alone, bounds, problem, shaken, square, steps
 from .outcome import FINISHED, OUT_OF_RANGE, STOPS, outcome

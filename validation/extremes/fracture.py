@@ -7,7 +7,7 @@ from mpm_ref.core.levelset import box
 from mpm_ref.core.motion import Motion, Steady
 from mpm_ref.explicit import Scheme
 
-from ..registry import experiment
+from ..common.registry import experiment
 from ..verification.lattice import lattice
 from .blocks import block, bounds, problem, steps
 from .outcome import outcome

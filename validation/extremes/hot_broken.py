@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.linalg import eigvalsh
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .hot_bodies import DX, FRAME, brick, elastic, gravity
 from .hot_solve import (
     CONVERGED,

@@ -7,7 +7,7 @@ converge is told.
 
 from mpm_ref.hot.methods import METHODS as ALL
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .hot_bodies import DX, FRAME, elastic, gravity
 from .hot_broken import broken
 from .hot_solve import CONVERGED, EPS, OUTER, STOPPED, Setup, solve, table_of

@@ -5,10 +5,10 @@ import numpy as np
 from mpm_ref.core.boundary import Collider, Conditions
 from mpm_ref.core.levelset import half_space
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .hot_bodies import DX, FRAME, brick, elastic, gravity
-from .hot_march import Scene, all_of, march
 from .hot_solve import METHODS, Setup, record_ends, table_of
+from .hot_steps import Scene, all_of, march
 
 CELLS = {2: (6, 6), 3: (4, 4, 4)}
 KINDS = ("sticky", "slip", "separate")

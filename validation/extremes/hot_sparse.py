@@ -1,6 +1,6 @@
 """Few particles for the grid: one in a cell, none beside it, dust; and nodes of hardly any mass."""
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .blocks import alone
 from .hot_bodies import DX, FRAME, brick, elastic, gravity, shaken
 from .hot_solve import METHODS, Setup, record_ends, solve, table_of

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from mpm_ref.hot.methods import METHODS as ALL
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .hot_bodies import DX, FRAME, elastic, gravity, halves, shaken
 from .hot_solve import METHODS, Setup, record_ends, solve, table_of
 

@@ -1,9 +1,9 @@
 """Time steps up to 1/24 s, and matter that crosses many cells in one of them."""
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .hot_bodies import DX, FRAME, brick, elastic, gravity, shaken
-from .hot_march import Scene, all_of
 from .hot_solve import Setup, record_ends, table_of
+from .hot_steps import Scene, all_of
 
 STEPS = 5
 TIMES = (1e-6, 1e-3, FRAME)       # [s]

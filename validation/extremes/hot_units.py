@@ -6,7 +6,7 @@ import numpy as np
 
 from mpm_ref.core.state import Particles
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .hot_bodies import elastic
 from .hot_solve import METHODS, copied, stepper_of
 from .hot_stiffness import bent

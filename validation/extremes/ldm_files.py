@@ -11,10 +11,10 @@ from mpm_ref.rom import modes_file
 from mpm_ref.rom.fields.pod import basis
 from mpm_ref.rom.fields.polynomial_manifold import curved
 from mpm_ref.rom.weights import Model, load
-from mpm_ref.sealed import SEAL, opened, sealed
+from mpm_ref.store.weights_file import SEAL, opened, sealed
 
-from ..ldm import nets
-from ..registry import experiment
+from ..common.registry import experiment
+from ..ldm import networks
 
 NET, OTHERS = "gravity-r4", ("gravity-r7", "torsion-0", "poke")
 MODES, BENT, POINTS, STATES = 4, 2, 40, 30      # of maps of modes: all, those that lead; and what
@@ -139,15 +139,15 @@ def tried(run, folder):
         yield "unfit", rows(path.stem, unfit(opened(path)), read)
         yield "other", rows(path.stem, [("of another kind", other.stem, other.read_bytes())
                                         for other in others if readers[other] != read], read)
-    trainings = [("of another training", name, (nets.FOLDER / f"{name}.npz").read_bytes())
+    trainings = [("of another training", name, (networks.FOLDER / f"{name}.npz").read_bytes())
                  for name in OTHERS]
-    with patch.object(nets, "FOLDER", copy.parent):
-        yield "other", rows(NET, trainings, lambda _: nets.trained.__wrapped__(NET))
+    with patch.object(networks, "FOLDER", copy.parent):
+        yield "other", rows(NET, trainings, lambda _: networks.trained.__wrapped__(NET))
 
 
 def written(folder, rng):
     """{file: its reader} of a trained map, and of maps of modes that are written into a folder."""
-    net = nets.FOLDER / f"{NET}.npz"
+    net = networks.FOLDER / f"{NET}.npz"
     readers = {net: load}
     for kind, model in of_modes(load(net), rng).items():
         readers[folder / f"{kind}.npz"] = modes_file.load

@@ -4,13 +4,17 @@
 
 import numpy as np
 
+from mpm_ref.body import Body, particles_at
 from mpm_ref.energy import energy
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.march import Way, model
-from mpm_ref.rom.latent import points, velocities
+from mpm_ref.explicit import initial_stress
+from mpm_ref.materials import NoFlow
+from mpm_ref.rom.kinematics import evaluate
+from mpm_ref.rom.latent import velocities
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.run import Way
 
+from ..common.registry import experiment
 from ..ldm.studies import GRAVITY
-from ..registry import experiment
 from ..verification.scenes import with_
 from .ldm_runs import Trial, ended, full, learned, record_silent, table_of
 
@@ -78,11 +82,14 @@ def distance(x, X):
 
 def energies(case, map, way, latents):
     """Mechanical energy of each of the states of a reduced run [J]."""
-    stepper, dt = model(case, map, way), case.problem.clock.dt
+    law, dt = case.problem.bodies[0].law, case.problem.clock.dt
     found = []
     for latent in latents:
-        velocity = velocities(map, latent, dt, case.X)[way.velocity]
-        body = stepper.body(points(map, latent, case.X, velocity), case.m, case.V0)
+        at = evaluate(map, case.X, latent.xhat)
+        v = velocities(map, latent, dt, case.X)[way.velocity](at)
+        particles = particles_at(at.x, v, case.m, case.V0, transfer="pic")._replace(F=at.F)
+        body = Body("reduced", particles, law, NoFlow(), np.arange(len(at.x)))
+        initial_stress(body)
         found.append(energy((body,), case.problem.gravity).sum)
     return np.array(found)
 

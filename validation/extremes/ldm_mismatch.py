@@ -2,11 +2,11 @@
 checksum stands in the way.
 """
 
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.march import Way
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.run import Way
 
+from ..common.registry import experiment
 from ..ldm.studies import GRAVITY, POKES, TORSION
-from ..registry import experiment
 from ..verification.scenes import with_
 from .ldm_runs import FLAGGED, STOPPED, Trial, ended, full, learned, record_silent, table_of
 

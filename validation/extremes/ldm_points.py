@@ -3,11 +3,11 @@
 import numpy as np
 from scipy.spatial import KDTree
 
-from mpm_ref.reduced.march import SCHEMES, Way
 from mpm_ref.rom.fields.pod import held, measured
+from mpm_ref.rom.study.run import SCHEMES, Way
 
+from ..common.registry import experiment
 from ..ldm.studies import GRAVITY, TORSION
-from ..registry import experiment
 from .ldm_range import beside
 from .ldm_runs import STOPPED, Trial, ended, learned, linear, record_silent, table_of
 

@@ -4,11 +4,11 @@ from functools import cache
 
 import numpy as np
 
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.march import SCHEMES, Way
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.run import SCHEMES, Way
 
+from ..common.registry import experiment
 from ..ldm.studies import GRAVITY, STUDIES, TORSION
-from ..registry import experiment
 from .ldm_runs import Trial, ended, full, learned, record_silent, table_of
 
 OUTSIDE = {         # of the studies: parameters; trained 1 .. 10, and 0 .. 0.6, 0 .. 2

@@ -1,5 +1,5 @@
 """Reduced runs at their extremes: how each ended, beside the full-order run, and what its watch
-said (see `mpm_ref.reduced.watch`).
+said (see `mpm_ref.rom.study.watch`).
 
 A run is bad where its error is above BAD times what is usual for its map, and above TOLERABLE. It
 ends in one of four ways: it stopped with a sentence; the watch flagged it in some step; it is fine;
@@ -12,17 +12,17 @@ from typing import NamedTuple
 import numpy as np
 import threadpoolctl
 
-from mpm_ref.cases import in_order
 from mpm_ref.core.grid import OutOfRange
 from mpm_ref.monitor import Unstable
-from mpm_ref.reduced.errors import Squares
-from mpm_ref.reduced.march import drawing
-from mpm_ref.reduced.watch import Nonsense, watch, watched
 from mpm_ref.rom.fields.pod import basis
 from mpm_ref.rom.step import BREAKDOWNS
+from mpm_ref.rom.study.errors import Squares
+from mpm_ref.rom.study.run import drawing
+from mpm_ref.rom.study.watch import Nonsense, watch, watched
 from mpm_ref.simulate import simulate
+from mpm_ref.trajectories import in_order
 
-from ..ldm.nets import trained
+from ..ldm.networks import trained
 from ..verification.scenes import threads_for
 
 BAD = 5.0           # times the error that is usual for the map

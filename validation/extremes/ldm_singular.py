@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from mpm_ref.reduced.march import SCHEMES, Way
 from mpm_ref.rom.fields.network import Decoder
 from mpm_ref.rom.fields.perceptron import layers_of, network
 from mpm_ref.rom.fields.pod import Modes
+from mpm_ref.rom.study.run import SCHEMES, Way
 
+from ..common.registry import experiment
 from ..ldm.studies import GRAVITY
-from ..registry import experiment
 from .ldm_points import Bench
 from .ldm_runs import learned, linear, record_silent, table_of
 

@@ -1,10 +1,10 @@
 """Reduced runs with up to ten times the time step, beside the full-order run with the same one."""
 
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.march import SCHEMES, Way
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.run import SCHEMES, Way
 
+from ..common.registry import experiment
 from ..ldm.studies import GRAVITY
-from ..registry import experiment
 from ..verification.scenes import with_
 from .ldm_range import beside
 from .ldm_runs import FINE, Trial, ended, full, learned, record_silent, table_of

@@ -9,7 +9,7 @@ from mpm_ref.core.levelset import box
 from mpm_ref.explicit import Scheme
 from mpm_ref.materials import make_law
 
-from ..registry import experiment
+from ..common.registry import experiment
 from ..verification.lattice import lattice
 from .blocks import RHO, block, bounds, problem, steps
 from .outcome import FINISHED, outcome

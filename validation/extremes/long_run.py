@@ -5,7 +5,7 @@ import numpy as np
 from mpm_ref.energy import energy
 from mpm_ref.explicit import Scheme
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .blocks import STILL, alone, bounds, problem, square, steps
 from .outcome import FINISHED, outcome
 

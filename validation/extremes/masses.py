@@ -6,7 +6,7 @@ from mpm_ref.energy import energy
 from mpm_ref.explicit import Scheme
 from mpm_ref.materials import make_law
 
-from ..registry import experiment
+from ..common.registry import experiment
 from ..verification.lattice import lattice
 from .blocks import NU, RHO, STILL, E, alone, block, bounds, problem, steps
 from .long_run import kept

@@ -2,10 +2,10 @@
 
 from mpm_ref.nclaw.bodies import learned
 
-from ..nclaw.trade_nets import OF_EPOCHS, bundled
-from ..registry import experiment
+from ..common.registry import experiment
+from ..common.weights_needed import there
+from ..nclaw.small_trainings import OF_EPOCHS, bundled
 from ..verification.scenes import with_
-from ..waiting import there
 from .nclaw_runs import EVERY, SHORT, Law, Setup, record_silent, table_of, trials
 from .nclaw_strain import thrown
 from .nclaw_time_step import longer

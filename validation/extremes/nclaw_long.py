@@ -7,11 +7,11 @@ import numpy as np
 from mpm_ref.energy import kinetic
 from mpm_ref.monitor import volume_ratio
 from mpm_ref.nclaw.bodies import own
-from mpm_ref.nclaw.strain_watch import look
+from mpm_ref.nclaw.strain_watch import strain_report
 from mpm_ref.nclaw.study.compare import Broken, positions
 from mpm_ref.scene import build
 
-from ..registry import experiment
+from ..common.registry import experiment
 from ..verification.scenes import threads_for
 from .nclaw_runs import laws, scene_for
 
@@ -70,7 +70,8 @@ def row(step, bodies, x, bounds):
     state = [(float(kinetic(body.particles).sum()), float(volume_ratio(body.particles).mean()),
               float(at[:, 1].mean())) for body, at in zip(bodies, x, strict=True)]
     pairs = [a for pair in zip(*state, strict=True) for a in pair]
-    return Row(step, float(np.mean((x[0] - x[1]) ** 2)), *pairs, look(bodies[0], bounds).beyond)
+    return Row(step, float(np.mean((x[0] - x[1]) ** 2)), *pairs,
+               strain_report(bodies[0], bounds).excess)
 
 
 def record_drift(run, law, rows, said):

@@ -1,8 +1,8 @@
 """Laws learned from a run with faults: a time without frames, outliers, a wrong density."""
 
+from ..common.registry import experiment
 from ..nclaw.small_runs import Measured, measured, spread
-from ..nclaw.trade_nets import BASE, OF_FAULTS, SEEDS, small_nets
-from ..registry import experiment
+from ..nclaw.small_trainings import BASE, OF_FAULTS, SEEDS, small_nets
 
 FAULTS = ("gap", "outliers")
 

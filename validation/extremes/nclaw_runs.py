@@ -14,15 +14,15 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm_ref.nclaw.bodies import learned, own
-from mpm_ref.nclaw.strain_watch import look
+from mpm_ref.nclaw.strain_watch import strain_report
 from mpm_ref.nclaw.study.compare import Broken, positions
 from mpm_ref.scene import build
 
+from ..common.weights_needed import there
 from ..nclaw.environments import ENVIRONMENTS, environment
-from ..nclaw.met import met_by
-from ..nclaw.nets import trained
+from ..nclaw.strain_bounds import met_by
+from ..nclaw.trained_laws import trained
 from ..verification.scenes import threads_for
-from ..waiting import there
 
 BAD = 3.0           # times the mean squared error that is usual for the law
 BADS = 2.0, BAD, 5.0, 10.0
@@ -124,7 +124,7 @@ def ended(law, setup):
             except Broken as end:
                 said = str(end)
                 break
-            sights.append(look(body, law.bounds))
+            sights.append(strain_report(body, law.bounds))
     return of_sights(sights, np.inf if said else np.mean(errors), said,
                      (setup.scene.every, setup.scene.dt != law.dt))
 
@@ -137,17 +137,17 @@ def strain(body, F):
 
 
 def of_sights(sights, error, said, how):
-    """`End` from the `Sight`s of a run; how: steps between them, whether they are of another length
-    than in training.
+    """`End` from the `StrainReport`s of a run; how: steps between them, whether they are of another
+    length than in training.
     """
     every, other = how
-    astray = [k * every for k, sight in enumerate(sights) if sight.astray]
-    lost = [k * every for k, sight in enumerate(sights) if not sight.beyond <= LOST]
+    astray = [k * every for k, sight in enumerate(sights) if sight.out_of_range]
+    lost = [k * every for k, sight in enumerate(sights) if not sight.excess <= LOST]
     lost += [len(sights) * every] if said else []
     flags = [*(["strain"] if astray else []), *(["dt"] if other else [])]
     first = 0 if other else astray[0] if astray else -1
     return End(float(error), (len(sights) - 1) * every, first, " ".join(flags),
-               max(sight.beyond for sight in sights), lost[0] if lost else -1,
+               max(sight.excess for sight in sights), lost[0] if lost else -1,
                min(sight.J for sight in sights), said)
 
 

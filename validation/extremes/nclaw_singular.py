@@ -13,13 +13,13 @@ import numpy as np
 from mpm_ref.core.spectral import UNDETERMINED
 from mpm_ref.explicit import deform_body, initial_stress
 from mpm_ref.materials.learned.invariants import spectrum
-from mpm_ref.materials.learned.strain_range import measures
+from mpm_ref.materials.learned.strain_range import excess, strain_measures
 from mpm_ref.nclaw.bodies import gradients, points, stresses
-from mpm_ref.nclaw.strain_watch import BEYOND, beyond
+from mpm_ref.nclaw.strain_watch import MAX_EXCESS
 from mpm_ref.scene import build
 
+from ..common.registry import experiment
 from ..nclaw.environments import environment
-from ..registry import experiment
 from .nclaw_runs import laws
 
 SAME = 1e-13        # of an answer, times how near R is to undetermined: as good as the same
@@ -107,7 +107,7 @@ def row(of, true, F, bounds, rng):
     own, theirs = answered(of, F), answered(true, F)
     finite = bool(np.isfinite(own.tau).all() and np.isfinite(own.F).all())
     return (int(determined(F)), int(finite), *turned(of, F, rng), size(own.tau), size(theirs.tau),
-            size(own.F - F), size(theirs.F - F), float(beyond(measures(F), bounds).max()))
+            size(own.F - F), size(theirs.F - F), float(excess(strain_measures(F), bounds).max()))
 
 
 @experiment("extremes.nclaw.singular", title="NCLaw: degenerate and inverted deformation gradients",
@@ -141,7 +141,7 @@ def record_answers(run, name, found):
                    max(some[worst]["turns"], some[worst]["returned_turns"]), scale=scale,
                    note=f"largest difference between what is answered to Q F, and the answer to F "
                         f"turned, of the answer: {worst}", **rule)
-    guesses = {kind: one for kind, one in found.items() if one["beyond"] > BEYOND}
+    guesses = {kind: one for kind, one in found.items() if one["beyond"] > MAX_EXCESS}
     worst = max(guesses, key=lambda kind: guesses[kind]["stress"])
     run.record(f"extremes.nclaw.singular.{name}.guesses", len(guesses), unit="kinds",
                comparator="info", scale=scale, note="out of the bounds of strains; the largest "

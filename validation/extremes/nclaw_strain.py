@@ -4,8 +4,8 @@ one that they were trained on.
 
 import numpy as np
 
+from ..common.registry import experiment
 from ..nclaw.tasks import SEEDS, velocity
-from ..registry import experiment
 from ..verification.scenes import with_
 from .nclaw_runs import (
     CHOSEN,

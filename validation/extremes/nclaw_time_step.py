@@ -4,7 +4,7 @@ A learned return map corrects F once a step, by how much it was trained to in st
 in shorter steps it corrects more often.
 """
 
-from ..registry import experiment
+from ..common.registry import experiment
 from ..verification.scenes import with_
 from .nclaw_runs import EVERY, Setup, laws, record_silent, scene_for, table_of, trials
 

@@ -3,7 +3,7 @@ with, and inside; and how well the distance of latent coordinates from the train
 of them are wrong.
 """
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .ldm_runs import BAD, TOLERABLE, record_silent, table_of
 from .nsf_runs import ERRORS, Bench, made, scenes
 

@@ -10,10 +10,10 @@ import numpy as np
 from mpm_ref.rom import spanned_file
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.weights import Model
-from mpm_ref.sealed import opened
+from mpm_ref.store.weights_file import opened
 
-from ..nsf.tested import refitted
-from ..registry import experiment
+from ..common.registry import experiment
+from ..nsf.reduced_runs import refitted
 from .ldm_files import damages, flipped, refusal, unfit
 from .ldm_runs import FINE, SILENT, record_silent, table_of
 from .nsf_runs import ERRORS, Bench, scenes

@@ -4,13 +4,13 @@ import numpy as np
 
 from mpm_ref.core.grid import OutOfRange
 from mpm_ref.monitor import Unstable
-from mpm_ref.reduced.nsf.watch import look
-from mpm_ref.reduced.whole import at_once, whole
 from mpm_ref.rom.step import BREAKDOWNS
+from mpm_ref.rom.study.nsf_case import at_once, whole
+from mpm_ref.rom.study.nsf_watch import look
 from mpm_ref.simulate import simulate
 from mpm_ref.timestep import TooLarge
 
-from ..registry import experiment
+from ..common.registry import experiment
 from ..verification.scenes import with_
 from .ldm_long import LONGER, distance
 from .nsf_runs import GONE, Bench, scenes

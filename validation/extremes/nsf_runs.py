@@ -1,5 +1,5 @@
 """Reduced runs with inferred stress at their extremes: how each ended, beside the full-order run,
-and what its watch said (see `mpm_ref.reduced.nsf.watch`). The four ends are those of `ldm_runs`.
+and what its watch said (see `mpm_ref.rom.study.nsf_watch`). The four ends are those of `ldm_runs`.
 
 Errors are of the displacement, which depend on no origin: those of the position are much smaller,
 and none would be above `ldm_runs.TOLERABLE`.
@@ -11,15 +11,15 @@ import numpy as np
 
 from mpm_ref.core.grid import OutOfRange
 from mpm_ref.monitor import Unstable
-from mpm_ref.reduced.inferring import Plan, drawn, infer
-from mpm_ref.reduced.nsf.evaluate import course, level_of, share
-from mpm_ref.reduced.nsf.watch import look, trained
-from mpm_ref.reduced.whole import history, whole
 from mpm_ref.rom.step import BREAKDOWNS
+from mpm_ref.rom.study.nsf_case import history, whole
+from mpm_ref.rom.study.nsf_evaluate import course, level_of, share
+from mpm_ref.rom.study.nsf_run import Plan, drawn, infer
+from mpm_ref.rom.study.nsf_watch import look, trained
 from mpm_ref.timestep import TooLarge
 
+from ..nsf.reduced_runs import tested
 from ..nsf.studies import jelly, metal
-from ..nsf.tested import tested
 from .ldm_runs import End as LdmEnd
 from .ldm_runs import Trial
 

@@ -5,13 +5,13 @@ coordinate and below, and on samples in one corner.
 import numpy as np
 from scipy.spatial import KDTree
 
-from mpm_ref.reduced.inferring import Chosen
-from mpm_ref.reduced.nsf.watch import SPARSE
 from mpm_ref.rom.cubature import misfit
+from mpm_ref.rom.study.nsf_run import Chosen
+from mpm_ref.rom.study.nsf_watch import SPARSE
 
+from ..common.registry import experiment
+from ..nsf.reduced_runs import tested
 from ..nsf.studies import ball, bread, cake, sand
-from ..nsf.tested import tested
-from ..registry import experiment
 from .ldm_runs import FLAGGED, SILENT, STOPPED, record_silent, table_of
 from .nsf_beyond import is_bad
 from .nsf_runs import ERRORS, Bench, scenes

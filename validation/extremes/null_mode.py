@@ -4,7 +4,7 @@ import numpy as np
 
 from mpm_ref.explicit import Scheme
 
-from ..registry import experiment
+from ..common.registry import experiment
 from ..verification.periodic import Periodic
 from .blocks import bounds, problem, square, steps
 from .outcome import outcome

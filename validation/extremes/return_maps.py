@@ -7,7 +7,7 @@ from mpm_ref.energy import elastic
 from mpm_ref.explicit import deform_body
 from mpm_ref.materials import Hencky, lame, make_flow, stiffness
 
-from ..registry import experiment
+from ..common.registry import experiment
 
 LAW = Hencky(*lame(1e6, 0.3))
 SIGMA_Y = 1e3                   # [Pa]

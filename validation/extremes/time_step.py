@@ -6,7 +6,7 @@ import numpy as np
 
 from mpm_ref.explicit import Scheme
 
-from ..registry import experiment
+from ..common.registry import experiment
 from ..verification.lattice import lattice
 from .blocks import alone, block, bounds, problem, shaken, steps
 from .outcome import FINISHED, REFUSED, STOPS, outcome

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 from mpm_ref.scene import build
 
-from ..registry import experiment
-from .begun import BEGUN, begun, particles, scene, steps
+from ..common.registry import experiment
 from .iterates import COLUMNS, EPS, Way, first, iterates, ways
+from .warm_states import BEGUN, begun, particles, scene, steps
 
 JACOBI, OURS, GEOMETRIC = "pn-pcg", "pn-mgpcg", "pn-gmg-pcg"
 NEWTONS = (*ways(JACOBI, OURS, GEOMETRIC),

@@ -7,10 +7,10 @@ paper's tolerance and at the error that HOT has there.
 
 from mpm_ref.scene import build
 
-from ..registry import experiment
-from .begun import scene
+from ..common.registry import experiment
 from .iterates import COLUMNS, EPS, Way, errors, first, noted, swiftest, ways
 from .one_step import difference, solved
+from .warm_states import scene
 
 EXACT = 1e-13               # tolerance of the reference
 FURTHER = 1e-9              # to which methods go on whose iterates do not depend on the tolerance

@@ -18,12 +18,12 @@ import scipy.sparse as sp
 from mpm_ref.hot.multigrid.hierarchy import hierarchy
 from mpm_ref.hot.multigrid.projectors import block_diagonal, diagonal_blocks, onto_range
 
-from ..registry import experiment
-from .begun import begun, steps
-from .frozen import Frozen, frozen
+from ..common.registry import experiment
+from .linear_system import Frozen, frozen
 from .measured_cg import Until, cg, convergence_factor
 from .one_step import after
 from .stiffness import bar
+from .warm_states import begun, steps
 
 WAYS = {
     "masked": "prolongations masked",

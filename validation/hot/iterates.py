@@ -12,8 +12,8 @@ from mpm_ref.hot.methods import solved as descended
 from mpm_ref.hot.report import Report, Watch, Watched
 from mpm_ref.simulate import State
 
-from .begun import coming
 from .one_step import Step, difference
+from .warm_states import coming
 
 EPS = 1e-7                  # the paper's tolerance
 COLUMNS = ("method", "iteration", "cg", "cpu", "residual")

@@ -4,7 +4,7 @@ import numpy as np
 
 from mpm_ref.hot.multigrid.embedding import kernel_value, width
 
-from ..registry import experiment
+from ..common.registry import experiment
 
 LEVELS = (0, 1, 2, 3)
 STEP = 1.0 / 64         # own cells between the points where a kernel is looked at

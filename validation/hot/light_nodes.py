@@ -14,7 +14,7 @@ from scipy.linalg import cholesky, eigh, solve_triangular
 
 from mpm_ref.hot.multigrid.hierarchy import hierarchy
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .one_step import Step, after, difference, solved
 from .stiffness import bar
 

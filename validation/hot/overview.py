@@ -7,11 +7,11 @@ particles. Tolerances are the printed ones, hence not equal errors: see `trade.h
 
 from typing import NamedTuple
 
-from .. import targets
-from ..registry import experiment
-from .begun import BEGUN, PRINTED, QUICK, begun, particles, steps
+from ..common import targets
+from ..common.registry import experiment
 from .one_step import after, solved
 from .stiffness import bar
+from .warm_states import BEGUN, PRINTED, QUICK, begun, particles, steps
 
 METHODS = ("hot", "hot-quadratic", "lbfgs-h", "pn-pcg", "pn-pcg-mf", "pn-mgpcg", "lbfgs-gmg",
            "gast15")

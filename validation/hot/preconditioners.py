@@ -18,14 +18,14 @@ import threadpoolctl
 
 from mpm_ref.core.jit import set_threads
 from mpm_ref.hot.krylov import Rule, block_jacobi, pcg, scalar_jacobi
-from mpm_ref.hot.linear import by_matrix
+from mpm_ref.hot.linearization import by_matrix
 from mpm_ref.hot.multigrid.blocks import hierarchy as block_hierarchy
 from mpm_ref.hot.multigrid.blocks.sweep import Sweep, sweep
 from mpm_ref.hot.multigrid.hierarchy import hierarchy
 from mpm_ref.hot.multigrid.projectors import diagonal_blocks
 
-from ..registry import experiment
-from .frozen import rigid_modes, twisted
+from ..common.registry import experiment
+from .linear_system import rigid_modes, twisted
 from .measured_cg import Until, cg, convergence_factor
 from .one_step import after
 from .stiffness import bar

@@ -10,19 +10,19 @@ from math import log10
 
 import numpy as np
 
+from mpm_ref.hot.assembly import pattern_of
 from mpm_ref.hot.krylov import newton_tolerance
 from mpm_ref.hot.methods import METHODS
 from mpm_ref.hot.multigrid.embedding import embed
 from mpm_ref.hot.norms import surface
-from mpm_ref.hot.pattern import pattern_of
 from mpm_ref.scene import build, load
 from mpm_ref.timestep import advective
 
-from .. import targets
-from ..registry import experiment
-from ..settings import record_settings
+from ..common import targets
+from ..common.registry import experiment
+from ..common.settings import record_settings
 from ..verification.scenes import SCENES
-from . import begun, stiffness, stretched
+from . import stiffness, stretched, warm_states
 from .sizes import sized
 
 PARTS = {       # the bodies that are parts 0, 1, .. of Table 2
@@ -139,7 +139,7 @@ def cells(made):
 
 def variants():
     """Modulus of the soft cat, as section 7.2 and the caption of Figure 15 give it."""
-    cat, = (body for body in begun.scene("armacat_soft", "quick").body if body.name == "cat")
+    cat, = (body for body in warm_states.scene("armacat_soft", "quick").body if body.name == "cat")
     return dict.fromkeys(("hot.table2.armacat.youngs.cat_soft", "hot.sec7_2.armacat_youngs"),
                          cat.material.E)
 

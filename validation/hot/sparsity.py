@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from mpm_ref.hot.multigrid.embedding import embed
 from mpm_ref.scene import build
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .sizes import sized
 
 LEVELS = 5

@@ -6,7 +6,7 @@ from typing import NamedTuple
 from mpm_ref.scene import Limits, Solver, build
 from mpm_ref.simulate import simulate
 
-from ..registry import experiment
+from ..common.registry import experiment
 from ..verification.scenes import shipped, with_
 
 SCENE = "hot_stiffness"

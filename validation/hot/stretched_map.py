@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import targets
-from ..registry import experiment
+from ..common import targets
+from ..common.registry import experiment
 from .iterates import first, iterates, noted, ways
 from .stretched import VARIANTS, stretched
 

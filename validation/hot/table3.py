@@ -9,10 +9,10 @@ the steps, over the time they advance.
 
 from typing import NamedTuple
 
-from .. import targets
-from ..registry import experiment
-from .begun import BEGUN, PRINTED, QUICK, begun, particles, steps
+from ..common import targets
+from ..common.registry import experiment
 from .one_step import solved
+from .warm_states import BEGUN, PRINTED, QUICK, begun, particles, steps
 
 METHODS = {"sgs": "sgs-pcg", "jacobi": "pn-pcg"}
 FRAME = 1.0 / 24.0      # of playback [s]

@@ -5,9 +5,9 @@ iterations. Methods go on here to tolerances below the paper's, as far as their 
 bottom plots.
 """
 
-from ..registry import experiment
-from .begun import BEGUN, begun, particles, steps
+from ..common.registry import experiment
 from .iterates import COLUMNS, EPS, Way, iterates, noted, spread, swiftest, ways
+from .warm_states import BEGUN, begun, particles, steps
 
 FIVE = ways("pn-pcg", "pn-pcg-mf", "pn-mgpcg", "lbfgs-h", "hot")
 FLEXIBLE = Way("pn-mgpcg-flexible", "pn-mgpcg", {"flexible": True})

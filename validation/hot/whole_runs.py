@@ -11,8 +11,8 @@ import numpy as np
 
 from mpm_ref.hot.methods import METHODS
 
-from ..registry import experiment
-from .course import COLUMNS, course
+from ..common.registry import experiment
+from .run_history import COLUMNS, course
 from .sizes import SIZES, sized
 
 METHOD = "hot"

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from mpm_ref.reduced.march import PROJECTIONS, SCHEMES, Way
 from mpm_ref.rom.latent import VELOCITIES
+from mpm_ref.rom.study.run import PROJECTIONS, SCHEMES, Way
 
-from ..registry import experiment
-from .nets import BOTH, REPEATED, TERMS
+from ..common.registry import experiment
+from .networks import BOTH, REPEATED, TERMS
 from .references import mean_of, references, share
 from .studies import GRAVITY
 

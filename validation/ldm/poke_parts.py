@@ -9,17 +9,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.reduced.case import prescribed
-from mpm_ref.reduced.errors import Squares
-from mpm_ref.reduced.march import march, model, picked, stepped
 from mpm_ref.rom.latent import initial
+from mpm_ref.rom.study.case import prescribed
+from mpm_ref.rom.study.errors import Squares
+from mpm_ref.rom.study.run import march, model, picked, stepped
 
-from ..registry import experiment
-from .beyond import DRIVEN, LAM_F
-from .nets import trained
-from .pairs import ALL
+from ..common.registry import experiment
+from .networks import trained
+from .paired_runs import ALL
 from .references import bent, pod, references, share
 from .studies import POKES
+from .untrained_maps import DRIVEN, LAM_F
 
 DIMENSIONS = (6, 12, 24, 48)        # of POD
 CUBIC = 3

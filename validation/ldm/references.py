@@ -5,12 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.reduced.case import case
 from mpm_ref.rom.fields.pod import basis, modes
 from mpm_ref.rom.fields.polynomial_manifold import curved
+from mpm_ref.rom.study.case import case
 
-from .nets import trained
-from .online import compared, reconstructed
+from .networks import trained
+from .reduced_runs import compared, reconstructed
 from .studies import STUDIES
 
 MODES = 40          # that curved maps follow with

@@ -5,9 +5,9 @@ import numpy as np
 from mpm_ref.rom.fields.architecture import FEATURES, HIDDEN, KERNEL, SHORTEST, STRIDE, lengths
 from mpm_ref.scene import build
 
-from ..registry import experiment
-from ..settings import record_settings
-from .nets import nets
+from ..common.registry import experiment
+from ..common.settings import record_settings
+from .networks import nets
 from .studies import GRAVITY, PHI, POKE, POKES, TORSION, TOWER, poked_again
 from .tower import GRIDS, POINTS, scene_of
 

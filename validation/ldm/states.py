@@ -7,14 +7,14 @@ from math import asin, atan2
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mpm_ref.reduced.case import case, prescribed
-from mpm_ref.reduced.march import picked
 from mpm_ref.rom.sampling import PER_GROUP
+from mpm_ref.rom.study.case import case, prescribed
+from mpm_ref.rom.study.run import picked
 
-from ..registry import experiment
-from .kept_bodies import keep
-from .nets import trained
-from .pairs import ALL, SHOWN_WAY, beside, pair, positions
+from ..common.registry import experiment
+from .networks import trained
+from .paired_runs import ALL, SHOWN_WAY, beside, pair, positions
+from .published_bodies import keep
 from .references import share
 from .studies import POKES, TORSION, TOWER, fallen, leaning, poked, twisted
 from .superres import REFINE, advected, fine

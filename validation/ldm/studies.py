@@ -5,10 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.cases import snapshots
-from mpm_ref.reduced.study import latin
+from mpm_ref.rom.study.study import latin
 from mpm_ref.sampling import Regular
 from mpm_ref.scene import build
+from mpm_ref.trajectories import snapshots
 
 from ..verification.scenes import shipped, threads_for, with_
 

@@ -3,15 +3,15 @@
 import numpy as np
 
 from mpm_ref.body import Body, particles_at
-from mpm_ref.cases import history
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.errors import Squares
-from mpm_ref.reduced.march import SCHEMES, Way, march
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.errors import Squares
+from mpm_ref.rom.study.run import SCHEMES, Way, march
 from mpm_ref.scene import build
+from mpm_ref.trajectories import history
 
-from ..registry import experiment
+from ..common.registry import experiment
 from ..verification.scenes import threads_for, with_
-from .nets import trained
+from .networks import trained
 from .references import share
 from .studies import TORSION
 

@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from mpm_ref.cases import history
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.errors import Errors
-from mpm_ref.reduced.march import SCHEMES, Way
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.errors import Errors
+from mpm_ref.rom.study.run import SCHEMES, Way
 from mpm_ref.scene import build
+from mpm_ref.trajectories import history
 
-from ..registry import experiment
+from ..common.registry import experiment
 from ..verification.scenes import threads_for
-from .nets import SEEDS
+from .networks import SEEDS
 from .references import References, mean_of, references, share
 from .studies import POKES, TORSION, poked_again
 
@@ -59,7 +59,7 @@ def table(run, name, tests, nets):
 
 def kept(run, tests, net, way, draw):
     """`Errors` of one draw of samples, kept if the experiment is cut off."""
-    return Errors(*run.kept(f"{net}.{way.name}.{way.points}.{draw}",
+    return Errors(*run.cached(f"{net}.{way.name}.{way.points}.{draw}",
                             lambda: tests.errors(net, way, 1000 * draw)))
 
 

@@ -3,14 +3,14 @@
 The map is trained on one in sixteen of 34 thousand points on a grid three times as coarse.
 """
 
-from mpm_ref.reduced.march import PROJECTIONS, SCHEMES, Way
+from mpm_ref.rom.study.run import PROJECTIONS, SCHEMES, Way
 from mpm_ref.scene import build
 
-from ..registry import experiment
-from .nets import trained
-from .racing import COLUMNS, WAY, fastest, race
+from ..common.registry import experiment
+from .networks import trained
 from .references import share
 from .studies import TOWER, refined
+from .timing import COLUMNS, WAY, fastest, race
 
 NET = "tower"
 SOUND = 1.5         # times the error of the paper's way, up to which a faster one counts

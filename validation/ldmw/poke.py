@@ -4,10 +4,10 @@ import numpy as np
 
 from mpm_ref.rom.sampling import draw
 
-from ..ldm.nets import trained
-from ..ldm.online import reconstructed
+from ..common.registry import experiment
+from ..ldm.networks import trained
+from ..ldm.reduced_runs import reconstructed
 from ..ldm.workshop_studies import PUSHES
-from ..registry import experiment
 from .runs import Fields, by_nodes, by_points, kept, pod, record, runs
 
 NET, R, HYPER = "push", 5, 15

@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 import threadpoolctl
 
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.march import Way, model, start, stepped
 from mpm_ref.rom.fields.pod import modes
 from mpm_ref.rom.quadrature.lagrangian import neighbours
 from mpm_ref.rom.quadrature.node_centric import node_centric, nodes_of
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.run import Way, model, start, stepped
 
-from ..ldm.nets import trained
+from ..ldm.networks import trained
 from ..verification.scenes import threads_for
 
 POINT_WAY, NODE_WAY = Way("lagrangian", "linear"), Way("eulerian", "linear")
@@ -107,7 +107,7 @@ def march(one, map, rest, approach):
 def of_state(map, latent, X):
     """x, v and F of points X in a state; the velocity is the one that was fitted."""
     x, F, _ = map.derivatives(X, latent.xhat)
-    return x, map.velocity(X, latent.before, latent.vhat), F
+    return x, map.velocity(X, latent.fitted_at, latent.vhat), F
 
 
 def by_points(samples, near=None):
@@ -140,7 +140,7 @@ def by_nodes(chosen, count=None):
         body = node_centric(stepper.quadrature, nodes)
 
         def choose(t, latent):
-            found = body.samples(map, latent)
+            found = body.samples(map, latent.xhat)
             return found if count is None else found[spread(one.X[found], count)]
 
         return replace(stepper, quadrature=body), choose

@@ -5,10 +5,10 @@ import numpy as np
 from mpm_ref.rom.fields.architecture import HIDDEN
 from mpm_ref.scene import build
 
-from ..ldm.nets import SHARES, nets
+from ..common.registry import experiment
+from ..common.settings import record_settings
+from ..ldm.networks import SHARES, nets
 from ..ldm.workshop_studies import PUSHES, SHEAR3, SHEAR17
-from ..registry import experiment
-from ..settings import record_settings
 from .poke import HYPER, NET
 from .shear import HYPER as SHEAR_HYPER
 from .shear import LOSSES

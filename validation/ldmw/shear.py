@@ -10,9 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..ldm.nets import NEITHER, NO_F, WORKSHOP
+from ..common.registry import experiment
+from ..ldm.networks import NEITHER, NO_F, WORKSHOP
 from ..ldm.workshop_studies import SHEAR3, SHEAR17
-from ..registry import experiment
 from .runs import by_nodes, by_points, pod, record, runs, spread
 
 R, HYPER = 1, 6             # latent coordinates; sample points of the hyper-reduction
@@ -54,8 +54,9 @@ def forceless(approach):
     """An approach whose material resists nothing."""
     def softened(one, map):
         stepper, choose = approach(one, map)
-        law = type(stepper.law)(*np.zeros(len(stepper.law)).tolist())
-        return replace(stepper, law=law), choose
+        field = stepper.field
+        law = type(field.law)(*np.zeros(len(field.law)).tolist())
+        return replace(stepper, field=field._replace(law=law)), choose
 
     return softened
 

@@ -1,9 +1,9 @@
 """What the workshop paper's Figure 1 shows: ends of reduced poking runs, beside full-order ones."""
 
-from ..ldm.kept_bodies import keep
-from ..ldm.nets import trained
+from ..common.registry import experiment
+from ..ldm.networks import trained
+from ..ldm.published_bodies import keep
 from ..ldm.workshop_studies import PUSHES
-from ..registry import experiment
 from .poke import HYPER, NET, samples
 from .runs import by_points, compared, kept, record, runs
 

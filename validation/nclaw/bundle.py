@@ -1,4 +1,4 @@
-"""The laws of a small training after some of its epochs, as one file (see `mpm_ref.archive`).
+"""The laws of a small training after some of its epochs, in one file.
 
 Networks are trained in single precision, and stored so: they come back as they were, as doubles.
 """
@@ -8,9 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.archive import about_of, require_format, stated
-from mpm_ref.materials.learned.weights import PARTS, Laws, arrays_of, fault_of, trained_of
-from mpm_ref.sealed import opened, sealed, write_whole
+from mpm_ref.materials.learned.weights import (
+    PARTS,
+    LearnedLaws,
+    fault_of,
+    law_arrays,
+    law_from_arrays,
+)
+from mpm_ref.store.weights_file import about_of, opened, require_format, sealed, stated, write_whole
 
 FORMAT = 1
 
@@ -18,7 +23,7 @@ FORMAT = 1
 class Bundle(NamedTuple):
     """Laws by epoch, and what is known of their training."""
 
-    laws: dict          # {epochs over: `learned.weights.Laws`}, each with an about
+    laws: dict          # {epochs over: `LearnedLaws`}, each with an about
     about: dict         # plain values
 
 
@@ -31,7 +36,7 @@ def save(path, bundle):
     arrays = stated(path, FORMAT, about)
     for epoch, laws in bundle.laws.items():
         for part in PARTS:
-            for name, a in arrays_of(part, getattr(laws, part)).items():
+            for name, a in law_arrays(part, getattr(laws, part)).items():
                 arrays[f"{epoch}.{name}"] = single(path, name, a)
     write_whole(Path(path), sealed(arrays))
 
@@ -58,11 +63,11 @@ def load(path):
 
 
 def laws_of(path, arrays, epoch, about):
-    """`Laws` of an epoch."""
+    """`LearnedLaws` of an epoch."""
     start = f"{epoch}."
     own = {name.removeprefix(start): a.astype(float) if a.dtype == np.float32 else a
            for name, a in arrays.items() if name.startswith(start)}
     fault = fault_of(own)
     if fault:
         raise ValueError(f"{path} holds no trained laws of epoch {epoch}: {fault}; train again")
-    return Laws(*(trained_of(part, own) for part in PARTS), about)
+    return LearnedLaws(*(law_from_arrays(part, own) for part in PARTS), about)

@@ -5,12 +5,12 @@
 from mpm_ref.materials.learned.weights import mixed
 from mpm_ref.nclaw.gnn.simulator import Simulator
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .diverged import diverged
-from .met import LABELED
-from .nets import identity, nets
 from .simulators import GraphNet
+from .strain_bounds import LABELED
 from .tables import known, method_of
+from .trained_laws import identity, nets
 
 STEP = {"unit": "m^2", "note": "mean over steps from restarts of the horizon of that epoch"}
 MIXED = {"unit": "m^2", "note": f"{STEP['note']}; the loss's term of velocities is in it, which "

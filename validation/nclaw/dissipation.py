@@ -8,19 +8,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.cases import in_order
 from mpm_ref.energy import kinetic
 from mpm_ref.materials.learned import learned_flow, learned_law
 from mpm_ref.nclaw.bodies import fresh, gradients
 from mpm_ref.nclaw.dissipation import balance, loops, work
 from mpm_ref.nclaw.study.compare import Broken, positions
 from mpm_ref.scene import build
+from mpm_ref.trajectories import in_order
 
-from ..registry import experiment
+from ..common.registry import experiment
+from ..common.weights_needed import there
 from ..verification.scenes import threads_for
-from ..waiting import there
 from .environments import ENVIRONMENTS, environment
-from .nets import trained, weights_of
+from .trained_laws import trained, weights_of
 
 METHODS = ("ours", "admissible")
 TRUE = "true"
@@ -53,7 +53,7 @@ def dissipation(run):
     cycles, runs = [], []
     for (method, name), pair in run.progress(laws.items(), "laws"):
         cycles += [(method, name, size, n, *cycled(pair, G)) for size, G in closed.items()]
-        found = run.kept(f"{method}.{name}", partial(returns, name, pair, length))
+        found = run.cached(f"{method}.{name}", partial(returns, name, pair, length))
         runs.append((method, name, length, *found))
     run.table("cycles", CYCLES, cycles)
     run.table("runs", RUNS, runs)

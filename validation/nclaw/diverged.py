@@ -4,8 +4,8 @@ that it would have made.
 
 import json
 
-from ..record import write_whole
-from . import nets
+from ..common.record import write_whole
+from . import trained_laws
 
 
 def keep(weights, about):
@@ -19,7 +19,7 @@ def keep(weights, about):
 
 def beside(weights):
     """The path that belongs to a file of weights."""
-    return weights.with_suffix(nets.DIVERGED)
+    return weights.with_suffix(trained_laws.DIVERGED)
 
 
 def diverged(name, now):
@@ -27,10 +27,10 @@ def diverged(name, now):
     of its epochs and "stopped", a sentence; None where nothing is kept. Raises ValueError for a
     file that cannot be read, or of another training or another scene.
     """
-    path = beside(nets.FOLDER / f"{name}.npz")
+    path = beside(trained_laws.FOLDER / f"{name}.npz")
     if not path.exists():
         return None
-    again = f"python -m validation.train_laws {name}"
+    again = f"python -m validation.training.nclaw {name}"
     try:
         about = json.loads(path.read_text())
     except ValueError as fault:

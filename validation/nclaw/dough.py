@@ -31,7 +31,7 @@ from mpm_ref.scene import (
     Walls,
 )
 
-from .nets import named, stored
+from .trained_laws import named, stored
 
 FRAMES_PER_SECOND, EVERY, FRAMES = 960, 3, 40       # steps between frames; frames after the first
 DX, NODES, WALL = 0.01, 24, 3                       # [m], per axis, in each wall
@@ -114,7 +114,7 @@ def film(x):
 
 @cache
 def trained(name):
-    """`learned.weights.Laws` of `doughs` by name; errors as of `nets.trained`."""
+    """`LearnedLaws` of `doughs` by name; errors as of `nets.trained`."""
     return stored(name, identity(doughs()[name]))
 
 

@@ -9,9 +9,9 @@ from mpm_ref.materials import make_flow
 from mpm_ref.nclaw.bodies import fresh, learned, own
 from mpm_ref.nclaw.camera import project
 
-from ..ldm.kept_bodies import keep
-from ..registry import experiment
-from ..waiting import there
+from ..common.registry import experiment
+from ..common.weights_needed import there
+from ..ldm.published_bodies import keep
 from .diverged import diverged
 from .dough import (
     DROP,
@@ -29,8 +29,8 @@ from .dough import (
     star,
     trained,
 )
+from .initial_laws import untrained
 from .states import shots
-from .untrained import untrained
 
 BODIES = {"block": block, "star": star}
 COLUMNS = ("laws", "pixels", "block", "star", "broken")

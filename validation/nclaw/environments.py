@@ -2,8 +2,8 @@
 
 from functools import cache
 
-from mpm_ref.cases import observed
 from mpm_ref.scene import build
+from mpm_ref.trajectories import observed
 
 from ..verification.scenes import shipped, threads_for, with_
 

@@ -7,14 +7,14 @@ import numpy as np
 
 from mpm_ref.nclaw.gnn.simulator import Simulator
 
-from .. import targets
+from ..common import targets
 from ..verification.scenes import with_
 from .environments import ENVIRONMENTS
 from .evaluate import Found, compare, learned
-from .nets import nets
 from .simulators import GraphNet
+from .stand_in_bodies import has_mesh, said
 from .tasks import TOYS, scenes
-from .toys import has_mesh, said
+from .trained_laws import nets
 
 PRINTED = {"jelly": "jello", "sand": "sand", "plasticine": "plasticine", "water": "water"}
 OURS = "ours"
@@ -51,7 +51,7 @@ def errors(run, laws, tasks, goes_on=False):
             for draw, scene in enumerate(scenes(task, name) if able else ()):
                 if run.profile == "quick":
                     scene = with_(scene, steps=SHORT)
-                found = run.kept(f"{task}.{name}.{draw}",
+                found = run.cached(f"{task}.{name}.{draw}",
                                  partial(compare, scene, [*map(ready, able.values())], goes_on))
                 rows += [Row(method, name, task, draw, *Found(*one))
                          for method, one in zip(able, found, strict=True)]

@@ -17,7 +17,7 @@ from mpm_ref.nclaw.study.compare import Broken, Follower, Found, positions
 from mpm_ref.scene import build
 
 from ..verification.scenes import threads_for
-from .free import free
+from .gnn_rollout import free
 
 __all__ = ["Broken", "Found", "compare", "fresh", "learned", "own", "positions"]
 

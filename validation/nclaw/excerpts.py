@@ -8,7 +8,7 @@ of velocities in the loss, whose weight is not printed; the errors are those of 
 from typing import NamedTuple
 
 from .errors import OURS, grouped, record_mean
-from .nets import nets
+from .trained_laws import nets
 
 NOT_RUN = "Table 4: the simulator of Li & Farimani (2022) is another paper's and is not run"
 

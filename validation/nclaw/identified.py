@@ -8,10 +8,10 @@ from mpm_ref.materials import NoFlow
 from mpm_ref.materials.learned import learned_flow, learned_law
 from mpm_ref.scene import build
 
-from ..registry import experiment
-from ..waiting import there
+from ..common.registry import experiment
+from ..common.weights_needed import there
 from .environments import environment, trajectory
-from .nets import trained
+from .trained_laws import trained
 
 NAME, POINTS, SEED = "water", 1000, 0
 METHODS = {NAME: "ours", f"{NAME}-labeled": "labeled"}      # of weights

@@ -9,9 +9,9 @@ one grid. Positions, velocities and deformation gradients stay as they are when 
 import numpy as np
 
 from mpm_ref.body import Body, particles_at
-from mpm_ref.cases import in_order
 from mpm_ref.core.grid import OutOfRange
 from mpm_ref.simulate import keep_inside
+from mpm_ref.trajectories import in_order
 
 FIRST, LAST = 500, 1500     # steps
 HOLD = 20                   # steps between changes

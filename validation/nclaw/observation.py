@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import KDTree
 
-from mpm_ref.cases import Observed
+from mpm_ref.trajectories import Observed
 
 OFF = 0.1           # size of an outlier [m]
 WINDOW = 11         # frames of a parabola in time

@@ -8,14 +8,14 @@ from mpm_ref.nclaw.bodies import own
 from mpm_ref.nclaw.study.compare import Broken
 from mpm_ref.scene import build
 
-from ..registry import experiment
+from ..common.registry import experiment
+from ..common.weights_needed import there
 from ..verification.scenes import threads_for, with_
-from ..waiting import there
 from .environments import ENVIRONMENTS, environment
 from .errors import PRINTED, ready
 from .evaluate import frames
-from .nets import nets, trained, weights_of
 from .simulators import GraphNet
+from .trained_laws import nets, trained, weights_of
 
 REPEATS = {"quick": 3, "standard": 10}
 TRUE = "true"

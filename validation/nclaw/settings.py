@@ -14,17 +14,17 @@ from mpm_ref.sampling import points
 from mpm_ref.scene import build
 from mpm_ref.shapes.inside import solid
 
-from ..registry import experiment
-from ..settings import record_settings
+from ..common.registry import experiment
+from ..common.settings import record_settings
+from ..common.weights_needed import there
 from ..verification.scenes import shipped
-from ..waiting import there
 from .environments import ENVIRONMENTS
+from .gallery import contact, large, pool
 from .identified import POINTS
-from .nets import trained
 from .runtime import REPEATS
-from .shown import contact, large, pool
 from .simulators import COUNTS, named
 from .tasks import FASTEST, LONG, SEEDS, slope
+from .trained_laws import trained
 
 AXES = "xyz"
 JELLY = "jelly"     # any environment: all four have the same grid, steps and recipe
@@ -46,7 +46,7 @@ def settings(run):
     if GRAPHS in found:
         record(run, f"weights {GRAPHS}.npz", of_graphs(found[GRAPHS], jelly))
     record(run, "validation/nclaw/tasks.py", of_tasks(jelly))
-    record(run, "validation/nclaw/shown.py", of_bodies())
+    record(run, "validation/nclaw/gallery.py", of_bodies())
     record(run, "validation/nclaw", of_measurements())
 
 

@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.cases import in_order
 from mpm_ref.nclaw.bodies import own
 from mpm_ref.nclaw.gnn.history import box_of
 from mpm_ref.nclaw.study.compare import positions
 from mpm_ref.scene import build
 from mpm_ref.store.words import counted
+from mpm_ref.trajectories import in_order
 
 from ..verification.scenes import threads_for
 from .environments import ENVIRONMENTS

@@ -6,12 +6,12 @@ from functools import partial
 
 from mpm_ref.scene import Poisson
 
-from ..registry import experiment
+from ..common.registry import experiment
 from ..verification.scenes import with_
-from .elsewhere import both, show
 from .environments import ENVIRONMENTS, environment
+from .other_bodies import both, show
+from .stand_in_bodies import said
 from .tasks import slope
-from .toys import said
 
 WORDS = ("ours", "admissible")
 FEW, SHORT = 1000, 550          # points and steps, quick: until it has reached the floor

@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..common.weights_needed import there
 from ..verification.scenes import with_
-from ..waiting import there
 from .environments import environment
 from .evaluate import compare, learned
+from .small_trainings import bundled, small_nets
 from .tasks import SEEDS, velocity
-from .trade_nets import bundled, small_nets
 
 SHORT = 200         # steps, quick
 

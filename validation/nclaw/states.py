@@ -7,15 +7,15 @@ import numpy as np
 from mpm_ref.nclaw.gnn.simulator import Simulator
 from mpm_ref.scene import build
 
-from ..ldm.kept_bodies import keep
-from ..registry import experiment
+from ..common.registry import experiment
+from ..common.weights_needed import there
+from ..ldm.published_bodies import keep
 from ..verification.scenes import threads_for, with_
-from ..waiting import there
 from .environments import ENVIRONMENTS
 from .evaluate import Broken, frames, learned, own
-from .nets import trained, weights_of
+from .initial_laws import untrained
 from .tasks import SEEDS, reconstruction, time, velocity
-from .untrained import untrained
+from .trained_laws import trained, weights_of
 
 SHOTS = (0, 250, 500, 750, 1000)        # steps, of Figure 6
 DISTANCE = "mean squared error of an axis, of the last states alone"

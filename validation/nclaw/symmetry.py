@@ -10,7 +10,7 @@ from mpm_ref.nclaw.bodies import gradients, own, points, stresses
 from mpm_ref.nclaw.study.compare import positions
 from mpm_ref.scene import build
 
-from ..registry import experiment
+from ..common.registry import experiment
 from ..verification.scenes import threads_for
 from .dissipation import BOUND, known
 from .environments import ENVIRONMENTS, environment

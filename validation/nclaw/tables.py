@@ -1,14 +1,14 @@
 """Errors of NCLaw's laws: on the run they are trained on (Table 1), and away from it (Table 2)."""
 
-from ..registry import experiment
-from ..waiting import there
+from ..common.registry import experiment
+from ..common.weights_needed import there
 from .environments import ENVIRONMENTS
 from .errors import COLUMNS, OURS, RELEASED, as_printed, errors, record, to_the_digits
 from .excerpts import NOT_RUN, record_excerpts
-from .nets import nets, trained
+from .initial_laws import untrained
+from .stand_in_bodies import has_mesh
 from .tasks import TOYS
-from .toys import has_mesh
-from .untrained import untrained
+from .trained_laws import nets, trained
 
 INIT = "ours-init"
 AWAY = ("time", "velocity", "geometry")     # tasks of Table 2

@@ -17,7 +17,7 @@ from mpm_ref.scene import Clip, Poisson, Velocity, Walls
 
 from ..verification.scenes import with_
 from .environments import environment
-from .toys import toy
+from .stand_in_bodies import toy
 
 CENTER = (0.5, 0.5, 0.5)                    # about which bodies spin [m]
 LONG = {"jelly": 2000, "sand": 2000, "plasticine": 2000, "water": 5000}     # steps

@@ -16,16 +16,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.reduced.nsf.fields import BLOCK
-from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.fields.architecture import DEPTH
 from mpm_ref.rom.fields.network import Decoder, Field, FieldUnits, LearnedFields, Units, learned
 from mpm_ref.rom.fields.perceptron import network
 from mpm_ref.rom.fields.pod_fields import Part, Sizes, Spanned, cells
 from mpm_ref.rom.fields.radial_basis import Radial
+from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.nsf_fields import BLOCK
 from validation.nsf.pointwise_networks import infer
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .speed import whole_steps
 from .studies import cake, metal
 

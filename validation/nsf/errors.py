@@ -5,12 +5,12 @@ place of the paper's networks.
 
 import numpy as np
 
-from mpm_ref.reduced.errors import Errors
+from mpm_ref.rom.study.errors import Errors
 
-from ..registry import experiment
+from ..common.registry import experiment
+from .reduced_runs import FASTER, refitted, tested
 from .states import keep_states
 from .studies import jelly, sand
-from .tested import FASTER, refitted, tested
 
 ORIGIN = "from the corner of the unit box that scenes stand in"
 MODAL = "fields of modes, no networks"

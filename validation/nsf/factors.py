@@ -12,15 +12,15 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm_ref.core.blas import one_thread
-from mpm_ref.reduced.inferring import Plan, infer
-from mpm_ref.reduced.whole import whole
+from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.nsf_run import Plan, infer
 from mpm_ref.simulate import simulate
 
-from ..registry import experiment
+from ..common.registry import experiment
 from ..verification.scenes import with_
 from .errors import mean, rows_of
+from .reduced_runs import FASTER, tested
 from .studies import cake, metal
-from .tested import FASTER, tested
 
 REPEATS = DRAWS = 3
 DRAWN, WEIGHED, CELLS = "drawn", "weighed", "cells"     # kinds of samples

@@ -4,11 +4,11 @@ takes from the latent coordinates before the step.
 
 import numpy as np
 
-from mpm_ref.rom.inferred import INVERSIONS
+from mpm_ref.rom.projection import INVERSIONS
 
-from ..registry import experiment
+from ..common.registry import experiment
+from .reduced_runs import FASTER, tested
 from .studies import jelly, metal
-from .tested import FASTER, tested
 
 COLUMNS = ("scene", "value", "draw", "inversion", "faster", "origin", "centroid", "displacement",
            "stress", "least", "median", "most")

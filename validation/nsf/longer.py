@@ -11,14 +11,14 @@ import numpy as np
 
 from mpm_ref.core.blas import one_thread
 from mpm_ref.monitor import Unstable
-from mpm_ref.reduced.errors import Errors
-from mpm_ref.reduced.inferring import Plan
-from mpm_ref.reduced.nsf.evaluate import course, level_of, share
-from mpm_ref.reduced.whole import at_once, history, whole
 from mpm_ref.rom.kinematics import NoBody
+from mpm_ref.rom.study.errors import Errors
+from mpm_ref.rom.study.nsf_case import at_once, history, whole
+from mpm_ref.rom.study.nsf_evaluate import course, level_of, share
+from mpm_ref.rom.study.nsf_run import Plan
 from mpm_ref.simulate import simulate
 
-from ..registry import experiment
+from ..common.registry import experiment
 from ..verification.scenes import with_
 from .factors import REPEATS, seconds
 from .studies import cake, metal

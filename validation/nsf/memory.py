@@ -7,18 +7,18 @@ from functools import partial
 
 import numpy as np
 
-from mpm_ref.reduced.inferring import drawn
-from mpm_ref.reduced.nsf.evaluate import closest, course, level_of, share
-from mpm_ref.reduced.nsf.fields import BLOCK
-from mpm_ref.reduced.whole import history, whole
-from mpm_ref.rom.fields.joint_latent import Joint, Stacked, joint
+from mpm_ref.rom.fields.joint_latent import Stacked, joint, joint_stepper
 from mpm_ref.rom.fields.pod_fields import Sizes, spanned
-from mpm_ref.rom.inferred import Inferred, Position
+from mpm_ref.rom.latent import Latent
 from mpm_ref.rom.projection import project_position
 from mpm_ref.rom.snapshots import joined
+from mpm_ref.rom.study.nsf_case import history, whole
+from mpm_ref.rom.study.nsf_evaluate import closest, course, level_of, share
+from mpm_ref.rom.study.nsf_fields import BLOCK
+from mpm_ref.rom.study.nsf_run import drawn, model
 from mpm_ref.rom.symmetric import tensor
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .studies import Study, sand
 
 INFO = {"comparator": "info"}
@@ -71,7 +71,7 @@ def of_positions(study, value, runs, test):
     rest = xhat[:, 0].mean(axis=0)
     yield value, NEAREST, *errors(fields, test, closest(fields, test.x[0], rest))
     for samples in (study.samples, len(one.X)):
-        found = states(one, Inferred, fields, rest, samples, test.dt)
+        found = states(one, model(one, fields), rest, samples, test.dt)
         yield value, samples, *errors(fields, test, found)
 
 
@@ -79,12 +79,12 @@ def of_both(study, value, runs, test):
     """The same with joint ones."""
     one = whole(study.run(value))
     fields, xhat, scale = joint(runs, study.sizes, BLOCK * one.problem.dx)
-    rest, body = xhat[:, 0].mean(axis=0), one.problem.bodies[0]
-    stepper = partial(Joint, law=body.law, flow=body.flow, scale=scale)
+    rest = xhat[:, 0].mean(axis=0)
+    stepper = joint_stepper(fields, one.matter, one.problem, scale)
     both = Stacked(fields, scale, 1.0)
     yield value, NEAREST, *errors(fields, test, nearest(both, test, rest))
     for samples in (study.samples, len(one.X)):
-        found = states(one, stepper, fields, rest, samples, test.dt)
+        found = states(one, stepper, rest, samples, test.dt)
         yield value, samples, *errors(fields, test, found)
 
 
@@ -97,15 +97,12 @@ def nearest(both, test, xhat):
         yield level, xhat
 
 
-def states(one, kind, fields, rest, samples, apart):
-    """Yield (level or None, latent coordinates) of a reduced run of a kind of stepper, from those
-    at rest; levels are `apart` [s].
+def states(one, stepper, rest, samples, apart):
+    """Yield (level or None, latent coordinates) of a reduced run of a stepper, from those at rest;
+    levels are `apart` [s].
     """
-    problem, clock = one.problem, one.problem.clock
-    stepper = kind(fields, one.matter, problem.dx, problem.scheme.degree, problem.gravity,
-                   problem.conditions)
-    some = drawn(len(one.X), samples, 0).points
-    at = Position(rest)
+    clock, some = one.problem.clock, drawn(len(one.X), samples, 0).points
+    at = Latent(rest)
     for k in range(clock.steps + 1):
         yield level_of(k * clock.dt / apart), at.xhat
         if k < clock.steps:

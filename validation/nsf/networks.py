@@ -4,7 +4,7 @@ stand.
 Latent coordinates are those of POD modes, in one unit of length: an encoder has to be learned, and
 nothing says what a map is like beside its snapshots, where a reduced run soon is. Here the position
 is also trained on snapshots that are moved along the modes. Each is a file of weights, remade by
-`python -m validation.train_fields NAME`.
+`python -m validation.training.nsf NAME`.
 """
 
 import hashlib
@@ -12,14 +12,14 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from mpm_ref.reduced.nsf.fields import BLOCK
-from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.fields.architecture import DEPTH
 from mpm_ref.rom.fields.network import learned
 from mpm_ref.rom.fields_file import load
-from mpm_ref.scene.text import canonical
+from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.nsf_fields import BLOCK
+from mpm_ref.scene.toml import canonical
 
-from ..waiting import Untrained
+from ..common.weights_needed import Untrained
 from .studies import Study, ball, bread, cake, jelly, metal, sand, toothpaste
 
 FOLDER = Path(__file__).parent / "weights"
@@ -94,7 +94,7 @@ def trained(name):
     """`fields_file.Model` of a scene. Raises `Untrained` where it is missing, ValueError where it
     is damaged, or of another training or other scenes than `net_of` says now.
     """
-    path, again = FOLDER / f"{name}.npz", f"python -m validation.train_fields {name}"
+    path, again = FOLDER / f"{name}.npz", f"python -m validation.training.nsf {name}"
     if not path.exists():
         raise Untrained(f"no weights {path.name}: {again}")
     model, now = load(path), identity(net_of(name))

@@ -6,16 +6,16 @@ from itertools import pairwise
 
 import numpy as np
 
-from mpm_ref.reduced.errors import Errors
 from mpm_ref.rom.fields import perceptron
 from mpm_ref.rom.fields.architecture import DEPTH
+from mpm_ref.rom.study.errors import Errors
 
-from .. import targets
-from ..registry import experiment
-from ..waiting import there
+from ..common import targets
+from ..common.registry import experiment
+from ..common.weights_needed import there
 from .errors import COLUMNS, mean, rows_of, said, share, weights
 from .networks import fields_of, nets, trained
-from .tested import tested
+from .reduced_runs import tested
 
 DIM, DRAWS = 3, 3
 OUTPUTS = {"g": 3, "h": 6, "l": 9}

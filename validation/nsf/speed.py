@@ -6,31 +6,33 @@ the time of either goes. Fields are those of modes, of three training runs only:
 radial functions have four times as many centres, which these times leave out.
 """
 
+import dataclasses
 from collections import deque
 from time import perf_counter
 
 import numpy as np
 
 from mpm_ref.explicit import deform_body
-from mpm_ref.reduced.inferring import begin
-from mpm_ref.reduced.whole import whole
-from mpm_ref.rom.inferred import Inferred
+from mpm_ref.rom.step import ReducedStepper
+from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.nsf_run import begin, model
 from mpm_ref.simulate import simulate
 
-from ..registry import experiment
+from ..common.registry import experiment
 from ..verification.scenes import with_
+from .reduced_runs import FASTER, tested
 from .studies import cake, metal, sand
-from .tested import FASTER, tested
 
 INFO = {"comparator": "info"}
 REPEATS, WARM = 3, 3        # timings; steps before them
 HELD = 120                  # steps of the sand, whose bytes alone are told
-STAGES = ("integration", "inferred", "moved", "inverted")
+STAGES = {"integration": "cloud", "inferred": "bodies", "moved": "on_grid",
+          "inverted": "project"}        # columns of the table: methods of `ReducedStepper`
 COLUMNS = ("scene", "samples", "inversion", "points", "full", "deform", *STAGES, "reduced")
 STUDIES = {"metal": (metal, (30, 10)), "cake": (cake, (700, 100))}
 
 
-class Clocked(Inferred):
+class Clocked(ReducedStepper):
     """The reduced model, which keeps the seconds of its stages."""
 
     def begin(self):
@@ -38,26 +40,26 @@ class Clocked(Inferred):
         self.spent = dict.fromkeys(STAGES, 0.0)
 
     def clocked(self, stage, *given):
-        """What a stage gives."""
+        """Return the result of a stage."""
         start = perf_counter()
-        found = getattr(super(), stage)(*given)
+        result = getattr(super(), STAGES[stage])(*given)
         self.spent[stage] += perf_counter() - start
-        return found
+        return result
 
-    def integration(self, *given):
-        """As `Inferred`, clocked."""
+    def cloud(self, *given):
+        """Find the quadrature points, clocked."""
         return self.clocked("integration", *given)
 
-    def inferred(self, *given):
-        """As `Inferred`, clocked."""
+    def bodies(self, *given):
+        """Evaluate the fields, clocked."""
         return self.clocked("inferred", *given)
 
-    def moved(self, *given):
-        """As `Inferred`, clocked."""
+    def on_grid(self, *given):
+        """Make a step on the grid, clocked."""
         return self.clocked("moved", *given)
 
-    def inverted(self, *given):
-        """As `Inferred`, clocked."""
+    def project(self, *given):
+        """Project on latent coordinates, clocked."""
         return self.clocked("inverted", *given)
 
 
@@ -114,9 +116,8 @@ def reduced_steps(one, count, inversion, steps):
     """{what: seconds of a reduced step; of its stages}, and integration points; means."""
     value = one.study.test[0]
     scene, fields = whole(one.study.run(value)), one.of(value)
-    problem = scene.problem
-    stepper = Clocked(fields, scene.matter, problem.dx, problem.scheme.degree, problem.gravity,
-                      problem.conditions, inversion)
+    problem, plain = scene.problem, model(scene, fields, inversion)
+    stepper = Clocked(*(getattr(plain, option.name) for option in dataclasses.fields(plain)))
     samples = one.study.chosen(scene, count, 0)[0].points
     stepper.begin()
     at, dt, points = begin(scene, fields, one.rest), problem.clock.dt, []

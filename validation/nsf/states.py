@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from mpm_ref.reduced.inferring import Plan, infer
-from mpm_ref.reduced.nsf.evaluate import level_of
-from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.step import BREAKDOWNS
+from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.nsf_evaluate import level_of
+from mpm_ref.rom.study.nsf_run import Plan, infer
 from mpm_ref.rom.symmetric import tensor
 
-from ..ldm.kept_bodies import keep
+from ..ldm.published_bodies import keep
 
 SHOTS = 3               # times, evenly spaced, the last among them
 WAYS = "map", "weighed"     # of reduced runs, beside the usual one

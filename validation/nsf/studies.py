@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.reduced.inferring import drawn, of_cells, weighed
-from mpm_ref.reduced.vary import varied
 from mpm_ref.rom.fields.pod_fields import Sizes
+from mpm_ref.rom.study.nsf_run import drawn, of_cells, weighed
 from mpm_ref.scene import Poisson
+from mpm_ref.scene.overrides import varied
 
 from ..verification.scenes import shipped
 

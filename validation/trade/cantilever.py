@@ -10,11 +10,11 @@ from mpm_ref.core.state import NONE
 from mpm_ref.materials import make_law, stiffness
 from mpm_ref.problem import Clock, Problem
 
-from ..registry import experiment
+from ..common.registry import experiment
 from ..verification.lattice import body
 from .front import EMULATED, record_points
+from .knobs import DEFAULT, QUICK, STANDARD, settings
 from .measure import Trial, measure, sampled
-from .setting import DEFAULT, QUICK, STANDARD, settings
 
 E, NU, RHO = 1e6, 0.3, 1000.0               # [Pa], 1, [kg/m^2]
 LENGTH, HEIGHT, CLAMP = 1.0, 0.25, 0.25     # [m]; the clamp is two cells of the coarsest grid

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..common.registry import experiment
 from ..hot.one_step import after, errors, solved
 from ..hot.stiffness import METHODS, bar
-from ..registry import experiment
 
 EXACT = 1e-13           # tolerance of the reference
 AGREE = 1e-6            # how near the references of two methods must be

@@ -16,8 +16,8 @@ from mpm_ref.energy import energy
 from mpm_ref.scene import build
 from mpm_ref.simulate import simulate
 
+from ..common.registry import experiment
 from ..hot.stiffness import bar
-from ..registry import experiment
 from ..verification.scenes import with_
 
 PER_CELL = 8            # as those runs had

@@ -11,10 +11,10 @@ import numpy as np
 
 from mpm_ref.hot.methods import METHODS, RULES
 
-from ..hot.begun import begun, particles, steps
+from ..common.registry import experiment
 from ..hot.one_step import after, difference, solved
 from ..hot.stiffness import bar
-from ..registry import experiment
+from ..hot.warm_states import begun, particles, steps
 from .hot import time_for
 
 HOT = METHODS["hot"].cycle

@@ -9,13 +9,13 @@ from functools import partial
 from math import inf
 from typing import NamedTuple
 
-from .. import targets
-from ..hot.begun import BEGUN, PRINTED, begun, particles, steps
+from ..common import targets
+from ..common.registry import experiment
 from ..hot.one_step import Errors, errors, solved
 from ..hot.stiffness import METHODS
-from ..registry import experiment
+from ..hot.warm_states import BEGUN, PRINTED, begun, particles, steps
 from .hot import PAPER, POINT, Point, known, record_equal_eps, times_for
-from .hot_ways import ALL, OPTIONS, SLOW, SOME, descended, ways
+from .hot_methods import ALL, OPTIONS, SLOW, SOME, descended, ways
 
 EXACT, CHECK = "pn-mgpcg", "pn-pcg"     # methods of the reference and of its check
 MANY = {"iterations": 1000, "cg_iterations": 20000}     # at most, of their solves
@@ -77,7 +77,7 @@ def equal_error(run):
     trials = plan(run.profile)
     compiled(trials)
     for trial in run.progress(trials, "scenes"):
-        found, exact = unpacked(run.kept(trial.name, partial(ladder, trial)))
+        found, exact = unpacked(run.cached(trial.name, partial(ladder, trial)))
         own = known(found, exact.least)
         times[trial] = seconds(own)
         record_trial(run, trial, own, exact)

@@ -8,11 +8,11 @@ three solve the same steps to the same tolerance, and are compared with what is 
 import numpy as np
 
 from mpm_ref.hot.methods import minimise
-from mpm_ref.hot.unknowns import free_part
+from mpm_ref.hot.system import free_part
 
-from ..hot.begun import BEGUN, begun, particles, steps
+from ..common.registry import experiment
 from ..hot.one_step import difference, solved
-from ..registry import experiment
+from ..hot.warm_states import BEGUN, begun, particles, steps
 
 STARTS = ("zero", "gravity", "last")
 EPS, EXACT = 1e-8, 1e-10

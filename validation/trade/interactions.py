@@ -4,10 +4,10 @@ from itertools import combinations
 
 import numpy as np
 
-from ..registry import experiment
+from ..common.registry import experiment
+from .knobs import DEFAULT
 from .measure import measure
 from .mms import prepare
-from .setting import DEFAULT
 
 # One change of each knob, none of which breaks the run.
 CHANGES = {

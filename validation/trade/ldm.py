@@ -4,15 +4,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.march import Way
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.run import Way
 
-from ..ldm.nets import trained
-from ..ldm.racing import COLUMNS, Full, alone, median, race
+from ..common.registry import experiment
+from ..ldm.networks import trained
 from ..ldm.references import References, pod, references, share
 from ..ldm.studies import GRAVITY, TORSION, TOWER
+from ..ldm.timing import COLUMNS, Full, alone, median, race
 from ..ldm.tower import FAST, NET, PAPER, scene_of
-from ..registry import experiment
 from ..verification.scenes import with_
 from .front import front
 

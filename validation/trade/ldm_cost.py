@@ -6,15 +6,15 @@ from time import process_time
 import numpy as np
 
 from mpm_ref.core.blas import one_thread
-from mpm_ref.reduced import march
-from mpm_ref.reduced.case import case
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.run import model, picked, precise, start
 from mpm_ref.scene import build
 
-from ..ldm.nets import trained
-from ..ldm.racing import fastest, race
+from ..common.registry import experiment
+from ..ldm.networks import trained
 from ..ldm.studies import STUDIES, TOWER
+from ..ldm.timing import fastest, race
 from ..ldm.tower import FAST, GRIDS, NET, PAPER, scene_of
-from ..registry import experiment
 
 EVALUATIONS = ("derivatives", "place", "velocity")
 PARTS = ("network", "quadrature", "grid", "projection", "rest")
@@ -67,7 +67,7 @@ def split(one, at, way, steps=STEPS):
     points; means over steps, after one that compiles.
     """
     (map, rest), clock, asked = at, Clock(), Counter()
-    stepper = march.model(one, map, way)
+    stepper = model(one, map, way)
 
     def counted(name, method):
         timed = clock.part("network", method)
@@ -77,13 +77,14 @@ def split(one, at, way, steps=STEPS):
             return timed(X, *args)
         return call
 
-    stepper.map = Watched(stepper.map, EVALUATIONS, counted)
+    field = stepper.field
+    stepper.field = field._replace(g=Watched(field.g, EVALUATIONS, counted))
     stepper.quadrature = Watched(stepper.quadrature, ("cloud",),
                                  lambda name, method: clock.part("quadrature", method))
     stepper.on_grid = clock.part("grid", stepper.on_grid)
     stepper.project = clock.part("projection", stepper.project)
-    latent = march.start(one, map, rest)
-    pick, dt, points = march.picked(one, map, way, latent.xhat, 0), one.problem.clock.dt, []
+    latent = start(one, map, rest)
+    pick, dt, points = picked(one, map, way, latent.xhat, 0), one.problem.clock.dt, []
     with one_thread():
         for k in range(steps + 1):
             if k == 1:
@@ -114,7 +115,7 @@ def of_parts(run):
 def parted(run, name, one, at, way):
     """Record the parts of a way; a row of the table."""
     spent, asked, points = split(one, at, way)
-    total, each = sum(spent.values()), cost(one, march.precise(at[0], way), at[1])
+    total, each = sum(spent.values()), cost(one, precise(at[0], way), at[1])
     predicted = sum(asked[kind] * each[kind] for kind in EVALUATIONS)
     shares = ", ".join(f"{part} {spent[part] / total:.0%}" for part in PARTS)
     scale = f"{len(one.X)} particles, {way.points} samples, {points:.0f} quadrature points"

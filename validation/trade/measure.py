@@ -17,7 +17,7 @@ from mpm_ref.timestep import stable_dt
 from ..extremes.long_run import CARRIED, round_state
 from ..extremes.outcome import FINISHED, REFUSED, outcome
 from ..verification.lattice import lattice
-from .setting import Setting
+from .knobs import Setting
 
 LOST = "wrong"          # a run that ended, with an error of the size of the answer
 

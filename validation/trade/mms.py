@@ -7,16 +7,16 @@ import numpy as np
 from mpm_ref.materials import stiffness
 from mpm_ref.problem import Clock, Problem
 
-from ..registry import experiment
+from ..common.registry import experiment
 from ..verification.axis_aligned import AxisAligned
 from ..verification.convergence import order, rms
-from ..verification.follow import CHECKS, put_on
 from ..verification.lattice import body
+from ..verification.manufactured_runs import CHECKS, put_on
 from ..verification.mms import LAW, RHO0, A, C
 from ..verification.periodic import Periodic
 from .front import EMULATED, record_points
+from .knobs import QUICK, STANDARD, settings
 from .measure import Trial, measure, sampled
-from .setting import QUICK, STANDARD, settings
 
 SOUND = float(np.sqrt(stiffness(LAW) / RHO0))       # [m/s]
 END = 2.0 / C                                       # one oscillation [s]

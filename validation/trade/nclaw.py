@@ -2,9 +2,9 @@
 
 from math import isnan
 
+from ..common.registry import experiment
 from ..nclaw.small_runs import Measured, measured, spread
-from ..nclaw.trade_nets import BASE, OF_EPOCHS, OF_SIGHT, OF_TRAINING, SEEDS, small_nets
-from ..registry import experiment
+from ..nclaw.small_trainings import BASE, OF_EPOCHS, OF_SIGHT, OF_TRAINING, SEEDS, small_nets
 from .front import front
 
 SIZE = ("environment", "edge", "cells", "epochs", "first", "last", "seed")

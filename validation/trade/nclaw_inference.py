@@ -14,12 +14,12 @@ from mpm_ref.nclaw.bodies import own, points
 from mpm_ref.nclaw.study.compare import Broken, positions
 from mpm_ref.scene import build
 
+from ..common.registry import experiment
 from ..nclaw.environments import environment
 from ..nclaw.evaluate import compare, learned
-from ..nclaw.nets import trained
 from ..nclaw.small_runs import measured
-from ..nclaw.trade_nets import BASE, OF_WIDTH, last, small_nets
-from ..registry import experiment
+from ..nclaw.small_trainings import BASE, OF_WIDTH, last, small_nets
+from ..nclaw.trained_laws import trained
 from ..verification.scenes import threads_for, with_
 from .front import front
 
@@ -83,13 +83,13 @@ def width(run):
 
 
 def of_laws(laws, body):
-    """`cost` of `weights.Laws`, in place of those of a body."""
+    """`cost` of `LearnedLaws`, in place of those of a body."""
     made = learned(laws)(body)
     return cost(made.law, made.flow)
 
 
 def rounded(laws, bits):
-    """`weights.Laws` whose weights have so many binary digits."""
+    """`LearnedLaws` whose weights have so many binary digits."""
     return laws._replace(**{part: getattr(laws, part)._replace(layers=tuple(
         tuple(shorter(a, bits) for a in layer) for layer in getattr(laws, part).layers))
         for part in PARTS})
@@ -102,7 +102,7 @@ def shorter(a, bits):
 
 
 def size_of(laws, bits):
-    """Bytes of the weights of `weights.Laws` of so many digits: each with a sign in place of the
+    """Bytes of the weights of `LearnedLaws` of so many digits: each with a sign in place of the
     leading one, and an exponent as wide as theirs and zero need. Biases that are zero take none.
     """
     a = np.concatenate([a.ravel() for part in PARTS for layer in getattr(laws, part).layers

@@ -6,16 +6,16 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm_ref.core.blas import one_thread
-from mpm_ref.reduced.inferring import Plan, infer
-from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.step import BREAKDOWNS
+from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.nsf_run import Plan, infer
 from mpm_ref.simulate import simulate
 
+from ..common.registry import experiment
 from ..extremes.nsf_runs import scenes
 from ..extremes.outcome import outcome
-from ..ldm.racing import clocked
+from ..ldm.timing import clocked
 from ..nsf.errors import COLUMNS, mean, rows_of, share, weights
-from ..registry import experiment
 from ..verification.scenes import with_
 from .front import front
 

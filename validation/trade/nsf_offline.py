@@ -4,15 +4,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.reduced.whole import history
 from mpm_ref.rom.snapshots import joined
+from mpm_ref.rom.study.nsf_case import history
 
-from ..ldm.racing import clocked
+from ..common.registry import experiment
+from ..common.weights_needed import Untrained, there
+from ..ldm.timing import clocked
 from ..nsf.networks import fields_of, nets, trained
+from ..nsf.reduced_runs import Tested, refitted
 from ..nsf.studies import jelly, metal
-from ..nsf.tested import Tested, refitted
-from ..registry import experiment
-from ..waiting import Untrained, there
 from .nsf import full_cpu, reduced_cpu
 
 INFO = {"comparator": "info", "unit": "s"}

@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.reduced.whole import whole
+from mpm_ref.rom.study.nsf_case import whole
 
+from ..common.registry import experiment
 from ..extremes.nsf_runs import scenes
 from ..nsf.errors import COLUMNS, mean, rows_of, share
-from ..nsf.tested import refitted
-from ..registry import experiment
+from ..nsf.reduced_runs import refitted
 
 LEVELS = {          # one at a time, from the study's own
     "quick": {"r": (3,), "tau": (10,), "C": (10,), "smoothing": (1.0,)},

@@ -1,10 +1,10 @@
 """What NSF's networks cost and give by the width of their hidden layers."""
 
+from ..common.registry import experiment
+from ..common.weights_needed import there
 from ..nsf.errors import COLUMNS, mean, rows_of, share
 from ..nsf.networks import narrow, net_of, trained
 from ..nsf.networks_runs import OUTPUTS, TRAINED, scale_of, tested_on, weights_of
-from ..registry import experiment
-from ..waiting import there
 from .nsf import full_cpu, reduced_cpu
 
 DOUBLE = 8              # bytes of a weight

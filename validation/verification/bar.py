@@ -16,7 +16,7 @@ import numpy as np
 
 from mpm_ref.materials import FixedCorotated, lame
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .convergence import order, rms
 from .mms import name
 from .scenes import threads_for

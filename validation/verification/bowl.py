@@ -28,7 +28,7 @@ from mpm_ref.scene import (
 )
 from mpm_ref.simulate import simulate
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .block import G
 from .scenes import mean, threads_for
 

@@ -21,7 +21,7 @@ from mpm_ref.core.boundary import BoxWalls, Conditions
 from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.materials import FixedCorotated, lame, stiffness
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .convergence import extrapolated
 from .elastica import deflected, timoshenko
 from .lattice import body, lattice

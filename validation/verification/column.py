@@ -5,7 +5,7 @@ Exponents as the abstracts of their papers state them: in plane channels 0.65 +-
 [Lube2005] and [Lube2004] are quoted so in later work; the papers are not at hand: `unconfirmed`.
 """
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .collapse import Case, collapse
 from .convergence import order
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from mpm_ref.materials import FixedCorotated, lame
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .columns import Column, settled, stress_errors
 from .convergence import order
 from .mms import name

@@ -17,7 +17,7 @@ from mpm_ref.energy import energy
 from mpm_ref.scene import Regular, build
 from mpm_ref.simulate import simulate
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .scenes import shipped, threads_for, with_
 
 G = 9.81                            # [m/s^2]

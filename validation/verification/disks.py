@@ -6,7 +6,7 @@ import numpy as np
 
 from mpm_ref.scene import Scheme
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .collision import TRANSFERS, course, thinned
 from .convergence import order
 from .scenes import shipped

@@ -12,7 +12,7 @@ from mpm_ref.body import Body, particles_at
 from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.materials import LogNeoHookean, NoFlow, lame
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .scenes import threads_for
 from .symplectic import travelled
 

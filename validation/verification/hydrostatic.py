@@ -13,7 +13,7 @@ import numpy as np
 
 from mpm_ref.materials import Fluid
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .columns import Column, settled, stress_errors
 from .convergence import order
 from .mms import name

@@ -16,7 +16,7 @@ from mpm_ref.hot.methods import METHODS, options_of
 from mpm_ref.hot.step import ImplicitStepper
 from mpm_ref.materials import make_law
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .convergence import order, rms
 from .lattice import body, lattice
 

@@ -12,7 +12,7 @@ wave speed; the way gained thereby falls with the square root of its stiffness.
 
 import numpy as np
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .block import HEIGHT, LENGTH, Slope, slide
 from .symplectic import travelled
 

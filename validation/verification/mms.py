@@ -13,12 +13,12 @@ import numpy as np
 from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.materials import LogNeoHookean, lame, stiffness
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .axis_aligned import AxisAligned, forcing
 from .convergence import order
-from .follow import follow, steps_of
 from .independent import axis_aligned_forcing
 from .lattice import body, lattice
+from .manufactured_runs import follow, steps_of
 from .periodic import Periodic
 
 E, NU, RHO0, A = 1e7, 0.3, 1000.0, 0.05

@@ -24,7 +24,7 @@ from mpm_ref.core.motion import Motion, Steady
 from mpm_ref.core.solids import half_space
 from mpm_ref.materials import FixedCorotated, Hencky, LogNeoHookean, lame, stiffness
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .convergence import order
 from .mms import name
 from .settle import Pace, settle

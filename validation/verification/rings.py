@@ -10,7 +10,7 @@ from itertools import pairwise
 
 from mpm_ref.scene import Body, Material, Regular, Scene, Scheme, Torus, Velocity
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .collision import TRANSFERS, course, thinned
 
 PUBLISHED = {"pic": 8.004e6, "apic": 1.347e7, "flip": 1.365e7}      # [J/m] at 0.6 s; no MLS there

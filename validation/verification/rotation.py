@@ -9,7 +9,7 @@ from mpm_ref.energy import angular_momentum, energy
 from mpm_ref.scene import Body, Box, Material, Regular, Scene, Scheme, Sphere, Velocity, build
 from mpm_ref.simulate import simulate
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .scenes import threads_for
 from .symplectic import allowed_gain
 

@@ -17,11 +17,11 @@ import numpy as np
 from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.materials import LogNeoHookean, lame, stiffness
 
-from ..registry import experiment
+from ..common.registry import experiment
 from .convergence import order
-from .follow import LOST, follow, steps_of
 from .independent import vortex_forcing
 from .lattice import body, lattice
+from .manufactured_runs import LOST, follow, steps_of
 from .mms import SECOND_ORDER, name
 from .vortex_motion import INNER, OUTER, Vortex, forcing, printed_forcing
 

@@ -10,7 +10,7 @@ taken. Shapes, motions and coefficients of friction are data and have no bar:
     the same with friction                                         see `rub_bar`
 """
 
-from ..collide import by_node
+from ..boundary import by_node
 from ..contact import STICKY, load, nearest, projected, rest, strongest
 from ..jit import CHUNKS, chunk, kernel, parallel, prange
 from ..tensor import dot, fill, identity, lin, norm, put_vec, vec

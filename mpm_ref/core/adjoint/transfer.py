@@ -24,8 +24,7 @@ from ..stencil import (
 )
 from ..tensor import dot, fill, inner, lin, mat, mlin, mv, outer, put_vec, vec, vm
 from ..transfer_mls3 import fits
-from .curvature import hessian
-from .lever import GradientForm, MlsForm, around, lever, lever_bar
+from .shape_gradient import GradientForm, MlsForm, around, hessian, lever, lever_bar
 from .transfer_mls3 import gather_bars_mls3_all, scatter_bars_mls3_color
 
 

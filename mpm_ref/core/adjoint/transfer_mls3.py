@@ -1,6 +1,6 @@
 """The adjoint of the transfer that most scenes use, for speed: MLS form, quadratic splines, 3D.
 
-The same sums as `scatter_bars` and `gather_bars` of `transfer_adjoint`, line by line as in
+The sums of `scatter_bars` and `gather_bars` of `adjoint.transfer`, line by line as in
 `transfer_mls3`. Both have in common a field U_ip = U_p + Q_p r_ip, affine in the node's position,
 of which sum_i w_ip h_ip with h_ip = v_i . U_ip is differentiated:
 

@@ -2,7 +2,7 @@
 
 HOT's stop is relative: sqrt(r^T D^+ r) <= tolerance sqrt(b^T D^+ b), D the diagonal, or the
 diagonal blocks, of the coarsest matrix (HOT-sec5.3-coarse). What b is reads in two ways; see `stop`
-in `choices`. The inexact solve makes the V-cycle slightly non-linear; a direct one does not.
+in `options`. The inexact solve makes the V-cycle slightly non-linear; a direct one does not.
 """
 
 from functools import partial

@@ -15,13 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..assembly import assembled
-from ..modes import Modes
-from ..pattern import Pattern, pattern_of
+from ..assembly import Pattern, assembled, pattern_of
 from ..potential import box_of
-from ..quadrature import order_of, sites_of
-from ..system import constrained
-from ..unknowns import Unknowns
+from ..quadrature import Modes, order_of, sites_of
+from ..system import Unknowns, constrained
 
 
 class Space(NamedTuple):

@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from ..choices import DTYPES, checked
 from .blocks import hierarchy as block_hierarchy
 from .coarsest import by_pcg, of_coarsest, size
+from .options import DTYPES, checked
 from .projectors import coarse_nodes, diagonal_blocks, given_nodes, inverses, onto_range
 from .smoothers import POLYNOMIAL, GaussSeidel, largest_eigenvalue, times
 
@@ -73,7 +73,7 @@ def build_given(matrices):
 
 
 def smoother(level, word):
-    """The map r -> du, both (n d,), of a word in `choices.WORDS`."""
+    """The map r -> du, both (n d,), of a word in `options.WORDS`."""
     if word == "gauss-seidel":
         return GaussSeidel(level.A, level.D_inv, level.index)
     largest = largest_eigenvalue(on_nodes(level.A), level.D_inv, level.index)
@@ -165,7 +165,7 @@ def hierarchy(A, index, levels=3, kernel="linear", path="blocks", **choices):
     A is a bsr_array with d x d blocks [kg], symmetric and positive semi-definite; its null
     directions are held directions of single nodes. kernel is "linear", or "quadratic" for
     HOT-quadratic; path is "blocks", or "scipy" for the readable twin; choices are fields of
-    `choices.Choices`. The result has `levels`, `cycle(b)` and the count `iterations` of coarsest
+    `options.Choices`. The result has `levels`, `cycle(b)` and the count `iterations` of coarsest
     CG. One level is the coarsest solver alone (LBFGS-H in HOT-methods).
 
     Raises ValueError for unknown words, for shapes that do not match, or a diagonal not finite.

@@ -32,9 +32,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...core import law as registry
 from ...core.adjoint.deform import back, within
 from ...core.jit import CHUNKS, chunk, kernel, parallel, prange
-from ...core.spectral import UNDETERMINED, mixed
+from ...core.spectral import UNDETERMINED, mixed, svd
 from ...core.tensor import (
     diagonal,
     dot,
@@ -52,7 +53,9 @@ from ...core.tensor import (
 )
 from ..log_strain import deviator, log_strain, stretches
 from ..log_strain_adjoint import log_gap_ratio
+from ..no_flow import never_fails
 from ..stretches import inverse
+from .network import flatten, outputs, softplus
 from .principal import pull_back_stretches
 
 READ, ANSWERED = 3, 2
@@ -63,6 +66,25 @@ class Contraction(NamedTuple):
     """Deformation gradient of less logarithmic strain."""
 
     strain: float = 1e-3        # below which strains are read as they are, above by their logarithm
+
+
+class ContractionFlow(NamedTuple):
+    """F_trial -> F, a return map of the whole deformation gradient."""
+
+    sizes: np.ndarray
+    W: np.ndarray
+    b: np.ndarray
+    strain: float       # see `Contraction`
+
+    @property
+    def dim(self):
+        """Number of space dimensions."""
+        return 3
+
+
+def build_flow(weights):
+    """`ContractionFlow` of a `LawWeights` of kind `Contraction`."""
+    return ContractionFlow(*flatten(weights.layers), weights.kind.strain)
 
 
 def strains_of(of, kind):
@@ -203,3 +225,16 @@ def _contracted(c, of, F):
 def _pull(G, c, of, c_bar, F_bar):
     for k in prange(CHUNKS):
         pull(G, c, of, (c_bar, F_bar), chunk(k, len(G)))
+
+
+@kernel
+def returned(F, flow):
+    """F after the return; NaN unless det F > 0."""
+    U, s, V, _ = svd(F)
+    x = np.array(read(s, flow.strain))
+    y = outputs(x, flow.sizes, flow.W, flow.b)
+    return mmt(scale_columns(U, left(s, softplus(y[0]), softplus(y[1]))), V)
+
+
+registry.returned.method(ContractionFlow, returned)
+registry.intact.method(ContractionFlow, never_fails)

@@ -13,17 +13,21 @@ N is a network whose weights are all positive, with softplus between its layers:
 grows with each measure. The measures are convex functions of (F, cof F, J), so that psi is
 polyconvex; none of them is negative, hence neither is psi; and psi has no bound as J goes to 0,
 nor as strains grow. At rest mu = 2 unit (N_q + N_r) and lam = unit (4 N_r + 2 N_u + N_w) are
-positive, so that waves are real.
+positive, so that waves are real. `kirchhoff` and `psi` evaluate N and its slopes, backwards through
+its layers, in doubles:
+
+    a_{l+1} = softplus(a_l W_l + b_l),   N = a_{L-1} W_{L-1},   g_l = (g_{l+1} softplus'(z_l)) W_l^T
 
 That is more than thermodynamics asks for. Laws that are softer in strong compression than any
 polyconvex one, as fixed corotated (NCLAW-eq12), are out of its reach there.
 """
 
-from math import log
+from math import exp, inf, log
 from typing import NamedTuple
 
 import numpy as np
 
+from ...core import law as registry
 from ...core.jit import CHUNKS, chunk, kernel, parallel, prange
 from ...core.tensor import (
     cofactor,
@@ -38,6 +42,8 @@ from ...core.tensor import (
     trace,
     transpose,
 )
+from ..waves import moduli_at_rest, stiffness
+from .network import flatten, softplus
 
 MEASURES = 4
 LIKE = (0, 1, 2)        # any tuple of length 3
@@ -47,6 +53,31 @@ class Energetic(NamedTuple):
     """Kirchhoff stress that belongs to an energy."""
 
     unit: float = 1e4       # of N [Pa]
+
+
+class EnergyLaw(NamedTuple):
+    """F -> psi [J/m^3], tau [Pa]."""
+
+    sizes: np.ndarray   # widths of the layers, inputs first, outputs last; integer
+    W: np.ndarray       # weights >= 0, as of `network.NeuralLaw`
+    b: np.ndarray
+    unit: float         # of N [Pa]
+    rest: float         # N at rest
+    mu: float           # moduli at rest [Pa]
+    lam: float
+
+    @property
+    def dim(self):
+        """Number of space dimensions."""
+        return 3
+
+
+def build_law(weights):
+    """`EnergyLaw` of a `LawWeights` of kind `Energetic`."""
+    law = EnergyLaw(*flatten(weights.layers), weights.kind.unit, 0.0, 0.0, 0.0)
+    value, (q, r, u, w) = value_and_slopes((0.0, 0.0, 0.0, 0.0), law)
+    return law._replace(rest=value, mu=2.0 * law.unit * (q + r),
+                        lam=law.unit * (4.0 * r + 2.0 * u + w))
 
 
 def measures_of(F):
@@ -179,3 +210,82 @@ def _pull(G, g, F, g_bar, F_bar):
 def _pull_measures(m_bar, F, F_bar):
     for c in prange(CHUNKS):
         pull_measures(m_bar, F, F_bar, chunk(c, len(F)))
+
+
+@kernel
+def slope(z):
+    """Of softplus at z."""
+    return 1.0 / (1.0 + exp(-z))
+
+
+@kernel
+def value_and_slopes(m, law):
+    """N and its slopes at measures m."""
+    z, a = before_last(m, law)
+    sizes, w, k, value = law.sizes, len(law.W), len(z), 0.0
+    g = law.W[w - len(a):].copy()
+    for j in range(len(a)):
+        value += a[j] * g[j]
+    w -= len(a)
+    for l in range(len(sizes) - 3, -1, -1):
+        n, h = sizes[l], sizes[l + 1]
+        w, k = w - n * h, k - h
+        below = np.zeros(n)
+        for i in range(n):
+            for j in range(h):
+                below[i] += law.W[w + i * h + j] * slope(z[k + j]) * g[j]
+        g = below
+    return value, (g[0], g[1], g[2], g[3])
+
+
+@kernel
+def before_last(m, law):
+    """z of all layers but the last in a row, and what the last layer reads."""
+    sizes, z = law.sizes, law.b[:len(law.b) - 1].copy()
+    a, w, k = np.empty(MEASURES), 0, 0
+    for i in range(MEASURES):
+        a[i] = m[i]
+    for l in range(len(sizes) - 2):
+        n, h = sizes[l], sizes[l + 1]
+        above = np.empty(h)
+        for i in range(n):
+            for j in range(h):
+                z[k + j] += a[i] * law.W[w + i * h + j]
+        for j in range(h):
+            above[j] = softplus(z[k + j])
+        a, w, k = above, w + n * h, k + h
+    return z, a
+
+
+@kernel
+def psi(F, law):
+    """Energy per rest volume [J/m^3]; inf unless det F > 0."""
+    if not det(F) > 0.0:
+        return inf
+    value, _ = value_and_slopes(measures(F), law)
+    return law.unit * (value - law.rest)
+
+
+@kernel
+def kirchhoff(F, law):
+    """tau = (dpsi/dF) F^T [Pa]; NaN unless det F > 0."""
+    _, g = value_and_slopes(measures(F), law)
+    return mlin(law.unit, stress(g, F), 0.0, F)
+
+
+@kernel
+def wave(law):
+    """lam + 2 mu at rest [Pa]."""
+    return law.lam + 2.0 * law.mu
+
+
+@kernel
+def at_rest(law):
+    """lam + 2 mu and 3 lam + 2 mu [Pa]."""
+    return law.lam + 2.0 * law.mu, 3.0 * law.lam + 2.0 * law.mu
+
+
+registry.psi.method(EnergyLaw, psi)
+registry.kirchhoff.method(EnergyLaw, kirchhoff)
+stiffness.method(EnergyLaw, wave)
+moduli_at_rest.method(EnergyLaw, at_rest)

@@ -12,7 +12,7 @@ outputs: no sum is reordered, and the compiler may use vector registers all the 
 No energy belongs to such a stress. How stiff it is, is known at rest alone, from differences.
 """
 
-from math import erf, sqrt
+from math import erf, exp, log1p, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -44,7 +44,7 @@ class NeuralLaw(NamedTuple):
     @property
     def dim(self):
         """Number of space dimensions."""
-        return dim_of(self.sizes[0])
+        return dim_of_inputs(self.sizes[0])
 
 
 class NeuralStress(NeuralLaw):
@@ -70,7 +70,7 @@ class NeuralFlow(NamedTuple):
     @property
     def dim(self):
         """Number of space dimensions."""
-        return dim_of(self.sizes[0])
+        return dim_of_inputs(self.sizes[0])
 
 
 class NeuralCorrection(NeuralFlow):
@@ -81,13 +81,13 @@ class NeuralPlainCorrection(NeuralFlow):
     """As `response.PlainCorrection`."""
 
 
-STRESSES = {response.Stress: NeuralStress, response.SymmetricStress: NeuralSymmetricStress,
+LAW_CLASSES = {response.Stress: NeuralStress, response.SymmetricStress: NeuralSymmetricStress,
             response.PlainStress: NeuralPlainStress}
-CORRECTIONS = {response.Correction: NeuralCorrection,
+FLOW_CLASSES = {response.Correction: NeuralCorrection,
                response.PlainCorrection: NeuralPlainCorrection}
 
 
-def dim_of(inputs):
+def dim_of_inputs(inputs):
     """Number of space dimensions of a law that reads so many numbers."""
     return {inputs_of(d): d for d in (2, 3) for inputs_of in (count, squared)}[int(inputs)]
 
@@ -97,16 +97,16 @@ def squared(d):
     return d * d
 
 
-def elastic(trained):
-    """`NeuralLaw` of a `weights.Trained`. Raises ValueError for one that gives no stress."""
-    law = _made(STRESSES, trained, 0.0, 0.0)
+def build_law(trained):
+    """`NeuralLaw` of a `LawWeights`. Raises ValueError for one that gives no stress."""
+    law = _made(LAW_CLASSES, trained, 0.0, 0.0)
     wave, largest = moduli_of(law)
     return law._replace(wave=wave, largest=largest)
 
 
-def plastic(trained):
-    """`NeuralFlow` of a `weights.Trained`. Raises ValueError for one that gives no F."""
-    return _made(CORRECTIONS, trained)
+def build_flow(trained):
+    """`NeuralFlow` of a `LawWeights`. Raises ValueError for one that gives no F."""
+    return _made(FLOW_CLASSES, trained)
 
 
 def _made(classes, trained, *more):
@@ -115,10 +115,10 @@ def _made(classes, trained, *more):
     except KeyError:
         raise ValueError(f"answers of kind {type(trained.kind).__name__}: expected "
                          f"{' or '.join(known.__name__ for known in classes)}") from None
-    return kind(*network(trained.layers), *trained.kind, *more)
+    return kind(*flatten(trained.layers), *trained.kind, *more)
 
 
-def network(layers):
+def flatten(layers):
     """sizes, W, b of layers [(W (in, out), b (out,))]."""
     sizes = [len(layers[0][0]), *(len(b) for _, b in layers)]
     W, b = (np.concatenate([np.ravel(a) for a in arrays]).astype(float)
@@ -152,6 +152,12 @@ def gelu(z):
 
 
 @kernel
+def softplus(z):
+    """log(1 + exp z)."""
+    return max(z, 0.0) + log1p(exp(-abs(z)))
+
+
+@kernel
 def outputs(a, sizes, W, b):
     """What a network makes of inputs a."""
     w, k, last = 0, 0, len(sizes) - 1
@@ -170,7 +176,7 @@ def outputs(a, sizes, W, b):
 
 
 @kernel
-def unturned(F, sizes, W, b):
+def network_answer(F, sizes, W, b):
     """The network's Y at F, and R; NaN where F is not finite."""
     d = len(F)
     U, s, V, _ = svd(F)
@@ -186,7 +192,7 @@ def unturned(F, sizes, W, b):
 @kernel
 def respond(F, law):
     """The answer of a law or a flow at F."""
-    Y, R = unturned(F, law.sizes, law.W, law.b)
+    Y, R = network_answer(F, law.sizes, law.W, law.b)
     return answer(Y, F, R, law)
 
 
@@ -208,12 +214,12 @@ def at_rest(law):
     return law.wave, law.largest
 
 
-for _kind, _class in STRESSES.items():
+for _kind, _class in LAW_CLASSES.items():
     answer.method(_class, answer.methods[_kind])
     names.kirchhoff.method(_class, kirchhoff)
     stiffness.method(_class, wave)
     moduli_at_rest.method(_class, at_rest)
-for _kind, _class in CORRECTIONS.items():
+for _kind, _class in FLOW_CLASSES.items():
     answer.method(_class, answer.methods[_kind])
     names.returned.method(_class, respond)
     names.intact.method(_class, never_fails)

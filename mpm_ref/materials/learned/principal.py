@@ -25,13 +25,12 @@ b_ij is 0 where s_i + s_j = 0 to round-off, where R is not determined. Of a_ij t
   s_j^2, and with it b_ij, which needs no bound. Gradients over tens of steps explode all the same.
 """
 
-from typing import NamedTuple
 
 import numpy as np
 
 from ...core.adjoint.deform import back, within
-from ...core.jit import CHUNKS, chunk, kernel, parallel, prange
-from ...core.spectral import UNDETERMINED, mixed
+from ...core.jit import CHUNKS, by_type, chunk, kernel, parallel, prange
+from ...core.spectral import UNDETERMINED, mixed, svd
 from ...core.tensor import (
     diag,
     diagonal,
@@ -48,20 +47,6 @@ from ...core.tensor import (
 
 LEAST_GAP = 5e-7        # of s_i - s_j, in the ratios of laws that are not isotropic
 PAIRS = {2: ((0, 1),), 3: ((0, 1), (0, 2), (1, 2))}     # of axes, as `spectral.mixed` orders them
-
-
-class StretchStress(NamedTuple):
-    """Kirchhoff stress of a network d -> d of s - 1 with ELU between layers, made isotropic: y is
-    the mean over all orders in which s can be read.
-    """
-
-    unit: float = 1.0       # of y [Pa]
-
-
-class ReleasedStretchStress(NamedTuple):
-    """The same of the descending s alone, as the authors' release reads it."""
-
-    unit: float = 1.0       # of y [Pa]
 
 
 def stresses(y, of):
@@ -117,6 +102,16 @@ def skew(y, s, i, j):
 def stress_of(U, s, y):
     """U diag(y s) U^T."""
     return back(U, diag(mul(y, s)), U)
+
+
+stretch_response = by_type("stretch_response")      # (s, law) -> y [Pa]
+
+
+@kernel
+def kirchhoff(F, law):
+    """Return tau [Pa]."""
+    U, s, _, _ = svd(F)
+    return stress_of(U, s, stretch_response(s, law))
 
 
 @kernel

@@ -53,6 +53,10 @@ class PlainCorrection(NamedTuple):
     alpha: float = ALPHA
 
 
+STRESSES = Stress, SymmetricStress, PlainStress
+CORRECTIONS = Correction, PlainCorrection
+
+
 class Bars(NamedTuple):
     """Gradients of what an answer is made of; (n, d, d) each."""
 

@@ -22,10 +22,29 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...core import law as registry
+from ...core.jit import kernel
+from .principal import kirchhoff, stretch_response
+
 SIDE = 10               # intervals on each side of 1
 LARGEST = 10.0          # knot
 BERNSTEIN = np.array([[-1.0, 3.0, -3.0, 1.0], [3.0, -6.0, 3.0, 0.0], [-3.0, 3.0, 0.0, 0.0],
                       [1.0, 0.0, 0.0, 0.0]])    # powers 3 .. 0 of Bezier points
+
+
+class SplineStress(NamedTuple):
+    """Kirchhoff stress of `fair` splines; values at knots are (21, 3), of f, g, h.
+
+    In kPa, a rate of 1 moves a value as far as the stiffness of the paper's materials asks for.
+    """
+
+    unit: float = 1e3       # of the values [Pa]
+
+
+class ReleasedSplineStress(NamedTuple):
+    """The same of `released` splines, in Pa: a rate of 1 moves them by 150 of 1e4 at most."""
+
+    unit: float = 1.0       # of the values [Pa]
 
 
 class Pieces(NamedTuple):
@@ -37,6 +56,14 @@ class Pieces(NamedTuple):
     breaks: np.ndarray      # (p - 1,)
     origins: np.ndarray     # (p,)
     basis: np.ndarray       # (p, 4, knots)
+
+
+class SplineLaw(NamedTuple):
+    """f, g, h as pieces (see `Pieces`); 3D."""
+
+    breaks: np.ndarray      # (p - 1,)
+    origins: np.ndarray     # (p,)
+    tables: np.ndarray      # (3, p, 4) coefficients of powers 3 .. 0 [Pa]
 
 
 def knots():
@@ -82,19 +109,35 @@ def in_powers(matrix, points, width):
     return matrix @ points / width[:, None, None] ** np.arange(3, -1, -1)[:, None]
 
 
-class SplineStress(NamedTuple):
-    """Kirchhoff stress of `fair` splines; values at knots are (21, 3), of f, g, h.
-
-    In kPa, a rate of 1 moves a value as far as the stiffness of the paper's materials asks for.
-    """
-
-    unit: float = 1e3       # of the values [Pa]
-
-
-class ReleasedSplineStress(NamedTuple):
-    """The same of `released` splines, in Pa: a rate of 1 moves them by 150 of 1e4 at most."""
-
-    unit: float = 1.0       # of the values [Pa]
-
-
 READINGS = {SplineStress: fair, ReleasedSplineStress: released}
+
+
+def build_law(weights):
+    """Return the `SplineLaw` of `LawWeights`, whose one layer has the values at the knots."""
+    kind, values = weights.kind, weights.layers[0][0]
+    pieces = READINGS[type(kind)](knots())
+    tables = np.einsum("pmk,kf->fpm", pieces.basis, kind.unit * values)
+    return SplineLaw(pieces.breaks.copy(), pieces.origins.copy(), np.ascontiguousarray(tables))
+
+
+@kernel
+def splined(s, law):
+    """y_i = f(s_i) + sum_j g(s_i s_j) s_j + h(J) J/s_i."""
+    g01, g02 = value(law, 1, s[0] * s[1]), value(law, 1, s[0] * s[2])
+    g12 = value(law, 1, s[1] * s[2])
+    h = value(law, 2, s[0] * s[1] * s[2])
+    return (value(law, 0, s[0]) + g01 * s[1] + g02 * s[2] + h * s[1] * s[2],
+            value(law, 0, s[1]) + g01 * s[0] + g12 * s[2] + h * s[0] * s[2],
+            value(law, 0, s[2]) + g02 * s[0] + g12 * s[1] + h * s[0] * s[1])
+
+
+@kernel
+def value(law, k, x):
+    """f, g or h, of k = 0, 1, 2, at x."""
+    p = np.searchsorted(law.breaks, x)
+    c, t = law.tables[k, p], x - law.origins[p]
+    return ((c[0] * t + c[1]) * t + c[2]) * t + c[3]
+
+
+stretch_response.method(SplineLaw, splined)
+registry.kirchhoff.method(SplineLaw, kirchhoff)

@@ -1,7 +1,11 @@
-"""The strains that a law has seen in training, as bounds: of each stretch, in descending order, and
-of J = det F.
+"""The strains that a law met in training, as bounds: of each stretch s_0 >= s_1 >= .. and of J.
 
-Bounds say where there was nothing to learn from; within them there may be gaps.
+Bounds say where there was nothing to learn from; within them there may be gaps. A point is out of
+them by
+
+    excess_p = max over a of  max(low_a - a_p, a_p - high_a, 0) / (high_a - low_a)
+
+with a over the stretches and J = det F: the distance to the bounds in units of their width.
 """
 
 import numpy as np
@@ -9,22 +13,58 @@ import numpy as np
 from .invariants import spectrum
 
 ROUND_OFF = 1e-9        # of stretches and J, which count as within bounds
+MIN_WIDTH = 1e-9        # of bounds that have no width, of laws that met rest alone
 
 
-def seen(F):
-    """Bounds as plain values, of deformation gradients F (.., d, d)."""
-    found = measures(F.reshape(-1, *F.shape[-2:]))
-    return {"low": found.min(axis=0).tolist(), "high": found.max(axis=0).tolist()}
-
-
-def within(F, bounds):
-    """Which (n,) of F (n, d, d) lie within bounds; none that are not finite."""
-    found, slack = measures(F), ROUND_OFF
-    low, high = (np.array(bounds[end]) for end in ("low", "high"))
-    return np.all((found >= low - slack) & (found <= high + slack), axis=1)
-
-
-def measures(F):
-    """Stretches in descending order, then J, (n, d + 1), of F (n, d, d)."""
+def strain_measures(F):
+    """Return the stretches in descending order, then J, (n, d + 1), of F (n, d, d)."""
     s = spectrum(np.ascontiguousarray(F)).s
     return np.column_stack([s, s.prod(axis=1)])
+
+
+def strain_bounds(F):
+    """Return the bounds of deformation gradients F (.., d, d), {"low", "high"} of plain values."""
+    measures = strain_measures(F.reshape(-1, *F.shape[-2:]))
+    return {"low": measures.min(axis=0).tolist(), "high": measures.max(axis=0).tolist()}
+
+
+def within_bounds(F, bounds):
+    """Return which (n,) of F (n, d, d) lie within bounds; none that are not finite."""
+    measures, slack = strain_measures(F), ROUND_OFF
+    low, high = (np.array(bounds[end]) for end in ("low", "high"))
+    return np.all((measures >= low - slack) & (measures <= high + slack), axis=1)
+
+
+def excess(measures, bounds):
+    """Return how far (n,) points of strain measures (n, d + 1) are out of bounds.
+
+    It is infinite for J <= 0 below the bounds, and where F is not finite.
+    """
+    low, high = (np.array(bounds[end]) for end in ("low", "high"))
+    with np.errstate(invalid="ignore", over="ignore"):
+        out = np.maximum(low - measures, measures - high) / np.maximum(high - low, MIN_WIDTH)
+        worst = np.maximum(out.max(axis=1), 0.0)
+        inverted = (measures[:, -1] <= 0.0) & (measures[:, -1] < low[-1])
+    return np.where(inverted | ~np.isfinite(measures).all(axis=1), np.inf, worst)
+
+
+def stored_bounds(about, d):
+    """Return the bounds that the record of a training holds, and its `dt` [s] or None; or None.
+
+    Raises ValueError for bounds that are none in d dimensions.
+    """
+    if "seen" not in about:
+        return None
+    given = about["seen"]
+    try:
+        low, high = (np.array(given[end], dtype=float) for end in ("low", "high"))
+    except (TypeError, KeyError, ValueError):
+        low = high = np.zeros(0)
+    if low.shape != (d + 1,) or high.shape != (d + 1,) or not (low <= high).all():
+        raise ValueError(f"strains seen in training: {given}; expected low and high, for {d} "
+                         "stretches and J; train again")
+    dt = about.get("dt")
+    if dt is not None and not (isinstance(dt, int | float) and 0.0 < dt < np.inf):
+        raise ValueError(f"time step of training: {dt}; expected a number above 0, in s; train "
+                         "again")
+    return {"low": low.tolist(), "high": high.tolist(), "dt": dt}

@@ -1,23 +1,80 @@
-"""The law and the flow of a body, of any laws that were trained and stored."""
+"""The learned laws and flows, by the kind that is stored beside their weights.
 
-from . import admissible, network, principal_laws
-from .weights import BESIDE
+A file of weights may also hold constants that were identified: records of `materials`, which have
+no layers and are the law themselves.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from .. import (
+    DruckerPrager,
+    FixedCorotated,
+    Fluid,
+    FluidProjection,
+    Hencky,
+    NoFlow,
+    VonMises,
+)
+from . import contraction, energetic, network, response, spline, stretch_network
+from .contraction import ANSWERED, READ, Contraction
+from .energetic import MEASURES, Energetic
+from .invariants import count
 
 
-def learned_law(trained):
-    """The law of a `weights.Trained` of stress: neural, of an energy, in principal stretches, or an
-    identified one. Raises ValueError for what gives no stress.
-    """
-    if type(trained.kind) not in BESIDE["elastic"]:
-        return network.elastic(trained)
-    made = admissible.MADE.get(type(trained.kind), principal_laws.elastic)
-    return made(trained) if trained.layers else trained.kind
+class LearnedEntry(NamedTuple):
+    """How the weights of a kind become a law or a flow."""
+
+    build: Callable         # `LawWeights` -> the record that kernels are compiled for
+    ends: frozenset         # {(inputs, outputs)} that the layers may have; empty: no layers
+    in_scenes: bool = True  # whether it has a `stiffness`, which a run of a scene needs
 
 
-def learned_flow(trained):
-    """The flow of a `weights.Trained` that gives F: neural, a contraction, identified, or none.
-    Raises ValueError for what gives no F.
-    """
-    if type(trained.kind) not in BESIDE["plastic"]:
-        return network.plastic(trained)
-    return admissible.MADE[type(trained.kind)](trained) if trained.layers else trained.kind
+ROTATED = frozenset((count(d), d * d) for d in (2, 3))
+PLAIN = ROTATED | frozenset((d * d, d * d) for d in (2, 3))
+STRETCHES = LearnedEntry(stretch_network.build_law, frozenset({(2, 2), (3, 3)}), in_scenes=False)
+KNOTS = LearnedEntry(spline.build_law, frozenset({(len(spline.knots()), 3)}), in_scenes=False)
+IDENTIFIED = LearnedEntry(lambda weights: weights.kind, frozenset(), in_scenes=False)
+
+ELASTIC = {         # kind -> entry
+    response.Stress: LearnedEntry(network.build_law, ROTATED),
+    response.SymmetricStress: LearnedEntry(network.build_law, ROTATED),
+    response.PlainStress: LearnedEntry(network.build_law, PLAIN),
+    stretch_network.StretchStress: STRETCHES,
+    stretch_network.ReleasedStretchStress: STRETCHES,
+    spline.SplineStress: KNOTS,
+    spline.ReleasedSplineStress: KNOTS,
+    Energetic: LearnedEntry(energetic.build_law, frozenset({(MEASURES, 1)})),
+    **dict.fromkeys((FixedCorotated, Hencky, Fluid), IDENTIFIED),
+}
+PLASTIC = {
+    response.Correction: LearnedEntry(network.build_flow, ROTATED),
+    response.PlainCorrection: LearnedEntry(network.build_flow, PLAIN),
+    Contraction: LearnedEntry(contraction.build_flow, frozenset({(READ, ANSWERED)})),
+    **dict.fromkeys((NoFlow, DruckerPrager, VonMises, FluidProjection), IDENTIFIED),
+}
+TABLES = {"elastic": ELASTIC, "plastic": PLASTIC}
+KINDS = {kind.__name__: kind for table in TABLES.values() for kind in table}
+
+
+def learned_law(weights):
+    """Return the elastic law of `LawWeights`. Raises ValueError for a kind that gives no stress."""
+    return _entry(ELASTIC, weights.kind).build(weights)
+
+
+def learned_flow(weights):
+    """Return the flow of `LawWeights`. Raises ValueError for a kind that gives no F."""
+    return _entry(PLASTIC, weights.kind).build(weights)
+
+
+def is_identified(part, kind):
+    """Return whether the laws of a kind, a class, have constants in place of layers."""
+    return kind in TABLES[part] and not TABLES[part][kind].ends
+
+
+def _entry(table, kind):
+    try:
+        return table[type(kind)]
+    except KeyError:
+        raise ValueError(f"a law of kind {type(kind).__name__}: expected "
+                         f"{' or '.join(one.__name__ for one in table)}") from None

@@ -1,10 +1,10 @@
-"""Trained laws as a file (see `archive`): an elastic and a plastic law, layers and kinds.
+"""Learned laws as a file (see `archive`): an elastic law and a flow, layers and kind of each.
 
 A kind is a record of numbers, and its type says what layers (W (in, out), b (out,)) are for:
 
     answers of `response`       GELU between them; of the invariants, without R also of F - I
-    a stress of `principal`     ELU between them; from s - 1 to y, d numbers each
-    a stress of `spline`        one, the values of f, g, h at knots, b = 0
+    `stretch_network`           ELU between them; from s - 1 to y, d numbers each
+    `spline`                    one, the values of f, g, h at knots, b = 0
     `Energetic`                 softplus between them, no W negative; from four measures to N
     `Contraction`               GELU between them; from three strains to a and b before softplus
     of `materials`              none, the record is the law: identified ones, and no return map
@@ -15,66 +15,57 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ... import materials
-from ...archive import read, stated, write
-from . import principal, response, spline
-from .contraction import ANSWERED, READ, Contraction
-from .energetic import MEASURES, Energetic
-from .invariants import count
+from ...store.weights_file import read, stated, write
+from .energetic import Energetic
+from .network import dim_of_inputs
+from .response import CORRECTIONS, STRESSES
+from .table import KINDS, TABLES
 
 FORMAT = 1
-PARTS = ("elastic", "plastic")
-KINDS = {kind.__name__: kind for kind in (response.Stress, response.SymmetricStress,
-                                          response.PlainStress, response.Correction,
-                                          response.PlainCorrection)}
-ANSWERS = {"elastic": ("Stress", "SymmetricStress", "PlainStress"),
-           "plastic": ("Correction", "PlainCorrection")}
-TURNED = {(count(d), d * d) for d in (2, 3)}        # numbers into the first layer, out of the last
-PLAIN = TURNED | {(d * d, d * d) for d in (2, 3)}
-STRETCHES, KNOTS, NO_LAYERS = {(2, 2), (3, 3)}, {(len(spline.knots()), 3)}, set()
-BESIDE = {      # of methods that ours are compared with
-    "elastic": {principal.StretchStress: STRETCHES, principal.ReleasedStretchStress: STRETCHES,
-                spline.SplineStress: KNOTS, spline.ReleasedSplineStress: KNOTS,
-                Energetic: {(MEASURES, 1)},
-                materials.FixedCorotated: NO_LAYERS, materials.Hencky: NO_LAYERS,
-                materials.Fluid: NO_LAYERS},
-    "plastic": {Contraction: {(READ, ANSWERED)},
-                **{kind: NO_LAYERS for kind in (materials.NoFlow, materials.DruckerPrager,
-                                                materials.VonMises, materials.FluidProjection)}}}
-RECORDS = KINDS | {kind.__name__: kind for part in PARTS for kind in BESIDE[part]}
-ENDS = {name: PLAIN if name.startswith("Plain") else TURNED for name in KINDS}
-ENDS |= {kind.__name__: ends for part in PARTS for kind, ends in BESIDE[part].items()}
+PARTS = tuple(TABLES)       # of a file: "elastic", "plastic"
 
 
-class Trained(NamedTuple):
-    """A law: layers ((W (in, out), b (out,)), ..), which may be none, and its kind."""
-
-    layers: tuple
-    kind: tuple             # a NamedTuple of RECORDS
+RESPONSES = {kind.__name__ for kind in (*STRESSES, *CORRECTIONS)}
 
 
-class Laws(NamedTuple):
-    """Two trained laws, and what is known of their training."""
+class LawWeights(NamedTuple):
+    """What was learned of a law: its layers, which may be none, and its kind."""
 
-    elastic: Trained        # F -> tau [Pa]
-    plastic: Trained        # trial F -> F
+    layers: tuple           # ((W (in, out), b (out,)), ..)
+    kind: tuple             # a NamedTuple of KINDS
+
+
+class LearnedLaws(NamedTuple):
+    """The weights of an elastic law and of a flow, and a record of their training."""
+
+    elastic: LawWeights     # F -> tau [Pa]
+    plastic: LawWeights     # trial F -> F
     about: dict             # plain values
 
 
 def save(path, laws):
-    """Write `Laws`, whole or not at all. Raises ValueError for numbers that are not finite, sizes
-    that do not fit and an `about` with more than JSON knows, OSError where the system refuses.
+    """Write `LearnedLaws`, whole or not at all.
+
+    Raises ValueError for numbers that are not finite, sizes that do not fit and an `about` with
+    more than JSON knows, OSError where the system refuses.
     """
     arrays = stated(path, FORMAT, laws.about)
     for part in PARTS:
-        arrays |= arrays_of(part, getattr(laws, part))
+        arrays |= law_arrays(part, getattr(laws, part))
     write(path, arrays, fault_of)
 
 
 def load(path):
     """Read what `save` wrote. Raises ValueError saying what is wrong with the file."""
     arrays, about = read(path, FORMAT, fault_of, "trained laws")
-    return Laws(*(trained_of(part, arrays) for part in PARTS), about)
+    return LearnedLaws(*(law_from_arrays(part, arrays) for part in PARTS), about)
+
+
+def dim_of(laws):
+    """Return the number of space dimensions of `LearnedLaws`; 3 of those that are for any."""
+    dims = [dim_of_inputs(len(law.layers[0][0])) for law in laws[:2]
+            if type(law.kind).__name__ in RESPONSES]
+    return dims[0] if dims else 3
 
 
 def mixed(about):
@@ -84,7 +75,7 @@ def mixed(about):
     return bool(about.get("recipe", {}).get("velocity")) and "errors_of" not in about
 
 
-def arrays_of(part, law):
+def law_arrays(part, law):
     """The arrays of a law by name."""
     found = {f"{part}_kind": np.array(type(law.kind).__name__),
              f"{part}_constants": np.array(law.kind, dtype=float)}
@@ -93,12 +84,12 @@ def arrays_of(part, law):
     return found
 
 
-def trained_of(part, arrays):
-    """`Trained` from the arrays of a file."""
-    kind = RECORDS[str(arrays[f"{part}_kind"])]
+def law_from_arrays(part, arrays):
+    """`LawWeights` from the arrays of a file."""
+    kind = KINDS[str(arrays[f"{part}_kind"])]
     layers = tuple((arrays[f"{part}_W{k}"], arrays[f"{part}_b{k}"])
                    for k in range(depth(part, arrays)))
-    return Trained(layers, kind(*arrays[f"{part}_constants"].tolist()))
+    return LawWeights(layers, kind(*arrays[f"{part}_constants"].tolist()))
 
 
 def depth(part, arrays):
@@ -113,7 +104,7 @@ def fault_of(arrays):
         if fault:
             return fault
     read = [arrays[f"{part}_W0"].shape[0] for part in PARTS
-            if str(arrays[f"{part}_kind"]) in ANSWERS[part]]
+            if str(arrays[f"{part}_kind"]) in RESPONSES]
     if len(set(read)) > 1:
         return f"laws that read {read[0]} and {read[1]} numbers, expected as many"
     return None
@@ -122,23 +113,23 @@ def fault_of(arrays):
 def fault_of_law(part, arrays):
     """What is wrong with a law, or None."""
     kind = str(arrays.get(f"{part}_kind"))
-    known = *ANSWERS[part], *(record.__name__ for record in BESIDE[part])
-    if kind not in known:
-        return f"{part} law of kind {kind}, expected {' or '.join(known)}"
+    ends = {one.__name__: entry.ends for one, entry in TABLES[part].items()}
+    if kind not in ends:
+        return f"{part} law of kind {kind}, expected {' or '.join(ends)}"
     layers = depth(part, arrays)
     names = [f"{part}_{what}{k}" for k in range(layers) for what in "Wb"]
     missing = [name for name in (*names, f"{part}_constants") if name not in arrays]
-    if missing or (ENDS[kind] and not layers):
+    if missing or (ends[kind] and not layers):
         return f"{part} law without {', '.join(missing) or 'layers'}"
     for name in (*names, f"{part}_constants"):
         if arrays[name].dtype != float or not np.isfinite(arrays[name]).all():
             return f"{name} has entries that are not finite numbers"
-    if arrays[f"{part}_constants"].shape != (len(RECORDS[kind]._fields),):
+    if arrays[f"{part}_constants"].shape != (len(KINDS[kind]._fields),):
         return f"{part} law with constants {arrays[f'{part}_constants']}"
     if kind == Energetic.__name__ and any((arrays[f"{part}_W{k}"] < 0.0).any()
                                           for k in range(layers)):
         return f"{part} law of an energy with negative weights"
-    return fault_of_sizes(part, arrays, ENDS[kind])
+    return fault_of_sizes(part, arrays, ends[kind])
 
 
 def fault_of_sizes(part, arrays, ends):

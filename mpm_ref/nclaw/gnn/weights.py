@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...archive import read, stated, write
+from ...store.weights_file import read, stated, write
 from .history import HISTORY, Reading, Scales
 from .network import Network, Perceptron
 from .simulator import Simulator

@@ -13,11 +13,11 @@ import msgspec
 import numpy as np
 
 from ...body import keep_inside
-from ...cases import in_order
 from ...core.grid import OutOfRange
-from ...reduced.generate import one_thread
+from ...rom.study.generate import one_thread
 from ...scene import SceneError, build
 from ...simulate import SORT, last_step
+from ...trajectories import in_order
 from ..bodies import own
 
 FEW = 5000      # particles, up to which a second thread would wait more than it works

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...materials import NoFlow
-from ...materials.learned.strain_range import within
+from ...materials.learned.strain_range import within_bounds
 from ..paths import Path, course, cycles, looked_at, monotone
 
 
@@ -47,7 +47,7 @@ def curves(truth, learned, paths, dt, bounds=None):
     found = []
     for path in paths:
         true, own = (course(*of, path, dt) for of in (truth, learned))
-        inside = None if bounds is None else within(own.F, bounds)
+        inside = None if bounds is None else within_bounds(own.F, bounds)
         found.append(Curve(path, dt, looked_at(path, true), looked_at(path, own), inside))
     return found
 

@@ -6,11 +6,12 @@
 from pathlib import Path
 from typing import NamedTuple
 
-from ...materials.learned.weights import BESIDE, PARTS
-from ...reduced.study import base_of
-from ...reduced.study_file import plain
+from ...materials.learned.table import is_identified
+from ...materials.learned.weights import PARTS
+from ...rom.study.study import base_of
+from ...rom.study.study_file import plain
 from ...scene import Scene, SceneError, build
-from ...scene.error import opened_by
+from ...scene.messages import opened_by
 from ..batched_step import world
 from .tables import SYS_ID, Tables, checked
 
@@ -67,6 +68,5 @@ def require_learnable(study):
 
 def identifiable(material, body):
     """Whether "sys-id" knows which constants of a body's laws to learn."""
-    known = all(type(law) in BESIDE[part] for part, law in zip(PARTS, (body.law, body.flow),
-                                                               strict=True))
-    return known and material.E is not None
+    laws = zip(PARTS, (body.law, body.flow), strict=True)
+    return all(is_identified(part, type(law)) for part, law in laws) and material.E is not None

@@ -8,17 +8,17 @@ from dataclasses import fields
 import msgspec
 from msgspec import Struct, field
 
-from ...materials.learned.weights import PARTS, RECORDS
-from ...reduced.study_file import require_keys
-from ...reduced.tables import one_of
+from ...materials.learned.table import KINDS
+from ...materials.learned.weights import PARTS
+from ...rom.study.study_file import require_keys
+from ...rom.study.tables import one_of
 from ...scene import SceneError
-from ...scene.check import check_finite
-from ...scene.error import at
-from ...scene.words import rephrase
+from ...scene.messages import at, rephrase
+from ...scene.validate import check_finite
 from ..train.recipe import Recipe
 
 SYS_ID = "sys-id"
-KINDS = {       # method -> kinds of answers of its elastic and plastic law, the usual one first
+METHOD_KINDS = {        # method -> kinds of its elastic law and of its flow, the usual one first
     "ours": (("Stress", "SymmetricStress"), ("Correction",)),
     "labeled": (("Stress", "SymmetricStress"), ("Correction",)),
     "spline": (("SplineStress", "ReleasedSplineStress"), ("NoFlow",)),
@@ -64,7 +64,7 @@ class Tables(Table):
     checkpoint: str | None = None   # likewise
 
     def __post_init__(self):
-        one_of("method", self.method, KINDS)
+        one_of("method", self.method, METHOD_KINDS)
         with at("laws"):
             records_of(self.method, self.laws)
 
@@ -83,8 +83,8 @@ def records_of(method, answers):
         raise ValueError(f'elastic, plastic: method = "{SYS_ID}" learns the constants of the '
                          "scene's own laws; leave them out")
     names = [picked(part, name, known) for part, name, known in
-             zip(PARTS, given, KINDS[method], strict=False)]
-    return with_constants([RECORDS[name]() for name in names], unit=answers.unit,
+             zip(PARTS, given, METHOD_KINDS[method], strict=False)]
+    return with_constants([KINDS[name]() for name in names], unit=answers.unit,
                           alpha=answers.alpha, strain=answers.strain)
 
 

@@ -3,9 +3,9 @@
 from dataclasses import asdict
 
 from ... import scene
-from ...learning import part
-from ...materials.learned.strain_range import seen
+from ...materials.learned.strain_range import strain_bounds
 from ...store.manifest import source_hash, versions
+from ...training import part
 
 
 def drive():
@@ -15,7 +15,7 @@ def drive():
 
 
 def trained(study, observed, checkpoint=None, on_epoch=None, **about):
-    """`learned.weights.Laws` of a study from its run, `cases.Observed`.
+    """`LearnedLaws` of a study from its run, `Observed`.
 
     checkpoint and on_epoch: as for `nclaw.train.fit.train`; about: what else is to be known, with
     the `threads` of PyTorch. Raises ValueError without PyTorch and for a checkpoint of another
@@ -27,7 +27,7 @@ def trained(study, observed, checkpoint=None, on_epoch=None, **about):
     done = how.taught(study.tables.method, recipe, laws, (problem, observed), checkpoint, on_epoch)
     took = {f"{clock}_seconds": round(s, 1) for clock, s in done.meter.total._asdict().items()}
     return how.stored(laws, {
-        **about, **identity(study), **took, **done.known, "seen": seen(observed.F),
+        **about, **identity(study), **took, **done.known, "seen": strain_bounds(observed.F),
         "torch": how.version()})
 
 

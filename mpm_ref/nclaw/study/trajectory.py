@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ...cases import Observed
-from ...store import BadResults, Fields, require_run
-from ...store.results import Results
+from ...store.results import BadResults, Results
 from ...store.running import Options, run
+from ...store.writer import Fields, require_run
+from ...trajectories import Observed
 
 FIELDS = ("x", "v", "C", "F")
 J_ALONE = "J"
@@ -33,7 +33,7 @@ def make(path, problem, watch=None):
 
 
 def read(path, problem):
-    """`cases.Observed` of a results file that is `whole`. Raises BadResults for one that lacks a
+    """`Observed` of a results file that is `whole`. Raises BadResults for one that lacks a
     field, or whose numbers are not all finite.
     """
     body, d = problem.bodies[0].name, problem.dim

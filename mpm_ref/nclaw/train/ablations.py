@@ -10,7 +10,7 @@
 import torch
 
 from ...materials.learned.invariants import count
-from ...materials.learned.weights import Trained
+from ...materials.learned.weights import LawWeights
 from .autograd import Answer, Invariants
 from .kinds import LawOfKind
 from .perceptron import HIDDEN, Perceptron, layers_of
@@ -29,8 +29,8 @@ class PlainLaw(LawOfKind):
         return Answer.apply(self.net(a), F, F, self.kind)
 
     def trained(self):
-        """`Trained` of the law."""
-        return Trained(tuple(layers_of(self.net)), self.kind)
+        """`LawWeights` of the law."""
+        return LawWeights(tuple(layers_of(self.net)), self.kind)
 
 
 class UnshiftedLaw(LawOfKind):
@@ -48,6 +48,6 @@ class UnshiftedLaw(LawOfKind):
         return Answer.apply(self.net(a + self.rest), F, R, self.kind)
 
     def trained(self):
-        """`Trained` of the law, in numbers that vanish at rest."""
+        """`LawWeights` of the law, in numbers that vanish at rest."""
         (W, b), *others = layers_of(self.net)
-        return Trained(((W, b + self.rest.double().numpy() @ W), *others), self.kind)
+        return LawWeights(((W, b + self.rest.double().numpy() @ W), *others), self.kind)

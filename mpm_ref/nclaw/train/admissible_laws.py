@@ -15,7 +15,7 @@ from torch.autograd import Function
 
 from ...materials.learned import contraction, energetic
 from ...materials.learned.invariants import spectrum
-from ...materials.learned.weights import Trained
+from ...materials.learned.weights import LawWeights
 from .kinds import LawOfKind
 from .perceptron import Perceptron, layers_of
 
@@ -136,8 +136,8 @@ class EnergeticLaw(LawOfKind):
         return self.kind.unit * EnergyStress.apply(self.net(Measures.apply(F)), F)
 
     def trained(self):
-        """`Trained` of the law."""
-        return Trained(self.net.layers(), self.kind)
+        """`LawWeights` of the law."""
+        return LawWeights(self.net.layers(), self.kind)
 
 
 class ContractionLaw(LawOfKind):
@@ -156,5 +156,5 @@ class ContractionLaw(LawOfKind):
         return Contracted.apply(c, F, of)
 
     def trained(self):
-        """`Trained` of the law."""
-        return Trained(tuple(layers_of(self.net)), self.kind)
+        """`LawWeights` of the law."""
+        return LawWeights(tuple(layers_of(self.net)), self.kind)

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import torch
 
-from ... import checkpoints
-from ...cost import Cost, Meter
+from ...store import weights_file
+from ...training import Cost, Meter, train_epochs
 from .kinds import described
 from .rollout import squared
 
@@ -122,7 +122,7 @@ class Session:
                     "cost": tuple(self.meter.total),
                     **{name: [one.state_dict() for one in having] for name, having in
                        self.stateful().items()}}, content)
-        checkpoints.write(path, content.getvalue())
+        weights_file.write_sealed(path, content.getvalue())
 
     def stateful(self):
         """What a checkpoint keeps the states of."""
@@ -132,8 +132,8 @@ class Session:
         """Go on from a checkpoint. Raises ValueError where it is damaged, or of another training,
         other laws or other data.
         """
-        kept = torch.load(io.BytesIO(checkpoints.read(path)), weights_only=True)
-        checkpoints.require_same(path, kept["training"], self.named)
+        kept = torch.load(io.BytesIO(weights_file.read_sealed(path)), weights_only=True)
+        weights_file.require_same_training(path, kept["training"], self.named)
         for name, having in self.stateful().items():
             for one, state in zip(having, kept[name], strict=True):
                 one.load_state_dict(state)
@@ -158,4 +158,4 @@ def train(recipe, laws, world, observed, checkpoint=None, on_epoch=None):
     Raises `Diverged`, with the epoch and the steps.
     """
     session = Session(recipe, laws, world, observed)
-    return checkpoints.finished(session, recipe.epochs, SAVE, checkpoint, on_epoch)
+    return train_epochs(session, recipe.epochs, SAVE, checkpoint, on_epoch)

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
-from ...checkpoints import finished
 from ...core import deform
 from ...materials import NoFlow
+from ...training import train_epochs
 from .fit import SAVE, Diverged, Epoch, Session
 from .sysid import axes, particles
 
@@ -78,4 +78,4 @@ def train_labeled(recipe, laws, world, labels, checkpoint=None, on_epoch=None):
     [Pa^2], `error` that of F.
     """
     session = LabeledSession(recipe, laws, world, labels)
-    return finished(session, recipe.epochs, SAVE, checkpoint, on_epoch)
+    return train_epochs(session, recipe.epochs, SAVE, checkpoint, on_epoch)

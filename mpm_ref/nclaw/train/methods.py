@@ -17,13 +17,13 @@ from functools import singledispatch
 
 import torch
 
-from ...materials.learned.principal import ReleasedStretchStress, StretchStress
+from ...materials.learned.stretch_network import ReleasedStretchStress, StretchStress
 from . import neural_laws
 from .ablations import PlainLaw, UnshiftedLaw
 from .admissible_laws import ContractionLaw, EnergeticLaw
 from .principal_laws import ReleasedStretchLaw, StretchLaw
 from .rollout import Laws
-from .spline_law import SplineLaw
+from .spline_law import SplineLawModule
 from .unchanged import Unchanged
 
 SYS_ID, LABELED = "sys-id", "labeled"
@@ -38,7 +38,7 @@ def stretch_law(kind):
 METHODS = {     # method -> elastic and plastic law of a kind
     "ours": (neural_laws.NeuralLaw, neural_laws.NeuralLaw),
     LABELED: (neural_laws.NeuralLaw, neural_laws.NeuralLaw),
-    "spline": (SplineLaw, Unchanged),
+    "spline": (SplineLawModule, Unchanged),
     "neural": (stretch_law, Unchanged),
     "no rotation": (PlainLaw, PlainLaw),
     "no undeformed": (UnshiftedLaw, UnshiftedLaw),
@@ -55,7 +55,7 @@ def laws_of(method, seed, elastic, plastic):
 
 @singledispatch
 def trained_of(learned):
-    """`weights.Trained` of a law of any method."""
+    """`LawWeights` of a law of any method."""
     return learned.trained()
 
 

@@ -3,7 +3,7 @@
 import torch
 
 from ...materials.learned.invariants import count
-from ...materials.learned.weights import Trained
+from ...materials.learned.weights import LawWeights
 from .autograd import Answer, Invariants
 from .kinds import LawOfKind
 from .perceptron import HIDDEN, Perceptron, layers_of
@@ -30,5 +30,5 @@ def neural_laws(seed, elastic, plastic, dim=3):
 
 
 def trained_of(law):
-    """`Trained` of a `NeuralLaw`."""
-    return Trained(tuple(layers_of(law.net)), law.kind)
+    """`LawWeights` of a `NeuralLaw`."""
+    return LawWeights(tuple(layers_of(law.net)), law.kind)

@@ -14,7 +14,7 @@ from torch.autograd import Function
 
 from ...materials.learned import principal
 from ...materials.learned.invariants import spectrum
-from ...materials.learned.weights import Trained
+from ...materials.learned.weights import LawWeights
 from .kinds import LawOfKind
 from .perceptron import Perceptron, layers_of
 
@@ -110,8 +110,8 @@ class ReleasedStretchLaw(PrincipalLaw):
         return torch.from_numpy(principal.bounded_ratios(y.numpy(), s.numpy()))
 
     def trained(self):
-        """`Trained` of the law."""
-        return Trained(tuple(layers_of(self.net)), self.kind)
+        """`LawWeights` of the law."""
+        return LawWeights(tuple(layers_of(self.net)), self.kind)
 
 
 class StretchLaw(ReleasedStretchLaw):

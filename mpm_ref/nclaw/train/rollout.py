@@ -37,7 +37,7 @@ class Trajectory(NamedTuple):
 
 
 def trajectory_of(observed):
-    """`Trajectory` of `cases.Observed`."""
+    """`Trajectory` of `Observed`."""
     return Trajectory(*(torch.from_numpy(a) for a in (observed.x, observed.v, observed.C,
                                                       observed.F)))
 

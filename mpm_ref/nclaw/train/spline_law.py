@@ -5,7 +5,7 @@ from torch import nn
 
 from ...materials.learned.principal import PAIRS
 from ...materials.learned.spline import READINGS, knots
-from ...materials.learned.weights import Trained
+from ...materials.learned.weights import LawWeights
 from .principal_laws import PrincipalLaw
 
 START = 1e4         # values begin evenly from -START to START [Pa], as in the authors' release
@@ -13,7 +13,7 @@ OTHERS = torch.tensor([[1, 2], [0, 2], [0, 1]])     # axes
 I, J = torch.tensor(PAIRS[3]).T
 
 
-class SplineLaw(PrincipalLaw):
+class SplineLawModule(PrincipalLaw):
     """`PrincipalLaw` of splines in 3D, of a kind of `spline`."""
 
     def __init__(self, kind):
@@ -43,6 +43,6 @@ class SplineLaw(PrincipalLaw):
         return self.at(f, s) + areas + self.at(h, s.prod(1, keepdim=True)) * first * second
 
     def trained(self):
-        """`Trained` of the law: one layer from the knots to f, g, h, without biases."""
+        """`LawWeights` of the law: one layer from the knots to f, g, h, without biases."""
         values = self.values.detach().numpy().copy()
-        return Trained(((values, 0.0 * values[0]),), self.kind)
+        return LawWeights(((values, 0.0 * values[0]),), self.kind)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...body import keep_inside
 from ...core.grid import OutOfRange
-from ...materials.learned.strain_range import measures
+from ...materials.learned.strain_range import strain_measures
 from ..bodies import carried, gradients
 from .teacher import Teacher
 
@@ -21,11 +21,11 @@ LARGEST = 100.0     # stretch or J, above which a segment has broken down
 def met(problem, observed, law, cuts):
     """Bounds as of `seen.seen`.
 
-    problem: a `Problem` of one body, at its start; observed: `cases.Observed` of its run, all
+    problem: a `Problem` of one body, at its start; observed: `Observed` of its run, all
     steps; law: what makes the body of learned laws (`bodies.learned`); cuts: time levels at which
     segments begin, and the last one. Of segments that break down there is what came before.
     """
-    rows = [extremes(measures(F)) for F in observed.F if np.isfinite(F).all()]
+    rows = [extremes(strain_measures(F)) for F in observed.F if np.isfinite(F).all()]
     body, stepper = law(problem.bodies[0]), problem.stepper()
     for begin, end in pairwise(cuts):
         restart(body, observed, begin)
@@ -59,7 +59,7 @@ def segment(problem, stepper, body, steps):
         if problem.clip is not None:
             keep_inside((body,), *problem.clip)
         with np.errstate(invalid="ignore", over="ignore"):
-            row = extremes(measures(gradients(body)))
+            row = extremes(strain_measures(gradients(body)))
         if not (np.abs(row).max() <= LARGEST and np.isfinite(body.particles.x).all()):
             break
         found.append(row)

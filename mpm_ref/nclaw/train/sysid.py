@@ -20,7 +20,7 @@ from ...core.adjoint.deform import DeformBars, Step
 from ...core.jit import CHUNKS
 from ...core.state import NO_HISTORY, NONE, Particles
 from ...materials import NoFlow
-from ...materials.learned.weights import Trained
+from ...materials.learned.weights import LawWeights
 from .rollout import Laws
 from .unchanged import Unchanged
 
@@ -103,8 +103,8 @@ class KnownStress(nn.Module):
         return Known.apply(F, self.moduli(), (self.law, NoFlow))
 
     def trained(self):
-        """`Trained` without layers: the law's record."""
-        return Trained((), self.law(*self.moduli().tolist()))
+        """`LawWeights` without layers: the law's record."""
+        return LawWeights((), self.law(*self.moduli().tolist()))
 
 
 class KnownReturn(nn.Module):
@@ -132,8 +132,8 @@ class KnownReturn(nn.Module):
         return Known.apply(F, torch.cat([self.moduli(), self.constants()]), self.of)
 
     def trained(self):
-        """`Trained` without layers: the flow's record."""
-        return Trained((), self.of[1](*self.constants().tolist()))
+        """`LawWeights` without layers: the flow's record."""
+        return LawWeights((), self.of[1](*self.constants().tolist()))
 
 
 def known_laws(unit, E, flow):

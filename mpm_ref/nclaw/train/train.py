@@ -3,7 +3,7 @@
 import torch
 
 from ...materials import Fluid, FluidProjection, NoFlow, make_flow, make_law
-from ...materials.learned.weights import Laws
+from ...materials.learned.weights import LearnedLaws
 from ..batched_step import world
 from . import sysid
 from .fit import Diverged, train
@@ -44,7 +44,7 @@ def begun_flow(flow, law):
 def taught(method, recipe, laws, seen, checkpoint=None, on_epoch=None):
     """The session that trained `laws`, in place, as a method asks for.
 
-    seen: a `Problem` of one body at its start, and the `cases.Observed` of its run; checkpoint and
+    seen: a `Problem` of one body at its start, and the `Observed` of its run; checkpoint and
     on_epoch as for `fit.train`. Raises `Diverged`.
     """
     problem, observed = seen
@@ -56,8 +56,8 @@ def taught(method, recipe, laws, seen, checkpoint=None, on_epoch=None):
 
 
 def stored(laws, about):
-    """`weights.Laws` of laws that were trained."""
-    return Laws(*map(trained_of, laws), about)
+    """`LearnedLaws` of laws that were trained."""
+    return LearnedLaws(*map(trained_of, laws), about)
 
 
 def use_threads(n):

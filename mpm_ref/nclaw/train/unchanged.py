@@ -1,7 +1,7 @@
 """No return map: the plastic law of baselines that know elasticity alone (NCLAW-eq13)."""
 
 from ...materials import NoFlow
-from ...materials.learned.weights import Trained
+from ...materials.learned.weights import LawWeights
 from .kinds import LawOfKind
 
 NO_FLOW = NoFlow()
@@ -18,5 +18,5 @@ class Unchanged(LawOfKind):
         return F
 
     def trained(self):
-        """`Trained` without layers."""
-        return Trained((), self.kind)
+        """`LawWeights` without layers."""
+        return LawWeights((), self.kind)

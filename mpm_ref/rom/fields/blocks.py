@@ -24,14 +24,14 @@ class Blocks(NamedTuple):
     radius: np.ndarray      # (blocks,) largest distance of a block's point from it [m]
     above: object           # `Blocks` of the centres, or None
 
-    def near(self, map, xhat, x, distance, margin=0.0):
+    def near(self, g, xhat, x, distance, margin=0.0):
         """Indices of all points that may be within a distance [m], by the largest axis, of one of
         the positions x (m, d); or that have points within a margin [m] at rest which may be.
         """
         k = np.arange(len(self.center))
         if self.above is not None:
-            k = self.above.near(map, xhat, x, distance, margin + self.radius.max())
-        at, F, _ = map.derivatives(self.center[k], xhat)
+            k = self.above.near(g, xhat, x, distance, margin + self.radius.max())
+        at, F, _ = g.derivatives(self.center[k], xhat)
         stretch = SAFETY * np.linalg.norm(F, 2, axis=(1, 2)).max(initial=0.0)
         gap, _ = KDTree(x).query(at, p=np.inf)
         found = k[gap <= distance + stretch * (self.radius[k] + margin)]

@@ -1,10 +1,12 @@
-"""The model that NSF is compared with: a deformation map alone, as LDM has (NSF-X12).
+"""Elastic fields: the stress follows from the deformation gradient of the map.
 
-    tau_p = tau(F_p),    F_p = dg/dX = I + sum_k a_k(xhat) dU_k/dX,    no affine field
+    tau_p = tau(F_p),    F_p = dg/dX,    no affine field
 
-Where plasticity has acted, or a body is torn between two points, that is not the stress of the full
-model. The gradients of modes are those of the planes that fit them best at a point's nearest
-neighbours of the same body.
+`ElasticMap` makes a field of a deformation map and a law, as LDM has it (LDM-eq15). `ElasticModes`
+does so for the modes of NSF's fields, where F = I + sum_k a_k(xhat) dU_k/dX: it is the model that
+NSF is compared with (NSF-X12). Where plasticity has acted, or a body is torn between two points,
+that is not the stress of the full model. The gradients of modes are those of the planes that fit
+them best at a point's nearest neighbours of the same body.
 """
 
 from itertools import pairwise
@@ -20,6 +22,39 @@ from .pod_fields import Spanned
 
 NEIGHBOURS = 26         # of a point, in 3D those of a lattice; in 2D 8
 LEAST = 1e-10           # of a spread over the largest: across a plane there is no gradient
+
+
+class ElasticMap(NamedTuple):
+    """A deformation map of a body of one law, with the stress of its F."""
+
+    g: object           # `fields.DeformationMap`, of points at rest
+    law: tuple          # the elastic law's parameters (see materials)
+
+    @property
+    def dim(self):
+        """Number of axes d."""
+        return self.g.dim
+
+    @property
+    def r(self):
+        """Number of latent coordinates."""
+        return self.g.r
+
+    def place(self, X, xhat):
+        """Return x of points X (n, d) [m]."""
+        return self.g.place(X, xhat)
+
+    def derivatives(self, X, xhat):
+        """Return x (n, d), F (n, d, d) and dg/dxhat (n, d, r) of points X (n, d)."""
+        return self.g.derivatives(X, xhat)
+
+    def velocity(self, X, xhat, vhat):
+        """Return dg/dxhat vhat of points X (n, d) [m/s]."""
+        return self.g.velocity(X, xhat, vhat)
+
+    def stress(self, X, xhat, F=None):
+        """Return the Kirchhoff stress (n, d, d) [Pa] of F (n, d, d), if given, or of the map's."""
+        return elastic_stress(self.g.derivatives(X, xhat)[1] if F is None else F, self.law)
 
 
 class Portion(NamedTuple):
@@ -65,12 +100,13 @@ class Deformed(NamedTuple):
         """Deformation gradients (m, d, d) of the map."""
         return np.eye(self.dim) + self.D[points] @ self.map.all(xhat)
 
-    def stress(self, points, xhat):
-        """Kirchhoff stress (m, d, d) [Pa]."""
-        tau, F = np.empty((len(points), self.dim, self.dim)), self.F(points, xhat)
+    def stress(self, points, xhat, F=None):
+        """Return the Kirchhoff stress (m, d, d) [Pa] of F (m, d, d), if given, or of the map's."""
+        F = self.F(points, xhat) if F is None else F
+        tau = np.empty_like(F)
         for body in self.bodies:
             own = (points >= body.first) & (points < body.last)
-            tau[own] = elastic(F[own], body.law)
+            tau[own] = elastic_stress(F[own], body.law)
         return tau
 
     def affine(self, points, xhat):
@@ -84,7 +120,7 @@ class Deformed(NamedTuple):
         return self.map.near(xhat, x, distance)
 
 
-def elastic(F, law):
+def elastic_stress(F, law):
     """Kirchhoff stress (m, d, d) [Pa] of deformation gradients (m, d, d), without plasticity."""
     m, d = F.shape[:2]
     particles = particles_at(np.zeros((m, d)), np.zeros((m, d)), np.ones(m), np.ones(m), "pic")

@@ -22,8 +22,9 @@ import numpy as np
 from ...body import Body, particles_at
 from ...explicit import deform_body, gather
 from ...materials import Hardening, Hencky, Softening
-from ..inferred import Inferred
-from ..projection import project_position
+from ..projection import Projected, project_position
+from ..quadrature.lagrangian import NumberedPoints
+from ..step import ReducedStepper
 from ..symmetric import values
 from .pod_fields import Spanned, cells, modes_of, part
 from .radial_basis import through
@@ -99,16 +100,35 @@ class Stacked(NamedTuple):
         return self.of(x, self.fields.stress(points, xhat)), None, both
 
 
+@dataclass(frozen=True)
+class JointInversion:
+    """Projection on latent coordinates whose positions and stresses of the samples are nearest to
+    those after the step (NSF-eq10 with stress beside position).
+    """
+
+    scale: Scale
+    weight: float = WEIGHT
+
+    def __call__(self, field, latent, samples, trial, dt, weights=None):
+        """Return `Projected` from the `Kinematics` of samples and their trial particles. Raises
+        ValueError for samples with weights.
+        """
+        if weights is not None:
+            raise ValueError("samples with weights: expected samples that all count the same; "
+                             "weights are made for positions alone")
+        both = Stacked(field, self.scale, self.weight)
+        fit = project_position(both, samples.points, both.of(trial.x, trial.tau), latent.xhat)
+        return Projected(fit.y, None, fit)
+
+
 @dataclass
-class Joint(Inferred):
+class JointStepper(ReducedStepper):
     """Advances latent coordinates of position and stress. All points are of one material: law and
     flow. Raises ValueError for a law other than Hencky's, or a flow with a history of its own.
     """
 
     law: object = None
     flow: object = None
-    scale: Scale = None
-    weight: float = WEIGHT
 
     def __post_init__(self):
         super().__post_init__()
@@ -117,28 +137,28 @@ class Joint(Inferred):
                              f"{type(self.flow).__name__}: expected Hencky's law, whose stress "
                              "tells the elastic strain, and a flow without hardening or softening")
 
-    def moved(self, cloud, count, t, dt):
-        """As `Inferred.moved`; keeps the samples' stresses after the step for `inverted`."""
-        grid, own = self.grid(cloud, t, dt), cloud.particles
-        trial = particles_at(own.x[:count], own.v[:count], own.m[:count], own.V0[:count], "apic")
-        trial.F[:] = stretch_of(own.tau[:count], self.law)
-        body = Body("samples", trial, self.law, self.flow, np.arange(count))
-        gather(body, grid, self.scheme, dt)
-        deform_body(body, dt)
-        self.tau = trial.tau
-        return trial.x
-
-    def inverted(self, points, w, x, xhat, dt):
-        """Latent coordinates whose positions and stresses of the samples are nearest to x (m, d)
-        and to those that `moved` kept, and the `Fit` (NSF-eq10 with stress beside position). Raises
-        ValueError for samples with weights.
+    def on_grid(self, body, samples, t, dt):
+        """Return the samples' particles after a step on the grid, their stress carried along by the
+        material's own law.
         """
-        if w is not None:
-            raise ValueError("samples with weights: expected samples that all count the same; "
-                             "weights are made for positions alone")
-        both = Stacked(self.fields, self.scale, self.weight)
-        fit = project_position(both, points, both.of(x, self.tau), xhat)
-        return fit.y, fit
+        x, start = samples.particles.x, body.particles      # the samples are its first points
+        m = len(x)
+        trial = particles_at(x, start.v[:m], start.m[:m], start.V0[:m], transfer="apic")
+        trial.F[:] = stretch_of(start.tau[:m], self.law)
+        carried = Body("samples", trial, self.law, self.flow, samples.id)
+        gather(carried, self.grid(body, samples, t, dt), self.scheme, dt)
+        deform_body(carried, dt)
+        return trial
+
+
+def joint_stepper(fields, material, problem, scale, weight=WEIGHT):
+    """Return the `JointStepper` of `joint` fields of `MaterialPoints` of the first body of a
+    problem, with its grid, gravity, conditions and material.
+    """
+    body, dx, degree = problem.bodies[0], problem.dx, problem.scheme.degree
+    return JointStepper(fields, NumberedPoints(material.m, material.V0, dx, degree),
+                        JointInversion(scale, weight), problem.gravity, problem.conditions, "apic",
+                        "difference", material.v, law=body.law, flow=body.flow)
 
 
 def stretch_of(tau, law):

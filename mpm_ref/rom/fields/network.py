@@ -211,8 +211,8 @@ class LearnedFields(NamedTuple):
         x, _, G = self.g.derivatives(self.X[points], xhat)
         return x, None, G
 
-    def stress(self, points, xhat):
-        """Kirchhoff stress (m, d, d) [Pa]."""
+    def stress(self, points, xhat, F=None):
+        """Return the Kirchhoff stress (m, d, d) [Pa]; F is of no use to it."""
         return tensor(self._values(self.h, points, xhat), self.dim)
 
     def affine(self, points, xhat):

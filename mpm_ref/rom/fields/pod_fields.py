@@ -95,8 +95,8 @@ class Spanned(NamedTuple):
         """x (m, d), None (no gradient is known in between points), and dg/dxhat (m, d, r)."""
         return self.place(points, xhat), None, self.U[points] @ self.rates(xhat)
 
-    def stress(self, points, xhat):
-        """Kirchhoff stress (m, d, d) [Pa]."""
+    def stress(self, points, xhat, F=None):
+        """Return the Kirchhoff stress (m, d, d) [Pa]; F is of no use to it."""
         return tensor(self.tau.at(points, np.concatenate([xhat, self.mu])), self.dim)
 
     def affine(self, points, xhat):

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..kinematics import CLOSE, from_middles, guesses, preimages
+from ..kinematics import CLOSE, evaluate, guesses, guesses_by_cell, preimages
 from . import Cloud
 from .stencil_overlap import reach
 
@@ -33,41 +33,42 @@ class Eulerian(NamedTuple):
                         # read is empty where the points miss the body's edge
 
     def places(self, x):
-        """All quadrature points (n, d) [m] that share a node with samples at x."""
+        """Return all quadrature points (n, d) [m] that share a node with samples at x."""
         return self.cells(x).reshape(-1, self.X.shape[1])
 
     def cells(self, x):
-        """The same by cell, (cells, l^d, d)."""
+        """Return the points of `places` by cell, (cells, l^d, d)."""
         s = (np.arange(self.per_cell) + 0.5) / self.per_cell
         first = 0.5 * (self.degree - 1)         # points with a base begin so many cells after it
         s = np.sort(s + np.ceil(first - s))
         offsets = np.array(list(product(s, repeat=x.shape[1])))
         return (reach(x, self.dx, self.degree).cells()[:, None] + offsets) * self.dx
 
-    def cloud(self, map, latent, samples):
-        """`Cloud` of a step with these samples: m_q = rho / J_q V_q. A point whose preimage is not
-        in the body carries nothing (LDM-X12), nor does one that is far from it at first guess, or
-        where the map is inverted.
+    def cloud(self, g, xhat, samples):
+        """Return the `Cloud` of a step with these samples. A point whose preimage is not in the
+        body carries nothing (LDM-X12), nor does one that is far from it at first guess, or where
+        the map is inverted.
         """
-        x, start = self.starts(map, latent.xhat, samples)
-        far = self.distance(start) > FAR * self.dx
-        back = preimages(map, latent.xhat, x[~far], start[~far], self.dx, self.close)
-        J, inside = np.linalg.det(back.at.F), self.distance(back.at.X) <= 0.0
-        kept = back.found & inside & (J > 0.0)
-        V0 = (self.dx / self.per_cell) ** x.shape[1] / J[kept]
-        lost = np.sum(~back.found | inside & (J <= 0.0))
-        said = {"points": len(V0), "far": int(far.sum()), "lost": int(lost),
-                "outside": int(np.sum(~far) - len(V0) - lost), "iterations": back.iterations}
-        return Cloud(back.at.of(kept), self.rho * V0, V0, said)
+        x, first = self.first_guesses(g, xhat, samples)
+        far = self.distance(first) > FAR * self.dx
+        back = preimages(g, xhat, x[~far], first[~far], self.dx, self.close)
+        J, inside = np.linalg.det(back.points.F), self.distance(back.points.points) <= 0.0
+        sound = back.converged & inside & (J > 0.0)
+        V0 = (self.dx / self.per_cell) ** x.shape[1] / J[sound]
+        lost = np.sum(~back.converged | inside & (J <= 0.0))
+        report = {"points": len(V0), "far": int(far.sum()), "lost": int(lost),
+                  "outside": int(np.sum(~far) - len(V0) - lost), "iterations": back.iterations}
+        return Cloud(back.points.select(sound), self.rho * V0, V0,
+                     evaluate(g, self.X[samples], xhat), report)
 
-    def starts(self, map, xhat, samples):
-        """All quadrature points x (n, d) around the samples, and first guesses (n, d) of where they
-        are from [m]: cell by cell, where a cell's middle is near the body.
+    def first_guesses(self, g, xhat, samples):
+        """Return all quadrature points x (n, d) around the samples, and first guesses (n, d) of
+        their preimages [m]: cell by cell, where a cell's middle is near the body.
         """
-        x = self.cells(map.place(self.X[samples], xhat))
+        x = self.cells(g.place(self.X[samples], xhat))
         middle, seeds = x.mean(axis=1), np.concatenate([self.X[samples], self.seeds])
-        start = guesses(map, xhat, middle, seeds)
-        near = self.distance(start) <= (FAR + 0.5 * x.shape[2]**0.5) * self.dx
-        start = np.repeat(start[:, None], x.shape[1], axis=1)
-        start[near] = from_middles(map, xhat, x[near], start[near, 0], seeds, self.dx)
-        return x.reshape(-1, x.shape[2]), start.reshape(-1, x.shape[2])
+        first = guesses(g, xhat, middle, seeds)
+        near = self.distance(first) <= (FAR + 0.5 * x.shape[2]**0.5) * self.dx
+        first = np.repeat(first[:, None], x.shape[1], axis=1)
+        first[near] = guesses_by_cell(g, xhat, x[near], first[near, 0], seeds, self.dx)
+        return x.reshape(-1, x.shape[2]), first.reshape(-1, x.shape[2])

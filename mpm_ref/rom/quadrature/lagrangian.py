@@ -1,7 +1,9 @@
 """Lagrangian quadrature: the samples' own neighbours carry mass, momentum and stress (LDM-alg3,
 LDM-sec3.2.1-sets). Neighbours are other material points, or (`Resampled`) points of another
 sampling of the body, as coarse as the quadrature allows: then a step's cost does not grow with the
-number of material points, and no map needs to be inverted.
+number of material points, and no map needs to be inverted. `Neighbours` are found once, for all
+times and parameters (LDMW-sets). `NumberedPoints` are those of fields that know no other points
+(NSF-sec5.4).
 """
 
 from typing import NamedTuple
@@ -9,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..fields.blocks import Blocks, blocks
-from ..latent import at_start
-from . import carried
+from ..kinematics import Kinematics, evaluate
+from . import Cloud
 from .stencil_overlap import reach
 
 CELLS = 2.0         # size of a block [dx]
@@ -26,34 +28,49 @@ class Lagrangian(NamedTuple):
     dx: float           # of the grid [m]
     degree: int         # of its splines
 
-    feather = 0.0       # mass of a sample on the grid beyond its own
+    feather = 0.0       # samples are quadrature points themselves
 
-    def support(self, map, latent, samples):
-        """Sorted indices of the samples and of all points that share a node with one."""
+    def support(self, g, xhat, samples):
+        """Return sorted numbers of the samples and of all points that share a node with one."""
         if len(samples) == len(self.X):
             return samples
-        x = map.place(self.X[samples], latent.xhat)
-        return np.union1d(self.neighbours(map, latent.xhat, x), samples)
+        x = g.place(self.X[samples], xhat)
+        return np.union1d(self.neighbours(g, xhat, x), samples)
 
-    def neighbours(self, map, xhat, x):
-        """Indices of all points that share a node with a position x (m, d)."""
-        candidates = self.blocks.near(map, xhat, x, (self.degree + 1) * self.dx)
-        here = map.place(self.X[candidates], xhat)
-        return candidates[reach(x, self.dx, self.degree).reached(here)]
+    def neighbours(self, g, xhat, x):
+        """Return numbers of all points that share a node with a position x (m, d)."""
+        candidates = self.blocks.near(g, xhat, x, (self.degree + 1) * self.dx)
+        overlap = reach(x, self.dx, self.degree)
+        return candidates[overlap.reached(g.place(self.X[candidates], xhat))]
 
-    def cloud(self, map, latent, samples):
-        """`Cloud` of a step with these samples."""
-        return carried(self, self.support(map, latent, samples), map, latent.xhat, samples)
+    def cloud(self, g, xhat, samples):
+        """Return the `Cloud` of a step with these samples."""
+        return cloud_of(self, self.support(g, xhat, samples), g, xhat, samples)
+
+
+def lagrangian(X, m, V0, dx, degree):
+    """Return the `Lagrangian` quadrature of a body's material points."""
+    return Lagrangian(X, m, V0, blocks(X, CELLS * dx), dx, degree)
+
+
+def cloud_of(body, chosen, g, xhat, samples):
+    """Return the `Cloud` of the chosen ones, sorted, of points with X, m and V0, of which some are
+    the samples, sorted.
+    """
+    at = evaluate(g, body.X[chosen], xhat)
+    return Cloud(at, body.m[chosen], body.V0[chosen], at.select(np.searchsorted(chosen, samples)),
+                 {"points": len(chosen)})
 
 
 class Resampled(NamedTuple):
-    """Samples are material points; what carries mass is another sampling of the body."""
+    """Quadrature by another sampling of the body, whose points carry mass; samples are material
+    points.
+    """
 
     X: np.ndarray       # (n, d) material points at rest [m]
     other: Lagrangian
 
-    feather = 1e-9      # mass of a sample on the grid over that of a point: no node that samples
-                        # read is empty
+    feather = 1e-9      # no node that samples read is empty
 
     @property
     def dx(self):
@@ -62,26 +79,22 @@ class Resampled(NamedTuple):
 
     @property
     def degree(self):
-        """Of the grid's splines."""
+        """Degree of the grid's splines."""
         return self.other.degree
 
-    def cloud(self, map, latent, samples):
-        """`Cloud` of a step with these samples."""
-        x = map.place(self.X[samples], latent.xhat)
-        chosen = np.sort(self.other.neighbours(map, latent.xhat, x))
-        return carried(self.other, chosen, map, latent.xhat)
-
-
-def lagrangian(X, m, V0, dx, degree):
-    """`Lagrangian` quadrature of a body's material points."""
-    return Lagrangian(X, m, V0, blocks(X, CELLS * dx), dx, degree)
+    def cloud(self, g, xhat, samples):
+        """Return the `Cloud` of a step with these samples."""
+        X, other = self.X[samples], self.other
+        chosen = np.sort(other.neighbours(g, xhat, g.place(X, xhat)))
+        return Cloud(evaluate(g, other.X[chosen], xhat), other.m[chosen], other.V0[chosen],
+                     evaluate(g, X, xhat), {"points": len(chosen)})
 
 
 class Neighbours(NamedTuple):
     """Lagrangian quadrature on a set of material points that does not change.
 
-    It is that of `lagrangian`, to the last bit, as long as no other point comes to share a node
-    with a sample: nothing tells when one does, and then the sample's nodes lack its mass.
+    It equals that of `lagrangian`, to the last bit, as long as no other point comes to share a node
+    with a sample. It does not notice when one does, and then the sample's nodes lack its mass.
     """
 
     X: np.ndarray           # (n, d) of all material points, at rest [m]
@@ -89,32 +102,65 @@ class Neighbours(NamedTuple):
     V0: np.ndarray          # (n,)   volume at rest [m^d]
     dx: float               # of the grid [m]
     degree: int             # of its splines
-    samples: np.ndarray     # (s,) indices of M, sorted
-    around: np.ndarray      # (k,) indices of N, sorted; none is in M
+    samples: np.ndarray     # (s,) numbers of M, sorted
+    around: np.ndarray      # (k,) numbers of N, sorted; none is in M
 
-    feather = 0.0           # mass of a sample on the grid beyond its own
+    feather = 0.0           # samples are quadrature points themselves
 
-    def cloud(self, map, latent, samples):
-        """`Cloud` of the points of M and N. Raises ValueError for a sample that is not in M."""
+    def cloud(self, g, xhat, samples):
+        """Return the `Cloud` of the points of M and N. Raises ValueError for a sample that is not
+        in M.
+        """
         foreign = np.setdiff1d(samples, self.samples)
         if len(foreign):
             raise ValueError(f"sample {foreign[0]} is not among the {len(self.samples)} that "
                              "neighbours were found for: sample among those")
-        chosen = np.union1d(self.samples, self.around)
-        return carried(self, chosen, map, latent.xhat, samples)
+        return cloud_of(self, np.union1d(self.samples, self.around), g, xhat, samples)
 
 
-def neighbours(lagrangian, map, latents, samples):
-    """`Neighbours` of samples of a `Lagrangian` quadrature: the points that share a node with one
-    at any of the latent coordinates (.., r), such as those of all training snapshots.
+def neighbours(lagrangian, g, latents, samples):
+    """Return the `Neighbours` of samples of a `Lagrangian` quadrature: the points that share a node
+    with one at any of the latent coordinates (.., r), such as those of all training snapshots.
 
     Raises ValueError where there are no latent coordinates.
     """
-    samples, latents = np.unique(samples), np.reshape(latents, (-1, map.r))
+    samples, latents = np.unique(samples), np.reshape(latents, (-1, g.r))
     if not len(latents):
         raise ValueError("no latent coordinates to find neighbours at: expected those of at least "
                          "one state")
-    near = [lagrangian.support(map, at_start(xhat), samples) for xhat in latents]
+    near = [lagrangian.support(g, xhat, samples) for xhat in latents]
     around = np.setdiff1d(np.unique(np.concatenate(near)), samples)
     return Neighbours(lagrangian.X, lagrangian.m, lagrangian.V0, lagrangian.dx, lagrangian.degree,
                       samples, around)
+
+
+class NumberedPoints(NamedTuple):
+    """Lagrangian quadrature of a field that knows its points by number, and finds those nearby."""
+
+    m: np.ndarray           # (n,) mass [kg]
+    V0: np.ndarray          # (n,) volume at rest [m^d]
+    dx: float               # of the grid [m]
+    degree: int             # of its splines
+
+    feather = 0.0           # samples are quadrature points themselves
+
+    def cloud(self, field, xhat, samples):
+        """Return the `Cloud` of the integration points N that share a node with a sample
+        (NSF-sec5.4), the samples first. F and dg/dxhat are not evaluated.
+        """
+        points, x = self.integration_points(field, xhat, samples)
+        count = len(samples)
+        return Cloud(Kinematics(points, x), self.m[points], self.V0[points],
+                     Kinematics(samples, x[:count]), {"points": len(points)})
+
+    def integration_points(self, field, xhat, samples):
+        """Return numbers (m,) of the points of `cloud` and their positions (m, d) [m]."""
+        x = field.place(samples, xhat)
+        if len(samples) == len(self.m):
+            return samples, x
+        candidates = field.near(xhat, x, (self.degree + 1) * self.dx)
+        candidates = candidates[~np.isin(candidates, samples)]
+        x_candidates = field.place(candidates, xhat)
+        near = reach(x, self.dx, self.degree).reached(x_candidates)
+        return (np.concatenate([samples, candidates[near]]),
+                np.concatenate([x, x_candidates[near]]))

@@ -34,7 +34,7 @@ class NodeCentric(NamedTuple):
     close: float = CLOSE
 
     feather = Eulerian.feather
-    cloud, starts, places = Eulerian.cloud, Eulerian.starts, Eulerian.places
+    cloud, first_guesses, places = Eulerian.cloud, Eulerian.first_guesses, Eulerian.places
 
     def cells(self, x):
         """All quadrature points (cells, l^d, d) [m] that share a sample node, wherever samples x
@@ -42,11 +42,11 @@ class NodeCentric(NamedTuple):
         """
         return Eulerian.cells(self, (self.whole + 0.5 * self.degree) * self.dx)
 
-    def samples(self, map, latent):
-        """Indices of the material points that have all their nodes among the sample nodes. Raises
-        `NoBody` where there are none, `OutOfRange` where they are nowhere.
+    def samples(self, g, xhat):
+        """Return numbers of the material points that have all their nodes among the sample nodes.
+        Raises `NoBody` where there are none, `OutOfRange` where they are nowhere.
         """
-        x = map.place(self.X, latent.xhat)
+        x = g.place(self.X, xhat)
         extent(x)
         at = bases(x, self.dx, self.degree)
         both = np.concatenate([self.whole, at])

@@ -4,15 +4,17 @@ from uuid import uuid4
 
 import pytest
 
-from validation import registry
-from validation.registry import Experiment, discover, select
+from validation.common import registry
+from validation.common.registry import Experiment, discover, select
 
 
 @pytest.mark.parametrize(("fields", "said"), [
-    ({"id": "elsewhere.toy", "title": ""}, "groups are"),
-    ({"id": "verification", "title": ""}, "expected <group>.<name>"),
-    ({"id": "verification.toy", "title": "", "profiles": ("fast",)}, "unknown profile 'fast'"),
-    ({"id": "verification.toy", "title": "", "budget": {"fast": 1}}, "unknown profile 'fast'"),
+    ({"experiment_id": "elsewhere.toy", "title": ""}, "groups are"),
+    ({"experiment_id": "verification", "title": ""}, "expected <group>.<name>"),
+    ({"experiment_id": "verification.toy", "title": "", "profiles": ("fast",)},
+     "unknown profile 'fast'"),
+    ({"experiment_id": "verification.toy", "title": "", "budget": {"fast": 1}},
+     "unknown profile 'fast'"),
 ])
 def test_bad_declaration_is_refused(fields, said):
     with pytest.raises(ValueError, match=said):

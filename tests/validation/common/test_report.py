@@ -1,19 +1,22 @@
 """The report, the figures in it, and README's status table, from toy results."""
 
+import io
 import re
 from collections import Counter
 from uuid import uuid4
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from figures.frame import Drawn, draw_all
-from validation import Results
-from validation.registry import Experiment
-from validation.report import chapters, write_report
-from validation.results import RESULTS, ROOT
-from validation.run import Setting, run_all
-from validation.status import BEGIN, END, status_table, with_status
-from validation.targets import Target, load
+from validation import ProfileResults
+from validation.common.registry import Experiment
+from validation.common.report import chapters, preview, write_report
+from validation.common.results import RESULTS, ROOT
+from validation.common.run import RunSetting, run_all
+from validation.common.status import BEGIN, END, status_table, with_status
+from validation.common.targets import Target, load
 
 
 def target(id, kind="error", **fields):
@@ -58,7 +61,8 @@ def folder(tmp_path):
     """Results of a toy experiment."""
     toys = [Experiment(f"nsf.{f.__name__}", "Bread of NSF", ("quick",), {}, f)
             for f in (bread, long_table)]
-    assert run_all(toys, Setting("quick", tmp_path / "quick", targets=TARGETS, commit="abc")) == []
+    setting = RunSetting("quick", tmp_path / "quick", targets=TARGETS, commit="abc")
+    assert run_all(toys, setting) == []
     return tmp_path / "quick"
 
 
@@ -68,7 +72,7 @@ def text(folder, name, targets=TARGETS):
 
 
 def test_chapter_counts(folder):
-    chapter, = chapters(Results(folder), TARGETS)
+    chapter, = chapters(ProfileResults(folder), TARGETS)
     assert chapter.counts == {"pass": 2, "miss": 1}
     assert [t.id for t in chapter.missing] == ["nsf.table1.jelly"]
     assert [t.id for t in chapter.settings] == ["nsf.table1.dt"]
@@ -80,7 +84,7 @@ def test_a_number_that_repeats_another_is_told_beside_it(folder):
     more = {t.id: t for t in (
         target("nsf.bread.again", again="nsf.table1.bread"), target("nsf.jelly.again",
                                                                     again="nsf.table1.jelly"))}
-    chapter, = chapters(Results(folder), TARGETS | more)
+    chapter, = chapters(ProfileResults(folder), TARGETS | more)
     assert [t.id for t in chapter.missing] == ["nsf.table1.jelly", "nsf.jelly.again"]
     words = [row.what for section in chapter.sections for row in section.rows]
     assert "the bread (Table 1; Table 1: 1.2 %)" in words
@@ -92,9 +96,9 @@ def test_printed_number_counts_for_its_paper(tmp_path):
         run.record("nsf.table1.bread", 1.0)
         run.record("trade.other.time", 1.0, comparator="info", unit="s")
 
-    setting = Setting("quick", tmp_path, targets=TARGETS)
+    setting = RunSetting("quick", tmp_path, targets=TARGETS)
     run_all([Experiment("trade.other", "Cost", ("quick",), {}, other)], setting)
-    trade, nsf = chapters(Results(tmp_path), TARGETS)
+    trade, nsf = chapters(ProfileResults(tmp_path), TARGETS)
     assert (trade.counts, nsf.counts) == ({"info": 1}, {"pass": 1})
     assert "nsf.table1.bread" not in [t.id for t in nsf.missing]
 
@@ -133,8 +137,8 @@ def test_words_of_an_id_are_parted_at_dots_but_not_at_decimal_points(tmp_path, t
     def numbers(run):
         run.record(target, 1.0, comparator="info")
 
-    run_all([Experiment("hot.map", "", ("quick",), {}, numbers)], Setting("quick", tmp_path))
-    section, = chapters(Results(tmp_path), {})[0].sections
+    run_all([Experiment("hot.map", "", ("quick",), {}, numbers)], RunSetting("quick", tmp_path))
+    section, = chapters(ProfileResults(tmp_path), {})[0].sections
     assert [row.what for row in section.rows] == [said]
 
 
@@ -158,63 +162,84 @@ def test_report_without_results_lists_what_is_missing(tmp_path):
 def scripts(tmp_path, monkeypatch):
     """A package of figure scripts with a name of its own."""
     package = tmp_path / f"drawn_{uuid4().hex}"
-    package.mkdir()
+    (package / "nsf").mkdir(parents=True)
     monkeypatch.syspath_prepend(tmp_path)
     for name in ("bread", "unmade"):
-        (package / f"{name}.py").write_text(FIGURE.format(name=name))
+        (package / "nsf" / f"{name}.py").write_text(FIGURE.format(name=name))
     return package
 
 
 def test_figure_is_drawn_and_shown_under_its_experiment(folder, scripts):
-    assert draw_all(Results(folder), folder=scripts) == Drawn(["bread"], ["unmade"], [])
-    assert sorted(f.name for f in (folder / "figures").iterdir()) == ["bread.pdf", "bread.png"]
-    section = chapters(Results(folder), TARGETS)[0].sections[0]
+    drawn = draw_all(ProfileResults(folder), folder=scripts)
+    assert drawn == Drawn(["nsf_bread"], ["nsf_unmade"], [])
+    names = sorted(f.name for f in (folder / "figures").iterdir())
+    assert names == ["nsf_bread.pdf", "nsf_bread.png"]
+    section = chapters(ProfileResults(folder), TARGETS)[0].sections[0]
     assert section.figures[0].caption == "Error of the bread over cells."
-    assert 'src="data:image/png;base64,iVBOR' in text(folder, "report.html")
-    assert "![bread](figures/bread.png)" in text(folder, "report.md")
+    page = text(folder, "report.html")
+    assert '<a href="figures/nsf_bread.png"><img src="data:image/webp;base64,UklGR' in page
+    assert "![nsf_bread](figures/nsf_bread.png)" in text(folder, "report.md")
+
+
+def test_preview_of_a_large_figure_is_small_and_keeps_its_shape():
+    noise = np.random.default_rng(0).integers(0, 255, (600, 1920, 3), dtype=np.uint8)
+    with Image.open(io.BytesIO(preview(Image.fromarray(noise)))) as image:
+        assert (image.format, image.size) == ("WEBP", (960, 300))
+    with Image.open(io.BytesIO(preview(Image.new("RGBA", (300, 200))))) as image:
+        assert image.size == (300, 200)
+
+
+def test_rows_carry_what_the_filter_reads(folder):
+    page = text(folder, "report.html")
+    assert '<div class="chapter" data-group="nsf">' in page
+    assert '<option value="nsf">NSF</option>' in page
+    assert Counter(re.findall(r'<tr data-verdict="(\w+)">', page)) == {"pass": 2, "miss": 1}
+    assert '<a href="#nsf.bread">nsf.bread</a>' in page
 
 
 def test_figure_is_drawn_again_with_the_same_bytes(folder, scripts):
     def drawn():
-        draw_all(Results(folder), folder=scripts)
+        draw_all(ProfileResults(folder), folder=scripts)
         return {f.name: f.read_bytes() for f in (folder / "figures").iterdir()}
 
     first = drawn()
-    assert b"CreationDate" not in first["bread.pdf"]
+    assert b"CreationDate" not in first["nsf_bread.pdf"]
     assert drawn() == first
 
 
 def test_figure_that_raises_is_named(folder, scripts, capsys):
-    (scripts / "bad.py").write_text(FIGURE.format(name="bread").replace("Figure()", "1 / 0"))
-    assert draw_all(Results(folder), folder=scripts).failed == ["bad"]
-    assert (folder / "figures" / "bread.png").exists()
+    script = FIGURE.format(name="bread").replace("Figure()", "1 / 0")
+    (scripts / "nsf" / "bad.py").write_text(script)
+    assert draw_all(ProfileResults(folder), folder=scripts).failed == ["nsf_bad"]
+    assert (folder / "figures" / "nsf_bread.png").exists()
     assert "ZeroDivisionError" in capsys.readouterr().err
 
 
 def test_figures_about_other_experiments_are_left(folder, scripts):
-    drawn = draw_all(Results(folder), about=["nsf.long_table"], folder=scripts)
+    drawn = draw_all(ProfileResults(folder), about=["nsf.long_table"], folder=scripts)
     assert drawn == Drawn([], [], [])
     assert not (folder / "figures").exists()
 
 
 def test_figure_without_results_is_left_out_and_says_why(folder, scripts, capsys):
-    assert draw_all(Results(folder), names=["unmade"], folder=scripts).left == ["unmade"]
-    assert "figure unmade is left out: no results of nsf.unmade" in capsys.readouterr().err
+    drawn = draw_all(ProfileResults(folder), names=["nsf_unmade"], folder=scripts)
+    assert drawn.left == ["nsf_unmade"]
+    assert "figure nsf_unmade is left out: no results of nsf.unmade" in capsys.readouterr().err
 
 
 def test_figure_answers_to_its_experiment(folder, scripts):
-    (scripts / "butter.py").write_text(FIGURE.format(name="bread"))
-    drawn = draw_all(Results(folder), names=["bread", "nsf.bread"], folder=scripts)
-    assert drawn.done == ["bread", "butter"]
+    (scripts / "nsf" / "butter.py").write_text(FIGURE.format(name="bread"))
+    drawn = draw_all(ProfileResults(folder), names=["nsf_bread", "nsf.bread"], folder=scripts)
+    assert drawn.done == ["nsf_bread", "nsf_butter"]
 
 
 def test_unknown_figure_is_refused(folder, scripts):
-    with pytest.raises(ValueError, match="no figure 'cake'; there are: bread, unmade"):
-        draw_all(Results(folder), names=["cake"], folder=scripts)
+    with pytest.raises(ValueError, match="no figure 'cake'; there are: nsf_bread, nsf_unmade"):
+        draw_all(ProfileResults(folder), names=["cake"], folder=scripts)
 
 
 def test_status_table(folder):
-    assert status_table(Results(folder), TARGETS).splitlines()[2:] == [
+    assert status_table(ProfileResults(folder), TARGETS).splitlines()[2:] == [
         "| NSF | `nsf.bread` | 2 pass, 1 miss |", "| NSF |  | not yet: 1 printed result |"]
 
 
@@ -227,7 +252,7 @@ def test_status_is_put_between_the_markers():
 
 def test_readme_is_current():
     """Where results are published, README shows them: `python -m validation status --write`."""
-    published = Results(RESULTS / "standard")
+    published = ProfileResults(RESULTS / "standard")
     if published.ids():
         readme = (ROOT / "README.md").read_text(encoding="utf-8")
         assert readme == with_status(readme, status_table(published, load()))

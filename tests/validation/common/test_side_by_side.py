@@ -3,10 +3,10 @@
 import os
 from types import MappingProxyType
 
-from validation.registry import Experiment, discover
-from validation.results import Results
-from validation.run import Setting, run_all
-from validation.side_by_side import known, run_side_by_side
+from validation.common.parallel import experiment_of, run_side_by_side
+from validation.common.registry import Experiment, discover
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 
 
 def fall(run):
@@ -43,11 +43,11 @@ def toys(*names):
 
 
 def numbers(folder, id):
-    return [(r.target, r.value, r.verdict, r.note) for r in Results(folder).records(id)]
+    return [(r.target, r.value, r.verdict, r.note) for r in ProfileResults(folder).records(id)]
 
 
 def test_results_are_those_of_one_process(tmp_path):
-    setting = Setting("quick", tmp_path / "one", commit="abc", targets=MappingProxyType({}))
+    setting = RunSetting("quick", tmp_path / "one", commit="abc", targets=MappingProxyType({}))
     apart = setting._replace(folder=tmp_path / "two")
     three = toys("fall", "rise", "breaks")
     assert run_all(three, setting) == ["verification.breaks"]
@@ -55,11 +55,11 @@ def test_results_are_those_of_one_process(tmp_path):
     for e in three:
         assert numbers(tmp_path / "one", e.id) == numbers(tmp_path / "two", e.id) != []
     assert (tmp_path / "two" / "verification.fall.heights.csv").read_text() == "h\n1.0\n"
-    assert {r.workers for r in Results(tmp_path / "two").records("verification.fall")} == {2}
+    assert {r.workers for r in ProfileResults(tmp_path / "two").records("verification.fall")} == {2}
 
 
 def test_it_is_another_process_that_runs_them(tmp_path):
-    setting = Setting("quick", tmp_path, commit="abc")
+    setting = RunSetting("quick", tmp_path, commit="abc")
     assert run_side_by_side(toys("tells"), setting, 2, toy) == []
     (_, pid, *_), = (n for n in numbers(tmp_path, "verification.tells") if n[1] is not None)
     assert pid != os.getpid()
@@ -67,10 +67,10 @@ def test_it_is_another_process_that_runs_them(tmp_path):
 
 def test_processes_know_every_experiment():
     experiments = discover().experiments
-    assert all(known(id) == experiment for id, experiment in experiments.items())
+    assert all(experiment_of(id) == experiment for id, experiment in experiments.items())
 
 
 def test_process_that_dies_is_a_failure(tmp_path, capsys):
-    failed = run_side_by_side(toys("dies"), Setting("quick", tmp_path), 1, toy)
+    failed = run_side_by_side(toys("dies"), RunSetting("quick", tmp_path), 1, toy)
     assert failed == ["verification.dies"]
     assert "its process ended" in capsys.readouterr().err

@@ -5,8 +5,8 @@ from collections import Counter
 
 import pytest
 
-from validation import equations, targets
-from validation.citations import ID
+from validation.common import equations, targets
+from validation.common.citations import ID
 
 GOOD = ('{id = "toy.a", value = 1.5, unit = "m", what = "length", paper_ref = "Table 1", '
         'kind = "setting", comparator = "=", confidence = "exact"}')

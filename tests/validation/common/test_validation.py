@@ -9,12 +9,12 @@ import pytest
 from typer.testing import CliRunner
 
 from validation import __main__ as cli
-from validation.provenance import commit
-from validation.record import read_records, write_whole
-from validation.registry import Catalogue, Experiment, nearest
-from validation.results import Results
-from validation.run import Setting, run_all
-from validation.targets import Target
+from validation.common.provenance import commit
+from validation.common.record import read_records, write_whole
+from validation.common.registry import Catalogue, Experiment, nearest
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
+from validation.common.targets import Target
 
 KEYS = {"target", "value", "unit", "paper", "comparator", "verdict", "scale", "seconds", "seed",
         "command", "commit", "date", "cores"}
@@ -31,8 +31,8 @@ def make(function):
 
 def run(folder, *functions, **setting):
     """Run toy experiments; returns the ids that failed, and the results."""
-    failed = run_all([make(f) for f in functions], Setting("quick", folder, **setting))
-    return failed, Results(folder)
+    failed = run_all([make(f) for f in functions], RunSetting("quick", folder, **setting))
+    return failed, ProfileResults(folder)
 
 
 def numbers(results, id):
@@ -211,7 +211,7 @@ def test_damaged_results_are_named(tmp_path):
 
 def test_missing_results_are_named(tmp_path):
     with pytest.raises(FileNotFoundError, match=r"no results of verification\.toy"):
-        Results(tmp_path).records("verification.toy")
+        ProfileResults(tmp_path).records("verification.toy")
 
 
 def test_commit_says_whether_the_source_is_changed(tmp_path):

@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.march import Way
-from mpm_ref.reduced.watch import Sight
 from mpm_ref.rom.fields.pod import basis
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.run import Way
+from mpm_ref.rom.study.watch import Sight
 from validation.extremes import ldm_files as files
 from validation.extremes import ldm_long as long
 from validation.extremes import ldm_singular as singular

@@ -7,10 +7,11 @@ import pytest
 from small_toys import Records
 
 from mpm_ref.materials import Fluid, NoFlow
-from mpm_ref.materials.learned.strain_range import seen
+from mpm_ref.materials.learned.strain_range import strain_bounds
 from mpm_ref.nclaw.bodies import fresh, learned
-from mpm_ref.nclaw.strain_watch import Sight
+from mpm_ref.nclaw.strain_watch import StrainReport
 from mpm_ref.scene import build
+from validation.common.weights_needed import Untrained, there
 from validation.extremes import nclaw_epochs, nclaw_long, nclaw_runs, nclaw_strain
 from validation.extremes import nclaw_observed as observed
 from validation.extremes.nclaw_runs import (
@@ -31,14 +32,13 @@ from validation.extremes.nclaw_runs import (
     trials,
 )
 from validation.extremes.nclaw_time_step import longer
-from validation.nclaw import met as met_of
+from validation.nclaw import strain_bounds as met_of
 from validation.nclaw.environments import environment
-from validation.nclaw.nets import Net
+from validation.nclaw.initial_laws import untrained
 from validation.nclaw.small_runs import Measured
-from validation.nclaw.trade_nets import Small
-from validation.nclaw.untrained import untrained
+from validation.nclaw.small_trainings import Small
+from validation.nclaw.trained_laws import Net
 from validation.verification.scenes import with_
-from validation.waiting import Untrained, there
 
 GOOD = End(1e-4, 1000, -1, "", 0.1, -1, 0.9, "")
 WIDE = {"low": [0.0, -9.0, -9.0, -99.0], "high": [9.0, 9.0, 9.0, 99.0]}
@@ -51,7 +51,7 @@ def trial(what="what", law="jelly", usual=1e-4, **changes):
 
 
 def sight(beyond=0.0, J=1.0, count=0):
-    return Sight("cube", 0, (1.0, 1.0, 1.0, J), beyond, count, 1000)
+    return StrainReport("cube", 0, (1.0, 1.0, 1.0, J), beyond, count, 1000)
 
 
 def as_true(body):
@@ -224,10 +224,10 @@ def test_bounds_that_weights_do_not_say_are_made(monkeypatch):
     monkeypatch.setattr(met_of, "trained", lambda name: SimpleNamespace(about={}))
     monkeypatch.setattr(met_of, "learned", lambda laws: laws)
     monkeypatch.setattr(met_of, "trajectory", lambda name: short)
-    monkeypatch.setattr(met_of, "met", lambda *of: made.append(of[3]) or seen(of[1].F))
+    monkeypatch.setattr(met_of, "met", lambda *of: made.append(of[3]) or strain_bounds(of[1].F))
     monkeypatch.setattr(met_of, "nets", lambda: {"jelly": Net("jelly"),
                                                  "labels": Net("jelly", method="labeled")})
-    assert met_of.met_by.__wrapped__("jelly") == seen(short.F)
+    assert met_of.met_by.__wrapped__("jelly") == strain_bounds(short.F)
     met_of.met_by.__wrapped__("labels")
     assert made == [[0, 5], ()]         # the last horizon is longer than the run
 

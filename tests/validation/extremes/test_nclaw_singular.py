@@ -11,7 +11,7 @@ from mpm_ref.nclaw.bodies import learned
 from mpm_ref.scene import build
 from validation.extremes import nclaw_singular as singular
 from validation.nclaw.environments import environment
-from validation.nclaw.nets import trained
+from validation.nclaw.trained_laws import trained
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def test_answers_are_finite_and_turn_with_the_body(jelly, rng, name):
 
 def test_answers_that_do_not_turn_are_noticed(jelly, rng):
     """Those of a network that reads F as it is; and all of them where R is anything."""
-    plain = network.elastic(law(response.PlainStress(UNIT), 3))
+    plain = network.build_law(law(response.PlainStress(UNIT), 3))
     F = singular.asked((1.1, 1.0, 0.9), rng)
     assert max(singular.turned(jelly, F, rng)) < singular.SAME
     assert singular.turned((plain, jelly[1]), F, rng)[0] > 1e-3

@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 from small_toys import Records
 
-from mpm_ref.reduced.nsf.watch import Sight
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.kinematics import NoBody
+from mpm_ref.rom.study.nsf_watch import Sight
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.extremes import nsf_beyond as beyond
 from validation.extremes import nsf_damage as damage
 from validation.extremes import nsf_long as long
 from validation.extremes import nsf_runs as runs
 from validation.extremes import nsf_samples as samples
 from validation.extremes.ldm_runs import BAD, FINE, FLAGGED, SILENT, STOPPED, TOLERABLE, Trial
-from validation.nsf import tested
+from validation.nsf import reduced_runs
 from validation.nsf.studies import jelly
-from validation.results import Results
-from validation.run import Setting, run_all
 from validation.verification.scenes import with_
 
 STUDY = jelly(4)._replace(train=(0.3, 0.5), test=(0.4,), samples=40,
@@ -29,7 +29,7 @@ GOOD = runs.End(2.0, 0.2, 15.0, 30, -1, "", 0.4, 5, 0.01, "")
 @pytest.fixture(scope="module")
 def bench():
     """The small study."""
-    return runs.Bench("jelly", tested.tested(STUDY))
+    return runs.Bench("jelly", reduced_runs.tested(STUDY))
 
 
 def trial(end=GOOD, what="0.4", points=40, **changes):
@@ -100,8 +100,8 @@ def test_runs_inside_and_outside_are_told_apart(tmp_path, monkeypatch):
     monkeypatch.setattr(runs, "studies", lambda run: {"jelly": STUDY})
     monkeypatch.setattr(beyond, "OUTSIDE", {"jelly": {"quick": (1.0, 50.0)}})
     monkeypatch.setattr(beyond, "INSIDE", {"jelly": (0.35,)})
-    assert not run_all([beyond.beyond.experiment], Setting("quick", tmp_path))
-    results, id = Results(tmp_path), "extremes.nsf.beyond"
+    assert not run_all([beyond.beyond.experiment], RunSetting("quick", tmp_path))
+    results, id = ProfileResults(tmp_path), "extremes.nsf.beyond"
     table = results.table(id, "runs")
     assert table["what"].tolist() == [0.4, 0.35, 1.0]
     assert table["beyond"].argmax() == 2
@@ -176,7 +176,7 @@ def test_files_of_fields_are_refused_where_damaged(bench):
     found = Records()
     run = SimpleNamespace(rng=np.random.default_rng(0), choose=lambda **by: 1,
                           record=found.record)
-    damage.record_files(run, "jelly", tested.refitted(bench.one, STUDY.sizes, follows=True))
+    damage.record_files(run, "jelly", reduced_runs.refitted(bench.one, STUDY.sizes, follows=True))
     assert {id: value for id, (value, _) in found.items()} == {
         f"extremes.nsf.damage.files.{name}": 1.0 for name in ("damaged", "unfit")}
 
@@ -247,7 +247,7 @@ def test_a_run_without_a_start_is_recorded(bench, monkeypatch):
     def broken(*_):
         raise NoBody("no such body")
 
-    monkeypatch.setattr("mpm_ref.reduced.inferring.begin", broken)
+    monkeypatch.setattr("mpm_ref.rom.study.nsf_run.begin", broken)
     own, said = long.reduced_run(bench, STUDY.run(0.4), bench.drawn(40))
     assert (own, said) == ({}, "no such body")
     found = Records()

@@ -6,8 +6,8 @@ import pytest
 from mpm_ref.scene import Body, Box, Material, Regular, Scene, Scheme, build
 from mpm_ref.simulate import SORT, simulate
 from mpm_ref.store.checkpoint import digest
-from validation import targets
-from validation.hot import begun as states
+from validation.common import targets
+from validation.hot import warm_states as states
 from validation.hot.overview import ABLATION, Cost, options, overview
 from validation.trade.hot_start import beginnings, carried
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from mpm_ref.placement import misplaced
+from mpm_ref.preflight import misplaced
 from mpm_ref.scene import build
 from mpm_ref.simulate import simulate
-from validation import targets
+from validation.common import targets
 from validation.hot.settings import PARTS
 from validation.hot.sizes import FILL, SIZES, Size, sized
 from validation.hot.stretched import HIGH, LOW, VARIANTS, stretched

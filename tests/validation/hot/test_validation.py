@@ -8,12 +8,12 @@ from multigrid_matrices import assembled, case, dense, lump, points
 from mpm_ref.hot.krylov import block_jacobi
 from mpm_ref.hot.multigrid.embedding import embed
 from mpm_ref.hot.multigrid.hierarchy import hierarchy
-from validation import targets
-from validation.hot.begun import PRINTED, SOFT_CAT, scene
-from validation.hot.frozen import frozen, rigid_modes
+from validation.common import targets
 from validation.hot.held_nodes import WAYS, cycle, found, mean_diagonal, on_free, with_held
+from validation.hot.linear_system import frozen, rigid_modes
 from validation.hot.measured_cg import Until, cg, convergence_factor, spectrum
 from validation.hot.sparsity import LEVELS, galerkin, geometric, of_particles
+from validation.hot.warm_states import PRINTED, SOFT_CAT, scene
 
 TIGHT = Until(1e-12, 200)
 

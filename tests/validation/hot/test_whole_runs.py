@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from figures._splats import DARK, Balls, Camera, image, outward
-from figures._states import Look, states
+from figures.common.splats import DARK, Balls, Camera, image, outward
+from figures.common.state_panels import Look, states
 from mpm_ref.scene import build
-from validation.hot import course as courses
+from validation.common.registry import discover
+from validation.common.results import ProfileResults
+from validation.hot import run_history as courses
 from validation.hot import whole_runs
-from validation.hot.course import COLUMNS, FIELDS, SHOTS, course, read, run
+from validation.hot.run_history import COLUMNS, FIELDS, SHOTS, course, read, run
 from validation.hot.sizes import SIZES
-from validation.registry import discover
-from validation.results import Results
 from validation.trade.hot_energy import DT, End, Way, apart, twisted
 from validation.verification.scenes import shipped, with_
 
@@ -141,7 +141,7 @@ def test_normals_of_a_cloud_point_outwards():
 
 
 def test_states_are_drawn_and_missing_ones_named(known, tmp_path):
-    results = Results(tmp_path)
+    results = ProfileResults(tmp_path)
     with pytest.raises(FileNotFoundError, match=r"hot\.scenes\.faceless"):
         states(results, "faceless", Look((0,), ("#e8a33d",)))
     courses.write(tmp_path / "states" / "faceless.npz", known)

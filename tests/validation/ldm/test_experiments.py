@@ -6,17 +6,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mpm_ref.reduced.errors import Errors
-from mpm_ref.reduced.march import SCHEMES, Way
+from mpm_ref.rom.study.errors import Errors
+from mpm_ref.rom.study.run import SCHEMES, Way
 from mpm_ref.rom.weights import Model, load, save
-from validation import targets
-from validation.ldm import nets, settings, superres
+from validation.common import targets
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
+from validation.ldm import networks, settings, superres
 from validation.ldm.gravity import SAME, enough
 from validation.ldm.references import mean_of, references
 from validation.ldm.studies import TORSION, TOWER
 from validation.ldm.tower import GRIDS, scene_of
-from validation.results import Results
-from validation.run import Setting, run_all
 from validation.verification.scenes import with_
 
 
@@ -51,31 +51,31 @@ def test_few_references_are_spread_over_the_tests(monkeypatch):
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     """Where weights are looked for; nothing is remembered."""
-    monkeypatch.setattr(nets, "FOLDER", tmp_path)
-    nets.trained.cache_clear()
+    monkeypatch.setattr(networks, "FOLDER", tmp_path)
+    networks.trained.cache_clear()
     yield tmp_path
-    nets.trained.cache_clear()
+    networks.trained.cache_clear()
 
 
 def test_missing_weights_say_how_to_make_them(folder):
-    with pytest.raises(ValueError, match=r"gravity-r2.npz: python -m validation.train gravity-r2"):
-        nets.trained("gravity-r2")
+    with pytest.raises(ValueError, match=r"gravity-r2.npz: python -m validation.training.ldm grav"):
+        networks.trained("gravity-r2")
 
 
 @pytest.mark.parametrize("key", ["scenes", "epochs", "seed"])
 def test_weights_of_another_training_are_refused(folder, key):
-    model = load(next((nets.Path(nets.__file__).parent / "weights").glob("gravity-r2.npz")))
+    model = load(next((networks.Path(networks.__file__).parent / "weights").glob("gravity-r2.npz")))
     assert save(folder / "gravity-r2.npz", model) is None
-    assert nets.trained("gravity-r2").decoder.r == 2
-    nets.trained.cache_clear()
+    assert networks.trained("gravity-r2").decoder.r == 2
+    networks.trained.cache_clear()
     save(folder / "gravity-r2.npz", Model(*model[:3], {**model.about, key: "other"}))
     with pytest.raises(ValueError, match=r"of .*'other'.*: python -m validation\.train gravity-r2"):
-        nets.trained("gravity-r2")
+        networks.trained("gravity-r2")
 
 
-@pytest.mark.parametrize("name", nets.nets())
+@pytest.mark.parametrize("name", networks.nets())
 def test_all_weights_are_here_and_of_what_is_said(name):
-    model, net = nets.trained(name), nets.nets()[name]
+    model, net = networks.trained(name), networks.nets()[name]
     steps = net.study.scene(*net.study.mu[0]).steps
     assert model.decoder.r == net.r
     assert model.xhat.shape[:2] == (len(net.study.train), steps + 1)
@@ -112,9 +112,9 @@ def made_up(monkeypatch):
 
 
 def test_tracers_of_table_4_are_measured_at_the_same_times_and_to_be_beaten(tmp_path, made_up):
-    setting = Setting("standard", tmp_path, targets=targets.load())
+    setting = RunSetting("standard", tmp_path, targets=targets.load())
     assert run_all([superres.superresolution.experiment], setting) == []
-    found = {r.target.rpartition(".")[2]: r for r in Results(tmp_path).records("ldm.table4")}
+    found = {r.target.rpartition(".")[2]: r for r in ProfileResults(tmp_path).records("ldm.table4")}
     for k, scheme in enumerate(SCHEMES):
         assert found[Way(*scheme).name].value == pytest.approx(1.0 + k)
     baseline, gain = found["baseline"], found["gain"]
@@ -127,17 +127,17 @@ def test_tracers_of_table_4_are_measured_at_the_same_times_and_to_be_beaten(tmp_
 def test_tracers_that_are_as_good_are_not_beaten(tmp_path, made_up, monkeypatch):
     monkeypatch.setattr(superres, "advected", lambda scene, X: 1.039 * superres.history(0).x[::2])
     for profile, verdict in (("standard", "miss"), ("quick", None)):
-        setting = Setting(profile, tmp_path / profile, targets=targets.load())
+        setting = RunSetting(profile, tmp_path / profile, targets=targets.load())
         assert run_all([superres.superresolution.experiment], setting) == []
-        records = Results(tmp_path / profile).records("ldm.table4")
+        records = ProfileResults(tmp_path / profile).records("ldm.table4")
         assert {r.target: r.verdict for r in records}.get("ldm.table4.gain") == verdict
 
 
 def missed(folder):
     """Printed settings that ours are not."""
-    setting = Setting("quick", folder, targets=targets.load())
+    setting = RunSetting("quick", folder, targets=targets.load())
     assert run_all([settings.settings.experiment], setting) == []
-    return {r.target for r in Results(folder).records("ldm.settings") if r.verdict == "miss"}
+    return {r.target for r in ProfileResults(folder).records("ldm.settings") if r.verdict == "miss"}
 
 
 @pytest.fixture
@@ -157,7 +157,7 @@ def test_settings_of_the_tower_are_those_of_its_runs(tmp_path, coarse, monkeypat
     other = TOWER._replace(mu=TOWER.mu + 0.3, test=TOWER.test[1:])
     monkeypatch.setattr(settings, "TOWER", other)
     monkeypatch.setattr(settings, "nets", lambda: {
-        name: net._replace(r=net.r + (name == "tower")) for name, net in nets.nets().items()})
+        name: net._replace(r=net.r + (name == "tower")) for name, net in networks.nets().items()})
     counts = {f"ldm.{place}.n_{of}" for place in ("table2.tower", "sec5_4")
               for of in ("train", "test")}
     drawn = {f"ldm.sec5_4.{name}_max" for name in ("r", "theta", "phi")}

@@ -5,14 +5,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mpm_ref.cases import snapshots
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.errors import Errors
-from mpm_ref.reduced.march import march
 from mpm_ref.rom.fields.pod import modes
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.errors import Errors
+from mpm_ref.rom.study.run import march
 from mpm_ref.scene import build
+from mpm_ref.trajectories import snapshots
 from validation.ldm import poke_parts
-from validation.ldm.pairs import ALL
+from validation.ldm.paired_runs import ALL
 from validation.ldm.poke_parts import Parts, let_go, parts, swinging
 from validation.ldm.references import References
 from validation.ldm.studies import POKES, poked

@@ -5,17 +5,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from figures import _states
+from figures.common import state_panels
 from figures.frame import draw_all
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.errors import Errors
 from mpm_ref.rom.fields.affine import Affine
-from validation import targets
-from validation.ldm import kept_bodies, pairs, states
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.errors import Errors
+from validation.common import targets
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
+from validation.ldm import paired_runs, published_bodies, states
 from validation.ldm.studies import POKES, TORSION, TOWER, fallen, leaning, twisted
 from validation.ldm.superres import fine
-from validation.results import Results
-from validation.run import Setting, run_all
 from validation.verification.scenes import with_
 
 # Experiments, and how many printed numbers each records; those that made-up runs miss.
@@ -36,13 +36,13 @@ SOME = np.stack(np.meshgrid(*3 * (np.arange(2.0),), indexing="ij"), axis=-1).res
 def short(monkeypatch):
     """A short run, and a map that is exact for affine motions."""
     affine = SimpleNamespace(decoder=Affine(3), rest=Affine(3).rest)
-    monkeypatch.setattr(pairs, "trained", lambda name: affine)
+    monkeypatch.setattr(paired_runs, "trained", lambda name: affine)
     return with_(fallen(5.0), steps=3)
 
 
 def test_a_pair_is_one_run_in_two_models(short):
-    one = pairs.pair(short, "any", {0, 3})
-    x = list(pairs.positions(short))
+    one = paired_runs.pair(short, "any", {0, 3})
+    x = list(paired_runs.positions(short))
     np.testing.assert_array_equal(one.full, [x[0], x[3]])
     np.testing.assert_allclose(one.reduced[0], one.X, atol=1e-12)
     assert one.xhat.shape == (4, 12)
@@ -52,17 +52,18 @@ def test_a_pair_is_one_run_in_two_models(short):
 
 
 def test_scales_say_of_how_many_points_errors_are(short, monkeypatch):
-    monkeypatch.setattr(pairs, "ERROR_POINTS", 500)
-    one = pairs.pair(short, "any", way=pairs.ALL)
-    own = pairs.beside(one.X[::3], one.reduced[:, ::3], one.full[:, ::3])
+    monkeypatch.setattr(paired_runs, "ERROR_POINTS", 500)
+    one = paired_runs.pair(short, "any", way=paired_runs.ALL)
+    own = paired_runs.beside(one.X[::3], one.reduced[:, ::3], one.full[:, ::3])
     assert one.errors == pytest.approx(own)
     assert one.scale == "1368 particles, 3 steps, all points, errors of 456 points"
     with pytest.raises(ValueError, match="longer"):
-        pairs.beside(one.X, one.reduced[:2], one.full)
+        paired_runs.beside(one.X, one.reduced[:2], one.full)
 
 
 def test_errors_are_of_all_points_whatever_is_shown(short):
-    every, some = pairs.pair(short, "any"), pairs.pair(short, "any", {1}, np.array([4, 9]))
+    every = paired_runs.pair(short, "any")
+    some = paired_runs.pair(short, "any", {1}, np.array([4, 9]))
     assert every.full.shape == (4, 1368, 3)
     np.testing.assert_array_equal(some.full[0], every.full[1][[4, 9]])
     np.testing.assert_allclose(some.reduced[0], every.reduced[1][[4, 9]], atol=1e-12)
@@ -72,26 +73,27 @@ def test_errors_are_of_all_points_whatever_is_shown(short):
 def test_what_is_kept_is_read_again(tmp_path):
     run = SimpleNamespace(folder=tmp_path, experiment=SimpleNamespace(id="ldm.toy"))
     x = np.random.default_rng(0).normal(size=(50, 3))
-    kept_bodies.keep(run, x=x, count=[3, 1])
-    found = kept_bodies.read(tmp_path, "ldm.toy")
+    published_bodies.keep(run, x=x, count=[3, 1])
+    found = published_bodies.read(tmp_path, "ldm.toy")
     assert found["x"].dtype == np.float32
     assert found["count"].tolist() == [3, 1]
-    assert 0.0 < np.abs(found["x"] - x).max() <= 2.0 ** -kept_bodies.BITS * np.abs(x).max() / 2.0
+    rounding = 2.0 ** -published_bodies.BITS * np.abs(x).max() / 2.0
+    assert 0.0 < np.abs(found["x"] - x).max() <= rounding
     with pytest.raises(FileNotFoundError, match=r"run ldm\.other again"):
-        kept_bodies.read(tmp_path, "ldm.other")
+        published_bodies.read(tmp_path, "ldm.other")
 
 
 def test_rounding_takes_less_room_and_keeps_zeros(tmp_path):
     x = np.random.default_rng(0).normal(size=(5000, 3))
     np.savez_compressed(tmp_path / "plain.npz", x=x.astype(np.float32))
-    np.savez_compressed(tmp_path / "rounded.npz", x=kept_bodies.rounded(x))
+    np.savez_compressed(tmp_path / "rounded.npz", x=published_bodies.rounded(x))
     plain, rounded = ((tmp_path / f"{name}.npz").stat().st_size for name in ("plain", "rounded"))
     assert rounded < 0.75 * plain
-    assert kept_bodies.rounded(np.array([0.0, 1.0])).tolist() == [0.0, 1.0]
-    assert kept_bodies.rounded(np.zeros(3)).tolist() == [0.0, 0.0, 0.0]
-    gone = kept_bodies.rounded(np.array([np.nan, 1.0, np.inf]))
+    assert published_bodies.rounded(np.array([0.0, 1.0])).tolist() == [0.0, 1.0]
+    assert published_bodies.rounded(np.zeros(3)).tolist() == [0.0, 0.0, 0.0]
+    gone = published_bodies.rounded(np.array([np.nan, 1.0, np.inf]))
     assert np.array_equal(gone, [np.nan, 1.0, np.inf], equal_nan=True)
-    assert kept_bodies.rounded(np.zeros((2, 0))).shape == (2, 0)
+    assert published_bodies.rounded(np.zeros((2, 0))).shape == (2, 0)
 
 
 def test_skin_is_what_is_seen():
@@ -124,12 +126,12 @@ def test_what_has_come_back_has_returned():
     assert states.returned(path[:, None] + np.ones((1, 5, 1))) == pytest.approx(0.5)
 
 
-def stood_in(scene, net, shots=None, shown=None, way=pairs.SHOWN_WAY):
+def stood_in(scene, net, shots=None, shown=None, way=paired_runs.SHOWN_WAY):
     """A `Pair` of a few points without any run."""
     k = scene.steps + 1 if shots is None else len(shots)
     x = np.arange(k)[:, None, None] * 0.01 + SOME
     xhat = np.random.default_rng(0).normal(size=(scene.steps + 1, 4))
-    return pairs.Pair(case(scene), SOME, 1.01 * x, x, xhat, Errors(0.1, 0.2, 0.3), len(SOME),
+    return paired_runs.Pair(case(scene), SOME, 1.01 * x, x, xhat, Errors(0.1, 0.2, 0.3), len(SOME),
                       way.points or len(SOME))
 
 
@@ -139,19 +141,19 @@ def judged(name, folder, monkeypatch):
     monkeypatch.setattr(states, "advected", lambda scene, X: np.stack((scene.steps + 1) * [SOME]))
     monkeypatch.setattr(states, "positions", lambda scene: [SOME])
     declared = getattr(states, name).experiment
-    assert run_all([declared], Setting("standard", folder, targets=targets.load())) == []
-    records = Results(folder).records(declared.id)
+    assert run_all([declared], RunSetting("standard", folder, targets=targets.load())) == []
+    records = ProfileResults(folder).records(declared.id)
     return {r.target: r.verdict for r in records if r.paper is not None}
 
 
 @pytest.mark.parametrize("name", MADE)
 def test_figures_are_drawn_from_what_experiments_leave(name, tmp_path, monkeypatch):
-    monkeypatch.setattr(_states, "PIXELS", 40)
+    monkeypatch.setattr(state_panels, "PIXELS", 40)
     found = judged(name, tmp_path, monkeypatch)
     missed = {target for target, verdict in found.items() if verdict == "miss"}
     assert missed == MISSED.get(name, set())
     assert len(found) == MADE[name]
-    drawn = draw_all(Results(tmp_path), names=[getattr(states, name).experiment.id])
+    drawn = draw_all(ProfileResults(tmp_path), names=[getattr(states, name).experiment.id])
     assert (drawn.left, drawn.failed) == ([], [])
     assert len(drawn.done) == 1 + (name == "poke")
 
@@ -168,7 +170,7 @@ def test_what_is_recorded_is_of_the_scenes_that_ran(name, tmp_path, monkeypatch)
 def test_tracers_are_measured_as_the_reduced_run_is(tmp_path, monkeypatch):
     """Figure 12: the same points and times, and the reduced run must be the better."""
     judged("superresolution", tmp_path, monkeypatch)
-    found = {r.target: r for r in Results(tmp_path).records("ldm.fig12")}
+    found = {r.target: r for r in ProfileResults(tmp_path).records("ldm.fig12")}
     reduced, baseline, gain = (found[f"ldm.fig12.{name}"]
                                for name in ("reduced_high", "baseline", "gain"))
     x = np.arange(31)[:, None, None] * 0.01 + SOME
@@ -181,12 +183,12 @@ def test_tracers_are_measured_as_the_reduced_run_is(tmp_path, monkeypatch):
 
 def test_samples_are_near_what_is_held(tmp_path):
     """LDM-sec3.3-hyper."""
-    setting = Setting("quick", tmp_path, targets=targets.load())
+    setting = RunSetting("quick", tmp_path, targets=targets.load())
     assert run_all([states.sampled.experiment], setting) == []
-    found = kept_bodies.read(tmp_path, "ldm.fig4")
+    found = published_bodies.read(tmp_path, "ldm.fig4")
     z = found["X"][found["samples"], 2]
     bottom, top = (z[held] for held in found["held"])
-    assert len(z) == pairs.SHOWN_WAY.points
+    assert len(z) == paired_runs.SHOWN_WAY.points
     assert min(len(bottom), len(top)) >= 5
     assert bottom.max() < 3.0
     assert top.min() > 36.0

@@ -5,14 +5,14 @@ from math import cos, pi, sin
 import numpy as np
 import pytest
 
-from mpm_ref.cases import snapshots
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.errors import Squares
-from mpm_ref.reduced.march import SCHEMES, Way, march
 from mpm_ref.rom.fields.affine import Affine
 from mpm_ref.rom.fields.pod import modes
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.errors import Squares
+from mpm_ref.rom.study.run import SCHEMES, Way, march
 from mpm_ref.scene import build
-from validation.ldm.online import compared, reconstructed
+from mpm_ref.trajectories import snapshots
+from validation.ldm.reduced_runs import compared, reconstructed
 from validation.ldm.studies import GRAVITY, PHI, POKE, POKES, STUDIES, TORSION, poked_again
 from validation.verification.scenes import shipped, with_
 

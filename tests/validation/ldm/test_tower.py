@@ -6,15 +6,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.errors import Errors
-from mpm_ref.reduced.march import Way, march
 from mpm_ref.rom.fields.affine import Affine
 from mpm_ref.rom.kinematics import NoBody
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.errors import Errors
+from mpm_ref.rom.study.run import Way, march
 from mpm_ref.scene import build
 from validation.ldm import tower
-from validation.ldm.racing import COLUMNS, Full, Raced, Spent, clocked, fastest, median, race
 from validation.ldm.studies import TOWER, latin_twice, refined
+from validation.ldm.timing import COLUMNS, Full, Raced, Spent, clocked, fastest, median, race
 from validation.verification.scenes import with_
 
 EXACT = Affine(3), Affine(3).rest       # a map that is exact for affine motions
@@ -72,7 +72,7 @@ def test_a_run_that_breaks_down_has_no_error(small, monkeypatch):
                 raise NoBody("none is left")
             yield state
 
-    monkeypatch.setattr("validation.ldm.racing.march", breaking)
+    monkeypatch.setattr("validation.ldm.timing.march", breaking)
     _, (broken, fine) = race(small, EXACT, [lost, sound], 2)
     assert broken.errors.origin == broken.spent.wall == np.inf
     assert np.isfinite(fine.errors.origin)

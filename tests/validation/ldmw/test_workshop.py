@@ -6,27 +6,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from figures import _states
+from figures.common import state_panels
 from figures.frame import draw_all
-from mpm_ref.reduced.case import case
-from mpm_ref.rom.latent import at_start
+from mpm_ref.rom.latent import start_state
+from mpm_ref.rom.study.case import case
 from mpm_ref.rom.weights import load, save
-from validation import targets
-from validation.ldm import kept_bodies, nets
-from validation.ldm.workshop_studies import (
-    PUSHES,
-    SHEAR3,
-    SHEAR17,
-    TOP,
-    WORKSHOP,
-    pushed,
-    sheared,
-)
+from validation.common import targets
+from validation.common.record import read_records
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
+from validation.ldm import networks, published_bodies
+from validation.ldm.workshop_studies import PUSHES, SHEAR3, SHEAR17, TOP, WORKSHOP, pushed, sheared
 from validation.ldmw import poke, settings, shear, states
 from validation.ldmw.runs import by_nodes, by_points, kept, pod, runs, spread
-from validation.record import read_records
-from validation.results import Results
-from validation.run import Setting, run_all
 
 SHEARS = (SHEAR3, SHEAR17)
 
@@ -124,9 +116,9 @@ def test_few_nodes_have_few_samples_and_few_of_these_are_used(sheared_runs):
     one, some = sheared_runs.cases[0], spread(sheared_runs.X, 6)
     map, rest = pod(SHEAR17, 1)
     _, every = by_nodes(some)(one, map)
-    assert set(some) <= set(every(0.0, at_start(rest))) < set(range(17))
+    assert set(some) <= set(every(0.0, start_state(rest))) < set(range(17))
     _, few = by_nodes(some, 6)(one, map)
-    assert len(few(0.0, at_start(rest))) == 6
+    assert len(few(0.0, start_state(rest))) == 6
 
 
 def test_samples_are_spread_from_the_bottom_to_the_top():
@@ -157,18 +149,18 @@ def test_samples_of_a_push_are_held_pushed_and_free():
 
 @pytest.mark.parametrize(("key", "value"), [("latent", "encoder"), ("terms", "both")])
 def test_weights_of_another_training_are_refused(tmp_path, monkeypatch, key, value):
-    model = load(nets.FOLDER / "shear17.npz")
+    model = load(networks.FOLDER / "shear17.npz")
     assert model.about["latent"] == "free"
     save(tmp_path / "shear17.npz", model._replace(about={**model.about, key: value}))
-    monkeypatch.setattr(nets, "FOLDER", tmp_path)
+    monkeypatch.setattr(networks, "FOLDER", tmp_path)
     with pytest.raises(ValueError, match=r"shear17\.npz are of .*train shear17"):
-        nets.trained.__wrapped__("shear17")
+        networks.trained.__wrapped__("shear17")
 
 
 def recorded(function, folder):
     """{target: `Record`} of an experiment at the quick profile."""
     one = function.experiment
-    assert run_all([one], Setting("quick", folder, targets=targets.load())) == []
+    assert run_all([one], RunSetting("quick", folder, targets=targets.load())) == []
     return {record.target: record for record in read_records(folder / f"{one.id}.json")}
 
 
@@ -207,18 +199,18 @@ def stood_in(study, numbers):
 def test_fig1_is_of_the_ends_of_test_runs(tmp_path, monkeypatch):
     monkeypatch.setattr(states, "runs", stood_in)
     monkeypatch.setattr(states, "kept", lambda *of: None)
-    monkeypatch.setattr(_states, "PIXELS", 40)
+    monkeypatch.setattr(state_panels, "PIXELS", 40)
     found = recorded(states.pokes, tmp_path)
     for k in (1, 2, 3):
         one = found[f"ldmw.fig1.error.{k}.position"]
         assert one.value == pytest.approx(k / np.sqrt(3.0))
         assert (one.verdict, one.scale) == (
             "info", "8 particles, 2 steps, r = 5, 15 sample points, one run each")
-    ends = kept_bodies.read(tmp_path, "ldmw.fig1")
+    ends = published_bodies.read(tmp_path, "ldmw.fig1")
     assert ends["full"] == pytest.approx(np.stack(3 * [SOME]))
     assert ends["reduced"] == pytest.approx(np.stack([k * SOME for k in (1.01, 1.02, 1.03)]), 1e-4)
     assert ends["mu"] == pytest.approx(PUSHES.mu[list(states.SHOWN)], 1e-3)
-    drawn = draw_all(Results(tmp_path), names=["ldmw.fig1"])
+    drawn = draw_all(ProfileResults(tmp_path), names=["ldmw.fig1"])
     assert (drawn.done, drawn.left, drawn.failed) == (["ldmw_fig01"], [], [])
 
 

@@ -7,19 +7,19 @@ from small_toys import known
 
 from mpm_ref.materials.learned import response, weights
 from mpm_ref.scene import build
-from mpm_ref.sealed import sealed
-from validation.nclaw import bundle, nets, trade_nets
+from mpm_ref.store.weights_file import sealed
+from validation.common.weights_needed import Untrained
+from validation.nclaw import bundle, small_trainings, trained_laws
 from validation.nclaw.bundle import Bundle
 from validation.nclaw.environments import ENVIRONMENTS
-from validation.nclaw.trade_nets import Small, bundled, identity, small_nets
-from validation.nclaw.untrained import untrained
-from validation.waiting import Untrained
+from validation.nclaw.initial_laws import untrained
+from validation.nclaw.small_trainings import Small, bundled, identity, small_nets
 
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     """Where weights are looked for; nothing is remembered."""
-    monkeypatch.setattr(trade_nets, "FOLDER", tmp_path)
+    monkeypatch.setattr(small_trainings, "FOLDER", tmp_path)
     bundled.cache_clear()
     yield tmp_path
     bundled.cache_clear()
@@ -28,33 +28,33 @@ def folder(tmp_path, monkeypatch):
 # which trainings there are
 
 def test_each_training_is_of_a_name_of_its_own():
-    groups = (trade_nets.OF_EPOCHS, trade_nets.OF_TRAINING, trade_nets.OF_WIDTH,
-              trade_nets.OF_SIGHT, trade_nets.OF_FAULTS)
+    groups = (small_trainings.OF_EPOCHS, small_trainings.OF_TRAINING, small_trainings.OF_WIDTH,
+              small_trainings.OF_SIGHT, small_trainings.OF_FAULTS)
     assert len(small_nets()) == sum(map(len, groups))
     assert len(set(small_nets().values())) == len(small_nets())
-    assert not {*small_nets()} & {*nets.nets()}
-    assert {*trade_nets.SEEDS} <= {*trade_nets.OF_TRAINING}
+    assert not {*small_nets()} & {*trained_laws.nets()}
+    assert {*small_trainings.SEEDS} <= {*small_trainings.OF_TRAINING}
 
 
 def test_epochs_are_kept_of_all_materials():
-    found = {net.environment: name for name, net in trade_nets.OF_EPOCHS.items()}
+    found = {net.environment: name for name, net in small_trainings.OF_EPOCHS.items()}
     assert found == {name: f"small-{name}-epochs" for name in ENVIRONMENTS}
-    assert {(net.epochs, net.kept) for net in trade_nets.OF_EPOCHS.values()} == {
+    assert {(net.epochs, net.kept) for net in small_trainings.OF_EPOCHS.values()} == {
         (300, (10, 20, 30, 50, 75, 100, 150, 200))}
 
 
 @pytest.mark.parametrize("name", [name for name, net in small_nets().items()
-                                  if name != trade_nets.BASE and net not in
-                                  trade_nets.OF_EPOCHS.values()])
+                                  if name != small_trainings.BASE and net not in
+                                  small_trainings.OF_EPOCHS.values()])
 def test_trainings_differ_from_the_base_in_one_choice(name):
-    net, base = small_nets()[name], small_nets()[trade_nets.BASE]
+    net, base = small_nets()[name], small_nets()[small_trainings.BASE]
     own = {key for key in Small._fields if getattr(net, key) != getattr(base, key)}
     assert len(own) == 1 or own <= {"edge", "cells", "epochs"}
 
 
 def test_the_full_size_is_the_environment_s():
     one, full = (build(scene) for scene in (Small(edge=10, cells=20).scene,
-                                            trade_nets.environment("jelly")))
+                                            small_trainings.environment("jelly")))
     assert np.array_equal(one.bodies[0].particles.x, full.bodies[0].particles.x)
     assert one.dx == pytest.approx(full.dx)
     assert (one.conditions.walls.low, one.conditions.walls.high) == (
@@ -121,7 +121,7 @@ def test_a_training_that_kept_nothing_is_a_file_too(tmp_path):
 
 
 def test_doubles_are_refused(tmp_path):
-    exact = weights.Laws(law(response.Stress(), 3), law(response.Correction(), 3), {})
+    exact = weights.LearnedLaws(law(response.Stress(), 3), law(response.Correction(), 3), {})
     with pytest.raises(ValueError, match=r"a\.npz is not written: elastic_W0 has more digits than"):
         bundle.save(tmp_path / "a.npz", Bundle({1: exact}, {}))
     assert not list(tmp_path.iterdir())
@@ -140,15 +140,15 @@ def test_files_of_something_else_are_told(tmp_path):
 
 
 def test_missing_bundles_say_how_to_make_them(folder):
-    with pytest.raises(Untrained, match=r"no weights small.npz: python -m validation.train_laws "
-                                        "small$"):
+    with pytest.raises(Untrained, match="no weights small.npz: "
+                       r"python -m validation\.training\.nclaw small$"):
         bundled("small")
 
 
 def test_bundles_of_another_training_are_refused(folder):
     bundle.save(folder / "small.npz", known(identity(Small())))
     assert list(bundled("small").laws) == [10, 100]
-    assert trade_nets.last("small") is bundled("small").laws[100]
+    assert small_trainings.last("small") is bundled("small").laws[100]
     bundled.cache_clear()
     bundle.save(folder / "small.npz", known(identity(Small(seed=3))))
     with pytest.raises(ValueError, match=r"small.npz are of .*'seed': 3.*now it is .*'seed': 0"):
@@ -159,4 +159,4 @@ def test_a_training_that_stopped_has_no_last_laws(folder):
     bundle.save(folder / "small.npz", known(
         {"stopped": "epoch 12: nan", **identity(Small())}, (10,)))
     with pytest.raises(Untrained, match="small stopped: epoch 12: nan"):
-        trade_nets.last("small")
+        small_trainings.last("small")

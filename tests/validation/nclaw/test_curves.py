@@ -5,13 +5,13 @@ import json
 import matplotlib as mpl
 import pytest
 
-from figures import nclaw_loss
-from validation.nclaw import curves, diverged, nets, tables
+from figures.nclaw import loss
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
+from validation.nclaw import curves, diverged, tables, trained_laws
 from validation.nclaw.environments import ENVIRONMENTS
-from validation.nclaw.nets import Net, identity
-from validation.nclaw.untrained import untrained
-from validation.results import Results
-from validation.run import Setting, run_all
+from validation.nclaw.initial_laws import untrained
+from validation.nclaw.trained_laws import Net, identity
 
 mpl.use("Agg")
 GONE = "plasticine-no-undeformed"
@@ -20,27 +20,28 @@ GONE = "plasticine-no-undeformed"
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch):
     """Where weights and what is known of trainings that diverged are looked for."""
-    monkeypatch.setattr(nets, "FOLDER", tmp_path / "weights")
+    monkeypatch.setattr(trained_laws, "FOLDER", tmp_path / "weights")
     return tmp_path / "weights"
 
 
 def done(folder, experiment):
-    assert run_all([experiment.experiment], Setting("quick", folder)) == []
-    return Results(folder)
+    assert run_all([experiment.experiment], RunSetting("quick", folder)) == []
+    return ProfileResults(folder)
 
 
 def lost(folder, **changes):
     """Keep what is known of a training that diverged."""
-    about = {**identity(nets.nets()[GONE]), "errors": [1e-3, 2e-3], "stopped": "epoch 3: gone",
+    about = {**identity(trained_laws.nets()[GONE]), "errors": [1e-3, 2e-3],
+             "stopped": "epoch 3: gone",
              **changes}
     return diverged.keep(folder / f"{GONE}.npz", about)
 
 
 def test_without_weights_no_curve_is_drawn(tmp_path, monkeypatch):
     monkeypatch.setattr(curves, "known", lambda run: {})
-    assert run_all([curves.loss.experiment], Setting("quick", tmp_path)) == []
+    assert run_all([curves.loss.experiment], RunSetting("quick", tmp_path)) == []
     with pytest.raises(FileNotFoundError, match="the weights were missing"):
-        nclaw_loss.draw(Results(tmp_path))
+        loss.draw(ProfileResults(tmp_path))
 
 
 def test_curves_of_ablations_stand_beside_ours(tmp_path, monkeypatch):
@@ -52,11 +53,11 @@ def test_curves_of_ablations_stand_beside_ours(tmp_path, monkeypatch):
     results = done(tmp_path, curves.loss)
     assert results.value("nclaw.loss", "nclaw.loss.ours.sand.last") == pytest.approx(4e-4)
     assert results.value("nclaw.loss", "nclaw.loss.no-rotation.plasticine.first") == 1e-3
-    left, right = nclaw_loss.draw(results).axes
+    left, right = loss.draw(results).axes
     assert {line.get_label() for line in left.lines} == set(ENVIRONMENTS)
     assert [line.get_label() for line in right.lines] == ["ours", "no-rotation"]
     assert list(right.lines[1].get_ydata()) == pytest.approx([1e-3, 22e-4])
-    assert nclaw_loss.scale(results) == "2 epochs"
+    assert loss.scale(results) == "2 epochs"
 
 
 def test_errors_of_labels_are_told_as_what_they_are_and_not_drawn(tmp_path, monkeypatch):
@@ -68,7 +69,7 @@ def test_errors_of_labels_are_told_as_what_they_are_and_not_drawn(tmp_path, monk
     units = {one["target"]: one["unit"] for one in records}
     assert units["nclaw.loss.ours.sand.last"] == "m^2"
     assert units["nclaw.loss.labeled.sand.last"] == "1"
-    axes, = nclaw_loss.draw(results).axes
+    axes, = loss.draw(results).axes
     assert [line.get_label() for line in axes.lines] == ["sand"]
 
 
@@ -96,7 +97,7 @@ def test_a_training_that_diverged_has_a_curve_with_a_cross(tmp_path, folder, mon
     assert record.target == "nclaw.loss.no-undeformed.plasticine.epochs"
     assert (record.value, record.scale) == (2, "of 300 epochs")
     assert record.note == "the training diverged: epoch 3: gone"
-    right = nclaw_loss.draw(results).axes[1]
+    right = loss.draw(results).axes[1]
     ours, own, cross = right.lines
     assert list(own.get_ydata()) == [1e-3, 2e-3]
     assert (cross.get_marker(), list(cross.get_xdata())) == ("x", [2.0])
@@ -107,16 +108,16 @@ def test_what_knows_the_laws_does_not_hide_the_others(tmp_path, monkeypatch):
     laws = {method: {"sand": untrained()._replace(about={"errors": [1e-6, error]})}
             for method, error in (("ours", 1e-7), ("sys-id", 1e-20))}
     monkeypatch.setattr(curves, "known", lambda run: laws)
-    left, right = nclaw_loss.draw(done(tmp_path, curves.loss)).axes
-    assert right.get_ylim()[0] == pytest.approx(nclaw_loss.ROOM * 1e-7)
+    left, right = loss.draw(done(tmp_path, curves.loss)).axes
+    assert right.get_ylim()[0] == pytest.approx(loss.ROOM * 1e-7)
     assert left.get_ylim()[0] > 1e-8
 
 
 def test_what_is_kept_must_be_of_that_training(folder):
-    assert diverged.diverged(GONE, nets.identity(nets.nets()[GONE])) is None
+    assert diverged.diverged(GONE, trained_laws.identity(trained_laws.nets()[GONE])) is None
     path = lost(folder, seed=7)
     with pytest.raises(ValueError, match=r"is of .*'seed': 7.*now it is .*'seed': 0.*train_laws"):
-        diverged.diverged(GONE, nets.identity(nets.nets()[GONE]))
+        diverged.diverged(GONE, trained_laws.identity(trained_laws.nets()[GONE]))
     path.write_text(json.dumps({"errors": []})[:-1])
     with pytest.raises(ValueError, match=f"{GONE}.diverged.json is damaged"):
-        diverged.diverged(GONE, nets.identity(nets.nets()[GONE]))
+        diverged.diverged(GONE, trained_laws.identity(trained_laws.nets()[GONE]))

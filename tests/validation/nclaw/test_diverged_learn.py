@@ -1,14 +1,14 @@
-"""`python -m validation.train_laws NAME` of a training that diverges. Needs PyTorch."""
+"""`python -m validation.training.nclaw NAME` of a training that diverges. Needs PyTorch."""
 
 import pytest
 
 torch = pytest.importorskip("torch")
 
 from mpm_ref.nclaw.train.fit import Diverged, Epoch  # noqa: E402
-from validation import train_laws  # noqa: E402
-from validation.nclaw import nets  # noqa: E402
+from validation.nclaw import trained_laws  # noqa: E402
 from validation.nclaw.diverged import beside, diverged  # noqa: E402
-from validation.nclaw.untrained import untrained  # noqa: E402
+from validation.nclaw.initial_laws import untrained  # noqa: E402
+from validation.training import nclaw  # noqa: E402
 
 NAME = "plasticine-no-undeformed"
 HISTORY = [Epoch(1.0, 1e-3, 40, (1.0, 1.0)), Epoch(1.0, 2e-3, 40, (1.0, 1.0))]
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.usefixtures("one_torch_thread")
 @pytest.fixture
 def places(tmp_path, monkeypatch):
     """Folders of weights and checkpoints."""
-    monkeypatch.setattr(nets, "FOLDER", tmp_path / "weights")
+    monkeypatch.setattr(trained_laws, "FOLDER", tmp_path / "weights")
     return tmp_path / "weights", tmp_path / "checkpoints"
 
 
@@ -33,13 +33,13 @@ def diverging(net, recipe, laws, checkpoint, show):
 
 
 def test_errors_of_a_training_that_diverges_are_kept(places, monkeypatch, capsys):
-    monkeypatch.setattr(train_laws, "taught", diverging)
-    train_laws.main([NAME], *places)
-    found = diverged(NAME, nets.identity(nets.nets()[NAME]))
+    monkeypatch.setattr(nclaw, "taught", diverging)
+    nclaw.main([NAME], *places)
+    found = diverged(NAME, trained_laws.identity(trained_laws.nets()[NAME]))
     assert found["errors"] == [1e-3, 2e-3]
     assert found["stopped"] == "epoch 3: gone"
     assert found["recipe"]["epochs"] == 300
-    assert found["command"] == f"python -m validation.train_laws {NAME}"
+    assert found["command"] == f"python -m validation.training.nclaw {NAME}"
     assert f"{NAME} diverged: epoch 3: gone" in capsys.readouterr().err
     assert [path.name for path in places[0].iterdir()] == [f"{NAME}.diverged.json"]
     assert not list(places[1].iterdir())
@@ -47,19 +47,20 @@ def test_errors_of_a_training_that_diverges_are_kept(places, monkeypatch, capsys
 
 def test_errors_before_a_checkpoint_are_found_again(places, monkeypatch):
     """A training that goes on and diverges at once has shown none."""
-    monkeypatch.setattr(train_laws, "taught", diverging)
+    monkeypatch.setattr(nclaw, "taught", diverging)
     for place in places:
         place.mkdir()
     (places[1] / f"{NAME}.pt").write_text("two epochs")
-    train_laws.main([NAME], *places)
-    assert diverged(NAME, nets.identity(nets.nets()[NAME]))["errors"] == [1e-3, 2e-3]
+    nclaw.main([NAME], *places)
+    identity = trained_laws.identity(trained_laws.nets()[NAME])
+    assert diverged(NAME, identity)["errors"] == [1e-3, 2e-3]
 
 
 def test_weights_take_the_place_of_what_was_known(places):
     places[0].mkdir()
     path = places[0] / f"{NAME}.npz"
-    train_laws.written(path, {"errors": [], "stopped": "epoch 1: gone"})
+    nclaw.written(path, {"errors": [], "stopped": "epoch 1: gone"})
     assert beside(path).exists()
-    train_laws.written(path, untrained())
+    nclaw.written(path, untrained())
     assert path.exists()
     assert not beside(path).exists()

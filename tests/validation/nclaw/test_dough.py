@@ -6,11 +6,11 @@ import pytest
 from mpm_ref.nclaw.bodies import own
 from mpm_ref.nclaw.camera import filmed, front, pinhole, project
 from mpm_ref.scene import build, dumps, loads
-from validation import targets
-from validation.nclaw import dough, dough_runs, nets
+from validation.common import targets
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
+from validation.nclaw import dough, dough_runs, trained_laws
 from validation.nclaw.states import shots
-from validation.results import Results
-from validation.run import Setting, run_all
 from validation.verification.scenes import with_
 
 
@@ -86,12 +86,12 @@ def test_the_identity_of_a_training_tells_what_it_saw(monkeypatch):
 # The experiment.
 
 def test_the_experiment_says_how_far_laws_are_off(tmp_path, monkeypatch):
-    monkeypatch.setattr(nets, "FOLDER", tmp_path)
+    monkeypatch.setattr(trained_laws, "FOLDER", tmp_path)
     monkeypatch.setattr(dough_runs, "scene", short)
     dough.trained.cache_clear()
-    setting = Setting("quick", tmp_path, targets=targets.load())
+    setting = RunSetting("quick", tmp_path, targets=targets.load())
     assert not run_all([dough_runs.dough.experiment], setting)
-    results = Results(tmp_path)
+    results = ProfileResults(tmp_path)
     found = {r.target: r for r in results.records("nclaw.dough")}
     noise = found["nclaw.dough.true.pixels"].value
     assert noise == pytest.approx(dough.NOISE * 2.0**0.5, rel=0.1)
@@ -101,7 +101,7 @@ def test_the_experiment_says_how_far_laws_are_off(tmp_path, monkeypatch):
         assert found[f"nclaw.dough.{name}.star"].value > 1e-4
     waiting = found["nclaw.dough.untrained"]
     assert waiting.value == len(dough.doughs())
-    assert "python -m validation.train_laws dough" in waiting.note
+    assert "python -m validation.training.nclaw dough" in waiting.note
     assert found["nclaw.dough.depth_speed"].value > 0.0
     dough.trained.cache_clear()
 

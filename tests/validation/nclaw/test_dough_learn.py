@@ -17,11 +17,11 @@ from mpm_ref.nclaw.train.recipe import Recipe  # noqa: E402
 from mpm_ref.nclaw.train.rollout import Laws, squared  # noqa: E402
 from mpm_ref.nclaw.train.sysid import KnownReturn, KnownStress  # noqa: E402
 from mpm_ref.nclaw.train.teacher import Teacher  # noqa: E402
-from validation import train_dough  # noqa: E402
+from validation.common.weights_needed import Untrained  # noqa: E402
 from validation.nclaw import dough  # noqa: E402
 from validation.nclaw.diverged import diverged  # noqa: E402
-from validation.train_laws import main  # noqa: E402
-from validation.waiting import Untrained  # noqa: E402
+from validation.training import dough as dough_training  # noqa: E402
+from validation.training.nclaw import main  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
@@ -32,13 +32,13 @@ H = 1e-3 * 0.5 ** np.arange(5)
 @pytest.fixture(scope="module")
 def true():
     """`Problem` and `cases.Observed` of the block."""
-    return train_dough.run_of()
+    return dough_training.run_of()
 
 
 @pytest.fixture(scope="module")
 def seen():
     """`World` and `Film` of the block."""
-    return train_dough.seen()
+    return dough_training.seen()
 
 
 def exact(problem):
@@ -92,7 +92,7 @@ def test_the_state_is_known_at_the_start_alone(true, seen):
 def test_horizons_grow_to_the_whole_run(seen):
     net = dough.doughs()["dough"]
     steps = len(seen[1].x) - 1
-    recipe = train_dough.recipe_of(net, steps)
+    recipe = dough_training.recipe_of(net, steps)
     ends = [seen[1].restarts(recipe.teacher.restarts(steps, epoch, net.epochs))
             for epoch in range(net.epochs)]
     assert all(start == 0 and len(rest) == 1 for start, *rest in ends)
@@ -145,17 +145,17 @@ def test_training_on_a_film_lowers_the_error(seen):
 def test_the_command_writes_weights_that_are_taken(tmp_path, monkeypatch):
     """With a training of one epoch."""
     short = dough.doughs()["dough"]._replace(epochs=1, guessed=1)
-    monkeypatch.setattr("validation.train_laws.doughs", lambda: {"dough": short})
+    monkeypatch.setattr("validation.training.nclaw.doughs", lambda: {"dough": short})
     monkeypatch.setattr(dough, "doughs", lambda: {"dough": short})
-    monkeypatch.setattr("validation.nclaw.nets.FOLDER", tmp_path)
+    monkeypatch.setattr("validation.nclaw.trained_laws.FOLDER", tmp_path)
     main(["dough"], tmp_path, tmp_path / "checkpoints")
     dough.trained.cache_clear()
     laws = dough.trained("dough")
     dough.trained.cache_clear()
     assert laws.elastic.kind._fields == ("unit",)
     assert len(laws.about["errors"]) == 1
-    assert laws.about["command"] == "python -m validation.train_laws dough"
-    assert world(train_dough.run_of()[0]).dt == pytest.approx(1.0 / 2880.0)
+    assert laws.about["command"] == "python -m validation.training.nclaw dough"
+    assert world(dough_training.run_of()[0]).dt == pytest.approx(1.0 / 2880.0)
 
 
 def test_errors_of_a_training_that_diverges_are_kept(tmp_path, monkeypatch):
@@ -170,9 +170,9 @@ def test_errors_of_a_training_that_diverges_are_kept(tmp_path, monkeypatch):
     (tmp_path / "checkpoints" / "dough-free.pt").write_text("an epoch")
 
     net = dough.doughs()["dough-free"]._replace(guessed=0)
-    monkeypatch.setattr("validation.train_laws.doughs", lambda: {"dough-free": net})
-    monkeypatch.setattr("validation.nclaw.nets.FOLDER", tmp_path)
-    monkeypatch.setattr(train_dough, "train", diverging)
+    monkeypatch.setattr("validation.training.nclaw.doughs", lambda: {"dough-free": net})
+    monkeypatch.setattr("validation.nclaw.trained_laws.FOLDER", tmp_path)
+    monkeypatch.setattr(dough_training, "train", diverging)
     main(["dough-free"], tmp_path, tmp_path / "checkpoints")
     found = diverged("dough-free", dough.identity(net))
     assert (found["errors"], found["stopped"]) == ([1e-3], "epoch 2: gone")

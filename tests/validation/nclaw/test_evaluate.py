@@ -5,21 +5,21 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mpm_ref.cases import in_order
 from mpm_ref.materials import Fluid, NoFlow
 from mpm_ref.materials.learned.response import Correction, Stress
 from mpm_ref.scene import build
 from mpm_ref.simulate import SORT, simulate
-from validation import targets
-from validation.nclaw import errors, evaluate, nets, tables
+from mpm_ref.trajectories import in_order
+from validation.common import targets
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
+from validation.common.weights_needed import Untrained
+from validation.nclaw import errors, evaluate, tables, trained_laws
 from validation.nclaw.environments import ENVIRONMENTS
 from validation.nclaw.evaluate import Broken, Found, compare, fresh, own, positions
+from validation.nclaw.initial_laws import untrained
 from validation.nclaw.tasks import reconstruction
-from validation.nclaw.untrained import untrained
-from validation.results import Results
-from validation.run import Setting, run_all
 from validation.verification.scenes import with_
-from validation.waiting import Untrained
 
 
 def no_stress(body):
@@ -130,7 +130,7 @@ def test_untrained_laws_are_those_that_pytorch_draws():
     ("sand", "sand", "ours"), ("spline-sand", "sand", "spline"), ("sand-spline", "sand", "spline"),
     ("plasticine-no-rotation", "plasticine", "no-rotation"), ("sys-id-water", "water", "sys-id")])
 def test_methods_are_told_by_the_names_of_nets(name, environment, method):
-    assert tables.method_of(name, nets.Net(environment)) == method
+    assert tables.method_of(name, trained_laws.Net(environment)) == method
 
 
 @pytest.mark.parametrize(("value", "low", "high"), [
@@ -162,7 +162,7 @@ def made_up(monkeypatch):
     def compared(scene, laws, goes_on):
         return [Found(float(next(count))) for _ in laws]
 
-    known = {name: nets.Net(name) for name in ENVIRONMENTS}
+    known = {name: trained_laws.Net(name) for name in ENVIRONMENTS}
     for name, value in {"compare": compared, "learned": lambda laws: laws}.items():
         monkeypatch.setattr(errors, name, value)
     for name, value in {"trained": trained, "nets": lambda: known}.items():
@@ -171,9 +171,9 @@ def made_up(monkeypatch):
 
 
 def recorded(folder, experiment, profile="standard"):
-    setting = Setting(profile, folder, targets=targets.load())
+    setting = RunSetting(profile, folder, targets=targets.load())
     failed = run_all([experiment.experiment], setting)
-    return failed, {r.target: r for r in Results(folder).records(experiment.experiment.id)}
+    return failed, {r.target: r for r in ProfileResults(folder).records(experiment.experiment.id)}
 
 
 def test_table_1_has_the_mean_and_the_sample_deviation_of_four(tmp_path, made_up):
@@ -209,7 +209,7 @@ def test_variants_of_ours_are_in_large_bodies_at_the_papers_profile_alone():
 @pytest.fixture
 def beside(made_up, monkeypatch):
     """Of two environments ours and another method, as Tables 4 and 7 have them."""
-    known = {name: nets.Net(name.split("-")[0]) for name in
+    known = {name: trained_laws.Net(name.split("-")[0]) for name in
              ("plasticine", "plasticine-gnn", "water", "water-velocity")}
     made_up.update(known)
     monkeypatch.setattr(tables, "nets", lambda: known)
@@ -224,7 +224,8 @@ def test_tables_4_and_7_have_rows_of_table_1(tmp_path, beside):
         "nclaw.table7.reconstruction.without": (3.0, 2.0e-5),
         "nclaw.table7.reconstruction.with": (4.0, 1.3e-5)}
     assert found["nclaw.table7.reconstruction.with"].verdict == "miss"
-    assert sum("another paper's" in r.note for r in Results(tmp_path).records("nclaw.table1")) == 1
+    records = ProfileResults(tmp_path).records("nclaw.table1")
+    assert sum("another paper's" in r.note for r in records) == 1
 
 
 def test_tables_4_and_7_have_rows_of_table_2(tmp_path, beside):
@@ -246,7 +247,8 @@ def test_tables_4_and_7_have_rows_of_table_2(tmp_path, beside):
         assert found[f"{table}.geometry.{next(iter(columns))}"].verdict == "info"
         assert found[f"{table}.time.{column}"].verdict == "miss"
         assert "mean of 3 velocities" in found[f"{table}.velocity.{column}"].scale
-    assert not any("another paper's" in r.note for r in Results(tmp_path).records("nclaw.table2"))
+    records = ProfileResults(tmp_path).records("nclaw.table2")
+    assert not any("another paper's" in r.note for r in records)
 
 
 def test_table_4_says_the_size_of_its_graph_network(tmp_path, beside, monkeypatch):

@@ -1,5 +1,5 @@
-"""`python -m validation.train_laws ENVIRONMENT-gnn`: from runs to weights that tables find. Needs
-PyTorch.
+"""`python -m validation.training.nclaw ENVIRONMENT-gnn`: from runs to weights that tables find.
+Needs PyTorch.
 """
 
 import numpy as np
@@ -9,12 +9,12 @@ torch = pytest.importorskip("torch")
 
 from mpm_ref.nclaw.gnn.train.examples import run_of  # noqa: E402
 from mpm_ref.nclaw.gnn.train.recipe import GraphRecipe  # noqa: E402
-from validation import train_gnn, train_laws  # noqa: E402
-from validation.nclaw import nets  # noqa: E402
+from validation.nclaw import trained_laws  # noqa: E402
 from validation.nclaw.evaluate import compare  # noqa: E402
-from validation.nclaw.nets import trained  # noqa: E402
 from validation.nclaw.simulators import GraphNet, shown, simulators  # noqa: E402
 from validation.nclaw.tasks import reconstruction, velocity  # noqa: E402
+from validation.nclaw.trained_laws import trained  # noqa: E402
+from validation.training import gnn, nclaw  # noqa: E402
 from validation.verification.scenes import with_  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
@@ -27,20 +27,20 @@ def scene(made=reconstruction, *seed):
 @pytest.fixture
 def places(tmp_path, monkeypatch):
     """Folders of weights and checkpoints; two runs of three frames, and next to no training."""
-    monkeypatch.setattr(train_gnn, "scenes_of", lambda net: [scene(), scene(velocity, 100)])
-    monkeypatch.setattr(train_gnn, "recipe_of", lambda net: GraphRecipe(
+    monkeypatch.setattr(gnn, "scenes_of", lambda net: [scene(), scene(velocity, 100)])
+    monkeypatch.setattr(gnn, "recipe_of", lambda net: GraphRecipe(
         steps=2, check=1, width=4, blocks=1, batch=1))
-    monkeypatch.setattr(nets, "FOLDER", tmp_path / "weights")
+    monkeypatch.setattr(trained_laws, "FOLDER", tmp_path / "weights")
     trained.cache_clear()
     yield tmp_path / "weights", tmp_path / "checkpoints"
     trained.cache_clear()
 
 
 def test_a_graph_network_is_trained_stored_found_and_run(places):
-    train_laws.main(["water-gnn-10"], *places)
+    nclaw.main(["water-gnn-10"], *places)
     found = trained("water-gnn-10")
     assert (found.about["method"], found.about["runs"]) == ("gnn", 10)
-    assert found.about["command"] == "python -m validation.train_laws water-gnn-10"
+    assert found.about["command"] == "python -m validation.training.nclaw water-gnn-10"
     assert len(found.about["errors"]) == len(found.about["losses"]) == 2
     assert found.about["cpu_seconds"] > 0.0
     assert not list(places[1].iterdir())        # the checkpoint is not needed any more
@@ -51,12 +51,12 @@ def test_a_graph_network_is_trained_stored_found_and_run(places):
 def test_what_a_net_says_is_what_is_trained():
     net = GraphNet("sand", steps=3000, width=7, batch=3, noise=2e-4, first_rate=1e-2,
                    last_rate=1e-4, seed=5)
-    recipe, plain = train_gnn.recipe_of(net), GraphRecipe(steps=1000)
+    recipe, plain = gnn.recipe_of(net), GraphRecipe(steps=1000)
     for name in ("steps", "width", "batch", "noise", "first_rate", "last_rate", "seed"):
         assert getattr(recipe, name) == getattr(net, name) != getattr(plain, name)
     for name in ("blocks", "radius", "check", "checked"):
         assert getattr(recipe, name) == getattr(plain, name)
-    assert all(train_gnn.recipe_of(net).rounds == net.steps // 1000
+    assert all(gnn.recipe_of(net).rounds == net.steps // 1000
                for net in simulators().values())
 
 

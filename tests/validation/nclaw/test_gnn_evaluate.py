@@ -9,18 +9,18 @@ from mpm_ref.nclaw.gnn.network import Network, Perceptron
 from mpm_ref.nclaw.gnn.simulator import Simulator
 from mpm_ref.nclaw.gnn.weights import save
 from mpm_ref.scene import build
-from validation import targets
-from validation.nclaw import curves, errors, nets, simulators, tables, trajectories
+from validation.common import targets
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
+from validation.common.weights_needed import Untrained
+from validation.nclaw import curves, errors, gnn_runs, simulators, tables, trained_laws
 from validation.nclaw.environments import ENVIRONMENTS
 from validation.nclaw.evaluate import Broken, Found, compare, own, positions
-from validation.nclaw.free import free
-from validation.nclaw.nets import identity, trained
+from validation.nclaw.gnn_rollout import free
 from validation.nclaw.simulators import GraphNet, scenes_of, shown
 from validation.nclaw.tasks import SEEDS, reconstruction
-from validation.results import Results
-from validation.run import Setting, run_all
+from validation.nclaw.trained_laws import identity, trained
 from validation.verification.scenes import with_
-from validation.waiting import Untrained
 
 CENTER = (0.5, 0.5, 0.5)
 
@@ -53,7 +53,7 @@ def test_there_is_one_of_1_10_and_100_runs_for_each_environment():
         counts = {found[f"{name}-gnn{end}"].runs: found[f"{name}-gnn{end}"].environment
                   for end in ("", "-10", "-100")}
         assert counts == dict.fromkeys((1, 10, 100), name)
-    assert found.items() <= nets.nets().items()
+    assert found.items() <= trained_laws.nets().items()
 
 
 def test_methods_are_told_by_their_names():
@@ -139,14 +139,14 @@ def test_frames_that_are_not_those_it_learned_are_refused(scene, dt, said):
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     """Where weights are looked for; nothing is remembered of it."""
-    monkeypatch.setattr(nets, "FOLDER", tmp_path)
+    monkeypatch.setattr(trained_laws, "FOLDER", tmp_path)
     trained.cache_clear()
     yield tmp_path
     trained.cache_clear()
 
 
 def test_weights_of_graph_networks_are_found_by_name(folder):
-    about = identity(nets.nets()["jelly-gnn"])
+    about = identity(trained_laws.nets()["jelly-gnn"])
     save(folder / "jelly-gnn.npz", toys.simulator()._replace(about=about))
     assert trained("jelly-gnn").about == about
     assert isinstance(trained("jelly-gnn"), Simulator)
@@ -156,7 +156,7 @@ def test_weights_that_are_not_there_or_of_another_training_are_told(folder):
     with pytest.raises(Untrained, match=r"^no weights sand-gnn-10\.npz: python -m "
                                              r"validation\.train_laws sand-gnn-10$"):
         trained("sand-gnn-10")
-    about = identity(nets.nets()["sand-gnn"])
+    about = identity(trained_laws.nets()["sand-gnn"])
     save(folder / "sand-gnn-10.npz", toys.simulator()._replace(about=about))
     with pytest.raises(ValueError, match=r"are of .*'runs': 1, .*, now it is .*'runs': 10, .*: "):
         trained("sand-gnn-10")
@@ -180,9 +180,9 @@ def trained_ones(monkeypatch):
 
 
 def recorded(folder, experiment, profile="standard"):
-    setting = Setting(profile, folder, targets=targets.load())
+    setting = RunSetting(profile, folder, targets=targets.load())
     assert run_all([experiment.experiment], setting) == []
-    return {r.target: r for r in Results(folder).records(experiment.experiment.id)}
+    return {r.target: r for r in ProfileResults(folder).records(experiment.experiment.id)}
 
 
 def test_table_1_has_their_row_and_says_what_was_smaller(tmp_path, trained_ones):
@@ -214,10 +214,10 @@ def test_what_was_picked_is_recorded(tmp_path, trained_ones):
 
 
 def test_table_6_is_of_1_10_and_100_runs_of_water(tmp_path, trained_ones, monkeypatch):
-    monkeypatch.setattr(trajectories, "trained", lambda name: still()._replace(about={"of": name}))
+    monkeypatch.setattr(gnn_runs, "trained", lambda name: still()._replace(about={"of": name}))
     monkeypatch.setattr(errors, "compare", lambda scene, laws, goes_on: [
         Found(2.0 * ("gnn" in one.about["of"]) + len(one.about["of"])) for one in laws])
-    found = recorded(tmp_path, trajectories.table6)
+    found = recorded(tmp_path, gnn_runs.table6)
     assert {target: one.value for target, one in found.items() if target != "nclaw.table6"} == {
         "nclaw.table6.gnn.1.loss": 2.0 + len("water-gnn"), "nclaw.table6.gnn.1.trajectories": 1,
         "nclaw.table6.gnn.10.loss": 2.0 + len("water-gnn-10"),
@@ -234,8 +234,8 @@ def test_table_6_tells_what_is_not_trained_and_runs_nothing(tmp_path, trained_on
     def missing(name):
         raise Untrained(f"no weights {name}.npz")
 
-    monkeypatch.setattr(trajectories, "trained", missing)
+    monkeypatch.setattr(gnn_runs, "trained", missing)
     monkeypatch.setattr(errors, "compare", lambda *args: pytest.fail("ran"))
-    found = recorded(tmp_path, trajectories.table6)
+    found = recorded(tmp_path, gnn_runs.table6)
     assert found.keys() <= {"nclaw.table6", "nclaw.table6.untrained"}
     assert found["nclaw.table6.untrained"].value == 4

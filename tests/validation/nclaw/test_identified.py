@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mpm_ref.cases import Observed
 from mpm_ref.materials import Fluid, Hencky, NoFlow, VonMises
+from mpm_ref.trajectories import Observed
 from validation.nclaw import identified
 
 

@@ -7,7 +7,7 @@ import pytest
 from mpm_ref.nclaw.bodies import own
 from mpm_ref.nclaw.study.compare import positions
 from mpm_ref.scene import build
-from validation.nclaw import elsewhere, melting, shown
+from validation.nclaw import gallery, melting, other_bodies
 from validation.nclaw.environments import ENVIRONMENTS, environment
 from validation.nclaw.tasks import unit_cube
 from validation.verification.scenes import with_
@@ -20,12 +20,12 @@ def scene():
     """A small cube of plasticine."""
     cube = environment("plasticine")
     few = with_(cube.body[0], sampling=with_(cube.body[0].sampling, counts=(4, 4, 4)))
-    return unit_cube(with_(shown.cone(), body=(few,), steps=STEPS, every=EVERY), 10, 1)
+    return unit_cube(with_(gallery.cone(), body=(few,), steps=STEPS, every=EVERY), 10, 1)
 
 
 def fluffy(body):
     """A body of next to no stress."""
-    return elsewhere.fresh(body, body.law._replace(mu=1e-3, lam=1e-3), body.flow)
+    return other_bodies.fresh(body, body.law._replace(mu=1e-3, lam=1e-3), body.flow)
 
 
 def test_a_body_that_does_not_change_is_run_as_ever(scene):
@@ -60,7 +60,7 @@ def test_what_melts_moves_otherwise(scene, monkeypatch):
 
 def nowhere(body):
     """A body whose stress is not a number."""
-    return elsewhere.fresh(body, body.law._replace(mu=np.nan), body.flow)
+    return other_bodies.fresh(body, body.law._replace(mu=np.nan), body.flow)
 
 
 def test_a_run_that_breaks_down_has_frames_of_nan(scene, monkeypatch):
@@ -81,7 +81,7 @@ def test_the_threshold_moves_as_in_the_release(step, share):
 
 @pytest.mark.parametrize("name", ENVIRONMENTS)
 def test_materials_are_known_by_their_laws(name):
-    assert elsewhere.of(build(environment(name)).bodies[0]) == name
+    assert other_bodies.of(build(environment(name)).bodies[0]) == name
 
 
 def test_parts_make_the_whole(scene):

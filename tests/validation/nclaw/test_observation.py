@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mpm_ref.cases import Observed
+from mpm_ref.trajectories import Observed
 from validation.nclaw.observation import (
     OFF,
     Seen,

@@ -2,11 +2,11 @@
 
 import pytest
 
-from validation import targets
-from validation.nclaw import errors, nets, tables
+from validation.common import targets
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
+from validation.nclaw import errors, tables, trained_laws
 from validation.nclaw.evaluate import Found
-from validation.results import Results
-from validation.run import Setting, run_all
 
 ERROR = 0.125
 NAMES = ("jelly", "jelly-spline", "jelly-spline-released", "sand-neural-released")
@@ -18,12 +18,13 @@ def found(monkeypatch, tmp_path):
     monkeypatch.setattr(errors, "compare", lambda scene, laws, goes_on: [Found(ERROR)] * len(laws))
     monkeypatch.setattr(errors, "learned", lambda laws: laws)
     monkeypatch.setattr(tables, "trained", lambda name: name)
-    monkeypatch.setattr(tables, "nets", lambda: {n: nets.Net(n.split("-")[0]) for n in NAMES})
+    monkeypatch.setattr(tables, "nets", lambda: {
+        n: trained_laws.Net(n.split("-")[0]) for n in NAMES})
 
     def of(experiment):
-        failed = run_all([experiment], Setting("standard", tmp_path, targets=targets.load()))
+        failed = run_all([experiment], RunSetting("standard", tmp_path, targets=targets.load()))
         assert failed == []
-        return {r.target: r for r in Results(tmp_path).records(experiment.id)}
+        return {r.target: r for r in ProfileResults(tmp_path).records(experiment.id)}
 
     return of
 
@@ -47,6 +48,7 @@ def test_the_tables_have_the_repaired_ones(found):
 
 def test_the_largest_of_ours_is_generally_below_a_thousandth(found, monkeypatch):
     assert "nclaw.sec4_2.recon_ours_lt" not in found(tables.table1.experiment)
-    monkeypatch.setattr(tables, "nets", lambda: {n: nets.Net(n) for n in tables.ENVIRONMENTS})
+    monkeypatch.setattr(tables, "nets", lambda: {
+        n: trained_laws.Net(n) for n in tables.ENVIRONMENTS})
     record = found(tables.table1.experiment)["nclaw.sec4_2.recon_ours_lt"]
     assert (record.value, record.paper, record.verdict) == (ERROR, 0.001, "miss")

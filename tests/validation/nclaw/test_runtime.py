@@ -6,13 +6,13 @@ import pytest
 from mpm_ref.nclaw.bodies import own
 from mpm_ref.nclaw.gnn.simulator import Simulator
 from tests.validation.nclaw.test_gnn_evaluate import still, water
-from validation import targets
+from validation.common import targets
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
+from validation.common.weights_needed import Untrained
 from validation.nclaw import runtime
+from validation.nclaw.initial_laws import untrained
 from validation.nclaw.simulators import simulators
-from validation.nclaw.untrained import untrained
-from validation.results import Results
-from validation.run import Setting, run_all
-from validation.waiting import Untrained
 
 REPEATS = 10
 
@@ -41,9 +41,9 @@ def runs(monkeypatch):
 
 
 def recorded(folder):
-    setting = Setting("standard", folder, targets=targets.load())
+    setting = RunSetting("standard", folder, targets=targets.load())
     assert run_all([runtime.table3.experiment], setting) == []
-    return {r.target: r for r in Results(folder).records("nclaw.table3")}
+    return {r.target: r for r in ProfileResults(folder).records("nclaw.table3")}
 
 
 def test_laws_and_graph_networks_are_timed_in_turn(tmp_path, runs):

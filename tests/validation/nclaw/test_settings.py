@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from validation import targets
+from validation.common import targets
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
+from validation.common.weights_needed import Untrained
 from validation.nclaw import settings
-from validation.results import Results
-from validation.run import Setting, run_all
 from validation.verification.scenes import shipped, with_
-from validation.waiting import Untrained
 
 ELSEWHERE = {       # in other experiments, with what they are settings of
     *(f"nclaw.table6.{row}.trajectories" for row in ("gnn.1", "gnn.10", "gnn.100", "ours.1")),
@@ -23,9 +23,9 @@ GRAPH = {"nclaw.sec4_1.gnn_step_factor", "nclaw.appF1.steps_gnn",
 
 
 def records(folder):
-    setting = Setting("quick", folder, targets=targets.load())
+    setting = RunSetting("quick", folder, targets=targets.load())
     assert run_all([settings.settings.experiment], setting) == []
-    return {r.target: r for r in Results(folder).records("nclaw.settings")
+    return {r.target: r for r in ProfileResults(folder).records("nclaw.settings")
             if r.target != "nclaw.settings"}
 
 

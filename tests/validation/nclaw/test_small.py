@@ -6,7 +6,6 @@ from nclaw_toys import cube
 
 torch = pytest.importorskip("torch")
 
-from mpm_ref.cases import Observed, observed  # noqa: E402
 from mpm_ref.materials.learned.response import Correction, Stress  # noqa: E402
 from mpm_ref.nclaw.batched_step import world  # noqa: E402
 from mpm_ref.nclaw.train import fit  # noqa: E402
@@ -15,10 +14,11 @@ from mpm_ref.nclaw.train.neural_laws import neural_laws  # noqa: E402
 from mpm_ref.nclaw.train.observations import Partial  # noqa: E402
 from mpm_ref.nclaw.train.recipe import Recipe  # noqa: E402
 from mpm_ref.nclaw.train.rollout import Trajectory, squared, trajectory_of  # noqa: E402
-from validation import train_small  # noqa: E402
+from mpm_ref.trajectories import Observed, observed  # noqa: E402
 from validation.nclaw.observation import Seen  # noqa: E402
-from validation.nclaw.trade_nets import Small, identity  # noqa: E402
-from validation.train_small import bundled, run_of, shown  # noqa: E402
+from validation.nclaw.small_trainings import Small, identity  # noqa: E402
+from validation.training import small  # noqa: E402
+from validation.training.small import bundled, run_of, shown  # noqa: E402
 from validation.verification.scenes import with_  # noqa: E402
 
 STEPS = 11
@@ -126,8 +126,8 @@ def test_a_checkpoint_knows_what_was_seen(run, tmp_path, monkeypatch):
 @pytest.fixture
 def toy(monkeypatch):
     """The trainer on a small cube of a few steps."""
-    monkeypatch.setattr(train_small, "run_of", lambda net: observed(cube(STEPS)))
-    monkeypatch.setattr(train_small, "build", lambda scene: cube(STEPS))
+    monkeypatch.setattr(small, "run_of", lambda net: observed(cube(STEPS)))
+    monkeypatch.setattr(small, "build", lambda scene: cube(STEPS))
     return Small(epochs=3, first=3, last=6, kept=(1, 2))
 
 
@@ -162,7 +162,7 @@ def test_a_training_that_diverges_is_kept_as_far_as_it_came(toy, monkeypatch):
         assert len(done.history) == 2
         raise Diverged("epoch 2: the loss is nan; try smaller rates")
 
-    monkeypatch.setattr(train_small, "train", broken)
+    monkeypatch.setattr(small, "train", broken)
     made = bundled("toy", toy, 1)
     assert list(made.laws) == [1, 2]
     assert made.about["stopped"] == "epoch 2: the loss is nan; try smaller rates"

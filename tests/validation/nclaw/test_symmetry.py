@@ -9,15 +9,15 @@ from neural_toys import deformations, plain, trained
 
 from mpm_ref.materials import FixedCorotated, Fluid
 from mpm_ref.materials.learned import network, response
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.nclaw import symmetry
 from validation.nclaw.environments import ENVIRONMENTS
-from validation.results import Results
-from validation.run import Setting, run_all
 
 
 def test_the_skew_part_is_that_of_the_paper_s_stress():
     of, F = trained(response.Stress(neural_toys.UNIT), 3), deformations(3)
-    skew, size = symmetry.split(network.elastic(of), F)
+    skew, size = symmetry.split(network.build_law(of), F)
     tau = np.array([plain(of, one) for one in F])
     assert size == pytest.approx(np.linalg.norm(tau, axis=(1, 2)), rel=1e-9)
     expected = np.sqrt(sum((tau[:, a, b] - tau[:, b, a]) ** 2 for a, b in ((0, 1), (0, 2), (1, 2)))
@@ -27,7 +27,7 @@ def test_the_skew_part_is_that_of_the_paper_s_stress():
 
 
 @pytest.mark.parametrize("law", [
-    network.elastic(trained(response.SymmetricStress(neural_toys.UNIT), 3)),
+    network.build_law(trained(response.SymmetricStress(neural_toys.UNIT), 3)),
     FixedCorotated(4e4, 3e4), Fluid(5e4)], ids=["learned", "jelly", "water"])
 def test_other_stresses_are_symmetric(law):
     skew, size = symmetry.split(law, deformations(3))
@@ -53,8 +53,8 @@ def test_what_must_be_symmetric_is_judged(tmp_path, monkeypatch):
         (method, name): law for method in ("ours", "admissible") for name in ENVIRONMENTS[:1]})
     monkeypatch.setattr(symmetry, "met", lambda name, every: None)
     monkeypatch.setattr(symmetry, "split", lambda law, F: np.array([[3.0, 0.0], [5.0, 12.0]]))
-    assert run_all([symmetry.symmetry.experiment], Setting("standard", tmp_path)) == []
-    found = {r.target: r for r in Results(tmp_path).records("nclaw.symmetry")}
+    assert run_all([symmetry.symmetry.experiment], RunSetting("standard", tmp_path)) == []
+    found = {r.target: r for r in ProfileResults(tmp_path).records("nclaw.symmetry")}
     ours, admissible = (found[f"nclaw.symmetry.{word}.jelly"] for word in ("ours", "admissible"))
     assert ours.value == pytest.approx(3.0 / 13.0)
     assert "0.3 in the median, 0.6 at most" in ours.note

@@ -6,7 +6,7 @@ import pytest
 from mpm_ref.problem import Clock
 from mpm_ref.scene import Mesh, Poisson, build
 from mpm_ref.shapes.inside import solid
-from validation.nclaw import shown, tasks, toys
+from validation.nclaw import gallery, stand_in_bodies, tasks
 from validation.nclaw.environments import ENVIRONMENTS
 from validation.verification.scenes import with_
 
@@ -62,7 +62,7 @@ def test_other_bodies_fall_on_a_finer_grid(name):
 
 @pytest.mark.parametrize("toy", tasks.TOYS.values(), ids=lambda toy: toy.name)
 def test_stand_ins_are_as_long_and_as_large_as_the_meshes(toy):
-    body = solid(toys.toy(toy.name, toy.size))
+    body = solid(stand_in_bodies.toy(toy.name, toy.size))
     size = body.high - body.low
     assert size.max() == pytest.approx(toy.size, rel=0.09)
     assert 0.5 * (body.high + body.low) == pytest.approx(3 * [0.5], abs=0.06)
@@ -70,16 +70,17 @@ def test_stand_ins_are_as_long_and_as_large_as_the_meshes(toy):
 
 
 def test_a_mesh_of_the_users_is_taken_instead(tmp_path, monkeypatch):
-    monkeypatch.setattr(toys, "MESHES", tmp_path)
-    assert toys.said("bunny") == "a stand-in for bunny"
+    monkeypatch.setattr(stand_in_bodies, "MESHES", tmp_path)
+    assert stand_in_bodies.said("bunny") == "a stand-in for bunny"
     (tmp_path / "bunny.obj").write_text("v 0 0 0")
-    assert toys.toy("bunny", 0.7) == Mesh(file=str(tmp_path / "bunny.obj"), size=0.7,
+    assert stand_in_bodies.toy("bunny", 0.7) == Mesh(file=str(tmp_path / "bunny.obj"), size=0.7,
                                           center=(0.5, 0.5, 0.5))
-    assert toys.said("bunny") == "bunny"
-    assert not isinstance(toys.toy("spot", 0.7), Mesh)
+    assert stand_in_bodies.said("bunny") == "bunny"
+    assert not isinstance(stand_in_bodies.toy("spot", 0.7), Mesh)
 
 
-@pytest.mark.parametrize("scene", [tasks.slope(), shown.large(), shown.contact(), shown.pool()],
+@pytest.mark.parametrize("scene", [tasks.slope(), gallery.large(), gallery.contact(),
+                                   gallery.pool()],
                          ids=["slope", "large", "contact", "pool"])
 def test_bodies_that_are_only_looked_at_are_within_the_box(scene):
     low, high = scene.clip.lower, scene.clip.upper
@@ -97,7 +98,7 @@ def test_the_slope_pulls_down_and_along():
 
 
 def test_the_pool_holds_as_many_points_as_printed():
-    problem = build(shown.pool())
+    problem = build(gallery.pool())
     duck, water = problem.bodies
     assert len(duck.particles.x) + len(water.particles.x) == 102_294
     assert water.particles.m[0] / water.particles.V0[0] == pytest.approx(3000.0)
@@ -105,7 +106,7 @@ def test_the_pool_holds_as_many_points_as_printed():
 
 
 def test_toys_run_to_the_middle():
-    for body in shown.contact().body:
+    for body in gallery.contact().body:
         middle = np.array((0.5, 0.4, 0.5)) - np.mean(
             [solid(body.shape).low, solid(body.shape).high], axis=0)
         v = np.array(body.velocity.linear)

@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from mpm_ref.reduced.inferring import infer
-from mpm_ref.reduced.nsf import watch
-from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.kinematics import NoBody
-from validation.nsf import beyond, tested
+from mpm_ref.rom.study import nsf_watch
+from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.nsf_run import infer
+from validation.nsf import reduced_runs, unseen_runs
 from validation.nsf.studies import bread
 
 
 @pytest.fixture(scope="module")
 def slice_of_bread():
-    return tested.tested(bread(4, train=3)._replace(test=(beyond.E,)))
+    return reduced_runs.tested(bread(4, train=3)._replace(test=(unseen_runs.E,)))
 
 
 def boxes(scene):
@@ -22,8 +22,8 @@ def boxes(scene):
 
 
 def test_weak_boxes_are_shifted_in_both_bodies_and_stay_between_the_ends():
-    base = bread(2).run(beyond.E)
-    mild, rough = (beyond.shifted(base, scale, 0) for scale in (0.08, 0.3))
+    base = bread(2).run(unseen_runs.E)
+    mild, rough = (unseen_runs.shifted(base, scale, 0) for scale in (0.08, 0.3))
     for scene in (mild, rough):
         assert scene.body[0].shape.minus == scene.body[1].shape.shapes
         assert (boxes(scene)[:, 0] > 0.4 - 1e-12).all()
@@ -32,32 +32,32 @@ def test_weak_boxes_are_shifted_in_both_bodies_and_stay_between_the_ends():
     off = [np.abs(boxes(scene) - boxes(base)).max() for scene in (mild, rough)]
     assert 0.005 < off[0] <= 0.02
     assert off[1] > 2.0 * off[0]
-    assert beyond.shifted(base, 0.08, 0) == mild
-    assert beyond.shifted(base, 0.08, 1) != mild
+    assert unseen_runs.shifted(base, 0.08, 0) == mild
+    assert unseen_runs.shifted(base, 0.08, 1) != mild
 
 
 def test_points_are_in_the_order_of_training(slice_of_bread):
     one = slice_of_bread
-    scene = beyond.shifted(one.study.run(beyond.E), 0.3, 0)
+    scene = unseen_runs.shifted(one.study.run(unseen_runs.E), 0.3, 0)
     assert not np.array_equal(whole(scene).X, one.runs.X)
-    test = beyond.other(one, scene)
+    test = unseen_runs.other(one, scene)
     assert np.abs(test.X - one.runs.X).max() < 1e-12
     assert np.abs(test.x[0, 0] - one.runs.X).max() < 1e-6
-    usual = one.tests[beyond.E]
+    usual = one.tests[unseen_runs.E]
     assert test.x.shape == usual.x.shape
     assert np.abs(test.x[0, -1] - usual.x[0, -1]).max() > 1e-3
 
 
 def test_other_points_are_refused(slice_of_bread):
-    scene = bread(5).run(beyond.E)
+    scene = bread(5).run(unseen_runs.E)
     with pytest.raises(ValueError, match="expected the same slice"):
-        beyond.other(slice_of_bread, scene)
+        unseen_runs.other(slice_of_bread, scene)
 
 
 @pytest.mark.parametrize(("shift", "side", "end"), [(1.0, "upper", 0.6), (-1.0, "lower", 0.4)])
 def test_a_box_goes_no_farther_than_the_held_ends(shift, side, end):
-    box = bread(2).run(beyond.E).body[1].shape.shapes[0]
-    gone = beyond.moved(box, shift)
+    box = bread(2).run(unseen_runs.E).body[1].shape.shapes[0]
+    gone = unseen_runs.moved(box, shift)
     assert getattr(gone, side)[0] == pytest.approx(end)
     assert gone.upper[0] - gone.lower[0] == pytest.approx(box.upper[0] - box.lower[0])
     assert gone.lower[1:] == pytest.approx(box.lower[1:])
@@ -71,11 +71,11 @@ def test_the_farthest_state_is_that_of_the_whole_run(slice_of_bread, monkeypatch
     seen = []
 
     def look(extent, at, report):
-        seen.append(watch.look(extent, at, report))
+        seen.append(nsf_watch.look(extent, at, report))
         return seen[-1]
 
-    monkeypatch.setattr(beyond, "look", look)
-    far = beyond.farthest(one, value)
+    monkeypatch.setattr(unseen_runs, "look", look)
+    far = unseen_runs.farthest(one, value)
     assert len(seen) == whole(one.study.run(value)).problem.clock.steps + 1
     assert far == max(sight.beyond for sight in seen)
 
@@ -85,5 +85,5 @@ def test_the_farthest_state_is_that_of_the_whole_run(slice_of_bread, monkeypatch
                 raise NoBody("gone")
             yield state
 
-    monkeypatch.setattr(beyond, "infer", breaks)
-    assert beyond.farthest(one, value) == max(sight.beyond for sight in seen[:3])
+    monkeypatch.setattr(unseen_runs, "infer", breaks)
+    assert unseen_runs.farthest(one, value) == max(sight.beyond for sight in seen[:3])

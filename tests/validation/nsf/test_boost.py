@@ -6,12 +6,12 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from figures import nsf_fig06
-from validation.nsf import boost
+from figures.nsf import fig06
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
+from validation.common.weights_needed import Untrained
+from validation.nsf import super_resolution
 from validation.nsf.studies import jelly
-from validation.results import Results
-from validation.run import Setting, run_all
-from validation.waiting import Untrained
 
 mpl.use("Agg")
 
@@ -33,7 +33,7 @@ def recorded(rng, tmp_path):
         run = SimpleNamespace(profile="quick", folder=tmp_path,
                               experiment=SimpleNamespace(id="nsf.fig6"),
                               record=lambda id, value, **rule: found.update({id[9:]: value}))
-        boost.compared(run, SimpleNamespace(place=place), few, many, xhat)
+        super_resolution.compared(run, SimpleNamespace(place=place), few, many, xhat)
         return found
 
     return of
@@ -53,16 +53,16 @@ def test_errors_are_of_the_displacement_at_all_times(recorded):
 
 def test_the_grid_stays_and_points_are_more():
     scene = jelly(4).run(0.45)
-    more = boost.finer(scene, 8)
+    more = super_resolution.finer(scene, 8)
     assert more.dx == scene.dx
     assert [body.sampling.count for body in more.body] == [
         8 * body.sampling.count for body in scene.body]
-    assert boost.states(scene).x.shape[1] == 1 + boost.SHOTS
+    assert super_resolution.states(scene).x.shape[1] == 1 + super_resolution.SHOTS
 
 
 def test_a_figure_of_three_rows(recorded, tmp_path):
     recorded(stretched)
-    axes = nsf_fig06.draw(SimpleNamespace(folder=tmp_path)).axes
+    axes = fig06.draw(SimpleNamespace(folder=tmp_path)).axes
     assert [ax.texts[0].get_text() for ax in axes[::3]] == [
         "points of the training", "networks, more points", "full order, more points"]
 
@@ -71,7 +71,7 @@ def test_without_weights_it_says_how_they_are_made(tmp_path, monkeypatch):
     def missing(name):
         raise Untrained(f"no weights {name}.npz")
 
-    monkeypatch.setattr(boost, "trained", missing)
-    assert run_all([boost.boost.experiment], Setting("quick", tmp_path)) == []
-    assert {r.target for r in Results(tmp_path).records("nsf.fig6")} == {
+    monkeypatch.setattr(super_resolution, "trained", missing)
+    assert run_all([super_resolution.boost.experiment], RunSetting("quick", tmp_path)) == []
+    assert {r.target for r in ProfileResults(tmp_path).records("nsf.fig6")} == {
         "nsf.fig6", "nsf.fig6.untrained"}

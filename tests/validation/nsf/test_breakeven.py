@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from mpm_ref.reduced.whole import whole
+from mpm_ref.rom.study.nsf_case import whole
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.nsf import breakeven
 from validation.nsf.breakeven import Cost, kinds
 from validation.nsf.studies import jelly
-from validation.results import Results
-from validation.run import Setting, run_all
 
 SMALL = breakeven.Scene(jelly, (5, 7, 11), 0.25)
 
@@ -55,8 +55,8 @@ def test_records_follow_from_times(tmp_path, monkeypatch):
     monkeypatch.setattr(breakeven, "seconds_of_a_point", lambda fields, points: 1.0)
     monkeypatch.setattr(breakeven, "passes", lambda fields, points: (2.0, 6.0))
     monkeypatch.setattr(breakeven, "whole_steps", lambda study, steps: (2.0 * n, 1.0 * n))
-    assert not run_all([breakeven.breakeven.experiment], Setting("quick", tmp_path))
-    results = Results(tmp_path)
+    assert not run_all([breakeven.breakeven.experiment], RunSetting("quick", tmp_path))
+    results = ProfileResults(tmp_path)
     found = {r.target: r.value for r in results.records("nsf.breakeven")}
     for word in ("printed", "networks-64", "modes"):
         assert found[f"nsf.breakeven.jelly.{word}.even"] == pytest.approx(100.0)

@@ -5,10 +5,10 @@ import pytest
 from small_toys import Records
 
 from mpm_ref.core.grid import OutOfRange
-from mpm_ref.reduced.inferring import of_cells
-from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.fields.elastic import Deformed
-from validation.nsf import errors, tested
+from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.nsf_run import of_cells
+from validation.nsf import errors, reduced_runs
 from validation.nsf.studies import bread, cake, jelly, metal, sand, toothpaste
 
 TEST = 0.45
@@ -17,7 +17,7 @@ TEST = 0.45
 @pytest.fixture(scope="module")
 def cube():
     """The jelly cube at half the resolution."""
-    return tested.tested(jelly(2))
+    return reduced_runs.tested(jelly(2))
 
 
 def test_coarse_grids_keep_particles_to_a_cell_and_waves_to_a_step():
@@ -84,7 +84,7 @@ def test_tests_that_are_a_training_run_are_counted(cube):
 
 
 def test_the_affine_field_is_worth_its_modes(cube):
-    without = tested.refitted(cube, cube.study.sizes._replace(C=0), follows=False)
+    without = reduced_runs.refitted(cube, cube.study.sizes._replace(C=0), follows=False)
     some = [one.errors(TEST, 50).errors.origin for one in (without, cube)]
     assert some[0] > 5.0 * some[1]
     assert without.xhat == pytest.approx(cube.xhat, abs=1e-9)
@@ -106,7 +106,7 @@ def test_a_run_that_breaks_down_is_infinitely_off(cube, monkeypatch):
         raise OutOfRange("far away")
         yield
 
-    monkeypatch.setattr(tested, "infer", broken)
+    monkeypatch.setattr(reduced_runs, "infer", broken)
     found = cube.errors(TEST, 50)
     assert found.errors == (np.inf, np.inf, np.inf)
     assert found.stress == np.inf

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from small_toys import Records
 
-from mpm_ref.reduced.inferring import of_cells
-from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.fields.pod_fields import Sizes
-from validation.nsf import factors, tested
+from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.nsf_run import of_cells
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
+from validation.nsf import factors, reduced_runs
 from validation.nsf.factors import Way
 from validation.nsf.studies import jelly
-from validation.results import Results
-from validation.run import Setting, run_all
 
 STUDY = jelly(4)._replace(train=(0.3, 0.5), test=(0.35, 0.4), samples=40,
                           sizes=Sizes(r=3, modes=8, tau=12, C=12, smoothing=1e-4))
@@ -23,7 +23,7 @@ DRAWN, WEIGHED, LONGER, CELLS = (
 @pytest.fixture(scope="module")
 def one():
     """The small study."""
-    return tested.tested(STUDY)
+    return reduced_runs.tested(STUDY)
 
 
 @pytest.fixture
@@ -94,8 +94,8 @@ def test_errors_and_times_are_recorded(one, tmp_path, monkeypatch):
     monkeypatch.setattr(factors, "PRINTED", {"metal": WEIGHED, "cake": DRAWN})
     monkeypatch.setattr(factors, "WAYS", {("quick", "metal"): (DRAWN, WEIGHED),
                                           ("quick", "cake"): (CELLS,)})
-    assert not run_all([factors.factors.experiment], Setting("quick", tmp_path))
-    found = Results(tmp_path)
+    assert not run_all([factors.factors.experiment], RunSetting("quick", tmp_path))
+    found = ProfileResults(tmp_path)
     table = found.table("nsf.factors", "ways")
     assert table["scene"].tolist() == ["metal", "metal", "cake"]
     for k, way in enumerate((DRAWN, WEIGHED, CELLS)):

@@ -3,14 +3,14 @@
 import pytest
 from small_toys import Records
 
-from mpm_ref.reduced.inferring import Plan, infer
-from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.fields.pod_fields import Sizes
-from validation import targets
-from validation.nsf import inversion, tested
+from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.nsf_run import Plan, infer
+from validation.common import targets
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
+from validation.nsf import inversion, reduced_runs
 from validation.nsf.studies import jelly
-from validation.results import Results
-from validation.run import Setting, run_all
 
 STUDY = jelly(4)._replace(train=(0.3, 0.5), test=(0.35, 0.4), samples=40,
                           sizes=Sizes(r=3, modes=8, tau=12, C=12, smoothing=1e-4))
@@ -19,7 +19,7 @@ STUDY = jelly(4)._replace(train=(0.3, 0.5), test=(0.35, 0.4), samples=40,
 @pytest.fixture(scope="module")
 def one():
     """The small study."""
-    return tested.tested(STUDY)
+    return reduced_runs.tested(STUDY)
 
 
 @pytest.mark.parametrize("faster", [1.0, 1.5])
@@ -50,9 +50,9 @@ def test_errors_and_iterations_are_recorded(one, tmp_path, monkeypatch):
     monkeypatch.setattr(inversion, "jelly", lambda coarser: STUDY)
     monkeypatch.setattr(inversion, "metal", lambda coarser, train: STUDY._replace(test=(0.4,)))
     monkeypatch.setattr(inversion, "tested", lambda study: one._replace(study=study))
-    setting = Setting("quick", tmp_path, targets=targets.load())
+    setting = RunSetting("quick", tmp_path, targets=targets.load())
     assert not run_all([inversion.inversion.experiment], setting)
-    found = Results(tmp_path)
+    found = ProfileResults(tmp_path)
     table = found.table("nsf.inversion", "runs")
     assert list(zip(table["scene"], table["value"], table["inversion"], table["faster"],
                     strict=True)) == [

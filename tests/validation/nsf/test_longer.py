@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from small_toys import Records
 
-from mpm_ref.reduced.errors import Errors
-from mpm_ref.reduced.whole import history
 from mpm_ref.rom.kinematics import NoBody
 from mpm_ref.rom.snapshots import Histories
+from mpm_ref.rom.study.errors import Errors
+from mpm_ref.rom.study.nsf_case import history
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.nsf import longer
 from validation.nsf.studies import jelly, metal
-from validation.results import Results
-from validation.run import Setting, run_all
 from validation.verification.scenes import with_
 
 STUDY = jelly(4)._replace(test=(0.3, 0.35, 0.4), every=8)
@@ -93,8 +93,8 @@ def test_errors_and_times_are_recorded(tmp_path, monkeypatch):
     monkeypatch.setattr(longer, "metal", lambda coarser: STUDY)
     monkeypatch.setattr(longer, "cake", lambda coarser: STUDY)
     monkeypatch.setattr(longer, "taken", lambda scene, repeats: [8.0, 6.0, 4.0, inf])
-    assert not run_all([longer.longer.experiment], Setting("quick", tmp_path))
-    found = Results(tmp_path)
+    assert not run_all([longer.longer.experiment], RunSetting("quick", tmp_path))
+    found = ProfileResults(tmp_path)
     table = found.table("nsf.longer", "steps")
     assert table["scene"].tolist() == 4 * ["metal"] + 4 * ["cake"]
     assert table["faster"].tolist() == 2 * list(FACTORS)

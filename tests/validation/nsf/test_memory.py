@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from mpm_ref.rom.fields.pod_fields import Sizes
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.nsf import memory
-from validation.results import Results
-from validation.run import Setting, run_all
 
 STUDY = memory.shear()._replace(train=(0.02, 0.04), test=(0.03, 0.035), steps=600,
                                 sizes=Sizes(r=4, modes=8, tau=20, C=10, smoothing=1e-2))
@@ -18,8 +18,8 @@ def recorded(tmp_path_factory):
     folder = tmp_path_factory.mktemp("memory")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(memory, "studies", lambda run: {"shear": STUDY})
-        assert not run_all([memory.memory.experiment], Setting("quick", folder))
-    results = Results(folder)
+        assert not run_all([memory.memory.experiment], RunSetting("quick", folder))
+    results = ProfileResults(folder)
     return ({r.target: r.value for r in results.records("nsf.memory")},
             results.table("nsf.memory", "errors"))
 

@@ -6,28 +6,20 @@ import numpy as np
 import pytest
 from field_toys import R, networks
 
-from mpm_ref.reduced.errors import Errors
-from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.fields_file import Model, save
-from validation import targets
+from mpm_ref.rom.study.errors import Errors
+from mpm_ref.rom.study.nsf_case import whole
+from validation.common import targets
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
+from validation.common.weights_needed import Untrained
 from validation.nsf import networks as kept
 from validation.nsf import networks_runs as runs
-from validation.nsf import tested
-from validation.nsf.networks import (
-    Net,
-    Part,
-    fields_of,
-    identity,
-    net_of,
-    nets,
-    trained,
-)
-from validation.nsf.studied import STUDIES
+from validation.nsf import reduced_runs
+from validation.nsf.networks import Net, Part, fields_of, identity, net_of, nets, trained
 from validation.nsf.studies import jelly
-from validation.results import Results
-from validation.run import Setting, run_all
-from validation.waiting import Untrained
+from validation.nsf.study_settings import STUDIES
 
 STUDY = jelly(4)._replace(train=(0.3, 0.5), sizes=Sizes(r=R), samples=20)
 NET = Net(STUDY, Part(4, 2, 0.1), Part(5, 2, 0.0), Part(6, 2, 0.0))
@@ -77,7 +69,7 @@ def test_seeds_differ_in_the_seed_alone():
 
 @pytest.mark.usefixtures("folder")
 def test_missing_weights_say_how_they_are_made():
-    with pytest.raises(Untrained, match=r"no weights jelly.npz: python -m validation.train_fields "
+    with pytest.raises(Untrained, match=r"no weights jelly.npz: python -m validation.training.nsf "
                                         "jelly"):
         trained("jelly")
 
@@ -101,7 +93,7 @@ def test_weights_come_back_as_fields_of_the_scene(folder):
 def test_weights_of_another_training_are_refused(folder, change):
     save(folder / "jelly.npz", model(NET._replace(**change)))
     with pytest.raises(ValueError, match=r"weights jelly.npz are of .*, now it is .*: python -m "
-                                         "validation.train_fields jelly"):
+                                         "validation.training.nsf jelly"):
         trained("jelly")
 
 
@@ -124,16 +116,16 @@ def test_weights_that_lie_there_are_those_of_their_nets():
 
 def recorded(folder):
     """{id without "nsf.networks.": `Record`} of the experiment, which must not fail."""
-    setting = Setting("standard", folder / "out", targets=targets.load())
+    setting = RunSetting("standard", folder / "out", targets=targets.load())
     assert run_all([runs.networks.experiment], setting) == []
     return {r.target.removeprefix("nsf.networks."): r
-            for r in Results(folder / "out").records("nsf.networks")}
+            for r in ProfileResults(folder / "out").records("nsf.networks")}
 
 
 def test_without_weights_there_are_costs_and_the_command(folder):
     found = recorded(folder)
     assert found["untrained"].value == 1
-    assert "python -m validation.train_fields jelly" in found["untrained"].note
+    assert "python -m validation.training.nsf jelly" in found["untrained"].note
     assert found["jelly.weights"].value == (6 * 4 + 4 * 16 + 4 * 3 + 6 * 5 + 4 * 25 + 5 * 6
                                             + 6 * 6 + 4 * 36 + 6 * 9)
     assert found["jelly.operations"].value == 2 * found["jelly.weights"].value
@@ -146,13 +138,13 @@ def test_the_printed_networks_of_jelly_are_those_of_table_1(folder, monkeypatch)
     assert recorded(folder)["jelly.weights.printed"].value == 37_920 + 595_200 + 1_336_896
 
 
-class Ready(tested.Tested):
+class Ready(reduced_runs.Tested):
     """`Tested` with known errors, of each draw others."""
 
     def errors(self, value, count, draw, faster, weighed):
         """Errors that tell their draw, and whether samples have weights."""
         error = (0.001 if weighed else 0.01) * (draw + 1)
-        return tested.Found(Errors(error, 0.02, 0.03), 0.2, float(count), count, np.nan)
+        return reduced_runs.Found(Errors(error, 0.02, 0.03), 0.2, float(count), count, np.nan)
 
     def nearest(self, value):
         """Of the nearest states."""
@@ -181,7 +173,7 @@ def test_errors_are_means_in_per_cent(folder, monkeypatch):
     assert "2 runs and 1 test, dx and dt 4 times as long; r = 3, widths 4, 5 and 6, seed 0" in (
         found["jelly"].scale)
     assert "untrained" not in found
-    table = Results(folder / "out").table("nsf.networks", "errors")
+    table = ProfileResults(folder / "out").table("nsf.networks", "errors")
     assert table["draw"].tolist() == [0, 1, 2, 0, 1, 2, 0]
     assert (table["points"] == table["samples"]).all()
     assert {*table["scene"]} == {"jelly"}
@@ -190,7 +182,7 @@ def test_errors_are_means_in_per_cent(folder, monkeypatch):
 def test_weights_of_samples_are_those_of_modes_of_the_same_runs(folder):
     """The networks know no modes."""
     save(folder / "jelly.npz", model())
-    one, plain = runs.tested_on(trained("jelly"), STUDY), tested.tested(STUDY)
+    one, plain = runs.tested_on(trained("jelly"), STUDY), reduced_runs.tested(STUDY)
     scene = whole(STUDY.run(0.45))
     asked = []
     spied = STUDY.__class__.chosen

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from mpm_ref.placement import misplaced
-from mpm_ref.reduced.vary import varied
+from mpm_ref.preflight import misplaced
 from mpm_ref.scene import build, digest
+from mpm_ref.scene.overrides import varied
 from validation.verification.scenes import SCENES, shipped, with_
 
 VARIED = {      # scene: the key that sets the parameter of its experiment, and the parameter's ends

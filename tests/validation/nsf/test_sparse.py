@@ -8,22 +8,21 @@ from command_line import mpm_ref
 from small_nsf_studies import modelled, write
 from small_toys import Records
 
-from mpm_ref.reduced import inferring, maps
-from mpm_ref.reduced.inferring import Chosen, Plan, drawn, infer, of_cells, weighed
-from mpm_ref.reduced.nsf import watch
-from mpm_ref.reduced.nsf.recording import plan_of
-from mpm_ref.reduced.study import load
-from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.cubature import misfit
 from mpm_ref.rom.fields.pod_fields import Sizes
+from mpm_ref.rom.study import nsf_run, nsf_watch, reduce
+from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.nsf_record import plan_of
+from mpm_ref.rom.study.nsf_run import Chosen, Plan, drawn, infer, of_cells, weighed
+from mpm_ref.rom.study.study import load
 from mpm_ref.store.results import Results as Stored
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.extremes import nsf_samples as samples
 from validation.extremes.ldm_runs import BAD, Trial
 from validation.extremes.nsf_runs import Bench, End
-from validation.nsf import tested
+from validation.nsf import reduced_runs
 from validation.nsf.studies import jelly
-from validation.results import Results
-from validation.run import Setting, run_all
 
 GOOD = End(2.0, 0.2, 15.0, 30, -1, "", 0.4, 5, 0.01, "")
 
@@ -35,10 +34,10 @@ def made(tmp_path_factory):
 
 
 def test_they_are_told_by_the_command(made, tmp_path, monkeypatch):
-    fields = maps.read(made / "fields.npz").decoder
+    fields = reduce.read(made / "fields.npz").decoder
     left = misfit(fields.U, 3, drawn(len(fields.X), 20, 0).points)
     for bound, warned in ((0.99 * left, True), (1.01 * left, False)):
-        monkeypatch.setattr(watch, "SPARSE", bound)
+        monkeypatch.setattr(nsf_watch, "SPARSE", bound)
         done = mpm_ref("rom", "run", made / "pairs.toml", "--map", made / "fields.npz", "--out",
                        tmp_path / "run.h5", "--set", "v=2", "--overwrite")
         assert done.exit_code == 0
@@ -54,12 +53,12 @@ def test_they_are_told_by_the_command(made, tmp_path, monkeypatch):
 def test_a_run_on_samples_with_weights_is_that_of_their_plan(made, tmp_path, monkeypatch, asked,
                                                              pick, words):
     """By `rom run` and by `rom evaluate`; of networks there are none. The seed draws candidates."""
-    monkeypatch.setattr(inferring, "CANDIDATES", 40)
-    monkeypatch.setattr(inferring, "OFFERED", 12)
+    monkeypatch.setattr(nsf_run, "CANDIDATES", 40)
+    monkeypatch.setattr(nsf_run, "OFFERED", 12)
     study, out = write(tmp_path, ("points = 20", asked)), tmp_path / "run.h5"
     done = mpm_ref("rom", "run", study, "--map", made / "fields.npz", "--out", out, "--set", "v=2")
     assert done.exit_code == 0, done.output
-    model, one = maps.read(made / "fields.npz"), whole(load(study).scene([2.0]))
+    model, one = reduce.read(made / "fields.npz"), whole(load(study).scene([2.0]))
     fields = model.decoder.of([2.0])
     chosen = pick(fields, one)
     *_, (_, last, report) = infer(one, fields, Plan((chosen,)), model.rest)
@@ -76,13 +75,13 @@ def test_a_run_on_samples_with_weights_is_that_of_their_plan(made, tmp_path, mon
 
 
 def test_of_networks_nothing_is_known():
-    assert not list(watch.sparse(SimpleNamespace(r=3), drawn(40, 1, 0)))
+    assert not list(nsf_watch.sparse(SimpleNamespace(r=3), drawn(40, 1, 0)))
 
 
 def test_weights_tell_what_they_leave():
     for left, count in ((0.9, 1), (0.1, 0)):
         one = Chosen(0.0, np.arange(4), np.ones(4), left)
-        assert len(list(watch.sparse(SimpleNamespace(r=3), one))) == count
+        assert len(list(nsf_watch.sparse(SimpleNamespace(r=3), one))) == count
 
 
 def trial(error=2.0, flags=""):
@@ -118,12 +117,12 @@ def test_scenes_that_the_bound_has_not_seen_are_judged_by_it(tmp_path, monkeypat
     study = jelly(4)._replace(train=(0.3, 0.5), test=(0.4,), samples=40,
                               sizes=Sizes(r=5, modes=8, tau=12, C=12, smoothing=1e-4))
     monkeypatch.setattr(samples, "others", lambda run: {"cube": study})
-    assert not run_all([samples.unseen.experiment], Setting("quick", tmp_path))
-    found = Results(tmp_path)
+    assert not run_all([samples.unseen.experiment], RunSetting("quick", tmp_path))
+    found = ProfileResults(tmp_path)
     table = found.table("extremes.nsf.unseen", "left")
     assert list(zip(table["map"], table["what"], table["samples"], strict=True)) == [
         ("cube", "draw 0", 3)]
-    one = tested.tested(study)
+    one = reduced_runs.tested(study)
     points = drawn(len(one.fields.X), 3, 0).points
     assert table["left"] == pytest.approx([misfit(one.fields.U, 5, points)])
     records = {r.target: r for r in found.records("extremes.nsf.unseen")}

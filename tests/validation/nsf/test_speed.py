@@ -7,15 +7,15 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from mpm_ref.reduced.inferring import Plan, infer
-from mpm_ref.reduced.whole import whole
 from mpm_ref.rom.fields.pod_fields import Sizes
-from mpm_ref.rom.inferred import Inferred
+from mpm_ref.rom.step import ReducedStepper
+from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.nsf_run import Plan, infer
 from mpm_ref.simulate import simulate
-from validation.nsf import speed, tested
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
+from validation.nsf import reduced_runs, speed
 from validation.nsf.studies import jelly
-from validation.results import Results
-from validation.run import Setting, run_all
 from validation.trade.nsf_sizes import particle_bytes
 
 STUDY = jelly(4)._replace(train=(0.3, 0.5), test=(0.35, 0.4), samples=40,
@@ -29,7 +29,7 @@ N, FEW = 156, 2                     # particles of both, and so few samples that
 @pytest.fixture(scope="module")
 def one():
     """The small study."""
-    return tested.tested(STUDY._replace(test=STUDY.test[1:]))
+    return reduced_runs.tested(STUDY._replace(test=STUDY.test[1:]))
 
 
 @pytest.fixture
@@ -50,7 +50,8 @@ def clock(monkeypatch):
         yield from simulate(problem)
 
     for stage, spent in SPENT.items():
-        monkeypatch.setattr(Inferred, stage, passing(getattr(Inferred, stage), spent))
+        method = speed.STAGES[stage]
+        monkeypatch.setattr(ReducedStepper, method, passing(getattr(ReducedStepper, method), spent))
     monkeypatch.setattr(speed, "deform_body", passing(speed.deform_body, DEFORM))
     monkeypatch.setattr(speed, "simulate", run)
     monkeypatch.setattr(speed, "perf_counter", lambda: now[0])
@@ -123,10 +124,10 @@ def recorded(one, clock, tmp_path, monkeypatch):
     monkeypatch.setattr(speed, "STUDIES", {"jelly": (small, (N, FEW))})
     monkeypatch.setattr(speed, "sand", small)
     monkeypatch.setattr(speed, "tested", made)
-    assert not run_all([speed.speed.experiment], Setting("quick", tmp_path))
+    assert not run_all([speed.speed.experiment], RunSetting("quick", tmp_path))
     assert asked == [(3, 3), STUDY._replace(test=STUDY.test[1:]),
                      (3, 3), STUDY._replace(test=STUDY.test[:1], steps=speed.HELD)]
-    results = Results(tmp_path)
+    results = ProfileResults(tmp_path)
     return ({r.target: r for r in results.records("nsf.speed") if r.target != "nsf.speed"},
             results.table("nsf.speed", "times"))
 

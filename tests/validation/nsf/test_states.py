@@ -7,13 +7,14 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from figures import _reduced, nsf_fig18
-from mpm_ref.reduced.inferring import Plan, infer
-from mpm_ref.reduced.whole import whole
+from figures.common import reduced
+from figures.nsf import fig18
 from mpm_ref.rom.kinematics import NoBody
+from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.nsf_run import Plan, infer
 from mpm_ref.rom.symmetric import tensor
-from validation.ldm.kept_bodies import read
-from validation.nsf import states, tested
+from validation.ldm.published_bodies import read
+from validation.nsf import reduced_runs, states
 from validation.nsf.studies import jelly
 
 mpl.use("Agg")
@@ -23,7 +24,7 @@ TEST, ID = 0.45, "nsf.jelly"
 @pytest.fixture(scope="module")
 def cube():
     """The jelly cube at half the resolution."""
-    return tested.tested(jelly(2))
+    return reduced_runs.tested(jelly(2))
 
 
 @pytest.fixture
@@ -92,24 +93,24 @@ def results(cube, run):
 
 
 def test_a_row_for_each_way_and_a_column_for_each_time(results):
-    figure = _reduced.beside(results, ID, ("true", "ours", "map"))
+    figure = reduced.beside(results, ID, ("true", "ours", "map"))
     assert len(figure.axes) == 9
     assert [ax.texts[0].get_text() for ax in figure.axes[::3]] == [
         "0.45: full order", "0.45: reduced", "0.45: map alone"]
-    assert len(_reduced.ends(results, ID).axes) == 6
-    assert len(_reduced.stresses(results, ID).axes) == 7        # with a colour bar
+    assert len(reduced.ends(results, ID).axes) == 6
+    assert len(reduced.stresses(results, ID).axes) == 7        # with a colour bar
 
 
 def test_points_that_fly_away_are_left_out(rng):
     """A run may lose points; the box of the full-order runs and ROOM of its longest side stay."""
     x = rng.uniform(size=(30, 3)) * (1.0, 0.2, 0.2)
     x[:2] = [[0.0, 0.0, 0.0], [1.0, 0.2, 0.2]]
-    ends = _reduced.room(x)
+    ends = reduced.room(x)
     assert ends == pytest.approx(np.array([[-0.4, -0.4, -0.4], [1.4, 0.6, 0.6]]))
     gone = np.concatenate([x, [[1.39, 0.0, 0.0], [1.41, 0.0, 0.0], [0.0, -5.0, 0.0]]])
-    solid, _ = _reduced.drawn(gone, "#ffffff", 0.1, ends)
+    solid, _ = reduced.drawn(gone, "#ffffff", 0.1, ends)
     assert len(solid.x) == 31
-    assert len(_reduced.drawn(x + 10.0, "#ffffff", 0.1, ends)[0].x) == 0
+    assert len(reduced.drawn(x + 10.0, "#ffffff", 0.1, ends)[0].x) == 0
 
 
 @pytest.mark.parametrize(("number", "values", "also", "sides"), [
@@ -129,7 +130,7 @@ def test_points_that_fly_away_are_left_out(rng):
     ("16", 2, (), ["first of training", "last of training"])])
 def test_figures_show_all_that_experiments_keep(number, values, also, sides, tmp_path, rng):
     """A row for each parameter kept (of the stress, for one) and each way."""
-    script = importlib.import_module(f"figures.nsf_fig{number}")
+    script = importlib.import_module(f"figures.nsf.fig{number}")
     names, x = [f"{0.1 * k:g}" for k in range(1, values + 1)], rng.uniform(size=(3, 40, 3))
     words = ["true", "ours", *(word for word in states.WAYS if word in also)]
     kept = {"values": np.array(names), "levels": np.arange(3), "first": x, "last": x}
@@ -144,7 +145,7 @@ def test_figures_show_all_that_experiments_keep(number, values, also, sides, tmp
 
 
 def test_a_run_that_broke_down_is_an_empty_panel():
-    gone, _ = _reduced.drawn(np.full((4, 3), np.nan), "white", 0.1)
+    gone, _ = reduced.drawn(np.full((4, 3), np.nan), "white", 0.1)
     assert len(gone.x) == 0
 
 
@@ -156,7 +157,7 @@ def test_time_shares_are_of_the_most_samples_and_gauss_newton():
              "inversion": np.array([r[2] for r in rows]),
              "reduced": np.array([1e-3 * r[3] for r in rows])}
     table |= {name: np.full(4, value) for name, value in stages.items()}
-    cake, metal = nsf_fig18.draw(SimpleNamespace(table=lambda id, name: table)).axes
+    cake, metal = fig18.draw(SimpleNamespace(table=lambda id, name: table)).axes
     assert cake.get_title() == "cake, 700 samples: 8 ms a step"
     assert metal.get_title() == "metal, 30 samples: 4 ms a step"
     assert cake.patches[0].r == pytest.approx(np.sqrt(2.0) * metal.patches[0].r)

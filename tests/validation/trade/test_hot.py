@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from mpm_ref.scene import Body, Box, Material, Regular, Scene, Scheme, Velocity, build
-from validation.hot.begun import BEGUN
 from validation.hot.iterates import first
 from validation.hot.one_step import Errors, difference, errors
 from validation.hot.stiffness import METHODS
-from validation.trade import hot_ways
+from validation.hot.warm_states import BEGUN
+from validation.trade import hot_methods
 from validation.trade.hot import POINT, Point, known, times_for
+from validation.trade.hot_methods import ALL, CAPS, SLOW, SOME, Way, descended, ways
 from validation.trade.hot_scenes import (
     OVER,
     Trial,
@@ -21,7 +22,6 @@ from validation.trade.hot_scenes import (
     seconds,
     trust,
 )
-from validation.trade.hot_ways import ALL, CAPS, SLOW, SOME, Way, descended, ways
 
 
 @pytest.fixture(scope="module")
@@ -136,7 +136,7 @@ def stepped(monkeypatch, solve):
         assert options.items() >= CAPS.items()
         cpu, converged = solve(*way)
         return made(*way, cpu, 0.1, converged=converged)
-    monkeypatch.setattr(hot_ways, "point", point)
+    monkeypatch.setattr(hot_methods, "point", point)
     tried = [Way("hot", (1e-5, 1e-6, 1e-7, 1e-8)), Way("pn-pcg", (1e-5, 1e-6, 1e-7, 1e-8)),
              Way("gast15", (1.0, 0.1))]
     return [(p.method, p.eps) for p in descended(None, None, tried)]

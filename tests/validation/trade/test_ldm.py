@@ -5,13 +5,13 @@ from time import process_time
 import numpy as np
 import pytest
 
-from mpm_ref.reduced.case import case
-from mpm_ref.reduced.march import Way
 from mpm_ref.rom.fields.affine import Affine
-from validation.ldm.nets import trained
-from validation.ldm.racing import Raced, Spent
+from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.run import Way
+from validation.ldm.networks import trained
 from validation.ldm.references import references
 from validation.ldm.studies import GRAVITY
+from validation.ldm.timing import Raced, Spent
 from validation.trade import ldm
 from validation.trade.ldm_cost import EVALUATIONS, PARTS, Clock, Watched, cost, paid, split
 from validation.verification.scenes import with_

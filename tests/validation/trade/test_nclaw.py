@@ -8,11 +8,11 @@ from small_toys import Records, known
 
 from mpm_ref.materials.learned import weights
 from mpm_ref.scene import build
-from validation.nclaw import bundle, small_runs, trade_nets
+from validation.nclaw import bundle, small_runs, small_trainings
 from validation.nclaw.evaluate import Found
+from validation.nclaw.initial_laws import untrained
 from validation.nclaw.small_runs import Measured, measured, spent, spread
-from validation.nclaw.trade_nets import Small, bundled, identity, small_nets
-from validation.nclaw.untrained import untrained
+from validation.nclaw.small_trainings import Small, bundled, identity, small_nets
 from validation.trade import nclaw as trade
 from validation.trade import nclaw_inference as inference
 from validation.trade.nclaw_inference import error, rounded, shorter
@@ -21,7 +21,7 @@ from validation.trade.nclaw_inference import error, rounded, shorter
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     """Where weights are looked for; nothing is remembered."""
-    monkeypatch.setattr(trade_nets, "FOLDER", tmp_path)
+    monkeypatch.setattr(small_trainings, "FOLDER", tmp_path)
     bundled.cache_clear()
     yield tmp_path
     bundled.cache_clear()
@@ -55,7 +55,7 @@ def test_trainings_are_run_side_by_side(folder, monkeypatch):
     assert (found[0].cpu, found[1].cpu) == (10.0, 100.0)
     value, note = records["trade.nclaw.x.untrained"]
     assert value == 1
-    assert note == "no weights small-edge-8.npz: python -m validation.train_laws small-edge-8"
+    assert note == "no weights small-edge-8.npz: python -m validation.training.nclaw small-edge-8"
 
 
 def test_a_training_that_stopped_is_told(monkeypatch):
@@ -82,8 +82,8 @@ def row(name="small", **changes):
 
 def test_seeds_give_the_spread():
     some = [row(), row("small-seed-1", own=3e-4), row("small-third", own=9.0)]
-    assert spread(some, trade_nets.SEEDS) == (1e-4, 3e-4)
-    assert np.isnan(spread([], trade_nets.SEEDS)).all()
+    assert spread(some, small_trainings.SEEDS) == (1e-4, 3e-4)
+    assert np.isnan(spread([], small_trainings.SEEDS)).all()
 
 
 def test_the_first_epoch_costs_as_much_as_others(monkeypatch):
@@ -148,7 +148,7 @@ def test_all_weights_are_rounded():
 def weights_of(*numbers):
     """Laws of two layers of these weights each, and biases of zero."""
     layer = np.array([numbers]), np.zeros(len(numbers))
-    return weights.Laws(*[weights.Trained((layer, layer), None)] * 2, {})
+    return weights.LearnedLaws(*[weights.LawWeights((layer, layer), None)] * 2, {})
 
 
 @pytest.mark.parametrize(("numbers", "exponent"), [

@@ -5,15 +5,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mpm_ref.reduced.errors import Errors
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.kinematics import NoBody
+from mpm_ref.rom.study.errors import Errors
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
 from validation.extremes import nsf_runs
 from validation.extremes.outcome import FINISHED
-from validation.nsf import tested
+from validation.nsf import reduced_runs
 from validation.nsf.studies import jelly
-from validation.results import Results
-from validation.run import Setting, run_all
 from validation.trade import nsf, nsf_sizes
 
 STUDY = jelly(4)._replace(train=(0.3, 0.5), test=(0.4,), samples=40,
@@ -24,18 +24,18 @@ TEST = 0.4
 @pytest.fixture(scope="module")
 def one():
     """The small study."""
-    return tested.tested(STUDY)
+    return reduced_runs.tested(STUDY)
 
 
 @pytest.fixture
 def results(one, tmp_path, monkeypatch):
-    """A function that runs an experiment on the small study alone, and gives its `Results`."""
+    """A function that runs an experiment on the small study alone; returns `ProfileResults`."""
     monkeypatch.setattr(nsf_runs, "studies", lambda run: {"jelly": STUDY})
     monkeypatch.setattr(nsf_runs, "tested", lambda study: one)
 
     def made(function):
-        assert not run_all([function.experiment], Setting("quick", tmp_path))
-        return Results(tmp_path)
+        assert not run_all([function.experiment], RunSetting("quick", tmp_path))
+        return ProfileResults(tmp_path)
     return made
 
 
@@ -87,7 +87,7 @@ def test_steps_grow_until_a_run_breaks_down(one, results, monkeypatch):
     def errors(self, value, count, draw, faster, weighed):
         asked.append(faster)
         good = faster < 2.0
-        return tested.Found(
+        return reduced_runs.Found(
             Errors(0.1 if good else np.inf, np.inf, np.inf), 0.2, 30.0, 40.0, np.nan)
 
     monkeypatch.setattr(type(one), "errors", errors)
@@ -143,7 +143,7 @@ def test_sizes_are_told_with_their_bytes(one, results, monkeypatch, tmp_path):
     assert table["bytes"][2] < table["bytes"][0]
     assert table["bytes_full"][0] == nsf_sizes.particle_bytes(STUDY)
     assert table["origin"][1] > table["origin"][0]
-    targets = {r.target for r in Results(tmp_path).records("trade.nsf.sizes")}
+    targets = {r.target for r in ProfileResults(tmp_path).records("trade.nsf.sizes")}
     assert targets == {"trade.nsf.sizes", *(f"trade.nsf.sizes.jelly.{words}" for words in (
         "own.sizes", "r.2", "C.4", "precision.single"))}
 

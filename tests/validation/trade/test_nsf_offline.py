@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from mpm_ref.rom.fields.pod_fields import Sizes
-from validation.ldm.racing import Spent
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
+from validation.common.weights_needed import Untrained
+from validation.ldm.timing import Spent
 from validation.nsf.studies import jelly
-from validation.results import Results
-from validation.run import Setting, run_all
 from validation.trade import nsf_offline
 from validation.trade.nsf_offline import Bill
-from validation.waiting import Untrained
 
 STUDY = jelly(4)._replace(train=(0.3, 0.5), test=(0.4,), samples=40,
                           sizes=Sizes(r=3, modes=8, tau=12, C=12, smoothing=1e-4))
@@ -80,8 +80,8 @@ def recording():
 @pytest.mark.usefixtures("counted")
 def test_all_is_recorded(tmp_path, monkeypatch):
     monkeypatch.setattr(nsf_offline, "studies", lambda run: {"jelly": STUDY})
-    assert not run_all([nsf_offline.offline.experiment], Setting("quick", tmp_path))
-    found = Results(tmp_path)
+    assert not run_all([nsf_offline.offline.experiment], RunSetting("quick", tmp_path))
+    found = ProfileResults(tmp_path)
     records = {r.target.split(".")[-1]: r for r in found.records("trade.nsf.offline")}
     trainings = {"train_time_lo", "train_time_hi"}
     assert {*records} == {"offline", *Bill._fields, "pays_after", *trainings}

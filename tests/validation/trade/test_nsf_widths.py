@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from field_toys import R, networks
 
-from mpm_ref.reduced.errors import Errors
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.fields_file import Model
-from validation.nsf import tested
+from mpm_ref.rom.study.errors import Errors
+from validation.common.results import ProfileResults
+from validation.common.run import RunSetting, run_all
+from validation.common.weights_needed import Untrained
+from validation.nsf import reduced_runs
 from validation.nsf.networks import Net, Part, fields_of, narrow, net_of, nets
 from validation.nsf.studies import jelly
-from validation.results import Results
-from validation.run import Setting, run_all
 from validation.trade import nsf_widths
-from validation.waiting import Untrained
 
 STUDY = jelly(4)._replace(train=(0.3, 0.5), sizes=Sizes(r=R), samples=20)
 NARROW, WIDE = (Net(STUDY, *(Part(width, 2, 0.1) for _ in range(3)), octaves=octaves)
@@ -22,14 +22,14 @@ NETS = {"small": NARROW, "jelly-waves": WIDE}
 FULL, REDUCED = 10.0, 4.0       # CPU seconds
 
 
-class Ready(tested.Tested):
+class Ready(reduced_runs.Tested):
     """`Tested` with known errors: of few samples, of each draw others, and of all particles."""
 
     def errors(self, value, count, draw, faster, weighed):
         """Errors that tell their draw."""
         assert (faster, weighed) == (1.0, False)
         error = 0.01 * (draw + 1) if count == STUDY.samples else 0.005
-        return tested.Found(Errors(error, 0.02, 0.03), 0.2, float(count), count, np.nan)
+        return reduced_runs.Found(Errors(error, 0.02, 0.03), 0.2, float(count), count, np.nan)
 
 
 @pytest.fixture
@@ -49,8 +49,8 @@ def recorded(tmp_path, monkeypatch):
 
     def recorded(*lacking):
         recorded.lacking = lacking
-        assert run_all([nsf_widths.of_widths.experiment], Setting("standard", tmp_path)) == []
-        found = Results(tmp_path)
+        assert run_all([nsf_widths.of_widths.experiment], RunSetting("standard", tmp_path)) == []
+        found = ProfileResults(tmp_path)
         start = "trade.nsf.widths."
         return ({r.target.removeprefix(start): r for r in found.records(start[:-1])},
                 found.table(start[:-1], "widths"))

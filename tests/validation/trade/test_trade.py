@@ -5,9 +5,9 @@ import pytest
 
 from validation.extremes.long_run import round_state
 from validation.trade.front import cheapest, front
+from validation.trade.knobs import DEFAULT, QUICK, STANDARD, settings
 from validation.trade.measure import Point, sampled, state_bytes
 from validation.trade.mms import prepare
-from validation.trade.setting import DEFAULT, QUICK, STANDARD, settings
 
 
 def point(cpu, error, end="finished"):

@@ -10,8 +10,8 @@ from mpm_ref.body import Body, particles_at
 from mpm_ref.core.spline import STENCILS, base_of
 from mpm_ref.materials import FixedCorotated, NoFlow
 from mpm_ref.scene import build
-from validation.nclaw.recorded import digest
-from validation.settings import record_settings
+from validation.common.settings import record_settings
+from validation.nclaw.final_states import digest
 from validation.verification import block, bowl, collapse, column, dam_break, disks, rings, rotation
 from validation.verification.scenes import mean, shipped, threads_for
 from validation.verification.symplectic import allowed_gain, travelled

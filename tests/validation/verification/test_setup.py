@@ -8,8 +8,8 @@ import pytest
 from mpm_ref.core.state import NONE
 from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.materials import LogNeoHookean, lame
-from validation.verification.follow import put_on, steps_of
 from validation.verification.lattice import body, lattice
+from validation.verification.manufactured_runs import put_on, steps_of
 from validation.verification.periodic import Periodic
 from validation.verification.settle import Pace, settle
 from validation.verification.strip import stepper, strip

@@ -7,16 +7,15 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from ...choices import DTYPES
 from ..coarsest import CAP, by_pcg, of_coarsest, size
 from ..embedding import taps
+from ..options import DTYPES
 from ..projectors import coarse_nodes, given_nodes, onto_range
 from ..smoothers import POLYNOMIAL, largest_eigenvalue, times
 from . import coarsest
 from .galerkin import coarse_reach, galerkin
-from .inverse import inverse_blocks
 from .product import planes_of, product
-from .sparse import SERIAL, Blocks, blocks_of, diagonal, reach_of
+from .sparse import SERIAL, Blocks, blocks_of, diagonal, inverse_blocks, reach_of
 from .sweep import Sweep, correct, residual, split, sweep
 from .transfer import Transfer, prolong, restrict, transfer
 

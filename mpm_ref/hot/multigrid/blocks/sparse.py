@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ....core.jit import CHUNKS, chunk, kernel, parallel, prange
-from ....core.tensor import mat, put_mat
+from ....core.tensor import cofactor, det, mat, mlin, put_mat, trace, transpose
+from ..projectors import inverses, surely_regular
 
 KNOWN = ((2, 2), (3, 3))     # sizes of blocks
 SERIAL = 4000     # nodes below which starting threads costs more than they save
@@ -88,3 +89,28 @@ def reach_of(A, index):
     reach = np.zeros(CHUNKS, dtype=np.int64)
     _reaches(A, index, reach)
     return int(reach.max())
+
+
+# inverses of diagonal blocks: by cofactors where a node moves freely, else as `projectors` do
+
+
+@kernel
+def _invert(D, out, like):
+    for i in range(len(D)):
+        block, scale = mat(D, i, like), trace(mat(D, i, like))
+        if scale > 0.0:
+            block = mlin(1.0 / scale, block, 0.0, block)
+        size = scale * det(block)
+        if size > 0.0:
+            put_mat(out, i, mlin(1.0 / size, transpose(cofactor(block)), 0.0, block))
+
+
+def inverse_blocks(D, B):
+    """Pseudo-inverses (n, d, d) of diagonal blocks D on the ranges of projectors B, as
+    `projectors.inverses`.
+    """
+    out = np.empty_like(D)
+    _invert(D, out, (0,) * D.shape[1])
+    other = np.flatnonzero(~surely_regular(D))
+    out[other] = inverses(D[other], B[other])
+    return out

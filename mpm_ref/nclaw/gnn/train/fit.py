@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
-from .... import checkpoints
-from ....cost import Cost, Meter
+from ....store import weights_file
+from ....training import Cost, Meter, train_epochs
 from ...train.fit import Diverged
 from ..graph import Graph, Lost
 from ..history import HISTORY, Reading
@@ -133,14 +133,14 @@ class GraphSession:
                     "network": self.network.state_dict(), "best": self.best,
                     "optimiser": self.optimiser.state_dict(), "cost": tuple(self.meter.total)},
                    content)
-        checkpoints.write(path, content.getvalue())
+        weights_file.write_sealed(path, content.getvalue())
 
     def load(self, path):
         """Go on from a checkpoint. Raises ValueError where it is damaged, or of another training or
         other data.
         """
-        kept = torch.load(io.BytesIO(checkpoints.read(path)), weights_only=True)
-        checkpoints.require_same(path, kept["training"], self.named)
+        kept = torch.load(io.BytesIO(weights_file.read_sealed(path)), weights_only=True)
+        weights_file.require_same_training(path, kept["training"], self.named)
         self.network.load_state_dict(kept["network"])
         self.optimiser.load_state_dict(kept["optimiser"])
         self.best, self.history = kept["best"], [Round(*row) for row in kept["history"]]
@@ -168,4 +168,4 @@ def train(recipe, runs, dt, checkpoint=None, on_round=None):
     Raises `Diverged`, with the step.
     """
     session = GraphSession(recipe, runs, dt)
-    return checkpoints.finished(session, recipe.rounds, SAVE, checkpoint, on_round)
+    return train_epochs(session, recipe.rounds, SAVE, checkpoint, on_round)

@@ -1,0 +1,57 @@
+"""Where explicit runs break: time step against stiffness, for Poisson's ratios. Colours say how a
+run ended; the line is the stable time step, past which a run is refused unless it is allowed, as
+all were here.
+"""
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from ..common.orders import scales
+
+NEEDS = ["extremes.explicit.map"]
+COLOURS = {"finished": "#cfe8cf", "energy": "#f0c36d", "J": "#b58fd1", "CFL": "#e07a6a",
+           "not finite": "#444444", "out of range": "#000000"}
+ENDS = {"energy": "energy grew", "J": "J out of bounds", "CFL": "crossed a cell in a step"}
+
+
+def scale(results):
+    return scales(results, NEEDS[0])
+
+
+def draw(results):
+    table = results.table(NEEDS[0], "runs")
+    ratios = np.unique(table["nu"])
+    columns = min(len(ratios), 4)
+    rows = -(-len(ratios) // columns)
+    figure, axes = plt.subplots(rows, columns, figsize=(1.2 + 2.9 * columns, 0.8 + 2.9 * rows),
+                                sharex=True, sharey=True, squeeze=False)
+    for ax in axes.flat[len(ratios):]:
+        ax.set_visible(False)
+    for ax, nu in zip(axes.flat, ratios, strict=False):
+        panel(ax, {name: a[table["nu"] == nu] for name, a in table.items()})
+        ax.set_title(f"nu = {nu:g}", fontsize=10)
+    for ax in axes[-1]:
+        ax.set_xlabel("E [Pa]")
+    for ax in axes[:, 0]:
+        ax.set_ylabel("dt [s]")
+    seen = [kind for kind in COLOURS if kind in table["end"]]
+    handles = [plt.Line2D([], [], marker="s", ls="", color=COLOURS[k], label=ENDS.get(k, k))
+               for k in seen]
+    handles.append(plt.Line2D([], [], color="k", label="stable time step"))
+    figure.legend(handles=handles, loc="upper center", ncol=len(handles),
+                  bbox_to_anchor=(0.5, 1.05), fontsize=9)
+    figure.tight_layout()
+    return figure
+
+
+def panel(ax, runs):
+    """One Poisson's ratio."""
+    ax.grid(False)
+    for kind, colour in COLOURS.items():
+        mine = runs["end"] == kind
+        ax.plot(runs["E"][mine], runs["dt"][mine], "s", color=colour, ms=9)
+    bound = runs["dt"] / runs["of_bound"]
+    order = np.argsort(runs["E"])
+    ax.plot(runs["E"][order], bound[order], "k-")
+    ax.set(xscale="log", yscale="log")
+    ax.set_ylim(runs["dt"].min() / 2, runs["dt"].max() * 2)

@@ -1,0 +1,58 @@
+"""NSF: reduced runs with parameters within the trained range and outside. Left: error of the
+displacement, over the largest of the scene's tests, against how far latent coordinates leave the
+trained ones; above the horizontal line a run is bad, right of the vertical one it is flagged, so
+that false alarms are below on the right, and misses above on the left. Right: the shares of good
+runs that are flagged and of bad ones that are not, by where the vertical line is drawn.
+"""
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from mpm_ref.rom.study.watch import BEYOND
+from validation.extremes.ldm_runs import BAD
+
+from ..common.orders import scales, series
+from ..trade.ldm import readable
+from ..trade.nsf import COLOURS
+
+NEEDS = ["extremes.nsf.beyond"]
+
+
+def scale(results):
+    return scales(results, NEEDS[0], "false_alarms")
+
+
+def draw(results):
+    figure, axes = plt.subplots(1, 2, figsize=(9.2, 3.8))
+    runs(axes[0], results.table(NEEDS[0], "runs"))
+    rates(axes[1], results.table(NEEDS[0], "rates"))
+    for ax in axes:
+        ax.axvline(BEYOND, color="0.5", lw=1)
+        ax.set_xscale("log")
+        readable(ax.xaxis, (1.0, 2.0, 5.0))
+        ax.legend(fontsize=8)
+    figure.tight_layout()
+    return figure
+
+
+def runs(ax, table):
+    """A mark for each run that reached its end, with its parameter."""
+    for (scene,), rows in series(table, ("map",)).items():
+        rows = rows & np.isfinite(table["error"])
+        x, y = table["beyond"][rows], table["error"][rows] / table["usual"][rows]
+        ax.plot(x, y, "o", color=COLOURS[scene], ms=5, fillstyle="none", label=scene)
+        for a, b, value in zip(x, y, table["what"][rows], strict=True):
+            ax.annotate(f"{value:g}", (a, b), fontsize=7, xytext=(4, 3),
+                        textcoords="offset points")
+    ax.axhline(BAD, color="0.5", lw=1)
+    ax.set(yscale="log", xlabel="distance of the latent coordinates, over the trained gap",
+           ylabel="displacement error over that of tests")
+    readable(ax.yaxis, (1.0, 2.0, 5.0))
+
+
+def rates(ax, table):
+    """Shares by the bound."""
+    for name, words, style in (("false_alarms", "good, and flagged", "o-"),
+                               ("misses", "bad, and neither flagged nor stopped", "s--")):
+        ax.plot(table["bound"], table[name], style, color="k", ms=4, fillstyle="none", label=words)
+    ax.set(xlabel="bound", ylabel="share", ylim=(-0.05, 1.05))

@@ -1,0 +1,14 @@
+"""HOT, Figure 1: four soft pillars with a stiff ball in each are twisted and pulled."""
+
+from ..common.state_panels import Look, said, states
+
+NEEDS = ["hot.scenes.twist"]
+LOOK = Look((0, 2, 4, 6), ("#e8a33d", "#3b5ba5"))
+
+
+def scale(results):
+    return said(results, "twist")
+
+
+def draw(results):
+    return states(results, "twist", LOOK)

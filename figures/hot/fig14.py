@@ -1,0 +1,14 @@
+"""HOT, Figure 14: sauce is poured onto a turkey."""
+
+from ..common.state_panels import Look, said, states
+
+NEEDS = ["hot.scenes.sauce"]
+LOOK = Look((0, 1, 3, 12), ("#b5302a",), low=(2.2, 2.97, 2.45), high=(3.7, 4.2, 3.6))
+
+
+def scale(results):
+    return said(results, "sauce")
+
+
+def draw(results):
+    return states(results, "sauce", LOOK)

@@ -1,0 +1,28 @@
+"""HOT, Figure 17: one step of the metal wheel while it is crushed. Residual by iterations and by
+CPU time at the paper's tolerance (dashed, top), and on the way to smaller ones (bottom).
+"""
+
+import matplotlib.pyplot as plt
+
+from ..common.descents import EPS, drawn
+from ..common.orders import legend_below, shared
+
+NEEDS = ["hot.fig17"]
+METHODS = ("hot", "lbfgs-h", "pn-pcg", "pn-pcg-mf", "pn-mgpcg", "pn-mgpcg-flexible")
+
+
+def scale(results):
+    return shared(results, NEEDS[0])
+
+
+def draw(results):
+    table = results.table(NEEDS[0], "iterates")
+    figure, axes = plt.subplots(2, 2, figsize=(8.4, 6.2))
+    for row, eps in zip(axes, (EPS, table["eps"].min()), strict=True):
+        for ax, x in zip(row, ("iteration", "cpu"), strict=True):
+            drawn(ax, table, (x, "residual"), METHODS, table["eps"] == eps)
+            ax.set_title(f"tolerance {eps:.0e}", fontsize=9)
+    for ax in axes[1]:
+        ax.set_xscale("log")
+    legend_below(figure, axes.flat, columns=3)
+    return figure

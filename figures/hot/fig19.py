@@ -1,0 +1,36 @@
+"""HOT, Figure 19: armadillo and cat. CG iterations on the way of one step to the paper's tolerance
+(dashed; left), and by step (right), with Jacobi's preconditioner and with both multigrids. CG that
+allows for a preconditioner which varies is dotted.
+"""
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from ..common.descents import EPS, LOOKS
+from ..common.orders import legend_below, shared
+
+NEEDS = ["hot.fig19"]
+METHODS = ("pn-pcg", "pn-mgpcg", "pn-mgpcg-flexible", "pn-gmg-pcg", "pn-gmg-pcg-flexible")
+SCENE = "armacat_stiff"
+
+
+def scale(results):
+    return shared(results, NEEDS[0], ".cg")
+
+
+def draw(results):
+    way, costs = (results.table(NEEDS[0], name) for name in ("iterates", "costs"))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.4))
+    for method in METHODS:
+        label, color, style = LOOKS[method]
+        at = way["method"] == method
+        left.plot(way["residual"][at], way["cg"][at], style, color=color, label=label, ms=3)
+        at = (costs["method"] == method) & (costs["scene"] == SCENE)
+        right.plot(costs["step"][at], costs["cg"][at], style, color=color, label=label, ms=4)
+    left.axvline(EPS, color="0.3", ls="--", lw=0.8)
+    left.set(xscale="log", xlabel="residual", ylabel="CG iterations so far")
+    left.invert_xaxis()
+    right.set(xlabel="step", ylabel="CG iterations", yscale="log",
+              xticks=np.unique(costs["step"][costs["scene"] == SCENE]))
+    legend_below(figure, (left, right), columns=3)
+    return figure

@@ -1,0 +1,29 @@
+"""LDM, Figure 4: all points of the tower, and one draw of samples: near its bottom (blue), near its
+top (red) and elsewhere.
+"""
+
+import numpy as np
+from matplotlib.colors import to_rgb
+
+from validation.ldm.published_bodies import read
+
+from ..common.bodies import FULL, Panel, View, body, ghost, levelled, nothing, pictures
+from ..common.orders import scales
+from ..common.state_panels import spacing
+
+NEEDS = ["ldm.fig4"]
+COLOURS = ("#e8a33d", "#3b5ba5", "#c8473d")     # elsewhere, bottom, top
+LARGE = 1.1         # radius of a sample's ball over the spacing of all points
+
+
+def scale(results):
+    return scales(results, NEEDS[0])
+
+
+def draw(results):
+    kept = read(results.folder, NEEDS[0])
+    X, samples, view = kept["X"], kept["X"][kept["samples"]], View(2, 6.4)
+    paint = np.array([to_rgb(COLOURS[k]) for k in np.arange(1, 3) @ kept["held"]])
+    large = levelled(body(samples, paint, spacing(X), LARGE), view)
+    return pictures([Panel(body(X, FULL, spacing(X)), nothing(), f"all {len(X)} points"),
+                     Panel(large, ghost(X), f"{len(samples)} samples")], view)

@@ -1,0 +1,24 @@
+"""LDM, Figure 6: the cylinder under three gravities, at the end of reduced runs; at rest, it shines
+through. Colours: distance from the place at rest.
+"""
+
+from validation.ldm.published_bodies import read
+
+from ..common.bodies import Panel, View, away, body, ghost, pictures, shades
+from ..common.orders import scales
+from ..common.state_panels import spacing
+
+NEEDS = ["ldm.fig6"]
+
+
+def scale(results):
+    return scales(results, NEEDS[0])
+
+
+def draw(results):
+    kept = read(results.folder, NEEDS[0])
+    X, x = kept["X"], kept["reduced"]
+    paint, shown = shades(1000.0 * away(x, X))
+    found = [Panel(body(x[k], paint[k], spacing(X)), ghost(X), f"g = {g:g} m/s²")
+             for k, g in enumerate(kept["g"])]
+    return pictures(found, View(3, 9.0), shown, "displacement [mm]")

@@ -1,0 +1,17 @@
+"""LDM, Figure 8: position error of the cylinder under gravity by latent dimension, all points; with
+the error of the nearest states of the learned map, and of POD of the same dimension.
+"""
+
+from ..common.orders import shared
+from ..common.schemes import curves
+
+NEEDS = ["ldm.fig8"]
+NEAREST = ("nearest", "nearest state, no dynamics", "k:")
+
+
+def scale(results):
+    return shared(results, NEEDS[0])
+
+
+def draw(results):
+    return curves(results.table(NEEDS[0], "errors"), "r", "latent dimension r", "-", (NEAREST,))

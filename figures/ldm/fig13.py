@@ -1,0 +1,25 @@
+"""LDM, Figure 13: the cylinder before it is poked, when it is let go, and later; full (top) and
+reduced (bottom). Colours: distance from the place at rest, where it shines through.
+"""
+
+from validation.ldm.published_bodies import read
+
+from ..common.bodies import Panel, View, away, body, ghost, pictures, shades
+from ..common.orders import scales
+from ..common.state_panels import spacing
+
+NEEDS = ["ldm.fig13"]
+
+
+def scale(results):
+    return scales(results, NEEDS[0], "ldm.fig13")
+
+
+def draw(results):
+    kept = read(results.folder, NEEDS[0])
+    X, found = kept["X"], []
+    paint, shown = shades([1000.0 * away(kept[name], X) for name in ("full", "reduced")])
+    for name, colours in zip(("full", "reduced"), paint, strict=True):
+        for x, colour, t in zip(kept[name], colours, kept["t"], strict=True):
+            found.append(Panel(body(x, colour, spacing(X)), ghost(X), f"{name}, t = {t:.2f} s"))
+    return pictures(found, View(3, 5.4), shown, "displacement [mm]")

@@ -1,0 +1,36 @@
+"""LDM, Figure 15: four test runs of the tower at three times, full (white) beside reduced (yellow).
+To the left, the speed of the top and its direction: theta, phi.
+"""
+
+import numpy as np
+
+from validation.ldm.published_bodies import read
+
+from ..common.bodies import FULL, REDUCED, Panel, View, body, nothing, pictures, side_by_side
+from ..common.orders import shared
+from ..common.state_panels import spacing
+
+NEEDS = ["ldm.fig15"]
+VIEW = View(3, 8.0, turn=45.0, lift=8.0)
+
+
+def scale(results):
+    return shared(results, NEEDS[0], "ldm.fig15.error")
+
+
+def draw(results):
+    kept = read(results.folder, NEEDS[0])
+    X, apart, found = kept["X"], spacing(kept["X"]), []
+    for k, mu in enumerate(kept["mu"]):
+        for j, t in enumerate(kept["t"]):
+            x, y = (kept[name][k, j - 1] if j else X for name in ("full", "reduced"))
+            pair = side_by_side(body(x, FULL, apart), body(y, REDUCED, apart), VIEW)
+            found.append(Panel(pair, nothing(), "" if k else f"t = {t:.2f} s",
+                               "" if j else motion(*mu)))
+    return pictures(found, VIEW)
+
+
+def motion(r, theta, phi):
+    """How the top moves, in words."""
+    theta, phi = np.degrees((theta, phi))
+    return f"{r:.2f} m/s, {theta:.0f}°, \N{MINUS SIGN}{-phi:.0f}°"

@@ -1,0 +1,52 @@
+"""LDM workshop, Tables 1 and 2: errors of position, velocity and deformation gradient in reduced
+runs of one step (dots), and those that are printed (bars), or printed as the most (with an arrow).
+"""
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from ..common.orders import legend_below, shared
+
+NEEDS = ["ldmw.table1", "ldmw.table2"]
+FIELDS = {"position": ("position", "C0"), "velocity": ("velocity", "C1"),
+          "defgrad": ("deformation gradient", "C2")}
+ROWS = {"ldmw.table1": {"none": "no penalty", "temporal": "of v", "both": "of F and v"},
+        "ldmw.table2": {"point": "points", "node": "nodes", "point_hyper6": "six\npoints",
+                        "node_hyper6": "nodes of\nsix points"}}
+TITLES = ("Table 1: penalties in the loss", "Table 2: what is sampled")
+WIDTH = 0.22        # of a field in a row
+
+
+def scale(results):
+    return "; ".join(f"{title.split(':')[0]}: {shared(results, id)}"
+                     for id, title in zip(NEEDS, TITLES, strict=True))
+
+
+def draw(results):
+    figure, axes = plt.subplots(1, 2, figsize=(8.6, 3.8), sharey=True, width_ratios=(3, 4))
+    for ax, id, title in zip(axes, NEEDS, TITLES, strict=True):
+        panel(ax, {r.target: r for r in results.records(id)}, id)
+        ax.set_title(title, fontsize=9)
+    axes[0].set_ylabel("error [%]")
+    legend_below(figure, axes, columns=3)
+    return figure
+
+
+def panel(ax, records, id):
+    """All rows of a table, a field beside the other."""
+    for j, (field, (words, colour)) in enumerate(FIELDS.items()):
+        at = np.arange(len(ROWS[id])) + (j - 1) * WIDTH
+        own = [records[f"{id}.{row}.{field}"] for row in ROWS[id]]
+        for x, record in zip(at, own, strict=True):
+            printed(ax, x, record)
+        ax.semilogy(at, [r.value for r in own], "o", color=colour, ms=5, label=words)
+    ax.set_xticks(range(len(ROWS[id])), ROWS[id].values(), fontsize=8)
+    ax.grid(visible=False, axis="x")
+
+
+def printed(ax, x, record):
+    """A bar at what is printed, with an arrow where that is the most it can be."""
+    ax.plot([x - 0.4 * WIDTH, x + 0.4 * WIDTH], 2 * [record.paper], color="0.3", lw=2.0)
+    if record.comparator == "<=":
+        ax.annotate("", (x, 0.6 * record.paper), (x, record.paper),
+                    arrowprops={"arrowstyle": "->", "color": "0.3", "lw": 0.8})

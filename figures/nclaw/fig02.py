@@ -1,0 +1,50 @@
+"""NCLaw, Figure 2 (a) and (b): ends of runs for longer, and thrown otherwise; from left to right
+the start, the truth, ours, baselines as far as they are trained, ours before training (a thin layer
+on the floor, or broken down). Colours: distance from the truth; grey: the start.
+"""
+
+import numpy as np
+from matplotlib.colors import to_rgb
+
+from validation.ldm.published_bodies import read
+
+from ..common.bodies import GHOST, Panel, View, away, nothing, pictures, shades
+from ..common.orders import shared
+from ..common.pairs import TITLES, present, titled
+from ..common.state_panels import cloud, spacing
+
+NEEDS = ["nclaw.fig2"]
+NAMES = ("jelly", "sand", "plasticine", "water")
+TASKS = {"time": "longer", "velocity": "thrown otherwise"}
+WORDS = ("start", "true", "ours", "neural", "gnn", "init")
+TOP = 0.3           # end of the colours [m]
+
+
+def scale(results):
+    return shared(results, NEEDS[0])
+
+
+def draw(results):
+    kept, found = read(results.folder, NEEDS[0]), []
+    rows = {f"{name}_{task}": f"{name}, {said}" for task, said in TASKS.items() for name in NAMES}
+    words = present(kept, rows, WORDS)
+    shown = shades(np.zeros(1), top=TOP)[1]
+    for row, said in rows.items():
+        for word in words:
+            title = "" if found[len(words) - 1:] else TITLES[word]
+            panel = drawn(kept, row, word)._replace(side=said if word == words[0] else "")
+            found.append(panel._replace(title=f"{title}\n{panel.title}".strip()))
+    return pictures(found, View(len(words), 1.6 * len(words)), shown, "distance from the truth [m]")
+
+
+def drawn(kept, row, word):
+    """The panel of a law in a row, with what is to be said if there is nothing to be seen."""
+    if f"{row}_{word}" not in kept:
+        return Panel(nothing(), nothing(), "not trained")
+    x, true = (kept[f"{row}_{of}"].astype(float) for of in (word, "true"))
+    if not np.isfinite(x).all():
+        return Panel(nothing(), nothing(), titled("", x))
+    paint = shades(away(x, true), top=TOP)[0]
+    if word == "start":
+        paint[:] = to_rgb(GHOST)
+    return Panel(cloud(x, np.zeros(len(x)), paint, spacing(true)), nothing())

@@ -1,0 +1,53 @@
+"""NCLaw, Figure 4 (c) and (d): dough, on synthetic observations: the block that was filmed, and a
+star, half-way and at the end; from left to right the start, the truth, ours, laws that
+thermodynamics admits, the wrong guess that ours begin with. Colours: distance from the truth.
+"""
+
+import numpy as np
+from matplotlib.colors import to_rgb
+
+from validation.ldm.published_bodies import read
+
+from ..common.bodies import GHOST, Panel, View, away, nothing, pictures, shades
+from ..common.orders import scales
+from ..common.pairs import present, titled
+from ..common.state_panels import cloud, spacing
+
+NEEDS = ["nclaw.dough"]
+BODIES = {"block": "(c) block", "star": "(d) star"}
+WORDS = {"true": "truth", "dough": "ours", "dough-admissible": "admissible", "guess": "guess"}
+TIMES = {1: "half-way", 2: "at the end"}
+TOP = 0.02          # end of the colours [m]
+
+
+def scale(results):
+    block, star = (scales(results, NEEDS[0], part) for part in ("depth_speed", ".star"))
+    return f"block: {block}; star: {star}"
+
+
+def draw(results):
+    kept, found = read(results.folder, NEEDS[0]), []
+    words = present(kept, BODIES, WORDS)
+    shown = shades(np.zeros(1), top=TOP)[1]
+    for body, said in BODIES.items():
+        for k, when in TIMES.items():
+            title = "" if found else "start"
+            found.append(drawn(kept, (body, "true", 0), title)._replace(side=f"{said}, {when}"))
+            for word in words:
+                title = "" if found[1 + len(words):] else WORDS[word]
+                found.append(drawn(kept, (body, word, k), title))
+    columns = 1 + len(words)
+    return pictures(found, View(columns, 2.0 * columns, 12.0, 10.0), shown,
+                    "distance from the truth [m]")
+
+
+def drawn(kept, which, title):
+    """The panel of a body with a law at a kept time; grey at the start."""
+    body, word, k = which
+    x, true = (kept[f"{body}_{of}"].astype(float) for of in (word, "true"))
+    if not np.isfinite(x[k]).all():
+        return Panel(nothing(), nothing(), titled(title, x[k]))
+    paint = shades(away(x[k], true[k]), top=TOP)[0]
+    if k == 0:
+        paint[:] = to_rgb(GHOST)
+    return Panel(cloud(x[k], np.zeros(len(x[k])), paint, spacing(true[0])), nothing(), title)

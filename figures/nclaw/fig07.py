@@ -1,0 +1,23 @@
+"""NCLaw, Figures 2 (c), 7 and 8: bodies of task (c); from left to right the start, ours half-way,
+the baseline "neural" there, if it was kept, and the truth. Colours: height at the start.
+"""
+
+from validation.ldm.published_bodies import read
+
+from ..common.bodies import View, pictures
+from ..common.orders import shared
+from ..common.pairs import present, sides
+
+NEEDS = ["nclaw.fig7"]
+ROWS = {name: name for name in ("jelly", "sand", "plasticine", "water")}
+
+
+def scale(results):
+    return shared(results, NEEDS[0])
+
+
+def draw(results):
+    kept = read(results.folder, NEEDS[0])
+    words = present(kept, ROWS, ("ours", "neural"))
+    columns = 2 + len(words)
+    return pictures(sides(kept, ROWS, words), View(columns, 3.0 * columns))

@@ -1,0 +1,24 @@
+"""NSF, Figure 6: the jelly cube (the paper shows sand) at the points of the training, above; below
+the networks at a hundred times as many, and the full-order run of these. From left to right: time.
+"""
+
+from validation.ldm.published_bodies import read
+
+from ..common.bodies import View, pictures
+from ..common.orders import shared
+from ..common.reduced import COLOURS, row
+
+NEEDS = ["nsf.fig6"]
+ROWS = {"few": ("ours", "points of the training"), "networks": ("ours", "networks, more points"),
+        "many": ("true", "full order, more points")}
+
+
+def scale(results):
+    return shared(results, NEEDS[0], "many")
+
+
+def draw(results):
+    kept = read(results.folder, NEEDS[0])
+    found = [panel for word, (colour, side) in ROWS.items()
+             for panel in row(kept[word], COLOURS[colour], side)]
+    return pictures(found, View(len(kept["few"]), 8.0, 25.0, 15.0))

@@ -1,0 +1,33 @@
+"""One step of a twisted bar with a stiff middle, solved to a ladder of tolerances: what each method
+costs for the error it leaves in the particles. Large marks: the paper's tolerance, 1e-7.
+"""
+
+import matplotlib.pyplot as plt
+
+from ..common.orders import legend_below, scales, series
+from ..hot.fig20 import METHODS
+
+NEEDS = ["trade.hot.bar"]
+PAPER = 1e-7
+
+
+def scale(results):
+    return scales(results, NEEDS[0])
+
+
+def draw(results):
+    table = results.table(NEEDS[0], "points")
+    stiff = series(table, ("E",))
+    figure, axes = plt.subplots(1, len(stiff), figsize=(2.2 + 3.2 * len(stiff), 3.6), sharey=True,
+                                squeeze=False)
+    for ax, ((E,), rows) in zip(axes[0], stiff.items(), strict=True):
+        for k, (method, (label, style)) in enumerate(METHODS.items()):
+            own = rows & (table["method"] == method)
+            ax.loglog(table["cpu"][own], table["error"][own], style, ms=4, color=f"C{k}",
+                      label=label)
+            at = own & (table["eps"] == PAPER)
+            ax.loglog(table["cpu"][at], table["error"][at], style[0], ms=9, color=f"C{k}")
+        ax.set(title=f"middle {E:.0e} Pa", xlabel="CPU time of the step [s]")
+    axes[0][0].set_ylabel("error / velocity increment, rms over particles")
+    legend_below(figure, axes[0], columns=5)
+    return figure

@@ -1,0 +1,91 @@
+"""LDM: error of reduced runs by how they are made. Left: error against wall time on the tower. The
+star is the paper's way, single marks differ from it in what the legend says; curves go over numbers
+of samples, which stand beside them. The dotted line joins what nothing beats in error and CPU time.
+Right: torsion with all samples, by how dense quadrature is. Runs that broke down are left out.
+"""
+
+from itertools import cycle
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+
+from ..common.orders import OTHERS, legend_below, titled
+
+NEEDS = ["trade.ldm.knobs", "trade.ldm.density"]
+TITLES = ("tower", "torsion")
+WORDS = {"quadrature": "quadrature: {}", "per_cell": "quadrature points to a cell and axis: {:g}",
+         "projection": "projection: {}", "velocity": "velocity: {}", "samples": "samples: {}",
+         "close": "preimages: {:g} dx", "precision": "precision: {}"}
+MARKS = "oD^v<>PXHdp+x12s"
+RANGE = 2.0         # up and down from the middle of errors, at least
+PLACES = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
+DENSE = {"eulerian": ("Eulerian", "v-", "C4"), "resampled": ("resampled", "D--", "C5")}
+
+
+def scale(results):
+    return titled(results, NEEDS, TITLES)
+
+
+def draw(results):
+    figure, axes = plt.subplots(1, 2, figsize=(9.2, 4.2), width_ratios=(3, 2))
+    choices(axes[0], results.table(NEEDS[0], "ways"))
+    densities(axes[1], results.table(NEEDS[1], "densities"))
+    for ax, title in zip(axes, TITLES, strict=True):
+        ax.set_title(title, fontsize=9)
+        ax.set_ylabel("position error [%]")
+        low, high = ax.get_ylim()
+        middle = np.sqrt(low * high)
+        ax.set_ylim(min(low, middle / RANGE), max(high, RANGE * middle))
+        readable(ax.yaxis)
+    readable(axes[0].xaxis)
+    axes[0].set_xlabel("wall time of a step [ms]")
+    axes[1].set_xlabel("quadrature points of a cell along each axis")
+    legend_below(figure, axes[:1], columns=3)
+    return figure
+
+
+def readable(axis, places=PLACES):
+    """Plain numbers at some places of each decade."""
+    axis.set(major_locator=LogLocator(subs=places), minor_formatter=NullFormatter(),
+             major_formatter=FuncFormatter(lambda x, _: f"{x:g}"))
+
+
+def choices(ax, table):
+    """Marks by what differs from the first row, joined where numbers of samples alone do."""
+    x, y, points = 1e3 * table["wall"], 100.0 * table["origin"], table["points"]
+    front = np.flatnonzero(table["pareto"])
+    front = front[np.argsort(x[front])]
+    ax.loglog(x[front], y[front], ":", color="0.3", zorder=0, label="nothing beats these")
+    for (words, rows), mark, colour in zip(grouped(table).items(), cycle(MARKS), cycle(OTHERS)):
+        rows = sorted(rows, key=lambda k: points[k])
+        ax.plot(x[rows], y[rows], mark + "-" * (len(rows) > 1), color=colour, ms=6,
+                fillstyle="none", label=words or "the paper's way")
+        for k in rows if len(rows) > 1 else ():
+            ax.annotate(f"{points[k]:g}", (x[k], y[k]), fontsize=7, xytext=(3, 6),
+                        textcoords="offset points")
+    ax.plot(x[0], y[0], "k*", ms=10, label=f"{points[0]:g} samples, as single marks")
+
+
+def grouped(table):
+    """{what differs from the first row but for the number of samples, in words: rows}."""
+    found = {}
+    for k in range(len(table["points"])):
+        words = ", ".join(form.format(table[name][k]) for name, form in WORDS.items()
+                          if table[name][k] != table[name][0])
+        found.setdefault(words, []).append(k)
+    return found
+
+
+def densities(ax, table):
+    """Curves by quadrature, and a line for material points."""
+    error = 100.0 * table["origin"]
+    for name, (words, style, colour) in DENSE.items():
+        rows = table["quadrature"] == name
+        if rows.any():
+            ax.semilogy(table["per_cell"][rows], error[rows], style, color=colour, ms=6,
+                        fillstyle="none", label=words)
+    ax.axhline(error[table["quadrature"] == "lagrangian"][0], color="k", ls=":",
+               label="Lagrangian: material points")
+    ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    ax.legend(fontsize=8)

@@ -1,0 +1,184 @@
+"""Options that several commands share, the objects they stand for, and checks of output files."""
+
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .. import scene
+from ..materials.learned import weights
+from ..materials.learned.weights import dim_of
+from ..nclaw.study.compare import problem_of
+from ..nclaw.train.teacher import Teacher
+from ..rom.study import reduce
+from ..rom.study.generate import one_thread
+from ..rom.study.study import load
+from ..scene import SceneError
+from .catalogue import find_scene, find_study, shipped_scenes
+from .errors import INTERRUPT, end, one_line
+from .terminal import warn
+
+Json = Annotated[bool, typer.Option("--json", help="Answer with JSON.")]
+HDF5, MAPS, PICTURES = (".h5", ".hdf5"), (".npz",), (".png", ".pdf", ".svg")
+FILES = (*HDF5, *MAPS, *PICTURES, ".toml", ".json")
+
+
+def require_ending(out, endings):
+    """Raise ValueError unless the name of a file to write ends in one of these."""
+    if Path(out).suffix.lower() not in endings:
+        raise ValueError(f"--out {out}: expected a name that ends in {' or '.join(endings)}")
+
+
+def require_folder_name(out):
+    """Raise ValueError where the name of a folder to write into is that of a file, unless there is
+    such a folder.
+    """
+    ending = Path(out).suffix.lower()
+    if ending in FILES and not Path(out).exists():
+        raise ValueError(f"--out {out}: expected the name of a folder, but files' names end in "
+                         f"{ending}; leave the ending out")
+
+
+def require_free(out, overwrite):
+    """Raise ValueError where a file stands that is not to be replaced."""
+    if Path(out).exists() and not overwrite:
+        raise ValueError(f"{out} exists: add --overwrite to replace it, or name another file")
+
+
+WeightsFile = Annotated[Path, typer.Argument(metavar="WEIGHTS",
+                                             help="File of `mpm-ref law train`.")]
+SceneName = Annotated[str, typer.Argument(metavar="SCENE",
+                                          help="A TOML file, or the name of a shipped scene.")]
+NUMBERS = (".csv",)
+OF_ERRORS = {"labeled": "squared error of F"}       # of methods that follow no motion
+
+
+def fitting(file, name, steps=None):
+    """(`LearnedLaws`, `Problem`) of a file and of a scene that they fit, of so many steps if
+    given. Raises ValueError.
+    """
+    laws, path = weights.load(file), find_scene(name)
+    problem = problem_of(scene.load(path), str(path), steps)
+    if dim_of(laws) != problem.dim:
+        raise SceneError(f"{file}: its laws are for {dim_of(laws)} dimensions, but {path} has "
+                         f"dim = {problem.dim}; name another scene")
+    return laws, problem
+
+
+def of_errors(method):
+    """What the errors of a training's epochs are of, in words."""
+    return OF_ERRORS.get(method, "mean squared error of a step [m^2]")
+
+
+def horizons(method, recipe, epochs):
+    """The longest runs from a restart in the first and the last of some epochs [steps]; none of
+    methods that follow no motion, nor where a recipe, plain values, does not say.
+    """
+    if method in OF_ERRORS or not {"first", "last", "epochs"} <= recipe.keys():
+        return ()
+    teacher = Teacher(recipe["first"], recipe["last"])
+    return tuple(teacher.horizon(k, recipe["epochs"]) for k in (0, epochs - 1))
+
+
+def not_true(problem):
+    """The warnings about bodies whose law in the scene is a learned one, which says what it has
+    met.
+    """
+    for name in problem.seen:
+        yield (f"body {name!r} has a learned law in the scene: this compares two learned laws; "
+               "name the scene of the true one")
+
+
+def other_steps(laws, problem):
+    """The warning about steps of another length than in training; or none."""
+    dt = laws.about.get("dt")
+    if dt not in (None, problem.clock.dt):
+        yield (f"the laws were trained in steps of {dt:g} s, the scene has dt = "
+               f"{problem.clock.dt:g} s: a learned return map acts once a step, so that it may "
+               "answer otherwise")
+
+
+StudyName = Annotated[str, typer.Argument(metavar="STUDY",
+                                          help="A TOML file, or the name of a shipped study.")]
+Data = Annotated[Path | None, typer.Option(
+    help="Folder of `generate`, default: STUDY-data here.")]
+MapFile = Annotated[Path | None, typer.Option(
+    "--map", help="Map of `train`, default: STUDY.npz here.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the file of --out.")]
+
+
+def examples(*commands):
+    """The end of a command's help: how it is typed, a line each."""
+    return "\n\n".join(["Examples:", *(f"mpm-ref rom {command}" for command in commands)])
+
+
+def studied(name):
+    """The `Study` of a file or a shipped name."""
+    return load(find_study(name), shipped_scenes())
+
+
+@contextmanager
+def at_work(name):
+    """The same, while reduced runs of it are made: on one thread, their faults in one line."""
+    with one_line(), one_thread():
+        yield studied(name)
+
+
+@contextmanager
+def on_interrupt(say):
+    """Ctrl-C in this block ends the command; say() tells how far it is, and how to go on."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        end(f"interrupted {say()}", INTERRUPT)
+
+
+def named(path, study, ending):
+    """A path as it is given; else named after the study, here."""
+    return path or Path(f"{study.path.stem}{ending}")
+
+
+def assigned(texts):
+    """Texts NAME=VALUE without blanks, each name once. Raises SceneError."""
+    found = {}
+    for text in texts:
+        name, sign, value = (part.strip() for part in text.partition("="))
+        if not sign:
+            raise SceneError(f"{text}: expected NAME=VALUE")
+        if name in found:
+            raise SceneError(f"--set {name} is given twice, {found[name]} and {name}={value}: "
+                             "keep one of them")
+        found[name] = f"{name}={value}"
+    return list(found.values())
+
+
+def map_of(name, study, path):
+    """(file, `Model`) of the map of a study by that name: the file given, else the study's own,
+    with a warning where that was made otherwise than the study says. Raises ValueError.
+    """
+    file = named(path, study, ".npz")
+    if not file.exists():
+        raise SceneError(f"there is no {file}: mpm-ref rom train {name}"
+                         + (f" --out {path}" if path else ""))
+    model = reduce.load(file, study)
+    if path is None:
+        warn(unlike(file, study.tables.map, model))
+    return file, model
+
+
+def unlike(file, asked, model):
+    """The warning about a map of another kind or r than is asked for, or else of other settings; or
+    none.
+    """
+    made, now = model.about["map"], asked.settings
+    kind, r = made["kind"], model.decoder.r
+    others = [key for key in now if made.get(key, now[key]) != now[key]]
+    if (kind, r) != (asked.kind, asked.r):
+        found, wanted = f"{kind}, r = {r}", f"{asked.kind}, r = {asked.r}"
+    elif others:
+        found, wanted = (", ".join(f"{key} = {of[key]}" for key in others) for of in (made, now))
+    else:
+        return
+    yield (f"{file} is {found}, where the study's [map] says {wanted}: train again with "
+           "--overwrite, or name the map with --map")

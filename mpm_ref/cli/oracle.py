@@ -1,0 +1,70 @@
+"""`mpm-ref oracle record | check`: golden files, to check other codes by (see `oracle`)."""
+
+from math import inf
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .. import oracle, scene
+from ..store.words import counted
+from .catalogue import find_scene, keep_scene
+from .errors import at_start, one_line, options
+from .terminal import compiling, warn
+
+DEPARTS = 1      # exit status of a check that another code fails
+
+app = typer.Typer(no_args_is_help=True, help="Record golden files, and check other codes by them.")
+
+
+@app.command()
+def record(
+    name: Annotated[str, typer.Argument(metavar="SCENE")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Golden file.")] = Path("golden.h5"),
+    steps: Annotated[int, typer.Option(help="Steps to record, every stage of each.")] = 3,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a golden file.")] = False,
+    begin: Annotated[int, typer.Option(help="Steps of the run to make before.")] = 0,
+    eps: Annotated[float | None, typer.Option(help="Tolerance of implicit steps.")] = None,
+    adjoint: Annotated[bool, typer.Option("--adjoint", help="Record gradients too.")] = False,
+):
+    """Run the first steps of a scene and record every stage with the error of each number."""
+    with one_line():
+        path = find_scene(name)
+        with options(), at_start(path), compiling():
+            keep_scene(path, out)
+            if eps is not None and not 0.0 < eps < inf:
+                raise ValueError(f"--eps {eps}: expected a tolerance, a finite number > 0")
+            if adjoint and eps is not None:
+                raise ValueError(f"--adjoint with --eps {eps}: implicit steps have no adjoint, and "
+                                 "explicit ones solve nothing; leave one of them out")
+            problem, idle = scene.build(scene.load(path), str(path)), ()
+            if adjoint:
+                oracle.record_adjoint(problem, out, steps, overwrite, begin)
+            else:
+                idle = oracle.record(problem, out, steps, overwrite, begin, eps)
+        warn(nothing_to_solve(idle))
+        print(f"{out}: {counted(steps, 'step')} of {problem.title or name}")
+
+
+def nothing_to_solve(steps):
+    """The warnings about recorded steps that say nothing of a solver: one, or none."""
+    if not steps:
+        return []
+    which = ", ".join(map(str, steps))
+    return [f"nothing to solve in {'step' if len(steps) == 1 else 'steps'} {which}: dv is 0 "
+            "everywhere after 0 iterations; to say something of a solver, record later with "
+            "--begin, when something moves or bears"]
+
+
+@app.command()
+def check(
+    golden: Annotated[Path, typer.Argument(metavar="GOLDEN", help="A golden file.")],
+    other: Annotated[Path, typer.Argument(metavar="OTHER", help="What the other code wrote.")],
+    precision: Annotated[str, typer.Option(help="f64, f32, or auto: as it is stored.")] = "auto",
+    json: Annotated[bool, typer.Option("--json", help="Answer with JSON.")] = False,
+):
+    """Name the first stage that departs, where and by how much. Exit status 0 if none, else 1."""
+    with one_line(), options():
+        report = oracle.check(golden, other, precision)
+    print(report.json if json else report)
+    raise typer.Exit(0 if report.agrees else DEPARTS)

@@ -1,0 +1,206 @@
+"""`mpm-ref rom generate` and `train`: the data of a study, and the map that is made of them."""
+
+import os
+from collections import Counter
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..rom.study import dataset, reduce
+from ..rom.study.generate import (
+    INTERRUPTED,
+    NOT_WRITTEN,
+    SKIPPED,
+    UNSTABLE,
+    file_of,
+    generate,
+    one_thread,
+    said,
+)
+from ..rom.study.model import kind_of, known_of, with_kind
+from ..rom.study.nsf_hints import hints
+from ..rom.study.tables import KEYS, NETWORK, NSF
+from ..store.atomic import NotWritten, require_place
+from ..store.words import counted
+from ..training import DEVICES, Machine
+from . import errors
+from .catalogue import keep_scene
+from .errors import end, one_line, options, writing
+from .options import (
+    MAPS,
+    Data,
+    Overwrite,
+    StudyName,
+    named,
+    on_interrupt,
+    require_ending,
+    require_folder_name,
+    require_free,
+    studied,
+)
+from .terminal import passing, warn
+
+MADE, CONTINUED, THERE = "made", "continued", "was there"
+STATUS = {UNSTABLE: errors.UNSTABLE, NOT_WRITTEN: errors.NOT_WRITTEN}
+
+
+def make_data(
+    name: StudyName,
+    out: Annotated[Path | None, typer.Option(
+        "--out", "-o", help="Folder for the runs, default: STUDY-data here.")] = None,
+    workers: Annotated[int | None, typer.Option(
+        help="Processes of one thread each, default: all cores.", min=1)] = None,
+):
+    """Make the full-order runs of a study.
+
+    Finished ones are left as they are, one that was cut off goes on from its checkpoint; Ctrl-C
+    whenever you like. Exit status: 0 done, 2 bad input, 3 a run became unstable, 4 a file could not
+    be written, 130 Ctrl-C.
+    """
+    with one_line():
+        study = studied(name)
+        folder, ended = named(out, study, "-data"), []
+        with options():
+            require_folder_name(folder)
+            known_of(study, study.mu[0])        # refuses what reduced runs do not know
+        make_folder(folder)
+        workers = workers or os.cpu_count() or 1
+        with (on_interrupt(lambda: f"after {len(ended)} of {counted(len(study.mu), 'run')}; the "
+                           "same command again goes on"),
+              passing(total=len(study.mu), unit="run", desc=str(folder)) as bar):
+            if bar.disable:
+                print(f"{folder}: {counted(len(study.mu), 'run')} of {study.path.stem}, "
+                      f"{min(workers, len(study.mu))} at a time", flush=True)
+            for done in generate(study, folder, workers):
+                if done.why == INTERRUPTED:
+                    raise KeyboardInterrupt
+                if not done.well:
+                    bar.close()
+                    end(done.said, STATUS.get(done.why, errors.BAD_INPUT))
+                ended.append(done)
+                bar.update()
+                if bar.disable:
+                    print(f"{len(ended)} of {len(study.mu)}: {file_of(folder, done.number)}, "
+                          f"{said(study, study.mu[done.number])}: {came(done)}", flush=True)
+        print(f"{folder}: {counted(len(study.mu), 'run')} of {study.path.stem}: {in_sum(ended)}; "
+              f"{len(study.test)} held out")
+
+
+def came(done):
+    """How a run came about, of a `Done` that ended well, in a word."""
+    if done.why == SKIPPED:
+        return THERE
+    return CONTINUED if done.continued else MADE
+
+
+def in_sum(ended):
+    """How many runs were made, continued, and there before, of a `Done` of each."""
+    count = Counter(map(came, ended))
+    made, continued, there = (count[word] for word in (MADE, CONTINUED, THERE))
+    return f"made {made}, continued {continued}, {there} were there"
+
+
+def machine_of(text):
+    """`Machine` of what is typed: a number of threads, or a device. Raises ValueError."""
+    if text in DEVICES[1:]:
+        return Machine(device=text)
+    if not text.isdecimal() or int(text) < 1:
+        raise ValueError(f"--threads {text}: expected 1 or more, or {DEVICES[1]}")
+    return Machine(int(text))
+
+
+def train(
+    name: StudyName,
+    data: Data = None,
+    out: Annotated[Path | None, typer.Option(
+        "--out", "-o", help="File for the map, default: STUDY.npz here.")] = None,
+    kind: Annotated[str | None, typer.Option(
+        help=f"Kind of the map: {', '.join(KEYS)}; default: as the study says.")] = None,
+    threads: Annotated[str, typer.Option(
+        metavar="N|cuda", help="Threads of PyTorch; cuda: a graphics processor.")] = "1",
+    overwrite: Overwrite = False,
+):
+    """Make the map of a study from its runs.
+
+    POD modes, straight or curved, are made at once; a network is trained, which needs PyTorch. A
+    training that is cut off goes on from its checkpoint, MAP.pt. Exit status: 0 done, 2 bad input,
+    4 a file could not be written, 130 Ctrl-C.
+    """
+    with one_line():
+        with options():
+            study, machine = studied(name), machine_of(threads)
+            out, data = named(out, study, ".npz"), named(data, study, "-data")
+            checkpoint = out.with_suffix(".pt")
+            require_map_place(out, study, overwrite)
+            study = with_kind(study, kind)
+            require_device(study.tables.map.kind, machine.device)
+            with writing():
+                snapshots = dataset.load(study, data, study.train)
+            if study.tables.model == NSF:
+                warn(hints(study))
+            about = {"command": f"mpm-ref rom train {name} --data {data} --out {out} "
+                                f"--kind {study.tables.map.kind} {typed(machine)}"}
+            with writing(), on_interrupt(lambda: resuming(checkpoint)):
+                model = fitted(study, snapshots, about, checkpoint, machine)
+            write(out, model)
+        reduce.forget(checkpoint)
+        print(f"{out}: {kind_of(model)}, r = {model.decoder.r}, of "
+              f"{counted(len(study.train), 'run')} and {len(snapshots.X)} points")
+
+
+def require_device(kind, device):
+    """Raise ValueError for a kind of map that is not made on such a device, and where there is
+    none, or no PyTorch.
+    """
+    if kind == NETWORK:
+        reduce.training().device_of(device)
+    elif device != DEVICES[0]:
+        raise ValueError(f"--threads {device}: {kind} are made on the processor; leave it out")
+
+
+def typed(machine):
+    """The option of a `Machine` as it is typed."""
+    return f"--threads {machine.threads if machine.device == DEVICES[0] else machine.device}"
+
+
+def resuming(checkpoint):
+    """How a training goes on that was cut off."""
+    if checkpoint.exists():
+        return f"before the map was made; the same command again goes on from {checkpoint}"
+    return "before there was a checkpoint; the same command again begins anew"
+
+
+def fitted(study, snapshots, about, checkpoint, machine):
+    """`Model` of a study's kind, with a bar of epochs."""
+    if study.tables.map.kind != NETWORK:
+        with one_thread():
+            return reduce.computed(study, snapshots, about)
+    with passing(total=study.tables.map.total, unit="epoch", desc=study.path.stem) as bar:
+        def show(history):
+            bar.update(len(history) - bar.n)
+            bar.set_postfix_str(f"loss {history[-1][0]:.2e}")
+        return reduce.learned(study, snapshots, about, checkpoint, show, machine)
+
+
+def make_folder(folder):
+    """Make a folder for data. Raises NotWritten."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as fault:
+        raise NotWritten(f"--out {folder}: this is no folder, and none can be made there "
+                         f"({fault.strerror})") from None
+
+
+def require_map_place(out, study, overwrite):
+    """Raise ValueError or NotWritten where no map is to be written."""
+    keep_scene(study.path, out)
+    require_ending(out, MAPS)
+    require_place(out)
+    require_free(out, overwrite)
+
+
+def write(out, model):
+    """Write a map. Raises NotWritten."""
+    with writing():
+        reduce.save(out, model)

@@ -1,0 +1,250 @@
+"""`mpm-ref run`: a scene into a results file, with progress, and what each way to end returns.
+
+Exit status: 0 finished, or stopped at --steps; 2 the scene, the options or the files do not fit;
+3 the run became unstable; 4 a file could not be written; 130 Ctrl-C; 143 terminated.
+"""
+
+import sys
+from contextlib import ExitStack
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Annotated
+
+import threadpoolctl
+import typer
+
+from .. import scene
+from ..core.grid import OutOfRange
+from ..core.jit import set_threads
+from ..monitor import Unstable
+from ..simulate import last_step
+from ..store import checkpoint, running
+from ..store.atomic import NotWritten
+from ..store.results import UNITS, USUAL
+from ..store.running import (
+    AT_LIMIT,
+    FINISHED,
+    INTERRUPTED,
+    TERMINATED,
+    Options,
+    Watch,
+    checkpoint_of,
+)
+from ..store.words import counted
+from ..store.writer import Fields
+from ..timestep import TooLarge
+from . import info
+from .catalogue import find_scene, keep_scene
+from .errors import INTERRUPT, NOT_WRITTEN, UNSTABLE, at_start, end, one_line, options
+from .options import Json
+from .terminal import COMPILING, as_json, compiling, passing, warn
+
+FIELDS = f"To store, of {','.join(UNITS)}; default: {','.join(USUAL)}."
+EVERY = "Steps between checkpoints, default: one a minute."
+RESULTS = "Results file, default: SCENE.h5 here."
+GZIP = "Compression, 1 to 9, default: none."
+EXIT = {FINISHED: 0, AT_LIMIT: 0, INTERRUPTED: INTERRUPT, TERMINATED: 143}
+# The bar takes what the rest leaves of the line.
+LINE = "{{percentage:3.0f}}%|{{bar}}| {done} [{{elapsed}}<{{remaining}}{{postfix}}]"
+STEPS = LINE.format(done="{n}/{total:g} steps")
+SECONDS = LINE.format(done="t {n:.4g}/{total:g} s")
+
+
+def run(
+    name: Annotated[str, typer.Argument(metavar="SCENE", help="A TOML file, or a shipped scene.")],
+    out: Annotated[Path | None, typer.Option("--out", "-o", help=RESULTS)] = None,
+    steps: Annotated[int | None, typer.Option(help="Stop after so many steps in all.")] = None,
+    threads: Annotated[int | None, typer.Option(help="Number of threads, default: all.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the results.")] = False,
+    checkpoint_every: Annotated[int | None, typer.Option(help=EVERY)] = None,
+    fields: Annotated[str | None, typer.Option(help=FIELDS)] = None,
+    gzip: Annotated[int | None, typer.Option(help=GZIP)] = None,
+    json: Json = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar.")] = False,
+):
+    """Run a scene into a results file.
+
+    Ctrl-C ends the run after the step being made, with a checkpoint; after that, or whatever else
+    ends it, --resume continues bit for bit. Exit status: 0 done, 2 bad input, 3 the run became
+    unstable, 4 a file could not be written, 130 Ctrl-C, 143 terminated.
+    """
+    with one_line():
+        path = find_scene(name)
+        record, out = scene.load(path), out or Path(f"{path.stem}.h5")
+        with options():
+            keep_scene(path, out)
+            how = Options(steps, checkpoint_every, stored(fields, gzip), resume, overwrite,
+                          record.seed)
+            use_threads(threads)
+        with Bar(Request(name, out, json, quiet)) as bar:
+            status = run_scene(scene.build(record, str(path)), bar, how)
+        raise typer.Exit(status)
+
+
+def stored(fields, gzip):
+    """`Fields` of the two options; None where neither is given. Raises ValueError."""
+    if fields is None and gzip is None:
+        return None
+    return Fields(USUAL if fields is None else tuple(fields.split(",")), gzip or 0)
+
+
+def use_threads(n):
+    """Let kernels and BLAS use n threads; None leaves it at all cores. Raises ValueError."""
+    if n is not None:
+        set_threads(n)
+        threadpoolctl.threadpool_limits(n)
+
+
+@dataclass(frozen=True)
+class Request:
+    """What the command line asked for."""
+
+    scene: str
+    out: Path
+    json: bool = False
+    quiet: bool = False
+
+
+class Bar(Watch):
+    """What is run, on the output; and progress on the error channel of a terminal: steps or time
+    done, time left, dt, kinetic and total energy. A context manager.
+    """
+
+    def __init__(self, request):
+        self.request, self.facts, self.energies, self.steps = request, None, "", 0
+        self.bar, self.stack = None, ExitStack()
+
+    def __enter__(self):
+        self.stack.enter_context(compiling(self.request.quiet))
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    @property
+    def began(self):
+        """Whether the run began."""
+        return self.bar is not None
+
+    def begin(self, problem, state):
+        """Say what is run and what looks wrong in it, and open the bar."""
+        self.facts = info.of_problem(problem)
+        self.stack.close()
+        if state is None:
+            warn(self.facts["warnings"])
+        if not self.request.json:
+            print("\n".join(info.problem_lines(self.facts)), flush=True)
+        self.total = last_step(problem.clock)
+        self.bar = passing(
+            self.request.quiet, total=self.total or problem.clock.end, mininterval=0.2,
+            initial=0 if state is None else self.done(state),
+            bar_format=STEPS if self.total else SECONDS,
+        )
+        self.bar.set_postfix_str(COMPILING)
+
+    def done(self, state):
+        """How far a state is."""
+        return state.step if self.total else state.t
+
+    def step(self, state, dt):
+        """Move the bar."""
+        self.steps += 1
+        if self.steps == 1:
+            self.start_clock(state)
+        t = f"t {state.t:.3g}, " if self.total else ""
+        solve = "" if state.solve is None else f", {in_short(state.solve)}"
+        self.bar.set_postfix_str(f"{t}dt {dt:.3g} s{solve}{self.energies}", refresh=False)
+        self.bar.update(self.done(state) - self.bar.n)
+
+    def start_clock(self, state):
+        """Count from here: the first step compiles."""
+        self.bar.reset()
+        self.bar.initial = self.bar.n = self.bar.last_print_n = self.done(state)
+
+    def frame(self, frame, energy):
+        """Note the energies that are finite: of a law without energy the sum is not."""
+        known = {"E_kin": energy.kinetic, "E": energy.sum}
+        said = [f"{name} {value:.3g}" for name, value in known.items() if isfinite(value)]
+        self.energies = f", {', '.join(said)} J" if said else ""
+
+    def astray(self, said):
+        """Say that a learned law is asked what it has not seen."""
+        with self.bar.external_write_mode(file=sys.stderr):
+            warn([said])
+
+    def close(self):
+        """Leave the bar as it is."""
+        self.stack.close()
+        if self.bar is not None:
+            self.bar.close()
+
+
+def in_short(report):
+    """Iterations and last residual of an implicit step."""
+    return f"{report.iterations} it to {report.residuals[-1]:.0e}"
+
+
+def run_scene(problem, bar, options):
+    """Run a problem as asked; returns the exit status. Faults of the input are raised."""
+    request = bar.request
+    try:
+        outcome = running.run(problem, request.out, options, bar)
+    except (Unstable, OutOfRange, TooLarge, NotWritten, KeyboardInterrupt) as fault:
+        bar.close()
+        if not bar.began:
+            with at_start(request.scene):
+                raise
+        _broke_off(fault, request)
+    bar.close()
+    if not outcome.same_code:
+        print("mpm-ref: the checkpoint was saved by another version of the code: the run went on, "
+              "but not bit for bit", file=sys.stderr)
+    _report(outcome, request, bar.facts)
+    return EXIT[outcome.why]
+
+
+def _broke_off(fault, request):
+    """End a run that could not end between two steps by itself."""
+    said = str(fault) or "interrupted at once"
+    status = {NotWritten: NOT_WRITTEN, KeyboardInterrupt: INTERRUPT}.get(type(fault), UNSTABLE)
+    next_ = last_good(request, again=status != UNSTABLE)
+    end(f"{said}{'' if said.endswith('?') else '.'} {next_}", status)
+
+
+def _report(outcome, request, facts):
+    """Say how the run ended and how to go on."""
+    state = outcome.state
+    warn(info.unsolved(outcome.unsolved))
+    if request.json:
+        print(as_json({
+            "why": outcome.why, "out": str(request.out), "step": state.step, "t": state.t,
+            "frames": outcome.frames, "unsolved": outcome.unsolved,
+            "checkpoint": str(checkpoint_of(request.out)),
+            "state_sha256": checkpoint.digest(state), "problem": facts,
+        }))
+    else:
+        print(f"{outcome.why}: step {state.step}, t = {state.t:.6g} s, "
+              f"{counted(outcome.frames, 'frame')} in {request.out}")
+    if outcome.why != FINISHED:
+        print(f"to go on: {how_to_resume(request)}", file=sys.stderr)
+
+
+def how_to_resume(request):
+    """The command that continues a run."""
+    return f"mpm-ref run {request.scene} --out {request.out} --resume"
+
+
+def last_good(request, again):
+    """Where the last checkpoint of a run stands, and how to go on: from it, or, where the same
+    scene would break again, with another one.
+    """
+    path = checkpoint_of(request.out)
+    try:
+        there = checkpoint.summary(path)
+    except checkpoint.BadCheckpoint as fault:
+        return f"No checkpoint: {fault}"
+    on = f"to go on from it: {how_to_resume(request)}" if again else (
+        "the same scene would break again: change it and start anew with --overwrite")
+    return f"Last good checkpoint: {path}, step {there['step']}, t = {there['t']:.6g} s; {on}"

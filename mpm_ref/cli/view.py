@@ -1,0 +1,83 @@
+"""`mpm-ref plot | animate | export | scenes`: commands that look at results and scenes."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .. import plotting, scene
+from ..store.atomic import require_place
+from ..store.results import SCALARS, Results
+from ..store.vtkhdf import export_grid, export_particles
+from .catalogue import shipped_scenes
+from .errors import one_line, options
+from .options import PICTURES, Json, require_ending
+from .terminal import print_titles
+
+ResultsFile = Annotated[Path, typer.Argument(metavar="FILE", help="A results file.")]
+Scalar = Annotated[str, typer.Option(help=f"Colour: {', '.join(SCALARS)}.")]
+View = Annotated[str | None, typer.Option(help="Axes to the right and up, such as xz.")]
+
+
+def plot(
+    file: ResultsFile,
+    frame: Annotated[int, typer.Option(help="Number from 0; -1 is the last.")] = -1,
+    field: Scalar = "speed",
+    view: View = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="FILE.png")] = None,
+):
+    """Draw the particles and the solids of one frame (png, pdf or svg); 3D solids are cut halfway
+    of the particles' depth.
+    """
+    what = {"frame": frame, "field": field, "view": _axes(view)}
+    _to_file(plotting.save_plot, file, out, PICTURES, **what)
+
+
+def animate(
+    file: ResultsFile,
+    field: Scalar = "speed",
+    view: View = None,
+    fps: Annotated[int, typer.Option(help="Frames per second.", min=1, max=100)] = 20,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="FILE.gif")] = None,
+):
+    """Make a GIF of all frames."""
+    _to_file(plotting.animate, file, out, (".gif",), field=field, view=_axes(view), fps=fps)
+
+
+def export(
+    file: ResultsFile,
+    grid: Annotated[bool, typer.Option("--grid", help="Nodes, not particles.")] = False,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="FILE.vtkhdf")] = None,
+):
+    """Write VTKHDF, which ParaView and VTK open: particles, or density and velocity of nodes."""
+    _to_file(export_grid if grid else export_particles, file, out, (".vtkhdf", ".hdf"))
+
+
+def scenes(json: Json = False):
+    """List the scenes that come with the package."""
+    with one_line():
+        titles = {name: scene.load(path).title for name, path in shipped_scenes().items()}
+        print_titles(titles, json)
+
+
+def _to_file(make, file, out, suffixes, **what):
+    """Make a file from results and name it."""
+    out = out or file.with_suffix(suffixes[0])
+    with options():
+        require_ending(out, suffixes)
+        if out.exists() and file.exists() and out.samefile(file):
+            raise ValueError(f"--out {out}: this is the results file itself; name another file")
+    with one_line(), Results(file) as results:
+        require_place(out)
+        make(results, out, **what)
+        print(out)
+
+
+def _axes(view):
+    """Axes by name, xz, as numbers."""
+    if view is None:
+        return None
+    with options():
+        if len(view) != 2 or len(set(view)) != 2 or not set(view) <= set(plotting.AXES):
+            raise ValueError(f"--view {view}: expected two different axes such as xy or xz")
+    return tuple(plotting.AXES.index(axis) for axis in view)

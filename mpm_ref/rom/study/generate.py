@@ -1,0 +1,203 @@
+"""Full-order runs of a study into a folder, a results file for each, on several processes.
+
+What is there is not made again: a finished run is left as it is, one that was cut off goes on from
+its last checkpoint.
+"""
+
+import multiprocessing
+import os
+import signal
+import threading
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing.connection import wait
+from pathlib import Path
+from typing import NamedTuple
+
+import numba
+import threadpoolctl
+
+from ...core.grid import OutOfRange
+from ...monitor import Unstable
+from ...scene import build, digest
+from ...store.atomic import NotWritten
+from ...store.results import BadResults, Results
+from ...store.running import FINISHED, Options, Watch, checkpoint_of, run
+from ...store.writer import Fields
+from ...timestep import TooLarge
+from .tables import LDM, NSF
+
+FIELDS = ("x", "F", "v")
+STORED = {LDM: FIELDS, NSF: ("x", "C", "tau")}      # of particles, in all frames
+SKIPPED, INTERRUPTED = "skipped", "interrupted"
+UNSTABLE, NOT_WRITTEN, REFUSED = "unstable", "not written", "refused"
+
+
+class Done(NamedTuple):
+    """How one run of a study ended: finished, or a word of those above; and what is to be said."""
+
+    number: int
+    why: str
+    said: str = ""
+    continued: bool = False     # whether from a checkpoint
+
+    @property
+    def well(self):
+        """Whether its data are there."""
+        return self.why in (FINISHED, SKIPPED)
+
+
+def file_of(folder, k):
+    """Results file of run number k."""
+    return Path(folder) / f"case-{k:03d}.h5"
+
+
+def generate(study, folder, workers=1):
+    """Make all runs of a study and yield a `Done` of each, as they end.
+
+    After the first that does not end well no other begins. Those under way then, or at Ctrl-C, end
+    after the step being made, with a checkpoint. Each process uses one thread.
+    """
+    numbers = range(len(study.mu))
+    if workers > 1:
+        yield from _in_processes(study, folder, min(workers, len(numbers)))
+        return
+    with one_thread():
+        for k in numbers:
+            done = made(study, folder, k)
+            yield done
+            if not done.well:
+                return
+
+
+def _in_processes(study, folder, workers):
+    """`generate` on several processes, which are started anew: a fork of a process with threads
+    may hang.
+    """
+    context = multiprocessing.get_context("spawn")
+    stop = context.Event()
+    with ProcessPoolExecutor(workers, context, _begin_worker, (stop,)) as pool:
+        with _deaf():
+            waiting = [pool.submit(made, study, folder, k) for k in range(len(study.mu))]
+        try:
+            for future in as_completed(waiting):
+                yield (done := future.result())
+                if not done.well:
+                    return
+        except BrokenProcessPool:
+            yield Done(-1, NOT_WRITTEN, "a process that made runs was killed, for want of memory "
+                       "perhaps; the same command goes on, with fewer --workers if need be")
+        finally:
+            stop.set()
+            pool.shutdown(wait=True, cancel_futures=True)
+
+
+@contextmanager
+def _deaf():
+    """Processes started in this block do not listen to Ctrl-C before they have begun."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+class _Ear(Watch):
+    """Ends a run as Ctrl-C would, once `stop` is set: the terminal's own goes to the parent."""
+
+    stop = None         # of a process that only makes runs
+
+    def step(self, state, dt):
+        """After every step."""
+        if self.asked:
+            signal.raise_signal(signal.SIGINT)
+
+    @property
+    def asked(self):
+        """Whether to stop."""
+        return self.stop is not None and self.stop.is_set()
+
+
+EAR = _Ear()
+
+
+def _begin_worker(stop):
+    """One thread, no Ctrl-C but by `stop`, and no life without the parent: as files stand at any
+    moment, a process may end at any.
+    """
+    def end_with_parent():
+        wait([multiprocessing.parent_process().sentinel])
+        os._exit(1)
+
+    os.setpgrp()
+    EAR.stop = stop
+    numba.set_num_threads(1)
+    threadpoolctl.threadpool_limits(1)
+    threading.Thread(target=end_with_parent, daemon=True).start()
+
+
+def made(study, folder, k):
+    """`Done` of run number k, made if it is not there."""
+    path = file_of(folder, k)
+    if EAR.asked:
+        return Done(k, INTERRUPTED)
+    try:
+        scene = study.scene(study.mu[k])
+        if finished(path, scene):
+            return Done(k, SKIPPED)
+        continued = checkpoint_of(path).exists()
+        outcome = run(build(scene), path, options(study, k), EAR)
+    except (Unstable, OutOfRange, TooLarge) as fault:
+        return Done(k, UNSTABLE, f"run {k} ({said(study, study.mu[k])}): {fault}")
+    except NotWritten as fault:
+        return Done(k, NOT_WRITTEN, str(fault))
+    except (ValueError, OSError) as fault:
+        return Done(k, REFUSED, str(fault))
+    why = FINISHED if outcome.why == FINISHED else INTERRUPTED
+    return Done(k, why, continued=continued)
+
+
+def options(study, k):
+    """How run number k is recorded."""
+    model, facts = study.tables.model, {}
+    if model == NSF:
+        facts = {"parameters": dict(zip(study.names, study.mu[k].tolist(), strict=True))}
+    return Options(fields=Fields(STORED[model]), resume=True, facts=facts)
+
+
+def finished(path, scene):
+    """Whether a file has all steps of a scene. Raises BadResults for a file that is no results
+    file, or of another scene.
+    """
+    if not path.exists():
+        return False
+    with Results(path) as results:
+        if results.h5.attrs["scene_sha256"] != digest(scene):
+            raise BadResults(f"{path} holds a run of another scene or study; name another folder, "
+                             "or remove this one's files")
+        parts = results.manifest.get("parts")
+        return bool(parts) and parts[-1]["why"] == FINISHED
+
+
+def said(study, mu):
+    """Parameters in words."""
+    return ", ".join(f"{name} = {value:g}" for name, value in
+                     zip(study.names, mu, strict=True))
+
+
+@contextmanager
+def one_thread():
+    """While the block runs, kernels and BLAS use one thread: runs of a few thousand particles gain
+    nothing from more.
+    """
+    before = numba.get_num_threads()
+    numba.set_num_threads(1)
+    try:
+        with threadpoolctl.threadpool_limits(1):
+            yield
+    finally:
+        numba.set_num_threads(before)

@@ -1,0 +1,257 @@
+"""Build a `Problem` of a checked scene: sampled bodies, colliders and motions, clock, limits.
+
+Each `build_*` takes a checked record, except for what only the built object can check: then it
+raises SceneError with the key's path.
+"""
+
+from math import inf, radians
+
+import numpy as np
+
+from ..body import AFFINE, Body, particles_at
+from ..core import motion as rigid
+from ..core.boundary import BoxWalls, Conditions, Prescribed
+from ..core.boundary import Collider as RigidCollider
+from ..hot.methods import METHODS, options_of
+from ..hot.step import check_scheme
+from ..materials import Material
+from ..monitor import Limits
+from ..problem import Clock
+from ..sampling import sample
+from ..sampling.arrays import read_arrays
+from ..shapes import level_set
+from ..shapes.inside import rotation, solid
+from .messages import SceneError, at
+from .records import Keyframes, Oscillation, Ramps, Steady
+
+NAMES = f'expected "explicit" or one of {", ".join(METHODS)}'
+CFL = 0.5       # share of the stable time step, for a scene that says nothing about its step
+
+
+def build_body(scene, k):
+    """Body number k of a checked scene. Raises SceneError with the path of what does not work."""
+    record, path = scene.body[k], f"body[{k}]"
+    law = record.material.elastic()
+    material = Material(law, record.material.flowing(scene.dim))
+    if record.shape is not None:
+        particles = _sampled(scene, record, material, (path, [scene.seed, k]))
+    else:
+        particles = _read(scene, record, material, path)
+    return Body(record.name, particles, law, material.flow, np.arange(len(particles.x)))
+
+
+def strain_bounds(record, dim, k):
+    """Return the strains that the laws of body number k met in training, or None; errors as of
+    `build_body`.
+    """
+    with at(f"body[{k}].material.weights"):
+        return record.material.strain_bounds(dim)
+
+
+def _sampled(scene, record, material, where):
+    """Particles that fill the body's shape; `where` is its path and its seed."""
+    path, seed = where
+    with at(f"{path}.shape"):
+        shape = solid(record.shape)
+    with at(f"{path}.sampling"):
+        x, V0 = sample(record.sampling, shape, scene.dx, seed)
+    m = record.density * V0
+    return _at_rest(scene, material, x, velocity(record.velocity, x, m), (m, V0))
+
+
+def _at_rest(scene, material, x, v, sizes):
+    """Particles without deformation; `sizes` are their masses and volumes."""
+    particles = particles_at(x, v, *sizes, scene.step_scheme.transfer, fluid=not material.needs_F)
+    if not material.has_history:
+        return particles
+    return particles._replace(y=np.full(len(x), material.initial_y))
+
+
+def velocity(record, x, m):
+    """v = linear + angular x (x - center) at points x (N, d) with masses m (N,)."""
+    v = np.zeros_like(x)
+    if record.linear is not None:
+        v += record.linear
+    center = np.average(x, axis=0, weights=m) if record.center is None else record.center
+    r = x - np.asarray(center)
+    if isinstance(record.angular, tuple):
+        return v + np.cross(record.angular, r)
+    return v + record.angular * np.column_stack([-r[:, 1], r[:, 0]]) if x.shape[1] == 2 else v
+
+
+def _read(scene, record, material, path):
+    """Particles from a file of arrays."""
+    source = record.particles
+    with at(f"{path}.particles"):
+        a = read_arrays(source.file, scene.dim, source.group, source.select)
+        m, V0 = masses(a, record.density)
+        _check_deformation(a, material)
+    if "v" in a and record.velocity.moves:
+        raise SceneError(f"{path}.velocity: the file has velocities v; leave this table out")
+    v = a.get("v", velocity(record.velocity, a["x"], m))
+    particles = _at_rest(scene, material, a["x"], v, (m, V0))
+    if "C" in a and scene.step_scheme.transfer in AFFINE:
+        particles.C[:] = a["C"]
+    if "y" in a and material.has_history:
+        particles.y[:] = a["y"]
+    if "J" in a or "F" in a:
+        particles.F[:] = a["J"] if "J" in a else a["F"]
+    return particles
+
+
+def masses(a, density):
+    """Masses [kg] and volumes at rest [m^d] of arrays, the one from the other by the density.
+
+    Raises ValueError unless two of m, V0 and the density are known.
+    """
+    known = [name for name in ("m", "V0") if name in a] + ["density"] * (density is not None)
+    if len(known) != 2:
+        raise ValueError(f"known of m, V0 and density: {', '.join(known) or 'none'}; expected two")
+    return (a["m"] if "m" in a else density * a["V0"],
+            a["V0"] if "V0" in a else a["m"] / density)
+
+
+def _check_deformation(a, material):
+    """F for what carries F, J (or an F whose determinant is J) for what carries J."""
+    if not material.needs_F and "F" in a and "J" not in a:
+        a["J"] = np.linalg.det(a["F"])
+        if not (a["J"] > 0.0).all():
+            p = int(np.argmin(a["J"]))
+            raise ValueError(f"the array F has determinant {a['J'][p]:.6g} for particle {p}: "
+                             "expected a number > 0")
+    if material.needs_F and "J" in a:
+        if "F" not in a:
+            raise ValueError("the array F is missing; J alone is for a fluid that carries no F")
+        del a["J"]
+
+
+def build_clock(scene):
+    """When the run steps, shows frames and ends."""
+    for a, b in (("dt", "cfl"), ("steps", "end"), ("every", "interval")):
+        if getattr(scene, a) is not None and getattr(scene, b) is not None:
+            raise SceneError(f"{a}: given together with `{b}`; give one of the two")
+    if scene.steps is None and scene.end is None:
+        raise SceneError("steps: this key is missing; give `steps` or `end`")
+    cfl = CFL if scene.cfl is None else scene.cfl
+    if scene.dt is None and cfl > 1.0 and scene.unstable != "allow":
+        raise SceneError(f'cfl = {cfl}: expected at most 1, or with it unstable = "allow"')
+    if scene.dt is not None and scene.longest is not None:
+        raise SceneError("longest: given together with `dt`, which it could not change")
+    longest = inf if scene.longest is None else scene.longest
+    return Clock(scene.dt, cfl, scene.steps, scene.end, scene.every, scene.interval, longest)
+
+
+def build_solver(scene):
+    """Options of the implicit method that the scene names; None for the explicit integrator."""
+    if scene.integrator == "explicit":
+        if scene.solver is not None:
+            raise SceneError('solver: given, but the integrator is "explicit"; add integrator = '
+                             '"hot", or another implicit method, or remove this table')
+        return None
+    if scene.integrator not in METHODS:
+        raise SceneError(f"integrator = {scene.integrator!r}: {NAMES}")
+    with at("scheme"):
+        check_scheme(scene.step_scheme)
+    parts = {f"collider[{k}]": part for k, part in enumerate(scene.collider)}
+    for name, part in (parts | {"walls": scene.walls}).items():
+        if part is not None and part.friction:
+            raise SceneError(f"{name}.friction = {part.friction}: expected 0 with an implicit "
+                             "integrator; friction has no potential")
+    return options_of(scene.integrator, **(scene.solver.given() if scene.solver else {}))
+
+
+def build_limits(scene):
+    """What a healthy run stays within."""
+    limits = scene.limits
+    if not limits.J[0] < 1.0 < limits.J[1]:
+        raise SceneError(f"limits.J = {list(limits.J)}: expected two numbers, one < 1, one > 1")
+    return Limits(limits.cfl, limits.J, limits.growth)
+
+
+def build_conditions(scene):
+    """Colliders, prescribed regions and walls; None where there are none."""
+    colliders = tuple(_collider(c, scene.dim, f"collider[{k}]")
+                      for k, c in enumerate(scene.collider))
+    prescribed = tuple(_prescribed(f, scene.dim, f"fixed[{k}]") for k, f in enumerate(scene.fixed))
+    walls = _walls(scene.walls, scene.dim)
+    if not colliders and not prescribed and walls is None:
+        return None
+    return Conditions(colliders, prescribed, walls)
+
+
+def _collider(record, dim, path):
+    with at(f"{path}.shape"):
+        shape = level_set(record.shape)
+    motion = _motion(record.motion, dim, f"{path}.motion")
+    with at(path):
+        return RigidCollider(shape, record.kind, record.friction, motion, record.inside)
+
+
+def _prescribed(record, dim, path):
+    with at(f"{path}.region"):
+        shape = level_set(record.region)
+    motion = _motion(record.motion, dim, f"{path}.motion")
+    until = inf if record.until is None else record.until
+    with at(path):
+        return Prescribed(shape, motion, record.inside, record.follows, record.since, until)
+
+
+def _walls(record, dim):
+    if record is None:
+        return None
+    with at("walls"):
+        low, high = _nodes("low", record.low, dim), _nodes("high", record.high, dim)
+        return BoxWalls(low, high, record.kind, record.friction)
+
+
+def _nodes(name, nodes, dim):
+    """Node indices per axis, None for "open"."""
+    nodes = nodes or dim * ("open",)
+    if len(nodes) != dim:
+        raise ValueError(f"{name} = {list(nodes)}: expected {dim} node indices or 'open'")
+    return tuple(None if node == "open" else node for node in nodes)
+
+
+def _motion(record, dim, path):
+    """The rigid motion of a collider or region."""
+    translation = _schedule(record.translation, dim, f"{path}.translation")
+    turning = _schedule(record.rotation, 1, f"{path}.rotation")
+    with at(path):
+        orientation = rotation(record.angle, record.axis, dim) if record.angle else None
+        made = rigid.Motion(translation, turning, record.axis, record.center, orientation)
+        made.pose(1.0, 1.0, dim)        # checks what belongs together
+    return made
+
+
+def _schedule(record, size, path):
+    """A schedule of vectors of that size, or of numbers for size 1."""
+    if record is None:
+        return None
+    with at(path):
+        match record:
+            case Steady():
+                return rigid.Steady(_value("rate", record.rate, size), record.start, _stop(record))
+            case Keyframes():
+                return rigid.Keyframes(record.times, _values("values", record.values, size))
+            case Ramps():
+                return rigid.Ramps(record.times, _values("rates", record.rates, size))
+            case Oscillation():
+                amplitude = _value("amplitude", record.amplitude, size)
+                return rigid.Oscillation(amplitude, record.frequency, radians(record.phase),
+                                         record.start, _stop(record))
+
+
+def _stop(record):
+    return inf if record.stop is None else record.stop
+
+
+def _values(name, values, size):
+    return [_value(f"{name}[{k}]", value, size) for k, value in enumerate(values)]
+
+
+def _value(name, value, size):
+    """A vector of that size, or a number for size 1."""
+    if np.shape(value) != (() if size == 1 else (size,)):
+        expected = "a number" if size == 1 else f"{size} numbers"
+        raise ValueError(f"{name} = {value}: expected {expected}")
+    return np.array(value) if size > 1 else value

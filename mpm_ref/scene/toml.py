@@ -1,0 +1,131 @@
+"""Scenes as text: TOML files, and a canonical JSON text with its hash."""
+
+import hashlib
+import json
+import tomllib
+from pathlib import Path
+
+import msgspec
+
+from ..shapes.quantities import Kind, Record
+from .messages import SceneError, joined
+from .validate import checked
+
+FILES = "file", "weights"       # keys that name a file
+
+
+def load(path):
+    """The `Scene` of a TOML file; file names in it are taken from the folder of that file.
+
+    Raises SceneError, which names the file and the key.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except OSError as fault:
+        raise SceneError(f"{path}: cannot be read ({fault.strerror})") from None
+    except UnicodeDecodeError:
+        raise SceneError(f"{path}: not a text file in UTF-8") from None
+    return loads(text, source=str(path), folder=Path(path).parent)
+
+
+def loads(text, source="", folder="."):
+    """The `Scene` of a TOML text, or of JSON as `canonical` writes it.
+
+    `source` opens error messages, `folder` is where file names start. Raises SceneError.
+    """
+    try:
+        data = json.loads(text) if text.lstrip().startswith("{") else tomllib.loads(text)
+    except (ValueError, RecursionError) as fault:
+        raise SceneError(f"{source or 'the scene'}: not valid TOML: {fault}") from None
+    return checked(_located(data, Path(folder)), source)
+
+
+def _located(data, folder):
+    """Plain tables with the names of their files made to start at a folder."""
+    if isinstance(data, list):
+        return [_located(item, folder) for item in data]
+    if not isinstance(data, dict):
+        return data
+    located = {key: _located(value, folder) for key, value in data.items()}
+    for key in FILES:
+        if isinstance(located.get(key), str):
+            located[key] = str(folder / located[key])
+    return located
+
+
+def dumps(scene):
+    """TOML text of a scene, defaults left out; `loads` gives the same scene."""
+    tables = _tables(checked(scene))
+    many = {key: tables.pop(key) for key in ("body", "collider", "fixed") if key in tables}
+    lines = [_pair(key, value) for key, value in tables.items()]
+    for key, items in many.items():
+        for item in items:
+            lines += ["", f"[[{key}]]", *(_pair(k, value) for k, value in item.items())]
+    return "\n".join([*lines, ""])
+
+
+def _pair(key, value):
+    return f"{key} = {_toml(value)}"
+
+
+def _toml(value):
+    """A value on one line of TOML."""
+    if isinstance(value, dict):
+        return f"{{{', '.join(_pair(key, item) for key, item in value.items())}}}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_toml, value))}]"
+    # JSON writes numbers, truth values and texts as TOML does, but for the DEL character.
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def canonical(scene):
+    """JSON text of a scene: sorted keys, no defaults; files by their name and the sha256 of what
+    they hold. Equal scenes have equal texts, wherever they lie. Raises SceneError.
+    """
+    return json.dumps(_by_content(_tables(checked(scene))), sort_keys=True, separators=(",", ":"))
+
+
+def digest(scene):
+    """The scene's hash: sha256 of its canonical text."""
+    return hashlib.sha256(canonical(scene).encode()).hexdigest()
+
+
+def _tables(record):
+    """A record as plain tables without the keys that have their default value."""
+    tables = {"type": record.__struct_config__.tag} if isinstance(record, Kind) else {}
+    for field in msgspec.structs.fields(record):
+        value = getattr(record, field.name)
+        if value is not None and value != field.default:
+            tables[field.name] = _plain_but_defaults(value)
+    return tables
+
+
+def _plain_but_defaults(value):
+    if isinstance(value, Record):
+        return _tables(value)
+    return [_plain_but_defaults(item) for item in value] if isinstance(value, tuple) else value
+
+
+def _by_content(data, path=""):
+    """Plain tables in which a file is its name and the sha256 of what it holds."""
+    if isinstance(data, list | tuple):
+        return [_by_content(item, f"{path}[{k}]") for k, item in enumerate(data)]
+    if not isinstance(data, dict):
+        return data
+    tables = {key: _by_content(value, joined(path, key)) for key, value in data.items()}
+    for key in FILES:
+        if key in data:
+            tables[key] = Path(data[key]).name
+            tables["sha256"] = _sha256(data[key], joined(path, key))
+            if data.get("sha256") not in (None, tables["sha256"]):
+                raise SceneError(f"{path}.sha256: the file {data[key]!r} holds something else, "
+                                 f"its sha256 is {tables['sha256']}")
+    return tables
+
+
+def _sha256(file, where):
+    try:
+        with open(file, "rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except (OSError, ValueError) as fault:
+        raise SceneError(f"{where} = {file!r}: cannot be read ({fault})") from None

@@ -1,0 +1,108 @@
+"""From plain tables to a checked `Scene`, or one sentence that names the key and what is wrong.
+
+Keys, types and bounds are checked by msgspec; what spans tables is checked here.
+"""
+
+from math import isfinite
+from typing import get_args
+
+import msgspec
+import numpy as np
+
+from ..shapes import Mesh
+from ..shapes.quantities import Vector
+from .builder import build_clock, build_conditions, build_limits, build_solver
+from .messages import SceneError, at, joined, rephrase, shown
+from .records import Scene
+
+
+def checked(data, source=""):
+    """The `Scene` of plain tables (dict) or of a Scene made in Python, if nothing is wrong with it.
+
+    `source`, usually a file name, opens the message. Raises SceneError for whatever is wrong.
+    """
+    try:
+        if isinstance(data, Scene):
+            data = plain(data)
+        check_finite(data)
+        scene = msgspec.convert(data, Scene)
+        check_scene(scene)
+    except msgspec.ValidationError as fault:
+        raise _from(source, rephrase(str(fault), data)) from None
+    except RecursionError:
+        raise _from(source, "the tables are nested too deeply") from None
+    except (ValueError, TypeError, OverflowError) as fault:
+        raise _from(source, fault) from None
+    return scene
+
+
+def _from(source, message):
+    return SceneError(f"{source}: {message}" if source else message)
+
+
+def plain(record):
+    """A record as tables of numbers, texts and lists; NumPy's numbers and arrays become plain."""
+    return msgspec.to_builtins(record, enc_hook=_plain_numpy)
+
+
+def _plain_numpy(value):
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    raise ValueError(f"{shown(value)}: expected a number, a text, a list or a table")
+
+
+def check_finite(data, path=""):
+    """Raise SceneError for a NaN or an infinity anywhere in plain tables."""
+    if isinstance(data, float) and not isfinite(data):
+        raise SceneError(f"{path} = {data}: expected a finite number")
+    if isinstance(data, dict):
+        for key, value in data.items():
+            check_finite(value, joined(path, key))
+    elif isinstance(data, list | tuple):
+        for k, value in enumerate(data):
+            check_finite(value, f"{path}[{k}]")
+
+
+def check_scene(scene):
+    """Raise SceneError for the first thing that does not fit together."""
+    check_dimension(scene, scene.dim)
+    for k, body in enumerate(scene.body):
+        check_body(body, scene.dim, f"body[{k}]")
+        if body.material.is_neural and scene.integrator != "explicit":
+            raise SceneError(f"body[{k}].material.law = {body.material.law!r}: expected the "
+                             f'integrator "explicit"; a learned stress has no energy to minimise')
+        if body.name in [other.name for other in scene.body[:k]]:
+            raise SceneError(f"body[{k}].name = {body.name!r}: another body has this name")
+    if scene.clip and not all(a < b for a, b in zip(scene.clip.lower, scene.clip.upper)):
+        raise SceneError("clip: expected lower < upper on every axis")
+    build_clock(scene)
+    build_limits(scene)
+    build_conditions(scene)
+    build_solver(scene)
+
+
+def check_body(body, dim, path):
+    """Raise SceneError for a material or velocity that does not fit the dimension."""
+    with at(f"{path}.material" + ("" if body.material.is_neural else ".flow")):
+        body.material.flowing(dim)
+    angular = body.velocity.angular
+    if isinstance(angular, tuple) != (dim == 3) and angular != 0.0:
+        expected = "a number" if dim == 2 else "3 numbers"
+        raise SceneError(f"{path}.velocity.angular = {shown(angular)}: expected {expected} "
+                         f"(dim = {dim})")
+
+
+def check_dimension(record, dim, path=""):
+    """Raise SceneError for a vector without `dim` components, in a record or what it holds."""
+    if dim == 2 and isinstance(record, Mesh):
+        raise SceneError(f"{path[:-1]}: a mesh of triangles is for dim = 3")
+    for field in msgspec.structs.fields(record):
+        value, where = getattr(record, field.name), f"{path}{field.name}"
+        if isinstance(value, msgspec.Struct):
+            check_dimension(value, dim, f"{where}.")
+        elif isinstance(value, tuple) and value and isinstance(value[0], msgspec.Struct):
+            for k, item in enumerate(value):
+                check_dimension(item, dim, f"{where}[{k}].")
+        elif isinstance(value, tuple) and Vector in (field.type, *get_args(field.type)):
+            if len(value) != dim:
+                raise SceneError(f"{where} = {list(value)}: expected {dim} numbers (dim = {dim})")

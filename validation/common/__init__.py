@@ -1,0 +1,1 @@
+"""Common parts of the validation suite: records, runs, reports, printed numbers."""

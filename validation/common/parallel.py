@@ -1,0 +1,83 @@
+"""Run experiments in parallel: the processes share the cores evenly.
+
+Kernels are compiled by one core whatever the number of threads, so that two experiments at a time
+take not much more than half the time of one after the other. Timings are CPU seconds; beside
+another experiment they are less quiet, and each record's `workers` says so.
+"""
+
+import os
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from functools import cache
+from multiprocessing import get_context
+
+import numba
+import threadpoolctl
+from tqdm import tqdm
+
+from mpm_ref.core.jit import set_threads
+
+from .progress import SuiteProgress
+from .registry import discover
+from .run import attempt
+
+
+@cache
+def experiment_of(experiment_id):
+    """Return the experiment of that id."""
+    return discover().experiments[experiment_id]
+
+
+def run_side_by_side(experiments, setting, workers, find=experiment_of):
+    """Run experiments like `run.run_all`, `workers` at a time, the longest first.
+
+    Each process calls find(id) for its experiments, since a function that another function made
+    cannot be sent to a process.
+    """
+    longest = sorted(experiments, key=lambda e: -e.seconds(setting.profile))
+    setting = setting._replace(targets=dict(setting.targets), workers=workers)
+    failed = []
+    with (SuiteProgress([e.seconds(setting.profile) for e in experiments]) as progress,
+          ProcessPoolExecutor(workers, get_context("spawn"), take_share, (workers,)) as pool):
+        coming = {pool.submit(attempt_in_process, find, e.id, setting): e for e in longest}
+        try:
+            for future in as_completed(coming):
+                experiment = coming[future]
+                summary, raised = what_came(future)
+                if raised:
+                    progress.say(raised)
+                    failed.append(experiment.id)
+                progress.ended(experiment.id, experiment.seconds(setting.profile), summary)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    return failed
+
+
+def attempt_in_process(find, experiment_id, setting):
+    """Return the `ExperimentOutcome` of an experiment that runs in this process."""
+    return attempt(find(experiment_id), setting, Silent())
+
+
+def what_came(future):
+    """(summary, what was raised or None) of a future; that of a process which died says so."""
+    try:
+        outcome = future.result()
+    except Exception as error:
+        return "FAILED: its process ended", f"{type(error).__name__}: {error}"
+    return outcome.summary, outcome.raised
+
+
+def take_share(workers):
+    """Let this process use its share of the cores."""
+    threads = max((os.cpu_count() or 1) // workers, 1)
+    set_threads(min(threads, numba.config.NUMBA_NUM_THREADS))
+    threadpoolctl.threadpool_limits(threads)
+
+
+class Silent:
+    """A `SuiteProgress` for a process that has no place on the terminal."""
+
+    def inner(self, iterable, desc):
+        """Iterate like `SuiteProgress.inner`, without a bar."""
+        items = range(iterable) if isinstance(iterable, int) else iterable
+        return tqdm(items, desc=desc, disable=True)
