@@ -70,7 +70,7 @@ def run_rows(name):
 def timed(step, method, options):
     """(CPU seconds, report) of a step's solve, from its particles on."""
     start = process_time()
-    pose = step.stepper.pose(step.bodies, step.t, step.dt)
+    pose = step.stepper.problem(step.bodies, step.t, step.dt)
     report = minimise(step.stepper.system(pose), method, **options).report
     return process_time() - start, report
 

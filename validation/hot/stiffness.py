@@ -50,7 +50,7 @@ def cost(dx, E, method, steps, **solver):
         pass
     n = len(reports)
     return Cost(method, E, n, sum(r.iterations for r in reports) / n,
-                sum(r.inner for r in reports) / n,
+                sum(r.cg_iterations for r in reports) / n,
                 sum(sum(r.seconds.values()) for r in reports) / n,
                 all(r.converged for r in reports)), sum(len(b.id) for b in problem.bodies)
 

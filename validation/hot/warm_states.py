@@ -107,7 +107,7 @@ def steps(problem, state, count):
     stepper = problem.stepper()
     for _ in range(count):
         dt = coming(problem, stepper, state)
-        yield Step(state.bodies, stepper, stepper.pose(state.bodies, state.t, dt), dt, state.t)
+        yield Step(state.bodies, stepper, stepper.problem(state.bodies, state.t, dt), dt, state.t)
         onward(problem, stepper, state)
 
 

@@ -85,7 +85,8 @@ def point(step, exact, way, repeats, **changes):
     off = errors(step, found.dv, exact.dv)
     system = step.stepper.system(step.pose)
     gap = (found.E - exact.E) / (system.energy(system.start) - exact.E)
-    return Point(method, eps, cpu, off.velocity, off.cells_max, report.iterations, report.inner,
+    return Point(method, eps, cpu, off.velocity, off.cells_max, report.iterations,
+                 report.cg_iterations,
                  report.converged, gap, off.velocity_max, off.cells)
 
 

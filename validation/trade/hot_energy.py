@@ -49,7 +49,7 @@ class Way(NamedTuple):
         only where it is flexible: plain CG takes thousands of iterations in PN-MGPCG's last steps.
         """
         flexible = {"flexible": True} if self.method == "pn-mgpcg" else {}
-        return {"eps": self.eps, "cells": self.cells, **flexible}
+        return {"eps": self.eps, "displacement_tolerance": self.cells, **flexible}
 
 
 ANSWER = Way("pn-pcg", 1e-12)       # the run that others are compared with

@@ -17,7 +17,7 @@ FLEXIBLE = {"flexible": True}       # CG bears a preconditioner that varies, as 
                                     # iterations near the solution
 OPTIONS = {"pn-mgpcg": FLEXIBLE, "pn-gmg-pcg": FLEXIBLE}
 OWN = {"gast15": tuple(10.0**-k for k in range(-1, 6))}     # its tolerance is an L2 norm [kg m/s]
-CAPS = {"iterations": 300, "cg_iterations": 3000}   # of a solve; one that is cut short says so
+CAPS = {"max_iterations": 300, "max_cg_iterations": 3000}   # one that is cut short says so
 SLOW = 10.0                         # CPU time from which on a solve is its way's last [s]
 
 

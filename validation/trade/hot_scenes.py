@@ -18,7 +18,7 @@ from .hot import PAPER, POINT, Point, known, record_equal_eps, times_for
 from .hot_methods import ALL, OPTIONS, SLOW, SOME, descended, ways
 
 EXACT, CHECK = "pn-mgpcg", "pn-pcg"     # methods of the reference and of its check
-MANY = {"iterations": 1000, "cg_iterations": 20000}     # at most, of their solves
+MANY = {"max_iterations": 1000, "max_cg_iterations": 20000}     # at most, of their solves
 BELOW = 10.0                        # of the smallest tolerance, the reference's
 TRUST = 3.0                         # errors below so many times the reference's own say nothing
 TIE = 1.1                           # ratio of CPU times below which nobody is faster

@@ -55,7 +55,7 @@ def moved(stepper, steps):
         stepper.step([made], k * END / steps, END / steps)
         energies.append(energy([made], FREE, D).sum)
         if stepper.implicit and not stepper.report.converged:
-            missed.append(stepper.report.why)
+            missed.append(stepper.report.message)
     return Course(made.particles.x, np.array(energies), missed)
 
 
