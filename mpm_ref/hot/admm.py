@@ -83,7 +83,7 @@ class ADMM:
 
 
 def component_linearization(K, project):
-    """`Linearization` of B (K x I) for a matrix K (n, n) and the projection u -> B u, on u = B u."""
+    """`Linearization` of B (K x I) on u = B u, for a matrix K (n, n) and project(u) = B u."""
     inverse = (1.0 / K.diagonal())[:, None]
     return Linearization(lambda u: project(K @ u), lambda r: project(inverse * r))
 

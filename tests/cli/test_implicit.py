@@ -40,7 +40,7 @@ def test_run_and_what_it_leaves(tmp_path):
 
 
 ALLOWED = """unstable = "allow"
-solver = {{ iterations = {iterations} }}
+solver = {{ max_iterations = {iterations} }}
 walls = {{ low = ["open", 3] }}
 """
 

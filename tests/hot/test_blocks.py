@@ -87,7 +87,7 @@ def test_the_paths_are_twins_in_single_precision(c, smoother, rng):
 
 
 @pytest.mark.parametrize("power", [0, 2])
-def test_matrices_of_another_reach(c, power):
+def test_matrices_of_another_radius(c, power):
     A = sp.csr_array(c.A)
     if power == 0:
         d = c.index.shape[1]
@@ -103,7 +103,7 @@ def test_matrices_of_another_reach(c, power):
     A.sort_indices()
     slow, fast = (hierarchy(A, c.index, 3, implementation=word).levels
                   for word in ("scipy", "blocks"))
-    assert fast[0].reach == (1 if power == 0 else 4)
+    assert fast[0].radius == (1 if power == 0 else 4)
     for ours, theirs in zip(fast, slow, strict=True):
         close(ours.A.toarray(), theirs.A.toarray())
 

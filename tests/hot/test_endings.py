@@ -175,7 +175,7 @@ def test_default_is_hot_as_printed():                                  # HOT-alg
     hot = METHODS["hot"]
     assert hot == SolverOptions()
     assert (hot.window, hot.levels, hot.kernel, hot.eps) == (8, 3, "linear", 1e-7)
-    assert (hot.start, hot.norm, hot.rebuild) == ("zero", "characteristic", 0)
+    assert (hot.start, hot.norm, hot.rebuild_every) == ("zero", "characteristic", 0)
     assert minimise(bar()).report.method == minimise(bar(), SolverOptions()).report.method == "hot"
 
 

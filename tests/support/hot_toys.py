@@ -206,6 +206,6 @@ def exactly(monkeypatch):
         built.append(Exact(*arguments, **more))
         return built[-1]
     monkeypatch.setattr(linearization, "hierarchy", build)
-    monkeypatch.setattr(linearization, "hierarchy_of",
+    monkeypatch.setattr(linearization, "hierarchy_from_matrices",
                         lambda matrices, *_, **__: build(*matrices[0]))
     return built

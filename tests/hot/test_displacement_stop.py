@@ -25,7 +25,7 @@ def step(request):
 
 
 @pytest.mark.parametrize("case", [*CASES, *DEGREES], ids=lambda case: case.name)
-def test_reach_is_the_largest_velocity_of_a_particle(case):
+def test_largest_velocity_is_that_of_a_particle(case):
     q = problem_of(case)
     v = [transfer.velocity(over(q, q.w), ip, box)
          for _, ip, box in plain_bodies(q, case.degree)]
