@@ -15,9 +15,9 @@ import numpy as np
 from mpm_ref.hot.methods import minimise
 from mpm_ref.scene import build, load
 from mpm_ref.simulate import simulate
+from validation.common.scenes import with_
 from validation.hot.stiffness import bar
 from validation.hot.warm_states import begun, particles, steps
-from validation.verification.scenes import with_
 
 SCENES = Path(__file__).parent / "scenes"
 VARIANTS = {                        # the first is what the others are relative to

@@ -13,11 +13,11 @@ from mpm_ref.materials import Fluid, NoFlow
 from mpm_ref.nclaw.gnn.simulator import Simulator
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
+from validation.common.scenes import with_
 from validation.common.weights_needed import Untrained
 from validation.nclaw import other_bodies, states
 from validation.nclaw.evaluate import body_with_laws
 from validation.nclaw.tasks import reconstruction
-from validation.verification.scenes import with_
 
 mpl.use("Agg")
 

@@ -3,9 +3,9 @@
 from mpm_ref.nclaw.bodies import body_maker
 
 from ..common.registry import experiment
+from ..common.scenes import with_
 from ..common.weights_needed import there
 from ..nclaw.small_trainings import OF_EPOCHS, bundled
-from ..verification.scenes import with_
 from .nclaw_runs import EVERY, SHORT, Law, Setup, record_silent, table_of, trials
 from .nclaw_strain import thrown
 from .nclaw_time_step import longer

@@ -12,7 +12,7 @@ from mpm_ref.nclaw.study.compare import RunBroken, positions
 from mpm_ref.scene import build
 
 from ..common.registry import experiment
-from ..verification.scenes import threads_for
+from ..common.scenes import threads_for
 from .nclaw_runs import laws, scene_for
 
 STEPS = {"quick": 500, "standard": 5000}

@@ -18,11 +18,11 @@ from mpm_ref.nclaw.strain_watch import strain_report
 from mpm_ref.nclaw.study.compare import RunBroken, positions
 from mpm_ref.scene import build
 
+from ..common.scenes import threads_for
 from ..common.weights_needed import there
 from ..nclaw.environments import ENVIRONMENTS, environment
 from ..nclaw.strain_bounds import met_by
 from ..nclaw.trained_laws import trained
-from ..verification.scenes import threads_for
 
 BAD = 3.0           # times the mean squared error that is usual for the law
 BADS = 2.0, BAD, 5.0, 10.0

@@ -20,8 +20,8 @@ from mpm_ref.timestep import advective
 
 from ..common import targets
 from ..common.registry import experiment
+from ..common.scenes import SCENES
 from ..common.settings import record_settings
-from ..verification.scenes import SCENES
 from . import stiffness, stretched, warm_states
 from .sizes import sized
 

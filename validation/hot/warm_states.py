@@ -28,7 +28,7 @@ from mpm_ref.simulate import (
 from mpm_ref.store.checkpoint import BadCheckpoint, load, save
 from mpm_ref.store.manifest import scene_hash, source_hash
 
-from ..verification.scenes import with_
+from ..common.scenes import with_
 from .one_step import Step
 from .sizes import sized
 

@@ -17,8 +17,8 @@ from mpm_ref.scene import build
 from mpm_ref.trajectories import in_order
 
 from ..common.registry import experiment
+from ..common.scenes import threads_for
 from ..common.weights_needed import there
-from ..verification.scenes import threads_for
 from .environments import ENVIRONMENTS, environment
 from .trained_laws import trained, weights_of
 

@@ -8,7 +8,7 @@ import numpy as np
 from mpm_ref.nclaw.gnn.simulator import Simulator
 
 from ..common import targets
-from ..verification.scenes import with_
+from ..common.scenes import with_
 from .environments import ENVIRONMENTS
 from .evaluate import ComparedError, body_maker, compare
 from .simulators import GraphNet

@@ -16,7 +16,7 @@ from mpm_ref.nclaw.gnn.simulator import Simulator
 from mpm_ref.nclaw.study.compare import ComparedError, ComparedRun, RunBroken, positions
 from mpm_ref.scene import build
 
-from ..verification.scenes import threads_for
+from ..common.scenes import threads_for
 from .gnn_rollout import free
 
 __all__ = ["ComparedError", "RunBroken", "body_maker", "body_with_laws", "compare", "copy_body",

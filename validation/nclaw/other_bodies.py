@@ -12,9 +12,9 @@ from mpm_ref.nclaw.bodies import body_maker, body_with_laws, copy_body
 from mpm_ref.scene import build
 
 from ..common.registry import experiment
+from ..common.scenes import threads_for, with_
 from ..common.weights_needed import Untrained
 from ..ldm.published_bodies import keep
-from ..verification.scenes import threads_for, with_
 from .environments import ENVIRONMENTS, environment
 from .gallery import cone, contact, large, pool
 from .melting import melting

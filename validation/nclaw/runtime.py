@@ -9,8 +9,8 @@ from mpm_ref.nclaw.study.compare import RunBroken
 from mpm_ref.scene import build
 
 from ..common.registry import experiment
+from ..common.scenes import threads_for, with_
 from ..common.weights_needed import there
-from ..verification.scenes import threads_for, with_
 from .environments import ENVIRONMENTS, environment
 from .errors import PRINTED, ready
 from .evaluate import frames

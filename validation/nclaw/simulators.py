@@ -18,7 +18,7 @@ from mpm_ref.scene import build
 from mpm_ref.store.words import counted
 from mpm_ref.trajectories import in_order
 
-from ..verification.scenes import threads_for
+from ..common.scenes import threads_for
 from .environments import ENVIRONMENTS
 from .tasks import reconstruction, velocity
 

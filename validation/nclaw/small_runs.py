@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..common.scenes import with_
 from ..common.weights_needed import there
-from ..verification.scenes import with_
 from .environments import environment
 from .evaluate import body_maker, compare
 from .small_trainings import bundled, small_nets

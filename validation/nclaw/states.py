@@ -8,9 +8,9 @@ from mpm_ref.nclaw.gnn.simulator import Simulator
 from mpm_ref.scene import build
 
 from ..common.registry import experiment
+from ..common.scenes import threads_for, with_
 from ..common.weights_needed import there
 from ..ldm.published_bodies import keep
-from ..verification.scenes import threads_for, with_
 from .environments import ENVIRONMENTS
 from .evaluate import RunBroken, body_maker, copy_body, frames
 from .initial_laws import untrained

@@ -9,7 +9,7 @@ from mpm_ref.nclaw.train.recipe import Recipe
 from mpm_ref.nclaw.train.strains import segment_cuts, training_bounds
 from mpm_ref.scene import build
 
-from ..verification.scenes import threads_for
+from ..common.scenes import threads_for
 from .environments import environment, trajectory
 from .trained_laws import nets, trained
 

@@ -16,7 +16,7 @@ from mpm_ref.nclaw.study.compare import positions
 from mpm_ref.scene import build
 
 from ..common.registry import experiment
-from ..verification.scenes import threads_for
+from ..common.scenes import threads_for
 from .dissipation import BOUND, known
 from .environments import ENVIRONMENTS, environment
 

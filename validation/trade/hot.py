@@ -70,15 +70,15 @@ def one_stiffness(run, step, E, plan):
                "the increment")
     points = [point(step, exact, (method, eps), repeats) for eps in ladder for method in METHODS]
     record_equal_eps(run, name, points, scale)
-    record_equal_error(run, name, known(points, least), scale)
+    record_equal_error(run, name, bounded_below(points, least), scale)
     return points
 
 
-def point(step, exact, way, repeats, **changes):
-    """`Point` of a way (method, eps) beside the exact `Solution`, of so many equal solves the
+def point(step, exact, rule, repeats, **changes):
+    """`Point` of a rule (method, eps) beside the exact `Solution`, of so many equal solves the
     median time; changes: further options.
     """
-    method, eps = way
+    method, eps = rule
     solutions = [solved(step, method, eps=eps, **changes) for _ in range(repeats)]
     cpu = float(np.median([sum(s.report.seconds.values()) for s in solutions]))
     found, report = solutions[0], solutions[0].report
@@ -90,7 +90,7 @@ def point(step, exact, way, repeats, **changes):
                  report.converged, gap, off.velocity_max, off.cells)
 
 
-def known(points, least):
+def bounded_below(points, least):
     """`Point`s with no error below the reference's own `Errors`: a method that made the reference
     would agree with it to the bit.
     """

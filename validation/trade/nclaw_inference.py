@@ -15,12 +15,12 @@ from mpm_ref.nclaw.study.compare import RunBroken, positions
 from mpm_ref.scene import build
 
 from ..common.registry import experiment
+from ..common.scenes import threads_for, with_
 from ..nclaw.environments import environment
 from ..nclaw.evaluate import body_maker, compare
 from ..nclaw.small_runs import measured
 from ..nclaw.small_trainings import BASE, OF_WIDTH, last, small_nets
 from ..nclaw.trained_laws import trained
-from ..verification.scenes import threads_for, with_
 from .front import front
 
 NAMES = ("jelly", "plasticine")

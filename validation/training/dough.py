@@ -18,8 +18,8 @@ from mpm_ref.scene import build
 from mpm_ref.trajectories import observed
 
 from ..common.provenance import commit, provenance
+from ..common.scenes import threads_for, with_
 from ..nclaw.dough import EVERY, GUESS, block, camera, film, identity, material, scene
-from ..verification.scenes import threads_for, with_
 
 ROOT = Path(__file__).parents[2]
 WHOLE = 1.7         # horizon after the last epoch, in runs: the whole run is seen from half-way on

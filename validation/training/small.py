@@ -24,10 +24,10 @@ from mpm_ref.scene import build
 from mpm_ref.trajectories import observed
 
 from ..common.provenance import commit, provenance
+from ..common.scenes import threads_for, with_
 from ..nclaw.bundle import Bundle
 from ..nclaw.observation import observed_by
 from ..nclaw.small_trainings import identity
-from ..verification.scenes import threads_for, with_
 
 ROOT = Path(__file__).parents[2]
 BATCH = 40          # segments side by side: all of the first epoch

@@ -11,6 +11,7 @@ from mpm_ref.materials.learned.strain_range import strain_bounds
 from mpm_ref.nclaw.bodies import body_maker, body_with_laws
 from mpm_ref.nclaw.strain_watch import StrainReport
 from mpm_ref.scene import build
+from validation.common.scenes import with_
 from validation.common.weights_needed import Untrained, there
 from validation.extremes import nclaw_epochs, nclaw_long, nclaw_runs, nclaw_strain
 from validation.extremes import nclaw_observed as observed
@@ -38,7 +39,6 @@ from validation.nclaw.initial_laws import untrained
 from validation.nclaw.small_runs import Measured
 from validation.nclaw.small_trainings import Small
 from validation.nclaw.trained_laws import Net
-from validation.verification.scenes import with_
 
 GOOD = End(1e-4, 1000, -1, "", 0.1, -1, 0.9, "")
 WIDE = {"low": [0.0, -9.0, -9.0, -99.0], "high": [9.0, 9.0, 9.0, 99.0]}

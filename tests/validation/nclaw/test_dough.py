@@ -9,9 +9,9 @@ from mpm_ref.scene import build, dumps, loads
 from validation.common import targets
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
+from validation.common.scenes import with_
 from validation.nclaw import dough, dough_runs, trained_laws
 from validation.nclaw.states import shots
-from validation.verification.scenes import with_
 
 
 @pytest.fixture(scope="module")

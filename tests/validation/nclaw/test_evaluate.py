@@ -13,6 +13,7 @@ from mpm_ref.trajectories import in_order
 from validation.common import targets
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
+from validation.common.scenes import with_
 from validation.common.weights_needed import Untrained
 from validation.nclaw import errors, evaluate, tables, trained_laws
 from validation.nclaw.environments import ENVIRONMENTS
@@ -26,7 +27,6 @@ from validation.nclaw.evaluate import (
 )
 from validation.nclaw.initial_laws import untrained
 from validation.nclaw.tasks import reconstruction
-from validation.verification.scenes import with_
 
 
 def no_stress(body):

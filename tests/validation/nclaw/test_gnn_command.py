@@ -9,13 +9,13 @@ torch = pytest.importorskip("torch")
 
 from mpm_ref.nclaw.gnn.train.examples import training_run  # noqa: E402
 from mpm_ref.nclaw.gnn.train.fit import GraphRecipe  # noqa: E402
+from validation.common.scenes import with_  # noqa: E402
 from validation.nclaw import trained_laws  # noqa: E402
 from validation.nclaw.evaluate import compare  # noqa: E402
 from validation.nclaw.simulators import GraphNet, shown, simulators  # noqa: E402
 from validation.nclaw.tasks import reconstruction, velocity  # noqa: E402
 from validation.nclaw.trained_laws import trained  # noqa: E402
 from validation.training import gnn, nclaw  # noqa: E402
-from validation.verification.scenes import with_  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 

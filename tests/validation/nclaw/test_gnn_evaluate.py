@@ -12,6 +12,7 @@ from mpm_ref.scene import build
 from validation.common import targets
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
+from validation.common.scenes import with_
 from validation.common.weights_needed import Untrained
 from validation.nclaw import curves, errors, gnn_runs, simulators, tables, trained_laws
 from validation.nclaw.environments import ENVIRONMENTS
@@ -20,7 +21,6 @@ from validation.nclaw.gnn_rollout import free
 from validation.nclaw.simulators import GraphNet, scenes_of, shown
 from validation.nclaw.tasks import SEEDS, reconstruction
 from validation.nclaw.trained_laws import identity, trained
-from validation.verification.scenes import with_
 
 CENTER = (0.5, 0.5, 0.5)
 

@@ -7,10 +7,10 @@ import pytest
 from mpm_ref.nclaw.bodies import copy_body
 from mpm_ref.nclaw.study.compare import positions
 from mpm_ref.scene import build
+from validation.common.scenes import with_
 from validation.nclaw import gallery, melting, other_bodies
 from validation.nclaw.environments import ENVIRONMENTS, environment
 from validation.nclaw.tasks import unit_cube
-from validation.verification.scenes import with_
 
 STEPS, EVERY = 60, 20
 

@@ -20,11 +20,11 @@ from mpm_ref.nclaw.train.recipe import Recipe  # noqa: E402
 from mpm_ref.nclaw.train.rollout import segment_errors  # noqa: E402
 from mpm_ref.nclaw.train.session import Diverged  # noqa: E402
 from mpm_ref.trajectories import Observed, observed  # noqa: E402
+from validation.common.scenes import with_  # noqa: E402
 from validation.nclaw.observation import Seen  # noqa: E402
 from validation.nclaw.small_trainings import Small, identity  # noqa: E402
 from validation.training import small  # noqa: E402
 from validation.training.small import bundled, run_of, shown  # noqa: E402
-from validation.verification.scenes import with_  # noqa: E402
 
 STEPS = 11
 SHORT = Recipe(epochs=3, first=3, last=6, batch=2, elastic_rate=1e-2, plastic_rate=1e-3)
