@@ -15,7 +15,7 @@ from mpm_ref.hot.methods import minimise
 from mpm_ref.hot.multigrid.blocks.product import planes_of, product
 from mpm_ref.hot.multigrid.blocks.sparse import blocks_of
 from mpm_ref.hot.multigrid.hierarchy import hierarchy
-from mpm_ref.hot.multigrid.options import Choices
+from mpm_ref.hot.multigrid.options import CycleOptions
 from validation.hot.linear_system import frozen
 from validation.hot.measured_cg import Until
 from validation.hot.one_step import Step, after
@@ -26,7 +26,7 @@ from validation.hot.stretched import FRAME, stretched
 THEIRS = "aggregation-rigid"        # pyamg's, of `validation.hot.preconditioners`
 METHODS = {                         # the first is what the others are relative to
     "hot": ("hot", {}),
-    "hot, smoothers in single precision": ("hot", {"cycle": Choices(precision="single")}),
+    "hot, smoothers in single precision": ("hot", {"cycle": CycleOptions(precision="single")}),
     "hot-plus": ("hot-plus", {}),
     "lbfgs-h": ("lbfgs-h", {}),
     "pn-pcg": ("pn-pcg", {}),
@@ -49,7 +49,7 @@ def box(dx=1.0 / 16.0):
     """`Step` of the stretched box."""
     problem = stretched("particle", dx)
     stepper = problem.stepper()
-    return Step(problem.bodies, stepper, stepper.pose(problem.bodies, 0.0, FRAME), FRAME, 0.0)
+    return Step(problem.bodies, stepper, stepper.problem(problem.bodies, 0.0, FRAME), FRAME, 0.0)
 
 
 STEPS = {"twist": twist, "box": box}
@@ -123,7 +123,7 @@ def method_row(name, reports):
     last = reports[-1]
     return {
         "method": name, "converged": last.converged, "iterations": last.iterations,
-        "cg": last.inner, "evaluations": last.evaluations,
+        "cg": last.cg_iterations, "evaluations": last.evaluations,
         "cpu_s": float(np.median([sum(r.seconds.values()) for r in reports])),
         "parts_s": {part: float(np.median([r.seconds[part] for r in reports]))
                     for part in last.seconds},

@@ -15,9 +15,9 @@ import numpy as np
 from mpm_ref.hot.methods import minimise
 from mpm_ref.scene import build, load
 from mpm_ref.simulate import simulate
+from validation.common.scenes import with_
 from validation.hot.stiffness import bar
 from validation.hot.warm_states import begun, particles, steps
-from validation.verification.scenes import with_
 
 SCENES = Path(__file__).parent / "scenes"
 VARIANTS = {                        # the first is what the others are relative to
@@ -70,7 +70,7 @@ def run_rows(name):
 def timed(step, method, options):
     """(CPU seconds, report) of a step's solve, from its particles on."""
     start = process_time()
-    pose = step.stepper.pose(step.bodies, step.t, step.dt)
+    pose = step.stepper.problem(step.bodies, step.t, step.dt)
     report = minimise(step.stepper.system(pose), method, **options).report
     return process_time() - start, report
 

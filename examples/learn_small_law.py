@@ -18,7 +18,7 @@ from mpm_ref.body import Body, particles_at
 from mpm_ref.core.boundary import Conditions, nclaw_walls
 from mpm_ref.explicit import Scheme
 from mpm_ref.materials import NoFlow, make_law
-from mpm_ref.nclaw.batched_step import nodes, world
+from mpm_ref.nclaw.batched_step import make_nodes, make_world
 from mpm_ref.problem import Clock, Problem
 from mpm_ref.trajectories import observed
 
@@ -28,8 +28,9 @@ except ModuleNotFoundError:
     raise SystemExit('this example learns with PyTorch, which is not installed: pip install '
                      '"mpm_ref[learn]", or `make learn` in the repository') from None
 
-from mpm_ref.nclaw.train.rollout import Laws, step, trajectory_of
-from mpm_ref.nclaw.train.sysid import KnownStress
+from mpm_ref.nclaw.train.identified_laws import IdentifiedLaw
+from mpm_ref.nclaw.train.observations import trajectory_of
+from mpm_ref.nclaw.train.rollout import LawPair, step
 
 DX, DT, STEPS, SEEN = 0.05, 1e-3, 60, (15, 30, 45, 60)
 SPACING, RHO, E, NU = 0.05, 1000.0, 1e5, 0.3        # [m], [kg/m^3], [Pa]
@@ -83,13 +84,13 @@ class Seen(torch.nn.Module):
 
     def __init__(self, problem):
         super().__init__()
-        self.world, self.run = world(problem), trajectory_of(observed(problem))
+        self.world, self.run = make_world(problem), trajectory_of(observed(problem))
 
     def forward(self, law):
         """The loss."""
-        state, on, total = self.run.at([0]), nodes(self.world, 1), 0.0
+        state, on, total = self.run.states([0]), make_nodes(self.world, 1), 0.0
         for n in range(1, STEPS + 1):
-            state = step(Laws(law, unchanged), self.world, state, on)
+            state = step(LawPair(law, unchanged), self.world, state, on)
             if n in SEEN:
                 off = state[0][0, CORNERS] - self.run.x[n, CORNERS]
                 total = total + (off**2).sum(dim=1).mean() / SPACING**2
@@ -120,7 +121,7 @@ def compared(law):
     unit, rest = make_law("fixed_corotated", E=1.0, nu=NU), torch.zeros(1, dtype=torch.float64)
     F = Seen(thrown()).run.F.flatten(0, 1)
     with torch.no_grad():
-        tau = KnownStress(unit, log(E))(F)
+        tau = IdentifiedLaw(unit, log(E))(F)
         found = law.moduli(rest[:, None, None].expand(1, 3, 3), rest).squeeze(1).tolist()
         error = (law(F) - tau).norm() / tau.norm()
     return found, (E * unit.mu, E * (unit.lam + 2.0 / 3.0 * unit.mu)), error.item()

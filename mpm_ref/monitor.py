@@ -140,10 +140,10 @@ def advice(problem, solve):
     if solve is None or solve.converged:
         return "take a smaller dt, or look at the last checkpoint"
     options, key = problem.solver, "eps"
-    if options is not None and solve.iterations >= options.iterations:
-        key = "iterations"
-    elif options is not None and options.cells > 0.0:
-        key = "cells"
+    if options is not None and solve.iterations >= options.max_iterations:
+        key = "max_iterations"
+    elif options is not None and options.displacement_tolerance > 0.0:
+        key = "displacement_tolerance"
     return f"give the solver a larger `{key}`, or take a smaller dt"
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from .core.stencil import inverse_inertia
 from .explicit import Scheme, Stepper
-from .hot.methods import Options
+from .hot.methods import SolverOptions
 from .hot.step import ImplicitStepper
 from .materials import recovers
 from .monitor import Limits
@@ -61,7 +61,7 @@ class Problem:
     title: str = ""
     source: str = ""                    # canonical text of the scene, "" if built in Python
     integrator: str = "explicit"        # or "implicit"
-    solver: Options | None = None       # of an implicit step; None: HOT's
+    solver: SolverOptions | None = None     # of an implicit step; None: HOT's
     strain_bounds: dict = field(default_factory=dict)   # {body: strains of its laws' training}
 
     def __post_init__(self):

@@ -94,7 +94,7 @@ def advance(problem, stepper, state):
     if due or runs_away(problem, state, dt):
         check(problem, state, dt)
     if state.solve is not None and not (state.solve.converged or problem.allow_unstable):
-        raise lost(problem, state, dt, f"the implicit step was not solved: {state.solve.why}")
+        raise lost(problem, state, dt, f"the implicit step was not solved: {state.solve.message}")
     return dt
 
 
@@ -128,7 +128,7 @@ def swiftest(problem, stepper, state):
     bound = min(advective(q, problem.dx, 0.0, problem.gravity) for q in particles)
     if not stepper.implicit:
         return bound
-    u = stepper.driven(state.bodies, state.t, AHEAD * min(next_dt(clock, state, bound), 1.0))
+    u = stepper.driven_speed(state.bodies, state.t, AHEAD * min(next_dt(clock, state, bound), 1.0))
     return min(bound, problem.dx / u) if u > 0.0 else bound
 
 

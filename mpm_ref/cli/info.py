@@ -66,7 +66,8 @@ def solver_of(stepper):
     if not stepper.implicit:
         return None
     options = stepper.options
-    return {"method": options.method, "eps": options.eps, "cells": options.cells}
+    return {"method": options.method, "eps": options.eps,
+            "displacement_tolerance": options.displacement_tolerance}
 
 
 def of_results(path):
@@ -118,8 +119,9 @@ def method(facts):
     if facts["wave_speed"] is not None:
         return f"wave speed {facts['wave_speed']:.4g} m/s"
     solver = facts["solver"]
-    held = f", to hold {solver['cells']:g} dx" if solver["cells"] else ""
-    return f"implicit: {solver['method']}, eps {solver['eps']:g}{held}"
+    dx = solver["displacement_tolerance"]
+    displacement = f", displacements to {dx:g} dx" if dx else ""
+    return f"implicit: {solver['method']}, eps {solver['eps']:g}{displacement}"
 
 
 def step_line(facts):

@@ -13,12 +13,10 @@ from typing import Annotated
 import typer
 
 from ..materials.learned import learned_flow, learned_law, weights
-from ..nclaw.export import exported, write
+from ..nclaw.export import export_tables, write
 from ..nclaw.strain_watch import ComparisonWatch
-from ..nclaw.study.compare import Broken, beside
-from ..nclaw.study.curves import curves, paths_for
-from ..nclaw.study.numbers import write_curves, write_errors
-from ..nclaw.study.pictures import draw
+from ..nclaw.study.compare import RunBroken, compare_runs, write_errors
+from ..nclaw.study.curves import compare_curves, draw_curves, paths_for, write_curves
 from ..store.atomic import require_place
 from ..store.words import counted
 from . import law_train
@@ -84,14 +82,14 @@ def compared(problem, laws, name):
     try:
         with (on_interrupt(lambda: f"after {len(errors)} of {counted(total, 'frame')}"),
               passing(unit="frame", total=total, desc=problem.title or name) as bar):
-            for error, found in beside(problem, watched.body):
+            for error, found in compare_runs(problem, watched.body):
                 if found.step < 0:
                     with bar.external_write_mode(file=sys.stderr):
                         warn(watched.news(len(errors)))
                 errors.append(error)
                 bar.set_postfix_str(f"error {found.error:.2e} m^2", refresh=False)
                 bar.update()
-    except Broken as fault:
+    except RunBroken as fault:
         end(f"{name}: its own laws break down in {fault}", UNSTABLE)
     return errors, found
 
@@ -146,7 +144,7 @@ def export(
             if out.exists() and out.samefile(file):
                 raise ValueError(f"--out {out}: these are the weights; name another file")
             require_free(out, overwrite)
-            tables = exported(laws)
+            tables = export_tables(laws)
         with writing():
             write(out, tables)
         said = ", ".join(f"{part} {described(getattr(laws, part))}" for part in weights.PARTS)
@@ -183,7 +181,7 @@ def plot(
                 raise ValueError(f"--strain {strain:g}: expected a number above 0 and below 1")
             warn(other_steps(laws, problem))
             found = beside_truth(laws, problem, strain, steps)
-        draw(found, f"{file.name} against {problem.title or against}: {steps} steps of "
+        draw_curves(found, f"{file.name} against {problem.title or against}: {steps} steps of "
              f"{problem.clock.dt:g} s to a strain of {strain:g}", out)
         if csv is not None:
             write_curves(found, csv)
@@ -205,7 +203,7 @@ def beside_truth(laws, problem, strain, steps):
     body, dt = problem.bodies[0], problem.clock.dt
     learned = learned_law(laws.elastic), learned_flow(laws.plastic)
     paths = paths_for((body.flow, learned[1]), problem.dim, strain, steps)
-    return curves((body.law, body.flow), learned, paths, dt, laws.about.get("seen"))
+    return compare_curves((body.law, body.flow), learned, paths, dt, laws.about.get("seen"))
 
 
 def line(curve):

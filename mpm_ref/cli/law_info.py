@@ -10,8 +10,7 @@ from ..materials.learned import spline, weights
 from ..materials.learned.weights import PARTS, dim_of
 from ..nclaw import export
 from ..nclaw.gnn import weights as gnn_weights
-from ..nclaw.study.study import load
-from ..nclaw.study.tables import SYS_ID
+from ..nclaw.study.study import SYS_ID, load
 from ..rom.study.study_file import plain
 from ..scene import SceneError
 from ..store.weights_file import about_of, require_format
@@ -66,7 +65,7 @@ def in_text(path):
     if not isinstance(found, dict) or not is_exported(found):
         return None
     try:
-        return export.flat(found)
+        return export.flatten_tables(found)
     except ValueError as error:
         raise ValueError(f"{path} holds no layers of laws: {error}; export them again") from None
 

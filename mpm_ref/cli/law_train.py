@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from ..materials.learned import weights
-from ..nclaw.study import training, trajectory
+from ..nclaw.study import training
 from ..nclaw.study.compare import threads_for
 from ..nclaw.study.study import load
 from ..store.atomic import require_place
@@ -61,7 +61,7 @@ def train(
             checkpoint = study.file("checkpoint") or out.with_suffix(".pt")
             require_outputs(study, out, data, overwrite)
             require_checkpoint(checkpoint, study.path, out, data)
-            training.drive()
+            training.trainer()
             with at_start(study.path):
                 seen = motion(study, data)
             with writing():
@@ -110,13 +110,13 @@ def motion(study, data):
         if data is None:
             with passing(desc="full-order run", bar_format="{desc}", leave=False):
                 return observed(problem)
-        if not trajectory.whole(data, problem):
+        if not training.is_complete(data, problem):
             with passing(total=problem.clock.steps, unit="step", desc=str(data)) as bar:
-                made = trajectory.make(data, study.problem(), Steps(bar))
+                made = training.make_run(data, study.problem(), Steps(bar))
             if made < problem.clock.steps:
                 end(f"interrupted at step {made} of {problem.clock.steps} of the run to learn "
                     "from; the same command again goes on", INTERRUPT)
-    return trajectory.read(data, problem)
+    return training.read_run(data, problem)
 
 
 class Steps(Watch):
@@ -132,10 +132,10 @@ class Steps(Watch):
 
 def learned(study, seen, checkpoint, **about):
     """`LearnedLaws` of a study, with its progress; ends the command where it diverges."""
-    how = training.drive()
+    how = training.trainer()
     try:
         with on_interrupt(lambda: resuming(checkpoint)), Epochs(study, len(seen.x) - 1) as now:
-            return training.trained(study, seen, checkpoint, now.show, **about)
+            return training.train_study(study, seen, checkpoint, now.show, **about)
     except how.Diverged as fault:
         left = f"; {checkpoint} is of this training: remove it when the study changes"
         end(f"{study.path}: {fault}{left if checkpoint.exists() else ''}", UNSTABLE)

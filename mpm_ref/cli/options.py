@@ -10,7 +10,7 @@ from .. import scene
 from ..materials.learned import weights
 from ..materials.learned.weights import dim_of
 from ..nclaw.study.compare import problem_of
-from ..nclaw.train.teacher import Teacher
+from ..nclaw.train.recipe import TeacherForcing
 from ..rom.study import reduce
 from ..rom.study.generate import one_thread
 from ..rom.study.study import load
@@ -77,7 +77,7 @@ def horizons(method, recipe, epochs):
     """
     if method in OF_ERRORS or not {"first", "last", "epochs"} <= recipe.keys():
         return ()
-    teacher = Teacher(recipe["first"], recipe["last"])
+    teacher = TeacherForcing(recipe["first"], recipe["last"])
     return tuple(teacher.horizon(k, recipe["epochs"]) for k in (0, epochs - 1))
 
 

@@ -43,12 +43,12 @@ from ..core.tensor import (
 )
 from ..materials.principal import dpk1_hat, pk1_hat, semidefinite
 from .assembly import assembled
-from .krylov import Rule
-from .line_search import Point
-from .linearization import Linear, solve
+from .krylov import CGOptions
+from .line_search import Iterate
+from .linearization import Linearization, solve
 from .norms import rest_stiffness
-from .potential import moved
-from .quadrature import Modes
+from .potential import new_gradient
+from .quadrature import StressModes
 
 SHARE = 0.1     # of its right-hand side, in the energy norm, to which a global step is solved
 
@@ -56,36 +56,36 @@ SHARE = 0.1     # of its right-hand side, in the energy norm, to which a global 
 class ADMM:
     """Iterates of ADMM on a `System`, from the increment dv (n, d) where it stands.
 
-    `penalty` is that of `Splitting`, `cap` bounds CG; `watch` counts.
+    `penalty` is that of `Splitting`, `cap` bounds CG; `profiler` counts.
     """
 
-    def __init__(self, system, penalty, cap, watch):
-        self.system, self.penalty, self.watch = system, penalty, watch
-        self.rule = Rule(lambda size: SHARE, cap)
+    def __init__(self, system, penalty, cap, profiler):
+        self.system, self.penalty, self.profiler = system, penalty, profiler
+        self.rule = CGOptions(lambda size: SHARE, cap)
         self.splitting = None
 
     def advance(self, now):
-        """(`Point`, None): the next iterate, whatever its energy."""
+        """Return (next `Iterate`, None), whatever its energy."""
         if self.splitting is None:
             self._begin(now.dv)
-        with self.watch.part("local"):
+        with self.profiler.part("local"):
             g, missed = self.splitting.local_step(now.dv)
-        self.watch.capped += missed > 0
-        dv = now.dv + solve(self.linear, -self.system.free(g), self.rule, self.watch)
-        return Point(dv, *self.system.evaluate(dv)), None
+        self.profiler.capped_solves += missed > 0
+        dv = now.dv + solve(self.linear, -self.system.project(g), self.rule, self.profiler)
+        return Iterate(dv, *self.system.evaluate(dv)), None
 
     def _begin(self, dv):
         self.splitting = Splitting(self.system.potential, dv, self.penalty)
-        with self.watch.part("assembly"):
+        with self.profiler.part("assembly"):
             K = self.splitting.matrix()
-        self.watch.builds += 1
-        self.linear = by_component(K, self.system.free)
+        self.profiler.hessians += 1
+        self.linear = component_linearization(K, self.system.project)
 
 
-def by_component(K, free):
-    """`Linear` of B (K x I) for a matrix K (n, n) and the projection `free`, on u = B u."""
+def component_linearization(K, project):
+    """`Linearization` of B (K x I) on u = B u, for a matrix K (n, n) and project(u) = B u."""
     inverse = (1.0 / K.diagonal())[:, None]
-    return Linear(lambda u: free(K @ u), lambda r: free(inverse * r))
+    return Linearization(lambda u: project(K @ u), lambda r: project(inverse * r))
 
 
 # the potential with the deformation split off
@@ -108,19 +108,19 @@ class Splitting:
 
     def _zero(self, dv):
         q = self.potential
-        q.spread(q.unknowns.v + dv)
-        return tuple(-(s.F + q.dt * s.T @ s.F) for s in q.sites)
+        q.gather_gradients(q.unknowns.v + dv)
+        return tuple(-(s.F + q.dt * s.T @ s.F) for s in q.points)
 
     def local_step(self, dv):
         """New multipliers and Z_p at dv (n, d); then the gradient (n, d) [kg m/s] of the augmented
         Lagrangian with respect to dv, and how many proximal maps missed their tolerance.
         """
         q, missed = self.potential, 0
-        q.spread(q.unknowns.v + dv)
-        for body, sites, k, Y in zip(q.bodies, q.sites, self.k, self.Y):
-            _split_all(sites, body.law, (q.dt, k), Y, tuple(range(dv.shape[1])))
-            missed += len(sites.psi) - int(sites.psi.sum())
-        return q.collect() + q.unknowns.m[:, None] * dv - q.dt * q.weight, missed
+        q.gather_gradients(q.unknowns.v + dv)
+        for body, points, k, Y in zip(q.bodies, q.points, self.k, self.Y):
+            _split_all(points, body.law, (q.dt, k), Y, tuple(range(dv.shape[1])))
+            missed += len(points.psi) - int(points.psi.sum())
+        return q.scatter_forces() + q.unknowns.m[:, None] * dv - q.dt * q.weight, missed
 
     def matrix(self):
         """K (n, n) [kg] of the global step, the same for every component and every iterate.
@@ -128,22 +128,22 @@ class Splitting:
         K_ij = m_i delta_ij + dt^2 sum_p V0_p k_p (F_p^n^T dw_ip) . (F_p^n^T dw_jp)
         """
         q = self.potential
-        modes = tuple(isotropic(s, q.dt * q.dt * k) for s, k in zip(q.sites, self.k))
-        H = assembled(tuple(zip(q.sites, modes)), q.unknowns, q.pattern)
+        modes = tuple(isotropic_modes(s, q.dt * q.dt * k) for s, k in zip(q.points, self.k))
+        H = assembled(tuple(zip(q.points, modes)), q.unknowns, q.pattern)
         n = len(q.unknowns.m)
         return sp.csr_array((H.data[:, 0, 0].copy(), H.indices, H.indptr), shape=(n, n))
 
 
-def isotropic(sites, k):
-    """`Modes` of the stress V0_p k L F_p^n (F_p^n)^T of a velocity gradient L."""
-    n, d = sites.s.shape
-    eye, stiffness = np.tile(np.eye(d), (n, 1, 1)), k * sites.V0[:, None, None]
+def isotropic_modes(points, k):
+    """`StressModes` of the stress V0_p k L F_p^n (F_p^n)^T of a velocity gradient L."""
+    n, d = points.s.shape
+    eye, stiffness = np.tile(np.eye(d), (n, 1, 1)), k * points.V0[:, None, None]
     pairs = np.tile(stiffness, (1, d * (d - 1) // 2, 2))
-    return Modes(eye, sites.F, stiffness * eye, pairs)
+    return StressModes(eye, points.F, stiffness * eye, pairs)
 
 
 @kernel
-def split(sites, law, options, Y, like, bounds):
+def split_points(points, law, options, Y, like, bounds):
     """Z_p, Y_p and the stress of the penalty of the particles bounds[0] .. bounds[1] - 1.
 
         Lambda = F + Y,  Z = prox(F + Lambda),  Y = Lambda - Z,  T = dt V0 k (F + Y) (F^n)^T
@@ -152,21 +152,21 @@ def split(sites, law, options, Y, like, bounds):
     """
     dt, k = options
     for p in range(bounds[0], bounds[1]):
-        F_n = mat(sites.F, p, like)
-        F = moved(mat(sites.T, p, like), dt, F_n)
+        F_n = mat(points.F, p, like)
+        F = new_gradient(mat(points.T, p, like), dt, F_n)
         multiplier = mlin(1.0, F, 1.0, mat(Y, p, like))
         U, s, V, _ = svd(mlin(1.0, F, 1.0, multiplier))
-        z, sites.psi[p] = prox(s, k, law)
+        z, points.psi[p] = prox(s, k, law)
         Y_p = mlin(1.0, multiplier, -1.0, mmt(mm(U, diag(z)), V))
         put_mat(Y, p, Y_p)
-        stress = mlin(dt * sites.V0[p] * k, mlin(1.0, F, 1.0, Y_p), 0.0, identity(like))
-        put_mat(sites.T, p, mmt(stress, F_n))
+        stress = mlin(dt * points.V0[p] * k, mlin(1.0, F, 1.0, Y_p), 0.0, identity(like))
+        put_mat(points.T, p, mmt(stress, F_n))
 
 
 @parallel
-def _split_all(sites, law, options, Y, like):
+def _split_all(points, law, options, Y, like):
     for c in prange(CHUNKS):
-        split(sites, law, options, Y, like, chunk(c, len(sites.psi)))
+        split_points(points, law, options, Y, like, chunk(c, len(points.psi)))
 
 
 # the proximal map of an elastic energy, in principal space: the local step
@@ -190,14 +190,14 @@ LEAST = 0.1         # stretch to begin with where the law has no stress at s
 @kernel
 def prox(s, k, law):
     """z of the stretches s, for a penalty k [Pa], and 1.0 if round-off was reached, else 0.0."""
-    z = begun(s, law)
+    z = initial_stretches(s, law)
     r = residual(z, s, k, law)
     for _ in range(CAP):
         H = mlin(1.0, semidefinite(dpk1_hat(z, law)), k, identity(s))
         if norm(r) <= ROUND_OFF * norm(mv(H, lin(1.0, s, 1.0, z))):
             return z, 1.0
         p = mv(cofactor(H), lin(-1.0 / det(H), r, 0.0, r))
-        z, r, moved = advanced(z, r, p, (s, k), law)
+        z, r, moved = line_search_step(z, r, p, (s, k), law)
         if not moved:
             return z, 0.0
     return z, 0.0
@@ -210,7 +210,7 @@ def residual(z, s, k, law):
 
 
 @kernel
-def begun(s, law):
+def initial_stretches(s, law):
     """s, or stretches for which the law has a stress."""
     if isfinite(total_of(pk1_hat(s, law))):
         return s
@@ -221,7 +221,7 @@ def begun(s, law):
 
 
 @kernel
-def advanced(z, r, p, target, law):
+def line_search_step(z, r, p, target, law):
     """z and its residual after a step along p that does not climb, and whether there was one."""
     s, k = target
     slope, alpha = dot(r, p), 1.0

@@ -25,17 +25,17 @@ from ..materials.principal import apply
 from .quadrature import pairs_of
 
 
-class Matrix(NamedTuple):
-    """Where the blocks of a cell go."""
+class BlockSlots(NamedTuple):
+    """Places in the Hessian of the blocks of a cell."""
 
     data: np.ndarray      # (blocks, d, d)
     block: np.ndarray     # (n, offsets)    as in `Pattern`
     number: np.ndarray    # (n1, .., nd)    number of each node of the box, -1 without mass
-    hop: np.ndarray       # (S,)            nodes of the box from a cell's first to its I-th
+    hop: np.ndarray       # (S,)            from a cell's first node to its I-th, in the box
     code: np.ndarray      # (S,)            offset of the I-th node, numbered as in `Pattern`
 
 
-class Cell(NamedTuple):
+class CellBlocks(NamedTuple):
     """Workspace of one cell with S = (degree + 1)^d nodes."""
 
     K: np.ndarray     # (S, S, d, d)    sums of the blocks I, J, for J >= I
@@ -45,13 +45,13 @@ class Cell(NamedTuple):
 
 
 def assembled(bodies, unknowns, pattern):
-    """H = M + the blocks of bodies, pairs of `Sites` and `Modes`, as a bsr_array [kg]."""
+    """H = M + the blocks of bodies, pairs of points and `StressModes`, as a bsr_array [kg]."""
     n, d = unknowns.v.shape
     matrix = _empty(unknowns.number, pattern)
     stencil = tuple(range(pattern.degree + 1))
-    for sites, modes in bodies:
+    for points, modes in bodies:
         for color in (0, 1):
-            _assemble_color(sites, modes, stencil, unknowns.dx, matrix, color)
+            _assemble_color(points, modes, stencil, unknowns.dx, matrix, color)
     _complete_all(matrix.data, pattern, unknowns.m)
     return bsr_array((matrix.data, pattern.indices, pattern.indptr), (n * d, n * d))
 
@@ -61,21 +61,21 @@ def _empty(number, pattern):
     data = np.zeros((len(pattern.indices), d, d))
     offset = np.indices(d * (degree + 1,)).reshape(d, -1)
     code = strides(d * (2 * degree + 1,)) @ offset
-    return Matrix(data, pattern.block, number, strides(number.shape) @ offset, code)
+    return BlockSlots(data, pattern.block, number, strides(number.shape) @ offset, code)
 
 
 @kernel
-def assemble(sites, modes, stencil, dx, matrix, bounds):
+def assemble(points, modes, stencil, dx, matrix, bounds):
     """Add the blocks with j >= i of the particles bounds[0] .. bounds[1] - 1."""
     like = matrix.number.shape
     cell = empty_cell(len(matrix.hop), len(like))
     for p in range(bounds[0], bounds[1]):
-        slopes(sites, p, stencil, dx, cell.g, like)
+        slopes(points, p, stencil, dx, cell.g, like)
         differential(modes, p, cell.C, like)
         contract(cell, like)
         accumulate(cell, like)
-        if p + 1 == bounds[1] or vec(sites.base, p, like) != vec(sites.base, p + 1, like):
-            flush(cell.K, first_node(sites.base, p, like), matrix, like)
+        if p + 1 == bounds[1] or vec(points.base, p, like) != vec(points.base, p + 1, like):
+            flush(cell.K, first_node(points.base, p, like), matrix, like)
             clear(cell.K)
 
 
@@ -83,13 +83,13 @@ def assemble(sites, modes, stencil, dx, matrix, bounds):
 def empty_cell(S, d):
     """Workspace with K = 0."""
     K = np.zeros((S, S, d, d))
-    return Cell(K, np.empty((S, d)), np.empty((d * d, d, d)), np.empty((d, S, d, d)))
+    return CellBlocks(K, np.empty((S, d)), np.empty((d * d, d, d)), np.empty((d, S, d, d)))
 
 
 @kernel
-def slopes(sites, p, stencil, dx, g, like):
+def slopes(points, p, stencil, dx, g, like):
     """g_I = dw_Ip [1/m]."""
-    s = vec(sites.s, p, like)
+    s = vec(points.s, p, like)
     w, dw = weights_per_axis(s, stencil), slopes_per_axis(s, stencil)
     for c in range(columns(s, stencil)):
         k = column(c, stencil, like)
@@ -207,12 +207,12 @@ def put_transposed(data, k, l):
 
 
 @parallel
-def _assemble_color(sites, modes, stencil, dx, matrix, color):
-    for h in prange((len(sites.slab) - color) // 2):
+def _assemble_color(points, modes, stencil, dx, matrix, color):
+    for h in prange((len(points.slab) - color) // 2):
         a = 2 * h + color
-        bounds = sites.slab[a], sites.slab[a + 1]
+        bounds = points.slab[a], points.slab[a + 1]
         if bounds[1] > bounds[0]:
-            assemble(sites, modes, stencil, dx, matrix, bounds)
+            assemble(points, modes, stencil, dx, matrix, bounds)
 
 
 @parallel
@@ -225,8 +225,8 @@ def _complete_all(data, pattern, m):
 
 
 class Pattern(NamedTuple):
-    """Block sparsity of n rows; o numbers the (2 q + 1)^d offsets of nodes within reach of splines
-    of degree q, first axis slowest.
+    """Block sparsity of n rows; o numbers the (2 q + 1)^d offsets of nodes that share splines of
+    degree q, first axis slowest.
     """
 
     indptr: np.ndarray     # (n + 1,)        first block of each row
@@ -242,11 +242,11 @@ def pattern_of(number, degree):
     node = np.flatnonzero(padded.reshape(-1) >= 0)
     hop = strides(padded.shape) @ (np.indices(d * (width,)).reshape(d, -1) - degree)
     indptr = np.zeros(len(node) + 1, dtype=np.int32)
-    _count_all(padded.reshape(-1), node, hop, indptr)
+    _count_blocks_all(padded.reshape(-1), node, hop, indptr)
     np.cumsum(indptr, out=indptr)
     indices = np.empty(indptr[-1], dtype=np.int32)
     block = np.empty((len(node), len(hop)), dtype=np.int32)
-    _place_all(padded.reshape(-1), node, hop, Pattern(indptr, indices, block, degree))
+    _fill_pattern_all(padded.reshape(-1), node, hop, Pattern(indptr, indices, block, degree))
     return Pattern(indptr, indices, block, degree)
 
 
@@ -256,7 +256,7 @@ def strides(shape):
 
 
 @kernel
-def count(number, node, hop, indptr, bounds):
+def count_blocks(number, node, hop, indptr, bounds):
     """indptr[i + 1] = blocks of row i, for the rows bounds[0] .. bounds[1] - 1."""
     for i in range(bounds[0], bounds[1]):
         for o in range(len(hop)):
@@ -265,7 +265,7 @@ def count(number, node, hop, indptr, bounds):
 
 
 @kernel
-def place(number, node, hop, pattern, bounds):
+def fill_pattern(number, node, hop, pattern, bounds):
     """Columns and block numbers of the rows bounds[0] .. bounds[1] - 1."""
     for i in range(bounds[0], bounds[1]):
         k = pattern.indptr[i]
@@ -279,42 +279,42 @@ def place(number, node, hop, pattern, bounds):
 
 
 @parallel
-def _count_all(number, node, hop, indptr):
+def _count_blocks_all(number, node, hop, indptr):
     for c in prange(CHUNKS):
-        count(number, node, hop, indptr, chunk(c, len(node)))
+        count_blocks(number, node, hop, indptr, chunk(c, len(node)))
 
 
 @parallel
-def _place_all(number, node, hop, pattern):
+def _fill_pattern_all(number, node, hop, pattern):
     for c in prange(CHUNKS):
-        place(number, node, hop, pattern, chunk(c, len(node)))
+        fill_pattern(number, node, hop, pattern, chunk(c, len(node)))
 
 
 # diagonal blocks without the matrix
 
 
 def diagonal(bodies, unknowns, stencil):
-    """Diagonal blocks (n, d, d) [kg] of the Hessian of bodies, pairs of `Sites` and `Modes`.
+    """Diagonal blocks (n, d, d) [kg] of the Hessian of bodies, pairs of points and `StressModes`.
 
         H_ii = m_i I + sum_p h_ip,    h_ip e_b = U Y_b (W^T dw_ip),    Y_b = apply(A, pairs, X_b)
 
-    with X_b = (U^T e_b) (W^T dw_ip)^T: the response of particle p (see `quadrature.Modes`) to node
-    i moving along axis b.
+    with X_b = (U^T e_b) (W^T dw_ip)^T: the response of particle p (see `quadrature.StressModes`)
+    to node i moving along axis b.
     """
     d = unknowns.number.ndim
     D = unknowns.m[:, None, None] * np.eye(d)
-    for sites, modes in bodies:
+    for points, modes in bodies:
         for color in (0, 1):
-            _add_color(sites, modes, stencil, unknowns, D, color)
+            _add_diagonal_color(points, modes, stencil, unknowns, D, color)
     return 0.5 * (D + np.swapaxes(D, 1, 2))
 
 
 @kernel
-def add(sites, modes, stencil, unknowns, D, bounds):
+def add_diagonal(points, modes, stencil, unknowns, D, bounds):
     """Add the blocks of the particles bounds[0] .. bounds[1] - 1."""
     like = unknowns.number.shape
     for p in range(bounds[0], bounds[1]):
-        base, s = vec(sites.base, p, like), vec(sites.s, p, like)
+        base, s = vec(points.base, p, like), vec(points.s, p, like)
         w, dw = weights_per_axis(s, stencil), slopes_per_axis(s, stencil)
         U, A, pairs = mat(modes.U, p, like), mat(modes.A, p, like), pairs_of(modes.ab, p, like)
         W_T = transpose(mat(modes.W, p, like))
@@ -323,29 +323,29 @@ def add(sites, modes, stencil, unknowns, D, bounds):
             for l in range(len(stencil)):
                 i = unknowns.number[node(base, k, l)]
                 if i >= 0:
-                    h_ip = block(U, A, pairs, mv(W_T, gradient(k, l, w, dw, unknowns.dx)))
+                    h_ip = diagonal_block(U, A, pairs, mv(W_T, gradient(k, l, w, dw, unknowns.dx)))
                     put_mat(D, i, mlin(1.0, mat(D, i, like), 1.0, h_ip))
 
 
 @kernel
-def block(U, A, pairs, x):
+def diagonal_block(U, A, pairs, x):
     """h_ip, for x = W^T dw_ip."""
     if len(x) == 2:
-        rows = moved(U, A, pairs, U[0], x), moved(U, A, pairs, U[1], x)
+        rows = axis_response(U, A, pairs, U[0], x), axis_response(U, A, pairs, U[1], x)
     else:
-        rows = (moved(U, A, pairs, U[0], x), moved(U, A, pairs, U[1], x),
-                moved(U, A, pairs, U[2], x))
+        rows = (axis_response(U, A, pairs, U[0], x), axis_response(U, A, pairs, U[1], x),
+                axis_response(U, A, pairs, U[2], x))
     return transpose(rows)
 
 
 @kernel
-def moved(U, A, pairs, e, x):
+def axis_response(U, A, pairs, e, x):
     """U apply(A, pairs, e x^T) x."""
     return mv(U, mv(apply(A, pairs, outer(e, x)), x))
 
 
 @parallel
-def _add_color(sites, modes, stencil, unknowns, D, color):
-    for h in prange((len(sites.slab) - color) // 2):
+def _add_diagonal_color(points, modes, stencil, unknowns, D, color):
+    for h in prange((len(points.slab) - color) // 2):
         a = 2 * h + color
-        add(sites, modes, stencil, unknowns, D, (sites.slab[a], sites.slab[a + 1]))
+        add_diagonal(points, modes, stencil, unknowns, D, (points.slab[a], points.slab[a + 1]))

@@ -1,10 +1,10 @@
-"""Conditions of a step as a linear space: nodes held, or free along planes only (HOT-bc).
+"""Conditions of a step as a linear space: nodes fixed, or free along planes only (HOT-bc).
 
-A collider that holds a node takes all its freedom; one with a plane n . (u - v_c) = 0 takes one
-direction. "separate" is an inequality, which an active set decides: a plane bears if the node would
-go through it, and is let go if it would have to pull the node. Near rest a node may ask for both in
-turn without end, since solves are inexact: a plane that has been let go twice bears for the rest of
-the step. Friction does not derive from a potential and is refused.
+A collider that fixes a node takes all its freedom; one with a plane n . (u - v_c) = 0 takes one
+direction. "separate" is an inequality, which an active set decides: a plane becomes active if the
+node would go through it, and is released if it would have to pull the node. Near rest a node may
+ask for both in turn without end, since solves are inexact: a plane that has been released twice
+stays active for the rest of the step. Friction does not derive from a potential and is refused.
 """
 
 import numpy as np
@@ -25,12 +25,12 @@ from ..core.contact import (
 from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
 from ..core.tensor import dot, fill, identity, lin, mlin, norm, outer, put_mat, put_vec, vec
 
-FREE, BEARS, HOLDS = range(3)     # what a pair of node and part does
-LETS = 2                          # times that a plane is let go in a step, at most
+FREE, PLANE, FIXED = range(3)     # roles of a pair of node and part
+RELEASES = 2                      # of a plane in a step, at most
 SLACK = 1e-9                      # of the largest speed or impulse at any node: round-off
 
 
-class Restraint:
+class ActiveSet:
     """The conditions at the nodes of one step, of length dt and ending at time t [s].
 
     Raises ValueError for a part with friction.
@@ -43,73 +43,76 @@ class Restraint:
                              'friction has no potential; take integrator = "explicit"')
         self.like = tuple(range(grid.m.ndim))
         self.role = np.zeros(sum(len(touch.node) for touch in touches), dtype=np.int8)
-        self.lets = np.zeros_like(self.role)        # times that each pair has been let go
+        self.releases = np.zeros_like(self.role)        # of each pair so far
         if len(self.role):
             contacts, self.start = by_node(touches, kind, mu)
             numbers = unknowns.number.reshape(-1)[contacts.node]
             self.contacts = contacts._replace(node=numbers)
 
-    def begin(self, unknowns, u):
+    def initial_unknowns(self, unknowns, u):
         """`unknowns` under the conditions that the velocities u (n, d) would break."""
         if len(self.role):
-            _begin_all(self.contacts, self.start, self.role, u, self.like)
-        return self.applied(unknowns)
+            _initial_roles_all(self.contacts, self.start, self.role, u, self.like)
+        return self.apply(unknowns)
 
-    def applied(self, unknowns):
-        """`unknowns` with B and dv0 of the pairs that hold or bear."""
+    def apply(self, unknowns):
+        """`unknowns` with B and dv0 of the fixed nodes and active planes."""
         if not len(self.role):
             return unknowns
         B, u = np.tile(np.eye(len(self.like)), (len(unknowns.m), 1, 1)), unknowns.v.copy()
         _apply_all(self.contacts, self.start, self.role, (B, u), self.like)
         return unknowns._replace(B=B, dv0=u - unknowns.v)
 
-    def revise(self, u, g):
-        """Decide anew which separate planes bear, from the velocities u (n, d) [m/s] and the
-        gradient g (n, d) [kg m/s], the impulse of the parts; returns how many changed.
+    def update(self, u, g):
+        """Update which separate planes are active; return how many changed.
+
+        u (n, d) [m/s] are the velocities, g (n, d) [kg m/s] is the gradient, the impulse of the
+        parts.
         """
         if not len(self.role):
             return 0
         before = self.role.copy()
         slack = SLACK * float(np.abs(u).max()), SLACK * float(np.abs(g).max())
-        _revise_all(self.contacts, self.start, (self.role, self.lets), (u, g), slack, self.like)
+        _update_roles_all(self.contacts, self.start, (self.role, self.releases), (u, g), slack,
+                          self.like)
         return int(np.count_nonzero(self.role != before))
 
 
 @kernel
-def begin(contacts, pairs, role, u):
+def initial_roles(contacts, pairs, role, u):
     """Roles of the pairs of one node whose velocity without them is u; see `contact.meet`."""
     r = strongest(contacts, pairs, u)
     found, planes = nearest(contacts, pairs, u)
     for k in range(pairs[0], pairs[1]):
         if r <= STICKY:
-            role[k] = HOLDS if rank(contacts, k, u) <= r else FREE
+            role[k] = FIXED if rank(contacts, k, u) <= r else FREE
         elif not found:
-            role[k] = HOLDS
+            role[k] = FIXED
         elif contacts.kind[contacts.part[k]] == SLIP or k in planes:
-            role[k] = BEARS
+            role[k] = PLANE
         else:
             role[k] = FREE
 
 
 @kernel
-def held(contacts, pairs, role, u):
-    """How many pairs hold the node, and their mean velocity."""
+def fixed_velocity(contacts, pairs, role, u):
+    """Number of pairs that fix the node, and their mean velocity."""
     count, v = 0, fill(0.0, u)
     for k in range(pairs[0], pairs[1]):
-        if role[k] == HOLDS:
+        if role[k] == FIXED:
             count, v = count + 1, lin(1.0, v, 1.0, vec(contacts.v, k, u))
     return count, lin(1.0 / max(count, 1), v, 0.0, v)
 
 
 @kernel
-def met(contacts, pairs, role, u):
-    """Velocity nearest to u on the planes that bear, an orthonormal basis of their normals, padded
+def plane_velocity(contacts, pairs, role, u):
+    """Velocity nearest to u on the active planes, an orthonormal basis of their normals, padded
     by zeros, and the planes that span it, padded by -1.
     """
     zero = fill(0.0, u)
     basis, planes = (zero, zero, zero), (-1, -1, -1)
     for k in range(pairs[0], pairs[1]):
-        if role[k] == BEARS:
+        if role[k] == PLANE:
             n = vec(contacts.n, k, u)
             e = rest(rest(n, basis), basis)
             size = norm(e)
@@ -121,61 +124,62 @@ def met(contacts, pairs, role, u):
 
 
 @kernel
-def apply(contacts, start, role, fields, like, bounds):
+def apply_roles(contacts, start, role, fields, like, bounds):
     """B and u, the fields, of the nodes bounds[0] .. bounds[1] - 1 of those touched."""
     B, u = fields
     for a in range(bounds[0], bounds[1]):
         pairs, i = (start[a], start[a + 1]), contacts.node[start[a]]
         v = vec(u, i, like)
-        count, v_held = held(contacts, pairs, role, v)
+        count, v_fixed = fixed_velocity(contacts, pairs, role, v)
         if count > 0:
-            put_vec(u, i, v_held)
+            put_vec(u, i, v_fixed)
             put_mat(B, i, mlin(0.0, identity(like), 0.0, identity(like)))
         else:
-            v_met, (p, q, r), _ = met(contacts, pairs, role, v)
+            v_plane, (p, q, r), _ = plane_velocity(contacts, pairs, role, v)
             N = mlin(1.0, mlin(1.0, outer(p, p), 1.0, outer(q, q)), 1.0, outer(r, r))
-            put_vec(u, i, v_met)
+            put_vec(u, i, v_plane)
             put_mat(B, i, mlin(1.0, identity(like), -1.0, N))
 
 
 @kernel
-def revise(contacts, pairs, state, u, g, slack):
-    """Let go planes that would pull; let bear planes that the node goes through. `state` is the
-    roles of the pairs and how often each was let go.
+def update_roles(contacts, pairs, state, u, g, slack):
+    """Release planes that would pull; activate planes that the node goes through. `state` has the
+    roles of the pairs and how often each was released.
     """
-    role, lets = state
-    count, _ = held(contacts, pairs, role, u)
+    role, releases = state
+    count, _ = fixed_velocity(contacts, pairs, role, u)
     if count > 0:
         return
-    _, _, planes = met(contacts, pairs, role, u)
+    _, _, planes = plane_velocity(contacts, pairs, role, u)
     for k in range(pairs[0], pairs[1]):
         if contacts.kind[contacts.part[k]] != SLIP:
             if role[k] == FREE and approach(contacts, k, u) < -slack[0]:
-                role[k] = BEARS
-            elif k in planes and lets[k] < LETS and load(contacts, k, planes, g) < -slack[1]:
-                role[k], lets[k] = FREE, lets[k] + 1
+                role[k] = PLANE
+            elif (k in planes and releases[k] < RELEASES
+                  and load(contacts, k, planes, g) < -slack[1]):
+                role[k], releases[k] = FREE, releases[k] + 1
 
 
 @parallel
-def _begin_all(contacts, start, role, u, like):
+def _initial_roles_all(contacts, start, role, u, like):
     for c in prange(CHUNKS):
         first, last = chunk(c, len(start) - 1)
         for a in range(first, last):
             v = vec(u, contacts.node[start[a]], like)
-            begin(contacts, (start[a], start[a + 1]), role, v)
+            initial_roles(contacts, (start[a], start[a + 1]), role, v)
 
 
 @parallel
 def _apply_all(contacts, start, role, fields, like):
     for c in prange(CHUNKS):
-        apply(contacts, start, role, fields, like, chunk(c, len(start) - 1))
+        apply_roles(contacts, start, role, fields, like, chunk(c, len(start) - 1))
 
 
 @parallel
-def _revise_all(contacts, start, state, fields, slack, like):
+def _update_roles_all(contacts, start, state, fields, slack, like):
     for c in prange(CHUNKS):
         first, last = chunk(c, len(start) - 1)
         for a in range(first, last):
             i = contacts.node[start[a]]
             u, g = vec(fields[0], i, like), vec(fields[1], i, like)
-            revise(contacts, (start[a], start[a + 1]), state, u, g, slack)
+            update_roles(contacts, (start[a], start[a + 1]), state, u, g, slack)

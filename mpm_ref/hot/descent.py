@@ -13,30 +13,30 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .line_search import Point, search
+from .line_search import Iterate, search
 from .norms import length, scaled_norm
 
 ROUND_OFF = 1e-13       # of the energy; many slow steps may lower it by less than a search can tell
 
 
-class Stop(NamedTuple):
-    """When to end the loop."""
+class StoppingRule(NamedTuple):
+    """Conditions under which the loop ends."""
 
     eps: float          # tolerance of the gradient's size
     norm: str           # "characteristic": ||g^||_2 / sqrt(n); "L2": ||g||_2 [kg m/s]
-    iterations: int     # at most
+    max_iterations: int
     patience: int       # steps that lower neither the gradient nor, beyond round-off, the energy
 
 
-class Progress:
+class BestIterate:
     """The best iterate so far, and for how many iterates nothing has improved."""
 
     def __init__(self, noise):
         self.noise = noise
         self.best, self.least, self.lowest, self.idle = None, inf, inf, 0
 
-    def note(self, point, size):
-        """Count in an iterate whose gradient has the given size."""
+    def update(self, point, size):
+        """Compare an iterate, whose gradient has the given size, with those before."""
         fallen = point.E < self.lowest - self.noise * abs(point.E)
         if self.best is None or size < self.least:
             self.best, self.least, fallen = point, size, True
@@ -44,46 +44,47 @@ class Progress:
         self.idle = 0 if fallen else self.idle + 1
 
 
-def descend(system, method, stop, rules, watch):
-    """(`Point`, why not converged or None) from system.start, for a method with
+def descend(system, method, stop, rules, profiler):
+    """Minimise from system.start; return (`Iterate`, None), or (best `Iterate`, message).
 
-    direction(dv, g) -> p; learn(s, y, full) from an accepted step, which may be the full one;
-    refresh() -> whether it can do better after a direction was refused. `rules` bound the line
-    search, `watch` counts.
+    The method has direction(dv, g) -> p; update(s, y, full), called after an accepted step, which
+    may be the full one; restart() -> whether it has a better direction after one was refused.
+    `rules` bound the line search, `profiler` counts.
     """
-    return iterate(system, system.start, advance_of(system, method, rules, watch), stop, watch)
+    advance = line_search_steps(system, method, rules, profiler)
+    return iterate(system, system.start, advance, stop, profiler)
 
 
-def advance_of(system, method, rules, watch):
-    """The steps of a method, for `iterate`."""
-    return lambda now: advanced(system, method, now, rules, watch)
+def line_search_steps(system, method, rules, profiler):
+    """Return the function advance(`Iterate`) of a method, for `iterate`."""
+    return lambda now: next_iterate(system, method, now, rules, profiler)
 
 
-def iterate(system, start, advance, stop, watch):
-    """As `descend`, from start (n, d) by steps advance(`Point`) -> (`Point`, None), or (None, why
-    there is none).
+def iterate(system, start, advance, stop, profiler):
+    """Minimise as `descend`, from start (n, d), by steps advance(`Iterate`) -> (`Iterate`, None) or
+    (None, message).
     """
-    now = Point(start.copy(), *system.evaluate(start))
-    progress = Progress(ROUND_OFF)
-    for k in range(stop.iterations + 1):
-        watch.note(scaled_norm(now.g, system.kappa))
-        size = watch.residuals[-1] if stop.norm == "characteristic" else length(now.g)
-        progress.note(now, size)
+    now = Iterate(start.copy(), *system.evaluate(start))
+    best = BestIterate(ROUND_OFF)
+    for k in range(stop.max_iterations + 1):
+        profiler.record(scaled_norm(now.g, system.kappa))
+        size = profiler.residuals[-1] if stop.norm == "characteristic" else length(now.g)
+        best.update(now, size)
         if np.isfinite(now.E) and size <= stop.eps:
             return now, None
-        why = spent(now, size, k, progress.idle, stop)
-        if why is not None:
-            return progress.best, why
-        now, why = advance(now)
-        if why is not None:
-            return progress.best, why
+        message = failure_message(now, size, k, best.idle, stop)
+        if message is not None:
+            return best.best, message
+        now, message = advance(now)
+        if message is not None:
+            return best.best, message
 
 
-def spent(now, size, k, idle, stop):
-    """Why the loop cannot go on at an iterate that has not converged, or None."""
+def failure_message(now, size, k, idle, stop):
+    """Return why the loop cannot go on at an iterate that has not converged, or None."""
     if not (np.isfinite(now.E) and np.isfinite(size)):
         return f"energy {now.E:.3g} J, gradient {size:.3g} at iterate {k}: expected finite values"
-    if k == stop.iterations:
+    if k == stop.max_iterations:
         return f"{k} iterations, the cap, left the gradient at {size:.3g} > {stop.eps:.3g}"
     if idle >= stop.patience:
         return (f"neither energy nor gradient fell in {idle} iterations: the gradient stays at "
@@ -91,15 +92,15 @@ def spent(now, size, k, idle, stop):
     return None
 
 
-def advanced(system, method, now, rules, watch):
-    """The next `Point`, or None and why there is none."""
+def next_iterate(system, method, now, rules, profiler):
+    """Return (next `Iterate`, None) or (None, message)."""
     while True:
-        p = system.free(method.direction(now.dv, now.g))
+        p = system.project(method.direction(now.dv, now.g))
         found = search(system, now, p, rules)
-        watch.backtracks += found.backtracks
+        profiler.backtracks += found.backtracks
         if found.point is not None:
             full = found.backtracks == 0
-            method.learn(found.point.dv - now.dv, found.point.g - now.g, full)
-        if found.point is not None or not method.refresh():
-            return found.point, found.why
-        watch.refreshes += 1
+            method.update(found.point.dv - now.dv, found.point.g - now.g, full)
+        if found.point is not None or not method.restart():
+            return found.point, found.message
+        profiler.restarts += 1

@@ -1,13 +1,13 @@
-"""A stop by what a step hands on: by how many cells its particles are still off.
+"""A stopping rule for the particles' displacement: its error in cells, not the gradient's size.
 
-The size of the gradient says little of that: at one tolerance the methods leave errors that differ
-many times over (`trade.hot.bar`). So the end of a method is checked by one more step of Newton,
+At one tolerance of the gradient the methods leave errors of displacement that differ many times
+over (`trade.hot.bar`). So the end of a method is checked by one more step of Newton,
 
     H e = -g    at the iterate, about, by CG with multigrid as preconditioner,
 
-which is the error to first order, seen where it matters, on the particles:
+which is the error to first order, measured on the particles:
 
-    off = SAFETY max_p |sum_i w_ip e_i| dt / dx <= cells
+    particle error = SAFETY max_p |sum_i w_ip e_i| dt / dx <= displacement tolerance
 
 The step is taken whatever it says. If it is too long, the method goes on with a smaller tolerance
 of the gradient. Modes of nodes of next to no mass, which the gradient's norm counts and which take
@@ -17,77 +17,83 @@ most iterations at small tolerances, count for little here: particles hardly fee
 from dataclasses import replace
 
 from .descent import iterate
-from .krylov import Rule
+from .krylov import CGOptions
 from .line_search import search
-from .linearization import Linear, first_inverse, solve
+from .linearization import Linearization, initial_inverse, solve
 from .norms import scaled_norm
 
-REFUSED = ("the line search refused the step that would tell more, near the limit of round-off or "
-           "where the energy is no number")
+REFUSED_STEP = ("the line search refused the step that would tell more, near the limit of "
+                "round-off or where the energy is no number")
 SAFETY = 3.0                # the estimate falls short of the error by less than this in nearly all
                             # states; trade.hot.held says in how many, and by how much not
 ROUNDS = 12                 # of a method and a check, at most
 FACTORS = (1e-2, 0.5)       # by which the gradient's tolerance falls from round to round
-CHECK = Rule(lambda size: 0.02, 50, flexible=True)      # a cap of 16 let more errors pass, where
-                            # nodes at the rim make CG slow
+CHECK = CGOptions(lambda size: 0.02, 50, flexible=True)     # a cap of 16 let more errors pass,
+                            # where nodes at the rim make CG slow
 
 
-def held(system, advance, inverse, stop, options, watch):
-    """(`Point`, why not held or None) of steps advance(`Point`), as `descent.iterate` takes them.
+def iterate_to_displacement(system, advance, inverse, stop, options, profiler):
+    """Iterate until the error of displacement is small; return (`Iterate`, None) or (its, message).
 
-    inverse(dv) -> the preconditioner of the check at an increment; stop.eps is the first tolerance.
+    advance(`Iterate`) is as for `descent.iterate`; inverse(dv) -> the preconditioner of the check
+    at an increment; stop.eps is the first tolerance of the gradient.
     """
     start = system.start
     for _ in range(ROUNDS):
-        before = len(watch.residuals)
-        point, why = iterate(system, start, advance, stop, watch)
-        better = checked(system, point, inverse(point.dv), options.search, watch)
+        before = len(profiler.residuals)
+        point, message = iterate(system, start, advance, stop, profiler)
+        better = newton_check(system, point, inverse(point.dv), options.search, profiler)
         if better is None:
-            return point, short(watch.off, options, why or REFUSED)
-        if watch.off <= options.cells or why is not None:
-            watch.note(scaled_norm(better.g, system.kappa))
-            return better, short(watch.off, options, why)
+            return point, failure_message(profiler.particle_error, options,
+                                          message or REFUSED_STEP)
+        if profiler.particle_error <= options.displacement_tolerance or message is not None:
+            profiler.record(scaled_norm(better.g, system.kappa))
+            return better, failure_message(profiler.particle_error, options, message)
         start = better.dv
-        stop = stop._replace(eps=stop.eps * factor(options.cells / watch.off),
-                             iterations=stop.iterations - (len(watch.residuals) - before))
-        if stop.iterations < 0:
+        factor = tolerance_factor(options.displacement_tolerance / profiler.particle_error)
+        steps = len(profiler.residuals) - before
+        stop = stop._replace(eps=stop.eps * factor, max_iterations=stop.max_iterations - steps)
+        if stop.max_iterations < 0:
             break
-    return better, short(watch.off, options, f"{options.iterations} iterations, {ROUNDS} checks")
+    return better, failure_message(profiler.particle_error, options,
+                                   f"{options.max_iterations} iterations, {ROUNDS} checks")
 
 
-def checked(system, point, inverse, rules, watch):
-    """The `Point` after a step of Newton, None if a line search refuses it; watch.off is how far
-    the particles of the first one may be off [dx].
+def newton_check(system, point, inverse, rules, profiler):
+    """Return the `Iterate` after a step of Newton, or None if the line search refuses it.
+
+    Sets profiler.particle_error [dx], the estimate of the error of the given iterate.
     """
-    linear, capped = Linear(system.product(point.dv), inverse), watch.capped
-    e = system.free(solve(linear, -point.g, CHECK, watch))
-    unsure = 2.0 if watch.capped > capped else 1.0      # CG ended early: e is too short
-    watch.off = unsure * SAFETY * system.cells(e)
+    linear, capped = Linearization(system.product(point.dv), inverse), profiler.capped_solves
+    e = system.project(solve(linear, -point.g, CHECK, profiler))
+    unsure = 2.0 if profiler.capped_solves > capped else 1.0      # CG ended early: e is too short
+    profiler.particle_error = unsure * SAFETY * system.particle_displacement(e)
     found = search(system, point, e, rules)
-    watch.backtracks += found.backtracks
+    profiler.backtracks += found.backtracks
     return found.point
 
 
-def factor(wanted):
-    """Of the gradient's tolerance, to bring the error down by a factor that is wanted."""
+def tolerance_factor(wanted):
+    """Factor of the gradient's tolerance that should lower the error by the factor wanted."""
     least, most = FACTORS
     return min(max(wanted, least), most)
 
 
-def short(off, options, why):
-    """Why an error is not held, None if it is."""
-    if off <= options.cells:
+def failure_message(error, options, reason):
+    """Return why an error exceeds its tolerance, None if it does not."""
+    if error <= options.displacement_tolerance:
         return None
-    return f"particles may still be off by {off:.2g} dx, {options.cells:g} were asked: {why}"
+    return (f"particles may still be off by {error:.2g} dx, "
+            f"{options.displacement_tolerance:g} were asked: {reason}")
 
 
-def multigrid_once(system, options, watch):
-    """dv -> a V-cycle of the Hessian where it is first asked for."""
+def lazy_v_cycle(system, options, profiler):
+    """Return the function dv -> V-cycle, of the Hessian at the dv of the first call."""
     cycle = replace(options, descent="lbfgs", inverse="cycle", operator="matrix")
-    kept = []
+    cached = []
 
     def of_first(dv):
-        if not kept:
-            kept.append(first_inverse(system, cycle, watch)(dv).inverse)
-        return kept[0]
+        if not cached:
+            cached.append(initial_inverse(system, cycle, profiler)(dv).inverse)
+        return cached[0]
     return of_first

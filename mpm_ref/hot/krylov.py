@@ -16,7 +16,7 @@ from .multigrid.smoothers import times
 from .norms import dot
 
 
-class Rule(NamedTuple):
+class CGOptions(NamedTuple):
     """CG stops when sqrt(r.P r) <= relative(sqrt(r0.P r0)) sqrt(r0.P r0), r0 = b and P the
     preconditioner: an energy norm (HOT-sec5.3-k), in sqrt(J) for gradients in kg m/s.
     """
@@ -26,15 +26,15 @@ class Rule(NamedTuple):
     flexible: bool = False  # a preconditioner that varies: one more product of fields
 
 
-class Solved(NamedTuple):
-    """Outcome of a linear solve; `why` is None where the rule was met."""
+class CGResult(NamedTuple):
+    """Outcome of a linear solve; `message` is None where the rule was met."""
 
     x: np.ndarray
     iterations: int
-    why: str | None
+    message: str | None
 
 
-def half(size):
+def one_half(size):
     """Tolerance 1/2: of the coarsest level, and of LBFGS-H (HOT-sec5.3-coarse)."""
     return 0.5
 
@@ -56,7 +56,7 @@ def stiffest_tolerance(eps, kappa):
 
 
 def pcg(product, b, inverse, rule):
-    """x of product(x) = b, from x = 0; `Solved`.
+    """x of product(x) = b, from x = 0; `CGResult`.
 
     A direction without positive curvature, or a number that is not finite, ends the solve: x is
     then the last sound iterate, or inverse(b) if there is none.
@@ -64,27 +64,27 @@ def pcg(product, b, inverse, rule):
     x, r, z = np.zeros_like(b), b.copy(), inverse(b)
     rz = dot(r, z)
     if not rz > 0.0:
-        return Solved(z, 0, None if rz == 0.0 else f"r.P r = {rz:.3g} in CG: expected > 0")
+        return CGResult(z, 0, None if rz == 0.0 else f"r.P r = {rz:.3g} in CG: expected > 0")
     goal = (rule.relative(sqrt(rz)) ** 2) * rz
     if rz <= goal:
-        return Solved(x, 0, None)
+        return CGResult(x, 0, None)
     p = z.copy()
     for k in range(rule.cap):
         Ap = product(p)
         curvature = dot(p, Ap)
         if not 0.0 < curvature < inf:
-            return Solved(x if k else z, k, f"p.A p = {curvature:.3g} in CG: expected > 0")
+            return CGResult(x if k else z, k, f"p.A p = {curvature:.3g} in CG: expected > 0")
         alpha = rz / curvature
         x, r_old, r = x + alpha * p, r, r - alpha * Ap
         z = inverse(r)
         rz_old, rz = rz, dot(r, z)
         if rz <= goal:
-            return Solved(x, k + 1, None)
+            return CGResult(x, k + 1, None)
         if not isfinite(rz):
-            return Solved(x, k + 1, f"r.P r = {rz:.3g} in CG: expected > 0")
+            return CGResult(x, k + 1, f"r.P r = {rz:.3g} in CG: expected > 0")
         mixed = dot(r_old, z) if rule.flexible else 0.0
         p = z + ((rz - mixed) / rz_old) * p
-    return Solved(x, rule.cap, f"CG reached its cap of {rule.cap} iterations")
+    return CGResult(x, rule.cap, f"CG reached its cap of {rule.cap} iterations")
 
 
 def block_jacobi(D):

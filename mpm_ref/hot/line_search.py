@@ -16,7 +16,7 @@ import numpy as np
 from .norms import dot
 
 
-class Point(NamedTuple):
+class Iterate(NamedTuple):
     """An iterate with its energy and gradient."""
 
     dv: np.ndarray      # (n, d) [m/s]
@@ -24,8 +24,8 @@ class Point(NamedTuple):
     g: np.ndarray       # (n, d) [kg m/s]
 
 
-class Rules(NamedTuple):
-    """What bounds a search."""
+class LineSearchOptions(NamedTuple):
+    """Bounds of a search."""
 
     shrink: float = 0.5     # factor between trials
     floor: float = 1e-10    # smallest share of the full step that is tried
@@ -33,46 +33,48 @@ class Rules(NamedTuple):
     noise: float = 1e-10    # share of |E| below which a difference is round-off
 
 
-class Searched(NamedTuple):
-    """The accepted `Point`, or None and `why`; and how many trials were refused."""
+class LineSearchResult(NamedTuple):
+    """The accepted `Iterate`, or None and `message`; and how many trials were refused."""
 
-    point: Point | None
-    why: str | None
+    point: Iterate | None
+    message: str | None
     backtracks: int
 
 
 def search(system, now, p, rules):
-    """`Searched` along p (n, d) [m/s] from the `Point` now."""
+    """`LineSearchResult` along p (n, d) [m/s] from the `Iterate` now."""
     slope = dot(now.g, p)
     if not isfinite(slope):
-        return Searched(None, f"the direction is not finite: g . p = {slope:.3g}", 0)
+        return LineSearchResult(None, f"the direction is not finite: g . p = {slope:.3g}", 0)
     if not slope < 0.0:
-        return Searched(None, f"not a descent direction: g . p = {slope:.3g}, expected < 0", 0)
+        message = f"not a descent direction: g . p = {slope:.3g}, expected < 0"
+        return LineSearchResult(None, message, 0)
     alpha, refused, noise = 1.0, 0, rules.noise * abs(now.E)
     while alpha >= rules.floor and refused <= rules.cap:
-        trial = attempt(system, now.dv + alpha * p, now.E + noise, fused=refused == 0)
-        if trial is not None and falls(now, trial, p, slope, noise):
-            return Searched(trial, None, refused)
+        trial = trial_iterate(system, now.dv + alpha * p, now.E + noise, fused=refused == 0)
+        if trial is not None and decreases(now, trial, p, slope, noise):
+            return LineSearchResult(trial, None, refused)
         alpha, refused = alpha * rules.shrink, refused + 1
-    return Searched(None, f"the line search refused {refused} steps, down to its "
-                    f"{'floor' if alpha < rules.floor else 'cap'}, along a slope of {slope:.3g} J",
-                    refused)
+    limit = "floor" if alpha < rules.floor else "cap"
+    return LineSearchResult(None, f"the line search refused {refused} steps, down to its {limit}, "
+                            f"along a slope of {slope:.3g} J", refused)
 
 
-def attempt(system, dv, limit, fused):
-    """The `Point` at dv, or None if its energy exceeds the limit.
+def trial_iterate(system, dv, limit, fused):
+    """The `Iterate` at dv, or None if its energy exceeds the limit.
 
     The full step is nearly always accepted, so energy and gradient come from one pass there;
     shorter ones ask for the energy first.
     """
     if not fused and not system.energy(dv) <= limit:
         return None
-    return Point(dv, *system.evaluate(dv))
+    return Iterate(dv, *system.evaluate(dv))
 
 
-def falls(now, trial, p, slope, noise):
-    """Whether the energy falls from `now` to `trial`, by the slopes where round-off hides it; what
-    is not finite does not fall.
+def decreases(now, trial, p, slope, noise):
+    """Return whether the energy falls from now to trial, by the slopes where round-off hides it.
+
+    A trial that is not finite does not lower it.
     """
     if not np.isfinite(trial.g).all():
         return False

@@ -1,6 +1,6 @@
 """Inexact projected Newton: each direction by CG on the Hessian of the iterate (HOT-alg1)."""
 
-from .krylov import Rule, newton_tolerance
+from .krylov import CGOptions, newton_tolerance
 from .linearization import solve
 from .norms import length
 
@@ -15,8 +15,8 @@ class Forcing:
     def __init__(self, norm, tau):
         self.norm, self.tau = norm, tau
 
-    def of(self, g):
-        """The function from sqrt(g.P g) to k."""
+    def relative_tolerance(self, g):
+        """Return the function from sqrt(g.P g) to k."""
         def relative(size):
             return newton_tolerance(size if self.norm == "energy" else length(g), self.tau)
         return relative
@@ -25,21 +25,21 @@ class Forcing:
 class Newton:
     """Directions p of H p = -g for `descent`, H and its preconditioner being linearise(dv).
 
-    `cap` and `flexible` are those of `krylov.Rule`.
+    `cap` and `flexible` are those of `krylov.CGOptions`.
     """
 
-    def __init__(self, linearise, forcing, cap, flexible, watch):
-        self.linearise, self.forcing, self.watch = linearise, forcing, watch
+    def __init__(self, linearise, forcing, cap, flexible, profiler):
+        self.linearise, self.forcing, self.profiler = linearise, forcing, profiler
         self.cap, self.flexible = cap, flexible
 
     def direction(self, dv, g):
         """p (n, d) [m/s]."""
-        rule = Rule(self.forcing.of(g), self.cap, self.flexible)
-        return solve(self.linearise(dv), -g, rule, self.watch)
+        rule = CGOptions(self.forcing.relative_tolerance(g), self.cap, self.flexible)
+        return solve(self.linearise(dv), -g, rule, self.profiler)
 
-    def learn(self, s, y, full=True):
-        """Nothing: the next Hessian is taken where it is needed."""
+    def update(self, s, y, full=True):
+        """Do nothing: each direction takes a new Hessian."""
 
-    def refresh(self):
-        """False: the Hessian was that of the iterate."""
+    def restart(self):
+        """Return False: the Hessian was that of the iterate."""
         return False

@@ -11,7 +11,7 @@ The Hessian is an operator or a matrix (HOT-sec3.1-seq):
 
     (H u)_i = m_i u_i + sum_p T_p dw_ip,    T_p = dt^2 V0_p [dP/dF : (L_p F_p^n)] (F_p^n)^T
 
-with L_p = sum_i u_i dw_ip^T. T_p is computed in principal space, see `quadrature.Modes`.
+with L_p = sum_i u_i dw_ip^T. T_p is computed in principal space, see `quadrature.StressModes`.
 """
 
 from functools import cached_property
@@ -40,8 +40,8 @@ from ..materials import FixedCorotated, Fluid, Hencky, LogNeoHookean, NeoHookean
 from ..materials.log_strain import log_strain
 from ..materials.principal import apply, local, local_spd
 from .assembly import assembled, pattern_of
-from .quadrature import Modes, pairs_of, sites_of
-from .transfer import add_forces, gradients, reach
+from .quadrature import StressModes, pairs_of, quadrature_points
+from .transfer import add_forces, gradients, largest_velocity
 
 
 class Potential:
@@ -55,27 +55,27 @@ class Potential:
         self.weight = unknowns.m[:, None] * np.asarray(gravity, dtype=float)
         self.box = box_of(unknowns)
         self.at = np.flatnonzero(unknowns.number.reshape(-1) >= 0)
-        self.sites = tuple(sites_of(body, self.box, stencil) for body in bodies)
+        self.points = tuple(quadrature_points(body, self.box, stencil) for body in bodies)
 
     def energy(self, dv):
-        """E(dv) [J]; inf where a law refuses a deformation gradient."""
-        return self._respond(dv)
+        """Return E(dv) [J]; inf where a law refuses a deformation gradient."""
+        return self._energy(dv)
 
     def evaluate(self, dv):
-        """E(dv) [J], and g = dE/d dv (n, d) [kg m/s], which knows no conditions."""
-        E = self._respond(dv)
-        g = self.collect()
+        """Return E(dv) [J] and g = dE/d dv (n, d) [kg m/s], without conditions."""
+        E = self._energy(dv)
+        g = self.scatter_forces()
         g += self.unknowns.m[:, None] * dv
         g -= self.dt * self.weight
         return E, g
 
     def tangent(self, dv, projected=True):
-        """`Tangent` at dv: dP/dF of every particle, without its negative eigenvalues if projected
-        (HOT-alg1).
+        """Return the `Tangent` at dv: dP/dF of every particle, without its negative
+        eigenvalues if projected (HOT-alg1).
         """
-        self.spread(self.unknowns.v + dv)
-        modes = tuple(differentials(sites, body.law, self.dt, projected)
-                      for body, sites in zip(self.bodies, self.sites))
+        self.gather_gradients(self.unknowns.v + dv)
+        modes = tuple(stress_modes(points, body.law, self.dt, projected)
+                      for body, points in zip(self.bodies, self.points))
         return Tangent(self, modes)
 
     @cached_property
@@ -83,35 +83,36 @@ class Potential:
         """`Pattern` of the Hessians."""
         return pattern_of(self.unknowns.number, len(self.stencil) - 1)
 
-    def spread(self, u):
-        """Velocity gradient of every particle, into sites.T, of the nodal velocities u (n, d)."""
-        self._place(u)
-        for sites in self.sites:
-            gradients(sites, self.box, self.stencil)
+    def gather_gradients(self, u):
+        """Velocity gradient of every particle, into points.T, of the nodal velocities u (n, d)."""
+        self._load(u)
+        for points in self.points:
+            gradients(points, self.box, self.stencil)
 
-    def reach(self, u):
+    def largest_velocity(self, u):
         """Largest velocity [m/s] that the nodal velocities u (n, d) give to a particle."""
-        self._place(u)
-        return max((reach(sites, self.box, self.stencil) for sites in self.sites), default=0.0)
+        self._load(u)
+        return max((largest_velocity(points, self.box, self.stencil)
+                    for points in self.points), default=0.0)
 
-    def collect(self):
-        """sum_p T_p dw_ip (n, d) of the T that the sites hold."""
+    def scatter_forces(self):
+        """sum_p T_p dw_ip (n, d) of the T that the points hold."""
         self.box.f[:] = 0.0
-        for sites in self.sites:
-            add_forces(sites, self.box, self.stencil)
+        for points in self.points:
+            add_forces(points, self.box, self.stencil)
         return self.box.f.reshape(-1, self.weight.shape[1])[self.at]
 
-    def _place(self, u):
+    def _load(self, u):
         self.box.v.reshape(-1, u.shape[1])[self.at] = u
 
-    def _respond(self, dv):
+    def _energy(self, dv):
         m, u = self.unknowns.m, self.unknowns.v + dv
-        self.spread(u)
+        self.gather_gradients(u)
         E = total(np.einsum("n,na,na->n", 0.5 * m, dv, dv))
         E -= self.dt * total(np.einsum("na,na->n", self.weight, u))
-        for body, sites in zip(self.bodies, self.sites):
-            response(sites, body.law, self.dt)
-            E += total(sites.psi)
+        for body, points in zip(self.bodies, self.points):
+            update_response(points, body.law, self.dt)
+            E += total(points.psi)
         return float(E)
 
 
@@ -128,28 +129,27 @@ def box_of(unknowns):
 #
 # T_p is the derivative of psi_p with respect to L_p [J s]; HOT-eq2 sums T_p dw_ip.
 
-
 energy_and_stress = by_type("energy_and_stress")      # (F, law) -> psi, P, at the cost of P alone
 
 
 @kernel
-def moved(L, dt, F):
+def new_gradient(L, dt, F):
     """(I + dt L) F."""
     return mm(mlin(1.0, identity(F), dt, L), F)
 
 
 @kernel
-def respond(sites, law, dt, like, bounds):
+def energies_and_stresses(points, law, dt, like, bounds):
     """psi_p and T_p of the particles bounds[0] .. bounds[1] - 1; before, T_p holds L_p."""
     for p in range(bounds[0], bounds[1]):
-        F_n = mat(sites.F, p, like)
-        psi, P = energy_and_stress(moved(mat(sites.T, p, like), dt, F_n), law)
-        sites.psi[p] = sites.V0[p] * psi
-        put_mat(sites.T, p, mlin(dt * sites.V0[p], mmt(P, F_n), 0.0, F_n))
+        F_n = mat(points.F, p, like)
+        psi, P = energy_and_stress(new_gradient(mat(points.T, p, like), dt, F_n), law)
+        points.psi[p] = points.V0[p] * psi
+        put_mat(points.T, p, mlin(dt * points.V0[p], mmt(P, F_n), 0.0, F_n))
 
 
 @kernel
-def by_rotation(F, law):
+def fixed_corotated_response(F, law):
     """psi, P of the fixed corotated law from one polar decomposition (NCLAW-eq12)."""
     D = mlin(1.0, F, -1.0, rotation(F))
     psi = law.mu * inner(D, D) + fluid.psi(F, law)
@@ -157,7 +157,7 @@ def by_rotation(F, law):
 
 
 @kernel
-def by_stretches(F, law):
+def hencky_response(F, law):
     """psi, P of the Hencky law from one singular value decomposition (NSF-eq13)."""
     U, s, V, _ = svd(F)
     psi = inf
@@ -168,70 +168,69 @@ def by_stretches(F, law):
 
 
 @kernel
-def apart(F, law):
+def direct_response(F, law):
     """psi, P of a law that needs no decomposition."""
     return laws.psi(F, law), laws.pk1(F, law)
 
 
-energy_and_stress.method(FixedCorotated, by_rotation)
-energy_and_stress.method(Hencky, by_stretches)
+energy_and_stress.method(FixedCorotated, fixed_corotated_response)
+energy_and_stress.method(Hencky, hencky_response)
 for _law in (NeoHookean, LogNeoHookean, Fluid):
-    energy_and_stress.method(_law, apart)
+    energy_and_stress.method(_law, direct_response)
 
 
 @parallel
-def _respond_all(sites, law, dt, like):
+def _energies_and_stresses_all(points, law, dt, like):
     for c in prange(CHUNKS):
-        respond(sites, law, dt, like, chunk(c, len(sites.psi)))
+        energies_and_stresses(points, law, dt, like, chunk(c, len(points.psi)))
 
 
-def response(sites, law, dt):
-    """`respond` for all particles of a body."""
-    _respond_all(sites, law, dt, tuple(range(sites.F.shape[1])))
+def update_response(points, law, dt):
+    """`energies_and_stresses` for all particles of a body."""
+    _energies_and_stresses_all(points, law, dt, tuple(range(points.F.shape[1])))
 
 
 # the Hessian
 
-
 class Tangent:
-    """Hessian H = d2E/d dv2 [kg] of a `Potential` at one dv, which knows no conditions."""
+    """Hessian H = d2E/d dv2 [kg] of a `Potential` at one dv, without conditions."""
 
     def __init__(self, potential, modes):
         self.potential, self.modes = potential, modes
 
     def product(self, u):
         """H u (n, d), without a matrix."""
-        self.potential.spread(u)
-        for sites, modes in zip(self.potential.sites, self.modes):
-            _stress_all(sites, modes, tuple(range(u.shape[1])))
-        return self.potential.collect() + self.potential.unknowns.m[:, None] * u
+        self.potential.gather_gradients(u)
+        for points, modes in zip(self.potential.points, self.modes):
+            _stress_changes_all(points, modes, tuple(range(u.shape[1])))
+        return self.potential.scatter_forces() + self.potential.unknowns.m[:, None] * u
 
     def matrix(self):
-        """H as a bsr_array of blocks (d, d), symmetric to the bit; a row has a block for every node
-        in the stencil of 5^d (for quadratic splines) nodes around its own.
+        """Return H as a bsr_array of blocks (d, d), symmetric to the bit. A row has a block for
+        every node in the stencil of 5^d (for quadratic splines) nodes around its own.
         """
         q = self.potential
-        return assembled(tuple(zip(q.sites, self.modes)), q.unknowns, q.pattern)
+        return assembled(tuple(zip(q.points, self.modes)), q.unknowns, q.pattern)
 
 
-def differentials(sites, law, dt, projected):
-    """`Modes` at the velocity gradients L that sites.T holds."""
-    n, d = sites.s.shape
+def stress_modes(points, law, dt, projected):
+    """`StressModes` at the velocity gradients L that points.T holds."""
+    n, d = points.s.shape
     square = (np.empty((n, d, d)) for _ in range(3))
-    modes = Modes(*square, np.empty((n, d * (d - 1) // 2, 2)))
-    _differentiate_all(sites, law, (dt, projected), modes, tuple(range(d)))
+    modes = StressModes(*square, np.empty((n, d * (d - 1) // 2, 2)))
+    _differentiate_all(points, law, (dt, projected), modes, tuple(range(d)))
     return modes
 
 
 @kernel
-def differentiate(sites, law, options, modes, like, bounds):
-    """`Modes` of the particles bounds[0] .. bounds[1] - 1; options are dt and projected."""
+def differentiate(points, law, options, modes, like, bounds):
+    """`StressModes` of the particles bounds[0] .. bounds[1] - 1; options are dt and projected."""
     dt, projected = options
     for p in range(bounds[0], bounds[1]):
-        F_n = mat(sites.F, p, like)
-        U, s, V, _ = svd(moved(mat(sites.T, p, like), dt, F_n))
+        F_n = mat(points.F, p, like)
+        U, s, V, _ = svd(new_gradient(mat(points.T, p, like), dt, F_n))
         A, pairs = local_spd(s, law) if projected else local(s, law)
-        scale = dt * dt * sites.V0[p]
+        scale = dt * dt * points.V0[p]
         put_mat(modes.U, p, U)
         put_mat(modes.W, p, mm(F_n, V))
         put_mat(modes.A, p, mlin(scale, A, 0.0, A))
@@ -240,22 +239,22 @@ def differentiate(sites, law, options, modes, like, bounds):
 
 
 @kernel
-def stress(sites, modes, like, bounds):
+def stress_changes(points, modes, like, bounds):
     """T_p of the particles bounds[0] .. bounds[1] - 1; before, T_p holds L_p."""
     for p in range(bounds[0], bounds[1]):
         U, W = mat(modes.U, p, like), mat(modes.W, p, like)
-        X = mm(transpose(U), mm(mat(sites.T, p, like), W))
+        X = mm(transpose(U), mm(mat(points.T, p, like), W))
         Y = apply(mat(modes.A, p, like), pairs_of(modes.ab, p, like), X)
-        put_mat(sites.T, p, mmt(mm(U, Y), W))
+        put_mat(points.T, p, mmt(mm(U, Y), W))
 
 
 @parallel
-def _differentiate_all(sites, law, options, modes, like):
+def _differentiate_all(points, law, options, modes, like):
     for c in prange(CHUNKS):
-        differentiate(sites, law, options, modes, like, chunk(c, len(sites.T)))
+        differentiate(points, law, options, modes, like, chunk(c, len(points.T)))
 
 
 @parallel
-def _stress_all(sites, modes, like):
+def _stress_changes_all(points, modes, like):
     for c in prange(CHUNKS):
-        stress(sites, modes, like, chunk(c, len(sites.T)))
+        stress_changes(points, modes, like, chunk(c, len(points.T)))

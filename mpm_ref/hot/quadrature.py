@@ -1,7 +1,7 @@
 """The particles as quadrature points of an implicit step: what stays the same while it is solved.
 
-`Sites` holds the positions, rest volumes and old deformation gradients; `Modes` the differential of
-the stress at the current iterate.
+`QuadraturePoints` holds positions, rest volumes and old deformation gradients; `StressModes` the
+differential of the stress at an iterate.
 
 Particles are taken sorted by cell. Cells come first axis slowest, so that slabs (see `core.order`)
 are runs of them, and all particles of a cell, which share their nodes, follow each other.
@@ -18,7 +18,7 @@ from ..core.stencil import locate
 from ..core.tensor import diag, mat, put_mat, put_vec, vec
 
 
-class Sites(NamedTuple):
+class QuadraturePoints(NamedTuple):
     """N particles of a body in the order of their cells."""
 
     base: np.ndarray    # (N, d)        first node that the particle reaches, from the grid's first
@@ -30,31 +30,31 @@ class Sites(NamedTuple):
     T: np.ndarray       # (N, d, d)     workspace: a velocity gradient, then a stress
 
 
-def sites_of(body, grid, stencil):
-    """`Sites` of a body whose particles lie inside the grid; those that have failed are left out.
+def quadrature_points(body, grid, stencil):
+    """`QuadraturePoints` of a body inside the grid, without the particles that have failed.
 
-    A fluid, which carries J alone, gets an F with that determinant: all of them are alike to it.
+    A fluid, which carries J alone, gets an F with that determinant: its law depends on no more.
     """
-    order = order_of(body, grid, stencil)
+    order = cell_order(body, grid, stencil)
     n, d = len(order), grid.m.ndim
     base, s, F, V0 = np.empty((n, d), np.int64), np.empty((n, d)), np.empty((n, d, d)), np.empty(n)
-    _place_all(body.particles, grid, stencil, order, (base, s, F, V0))
+    _fill_points_all(body.particles, grid, stencil, order, (base, s, F, V0))
     width = slab_width(stencil)
     slabs = np.arange(-(-grid.m.shape[0] // width) + 1)
     start = np.searchsorted(base[:, 0] // width, slabs)
-    return Sites(base, s, F, V0, start, np.empty(n), np.empty((n, d, d)))
+    return QuadraturePoints(base, s, F, V0, start, np.empty(n), np.empty((n, d, d)))
 
 
-def order_of(body, grid, stencil):
-    """The particles of `Sites` (N,): those that have not failed, by cell."""
+def cell_order(body, grid, stencil):
+    """The particles of `QuadraturePoints` (N,): those that have not failed, by cell."""
     order = by_cell(body.particles.x, grid, stencil)
-    return order[whole(body)[order]] if body.particles.y.ndim == 1 else order
+    return order[intact_particles(body)[order]] if body.particles.y.ndim == 1 else order
 
 
-def whole(body):
-    """Which particles (N,) have not failed."""
+def intact_particles(body):
+    """Return True for each particle (N,) that has not failed."""
     out = np.empty(len(body.particles.y), dtype=bool)
-    _ask_all(body.particles.y, body.flow, out)
+    _mark_intact_all(body.particles.y, body.flow, out)
     return out
 
 
@@ -73,7 +73,7 @@ def deformation(F, p, like):
 
 
 @kernel
-def place(particles, grid, stencil, order, out, bounds):
+def fill_points(particles, grid, stencil, order, out, bounds):
     """Base node, offset, F and V0 of the particles order[bounds[0]] .. order[bounds[1] - 1]."""
     d = grid.m.shape
     for k in range(bounds[0], bounds[1]):
@@ -86,29 +86,28 @@ def place(particles, grid, stencil, order, out, bounds):
 
 
 @kernel
-def ask(y, flow, out, bounds):
-    """Whether the particles bounds[0] .. bounds[1] - 1 have not failed."""
+def mark_intact(y, flow, out, bounds):
+    """out_p = True where a particle of bounds[0] .. bounds[1] - 1 has not failed."""
     for p in range(bounds[0], bounds[1]):
         out[p] = intact(y[p], flow) > 0.0
 
 
 @parallel
-def _place_all(particles, grid, stencil, order, out):
+def _fill_points_all(particles, grid, stencil, order, out):
     for c in prange(CHUNKS):
-        place(particles, grid, stencil, order, out, chunk(c, len(order)))
+        fill_points(particles, grid, stencil, order, out, chunk(c, len(order)))
 
 
 @parallel
-def _ask_all(y, flow, out):
+def _mark_intact_all(y, flow, out):
     for c in prange(CHUNKS):
-        ask(y, flow, out, chunk(c, len(y)))
+        mark_intact(y, flow, out, chunk(c, len(y)))
 
 
 # the differential of the stress
 
-
-class Modes(NamedTuple):
-    """Differential of the stress of N particles in principal space, in the order of their `Sites`.
+class StressModes(NamedTuple):
+    """Differential of the stress of N `QuadraturePoints` in principal space.
 
     With F_p = U diag(s) V^T and W = F_p^n V, a velocity gradient L changes the stress that acts on
     the nodes by

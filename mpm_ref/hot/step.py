@@ -13,45 +13,48 @@ import numpy as np
 from ..core.grid import Storage
 from ..core.state import Grid
 from ..explicit import Stepper, damp, deform_body, gather, scatter
-from .constraints import Restraint
-from .methods import Options, minimise
-from .multigrid.geometric import Geometric, conditions_at
+from .constraints import ActiveSet
+from .methods import SolverOptions, minimise
+from .multigrid.geometric import CoarseGrids, coarse_conditions
 from .norms import characteristic_norms
 from .potential import Potential
-from .report import together
+from .report import combined_report
 from .system import System, Unknowns, free_part, unknowns_of
 
-REVISIONS = 20      # of the planes that bear, at most: after that, nodes stay as they are
+MAX_UPDATES = 20      # of the active set; after that, nodes stay as they are
 
 
-class Pose(NamedTuple):
-    """What an implicit step has to solve."""
+class ImplicitProblem(NamedTuple):
+    """The minimisation problem of one implicit step."""
 
     grid: Grid                      # mass and momentum
     unknowns: Unknowns
     potential: Potential
     kappa: np.ndarray               # (n,)  characteristic norms [kg m/s]
-    restraint: Restraint | None
-    falling: np.ndarray             # (d,)  dt g [m/s]
-    geometric: Geometric            # its grids of greater spacings
+    active_set: ActiveSet | None
+    gravity_increment: np.ndarray   # (d,)  dt g [m/s]
+    coarse_grids: CoarseGrids       # of greater spacings
 
 
 class ImplicitStepper(Stepper):
-    """Advances bodies by implicit steps; used as `explicit.Stepper`. After each step `report` is
-    the solver's (see `report`).
+    """Advances bodies by implicit steps, with the interface of `explicit.Stepper`.
+
+    After each step, `report` is the `report.SolveReport` of its solve.
     """
 
     implicit = True             # the particles' speed alone bounds a step (HOT-cfl, HOT-dt)
 
     def __init__(self, scheme, dx, dim, gravity, conditions=None, options=None):
         super().__init__(scheme, dx, dim, gravity, conditions)
-        self.options = Options() if options is None else options
+        self.options = SolverOptions() if options is None else options
         self.report = None
-        self.revisions = 0          # of the planes that bear, in the last solve
+        self.active_set_updates = 0         # in the last solve
         check_scheme(scheme)
 
     def start(self, bodies):
-        """As `explicit.Stepper.start`. Raises ValueError for body forces of particles."""
+        """Prepare the bodies, as `explicit.Stepper.start`. Raises ValueError for body forces of
+        particles.
+        """
         super().start(bodies)
         for body in bodies:
             if body.particles.b.ndim == 2:
@@ -64,83 +67,90 @@ class ImplicitStepper(Stepper):
         """
         if not 0.0 < dt < np.inf:
             raise ValueError(f"dt = {dt}: expected a positive, finite time in s")
-        pose = self.pose(bodies, t, dt)
-        put(pose.grid, pose.unknowns, pose.unknowns.v + self.solve(pose))
+        problem = self.problem(bodies, t, dt)
+        write_velocities(problem.grid, problem.unknowns, problem.unknowns.v + self.solve(problem))
         for body in bodies:
-            gather(body, pose.grid, self.scheme, dt)
+            gather(body, problem.grid, self.scheme, dt)
             deform_body(body, dt)
             damp(body, self.scheme)
-        return pose.grid
+        return problem.grid
 
-    def driven(self, bodies, t, dt):
+    def driven_speed(self, bodies, t, dt):
         """Largest speed [m/s] that moving parts give to nodes with mass from time t to t + dt."""
         if self.conditions is None or not self.conditions.moves:
             return 0.0
         grid = scatter(bodies, self.storage, self.scheme, 0.0)
         return self.conditions.fastest(grid, t + dt, dt)
 
-    def pose(self, bodies, t, dt):
-        """`Pose` of the step from time t [s] by dt [s]; the bodies stay as they are."""
+    def problem(self, bodies, t, dt):
+        """`ImplicitProblem` of the step from time t [s] by dt [s]; the bodies stay as they are."""
         grid = scatter(bodies, self.storage, self.scheme, 0.0)
-        unknowns, restraint = self._restrained(grid, self.conditions, t, dt)
+        unknowns, active_set = self._constrained(grid, self.conditions, t, dt)
         stencil = self.scheme.stencil
         potential = Potential(bodies, unknowns, stencil, dt, self.gravity)
         kappa = characteristic_norms(bodies, unknowns, stencil, dt)
-        geometric = Geometric(potential, partial(self.coarser, bodies, t, dt))
-        return Pose(grid, unknowns, potential, kappa, restraint, dt * self.gravity, geometric)
+        coarse_grids = CoarseGrids(potential, partial(self.coarse_unknowns, bodies, t, dt))
+        return ImplicitProblem(grid, unknowns, potential, kappa, active_set, dt * self.gravity,
+                               coarse_grids)
 
-    def coarser(self, bodies, t, dt, level):
-        """`Unknowns` of the step on a grid of 2^level dx, whose nodes meet the conditions anew; a
-        separate plane bears there as it does before the solve.
+    def coarse_unknowns(self, bodies, t, dt, level):
+        """`Unknowns` of the step on a grid of 2^level dx, under the conditions at its own
+        nodes; separate planes are active there as before the solve.
         """
         factor, conditions = 2**level, self.conditions
         storage = Storage(factor * self.dx, self.scheme.stencil, len(self.gravity))
         grid = scatter(bodies, storage, self.scheme, 0.0)
-        conditions = None if conditions is None else conditions_at(conditions, factor)
-        return self._restrained(grid, conditions, t, dt)[0]
+        conditions = None if conditions is None else coarse_conditions(conditions, factor)
+        return self._constrained(grid, conditions, t, dt)[0]
 
-    def _restrained(self, grid, conditions, t, dt):
-        """The unknowns of a grid under conditions, and their `Restraint` or None."""
+    def _constrained(self, grid, conditions, t, dt):
+        """The unknowns of a grid under conditions, and their `ActiveSet` or None."""
         unknowns = unknowns_of(grid)
         if conditions is None:
             return unknowns, None
-        restraint = Restraint(conditions, grid, unknowns, t + dt, dt)
-        return restraint.begin(unknowns, unknowns.v + dt * self.gravity), restraint
+        active_set = ActiveSet(conditions, grid, unknowns, t + dt, dt)
+        return active_set.initial_unknowns(unknowns, unknowns.v + dt * self.gravity), active_set
 
-    def system(self, pose, near=None):
-        """`System` of a pose, for its conditions as they stand. It starts where the options say,
-        or at what they admit that is nearest to an increment near (n, d) [m/s].
+    def system(self, problem, near=None):
+        """`System` of a problem under its current active set.
+
+        It starts where the options say, or at the admissible increment nearest to near (n, d)
+        [m/s].
         """
-        q, start = pose.unknowns, pose.unknowns.dv0
+        q, start = problem.unknowns, problem.unknowns.dv0
         if near is not None:
             start = start + free_part(q, near - start)
         elif self.options.start == "gravity":
-            start = start + free_part(q, np.broadcast_to(pose.falling, start.shape))
-        return System(pose.potential, q, pose.kappa, start, pose.geometric)
+            start = start + free_part(q, np.broadcast_to(problem.gravity_increment, start.shape))
+        return System(problem.potential, q, problem.kappa, start, problem.coarse_grids)
 
-    def solve(self, pose):
-        """The increment dv (n, d) [m/s] of a pose; separate planes come and go in between, and each
-        solve goes on from the one before.
+    def solve(self, problem):
+        """Return the increment dv (n, d) [m/s] of a problem.
+
+        The active set of separate planes is updated between solves, each of which starts from the
+        result of the one before.
         """
         dv, reports = None, []
-        for self.revisions in range(REVISIONS):
-            solution = minimise(self.system(pose, dv), self.options)
+        for self.active_set_updates in range(MAX_UPDATES):
+            solution = minimise(self.system(problem, dv), self.options)
             reports.append(solution.report)
-            self.report, dv = together(reports), solution.dv
-            if not (pose.restraint and self._revised(pose, dv)):
+            self.report, dv = combined_report(reports), solution.dv
+            if not (problem.active_set and self._updated(problem, dv)):
                 return dv
-            pose = pose._replace(unknowns=pose.restraint.applied(pose.unknowns))
-        self.revisions = REVISIONS
-        self.report = self.report._replace(converged=False, why=f"separate planes still came or "
-                                           f"went after {REVISIONS} solves")
+            problem = problem._replace(unknowns=problem.active_set.apply(problem.unknowns))
+        self.active_set_updates = MAX_UPDATES
+        self.report = self.report._replace(converged=False, message="separate planes still "
+                                           f"came or went after {MAX_UPDATES} solves")
         return dv
 
-    def _revised(self, pose, dv):
-        return pose.restraint.revise(pose.unknowns.v + dv, pose.potential.evaluate(dv)[1])
+    def _updated(self, problem, dv):
+        return problem.active_set.update(problem.unknowns.v + dv, problem.potential.evaluate(dv)[1])
 
 
-def put(grid, unknowns, v):
-    """The velocities v (n, d) of the nodes into the grid; the old ones too where it keeps them."""
+def write_velocities(grid, unknowns, v):
+    """Write the velocities v (n, d) of the nodes into the grid, and the old ones where it has an
+    array for them.
+    """
     d = grid.m.ndim
     at = np.flatnonzero(unknowns.number.reshape(-1) >= 0)
     if grid.v_old.ndim > 1:

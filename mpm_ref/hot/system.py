@@ -48,62 +48,63 @@ class System:
     """E(dv) for dv = dv0 + B w: values, projected gradients and Hessians (HOT-eq1, HOT-bc).
 
     kappa (n,) [kg m/s] are the characteristic norms (HOT-eq9); start (n, d) [m/s] the admissible
-    increment to begin with; geometric, a `geometric.Geometric`, makes the coarser `matrices`.
+    increment to begin with; coarse_grids, a `geometric.CoarseGrids`, makes
+    the coarser `matrices`.
     """
 
-    def __init__(self, potential, unknowns, kappa, start, geometric=None):
+    def __init__(self, potential, unknowns, kappa, start, coarse_grids=None):
         self.potential, self.unknowns = potential, unknowns
-        self.kappa, self.start, self.geometric = kappa, start, geometric
+        self.kappa, self.start, self.coarse_grids = kappa, start, coarse_grids
         self.index, self.n = unknowns.index, len(unknowns.m)
         self._at, self._tangent = None, None
 
     def energy(self, dv):
-        """E(dv) [J]."""
+        """Return E(dv) [J]."""
         return self.potential.energy(dv)
 
     def evaluate(self, dv):
-        """E(dv) [J] and B dE/d dv (n, d) [kg m/s]."""
+        """Return E(dv) [J] and B dE/d dv (n, d) [kg m/s]."""
         E, g = self.potential.evaluate(dv)
-        return E, self.free(g)
+        return E, self.project(g)
 
-    def free(self, u):
+    def project(self, u):
         """B u (n, d)."""
         return free_part(self.unknowns, u)
 
-    def cells(self, u):
-        """How far the velocities u (n, d) move the particles in the step, at most [dx]."""
-        return self.potential.reach(u) * self.potential.dt / self.unknowns.dx
+    def particle_displacement(self, u):
+        """Largest displacement [dx] of a particle in the step by nodal velocities u (n, d)."""
+        return self.potential.largest_velocity(u) * self.potential.dt / self.unknowns.dx
 
     def tangent(self, dv):
-        """The potential's `Tangent` at dv; the last one is kept."""
+        """The potential's `Tangent` at dv; the last one is cached."""
         if self._at is None or not np.array_equal(dv, self._at):
             self._at, self._tangent = dv.copy(), self.potential.tangent(dv)
         return self._tangent
 
     def matrix(self, dv):
-        """B H B at dv as a bsr_array: rows and columns of what is held are zero."""
+        """B H B at dv as a bsr_array: rows and columns of fixed directions are zero."""
         return constrained(self.tangent(dv).matrix(), self.unknowns.B)
 
     def matrices(self, dv, levels):
-        """(`matrix`, node indices) at dv on grids of 1, 2, 4, ... times the spacing, a list.
+        """Return [(`matrix`, node indices)] at dv on grids of 1, 2, 4, ... times the spacing.
 
-        Raises ValueError where the system was made without `geometric`.
+        Raises ValueError where the system was made without `coarse_grids`.
         """
-        if self.geometric is None:
+        if self.coarse_grids is None:
             raise ValueError("a method with geometric multigrid on a System without coarser grids: "
-                             "expected one made with geometric = Geometric(...)")
+                             "expected one made with coarse_grids = CoarseGrids(...)")
         modes = self.tangent(dv).modes
-        return [(self.matrix(dv), self.index), *self.geometric.matrices(modes, levels)]
+        return [(self.matrix(dv), self.index), *self.coarse_grids.matrices(modes, levels)]
 
     def product(self, dv):
         """u -> B H B u at dv, without a matrix."""
         tangent = self.tangent(dv)
-        return lambda u: self.free(tangent.product(self.free(u)))
+        return lambda u: self.project(tangent.product(self.project(u)))
 
     def diagonal(self, dv):
         """Diagonal blocks (n, d, d) of B H B at dv, without the matrix [kg]."""
         q, B, modes = self.potential, self.unknowns.B, self.tangent(dv).modes
-        return B @ diagonal(zip(q.sites, modes), self.unknowns, q.stencil) @ B
+        return B @ diagonal(zip(q.points, modes), self.unknowns, q.stencil) @ B
 
 
 def constrained(H, B):

@@ -5,7 +5,7 @@
 
 Nodes are those of a box: u is `grid.v`, f is `grid.f`. Forces are added slab by slab in two
 colours, so that they are the same to the bit for any number of threads (see `core.order`).
-`reach` is the largest velocity that nodes give to a particle.
+`largest_velocity` is the largest velocity that nodes give to a particle.
 """
 
 from math import inf, isfinite, sqrt
@@ -29,11 +29,11 @@ from ..core.transfer_mls3 import add_momenta, node_number, plane, strides, weigh
 
 
 @kernel
-def gather(sites, grid, stencil, bounds):
+def gather(points, grid, stencil, bounds):
     """T_p = sum_i u_i dw_ip^T for the particles bounds[0] .. bounds[1] - 1."""
     d = grid.m.shape
     for p in range(bounds[0], bounds[1]):
-        base, s = vec(sites.base, p, d), vec(sites.s, p, d)
+        base, s = vec(points.base, p, d), vec(points.s, p, d)
         w, dw = weights_per_axis(s, stencil), slopes_per_axis(s, stencil)
         T = outer(fill(0.0, s), s)
         for c in range(columns(s, stencil)):
@@ -41,15 +41,15 @@ def gather(sites, grid, stencil, bounds):
             for l in range(len(stencil)):
                 u_i = of_node(grid.v, node(base, k, l))
                 T = mlin(1.0, T, 1.0, outer(u_i, gradient(k, l, w, dw, grid.dx)))
-        put_mat(sites.T, p, T)
+        put_mat(points.T, p, T)
 
 
 @kernel
-def scatter(sites, grid, stencil, bounds):
+def scatter(points, grid, stencil, bounds):
     """f_i += sum_p T_p dw_ip for the particles bounds[0] .. bounds[1] - 1."""
     d = grid.m.shape
     for p in range(bounds[0], bounds[1]):
-        base, s, T = vec(sites.base, p, d), vec(sites.s, p, d), mat(sites.T, p, d)
+        base, s, T = vec(points.base, p, d), vec(points.s, p, d), mat(points.T, p, d)
         w, dw = weights_per_axis(s, stencil), slopes_per_axis(s, stencil)
         for c in range(columns(s, stencil)):
             k = column(c, stencil, d)
@@ -59,29 +59,29 @@ def scatter(sites, grid, stencil, bounds):
 
 
 @parallel
-def _gather_all(sites, grid, stencil):
+def _gather_all(points, grid, stencil):
     for c in prange(CHUNKS):
-        gather(sites, grid, stencil, chunk(c, len(sites.T)))
+        gather(points, grid, stencil, chunk(c, len(points.T)))
 
 
 @parallel
-def _scatter_color(sites, grid, stencil, color):
-    for h in prange((len(sites.slab) - color) // 2):
+def _scatter_color(points, grid, stencil, color):
+    for h in prange((len(points.slab) - color) // 2):
         a = 2 * h + color
-        scatter(sites, grid, stencil, (sites.slab[a], sites.slab[a + 1]))
+        scatter(points, grid, stencil, (points.slab[a], points.slab[a + 1]))
 
 
-def gradients(sites, grid, stencil):
-    """`gather` for all particles of a body: sites.T from grid.v."""
+def gradients(points, grid, stencil):
+    """`gather` for all particles of a body: points.T from grid.v."""
     run = gather3_all if _has_fast_twin(grid, stencil) else _gather_all
-    run(sites, grid, stencil)
+    run(points, grid, stencil)
 
 
-def add_forces(sites, grid, stencil):
-    """`scatter` for all particles of a body: grid.f from sites.T."""
+def add_forces(points, grid, stencil):
+    """`scatter` for all particles of a body: grid.f from points.T."""
     run = scatter3_color if _has_fast_twin(grid, stencil) else _scatter_color
     for color in (0, 1):
-        run(sites, grid, stencil, color)
+        run(points, grid, stencil, color)
 
 
 def _has_fast_twin(grid, stencil):
@@ -97,28 +97,28 @@ def _has_fast_twin(grid, stencil):
 
 
 @kernel
-def gather3(sites, grid, stencil, bounds):
+def gather3(points, grid, stencil, bounds):
     """`gather` for a quadratic stencil in 3D."""
     u, n, d = grid.v.reshape(-1), strides(grid.m), grid.m.shape
     for p in range(bounds[0], bounds[1]):
-        w, dw = factors(vec(sites.s, p, d), grid.dx, stencil)
-        i = node_number(vec(sites.base, p, d), n)
+        w, dw = factors(vec(points.s, p, d), grid.dx, stencil)
+        i = node_number(vec(points.base, p, d), n)
         A, dA = plane(u, i, n[1], w[1], dw[1])
         B, dB = plane(u, i + n[0], n[1], w[1], dw[1])
         C, dC = plane(u, i + n[0] + n[0], n[1], w[1], dw[1])
         x, y, z = weighted(dw[0], A, B, C), weighted(w[0], dA, dB, dC), weighted(w[0], A, B, C)
-        put_mat(sites.T, p, transpose((vm(w[2], x), vm(w[2], y), vm(dw[2], z))))
+        put_mat(points.T, p, transpose((vm(w[2], x), vm(w[2], y), vm(dw[2], z))))
 
 
 @kernel
-def scatter3(sites, grid, stencil, bounds):
+def scatter3(points, grid, stencil, bounds):
     """`scatter` for a quadratic stencil in 3D."""
     f, n, d = grid.f.reshape(-1), strides(grid.m), grid.m.shape
     for p in range(bounds[0], bounds[1]):
-        w, dw = factors(vec(sites.s, p, d), grid.dx, stencil)
-        x, y, z = transpose(mat(sites.T, p, d))
+        w, dw = factors(vec(points.s, p, d), grid.dx, stencil)
+        x, y, z = transpose(mat(points.T, p, d))
         X, Y, Z = outer(w[2], x), outer(w[2], y), outer(dw[2], z)
-        i = node_number(vec(sites.base, p, d), n)
+        i = node_number(vec(points.base, p, d), n)
         for a in range(3):
             j = i
             for b in range(3):
@@ -137,18 +137,18 @@ def factors(s, dx, stencil):
 
 
 @parallel
-def gather3_all(sites, grid, stencil):
+def gather3_all(points, grid, stencil):
     """`gather3` for all particles, in parallel."""
     for c in prange(CHUNKS):
-        gather3(sites, grid, stencil, chunk(c, len(sites.T)))
+        gather3(points, grid, stencil, chunk(c, len(points.T)))
 
 
 @parallel
-def scatter3_color(sites, grid, stencil, color):
+def scatter3_color(points, grid, stencil, color):
     """`scatter3` for the slabs of one colour, in parallel."""
-    for h in prange((len(sites.slab) - color) // 2):
+    for h in prange((len(points.slab) - color) // 2):
         a = 2 * h + color
-        scatter3(sites, grid, stencil, (sites.slab[a], sites.slab[a + 1]))
+        scatter3(points, grid, stencil, (points.slab[a], points.slab[a + 1]))
 
 
 # the largest velocity of a particle
@@ -158,13 +158,13 @@ def scatter3_color(sites, grid, stencil, color):
 
 
 @kernel
-def farthest(sites, grid, stencil, bounds):
+def largest_square(points, grid, stencil, bounds):
     """max_p |sum_i w_ip u_i|^2 of the particles bounds[0] .. bounds[1] - 1; u is grid.v. Infinite
     where u is no number.
     """
     d, most = grid.m.shape, 0.0
     for p in range(bounds[0], bounds[1]):
-        base, s = vec(sites.base, p, d), vec(sites.s, p, d)
+        base, s = vec(points.base, p, d), vec(points.s, p, d)
         w, u = weights_per_axis(s, stencil), fill(0.0, s)
         for c in range(columns(s, stencil)):
             k = column(c, stencil, d)
@@ -176,13 +176,13 @@ def farthest(sites, grid, stencil, bounds):
 
 
 @parallel
-def _farthest_all(sites, grid, stencil, out):
+def _largest_square_all(points, grid, stencil, out):
     for c in prange(CHUNKS):
-        out[c] = farthest(sites, grid, stencil, chunk(c, len(sites.T)))
+        out[c] = largest_square(points, grid, stencil, chunk(c, len(points.T)))
 
 
-def reach(sites, grid, stencil):
-    """max_p |sum_i w_ip u_i| of a body's `Sites`, u being `grid.v`; in the unit of u."""
+def largest_velocity(points, grid, stencil):
+    """max_p |sum_i w_ip u_i| of a body's points, u being `grid.v`; in the unit of u."""
     out = np.empty(CHUNKS)
-    _farthest_all(sites, grid, stencil, out)
+    _largest_square_all(points, grid, stencil, out)
     return sqrt(out.max())

@@ -55,7 +55,7 @@ class States(NamedTuple):
 ROWS = States((3,), (3,), (3, 3), (3, 3), (3, 3))       # shapes of one particle's
 
 
-class Nodes(NamedTuple):
+class BatchNodes(NamedTuple):
     """Storage of a grid for each of b bodies, flat, and of its bars; reused from step to step."""
 
     m: np.ndarray           # (b, most nodes)
@@ -64,7 +64,7 @@ class Nodes(NamedTuple):
     v_bar: np.ndarray
 
 
-def world(problem):
+def make_world(problem):
     """`World` of a problem of one body. Raises ValueError for what is not as in NCLAW-sim."""
     walls, clip, scheme = getattr(problem.conditions, "walls", None), problem.clip, problem.scheme
     if problem.dim != 3 or (scheme.transfer, scheme.degree, scheme.rpic) != ("mls", 2, 0.0):
@@ -72,7 +72,7 @@ def world(problem):
                          "without damping")
     if len(problem.bodies) != 1 or problem.clock.dt is None:
         raise ValueError(f"{problem.title!r}: expected one body and a fixed dt")
-    if clip is None or not boxed(walls) or problem.conditions.parts:
+    if clip is None or not is_nclaw_box(walls) or problem.conditions.parts:
         raise ValueError(f"{problem.title!r}: expected a box of walls of kind \"separate\" without "
                          "friction and a clip, nothing else")
     q = problem.bodies[0].particles
@@ -84,18 +84,18 @@ def world(problem):
                  np.asarray(clip[1], float), q.m, q.V0)
 
 
-def boxed(walls):
+def is_nclaw_box(walls):
     """Whether walls are those of NCLAW-sim: six that let go and do not rub."""
     return (walls is not None and walls.kind == "separate" and not walls.friction
             and None not in (*walls.low, *walls.high))
 
 
-def nodes(of, count):
-    """`Nodes` for so many bodies in a `World`."""
-    return Nodes(*(np.empty((count, k * most_nodes(of))) for k in (1, 3, 1, 3)))
+def make_nodes(of, count):
+    """`BatchNodes` for so many bodies in a `World`."""
+    return BatchNodes(*(np.empty((count, k * max_nodes(of))) for k in (1, 3, 1, 3)))
 
 
-def most_nodes(of):
+def max_nodes(of):
     """How many nodes a body can reach."""
     return int(np.prod(np.ceil((of.upper - of.lower) / of.dx) + len(QUADRATIC)))
 
@@ -120,7 +120,7 @@ def pull_back(of, before, after, bars, on):
 
 def require_fit(of, on, before, *beside):
     """Raise ValueError where kernels would read or write beside arrays: those of `States` before a
-    step, of what is carried after it or its gradients (`beside`), and of `Nodes`.
+    step, of what is carried after it or its gradients (`beside`), and of `BatchNodes`.
     """
     require_shapes(of, before, len(before.x))
     for states in beside:
@@ -139,11 +139,11 @@ def require_shapes(of, arrays, bodies):
 
 
 def require_nodes(of, on, bodies):
-    """Raise ValueError unless `Nodes` hold so many bodies of a `World`."""
-    most = most_nodes(of)
+    """Raise ValueError unless `BatchNodes` hold so many bodies of a `World`."""
+    most = max_nodes(of)
     if len(on.m) < bodies or on.m.shape[1] < most:
         raise ValueError(f"storage for {len(on.m)} bodies of {on.m.shape[1]} nodes, expected at "
-                         f"least {bodies} of {most}; make it with `nodes` of this world")
+                         f"least {bodies} of {most}; make it with `make_nodes` of this world")
 
 
 def require_inside(of, x):
@@ -155,7 +155,7 @@ def require_inside(of, x):
 
 
 @kernel
-def box(of, x):
+def reached_box(of, x):
     """The first node that particles at x (n, 3) reach, and how many there are along each axis."""
     first, shape = np.empty(3, np.int64), np.empty(3, np.int64)
     for a in range(3):
@@ -168,7 +168,7 @@ def box(of, x):
 
 
 @kernel
-def carved(of, m, v, at):
+def body_grid(of, m, v, at):
     """`Grid` of zeros in the storage of one body; at = (first node, shape)."""
     first, (nx, ny, nz) = at
     size = nx * ny * nz
@@ -218,7 +218,7 @@ def particles_of(of, states, tau, b):
 @kernel
 def advance_one(of, before, after, on, b):
     """The step of body b."""
-    grid, tau = carved(of, on.m[b], on.v[b], box(of, before.x[b])), before.tau[b]
+    grid, tau = body_grid(of, on.m[b], on.v[b], reached_box(of, before.x[b])), before.tau[b]
     scatter_velocities(of, particles_of(of, before, tau, b), grid)
     stop_at_walls(of, grid, grid.v)
     moved = particles_of(of, after, tau, b)
@@ -233,10 +233,10 @@ def advance_one(of, before, after, on, b):
 
 @kernel
 def pull_back_one(of, before, after, bars, found, where):
-    """The adjoint of the step of a body, where = (`Nodes`, its number)."""
+    """The adjoint of the step of a body, where = (`BatchNodes`, its number)."""
     on, b = where
-    at, particles = box(of, before.x[b]), particles_of(of, before, before.tau[b], b)
-    grid, bar = carved(of, on.m[b], on.v[b], at), carved(of, on.m_bar[b], on.v_bar[b], at)
+    at, particles = reached_box(of, before.x[b]), particles_of(of, before, before.tau[b], b)
+    grid, bar = body_grid(of, on.m[b], on.v[b], at), body_grid(of, on.m_bar[b], on.v_bar[b], at)
     scatter_velocities(of, particles, grid)
     unread = np.zeros(len(of.m))
     mine = Particles(found.x[b], found.v[b], found.C[b], NONE, found.F[b], found.tau[b], unread,

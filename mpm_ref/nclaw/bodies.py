@@ -7,7 +7,7 @@ from ..materials import Material
 from ..materials.learned import learned_flow, learned_law
 
 
-def fresh(body, law, flow):
+def body_with_laws(body, law, flow):
     """A body as another stands, with particles of its own, of a law and a flow.
 
     J becomes F = J^(1/d) I where the laws read F, and F becomes J where they read that alone.
@@ -15,7 +15,7 @@ def fresh(body, law, flow):
     q, material = body.particles, Material(law, flow)
     transfer = "mls" if q.L is q.C else "apic" if q.C.ndim == 3 else "pic"
     made = particles_at(q.x, q.v, q.m, q.V0, transfer, fluid=not material.needs_F)
-    made.F[:] = carried(q.F, made.F.ndim == 3, q.x.shape[1])
+    made.F[:] = convert_gradients(q.F, made.F.ndim == 3, q.x.shape[1])
     if q.C.ndim == 3:
         made.C[:] = q.C
     if material.has_history:
@@ -24,45 +24,45 @@ def fresh(body, law, flow):
     return Body(body.name, made._replace(b=q.b.copy()), law, flow, body.id.copy())
 
 
-def carried(F, whole, d):
+def convert_gradients(F, whole, d):
     """F (n, d, d), or J (n,) unless `whole`, of either of them."""
     if whole == (F.ndim == 3):
         return F
     return F[:, None, None] ** (1.0 / d) * np.eye(d) if whole else np.linalg.det(F)
 
 
-def own(body):
+def copy_body(body):
     """A body of its own laws."""
-    return fresh(body, body.law, body.flow)
+    return body_with_laws(body, body.law, body.flow)
 
 
-def learned(laws):
+def body_maker(laws):
     """What makes bodies of trained `LearnedLaws`. Raises ValueError for what is no stress and no
     return map.
     """
     elastic, plastic = learned_law(laws.elastic), learned_flow(laws.plastic)
-    return lambda body: fresh(body, elastic, plastic)
+    return lambda body: body_with_laws(body, elastic, plastic)
 
 
-def points(law, flow, F):
+def material_points(law, flow, F):
     """A `Body` of material points at rest, of deformation gradients F (n, d, d), that belong to no
     grid.
     """
     n, d, _ = F.shape
     still, one, material = np.zeros((n, d)), np.ones(n), Material(law, flow)
     made = particles_at(still, still, one, one, fluid=not material.needs_F)
-    made.F[:] = carried(F, material.needs_F, d)
+    made.F[:] = convert_gradients(F, material.needs_F, d)
     if material.has_history:
         made = made._replace(y=np.full(n, material.initial_y))
     return Body("points", made, law, flow, np.arange(n))
 
 
-def gradients(body):
+def deformation_gradients(body):
     """F (n, d, d) of a body's particles, J^(1/d) I where they carry J alone."""
-    return carried(body.particles.F, True, body.particles.x.shape[1])
+    return convert_gradients(body.particles.F, True, body.particles.x.shape[1])
 
 
-def stresses(body):
+def kirchhoff_stresses(body):
     """tau (n, d, d) [Pa] of a body's particles."""
     tau, d = body.particles.tau, body.particles.x.shape[1]
     return tau if tau.ndim == 3 else tau[:, None, None] * np.eye(d)

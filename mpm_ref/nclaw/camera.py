@@ -33,12 +33,12 @@ def project(P, x):
     return h[..., :2] / h[..., 2:]
 
 
-def front(x):
+def front_layer(x):
     """Which of points x (n, 3) form the layer nearest to a camera as of `pinhole`."""
     return np.flatnonzero(x[:, 2] > x[:, 2].max() - 1e-9)
 
 
-def filmed(P, x, points, noise, rng):
+def observe_marks(P, x, points, noise, rng):
     """`Marks` of some points in frames x (f + 1, n, 3), each place off by normal noise [px]."""
     places = project(P, x[:, points])
     return Marks(points, places + noise * rng.normal(size=places.shape))

@@ -22,7 +22,7 @@ import numpy as np
 
 from ..explicit import deform_body, initial_stress
 from ..materials import NoFlow
-from .bodies import gradients, points, stresses
+from .bodies import deformation_gradients, kirchhoff_stresses, material_points
 
 SIMPSON = ((0.0, 1.0 / 6.0), (0.5, 4.0 / 6.0), (1.0, 1.0 / 6.0))    # places and weights
 
@@ -74,15 +74,15 @@ def work(law, F, after):
 
 def first_piola(law, F):
     """P (n, 3, 3) [Pa] of F (n, 3, 3)."""
-    body = points(law, NoFlow(), F)
+    body = material_points(law, NoFlow(), F)
     initial_stress(body)
-    return stresses(body) @ np.linalg.inv(F).swapaxes(1, 2)
+    return kirchhoff_stresses(body) @ np.linalg.inv(F).swapaxes(1, 2)
 
 
 def returned(law, flow, trial):
     """F (n, 3, 3) after the return of trial ones."""
     if isinstance(flow, NoFlow):
         return trial
-    body = points(law, flow, trial)
+    body = material_points(law, flow, trial)
     deform_body(body, 0.0)
-    return gradients(body)
+    return deformation_gradients(body)

@@ -35,7 +35,7 @@ from ..materials.learned.invariants import invariants, spectrum
 from ..materials.learned.stretch_network import ReleasedStretchStress, StretchStress
 from ..materials.learned.weights import PARTS, dim_of
 from ..store.weights_file import sealed, write_whole
-from .bodies import gradients, points, stresses
+from .bodies import deformation_gradients, kirchhoff_stresses, material_points
 
 FORMAT = "mpm_ref law 1"
 THETA = "theta = sum_i log s_i"
@@ -76,14 +76,14 @@ ANSWERS = {     # kind -> what is done with what it reads
 }
 
 
-def exported(laws):
+def export_tables(laws):
     """{"format", "dim", "decomposition", "about", "elastic", "plastic", "check"} of `LearnedLaws`:
     texts, numbers, arrays, and tables of them.
     """
     d = dim_of(laws)
     return {"format": FORMAT, "dim": d, "decomposition": OF_F, "about": laws.about,
             **{part: part_of(getattr(laws, part), d) for part in PARTS},
-            "check": checks(laws, questions(d))}
+            "check": check_pairs(laws, questions(d))}
 
 
 def part_of(weights, d):
@@ -115,18 +115,18 @@ def questions(d):
     return np.array([rest, turn, stretched, sheared, (1.0 - SPREAD) * rest, *(turns @ drawn)])
 
 
-def checks(laws, F):
+def check_pairs(laws, F):
     """Questions F (n, d, d) and the answers of both laws, with what their first layers read."""
     law, flow = learned_law(laws.elastic), learned_flow(laws.plastic)
-    elastic, plastic = points(law, NoFlow(), F), points(law, flow, F)
+    elastic, plastic = material_points(law, NoFlow(), F), material_points(law, flow, F)
     initial_stress(elastic)
     deform_body(plastic, 1.0)
-    return {"F": F, "elastic_read": input_values(laws.elastic, F), "tau": stresses(elastic),
-            "plastic_read": input_values(laws.plastic, F),
-            "returned": F if isinstance(flow, NoFlow) else gradients(plastic)}
+    return {"F": F, "elastic_read": input_values(laws.elastic, F),
+            "tau": kirchhoff_stresses(elastic), "plastic_read": input_values(laws.plastic, F),
+            "returned": F if isinstance(flow, NoFlow) else deformation_gradients(plastic)}
 
 
-def flat(tables, path=""):
+def flatten_tables(tables, path=""):
     """{name: text, number or array} of nested tables, names joined by "_"; lists of words become
     arrays, `about` JSON.
     """
@@ -135,19 +135,21 @@ def flat(tables, path=""):
         name = f"{path}_{key}" if path else key
         if key == "about":
             value = json.dumps(value)
-        found |= flat(value, name) if isinstance(value, dict) else {name: np.asarray(value)}
+        nested = isinstance(value, dict)
+        found |= flatten_tables(value, name) if nested else {name: np.asarray(value)}
     return found
 
 
 def write(path, tables):
-    """Write `exported` tables, JSON or npz as the name says, whole or not at all. Raises OSError
-    where the system refuses.
+    """Write the tables of `export_tables`, JSON or npz as the name says, whole or not at all.
+
+    Raises OSError where the system refuses.
     """
     path = Path(path)
     if path.suffix.lower() == ".json":
         content = json.dumps(tables, indent=1, default=lambda a: a.tolist()).encode()
     else:
-        content = sealed(flat(tables))
+        content = sealed(flatten_tables(tables))
     write_whole(path, content)
 
 

@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..explicit import deform_body, initial_stress
-from .bodies import gradients, points, stresses
+from .bodies import deformation_gradients, kirchhoff_stresses, material_points
 
 
-class Path(NamedTuple):
-    """What is prescribed, at time levels 0 .. k, and what of the stress is looked at."""
+class StrainPath(NamedTuple):
+    """A prescribed deformation at time levels 0 .. k, and the component of stress to record."""
 
     name: str
     strain: np.ndarray      # (k + 1,) the first is 0
@@ -25,69 +25,70 @@ class Path(NamedTuple):
     symbol: str             # of that stress
 
 
-class Course(NamedTuple):
-    """What becomes of a point along a path."""
+class PathResponse(NamedTuple):
+    """The elastic deformation gradient and the stress of a point along a path."""
 
     F: np.ndarray           # (k + 1, d, d)
     tau: np.ndarray         # (k + 1, d, d) [Pa]
 
 
-class Kind(NamedTuple):
-    """Directions of a family of paths, G = I + strain A."""
+class PathFamily(NamedTuple):
+    """The direction of a family of paths, G = I + strain A."""
 
     A: np.ndarray           # (d, d)
     reads: np.ndarray       # (d, d)
     symbol: str
 
 
-def kinds(d):
-    """{name: `Kind`} in d dimensions: along one axis, in simple shear, alike in all directions."""
+def path_families(d):
+    """Return {name: `PathFamily`} in d dimensions: along one axis, in simple shear, volumetric."""
     first, shear = np.zeros((2, d, d))
     first[0, 0] = shear[0, 1] = 1.0
-    return {"uniaxial": Kind(first, first, "tau_xx"), "shear": Kind(shear, shear, "tau_xy"),
-            "volumetric": Kind(np.eye(d), np.eye(d) / d, "tr(tau)/d")}
+    return {"uniaxial": PathFamily(first, first, "tau_xx"),
+            "shear": PathFamily(shear, shear, "tau_xy"),
+            "volumetric": PathFamily(np.eye(d), np.eye(d) / d, "tr(tau)/d")}
 
 
 def monotone(d, strain, steps):
-    """`Path`s from rest to strains of at most this size, in so many steps each: stretched and
-    compressed along one axis, sheared, swollen and compressed in all directions.
+    """Return the `StrainPath`s from rest to strains of at most this size: stretched and compressed
+    along one axis, sheared, swollen and compressed in all directions. steps: their number on each.
     """
     ends = {"uniaxial": (strain, -strain), "shear": (strain,), "volumetric": (strain, -strain)}
-    return [path(name, kind, (0.0, end), steps) for name, kind in kinds(d).items()
+    return [path(name, kind, (0.0, end), steps) for name, kind in path_families(d).items()
             for end in ends[name]]
 
 
 def cycles(d, strain, steps):
-    """`Path`s that load and unload, in so many steps from turn to turn: compressed along one axis
-    and back; sheared, back, the other way and back.
+    """Return the `StrainPath`s that load and unload: compressed along one axis and back; sheared,
+    back, the other way and back. steps: their number from turn to turn.
     """
-    known = kinds(d)
+    known = path_families(d)
     return [path("uniaxial cycle", known["uniaxial"], (0.0, -strain, 0.0), steps),
             path("shear cycle", known["shear"], (0.0, strain, 0.0, -strain, 0.0), steps)]
 
 
 def path(name, kind, turns, steps):
-    """The `Path` from turn to turn (strains), in so many even steps each."""
+    """Return the `StrainPath` from turn to turn (strains), of `steps` even steps each."""
     legs = [np.linspace(a, b, steps + 1)[1:] for a, b in pairwise(turns)]
     strain = np.concatenate([turns[:1], *legs])
     G = np.eye(len(kind.A)) + strain[:, None, None] * kind.A
-    return Path(name, strain, G, kind.reads, kind.symbol)
+    return StrainPath(name, strain, G, kind.reads, kind.symbol)
 
 
-def course(law, flow, path, dt):
-    """`Course` of a law and a flow along a path, in steps of dt [s]."""
-    point, d = points(law, flow, path.G[:1]), path.G.shape[1]
+def path_response(law, flow, path, dt):
+    """Return the `PathResponse` of a law and a flow along a path, in steps of dt [s]."""
+    point, d = material_points(law, flow, path.G[:1]), path.G.shape[1]
     initial_stress(point)
-    rows = [(gradients(point)[0].copy(), stresses(point)[0].copy())]
+    rows = [(deformation_gradients(point)[0].copy(), kirchhoff_stresses(point)[0].copy())]
     for before, after in pairwise(path.G):
         point.particles.L[0] = (after @ np.linalg.inv(before) - np.eye(d)) / dt
         deform_body(point, dt)
-        rows.append((gradients(point)[0].copy(), stresses(point)[0].copy()))
-    return Course(*(np.array(rows) for rows in zip(*rows, strict=True)))
+        rows.append((deformation_gradients(point)[0].copy(), kirchhoff_stresses(point)[0].copy()))
+    return PathResponse(*(np.array(rows) for rows in zip(*rows, strict=True)))
 
 
-def looked_at(path, course):
-    """The stress (k + 1,) [Pa] that a path looks at; NaN where it is not finite."""
+def path_stress(path, course):
+    """Return the stress (k + 1,) [Pa] that a path records; NaN where it is not finite."""
     finite = np.isfinite(course.tau).all(axis=(1, 2))
     found = np.full(len(finite), np.nan)
     found[finite] = np.einsum("ij,kij->k", path.reads, course.tau[finite])

@@ -15,7 +15,7 @@ import numpy as np
 from ..body import Body
 from ..materials.learned.strain_range import excess, stored_bounds, strain_measures
 from ..monitor import CHECK
-from .bodies import gradients, learned
+from .bodies import body_maker, deformation_gradients
 
 MAX_EXCESS = 0.3        # runs of task (b) reach 0.2, those thrown twice as fast 0.8
 
@@ -44,7 +44,7 @@ class StrainReport(NamedTuple):
 def strain_report(body: Body, bounds):
     """Return the `StrainReport` of a body by bounds of `strain_range`."""
     with np.errstate(invalid="ignore", over="ignore"):
-        measures = strain_measures(gradients(body))
+        measures = strain_measures(deformation_gradients(body))
     out = excess(measures, bounds)
     p = int(np.argmax(out))
     return StrainReport(body.name, int(body.id[p]), tuple(measures[p].tolist()), float(out[p]),
@@ -82,7 +82,7 @@ class ComparisonWatch:
     """
 
     def __init__(self, laws, problem):
-        self.law, self.clock = learned(laws), problem.clock
+        self.law, self.clock = body_maker(laws), problem.clock
         self.bounds, self.silent = stored_bounds(laws.about, problem.dim), []
 
     def body(self, body):

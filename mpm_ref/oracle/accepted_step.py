@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..hot.methods import METHODS, Options
-from ..hot.multigrid.options import Choices
+from ..hot.methods import METHODS, SolverOptions
+from ..hot.multigrid.options import CycleOptions
 from . import sampled
 from .implicit_stages import after
 from .scales import size
@@ -36,9 +36,10 @@ def solve(stepper, bodies, dt, S_g, t):
     pose, accepted = accepted_by(stepper, bodies, (t, dt), options)
     report = stepper.report
     if not report.converged:
-        raise ValueError(f"the implicit step was not solved: {report.why}; take a smaller dt, "
+        raise ValueError(f"the implicit step was not solved: {report.message}; take a smaller dt, "
                          "another method, a larger eps, or more iterations")
-    tight = replace(options, eps=CLOSER * options.eps, cells=0.0, iterations=10_000)
+    tight = replace(options, eps=CLOSER * options.eps, displacement_tolerance=0.0,
+                    max_iterations=10_000)
     pose, dv = tightly(stepper, bodies, (t, dt), tight)
     second = tightly(stepper, bodies, (t, dt), other_method(options, tight.eps))[1]
     system = stepper.system(pose)
@@ -64,7 +65,7 @@ def tightly(stepper, bodies, when, options):
     found = accepted_by(stepper, bodies, when, options)
     if not stepper.report.converged:
         raise ValueError(f"{options.method} did not solve the step to {options.eps:.2g}, which the "
-                         f"oracle needs: {stepper.report.why}; record to a larger eps")
+                         f"oracle needs: {stepper.report.message}; record to a larger eps")
     return found
 
 
@@ -72,22 +73,22 @@ def accepted_by(stepper, bodies, when, options):
     """(`Pose` as its planes bear in the end, increment) that a method accepts."""
     before, stepper.options = stepper.options, options
     try:
-        pose = stepper.pose(bodies, *when)
+        pose = stepper.problem(bodies, *when)
         dv = stepper.solve(pose)
     finally:
         stepper.options = before
-    if pose.restraint is not None:
-        pose = pose._replace(unknowns=pose.restraint.applied(pose.unknowns))
+    if pose.active_set is not None:
+        pose = pose._replace(unknowns=pose.active_set.apply(pose.unknowns))
     return pose, dv
 
 
 def other_method(options, eps):
-    """`Options` of a method that is not akin to that of the options: Newton beside L-BFGS and ADMM,
+    """`SolverOptions` of an unrelated method: Newton beside L-BFGS and ADMM,
     L-BFGS beside Newton. The coarsest level is solved directly: CG bears no V-cycle that varies.
     """
     word = "hot" if options.descent == "newton" else "pn-mgpcg"
-    other = replace(METHODS[word], path=options.path, start=options.start,
-                    cycle=Choices(coarsest="direct"))
+    other = replace(METHODS[word], implementation=options.implementation, start=options.start,
+                    cycle=CycleOptions(coarsest="direct"))
     if options.norm == "L2":
         return replace(other, norm="L2", eps=eps)
     return replace(other, eps=eps)
@@ -116,4 +117,4 @@ def bars(problem, copies, pose, solved, dt):
 
 def options_of(problem):
     """The options of an implicit problem's solver."""
-    return Options() if problem.solver is None else problem.solver
+    return SolverOptions() if problem.solver is None else problem.solver

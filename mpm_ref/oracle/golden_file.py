@@ -150,7 +150,7 @@ def solver_attributes(options):
     named = {"search": options.search._asdict(), "cycle": options.cycle._asdict()}
     return {"integrator": "implicit", "options": json.dumps({**asdict(options), **named}),
             **{name: getattr(options, name)
-               for name in ("method", "eps", "cells", "norm", "start")}}
+               for name in ("method", "eps", "displacement_tolerance", "norm", "start")}}
 
 
 def put_body(group, body):

@@ -59,7 +59,7 @@ class Side:
 
     def __init__(self, problem, bodies, stepper, t, dt):
         self.problem, self.bodies, self.stepper = problem, bodies, stepper
-        self.pose = stepper.pose(bodies, t, dt)
+        self.pose = stepper.problem(bodies, t, dt)
         self.system = stepper.system(self.pose)
         self.A = self.system.matrix(self.system.start)
         self.g = self.system.evaluate(self.system.start)[1]
@@ -172,8 +172,8 @@ class Step:
 
     def by_the_other_side(self):
         """What the reversed run sees, on the other path of multigrid."""
-        side, path = self.mirrored, {"blocks": "scipy", "scipy": "blocks"}[self.options.path]
-        options = replace(self.options, path=path)
+        side, other = self.mirrored, {"blocks": "scipy", "scipy": "blocks"}
+        options = replace(self.options, implementation=other[self.options.implementation])
         grids = None if self.grids is None else side.grids(options)
         return turned(side.seen(self.fixed, grids, options))
 

@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..explicit import scatter
-from ..hot.linearization import by_matrix
-from ..hot.methods import made
+from ..hot.linearization import matrix_product
+from ..hot.methods import descent_method
 from ..hot.multigrid.blocks.transfer import prolong
 from ..hot.multigrid.hierarchy import hierarchy
-from ..hot.report import Watch
-from ..hot.step import put
+from ..hot.report import Profiler
+from ..hot.step import write_velocities
 from . import kernel_stages
 
 SEED = 20200
@@ -36,8 +36,8 @@ class Frozen:
 
     def __init__(self, system, A):
         self.A, self.start, self.index = A, system.start, system.index
-        self.kappa, self.n, self.free, self.matrices = (
-            system.kappa, system.n, system.free, system.matrices)
+        self.kappa, self.n, self.project, self.matrices = (
+            system.kappa, system.n, system.project, system.matrices)
 
     def matrix(self, dv):
         """A."""
@@ -45,7 +45,7 @@ class Frozen:
 
     def product(self, dv):
         """u -> A u."""
-        return by_matrix(self.A)
+        return matrix_product(self.A)
 
     def diagonal(self, dv):
         """Diagonal blocks of A."""
@@ -62,12 +62,12 @@ def draw(system, levels):
     speed = STRAIN * q.dx / system.potential.dt
     trial, probe, load = rng.uniform(-1.0, 1.0, (3, *q.v.shape))
     coarse = tuple(times(level.B, rng.uniform(-1.0, 1.0, level.index.shape)) for level in levels)
-    trial, probe = speed * system.free(trial), system.free(probe)
+    trial, probe = speed * system.project(trial), system.project(probe)
     for _ in range(HALVINGS):
         if np.isfinite(system.energy(system.start + trial)):
             break
         trial /= 2
-    load = q.m[:, None] * speed * system.free(load)
+    load = q.m[:, None] * speed * system.project(load)
     return Fixed(system.start + trial, probe, load, coarse)
 
 
@@ -78,7 +78,7 @@ def times(B, u):
 
 def grids_of(A, index, options):
     """The multigrid hierarchy of a matrix that the options describe."""
-    return hierarchy(A, index, options.levels, options.kernel, options.path,
+    return hierarchy(A, index, options.levels, options.kernel, options.implementation,
                      **options.cycle._asdict())
 
 
@@ -92,7 +92,7 @@ def prolonged(level, u):
 def direction(system, A, g, options):
     """The first direction at the start of a system, from its gradient and its matrix there."""
     frozen = Frozen(system, A)
-    return frozen.free(made(frozen, options, Watch()).direction(frozen.start, g))
+    return frozen.project(descent_method(frozen, options, Profiler()).direction(frozen.start, g))
 
 
 def at_particles(bodies, store, scheme):
@@ -130,7 +130,7 @@ def of_multigrid(grids, fixed):
     for k, u in enumerate(fixed.coarse, 1):
         fine, level = grids.levels[k - 1 : k + 1]
         seen[f"prolonged{k}"] = prolonged(fine, u)
-        seen[f"coarse{k}"] = by_matrix(level.A)(u)
+        seen[f"coarse{k}"] = matrix_product(level.A)(u)
         seen[f"nodes{k}"], seen[f"probe{k}"] = level.index, u
     return seen
 
@@ -139,7 +139,7 @@ def after(problem, bodies, pose, v, dt):
     """{key: array} of grid to particles and deformation, for the nodal velocities v (n, d); the
     bodies advance.
     """
-    put(pose.grid, pose.unknowns, v)
+    write_velocities(pose.grid, pose.unknowns, v)
     seen = {}
     for body in bodies:
         kernel_stages.advance(problem, body, pose.grid, dt, seen)

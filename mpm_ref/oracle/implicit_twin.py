@@ -89,7 +89,7 @@ class SolvedTwin(Twin):
         """E (1,) [J] and its gradient (n, d) on what is free [kg m/s]."""
         bodies = [(q, ip, self.box) for q, ip in zip(self.whole, self.clouds)]
         E, g = potential.evaluate(bodies, self.m, self.v, self.over(dv), self.dt, self.gravity)
-        return np.array([E]), self.free(self.nodal(g))
+        return np.array([E]), self.project(self.nodal(g))
 
     def free(self, u):
         """B u."""
@@ -106,13 +106,13 @@ class SolvedTwin(Twin):
 
     def product(self, ats, u):
         """B H B u (n, d) [kg m/s]."""
-        u = self.over(self.free(u))
+        u = self.over(self.project(u))
         total = self.m[..., None] * u
         for q, ip, at in zip(self.whole, self.clouds, ats):
             dF = np.einsum("pab,pbc->pac", transfer.velocity_gradient(u, ip, self.box), at.F_n)
             T = np.einsum("pab,pcb->pac", differential.applied(at.modes, dF), at.F_n)
             total -= self.dt**2 * transfer.internal_force(q.V0, T, ip, self.box)
-        return self.free(self.nodal(total))
+        return self.project(self.nodal(total))
 
     def moved(self, v):
         """`plain.step.Step` of particles and deformation under the nodal velocities v (n, d)."""

@@ -21,8 +21,8 @@ hold as much energy. It is an assumption, and each file tests it on two methods:
 import numpy as np
 import scipy.sparse as sp
 
-from ..hot.krylov import Rule, pcg
-from ..hot.linearization import by_matrix
+from ..hot.krylov import CGOptions, pcg
+from ..hot.linearization import matrix_product
 from ..hot.multigrid.hierarchy import hierarchy
 from ..hot.multigrid.projectors import diagonal_blocks
 from .scales import size
@@ -59,7 +59,7 @@ def scale(solve, system, A, b, S_b):
     rng, here = np.random.default_rng(0), solve(A, b)
     changes = []
     for _ in range(MOVES):
-        nudge = MOVE * S_b[:, None] * system.free(rng.normal(size=b.shape))
+        nudge = MOVE * S_b[:, None] * system.project(rng.normal(size=b.shape))
         there = solve(moved_matrix(A, system.unknowns.B, rng), b + nudge)
         changes.append(size(there - here) / MOVE)
     return size(here) + spread_of(changes)
@@ -68,14 +68,14 @@ def scale(solve, system, A, b, S_b):
 def solver(A, index, levels=3):
     """b -> A^+ b by CG with the V-cycle, for many right-hand sides."""
     cycle = hierarchy(A, index, levels, coarsest="direct").cycle
-    rule = Rule(lambda size: TIGHT)
-    return lambda b: pcg(by_matrix(A), b, cycle, rule).x
+    rule = CGOptions(lambda size: TIGHT)
+    return lambda b: pcg(matrix_product(A), b, cycle, rule).x
 
 
 def increments(system, A, weight, seed):
     """SAMPLES random increments (n, d) [m/s]: A^+ of gradients with the sizes weight (n,)."""
     rng, solve = np.random.default_rng(seed), solver(A, system.index)
-    return [solve(system.free(weight[:, None] * rng.normal(size=system.start.shape)))
+    return [solve(system.project(weight[:, None] * rng.normal(size=system.start.shape)))
             for _ in range(SAMPLES)]
 
 

@@ -284,19 +284,19 @@ class Scheme(Record):
 
 
 class Solver(Record):
-    """How an implicit step is solved; as `hot.methods.Options`, the method's where not given."""
+    """Options of implicit steps; those not given are the method's, see `hot.methods`."""
 
     eps: Positive | None = None                 # tolerance of the scaled gradient
-    cells: NotNegative | None = None            # error of displacement to hold [dx]
+    displacement_tolerance: NotNegative | None = None       # error of a step [dx]
     start: Literal["zero", "gravity"] | None = None
     window: Natural | None = None               # pairs of L-BFGS
-    rebuild: Natural | None = None              # steps between Hessians of L-BFGS
-    renew: Literal["never", "shortened", "stale"] | None = None      # Hessian of L-BFGS
-    iterations: Count | None = None             # at most
-    cg_iterations: Count | None = None          # of a linear solve, at most
-    flexible: bool | None = None                # CG that bears a preconditioner that varies
+    rebuild_every: Natural | None = None        # steps between Hessians of L-BFGS
+    rebuild_when: Literal["never", "shortened", "stale"] | None = None
+    max_iterations: Count | None = None
+    max_cg_iterations: Count | None = None      # of a linear solve
+    flexible: bool | None = None                # CG for a preconditioner that varies
     levels: Count | None = None                 # of multigrid
-    path: Literal["blocks", "scipy"] | None = None
+    implementation: Literal["blocks", "scipy"] | None = None
 
     def given(self):
         """The keys that are given, as a dictionary."""

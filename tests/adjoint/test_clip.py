@@ -61,11 +61,11 @@ def test_gradients_are_those_of_bodies_apart(place, rng):
     before = before._replace(tau=q.tau[None].copy())
     tape = Tape(stepper, problem.bodies, clip=problem.clip)
     tape.step(0.0, DT)
-    after = batched_step.advance(of, before, batched_step.nodes(of, 1))
+    after = batched_step.advance(of, before, batched_step.make_nodes(of, 1))
     assert ((q.x == problem.clip[0]) | (q.x == problem.clip[1])).any()
     assert q.x == pytest.approx(after.x[0], abs=1e-14)
     bars = random_like(after, rng)
-    expected = batched_step.pull_back(of, before, after, bars, batched_step.nodes(of, 1))
+    expected = batched_step.pull_back(of, before, after, bars, batched_step.make_nodes(of, 1))
     found, = tape.gradient({1: [Seed(*(a[0] for a in bars[:4]))]}).bodies
     for name in "xvC":
         a, b = getattr(found, name), getattr(expected, name)[0]

@@ -18,15 +18,17 @@ def implicit(tmp_path, solver=""):
     return path
 
 
-@pytest.mark.parametrize(("solver", "said", "cells"), [
+@pytest.mark.parametrize(("solver", "said", "tolerance"), [
     ("", "implicit: hot, eps 1e-07\n", 0.0),
-    ("solver = { cells = 1e-3 }\n", "implicit: hot, eps 1e-07, to hold 0.001 dx\n", 1e-3),
+    ("solver = { displacement_tolerance = 1e-3 }\n",
+     "implicit: hot, eps 1e-07, displacements to 0.001 dx\n", 1e-3),
 ])
-def test_info_names_the_method_and_its_tolerances(tmp_path, solver, said, cells):
+def test_info_names_the_method_and_its_tolerances(tmp_path, solver, said, tolerance):
     scene = implicit(tmp_path, solver)
     assert said in mpm_ref("info", scene).stdout
     facts = json.loads(mpm_ref("info", scene, "--json").stdout)
-    assert facts["solver"] == {"method": "hot", "eps": 1e-7, "cells": cells}
+    assert facts["solver"] == {"method": "hot", "eps": 1e-7,
+                               "displacement_tolerance": tolerance}
 
 
 def test_run_and_what_it_leaves(tmp_path):
@@ -38,7 +40,7 @@ def test_run_and_what_it_leaves(tmp_path):
 
 
 ALLOWED = """unstable = "allow"
-solver = {{ iterations = {iterations} }}
+solver = {{ max_iterations = {iterations} }}
 walls = {{ low = ["open", 3] }}
 """
 

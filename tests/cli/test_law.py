@@ -11,12 +11,13 @@ torch = pytest.importorskip("torch")
 from mpm_ref.cli import law_train  # noqa: E402
 from mpm_ref.materials.learned import weights  # noqa: E402
 from mpm_ref.materials.learned.strain_range import strain_bounds  # noqa: E402
-from mpm_ref.nclaw.batched_step import world  # noqa: E402
-from mpm_ref.nclaw.study import tables  # noqa: E402
+from mpm_ref.nclaw.batched_step import make_world  # noqa: E402
+from mpm_ref.nclaw.study import study as law_study  # noqa: E402
 from mpm_ref.nclaw.study.study import load  # noqa: E402
-from mpm_ref.nclaw.train import fit, methods  # noqa: E402
+from mpm_ref.nclaw.train import fit, session  # noqa: E402
+from mpm_ref.nclaw.train import train as law_trainer  # noqa: E402
 from mpm_ref.nclaw.train.labeled import labels_of, train_labeled  # noqa: E402
-from mpm_ref.nclaw.train.rollout import trajectory_of  # noqa: E402
+from mpm_ref.nclaw.train.observations import trajectory_of  # noqa: E402
 from mpm_ref.scene import digest  # noqa: E402
 from mpm_ref.store.running import Options, checkpoint_of, run  # noqa: E402
 from mpm_ref.store.writer import Fields  # noqa: E402
@@ -49,20 +50,20 @@ def made(tmp_path_factory):
 # What is learned.
 
 def test_methods_are_those_that_are_learned():
-    assert set(tables.KINDS) == {*methods.METHODS, methods.SYS_ID}
-    assert tables.SYS_ID == methods.SYS_ID
-    assert set(law_train.OF_ERRORS) == {methods.LABELED}
+    assert set(law_study.METHOD_KINDS) == {*law_trainer.METHODS, law_trainer.SYS_ID}
+    assert law_study.SYS_ID == law_trainer.SYS_ID
+    assert set(law_train.OF_ERRORS) == {law_trainer.LABELED}
 
 
 def test_weights_are_those_of_the_training_by_hand(made):
     study = load(made / "cubes.toml")
-    laws = methods.laws_of("ours", 0, *study.tables.records)
+    laws = law_trainer.drawn_laws("ours", 0, *study.tables.records)
     data = trajectory_of(observed(study.problem()))
-    session = fit.train(study.tables.train, laws, world(study.problem()), data)
+    session = fit.train(study.tables.train, laws, make_world(study.problem()), data)
     found = weights.load(made / "whole.npz")
     assert found.about["errors"] == [epoch.error for epoch in session.history]
     for own, law in zip(found[:2], laws, strict=True):
-        for (W, b), (V, c) in zip(own.layers, methods.trained_of(law).layers, strict=True):
+        for (W, b), (V, c) in zip(own.layers, law.weights().layers, strict=True):
             assert np.array_equal(W, V)
             assert np.array_equal(b, c)
 
@@ -105,8 +106,8 @@ def test_labeled_laws_are_trained_on_answers(tmp_path):
     study = load(write_study(tmp_path, ("[train]", 'method = "labeled"\n[train]'), scene=[FLOWING]))
     problem, data = study.problem(), trajectory_of(observed(study.problem()))
     labels = labels_of(data, problem.bodies[0].law, problem.clock.dt)
-    laws = methods.laws_of("labeled", 0, *study.tables.records)
-    session = train_labeled(study.tables.train, laws, world(problem), labels)
+    laws = law_trainer.drawn_laws("labeled", 0, *study.tables.records)
+    session = train_labeled(study.tables.train, laws, make_world(problem), labels)
     done = train(study.path, tmp_path / "laws.npz")
     errors = weights.load(tmp_path / "laws.npz").about["errors"]
     assert done.stdout.endswith("labeled, 4 epochs on 20 steps of 27 points; squared error of F "
@@ -198,7 +199,7 @@ def test_a_checkpoint_that_cannot_be_written_is_told(made, tmp_path, monkeypatch
         raise OSError(f"{path} could not be written: no space left; is the disk full?")
 
     monkeypatch.setattr(fit, "SAVE", 2)
-    monkeypatch.setattr(fit.checkpoints, "write", full)
+    monkeypatch.setattr(session.weights_file, "write_sealed", full)
     assert_told(train(made / "cubes.toml", tmp_path / "laws.npz"), 4, "laws.pt could not be writ")
     assert list(tmp_path.iterdir()) == []
 
@@ -235,7 +236,7 @@ def test_a_run_that_was_cut_off_goes_on(made, tmp_path):
 
 
 def test_ctrl_c_in_the_run_says_how_far_it_is(made, tmp_path, monkeypatch):
-    monkeypatch.setattr(law_train.trajectory, "make", lambda path, problem, watch: 7)
+    monkeypatch.setattr(law_train.training, "make_run", lambda path, problem, watch: 7)
     done = train(made / "cubes.toml", tmp_path / "laws.npz", "--data", tmp_path / "run.h5")
     assert_told(done, 130, f"interrupted at step 7 of {STEPS} of the run to learn from")
 

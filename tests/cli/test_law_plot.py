@@ -17,8 +17,7 @@ from mpm_ref.materials.learned.response import Correction
 from mpm_ref.materials.learned.strain_range import strain_bounds, within_bounds
 from mpm_ref.materials.learned.weights import LawWeights
 from mpm_ref.nclaw import paths
-from mpm_ref.nclaw.study import pictures
-from mpm_ref.nclaw.study.curves import curves
+from mpm_ref.nclaw.study import curves
 
 mpl.use("Agg")
 
@@ -100,8 +99,8 @@ def test_a_return_map_acts_once_a_step():
     flow = learned_flow(LawWeights(((W, b),), Correction(alpha)))
     law = learned_law(identified().elastic)
     for steps in (3, 6):
-        still = paths.path("still", paths.kinds(3)["shear"], (0.0, 0.0), steps)
-        found = paths.course(law, flow, still, DT)
+        still = paths.path("still", paths.path_families(3)["shear"], (0.0, 0.0), steps)
+        found = paths.path_response(law, flow, still, DT)
         assert found.F[-1] == pytest.approx(np.diag([1.0 + steps * alpha, 1.0, 1.0]), abs=1e-14)
         assert found.tau[0] == pytest.approx(np.zeros((3, 3)), abs=1e-9)
         assert found.tau[-1, 0, 0] > 2.0 * MU * steps * alpha
@@ -110,14 +109,15 @@ def test_a_return_map_acts_once_a_step():
 def test_fluids_carry_j_alone():
     """tau = lam J (J - 1) I; a shear changes nothing, and what carries F gives the same."""
     law = make_law("fluid", lam=1e5)
-    rows = curves((law, NO_FLOW), (law, FluidProjection()), paths.monotone(3, 0.1, 5), DT)
+    rows = curves.compare_curves((law, NO_FLOW), (law, FluidProjection()),
+                                 paths.monotone(3, 0.1, 5), DT)
     for row in rows:
         assert row.learned == pytest.approx(row.truth, abs=1e-7)
     shear, swollen = rows[2], rows[3]
     assert shear.truth == pytest.approx(np.zeros(6), abs=1e-9)
     assert isnan(shear.off)
     assert swollen.truth[-1] == pytest.approx(1e5 * 1.1**3 * (1.1**3 - 1.0))
-    end = paths.course(law, NO_FLOW, swollen.path, DT)
+    end = paths.path_response(law, NO_FLOW, swollen.path, DT)
     assert end.F[-1] == pytest.approx(1.1 * np.eye(3))
     assert end.tau[-1] == pytest.approx(swollen.truth[-1] * np.eye(3))
 
@@ -162,7 +162,7 @@ def lines_of(monkeypatch, folder, laws, **how):
     assert plot(folder, laws, **how).exit_code == 0
     figure = shown[0]
     drawn = {axes.get_title(): [(line.get_linestyle(), line.get_xdata()[np.isfinite(
-        line.get_ydata())]) for line in axes.lines if line.get_color() == pictures.LEARNED]
+        line.get_ydata())]) for line in axes.lines if line.get_color() == curves.LEARNED]
         for axes in figure.axes}
     return drawn, [text.get_text() for text in figure.legends[0].get_texts()], figure
 

@@ -6,7 +6,7 @@ from small_laws import DT, E, write_study
 
 from mpm_ref.cli.catalogue import shipped_scenes, shipped_studies
 from mpm_ref.materials.learned.table import KINDS
-from mpm_ref.nclaw.study import tables
+from mpm_ref.nclaw.study import study as law_study
 from mpm_ref.nclaw.study.study import load
 from mpm_ref.nclaw.train.recipe import Recipe
 
@@ -29,10 +29,10 @@ def test_shipped_studies_load():
     assert found["law_jelly_small"].scene.steps == 300
 
 
-@pytest.mark.parametrize("method", tables.KINDS)
+@pytest.mark.parametrize("method", law_study.METHOD_KINDS)
 def test_each_method_has_usual_kinds(tmp_path, method):
     study = load(write_study(tmp_path, of_method(method)))
-    kinds = tables.KINDS[method]
+    kinds = law_study.METHOD_KINDS[method]
     assert [type(record).__name__ for record in study.tables.records] == [
         known[0] for known in kinds]
     assert {name for known in kinds for name in known} <= set(KINDS)

@@ -13,11 +13,11 @@ from mpm_ref.materials import Fluid, NoFlow
 from mpm_ref.nclaw.gnn.simulator import Simulator
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
+from validation.common.scenes import with_
 from validation.common.weights_needed import Untrained
 from validation.nclaw import other_bodies, states
-from validation.nclaw.evaluate import fresh
+from validation.nclaw.evaluate import body_with_laws
 from validation.nclaw.tasks import reconstruction
-from validation.verification.scenes import with_
 
 mpl.use("Agg")
 
@@ -32,7 +32,7 @@ def short(monkeypatch):
         monkeypatch.setattr(states, name, scene)
     monkeypatch.setattr(states, "SHOTS", (0, 5, 10))
     monkeypatch.setattr(states, "trained", lambda name: name)
-    monkeypatch.setattr(states, "learned", lambda laws: lambda body: fresh(
+    monkeypatch.setattr(states, "body_maker", lambda laws: lambda body: body_with_laws(
         body, Fluid(1e15 if laws == "sand" else 0.0), NoFlow()))
 
 
@@ -95,7 +95,7 @@ def test_a_graph_network_runs_through_all_its_frames(monkeypatch):
     monkeypatch.setattr(states, "frames", frames)
     simulator = Simulator(*[None] * len(Simulator._fields))
     assert states.ends(scene, simulator)[:, 0, 0].tolist() == [0.0, 4.0]
-    assert states.ends(scene, states.own)[:, 0, 0].tolist() == [0.0, 1.0]
+    assert states.ends(scene, states.copy_body)[:, 0, 0].tolist() == [0.0, 1.0]
     assert asked == [5, 20]
 
 
@@ -108,8 +108,8 @@ def test_runs_beside_the_truth_are_drawn_as_far_as_trained(tmp_path, short, monk
     monkeypatch.setattr(other_bodies, "contact", lambda: water)
     monkeypatch.setattr(other_bodies, "large", lambda: with_(reconstruction("sand"), steps=10))
     monkeypatch.setattr(other_bodies, "trained", lambda name: name)
-    monkeypatch.setattr(other_bodies, "learned", lambda name: other_bodies.own if name == "water"
-                        else untrained_yet(name))
+    monkeypatch.setattr(other_bodies, "body_maker", lambda name: other_bodies.copy_body
+                        if name == "water" else untrained_yet(name))
     results = done(tmp_path, other_bodies.many)
     assert results.value("nclaw.fig3", "nclaw.fig3.toys.ours") == 0.0
     assert "no weights sand" in str(results.records("nclaw.fig3"))
@@ -119,7 +119,7 @@ def test_runs_beside_the_truth_are_drawn_as_far_as_trained(tmp_path, short, monk
 
 def test_states_of_a_run_that_breaks_down_are_missing():
     scene = with_(reconstruction("water"), steps=100, every=5)
-    x = states.shots(scene, lambda body: fresh(body, Fluid(1e15), NoFlow()))
+    x = states.shots(scene, lambda body: body_with_laws(body, Fluid(1e15), NoFlow()))
     assert x.shape == (21, 1000, 3)
     assert np.isfinite(x[0]).all()
     assert np.isnan(x[-1]).all()
@@ -155,8 +155,9 @@ def test_bodies_of_task_c_are_run_with_baselines(tmp_path, monkeypatch):
     monkeypatch.setattr(other_bodies, "geometry",
                         lambda name: with_(reconstruction(name), steps=20))
     monkeypatch.setattr(other_bodies, "trained", lambda name: name)
-    monkeypatch.setattr(other_bodies, "learned", lambda name: other_bodies.own if name == "water"
-                        else lambda body: fresh(body, Fluid(0.0), NoFlow()))
+    monkeypatch.setattr(other_bodies, "body_maker", lambda name: other_bodies.copy_body
+                        if name == "water" else
+                        lambda body: body_with_laws(body, Fluid(0.0), NoFlow()))
     results = done(tmp_path, other_bodies.bodies)
     found = {r.target: r for r in results.records("nclaw.fig7")}
     assert found["nclaw.fig7.water.ours"].value == 0.0

@@ -14,7 +14,7 @@ from validation.common.run import RunSetting, run_all
 from validation.ldm.published_bodies import keep
 from validation.nclaw import other_bodies, slope
 from validation.nclaw.environments import ENVIRONMENTS, environment
-from validation.nclaw.evaluate import fresh
+from validation.nclaw.evaluate import body_with_laws
 from validation.nclaw.tasks import reconstruction
 
 mpl.use("Agg")
@@ -46,9 +46,9 @@ def test_the_slope_is_run_with_true_laws_ours_and_admissible_ones(tmp_path, monk
     monkeypatch.setattr(slope, "FEW", 60)
     monkeypatch.setattr(slope, "SHORT", 20)
     monkeypatch.setattr(other_bodies, "trained", lambda name: name)
-    monkeypatch.setattr(other_bodies, "learned", lambda name: other_bodies.own
+    monkeypatch.setattr(other_bodies, "body_maker", lambda name: other_bodies.copy_body
                         if name == "water-admissible"
-                        else lambda body: fresh(body, Fluid(0.0), NoFlow()))
+                        else lambda body: body_with_laws(body, Fluid(0.0), NoFlow()))
     assert run_all([slope.inclined.experiment], RunSetting("quick", tmp_path)) == []
     results = ProfileResults(tmp_path)
     found = {r.target: r for r in results.records("nclaw.slope")}

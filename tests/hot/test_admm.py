@@ -12,12 +12,12 @@ from scipy.optimize import minimize
 from mpm_ref.core.law import pk1, psi
 from mpm_ref.core.spectral import svd
 from mpm_ref.core.tensor import mat
-from mpm_ref.hot.admm import ADMM, Splitting, isotropic, prox, residual
-from mpm_ref.hot.line_search import Point
+from mpm_ref.hot.admm import ADMM, Splitting, isotropic_modes, prox, residual
+from mpm_ref.hot.line_search import Iterate
 from mpm_ref.hot.methods import minimise
 from mpm_ref.hot.norms import rest_stiffness
 from mpm_ref.hot.potential import Tangent
-from mpm_ref.hot.report import Watch
+from mpm_ref.hot.report import Profiler
 from mpm_ref.hot.system import System
 
 
@@ -81,7 +81,7 @@ def test_matrix_is_the_hessian_of_the_penalty(case):
     split = Splitting(q, problem.dv, 1.7)
     K = split.matrix()
     assert np.array_equal(K.toarray(), K.toarray().T)
-    free = Tangent(q, tuple(isotropic(s, q.dt**2 * k) for s, k in zip(q.sites, split.k)))
+    free = Tangent(q, tuple(isotropic_modes(s, q.dt**2 * k) for s, k in zip(q.points, split.k)))
     assert np.abs(K @ u - free.product(u)).max() < 1e-12 * np.abs(K @ u).max()
     assert split.k == tuple(1.7 * penalty(body.law, case.d) for body in problem.bodies)
 
@@ -95,11 +95,11 @@ def test_gradient_of_the_lagrangian_changes_by_the_matrix(case):
     before, missed = split.local_step(dv)
     assert missed == 0
     Y = [y.copy() for y in split.Y]
-    q.spread(q.unknowns.v + dv + u)
-    F = [s.F + q.dt * s.T @ s.F for s in q.sites]
-    for s, k, f, y in zip(q.sites, split.k, F, Y):
+    q.gather_gradients(q.unknowns.v + dv + u)
+    F = [s.F + q.dt * s.T @ s.F for s in q.points]
+    for s, k, f, y in zip(q.points, split.k, F, Y):
         s.T[:] = q.dt * (s.V0 * k)[:, None, None] * (f + y) @ s.F.transpose(0, 2, 1)
-    after = q.collect() + q.unknowns.m[:, None] * (dv + u) - q.dt * q.weight
+    after = q.scatter_forces() + q.unknowns.m[:, None] * (dv + u) - q.dt * q.weight
     assert np.abs(after - before - split.matrix() @ u).max() < 1e-10 * np.abs(after).max()
 
 
@@ -109,7 +109,7 @@ def test_gradient_of_the_lagrangian_changes_by_the_matrix(case):
 def step(d):
     """A system of two blocks, held on one side, on a floor askew; and its minimiser."""
     pose = pose_of(d)
-    system = System(pose.potential, pose.unknowns, pose.kappa, pose.unknowns.dv0, pose.geometric)
+    system = System(pose.potential, pose.unknowns, pose.kappa, pose.unknowns.dv0, pose.coarse_grids)
     return system, minimise(system, "pn-pcg", eps=1e-12)
 
 
@@ -124,10 +124,10 @@ def test_finds_the_minimiser_of_a_step(d):
     system, answer = step(d)
     solution = minimise(system, "admm", eps=1e-11)
     assert answer.report.converged
-    assert solution.report.converged, solution.report.why
+    assert solution.report.converged, solution.report.message
     assert solution.E == pytest.approx(answer.E, rel=1e-12)
     assert apart(system, solution.dv, answer.dv) < 1e-6
-    free = system.free(solution.dv - system.start)
+    free = system.project(solution.dv - system.start)
     assert np.abs(free - (solution.dv - system.start)).max() < 1e-12
     assert solution.report.residuals[-1] <= 1e-11
 
@@ -144,12 +144,12 @@ def test_many_iterations_at_a_linear_rate():
 
 def test_multipliers_become_the_stress():
     system, _ = step(2)
-    admm, now = ADMM(system, 1.0, 1000, Watch()), Point(system.start, 0.0, system.start)
+    admm, now = ADMM(system, 1.0, 1000, Profiler()), Iterate(system.start, 0.0, system.start)
     for _ in range(150):
         now, _ = admm.advance(now)
     q = system.potential
-    q.spread(q.unknowns.v + now.dv)
-    for body, s, k, Y in zip(q.bodies, q.sites, admm.splitting.k, admm.splitting.Y):
+    q.gather_gradients(q.unknowns.v + now.dv)
+    for body, s, k, Y in zip(q.bodies, q.points, admm.splitting.k, admm.splitting.Y):
         F = s.F + q.dt * s.T @ s.F
         P = np.array([pk1(mat(F, p, (0, 1)), body.law) for p in range(len(F))])
         assert np.abs(k * (F + Y) - P).max() < 1e-6 * np.abs(P).max()
@@ -165,12 +165,12 @@ def test_same_minimiser_for_any_penalty():
 
 def test_capped_solves_are_reported():
     system, _ = step(2)
-    report = minimise(system, "admm", iterations=3).report
+    report = minimise(system, "admm", max_iterations=3).report
     assert not report.converged
-    assert "3 iterations, the cap" in report.why
-    assert (report.builds, report.iterations, report.evaluations) == (1, 3, 4)
-    assert report.capped == 0
-    assert minimise(system, "admm", iterations=3, cg_iterations=1).report.capped == 3
+    assert "3 iterations, the cap" in report.message
+    assert (report.hessians, report.iterations, report.evaluations) == (1, 3, 4)
+    assert report.capped_solves == 0
+    assert minimise(system, "admm", max_iterations=3, max_cg_iterations=1).report.capped_solves == 3
     assert {"local", "krylov", "evaluate", "assembly"} <= set(report.seconds)
 
 
@@ -180,5 +180,5 @@ def test_small_penalty_on_a_law_that_is_not_convex_may_cycle_and_says_so():
     system = System(problem.potential, q, np.ones(len(q.m)), q.dv0)
     report = minimise(system, "admm", penalty=0.3).report
     assert not report.converged
-    assert "neither energy nor gradient fell in 50 iterations" in report.why
+    assert "neither energy nor gradient fell in 50 iterations" in report.message
     assert minimise(system, "admm", penalty=4.0).report.converged

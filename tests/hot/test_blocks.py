@@ -9,7 +9,7 @@ from multigrid_matrices import case
 from mpm_ref.core.jit import set_threads
 from mpm_ref.hot.multigrid import blocks
 from mpm_ref.hot.multigrid.blocks.product import planes_of, product
-from mpm_ref.hot.multigrid.blocks.sparse import blocks_of, diagonal, inverse_blocks, reach_of
+from mpm_ref.hot.multigrid.blocks.sparse import blocks_of, coupling_radius, diagonal, inverse_blocks
 from mpm_ref.hot.multigrid.blocks.sweep import Sweep, correct, residual, split, sweep
 from mpm_ref.hot.multigrid.hierarchy import hierarchy
 from mpm_ref.hot.multigrid.projectors import diagonal_blocks, inverses, onto_range
@@ -37,7 +37,7 @@ def test_products_diagonals_and_inverses(c, rng):
     B = onto_range(D)
     close(B, c.B)
     close(inverse_blocks(D, B), inverses(D, B))
-    assert reach_of(A, c.index) == 2
+    assert coupling_radius(A, c.index) == 2
 
 
 def test_sweeps_keep_their_products(c, rng):                           # HOT-smoother
@@ -64,8 +64,8 @@ def test_sweeps_keep_their_products(c, rng):                           # HOT-smo
     {"kernel": "quadratic"}, {"levels": 1}, {"levels": 5}], ids=str)
 def test_the_paths_are_twins(c, choices, rng):
     b = rng.standard_normal(c.index.shape)
-    slow = hierarchy(c.A, c.index, path="scipy", **choices)
-    fast = hierarchy(c.A, c.index, path="blocks", **choices)
+    slow = hierarchy(c.A, c.index, implementation="scipy", **choices)
+    fast = hierarchy(c.A, c.index, implementation="blocks", **choices)
     for ours, theirs in zip(fast.levels, slow.levels, strict=True):
         np.testing.assert_array_equal(ours.index, theirs.index)
         close(ours.A.toarray(), theirs.A.toarray())
@@ -79,7 +79,7 @@ def test_the_paths_are_twins_in_single_precision(c, smoother, rng):
     b = rng.standard_normal(c.index.shape)
     words = {"smoother": smoother, "coarsest": "direct"}
     slow, fast, double = (
-        hierarchy(c.A, c.index, path=path, precision=precision, **words).cycle(b)
+        hierarchy(c.A, c.index, implementation=path, precision=precision, **words).cycle(b)
         for path, precision in (("scipy", "single"), ("blocks", "single"), ("blocks", "double")))
     close(fast, slow, 1e-6)              # sweeps know the diagonal blocks in double, SciPy's do not
     close(fast, double, 1e-5)
@@ -87,7 +87,7 @@ def test_the_paths_are_twins_in_single_precision(c, smoother, rng):
 
 
 @pytest.mark.parametrize("power", [0, 2])
-def test_matrices_of_another_reach(c, power):
+def test_matrices_of_another_radius(c, power):
     A = sp.csr_array(c.A)
     if power == 0:
         d = c.index.shape[1]
@@ -101,8 +101,9 @@ def test_matrices_of_another_reach(c, power):
         A = A @ A
     A = sp.bsr_array(A, blocksize=c.A.blocksize)
     A.sort_indices()
-    slow, fast = (hierarchy(A, c.index, 3, path=path).levels for path in ("scipy", "blocks"))
-    assert fast[0].reach == (1 if power == 0 else 4)
+    slow, fast = (hierarchy(A, c.index, 3, implementation=word).levels
+                  for word in ("scipy", "blocks"))
+    assert fast[0].radius == (1 if power == 0 else 4)
     for ours, theirs in zip(fast, slow, strict=True):
         close(ours.A.toarray(), theirs.A.toarray())
 

@@ -12,7 +12,7 @@ from mpm_ref.hot.multigrid.projectors import diagonal_blocks
 def test_blocks_are_those_of_the_matrix(case):
     q = problem_of(case)
     tangent = q.potential.tangent(q.dv)
-    D = diagonal(tuple(zip(q.potential.sites, tangent.modes)), q.unknowns, q.potential.stencil)
+    D = diagonal(tuple(zip(q.potential.points, tangent.modes)), q.unknowns, q.potential.stencil)
     expected = diagonal_blocks(tangent.matrix())
     size = np.abs(expected).max(axis=(1, 2), keepdims=True)
     assert np.abs((D - expected) / size).max() < 1e-12

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from hot_toys import DESCENTS, Exact, bar, exactly, quadratic, scalar, tight
 
-from mpm_ref.hot.descent import Stop, descend
+from mpm_ref.hot.descent import StoppingRule, descend
 from mpm_ref.hot.lbfgs import LBFGS
-from mpm_ref.hot.line_search import Point, Rules, search
-from mpm_ref.hot.linearization import Linear
-from mpm_ref.hot.methods import METHODS, WORDS, Options, minimise, options_of
+from mpm_ref.hot.line_search import Iterate, LineSearchOptions, search
+from mpm_ref.hot.linearization import Linearization
+from mpm_ref.hot.methods import CHOICES, METHODS, SolverOptions, minimise, options_of
 from mpm_ref.hot.norms import scaled_norm
-from mpm_ref.hot.report import Watch
+from mpm_ref.hot.report import Profiler
 
 
 @pytest.fixture(autouse=True)
@@ -25,10 +25,10 @@ def hierarchies(monkeypatch):
 @pytest.mark.parametrize("word", DESCENTS)
 def test_capped_solve_says_so_and_returns_the_smallest_gradient(word):
     toy = bar()
-    solution = minimise(toy, word, iterations=3)
+    solution = minimise(toy, word, max_iterations=3)
     report = solution.report
     assert not report.converged
-    assert "3 iterations, the cap" in report.why
+    assert "3 iterations, the cap" in report.message
     assert report.iterations == 3
     at_end = scaled_norm(toy.evaluate(solution.dv)[1], toy.kappa)
     if METHODS[word].norm == "characteristic":
@@ -55,8 +55,8 @@ def test_no_node_at_all_is_solved_at_once(word):
 
 def test_step_to_a_gradient_without_value_is_refused():
     toy = scalar(lambda x: -x, lambda x: -1.0 if x < 1.0 else np.nan, lambda x: 1e-3)
-    now = Point(toy.start, *toy.evaluate(toy.start))
-    found = search(toy, now, np.array([[3.0]]), Rules())
+    now = Iterate(toy.start, *toy.evaluate(toy.start))
+    found = search(toy, now, np.array([[3.0]]), LineSearchOptions())
     assert found.backtracks == 2
     assert found.point.dv[0, 0] == 0.75
 
@@ -67,7 +67,7 @@ def test_start_without_energy_is_reported(word, bad):
     toy = scalar(lambda x: bad, lambda x: 1.0, lambda x: 1.0)
     report = minimise(toy, word).report
     assert not report.converged
-    assert "expected finite values" in report.why
+    assert "expected finite values" in report.message
     assert report.iterations == 0
 
 
@@ -76,7 +76,7 @@ def test_matrix_without_value_is_reported(word):
     toy = scalar(lambda x: x, lambda x: 1.0, lambda x: np.nan)
     report = minimise(toy, word).report
     assert not report.converged
-    assert "direction is not finite" in report.why
+    assert "direction is not finite" in report.message
 
 
 @pytest.mark.parametrize("word", DESCENTS)
@@ -84,7 +84,7 @@ def test_uphill_direction_is_reported_and_not_taken(word):
     toy = scalar(lambda x: np.cos(x), lambda x: -np.sin(x), lambda x: -np.cos(x), start=0.5)
     solution = minimise(toy, word)          # concave: minus the gradient over H climbs
     assert not solution.report.converged
-    assert "not a descent direction: g . p = " in solution.report.why
+    assert "not a descent direction: g . p = " in solution.report.message
     assert solution.dv[0, 0] == 0.5
     assert solution.report.iterations == 0
 
@@ -100,28 +100,30 @@ def test_lbfgs_starts_afresh_when_what_it_learnt_points_uphill():
         def ages(r):
             trust[-1] += 1
             return -inverse(r) if len(trust) == 1 and trust[-1] > 2 else inverse(r)
-        return Linear(None, ages)
+        return Linearization(None, ages)
 
-    watch = Watch()
-    _, why = descend(toy, LBFGS(build, 8, 0), Stop(1e-9, "characteristic", 100, 50), Rules(), watch)
+    profiler = Profiler()
+    _, why = descend(toy, LBFGS(build, 8, 0),
+                     StoppingRule(1e-9, "characteristic", 100, 50), LineSearchOptions(), profiler)
     assert why is None
-    assert watch.refreshes == 1
+    assert profiler.restarts == 1
     assert len(trust) == 2
 
 
 @pytest.mark.parametrize(("rules", "refused", "said"), [
-    (Rules(cap=7), 8, "cap"), (Rules(floor=1e-2), 7, "floor"), (Rules(shrink=0.1), 11, "floor")])
+    (LineSearchOptions(cap=7), 8, "cap"), (LineSearchOptions(floor=1e-2), 7, "floor"),
+    (LineSearchOptions(shrink=0.1), 11, "floor")])
 def test_line_search_is_bounded(rules, refused, said):
     toy = scalar(lambda x: abs(x), lambda x: -1.0, lambda x: 1.0)       # the gradient lies
-    now = Point(toy.start, *toy.evaluate(toy.start))
+    now = Iterate(toy.start, *toy.evaluate(toy.start))
     found = search(toy, now, np.ones((1, 1)), rules)
     assert found.point is None
     assert found.backtracks == refused
-    assert f"refused {refused} steps, down to its {said}" in found.why
+    assert f"refused {refused} steps, down to its {said}" in found.message
     report = minimise(toy, "hot", search=rules).report
     assert not report.converged
     assert report.backtracks == refused
-    assert found.why == report.why
+    assert found.message == report.message
 
 
 def buried():
@@ -134,19 +136,19 @@ def buried():
 
 @pytest.mark.parametrize("word", DESCENTS)
 def test_slopes_decide_where_the_energy_is_lost_in_round_off(word):
-    plain = minimise(buried(), tight(word, 1e-9), search=Rules(noise=0.0)).report
+    plain = minimise(buried(), tight(word, 1e-9), search=LineSearchOptions(noise=0.0)).report
     aware = minimise(buried(), tight(word, 1e-9)).report
     assert aware.converged
     assert aware.backtracks == 0
     assert not plain.converged
-    assert "the line search refused" in plain.why
+    assert "the line search refused" in plain.message
 
 
 def test_tolerance_below_round_off_ends_with_a_diagnosis():
     report = minimise(bar(), "hot", eps=1e-30, patience=20).report
     assert not report.converged
     assert report.iterations < 200
-    assert "line search" in report.why or "near the limit of round-off" in report.why
+    assert "line search" in report.message or "near the limit of round-off" in report.message
     assert min(report.residuals) < 1e-12
 
 
@@ -154,7 +156,7 @@ def test_patience_ends_a_walk_on_the_spot():
     toy = scalar(lambda x: 1.0, lambda x: 1.0, lambda x: 1e20)      # flat, with a slope that lies
     toy.functions = (toy.functions[0], lambda x: np.sign(0.5 - x), toy.functions[2])
     report = minimise(toy, "pn-pcg", patience=4).report
-    assert "neither energy nor gradient fell in 4 iterations" in report.why
+    assert "neither energy nor gradient fell in 4 iterations" in report.message
     assert report.iterations == 4
 
 
@@ -163,7 +165,7 @@ def test_patience_bears_a_slow_descent():
     toy = scalar(lambda x: 1.0 - 1e-12 * min(x, far), lambda x: -1e-12 if x < far else 0.0,
                  lambda x: 1e-12)
     report = minimise(toy, "pn-pcg", eps=1e-14).report
-    assert report.converged, report.why
+    assert report.converged, report.message
     assert report.iterations == far
 
 
@@ -171,10 +173,10 @@ def test_patience_bears_a_slow_descent():
 
 def test_default_is_hot_as_printed():                                  # HOT-alg3, HOT-smoother
     hot = METHODS["hot"]
-    assert hot == Options()
+    assert hot == SolverOptions()
     assert (hot.window, hot.levels, hot.kernel, hot.eps) == (8, 3, "linear", 1e-7)
-    assert (hot.start, hot.norm, hot.rebuild) == ("zero", "characteristic", 0)
-    assert minimise(bar()).report.method == minimise(bar(), Options()).report.method == "hot"
+    assert (hot.start, hot.norm, hot.rebuild_every) == ("zero", "characteristic", 0)
+    assert minimise(bar()).report.method == minimise(bar(), SolverOptions()).report.method == "hot"
 
 
 def test_changes_apply_to_words_and_options():
@@ -183,19 +185,20 @@ def test_changes_apply_to_words_and_options():
         bar(), replace(METHODS["pn-pcg"])).report.iterations
 
 
-@pytest.mark.parametrize("name", sorted(WORDS))
+@pytest.mark.parametrize("name", sorted(CHOICES))
 def test_unknown_word_is_refused(name):
     with pytest.raises(ValueError, match=f"{name} = 'magic': expected one of"):
-        Options(**{name: "magic"})
+        SolverOptions(**{name: "magic"})
 
 
 @pytest.mark.parametrize("change", [
-    {"eps": 0.0}, {"patience": 0}, {"levels": 0}, {"window": -1}, {"rebuild": -1},
-    {"iterations": -1}, {"operator": "free"}, {"operator": "free", "inverse": "sgs"},
+    {"eps": 0.0}, {"patience": 0}, {"levels": 0}, {"window": -1}, {"rebuild_every": -1},
+    {"max_iterations": -1}, {"operator": "matrix-free"},
+    {"operator": "matrix-free", "inverse": "sgs"},
     {"descent": "newton", "inverse": "cg"}])
 def test_senseless_options_are_refused(change):
     with pytest.raises(ValueError, match="expected"):
-        Options(**change)
+        SolverOptions(**change)
 
 
 def test_unknown_method_is_refused():

@@ -77,7 +77,7 @@ def pyamg_twin(grids, d):
 
 def test_the_cycle_is_that_of_pyamg(d, rng):                           # HOT-alg2
     c = small(d, held=False)
-    grids = hierarchy(c.A, c.index, 3, path="scipy", coarsest="direct")
+    grids = hierarchy(c.A, c.index, 3, implementation="scipy", coarsest="direct")
     twin, order = pyamg_twin(grids, d)
     b = rng.standard_normal(c.index.shape)
     u = np.empty(b.size)
@@ -89,7 +89,7 @@ def test_the_cycle_is_that_of_pyamg(d, rng):                           # HOT-alg
     *product(PATHS, SMOOTHERS, ["double"]), ("blocks", "gauss-seidel", "single")])
 def test_the_cycle_is_symmetric_positive_and_zero_where_held(d, path, word, precision):
     c = small(d)
-    M = dense(hierarchy(c.A, c.index, 3, path=path, smoother=word, coarsest="direct",
+    M = dense(hierarchy(c.A, c.index, 3, implementation=path, smoother=word, coarsest="direct",
                         precision=precision), c.index.shape)
     close(M, M.T, 1e-13)
     Q = free_basis(c.B)
@@ -102,7 +102,7 @@ def test_the_cycle_is_symmetric_positive_and_zero_where_held(d, path, word, prec
 @pytest.mark.parametrize("path", PATHS)
 def test_the_cycle_is_linear_with_an_exact_coarse_solve(d, path, rng):
     c = small(d)
-    cycle = hierarchy(c.A, c.index, path=path, coarsest="direct").cycle
+    cycle = hierarchy(c.A, c.index, implementation=path, coarsest="direct").cycle
     a, b = rng.standard_normal((2, *c.index.shape))
     close(cycle(2.0 * a - b), 2.0 * cycle(a) - cycle(b), 1e-13)
 
@@ -116,8 +116,8 @@ def test_held_nodes_leave_no_trace(d, word, path, rng):                # HOT-bc:
     removed = sp.bsr_array(sp.csr_array(c.A)[rows][:, rows], blocksize=(d, d))
     removed.sort_indices()
     b = rng.standard_normal(c.index.shape)
-    here = hierarchy(c.A, c.index, path=path, smoother=word)
-    there = hierarchy(removed, c.index[free], path=path, smoother=word)
+    here = hierarchy(c.A, c.index, implementation=path, smoother=word)
+    there = hierarchy(removed, c.index[free], implementation=path, smoother=word)
     close(here.cycle(b)[free], there.cycle(b[free]))
 
 
@@ -146,7 +146,7 @@ def free_cycle(c, index, b):
 def test_the_cycle_is_the_textbook_s_in_free_coordinates(d, path, rng):        # HOT-eq3, HOT-eq4
     c = small(d)
     b = rng.standard_normal(c.index.shape)
-    u = hierarchy(c.A, c.index, 2, path=path, coarsest="direct").cycle(b)
+    u = hierarchy(c.A, c.index, 2, implementation=path, coarsest="direct").cycle(b)
     close(u, free_cycle(c, c.index, b))
 
 
@@ -156,7 +156,7 @@ def test_the_coarsest_cg_stops_at_its_tolerance(d, preconditioner, path, rng):  
     c = small(d)
     b = np.einsum("iab,ib->ia", c.B, rng.standard_normal(c.index.shape))
     for tolerance in (0.5, 1e-6):
-        grids = hierarchy(c.A, c.index, 1, path=path, tolerance=tolerance,
+        grids = hierarchy(c.A, c.index, 1, implementation=path, tolerance=tolerance,
                           preconditioner=preconditioner)
         u = grids.cycle(b)
         r = b - (c.A @ u.reshape(-1)).reshape(b.shape)
@@ -169,8 +169,8 @@ def test_the_coarsest_cg_stops_at_its_tolerance(d, preconditioner, path, rng):  
 def test_the_stop_of_the_release_counts_what_smoothing_did(path, rng):
     c = small(2)
     b = rng.standard_normal(c.index.shape)
-    loose = hierarchy(c.A, c.index, path=path, stop="load", sweeps=4)
-    tight = hierarchy(c.A, c.index, path=path, stop="residual", sweeps=4)
+    loose = hierarchy(c.A, c.index, implementation=path, stop="load", sweeps=4)
+    tight = hierarchy(c.A, c.index, implementation=path, stop="residual", sweeps=4)
     loose.cycle(b), tight.cycle(b)
     assert loose.iterations < tight.iterations
 
@@ -192,7 +192,7 @@ def test_odd_hierarchies_stay_finite(d, solver, path, rng):
     for A, index in ((alone, c.index[odd]), (tiny, c.index), (nothing, c.index),
                      (one, np.full((1, d), -3))):
         b = rng.standard_normal(index.shape)
-        grids = hierarchy(A, index, 9, path=path, coarsest=solver)
+        grids = hierarchy(A, index, 9, implementation=path, coarsest=solver)
         u = grids.cycle(b)
         assert np.isfinite(u).all()
         assert (u == 0.0).all() if A is nothing else np.vdot(u, b) > 0.0
@@ -207,9 +207,9 @@ def test_a_lone_node_hangs_on_more_coarse_nodes_than_it_fixes(d, dense_up_to, pa
     A = sp.bsr_array(sp.block_diag([sp.csr_array(c.A), 0.3 * np.eye(d)]), blocksize=(d, d))
     A.sort_indices()
     b = np.cos(np.arange(index.size)).reshape(index.shape)
-    u = hierarchy(A, index, 3, path=path, coarsest="direct").cycle(b)
+    u = hierarchy(A, index, 3, implementation=path, coarsest="direct").cycle(b)
     np.testing.assert_allclose(u[-1], b[-1] / 0.3, rtol=1e-13)
-    close(u[:-1], hierarchy(c.A, c.index, 3, path=path, coarsest="direct").cycle(b[:-1]))
+    close(u[:-1], hierarchy(c.A, c.index, 3, implementation=path, coarsest="direct").cycle(b[:-1]))
 
 
 def test_slabs_of_one_colour_do_not_couple(d):                         # HOT-smoother
@@ -225,7 +225,7 @@ def test_slabs_of_one_colour_do_not_couple(d):                         # HOT-smo
 
 
 @pytest.mark.parametrize(("wrong", "said"), [
-    ({"path": "gpu"}, "path = 'gpu': expected one of scipy, blocks"),
+    ({"implementation": "gpu"}, "implementation = 'gpu': expected one of scipy, blocks"),
     ({"smoother": "ilu"}, "smoother = 'ilu': expected one of gauss-seidel, jacobi, chebyshev"),
     ({"precision": "half"}, "precision = 'half': expected one of double, single"),
     ({"coarse": "pcg"}, "no option 'coarse': expected one of smoother, "),

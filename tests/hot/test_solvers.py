@@ -5,11 +5,11 @@ import pytest
 from hot_toys import DESCENTS, Exact, bar, exactly, quadratic, scalar, tight
 
 from mpm_ref.hot.krylov import block_jacobi, newton_tolerance, stiffest_tolerance
-from mpm_ref.hot.lbfgs import LBFGS, Pair, two_loop
-from mpm_ref.hot.methods import METHODS, made, minimise
+from mpm_ref.hot.lbfgs import LBFGS, CurvaturePair, two_loop
+from mpm_ref.hot.methods import METHODS, descent_method, minimise
 from mpm_ref.hot.newton import Forcing
 from mpm_ref.hot.norms import scaled_norm
-from mpm_ref.hot.report import Watch, together
+from mpm_ref.hot.report import Profiler, combined_report
 
 NEWTON = sorted(word for word, options in METHODS.items() if options.descent == "newton")
 
@@ -40,10 +40,10 @@ def test_every_method_finds_the_minimiser(word, minimum):
     toy = bar()
     solution = minimise(toy, tight(word))
     assert solution.report.converged
-    assert solution.report.why == "converged"
+    assert solution.report.message == "converged"
     assert solution.report.method == word
     assert np.abs(solution.dv - minimum).max() < 1e-8
-    assert np.abs(toy.free(solution.dv - toy.start) - (solution.dv - toy.start)).max() < 1e-12
+    assert np.abs(toy.project(solution.dv - toy.start) - (solution.dv - toy.start)).max() < 1e-12
 
 
 @pytest.mark.parametrize("word", DESCENTS)
@@ -51,8 +51,8 @@ def test_nothing_to_do_takes_no_step_and_no_matrix(word):
     toy = quadratic(np.eye(6).reshape(3, 2, 3, 2), np.zeros((3, 2)))
     solution = minimise(toy, word)
     report = solution.report
-    assert (report.converged, report.iterations, report.inner) == (True, 0, 0)
-    assert (report.evaluations, report.builds, report.residuals) == (1, 0, (0.0,))
+    assert (report.converged, report.iterations, report.cg_iterations) == (True, 0, 0)
+    assert (report.evaluations, report.hessians, report.residuals) == (1, 0, (0.0,))
     assert not solution.dv.any()
 
 
@@ -79,19 +79,19 @@ def test_accepted_energies_never_rise():
 def test_first_direction_of_hot_is_the_cycle_of_the_gradient(hierarchies):     # HOT-alg3
     toy = bar()
     g = toy.evaluate(toy.start)[1]
-    minimise(toy, "hot", iterations=1)
+    minimise(toy, "hot", max_iterations=1)
     assert np.array_equal(hierarchies[0].calls[0], -g)
     first_trial = next(dv for dv, _ in toy.visited[2:])
-    p = toy.free(Exact(toy.matrix(toy.start)).cycle(-g))
+    p = toy.project(Exact(toy.matrix(toy.start)).cycle(-g))
     assert np.allclose(first_trial - toy.start, p, atol=1e-14)
 
 
 def test_hot_builds_one_hierarchy_per_solve_and_cycles_once_per_iteration(hierarchies):
     # HOT-alg3, which so pays HOT-cost once
     report = minimise(bar(), "hot").report
-    assert report.builds == len(hierarchies) == 1
+    assert report.hessians == len(hierarchies) == 1
     assert len(hierarchies[0].calls) == report.iterations > 3
-    assert report.inner == 0
+    assert report.cg_iterations == 0
 
 
 def test_two_loop_is_the_update_of_broyden_fletcher_goldfarb_and_shanno():     # HOT-alg3
@@ -102,7 +102,7 @@ def test_two_loop_is_the_update_of_broyden_fletcher_goldfarb_and_shanno():     #
         s = rng.standard_normal((3, 2))
         y = s * rng.uniform(0.5, 2.0, (3, 2))
         rho = 1.0 / np.sum(s * y)
-        pairs.append(Pair(s, y, rho))
+        pairs.append(CurvaturePair(s, y, rho))
         V = np.eye(6) - rho * np.outer(y, s)
         inverse = V.T @ inverse @ V + rho * np.outer(s, s)
     q = rng.standard_normal((3, 2))
@@ -111,10 +111,10 @@ def test_two_loop_is_the_update_of_broyden_fletcher_goldfarb_and_shanno():     #
 
 
 def test_window_holds_the_newest_pairs_of_positive_curvature():
-    method = LBFGS(build=None, window=3, rebuild=0)
+    method = LBFGS(build=None, window=3, rebuild_every=0)
     s = np.ones((2, 2))
     for curvature in (1.0, -1.0, 2.0, 0.0, 3.0, 4.0):
-        method.learn(s, curvature * s)
+        method.update(s, curvature * s)
     assert [1.0 / (pair.rho * 4.0) for pair in method.pairs] == [2.0, 3.0, 4.0]
 
 
@@ -124,18 +124,18 @@ def test_pairs_save_iterations():
 
 
 def test_rebuild_takes_a_new_hessian_every_k_steps(hierarchies):
-    report = minimise(bar(), "hot", rebuild=2).report
+    report = minimise(bar(), "hot", rebuild_every=2).report
     assert report.converged
-    assert report.builds == len(hierarchies) == (report.iterations + 1) // 2 > 1
-    assert report.refreshes == 0
+    assert report.hessians == len(hierarchies) == (report.iterations + 1) // 2 > 1
+    assert report.restarts == 0
 
 
 @pytest.mark.parametrize("word", NEWTON)
 def test_newton_takes_a_hessian_per_iteration(word):                   # HOT-alg1
     toy = bar()
     report = minimise(toy, word).report
-    assert report.builds == report.iterations
-    free = METHODS[word].operator == "free"
+    assert report.hessians == report.iterations
+    free = METHODS[word].operator == "matrix-free"
     assert toy.calls["matrix"] == (0 if free else report.iterations)
     assert toy.calls["product"] == toy.calls["diagonal"] == (report.iterations if free else 0)
 
@@ -145,13 +145,14 @@ def test_tolerance_of_newton_depends_on_the_gradient_as_printed(norm):
     toy = bar()
     g = toy.evaluate(toy.start)[1]
     size = {"energy": 0.04, "L2": np.linalg.norm(g)}[norm]
-    assert Forcing(norm, 1e-6).of(g)(0.04) == newton_tolerance(size, 1e-6)
-    assert Forcing(norm, 1e-6).of(1e-12 * g)(1e-9) == pytest.approx(1e-3)
+    assert Forcing(norm, 1e-6).relative_tolerance(g)(0.04) == newton_tolerance(size, 1e-6)
+    assert Forcing(norm, 1e-6).relative_tolerance(1e-12 * g)(1e-9) == pytest.approx(1e-3)
 
 
 def test_tolerances_of_newton_look_at_their_own_stop():
     toy = bar()
-    plain, gast = (made(toy, METHODS[word], Watch()).forcing for word in ("pn-pcg", "gast15"))
+    plain, gast = (descent_method(toy, METHODS[word], Profiler()).forcing
+                   for word in ("pn-pcg", "gast15"))
     assert (plain.norm, plain.tau) == ("energy", stiffest_tolerance(1e-7, toy.kappa))
     assert (gast.norm, gast.tau) == ("L2", 1e-3)
 
@@ -178,20 +179,20 @@ def test_newton_solves_to_the_printed_tolerance():                     # HOT-sec
 
     def left(cap):
         toy.visited.clear()
-        minimise(toy, "pn-pcg", eps=eps, iterations=1, cg_iterations=cap)
+        minimise(toy, "pn-pcg", eps=eps, max_iterations=1, max_cg_iterations=cap)
         p = toy.visited[1][0] - toy.start
         return energy(-g - (A @ p.reshape(-1)).reshape(g.shape))
 
-    report = minimise(gentle(), "pn-pcg", eps=eps, iterations=1).report
-    assert report.inner > 1
-    assert left(10000) <= k * energy(g) < left(report.inner - 1)
+    report = minimise(gentle(), "pn-pcg", eps=eps, max_iterations=1).report
+    assert report.cg_iterations > 1
+    assert left(10000) <= k * energy(g) < left(report.cg_iterations - 1)
 
 
 def test_lbfgs_h_solves_to_half_of_the_energy_norm():                  # HOT-sec5.3-coarse
     report = minimise(bar(), "lbfgs-h").report
-    assert report.capped == 0
-    assert report.iterations < report.inner < 10 * report.iterations
-    assert minimise(bar(), "lbfgs-h", cg_iterations=1).report.capped > 0
+    assert report.capped_solves == 0
+    assert report.iterations < report.cg_iterations < 10 * report.iterations
+    assert minimise(bar(), "lbfgs-h", max_cg_iterations=1).report.capped_solves > 0
 
 
 # Reports.
@@ -202,7 +203,7 @@ def test_report_counts_what_happened(word):
     report = minimise(toy, word).report
     assert report.evaluations == toy.calls["energy"] + toy.calls["evaluate"] == len(toy.visited)
     assert report.evaluations == 1 + report.iterations + report.backtracks + toy.calls["energy"]
-    assert report.builds == toy.calls["matrix"] + toy.calls["product"]
+    assert report.hessians == toy.calls["matrix"] + toy.calls["product"]
     assert len(report.residuals) == report.iterations + 1
     assert report.residuals[0] == scaled_norm(bar(seed=1).evaluate(toy.start)[1], toy.kappa)
     assert {"other", "evaluate", "assembly"} <= set(report.seconds)
@@ -230,9 +231,9 @@ def test_gast_measures_the_plain_gradient():
 
 def test_reports_of_solves_in_a_row_add_up():
     first, second = (minimise(bar(seed=seed), "hot").report for seed in (1, 2))
-    both = together([first, second])
+    both = combined_report([first, second])
     assert both.iterations == first.iterations + second.iterations
     assert both.evaluations == first.evaluations + second.evaluations
     assert sum(both.seconds.values()) == pytest.approx(
         sum(first.seconds.values()) + sum(second.seconds.values()))
-    assert (both.residuals, both.why) == (second.residuals, second.why)
+    assert (both.residuals, both.message) == (second.residuals, second.message)

@@ -73,7 +73,7 @@ def test_energy_never_rises_and_momentum_is_kept():
     stepper.start([body])
     for k in range(20):
         stepper.step([body], k * 0.01, 0.01)
-        assert stepper.report.converged, stepper.report.why
+        assert stepper.report.converged, stepper.report.message
         before.append(energy([body], NOTHING, D).sum)
     assert np.all(np.diff(before) <= 1e-12 * before[0])
     scale = np.sum(body.particles.m) * 0.1
@@ -166,7 +166,7 @@ def problem_of(**changes):
 
 
 def test_solve_that_does_not_converge_ends_the_run():
-    capped = problem_of(solver=options_of("pn-pcg", iterations=1, eps=1e-12))
+    capped = problem_of(solver=options_of("pn-pcg", max_iterations=1, eps=1e-12))
     with pytest.raises(Unstable, match="the implicit step was not solved: 1 iterations, the cap"):
         list(simulate(capped))
     frames = list(simulate(replace(capped, bodies=(block(v=squeezed),), allow_unstable=True)))

@@ -10,7 +10,7 @@ from mpm_ref.core.law import kirchhoff, psi, returned
 from mpm_ref.materials.learned import contraction, energetic, weights
 from mpm_ref.materials.learned.contraction import Contraction
 from mpm_ref.materials.learned.invariants import spectrum
-from mpm_ref.nclaw.bodies import points
+from mpm_ref.nclaw.bodies import material_points
 from mpm_ref.store.weights_file import sealed
 from mpm_ref.timestep import moduli
 from tests.nclaw.test_invariants import REPEATED, built, turns
@@ -107,7 +107,7 @@ def test_moduli_at_rest_are_those_of_small_strains():
     assert tau[0, 0] / h == pytest.approx(law.lam + 2.0 * law.mu, rel=1e-4)
     assert tau[1, 1] / h == pytest.approx(law.lam, rel=1e-4)
     assert sheared[0, 1] / h == pytest.approx(law.mu, rel=1e-4)
-    wave, largest = moduli(points(law, toys.deployed()[1], np.eye(3)[None]))
+    wave, largest = moduli(material_points(law, toys.deployed()[1], np.eye(3)[None]))
     assert wave == [law.lam + 2.0 * law.mu]
     assert largest == [3.0 * law.lam + 2.0 * law.mu]
 

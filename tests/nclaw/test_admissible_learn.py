@@ -18,12 +18,13 @@ from mpm_ref.materials.learned import learned_flow, learned_law  # noqa: E402
 from mpm_ref.materials.learned.contraction import Contraction  # noqa: E402
 from mpm_ref.materials.learned.energetic import Energetic  # noqa: E402
 from mpm_ref.materials.learned.weights import LearnedLaws, load, save  # noqa: E402
-from mpm_ref.nclaw.batched_step import world  # noqa: E402
+from mpm_ref.nclaw.batched_step import make_world  # noqa: E402
 from mpm_ref.nclaw.train.admissible_laws import START  # noqa: E402
 from mpm_ref.nclaw.train.fit import train  # noqa: E402
-from mpm_ref.nclaw.train.methods import laws_of, trained_of  # noqa: E402
+from mpm_ref.nclaw.train.observations import trajectory_of  # noqa: E402
 from mpm_ref.nclaw.train.recipe import Recipe  # noqa: E402
-from mpm_ref.nclaw.train.rollout import squared, trajectory_of  # noqa: E402
+from mpm_ref.nclaw.train.rollout import segment_errors  # noqa: E402
+from mpm_ref.nclaw.train.train import drawn_laws  # noqa: E402
 from mpm_ref.trajectories import observed  # noqa: E402
 from validation.nclaw.trained_laws import nets  # noqa: E402
 from validation.training.nclaw import begun  # noqa: E402
@@ -39,7 +40,7 @@ SPHERES = "I", "1.01 I"     # where the size of the deviator has a kink
 @pytest.fixture
 def laws():
     """Laws that bend and flow, unlike those that training begins with."""
-    made = laws_of("admissible", 0, Energetic(1e5), Contraction(1e-2))
+    made = drawn_laws("admissible", 0, Energetic(1e5), Contraction(1e-2))
     torch.manual_seed(1)
     with torch.no_grad():
         for own in (*made.elastic.parameters(), *made.plastic.parameters()):
@@ -52,7 +53,7 @@ def laws():
 def run():
     """`World` and `Trajectory` of a small cube."""
     problem = cube(STEPS)
-    return world(problem), trajectory_of(observed(problem))
+    return make_world(problem), trajectory_of(observed(problem))
 
 
 @pytest.mark.parametrize(("part", "stretches"), [
@@ -81,20 +82,20 @@ def test_remainder_is_of_second_order_in_the_weights(laws, run, turned):
     flat = [a for some in own for a in some]
     start = [a.detach().clone() for a in flat]
     way = [on * torch.randn_like(a) for some, on in zip(own, turned, strict=True) for a in some]
-    slopes = torch.autograd.grad(squared(laws, *run, [0], [STEPS]).loss, flat)
+    slopes = torch.autograd.grad(segment_errors(laws, *run, [0], [STEPS]).loss, flat)
 
     def loss(h):
         with torch.no_grad():
             for a, first, da in zip(flat, start, way, strict=True):
                 a[:] = first + h * da
-            return squared(laws, *run, [0], [STEPS]).loss.item()
+            return segment_errors(laws, *run, [0], [STEPS]).loss.item()
 
     slope = sum((g * da).sum() for g, da in zip(slopes, way, strict=True)).item()
     assert rate(loss, slope, H) == pytest.approx(2.0, abs=0.1)
 
 
 def test_stored_laws_answer_as_the_trained_ones(laws, tmp_path, rng):
-    save(tmp_path / "laws.npz", LearnedLaws(*map(trained_of, laws), {}))
+    save(tmp_path / "laws.npz", LearnedLaws(*(law.weights() for law in laws), {}))
     back, F = load(tmp_path / "laws.npz"), strained(rng)
     law, flow = learned_law(back.elastic), learned_flow(back.plastic)
     with torch.no_grad():
@@ -108,7 +109,7 @@ def test_stored_laws_answer_as_the_trained_ones(laws, tmp_path, rng):
 def test_training_begins_near_its_unit_and_with_little_flow(rng):
     net = nets()["plasticine-admissible"]
     laws = begun(net)
-    law = learned_law(trained_of(laws.elastic))
+    law = learned_law(laws.elastic.weights())
     assert (net.elastic, net.plastic) == ("Energetic", "Contraction")
     assert 0.1 < law.mu / Energetic().unit < 10.0
     F = torch.from_numpy(strained(rng))
@@ -119,5 +120,5 @@ def test_training_begins_near_its_unit_and_with_little_flow(rng):
 
 def test_training_lowers_the_error(run):
     recipe = Recipe(epochs=15, first=3, last=3, elastic_rate=0.1, plastic_rate=0.01)
-    history = train(recipe, laws_of("admissible", 0, Energetic(), Contraction()), *run).history
+    history = train(recipe, drawn_laws("admissible", 0, Energetic(), Contraction()), *run).history
     assert history[-1].error < 0.3 * history[0].error

@@ -14,7 +14,7 @@ from mpm_ref.core.boundary import Collider, Conditions, nclaw_walls
 from mpm_ref.core.jit import set_threads
 from mpm_ref.core.solids import half_space
 from mpm_ref.explicit import Scheme
-from mpm_ref.nclaw.batched_step import States, advance, nodes, pull_back, world
+from mpm_ref.nclaw.batched_step import States, advance, make_nodes, make_world, pull_back
 from mpm_ref.problem import Clock
 from mpm_ref.simulate import keep_inside
 
@@ -45,7 +45,7 @@ def of(before):
 
 
 def stepped(of, before):
-    return advance(of, before, nodes(of, len(before.x)))
+    return advance(of, before, make_nodes(of, len(before.x)))
 
 
 def seeds(before, rng):
@@ -54,7 +54,7 @@ def seeds(before, rng):
 
 
 def gradient(of, before, seeds):
-    on = nodes(of, len(before.x))
+    on = make_nodes(of, len(before.x))
     return pull_back(of, before, advance(of, before, on), seeds, on)
 
 
@@ -115,7 +115,7 @@ def test_company_changes_no_bit(of, before, rng):
 
 
 def test_what_the_grids_held_before_is_forgotten(of, before, rng):
-    bars, on = seeds(before, rng), nodes(of, 3)
+    bars, on = seeds(before, rng), make_nodes(of, 3)
     for a in on:
         a[:] = np.nan
     after = advance(of, before, on)
@@ -241,7 +241,7 @@ def test_arrays_of_another_body_are_told(of, before, rng, name):
     for k in range(1 if name == "tau" else 3):
         wrong = [short(states, name) if i == k else states for i, states in enumerate(given)]
         with pytest.raises(ValueError, match=said):
-            pull_back(of, *wrong, nodes(of, 3))
+            pull_back(of, *wrong, make_nodes(of, 3))
 
 
 def test_gradients_of_fewer_bodies_are_told(of, before, rng):
@@ -257,7 +257,7 @@ def test_a_stress_that_is_left_out_is_told(of, before):
 
 @pytest.mark.parametrize(("coarser", "count"), [(1.0, 2), (2.0, 3)])
 def test_storage_that_is_too_small_is_told(of, before, rng, coarser, count):
-    on = nodes(of._replace(dx=coarser * of.dx), count)
+    on = make_nodes(of._replace(dx=coarser * of.dx), count)
     said = rf"^storage for {count} bodies of \d+ nodes, expected at least 3 of \d+; make it with "
     with pytest.raises(ValueError, match=said):
         advance(of, before, on)
@@ -269,7 +269,7 @@ def test_a_body_force_of_its_own_is_refused(before):
     body = problem_of(before, 0).bodies[0]
     pushed = body._replace(particles=body.particles._replace(b=np.ones((N, 3))))
     with pytest.raises(ValueError, match=r": expected no body force but gravity; "):
-        world(replace(problem_of(before, 0), bodies=(pushed,)))
+        make_world(replace(problem_of(before, 0), bodies=(pushed,)))
 
 
 def test_a_world_is_that_of_the_problem(before):
@@ -294,4 +294,4 @@ def test_other_problems_are_refused(before, change):
     if "bodies" in change:
         change = {"bodies": 2 * problem.bodies}
     with pytest.raises(ValueError, match=r"^'a toy': expected "):
-        world(replace(problem, title="a toy", **change))
+        make_world(replace(problem, title="a toy", **change))

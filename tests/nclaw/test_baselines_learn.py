@@ -23,9 +23,9 @@ from mpm_ref.materials.learned import (  # noqa: E402
     weights,
 )
 from mpm_ref.materials.learned.invariants import invariants, rotations, spectrum  # noqa: E402
-from mpm_ref.nclaw.train.kinds import described  # noqa: E402
-from mpm_ref.nclaw.train.methods import METHODS, laws_of, trained_of  # noqa: E402
-from mpm_ref.nclaw.train.principal_laws import ReleasedStretchLaw, StretchLaw  # noqa: E402
+from mpm_ref.nclaw.train.neural_laws import describe  # noqa: E402
+from mpm_ref.nclaw.train.principal_laws import ReleasedStretchLawModule, StretchLawModule  # noqa: E402
+from mpm_ref.nclaw.train.train import METHODS, drawn_laws  # noqa: E402
 from validation.nclaw.environments import ENVIRONMENTS  # noqa: E402
 from validation.nclaw.trained_laws import Net, identity, nets  # noqa: E402
 from validation.training.nclaw import begun  # noqa: E402
@@ -41,7 +41,7 @@ ABLATIONS = {"no rotation": (response.PlainStress(2.0), response.PlainCorrection
 
 def law_of(name, rng):
     """An elastic law with random weights."""
-    law = laws_of(name.split()[-1], 3, KINDS[name], None).elastic
+    law = drawn_laws(name.split()[-1], 3, KINDS[name], None).elastic
     with torch.no_grad():
         for own in law.parameters():
             own.copy_(torch.from_numpy(rng.normal(size=own.shape)))
@@ -103,7 +103,7 @@ def test_gradient_by_weights_is_exact(name, rng):
 @pytest.mark.parametrize("name", KINDS)
 def test_stored_law_answers_as_the_trained_one(name, rng):
     law = law_of(name, rng)
-    stored = learned_law(trained_of(law))
+    stored = learned_law(law.weights())
     for stretches in APART:
         F = built(stretches, 4, 3, rng)
         tau = [kirchhoff(tuple(map(tuple, A.tolist())), stored) for A in F]
@@ -128,8 +128,8 @@ def test_stored_ablation_answers_as_the_trained_one(method, rng):
     of = spectrum(F)
     plain = method == "no rotation"
     read = (F - np.eye(3)).reshape(-1, 9) if plain else invariants(F, of)
-    for law in laws_of(method, 0, *ABLATIONS[method]):
-        trained = trained_of(law)
+    for law in drawn_laws(method, 0, *ABLATIONS[method]):
+        trained = law.weights()
         expected = response.answers(network(trained.layers, read), F, rotations(of), trained.kind)
         with torch.no_grad():
             assert law(torch.from_numpy(F)).numpy() == pytest.approx(expected, abs=1e-5)
@@ -139,14 +139,14 @@ def test_no_undeformed_has_stress_at_rest():
     rest = torch.eye(3, dtype=torch.float64)[None]
     for method, kinds in ABLATIONS.items():
         with torch.no_grad():
-            tau = laws_of(method, 0, *kinds).elastic(rest)
+            tau = drawn_laws(method, 0, *kinds).elastic(rest)
         assert (float(abs(tau).max()) > 0.1) == (method == "no undeformed")
 
 
 @pytest.mark.usefixtures("double")
 @pytest.mark.parametrize("method", ABLATIONS)
 def test_gradient_of_an_ablation_is_exact(method, rng):
-    for law in laws_of(method, 0, *ABLATIONS[method]):
+    for law in drawn_laws(method, 0, *ABLATIONS[method]):
         law.double()
         assert order(law, built("generic", 5, 3, rng), rng) == pytest.approx(2.0, abs=0.15)
 
@@ -158,13 +158,14 @@ def told(name, change=1.0, seed=0):
     elastic, plastic = ABLATIONS.get(name) or (KINDS[name], NoFlow())
     kinds = (type(kind)(*(change * a for a in kind)) for kind in (elastic, plastic))
     method = name if name in ABLATIONS else name.split()[-1]
-    return [described(law) for law in laws_of(method, seed, *kinds)]
+    return [describe(law) for law in drawn_laws(method, seed, *kinds)]
 
 
 def test_no_two_laws_are_told_alike():
     every = [str(told(name, change)) for name in (*KINDS, *ABLATIONS) for change in (1.0, 2.0)]
     assert len(set(every)) == len(every)
-    one, other = (described(law(KINDS["neural"])) for law in (StretchLaw, ReleasedStretchLaw))
+    one, other = (describe(law(KINDS["neural"]))
+                  for law in (StretchLawModule, ReleasedStretchLawModule))
     assert one != other
 
 
@@ -193,7 +194,7 @@ def test_no_two_nets_are_told_alike():
 def test_every_net_begins_and_is_stored(name, tmp_path):
     """With the method and the kinds that it names."""
     net = nets()[name]
-    stored = weights.LearnedLaws(*map(trained_of, begun(net)), identity(net))
+    stored = weights.LearnedLaws(*(law.weights() for law in begun(net)), identity(net))
     weights.save(tmp_path / "laws.npz", stored)
     back = weights.load(tmp_path / "laws.npz")
     kinds = [type(law.kind).__name__ for law in (back.elastic, back.plastic)]
@@ -205,7 +206,7 @@ def test_every_net_begins_and_is_stored(name, tmp_path):
 def test_laws_begin_the_same_of_one_seed():
     kinds = response.Stress(), response.Correction()
     for method in ("ours", "labeled", "no undeformed"):
-        one, same, other = (trained_of(laws_of(method, seed, *kinds).plastic).layers[0][0]
+        one, same, other = (drawn_laws(method, seed, *kinds).plastic.weights().layers[0][0]
                             for seed in (0, 0, 1))
         assert (one == same).all()
         assert not (one == other).any()

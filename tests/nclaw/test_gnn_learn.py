@@ -9,16 +9,17 @@ from gnn_toys import DT, RADIUS
 
 torch = pytest.importorskip("torch")
 
-from mpm_ref.nclaw.gnn.graph import Graph, near  # noqa: E402
-from mpm_ref.nclaw.gnn.history import HISTORY, begun, of_edges, of_points  # noqa: E402
-from mpm_ref.nclaw.gnn.network import answers  # noqa: E402
-from mpm_ref.nclaw.gnn.train.examples import (  # noqa: E402
-    example,
-    run_of,
-    scales_of,
-    walk,
+from mpm_ref.nclaw.gnn.features import (  # noqa: E402  # noqa: E402
+    HISTORY,
+    Graph,
+    edge_features,
+    neighbour_graph,
+    point_features,
+    straight_flight,
 )
-from mpm_ref.nclaw.gnn.train.network import GraphNetwork, exported  # noqa: E402
+from mpm_ref.nclaw.gnn.network import answers  # noqa: E402
+from mpm_ref.nclaw.gnn.train.examples import example, random_walk, scales_of, training_run  # noqa: E402
+from mpm_ref.nclaw.gnn.train.network import GraphNetwork, export_weights  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
@@ -38,9 +39,9 @@ def network(d=3, seed=0):
 def told(d=3, n=40):
     """What points and edges are told, and the graph, of `gnn_toys.frames`."""
     frames = toys.frames(d, n)
-    graph = near(frames[-1], RADIUS)
-    return (of_points(frames, toys.box(d), toys.reading(d)), of_edges(frames[-1], graph, RADIUS),
-            graph)
+    graph = neighbour_graph(frames[-1], RADIUS)
+    return (point_features(frames, toys.box(d), toys.reading(d)),
+            edge_features(frames[-1], graph, RADIUS), graph)
 
 
 def tensors(points, edges, graph):
@@ -53,7 +54,7 @@ def test_the_network_without_pytorch_answers_alike(d):
     net = network(d)
     with torch.no_grad():
         found = net(*tensors(*told(d))).numpy()
-    assert answers(exported(net), *told(d)) == pytest.approx(found, rel=1e-11, abs=1e-12)
+    assert answers(export_weights(net), *told(d)) == pytest.approx(found, rel=1e-11, abs=1e-12)
 
 
 def test_gradients_are_those_of_differences():
@@ -69,7 +70,7 @@ def test_gradients_are_those_of_differences():
         with torch.no_grad():
             for a, b in zip(net.parameters(), way, strict=True):
                 a += h * b
-        value = (G * answers(exported(net), *given)).sum()
+        value = (G * answers(export_weights(net), *given)).sum()
         with torch.no_grad():
             for a, b in zip(net.parameters(), way, strict=True):
                 a -= h * b
@@ -107,7 +108,7 @@ def test_weights_begin_within_two_deviations():
 
 def test_noise_is_a_walk_of_velocities():
     """The deviation of velocity k is noise (k/5)^(1/2), positions are their sum from zero on."""
-    found = walk(np.random.default_rng(0), (20_000, 3), NOISE)
+    found = random_walk(np.random.default_rng(0), (20_000, 3), NOISE)
     assert found.shape == (HISTORY + 1, 20_000, 3)
     assert not found[0].any()
     u = np.diff(found, axis=0)
@@ -129,16 +130,16 @@ def a_run(d=3, k=7, n=40, seed=0):
 
 def test_a_run_is_shown_from_its_first_frame_to_the_one_before_its_last():
     x, v = a_run()
-    run = run_of(x, v, DT, toys.box())
+    run = training_run(x, v, DT, toys.box())
     assert run.count == 7
     np.testing.assert_array_equal(run.frames[HISTORY:], x)
-    np.testing.assert_array_equal(run.frames[:HISTORY + 1], begun(x[0], v, DT))
+    np.testing.assert_array_equal(run.frames[:HISTORY + 1], straight_flight(x[0], v, DT))
 
 
 def test_without_noise_the_true_acceleration_is_expected():
     """-g dt^2 in each frame but the first, to which flight was straight: half of it there."""
     x, v = a_run()
-    run, reading, none = run_of(x, v, DT, toys.box()), toys.reading(), np.zeros((6, 40, 3))
+    run, reading, none = training_run(x, v, DT, toys.box()), toys.reading(), np.zeros((6, 40, 3))
     for k, share in ((0, 0.5), (1, 1.0), (6, 1.0)):
         found = example(run, k, reading, none).answer.numpy()
         a = -9.8 * share * DT**2 * np.array((0.0, 1.0, 0.0))
@@ -148,10 +149,10 @@ def test_without_noise_the_true_acceleration_is_expected():
 
 def test_noise_is_told_and_the_true_next_velocity_expected():
     x, v = a_run()
-    run, reading = run_of(x, v, DT, toys.box()), toys.reading()
-    noise = walk(np.random.default_rng(0), (40, 3), NOISE)
+    run, reading = training_run(x, v, DT, toys.box()), toys.reading()
+    noise = random_walk(np.random.default_rng(0), (40, 3), NOISE)
     noisy, clean = (example(run, 3, reading, e) for e in (noise, 0.0 * noise))
-    graph = near(x[3] + noise[-1], RADIUS)
+    graph = neighbour_graph(x[3] + noise[-1], RADIUS)
     assert [a.tolist() for a in noisy.graph] == [a.tolist() for a in graph]
     off = (noisy.points - clean.points)[:, :15].numpy().reshape(40, HISTORY, 3)
     assert off == pytest.approx(np.diff(noise, axis=0).swapaxes(0, 1) / reading.scales.v_std,
@@ -161,7 +162,7 @@ def test_noise_is_told_and_the_true_next_velocity_expected():
 
 
 def test_scales_are_of_what_is_expected_and_of_noise():
-    runs = [run_of(*a_run(seed=seed), DT, toys.box()) for seed in (0, 5)]
+    runs = [training_run(*a_run(seed=seed), DT, toys.box()) for seed in (0, 5)]
     found = scales_of(runs, NOISE)
     u = np.concatenate([np.diff(run.frames[HISTORY - 1:], axis=0).reshape(-1, 3) for run in runs])
     assert found.v_mean == pytest.approx(u.mean(axis=0))
@@ -177,4 +178,4 @@ def test_scales_are_of_what_is_expected_and_of_noise():
     (lambda x, v: (x, v * np.inf), "not finite numbers: learn from another one")])
 def test_runs_that_teach_nothing_are_refused(change, said):
     with pytest.raises(ValueError, match=said):
-        run_of(*change(*a_run()), DT, toys.box())
+        training_run(*change(*a_run()), DT, toys.box())

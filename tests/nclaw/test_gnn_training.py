@@ -14,12 +14,15 @@ torch = pytest.importorskip("torch")
 
 from mpm_ref.nclaw.gnn.simulator import Simulator  # noqa: E402
 from mpm_ref.nclaw.gnn.train import fit  # noqa: E402
-from mpm_ref.nclaw.gnn.train.examples import example, run_of  # noqa: E402
-from mpm_ref.nclaw.gnn.train.fit import GraphSession, train  # noqa: E402
-from mpm_ref.nclaw.gnn.train.network import exported  # noqa: E402
-from mpm_ref.nclaw.gnn.train.recipe import GraphRecipe  # noqa: E402
+from mpm_ref.nclaw.gnn.train.examples import example, training_run  # noqa: E402
+from mpm_ref.nclaw.gnn.train.fit import (  # noqa: E402
+    GraphRecipe,
+    GraphSession,
+    train_graph,
+)
+from mpm_ref.nclaw.gnn.train.network import export_weights  # noqa: E402
 from mpm_ref.nclaw.gnn.weights import load, save  # noqa: E402
-from mpm_ref.nclaw.train.fit import Diverged  # noqa: E402
+from mpm_ref.nclaw.train.session import Diverged  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
@@ -30,7 +33,7 @@ SHORT = GraphRecipe(steps=12, width=6, blocks=2, batch=2, radius=RADIUS, first_r
 @pytest.fixture(scope="module")
 def runs():
     """Two runs that slow down."""
-    return [run_of(*toys.braked(seed=seed), DT, toys.box()) for seed in (0, 1)]
+    return [training_run(*toys.braked(seed=seed), DT, toys.box()) for seed in (0, 1)]
 
 
 def bits(session):
@@ -51,7 +54,7 @@ def test_training_lowers_the_loss_and_the_error_of_free_runs(runs):
     recipe = replace(SHORT, steps=160, check=40, noise=1e-5, width=32, batch=1)
     session = GraphSession(recipe, runs, DT)
     loss, error = losses(session), session.error()
-    session = train(recipe, runs, DT)
+    session = train_graph(recipe, runs, DT)
     assert len(session.history) == 4
     assert losses(session) < 0.5 * loss
     assert session.history[-1].error == session.error() < 0.2 * error
@@ -105,7 +108,7 @@ def test_the_error_is_that_of_free_runs_from_the_start(runs, double, checked):
     session.network.double()
     for seed, run in enumerate(runs):
         x, v = toys.braked(seed=seed)
-        simulator = Simulator(exported(session.network), session.reading, {})
+        simulator = Simulator(export_weights(session.network), session.reading, {})
         found = simulator.run(x[0], v, run.box)
         errors.append(np.mean((np.array(list(islice(found, 8))) - x) ** 2))
     assert session.error() == pytest.approx(np.mean(errors[:checked]), rel=1e-9)
@@ -116,7 +119,7 @@ def test_the_round_with_the_least_error_is_picked(runs, monkeypatch, tmp_path):
     errors, at_rounds = iter([3.0, np.inf, 1.0, 2.0]), []
     monkeypatch.setattr(GraphSession, "error", lambda self: at_rounds.append(
         self.network.answer.layers[2].weight.detach().clone()) or next(errors))
-    session = train(SHORT, runs, DT)
+    session = train_graph(SHORT, runs, DT)
     assert session.picked == 2
     save(tmp_path / "gnn.npz", session.simulator({"picked": 2}))
     W = load(tmp_path / "gnn.npz").network.answer.layers[2][0]
@@ -128,7 +131,7 @@ def test_the_round_with_the_least_error_is_picked(runs, monkeypatch, tmp_path):
 def test_free_runs_that_break_down_are_told(runs, monkeypatch):
     monkeypatch.setattr(GraphSession, "answer", lambda self, points, *rest: np.full(
         (len(points), 3), np.nan))
-    session = train(SHORT, runs, DT)
+    session = train_graph(SHORT, runs, DT)
     assert [one.error for one in session.history] == 4 * [np.inf]
     with pytest.raises(Diverged, match=r"^all 4 free runs broke down; try more steps"):
         session.simulator({})
@@ -145,7 +148,7 @@ def test_a_loss_that_is_no_number_is_told(runs):
 # checkpoints
 
 def test_a_training_that_was_cut_off_goes_on_bit_for_bit(tmp_path, runs):
-    whole, rounds = bits(train(SHORT, runs, DT)), []
+    whole, rounds = bits(train_graph(SHORT, runs, DT)), []
 
     def cut(history):
         rounds.append(len(history))
@@ -153,9 +156,9 @@ def test_a_training_that_was_cut_off_goes_on_bit_for_bit(tmp_path, runs):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        train(SHORT, runs, DT, tmp_path / "a.pt", cut)
+        train_graph(SHORT, runs, DT, tmp_path / "a.pt", cut)
     torch.rand(3)
-    assert bits(train(SHORT, runs, DT, tmp_path / "a.pt", cut)) == whole
+    assert bits(train_graph(SHORT, runs, DT, tmp_path / "a.pt", cut)) == whole
     assert rounds[2:] == [3, 4]
 
 
@@ -164,18 +167,18 @@ def test_a_training_that_was_cut_off_goes_on_bit_for_bit(tmp_path, runs):
     {"first_rate": 1e-4}, {"last_rate": 1e-6}, {"check": 6}, {"checked": 2}, {"seed": 1}])
 def test_a_checkpoint_of_another_recipe_is_refused(tmp_path, runs, settings):
     path, recipe = tmp_path / "a.pt", replace(SHORT, steps=6)
-    train(recipe, runs, DT, path)
+    train_graph(recipe, runs, DT, path)
     with pytest.raises(ValueError, match=r"is a checkpoint of the training .*, not of .*; remove"):
-        train(replace(recipe, **settings), runs, DT, path)
+        train_graph(replace(recipe, **settings), runs, DT, path)
 
 
 def test_a_checkpoint_of_other_runs_is_refused(tmp_path, runs):
     path, recipe = tmp_path / "a.pt", replace(SHORT, steps=3)
-    train(recipe, runs, DT, path)
+    train_graph(recipe, runs, DT, path)
     moved = runs[0]._replace(box=toys.box()._replace(low=np.full(3, 1e-3)))
     for others, dt in ((runs[::-1], DT), ([moved, runs[1]], DT), (runs, 2.0 * DT)):
         with pytest.raises(ValueError, match="is a checkpoint of the training"):
-            train(recipe, others, dt, path)
+            train_graph(recipe, others, dt, path)
 
 
 # recipes

@@ -7,7 +7,7 @@ from damaged import assert_damage_is_told, changed, refused, without
 from neural_toys import laws
 
 from mpm_ref.materials.learned import weights as of_laws
-from mpm_ref.nclaw.gnn.network import Perceptron
+from mpm_ref.nclaw.gnn.network import PerceptronWeights
 from mpm_ref.nclaw.gnn.weights import FORMAT, arrays_of, load, named, save
 from mpm_ref.store.weights_file import sealed
 
@@ -85,9 +85,9 @@ def test_damaged_files_are_told(tmp_path):
     ({"about": {"x": np.nan}}, "about: Out of range float"),
     ({"reading": toys.reading()._replace(radius=0.0)}, "radius has entries that are not positive"),
     ({"network": toys.network(2)}, r"points_W0 has shape \(14, 6\), expected \(21"),
-    ({"network": toys.network()._replace(answer=Perceptron(
+    ({"network": toys.network()._replace(answer=PerceptronWeights(
         4 * ((np.zeros((6, 6)), np.zeros(6)),)))}, "it has answer_W3, answer_b3, which belong to"),
-    ({"network": toys.network()._replace(answer=Perceptron(
+    ({"network": toys.network()._replace(answer=PerceptronWeights(
         3 * ((np.full((6, 6), np.inf), np.zeros(6)),)))}, "answer_W0 has entries that are not"),
 ])
 def test_what_could_not_be_read_is_not_written(tmp_path, change, said):

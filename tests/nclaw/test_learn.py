@@ -15,14 +15,21 @@ from tests.nclaw.test_invariants import near_rest, turns
 torch = pytest.importorskip("torch")
 
 from mpm_ref.materials.learned.response import Correction, Stress, SymmetricStress  # noqa: E402
-from mpm_ref.nclaw.batched_step import world  # noqa: E402
+from mpm_ref.nclaw.batched_step import make_world  # noqa: E402
 from mpm_ref.nclaw.train.autograd import Invariants  # noqa: E402
-from mpm_ref.nclaw.train.fit import Session  # noqa: E402
-from mpm_ref.nclaw.train.neural_laws import NeuralLaw, neural_laws, trained_of  # noqa: E402
-from mpm_ref.nclaw.train.perceptron import Perceptron, layers_of  # noqa: E402
-from mpm_ref.nclaw.train.recipe import Recipe  # noqa: E402
-from mpm_ref.nclaw.train.rollout import Laws, squared, trajectory_of  # noqa: E402
-from mpm_ref.nclaw.train.teacher import Teacher  # noqa: E402
+from mpm_ref.nclaw.train.fit import TrajectorySession  # noqa: E402
+from mpm_ref.nclaw.train.neural_laws import (  # noqa: E402
+    MultilayerPerceptron,
+    NeuralLawModule,
+    layers_of,
+    neural_laws,
+)
+from mpm_ref.nclaw.train.observations import trajectory_of  # noqa: E402
+from mpm_ref.nclaw.train.recipe import (  # noqa: E402
+    Recipe,
+    TeacherForcing,
+)
+from mpm_ref.nclaw.train.rollout import LawPair, segment_errors  # noqa: E402
 from mpm_ref.scene import build  # noqa: E402
 from mpm_ref.trajectories import observed  # noqa: E402
 from validation.nclaw.environments import environment, trajectory  # noqa: E402
@@ -38,14 +45,14 @@ pytestmark = pytest.mark.usefixtures("one_torch_thread")
 def run():
     """`World` and `Trajectory` of a small cube."""
     problem = cube(STEPS)
-    return world(problem), trajectory_of(observed(problem))
+    return make_world(problem), trajectory_of(observed(problem))
 
 
 # The teacher.
 
 def test_horizons_of_the_paper():
     """NCLAW-train: of 1000 steps, 40 segments of 25 at first and 6 at last, never 5."""
-    cuts = [Teacher().restarts(1000, epoch, 300) for epoch in range(300)]
+    cuts = [TeacherForcing().restarts(1000, epoch, 300) for epoch in range(300)]
     assert cuts[0] == list(range(0, 1001, 25))
     assert sorted(np.diff(cuts[-1]).tolist()) == [166, 166, 167, 167, 167, 167]
     assert (np.diff([len(cut) for cut in cuts]) <= 0).all()
@@ -56,23 +63,23 @@ def test_horizons_of_the_paper():
 
 
 def test_horizons_grow_by_half_a_cosine():
-    found = [Teacher(25, 200).horizon(epoch, 300) for epoch in (0, 100, 150, 200, 300)]
+    found = [TeacherForcing(25, 200).horizon(epoch, 300) for epoch in (0, 100, 150, 200, 300)]
     assert found == pytest.approx([25.0, 68.75, 112.5, 156.25, 200.0])
 
 
 def test_restarts_are_those_of_the_release():
     """Where floor(linspace(0, segments, steps)) changes, the segments ceil(steps/horizon)."""
     for steps, epoch in ((1000, 137), (333, 0), (26, 0), (50, 0)):
-        count = -(-steps // Teacher().horizon(epoch, 300))
+        count = -(-steps // TeacherForcing().horizon(epoch, 300))
         part = [n * count // steps for n in range(steps)]
         expected = [n for n in range(1, steps) if part[n] > part[n - 1]]
-        assert Teacher().restarts(steps, epoch, 300) == [0, *expected, steps]
+        assert TeacherForcing().restarts(steps, epoch, 300) == [0, *expected, steps]
 
 
 @pytest.mark.parametrize(("steps", "expected"), [(1, [0, 1]), (3, [0, 1, 2, 3]), (25, [0, 25])])
 def test_restarts_of_short_trajectories(steps, expected):
     horizon = 1 if steps == 3 else 25
-    assert Teacher(horizon, 200).restarts(steps, 0, 300) == expected
+    assert TeacherForcing(horizon, 200).restarts(steps, 0, 300) == expected
 
 
 # The recipe.
@@ -82,14 +89,14 @@ def test_readings_of_the_loss():
     assert Recipe().weight(40, 1000) == pytest.approx(400.0)
     assert Recipe(scale=2.0).weight(6, 1000) == pytest.approx(0.012)
     assert Recipe(reading="printed", scale=2.0).weight(6, 1000) == pytest.approx(1e-3)
-    assert Recipe(first=3, last=7).teacher == Teacher(3, 7)
+    assert Recipe(first=3, last=7).teacher == TeacherForcing(3, 7)
 
 
 def test_the_recipe_is_that_of_the_paper():
     """NCLAW-train."""
     r = Recipe()
     assert (r.epochs, r.elastic_rate, r.plastic_rate, r.clip) == (300, 1.0, 0.1, 0.1)
-    assert (r.teacher, r.reading, r.scale, r.seed) == (Teacher(25, 200), "release", 1e4, 0)
+    assert (r.teacher, r.reading, r.scale, r.seed) == (TeacherForcing(25, 200), "release", 1e4, 0)
 
 
 @pytest.mark.parametrize(("settings", "said"), [
@@ -131,7 +138,7 @@ def test_equal_seeds_draw_equal_weights():
 
 @pytest.mark.parametrize("bias", [False, True])
 def test_exported_layers_are_those_of_the_network(bias, rng):
-    net, a = Perceptron(7, 4, (6, 5), bias), rng.normal(size=(9, 7))
+    net, a = MultilayerPerceptron(7, 4, (6, 5), bias), rng.normal(size=(9, 7))
     with torch.no_grad():
         for layer in net.layers if bias else ():
             layer.bias += torch.rand(len(layer.bias))
@@ -148,8 +155,8 @@ def test_exported_layers_are_those_of_the_network(bias, rng):
 
 
 def test_a_law_says_what_it_is_as_plain_arrays():
-    law = NeuralLaw(SymmetricStress(2.0))
-    found = trained_of(law)
+    law = NeuralLawModule(SymmetricStress(2.0))
+    found = law.weights()
     assert found.kind == SymmetricStress(2.0)
     for (W, b), layer in zip(found.layers, law.net.layers, strict=True):
         assert np.array_equal(W.T, layer.weight.detach().numpy())
@@ -195,18 +202,18 @@ def jelly(F):
 
 def test_with_the_exact_law_nothing_is_off(run):
     """NCLAW-alg2 is NCLAW-alg1 then; a law that is a little off is told."""
-    error = squared(Laws(jelly, lambda F: F), *run, [0, 3], [3, STEPS]).loss
+    error = segment_errors(LawPair(jelly, lambda F: F), *run, [0, 3], [3, STEPS]).loss
     assert error < 1e-26
-    stiffer = Laws(lambda F: 1.01 * jelly(F), lambda F: F)
-    assert squared(stiffer, *run, [0, 3], [3, STEPS]).loss > 1e-16
+    stiffer = LawPair(lambda F: 1.01 * jelly(F), lambda F: F)
+    assert segment_errors(stiffer, *run, [0, 3], [3, STEPS]).loss > 1e-16
 
 
 def test_segments_do_not_know_each_other(run):
     """Nor how many run beside them, or how long those are."""
     laws = neural_laws(0, *STIFF)
     with torch.no_grad():
-        parts = [squared(laws, *run, [a], [b]).loss for a, b in ((0, 2), (2, 7), (7, STEPS))]
-        together = squared(laws, *run, [0, 2, 7], [2, 7, STEPS]).loss
+        parts = [segment_errors(laws, *run, [a], [b]).loss for a, b in ((0, 2), (2, 7), (7, STEPS))]
+        together = segment_errors(laws, *run, [0, 2, 7], [2, 7, STEPS]).loss
         assert min(parts) > 0.0
         assert together.item() == pytest.approx(sum(parts).item(), rel=1e-6)
 
@@ -215,10 +222,10 @@ def test_what_would_become_of_a_segment_after_its_end_does_not_matter(run):
     """One that is swollen, and then more, until a law has no answer."""
     (world, data), laws = run, neural_laws(0, *STIFF)
     data = data._replace(F=torch.cat([2.0 * data.F[:1], data.F[1:]]))
-    broken = Laws(lambda F: torch.where(J(F) > 30.0, torch.nan, laws.elastic(F)),
+    broken = LawPair(lambda F: torch.where(J(F) > 30.0, torch.nan, laws.elastic(F)),
                   lambda F: torch.where(J(F) > 5.0, 2.0 * F, laws.plastic(F)))
-    together = squared(broken, world, data, [0, 1], [1, 4]).loss
-    parts = sum(squared(broken, world, data, [a], [b]).loss for a, b in ((0, 1), (1, 4)))
+    together = segment_errors(broken, world, data, [0, 1], [1, 4]).loss
+    parts = sum(segment_errors(broken, world, data, [a], [b]).loss for a, b in ((0, 1), (1, 4)))
     assert together.item() == pytest.approx(parts.item(), rel=1e-6)
     for a, b in zip(*(torch.autograd.grad(loss, parameters(laws)) for loss in (together, parts))):
         assert (a - b).norm() < 1e-5 * b.norm()
@@ -227,8 +234,8 @@ def test_what_would_become_of_a_segment_after_its_end_does_not_matter(run):
 def test_errors_are_means_over_particles_and_axes(run):
     world, observed = run
     moved = observed._replace(x=observed.x + torch.tensor([3e-3, 0.0, 0.0]))
-    state = Laws(jelly, lambda F: F)
-    error = squared(state, world, moved._replace(x=torch.cat([observed.x[:1], moved.x[1:]])),
+    state = LawPair(jelly, lambda F: F)
+    error = segment_errors(state, world, moved._replace(x=torch.cat([observed.x[:1], moved.x[1:]])),
                     [0], [4])
     assert error.loss.item() == pytest.approx(4 * 3e-6, rel=1e-9)
 
@@ -238,19 +245,19 @@ def test_errors_of_velocities_count_as_told(run):
     world, observed = run
     moved = observed._replace(v=observed.v + torch.tensor([0.0, 0.3, 0.0]))
     slower = observed._replace(v=torch.cat([observed.v[:1], moved.v[1:]]))
-    found = squared(Laws(jelly, lambda F: F), world, slower, [0], [4], velocity=1e-4)
+    found = segment_errors(LawPair(jelly, lambda F: F), world, slower, [0], [4], velocity=1e-4)
     assert found.loss.item() == pytest.approx(4 * 1e-4 * 0.03, rel=1e-9)
     assert found.positions < 1e-26
 
 
 def gradients(laws, run, cuts):
     """Loss, and gradients of all weights."""
-    loss = squared(laws, *run, cuts[:-1], cuts[1:]).loss
+    loss = segment_errors(laws, *run, cuts[:-1], cuts[1:]).loss
     return loss, torch.autograd.grad(loss, parameters(laws))
 
 
 def doubled(laws):
-    return Laws(*(law.double() for law in laws))
+    return LawPair(*(law.double() for law in laws))
 
 
 @pytest.mark.usefixtures("double")
@@ -267,7 +274,7 @@ def test_remainder_is_of_second_order_in_the_weights(run, kind):
             with torch.no_grad():
                 for a, first, da in zip(parameters(laws), start, direction):
                     a[:] = first + h * da
-                return squared(laws, *run, cuts[:-1], cuts[1:]).loss.item()
+                return segment_errors(laws, *run, cuts[:-1], cuts[1:]).loss.item()
 
         slope = sum((g * da).sum() for g, da in zip(slopes, direction)).item()
         assert rate(loss, slope, H) == pytest.approx(2.0, abs=0.1)
@@ -290,7 +297,7 @@ def test_the_first_epoch_of_jelly_is_that_of_the_release():
     of 1e-3 m, which is as much as their last digit.
     """
     laws = neural_laws(0, Stress(), Correction())
-    session = Session(Recipe(), laws, world(build(environment("jelly"))),
+    session = TrajectorySession(Recipe(), laws, make_world(build(environment("jelly"))),
                       trajectory_of(trajectory("jelly")))
     session.epoch()
     found = session.history[0]

@@ -24,15 +24,21 @@ from mpm_ref.materials import (  # noqa: E402
     make_law,
 )
 from mpm_ref.materials.learned import response  # noqa: E402
-from mpm_ref.nclaw.batched_step import nodes, world  # noqa: E402
+from mpm_ref.nclaw.batched_step import make_nodes, make_world  # noqa: E402
 from mpm_ref.nclaw.train import labeled  # noqa: E402
 from mpm_ref.nclaw.train.fit import train  # noqa: E402
-from mpm_ref.nclaw.train.kinds import described  # noqa: E402
+from mpm_ref.nclaw.train.identified_laws import (  # noqa: E402
+    START,
+    IdentifiedFlow,
+    IdentifiedLaw,
+    identified_laws,
+)
 from mpm_ref.nclaw.train.labeled import labels_of, train_labeled  # noqa: E402
-from mpm_ref.nclaw.train.methods import laws_of, trained_of  # noqa: E402
+from mpm_ref.nclaw.train.neural_laws import describe  # noqa: E402
+from mpm_ref.nclaw.train.observations import Trajectory  # noqa: E402
 from mpm_ref.nclaw.train.recipe import Recipe  # noqa: E402
-from mpm_ref.nclaw.train.rollout import Laws, Trajectory, step  # noqa: E402
-from mpm_ref.nclaw.train.sysid import START, KnownReturn, KnownStress, known_laws  # noqa: E402
+from mpm_ref.nclaw.train.rollout import LawPair, step  # noqa: E402
+from mpm_ref.nclaw.train.train import drawn_laws  # noqa: E402
 from validation.nclaw.trained_laws import nets  # noqa: E402
 from validation.training.nclaw import begun  # noqa: E402
 
@@ -48,8 +54,8 @@ H = 1e-3 * 0.5 ** np.arange(5)
 @pytest.fixture(scope="module")
 def run():
     """`World` and `Trajectory` of a small cube that yields, and its constants."""
-    q, where = cube(STEPS).bodies[0].particles, world(cube(STEPS))
-    laws, on = yielding(log(E), TAU_Y), nodes(where, 1)
+    q, where = cube(STEPS).bodies[0].particles, make_world(cube(STEPS))
+    laws, on = yielding(log(E), TAU_Y), make_nodes(where, 1)
     states = [tuple(torch.from_numpy(a.copy())[None] for a in (q.x, q.v, q.C, q.F))]
     with torch.no_grad():
         for _ in range(STEPS):
@@ -58,9 +64,9 @@ def run():
 
 
 def yielding(log_E, tau_y):
-    """`Laws` of a return map on an elastic law."""
-    elastic = KnownStress(UNIT, log_E)
-    return Laws(elastic, KnownReturn(elastic, VonMises(tau_y, 0.05)))
+    """`LawPair` of a return map on an elastic law."""
+    elastic = IdentifiedLaw(UNIT, log_E)
+    return LawPair(elastic, IdentifiedFlow(elastic, VonMises(tau_y, 0.05)))
 
 
 def plasticine():
@@ -76,7 +82,7 @@ def test_known_stress_is_that_of_the_law(rng):
     law = Hencky(*(np.exp(LOG_E) * np.array(UNIT)))
     expected = [kirchhoff(tuple(map(tuple, A.tolist())), law) for A in F]
     with torch.no_grad():
-        found = KnownStress(UNIT, LOG_E)(torch.from_numpy(F)).numpy()
+        found = IdentifiedLaw(UNIT, LOG_E)(torch.from_numpy(F)).numpy()
     assert found == pytest.approx(np.array(expected), rel=1e-12)
 
 
@@ -126,18 +132,18 @@ def test_constants_begin_as_in_the_release():
     """log E at 0.8 of its value, yield stress and friction angle too."""
     jelly, sand, plastic = (begun(nets()[f"{name}-sys-id"]) for name in ("jelly", "sand",
                                                                          "plasticine"))
-    assert trained_of(jelly.elastic).kind == pytest.approx(make_law("fixed_corotated", E=1e4,
+    assert jelly.elastic.weights().kind == pytest.approx(make_law("fixed_corotated", E=1e4,
                                                                     nu=0.2))
     assert sand.elastic.log_E.item() == pytest.approx(0.8 * log(1e6))
     sine = np.sin(np.radians(20.0))
-    slope, s_min = trained_of(sand.plastic).kind
+    slope, s_min = sand.plastic.weights().kind
     assert (slope, s_min) == (pytest.approx(np.sqrt(2 / 3) * 2 * sine / (3 - sine)), 0.05)
-    assert trained_of(plastic.plastic).kind == (pytest.approx(4e3), 0.05)
+    assert plastic.plastic.weights().kind == (pytest.approx(4e3), 0.05)
 
 
 def test_fluid_keeps_what_its_pressure_needs(rng):
     """No constant of the projection is learned."""
-    elastic, plastic = known_laws(Fluid(0.5), 100.0, FluidProjection())
+    elastic, plastic = identified_laws(Fluid(0.5), 100.0, FluidProjection())
     F = torch.from_numpy(near_rest(5, 3, rng))
     with torch.no_grad():
         after = plastic(F)
@@ -154,7 +160,7 @@ def test_constants_that_are_not_learned_are_told():
     small, large = VonMises(TAU_Y, 0.05), VonMises(2.0 * TAU_Y, 0.05)
 
     def told(unit=UNIT, E=E, flow=small):
-        return [described(law) for law in known_laws(unit, E, flow)]
+        return [describe(law) for law in identified_laws(unit, E, flow)]
 
     assert told(E=2.0 * E, flow=large) == told()
     others = [told(unit=Hencky(0.4, 0.2)), told(unit=FixedCorotated(*UNIT)),
@@ -164,7 +170,7 @@ def test_constants_that_are_not_learned_are_told():
 
 def test_constants_are_found_from_motion(run):
     """Those with which the run was made; each at least twice as near as at the start."""
-    laws = known_laws(UNIT, E, VonMises(START * TAU_Y, 0.05))
+    laws = identified_laws(UNIT, E, VonMises(START * TAU_Y, 0.05))
 
     def off():
         learned = laws.elastic.log_E.item(), laws.plastic.log_own.item()
@@ -194,7 +200,7 @@ def test_laws_learn_their_labels(run):
     where, trajectory = run
     labels, told = labels_of(trajectory, TRUE, where.dt), []
     for _ in range(2):
-        laws = laws_of("labeled", 0, response.Stress(1e3), response.Correction(1e-2))
+        laws = drawn_laws("labeled", 0, response.Stress(1e3), response.Correction(1e-2))
         recipe = Recipe(epochs=30, elastic_rate=0.1, plastic_rate=0.1)
         told.append(train_labeled(recipe, laws, where, labels).history)
     assert told[0] == told[1]
@@ -208,7 +214,7 @@ def test_teaching_that_was_cut_off_goes_on_bit_for_bit(tmp_path, monkeypatch, ru
     labels, recipe = labels_of(run[1], TRUE, where.dt), Recipe(epochs=5)
 
     def taught(seed, *more):
-        laws = laws_of("labeled", seed, response.Stress(1e3), response.Correction(1e-2))
+        laws = drawn_laws("labeled", seed, response.Stress(1e3), response.Correction(1e-2))
         session = train_labeled(recipe, laws, where, labels, *more)
         return session.history, [a.tolist() for law in laws for a in law.parameters()]
 

@@ -19,7 +19,7 @@ from mpm_ref.materials.learned.strain_range import (
 )
 from mpm_ref.monitor import CHECK
 from mpm_ref.nclaw import strain_watch as watching
-from mpm_ref.nclaw.bodies import fresh, own
+from mpm_ref.nclaw.bodies import body_with_laws, copy_body
 from mpm_ref.nclaw.strain_watch import (
     MAX_EXCESS,
     StrainWatch,
@@ -28,7 +28,7 @@ from mpm_ref.nclaw.strain_watch import (
     time_step_warnings,
 )
 from mpm_ref.nclaw.train.recipe import Recipe
-from mpm_ref.nclaw.train.strains import LARGEST, cuts_of, met
+from mpm_ref.nclaw.train.strains import MAX_STRETCH, segment_cuts, training_bounds
 from mpm_ref.problem import Clock, Problem
 from mpm_ref.scene import SceneError, build, load
 from mpm_ref.simulate import State
@@ -204,54 +204,57 @@ def test_other_time_steps_are_told(clock, said):
 
 def soft(one):
     """A body of a softer law."""
-    return fresh(one, FixedCorotated(4e2, 3e2), one.flow)
+    return body_with_laws(one, FixedCorotated(4e2, 3e2), one.flow)
 
 
 def test_what_is_met_is_of_the_run_and_of_segments():
     """With the true laws, segments are the run; with others they strain otherwise."""
     run = observed(cube(40))
     alone = strain_bounds(run.F)
-    same = met(cube(40), run, own, [0, 5, 40])
+    same = training_bounds(cube(40), run, copy_body, [0, 5, 40])
     assert all(same[end] == pytest.approx(alone[end]) for end in alone)
-    other = met(cube(40), run, soft, [0, 40])
+    other = training_bounds(cube(40), run, soft, [0, 40])
     assert other["low"][-1] < 0.95 * alone["low"][-1]
     assert all(a <= b for a, b in zip(other["low"], alone["low"], strict=True))
     assert all(a >= b for a, b in zip(other["high"], alone["high"], strict=True))
-    assert met(cube(40), run, soft, []) == alone
+    assert training_bounds(cube(40), run, soft, []) == alone
 
 
 def test_segments_begin_in_the_observed_state():
     """The short one of the late run strains otherwise than the long one."""
     run = observed(cube(40))
-    late, whole, alone = met(cube(40), run, soft, [30, 40]), met(cube(40), run, soft, [0, 40]), \
-        strain_bounds(run.F)
+    late = training_bounds(cube(40), run, soft, [30, 40])
+    whole = training_bounds(cube(40), run, soft, [0, 40])
+    alone = strain_bounds(run.F)
     assert late["high"][0] > 1.01 * alone["high"][0]
     assert late["low"] == alone["low"]
     assert whole["low"][-1] < 0.95 * alone["low"][-1]
 
 
+def stiff(mu, lam):
+    return lambda body: body_with_laws(body, FixedCorotated(mu, lam), body.flow)
+
+
 def test_segments_that_break_down_count_as_far_as_they_went():
     run = observed(cube(12))
-    found = met(cube(12), run, lambda one: fresh(one, FixedCorotated(4e6, 3e6), one.flow),
-                [0, 12])
-    assert max(map(abs, found["low"] + found["high"])) <= LARGEST
+    found = training_bounds(cube(12), run, stiff(4e6, 3e6), [0, 12])
+    assert max(map(abs, found["low"] + found["high"])) <= MAX_STRETCH
     assert found["high"][0] > 1.1 * strain_bounds(run.F)["high"][0]
-    hopeless = met(cube(12), run, lambda one: fresh(one, FixedCorotated(1e200, 1e200), one.flow),
-                   [0, 12])
+    hopeless = training_bounds(cube(12), run, stiff(1e200, 1e200), [0, 12])
     assert hopeless == strain_bounds(run.F)
 
 
 def test_frames_that_were_not_seen_are_left_out():
     run = observed(cube(6))
     run.F[3] = np.nan
-    assert np.isfinite(met(cube(6), run, lambda one: one, [])["low"]).all()
+    assert np.isfinite(training_bounds(cube(6), run, lambda one: one, [])["low"]).all()
 
 
 def test_cuts_are_those_of_an_epoch():
     recipe = Recipe(epochs=10)
-    assert len(cuts_of(recipe, 1000, 1)) == 41
-    assert len(cuts_of(recipe, 1000)) < len(cuts_of(recipe, 1000, 5)) < 41
-    assert cuts_of(recipe, 1000)[-1] == 1000
+    assert len(segment_cuts(recipe, 1000, 1)) == 41
+    assert len(segment_cuts(recipe, 1000)) < len(segment_cuts(recipe, 1000, 5)) < 41
+    assert segment_cuts(recipe, 1000)[-1] == 1000
 
 
 # scenes and the command line

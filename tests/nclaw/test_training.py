@@ -11,14 +11,19 @@ torch = pytest.importorskip("torch")
 
 from mpm_ref import training  # noqa: E402
 from mpm_ref.materials.learned.response import Correction, PlainStress, Stress  # noqa: E402
-from mpm_ref.nclaw.batched_step import world  # noqa: E402
+from mpm_ref.nclaw.batched_step import make_world  # noqa: E402
 from mpm_ref.nclaw.train import fit  # noqa: E402
-from mpm_ref.nclaw.train.ablations import UnshiftedLaw  # noqa: E402
-from mpm_ref.nclaw.train.fit import Diverged, Session, train  # noqa: E402
-from mpm_ref.nclaw.train.neural_laws import NeuralLaw, neural_laws  # noqa: E402
+from mpm_ref.nclaw.train.fit import TrajectorySession, train  # noqa: E402
+from mpm_ref.nclaw.train.neural_laws import (  # noqa: E402
+    NeuralLawModule,
+    NoFlowModule,
+    UnshiftedLawModule,
+    neural_laws,
+)
+from mpm_ref.nclaw.train.observations import Trajectory, trajectory_of  # noqa: E402
 from mpm_ref.nclaw.train.recipe import Recipe  # noqa: E402
-from mpm_ref.nclaw.train.rollout import Laws, Trajectory, trajectory_of  # noqa: E402
-from mpm_ref.nclaw.train.unchanged import Unchanged  # noqa: E402
+from mpm_ref.nclaw.train.rollout import LawPair  # noqa: E402
+from mpm_ref.nclaw.train.session import Diverged  # noqa: E402
 from mpm_ref.trajectories import observed  # noqa: E402
 
 STEPS = 11          # segments of 3 and 2 steps
@@ -31,7 +36,7 @@ pytestmark = pytest.mark.usefixtures("one_torch_thread")
 def run():
     """`World` and `Trajectory` of a small cube."""
     problem = cube(STEPS)
-    return world(problem), trajectory_of(observed(problem))
+    return make_world(problem), trajectory_of(observed(problem))
 
 
 def laws():
@@ -79,15 +84,15 @@ def test_errors_are_of_positions_whatever_velocities_weigh(run):
 def test_a_training_says_what_its_errors_are_of(run):
     """Checkpoints with a term of velocities that do not say it had that in their errors."""
     for weight in (0.0, 1e-4):
-        session = Session(replace(SHORT, velocity=weight), laws(), *run)
-        assert ("errors_of" in json.loads(session.named)) == (weight > 0.0)
+        session = TrajectorySession(replace(SHORT, velocity=weight), laws(), *run)
+        assert ("errors_of" in json.loads(session.settings)) == (weight > 0.0)
     session.epoch()
-    assert session.known == {"errors": [session.history[0].error], "errors_of": "positions"}
+    assert session.errors == {"errors": [session.history[0].error], "errors_of": "positions"}
 
 
 def first_gradients(recipe, laws, run):
     """Those that the first epoch steps with, and what it says."""
-    session = Session(recipe, laws, *run)
+    session = TrajectorySession(recipe, laws, *run)
     session.epoch()
     return [a.grad for a in parameters(laws)], session.history[0]
 
@@ -112,7 +117,7 @@ def test_a_batch_changes_nothing_but_round_off(run, monkeypatch, batch):
     monkeypatch.setattr(torch.Tensor, "float", torch.Tensor.double)
     found, said = [], []
     for recipe in (SHORT, replace(SHORT, batch=batch)):
-        doubles = Laws(*(law.double() for law in laws()))
+        doubles = LawPair(*(law.double() for law in laws()))
         for into, what in zip((found, said), first_gradients(recipe, doubles, run)):
             into.append(what)
     assert said[1].loss == pytest.approx(said[0].loss, rel=1e-12)
@@ -134,7 +139,7 @@ def test_gradients_are_cut_to_a_norm_law_by_law(run):
 
 def test_rates_fall_by_half_a_cosine(run):
     """NCLAW-train: each law at its own rate, down to zero."""
-    rates, session = [], Session(SHORT, laws(), *run)
+    rates, session = [], TrajectorySession(SHORT, laws(), *run)
     for _ in range(SHORT.epochs):
         rates.append([optimiser.param_groups[0]["lr"] for optimiser in session.optimisers])
         session.epoch()
@@ -150,7 +155,7 @@ def test_one_law_alone_is_trained(run):
 
     elastic = laws().elastic
     before = [a.clone() for a in elastic.parameters()]
-    session = train(SHORT, Laws(elastic, Identity()), *run)
+    session = train(SHORT, LawPair(elastic, Identity()), *run)
     assert [epoch.steepness[1] for epoch in session.history] == [0.0] * SHORT.epochs
     assert not any(map(torch.equal, before, elastic.parameters()))
 
@@ -249,10 +254,12 @@ def test_a_checkpoint_of_another_recipe_is_refused(checkpoint, run, settings):
 
 
 @pytest.mark.parametrize("others", [
-    {"elastic": lambda: NeuralLaw(Stress(2e5))}, {"elastic": lambda: NeuralLaw(PlainStress(1e5))},
-    {"elastic": lambda: NeuralLaw(Stress(1e5), hidden=(64, 8))},
-    {"elastic": lambda: UnshiftedLaw(Stress(1e5))}, {"plastic": lambda: Unchanged(Correction(0.1))},
-    {"plastic": lambda: NeuralLaw(Correction(0.2))}],
+    {"elastic": lambda: NeuralLawModule(Stress(2e5))},
+    {"elastic": lambda: NeuralLawModule(PlainStress(1e5))},
+    {"elastic": lambda: NeuralLawModule(Stress(1e5), hidden=(64, 8))},
+    {"elastic": lambda: UnshiftedLawModule(Stress(1e5))},
+    {"plastic": lambda: NoFlowModule(Correction(0.1))},
+    {"plastic": lambda: NeuralLawModule(Correction(0.2))}],
     ids=["unit", "kind", "sizes", "biases", "class", "alpha"])
 def test_a_checkpoint_of_other_laws_is_refused(checkpoint, run, others):
     begun = laws()._replace(**{part: make() for part, make in others.items()})

@@ -21,7 +21,7 @@ def test_options_are_named_in_the_file(problem, tmp_path):
     oracle.record(problem, tmp_path / "golden.h5", 1, eps=EPS)
     with h5py.File(tmp_path / "golden.h5") as f:
         options = json.loads(f.attrs["options"])
-        assert f.attrs["cells"] == 0.0
+        assert f.attrs["displacement_tolerance"] == 0.0
     assert options["cycle"]["smoother"] == "gauss-seidel"
     assert options["search"]["shrink"] == 0.5
 

@@ -14,11 +14,11 @@ from mpm_ref.rom.study.case import case
 from mpm_ref.rom.study.evaluate import NEAREST, REDUCED, Held, breakdowns, course
 from mpm_ref.rom.study.run import Way
 from mpm_ref.rom.study.watch import watch, watched
+from validation.common.scenes import with_
 from validation.extremes import ldm_runs
 from validation.ldm import reduced_runs
 from validation.ldm.studies import GRAVITY
 from validation.ldm.timing import Online
-from validation.verification.scenes import with_
 
 FAULTS = [NoBody("no body"), OutOfRange("nowhere"), np.linalg.LinAlgError("singular")]
 X = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])

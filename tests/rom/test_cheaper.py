@@ -20,9 +20,9 @@ from mpm_ref.rom.study.run import Way, groups, march, model, picked, stepped
 from mpm_ref.rom.study.tables import Run
 from mpm_ref.rom.weights import Model
 from mpm_ref.scene import Box, Cylinder, Difference, Union
+from validation.common.scenes import with_
 from validation.ldm.networks import trained
 from validation.ldm.studies import GRAVITY, POKES, TORSION
-from validation.verification.scenes import with_
 
 DX = 0.11
 

@@ -14,8 +14,8 @@ from mpm_ref.rom.study import watch as watching
 from mpm_ref.rom.study.case import case
 from mpm_ref.rom.study.run import Way, march
 from mpm_ref.rom.study.watch import MEMORY, Nonsense, Sight, Watch, seen, watch, watched
+from validation.common.scenes import with_
 from validation.ldm.studies import GRAVITY
-from validation.verification.scenes import with_
 
 WELL = Sight(beyond=0.3, off=0.01, seen=0.9, blind=0, lost=0.0, J=0.8, inverted=0.0, far=0.9)
 DX, DT = 0.1, 0.02

@@ -12,7 +12,7 @@ from mpm_ref.materials.learned.energetic import EnergyLaw
 from mpm_ref.materials.learned.spline import SplineStress, knots
 from mpm_ref.materials.learned.stretch_network import StretchStress
 from mpm_ref.materials.learned.weights import LawWeights, LearnedLaws, load
-from mpm_ref.nclaw.bodies import learned
+from mpm_ref.nclaw.bodies import body_maker
 from mpm_ref.nclaw.study.compare import positions
 from mpm_ref.scene import SceneError, build
 from mpm_ref.scene import load as load_scene
@@ -51,7 +51,7 @@ def test_admissible_laws_are_a_material_with_an_energy(scene):
     done = mpm_ref("run", scene, "--out", out)
     assert done.exit_code == 0, done.output
     true = build(load_scene(write_scene(scene.parent, name="true.toml")))
-    *_, last = positions(true, tuple(map(learned(load(file)), true.bodies)))
+    *_, last = positions(true, tuple(map(body_maker(load(file)), true.bodies)))
     with Results(out) as results:
         assert np.array_equal(results.field("cube", "x")[-1], last)
         assert results.energy[-1, 1] > 0.0

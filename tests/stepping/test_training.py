@@ -12,7 +12,7 @@ from mpm_ref.training import part
 
 
 @pytest.mark.parametrize(("asked", "said"), [
-    (training.drive, 'laws are trained with PyTorch, which is not installed: pip install '
+    (training.trainer, 'laws are trained with PyTorch, which is not installed: pip install '
                      '"mpm_ref[learn]", or `make learn` in the repository; laws that were trained '
                      'run, export and plot without it'),
     (reduce.training, 'a network is trained with PyTorch, which is not installed: pip install '
@@ -32,7 +32,7 @@ def test_another_module_that_is_missing_is_named():
 
 def test_with_pytorch_the_part_is_there():
     pytest.importorskip("torch")
-    assert training.drive().__name__ == "mpm_ref.nclaw.train.train"
+    assert training.trainer().__name__ == "mpm_ref.nclaw.train.train"
     assert reduce.training().__name__ == "mpm_ref.rom.train.settings"
 
 

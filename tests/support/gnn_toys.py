@@ -4,8 +4,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from mpm_ref.nclaw.gnn.history import HISTORY, Box, Reading, Scales, begun
-from mpm_ref.nclaw.gnn.network import Network, Perceptron
+from mpm_ref.nclaw.gnn.features import (
+    HISTORY,
+    FeatureSettings,
+    MotionScales,
+    WallBox,
+    straight_flight,
+)
+from mpm_ref.nclaw.gnn.network import GraphWeights, PerceptronWeights
 from mpm_ref.nclaw.gnn.simulator import Simulator
 
 DT = 2.5e-3         # [s] from frame to frame
@@ -14,26 +20,27 @@ WIDTH, BLOCKS = 6, 3
 
 
 def perceptron(rng, inputs, outputs, norm=True):
-    """A `Perceptron` with random numbers in it."""
+    """A `PerceptronWeights` with random numbers in it."""
     layers = tuple((rng.normal(size=(n, m)) / np.sqrt(n), 0.3 * rng.normal(size=m))
                    for n, m in pairwise((inputs, WIDTH, WIDTH, outputs)))
     scale = (1.0 + 0.2 * rng.normal(size=outputs), 0.1 * rng.normal(size=outputs))
-    return Perceptron(layers, scale if norm else ())
+    return PerceptronWeights(layers, scale if norm else ())
 
 
 def network(d=3, seed=0):
-    """A `Network` with random numbers in it."""
+    """A `GraphWeights` with random numbers in it."""
     rng = np.random.default_rng(seed)
     blocks = tuple((perceptron(rng, 3 * WIDTH, WIDTH), perceptron(rng, 2 * WIDTH, WIDTH))
                    for _ in range(BLOCKS))
-    return Network(perceptron(rng, (HISTORY + 2) * d, WIDTH), perceptron(rng, d + 1, WIDTH),
+    return GraphWeights(perceptron(rng, (HISTORY + 2) * d, WIDTH), perceptron(rng, d + 1, WIDTH),
                    blocks, perceptron(rng, WIDTH, d, norm=False))
 
 
 def reading(d=3):
-    """`Reading` of points that fly at about 1 m/s."""
-    return Reading(RADIUS, DT, Scales(np.linspace(-1e-3, 1e-3, d), np.linspace(2e-3, 3e-3, d),
-                                      np.linspace(1e-6, 2e-6, d), np.linspace(3e-4, 4e-4, d)))
+    """`FeatureSettings` of points that fly at about 1 m/s."""
+    scales = MotionScales(np.linspace(-1e-3, 1e-3, d), np.linspace(2e-3, 3e-3, d),
+                          np.linspace(1e-6, 2e-6, d), np.linspace(3e-4, 4e-4, d))
+    return FeatureSettings(RADIUS, DT, scales)
 
 
 def simulator(d=3, seed=0):
@@ -43,7 +50,7 @@ def simulator(d=3, seed=0):
 
 def box(d=3):
     """The box from 0 to 1."""
-    return Box(np.zeros(d), np.ones(d))
+    return WallBox(np.zeros(d), np.ones(d))
 
 
 def flight(d=3, n=40, seed=0):
@@ -56,7 +63,7 @@ def frames(d=3, n=40, seed=0):
     """Frames (HISTORY + 1, n, d) of a flight that is not quite straight."""
     x, v = flight(d, n, seed)
     bends = 1e-4 * np.random.default_rng(seed + 1).normal(size=(HISTORY + 1, n, d))
-    return begun(x, v, DT) + bends
+    return straight_flight(x, v, DT) + bends
 
 
 def braked(k=7, seed=0):

@@ -9,7 +9,7 @@ from hot_steps import DT, DX, block, conditions, unit
 from mpm_ref.core.boundary import Collider, Conditions
 from mpm_ref.core.levelset import half_space
 from mpm_ref.explicit import Scheme
-from mpm_ref.hot.methods import Options
+from mpm_ref.hot.methods import SolverOptions
 from mpm_ref.hot.multigrid.hierarchy import hierarchy
 from mpm_ref.oracle import accepted_step, implicit_stages, recording
 from mpm_ref.oracle.implicit_recording import started
@@ -64,7 +64,7 @@ def step_of(problem, golden, k, real=np.float64):
     step = golden[f"steps/{k}"]
     posed = replace(problem, bodies=bodies_at(problem, golden, k))
     stepper, (t, dt) = started(posed), (step.attrs["t"], step.attrs["dt"])
-    pose = stepper.pose(posed.bodies, t, dt)
+    pose = stepper.problem(posed.bodies, t, dt)
     system, twin = stepper.system(pose), SolvedTwin(posed, pose.unknowns, dt, real)
     seen = twin.before() | twin.conditions() | {"kappa": twin.kappa(), "nodes": system.index}
     trial, probe, load = given(step)
@@ -83,10 +83,10 @@ def step_of(problem, golden, k, real=np.float64):
 def multigrid(step, system, load):
     """{key: array} of multigrid on SciPy matrices."""
     A = system.matrix(system.start)
-    grids = hierarchy(A, system.index, path="scipy")
+    grids = hierarchy(A, system.index, implementation="scipy")
     seen = {"cycle": grids.cycle(load)}
     g = system.evaluate(system.start)[1]
-    options = Options(path="scipy")
+    options = SolverOptions(implementation="scipy")
     seen["direction"] = implicit_stages.direction(system, A, g, options)
     for k, (fine, coarse) in enumerate(zip(grids.levels, grids.levels[1:]), 1):
         W = embedding(fine.index, coarse.index, "linear")

@@ -53,7 +53,7 @@ def stepper_of(d, side=None, options=None):
 def pose_of(d, side=None):
     """The pose of the first step."""
     stepper, bodies = stepper_of(d, side)
-    return stepper.pose(bodies, 0.0, DT)
+    return stepper.problem(bodies, 0.0, DT)
 
 
 def walls(d, low, high):

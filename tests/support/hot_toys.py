@@ -37,9 +37,9 @@ class Toy:
 
     def evaluate(self, dv):
         self.calls["evaluate"] += 1
-        return self._energy(dv), self.free(self.functions[1](dv))
+        return self._energy(dv), self.project(self.functions[1](dv))
 
-    def free(self, u):
+    def project(self, u):
         return np.einsum("nab,nb->na", self.B, u)
 
     def dense(self, dv):
@@ -206,6 +206,6 @@ def exactly(monkeypatch):
         built.append(Exact(*arguments, **more))
         return built[-1]
     monkeypatch.setattr(linearization, "hierarchy", build)
-    monkeypatch.setattr(linearization, "hierarchy_of",
+    monkeypatch.setattr(linearization, "hierarchy_from_matrices",
                         lambda matrices, *_, **__: build(*matrices[0]))
     return built

@@ -8,7 +8,7 @@ from mpm_ref.body import Body, particles_at
 from mpm_ref.core.boundary import Conditions, nclaw_walls
 from mpm_ref.explicit import Scheme
 from mpm_ref.materials import FixedCorotated, NoFlow
-from mpm_ref.nclaw.batched_step import States, world
+from mpm_ref.nclaw.batched_step import States, make_world
 from mpm_ref.problem import Clock, Problem
 
 DX, DT = 0.05, 5e-4
@@ -71,7 +71,7 @@ def cube(steps, seed=0):
 
 def world_of(states, clip=(LOWER, UPPER)):
     """Their `World`."""
-    return world(problem_of(states, 0, clip))
+    return make_world(problem_of(states, 0, clip))
 
 
 def random_like(states, rng, sizes=None):

@@ -86,7 +86,7 @@ def softest(setup, method):
     """Least x.H x / x.P x of the Hessian H and its projection P where a solve ended."""
     with np.errstate(all="ignore"):
         stepper = stepper_of(setup._replace(bodies=copied(setup.bodies)), method)
-        pose = stepper.pose(setup.bodies, 0.0, setup.dt)
+        pose = stepper.problem(setup.bodies, 0.0, setup.dt)
         dv = stepper.solve(pose)
     H = pose.potential.tangent(dv, projected=False).matrix().toarray()
     P = pose.potential.tangent(dv).matrix().toarray()
@@ -100,7 +100,8 @@ def stretched(run):
     moduli = run.choose(quick=(1e6,), standard=(1e4, 1e6))
     stopped = sweep(run, "stretched", cases(run, STRETCHED, moduli), "L-BFGS is slow by the first "
                     "inverse, far from where it was taken: see extremes.hot.stretched.rebuilt")
-    again = [solve(setup, "hot", rebuild=REBUILD) for setup, e in stopped if e.method == "hot"]
+    again = [solve(setup, "hot", rebuild_every=REBUILD)
+             for setup, e in stopped if e.method == "hot"]
     run.record("extremes.hot.stretched.rebuilt", max((e.iterations for e in again), default=0),
                comparator="info", scale=f"{len(again)} solves in which HOT reached its cap",
                note=f"outer iterations, at most, if HOT takes a new Hessian every {REBUILD} of "

@@ -14,7 +14,7 @@ CELLS = {2: (6, 6), 3: (4, 4, 4)}
 KINDS = ("sticky", "slip", "separate")
 GAP, SPEED = 1.5 * DX, 5.0          # between the pieces [m]; of each towards or from the other
 MODULI = (1e2, 1e4, 1e6, 1e8, 1e10, 1e12)
-WAYS = {"zero": {}, "gravity": {"start": "gravity"}, "held": {"cells": 1e-3}}
+WAYS = {"zero": {}, "gravity": {"start": "gravity"}, "held": {"displacement_tolerance": 1e-3}}
 
 
 def floor(d, kind):

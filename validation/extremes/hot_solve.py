@@ -14,7 +14,7 @@ from mpm_ref.core.state import Particles
 from mpm_ref.explicit import Scheme, deform_body, gather
 from mpm_ref.hot.methods import METHODS as ALL
 from mpm_ref.hot.norms import scaled_norm
-from mpm_ref.hot.step import REVISIONS, ImplicitStepper, put
+from mpm_ref.hot.step import MAX_UPDATES, ImplicitStepper, write_velocities
 
 METHODS = ("hot", "hot-plus", "lbfgs-h", "pn-pcg", "pn-mgpcg")
 EPS = 1e-7                          # the paper's
@@ -51,7 +51,7 @@ class End(NamedTuple):
 
 def options(method, **changes):
     """The method's `Options` with the caps of these experiments."""
-    return replace(ALL[method], **{"iterations": OUTER, "cg_iterations": CG, **changes})
+    return replace(ALL[method], **{"max_iterations": OUTER, "max_cg_iterations": CG, **changes})
 
 
 def stepper_of(setup, method, **changes):
@@ -67,13 +67,13 @@ def solve(setup, method, **changes):
     setup = setup._replace(bodies=copied(setup.bodies))
     with np.errstate(all="ignore"):
         stepper = stepper_of(setup, method, **changes)
-        pose = stepper.pose(setup.bodies, 0.0, setup.dt)
+        pose = stepper.problem(setup.bodies, 0.0, setup.dt)
         dv = stepper.solve(pose)
         wrong = wrong_with(stepper, pose, dv) or wrong_after(stepper, setup, pose, dv)
     r = stepper.report
     kind = wrong or (CONVERGED if r.converged else STOPPED)
-    return End(method, kind, r.iterations, r.inner, r.evaluations, r.backtracks, r.residuals[0],
-               min(r.residuals), sum(r.seconds.values()), r.why)
+    return End(method, kind, r.iterations, r.cg_iterations, r.evaluations, r.backtracks,
+               r.residuals[0], min(r.residuals), sum(r.seconds.values()), r.message)
 
 
 def copied(bodies):
@@ -85,17 +85,18 @@ def copied(bodies):
 def wrong_with(stepper, pose, dv):
     """What a solve did that it must not do; "" if nothing."""
     r, chosen = stepper.report, stepper.options
-    solves = stepper.revisions + 1
-    searches = r.iterations + r.refreshes + solves
-    if r.iterations > chosen.iterations * solves or r.inner > chosen.cg_iterations * searches:
+    solves = stepper.active_set_updates + 1
+    searches = r.iterations + r.restarts + solves
+    if (r.iterations > chosen.max_iterations * solves
+            or r.cg_iterations > chosen.max_cg_iterations * searches):
         return "more iterations than its caps"
-    if r.evaluations > solves + PER_SEARCH * searches or stepper.revisions >= REVISIONS:
+    if r.evaluations > solves + PER_SEARCH * searches or stepper.active_set_updates >= MAX_UPDATES:
         return "more evaluations than its caps"
     if not np.isfinite(dv).all():
         return "increment not finite"
-    if not (r.converged or r.why):
+    if not (r.converged or r.message):
         return "no reason given"
-    return "" if stepper.revisions else wrong_at(stepper.system(pose), chosen, r, dv)
+    return "" if stepper.active_set_updates else wrong_at(stepper.system(pose), chosen, r, dv)
 
 
 def wrong_at(system, chosen, report, dv):
@@ -114,7 +115,7 @@ def wrong_after(stepper, setup, pose, dv):
     """Moves the particles by the step: what of them is not finite then; "" if nothing."""
     if not all(np.isfinite(a).all() for b in setup.bodies for a in b.particles):
         return ""                   # nor was it before
-    put(pose.grid, pose.unknowns, pose.unknowns.v + dv)
+    write_velocities(pose.grid, pose.unknowns, pose.unknowns.v + dv)
     for body in setup.bodies:
         gather(body, pose.grid, stepper.scheme, setup.dt)
         deform_body(body, setup.dt)

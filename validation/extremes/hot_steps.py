@@ -27,13 +27,14 @@ def march(setup, method, steps, **changes):
             reports.append(stepper.report)
             if not all(np.isfinite(a).all() for body in bodies for a in body.particles):
                 return together(method, reports, f"step {k + 1} left particles not finite"), bodies
-    why = next((r.why for r in reports if not r.converged), "")
+    why = next((r.message for r in reports if not r.converged), "")
     return together(method, reports, STOPPED if why else CONVERGED, why), bodies
 
 
 def together(method, reports, kind, why=""):
     """`End` of several reports: iterations are those of the worst step, inner ones of all."""
-    return End(method, kind, max(r.iterations for r in reports), sum(r.inner for r in reports),
+    return End(method, kind, max(r.iterations for r in reports),
+               sum(r.cg_iterations for r in reports),
                max(r.evaluations for r in reports), sum(r.backtracks for r in reports),
                max(r.residuals[0] for r in reports), max(min(r.residuals) for r in reports),
                sum(sum(r.seconds.values()) for r in reports), why)

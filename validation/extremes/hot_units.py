@@ -44,7 +44,7 @@ def solved(setup, method):
     """(`Report`, increment (n, d)) of one step."""
     setup = setup._replace(bodies=copied(setup.bodies))
     stepper = stepper_of(setup, method)
-    dv = stepper.solve(stepper.pose(setup.bodies, 0.0, setup.dt))
+    dv = stepper.solve(stepper.problem(setup.bodies, 0.0, setup.dt))
     return stepper.report, dv
 
 
@@ -67,7 +67,8 @@ def apart(setup, method, units, rng):
     residuals = float(np.max(np.abs(b / a - 1.0))) if len(a) == len(b) else np.inf
     digit = max(far(solved(jittered(setup, rng), method)[1], dv) for _ in range(TRIALS))
     increment = far(dv_new * units.T / units.L, dv)
-    return Apart(residuals, increment, digit, r.iterations, r_new.iterations, r.inner, r_new.inner)
+    return Apart(residuals, increment, digit, r.iterations, r_new.iterations,
+                 r.cg_iterations, r_new.cg_iterations)
 
 
 def far(dv, from_dv):

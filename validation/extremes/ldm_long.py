@@ -14,8 +14,8 @@ from mpm_ref.rom.study.case import case
 from mpm_ref.rom.study.run import Way
 
 from ..common.registry import experiment
+from ..common.scenes import with_
 from ..ldm.studies import GRAVITY
-from ..verification.scenes import with_
 from .ldm_runs import Trial, ended, full, learned, record_silent, table_of
 
 LONGER = 10

@@ -6,8 +6,8 @@ from mpm_ref.rom.study.case import case
 from mpm_ref.rom.study.run import Way
 
 from ..common.registry import experiment
+from ..common.scenes import with_
 from ..ldm.studies import GRAVITY, POKES, TORSION
-from ..verification.scenes import with_
 from .ldm_runs import FLAGGED, STOPPED, Trial, ended, full, learned, record_silent, table_of
 
 OF = {"gravity-r4": "gravity", "gravity-r7": "gravity", "torsion-0": "torsion", "poke": "poke"}

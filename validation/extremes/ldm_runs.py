@@ -22,8 +22,8 @@ from mpm_ref.rom.study.watch import Nonsense, watch, watched
 from mpm_ref.simulate import simulate
 from mpm_ref.trajectories import in_order
 
+from ..common.scenes import threads_for
 from ..ldm.networks import trained
-from ..verification.scenes import threads_for
 
 BAD = 5.0           # times the error that is usual for the map
 TOLERABLE = 1.0     # [%], the axis of LDM's Figure 9

@@ -4,8 +4,8 @@ from mpm_ref.rom.study.case import case
 from mpm_ref.rom.study.run import SCHEMES, Way
 
 from ..common.registry import experiment
+from ..common.scenes import with_
 from ..ldm.studies import GRAVITY
-from ..verification.scenes import with_
 from .ldm_range import beside
 from .ldm_runs import FINE, Trial, ended, full, learned, record_silent, table_of
 

@@ -1,11 +1,11 @@
 """Laws of unfinished trainings, run freely: in training they are only ever run for a horizon."""
 
-from mpm_ref.nclaw.bodies import learned
+from mpm_ref.nclaw.bodies import body_maker
 
 from ..common.registry import experiment
+from ..common.scenes import with_
 from ..common.weights_needed import there
 from ..nclaw.small_trainings import OF_EPOCHS, bundled
-from ..verification.scenes import with_
 from .nclaw_runs import EVERY, SHORT, Law, Setup, record_silent, table_of, trials
 from .nclaw_strain import thrown
 from .nclaw_time_step import longer
@@ -32,7 +32,7 @@ def of_training(run, net, kept):
     setups, found = tried(run, net), {}
     for epoch in sorted({*kept} & {*(EPOCHS[run.profile] or kept), max(kept)}, reverse=True):
         laws = kept[epoch]
-        law = Law(f"{net.environment} after {epoch}", net.environment, learned(laws),
+        law = Law(f"{net.environment} after {epoch}", net.environment, body_maker(laws),
                   laws.about["seen"], laws.about["dt"])
         usual = found[max(kept)][0].usual if found else None
         found[epoch] = trials(run, law, setups, usual)

@@ -6,13 +6,13 @@ import numpy as np
 
 from mpm_ref.energy import kinetic
 from mpm_ref.monitor import volume_ratio
-from mpm_ref.nclaw.bodies import own
+from mpm_ref.nclaw.bodies import copy_body
 from mpm_ref.nclaw.strain_watch import strain_report
-from mpm_ref.nclaw.study.compare import Broken, positions
+from mpm_ref.nclaw.study.compare import RunBroken, positions
 from mpm_ref.scene import build
 
 from ..common.registry import experiment
-from ..verification.scenes import threads_for
+from ..common.scenes import threads_for
 from .nclaw_runs import laws, scene_for
 
 STEPS = {"quick": 500, "standard": 5000}
@@ -51,14 +51,14 @@ def long_run(run):
 def drawn_out(law, scene):
     """`Row`s of a long run, and the sentence with which it stopped."""
     problem, beside = build(scene), build(scene)
-    body, true = law.make(problem.bodies[0]), own(beside.bodies[0])
+    body, true = law.make(problem.bodies[0]), copy_body(beside.bodies[0])
     rows, said = [], ""
     with threads_for(problem.bodies):
         run = positions(problem, (body,))
         for k, x in enumerate(positions(beside, (true,))):
             try:
                 at = next(run)
-            except Broken as end:
+            except RunBroken as end:
                 said = str(end)
                 break
             rows.append(row(k * scene.every, (body, true), (at, x), law.bounds))

@@ -13,16 +13,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.nclaw.bodies import learned, own
+from mpm_ref.nclaw.bodies import body_maker, copy_body
 from mpm_ref.nclaw.strain_watch import strain_report
-from mpm_ref.nclaw.study.compare import Broken, positions
+from mpm_ref.nclaw.study.compare import RunBroken, positions
 from mpm_ref.scene import build
 
+from ..common.scenes import threads_for
 from ..common.weights_needed import there
 from ..nclaw.environments import ENVIRONMENTS, environment
 from ..nclaw.strain_bounds import met_by
 from ..nclaw.trained_laws import trained
-from ..verification.scenes import threads_for
 
 BAD = 3.0           # times the mean squared error that is usual for the law
 BADS = 2.0, BAD, 5.0, 10.0
@@ -94,7 +94,7 @@ class Trial(NamedTuple):
 def law(name):
     """`Law` of the weights of an environment. Raises `Untrained`."""
     laws = trained(name)
-    return Law(name, name, learned(laws), met_by(name), environment(name).dt)
+    return Law(name, name, body_maker(laws), met_by(name), environment(name).dt)
 
 
 def laws(run):
@@ -112,7 +112,7 @@ def scene_for(run, name, **changes):
 def ended(law, setup):
     """`End` of a `Setup` with a learned law, beside its own laws."""
     problem, beside = build(setup.scene), build(setup.scene)
-    body, true = law.make(problem.bodies[0]), own(beside.bodies[0])
+    body, true = law.make(problem.bodies[0]), copy_body(beside.bodies[0])
     for one in (body, true):
         strain(one, setup.F)
     errors, sights, said = [], [], ""
@@ -121,7 +121,7 @@ def ended(law, setup):
         for x in positions(beside, (true,)):
             try:
                 errors.append(float(np.mean((next(run) - x) ** 2)))
-            except Broken as end:
+            except RunBroken as end:
                 said = str(end)
                 break
             sights.append(strain_report(body, law.bounds))

@@ -14,7 +14,7 @@ from mpm_ref.core.spectral import UNDETERMINED
 from mpm_ref.explicit import deform_body, initial_stress
 from mpm_ref.materials.learned.invariants import spectrum
 from mpm_ref.materials.learned.strain_range import excess, strain_measures
-from mpm_ref.nclaw.bodies import gradients, points, stresses
+from mpm_ref.nclaw.bodies import deformation_gradients, kirchhoff_stresses, material_points
 from mpm_ref.nclaw.strain_watch import MAX_EXCESS
 from mpm_ref.scene import build
 
@@ -56,10 +56,10 @@ def asked(s, rng):
 def answered(of, F):
     """`Answers` of (law, flow)."""
     with np.errstate(all="ignore"):
-        body, again = points(*of, F), points(*of, F)
+        body, again = material_points(*of, F), material_points(*of, F)
         initial_stress(body)
         deform_body(again, 1.0)
-        return Answers(stresses(body).copy(), gradients(again).copy())
+        return Answers(kirchhoff_stresses(body).copy(), deformation_gradients(again).copy())
 
 
 def off(found, expected, unit):

@@ -5,8 +5,8 @@ one that they were trained on.
 import numpy as np
 
 from ..common.registry import experiment
+from ..common.scenes import with_
 from ..nclaw.tasks import SEEDS, velocity
-from ..verification.scenes import with_
 from .nclaw_runs import (
     CHOSEN,
     EVERY,

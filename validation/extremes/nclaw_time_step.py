@@ -5,7 +5,7 @@ in shorter steps it corrects more often.
 """
 
 from ..common.registry import experiment
-from ..verification.scenes import with_
+from ..common.scenes import with_
 from .nclaw_runs import EVERY, Setup, laws, record_silent, scene_for, table_of, trials
 
 FACTORS = {"quick": (1.0, 4.0), "standard": (1.0, 0.25, 0.5, 2.0, 4.0)}     # trained first

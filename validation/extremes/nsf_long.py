@@ -11,7 +11,7 @@ from mpm_ref.simulate import simulate
 from mpm_ref.timestep import TooLarge
 
 from ..common.registry import experiment
-from ..verification.scenes import with_
+from ..common.scenes import with_
 from .ldm_long import LONGER, distance
 from .nsf_runs import GONE, Bench, scenes
 

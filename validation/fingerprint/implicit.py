@@ -15,10 +15,10 @@ SETUPS = {
                        "longest": 0.02, "cfl": 0.6}),
 }
 VARIANTS = {        # of HOT: changes of its options
-    "displacement-stop": {"cells": 1e-3},
-    "scipy": {"path": "scipy"},
-    "rebuild": {"rebuild": 2, "start": "gravity"},
-    "shortened": {"renew": "shortened", "jacobi": "scalar"},
+    "displacement-stop": {"displacement_tolerance": 1e-3},
+    "scipy": {"implementation": "scipy"},
+    "rebuild": {"rebuild_every": 2, "start": "gravity"},
+    "shortened": {"rebuild_when": "shortened", "jacobi": "scalar"},
 }
 STEPS = 4
 

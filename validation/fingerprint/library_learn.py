@@ -4,9 +4,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from mpm_ref.nclaw.gnn.history import box_of
+from mpm_ref.nclaw.gnn.features import box_of
 from mpm_ref.nclaw.study import study as law_study
-from mpm_ref.nclaw.study.training import trained
+from mpm_ref.nclaw.study.training import train_study
 from mpm_ref.rom.snapshots import joined
 from mpm_ref.rom.study.nsf_case import history
 from mpm_ref.rom.study.reduce import learned
@@ -33,7 +33,7 @@ def law(text):
     """Return the weights of both laws of a law study after its training."""
     with study_file(text) as path:
         study = law_study.load(path, SCENES)
-        laws = trained(study, observed(study.problem()), threads=1)
+        laws = train_study(study, observed(study.problem()), threads=1)
     return {"elastic": laws[0], "plastic": laws[1]}
 
 

@@ -6,11 +6,11 @@ import numpy as np
 
 from mpm_ref.materials.learned import weights
 from mpm_ref.nclaw import batched_step
-from mpm_ref.nclaw.bodies import learned
+from mpm_ref.nclaw.bodies import body_maker
 from mpm_ref.nclaw.dissipation import balance, loops
 from mpm_ref.nclaw.gnn import weights as gnn_weights
-from mpm_ref.nclaw.gnn.history import box_of
-from mpm_ref.nclaw.paths import course, cycles
+from mpm_ref.nclaw.gnn.features import box_of
+from mpm_ref.nclaw.paths import cycles, path_response
 from mpm_ref.nclaw.study.compare import positions
 from mpm_ref.trajectories import in_order
 
@@ -21,7 +21,7 @@ WEIGHTS = ROOT / "validation" / "nclaw" / "weights"
 
 def material(name):
     """Return the function that gives a body the stored laws of a name."""
-    return learned(weights.load(WEIGHTS / f"{name}.npz"))
+    return body_maker(weights.load(WEIGHTS / f"{name}.npz"))
 
 
 def of_law(name, scene_name, frames):
@@ -50,7 +50,7 @@ def of_graph(name, scene_name, frames):
 def of_paths(name, scene_name, steps):
     """Return stresses of a stored law along prescribed deformations, and the energy it takes."""
     _, _, law, flow, _ = material(name)(problem(scene_name).bodies[0])
-    paths = [tuple(course(law, flow, path, 5e-4)) for path in cycles(3, 0.1, steps)]
+    paths = [tuple(path_response(law, flow, path, 5e-4)) for path in cycles(3, 0.1, steps)]
     G = loops(20, 0.1, steps, np.random.default_rng(0))
     return {"paths": paths, "balance": tuple(balance(law, flow, G))}
 
@@ -58,13 +58,13 @@ def of_paths(name, scene_name, steps):
 def of_batches(scene_name, bodies, steps):
     """Return the states of bodies of one batch, and gradients of the last step."""
     full = problem(scene_name)
-    world = batched_step.world(full)
+    world = batched_step.make_world(full)
     _, q, *_ = full.bodies[0]
     rng = np.random.default_rng(0)
     start = (q.x, q.v, q.C, np.tile(np.eye(3), (len(q.x), 1, 1)))
     x, v, C, F = (np.stack([a] * bodies) for a in start)
     v = v * np.linspace(0.8, 1.2, bodies)[:, None, None]
-    storage = batched_step.nodes(world, bodies)
+    storage = batched_step.make_nodes(world, bodies)
     after = batched_step.States(x, v, C, F)
     for _ in range(steps):
         tau = 1e3 * rng.normal(size=F.shape)

@@ -42,13 +42,13 @@ def coarse_grids(run):
     """CG by residual in one step, and by step; L-BFGS with either multigrid."""
     one = first(build(scene(CAT, "quick")))
     for way in (*NEWTONS, *DESCENTS):
-        iterates(one, way, iterations=2)                        # compiles
+        iterates(one, way, max_iterations=2)                        # compiles
     costs, rows = [], []
     problem, coming = armacat(run)
     scale = f"{particles(problem)} particles (the paper: 403 000)"
     for k, step in enumerate(coming):
         for way in run.progress((*NEWTONS, *DESCENTS), f"step {k}"):
-            made = iterates(step, way, iterations=CAP)
+            made = iterates(step, way, max_iterations=CAP)
             costs.append(cost(CAT, k, way, made))
             if k == 0:
                 rows += [(way.name, *row) for row in made.rows]
@@ -71,7 +71,7 @@ def armacat(run):
 def cost(name, k, way, made):
     """`Cost` of a solve."""
     r = made.report
-    return Cost(name, k, way.name, r.iterations, r.inner, r.clock[-1], r.converged)
+    return Cost(name, k, way.name, r.iterations, r.cg_iterations, r.cpu_times[-1], r.converged)
 
 
 def total(costs, method, field="cg"):
@@ -114,7 +114,7 @@ def elsewhere(run):
     count, costs = run.choose(quick=1, standard=5, paper=5), []
     for name in ELSEWHERE:
         problem, state = begun(name, run.profile)
-        new = [cost(name, k, way, iterates(step, way, iterations=CAP))
+        new = [cost(name, k, way, iterates(step, way, max_iterations=CAP))
                for k, step in enumerate(steps(problem, state, count)) for way in DESCENTS]
         record_lbfgs(run, name, new, f"{particles(problem)} particles, {times(count)} "
                      f"from {BEGUN[name]:g} s on")

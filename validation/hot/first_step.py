@@ -27,7 +27,7 @@ def first_step(run):
     """Residuals of all methods along their way, and ADMM's time over HOT's."""
     step = first(build(scene("faceless", "quick")))
     for way in methods():
-        swiftest(step, way, 1, iterations=2)                    # compiles
+        swiftest(step, way, 1, max_iterations=2)                    # compiles
     if run.profile != "quick":
         step = first(build(scene("faceless", "paper")))
     exact = solved(step, "pn-pcg", eps=EXACT)
@@ -48,7 +48,7 @@ def first_step(run):
 
 def methods():
     """Every method, those of `DESCENTS` past the paper's tolerance."""
-    return [*ways(*DESCENTS, eps=FURTHER, iterations=PATIENCE), *ways(*NEWTONS)]
+    return [*ways(*DESCENTS, eps=FURTHER, max_iterations=PATIENCE), *ways(*NEWTONS)]
 
 
 def check_reference(run, step, exact, scale):
@@ -80,14 +80,14 @@ def record_slowdown(run, found, curves, scale):
     """ADMM's time over HOT's, to the tolerance and to HOT's error there."""
     hot, admm = found[HOT], found[ADMM]
     k, own = hot.first(EPS), admm.first(EPS)
-    cpu, theirs, ours = hot.report.clock[k], curves[ADMM], curves[HOT]
-    run.record("hot.fig16.admm_slowdown", admm.report.clock[own] / cpu if own else None,
+    cpu, theirs, ours = hot.report.cpu_times[k], curves[ADMM], curves[HOT]
+    run.record("hot.fig16.admm_slowdown", admm.report.cpu_times[own] / cpu if own else None,
                scale=scale, note=f"CPU time to eps = {EPS:g}; HOT: {cpu:.3f} s, {k} iterations, "
                f"ADMM: {own} iterations, where its error is "
                f"{level(theirs, own) / level(ours, k):.0f} times HOT's")
     later = reached(theirs, level(ours, k))
     run.record("hot.fig16.equal_error",
-               admm.report.clock[later] / cpu if later else None, unit="1", comparator="info",
+               admm.report.cpu_times[later] / cpu if later else None, unit="1", comparator="info",
                scale=scale, note=f"CPU time to HOT's error at eps = {EPS:g}; ADMM: {later} "
                "iterations")
 
@@ -107,10 +107,10 @@ def reached(curve, error):
 def record_penalties(run, step, exact, scale):
     """What another penalty does for ADMM: its choice is ours, as the paper prints none."""
     for penalty in PENALTIES:
-        changes = {"penalty": penalty, "iterations": PATIENCE}
+        changes = {"penalty": penalty, "max_iterations": PATIENCE}
         made = swiftest(step, Way(ADMM, ADMM, changes), 1)
         report, (rms, _) = made.report, difference(step, made.dv[-1], exact)
         run.record(f"hot.fig16.admm.penalty-{penalty:g}.iterations", report.iterations,
                    comparator="info", scale=scale,
-                   note=noted(f"to eps = {EPS:g}, {report.clock[-1]:.3f} CPU seconds; error "
+                   note=noted(f"to eps = {EPS:g}, {report.cpu_times[-1]:.3f} CPU seconds; error "
                               f"{rms:.1e}", report))

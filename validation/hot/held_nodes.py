@@ -77,7 +77,7 @@ def cycle(given, way, levels):
         size = 1.0 if way == "leaking" else mean_diagonal(given)
         A = sp.bsr_array(A + block_diagonal(size * np.eye(d) * ~given.free[:, None, None]))
         A.sort_indices()
-    return hierarchy(A, given.index, levels, path="scipy", coarsest="direct")
+    return hierarchy(A, given.index, levels, implementation="scipy", coarsest="direct")
 
 
 def mean_diagonal(given):

@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.hot.descent import Stop
+from mpm_ref.hot.descent import StoppingRule
 from mpm_ref.hot.methods import options_of
-from mpm_ref.hot.methods import solved as descended
-from mpm_ref.hot.report import Report, Watch, Watched
+from mpm_ref.hot.methods import solve as descended
+from mpm_ref.hot.report import ProfiledSystem, Profiler, SolveReport
 from mpm_ref.simulate import State
 
 from .one_step import Step, difference
@@ -32,12 +32,12 @@ class Iterates(NamedTuple):
 
     dv: list            # of (n, d) [m/s]
     cg: list            # CG iterations before each
-    report: Report
+    report: SolveReport
 
     @property
     def rows(self):
         """(iteration, CG iterations, CPU seconds, residual) of every iterate."""
-        return list(zip(range(len(self.cg)), self.cg, self.report.clock, self.report.residuals,
+        return list(zip(range(len(self.cg)), self.cg, self.report.cpu_times, self.report.residuals,
                         strict=True))
 
     def first(self, eps):
@@ -45,26 +45,26 @@ class Iterates(NamedTuple):
         return next((k for k, r in enumerate(self.report.residuals) if r <= eps), None)
 
 
-class Keeper(Watch):
-    """A watch that also remembers every iterate, for a system whose evaluations it is told."""
+class Keeper(Profiler):
+    """A profiler that also remembers every iterate, for a system whose evaluations it is told."""
 
     def __init__(self):
         super().__init__()
         self.dv, self.cg, self.at = [], [], None
 
-    def note(self, residual):
-        """As the watch's; the iterate is where the potential was evaluated last."""
-        super().note(residual)
+    def record(self, residual):
+        """As the profiler's; the iterate is where the potential was evaluated last."""
+        super().record(residual)
         self.dv.append(self.at)
-        self.cg.append(self.inner)
+        self.cg.append(self.cg_iterations)
 
 
-class Told(Watched):
-    """A watched system that tells a `Keeper` where it is evaluated."""
+class Told(ProfiledSystem):
+    """A profiled system that tells a `Keeper` where it is evaluated."""
 
     def evaluate(self, dv):
         """E(dv) [J] and its gradient (n, d) [kg m/s]."""
-        self.watch.at = dv
+        self.profiler.at = dv
         return super().evaluate(dv)
 
 
@@ -78,24 +78,24 @@ def first(problem):
     stepper, state = problem.stepper(), State(problem.bodies, frame=1)
     stepper.start(state.bodies)
     dt = coming(problem, stepper, state)
-    return Step(state.bodies, stepper, stepper.pose(state.bodies, state.t, dt), dt, state.t)
+    return Step(state.bodies, stepper, stepper.problem(state.bodies, state.t, dt), dt, state.t)
 
 
 def iterates(step, way, **changes):
     """`Iterates` of a step by a `Way`, with further changes, solved as by `methods.minimise`."""
     options = options_of(way.method, **{**way.changes, **changes})
-    watch = Keeper()
-    system = Told(step.stepper.system(step.pose), watch)
-    with watch.part("other"), np.errstate(all="ignore"):
-        stop = Stop(options.eps, options.norm, options.iterations, options.patience)
-        _, why = descended(system, options, stop, watch)
-    return Iterates(watch.dv, watch.cg, watch.report(options.method, why))
+    profiler = Keeper()
+    system = Told(step.stepper.system(step.pose), profiler)
+    with profiler.part("other"), np.errstate(all="ignore"):
+        stop = StoppingRule(options.eps, options.norm, options.max_iterations, options.patience)
+        _, why = descended(system, options, stop, profiler)
+    return Iterates(profiler.dv, profiler.cg, profiler.report(options.method, why))
 
 
 def swiftest(step, way, repeats, **changes):
     """`iterates` that took the least CPU time of so many equal solves."""
     return min((iterates(step, way, **changes) for _ in range(repeats)),
-               key=lambda made: made.report.clock[-1])
+               key=lambda made: made.report.cpu_times[-1])
 
 
 def spread(last, most):
@@ -112,7 +112,8 @@ def noted(text, report):
     """A text, and what must be said of a solve that did not converge, or whose CG was cut."""
     said = [text]
     if not report.converged:
-        said.append(report.why)
-    if report.capped:
-        said.append(f"{report.capped} linear solves, or local steps, short of their tolerance")
+        said.append(report.message)
+    if report.capped_solves:
+        said.append(f"{report.capped_solves} linear solves, or local steps, short of "
+                    "their tolerance")
     return "; ".join(said)

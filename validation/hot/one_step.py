@@ -6,7 +6,7 @@ import numpy as np
 
 from mpm_ref.explicit import gather
 from mpm_ref.hot.methods import minimise
-from mpm_ref.hot.step import put
+from mpm_ref.hot.step import write_velocities
 from mpm_ref.scene import build
 from mpm_ref.simulate import simulate
 
@@ -29,7 +29,7 @@ def after(scene, steps, **solver):
     if state.step != steps:
         raise ValueError(f"the scene made {state.step} steps: expected {steps}")
     stepper = problem.stepper()
-    return Step(state.bodies, stepper, stepper.pose(state.bodies, state.t, dt), dt, state.t)
+    return Step(state.bodies, stepper, stepper.problem(state.bodies, state.t, dt), dt, state.t)
 
 
 def solved(step, method, **changes):
@@ -41,7 +41,7 @@ def particle_velocities(step, dv):
     """Velocities of all particles after the step with the increment dv, and their masses."""
     grid, q = step.pose.grid, step.pose.unknowns
     grid = grid._replace(v=grid.v.copy())
-    put(grid, q, q.v + dv)
+    write_velocities(grid, q, q.v + dv)
     v, m = [], []
     for body in step.bodies:
         copy = body._replace(particles=type(body.particles)(*(a.copy() for a in body.particles)))

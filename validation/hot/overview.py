@@ -63,7 +63,8 @@ def costs(step, about, methods, caps):
     for method in methods:
         report = solved(step, method, **options(method, caps)).report
         found.append(Cost(about[0], method, *about[1:], sum(report.seconds.values()),
-                          report.iterations, report.inner, report.coarse, report.evaluations,
+                          report.iterations, report.cg_iterations, report.coarse_iterations,
+                          report.evaluations,
                           report.converged))
     return found
 
@@ -92,7 +93,7 @@ def overview(rows, method, count, nodes):
     cpu, n = sum(r.cpu for r in own), len(own)
     return Overview(own[0].scene, method, count, nodes, n, cpu / sum(r.cpu for r in hot),
                     max(ratios), cpu / n, sum(r.iterations for r in own) / n,
-                    sum(r.inner for r in own) / n, sum(not r.converged for r in own))
+                    sum(r.cg_iterations for r in own) / n, sum(not r.converged for r in own))
 
 
 def compiled(methods):
@@ -100,7 +101,7 @@ def compiled(methods):
     problem, state = begun("faceless", "quick")
     for step in steps(problem, state, 1):
         for method in methods:
-            solved(step, method, iterations=2)
+            solved(step, method, max_iterations=2)
 
 
 @experiment("hot.fig15", title="Speed-up overview: every method on every scene, over HOT's time",
@@ -109,8 +110,8 @@ def compiled(methods):
 def speedups(run):
     """Total and worst-step time of all methods on all scenes, beside the printed ranges."""
     names, count = run.choose(quick=(QUICK, 1), standard=(PRINTED, 3), paper=(PRINTED, 3))
-    caps = run.choose(quick={"iterations": 15, "cg_iterations": 300},
-                      standard={"iterations": 30, "cg_iterations": 1000}, paper={})
+    caps = run.choose(quick={"max_iterations": 15, "max_cg_iterations": 300},
+                      standard={"max_iterations": 30, "max_cg_iterations": 1000}, paper={})
     compiled(METHODS)
     rows, table = [], {}
     for name in run.progress(names, "scenes"):
@@ -188,14 +189,14 @@ def record_stiff(run):
     count = 3
     dx = run.choose(quick=0.03, standard=0.02, paper=0.0075)
     step = after(bar(dx, STIFF, "hot", count), count)
-    gast, hot = (solved(step, method, **options(method, {"iterations": 200})).report
+    gast, hot = (solved(step, method, **options(method, {"max_iterations": 200})).report
                  for method in ("gast15", "hot"))
     size = sum(len(body.id) for body in step.bodies)
     run.record("hot.fig15.bar.gast15", sum(gast.seconds.values()) / sum(hot.seconds.values()),
                comparator=">=", bound=GOAL, scale=f"{size} particles, middle {STIFF:.0e} Pa",
                note=f"CPU time of Gast15 over HOT's; {gast.iterations} and {hot.iterations} "
-               f"iterations, {gast.inner} of CG; Gast15: {gast.why}. No printed number: the goal "
-               "is what a prototype gained with more particles")
+               f"iterations, {gast.cg_iterations} of CG; Gast15: {gast.message}. No printed "
+               "number: the goal is what a prototype gained with more particles")
 
 
 def in_words(table):

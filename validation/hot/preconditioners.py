@@ -17,8 +17,8 @@ import scipy.sparse as sp
 import threadpoolctl
 
 from mpm_ref.core.jit import set_threads
-from mpm_ref.hot.krylov import Rule, block_jacobi, pcg, scalar_jacobi
-from mpm_ref.hot.linearization import by_matrix
+from mpm_ref.hot.krylov import CGOptions, block_jacobi, pcg, scalar_jacobi
+from mpm_ref.hot.linearization import matrix_product
 from mpm_ref.hot.multigrid.blocks import hierarchy as block_hierarchy
 from mpm_ref.hot.multigrid.blocks.sweep import Sweep, sweep
 from mpm_ref.hot.multigrid.hierarchy import hierarchy
@@ -42,7 +42,7 @@ RUN = 50                        # V-cycles, and iterations of CG, that are timed
 def gauss_seidel(system):
     """One symmetric sweep by block kernels."""
     level, = block_hierarchy.build(system.A, system.index, 1, "linear")
-    split = block_hierarchy.GaussSeidel(level).split
+    split = block_hierarchy.BlockGaussSeidel(level).split
 
     def inverse(r):
         state = Sweep(np.empty_like(r), np.zeros_like(r), np.empty_like(r))
@@ -170,9 +170,9 @@ def price(step):
     b = -system().evaluate(dv)[1]
     A, matrix = least(lambda: system().matrix(dv))
     grids, made = least(lambda: hierarchy(A, index))
-    product, inverse = by_matrix(A), block_jacobi(diagonal_blocks(A))
+    product, inverse = matrix_product(A), block_jacobi(diagonal_blocks(A))
     _, cycles = least(lambda: [grids.cycle(b) for _ in range(RUN)])
-    solved, iterations = least(lambda: pcg(product, b, inverse, Rule(lambda size: 0.0, RUN)))
+    solved, iterations = least(lambda: pcg(product, b, inverse, CGOptions(lambda size: 0.0, RUN)))
     return Price(matrix, made, cycles / RUN, iterations / solved.iterations)
 
 

@@ -116,7 +116,8 @@ class Log:
         """Take in a step that led from a momentum to a state."""
         report, q = state.solve, energy(state.bodies, self.problem.gravity, self.problem.inertia)
         self.rows.append((
-            state.step, state.t, dt, report.iterations, report.coarse, report.residuals[-1],
+            state.step, state.t, dt, report.iterations, report.coarse_iterations,
+            report.residuals[-1],
             report.converged, report.backtracks, report.evaluations, sum(report.seconds.values()),
             cpu, *q, np.linalg.norm(self.stepper.impulse) / dt, self.gap(state, dt, before)))
 

@@ -20,8 +20,8 @@ from mpm_ref.timestep import advective
 
 from ..common import targets
 from ..common.registry import experiment
+from ..common.scenes import SCENES
 from ..common.settings import record_settings
-from ..verification.scenes import SCENES
 from . import stiffness, stretched, warm_states
 from .sizes import sized
 
@@ -157,7 +157,7 @@ def solver():
         "hot.sec7_1.eps": hot.eps, "hot.sec7_1.levels": hot.levels,
         "hot.sec7_1.window": hot.window, "hot.sec7_1.gs_sweeps": hot.cycle.sweeps,
         "hot.alg2.coarse_tol": hot.cycle.tolerance, "hot.alg1.k_max": newton_tolerance(1.0, 0.0),
-        "hot.sec7_3.pcg_cap": METHODS["lbfgs-h"].cg_iterations,
+        "hot.sec7_3.pcg_cap": METHODS["lbfgs-h"].max_cg_iterations,
         "hot.sec7_1.gast_tol": METHODS["gast15"].eps,
         "hot.sec7_2.gast_tol_faceless": METHODS["gast15"].eps,
         "hot.sec5_2.ell_3d": surface(1.0, 3), "hot.sec5_2.ell_2d": surface(1.0, 2)}

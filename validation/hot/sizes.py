@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from ..verification.scenes import shipped, with_
+from ..common.scenes import catalogue_scene, with_
 
 FILL = 0.87         # of the release's particles per cell: what the numbers of Table 2 come to where
                     # shapes are known (Chain 308 000, Boards 188 000), as for LDM-tab2-sampling
@@ -11,7 +11,7 @@ FILL = 0.87         # of the release's particles per cell: what the numbers of T
 class Size(NamedTuple):
     """Grid spacing of a scene at each profile [m]; None where the paper prints none."""
 
-    quick: float            # 3000 to 6000 particles: as the scene is shipped
+    quick: float            # 3000 to 6000 particles: as the scene is catalogue_scene
     standard: float         # 15 000 to 60 000
     paper: float | None
 
@@ -40,7 +40,7 @@ def sized(name, profile, **changes):
     if name not in SIZES or profile not in Size._fields:
         raise ValueError(f"sized({name!r}, {profile!r}): expected one of {', '.join(SIZES)} and "
                          f"one of {', '.join(Size._fields)}")
-    dx, scene = getattr(SIZES[name], profile), shipped(name, **changes)
+    dx, scene = getattr(SIZES[name], profile), catalogue_scene(name, **changes)
     if dx is None:
         raise ValueError(f"{name}: the paper prints no size; take 'standard'")
     finer = (scene.dx / dx) ** scene.dim

@@ -7,7 +7,7 @@ from mpm_ref.scene import Limits, Solver, build
 from mpm_ref.simulate import simulate
 
 from ..common.registry import experiment
-from ..verification.scenes import shipped, with_
+from ..common.scenes import catalogue_scene, with_
 
 SCENE = "hot_stiffness"
 PER_CELL = 12
@@ -34,7 +34,7 @@ class Cost(NamedTuple):
 
 def bar(dx, E, method, steps, **solver):
     """The scene at another spacing and stiffness, solved by a method for some steps."""
-    scene = shipped(SCENE, dx=dx, integrator=method, steps=steps, end=None,
+    scene = catalogue_scene(SCENE, dx=dx, integrator=method, steps=steps, end=None,
                     unstable="allow", solver=Solver(**solver), limits=FIRST)
     count = ceil(PER_CELL * 0.12 * 0.12 * 0.3 / dx**3)
     bodies = tuple(with_(body, sampling=with_(body.sampling, count=count)) for body in scene.body)
@@ -50,7 +50,7 @@ def cost(dx, E, method, steps, **solver):
         pass
     n = len(reports)
     return Cost(method, E, n, sum(r.iterations for r in reports) / n,
-                sum(r.inner for r in reports) / n,
+                sum(r.cg_iterations for r in reports) / n,
                 sum(sum(r.seconds.values()) for r in reports) / n,
                 all(r.converged for r in reports)), sum(len(b.id) for b in problem.bodies)
 

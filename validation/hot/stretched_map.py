@@ -44,7 +44,7 @@ class Solve(NamedTuple):
 def stretched_map(run):
     """Iterations over readings, sizes and materials; residuals on a slice of one case."""
     for way in PAIR:
-        iterates(first(stretched("body")), way, iterations=2)   # compiles
+        iterates(first(stretched("body")), way, max_iterations=2)   # compiles
     solves = []
     for case in run.progress(list(sweep(run)), "boxes"):
         new = pair(*case)
@@ -77,10 +77,10 @@ def pair(variant, cells, nu, E, seed):
     J = float(np.linalg.det(step.bodies[0].particles.F).mean())
     found = []
     for way in PAIR:
-        made = iterates(step, way, iterations=CAP)
+        made = iterates(step, way, max_iterations=CAP)
         r = made.report
-        found.append((Solve(variant, cells, nu, E, seed, J, way.name, r.iterations, r.inner,
-                            r.backtracks, r.clock[-1], r.converged), made))
+        found.append((Solve(variant, cells, nu, E, seed, J, way.name, r.iterations, r.cg_iterations,
+                            r.backtracks, r.cpu_times[-1], r.converged), made))
     return found
 
 

@@ -53,7 +53,8 @@ def costs(name, profile, count):
 def cost(about, done, advanced):
     """`Cost` of some reports; about: its first fields; advanced: the time they advance [s]."""
     n = len(done)
-    return Cost(*about, n, sum(r.iterations for r in done) / n, sum(r.inner for r in done) / n,
+    return Cost(*about, n, sum(r.iterations for r in done) / n,
+                sum(r.cg_iterations for r in done) / n,
                 sum(sum(r.seconds.values()) for r in done) / n, advanced / n,
                 all(r.converged for r in done))
 

@@ -28,7 +28,7 @@ from mpm_ref.simulate import (
 from mpm_ref.store.checkpoint import BadCheckpoint, load, save
 from mpm_ref.store.manifest import scene_hash, source_hash
 
-from ..verification.scenes import with_
+from ..common.scenes import with_
 from .one_step import Step
 from .sizes import sized
 
@@ -107,7 +107,7 @@ def steps(problem, state, count):
     stepper = problem.stepper()
     for _ in range(count):
         dt = coming(problem, stepper, state)
-        yield Step(state.bodies, stepper, stepper.pose(state.bodies, state.t, dt), dt, state.t)
+        yield Step(state.bodies, stepper, stepper.problem(state.bodies, state.t, dt), dt, state.t)
         onward(problem, stepper, state)
 
 

@@ -30,14 +30,14 @@ def wheel(run):
              f"nodes, {BEGUN['wheel']:g} s after the start, dt = {step.dt:.3g} s")
     rows, found = [], {}
     for way in (*FIVE, FLEXIBLE):
-        iterates(step, way, iterations=2)                       # compiles
+        iterates(step, way, max_iterations=2)                       # compiles
         found[way.name] = swiftest(step, way, 3)
         rows += table_rows(way, EPS, found[way.name])
         record_method(run, f"hot.fig17.{way.name}", found[way.name].report, scale)
     record_claims(run, found, scale)
     for eps in further:
         for way in run.progress(onward, f"eps = {eps:g}"):
-            made = iterates(step, way, eps=eps, iterations=cap, cg_iterations=CG_CAP)
+            made = iterates(step, way, eps=eps, max_iterations=cap, max_cg_iterations=CG_CAP)
             rows += table_rows(way, eps, made)
             name = f"hot.fig17.{way.name}.eps{eps:.0e}".replace("e-0", "e-")
             record_method(run, name, made.report, scale)
@@ -53,8 +53,9 @@ def record_method(run, name, report, scale):
     """Iterations of a solve, None where its tolerance was not met."""
     run.record(f"{name}.iterations", report.iterations if report.converged else None,
                comparator="info", scale=scale,
-               note=noted(f"{report.inner} of CG, {report.coarse} on the coarsest level, "
-                          f"{report.backtracks} back, {report.clock[-1]:.2f} CPU seconds to "
+               note=noted(f"{report.cg_iterations} of CG, {report.coarse_iterations} on the "
+                          f"coarsest level, {report.backtracks} back, "
+                          f"{report.cpu_times[-1]:.2f} CPU seconds to "
                           f"{report.residuals[-1]:.1e}", report))
 
 
@@ -64,7 +65,7 @@ def record_claims(run, found, scale):
     run.record("hot.sec7_3.lbfgsh_wheel_outer", slow.iterations, scale=scale, note="the start's "
                f"residual is {slow.residuals[0] / EPS:.0f} times the tolerance here, so that "
                "neither method has far to go; below it see hot.fig17.lbfgs-h.*")
-    others = [made.report.clock[-1] for name, made in found.items() if name != "hot"]
-    run.record("hot.fig17.fastest", min(others) / hot.clock[-1], comparator=">=", bound=1.0,
+    others = [made.report.cpu_times[-1] for name, made in found.items() if name != "hot"]
+    run.record("hot.fig17.fastest", min(others) / hot.cpu_times[-1], comparator=">=", bound=1.0,
                scale=scale, note="least CPU time of the others over HOT's, at the paper's "
                "tolerance, which is not equal error")

@@ -7,7 +7,7 @@ from mpm_ref.scene import build
 from mpm_ref.simulate import simulate
 
 from ..common.registry import experiment
-from ..verification.scenes import shipped, threads_for, with_
+from ..common.scenes import catalogue_scene, threads_for, with_
 
 SCENE = "ldm_gravity"
 
@@ -30,7 +30,7 @@ def cylinder(run):
 
 def deflection(g):
     """Times [s], drop of the free end [m], extremes of J, number of particles."""
-    problem = build(with_(shipped(SCENE), gravity=(0.0, 0.0, -g)))
+    problem = build(with_(catalogue_scene(SCENE), gravity=(0.0, 0.0, -g)))
     x0, rows = problem.bodies[0].particles.x.copy(), []
     tip = x0[:, 0] > x0[:, 0].max() - problem.dx
     with threads_for(problem.bodies):

@@ -12,7 +12,7 @@ from mpm_ref.scene import build
 from mpm_ref.simulate import simulate
 from mpm_ref.trajectories import in_order
 
-from ..verification.scenes import threads_for
+from ..common.scenes import threads_for
 from .networks import trained
 
 SHOWN_WAY = Way("lagrangian", "linear", 50)

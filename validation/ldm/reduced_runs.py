@@ -9,7 +9,7 @@ from mpm_ref.rom.step import BREAKDOWNS
 from mpm_ref.rom.study.errors import Errors, Squares
 from mpm_ref.rom.study.run import march
 
-from ..verification.scenes import threads_for
+from ..common.scenes import threads_for
 
 
 def compared(cases, references, map, way, rest, seed=0):

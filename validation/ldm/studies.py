@@ -10,7 +10,7 @@ from mpm_ref.sampling import Regular
 from mpm_ref.scene import build
 from mpm_ref.trajectories import snapshots
 
-from ..verification.scenes import shipped, threads_for, with_
+from ..common.scenes import catalogue_scene, threads_for, with_
 
 PHI = 2.0 * pi / 3.0        # polar angle of the poke (LDM-X5)
 POKE = 0.48                 # its speed [m/s]
@@ -49,12 +49,12 @@ def drawn(count, of, seed=0):
 
 def fallen(g):
     """LDM-sec5.1: the cylinder under gravity g [m/s^2]."""
-    return shipped("ldm_gravity", gravity=(0.0, 0.0, -float(g)))
+    return catalogue_scene("ldm_gravity", gravity=(0.0, 0.0, -float(g)))
 
 
 def twisted(v, w):
     """LDM-sec5.2: the block pulled at v [m/s] and twisted at w [rad/s]."""
-    scene = shipped("ldm_torsion")
+    scene = catalogue_scene("ldm_torsion")
     bottom, top = scene.fixed
     motion = with_(top.motion, translation=with_(top.motion.translation, rate=(0.0, 0.0, float(v))),
                    rotation=with_(top.motion.rotation, rate=float(w)))
@@ -63,7 +63,7 @@ def twisted(v, w):
 
 def poked(theta):
     """LDM-sec5.3: the cylinder poked at its rim, at an angle theta [rad]."""
-    scene = shipped("ldm_poke")
+    scene = catalogue_scene("ldm_poke")
     base, poke = scene.fixed
     return with_(scene, fixed=(base, at_rim(poke, float(theta))))
 
@@ -72,7 +72,7 @@ def poked_again(thetas):
     """LDM-sec5.3.2: the cylinder poked at one angle after the other [rad], each time let go for as
     long as a single poke's run lasts.
     """
-    scene = shipped("ldm_poke")
+    scene = catalogue_scene("ldm_poke")
     base, poke = scene.fixed
     length = scene.steps * scene.dt
     pokes = (at_rim(poke, float(theta), k * length) for k, theta in enumerate(thetas))
@@ -81,7 +81,7 @@ def poked_again(thetas):
 
 def leaning(r, theta, phi):
     """LDM-sec5.4: the tower's top moved at r [m/s] in a direction of angles theta and phi [rad]."""
-    scene = shipped("ldm_tower")
+    scene = catalogue_scene("ldm_tower")
     bottom, top = scene.fixed
     along = (cos(phi) * cos(theta), cos(phi) * sin(theta), sin(phi))
     path = with_(top.motion.translation, rate=tuple(float(r) * a for a in along))

@@ -10,7 +10,7 @@ from mpm_ref.scene import build
 from mpm_ref.trajectories import history
 
 from ..common.registry import experiment
-from ..verification.scenes import threads_for, with_
+from ..common.scenes import threads_for, with_
 from .networks import trained
 from .references import share
 from .studies import TORSION

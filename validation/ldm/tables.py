@@ -9,7 +9,7 @@ from mpm_ref.scene import build
 from mpm_ref.trajectories import history
 
 from ..common.registry import experiment
-from ..verification.scenes import threads_for
+from ..common.scenes import threads_for
 from .networks import SEEDS
 from .references import References, mean_of, references, share
 from .studies import POKES, TORSION, poked_again

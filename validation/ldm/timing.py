@@ -16,7 +16,7 @@ from mpm_ref.scene import Scheme, build
 from mpm_ref.simulate import State, advance
 from mpm_ref.trajectories import in_order
 
-from ..verification.scenes import with_
+from ..common.scenes import with_
 
 TRACKED = 4000              # points that errors are of
 WAY = Way._fields

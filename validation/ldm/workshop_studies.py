@@ -14,7 +14,7 @@ import numpy as np
 
 from mpm_ref.scene import HalfSpace
 
-from ..verification.scenes import shipped, with_
+from ..common.scenes import catalogue_scene, with_
 from .studies import Study, drawn, scene_size
 
 CELLS = 4               # over the cylinder's height, in the unit tests
@@ -26,7 +26,7 @@ RHO, THETA, PHI = (1.0, 1.1, 1.2), (0.0, 4.5, 9.0), (10.0, 12.5, 15.0)  # [R], [
 
 def sheared(points, v):
     """LDMW-unit: one step in which the top of a cylinder of so many points moves at v [m/s]."""
-    scene = shipped("ldm_poke")
+    scene = catalogue_scene("ldm_poke")
     (base, poke), body = scene.fixed, scene.body[0]
     path = with_(poke.motion.translation, rate=(float(v), 0.0, 0.0))
     top = with_(poke, name="top", region=HalfSpace(point=(0.0, 0.0, TOP), normal=(0.0, 0.0, -1.0)),
@@ -41,7 +41,7 @@ def pushed(rho, theta, phi):
     """LDMW-poke: the cylinder of which the rim is pushed rho radii far, theta degrees off the plane
     y = 0 and phi degrees downwards.
     """
-    scene = shipped("ldm_poke")
+    scene = catalogue_scene("ldm_poke")
     base, poke = scene.fixed
     theta, phi = radians(theta), radians(phi)
     speed = float(rho) * scene_size(poke)[0] / poke.until

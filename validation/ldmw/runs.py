@@ -15,8 +15,8 @@ from mpm_ref.rom.quadrature.node_centric import node_centric, nodes_of
 from mpm_ref.rom.study.case import case
 from mpm_ref.rom.study.run import Way, model, start, stepped
 
+from ..common.scenes import threads_for
 from ..ldm.networks import trained
-from ..verification.scenes import threads_for
 
 POINT_WAY, NODE_WAY = Way("lagrangian", "linear"), Way("eulerian", "linear")
 

@@ -10,15 +10,15 @@ import numpy as np
 
 from mpm_ref.energy import kinetic
 from mpm_ref.materials.learned import learned_flow, learned_law
-from mpm_ref.nclaw.bodies import fresh, gradients
+from mpm_ref.nclaw.bodies import body_with_laws, deformation_gradients
 from mpm_ref.nclaw.dissipation import balance, loops, work
-from mpm_ref.nclaw.study.compare import Broken, positions
+from mpm_ref.nclaw.study.compare import RunBroken, positions
 from mpm_ref.scene import build
 from mpm_ref.trajectories import in_order
 
 from ..common.registry import experiment
+from ..common.scenes import threads_for
 from ..common.weights_needed import there
-from ..verification.scenes import threads_for
 from .environments import ENVIRONMENTS, environment
 from .trained_laws import trained, weights_of
 
@@ -88,12 +88,12 @@ def returns(name, pair, steps):
     start [J], and why it ended before so many steps, if it did.
     """
     problem = build(environment(name, steps=steps, every=1))
-    body, found, why = fresh(problem.bodies[0], *pair), [], ""
+    body, found, why = body_with_laws(problem.bodies[0], *pair), [], ""
     thrown = float(kinetic(body.particles).sum())
     with threads_for(problem.bodies):
         try:
             found += taken(body, pair.law, positions(problem, (body,)), problem.clock.dt)
-        except Broken as end:
+        except RunBroken as end:
             why = str(end)
     a = np.array(found)
     return float(a[a > 0.0].sum()), float(-a[a < 0.0].sum()), thrown, why
@@ -107,7 +107,7 @@ def taken(body, law, frames, dt):
     V0 = in_order(body.particles.V0, body.id)
     next(frames)
     for _ in frames:
-        L, F_new = (in_order(a, body.id) for a in (body.particles.L, gradients(body)))
+        L, F_new = (in_order(a, body.id) for a in (body.particles.L, deformation_gradients(body)))
         yield V0 * work(law, F_new, F + dt * L @ F)
         F = F_new
 

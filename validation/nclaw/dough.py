@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.nclaw.camera import filmed, front, pinhole
+from mpm_ref.nclaw.camera import front_layer, observe_marks, pinhole
 from mpm_ref.scene import (
     Body,
     Box,
@@ -109,7 +109,7 @@ def camera():
 
 def film(x):
     """`Marks` that the camera sees in true frames x (f + 1, n, 3) of the run."""
-    return filmed(camera(), x, front(x[0]), NOISE, np.random.default_rng(SEED))
+    return observe_marks(camera(), x, front_layer(x[0]), NOISE, np.random.default_rng(SEED))
 
 
 @cache

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm_ref.materials import make_flow
-from mpm_ref.nclaw.bodies import fresh, learned, own
+from mpm_ref.nclaw.bodies import body_maker, body_with_laws, copy_body
 from mpm_ref.nclaw.camera import project
 
 from ..common.registry import experiment
@@ -76,15 +76,15 @@ def contestants(run):
             run.record(f"nclaw.dough.{name}.epochs", len(about["errors"]), unit="epochs",
                        comparator="info", scale=f"of {net.epochs} epochs",
                        note=f"the training diverged: {about['stopped']}")
-    return {"true": own, "guess": guessed, "init": learned(untrained()),
-            **{name: learned(one) for name, one in laws.items()}}
+    return {"true": copy_body, "guess": guessed, "init": body_maker(untrained()),
+            **{name: body_maker(one) for name, one in laws.items()}}
 
 
 def guessed(body):
     """A body of the wrong guess."""
     of = material(**GUESS)
     law = of.elastic()
-    return fresh(body, law, make_flow(of.flow.type, law, 3, tau_y=of.flow.tau_y,
+    return body_with_laws(body, law, make_flow(of.flow.type, law, 3, tau_y=of.flow.tau_y,
                                       s_min=of.flow.s_min))
 
 

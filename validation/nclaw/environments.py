@@ -5,14 +5,14 @@ from functools import cache
 from mpm_ref.scene import build
 from mpm_ref.trajectories import observed
 
-from ..verification.scenes import shipped, threads_for, with_
+from ..common.scenes import catalogue_scene, threads_for, with_
 
 ENVIRONMENTS = ("jelly", "sand", "plasticine", "water")
 
 
 def environment(name, **changes):
     """The scene of a training environment, its fixed step not compared with its bound."""
-    return with_(shipped(f"nclaw_{name}"), unstable="allow", **changes)
+    return with_(catalogue_scene(f"nclaw_{name}"), unstable="allow", **changes)
 
 
 @cache

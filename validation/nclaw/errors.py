@@ -8,9 +8,9 @@ import numpy as np
 from mpm_ref.nclaw.gnn.simulator import Simulator
 
 from ..common import targets
-from ..verification.scenes import with_
+from ..common.scenes import with_
 from .environments import ENVIRONMENTS
-from .evaluate import Found, compare, learned
+from .evaluate import ComparedError, body_maker, compare
 from .simulators import GraphNet
 from .stand_in_bodies import has_mesh, said
 from .tasks import TOYS, scenes
@@ -29,7 +29,7 @@ SHORT = 100         # steps, quick
 
 
 class Row(NamedTuple):
-    """An error: its method, environment and task; draw of a velocity; see `Found`."""
+    """An error: its method, environment and task; draw of a velocity; see `ComparedError`."""
 
     method: str
     environment: str
@@ -53,14 +53,14 @@ def errors(run, laws, tasks, goes_on=False):
                     scene = with_(scene, steps=SHORT)
                 found = run.cached(f"{task}.{name}.{draw}",
                                  partial(compare, scene, [*map(ready, able.values())], goes_on))
-                rows += [Row(method, name, task, draw, *Found(*one))
+                rows += [Row(method, name, task, draw, *ComparedError(*one))
                          for method, one in zip(able, found, strict=True)]
     return rows
 
 
 def ready(laws):
     """What `compare` runs, of trained laws or a trained graph network."""
-    return laws if isinstance(laws, Simulator) else learned(laws)
+    return laws if isinstance(laws, Simulator) else body_maker(laws)
 
 
 def fits(laws, task):

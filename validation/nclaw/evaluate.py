@@ -11,19 +11,20 @@ training in task (a) are of that corner in good part, which `goes_on` is for.
 
 import numpy as np
 
-from mpm_ref.nclaw.bodies import fresh, learned, own
+from mpm_ref.nclaw.bodies import body_maker, body_with_laws, copy_body
 from mpm_ref.nclaw.gnn.simulator import Simulator
-from mpm_ref.nclaw.study.compare import Broken, Follower, Found, positions
+from mpm_ref.nclaw.study.compare import ComparedError, ComparedRun, RunBroken, positions
 from mpm_ref.scene import build
 
-from ..verification.scenes import threads_for
+from ..common.scenes import threads_for
 from .gnn_rollout import free
 
-__all__ = ["Broken", "Found", "compare", "fresh", "learned", "own", "positions"]
+__all__ = ["ComparedError", "RunBroken", "body_maker", "body_with_laws", "compare", "copy_body",
+           "positions"]
 
 
 def compare(scene, laws, goes_on=False):
-    """[`Found`] of some laws on a scene. Raises `Broken` if its own laws break down.
+    """[`ComparedError`] of some laws on a scene. Raises `RunBroken` if its own laws break down.
 
     laws: as of `frames`;
     goes_on: points of runs that break down stay in a corner, as in the release; else the error of
@@ -32,8 +33,8 @@ def compare(scene, laws, goes_on=False):
     problem = build(scene)
     corner = problem.clip[1] if goes_on else np.inf
     with threads_for(problem.bodies):
-        runs = [Follower(frames(problem, law), corner) for law in laws]
-        for x in positions(problem, tuple(map(own, problem.bodies))):
+        runs = [ComparedRun(frames(problem, law), corner) for law in laws]
+        for x in positions(problem, tuple(map(copy_body, problem.bodies))):
             for run in runs:
                 run.follow(x)
     return [run.found() for run in runs]
@@ -41,7 +42,7 @@ def compare(scene, laws, goes_on=False):
 
 def frames(problem, law):
     """Positions in the frames of a problem of a law: a function that makes of a body at the start
-    the same one of other laws, see `fresh`; or a graph network, which needs no bodies.
+    the same one of other laws, see `body_with_laws`; or a graph network, which needs no bodies.
     """
     if isinstance(law, Simulator):
         return free(problem, law)

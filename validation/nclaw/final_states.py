@@ -14,7 +14,7 @@ from mpm_ref.scene import build
 from mpm_ref.simulate import simulate
 
 from ..common.registry import experiment
-from ..verification.scenes import mean, threads_for
+from ..common.scenes import mean, threads_for
 from .environments import ENVIRONMENTS, environment
 
 CARRIED = ("x", "v", "C", "F", "y")         # what a particle carries from step to step

@@ -7,7 +7,7 @@ Sizes, places, steps and densities are those of the authors' release; bodies sta
 
 from mpm_ref.scene import Box, Lattice, Poisson, Velocity
 
-from ..verification.scenes import with_
+from ..common.scenes import with_
 from .environments import environment
 from .stand_in_bodies import toy
 from .tasks import MILD, unit_cube

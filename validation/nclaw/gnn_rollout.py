@@ -2,8 +2,8 @@
 
 from math import isclose
 
-from mpm_ref.nclaw.gnn.graph import Lost
-from mpm_ref.nclaw.study.compare import Broken
+from mpm_ref.nclaw.gnn.features import SimulatorFailure
+from mpm_ref.nclaw.study.compare import RunBroken
 
 from .simulators import start
 
@@ -13,7 +13,7 @@ def free(problem, simulator):
     told where they are at the start, how fast, and the walls.
 
     Nothing keeps them in the problem's clip: the largest printed error of a graph network is past
-    what a clip allows (NCLAW-X8). Raises `Broken` where a point has no finite place or too many
+    what a clip allows (NCLAW-X8). Raises `RunBroken` where a point has no finite place or too many
     crowd together, ValueError for frames unlike those that it has learned.
     """
     clock, learned = problem.clock, simulator.reading.dt
@@ -24,5 +24,5 @@ def free(problem, simulator):
     for step in range(0, clock.steps + 1, clock.every):
         try:
             yield next(run)
-        except Lost as fault:
-            raise Broken(step, str(fault)) from None
+        except SimulatorFailure as fault:
+            raise RunBroken(step, str(fault)) from None

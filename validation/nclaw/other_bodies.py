@@ -8,13 +8,13 @@ from math import isfinite
 import numpy as np
 
 from mpm_ref.materials import DruckerPrager, FixedCorotated, Fluid, Hencky, VonMises
-from mpm_ref.nclaw.bodies import fresh, learned, own
+from mpm_ref.nclaw.bodies import body_maker, body_with_laws, copy_body
 from mpm_ref.scene import build
 
 from ..common.registry import experiment
+from ..common.scenes import threads_for, with_
 from ..common.weights_needed import Untrained
 from ..ldm.published_bodies import keep
-from ..verification.scenes import threads_for, with_
 from .environments import ENVIRONMENTS, environment
 from .gallery import cone, contact, large, pool
 from .melting import melting
@@ -83,9 +83,9 @@ def both(scene, words=WORDS):
     """`thinned` runs of a scene with true laws and with those of some words. Raises `Untrained`."""
     ends = with_(scene, every=scene.steps)
     names = {of(body) for body in build(scene).bodies}
-    laws = {word: {name: learned(trained(weights_of(word, name))) for name in names}
+    laws = {word: {name: body_maker(trained(weights_of(word, name))) for name in names}
             for word in words}
-    runs = {"true": shots(ends, own)}
+    runs = {"true": shots(ends, copy_body)}
     for word, mine in laws.items():
         runs[word] = shots(ends, lambda body, mine=mine: mine[of(body)](body))
     return thinned(runs, scene.steps)
@@ -94,7 +94,7 @@ def both(scene, words=WORDS):
 def melted(scene):
     """`thinned` runs of a scene whose plasticine becomes sand. Raises `Untrained`."""
     ends = with_(scene, every=scene.steps)
-    ours = [learned(trained(name)) for name in MELTS]
+    ours = [body_maker(trained(name)) for name in MELTS]
     true = [partial(of_laws, build(environment(name)).bodies[0]) for name in MELTS]
     with threads_for(build(scene).bodies):
         runs = {word: np.array([*melting(build(ends), *laws)])
@@ -123,4 +123,4 @@ def of(body):
 
 def of_laws(other, body):
     """A body of the laws of another."""
-    return fresh(body, other.law, other.flow)
+    return body_with_laws(body, other.law, other.flow)

@@ -4,13 +4,13 @@ from time import perf_counter, process_time
 
 import numpy as np
 
-from mpm_ref.nclaw.bodies import own
-from mpm_ref.nclaw.study.compare import Broken
+from mpm_ref.nclaw.bodies import copy_body
+from mpm_ref.nclaw.study.compare import RunBroken
 from mpm_ref.scene import build
 
 from ..common.registry import experiment
+from ..common.scenes import threads_for, with_
 from ..common.weights_needed import there
-from ..verification.scenes import threads_for, with_
 from .environments import ENVIRONMENTS, environment
 from .errors import PRINTED, ready
 from .evaluate import frames
@@ -37,7 +37,7 @@ def table3(run):
     for name in run.progress(ENVIRONMENTS, "environments"):
         laws = methods(name, found)
         if laws:
-            times = timed(environment(name, steps=steps), {**laws, TRUE: own},
+            times = timed(environment(name, steps=steps), {**laws, TRUE: copy_body},
                           REPEATS[run.profile])
             rows += [(name, word, *one) for word, some in times.items() for one in some]
             for word in laws:
@@ -69,7 +69,7 @@ def took(scene, law):
         try:
             for _ in run:
                 pass
-        except Broken:
+        except RunBroken:
             return np.nan, np.nan
         return perf_counter() - wall, process_time() - cpu
 

@@ -15,9 +15,9 @@ from mpm_ref.scene import build
 from mpm_ref.shapes.inside import solid
 
 from ..common.registry import experiment
+from ..common.scenes import catalogue_scene
 from ..common.settings import record_settings
 from ..common.weights_needed import there
-from ..verification.scenes import shipped
 from .environments import ENVIRONMENTS
 from .gallery import contact, large, pool
 from .identified import POINTS
@@ -35,7 +35,7 @@ GRAPHS = named(JELLY, COUNTS[0])
             profiles=("quick", "standard"), budget={"quick": 6, "standard": 6})
 def settings(run):
     """Of the scenes nclaw_*.toml, of trained weights, and of the tasks."""
-    scenes = {name: shipped(f"nclaw_{name}") for name in ENVIRONMENTS}
+    scenes = {name: catalogue_scene(f"nclaw_{name}") for name in ENVIRONMENTS}
     jelly = scenes[JELLY]
     record_settings(run, f"nclaw_{JELLY}", of_environment(jelly, len(scenes)))
     record_settings(run, "nclaw_*", of_release(scenes))

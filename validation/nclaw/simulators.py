@@ -11,14 +11,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.nclaw.bodies import own
-from mpm_ref.nclaw.gnn.history import box_of
+from mpm_ref.nclaw.bodies import copy_body
+from mpm_ref.nclaw.gnn.features import box_of
 from mpm_ref.nclaw.study.compare import positions
 from mpm_ref.scene import build
 from mpm_ref.store.words import counted
 from mpm_ref.trajectories import in_order
 
-from ..verification.scenes import threads_for
+from ..common.scenes import threads_for
 from .environments import ENVIRONMENTS
 from .tasks import reconstruction, velocity
 
@@ -54,7 +54,7 @@ class Shown(NamedTuple):
 
     x: np.ndarray       # (k + 1, n, d) [m]
     v: np.ndarray       # (n, d) [m/s]
-    box: tuple          # `nclaw.gnn.history.Box`
+    box: tuple          # `nclaw.gnn.features.WallBox`
     dt: float           # [s] between frames
 
 
@@ -79,7 +79,7 @@ def shown(scene):
     """`Shown` of a scene."""
     problem = build(scene)
     with threads_for(problem.bodies):
-        x = np.array(list(positions(problem, tuple(map(own, problem.bodies)))))
+        x = np.array(list(positions(problem, tuple(map(copy_body, problem.bodies)))))
     return Shown(x, *start(problem)[1:], problem.clock.every * problem.clock.dt)
 
 

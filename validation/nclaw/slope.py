@@ -7,7 +7,7 @@ from functools import partial
 from mpm_ref.scene import Poisson
 
 from ..common.registry import experiment
-from ..verification.scenes import with_
+from ..common.scenes import with_
 from .environments import ENVIRONMENTS, environment
 from .other_bodies import both, show
 from .stand_in_bodies import said

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..common.scenes import with_
 from ..common.weights_needed import there
-from ..verification.scenes import with_
 from .environments import environment
-from .evaluate import compare, learned
+from .evaluate import body_maker, compare
 from .small_trainings import bundled, small_nets
 from .tasks import SEEDS, velocity
 
@@ -56,7 +56,7 @@ def measured(run, names, full=True):
 def of_size(run, found, full):
     """[`Measured`] of {(name, epoch): laws} that were trained on one scene."""
     net = small_nets()[next(iter(found))[0]]
-    makers = [learned(laws) for laws in found.values()]
+    makers = [body_maker(laws) for laws in found.values()]
     results = [compare(cut(run, scene), makers) for scene in scenes(net, full)]
     rows = []
     for k, (name, epoch) in enumerate(found):

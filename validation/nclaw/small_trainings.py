@@ -12,8 +12,8 @@ from typing import NamedTuple
 from mpm_ref.scene import Walls
 from mpm_ref.scene.toml import canonical
 
+from ..common.scenes import with_
 from ..common.weights_needed import Untrained
-from ..verification.scenes import with_
 from .bundle import load
 from .environments import ENVIRONMENTS, environment
 from .observation import Seen

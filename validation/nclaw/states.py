@@ -8,11 +8,11 @@ from mpm_ref.nclaw.gnn.simulator import Simulator
 from mpm_ref.scene import build
 
 from ..common.registry import experiment
+from ..common.scenes import threads_for, with_
 from ..common.weights_needed import there
 from ..ldm.published_bodies import keep
-from ..verification.scenes import threads_for, with_
 from .environments import ENVIRONMENTS
-from .evaluate import Broken, frames, learned, own
+from .evaluate import RunBroken, body_maker, copy_body, frames
 from .initial_laws import untrained
 from .tasks import SEEDS, reconstruction, time, velocity
 from .trained_laws import trained, weights_of
@@ -28,7 +28,7 @@ BESIDE = ("ours", "neural", "gnn")      # of Figure 2
 def training(run):
     """Keeps the points of each environment at five times."""
     scenes = {name: with_(reconstruction(name), every=SHOTS[1]) for name in ENVIRONMENTS}
-    found = {name: shots(scene, own) for name, scene in run.progress(scenes.items(), "runs")}
+    found = {name: shots(scene, copy_body) for name, scene in run.progress(scenes.items(), "runs")}
     keep(run, t=[k * scenes["jelly"].dt for k in SHOTS], **found)
     for name, x in found.items():
         run.record(f"nclaw.fig6.{name}.low", x[-1, :, 1].min(), unit="m", comparator="info",
@@ -58,10 +58,10 @@ def away(run):
 def contestants(name, laws):
     """{word: what `shots` takes} of an environment, of those laws of `nets` that are there."""
     own_nets = {word: laws.get(weights_of(word, name)) for word in BESIDE}
-    return {"true": own,
-            **{word: one if isinstance(one, Simulator) else learned(one)
+    return {"true": copy_body,
+            **{word: one if isinstance(one, Simulator) else body_maker(one)
                for word, one in own_nets.items() if one is not None},
-            "init": learned(untrained())}
+            "init": body_maker(untrained())}
 
 
 def ends(scene, law):
@@ -80,7 +80,7 @@ def shots(scene, law):
     with threads_for(problem.bodies):
         try:
             found += frames(problem, law)
-        except Broken:
+        except RunBroken:
             missing = 1 + scene.steps // scene.every - len(found)
             found += missing * [np.full_like(found[0], np.nan)]
     return np.array(found)

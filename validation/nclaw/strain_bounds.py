@@ -4,12 +4,12 @@ their training, made again as far as it needs to be, shows.
 
 from functools import cache
 
-from mpm_ref.nclaw.bodies import learned
+from mpm_ref.nclaw.bodies import body_maker
 from mpm_ref.nclaw.train.recipe import Recipe
-from mpm_ref.nclaw.train.strains import cuts_of, met
+from mpm_ref.nclaw.train.strains import segment_cuts, training_bounds
 from mpm_ref.scene import build
 
-from ..verification.scenes import threads_for
+from ..common.scenes import threads_for
 from .environments import environment, trajectory
 from .trained_laws import nets, trained
 
@@ -26,6 +26,7 @@ def met_by(name):
 def bounds(net, laws):
     """Bounds of the strains that laws have met, which were trained as a `Net` says."""
     observed, problem = trajectory(net.environment), build(environment(net.environment))
-    cuts = () if net.method == LABELED else cuts_of(Recipe(epochs=net.epochs), len(observed.x) - 1)
+    steps = len(observed.x) - 1
+    cuts = () if net.method == LABELED else segment_cuts(Recipe(epochs=net.epochs), steps)
     with threads_for(problem.bodies):
-        return met(problem, observed, learned(laws), cuts)
+        return training_bounds(problem, observed, body_maker(laws), cuts)

@@ -6,12 +6,17 @@ import numpy as np
 
 from mpm_ref.explicit import initial_stress
 from mpm_ref.materials import NoFlow
-from mpm_ref.nclaw.bodies import gradients, own, points, stresses
+from mpm_ref.nclaw.bodies import (
+    copy_body,
+    deformation_gradients,
+    kirchhoff_stresses,
+    material_points,
+)
 from mpm_ref.nclaw.study.compare import positions
 from mpm_ref.scene import build
 
 from ..common.registry import experiment
-from ..verification.scenes import threads_for
+from ..common.scenes import threads_for
 from .dissipation import BOUND, known
 from .environments import ENVIRONMENTS, environment
 
@@ -39,16 +44,17 @@ def met(name, every):
     many.
     """
     problem = build(environment(name, every=every))
-    body = own(problem.bodies[0])
+    body = copy_body(problem.bodies[0])
     with threads_for(problem.bodies):
-        return np.concatenate([gradients(body).copy() for _ in positions(problem, (body,))])
+        return np.concatenate([deformation_gradients(body).copy()
+                               for _ in positions(problem, (body,))])
 
 
 def split(law, F):
     """Norms [Pa] (n,) of the skew part of a law's Kirchhoff stress, and of all of it."""
-    body = points(law, NoFlow(), F)
+    body = material_points(law, NoFlow(), F)
     initial_stress(body)
-    tau = stresses(body)
+    tau = kirchhoff_stresses(body)
     return (np.linalg.norm(a, axis=(1, 2)) for a in (0.5 * (tau - tau.mT), tau))
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from mpm_ref.scene import Clip, Poisson, Velocity, Walls
 
-from ..verification.scenes import with_
+from ..common.scenes import with_
 from .environments import environment
 from .stand_in_bodies import toy
 

@@ -17,7 +17,7 @@ from mpm_ref.rom.study.nsf_run import Plan, infer
 from mpm_ref.simulate import simulate
 
 from ..common.registry import experiment
-from ..verification.scenes import with_
+from ..common.scenes import with_
 from .errors import mean, rows_of
 from .reduced_runs import FASTER, tested
 from .studies import cake, metal

@@ -19,7 +19,7 @@ from mpm_ref.rom.study.nsf_run import Plan
 from mpm_ref.simulate import simulate
 
 from ..common.registry import experiment
-from ..verification.scenes import with_
+from ..common.scenes import with_
 from .factors import REPEATS, seconds
 from .studies import cake, metal
 

@@ -6,8 +6,8 @@ What differs between runs of a scene (E, xi, angles) is that of the studies (`st
 from mpm_ref.scene import build
 
 from ..common.registry import experiment
+from ..common.scenes import catalogue_scene
 from ..common.settings import record_settings
-from ..verification.scenes import shipped
 from .study_settings import of_networks, of_studies
 
 ROUNDED = 0.01      # dx = 1/150 and 1/160 are printed with two digits, 0.0067 and 0.0063
@@ -32,7 +32,7 @@ STAND_INS = {       # where the shape is not published, and ours has nearly as m
 def settings(run):
     """Settings of the scenes nsf_*.toml, of the studies of them, and of the networks."""
     for name in NAMES:
-        scene = shipped(f"nsf_{name}")
+        scene = catalogue_scene(f"nsf_{name}")
         dx = f"nsf.table1.{name}.dx"
         record_settings(run, f"nsf_{name}", printed(name, scene),
                         **{dx.replace(".", "_"): ROUNDED})

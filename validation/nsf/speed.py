@@ -19,7 +19,7 @@ from mpm_ref.rom.study.nsf_run import begin, model
 from mpm_ref.simulate import simulate
 
 from ..common.registry import experiment
-from ..verification.scenes import with_
+from ..common.scenes import with_
 from .reduced_runs import FASTER, tested
 from .studies import cake, metal, sand
 

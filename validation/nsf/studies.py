@@ -15,7 +15,7 @@ from mpm_ref.rom.study.nsf_run import drawn, of_cells, weighed
 from mpm_ref.scene import Poisson
 from mpm_ref.scene.overrides import varied
 
-from ..verification.scenes import shipped
+from ..common.scenes import catalogue_scene
 
 
 class Study(NamedTuple):
@@ -37,7 +37,7 @@ class Study(NamedTuple):
 
     def run(self, value):
         """The scene of a run."""
-        base = shipped(self.scene)
+        base = catalogue_scene(self.scene)
         bodies = {f"body.{body.name}.sampling.count": round(body.sampling.count / self.coarser**3)
                   for body in base.body if isinstance(body.sampling, Poisson)}
         steps = (self.steps or base.steps) // self.coarser // self.spacing * self.spacing

@@ -15,7 +15,7 @@ from mpm_ref.rom.study.nsf_watch import look, trained
 from mpm_ref.rom.study.watch import BEYOND
 
 from ..common.registry import experiment
-from ..verification.scenes import with_
+from ..common.scenes import with_
 from .errors import COLUMNS, mean, rows_of, share
 from .reduced_runs import tested
 from .states import keep_runs, keep_states

@@ -70,26 +70,27 @@ def one_stiffness(run, step, E, plan):
                "the increment")
     points = [point(step, exact, (method, eps), repeats) for eps in ladder for method in METHODS]
     record_equal_eps(run, name, points, scale)
-    record_equal_error(run, name, known(points, least), scale)
+    record_equal_error(run, name, bounded_below(points, least), scale)
     return points
 
 
-def point(step, exact, way, repeats, **changes):
-    """`Point` of a way (method, eps) beside the exact `Solution`, of so many equal solves the
+def point(step, exact, rule, repeats, **changes):
+    """`Point` of a rule (method, eps) beside the exact `Solution`, of so many equal solves the
     median time; changes: further options.
     """
-    method, eps = way
+    method, eps = rule
     solutions = [solved(step, method, eps=eps, **changes) for _ in range(repeats)]
     cpu = float(np.median([sum(s.report.seconds.values()) for s in solutions]))
     found, report = solutions[0], solutions[0].report
     off = errors(step, found.dv, exact.dv)
     system = step.stepper.system(step.pose)
     gap = (found.E - exact.E) / (system.energy(system.start) - exact.E)
-    return Point(method, eps, cpu, off.velocity, off.cells_max, report.iterations, report.inner,
+    return Point(method, eps, cpu, off.velocity, off.cells_max, report.iterations,
+                 report.cg_iterations,
                  report.converged, gap, off.velocity_max, off.cells)
 
 
-def known(points, least):
+def bounded_below(points, least):
     """`Point`s with no error below the reference's own `Errors`: a method that made the reference
     would agree with it to the bit.
     """

@@ -26,7 +26,7 @@ FIRST = 1e-6                            # tolerance of the gradient that it begi
 PAPER = 1e-7
 EXACT = 1e-11                           # ... of the references
 CHECKED = 3.0                           # the references differ by less than 1 / 3 of what is asked
-CAPS = {"iterations": 1000, "cg_iterations": 20000}
+CAPS = {"max_iterations": 1000, "max_cg_iterations": 20000}
 HELD = 0.95                             # share of the solves that the rule is to hold
 
 
@@ -72,7 +72,7 @@ def trials(name, asked):
     exact = solved(step, "pn-mgpcg", eps=EXACT, **OPTIONS["pn-mgpcg"], **CAPS)
     check = solved(step, "pn-pcg", eps=EXACT, **CAPS)
     for method in METHODS:
-        solved(step, method, cells=1.0, iterations=2)               # compiles
+        solved(step, method, displacement_tolerance=1.0, max_iterations=2)               # compiles
     rows = [trial(step, exact, name, method, cells)
             for cells in (0.0, *asked) for method in METHODS]
     scale = (f"{particles(problem)} particles, {len(exact.dv)} nodes, step {LATER} from "
@@ -83,10 +83,11 @@ def trials(name, asked):
 def trial(step, exact, name, method, cells):
     """`Trial` of a method, by the rule or, where cells is 0, by the paper's tolerance."""
     changes = {**CAPS, **OPTIONS.get(method, {})}
-    found = solved(step, method, cells=cells, eps=FIRST if cells else PAPER, **changes)
+    found = solved(step, method, displacement_tolerance=cells,
+                   eps=FIRST if cells else PAPER, **changes)
     r = found.report
-    return Trial(name, method, cells, difference(step, found.dv, exact.dv)[1], r.off,
-                 sum(r.seconds.values()), r.iterations, r.inner, r.converged)
+    return Trial(name, method, cells, difference(step, found.dv, exact.dv)[1], r.particle_error,
+                 sum(r.seconds.values()), r.iterations, r.cg_iterations, r.converged)
 
 
 def record_scene(run, name, rows, scale):

@@ -1,4 +1,4 @@
-"""What is left of a whole run's energy at a tolerance: the twisted bar, step after step.
+"""The energy of a whole run at a tolerance: the twisted bar, step after step.
 
 The authors' code on this bar with a middle of 1e9 Pa had after 40 steps kinetic energies between
 0.31 J and 0.55 J, by solver, at the paper's tolerance, and 0.914 J on which two solvers agreed at
@@ -17,8 +17,8 @@ from mpm_ref.scene import build
 from mpm_ref.simulate import simulate
 
 from ..common.registry import experiment
+from ..common.scenes import with_
 from ..hot.stiffness import bar
-from ..verification.scenes import with_
 
 PER_CELL = 8            # as those runs had
 MIDDLE = 1e9            # [Pa]
@@ -30,7 +30,7 @@ COLUMNS = ("method", "eps", "cells", "kinetic", "elastic", "total", "rms", "max"
            "iterations", "converged")
 
 
-class Way(NamedTuple):
+class StopRule(NamedTuple):
     """A method, and what ends its solves: a gradient, or an error of displacement to hold [dx]."""
 
     method: str
@@ -49,10 +49,10 @@ class Way(NamedTuple):
         only where it is flexible: plain CG takes thousands of iterations in PN-MGPCG's last steps.
         """
         flexible = {"flexible": True} if self.method == "pn-mgpcg" else {}
-        return {"eps": self.eps, "cells": self.cells, **flexible}
+        return {"eps": self.eps, "displacement_tolerance": self.cells, **flexible}
 
 
-ANSWER = Way("pn-pcg", 1e-12)       # the run that others are compared with
+ANSWER = StopRule("pn-pcg", 1e-12)       # the run that others are compared with
 
 
 class End(NamedTuple):
@@ -81,33 +81,34 @@ def energies(run):
     ladder = run.choose(quick=(1e-7, 1e-9), standard=(1e-5, 1e-7, 1e-9, 1e-11))
     held = run.choose(quick=(), standard=(1e-2, 1e-3))
     for method in methods:
-        whole(dx, 1, Way(method, 1e-3))                       # compiles
-    answer = whole(dx, steps, ANSWER)
-    ways = [Way(m, eps) for m in methods for eps in ladder]
-    ways += [Way(m, FIRST, cells) for m in methods for cells in held]
+        full_run(dx, 1, StopRule(method, 1e-3))                       # compiles
+    answer = full_run(dx, steps, ANSWER)
+    ways = [StopRule(m, eps) for m in methods for eps in ladder]
+    ways += [StopRule(m, FIRST, cells) for m in methods for cells in held]
     scale = (f"{len(answer.x)} particles, dx = {dx} m, middle {MIDDLE:.0e} Pa, {steps} steps of "
              f"{DT:.4f} s")
-    ends = {way: whole(dx, steps, way) for way in run.progress(ways, "runs")}
-    for way, end in ends.items():
-        record_end(run, way, end, answer, (dx, scale))
+    ends = {rule: full_run(dx, steps, rule) for rule in run.progress(ways, "runs")}
+    for rule, end in ends.items():
+        record_end(run, rule, end, answer, (dx, scale))
     record_agreement(run, ends, answer, scale)
     rows = {**ends, ANSWER: answer}
     run.table("ends", COLUMNS, [(*key, end.kinetic, end.elastic, end.total,
-                                 *apart(end, answer, dx), end.cpu, end.iterations, end.converged)
+                                 *distance_in_cells(end, answer, dx), end.cpu, end.iterations,
+                                 end.converged)
                                 for key, end in rows.items()])
 
 
-def twisted(dx, steps, way):
+def twisted(dx, steps, rule):
     """The scene: the bar of Figure 20, with fixed steps and fewer particles per cell."""
-    scene = bar(dx, MIDDLE, way.method, steps, **way.options)
+    scene = bar(dx, MIDDLE, rule.method, steps, **rule.options)
     count = round(PER_CELL * 0.12 * 0.12 * 0.3 / dx**3)
     bodies = tuple(with_(b, sampling=with_(b.sampling, count=count)) for b in scene.body)
     return with_(scene, body=bodies, dt=DT, cfl=None, longest=None, interval=None)
 
 
-def whole(dx, steps, way):
+def full_run(dx, steps, rule):
     """`End` of a run."""
-    problem, reports = build(twisted(dx, steps, way)), []
+    problem, reports = build(twisted(dx, steps, rule)), []
     for _ in simulate(problem, on_step=lambda state, dt: reports.append(state.solve)):
         pass
     E = energy(problem.bodies, problem.gravity, problem.inertia)
@@ -117,7 +118,7 @@ def whole(dx, steps, way):
                all(r.converged for r in reports))
 
 
-def apart(end, answer, dx):
+def distance_in_cells(end, answer, dx):
     """Root mean square and largest distance of the particles from where they should be, in cells
     (all have nearly the same mass).
     """
@@ -125,11 +126,11 @@ def apart(end, answer, dx):
     return float(np.sqrt(np.mean(far**2))), float(far.max())
 
 
-def record_end(run, way, end, answer, size):
+def record_end(run, rule, end, answer, size):
     """Energies of one run over those of the answer, and how far its particles are off."""
     dx, scale = size
-    name = f"trade.hot.energy.{way.name}"
-    rms, most = apart(end, answer, dx)
+    name = f"trade.hot.energy.{rule.name}"
+    rms, most = distance_in_cells(end, answer, dx)
     say = partial(run.record, unit="1", comparator="info", scale=scale)
     late = "" if end.converged else "; not every step converged"
     say(f"{name}.kinetic", end.kinetic / answer.kinetic,
@@ -142,9 +143,9 @@ def record_end(run, way, end, answer, size):
 
 def record_agreement(run, ends, answer, scale):
     """Whole runs of different solvers agree when each is converged; they do not before."""
-    plain = {way: end for way, end in ends.items() if not way.cells}
-    for eps in sorted({way.eps for way in plain}, reverse=True):
-        share = [end.kinetic / answer.kinetic for way, end in plain.items() if way.eps == eps]
+    plain = {rule: end for rule, end in ends.items() if not rule.cells}
+    for eps in sorted({rule.eps for rule in plain}, reverse=True):
+        share = [end.kinetic / answer.kinetic for rule, end in plain.items() if rule.eps == eps]
         judged = eps <= CONVERGED
         rule = {"comparator": "<=", "bound": AGREE} if judged else {"comparator": "info"}
         run.record(f"trade.hot.energy.spread.eps{eps:.0e}".replace("e-0", "e-"),

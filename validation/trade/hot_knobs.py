@@ -32,9 +32,9 @@ KNOBS = {
     "coarsest direct": {"cycle": HOT._replace(coarsest="direct")},
     "single precision": {"cycle": HOT._replace(precision="single")},
     "quadratic kernel": {"kernel": "quadratic"},
-    "rebuild 5": {"rebuild": 5},
-    "renew shortened": {"renew": "shortened"},
-    "renew stale": {"renew": "stale"},
+    "rebuild 5": {"rebuild_every": 5},
+    "renew shortened": {"rebuild_when": "shortened"},
+    "renew stale": {"rebuild_when": "stale"},
     "start gravity": {"start": "gravity"},
     "shorter trials": {"search": RULES._replace(shrink=0.2)},
 }
@@ -45,7 +45,7 @@ LEVELS = (1e-2, 1e-4)               # errors at which times are compared
 EXACT = 1e-12
 PAPER = 1e-7
 CFL = (0.25, 0.5, 1.0, 2.0)         # of the step that the scene takes
-CAPS = {"iterations": 500}
+CAPS = {"max_iterations": 500}
 
 
 @experiment("trade.hot.knobs", title="HOT: levels, window, smoothing, rebuilds at equal error",
@@ -90,7 +90,7 @@ def settings(run, about, tried, plan):
     ladder, repeats = plan
     exact = reference(step)
     for setting in tried:
-        solved(step, SETTINGS[setting], iterations=2)               # compiles
+        solved(step, SETTINGS[setting], max_iterations=2)               # compiles
     rows = {}
     for eps in ladder:
         for setting in tried:
@@ -122,7 +122,7 @@ def times(run, about):
     found = []
     for share in CFL:
         dt = share * step.dt
-        pose = step.stepper.pose(step.bodies, step.t, dt)
+        pose = step.stepper.problem(step.bodies, step.t, dt)
         other = step._replace(pose=pose, dt=dt)
         solution, exact = solved(other, "hot", **CAPS), reference(other)
         cpu = sum(solution.report.seconds.values())

@@ -1,4 +1,4 @@
-"""The ways in which a step is solved at equal error: methods, each with its tolerances.
+"""Methods, each with its ladder of tolerances, that solve a step at equal error.
 
 All take turns, so that the load of the machine bears on all alike, and each goes down its ladder
 until a solve is cut short or slow: the next would be so too.
@@ -17,11 +17,11 @@ FLEXIBLE = {"flexible": True}       # CG bears a preconditioner that varies, as 
                                     # iterations near the solution
 OPTIONS = {"pn-mgpcg": FLEXIBLE, "pn-gmg-pcg": FLEXIBLE}
 OWN = {"gast15": tuple(10.0**-k for k in range(-1, 6))}     # its tolerance is an L2 norm [kg m/s]
-CAPS = {"iterations": 300, "cg_iterations": 3000}   # of a solve; one that is cut short says so
-SLOW = 10.0                         # CPU time from which on a solve is its way's last [s]
+CAPS = {"max_iterations": 300, "max_cg_iterations": 3000}   # one that is cut short says so
+SLOW = 10.0                         # CPU time from which on a solve is its ladder's last [s]
 
 
-class Way(NamedTuple):
+class ToleranceLadder(NamedTuple):
     """A method, and the tolerances that it is given, largest first."""
 
     method: str
@@ -33,26 +33,26 @@ class Way(NamedTuple):
         return {**CAPS, **OPTIONS.get(self.method, {})}
 
 
-def ways(methods, ladder):
-    """The `Way`s of methods, on one ladder but where a method's tolerance means something else."""
-    return [Way(method, OWN.get(method, ladder)) for method in methods]
+def tolerance_ladders(methods, ladder):
+    """Return the ladders of methods: one for all but where a tolerance means something else."""
+    return [ToleranceLadder(method, OWN.get(method, ladder)) for method in methods]
 
 
 def descended(step, exact, tried):
-    """`Point`s of all `Way`s tried, beside the exact `Solution`."""
+    """`Point`s of all `ToleranceLadder`s tried, beside the exact `Solution`."""
     found, ended = [], set()
-    for rung in zip_longest(*(way.ladder for way in tried)):
-        for way, eps in zip(tried, rung, strict=True):
-            if eps is None or way.method in ended:
+    for rung in zip_longest(*(ladder.ladder for ladder in tried)):
+        for ladder, eps in zip(tried, rung, strict=True):
+            if eps is None or ladder.method in ended:
                 continue
-            found.append(point(step, exact, (way.method, eps), 1, **way.options))
+            found.append(point(step, exact, (ladder.method, eps), 1, **ladder.options))
             if last(found[-1]):
-                ended.add(way.method)
+                ended.add(ladder.method)
     return found
 
 
 def last(p):
-    """Whether a `Point` is its way's last. HOT goes on to the paper's tolerance, at which all are
-    compared to it.
+    """Return whether a `Point` is its ladder's last. HOT goes on to the paper's tolerance, at
+    which all are compared to it.
     """
     return (not p.converged or p.cpu > SLOW) and (p.method != "hot" or p.eps <= PAPER)

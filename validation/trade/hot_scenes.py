@@ -14,11 +14,11 @@ from ..common.registry import experiment
 from ..hot.one_step import Errors, errors, solved
 from ..hot.stiffness import METHODS
 from ..hot.warm_states import BEGUN, PRINTED, begun, particles, steps
-from .hot import PAPER, POINT, Point, known, record_equal_eps, times_for
-from .hot_methods import ALL, OPTIONS, SLOW, SOME, descended, ways
+from .hot import PAPER, POINT, Point, bounded_below, record_equal_eps, times_for
+from .hot_methods import ALL, OPTIONS, SLOW, SOME, descended, tolerance_ladders
 
 EXACT, CHECK = "pn-mgpcg", "pn-pcg"     # methods of the reference and of its check
-MANY = {"iterations": 1000, "cg_iterations": 20000}     # at most, of their solves
+MANY = {"max_iterations": 1000, "max_cg_iterations": 20000}     # at most, of their solves
 BELOW = 10.0                        # of the smallest tolerance, the reference's
 TRUST = 3.0                         # errors below so many times the reference's own say nothing
 TIE = 1.1                           # ratio of CPU times below which nobody is faster
@@ -78,7 +78,7 @@ def equal_error(run):
     compiled(trials)
     for trial in run.progress(trials, "scenes"):
         found, exact = unpacked(run.cached(trial.name, partial(ladder, trial)))
-        own = known(found, exact.least)
+        own = bounded_below(found, exact.least)
         times[trial] = seconds(own)
         record_trial(run, trial, own, exact)
         rows += [(trial.scene, trial.size, *p, exact.least.velocity, exact.least.cells_max)
@@ -100,7 +100,7 @@ def ladder(trial):
     step = next(steps(problem, state, 1))
     exact, check = (solved(step, method, eps=trial.eps, **MANY, **OPTIONS.get(method, {}))
                     for method in (EXACT, CHECK))
-    found = descended(step, exact, ways(trial.methods, trial.ladder))
+    found = descended(step, exact, tolerance_ladders(trial.methods, trial.ladder))
     scale = (f"{particles(problem)} particles, {len(exact.dv)} nodes, one step from "
              f"{BEGUN[trial.scene]:g} s on")
     return found, Reference(errors(step, check.dv, exact.dv),

@@ -16,7 +16,7 @@ from ..hot.warm_states import BEGUN, begun, particles, steps
 
 STARTS = ("zero", "gravity", "last")
 EPS, EXACT = 1e-8, 1e-10
-CAPS = {"iterations": 1000}
+CAPS = {"max_iterations": 1000}
 COLUMNS = ("scene", "step", "start", "cpu", "iterations", "cells", "converged")
 
 
@@ -51,7 +51,7 @@ def scene_rows(name, count):
 def beginnings(step, last):
     """{start: increment (n, d)} of a step, whose predecessor took the increments last."""
     q = step.pose.unknowns
-    fall = np.broadcast_to(step.pose.falling, q.dv0.shape)
+    fall = np.broadcast_to(step.pose.gravity_increment, q.dv0.shape)
     return {"zero": q.dv0, "gravity": q.dv0 + free_part(q, fall),
             "last": q.dv0 + free_part(q, carried(*last, q.index))}
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 from mpm_ref.explicit import Scheme
 
 
-class Setting(NamedTuple):
+class ExplicitSetting(NamedTuple):
     """One choice of all knobs."""
 
     transfer: str = "mls"
@@ -29,7 +29,7 @@ class Setting(NamedTuple):
         return ", ".join(changed) or "the default"
 
 
-DEFAULT = Setting()
+DEFAULT = ExplicitSetting()
 
 TRANSFERS = ({"transfer": "pic"}, {"transfer": "flip"}, {"transfer": "flip", "flip": 0.95},
              {"transfer": "apic"})
@@ -60,7 +60,7 @@ STANDARD = {
 
 
 def settings(levels):
-    """(knob, `Setting`) of all levels, one knob at a time from the default."""
+    """(knob, `ExplicitSetting`) of all levels, one knob at a time from the default."""
     out = [("default", DEFAULT)]
     for knob, changes in levels.items():
         out += [(knob, DEFAULT._replace(**change)) for change in changes]

@@ -8,12 +8,12 @@ from mpm_ref.rom.study.case import case
 from mpm_ref.rom.study.run import Way
 
 from ..common.registry import experiment
+from ..common.scenes import with_
 from ..ldm.networks import trained
 from ..ldm.references import References, pod, references, share
 from ..ldm.studies import GRAVITY, TORSION, TOWER
 from ..ldm.timing import COLUMNS, Full, alone, median, race
 from ..ldm.tower import FAST, NET, PAPER, scene_of
-from ..verification.scenes import with_
 from .front import front
 
 BASE = PAPER._replace(points=50)
@@ -54,7 +54,7 @@ def of_ways(run):
 
 
 @dataclass(frozen=True)
-class Setting:
+class ReducedSetting:
     """A reduced run of the cylinder under gravity."""
 
     map: str                # "network" or "pod"
@@ -99,7 +99,7 @@ def of_maps(run):
     longer = run.choose(quick=(1, 3), standard=(1, 2, 3, 5, 6))
     maps = run.choose(quick=("network",), standard=("network", "pod"))
     tests = references(GRAVITY, run.choose(quick=1, standard=3))
-    chosen = [Setting(name, r, n, k) for name in maps for r in dimensions for n in points
+    chosen = [ReducedSetting(name, r, n, k) for name in maps for r in dimensions for n in points
               for k in longer]
     full = full_run(GRAVITY.scene(*GRAVITY.mu[GRAVITY.test[0]]))
     measured = [one.measured(tests) for one in run.progress(chosen, "settings")]

@@ -50,7 +50,7 @@ class Clock:
         return timed
 
 
-class Watched:
+class TimedCalls:
     """An object of which some methods go through a function of (name, method)."""
 
     def __init__(self, of, names, through):
@@ -78,8 +78,8 @@ def split(one, at, way, steps=STEPS):
         return call
 
     field = stepper.field
-    stepper.field = field._replace(g=Watched(field.g, EVALUATIONS, counted))
-    stepper.quadrature = Watched(stepper.quadrature, ("cloud",),
+    stepper.field = field._replace(g=TimedCalls(field.g, EVALUATIONS, counted))
+    stepper.quadrature = TimedCalls(stepper.quadrature, ("cloud",),
                                  lambda name, method: clock.part("quadrature", method))
     stepper.on_grid = clock.part("grid", stepper.on_grid)
     stepper.project = clock.part("projection", stepper.project)
@@ -159,7 +159,7 @@ def offline(run):
         rows.append((count, scene.steps, data, training, *known,
                      paid(known[0] - known[2], data + training),
                      paid(known[1] - known[2], data + training)))
-        told(run, size, rows[-1])
+        cost_summary(run, size, rows[-1])
     run.table("pays", PAYS, rows)
 
 
@@ -173,7 +173,7 @@ def paid(gain, spent):
     return spent / gain if gain > 0.0 else np.inf
 
 
-def told(run, size, row):
+def cost_summary(run, size, row):
     """Record a row of the table."""
     known = dict(zip(PAYS, row, strict=True))
     run.record(f"trade.ldm.offline.{size}", known["cpu_fastest"] - known["cpu_reduced"],

@@ -17,7 +17,7 @@ from mpm_ref.timestep import stable_dt
 from ..extremes.long_run import CARRIED, round_state
 from ..extremes.outcome import FINISHED, REFUSED, outcome
 from ..verification.lattice import lattice
-from .knobs import Setting
+from .knobs import ExplicitSetting
 
 LOST = "wrong"          # a run that ended, with an error of the size of the answer
 
@@ -34,7 +34,7 @@ class Point(NamedTuple):
     """One setting, measured."""
 
     knob: str
-    setting: Setting
+    setting: ExplicitSetting
     error: float            # relative; NaN where the run broke
     cpu: float              # seconds of the step loop, smallest of the repeats
     bytes: int              # of state and grid
@@ -50,7 +50,7 @@ class Point(NamedTuple):
         return self.end == FINISHED
 
 
-COLUMNS = ("knob", *Setting._fields, *Point._fields[2:], "pareto_cpu", "pareto_bytes")
+COLUMNS = ("knob", *ExplicitSetting._fields, *Point._fields[2:], "pareto_cpu", "pareto_bytes")
 
 
 def measure(knob, setting, prepare, repeats):

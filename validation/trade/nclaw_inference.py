@@ -10,17 +10,17 @@ import numpy as np
 
 from mpm_ref.explicit import deform_body
 from mpm_ref.materials.learned.weights import PARTS
-from mpm_ref.nclaw.bodies import own, points
-from mpm_ref.nclaw.study.compare import Broken, positions
+from mpm_ref.nclaw.bodies import copy_body, material_points
+from mpm_ref.nclaw.study.compare import RunBroken, positions
 from mpm_ref.scene import build
 
 from ..common.registry import experiment
+from ..common.scenes import threads_for, with_
 from ..nclaw.environments import environment
-from ..nclaw.evaluate import compare, learned
+from ..nclaw.evaluate import body_maker, compare
 from ..nclaw.small_runs import measured
 from ..nclaw.small_trainings import BASE, OF_WIDTH, last, small_nets
 from ..nclaw.trained_laws import trained
-from ..verification.scenes import threads_for, with_
 from .front import front
 
 NAMES = ("jelly", "plasticine")
@@ -47,7 +47,7 @@ class Step(NamedTuple):
 
 def cost(law, flow):
     """CPU seconds of both laws for one point, median."""
-    body = points(law, flow, np.eye(3) + STRAIN * np.random.default_rng(0).normal(
+    body = material_points(law, flow, np.eye(3) + STRAIN * np.random.default_rng(0).normal(
         size=(POINTS, 3, 3)))
     start, seconds = body.particles.F.copy(), []
     with threads_for((body,)):
@@ -84,7 +84,7 @@ def width(run):
 
 def of_laws(laws, body):
     """`cost` of `LearnedLaws`, in place of those of a body."""
-    made = learned(laws)(body)
+    made = body_maker(laws)(body)
     return cost(made.law, made.flow)
 
 
@@ -119,7 +119,7 @@ def digits(run):
     for name in run.choose(quick=NAMES[:1], standard=NAMES):
         steps = run.choose(quick=SHORT, standard=environment(name).steps)
         laws = [rounded(trained(name), k) for k in bits]
-        found = compare(environment(name, steps=steps, every=EVERY), [*map(learned, laws)])
+        found = compare(environment(name, steps=steps, every=EVERY), [*map(body_maker, laws)])
         sizes = [size_of(one, k) for one, k in zip(laws, bits, strict=True)]
         best = front(sizes, [one.error for one in found])
         for k, size, one, on in zip(bits, sizes, found, best, strict=True):
@@ -153,12 +153,12 @@ def time_step(run):
 def of_steps(name, factors, steps):
     """`Step`s of an environment: over the time of so many steps of the trained length."""
     scene = environment(name, steps=steps, every=EVERY)
-    x, _ = timed(scene, own)
+    x, _ = timed(scene, copy_body)
     rows = []
     for factor in factors:
         other = with_(scene, dt=factor * scene.dt, steps=round(steps / factor),
                       every=round(EVERY / factor))
-        found = [timed(other, make) for make in (learned(trained(name)), own)]
+        found = [timed(other, make) for make in (body_maker(trained(name)), copy_body)]
         rows.append(Step(name, factor, *(a for at, cpu in found for a in (cpu, error(at, x)))))
     return rows
 
@@ -171,7 +171,7 @@ def timed(scene, make):
         try:
             for x in positions(problem, tuple(map(make, problem.bodies))):
                 frames.append(x)
-        except Broken:
+        except RunBroken:
             pass
         return frames, process_time() - begin
 

@@ -12,11 +12,11 @@ from mpm_ref.rom.study.nsf_run import Plan, infer
 from mpm_ref.simulate import simulate
 
 from ..common.registry import experiment
+from ..common.scenes import with_
 from ..extremes.nsf_runs import scenes
 from ..extremes.outcome import outcome
 from ..ldm.timing import clocked
 from ..nsf.errors import COLUMNS, mean, rows_of, share, weights
-from ..verification.scenes import with_
 from .front import front
 
 COUNTS = {"quick": (10, 50), "standard": (5, 10, 20, 30, 50, 100, 200, 400)}

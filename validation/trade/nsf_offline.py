@@ -51,7 +51,7 @@ def offline(run):
     rows = []
     for name, study in run.progress(studies(run).items(), "scenes"):
         one, bill = of_modes(study, run.choose(quick=1, standard=3))
-        rows.append(told(run, name, "modes", one, bill))
+        rows.append(offline_summary(run, name, "modes", one, bill))
         if run.profile == "standard" and name == "jelly":
             rows += of_networks(run, name, one, bill)
     run.table("bills", COLUMNS, rows)
@@ -82,7 +82,7 @@ def of_networks(run, name, one, bill):
         return []
     other = one._replace(fields=fields_of(model, one.study), xhat=model.xhat)
     training = sum(model.about["cpu_seconds"].values())
-    return [told(run, name, "networks", other, bill._replace(
+    return [offline_summary(run, name, "networks", other, bill._replace(
         making=training, reduced=reduced_cpu(other, one.study.samples, False, 1)))]
 
 
@@ -101,7 +101,7 @@ def trainings(run):
                             "networks on a graphics processor")
 
 
-def told(run, name, kind, one, bill):
+def offline_summary(run, name, kind, one, bill):
     """Record a `Bill`; its row."""
     id, scale = f"trade.nsf.offline.{name}.{kind}", f"{one.size}, {one.study.samples} samples"
     for word, value in bill._asdict().items():

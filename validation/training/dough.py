@@ -7,20 +7,19 @@ import torch
 from tqdm import tqdm
 
 from mpm_ref.materials.learned import weights
-from mpm_ref.nclaw.batched_step import world
-from mpm_ref.nclaw.train.fit import Diverged, train
-from mpm_ref.nclaw.train.image_observations import film_of
+from mpm_ref.nclaw.batched_step import make_world
+from mpm_ref.nclaw.train.fit import train
 from mpm_ref.nclaw.train.labeled import labels_of, train_labeled
-from mpm_ref.nclaw.train.methods import laws_of
+from mpm_ref.nclaw.train.observations import observe_images, trajectory_of
 from mpm_ref.nclaw.train.recipe import PRINTED, Recipe
-from mpm_ref.nclaw.train.rollout import trajectory_of
-from mpm_ref.nclaw.train.train import stored
+from mpm_ref.nclaw.train.session import Diverged
+from mpm_ref.nclaw.train.train import drawn_laws, learned_laws
 from mpm_ref.scene import build
 from mpm_ref.trajectories import observed
 
 from ..common.provenance import commit, provenance
+from ..common.scenes import threads_for, with_
 from ..nclaw.dough import EVERY, GUESS, block, camera, film, identity, material, scene
-from ..verification.scenes import threads_for, with_
 
 ROOT = Path(__file__).parents[2]
 WHOLE = 1.7         # horizon after the last epoch, in runs: the whole run is seen from half-way on
@@ -37,16 +36,17 @@ def run_of(of=None):
 def seen():
     """`World` and `Film` of the run: what a training is told."""
     problem, true = run_of()
-    return world(problem), film_of(film(true.x[::EVERY]), camera(), problem.bodies[0], EVERY)
+    marks = film(true.x[::EVERY])
+    return make_world(problem), observe_images(marks, camera(), problem.bodies[0], EVERY)
 
 
 def begun(net):
-    """`rollout.Laws` before training on the film."""
+    """`rollout.LawPair` before training on the film."""
     kinds = weights.RESPONSES[net.elastic](), weights.RESPONSES[net.plastic]()
-    laws = laws_of(net.method, net.seed, *kinds)
+    laws = drawn_laws(net.method, net.seed, *kinds)
     if net.guessed:
         problem, run = run_of(material(**GUESS))
-        where = world(problem)
+        where = make_world(problem)
         labels = labels_of(trajectory_of(run), problem.bodies[0].law, where.dt)
         train_labeled(Recipe(epochs=net.guessed, seed=net.seed, **LABELS), laws, where, labels)
     return laws
@@ -81,4 +81,4 @@ def filmed_laws(name, net, checkpoint, threads):
                 return filmed_laws(name, net, checkpoint, threads)
             return {**about, "errors": errors, "stopped": str(fault)}
     took = {f"{clock}_seconds": round(s, 1) for clock, s in done.meter.total._asdict().items()}
-    return stored(laws, {**about, **took, **done.known})
+    return learned_laws(laws, {**about, **took, **done.errors})

@@ -7,9 +7,8 @@ from pathlib import Path
 import torch
 from tqdm import tqdm
 
-from mpm_ref.nclaw.gnn.train.examples import run_of
-from mpm_ref.nclaw.gnn.train.fit import train
-from mpm_ref.nclaw.gnn.train.recipe import GraphRecipe
+from mpm_ref.nclaw.gnn.train.examples import training_run
+from mpm_ref.nclaw.gnn.train.fit import GraphRecipe, train_graph
 
 from ..common.provenance import commit, provenance
 from ..nclaw.simulators import scenes_of, shown
@@ -28,12 +27,12 @@ def simulator(name, net, checkpoint, threads):
     """`nclaw.gnn.Simulator` of a `GraphNet` by name, with what is to be known of it."""
     recipe, seen = recipe_of(net), [shown(scene) for scene in tqdm(scenes_of(net), desc="runs")]
     dt = seen[0].dt
-    runs = [run_of(one.x, one.v, dt, one.box) for one in seen]
+    runs = [training_run(one.x, one.v, dt, one.box) for one in seen]
     with tqdm(total=recipe.steps, desc=name) as bar:
         def show(history):
             bar.update(len(history) * recipe.check - bar.n)
             bar.set_postfix(loss=f"{history[-1].loss:.2f}", error=f"{history[-1].error:.1e}")
-        done = train(recipe, runs, dt, checkpoint, show)
+        done = train_graph(recipe, runs, dt, checkpoint, show)
     took = {f"{clock}_seconds": round(s, 1) for clock, s in done.meter.total._asdict().items()}
     return done.simulator({
         **identity(net), "recipe": asdict(recipe), "threads": threads, **took,

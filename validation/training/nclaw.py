@@ -14,8 +14,8 @@ from tqdm import tqdm
 from mpm_ref.materials.learned import weights
 from mpm_ref.nclaw.gnn import weights as of_graphs
 from mpm_ref.nclaw.train import train
-from mpm_ref.nclaw.train.methods import SYS_ID
 from mpm_ref.nclaw.train.recipe import Recipe
+from mpm_ref.nclaw.train.train import SYS_ID
 from mpm_ref.scene import build
 
 from ..common.provenance import commit, provenance
@@ -38,13 +38,14 @@ def begun(net):
     """`Laws` of a net before training."""
     kinds = () if net.method == SYS_ID else (
         weights.RESPONSES[net.elastic](), weights.RESPONSES[net.plastic]())
-    return train.begun(net.method, net.seed, kinds, environment(net.environment).body[0].material)
+    material = environment(net.environment).body[0].material
+    return train.initial_laws(net.method, net.seed, kinds, material)
 
 
 def taught(net, recipe, laws, checkpoint, show):
     """`laws` trained as the method of a net asks for; returns the session."""
     seen = build(environment(net.environment)), trajectory(net.environment)
-    return train.taught(net.method, recipe, laws, seen, checkpoint, show)
+    return train.train_laws(net.method, recipe, laws, seen, checkpoint, show)
 
 
 def made(name, checkpoints, threads):
@@ -70,8 +71,8 @@ def made(name, checkpoints, threads):
                 return made(name, checkpoints, threads)
             return {**known_of(name, recipe, threads), "errors": errors, "stopped": str(fault)}
     took = {f"{clock}_seconds": round(s, 1) for clock, s in done.meter.total._asdict().items()}
-    about = {**known_of(name, recipe, threads), **took, **done.known}
-    stored = train.stored(laws, about)
+    about = {**known_of(name, recipe, threads), **took, **done.errors}
+    stored = train.learned_laws(laws, about)
     return stored._replace(about={**about, "seen": bounds(net, stored),
                                   "dt": environment(net.environment).dt})
 

@@ -11,22 +11,23 @@ from tqdm import tqdm
 
 from mpm_ref.materials.learned import weights
 from mpm_ref.materials.learned.response import Correction, Stress
-from mpm_ref.nclaw.batched_step import world
-from mpm_ref.nclaw.bodies import learned
-from mpm_ref.nclaw.train.fit import Diverged, train
-from mpm_ref.nclaw.train.neural_laws import NeuralLaw, trained_of
-from mpm_ref.nclaw.train.observations import Partial
+from mpm_ref.nclaw.batched_step import make_world
+from mpm_ref.nclaw.bodies import body_maker
+from mpm_ref.nclaw.train.fit import train
+from mpm_ref.nclaw.train.neural_laws import NeuralLawModule
+from mpm_ref.nclaw.train.observations import PartialTrajectory, trajectory_of
 from mpm_ref.nclaw.train.recipe import Recipe
-from mpm_ref.nclaw.train.rollout import Laws, trajectory_of
-from mpm_ref.nclaw.train.strains import cuts_of, met
+from mpm_ref.nclaw.train.rollout import LawPair
+from mpm_ref.nclaw.train.session import Diverged
+from mpm_ref.nclaw.train.strains import segment_cuts, training_bounds
 from mpm_ref.scene import build
 from mpm_ref.trajectories import observed
 
 from ..common.provenance import commit, provenance
+from ..common.scenes import threads_for, with_
 from ..nclaw.bundle import Bundle
 from ..nclaw.observation import observed_by
 from ..nclaw.small_trainings import identity
-from ..verification.scenes import threads_for, with_
 
 ROOT = Path(__file__).parents[2]
 BATCH = 40          # segments side by side: all of the first epoch
@@ -40,24 +41,27 @@ def run_of(net):
 
 
 def shown(net, true):
-    """What a training is given of a run: (`Observed`, `Trajectory` or `Partial` of it)."""
+    """Return what a training is given of a run: its `Observed`, and a `Trajectory` of it, or a
+    `PartialTrajectory`.
+    """
     if net.seen.all:
         return true, trajectory_of(true)
     found, weight = observed_by(net.seen, true, net.scene.dt, net.seed)
-    return found, Partial(*trajectory_of(found), torch.from_numpy(weight))
+    return found, PartialTrajectory(*trajectory_of(found), torch.from_numpy(weight))
 
 
 def begun(net):
-    """`rollout.Laws` before training, drawn as those of NCLaw but for their width."""
+    """`rollout.LawPair` before training, drawn as those of NCLaw but for their width."""
     torch.manual_seed(net.seed)
-    return Laws(*(NeuralLaw(kind, hidden=(net.width,) * 2) for kind in (Stress(), Correction())))
+    return LawPair(*(NeuralLawModule(kind, hidden=(net.width,) * 2)
+                     for kind in (Stress(), Correction())))
 
 
 class Keeper:
     """Keeps laws of a training under way, with what strains they have met, errors and CPU seconds
     of epochs, and shows it on a bar.
 
-    of: (`Small`, `Recipe`, `rollout.Laws`, what `shown` gives)
+    of: (`Small`, `Recipe`, `rollout.LawPair`, what `shown` gives)
     """
 
     def __init__(self, of, bar):
@@ -78,9 +82,9 @@ class Keeper:
     def stored(self, epoch):
         """`LearnedLaws` as they are."""
         net, recipe, laws, (seen, data) = self.of
-        made = weights.LearnedLaws(*map(trained_of, laws), {})
-        cuts = data.restarts(cuts_of(recipe, len(seen.x) - 1, epoch))
-        bounds = met(build(net.taken), seen, learned(made), cuts)
+        made = weights.LearnedLaws(*(law.weights() for law in laws), {})
+        cuts = data.restarts(segment_cuts(recipe, len(seen.x) - 1, epoch))
+        bounds = training_bounds(build(net.taken), seen, body_maker(made), cuts)
         return made._replace(about={"seen": bounds, "dt": net.scene.dt})
 
 
@@ -93,7 +97,7 @@ def bundled(name, net, threads):
     with tqdm(total=recipe.epochs, desc=name) as bar:
         keeper = Keeper((net, recipe, laws, given), bar)
         try:
-            train(recipe, laws, world(build(net.taken)), given[1], None, keeper.show)
+            train(recipe, laws, make_world(build(net.taken)), given[1], None, keeper.show)
         except Diverged as fault:
             stopped = str(fault)
     return Bundle(keeper.laws, {

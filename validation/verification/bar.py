@@ -17,9 +17,9 @@ import numpy as np
 from mpm_ref.materials import FixedCorotated, lame
 
 from ..common.registry import experiment
+from ..common.scenes import threads_for
 from .convergence import order, rms
 from .mms import name
-from .scenes import threads_for
 from .strip import ON_WALL, stepper, strip
 
 L, E, RHO, V = 25.0, 100.0, 1.0, 0.1

@@ -13,7 +13,7 @@ from mpm_ref.scene import Body, Box, Collider, HalfSpace, Material, Moved, Regul
 from mpm_ref.scene import Scheme as SceneScheme
 from mpm_ref.simulate import simulate
 
-from .scenes import mean, threads_for
+from ..common.scenes import mean, threads_for
 
 G = 9.81                        # [m/s^2]
 LENGTH, HEIGHT = 0.4, 0.2       # of the block [m]

@@ -29,8 +29,8 @@ from mpm_ref.scene import (
 from mpm_ref.simulate import simulate
 
 from ..common.registry import experiment
+from ..common.scenes import mean, threads_for
 from .block import G
-from .scenes import mean, threads_for
 
 RADIUS, THICKNESS, HALF_ANGLE, START = 1.0, 0.2, 15.0, 60.0     # [m], [m], degrees, degrees
 AGREED = 1e-3       # relative error of the speed that a public code's test of such a slide allows

@@ -25,7 +25,7 @@ from mpm_ref.scene import (
 )
 from mpm_ref.simulate import simulate
 
-from .scenes import shipped, threads_for, with_
+from ..common.scenes import catalogue_scene, threads_for, with_
 
 G = 9.81                # [m/s^2]
 WIDTH = 0.1             # L [m]
@@ -75,7 +75,7 @@ class Collapse(NamedTuple):
 def scene(case):
     """The shipped scene's sand in a column, 2^dim particles per cell."""
     dim, height, dx = case.dim, case.a * WIDTH, WIDTH / case.cells
-    sand = shipped("column_collapse").body[0]
+    sand = catalogue_scene("column_collapse").body[0]
     flow = with_(sand.material.flow, friction_angle=case.friction_angle)
     sand = with_(sand, shape=column(dim, height), sampling=Regular(per_cell=2),
                  material=with_(sand.material, flow=flow))

@@ -8,13 +8,13 @@ from mpm_ref.energy import energy, momentum
 from mpm_ref.scene import build
 from mpm_ref.simulate import simulate
 
-from .scenes import mean, threads_for, with_
+from ..common.scenes import mean, threads_for, with_
 
 TRANSFERS = ("pic", "mls", "apic", "flip")
 
 
-class Course(NamedTuple):
-    """Course of a collision at S times."""
+class CollisionHistory(NamedTuple):
+    """CollisionHistory of a collision at S times."""
 
     t: np.ndarray           # (S,)    [s]
     speed: np.ndarray       # (S,)    of the first body's centre, relative to its first [1]
@@ -34,7 +34,7 @@ class Course(NamedTuple):
         return self.kinetic + self.elastic
 
 
-def course(scene):
+def collision_history(scene):
     """Run a scene of bodies in free flight and measure after each step."""
     problem, rows = build(with_(scene, every=1, interval=None)), []
     with threads_for(problem.bodies):
@@ -45,11 +45,11 @@ def course(scene):
             rows.append((frame.t, v, E.kinetic, E.elastic, momentum(bodies)))
     t, v, kinetic, elastic, p = map(np.array, zip(*rows, strict=True))
     count = sum(len(body.particles.x) for body in problem.bodies)
-    return Course(t, v / v[0], kinetic, elastic, p, count)
+    return CollisionHistory(t, v / v[0], kinetic, elastic, p, count)
 
 
 def thinned(transfer, c, rows):
-    """At most so many rows (transfer, t, kinetic, elastic) of a course, energies relative."""
+    """Return at most so many rows (transfer, t, kinetic, elastic), energies relative."""
     chosen = np.unique(np.linspace(0, len(c.t) - 1, rows).round().astype(int))
     return [(transfer, c.t[k], c.kinetic[k] / c.total[0], c.elastic[k] / c.total[0])
             for k in chosen]

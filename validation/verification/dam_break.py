@@ -18,7 +18,7 @@ from mpm_ref.scene import Regular, build
 from mpm_ref.simulate import simulate
 
 from ..common.registry import experiment
-from .scenes import shipped, threads_for, with_
+from ..common.scenes import catalogue_scene, threads_for, with_
 
 G = 9.81                            # [m/s^2]
 MEASURED = np.array([               # T, Z; unconfirmed
@@ -42,7 +42,7 @@ class Front(NamedTuple):
 
 def width():
     """The column's width a [m]."""
-    return shipped("dam_break").body[0].shape.upper[0]
+    return catalogue_scene("dam_break").body[0].shape.upper[0]
 
 
 def ritter(T):
@@ -52,7 +52,7 @@ def ritter(T):
 
 def front(cells, per_cell=2):
     """Run the shipped scene with dx = a/cells."""
-    scene, a = shipped("dam_break"), width()
+    scene, a = catalogue_scene("dam_break"), width()
     water = with_(scene.body[0], sampling=Regular(per_cell=per_cell))
     scene = with_(scene, dx=a / cells, end=END, interval=END / 60, body=(water,))
     problem, rows, low, high = build(scene), [], 1.0, 1.0

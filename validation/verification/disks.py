@@ -7,9 +7,9 @@ import numpy as np
 from mpm_ref.scene import Scheme
 
 from ..common.registry import experiment
-from .collision import TRANSFERS, course, thinned
+from ..common.scenes import catalogue_scene
+from .collision import TRANSFERS, collision_history, thinned
 from .convergence import order
-from .scenes import shipped
 from .symplectic import allowed_gain
 
 ROUND_OFF = 1e-12           # of one disk's momentum: rounding of some 1e3 steps
@@ -20,14 +20,14 @@ SHOWN = 100
 
 def touching_time():
     """When the two circles of the scene touch [s]: (distance - 2 radius)/(closing speed)."""
-    (ax, ay), (bx, by) = (body.shape.center for body in shipped("colliding_disks").body)
-    radius = shipped("colliding_disks").body[0].shape.radius
+    (ax, ay), (bx, by) = (body.shape.center for body in catalogue_scene("colliding_disks").body)
+    radius = catalogue_scene("colliding_disks").body[0].shape.radius
     return (hypot(bx - ax, by - ay) - 2.0 * radius) / closing_speed()
 
 
 def closing_speed():
     """Relative speed of the two disks before they meet [m/s]."""
-    (ux, uy), (vx, vy) = (body.velocity.linear for body in shipped("colliding_disks").body)
+    (ux, uy), (vx, vy) = (body.velocity.linear for body in catalogue_scene("colliding_disks").body)
     return hypot(vx - ux, vy - uy)
 
 
@@ -42,7 +42,7 @@ def disks(run):
     """All transfers at dx = 0.05 to the end; MLS up to first contact on finer grids."""
     rows = []
     for transfer in run.progress(TRANSFERS, "transfers"):
-        c = course(shipped("colliding_disks", scheme=Scheme(transfer=transfer)))
+        c = collision_history(catalogue_scene("colliding_disks", scheme=Scheme(transfer=transfer)))
         judge(run, transfer, c)
         rows += thinned(transfer, c, SHOWN)
         if run.choose(quick=False, standard=True):
@@ -69,7 +69,8 @@ def judge(run, transfer, c):
 
 def shorter_steps(run, transfer, dt=0.0005):
     """A quarter of the time step: what is lost depends on the number of steps, but for FLIP."""
-    c = course(shipped("colliding_disks", dt=dt, scheme=Scheme(transfer=transfer)))
+    c = collision_history(
+        catalogue_scene("colliding_disks", dt=dt, scheme=Scheme(transfer=transfer)))
     run.record(f"verification.disks.{transfer}.energy_kept_short_dt",
                float(c.total[-1] / c.total[0]), comparator="info",
                scale=f"{c.particles} particles, {c.steps} steps, dx = radius/4",
@@ -81,7 +82,7 @@ def contact(run, sizes):
     """First contact against dx: early by a distance of the order of dx."""
     rows, exact = [], touching_time()
     for dx in run.progress(sizes, "first contact"):
-        c = course(shipped("colliding_disks", dx=dx, dt=0.04 * dx, end=exact))
+        c = collision_history(catalogue_scene("colliding_disks", dx=dx, dt=0.04 * dx, end=exact))
         t = contact_time(c)
         rows.append((dx, t, (exact - t) * closing_speed(), c.particles))
     run.table("contact", ("dx", "t", "gap", "particles"), rows)

@@ -13,7 +13,7 @@ from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.materials import LogNeoHookean, NoFlow, lame
 
 from ..common.registry import experiment
-from .scenes import threads_for
+from ..common.scenes import threads_for
 from .symplectic import travelled
 
 G, V, DX = np.array([0.3, -9.8]), np.array([1.0, 2.0]), 0.1

@@ -29,7 +29,7 @@ FALLING = ("hot", "hot-plus", "pn-pcg")             # whose energies are looked 
 OTHER = "pn-pcg"                                    # whose end state the others must find
 
 
-class Course(NamedTuple):
+class EnergyHistory(NamedTuple):
     """A run."""
 
     x: np.ndarray           # (N, 2)        positions in the end, in the order of the start [m]
@@ -46,8 +46,8 @@ def square():
     return made._replace(particles=made.particles._replace(b=NONE))
 
 
-def moved(stepper, steps):
-    """`Course` of the square."""
+def displaced(stepper, steps):
+    """`EnergyHistory` of the square."""
     made, missed = square(), []
     stepper.start([made])
     energies = [energy([made], FREE, D).sum]
@@ -55,8 +55,8 @@ def moved(stepper, steps):
         stepper.step([made], k * END / steps, END / steps)
         energies.append(energy([made], FREE, D).sum)
         if stepper.implicit and not stepper.report.converged:
-            missed.append(stepper.report.why)
-    return Course(made.particles.x, np.array(energies), missed)
+            missed.append(stepper.report.message)
+    return EnergyHistory(made.particles.x, np.array(energies), missed)
 
 
 def explicit():
@@ -76,50 +76,50 @@ def verify(run):
     """Errors over time steps, energies, and the end states of all methods."""
     counts = run.choose(quick=(40, 80, 160), standard=(40, 80, 160, 320, 640))
     scale = f"2D, {len(square().id)} particles, {counts} steps"
-    courses = {method: [moved(implicit(method), n) for n in run.progress(counts, method)]
+    histories = {method: [displaced(implicit(method), n) for n in run.progress(counts, method)]
                for method in FALLING}
-    record_order(run, counts, courses["hot"], scale)
-    for method, found in courses.items():
+    record_order(run, counts, histories["hot"], scale)
+    for method, found in histories.items():
         record_energy(run, method, found, scale)
-    record_minimisers(run, counts[0], courses[OTHER][0])
+    record_minimisers(run, counts[0], histories[OTHER][0])
 
 
-def record_order(run, counts, courses, scale):
+def record_order(run, counts, histories, scale):
     """Order in dt of the distance of HOT's runs from explicit ones of as many steps."""
     steps = [END / n for n in counts]
-    errors = [rms(course.x - moved(explicit(), n).x)
-              for n, course in zip(counts, courses, strict=True)]
+    errors = [rms(history.x - displaced(explicit(), n).x)
+              for n, history in zip(counts, histories, strict=True)]
     run.record("verification.implicit.order", order(steps, errors), paper=1.0,
                comparator="band", bound=(0.8, 1.2), scale=scale,
                note="in dt, of the distance of the particles from those of the explicit run")
-    rows = [(dt, error, course.energies[-1] / course.energies[0], rise(course))
-            for dt, error, course in zip(steps, errors, courses, strict=True)]
+    rows = [(dt, error, history.energies[-1] / history.energies[0], rise(history))
+            for dt, error, history in zip(steps, errors, histories, strict=True)]
     run.table("errors", ("dt", "error", "energy_kept", "largest_rise"), rows)
 
 
-def rise(course):
+def rise(history):
     """Largest rise of the energy in a step, of the start's; below 0 if it falls in every step."""
-    return float(np.diff(course.energies).max() / course.energies[0])
+    return float(np.diff(history.energies).max() / history.energies[0])
 
 
-def record_energy(run, method, courses, scale):
+def record_energy(run, method, histories, scale):
     """That the energy falls in every step of a method's runs."""
     target = "verification.implicit.gained" + ("" if method == "hot" else f".{method}")
-    run.record(target, max(rise(course) for course in courses), comparator="<=", bound=1e-9,
+    run.record(target, max(rise(history) for history in histories), comparator="<=", bound=1e-9,
                scale=scale, note="largest rise of the energy in a step, of the start's")
 
 
 def record_minimisers(run, steps, one):
     """How far the runs of other methods end from `one`, that of OTHER; whether all converged."""
     scale = f"{steps} steps, eps = {EPS:g}"
-    others = {method: moved(implicit(method), steps) for method in METHODS if method != OTHER}
-    missed = [f"{method}: {why}" for method, course in {OTHER: one, **others}.items()
-              for why in course.missed]
+    others = {method: displaced(implicit(method), steps) for method in METHODS if method != OTHER}
+    missed = [f"{method}: {why}" for method, history in {OTHER: one, **others}.items()
+              for why in history.missed]
     run.record("verification.implicit.missed", len(missed), paper=0, comparator="=", scale=scale,
                note="; ".join((f"solves that did not converge, of {len(METHODS)} methods",
                                *missed[:2])))
-    for method, course in others.items():
+    for method, history in others.items():
         run.record(f"verification.implicit.{method}",
-                   float(np.abs(course.x - one.x).max() / DX),
+                   float(np.abs(history.x - one.x).max() / DX),
                    unit="cells", comparator="<=", bound=1e-4, scale=scale,
                    note=f"largest difference in position from the run with {OTHER}")

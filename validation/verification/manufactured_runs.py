@@ -6,8 +6,8 @@ import numpy as np
 
 from mpm_ref.core.grid import OutOfRange
 
+from ..common.scenes import threads_for
 from .convergence import rms
-from .scenes import threads_for
 
 CHECKS = 20          # times at which the error is taken
 LOST = 1.0           # error [m] at which a body has nothing to do with its motion: it has this size

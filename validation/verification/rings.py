@@ -11,7 +11,7 @@ from itertools import pairwise
 from mpm_ref.scene import Body, Material, Regular, Scene, Scheme, Torus, Velocity
 
 from ..common.registry import experiment
-from .collision import TRANSFERS, course, thinned
+from .collision import TRANSFERS, collision_history, thinned
 
 PUBLISHED = {"pic": 8.004e6, "apic": 1.347e7, "flip": 1.365e7}      # [J/m] at 0.6 s; no MLS there
 SHOWN = 100
@@ -38,7 +38,7 @@ def ring_collision(run):
     dx = run.choose(quick=0.4, standard=0.1)
     rows, kept = [], {}
     for transfer in run.progress(TRANSFERS, "transfers"):
-        c = course(rings(dx, transfer))
+        c = collision_history(rings(dx, transfer))
         kept[transfer] = float(c.total[-1] / c.total[0])
         run.record(f"verification.rings.{transfer}.energy", float(c.total[-1]), unit="J/m",
                    paper=PUBLISHED.get(transfer), comparator="info",

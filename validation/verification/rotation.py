@@ -10,7 +10,7 @@ from mpm_ref.scene import Body, Box, Material, Regular, Scene, Scheme, Sphere, V
 from mpm_ref.simulate import simulate
 
 from ..common.registry import experiment
-from .scenes import threads_for
+from ..common.scenes import threads_for
 from .symplectic import allowed_gain
 
 RADIUS, DX, SPIN = 0.5, 0.1, 1.0        # [m], [m], [rad/s]

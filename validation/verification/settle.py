@@ -9,7 +9,7 @@ the final state does not depend on it.
 from math import ceil
 from typing import NamedTuple
 
-from .scenes import threads_for
+from ..common.scenes import threads_for
 
 
 class Pace(NamedTuple):

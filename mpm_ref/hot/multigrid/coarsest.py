@@ -14,7 +14,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 from ...core.blas import one_thread
-from ..krylov import Rule, pcg
+from ..krylov import CGOptions, pcg
 from ..norms import dot
 from .projectors import block_diagonal
 from .smoothers import times
@@ -36,14 +36,14 @@ def scalar_inverses(D, B):
     return B @ (inverse[:, :, None] * np.eye(d)) @ B
 
 
-def size(b, D_inv):
+def energy_norm(b, D_inv):
     """sqrt(b^T D^+ b) [sqrt(J)] of b (n, d), in which HOT's stop is measured."""
     return sqrt(max(0.0, dot(b, times(D_inv, b))))
 
 
-def by_pcg(apply, D_inv, b, enough):
+def solve_by_cg(apply, D_inv, b, enough):
     """(u, iterations): A u = b from u = 0 until sqrt(r^T D^+ r) <= enough, b and u (n, d)."""
-    rule = Rule(lambda own: enough / own, CAP)
+    rule = CGOptions(lambda own: enough / own, CAP)
     solved = pcg(apply, b, partial(times, D_inv), rule)
     return solved.x, solved.iterations
 
@@ -90,7 +90,7 @@ def _cholesky(A):
             shift *= 10.0
 
 
-def of_coarsest(level, choices):
+def coarsest_solver(level, choices):
     """Direct solver of the coarsest level, or None, and the inverse diagonals of its CG."""
     direct = Direct(level.A, level.D, level.B) if choices.coarsest == "direct" else None
     scalar = choices.preconditioner == "scalar"

@@ -19,7 +19,7 @@ TAPS = {
 
 
 class Embedding(NamedTuple):
-    """How n fine nodes hang on m coarse ones: v_i = sum_c W_ic v_c."""
+    """Weights of n fine nodes on m coarse ones: v_i = sum_c W_ic v_c."""
 
     W: sp.csr_array           # (n, m)   weights; a row sums to 1
     index: np.ndarray         # (m, d)   world index of coarse node, lexicographic
@@ -65,7 +65,7 @@ def embed(index, kernel="linear"):
     return Embedding(W, coarse)
 
 
-def onto(index, coarse, kernel="linear"):
+def embed_onto(index, coarse, kernel="linear"):
     """Weights (n, m) of nodes index (n, d) on the given coarse nodes (m, d), lexicographic.
 
     What would hang on other nodes is left out.

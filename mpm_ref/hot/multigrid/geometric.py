@@ -17,74 +17,78 @@ import numpy as np
 
 from ..assembly import Pattern, assembled, pattern_of
 from ..potential import box_of
-from ..quadrature import Modes, order_of, sites_of
+from ..quadrature import StressModes, cell_order, quadrature_points
 from ..system import Unknowns, constrained
 
 
-class Space(NamedTuple):
-    """One coarser level; per body, `sites` and the places of its particles on the finest level."""
+class CoarseGrid(NamedTuple):
+    """One coarser level; for each body its points and their ranks on the finest level."""
 
     unknowns: Unknowns
-    sites: tuple
-    places: tuple           # of arrays (N,)
+    points: tuple
+    order: tuple            # of arrays (N,)
     pattern: Pattern
 
 
-class Geometric:
-    """Coarser levels of a `Potential`; unknowns_at(level) are those at 2^level dx, with their
-    conditions. What does not depend on the increment is kept from one matrix to the next.
+class CoarseGrids:
+    """Coarser levels of a `Potential`; coarse_unknowns(level) are those at 2^level dx, with their
+    conditions. Data that do not depend on the increment are reused from one matrix to the next.
     """
 
-    def __init__(self, potential, unknowns_at):
-        self.potential, self.unknowns_at = potential, unknowns_at
-        self.spaces = []
+    def __init__(self, potential, coarse_unknowns):
+        self.potential, self.coarse_unknowns = potential, coarse_unknowns
+        self.grids = []
 
     def matrices(self, modes, levels):
-        """(B H B, node indices) of the levels 1 .. levels - 1, from the `Modes` of every body.
+        """Return [(B H B, node indices)] of the levels 1 .. levels - 1.
 
-        Fewer where a level would have as many nodes as the one before.
+        There are fewer where a level would have as many nodes as the one before.
+
+        modes has the `StressModes` of every body.
         """
         found, n = [], len(self.potential.unknowns.m)
         for level in range(1, levels):
-            space = self.space(level)
-            if len(space.unknowns.m) >= n:
+            grid = self.grid(level)
+            if len(grid.unknowns.m) >= n:
                 break
-            n = len(space.unknowns.m)
-            found.append((matrix(space, modes), space.unknowns.index))
+            n = len(grid.unknowns.m)
+            found.append((coarse_matrix(grid, modes), grid.unknowns.index))
         return found
 
-    def space(self, level):
-        """`Space` of a level >= 1."""
-        while len(self.spaces) < level:
-            unknowns = self.unknowns_at(len(self.spaces) + 1)
-            self.spaces.append(space_of(self.potential, unknowns))
-        return self.spaces[level - 1]
+    def grid(self, level):
+        """`CoarseGrid` of a level >= 1."""
+        while len(self.grids) < level:
+            unknowns = self.coarse_unknowns(len(self.grids) + 1)
+            self.grids.append(coarse_grid(self.potential, unknowns))
+        return self.grids[level - 1]
 
 
-def space_of(potential, unknowns):
-    """`Space` of a potential's particles on other nodes."""
+def coarse_grid(potential, unknowns):
+    """`CoarseGrid` of a potential's particles on other nodes."""
     stencil, box = potential.stencil, box_of(unknowns)
-    sites = tuple(sites_of(body, box, stencil) for body in potential.bodies)
-    places = tuple(places_of(body, (potential.box, box), stencil) for body in potential.bodies)
-    return Space(unknowns, sites, places, pattern_of(unknowns.number, len(stencil) - 1))
+    points = tuple(quadrature_points(body, box, stencil) for body in potential.bodies)
+    order = tuple(point_permutation(body, (potential.box, box), stencil)
+                  for body in potential.bodies)
+    return CoarseGrid(unknowns, points, order, pattern_of(unknowns.number, len(stencil) - 1))
 
 
-def places_of(body, boxes, stencil):
-    """Where in the order of the first box's cells the particles in that of the second stand."""
-    before, after = (order_of(body, box, stencil) for box in boxes)
+def point_permutation(body, boxes, stencil):
+    """Ranks (N,) of the particles by the first box's cells, listed by the second box's cells."""
+    before, after = (cell_order(body, box, stencil) for box in boxes)
     rank = np.empty(len(body.particles.x), dtype=np.int64)
     rank[before] = np.arange(len(before))
     return rank[after]
 
 
-def matrix(space, modes):
+def coarse_matrix(grid, modes):
     """B H B of a level as a bsr_array [kg]."""
-    sorted_modes = (Modes(*(a[at] for a in of_body)) for of_body, at in zip(modes, space.places))
-    bodies = tuple(zip(space.sites, sorted_modes))
-    return constrained(assembled(bodies, space.unknowns, space.pattern), space.unknowns.B)
+    sorted_modes = (StressModes(*(a[order] for a in of_body))
+                    for of_body, order in zip(modes, grid.order))
+    bodies = tuple(zip(grid.points, sorted_modes))
+    return constrained(assembled(bodies, grid.unknowns, grid.pattern), grid.unknowns.B)
 
 
-def conditions_at(conditions, factor):
+def coarse_conditions(conditions, factor):
     """`Conditions` for a grid of `factor` times the spacing: walls are counted in its nodes."""
     walls = conditions.walls
     if walls is None:

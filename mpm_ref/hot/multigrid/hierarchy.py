@@ -1,8 +1,9 @@
-"""Node-embedding multigrid: the readable path on SciPy matrices, and the door to the fast one.
+"""Node-embedding multigrid: the readable implementation on SciPy matrices, and the choice
+between it and the fast one in `blocks`.
 
 A level is a matrix and the prolongation from the next coarser level; coarse matrices are Galerkin
 products (HOT-eq6). Held directions are masked out of every prolongation, so that coarse levels
-learn of conditions through the product alone and no identity rows leak into them (HOT-bc).
+get the conditions through the product alone and no identity rows leak into them (HOT-bc).
 """
 
 from functools import partial
@@ -13,9 +14,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from .blocks import hierarchy as block_hierarchy
-from .coarsest import by_pcg, of_coarsest, size
-from .options import DTYPES, checked
-from .projectors import coarse_nodes, diagonal_blocks, given_nodes, inverses, onto_range
+from .coarsest import coarsest_solver, energy_norm, solve_by_cg
+from .options import DTYPES, cycle_options
+from .projectors import coarse_nodes, diagonal_blocks, inverses, onto_range, weights_onto
 from .smoothers import POLYNOMIAL, GaussSeidel, largest_eigenvalue, times
 
 
@@ -61,19 +62,19 @@ def build(A, index, levels, kernel):
     return [*built, Level(A, None, index, B, D, inverses(D, B))]
 
 
-def build_given(matrices):
+def build_from_matrices(matrices):
     """Levels of matrices and node indices that were made one by one, finest first."""
     built = []
     for (A, index), coarser in zip_longest(matrices, matrices[1:]):
         D = diagonal_blocks(A)
         B = onto_range(D)
-        P = prolongation(given_nodes(index, B, coarser[1]), B) if coarser else None
+        P = prolongation(weights_onto(index, B, coarser[1]), B) if coarser else None
         built.append(Level(A, P, index, B, D, inverses(D, B)))
     return built
 
 
 def smoother(level, word):
-    """The map r -> du, both (n d,), of a word in `options.WORDS`."""
+    """The map r -> du, both (n d,), of a word in `options.CHOICES`."""
     if word == "gauss-seidel":
         return GaussSeidel(level.A, level.D_inv, level.index)
     largest = largest_eigenvalue(on_nodes(level.A), level.D_inv, level.index)
@@ -118,7 +119,7 @@ class Hierarchy:
     def __init__(self, levels, choices):
         self.levels, self.choices = rounded(levels, choices.precision), choices
         self.smoothers = [smoother(level, choices.smoother) for level in self.levels[:-1]]
-        self.direct, self.D_inv = of_coarsest(levels[-1], choices)
+        self.direct, self.D_inv = coarsest_solver(levels[-1], choices)
         self.iterations = 0           # of the coarsest CG, over all cycles
 
     def cycle(self, b):
@@ -138,60 +139,63 @@ class Hierarchy:
         if self.direct:
             return self.direct(b).reshape(-1)
         of = b if self.choices.stop == "residual" else load.reshape(b.shape)
-        enough = self.choices.tolerance * size(of, self.D_inv)
-        u, k = by_pcg(on_nodes(last.A), self.D_inv, b, enough)
+        enough = self.choices.tolerance * energy_norm(of, self.D_inv)
+        u, k = solve_by_cg(on_nodes(last.A), self.D_inv, b, enough)
         self.iterations += k
         return u.reshape(-1)
 
 
-class Path(NamedTuple):
+class Implementation(NamedTuple):
     """An implementation: levels by Galerkin products, levels of given matrices, the V-cycle."""
 
     build: callable
-    build_given: callable
+    build_from_matrices: callable
     cycle: callable
 
 
-PATHS = {
-    "scipy": Path(build, build_given, Hierarchy),
-    "blocks": Path(block_hierarchy.build, block_hierarchy.build_given,
-                   block_hierarchy.Hierarchy),
+IMPLEMENTATIONS = {
+    "scipy": Implementation(build, build_from_matrices, Hierarchy),
+    "blocks": Implementation(block_hierarchy.build, block_hierarchy.build_from_matrices,
+                   block_hierarchy.BlockHierarchy),
 }
 
 
-def hierarchy(A, index, levels=3, kernel="linear", path="blocks", **choices):
+def hierarchy(A, index, levels=3, kernel="linear", implementation="blocks", **choices):
     """Multigrid hierarchy of A for nodes with world indices index (n, d), lexicographic.
 
     A is a bsr_array with d x d blocks [kg], symmetric and positive semi-definite; its null
     directions are held directions of single nodes. kernel is "linear", or "quadratic" for
-    HOT-quadratic; path is "blocks", or "scipy" for the readable twin; choices are fields of
-    `options.Choices`. The result has `levels`, `cycle(b)` and the count `iterations` of coarsest
-    CG. One level is the coarsest solver alone (LBFGS-H in HOT-methods).
+    HOT-quadratic; implementation is "blocks", or "scipy" for the readable twin; choices are fields
+    of `options.CycleOptions`. The result has `levels`, `cycle(b)` and the count `iterations` of
+    coarsest CG. One level is the coarsest solver alone (LBFGS-H in HOT-methods).
 
     Raises ValueError for unknown words, for shapes that do not match, or a diagonal not finite.
     """
-    chosen, made = checked(levels, choices), _path(path)
-    index = checked_matrix(A, index)
+    chosen, made = cycle_options(levels, choices), _implementation(implementation)
+    index = checked_index(A, index)
     return made.cycle(made.build(A, index, levels, kernel), chosen)
 
 
-def hierarchy_of(matrices, path="blocks", **choices):
-    """As `hierarchy`, of pairs (A, index) that are given for every level, finest first; index c of
-    a level is where index 2 c of the one before is. Embedding is linear (HOT-methods, LBFGS-GMG).
+def hierarchy_from_matrices(matrices, implementation="blocks", **choices):
+    """Multigrid hierarchy of given pairs (A, index) for every level, finest first.
+
+    Index c of a level is the place of index 2 c of the one before; options as for
+    `hierarchy`. Embedding is linear (HOT-methods, LBFGS-GMG).
     """
-    chosen, made = checked(len(matrices), choices), _path(path)
-    given = [(A, checked_matrix(A, index)) for A, index in matrices]
-    return made.cycle(made.build_given(given), chosen)
+    chosen = cycle_options(len(matrices), choices)
+    made = _implementation(implementation)
+    given = [(A, checked_index(A, index)) for A, index in matrices]
+    return made.cycle(made.build_from_matrices(given), chosen)
 
 
-def _path(word):
-    if word not in PATHS:
-        raise ValueError(f"path = {word!r}: expected one of {', '.join(PATHS)}")
-    return PATHS[word]
+def _implementation(word):
+    if word not in IMPLEMENTATIONS:
+        raise ValueError(f"implementation = {word!r}: expected one of {', '.join(IMPLEMENTATIONS)}")
+    return IMPLEMENTATIONS[word]
 
 
-def checked_matrix(A, index):
-    """The node indices (n, d) of A as integers; raises ValueError as `hierarchy`."""
+def checked_index(A, index):
+    """Return the node indices (n, d) of A as integers; raises ValueError as `hierarchy`."""
     index = np.ascontiguousarray(index, dtype=np.int64)
     n, d = index.shape
     if A.shape != (n * d, n * d) or A.blocksize != (d, d):

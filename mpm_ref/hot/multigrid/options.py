@@ -1,10 +1,10 @@
-"""What a V-cycle may be made of, in words. The defaults are the paper's."""
+"""Options of a V-cycle. The defaults are the paper's."""
 
 from typing import NamedTuple
 
 import numpy as np
 
-WORDS = {
+CHOICES = {
     "smoother": ("gauss-seidel", "jacobi", "chebyshev"),
     "coarsest": ("pcg", "direct"),
     "preconditioner": ("block", "scalar"),
@@ -14,7 +14,7 @@ WORDS = {
 DTYPES = {"double": np.float64, "single": np.float32}
 
 
-class Choices(NamedTuple):
+class CycleOptions(NamedTuple):
     """Parts of a V-cycle (HOT-smoother, HOT-sec5.3-coarse)."""
 
     smoother: str = "gauss-seidel"
@@ -27,14 +27,17 @@ class Choices(NamedTuple):
     precision: str = "double"         # of the matrices that smoothers read; sums are in double
 
 
-def checked(levels, choices):
-    """Choices of a dictionary. Raises ValueError for an unknown word or an impossible number."""
-    unknown = sorted(set(choices) - set(Choices._fields))
+def cycle_options(levels, choices):
+    """Return the `CycleOptions` of a dictionary, checked together with the number of levels.
+
+    Raises ValueError for an unknown word or an impossible number.
+    """
+    unknown = sorted(set(choices) - set(CycleOptions._fields))
     if unknown:
-        known = ", ".join(Choices._fields)
+        known = ", ".join(CycleOptions._fields)
         raise ValueError(f"hierarchy has no option {unknown[0]!r}: expected one of {known}")
-    chosen = Choices(**choices)
-    for name, words in WORDS.items():
+    chosen = CycleOptions(**choices)
+    for name, words in CHOICES.items():
         if getattr(chosen, name) not in words:
             raise ValueError(
                 f"{name} = {getattr(chosen, name)!r}: expected one of {', '.join(words)}")

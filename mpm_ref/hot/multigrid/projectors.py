@@ -8,7 +8,7 @@ is decided from the weights alone, since coarse blocks of a stiff body may lose 
 import numpy as np
 import scipy.sparse as sp
 
-from .embedding import Embedding, embed, onto
+from .embedding import Embedding, embed, embed_onto
 
 NULL = 1e-13      # of the largest eigenvalue; round-off of B H B leaves about 1e-16
 REGULAR = 1e-8    # a determinant, of a block of mean eigenvalue 1, that cannot be round-off
@@ -25,8 +25,8 @@ def diagonal_blocks(A):
     return D
 
 
-def surely_regular(D):
-    """Whether symmetric semi-definite blocks D (n, d, d) have full rank beyond any doubt: the
+def is_regular(D):
+    """Return whether symmetric semi-definite blocks D (n, d, d) surely have full rank: the
     product of the eigenvalues, each over their mean, is far above round-off.
     """
     d = D.shape[1]
@@ -37,7 +37,7 @@ def surely_regular(D):
 def onto_range(G):
     """Orthogonal projectors (n, d, d) onto the ranges of symmetric semi-definite blocks G."""
     B = np.tile(np.eye(G.shape[1]), (len(G), 1, 1))
-    doubtful = ~surely_regular(G)
+    doubtful = ~is_regular(G)
     values, vectors = np.linalg.eigh(G[doubtful])
     kept = values > NULL * np.maximum(values[:, -1:], 0.0)
     columns = vectors * kept[:, None, :]
@@ -66,12 +66,12 @@ def coarse_nodes(index, B, kernel):
     return Embedding(W, inner.index), onto_range((W.T @ B.reshape(-1, d * d)).reshape(-1, d, d))
 
 
-def given_nodes(index, B, coarse):
+def weights_onto(index, B, coarse):
     """Weights (n, m), linear, of nodes index (n, d) with projectors B on given coarse nodes (m, d);
     rows of wholly held nodes are empty.
     """
     free = np.flatnonzero(B.any(axis=(1, 2)))
-    W = sp.coo_array(onto(index[free], coarse))
+    W = sp.coo_array(embed_onto(index[free], coarse))
     return sp.csr_array(sp.coo_array((W.data, (free[W.row], W.col)), (len(index), len(coarse))))
 
 

@@ -15,24 +15,24 @@ import numpy as np
 TINY = 1e-5         # added to the variance of outputs
 
 
-class Perceptron(NamedTuple):
+class PerceptronWeights(NamedTuple):
     """Affine maps, and what outputs are scaled with once they are normalised."""
 
     layers: tuple       # ((W (in, out), b (out,)), ..)
     norm: tuple = ()    # gain and shift (out,); none: outputs are left as they are
 
 
-class Network(NamedTuple):
+class GraphWeights(NamedTuple):
     """All perceptrons."""
 
-    points: Perceptron
-    edges: Perceptron
+    points: PerceptronWeights
+    edges: PerceptronWeights
     blocks: tuple       # of (edges_k, points_k)
-    answer: Perceptron
+    answer: PerceptronWeights
 
 
 def answers(net, points, edges, graph):
-    """Answers (n, d) of a `Network` to what points (n, ..) and edges (k, ..) are told."""
+    """Answers (n, d) of a `GraphWeights` to what points (n, ..) and edges (k, ..) are told."""
     v, e = outputs(net.points, points), outputs(net.edges, edges)
     for of_edges, of_points in net.blocks:
         m = outputs(of_edges, np.hstack([e, v[graph.senders], v[graph.receivers]]))
@@ -42,7 +42,7 @@ def answers(net, points, edges, graph):
 
 
 def outputs(perceptron, a):
-    """What a `Perceptron` makes of inputs (n, in)."""
+    """What a `PerceptronWeights` makes of inputs (n, in)."""
     *inner, (W, b) = perceptron.layers
     for V, c in inner:
         a = np.maximum(a @ V + c, 0.0)

@@ -5,8 +5,8 @@ from itertools import pairwise
 import numpy as np
 
 from ...store.weights_file import read, stated, write
-from .history import HISTORY, Reading, Scales
-from .network import Network, Perceptron
+from .features import HISTORY, FeatureSettings, MotionScales
+from .network import GraphWeights, PerceptronWeights
 from .simulator import Simulator
 
 FORMAT = "gnn 1"
@@ -27,12 +27,12 @@ def load(path):
     """Read what `save` wrote. Raises ValueError saying what is wrong with the file."""
     arrays, about = read(path, FORMAT, fault_of, "trained graph network")
     radius, dt = (float(arrays[name]) for name in NUMBERS)
-    scales = Scales(*(arrays[name] for name in Scales._fields))
-    return Simulator(network_of(arrays), Reading(radius, dt, scales), about)
+    scales = MotionScales(*(arrays[name] for name in MotionScales._fields))
+    return Simulator(network_of(arrays), FeatureSettings(radius, dt, scales), about)
 
 
 def named(network):
-    """(name, `Perceptron`) of all of a network."""
+    """(name, `PerceptronWeights`) of all of a network."""
     yield "points", network.points
     yield "edges", network.edges
     for k, (of_edges, of_points) in enumerate(network.blocks):
@@ -54,18 +54,18 @@ def arrays_of(simulator):
 
 
 def network_of(arrays):
-    """`Network` of the arrays of a file, in doubles."""
+    """`GraphWeights` of the arrays of a file, in doubles."""
     def perceptron(name):
         layers = tuple((double(f"{name}_W{l}"), double(f"{name}_b{l}")) for l in range(LAYERS))
         norm = () if name == "answer" else (double(f"{name}_gain"), double(f"{name}_shift"))
-        return Perceptron(layers, norm)
+        return PerceptronWeights(layers, norm)
 
     def double(name):
         return arrays[name].astype(float)
 
     blocks = tuple((perceptron(f"edges_{k}"), perceptron(f"points_{k}"))
                    for k in range(blocks_of(arrays)))
-    return Network(perceptron("points"), perceptron("edges"), blocks, perceptron("answer"))
+    return GraphWeights(perceptron("points"), perceptron("edges"), blocks, perceptron("answer"))
 
 
 def blocks_of(arrays):
@@ -99,7 +99,7 @@ def fault_of(arrays):
 
 def shapes_of(width, blocks, d):
     """{name: shape} of the arrays of a network of so many blocks in d dimensions."""
-    found = {**dict.fromkeys(NUMBERS, ()), **dict.fromkeys(Scales._fields, (d,))}
+    found = {**dict.fromkeys(NUMBERS, ()), **dict.fromkeys(MotionScales._fields, (d,))}
     ends = {"points": ((HISTORY + 2) * d, width), "edges": (d + 1, width), "answer": (width, d)}
     for k in range(blocks):
         ends |= {f"edges_{k}": (3 * width, width), f"points_{k}": (2 * width, width)}

@@ -6,6 +6,7 @@ the first one, which is zero, included. Runs go side by side, none is kept.
 A run breaks down where a coordinate of a point is not a number any more.
 """
 
+import csv
 from contextlib import nullcontext
 from typing import NamedTuple
 
@@ -17,13 +18,14 @@ from ...core.grid import OutOfRange
 from ...rom.study.generate import one_thread
 from ...scene import SceneError, build
 from ...simulate import SORT, last_step
+from ...store.atomic import replacing
 from ...trajectories import in_order
-from ..bodies import own
+from ..bodies import copy_body
 
 FEW = 5000      # particles, up to which a second thread would wait more than it works
 
 
-class Broken(ValueError):
+class RunBroken(ValueError):
     """A run does not go on: attributes step and why."""
 
     def __init__(self, step, why):
@@ -31,7 +33,7 @@ class Broken(ValueError):
         super().__init__(f"step {step}: {why}")
 
 
-class Found(NamedTuple):
+class ComparedError(NamedTuple):
     """What became of a run."""
 
     error: float            # [m^2]; infinite if it broke down, unless it goes on
@@ -39,7 +41,7 @@ class Found(NamedTuple):
     why: str = ""
 
 
-class Follower:
+class ComparedRun:
     """A run beside the true one, and the sum of the errors of its frames."""
 
     def __init__(self, frames, corner):
@@ -58,24 +60,25 @@ class Follower:
         if self.broken is None:
             try:
                 return next(self.frames)
-            except Broken as end:
+            except RunBroken as end:
                 self.broken = end
         return self.corner
 
     def found(self):
-        """`Found` so far."""
+        """`ComparedError` so far."""
         broken = () if self.broken is None else (self.broken.step, self.broken.why)
-        return Found(self.total / self.count, *broken)
+        return ComparedError(self.total / self.count, *broken)
 
 
-def beside(problem, law):
-    """Yield (error of a frame [m^2], `Found` so far) of a run of a problem by another law: a
-    function that makes a body of it, see `nclaw.bodies.learned`. Errors are infinite from where it
-    breaks down. Raises `Broken` where the problem's own laws break down.
+def compare_runs(problem, law):
+    """Yield (error of a frame [m^2], `ComparedError` so far) of a run of a problem by another law.
+
+    law: a function that makes a body of it, see `nclaw.bodies.body_maker`. Errors are infinite from
+    where that law breaks down. Raises `RunBroken` where the problem's own laws break down.
     """
     with threads_for(problem.bodies):
-        run = Follower(positions(problem, tuple(map(law, problem.bodies))), np.inf)
-        for x in positions(problem, tuple(map(own, problem.bodies))):
+        run = ComparedRun(positions(problem, tuple(map(law, problem.bodies))), np.inf)
+        for x in positions(problem, tuple(map(copy_body, problem.bodies))):
             yield run.follow(x), run.found()
 
 
@@ -88,29 +91,29 @@ def threads_for(bodies):
 def positions(problem, bodies):
     """Positions (n, d) of all points at the start and at each frame, bodies one after the other, in
     their own order. The run is that of `simulate`, not stopped for its energy or its speed; raises
-    `Broken` where a point has no finite place.
+    `RunBroken` where a point has no finite place.
     """
     clock, stepper = problem.clock, problem.stepper()
     stepper.start(bodies)
-    yield placed(bodies)
+    yield body_positions(bodies)
     for k in range(clock.steps):
         try:
             if k % SORT == 0:
                 stepper.sort(bodies)
             stepper.step(bodies, k * clock.dt, clock.dt)
         except OutOfRange as error:
-            raise Broken(k, str(error)) from None
+            raise RunBroken(k, str(error)) from None
         if problem.clip is not None:
             keep_inside(bodies, *problem.clip)
         if (k + 1) % clock.every == 0:
-            x = placed(bodies)
+            x = body_positions(bodies)
             if not np.isfinite(x).all():
                 p = int(np.argwhere(~np.isfinite(x))[0, 0])
-                raise Broken(k + 1, f"particle {p} has position {x[p]}")
+                raise RunBroken(k + 1, f"particle {p} has position {x[p]}")
             yield x
 
 
-def placed(bodies):
+def body_positions(bodies):
     """Positions (n, d) of the points of bodies."""
     return np.concatenate([in_order(body.particles.x, body.id) for body in bodies])
 
@@ -135,3 +138,18 @@ def require_one_material(scene, source):
     if any(body.material != scene.body[0].material for body in scene.body):
         raise SceneError(f"{source}: its bodies are of several materials, expected one, in whose "
                          "place the learned laws stand")
+
+
+def write_errors(errors, clock, out):
+    """Write the errors of frames [m^2] as CSV, with their steps and times [s]."""
+    rows = ((k, k * clock.every, k * clock.every * clock.dt, error)
+            for k, error in enumerate(errors))
+    write_rows(("frame", "step", "t", "error"), rows, out)
+
+
+def write_rows(columns, rows, out):
+    """Write rows as CSV, whole or not at all. Raises NotWritten."""
+    with replacing(out) as part, open(part, "w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file)
+        table.writerow(columns)
+        table.writerows(rows)

@@ -1,5 +1,8 @@
-"""Stress-strain curves of learned laws beside the true ones, along one-element paths."""
+"""Stress-strain curves of learned laws beside the true ones, along one-element paths: computed,
+written as CSV, and drawn. Matplotlib is imported when a picture is made.
+"""
 
+from itertools import groupby
 from math import nan
 from typing import NamedTuple
 
@@ -7,13 +10,20 @@ import numpy as np
 
 from ...materials import NoFlow
 from ...materials.learned.strain_range import within_bounds
-from ..paths import Path, course, cycles, looked_at, monotone
+from ...store.atomic import replacing
+from ..paths import StrainPath, cycles, monotone, path_response, path_stress
+from .compare import write_rows
+
+PANEL, ROOM = (3.1, 2.7), 0.8   # width and height of a panel; for the title and the legend [inch]
+COLUMNS = 3
+TRUTH, LEARNED = "0.6", "C3"    # colours
+STYLES = {True: "-", False: ":"}
 
 
 class Curve(NamedTuple):
     """Stresses along a path."""
 
-    path: Path
+    path: StrainPath
     dt: float               # [s] of a step
     truth: np.ndarray       # (k + 1,) [Pa]
     learned: np.ndarray     # (k + 1,) [Pa]; NaN where the law broke down
@@ -40,15 +50,15 @@ class Curve(NamedTuple):
         return float(self.path.strain[at[0]]) if len(at) else None
 
 
-def curves(truth, learned, paths, dt, bounds=None):
+def compare_curves(truth, learned, paths, dt, bounds=None):
     """[`Curve`] of paths. truth, learned: (law, flow) each; dt [s] of a step; bounds: strains that
     training has seen (see `learned.strain_range`), if known.
     """
     found = []
     for path in paths:
-        true, own = (course(*of, path, dt) for of in (truth, learned))
+        true, own = (path_response(*of, path, dt) for of in (truth, learned))
         inside = None if bounds is None else within_bounds(own.F, bounds)
-        found.append(Curve(path, dt, looked_at(path, true), looked_at(path, own), inside))
+        found.append(Curve(path, dt, path_stress(path, true), path_stress(path, own), inside))
     return found
 
 
@@ -56,3 +66,59 @@ def paths_for(flows, d, strain, steps):
     """Paths to strains of this size: from rest, and where there is a flow also cycles."""
     flowing = any(not isinstance(flow, NoFlow) for flow in flows)
     return monotone(d, strain, steps) + (cycles(d, strain, steps) if flowing else [])
+
+
+def write_curves(found, out):
+    """Write `curves.Curve`s as CSV: a row for each time level. Stresses are in Pa; `seen` is 1 or
+    0, empty where it is not known.
+    """
+    rows = ((curve.path.name, k * curve.dt, curve.path.strain[k], curve.path.symbol,
+             curve.truth[k], curve.learned[k], "" if curve.seen is None else int(curve.seen[k]))
+            for curve in found for k in range(len(curve.truth)))
+    write_rows(("path", "t", "strain", "stress", "truth", "learned", "seen"), rows, out)
+
+
+def draw_curves(found, title, out):
+    """Write a picture of `Curve`s, a panel for each name of a path: png, pdf or svg."""
+    from matplotlib.figure import Figure
+
+    panels = {name: list(own) for name, own in groupby(found, lambda curve: curve.path.name)}
+    columns = min(len(panels), COLUMNS)
+    rows = -(-len(panels) // columns)
+    figure = Figure(figsize=(PANEL[0] * columns, PANEL[1] * rows + ROOM), layout="constrained")
+    for k, (name, own) in enumerate(panels.items(), 1):
+        axes = figure.add_subplot(rows, columns, k)
+        for curve in own:
+            draw_curve(axes, curve)
+        axes.set(xlabel="strain", ylabel=f"{own[0].path.symbol} [Pa]", title=name)
+        axes.ticklabel_format(axis="y", scilimits=(-3, 3))
+        axes.locator_params(axis="x", nbins=5)
+    figure.suptitle(title, fontsize=9)
+    add_legend(figure, found)
+    with replacing(out) as part:
+        figure.savefig(part)
+
+
+def draw_curve(axes, curve):
+    """Draw both stresses; the learned one dotted beyond the strains of training."""
+    strain = curve.path.strain
+    axes.plot(strain, curve.truth, "-", color=TRUTH, lw=3.0)
+    seen = np.ones(len(strain), bool) if curve.seen is None else curve.seen
+    for inside, style in STYLES.items():
+        shown = seen == inside
+        shown[:-1] |= shown[1:]         # lines reach from one kind of point to the next
+        axes.plot(strain, np.where(shown, curve.learned, nan), style, color=LEARNED, lw=1.4)
+
+
+def add_legend(figure, found):
+    """Say below the panels what lines are."""
+    from matplotlib.lines import Line2D
+
+    known = found[0].seen is not None
+    words = {"truth": ("-", TRUTH), "learned": (STYLES[True], LEARNED)}
+    if known:
+        words["learned, beyond the strains of training"] = STYLES[False], LEARNED
+    lines = [Line2D([], [], ls=style, color=color) for style, color in words.values()]
+    figure.legend(lines, list(words), loc="outside lower center", ncols=3, fontsize=8,
+                  title=None if known else "the weights do not say which strains training saw",
+                  title_fontsize=8)

@@ -1,33 +1,46 @@
-"""Laws of a study, trained on a run of its scene, and what is to be known of them."""
+"""The training of a law study: the full-order run that laws are learned from, in a results file,
+and the laws with the record of their training.
+"""
 
 from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
 
 from ... import scene
 from ...materials.learned.strain_range import strain_bounds
 from ...store.manifest import source_hash, versions
+from ...store.results import BadResults, Results
+from ...store.running import Options, run
+from ...store.writer import Fields, require_run
 from ...training import part
+from ...trajectories import Observed
+
+FIELDS = ("x", "v", "C", "F")
+J_ALONE = "J"
 
 
-def drive():
+def trainer():
     """The part of the package that trains laws. Raises ValueError without PyTorch."""
     return part("nclaw.train.train", "laws are trained",
                 "laws that were trained run, export and plot without it")
 
 
-def trained(study, observed, checkpoint=None, on_epoch=None, **about):
+def train_study(study, observed, checkpoint=None, on_epoch=None, **about):
     """`LearnedLaws` of a study from its run, `Observed`.
 
     checkpoint and on_epoch: as for `nclaw.train.fit.train`; about: what else is to be known, with
     the `threads` of PyTorch. Raises ValueError without PyTorch and for a checkpoint of another
-    training, and `Diverged` of `drive`.
+    training, and `Diverged` of `trainer`.
     """
-    how, recipe, problem = drive(), study.tables.train, study.problem()
+    how, recipe, problem = trainer(), study.tables.train, study.problem()
     how.use_threads(about["threads"])
-    laws = how.begun(study.tables.method, recipe.seed, study.tables.records, study.material)
-    done = how.taught(study.tables.method, recipe, laws, (problem, observed), checkpoint, on_epoch)
+    laws = how.initial_laws(study.tables.method, recipe.seed, study.tables.records, study.material)
+    done = how.train_laws(study.tables.method, recipe, laws, (problem, observed), checkpoint,
+                          on_epoch)
     took = {f"{clock}_seconds": round(s, 1) for clock, s in done.meter.total._asdict().items()}
-    return how.stored(laws, {
-        **about, **identity(study), **took, **done.known, "seen": strain_bounds(observed.F),
+    return how.learned_laws(laws, {
+        **about, **identity(study), **took, **done.errors, "seen": strain_bounds(observed.F),
         "torch": how.version()})
 
 
@@ -37,3 +50,48 @@ def identity(study):
             "dt": study.scene.dt, "method": study.tables.method,
             "recipe": asdict(study.tables.train), "source_sha256": source_hash(),
             "versions": versions()}
+
+
+def is_complete(path, problem):
+    """Whether a results file holds all steps of a problem. Raises BadResults for a file that is no
+    results file, or of another scene.
+    """
+    if not Path(path).exists():
+        return False
+    with Results(path) as results:
+        require_run(results.h5, path, problem, 0)
+        return len(results) == problem.clock.steps + 1
+
+
+def make_run(path, problem, watch=None):
+    """Run a problem into a results file, from its checkpoint if there is one; returns the steps
+    that it has then, fewer than all where it was interrupted. Raises as `store.running.run`.
+    """
+    options = Options(fields=Fields(FIELDS), resume=True)
+    return run(problem, path, options, watch).state.step
+
+
+def read_run(path, problem):
+    """`Observed` of a results file that is `is_complete`. Raises BadResults for one that lacks a
+    field, or whose numbers are not all finite.
+    """
+    body, d = problem.bodies[0].name, problem.dim
+    with Results(path) as results:
+        found = {name: results.field(body, name) for name in FIELDS[:3]}
+        last = J_ALONE if results.has(body, J_ALONE) else FIELDS[3]
+        found[last] = results.field(body, last)
+    require_finite(path, found)
+    J = found.pop(J_ALONE, None)
+    if J is not None:
+        found["F"] = J[..., None, None] ** (1.0 / d) * np.eye(d)
+    return Observed(**found)
+
+
+def require_finite(path, fields):
+    """Raise BadResults unless {name: field (k + 1, n, ..)} are finite numbers."""
+    for name, a in fields.items():
+        lost = np.argwhere(~np.isfinite(a))
+        if len(lost):
+            k, p = lost[0][:2]
+            raise BadResults(f"{path}: {name} of particle {p} after step {k} is {a[k, p]}: "
+                             "expected finite numbers to learn from; make the run again")

@@ -16,8 +16,7 @@ from torch.autograd import Function
 from ...materials.learned import contraction, energetic
 from ...materials.learned.invariants import spectrum
 from ...materials.learned.weights import LawWeights
-from .kinds import LawOfKind
-from .perceptron import Perceptron, layers_of
+from .neural_laws import LawModule, MultilayerPerceptron, layers_of
 
 HIDDEN = {"elastic": (16, 16), "plastic": (32, 32)}
 START = 1e-3        # a and b of the return map, at first
@@ -124,7 +123,7 @@ class GrowingConvex(nn.Module):
                      for log_W, b in zip(self.log_W, biases, strict=True))
 
 
-class EnergeticLaw(LawOfKind):
+class EnergyLawModule(LawModule):
     """F (n, 3, 3) -> tau (n, 3, 3) [Pa] of an energy."""
 
     def __init__(self, kind):
@@ -135,17 +134,18 @@ class EnergeticLaw(LawOfKind):
         """tau."""
         return self.kind.unit * EnergyStress.apply(self.net(Measures.apply(F)), F)
 
-    def trained(self):
-        """`LawWeights` of the law."""
+    def weights(self):
+        """Return the `LawWeights` of the law."""
         return LawWeights(self.net.layers(), self.kind)
 
 
-class ContractionLaw(LawOfKind):
+class ContractionModule(LawModule):
     """Trial F (n, 3, 3) -> F (n, 3, 3) of less strain."""
 
     def __init__(self, kind):
         super().__init__(kind)
-        self.net = Perceptron(contraction.READ, contraction.ANSWERED, HIDDEN["plastic"], bias=True)
+        self.net = MultilayerPerceptron(contraction.READ, contraction.ANSWERED, HIDDEN["plastic"],
+                                        bias=True)
         self.net.double()
         nn.init.constant_(self.net.layers[-1].bias, log(START))
 
@@ -155,6 +155,6 @@ class ContractionLaw(LawOfKind):
         c = nn.functional.softplus(self.net(Strains.apply(F, of, self.kind)))
         return Contracted.apply(c, F, of)
 
-    def trained(self):
-        """`LawWeights` of the law."""
+    def weights(self):
+        """Return the `LawWeights` of the law."""
         return LawWeights(tuple(layers_of(self.net)), self.kind)

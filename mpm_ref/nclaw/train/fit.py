@@ -1,25 +1,20 @@
-"""Training of neural laws on one trajectory: seeds, schedule, checkpoints, history (NCLAW-eq5).
-
-A training that is cut off goes on from its last checkpoint, with the numbers of one that was not,
-on the same machine with the same number of threads.
-"""
+"""Training of laws on one trajectory: segments, schedule, cut gradients, history (NCLAW-eq5)."""
 
 import hashlib
-import io
 import json
 from dataclasses import asdict
 from typing import NamedTuple
 
 import torch
 
-from ...store import weights_file
-from ...training import Cost, Meter, train_epochs
-from .kinds import described
-from .rollout import squared
+from ...training import train_epochs
+from .neural_laws import describe
+from .rollout import segment_errors
+from .session import Diverged, TrainingSession
 
 SAVE = 5            # epochs between checkpoints
 FORMAT = 2          # of checkpoints
-LESS = "Try smaller rates, a smaller unit or shorter horizons"
+ADVICE = "Try smaller rates, a smaller unit or shorter horizons"
 
 
 class Epoch(NamedTuple):
@@ -31,26 +26,22 @@ class Epoch(NamedTuple):
     steepness: tuple    # norms of the gradients, elastic and plastic
 
 
-class Diverged(ValueError):
-    """A loss or a gradient is not finite, or a run left its box."""
-
-
-class Session:
+class TrajectorySession(TrainingSession):
     """Laws, optimisers and schedules of a training under way."""
 
-    of_errors = "positions"         # what errors of epochs are of
+    entry = Epoch
+    errors_of = "positions"         # what the errors of epochs are of
 
     def __init__(self, recipe, laws, world, observed):
-        self.meter = Meter()
+        super().__init__()
         self.recipe, self.laws, self.world, self.observed = recipe, laws, world, observed
-        self.of = sha256(world, observed)
+        self.digest = data_digest(world, observed)
         rates = recipe.elastic_rate, recipe.plastic_rate
         learned = [(list(law.parameters()), rate) for law, rate in zip(laws, rates, strict=True)]
         self.parameters = [own for own, _ in learned]
         self.optimisers = [torch.optim.Adam(own, lr=rate) for own, rate in learned if own]
         self.schedules = [torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, recipe.epochs)
                           for optimiser in self.optimisers]
-        self.history = []
 
     @property
     def number(self):
@@ -58,20 +49,20 @@ class Session:
         return len(self.history) + 1
 
     @property
-    def named(self):
-        """The training's settings, what is trained and on what, as one line of text; without the
-        size of a batch, with which only time and round-off change.
+    def settings(self):
+        """Return the settings, what is trained and on what, as one line of text; without the size
+        of a batch, with which only time and round-off change.
         """
-        settings = {name: value for name, value in asdict(self.recipe).items() if name != "batch"}
+        recipe = {name: value for name, value in asdict(self.recipe).items() if name != "batch"}
         if self.recipe.velocity:        # an error without a name has velocities in it
-            settings["errors_of"] = self.of_errors
-        return json.dumps({"format": FORMAT, **settings, "laws": [*map(described, self.laws)],
-                           "data": self.of})
+            recipe["errors_of"] = self.errors_of
+        return json.dumps({"format": FORMAT, **recipe, "laws": [*map(describe, self.laws)],
+                           "data": self.digest})
 
     @property
-    def known(self):
-        """The errors of all epochs and what they are of: plain values, for an `about`."""
-        return {"errors": [epoch.error for epoch in self.history], "errors_of": self.of_errors}
+    def errors(self):
+        """Return the errors of all epochs and what they are of: plain values, for an `about`."""
+        return {"errors": [epoch.error for epoch in self.history], "errors_of": self.errors_of}
 
     def epoch(self):
         """The trajectory once, in segments, and a step of each optimiser."""
@@ -95,14 +86,14 @@ class Session:
         it that is of positions.
         """
         try:
-            found = squared(self.laws, self.world, self.observed, cuts[:-1], cuts[1:],
+            found = segment_errors(self.laws, self.world, self.observed, cuts[:-1], cuts[1:],
                             self.recipe.velocity)
         except ValueError as fault:
-            raise Diverged(f"epoch {self.number}, steps {cuts[0]} to {cuts[-1]}: {fault} {LESS}"
+            raise Diverged(f"epoch {self.number}, steps {cuts[0]} to {cuts[-1]}: {fault} {ADVICE}"
                            ) from None
         if not torch.isfinite(found.loss):
             raise Diverged(f"epoch {self.number}, steps {cuts[0]} to {cuts[-1]}: the loss is "
-                           f"{found.loss.item()}. {LESS}")
+                           f"{found.loss.item()}. {ADVICE}")
         if found.loss.requires_grad:
             (weight * found.loss).backward()
         return found.loss.item(), found.positions.item()
@@ -112,36 +103,25 @@ class Session:
         for own in self.parameters:
             norm = torch.nn.utils.clip_grad_norm_(own, self.recipe.clip).item() if own else 0.0
             if not norm < float("inf"):
-                raise Diverged(f"epoch {self.number}: a gradient of norm {norm}. {LESS}")
+                raise Diverged(f"epoch {self.number}: a gradient of norm {norm}. {ADVICE}")
             yield norm
 
-    def save(self, path):
-        """Checkpoint, whole or not at all."""
-        content = io.BytesIO()
-        torch.save({"training": self.named, "history": [tuple(epoch) for epoch in self.history],
-                    "cost": tuple(self.meter.total),
-                    **{name: [one.state_dict() for one in having] for name, having in
-                       self.stateful().items()}}, content)
-        weights_file.write_sealed(path, content.getvalue())
-
-    def stateful(self):
-        """What a checkpoint keeps the states of."""
+    def parts(self):
+        """Return all that has a state, by name."""
         return {"laws": self.laws, "optimisers": self.optimisers, "schedules": self.schedules}
 
-    def load(self, path):
-        """Go on from a checkpoint. Raises ValueError where it is damaged, or of another training,
-        other laws or other data.
-        """
-        kept = torch.load(io.BytesIO(weights_file.read_sealed(path)), weights_only=True)
-        weights_file.require_same_training(path, kept["training"], self.named)
-        for name, having in self.stateful().items():
-            for one, state in zip(having, kept[name], strict=True):
+    def states(self):
+        """Return the states of all parts."""
+        return {name: [one.state_dict() for one in parts] for name, parts in self.parts().items()}
+
+    def restore(self, stored):
+        """Put the states of all parts back."""
+        for name, parts in self.parts().items():
+            for one, state in zip(parts, stored[name], strict=True):
                 one.load_state_dict(state)
-        self.history = [Epoch(*row) for row in kept["history"]]
-        self.meter.before = Cost(*kept["cost"])
 
 
-def sha256(world, observed):
+def data_digest(world, observed):
     """Digest of all that is trained on."""
     digest = hashlib.sha256(repr((world.dx, world.dt, world.eps)).encode())
     for a in (*world[2:3], *world[4:]):
@@ -152,10 +132,10 @@ def sha256(world, observed):
 
 
 def train(recipe, laws, world, observed, checkpoint=None, on_epoch=None):
-    """Train `rollout.Laws` in place on a `Trajectory`, or a `Partial` one; returns the `Session`.
+    """Train a `LawPair` in place on `observations`; return the `TrajectorySession`.
 
     checkpoint: a file to go on from and to save to; on_epoch(history) is called after each epoch.
     Raises `Diverged`, with the epoch and the steps.
     """
-    session = Session(recipe, laws, world, observed)
+    session = TrajectorySession(recipe, laws, world, observed)
     return train_epochs(session, recipe.epochs, SAVE, checkpoint, on_epoch)

@@ -14,8 +14,9 @@ import torch
 from ...core import deform
 from ...materials import NoFlow
 from ...training import train_epochs
-from .fit import SAVE, Diverged, Epoch, Session
-from .sysid import axes, particles
+from .fit import SAVE, Epoch, TrajectorySession
+from .identified_laws import axes, particles
+from .session import Diverged
 
 BATCH = 1000        # pairs
 
@@ -38,10 +39,10 @@ def labels_of(observed, law, dt):
     return Labels(F, torch.from_numpy(q.tau), F + dt * C @ F, F_new)
 
 
-class LabeledSession(Session):
+class LabeledSession(TrajectorySession):
     """Laws, optimisers and schedules of a training on `Labels`."""
 
-    of_errors = "F"
+    errors_of = "F"
 
     def epoch(self):
         """All pairs once."""

@@ -1,34 +1,153 @@
-"""A neural law as it is trained: invariants, a network, an answer."""
+"""Neural laws as they are trained, with the paper's ablations (NCLAW-alg4, NCLAW-ablation).
+
+Their networks are 13 -> 64 -> 64 -> 9 without biases (NCLAW-arch). GELU(0) = 0, so that without
+biases what vanishes at rest gives an answer that does (NCLAW-rest). Weights begin as Xavier's,
+drawn as the authors' release draws them: after those that PyTorch draws by itself, from the same
+generator.
+
+`PlainLawModule`      "no rotation": reads F - I, 9 numbers in 3D, and answers without R.
+`UnshiftedLawModule`  "no undeformed": reads s, F^T F and det F as they are, and has biases. The
+                      authors' release can leave the shift out of the elastic law alone; the text
+                      knows no such difference, and here both laws go without. Stored, what the
+                      shift would take away is part of the first layer's biases.
+`NoFlowModule`        no return map: the flow of baselines that know elasticity alone (NCLAW-eq13).
+"""
+
+from itertools import pairwise
 
 import torch
+from torch import nn
 
+from ...materials import NoFlow
 from ...materials.learned.invariants import count
 from ...materials.learned.weights import LawWeights
 from .autograd import Answer, Invariants
-from .kinds import LawOfKind
-from .perceptron import HIDDEN, Perceptron, layers_of
-from .rollout import Laws
+from .rollout import LawPair
+
+HIDDEN = (64, 64)
+NO_FLOW = NoFlow()
 
 
-class NeuralLaw(LawOfKind):
+class LawModule(nn.Module):
+    """A law of a kind, of those that `weights` knows."""
+
+    def __init__(self, kind):
+        super().__init__()
+        self.kind = kind
+
+    def extra_repr(self):
+        """The kind with its constants."""
+        return repr(self.kind)
+
+
+def describe(law):
+    """What is to be known of a law but for what it has learned: its class, its constants, the sizes
+    of its layers; plain values.
+    """
+    return [type(law).__name__, law.extra_repr(), [list(a.shape) for a in law.parameters()]]
+
+
+class MultilayerPerceptron(nn.Module):
+    """Affine maps with GELU between them; float32, (n, inputs) -> (n, outputs)."""
+
+    activation = staticmethod(nn.functional.gelu)
+
+    def __init__(self, inputs, outputs, hidden=HIDDEN, bias=False):
+        super().__init__()
+        sizes = (inputs, *hidden, outputs)
+        self.layers = nn.ModuleList([nn.Linear(n, m, bias=bias) for n, m in pairwise(sizes)])
+        for layer in self.layers:
+            nn.init.xavier_uniform_(layer.weight)
+            if bias:
+                nn.init.zeros_(layer.bias)
+
+    def forward(self, a):
+        """Outputs (n, outputs) of inputs (n, inputs)."""
+        for layer in self.layers[:-1]:
+            a = self.activation(layer(a))
+        return self.layers[-1](a)
+
+
+def layers_of(net):
+    """Weights [(W (in, out), b (out,))] as arrays of doubles; b is zero where there is no bias."""
+    found = []
+    for layer in net.layers:
+        W = layer.weight.detach().double().numpy().T.copy()
+        bias = torch.zeros(len(layer.weight)) if layer.bias is None else layer.bias.detach()
+        found.append((W, bias.double().numpy().copy()))
+    return found
+
+
+class NeuralLawModule(LawModule):
     """F (n, d, d) -> answers (n, d, d) of a kind of `response` (NCLAW-alg4)."""
 
     def __init__(self, kind, dim=3, hidden=HIDDEN):
         super().__init__(kind)
-        self.net = Perceptron(count(dim), dim * dim, hidden)
+        self.net = MultilayerPerceptron(count(dim), dim * dim, hidden)
 
     def forward(self, F):
         """The answers."""
         a, R = Invariants.apply(F)
         return Answer.apply(self.net(a), F, R, self.kind)
 
+    def weights(self):
+        """Return the `LawWeights` of the law."""
+        return LawWeights(tuple(layers_of(self.net)), self.kind)
+
 
 def neural_laws(seed, elastic, plastic, dim=3):
-    """`Laws` before training: the elastic one is drawn first, then the plastic one."""
+    """`LawPair` before training: the elastic one is drawn first, then the plastic one."""
     torch.manual_seed(seed)
-    return Laws(NeuralLaw(elastic, dim), NeuralLaw(plastic, dim))
+    return LawPair(NeuralLawModule(elastic, dim), NeuralLawModule(plastic, dim))
 
 
-def trained_of(law):
-    """`LawWeights` of a `NeuralLaw`."""
-    return LawWeights(tuple(layers_of(law.net)), law.kind)
+class PlainLawModule(LawModule):
+    """F (n, d, d) -> answers (n, d, d) of `PlainStress` or `PlainCorrection`."""
+
+    def __init__(self, kind, dim=3, hidden=HIDDEN):
+        super().__init__(kind)
+        self.net = MultilayerPerceptron(dim * dim, dim * dim, hidden)
+
+    def forward(self, F):
+        """The answers."""
+        a = (F - torch.eye(F.shape[1], dtype=F.dtype)).flatten(1).float()
+        return Answer.apply(self.net(a), F, F, self.kind)
+
+    def weights(self):
+        """Return the `LawWeights` of the law."""
+        return LawWeights(tuple(layers_of(self.net)), self.kind)
+
+
+class UnshiftedLawModule(LawModule):
+    """F (n, d, d) -> answers (n, d, d) of a kind of `response`, not zero at rest."""
+
+    def __init__(self, kind, dim=3, hidden=HIDDEN):
+        super().__init__(kind)
+        self.net = MultilayerPerceptron(count(dim), dim * dim, hidden, bias=True)
+        one = torch.ones(dim)
+        self.rest = torch.cat([one, torch.eye(dim).flatten(), one[:1]])
+
+    def forward(self, F):
+        """The answers."""
+        a, R = Invariants.apply(F)
+        return Answer.apply(self.net(a + self.rest), F, R, self.kind)
+
+    def weights(self):
+        """Return the `LawWeights` of the law, in numbers that vanish at rest."""
+        (W, b), *others = layers_of(self.net)
+        return LawWeights(((W, b + self.rest.double().numpy() @ W), *others), self.kind)
+
+
+class NoFlowModule(LawModule):
+    """F (n, d, d) as it is; nothing is learned."""
+
+    def __init__(self, kind=NO_FLOW):
+        super().__init__(kind)
+
+    def forward(self, F):
+        """F."""
+        return F
+
+    def weights(self):
+        """Return the `LawWeights` without layers."""
+        return LawWeights((), self.kind)

@@ -1,14 +1,59 @@
-"""A trajectory of which not all is seen: errors count where it is, segments begin where it is."""
+"""Observations that laws are trained on: a trajectory, a part of one, or marks in images.
+
+Each kind has `states(levels)` where segments begin, `restarts(cuts)`, the time levels at which they
+may, and `squared_error(name, a, levels)` of positions "x" or velocities "v".
+
+Segments restart from states that were observed (`recipe`), and of images that is the first one
+alone (NCLAW-real). So an epoch runs from the start to its horizon, which grows to the whole run:
+the gradient is exact. Restarts from the run's own later states, without their gradients, would see
+those further than the horizon, but blame a law for errors that it made before.
+"""
 
 from typing import NamedTuple
 
 import numpy as np
 import torch
 
+from ..camera import project
 
-class Partial(NamedTuple):
+
+class Trajectory(NamedTuple):
+    """Observed states at time levels 0 .. k; tensors of doubles."""
+
+    x: torch.Tensor     # (k + 1, n, 3)    [m]
+    v: torch.Tensor     # (k + 1, n, 3)    [m/s]
+    C: torch.Tensor     # (k + 1, n, 3, 3) [1/s]
+    F: torch.Tensor     # (k + 1, n, 3, 3)
+
+    def states(self, levels):
+        """The states (b, n, ..) at b time levels."""
+        return tuple(a[levels] for a in self)
+
+    def restarts(self, cuts):
+        """Where segments begin that are asked for at time levels `cuts`, and end: as asked for."""
+        return cuts
+
+    def squared_error(self, name, a, levels):
+        """Squared errors of a field `a` (b, n, 3) at b time levels, their mean over points and
+        axes, summed over the levels.
+        """
+        return mean_squared(a, getattr(self, name)[levels])
+
+
+def trajectory_of(observed):
+    """`Trajectory` of `Observed`."""
+    return Trajectory(*(torch.from_numpy(a) for a in (observed.x, observed.v, observed.C,
+                                                      observed.F)))
+
+
+def mean_squared(a, b):
+    """Squared differences of a, b (b, n, 3), their mean over points and axes, summed over runs."""
+    return ((a - b) ** 2).mean(dim=(1, 2)).sum()
+
+
+class PartialTrajectory(NamedTuple):
     """Observed states at time levels 0 .. k, and what they count, in place of a
-    `rollout.Trajectory`; tensors of doubles.
+    `Trajectory`; tensors of doubles.
 
     What stands at a level where nothing counts is never read; the first level must be seen. Weights
     with a mean of 1 over the levels after the first leave the size of a loss
@@ -21,7 +66,7 @@ class Partial(NamedTuple):
     F: torch.Tensor         # (k + 1, n, 3, 3)
     weight: torch.Tensor    # (k + 1, n) of squared errors
 
-    def at(self, levels):
+    def states(self, levels):
         """The states (b, n, ..) at b time levels."""
         return tuple(a[levels] for a in self[:4])
 
@@ -33,10 +78,63 @@ class Partial(NamedTuple):
         begins = seen[np.searchsorted(seen, cuts[:-1], side="right") - 1]
         return [*np.unique(begins).tolist(), cuts[-1]]
 
-    def off(self, name, a, levels):
+    def squared_error(self, name, a, levels):
         """Weighted squared errors of a field `a` (b, n, 3) at b time levels, their mean over points
         and axes, summed over the levels.
         """
         weight = self.weight[levels]
         off = torch.where((weight > 0.0)[..., None], a - getattr(self, name)[levels], 0.0)
         return (weight * (off**2).mean(dim=2)).mean(dim=1).sum()
+
+
+class ImageObservations(NamedTuple):
+    """Marks in images at time levels 0 .. k, in place of a `Trajectory`; tensors of doubles
+    but for `marked`.
+    """
+
+    x: torch.Tensor         # (k + 1, m, 2) places of marks [px]; finite also where no frame is
+    weight: torch.Tensor    # (k + 1,) of squared errors in the image, 0 where no frame is
+    marked: torch.Tensor    # (m,) which points are marked; integer
+    P: torch.Tensor         # (3, 4) of the camera, see `camera`
+    depth: torch.Tensor     # (3,) unit vector along which it looks
+    x_0: torch.Tensor       # (n, 3) [m] the state at the start, which is known
+    v_0: torch.Tensor       # (n, 3) [m/s]
+    C_0: torch.Tensor       # (n, 3, 3) [1/s]
+    F_0: torch.Tensor       # (n, 3, 3)
+
+    def states(self, levels):
+        """The states (b, n, ..) at b time levels, all of them 0. Raises ValueError for others."""
+        if levels.any():
+            raise ValueError(f"states at time levels {levels.tolist()}: a film knows that at level "
+                             "0 alone")
+        return tuple(a.expand(len(levels), *a.shape) for a in self[5:])
+
+    def restarts(self, cuts):
+        """Where the one segment begins and ends, of those asked for at time levels `cuts`."""
+        return cuts[:2]
+
+    def squared_error(self, name, a, levels):
+        """Of positions a (b, n, 3) [m] at b time levels the weighted squared distance of marks in
+        the image [px^2], of velocities [m/s] the squared component in depth, which the paper's
+        prior has small; their mean over marks or points, summed over the levels.
+        """
+        if name == "v":
+            return ((a @ self.depth) ** 2).mean(dim=1).sum()
+        distances = project(self.P, a[:, self.marked]) - self.x[levels]
+        return (self.weight[levels] * (distances ** 2).sum(dim=2).mean(dim=1)).sum()
+
+
+def observe_images(marks, P, start, every):
+    """Return the `ImageObservations` of `camera.Marks` in frames `every` steps apart.
+
+    P (3, 4) is the camera's; start is the `Body` at the start. Frames weigh `every`, so that a mean
+    over steps is one over frames.
+    """
+    frames, m, _ = marks.places.shape
+    steps = every * (frames - 1)
+    x, weight = torch.zeros(steps + 1, m, 2, dtype=torch.float64), torch.zeros(steps + 1).double()
+    x[::every], weight[::every] = torch.from_numpy(marks.places), float(every)
+    P = torch.from_numpy(P)
+    q = start.particles
+    return ImageObservations(x, weight, torch.from_numpy(marks.points), P, P[2, :3].clone(),
+                *(torch.from_numpy(a.copy()) for a in (q.x, q.v, q.C, q.F)))

@@ -9,40 +9,11 @@ from typing import NamedTuple
 
 import torch
 
-from ..batched_step import nodes
+from ..batched_step import make_nodes
 from .autograd import Advance
 
 
-class Trajectory(NamedTuple):
-    """Observed states at time levels 0 .. k; tensors of doubles."""
-
-    x: torch.Tensor     # (k + 1, n, 3)    [m]
-    v: torch.Tensor     # (k + 1, n, 3)    [m/s]
-    C: torch.Tensor     # (k + 1, n, 3, 3) [1/s]
-    F: torch.Tensor     # (k + 1, n, 3, 3)
-
-    def at(self, levels):
-        """The states (b, n, ..) at b time levels."""
-        return tuple(a[levels] for a in self)
-
-    def restarts(self, cuts):
-        """Where segments begin that are asked for at time levels `cuts`, and end: as asked for."""
-        return cuts
-
-    def off(self, name, a, levels):
-        """Squared errors of a field `a` (b, n, 3) at b time levels, their mean over points and
-        axes, summed over the levels.
-        """
-        return mean_squared(a, getattr(self, name)[levels])
-
-
-def trajectory_of(observed):
-    """`Trajectory` of `Observed`."""
-    return Trajectory(*(torch.from_numpy(a) for a in (observed.x, observed.v, observed.C,
-                                                      observed.F)))
-
-
-class Laws(NamedTuple):
+class LawPair(NamedTuple):
     """What is learned: functions of F (n, d, d)."""
 
     elastic: object     # -> tau [Pa]
@@ -61,32 +32,29 @@ def step(laws, world, state, on):
     return x, v, C, over_points(laws.plastic, F)
 
 
-class Squared(NamedTuple):
+class SegmentErrors(NamedTuple):
     """Squared errors of segments."""
 
     loss: torch.Tensor          # what is learned from [m^2]
     positions: torch.Tensor     # its part that is of positions, without a gradient [m^2]
 
 
-def squared(laws, world, observed, starts, ends, velocity=0.0):
-    """`Squared`: mean squared errors of positions, over particles and axes, summed over the steps
-    of segments from time levels `starts` to later ones, `ends`. Those that have ended go no
-    further. In the loss those of velocities are added, times `velocity` [s^2].
+def segment_errors(laws, world, observed, starts, ends, velocity=0.0):
+    """Return the `SegmentErrors`: mean squared errors of positions, over particles and axes, summed
+    over the steps of segments from time levels `starts` to later ones, `ends`.
+
+    Segments that have ended go no further. In the loss the errors of velocities are added, times
+    `velocity` [s^2].
     """
     levels, last, total, positions = torch.tensor(starts), torch.tensor(ends), 0.0, 0.0
-    state, on = observed.at(levels), nodes(world, len(starts))
+    state, on = observed.states(levels), make_nodes(world, len(starts))
     while len(levels):
         state, levels = step(laws, world, state, on), levels + 1
-        off = observed.off("x", state[0], levels)
+        off = observed.squared_error("x", state[0], levels)
         total, positions = total + off, positions + off.detach()
         if velocity:
-            total = total + velocity * observed.off("v", state[1], levels)
+            total = total + velocity * observed.squared_error("v", state[1], levels)
         under_way = levels < last
         if not under_way.all():
             levels, last, *state = (a[under_way] for a in (levels, last, *state))
-    return Squared(total, positions)
-
-
-def mean_squared(a, b):
-    """Squared differences of a, b (b, n, 3), their mean over points and axes, summed over runs."""
-    return ((a - b) ** 2).mean(dim=(1, 2)).sum()
+    return SegmentErrors(total, positions)

@@ -12,17 +12,17 @@ import numpy as np
 from ...body import keep_inside
 from ...core.grid import OutOfRange
 from ...materials.learned.strain_range import strain_measures
-from ..bodies import carried, gradients
-from .teacher import Teacher
+from ..bodies import convert_gradients, deformation_gradients
+from .recipe import TeacherForcing
 
-LARGEST = 100.0     # stretch or J, above which a segment has broken down
+MAX_STRETCH = 100.0     # stretch or J, above which a segment has broken down
 
 
-def met(problem, observed, law, cuts):
+def training_bounds(problem, observed, law, cuts):
     """Bounds as of `seen.seen`.
 
     problem: a `Problem` of one body, at its start; observed: `Observed` of its run, all
-    steps; law: what makes the body of learned laws (`bodies.learned`); cuts: time levels at which
+    steps; law: makes the body of learned laws (`bodies.body_maker`); cuts: time levels at which
     segments begin, and the last one. Of segments that break down there is what came before.
     """
     rows = [extremes(strain_measures(F)) for F in observed.F if np.isfinite(F).all()]
@@ -35,17 +35,17 @@ def met(problem, observed, law, cuts):
     return {"low": low.min(axis=0).tolist(), "high": high.max(axis=0).tolist()}
 
 
-def cuts_of(recipe, steps, epoch=None):
+def segment_cuts(recipe, steps, epoch=None):
     """The cuts of an epoch, counted from 1, of a `learn.recipe.Recipe`; of the last one."""
     number = (epoch or recipe.epochs) - 1
-    return Teacher(recipe.first, recipe.last).restarts(steps, number, recipe.epochs)
+    return TeacherForcing(recipe.first, recipe.last).restarts(steps, number, recipe.epochs)
 
 
 def restart(body, observed, k):
     """Put a body into the observed state of time level k."""
     q = body.particles
     q.x[:], q.v[:], q.C[:] = observed.x[k], observed.v[k], observed.C[k]
-    q.F[:] = carried(observed.F[k], q.F.ndim == 3, q.x.shape[1])
+    q.F[:] = convert_gradients(observed.F[k], q.F.ndim == 3, q.x.shape[1])
 
 
 def segment(problem, stepper, body, steps):
@@ -59,8 +59,8 @@ def segment(problem, stepper, body, steps):
         if problem.clip is not None:
             keep_inside((body,), *problem.clip)
         with np.errstate(invalid="ignore", over="ignore"):
-            row = extremes(strain_measures(gradients(body)))
-        if not (np.abs(row).max() <= LARGEST and np.isfinite(body.particles.x).all()):
+            row = extremes(strain_measures(deformation_gradients(body)))
+        if not (np.abs(row).max() <= MAX_STRETCH and np.isfinite(body.particles.x).all()):
             break
         found.append(row)
     return found

@@ -1,63 +1,109 @@
-"""A training from what a scene gives: how its laws begin, and what they are trained on."""
+"""A training by one of the methods that are compared, from a scene's record to stored weights.
+
+    ours            neural laws (NCLAW-alg4)
+    spline          splines in principal stretches, no return map
+    neural          a network in principal stretches, no return map
+    no rotation     ours without R
+    no undeformed   ours without the shift to rest, with biases
+    labeled         ours, trained by `labeled.train_labeled`
+    admissible      an energy and a contraction, which thermodynamics admits
+    sys-id          the true laws, see `identified_laws`
+
+All but the last are drawn from a seed, the elastic law first. Of spline and neural there is a
+kind as the authors' release has it and one that is better founded (`learned.spline`,
+`learned.stretch_network`).
+"""
 
 import torch
 
 from ...materials import Fluid, FluidProjection, NoFlow, make_flow, make_law
+from ...materials.learned.stretch_network import ReleasedStretchStress, StretchStress
 from ...materials.learned.weights import LearnedLaws
-from ..batched_step import world
-from . import sysid
-from .fit import Diverged, train
+from ..batched_step import make_world
+from .admissible_laws import ContractionModule, EnergyLawModule
+from .fit import train
+from .identified_laws import START, identified_laws
 from .labeled import labels_of, train_labeled
-from .methods import LABELED, SYS_ID, laws_of, trained_of
-from .rollout import trajectory_of
+from .neural_laws import NeuralLawModule, NoFlowModule, PlainLawModule, UnshiftedLawModule
+from .observations import trajectory_of
+from .principal_laws import ReleasedStretchLawModule, SplineLawModule, StretchLawModule
+from .rollout import LawPair
+from .session import Diverged
 
-OF_FLOWS = "friction_angle", "tau_y", "sigma_y"     # constants that "sys-id" learns
+SYS_ID, LABELED = "sys-id", "labeled"
+OF_STRETCHES = {StretchStress: StretchLawModule, ReleasedStretchStress: ReleasedStretchLawModule}
 
-__all__ = ["Diverged", "begun", "stored", "taught", "use_threads", "version"]
+IDENTIFIED = "friction_angle", "tau_y", "sigma_y"    # constants of flows that "sys-id" learns
+
+__all__ = ["Diverged", "drawn_laws", "initial_laws", "learned_laws", "train_laws", "use_threads",
+           "version"]
 
 
-def begun(method, seed, kinds, material):
-    """`rollout.Laws` before training.
+def stretch_law(kind):
+    """The law of either kind of `principal`."""
+    return OF_STRETCHES[type(kind)](kind)
+
+
+METHODS = {     # method -> elastic and plastic law of a kind
+    "ours": (NeuralLawModule, NeuralLawModule),
+    LABELED: (NeuralLawModule, NeuralLawModule),
+    "spline": (SplineLawModule, NoFlowModule),
+    "neural": (stretch_law, NoFlowModule),
+    "no rotation": (PlainLawModule, PlainLawModule),
+    "no undeformed": (UnshiftedLawModule, UnshiftedLawModule),
+    "admissible": (EnergyLawModule, ContractionModule),
+}
+
+
+def drawn_laws(method, seed, elastic, plastic):
+    """`LawPair` of a method before training, of kinds."""
+    torch.manual_seed(seed)
+    return LawPair(*(make(kind) for make, kind in zip(METHODS[method], (elastic, plastic),
+                                                      strict=True)))
+
+
+def initial_laws(method, seed, kinds, material):
+    """`rollout.LawPair` before training.
 
     kinds: records of what both laws answer, of all methods but "sys-id"; material: a scene's record
     of the true laws, of which that takes all but the constants that it learns.
     """
     if method != SYS_ID:
-        return laws_of(method, seed, *kinds)
+        return drawn_laws(method, seed, *kinds)
     unit = make_law(material.law, E=1.0, nu=material.nu)
-    return sysid.known_laws(unit, material.E, begun_flow(material.flow, unit))
+    return identified_laws(unit, material.E, initial_flow(material.flow, unit))
 
 
-def begun_flow(flow, law):
-    """The flow of a scene with its constant at `sysid.START` of its value. A fluid without one has
+def initial_flow(flow, law):
+    """Return the flow of a scene with its constant at START of its value. A fluid without one has
     F = J^(1/d) R here (NCLAW-eq21).
     """
     if flow.type == "none":
         return FluidProjection() if isinstance(law, Fluid) else NoFlow()
-    given = {name: sysid.START * getattr(flow, name) for name in OF_FLOWS
+    given = {name: START * getattr(flow, name) for name in IDENTIFIED
              if getattr(flow, name) is not None}
     if flow.s_min is not None:
         given["s_min"] = flow.s_min
     return make_flow(flow.type, law, 3, **given)
 
 
-def taught(method, recipe, laws, seen, checkpoint=None, on_epoch=None):
+def train_laws(method, recipe, laws, run, checkpoint=None, on_epoch=None):
     """The session that trained `laws`, in place, as a method asks for.
 
-    seen: a `Problem` of one body at its start, and the `Observed` of its run; checkpoint and
+    run: a `Problem` of one body at its start, and the `Observed` of its run; checkpoint and
     on_epoch as for `fit.train`. Raises `Diverged`.
     """
-    problem, observed = seen
-    where, trajectory = world(problem), trajectory_of(observed)
+    problem, observed = run
+    where, trajectory = make_world(problem), trajectory_of(observed)
     if method == LABELED:
         labels = labels_of(trajectory, problem.bodies[0].law, where.dt)
         return train_labeled(recipe, laws, where, labels, checkpoint, on_epoch)
     return train(recipe, laws, where, trajectory, checkpoint, on_epoch)
 
 
-def stored(laws, about):
+def learned_laws(laws, about):
     """`LearnedLaws` of laws that were trained."""
-    return LearnedLaws(*map(trained_of, laws), about)
+    return LearnedLaws(*(law.weights() for law in laws), about)
 
 
 def use_threads(n):

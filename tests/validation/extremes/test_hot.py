@@ -35,7 +35,7 @@ def test_sound_solves_pass_and_leave_the_bodies_alone():
     given = setup()
     before = given.bodies[0].particles.x.copy()
     assert solve(given, "pn-pcg").kind == CONVERGED
-    stopped = solve(given, "hot", iterations=1)
+    stopped = solve(given, "hot", max_iterations=1)
     assert stopped.kind == STOPPED
     assert "the cap" in stopped.why
     assert np.array_equal(given.bodies[0].particles.x, before)
@@ -45,8 +45,8 @@ def test_sound_solves_pass_and_leave_the_bodies_alone():
     (lambda dv, r: (np.zeros_like(dv), r), "converged, but its gradient is not small"),
     (lambda dv, r: (100.0 * dv, r), "energy rose"),
     (lambda dv, r: (np.nan * dv, r), "increment not finite"),
-    (lambda dv, r: (dv, r._replace(converged=False, why="")), "no reason given"),
-    (lambda dv, r: (dv, r._replace(iterations=501)), "more iterations than its caps"),
+    (lambda dv, r: (dv, r._replace(converged=False, message="")), "no reason given"),
+    (lambda dv, r: (dv, r._replace(max_iterations=501)), "more iterations than its caps"),
     (lambda dv, r: (dv, r._replace(evaluations=10**6)), "more evaluations than its caps"),
 ])
 def test_unsound_solves_are_named(monkeypatch, change, said):
@@ -83,7 +83,7 @@ def test_hard_states_are_of_one_step_in_two_dimensions():
 
 
 def test_ends_of_a_method_are_counted_by_kind():
-    good, lost = solve(setup(), "pn-pcg"), solve(setup(), "pn-pcg", iterations=1)
+    good, lost = solve(setup(), "pn-pcg"), solve(setup(), "pn-pcg", max_iterations=1)
     rows = [("a", good), ("b", lost), ("c", good._replace(kind="energy rose")), ("d", good)]
     found = Records()
     every.record_method(found, "pn-pcg", rows)

@@ -10,6 +10,7 @@ from mpm_ref.rom.fields.pod import basis
 from mpm_ref.rom.study.case import case
 from mpm_ref.rom.study.run import Way
 from mpm_ref.rom.study.watch import Sight
+from validation.common.scenes import with_
 from validation.extremes import ldm_files as files
 from validation.extremes import ldm_long as long
 from validation.extremes import ldm_singular as singular
@@ -32,7 +33,6 @@ from validation.extremes.ldm_runs import (
 )
 from validation.extremes.ldm_time_step import record_reach, with_usual
 from validation.ldm.studies import GRAVITY, TORSION
-from validation.verification.scenes import with_
 
 GOOD = End(0.3, 30, -1, "", 0.4, 0.01, 0.9, 4, 0.0, 0.7, "")
 WELL = Sight(beyond=0.3, off=0.01, seen=0.9, blind=0, lost=0.0, J=0.8, inverted=0.0, far=0.9)

@@ -8,9 +8,10 @@ from small_toys import Records
 
 from mpm_ref.materials import Fluid, NoFlow
 from mpm_ref.materials.learned.strain_range import strain_bounds
-from mpm_ref.nclaw.bodies import fresh, learned
+from mpm_ref.nclaw.bodies import body_maker, body_with_laws
 from mpm_ref.nclaw.strain_watch import StrainReport
 from mpm_ref.scene import build
+from validation.common.scenes import with_
 from validation.common.weights_needed import Untrained, there
 from validation.extremes import nclaw_epochs, nclaw_long, nclaw_runs, nclaw_strain
 from validation.extremes import nclaw_observed as observed
@@ -38,7 +39,6 @@ from validation.nclaw.initial_laws import untrained
 from validation.nclaw.small_runs import Measured
 from validation.nclaw.small_trainings import Small
 from validation.nclaw.trained_laws import Net
-from validation.verification.scenes import with_
 
 GOOD = End(1e-4, 1000, -1, "", 0.1, -1, 0.9, "")
 WIDE = {"low": [0.0, -9.0, -9.0, -99.0], "high": [9.0, 9.0, 9.0, 99.0]}
@@ -55,11 +55,11 @@ def sight(beyond=0.0, J=1.0, count=0):
 
 
 def as_true(body):
-    return fresh(body, body.law, body.flow)
+    return body_with_laws(body, body.law, body.flow)
 
 
 def wild(body):
-    return fresh(body, Fluid(1e15), NoFlow())
+    return body_with_laws(body, Fluid(1e15), NoFlow())
 
 
 def small(**changes):
@@ -145,7 +145,7 @@ def test_a_run_that_breaks_down_stops_with_a_sentence():
 
 
 def test_what_is_usual_is_the_first_run_s_error():
-    law = Law("none", "jelly", learned(untrained()), WIDE, DT)
+    law = Law("none", "jelly", body_maker(untrained()), WIDE, DT)
     setups = [Setup("as trained", small(steps=20)), Setup("again", small(steps=40))]
     first, second = trials(Records(), law, setups)
     assert first.usual == second.usual == first.end.error > 0.0
@@ -154,7 +154,7 @@ def test_what_is_usual_is_the_first_run_s_error():
 
 
 def test_fluids_start_at_the_volume_of_the_strain():
-    one = fresh(build(environment("water")).bodies[0], Fluid(1e5), NoFlow())
+    one = body_with_laws(build(environment("water")).bodies[0], Fluid(1e5), NoFlow())
     assert one.particles.F.ndim == 1
     nclaw_runs.strain(one, np.diag([0.5, 1.0, 1.0]))
     assert one.particles.F == pytest.approx(0.5)
@@ -222,9 +222,10 @@ def test_bounds_that_weights_do_not_say_are_made(monkeypatch):
     short = SimpleNamespace(x=np.zeros((6, 1)), F=np.eye(3)[None, None] * np.ones((6, 1, 1, 1)))
     made = []
     monkeypatch.setattr(met_of, "trained", lambda name: SimpleNamespace(about={}))
-    monkeypatch.setattr(met_of, "learned", lambda laws: laws)
+    monkeypatch.setattr(met_of, "body_maker", lambda laws: laws)
     monkeypatch.setattr(met_of, "trajectory", lambda name: short)
-    monkeypatch.setattr(met_of, "met", lambda *of: made.append(of[3]) or strain_bounds(of[1].F))
+    monkeypatch.setattr(met_of, "training_bounds",
+                        lambda *of: made.append(of[3]) or strain_bounds(of[1].F))
     monkeypatch.setattr(met_of, "nets", lambda: {"jelly": Net("jelly"),
                                                  "labels": Net("jelly", method="labeled")})
     assert met_of.met_by.__wrapped__("jelly") == strain_bounds(short.F)

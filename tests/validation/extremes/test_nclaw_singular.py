@@ -7,7 +7,7 @@ from neural_toys import trained as law
 from small_toys import Records
 
 from mpm_ref.materials.learned import network, response
-from mpm_ref.nclaw.bodies import learned
+from mpm_ref.nclaw.bodies import body_maker
 from mpm_ref.scene import build
 from validation.extremes import nclaw_singular as singular
 from validation.nclaw.environments import environment
@@ -17,7 +17,7 @@ from validation.nclaw.trained_laws import trained
 @pytest.fixture(scope="module")
 def jelly():
     """(law, flow) of jelly's weights."""
-    body = learned(trained("jelly"))(build(environment("jelly")).bodies[0])
+    body = body_maker(trained("jelly"))(build(environment("jelly")).bodies[0])
     return body.law, body.flow
 
 

@@ -11,6 +11,7 @@ from mpm_ref.rom.kinematics import NoBody
 from mpm_ref.rom.study.nsf_watch import Sight
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
+from validation.common.scenes import with_
 from validation.extremes import nsf_beyond as beyond
 from validation.extremes import nsf_damage as damage
 from validation.extremes import nsf_long as long
@@ -19,7 +20,6 @@ from validation.extremes import nsf_samples as samples
 from validation.extremes.ldm_runs import BAD, FINE, FLAGGED, SILENT, STOPPED, TOLERABLE, Trial
 from validation.nsf import reduced_runs
 from validation.nsf.studies import jelly
-from validation.verification.scenes import with_
 
 STUDY = jelly(4)._replace(train=(0.3, 0.5), test=(0.4,), samples=40,
                           sizes=Sizes(r=5, modes=8, tau=12, C=12, smoothing=1e-4))

@@ -30,7 +30,7 @@ def test_iterates_are_those_of_the_method(step, made, method):
     solution = minimise(system, method)
     np.testing.assert_array_equal(kept.dv[-1], solution.dv)
     assert kept.report.residuals == solution.report.residuals
-    assert kept.cg[-1] == solution.report.inner
+    assert kept.cg[-1] == solution.report.cg_iterations
     for dv, residual in zip(kept.dv, kept.report.residuals, strict=True):
         assert scaled_norm(system.evaluate(dv)[1], system.kappa) == residual
 

@@ -7,10 +7,10 @@ from mpm_ref.preflight import misplaced
 from mpm_ref.scene import build
 from mpm_ref.simulate import simulate
 from validation.common import targets
+from validation.common.scenes import SCENES, catalogue_scene
 from validation.hot.settings import PARTS
 from validation.hot.sizes import FILL, SIZES, Size, sized
 from validation.hot.stretched import HIGH, LOW, VARIANTS, stretched
-from validation.verification.scenes import SCENES, shipped
 
 PER_CELL = {            # of the release, where it is not 8 for all bodies
     "hot_armacat": {"trampoline": 16}, "hot_boards": {"grains": 16}, "hot_faceless": {"bust": 20},
@@ -33,7 +33,7 @@ def test_every_scene_has_its_sizes():
 
 @pytest.mark.parametrize("name", SIZES)
 def test_scene_is_shipped_at_its_quick_size(name):
-    assert sized(name, "quick") == shipped(name)
+    assert sized(name, "quick") == catalogue_scene(name)
     assert 3000 <= count(sized(name, "quick")) <= 6000
     assert 15_000 <= count(sized(name, "standard")) <= 60_000
 
@@ -59,7 +59,7 @@ def test_sizes_are_refused_in_a_sentence():
 
 @pytest.mark.parametrize("name", SIZES)
 def test_scene_is_filled_stands_and_steps(name):
-    problem = build(shipped(name, steps=2, end=None, interval=None))
+    problem = build(catalogue_scene(name, steps=2, end=None, interval=None))
     assert_filled(name, problem)
     assert_stands(name, problem)
     assert_converges(problem)

@@ -37,7 +37,7 @@ def system(clamped):
 
 
 def two_grid(system):
-    return hierarchy(system.A, system.index, 2, coarsest="direct", path="scipy")
+    return hierarchy(system.A, system.index, 2, coarsest="direct", implementation="scipy")
 
 
 def product(system, grids):
@@ -166,7 +166,7 @@ def rough(shape):
 def test_pattern_is_that_of_the_galerkin_matrices(kernel):
     x = points(lump(2, 9, 0.85, np.random.default_rng(0)))
     A, index = assembled(x, np.ones(len(x)))
-    levels = hierarchy(A, index, 3, kernel, path="scipy").levels
+    levels = hierarchy(A, index, 3, kernel, implementation="scipy").levels
     pattern, there = of_particles(0.1 * x, 0.1)
     for level in levels:
         np.testing.assert_array_equal(there, level.index)

@@ -8,17 +8,17 @@ from figures.common.state_panels import Look, states
 from mpm_ref.scene import build
 from validation.common.registry import discover
 from validation.common.results import ProfileResults
+from validation.common.scenes import catalogue_scene, with_
 from validation.hot import run_history as courses
 from validation.hot import whole_runs
 from validation.hot.run_history import COLUMNS, FIELDS, SHOTS, course, read, run
 from validation.hot.sizes import SIZES
-from validation.trade.hot_energy import DT, End, Way, apart, twisted
-from validation.verification.scenes import shipped, with_
+from validation.trade.hot_energy import DT, End, StopRule, distance_in_cells, twisted
 
 
 def small(steps=3, **changes):
     """The first steps of a bust of few particles, held at its foot and turned at its head."""
-    scene = shipped("hot_faceless", unstable="allow", dx=0.06, **changes)
+    scene = catalogue_scene("hot_faceless", unstable="allow", dx=0.06, **changes)
     scene = with_(scene, end=steps * scene.longest)
     body = scene.body[0]
     return with_(scene, body=(with_(body, sampling=with_(body.sampling, count=500)),))
@@ -154,9 +154,9 @@ def test_states_are_drawn_and_missing_ones_named(known, tmp_path):
 # The trade
 
 def test_bar_of_the_trade_has_fixed_steps_and_the_count_of_the_authors():
-    scene = twisted(0.015, 40, Way("hot", 1e-9))
+    scene = twisted(0.015, 40, StopRule("hot", 1e-9))
     assert sum(body.sampling.count for body in scene.body) == 30720
-    clock = build(with_(twisted(0.06, 2, Way("hot", 1e-9)))).clock
+    clock = build(with_(twisted(0.06, 2, StopRule("hot", 1e-9)))).clock
     assert (clock.dt, clock.steps, clock.interval) == (DT, 2, None)
 
 
@@ -164,5 +164,6 @@ def test_distance_from_the_answer_is_in_cells():
     x = np.zeros((4, 3))
     y = x.copy()
     y[0, 2] = 0.3
-    assert apart(End(1.0, 1.0, y, 0.0, 1.0, True), End(1.0, 1.0, x, 0.0, 1.0, True), 0.1) \
+    ends = [End(1.0, 1.0, places, 0.0, 1.0, True) for places in (y, x)]
+    assert distance_in_cells(*ends, 0.1) \
         == pytest.approx((1.5, 3.0))

@@ -12,12 +12,12 @@ from mpm_ref.rom.weights import Model, load, save
 from validation.common import targets
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
+from validation.common.scenes import with_
 from validation.ldm import networks, settings, superres
 from validation.ldm.gravity import SAME, enough
 from validation.ldm.references import mean_of, references
 from validation.ldm.studies import TORSION, TOWER
 from validation.ldm.tower import GRIDS, scene_of
-from validation.verification.scenes import with_
 
 
 def rows(**means):

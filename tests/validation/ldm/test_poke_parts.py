@@ -11,12 +11,12 @@ from mpm_ref.rom.study.errors import Errors
 from mpm_ref.rom.study.run import march
 from mpm_ref.scene import build
 from mpm_ref.trajectories import snapshots
+from validation.common.scenes import with_
 from validation.ldm import poke_parts
 from validation.ldm.paired_runs import ALL
 from validation.ldm.poke_parts import Parts, let_go, parts, swinging
 from validation.ldm.references import References
 from validation.ldm.studies import POKES, poked
-from validation.verification.scenes import with_
 
 STEPS, DRIVEN = 5, 2
 

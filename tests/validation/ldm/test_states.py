@@ -13,10 +13,10 @@ from mpm_ref.rom.study.errors import Errors
 from validation.common import targets
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
+from validation.common.scenes import with_
 from validation.ldm import paired_runs, published_bodies, states
 from validation.ldm.studies import POKES, TORSION, TOWER, fallen, leaning, twisted
 from validation.ldm.superres import fine
-from validation.verification.scenes import with_
 
 # Experiments, and how many printed numbers each records; those that made-up runs miss.
 MADE = {"gravities": 3, "torsion": 0, "superresolution": 5, "poke": 0, "tower": 16}

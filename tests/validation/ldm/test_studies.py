@@ -12,9 +12,9 @@ from mpm_ref.rom.study.errors import Squares
 from mpm_ref.rom.study.run import SCHEMES, Way, march
 from mpm_ref.scene import build
 from mpm_ref.trajectories import snapshots
+from validation.common.scenes import catalogue_scene, with_
 from validation.ldm.reduced_runs import compared, reconstructed
 from validation.ldm.studies import GRAVITY, PHI, POKE, POKES, STUDIES, TORSION, poked_again
-from validation.verification.scenes import shipped, with_
 
 STEPS = 4
 
@@ -129,8 +129,8 @@ def test_a_region_that_was_let_go_asks_for_no_samples():
 
 @pytest.mark.parametrize(("scene", "said"), [
     (with_(GRAVITY.scene(1.0), scheme=with_(GRAVITY.scene(1.0).scheme, transfer="apic")), "apic"),
-    (shipped("nsf_metal"), "plastic flow"),
-    (shipped("colliding_disks"), "more than one body"),
+    (catalogue_scene("nsf_metal"), "plastic flow"),
+    (catalogue_scene("colliding_disks"), "more than one body"),
 ], ids=["transfer", "plastic", "bodies"])
 def test_what_a_reduced_run_does_not_know_is_refused(scene, said):
     with pytest.raises(ValueError, match=said):

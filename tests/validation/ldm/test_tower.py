@@ -12,10 +12,10 @@ from mpm_ref.rom.study.case import case
 from mpm_ref.rom.study.errors import Errors
 from mpm_ref.rom.study.run import Way, march
 from mpm_ref.scene import build
+from validation.common.scenes import with_
 from validation.ldm import tower
 from validation.ldm.studies import TOWER, latin_twice, refined
 from validation.ldm.timing import COLUMNS, Full, Raced, Spent, clocked, fastest, median, race
-from validation.verification.scenes import with_
 
 EXACT = Affine(3), Affine(3).rest       # a map that is exact for affine motions
 PRINTED = 3076115 * (0.48 / 3) ** 3     # [m^3]: points times volumes (LDM-tab2-sampling, LDM-X8)

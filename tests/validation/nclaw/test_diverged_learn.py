@@ -4,7 +4,8 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from mpm_ref.nclaw.train.fit import Diverged, Epoch  # noqa: E402
+from mpm_ref.nclaw.train.fit import Epoch  # noqa: E402
+from mpm_ref.nclaw.train.session import Diverged  # noqa: E402
 from validation.nclaw import trained_laws  # noqa: E402
 from validation.nclaw.diverged import beside, diverged  # noqa: E402
 from validation.nclaw.initial_laws import untrained  # noqa: E402
@@ -33,7 +34,7 @@ def diverging(net, recipe, laws, checkpoint, show):
 
 
 def test_errors_of_a_training_that_diverges_are_kept(places, monkeypatch, capsys):
-    monkeypatch.setattr(nclaw, "taught", diverging)
+    monkeypatch.setattr(nclaw, "train_laws", diverging)
     nclaw.main([NAME], *places)
     found = diverged(NAME, trained_laws.identity(trained_laws.nets()[NAME]))
     assert found["errors"] == [1e-3, 2e-3]
@@ -47,7 +48,7 @@ def test_errors_of_a_training_that_diverges_are_kept(places, monkeypatch, capsys
 
 def test_errors_before_a_checkpoint_are_found_again(places, monkeypatch):
     """A training that goes on and diverges at once has shown none."""
-    monkeypatch.setattr(nclaw, "taught", diverging)
+    monkeypatch.setattr(nclaw, "train_laws", diverging)
     for place in places:
         place.mkdir()
     (places[1] / f"{NAME}.pt").write_text("two epochs")

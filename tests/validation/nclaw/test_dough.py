@@ -3,21 +3,21 @@
 import numpy as np
 import pytest
 
-from mpm_ref.nclaw.bodies import own
-from mpm_ref.nclaw.camera import filmed, front, pinhole, project
+from mpm_ref.nclaw.bodies import copy_body
+from mpm_ref.nclaw.camera import front_layer, observe_marks, pinhole, project
 from mpm_ref.scene import build, dumps, loads
 from validation.common import targets
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
+from validation.common.scenes import with_
 from validation.nclaw import dough, dough_runs, trained_laws
 from validation.nclaw.states import shots
-from validation.verification.scenes import with_
 
 
 @pytest.fixture(scope="module")
 def truth():
     """True frames of the block."""
-    return shots(dough.scene(dough.block()), own)
+    return shots(dough.scene(dough.block()), copy_body)
 
 
 # The camera.
@@ -40,11 +40,11 @@ def test_marks_are_those_of_the_front_off_by_noise(truth):
     layer = truth[0, marks.points, 2]
     assert (layer == layer[0]).all()
     assert layer[0] == truth[0, :, 2].max()
-    assert len(front(truth[0] * [1.0, 1.0, -1.0])) == len(marks.points)
+    assert len(front_layer(truth[0] * [1.0, 1.0, -1.0])) == len(marks.points)
     off = marks.places - project(P, truth[:, marks.points])
     assert off.std() == pytest.approx(dough.NOISE, rel=0.05)
     assert abs(off.mean()) < 0.1 * dough.NOISE
-    again = filmed(P, truth, marks.points, dough.NOISE, np.random.default_rng(dough.SEED))
+    again = observe_marks(P, truth, marks.points, dough.NOISE, np.random.default_rng(dough.SEED))
     assert np.array_equal(again.places, marks.places)
 
 
@@ -63,7 +63,7 @@ def test_the_body_has_fallen_half_a_metre():
 @pytest.mark.parametrize("shape", [dough.block, dough.star])
 def test_bodies_hit_the_floor_and_not_the_other_walls(shape):
     scene = dough.scene(shape())
-    x = shots(scene, own)
+    x = shots(scene, copy_body)
     wall = dough.WALL * dough.DX
     assert x[0, :, 1].min() > wall + dough.DX
     assert x[-1, :, 1].min() < wall

@@ -8,15 +8,18 @@ torch = pytest.importorskip("torch")
 
 from mpm_ref.materials.learned.contraction import Contraction  # noqa: E402
 from mpm_ref.materials.learned.energetic import Energetic  # noqa: E402
-from mpm_ref.nclaw.batched_step import world  # noqa: E402
+from mpm_ref.nclaw.batched_step import make_world  # noqa: E402
 from mpm_ref.nclaw.camera import project  # noqa: E402
-from mpm_ref.nclaw.train.fit import Diverged, Epoch, train  # noqa: E402
-from mpm_ref.nclaw.train.image_observations import film_of  # noqa: E402
-from mpm_ref.nclaw.train.methods import laws_of  # noqa: E402
-from mpm_ref.nclaw.train.recipe import Recipe  # noqa: E402
-from mpm_ref.nclaw.train.rollout import Laws, squared  # noqa: E402
-from mpm_ref.nclaw.train.sysid import KnownReturn, KnownStress  # noqa: E402
-from mpm_ref.nclaw.train.teacher import Teacher  # noqa: E402
+from mpm_ref.nclaw.train.fit import Epoch, train  # noqa: E402
+from mpm_ref.nclaw.train.identified_laws import IdentifiedFlow, IdentifiedLaw  # noqa: E402
+from mpm_ref.nclaw.train.observations import observe_images  # noqa: E402
+from mpm_ref.nclaw.train.recipe import (  # noqa: E402
+    Recipe,
+    TeacherForcing,
+)
+from mpm_ref.nclaw.train.rollout import LawPair, segment_errors  # noqa: E402
+from mpm_ref.nclaw.train.session import Diverged  # noqa: E402
+from mpm_ref.nclaw.train.train import drawn_laws  # noqa: E402
 from validation.common.weights_needed import Untrained  # noqa: E402
 from validation.nclaw import dough  # noqa: E402
 from validation.nclaw.diverged import diverged  # noqa: E402
@@ -45,8 +48,8 @@ def exact(problem):
     """The true laws, in PyTorch."""
     body, = problem.bodies
     unit = type(body.law)(*(a / dough.E for a in body.law))
-    elastic = KnownStress(unit, np.log(dough.E))
-    return Laws(elastic, KnownReturn(elastic, body.flow))
+    elastic = IdentifiedLaw(unit, np.log(dough.E))
+    return LawPair(elastic, IdentifiedFlow(elastic, body.flow))
 
 
 def cut(film, steps):
@@ -55,7 +58,7 @@ def cut(film, steps):
 
 
 def admissible():
-    return laws_of("admissible", 0, Energetic(1e3), Contraction())
+    return drawn_laws("admissible", 0, Energetic(1e3), Contraction())
 
 
 def test_with_the_true_laws_noise_is_left(true, seen):
@@ -63,7 +66,7 @@ def test_with_the_true_laws_noise_is_left(true, seen):
     (problem, run), (where, film) = true, seen
     assert film.weight.sum() == dough.EVERY * (1 + dough.FRAMES)
     with torch.no_grad():
-        error = squared(exact(problem), where, film, [0], [STEPS]).loss.item()
+        error = segment_errors(exact(problem), where, film, [0], [STEPS]).loss.item()
     marks = dough.film(run.x[::dough.EVERY])
     frames = slice(1, 1 + STEPS // dough.EVERY)
     noise = marks.places - project(dough.camera(), run.x[::dough.EVERY][:, marks.points])
@@ -75,18 +78,20 @@ def test_velocities_count_in_depth_alone(true, seen):
     """And of all points, at every step."""
     (problem, run), (where, film) = true, seen
     with torch.no_grad():
-        with_it, without = (squared(exact(problem), where, film, [0], [STEPS], weight).loss.item()
-                            for weight in (3.0, 0.0))
+        laws = exact(problem)
+        with_it, without = (
+            segment_errors(laws, where, film, [0], [STEPS], weight).loss.item()
+            for weight in (3.0, 0.0))
     depth = (run.v[1:STEPS + 1, :, 2] ** 2).mean(axis=1).sum()
     assert with_it - without == pytest.approx(3.0 * depth, rel=1e-6)
 
 
 def test_the_state_is_known_at_the_start_alone(true, seen):
     film = seen[1]
-    for a, name in zip(film.at(torch.tensor([0])), "xvCF", strict=True):
+    for a, name in zip(film.states(torch.tensor([0])), "xvCF", strict=True):
         assert np.array_equal(a[0].numpy(), getattr(true[1], name)[0])
     with pytest.raises(ValueError, match=r"levels \[25\]: a film knows that at level 0 alone"):
-        film.at(torch.tensor([25]))
+        film.states(torch.tensor([25]))
 
 
 def test_horizons_grow_to_the_whole_run(seen):
@@ -100,7 +105,7 @@ def test_horizons_grow_to_the_whole_run(seen):
     assert (np.diff(horizons) >= 0).all()
     assert horizons[0] == net.horizon
     assert 0.4 < horizons.count(steps) / net.epochs < 0.6
-    assert recipe.teacher == Teacher(net.horizon, round(1.7 * steps))
+    assert recipe.teacher == TeacherForcing(net.horizon, round(1.7 * steps))
 
 
 def test_what_the_film_does_not_show_is_not_trained_on(true, seen):
@@ -110,7 +115,7 @@ def test_what_the_film_does_not_show_is_not_trained_on(true, seen):
     marks = dough.film(later[::dough.EVERY])
     hidden = np.setdiff1d(np.arange(later.shape[1]), marks.points)
     later[1:, hidden] = np.nan
-    other = film_of(dough.film(later[::dough.EVERY]), dough.camera(), problem.bodies[0],
+    other = observe_images(dough.film(later[::dough.EVERY]), dough.camera(), problem.bodies[0],
                     dough.EVERY)
     assert all(torch.equal(a, b) for a, b in zip(other, seen[1], strict=True))
 
@@ -122,13 +127,13 @@ def test_gradient_is_exact(seen):
     start = [a.detach().clone() for a in own]
     torch.manual_seed(1)
     way = [torch.randn_like(a) for a in own]
-    slopes = torch.autograd.grad(squared(laws, where, film, [0], [STEPS], 1.0).loss, own)
+    slopes = torch.autograd.grad(segment_errors(laws, where, film, [0], [STEPS], 1.0).loss, own)
 
     def loss(h):
         with torch.no_grad():
             for a, first, da in zip(own, start, way, strict=True):
                 a[:] = first + h * da
-            return squared(laws, where, film, [0], [STEPS], 1.0).loss.item()
+            return segment_errors(laws, where, film, [0], [STEPS], 1.0).loss.item()
 
     slope = sum((g * da).sum() for g, da in zip(slopes, way, strict=True)).item()
     assert rate(loss, slope, H) == pytest.approx(2.0, abs=0.1)
@@ -155,7 +160,7 @@ def test_the_command_writes_weights_that_are_taken(tmp_path, monkeypatch):
     assert laws.elastic.kind._fields == ("unit",)
     assert len(laws.about["errors"]) == 1
     assert laws.about["command"] == "python -m validation.training.nclaw dough"
-    assert world(dough_training.run_of()[0]).dt == pytest.approx(1.0 / 2880.0)
+    assert make_world(dough_training.run_of()[0]).dt == pytest.approx(1.0 / 2880.0)
 
 
 def test_errors_of_a_training_that_diverges_are_kept(tmp_path, monkeypatch):

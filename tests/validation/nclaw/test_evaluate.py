@@ -13,21 +13,28 @@ from mpm_ref.trajectories import in_order
 from validation.common import targets
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
+from validation.common.scenes import with_
 from validation.common.weights_needed import Untrained
 from validation.nclaw import errors, evaluate, tables, trained_laws
 from validation.nclaw.environments import ENVIRONMENTS
-from validation.nclaw.evaluate import Broken, Found, compare, fresh, own, positions
+from validation.nclaw.evaluate import (
+    ComparedError,
+    RunBroken,
+    body_with_laws,
+    compare,
+    copy_body,
+    positions,
+)
 from validation.nclaw.initial_laws import untrained
 from validation.nclaw.tasks import reconstruction
-from validation.verification.scenes import with_
 
 
 def no_stress(body):
-    return fresh(body, Fluid(0.0), NoFlow())
+    return body_with_laws(body, Fluid(0.0), NoFlow())
 
 
 def wild(body):
-    return fresh(body, Fluid(1e15), NoFlow())
+    return body_with_laws(body, Fluid(1e15), NoFlow())
 
 
 def water(steps, **changes):
@@ -37,12 +44,12 @@ def water(steps, **changes):
 # the measure
 
 def test_a_law_is_not_off_from_itself():
-    assert compare(water(SORT + 6), [own, own]) == [Found(0.0), Found(0.0)]
+    assert compare(water(SORT + 6), [copy_body, copy_body]) == [ComparedError(0.0)] * 2
 
 
 def test_runs_are_those_of_simulate():
     problem = build(water(SORT + 6))
-    shown = list(positions(problem, tuple(map(own, problem.bodies))))
+    shown = list(positions(problem, tuple(map(copy_body, problem.bodies))))
     frames = [in_order(frame.state.bodies[0].particles.x, frame.state.bodies[0].id)
               for frame in simulate(problem)]
     assert len(shown) == len(frames) == 1 + (SORT + 6) // 5
@@ -54,7 +61,7 @@ def test_the_first_frame_counts(monkeypatch):
     off = {"true": (0.0, 0.0, 0.0), "other": (0.0, 2.0**0.5, 8.0**0.5)}
     problem = SimpleNamespace(bodies=(SimpleNamespace(particles=SimpleNamespace(x=np.zeros(4))),))
     monkeypatch.setattr(evaluate, "build", lambda scene: problem)
-    monkeypatch.setattr(evaluate, "own", lambda body: "true")
+    monkeypatch.setattr(evaluate, "copy_body", lambda body: "true")
     monkeypatch.setattr(evaluate, "positions", lambda problem, bodies: (
         np.ones((4, 2)) + np.array([d, 0.0]) for d in off[bodies[0]]))
     found, = compare(None, [lambda body: "other"])
@@ -70,7 +77,7 @@ def test_without_stress_the_error_is_the_printed_one_before_training():
 def test_points_of_several_bodies_stand_one_after_the_other():
     problem = build(water(5))
     body = problem.bodies[0]
-    x = next(positions(problem, (own(body), own(body))))
+    x = next(positions(problem, (copy_body(body), copy_body(body))))
     assert np.array_equal(x, np.tile(in_order(body.particles.x, body.id), (2, 1)))
 
 
@@ -90,15 +97,15 @@ def test_a_run_that_goes_on_stays_in_the_upper_corner():
     assert 0 < found.step < 100
     problem, ahead = build(water(100)), build(water(100))
     own_frames, off = positions(ahead, tuple(map(wild, ahead.bodies))), []
-    for k, true in enumerate(positions(problem, tuple(map(own, problem.bodies)))):
+    for k, true in enumerate(positions(problem, tuple(map(copy_body, problem.bodies)))):
         place = next(own_frames) if 5 * k < found.step else 0.975
         off.append(np.mean((place - true) ** 2))
     assert found.error == pytest.approx(np.mean(off), rel=1e-12)
 
 
 def test_a_true_run_may_not_break_down(monkeypatch):
-    monkeypatch.setattr(evaluate, "own", wild)
-    with pytest.raises(Broken, match=r"step \d+: particle \d+ has position"):
+    monkeypatch.setattr(evaluate, "copy_body", wild)
+    with pytest.raises(RunBroken, match=r"step \d+: particle \d+ has position"):
         compare(water(100), [no_stress])
 
 
@@ -160,7 +167,7 @@ def made_up(monkeypatch):
         return name
 
     def compared(scene, laws, goes_on):
-        return [Found(float(next(count))) for _ in laws]
+        return [ComparedError(float(next(count))) for _ in laws]
 
     known = {name: trained_laws.Net(name) for name in ENVIRONMENTS}
     for name, value in {"compare": compared, "learned": lambda laws: laws}.items():
@@ -271,7 +278,7 @@ def test_missing_weights_are_told(tmp_path, made_up):
 
 def test_breakdowns_are_recorded_as_misses(tmp_path, made_up, monkeypatch):
     monkeypatch.setattr(errors, "compare", lambda *args: [
-        Found(np.inf, 7, "particle 3 is lost")])
+        ComparedError(np.inf, 7, "particle 3 is lost")])
     _, found = recorded(tmp_path, tables.table1)
     one = found["nclaw.table1.ours.jello"]
     assert (one.value, one.verdict) == (None, "miss")
@@ -285,7 +292,7 @@ def test_before_training_errors_must_be_the_printed_digits(tmp_path, made_up, mo
                                          strict=True))
     monkeypatch.setattr(errors, "scenes", lambda task, name: [reconstruction(name)]
                         if task == "reconstruction" else [])
-    monkeypatch.setattr(errors, "compare", lambda *args: [Found(next(values))])
+    monkeypatch.setattr(errors, "compare", lambda *args: [ComparedError(next(values))])
     _, found = recorded(tmp_path, tables.init)
     verdicts = [found[f"nclaw.table1.ours-init.{name}"].verdict for name in errors.PRINTED.values()]
     assert verdicts == ["pass", "pass", "miss", "pass"]
@@ -295,7 +302,7 @@ def test_before_training_errors_must_be_the_printed_digits(tmp_path, made_up, mo
 def test_quick_runs_are_short_and_not_judged(tmp_path, made_up, monkeypatch):
     steps = []
     monkeypatch.setattr(errors, "compare", lambda scene, laws, goes_on: [
-        Found(9.0 + (steps.append(scene.steps) or 0.0)) for _ in laws])
+        ComparedError(9.0 + (steps.append(scene.steps) or 0.0)) for _ in laws])
     _, found = recorded(tmp_path, tables.table1, "quick")
     assert set(steps) == {errors.SHORT}
     assert found["nclaw.table1.ours.jello"].verdict == "info"

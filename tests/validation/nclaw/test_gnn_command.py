@@ -7,15 +7,15 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from mpm_ref.nclaw.gnn.train.examples import run_of  # noqa: E402
-from mpm_ref.nclaw.gnn.train.recipe import GraphRecipe  # noqa: E402
+from mpm_ref.nclaw.gnn.train.examples import training_run  # noqa: E402
+from mpm_ref.nclaw.gnn.train.fit import GraphRecipe  # noqa: E402
+from validation.common.scenes import with_  # noqa: E402
 from validation.nclaw import trained_laws  # noqa: E402
 from validation.nclaw.evaluate import compare  # noqa: E402
 from validation.nclaw.simulators import GraphNet, shown, simulators  # noqa: E402
 from validation.nclaw.tasks import reconstruction, velocity  # noqa: E402
 from validation.nclaw.trained_laws import trained  # noqa: E402
 from validation.training import gnn, nclaw  # noqa: E402
-from validation.verification.scenes import with_  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
@@ -62,7 +62,7 @@ def test_what_a_net_says_is_what_is_trained():
 
 def test_the_network_is_shown_the_run_that_is_seen():
     seen = shown(scene())
-    run = run_of(seen.x, seen.v, seen.dt, seen.box)
+    run = training_run(seen.x, seen.v, seen.dt, seen.box)
     assert run.count == 3
     assert np.diff(run.frames, axis=0)[:5] == pytest.approx(
         np.broadcast_to(seen.dt * seen.v, (5, 1000, 3)))

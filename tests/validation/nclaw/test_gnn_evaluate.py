@@ -4,23 +4,23 @@ import gnn_toys as toys
 import numpy as np
 import pytest
 
-from mpm_ref.nclaw.gnn.history import Scales
-from mpm_ref.nclaw.gnn.network import Network, Perceptron
+from mpm_ref.nclaw.gnn.features import MotionScales
+from mpm_ref.nclaw.gnn.network import GraphWeights, PerceptronWeights
 from mpm_ref.nclaw.gnn.simulator import Simulator
 from mpm_ref.nclaw.gnn.weights import save
 from mpm_ref.scene import build
 from validation.common import targets
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
+from validation.common.scenes import with_
 from validation.common.weights_needed import Untrained
 from validation.nclaw import curves, errors, gnn_runs, simulators, tables, trained_laws
 from validation.nclaw.environments import ENVIRONMENTS
-from validation.nclaw.evaluate import Broken, Found, compare, own, positions
+from validation.nclaw.evaluate import ComparedError, RunBroken, compare, copy_body, positions
 from validation.nclaw.gnn_rollout import free
 from validation.nclaw.simulators import GraphNet, scenes_of, shown
 from validation.nclaw.tasks import SEEDS, reconstruction
 from validation.nclaw.trained_laws import identity, trained
-from validation.verification.scenes import with_
 
 CENTER = (0.5, 0.5, 0.5)
 
@@ -39,9 +39,10 @@ def still(dt=toys.DT, a=0.0):
     nothing = tuple((np.zeros((n, m)), np.zeros(m)) for n, m in ((21, 1), (1, 1), (1, 1)))
     edges = ((np.zeros((4, 1)), np.zeros(1)), *nothing[1:])
     last = (*nothing[1:], (np.zeros((1, 3)), np.zeros(3)))
-    scales = Scales(np.zeros(3), np.ones(3), np.full(3, a), np.ones(3))
-    return Simulator(Network(Perceptron(nothing), Perceptron(edges), (), Perceptron(last)),
-                     toys.reading()._replace(dt=dt, scales=scales), {})
+    scales = MotionScales(np.zeros(3), np.ones(3), np.full(3, a), np.ones(3))
+    network = GraphWeights(PerceptronWeights(nothing), PerceptronWeights(edges), (),
+                           PerceptronWeights(last))
+    return Simulator(network, toys.reading()._replace(dt=dt, scales=scales), {})
 
 
 # which there are
@@ -83,7 +84,7 @@ def test_a_training_is_known_by_all_that_its_net_says():
 def test_a_run_is_shown_in_frames_of_five_steps():
     seen = shown(water(20))
     problem = build(water(20))
-    assert np.array_equal(seen.x, list(positions(problem, tuple(map(own, problem.bodies)))))
+    assert np.array_equal(seen.x, list(positions(problem, tuple(map(copy_body, problem.bodies)))))
     assert seen.x.shape == (5, 1000, 3)
     assert seen.dt == pytest.approx(2.5e-3)
     assert (*seen.box.low, *seen.box.high) == pytest.approx((0.1, 0.1, 0.1, 0.9, 0.9, 0.9))
@@ -109,8 +110,8 @@ def test_points_may_leave_the_box():
 def test_errors_of_a_graph_network_are_measured_like_those_of_laws():
     seen = shown(water(15))
     straight = [seen.x[0] + k * seen.dt * seen.v for k in range(4)]
-    exact, found = compare(water(15), [own, still()])
-    assert exact == Found(0.0)
+    exact, found = compare(water(15), [copy_body, still()])
+    assert exact == ComparedError(0.0)
     assert found.error == pytest.approx(np.mean([(x - y) ** 2 for x, y in
                                                  zip(straight, seen.x, strict=True)]), rel=1e-9)
     assert found.error > 1e-9
@@ -121,7 +122,7 @@ def test_a_free_run_that_breaks_down_says_where():
     found, = compare(water(15), [lost])
     assert (found.error, found.step) == (np.inf, 5)
     assert "expected a finite place" in found.why
-    with pytest.raises(Broken, match=r"^step 5: point 0 is at "):
+    with pytest.raises(RunBroken, match=r"^step 5: point 0 is at "):
         list(free(build(water(15)), lost))
 
 
@@ -176,7 +177,7 @@ def trained_ones(monkeypatch):
 
     monkeypatch.setattr(tables, "trained", found)
     monkeypatch.setattr(errors, "compare", lambda scene, laws, goes_on: [
-        Found(float(next(count))) for _ in laws])
+        ComparedError(float(next(count))) for _ in laws])
 
 
 def recorded(folder, experiment, profile="standard"):
@@ -216,7 +217,7 @@ def test_what_was_picked_is_recorded(tmp_path, trained_ones):
 def test_table_6_is_of_1_10_and_100_runs_of_water(tmp_path, trained_ones, monkeypatch):
     monkeypatch.setattr(gnn_runs, "trained", lambda name: still()._replace(about={"of": name}))
     monkeypatch.setattr(errors, "compare", lambda scene, laws, goes_on: [
-        Found(2.0 * ("gnn" in one.about["of"]) + len(one.about["of"])) for one in laws])
+        ComparedError(2.0 * ("gnn" in one.about["of"]) + len(one.about["of"])) for one in laws])
     found = recorded(tmp_path, gnn_runs.table6)
     assert {target: one.value for target, one in found.items() if target != "nclaw.table6"} == {
         "nclaw.table6.gnn.1.loss": 2.0 + len("water-gnn"), "nclaw.table6.gnn.1.trajectories": 1,

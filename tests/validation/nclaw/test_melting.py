@@ -4,13 +4,13 @@
 import numpy as np
 import pytest
 
-from mpm_ref.nclaw.bodies import own
+from mpm_ref.nclaw.bodies import copy_body
 from mpm_ref.nclaw.study.compare import positions
 from mpm_ref.scene import build
+from validation.common.scenes import with_
 from validation.nclaw import gallery, melting, other_bodies
 from validation.nclaw.environments import ENVIRONMENTS, environment
 from validation.nclaw.tasks import unit_cube
-from validation.verification.scenes import with_
 
 STEPS, EVERY = 60, 20
 
@@ -25,13 +25,13 @@ def scene():
 
 def fluffy(body):
     """A body of next to no stress."""
-    return other_bodies.fresh(body, body.law._replace(mu=1e-3, lam=1e-3), body.flow)
+    return other_bodies.body_with_laws(body, body.law._replace(mu=1e-3, lam=1e-3), body.flow)
 
 
 def test_a_body_that_does_not_change_is_run_as_ever(scene):
     """But for round-off of another order of sums."""
-    plain = [*positions(build(scene), tuple(map(own, build(scene).bodies)))]
-    same = [*melting.melting(build(scene), own, own)]
+    plain = [*positions(build(scene), tuple(map(copy_body, build(scene).bodies)))]
+    same = [*melting.melting(build(scene), copy_body, copy_body)]
     assert len(plain) == len(same) == 1 + STEPS // EVERY
     assert np.allclose(plain, same, atol=1e-12)
 
@@ -44,9 +44,9 @@ def test_the_lowest_points_change_first(scene, monkeypatch):
 
     def after(body):
         seen.append(body.id.copy())
-        return own(body)
+        return copy_body(body)
 
-    start, *_ = melting.melting(build(scene), own, after)
+    start, *_ = melting.melting(build(scene), copy_body, after)
     assert [len(ids) for ids in seen] == [32, 64]
     assert start[seen[0], 1].max() <= np.delete(start[:, 1], seen[0]).min()
 
@@ -54,21 +54,21 @@ def test_the_lowest_points_change_first(scene, monkeypatch):
 def test_what_melts_moves_otherwise(scene, monkeypatch):
     monkeypatch.setattr(melting, "FIRST", -1)
     monkeypatch.setattr(melting, "LAST", 0)
-    ends = [[*melting.melting(build(scene), own, after)][-1] for after in (own, fluffy)]
+    ends = [[*melting.melting(build(scene), copy_body, after)][-1] for after in (copy_body, fluffy)]
     assert np.abs(ends[1] - ends[0]).max() > 1e-4
 
 
 def nowhere(body):
     """A body whose stress is not a number."""
-    return other_bodies.fresh(body, body.law._replace(mu=np.nan), body.flow)
+    return other_bodies.body_with_laws(body, body.law._replace(mu=np.nan), body.flow)
 
 
 def test_a_run_that_breaks_down_has_frames_of_nan(scene, monkeypatch):
     """As many as were asked for, from the first change on."""
     monkeypatch.setattr(melting, "FIRST", 10)
     monkeypatch.setattr(melting, "LAST", 30)
-    whole = [*melting.melting(build(scene), own, own)]
-    found = [*melting.melting(build(scene), own, nowhere)]
+    whole = [*melting.melting(build(scene), copy_body, copy_body)]
+    found = [*melting.melting(build(scene), copy_body, nowhere)]
     assert len(found) == len(whole)
     assert np.array_equal(found[:2], whole[:2])
     assert np.isnan(found[2:]).all()
@@ -86,7 +86,7 @@ def test_materials_are_known_by_their_laws(name):
 
 def test_parts_make_the_whole(scene):
     """Whatever their order."""
-    body = own(build(scene).bodies[0])
+    body = copy_body(build(scene).bodies[0])
     body.particles.F[:] += np.arange(64)[:, None, None]
     which = np.random.default_rng(0).random(64) < 0.4
     again = melting.whole([melting.part(body, ~which), melting.part(body, which)])

@@ -6,7 +6,7 @@ from validation.common import targets
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.nclaw import errors, tables, trained_laws
-from validation.nclaw.evaluate import Found
+from validation.nclaw.evaluate import ComparedError
 
 ERROR = 0.125
 NAMES = ("jelly", "jelly-spline", "jelly-spline-released", "sand-neural-released")
@@ -15,8 +15,9 @@ NAMES = ("jelly", "jelly-spline", "jelly-spline-released", "sand-neural-released
 @pytest.fixture
 def found(monkeypatch, tmp_path):
     """What an experiment records of errors that are all `ERROR`: {target: `Record`}."""
-    monkeypatch.setattr(errors, "compare", lambda scene, laws, goes_on: [Found(ERROR)] * len(laws))
-    monkeypatch.setattr(errors, "learned", lambda laws: laws)
+    monkeypatch.setattr(errors, "compare",
+                        lambda scene, laws, goes_on: [ComparedError(ERROR)] * len(laws))
+    monkeypatch.setattr(errors, "body_maker", lambda laws: laws)
     monkeypatch.setattr(tables, "trained", lambda name: name)
     monkeypatch.setattr(tables, "nets", lambda: {
         n: trained_laws.Net(n.split("-")[0]) for n in NAMES})

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mpm_ref.nclaw.bodies import own
+from mpm_ref.nclaw.bodies import copy_body
 from mpm_ref.nclaw.gnn.simulator import Simulator
 from tests.validation.nclaw.test_gnn_evaluate import still, water
 from validation.common import targets
@@ -30,7 +30,7 @@ def runs(monkeypatch):
         return still() if name.endswith("gnn") else untrained()
 
     def took(scene, law):
-        word = "true" if law is own else "gnn" if isinstance(law, Simulator) else "ours"
+        word = "true" if law is copy_body else "gnn" if isinstance(law, Simulator) else "ours"
         asked.append((word, scene.steps))
         k = sum(one == (word, 1000) for one in asked)
         return k * {"true": 0.5, "ours": 1.0, "gnn": 3.0}[word], 10.0 * k
@@ -71,7 +71,7 @@ def test_what_is_not_trained_is_told_and_not_run(tmp_path, runs):
     assert not {target for target in found if target.endswith(("jello", "water"))}
 
 
-@pytest.mark.parametrize("law", [own, still()], ids=["laws", "graph network"])
+@pytest.mark.parametrize("law", [copy_body, still()], ids=["laws", "graph network"])
 def test_a_run_takes_time(law):
     wall, cpu = runtime.took(water(5), law)
     assert 0.0 < wall < 60.0

@@ -6,9 +6,9 @@ import pytest
 from validation.common import targets
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
+from validation.common.scenes import catalogue_scene, with_
 from validation.common.weights_needed import Untrained
 from validation.nclaw import settings
-from validation.verification.scenes import shipped, with_
 
 ELSEWHERE = {       # in other experiments, with what they are settings of
     *(f"nclaw.table6.{row}.trajectories" for row in ("gnn.1", "gnn.10", "gnn.100", "ours.1")),
@@ -44,7 +44,7 @@ def test_all_settings_are_the_printed_ones(tmp_path):
 
 def test_other_settings_miss(tmp_path, monkeypatch):
     def changed(name):
-        scene = shipped(name)
+        scene = catalogue_scene(name)
         return with_(scene, every=10) if name == "nclaw_jelly" else scene
 
     def other(name):
@@ -55,7 +55,7 @@ def test_other_settings_miss(tmp_path, monkeypatch):
                              elastic=biased(laws.elastic))
 
     found = {name: settings.trained(name) for name in (settings.JELLY, settings.GRAPHS)}
-    monkeypatch.setattr(settings, "shipped", changed)
+    monkeypatch.setattr(settings, "catalogue_scene", changed)
     monkeypatch.setattr(settings, "trained", other)
     monkeypatch.setattr(settings, "FASTEST", 2.0)
     assert misses(records(tmp_path)) == {

@@ -7,19 +7,24 @@ from nclaw_toys import cube
 torch = pytest.importorskip("torch")
 
 from mpm_ref.materials.learned.response import Correction, Stress  # noqa: E402
-from mpm_ref.nclaw.batched_step import world  # noqa: E402
+from mpm_ref.nclaw.batched_step import make_world  # noqa: E402
 from mpm_ref.nclaw.train import fit  # noqa: E402
-from mpm_ref.nclaw.train.fit import Diverged, train  # noqa: E402
+from mpm_ref.nclaw.train.fit import train  # noqa: E402
 from mpm_ref.nclaw.train.neural_laws import neural_laws  # noqa: E402
-from mpm_ref.nclaw.train.observations import Partial  # noqa: E402
+from mpm_ref.nclaw.train.observations import (  # noqa: E402
+    PartialTrajectory,
+    Trajectory,
+    trajectory_of,
+)
 from mpm_ref.nclaw.train.recipe import Recipe  # noqa: E402
-from mpm_ref.nclaw.train.rollout import Trajectory, squared, trajectory_of  # noqa: E402
+from mpm_ref.nclaw.train.rollout import segment_errors  # noqa: E402
+from mpm_ref.nclaw.train.session import Diverged  # noqa: E402
 from mpm_ref.trajectories import Observed, observed  # noqa: E402
+from validation.common.scenes import with_  # noqa: E402
 from validation.nclaw.observation import Seen  # noqa: E402
 from validation.nclaw.small_trainings import Small, identity  # noqa: E402
 from validation.training import small  # noqa: E402
 from validation.training.small import bundled, run_of, shown  # noqa: E402
-from validation.verification.scenes import with_  # noqa: E402
 
 STEPS = 11
 SHORT = Recipe(epochs=3, first=3, last=6, batch=2, elastic_rate=1e-2, plastic_rate=1e-3)
@@ -31,7 +36,7 @@ pytestmark = pytest.mark.usefixtures("one_torch_thread")
 def run():
     """`World` and `Trajectory` of a small cube."""
     problem = cube(STEPS)
-    return world(problem), trajectory_of(observed(problem))
+    return make_world(problem), trajectory_of(observed(problem))
 
 
 def laws():
@@ -39,7 +44,7 @@ def laws():
 
 
 def partial(whole, weight):
-    return Partial(*whole, torch.from_numpy(np.ascontiguousarray(weight)))
+    return PartialTrajectory(*whole, torch.from_numpy(np.ascontiguousarray(weight)))
 
 
 def ones(whole):
@@ -49,7 +54,7 @@ def ones(whole):
 def gradients(data, where, cuts, velocity=0.0):
     """The loss of segments, and its gradients."""
     made = laws()
-    loss = squared(made, where, data, cuts[:-1], cuts[1:], velocity).loss
+    loss = segment_errors(made, where, data, cuts[:-1], cuts[1:], velocity).loss
     loss.backward()
     return loss.item(), [a.grad.clone() for law in made for a in law.parameters()]
 
@@ -90,8 +95,8 @@ def test_weights_are_those_of_squared_errors(run):
     weight = np.random.default_rng(0).random(whole.x.shape[:2])
     data, a = partial(whole, weight), whole.x[[4, 6]] + 0.1
     expected = 0.01 * weight[[4, 6]].mean(axis=1).sum()
-    assert data.off("x", a, torch.tensor([4, 6])).item() == pytest.approx(expected)
-    assert data.off("v", whole.v[[4]], torch.tensor([4])).item() == 0.0
+    assert data.squared_error("x", a, torch.tensor([4, 6])).item() == pytest.approx(expected)
+    assert data.squared_error("v", whole.v[[4]], torch.tensor([4])).item() == 0.0
 
 
 def test_segments_begin_where_something_is_seen(run):
@@ -172,7 +177,7 @@ def test_a_training_that_diverges_is_kept_as_far_as_it_came(toy, monkeypatch):
 def test_a_training_takes_what_is_seen(toy, seen):
     true = observed(cube(STEPS))
     found, data = shown(toy._replace(seen=seen), true)
-    assert isinstance(data, Partial)
+    assert isinstance(data, PartialTrajectory)
     assert isinstance(found, Observed)
     made = bundled("toy", toy._replace(seen=seen), 1)
     assert np.isfinite(made.about["errors"]).all()

@@ -6,9 +6,9 @@ import pytest
 from mpm_ref.problem import Clock
 from mpm_ref.scene import Mesh, Poisson, build
 from mpm_ref.shapes.inside import solid
+from validation.common.scenes import with_
 from validation.nclaw import gallery, stand_in_bodies, tasks
 from validation.nclaw.environments import ENVIRONMENTS
-from validation.verification.scenes import with_
 
 DRAWN = {       # by the release's own code
     1: ((0.05859466755, -2.23275321281, -1.76374650039),

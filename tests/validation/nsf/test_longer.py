@@ -12,9 +12,9 @@ from mpm_ref.rom.study.errors import Errors
 from mpm_ref.rom.study.nsf_case import history
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
+from validation.common.scenes import with_
 from validation.nsf import longer
 from validation.nsf.studies import jelly, metal
-from validation.verification.scenes import with_
 
 STUDY = jelly(4)._replace(test=(0.3, 0.35, 0.4), every=8)
 FACTORS = (1.0, 1.5, 2.0, 20.0)

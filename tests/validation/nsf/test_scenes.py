@@ -6,7 +6,7 @@ import pytest
 from mpm_ref.preflight import misplaced
 from mpm_ref.scene import build, digest
 from mpm_ref.scene.overrides import varied
-from validation.verification.scenes import SCENES, shipped, with_
+from validation.common.scenes import SCENES, catalogue_scene, with_
 
 VARIED = {      # scene: the key that sets the parameter of its experiment, and the parameter's ends
     "bread": ("body.bread.material.E", (1.0, 13.0)),
@@ -18,7 +18,7 @@ VARIED = {      # scene: the key that sets the parameter of its experiment, and 
 
 
 def test_sand_has_72000_particles_of_the_given_volume():
-    sand = shipped("nsf_sand")
+    sand = catalogue_scene("nsf_sand")
     body = sand.body[0]
     assert body.sampling.count == 72_000
     volume = np.prod(np.subtract(body.shape.upper, body.shape.lower))
@@ -30,13 +30,13 @@ def test_sand_has_72000_particles_of_the_given_volume():
     ("metal", [49_984]), ("bread", [36_000, 4_000]), ("cake", [200_000]), ("toothpaste", [45_412]),
     ("jelly", [4_000, 6_000]), ("ball", [97_944])])
 def test_particles(name, counts):
-    assert [len(body.id) for body in build(shipped(f"nsf_{name}")).bodies] == counts
+    assert [len(body.id) for body in build(catalogue_scene(f"nsf_{name}")).bodies] == counts
 
 
 @pytest.mark.parametrize("dx", [1 / 160, 1 / 80, 1 / 53])
 def test_weak_elements_fill_the_gaps_of_the_bread(dx):
     """On a grid that they do not fit, too: no particle is there twice, and none is missing."""
-    scene = shipped("nsf_bread", dx=dx)
+    scene = catalogue_scene("nsf_bread", dx=dx)
     bread = scene.body[0]
     whole = with_(scene, body=(with_(bread, shape=bread.shape.shape),))
     parts, slab = (sorted(tuple(x) for body in build(one).bodies for x in body.particles.x)
@@ -49,6 +49,6 @@ def test_one_key_sets_what_differs(name):
     """The key that the file names; bodies stand well at both ends of the range."""
     path, ends = VARIED[name]
     assert f"`{path}` alone sets" in (SCENES / f"nsf_{name}.toml").read_text()
-    low, high = (varied(shipped(f"nsf_{name}"), {path: value}) for value in ends)
+    low, high = (varied(catalogue_scene(f"nsf_{name}"), {path: value}) for value in ends)
     assert digest(low) != digest(high)
     assert [misplaced(build(end)) for end in (low, high)] == [[], []]

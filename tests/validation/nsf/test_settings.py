@@ -5,8 +5,8 @@ import pytest
 from validation.common import targets
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
+from validation.common.scenes import catalogue_scene, with_
 from validation.nsf import scene_settings
-from validation.verification.scenes import shipped, with_
 
 STAND_INS = {"nsf.metal.particles", "nsf.table1.ball.particles"}
 SMALL = ("bread", "cake", "jelly")      # filled in a moment
@@ -34,7 +34,7 @@ def test_settings_are_the_printed_ones(tmp_path):
 def test_stand_ins_have_nearly_the_printed_number_of_particles():
     """To a thousandth: as near as shapes of our own come."""
     for name, (target, _) in scene_settings.STAND_INS.items():
-        ours = scene_settings.particles(shipped(f"nsf_{name}"))
+        ours = scene_settings.particles(catalogue_scene(f"nsf_{name}"))
         paper = targets.load()[f"nsf.{target}"]
         assert ours != paper.value
         assert ours == pytest.approx(paper.value, rel=1e-3)
@@ -53,13 +53,13 @@ def test_studies_and_networks_are_the_printed_ones(tmp_path):
 
 def test_other_settings_miss(tmp_path, monkeypatch):
     def changed(name):
-        scene = shipped(name)
+        scene = catalogue_scene(name)
         body = scene.body[0]
         material = with_(body.material, **({"E": 2.0} if name == "nsf_jelly" else {}))
         return with_(scene, dt=2.0 * scene.dt, body=(with_(body, material=material),))
 
     monkeypatch.setattr(scene_settings, "NAMES", SMALL)
-    monkeypatch.setattr(scene_settings, "shipped", changed)
+    monkeypatch.setattr(scene_settings, "catalogue_scene", changed)
     # one body of two is left out: their numbers of particles miss as well
     assert misses(records(tmp_path)) == {
         *(f"nsf.table1.{name}.dt" for name in SMALL), "nsf.table1.jelly.E",

@@ -9,8 +9,16 @@ from validation.hot.one_step import Errors, difference, errors
 from validation.hot.stiffness import METHODS
 from validation.hot.warm_states import BEGUN
 from validation.trade import hot_methods
-from validation.trade.hot import POINT, Point, known, times_for
-from validation.trade.hot_methods import ALL, CAPS, SLOW, SOME, Way, descended, ways
+from validation.trade.hot import POINT, Point, bounded_below, times_for
+from validation.trade.hot_methods import (
+    ALL,
+    CAPS,
+    SLOW,
+    SOME,
+    ToleranceLadder,
+    descended,
+    tolerance_ladders,
+)
 from validation.trade.hot_scenes import (
     OVER,
     Trial,
@@ -74,7 +82,7 @@ def test_no_error_is_known_better_than_the_reference():
     points = [made("pn-pcg", 1e-7, 1.0, 0.0), made("pn-pcg", 1e-6, 1.0, 1e-2, cells=1e-2,
                                                    error_max=2e-2, cells_rms=3e-3)]
     least = Errors(1e-4, 2e-4, 3e-5, 4e-5)
-    small, large = known(points, least)
+    small, large = bounded_below(points, least)
     assert (small.error, small.error_max, small.cells_rms, small.cells) == least
     assert large == points[1]
 
@@ -137,8 +145,9 @@ def stepped(monkeypatch, solve):
         cpu, converged = solve(*way)
         return made(*way, cpu, 0.1, converged=converged)
     monkeypatch.setattr(hot_methods, "point", point)
-    tried = [Way("hot", (1e-5, 1e-6, 1e-7, 1e-8)), Way("pn-pcg", (1e-5, 1e-6, 1e-7, 1e-8)),
-             Way("gast15", (1.0, 0.1))]
+    tried = [ToleranceLadder("hot", (1e-5, 1e-6, 1e-7, 1e-8)),
+             ToleranceLadder("pn-pcg", (1e-5, 1e-6, 1e-7, 1e-8)),
+             ToleranceLadder("gast15", (1.0, 0.1))]
     return [(p.method, p.eps) for p in descended(None, None, tried)]
 
 
@@ -161,7 +170,7 @@ def test_every_method_is_tried_and_newton_with_multigrid_bears_its_cycle():
     assert {trial.methods for trial in quick} == {METHODS}
     assert {(t.size, t.methods) for t in standard} == {("quick", ALL), ("standard", SOME)}
     assert {t.scene for t in standard if t.size == "quick"} == set(BEGUN)
-    found = {way.method: way for way in ways(ALL, (1e-3, 1e-4))}
+    found = {way.method: way for way in tolerance_ladders(ALL, (1e-3, 1e-4))}
     assert {name for name, way in found.items() if "flexible" in way.options} == {
         "pn-mgpcg", "pn-gmg-pcg"}
     assert [name for name, way in found.items() if way.ladder != (1e-3, 1e-4)] == ["gast15"]

@@ -8,13 +8,13 @@ import pytest
 from mpm_ref.rom.fields.affine import Affine
 from mpm_ref.rom.study.case import case
 from mpm_ref.rom.study.run import Way
+from validation.common.scenes import with_
 from validation.ldm.networks import trained
 from validation.ldm.references import references
 from validation.ldm.studies import GRAVITY
 from validation.ldm.timing import Raced, Spent
 from validation.trade import ldm
-from validation.trade.ldm_cost import EVALUATIONS, PARTS, Clock, Watched, cost, paid, split
-from validation.verification.scenes import with_
+from validation.trade.ldm_cost import EVALUATIONS, PARTS, Clock, TimedCalls, cost, paid, split
 
 EXACT = Affine(3), Affine(3).rest
 
@@ -59,7 +59,8 @@ def test_a_part_that_raises_is_left():
 
 def test_what_is_watched_is_the_same_but_for_the_named_methods():
     said = []
-    watched = Watched([3, 1], ("sort",), lambda name, method: lambda: said.append(name) or method())
+    watched = TimedCalls([3, 1], ("sort",),
+                         lambda name, method: lambda: said.append(name) or method())
     watched.sort()
     watched.append(5)
     assert watched.of == [1, 3, 5]
@@ -67,12 +68,10 @@ def test_what_is_watched_is_the_same_but_for_the_named_methods():
 
 
 def test_a_step_asks_the_map_as_often_as_its_way_says(one):
-    """All points, Lagrangian: the samples are among the points, and asked for once; velocities
-    before are asked for by each.
-    """
+    """All points, Lagrangian: the samples are the points, and each quantity is asked for once."""
     n = len(one.X)
-    for velocity, derivatives, place, speeds in (("previous", 1, 0, 2), ("latest", 1, 0, 0),
-                                                 ("difference", 1, 2, 0), ("transported", 2, 0, 1)):
+    for velocity, derivatives, place, speeds in (("previous", 1, 0, 1), ("latest", 1, 0, 0),
+                                                 ("difference", 1, 1, 0), ("transported", 2, 0, 1)):
         spent, asked, points = split(one, EXACT, Way(velocity=velocity), 3)
         assert points == n
         expected = dict(zip(EVALUATIONS, (derivatives * n, place * n, speeds * n), strict=True))
@@ -114,7 +113,7 @@ def test_longer_steps_meet_the_same_answer_at_their_times():
     assert np.array_equal(after.problem.gravity, before.problem.gravity)
     assert np.array_equal(longer.x[0], tests.x[0][::3])
     assert len(longer.x[0]) == after.problem.clock.steps + 1
-    errors, seconds = ldm.Setting("network", 4, 20, 3).measured(tests)
+    errors, seconds = ldm.ReducedSetting("network", 4, 20, 3).measured(tests)
     assert 0.0 < errors.origin < 0.05
     assert seconds > 0.0
 

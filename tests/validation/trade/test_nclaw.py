@@ -9,7 +9,7 @@ from small_toys import Records, known
 from mpm_ref.materials.learned import weights
 from mpm_ref.scene import build
 from validation.nclaw import bundle, small_runs, small_trainings
-from validation.nclaw.evaluate import Found
+from validation.nclaw.evaluate import ComparedError
 from validation.nclaw.initial_laws import untrained
 from validation.nclaw.small_runs import Measured, measured, spent, spread
 from validation.nclaw.small_trainings import Small, bundled, identity, small_nets
@@ -38,7 +38,7 @@ def test_trainings_are_run_side_by_side(folder, monkeypatch):
 
     def compared(scene, makers):
         asked.append((scene.body[0].sampling.counts[0], len(makers)))
-        return [Found(0.1 * len(asked) + k, 7 if len(asked) == 2 else -1)
+        return [ComparedError(0.1 * len(asked) + k, 7 if len(asked) == 2 else -1)
                 for k in range(len(makers))]
 
     monkeypatch.setattr(small_runs, "compare", compared)
@@ -166,7 +166,7 @@ def test_the_front_of_digits_is_of_error_and_bytes(monkeypatch):
     monkeypatch.setattr(inference, "DIGITS", {"standard": (24, 16, 11, 8)})
     monkeypatch.setattr(inference, "trained", lambda name: untrained())
     monkeypatch.setattr(inference, "compare", lambda scene, laws: [
-        Found(next(errors), -1, "lost" if k == 3 else "") for k, _ in enumerate(laws)])
+        ComparedError(next(errors), -1, "lost" if k == 3 else "") for k, _ in enumerate(laws)])
     records = Records()
     inference.digits(records)
     columns, rows = records["digits"]

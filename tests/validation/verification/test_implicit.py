@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from validation.verification import implicit as module
-from validation.verification.implicit import EPS, Course, implicit, moved, record_minimisers, rise
+from validation.verification.implicit import (
+    EPS,
+    EnergyHistory,
+    displaced,
+    implicit,
+    record_minimisers,
+    rise,
+)
 
 
 class Records(dict):
@@ -21,14 +28,14 @@ def test_every_method_solves_to_the_same_tolerance():
 
 
 def test_course_says_which_solves_did_not_converge():
-    assert moved(implicit("pn-pcg"), 1).missed == []
-    missed = moved(implicit("pn-pcg", iterations=1), 2).missed
+    assert displaced(implicit("pn-pcg"), 1).missed == []
+    missed = displaced(implicit("pn-pcg", iterations=1), 2).missed
     assert len(missed) == 2
     assert "the cap" in missed[0]
 
 
 def test_rise_is_the_largest_of_a_step():
-    course = Course(np.zeros((1, 2)), np.array([4.0, 2.0, 3.0, 1.0]), [])
+    course = EnergyHistory(np.zeros((1, 2)), np.array([4.0, 2.0, 3.0, 1.0]), [])
     assert rise(course) == 0.25
     assert rise(course._replace(energies=np.array([4.0, 3.0, 1.0]))) == -0.25
 
@@ -37,8 +44,8 @@ def test_methods_that_end_elsewhere_or_miss_are_told(monkeypatch):
     ways = {"pn-pcg": 0.0, "hot": 0.0, "admm": 0.5}
     monkeypatch.setattr(module, "METHODS", ways)
     monkeypatch.setattr(module, "implicit", lambda method: method)
-    course = Course(np.zeros((3, 2)), np.ones(2), [])
-    monkeypatch.setattr(module, "moved", lambda method, steps: course._replace(
+    course = EnergyHistory(np.zeros((3, 2)), np.ones(2), [])
+    monkeypatch.setattr(module, "displaced", lambda method, steps: course._replace(
         x=ways[method] * module.DX * np.eye(3, 2), missed=["capped"] if ways[method] else []))
     found = Records()
     record_minimisers(found, 1, course)

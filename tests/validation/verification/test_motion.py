@@ -10,10 +10,10 @@ from mpm_ref.body import Body, particles_at
 from mpm_ref.core.spline import STENCILS, base_of
 from mpm_ref.materials import FixedCorotated, NoFlow
 from mpm_ref.scene import build
+from validation.common.scenes import catalogue_scene, mean, threads_for
 from validation.common.settings import record_settings
 from validation.nclaw.final_states import digest
 from validation.verification import block, bowl, collapse, column, dam_break, disks, rings, rotation
-from validation.verification.scenes import mean, shipped, threads_for
 from validation.verification.symplectic import allowed_gain, travelled
 
 
@@ -84,7 +84,7 @@ def test_loss_is_the_largest_of_all_steps():
 # collisions
 
 def test_disks_touch_when_they_are_two_radii_apart():
-    scene, t = shipped("colliding_disks"), disks.touching_time()
+    scene, t = catalogue_scene("colliding_disks"), disks.touching_time()
     a, b = (np.array(body.shape.center) + t * np.array(body.velocity.linear)
             for body in scene.body)
     assert np.linalg.norm(b - a) == pytest.approx(2.0 * scene.body[0].shape.radius)

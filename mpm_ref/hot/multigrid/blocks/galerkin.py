@@ -16,32 +16,32 @@ import scipy.sparse as sp
 
 from ....core.jit import CHUNKS, chunk, kernel, parallel, prange
 from ....core.tensor import mat, mlin, put_mat, transpose
-from .sparse import Blocks, find
+from .sparse import BlockMatrix, find
 
 
 class Stencil(NamedTuple):
-    """Places of offsets -reach .. reach of every axis in a block of offsets, last axis fastest.
+    """Places of offsets -radius .. radius of every axis in a block of offsets, last axis fastest.
 
     The place of offset o is centre + sum_a o_a stride_a, so that it is linear in the nodes' keys
     sum_a index_a stride_a: place = centre + key_j - key_i.
     """
 
-    width: int                # 2 reach + 1
+    width: int                # 2 radius + 1
     centre: int
     stride: np.ndarray        # (d,)
 
 
-def stencil(reach, d):
-    """Stencil of offsets up to `reach` in d dimensions."""
-    width = 2 * reach + 1
+def stencil(radius, d):
+    """Stencil of offsets up to `radius` in d dimensions."""
+    width = 2 * radius + 1
     return Stencil(width, width**d // 2, width ** np.arange(d - 1, -1, -1, dtype=np.int64))
 
 
-def coarse_reach(reach, w):
-    """Reach of the coarse matrix for taps w over -t .. t: |2 c' - 2 c| <= reach + 2 t (HOT-nnz: 2
+def coarse_radius(radius, w):
+    """Reach of the coarse matrix for taps w over -t .. t: |2 c' - 2 c| <= radius + 2 t (HOT-nnz: 2
     stays 2 for linear embedding, t = 1).
     """
-    return (reach + len(w) - 1) // 2
+    return (radius + len(w) - 1) // 2
 
 
 class Rows(NamedTuple):
@@ -55,8 +55,8 @@ class Rows(NamedTuple):
     skip: int                 # places below belong to c' < c alone
 
 
-class Plan(NamedTuple):
-    """How S becomes a row of the coarse matrix."""
+class ContractionPlan(NamedTuple):
+    """The contraction of S to a row of the coarse matrix."""
 
     taps: np.ndarray          # N(o/2) of one axis
     fine: int                 # width of S
@@ -165,17 +165,17 @@ def _fill(box, place, offsets, start, column, bounds):
                 to += 1
 
 
-def pattern(index, reach):
-    """(start, column) of the matrix that couples all nodes within `reach` of each other, for nodes
+def pattern(index, radius):
+    """(start, column) of the matrix that couples all nodes within `radius` of each other, for nodes
     index (n, d) in lexicographic order.
     """
-    low = index.min(axis=0) - reach
-    shape = index.max(axis=0) + reach + 1 - low
+    low = index.min(axis=0) - radius
+    shape = index.max(axis=0) + radius + 1 - low
     stride = np.append(np.cumprod(shape[:0:-1])[::-1], 1)
     place = (index - low) @ stride
     box = np.full(np.prod(shape), -1, dtype=np.int32)
     box[place] = np.arange(len(index), dtype=np.int32)
-    one = np.arange(-reach, reach + 1)
+    one = np.arange(-radius, radius + 1)
     axes = np.meshgrid(*[one] * index.shape[1], indexing="ij")
     offsets = sum(a * s for a, s in zip(axes, stride)).reshape(-1)
     start = np.zeros(len(index) + 1, dtype=np.int32)
@@ -186,19 +186,20 @@ def pattern(index, reach):
     return start, column
 
 
-def galerkin(A, index, to, coarse, reach, w):
-    """bsr_array P^T A P of Blocks A for nodes index (n, d) that hang on nodes coarse (m, d) by the
-    `Transfer` to, whose weights are products of the taps w of the axes; A couples up to `reach`.
+def galerkin(A, index, to, coarse, radius, w):
+    """bsr_array P^T A P of a BlockMatrix A for nodes index (n, d) that hang on nodes coarse (m, d)
+    by the `Transfer` to, whose weights are products of the taps w of the axes; A couples up to
+    `radius`.
     """
     d, t = index.shape[1], len(w) // 2
-    wide, narrow = stencil(reach + t, d), stencil(coarse_reach(reach, w), d)
+    wide, narrow = stencil(radius + t, d), stencil(coarse_radius(radius, w), d)
     origin = 2 * coarse @ wide.stride - wide.centre
-    rows = Rows(*to.down, index @ wide.stride, origin, int(reach * wide.stride[0]))
+    rows = Rows(*to.down, index @ wide.stride, origin, int(radius * wide.stride[0]))
     start, column = pattern(coarse, narrow.width // 2)
-    C = Blocks(start, column, np.empty((len(column), d, d)), A.like)
+    C = BlockMatrix(start, column, np.empty((len(column), d, d)), A.like)
     scratch = np.empty((2, CHUNKS, wide.width**d * d * d))
     key = coarse @ narrow.stride
-    plan = Plan(np.array(w), wide.width, narrow.width, narrow.centre, key)
+    plan = ContractionPlan(np.array(w), wide.width, narrow.width, narrow.centre, key)
     _all_coarse_rows(A, rows, C, plan, scratch)
     size = len(coarse) * d
     return sp.bsr_array((C.data, C.column, C.start), shape=(size, size))

@@ -1,4 +1,4 @@
-"""The V-cycle on block kernels: the tested twin of the path on SciPy matrices in `multigrid`."""
+"""The V-cycle on block kernels: the tested twin of the one on SciPy matrices in `multigrid`."""
 
 from functools import partial
 from itertools import zip_longest
@@ -7,20 +7,20 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from ..coarsest import CAP, by_pcg, of_coarsest, size
+from ..coarsest import CAP, coarsest_solver, energy_norm, solve_by_cg
 from ..embedding import taps
 from ..options import DTYPES
-from ..projectors import coarse_nodes, given_nodes, onto_range
+from ..projectors import coarse_nodes, onto_range, weights_onto
 from ..smoothers import POLYNOMIAL, largest_eigenvalue, times
 from . import coarsest
-from .galerkin import coarse_reach, galerkin
+from .galerkin import coarse_radius, galerkin
 from .product import planes_of, product
-from .sparse import SERIAL, Blocks, blocks_of, diagonal, inverse_blocks, reach_of
+from .sparse import SERIAL, BlockMatrix, blocks_of, coupling_radius, diagonal, inverse_blocks
 from .sweep import Sweep, correct, residual, split, sweep
 from .transfer import Transfer, prolong, restrict, transfer
 
 
-class Level(NamedTuple):
+class BlockLevel(NamedTuple):
     """One level of n nodes in d dimensions."""
 
     A: sp.bsr_array            # (n d, n d)  matrix [kg]
@@ -28,46 +28,46 @@ class Level(NamedTuple):
     B: np.ndarray              # (n, d, d)   projectors onto the free directions
     D: np.ndarray              # (n, d, d)   diagonal blocks of A [kg]
     D_inv: np.ndarray          # (n, d, d)   their pseudo-inverses [1/kg]
-    reach: int                 # nodes over which A couples
-    blocks: Blocks             # the arrays of A
+    radius: int                # nodes over which A couples, along an axis
+    blocks: BlockMatrix        # the arrays of A
     transfer: Transfer | None  # to the next level; None on the coarsest
 
 
 def build(A, index, levels, kernel):
-    """Levels, finest first, as `multigrid.build`."""
+    """Levels, finest first, as `multigrid.hierarchy.build`."""
     blocks, w = blocks_of(A), taps(kernel)
-    D, reach = diagonal(blocks), reach_of(blocks, index)
+    D, radius = diagonal(blocks), coupling_radius(blocks, index)
     B, built = onto_range(D), []
     for _ in range(levels - 1):
         embedding, B_coarse = coarse_nodes(index, B, kernel)
         if not 0 < len(embedding.index) < len(index):
             break
         to = transfer(embedding.W, B)
-        built.append(Level(A, index, B, D, inverse_blocks(D, B), reach, blocks, to))
-        A = galerkin(blocks, index, to, embedding.index, reach, w)
-        index, B, reach, blocks = embedding.index, B_coarse, coarse_reach(reach, w), blocks_of(A)
+        built.append(BlockLevel(A, index, B, D, inverse_blocks(D, B), radius, blocks, to))
+        A = galerkin(blocks, index, to, embedding.index, radius, w)
+        index, B, radius, blocks = embedding.index, B_coarse, coarse_radius(radius, w), blocks_of(A)
         D = diagonal(blocks)
-    return [*built, Level(A, index, B, D, inverse_blocks(D, B), reach, blocks, None)]
+    return [*built, BlockLevel(A, index, B, D, inverse_blocks(D, B), radius, blocks, None)]
 
 
-def build_given(matrices):
-    """Levels of matrices and node indices, as `multigrid.build_given`."""
+def build_from_matrices(matrices):
+    """Levels of matrices and node indices, as `multigrid.build_from_matrices`."""
     built = []
     for (A, index), coarser in zip_longest(matrices, matrices[1:]):
         blocks = blocks_of(A)
         D = diagonal(blocks)
         B = onto_range(D)
-        to = transfer(given_nodes(index, B, coarser[1]), B) if coarser else None
-        reach = reach_of(blocks, index)
-        built.append(Level(A, index, B, D, inverse_blocks(D, B), reach, blocks, to))
+        to = transfer(weights_onto(index, B, coarser[1]), B) if coarser else None
+        radius = coupling_radius(blocks, index)
+        built.append(BlockLevel(A, index, B, D, inverse_blocks(D, B), radius, blocks, to))
     return built
 
 
-class GaussSeidel:
+class BlockGaussSeidel:
     """Sweeps before and after the coarse correction, by kernels that keep their products."""
 
     def __init__(self, level, dtype=float):
-        self.split = split(level.blocks, level.D_inv, level.index, level.reach, dtype)
+        self.split = split(level.blocks, level.D_inv, level.index, level.radius, dtype)
 
     def __call__(self, b):
         """The iterate of b (n, d) after one sweep from zero."""
@@ -95,7 +95,7 @@ class GaussSeidel:
             sweep(self.split, b, self.state)
 
 
-class Polynomial:
+class BlockPolynomial:
     """Jacobi or Chebyshev smoothing with products by kernel."""
 
     def __init__(self, level, word, dtype=float):
@@ -124,17 +124,17 @@ def smoother(level, choices):
     """Smoother of a level by the words of `Choices`."""
     dtype = DTYPES[choices.precision]
     if choices.smoother == "gauss-seidel":
-        return GaussSeidel(level, dtype)
-    return Polynomial(level, choices.smoother, dtype)
+        return BlockGaussSeidel(level, dtype)
+    return BlockPolynomial(level, choices.smoother, dtype)
 
 
-class Hierarchy:
-    """Levels on block arrays and the V-cycle over them; see `multigrid.hierarchy`."""
+class BlockHierarchy:
+    """Levels on block arrays and the V-cycle over them; see `multigrid.hierarchy.hierarchy`."""
 
     def __init__(self, levels, choices):
         self.levels, self.choices = levels, choices
         self.smoothers = [smoother(level, choices) for level in self.levels[:-1]]
-        self.direct, self.D_inv = of_coarsest(levels[-1], choices)
+        self.direct, self.D_inv = coarsest_solver(levels[-1], choices)
         self.coarse = None if self.direct else planes_of(levels[-1].blocks)
         self.iterations = 0           # of the coarsest CG, over all cycles
 
@@ -157,11 +157,11 @@ class Hierarchy:
         if self.direct:
             return self.direct(b)
         of = b if self.choices.stop == "residual" else self._restricted(load)
-        enough = self.choices.tolerance * size(of, self.D_inv)
+        enough = self.choices.tolerance * energy_norm(of, self.D_inv)
         if len(b) < SERIAL:
             u, k = coarsest.conjugate_gradients(self.coarse, self.D_inv, b, enough, CAP)
         else:
-            u, k = by_pcg(partial(product, self.coarse), self.D_inv, b, enough)
+            u, k = solve_by_cg(partial(product, self.coarse), self.D_inv, b, enough)
         self.iterations += k
         return u
 

@@ -21,11 +21,11 @@ class Planes(NamedTuple):
     start: np.ndarray      # (n + 1,)     int32
     column: np.ndarray     # (k,)         int32
     data: np.ndarray       # (d, d, k)    in double or single precision
-    like: np.ndarray       # as in Blocks
+    like: np.ndarray       # as in BlockMatrix
 
 
 def planes_of(A, dtype=float):
-    """Planes of Blocks A, entries in the given precision."""
+    """Planes of a BlockMatrix A, entries in the given precision."""
     data = np.empty((*A.data.shape[1:], len(A.column)), dtype)
     _spread_all(A, data)
     return Planes(A.start, A.column, data, A.like)

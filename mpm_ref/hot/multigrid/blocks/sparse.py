@@ -6,13 +6,13 @@ import numpy as np
 
 from ....core.jit import CHUNKS, chunk, kernel, parallel, prange
 from ....core.tensor import cofactor, det, mat, mlin, put_mat, trace, transpose
-from ..projectors import inverses, surely_regular
+from ..projectors import inverses, is_regular
 
-KNOWN = ((2, 2), (3, 3))     # sizes of blocks
-SERIAL = 4000     # nodes below which starting threads costs more than they save
+BLOCK_SIZES = ((2, 2), (3, 3))
+SERIAL = 4000                       # nodes below which starting threads costs more than they save
 
 
-class Blocks(NamedTuple):
+class BlockMatrix(NamedTuple):
     """Rows of blocks, as in scipy.sparse.bsr_array: row i is data[start[i] : start[i + 1]]."""
 
     start: np.ndarray      # (n + 1,)     int32
@@ -21,20 +21,20 @@ class Blocks(NamedTuple):
     like: np.ndarray       # no elements, d axes: the dimension, where kernels need to know it
 
 
-def no_nodes(d):
+def dimension_tag(d):
     """An array of d axes and no elements, to tell kernels the dimension: its shape is a d-tuple."""
     return np.empty((0,) * d)
 
 
 def blocks_of(A):
-    """Blocks that share the arrays of a bsr_array A, whose indices are sorted.
+    """BlockMatrix that shares the arrays of a bsr_array A, whose indices are sorted.
 
     Raises ValueError unless they are 2 x 2 or 3 x 3: kernels would write past the end of arrays.
     """
-    if A.blocksize not in KNOWN:
+    if A.blocksize not in BLOCK_SIZES:
         raise ValueError(f"matrix in blocks of {A.blocksize}: expected (2, 2) or (3, 3), or "
-                         "path = 'scipy'")
-    return Blocks(A.indptr, A.indices, A.data, no_nodes(A.blocksize[0]))
+                         "implementation = 'scipy'")
+    return BlockMatrix(A.indptr, A.indices, A.data, dimension_tag(A.blocksize[0]))
 
 
 @kernel
@@ -69,26 +69,26 @@ def diagonal(A):
 
 
 @kernel
-def _reach(A, index, bounds):
-    reach = 0
+def _coupling_radius(A, index, bounds):
+    radius = 0
     for i in range(bounds[0], bounds[1]):
         for e in range(A.start[i], A.start[i + 1]):
             for a in range(index.shape[1]):
-                reach = max(reach, abs(index[A.column[e], a] - index[i, a]))
-    return reach
+                radius = max(radius, abs(index[A.column[e], a] - index[i, a]))
+    return radius
 
 
 @parallel
-def _reaches(A, index, reach):
+def _coupling_radii(A, index, radius):
     for c in prange(CHUNKS):
-        reach[c] = _reach(A, index, chunk(c, len(index)))
+        radius[c] = _coupling_radius(A, index, chunk(c, len(index)))
 
 
-def reach_of(A, index):
+def coupling_radius(A, index):
     """Largest distance along an axis, in nodes, between two nodes that A couples."""
-    reach = np.zeros(CHUNKS, dtype=np.int64)
-    _reaches(A, index, reach)
-    return int(reach.max())
+    radius = np.zeros(CHUNKS, dtype=np.int64)
+    _coupling_radii(A, index, radius)
+    return int(radius.max())
 
 
 # inverses of diagonal blocks: by cofactors where a node moves freely, else as `projectors` do
@@ -111,6 +111,6 @@ def inverse_blocks(D, B):
     """
     out = np.empty_like(D)
     _invert(D, out, (0,) * D.shape[1])
-    other = np.flatnonzero(~surely_regular(D))
+    other = np.flatnonzero(~is_regular(D))
     out[other] = inverses(D[other], B[other])
     return out

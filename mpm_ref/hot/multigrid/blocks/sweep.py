@@ -22,8 +22,8 @@ from .product import Planes, put_entries, row_times
 from .sparse import SERIAL
 
 
-class Order(NamedTuple):
-    """How nodes are swept."""
+class SweepOrder(NamedTuple):
+    """The order in which nodes are swept."""
 
     node: np.ndarray       # (n,)         in the order of the sweep
     slab: np.ndarray       # (s + 1,)     slab k is node[slab[k] : slab[k + 1]]
@@ -34,30 +34,30 @@ class Order(NamedTuple):
 class Split(NamedTuple):
     """A = L + D + U. Row k of L is that of order.node[k], row k of U that of node[n - 1 - k]."""
 
-    order: Order
+    order: SweepOrder
     L: Planes
     U: Planes
 
 
-def split(A, D_inv, index, reach, dtype=float):
-    """Split of Blocks A for nodes with world indices index (n, d), coupled over `reach` nodes, with
-    L and U in the given precision.
+def split(A, D_inv, index, radius, dtype=float):
+    """Split of a BlockMatrix A for nodes with world indices index (n, d), coupled over `radius`
+    nodes, with L and U in the given precision.
     """
-    width = max(SLAB, reach)
+    width = max(SLAB, radius)
     node = coloured(index, width).astype(np.int32)
     place = np.empty_like(node)
     place[node] = np.arange(len(node), dtype=np.int32)
     slab = index[node, 0] // width
     first = np.flatnonzero(np.diff(slab, prepend=slab[:1] - 1))
     second = int(np.searchsorted(slab[first] % 2, 1))
-    order = Order(node, np.append(first, len(node)).astype(np.int32), second, D_inv)
+    order = SweepOrder(node, np.append(first, len(node)).astype(np.int32), second, D_inv)
     L = _half(A, node, place, dtype)
     U = _half(A, node[::-1].copy(), len(node) - 1 - place, dtype)
     return Split(order, L, U)
 
 
 def _half(A, order, place, dtype):
-    """Blocks of A whose column comes before their row in `order`, in that order of rows."""
+    """The blocks of A whose column comes before their row in `order`, in that order of rows."""
     n = len(order)
     start = np.zeros(n + 1, dtype=np.int32)
     _count_all(A, order, place, start)

@@ -7,10 +7,10 @@ import scipy.sparse as sp
 
 from ....core.jit import CHUNKS, chunk, kernel, parallel, prange
 from ....core.tensor import fill, lin, mat, mv, put_vec, vec
-from .sparse import SERIAL, no_nodes
+from .sparse import SERIAL, dimension_tag
 
 
-class Weights(NamedTuple):
+class NodeWeights(NamedTuple):
     """Rows of scalar weights, as in scipy.sparse.csr_array."""
 
     start: np.ndarray      # (n + 1,)
@@ -21,11 +21,11 @@ class Weights(NamedTuple):
 class Transfer(NamedTuple):
     """v_i = B_i sum_c W_ic v_c and its transpose; only partly held nodes need their projector."""
 
-    up: Weights               # of fine nodes
-    down: Weights             # of coarse nodes
+    up: NodeWeights           # of fine nodes
+    down: NodeWeights         # of coarse nodes
     partly: np.ndarray        # (k,)       fine nodes held in some directions
     B: np.ndarray             # (k, d, d)  their projectors
-    like: np.ndarray          # as in Blocks
+    like: np.ndarray          # as in BlockMatrix
 
 
 def transfer(W, B):
@@ -33,8 +33,8 @@ def transfer(W, B):
     R = sp.csr_array(W.T)
     unit = (np.eye(B.shape[1]) == B).all(axis=(1, 2))
     partly = np.flatnonzero(~unit & B.any(axis=(1, 2)))
-    weights = (Weights(w.indptr, w.indices, w.data) for w in (W, R))
-    return Transfer(*weights, partly, B[partly], no_nodes(B.shape[1]))
+    weights = (NodeWeights(w.indptr, w.indices, w.data) for w in (W, R))
+    return Transfer(*weights, partly, B[partly], dimension_tag(B.shape[1]))
 
 
 @kernel

@@ -10,15 +10,24 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
-from ..graph import Graph, near
-from ..history import HISTORY, Box, Scales, begun, expected, of_edges, of_points
+from ..features import (
+    HISTORY,
+    Graph,
+    MotionScales,
+    WallBox,
+    edge_features,
+    neighbour_graph,
+    point_features,
+    straight_flight,
+    target_answer,
+)
 
 
-class Run(NamedTuple):
-    """A run that is learned from, HISTORY frames of straight flight before it."""
+class TrainingRun(NamedTuple):
+    """A run to learn from, with HISTORY frames of straight flight before it."""
 
     frames: np.ndarray      # (HISTORY + k + 1, n, d) positions [m]
-    box: Box
+    box: WallBox
 
     @property
     def count(self):
@@ -26,8 +35,8 @@ class Run(NamedTuple):
         return len(self.frames) - HISTORY - 1
 
 
-class Example(NamedTuple):
-    """What is told, and what is expected; tensors in single precision."""
+class TrainingExample(NamedTuple):
+    """The features and the expected answer of a frame; tensors in single precision."""
 
     points: torch.Tensor
     edges: torch.Tensor
@@ -35,8 +44,9 @@ class Example(NamedTuple):
     answer: torch.Tensor
 
 
-def run_of(x, v, dt, box):
-    """`Run` of positions x (k + 1, n, d) [m], dt [s] apart, and velocities at the start v [m/s].
+def training_run(x, v, dt, box):
+    """Return the `TrainingRun` of positions x (k + 1, n, d) [m], dt [s] apart, and velocities v
+    [m/s] at the start.
 
     Raises ValueError for fewer than two frames, and for numbers that are not finite.
     """
@@ -45,19 +55,20 @@ def run_of(x, v, dt, box):
     if not (np.isfinite(x).all() and np.isfinite(v).all()):
         raise ValueError("a run with positions or velocities that are not finite numbers: learn "
                          "from another one")
-    return Run(np.concatenate([begun(x[0], v, dt)[:-1], x]), box)
+    return TrainingRun(np.concatenate([straight_flight(x[0], v, dt)[:-1], x]), box)
 
 
 def scales_of(runs, noise):
-    """`Scales` of the velocities and accelerations that are expected in some runs, and of noise."""
+    """Return the `MotionScales` of velocities and accelerations in some runs, and of noise."""
     u = [np.diff(run.frames[HISTORY - 1:], axis=0) for run in runs]
     d = u[0].shape[-1]
     found = [np.concatenate([b.reshape(-1, d) for b in a])
              for a in (u, [np.diff(one, axis=0) for one in u])]
-    return Scales(*(b for a in found for b in (a.mean(axis=0), np.hypot(a.std(axis=0), noise))))
+    return MotionScales(*(b for a in found
+                          for b in (a.mean(axis=0), np.hypot(a.std(axis=0), noise))))
 
 
-def walk(draws, shape, noise):
+def random_walk(draws, shape, noise):
     """Errors of positions (HISTORY + 1, n, d), the first ones zero; the last velocity's deviation
     is `noise`. shape: n, d; draws: a `numpy.random.Generator`.
     """
@@ -66,14 +77,17 @@ def walk(draws, shape, noise):
 
 
 def example(run, k, reading, noise):
-    """`Example` of frame k of a `Run`, counted from 0; noise (HISTORY + 1, n, d) [m]."""
+    """Return the `TrainingExample` of frame k of a `TrainingRun`, counted from 0.
+
+    noise (HISTORY + 1, n, d) [m] is added to the positions.
+    """
     frames = run.frames[k:k + HISTORY + 1] + noise
     x, after = frames[-1], run.frames[k + HISTORY + 1] + noise[-1]
-    graph = near(x, reading.radius)
-    return Example(single(of_points(frames, run.box, reading)),
-                   single(of_edges(x, graph, reading.radius)),
+    graph = neighbour_graph(x, reading.radius)
+    return TrainingExample(single(point_features(frames, run.box, reading)),
+                   single(edge_features(x, graph, reading.radius)),
                    Graph(*map(torch.from_numpy, graph)),
-                   single(expected(frames, after, reading.scales)))
+                   single(target_answer(frames, after, reading.scales)))
 
 
 def single(a):

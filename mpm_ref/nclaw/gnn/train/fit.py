@@ -6,24 +6,68 @@ checkpoint with the numbers of one that was not, on the same machine with the sa
 """
 
 import hashlib
-import io
 import json
 from copy import deepcopy
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
 import torch
 
-from ....store import weights_file
-from ....training import Cost, Meter, train_epochs
-from ...train.fit import Diverged
-from ..graph import Graph, Lost
-from ..history import HISTORY, Reading
+from ....training import train_epochs
+from ...train.session import Diverged, TrainingSession
+from ..features import HISTORY, FeatureSettings, Graph, SimulatorFailure
 from ..simulator import Simulator, free_run
-from .examples import example, scales_of, single, walk
-from .network import GraphNetwork, exported
+from .examples import example, random_walk, scales_of, single
+from .network import GraphNetwork, export_weights
+
+
+@dataclass(frozen=True)
+class GraphRecipe:
+    """Each step of Adam is shown a frame of a run, `batch` times at random, with noise on what came
+    before; its loss is that of answers, summed over axes, the mean over points.
+
+    Rates fall from `first_rate` to `last_rate`, evenly in their logarithm. [GNS] has up to 20
+    million steps with 10 blocks 128 wide, batches of 2, rates of 1e-4 to 1e-6, and deviations of
+    noise of 3e-4 m per frame in its text, 6.7e-4 in its code. Every `check` steps the network runs
+    freely along the first `checked` of the runs, and the weights with the least error are kept.
+    """
+
+    steps: int = 20_000_000
+    width: int = 128
+    blocks: int = 10
+    batch: int = 2
+    noise: float = 3e-4         # deviation of the last velocity [m per frame]
+    radius: float = 0.085       # [m]: at rest 15 neighbours of a point in NCLaw's cubes, on average
+    first_rate: float = 1e-4
+    last_rate: float = 1e-6
+    check: int = 1000
+    checked: int = 1
+    seed: int = 0
+
+    def __post_init__(self):
+        for name in ("steps", "width", "blocks", "batch", "check", "checked"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} = {getattr(self, name)}: expected at least 1")
+        for name in ("radius", "first_rate", "last_rate"):
+            if not 0.0 < getattr(self, name) < float("inf"):
+                raise ValueError(f"{name} = {getattr(self, name)}: expected a positive number")
+        if not 0.0 <= self.noise < float("inf"):
+            raise ValueError(f"noise = {self.noise}: expected a number >= 0")
+        if self.steps % self.check:
+            raise ValueError(f"steps = {self.steps}, check = {self.check}: expected a multiple of "
+                             "it, so that the last step is checked")
+
+    @property
+    def rounds(self):
+        """How often the network is checked."""
+        return self.steps // self.check
+
+    def rate(self, step):
+        """The rate of a step, counted from 0."""
+        return self.first_rate * (self.last_rate / self.first_rate) ** (step / self.steps)
+
 
 SAVE = 1            # rounds between checkpoints
 FORMAT = 1          # of checkpoints
@@ -36,24 +80,25 @@ class Round(NamedTuple):
     error: float        # mean squared, of free runs [m^2]; infinite where they break down
 
 
-class GraphSession:
+class GraphSession(TrainingSession):
     """Network and optimiser of a training under way."""
 
+    entry = Round
+
     def __init__(self, recipe, runs, dt):
-        self.meter = Meter()
+        super().__init__()
         self.recipe, self.runs = recipe, runs
-        self.reading = Reading(recipe.radius, dt, scales_of(runs, recipe.noise))
-        self.of = sha256(runs, dt)
+        self.reading = FeatureSettings(recipe.radius, dt, scales_of(runs, recipe.noise))
+        self.digest = data_digest(runs, dt)
         torch.manual_seed(recipe.seed)
         self.network = GraphNetwork(runs[0].frames.shape[-1], recipe.width, recipe.blocks)
         self.optimiser = torch.optim.Adam(self.network.parameters(), lr=recipe.first_rate)
-        self.best = copied(self.network)
-        self.history = []
+        self.best = copy_state(self.network)
 
     @property
-    def named(self):
-        """The training's settings and on what it is, as one line of text."""
-        return json.dumps({"format": FORMAT, **asdict(self.recipe), "data": self.of})
+    def settings(self):
+        """Return the settings of the training and the digest of its data, as one line of text."""
+        return json.dumps({"format": FORMAT, **asdict(self.recipe), "data": self.digest})
 
     @property
     def picked(self):
@@ -66,7 +111,7 @@ class GraphSession:
         loss = np.mean([self.step(done + k) for k in range(self.recipe.check)])
         self.history.append(Round(float(loss), self.error()))
         if self.picked == len(self.history) - 1:
-            self.best = copied(self.network)
+            self.best = copy_state(self.network)
 
     def step(self, number):
         """One step of the optimiser; returns its loss."""
@@ -86,7 +131,7 @@ class GraphSession:
     def loss(self, draws):
         """The loss of a random frame with noise on it."""
         run = self.runs[draws.integers(len(self.runs))]
-        noise = walk(draws, run.frames.shape[1:], self.recipe.noise)
+        noise = random_walk(draws, run.frames.shape[1:], self.recipe.noise)
         shown = example(run, int(draws.integers(run.count)), self.reading, noise)
         found = self.network(shown.points, shown.edges, shown.graph)
         return ((found - shown.answer) ** 2).sum(dim=1).mean()
@@ -104,7 +149,7 @@ class GraphSession:
         try:
             error = np.mean([np.mean((x - y) ** 2) for x, y in
                              zip(islice(found, len(true)), true, strict=True)])
-        except Lost:
+        except SimulatorFailure:
             return np.inf
         return error if np.isfinite(error) else np.inf
 
@@ -124,35 +169,26 @@ class GraphSession:
             raise Diverged(f"all {len(self.history)} free runs broke down; try more steps")
         picked = deepcopy(self.network)
         picked.load_state_dict(self.best)
-        return Simulator(exported(picked), self.reading, about)
+        return Simulator(export_weights(picked), self.reading, about)
 
-    def save(self, path):
-        """Checkpoint, whole or not at all."""
-        content = io.BytesIO()
-        torch.save({"training": self.named, "history": [tuple(one) for one in self.history],
-                    "network": self.network.state_dict(), "best": self.best,
-                    "optimiser": self.optimiser.state_dict(), "cost": tuple(self.meter.total)},
-                   content)
-        weights_file.write_sealed(path, content.getvalue())
+    def states(self):
+        """Return the states of the network, of the one that is picked so far, of the optimiser."""
+        return {"network": self.network.state_dict(), "best": self.best,
+                "optimiser": self.optimiser.state_dict()}
 
-    def load(self, path):
-        """Go on from a checkpoint. Raises ValueError where it is damaged, or of another training or
-        other data.
-        """
-        kept = torch.load(io.BytesIO(weights_file.read_sealed(path)), weights_only=True)
-        weights_file.require_same_training(path, kept["training"], self.named)
-        self.network.load_state_dict(kept["network"])
-        self.optimiser.load_state_dict(kept["optimiser"])
-        self.best, self.history = kept["best"], [Round(*row) for row in kept["history"]]
-        self.meter.before = Cost(*kept["cost"])
+    def restore(self, stored):
+        """Put these states back."""
+        self.network.load_state_dict(stored["network"])
+        self.optimiser.load_state_dict(stored["optimiser"])
+        self.best = stored["best"]
 
 
-def copied(network):
+def copy_state(network):
     """The weights of a network as they are now, by name."""
     return {name: a.clone() for name, a in network.state_dict().items()}
 
 
-def sha256(runs, dt):
+def data_digest(runs, dt):
     """Digest of all that is trained on."""
     digest = hashlib.sha256(repr(dt).encode())
     for run in runs:
@@ -161,7 +197,7 @@ def sha256(runs, dt):
     return digest.hexdigest()
 
 
-def train(recipe, runs, dt, checkpoint=None, on_round=None):
+def train_graph(recipe, runs, dt, checkpoint=None, on_round=None):
     """A `GraphSession`, trained on `Run`s of frames dt [s] apart.
 
     checkpoint: a file to go on from and to save to; on_round(history) is called after each round.

@@ -11,11 +11,11 @@ import torch
 from torch import nn
 
 from .. import network
-from ..history import HISTORY
+from ..features import HISTORY
 from ..weights import LAYERS
 
 
-class Perceptron(nn.Module):
+class NormedPerceptron(nn.Module):
     """Affine maps with max(z, 0) between them, then a normalisation unless `norm` is False."""
 
     def __init__(self, inputs, width, outputs, norm=True):
@@ -44,8 +44,8 @@ class Block(nn.Module):
 
     def __init__(self, width):
         super().__init__()
-        self.edges = Perceptron(3 * width, width, width)
-        self.points = Perceptron(2 * width, width, width)
+        self.edges = NormedPerceptron(3 * width, width, width)
+        self.points = NormedPerceptron(2 * width, width, width)
 
     def forward(self, v, e, senders, receivers):
         """v (n, width) and e (k, width) after it."""
@@ -64,10 +64,10 @@ class GraphNetwork(nn.Module):
 
     def __init__(self, dim=3, width=128, blocks=10):
         super().__init__()
-        self.points = Perceptron((HISTORY + 2) * dim, width, width)
-        self.edges = Perceptron(dim + 1, width, width)
+        self.points = NormedPerceptron((HISTORY + 2) * dim, width, width)
+        self.edges = NormedPerceptron(dim + 1, width, width)
         self.blocks = nn.ModuleList([Block(width) for _ in range(blocks)])
-        self.answer = Perceptron(width, width, dim, norm=False)
+        self.answer = NormedPerceptron(width, width, dim, norm=False)
 
     def forward(self, points, edges, graph):
         """The answers; graph: `Graph` of tensors."""
@@ -77,17 +77,19 @@ class GraphNetwork(nn.Module):
         return self.answer(v)
 
 
-def exported(net):
-    """`gnn.network.Network` of a `GraphNetwork`, in doubles."""
-    blocks = tuple((plain(block.edges), plain(block.points)) for block in net.blocks)
-    return network.Network(plain(net.points), plain(net.edges), blocks, plain(net.answer))
+def export_weights(net):
+    """`gnn.network.GraphWeights` of a `GraphNetwork`, in doubles."""
+    blocks = tuple((export_perceptron(block.edges), export_perceptron(block.points))
+                   for block in net.blocks)
+    return network.GraphWeights(export_perceptron(net.points), export_perceptron(net.edges),
+                                blocks, export_perceptron(net.answer))
 
 
-def plain(perceptron):
-    """`gnn.network.Perceptron` of a `Perceptron`."""
+def export_perceptron(perceptron):
+    """`gnn.network.PerceptronWeights` of a `NormedPerceptron`."""
     layers = tuple((double(layer.weight).T.copy(), double(layer.bias))
                    for layer in perceptron.layers)
-    return network.Perceptron(layers, tuple(map(double, perceptron.norm.parameters())))
+    return network.PerceptronWeights(layers, tuple(map(double, perceptron.norm.parameters())))
 
 
 def double(parameter):

@@ -8,7 +8,7 @@ from mpm_ref.core.grid import Grid
 from mpm_ref.core.levelset import half_space, sphere
 from mpm_ref.core.motion import Motion, Steady
 from mpm_ref.core.state import NONE
-from mpm_ref.hot.constraints import BEARS, FREE, HOLDS, LETS, Restraint
+from mpm_ref.hot.constraints import FIXED, FREE, PLANE, RELEASES, ActiveSet
 from mpm_ref.hot.system import free_part, unknowns_of
 
 DX = 0.5
@@ -27,8 +27,8 @@ def restrained(colliders, d=2, u=None, seed=0):
     """Restraint, unknowns under it, for a grid whose nodes move with u (or as they do)."""
     grid = grid_of(d, np.random.default_rng(seed))
     free = unknowns_of(grid)
-    restraint = Restraint(Conditions(tuple(colliders)), grid, free, 0.1, 0.1)
-    return restraint, restraint.begin(free, free.v if u is None else u)
+    active_set = ActiveSet(Conditions(tuple(colliders)), grid, free, 0.1, 0.1)
+    return active_set, active_set.initial_unknowns(free, free.v if u is None else u)
 
 
 def inside(unknowns, distance):
@@ -53,10 +53,10 @@ def test_numbers_index_mass_velocity(d, rng):
 def test_sticky_nodes_take_the_velocity_of_the_collider(d):
     motion = Motion(Steady((0.3, -0.2, 0.1)[:d]))
     wall = Collider(half_space((0.0,) * d, (1.0, *(0.0,) * (d - 1))), "sticky", motion=motion)
-    restraint, q = restrained([wall], d)
+    active_set, q = restrained([wall], d)
     held = inside(q, lambda x: x[:, 0] - 0.03)
     assert held.any()
-    assert (restraint.role == HOLDS).all()
+    assert (active_set.role == FIXED).all()
     assert not q.B[held].any()
     assert np.allclose((q.v + q.dv0)[held], (0.3, -0.2, 0.1)[:d], rtol=0, atol=1e-15)
     assert np.array_equal(q.B[~held], np.tile(np.eye(d), (np.count_nonzero(~held), 1, 1)))
@@ -66,10 +66,10 @@ def test_sticky_nodes_take_the_velocity_of_the_collider(d):
 @pytest.mark.parametrize("d", [2, 3])
 def test_slip_takes_the_normal_of_an_oblique_plane(d):
     n = np.array([0.6, 0.8, 0.0][:d])
-    restraint, q = restrained([Collider(half_space((0.0,) * d, tuple(n)), "slip")], d)
+    active_set, q = restrained([Collider(half_space((0.0,) * d, tuple(n)), "slip")], d)
     held = inside(q, lambda x: x @ n)
     assert held.any()
-    assert (restraint.role == BEARS).all()
+    assert (active_set.role == PLANE).all()
     assert np.allclose(q.B[held], np.eye(d) - np.outer(n, n), atol=1e-15)
     w = np.random.default_rng(1).normal(size=q.v.shape)
     u = q.v + q.dv0 + free_part(q, w)
@@ -88,26 +88,26 @@ def test_two_slip_planes_leave_an_edge_and_three_a_point():
 
 def test_separate_bears_only_on_approach_and_lets_go_of_what_pulls():
     floor = Collider(half_space((0.0, 0.0), (0.0, 1.0)), "separate")
-    restraint, q = restrained([floor])
-    node = restraint.contacts.node
+    active_set, q = restrained([floor])
+    node = active_set.contacts.node
     down = q.v[node, 1] < 0.0
     assert down.any()
     assert not down.all()
-    assert np.array_equal(restraint.role == BEARS, down)
+    assert np.array_equal(active_set.role == PLANE, down)
     # the floor would pull the first of the nodes that bear; the first free one goes down
     u, g = q.v + q.dv0, np.zeros_like(q.v)
     pulled, through = node[down][0], node[~down][0]
     g[node[down], 1] = 1.0
     g[pulled, 1], u[through, 1] = -1.0, -1.0
-    assert restraint.revise(u, g) == 2
-    assert restraint.role[node == pulled] == FREE
-    assert restraint.role[node == through] == BEARS
-    q = restraint.applied(q)
+    assert active_set.update(u, g) == 2
+    assert active_set.role[node == pulled] == FREE
+    assert active_set.role[node == through] == PLANE
+    q = active_set.apply(q)
     assert np.array_equal(q.B[pulled], np.eye(2))
     assert (q.v + q.dv0)[through, 1] == 0.0
     u = q.v + q.dv0
     u[pulled, 1] = 1.0
-    assert restraint.revise(u, g * (g > 0)) == 0
+    assert active_set.update(u, g * (g > 0)) == 0
 
 
 def test_friction_is_refused():
@@ -117,21 +117,22 @@ def test_friction_is_refused():
 
 
 def test_conditions_that_touch_nothing_change_nothing():
-    restraint, q = restrained([Collider(sphere((90.0, 0.0), 1.0))])
+    active_set, q = restrained([Collider(sphere((90.0, 0.0), 1.0))])
     assert not q.dv0.any()
-    assert restraint.revise(q.v, q.v) == 0
+    assert active_set.update(q.v, q.v) == 0
 
 
 def test_a_plane_that_comes_and_goes_ends_bearing():
     floor = Collider(half_space((0.0, 0.0), (0.0, 1.0)), "separate")
-    restraint, q = restrained([floor])
-    node = restraint.contacts.node
+    active_set, q = restrained([floor])
+    node = active_set.contacts.node
     up, down = q.v.copy(), q.v.copy()
     up[node, 1], down[node, 1] = 1.0, -1.0
     pulled, pushed = np.zeros_like(q.v), np.zeros_like(q.v)
     pulled[node, 1], pushed[node, 1] = -1.0, 1.0
-    restraint.revise(down, pushed)
-    changes = [(restraint.revise(up, pulled), restraint.revise(down, pushed)) for _ in range(LETS)]
+    active_set.update(down, pushed)
+    changes = [(active_set.update(up, pulled), active_set.update(down, pushed))
+               for _ in range(RELEASES)]
     assert all(come == len(node) for _, come in changes)
-    assert restraint.revise(up, pulled) == 0
-    assert (restraint.role == BEARS).all()
+    assert active_set.update(up, pulled) == 0
+    assert (active_set.role == PLANE).all()

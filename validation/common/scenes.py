@@ -13,7 +13,7 @@ SCENES = Path(__file__).parents[2] / "scenes"
 FEW = 5000
 
 
-def shipped(name, **changes):
+def catalogue_scene(name, **changes):
     """The scene ``scenes/<name>.toml`` with some of its keys replaced."""
     return with_(load(SCENES / f"{name}.toml"), **changes)
 

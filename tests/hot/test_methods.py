@@ -8,8 +8,8 @@ from hot_cases import CASES, coarser_unknowns, problem_of
 from hot_toys import lattice, tight
 
 from mpm_ref.hot.methods import METHODS, minimise, options_of
-from mpm_ref.hot.multigrid.geometric import Geometric
-from mpm_ref.hot.multigrid.options import Choices
+from mpm_ref.hot.multigrid.geometric import CoarseGrids
+from mpm_ref.hot.multigrid.options import CycleOptions
 from mpm_ref.hot.norms import characteristic_norms
 from mpm_ref.hot.system import System
 
@@ -27,7 +27,7 @@ def system():
     unknowns = q.unknowns._replace(B=B)
     q.potential.unknowns = unknowns
     kappa = characteristic_norms(q.bodies, unknowns, q.potential.stencil, q.potential.dt)
-    grids = Geometric(q.potential, partial(coarser_unknowns, q, CASES[0].degree))
+    grids = CoarseGrids(q.potential, partial(coarser_unknowns, q, CASES[0].degree))
     return System(q.potential, unknowns, kappa, unknowns.dv0, grids)
 
 
@@ -40,7 +40,7 @@ def answer(system):
 def test_every_method_finds_the_minimiser_of_a_step(system, answer, word):     # HOT-methods
     solution = minimise(system, tight(word, 1e-12), **ADMM if word == "admm" else {})
     assert answer.report.converged
-    assert solution.report.converged, solution.report.why
+    assert solution.report.converged, solution.report.message
     assert solution.E == pytest.approx(answer.E, rel=1e-12)
     m = system.unknowns.m[:, None]
     apart, size = (np.sqrt(np.sum(m * u**2)) for u in (solution.dv - answer.dv, answer.dv))
@@ -48,8 +48,8 @@ def test_every_method_finds_the_minimiser_of_a_step(system, answer, word):     #
 
 
 def test_smoothers_in_single_precision_lead_to_the_same_minimiser(system, answer):
-    solution = minimise(system, tight("hot", 1e-12), cycle=Choices(precision="single"))
-    assert solution.report.converged, solution.report.why
+    solution = minimise(system, tight("hot", 1e-12), cycle=CycleOptions(precision="single"))
+    assert solution.report.converged, solution.report.message
     assert solution.E == pytest.approx(answer.E, rel=1e-12)
 
 
@@ -62,7 +62,7 @@ def test_multigrid_methods_find_the_minimiser_of_a_lattice(word, shape):
     jacobi = minimise(lattice(shape, stiff=100.0), tight("pn-pcg", 1e-10))
     assert np.abs(solution.dv - jacobi.dv).max() < 1e-6
     direct = METHODS[word].cycle.coarsest == "direct"
-    assert (solution.report.coarse > 0) != direct
+    assert (solution.report.coarse_iterations > 0) != direct
 
 
 def test_cycle_direction_takes_fewer_steps_than_jacobi():
@@ -74,7 +74,8 @@ def test_cycle_direction_takes_fewer_steps_than_jacobi():
 
 
 def test_paths_of_multigrid_agree():
-    blocks, scipy = (minimise(lattice((10, 21)), "hot", path=path) for path in ("blocks", "scipy"))
+    blocks, scipy = (minimise(lattice((10, 21)), "hot", implementation=word)
+                     for word in ("blocks", "scipy"))
     assert blocks.report.iterations == scipy.report.iterations
     assert np.allclose(blocks.dv, scipy.dv, atol=1e-10)
 
@@ -83,6 +84,6 @@ def test_choices_reach_the_hierarchy():
     cycle = METHODS["hot"].cycle
     direct = minimise(lattice((10, 21)), "hot", cycle=cycle._replace(coarsest="direct")).report
     assert direct.converged
-    assert direct.coarse == 0
+    assert direct.coarse_iterations == 0
     with pytest.raises(ValueError, match="smoother = 'magic'"):
         options_of("hot", cycle=cycle._replace(smoother="magic"))

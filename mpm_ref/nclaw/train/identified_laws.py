@@ -21,13 +21,13 @@ from ...core.jit import CHUNKS
 from ...core.state import NO_HISTORY, NONE, Particles
 from ...materials import NoFlow
 from ...materials.learned.weights import LawWeights
-from .rollout import Laws
-from .unchanged import Unchanged
+from .neural_laws import NoFlowModule
+from .rollout import LawPair
 
 START = 0.8
 
 
-class Known(Function):
+class MaterialFunction(Function):
     """F (n, d, d), constants (c,) of a law, then of a flow -> tau, or F after the return map.
 
     of: types of law and flow; with NoFlow it is tau.
@@ -79,7 +79,7 @@ def records(constants, of):
     return law(*constants[:moduli]), flow(*constants[moduli:])
 
 
-class KnownStress(nn.Module):
+class IdentifiedLaw(nn.Module):
     """F (n, d, d) -> tau (n, d, d) of a law with a learned log E.
 
     unit: the law's record for E = 1 Pa; log_E: where it begins.
@@ -100,17 +100,17 @@ class KnownStress(nn.Module):
 
     def forward(self, F):
         """tau."""
-        return Known.apply(F, self.moduli(), (self.law, NoFlow))
+        return MaterialFunction.apply(F, self.moduli(), (self.law, NoFlow))
 
-    def trained(self):
-        """`LawWeights` without layers: the law's record."""
+    def weights(self):
+        """Return `LawWeights` without layers: the law's record."""
         return LawWeights((), self.law(*self.moduli().tolist()))
 
 
-class KnownReturn(nn.Module):
+class IdentifiedFlow(nn.Module):
     """F (n, d, d) -> F after the return map of a flow whose first constant, if any, is learned.
 
-    elastic: the `KnownStress` whose moduli it reads; flow: its record as it begins.
+    elastic: the `IdentifiedLaw` whose moduli it reads; flow: its record as it begins.
     """
 
     def __init__(self, elastic, flow):
@@ -129,16 +129,19 @@ class KnownReturn(nn.Module):
 
     def forward(self, F):
         """F after the return map."""
-        return Known.apply(F, torch.cat([self.moduli(), self.constants()]), self.of)
+        return MaterialFunction.apply(F, torch.cat([self.moduli(), self.constants()]), self.of)
 
-    def trained(self):
-        """`LawWeights` without layers: the flow's record."""
+    def weights(self):
+        """Return `LawWeights` without layers: the flow's record."""
         return LawWeights((), self.of[1](*self.constants().tolist()))
 
 
-def known_laws(unit, E, flow):
-    """`Laws` before training: unit is the record of the law for 1 Pa, E its true modulus [Pa], flow
-    the record of the return map as it begins.
+def identified_laws(unit, E, flow):
+    """Return the `LawPair` before training.
+
+    unit: the record of the law for 1 Pa; E: its true modulus [Pa]; flow: the record of the return
+    map as it begins.
     """
-    elastic = KnownStress(unit, START * log(E))
-    return Laws(elastic, Unchanged() if isinstance(flow, NoFlow) else KnownReturn(elastic, flow))
+    elastic = IdentifiedLaw(unit, START * log(E))
+    plastic = NoFlowModule() if isinstance(flow, NoFlow) else IdentifiedFlow(elastic, flow)
+    return LawPair(elastic, plastic)

@@ -85,17 +85,17 @@ def test_bodies_add_up():
 def test_the_fast_exchange_equals_the_plain_one(rng):
     """Lines of nodes instead of nodes: the same sums in another order."""
     q = problem_of(CASES[2])
-    sites, box, stencil = q.potential.sites[0], q.potential.box, q.potential.stencil
+    points, box, stencil = q.potential.points[0], q.potential.box, q.potential.stencil
     box.v[:] = rng.normal(size=box.v.shape)
-    transfer.gradients(sites, box, stencil)
-    T = sites.T.copy()
-    transfer.gather(sites, box, stencil, (0, len(T)))
-    assert np.abs(sites.T - T).max() <= 1e-14 * np.abs(T).max()
+    transfer.gradients(points, box, stencil)
+    T = points.T.copy()
+    transfer.gather(points, box, stencil, (0, len(T)))
+    assert np.abs(points.T - T).max() <= 1e-14 * np.abs(T).max()
     box.f[:] = 0.0
-    transfer.add_forces(sites, box, stencil)
+    transfer.add_forces(points, box, stencil)
     f = box.f.copy()
     box.f[:] = 0.0
-    transfer.scatter(sites, box, stencil, (0, len(T)))
+    transfer.scatter(points, box, stencil, (0, len(T)))
     assert np.abs(box.f - f).max() <= 1e-14 * np.abs(f).max()
 
 
