@@ -147,7 +147,7 @@ def test_bounds_are_those_of_stretches_and_volumes():
 def test_what_training_saw_is_marked(tmp_path):
     F = np.eye(3), np.diag([1.05, 1.0, 1.0]), np.diag([1.0, 1.0, 0.9])
     bounds = strain_bounds(np.array(F))
-    laws = identified()._replace(about={"in_range": bounds})
+    laws = identified()._replace(about={"seen": bounds})
     (up, down, *_), _ = table(tmp_path, laws)
     assert (up["in_range"] == (up["strain"] < 0.0501)).all()
     assert (down["in_range"] == 1.0).all()
@@ -170,7 +170,7 @@ def lines_of(monkeypatch, folder, laws, **how):
 def test_lines_are_dotted_beyond_what_training_saw(tmp_path, monkeypatch):
     F = np.eye(3), np.diag([1.05, 1.0, 1.0]), np.diag([1.0, 1.0, 0.9])
     bounds = strain_bounds(np.array(F))
-    laws = identified()._replace(about={"in_range": bounds})
+    laws = identified()._replace(about={"seen": bounds})
     drawn, words, _ = lines_of(monkeypatch, tmp_path, laws)
     (solid, inside), (dotted, outside), (_, down), (_, beyond) = drawn["uniaxial"]
     assert (solid, dotted) == ("-", ":")
@@ -184,7 +184,7 @@ def test_lines_say_where_strains_of_training_end(tmp_path):
     """Strains are whole steps of 0.1 / STEPS; stretches were seen up to 1.05 and down to 0.9."""
     F = np.eye(3), np.diag([1.05, 1.0, 1.0]), np.diag([1.0, 1.0, 0.9])
     bounds = strain_bounds(np.array(F))
-    stretched, pressed, *_ = plot(tmp_path, identified()._replace(about={"in_range": bounds})
+    stretched, pressed, *_ = plot(tmp_path, identified()._replace(about={"seen": bounds})
                                   ).stdout.splitlines()
     assert stretched.startswith("uniaxial to +0.1")
     assert stretched.endswith("; at 0.0525 beyond the strains of training")
