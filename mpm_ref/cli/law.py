@@ -209,10 +209,10 @@ def beside_truth(laws, problem, strain, steps):
 def line(curve):
     """How far a learned law is off along a path, in words."""
     end = curve.path.strain[abs(curve.path.strain).argmax()]
-    off = f"off by at most {100.0 * curve.off:.3g} % of it" if isfinite(curve.off) else (
-        f"the learned law breaks down at strain {curve.broken:.4g}" if curve.broken is not None
+    off = f"off by at most {100.0 * curve.error:.3g} % of it" if isfinite(curve.error) else (
+        f"the learned law breaks down at strain {curve.failure:.4g}" if curve.failure is not None
         else f"the learned law gives up to {abs(curve.learned).max():.4g} Pa")
-    beyond = "" if curve.beyond is None else (
-        f"; at {curve.beyond:.3g} beyond the strains of training")
+    beyond = "" if curve.range_exit is None else (
+        f"; at {curve.range_exit:.3g} beyond the strains of training")
     return (f"{curve.path.name} to {end:+g}: {curve.path.symbol} up to "
             f"{abs(curve.truth).max():.4g} Pa, {off}{beyond}")

@@ -8,37 +8,39 @@ from ..materials.learned import learned_flow, learned_law
 
 
 def body_with_laws(body, law, flow):
-    """A body as another stands, with particles of its own, of a law and a flow.
+    """Return a copy of a body with other laws.
 
     J becomes F = J^(1/d) I where the laws read F, and F becomes J where they read that alone.
     """
     q, material = body.particles, Material(law, flow)
     transfer = "mls" if q.L is q.C else "apic" if q.C.ndim == 3 else "pic"
-    made = particles_at(q.x, q.v, q.m, q.V0, transfer, fluid=not material.needs_F)
-    made.F[:] = convert_gradients(q.F, made.F.ndim == 3, q.x.shape[1])
+    particles = particles_at(q.x, q.v, q.m, q.V0, transfer, fluid=not material.needs_F)
+    particles.F[:] = convert_gradients(q.F, particles.F.ndim == 3, q.x.shape[1])
     if q.C.ndim == 3:
-        made.C[:] = q.C
+        particles.C[:] = q.C
     if material.has_history:
         kept = q.y.ndim == 1
-        made = made._replace(y=q.y.copy() if kept else np.full(len(q.x), material.initial_y))
-    return Body(body.name, made._replace(b=q.b.copy()), law, flow, body.id.copy())
+        y = q.y.copy() if kept else np.full(len(q.x), material.initial_y)
+        particles = particles._replace(y=y)
+    return Body(body.name, particles._replace(b=q.b.copy()), law, flow, body.id.copy())
 
 
-def convert_gradients(F, whole, d):
-    """F (n, d, d), or J (n,) unless `whole`, of either of them."""
-    if whole == (F.ndim == 3):
+def convert_gradients(F, full, d):
+    """Return F (n, d, d) if `full`, else J (n,), from either of them."""
+    if full == (F.ndim == 3):
         return F
-    return F[:, None, None] ** (1.0 / d) * np.eye(d) if whole else np.linalg.det(F)
+    return F[:, None, None] ** (1.0 / d) * np.eye(d) if full else np.linalg.det(F)
 
 
 def copy_body(body):
-    """A body of its own laws."""
+    """Return a copy of a body with its own laws."""
     return body_with_laws(body, body.law, body.flow)
 
 
 def body_maker(laws):
-    """What makes bodies of trained `LearnedLaws`. Raises ValueError for what is no stress and no
-    return map.
+    """Return a function that gives a body the laws of `LearnedLaws`.
+
+    Raises ValueError for an elastic law that is no stress, and a plastic one that is no return map.
     """
     elastic, plastic = learned_law(laws.elastic), learned_flow(laws.plastic)
     return lambda body: body_with_laws(body, elastic, plastic)
@@ -50,11 +52,11 @@ def material_points(law, flow, F):
     """
     n, d, _ = F.shape
     still, one, material = np.zeros((n, d)), np.ones(n), Material(law, flow)
-    made = particles_at(still, still, one, one, fluid=not material.needs_F)
-    made.F[:] = convert_gradients(F, material.needs_F, d)
+    particles = particles_at(still, still, one, one, fluid=not material.needs_F)
+    particles.F[:] = convert_gradients(F, material.needs_F, d)
     if material.has_history:
-        made = made._replace(y=np.full(n, material.initial_y))
-    return Body("points", made, law, flow, np.arange(n))
+        particles = particles._replace(y=np.full(n, material.initial_y))
+    return Body("points", particles, law, flow, np.arange(n))
 
 
 def deformation_gradients(body):

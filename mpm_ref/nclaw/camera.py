@@ -34,7 +34,7 @@ def project(P, x):
 
 
 def front_layer(x):
-    """Which of points x (n, 3) form the layer nearest to a camera as of `pinhole`."""
+    """Return which of points x (n, 3) form the layer nearest to a camera as of `pinhole`."""
     return np.flatnonzero(x[:, 2] > x[:, 2].max() - 1e-9)
 
 

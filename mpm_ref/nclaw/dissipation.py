@@ -28,18 +28,18 @@ SIMPSON = ((0.0, 1.0 / 6.0), (0.5, 4.0 / 6.0), (1.0, 1.0 / 6.0))    # places and
 
 
 class Balance(NamedTuple):
-    """What paths cost, per rest volume."""
+    """The energies of paths, per rest volume."""
 
     work: np.ndarray        # (n,) sum of w [J/m^3]
-    moved: np.ndarray       # (n,) sum of |w| [J/m^3]
+    exchanged: np.ndarray       # (n,) sum of |w| [J/m^3]
     taken: np.ndarray       # (n,) sum of D of the returns [J/m^3]
     least: np.ndarray       # (n,) the least of these D [J/m^3]
 
     @property
     def share(self):
         """W over what went in and out (n,), in [-1, 1]; 0 where nothing did."""
-        return np.divide(self.work, self.moved, out=np.zeros_like(self.work),
-                         where=self.moved != 0.0)
+        return np.divide(self.work, self.exchanged, out=np.zeros_like(self.work),
+                         where=self.exchanged != 0.0)
 
 
 def loops(n, size, steps, rng):

@@ -130,14 +130,14 @@ def flatten_tables(tables, path=""):
     """{name: text, number or array} of nested tables, names joined by "_"; lists of words become
     arrays, `about` JSON.
     """
-    found = {}
+    result = {}
     for key, value in tables.items():
         name = f"{path}_{key}" if path else key
         if key == "about":
             value = json.dumps(value)
         nested = isinstance(value, dict)
-        found |= flatten_tables(value, name) if nested else {name: np.asarray(value)}
-    return found
+        result |= flatten_tables(value, name) if nested else {name: np.asarray(value)}
+    return result
 
 
 def write(path, tables):
@@ -190,15 +190,15 @@ def reads_gradient(weights, d):
 def input_values(weights, F):
     """Return the numbers (n, inputs) that the first layer of `LawWeights` reads at F (n, d, d)."""
     n, d, _ = F.shape
-    kind, of = weights.kind, spectrum(F)
+    kind, factors = weights.kind, spectrum(F)
     if not input_labels(weights, d):
         return np.empty((n, 0))
     if isinstance(kind, Energetic):
         return energetic.measures_of(F)
     if isinstance(kind, Contraction):
-        return contraction.strains_of(of, kind)
+        return contraction.strains_of(factors, kind)
     if isinstance(kind, StretchStress | ReleasedStretchStress):
-        return of.s - 1.0
+        return factors.s - 1.0
     if reads_gradient(weights, d):
         return (F - np.eye(d)).reshape(n, -1)
-    return invariants(F, of)
+    return invariants(F, factors)

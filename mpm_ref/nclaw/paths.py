@@ -87,9 +87,9 @@ def path_response(law, flow, path, dt):
     return PathResponse(*(np.array(rows) for rows in zip(*rows, strict=True)))
 
 
-def path_stress(path, course):
+def path_stress(path, response):
     """Return the stress (k + 1,) [Pa] that a path records; NaN where it is not finite."""
-    finite = np.isfinite(course.tau).all(axis=(1, 2))
+    finite = np.isfinite(response.tau).all(axis=(1, 2))
     found = np.full(len(finite), np.nan)
-    found[finite] = np.einsum("ij,kij->k", path.reads, course.tau[finite])
+    found[finite] = np.einsum("ij,kij->k", path.reads, response.tau[finite])
     return found

@@ -37,7 +37,7 @@ class StrainReport(NamedTuple):
 
     @property
     def out_of_range(self):
-        """Whether the law answers for a point beyond the strains of its training."""
+        """Return whether the law answers for a point beyond the strains of its training."""
         return self.count > 0
 
 

@@ -115,7 +115,7 @@ def test_fluids_carry_j_alone():
         assert row.learned == pytest.approx(row.truth, abs=1e-7)
     shear, swollen = rows[2], rows[3]
     assert shear.truth == pytest.approx(np.zeros(6), abs=1e-9)
-    assert isnan(shear.off)
+    assert isnan(shear.error)
     assert swollen.truth[-1] == pytest.approx(1e5 * 1.1**3 * (1.1**3 - 1.0))
     end = paths.path_response(law, NO_FLOW, swollen.path, DT)
     assert end.F[-1] == pytest.approx(1.1 * np.eye(3))
@@ -149,9 +149,9 @@ def test_what_training_saw_is_marked(tmp_path):
     bounds = strain_bounds(np.array(F))
     laws = identified()._replace(about={"seen": bounds})
     (up, down, *_), _ = table(tmp_path, laws)
-    assert (up["seen"] == (up["strain"] < 0.0501)).all()
-    assert (down["seen"] == 1.0).all()
-    assert (table(tmp_path, identified())[0][0]["seen"] == -1.0).all()      # left empty
+    assert (up["in_range"] == (up["strain"] < 0.0501)).all()
+    assert (down["in_range"] == 1.0).all()
+    assert (table(tmp_path, identified())[0][0]["in_range"] == -1.0).all()      # left empty
 
 
 def lines_of(monkeypatch, folder, laws, **how):

@@ -58,7 +58,7 @@ def test_of_elastic_matter_nothing_is_left(pair, closed):
     """Water too: its pressure knows J alone, which the projection keeps."""
     found = balance(*pair, closed)
     assert abs(found.share).max() < 1e-9
-    assert found.moved.min() > 1.0
+    assert found.exchanged.min() > 1.0
 
 
 @pytest.mark.parametrize("pair", [(CLAY, YIELD), toys.deployed(shift=2.0)],
@@ -81,7 +81,7 @@ def test_a_stress_without_energy_creates_some():
     law = network.build_law(neural_toys.trained(response.Stress(1e4), 3))
     G = loops(30, 0.1, 100, np.random.default_rng(0))
     one, other = balance(law, NoFlow(), G), balance(law, NoFlow(), G[::-1])
-    assert one.work == pytest.approx(-other.work, rel=1e-6, abs=1e-9 * one.moved.max())
+    assert one.work == pytest.approx(-other.work, rel=1e-6, abs=1e-9 * one.exchanged.max())
     assert one.share.min() < -100.0 * CREATED
     assert 0.2 < np.mean(one.share < -CREATED) < 0.8
 

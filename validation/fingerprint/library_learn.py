@@ -43,7 +43,7 @@ def graph(scene, values, frames, recipe):
     box, dt = box_of(world.conditions.walls, world.dx), frames * world.clock.dt
     x, v, *_ = observed(world)
     run = part("nclaw.gnn.train.examples", "", "").run_of(x[::frames], v[0], dt, box)
-    kind = part("nclaw.gnn.train.recipe", "", "").GraphRecipe
+    kind = part("nclaw.gnn.train.fit", "", "").GraphRecipe
     session = part("nclaw.gnn.train.fit", "", "").train(kind(**recipe), [run], dt)
     network, reading, _ = session.simulator({})
     return {"network": network, "reading": reading, "history": session.history}

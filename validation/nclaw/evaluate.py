@@ -37,7 +37,7 @@ def compare(scene, laws, goes_on=False):
         for x in positions(problem, tuple(map(copy_body, problem.bodies))):
             for run in runs:
                 run.follow(x)
-    return [run.found() for run in runs]
+    return [run.error() for run in runs]
 
 
 def frames(problem, law):

@@ -87,31 +87,31 @@ def build_flow(weights):
     return ContractionFlow(*flatten(weights.layers), weights.kind.strain)
 
 
-def strains_of(of, kind):
+def strains_of(factors, kind):
     """x (n, 3) of a `Spectrum`; NaN unless det F > 0."""
-    x = np.empty_like(of.s)
-    _strains(of.s, kind.strain, x)
+    x = np.empty_like(factors.s)
+    _strains(factors.s, kind.strain, x)
     return x
 
 
-def pull_back_strains(x_bar, of, kind):
+def pull_back_strains(x_bar, factors, kind):
     """Gradient of F (n, 3, 3) from that of x (n, 3)."""
-    s_bar = np.empty_like(of.s)
-    _pull_strains(x_bar, of.s, kind.strain, s_bar)
-    return pull_back_stretches(s_bar, of)
+    s_bar = np.empty_like(factors.s)
+    _pull_strains(x_bar, factors.s, kind.strain, s_bar)
+    return pull_back_stretches(s_bar, factors)
 
 
-def contracted(c, of):
+def contracted(c, factors):
     """F (n, 3, 3) after the return, of c = (a, b) (n, 2) and the `Spectrum` of the trial."""
-    F = np.empty_like(of.U)
-    _contracted(c, of, F)
+    F = np.empty_like(factors.U)
+    _contracted(c, factors, F)
     return F
 
 
-def pull_back(G, c, of):
+def pull_back(G, c, factors):
     """Gradients of c (n, 2), and of the trial F (n, 3, 3) at fixed c, from that of F, G."""
-    c_bar, F_bar = np.empty_like(c), np.empty_like(of.U)
-    _pull(G, c, of, c_bar, F_bar)
+    c_bar, F_bar = np.empty_like(c), np.empty_like(factors.U)
+    _pull(G, c, factors, c_bar, F_bar)
     return c_bar, F_bar
 
 
@@ -159,7 +159,7 @@ def left_bars(s, s_new, s_new_bar, a, b):
 
 @kernel
 def pairs_of(s, s_new, share):
-    """What `mixed` needs of every pair."""
+    """Return the factors that `mixed` needs of every pair of axes."""
     return (pair(s, s_new, 0, 1, share), pair(s, s_new, 0, 2, share), pair(s, s_new, 1, 2, share))
 
 
@@ -186,18 +186,18 @@ def pull_read(x_bar, s, strain, s_bar, bounds):
 
 
 @kernel
-def contract(c, of, F, bounds):
+def contract(c, factors, F, bounds):
     """F after the return of the points bounds[0] .. bounds[1] - 1."""
     for p in range(bounds[0], bounds[1]):
-        s = left(vec(of.s, p, LIKE), c[p, 0], c[p, 1])
-        put_mat(F, p, mmt(scale_columns(mat(of.U, p, LIKE), s), mat(of.V, p, LIKE)))
+        s = left(vec(factors.s, p, LIKE), c[p, 0], c[p, 1])
+        put_mat(F, p, mmt(scale_columns(mat(factors.U, p, LIKE), s), mat(factors.V, p, LIKE)))
 
 
 @kernel
-def pull(G, c, of, bars, bounds):
+def pull(G, c, factors, bars, bounds):
     """bars = (c_bar, F_bar) of the points bounds[0] .. bounds[1] - 1."""
     for p in range(bounds[0], bounds[1]):
-        U, s, V = mat(of.U, p, LIKE), vec(of.s, p, LIKE), mat(of.V, p, LIKE)
+        U, s, V = mat(factors.U, p, LIKE), vec(factors.s, p, LIKE), mat(factors.V, p, LIKE)
         X, s_new = within(U, mat(G, p, LIKE), V), left(s, c[p, 0], c[p, 1])
         s_bar, bars[0][p, 0], bars[0][p, 1] = left_bars(s, s_new, diagonal(X), c[p, 0], c[p, 1])
         put_mat(bars[1], p, back(U, mixed(s_bar, pairs_of(s, s_new, exp(-c[p, 0])), X), V))
@@ -216,15 +216,15 @@ def _pull_strains(x_bar, s, strain, s_bar):
 
 
 @parallel
-def _contracted(c, of, F):
+def _contracted(c, factors, F):
     for k in prange(CHUNKS):
-        contract(c, of, F, chunk(k, len(F)))
+        contract(c, factors, F, chunk(k, len(F)))
 
 
 @parallel
-def _pull(G, c, of, c_bar, F_bar):
+def _pull(G, c, factors, c_bar, F_bar):
     for k in prange(CHUNKS):
-        pull(G, c, of, (c_bar, F_bar), chunk(k, len(G)))
+        pull(G, c, factors, (c_bar, F_bar), chunk(k, len(G)))
 
 
 @kernel

@@ -82,9 +82,9 @@ def build_law(weights):
 
 def measures_of(F):
     """q, r, u, w (n, 4) of F (n, 3, 3); NaN unless det F > 0."""
-    found = np.empty((len(F), MEASURES))
-    _measures(F, found)
-    return found
+    out = np.empty((len(F), MEASURES))
+    _measures(F, out)
+    return out
 
 
 def stresses(g, F):
@@ -159,10 +159,10 @@ def put_row(a, p, x):
 
 
 @kernel
-def measure(F, found, bounds):
+def measure(F, out, bounds):
     """Measures of the points bounds[0] .. bounds[1] - 1."""
     for p in range(bounds[0], bounds[1]):
-        put_row(found, p, measures(mat(F, p, LIKE)))
+        put_row(out, p, measures(mat(F, p, LIKE)))
 
 
 @kernel
@@ -189,9 +189,9 @@ def pull_measures(m_bar, F, F_bar, bounds):
 
 
 @parallel
-def _measures(F, found):
+def _measures(F, out):
     for c in prange(CHUNKS):
-        measure(F, found, chunk(c, len(F)))
+        measure(F, out, chunk(c, len(F)))
 
 
 @parallel
@@ -214,7 +214,7 @@ def _pull_measures(m_bar, F, F_bar):
 
 @kernel
 def slope(z):
-    """Of softplus at z."""
+    """Return the derivative of softplus at z."""
     return 1.0 / (1.0 + exp(-z))
 
 

@@ -31,57 +31,57 @@ class Spectrum(NamedTuple):
 
 
 def count(d):
-    """How many numbers a law reads in d dimensions."""
+    """Return the number of invariants in d dimensions."""
     return d + d * d + 1
 
 
 def spectrum(F):
     """`Spectrum` of F (n, d, d); NaN where F is not finite."""
     n, d, _ = F.shape
-    found = Spectrum(np.empty((n, d, d)), np.empty((n, d)), np.empty((n, d, d)))
-    _spectra(F, found, tuple(range(d)))
-    return found
+    result = Spectrum(np.empty((n, d, d)), np.empty((n, d)), np.empty((n, d, d)))
+    _spectra(F, result, tuple(range(d)))
+    return result
 
 
-def rotations(of):
+def rotations(factors):
     """R = U V^T (n, d, d) of a `Spectrum`."""
-    R = np.empty_like(of.U)
-    _turn(of, R, tuple(range(R.shape[1])))
+    R = np.empty_like(factors.U)
+    _turn(factors, R, tuple(range(R.shape[1])))
     return R
 
 
-def invariants(F, of):
+def invariants(F, factors):
     """a (n, count(d)) of F (n, d, d) with its `Spectrum`."""
     n, d, _ = F.shape
     a = np.empty((n, count(d)))
-    _read(F, of.s, a, tuple(range(d)))
+    _read(F, factors.s, a, tuple(range(d)))
     return a
 
 
-def pull_back(F, of, a_bar, R_bar):
+def pull_back(F, factors, a_bar, R_bar):
     """Gradient (n, d, d) with respect to F, of gradients a_bar (n, count(d)) and R_bar (n, d, d);
     zero where F leaves R undetermined.
     """
     F_bar = np.empty_like(F)
-    _pull(F, of, (a_bar, R_bar), F_bar, tuple(range(F.shape[1])))
+    _pull(F, factors, (a_bar, R_bar), F_bar, tuple(range(F.shape[1])))
     return F_bar
 
 
 @kernel
-def decompose(F, of, like, bounds):
+def decompose(F, factors, like, bounds):
     """Singular value decompositions of the points bounds[0] .. bounds[1] - 1."""
     for p in range(bounds[0], bounds[1]):
         U, s, V, _ = svd(mat(F, p, like))
-        put_mat(of.U, p, U)
-        put_vec(of.s, p, s)
-        put_mat(of.V, p, V)
+        put_mat(factors.U, p, U)
+        put_vec(factors.s, p, s)
+        put_mat(factors.V, p, V)
 
 
 @kernel
-def turn(of, R, like, bounds):
+def turn(factors, R, like, bounds):
     """R = U V^T of the points bounds[0] .. bounds[1] - 1."""
     for p in range(bounds[0], bounds[1]):
-        put_mat(R, p, mmt(mat(of.U, p, like), mat(of.V, p, like)))
+        put_mat(R, p, mmt(mat(factors.U, p, like), mat(factors.V, p, like)))
 
 
 @kernel
@@ -104,29 +104,29 @@ def describe(F, s, a, p):
 
 
 @kernel
-def pull(F, of, bars, F_bar, like, bounds):
+def pull(F, factors, bars, F_bar, like, bounds):
     """F_bar of the points bounds[0] .. bounds[1] - 1, from bars = (a_bar, R_bar)."""
     d, (a_bar, R_bar) = len(like), bars
     for p in range(bounds[0], bounds[1]):
-        F_p, U, V = mat(F, p, like), mat(of.U, p, like), mat(of.V, p, like)
-        own = mmt(mm(U, diag(vec(a_bar, p, like))), V)
-        spin = d_rotation(U, vec(of.s, p, like), V, mat(R_bar, p, like))
+        F_p, U, V = mat(F, p, like), mat(factors.U, p, like), mat(factors.V, p, like)
+        from_s = mmt(mm(U, diag(vec(a_bar, p, like))), V)
+        spin = d_rotation(U, vec(factors.s, p, like), V, mat(R_bar, p, like))
         C_bar = mat(a_bar[p, d:d + d * d].reshape(1, d, d), 0, like)
         stretch = mm(F_p, mlin(1.0, C_bar, 1.0, transpose(C_bar)))
         size = mlin(a_bar[p, d + d * d], cofactor(F_p), 1.0, stretch)
-        put_mat(F_bar, p, mlin(1.0, mlin(1.0, own, 1.0, spin), 1.0, size))
+        put_mat(F_bar, p, mlin(1.0, mlin(1.0, from_s, 1.0, spin), 1.0, size))
 
 
 @parallel
-def _spectra(F, of, like):
+def _spectra(F, factors, like):
     for c in prange(CHUNKS):
-        decompose(F, of, like, chunk(c, len(F)))
+        decompose(F, factors, like, chunk(c, len(F)))
 
 
 @parallel
-def _turn(of, R, like):
+def _turn(factors, R, like):
     for c in prange(CHUNKS):
-        turn(of, R, like, chunk(c, len(R)))
+        turn(factors, R, like, chunk(c, len(R)))
 
 
 @parallel
@@ -136,6 +136,6 @@ def _read(F, s, a, like):
 
 
 @parallel
-def _pull(F, of, bars, F_bar, like):
+def _pull(F, factors, bars, F_bar, like):
     for c in prange(CHUNKS):
-        pull(F, of, bars, F_bar, like, chunk(c, len(F)))
+        pull(F, factors, bars, F_bar, like, chunk(c, len(F)))

@@ -48,15 +48,15 @@ class NeuralLaw(NamedTuple):
 
 
 class NeuralStress(NeuralLaw):
-    """As `response.Stress`."""
+    """A law with the answer of `response.Stress`."""
 
 
 class NeuralSymmetricStress(NeuralLaw):
-    """As `response.SymmetricStress`."""
+    """A law with the answer of `response.SymmetricStress`."""
 
 
 class NeuralPlainStress(NeuralLaw):
-    """As `response.PlainStress`."""
+    """A law with the answer of `response.PlainStress`."""
 
 
 class NeuralFlow(NamedTuple):
@@ -74,11 +74,11 @@ class NeuralFlow(NamedTuple):
 
 
 class NeuralCorrection(NeuralFlow):
-    """As `response.Correction`."""
+    """A flow with the answer of `response.Correction`."""
 
 
 class NeuralPlainCorrection(NeuralFlow):
-    """As `response.PlainCorrection`."""
+    """A flow with the answer of `response.PlainCorrection`."""
 
 
 LAW_CLASSES = {response.Stress: NeuralStress, response.SymmetricStress: NeuralSymmetricStress,
@@ -93,7 +93,7 @@ def dim_of_inputs(inputs):
 
 
 def squared(d):
-    """How many numbers a law reads that is told F alone."""
+    """Return the number of inputs of a law that reads F alone."""
     return d * d
 
 
@@ -159,7 +159,7 @@ def softplus(z):
 
 @kernel
 def outputs(a, sizes, W, b):
-    """What a network makes of inputs a."""
+    """Return the outputs of a network at inputs a."""
     w, k, last = 0, 0, len(sizes) - 1
     for l in range(last):
         n, m = sizes[l], sizes[l + 1]

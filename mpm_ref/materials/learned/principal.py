@@ -49,26 +49,26 @@ LEAST_GAP = 5e-7        # of s_i - s_j, in the ratios of laws that are not isotr
 PAIRS = {2: ((0, 1),), 3: ((0, 1), (0, 2), (1, 2))}     # of axes, as `spectral.mixed` orders them
 
 
-def stresses(y, of):
+def stresses(y, factors):
     """tau (n, d, d) of y (n, d) and a `Spectrum`."""
-    tau = np.empty_like(of.U)
-    _stresses(y, of, tau, _like(y))
+    tau = np.empty_like(factors.U)
+    _stresses(y, factors, tau, _like(y))
     return tau
 
 
-def pull_back(G, y, ratios, of):
+def pull_back(G, y, ratios, factors):
     """Gradients of y (n, d), and of F (n, d, d) at fixed y, from that of tau, G (n, d, d); ratios
     (n, pairs) are the a_ij.
     """
     y_bar, F_bar = np.empty_like(y), np.empty_like(G)
-    _pull((G, y, ratios), of, (y_bar, F_bar), _like(y))
+    _pull((G, y, ratios), factors, (y_bar, F_bar), _like(y))
     return y_bar, F_bar
 
 
-def pull_back_stretches(s_bar, of):
+def pull_back_stretches(s_bar, factors):
     """Gradient of F (n, d, d) from that of s (n, d), counted as sorted: U diag(s') V^T."""
-    F_bar = np.empty_like(of.U)
-    _pull_stretches(s_bar, of, F_bar, _like(s_bar))
+    F_bar = np.empty_like(factors.U)
+    _pull_stretches(s_bar, factors, F_bar, _like(s_bar))
     return F_bar
 
 
@@ -84,7 +84,7 @@ def _like(a):
 
 @kernel
 def pairs_of(y, s, a):
-    """What `mixed` needs of every pair: a_ij, b_ij."""
+    """Return what `mixed` needs of every pair of axes: a_ij, b_ij."""
     if len(s) == 2:
         return ((a[0], skew(y, s, 0, 1)),)
     else:
@@ -93,7 +93,7 @@ def pairs_of(y, s, a):
 
 @kernel
 def skew(y, s, i, j):
-    """b_ij."""
+    """Return the ratio b_ij."""
     total = s[i] + s[j]
     return (y[i] + y[j]) / total if total > UNDETERMINED * s[0] else 0.0
 
@@ -115,18 +115,20 @@ def kirchhoff(F, law):
 
 
 @kernel
-def respond(y, of, tau, like, bounds):
+def respond(y, factors, tau, like, bounds):
     """tau of the points bounds[0] .. bounds[1] - 1."""
     for p in range(bounds[0], bounds[1]):
-        put_mat(tau, p, stress_of(mat(of.U, p, like), vec(of.s, p, like), vec(y, p, like)))
+        U, s = mat(factors.U, p, like), vec(factors.s, p, like)
+        put_mat(tau, p, stress_of(U, s, vec(y, p, like)))
 
 
 @kernel
-def pull(given, of, bars, like, bounds):
+def pull(given, factors, bars, like, bounds):
     """bars = (y_bar, F_bar) of the points bounds[0] .. bounds[1] - 1, of given = (G, y, ratios)."""
     G, ys, ratios = given
     for p in range(bounds[0], bounds[1]):
-        U, V, s, y = mat(of.U, p, like), mat(of.V, p, like), vec(of.s, p, like), vec(ys, p, like)
+        U, V = mat(factors.U, p, like), mat(factors.V, p, like)
+        s, y = vec(factors.s, p, like), vec(ys, p, like)
         T = within(U, mat(G, p, like), U)
         M = mixed(fill(0.0, s), pairs_of(y, s, ratios[p]), scale_columns(T, s))
         put_vec(bars[0], p, mul(diagonal(T), s))
@@ -134,25 +136,26 @@ def pull(given, of, bars, like, bounds):
 
 
 @kernel
-def pull_stretches(s_bar, of, F_bar, like, bounds):
+def pull_stretches(s_bar, factors, F_bar, like, bounds):
     """U diag(s_bar) V^T of the points bounds[0] .. bounds[1] - 1."""
     for p in range(bounds[0], bounds[1]):
-        put_mat(F_bar, p, back(mat(of.U, p, like), diag(vec(s_bar, p, like)), mat(of.V, p, like)))
+        U, V = mat(factors.U, p, like), mat(factors.V, p, like)
+        put_mat(F_bar, p, back(U, diag(vec(s_bar, p, like)), V))
 
 
 @parallel
-def _stresses(y, of, tau, like):
+def _stresses(y, factors, tau, like):
     for c in prange(CHUNKS):
-        respond(y, of, tau, like, chunk(c, len(y)))
+        respond(y, factors, tau, like, chunk(c, len(y)))
 
 
 @parallel
-def _pull(given, of, bars, like):
+def _pull(given, factors, bars, like):
     for c in prange(CHUNKS):
-        pull(given, of, bars, like, chunk(c, len(given[1])))
+        pull(given, factors, bars, like, chunk(c, len(given[1])))
 
 
 @parallel
-def _pull_stretches(s_bar, of, F_bar, like):
+def _pull_stretches(s_bar, factors, F_bar, like):
     for c in prange(CHUNKS):
-        pull_stretches(s_bar, of, F_bar, like, chunk(c, len(s_bar)))
+        pull_stretches(s_bar, factors, F_bar, like, chunk(c, len(s_bar)))

@@ -78,9 +78,9 @@ def answers(Y, F, R, kind):
 
 def pull_back(G, Y, F, R, kind):
     """`Bars` of gradients G (n, d, d) of answers."""
-    found = Bars(*(np.empty_like(F) for _ in Bars._fields))
-    _pull(G, (Y, F, R), kind, found, tuple(range(F.shape[1])))
-    return found
+    result = Bars(*(np.empty_like(F) for _ in Bars._fields))
+    _pull(G, (Y, F, R), kind, result, tuple(range(F.shape[1])))
+    return result
 
 
 @kernel
@@ -91,7 +91,7 @@ def symmetric(Y):
 
 @kernel
 def scaled(a, A):
-    """a A."""
+    """Return the product a A."""
     return mlin(a, A, 0.0, A)
 
 
@@ -170,17 +170,17 @@ for _kind, _answer, _bars in ((Stress, stress, stress_bars),
 
 
 @kernel
-def respond(of, kind, out, like, bounds):
+def respond(inputs, kind, out, like, bounds):
     """Answers of the points bounds[0] .. bounds[1] - 1, of = (Y, F, R)."""
-    Y, F, R = of
+    Y, F, R = inputs
     for p in range(bounds[0], bounds[1]):
         put_mat(out, p, answer(mat(Y, p, like), mat(F, p, like), mat(R, p, like), kind))
 
 
 @kernel
-def pull(G, of, kind, out, like, bounds):
+def pull(G, inputs, kind, out, like, bounds):
     """`Bars` of the points bounds[0] .. bounds[1] - 1, of = (Y, F, R)."""
-    Y, F, R = of
+    Y, F, R = inputs
     for p in range(bounds[0], bounds[1]):
         Y_bar, F_bar, R_bar = bars(mat(G, p, like), mat(Y, p, like), mat(F, p, like),
                                    mat(R, p, like), kind)
@@ -190,12 +190,12 @@ def pull(G, of, kind, out, like, bounds):
 
 
 @parallel
-def _answers(of, kind, out, like):
+def _answers(inputs, kind, out, like):
     for c in prange(CHUNKS):
-        respond(of, kind, out, like, chunk(c, len(out)))
+        respond(inputs, kind, out, like, chunk(c, len(out)))
 
 
 @parallel
-def _pull(G, of, kind, out, like):
+def _pull(G, inputs, kind, out, like):
     for c in prange(CHUNKS):
-        pull(G, of, kind, out, like, chunk(c, len(G)))
+        pull(G, inputs, kind, out, like, chunk(c, len(G)))

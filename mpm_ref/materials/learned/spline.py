@@ -42,15 +42,18 @@ class SplineStress(NamedTuple):
 
 
 class ReleasedSplineStress(NamedTuple):
-    """The same of `released` splines, in Pa: a rate of 1 moves them by 150 of 1e4 at most."""
+    """Kirchhoff stress of `released` splines, in Pa: a rate of 1 moves the values by 150 of 1e4 at
+    most.
+    """
 
     unit: float = 1.0       # of the values [Pa]
 
 
 class Pieces(NamedTuple):
-    """How values at knots make a function: piece k, of as many breaks below x, is
+    """The pieces of a function of values at knots.
 
-    sum_m c_m (x - origin_k)^m,    c = basis[k] @ values,    m = 3 .. 0
+    Piece k, of as many breaks below x, is sum_m c_m (x - origin_k)^m with c = basis[k] @ values and
+    m = 3 .. 0.
     """
 
     breaks: np.ndarray      # (p - 1,)

@@ -26,7 +26,7 @@ class StretchStress(NamedTuple):
 
 
 class ReleasedStretchStress(NamedTuple):
-    """The same of the descending s alone, as the authors' release reads it."""
+    """Kirchhoff stress of a network of the descending s alone, as the authors' release reads it."""
 
     unit: float = 1.0       # of y [Pa]
 

@@ -23,7 +23,7 @@ from .invariants import count
 
 
 class LearnedEntry(NamedTuple):
-    """How the weights of a kind become a law or a flow."""
+    """The construction of a law or a flow from weights of a kind."""
 
     build: Callable         # `LawWeights` -> the record that kernels are compiled for
     ends: frozenset         # {(inputs, outputs)} that the layers may have; empty: no layers

@@ -29,7 +29,7 @@ RESPONSES = {kind.__name__ for kind in (*STRESSES, *CORRECTIONS)}
 
 
 class LawWeights(NamedTuple):
-    """What was learned of a law: its layers, which may be none, and its kind."""
+    """The weights of a law: its layers, which may be none, and its kind."""
 
     layers: tuple           # ((W (in, out), b (out,)), ..)
     kind: tuple             # a NamedTuple of KINDS
@@ -93,12 +93,12 @@ def law_from_arrays(part, arrays):
 
 
 def depth(part, arrays):
-    """How many layers a law has."""
+    """Return the number of layers of a law."""
     return sum(name.startswith(f"{part}_W") for name in arrays)
 
 
 def fault_of(arrays):
-    """What is wrong with the arrays of a file, or None."""
+    """Return a sentence on what is wrong with the arrays of a file, or None."""
     for part in PARTS:
         fault = fault_of_law(part, arrays)
         if fault:
@@ -111,7 +111,7 @@ def fault_of(arrays):
 
 
 def fault_of_law(part, arrays):
-    """What is wrong with a law, or None."""
+    """Return a sentence on what is wrong with the arrays of a law, or None."""
     kind = str(arrays.get(f"{part}_kind"))
     ends = {one.__name__: entry.ends for one, entry in TABLES[part].items()}
     if kind not in ends:
@@ -133,7 +133,10 @@ def fault_of_law(part, arrays):
 
 
 def fault_of_sizes(part, arrays, ends):
-    """What is wrong with the sizes of a law's layers, or None; ends: those that they may have."""
+    """Return a sentence on what is wrong with the sizes of a law's layers, or None.
+
+    ends: the pairs of inputs and outputs that they may have.
+    """
     layers = range(depth(part, arrays))
     sizes = [arrays[f"{part}_W{k}"].shape for k in layers]
     if (any(len(size) != 2 for size in sizes) or any(a[1] != b[0] for a, b in pairwise(sizes))

@@ -2,5 +2,5 @@
 
 It is that of [GNS]: points are the nodes of a graph, edges join those that are near each other.
 What a point has done in the last frames, and where its neighbours are, gives its acceleration;
-no law, no grid, no balance of momentum is known. `gnn.train` trains it.
+it knows no law, no grid and no balance of momentum. `gnn.train` trains it.
 """

@@ -23,7 +23,7 @@ class PerceptronWeights(NamedTuple):
 
 
 class GraphWeights(NamedTuple):
-    """All perceptrons."""
+    """The weights of all perceptrons of a graph network."""
 
     points: PerceptronWeights
     edges: PerceptronWeights
@@ -42,7 +42,7 @@ def answers(net, points, edges, graph):
 
 
 def outputs(perceptron, a):
-    """What a `PerceptronWeights` makes of inputs (n, in)."""
+    """Return the outputs of a perceptron at inputs (n, in)."""
     *inner, (W, b) = perceptron.layers
     for V, c in inner:
         a = np.maximum(a @ V + c, 0.0)

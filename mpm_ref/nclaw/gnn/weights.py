@@ -69,13 +69,13 @@ def network_of(arrays):
 
 
 def blocks_of(arrays):
-    """How many blocks pass messages."""
+    """Return the number of blocks that pass messages."""
     return sum(name.startswith("edges_") and name.endswith("_gain") and name != "edges_gain"
                for name in arrays)
 
 
 def fault_of(arrays):
-    """What is wrong with the arrays of a file, or None."""
+    """Return a sentence on what is wrong with the arrays of a file, or None."""
     found = arrays.get("points_W0"), arrays.get("v_mean")
     if any(a is None for a in found) or (found[0].ndim, found[1].ndim) != (2, 1):
         return "it lacks points_W0 or v_mean, or they are no matrix and no vector"

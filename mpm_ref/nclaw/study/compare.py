@@ -34,7 +34,7 @@ class RunBroken(ValueError):
 
 
 class ComparedError(NamedTuple):
-    """What became of a run."""
+    """The error of a run, and where it broke down."""
 
     error: float            # [m^2]; infinite if it broke down, unless it goes on
     step: int = -1          # in which it broke down
@@ -64,8 +64,8 @@ class ComparedRun:
                 self.broken = end
         return self.corner
 
-    def found(self):
-        """`ComparedError` so far."""
+    def error(self):
+        """Return the `ComparedError` so far."""
         broken = () if self.broken is None else (self.broken.step, self.broken.why)
         return ComparedError(self.total / self.count, *broken)
 
@@ -79,7 +79,7 @@ def compare_runs(problem, law):
     with threads_for(problem.bodies):
         run = ComparedRun(positions(problem, tuple(map(law, problem.bodies))), np.inf)
         for x in positions(problem, tuple(map(copy_body, problem.bodies))):
-            yield run.follow(x), run.found()
+            yield run.follow(x), run.error()
 
 
 def threads_for(bodies):
@@ -114,7 +114,7 @@ def positions(problem, bodies):
 
 
 def body_positions(bodies):
-    """Positions (n, d) of the points of bodies."""
+    """Return the positions (n, d) of the points of bodies."""
     return np.concatenate([in_order(body.particles.x, body.id) for body in bodies])
 
 

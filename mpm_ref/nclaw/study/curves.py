@@ -27,24 +27,24 @@ class Curve(NamedTuple):
     dt: float               # [s] of a step
     truth: np.ndarray       # (k + 1,) [Pa]
     learned: np.ndarray     # (k + 1,) [Pa]; NaN where the law broke down
-    seen: np.ndarray | None     # (k + 1,) whether training saw such strains; None: not known
+    in_range: np.ndarray | None     # (k + 1,) whether training met such strains; None: not known
 
     @property
-    def off(self):
-        """Largest difference, of the largest true stress; NaN without true stress, or where the
+    def error(self):
+        """The largest difference, of the largest true stress; NaN without true stress, or where the
         learned law broke down.
         """
         largest = np.abs(self.truth).max()
         return float(np.abs(self.learned - self.truth).max() / largest) if largest > 0.0 else nan
 
     @property
-    def beyond(self):
-        """The first strain of the path that training has not seen, or None."""
-        outside = () if self.seen is None else np.flatnonzero(~self.seen)
+    def range_exit(self):
+        """The first strain of the path that training did not meet, or None."""
+        outside = () if self.in_range is None else np.flatnonzero(~self.in_range)
         return float(self.path.strain[outside[0]]) if len(outside) else None
 
     @property
-    def broken(self):
+    def failure(self):
         """The strain at which the learned law first gives no finite stress, or None."""
         at = np.flatnonzero(~np.isfinite(self.learned))
         return float(self.path.strain[at[0]]) if len(at) else None
@@ -54,12 +54,12 @@ def compare_curves(truth, learned, paths, dt, bounds=None):
     """[`Curve`] of paths. truth, learned: (law, flow) each; dt [s] of a step; bounds: strains that
     training has seen (see `learned.strain_range`), if known.
     """
-    found = []
+    curves = []
     for path in paths:
         true, own = (path_response(*of, path, dt) for of in (truth, learned))
         inside = None if bounds is None else within_bounds(own.F, bounds)
-        found.append(Curve(path, dt, path_stress(path, true), path_stress(path, own), inside))
-    return found
+        curves.append(Curve(path, dt, path_stress(path, true), path_stress(path, own), inside))
+    return curves
 
 
 def paths_for(flows, d, strain, steps):
@@ -68,21 +68,22 @@ def paths_for(flows, d, strain, steps):
     return monotone(d, strain, steps) + (cycles(d, strain, steps) if flowing else [])
 
 
-def write_curves(found, out):
-    """Write `curves.Curve`s as CSV: a row for each time level. Stresses are in Pa; `seen` is 1 or
-    0, empty where it is not known.
+def write_curves(curves, out):
+    """Write `Curve`s as CSV: a row for each time level. Stresses are in Pa; `in_range`
+    is 1 or 0, empty where it is not known.
     """
     rows = ((curve.path.name, k * curve.dt, curve.path.strain[k], curve.path.symbol,
-             curve.truth[k], curve.learned[k], "" if curve.seen is None else int(curve.seen[k]))
-            for curve in found for k in range(len(curve.truth)))
-    write_rows(("path", "t", "strain", "stress", "truth", "learned", "seen"), rows, out)
+             curve.truth[k], curve.learned[k],
+             "" if curve.in_range is None else int(curve.in_range[k]))
+            for curve in curves for k in range(len(curve.truth)))
+    write_rows(("path", "t", "strain", "stress", "truth", "learned", "in_range"), rows, out)
 
 
-def draw_curves(found, title, out):
+def draw_curves(curves, title, out):
     """Write a picture of `Curve`s, a panel for each name of a path: png, pdf or svg."""
     from matplotlib.figure import Figure
 
-    panels = {name: list(own) for name, own in groupby(found, lambda curve: curve.path.name)}
+    panels = {name: list(own) for name, own in groupby(curves, lambda curve: curve.path.name)}
     columns = min(len(panels), COLUMNS)
     rows = -(-len(panels) // columns)
     figure = Figure(figsize=(PANEL[0] * columns, PANEL[1] * rows + ROOM), layout="constrained")
@@ -94,7 +95,7 @@ def draw_curves(found, title, out):
         axes.ticklabel_format(axis="y", scilimits=(-3, 3))
         axes.locator_params(axis="x", nbins=5)
     figure.suptitle(title, fontsize=9)
-    add_legend(figure, found)
+    add_legend(figure, curves)
     with replacing(out) as part:
         figure.savefig(part)
 
@@ -103,18 +104,18 @@ def draw_curve(axes, curve):
     """Draw both stresses; the learned one dotted beyond the strains of training."""
     strain = curve.path.strain
     axes.plot(strain, curve.truth, "-", color=TRUTH, lw=3.0)
-    seen = np.ones(len(strain), bool) if curve.seen is None else curve.seen
+    in_range = np.ones(len(strain), bool) if curve.in_range is None else curve.in_range
     for inside, style in STYLES.items():
-        shown = seen == inside
+        shown = in_range == inside
         shown[:-1] |= shown[1:]         # lines reach from one kind of point to the next
         axes.plot(strain, np.where(shown, curve.learned, nan), style, color=LEARNED, lw=1.4)
 
 
-def add_legend(figure, found):
+def add_legend(figure, curves):
     """Say below the panels what lines are."""
     from matplotlib.lines import Line2D
 
-    known = found[0].seen is not None
+    known = curves[0].in_range is not None
     words = {"truth": ("-", TRUTH), "learned": (STYLES[True], LEARNED)}
     if known:
         words["learned, beyond the strains of training"] = STYLES[False], LEARNED

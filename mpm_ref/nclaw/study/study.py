@@ -44,8 +44,8 @@ class LawStudyTable(Struct, frozen=True, kw_only=True):
 
 
 class AnswerTable(LawStudyTable):
-    """What the laws answer, by kinds of `learned.weights`; by default the usual ones of the method
-    with their usual constants.
+    """The kinds of the laws, of `learned.table`; by default the usual ones of the method with their
+    usual constants.
     """
 
     elastic: str | None = None
@@ -79,8 +79,10 @@ class LawStudyTables(LawStudyTable):
 
 
 def records_of(method, answers):
-    """The same of a method and `AnswerTable`. Raises ValueError for kinds that the method does not
-    know, and for constants that they do not have.
+    """Return the records of kinds of a method and an `AnswerTable`.
+
+    Raises ValueError for kinds that the method does not have, and for constants that the kinds do
+    not have.
     """
     given = answers.elastic, answers.plastic
     if method == SYS_ID and any(given):
@@ -92,11 +94,11 @@ def records_of(method, answers):
                           alpha=answers.alpha, strain=answers.strain)
 
 
-def choose_kind(part, name, known):
+def choose_kind(part, name, kinds):
     """The name of a kind: the given one, else the usual. Raises ValueError for an unknown one."""
     if name is None:
-        return known[0]
-    one_of(part, name, known)
+        return kinds[0]
+    one_of(part, name, kinds)
     return name
 
 
@@ -131,7 +133,7 @@ def checked(data):
 
 
 class LawStudy(NamedTuple):
-    """What is learned from a scene."""
+    """A scene, and the settings of the laws that are learned from it."""
 
     path: Path
     scene: Scene            # every step of which is shown
@@ -181,6 +183,6 @@ def require_learnable(study):
 
 
 def identifiable(material, body):
-    """Whether "sys-id" knows which constants of a body's laws to learn."""
+    """Return whether "sys-id" can learn the constants of a body's laws."""
     laws = zip(PARTS, (body.law, body.flow), strict=True)
     return all(is_identified(part, type(law)) for part, law in laws) and material.E is not None

@@ -21,17 +21,17 @@ J_ALONE = "J"
 
 
 def trainer():
-    """The part of the package that trains laws. Raises ValueError without PyTorch."""
+    """Return the module that trains laws. Raises ValueError without PyTorch."""
     return part("nclaw.train.train", "laws are trained",
                 "laws that were trained run, export and plot without it")
 
 
 def train_study(study, observed, checkpoint=None, on_epoch=None, **about):
-    """`LearnedLaws` of a study from its run, `Observed`.
+    """Train the laws of a study on its run, `Observed`, and return `LearnedLaws`.
 
-    checkpoint and on_epoch: as for `nclaw.train.fit.train`; about: what else is to be known, with
-    the `threads` of PyTorch. Raises ValueError without PyTorch and for a checkpoint of another
-    training, and `Diverged` of `trainer`.
+    checkpoint and on_epoch: as for `nclaw.train.fit.train`; about: more facts for the record of the
+    training, with the `threads` of PyTorch. Raises ValueError without PyTorch and for a checkpoint
+    of another training, and `Diverged` of `trainer`.
     """
     how, recipe, problem = trainer(), study.tables.train, study.problem()
     how.use_threads(about["threads"])
@@ -45,7 +45,7 @@ def train_study(study, observed, checkpoint=None, on_epoch=None, **about):
 
 
 def identity(study):
-    """What laws are of and how they were made: plain values."""
+    """Return what identifies a training: scene, method, recipe and versions, as plain values."""
     return {"scene_sha256": scene.digest(study.scene), "title": study.scene.title,
             "dt": study.scene.dt, "method": study.tables.method,
             "recipe": asdict(study.tables.train), "source_sha256": source_hash(),
@@ -53,8 +53,9 @@ def identity(study):
 
 
 def is_complete(path, problem):
-    """Whether a results file holds all steps of a problem. Raises BadResults for a file that is no
-    results file, or of another scene.
+    """Return whether a results file holds all steps of a problem.
+
+    Raises BadResults for a file that is no results file, or of another scene.
     """
     if not Path(path).exists():
         return False

@@ -28,7 +28,7 @@ class Measures(Function):
 
     @staticmethod
     def forward(ctx, F):
-        """The measures."""
+        """Return the measures (n, 4)."""
         ctx.F = F.contiguous().numpy()
         return torch.from_numpy(energetic.measures_of(ctx.F))
 
@@ -43,46 +43,47 @@ class EnergyStress(Function):
 
     @staticmethod
     def forward(ctx, g, F):
-        """tau."""
-        ctx.of = g.contiguous().numpy(), F.contiguous().numpy()
-        return torch.from_numpy(energetic.stresses(*ctx.of))
+        """Return tau (n, 3, 3) in units of the energy."""
+        ctx.inputs = g.contiguous().numpy(), F.contiguous().numpy()
+        return torch.from_numpy(energetic.stresses(*ctx.inputs))
 
     @staticmethod
     def backward(ctx, G):
         """Gradients of g, and of F at fixed g."""
-        return tuple(map(torch.from_numpy, energetic.pull_back(G.contiguous().numpy(), *ctx.of)))
+        gradients = energetic.pull_back(G.contiguous().numpy(), *ctx.inputs)
+        return tuple(map(torch.from_numpy, gradients))
 
 
 class Strains(Function):
     """Trial F (n, 3, 3) and its `Spectrum` -> what a `Contraction` reads (n, 3)."""
 
     @staticmethod
-    def forward(ctx, F, of, kind):
-        """x."""
-        ctx.of = of, kind
-        return torch.from_numpy(contraction.strains_of(of, kind))
+    def forward(ctx, F, factors, kind):
+        """Return the strains x (n, 3)."""
+        ctx.inputs = factors, kind
+        return torch.from_numpy(contraction.strains_of(factors, kind))
 
     @staticmethod
     def backward(ctx, x_bar):
         """Gradient of F."""
-        found = contraction.pull_back_strains(x_bar.contiguous().numpy(), *ctx.of)
-        return torch.from_numpy(found), None, None
+        gradients = contraction.pull_back_strains(x_bar.contiguous().numpy(), *ctx.inputs)
+        return torch.from_numpy(gradients), None, None
 
 
 class Contracted(Function):
     """c = (a, b) (n, 2), trial F (n, 3, 3) and its `Spectrum` -> F (n, 3, 3)."""
 
     @staticmethod
-    def forward(ctx, c, F, of):
-        """F."""
-        ctx.of = c.contiguous().numpy(), of
-        return torch.from_numpy(contraction.contracted(*ctx.of))
+    def forward(ctx, c, F, factors):
+        """Return F after the return map."""
+        ctx.inputs = c.contiguous().numpy(), factors
+        return torch.from_numpy(contraction.contracted(*ctx.inputs))
 
     @staticmethod
     def backward(ctx, G):
         """Gradients of c, and of F at fixed c."""
-        found = contraction.pull_back(G.contiguous().numpy(), *ctx.of)
-        return *map(torch.from_numpy, found), None
+        gradients = contraction.pull_back(G.contiguous().numpy(), *ctx.inputs)
+        return *map(torch.from_numpy, gradients), None
 
 
 class GrowingConvex(nn.Module):
@@ -104,7 +105,7 @@ class GrowingConvex(nn.Module):
                                    for n in hidden])
 
     def forward(self, m):
-        """The slopes."""
+        """Return the slopes (n, inputs) at inputs m."""
         *inner, last = (log_W.exp() for log_W in self.log_W)
         a, grown = m, []
         for W, b in zip(inner, self.b, strict=True):
@@ -131,7 +132,7 @@ class EnergyLawModule(LawModule):
         self.net = GrowingConvex(SHARES, HIDDEN["elastic"])
 
     def forward(self, F):
-        """tau."""
+        """Return tau (n, 3, 3) [Pa]."""
         return self.kind.unit * EnergyStress.apply(self.net(Measures.apply(F)), F)
 
     def weights(self):
@@ -151,9 +152,9 @@ class ContractionModule(LawModule):
 
     def forward(self, F):
         """F after the return."""
-        of = spectrum(F.detach().numpy())
-        c = nn.functional.softplus(self.net(Strains.apply(F, of, self.kind)))
-        return Contracted.apply(c, F, of)
+        factors = spectrum(F.detach().numpy())
+        c = nn.functional.softplus(self.net(Strains.apply(F, factors, self.kind)))
+        return Contracted.apply(c, F, factors)
 
     def weights(self):
         """Return the `LawWeights` of the law."""

@@ -15,17 +15,17 @@ class Invariants(Function):
 
     @staticmethod
     def forward(ctx, F):
-        """a, R."""
+        """Return the invariants a and R."""
         F = F.numpy()
-        ctx.F, ctx.of = F, invariants.spectrum(F)
-        a, R = invariants.invariants(F, ctx.of), invariants.rotations(ctx.of)
+        ctx.F, ctx.factors = F, invariants.spectrum(F)
+        a, R = invariants.invariants(F, ctx.factors), invariants.rotations(ctx.factors)
         return torch.from_numpy(a).float(), torch.from_numpy(R)
 
     @staticmethod
     def backward(ctx, a_bar, R_bar):
         """Gradient of F."""
         a_bar, R_bar = a_bar.double().numpy(), R_bar.contiguous().numpy()
-        return torch.from_numpy(invariants.pull_back(ctx.F, ctx.of, a_bar, R_bar))
+        return torch.from_numpy(invariants.pull_back(ctx.F, ctx.factors, a_bar, R_bar))
 
 
 class Answer(Function):
@@ -33,16 +33,16 @@ class Answer(Function):
 
     @staticmethod
     def forward(ctx, Y, F, R, kind):
-        """The answers."""
+        """Return the answers (n, d, d)."""
         ctx.kind, ctx.precision = kind, Y.dtype
-        ctx.of = Y.double().numpy().reshape(F.shape), F.numpy(), R.numpy()
-        return torch.from_numpy(response.answers(*ctx.of, kind))
+        ctx.inputs = Y.double().numpy().reshape(F.shape), F.numpy(), R.numpy()
+        return torch.from_numpy(response.answers(*ctx.inputs, kind))
 
     @staticmethod
     def backward(ctx, G):
         """Gradients of Y, F, R."""
-        found = response.pull_back(G.contiguous().numpy(), *ctx.of, ctx.kind)
-        Y, F, R = map(torch.from_numpy, found)
+        gradients = response.pull_back(G.contiguous().numpy(), *ctx.inputs, ctx.kind)
+        Y, F, R = map(torch.from_numpy, gradients)
         return Y.reshape(len(Y), -1).to(ctx.precision), F, R, None
 
 
@@ -51,8 +51,8 @@ class Advance(Function):
 
     @staticmethod
     def forward(ctx, world, nodes, *before):
-        """The states."""
-        ctx.of, ctx.on = world, nodes
+        """Return x, v, C and the trial F after the step."""
+        ctx.world, ctx.nodes = world, nodes
         ctx.before = batched_step.States(*(a.numpy() for a in before))
         ctx.after = batched_step.advance(world, ctx.before, nodes)
         return tuple(map(torch.from_numpy, ctx.after[:4]))
@@ -61,5 +61,5 @@ class Advance(Function):
     def backward(ctx, *bars):
         """Gradients of the states before and of tau."""
         bars = batched_step.States(*(bar.contiguous().numpy() for bar in bars))
-        found = batched_step.pull_back(ctx.of, ctx.before, ctx.after, bars, ctx.on)
-        return None, None, *map(torch.from_numpy, found)
+        gradients = batched_step.pull_back(ctx.world, ctx.before, ctx.after, bars, ctx.nodes)
+        return None, None, *map(torch.from_numpy, gradients)

@@ -18,7 +18,7 @@ ADVICE = "Try smaller rates, a smaller unit or shorter horizons"
 
 
 class Epoch(NamedTuple):
-    """What an epoch was like."""
+    """The errors and gradients of an epoch."""
 
     loss: float         # as it is trained on
     error: float        # mean squared error of positions after a step [m^2]
@@ -45,7 +45,7 @@ class TrajectorySession(TrainingSession):
 
     @property
     def number(self):
-        """Of the epoch under way, counted from 1."""
+        """Return the number of the epoch under way, counted from 1."""
         return len(self.history) + 1
 
     @property

@@ -34,9 +34,9 @@ class MaterialFunction(Function):
     """
 
     @staticmethod
-    def forward(ctx, F, constants, of):
+    def forward(ctx, F, constants, kinds):
         """tau or F."""
-        law, flow = ctx.records = records(constants.tolist(), of)
+        law, flow = ctx.records = records(constants.tolist(), kinds)
         ctx.F, like = F.contiguous().numpy(), axes(F)
         q = particles(ctx.F.copy(), np.zeros(F.shape))
         if isinstance(flow, NoFlow):
@@ -72,9 +72,9 @@ def particles(F, tau):
                      NONE)
 
 
-def records(constants, of):
+def records(constants, kinds):
     """The law and the flow of constants in a row."""
-    law, flow = of
+    law, flow = kinds
     moduli = len(law._fields)
     return law(*constants[:moduli]), flow(*constants[moduli:])
 
@@ -99,7 +99,7 @@ class IdentifiedLaw(nn.Module):
         return self.log_E.exp() * self.unit
 
     def forward(self, F):
-        """tau."""
+        """Return tau (n, d, d) [Pa]."""
         return MaterialFunction.apply(F, self.moduli(), (self.law, NoFlow))
 
     def weights(self):
@@ -124,7 +124,7 @@ class IdentifiedFlow(nn.Module):
         return f"{self.of[1].__name__}, {self.fixed.tolist()}"
 
     def constants(self):
-        """Those of the flow."""
+        """Return the constants of the flow."""
         return torch.cat([self.log_own.exp(), self.fixed])
 
     def forward(self, F):

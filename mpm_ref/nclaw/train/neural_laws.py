@@ -41,8 +41,8 @@ class LawModule(nn.Module):
 
 
 def describe(law):
-    """What is to be known of a law but for what it has learned: its class, its constants, the sizes
-    of its layers; plain values.
+    """Return what identifies a law before training, as plain values: its class, its constants, the
+    sizes of its layers.
     """
     return [type(law).__name__, law.extra_repr(), [list(a.shape) for a in law.parameters()]]
 
@@ -86,7 +86,7 @@ class NeuralLawModule(LawModule):
         self.net = MultilayerPerceptron(count(dim), dim * dim, hidden)
 
     def forward(self, F):
-        """The answers."""
+        """Return the answers (n, d, d)."""
         a, R = Invariants.apply(F)
         return Answer.apply(self.net(a), F, R, self.kind)
 
@@ -109,7 +109,7 @@ class PlainLawModule(LawModule):
         self.net = MultilayerPerceptron(dim * dim, dim * dim, hidden)
 
     def forward(self, F):
-        """The answers."""
+        """Return the answers (n, d, d)."""
         a = (F - torch.eye(F.shape[1], dtype=F.dtype)).flatten(1).float()
         return Answer.apply(self.net(a), F, F, self.kind)
 
@@ -128,7 +128,7 @@ class UnshiftedLawModule(LawModule):
         self.rest = torch.cat([one, torch.eye(dim).flatten(), one[:1]])
 
     def forward(self, F):
-        """The answers."""
+        """Return the answers (n, d, d)."""
         a, R = Invariants.apply(F)
         return Answer.apply(self.net(a + self.rest), F, R, self.kind)
 
@@ -145,7 +145,7 @@ class NoFlowModule(LawModule):
         super().__init__(kind)
 
     def forward(self, F):
-        """F."""
+        """Return F."""
         return F
 
     def weights(self):

@@ -26,11 +26,11 @@ class Trajectory(NamedTuple):
     F: torch.Tensor     # (k + 1, n, 3, 3)
 
     def states(self, levels):
-        """The states (b, n, ..) at b time levels."""
+        """Return the states (b, n, ..) at b time levels."""
         return tuple(a[levels] for a in self)
 
     def restarts(self, cuts):
-        """Where segments begin that are asked for at time levels `cuts`, and end: as asked for."""
+        """Return where segments begin and end: the time levels `cuts` as they are."""
         return cuts
 
     def squared_error(self, name, a, levels):
@@ -67,12 +67,12 @@ class PartialTrajectory(NamedTuple):
     weight: torch.Tensor    # (k + 1, n) of squared errors
 
     def states(self, levels):
-        """The states (b, n, ..) at b time levels."""
+        """Return the states (b, n, ..) at b time levels."""
         return tuple(a[levels] for a in self[:4])
 
     def restarts(self, cuts):
-        """Where segments begin that are asked for at time levels `cuts`, at the last seen level
-        before each; and the end as it is.
+        """Return where segments begin, each at the last observed level before the one that `cuts`
+        asks for; and the end as it is.
         """
         seen = np.flatnonzero(self.weight.any(dim=1).numpy())
         begins = seen[np.searchsorted(seen, cuts[:-1], side="right") - 1]
@@ -110,13 +110,17 @@ class ImageObservations(NamedTuple):
         return tuple(a.expand(len(levels), *a.shape) for a in self[5:])
 
     def restarts(self, cuts):
-        """Where the one segment begins and ends, of those asked for at time levels `cuts`."""
+        """Return the begin and the end of the one segment, of those asked for at time levels
+        `cuts`.
+        """
         return cuts[:2]
 
     def squared_error(self, name, a, levels):
-        """Of positions a (b, n, 3) [m] at b time levels the weighted squared distance of marks in
-        the image [px^2], of velocities [m/s] the squared component in depth, which the paper's
-        prior has small; their mean over marks or points, summed over the levels.
+        """Return a sum over time levels for positions or velocities a (b, n, 3).
+
+        Of positions [m] it is the weighted squared distance of marks in the image [px^2], of
+        velocities [m/s] the squared component in depth, which the paper's prior has small; both are
+        means over marks or points.
         """
         if name == "v":
             return ((a @ self.depth) ** 2).mean(dim=1).sum()

@@ -30,15 +30,15 @@ class Stretches(Function):
     """F (n, d, d), and its `Spectrum` -> s (n, d)."""
 
     @staticmethod
-    def forward(ctx, F, of):
-        """s."""
-        ctx.of = of
-        return torch.from_numpy(of.s)
+    def forward(ctx, F, factors):
+        """Return s (n, d)."""
+        ctx.factors = factors
+        return torch.from_numpy(factors.s)
 
     @staticmethod
     def backward(ctx, s_bar):
         """Gradient of F."""
-        F_bar = principal.pull_back_stretches(s_bar.contiguous().numpy(), ctx.of)
+        F_bar = principal.pull_back_stretches(s_bar.contiguous().numpy(), ctx.factors)
         return torch.from_numpy(F_bar), None
 
 
@@ -46,33 +46,33 @@ class PrincipalStress(Function):
     """y (n, d) and F (n, d, d), its `Spectrum` and the ratios a_ij (n, pairs) -> tau (n, d, d)."""
 
     @staticmethod
-    def forward(ctx, y, F, of, ratios):
-        """tau."""
-        ctx.given = y.contiguous().numpy(), ratios.contiguous().numpy(), of
-        return torch.from_numpy(principal.stresses(ctx.given[0], of))
+    def forward(ctx, y, F, factors, ratios):
+        """Return tau (n, d, d)."""
+        ctx.given = y.contiguous().numpy(), ratios.contiguous().numpy(), factors
+        return torch.from_numpy(principal.stresses(ctx.given[0], factors))
 
     @staticmethod
     def backward(ctx, G):
         """Gradients of y, and of F at fixed y."""
-        found = principal.pull_back(G.contiguous().numpy(), *ctx.given)
-        return *map(torch.from_numpy, found), None, None
+        gradients = principal.pull_back(G.contiguous().numpy(), *ctx.given)
+        return *map(torch.from_numpy, gradients), None, None
 
 
 class PrincipalLawModule(LawModule):
     """F (n, d, d) -> tau (n, d, d) [Pa]; `y` is in units of `kind.unit`, and isotropic."""
 
     def forward(self, F):
-        """tau."""
-        of = spectrum(F.detach().numpy())
-        s = Stretches.apply(F, of)
+        """Return tau (n, d, d) [Pa]."""
+        factors = spectrum(F.detach().numpy())
+        s = Stretches.apply(F, factors)
         y = self.y(s)
         with torch.no_grad():
             ratios = self.ratios(y, s)
-        return self.kind.unit * PrincipalStress.apply(y, F, of, ratios)
+        return self.kind.unit * PrincipalStress.apply(y, F, factors, ratios)
 
     def ratios(self, y, s):
         """a_ij (n, pairs); stretches nearer than MEETING are first moved apart to that."""
-        found = []
+        ratios = []
         for i, j in principal.PAIRS[s.shape[1]]:
             gap = s[:, i] - s[:, j]
             near, ratio = gap < LEAST_GAP, (y[:, i] - y[:, j]) / gap
@@ -81,8 +81,8 @@ class PrincipalLawModule(LawModule):
             apart[:, i], apart[:, j] = middle + 0.5 * LEAST_GAP, middle - 0.5 * LEAST_GAP
             of_apart = self.y(apart)
             ratio[near] = (of_apart[:, i] - of_apart[:, j]) / LEAST_GAP
-            found.append(ratio)
-        return torch.stack(found, dim=1)
+            ratios.append(ratio)
+        return torch.stack(ratios, dim=1)
 
 
 class EluPerceptron(MultilayerPerceptron):
@@ -102,7 +102,7 @@ class ReleasedStretchLawModule(PrincipalLawModule):
         self.net = EluPerceptron(dim, dim, hidden).double()
 
     def y(self, s):
-        """What the network gives (n, d)."""
+        """Return the outputs (n, d) of the network."""
         return self.net(s - 1.0)
 
     def ratios(self, y, s):

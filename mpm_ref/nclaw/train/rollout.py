@@ -14,7 +14,7 @@ from .autograd import Advance
 
 
 class LawPair(NamedTuple):
-    """What is learned: functions of F (n, d, d)."""
+    """An elastic law and a flow to be learned, functions of F (n, d, d)."""
 
     elastic: object     # -> tau [Pa]
     plastic: object     # -> F
@@ -25,10 +25,10 @@ def over_points(law, F):
     return law(F.reshape(-1, *F.shape[2:])).reshape(F.shape)
 
 
-def step(laws, world, state, on):
+def step(laws, world, state, nodes):
     """The state (x, v, C, F) after a step."""
     tau = over_points(laws.elastic, state[3])
-    x, v, C, F = Advance.apply(world, on, *state, tau)
+    x, v, C, F = Advance.apply(world, nodes, *state, tau)
     return x, v, C, over_points(laws.plastic, F)
 
 
@@ -47,9 +47,9 @@ def segment_errors(laws, world, observed, starts, ends, velocity=0.0):
     `velocity` [s^2].
     """
     levels, last, total, positions = torch.tensor(starts), torch.tensor(ends), 0.0, 0.0
-    state, on = observed.states(levels), make_nodes(world, len(starts))
+    state, nodes = observed.states(levels), make_nodes(world, len(starts))
     while len(levels):
-        state, levels = step(laws, world, state, on), levels + 1
+        state, levels = step(laws, world, state, nodes), levels + 1
         off = observed.squared_error("x", state[0], levels)
         total, positions = total + off, positions + off.detach()
         if velocity:

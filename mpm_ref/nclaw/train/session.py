@@ -1,4 +1,4 @@
-"""What the trainings of laws and of graph networks share: their state as a checkpoint.
+"""The state of a training as a checkpoint, of laws and of graph networks alike.
 
 A training that is cut off goes on from its last checkpoint, with the numbers of one that was not,
 on the same machine with the same number of threads.

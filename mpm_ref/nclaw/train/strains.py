@@ -19,11 +19,11 @@ MAX_STRETCH = 100.0     # stretch or J, above which a segment has broken down
 
 
 def training_bounds(problem, observed, law, cuts):
-    """Bounds as of `seen.seen`.
+    """Return the bounds of the strains that a training meets, as of `strain_bounds`.
 
-    problem: a `Problem` of one body, at its start; observed: `Observed` of its run, all
-    steps; law: makes the body of learned laws (`bodies.body_maker`); cuts: time levels at which
-    segments begin, and the last one. Of segments that break down there is what came before.
+    problem: a `Problem` of one body, at its start; observed: `Observed` of its run, all steps; law:
+    makes the body of learned laws (`bodies.body_maker`); cuts: time levels at which segments begin,
+    and the last one. Segments that break down count up to there.
     """
     rows = [extremes(strain_measures(F)) for F in observed.F if np.isfinite(F).all()]
     body, stepper = law(problem.bodies[0]), problem.stepper()
@@ -31,12 +31,15 @@ def training_bounds(problem, observed, law, cuts):
         restart(body, observed, begin)
         stepper.start((body,))
         rows += segment(problem, stepper, body, end - begin)
-    low, high = (np.array(found) for found in zip(*rows, strict=True))
+    low, high = (np.array(measures) for measures in zip(*rows, strict=True))
     return {"low": low.min(axis=0).tolist(), "high": high.max(axis=0).tolist()}
 
 
 def segment_cuts(recipe, steps, epoch=None):
-    """The cuts of an epoch, counted from 1, of a `learn.recipe.Recipe`; of the last one."""
+    """Return the time levels at which segments of an epoch begin, and the last one.
+
+    The epoch of a `Recipe` counts from 1; by default it is the last one.
+    """
     number = (epoch or recipe.epochs) - 1
     return TeacherForcing(recipe.first, recipe.last).restarts(steps, number, recipe.epochs)
 
@@ -50,7 +53,7 @@ def restart(body, observed, k):
 
 def segment(problem, stepper, body, steps):
     """[(low, high)] of the strains after each of so many steps."""
-    found, dt = [], problem.clock.dt
+    measures, dt = [], problem.clock.dt
     for _ in range(steps):
         try:
             stepper.step((body,), 0.0, dt)
@@ -62,10 +65,10 @@ def segment(problem, stepper, body, steps):
             row = extremes(strain_measures(deformation_gradients(body)))
         if not (np.abs(row).max() <= MAX_STRETCH and np.isfinite(body.particles.x).all()):
             break
-        found.append(row)
-    return found
+        measures.append(row)
+    return measures
 
 
-def extremes(found):
-    """The smallest and the largest of measures (n, d + 1)."""
-    return found.min(axis=0), found.max(axis=0)
+def extremes(measures):
+    """Return the smallest and the largest of strain measures (n, d + 1)."""
+    return measures.min(axis=0), measures.max(axis=0)

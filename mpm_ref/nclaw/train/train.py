@@ -40,7 +40,7 @@ __all__ = ["Diverged", "drawn_laws", "initial_laws", "learned_laws", "train_laws
 
 
 def stretch_law(kind):
-    """The law of either kind of `principal`."""
+    """Return the law of either kind of `stretch_network`."""
     return OF_STRETCHES[type(kind)](kind)
 
 
@@ -56,17 +56,17 @@ METHODS = {     # method -> elastic and plastic law of a kind
 
 
 def drawn_laws(method, seed, elastic, plastic):
-    """`LawPair` of a method before training, of kinds."""
+    """Return the `LawPair` of a method and its kinds before training, drawn from a seed."""
     torch.manual_seed(seed)
     return LawPair(*(make(kind) for make, kind in zip(METHODS[method], (elastic, plastic),
                                                       strict=True)))
 
 
 def initial_laws(method, seed, kinds, material):
-    """`rollout.LawPair` before training.
+    """Return the `LawPair` before training.
 
-    kinds: records of what both laws answer, of all methods but "sys-id"; material: a scene's record
-    of the true laws, of which that takes all but the constants that it learns.
+    kinds: records of the kinds of both laws, of all methods but "sys-id"; material: a scene's
+    record of the true laws, of which "sys-id" takes all but the constants that it learns.
     """
     if method != SYS_ID:
         return drawn_laws(method, seed, *kinds)
@@ -88,7 +88,7 @@ def initial_flow(flow, law):
 
 
 def train_laws(method, recipe, laws, run, checkpoint=None, on_epoch=None):
-    """The session that trained `laws`, in place, as a method asks for.
+    """Train `laws` in place by a method, and return the session.
 
     run: a `Problem` of one body at its start, and the `Observed` of its run; checkpoint and
     on_epoch as for `fit.train`. Raises `Diverged`.
@@ -102,7 +102,7 @@ def train_laws(method, recipe, laws, run, checkpoint=None, on_epoch=None):
 
 
 def learned_laws(laws, about):
-    """`LearnedLaws` of laws that were trained."""
+    """Return the `LearnedLaws` of laws that were trained."""
     return LearnedLaws(*(law.weights() for law in laws), about)
 
 
@@ -112,5 +112,5 @@ def use_threads(n):
 
 
 def version():
-    """PyTorch's."""
+    """Return the version of PyTorch."""
     return torch.__version__

@@ -34,7 +34,7 @@ def diverging(net, recipe, laws, checkpoint, show):
 
 
 def test_errors_of_a_training_that_diverges_are_kept(places, monkeypatch, capsys):
-    monkeypatch.setattr(nclaw, "train_laws", diverging)
+    monkeypatch.setattr(nclaw, "taught", diverging)
     nclaw.main([NAME], *places)
     found = diverged(NAME, trained_laws.identity(trained_laws.nets()[NAME]))
     assert found["errors"] == [1e-3, 2e-3]
@@ -48,7 +48,7 @@ def test_errors_of_a_training_that_diverges_are_kept(places, monkeypatch, capsys
 
 def test_errors_before_a_checkpoint_are_found_again(places, monkeypatch):
     """A training that goes on and diverges at once has shown none."""
-    monkeypatch.setattr(nclaw, "train_laws", diverging)
+    monkeypatch.setattr(nclaw, "taught", diverging)
     for place in places:
         place.mkdir()
     (places[1] / f"{NAME}.pt").write_text("two epochs")

@@ -126,7 +126,7 @@ def test_untrained_laws_are_those_that_pytorch_draws():
     for seed in (0, 3):
         for theirs, ours in zip(law.neural_laws(seed, Stress(), Correction()), untrained(seed)[:2],
                                 strict=True):
-            for (W, b), (V, c) in zip(law.trained_of(theirs).layers, ours.layers, strict=True):
+            for (W, b), (V, c) in zip(theirs.weights().layers, ours.layers, strict=True):
                 assert np.array_equal(W, V)
                 assert np.array_equal(b, c)
 

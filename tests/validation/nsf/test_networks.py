@@ -1,5 +1,5 @@
 """Trained networks of NSF's scenes: which weights are taken for them, what they cost, and the
-experiment on them; the training itself is in validation/nsf/test_networks_learn.py.
+experiment on them; the training itself is in tests/validation/nsf/test_networks_learn.py.
 """
 
 import numpy as np

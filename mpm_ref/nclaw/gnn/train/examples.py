@@ -31,7 +31,7 @@ class TrainingRun(NamedTuple):
 
     @property
     def count(self):
-        """How many frames follow another one: k."""
+        """Return the number k of frames that follow another one."""
         return len(self.frames) - HISTORY - 1
 
 

@@ -61,7 +61,7 @@ class GraphRecipe:
 
     @property
     def rounds(self):
-        """How often the network is checked."""
+        """Return the number of times that the network is checked."""
         return self.steps // self.check
 
     def rate(self, step):
@@ -74,7 +74,7 @@ FORMAT = 1          # of checkpoints
 
 
 class Round(NamedTuple):
-    """What a round was like."""
+    """The errors of a round of the training."""
 
     loss: float         # the mean over its steps
     error: float        # mean squared, of free runs [m^2]; infinite where they break down
@@ -106,7 +106,7 @@ class GraphSession(TrainingSession):
         return int(np.argmin([one.error for one in self.history]))
 
     def epoch(self):
-        """One `Round`."""
+        """Run one `Round`."""
         done = len(self.history) * self.recipe.check
         loss = np.mean([self.step(done + k) for k in range(self.recipe.check)])
         self.history.append(Round(float(loss), self.error()))

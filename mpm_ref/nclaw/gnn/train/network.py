@@ -60,7 +60,7 @@ class Block(nn.Module):
 
 
 class GraphNetwork(nn.Module):
-    """What points (n, ..) and edges (k, ..) are told -> answers (n, d)."""
+    """A graph network: features of points (n, ..) and edges (k, ..) -> answers (n, d)."""
 
     def __init__(self, dim=3, width=128, blocks=10):
         super().__init__()
