@@ -1,5 +1,4 @@
-"""The only place where Numba is configured: two decorators, one dispatch, one cache, one thread
-pool.
+"""All configuration of Numba: three decorators, one dispatch, one cache, one thread pool.
 
 Every option and its reason:
 
@@ -11,7 +10,8 @@ Every option and its reason:
   reorders no sum, hence changes no bit, and makes particle-to-grid transfer 1.3 times faster.
 * ``cache=True`` in a folder named by the hash of every file that shapes kernels. Numba looks only
   at the file of the cached function: after an edit of a *callee in another file* it would
-  silently run the old code.
+  silently run the old code. Docstrings and comments shape no kernel and are left out of the hash:
+  after an edit of them, Numba compiles the kernels of that file again, and no others.
 * The threading layer is pinned (OpenMP where present, else Numba's own work queue): Numba's
   default changes when another package installs TBB. The bits of our results do not depend on it.
 * Waiting OpenMP threads sleep instead of spinning: on a machine that does other work too, spinning
@@ -20,12 +20,13 @@ Every option and its reason:
   function of the input alone. See `chunk` and `total`.
 """
 
+import ast
 import hashlib
 import importlib.util
 import os
 import shutil
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from time import time
 
@@ -36,9 +37,10 @@ from numba import njit, prange
 from numba.extending import overload
 
 CHUNKS = 64          # of every parallel loop and reduction
-KEPT_CACHES = 4      # compiled versions of the package that stay on disk, however old
+VERSIONS = 4         # of the package whose compiled kernels stay on disk, however old
 IN_USE = 86400.0     # [s] since a version was opened, in which it may still be in use: stays too
 
+DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef)
 _OPTIONS = {"error_model": "numpy", "cache": True}
 
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")     # read when the library is loaded
@@ -49,37 +51,81 @@ if "NUMBA_THREADING_LAYER" not in os.environ:
     numba.config.THREADING_LAYER = "omp" if has_omp else "workqueue"
 
 
-def _source_hash():
-    """Hash of all files that shape compiled code, and of the compiler's version: kernels, and in
-    `core` and `materials` also the records and tables that kernels are compiled for.
+def _sources(package):
+    """Return the texts of all files that shape compiled code: kernels, and in `core` and
+    `materials` also the records and tables that kernels are compiled for.
     """
+    texts = ((file.relative_to(package), file.read_bytes()) for file in
+             sorted(package.rglob("*.py")))
+    return [text for path, text in texts
+            if path.parts[0] in ("core", "materials") or b"jit import" in text]
+
+
+def _syntax(text):
+    """Return the syntax tree of a text, without comments, docstrings and positions, as bytes."""
+    tree = ast.parse(text)
+    for node in ast.walk(tree):
+        if isinstance(node, DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
+            del node.body[0]
+    return ast.dump(tree).encode()
+
+
+def _hash(parts):
+    """Return the hash of a sequence of bytes and of the compiler's version."""
     digest = hashlib.sha256(f"{numba.__version__} {sys.version}".encode())
-    package = Path(__file__).parents[1]
-    for file in sorted(package.rglob("*.py")):
-        text, room = file.read_bytes(), file.relative_to(package).parts[0]
-        if room in ("core", "materials") or b"jit import" in text:
-            digest.update(text)
+    for part in parts:
+        digest.update(part)
     return digest.hexdigest()[:16]
 
 
+def _source_hash(package, root):
+    """Return the hash of the syntax of `_sources`, which names the folder of compiled kernels.
+
+    Parsing takes longer than reading, so that the folder `root` has, for each state of the texts,
+    a small file with the hash of their syntax.
+    """
+    texts = _sources(package)
+    known = root / f"{_hash(texts)}.syntax"
+    try:
+        found = known.read_text(encoding="ascii")
+    except OSError:
+        found = ""
+    if len(found) == 16:            # neither missing nor half written by another process
+        return found
+    found = _hash(map(_syntax, texts))
+    with suppress(OSError):
+        root.mkdir(parents=True, exist_ok=True)
+        known.write_text(found, encoding="ascii")
+    return found
+
+
 def _used(version):
-    """When a folder of compiled kernels was last opened [s]."""
+    """Return when a folder of compiled kernels was last opened [s]."""
     return version.stat().st_mtime
 
 
+def _remove_old(root):
+    """Remove the versions long unused from the folder of compiled kernels."""
+    for known in root.glob("*.syntax"):
+        if time() - _used(known) > IN_USE:
+            known.unlink(missing_ok=True)
+    versions = [d for d in root.iterdir() if d.is_dir()]
+    for old in sorted(versions, key=_used)[:-VERSIONS]:
+        if time() - _used(old) > IN_USE:
+            shutil.rmtree(old, ignore_errors=True)
+
+
 def _cache_dir():
-    """Folder of this version's compiled kernels; removes those of versions long unused."""
+    """Return the folder of this version's compiled kernels, and remove versions long unused."""
     root = Path(numba.config.CACHE_DIR or platformdirs.user_cache_dir("mpm_ref")) / "kernels"
-    here = root / _source_hash()
+    here = root / _source_hash(Path(__file__).parents[1], root)
     try:
         here.mkdir(parents=True, exist_ok=True)
         os.utime(here)
-        versions = [d for d in root.iterdir() if d.is_dir()]
-        for old in sorted(versions, key=_used)[:-KEPT_CACHES]:
-            if time() - _used(old) > IN_USE:
-                shutil.rmtree(old, ignore_errors=True)
     except OSError:
         return ""          # Numba then falls back to a folder of its own, or compiles anew
+    with suppress(OSError):         # another process may remove the same
+        _remove_old(root)
     return str(here)
 
 
