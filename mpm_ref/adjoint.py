@@ -12,7 +12,7 @@ import numpy as np
 
 from .core.adjoint import deform as deform_adjoint
 from .core.adjoint.boundary import solve_adjoint
-from .core.adjoint.deform import DeformBars, Step
+from .core.adjoint.deform import DeformBars, DeformStep
 from .core.adjoint.grid import Update, update_adjoint
 from .core.adjoint.transfer import Exchange, g2p_adjoint, p2g_adjoint
 from .core.boundary import solve
@@ -128,7 +128,7 @@ def deform_body_adjoint(body, L, bar, parts, dt):
     """
     require_adjoint(body)
     q, law, flow, bars = body.particles, body.law, body.flow, _of_deformation(bar)
-    step = Step(q.F, q.y, L, parts, dt)
+    step = DeformStep(q.F, q.y, L, parts, dt)
     if q.F.ndim == 1:
         deform_adjoint.fluid(step, bars, law)
     elif isinstance(flow, NoFlow):

@@ -25,7 +25,7 @@ TRANSFERS = ("pic", "flip", "apic", "mls")
 
 @dataclass(frozen=True)
 class Scheme:
-    """How particles and grid exchange momentum.
+    """The exchange of momentum between particles and grid.
 
     degree of the B-spline (1, 2, 3); transfer "pic", "flip", "apic" or "mls"; flip is the share
     of FLIP (1) against PIC (0); rpic in [0, 1] damps the strain rate in C (NSF-rpic); mass_eps
@@ -66,7 +66,7 @@ class Scheme:
 
     @property
     def affine(self):
-        """Whether particles carry C."""
+        """True if particles carry C."""
         return self.transfer in AFFINE
 
     @property
@@ -162,7 +162,7 @@ def deform_body(body, dt):
     elif isinstance(flow, NoFlow):
         deform.elastic(particles, law, dt, like)
     elif type(flow) in returned.methods:
-        deform.whole(particles, law, flow, dt, like)
+        deform.full(particles, law, flow, dt, like)
     else:
         deform.plastic(particles, law, flow, dt, like)
 

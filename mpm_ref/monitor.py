@@ -30,7 +30,7 @@ class Unstable(RuntimeError):
 
 @dataclass(frozen=True)
 class Limits:
-    """What a healthy run stays within.
+    """Limits of a healthy run.
 
     cfl: cells that a particle may cross in one step; J: smallest and largest volume ratio (a law
     that recovers from inversion may go below the smallest); growth: mechanical energy that may
@@ -72,8 +72,8 @@ def account(problem, bodies):
 
 
 def runs_away(problem, state, dt):
-    """Whether a velocity has a component past the CFL limit, or NaN: a cheap look after every step,
-    before the grid follows such a particle.
+    """Return whether a velocity has a component past the CFL limit, or NaN: a cheap test after
+    every step, before the grid follows such a particle.
     """
     most = problem.limits.cfl * problem.dx / dt
     velocities = (body.particles.v for body in state.bodies)
@@ -136,7 +136,7 @@ def lost(problem, state, dt, reason):
 
 
 def advice(problem, solve):
-    """What may help a run whose last implicit step, if it was one, has the report `solve`."""
+    """Return advice for a run whose last implicit step, if it was one, has the report `solve`."""
     if solve is None or solve.converged:
         return "take a smaller dt, or look at the last checkpoint"
     options, key = problem.solver, "eps"

@@ -217,14 +217,14 @@ def _body_dt(body, grid, scheme, gravity):
     )
 
 
-def advective(particles, dx, reach, gravity):
-    """Largest dt in which no particle, nor a point at the distance reach [m] that moves with its
+def advective(particles, dx, distance, gravity):
+    """Largest dt in which no particle, nor a point at a distance [m] that moves with its
     velocity gradient, crosses a cell: dt u + dt^2 g = dx with the largest such speed u.
     """
     q = particles
     u = np.sqrt(np.einsum("pa,pa->p", q.v, q.v))
-    if reach:
-        u += reach * np.sqrt(np.einsum("pab,pab->p", q.L, q.L))
+    if distance:
+        u += distance * np.sqrt(np.einsum("pab,pab->p", q.L, q.L))
     u, g = float(np.max(u)), float(np.linalg.norm(gravity))
     if q.b.ndim == 2:
         g += float(np.sqrt(np.max(np.einsum("pa,pa->p", q.b, q.b))))

@@ -150,7 +150,7 @@ class Conditions:
 
     @property
     def moves(self):
-        """Whether a part moves, and so may do work."""
+        """True if a part moves, and so may do work."""
         return any(part.motion.moves for part in self.parts)
 
     def fastest(self, grid, t, dt):
@@ -173,8 +173,9 @@ class Conditions:
         return solve(*self.touched(grid, t, dt), grid)
 
     def touched(self, grid, t, dt):
-        """What `apply` solves for: the `Touch` of each part at time t, its rule and its friction,
-        three lists.
+        """Return three lists with an entry for each part: its `Touch` at time t, rule and friction.
+
+        `apply` solves for them.
         """
         touches, rules = [], list(self.parts)
         if self.parts:
@@ -197,7 +198,7 @@ def _check(kind, friction):
 
 # the nodes of each part, and one velocity for each that satisfies all parts
 
-class Nodes(NamedTuple):
+class MassNodes(NamedTuple):
     """Some nodes of a grid, by their index in its flattened arrays."""
 
     flat: np.ndarray      # (A,)
@@ -215,9 +216,9 @@ class Touch(NamedTuple):
 
 
 def nodes_with_mass(grid):
-    """`Nodes` of a grid that have mass."""
+    """`MassNodes` of a grid that have mass."""
     flat = np.flatnonzero(grid.m.reshape(-1) > 0.0)
-    return Nodes(flat, grid.m, grid.origin, float(grid.dx))
+    return MassNodes(flat, grid.m, grid.origin, float(grid.dx))
 
 
 def touch(nodes, shape, inside, region, pose):

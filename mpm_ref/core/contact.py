@@ -135,7 +135,7 @@ def projected(contacts, planes, v):
 
 @kernel
 def allowed(contacts, pairs, planes, u, basis, speed):
-    """Whether u, which is on the planes, suits all other colliders. NaN does, to stay visible."""
+    """Return whether u, on the planes, suits all other colliders. NaN does, to stay visible."""
     for k in range(pairs[0], pairs[1]):
         if k != planes[0] and k != planes[1] and k != planes[2]:
             a, slack = approach(contacts, k, u), 0.0
@@ -160,7 +160,7 @@ def nearer(contacts, pairs, planes, v, best):
 
 @kernel
 def nearest(contacts, pairs, v):
-    """Whether there is an allowed velocity, and the planes that bear the smallest change to one."""
+    """Return whether there is an allowed velocity, and the planes of the smallest change to one."""
     zero, none = fill(0.0, v), (-1, -1, -1)
     if allowed(contacts, pairs, none, v, (zero, zero, zero), 0.0):
         return True, none

@@ -1,4 +1,4 @@
-"""How a 3 x 3 spectral problem becomes a 2 x 2 one, and the closed forms of the latter.
+"""Deflation of a 3 x 3 spectral problem to a 2 x 2 one, and the closed forms of the latter.
 
 Of the three eigenvalues of a symmetric matrix, the one farthest from the middle one has a well
 conditioned eigenvector, however close the other two are [Scherzinger2008]. With that

@@ -55,7 +55,7 @@ def deform_plastic(particles, law, flow, dt, like, bounds):
 
 
 @kernel
-def deform_whole(particles, law, flow, dt, like, bounds):
+def deform_full(particles, law, flow, dt, like, bounds):
     """F <- returned((I + dt L) F), tau = kirchhoff(F)."""
     for p in range(bounds[0], bounds[1]):
         F = returned(mm(growth(particles.L, p, dt, like), mat(particles.F, p, like)), flow)
@@ -117,10 +117,10 @@ def plastic(particles, law, flow, dt, like):
 
 
 @parallel
-def whole(particles, law, flow, dt, like):
-    """`deform_whole` for all particles. `like` is any tuple of length d."""
+def full(particles, law, flow, dt, like):
+    """`deform_full` for all particles. `like` is any tuple of length d."""
     for c in prange(CHUNKS):
-        deform_whole(particles, law, flow, dt, like, chunk(c, len(particles.x)))
+        deform_full(particles, law, flow, dt, like, chunk(c, len(particles.x)))
 
 
 @parallel

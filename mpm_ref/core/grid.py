@@ -145,7 +145,7 @@ def _update_all_empty(nodes, gravity, dt):
 
 
 def flattened(grid):
-    """The same storage with one axis for all nodes: m (n,), v (n, d); f, v_old where carried."""
+    """Return a view with one axis for all nodes: m (n,), v (n, d); f, v_old where carried."""
     d = grid.m.ndim
     f, v_old = (a if a.ndim == 1 else a.reshape(-1, d) for a in (grid.f, grid.v_old))
     return Grid(grid.m.reshape(-1), grid.v.reshape(-1, d), f, v_old, grid.origin, grid.dx)

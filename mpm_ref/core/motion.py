@@ -40,7 +40,7 @@ class Keyframes:
         _table("values", self.times, self.values)
 
     def value(self, t):
-        """Interpolated value."""
+        """Return the interpolated value at time t."""
         return _interpolate(t, self.times, self.values)
 
 
@@ -115,7 +115,7 @@ class Motion:
 
     @property
     def moves(self):
-        """Whether the motion depends on time."""
+        """True if the motion depends on time."""
         return self.translation is not None or self.rotation is not None
 
     @property

@@ -1,4 +1,4 @@
-"""Matrices out of the ordinary: not finite, or with squares beyond the range of floats."""
+"""Matrices that are not finite, or whose squares leave the range of floats: tests and scaling."""
 
 from math import frexp, isfinite, ldexp, nan
 
@@ -16,7 +16,7 @@ def not_a_number(like):
 
 @kernel
 def is_finite(A):
-    """Whether all entries are finite."""
+    """Return whether all entries are finite."""
     if len(A) == 2:
         (a, b), (c, d) = A
         return isfinite(a) and isfinite(b) and isfinite(c) and isfinite(d)
@@ -31,7 +31,7 @@ def _finite_vector(x):
 
 @kernel
 def largest_entry(A):
-    """max |A_ij|."""
+    """Return max |A_ij|."""
     if len(A) == 2:
         return max(abs(A[0][0]), abs(A[0][1]), abs(A[1][0]), abs(A[1][1]))
     else:
@@ -45,7 +45,7 @@ def _largest(x):
 
 @kernel
 def is_moderate(A):
-    """Whether the largest entry is of a size that needs no scaling."""
+    """Return whether the largest entry is of a size that needs no scaling."""
     return SMALLEST < largest_entry(A) < LARGEST
 
 

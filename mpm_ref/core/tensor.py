@@ -100,7 +100,7 @@ def norm(x):
 
 @kernel
 def identity(like):
-    """Unit matrix."""
+    """Return the unit matrix."""
     if len(like) == 2:
         return (1.0, 0.0), (0.0, 1.0)
     else:
@@ -136,7 +136,7 @@ def mlin(a, A, b, B):
 
 @kernel
 def outer(x, y):
-    """x y^T."""
+    """Return x y^T."""
     if len(x) == 2:
         return (x[0] * y[0], x[0] * y[1]), (x[1] * y[0], x[1] * y[1])
     else:
@@ -149,7 +149,7 @@ def outer(x, y):
 
 @kernel
 def transpose(A):
-    """A^T."""
+    """Return A^T."""
     if len(A) == 2:
         return (A[0][0], A[1][0]), (A[0][1], A[1][1])
     else:
@@ -162,7 +162,7 @@ def transpose(A):
 
 @kernel
 def mv(A, x):
-    """A x."""
+    """Return A x."""
     if len(x) == 2:
         return dot(A[0], x), dot(A[1], x)
     else:
@@ -180,7 +180,7 @@ def vm(x, A):
 
 @kernel
 def mm(A, B):
-    """A B."""
+    """Return A B."""
     if len(A) == 2:
         return vm(A[0], B), vm(A[1], B)
     else:
@@ -189,7 +189,7 @@ def mm(A, B):
 
 @kernel
 def mmt(A, B):
-    """A B^T."""
+    """Return A B^T."""
     if len(A) == 2:
         return mv(B, A[0]), mv(B, A[1])
     else:
@@ -198,7 +198,7 @@ def mmt(A, B):
 
 @kernel
 def scale_columns(A, s):
-    """A diag(s)."""
+    """Return A diag(s)."""
     if len(A) == 2:
         return mul(A[0], s), mul(A[1], s)
     else:
@@ -237,7 +237,7 @@ def cofactor(A):
 
 @kernel
 def det(A):
-    """Determinant."""
+    """Return the determinant."""
     if len(A) == 2:
         return A[0][0] * A[1][1] - A[0][1] * A[1][0]
     else:

@@ -23,7 +23,7 @@ _1, _2, _3, _4, _5, _6, _7, _8 = (np.uint64(k) for k in range(1, 9))
 
 
 def fits(grid, stencil, mls):
-    """Whether a transfer is the one that is written here."""
+    """Return whether a transfer is the one of this file."""
     return mls and grid.m.ndim == 3 and len(stencil) == 3
 
 

@@ -80,7 +80,7 @@ def pk1_hat(s, law):
 
 @kernel
 def dpk1_hat(s, law):
-    """dP_i/ds_j [Pa]."""
+    """Return dP_i/ds_j [Pa]."""
     return mlin(2.0 * law.mu, identity(s), 1.0, fluid.dpk1_hat(s, law))
 
 

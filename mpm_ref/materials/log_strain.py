@@ -4,13 +4,13 @@ from math import exp, inf, log
 
 from ..core.jit import kernel
 from ..core.tensor import fill, lin, norm, total_of
-from .stretches import orientation_kept
+from .stretches import positive_stretches
 
 
 @kernel
 def log_strain(s):
     """eps_i = log s_i; all NaN where one s_i is not > 0."""
-    return _log(orientation_kept(s))
+    return _log(positive_stretches(s))
 
 
 @kernel

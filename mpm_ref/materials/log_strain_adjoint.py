@@ -73,20 +73,20 @@ def clamp_vjp(s, x_bar, low, high):
             low_bar += x_bar[i]
         elif s[i] > high:
             high_bar += x_bar[i]
-    return mul(x_bar, free(s, low, high)), low_bar, high_bar
+    return mul(x_bar, unclamped(s, low, high)), low_bar, high_bar
 
 
 @kernel
-def free(s, low, high):
+def unclamped(s, low, high):
     """1 for each s_i that a clamp leaves as it is, otherwise 0."""
     if len(s) == 2:
-        return _free(s[0], low, high), _free(s[1], low, high)
+        return _unclamped(s[0], low, high), _unclamped(s[1], low, high)
     else:
-        return _free(s[0], low, high), _free(s[1], low, high), _free(s[2], low, high)
+        return _unclamped(s[0], low, high), _unclamped(s[1], low, high), _unclamped(s[2], low, high)
 
 
 @kernel
-def _free(x, low, high):
+def _unclamped(x, low, high):
     return 0.0 if x < low or x > high else 1.0
 
 
@@ -95,7 +95,7 @@ def clamp_gap_ratio(s, i, j, low, high):
     """(x_i - x_j)/(s_i - s_j) of x = clamp(s); for equal ones the derivative."""
     gap = s[i] - s[j]
     x = clamp(s, low, high)
-    return (x[i] - x[j]) / gap if gap != 0.0 else _free(s[i], low, high)
+    return (x[i] - x[j]) / gap if gap != 0.0 else _unclamped(s[i], low, high)
 
 
 @kernel

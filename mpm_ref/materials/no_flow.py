@@ -6,7 +6,7 @@ from ..core.jit import kernel
 
 
 class NoFlow(NamedTuple):
-    """The identity."""
+    """Elasticity: a return map that is the identity."""
 
 
 def build():
@@ -37,7 +37,7 @@ def no_bars(law):
 
 @kernel
 def gap_ratio(s, s_new, i, j, share, flow):
-    """1."""
+    """Return the constant 1."""
     return 1.0
 
 

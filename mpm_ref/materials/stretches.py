@@ -1,4 +1,4 @@
-"""What laws take from the principal stretches (singular values) s: J, its derivatives, 1/s."""
+"""Functions of the principal stretches (singular values) s: J, its derivatives, 1/s."""
 
 from math import nan
 
@@ -34,7 +34,7 @@ def d_others(s):
 
 
 @kernel
-def orientation_kept(s):
+def positive_stretches(s):
     """s, or NaN where one of them is not > 0: some laws are not defined there."""
     for i in range(len(s)):
         if not s[i] > 0.0:
@@ -51,7 +51,7 @@ def expanded(J):
 @kernel
 def inverse(s):
     """1/s_i; all NaN where one s_i is not > 0."""
-    return _inverse(orientation_kept(s))
+    return _inverse(positive_stretches(s))
 
 
 @kernel

@@ -30,7 +30,7 @@ from .waves import stiffness
 
 
 class FlowEntry(NamedTuple):
-    """How a scene file makes a flow."""
+    """Constructor of a flow from the values of a scene file."""
 
     build: Callable         # its keyword parameters are those of the scene; `dim` is added
     laws: tuple             # the laws that it is written for
@@ -71,12 +71,12 @@ class Material(NamedTuple):
 
     @property
     def needs_F(self):
-        """Whether the deformation gradient is carried; else its determinant J is."""
+        """True if particles carry the deformation gradient, else its determinant J."""
         return not (isinstance(self.law, Fluid) and isinstance(self.flow, NoFlow))
 
     @property
     def has_history(self):
-        """Whether each particle carries a yield stress of its own."""
+        """True if each particle carries a yield stress of its own."""
         return isinstance(self.flow, Hardening | Softening)
 
     @property
@@ -90,7 +90,7 @@ class Material(NamedTuple):
 
 
 def recovers(law):
-    """Whether the law turns inverted matter, det F <= 0, back: fixed corotated does.
+    """Return whether the law turns inverted matter, det F <= 0, back: fixed corotated does.
 
     A fluid's energy is finite there too, but no run should go on with a fluid of J <= 0.
     """

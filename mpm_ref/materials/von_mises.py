@@ -17,7 +17,7 @@ from .no_flow import never_fails
 
 
 class VonMises(NamedTuple):
-    """Perfect plasticity."""
+    """Von Mises flow without hardening: perfect plasticity."""
 
     tau_y: float    # radius of the yield surface [Pa]
     s_min: float    # trial singular values that yield are first lifted to it (NCLaw 0.05); 0: no
@@ -87,7 +87,7 @@ def harden(s, y, dt, law, flow):
 
 @kernel
 def harden_vjp(state, bars, dt, law, flow):
-    """As `project_vjp`, of mu, lam, tau_y, xi, s_min; tau_y, the first y, is not read here."""
+    """Bars of mu, lam, tau_y, xi, s_min, as `project_vjp`; tau_y, the first y, is not read here."""
     s, y = state
     s_bar, y_bar = bars
     dgamma_bar = 2.0 * law.mu * flow.xi * y_bar
@@ -120,7 +120,7 @@ def carries(y, flow):
 
 @kernel
 def soften_vjp(state, bars, dt, law, flow):
-    """As `harden_vjp`, with theta for xi; all bars are 0 once the particle has failed."""
+    """Bars as `harden_vjp`, with theta for xi; all are 0 once the particle has failed."""
     s, y = state
     s_bar, y_bar = bars
     _, dgamma = radial_return(s, y, law, flow.s_min)

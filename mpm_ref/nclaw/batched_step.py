@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.adjoint.grid import Update, update_bars
-from ..core.adjoint.transfer import Moved
+from ..core.adjoint.transfer import Advection
 from ..core.adjoint.transfer_mls3 import gather_bars_mls3, scatter_bars_mls3
 from ..core.jit import kernel, parallel, prange
 from ..core.spline import STENCILS, base_of
@@ -257,7 +257,8 @@ def pull_back_one(world, before, after, bars, result, index):
     free = grid.v.copy()
     stop_at_walls(world, grid, free)
     stopped = Grid(grid.m, free, NONE, NONE, grid.origin, world.dx)
-    scatter_bars_mls3(Moved(particles.x, u), stopped, mine, bar, QUADRATIC, np.arange(len(world.m)))
+    scatter_bars_mls3(Advection(particles.x, u), stopped, mine, bar, QUADRATIC,
+                      np.arange(len(world.m)))
     stop_at_walls(world, grid, bar.v)
     update_one(world, grid, bar)
     gather_bars_mls3(particles, bar, mine, QUADRATIC, world.dt, (0, len(world.m)))

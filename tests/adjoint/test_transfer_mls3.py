@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mpm_ref.core.adjoint.transfer import MlsForm, Moved, gather_bars, scatter_bars
+from mpm_ref.core.adjoint.transfer import Advection, MlsForm, gather_bars, scatter_bars
 from mpm_ref.core.adjoint.transfer_mls3 import gather_bars_mls3, scatter_bars_mls3
 from mpm_ref.core.spline import STENCILS
 from mpm_ref.core.state import NO_HISTORY, NONE, Grid, Particles
@@ -59,7 +59,7 @@ def test_bars_of_particles_are_those_of_the_plain_adjoint(fluid, forced):
 def test_bars_of_nodes_are_those_of_the_plain_adjoint():
     rng = np.random.default_rng(1)
     particles, grid = random_particles(rng, False, False), random_grid(rng)
-    moved = Moved(particles.x, rng.normal(size=(N, 3)))
+    moved = Advection(particles.x, rng.normal(size=(N, 3)))
     bars = bars_of(particles, rng)
     bars.v[:] = 0.0                                     # what FLIP alone has
     found, expected = twice(bars)

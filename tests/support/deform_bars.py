@@ -14,7 +14,7 @@ from flows import CASES, setting
 
 from mpm_ref.core import deform
 from mpm_ref.core.adjoint import deform as adjoint
-from mpm_ref.core.adjoint.deform import DeformBars, Step
+from mpm_ref.core.adjoint.deform import DeformBars, DeformStep
 from mpm_ref.core.jit import CHUNKS
 from mpm_ref.core.law import project_vjp
 from mpm_ref.core.state import NO_HISTORY, NONE, Particles
@@ -158,7 +158,7 @@ def seeds(q, law, flow):
     w_F, w_tau, w_y = q.weights
     bars = DeformBars(w_F.copy(), w_tau, np.full_like(q.L, np.nan), w_y.copy())
     sums = np.zeros((CHUNKS, len(law) + len(flow)))
-    return bars, Step(q.F, q.y, q.L, sums, DT), tuple(range(q.L.shape[1]))
+    return bars, DeformStep(q.F, q.y, q.L, sums, DT), tuple(range(q.L.shape[1]))
 
 
 def named(bars, sums, law, flow):

@@ -46,8 +46,8 @@ class DeformBars(NamedTuple):
     y: np.ndarray       # (N,)       as F, where the return map has a memory, else as in `state`
 
 
-class Step(NamedTuple):
-    """What a step of deformation found, and the sums to which the bars of parameters are added."""
+class DeformStep(NamedTuple):
+    """State before a step of deformation, and the sums to which bars of parameters are added."""
 
     F: np.ndarray       # (N, d, d), or (N,) of J
     y: np.ndarray       # (N,), or no history
@@ -73,7 +73,7 @@ def plastic(step, bars, law, flow):
 
 def initial_stress(F, y, bars, law, flow, sums):
     """Adjoint of `deform.initial_stress`: adds to bars.F."""
-    _initial_stress(Step(F, y, F, sums, 0.0), bars, law, flow, _like(F))
+    _initial_stress(DeformStep(F, y, F, sums, 0.0), bars, law, flow, _like(F))
 
 
 def _like(a):
@@ -82,7 +82,7 @@ def _like(a):
 
 @kernel
 def fluid_vjp(step, bars, law, like, c):
-    """Of J' = det(I + dt L) J, tau = pressure(J')."""
+    """Adjoint of J' = det(I + dt L) J, tau = pressure(J')."""
     start, stop = chunk(c, len(step.F))
     for p in range(start, stop):
         G = growth(step.L, p, step.dt, like)
@@ -95,7 +95,7 @@ def fluid_vjp(step, bars, law, like, c):
 
 @kernel
 def elastic_vjp(step, bars, law, like, c):
-    """Of F' = (I + dt L) F, tau = kirchhoff(F')."""
+    """Adjoint of F' = (I + dt L) F, tau = kirchhoff(F')."""
     start, stop = chunk(c, len(step.F))
     for p in range(start, stop):
         U, s, V, _ = svd(trial(step, p, like))
@@ -106,7 +106,7 @@ def elastic_vjp(step, bars, law, like, c):
 
 @kernel
 def plastic_vjp(step, bars, law, flow, like, c):
-    """Of F' = U diag(s') V^T and tau = U diag(kirchhoff_hat(s')) U^T, s' after the return of s."""
+    """Adjoint of F' = U diag(s') V^T, tau = U diag(kirchhoff_hat(s')) U^T, s' the return of s."""
     start, stop = chunk(c, len(step.F))
     for p in range(start, stop):
         U, s, V, _ = svd(trial(step, p, like))
@@ -126,7 +126,7 @@ def plastic_vjp(step, bars, law, flow, like, c):
 
 @kernel
 def initial_stress_vjp(step, bars, law, flow, like, c):
-    """Of tau = kirchhoff(F), 0 where the material has failed."""
+    """Adjoint of tau = kirchhoff(F), 0 where the material has failed."""
     start, stop = chunk(c, len(step.F))
     for p in range(start, stop):
         U, s, V, _ = svd(mat(step.F, p, like))
@@ -138,7 +138,7 @@ def initial_stress_vjp(step, bars, law, flow, like, c):
 
 @kernel
 def initial_pressure_vjp(J, bars, law, sums, c):
-    """Of tau = pressure(J)."""
+    """Adjoint of tau = pressure(J)."""
     start, stop = chunk(c, len(J))
     for p in range(start, stop):
         bars.F[p] += pressure_vjp(J[p], bars.tau[p], law, sums, c)
@@ -197,7 +197,7 @@ def add(sums, c, parameters):
 
 @kernel
 def quotients(s, s_new, share, flow):
-    """What `mixed` needs of a return map s -> s_new, for every pair."""
+    """Difference quotients of a return map s -> s_new for every pair, which `mixed` takes."""
     if len(s) == 2:
         return (_quotients(s, s_new, 0, 1, share, flow),)
     else:

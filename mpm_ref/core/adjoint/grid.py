@@ -40,8 +40,8 @@ def update_bars(nodes, bars, gravity, how, sums, bounds):
 
 
 @kernel
-def update_bars_apart(nodes, bars, how, bounds):
-    """After `update_bars`, where forces and old velocities are carried apart (FLIP):
+def update_flip_bars(nodes, bars, how, bounds):
+    """After `update_bars`, where forces and old velocities are carried separately (FLIP):
 
     f = dt v'/m,   (m v) += v_old'/m,   m -= v_old' . v_old/m
     """
@@ -61,9 +61,9 @@ def _update_all(nodes, bars, gravity, how, sums):
 
 
 @parallel
-def _update_all_apart(nodes, bars, how):
+def _update_flip_all(nodes, bars, how):
     for c in prange(CHUNKS):
-        update_bars_apart(nodes, bars, how, chunk(c, len(nodes.m)))
+        update_flip_bars(nodes, bars, how, chunk(c, len(nodes.m)))
 
 
 def update_adjoint(grid, bars, gravity, how):
@@ -76,5 +76,5 @@ def update_adjoint(grid, bars, gravity, how):
     sums = np.zeros((CHUNKS, len(gravity)))
     _update_all(nodes, flat, gravity, how, sums)
     if grid.f.ndim > 1:
-        _update_all_apart(nodes, flat, how)
+        _update_flip_all(nodes, flat, how)
     return sums.sum(axis=0)

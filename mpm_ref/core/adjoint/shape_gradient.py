@@ -1,4 +1,4 @@
-"""The lever a_ip of a pair, with which the force is f_i = -sum_p V0_p tau_p a_ip.
+"""The shape gradient a_ip of a pair, with which the force is f_i = -sum_p V0_p tau_p a_ip.
 
     gradient form   a_ip = dw_ip                da_ip/dx_p = d^2 w_ip/dx_p^2
     MLS form        a_ip = D^-1 w_ip r_ip       da_ip/dx_p = D^-1 (r_ip dw_ip^T - w_ip I)
@@ -15,8 +15,8 @@ from ..stencil import arm, gradient, locate, product, slopes_per_axis, weights_p
 from ..tensor import dot, lin, mv
 
 
-class Splines(NamedTuple):
-    """Those of one particle, per axis."""
+class ParticleSplines(NamedTuple):
+    """Spline weights of one particle and their derivatives, per axis."""
 
     s: tuple        # offset from the base node [cells]
     w: tuple        # weights N
@@ -26,20 +26,21 @@ class Splines(NamedTuple):
 
 
 class GradientForm(NamedTuple):
-    """Forces over dt with the lever dw_ip."""
+    """Forces over dt with the shape gradient dw_ip."""
 
     dt: float       # [s]
 
 
 class MlsForm(NamedTuple):
-    """Forces over dt with the lever D^-1 w_ip r_ip."""
+    """Forces over dt with the shape gradient D^-1 w_ip r_ip."""
 
     dt: float       # [s]
     D_inv: float    # [1/m^2]
 
 
-lever = by_type("lever")                # (k, l, splines, form) -> a_ip
-lever_bar = by_type("lever_bar")        # (k, l, splines, q, form) -> (da_ip/dx_p)^T q
+shape_gradient = by_type("shape_gradient")              # (k, l, splines, form) -> a_ip
+# (k, l, splines, q, form) -> (da_ip/dx_p)^T q
+shape_gradient_bar = by_type("shape_gradient_bar")
 
 
 @kernel
@@ -65,18 +66,18 @@ def _moment_bar(k, l, splines, q, form):
     return lin(form.D_inv * dot(r_ip, q), dw_ip, -form.D_inv * w_ip, q)
 
 
-lever.method(GradientForm, _slope)
-lever.method(MlsForm, _moment)
-lever_bar.method(GradientForm, _slope_bar)
-lever_bar.method(MlsForm, _moment_bar)
+shape_gradient.method(GradientForm, _slope)
+shape_gradient.method(MlsForm, _moment)
+shape_gradient_bar.method(GradientForm, _slope_bar)
+shape_gradient_bar.method(MlsForm, _moment_bar)
 
 
 @kernel
 def around(x, grid, stencil):
-    """Base node of the point x, and its `Splines`."""
+    """Base node of the point x, and its `ParticleSplines`."""
     base, s = locate(x, grid, stencil)
     w, dw = weights_per_axis(s, stencil), slopes_per_axis(s, stencil)
-    return base, Splines(s, w, dw, curvatures_per_axis(s, stencil), grid.dx)
+    return base, ParticleSplines(s, w, dw, curvatures_per_axis(s, stencil), grid.dx)
 
 
 # second derivatives of the weights w_ip with respect to the position of the particle

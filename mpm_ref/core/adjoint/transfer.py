@@ -1,8 +1,8 @@
 """Adjoint of the transfers: gradients of a loss carried back through g2p and through p2g.
 
-A bar is the gradient of the loss with respect to the field of the same name; bars of particles are
-kept in a `Particles`, those of nodes in a `Grid`. What the transfer gathers its adjoint scatters,
-and the other way round. Names as in `transfer`; a_ip is the `lever` of a pair.
+A bar is the gradient of the loss with respect to the field of the same name; bars of particles
+stand in a `Particles`, those of nodes in a `Grid`. What the transfer gathers its adjoint scatters,
+and the other way round. Names as in `transfer`; a_ip is the `shape_gradient` of a pair.
 """
 
 from typing import NamedTuple
@@ -24,19 +24,26 @@ from ..stencil import (
 )
 from ..tensor import dot, fill, inner, lin, mat, mlin, mv, outer, put_vec, vec, vm
 from ..transfer_mls3 import fits
-from .shape_gradient import GradientForm, MlsForm, around, hessian, lever, lever_bar
+from .shape_gradient import (
+    GradientForm,
+    MlsForm,
+    around,
+    hessian,
+    shape_gradient,
+    shape_gradient_bar,
+)
 from .transfer_mls3 import gather_bars_mls3_all, scatter_bars_mls3_color
 
 
-class Moved(NamedTuple):
-    """What g2p moved: positions before the step, and the bars of sum_i w_ip v_i."""
+class Advection(NamedTuple):
+    """Positions of particles before g2p, and the bars of sum_i w_ip v_i."""
 
     x: np.ndarray       # (N, d)
     u: np.ndarray       # (N, d)
 
 
 class Exchange(NamedTuple):
-    """How particles and grid exchange momentum in one step."""
+    """Parameters of the exchange of momentum between particles and grid in one step."""
 
     stencil: tuple
     dt: float       # [s]
@@ -45,7 +52,7 @@ class Exchange(NamedTuple):
 
 
 @kernel
-def scatter_bars(moved, grid, bars, nodes, stencil, members):
+def scatter_bars(advection, grid, bars, nodes, stencil, members):
     """Adjoint of `gather` and `gather_mls` for the particles in `members`.
 
     With bars C_p, L_p after the step, bars.v = flip v'_p and U_ip = u_p + D^-1 C_p r_ip:
@@ -56,8 +63,8 @@ def scatter_bars(moved, grid, bars, nodes, stencil, members):
     d = grid.m.shape
     D_inv = inverse_inertia(grid.dx, stencil)
     for p in members:
-        base, splines = around(vec(moved.x, p, d), grid, stencil)
-        x, u, lag = vec(bars.x, p, d), vec(moved.u, p, d), vec(bars.v, p, d)
+        base, splines = around(vec(advection.x, p, d), grid, stencil)
+        x, u, lag = vec(bars.x, p, d), vec(advection.u, p, d), vec(bars.v, p, d)
         B = affine(bars.C, p, d)
         B = mlin(D_inv, B, 0.0, B)
         for c in range(columns(x, stencil)):
@@ -138,9 +145,9 @@ def gather_bars(particles, nodes, bars, stencil, form, bounds):
                 mass += w_ip * phi
                 mv_p, f_p = lin(1.0, mv_p, w_ip, v_i), lin(1.0, f_p, w_ip, f_i)
                 B = mlin(1.0, B, w_ip, outer(v_i, r_ip))
-                T = mlin(1.0, T, 1.0, outer(f_i, lever(k, l, splines, form)))
+                T = mlin(1.0, T, 1.0, outer(f_i, shape_gradient(k, l, splines, form)))
                 x = lin(1.0, x, m * phi, gradient(k, l, splines.w, splines.dw, nodes.dx))
-                x = lin(1.0, x, -V0, lever_bar(k, l, splines, vm(f_i, tau), form))
+                x = lin(1.0, x, -V0, shape_gradient_bar(k, l, splines, vm(f_i, tau), form))
         put_vec(bars.x, p, lin(1.0, x, -m, vm(mv_p, C)))
         put_vec(bars.v, p, lin(1.0, vec(bars.v, p, d), m, mv_p))
         put_affine(bars.C, p, m, B)
@@ -160,10 +167,10 @@ def force_bar(f, i, v_i, dt):
 
 
 @parallel
-def _scatter_color(moved, grid, bars, nodes, stencil, slabs):
+def _scatter_color(advection, grid, bars, nodes, stencil, slabs):
     for h in prange(len(slabs.start) // 2):
         members = slabs.order[slabs.start[2 * h] : slabs.start[2 * h + 1]]
-        scatter_bars(moved, grid, bars, nodes, stencil, members)
+        scatter_bars(advection, grid, bars, nodes, stencil, members)
 
 
 @parallel
@@ -179,14 +186,14 @@ def g2p_adjoint(x, grid, bars, nodes, how, slabs):
     Slabs of one colour run in parallel (see `p2g`). Under MLS the bar of C is that of L too, and
     bars.L is not read.
     """
-    moved = Moved(x, bars.v + how.dt * bars.x)
+    advection = Advection(x, bars.v + how.dt * bars.x)
     bars.v[:] *= how.flip if grid.v_old.ndim > 1 else 0.0
     if how.mls:
         bars = bars._replace(L=NONE)
     run = scatter_bars_mls3_color if fits(grid, how.stencil, how.mls) else _scatter_color
     for color in (0, 1):
         of_color = slabs._replace(start=slabs.start[color:])
-        run(moved, grid, bars, nodes, how.stencil, of_color)
+        run(advection, grid, bars, nodes, how.stencil, of_color)
 
 
 def p2g_adjoint(particles, nodes, bars, how):

@@ -18,13 +18,13 @@ from ..transfer_mls3 import _1, _2, _3, add_momenta, line_of, moments, node_numb
 
 
 @kernel
-def scatter_bars_mls3(moved, grid, bars, nodes, stencil, members):
+def scatter_bars_mls3(advection, grid, bars, nodes, stencil, members):
     """`scatter_bars` for MLS-MPM with a quadratic stencil in 3D."""
     v, v_bar, n = grid.v.reshape(-1), nodes.v.reshape(-1), strides(grid.m)
     for p in members:
-        base, s = locate(vec(moved.x, p, grid.m.shape), grid, stencil)
+        base, s = locate(vec(advection.x, p, grid.m.shape), grid, stencil)
         w, dw = weights_per_axis(s, stencil), slopes_per_axis(s, stencil)
-        u, B = vec(moved.u, p, s), affine(bars.C, p, s)
+        u, B = vec(advection.u, p, s), affine(bars.C, p, s)
         Q = mlin(grid.dx * inverse_inertia(grid.dx, stencil), B, 0.0, B)
         first, dx_U, dy_U = field(u, Q, s)
         slope, mean = fill(0.0, s), fill(0.0, s)
@@ -66,12 +66,12 @@ def gather_bars_mls3(particles, nodes, bars, stencil, dt, bounds):
 
 
 @kernel
-def sums(nodes, i, of_field, mass, at):
+def sums(nodes, i, of_field, mass, location):
     """dx sum_i (v_i . U_ip + m m_i) dw_ip, sum_i w_ip m_i, sum_i w_ip v_i, sum_i w_ip v_i r_ip^T/dx
-    of the 27 nodes from number i on, with the field U and at = (splines, s).
+    of the 27 nodes from number i on, with the field U and location = (splines, s).
     """
     m, v, n = nodes.m.reshape(-1), nodes.v.reshape(-1), strides(nodes.m)
-    (splines, s), (first, dx_U, dy_U) = at, of_field
+    (splines, s), (first, dx_U, dy_U) = location, of_field
     w, r = splines[0], moments(splines[0][2], s[2])
     slope, m_i = fill(0.0, s), 0.0
     mv_x, mv_y, mv_z, mv_p = slope, slope, slope, slope
@@ -125,11 +125,11 @@ def with_line(slope, h, splines, a, b):
 
 
 @parallel
-def scatter_bars_mls3_color(moved, grid, bars, nodes, stencil, slabs):
+def scatter_bars_mls3_color(advection, grid, bars, nodes, stencil, slabs):
     """`scatter_bars_mls3` for the slabs of one colour, in parallel."""
     for h in prange(len(slabs.start) // 2):
         members = slabs.order[slabs.start[2 * h] : slabs.start[2 * h + 1]]
-        scatter_bars_mls3(moved, grid, bars, nodes, stencil, members)
+        scatter_bars_mls3(advection, grid, bars, nodes, stencil, members)
 
 
 @parallel

@@ -16,7 +16,7 @@ from torch.autograd import Function
 
 from ...core import deform
 from ...core.adjoint import deform as deform_adjoint
-from ...core.adjoint.deform import DeformBars, Step
+from ...core.adjoint.deform import DeformBars, DeformStep
 from ...core.jit import CHUNKS
 from ...core.state import NO_HISTORY, NONE, Particles
 from ...materials import NoFlow
@@ -55,7 +55,7 @@ class MaterialFunction(Function):
             deform_adjoint.initial_stress(ctx.F, NO_HISTORY, bars, law, flow, sums)
         else:
             bars = DeformBars(G.copy(), zero, zero.copy(), NO_HISTORY)
-            at_rest = Step(ctx.F, NO_HISTORY, zero, sums, 0.0)
+            at_rest = DeformStep(ctx.F, NO_HISTORY, zero, sums, 0.0)
             deform_adjoint.plastic(at_rest, bars, law, flow)
         return torch.from_numpy(bars.F), torch.from_numpy(sums.sum(axis=0)), None
 
