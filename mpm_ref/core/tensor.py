@@ -149,7 +149,7 @@ def outer(x, y):
 
 @kernel
 def transpose(A):
-    """Return A^T."""
+    """Return the transpose A^T."""
     if len(A) == 2:
         return (A[0][0], A[1][0]), (A[0][1], A[1][1])
     else:

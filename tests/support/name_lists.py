@@ -4,7 +4,11 @@ PACKAGES = ("mpm_ref", "validation", "figures", "benchmarks", "examples")
 UNIQUE = ("mpm_ref", "validation")          # class names are unique across these
 
 # Class names that several modules share on purpose, each with the reason.
-SHARED_CLASS_NAMES: dict[str, str] = {}
+_KERNELS = "the record of a scene file, and in `core` that of the kernels it is built into"
+SHARED_CLASS_NAMES: dict[str, str] = dict.fromkeys(
+    ("HalfSpace", "Sphere", "Cylinder", "Capsule", "Torus", "Wedge", "Steady", "Keyframes", "Ramps",
+     "Oscillation", "Motion", "Collider"), _KERNELS) | {
+    "Material": "the record of a scene file, and in `materials` the law and flow it is built into"}
 
 # Not even as one of the words of a name (`kept_bodies`, `HeldRun`; the plural counts as well).
 BANNED_WORDS = {
