@@ -7,9 +7,11 @@ VENV  := .venv
 PY    := $(VENV)/bin/python
 PIP   := $(PY) -m pip --disable-pip-version-check
 READY := $(VENV)/.ready
+TRAINS := $(VENV)/.trains
+FAST  := tests/core tests/materials tests/stepping tests/scene
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce test docs standard figures bench learn clean
+.PHONY: help reproduce test test-fast test-slow test-all docs standard figures bench learn clean
 
 help:            ## this list
 	@sed -n 's/^\([a-z-]*\): [^#]*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 14
@@ -17,9 +19,18 @@ help:            ## this list
 reproduce: $(READY) ## every experiment at the quick profile -> results/quick/report.html and report.md
 	$(PY) -m validation run --profile quick --workers $(WORKERS)
 
-test: $(READY)   ## lint and the test suite
+test: $(TRAINS)  ## lint and the tests but those marked slow; with PyTorch where a CPU build is on offer
 	$(PY) -m ruff check .
-	$(PY) -m pytest -n $(WORKERS) --dist loadfile
+	$(PY) -m pytest -n $(WORKERS) --dist loadfile -m "not slow"
+
+test-fast: $(READY) ## lint and the tests of kernels, materials, steps and scenes: the inner loop
+	$(PY) -m ruff check .
+	$(PY) -m pytest -n $(WORKERS) --dist loadfile -m "not slow" $(FAST)
+
+test-slow: $(TRAINS) ## the tests marked slow: notebooks, and the longest of the others
+	$(PY) -m pytest -n $(WORKERS) --dist loadfile -m slow
+
+test-all: test test-slow ## every test
 
 # Notebooks run when their code changes; make docs NOTEBOOKS=off shows them without results.
 NOTEBOOKS ?= cache
@@ -59,6 +70,12 @@ learn: $(READY)  ## add PyTorch (CPU build) for what trains; see README before
 	    exit 1; \
 	fi
 	$(PIP) install $(TORCH_FROM) -c constraints.txt -e '.[learn]'
+
+# The tests of what trains are skipped without PyTorch; a CUDA build is never installed for them.
+$(TRAINS): $(READY)
+	@$(MAKE) --no-print-directory learn || \
+	    echo "No CPU build of PyTorch at hand: the tests of what trains are skipped."
+	@touch $@
 
 clean:           ## remove caches, the site and the quick results (the environment .venv stays)
 	rm -rf docs/_build results/quick .pytest_cache .ruff_cache .hypothesis
