@@ -8,13 +8,14 @@ from small_laws import FLOWING, STEPS, E, write_study
 
 torch = pytest.importorskip("torch")
 
+from mpm_ref import training  # noqa: E402
 from mpm_ref.cli import law_train  # noqa: E402
 from mpm_ref.materials.learned import weights  # noqa: E402
 from mpm_ref.materials.learned.strain_range import strain_bounds  # noqa: E402
 from mpm_ref.nclaw.batched_step import make_world  # noqa: E402
 from mpm_ref.nclaw.study import study as law_study  # noqa: E402
 from mpm_ref.nclaw.study.study import load  # noqa: E402
-from mpm_ref.nclaw.train import fit, session  # noqa: E402
+from mpm_ref.nclaw.train import fit  # noqa: E402
 from mpm_ref.nclaw.train import train as law_trainer  # noqa: E402
 from mpm_ref.nclaw.train.labeled import labels_of, train_labeled  # noqa: E402
 from mpm_ref.nclaw.train.observations import trajectory_of  # noqa: E402
@@ -199,7 +200,7 @@ def test_a_checkpoint_that_cannot_be_written_is_told(made, tmp_path, monkeypatch
         raise OSError(f"{path} could not be written: no space left; is the disk full?")
 
     monkeypatch.setattr(fit, "SAVE", 2)
-    monkeypatch.setattr(session.weights_file, "write_sealed", full)
+    monkeypatch.setattr(training.weights_file, "write_sealed", full)
     assert_told(train(made / "cubes.toml", tmp_path / "laws.npz"), 4, "laws.pt could not be writ")
     assert list(tmp_path.iterdir()) == []
 

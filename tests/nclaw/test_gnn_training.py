@@ -22,7 +22,7 @@ from mpm_ref.nclaw.gnn.train.fit import (  # noqa: E402
 )
 from mpm_ref.nclaw.gnn.train.network import export_weights  # noqa: E402
 from mpm_ref.nclaw.gnn.weights import load, save  # noqa: E402
-from mpm_ref.nclaw.train.session import Diverged  # noqa: E402
+from mpm_ref.training import Diverged  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
@@ -38,7 +38,7 @@ def runs():
 
 def bits(session):
     """Weights, those picked, and history of a training."""
-    return (session.history, [a.numpy().tobytes() for a in session.best.values()],
+    return (session.history, [a.numpy().tobytes() for a in session.best.state_dict().values()],
             [a.detach().numpy().tobytes() for a in session.network.parameters()])
 
 

@@ -23,7 +23,7 @@ from mpm_ref.nclaw.train.neural_laws import (  # noqa: E402
 from mpm_ref.nclaw.train.observations import Trajectory, trajectory_of  # noqa: E402
 from mpm_ref.nclaw.train.recipe import Recipe  # noqa: E402
 from mpm_ref.nclaw.train.rollout import LawPair  # noqa: E402
-from mpm_ref.nclaw.train.session import Diverged  # noqa: E402
+from mpm_ref.training import Diverged  # noqa: E402
 from mpm_ref.trajectories import observed  # noqa: E402
 
 STEPS = 11          # segments of 3 and 2 steps
@@ -85,7 +85,7 @@ def test_a_training_says_what_its_errors_are_of(run):
     """Checkpoints with a term of velocities that do not say it had that in their errors."""
     for weight in (0.0, 1e-4):
         session = TrajectorySession(replace(SHORT, velocity=weight), laws(), *run)
-        assert ("errors_of" in json.loads(session.settings)) == (weight > 0.0)
+        assert ("errors_of" in json.loads(session.description)) == (weight > 0.0)
     session.epoch()
     assert session.errors == {"errors": [session.history[0].error], "errors_of": "positions"}
 

@@ -12,9 +12,9 @@ from mpm_ref.nclaw.train.fit import train
 from mpm_ref.nclaw.train.labeled import labels_of, train_labeled
 from mpm_ref.nclaw.train.observations import observe_images, trajectory_of
 from mpm_ref.nclaw.train.recipe import PRINTED, Recipe
-from mpm_ref.nclaw.train.session import Diverged
 from mpm_ref.nclaw.train.train import drawn_laws, learned_laws
 from mpm_ref.scene import build
+from mpm_ref.training import Diverged
 from mpm_ref.trajectories import observed
 
 from ..common.provenance import commit, provenance

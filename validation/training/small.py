@@ -18,9 +18,9 @@ from mpm_ref.nclaw.train.neural_laws import NeuralLawModule
 from mpm_ref.nclaw.train.observations import PartialTrajectory, trajectory_of
 from mpm_ref.nclaw.train.recipe import Recipe
 from mpm_ref.nclaw.train.rollout import LawPair
-from mpm_ref.nclaw.train.session import Diverged
 from mpm_ref.nclaw.train.strains import segment_cuts, training_bounds
 from mpm_ref.scene import build
+from mpm_ref.training import Diverged
 from mpm_ref.trajectories import observed
 
 from ..common.provenance import commit, provenance

@@ -7,10 +7,9 @@ from typing import NamedTuple
 
 import torch
 
-from ...training import train_epochs
+from ...training import Diverged, Session, train_epochs
 from .neural_laws import describe
 from .rollout import segment_errors
-from .session import Diverged, TrainingSession
 
 SAVE = 5            # epochs between checkpoints
 FORMAT = 2          # of checkpoints
@@ -26,10 +25,10 @@ class Epoch(NamedTuple):
     steepness: tuple    # norms of the gradients, elastic and plastic
 
 
-class TrajectorySession(TrainingSession):
+class TrajectorySession(Session):
     """Laws, optimisers and schedules of a training under way."""
 
-    entry = Epoch
+    entry = Epoch._make
     errors_of = "positions"         # what the errors of epochs are of
 
     def __init__(self, recipe, laws, world, observed):
@@ -49,7 +48,7 @@ class TrajectorySession(TrainingSession):
         return len(self.history) + 1
 
     @property
-    def settings(self):
+    def description(self):
         """Return the settings, what is trained and on what, as one line of text; without the size
         of a batch, with which only time and round-off change.
         """
@@ -106,19 +105,9 @@ class TrajectorySession(TrainingSession):
                 raise Diverged(f"epoch {self.number}: a gradient of norm {norm}. {ADVICE}")
             yield norm
 
-    def parts(self):
-        """Return all that has a state, by name."""
-        return {"laws": self.laws, "optimisers": self.optimisers, "schedules": self.schedules}
-
     def states(self):
-        """Return the states of all parts."""
-        return {name: [one.state_dict() for one in parts] for name, parts in self.parts().items()}
-
-    def restore(self, stored):
-        """Put the states of all parts back."""
-        for name, parts in self.parts().items():
-            for one, state in zip(parts, stored[name], strict=True):
-                one.load_state_dict(state)
+        """Return the laws, optimisers and schedules, of which a checkpoint has the states."""
+        return {"laws": self.laws, "optimisers": self.optimisers, "schedules": self.schedules}
 
 
 def data_digest(world, observed):

@@ -13,10 +13,9 @@ import torch
 
 from ...core import deform
 from ...materials import NoFlow
-from ...training import train_epochs
+from ...training import Diverged, train_epochs
 from .fit import SAVE, Epoch, TrajectorySession
 from .identified_laws import axes, particles
-from .session import Diverged
 
 BATCH = 1000        # pairs
 

@@ -19,6 +19,7 @@ import torch
 from ...materials import Fluid, FluidProjection, NoFlow, make_flow, make_law
 from ...materials.learned.stretch_network import ReleasedStretchStress, StretchStress
 from ...materials.learned.weights import LearnedLaws
+from ...training import Diverged
 from ..batched_step import make_world
 from .admissible_laws import ContractionModule, EnergyLawModule
 from .fit import train
@@ -28,7 +29,6 @@ from .neural_laws import NeuralLawModule, NoFlowModule, PlainLawModule, Unshifte
 from .observations import trajectory_of
 from .principal_laws import ReleasedStretchLawModule, SplineLawModule, StretchLawModule
 from .rollout import LawPair
-from .session import Diverged
 
 SYS_ID, LABELED = "sys-id", "labeled"
 OF_STRETCHES = {StretchStress: StretchLawModule, ReleasedStretchStress: ReleasedStretchLawModule}

@@ -5,7 +5,7 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from mpm_ref.nclaw.train.fit import Epoch  # noqa: E402
-from mpm_ref.nclaw.train.session import Diverged  # noqa: E402
+from mpm_ref.training import Diverged  # noqa: E402
 from validation.nclaw import trained_laws  # noqa: E402
 from validation.nclaw.diverged import beside, diverged  # noqa: E402
 from validation.nclaw.initial_laws import untrained  # noqa: E402

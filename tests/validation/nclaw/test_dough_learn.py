@@ -18,8 +18,8 @@ from mpm_ref.nclaw.train.recipe import (  # noqa: E402
     TeacherForcing,
 )
 from mpm_ref.nclaw.train.rollout import LawPair, segment_errors  # noqa: E402
-from mpm_ref.nclaw.train.session import Diverged  # noqa: E402
 from mpm_ref.nclaw.train.train import drawn_laws  # noqa: E402
+from mpm_ref.training import Diverged  # noqa: E402
 from validation.common.weights_needed import Untrained  # noqa: E402
 from validation.nclaw import dough  # noqa: E402
 from validation.nclaw.diverged import diverged  # noqa: E402

@@ -18,7 +18,7 @@ from mpm_ref.nclaw.train.observations import (  # noqa: E402
 )
 from mpm_ref.nclaw.train.recipe import Recipe  # noqa: E402
 from mpm_ref.nclaw.train.rollout import segment_errors  # noqa: E402
-from mpm_ref.nclaw.train.session import Diverged  # noqa: E402
+from mpm_ref.training import Diverged  # noqa: E402
 from mpm_ref.trajectories import Observed, observed  # noqa: E402
 from validation.common.scenes import with_  # noqa: E402
 from validation.nclaw.observation import Seen  # noqa: E402

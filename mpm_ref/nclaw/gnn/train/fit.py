@@ -15,8 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
-from ....training import train_epochs
-from ...train.session import Diverged, TrainingSession
+from ....training import Diverged, Session, train_epochs
 from ..features import HISTORY, FeatureSettings, Graph, SimulatorFailure
 from ..simulator import Simulator, free_run
 from .examples import example, random_walk, scales_of, single
@@ -80,10 +79,10 @@ class Round(NamedTuple):
     error: float        # mean squared, of free runs [m^2]; infinite where they break down
 
 
-class GraphSession(TrainingSession):
+class GraphSession(Session):
     """Network and optimiser of a training under way."""
 
-    entry = Round
+    entry = Round._make
 
     def __init__(self, recipe, runs, dt):
         super().__init__()
@@ -93,10 +92,10 @@ class GraphSession(TrainingSession):
         torch.manual_seed(recipe.seed)
         self.network = GraphNetwork(runs[0].frames.shape[-1], recipe.width, recipe.blocks)
         self.optimiser = torch.optim.Adam(self.network.parameters(), lr=recipe.first_rate)
-        self.best = copy_state(self.network)
+        self.best = deepcopy(self.network)
 
     @property
-    def settings(self):
+    def description(self):
         """Return the settings of the training and the digest of its data, as one line of text."""
         return json.dumps({"format": FORMAT, **asdict(self.recipe), "data": self.digest})
 
@@ -111,7 +110,7 @@ class GraphSession(TrainingSession):
         loss = np.mean([self.step(done + k) for k in range(self.recipe.check)])
         self.history.append(Round(float(loss), self.error()))
         if self.picked == len(self.history) - 1:
-            self.best = copy_state(self.network)
+            self.best = deepcopy(self.network)
 
     def step(self, number):
         """One step of the optimiser; returns its loss."""
@@ -167,25 +166,11 @@ class GraphSession(TrainingSession):
         """
         if not np.isfinite(self.history[self.picked].error):
             raise Diverged(f"all {len(self.history)} free runs broke down; try more steps")
-        picked = deepcopy(self.network)
-        picked.load_state_dict(self.best)
-        return Simulator(export_weights(picked), self.reading, about)
+        return Simulator(export_weights(self.best), self.reading, about)
 
     def states(self):
-        """Return the states of the network, of the one that is picked so far, of the optimiser."""
-        return {"network": self.network.state_dict(), "best": self.best,
-                "optimiser": self.optimiser.state_dict()}
-
-    def restore(self, stored):
-        """Put these states back."""
-        self.network.load_state_dict(stored["network"])
-        self.optimiser.load_state_dict(stored["optimiser"])
-        self.best = stored["best"]
-
-
-def copy_state(network):
-    """The weights of a network as they are now, by name."""
-    return {name: a.clone() for name, a in network.state_dict().items()}
+        """Return what a checkpoint has the states of: the network, the best one, the optimiser."""
+        return {"network": [self.network], "best": [self.best], "optimiser": [self.optimiser]}
 
 
 def data_digest(runs, dt):
