@@ -12,8 +12,8 @@ import typer
 from .. import scene
 from ..nclaw.strain_watch import time_step_warnings
 from ..preflight import misplaced
-from ..rom import modes_file
-from ..rom.study import nsf_networks, summary
+from ..rom.model_file import is_model
+from ..rom.study import summary
 from ..store import checkpoint, manifest
 from ..store.atomic import in_words
 from ..store.manifest import scene_hash
@@ -237,7 +237,7 @@ def of_npz(name):
     """
     path = Path(name)
     arrays = opened(path)
-    if modes_file.is_one(arrays) or nsf_networks.is_one(arrays) or "xhat" in arrays:
+    if is_model(arrays):
         facts = rom_info.of_map(path)
         return facts, rom_info.map_lines(facts)
     if law_info.is_graph_network(arrays):

@@ -172,7 +172,7 @@ def unlike(file, asked, model):
     none.
     """
     made, now = model.about["map"], asked.settings
-    kind, r = made["kind"], model.decoder.r
+    kind, r = made["kind"], model.field.r
     others = [key for key in now if made.get(key, now[key]) != now[key]]
     if (kind, r) != (asked.kind, asked.r):
         found, wanted = f"{kind}, r = {r}", f"{asked.kind}, r = {asked.r}"

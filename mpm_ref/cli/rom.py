@@ -102,7 +102,7 @@ def run(
         warn(astray(outcome.out_of_bounds, clock.steps + 1, clock.dt))
         if not json:
             print(f"{FINISHED}: {counted(clock.steps, 'step')} of {kind_of(model)}, r = "
-                  f"{model.decoder.r}, {made.count} points in {out}")
+                  f"{model.field.r}, {made.count} points in {out}")
 
 
 def announce(out, size):

@@ -3,12 +3,11 @@
 import msgspec
 import numpy as np
 
-from ..rom.fields.network import Decoder
+from ..rom import model_file
+from ..rom.fields.network import Decoder, Networks
 from ..rom.fields.pod_fields import Spanned
 from ..rom.fields.polynomial_manifold import Curved
-from ..rom.study import reduce
 from ..rom.study.model import known_of
-from ..rom.study.nsf_networks import Networks
 from ..rom.study.study_file import checked, plain
 from ..rom.study.tables import CURVED, MODES, NETWORK, NSF
 from ..scene import SceneError
@@ -79,8 +78,8 @@ def of_map(path):
     """What a file of `mpm-ref rom train` holds, and what it says of its making; None for what it
     does not say. Raises ValueError for a file that is damaged or no map.
     """
-    model = reduce.read(path)
-    about, map = model.about, model.decoder
+    model = model_file.load(path)
+    about, map = model.about, model.field
     runs, levels, r = model.xhat.shape
     names, loss, fit = about.get("parameters", ()), about.get("loss"), about.get("fit", {})
     return {

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ..rom import model_file
 from ..rom.study import dataset, reduce
 from ..rom.study.generate import (
     INTERRUPTED,
@@ -145,7 +146,7 @@ def train(
                 model = fitted(study, snapshots, about, checkpoint, machine)
             write(out, model)
         reduce.forget(checkpoint)
-        print(f"{out}: {kind_of(model)}, r = {model.decoder.r}, of "
+        print(f"{out}: {kind_of(model)}, r = {model.field.r}, of "
               f"{counted(len(study.train), 'run')} and {len(snapshots.X)} points")
 
 
@@ -203,4 +204,4 @@ def require_map_place(out, study, overwrite):
 def write(out, model):
     """Write a map. Raises NotWritten."""
     with writing():
-        reduce.save(out, model)
+        model_file.save(out, model)

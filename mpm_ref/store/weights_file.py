@@ -21,7 +21,7 @@ import numpy as np
 SEAL = 64           # bytes: a sha256 in hexadecimal digits
 MAGIC = b"PK"       # what every zip archive begins with
 KINDS = {       # a format without its number -> the files that have it
-    "": "maps, laws or stress fields", "gnn": "graph networks",
+    "": "laws", "reduced model": "reduced models", "gnn": "graph networks",
     "mpm_ref law": "layers of exported laws"}
 
 

@@ -13,11 +13,11 @@ from typer.main import get_command
 
 from mpm_ref.cli import rom
 from mpm_ref.cli.catalogue import shipped_studies
-from mpm_ref.rom import weights
+from mpm_ref.rom import model_file
+from mpm_ref.rom.model_file import Model
 from mpm_ref.rom.snapshots import displacement_error, position_error
-from mpm_ref.rom.study import dataset, errors, reduce
+from mpm_ref.rom.study import dataset, errors
 from mpm_ref.rom.study.study import load
-from mpm_ref.rom.weights import Model
 from mpm_ref.store.weights_file import sealed
 
 LDM = Path(__file__).parents[2] / "validation" / "ldm" / "weights"
@@ -46,9 +46,9 @@ def test_a_map_says_what_it_is_of_and_what_made_it(made, tmp_path, edits, head):
 
 def test_the_errors_of_a_map_are_those_over_its_training_runs(made):
     found = json.loads(mpm_ref("info", made / "map.npz", "--json").stdout)
-    bars, model = load(made / "bars.toml"), reduce.read(made / "map.npz")
+    bars, model = load(made / "bars.toml"), model_file.load(made / "map.npz")
     data = dataset.load(bars, made / "data", bars.train)
-    x = np.array([model.decoder.place(data.X, y) for y in model.xhat.reshape(-1, 3)])
+    x = np.array([model.field.place(data.X, y) for y in model.xhat.reshape(-1, 3)])
     reference = data.flat()[0]
     assert found["errors"] == pytest.approx({
         "origin": position_error(x, reference),
@@ -69,7 +69,7 @@ def test_errors_of_a_map_are_looked_at_some_points(monkeypatch):
 
 def test_a_network_says_its_last_loss(tmp_path):
     about = {"loss": [[9.0, 3.0, 2.0, 1.0], [0.6, 0.3, 0.2, 0.1]], "study": 64 * "a"}
-    weights.save(tmp_path / "map.npz",
+    model_file.save(tmp_path / "map.npz",
                  Model(rom_toys.decoder(3, 2), np.ones((4, 3, 2)), np.zeros(2), about))
     assert mpm_ref("info", tmp_path / "map.npz").stdout.splitlines() == [
         f"{tmp_path / 'map.npz'}: a map, network, r = 2, 3D, study aaaaaaaaaaaa",
@@ -80,7 +80,7 @@ def test_a_network_says_its_last_loss(tmp_path):
 @pytest.mark.parametrize("name", ["gravity-r4", "push", "tower"])
 def test_the_maps_of_the_papers_experiments_say_what_they_know(name):
     what, of, loss, by = mpm_ref("info", LDM / f"{name}.npz").stdout.splitlines()
-    r = weights.load(LDM / f"{name}.npz").decoder.r
+    r = model_file.load(LDM / f"{name}.npz").field.r
     assert f"a map, network, r = {r}, 3D, study " in what
     assert of.startswith("made of ")
     assert loss.startswith("last loss kept: ")
@@ -92,8 +92,9 @@ def test_what_is_no_map_is_told(made, tmp_path):
     damaged[100] ^= 1
     (tmp_path / "map.npz").write_bytes(damaged)
     assert_told(mpm_ref("info", tmp_path / "map.npz"), 2, "map.npz is damaged")
-    (tmp_path / "map.npz").write_bytes(sealed({"format": np.array(1), "xhat": np.ones((1, 2, 3))}))
-    assert_told(mpm_ref("info", tmp_path / "map.npz"), 2, "map.npz holds no trained map: it lacks ")
+    (tmp_path / "map.npz").write_bytes(sealed({"format": np.array(model_file.FORMAT)}))
+    assert_told(mpm_ref("info", tmp_path / "map.npz"), 2,
+                "map.npz holds no reduced model: its kind is None")
 
 
 # info of a study

@@ -11,6 +11,7 @@ from command_line import assert_told, mpm_ref
 from small_nsf_studies import EVERY, RUNS, STEPS, modelled, write
 from small_studies import ended
 
+from mpm_ref.rom import model_file
 from mpm_ref.rom.fields.pod_fields import Sizes, spanned
 from mpm_ref.rom.study import record, reduce, summary
 from mpm_ref.rom.study.generate import options
@@ -102,8 +103,8 @@ def test_fields_are_those_of_the_training_runs(made, pairs):
     fields, xhat = spanned(data, Sizes(3, 5, 8, 8, smoothing=1e-6), BLOCK * 0.1)
     assert np.array_equal(model.xhat, xhat)
     assert xhat.shape == (RUNS - 1, LEVELS, 3)
-    assert np.array_equal(model.decoder.tau.coefficients.w, fields.tau.coefficients.w)
-    assert np.array_equal(model.decoder.cells.order, fields.cells.order)
+    assert np.array_equal(model.field.tau.coefficients.w, fields.tau.coefficients.w)
+    assert np.array_equal(model.field.cells.order, fields.cells.order)
     assert model.about["model"] == NSF
     x = np.stack([fields.place(np.arange(len(data.X)), y) for y in xhat.reshape(-1, 3)])
     off = np.linalg.norm(x - data.x.reshape(x.shape)) / np.linalg.norm(data.x)
@@ -115,8 +116,8 @@ def test_the_stress_sees_the_parameters_where_the_study_says_so(made, tmp_path):
     study = write(tmp_path, ("r = 3", "r = 3\nstress_sees_parameters = false"))
     done = mpm_ref("rom", "train", study, "--data", made / "data", "--out", out)
     assert done.exit_code == 0, done.output
-    assert reduce.read(made / "fields.npz").decoder.mu.shape == (1,)
-    assert reduce.read(out).decoder.mu.shape == (0,)
+    assert model_file.load(made / "fields.npz").field.mu.shape == (1,)
+    assert model_file.load(out).field.mu.shape == (0,)
 
 
 def test_fields_of_a_single_run_ignore_its_parameter(tmp_path):
@@ -143,7 +144,7 @@ def test_a_run_is_the_reduced_run_of_its_parameters(made, reduced, tmp_path, way
     pairs = load(made / "pairs.toml")
     assert (done.exit_code, done.stderr) == (0, "")
     model, one = reduce.load(made / "fields.npz", pairs), whole(pairs.scene([1.9]))
-    (count, seed, *how), n, fields = plan, len(one.X), model.decoder.of([1.9])
+    (count, seed, *how), n, fields = plan, len(one.X), model.field.of([1.9])
     plan = Plan((drawn(n, count or n, seed),), *how)
     states = list(infer(one, fields, plan, model.rest))
     with Results(out) as results:
@@ -254,8 +255,8 @@ def test_longer_steps_are_compared_where_they_meet_the_states_kept(made, tmp_pat
 
 def test_a_run_that_breaks_down_is_infinitely_off(made, pairs, tmp_path):
     model, bad = reduce.load(made / "fields.npz", pairs), tmp_path / "bad.npz"
-    tau = model.decoder.tau
-    reduce.save(bad, model._replace(decoder=model.decoder._replace(
+    tau = model.field.tau
+    model_file.save(bad, model._replace(field=model.field._replace(
         tau=tau._replace(modes=1e6 * tau.modes))))
     done = mpm_ref("rom", "evaluate", made / "pairs.toml", "--map", bad, "--data", made / "data",
                    "--out", tmp_path / "e.png", "--json")

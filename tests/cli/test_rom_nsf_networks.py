@@ -47,8 +47,8 @@ def test_networks_are_those_of_the_three_stages(made, study):
     plan = settings.stage_plan(study.tables.map.settings, 2)
     own = stages.train_stages(plan, data)
     model = reduce.load(made / "nets.npz", study)
-    assert isinstance(model.decoder, Networks)
-    for ours, theirs in zip(model.decoder, (own.g.decoder, own.h.field, own.l.field), strict=True):
+    assert isinstance(model.field, Networks)
+    for ours, theirs in zip(model.field, (own.g.decoder, own.h.field, own.l.field), strict=True):
         assert np.array_equal(ours.net.W, theirs.net.W)
     assert np.array_equal(model.xhat, own.g.xhat)
     x = np.stack([own.g.decoder.place(data.X, y) for y in own.g.xhat.reshape(-1, 3)])
@@ -87,7 +87,7 @@ def test_a_run_is_one_on_the_networks(made, study, tmp_path):
         X = np.concatenate([results.field(body, "x", 0) for body in ("hard", "soft")])
         xhat, mu = results.h5["reduced/xhat"][0], [1.9]
         rest = histories(study, made / "data", (0,), float).X
-        fields = learned(rest, model.decoder, mu, 0.3)
+        fields = learned(rest, model.field, mu, 0.3)
         tau = np.concatenate([results.field(body, "tau", 0) for body in ("hard", "soft")])
         assert np.array_equal(X, fields.place(np.arange(len(X)), xhat))
         assert np.array_equal(tau, fields.stress(np.arange(len(X)), xhat))
@@ -131,4 +131,4 @@ def test_a_training_that_was_cut_off_goes_on_from_its_stages(made, study, tmp_pa
     assert seen[50] == ("h", 1)
     assert not (tmp_path / "nets.pt").exists()
     ours, theirs = (reduce.load(folder / "nets.npz", study) for folder in (tmp_path, made))
-    assert np.array_equal(ours.decoder.l.net.W, theirs.decoder.l.net.W)
+    assert np.array_equal(ours.field.l.net.W, theirs.field.l.net.W)

@@ -8,6 +8,7 @@ import pytest
 from command_line import assert_told, mpm_ref
 from small_studies import CURVED, STEPS, ended, modelled, write
 
+from mpm_ref.rom import model_file
 from mpm_ref.rom.study import reduce, summary
 from mpm_ref.rom.study.case import case
 from mpm_ref.rom.study.record import COUNTS, NUMBERS, VECTORS
@@ -39,12 +40,12 @@ def test_a_run_is_the_reduced_run_of_its_parameters(made, reduced):
     assert done.stderr == ""
     bars = load(made / "bars.toml")
     model, one = reduce.load(made / "map.npz", bars), case(bars.scene([2.5]))
-    states = list(march(one, model.decoder, Way(), model.rest))
+    states = list(march(one, model.field, Way(), model.rest))
     with Results(out) as results:
         assert len(results) == STEPS + 1
         assert results.manifest["reduced"]["parameters"] == {"g": 2.5}
         for k, (latent, report) in enumerate(states):
-            x, F, _ = model.decoder.derivatives(one.X, latent.xhat)
+            x, F, _ = model.field.derivatives(one.X, latent.xhat)
             np.testing.assert_allclose(results.field("bar", "x", k), x, rtol=1e-12)
             np.testing.assert_allclose(results.field("bar", "F", k), F, atol=1e-12)
             np.testing.assert_allclose(results.h5["reduced/xhat"][k], latent.xhat, atol=1e-12)
@@ -88,7 +89,7 @@ def test_a_body_is_shown_at_more_points_than_it_was_trained_with(made, reduced, 
             assert b.field("bar", name).sum() == pytest.approx(a.field("bar", name).sum())
         model = reduce.load(made / "map.npz", load(made / "bars.toml"))
         X, xhat = b.field("bar", "x", 0), b.h5["reduced/xhat"][-1]
-        x, F, _ = model.decoder.derivatives(X, xhat)
+        x, F, _ = model.field.derivatives(X, xhat)
         np.testing.assert_allclose(b.field("bar", "x", -1), x, atol=1e-6)
         np.testing.assert_allclose(b.field("bar", "F", -1), F, atol=1e-6)
         assert b.scalar("bar", "J", -1).min() > 0.9
@@ -281,8 +282,8 @@ def test_without_a_run_held_out_there_is_nothing_to_evaluate(made, tmp_path):
 def test_a_run_that_breaks_down_is_infinitely_off(made, tmp_path):
     study = load(made / "bars.toml")
     model = reduce.load(made / "map.npz", study)
-    reduce.save(tmp_path / "bad.npz", model._replace(decoder=model.decoder._replace(
-        slope=1e6 * model.decoder.slope)))
+    model_file.save(tmp_path / "bad.npz", model._replace(field=model.field._replace(
+        slope=1e6 * model.field.slope)))
     done = evaluate(made, "--json", "--out", tmp_path / "e.png", map=tmp_path / "bad.npz")
     assert done.exit_code == 3
     found = json.loads(done.stdout)

@@ -122,7 +122,7 @@ def test_a_sound_file_of_something_else_is_told(tmp_path, said, change):
 
 
 def test_damaged_files_are_told(tmp_path):
-    """`sealed` sees to it; its own tests are those of `rom.weights`."""
+    """`sealed` sees to it; its own tests are those of `rom.model_file`."""
     assert_damage_is_told(load, lambda path: save(path, laws()), tmp_path / "laws.npz")
 
 

@@ -10,6 +10,7 @@ from mpm_ref.materials.fixed_corotated import FixedCorotated
 from mpm_ref.problem import Clock
 from mpm_ref.rom.fields.affine import Affine
 from mpm_ref.rom.latent import start_state
+from mpm_ref.rom.model_file import Model
 from mpm_ref.rom.quadrature.lagrangian import Resampled, lagrangian
 from mpm_ref.rom.sampling import PER_GROUP, pivoted
 from mpm_ref.rom.step import ldm_stepper
@@ -18,7 +19,6 @@ from mpm_ref.rom.study.case import case, distance
 from mpm_ref.rom.study.model import require_way
 from mpm_ref.rom.study.run import Way, groups, march, model, picked, stepped
 from mpm_ref.rom.study.tables import Run
-from mpm_ref.rom.weights import Model
 from mpm_ref.scene import Box, Cylinder, Difference, Union
 from validation.common.scenes import with_
 from validation.ldm.networks import trained
@@ -75,7 +75,7 @@ def test_nodes_beyond_the_other_sampling_move_with_the_samples(d):
 def test_a_run_with_another_sampling_is_near_the_one_with_material_points():
     """They differ by their quadrature alone; one point to a cell is too few."""
     trained_map = trained("gravity-r4")
-    map, one = trained_map.decoder, case(with_(GRAVITY.scene(5.0), steps=10))
+    map, one = trained_map.field, case(with_(GRAVITY.scene(5.0), steps=10))
     def end(way):
         *_, (latent, _) = march(one, map, way, trained_map.rest)
         return map.place(one.X, latent.xhat) - one.X
@@ -92,8 +92,8 @@ def test_single_precision_and_near_preimages_change_little():
     model, one = trained("gravity-r4"), case(with_(GRAVITY.scene(5.0), steps=6))
     paper = Way("eulerian", points=30)
     def end(**how):
-        *_, (latent, _) = march(one, model.decoder, paper._replace(**how), model.rest)
-        return model.decoder.place(one.X, latent.xhat) - one.X
+        *_, (latent, _) = march(one, model.field, paper._replace(**how), model.rest)
+        return model.field.place(one.X, latent.xhat) - one.X
 
     exact, near, single = (end(**how) for how in ({}, {"close": 1e-2},
                                                   {"close": 1e-2, "precision": "single"}))
@@ -113,7 +113,7 @@ def test_precision_that_there_is_not(torsion, way, said):
 
 
 def test_preimages_nearer_than_single_precision_tells_are_refused(torsion):
-    map = trained("gravity-r4").decoder
+    map = trained("gravity-r4").field
     with pytest.raises(ValueError, match=r"close = 1e-09 dx in single precision: expected at leas"):
         model(torsion, map, Way("eulerian", precision="single"))
     assert model(torsion, map, Way(precision="single")).field.g.net.W.dtype == np.float32

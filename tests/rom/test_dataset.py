@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small_studies import CURVED, STEPS, generated, study
 
-from mpm_ref.rom import modes_file
+from mpm_ref.rom import model_file
 from mpm_ref.rom.fields.pod import basis
 from mpm_ref.rom.fields.polynomial_manifold import curved
 from mpm_ref.rom.study import dataset, reduce
@@ -24,7 +24,7 @@ from mpm_ref.rom.study.generate import (
 from mpm_ref.scene import build
 from mpm_ref.store.results import BadResults, Results
 from mpm_ref.store.running import Options, checkpoint_of, run
-from mpm_ref.store.weights_file import sealed
+from mpm_ref.store.weights_file import sealed, stated
 from mpm_ref.store.writer import Fields
 from mpm_ref.training import Machine
 from mpm_ref.trajectories import snapshots
@@ -140,22 +140,22 @@ def test_modes_hold_the_training_states_and_their_coordinates(made, model):
     bars, folder = made
     data = dataset.load(bars, folder, bars.train)
     assert model.xhat.shape == (3, STEPS + 1, 3)
-    assert np.abs(model.decoder.place(data.X, model.rest) - data.X).max() == 0.0
-    off = [model.decoder.place(data.X, xhat) - x for xhat, x in
+    assert np.abs(model.field.place(data.X, model.rest) - data.X).max() == 0.0
+    off = [model.field.place(data.X, xhat) - x for xhat, x in
            zip(model.xhat.reshape(-1, 3), data.flat()[0], strict=True)]
     assert np.linalg.norm(off) < 0.02 * np.linalg.norm(data.x - data.X)
-    assert abs(np.einsum("snd,ndr->r", np.array(off), model.decoder.U)).max() < 1e-12
+    assert abs(np.einsum("snd,ndr->r", np.array(off), model.field.U)).max() < 1e-12
 
 
 def test_a_map_comes_back_bit_for_bit(made, model, tmp_path):
-    reduce.save(tmp_path / "map.npz", model)
+    model_file.save(tmp_path / "map.npz", model)
     back = reduce.load(tmp_path / "map.npz", made[0])
-    for a, b in zip((*model.decoder[:3], model.xhat, model.rest),
-                    (*back.decoder[:3], back.xhat, back.rest), strict=True):
+    for a, b in zip((*model.field[:3], model.xhat, model.rest),
+                    (*back.field[:3], back.xhat, back.rest), strict=True):
         np.testing.assert_array_equal(a, b)
     assert back.about == model.about
     assert back.about["map"] == {"kind": "modes", "r": 3}
-    reduce.save(tmp_path / "again.npz", back)
+    model_file.save(tmp_path / "again.npz", back)
     assert (tmp_path / "again.npz").read_bytes() == (tmp_path / "map.npz").read_bytes()
 
 
@@ -165,44 +165,43 @@ def test_a_curved_map_is_that_of_its_settings_and_comes_back_bit_for_bit(made, b
     known = basis(data.X, *data.flat(), 4)
     map = curved(known, 2, 2)
     assert np.array_equal(model.xhat.reshape(-1, 2), known.xhat[:, :2])
-    reduce.save(tmp_path / "map.npz", model)
+    model_file.save(tmp_path / "map.npz", model)
     back = reduce.load(tmp_path / "map.npz", bars)
     for a, b in zip((*map.modes[:3], *map[1:], model.xhat, model.rest),
-                    (*back.decoder.modes[:3], *back.decoder[1:], back.xhat, back.rest),
+                    (*back.field.modes[:3], *back.field[1:], back.xhat, back.rest),
                     strict=True):
         np.testing.assert_array_equal(a, b)
-    assert np.array_equal(back.decoder.place(data.X, back.rest), data.X)
+    assert np.array_equal(back.field.place(data.X, back.rest), data.X)
     assert back.about == model.about
     assert back.about["map"] == {"kind": "curved", "r": 2, "modes": 4, "degree": 2}
 
 
 def test_a_curved_map_does_not_go_with_linear_projection(made, bent, tmp_path):
-    reduce.save(tmp_path / "map.npz", bent[1])
+    model_file.save(tmp_path / "map.npz", bent[1])
     with pytest.raises(ValueError, match=r"run\.projection = 'linear': expected 'nonlinear'"):
         reduce.load(tmp_path / "map.npz", made[0])
 
 
 def test_what_is_no_curved_map_is_refused(bent, tmp_path):
     _, model = bent
-    assert model.decoder.powers.tolist() == [[2, 0], [1, 1], [0, 2]]
+    assert model.field.powers.tolist() == [[2, 0], [1, 1], [0, 2]]
     for name, wrong, words in (("C", np.zeros((3, 3)), r"C has shape \(3, 3\), expected \(2, 3\)"),
                                ("powers", np.ones((3, 1)), r"powers has shape \(3, 1\)"),
-                               ("powers", np.array(2), r"powers has not two axes"),
+                               ("powers", np.array(2), r"powers has 0 axes, expected 2"),
                                ("C", np.full((2, 3), np.nan), "C has numbers that are not finite")):
         with pytest.raises(ValueError, match=words):
-            modes_file.save(tmp_path / "x.npz", model._replace(
-                decoder=model.decoder._replace(**{name: wrong})))
+            model_file.save(tmp_path / "x.npz", model._replace(
+                field=model.field._replace(**{name: wrong})))
     assert not (tmp_path / "x.npz").exists()
-    _, arrays = modes_file.arrays_of(model)
-    content = {"kind": np.array("curved"), "format": np.array(1), "about": np.array("{}"), **arrays}
+    content = stated("x.npz", model_file.FORMAT, {}) | model_file.arrays_of(model)
     del content["powers"]
     (tmp_path / "x.npz").write_bytes(sealed(content))
     with pytest.raises(ValueError, match="lacks powers"):
-        modes_file.load(tmp_path / "x.npz")
+        model_file.load(tmp_path / "x.npz")
 
 
 def test_a_map_of_another_study_is_refused(model, tmp_path):
-    reduce.save(tmp_path / "map.npz", model)
+    model_file.save(tmp_path / "map.npz", model)
     with pytest.raises(ValueError, match=r"map\.npz is a map of another study"):
         reduce.load(tmp_path / "map.npz", study(tmp_path, ("to = 4.0", "to = 5.0")))
 
@@ -210,7 +209,7 @@ def test_a_map_of_another_study_is_refused(model, tmp_path):
 @pytest.mark.parametrize("damage", [lambda b: b[:-100], lambda b: b[:500] + b"?" + b[501:],
                                     lambda b: b"", lambda b: b"x = 1"])
 def test_a_damaged_map_is_refused(made, model, tmp_path, damage):
-    reduce.save(tmp_path / "map.npz", model)
+    model_file.save(tmp_path / "map.npz", model)
     content = (tmp_path / "map.npz").read_bytes()
     (tmp_path / "map.npz").write_bytes(damage(content))
     with pytest.raises(ValueError, match=r"map\.npz is (damaged|not an npz)"):
@@ -219,25 +218,25 @@ def test_a_damaged_map_is_refused(made, model, tmp_path, damage):
 
 def test_what_are_no_modes_is_refused(model, tmp_path):
     def written(**changes):
-        map = model.decoder
-        arrays = {"kind": np.array("modes"), "format": np.array(1), "about": np.array("{}"),
-                  "X": map.X, "U": map.U, "slope": map.slope, "xhat": model.xhat,
-                  "rest": model.rest} | changes
+        map = model.field
+        arrays = stated("x.npz", model_file.FORMAT, {}) | {
+            "kind": np.array("pod"), "X": map.X, "U": map.U, "slope": map.slope,
+            "xhat": model.xhat, "rest": model.rest} | changes
         path = tmp_path / "map.npz"
         path.write_bytes(sealed({k: a for k, a in arrays.items() if a is not None}))
         return path
 
-    assert modes_file.load(written()).decoder.r == 3
+    assert model_file.load(written()).field.r == 3
     for changes, words in (({"U": None}, "lacks U"), ({"rest": np.zeros(2)}, "rest has shape"),
-                           ({"xhat": np.zeros(3)}, "three axes"),
-                           ({"X": np.full_like(model.decoder.X, np.nan)}, "not finite"),
+                           ({"xhat": np.zeros(3)}, "xhat has 1 axes, expected 3"),
+                           ({"X": np.full_like(model.field.X, np.nan)}, "not finite"),
                            ({"about": np.array("{")}, r"map\.npz .*about is no JSON"),
                            ({"about": None}, r"map\.npz .*about is no JSON"),
-                           ({"format": np.array(2)}, "format 1")):
+                           ({"format": np.array(2)}, "format reduced model 1")):
         with pytest.raises(ValueError, match=words):
-            modes_file.load(written(**changes))
+            model_file.load(written(**changes))
     with pytest.raises(ValueError, match="not finite"):
-        modes_file.save(tmp_path / "x.npz", model._replace(rest=np.full(3, np.inf)))
+        model_file.save(tmp_path / "x.npz", model._replace(rest=np.full(3, np.inf)))
     assert not (tmp_path / "x.npz").exists()
 
 
@@ -250,11 +249,11 @@ def test_without_torch_a_network_is_refused_in_one_sentence(made, without_torch)
 def test_tabulated_modes_are_the_modes(model, bent, kind):
     of = model if kind == "straight" else bent[1]
     X = np.random.default_rng(0).uniform((0.0, 0.0), (0.8, 0.2), (30, 2))
-    here = tabulated(of.decoder, X)
-    assert type(here) is type(of.decoder)
+    here = tabulated(of.field, X)
+    assert type(here) is type(of.field)
     assert len(getattr(here, "modes", here).X) == 30
     for a, b in zip(here.derivatives(X, of.xhat[2, 5]),
-                    of.decoder.derivatives(X, of.xhat[2, 5]), strict=True):
+                    of.field.derivatives(X, of.xhat[2, 5]), strict=True):
         np.testing.assert_allclose(a, b, atol=1e-12)
 
 

@@ -6,8 +6,9 @@ import rom_toys
 from field_toys import MU, Q, field, latents, networks
 
 from mpm_ref.core.jit import kernel
+from mpm_ref.rom.fields.network import Networks
 from mpm_ref.rom.fields.perceptron import ROWS, count, features
-from mpm_ref.rom.fields_file import Model, load, save
+from mpm_ref.rom.model_file import Model, load, save
 from mpm_ref.rom.symmetric import tensor
 from validation.nsf.pointwise_networks import fill_features, infer
 
@@ -67,7 +68,7 @@ def test_torch_reads_the_same_features(d):
 
 def stored(tmp_path, octaves):
     """The path of a stored model, and the model."""
-    model = Model(*networks(2, octaves=octaves), np.zeros((2, 4, 3)), np.zeros(3), {})
+    model = Model(Networks(*networks(2, octaves=octaves)), np.zeros((2, 4, 3)), np.zeros(3), {})
     save(tmp_path / "a.npz", model)
     return tmp_path / "a.npz", model
 
@@ -75,14 +76,14 @@ def stored(tmp_path, octaves):
 def test_files_keep_octaves(tmp_path):
     path, model = stored(tmp_path, OCTAVES)
     again = load(path)
-    assert (again.h.octaves, again.l.octaves) == (OCTAVES, OCTAVES)
+    assert (again.field.h.octaves, again.field.l.octaves) == (OCTAVES, OCTAVES)
     X, xhat = rom_toys.cloud(2, 20), latents()
-    np.testing.assert_array_equal(again.h.values(X, xhat), model.h.values(X, xhat))
+    np.testing.assert_array_equal(again.field.h.values(X, xhat), model.field.h.values(X, xhat))
 
 
 @pytest.mark.parametrize("octaves", [-1, 1.5, (1, 2)])
 def test_octaves_that_are_no_number_of_them_are_refused(tmp_path, octaves):
     _, model = stored(tmp_path, 0)
-    wrong = model._replace(h=model.h._replace(octaves=octaves))
-    with pytest.raises(ValueError, match=r"h: octaves is .*: expected a whole number of 0 or more"):
+    wrong = model._replace(field=model.field._replace(h=model.field.h._replace(octaves=octaves)))
+    with pytest.raises(ValueError, match=r"h.octaves is .*: expected a whole number of 0 or more"):
         save(tmp_path / "b.npz", wrong)

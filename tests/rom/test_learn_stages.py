@@ -9,7 +9,7 @@ import rom_toys
 
 torch = pytest.importorskip("torch")
 
-from mpm_ref.rom import fields_file  # noqa: E402
+from mpm_ref.rom import model_file  # noqa: E402
 from mpm_ref.rom.fields.architecture import row_per_axis  # noqa: E402
 from mpm_ref.rom.snapshots import position_error  # noqa: E402
 from mpm_ref.rom.train import decoder, field, schedule, session, stages  # noqa: E402
@@ -122,9 +122,9 @@ def test_the_loss_of_every_stage_falls():
         assert fitted.history.shape == (200,)
         assert fitted.history[-1] < 0.1 * fitted.history[0]
     model = done.model({"seed": 0})
-    tau = model.h.values(DATA.X, model.xhat[1, 3], DATA.mu[1])
+    tau = model.field.h.values(DATA.X, model.xhat[1, 3], DATA.mu[1])
     assert position_error(tau, DATA.tau[1, 3]) < 0.35
-    assert position_error(model.l.values(DATA.X, model.xhat[1, 3]), DATA.C[1, 3]) < 0.35
+    assert position_error(model.field.l.values(DATA.X, model.xhat[1, 3]), DATA.C[1, 3]) < 0.35
 
 
 @pytest.mark.usefixtures("fast")
@@ -189,9 +189,10 @@ def test_stored_single_precision_is_trained_on_as_it_is(rng):
 
 def test_three_stages_are_one_file(tmp_path):
     done = stages.train_stages(plan(2), DATA).model({"seed": 0})
-    fields_file.save(tmp_path / "fields.npz", done)
-    back = fields_file.load(tmp_path / "fields.npz")
-    assert bits(back.xhat, back.rest, *back.h.net) == bits(done.xhat, done.rest, *done.h.net)
+    model_file.save(tmp_path / "fields.npz", done)
+    back = model_file.load(tmp_path / "fields.npz")
+    one, other = (bits(of.xhat, of.rest, *of.field.h.net) for of in (back, done))
+    assert one == other
     assert back.rest == pytest.approx(done.xhat[:, 0].mean(axis=0))
 
 

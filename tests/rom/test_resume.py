@@ -119,7 +119,7 @@ def test_what_is_known_of_a_file_are_the_states_of_its_run(made, reduced, tmp_pa
     model, one = reduce.load(made / "map.npz", bars), case(bars.scene([2.5]))
     with one_thread(), Results(tmp_path / "run.h5") as results:
         for (latent, report), (own, said) in zip(
-                resume.states(results), march(one, model.decoder, Way(points=12), model.rest),
+                resume.states(results), march(one, model.field, Way(points=12), model.rest),
                 strict=True):
             assert all(np.array_equal(a, b) for a, b in zip(latent, own, strict=True))
             assert (report and report[:4]) == (said and said[:4])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from small_studies import generated, study
 
+from mpm_ref.rom import model_file
 from mpm_ref.rom.study import dataset, reduce
 from mpm_ref.rom.study.tables import KEYS, LATENTS, NETWORK, WEIGHTS, Map
 from mpm_ref.training import Machine
@@ -54,11 +55,11 @@ def test_a_network_is_trained_as_its_settings_say_and_comes_back(made, tmp_path)
                         Machine())
     assert seen == [1, 2, 3]
     plain = train_decoder(DecoderTraining(3, (8, 8), weights=PRINTED, epochs=3, points=20), data)
-    np.testing.assert_array_equal(done.decoder.net.W, plain.decoder.net.W)
+    np.testing.assert_array_equal(done.field.net.W, plain.decoder.net.W)
     assert np.array_equal(done.about["loss"], plain.history)
-    reduce.save(tmp_path / "map.npz", done)
+    model_file.save(tmp_path / "map.npz", done)
     back = reduce.load(tmp_path / "map.npz", bars)
-    np.testing.assert_array_equal(back.decoder.net.W, done.decoder.net.W)
+    np.testing.assert_array_equal(back.field.net.W, done.field.net.W)
     assert back.about["map"]["weights"] == "printed"
 
 
@@ -73,7 +74,7 @@ def test_a_network_is_trained_with_weights_that_fit_its_body(made, tmp_path):
     plain, unscaled = (
         train_decoder(DecoderTraining(3, (8,), latent="modes", weights=w, epochs=3), data)
         for w in (fitting, CODE))
-    np.testing.assert_allclose(done.decoder.net.W, plain.decoder.net.W, rtol=1e-6)
-    assert not np.allclose(done.decoder.net.W, unscaled.decoder.net.W, rtol=1e-6)
+    np.testing.assert_allclose(done.field.net.W, plain.decoder.net.W, rtol=1e-6)
+    assert not np.allclose(done.field.net.W, unscaled.decoder.net.W, rtol=1e-6)
     assert done.about["map"]["weights"] == "scaled"
     np.testing.assert_allclose(done.xhat, plain.xhat, rtol=1e-9)

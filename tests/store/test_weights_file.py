@@ -7,10 +7,9 @@ import pytest
 
 from mpm_ref.materials.learned import weights as of_laws
 from mpm_ref.nclaw.gnn import weights as of_graphs
-from mpm_ref.rom import fields_file, modes_file
-from mpm_ref.rom import weights as of_maps
+from mpm_ref.rom import model_file
 from mpm_ref.rom.fields.pod import Modes
-from mpm_ref.rom.weights import Model
+from mpm_ref.rom.model_file import Model
 from mpm_ref.store.weights_file import read, stated, write
 from validation.nclaw import bundle
 from validation.nclaw.small_trainings import small_nets
@@ -18,7 +17,7 @@ from validation.nclaw.small_trainings import small_nets
 VALIDATION = Path(__file__).parents[2] / "validation"
 COMMITTED = [(of_graphs if "-gnn" in path.stem else bundle if path.stem in small_nets() else module,
               path)
-             for module, folder in ((of_maps, "ldm"), (of_laws, "nclaw"), (fields_file, "nsf"))
+             for module, folder in ((model_file, "ldm"), (of_laws, "nclaw"), (model_file, "nsf"))
              for path in sorted((VALIDATION / folder / "weights").glob("*.npz"))]
 
 
@@ -53,7 +52,7 @@ def test_a_fault_is_told_on_writing_and_on_reading(tmp_path):
 @pytest.mark.parametrize(("format", "asked", "said"), [
     ("gnn 2", 1, "holds no toys, format 1: its format, gnn 2, is that of graph networks; name "),
     ("mpm_ref law 1", "gnn 1", "holds no toys, format gnn 1: .*, is that of layers of exported l"),
-    (1, "gnn 1", "holds no toys, format gnn 1: its format, 1, is that of maps, laws or stress f"),
+    (1, "gnn 1", "holds no toys, format gnn 1: its format, 1, is that of laws; name"),
     ("gnn 2", "gnn 1", "has format gnn 2, this program reads gnn 1; use the version that wrote"),
     ("cake 7", 1, "has format cake 7, this program reads 1; "),
 ])
@@ -64,7 +63,7 @@ def test_files_of_another_kind_are_told_as_such(tmp_path, format, asked, said):
         read(path, asked, lambda found: None, "toys")
 
 
-@pytest.mark.parametrize("save", [modes_file.save, bundle.save])
+@pytest.mark.parametrize("save", [model_file.save, bundle.save])
 def test_what_json_does_not_know_is_refused_with_the_file(tmp_path, save):
     about = {"x": np.zeros(2)}
     modes = Modes(np.zeros((5, 2)), np.zeros((5, 2, 3)), np.zeros((5, 2, 2, 3)), None)

@@ -1,5 +1,6 @@
 """A small study for tests: a bar in 2D that is held at one end and bends under gravity."""
 
+from mpm_ref.rom import model_file
 from mpm_ref.rom.study import dataset, reduce
 from mpm_ref.rom.study.generate import FINISHED, generate
 from mpm_ref.rom.study.study import load
@@ -78,7 +79,8 @@ def generated(folder, data="."):
 def modelled(folder):
     """The folder, with a study, its runs in data/ and modes of them in map.npz."""
     bars, data = generated(folder, "data")
-    reduce.save(folder / "map.npz", reduce.computed(bars, dataset.load(bars, data, bars.train), {}))
+    runs = dataset.load(bars, data, bars.train)
+    model_file.save(folder / "map.npz", reduce.computed(bars, runs, {}))
     return folder
 
 

@@ -7,15 +7,15 @@ from unittest.mock import patch
 
 import numpy as np
 
-from mpm_ref.rom import modes_file
 from mpm_ref.rom.fields.pod import basis
 from mpm_ref.rom.fields.polynomial_manifold import curved
-from mpm_ref.rom.weights import Model, load
+from mpm_ref.rom.model_file import Model, load, save
 from mpm_ref.store.weights_file import SEAL, opened, sealed
 
 from ..common.registry import experiment
 from ..ldm import networks
 
+LAWS = Path(__file__).parents[1] / "nclaw" / "weights"       # files of another kind
 NET, OTHERS = "gravity-r4", ("gravity-r7", "torsion-0", "poke")
 MODES, BENT, POINTS, STATES = 4, 2, 40, 30      # of maps of modes: all, those that lead; and what
                                                 # they are made of
@@ -29,7 +29,7 @@ def of_modes(model, rng):
     """{kind: `Model` of modes} of a trained map's states at random points: straight ones, and
     curved ones with a part of the coordinates.
     """
-    map, latents = model.decoder, model.xhat.reshape(-1, model.decoder.r)
+    map, latents = model.field, model.xhat.reshape(-1, model.field.r)
     X = map.units.low + map.units.span * rng.random((POINTS, map.dim))
     found = [map.derivatives(X, xhat) for xhat in latents[::len(latents) // STATES]]
     known = basis(X, *(np.array(a) for a in tuple(zip(*found, strict=True))[:2]), MODES)
@@ -86,17 +86,17 @@ def unfit(arrays):
         found.flat[k] = value
         return sealed({**arrays, name: found})
 
-    for name in (name for name, a in arrays.items() if a.ndim and name != "sizes"):
+    for name in (name for name, a in arrays.items() if a.ndim and name != "net.sizes"):
         if arrays[name].dtype.kind == "f":
             yield "not finite", f"{name} with NaN", put(name, 0, np.nan)
             yield "not finite", f"{name} with infinity", put(name, -1, np.inf)
         yield "wrong sizes", f"{name} shorter", sealed({**arrays, name: arrays[name][..., :-1]})
         yield "wrong sizes", f"{name} left out", sealed(
             {key: a for key, a in arrays.items() if key != name})
-    for k in range(len(arrays.get("sizes", ()))):
-        yield "wrong sizes", f"sizes[{k}] one more", put("sizes", k, arrays["sizes"][k] + 1)
+    for k, size in enumerate(arrays.get("net.sizes", ())):
+        yield "wrong sizes", f"sizes[{k}] one more", put("net.sizes", k, size + 1)
     yield "wrong sizes", "of another format", put("format", 0, 99)
-    for name in (name for name in ("span", "std") if name in arrays):
+    for name in (name for name in ("units.span", "units.std") if name in arrays):
         yield "impossible", f"{name} with zero", put(name, 0, 0.0)
 
 
@@ -123,22 +123,22 @@ def tried(run, folder):
     """
     (folder / "copies").mkdir()
     copy, count = folder / "copies" / f"{NET}.npz", run.choose(quick=2, standard=30)
-    readers = written(folder, run.rng)
+    files = written(folder, run.rng)
 
-    def rows(name, made, read):
+    def rows(name, made, read=load):
         found = []
         for kind, what, content in made:
             copy.write_bytes(content)
             found.append((kind, f"{name}: {what}", *refusal(lambda: read(copy), copy)))
         return found
 
-    for path, read in readers.items():
-        others = [other for other in readers if other != path]
-        yield "damaged", rows(path.stem, damages(path, count, run.rng), read)
-        yield "damaged", rows(path.stem, (resealed(path, other) for other in others), read)
-        yield "unfit", rows(path.stem, unfit(opened(path)), read)
-        yield "other", rows(path.stem, [("of another kind", other.stem, other.read_bytes())
-                                        for other in others if readers[other] != read], read)
+    for path in files:
+        others = [other for other in files if other != path]
+        yield "damaged", rows(path.stem, damages(path, count, run.rng))
+        yield "damaged", rows(path.stem, (resealed(path, other) for other in others))
+        yield "unfit", rows(path.stem, unfit(opened(path)))
+    yield "other", rows("laws", [("of another kind", path.stem, path.read_bytes())
+                                 for path in sorted(LAWS.glob("*-neural.npz"))])
     trainings = [("of another training", name, (networks.FOLDER / f"{name}.npz").read_bytes())
                  for name in OTHERS]
     with patch.object(networks, "FOLDER", copy.parent):
@@ -146,13 +146,13 @@ def tried(run, folder):
 
 
 def written(folder, rng):
-    """{file: its reader} of a trained map, and of maps of modes that are written into a folder."""
+    """Return the files of a trained map, and of maps of modes that are written into a folder."""
     net = networks.FOLDER / f"{NET}.npz"
-    readers = {net: load}
+    files = [net]
     for kind, model in of_modes(load(net), rng).items():
-        readers[folder / f"{kind}.npz"] = modes_file.load
-        modes_file.save(folder / f"{kind}.npz", model)
-    return readers
+        files.append(folder / f"{kind}.npz")
+        save(files[-1], model)
+    return files
 
 
 def refusal(read, path):

@@ -43,7 +43,7 @@ class Reduction(NamedTuple):
 def learned(name):
     """`Reduction` of a trained map."""
     model = trained(name)
-    return Reduction(name, model.decoder, model.xhat, model.rest)
+    return Reduction(name, model.field, model.xhat, model.rest)
 
 
 def linear(snapshots, r):

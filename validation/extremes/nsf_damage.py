@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from mpm_ref.rom import spanned_file
+from mpm_ref.rom import model_file
 from mpm_ref.rom.fields.pod_fields import Sizes
-from mpm_ref.rom.weights import Model
+from mpm_ref.rom.model_file import Model
 from mpm_ref.store.weights_file import opened
 
 from ..common.registry import experiment
@@ -91,13 +91,13 @@ def record_files(run, name, one):
     count = run.choose(quick=1, standard=10)
     with tempfile.TemporaryDirectory() as folder:
         path, copy = Path(folder) / "fields.npz", Path(folder) / "copy.npz"
-        spanned_file.save(path, Model(one.fields, one.xhat, one.xhat[0, 0], {}))
+        model_file.save(path, Model(one.fields, one.xhat, one.xhat[0, 0], {}))
         made = {"damaged": damages(path, count, run.rng), "unfit": unfit(opened(path))}
         for group, files in made.items():
             rows = []
             for kind, what, content in files:
                 copy.write_bytes(content)
-                rows.append((kind, what, *refusal(lambda: spanned_file.load(copy), copy)))
+                rows.append((kind, what, *refusal(lambda: model_file.load(copy), copy)))
             taken = [f"{kind}: {what}: {said or 'accepted'}" for kind, what, ok, said in rows
                      if not ok]
             run.record(f"extremes.nsf.damage.files.{group}", 1.0 - len(taken) / len(rows),

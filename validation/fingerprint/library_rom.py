@@ -7,7 +7,7 @@ from itertools import islice
 import numba
 import numpy as np
 
-from mpm_ref.rom import fields_file, weights
+from mpm_ref.rom import model_file
 from mpm_ref.rom.fields.elastic import deformed
 from mpm_ref.rom.fields.joint_latent import joint, joint_stepper
 from mpm_ref.rom.fields.network import learned
@@ -52,8 +52,8 @@ def study(name):
 
 def network(name):
     """Return the stored map of a name and latent coordinates near the body at rest."""
-    stored = weights.load(LDM_WEIGHTS / f"{name}.npz")
-    return stored.decoder, stored.rest
+    stored = model_file.load(LDM_WEIGHTS / f"{name}.npz")
+    return stored.field, stored.rest
 
 
 @cached_by_threads
@@ -74,7 +74,7 @@ def small_setup():
 def pod():
     """Return POD modes of the study `gravity_small`, and latent coordinates at rest."""
     model = computed(study("gravity_small"), small_snapshots(), {})
-    return model.decoder, model.rest
+    return model.field, model.rest
 
 
 def polynomial(r, R, degree):
@@ -88,7 +88,7 @@ def data_of_pod():
     model = computed(study("gravity_small"), small_snapshots(), {})
     data = small_snapshots()
     return {"x": data.x, "F": data.F, "v": data.v, "latent": model.xhat,
-            "derivatives": model.decoder.derivatives(data.X, model.xhat[0, -1])}
+            "derivatives": model.field.derivatives(data.X, model.xhat[0, -1])}
 
 
 def setup_of(name, **values):
@@ -154,7 +154,7 @@ def small_fields():
     """Return the fields of modes of `jelly_small`, latent coordinates, and its held-out run."""
     small = study("jelly_small")
     model = computed(small, small_histories(), {})
-    return model.decoder, model.rest, whole(small.scene(small.mu[small.test[0]]))
+    return model.field, model.rest, whole(small.scene(small.mu[small.test[0]]))
 
 
 def data_of_modes():
@@ -190,10 +190,10 @@ def nsf_modes(samples, count, steps, map_alone=False, **options):
 
 def nsf_networks(name, scene_name, values, mu, count, steps):
     """Return a reduced run of a scene with other values on stored networks."""
-    stored = fields_file.load(NSF_WEIGHTS / f"{name}.npz")
+    stored = model_file.load(NSF_WEIGHTS / f"{name}.npz")
     setup = whole(scene(scene_name, **values))
-    g, h, l, _, rest, _ = stored
-    fields = learned(setup.X, (g, h, l), mu, BLOCK * setup.problem.dx)
+    rest = stored.rest
+    fields = learned(setup.X, stored.field, mu, BLOCK * setup.problem.dx)
     return nsf(setup, fields, rest, (drawn(len(setup.X), count, 0), steps))
 
 

@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from mpm_ref.rom.weights import load
+from mpm_ref.rom.model_file import load
 from mpm_ref.scene.toml import canonical
 
 from .studies import GRAVITY, POKES, TORSION, TOWER

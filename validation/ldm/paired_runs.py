@@ -51,9 +51,9 @@ def pair(scene, net, shots=None, shown=slice(None), way=SHOWN_WAY):
     """
     one, model = case(scene), trained(net)
     tracked = slice(None, None, -(-len(one.X) // ERROR_POINTS))
-    place, sums, kept, seen = model.decoder.place, Squares(one.X[tracked]), [], []
+    place, sums, kept, seen = model.field.place, Squares(one.X[tracked]), [], []
     with threads_for(one.problem.bodies), one_thread():
-        states = march(one, model.decoder, way, model.rest)
+        states = march(one, model.field, way, model.rest)
         for k, (x, (latent, report)) in enumerate(zip(positions(scene), states, strict=True)):
             sums.add(place(one.X[tracked], latent.xhat), x[tracked])
             seen.append((latent.xhat, report))

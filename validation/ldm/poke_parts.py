@@ -54,7 +54,7 @@ def maps():
         return f"pod-{r}", lambda: pod(POKES.name, r), np.zeros(r), ALL
 
     network = trained("poke")
-    return (("network", lambda: network.decoder, network.rest, ALL), *map(linear, DIMENSIONS),
+    return (("network", lambda: network.field, network.rest, ALL), *map(linear, DIMENSIONS),
             ("cubic", lambda: bent(POKES.name, R, CUBIC, LAM_F, DRIVEN), np.zeros(R),
              ALL._replace(projection="nonlinear")))
 

@@ -47,7 +47,7 @@ class References(NamedTuple):
     def errors(self, name, way, seed=0):
         """`Errors` of reduced runs on a trained map."""
         model = trained(name)
-        return self.on(model.decoder, model.rest, way, seed)
+        return self.on(model.field, model.rest, way, seed)
 
     def linear(self, r, way, seed=0):
         """`Errors` of reduced runs on as many POD modes."""
@@ -56,7 +56,7 @@ class References(NamedTuple):
     def nearest(self, name):
         """`Errors` of the nearest states of a trained map."""
         model = trained(name)
-        return self.near(model.decoder, model.rest)
+        return self.near(model.field, model.rest)
 
     def nearest_linear(self, r):
         """`Errors` of the nearest states of as many POD modes."""

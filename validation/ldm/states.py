@@ -33,7 +33,7 @@ def sampled(run):
     """Keeps all points and one draw of samples; records how many are near what is held."""
     one = case(TOWER.scene(*TOWER.mu[TOWER.test[0]]))
     model, held = trained("tower"), one.held(0.0)
-    samples = picked(one, model.decoder, SHOWN_WAY, model.rest, run.seed)(0.0)
+    samples = picked(one, model.field, SHOWN_WAY, model.rest, run.seed)(0.0)
     counts = [int(np.isin(samples, near).sum()) for near in held]
     scale = f"{len(one.X)} particles"
     keep(run, X=one.X, samples=samples, held=np.array([np.isin(samples, near) for near in held]))

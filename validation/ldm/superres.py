@@ -94,5 +94,5 @@ def told(run, errors, scale):
 
 def reduced(one, model, way):
     """x (k + 1, n, d) of a reduced run."""
-    return np.array([model.decoder.place(one.X, latent.xhat)
-                     for latent, _ in march(one, model.decoder, way, model.rest)])
+    return np.array([model.field.place(one.X, latent.xhat)
+                     for latent, _ in march(one, model.field, way, model.rest)])

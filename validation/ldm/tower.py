@@ -46,7 +46,7 @@ def speed(run):
         chosen = run.choose(quick=[PAPER._replace(points=25), FAST._replace(points=25)],
                             standard=ways(POINTS))
         steps = run.choose(quick=6, standard=scene.steps)
-        full, found = race(scene, (model.decoder, model.rest), chosen, steps)
+        full, found = race(scene, (model.field, model.rest), chosen, steps)
         best, count = fastest(scene), len(build(scene).bodies[0].id)
         rows += [(count, *one.row, full.wall, best.wall, one.spent.wall / scene.dt,
                   best.wall / one.spent.wall, full.wall / one.spent.wall) for one in found]

@@ -39,7 +39,7 @@ def maps(run):
         for r in run.progress(dimensions, study.name):
             model = trained(net.format(r))
             known = {f"degree-{p}": (bent(study.name, r, p), np.zeros(r)) for p in DEGREES}
-            for name, at in (known | {"network": (model.decoder, model.rest)}).items():
+            for name, at in (known | {"network": (model.field, model.rest)}).items():
                 rows += both(run, f"ldm.curved.{study.name}.r{r}.{name}", tests, at)
     run.table("errors", COLUMNS, rows)
 
@@ -58,7 +58,7 @@ def of_pokes(run):
                 at = bent(POKES.name, 6, p, lam_F, early), np.zeros(6)
                 rows += both(run, f"ldm.curved-poke.{name}", tests, at)
     model = trained("poke")
-    rows += both(run, "ldm.curved-poke.network", tests, (model.decoder, model.rest))
+    rows += both(run, "ldm.curved-poke.network", tests, (model.field, model.rest))
     run.table("errors", COLUMNS, rows)
 
 
@@ -68,7 +68,7 @@ def choices(run):
     """Errors on gravity, r = 4, linear projection, by number and choice of samples."""
     tests, rows, model = references(GRAVITY, run.choose(quick=1, standard=None)), [], trained(
         "gravity-r4")
-    known = {"network": (model.decoder, model.rest), "pod": (bent(GRAVITY.name, 4, 1), np.zeros(4))}
+    known = {"network": (model.field, model.rest), "pod": (bent(GRAVITY.name, 4, 1), np.zeros(4))}
     for name, at in run.choose(quick=dict(list(known.items())[:1]), standard=known).items():
         for count in run.progress(run.choose(quick=(10,), standard=(5, 10, 25, 50)), name):
             for choice in CHOICES:

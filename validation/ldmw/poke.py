@@ -40,7 +40,7 @@ def beside(run, tests, chosen):
     states, without dynamics.
     """
     every, map, of = np.arange(len(tests.X)), pod(PUSHES, R), trained(NET)
-    for name, own in (("nearest", (of.decoder, of.rest)), ("pod.nearest", map)):
+    for name, own in (("nearest", (of.field, of.rest)), ("pod.nearest", map)):
         share = reconstructed(tests.X, tests.full.x, *own).origin
         run.record(f"ldmw.poke.{name}.position", 100.0 * share, unit="%", scale=tests.scale,
                    comparator="info", note="of the map's nearest states")

@@ -54,7 +54,7 @@ class Runs(NamedTuple):
     def of_net(self, name, approach):
         """`Fields` on a trained map."""
         of = trained(name)
-        return self.errors(of.decoder, of.rest, approach)
+        return self.errors(of.field, of.rest, approach)
 
     @property
     def X(self):
@@ -126,8 +126,8 @@ def by_points(samples, near=None):
 def kept(name, one, samples):
     """`Neighbours` of sample points in all training states of a trained map (LDMW-sets)."""
     of = trained(name)
-    points = model(one, of.decoder, POINT_WAY).quadrature
-    return neighbours(points, of.decoder, of.xhat, samples)
+    points = model(one, of.field, POINT_WAY).quadrature
+    return neighbours(points, of.field, of.xhat, samples)
 
 
 def by_nodes(chosen, count=None):

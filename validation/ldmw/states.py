@@ -17,8 +17,8 @@ def pokes(run):
     tests, model = runs(PUSHES, SHOWN), trained(NET)
     chosen = samples(tests.cases[0], run.seed)
     approach = by_points(chosen, kept(NET, tests.cases[0], chosen))
-    found = list(run.progress(tests.levels(model.decoder, model.rest, approach), "runs"))
-    scale = (f"{len(tests.X)} particles, {len(found[0]) - 1} steps, r = {model.decoder.r}, "
+    found = list(run.progress(tests.levels(model.field, model.rest, approach), "runs"))
+    scale = (f"{len(tests.X)} particles, {len(found[0]) - 1} steps, r = {model.field.r}, "
              f"{HYPER} sample points, one run each")
     for k, levels in enumerate(found):
         record(run, f"ldmw.fig1.error.{k + 1}", compared([levels]), scale,

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from mpm_ref.rom.fields.architecture import DEPTH
 from mpm_ref.rom.fields.network import learned
-from mpm_ref.rom.fields_file import load
+from mpm_ref.rom.model_file import load
 from mpm_ref.rom.study.nsf_case import whole
 from mpm_ref.rom.study.nsf_fields import BLOCK
 from mpm_ref.scene.toml import canonical
@@ -91,7 +91,7 @@ def net_of(name):
 
 @cache
 def trained(name):
-    """`fields_file.Model` of a scene. Raises `Untrained` where it is missing, ValueError where it
+    """`Model` of a scene. Raises `Untrained` where it is missing, ValueError where it
     is damaged, or of another training or other scenes than `net_of` says now.
     """
     path, again = FOLDER / f"{name}.npz", f"python -m validation.training.nsf {name}"
@@ -116,7 +116,7 @@ def identity(net):
 
 
 def fields_of(model, study):
-    """`LearnedFields` of a `fields_file.Model` in the first run of a study."""
+    """`LearnedFields` of a `Model` in the first run of a study."""
     one = whole(study.run(study.train[0]))
     mu = [study.train[0]] if study.follows else []
-    return learned(one.X, (model.g, model.h, model.l), mu, BLOCK * one.problem.dx)
+    return learned(one.X, model.field, mu, BLOCK * one.problem.dx)

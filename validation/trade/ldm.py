@@ -42,7 +42,7 @@ def of_ways(run):
                         standard=knobs())
     scene = scene_of(size, TOWER.test[1])
     steps = run.choose(quick=4, standard=scene.steps)
-    full, found = race(scene, (model.decoder, model.rest), chosen, steps)
+    full, found = race(scene, (model.field, model.rest), chosen, steps)
     scale = f"about {size} thousand particles, {steps} steps, one test run"
     for one in found:
         share(run, f"trade.ldm.knobs.{one.words}", one.errors, scale,
@@ -68,7 +68,7 @@ class ReducedSetting:
         if self.map == "pod":
             return pod(GRAVITY.name, self.r), np.zeros(self.r)
         model = trained(f"gravity-r{self.r}")
-        return model.decoder, model.rest
+        return model.field, model.rest
 
     def measured(self, tests):
         """Errors, and CPU seconds of the steps of a run."""
@@ -135,7 +135,7 @@ def of_density(run):
                                                                 standard=("eulerian", "resampled"))
                                    for k in dense)]
     for way in run.progress(chosen, "densities"):
-        at = model.decoder, model.rest
+        at = model.field, model.rest
         errors, cpu = tests.on(*at, way), steps_of(tests, at, way)
         words = way.quadrature if way == chosen[0] else f"{way.quadrature}.{way.per_cell}"
         share(run, f"trade.ldm.density.{words}", errors, tests.scale, f"{cpu:.3g} CPU s a run",

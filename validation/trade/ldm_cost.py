@@ -103,7 +103,7 @@ def split(one, at, way, steps=STEPS):
 def of_parts(run):
     """Of a step of the tower with 25 samples, the paper's way and the cheap one, by size."""
     rows, model = [], trained(NET)
-    at = model.decoder, model.rest
+    at = model.field, model.rest
     for size in run.progress(run.choose(quick=(34,), standard=GRIDS), "sizes"):
         one = case(scene_of(size))
         for name, way in (("paper", PAPER), ("cheap", FAST)):
@@ -152,7 +152,7 @@ def offline(run):
     training = trained_in(model.about)
     for size in run.progress(run.choose(quick=(34,), standard=GRIDS), "sizes"):
         scene = scene_of(size)
-        full, (cheap,) = race(scene, (model.decoder, model.rest), [FAST._replace(points=25)],
+        full, (cheap,) = race(scene, (model.field, model.rest), [FAST._replace(points=25)],
                               run.choose(quick=3, standard=10))
         count, best = len(build(scene).bodies[0].id), fastest(scene)
         known = [scene.steps * a.cpu for a in (full, best, cheap.spent)]

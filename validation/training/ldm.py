@@ -10,11 +10,11 @@ import torch
 import typer
 from tqdm import tqdm
 
+from mpm_ref.rom.model_file import save
 from mpm_ref.rom.study.reduce import of_trained
 from mpm_ref.rom.train.decoder import DecoderTraining, train_decoder
 from mpm_ref.rom.train.loss import READINGS, LossWeights
 from mpm_ref.rom.train.settings import device_of
-from mpm_ref.rom.weights import save
 from mpm_ref.training import DEVICES, Machine
 
 from ..common.provenance import commit, provenance

@@ -12,7 +12,7 @@ import torch
 import typer
 from tqdm import tqdm
 
-from mpm_ref.rom.fields_file import save
+from mpm_ref.rom.model_file import save
 from mpm_ref.rom.snapshots import joined
 from mpm_ref.rom.study.nsf_case import history
 from mpm_ref.rom.train.decoder import DecoderTraining
@@ -70,7 +70,7 @@ class Work:
 
 
 def made(name, checkpoints, machine):
-    """`fields_file.Model` of a net by name, with what is to be known of it."""
+    """`model_file.Model` of a net by name, with what is to be known of it."""
     net = net_of(name)
     checkpoints.mkdir(parents=True, exist_ok=True)
     runs = runs_of(net.study)
@@ -94,11 +94,11 @@ def errors_of(model, runs):
     sums = {name: np.zeros(2) for name in ("displacement", "stress", "affine")}
     for run, mu in enumerate(runs.mu):
         for k in range(0, runs.x.shape[1], -(-runs.x.shape[1] // LEVELS)):
-            xhat, X = model.xhat[run, k], runs.X
+            xhat, X, (g, h, l) = model.xhat[run, k], runs.X, model.field
             for name, found, known in (
-                    ("displacement", model.g.place(X, xhat) - X, runs.x[run, k] - X),
-                    ("stress", model.h.values(X, xhat, model.h.own(mu)), runs.tau[run, k]),
-                    ("affine", model.l.values(X, xhat, model.l.own(mu)), runs.C[run, k])):
+                    ("displacement", g.place(X, xhat) - X, runs.x[run, k] - X),
+                    ("stress", h.values(X, xhat, h.own(mu)), runs.tau[run, k]),
+                    ("affine", l.values(X, xhat, l.own(mu)), runs.C[run, k])):
                 sums[name] += np.sum((found - known)**2), np.sum(known**2, dtype=float)
     return {name: float(np.sqrt(off / norm)) for name, (off, norm) in sums.items()}
 

@@ -182,6 +182,24 @@ class Field(NamedTuple):
                                / self.units.mu_std])
 
 
+class Networks(NamedTuple):
+    """Position, stress and affine field as networks, of no points in particular."""
+
+    g: Decoder      # position
+    h: Field        # stress, values of `symmetric`
+    l: Field        # affine field, row by row
+
+    @property
+    def dim(self):
+        """Number of axes d."""
+        return self.g.dim
+
+    @property
+    def r(self):
+        """Number of latent coordinates."""
+        return self.g.r
+
+
 class LearnedFields(NamedTuple):
     """The three fields at given points, in a run with parameters mu."""
 

@@ -63,8 +63,8 @@ def reduced(one, model, run):
     does.
     """
     before = None
-    for latent, _ in march(one, model.decoder, run.way, model.rest, run.seed):
-        x = model.decoder.place(one.X, latent.xhat)
+    for latent, _ in march(one, model.field, run.way, model.rest, run.seed):
+        x = model.field.place(one.X, latent.xhat)
         require_slow(x, before, one.problem)
         before = x
         yield x
@@ -88,8 +88,8 @@ def nearest(X, x, model):
     """Yield the positions (n, d) of a map's states that are nearest to x (k + 1, n, d)."""
     xhat = model.rest
     for reference in x:
-        xhat = project_position(model.decoder, X, reference, xhat).y
-        yield model.decoder.place(X, xhat)
+        xhat = project_position(model.field, X, reference, xhat).y
+        yield model.field.place(X, xhat)
 
 
 def course(X, x, positions):

@@ -46,8 +46,8 @@ def require_way(one, model, run):
     """Raise ValueError where the samples of a reduced run of a `Case` do not suffice, or its map
     has not that precision.
     """
-    precise(model.decoder, run.way)
-    drawing(one, model.decoder, run.way)
+    precise(model.field, run.way)
+    drawing(one, model.field, run.way)
 
 
 def known_of(study, mu):
@@ -91,5 +91,5 @@ def recording(study, model, mu, count=None):
         return nsf.recording(one, model, mu, run, facts)
     require_way(one, model, run)
     shown = one.problem if count is None else build(resampled(study.scene(mu), count))
-    return Recording(one, model, run, watch(one, model.decoder, model.xhat),
-                     field(model.decoder, shown.bodies[0]), shown, facts)
+    return Recording(one, model, run, watch(one, model.field, model.xhat),
+                     field(model.field, shown.bodies[0]), shown, facts)

@@ -31,7 +31,7 @@ def evaluate(study, model, histories):
     for k, number in enumerate(study.test):
         mu, data = histories.mu[k], (histories.x[k], histories.tau[k])
         one = whole(study.scene(mu))
-        fields = of_run(model.decoder, one, mu)
+        fields = of_run(model.field, one, mu)
         plan = plan_of(study.tables.run, one.problem, fields)
         found = {REDUCED: course(fields, *data, reduced(one, fields, plan, model.rest, study)),
                  NEAREST: course(fields, *data, only(levels, closest(fields, data[0], model.rest)))}

@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from ..fields.network import learned
+from ..fields.network import Networks, learned
 from ..fields.pod_fields import spanned
 from .errors import MEASURED, Squares
-from .nsf_networks import Networks
 
 BLOCK = 3.0         # size of blocks of points [dx]
 

@@ -2,31 +2,8 @@
 
 from contextlib import suppress
 from pathlib import Path
-from typing import NamedTuple
-
-from .. import fields_file
-from ..fields.network import Decoder, Field
-from ..weights import Model
 
 STAGES = "ghl"
-
-
-class Networks(NamedTuple):
-    """The three fields; they know no points (see `rom.fields.network`)."""
-
-    g: Decoder      # position
-    h: Field        # stress
-    l: Field        # affine field
-
-    @property
-    def dim(self):
-        """Number of axes d."""
-        return self.g.dim
-
-    @property
-    def r(self):
-        """Number of latent coordinates."""
-        return self.g.r
 
 
 def trained(fitted, map, histories, folder, on_epoch):
@@ -46,8 +23,7 @@ def trained(fitted, map, histories, folder, on_epoch):
     about = {f"{clock}_seconds": round(sum(getattr(part.cost, clock) for part in done), 1)
              for clock in done.g.cost._fields}
     losses = {"g": done.g.history[-1, 0], "h": done.h.history[-1], "l": done.l.history[-1]}
-    own = done.model(about | {"losses": {name: float(loss) for name, loss in losses.items()}})
-    return Model(Networks(own.g, own.h, own.l), own.xhat, own.rest, own.about)
+    return done.model(about | {"losses": {name: float(loss) for name, loss in losses.items()}})
 
 
 def forget(folder):
@@ -56,19 +32,3 @@ def forget(folder):
         (folder / f"{stage}.pt").unlink(missing_ok=True)
     with suppress(OSError):
         folder.rmdir()
-
-
-def is_one(arrays):
-    """Whether the arrays of a file are those of three networks."""
-    return "g.W" in arrays
-
-
-def save(path, model):
-    """Write a `Model` of networks; raises as `fields_file.save` does."""
-    fields_file.save(path, fields_file.Model(*model.decoder, model.xhat, model.rest, model.about))
-
-
-def load(path):
-    """Read what `save` wrote. Raises ValueError saying what is wrong with the file."""
-    own = fields_file.load(path)
-    return Model(Networks(own.g, own.h, own.l), own.xhat, own.rest, own.about)

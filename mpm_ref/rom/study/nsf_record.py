@@ -122,7 +122,7 @@ def recording(whole, model, mu, run, facts):
     """`Recording` of a reduced run with parameters mu on the fields of a `Model`. Raises ValueError
     as `plan_of` does.
     """
-    fields, clock = of_run(model.decoder, whole, mu), whole.problem.clock
+    fields, clock = of_run(model.field, whole, mu), whole.problem.clock
     plan = plan_of(run, whole.problem, fields)
     own = replace(clock, dt=run.faster * clock.dt, steps=plan.steps(clock), every=1)
     return Recording(whole, fields, model.rest, trained(fields, model.xhat), run, plan,

@@ -66,7 +66,7 @@ class Recording:
     @property
     def r(self):
         """Number of latent coordinates."""
-        return self.model.decoder.r
+        return self.model.field.r
 
     @property
     def count(self):

@@ -9,15 +9,12 @@ import numpy as np
 
 from ...shapes.inside import solid
 from ...store.manifest import source_hash, versions
-from ...store.weights_file import opened
 from ...training import part
-from .. import modes_file, spanned_file, weights
-from ..fields.network import Decoder
+from .. import model_file
 from ..fields.pod import basis
-from ..fields.pod_fields import Spanned
 from ..fields.polynomial_manifold import curved
 from ..latent import initial
-from ..weights import Model
+from ..model_file import Model
 from . import nsf_fields as nsf
 from . import nsf_networks
 from .errors import misfit
@@ -80,7 +77,7 @@ def measured(model, snapshots, misfit=misfit):
     """A `Model` that also says of its fit how many points the `Snapshots` have, and how far it is
     off them at its own latent coordinates.
     """
-    off = misfit(model.decoder, snapshots, model.xhat)._asdict()
+    off = misfit(model.field, snapshots, model.xhat)._asdict()
     known = {name: share for name, share in off.items() if isfinite(share)}
     return model._replace(about=model.about | {
         "fit": {"points": len(snapshots.X), "errors": known}})
@@ -125,26 +122,11 @@ def model_of(study):
     return {} if model == LDM else {"model": model}
 
 
-def save(path, model):
-    """Write a `Model`, whole or not at all. Raises OSError where the system refuses."""
-    files = {Decoder: weights, Spanned: spanned_file, nsf_networks.Networks: nsf_networks}
-    files.get(type(model.decoder), modes_file).save(path, model)
-
-
-def read(path):
-    """The `Model` of a file, of any kind and study. Raises ValueError for a file that is damaged or
-    no map.
-    """
-    arrays = opened(Path(path))
-    known = (file for file in (modes_file, spanned_file, nsf_networks) if file.is_one(arrays))
-    return next(known, weights).load(path)
-
-
 def load(path, study):
     """The `Model` of a file, of any kind. Raises ValueError for a file that is damaged or no map,
     for one of another study, and for one that the study's projection does not suit.
     """
-    model = read(path)
+    model = model_file.load(path)
     if model.about.get("study") != study.digest:
         raise ValueError(f"{path} is a map of another study, or of {study.path} before its scenes "
                          "or held-out runs changed; train again, or name the study it is of")

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..fields.architecture import hidden
-from ..fields_file import Model
+from ..fields.network import Networks
+from ..model_file import Model
 from ..snapshots import Snapshots
 from .decoder import DecoderTraining, TrainedDecoder, train_decoder
 from .field import FieldData, FieldTraining, TrainedField, train_field
@@ -40,8 +41,8 @@ class TrainedStages(NamedTuple):
         search near the mean of the training runs' first latent coordinates.
         """
         xhat = self.g.xhat
-        return Model(self.g.decoder, self.h.field, self.l.field, xhat, xhat[:, 0].mean(axis=0),
-                     about)
+        fields = Networks(self.g.decoder, self.h.field, self.l.field)
+        return Model(fields, xhat, xhat[:, 0].mean(axis=0), about)
 
 
 def printed_plan(dim, r, betas, follows=False):

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from mpm_ref.rom.model_file import Model, load, save
 from mpm_ref.rom.study.errors import Errors
 from mpm_ref.rom.study.run import SCHEMES, Way
-from mpm_ref.rom.weights import Model, load, save
 from validation.common import targets
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
@@ -66,7 +66,7 @@ def test_missing_weights_say_how_to_make_them(folder):
 def test_weights_of_another_training_are_refused(folder, key):
     model = load(next((networks.Path(networks.__file__).parent / "weights").glob("gravity-r2.npz")))
     assert save(folder / "gravity-r2.npz", model) is None
-    assert networks.trained("gravity-r2").decoder.r == 2
+    assert networks.trained("gravity-r2").field.r == 2
     networks.trained.cache_clear()
     save(folder / "gravity-r2.npz", Model(*model[:3], {**model.about, key: "other"}))
     with pytest.raises(ValueError, match=r"of .*'other'.*: python -m validation\.train gravity-r2"):
@@ -77,7 +77,7 @@ def test_weights_of_another_training_are_refused(folder, key):
 def test_all_weights_are_here_and_of_what_is_said(name):
     model, net = networks.trained(name), networks.nets()[name]
     steps = net.study.scene(*net.study.mu[0]).steps
-    assert model.decoder.r == net.r
+    assert model.field.r == net.r
     assert model.xhat.shape[:2] == (len(net.study.train), steps + 1)
     assert "+changes" not in model.about["commit"]
 

@@ -35,7 +35,7 @@ SOME = np.stack(np.meshgrid(*3 * (np.arange(2.0),), indexing="ij"), axis=-1).res
 @pytest.fixture
 def short(monkeypatch):
     """A short run, and a map that is exact for affine motions."""
-    affine = SimpleNamespace(decoder=Affine(3), rest=Affine(3).rest)
+    affine = SimpleNamespace(field=Affine(3), rest=Affine(3).rest)
     monkeypatch.setattr(paired_runs, "trained", lambda name: affine)
     return with_(fallen(5.0), steps=3)
 

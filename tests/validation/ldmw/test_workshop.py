@@ -9,8 +9,8 @@ import pytest
 from figures.common import state_panels
 from figures.frame import draw_all
 from mpm_ref.rom.latent import start_state
+from mpm_ref.rom.model_file import load, save
 from mpm_ref.rom.study.case import case
-from mpm_ref.rom.weights import load, save
 from validation.common import targets
 from validation.common.record import read_records
 from validation.common.results import ProfileResults

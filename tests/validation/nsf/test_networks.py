@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from field_toys import R, networks
 
+from mpm_ref.rom.fields.network import Networks
 from mpm_ref.rom.fields.pod_fields import Sizes
-from mpm_ref.rom.fields_file import Model, save
+from mpm_ref.rom.model_file import Model, save
 from mpm_ref.rom.study.errors import Errors
 from mpm_ref.rom.study.nsf_case import whole
 from validation.common import targets
@@ -39,7 +40,8 @@ def folder(tmp_path, monkeypatch):
 def model(net=NET):
     """Networks drawn at random that say they are a net's."""
     rng = np.random.default_rng(0)
-    return Model(*networks(3), rng.normal(size=(2, 31, R)), rng.normal(size=R), identity(net))
+    fields = Networks(*networks(3))
+    return Model(fields, rng.normal(size=(2, 31, R)), rng.normal(size=R), identity(net))
 
 
 def test_the_networks_are_those_of_all_scenes_with_the_printed_latent_coordinates():
@@ -79,9 +81,9 @@ def test_weights_come_back_as_fields_of_the_scene(folder):
     fields = fields_of(trained("jelly"), STUDY)
     X, xhat, some = whole(STUDY.run(0.45)).X, np.array([0.2, -0.1, 0.4]), np.array([3, 40])
     assert np.array_equal(fields.X, X)
-    assert fields.place(some, xhat) == pytest.approx(model().g.place(X[some], xhat))
+    assert fields.place(some, xhat) == pytest.approx(model().field.g.place(X[some], xhat))
     assert fields.stress(some, xhat)[:, 0, 2] == pytest.approx(
-        model().h.values(X[some], xhat)[:, 2])
+        model().field.h.values(X[some], xhat)[:, 2])
 
 
 @pytest.mark.parametrize("change", [
@@ -108,7 +110,7 @@ def test_damaged_weights_are_refused(folder):
 def test_weights_that_lie_there_are_those_of_their_nets():
     """What is committed fits what is asked for; 2 MB at most each."""
     for file in kept.FOLDER.glob("*.npz"):
-        assert trained(file.stem).g.r == net_of(file.stem).study.sizes.r
+        assert trained(file.stem).field.r == net_of(file.stem).study.sizes.r
         assert file.stat().st_size <= 2e6
 
 

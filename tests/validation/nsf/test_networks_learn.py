@@ -75,7 +75,7 @@ def test_the_command_writes_weights_that_are_taken(places):
     assert {stage: len(own) for stage, own in about["losses"].items()} == {"g": 6, "h": 5, "l": 4}
     assert {*about["cpu_seconds"]} == {*about["wall_seconds"]} == {*"ghl"}
     assert {*about["errors"]} == {"displacement", "stress", "affine"}
-    assert (model.g.net.sizes.tolist(), model.xhat.shape) == ([6, *[8] * 5, 3], (2, 31, 3))
+    assert (model.field.g.net.sizes.tolist(), model.xhat.shape) == ([6, *[8] * 5, 3], (2, 31, 3))
     fields = fields_of(model, STUDY)
     assert np.isfinite(fields.stress(np.arange(5), model.rest)).all()
     assert list(places[1].iterdir()) == []

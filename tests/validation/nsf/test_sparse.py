@@ -8,9 +8,10 @@ from command_line import mpm_ref
 from small_nsf_studies import modelled, write
 from small_toys import Records
 
+from mpm_ref.rom import model_file
 from mpm_ref.rom.cubature import misfit
 from mpm_ref.rom.fields.pod_fields import Sizes
-from mpm_ref.rom.study import nsf_run, nsf_watch, reduce
+from mpm_ref.rom.study import nsf_run, nsf_watch
 from mpm_ref.rom.study.nsf_case import whole
 from mpm_ref.rom.study.nsf_record import plan_of
 from mpm_ref.rom.study.nsf_run import Chosen, Plan, drawn, infer, of_cells, weighed
@@ -34,7 +35,7 @@ def made(tmp_path_factory):
 
 
 def test_they_are_told_by_the_command(made, tmp_path, monkeypatch):
-    fields = reduce.read(made / "fields.npz").decoder
+    fields = model_file.load(made / "fields.npz").field
     left = misfit(fields.U, 3, drawn(len(fields.X), 20, 0).points)
     for bound, warned in ((0.99 * left, True), (1.01 * left, False)):
         monkeypatch.setattr(nsf_watch, "SPARSE", bound)
@@ -58,8 +59,8 @@ def test_a_run_on_samples_with_weights_is_that_of_their_plan(made, tmp_path, mon
     study, out = write(tmp_path, ("points = 20", asked)), tmp_path / "run.h5"
     done = mpm_ref("rom", "run", study, "--map", made / "fields.npz", "--out", out, "--set", "v=2")
     assert done.exit_code == 0, done.output
-    model, one = reduce.read(made / "fields.npz"), whole(load(study).scene([2.0]))
-    fields = model.decoder.of([2.0])
+    model, one = model_file.load(made / "fields.npz"), whole(load(study).scene([2.0]))
+    fields = model.field.of([2.0])
     chosen = pick(fields, one)
     *_, (_, last, report) = infer(one, fields, Plan((chosen,)), model.rest)
     with Stored(out) as results:

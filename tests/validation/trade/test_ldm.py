@@ -83,7 +83,7 @@ def test_a_step_asks_the_map_as_often_as_its_way_says(one):
 def test_near_preimages_ask_less(one):
     model = trained("gravity-r4")
     way = Way("eulerian", points=20, velocity="latest")
-    paper, cheap = (split(one, (model.decoder, model.rest), way._replace(close=close), 2)
+    paper, cheap = (split(one, (model.field, model.rest), way._replace(close=close), 2)
                     for close in (1e-9, 1e-2))
     assert cheap[2] == paper[2]
     assert cheap[1]["derivatives"] < 0.7 * paper[1]["derivatives"]
@@ -132,6 +132,6 @@ def test_a_run_costs_as_many_steps_as_it_has(monkeypatch):
 
 def test_a_run_by_itself_has_the_errors_that_it_has_among_others():
     tests, model = references(GRAVITY, 1), trained("gravity-r4")
-    at, way = (model.decoder, model.rest), Way(points=20)
+    at, way = (model.field, model.rest), Way(points=20)
     found = ldm.alone(tests.cases[0], at, way, tests.x[0])
     assert tuple(found.errors) == pytest.approx(tuple(tests.on(*at, way)), rel=1e-12)

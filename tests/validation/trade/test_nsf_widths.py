@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from field_toys import R, networks
 
+from mpm_ref.rom.fields.network import Networks
 from mpm_ref.rom.fields.pod_fields import Sizes
-from mpm_ref.rom.fields_file import Model
+from mpm_ref.rom.model_file import Model
 from mpm_ref.rom.study.errors import Errors
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
@@ -40,7 +41,7 @@ def recorded(tmp_path, monkeypatch):
     def trained(name):
         if name in recorded.lacking:
             raise Untrained(f"no weights {name}.npz")
-        return Model(*networks(3), np.zeros((2, 31, R)), np.zeros(R), {})
+        return Model(Networks(*networks(3)), np.zeros((2, 31, R)), np.zeros(R), {})
 
     def ready(model, study):
         fields = fields_of(model, study)

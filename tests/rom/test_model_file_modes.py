@@ -1,16 +1,15 @@
 """Fields of modes as files: nothing is lost, and nothing damaged or foreign is taken for them.
 
-What a seal tells of a file is tested with `weights`, whose files are sealed by the same code.
+What a seal tells of a file is tested with `test_model_file`.
 """
 
 import numpy as np
 import pytest
 
-from mpm_ref.rom import modes_file, spanned_file, weights
+from mpm_ref.rom import model_file
 from mpm_ref.rom.fields.pod_fields import Sizes, spanned
+from mpm_ref.rom.model_file import Model, arrays_of, load, save
 from mpm_ref.rom.snapshots import joined
-from mpm_ref.rom.spanned_file import arrays_of, load, save
-from mpm_ref.rom.weights import Model
 from mpm_ref.store.weights_file import sealed, stated
 from tests.rom.test_spanned import ALL, bent
 
@@ -46,10 +45,10 @@ def test_fields_come_back_bit_for_bit(tmp_path, d, kind):
             assert np.array_equal(a, b)
     y = own.xhat[1, 4] + 0.01
     for name in ("place", "stress", "affine"):
-        assert np.array_equal(getattr(back.decoder, name)(ALL, y),
-                              getattr(own.decoder, name)(ALL, y))
-    assert np.array_equal(back.decoder.near(y, own.decoder.X[:3], 0.1),
-                          own.decoder.near(y, own.decoder.X[:3], 0.1))
+        assert np.array_equal(getattr(back.field, name)(ALL, y),
+                              getattr(own.field, name)(ALL, y))
+    assert np.array_equal(back.field.near(y, own.field.X[:3], 0.1),
+                          own.field.near(y, own.field.X[:3], 0.1))
 
 
 def test_equal_content_gives_equal_bytes(tmp_path):
@@ -62,7 +61,7 @@ def test_equal_content_gives_equal_bytes(tmp_path):
 
 def changed(**changes):
     """The arrays of a file with others in place of some; None: without."""
-    found = stated("f", spanned_file.FORMAT, ABOUT) | arrays_of(model())
+    found = stated("f", model_file.FORMAT, ABOUT) | arrays_of(model())
     found |= {name.replace("__", "."): a for name, a in changes.items()}
     return {name: a for name, a in found.items() if a is not None}
 
@@ -87,14 +86,14 @@ N = len(ALL)
     ({"bend__unit": np.zeros(2)}, "bend.unit has numbers that are not positive"),
     ({"bend__unit": np.array([1.0, np.inf])}, "bend.unit is infinite of coordinates that vary"),
     ({"cells__order": np.zeros(N, dtype=int)}, "do not hold each point once"),
-    ({"kind": np.array("modes")}, "its kind is modes"),
+    ({"kind": np.array("modes")}, "its kind is modes, expected one of network, "),
 ])
 def test_what_does_not_fit_is_refused(tmp_path, changes, said):
     path = tmp_path / "fields.npz"
     path.write_bytes(sealed(changed(**changes)))
     with pytest.raises(ValueError, match=said) as refusal:
         load(path)
-    assert str(refusal.value).startswith(f"{path} holds no fields of modes: ")
+    assert str(refusal.value).startswith(f"{path} holds no reduced model: ")
     assert "\n" not in str(refusal.value)
 
 
@@ -112,10 +111,3 @@ def test_fields_that_do_not_fit_are_not_written(tmp_path):
     with pytest.raises(ValueError, match="is not written: rest has numbers"):
         save(tmp_path / "fields.npz", bad)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_maps_and_fields_are_told_apart(tmp_path):
-    save(tmp_path / "fields.npz", model())
-    for file in (weights, modes_file):
-        with pytest.raises(ValueError, match=r"fields\.npz holds no "):
-            file.load(tmp_path / "fields.npz")

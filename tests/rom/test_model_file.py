@@ -1,4 +1,4 @@
-"""Trained maps as files: nothing is lost, and nothing damaged or foreign is taken for one."""
+"""Reduced models as files: nothing is lost, and nothing damaged or foreign is taken for one."""
 
 import time
 from datetime import datetime, timedelta
@@ -10,8 +10,8 @@ from damaged import changed, refused, without
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mpm_ref.rom import modes_file, weights
-from mpm_ref.rom.weights import Model, arrays_of, load, save
+from mpm_ref.rom import model_file
+from mpm_ref.rom.model_file import Model, arrays_of, load, save
 from mpm_ref.store.weights_file import seal, sealed, stated
 
 ABOUT = {"seed": 3, "command": "train ldm", "weights": {"F": 1.0 / 30.0, "v": 0.08},
@@ -26,12 +26,12 @@ def model(dim=3, r=2, seed=0):
 
 def file_of(model):
     """The arrays that are written."""
-    return stated("map.npz", weights.FORMAT, model.about) | arrays_of(model)
+    return stated("map.npz", model_file.FORMAT, model.about) | arrays_of(model)
 
 
 def flat(model):
     """All arrays of a model."""
-    return [*model.decoder.net, *model.decoder.units, model.xhat, model.rest]
+    return [*model.field.net, *model.field.units, model.xhat, model.rest]
 
 
 @pytest.fixture(scope="module")
@@ -51,21 +51,21 @@ def test_a_model_comes_back_bit_for_bit(tmp_path, d):
         np.testing.assert_array_equal(a, b)
     assert back.about == ABOUT
     X = rom_toys.cloud(d, 10)
-    for a, b in zip(back.decoder.derivatives(X, back.rest),
-                    model(d).decoder.derivatives(X, back.rest), strict=True):
+    for a, b in zip(back.field.derivatives(X, back.rest),
+                    model(d).field.derivatives(X, back.rest), strict=True):
         np.testing.assert_array_equal(a, b)
 
 
 def test_sizes_may_be_short_integers(saved):
     """Their products are not."""
     assert 20 * 20 > np.iinfo(np.int8).max
-    big = model()._replace(decoder=rom_toys.decoder(3, 2, hidden=(20, 20)))
-    short = file_of(big) | {"sizes": np.array([5, 20, 20, 3], dtype=np.int8)}
+    big = model()._replace(field=rom_toys.decoder(3, 2, hidden=(20, 20)))
+    short = file_of(big) | {"net.sizes": np.array([5, 20, 20, 3], dtype=np.int8)}
     path = saved.with_name("short.npz")
     path.write_bytes(sealed(short))
     X = rom_toys.cloud(3, 5)
-    np.testing.assert_array_equal(load(path).decoder.place(X, big.rest),
-                                  big.decoder.place(X, big.rest))
+    np.testing.assert_array_equal(load(path).field.place(X, big.rest),
+                                  big.field.place(X, big.rest))
 
 
 def test_equal_content_gives_equal_bytes(saved, monkeypatch):
@@ -80,9 +80,9 @@ def test_equal_content_gives_equal_bytes(saved, monkeypatch):
 
 def test_a_file_is_a_plain_npz(saved):
     with np.load(saved, allow_pickle=False) as file:
-        assert int(file["format"]) == weights.FORMAT
+        assert str(file["format"]) == model_file.FORMAT
         assert '"seed": 3' in str(file["about"])
-        np.testing.assert_array_equal(file["W"], model().decoder.net.W)
+        np.testing.assert_array_equal(file["net.W"], model().field.net.W)
 
 
 @pytest.mark.parametrize("broken", ["os.replace", "os.fsync"])
@@ -173,50 +173,57 @@ def test_a_file_that_says_nothing_of_its_map_is_told(tmp_path, about, said):
 
 
 def test_another_format_is_told(tmp_path, monkeypatch):
-    monkeypatch.setattr(weights, "FORMAT", 2)
+    monkeypatch.setattr(model_file, "FORMAT", "reduced model 2")
     save(tmp_path / "map.npz", model())
     monkeypatch.undo()
-    refused(load, tmp_path / "map.npz", "has format 2, this program reads 1; use the version")
+    refused(load, tmp_path / "map.npz",
+            "has format reduced model 2, this program reads reduced model 1; use the version")
 
 
 @pytest.mark.parametrize("kept", [[1, 1], [1], [], "1", 1.5, None])
 def test_what_is_no_format_is_told(kept, tmp_path):
     found = {} if kept is None else {"format": np.array(kept)}
-    path, modes = tmp_path / "map.npz", {"kind": np.array("modes")}
-    for module, arrays in ((weights, file_of(model())), (modes_file, modes)):
-        path.write_bytes(sealed(without("format")(arrays) | found))
-        said = r"has format .*, this program reads 1; use |holds no modes of format 1; make "
-        with pytest.raises(ValueError, match=rf"map\.npz ({said})"):
-            module.load(path)
+    path = tmp_path / "map.npz"
+    path.write_bytes(sealed(without("format")(file_of(model())) | found))
+    said = "has format .*, this program reads reduced model 1; |holds no reduced model, format"
+    with pytest.raises(ValueError, match=rf"map\.npz ({said})"):
+        load(path)
+
+
+def sized(sizes):
+    """The arrays of a file with other widths of layers."""
+    return changed(**{"net.sizes": sizes})
 
 
 FAULTS = {
-    "lacks W, b": without("W", "b"),
+    "lacks net.W, net.b": without("net.W", "net.b"),
+    "its kind is cake, expected one of network, ": changed(kind="cake"),
     "has format None": without("format"),
-    r"W has shape \(140,\), expected \(141,\)": changed(W=lambda W: W[1:]),
-    r"b has shape \(21,\), expected \(20,\)": changed(b=lambda b: np.append(b, 0.0)),
-    r"low has shape \(2,\), expected \(3,\)": changed(low=lambda a: a[:2]),
+    r"W has shape \(140,\), expected \(141,\)": changed(**{"net.W": lambda W: W[1:]}),
+    r"b has shape \(21,\), expected \(20,\)": changed(**{"net.b": lambda b: np.append(b, 0.0)}),
+    r"low has shape \(2,\), expected \(3,\)": changed(**{"units.low": lambda a: a[:2]}),
     r"xhat has shape \(4, 3, 1\), expected \(4, 3, 2\)": changed(xhat=lambda a: a[..., :1]),
     r"xhat has shape \(12, 2\), expected \('runs', 'levels', 2\)": changed(
         xhat=lambda a: a.reshape(12, 2)),
     r"rest has shape \(3,\), expected \(2,\)": changed(rest=np.zeros(3)),
-    r"layers of sizes \[3, 9, 8, 3\]": changed(sizes=[3, 9, 8, 3]),
-    r"layers of sizes \[5, 0, 8, 3\]": changed(sizes=[5, 0, 8, 3]),
-    r"layers of sizes \[\]": changed(sizes=np.array([], dtype=int)),
-    r"layers of sizes \[5, -9, 8, 3\]": changed(sizes=[5, -9, 8, 3]),
-    r"layers of sizes \[3, 3, .*, 3, \.\. 9999 in all\]: expected d \+ r, \.\., d;": changed(
-        sizes=np.full(9999, 3)),
-    r"sizes is an array of shape \(4,\) and type float64: expected whole numbers": changed(
-        sizes=lambda a: a + 0.5),
-    r"sizes is an array of shape \(2, 2\)": changed(sizes=lambda a: a.reshape(2, 2)),
-    r"sizes is an array of shape \(\)": changed(sizes=5),
-    r"sizes is an array of shape \(4,\) and type <U": changed(sizes=lambda a: a.astype(str)),
-    "W is of type <U.*, expected floating-point": changed(W=lambda W: W.astype(str)),
+    r"layers of net.sizes \[3, 9, 8, 3\]": sized([3, 9, 8, 3]),
+    r"sizes is an array of shape .* \[5, 0, 8, 3\]: expected whole": sized([5, 0, 8, 3]),
+    r"net.sizes is an array of shape .* \[\]: expected": sized(np.array([], dtype=int)),
+    r"net.sizes is an array of .* \[5, -9, 8, 3\]: expected": sized([5, -9, 8, 3]),
+    r"layers of net.sizes \[3, 3, .*, 3, \.\. 9999 in all\]: expected d \+ r, \.\., d": sized(
+        np.full(9999, 3)),
+    r"sizes is an array of shape \(4,\) and type float": sized(
+        lambda a: a + 0.5),
+    r"sizes is an array of shape \(2, 2\)": sized(lambda a: a.reshape(2, 2)),
+    r"sizes is an array of shape \(\)": sized(5),
+    r"sizes is an array of shape \(4,\) and type <U": sized(lambda a: a.astype(str)),
+    "W is of type <U.*, expected floating-point": changed(**{"net.W": lambda W: W.astype(str)}),
     "rest is of type int64": changed(rest=np.zeros(2, dtype=int)),
-    r"layers of sizes \[5\]": changed(sizes=[5]),
-    "W has numbers that are not finite": changed(W=lambda W: np.where(W > 0, W, np.nan)),
+    r"net.sizes is an array of shape .* \[5\]: expected": sized([5]),
+    "W has numbers that are not finite": changed(
+        **{"net.W": lambda W: np.where(W > 0, W, np.nan)}),
     "xhat has numbers that are not finite": changed(xhat=lambda a: a / 0.0),
-    "span or std has numbers that are not positive": changed(std=lambda a: 0.0 * a),
+    "units.std has numbers that are not positive": changed(**{"units.std": lambda a: 0.0 * a}),
 }
 
 
