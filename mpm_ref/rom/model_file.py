@@ -111,14 +111,14 @@ def decoder_of(arrays, prefix=""):
 
 
 def networks_of(arrays):
-    """Return `Networks`."""
+    """Return the `Networks` of the arrays of a file."""
     fields = (Field(network_of(arrays, name), record(FieldUnits, arrays, f"{name}units."),
                     int(arrays[f"{name}octaves"])) for name in ("h.", "l."))
     return Networks(decoder_of(arrays, "g."), *fields)
 
 
 def modes_of(arrays, prefix=""):
-    """Return `Modes`."""
+    """Return the `Modes` of arrays whose names begin with a prefix."""
     X, U, slope = (arrays[prefix + name] for name in ("X", "U", "slope"))
     return Modes(X, U, slope, KDTree(X))
 

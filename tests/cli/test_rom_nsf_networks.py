@@ -8,10 +8,9 @@ import pytest
 from command_line import assert_told, mpm_ref
 from small_nsf_studies import modelled, write
 
-from mpm_ref.rom.fields.network import learned
+from mpm_ref.rom.fields.network import Networks, learned
 from mpm_ref.rom.study import reduce
 from mpm_ref.rom.study.nsf_dataset import histories
-from mpm_ref.rom.study.nsf_networks import Networks
 from mpm_ref.rom.study.study import load
 from mpm_ref.store.results import Results
 
