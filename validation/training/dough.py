@@ -6,7 +6,7 @@ from pathlib import Path
 import torch
 from tqdm import tqdm
 
-from mpm_ref.materials.learned import weights
+from mpm_ref.materials.learned.table import KINDS
 from mpm_ref.nclaw.batched_step import make_world
 from mpm_ref.nclaw.train.fit import train
 from mpm_ref.nclaw.train.labeled import labels_of, train_labeled
@@ -42,7 +42,7 @@ def seen():
 
 def begun(net):
     """`rollout.LawPair` before training on the film."""
-    kinds = weights.RESPONSES[net.elastic](), weights.RESPONSES[net.plastic]()
+    kinds = KINDS[net.elastic](), KINDS[net.plastic]()
     laws = drawn_laws(net.method, net.seed, *kinds)
     if net.guessed:
         problem, run = run_of(material(**GUESS))

@@ -12,6 +12,7 @@ import typer
 from tqdm import tqdm
 
 from mpm_ref.materials.learned import weights
+from mpm_ref.materials.learned.table import KINDS
 from mpm_ref.nclaw.gnn import weights as of_graphs
 from mpm_ref.nclaw.train import train
 from mpm_ref.nclaw.train.recipe import Recipe
@@ -37,7 +38,7 @@ ROOT = Path(__file__).parents[2]
 def begun(net):
     """`Laws` of a net before training."""
     kinds = () if net.method == SYS_ID else (
-        weights.RESPONSES[net.elastic](), weights.RESPONSES[net.plastic]())
+        KINDS[net.elastic](), KINDS[net.plastic]())
     material = environment(net.environment).body[0].material
     return train.initial_laws(net.method, net.seed, kinds, material)
 
