@@ -11,7 +11,7 @@ from command_line import assert_told, mpm_ref
 from small_laws import identified, saved
 
 from mpm_ref.materials import NoFlow
-from mpm_ref.materials.learned import response, spline, stretch_network, weights
+from mpm_ref.materials.learned import response, spline, stretch_network
 from mpm_ref.materials.learned.contraction import Contraction
 from mpm_ref.materials.learned.energetic import Energetic
 from mpm_ref.materials.learned.table import KINDS
