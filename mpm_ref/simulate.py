@@ -12,7 +12,7 @@ from typing import NamedTuple
 from .body import keep_inside
 from .core.grid import OutOfRange
 from .monitor import CHECK, Account, account, check, lost, runs_away
-from .timestep import advective, refuse, stable_dt
+from .timestep import TimeStep, advective, refuse, stable_dt
 
 SORT = 64        # steps between physical sorts of the particles by cell
 AHEAD = 0.01     # of a step, or of a second, over which the speed of parts is taken
@@ -29,6 +29,7 @@ class State:
     t: float = 0.0                     # [s]
     frame: int = 0                     # frames shown so far
     bound: float = inf                 # stable dt at its last evaluation [s]
+    terms: TimeStep | None = None      # the bounds behind it; none in a state from a file
     account: Account | None = None     # energy at the start
     solve: object = None               # `hot` report of the last step, if it was implicit
 
@@ -45,17 +46,13 @@ class Frame(NamedTuple):
 def simulate(problem, state=None, on_step=None):
     """Run a problem, from its start or from a `State`, and yield a `Frame` at every frame time.
 
-    on_step(state, dt) is called after every step, when the state is whole: to save a checkpoint,
-    show progress, or end the run by raising. Raises `Unstable` (see `monitor`), `TooLarge` (see
-    `timestep`), and ValueError if a body does not fit the scheme. With a fixed dt, `end` is met by
-    the first step that reaches it.
+    on_step(state, dt) is called after every step, when the state is complete: to save a checkpoint,
+    show progress, or end the run by raising. Raises as `start`, `Unstable` (see `monitor`) and
+    `TooLarge` (see `timestep`). With a fixed dt, `end` is met by the first step that reaches it.
     """
     stepper = problem.stepper()
     if state is None:
-        state = State(problem.bodies)
-        stepper.start(state.bodies)
-        check(problem, state, 0.0)
-        state.account = account(problem, state.bodies)
+        state = start(problem, stepper)
     if state.frame == 0:
         yield show(state, 0.0)
     while not ended(problem.clock, state):
@@ -70,8 +67,23 @@ def simulate(problem, state=None, on_step=None):
             yield show(state, dt)
 
 
+def start(problem, stepper):
+    """Return the first `State` of a problem, with stress, energy account and stable time step.
+
+    Raises ValueError if a body does not fit the scheme, `Unstable` for a state that is not sound,
+    `core.grid.OutOfRange` where no grid covers it, `TooLarge` for a dt past its bound.
+    """
+    state = State(problem.bodies)
+    stepper.start(state.bodies)
+    check(problem, state, 0.0)
+    stepper.storage.cover([body.particles.x for body in state.bodies])
+    state.account = account(problem, state.bodies)
+    update_bound(problem, stepper, state)
+    return state
+
+
 def show(state, dt):
-    """The next frame of a run."""
+    """Return the next frame of a run."""
     frame = Frame(state.frame, state.t, dt, state)
     state.frame += 1
     return frame
@@ -82,7 +94,7 @@ def advance(problem, stepper, state):
     if state.step % SORT == 0:
         stepper.sort(state.bodies)
     if bound_is_due(problem.clock, state):
-        state.bound = rebound(problem, stepper, state)
+        update_bound(problem, stepper, state)
     dt = next_dt(problem.clock, state, swiftest(problem, stepper, state))
     stepper.step(state.bodies, state.t, dt)
     if problem.clip is not None:
@@ -99,24 +111,31 @@ def advance(problem, stepper, state):
 
 
 def bound_is_due(clock, state):
-    """An adaptive dt follows its bound closely; a fixed one is compared with it at checks."""
+    """Return whether the stable time step is evaluated before the next step.
+
+    An adaptive dt follows its bound closely; a fixed one is compared with it at checks. `start`
+    evaluates the bound of the first step.
+    """
     every = REBOUND if clock.dt is None else CHECK
-    return state.step % every == 0 or state.bound == inf
+    return (state.step > 0 and state.step % every == 0) or state.bound == inf
 
 
-def rebound(problem, stepper, state):
-    """Stable dt of the state [s]; refuses a fixed dt that is past it, unless the problem allows."""
+def update_bound(problem, stepper, state):
+    """Evaluate the stable dt of a state; refuse a fixed dt past it, where the problem says so.
+
+    Raises `TooLarge`, and `Unstable` where no dt is stable.
+    """
     terms = stable_dt(state.bodies, stepper)
     if not terms.dt > 0.0:
         check(problem, state, 0.0)
         raise lost(problem, state, 0.0, f"no stable time step: {terms.sentence()}")
     if problem.clock.dt is not None and not problem.allow_unstable:
         refuse(problem.clock.dt, terms, state.step)
-    return terms.dt
+    state.bound, state.terms = terms.dt, terms
 
 
 def swiftest(problem, stepper, state):
-    """Advective bound of dt as of now [s]; an adaptive step may not wait for the next `rebound`.
+    """Advective bound of dt as of now [s]; an adaptive step may not wait for `update_bound`.
 
     An implicit step ends with the velocities that parts give, so their speed now bounds it too, as
     in the release of HOT (HOT-dt).

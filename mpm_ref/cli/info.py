@@ -28,12 +28,14 @@ from .errors import at_start, one_line, options
 from .terminal import as_json, compiling, warn
 
 
-def of_problem(problem):
-    """Size, spacing, wave speed, bounds of the time step and memory of a `Problem` as it stands,
-    and what looks wrong in it.
+def of_problem(problem, state=None):
+    """Return size, wave speed, bounds of the time step and memory of a `Problem` as it stands, and
+    warnings about it; state: the first one of a run, where that was computed.
     """
     stepper = problem.stepper()
-    bounds = stable_dt(problem.bodies, stepper)
+    bounds = state.terms if state is not None else None
+    if bounds is None:
+        bounds = stable_dt(problem.bodies, stepper)
     grid = stepper.storage.cover([body.particles.x for body in problem.bodies])
     clock = problem.clock
     return {

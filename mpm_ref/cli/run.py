@@ -130,16 +130,16 @@ class Bar(Watch):
 
     def begin(self, problem, state):
         """Say what is run and what looks wrong in it, and open the bar."""
-        self.facts = info.of_problem(problem)
+        self.facts = info.of_problem(problem, state)
         self.stack.close()
-        if state is None:
+        if not state.frame:
             warn(self.facts["warnings"])
         if not self.request.json:
             print("\n".join(info.problem_lines(self.facts)), flush=True)
         self.total = last_step(problem.clock)
         self.bar = passing(
             self.request.quiet, total=self.total or problem.clock.end, mininterval=0.2,
-            initial=0 if state is None else self.done(state),
+            initial=self.done(state),
             bar_format=STEPS if self.total else SECONDS,
         )
         self.bar.set_postfix_str(COMPILING)

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..explicit import Stepper
-from ..simulate import State, advance, ended, frame_is_due, next_dt, rebound, swiftest
+from ..simulate import State, advance, ended, frame_is_due, next_dt, swiftest, update_bound
 from ..store.words import counted
 from . import kernel_stages, scaling
 from .plain_twin import Twin, placed
@@ -186,7 +186,7 @@ def step_length(problem, stepper, state=None):
     """
     state = replace(state or State(problem.bodies, frame=1), bodies=problem.bodies)
     if problem.clock.dt is None:
-        state.bound = rebound(problem, stepper, state)
+        update_bound(problem, stepper, state)
     return next_dt(problem.clock, state, swiftest(problem, stepper, state))
 
 

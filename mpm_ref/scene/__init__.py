@@ -24,14 +24,7 @@ from ..shapes import (
     Union,
     Wedge,
 )
-from .builder import (
-    build_body,
-    build_clock,
-    build_conditions,
-    build_limits,
-    build_solver,
-    strain_bounds,
-)
+from .builder import build_bodies
 from .messages import SceneError, opened_by
 from .records import (
     Arrays,
@@ -54,7 +47,7 @@ from .records import (
     Walls,
 )
 from .toml import canonical, digest, dumps, load, loads
-from .validate import checked
+from .validate import validate_scene
 
 __all__ = [
     "Arrays", "Body", "Box", "Capsule", "Clip", "Collider", "Cylinder", "Difference", "Fixed",
@@ -71,27 +64,27 @@ def build(scene, source=""):
     `source`, usually a file name, opens error messages. Raises SceneError, which names the key that
     does not work.
     """
-    scene = checked(scene, source)
+    scene = validate_scene(scene, source)
     with opened_by(source):
         return _built(scene)
 
 
 def _built(scene):
-    clip, solver = scene.clip, build_solver(scene)
+    (clock, limits, conditions, solver, _), clip = scene.parts, scene.clip
+    bodies, strain_bounds = build_bodies(scene)
     return Problem(
-        bodies=tuple(build_body(scene, k) for k in range(len(scene.body))),
+        bodies=bodies,
         dx=scene.dx,
-        clock=build_clock(scene),
+        clock=clock,
         gravity=np.zeros(scene.dim) if scene.gravity is None else np.array(scene.gravity),
         scheme=scene.step_scheme,
-        conditions=build_conditions(scene),
+        conditions=conditions,
         clip=None if clip is None else (np.array(clip.lower), np.array(clip.upper)),
-        limits=build_limits(scene),
+        limits=limits,
         allow_unstable=scene.unstable == "allow",
         title=scene.title,
         source=canonical(scene),
         integrator="explicit" if solver is None else "implicit",
         solver=solver,
-        strain_bounds={body.name: bounds for k, body in enumerate(scene.body)
-                       if (bounds := strain_bounds(body, scene.dim, k)) is not None},
+        strain_bounds=strain_bounds,
     )

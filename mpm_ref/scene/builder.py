@@ -5,6 +5,7 @@ raises SceneError with the key's path.
 """
 
 from math import inf, radians
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from ..core.boundary import Collider as RigidCollider
 from ..hot.methods import METHODS, options_of
 from ..hot.step import check_scheme
 from ..materials import Material
+from ..materials.learned.strain_range import stored_bounds
 from ..monitor import Limits
 from ..problem import Clock
 from ..sampling import sample
@@ -28,24 +30,59 @@ NAMES = f'expected "explicit" or one of {", ".join(METHODS)}'
 CFL = 0.5       # share of the stable time step, for a scene that says nothing about its step
 
 
-def build_body(scene, k):
-    """Body number k of a checked scene. Raises SceneError with the path of what does not work."""
+class Parts(NamedTuple):
+    """What a scene builds besides its bodies; none of it changes during a run."""
+
+    clock: Clock
+    limits: Limits
+    conditions: Conditions | None
+    solver: object              # `hot.methods.Options`; None for the explicit integrator
+    materials: tuple            # of (law, flow) for each body; None where a file holds them
+
+
+def build_parts(scene):
+    """Return the `Parts` of a scene. Raises SceneError for what only a built object can check."""
+    materials = tuple(build_material(body, scene.dim, k) for k, body in enumerate(scene.body))
+    return Parts(build_clock(scene), build_limits(scene), build_conditions(scene),
+                 build_solver(scene), tuple(None if record.material.is_neural else made[:2]
+                                            for record, made in zip(scene.body, materials)))
+
+
+def build_material(body, dim, k):
+    """Return law, return map and training range of body number k (see `records.Material.build`).
+
+    The range is None where no training is known. Raises SceneError.
+    """
+    path = f"body[{k}].material"
+    with at(path + ("" if body.material.is_neural else ".flow")):
+        law, flow, about = body.material.build(dim)
+    with at(f"{path}.weights"):
+        return law, flow, None if about is None else stored_bounds(about, dim)
+
+
+def build_bodies(scene):
+    """Return the bodies of a checked scene, and {body: strains of its training} of learned laws.
+
+    A file of weights is read again, since it may have changed since the check. Raises SceneError.
+    """
+    bodies, ranges = [], {}
+    for k, record in enumerate(scene.body):
+        built = scene.parts.materials[k]
+        law, flow, strains = (*built, None) if built else build_material(record, scene.dim, k)
+        bodies.append(build_body(scene, k, Material(law, flow)))
+        if strains is not None:
+            ranges[record.name] = strains
+    return tuple(bodies), ranges
+
+
+def build_body(scene, k, material):
+    """Return body number k of a checked scene. Raises SceneError with the path of what fails."""
     record, path = scene.body[k], f"body[{k}]"
-    law = record.material.elastic()
-    material = Material(law, record.material.flowing(scene.dim))
     if record.shape is not None:
         particles = _sampled(scene, record, material, (path, [scene.seed, k]))
     else:
         particles = _read(scene, record, material, path)
-    return Body(record.name, particles, law, material.flow, np.arange(len(particles.x)))
-
-
-def strain_bounds(record, dim, k):
-    """Return the strains that the laws of body number k met in training, or None; errors as of
-    `build_body`.
-    """
-    with at(f"body[{k}].material.weights"):
-        return record.material.strain_bounds(dim)
+    return Body(record.name, particles, *material, np.arange(len(particles.x)))
 
 
 def _sampled(scene, record, material, where):

@@ -10,7 +10,7 @@ from difflib import get_close_matches
 import msgspec
 
 from .messages import SceneError
-from .validate import checked
+from .validate import validate_scene
 
 STEP = re.compile(r"\[([^\[\]]+)\]|([^.\[\]]+)")
 
@@ -22,7 +22,7 @@ def varied(scene, values):
     tables = msgspec.json.decode(msgspec.json.encode(scene))
     for path, value in values.items():
         put(tables, path, value)
-    return checked(tables)
+    return validate_scene(tables)
 
 
 def put(tables, path, value):

@@ -12,7 +12,6 @@ from msgspec import Meta
 from ..explicit import Scheme as ExplicitScheme
 from ..materials import LAWS, make_flow, make_law
 from ..materials.learned import learned_flow, learned_law, weights
-from ..materials.learned.strain_range import stored_bounds
 from ..materials.learned.table import TABLES
 from ..materials.learned.weights import dim_of
 from ..sampling import Regular, Samplings
@@ -82,25 +81,21 @@ class Material(Record):
         """Whether its laws are learned."""
         return self.law == NEURAL
 
-    def elastic(self):
-        """The elastic law. Raises ValueError for a name or parameter that does not fit."""
-        if self.is_neural:
-            return learned_law(self.trained().elastic)
-        return make_law(self.law, **_given(self, "law", "flow"))
+    def build(self, dim):
+        """Return the law, the return map in `dim` dimensions, and the `about` of learned laws.
 
-    def flowing(self, dim):
-        """The return map in `dim` dimensions; errors as `elastic`."""
-        if self.is_neural:
-            return learned_flow(self.trained(dim).plastic)
-        parameters = _given(self.flow, "type")
-        return make_flow(self.flow.type, self.elastic(), dim, **parameters)
-
-    def strain_bounds(self, dim):
-        """Return the strains that its laws met in training, as `stored_bounds` does, or None.
-
-        Raises ValueError for weights that say something else.
+        `about` says how the laws were trained; it is None for laws by name. Raises ValueError for a
+        name, a parameter or a file that does not fit.
         """
-        return stored_bounds(self.trained().about, dim) if self.is_neural else None
+        if self.is_neural:
+            laws = self.trained(dim)
+            return learned_law(laws.elastic), learned_flow(laws.plastic), laws.about
+        law = self.elastic()
+        return law, make_flow(self.flow.type, law, dim, **_given(self.flow, "type")), None
+
+    def elastic(self):
+        """Return the elastic law by its name. Raises ValueError as `build`."""
+        return make_law(self.law, **_given(self, "law", "flow"))
 
     def trained(self, dim=None):
         """`LearnedLaws` of its file. Raises ValueError for a file that holds none, or for
@@ -312,8 +307,11 @@ class Limits(Record):
     growth: NotNegative = 0.5
 
 
-class Scene(Record):
-    """Everything that a run is determined by, apart from the program."""
+class Scene(Record, dict=True):
+    """Everything that determines a run, apart from the program.
+
+    `validate_scene` keeps under `parts` what it built to check the scene.
+    """
 
     dim: Literal[2, 3]
     dx: Length                                  # grid spacing [m]
@@ -337,6 +335,11 @@ class Scene(Record):
     walls: Walls | None = None
     clip: Clip | None = None
     limits: Limits = Limits()
+
+    @property
+    def parts(self):
+        """The `builder.Parts` of a scene that was validated, else None."""
+        return vars(self).get("parts")
 
     @property
     def step_scheme(self):

@@ -9,7 +9,7 @@ import msgspec
 
 from ..shapes.quantities import Kind, Record
 from .messages import SceneError, joined
-from .validate import checked
+from .validate import validate_scene
 
 FILES = "file", "weights"       # keys that name a file
 
@@ -37,7 +37,7 @@ def loads(text, source="", folder="."):
         data = json.loads(text) if text.lstrip().startswith("{") else tomllib.loads(text)
     except (ValueError, RecursionError) as fault:
         raise SceneError(f"{source or 'the scene'}: not valid TOML: {fault}") from None
-    return checked(_located(data, Path(folder)), source)
+    return validate_scene(_located(data, Path(folder)), source)
 
 
 def _located(data, folder):
@@ -55,7 +55,7 @@ def _located(data, folder):
 
 def dumps(scene):
     """TOML text of a scene, defaults left out; `loads` gives the same scene."""
-    tables = _tables(checked(scene))
+    tables = _tables(validate_scene(scene))
     many = {key: tables.pop(key) for key in ("body", "collider", "fixed") if key in tables}
     lines = [_pair(key, value) for key, value in tables.items()]
     for key, items in many.items():
@@ -82,7 +82,8 @@ def canonical(scene):
     """JSON text of a scene: sorted keys, no defaults; files by their name and the sha256 of what
     they hold. Equal scenes have equal texts, wherever they lie. Raises SceneError.
     """
-    return json.dumps(_by_content(_tables(checked(scene))), sort_keys=True, separators=(",", ":"))
+    tables = _by_content(_tables(validate_scene(scene)))
+    return json.dumps(tables, sort_keys=True, separators=(",", ":"))
 
 
 def digest(scene):

@@ -1,6 +1,6 @@
-"""From plain tables to a checked `Scene`, or one sentence that names the key and what is wrong.
+"""Validate a scene: plain tables become a `Scene`, or one sentence names the key and the fault.
 
-Keys, types and bounds are checked by msgspec; what spans tables is checked here.
+msgspec checks keys, types and bounds; this module checks what spans tables.
 """
 
 from math import isfinite
@@ -11,22 +11,25 @@ import numpy as np
 
 from ..shapes import Mesh
 from ..shapes.quantities import Vector
-from .builder import build_clock, build_conditions, build_limits, build_solver
-from .messages import SceneError, at, joined, rephrase, shown
+from .builder import build_parts
+from .messages import SceneError, joined, rephrase, shown
 from .records import Scene
 
 
-def checked(data, source=""):
-    """The `Scene` of plain tables (dict) or of a Scene made in Python, if nothing is wrong with it.
+def validate_scene(data, source=""):
+    """Return the valid `Scene` of plain tables (dict), or of a Scene built in Python.
 
+    A scene that was validated before comes back as it is; its `parts` are what the check built.
     `source`, usually a file name, opens the message. Raises SceneError for whatever is wrong.
     """
+    if isinstance(data, Scene) and data.parts is not None:
+        return data
     try:
         if isinstance(data, Scene):
             data = plain(data)
         check_finite(data)
         scene = msgspec.convert(data, Scene)
-        check_scene(scene)
+        vars(scene)["parts"] = check_scene(scene)
     except msgspec.ValidationError as fault:
         raise _from(source, rephrase(str(fault), data)) from None
     except RecursionError:
@@ -64,7 +67,7 @@ def check_finite(data, path=""):
 
 
 def check_scene(scene):
-    """Raise SceneError for the first thing that does not fit together."""
+    """Return the `Parts` of a scene. Raises SceneError for the first thing that does not fit."""
     check_dimension(scene, scene.dim)
     for k, body in enumerate(scene.body):
         check_body(body, scene.dim, f"body[{k}]")
@@ -75,16 +78,11 @@ def check_scene(scene):
             raise SceneError(f"body[{k}].name = {body.name!r}: another body has this name")
     if scene.clip and not all(a < b for a, b in zip(scene.clip.lower, scene.clip.upper)):
         raise SceneError("clip: expected lower < upper on every axis")
-    build_clock(scene)
-    build_limits(scene)
-    build_conditions(scene)
-    build_solver(scene)
+    return build_parts(scene)
 
 
 def check_body(body, dim, path):
-    """Raise SceneError for a material or velocity that does not fit the dimension."""
-    with at(f"{path}.material" + ("" if body.material.is_neural else ".flow")):
-        body.material.flowing(dim)
+    """Raise SceneError for a velocity that does not fit the dimension."""
     angular = body.velocity.angular
     if isinstance(angular, tuple) != (dim == 3) and angular != 0.0:
         expected = "a number" if dim == 2 else "3 numbers"

@@ -13,8 +13,8 @@ from pathlib import Path
 
 from ..energy import energy
 from ..monitor import Unstable, check
-from ..nclaw.strain_watch import strain_watch as range_watch
-from ..simulate import Frame, State, ended, frame_is_due, rebound, simulate
+from ..nclaw.strain_watch import strain_watch
+from ..simulate import Frame, ended, frame_is_due, simulate, start
 from ..timestep import TooLarge
 from . import checkpoint
 from .atomic import require_place
@@ -96,7 +96,7 @@ def run(problem, out, options=None, watch=None):
 
 
 def _where_to_begin(problem, out, options):
-    """(state of the checkpoint or None for the start, whether this very code saved it)."""
+    """Return (state of the checkpoint, or the first one, whether this very code saved it)."""
     path = checkpoint_of(out)
     _require_leave(out, options)
     if Path(out).exists():
@@ -106,8 +106,7 @@ def _where_to_begin(problem, out, options):
             raise Refused(f"{out}: there are no results beside the checkpoint {path}; "
                           "put them back, or remove the checkpoint to begin anew")
         return checkpoint.load(path, problem)
-    _require_start(problem)
-    return None, True
+    return start(problem, problem.stepper()), True
 
 
 def _require_leave(out, options):
@@ -146,9 +145,7 @@ def _require_same_fields(problem, out, options):
 
 
 def _why_over(problem, state, options):
-    """Why a state needs no further step, or None."""
-    if state is None:
-        return None
+    """Return why a state needs no further step, or None."""
     if ended(problem.clock, state):
         return FINISHED
     return AT_LIMIT if options.steps is not None and state.step >= options.steps else None
@@ -161,22 +158,10 @@ def _as_it_stands(problem, out, outcome):
         return replace(outcome, frames=len(results), unsolved=unsolved(results.manifest))
 
 
-def _require_start(problem):
-    """What a run finds of its first state, before anything is written: raises `Unstable` for a
-    state that is not sound, `OutOfRange` where no grid covers it, `TooLarge` for a dt past its
-    bound.
-    """
-    stepper, state = problem.stepper(), State(problem.bodies)
-    stepper.start(state.bodies)
-    check(problem, state, 0.0)
-    stepper.storage.cover([body.particles.x for body in state.bodies])
-    rebound(problem, stepper, state)
-
-
 def _open(problem, out, options, state):
     """`Writer` of the results, new ones or those of the run that goes on."""
     if options.resume and Path(out).exists():
-        return reopen(out, problem, state.frame if state else 0)
+        return reopen(out, problem, state.frame)
     _require_leave(out, options)        # another run may have begun there meanwhile
     facts = manifest(problem, options.seed) | options.facts
     return create(out, problem, options.fields or Fields(), facts, beside=checkpoint_of(out))
@@ -191,7 +176,7 @@ class Watch:
     """What a run tells while it goes on; this one does not listen."""
 
     def begin(self, problem, state):
-        """A run begins, or goes on from a state (None: from its start)."""
+        """A run begins, or goes on from a state that has frames already."""
 
     def step(self, state, dt):
         """A step of length dt [s] was made."""
@@ -224,13 +209,13 @@ class Session:
         self.state, self.part, self.dt, self.asked = None, None, 0.0, None
         self.shown = self.saved = None        # steps at which a frame, a checkpoint was last stored
         self.saved_at = time.perf_counter()
-        self.range = range_watch(problem)
+        self.range = strain_watch(problem)
 
     def loop(self, state):
-        """Run from a state, or None for the start; returns why it ended, see `Outcome`."""
-        self.part = Part(state.step if state else 0)
+        """Run from a state; returns why it ended, see `Outcome`."""
+        self.part = Part(state.step)
         self.state, self.shown = state, self.writer.last_step
-        self.saved = state.step if state else None
+        self.saved = state.step if state.frame else None
         try:
             with _signals(self):
                 for frame in simulate(self.problem, state, on_step=self.after_step):

@@ -13,7 +13,7 @@ from mpm_ref import sampling, shapes
 from mpm_ref.sampling import poisson
 from mpm_ref.scene import SceneError, build, loads
 from mpm_ref.scene.builder import build_conditions
-from mpm_ref.scene.validate import checked
+from mpm_ref.scene.validate import validate_scene
 from mpm_ref.shapes.inside import solid
 
 RICH = tomllib.loads((Path(__file__).parents[1] / "support/data" / "rich.toml").read_text())
@@ -104,7 +104,7 @@ WRONG = [
 @pytest.mark.parametrize(("path", "value", "said"), WRONG, ids=[f"{w[0]}={w[1]}" for w in WRONG])
 def test_the_sentence_names_the_key(path, value, said):
     with pytest.raises(SceneError) as caught:
-        checked(changed(path, value), "x.toml")
+        validate_scene(changed(path, value), "x.toml")
     assert str(caught.value).startswith(f"x.toml: {said}")
     assert "\n" not in str(caught.value)
 
@@ -123,7 +123,7 @@ BUILD = [
 @pytest.mark.parametrize(("path", "value", "said"), BUILD, ids=[w[2] for w in BUILD])
 def test_what_only_building_can_find_names_the_key(path, value, said):
     with pytest.raises(SceneError) as caught:
-        build(checked(changed(path, value)))
+        build(validate_scene(changed(path, value)))
     assert str(caught.value).startswith(said)
 
 
@@ -142,7 +142,7 @@ def test_deeply_nested_tables():
     for _ in range(3000):
         shape = {"type": "moved", "shape": shape}
     with pytest.raises(SceneError, match="nested too deeply"):
-        checked(changed("body.0.shape", shape))
+        validate_scene(changed("body.0.shape", shape))
 
 
 # fuzz: whatever stands in a scene, the error is one sentence that begins with the file
@@ -168,7 +168,7 @@ def refused(data):
     """The sentence with which a scene is refused, or None."""
     said = None
     try:
-        checked(data, "x.toml")
+        validate_scene(data, "x.toml")
     except SceneError as fault:
         said = str(fault)
     assert said is None or (said.startswith("x.toml: ") and "\n" not in said)
@@ -249,5 +249,5 @@ def test_absurd_shapes_are_sampled_or_refused(few_points, d, data, dx):
 
 
 def test_rich_scene_itself_is_right():
-    scene = checked(RICH)
+    scene = validate_scene(RICH)
     assert len(build_conditions(scene).parts) == 2

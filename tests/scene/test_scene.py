@@ -10,7 +10,7 @@ import pytest
 from mpm_ref import materials, scene
 from mpm_ref.scene import SceneError, build, canonical, digest, dumps, load, loads
 from mpm_ref.scene.records import Flow, Material
-from mpm_ref.scene.validate import checked
+from mpm_ref.scene.validate import validate_scene
 from validation.common import targets
 
 SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.toml"))
@@ -30,7 +30,7 @@ def test_round_trip(text):
     first = loads(text)
     assert loads(dumps(first)) == first
     assert loads(canonical(first)) == first
-    assert checked(first) == first
+    assert validate_scene(first) == first
 
 
 def test_hash_does_not_depend_on_how_it_is_written():
@@ -68,7 +68,7 @@ def test_numpy_values_are_taken_and_checked():
     made = loads(TINY)
     with_numpy = msgspec.structs.replace(made, dx=np.float64(0.1), gravity=np.array([0.0, -1.0]),
                                          steps=np.int64(1))
-    assert checked(with_numpy).gravity == (0.0, -1.0)
+    assert validate_scene(with_numpy).gravity == (0.0, -1.0)
     with pytest.raises(SceneError, match=r"^gravity\[1\] = nan"):
         build(msgspec.structs.replace(made, gravity=np.array([0.0, np.nan])))
     with pytest.raises(SceneError, match=r"^dx = 'x': expected a number"):

@@ -57,13 +57,14 @@ def test_the_first_of_two_writers_of_a_new_file_wins(tmp_path):
 
 
 def test_a_run_that_another_overtook_does_not_replace_it(tmp_path, monkeypatch):
-    out, start = tmp_path / "run.h5", running._require_start
+    out, start = tmp_path / "run.h5", running.start
 
-    def overtaken(problem):
-        monkeypatch.setattr(running, "_require_start", start)
+    def overtaken(problem, stepper):
+        monkeypatch.setattr(running, "start", start)
         run(colliding(), out)
+        return start(problem, stepper)
 
-    monkeypatch.setattr(running, "_require_start", overtaken)
+    monkeypatch.setattr(running, "start", overtaken)
     with pytest.raises(Refused, match="exists: add --resume"):
         run(colliding(source="other"), out)
     with Results(out) as results:

@@ -20,10 +20,10 @@ from mpm_ref.simulate import (
     ended,
     frame_is_due,
     next_dt,
-    rebound,
     show,
     simulate,
     swiftest,
+    update_bound,
 )
 from mpm_ref.store.checkpoint import BadCheckpoint, load, save
 from mpm_ref.store.manifest import scene_hash, source_hash
@@ -116,7 +116,7 @@ def coming(problem, stepper, state):
     if state.step % SORT == 0:
         stepper.sort(state.bodies)
     if bound_is_due(problem.clock, state):
-        state.bound = rebound(problem, stepper, state)
+        update_bound(problem, stepper, state)
     return next_dt(problem.clock, state, swiftest(problem, stepper, state))
 
 
