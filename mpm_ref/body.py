@@ -53,6 +53,16 @@ def permute(body, order):
     body.id[:] = body.id[order]
 
 
+def restore_order(values, number):
+    """Return rows (N, ..) in the order in which their body was sampled.
+
+    A run sorts particles now and then; number (N,) is the body's `id`, the first place of each.
+    """
+    ordered = np.empty_like(values)
+    ordered[number] = values
+    return ordered
+
+
 def keep_inside(bodies, low, high):
     """Clip positions to a box, velocities unchanged (NCLaw)."""
     for body in bodies:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .body import restore_order
 from .rom.snapshots import Snapshots
 from .simulate import simulate
 
@@ -61,16 +62,9 @@ def recorded(problem, kind, every=1):
         if frame.state.step != frame.index:
             raise ValueError(f"frame {frame.index} is step {frame.state.step}: expected every = 1")
         body = frame.state.bodies[0]
-        rows.append([in_order(getattr(body.particles, name), body.id)[::every]
+        rows.append([restore_order(getattr(body.particles, name), body.id)[::every]
                      for name in kind._fields])
     return kind(*(np.array(field) for field in zip(*rows, strict=True)))
-
-
-def in_order(a, id):
-    """A field (n, ..) with point number id[p] at place id[p]."""
-    out = np.empty_like(a)
-    out[id] = a
-    return out
 
 
 def snapshots(problems, mu, every=1):
@@ -95,4 +89,4 @@ def snapshots(problems, mu, every=1):
 def points_of(body):
     """x (n, d) [m], m (n,) [kg] and V0 (n,) [m^d] of a body, points in its own order."""
     q = body.particles
-    return tuple(in_order(a, body.id) for a in (q.x, q.m, q.V0))
+    return tuple(restore_order(a, body.id) for a in (q.x, q.m, q.V0))

@@ -85,7 +85,7 @@ def not_true(problem):
     """The warnings about bodies whose law in the scene is a learned one, which says what it has
     met.
     """
-    for name in problem.training_ranges:
+    for name in problem.strain_bounds:
         yield (f"body {name!r} has a learned law in the scene: this compares two learned laws; "
                "name the scene of the true one")
 

@@ -1,20 +1,40 @@
-"""Particles from a file of arrays, NPZ or HDF5, so that the state of any program can be run.
+"""Check arrays of particles, in memory or from a file (NPZ or HDF5), so that any state can be run.
 
 Names are those of `core.state.Particles`; N particles in d dimensions:
 
     x (N, d)   needed            v (N, d)      C (N, d, d)      F (N, d, d), or J (N,) for a fluid
-    m, V0 (N,) one of them, or both          y (N,) yield stress          body (N,) whole numbers
+    two of m, V0 and density (N,)            y (N,) yield stress          body (N,) whole numbers
 
-Arrays of other names are left alone.
+A file may hold arrays of other names, which are left alone.
 """
 
 from pathlib import Path
+from typing import NamedTuple
 
 import h5py
 import numpy as np
 
-AXES = {"x": 1, "v": 1, "C": 2, "F": 2, "J": 0, "m": 0, "V0": 0, "y": 0, "body": 0}
-ABOVE_ZERO = ("m", "V0", "J")
+
+class Quantity(NamedTuple):
+    """What an array holds: its axes besides that of the particles, and its text for messages."""
+
+    axes: int
+    text: str
+    positive: bool = False
+
+
+QUANTITIES = {
+    "x": Quantity(1, "positions [m]"),
+    "v": Quantity(1, "velocities [m/s]"),
+    "C": Quantity(2, "affine velocity gradients [1/s]"),
+    "F": Quantity(2, "deformation gradients [1]"),
+    "J": Quantity(0, "volume ratios det F [1]", positive=True),
+    "m": Quantity(0, "masses [kg]", positive=True),
+    "V0": Quantity(0, "volumes at rest [m^d]", positive=True),
+    "density": Quantity(0, "densities at rest [kg/m^d]", positive=True),
+    "y": Quantity(0, "yield stresses [Pa]"),
+    "body": Quantity(0, "numbers of bodies"),
+}
 
 
 class NoGroup(ValueError):
@@ -22,10 +42,9 @@ class NoGroup(ValueError):
 
 
 def read_arrays(file, dim, group="/", select=None):
-    """Checked arrays {name: array} of a file; `select` keeps the particles with that `body`.
+    """Return the checked arrays {name: array} of a file; `select` takes one value of `body`.
 
-    Raises ValueError, in one sentence, for a file that cannot be read, and for an array that is
-    missing, has another shape than its particles, or holds what no particle can have.
+    Raises ValueError, in one sentence, for a file that cannot be read, and as `check_arrays`.
     """
     path = Path(file)
     if not path.is_file():
@@ -39,7 +58,7 @@ def read_arrays(file, dim, group="/", select=None):
         raise
     except Exception as fault:      # what broken files raise in NumPy and h5py has no common class
         raise ValueError(f"file = {str(file)!r}: cannot be read ({fault})") from None
-    return _selected(_checked(arrays, dim), select)
+    return _selected(check_arrays(arrays, dim), select)
 
 
 def _read_npz(path, group):
@@ -47,45 +66,52 @@ def _read_npz(path, group):
         data = np.load(stream, allow_pickle=False)
         if not isinstance(data, np.lib.npyio.NpzFile):
             raise ValueError("not an NPZ archive")
-        return {name: data[name] for name in AXES if name in data.files}
+        return {name: data[name] for name in QUANTITIES if name in data.files}
 
 
 def _read_hdf5(path, group):
     with h5py.File(path, "r") as h5:
         if not isinstance(h5.get(group), h5py.Group):
             raise NoGroup(f"group = {group!r}: the file has no such group")
-        there = h5[group]
-        return {name: there[name][()] for name in AXES if isinstance(there.get(name), h5py.Dataset)}
+        data = h5[group]
+        return {name: data[name][()] for name in QUANTITIES
+                if isinstance(data.get(name), h5py.Dataset)}
 
 
-def _checked(arrays, dim):
-    """The arrays as numbers, if they belong to the same particles."""
+def check_arrays(arrays, dim):
+    """Return the arrays {name: array} of N particles as contiguous float64, `body` as it is.
+
+    Raises ValueError, in one sentence with shape and unit, for an array that is missing, has
+    another shape than its particles, or holds what no particle can have.
+    """
     if "x" not in arrays:
-        found = ", ".join(arrays) or "none that is known"
-        raise ValueError(f"the array x is missing; found {found}")
+        present = ", ".join(arrays) or "none that has a meaning"
+        raise ValueError(f"the array x is missing; found {present}; expected x of shape (N, {dim}),"
+                         f" {QUANTITIES['x'].text}")
     n = len(np.atleast_1d(arrays["x"]))
     if n == 0:
         raise ValueError("the array x holds no particle")
-    return {name: _numbers(name, a, (n, *AXES[name] * (dim,))) for name, a in arrays.items()}
+    return {name: _numbers(name, a, (n, *QUANTITIES[name].axes * (dim,)))
+            for name, a in arrays.items()}
 
 
 def _numbers(name, a, shape):
-    a = np.asarray(a)
+    a, (_, text, positive) = np.asarray(a), QUANTITIES[name]
     if a.shape != shape:
-        raise ValueError(f"the array {name} has shape {a.shape}: expected {shape}")
+        raise ValueError(f"the array {name} has shape {a.shape}: expected {shape}, {text}")
     kinds = "iu" if name == "body" else "iuf"
     if a.dtype.kind not in kinds:
         expected = "whole numbers" if name == "body" else "real numbers"
-        raise ValueError(f"the array {name} has type {a.dtype}: expected {expected}")
+        raise ValueError(f"the array {name} has type {a.dtype}: expected {expected}, {text}")
     if name == "body":
         return a
     a = np.ascontiguousarray(a, dtype=np.float64)
-    least = 0.0 if name in ABOVE_ZERO else -np.inf
-    good = np.isfinite(a) & (a > least)
+    good = np.isfinite(a) & (a > (0.0 if positive else -np.inf))
     if not good.all():
         p = tuple(int(k) for k in np.argwhere(~good)[0])
-        expected = "a finite number" + (" > 0" if name in ABOVE_ZERO else "")
-        raise ValueError(f"the array {name} has {a[p]} for particle {p[0]}: expected {expected}")
+        expected = "a finite number" + (" > 0" if positive else "")
+        raise ValueError(f"the array {name} has {a[p]} for particle {p[0]}: expected {expected}, "
+                         f"{text}")
     return a
 
 

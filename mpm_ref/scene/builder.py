@@ -60,8 +60,10 @@ def build_material(body, dim, k):
         return law, flow, None if about is None else stored_bounds(about, dim)
 
 
-def build_bodies(scene):
+def build_bodies(scene, arrays):
     """Return the bodies of a checked scene, and {body: strains of its training} of learned laws.
+
+    arrays: {body: checked arrays of `sampling.arrays`} of bodies without shape and file.
 
     A file of weights is read again, since it may have changed since the check. Raises SceneError.
     """
@@ -69,19 +71,19 @@ def build_bodies(scene):
     for k, record in enumerate(scene.body):
         built = scene.parts.materials[k]
         law, flow, strains = (*built, None) if built else build_material(record, scene.dim, k)
-        bodies.append(build_body(scene, k, Material(law, flow)))
+        bodies.append(build_body(scene, k, Material(law, flow), arrays.get(record.name)))
         if strains is not None:
             ranges[record.name] = strains
     return tuple(bodies), ranges
 
 
-def build_body(scene, k, material):
+def build_body(scene, k, material, arrays=None):
     """Return body number k of a checked scene. Raises SceneError with the path of what fails."""
     record, path = scene.body[k], f"body[{k}]"
     if record.shape is not None:
         particles = _sampled(scene, record, material, (path, [scene.seed, k]))
     else:
-        particles = _read(scene, record, material, path)
+        particles = _particles_of(scene, record, material, (path, arrays))
     return Body(record.name, particles, *material, np.arange(len(particles.x)))
 
 
@@ -116,17 +118,21 @@ def velocity(record, x, m):
     return v + record.angular * np.column_stack([-r[:, 1], r[:, 0]]) if x.shape[1] == 2 else v
 
 
-def _read(scene, record, material, path):
-    """Particles from a file of arrays."""
-    source = record.particles
+def _particles_of(scene, record, material, where):
+    """Particles from arrays: of a file, or handed over; `where` is the body's path and those."""
+    (path, a), source = where, record.particles
     with at(f"{path}.particles"):
-        a = read_arrays(source.file, scene.dim, source.group, source.select)
+        if a is None and source.file is None:
+            raise ValueError("its arrays were handed over in Python: use problem_from_arrays")
+        if a is None:
+            a = read_arrays(source.file, scene.dim, source.group, source.select)
         m, V0 = masses(a, record.density)
-        _check_deformation(a, material)
+        a = _deformation(a, material)
     if "v" in a and record.velocity.moves:
-        raise SceneError(f"{path}.velocity: the file has velocities v; leave this table out")
-    v = a.get("v", velocity(record.velocity, a["x"], m))
-    particles = _at_rest(scene, material, a["x"], v, (m, V0))
+        raise SceneError(f"{path}.velocity: the arrays have velocities v; leave this table out")
+    x = a["x"] if source.offset is None else a["x"] + source.offset
+    v = a.get("v", velocity(record.velocity, x, m))
+    particles = _at_rest(scene, material, x, v, (m, V0))
     if "C" in a and scene.step_scheme.transfer in AFFINE:
         particles.C[:] = a["C"]
     if "y" in a and material.has_history:
@@ -137,29 +143,35 @@ def _read(scene, record, material, path):
 
 
 def masses(a, density):
-    """Masses [kg] and volumes at rest [m^d] of arrays, the one from the other by the density.
+    """Return masses [kg] and volumes at rest [m^d] of arrays, one from the other by the density.
 
-    Raises ValueError unless two of m, V0 and the density are known.
+    density: a number, or None [kg/m^d]. Raises ValueError unless two of m, V0 and the density are
+    given.
     """
-    known = [name for name in ("m", "V0") if name in a] + ["density"] * (density is not None)
-    if len(known) != 2:
-        raise ValueError(f"known of m, V0 and density: {', '.join(known) or 'none'}; expected two")
+    given = [name for name in ("m", "V0", "density") if name in a]
+    given += ["density"] * (density is not None)
+    if len(given) != 2 or given[0] == given[1]:
+        raise ValueError(f"given of m [kg], V0 [m^d] and density [kg/m^d]: "
+                         f"{', '.join(given) or 'none'}; expected two")
+    density = a.get("density", density)
     return (a["m"] if "m" in a else density * a["V0"],
             a["V0"] if "V0" in a else a["m"] / density)
 
 
-def _check_deformation(a, material):
-    """F for what carries F, J (or an F whose determinant is J) for what carries J."""
-    if not material.needs_F and "F" in a and "J" not in a:
-        a["J"] = np.linalg.det(a["F"])
-        if not (a["J"] > 0.0).all():
-            p = int(np.argmin(a["J"]))
-            raise ValueError(f"the array F has determinant {a['J'][p]:.6g} for particle {p}: "
-                             "expected a number > 0")
-    if material.needs_F and "J" in a:
-        if "F" not in a:
-            raise ValueError("the array F is missing; J alone is for a fluid that carries no F")
-        del a["J"]
+def _deformation(a, material):
+    """The arrays with F alone for what carries F, and with J, or det F, for what carries J."""
+    if material.needs_F and "J" in a and "F" not in a:
+        raise ValueError("the array F is missing; J alone is for a fluid that carries no F")
+    if material.needs_F:
+        return {name: value for name, value in a.items() if name != "J"}
+    if "F" in a and "J" not in a:
+        J = np.linalg.det(a["F"])
+        if not (J > 0.0).all():
+            p = int(np.argmin(J))
+            raise ValueError(f"the array F has determinant {J[p]:.6g} for particle {p}: expected a "
+                             "number > 0")
+        return a | {"J": J}
+    return a
 
 
 def build_clock(scene):

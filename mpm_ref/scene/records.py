@@ -145,12 +145,20 @@ class Velocity(Record):
 
 
 class Arrays(Record):
-    """Particles from the arrays of an NPZ or HDF5 file."""
+    """Particles from the arrays of an NPZ or HDF5 file.
 
-    file: str
+    Without `file`, the arrays with this `sha256` are handed over in Python (`problem_from_arrays`).
+    """
+
+    file: str | None = None
     sha256: Sha256 | None = None                # of what the file must hold
     group: str = "/"                            # of an HDF5 file
     select: Annotated[int, Meta(ge=0)] | None = None    # particles whose `body` has this value
+    offset: Vector | None = None                # added to the positions [m]
+
+    def __post_init__(self):
+        if self.file is None and self.sha256 is None:
+            raise ValueError("the key `file` is missing")
 
 
 class Body(Record):

@@ -11,6 +11,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from ..body import restore_order
 from .atomic import part_of, require_space
 from .journal import LIBVER, InUse, JournaledFile, in_use
 from .manifest import scene_hash
@@ -131,7 +132,7 @@ class Writer:
             (*CLOCK, "energy"), (frame.t, frame.dt, frame.state.step, energy), strict=True)]
         for body in frame.state.bodies:
             group = self.h5[f"bodies/{body.name}"]
-            rows += [(group[name], in_order(a, body.id))
+            rows += [(group[name], restore_order(a, body.id))
                      for name, a in carried(body).items() if name in group]
         require_space(self.path, sum(np.asarray(row).nbytes for _, row in rows))
         for dataset, row in rows:
@@ -176,13 +177,6 @@ class Writer:
         self._file.commit()
 
 
-def in_order(a, id):
-    """The rows of a field in the order in which the body was sampled."""
-    out = np.empty_like(a)
-    out[id] = a
-    return out
-
-
 def _put(dataset, value):
     """Append a row."""
     n = len(dataset)
@@ -203,7 +197,7 @@ def _lay_out(h5, problem, fields):
         group = h5.create_group(f"bodies/{body.name}")
         group.attrs.update(index=k, law=_in_words(body.law), flow=_in_words(body.flow))
         for name, unit in (("m", "kg"), ("V0", f"m^{problem.dim}")):
-            a = in_order(getattr(body.particles, name), body.id)
+            a = restore_order(getattr(body.particles, name), body.id)
             group.create_dataset(name, data=a, fletcher32=a.size > 0).attrs["unit"] = unit
         for name, a in fields.of(body).items():
             _series(group, name, a.shape, "f8", fields.gzip).attrs["unit"] = UNITS[name]

@@ -9,10 +9,10 @@ import pytest
 from command_line import assert_told, mpm_ref
 from small_laws import DT, DX, EVERY, FLOWING, STEPS, E, identified, saved, write_scene
 
+from mpm_ref.body import restore_order
 from mpm_ref.cli import law
 from mpm_ref.scene import build, load
 from mpm_ref.simulate import simulate
-from mpm_ref.trajectories import in_order
 
 FRAMES = 1 + STEPS // EVERY
 SCENES = Path(__file__).parents[2] / "scenes"
@@ -33,7 +33,7 @@ def run_of(folder, *edits):
     """Positions (frames, n, 3) of the scene, run by itself."""
     bodies = (frame.state.bodies[0] for frame in
               simulate(build(load(write_scene(folder, *edits, name="alone.toml")))))
-    return np.array([in_order(body.particles.x, body.id) for body in bodies])
+    return np.array([restore_order(body.particles.x, body.id) for body in bodies])
 
 
 def test_the_true_laws_are_not_off(tmp_path):

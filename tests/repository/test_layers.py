@@ -30,7 +30,7 @@ FLOORS = (
     ("training",),
     ("materials.learned",),
     ("explicit", "energy"),
-    ("timestep", "monitor", "adjoint"),
+    ("timestep", "monitor", "adjoint", "constitutive"),
     ("tape",),
     ("hot", "rom", "nclaw"),
     ("problem", "shapes"),

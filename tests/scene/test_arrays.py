@@ -139,7 +139,7 @@ def one(value, shape=(N,)):
     ({"m": np.ones(N, dtype=bool)}, "type bool: expected real numbers"),
     ({"m": np.full(N, "a")}, "expected real numbers"),
     ({"body": np.ones(N)}, "the array body has type float64: expected whole numbers"),
-    ({"V0": None}, "known of m, V0 and density: m; expected two"),
+    ({"V0": None}, r"given of m \[kg\], V0 \[m\^d\] and density \[kg/m\^d\]: m; expected two"),
     ({"J": np.ones(N)}, "the array F is missing"),
     ({"x": np.full((N, 2), None)}, "cannot be read|allow_pickle|Object arrays"),
 ])
@@ -160,7 +160,7 @@ def test_too_much_is_refused(tmp_path):
     with pytest.raises(SceneError, match="m, V0, density; expected two"):
         particles(npz(tmp_path, changed()), 2, body="density = 1.0")
     file = npz(tmp_path, changed(v=np.ones((N, 2))))
-    with pytest.raises(SceneError, match=r"body\[0\].velocity: the file has velocities"):
+    with pytest.raises(SceneError, match=r"body\[0\].velocity: the arrays have velocities"):
         particles(file, 2, body="velocity = { angular = 1.0 }")
 
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import threadpoolctl
 
+from mpm_ref.body import restore_order
 from mpm_ref.core.grid import OutOfRange
 from mpm_ref.monitor import Unstable
 from mpm_ref.rom.fields.pod import basis
@@ -20,7 +21,6 @@ from mpm_ref.rom.study.errors import Squares
 from mpm_ref.rom.study.run import drawing
 from mpm_ref.rom.study.watch import Nonsense, watch, watched
 from mpm_ref.simulate import simulate
-from mpm_ref.trajectories import in_order
 
 from ..common.scenes import threads_for
 from ..ldm.networks import trained
@@ -127,7 +127,7 @@ def full(problem):
         try:
             for frame in simulate(problem):
                 body = frame.state.bodies[0]
-                rows.append(in_order(body.particles.x, body.id))
+                rows.append(restore_order(body.particles.x, body.id))
         except (Unstable, OutOfRange) as stop:
             return np.array(rows), str(stop)
     return np.array(rows), ""

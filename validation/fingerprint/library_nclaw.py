@@ -4,6 +4,7 @@ from itertools import islice
 
 import numpy as np
 
+from mpm_ref.body import restore_order
 from mpm_ref.materials.learned import weights
 from mpm_ref.nclaw import batched_step
 from mpm_ref.nclaw.bodies import body_maker
@@ -12,7 +13,6 @@ from mpm_ref.nclaw.gnn import weights as gnn_weights
 from mpm_ref.nclaw.gnn.features import box_of
 from mpm_ref.nclaw.paths import cycles, path_response
 from mpm_ref.nclaw.study.compare import positions
-from mpm_ref.trajectories import in_order
 
 from .library import ROOT, problem, state_of
 
@@ -42,7 +42,7 @@ def of_graph(name, scene_name, frames):
     """Return the positions that a stored graph network gives for a scene's start."""
     world, simulator = problem(scene_name), gnn_weights.load(WEIGHTS / f"{name}.npz")
     _, particles, _, _, number = world.bodies[0]
-    x, v = (in_order(a, number) for a in particles[:2])
+    x, v = (restore_order(a, number) for a in particles[:2])
     run = simulator.run(x, v, box_of(world.conditions.walls, world.dx))
     return {"x": np.array(list(islice(run, frames + 1)))}
 

@@ -4,13 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mpm_ref.body import restore_order
 from mpm_ref.core.blas import one_thread
 from mpm_ref.rom.study.case import Case, case
 from mpm_ref.rom.study.errors import Errors, Squares
 from mpm_ref.rom.study.run import Way, march
 from mpm_ref.scene import build
 from mpm_ref.simulate import simulate
-from mpm_ref.trajectories import in_order
 
 from ..common.scenes import threads_for
 from .networks import trained
@@ -67,7 +67,7 @@ def positions(scene):
     """Yield x (n, d) of a full-order run, points in the body's own order."""
     for frame in simulate(build(scene)):
         body = frame.state.bodies[0]
-        yield in_order(body.particles.x, body.id)
+        yield restore_order(body.particles.x, body.id)
 
 
 def beside(X, found, reference):

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mpm_ref.body import restore_order
 from mpm_ref.core.blas import one_thread
 from mpm_ref.rom.step import BREAKDOWNS
 from mpm_ref.rom.study.case import case
@@ -14,7 +15,6 @@ from mpm_ref.rom.study.errors import Errors, Squares
 from mpm_ref.rom.study.run import Way, march
 from mpm_ref.scene import Scheme, build
 from mpm_ref.simulate import State, advance
-from mpm_ref.trajectories import in_order
 
 from ..common.scenes import with_
 
@@ -82,7 +82,7 @@ class Full:
     def positions(self, every):
         """x (n, d) of one point in so many."""
         body = self.state.bodies[0]
-        return in_order(body.particles.x, body.id)[::every]
+        return restore_order(body.particles.x, body.id)[::every]
 
 
 class Online:

@@ -8,13 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mpm_ref.body import restore_order
 from mpm_ref.energy import kinetic
 from mpm_ref.materials.learned import learned_flow, learned_law
 from mpm_ref.nclaw.bodies import body_with_laws, deformation_gradients
 from mpm_ref.nclaw.dissipation import balance, loops, work
 from mpm_ref.nclaw.study.compare import RunBroken, positions
 from mpm_ref.scene import build
-from mpm_ref.trajectories import in_order
 
 from ..common.registry import experiment
 from ..common.scenes import threads_for
@@ -104,10 +104,11 @@ def taken(body, law, frames, dt):
     frames are all steps of dt [s].
     """
     F = np.tile(np.eye(3), (len(body.id), 1, 1))
-    V0 = in_order(body.particles.V0, body.id)
+    V0 = restore_order(body.particles.V0, body.id)
     next(frames)
     for _ in frames:
-        L, F_new = (in_order(a, body.id) for a in (body.particles.L, deformation_gradients(body)))
+        L, F_new = (restore_order(a, body.id)
+                    for a in (body.particles.L, deformation_gradients(body)))
         yield V0 * work(law, F_new, F + dt * L @ F)
         F = F_new
 

@@ -8,10 +8,9 @@ one grid. Positions, velocities and deformation gradients stay as they are when 
 
 import numpy as np
 
-from mpm_ref.body import Body, particles_at
+from mpm_ref.body import Body, particles_at, restore_order
 from mpm_ref.core.grid import OutOfRange
 from mpm_ref.simulate import keep_inside
-from mpm_ref.trajectories import in_order
 
 FIRST, LAST = 500, 1500     # steps
 HOLD = 20                   # steps between changes
@@ -79,8 +78,9 @@ def part(body, which):
 def whole(parts):
     """One body of all points of some parts, in their own order."""
     ids = np.concatenate([one.id for one in parts])
-    x, v, m, V0, C, F = (in_order(np.concatenate([getattr(one.particles, name) for one in parts]),
-                                  ids) for name in ("x", "v", "m", "V0", "C", "F"))
+    x, v, m, V0, C, F = (
+        restore_order(np.concatenate([getattr(one.particles, name) for one in parts]), ids)
+        for name in ("x", "v", "m", "V0", "C", "F"))
     particles = particles_at(x, v, m, V0)
     particles.C[:], particles.F[:] = C, F
     return Body(parts[0].name, particles, parts[0].law, parts[0].flow, np.arange(len(ids)))

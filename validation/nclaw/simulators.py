@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mpm_ref.body import restore_order
 from mpm_ref.nclaw.bodies import copy_body
 from mpm_ref.nclaw.gnn.features import box_of
 from mpm_ref.nclaw.study.compare import positions
 from mpm_ref.scene import build
 from mpm_ref.store.words import counted
-from mpm_ref.trajectories import in_order
 
 from ..common.scenes import threads_for
 from .environments import ENVIRONMENTS
@@ -85,6 +85,6 @@ def shown(scene):
 
 def start(problem):
     """Positions and velocities (n, d) of all points of a problem at the start, and its walls."""
-    x, v = (np.concatenate([in_order(getattr(body.particles, name), body.id)
+    x, v = (np.concatenate([restore_order(getattr(body.particles, name), body.id)
                             for body in problem.bodies]) for name in "xv")
     return x, v, box_of(problem.conditions.walls, problem.dx)

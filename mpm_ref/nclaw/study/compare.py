@@ -13,13 +13,12 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from ...body import keep_inside
+from ...body import keep_inside, restore_order
 from ...core.grid import OutOfRange
 from ...rom.study.generate import one_thread
 from ...scene import SceneError, build
 from ...simulate import SORT, last_step
 from ...store.atomic import replacing
-from ...trajectories import in_order
 from ..bodies import copy_body
 
 FEW = 5000      # particles, up to which a second thread would wait more than it works
@@ -115,7 +114,7 @@ def positions(problem, bodies):
 
 def body_positions(bodies):
     """Return the positions (n, d) of the points of bodies."""
-    return np.concatenate([in_order(body.particles.x, body.id) for body in bodies])
+    return np.concatenate([restore_order(body.particles.x, body.id) for body in bodies])
 
 
 def problem_of(scene, source, steps=None):

@@ -5,11 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from mpm_ref.body import restore_order
 from mpm_ref.materials import Fluid, NoFlow
 from mpm_ref.materials.learned.response import Correction, Stress
 from mpm_ref.scene import build
 from mpm_ref.simulate import SORT, simulate
-from mpm_ref.trajectories import in_order
 from validation.common import targets
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
@@ -50,7 +50,7 @@ def test_a_law_is_not_off_from_itself():
 def test_runs_are_those_of_simulate():
     problem = build(water(SORT + 6))
     shown = list(positions(problem, tuple(map(copy_body, problem.bodies))))
-    frames = [in_order(frame.state.bodies[0].particles.x, frame.state.bodies[0].id)
+    frames = [restore_order(frame.state.bodies[0].particles.x, frame.state.bodies[0].id)
               for frame in simulate(problem)]
     assert len(shown) == len(frames) == 1 + (SORT + 6) // 5
     assert np.array_equal(shown, frames)
@@ -78,7 +78,7 @@ def test_points_of_several_bodies_stand_one_after_the_other():
     problem = build(water(5))
     body = problem.bodies[0]
     x = next(positions(problem, (copy_body(body), copy_body(body))))
-    assert np.array_equal(x, np.tile(in_order(body.particles.x, body.id), (2, 1)))
+    assert np.array_equal(x, np.tile(restore_order(body.particles.x, body.id), (2, 1)))
 
 
 # breakdowns
