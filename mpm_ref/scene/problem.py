@@ -73,7 +73,7 @@ def _problem_of(scene, arrays):
         source=canonical(scene),
         integrator="explicit" if solver is None else "implicit",
         solver=solver,
-        strain_bounds=training_ranges,
+        strain_bounds=strain_bounds,
     )
 
 
