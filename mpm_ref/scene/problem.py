@@ -42,8 +42,8 @@ def problem_from_arrays(bodies, dx, **keys):
     a node at the point o takes offset = -o, and all else of the problem stands in shifted
     coordinates.
 
-    keys: all other keys of a scene (docs/reference/scenes.md): dt or cfl, steps or end, gravity, walls,
-    collider, fixed, scheme, integrator, solver, ... as plain values or records of `scene`. Arrays
+    keys: all other keys of a scene (docs/reference/scenes.md): dt or cfl, steps or end, gravity,
+    walls, collider, fixed, scheme, integrator, solver, ... as plain values or records. Arrays
     are copied. Raises SceneError, which names the body, the array, its shape and unit, or the key.
     """
     tables, arrays, dim = [], {}, _dimension(bodies)
