@@ -17,14 +17,14 @@ from .materials import Material
 
 
 class Response(NamedTuple):
-    """What laws answer at N points."""
+    """Energy and stresses of N points."""
 
     psi: np.ndarray     # (N,)       energy per rest volume [J/m^d]
     P: np.ndarray       # (N, d, d)  first Piola-Kirchhoff stress [Pa]
     tau: np.ndarray     # (N, d, d)  Kirchhoff stress P F^T [Pa]
 
 
-class Returned(NamedTuple):
+class PlasticResponse(NamedTuple):
     """Points after a return map."""
 
     F: np.ndarray       # (N, d, d), or J (N,) of a fluid without F
@@ -64,7 +64,7 @@ def differential(F, dF, law):
 
 
 def return_map(F, law, flow, dt=0.0, y=None):
-    """Return the `Returned` points of trial gradients F (N, d, d): F = project(F_trial), and tau.
+    """Return the `PlasticResponse` points of trial gradients F (N, d, d): F = project(F_trial), and tau.
 
     dt [s] is the length of the step, which viscous flows need; y (N,) [Pa] the yield stress before
     it, of flows that change it. Arguments stay as they are. Raises ValueError for other shapes, or
@@ -80,7 +80,7 @@ def return_map(F, law, flow, dt=0.0, y=None):
         q = q._replace(y=np.array(y, dtype=float))
     q.F[:] = F if material.needs_F else np.linalg.det(F)
     deform_body(Body("points", q, law, flow, np.arange(n)), dt)
-    return Returned(q.F, q.tau, q.y)
+    return PlasticResponse(q.F, q.tau, q.y)
 
 
 def _points(name, F):

@@ -16,7 +16,7 @@ import numpy as np
 
 
 class Quantity(NamedTuple):
-    """What an array holds: its axes besides that of the particles, and its text for messages."""
+    """The axes of an array besides that of the particles, and its text for messages."""
 
     axes: int
     text: str

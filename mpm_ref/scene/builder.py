@@ -30,8 +30,8 @@ NAMES = f'expected "explicit" or one of {", ".join(METHODS)}'
 CFL = 0.5       # share of the stable time step, for a scene that says nothing about its step
 
 
-class Parts(NamedTuple):
-    """What a scene builds besides its bodies; none of it changes during a run."""
+class SceneParts(NamedTuple):
+    """The objects of a scene besides its bodies; none of them changes during a run."""
 
     clock: Clock
     limits: Limits
@@ -41,9 +41,9 @@ class Parts(NamedTuple):
 
 
 def build_parts(scene):
-    """Return the `Parts` of a scene. Raises SceneError for what only a built object can check."""
+    """Return the `SceneParts` of a scene. Raises SceneError for what building finds."""
     materials = tuple(build_material(body, scene.dim, k) for k, body in enumerate(scene.body))
-    return Parts(build_clock(scene), build_limits(scene), build_conditions(scene),
+    return SceneParts(build_clock(scene), build_limits(scene), build_conditions(scene),
                  build_solver(scene), tuple(None if record.material.is_neural else made[:2]
                                             for record, made in zip(scene.body, materials)))
 

@@ -346,7 +346,7 @@ class Scene(Record, dict=True):
 
     @property
     def parts(self):
-        """The `builder.Parts` of a scene that was validated, else None."""
+        """The `builder.SceneParts` of a scene that was validated, else None."""
         return vars(self).get("parts")
 
     @property

@@ -67,7 +67,7 @@ def check_finite(data, path=""):
 
 
 def check_scene(scene):
-    """Return the `Parts` of a scene. Raises SceneError for the first thing that does not fit."""
+    """Return the `SceneParts` of a scene. Raises SceneError for the first misfit."""
     check_dimension(scene, scene.dim)
     for k, body in enumerate(scene.body):
         check_body(body, scene.dim, f"body[{k}]")
