@@ -64,7 +64,7 @@ def differential(F, dF, law):
 
 
 def return_map(F, law, flow, dt=0.0, y=None):
-    """Return the `PlasticResponse` points of trial gradients F (N, d, d): F = project(F_trial), and tau.
+    """Return the `PlasticResponse` to trial gradients F (N, d, d): F = project(F_trial), and tau.
 
     dt [s] is the length of the step, which viscous flows need; y (N,) [Pa] the yield stress before
     it, of flows that change it. Arguments stay as they are. Raises ValueError for other shapes, or
