@@ -20,6 +20,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import KDTree
 
+BEYOND = 1.5        # bound of `Extent.beyond`: a run beyond it has left its training data; 1 is as
+                    # far as training runs are from each other
+POINTS = 64         # of the body, that the metric is a mean over ...
+LATENTS = 100       # ... and training latents
 THIN = 0.1          # a direction with a smaller share of the largest spread counts as having it
 
 
@@ -76,6 +80,20 @@ def extent(xhat, metric=None):
         raise ValueError(f"{len(flat)} training latents of {len(runs)} runs, which do not differ: "
                          "expected runs of different parameters")
     return Extent(mean, ruler, KDTree(flat), float(gap), float(radius))
+
+
+def trained_extent(field, points, xhat):
+    """Return the `Extent` of the latent coordinates xhat (s, k + 1, r) that a field was trained
+    with, in the metric of `motion` at some of its points: the one distance of every reduced model.
+    Raises ValueError where the latents do not differ.
+    """
+    latents = evenly(np.reshape(xhat, (-1, field.r)), LATENTS)
+    return extent(xhat, motion(field, evenly(points, POINTS), latents))
+
+
+def evenly(a, count):
+    """Return at most `count` of the rows of an array, evenly among them."""
+    return a[::-(-len(a) // count)]
 
 
 def motion(map, X, xhat):

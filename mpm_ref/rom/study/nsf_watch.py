@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..cubature import misfit
-from ..extrapolation import extent, motion
+from ..extrapolation import BEYOND, trained_extent
 from ..fields.pod_fields import Spanned
-from .watch import BEYOND, LATENTS, LOOKED, WORDS, some
+from .watch import WORDS
 
 SPARSE = 0.74       # of `rom.cubature.misfit`, from runs of jelly cube and metal frame
 
@@ -37,9 +37,7 @@ def trained(fields, xhat):
     """`Extent` of the latent coordinates xhat (s, k + 1, r) of training runs. Raises ValueError
     where these do not differ.
     """
-    points, latents = some(np.arange(len(fields.X)), LOOKED), some(
-        xhat.reshape(-1, fields.r), LATENTS)
-    return extent(xhat, motion(fields, points, latents))
+    return trained_extent(fields, np.arange(len(fields.X)), xhat)
 
 
 def sparse(fields, chosen):

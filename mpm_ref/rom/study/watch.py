@@ -22,13 +22,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..extrapolation import Extent, extent, motion
+from ..extrapolation import BEYOND, Extent, evenly, trained_extent
 from ..projection import RANK
 from .run import continued, picked, start
 
 LOOKED = 64         # points of the body that are looked at, and samples
-LATENTS = 100       # training latents that the metric is a mean over
-BEYOND = 1.5        # 1 by the gap's definition
 OFF = 0.033         # [dx]; hardly separates runs in range from those with twice the time step
 SEEN = 0.3          # low enough for ten samples and seven coordinates
 MEMORY = 0.8        # share of what was seen before in what counts as seen: a poor draw is forgiven
@@ -111,7 +109,7 @@ class Watch(NamedTuple):
                  "seen": 1.0, "blind": 0, "lost": 0.0}
         if report is not None:
             lost = report.quadrature.get("lost", 0)
-            G_samples = self.map.derivatives(some(samples, LOOKED), latent.xhat)[2]
+            G_samples = self.map.derivatives(evenly(samples, LOOKED), latent.xhat)[2]
             found |= {"off": report.residual * self.dt / self.dx,
                       "seen": MEMORY * last.seen + (1.0 - MEMORY) * seen(G, G_samples),
                       "blind": self.map.r - report.rank, "lost": lost / (lost + report.points)}
@@ -130,9 +128,9 @@ def watch(case, map, xhat):
     """`Watch` of reduced runs of a `Case` on a map with training latents xhat (s, k + 1, r). Raises
     ValueError where these do not differ.
     """
-    X, latents = some(case.X, LOOKED), some(np.reshape(xhat, (-1, map.r)), LATENTS)
+    X = evenly(case.X, LOOKED)
     clock = case.problem.clock
-    return Watch(map, X, extent(xhat, motion(map, X, latents)), case.problem.dx, clock.dt)
+    return Watch(map, X, trained_extent(map, case.X, xhat), case.problem.dx, clock.dt)
 
 
 def watched(watch, case, way, rest, seed=0, pick=None):
@@ -184,8 +182,3 @@ def seen(G, G_samples):
     if len(B) < B.shape[1] or not moving.any():
         return 0.0
     return float(np.linalg.svd(B, compute_uv=False)[-1])
-
-
-def some(a, count):
-    """At most so many of the rows of an array, evenly among them."""
-    return a[::-(-len(a) // count)]
