@@ -256,7 +256,7 @@ def test_files_that_stand_are_kept(tmp_path):
 ])
 def test_what_an_export_needs_is_said_first(tmp_path, monkeypatch, options, status, words):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("mpm_ref.cli.law.exported", None)
+    monkeypatch.setattr("mpm_ref.cli.law.export_tables", None)
     assert_told(mpm_ref("law", "export", saved(tmp_path, identified()), *options), status, words)
 
 

@@ -170,7 +170,7 @@ def made_up(monkeypatch):
         return [ComparedError(float(next(count))) for _ in laws]
 
     known = {name: trained_laws.Net(name) for name in ENVIRONMENTS}
-    for name, value in {"compare": compared, "learned": lambda laws: laws}.items():
+    for name, value in {"compare": compared, "body_maker": lambda laws: laws}.items():
         monkeypatch.setattr(errors, name, value)
     for name, value in {"trained": trained, "nets": lambda: known}.items():
         monkeypatch.setattr(tables, name, value)
