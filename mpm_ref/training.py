@@ -1,7 +1,7 @@
 """Parts that all trainings share: PyTorch on demand, the device, time taken, and checkpoints.
 
 PyTorch is imported when it is asked for. A training that is cut off goes on from its checkpoint:
-`Session` saves and loads one, `train_epochs` says when.
+`TrainingSession` saves and loads one, `train_epochs` says when.
 """
 
 import hashlib
@@ -40,8 +40,8 @@ def part(name, what, instead):
                          f"{instead}") from None
 
 
-class Cost(NamedTuple):
-    """Time taken."""
+class TrainingTime(NamedTuple):
+    """The time that a training takes."""
 
     cpu: float          # [s], of all threads
     wall: float         # [s]
@@ -51,25 +51,25 @@ class Meter:
     """A stopwatch that starts when it is made, and adds the time of earlier parts."""
 
     def __init__(self):
-        self.before, self.start = Cost(0.0, 0.0), clocks()
+        self.before, self.start = TrainingTime(0.0, 0.0), clocks()
 
     @property
     def total(self):
-        """`Cost` up to now."""
-        return Cost(*(a + now - start for a, now, start in
+        """`TrainingTime` up to now."""
+        return TrainingTime(*(a + now - start for a, now, start in
                       zip(self.before, clocks(), self.start, strict=True)))
 
 
 def clocks():
     """Return the readings of the two clocks."""
-    return Cost(process_time(), perf_counter())
+    return TrainingTime(process_time(), perf_counter())
 
 
 class Diverged(ValueError):
     """A loss or a gradient is not finite, or a run of a training breaks down."""
 
 
-class Session:
+class TrainingSession:
     """A training under way: its history, its time, and its checkpoints.
 
     A subclass has `epoch()`, which appends an entry to `history`; `description`, one line of text
@@ -109,7 +109,7 @@ class Session:
             for part, state in zip(parts, stored[name], strict=True):
                 part.load_state_dict(state)
         self.history = [self.entry(row) for row in stored["history"]]
-        self.meter.before = Cost(*stored["cost"])
+        self.meter.before = TrainingTime(*stored["cost"])
 
 
 def sha256(*values):
@@ -125,7 +125,7 @@ def sha256(*values):
 
 
 def train_epochs(session, epochs, every, checkpoint=None, on_epoch=None):
-    """Return the `Session`, trained up to a number of epochs.
+    """Return the `TrainingSession`, trained up to a number of epochs.
 
     checkpoint: a file to go on from, and to save to every `every` epochs; on_epoch(history) is
     called after each epoch. Raises ValueError where the folder of the checkpoint is missing.

@@ -1,5 +1,5 @@
-"""Full-order runs of one body under different parameters, recorded step by step: the data of
-reduced models.
+"""Full-order runs of one body, recorded step by step: the data of reduced models and of learned
+laws.
 """
 
 from typing import NamedTuple
@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from .body import restore_order
-from .rom.snapshots import Snapshots
 from .simulate import simulate
 
 
@@ -65,28 +64,3 @@ def recorded(problem, kind, every=1):
         rows.append([restore_order(getattr(body.particles, name), body.id)[::every]
                      for name in kind._fields])
     return kind(*(np.array(field) for field in zip(*rows, strict=True)))
-
-
-def snapshots(problems, mu, every=1):
-    """`Snapshots` of problems that differ by parameters mu (s, parameters) alone; of one point in
-    so many.
-
-    Raises ValueError where their points or time steps differ.
-    """
-    rest, dt, runs = None, None, []
-    for problem in problems:
-        points = points_of(problem.bodies[0])
-        if rest is None:
-            rest, dt = points, problem.clock.dt
-        if dt != problem.clock.dt or not all(map(np.array_equal, points, rest)):
-            raise ValueError(f"run {len(runs)} has other points or another time step than run 0: "
-                             "expected runs that differ by their parameters alone")
-        runs.append(history(problem, every))
-    return Snapshots(*(a[::every] for a in rest), np.asarray(mu, dtype=float), *(
-        np.stack(field) for field in zip(*runs, strict=True)), dt)
-
-
-def points_of(body):
-    """x (n, d) [m], m (n,) [kg] and V0 (n,) [m^d] of a body, points in its own order."""
-    q = body.particles
-    return tuple(restore_order(a, body.id) for a in (q.x, q.m, q.V0))

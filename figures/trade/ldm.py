@@ -16,7 +16,7 @@ NEEDS = ["trade.ldm.knobs", "trade.ldm.density"]
 TITLES = ("tower", "torsion")
 WORDS = {"quadrature": "quadrature: {}", "per_cell": "quadrature points to a cell and axis: {:g}",
          "projection": "projection: {}", "velocity": "velocity: {}", "samples": "samples: {}",
-         "close": "preimages: {:g} dx", "precision": "precision: {}"}
+         "preimage_tolerance": "preimages: {:g} dx", "precision": "precision: {}"}
 MARKS = "oD^v<>PXHdp+x12s"
 RANGE = 2.0         # up and down from the middle of errors, at least
 PLACES = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)

@@ -88,7 +88,7 @@ def of_results(path):
             "energy": dict(zip(ENERGIES, results.energy[-1].tolist(), strict=True)) if n else None,
             "checkpoint": str(checkpoint_of(path)) if checkpoint_of(path).exists() else None,
             "manifest": results.manifest,
-            "reduced": summary.told(results),
+            "reduced": summary.summary(results),
             "warnings": [*unsolved(manifest.unsolved(results.manifest)),
                          *manifest.astray(results.manifest)],
         }
@@ -153,7 +153,7 @@ def results_lines(facts):
     else:
         lines.append("no frame yet")
     if facts["reduced"]:
-        lines.append(summary.line(facts["reduced"]))
+        lines.append(summary.summary_line(facts["reduced"]))
     lines += map(part_line, facts["manifest"].get("parts", []))
     lines.append(f"checkpoint: {facts['checkpoint'] or 'none'}")
     return lines

@@ -11,7 +11,7 @@ from ..materials.learned.weights import PARTS, dim_of
 from ..nclaw import export
 from ..nclaw.gnn import weights as gnn_weights
 from ..nclaw.study.study import SYS_ID, load
-from ..rom.study.study_file import plain
+from ..rom.study.study_file import read_toml
 from ..scene import SceneError
 from ..store.weights_file import about_of, require_format
 from ..store.words import counted
@@ -206,7 +206,7 @@ def is_law_study(path):
     studies of reduced runs.
     """
     try:
-        return bool(OWN & set(plain(path)))
+        return bool(OWN & set(read_toml(path)))
     except SceneError:
         return False
 

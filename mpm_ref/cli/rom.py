@@ -13,11 +13,19 @@ from typing import Annotated
 import typer
 
 from ..rom.study import baselines, dataset, reduce
-from ..rom.study import nsf_evaluate as nsf
-from ..rom.study.evaluate import REDUCED, breakdowns, draw, evaluate, facts, lines, together
-from ..rom.study.model import kind_of, recording, to_write
-from ..rom.study.record import record
-from ..rom.study.resume import begun
+from ..rom.study.evaluate import (
+    REDUCED,
+    breakdown_warnings,
+    draw,
+    evaluate,
+    facts,
+    lines,
+    stress_facts,
+    stress_lines,
+    total_errors,
+)
+from ..rom.study.record import particle_bytes, record, recording
+from ..rom.study.resume import earlier_part
 from ..rom.study.tables import NSF
 from ..scene import SceneError
 from ..store.atomic import in_words, require_place, require_space
@@ -86,22 +94,22 @@ def run(
             keep_scene(study.path, out)
             require_ending(out, HDF5)
             require_place(out)
-            mu = study.given(assigned(values or []))
+            mu = study.parse_parameters(assigned(values or []))
             file, model = map_of(name, study, map)
-            announce(out, to_write(study, mu, points_out))
+            announce(out, particle_bytes(study, mu, points_out))
             made = recording(study, model, mu, points_out)
             made.facts["map_sha256"] = reduce.sha256(file)
-            before = begun(made, out, overwrite)
-        warn([*study.outside(mu), *made.doubts, *changed(before)])
-        outcome = recorded(made, out, before.known, overwrite)
+            earlier = earlier_part(made, out, overwrite)
+        warn([*study.range_warnings(mu), *made.warnings, *changed(earlier)])
+        outcome = recorded(made, out, earlier.states, overwrite)
         if json:
             print(as_json(ran(made, out, outcome)))
-        if outcome.lost:
-            end(outcome.lost, UNSTABLE)
+        if outcome.breakdown:
+            end(outcome.breakdown, UNSTABLE)
         clock = made.problem.clock
         warn(astray(outcome.out_of_bounds, clock.steps + 1, clock.dt))
         if not json:
-            print(f"{FINISHED}: {counted(clock.steps, 'step')} of {kind_of(model)}, r = "
+            print(f"{FINISHED}: {counted(clock.steps, 'step')} of {reduce.kind_of(model)}, r = "
                   f"{model.field.r}, {made.count} points in {out}")
 
 
@@ -115,9 +123,9 @@ def announce(out, size):
     require_space(out, max(size - there, 0))
 
 
-def recorded(made, out, known, overwrite):
-    """Make a `Recording`, with a bar of steps; its `Outcome`."""
-    at, steps = max(len(known) - 1, 0), made.problem.clock.steps
+def recorded(made, out, earlier, overwrite):
+    """Return the `RecordedRun` of a `Recording`, with a bar of steps."""
+    at, steps = max(len(earlier) - 1, 0), made.problem.clock.steps
     again = "the same command without --overwrite" if overwrite else "the same command again"
 
     def show(k):
@@ -127,38 +135,40 @@ def recorded(made, out, known, overwrite):
 
     with (on_interrupt(lambda: f"at step {at} of {steps}; {again} goes on"),
           passing(total=steps, unit="step", desc=str(out)) as bar):
-        return record(made, out, known, show)
+        return record(made, out, earlier, show)
 
 
 def ran(made, out, outcome):
     """A `Recording` that was made, or broke down, as plain values."""
-    clock, lost = made.problem.clock, outcome.lost
+    clock, lost = made.problem.clock, outcome.breakdown
     step = lost.step if lost else clock.steps
     how = ({"why": BROKE, "reason": str(lost), "status": UNSTABLE} if lost else
            {"why": FINISHED, "status": 0})
     return how | {
         "out": str(out), "step": step, "t": step * clock.dt, "frames": step + (not lost),
         "points_out": made.count, "reduced": made.facts,
-        "out_of_bounds": {str(k): sight.why for k, sight in outcome.out_of_bounds.items()}}
+        "out_of_bounds": {str(k): check.out_of_bounds for k,
+                          check in outcome.out_of_bounds.items()}}
 
 
-def changed(before):
-    """The warning about a run that has `Begun` with other code; or none."""
-    if not before.same_code:
+def changed(earlier):
+    """Yield the warning about a run whose `EarlierPart` is of other code."""
+    if not earlier.same_code:
         yield ("the run was made in part by another version of the code, or of NumPy, SciPy or "
                "Numba: it goes on, but not bit for bit; --overwrite makes it anew")
 
 
 def astray(out_of_bounds, states, dt):
-    """The warnings about a run with {step: `Sight`} out of bounds, of so many states dt [s] apart;
-    or none.
+    """Yield the warnings about a run with {step: `StateCheck`} out of bounds, of this number of
+    states dt [s] apart.
     """
     if 0 in out_of_bounds:
         yield "the map does not give the body at rest: train longer, or another kind"
     if out_of_bounds:
-        worst = max(out_of_bounds.values(), key=lambda sight: sight.beyond)
+        worst = max(out_of_bounds.values(), key=lambda check: check.beyond)
         yield (f"{len(out_of_bounds)} of {states} states, from t = {min(out_of_bounds) * dt:.6g} s "
-               f"on, are where the map has learned nothing or cannot follow; at worst {worst.said}")
+               "on, are where the map has learned nothing or cannot follow; at worst "
+               f"{worst.message}")
 
 
 @app.command("evaluate", epilog=examples(
@@ -192,22 +202,20 @@ def judge(
             folder = named(data, study, "-data")
             with writing():
                 snapshots = dataset.load(study, folder, study.test)
-            inferred = study.tables.model == NSF
-            compare = nsf.evaluate if inferred else evaluate
-            runs = passing(unit="run", iterable=compare(study, model, snapshots),
+            runs = passing(unit="run", iterable=evaluate(study, model, snapshots),
                            total=len(study.test))
             found = list(runs)
-            trained = list(baselines.nearby(study, folder, snapshots))
-        all_runs = together(found, snapshots.X)
+            trained = list(baselines.nearest_training_runs(study, folder, snapshots))
+        all_runs, has_stress = total_errors(found, snapshots.X), study.tables.model == NSF
         draw(found, study.names, snapshots.dt, picture)
         if json:
-            stress = {"stress": nsf.stress_facts(found)} if inferred else {}
+            stress = {"stress": stress_facts(found)} if has_stress else {}
             print(as_json({"study": str(study.path), "picture": str(picture),
-                           **facts(study, found, all_runs), "nearby": baselines.facts(trained),
+                           **facts(study, found, all_runs), "baseline": baselines.facts(trained),
                            **stress}))
         else:
-            stress = nsf.stress_lines(found) if inferred else ()
+            stress = stress_lines(found) if has_stress else ()
             print("\n".join([*lines(study, found, all_runs), *baselines.lines(trained), *stress,
                              str(picture)]))
-        warn(breakdowns(study, found))
+        warn(breakdown_warnings(study, found))
     raise typer.Exit(0 if isfinite(all_runs[REDUCED].origin) else UNSTABLE)

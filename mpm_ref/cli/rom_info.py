@@ -7,8 +7,8 @@ from ..rom import model_file
 from ..rom.fields.network import Decoder, Networks
 from ..rom.fields.pod_fields import Spanned
 from ..rom.fields.polynomial_manifold import Curved
-from ..rom.study.model import known_of
-from ..rom.study.study_file import checked, plain
+from ..rom.study.record import supported_model
+from ..rom.study.study_file import parse_tables, read_toml
 from ..rom.study.tables import CURVED, MODES, NETWORK, NSF
 from ..scene import SceneError
 from ..store.words import counted
@@ -26,14 +26,15 @@ MEASURES = {"origin": "of the distance from the scene's origin",
 def studies(json: Json = False):
     """List the studies that come with the package."""
     with one_line():
-        print_titles({name: checked(plain(path)).title for name, path in shipped_studies().items()
+        print_titles({name: parse_tables(read_toml(path)).title for name,
+                      path in shipped_studies().items()
                 if is_study(path)}, json)
 
 
 def is_study(path):
     """Whether a path is that of a study of reduced runs, whatever is wrong with its tables."""
     try:
-        return bool(TABLES & set(plain(path)))
+        return bool(TABLES & set(read_toml(path)))
     except SceneError:
         return False
 
@@ -43,7 +44,7 @@ def of_study(name):
     for a scene that reduced runs do not know.
     """
     study = studied(name)
-    tables, one = study.tables, known_of(study, study.mu[0])
+    tables, one = study.tables, supported_model(study, study.mu[0])
     return {
         "study": str(study.path), "title": tables.title, "scene": tables.scene,
         "dim": study.base.dim, "points": len(one.X), "dx": study.base.dx, "dt": study.base.dt,
@@ -174,7 +175,7 @@ def stored_states(facts):
 def fields_line(facts):
     """Fields and reduced runs of a study in words."""
     map, run = facts["map"], facts["run"]
-    longer = f", steps {run['faster']:g} times as long" if run["faster"] != 1.0 else ""
+    longer = f", steps {run['dt_factor']:g} times as long" if run["dt_factor"] != 1.0 else ""
     return (f"stress fields: {map['kind']}, r = {map['r']}, {sizes_text(map)}; reduced runs: "
             f"{run['inversion']} inversion, {samples_text(run)}{longer}")
 
@@ -184,7 +185,7 @@ def samples_text(run):
     if run.get("cells"):
         return f"points of {run['cells']} cells at most, with weights"
     return (f"{run['points'] or 'all'} points"
-            f"{' at most, with weights' if run['weighed'] else ''}")
+            f"{' at most, with weights' if run['weighted'] else ''}")
 
 
 def training_lines(about):

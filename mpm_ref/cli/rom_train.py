@@ -17,10 +17,10 @@ from ..rom.study.generate import (
     file_of,
     generate,
     one_thread,
-    said,
+    parameter_text,
 )
-from ..rom.study.model import kind_of, known_of, with_kind
-from ..rom.study.nsf_hints import hints
+from ..rom.study.record import supported_model
+from ..rom.study.study import training_hints
 from ..rom.study.tables import KEYS, NETWORK, NSF
 from ..store.atomic import NotWritten, require_place
 from ..store.words import counted
@@ -64,7 +64,7 @@ def make_data(
         folder, ended = named(out, study, "-data"), []
         with options():
             require_folder_name(folder)
-            known_of(study, study.mu[0])        # refuses what reduced runs do not know
+            supported_model(study, study.mu[0])     # refuses what reduced runs do not know
         make_folder(folder)
         workers = workers or os.cpu_count() or 1
         with (on_interrupt(lambda: f"after {len(ended)} of {counted(len(study.mu), 'run')}; the "
@@ -76,27 +76,28 @@ def make_data(
             for done in generate(study, folder, workers):
                 if done.why == INTERRUPTED:
                     raise KeyboardInterrupt
-                if not done.well:
+                if not done.has_data:
                     bar.close()
-                    end(done.said, STATUS.get(done.why, errors.BAD_INPUT))
+                    end(done.message, STATUS.get(done.why, errors.BAD_INPUT))
                 ended.append(done)
                 bar.update()
                 if bar.disable:
                     print(f"{len(ended)} of {len(study.mu)}: {file_of(folder, done.number)}, "
-                          f"{said(study, study.mu[done.number])}: {came(done)}", flush=True)
+                          f"{parameter_text(study, study.mu[done.number])}: {came(done)}",
+                          flush=True)
         print(f"{folder}: {counted(len(study.mu), 'run')} of {study.path.stem}: {in_sum(ended)}; "
               f"{len(study.test)} held out")
 
 
 def came(done):
-    """How a run came about, of a `Done` that ended well, in a word."""
+    """How a run came about, of a `GeneratedRun` that ended well, in a word."""
     if done.why == SKIPPED:
         return THERE
     return CONTINUED if done.continued else MADE
 
 
 def in_sum(ended):
-    """How many runs were made, continued, and there before, of a `Done` of each."""
+    """How many runs were made, continued, and there before, of a `GeneratedRun` of each."""
     count = Counter(map(came, ended))
     made, continued, there = (count[word] for word in (MADE, CONTINUED, THERE))
     return f"made {made}, continued {continued}, {there} were there"
@@ -134,19 +135,19 @@ def train(
             out, data = named(out, study, ".npz"), named(data, study, "-data")
             checkpoint = out.with_suffix(".pt")
             require_map_place(out, study, overwrite)
-            study = with_kind(study, kind)
+            study = study.with_kind(kind)
             require_device(study.tables.map.kind, machine.device)
             with writing():
                 snapshots = dataset.load(study, data, study.train)
             if study.tables.model == NSF:
-                warn(hints(study))
+                warn(training_hints(study))
             about = {"command": f"mpm-ref rom train {name} --data {data} --out {out} "
                                 f"--kind {study.tables.map.kind} {typed(machine)}"}
             with writing(), on_interrupt(lambda: resuming(checkpoint)):
                 model = fitted(study, snapshots, about, checkpoint, machine)
             write(out, model)
-        reduce.forget(checkpoint)
-        print(f"{out}: {kind_of(model)}, r = {model.field.r}, of "
+        reduce.forget_checkpoint(checkpoint)
+        print(f"{out}: {reduce.kind_of(model)}, r = {model.field.r}, of "
               f"{counted(len(study.train), 'run')} and {len(snapshots.X)} points")
 
 
@@ -155,7 +156,7 @@ def require_device(kind, device):
     none, or no PyTorch.
     """
     if kind == NETWORK:
-        reduce.training().device_of(device)
+        reduce.trainer().device_of(device)
     elif device != DEVICES[0]:
         raise ValueError(f"--threads {device}: {kind} are made on the processor; leave it out")
 
@@ -176,12 +177,12 @@ def fitted(study, snapshots, about, checkpoint, machine):
     """`Model` of a study's kind, with a bar of epochs."""
     if study.tables.map.kind != NETWORK:
         with one_thread():
-            return reduce.computed(study, snapshots, about)
+            return reduce.compute_model(study, snapshots, about)
     with passing(total=study.tables.map.total, unit="epoch", desc=study.path.stem) as bar:
         def show(history):
             bar.update(len(history) - bar.n)
             bar.set_postfix_str(f"loss {history[-1][0]:.2e}")
-        return reduce.learned(study, snapshots, about, checkpoint, show, machine)
+        return reduce.train_model(study, snapshots, about, checkpoint, show, machine)
 
 
 def make_folder(folder):

@@ -9,7 +9,8 @@ from small_studies import CURVED, STEPS, ended, write
 
 from mpm_ref.cli.catalogue import shipped_studies
 from mpm_ref.rom.study import reduce
-from mpm_ref.rom.study.generate import FIELDS, FINISHED, Done
+from mpm_ref.rom.study.generate import FINISHED, GeneratedRun
+from mpm_ref.rom.study.methods import LDM_METHOD
 from mpm_ref.rom.study.study import load
 from mpm_ref.scene import build
 from mpm_ref.store.running import Options, run
@@ -98,7 +99,7 @@ def test_a_study_that_does_not_exist_is_told_with_those_that_do():
 
 def test_ctrl_c_says_how_far_it_is_and_how_to_go_on(made, tmp_path, monkeypatch):
     def interrupted(*_):
-        yield Done(0, FINISHED)
+        yield GeneratedRun(0, FINISHED)
         raise KeyboardInterrupt
     monkeypatch.setattr("mpm_ref.cli.rom_train.generate", interrupted)
     done = mpm_ref("rom", "generate", made / "bars.toml", "--out", tmp_path, *ONE)
@@ -110,7 +111,7 @@ def test_a_run_that_was_cut_off_counts_as_continued(made, tmp_path):
     shutil.copy(made / "data" / "case-000.h5", tmp_path)
     bars = load(study)
     run(build(bars.scene(bars.mu[1])), tmp_path / "case-001.h5",
-        Options(steps=3, fields=Fields(FIELDS)))
+        Options(steps=3, fields=Fields(LDM_METHOD.stored)))
     done = mpm_ref("rom", "generate", study, "--out", tmp_path, *ONE)
     assert "made 2, continued 1, 1 were there; 1 held out" in done.stdout
     assert [line.split(": ")[-1] for line in done.stdout.splitlines()[1:-1]] == [

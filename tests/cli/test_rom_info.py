@@ -62,9 +62,9 @@ def test_errors_of_a_map_are_looked_at_some_points(monkeypatch):
     data, map = rom_toys.snapshots(2), rom_toys.decoder(2, 3, seed=1)
     xhat = np.random.default_rng(0).uniform(size=(3, 5, 3))
     few = data._replace(X=data.X[::5], x=data.x[:, :, ::5])
-    assert errors.misfit(map, data, xhat) != errors.misfit(map, few, xhat)
+    assert errors.misfit(map, data.X, data, xhat) != errors.misfit(map, few.X, few, xhat)
     monkeypatch.setattr(errors, "MEASURED", 8)
-    assert errors.misfit(map, data, xhat) == errors.misfit(map, few, xhat)
+    assert errors.misfit(map, data.X, data, xhat) == errors.misfit(map, few.X, few, xhat)
 
 
 def test_a_network_says_its_last_loss(tmp_path):

@@ -11,7 +11,7 @@ import small_studies
 from command_line import mpm_ref
 
 from mpm_ref.rom.study import baselines, dataset
-from mpm_ref.rom.study.baselines import Nearby, facts, lines, nearest_runs
+from mpm_ref.rom.study.baselines import NearestRun, facts, lines, nearest_parameters
 from mpm_ref.rom.study.errors import Squares
 from mpm_ref.rom.study.study import load
 
@@ -60,7 +60,7 @@ def test_its_errors_are_those_of_its_states_beside_the_run_held_out(made, tmp_pa
     folder, *_, first = made
     number, taken, own = expected(made, slice(first, None))
     out = tmp_path / "e.png"
-    found = json.loads(evaluated(made, folder / "data", "--json", "--out", out))["nearby"]
+    found = json.loads(evaluated(made, folder / "data", "--json", "--out", out))["baseline"]
     assert found["all"] == pytest.approx(own, rel=1e-6)
     assert found["runs"] == [{"number": number, "training_run": taken, **found["all"]}]
     heading = "position errors [%] of the training run with the nearest parameters"
@@ -76,10 +76,10 @@ def test_its_errors_are_those_of_its_states_beside_the_run_held_out(made, tmp_pa
 def test_longer_steps_are_compared_at_the_same_states(made, tmp_path):
     """Of three steps of 1.5 two end between states of NSF's small study, two steps apart."""
     folder = made[0]
-    study = small_nsf_studies.write(tmp_path, ("points = 20", "points = 20\nfaster = 1.5"))
+    study = small_nsf_studies.write(tmp_path, ("points = 20", "points = 20\ndt_factor = 1.5"))
     number, taken, own = expected(made, [3, 6])
     found = json.loads(evaluated(made, folder / "data", "--json", "--out", tmp_path / "e.png",
-                                 study=study))["nearby"]
+                                 study=study))["baseline"]
     assert found["all"] == pytest.approx(own, rel=1e-6)
     assert [(one["number"], one["training_run"]) for one in found["runs"]] == [(number, taken)]
 
@@ -93,8 +93,8 @@ def test_without_its_data_it_is_left_out(made, tmp_path, damaged):
     for k in study.train if damaged else ():
         (tmp_path / f"case-{k:03d}.h5").write_bytes(b"no results")
     out = tmp_path / "e.png"
-    found = json.loads(evaluated(made, tmp_path, "--json", "--out", out))["nearby"]
-    taken = nearest_runs(study, number)[0]
+    found = json.loads(evaluated(made, tmp_path, "--json", "--out", out))["baseline"]
+    taken = nearest_parameters(study, number)[0]
     assert found == {"all": None, "runs": [{"number": number, "training_run": taken}]}
     assert [str(number), str(taken), "no", "data"] in [
         row.split() for row in evaluated(made, tmp_path, "--out", out).splitlines()]
@@ -106,7 +106,7 @@ def test_parameters_are_measured_in_their_ranges():
     """
     mu = np.array([[0.0, 5.0, 0.0], [1.0, 5.0, 1000.0], [0.1, 5.0, 600.0], [0.9, 5.0, 400.0]])
     study = SimpleNamespace(mu=mu, train=(1, 0), test=(2, 3))
-    assert (nearest_runs(study, 2), nearest_runs(study, 3)) == ([0], [1])
+    assert (nearest_parameters(study, 2), nearest_parameters(study, 3)) == ([0], [1])
 
 
 def test_of_runs_that_are_equally_near_the_better_one_is_taken(monkeypatch):
@@ -117,10 +117,12 @@ def test_of_runs_that_are_equally_near_the_better_one_is_taken(monkeypatch):
     off = {0: 3.0, 2: 2.0, 3: 1.0}
     monkeypatch.setattr(baselines, "_squares", lambda study, folder, k, X, x: SimpleNamespace(
         errors=SimpleNamespace(origin=off[k])))
-    assert nearest_runs(study, 1) == [0, 2]
-    assert [one.taken for one in baselines.nearby(study, "", snapshots)] == [2]
+    assert nearest_parameters(study, 1) == [0, 2]
+    (found,) = baselines.nearest_training_runs(study, "", snapshots)
+    assert found.training_run == 2
     off[2] = 4.0
-    assert [one.taken for one in baselines.nearby(study, "", snapshots)] == [0]
+    (found,) = baselines.nearest_training_runs(study, "", snapshots)
+    assert found.training_run == 0
 
 
 def test_all_runs_are_one_where_all_have_data(rng):
@@ -129,11 +131,11 @@ def test_all_runs_are_one_where_all_have_data(rng):
     for k in range(2):
         squares = Squares(X)
         squares.add(*x[k])
-        found.append(Nearby(k, 7, squares))
+        found.append(NearestRun(k, 7, squares))
     every = facts(found)
     assert every["all"] == pytest.approx(errors(X, x[:, 0], x[:, 1]))
     assert [row.split()[0] for row in lines(found)[2:]] == ["0", "1", "all"]
-    some = [found[0], Nearby(3, 2, None)]
+    some = [found[0], NearestRun(3, 2, None)]
     assert facts(some) == {"all": None, "runs": [
         every["runs"][0], {"number": 3, "training_run": 2}]}
     assert [row.split()[:3] for row in lines(some)[3:]] == [["3", "2", "no"]]

@@ -14,11 +14,12 @@ from small_studies import ended
 from mpm_ref.rom import model_file
 from mpm_ref.rom.fields.pod_fields import Sizes, spanned
 from mpm_ref.rom.study import record, reduce, summary
-from mpm_ref.rom.study.generate import options
-from mpm_ref.rom.study.nsf_case import history, whole
-from mpm_ref.rom.study.nsf_dataset import histories
-from mpm_ref.rom.study.nsf_fields import BLOCK
-from mpm_ref.rom.study.nsf_run import Plan, drawn, infer
+from mpm_ref.rom.study.dataset import load_histories, simulate_history
+from mpm_ref.rom.study.full_model import nsf_full_model
+from mpm_ref.rom.study.generate import run_options
+from mpm_ref.rom.study.reduce import BLOCK
+from mpm_ref.rom.study.run import FieldRunOptions, nsf_run
+from mpm_ref.rom.study.samples import drawn_samples
 from mpm_ref.rom.study.study import load
 from mpm_ref.rom.study.tables import NSF
 from mpm_ref.rom.symmetric import values
@@ -60,9 +61,9 @@ def test_runs_hold_what_fields_are_made_of(made, pairs):
             name: ["x", "C", "tau"] for name in ("hard", "soft")}
         assert results.manifest["parameters"] == {"v": pairs.mu[2, 0]}
         assert results.step.tolist() == list(range(0, STEPS + 1, EVERY))
-    found = histories(pairs, made / "data", (2, 0), float)
+    found = load_histories(pairs, made / "data", (2, 0), float)
     for k, number in enumerate((2, 0)):
-        full = history(pairs.scene(pairs.mu[number]), pairs.mu[number])
+        full = simulate_history(pairs.scene(pairs.mu[number]), pairs.mu[number])
         assert np.array_equal(found.X, full.X)
         assert np.array_equal(found.v[k], full.v[0])
         assert found.mu[k] == pairs.mu[number]
@@ -77,7 +78,7 @@ def test_what_is_there_is_not_made_again_and_what_was_cut_off_goes_on(made, pair
     data.mkdir()
     shutil.copy(made / "data" / "case-000.h5", data)
     run(build(pairs.scene(pairs.mu[1])), data / "case-001.h5",
-        replace(options(pairs, 1), steps=5))
+        replace(run_options(pairs, 1), steps=5))
     before = (data / "case-000.h5").stat().st_mtime_ns
     done = mpm_ref("rom", "generate", study, "--out", data, *ONE)
     assert "made 2, continued 1, 1 were there; 1 held out" in done.stdout
@@ -99,7 +100,7 @@ def test_runs_of_other_states_kept_are_not_taken(made, tmp_path):
 
 def test_fields_are_those_of_the_training_runs(made, pairs):
     model = reduce.load(made / "fields.npz", pairs)
-    data = histories(pairs, made / "data", pairs.train)
+    data = load_histories(pairs, made / "data", pairs.train)
     fields, xhat = spanned(data, Sizes(3, 5, 8, 8, smoothing=1e-6), BLOCK * 0.1)
     assert np.array_equal(model.xhat, xhat)
     assert xhat.shape == (RUNS - 1, LEVELS, 3)
@@ -136,28 +137,28 @@ def test_fields_of_a_single_run_ignore_its_parameter(tmp_path):
 
 @pytest.mark.parametrize(("way", "plan"), [
     ("points = 20", (20, 0)),
-    ('points = 9\nseed = 3\nfaster = 2.0\ninversion = "linear"', (9, 3, 2.0, "linear")),
+    ('points = 9\nseed = 3\ndt_factor = 2.0\ninversion = "linear"', (9, 3, 2.0, "linear")),
     ("", (None, 0)),
 ])
 def test_a_run_is_the_reduced_run_of_its_parameters(made, reduced, tmp_path, way, plan):
     done, out = reduced("--set", "v=1.9", study=write(tmp_path, ("points = 20", way)))
     pairs = load(made / "pairs.toml")
     assert (done.exit_code, done.stderr) == (0, "")
-    model, one = reduce.load(made / "fields.npz", pairs), whole(pairs.scene([1.9]))
+    model, one = reduce.load(made / "fields.npz", pairs), nsf_full_model(pairs.scene([1.9]))
     (count, seed, *how), n, fields = plan, len(one.X), model.field.of([1.9])
-    plan = Plan((drawn(n, count or n, seed),), *how)
-    states = list(infer(one, fields, plan, model.rest))
+    plan = FieldRunOptions((drawn_samples(n, count or n, seed),), *how)
+    states = list(nsf_run(one, fields, plan, model.rest).states())
     with Results(out) as results:
         def of_both(name, k):
             return np.concatenate([results.field(body, name, k) for body in ("hard", "soft")])
 
         assert np.array_equal(results.time, [t for t, *_ in states])
-        for k, (_, at, report) in enumerate(states):
+        for k, (_, at, report, _) in enumerate(states):
             assert np.array_equal(of_both("x", k), fields.place(np.arange(n), at.xhat))
             assert np.array_equal(of_both("tau", k), fields.stress(np.arange(n), at.xhat))
             assert np.array_equal(of_both("C", k), fields.affine(np.arange(n), at.xhat))
             assert results.h5["reduced/points"][k] == (report.points if report else 0)
-        assert np.array_equal(of_both("v", 0), one.matter.v)
+        assert np.array_equal(of_both("v", 0), one.v)
         step = (of_both("x", 4) - of_both("x", 3)) / np.diff(results.time[3:5])
         np.testing.assert_allclose(of_both("v", 4), step, rtol=1e-12, atol=1e-12)
 
@@ -202,7 +203,7 @@ def test_states_that_the_fields_have_not_learned_are_warned_of(reduced):
     assert "v = 9 lies outside the range" in outside
     assert "times as far from the training runs" in beyond
     with Results(out) as results:
-        found = summary.told(results)
+        found = summary.summary(results)
         assert found["out_of_bounds"] == np.sum(results.h5["reduced/beyond"][()] > 1.5) > 0
     assert f"{found['out_of_bounds']} of {STEPS + 1} states" in beyond
 
@@ -215,7 +216,7 @@ def test_errors_are_those_of_the_run_that_was_held_out(made, pairs, reduced, tmp
     assert done.exit_code == 0, done.output
     found, (number,) = json.loads(done.stdout), pairs.test
     assert found["runs"][0]["parameters"] == {"v": pairs.mu[number, 0]}
-    full = histories(pairs, made / "data", pairs.test, float)
+    full = load_histories(pairs, made / "data", pairs.test, float)
     _, out = reduced("--set", f"v={pairs.mu[number, 0]}")
     with Results(out) as results:
         x, tau = (np.concatenate([results.field(body, name)[EVERY::EVERY] for body in
@@ -243,14 +244,14 @@ def test_the_stress_has_a_table_of_its_own(made, tmp_path):
 def test_longer_steps_are_compared_where_they_meet_the_states_kept(made, tmp_path):
     """Of three steps of 1.5 two end between states that are two steps apart."""
     def evaluated(faster):
-        study = write(tmp_path, ("points = 20", f"points = 20\nfaster = {faster}"))
+        study = write(tmp_path, ("points = 20", f"points = 20\ndt_factor = {faster}"))
         return mpm_ref("rom", "evaluate", study, "--map", made / "fields.npz", "--data",
                        made / "data", "--out", tmp_path / "e.png", "--overwrite", "--json")
 
     error = json.loads(evaluated(1.5).stdout)["all"]["reduced"]["origin"]
     assert 0.0 < error < 0.01
-    assert_told(evaluated(1.01), 2, "faster = 1.01: expected steps of which some end at a state")
-    assert_told(evaluated(20.0), 2, "faster = 20: expected at most 16, the steps of the scene")
+    assert_told(evaluated(1.01), 2, "dt_factor = 1.01: expected steps of which some end at a")
+    assert_told(evaluated(20.0), 2, "dt_factor = 20: expected at most 16, the steps of the scene")
 
 
 def test_a_run_that_breaks_down_is_infinitely_off(made, pairs, tmp_path):
@@ -273,7 +274,7 @@ def test_a_run_that_breaks_down_is_infinitely_off(made, pairs, tmp_path):
 # info
 
 def test_info_knows_study_fields_and_results(made, pairs, reduced):
-    study, n = made / "pairs.toml", len(whole(pairs.base).X)
+    study, n = made / "pairs.toml", len(nsf_full_model(pairs.base).X)
     modes = ("modes: 5 of the displacement, 8 of the stress, 8 of the affine field; the stress "
              "sees the parameters")
     assert mpm_ref("info", study).stdout.splitlines() == [

@@ -11,10 +11,9 @@ from small_nsf_studies import modelled, write
 
 from mpm_ref.problem import Clock
 from mpm_ref.rom.study import reduce
-from mpm_ref.rom.study.evaluate import NEAREST, REDUCED, farthest
-from mpm_ref.rom.study.nsf_dataset import histories
-from mpm_ref.rom.study.nsf_evaluate import evaluate
-from mpm_ref.rom.study.nsf_run import Plan
+from mpm_ref.rom.study.dataset import load_histories
+from mpm_ref.rom.study.evaluate import NEAREST, REDUCED, evaluate, largest_length
+from mpm_ref.rom.study.run import step_count
 from mpm_ref.rom.study.study import load
 
 
@@ -27,12 +26,12 @@ def made(tmp_path_factory):
 @pytest.mark.parametrize(("faster", "steps"), [(1.0, 120), (1.5, 80), (7.0, 17), (80.0, 1),
                                                (0.1, 1200), (120.0, 1)])
 def test_no_step_ends_after_the_scene(faster, steps):
-    assert Plan((), faster).steps(Clock(0.01, steps=120)) == steps
+    assert step_count(Clock(0.01, steps=120), faster) == steps
 
 
 def test_a_run_that_goes_too_fast_has_no_errors(made, tmp_path):
     """`evaluate` says of it what `run` says, which names the length of the steps."""
-    study = write(tmp_path, ("points = 20", "points = 20\nfaster = 2.0"))
+    study = write(tmp_path, ("points = 20", "points = 20\ndt_factor = 2.0"))
     fields, v = made / "fields.npz", 200.0
     ran = mpm_ref("rom", "run", study, "--map", fields, "--set", f"v={v}", "--out",
                   tmp_path / "run.h5")
@@ -45,8 +44,8 @@ def test_a_run_that_goes_too_fast_has_no_errors(made, tmp_path):
 
 
 def test_the_farthest_point_counts():
-    assert farthest(np.array([[-3.0, -4.0], [0.0, 1.0]])) == 5.0
-    assert np.isnan(farthest(np.array([[np.nan, 0.0], [0.0, 1.0]])))
+    assert largest_length(np.array([[-3.0, -4.0], [0.0, 1.0]])) == 5.0
+    assert np.isnan(largest_length(np.array([[np.nan, 0.0], [0.0, 1.0]])))
 
 
 def test_errors_of_a_run_beyond_its_limit_are_infinite(made, tmp_path, monkeypatch):
@@ -55,7 +54,7 @@ def test_errors_of_a_run_beyond_its_limit_are_infinite(made, tmp_path, monkeypat
                "--out", tmp_path / "e.png", "--json", "--overwrite")
     good = json.loads(mpm_ref(*command).stdout)
     assert good["all"]["reduced"]["origin"] < 0.01
-    monkeypatch.setattr("mpm_ref.rom.study.evaluate.farthest", lambda u: float("nan"))
+    monkeypatch.setattr("mpm_ref.rom.study.evaluate.largest_length", lambda u: float("nan"))
     done = mpm_ref(*command)
     assert done.exit_code == 3
     found = json.loads(done.stdout)
@@ -65,11 +64,11 @@ def test_errors_of_a_run_beyond_its_limit_are_infinite(made, tmp_path, monkeypat
 
 
 def test_nearest_states_are_compared_at_the_times_of_longer_steps(made, tmp_path):
-    study = load(write(tmp_path, ("points = 20", "points = 20\nfaster = 4.0")))
-    runs = histories(study, made / "data", study.test, float)
+    study = load(write(tmp_path, ("points = 20", "points = 20\ndt_factor = 4.0")))
+    runs = load_histories(study, made / "data", study.test, float)
     (held,) = evaluate(study, reduce.load(made / "fields.npz", study), runs)
     for name in (REDUCED, NEAREST):
-        assert np.flatnonzero(np.isfinite(held.courses[name].levels)).tolist() == [0, 2, 4, 6, 8]
+        assert np.flatnonzero(np.isfinite(held.paths[name].levels)).tolist() == [0, 2, 4, 6, 8]
 
 
 def test_fields_that_were_made_otherwise_are_warned_of(made, tmp_path, monkeypatch):

@@ -10,7 +10,7 @@ from small_nsf_studies import modelled, write
 
 from mpm_ref.rom.fields.network import Networks, learned
 from mpm_ref.rom.study import reduce
-from mpm_ref.rom.study.nsf_dataset import histories
+from mpm_ref.rom.study.dataset import load_histories
 from mpm_ref.rom.study.study import load
 from mpm_ref.store.results import Results
 
@@ -42,7 +42,7 @@ def study(made):
 
 
 def test_networks_are_those_of_the_three_stages(made, study):
-    data = histories(study, made / "data", study.train)
+    data = load_histories(study, made / "data", study.train)
     plan = settings.stage_plan(study.tables.map.settings, 2)
     own = stages.train_stages(plan, data)
     model = reduce.load(made / "nets.npz", study)
@@ -71,7 +71,7 @@ def test_latent_coordinates_of_modes_are_in_one_unit_and_can_be_trained(made, st
     """Positions alone are known: no norm of the loss with gradients."""
     plan = settings.stage_plan({**study.tables.map.settings, "latent": "modes"}, 2)
     assert plan.g.latent == "directions"
-    data = histories(study, made / "data", study.train)
+    data = load_histories(study, made / "data", study.train)
     found = stages.train_decoder(replace(plan.g, epochs=1), stages.position_snapshots(data))
     assert found.xhat.shape == (*data.x.shape[:2], 3)
 
@@ -85,7 +85,7 @@ def test_a_run_is_one_on_the_networks(made, study, tmp_path):
     with Results(out) as results:
         X = np.concatenate([results.field(body, "x", 0) for body in ("hard", "soft")])
         xhat, mu = results.h5["reduced/xhat"][0], [1.9]
-        rest = histories(study, made / "data", (0,), float).X
+        rest = load_histories(study, made / "data", (0,), float).X
         fields = learned(rest, model.field, mu, 0.3)
         tau = np.concatenate([results.field(body, "tau", 0) for body in ("hard", "soft")])
         assert np.array_equal(X, fields.place(np.arange(len(X)), xhat))

@@ -37,17 +37,17 @@ def reduced(made, out, *options, study="pairs.toml"):
     (('kind = "modes"', 'kind = "network"'), 'map.C: given, but the kind is "network"'),
     (("r = 3", "r = 3\nbeta = [8, 8, 8]"), 'map.beta: given, but the kind is "modes"'),
     (("smoothing = 1e-6", "smoothing = -1.0"), "smoothing"),
-    (("points = 20", "weighed = true"), "weighed = true: expected `points` beside it"),
-    (("points = 20", "points = 20\ncells = 5"), "cells = 5: samples are points of so many cells"),
-    (("points = 20", "cells = 5\nweighed = true"), "neither `points` nor `weighed`"),
-    (("points = 20", "points = 20\nweighed = true\ncells = 5"), "neither `points` nor `weighed`"),
+    (("points = 20", "weighted = true"), "weighted = true: expected `points` beside it"),
+    (("points = 20", "points = 20\ncells = 5"), "cells = 5: samples are points of this many cells"),
+    (("points = 20", "cells = 5\nweighted = true"), "neither `points` nor `weighted`"),
+    (("points = 20", "points = 20\nweighted = true\ncells = 5"), "neither `points` nor `weighted`"),
     (("points = 20", "cells = 0"), "cells"),
     (("points = 20", 'inversion = "newton"'), "inversion = 'newton': expected one of"),
     (("points = 20", 'samples = "kept"'), "run.samples: unknown key"),
-    (("points = 20", "faster = 0.0"), "faster"),
-    (("points = 20", "faster = 16.5"), "run.faster = 16.5: expected at most 16, the steps of the"),
+    (("points = 20", "dt_factor = 0.0"), "dt_factor"),
+    (("points = 20", "dt_factor = 16.5"), "run.dt_factor = 16.5: expected at most 16, the steps"),
     (("smoothing = 1e-6", "weights = 1.0"), "map.weights: unknown key; did you mean `weight`?"),
-    (("points = 20", "faster = 1e-9"), "run.faster = 1e-09: expected a number >= 0.01"),
+    (("points = 20", "dt_factor = 1e-9"), "run.dt_factor = 1e-09: expected a number >= 0.01"),
     (('kind = "modes"\nr = 3\nmodes = 5\ntau = 8\nC = 8\nsmoothing = 1e-6',
       'kind = "network"\nr = 3\noctaves = 100000'), "octaves"),
     (('kind = "modes"\nr = 3\nmodes = 5\ntau = 8\nC = 8\nsmoothing = 1e-6',
@@ -81,14 +81,14 @@ def test_scenes_that_reduced_runs_do_not_know_are_refused_before_any_run(
 @pytest.mark.parametrize(("edit", "words"), [
     (("points = 20", "points = 1"), "points = 1: expected 2 .. "),
     (("points = 20", "points = 999"), "points = 999: expected 2 .. "),
-    (("points = 20", "faster = 99.0"), "faster = 99: expected at most 16"),
-    (("points = 20", "points = 20\nfaster = 20.0"), "faster = 20: expected at most 16"),
+    (("points = 20", "dt_factor = 99.0"), "dt_factor = 99: expected at most 16"),
+    (("points = 20", "points = 20\ndt_factor = 20.0"), "dt_factor = 20: expected at most 16"),
     (("to = 2.4", "to = 2.5"), "is a map of another study"),
 ])
 def test_what_a_run_cannot_be_made_with_is_refused(made, tmp_path, edit, words):
     study = write(tmp_path, edit)
     assert_told(reduced(made, tmp_path / "run.h5", study=study), 2, words)
-    if "points" in words or "faster" in words:      # known before data are made
+    if "points" in words or "dt_factor" in words:      # known before data are made
         for command in (("info",), ("rom", "generate")):
             assert_told(mpm_ref(*command, study), 2, words)
         assert not (tmp_path / "pairs-data").exists()

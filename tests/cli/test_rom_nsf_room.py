@@ -5,7 +5,7 @@ import pytest
 from command_line import assert_told, mpm_ref
 from small_nsf_studies import modelled
 
-from mpm_ref.rom.study import nsf_dataset
+from mpm_ref.rom.study import dataset
 from mpm_ref.rom.study.study import load
 from mpm_ref.store import memmap
 
@@ -21,7 +21,7 @@ def test_snapshots_without_room_end_the_command(made, tmp_path, monkeypatch, com
     def full(*_):
         raise OSError("no file for 9 GiB of snapshots")
 
-    monkeypatch.setattr(nsf_dataset, "empty", full)
+    monkeypatch.setattr(dataset, "empty", full)
     given = ("--map", made / "fields.npz") if command == "evaluate" else ()
     done = mpm_ref("rom", command, made / "pairs.toml", "--data", made / "data", *given, "--out",
                    tmp_path / ("e.png" if given else "e.npz"))
@@ -31,9 +31,9 @@ def test_snapshots_without_room_end_the_command(made, tmp_path, monkeypatch, com
 
 def test_snapshots_may_lie_in_files(made, monkeypatch):
     pairs = load(made / "pairs.toml")
-    known = nsf_dataset.histories(pairs, made / "data", pairs.train)
+    known = dataset.load_histories(pairs, made / "data", pairs.train)
     monkeypatch.setattr(memmap, "LARGEST", 0)
-    far = nsf_dataset.histories(pairs, made / "data", pairs.train)
+    far = dataset.load_histories(pairs, made / "data", pairs.train)
     for name in ("x", "tau", "C"):
         assert isinstance(getattr(far, name).base, np.memmap)
         assert np.array_equal(getattr(far, name), getattr(known, name))

@@ -10,9 +10,9 @@ from small_studies import CURVED, STEPS, ended, modelled, write
 
 from mpm_ref.rom import model_file
 from mpm_ref.rom.study import reduce, summary
-from mpm_ref.rom.study.case import case
-from mpm_ref.rom.study.record import COUNTS, NUMBERS, VECTORS
-from mpm_ref.rom.study.run import Way, march
+from mpm_ref.rom.study.full_model import ldm_full_model
+from mpm_ref.rom.study.record import LDM_SERIES
+from mpm_ref.rom.study.run import RunOptions, ldm_run
 from mpm_ref.rom.study.study import load
 from mpm_ref.scene import dumps
 from mpm_ref.store.results import Results
@@ -39,12 +39,12 @@ def test_a_run_is_the_reduced_run_of_its_parameters(made, reduced):
     assert done.exit_code == 0, done.output
     assert done.stderr == ""
     bars = load(made / "bars.toml")
-    model, one = reduce.load(made / "map.npz", bars), case(bars.scene([2.5]))
-    states = list(march(one, model.field, Way(), model.rest))
+    model, one = reduce.load(made / "map.npz", bars), ldm_full_model(bars.scene([2.5]))
+    states = list(ldm_run(one, model.field, RunOptions(), model.rest).states())
     with Results(out) as results:
         assert len(results) == STEPS + 1
         assert results.manifest["reduced"]["parameters"] == {"g": 2.5}
-        for k, (latent, report) in enumerate(states):
+        for k, (_, latent, report, _) in enumerate(states):
             x, F, _ = model.field.derivatives(one.X, latent.xhat)
             np.testing.assert_allclose(results.field("bar", "x", k), x, rtol=1e-12)
             np.testing.assert_allclose(results.field("bar", "F", k), F, atol=1e-12)
@@ -60,7 +60,7 @@ def test_what_is_known_of_each_state_is_stored_with_units(reduced):
     _, out = reduced("--set", "g=2.5")
     with h5py.File(out) as h5:
         group = h5["reduced"]
-        assert set(group) == {*VECTORS, *COUNTS, *NUMBERS}
+        assert set(group) == {name for names in LDM_SERIES for name in names}
         assert {len(series) for series in group.values()} == {STEPS + 1}
         assert group["vhat"].attrs["unit"] == "1/s"
         assert set(group["rank"][1:]) == {3}
@@ -101,7 +101,7 @@ def test_a_run_beyond_the_training_is_warned_of(reduced):
     outside, beyond = done.stderr.splitlines()
     assert outside.startswith("mpm-ref: warning: g = 9 lies outside the range")
     with Results(out) as results:
-        found = summary.told(results)
+        found = summary.summary(results)
         t = results.time[STEPS + 1 - found["out_of_bounds"]]
     assert f"{found['out_of_bounds']} of {STEPS + 1} states, from t = {t:g} s on" in beyond
     said = (f"reduced: bars, modes r = 3, g = 9; a step has {found['mean_samples']:.4g} samples "
@@ -147,7 +147,7 @@ def test_a_run_is_told_to_machines_too(made, reduced):
     assert found["reduced"]["map"] == {"kind": "modes", "r": 3}
     assert "beyond" in found["out_of_bounds"][str(STEPS)]
     with Results(out) as results:
-        assert summary.told(results)["out_of_bounds"] == len(found["out_of_bounds"])
+        assert summary.summary(results)["out_of_bounds"] == len(found["out_of_bounds"])
 
 
 def test_a_curved_map_runs_and_is_evaluated(made, reduced, tmp_path):

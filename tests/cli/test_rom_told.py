@@ -10,10 +10,11 @@ from small_studies import modelled, write
 
 from mpm_ref.cli import rom
 from mpm_ref.cli.rom import astray
-from mpm_ref.rom.study import summary
-from mpm_ref.rom.study.watch import Sight
+from mpm_ref.rom.study import monitor, summary
+from mpm_ref.rom.study.monitor import StateCheck
 
-WELL = Sight(beyond=0.3, off=0.01, seen=0.9, blind=0, lost=0.0, J=0.8, inverted=0.0, far=0.9)
+WELL = StateCheck(beyond=0.3, off=0.01, coverage=0.9, blind=0, lost=0.0, J=0.8, inverted=0.0,
+                  far=0.9)
 
 
 @pytest.fixture(scope="module")
@@ -26,8 +27,9 @@ def test_a_run_without_a_step_has_no_means():
     found = {"study": "ab", "name": "bars", "map": {"kind": "modes", "r": 3},
              "parameters": {"g": 2.0}, "states": 1, "out_of_bounds": 0, "mean_samples": None,
              "mean_points": None}
-    assert summary.line(found) == "reduced: bars, modes r = 3, g = 2; 0 of 1 states out of bounds"
-    some = summary.line(found | {"mean_samples": 20.0, "mean_points": 101.25})
+    assert summary.summary_line(found) == (
+        "reduced: bars, modes r = 3, g = 2; 0 of 1 states out of bounds")
+    some = summary.summary_line(found | {"mean_samples": 20.0, "mean_points": 101.25})
     assert "g = 2; a step has 20 samples and 101.2 integration points on average; 0 of 1" in some
 
 
@@ -42,14 +44,14 @@ def test_states_out_of_bounds_are_counted_and_the_first_is_told():
 
 
 def test_each_bound_that_is_stored_is_counted():
-    rows = {"beyond": [0.1] * 7, "off": [0.0] * 7, "seen": [1.0] * 7, "lost": [0] * 7,
+    rows = {"beyond": [0.1] * 7, "off": [0.0] * 7, "coverage": [1.0] * 7, "lost": [0] * 7,
             "points": [0, *[30] * 6], "rank": [0, *[2] * 6], "xhat": np.zeros((7, 2)),
             "inverted": [0.0] * 7}
-    changes = {"beyond": 9.0, "off": 1.0, "seen": 0.1, "lost": 10, "rank": 1, "inverted": 0.5}
+    changes = {"beyond": 9.0, "off": 1.0, "coverage": 0.1, "lost": 10, "rank": 1, "inverted": 0.5}
     for k, (name, value) in enumerate(changes.items(), 1):
         rows[name][k] = value
-    assert [summary.sight(rows, k).why for k in range(7)] == [
-        (), ("beyond",), ("off",), ("seen",), ("lost",), ("blind",), ("inverted",)]
+    assert [monitor.stored_check(rows, k).out_of_bounds for k in range(7)] == [
+        (), ("beyond",), ("off",), ("coverage",), ("lost",), ("blind",), ("inverted",)]
 
 
 @pytest.mark.parametrize(("edit", "asked"), [

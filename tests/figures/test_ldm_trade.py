@@ -10,9 +10,10 @@ from figures.trade import ldm, ldm_cost
 
 mpl.use("Agg")
 USUAL = {"quadrature": "eulerian", "projection": "linear", "points": 50, "velocity": "previous",
-         "per_cell": 2, "samples": "redrawn", "close": 1e-9, "precision": "double", "wall": 0.2,
+         "per_cell": 2, "samples": "redrawn", "preimage_tolerance": 1e-9,
+         "precision": "double", "wall": 0.2,
          "origin": 0.002, "pareto": 0}
-CHEAP = {"velocity": "transported", "close": 0.01}
+CHEAP = {"velocity": "transported", "preimage_tolerance": 0.01}
 WAYS = [{}, {"points": 100, "wall": 0.4, "origin": 0.001, "pareto": 1}, {"points": 10, "wall": 0.1},
         {"projection": "nonlinear", "wall": 0.3}, {**CHEAP, "points": 25, "wall": 0.06},
         {**CHEAP, "points": 10, "wall": 0.05, "origin": 0.004, "pareto": 1},

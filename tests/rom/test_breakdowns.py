@@ -10,10 +10,17 @@ import pytest
 from mpm_ref.core.grid import OutOfRange
 from mpm_ref.rom.kinematics import NoBody, guesses
 from mpm_ref.rom.study import record
-from mpm_ref.rom.study.case import case
-from mpm_ref.rom.study.evaluate import NEAREST, REDUCED, Held, breakdowns, course
-from mpm_ref.rom.study.run import Way
-from mpm_ref.rom.study.watch import watch, watched
+from mpm_ref.rom.study.evaluate import (
+    NEAREST,
+    REDUCED,
+    HeldOutRun,
+    ReferenceRun,
+    breakdown_warnings,
+    path_errors,
+)
+from mpm_ref.rom.study.full_model import ldm_full_model
+from mpm_ref.rom.study.monitor import checked_states, map_monitor
+from mpm_ref.rom.study.run import RunOptions, ldm_run
 from validation.common.scenes import with_
 from validation.extremes import ldm_runs
 from validation.ldm import reduced_runs
@@ -32,18 +39,32 @@ def broken(fault, *states):
 
 @pytest.fixture(scope="module")
 def one():
-    return case(with_(GRAVITY.scene(5.0), steps=2))
+    return ldm_full_model(with_(GRAVITY.scene(5.0), steps=2))
 
 
 # each place where runs are made: a function of what the run raises -> the sentence, or what stands
 # for it
 
-def of_course(one, monkeypatch, fault):
-    return course(X, np.stack(3 * [X + 2.0]), broken(fault, X + 1.0)).said
+class Shifted:
+    """A field whose latent coordinates are shifts of all points."""
+
+    def place(self, points, xhat):
+        return points + xhat
+
+
+def compared(shifts, levels=3):
+    """`PathErrors` of states that are shifted, of a body that is shifted by 2."""
+    reference = ReferenceRun(X, np.stack(levels * [X + 2.0]), None)
+    return path_errors(Shifted(), reference, enumerate(shifts), X)
+
+
+def of_path(one, monkeypatch, fault):
+    return compared(broken(fault, 1.0)).breakdown
 
 
 def of_compared(one, monkeypatch, fault):
-    monkeypatch.setattr(reduced_runs, "march", lambda *_: broken(fault))
+    monkeypatch.setattr(reduced_runs, "ldm_run",
+                        lambda *_: SimpleNamespace(states=lambda: broken(fault)))
     return reduced_runs.compared([one], [one.X[None]], None, None, None).origin == np.inf
 
 
@@ -55,22 +76,23 @@ def of_race(one, monkeypatch, fault):
 
 
 def of_record(one, monkeypatch, fault):
-    monkeypatch.setattr(record, "watched", lambda *_: broken(fault))
-    recording = record.Recording(one, SimpleNamespace(rest=None), SimpleNamespace(way=None, seed=0),
-                                 watch=None, field=None, problem=one.problem, facts={})
-    with pytest.raises(record.Lost, match="broke down in step 0: ") as lost:
-        list(record.steps(recording))
+    monkeypatch.setattr(record, "checked_states", lambda *_: broken(fault))
+    recording = record.Recording(None, None, None, one.problem, SimpleNamespace(seed=0), {},
+                                 record.LDM_SERIES, None)
+    with pytest.raises(record.BrokenRun, match="broke down in step 0: ") as lost:
+        list(record.shown_states(recording))
     return str(lost.value)
 
 
 def of_extremes(one, monkeypatch, fault):
-    net, way = ldm_runs.learned("gravity-r4"), Way(points=20)
-    start = next(watched(watch(one, net.map, net.xhat), one, way, net.rest))
-    monkeypatch.setattr(ldm_runs, "watched", lambda *_, **__: broken(fault, start))
+    net, way = ldm_runs.learned("gravity-r4"), RunOptions(points=20)
+    run = ldm_run(one, net.map, way, net.rest)
+    start = next(checked_states(run, map_monitor(one, net.map, net.xhat)))
+    monkeypatch.setattr(ldm_runs, "checked_states", lambda *_, **__: broken(fault, start))
     return ldm_runs.ended(one, [one.X], net, way).said
 
 
-PLACES = [of_course, of_compared, of_race, of_record, of_extremes]
+PLACES = [of_path, of_compared, of_race, of_record, of_extremes]
 
 
 @pytest.mark.parametrize("place", PLACES)
@@ -88,33 +110,32 @@ def test_a_mistake_does_not_pass_for_a_breakdown(one, monkeypatch, place):
 
 
 def test_states_and_levels_of_different_numbers_are_a_mistake():
-    with pytest.raises(ValueError, match="zip"):
-        course(X, np.stack(3 * [X + 2.0]), [X + 1.0, X + 1.0])
+    with pytest.raises(ValueError, match="2 states compared with 3 time levels: expected as many"):
+        compared([1.0, 1.0])
 
 
-def test_a_course_that_broke_down_is_infinitely_off_and_says_when_and_why():
-    found = course(X, np.stack(3 * [X + 2.0]), broken(NoBody("no\n  body"), X + 1.0))
-    assert found.said == "step 1: no body"
+def test_a_path_that_broke_down_is_infinitely_off_and_says_when_and_why():
+    found = compared(broken(NoBody("no\n  body"), 1.0))
+    assert found.breakdown == "step 1: no body"
     assert np.isinf([*found.errors, *found.sums]).all()
-    assert len(found.levels) == 1
-    sound = course(X, np.stack(3 * [X + 2.0]), 3 * [X + 1.0])
-    assert sound.said == ""
+    assert np.isfinite(found.levels).tolist() == [True, False, False]
+    sound = compared(3 * [1.0])
+    assert sound.breakdown == ""
     assert np.isfinite(sound.errors).all()
 
 
 @pytest.mark.parametrize("far", [np.nan, np.inf, 1e200])
 def test_positions_that_are_no_numbers_are_a_breakdown(far):
     with np.errstate(all="ignore"):
-        found = course(X, np.stack(3 * [X + 2.0]), [X, X + far, X])
-    assert found.said == "step 1: the positions, or their squares, are not finite"
+        found = compared([0.0, far, 0.0])
+    assert found.breakdown == "step 1: the positions, or their squares, are not finite"
 
 
 def test_a_breakdown_is_told_with_the_parameters_of_its_run():
-    good, bad = (course(X, np.stack([X + 2.0]), states)
-                 for states in ([X], broken(NoBody("no body"))))
-    found = [Held(2, np.array([3.0, 0.5]), {REDUCED: good, NEAREST: good}),
-             Held(7, np.array([4.0, 0.5]), {REDUCED: bad, NEAREST: good})]
-    said = list(breakdowns(SimpleNamespace(names=("g", "E")), found))
+    good, bad = (compared(states, 1) for states in ([0.0], broken(NoBody("no body"))))
+    found = [HeldOutRun(2, np.array([3.0, 0.5]), {REDUCED: good, NEAREST: good}),
+             HeldOutRun(7, np.array([4.0, 0.5]), {REDUCED: bad, NEAREST: good})]
+    said = list(breakdown_warnings(SimpleNamespace(names=("g", "E")), found))
     assert said == ["run 7 (g = 4, E = 0.5): the reduced run broke down in step 0: no body"]
 
 

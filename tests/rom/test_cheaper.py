@@ -1,5 +1,6 @@
 """Quadrature points of another sampling, and samples that are kept or chosen."""
 
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
@@ -7,18 +8,17 @@ import pytest
 from rom_toys import cloud
 
 from mpm_ref.materials.fixed_corotated import FixedCorotated
-from mpm_ref.problem import Clock
 from mpm_ref.rom.fields.affine import Affine
-from mpm_ref.rom.latent import start_state
-from mpm_ref.rom.model_file import Model
+from mpm_ref.rom.latent import Latent, start_state
 from mpm_ref.rom.quadrature.lagrangian import Resampled, lagrangian
 from mpm_ref.rom.sampling import PER_GROUP, pivoted
 from mpm_ref.rom.step import ldm_stepper
-from mpm_ref.rom.study import run as marching
-from mpm_ref.rom.study.case import case, distance
-from mpm_ref.rom.study.model import require_way
-from mpm_ref.rom.study.run import Way, groups, march, model, picked, stepped
-from mpm_ref.rom.study.tables import Run
+from mpm_ref.rom.study import samples as choice
+from mpm_ref.rom.study.full_model import ldm_full_model, signed_distance
+from mpm_ref.rom.study.methods import ldm_reduced_run
+from mpm_ref.rom.study.run import ReducedRun, RunOptions, ldm_model, ldm_run
+from mpm_ref.rom.study.samples import SampleSet, boundary_groups, ldm_sampler
+from mpm_ref.rom.study.tables import MapRunTable
 from mpm_ref.scene import Box, Cylinder, Difference, Union
 from validation.common.scenes import with_
 from validation.ldm.networks import trained
@@ -30,7 +30,7 @@ DX = 0.11
 @pytest.fixture(scope="module")
 def torsion():
     """The block, pulled and twisted, four steps."""
-    return case(with_(TORSION.scene(0.3, 1.0), steps=4))
+    return ldm_full_model(with_(TORSION.scene(0.3, 1.0), steps=4))
 
 
 def test_another_sampling_that_is_the_same_gives_the_same_cloud(d, rng):
@@ -54,7 +54,7 @@ def test_its_points_are_as_many_however_many_material_points_there_are(d, rng):
 
 
 def test_another_sampling_has_the_body_s_mass(torsion):
-    quadrature = model(torsion, Affine(3), Way("resampled", per_cell=3)).quadrature
+    quadrature = ldm_model(torsion, Affine(3), RunOptions("resampled", per_cell=3)).quadrature
     assert quadrature.other.m.sum() == pytest.approx(torsion.m.sum(), rel=1e-12)
     assert len(quadrature.other.X) != len(torsion.X)
 
@@ -75,13 +75,13 @@ def test_nodes_beyond_the_other_sampling_move_with_the_samples(d):
 def test_a_run_with_another_sampling_is_near_the_one_with_material_points():
     """They differ by their quadrature alone; one point to a cell is too few."""
     trained_map = trained("gravity-r4")
-    map, one = trained_map.field, case(with_(GRAVITY.scene(5.0), steps=10))
+    map, one = trained_map.field, ldm_full_model(with_(GRAVITY.scene(5.0), steps=10))
     def end(way):
-        *_, (latent, _) = march(one, map, way, trained_map.rest)
-        return map.place(one.X, latent.xhat) - one.X
+        *_, last = ldm_run(one, map, way, trained_map.rest).states()
+        return map.place(one.X, last.latent.xhat) - one.X
 
-    material = end(Way())
-    off = [np.linalg.norm(end(Way("resampled", per_cell=k)) - material) for k in (1, 2)]
+    material = end(RunOptions())
+    off = [np.linalg.norm(end(RunOptions("resampled", per_cell=k)) - material) for k in (1, 2)]
     size = np.linalg.norm(material)
     assert 0.0 < off[1] < 0.1 * size
     assert off[0] > 3.0 * off[1]
@@ -89,35 +89,35 @@ def test_a_run_with_another_sampling_is_near_the_one_with_material_points():
 
 def test_single_precision_and_near_preimages_change_little():
     """Far less than the displacement, and not nothing."""
-    model, one = trained("gravity-r4"), case(with_(GRAVITY.scene(5.0), steps=6))
-    paper = Way("eulerian", points=30)
+    model, one = trained("gravity-r4"), ldm_full_model(with_(GRAVITY.scene(5.0), steps=6))
+    paper = RunOptions("eulerian", points=30)
     def end(**how):
-        *_, (latent, _) = march(one, model.field, paper._replace(**how), model.rest)
-        return model.field.place(one.X, latent.xhat) - one.X
+        *_, last = ldm_run(one, model.field, paper._replace(**how), model.rest).states()
+        return model.field.place(one.X, last.latent.xhat) - one.X
 
-    exact, near, single = (end(**how) for how in ({}, {"close": 1e-2},
-                                                  {"close": 1e-2, "precision": "single"}))
+    exact, near, single = (end(**how) for how in (
+        {}, {"preimage_tolerance": 1e-2}, {"preimage_tolerance": 1e-2, "precision": "single"}))
     size = np.linalg.norm(exact)
     assert 0.0 < np.linalg.norm(near - exact) < 1e-2 * size
     assert 0.0 < np.linalg.norm(single - near) < 1e-4 * size
 
 
 @pytest.mark.parametrize(("way", "said"), [
-    (Way(precision="half"), r"precision = 'half': expected double or single"),
-    (Way(precision="single"), r"learned maps alone have it, this is one of Affine"),
-    (Way("eulerian", precision="single"), r"learned maps alone have it"),
+    (RunOptions(precision="half"), r"precision = 'half': expected double or single"),
+    (RunOptions(precision="single"), r"learned maps alone have it, this is one of Affine"),
+    (RunOptions("eulerian", precision="single"), r"learned maps alone have it"),
 ])
 def test_precision_that_there_is_not(torsion, way, said):
     with pytest.raises(ValueError, match=said):
-        model(torsion, Affine(3), way)
+        ldm_model(torsion, Affine(3), way)
 
 
 def test_preimages_nearer_than_single_precision_tells_are_refused(torsion):
     map = trained("gravity-r4").field
-    with pytest.raises(ValueError, match=r"close = 1e-09 dx in single precision: expected at leas"):
-        model(torsion, map, Way("eulerian", precision="single"))
-    assert model(torsion, map, Way(precision="single")).field.g.net.W.dtype == np.float32
-    assert model(torsion, map, Way()).field.g is map
+    with pytest.raises(ValueError, match="preimage_tolerance = 1e-09 dx in single precision:"):
+        ldm_model(torsion, map, RunOptions("eulerian", precision="single"))
+    assert ldm_model(torsion, map, RunOptions(precision="single")).field.g.net.W.dtype == np.float32
+    assert ldm_model(torsion, map, RunOptions()).field.g is map
 
 
 def test_pivots_are_the_rows_that_tell_the_coordinates(rng):
@@ -152,11 +152,11 @@ def test_chosen_samples_are_better_conditioned_than_drawn_ones(rng):
 @pytest.mark.parametrize("how", ["kept", "pivoted"])
 def test_samples_that_are_kept_stay_and_hold_the_boundaries(torsion, how):
     map = Affine(3)
-    pick = picked(torsion, map, Way(points=20, samples=how), map.rest, 3)
-    assert np.array_equal(pick(0.0), pick(0.01))
-    assert len(set(pick(0.0).tolist())) == 20
-    for near in torsion.near:
-        assert np.isin(pick(0.0), near).sum() >= PER_GROUP
+    pick = ldm_sampler(torsion, map, RunOptions(points=20, samples=how), map.rest, 3)
+    assert np.array_equal(pick(0.0, None).points, pick(0.01, None).points)
+    assert len(set(pick(0.0, None).points.tolist())) == 20
+    for near in torsion.boundary_points:
+        assert np.isin(pick(0.0, None).points, near).sum() >= PER_GROUP
 
 
 class Bulge(NamedTuple):
@@ -172,19 +172,21 @@ class Bulge(NamedTuple):
 def test_samples_are_pivoted_where_the_body_starts_and_hold_the_boundaries_beside(torsion, share):
     low, high = torsion.X[:, 2].min(), torsion.X[:, 2].max()
     height = low + share * (high - low)
-    pick = picked(torsion, Bulge(), Way(points=20, samples="pivoted"), np.full(3, height), 3)
-    chosen = pick(0.0)
-    held = sum(np.isin(chosen, near).sum() for near in torsion.near)
+    pick = ldm_sampler(torsion, Bulge(), RunOptions(points=20, samples="pivoted"),
+                       np.full(3, height), 3)
+    chosen = pick(0.0, None).points
+    held = sum(np.isin(chosen, near).sum() for near in torsion.boundary_points)
     close = abs(torsion.X[chosen, 2] - height) < 0.1 * (high - low)
     assert len(chosen) == 20
-    assert held == len(torsion.near) * PER_GROUP == 20 - close.sum()
+    assert held == len(torsion.boundary_points) * PER_GROUP == 20 - close.sum()
 
 
 def test_points_that_two_regions_hold_are_counted_once(torsion):
-    both = torsion._replace(near=2 * (torsion.near[0][:PER_GROUP],))
-    chosen = picked(both, Affine(3), Way(points=20, samples="pivoted"), Affine(3).rest, 3)(0.0)
+    both = torsion._replace(boundary_points=2 * (torsion.boundary_points[0][:PER_GROUP],))
+    chosen = ldm_sampler(both, Affine(3), RunOptions(points=20, samples="pivoted"), Affine(3).rest,
+                         3)(0.0, None).points
     assert len(set(chosen.tolist())) == len(chosen) == 20
-    assert np.isin(both.near[0], chosen).all()
+    assert np.isin(both.boundary_points[0], chosen).all()
 
 
 @pytest.mark.parametrize("how", ["redrawn", "kept", "pivoted"])
@@ -194,64 +196,80 @@ def test_points_that_two_regions_hold_are_counted_once(torsion):
 ])
 def test_samples_that_do_not_suffice_are_refused_however_they_are_chosen(
         torsion, how, points, said, monkeypatch):
-    monkeypatch.setattr(marching, "ENOUGH", 10**7)
+    monkeypatch.setattr(choice, "ENOUGH", 10**7)
     with pytest.raises(ValueError, match=said):
-        picked(torsion, Affine(3), Way(points=points, samples=how), Affine(3).rest, 3)(0.0)
+        ldm_sampler(torsion, Affine(3), RunOptions(points=points, samples=how), Affine(3).rest,
+                    3)(0.0, None)
+
+
+def study_of(options):
+    return SimpleNamespace(tables=SimpleNamespace(run=MapRunTable(**options._asdict())))
 
 
 @pytest.mark.parametrize(("points", "count"), [(20, 20), (None, 1757)])
 def test_no_more_are_pivoted_than_are_looked_at(torsion, points, count, monkeypatch):
     """Nor are fewer given than were asked for; the command says so before a run."""
-    way, map = Way(points=points, samples="pivoted"), Affine(3)
-    monkeypatch.setattr(marching, "ENOUGH", 19)
-    for ask in (lambda: picked(torsion, map, way, map.rest, 3),
-                lambda: require_way(torsion, Model(map, None, None, {}), Run(**way._asdict()))):
+    way, map = RunOptions(points=points, samples="pivoted"), Affine(3)
+    monkeypatch.setattr(choice, "ENOUGH", 19)
+    for ask in (lambda: ldm_sampler(torsion, map, way, map.rest, 3),
+                lambda: ldm_reduced_run(study_of(way), torsion, map, map.rest)):
         with pytest.raises(ValueError, match=f"{count} samples that are pivoted: .* at most 19;"):
             ask()
-    monkeypatch.setattr(marching, "ENOUGH", count)
-    assert len(picked(torsion, map, way._replace(points=20), map.rest, 3)(0.0)) == 20
+    monkeypatch.setattr(choice, "ENOUGH", count)
+    sampler = ldm_sampler(torsion, map, way._replace(points=20), map.rest, 3)
+    assert len(sampler(0.0, None).points) == 20
 
 
 def test_samples_of_a_region_are_forced_while_it_holds():
     """The patch that pokes lets go at 0.25 s; few points are near it."""
-    one, map = case(POKES.scene(0.0)), Affine(3)
-    pick = picked(one, map, Way(points=20), map.rest, 3)
-    patch = one.held(0.0)[1]
-    early, late = ([np.isin(pick(t), patch).sum() for _ in range(5)] for t in (0.0, 1.0))
+    one, map = ldm_full_model(POKES.scene(0.0)), Affine(3)
+    pick = ldm_sampler(one, map, RunOptions(points=20), map.rest, 3)
+    patch = one.constrained_points(0.0)[1]
+    early, late = ([np.isin(pick(t, None).points, patch).sum() for _ in range(5)]
+                   for t in (0.0, 1.0))
     assert min(early) >= PER_GROUP
     assert min(late) < PER_GROUP
 
 
 def test_samples_that_are_redrawn_change(torsion):
     map = Affine(3)
-    pick = picked(torsion, map, Way(points=20), map.rest, 3)
-    assert not np.array_equal(pick(0.0), pick(0.0))
+    pick = ldm_sampler(torsion, map, RunOptions(points=20), map.rest, 3)
+    assert not np.array_equal(pick(0.0, None).points, pick(0.0, None).points)
 
 
-@pytest.mark.parametrize(("way", "said"), [(Way("lagrange"), "quadrature = 'lagrange'"),
-                                           (Way(points=20, samples="best"), "samples = 'best'")])
+@pytest.mark.parametrize(("way", "said"), [(RunOptions("lagrange"), "quadrature = 'lagrange'"),
+                                           (RunOptions(points=20, samples="best"),
+                                            "samples = 'best'")])
 def test_ways_that_there_are_not_are_refused(torsion, way, said):
     with pytest.raises(ValueError, match=said):
-        next(march(torsion, Affine(3), way, Affine(3).rest))
+        next(ldm_run(torsion, Affine(3), way, Affine(3).rest).states())
 
 
 def test_distances_from_shapes_made_of_others():
     ball = Cylinder(start=(0.0, 0.0, 0.0), end=(0.0, 0.0, 2.0), radius=1.0)
     box = Box(lower=(0.0, -1.0, 0.0), upper=(3.0, 1.0, 2.0))
     X = np.array([[0.5, 0.0, 1.0], [2.5, 0.0, 1.0], [-0.5, 0.0, 1.0], [-2.0, 0.0, 1.0]])
-    assert distance(X, Union(shapes=(ball, box))) == pytest.approx([-0.5, -0.5, -0.5, 1.0])
-    assert distance(X, Difference(shape=ball, minus=(box,))) == pytest.approx([0.5, 1.5, -0.5, 1.0])
+    assert signed_distance(X, Union(shapes=(ball, box))) == pytest.approx([-0.5, -0.5, -0.5, 1.0])
+    assert signed_distance(X, Difference(shape=ball, minus=(box,))) == pytest.approx([0.5, 1.5,
+                                                                                      -0.5, 1.0])
 
 
 @pytest.mark.parametrize(("points", "bound"), [(None, 0), (9, 0), (19, 0), (20, 2), (50, 2)])
 def test_boundaries_take_at_most_half_of_the_samples(torsion, points, bound):
-    assert len(groups(torsion, Way(points=points), 0.0)) == bound
+    assert len(boundary_groups(torsion, RunOptions(points=points), 0.0)) == bound
 
 
 def test_every_step_is_told_its_time_and_goes_on_from_the_last():
-    class Counted:
-        def step(self, latent, samples, t, dt):
-            return latent + 1, (latent, samples, t, dt)
+    run = ReducedRun(CountedLatents(), None, lambda xhat: SampleSet, 0.25, 3)
+    first = (Latent(0), None)
+    start, *states = run.states([first])
+    assert start == (0.0, *first, None)
+    assert [(state.t, state.latent.xhat, state.report) for state in states] == [
+        (0.25 * (k + 1), k + 1, (k, k, 0.25 * k, 0.25, None)) for k in range(3)]
 
-    states = stepped(Counted(), Clock(dt=0.25, steps=3), 0, lambda t, latent: (t, latent))
-    assert list(states) == [(k + 1, (k, (0.25 * k, k), 0.25 * k, 0.25)) for k in range(3)]
+
+class CountedLatents:
+    """A stepper that counts steps, and reports what it is given."""
+
+    def step(self, latent, samples, t, dt, weights):
+        return Latent(latent.xhat + 1), (latent.xhat, samples.xhat, t, dt, weights)

@@ -10,15 +10,16 @@ from mpm_ref.rom import model_file
 from mpm_ref.rom.fields.pod import basis
 from mpm_ref.rom.fields.polynomial_manifold import curved
 from mpm_ref.rom.study import dataset, reduce
-from mpm_ref.rom.study.field import resampled, tabulated
+from mpm_ref.rom.study.dataset import simulate_snapshots
+from mpm_ref.rom.study.display import resampled, tabulated
 from mpm_ref.rom.study.generate import (
-    EAR,
     FINISHED,
     INTERRUPTED,
     SKIPPED,
+    STOP_WATCH,
     file_of,
-    finished,
     generate,
+    is_finished,
     one_thread,
 )
 from mpm_ref.scene import build
@@ -27,7 +28,6 @@ from mpm_ref.store.running import Options, checkpoint_of, run
 from mpm_ref.store.weights_file import sealed, stated
 from mpm_ref.store.writer import Fields
 from mpm_ref.training import Machine
-from mpm_ref.trajectories import snapshots
 
 # Data.
 
@@ -41,7 +41,8 @@ def test_data_are_those_of_runs_in_memory_bit_for_bit(made):
     bars, folder = made
     numbers = (3, 1)
     with one_thread():
-        there = snapshots((build(bars.scene(bars.mu[k])) for k in numbers), bars.mu[list(numbers)])
+        there = simulate_snapshots((build(bars.scene(bars.mu[k])) for k in numbers),
+                                   bars.mu[list(numbers)])
     found = dataset.load(bars, folder, numbers)
     for a, b in zip(found, there, strict=True):
         np.testing.assert_array_equal(a, b)
@@ -59,7 +60,7 @@ def test_a_run_that_was_cut_off_goes_on(made, tmp_path):
     bars, folder = made
     path, scene = file_of(tmp_path, 1), bars.scene(bars.mu[1])
     run(build(scene), path, Options(steps=3, fields=Fields(("x", "F", "v"))))
-    assert not finished(path, scene)
+    assert not is_finished(path, scene)
     with pytest.raises(dataset.Missing, match=r"lacks 1 of 1 runs, the first is case-001\.h5"):
         dataset.load(bars, tmp_path, (1,))
     assert [done.why for done in generate(bars, tmp_path)] == [FINISHED] * 4
@@ -83,7 +84,7 @@ class Later:
 
 def test_a_process_that_is_told_to_stop_ends_its_run_with_a_checkpoint(tmp_path, monkeypatch):
     bars = study(tmp_path)
-    monkeypatch.setattr(EAR, "stop", Later(4))
+    monkeypatch.setattr(STOP_WATCH, "stop", Later(4))
     assert [done.why for done in generate(bars, tmp_path)] == [INTERRUPTED]
     with Results(file_of(tmp_path, 0)) as results:
         assert results.step[-1] == 4
@@ -99,7 +100,7 @@ def test_runs_of_another_study_are_refused_and_left(made, tmp_path):
     *well, done = generate(other, folder)
     assert [one.why for one in well] == [SKIPPED]           # the first has the same scene
     assert done.why == "refused"
-    assert "another scene or study" in done.said
+    assert "another scene or study" in done.message
     assert file_of(folder, 1).read_bytes() == before
     with pytest.raises(BadResults, match="another scene or study"):
         dataset.load(other, folder, (1,))
@@ -109,7 +110,7 @@ def test_an_unstable_run_ends_the_rest(tmp_path):
     bars = study(tmp_path, ("to = 4.0\ncount = 4", "to = 1e6\ncount = 3"))
     first, second = generate(bars, tmp_path)
     assert (first.why, second.why) == (FINISHED, "unstable")
-    assert second.said.startswith("run 1 (g = 500000")
+    assert second.message.startswith("run 1 (g = 500000")
 
 
 def test_two_processes_make_the_same(made, tmp_path):
@@ -126,14 +127,15 @@ def test_two_processes_make_the_same(made, tmp_path):
 @pytest.fixture(scope="module")
 def model(made):
     bars, folder = made
-    return reduce.computed(bars, dataset.load(bars, folder, bars.train), {"command": "none"})
+    return reduce.compute_model(bars, dataset.load(bars, folder, bars.train), {"command": "none"})
 
 
 @pytest.fixture
 def bent(made, tmp_path):
     """The same study with a curved map, and that map."""
     bars = study(tmp_path, *CURVED)
-    return bars, reduce.computed(bars, dataset.load(bars, made[1], bars.train), {"command": "none"})
+    return bars, reduce.compute_model(bars, dataset.load(bars, made[1], bars.train),
+                                      {"command": "none"})
 
 
 def test_modes_hold_the_training_states_and_their_coordinates(made, model):
@@ -242,7 +244,7 @@ def test_what_are_no_modes_is_refused(model, tmp_path):
 
 def test_without_torch_a_network_is_refused_in_one_sentence(made, without_torch):
     with pytest.raises(ValueError, match=r'pip install "mpm_ref\[learn\]"'):
-        reduce.learned(made[0], None, {}, None, None, Machine())
+        reduce.train_model(made[0], None, {}, None, None, Machine())
 
 
 @pytest.mark.parametrize("kind", ["straight", "curved"])

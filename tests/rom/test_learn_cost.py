@@ -8,7 +8,7 @@ import rom_toys
 torch = pytest.importorskip("torch")
 
 from mpm_ref import training  # noqa: E402
-from mpm_ref.rom.study.reduce import of_trained  # noqa: E402
+from mpm_ref.rom.study.reduce import decoder_model  # noqa: E402
 from mpm_ref.rom.train import decoder  # noqa: E402
 from mpm_ref.rom.train.decoder import DecoderTraining, train_decoder  # noqa: E402
 
@@ -44,6 +44,6 @@ def test_the_cost_of_a_training_is_that_of_all_its_parts(clock, tmp_path):
 
 def test_the_file_of_a_map_says_what_its_training_took(clock, tmp_path):
     data = rom_toys.snapshots(2)
-    done = trained(clock, tmp_path / "a.pt")._replace(cost=training.Cost(12.34, 56.78))
-    about = of_trained(done, data.X, {"seed": 3}).about
+    done = trained(clock, tmp_path / "a.pt")._replace(cost=training.TrainingTime(12.34, 56.78))
+    about = decoder_model(done, data.X, {"seed": 3}).about
     assert (about["cpu_seconds"], about["wall_seconds"], about["seed"]) == (12.3, 56.8, 3)

@@ -4,8 +4,7 @@ import pytest
 from command_line import mpm_ref
 from small_nsf_studies import SCENE, modelled, write
 
-from mpm_ref.rom.study.nsf_hints import hints
-from mpm_ref.rom.study.study import load
+from mpm_ref.rom.study.study import load, training_hints
 
 BARE, SMOOTH = ("smoothing = 1e-6\n", ""), "smoothing = 1e-6"
 ELASTIC = SCENE.replace(', flow = { type = "von_mises", tau_y = 2e3 }', "")
@@ -19,7 +18,7 @@ NETWORKS = (("modes = 5\ntau = 8\nC = 8\nsmoothing = 1e-6", "beta = [2, 2, 2]"),
 ], ids=["default", "least", "more", "elastic", "networks"])
 def test_a_hint_is_given_where_matter_flows_and_modes_are_hardly_smoothed(
         tmp_path, edits, scene, told):
-    found = list(hints(load(write(tmp_path, *edits, scene=scene))))
+    found = list(training_hints(load(write(tmp_path, *edits, scene=scene))))
     assert len(found) == told
     assert all("1e-08 is for elastic matter, and that of soft flows" in one for one in found)
 

@@ -11,9 +11,9 @@ from command_line import assert_told, mpm_ref
 from small_studies import STEPS, ended, modelled, write
 
 from mpm_ref.rom.study import record, reduce, resume
-from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.full_model import ldm_full_model
 from mpm_ref.rom.study.generate import one_thread
-from mpm_ref.rom.study.run import Way, march
+from mpm_ref.rom.study.run import RunOptions, ldm_run
 from mpm_ref.rom.study.study import load
 from mpm_ref.store import manifest
 from mpm_ref.store.results import Results
@@ -116,11 +116,11 @@ def assert_told_last(done, words):
 def test_what_is_known_of_a_file_are_the_states_of_its_run(made, reduced, tmp_path):
     assert reduced("run.h5", g=2.5).exit_code == 0
     bars = load(tmp_path / "bars.toml")
-    model, one = reduce.load(made / "map.npz", bars), case(bars.scene([2.5]))
+    model, one = reduce.load(made / "map.npz", bars), ldm_full_model(bars.scene([2.5]))
     with one_thread(), Results(tmp_path / "run.h5") as results:
-        for (latent, report), (own, said) in zip(
-                resume.states(results), march(one, model.field, Way(points=12), model.rest),
-                strict=True):
+        run = ldm_run(one, model.field, RunOptions(points=12), model.rest)
+        for (latent, report), (_, own, said, _) in zip(resume.stored_states(results), run.states(),
+                                                       strict=True):
             assert all(np.array_equal(a, b) for a, b in zip(latent, own, strict=True))
             assert (report and report[:4]) == (said and said[:4])
 
@@ -237,18 +237,18 @@ def test_what_made_a_run_is_known_of_all_its_parts():
     other = now | {"source_sha256": "other"}
     older = now | {"versions": now["versions"] | {"numba": "0.1"}}
     unrelated = now | {"versions": now["versions"] | {"h5py": "0.1"}}
-    assert resume.same_code(now | {"parts": []})
-    assert resume.same_code(now | {"parts": [now, unrelated]})
+    assert resume.is_same_code(now | {"parts": []})
+    assert resume.is_same_code(now | {"parts": [now, unrelated]})
     for part in (other, older, {}):
-        assert not resume.same_code(now | {"parts": [now, part, now]})
-    assert not resume.same_code(other | {"parts": [now]})
+        assert not resume.is_same_code(now | {"parts": [now, part, now]})
+    assert not resume.is_same_code(other | {"parts": [now]})
 
 
 def test_a_run_that_was_killed_is_cut_off_too():
     rows = {"finished": [{"why": "finished"}], "killed": [{"why": "not ended"}], "older": [],
             "stopped": [{"why": "interrupted"}],
             "broken": [{"why": "the reduced run broke down in step 3"}]}
-    found = {name: resume.cut_off({"reduced": {}, "parts": own}) for name, own in rows.items()}
+    found = {name: resume.was_cut_off({"reduced": {}, "parts": own}) for name, own in rows.items()}
     assert found == {"finished": False, "killed": True, "older": True, "stopped": True,
                      "broken": False}
-    assert not resume.cut_off({"parts": []})
+    assert not resume.was_cut_off({"parts": []})

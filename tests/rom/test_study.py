@@ -6,10 +6,10 @@ import pytest
 from small_studies import STEPS, study, write
 
 from mpm_ref.cli.catalogue import shipped_scenes, shipped_studies
-from mpm_ref.rom.study.reduce import larger
-from mpm_ref.rom.study.run import Way
+from mpm_ref.rom.study.reduce import size_ratios
+from mpm_ref.rom.study.run import RunOptions
 from mpm_ref.rom.study.study import load
-from mpm_ref.rom.study.tables import KEYS, Map, Run
+from mpm_ref.rom.study.tables import KEYS, MapRunTable, MapTable
 from mpm_ref.scene import SceneError, canonical
 from mpm_ref.scene.overrides import flat, varied
 from validation.ldm.studies import STUDIES
@@ -150,7 +150,7 @@ def test_what_is_set_is_set_in_all_runs(tmp_path):
     ('"modes"', '"curved"\nmodes = 5', "run.projection = 'linear': expected 'nonlinear' for a "
      "curved map"),
     ("[map]", '[run]\nprecision = "half"\n[map]', "run.precision = 'half': expected one of"),
-    ("[map]", '[run]\nclose = 0\n[map]', "run.close = 0"),
+    ("[map]", '[run]\npreimage_tolerance = 0\n[map]', "run.preimage_tolerance = 0"),
     ('"modes"', '"network"\nlatent = "a"', "map.latent = 'a': expected one of"),
     ('"modes"', '"network"\nweights = "a"', "map.weights = 'a': expected one of"),
     ("[map]", '[run]\nvelocity = "a"\n[map]', "run.velocity = 'a': expected one of"),
@@ -219,16 +219,16 @@ def test_a_file_that_is_not_there_is_said(tmp_path):
 ])
 def test_parameters_that_are_not_given_well_are_refused(tmp_path, texts, words):
     with pytest.raises(SceneError, match=words):
-        study(tmp_path).given(texts)
+        study(tmp_path).parse_parameters(texts)
 
 
 def test_parameters_are_given_by_name_and_known_to_be_outside(tmp_path):
     bars = study(tmp_path)
-    assert bars.given(["g=2.5"]) == [2.5]
+    assert bars.parse_parameters(["g=2.5"]) == [2.5]
     low, high = bars.mu[list(bars.train)].min(), bars.mu[list(bars.train)].max()
-    assert not list(bars.outside([low])) + list(bars.outside([high]))
-    assert [f"g = {high + 0.1:g}" in said for said in bars.outside([high + 0.1])] == [True]
-    assert len(list(bars.outside([low - 0.1]))) == 1
+    assert not list(bars.range_warnings([low])) + list(bars.range_warnings([high]))
+    assert [f"g = {high + 0.1:g}" in said for said in bars.range_warnings([high + 0.1])] == [True]
+    assert len(list(bars.range_warnings([low - 0.1]))) == 1
 
 
 def test_the_digest_is_of_scenes_and_of_what_is_held_out(tmp_path):
@@ -242,21 +242,21 @@ def test_the_digest_is_of_scenes_and_of_what_is_held_out(tmp_path):
 
 def test_a_run_is_made_as_the_study_says(tmp_path):
     way = study(tmp_path, ("[map]", '[run]\npoints = 9\nprojection = "nonlinear"\n[map]'))
-    assert way.tables.run.way == Way(projection="nonlinear", points=9)
-    assert study(tmp_path).tables.run.way == Way()
-    assert set(Way._fields) == set(Run.__struct_fields__) - {"seed"}
+    assert way.tables.run.options == RunOptions(projection="nonlinear", points=9)
+    assert study(tmp_path).tables.run.options == RunOptions()
+    assert set(RunOptions._fields) == set(MapRunTable.__struct_fields__) - {"seed"}
 
 
 def test_every_key_of_a_map_belongs_to_one_kind():
     keys = [key for kind in KEYS.values() for key in kind]
-    assert sorted(("kind", "r", *keys)) == sorted(Map.__struct_fields__)
+    assert sorted(("kind", "r", *keys)) == sorted(MapTable.__struct_fields__)
 
 
 def test_a_study_may_scale_the_weights_to_its_body_and_steps(tmp_path):
     """Without a network or PyTorch: LDM's own studies need no other weights."""
     own = load(shipped_studies()["gravity"], shipped_scenes()).base
-    assert larger(own) == pytest.approx((1.0, 1.0))
-    assert larger(study(tmp_path).base) == pytest.approx((0.8 / 0.4, 0.01 * 144.0))
+    assert size_ratios(own) == pytest.approx((1.0, 1.0))
+    assert size_ratios(study(tmp_path).base) == pytest.approx((0.8 / 0.4, 0.01 * 144.0))
     network = '"network"\nlatent = "modes"\nweights = "scaled"'
     assert study(tmp_path, ('"modes"', network)).tables.map.weights == "scaled"
     assert "weights = 'tower': expected one of 'code', 'printed', 'scaled'" in told(

@@ -8,7 +8,7 @@ from small_studies import generated, study
 
 from mpm_ref.rom import model_file
 from mpm_ref.rom.study import dataset, reduce
-from mpm_ref.rom.study.tables import KEYS, LATENTS, NETWORK, WEIGHTS, Map
+from mpm_ref.rom.study.tables import KEYS, LATENTS, NETWORK, WEIGHTS, MapTable
 from mpm_ref.training import Machine
 
 torch = pytest.importorskip("torch")
@@ -25,7 +25,7 @@ def made(tmp_path_factory):
 
 
 def test_a_network_is_trained_as_the_study_says():
-    own = Map(kind="network", r=2)
+    own = MapTable(kind="network", r=2)
     for field in fields(DecoderTraining):
         if field.name not in ("r", "weights", "schedule", "jitter"):
             assert getattr(own, field.name) == field.default
@@ -51,7 +51,7 @@ def test_a_network_is_trained_as_its_settings_say_and_comes_back(made, tmp_path)
     network = '"network"\nepochs = 3\nhidden = [8, 8]\nweights = "printed"\npoints = 20'
     bars = study(tmp_path, ('"modes"', network))
     data, seen = dataset.load(bars, folder, bars.train), []
-    done = reduce.learned(bars, data, {}, tmp_path / "map.pt", lambda h: seen.append(len(h)),
+    done = reduce.train_model(bars, data, {}, tmp_path / "map.pt", lambda h: seen.append(len(h)),
                         Machine())
     assert seen == [1, 2, 3]
     plain = train_decoder(DecoderTraining(3, (8, 8), weights=PRINTED, epochs=3, points=20), data)
@@ -69,7 +69,7 @@ def test_a_network_is_trained_with_weights_that_fit_its_body(made, tmp_path):
     network = '"network"\nepochs = 3\nhidden = [8]\nweights = "scaled"\nlatent = "modes"'
     bars = study(tmp_path, ('"modes"', network))
     data = dataset.load(bars, folder, bars.train)
-    done = reduce.learned(bars, data, {}, None, None, Machine())
+    done = reduce.train_model(bars, data, {}, None, None, Machine())
     fitting = scale_weights(CODE, 0.8 / 0.4, 0.01 * 144.0)
     plain, unscaled = (
         train_decoder(DecoderTraining(3, (8,), latent="modes", weights=w, epochs=3), data)

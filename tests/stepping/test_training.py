@@ -15,7 +15,7 @@ from mpm_ref.training import part
     (training.trainer, 'laws are trained with PyTorch, which is not installed: pip install '
                      '"mpm_ref[learn]", or `make learn` in the repository; laws that were trained '
                      'run, export and plot without it'),
-    (reduce.training, 'a network is trained with PyTorch, which is not installed: pip install '
+    (reduce.trainer, 'a network is trained with PyTorch, which is not installed: pip install '
                     '"mpm_ref[learn]", or `make learn` in the repository; or make modes, which '
                     'need none: --kind modes'),
 ])
@@ -33,7 +33,7 @@ def test_another_module_that_is_missing_is_named():
 def test_with_pytorch_the_part_is_there():
     pytest.importorskip("torch")
     assert training.trainer().__name__ == "mpm_ref.nclaw.train.train"
-    assert reduce.training().__name__ == "mpm_ref.rom.train.settings"
+    assert reduce.trainer().__name__ == "mpm_ref.rom.train.settings"
 
 
 def test_what_is_taken_away_for_a_test_comes_back():
@@ -43,6 +43,6 @@ def test_what_is_taken_away_for_a_test_comes_back():
         hide(monkeypatch)
         assert not hasattr(rom.train, "decoder")
         with pytest.raises(ValueError, match="PyTorch"):
-            reduce.training()
+            reduce.trainer()
         assert importlib.import_module("mpm_ref.rom.train.schedule")
     assert rom.train.decoder is fit is importlib.import_module("mpm_ref.rom.train.decoder")

@@ -80,7 +80,7 @@ def modelled(folder):
     """The folder, with a study, its runs in data/ and modes of them in map.npz."""
     bars, data = generated(folder, "data")
     runs = dataset.load(bars, data, bars.train)
-    model_file.save(folder / "map.npz", reduce.computed(bars, runs, {}))
+    model_file.save(folder / "map.npz", reduce.compute_model(bars, runs, {}))
     return folder
 
 

@@ -10,8 +10,8 @@ from mpm_ref.explicit import initial_stress
 from mpm_ref.materials import NoFlow
 from mpm_ref.rom.kinematics import evaluate
 from mpm_ref.rom.latent import velocities
-from mpm_ref.rom.study.case import case
-from mpm_ref.rom.study.run import Way
+from mpm_ref.rom.study.full_model import ldm_full_model
+from mpm_ref.rom.study.run import RunOptions
 
 from ..common.registry import experiment
 from ..common.scenes import with_
@@ -19,7 +19,7 @@ from ..ldm.studies import GRAVITY
 from .ldm_runs import Trial, ended, full, learned, record_silent, table_of
 
 LONGER = 10
-FEW = Way(points=50)
+FEW = RunOptions(points=50)
 EVERY = 5           # steps between rows
 TAIL = 3            # displacements are compared over the last third of a run
 FALLS = {"quick": ((1.0, ("gravity-r4",)),),        # [m/s^2], maps; at 10 the body itself tears
@@ -50,9 +50,9 @@ class DrawnOut:
     """
 
     def __init__(self, name, scene, what, way):
-        reduction, one = learned(name), case(with_(scene, steps=LONGER * scene.steps))
+        reduction, one = learned(name), ldm_full_model(with_(scene, steps=LONGER * scene.steps))
         x, self.said = full(one.problem)
-        usual = ended(case(scene), x[:scene.steps + 1], reduction, way).error
+        usual = ended(ldm_full_model(scene), x[:scene.steps + 1], reduction, way).error
         states = []
         end = ended(one, x, reduction, way, keep=states)
         self.trial = Trial(name, what + (" (full order stopped)" if self.said else ""), way.name,

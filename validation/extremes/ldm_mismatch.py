@@ -2,8 +2,8 @@
 checksum stands in the way.
 """
 
-from mpm_ref.rom.study.case import case
-from mpm_ref.rom.study.run import Way
+from mpm_ref.rom.study.full_model import ldm_full_model
+from mpm_ref.rom.study.run import RunOptions
 
 from ..common.registry import experiment
 from ..common.scenes import with_
@@ -21,13 +21,13 @@ def mismatch(run):
     """The watch must notice each; a map on its own body is the usual."""
     runs, found = {}, []
     for study, k in ((GRAVITY, 21), (TORSION, 20), (POKES, 1)):
-        one = case(with_(study.scene(*study.mu[k]), steps=STEPS))
+        one = ldm_full_model(with_(study.scene(*study.mu[k]), steps=STEPS))
         runs[study.name] = one, full(one.problem)[0]
     for name in run.progress(run.choose(quick=QUICK, standard=tuple(OF)), "maps"):
         own = OF[name]
-        ends = {study: ended(*both, learned(name), Way(points=SAMPLES))
+        ends = {study: ended(*both, learned(name), RunOptions(points=SAMPLES))
                 for study, both in runs.items()}
-        found += [Trial(name, f"on {study}", Way().name, SAMPLES, ends[own].error, end)
+        found += [Trial(name, f"on {study}", RunOptions().name, SAMPLES, ends[own].error, end)
                   for study, end in ends.items() if study != own]
     missed = [f"{t.map} {t.what}: {t.end.error:.3g} %" for t in found
               if t.kind not in (FLAGGED, STOPPED)]

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from mpm_ref.rom.fields.pod import held, measured
-from mpm_ref.rom.study.run import SCHEMES, Way
+from mpm_ref.rom.study.run import SCHEMES, RunOptions
 
 from ..common.registry import experiment
 from ..ldm.studies import GRAVITY, TORSION
@@ -25,7 +25,7 @@ class Bench:
     def __init__(self, reduction, study="gravity", usual=None):
         self.reduction, (self.case, self.x, _) = reduction, beside(study, MU[study])
         self.known = {}
-        self.usual = self.ended(Way()).error if usual is None else usual
+        self.usual = self.ended(RunOptions()).error if usual is None else usual
 
     def ended(self, way):
         """`End` of the run, made once."""
@@ -40,7 +40,8 @@ class Bench:
 
     def together(self, place, count):
         """`Trial` with the samples nearest to a place, in all steps."""
-        way, near = Way(points=count), np.sort(KDTree(self.case.X).query(PLACES[place], count)[1])
+        way, near = RunOptions(points=count), np.sort(KDTree(self.case.X).query(PLACES[place],
+                                                                                count)[1])
         return self.trial(f"together at the {place}", way,
                           ended(self.case, self.x, self.reduction, way, lambda t: near))
 
@@ -55,7 +56,7 @@ def points(run):
     found = []
     for name in run.progress(names, "maps"):
         bench = Bench(learned(name), name.partition("-")[0])
-        found += [bench.trial("few", Way(*scheme, count)) for scheme in schemes
+        found += [bench.trial("few", RunOptions(*scheme, count)) for scheme in schemes
                   for count in COUNTS[run.profile]]
         if name.startswith("gravity"):
             found += [bench.together(place, count) for place in PLACES
@@ -86,7 +87,7 @@ def dimensions(run):
     """`Trial`s with r = 1 .. 7 learned, and POD from 1 to all modes that its snapshots have, with
     all samples and with few.
     """
-    found = [Bench(learned(f"gravity-r{r}")).trial("learned", Way(points=10))
+    found = [Bench(learned(f"gravity-r{r}")).trial("learned", RunOptions(points=10))
              for r in run.choose(quick=(7,), standard=range(1, 8))]
     runs = GRAVITY.train[::run.choose(quick=12, standard=6)]
     snapshots = GRAVITY.run(runs)
@@ -94,5 +95,6 @@ def dimensions(run):
     everything = held(np.linalg.svd(displaced, compute_uv=False))
     for r in (*run.choose(quick=(), standard=(1, 4, 15, 30, 60)), everything):
         bench = Bench(linear(snapshots, r))
-        found += [bench.trial("POD", Way()), bench.trial("POD", Way(points=max(10, r // 3 + 5)))]
+        found += [bench.trial("POD", RunOptions()),
+                  bench.trial("POD", RunOptions(points=max(10, r // 3 + 5)))]
     return found

@@ -4,8 +4,8 @@ from functools import cache
 
 import numpy as np
 
-from mpm_ref.rom.study.case import case
-from mpm_ref.rom.study.run import SCHEMES, Way
+from mpm_ref.rom.study.full_model import ldm_full_model
+from mpm_ref.rom.study.run import SCHEMES, RunOptions
 
 from ..common.registry import experiment
 from ..ldm.studies import GRAVITY, STUDIES, TORSION
@@ -27,7 +27,7 @@ FEW = {"gravity": 10, "torsion": 20}    # samples, beside all: half of them at e
 @cache
 def beside(study, mu):
     """`Case` of a run of a study by name, its full-order x, and what that said if it stopped."""
-    one = case(STUDIES[study].scene(*mu))
+    one = ldm_full_model(STUDIES[study].scene(*mu))
     return one, *full(one.problem)
 
 
@@ -62,7 +62,7 @@ def trials(name, study, parameters, scheme):
     for mu in parameters:
         one, x, said = beside(study.name, mu)
         for points in (None, FEW[study.name]):
-            way = Way(*scheme, points)
+            way = RunOptions(*scheme, points)
             what = ", ".join(f"{a:g}" for a in mu) + (" (full order stopped)" if said else "")
             found.append(Trial(name, what, way.name, points or len(one.X), np.nan,
                                ended(one, x, reduction, way)))
@@ -79,7 +79,7 @@ def record_rates(run, name, found):
     words = (f"{t.map}, {t.what}, {t.scheme} with {t.points}: {t.end.flags}" for t in flagged[:6])
     run.record(f"{name}.false_alarms", len(flagged) / len(inside), comparator="<=", bound=0.05,
                scale=scale, note="; ".join(("share flagged in any step", *words)))
-    for field, pick in (("beyond", max), ("off", max), ("seen", min), ("lost", max)):
+    for field, pick in (("beyond", max), ("off", max), ("coverage", min), ("lost", max)):
         worst = pick(inside, key=lambda t, field=field: getattr(t.end, field))
         run.record(f"{name}.inside.{field}", getattr(worst.end, field), comparator="info",
                    scale=scale, note=f"{pick.__name__}imum: {worst.map}, {worst.what}, "

@@ -18,8 +18,9 @@ from mpm_ref.monitor import Unstable
 from mpm_ref.rom.fields.pod import basis
 from mpm_ref.rom.step import BREAKDOWNS
 from mpm_ref.rom.study.errors import Squares
-from mpm_ref.rom.study.run import drawing
-from mpm_ref.rom.study.watch import Nonsense, watch, watched
+from mpm_ref.rom.study.monitor import NoBodyLeft, checked_states, map_monitor
+from mpm_ref.rom.study.run import ldm_run
+from mpm_ref.rom.study.samples import random_draw
 from mpm_ref.simulate import simulate
 
 from ..common.scenes import threads_for
@@ -28,7 +29,7 @@ from ..ldm.networks import trained
 BAD = 5.0           # times the error that is usual for the map
 TOLERABLE = 1.0     # [%], the axis of LDM's Figure 9
 STOPPED, FLAGGED, FINE, SILENT = "stopped", "flagged", "fine", "silent"
-STOPS = (Nonsense, *BREAKDOWNS)
+STOPS = (NoBodyLeft, *BREAKDOWNS)
 
 
 class Reduction(NamedTuple):
@@ -62,7 +63,7 @@ class End(NamedTuple):
     flags: str              # what was ever out of bounds
     beyond: float           # largest
     off: float              # largest [dx]
-    seen: float             # smallest
+    coverage: float         # smallest
     rank: int               # smallest
     lost: float             # largest
     J: float                # smallest
@@ -85,10 +86,14 @@ def ended(case, x, reduction, way, pick=None, keep=None):
     said = "" if pick else refused(case, reduction.map, way)
     sums, sights = Squares(case.X), []
     with threads_for((case.problem.bodies[0],)), threadpoolctl.threadpool_limits(1):
-        seen_by = watch(case, reduction.map, reduction.xhat)
+        monitor = map_monitor(case, reduction.map, reduction.xhat)
         try:
-            states = watched(seen_by, case, way, reduction.rest, pick=pick)
-            for latent, _, sight in islice(states, 1 if said else None):
+            reduced = ldm_run(case, reduction.map, way, reduction.rest)
+            if pick is not None:
+                reduced = reduced._replace(make_sampler=lambda xhat: pick)
+            states = checked_states(reduced, monitor)
+            for state, sight in islice(states, 1 if said else None):
+                latent = state.latent
                 at = reduction.map.place(case.X, latent.xhat)
                 if len(sights) < len(x):
                     sums.add(at, x[len(sights)])
@@ -105,19 +110,19 @@ def ended(case, x, reduction, way, pick=None, keep=None):
 def refused(case, map, way):
     """The sentence with which the samples of a way are refused, "" where they suffice."""
     try:
-        drawing(case, map, way)
+        random_draw(case, map, way)
     except ValueError as refusal:
         return str(refusal)
     return ""
 
 
 def of_sights(sights, r, error, said):
-    """`End` from the `Sight`s of a run."""
-    flagged = [k for k, sight in enumerate(sights) if sight.why]
-    flags = dict.fromkeys(word for sight in sights for word in sight.why)
-    beyond, off, seen, blind, lost, J, *_ = zip(*sights, strict=True)
+    """`End` from the `StateCheck`s of a run."""
+    flagged = [k for k, sight in enumerate(sights) if sight.out_of_bounds]
+    flags = dict.fromkeys(word for sight in sights for word in sight.out_of_bounds)
+    beyond, blind, off, coverage, lost, J, *_ = zip(*sights, strict=True)
     return End(error, len(sights) - 1, flagged[0] if flagged else -1, " ".join(flags), max(beyond),
-               max(off), min(seen), r - max(blind), max(lost), min(J), said)
+               max(off), min(coverage), r - max(blind), max(lost), min(J), said)
 
 
 def full(problem):

@@ -5,7 +5,7 @@ import numpy as np
 from mpm_ref.rom.fields.network import Decoder
 from mpm_ref.rom.fields.perceptron import layers_of, network
 from mpm_ref.rom.fields.pod import Modes
-from mpm_ref.rom.study.run import SCHEMES, Way
+from mpm_ref.rom.study.run import SCHEMES, RunOptions
 
 from ..common.registry import experiment
 from ..ldm.studies import GRAVITY
@@ -75,7 +75,7 @@ def singular(run):
     """The rank must be told; a redundant coordinate must do no harm, a missing one be noticed."""
     sound = learned(NET)
     pod = linear(GRAVITY.run(GRAVITY.train[::run.choose(quick=12, standard=6)]), R)
-    ways = [Way(*scheme) for scheme in run.choose(quick=SCHEMES[1:2], standard=SCHEMES[:2])]
+    ways = [RunOptions(*scheme) for scheme in run.choose(quick=SCHEMES[1:2], standard=SCHEMES[:2])]
     plain = {False: Bench(sound), True: Bench(pod)}
     more, tried = [], []
     for reduction, rank in run.progress(redundant(sound, pod, NEAR[run.profile], run.rng),
@@ -83,7 +83,7 @@ def singular(run):
         of = plain[isinstance(reduction.map, Modes)]
         bench = Bench(reduction, usual=of.usual)
         more += [(bench.trial("redundant", way), of.ended(way).error, rank) for way in ways]
-        tried.append(bench.trial("redundant", Way(points=FEW)))
+        tried.append(bench.trial("redundant", RunOptions(points=FEW)))
     less = [Bench(reduction, usual=plain[False].usual).trial("lacking", way)
             for reduction in lacking(sound) for way in ways]
     record_redundant(run, more, tried)

@@ -1,7 +1,7 @@
 """Reduced runs with up to ten times the time step, beside the full-order run with the same one."""
 
-from mpm_ref.rom.study.case import case
-from mpm_ref.rom.study.run import SCHEMES, Way
+from mpm_ref.rom.study.full_model import ldm_full_model
+from mpm_ref.rom.study.run import SCHEMES, RunOptions
 
 from ..common.registry import experiment
 from ..common.scenes import with_
@@ -18,13 +18,14 @@ def time_step(run):
     """Errors beside the full-order run with the trained step."""
     names = run.choose(quick=("gravity-r4", "gravity-r7"),
                        standard=tuple(f"gravity-r{r}" for r in (1, 2, 4, 7)))
-    ways = [Way(*scheme, points) for scheme in run.choose(quick=SCHEMES[1:2], standard=SCHEMES[:2])
+    ways = [RunOptions(*scheme, points)
+            for scheme in run.choose(quick=SCHEMES[1:2], standard=SCHEMES[:2])
             for points in (None, 50)]
     found, whole = [], {}
     for g in run.choose(quick=(GRAVITY.mu[21, 0],), standard=GRAVITY.mu[(2, 21), 0]):
         scene, (_, x, _) = GRAVITY.scene(g), beside("gravity", (g,))
         for factor in run.progress(FACTORS, f"g = {g:.3g}"):
-            longer = case(with_(scene, dt=factor * scene.dt, steps=scene.steps // factor))
+            longer = ldm_full_model(with_(scene, dt=factor * scene.dt, steps=scene.steps // factor))
             whole[g, factor] = not full(longer.problem)[1]
             for name in names:
                 found += [(factor, trial(name, f"{g:.3g} m/s^2, {factor} dt", way, longer,

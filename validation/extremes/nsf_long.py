@@ -5,8 +5,7 @@ import numpy as np
 from mpm_ref.core.grid import OutOfRange
 from mpm_ref.monitor import Unstable
 from mpm_ref.rom.step import BREAKDOWNS
-from mpm_ref.rom.study.nsf_case import at_once, whole
-from mpm_ref.rom.study.nsf_watch import look
+from mpm_ref.rom.study.full_model import field_of, nsf_full_model
 from mpm_ref.simulate import simulate
 from mpm_ref.timestep import TooLarge
 
@@ -44,11 +43,11 @@ def full_run(scene):
     """{step: (rms displacement [m], kinetic energy [J])} of a full-order run's frames as far as it
     goes, and the sentence with which it stopped.
     """
-    one, found = whole(scene), {}
+    one, found = nsf_full_model(scene), {}
     try:
         for frame in simulate(one.problem):
-            x, v = (at_once(frame.state.bodies, name) for name in "xv")
-            found[frame.state.step] = distance(x, one.X), kinetic(one.matter.m, v)
+            x, v = (field_of(frame.state.bodies, name) for name in "xv")
+            found[frame.state.step] = distance(x, one.X), kinetic(one.m, v)
     except (Unstable, TooLarge, OutOfRange) as stop:
         return found, str(stop)
     return found, ""
@@ -58,14 +57,14 @@ def reduced_run(bench, scene, chosen):
     """{step: (beyond, rms displacement [m], kinetic energy [J])} of every step of a reduced run,
     and the sentence with which it broke down, or was GONE.
     """
-    one, fields, found = whole(scene), bench.one.of(bench.value), {}
+    one, fields, found = nsf_full_model(scene), bench.one.of(bench.value), {}
     everything, before, dt = np.arange(len(one.X)), None, one.problem.clock.dt
     try:
-        for step, (_, at, report) in enumerate(bench.inferred(one, fields, chosen)):
-            x = fields.place(everything, at.xhat)
-            v = one.matter.v if before is None else (x - before) / dt
-            found[step] = (look(bench.extent, at, report).beyond, distance(x, one.X),
-                           kinetic(one.matter.m, v))
+        for step, state in enumerate(bench.inferred(one, fields, chosen)):
+            x = fields.place(everything, state.latent.xhat)
+            v = one.v if before is None else (x - before) / dt
+            found[step] = (bench.monitor.check(state).beyond, distance(x, one.X),
+                           kinetic(one.m, v))
             before = x
     except BREAKDOWNS as stop:
         return found, " ".join(str(stop).split())

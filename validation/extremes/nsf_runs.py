@@ -12,10 +12,12 @@ import numpy as np
 from mpm_ref.core.grid import OutOfRange
 from mpm_ref.monitor import Unstable
 from mpm_ref.rom.step import BREAKDOWNS
-from mpm_ref.rom.study.nsf_case import history, whole
-from mpm_ref.rom.study.nsf_evaluate import course, level_of, share
-from mpm_ref.rom.study.nsf_run import Plan, drawn, infer
-from mpm_ref.rom.study.nsf_watch import look, trained
+from mpm_ref.rom.study.dataset import simulate_history
+from mpm_ref.rom.study.evaluate import history_reference, level_of, path_errors, stress_share
+from mpm_ref.rom.study.full_model import nsf_full_model
+from mpm_ref.rom.study.monitor import field_monitor
+from mpm_ref.rom.study.run import FieldRunOptions, nsf_run
+from mpm_ref.rom.study.samples import drawn_samples
 from mpm_ref.timestep import TooLarge
 
 from ..nsf.reduced_runs import tested
@@ -68,41 +70,43 @@ class Bench:
 
     def __init__(self, name, one):
         self.name, self.one = name, one
-        self.extent = trained(one.fields, one.xhat)
+        self.monitor = field_monitor(one.fields, one.xhat)
         self.value, self.count = one.study.test[0], one.study.samples
         self.tests = [self.ended(value, self.drawn(self.count)) for value in one.study.test]
         self.usual = max(end.error for end in self.tests)
 
     def drawn(self, count, draw=0):
         """`Chosen` samples of any points."""
-        return drawn(len(self.one.fields.X), count, draw)
+        return drawn_samples(len(self.one.fields.X), count, draw)
 
     def ended(self, value, chosen, test=None, fields=None):
         """`End` of a reduced run with `Chosen` samples beside `Histories` of the full-order run, of
         the study's fields or others.
         """
         one = self.one if fields is None else self.one._replace(fields=fields)
-        scene, test = whole(one.study.run(value)), test or one.tests[value]
+        scene, test = nsf_full_model(one.study.run(value)), test or one.tests[value]
         states, sights, off, said = [], [], [], ""
         with np.errstate(all="ignore"):
             try:
-                for t, at, report in self.inferred(scene, one.of(value), chosen):
-                    states.append((level_of(t / test.dt), at.xhat))
-                    sights.append(look(self.extent, at, report))
-                    off.append(report.residual / scene.problem.dx if report else 0.0)
+                for state in self.inferred(scene, one.of(value), chosen):
+                    states.append((level_of(state.t / test.dt), state.latent.xhat))
+                    sights.append(self.monitor.check(state))
+                    off.append(state.report.residual / scene.problem.dx if state.report else 0.0)
             except BREAKDOWNS as stop:
                 said = " ".join(str(stop).split())
-            found, stress = course(one.of(value), test.x[0], test.tau[0], states)
-        errors = np.array([found.errors.displacement, found.errors.origin, share(stress)])
+            found = path_errors(one.of(value), history_reference(test), states)
+        errors = np.array([found.errors.displacement, found.errors.origin,
+                           stress_share(found.stress)])
         whole_run = len(states) == scene.problem.clock.steps + 1
         return End(*(100.0 * (errors if whole_run else np.full(3, np.inf))),
                    *of_sights(sights, one.fields.r), float(np.max(off, initial=0.0)), said)
 
     def inferred(self, scene, fields, chosen):
-        """Yield what `infer` does of a `Whole` scene, until latent coordinates are GONE."""
-        for state in infer(scene, fields, Plan((chosen,)), self.one.rest):
+        """Yield what `nsf_run` does of a `Whole` scene, until latent coordinates are GONE."""
+        run = nsf_run(scene, fields, FieldRunOptions((chosen,)), self.one.rest)
+        for state in run.states():
             yield state
-            if self.extent.outlying(state[1].xhat) > GONE:
+            if self.monitor.extent.outlying(state.latent.xhat) > GONE:
                 return
 
     def trial(self, what, chosen, fields=None):
@@ -115,9 +119,9 @@ class Bench:
 
 
 def of_sights(sights, r):
-    """What an `End` has of the `Sight`s of a run: steps, first, flags, beyond and rank."""
-    flagged = [k for k, sight in enumerate(sights) if sight.why]
-    flags = dict.fromkeys(word for sight in sights for word in sight.why)
+    """What an `End` has of the `StateCheck`s of a run: steps, first, flags, beyond and rank."""
+    flagged = [k for k, sight in enumerate(sights) if sight.out_of_bounds]
+    flags = dict.fromkeys(word for sight in sights for word in sight.out_of_bounds)
     return (len(sights) - 1, flagged[0] if flagged else -1, " ".join(flags),
             max((sight.beyond for sight in sights), default=np.nan),
             r - max((sight.blind for sight in sights), default=0))
@@ -126,6 +130,6 @@ def of_sights(sights, r):
 def made(study, value):
     """`Histories` of a full-order run, and "", or None and the sentence with which it stopped."""
     try:
-        return history(study.run(value), [value], np.float32, study.spacing), ""
+        return simulate_history(study.run(value), [value], np.float32, study.spacing), ""
     except (Unstable, TooLarge, OutOfRange) as stop:
         return None, str(stop)

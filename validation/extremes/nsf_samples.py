@@ -6,8 +6,8 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from mpm_ref.rom.cubature import misfit
-from mpm_ref.rom.study.nsf_run import Chosen
-from mpm_ref.rom.study.nsf_watch import SPARSE
+from mpm_ref.rom.study.monitor import SPARSE
+from mpm_ref.rom.study.samples import SampleSet
 
 from ..common.registry import experiment
 from ..nsf.reduced_runs import tested
@@ -65,13 +65,13 @@ def others(run):
 
 
 def judged(bench, what, chosen):
-    """The `Trial` of a run on `Chosen` samples, and what these leave of the products."""
+    """The `Trial` of a run on `SampleSet` samples, and what these leave of the products."""
     fields = bench.one.fields
     return bench.trial(what, chosen), misfit(fields.U, fields.r, chosen.points)
 
 
 def suffices(bench, chosen):
-    """Whether `Chosen` samples have as many equations as there are latent coordinates."""
+    """Whether `SampleSet` samples have as many equations as there are latent coordinates."""
     return len(chosen.points) * bench.one.fields.dim >= bench.one.fields.r
 
 
@@ -87,7 +87,7 @@ def record_judged(run, id, found):
 
 
 def sets_of(bench, profile):
-    """[(name, `Chosen`)] of samples: few, and many in a corner."""
+    """[(name, `SampleSet`)] of samples: few, and many in a corner."""
     X = bench.one.fields.X
     return [*few(bench, profile),
             *((f"at the {place} corner", clustered(X, corner, count))
@@ -95,7 +95,7 @@ def sets_of(bench, profile):
 
 
 def few(bench, profile):
-    """(name, `Chosen`) of few samples each."""
+    """(name, `SampleSet`) of few samples each."""
     return ((f"draw {draw}", bench.drawn(count, draw)) for count in COUNTS[profile]
             for draw in range(DRAWS[profile]))
 
@@ -106,8 +106,8 @@ def corners(X):
 
 
 def clustered(X, place, count):
-    """`Chosen`: the points X (n, d) nearest to a place."""
-    return Chosen(0.0, np.sort(KDTree(X).query(place, count)[1]))
+    """`SampleSet`: the points X (n, d) nearest to a place."""
+    return SampleSet(0.0, np.sort(KDTree(X).query(place, count)[1]))
 
 
 def record_all(run, id, trials):

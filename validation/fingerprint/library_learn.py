@@ -8,12 +8,12 @@ from mpm_ref.nclaw.gnn.features import box_of
 from mpm_ref.nclaw.study import study as law_study
 from mpm_ref.nclaw.study.training import train_study
 from mpm_ref.rom.snapshots import joined
-from mpm_ref.rom.study.nsf_case import history
-from mpm_ref.rom.study.reduce import learned
+from mpm_ref.rom.study.dataset import simulate_history, simulate_snapshots
+from mpm_ref.rom.study.reduce import train_model
 from mpm_ref.rom.study.study import load
 from mpm_ref.scene import build
 from mpm_ref.training import Machine, part
-from mpm_ref.trajectories import observed, snapshots
+from mpm_ref.trajectories import observed
 
 from .library import ROOT, problem, scene_names
 
@@ -53,9 +53,10 @@ def ldm(text):
     """Return the map, latent coordinates and coordinates at rest of a study's training."""
     with study_file(text) as path:
         study = load(path, SCENES)
-        runs = snapshots((build(study.scene(study.mu[k])) for k in study.train),
+        runs = simulate_snapshots((build(study.scene(study.mu[k])) for k in study.train),
                          study.mu[list(study.train)])
-        model = learned(study, runs, {}, path.with_suffix(".pt"), lambda history: None, Machine())
+        model = train_model(study, runs, {}, path.with_suffix(".pt"), lambda history: None,
+                            Machine())
     decoder, xhat, rest, _ = model
     return {"latent": xhat, "rest": rest, "derivatives": decoder.derivatives(runs.X, rest)}
 
@@ -64,8 +65,10 @@ def nsf(text):
     """Return three networks, latent coordinates and coordinates at rest of a study's training."""
     with study_file(text) as path:
         study = load(path, SCENES)
-        runs = joined((history(study.scene(study.mu[k]), study.mu[k], every=study.base.every)
+        runs = joined((simulate_history(study.scene(study.mu[k]), study.mu[k],
+                                        every=study.base.every)
                        for k in study.train), len(study.train))
-        model = learned(study, runs, {}, path.parent / "stages", lambda history: None, Machine())
+        model = train_model(study, runs, {}, path.parent / "stages", lambda history: None,
+                            Machine())
     fields, xhat, rest, _ = model
     return {"latent": xhat, "rest": rest, "networks": tuple(fields)}

@@ -18,16 +18,21 @@ from mpm_ref.rom.latent import Latent
 from mpm_ref.rom.quadrature.lagrangian import neighbours
 from mpm_ref.rom.quadrature.node_centric import node_centric, nodes_of
 from mpm_ref.rom.snapshots import joined
-from mpm_ref.rom.study.case import case
-from mpm_ref.rom.study.nsf_case import history, whole
-from mpm_ref.rom.study.nsf_fields import BLOCK
-from mpm_ref.rom.study.nsf_run import Plan, drawn, infer, of_cells, weighed
-from mpm_ref.rom.study.reduce import computed
-from mpm_ref.rom.study.run import Way, march, start, stepped
-from mpm_ref.rom.study.run import model as reduced_step
+from mpm_ref.rom.study.dataset import simulate_history, simulate_snapshots
+from mpm_ref.rom.study.full_model import ldm_full_model, nsf_full_model
+from mpm_ref.rom.study.reduce import BLOCK, compute_model
+from mpm_ref.rom.study.run import (
+    FieldRunOptions,
+    ReducedRun,
+    RunOptions,
+    ldm_run,
+    ldm_start,
+    nsf_run,
+)
+from mpm_ref.rom.study.run import ldm_model as reduced_step
+from mpm_ref.rom.study.samples import SampleSet, cell_samples, drawn_samples, weighted_samples
 from mpm_ref.rom.study.study import load as load_study
 from mpm_ref.scene import build
-from mpm_ref.trajectories import snapshots
 
 from .library import ROOT, scene, scene_names
 
@@ -60,7 +65,7 @@ def network(name):
 def small_snapshots():
     """Return the snapshots of the training runs of the study `gravity_small`."""
     small = study("gravity_small")
-    return snapshots((build(small.scene(small.mu[k])) for k in small.train),
+    return simulate_snapshots((build(small.scene(small.mu[k])) for k in small.train),
                      small.mu[list(small.train)])
 
 
@@ -68,12 +73,12 @@ def small_snapshots():
 def small_setup():
     """Return the held-out run of the study `gravity_small`."""
     small = study("gravity_small")
-    return case(small.scene(small.mu[small.test[0]]))
+    return ldm_full_model(small.scene(small.mu[small.test[0]]))
 
 
 def pod():
     """Return POD modes of the study `gravity_small`, and latent coordinates at rest."""
-    model = computed(study("gravity_small"), small_snapshots(), {})
+    model = compute_model(study("gravity_small"), small_snapshots(), {})
     return model.field, model.rest
 
 
@@ -85,7 +90,7 @@ def polynomial(r, R, degree):
 
 def data_of_pod():
     """Return the training snapshots and the modes computed from them."""
-    model = computed(study("gravity_small"), small_snapshots(), {})
+    model = compute_model(study("gravity_small"), small_snapshots(), {})
     data = small_snapshots()
     return {"x": data.x, "F": data.F, "v": data.v, "latent": model.xhat,
             "derivatives": model.field.derivatives(data.X, model.xhat[0, -1])}
@@ -93,18 +98,19 @@ def data_of_pod():
 
 def setup_of(name, **values):
     """Return the body, problem and points of a reduced run of a scene with other values."""
-    return case(scene(name, **values))
+    return ldm_full_model(scene(name, **values))
 
 
 def ldm(setup, decoder, rest, options, steps):
     """Return latent coordinates, reports and last positions of a reduced run with options."""
-    return summary(setup, decoder, march(setup, decoder, Way(**options), rest), steps)
+    run = ldm_run(setup, decoder, RunOptions(**options), rest)
+    return summary(setup, decoder, run, steps)
 
 
 def ldm_by_neighbours(setup, decoder, rest, count, steps):
     """Return the summary of a run with samples chosen once and the points found near them."""
     samples = np.arange(0, len(setup.X), len(setup.X) // count)
-    stepper = reduced_step(setup, decoder, Way("lagrangian", "linear"))
+    stepper = reduced_step(setup, decoder, RunOptions("lagrangian", "linear"))
     near = neighbours(stepper.quadrature, decoder, rest[None], samples)
     stepper = replace(stepper, quadrature=near)
     run = from_start(setup, decoder, rest, stepper, lambda t, latent: samples)
@@ -114,7 +120,7 @@ def ldm_by_neighbours(setup, decoder, rest, count, steps):
 def ldm_by_nodes(setup, decoder, rest, count, steps):
     """Return the summary of a run with the node-centric quadrature around some points' nodes."""
     chosen = np.argsort(np.linalg.norm(setup.X - setup.X.mean(axis=0), axis=1))[:count]
-    stepper = reduced_step(setup, decoder, Way("eulerian", "linear"))
+    stepper = reduced_step(setup, decoder, RunOptions("eulerian", "linear"))
     grid = stepper.quadrature
     quadrature = node_centric(grid, nodes_of(setup.X[chosen], grid.dx, grid.degree))
     run = from_start(setup, decoder, rest, replace(stepper, quadrature=quadrature),
@@ -123,15 +129,16 @@ def ldm_by_nodes(setup, decoder, rest, count, steps):
 
 
 def from_start(setup, decoder, rest, stepper, choose):
-    """Yield the latent state and report of each step of a stepper, the start first."""
-    first = start(setup, decoder, rest)
-    yield first, None
-    yield from stepped(stepper, setup.problem.clock, first, choose)
+    """Return the run of a stepper with samples choose(t, latent), from the body at rest."""
+    clock = setup.problem.clock
+    return ReducedRun(stepper, lambda: ldm_start(setup, decoder, rest),
+                      lambda xhat: lambda t, latent: SampleSet(t, choose(t, latent)),
+                      clock.dt, clock.steps)
 
 
 def summary(setup, decoder, run, steps):
     """Return latent coordinates, rates, reports and last positions of a run's first steps."""
-    latents, reports = zip(*islice(run, steps + 1), strict=True)
+    _, latents, reports, _ = zip(*islice(run.states(), steps + 1), strict=True)
     return {"latent": np.array([latent[0] for latent in latents]),
             "rate": np.array([latent[1] for latent in latents]),
             "reports": reports, "x": decoder.place(setup.X, latents[-1][0])}
@@ -144,7 +151,7 @@ def summary(setup, decoder, run, steps):
 def small_histories():
     """Return the full-order training runs of the study `jelly_small`."""
     small = study("jelly_small")
-    runs = (history(small.scene(small.mu[k]), small.mu[k], every=small.base.every)
+    runs = (simulate_history(small.scene(small.mu[k]), small.mu[k], every=small.base.every)
             for k in small.train)
     return joined(runs, len(small.train))
 
@@ -153,8 +160,8 @@ def small_histories():
 def small_fields():
     """Return the fields of modes of `jelly_small`, latent coordinates, and its held-out run."""
     small = study("jelly_small")
-    model = computed(small, small_histories(), {})
-    return model.field, model.rest, whole(small.scene(small.mu[small.test[0]]))
+    model = compute_model(small, small_histories(), {})
+    return model.field, model.rest, nsf_full_model(small.scene(small.mu[small.test[0]]))
 
 
 def data_of_modes():
@@ -174,8 +181,8 @@ def values_of(fields, xhat):
 
 def samples_of(kind, fields, setup, count):
     """Return samples of a kind: drawn, weighted point by point, or weighted cell by cell."""
-    choose = {"drawn": drawn, "weighted": partial(weighed, fields),
-              "cells": partial(of_cells, fields, setup.problem)}
+    choose = {"drawn": drawn_samples, "weighted": partial(weighted_samples, fields),
+              "cells": partial(cell_samples, fields, setup.problem)}
     return choose[kind](len(setup.X), count, 0)
 
 
@@ -191,17 +198,17 @@ def nsf_modes(samples, count, steps, map_alone=False, **options):
 def nsf_networks(name, scene_name, values, mu, count, steps):
     """Return a reduced run of a scene with other values on stored networks."""
     stored = model_file.load(NSF_WEIGHTS / f"{name}.npz")
-    setup = whole(scene(scene_name, **values))
+    setup = nsf_full_model(scene(scene_name, **values))
     rest = stored.rest
     fields = learned(setup.X, stored.field, mu, BLOCK * setup.problem.dx)
-    return nsf(setup, fields, rest, (drawn(len(setup.X), count, 0), steps))
+    return nsf(setup, fields, rest, (drawn_samples(len(setup.X), count, 0), steps))
 
 
 def nsf(setup, fields, rest, plan, factor=1.0, inversion="nonlinear"):
     """Return latent coordinates, reports and last fields of a run; plan: samples and steps."""
     chosen, steps = plan
-    run = infer(setup, fields, Plan((chosen,), factor, inversion), rest)
-    times, states, reports = zip(*islice(run, steps + 1), strict=True)
+    run = nsf_run(setup, fields, FieldRunOptions((chosen,), factor, inversion), rest)
+    times, states, reports, _ = zip(*islice(run.states(), steps + 1), strict=True)
     reports = [report and report[:6] for report in reports]
     return {"t": times, "latent": np.array([state[0] for state in states]), "reports": reports,
             "fields": values_of(fields, states[-1][0])}
@@ -214,10 +221,10 @@ def nsf_joint(name, key, train, values, sizes, plan):
     samples and of steps.
     """
     scenes = [scene(name, **values, **{key: value}) for value in train]
-    runs = joined((history(one, [value], every=values["every"])
+    runs = joined((simulate_history(one, [value], every=values["every"])
                    for one, value in zip(scenes, train, strict=True)), len(train))
-    setup = whole(scenes[len(train) // 2])
-    size, chosen = BLOCK * setup.problem.dx, (drawn(len(setup.X), plan[0], 0), plan[1])
+    setup = nsf_full_model(scenes[len(train) // 2])
+    size, chosen = BLOCK * setup.problem.dx, (drawn_samples(len(setup.X), plan[0], 0), plan[1])
     fields, xhat, scale = joint(runs, Sizes(*sizes), size)
     alone, coordinates = spanned(runs, Sizes(*sizes), size, False)
     return {"scale": tuple(scale),
@@ -228,7 +235,7 @@ def nsf_joint(name, key, train, values, sizes, plan):
 def joint_run(setup, fields, rest, scale, plan):
     """Return latent coordinates, reports and last fields of steps of position and stress."""
     problem, (chosen, steps) = setup.problem, plan
-    stepper = joint_stepper(fields, setup.matter, problem, scale)
+    stepper = joint_stepper(fields, setup.material, problem, scale)
     states, reports, dt = [Latent(rest)], [], problem.clock.dt
     for k in range(steps):
         state, report = stepper.step(states[-1], chosen.points, k * dt, dt)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from mpm_ref.rom.latent import VELOCITIES
-from mpm_ref.rom.study.run import PROJECTIONS, SCHEMES, Way
+from mpm_ref.rom.study.run import PROJECTIONS, SCHEMES, RunOptions
 
 from ..common.registry import experiment
 from .networks import BOTH, REPEATED, TERMS
@@ -26,7 +26,8 @@ def terms(run):
             found = tests.errors(name, way)
             share(run, f"ldm.fig7.{way.name}.{trained_with}", found, tests.scale, comparator="info")
             rows.append((way.name, *(weight > 0.0 for weight in TERMS[trained_with]), *found))
-    share(run, "ldm.fig7.printed-weights", tests.errors("gravity-r7-printed", Way()), tests.scale,
+    share(run, "ldm.fig7.printed-weights", tests.errors("gravity-r7-printed", RunOptions()),
+          tests.scale,
           "lambda_F = 100 and lambda_v = 0.01 in SI units, Lagrangian and linear",
           comparator="info")
     worst(run, "ldm.fig7.scale_max", rows, tests)
@@ -40,7 +41,7 @@ def velocity(run):
     tests, rows = some(run)
     for projection in PROJECTIONS:
         for choice in run.progress(VELOCITIES, projection):
-            found = tests.errors("gravity-r4", Way(projection=projection, velocity=choice))
+            found = tests.errors("gravity-r4", RunOptions(projection=projection, velocity=choice))
             share(run, f"ldm.velocity.{choice}.{projection}", found, tests.scale,
                   "as printed" if choice == "latest" else "", comparator="info")
             rows.append((choice, projection, *found))
@@ -55,7 +56,7 @@ def dimensions(run):
     for r in run.progress(run.choose(quick=(2, 4), standard=range(1, 8)), "r"):
         name = f"gravity-r{r}"
         rows += [(r, way.name, *tests.errors(name, way)) for way in ways(run)]
-        beside += [(r, "nearest", *tests.nearest(name)), (r, "pod", *tests.linear(r, Way())),
+        beside += [(r, "nearest", *tests.nearest(name)), (r, "pod", *tests.linear(r, RunOptions())),
                    (r, "pod.nearest", *tests.nearest_linear(r))]
     for r, name, *found in rows + beside:
         share(run, f"ldm.fig8.r{r}.{name}", found, tests.scale, comparator="info")
@@ -75,7 +76,7 @@ def samples(run):
         for way in ways(run, count):
             found = [tests.errors("gravity-r4", way, 1000 * k) for k in draws]
             rows += of_draws(run, way.name, count, found, tests)
-        found = [tests.linear(4, Way(points=count), 1000 * k) for k in draws]
+        found = [tests.linear(4, RunOptions(points=count), 1000 * k) for k in draws]
         rows += of_draws(run, "pod", count, found, tests)
     own = [row for row in rows if row[0] != "pod"]
     worst(run, "ldm.fig9.error_at_10", [row for row in own if row[1] == 10], tests)
@@ -113,7 +114,7 @@ def some(run):
 def ways(run, points=None):
     """The schemes of a profile, with so many samples."""
     chosen = run.choose(quick=SCHEMES[1:2], standard=SCHEMES)
-    return [Way(*scheme, points) for scheme in chosen]
+    return [RunOptions(*scheme, points) for scheme in chosen]
 
 
 def of_draws(run, name, count, found, tests):

@@ -6,16 +6,16 @@ import numpy as np
 
 from mpm_ref.body import restore_order
 from mpm_ref.core.blas import one_thread
-from mpm_ref.rom.study.case import Case, case
-from mpm_ref.rom.study.errors import Errors, Squares
-from mpm_ref.rom.study.run import Way, march
+from mpm_ref.rom.study.errors import PositionErrors, Squares
+from mpm_ref.rom.study.full_model import FullModel, ldm_full_model
+from mpm_ref.rom.study.run import RunOptions, ldm_run
 from mpm_ref.scene import build
 from mpm_ref.simulate import simulate
 
 from ..common.scenes import threads_for
 from .networks import trained
 
-SHOWN_WAY = Way("lagrangian", "linear", 50)
+SHOWN_WAY = RunOptions("lagrangian", "linear", 50)
 ALL = SHOWN_WAY._replace(points=None)       # as the paper's Table 4
 ERROR_POINTS = 4000         # points that errors are of, at most
 
@@ -23,12 +23,12 @@ ERROR_POINTS = 4000         # points that errors are of, at most
 class Pair(NamedTuple):
     """A reduced run beside the full one."""
 
-    case: Case              # that was run
+    ldm_full_model: FullModel              # that was run
     X: np.ndarray           # (n, d) points at rest that are shown [m]
     reduced: np.ndarray     # (shots, n, d) their positions [m]
     full: np.ndarray        # (shots, n, d)
     xhat: np.ndarray        # (k + 1, r) latent coordinates
-    errors: Errors          # over all time levels
+    errors: PositionErrors          # over all time levels
     tracked: int            # points that errors are of
     samples: int            # of a step
 
@@ -49,12 +49,12 @@ def pair(scene, net, shots=None, shown=slice(None), way=SHOWN_WAY):
     """`Pair` of a scene on a trained map: positions of the points `shown` at the steps `shots`,
     None for all of them.
     """
-    one, model = case(scene), trained(net)
+    one, model = ldm_full_model(scene), trained(net)
     tracked = slice(None, None, -(-len(one.X) // ERROR_POINTS))
     place, sums, kept, seen = model.field.place, Squares(one.X[tracked]), [], []
     with threads_for(one.problem.bodies), one_thread():
-        states = march(one, model.field, way, model.rest)
-        for k, (x, (latent, report)) in enumerate(zip(positions(scene), states, strict=True)):
+        states = ldm_run(one, model.field, way, model.rest).states()
+        for k, (x, (_, latent, report, _)) in enumerate(zip(positions(scene), states, strict=True)):
             sums.add(place(one.X[tracked], latent.xhat), x[tracked])
             seen.append((latent.xhat, report))
             if shots is None or k in shots:
@@ -71,7 +71,7 @@ def positions(scene):
 
 
 def beside(X, found, reference):
-    """`Errors` of states found (k, n, d) of points X (n, d) beside those of another run."""
+    """`PositionErrors` of states found (k, n, d) of points X (n, d) beside those of another run."""
     sums = Squares(X)
     for x, other in zip(found, reference, strict=True):
         sums.add(x, other)

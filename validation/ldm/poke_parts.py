@@ -10,9 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm_ref.rom.latent import initial
-from mpm_ref.rom.study.case import prescribed
 from mpm_ref.rom.study.errors import Squares
-from mpm_ref.rom.study.run import march, model, picked, stepped
+from mpm_ref.rom.study.full_model import prescribed_regions
+from mpm_ref.rom.study.run import ldm_model, ldm_run
+from mpm_ref.rom.study.samples import ldm_sampler
 
 from ..common.registry import experiment
 from .networks import trained
@@ -64,8 +65,8 @@ def parts(tests, decoder, rest, way):
     sums = Parts(*(Squares(tests.X) for _ in Parts._fields))
     for one, x in zip(tests.cases, tests.x, strict=True):
         end = let_go(one)
-        states = march(one, decoder, way, rest)
-        started = [decoder.place(one.X, latent.xhat) for latent, _ in states]
+        states = ldm_run(one, decoder, way, rest).states()
+        started = [decoder.place(one.X, state.latent.xhat) for state in states]
         add(sums.whole, started, x)
         add(sums.driven, started[:end + 1], x[:end + 1])
         add(sums.free, swinging(one, decoder, rest, way, x), x[end:])
@@ -82,7 +83,7 @@ def let_go(one):
     """Number of the step of a `Case` after which its patch, the only region that ever does, lets
     go. Raises ValueError where none or several do.
     """
-    ends = [part.until for part in prescribed(one.problem) if isfinite(part.until)]
+    ends = [part.until for part in prescribed_regions(one.problem) if isfinite(part.until)]
     if len(ends) != 1:
         raise ValueError(f"{len(ends)} prescribed regions let go: expected one, that of a poke; "
                          "give it, and it alone, an `until`")
@@ -95,7 +96,10 @@ def swinging(one, decoder, rest, way, x):
     """
     clock, first = one.problem.clock, let_go(one)
     start = initial(decoder, one.X, x[first], (x[first] - x[first - 1]) / clock.dt, rest)
-    pick = picked(one, decoder, way, rest, 0)
-    yield decoder.place(one.X, start.xhat)
-    for latent, _ in stepped(model(one, decoder, way), clock, start, lambda t, _: pick(t), first):
+    stepper, sampler = ldm_model(one, decoder, way), ldm_sampler(one, decoder, way, rest, 0)
+    latent = start
+    yield decoder.place(one.X, latent.xhat)
+    for k in range(first, clock.steps):
+        t = k * clock.dt
+        latent, _ = stepper.step(latent, sampler(t, latent).points, t, clock.dt)
         yield decoder.place(one.X, latent.xhat)

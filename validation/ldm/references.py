@@ -7,7 +7,7 @@ import numpy as np
 
 from mpm_ref.rom.fields.pod import basis, modes
 from mpm_ref.rom.fields.polynomial_manifold import curved
-from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.full_model import ldm_full_model
 
 from .networks import trained
 from .reduced_runs import compared, reconstructed
@@ -66,7 +66,7 @@ class References(NamedTuple):
 def references(study, count=None):
     """`References` of some test runs of a study, evenly among them, or of all."""
     runs = study.test[::-(-len(study.test) // count)] if count else study.test
-    cases = tuple(case(study.scene(*study.mu[k])) for k in runs)
+    cases = tuple(ldm_full_model(study.scene(*study.mu[k])) for k in runs)
     return References(study.name, cases, tuple(study.run(runs).x), len(study.test))
 
 

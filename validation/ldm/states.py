@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mpm_ref.rom.sampling import PER_GROUP
-from mpm_ref.rom.study.case import case, prescribed
-from mpm_ref.rom.study.run import picked
+from mpm_ref.rom.study.full_model import ldm_full_model, prescribed_regions
+from mpm_ref.rom.study.samples import ldm_sampler
 
 from ..common.registry import experiment
 from .networks import trained
@@ -31,9 +31,10 @@ LEANINGS = ((0.66, 1.386, -0.903), (0.75, 1.06, -0.537), (0.8, 0.403, -0.967),
             profiles=("quick", "standard"), budget={"quick": 5, "standard": 5})
 def sampled(run):
     """Keeps all points and one draw of samples; records how many are near what is held."""
-    one = case(TOWER.scene(*TOWER.mu[TOWER.test[0]]))
-    model, held = trained("tower"), one.held(0.0)
-    samples = picked(one, model.field, SHOWN_WAY, model.rest, run.seed)(0.0)
+    one = ldm_full_model(TOWER.scene(*TOWER.mu[TOWER.test[0]]))
+    model, held = trained("tower"), one.constrained_points(0.0)
+    sampler = ldm_sampler(one, model.field, SHOWN_WAY, model.rest, run.seed)
+    samples = sampler(0.0, None).points
     counts = [int(np.isin(samples, near).sum()) for near in held]
     scale = f"{len(one.X)} particles"
     keep(run, X=one.X, samples=samples, held=np.array([np.isin(samples, near) for near in held]))
@@ -149,7 +150,7 @@ def returned(a):
 def tower(run):
     """Keeps the outermost points at three times, reduced and full."""
     scene = leaning(*LEANINGS[0])
-    shots, shown = (0, scene.steps // 2, scene.steps), skin(case(scene).X)
+    shots, shown = (0, scene.steps // 2, scene.steps), skin(ldm_full_model(scene).X)
     found = [pair(leaning(*mu), "tower", shots, shown)
              for mu in run.progress(LEANINGS, "runs")]
     mu = [driven(one.case) for one in found]
@@ -169,7 +170,7 @@ def driven(one):
     """r [m/s], theta and phi [rad] of the last region that a `Case` drives: of its mean velocity
     r (cos phi cos theta, cos phi sin theta, sin phi).
     """
-    clock, motion = one.problem.clock, prescribed(one.problem)[-1].motion
+    clock, motion = one.problem.clock, prescribed_regions(one.problem)[-1].motion
     end = clock.steps * clock.dt
     v = motion.pose(end, end, one.problem.dim).v[0]
     r = float(np.linalg.norm(v))

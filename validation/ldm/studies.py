@@ -5,10 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mpm_ref.rom.study.dataset import simulate_snapshots
 from mpm_ref.rom.study.study import latin
 from mpm_ref.sampling import Regular
 from mpm_ref.scene import build
-from mpm_ref.trajectories import snapshots
 
 from ..common.scenes import catalogue_scene, threads_for, with_
 
@@ -38,7 +38,7 @@ class Study(NamedTuple):
         """`Snapshots` of the full-order runs of these numbers."""
         first = self.problem(numbers[0])
         with threads_for(first.bodies):
-            return snapshots((self.problem(k) for k in numbers), self.mu[list(numbers)],
+            return simulate_snapshots((self.problem(k) for k in numbers), self.mu[list(numbers)],
                              self.every)
 
 

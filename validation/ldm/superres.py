@@ -3,9 +3,9 @@
 import numpy as np
 
 from mpm_ref.body import Body, particles_at
-from mpm_ref.rom.study.case import case
 from mpm_ref.rom.study.errors import Squares
-from mpm_ref.rom.study.run import SCHEMES, Way, march
+from mpm_ref.rom.study.full_model import ldm_full_model
+from mpm_ref.rom.study.run import SCHEMES, RunOptions, ldm_run
 from mpm_ref.scene import build
 from mpm_ref.trajectories import history
 
@@ -57,10 +57,10 @@ def superresolution(run):
     model, sums, rows = trained(NET), {}, []
     for k in run.progress(tests, "runs"):
         mu = TORSION.mu[k]
-        one = case(fine(*mu))
+        one = ldm_full_model(fine(*mu))
         with threads_for(one.problem.bodies):
             x = history(build(fine(*mu))).x[::REFINE]
-        found = {Way(*scheme).name: reduced(one, model, Way(*scheme))[::REFINE]
+        found = {RunOptions(*scheme).name: reduced(one, model, RunOptions(*scheme))[::REFINE]
                  for scheme in schemes}
         found[BASELINE] = advected(TORSION.scene(*mu), one.X)
         for name, states in found.items():
@@ -94,5 +94,5 @@ def told(run, errors, scale):
 
 def reduced(one, model, way):
     """x (k + 1, n, d) of a reduced run."""
-    return np.array([model.field.place(one.X, latent.xhat)
-                     for latent, _ in march(one, model.field, way, model.rest)])
+    run = ldm_run(one, model.field, way, model.rest)
+    return np.array([model.field.place(one.X, state.latent.xhat) for state in run.states()])

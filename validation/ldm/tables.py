@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from mpm_ref.rom.study.case import case
-from mpm_ref.rom.study.errors import Errors
-from mpm_ref.rom.study.run import SCHEMES, Way
+from mpm_ref.rom.study.errors import PositionErrors
+from mpm_ref.rom.study.full_model import ldm_full_model
+from mpm_ref.rom.study.run import SCHEMES, RunOptions
 from mpm_ref.scene import build
 from mpm_ref.trajectories import history
 
@@ -47,7 +47,7 @@ def table(run, name, tests, nets):
     draws, rows = range(run.choose(quick=1, standard=DRAWS[tests.study])), []
     for scheme in run.progress(schemes, "schemes"):
         for points in (POINTS, None):
-            way = Way(*scheme, points)
+            way = RunOptions(*scheme, points)
             found = [(net, draw, kept(run, tests, net, way, draw)) for net in nets
                      for draw in (draws if points else range(1))]
             mean, words = mean_of([errors for *_, errors in found], "trainings and draws")
@@ -58,8 +58,8 @@ def table(run, name, tests, nets):
 
 
 def kept(run, tests, net, way, draw):
-    """`Errors` of one draw of samples, kept if the experiment is cut off."""
-    return Errors(*run.cached(f"{net}.{way.name}.{way.points}.{draw}",
+    """`PositionErrors` of one draw of samples, kept if the experiment is cut off."""
+    return PositionErrors(*run.cached(f"{net}.{way.name}.{way.points}.{draw}",
                             lambda: tests.errors(net, way, 1000 * draw)))
 
 
@@ -67,8 +67,8 @@ def beside(run, name, tests, nets, draws):
     """Record the nearest states of the learned maps, and POD with the same samples."""
     r = R[tests.study]
     found = {"nearest": mean_of([tests.nearest(net) for net in nets], "")[0],
-             "pod.nearest": tests.nearest_linear(r), "pod": tests.linear(r, Way()),
-             f"pod.{POINTS}": mean_of([tests.linear(r, Way(points=POINTS), 1000 * draw)
+             "pod.nearest": tests.nearest_linear(r), "pod": tests.linear(r, RunOptions()),
+             f"pod.{POINTS}": mean_of([tests.linear(r, RunOptions(points=POINTS), 1000 * draw)
                                        for draw in draws], "")[0]}
     for word, errors in found.items():
         share(run, f"{name}.{word}", errors, tests.scale, comparator="info")
@@ -81,15 +81,16 @@ def beside(run, name, tests, nets, draws):
 def in_a_row(run):
     """Errors of ten pokes one after the other, on the map that was trained on single ones."""
     scene = poked_again(run.rng.uniform(0.0, 2.0 * np.pi, POKED))
-    one = case(scene)
+    one = ldm_full_model(scene)
     with threads_for(one.problem.bodies):
         x = history(build(scene)).x
     tests, rows = References(POKES.name, (one,), (x,), 1), []
     for scheme in run.progress(SCHEMES, "schemes"):
         for points in (POINTS, None):
-            way = Way(*scheme, points)
+            way = RunOptions(*scheme, points)
             errors = kept(run, tests, "poke", way, 0)
             share(run, f"ldm.table6.{way.name}.{points or 'all'}", errors, tests.scale)
             rows.append((way.name, points or len(one.X), "poke", 0, *errors))
-    share(run, "ldm.table6.pod", tests.linear(R["poke"], Way()), tests.scale, comparator="info")
+    share(run, "ldm.table6.pod", tests.linear(R["poke"], RunOptions()), tests.scale,
+          comparator="info")
     run.table("errors", COLUMNS, rows)

@@ -10,16 +10,16 @@ import numpy as np
 from mpm_ref.body import restore_order
 from mpm_ref.core.blas import one_thread
 from mpm_ref.rom.step import BREAKDOWNS
-from mpm_ref.rom.study.case import case
-from mpm_ref.rom.study.errors import Errors, Squares
-from mpm_ref.rom.study.run import Way, march
+from mpm_ref.rom.study.errors import PositionErrors, Squares
+from mpm_ref.rom.study.full_model import ldm_full_model
+from mpm_ref.rom.study.run import RunOptions, ldm_run
 from mpm_ref.scene import Scheme, build
 from mpm_ref.simulate import State, advance
 
 from ..common.scenes import with_
 
 TRACKED = 4000              # points that errors are of
-WAY = Way._fields
+WAY = RunOptions._fields
 COLUMNS = (*WAY, "wall", "cpu", "quadrature_points", "origin", "centroid", "displacement")
 
 
@@ -33,10 +33,10 @@ class Spent(NamedTuple):
 class Raced(NamedTuple):
     """A reduced run beside the full one."""
 
-    way: Way
+    way: RunOptions
     spent: Spent            # median over the steps
     points: int             # quadrature points of a step, median
-    errors: Errors
+    errors: PositionErrors
 
     @property
     def row(self):
@@ -47,7 +47,7 @@ class Raced(NamedTuple):
     @property
     def words(self):
         """The way, as part of a name: what differs from the paper's."""
-        usual, points = Way("eulerian", "linear")._asdict(), self.way.points or "all"
+        usual, points = RunOptions("eulerian", "linear")._asdict(), self.way.points or "all"
         own = {name: a for name, a in self.way._asdict().items()
                if name not in ("quadrature", "projection", "points") and a != usual[name]}
         return "-".join(map(str, (self.way.quadrature, self.way.projection, points,
@@ -90,10 +90,10 @@ class Online:
 
     def __init__(self, one, at, way, every):
         (self.map, rest), self.X, self.way = at, one.X[::every], way
-        self.states = march(one, self.map, way, rest)
+        self.states = ldm_run(one, self.map, way, rest).states()
         self.sums, self.spent, self.points, self.ended = Squares(self.X), [], [], False
-        latent, _ = next(self.states)
-        self.sums.add(self.map.place(self.X, latent.xhat), self.X)
+        start = next(self.states)
+        self.sums.add(self.map.place(self.X, start.latent.xhat), self.X)
 
     def step(self, reference):
         """One step, what it takes, and its error."""
@@ -111,7 +111,7 @@ class Online:
     def raced(self):
         """`Raced` after the last step; infinite if it did not get there."""
         if self.ended:
-            return Raced(self.way, Spent(np.inf, np.inf), 0, Errors(np.inf, np.inf, np.inf))
+            return Raced(self.way, Spent(np.inf, np.inf), 0, PositionErrors(np.inf, np.inf, np.inf))
         return Raced(self.way, median(self.spent), int(np.median(self.points)), self.sums.errors)
 
 
@@ -126,7 +126,7 @@ def alone(one, at, way, x):
 
 def race(scene, at, ways, steps):
     """What a step of the full model `Spent`, and `Raced` of each way on at = (map, rest)."""
-    one, full = case(scene), Full(scene)
+    one, full = ldm_full_model(scene), Full(scene)
     every = -(-len(one.X) // TRACKED)
     with one_thread():
         online = [Online(one, at, way, every) for way in ways]

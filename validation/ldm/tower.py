@@ -3,7 +3,7 @@
 The map is trained on one in sixteen of 34 thousand points on a grid three times as coarse.
 """
 
-from mpm_ref.rom.study.run import PROJECTIONS, SCHEMES, Way
+from mpm_ref.rom.study.run import PROJECTIONS, SCHEMES, RunOptions
 from mpm_ref.scene import build
 
 from ..common.registry import experiment
@@ -17,8 +17,8 @@ SOUND = 1.5         # times the error of the paper's way, up to which a faster o
 GRIDS = {34: (1.44, 2), 385: (0.96, 3), 3076: (0.48, 3)}     # thousand points: dx [m], per axis
 POINTS = (25, 50)
 FEWEST = 10         # samples of the cheapest way
-PAPER = Way("eulerian", "linear")
-FAST = PAPER._replace(velocity="transported", close=1e-2, precision="single")
+PAPER = RunOptions("eulerian", "linear")
+FAST = PAPER._replace(velocity="transported", preimage_tolerance=1e-2, precision="single")
 OWN = ("particles", *COLUMNS, "wall_full", "wall_fastest", "wall_per_second", "speed_up",
        "speed_up_same")
 
@@ -30,8 +30,8 @@ def scene_of(size, k=TOWER.test[0]):
 
 def ways(points):
     """The paper's schemes and cheaper ones, at numbers of samples."""
-    cheap = (FAST, Way("resampled", "linear"), FAST._replace(quadrature="resampled"))
-    chosen = [*(Way(*scheme) for scheme in SCHEMES), *cheap]
+    cheap = (FAST, RunOptions("resampled", "linear"), FAST._replace(quadrature="resampled"))
+    chosen = [*(RunOptions(*scheme) for scheme in SCHEMES), *cheap]
     return [*(way._replace(points=n) for way in chosen for n in points),
             FAST._replace(points=FEWEST)]
 
@@ -76,7 +76,7 @@ def printed(run, rows):
         return
     rows = [r for r in rows if r["particles"] == rows[-1]["particles"]
             and (r["quadrature"], r["projection"]) == ("eulerian", PROJECTIONS[1])]
-    usual = next(r for r in rows if r["close"] == PAPER.close)
+    usual = next(r for r in rows if r["preimage_tolerance"] == PAPER.preimage_tolerance)
     sound = [r for r in rows if r["points"] < 50 and r["origin"] <= SOUND * usual["origin"]]
     best = min(sound, key=lambda r: r["wall"])
     way = ", ".join(f"{name} {best[name]}" for name in WAY)
@@ -85,6 +85,7 @@ def printed(run, rows):
                note=f"over the full model with its fastest transfer; {best['speed_up_same']:.3g} x "
                f"over the transfer it was trained on; {way}")
     run.record("ldm.fig16.realtime", best["wall_per_second"], scale=scale, note=way)
-    most = next(r for r in rows if r["points"] == 50 and r["close"] == PAPER.close)
+    most = next(r for r in rows if r["points"] == 50
+                and r["preimage_tolerance"] == PAPER.preimage_tolerance)
     run.record("ldm.sec5_4.quadrature_points", most["quadrature_points"],
                scale=f"{scale}, 50 samples")

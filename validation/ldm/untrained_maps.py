@@ -9,7 +9,7 @@ vhat).
 
 import numpy as np
 
-from mpm_ref.rom.study.run import PROJECTIONS, Way
+from mpm_ref.rom.study.run import PROJECTIONS, RunOptions
 
 from ..common.registry import experiment
 from .networks import trained
@@ -72,7 +72,7 @@ def choices(run):
     for name, at in run.choose(quick=dict(list(known.items())[:1]), standard=known).items():
         for count in run.progress(run.choose(quick=(10,), standard=(5, 10, 25, 50)), name):
             for choice in CHOICES:
-                way = Way(points=count, samples=choice)
+                way = RunOptions(points=count, samples=choice)
                 found = [tests.on(*at, way, 1000 * k)
                          for k in range(run.choose(quick=1, standard=DRAWS))]
                 mean, words = mean_of(found, "draws of samples")
@@ -87,7 +87,7 @@ def both(run, name, tests, at):
     """Record errors on a map, at = (map, rest), with both projections; rows of a table."""
     rows, nearest = [], tests.near(*at).origin
     for projection in PROJECTIONS:
-        way = Way(projection=projection)
+        way = RunOptions(projection=projection)
         errors = tests.on(*at, way)
         share(run, f"{name}.{projection}", errors, tests.scale,
               f"the nearest states {100.0 * nearest:.3g} %", comparator="info")

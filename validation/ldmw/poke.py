@@ -55,7 +55,7 @@ def beside(run, tests, chosen):
 
 def samples(one, seed):
     """Sample points: five each of what is held and what is pushed, the others anywhere."""
-    pick = draw(len(one.X), HYPER, R, one.X.shape[1], one.held(0.0))
+    pick = draw(len(one.X), HYPER, R, one.X.shape[1], one.constrained_points(0.0))
     return pick(np.random.default_rng(seed))
 
 

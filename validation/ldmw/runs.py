@@ -12,13 +12,14 @@ import threadpoolctl
 from mpm_ref.rom.fields.pod import modes
 from mpm_ref.rom.quadrature.lagrangian import neighbours
 from mpm_ref.rom.quadrature.node_centric import node_centric, nodes_of
-from mpm_ref.rom.study.case import case
-from mpm_ref.rom.study.run import Way, model, start, stepped
+from mpm_ref.rom.study.full_model import ldm_full_model
+from mpm_ref.rom.study.run import ReducedRun, RunOptions, ldm_model, ldm_start
+from mpm_ref.rom.study.samples import SampleSet
 
 from ..common.scenes import threads_for
 from ..ldm.networks import trained
 
-POINT_WAY, NODE_WAY = Way("lagrangian", "linear"), Way("eulerian", "linear")
+POINT_WAY, NODE_WAY = RunOptions("lagrangian", "linear"), RunOptions("eulerian", "linear")
 
 
 class Fields(NamedTuple):
@@ -80,7 +81,7 @@ def compared(found):
 
 def runs(study, numbers):
     """`Runs` of these numbers of a study."""
-    cases = tuple(case(study.scene(*study.mu[k])) for k in numbers)
+    cases = tuple(ldm_full_model(study.scene(*study.mu[k])) for k in numbers)
     return Runs(study, cases, study.run(list(numbers)))
 
 
@@ -98,10 +99,13 @@ def record(run, name, fields, scale, note="", **rule):
 
 def march(one, map, rest, approach):
     """Yield the `Latent` of each time level of a reduced run."""
-    (stepper, choose), first = approach(one, map), start(one, map, rest)
-    yield first
-    for latent, _ in stepped(stepper, one.problem.clock, first, choose):
-        yield latent
+    (stepper, choose), first = approach(one, map), ldm_start(one, map, rest)
+    clock = one.problem.clock
+    run = ReducedRun(stepper, lambda: first,
+                     lambda xhat: lambda t, latent: SampleSet(t, choose(t, latent)),
+                     clock.dt, clock.steps)
+    for state in run.states():
+        yield state.latent
 
 
 def of_state(map, latent, X):
@@ -115,7 +119,7 @@ def by_points(samples, near=None):
     `Neighbours` that are given.
     """
     def approach(one, map):
-        stepper = model(one, map, POINT_WAY)
+        stepper = ldm_model(one, map, POINT_WAY)
         if near is not None:
             stepper = replace(stepper, quadrature=near)
         return stepper, lambda t, latent: samples
@@ -126,7 +130,7 @@ def by_points(samples, near=None):
 def kept(name, one, samples):
     """`Neighbours` of sample points in all training states of a trained map (LDMW-sets)."""
     of = trained(name)
-    points = model(one, of.field, POINT_WAY).quadrature
+    points = ldm_model(one, of.field, POINT_WAY).quadrature
     return neighbours(points, of.field, of.xhat, samples)
 
 
@@ -135,7 +139,7 @@ def by_nodes(chosen, count=None):
     points that have all their nodes among them, or all, are samples.
     """
     def approach(one, map):
-        stepper = model(one, map, NODE_WAY)
+        stepper = ldm_model(one, map, NODE_WAY)
         nodes = nodes_of(one.X[chosen], stepper.quadrature.dx, stepper.quadrature.degree)
         body = node_centric(stepper.quadrature, nodes)
 

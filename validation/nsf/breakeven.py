@@ -21,8 +21,8 @@ from mpm_ref.rom.fields.network import Decoder, Field, FieldUnits, LearnedFields
 from mpm_ref.rom.fields.perceptron import network
 from mpm_ref.rom.fields.pod_fields import Part, Sizes, Spanned, cells
 from mpm_ref.rom.fields.radial_basis import Radial
-from mpm_ref.rom.study.nsf_case import whole
-from mpm_ref.rom.study.nsf_fields import BLOCK
+from mpm_ref.rom.study.full_model import nsf_full_model
+from mpm_ref.rom.study.reduce import BLOCK
 from validation.nsf.pointwise_networks import infer
 
 from ..common.registry import experiment
@@ -73,7 +73,7 @@ def breakeven(run):
     for name, scene in run.progress(SCENES.items(), "scenes"):
         study = scene.study(run.choose(quick=3, standard=1))
         full, deform = whole_steps(study, run.choose(quick=10, standard=50))
-        own = whole(study.run(study.test[0]))
+        own = nsf_full_model(study.run(study.test[0]))
         n = len(own.X)
         for word, products, fields in kinds(own, scene, run.rng):
             points = np.sort(run.rng.choice(n, round(scene.share * n), replace=False))

@@ -5,7 +5,7 @@ place of the paper's networks.
 
 import numpy as np
 
-from mpm_ref.rom.study.errors import Errors
+from mpm_ref.rom.study.errors import PositionErrors
 
 from ..common.registry import experiment
 from .reduced_runs import FASTER, refitted, tested
@@ -96,7 +96,7 @@ def known(run, name, one):
             ("nearest", nearest, "nearest states that the fields know"),
             ("next_run", next_run, "the training run whose parameter is nearest, taken as it is; "
              f"in {same} of {len(next_run)} tests it is the very same run")):
-        said(run, f"{name}.{word}", Errors(*np.mean(found, axis=0)), one.scale, note,
+        said(run, f"{name}.{word}", PositionErrors(*np.mean(found, axis=0)), one.scale, note,
              comparator="info")
 
 
@@ -150,15 +150,15 @@ def mean(rows, column):
 
 def share(run, name, rows, scale, note, **rule):
     """Record the mean error of rows, in per cent, and the largest; rule: as of `said`."""
-    errors = Errors(*(mean(rows, column) for column in Errors._fields))
+    errors = PositionErrors(*(mean(rows, column) for column in PositionErrors._fields))
     worst = 100.0 * max(row[COLUMNS.index("origin")] for row in rows)
     said(run, name, errors, scale, f"{note}; mean of {len(rows)}, the largest {worst:.3g} %",
          **rule)
 
 
 def said(run, name, errors, scale, note, fields=MODAL, **rule):
-    """Record `Errors` in per cent: the paper's, which depends on the origin, and others beside;
-    fields: what they are, in words.
+    """Record `PositionErrors` in per cent: the paper's, which depends on the origin, and others
+    beside; fields: what they are, in words.
     """
     origin, centroid, displacement = (100.0 * error for error in errors)
     run.record(name, origin, unit="%", scale=scale, note=f"{note}; {fields}; {ORIGIN}; from the "

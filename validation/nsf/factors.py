@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm_ref.core.blas import one_thread
-from mpm_ref.rom.study.nsf_case import whole
-from mpm_ref.rom.study.nsf_run import Plan, infer
+from mpm_ref.rom.study.full_model import nsf_full_model
+from mpm_ref.rom.study.run import FieldRunOptions, nsf_run
 from mpm_ref.simulate import simulate
 
 from ..common.registry import experiment
@@ -107,7 +107,7 @@ def taken(one, ways, repeats):
     still = with_(scene, every=scene.steps, interval=None)
     plans = [plan_of(one, way) for way in ways]
     with one_thread():
-        found = [[seconds(lambda: simulate(whole(still).problem)),
+        found = [[seconds(lambda: simulate(nsf_full_model(still).problem)),
                   *(seconds(lambda plan=plan: reduced_run(one, plan)) for plan in plans)]
                  for _ in range(repeats)]
     full, *reduced = np.median(found, axis=0).tolist()
@@ -115,17 +115,18 @@ def taken(one, ways, repeats):
 
 
 def plan_of(one, way):
-    """`Plan` of a `Way`."""
-    scene = whole(one.study.run(one.study.test[0]))
+    """`FieldRunOptions` of a `Way`."""
+    scene = nsf_full_model(one.study.run(one.study.test[0]))
     by = None if way.kind == DRAWN else one.fields
     sets = way.of(one).study.chosen(scene, way.samples, 0, by)
-    return Plan(sets, way.faster)
+    return FieldRunOptions(sets, way.faster)
 
 
 def reduced_run(one, plan):
     """The states of a reduced run of the first test."""
     value = one.study.test[0]
-    return infer(whole(one.study.run(value)), one.of(value), plan, one.rest)
+    full = nsf_full_model(one.study.run(value))
+    return nsf_run(full, one.of(value), plan, one.rest).states()
 
 
 def seconds(made):

@@ -5,7 +5,8 @@ from itertools import product
 import numpy as np
 
 from mpm_ref.rom.quadrature.stencil_overlap import bases, reach
-from mpm_ref.rom.study.nsf_case import history, whole
+from mpm_ref.rom.study.dataset import simulate_history
+from mpm_ref.rom.study.full_model import nsf_full_model
 
 from ..common.registry import experiment
 from ..ldm.published_bodies import keep
@@ -46,8 +47,8 @@ def thinned(x):
 def half_way(study):
     """`Whole` of a study's last training run, and where its points (n, d) are half-way [m]."""
     scene = study.run(study.train[-1])
-    x = history(scene, [study.train[-1]], every=study.spacing).x[0]
-    return whole(scene), x[len(x) // 2]
+    x = simulate_history(scene, [study.train[-1]], every=study.spacing).x[0]
+    return nsf_full_model(scene), x[len(x) // 2]
 
 
 def nodes_of(x, dx, degree):

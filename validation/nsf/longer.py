@@ -12,10 +12,11 @@ import numpy as np
 from mpm_ref.core.blas import one_thread
 from mpm_ref.monitor import Unstable
 from mpm_ref.rom.kinematics import NoBody
-from mpm_ref.rom.study.errors import Errors
-from mpm_ref.rom.study.nsf_case import at_once, history, whole
-from mpm_ref.rom.study.nsf_evaluate import course, level_of, share
-from mpm_ref.rom.study.nsf_run import Plan
+from mpm_ref.rom.study.dataset import simulate_history
+from mpm_ref.rom.study.errors import PositionErrors
+from mpm_ref.rom.study.evaluate import history_reference, level_of, path_errors, stress_share
+from mpm_ref.rom.study.full_model import field_of, nsf_full_model
+from mpm_ref.rom.study.run import step_count
 from mpm_ref.simulate import simulate
 
 from ..common.registry import experiment
@@ -32,23 +33,23 @@ class Ended(NamedTuple):
     """How a full-order run ended."""
 
     states: int             # that were compared
-    errors: Errors          # infinite where it ended before its time
+    errors: PositionErrors          # infinite where it ended before its time
     stress: float           # of the Kirchhoff stress, over its norm; likewise
     said: str               # why it ended then
 
 
 class Itself(NamedTuple):
-    """A full-order run in place of fields: what `course` asks of its bodies."""
+    """A full-order run in place of fields: what `path_errors` asks of its bodies."""
 
     X: np.ndarray           # (n, d) points at the start [m]
 
     def place(self, points, bodies):
         """Positions (n, d) of points."""
-        return at_once(bodies, "x")[points]
+        return field_of(bodies, "x")[points]
 
     def stress(self, points, bodies):
         """Their Kirchhoff stress (n, d, d)."""
-        return at_once(bodies, "tau")[points]
+        return field_of(bodies, "tau")[points]
 
 
 @experiment("nsf.longer", title="NSF: full-order runs with longer steps",
@@ -73,7 +74,7 @@ def longer(run):
 
 def stretched(scene, factor):
     """The scene with steps so many times as long, each of which is a frame."""
-    return with_(scene, dt=factor * scene.dt, steps=Plan((), factor).steps(scene), every=1,
+    return with_(scene, dt=factor * scene.dt, steps=step_count(scene, factor), every=1,
                  interval=None, unstable="allow")
 
 
@@ -90,7 +91,7 @@ def taken(scene, repeats):
 def of_run(scene):
     """Wall seconds of a run; infinite where it ends before its time."""
     try:
-        return seconds(lambda: simulate(whole(scene).problem))
+        return seconds(lambda: simulate(nsf_full_model(scene).problem))
     except Unstable:
         return inf
 
@@ -98,14 +99,15 @@ def of_run(scene):
 def ends_of(study, value):
     """`Ended` of runs with steps of FACTORS of the test with a value, in their order."""
     scene = study.run(value)
-    test = history(scene, [value], np.float32, study.spacing)
+    test = simulate_history(scene, [value], np.float32, study.spacing)
     return [end_of(test, stretched(scene, factor)) for factor in FACTORS]
 
 
 def end_of(test, scene):
     """`Ended` of the run of a scene beside the states of a `Histories`."""
-    own, stress = course(Itself(test.X), test.x[0], test.tau[0], states(test, scene))
-    return Ended(int(np.isfinite(own.levels[1:]).sum()), own.errors, share(stress), own.said)
+    own = path_errors(Itself(test.X), history_reference(test), states(test, scene))
+    return Ended(int(np.isfinite(own.levels[1:]).sum()), own.errors, stress_share(own.stress),
+                 own.breakdown)
 
 
 def states(test, scene):
@@ -113,7 +115,7 @@ def states(test, scene):
     time.
     """
     try:
-        for frame in simulate(whole(scene).problem):
+        for frame in simulate(nsf_full_model(scene).problem):
             yield level_of(frame.t / test.dt), frame.state.bodies
     except Unstable as fault:
         raise NoBody(fault.reason) from fault
@@ -121,7 +123,7 @@ def states(test, scene):
 
 def scale_of(study):
     """What is run, in words."""
-    one = whole(study.run(study.test[1]))
+    one = nsf_full_model(study.run(study.test[1]))
     coarse = f", dx and dt {study.coarser} times as long" if study.coarser > 1 else ""
     return f"{len(one.X)} particles, {one.problem.clock.steps} steps{coarse}"
 

@@ -12,10 +12,18 @@ from mpm_ref.rom.fields.pod_fields import Sizes, spanned
 from mpm_ref.rom.latent import Latent
 from mpm_ref.rom.projection import project_position
 from mpm_ref.rom.snapshots import joined
-from mpm_ref.rom.study.nsf_case import history, whole
-from mpm_ref.rom.study.nsf_evaluate import closest, course, level_of, share
-from mpm_ref.rom.study.nsf_fields import BLOCK
-from mpm_ref.rom.study.nsf_run import drawn, model
+from mpm_ref.rom.study.dataset import simulate_history
+from mpm_ref.rom.study.evaluate import (
+    history_reference,
+    level_of,
+    nearest_states,
+    path_errors,
+    stress_share,
+)
+from mpm_ref.rom.study.full_model import nsf_full_model
+from mpm_ref.rom.study.reduce import BLOCK
+from mpm_ref.rom.study.run import nsf_model
+from mpm_ref.rom.study.samples import drawn_samples
 from mpm_ref.rom.symmetric import tensor
 
 from ..common.registry import experiment
@@ -61,26 +69,26 @@ def studies(run):
 
 def made(study, value):
     """`Histories` of a run."""
-    return history(study.run(value), [value], every=study.spacing)
+    return simulate_history(study.run(value), [value], every=study.spacing)
 
 
 def of_positions(study, value, runs, test):
     """Rows (value, samples, errors) of a test, with latent coordinates of positions."""
-    one = whole(study.run(value))
+    one = nsf_full_model(study.run(value))
     fields, xhat = spanned(runs, study.sizes, BLOCK * one.problem.dx, follows=False)
     rest = xhat[:, 0].mean(axis=0)
-    yield value, NEAREST, *errors(fields, test, closest(fields, test.x[0], rest))
+    yield value, NEAREST, *errors(fields, test, nearest_states(fields, test.x[0], rest))
     for samples in (study.samples, len(one.X)):
-        found = states(one, model(one, fields), rest, samples, test.dt)
+        found = states(one, nsf_model(one, fields), rest, samples, test.dt)
         yield value, samples, *errors(fields, test, found)
 
 
 def of_both(study, value, runs, test):
     """The same with joint ones."""
-    one = whole(study.run(value))
+    one = nsf_full_model(study.run(value))
     fields, xhat, scale = joint(runs, study.sizes, BLOCK * one.problem.dx)
     rest = xhat[:, 0].mean(axis=0)
-    stepper = joint_stepper(fields, one.matter, one.problem, scale)
+    stepper = joint_stepper(fields, one.material, one.problem, scale)
     both = Stacked(fields, scale, 1.0)
     yield value, NEAREST, *errors(fields, test, nearest(both, test, rest))
     for samples in (study.samples, len(one.X)):
@@ -101,7 +109,7 @@ def states(one, stepper, rest, samples, apart):
     """Yield (level or None, latent coordinates) of a reduced run of a stepper, from those at rest;
     levels are `apart` [s].
     """
-    clock, some = one.problem.clock, drawn(len(one.X), samples, 0).points
+    clock, some = one.problem.clock, drawn_samples(len(one.X), samples, 0).points
     at = Latent(rest)
     for k in range(clock.steps + 1):
         yield level_of(k * clock.dt / apart), at.xhat
@@ -111,8 +119,8 @@ def states(one, stepper, rest, samples, apart):
 
 def errors(fields, test, found):
     """Errors of the displacement and of the stress, over their norms."""
-    of_motion, of_stress = course(fields, test.x[0], test.tau[0], found)
-    return of_motion.errors.displacement, share(of_stress)
+    path = path_errors(fields, history_reference(test), found)
+    return path.errors.displacement, stress_share(path.stress)
 
 
 def recorded(run, target, rows, study, test):

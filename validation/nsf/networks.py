@@ -15,8 +15,8 @@ from typing import NamedTuple
 from mpm_ref.rom.fields.architecture import DEPTH
 from mpm_ref.rom.fields.network import learned
 from mpm_ref.rom.model_file import load
-from mpm_ref.rom.study.nsf_case import whole
-from mpm_ref.rom.study.nsf_fields import BLOCK
+from mpm_ref.rom.study.full_model import nsf_full_model
+from mpm_ref.rom.study.reduce import BLOCK
 from mpm_ref.scene.toml import canonical
 
 from ..common.weights_needed import Untrained
@@ -117,6 +117,6 @@ def identity(net):
 
 def fields_of(model, study):
     """`LearnedFields` of a `Model` in the first run of a study."""
-    one = whole(study.run(study.train[0]))
+    one = nsf_full_model(study.run(study.train[0]))
     mu = [study.train[0]] if study.follows else []
     return learned(one.X, model.field, mu, BLOCK * one.problem.dx)

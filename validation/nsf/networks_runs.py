@@ -8,7 +8,7 @@ import numpy as np
 
 from mpm_ref.rom.fields import perceptron
 from mpm_ref.rom.fields.architecture import DEPTH
-from mpm_ref.rom.study.errors import Errors
+from mpm_ref.rom.study.errors import PositionErrors
 
 from ..common import targets
 from ..common.registry import experiment
@@ -102,6 +102,6 @@ def of_scene(run, name, one, scale):
         run.record(f"{id}{own}.stress", 100.0 * mean(rows, "stress"), unit="%", comparator="info",
                    scale=scale, note=f"{note}; of the Kirchhoff stress, all particles and times")
     nearest = [one.nearest(value) for value in run.progress(one.study.test, f"{name}, nearest")]
-    said(run, f"{id}.nearest", Errors(*np.mean(nearest, axis=0)), scale,
+    said(run, f"{id}.nearest", PositionErrors(*np.mean(nearest, axis=0)), scale,
          "nearest states that the networks know", **TRAINED)
     return drawn + weighed + every

@@ -8,11 +8,18 @@ from mpm_ref.rom.fields.elastic import deformed
 from mpm_ref.rom.fields.pod_fields import spanned
 from mpm_ref.rom.projection import INVERSIONS
 from mpm_ref.rom.snapshots import joined
-from mpm_ref.rom.study.errors import Errors, Squares
-from mpm_ref.rom.study.nsf_case import history, whole
-from mpm_ref.rom.study.nsf_evaluate import closest, course, level_of, share
-from mpm_ref.rom.study.nsf_fields import BLOCK
-from mpm_ref.rom.study.nsf_run import Plan, infer
+from mpm_ref.rom.study.dataset import simulate_history
+from mpm_ref.rom.study.errors import PositionErrors, Squares
+from mpm_ref.rom.study.evaluate import (
+    history_reference,
+    level_of,
+    nearest_states,
+    path_errors,
+    stress_share,
+)
+from mpm_ref.rom.study.full_model import nsf_full_model
+from mpm_ref.rom.study.reduce import BLOCK
+from mpm_ref.rom.study.run import FieldRunOptions, nsf_run
 from mpm_ref.store.words import counted
 
 FASTER = 1.5            # longer steps at deployment
@@ -21,7 +28,7 @@ FASTER = 1.5            # longer steps at deployment
 class Found(NamedTuple):
     """Errors of one reduced run."""
 
-    errors: Errors          # NSF-eq11: of all points at all times but the first
+    errors: PositionErrors          # NSF-eq11: of all points at all times but the first
     stress: float           # of the Kirchhoff stress, over its norm, likewise
     points: float           # integration points, mean over the steps; NaN where it broke down
     kept: float             # samples; of sets that follow each other, the mean
@@ -67,42 +74,44 @@ class Tested(NamedTuple):
         """The fields in a run with this value."""
         fields = self.fields.of([value] if self.study.follows else [])
         if self.map_alone:
-            return deformed(fields, whole(self.study.run(value)).problem.bodies)
+            return deformed(fields, nsf_full_model(self.study.run(value)).problem.bodies)
         return fields
 
     def errors(self, value, count, draw=0, faster=1.0, weighed=False):
         """`Found` of a reduced run with so many samples, drawn or weighed by cubature; infinite
         where it breaks down.
         """
-        fields, test, one = self.of(value), self.tests[value], whole(self.study.run(value))
+        fields, test, one = self.of(value), self.tests[value], nsf_full_model(self.study.run(value))
         sets = self.study.chosen(one, count, draw, (self.modes or self.fields) if weighed else None)
         points, iterations = [], []
 
         def states():
-            for t, at, report in infer(one, fields, Plan(sets, faster, self.inversion), self.rest):
+            options = FieldRunOptions(sets, faster, self.inversion)
+            for t, at, report, _ in nsf_run(one, fields, options, self.rest).states():
                 level = level_of(t / test.dt)
                 if level:
                     points.append(report.points)
                 iterations.extend(() if report is None else (report.iterations,))
                 yield level, at.xhat
 
-        found, stress = course(fields, test.x[0], test.tau[0], states())
-        return Found(found.errors, share(stress), np.nan if found.said else float(np.mean(points)),
+        found = path_errors(fields, history_reference(test), states())
+        return Found(found.errors, stress_share(found.stress),
+                     np.nan if found.breakdown else float(np.mean(points)),
                      float(np.mean([len(own.points) for own in sets])),
                      float(np.max([own.misfit for own in sets])), tuple(iterations))
 
     def nearest(self, value):
-        """`Errors` of the nearest states that the fields know, as far as a search finds them that
-        goes on from each time to the next.
+        """`PositionErrors` of the nearest states that the fields know, as far as a search finds
+        them that goes on from each time to the next.
         """
         X, x = self.tests[value].X, self.tests[value].x[0, 1:]
         squares, everything = Squares(X), np.arange(len(X))
-        for level, xhat in closest(self.fields, x, self.rest):
+        for level, xhat in nearest_states(self.fields, x, self.rest):
             squares.add(self.fields.place(everything, xhat), x[level])
         return squares.errors
 
     def next_run(self, value):
-        """`Errors` of the training run with the nearest value, taken for the test as it is."""
+        """Return the `PositionErrors` of the training run with the nearest value."""
         k = int(np.argmin(np.abs(self.runs.mu[:, 0] - value)))
         squares = Squares(self.runs.X)
         for x, reference in zip(self.runs.x[k, 1:], self.tests[value].x[0, 1:], strict=True):
@@ -113,7 +122,7 @@ class Tested(NamedTuple):
 def tested(study):
     """`Tested` of a study: makes its runs, and fields of them."""
     def made(value):
-        return history(study.run(value), [value], np.float32, study.spacing)
+        return simulate_history(study.run(value), [value], np.float32, study.spacing)
 
     runs = joined(map(made, study.train), len(study.train))
     tests = {value: made(value) for value in study.test}
@@ -122,7 +131,7 @@ def tested(study):
 
 def refitted(one, sizes, follows):
     """The same runs with other fields."""
-    block = BLOCK * whole(one.study.run(one.study.train[0])).problem.dx
+    block = BLOCK * nsf_full_model(one.study.run(one.study.train[0])).problem.dx
     fields, xhat = spanned(one.runs, sizes, block, follows, one.known)
     return one._replace(study=one.study._replace(sizes=sizes, follows=follows), fields=fields,
                         xhat=xhat)

@@ -14,8 +14,8 @@ import numpy as np
 
 from mpm_ref.explicit import deform_body
 from mpm_ref.rom.step import ReducedStepper
-from mpm_ref.rom.study.nsf_case import whole
-from mpm_ref.rom.study.nsf_run import begin, model
+from mpm_ref.rom.study.full_model import nsf_full_model
+from mpm_ref.rom.study.run import nsf_model, nsf_start
 from mpm_ref.simulate import simulate
 
 from ..common.registry import experiment
@@ -96,10 +96,11 @@ def whole_steps(study, steps):
     and stress; medians.
     """
     scene = study.run(study.test[0])
-    deque(simulate(whole(with_(scene, steps=WARM, every=WARM, interval=None)).problem), maxlen=0)
+    deque(simulate(nsf_full_model(with_(scene, steps=WARM, every=WARM, interval=None)).problem),
+          maxlen=0)
     took, deform = [], []
     for _ in range(REPEATS):
-        problem = whole(with_(scene, steps=steps, every=steps, interval=None)).problem
+        problem = nsf_full_model(with_(scene, steps=steps, every=steps, interval=None)).problem
         start = perf_counter()
         *_, last = simulate(problem)
         took.append((perf_counter() - start) / steps)
@@ -115,12 +116,12 @@ def whole_steps(study, steps):
 def reduced_steps(one, count, inversion, steps):
     """{what: seconds of a reduced step; of its stages}, and integration points; means."""
     value = one.study.test[0]
-    scene, fields = whole(one.study.run(value)), one.of(value)
-    problem, plain = scene.problem, model(scene, fields, inversion)
+    scene, fields = nsf_full_model(one.study.run(value)), one.of(value)
+    problem, plain = scene.problem, nsf_model(scene, fields, inversion)
     stepper = Clocked(*(getattr(plain, option.name) for option in dataclasses.fields(plain)))
     samples = one.study.chosen(scene, count, 0)[0].points
     stepper.begin()
-    at, dt, points = begin(scene, fields, one.rest), problem.clock.dt, []
+    at, dt, points = nsf_start(scene, fields, one.rest), problem.clock.dt, []
     for k in range(WARM + steps):
         if k == WARM:
             stepper.begin()
@@ -161,7 +162,7 @@ def record_bytes(run, name, one):
     """Record the bytes of the fields, and of the particles of a full-order run; those printed are
     of programs on a graphics processor, whose parts are not told, and do not judge ours.
     """
-    fields, problem = one.fields, whole(one.study.run(one.study.test[0])).problem
+    fields, problem = one.fields, nsf_full_model(one.study.run(one.study.test[0])).problem
     held = sum(a.nbytes for a in (fields.X, fields.U, fields.tau.modes, fields.C.modes))
     particles = sum(a.nbytes for body in problem.bodies for a in body.particles)
     scale = f"{len(fields.X)} particles"

@@ -3,9 +3,9 @@
 import numpy as np
 
 from mpm_ref.rom.step import BREAKDOWNS
-from mpm_ref.rom.study.nsf_case import whole
-from mpm_ref.rom.study.nsf_evaluate import level_of
-from mpm_ref.rom.study.nsf_run import Plan, infer
+from mpm_ref.rom.study.evaluate import level_of
+from mpm_ref.rom.study.full_model import nsf_full_model
+from mpm_ref.rom.study.run import FieldRunOptions, nsf_run
 from mpm_ref.rom.symmetric import tensor
 
 from ..ldm.published_bodies import keep
@@ -57,13 +57,13 @@ def of_run(name, one, value, shown, weighed=False):
     """The same of a reduced run with as many samples as the study has, drawn or weighed by
     cubature, those of the first draw; NaN from where it breaks down.
     """
-    test, scene, fields = one.tests[value], whole(one.study.run(value)), one.of(value)
+    test, scene, fields = one.tests[value], nsf_full_model(one.study.run(value)), one.of(value)
     levels = levels_of(test).tolist()
     x = np.full((SHOTS, len(shown), fields.dim), np.nan)
     tau = np.full(x.shape[:2], np.nan)
-    plan = Plan(one.study.chosen(scene, one.study.samples, 0, one.fields if weighed else None))
+    sets = one.study.chosen(scene, one.study.samples, 0, one.fields if weighed else None)
     try:
-        for t, at, _ in infer(scene, fields, plan, one.rest):
+        for t, at, *_ in nsf_run(scene, fields, FieldRunOptions(sets), one.rest).states():
             level = level_of(t / test.dt)
             if level in levels:
                 k = levels.index(level)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm_ref.rom.fields.pod_fields import Sizes
-from mpm_ref.rom.study.nsf_run import drawn, of_cells, weighed
+from mpm_ref.rom.study.samples import cell_samples, drawn_samples, weighted_samples
 from mpm_ref.scene import Poisson
 from mpm_ref.scene.overrides import varied
 
@@ -50,7 +50,7 @@ class Study(NamedTuple):
         return max(1, self.every // self.coarser)
 
     def chosen(self, one, count, draw, fields=None):
-        """Sample sets of a run of a `Whole` scene, as of `inferring.Plan`: `count` points drawn at
+        """Sample sets of a run of a `Whole` scene, as of `FieldRunOptions`: `count` points drawn at
         random, of a column in the middle if the study has one, and others half-way; by cubature of
         fields if these are given, point by point or cell by cell.
         """
@@ -58,8 +58,9 @@ class Study(NamedTuple):
         if self.column is not None and count < len(among):
             off = one.X - 0.5 * (one.X.min(axis=0) + one.X.max(axis=0))
             among = np.flatnonzero(np.hypot(*off.T[:2]) <= self.column * one.problem.dx)
-        by = partial(of_cells, fields, one.problem) if self.by_cell else partial(weighed, fields)
-        pick = drawn if fields is None else by
+        by = partial(cell_samples, fields,
+                     one.problem) if self.by_cell else partial(weighted_samples, fields)
+        pick = drawn_samples if fields is None else by
         sets = [pick(among, count, draw)]
         if self.later is not None and count == self.samples:
             clock = one.problem.clock

@@ -3,8 +3,8 @@ as they are printed.
 """
 
 from mpm_ref.rom.fields import architecture
-from mpm_ref.rom.study.nsf_case import whole
-from mpm_ref.rom.study.nsf_run import Plan
+from mpm_ref.rom.study.full_model import nsf_full_model
+from mpm_ref.rom.study.run import step_count
 from mpm_ref.rom.train.schedule import PRINTED
 
 from ..common import targets
@@ -41,9 +41,9 @@ def of_study(name, study):
     found |= dict(zip(SAMPLES.get(name, ()), (study.samples, study.later), strict=False))
     found |= dict(zip(ENDS.get(name, ()), (study.train[0], study.train[-1]), strict=False))
     if name in LONGER:
-        clock = whole(study.run(study.test[0])).problem.clock
+        clock = nsf_full_model(study.run(study.test[0])).problem.clock
         found |= {f"{name}.dt_factor": FASTER,
-                  f"{name}.steps_reduced": Plan((), FASTER).steps(clock)}
+                  f"{name}.steps_reduced": step_count(clock, FASTER)}
     return {f"nsf.{target}": value for target, value in found.items()}
 
 

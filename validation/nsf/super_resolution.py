@@ -5,9 +5,9 @@ full-order run of these points on the same grid, and beside what the nearest tra
 import numpy as np
 from scipy.spatial import KDTree
 
+from mpm_ref.rom.study.dataset import simulate_history
 from mpm_ref.rom.study.errors import Squares
-from mpm_ref.rom.study.nsf_case import history
-from mpm_ref.rom.study.nsf_evaluate import closest
+from mpm_ref.rom.study.evaluate import nearest_states
 from mpm_ref.scene import Poisson
 from mpm_ref.scene.overrides import varied
 
@@ -32,7 +32,7 @@ def boost(run):
         scene, fields = study.run(study.test[0]), fields_of(model, study)
         few = states(scene)
         many = states(finer(scene, run.choose(quick=4, standard=100)))
-        found = [xhat for _, xhat in closest(fields, few.x[0], model.rest)]
+        found = [xhat for _, xhat in nearest_states(fields, few.x[0], model.rest)]
         compared(run, fields.g, few, many, found)
 
 
@@ -72,7 +72,7 @@ def finer(scene, factor):
 
 def states(scene):
     """`Histories` of a run at `SHOTS` times after the start."""
-    return history(scene, [0.0], np.float32, scene.steps // SHOTS)
+    return simulate_history(scene, [0.0], np.float32, scene.steps // SHOTS)
 
 
 def thinned(x, most):

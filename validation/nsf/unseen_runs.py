@@ -9,10 +9,10 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from mpm_ref.rom.step import BREAKDOWNS
-from mpm_ref.rom.study.nsf_case import history, whole
-from mpm_ref.rom.study.nsf_run import Plan, infer
-from mpm_ref.rom.study.nsf_watch import look, trained
-from mpm_ref.rom.study.watch import BEYOND
+from mpm_ref.rom.study.dataset import simulate_history
+from mpm_ref.rom.study.full_model import nsf_full_model
+from mpm_ref.rom.study.monitor import BEYOND, field_monitor
+from mpm_ref.rom.study.run import FieldRunOptions, nsf_run
 
 from ..common.registry import experiment
 from ..common.scenes import with_
@@ -78,12 +78,13 @@ def steep(run):
 
 
 def farthest(one, value):
-    """Largest `Sight.beyond` of the states of a reduced run with the study's samples."""
-    scene, extent, found = whole(one.study.run(value)), trained(one.fields, one.xhat), []
-    plan = Plan(one.study.chosen(scene, one.study.samples, 0))
+    """Largest `StateCheck.beyond` of the states of a reduced run with the study's samples."""
+    scene, found = nsf_full_model(one.study.run(value)), []
+    monitor = field_monitor(one.fields, one.xhat)
+    plan = FieldRunOptions(one.study.chosen(scene, one.study.samples, 0))
     with suppress(*BREAKDOWNS):
-        for _, at, report in infer(scene, one.of(value), plan, one.rest):
-            found.append(look(extent, at, report).beyond)
+        for state in nsf_run(scene, one.of(value), plan, one.rest).states():
+            found.append(monitor.check(state).beyond)
     return max(found)
 
 
@@ -110,9 +111,9 @@ def moved(box, shift):
 def other(one, scene):
     """`Histories` of a run of the same points, in the order of the training runs."""
     study = one.study
-    run = history(scene, [E], np.float32, study.spacing)
+    run = simulate_history(scene, [E], np.float32, study.spacing)
     apart, order = KDTree(run.X).query(one.runs.X)
-    if len(run.X) != len(one.runs.X) or apart.max() > 1e-9 * whole(scene).problem.dx:
+    if len(run.X) != len(one.runs.X) or apart.max() > 1e-9 * nsf_full_model(scene).problem.dx:
         raise ValueError(f"the points differ by up to {apart.max():.3g} m from those of training: "
                          "expected the same slice")
     fields = {name: getattr(run, name)[:, :, order] for name in ("x", "tau", "C")}

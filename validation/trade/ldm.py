@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mpm_ref.rom.study.case import case
-from mpm_ref.rom.study.run import Way
+from mpm_ref.rom.study.full_model import ldm_full_model
+from mpm_ref.rom.study.run import RunOptions
 
 from ..common.registry import experiment
 from ..common.scenes import with_
@@ -20,17 +20,17 @@ BASE = PAPER._replace(points=50)
 CHOICES = {                 # one at a time, from BASE
     "points": (10, 25, 100, 200), "quadrature": ("lagrangian", "resampled"), "per_cell": (1, 3),
     "projection": ("nonlinear",), "velocity": ("transported", "difference", "latest"),
-    "close": (1e-4, 1e-2, 1e-1), "samples": ("kept", "pivoted")}
+    "preimage_tolerance": (1e-4, 1e-2, 1e-1), "samples": ("kept", "pivoted")}
 OWN = ("map", "r", "points", "longer", "cpu_run", "cpu_full", "origin", "centroid", "displacement",
        "pareto")
 
 
 def knobs():
-    """`Way`s that differ from BASE in one choice, and those of all cheap choices."""
+    """`RunOptions`s that differ from BASE in one choice, and those of all cheap choices."""
     single = [BASE._replace(**{name: value}) for name, values in CHOICES.items()
               for value in values]
     cheap = [FAST._replace(points=n) for n in (10, 25, 50, 100)]
-    return [BASE, *single, BASE._replace(close=1e-2, precision="single"), *cheap]
+    return [BASE, *single, BASE._replace(preimage_tolerance=1e-2, precision="single"), *cheap]
 
 
 @experiment("trade.ldm.knobs", title="LDM: what each choice costs and gives, on the tower",
@@ -38,8 +38,8 @@ def knobs():
 def of_ways(run):
     """Error and CPU time of a step by every choice alone, and all cheap ones together."""
     size, model = run.choose(quick=34, standard=385), trained(NET)
-    chosen = run.choose(quick=[BASE, BASE._replace(close=1e-2), FAST._replace(points=50)],
-                        standard=knobs())
+    quick = [BASE, BASE._replace(preimage_tolerance=1e-2), FAST._replace(points=50)]
+    chosen = run.choose(quick=quick, standard=knobs())
     scene = scene_of(size, TOWER.test[1])
     steps = run.choose(quick=4, standard=scene.steps)
     full, found = race(scene, (model.field, model.rest), chosen, steps)
@@ -72,7 +72,7 @@ class ReducedSetting:
 
     def measured(self, tests):
         """Errors, and CPU seconds of the steps of a run."""
-        way, longer = Way(points=self.points), lengthened(tests, self.longer)
+        way, longer = RunOptions(points=self.points), lengthened(tests, self.longer)
         return longer.on(*self.at, way), steps_of(longer, self.at, way)
 
 
@@ -85,7 +85,7 @@ def steps_of(tests, at, way):
 def lengthened(tests, longer):
     """`References` with a time step so many times longer, and the same right answer."""
     scenes = (GRAVITY.scene(-one.problem.gravity[-1]) for one in tests.cases)
-    cases = tuple(case(with_(scene, dt=longer * scene.dt, steps=scene.steps // longer))
+    cases = tuple(ldm_full_model(with_(scene, dt=longer * scene.dt, steps=scene.steps // longer))
                   for scene in scenes)
     return References(tests.study, cases, tuple(x[::longer] for x in tests.x), tests.of)
 
@@ -130,10 +130,10 @@ def of_density(run):
     tests = references(TORSION, run.choose(quick=1, standard=None))
     model, rows = trained("torsion-0"), []
     dense = run.choose(quick=(2, 3), standard=(1, 2, 3, 4))
-    chosen = [Way("lagrangian"), *(Way(quadrature, per_cell=k, close=1e-2)
-                                   for quadrature in run.choose(quick=("eulerian",),
-                                                                standard=("eulerian", "resampled"))
-                                   for k in dense)]
+    kinds = run.choose(quick=("eulerian",), standard=("eulerian", "resampled"))
+    chosen = [RunOptions("lagrangian"),
+              *(RunOptions(quadrature, per_cell=k, preimage_tolerance=1e-2)
+                for quadrature in kinds for k in dense)]
     for way in run.progress(chosen, "densities"):
         at = model.field, model.rest
         errors, cpu = tests.on(*at, way), steps_of(tests, at, way)

@@ -6,8 +6,9 @@ from time import process_time
 import numpy as np
 
 from mpm_ref.core.blas import one_thread
-from mpm_ref.rom.study.case import case
-from mpm_ref.rom.study.run import model, picked, precise, start
+from mpm_ref.rom.study.full_model import ldm_full_model
+from mpm_ref.rom.study.run import ldm_model, ldm_start, with_precision
+from mpm_ref.rom.study.samples import ldm_sampler
 from mpm_ref.scene import build
 
 from ..common.registry import experiment
@@ -67,7 +68,7 @@ def split(one, at, way, steps=STEPS):
     points; means over steps, after one that compiles.
     """
     (map, rest), clock, asked = at, Clock(), Counter()
-    stepper = model(one, map, way)
+    stepper = ldm_model(one, map, way)
 
     def counted(name, method):
         timed = clock.part("network", method)
@@ -83,15 +84,15 @@ def split(one, at, way, steps=STEPS):
                                  lambda name, method: clock.part("quadrature", method))
     stepper.on_grid = clock.part("grid", stepper.on_grid)
     stepper.project = clock.part("projection", stepper.project)
-    latent = start(one, map, rest)
-    pick, dt, points = picked(one, map, way, latent.xhat, 0), one.problem.clock.dt, []
+    latent = ldm_start(one, map, rest)
+    pick, dt, points = ldm_sampler(one, map, way, latent.xhat, 0), one.problem.clock.dt, []
     with one_thread():
         for k in range(steps + 1):
             if k == 1:
                 clock.turn()
                 clock.spent.clear()
                 asked.clear()
-            latent, report = stepper.step(latent, pick(k * dt), k * dt, dt)
+            latent, report = stepper.step(latent, pick(k * dt, latent).points, k * dt, dt)
             points.append(report.points)
         clock.turn()
     return ({name: clock.spent[name] / steps for name in PARTS},
@@ -105,7 +106,7 @@ def of_parts(run):
     rows, model = [], trained(NET)
     at = model.field, model.rest
     for size in run.progress(run.choose(quick=(34,), standard=GRIDS), "sizes"):
-        one = case(scene_of(size))
+        one = ldm_full_model(scene_of(size))
         for name, way in (("paper", PAPER), ("cheap", FAST)):
             rows.append(parted(run, f"trade.ldm.split.{size}.{name}", one, at,
                                way._replace(points=25)))
@@ -115,7 +116,7 @@ def of_parts(run):
 def parted(run, name, one, at, way):
     """Record the parts of a way; a row of the table."""
     spent, asked, points = split(one, at, way)
-    total, each = sum(spent.values()), cost(one, precise(at[0], way), at[1])
+    total, each = sum(spent.values()), cost(one, with_precision(at[0], way), at[1])
     predicted = sum(asked[kind] * each[kind] for kind in EVALUATIONS)
     shares = ", ".join(f"{part} {spent[part] / total:.0%}" for part in PARTS)
     scale = f"{len(one.X)} particles, {way.points} samples, {points:.0f} quadrature points"

@@ -7,8 +7,8 @@ import numpy as np
 
 from mpm_ref.core.blas import one_thread
 from mpm_ref.rom.step import BREAKDOWNS
-from mpm_ref.rom.study.nsf_case import whole
-from mpm_ref.rom.study.nsf_run import Plan, infer
+from mpm_ref.rom.study.full_model import nsf_full_model
+from mpm_ref.rom.study.run import FieldRunOptions, nsf_run
 from mpm_ref.simulate import simulate
 
 from ..common.registry import experiment
@@ -74,7 +74,7 @@ def of_sampling(run, one, sampling, full):
 def full_cpu(one):
     """CPU seconds of the steps of the full-order run of the first test."""
     scene = one.study.run(one.study.test[0])
-    problem = whole(with_(scene, every=scene.steps, interval=None)).problem
+    problem = nsf_full_model(with_(scene, every=scene.steps, interval=None)).problem
     return clocked(lambda: deque(simulate(problem), maxlen=0))[1].cpu
 
 
@@ -83,12 +83,12 @@ def reduced_cpu(one, count, weighed, repeats):
     Samples are chosen before.
     """
     value = one.study.test[0]
-    scene, fields = whole(one.study.run(value)), one.of(value)
-    plan = Plan(one.study.chosen(scene, count, 0, one.fields if weighed else None))
+    scene, fields = nsf_full_model(one.study.run(value)), one.of(value)
+    plan = FieldRunOptions(one.study.chosen(scene, count, 0, one.fields if weighed else None))
     try:
         with one_thread():
-            found = [clocked(lambda: deque(infer(scene, fields, plan, one.rest), maxlen=0))[1].cpu
-                     for _ in range(repeats)]
+            found = [clocked(lambda: deque(nsf_run(scene, fields, plan, one.rest).states(),
+                                           maxlen=0))[1].cpu for _ in range(repeats)]
     except BREAKDOWNS:
         return np.inf
     return float(np.median(found))
@@ -117,4 +117,4 @@ def full_end(scene, factor):
     """How a full-order run with a step so many times as long ends, a word of `outcome`."""
     steps = round(scene.steps / factor)
     longer = with_(scene, dt=factor * scene.dt, steps=steps, every=steps, interval=None)
-    return outcome(whole(longer).problem).kind
+    return outcome(nsf_full_model(longer).problem).kind

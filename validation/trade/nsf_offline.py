@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm_ref.rom.snapshots import joined
-from mpm_ref.rom.study.nsf_case import history
+from mpm_ref.rom.study.dataset import simulate_history
 
 from ..common.registry import experiment
 from ..common.weights_needed import Untrained, there
@@ -61,7 +61,7 @@ def offline(run):
 def of_modes(study, repeats):
     """`Tested` of a study on fields of modes, and their `Bill`."""
     def made(value):
-        return history(study.run(value), [value], np.float32, study.spacing)
+        return simulate_history(study.run(value), [value], np.float32, study.spacing)
 
     tests = {study.test[0]: made(study.test[0])}        # first, as it compiles what is missing
     runs, spent = clocked(lambda: joined(map(made, study.train), len(study.train)))

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.full_model import nsf_full_model
 
 from ..common.registry import experiment
 from ..extremes.nsf_runs import scenes
@@ -80,5 +80,5 @@ def arrays_of(record):
 
 def particle_bytes(study):
     """Bytes of the particles' arrays of a full-order run."""
-    problem = whole(study.run(study.test[0])).problem
+    problem = nsf_full_model(study.run(study.test[0])).problem
     return sum(nbytes(body.particles) for body in problem.bodies)

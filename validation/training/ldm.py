@@ -11,7 +11,7 @@ import typer
 from tqdm import tqdm
 
 from mpm_ref.rom.model_file import save
-from mpm_ref.rom.study.reduce import of_trained
+from mpm_ref.rom.study.reduce import decoder_model
 from mpm_ref.rom.train.decoder import DecoderTraining, train_decoder
 from mpm_ref.rom.train.loss import READINGS, LossWeights
 from mpm_ref.rom.train.settings import device_of
@@ -43,7 +43,7 @@ def made(name, checkpoints, machine):
             bar.set_postfix(loss=f"{history[-1][0]:.2e}")
         done = train_decoder(plan, snapshots, checkpoints / f"{name}.pt", show,
                              device_of(machine.device))
-    return of_trained(done, snapshots.X, {
+    return decoder_model(done, snapshots.X, {
         **identity(net), "training": asdict(plan),
         "command": f"python -m validation.training.ldm {name}",
         **machine._asdict(), "torch": torch.__version__, **provenance(commit(ROOT))})

@@ -14,12 +14,12 @@ from tqdm import tqdm
 
 from mpm_ref.rom.model_file import save
 from mpm_ref.rom.snapshots import joined
-from mpm_ref.rom.study.nsf_case import history
+from mpm_ref.rom.study.dataset import simulate_history
 from mpm_ref.rom.train.decoder import DecoderTraining
 from mpm_ref.rom.train.field import FieldTraining
 from mpm_ref.rom.train.settings import device_of
 from mpm_ref.rom.train.stages import POSITION, StagePlan, train_stages
-from mpm_ref.training import DEVICES, Cost, Machine
+from mpm_ref.training import DEVICES, Machine, TrainingTime
 
 from ..common.provenance import commit, provenance
 from ..nsf.networks import FOLDER, identity, narrow, net_of, nets
@@ -44,7 +44,7 @@ def plan_of(net):
 def runs_of(study):
     """`Histories` of a study's training runs."""
     values = tqdm(study.train, desc="runs")
-    return joined((history(study.run(value), [value], np.float32, study.spacing)
+    return joined((simulate_history(study.run(value), [value], np.float32, study.spacing)
                    for value in values), len(study.train))
 
 
@@ -79,7 +79,7 @@ def made(name, checkpoints, machine):
                             device_of(machine.device))
     stages = done._asdict().items()
     took = {f"{clock}_seconds": {stage: round(getattr(own.cost, clock), 1) for stage, own in stages}
-            for clock in Cost._fields}
+            for clock in TrainingTime._fields}
     plan = {stage: asdict(own) for stage, own in plan_of(net)._asdict().items()}
     return done.model({
         **identity(net), "plan": plan, "errors": errors_of(done.model({}), runs),

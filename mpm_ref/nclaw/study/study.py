@@ -12,8 +12,8 @@ from msgspec import Struct, field
 
 from ...materials.learned.table import KINDS, is_identified
 from ...materials.learned.weights import PARTS
-from ...rom.study.study import base_of
-from ...rom.study.study_file import plain, require_keys
+from ...rom.study.study import base_scene
+from ...rom.study.study_file import read_toml, require_keys
 from ...rom.study.tables import one_of
 from ...scene import Scene, SceneError, build
 from ...scene.messages import at, opened_by, rephrase
@@ -159,10 +159,10 @@ def load(path, shipped=None):
     SceneError, which names the file and the key, also for a scene whose laws cannot be learned.
     """
     path = Path(path)
-    data = plain(path)
+    data = read_toml(path)
     with opened_by(str(path)):
         tables = checked(data)
-        study = LawStudy(path, base_of(tables, path.parent, shipped or {}), tables)
+        study = LawStudy(path, base_scene(tables, path.parent, shipped or {}), tables)
         require_learnable(study)
         return study
 

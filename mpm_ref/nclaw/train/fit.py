@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import torch
 
-from ...training import Diverged, Session, train_epochs
+from ...training import Diverged, TrainingSession, train_epochs
 from .neural_laws import describe
 from .rollout import segment_errors
 
@@ -25,7 +25,7 @@ class Epoch(NamedTuple):
     steepness: tuple    # norms of the gradients, elastic and plastic
 
 
-class TrajectorySession(Session):
+class TrajectorySession(TrainingSession):
     """Laws, optimisers and schedules of a training under way."""
 
     entry = Epoch._make

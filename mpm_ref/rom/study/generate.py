@@ -26,35 +26,32 @@ from ...store.results import BadResults, Results
 from ...store.running import FINISHED, Options, Watch, checkpoint_of, run
 from ...store.writer import Fields
 from ...timestep import TooLarge
-from .tables import LDM, NSF
 
-FIELDS = ("x", "F", "v")
-STORED = {LDM: FIELDS, NSF: ("x", "C", "tau")}      # of particles, in all frames
 SKIPPED, INTERRUPTED = "skipped", "interrupted"
 UNSTABLE, NOT_WRITTEN, REFUSED = "unstable", "not written", "refused"
 
 
-class Done(NamedTuple):
-    """How one run of a study ended: finished, or a word of those above; and what is to be said."""
+class GeneratedRun(NamedTuple):
+    """The end of a full-order run of a study."""
 
     number: int
-    why: str
-    said: str = ""
-    continued: bool = False     # whether from a checkpoint
+    why: str                    # FINISHED, or one of the words above
+    message: str = ""
+    continued: bool = False     # from a checkpoint
 
     @property
-    def well(self):
-        """Whether its data are there."""
+    def has_data(self):
+        """Its data are there."""
         return self.why in (FINISHED, SKIPPED)
 
 
 def file_of(folder, k):
-    """Results file of run number k."""
+    """Return the results file of run number k."""
     return Path(folder) / f"case-{k:03d}.h5"
 
 
 def generate(study, folder, workers=1):
-    """Make all runs of a study and yield a `Done` of each, as they end.
+    """Make all runs of a study and yield a `GeneratedRun` of each, as they end.
 
     After the first that does not end well no other begins. Those under way then, or at Ctrl-C, end
     after the step being made, with a checkpoint. Each process uses one thread.
@@ -65,9 +62,9 @@ def generate(study, folder, workers=1):
         return
     with one_thread():
         for k in numbers:
-            done = made(study, folder, k)
+            done = generate_run(study, folder, k)
             yield done
-            if not done.well:
+            if not done.has_data:
                 return
 
 
@@ -78,23 +75,24 @@ def _in_processes(study, folder, workers):
     context = multiprocessing.get_context("spawn")
     stop = context.Event()
     with ProcessPoolExecutor(workers, context, _begin_worker, (stop,)) as pool:
-        with _deaf():
-            waiting = [pool.submit(made, study, folder, k) for k in range(len(study.mu))]
+        with _ignore_interrupts():
+            futures = [pool.submit(generate_run, study, folder, k) for k in range(len(study.mu))]
         try:
-            for future in as_completed(waiting):
+            for future in as_completed(futures):
                 yield (done := future.result())
-                if not done.well:
+                if not done.has_data:
                     return
         except BrokenProcessPool:
-            yield Done(-1, NOT_WRITTEN, "a process that made runs was killed, for want of memory "
-                       "perhaps; the same command goes on, with fewer --workers if need be")
+            yield GeneratedRun(
+                -1, NOT_WRITTEN, "a process that made runs was killed, for want of memory perhaps; "
+                "the same command goes on, with fewer --workers if need be")
         finally:
             stop.set()
             pool.shutdown(wait=True, cancel_futures=True)
 
 
 @contextmanager
-def _deaf():
+def _ignore_interrupts():
     """Processes started in this block do not listen to Ctrl-C before they have begun."""
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -106,7 +104,7 @@ def _deaf():
         signal.signal(signal.SIGINT, before)
 
 
-class _Ear(Watch):
+class _StopWatch(Watch):
     """Ends a run as Ctrl-C would, once `stop` is set: the terminal's own goes to the parent."""
 
     stop = None         # of a process that only makes runs
@@ -118,11 +116,11 @@ class _Ear(Watch):
 
     @property
     def asked(self):
-        """Whether to stop."""
+        """Whether a stop was asked for."""
         return self.stop is not None and self.stop.is_set()
 
 
-EAR = _Ear()
+STOP_WATCH = _StopWatch()
 
 
 def _begin_worker(stop):
@@ -134,44 +132,44 @@ def _begin_worker(stop):
         os._exit(1)
 
     os.setpgrp()
-    EAR.stop = stop
+    STOP_WATCH.stop = stop
     numba.set_num_threads(1)
     threadpoolctl.threadpool_limits(1)
     threading.Thread(target=end_with_parent, daemon=True).start()
 
 
-def made(study, folder, k):
-    """`Done` of run number k, made if it is not there."""
+def generate_run(study, folder, k):
+    """Return the `GeneratedRun` of run number k, which is made if it is not there."""
     path = file_of(folder, k)
-    if EAR.asked:
-        return Done(k, INTERRUPTED)
+    if STOP_WATCH.asked:
+        return GeneratedRun(k, INTERRUPTED)
     try:
         scene = study.scene(study.mu[k])
-        if finished(path, scene):
-            return Done(k, SKIPPED)
+        if is_finished(path, scene):
+            return GeneratedRun(k, SKIPPED)
         continued = checkpoint_of(path).exists()
-        outcome = run(build(scene), path, options(study, k), EAR)
+        outcome = run(build(scene), path, run_options(study, k), STOP_WATCH)
     except (Unstable, OutOfRange, TooLarge) as fault:
-        return Done(k, UNSTABLE, f"run {k} ({said(study, study.mu[k])}): {fault}")
+        return GeneratedRun(k, UNSTABLE, f"run {k} ({parameter_text(study, study.mu[k])}): {fault}")
     except NotWritten as fault:
-        return Done(k, NOT_WRITTEN, str(fault))
+        return GeneratedRun(k, NOT_WRITTEN, str(fault))
     except (ValueError, OSError) as fault:
-        return Done(k, REFUSED, str(fault))
+        return GeneratedRun(k, REFUSED, str(fault))
     why = FINISHED if outcome.why == FINISHED else INTERRUPTED
-    return Done(k, why, continued=continued)
+    return GeneratedRun(k, why, continued=continued)
 
 
-def options(study, k):
-    """How run number k is recorded."""
-    model, facts = study.tables.model, {}
-    if model == NSF:
+def run_options(study, k):
+    """Return the `Options` with which run number k is recorded."""
+    facts = {}
+    if study.model_entry:
         facts = {"parameters": dict(zip(study.names, study.mu[k].tolist(), strict=True))}
-    return Options(fields=Fields(STORED[model]), resume=True, facts=facts)
+    return Options(fields=Fields(study.method.stored), resume=True, facts=facts)
 
 
-def finished(path, scene):
-    """Whether a file has all steps of a scene. Raises BadResults for a file that is no results
-    file, or of another scene.
+def is_finished(path, scene):
+    """Return whether a file has all steps of a scene. Raises BadResults for a file that is no
+    results file, or of another scene.
     """
     if not path.exists():
         return False
@@ -183,15 +181,15 @@ def finished(path, scene):
         return bool(parts) and parts[-1]["why"] == FINISHED
 
 
-def said(study, mu):
-    """Parameters in words."""
+def parameter_text(study, mu):
+    """Return parameters in words."""
     return ", ".join(f"{name} = {value:g}" for name, value in
                      zip(study.names, mu, strict=True))
 
 
 @contextmanager
 def one_thread():
-    """While the block runs, kernels and BLAS use one thread: runs of a few thousand particles gain
+    """Limit kernels and BLAS to one thread in this block: runs of a few thousand particles gain
     nothing from more.
     """
     before = numba.get_num_threads()

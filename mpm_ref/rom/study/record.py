@@ -1,17 +1,6 @@
-"""A reduced run into a results file, as full-order runs have them (see `store`), and beside the
-particles what is known of each state: the group `reduced`, a row for each frame.
-
-What is recorded is any object with
-
-    problem, facts, run             of the points shown; what is to be known of the run; its options
-    r, count                        numbers of latent coordinates, and of points shown
-    series, stored                  series of the group; `Fields` of particles
-    doubts                          warnings before the run
-    states(known)                   (latent, report, sight) of all states, as a run yields them
-    bodies(latent)                  the bodies in a state
-    row(step)                       {name of a series: value} of a `Step`
-
-of which `Recording` is one, and that of `nsf.recording` another.
+"""A reduced run as a results file, as full-order runs have them (see `store`); beside the particles
+the group `reduced` has a row for each frame: latent coordinates, the step's report, and the check
+of the state.
 """
 
 import json
@@ -19,6 +8,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import inf
 from typing import NamedTuple
+
+import msgspec
 
 from ...energy import energy
 from ...monitor import Unstable, check
@@ -28,22 +19,33 @@ from ...store.manifest import Part, manifest
 from ...store.running import FINISHED, INTERRUPTED, checkpoint_of
 from ...store.writer import Fields, create, reopen
 from ..step import BREAKDOWNS
-from .field import Field
-from .run import picked
-from .watch import Nonsense, Watch, watched, watched_on
+from .monitor import NoBodyLeft, StateCheck, checked_states
+from .run import ReducedRun
 
-VECTORS = {"xhat": "1", "vhat": "1/s"}                          # of the group `reduced`: units
-COUNTS = {"samples": "1", "points": "1", "rank": "1", "lost": "1"}
-NUMBERS = {"residual": "m/s", "beyond": "1", "off": "1", "seen": "1", "inverted": "1"}
 BROKEN = (*BREAKDOWNS, Unstable)
 UNENDED = "not ended"       # of a part of a run that goes on, or was killed
 
 
-class Lost(RuntimeError):
+class RunSeries(NamedTuple):
+    """The series of the group `reduced`: {name: unit} of vectors (r,), counts and numbers."""
+
+    vectors: dict
+    counts: dict
+    numbers: dict
+
+
+LDM_SERIES = RunSeries(
+    {"xhat": "1", "vhat": "1/s"}, {"samples": "1", "points": "1", "rank": "1", "lost": "1"},
+    {"residual": "m/s", "beyond": "1", "off": "1", "coverage": "1", "inverted": "1"})
+NSF_SERIES = RunSeries({"xhat": "1"}, {"samples": "1", "points": "1", "rank": "1"},
+                    {"residual": "m", "beyond": "1"})
+
+
+class BrokenRun(RuntimeError):
     """A reduced run that gives no body any more, or an impossible one, in a step."""
 
-    def __init__(self, said, step):
-        super().__init__(said)
+    def __init__(self, message, step):
+        super().__init__(message)
         self.step = step
 
 
@@ -51,131 +53,156 @@ class Lost(RuntimeError):
 class Recording:
     """A reduced run to be recorded."""
 
-    case: object            # `Case`
-    model: object           # `Model`, of a map
-    run: object             # `tables.Run`
-    watch: Watch            # what its states are looked at with
-    field: Field            # where it is shown
-    problem: object         # of these points: its source, clock and limits
-    facts: dict             # what else is to be known of it, plain values
-
-    series = VECTORS, COUNTS, NUMBERS
-    stored = Fields()
-    doubts = ()
+    run: ReducedRun
+    monitor: object         # of `monitor`
+    display: object         # of `display`: the bodies of a state
+    problem: object         # of the points shown: its source, limits, and the clock of the run
+    options: object         # [run] of the study
+    facts: dict             # plain values that describe the run
+    series: RunSeries
+    fields: Fields          # of particles, stored in each frame
+    warnings: tuple = ()    # before the run
 
     @property
     def r(self):
         """Number of latent coordinates."""
-        return self.model.field.r
+        return self.run.stepper.field.r
 
     @property
     def count(self):
         """Number of points shown."""
-        return len(self.field.X)
-
-    def states(self, known):
-        """Yield (`Latent`, `Report` or None, `Sight`) of each state, those known too."""
-        if not known:
-            return watched(self.watch, self.case, self.run.way, self.model.rest, self.run.seed)
-        pick = picked(self.case, self.watch.map, self.run.way, known[0][0].xhat, self.run.seed)
-        return watched_on(known, self.watch, self.case, self.run.way, pick)
-
-    def bodies(self, latent):
-        """The body in a state."""
-        return (self.field.at(latent, self.problem.clock.dt, self.run.velocity),)
-
-    def row(self, step):
-        """Of a `Step`; at the start nothing is reported."""
-        known = {**step.latent._asdict(), **step.sight._asdict(), "lost": 0}
-        if step.report is not None:
-            lost = step.report.quadrature.get("lost", 0)
-            known |= {**step.report._asdict(), "lost": lost}
-        return known
+        return self.display.count
 
 
-class Outcome(NamedTuple):
-    """How a reduced run ended."""
+class RecordedRun(NamedTuple):
+    """The end of a reduced run, and its states that were out of bounds."""
 
-    out_of_bounds: dict     # {step: `Sight`} of its states that were out of bounds (see `watch`)
-    lost: object            # the `Lost` with which it broke down, or None
-
-
-class Step(NamedTuple):
-    """A state of a reduced run; no `Report` at the start, no `State` of one that is recorded."""
-
-    state: State
-    latent: object
-    report: object
-    sight: object           # `watch.Sight`
+    out_of_bounds: dict     # {step: `StateCheck`}
+    breakdown: object       # the `BrokenRun` with which it ended early, or None
 
 
-def record(recording, out, known=(), on_step=None):
-    """Make a reduced run into the results file `out`; returns an `Outcome`. known: its states that
-    stand there, after which it goes on (see `begun`).
+class ShownState(NamedTuple):
+    """A state of a reduced run, and its bodies; None of a state that is recorded already."""
+
+    reduced: object         # `RunState`
+    check: StateCheck
+    shown: State | None
+
+
+def recording(study, model, mu, count=None):
+    """Return the `Recording` of a study's reduced run with parameters mu, shown at `count` points
+    of the body's shape; None: at those of the study. Raises ValueError for samples that do not
+    suffice, a precision that the map has not, a number of points for fields that are known at their
+    own alone, and a scene that reduced runs do not support.
+    """
+    full = supported_model(study, mu)
+    facts = {"study": study.digest, "name": study.path.stem, "map": model.about["map"],
+             "points": len(full.X),
+             "parameters": dict(zip(study.names, map(float, mu), strict=True)),
+             "run": msgspec.to_builtins(study.tables.run), **study.model_entry}
+    field = study.method.field_of_run(model.field, full, mu)
+    return study.method.recording(study, full, field, model, facts, count)
+
+
+def supported_model(study, mu):
+    """Return the `FullModel` of a study's run with parameters mu. Raises ValueError for a scene
+    that reduced runs do not support, and with NSF for samples that do not suffice.
+    """
+    full = study.method.full_model(study.scene(mu))
+    study.method.require_samples(study, full)
+    return full
+
+
+def particle_bytes(study, mu, count=None):
+    """Return the bytes of the particles in the results file of a reduced run with parameters mu,
+    shown at `count` points; None: those of the study. Raises ValueError as `supported_model` does.
+    """
+    full = supported_model(study, mu)
+    steps = round(full.problem.clock.steps / getattr(study.tables.run, "dt_factor", 1.0))
+    fields = study.method.shown_fields.of(full.problem.bodies[0])
+    point = sum(a[0].nbytes for a in fields.values())
+    return (steps + 1) * (count or len(full.X)) * point
+
+
+def record(recording, out, earlier=(), on_step=None):
+    """Run a reduced run into the results file `out`; return a `RecordedRun`. earlier: its states
+    that the file has, after which it goes on (see `resume`).
 
     on_step(k) is called after each step. Where the run breaks down, the frames before then stand.
     Raises `NotWritten` or `InUse`.
     """
-    writer, out_of_bounds, lost = _writer(recording, out, len(known)), {}, None
+    writer, out_of_bounds, breakdown = _writer(recording, out, len(earlier)), {}, None
     try:
-        with _part(writer, max(len(known) - 1, 0)) as part:
-            for k, step in enumerate(steps(recording, known)):
-                if step.state is not None:
-                    _append(writer.h5["reduced"], recording.row(step))
-                    _show(writer, step.state, recording.problem)
-                    part.state = step.state
-                if step.sight.why:
-                    out_of_bounds[k] = step.sight
+        with _part(writer, max(len(earlier) - 1, 0)) as part:
+            for k, state in enumerate(shown_states(recording, earlier)):
+                if state.shown is not None:
+                    _append(writer.h5["reduced"], row_of(state))
+                    _show(writer, state.shown, recording.problem)
+                    part.state = state.shown
+                if state.check.out_of_bounds:
+                    out_of_bounds[k] = state.check
                 if on_step is not None:
                     on_step(k)
-    except Lost as fault:
-        lost = fault
+    except BrokenRun as fault:
+        breakdown = fault
     finally:
         writer.close()
-    return Outcome(out_of_bounds, lost)
+    return RecordedRun(out_of_bounds, breakdown)
 
 
-def marked(recording):
-    """The problem whose source says that it is a reduced run, and which."""
+def marked_problem(recording):
+    """Return the problem whose source says that it is a reduced run, and which."""
     problem = recording.problem
     return replace(problem, source=json.dumps([recording.facts, problem.source]))
 
 
 def _writer(recording, out, frames):
-    """`Writer` of a new file, or after so many frames of one that stands."""
+    """Return the `Writer` of a new file, or of one that has this number of frames."""
     if frames:
-        writer = reopen(out, marked(recording), frames)
+        writer = reopen(out, marked_problem(recording), frames)
         _cut(writer, frames)
         return writer
-    facts = manifest(recording.problem, recording.run.seed) | {"reduced": recording.facts}
-    writer = create(out, marked(recording), recording.stored, facts, checkpoint_of(out))
+    facts = manifest(recording.problem, recording.options.seed) | {"reduced": recording.facts}
+    writer = create(out, marked_problem(recording), recording.fields, facts, checkpoint_of(out))
     _lay_out(writer.h5, recording.series, recording.r)
     return writer
 
 
-def steps(recording, known=()):
-    """Yield each `Step` of a run, the start first, also of its states that are known; raises
-    `Lost`. Inverted points are for `watch` to judge: among very many, a few may be.
+def shown_states(recording, earlier=()):
+    """Yield each `ShownState` of a run, the start first, also of its earlier states; raises
+    `BrokenRun`. Inverted points are for `monitor` to judge: of very many, a few may be.
     """
     problem, k = recording.problem, 0
+    dt = problem.clock.dt
     bounds = replace(problem, limits=replace(problem.limits, J=(-inf, inf)))
     try:
-        for latent, report, sight in recording.states(known):
+        for reduced, state_check in checked_states(recording.run, recording.monitor, earlier):
             state = None
-            if k >= len(known):
-                bodies = recording.bodies(latent)
-                state = State(bodies, step=k, t=k * problem.clock.dt, frame=k + 1)
-                check(bounds, state, problem.clock.dt if k else 0.0)
-            yield Step(state, latent, report, sight)
+            if k >= len(earlier):
+                bodies = recording.display.bodies(reduced.latent, dt)
+                state = State(bodies, step=k, t=k * dt, frame=k + 1)
+                check(bounds, state, dt if k else 0.0)
+            yield ShownState(reduced, state_check, state)
             k += 1
-    except Nonsense as fault:
-        raise Lost(str(fault), k) from fault
+    except NoBodyLeft as fault:
+        raise BrokenRun(str(fault), k) from fault
     except BROKEN as fault:
-        faster = getattr(recording.run, "faster", 1.0)
-        longer = f", and are steps {faster:g} times as long too long" if faster > 1.0 else ""
-        raise Lost(f"the reduced run broke down in step {k}: {getattr(fault, 'reason', fault)}; "
-                   "are the parameters within the studied range, are there enough samples, and is "
-                   f"the map good (mpm-ref rom evaluate){longer}?", k) from fault
+        factor = getattr(recording.options, "dt_factor", 1.0)
+        longer = f", and are steps {factor:g} times as long too long" if factor > 1.0 else ""
+        raise BrokenRun(f"the reduced run broke down in step {k}: "
+                        f"{getattr(fault, 'reason', fault)}; are the parameters within the studied "
+                        "range, are there enough samples, and is the map good (mpm-ref rom "
+                        f"evaluate){longer}?", k) from fault
+
+
+def row_of(state):
+    """Return {name of a series: value} of a `ShownState`; at the start nothing is reported."""
+    reduced = state.reduced
+    row = {**reduced.latent._asdict(), **state.check._asdict(), "lost": 0}
+    if reduced.report is not None:
+        lost = reduced.report.quadrature.get("lost", 0)
+        row |= {**reduced.report._asdict(), "lost": lost}
+    return row
 
 
 def _show(writer, state, problem):
@@ -186,13 +213,13 @@ def _show(writer, state, problem):
 
 
 class _Part(Part):
-    """A part of a run, with its last state."""
+    """A part of a run, and its last state."""
 
     state = None
 
     @property
-    def begun(self):
-        """Its entry of `parts` in the manifest as long as it has not ended."""
+    def open_entry(self):
+        """The entry of `parts` in the manifest of a part that has not ended."""
         return {"began": self.began, "why": UNENDED, "first_step": self.first_step, **self.code}
 
 
@@ -205,14 +232,14 @@ def _part(writer, first_step):
     part, why = _Part(first_step), None
     facts, frames = writer.manifest, len(writer)
     before = facts["parts"]
-    writer.put_manifest(facts | {"parts": [*before, part.begun]})
+    writer.put_manifest(facts | {"parts": [*before, part.open_entry]})
     try:
         yield part
         why = FINISHED
     except KeyboardInterrupt:
         why = INTERRUPTED
         raise
-    except Lost as fault:
+    except BrokenRun as fault:
         why = str(fault)
         raise
     finally:
@@ -222,14 +249,14 @@ def _part(writer, first_step):
 
 
 def _entry(part, why):
-    """The entry of a part that ended; of one that made no state, without where it ended."""
+    """Return the entry of a part that ended; of one without a state, without its end."""
     if part.state is None:
-        return part.begun | {"why": why}
+        return part.open_entry | {"why": why}
     return part.ended(why, part.state, checkpoint.digest(part.state))
 
 
 def _lay_out(h5, series, r):
-    """The empty series of the group `reduced`: {name: unit} of vectors (r,), counts, numbers."""
+    """Create the empty series of the group `reduced`."""
     group = h5.create_group("reduced")
     for names, shape, kind in zip(series, ((r,), (), ()), ("f8", "i8", "f8"), strict=True):
         for name, unit in names.items():
@@ -239,15 +266,15 @@ def _lay_out(h5, series, r):
 
 
 def _cut(writer, frames):
-    """Keep the first so many frames, and their rows of the group `reduced`."""
+    """Keep the first frames, and their rows of the group `reduced`."""
     for series in writer.h5["reduced"].values():
         series.resize(frames, axis=0)
     writer.truncate(frames)
 
 
 def _append(series, row):
-    """A value of each series; zeros for what is not known before the first step. They stand with
-    the frame's commit.
+    """Append a value of each series, zero where the row has none. They stand with the frame's
+    commit.
     """
     for name, dataset in series.items():
         dataset.resize(len(dataset) + 1, axis=0)

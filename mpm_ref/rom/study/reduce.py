@@ -1,6 +1,7 @@
-"""Maps of a study: made of its data, and read from their files."""
+"""Reduced models of a study: computed from its data, trained on them, and read from their files."""
 
 import hashlib
+from contextlib import suppress
 from functools import partial
 from math import isfinite
 from pathlib import Path
@@ -11,120 +12,178 @@ from ...shapes.inside import solid
 from ...store.manifest import source_hash, versions
 from ...training import part
 from .. import model_file
+from ..fields.network import Networks, learned
 from ..fields.pod import basis
+from ..fields.pod_fields import spanned
 from ..fields.polynomial_manifold import curved
 from ..latent import initial
 from ..model_file import Model
-from . import nsf_fields as nsf
-from . import nsf_networks
 from .errors import misfit
-from .tables import CURVED, KEYS, LDM, MODES, NETWORK, NSF, require_nonlinear
+from .tables import CURVED, KEYS, LDM, MODES, NETWORK, require_nonlinear
 
-KEPT = 50           # epochs of which the loss is kept in the file
-SIDE, STEP = 0.4, 1.0 / 144.0       # the loss's weights "code" were made for a body whose largest
-                                    # side is so long [m], and for such steps [s]
+STORED_LOSSES = 50      # epochs of which the loss is stored in the file
+SIDE, STEP = 0.4, 1.0 / 144.0       # largest side [m] and time step [s] of the body that the loss's
+                                    # weights "code" were made for
+BLOCK = 3.0             # size of blocks of points [dx]
+STAGES = "ghl"          # of the training of NSF's networks
 
 
-def computed(study, snapshots, about):
-    """`Model` of POD modes of `Snapshots`, straight or bent, or of NSF's fields of `Histories`;
-    about: what else is to be known of it, plain values. Raises ValueError for more modes, or more
-    monomials, than the data tell.
+def compute_model(study, data, about):
+    """Return the `Model` of modes of a study's `Snapshots` or `Histories`; about: plain values that
+    describe it. Raises ValueError for more modes, or more monomials, than the data hold.
     """
-    how = study.tables.map
-    if study.tables.model == NSF:
-        fields, xhat = nsf.made(study, snapshots)
-        model = Model(fields, xhat, xhat[:, 0].mean(axis=0), about | identity(study))
-        return measured(model, snapshots, nsf.misfit)
-    bent = how.kind == CURVED
-    known = basis(snapshots.X, *snapshots.flat(), how.modes if bent else how.r)
-    map = curved(known, how.r, how.degree) if bent else known.modes
-    xhat = known.xhat[:, :how.r].reshape(*snapshots.x.shape[:2], how.r)
-    return measured(Model(map, xhat, np.zeros(how.r), about | identity(study)), snapshots)
+    field, xhat, rest = study.method.compute(study, data)
+    return with_misfit(study, Model(field, xhat, rest, about | identity(study)), data)
 
 
-def learned(study, snapshots, about, checkpoint, on_epoch, machine):
-    """`Model` of a network trained on `Snapshots`, or of NSF's on `Histories`, on a
-    `learning.Machine`; checkpoint and on_epoch as for `train.decoder.train_decoder`, the one a
-    folder for NSF. Raises ValueError without PyTorch, and for a checkpoint of another training.
+def train_model(study, data, about, checkpoint, on_epoch, machine):
+    """Return the `Model` of networks trained on a study's `Snapshots` or `Histories`, on a
+    `training.Machine`; checkpoint (a file, or a folder for NSF) and on_epoch as for
+    `train_epochs`. Raises ValueError without PyTorch, and for a checkpoint of another training.
     """
-    if study.tables.model == NSF:
-        return inferred(study, snapshots, about, checkpoint, on_epoch, machine)
-    settings = {name: getattr(study.tables.map, name) for name in ("r", *KEYS[NETWORK])}
-    train = training()
-    settings["weights"] = train.loss_weights(settings["weights"], *larger(study.base))
-    done = train.fit_decoder(settings, snapshots, checkpoint, on_epoch, machine)
-    return measured(of_trained(done, snapshots.X, about | identity(study) | machine._asdict() | {
-        "torch": train.torch_version()}), snapshots)
+    about = about | identity(study) | machine._asdict() | {"torch": trainer().torch_version()}
+    return with_misfit(study, study.method.train(study, data, about, checkpoint, on_epoch, machine),
+                       data)
 
 
-def inferred(study, histories, about, folder, on_epoch, machine):
-    """`Model` of NSF's three networks trained on `Histories`, as `learned` has it."""
-    how = about | identity(study) | machine._asdict() | {"torch": training().torch_version()}
-    fitted = partial(training().fit_stages, machine=machine)
-    model = nsf_networks.trained(fitted, study.tables.map, histories, folder, on_epoch)
-    return measured(model._replace(about=how | model.about), histories, nsf.misfit)
-
-
-def forget(checkpoint):
-    """Remove the checkpoint of a training that is done: a file, or the folder of NSF's."""
-    if checkpoint.is_dir():
-        nsf_networks.forget(checkpoint)
-    else:
-        checkpoint.unlink(missing_ok=True)
-
-
-def measured(model, snapshots, misfit=misfit):
-    """A `Model` that also says of its fit how many points the `Snapshots` have, and how far it is
-    off them at its own latent coordinates.
+def with_misfit(study, model, data):
+    """Return a `Model` whose `about` has its misfit: the number of points of the data, and the
+    errors at its own latent coordinates.
     """
-    off = misfit(model.field, snapshots, model.xhat)._asdict()
-    known = {name: share for name, share in off.items() if isfinite(share)}
+    errors = study.method.misfit(model.field, data, model.xhat)._asdict()
+    finite = {name: share for name, share in errors.items() if isfinite(share)}
     return model._replace(about=model.about | {
-        "fit": {"points": len(snapshots.X), "errors": known}})
+        "fit": {"points": len(data.X), "errors": finite}})
 
 
-def of_trained(done, X, about):
-    """`Model` of a `train.decoder.TrainedDecoder` for points X (n, d) at rest [m]; what the
-    training took and the loss of some epochs are added to what is to be known of it.
+def trainer():
+    """Return `rom.train.settings`, which trains networks. Raises ValueError without PyTorch."""
+    return part("rom.train.settings", "a network is trained",
+                f"or make modes, which need none: --kind {MODES}")
+
+
+# LDM's map.
+
+def compute_map(study, snapshots):
+    """Return POD modes of `Snapshots`, or a manifold over them, their latent coordinates (s, k + 1,
+    r), and those at rest (r,).
     """
-    rest = initial(done.decoder, X, xhat=done.xhat[:, 0].mean(axis=0)).xhat
-    loss = done.history[::max(1, len(done.history) // KEPT)].tolist()
-    took = {f"{clock}_seconds": round(s, 1) for clock, s in done.cost._asdict().items()}
-    return Model(done.decoder, done.xhat, rest, about | took | {"loss": loss})
+    settings = study.tables.map
+    is_curved = settings.kind == CURVED
+    modes = basis(snapshots.X, *snapshots.flat(), settings.modes if is_curved else settings.r)
+    g = curved(modes, settings.r, settings.degree) if is_curved else modes.modes
+    xhat = modes.xhat[:, :settings.r].reshape(*snapshots.x.shape[:2], settings.r)
+    return g, xhat, np.zeros(settings.r)
 
 
-def larger(scene):
-    """How many times larger a scene's body and steps are than those that the loss's weights "code"
+def train_map(study, snapshots, about, checkpoint, on_epoch, machine):
+    """Return the `Model` of a decoder trained on `Snapshots`."""
+    settings = {name: getattr(study.tables.map, name) for name in ("r", *KEYS[NETWORK])}
+    settings["weights"] = trainer().loss_weights(settings["weights"], *size_ratios(study.base))
+    trained = trainer().fit_decoder(settings, snapshots, checkpoint, on_epoch, machine)
+    return decoder_model(trained, snapshots.X, about)
+
+
+def decoder_model(trained, X, about):
+    """Return the `Model` of a `train.decoder.TrainedDecoder` for points X (n, d) at rest [m]; time
+    and the loss of some epochs are added to its `about`.
+    """
+    rest = initial(trained.decoder, X, xhat=trained.xhat[:, 0].mean(axis=0)).xhat
+    loss = trained.history[::max(1, len(trained.history) // STORED_LOSSES)].tolist()
+    time = {f"{clock}_seconds": round(s, 1) for clock, s in trained.cost._asdict().items()}
+    return Model(trained.decoder, trained.xhat, rest, about | time | {"loss": loss})
+
+
+def size_ratios(scene):
+    """Return the ratios of a scene's body and time step to those that the loss's weights "code"
     were made for.
     """
     body = solid(scene.body[0].shape)
     return float((body.high - body.low).max()) / SIDE, scene.dt / STEP
 
 
-def training():
-    """Return `rom.train.settings`, which trains networks. Raises ValueError without PyTorch."""
-    return part("rom.train.settings", "a network is trained",
-                f"or make modes, which need none: --kind {MODES}")
+def map_misfit(g, snapshots, xhat):
+    """Return the `PositionErrors` of a map's positions in its `Snapshots`."""
+    return misfit(g, snapshots.X, snapshots, xhat)
+
+
+# NSF's fields.
+
+def compute_fields(study, histories):
+    """Return the `Spanned` fields of `Histories`, their latent coordinates (s, k + 1, r), and those
+    near the start (r,).
+    """
+    settings = study.tables.map
+    fields, xhat = spanned(histories, settings.sizes, BLOCK * study.base.dx,
+                           settings.stress_sees_parameters)
+    return fields, xhat, xhat[:, 0].mean(axis=0)
+
+
+def train_fields(study, histories, about, folder, on_epoch, machine):
+    """Return the `Model` of three networks trained on `Histories`; folder: for the checkpoints of
+    the stages, created if need be; on_epoch(history) is called after each epoch of any stage, with
+    as many entries as epochs so far.
+    """
+    settings = study.tables.map
+    before = {"g": 0, "h": settings.epochs, "l": settings.epochs + settings.field_epochs}
+
+    def show(stage, history):
+        on_epoch([None] * before[stage] + history)
+
+    Path(folder).mkdir(exist_ok=True)
+    trained = partial(trainer().fit_stages, machine=machine)(
+        settings.settings, histories, folder, show)
+    time = {f"{clock}_seconds": round(sum(getattr(part.cost, clock) for part in trained), 1)
+            for clock in trained.g.cost._fields}
+    losses = {"g": trained.g.history[-1, 0], "h": trained.h.history[-1],
+              "l": trained.l.history[-1]}
+    return trained.model(about | time | {"losses": {name: float(loss)
+                                                    for name, loss in losses.items()}})
+
+
+def fields_of_run(fields, full, mu):
+    """Return the fields, `Spanned` or `Networks`, in the run of a `FullModel` with parameters mu,
+    where the stress is a function of them.
+    """
+    if isinstance(fields, Networks):
+        return learned(full.X, fields, mu, BLOCK * full.problem.dx)
+    return fields.of(mu) if len(fields.mu) else fields
+
+
+def fields_misfit(fields, histories, xhat):
+    """Return the `PositionErrors` of the fields' positions in their `Histories`."""
+    if isinstance(fields, Networks):
+        return misfit(fields.g, histories.X, histories, xhat)
+    return misfit(fields, np.arange(len(histories.X)), histories, xhat)
+
+
+# Files.
+
+def forget_checkpoint(checkpoint):
+    """Remove the checkpoint of a training that has ended: a file, or those of the stages in a
+    folder, and the folder if nothing else is in it.
+    """
+    if not checkpoint.is_dir():
+        checkpoint.unlink(missing_ok=True)
+        return
+    for stage in STAGES:
+        (checkpoint / f"{stage}.pt").unlink(missing_ok=True)
+    with suppress(OSError):
+        checkpoint.rmdir()
 
 
 def identity(study):
-    """What a map is of and how it was made: plain values."""
+    """Return the plain values that say of what a model is, and how it was made."""
     return {"study": study.digest, "name": study.path.stem, "title": study.tables.title,
             "scene": study.tables.scene, "map": study.tables.map.settings,
             "parameters": list(study.names),
             "mu": study.mu[list(study.train)].tolist(), "source_sha256": source_hash(),
-            "versions": versions(), **model_of(study)}
-
-
-def model_of(study):
-    """{"model": name} of a study of another model than LDM's, whose files do not say."""
-    model = study.tables.model
-    return {} if model == LDM else {"model": model}
+            "versions": versions(), **study.model_entry}
 
 
 def load(path, study):
-    """The `Model` of a file, of any kind. Raises ValueError for a file that is damaged or no map,
-    for one of another study, and for one that the study's projection does not suit.
+    """Return the `Model` of a file, of any kind. Raises ValueError for a file that is damaged or no
+    model, for one of another study, and for one that the study's projection does not suit.
     """
     model = model_file.load(path)
     if model.about.get("study") != study.digest:
@@ -135,6 +194,11 @@ def load(path, study):
     return model
 
 
+def kind_of(model):
+    """Return the kind of a model, as its study names it."""
+    return model.about["map"]["kind"]
+
+
 def sha256(path):
-    """Of a file's bytes."""
+    """Return the sha256 of a file's bytes."""
     return hashlib.sha256(Path(path).read_bytes()).hexdigest()

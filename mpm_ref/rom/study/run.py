@@ -1,5 +1,8 @@
-"""Reduced runs: the four schemes of LDM, and ways that are cheaper or steadier, step by step."""
+"""Reduced runs, step by step: the four schemes of LDM and their cheaper or steadier variants, and
+runs with inferred stress (NSF).
+"""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -7,28 +10,67 @@ import numpy as np
 from ...sampling import Regular, sample
 from ...shapes.inside import solid
 from ..kinematics import CLOSE
-from ..latent import initial
+from ..latent import Latent, initial, nearest
 from ..quadrature.eulerian import Eulerian
 from ..quadrature.lagrangian import Resampled, lagrangian
-from ..sampling import PER_GROUP, draw, pivoted
-from ..step import ldm_stepper
-from .case import distance
+from ..step import Report, ldm_stepper, nsf_stepper
+from .full_model import signed_distance
+from .samples import ENOUGH, SampleSet, ldm_sampler, nsf_sampler, require_valid_sets
 
 PRECISIONS = ("double", "single")
 QUADRATURES = ("lagrangian", "eulerian")
 PROJECTIONS = ("nonlinear", "linear")
 SCHEMES = tuple((q, p) for q in QUADRATURES for p in PROJECTIONS)
-ENOUGH = 4000       # points that tell where a body is at the start, and are pivoted among
-SINGLE = 1e-4       # nearest that preimages can be asked for in single precision [dx]
+SINGLE = 1e-4       # smallest tolerance of preimages in single precision [dx]
 COARSE = 8          # blocks over a body's longest side, from which Eulerian points are traced back
+ROUNDING = 1e-9     # of a step: one that ends this little after the scene is made
 
 
-class Way(NamedTuple):
-    """How a reduced run is made; `points` samples, or all of them where it is None.
+class RunState(NamedTuple):
+    """A state of a reduced run, and the step that led to it."""
+
+    t: float                        # [s]
+    latent: Latent
+    report: Report | None = None    # None at the start, like the samples
+    samples: SampleSet | None = None
+
+
+class ReducedRun(NamedTuple):
+    """A reduced run that is ready to be stepped."""
+
+    stepper: object         # `rom.step.ReducedStepper`
+    find_start: Callable    # () -> `Latent` of the start
+    make_sampler: Callable  # latent coordinates of the start -> function of the time [s] and the
+                            # `Latent` at which a step begins, which gives its `SampleSet`
+    dt: float               # length of a step [s]
+    steps: int
+
+    def states(self, earlier=()):
+        """Yield the `RunState` of all time levels, the start first. earlier: (`Latent`, `Report` or
+        None) of the first states, if these are known; their samples are drawn again, so that those
+        of later steps are the run's.
+        """
+        earlier, samples = earlier or [(self.find_start(), None)], None
+        sampler = self.make_sampler(earlier[0][0].xhat)
+        for k, (latent, report) in enumerate(earlier):
+            if k > 0:
+                samples = sampler((k - 1) * self.dt, earlier[k - 1][0])
+            yield RunState(k * self.dt, latent, report, samples)
+        for k in range(len(earlier) - 1, self.steps):
+            t = k * self.dt
+            samples = sampler(t, latent)
+            latent, report = self.stepper.step(latent, samples.points, t, self.dt, samples.weights)
+            yield RunState((k + 1) * self.dt, latent, report, samples)
+
+
+# LDM.
+
+class RunOptions(NamedTuple):
+    """Options of a reduced run of LDM; `points` samples, or all of them where it is None.
 
     Samples are "redrawn" for each step (LDM-sec3.3-hyper), "kept" from the start (LDMW-sets), or
-    kept and "pivoted": those that tell the latent coordinates best at the start, of ENOUGH points.
-    The quadrature is that of `SCHEMES`, or "resampled".
+    kept and "pivoted": those that determine the latent coordinates best at the start, of
+    `samples.ENOUGH` points. The quadrature is that of `SCHEMES`, or "resampled".
     """
 
     quadrature: str = "lagrangian"
@@ -37,144 +79,116 @@ class Way(NamedTuple):
     velocity: str = "previous"
     per_cell: int = 2           # quadrature points of a cell per axis, if they are not material
     samples: str = "redrawn"
-    close: float = CLOSE        # how near Eulerian points must be to their places [dx]
+    preimage_tolerance: float = CLOSE       # distance of Eulerian points from their places [dx]
     precision: str = "double"   # of a learned map, or "single"
 
     @property
     def name(self):
-        """As the targets call the scheme."""
+        """The name of the scheme, as the targets have it."""
         return f"{self.quadrature}_{self.projection}"
 
 
-def model(case, map, way):
-    """Return LDM's `ReducedStepper` of a `Case` on a map. Raises ValueError for a quadrature that
-    does not exist.
+def ldm_run(full, g, options, rest, seed=0):
+    """Return LDM's `ReducedRun` of a `FullModel` on a map g. rest: latent coordinates near the body
+    at rest. Raises ValueError as `ldm_model` does; its states, as `samples.ldm_sampler` does.
     """
-    problem = case.problem
-    make = {"lagrangian": of_material, "eulerian": of_cells, "resampled": of_another_sampling}
-    if way.quadrature not in make:
-        raise ValueError(f"quadrature = {way.quadrature!r}: expected one of {', '.join(make)}")
-    return ldm_stepper(precise(map, way), make[way.quadrature](case, way), problem.bodies[0].law,
-                       problem.gravity, way.projection, conditions=problem.conditions,
-                       velocity=way.velocity)
+    clock = full.problem.clock
+    return ReducedRun(ldm_model(full, g, options), lambda: ldm_start(full, g, rest),
+                      lambda xhat: ldm_sampler(full, g, options, xhat, seed), clock.dt, clock.steps)
 
 
-def precise(map, way):
-    """A map in the precision of a way. Raises ValueError for one that there is not, a map that has
-    only doubles, and preimages nearer than single precision can tell.
+def ldm_model(full, g, options):
+    """Return LDM's `ReducedStepper` of a `FullModel` on a map g. Raises ValueError for a quadrature
+    that does not exist.
     """
-    if way.precision == "double":
-        return map
-    if way.precision not in PRECISIONS:
-        raise ValueError(f"precision = {way.precision!r}: expected {' or '.join(PRECISIONS)}")
-    if not hasattr(map, "single"):
+    problem = full.problem
+    make = {"lagrangian": material_quadrature, "eulerian": cell_quadrature,
+            "resampled": resampled_quadrature}
+    if options.quadrature not in make:
+        raise ValueError(f"quadrature = {options.quadrature!r}: expected one of {', '.join(make)}")
+    return ldm_stepper(with_precision(g, options), make[options.quadrature](full, options),
+                       problem.bodies[0].law, problem.gravity, options.projection,
+                       conditions=problem.conditions, velocity=options.velocity)
+
+
+def with_precision(g, options):
+    """Return a map in the precision of `RunOptions`. Raises ValueError for one that does not exist,
+    a map that has only doubles, and preimages closer than single precision can tell.
+    """
+    if options.precision == "double":
+        return g
+    if options.precision not in PRECISIONS:
+        raise ValueError(f"precision = {options.precision!r}: expected {' or '.join(PRECISIONS)}")
+    if not hasattr(g, "single"):
         raise ValueError("precision = 'single': learned maps alone have it, this is one of "
-                         f"{type(map).__name__}")
-    if way.quadrature == "eulerian" and way.close < SINGLE:
-        raise ValueError(f"close = {way.close:g} dx in single precision: expected at least "
-                         f"{SINGLE:g}")
-    return map.single()
+                         f"{type(g).__name__}")
+    if options.quadrature == "eulerian" and options.preimage_tolerance < SINGLE:
+        raise ValueError(f"preimage_tolerance = {options.preimage_tolerance:g} dx in single "
+                         f"precision: expected at least {SINGLE:g}")
+    return g.single()
 
 
-def of_material(case, way):
-    """Quadrature with the material points of a `Case`."""
-    return lagrangian(case.X, case.m, case.V0, case.problem.dx, case.problem.scheme.degree)
+def material_quadrature(full, options):
+    """Return the quadrature with the material points of a `FullModel`."""
+    return lagrangian(full.X, full.m, full.V0, full.problem.dx, full.problem.scheme.degree)
 
 
-def of_cells(case, way):
-    """Quadrature with points of the grid's cells."""
-    size = np.ptp(case.X, axis=0).max() / COARSE
-    seeds = np.unique(np.floor(case.X / size), axis=0, return_index=True)[1]
-    return Eulerian(case.X, case.rho, lambda X: distance(X, case.shape), case.X[seeds],
-                    case.problem.dx, case.problem.scheme.degree, way.per_cell, way.close)
+def cell_quadrature(full, options):
+    """Return the quadrature with points of the grid's cells."""
+    size = np.ptp(full.X, axis=0).max() / COARSE
+    seeds = np.unique(np.floor(full.X / size), axis=0, return_index=True)[1]
+    return Eulerian(full.X, full.rho, lambda X: signed_distance(X, full.shape), full.X[seeds],
+                    full.problem.dx, full.problem.scheme.degree, options.per_cell,
+                    options.preimage_tolerance)
 
 
-def of_another_sampling(case, way):
-    """Quadrature with another sampling of the body at rest."""
-    dx, degree = case.problem.dx, case.problem.scheme.degree
-    X, V0 = sample(Regular(per_cell=way.per_cell), solid(case.shape), dx, 0)
-    return Resampled(case.X, lagrangian(X, case.rho * V0, V0, dx, degree))
+def resampled_quadrature(full, options):
+    """Return the quadrature with another sampling of the body at rest."""
+    dx, degree = full.problem.dx, full.problem.scheme.degree
+    X, V0 = sample(Regular(per_cell=options.per_cell), solid(full.shape), dx, 0)
+    return Resampled(full.X, lagrangian(X, full.rho * V0, V0, dx, degree))
 
 
-def march(case, map, way, rest, seed=0, pick=None):
-    """Yield (`Latent`, `Report` or None) of a reduced run, the start first. rest: latent
-    coordinates near the body at rest; pick: the samples as `picked` gives them, or others.
+def ldm_start(full, g, rest):
+    """Return the `Latent` of the body at rest, searched from latent coordinates near it."""
+    return initial(g, full.X[::-(-len(full.X) // ENOUGH)], xhat=rest)
+
+
+# NSF.
+
+class FieldRunOptions(NamedTuple):
+    """Options of a reduced run of NSF."""
+
+    samples: tuple          # of `SampleSet`, in order of time (NSF-sec5.4)
+    dt_factor: float = 1.0  # length of a step over that of the scene
+    inversion: str = "nonlinear"
+
+
+def nsf_run(full, fields, options, rest):
+    """Return NSF's `ReducedRun` of a `FullModel` on fields with `FieldRunOptions`, until the scene
+    ends. rest: latent coordinates near the start. Raises ValueError as `require_valid_sets` does.
     """
-    first = start(case, map, rest)
-    pick = pick or picked(case, map, way, first.xhat, seed)
-    yield from continued([(first, None)], case, map, way, pick)
+    require_valid_sets(options.samples, len(full.X))
+    clock = full.problem.clock
+    return ReducedRun(nsf_model(full, fields, options.inversion),
+                      lambda: nsf_start(full, fields, rest),
+                      lambda xhat: nsf_sampler(options.samples), options.dt_factor * clock.dt,
+                      step_count(clock, options.dt_factor))
 
 
-def continued(known, case, map, way, pick):
-    """Yield the same of a run whose first states (`Latent`, `Report` or None) are known, these too.
-    Their samples are picked again, so that those of later steps are the run's own.
-    """
-    stepper, clock = model(case, map, way), case.problem.clock
-    for k, state in enumerate(known):
-        if k > 0:
-            pick((k - 1) * clock.dt)
-        yield state
-    yield from stepped(stepper, clock, known[-1][0], lambda t, latent: pick(t), len(known) - 1)
+def step_count(clock, dt_factor):
+    """Return the number of steps, `dt_factor` times as long, within the scene's `Clock`."""
+    return int(clock.steps / dt_factor * (1.0 + ROUNDING))
 
 
-def stepped(stepper, clock, latent, choose, begin=0):
-    """Yield (`Latent`, `Report`) after each step from step `begin` on; choose(t, latent) gives the
-    samples.
-    """
-    for k in range(begin, clock.steps):
-        t = k * clock.dt
-        latent, report = stepper.step(latent, choose(t, latent), t, clock.dt)
-        yield latent, report
+def nsf_model(full, fields, inversion="nonlinear"):
+    """Return NSF's `ReducedStepper` of a `FullModel`."""
+    problem = full.problem
+    return nsf_stepper(fields, full.material, problem.dx, problem.scheme.degree, problem.gravity,
+                       inversion, conditions=problem.conditions)
 
 
-def start(case, map, rest):
-    """`Latent` of the body at rest, searched from latent coordinates near it."""
-    return initial(map, case.X[::-(-len(case.X) // ENOUGH)], xhat=rest)
-
-
-def picked(case, map, way, xhat, seed):
-    """Function of the time [s] -> indices of the samples of the step that begins then. Raises
-    ValueError for ways to choose them that there are not, and as `drawing` does.
-    """
-    rng = np.random.default_rng(seed)
-    if way.samples == "redrawn":
-        return lambda t: drawing(case, map, way, t)(rng)
-    if way.samples == "kept":
-        first = drawing(case, map, way)(rng)
-    elif way.samples == "pivoted":
-        first = chosen(case.X, drawing(case, map, way), lambda X: map.derivatives(X, xhat)[2], rng)
-    else:
-        raise ValueError(f"samples = {way.samples!r}: expected redrawn, kept or pivoted")
-    return lambda t: first
-
-
-def drawing(case, map, way, t=0.0):
-    """`Draw` of the samples of the step that begins at t [s]. Raises ValueError where they do not
-    suffice, and for more to be pivoted than are looked at.
-    """
-    n = len(case.X)
-    count = way.points or n
-    if way.samples == "pivoted" and count > ENOUGH:
-        raise ValueError(f"{count} samples that are pivoted: expected at most {ENOUGH}; take fewer "
-                         'points, or samples = "kept"')
-    return draw(n, count, map.r, map.dim, groups(case, way, t))
-
-
-def chosen(X, draw, G, rng):
-    """Sorted indices of the samples of a `Draw` from points X (n, d): those of its groups at
-    random, the others pivoted by dg/dxhat, G(X).
-    """
-    forced = np.unique(np.concatenate([np.empty(0, dtype=int), *(
-        rng.choice(group, min(draw.per_group, len(group)), replace=False)
-        for group in draw.groups)]))
-    some = np.setdiff1d(rng.choice(draw.n, min(draw.n, ENOUGH), replace=False), forced)
-    best = some[pivoted(G(X[some]), draw.count - len(forced))]
-    return np.union1d(best, forced)
-
-
-def groups(case, way, t):
-    """What samples must not miss; nothing where they are all points, or so few that these would be
-    more than half of them: what is held tells little of the body's motion.
-    """
-    held = case.held(t)
-    return held if way.points and way.points >= 2 * PER_GROUP * len(held) else ()
+def nsf_start(full, fields, rest):
+    """Return the `Latent` at the start, searched from latent coordinates near it."""
+    points = np.arange(0, len(full.X), -(-len(full.X) // ENOUGH))
+    return Latent(nearest(fields, points, full.X[points], rest))

@@ -10,21 +10,19 @@ from math import isfinite
 from pathlib import Path
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
 from ... import scene
 from ...scene import SceneError
 from ...scene.messages import at, opened_by
 from ...scene.overrides import flat, varied
-from .nsf_levels import every
-from .study_file import checked, plain
-from .tables import LATIN, LDM, NETWORK, NSF, Runs
+from .methods import METHODS, every_step
+from .study_file import parse_tables, read_toml
+from .tables import CURVED, LATIN, LDM, MODES, NETWORK, NSF, SIZES, CommonTables
 
 SAME = ("dim", "dx", "dt", "steps", "every", "seed", "scheme", "integrator")    # in all runs
 SUMMED = ("modes", "tau", "C")      # numbers of modes, of maps and fields that are sums of them
-VARIED = {LDM: 'gravity, a material or a motion; with model = "nsf" a velocity at the start too',
-          NSF: "gravity, a material, a motion or a velocity at the start"}
-FREE = {LDM: ("material",), NSF: ("material", "velocity")}      # of a body, from run to run
 
 
 class Study(NamedTuple):
@@ -32,9 +30,20 @@ class Study(NamedTuple):
 
     path: Path
     base: object            # the `Scene` with what is set in all runs
-    tables: Runs            # `Tables` of its model
+    tables: CommonTables    # those of its method (see `TABLES`)
     mu: np.ndarray          # (runs, parameters)
     test: tuple             # numbers of the runs that are held out
+
+    @property
+    def method(self):
+        """The `ReductionMethod` that the file names."""
+        return METHODS[self.tables.model]
+
+    @property
+    def model_entry(self):
+        """The entry {"model": name} of files of another method than LDM, whose files have none."""
+        model = self.tables.model
+        return {} if model == LDM else {"model": model}
 
     @property
     def names(self):
@@ -43,30 +52,30 @@ class Study(NamedTuple):
 
     @property
     def train(self):
-        """Numbers of the runs that the map is made of."""
+        """Numbers of the runs that the reduced model is computed from."""
         return tuple(k for k in range(len(self.mu)) if k not in self.test)
 
     def scene(self, mu):
-        """The scene of a run with parameters mu (parameters,)."""
+        """Return the scene of a run with parameters mu (parameters,)."""
         return varied(self.base, {one.key: one.scale * float(value) for one, value in
                                   zip(self.tables.parameter, mu, strict=True)})
 
-    def given(self, texts):
-        """Parameters [..] of a run, from texts NAME=VALUE. Raises SceneError."""
-        found = {}
+    def parse_parameters(self, texts):
+        """Return the parameters [..] of a run, from texts NAME=VALUE. Raises SceneError."""
+        values = {}
         for text in texts:
             name, _, value = text.partition("=")
             if name not in self.names:
                 raise SceneError(f"{text}: expected NAME=VALUE with one of the study's parameters "
                                  f"{', '.join(self.names)}")
-            found[name] = number(text, value)
+            values[name] = number(text, value)
         for name in self.names:
-            if name not in found:
+            if name not in values:
                 raise SceneError(f"the parameter {name} is not given: add --set {name}=VALUE")
-        return [found[name] for name in self.names]
+        return [values[name] for name in self.names]
 
-    def outside(self, mu):
-        """Sentences about parameters beyond the runs that the map is made of."""
+    def range_warnings(self, mu):
+        """Yield sentences about parameters beyond the runs that the map is made of."""
         trained = self.mu[list(self.train)]
         for name, value, low, high in zip(self.names, mu, trained.min(axis=0), trained.max(axis=0),
                                           strict=True):
@@ -74,23 +83,41 @@ class Study(NamedTuple):
                 yield (f"{name} = {value:g} lies outside the range {low:g} .. {high:g} of the runs "
                        "that the map is made of")
 
+    def with_kind(self, kind):
+        """Return the study with a map of another kind; None: its own. Raises ValueError for an
+        unknown one, and for one that needs other settings than the study has.
+        """
+        if kind is None:
+            return self
+        replace = msgspec.structs.replace
+        try:
+            table = replace(self.tables.map, kind=kind)
+            return self._replace(tables=replace(self.tables, map=table))
+        except ValueError as fault:
+            hint = ""
+            if kind == CURVED and self.tables.model != NSF:
+                hint = (f"; a curved map needs a study that says so, {self.path} or a copy: in "
+                        f'[map] kind = "{CURVED}" and `modes` larger than `r`, in [run] projection '
+                        '= "nonlinear" (docs/reference/studies.md)')
+            raise ValueError(f"{fault}{hint}") from None
+
     @property
     def digest(self):
-        """sha256 of all runs' scenes and of which are held out: what a map is a map of."""
+        """The sha256 of all runs' scenes and of the numbers held out: it identifies the data."""
         texts = [scene.canonical(self.scene(mu)) for mu in self.mu]
         return hashlib.sha256(json.dumps([texts, self.test]).encode()).hexdigest()
 
 
-def load(path, shipped=None):
-    """The `Study` of a TOML file; shipped {name: path} are scenes that it may name. Raises
+def load(path, scenes=None):
+    """Return the `Study` of a TOML file; scenes {name: path} are those that it may name. Raises
     SceneError, which names the file and the key.
     """
     path = Path(path)
-    data = plain(path)
+    data = read_toml(path)
     with opened_by(str(path)):
-        tables = checked(data)
+        tables = parse_tables(data)
         mu = parameters(tables)
-        base = base_of(tables, path.parent, shipped or {}, SHOWN[tables.model])
+        base = base_scene(tables, path.parent, scenes or {}, METHODS[tables.model].frame_spacing)
         study = Study(path, base, tables, mu, held_out(len(mu), tables.test, tables.seed))
         _require_one_body(study)
         _require_states(study)
@@ -99,18 +126,18 @@ def load(path, shipped=None):
 
 
 def number(text, value):
-    """A finite number; text is where it stands. Raises SceneError."""
+    """Return a finite number; text: the option that it is part of. Raises SceneError."""
     try:
-        if isfinite(found := float(value)):
-            return found
+        if isfinite(result := float(value)):
+            return result
     except ValueError:
         pass
     raise SceneError(f"{text}: expected a finite number, not {value!r}")
 
 
 def parameters(tables):
-    """Parameters (runs, parameters) of all runs: every combination, the last one fastest; or a
-    Latin hypercube.
+    """Return the parameters (runs, parameters) of all runs: every combination, the last one
+    fastest; or a Latin hypercube.
     """
     if tables.sampling != LATIN:
         axes = []
@@ -127,8 +154,9 @@ def parameters(tables):
 
 
 def latin(count, ends, rng):
-    """A Latin hypercube (count, parameters) in ranges (low, high): of count equal parts of each
-    range, each has one value, anywhere in it. The same as SciPy's, whose module asks for PyTorch.
+    """Return a Latin hypercube (count, parameters) in ranges (low, high): of count equal parts of
+    each range, each has one value, anywhere in it. SciPy's, with the same numbers, would import
+    PyTorch.
     """
     low, high = np.transpose(ends)
     u = rng.uniform(size=(count, len(ends)))
@@ -139,35 +167,28 @@ def latin(count, ends, rng):
 
 
 def held_out(runs, count, seed):
-    """Numbers of so many runs, drawn at random. Raises SceneError where none would be left."""
+    """Return the numbers of `count` runs, drawn at random. Raises SceneError where none would be
+    left.
+    """
     if count >= runs:
         raise SceneError(f"test = {count}: expected fewer than the {runs} runs of the study")
     return tuple(sorted(np.random.default_rng(seed).permutation(runs)[:count].tolist()))
 
 
-def each(base, changes):
-    """Steps from one frame to the next, where every one is shown."""
-    return 1
-
-
-SHOWN = {LDM: each, NSF: every}
-
-
-def base_of(tables, folder, shipped, spacing=each):
-    """The scene of a study's `Tables` with what is `set` in all runs; shipped {name: path} are
-    scenes that may be named, spacing a function of the scene and changes as `each` is. Raises
-    SceneError.
+def base_scene(tables, folder, scenes, frame_spacing=every_step):
+    """Return the scene of a study's tables with the values of `set`; scenes {name: path} are those
+    that may be named, frame_spacing a function as that of a `ReductionMethod`. Raises SceneError.
     """
     path = folder / tables.scene
     if not path.is_file():
-        path = shipped.get(tables.scene)
+        path = scenes.get(tables.scene)
     if path is None:
         raise SceneError(f"scene = {tables.scene!r}: there is no such file, nor a shipped scene of "
-                         f"that name; shipped scenes: {', '.join(shipped) or 'none'}")
+                         f"that name; shipped scenes: {', '.join(scenes) or 'none'}")
     base = scene.load(path)
     with opened_by("set"):
         changes = flat(tables.set)
-        base = varied(base, changes | {"every": spacing(base, changes), "interval": None})
+        base = varied(base, changes | {"every": frame_spacing(base, changes), "interval": None})
     if base.dt is None or base.steps is None:
         raise SceneError(f"scene = {tables.scene!r}: expected one with `dt` and `steps`, so that "
                          "all runs have the same time levels")
@@ -179,21 +200,21 @@ def _require_one_body(study):
     first = None
     for mu in study.mu:
         with opened_by("parameter"):
-            found = _kept(study.scene(mu), FREE[study.tables.model])
-        first = first or found
-        for name, value in found.items():
+            fields = _fixed_fields(study.scene(mu), study.method.free_fields)
+        first = first or fields
+        for name, value in fields.items():
             if value != first[name]:
                 raise SceneError(f"parameter: runs differ in `{name}` of the scene, but all need "
                                  "the same particles, grid and steps; vary "
-                                 f"{VARIED[study.tables.model]}")
+                                 f"{study.method.parameters}")
 
 
 def _require_states(study):
-    """Raise SceneError for more modes than the training runs keep states."""
-    base, map, runs = study.base, study.tables.map, len(study.train)
+    """Raise SceneError for more modes than the training runs have states."""
+    base, table, runs = study.base, study.tables.map, len(study.train)
     states = runs * (base.steps // base.every + 1)
-    for name in ("r", *SUMMED) if map.kind != NETWORK else ():
-        count = getattr(map, name, None) or 0
+    for name in ("r", *SUMMED) if table.kind != NETWORK else ():
+        count = getattr(table, name, None) or 0
         if count > states:
             raise SceneError(f"map.{name} = {count}: the {runs} training runs keep {states} "
                              "states, which hold no more modes than that; set "
@@ -202,14 +223,27 @@ def _require_states(study):
 
 def _require_step(study):
     """Raise SceneError for reduced steps that are longer than the scene."""
-    faster, steps = getattr(study.tables.run, "faster", 1.0), study.base.steps
-    if faster > steps:
-        raise SceneError(f"run.faster = {faster:g}: expected at most {steps}, the steps of the "
+    factor, steps = getattr(study.tables.run, "dt_factor", 1.0), study.base.steps
+    if factor > steps:
+        raise SceneError(f"run.dt_factor = {factor:g}: expected at most {steps}, the steps of the "
                          "scene")
 
 
-def _kept(one, free):
-    """What must be the same in all runs, by name; not what is free of a body."""
-    bodies = {f"body[{k}].{name}": getattr(body, name) for k, body in enumerate(one.body)
+def _fixed_fields(scene, free):
+    """Return {name: value} of a scene that are the same in all runs; free: names of a body that are
+    not.
+    """
+    bodies = {f"body[{k}].{name}": getattr(body, name) for k, body in enumerate(scene.body)
               for name in body.__struct_fields__ if name not in free}
-    return {name: getattr(one, name) for name in SAME} | bodies
+    return {name: getattr(scene, name) for name in SAME} | bodies
+
+
+def training_hints(study):
+    """Yield hints before fields are computed from a study's runs."""
+    table = study.tables.map
+    flowing = [body.name for body in study.base.body if body.material.flow.type != "none"]
+    if (study.tables.model == NSF and table.kind == MODES and flowing
+            and table.smoothing <= SIZES["smoothing"]):
+        yield (f"map.smoothing = {table.smoothing:g} is for elastic matter, and that of "
+               f"{', '.join(flowing)} flows: reduced runs are often far off then. Try 1e-6 to 1, "
+               "and keep what mpm-ref rom evaluate likes best, first with all points as samples")

@@ -5,31 +5,45 @@ from typing import Annotated, ClassVar
 import numpy as np
 from msgspec import Meta, Struct, field, to_builtins
 
-from ...shapes.quantities import Count, Natural, PerCell, Positive, Seed
+from ...shapes.quantities import Count, Natural, NotNegative, PerCell, Positive, Seed
 from ..fields.architecture import HIDDEN
+from ..fields.pod_fields import Sizes
 from ..latent import VELOCITIES
-from .run import PRECISIONS, PROJECTIONS, QUADRATURES, Way
+from ..projection import INVERSIONS
+from .run import PRECISIONS, PROJECTIONS, QUADRATURES, RunOptions
 
-LDM, NSF = "ldm", "nsf"             # reduced models; tables of the second are in `nsf.tables`
+LDM, NSF = "ldm", "nsf"             # methods
 MODES, CURVED, NETWORK = "modes", "curved", "network"
-KEYS = {                            # of a map of each kind, beside `kind` and `r`
+KEYS = {                            # of LDM's map of each kind, beside `kind` and `r`
     MODES: (),
     CURVED: ("modes", "degree"),
     NETWORK: ("hidden", "latent", "weights", "epochs", "batch", "points", "dense", "every",
               "seed"),
 }
 GRID, LATIN = "grid", "latin"
-LATENTS = ("encoder", "free", MODES)                # see `rom.train.decoder.Training`
-RESAMPLED, SAMPLES = "resampled", ("redrawn", "kept", "pivoted")       # see `march.Way`
-WEIGHTS = ("code", "printed", "scaled")             # of the loss, see `maps.larger`
+LATENTS = ("encoder", "free", MODES)                # see `rom.train.decoder.DecoderTraining`
+RESAMPLED, SAMPLES = "resampled", ("redrawn", "kept", "pivoted")       # see `run.RunOptions`
+WEIGHTS = ("code", "printed", "scaled")             # of the loss, see `reduce.size_ratios`
+SIZES = Sizes._field_defaults
+NUMBERS = ("modes", "tau", "C", "weight", "smoothing")     # of `Sizes`
+NSF_KEYS = {                        # of NSF's fields of each kind, beside `kind` and `r`
+    MODES: (*NUMBERS, "stress_sees_parameters"),
+    NETWORK: ("stress_sees_parameters", "beta", "octaves", "latent", "schedule", "epochs",
+              "field_epochs", "batch", "points", "seed"),
+}
+NSF_LATENTS, SCHEDULES = ("encoder-nsf", "free", MODES), ("steps", "cosine")    # see `rom.train`
 Word = Annotated[str, Meta(pattern=r"^\w[\w.-]*\Z", max_length=100)]
-Bend = Annotated[int, Meta(ge=2)]
+Degree = Annotated[int, Meta(ge=2)]
+Width = Annotated[int, Meta(ge=1, le=1000)]
+Factors = Annotated[tuple[Width, ...], Meta(min_length=3, max_length=3)]
+Octaves = Annotated[int, Meta(ge=0, le=16)]
+StepFactor = Annotated[float, Meta(ge=0.01)]
 
 
-def one_of(name, value, known):
-    """Raise ValueError unless a value is known."""
-    if value not in known:
-        raise ValueError(f"{name} = {value!r}: expected one of {', '.join(map(repr, known))}")
+def one_of(name, value, allowed):
+    """Raise ValueError unless a value is one of those allowed."""
+    if value not in allowed:
+        raise ValueError(f"{name} = {value!r}: expected one of {', '.join(map(repr, allowed))}")
 
 
 def require_nonlinear(kind, projection):
@@ -39,19 +53,19 @@ def require_nonlinear(kind, projection):
                          "since linear projection leaves the curve in every step")
 
 
-class Table(Struct, frozen=True, kw_only=True):
+class StudyTable(Struct, frozen=True, kw_only=True):
     """A table of a study file."""
 
 
-class Parameter(Table, rename={"start": "from", "stop": "to"}):
-    """What differs between runs: a name, its place in the scene, and its values."""
+class Parameter(StudyTable, rename={"start": "from", "stop": "to"}):
+    """A parameter that differs between runs: its name, its place in the scene, and its values."""
 
     name: Word
-    key: str                                    # path into the scene (see `vary`)
+    key: str                                    # path into the scene (see `scene.overrides`)
     values: Annotated[tuple[float, ...], Meta(min_length=1)] | None = None      # all of them, or
     start: float | None = None                  # from here
     stop: float | None = None                   # ... to here
-    count: Count | None = None                  # ... so many, evenly spaced
+    count: Count | None = None                  # ... this many, evenly spaced
     scale: float = 1.0                          # factor from the value to what the scene gets
 
     def __post_init__(self):
@@ -64,7 +78,7 @@ class Parameter(Table, rename={"start": "from", "stop": "to"}):
             raise ValueError(f"values = {list(self.values)}: expected numbers that differ")
 
     def grid(self):
-        """Its values on a grid. Raises ValueError where it does not say how many."""
+        """Return its values on a grid. Raises ValueError where their number is not given."""
         if self.values is not None:
             return np.array(self.values)
         if self.count is None:
@@ -72,8 +86,8 @@ class Parameter(Table, rename={"start": "from", "stop": "to"}):
         return np.linspace(self.start, self.stop, self.count)
 
 
-class Kinds(Table):
-    """What is learned, of one of several kinds, each with keys of its own."""
+class ReducedModelTable(StudyTable):
+    """A reduced model of one of several kinds, each with keys of its own."""
 
     keys: ClassVar[dict]                        # {kind: names of its keys, beside `kind` and `r`}
     kind: str
@@ -84,19 +98,19 @@ class Kinds(Table):
 
     @property
     def settings(self):
-        """{key: value} of the keys of its kind, plain values."""
+        """The {key: value} of the keys of its kind, plain values."""
         known = ("kind", "r", *self.keys[self.kind])
         return {key: value for key, value in to_builtins(self).items() if key in known}
 
 
-class Map(Kinds, kw_only=True):
-    """The map: POD modes, straight or bent (see `rom.fields.polynomial_manifold`), or a
-    network and how it is trained (see `rom.train.decoder.Training`).
+class MapTable(ReducedModelTable, kw_only=True):
+    """LDM's map: POD modes, straight or bent (see `rom.fields.polynomial_manifold`), or a
+    network and how it is trained (see `rom.train.decoder.DecoderTraining`).
     """
 
     keys = KEYS
-    modes: Count | None = None                  # of a curved map: those kept, r of them free
-    degree: Bend = 2                            # ... of the polynomials that the others are
+    modes: Count | None = None                  # of a curved map, r of them free
+    degree: Degree = 2                            # ... of the polynomials that the others are
     hidden: tuple[Count, ...] = HIDDEN
     latent: str = LATENTS[0]
     weights: str = WEIGHTS[0]
@@ -109,7 +123,7 @@ class Map(Kinds, kw_only=True):
 
     @property
     def total(self):
-        """Epochs of a training."""
+        """Number of epochs of a training."""
         return self.epochs
 
     def __post_init__(self):
@@ -121,17 +135,18 @@ class Map(Kinds, kw_only=True):
         one_of("weights", self.weights, WEIGHTS)
 
 
-class Run(Table):
-    """How reduced runs are made (see `march.Way`)."""
+class MapRunTable(StudyTable):
+    """Options of LDM's reduced runs (see `run.RunOptions`)."""
 
-    quadrature: str = Way().quadrature
-    projection: str = Way().projection
+    quadrature: str = RunOptions().quadrature
+    projection: str = RunOptions().projection
     points: Count | None = None                 # samples; none: all points
-    samples: str = Way().samples
-    per_cell: PerCell = Way().per_cell          # quadrature points per axis, not material ones
-    close: Positive = Way().close               # how near Eulerian points are traced back [dx]
-    precision: str = Way().precision            # of a network
-    velocity: str = Way().velocity
+    samples: str = RunOptions().samples
+    per_cell: PerCell = RunOptions().per_cell  # quadrature points per axis, not material ones
+    preimage_tolerance: Positive = RunOptions().preimage_tolerance  # distance of Eulerian points
+                                                # from their places [dx]
+    precision: str = RunOptions().precision            # of a network
+    velocity: str = RunOptions().velocity
     seed: Seed = 0                              # of the samples
 
     def __post_init__(self):
@@ -142,13 +157,13 @@ class Run(Table):
         one_of("precision", self.precision, PRECISIONS)
 
     @property
-    def way(self):
-        """As `march` takes it."""
-        return Way(**{name: getattr(self, name) for name in Way._fields})
+    def options(self):
+        """The `RunOptions` of these values."""
+        return RunOptions(**{name: getattr(self, name) for name in RunOptions._fields})
 
 
-class Runs(Table):
-    """A study file, but for what is learned and how reduced runs are made."""
+class CommonTables(StudyTable):
+    """The tables of a study file, without those that depend on its method."""
 
     scene: str                                  # a file, from the folder of this one; or shipped
     parameter: Annotated[tuple[Parameter, ...], Meta(min_length=1)]
@@ -172,12 +187,84 @@ class Runs(Table):
                 raise ValueError(f"parameter: two have the same {name}")
 
 
-class Tables(Runs, kw_only=True):
-    """A study file of LDM's reduced model."""
+class MapTables(CommonTables, kw_only=True):
+    """The tables of a study file of LDM."""
 
-    map: Map
-    run: Run = Run()
+    map: MapTable
+    run: MapRunTable = MapRunTable()
 
     def __post_init__(self):
         require_nonlinear(self.map.kind, self.run.projection)
         super().__post_init__()
+
+
+class FieldsTable(ReducedModelTable):
+    """NSF's fields: sums of modes (see `rom.fields.pod_fields`), or networks and how they are
+    trained (see `rom.train.settings.stage_plan`).
+    """
+
+    keys: ClassVar[dict] = NSF_KEYS
+    modes: Count = SIZES["modes"]               # of the displacement, r of them free
+    tau: Count = SIZES["tau"]                   # of the stress
+    C: Natural = SIZES["C"]                     # of the affine field; 0: there is none
+    stress_sees_parameters: bool = True         # whether it is a function of them (NSF-mu-dep)
+    weight: Positive = SIZES["weight"]          # of these beside latent coordinates
+    smoothing: NotNegative = SIZES["smoothing"]
+    beta: Factors = (16, 16, 16)                # widths of hidden layers over numbers of values
+    octaves: Octaves = 0                        # of Fourier features (see `rom.fields.perceptron`)
+    latent: str = NSF_LATENTS[0]
+    schedule: str = SCHEDULES[0]                # of learning rates
+    epochs: Count = 1500                        # of the position
+    field_epochs: Count = 3000                  # of the stress, and of the affine field
+    batch: Count = 32                           # snapshots at a time
+    points: Natural = 0                         # of each, anew each time; 0: all
+    seed: Seed = 0
+
+    def __post_init__(self):
+        super().__post_init__()
+        one_of("latent", self.latent, NSF_LATENTS)
+        one_of("schedule", self.schedule, SCHEDULES)
+        if self.kind == MODES and self.modes < self.r:
+            raise ValueError(f"modes = {self.modes}: expected at least r = {self.r} modes of the "
+                             "displacement, whose first coefficients are the latent coordinates")
+
+    @property
+    def sizes(self):
+        """The `Sizes`, as `spanned` takes them."""
+        return Sizes(**{name: getattr(self, name) for name in ("r", *NUMBERS)})
+
+    @property
+    def total(self):
+        """Number of epochs of all stages."""
+        return self.epochs + 2 * self.field_epochs
+
+
+class FieldsRunTable(StudyTable):
+    """Options of NSF's reduced runs (see `run.nsf_run`)."""
+
+    points: Count | None = None                 # samples, drawn once; none: all points
+    seed: Seed = 0                              # of that draw
+    weighted: bool = False  # whether they have weights, and are at most `points`
+    cells: Count | None = None                  # of all samples, which then have weights, at most
+    dt_factor: StepFactor = 1.0                 # length of a step over that of the scene
+    inversion: str = INVERSIONS[0]
+
+    def __post_init__(self):
+        one_of("inversion", self.inversion, INVERSIONS)
+        if self.cells is not None and (self.weighted or self.points is not None):
+            raise ValueError(f"cells = {self.cells}: samples are points of this many cells and "
+                             "have weights; expected neither `points` nor `weighted` beside it")
+        if self.weighted and self.points is None:
+            raise ValueError("weighted = true: expected `points` beside it, the largest number of "
+                             "samples")
+
+
+class FieldsTables(CommonTables, kw_only=True):
+    """The tables of a study file with model = "nsf"."""
+
+    map: FieldsTable
+    run: FieldsRunTable = FieldsRunTable()
+
+
+TABLES = {LDM: (MapTables, MapTable, MapRunTable),         # of each method: all, [map], [run]
+          NSF: (FieldsTables, FieldsTable, FieldsRunTable)}

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
-from ...training import Cost, sha256, train_epochs
+from ...training import TrainingTime, sha256, train_epochs
 from ..fields.architecture import ENCODERS, HIDDEN
 from ..fields.pod import basis, directions
 from ..snapshots import units
@@ -67,7 +67,7 @@ class TrainedDecoder(NamedTuple):
     decoder: object         # `rom.fields.network.Decoder`
     xhat: np.ndarray        # (s, k + 1, r) latent coordinates of the training snapshots
     history: np.ndarray     # (epochs, 4) loss, and its terms, of each epoch
-    cost: Cost              # of all parts of the training
+    cost: TrainingTime              # of all parts of the training
 
 
 class DecoderSession(NetworkSession):

@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from torch.nn.functional import mse_loss, pad
 
-from ...training import Cost, sha256, train_epochs
+from ...training import TrainingTime, sha256, train_epochs
 from ..fields.network import Field
 from ..snapshots import field_units
 from .perceptron import FieldPerceptron, network_of
@@ -61,7 +61,7 @@ class TrainedField(NamedTuple):
 
     field: Field
     history: np.ndarray     # (epochs,) mean squared error of standardised values in each epoch
-    cost: Cost              # of all parts of the training
+    cost: TrainingTime              # of all parts of the training
 
 
 class FieldSession(NetworkSession):

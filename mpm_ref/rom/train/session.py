@@ -19,7 +19,7 @@ PARTS = 200                         # ... this many checkpoints in all
 FORMAT = 4                          # of checkpoints
 
 
-class NetworkSession(training.Session):
+class NetworkSession(training.TrainingSession):
     """Networks, optimiser and random numbers of a training under way.
 
     `settings` has the fields schedule, epochs, batch, points and seed; `data` is a digest of the

@@ -8,9 +8,9 @@ import pytest
 
 from mpm_ref.rom.fields.pod import basis
 from mpm_ref.rom.model_file import load
-from mpm_ref.rom.study.case import case
-from mpm_ref.rom.study.run import Way
-from mpm_ref.rom.study.watch import Sight
+from mpm_ref.rom.study.full_model import ldm_full_model
+from mpm_ref.rom.study.monitor import StateCheck
+from mpm_ref.rom.study.run import RunOptions
 from validation.common.scenes import with_
 from validation.extremes import ldm_files as files
 from validation.extremes import ldm_long as long
@@ -36,7 +36,8 @@ from validation.extremes.ldm_time_step import record_reach, with_usual
 from validation.ldm.studies import GRAVITY, TORSION
 
 GOOD = End(0.3, 30, -1, "", 0.4, 0.01, 0.9, 4, 0.0, 0.7, "")
-WELL = Sight(beyond=0.3, off=0.01, seen=0.9, blind=0, lost=0.0, J=0.8, inverted=0.0, far=0.9)
+WELL = StateCheck(beyond=0.3, off=0.01, coverage=0.9, blind=0, lost=0.0, J=0.8, inverted=0.0,
+                  far=0.9)
 
 
 class Records(dict):
@@ -57,7 +58,7 @@ def trial(end, usual=0.3, **changes):
     ({"error": np.nan}, SILENT), ({"error": np.inf}, SILENT),
     ({"error": 50.0, "flags": "beyond"}, FLAGGED),
     ({"error": 50.0, "flags": "beyond", "said": "no body"}, STOPPED),
-    ({"error": 50.0, "said": "no body"}, STOPPED), ({"flags": "seen"}, FLAGGED)])
+    ({"error": 50.0, "said": "no body"}, STOPPED), ({"flags": "coverage"}, FLAGGED)])
 def test_a_run_ends_in_one_of_four_ways(changes, kind):
     assert GOOD._replace(**changes).kind(0.3) == kind
 
@@ -91,10 +92,10 @@ def test_silent_runs_are_counted_named_and_a_miss():
 
 def test_a_full_order_run_that_breaks_down_is_kept_as_far_as_it_went():
     scene = GRAVITY.scene(50.0)
-    x, said = full(case(scene).problem)
+    x, said = full(ldm_full_model(scene).problem)
     assert 5 < len(x) < scene.steps
     assert said.startswith("unstable at step")
-    whole, nothing = full(case(with_(GRAVITY.scene(1.0), steps=3)).problem)
+    whole, nothing = full(ldm_full_model(with_(GRAVITY.scene(1.0), steps=3)).problem)
     assert (len(whole), nothing) == (4, "")
 
 
@@ -104,8 +105,8 @@ def net():
 
 
 def fallen(net, g, way=None, pick=None):
-    one = case(GRAVITY.scene(g))
-    return ended(one, full(one.problem)[0], net, way or Way(points=50), pick)
+    one = ldm_full_model(GRAVITY.scene(g))
+    return ended(one, full(one.problem)[0], net, way or RunOptions(points=50), pick)
 
 
 def test_the_watch_knows_the_trained_range(net):
@@ -119,21 +120,21 @@ def test_the_watch_knows_the_trained_range(net):
 
 
 def test_samples_in_one_place_are_told(net):
-    near = np.argsort(case(GRAVITY.scene(1.0)).X[:, 0])[:50]
+    near = np.argsort(ldm_full_model(GRAVITY.scene(1.0)).X[:, 0])[:50]
     found = fallen(net, 7.5, pick=lambda t: near)
     assert found.error > 5.0
-    assert found.flags == "seen"
+    assert found.flags == "coverage"
 
 
 def test_too_few_samples_are_refused_before_the_first_step(net):
-    found = fallen(net, 5.0, Way(points=1))
+    found = fallen(net, 5.0, RunOptions(points=1))
     assert (found.kind(0.3), found.steps) == (STOPPED, 0)
     assert "expected at least 2 samples" in found.said
 
 
 def test_the_map_of_another_body_is_told_at_the_start(net):
-    one = case(with_(TORSION.scene(0.3, 1.0), steps=2))
-    found = ended(one, full(one.problem)[0], net, Way(points=50))
+    one = ldm_full_model(with_(TORSION.scene(0.3, 1.0), steps=2))
+    found = ended(one, full(one.problem)[0], net, RunOptions(points=50))
     assert found.first == 0
     assert "off" in found.flags
 
@@ -154,10 +155,10 @@ def test_a_run_is_made_once_for_each_way(net, monkeypatch):
     monkeypatch.setattr("validation.extremes.ldm_points.ended",
                         lambda case, x, net, way: made.append(way) or GOOD)
     bench = Bench(net)
-    assert bench.trial("few", Way(points=7)).points == 7
-    assert bench.trial("all", Way()).points == 99
-    assert bench.trial("all", Way()).usual == GOOD.error
-    assert made == [Way(), Way(points=7)]
+    assert bench.trial("few", RunOptions(points=7)).points == 7
+    assert bench.trial("all", RunOptions()).points == 99
+    assert bench.trial("all", RunOptions()).usual == GOOD.error
+    assert made == [RunOptions(), RunOptions(points=7)]
 
 
 # Time steps.
@@ -182,10 +183,10 @@ def test_how_far_runs_go_ends_at_the_first_that_does_not():
 # Long runs.
 
 def test_energy_is_that_of_the_state_and_distance_that_of_the_points(net):
-    one = case(with_(GRAVITY.scene(2.0), steps=6))
+    one = ldm_full_model(with_(GRAVITY.scene(2.0), steps=6))
     states, X = [], one.X
-    ended(one, full(one.problem)[0], net, Way(points=50), keep=states)
-    E = long.energies(one, net.map, Way(), [latent for latent, _ in states])
+    ended(one, full(one.problem)[0], net, RunOptions(points=50), keep=states)
+    E = long.energies(one, net.map, RunOptions(), [latent for latent, _ in states])
     height = 2.0 * one.m @ states[0][1][:, 2]
     assert E[0] == pytest.approx(height, abs=0.05)          # no motion, hardly any strain
     assert (np.diff(E)[1:] < 0.0).all()                     # PIC loses energy
@@ -195,7 +196,7 @@ def test_energy_is_that_of_the_state_and_distance_that_of_the_points(net):
 # Singular maps.
 
 def test_redundant_maps_do_what_the_sound_one_does(net, rng):
-    X = case(GRAVITY.scene(1.0)).X[::50]
+    X = ldm_full_model(GRAVITY.scene(1.0)).X[::50]
     short = GRAVITY._replace(scene=lambda g: with_(GRAVITY.scene(g), steps=3)).run([9, 20])
     pod = linear(short, 4)
     made = singular.redundant(net, pod, singular.NEAR["standard"], rng)
@@ -210,7 +211,7 @@ def test_redundant_maps_do_what_the_sound_one_does(net, rng):
 
 
 def test_lacking_maps_do_not(net):
-    X = case(GRAVITY.scene(1.0)).X[::50]
+    X = ldm_full_model(GRAVITY.scene(1.0)).X[::50]
     for reduction in singular.lacking(net):
         G = reduction.map.derivatives(X, net.rest)[2].reshape(-1, 4)
         assert np.linalg.matrix_rank(G, tol=1e-12) == 3

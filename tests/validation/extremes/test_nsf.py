@@ -8,7 +8,7 @@ from small_toys import Records
 
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.kinematics import NoBody
-from mpm_ref.rom.study.nsf_watch import Sight
+from mpm_ref.rom.study.monitor import StateCheck
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.common.scenes import with_
@@ -59,7 +59,7 @@ def test_the_four_ends_are_those_of_ldm(changes, kind):
 
 
 def test_the_extremes_of_a_run_are_kept():
-    sights = [Sight(0.1, 0), Sight(3.0, 0), Sight(0.2, 2)]
+    sights = [StateCheck(0.1, 0), StateCheck(3.0, 0), StateCheck(0.2, 2)]
     assert runs.of_sights(sights, 5) == (2, 1, "beyond blind", 3.0, 3)
     steps, first, flags, beyond, rank = runs.of_sights([], 5)
     assert (steps, first, flags, rank) == (-1, -1, "", 5)
@@ -247,7 +247,7 @@ def test_a_run_without_a_start_is_recorded(bench, monkeypatch):
     def broken(*_):
         raise NoBody("no such body")
 
-    monkeypatch.setattr("mpm_ref.rom.study.nsf_run.begin", broken)
+    monkeypatch.setattr("mpm_ref.rom.study.run.nsf_start", broken)
     own, said = long.reduced_run(bench, STUDY.run(0.4), bench.drawn(40))
     assert (own, said) == ({}, "no such body")
     found = Records()

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from mpm_ref.rom.model_file import Model, load, save
-from mpm_ref.rom.study.errors import Errors
-from mpm_ref.rom.study.run import SCHEMES, Way
+from mpm_ref.rom.study.errors import PositionErrors
+from mpm_ref.rom.study.run import SCHEMES, RunOptions
 from validation.common import targets
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
@@ -34,7 +34,8 @@ def test_enough_points_are_those_from_which_all_schemes_are_as_good_as_with_all(
 
 
 def test_the_mean_says_of_how_many_it_is():
-    mean, words = mean_of([Errors(0.01, 0.02, 0.1), Errors(0.03, 0.04, 0.3)], "draws")
+    mean, words = mean_of([PositionErrors(0.01, 0.02, 0.1), PositionErrors(0.03, 0.04, 0.3)],
+                          "draws")
     assert mean == pytest.approx((0.02, 0.03, 0.2))
     assert words == "mean of 2 draws, the largest 3 %"
 
@@ -100,7 +101,7 @@ def made_up(monkeypatch):
     x = np.ones((61, 8, 3)) + 0.5 * np.arange(61)[:, None, None]
     problem = SimpleNamespace(bodies=(), clock=SimpleNamespace(steps=60))
     off = np.where(np.arange(61) % superres.REFINE, 7.0, 0.01)[:, None, None]
-    ways = [Way(*scheme) for scheme in SCHEMES]
+    ways = [RunOptions(*scheme) for scheme in SCHEMES]
     for name, value in {
             "TORSION": TORSION._replace(test=TORSION.test[:2]), "trained": lambda name: None,
             "case": lambda scene: SimpleNamespace(X=x[0], problem=problem),
@@ -116,7 +117,7 @@ def test_tracers_of_table_4_are_measured_at_the_same_times_and_to_be_beaten(tmp_
     assert run_all([superres.superresolution.experiment], setting) == []
     found = {r.target.rpartition(".")[2]: r for r in ProfileResults(tmp_path).records("ldm.table4")}
     for k, scheme in enumerate(SCHEMES):
-        assert found[Way(*scheme).name].value == pytest.approx(1.0 + k)
+        assert found[RunOptions(*scheme).name].value == pytest.approx(1.0 + k)
     baseline, gain = found["baseline"], found["gain"]
     assert (baseline.value, baseline.verdict) == (pytest.approx(5.0), "info")
     assert (gain.value, gain.verdict) == (pytest.approx(5.0 / 4.0), "pass")

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from mpm_ref.rom.fields.pod import modes
-from mpm_ref.rom.study.case import case
-from mpm_ref.rom.study.errors import Errors
-from mpm_ref.rom.study.run import march
+from mpm_ref.rom.study.dataset import simulate_snapshots
+from mpm_ref.rom.study.errors import PositionErrors
+from mpm_ref.rom.study.full_model import ldm_full_model
+from mpm_ref.rom.study.run import ldm_run
 from mpm_ref.scene import build
-from mpm_ref.trajectories import snapshots
 from validation.common.scenes import with_
 from validation.ldm import poke_parts
 from validation.ldm.paired_runs import ALL
@@ -27,8 +27,8 @@ def short():
     base, poke = poked(0.3).fixed
     scene = with_(poked(0.3), steps=STEPS,
                   fixed=(base, with_(poke, until=DRIVEN * poked(0.3).dt)))
-    run = snapshots([build(scene)], np.zeros((1, 1)), 1)
-    return References("poke", (case(scene),), (run.x[0],), 1), run.F[0]
+    run = simulate_snapshots([build(scene)], np.zeros((1, 1)), 1)
+    return References("poke", (ldm_full_model(scene),), (run.x[0],), 1), run.F[0]
 
 
 def own(short, r):
@@ -38,16 +38,16 @@ def own(short, r):
 
 
 def test_the_patch_lets_go_after_a_quarter_of_a_second():
-    assert let_go(case(POKES.scene(0.0))) == 36
+    assert let_go(ldm_full_model(POKES.scene(0.0))) == 36
 
 
 def test_the_patch_is_found_wherever_it_stands():
     scene = POKES.scene(0.0)
     base, poke = scene.fixed
-    assert let_go(case(with_(scene, fixed=(poke, base)))) == 36
+    assert let_go(ldm_full_model(with_(scene, fixed=(poke, base)))) == 36
     for count, regions in ((0, (base,)), (2, (base, poke, with_(poke, name="other")))):
         with pytest.raises(ValueError, match=f"{count} prescribed regions let go: expected one"):
-            let_go(case(with_(scene, fixed=regions)))
+            let_go(ldm_full_model(with_(scene, fixed=regions)))
 
 
 def test_no_part_is_off_on_modes_that_span_the_run(short):
@@ -61,7 +61,7 @@ def test_a_run_from_the_start_is_told_from_one_that_begins_later(short):
     few = own(short, STEPS - 3)
     found, (x,) = parts(tests, *few, ALL), tests.x
     states = [few[0].place(tests.X, latent.xhat)
-              for latent, _ in march(tests.cases[0], *few[:1], ALL, few[1])]
+              for _, latent, *_ in ldm_run(tests.cases[0], *few[:1], ALL, few[1]).states()]
     later = list(swinging(tests.cases[0], *few, ALL, x))
     assert np.sum((states[DRIVEN] - x[DRIVEN]) ** 2) > np.sum((later[0] - x[DRIVEN]) ** 2)
     for errors, seen, true in ((found.whole, states, x), (found.driven, states[:DRIVEN + 1], x),
@@ -75,7 +75,7 @@ def test_the_network_comes_first_and_alone_at_quick(monkeypatch):
     compared = poke_parts.maps()
     assert compared[0][0] == "network"
     assert [len(rest) for _, _, rest, _ in compared] == [6, *poke_parts.DIMENSIONS, 6]
-    off = Errors(0.1, 0.2, 0.3)
+    off = PositionErrors(0.1, 0.2, 0.3)
     monkeypatch.setattr(poke_parts, "parts", lambda *_: Parts(off, off, off))
     monkeypatch.setattr(poke_parts, "references", lambda *_: SimpleNamespace(scale=""))
     rows = []

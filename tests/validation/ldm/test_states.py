@@ -8,8 +8,8 @@ import pytest
 from figures.common import state_panels
 from figures.frame import draw_all
 from mpm_ref.rom.fields.affine import Affine
-from mpm_ref.rom.study.case import case
-from mpm_ref.rom.study.errors import Errors
+from mpm_ref.rom.study.errors import PositionErrors
+from mpm_ref.rom.study.full_model import ldm_full_model
 from validation.common import targets
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
@@ -131,7 +131,9 @@ def stood_in(scene, net, shots=None, shown=None, way=paired_runs.SHOWN_WAY):
     k = scene.steps + 1 if shots is None else len(shots)
     x = np.arange(k)[:, None, None] * 0.01 + SOME
     xhat = np.random.default_rng(0).normal(size=(scene.steps + 1, 4))
-    return paired_runs.Pair(case(scene), SOME, 1.01 * x, x, xhat, Errors(0.1, 0.2, 0.3), len(SOME),
+    return paired_runs.Pair(ldm_full_model(scene), SOME, 1.01 * x, x, xhat,
+                            PositionErrors(0.1, 0.2, 0.3),
+                            len(SOME),
                       way.points or len(SOME))
 
 

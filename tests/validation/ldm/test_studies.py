@@ -7,11 +7,11 @@ import pytest
 
 from mpm_ref.rom.fields.affine import Affine
 from mpm_ref.rom.fields.pod import modes
-from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.dataset import simulate_snapshots
 from mpm_ref.rom.study.errors import Squares
-from mpm_ref.rom.study.run import SCHEMES, Way, march
+from mpm_ref.rom.study.full_model import ldm_full_model
+from mpm_ref.rom.study.run import SCHEMES, RunOptions, ldm_run
 from mpm_ref.scene import build
-from mpm_ref.trajectories import snapshots
 from validation.common.scenes import catalogue_scene, with_
 from validation.ldm.reduced_runs import compared, reconstructed
 from validation.ldm.studies import GRAVITY, PHI, POKE, POKES, STUDIES, TORSION, poked_again
@@ -74,7 +74,7 @@ def fall():
     """(`Case`, x, F) of the first steps of the cylinder under the strongest gravity."""
     short = GRAVITY._replace(scene=lambda g: with_(GRAVITY.scene(g), steps=STEPS))
     full = short.run([29])
-    return case(short.scene(*short.mu[29])), full.x[0], full.F[0]
+    return ldm_full_model(short.scene(*short.mu[29])), full.x[0], full.F[0]
 
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=lambda s: " ".join(s))
@@ -85,7 +85,7 @@ def test_a_run_on_its_own_modes_is_the_full_one(fall, scheme):
     """
     one, x, F = fall
     own = modes(one.X, x, F, STEPS)
-    found = compared([one], [x], own, Way(*scheme), np.zeros(STEPS))
+    found = compared([one], [x], own, RunOptions(*scheme), np.zeros(STEPS))
     assert reconstructed(one.X, [x], own, np.zeros(STEPS)).displacement < 1e-12
     assert found.displacement < (1e-12 if scheme[0] == "lagrangian" else 0.02)
 
@@ -93,9 +93,9 @@ def test_a_run_on_its_own_modes_is_the_full_one(fall, scheme):
 def test_the_start_is_the_body_at_rest_and_all_steps_are_given(fall):
     one, x, F = fall
     own = modes(one.X, x, F, 2)
-    states = list(march(one, own, Way(points=20), np.zeros(2)))
+    states = list(ldm_run(one, own, RunOptions(points=20), np.zeros(2)).states())
     assert len(states) == STEPS + 1
-    (latent, report), (_, first) = states[0], states[1]
+    (_, latent, report, _), (_, _, first, _) = states[:2]
     assert report is None
     assert abs(own.place(one.X, latent.xhat) - one.X).max() < 1e-12
     assert first.samples == 20
@@ -103,7 +103,7 @@ def test_the_start_is_the_body_at_rest_and_all_steps_are_given(fall):
 
 def test_samples_do_not_miss_the_end_that_is_held(fall):
     one, _, _ = fall
-    near, = one.held(0.0)
+    near, = one.constrained_points(0.0)
     assert (one.X[near, 0] <= one.problem.dx).all()
     assert len(near) == np.sum(one.X[:, 0] <= one.problem.dx)
 
@@ -111,19 +111,20 @@ def test_samples_do_not_miss_the_end_that_is_held(fall):
 def test_other_draws_are_other_runs_and_the_same_draw_the_same(fall):
     one, x, F = fall
     own = modes(one.X, x, F, 3)
-    a, b, c = (compared([one], [x], own, Way(points=10), np.zeros(3), seed) for seed in (0, 0, 1))
+    a, b, c = (compared([one], [x], own, RunOptions(points=10), np.zeros(3), seed)
+               for seed in (0, 0, 1))
     assert a == b != c
 
 
 def test_the_affine_map_is_a_map_of_a_study_too(fall):
     """The interface asks for no more than `rom` says; a bar that bends is far from affine."""
     one, x, _ = fall
-    found = compared([one], [x], Affine(3), Way(), Affine(3).rest)
+    found = compared([one], [x], Affine(3), RunOptions(), Affine(3).rest)
     assert 0.0 < found.origin < 0.1
 
 
 def test_a_region_that_was_let_go_asks_for_no_samples():
-    one = case(POKES.scene(0.0))
+    one = ldm_full_model(POKES.scene(0.0))
     assert [len(one.held(t)) for t in (0.0, 0.24, 0.26, 1.0)] == [2, 2, 1, 1]
 
 
@@ -134,13 +135,13 @@ def test_a_region_that_was_let_go_asks_for_no_samples():
 ], ids=["transfer", "plastic", "bodies"])
 def test_what_a_reduced_run_does_not_know_is_refused(scene, said):
     with pytest.raises(ValueError, match=said):
-        case(scene)
+        ldm_full_model(scene)
 
 
 def test_a_run_that_breaks_down_is_infinitely_off(fall):
     one, x, F = fall
     own = modes(one.X, x, F, 2)
-    assert compared([one], [x], own, Way(), np.full(2, np.nan)).origin == np.inf
+    assert compared([one], [x], own, RunOptions(), np.full(2, np.nan)).origin == np.inf
 
 
 @pytest.mark.parametrize("v", TORSION.mu[:, 0])
@@ -160,7 +161,8 @@ def test_angles_are_spread_evenly():
 def test_one_point_in_so_many_is_recorded():
     problems = [build(with_(GRAVITY.scene(g), steps=2)) for g in (2.0, 3.0)]
     again = [build(with_(GRAVITY.scene(g), steps=2)) for g in (2.0, 3.0)]
-    whole, thin = snapshots(problems, [[2.0], [3.0]]), snapshots(again, [[2.0], [3.0]], every=9)
+    whole = simulate_snapshots(problems, [[2.0], [3.0]])
+    thin = simulate_snapshots(again, [[2.0], [3.0]], every=9)
     for name in ("X", "m", "V0"):
         assert np.array_equal(getattr(whole, name)[::9], getattr(thin, name))
     for name in ("x", "F", "v"):

@@ -8,9 +8,9 @@ import pytest
 
 from mpm_ref.rom.fields.affine import Affine
 from mpm_ref.rom.kinematics import NoBody
-from mpm_ref.rom.study.case import case
-from mpm_ref.rom.study.errors import Errors
-from mpm_ref.rom.study.run import Way, march
+from mpm_ref.rom.study.errors import PositionErrors
+from mpm_ref.rom.study.full_model import ldm_full_model
+from mpm_ref.rom.study.run import RunOptions, ldm_run
 from mpm_ref.scene import build
 from validation.common.scenes import with_
 from validation.ldm import tower
@@ -53,7 +53,7 @@ def test_the_top_moves_as_it_is_told():
 
 
 def test_a_race_measures_every_way(small):
-    ways = [Way("resampled", points=30), Way("eulerian", points=30)]
+    ways = [RunOptions("resampled", points=30), RunOptions("eulerian", points=30)]
     full, found = race(small, EXACT, ways, 3)
     assert min(full) > 0.0
     for one, way in zip(found, ways, strict=True):
@@ -64,15 +64,18 @@ def test_a_race_measures_every_way(small):
 
 
 def test_a_run_that_breaks_down_has_no_error(small, monkeypatch):
-    sound, lost = (Way("resampled", points=n) for n in (30, 29))
+    sound, lost = (RunOptions("resampled", points=n) for n in (30, 29))
 
     def breaking(one, map, way, rest):
-        for k, state in enumerate(march(one, map, way, rest)):
-            if way == lost and k == 2:
-                raise NoBody("none is left")
-            yield state
+        def states():
+            for k, state in enumerate(ldm_run(one, map, way, rest).states()):
+                if way == lost and k == 2:
+                    raise NoBody("none is left")
+                yield state
 
-    monkeypatch.setattr("validation.ldm.timing.march", breaking)
+        return SimpleNamespace(states=states)
+
+    monkeypatch.setattr("validation.ldm.timing.ldm_run", breaking)
     _, (broken, fine) = race(small, EXACT, [lost, sound], 2)
     assert broken.errors.origin == broken.spent.wall == np.inf
     assert np.isfinite(fine.errors.origin)
@@ -80,7 +83,7 @@ def test_a_run_that_breaks_down_has_no_error(small, monkeypatch):
 
 def test_a_race_with_too_few_samples_is_a_mistake(small):
     with pytest.raises(ValueError, match="2 samples in 3 axes for 12 latent coordinates"):
-        race(small, EXACT, [Way("resampled", points=2)], 1)
+        race(small, EXACT, [RunOptions("resampled", points=2)], 1)
 
 
 def test_the_fastest_transfer_is_measured(small):
@@ -91,7 +94,7 @@ def test_tracked_points_are_in_their_own_order(small):
     full = Full(small)
     start = full.positions(7)
     full.step()
-    assert np.array_equal(start, case(small).X[::7])
+    assert np.array_equal(start, ldm_full_model(small).X[::7])
     assert np.abs(full.positions(7) - start).max() < 0.1
 
 
@@ -107,12 +110,12 @@ def test_time_is_counted_while_a_step_runs():
 
 
 def test_a_row_tells_the_way_in_order():
-    one = Raced(tower.FAST._replace(points=25), Spent(0.1, 0.2), 300, Errors(1.0, 2.0, 3.0))
+    one = Raced(tower.FAST._replace(points=25), Spent(0.1, 0.2), 300, PositionErrors(1.0, 2.0, 3.0))
     row = dict(zip(COLUMNS, one.row, strict=True))
     assert (row["quadrature"], row["points"], row["precision"]) == ("eulerian", 25, "single")
     assert (row["wall"], row["cpu"]) == (0.1, 0.2)
     assert (row["quadrature_points"], row["origin"]) == (300, 1.0)
-    assert one._replace(way=Way()).row[2] == "all"
+    assert one._replace(way=RunOptions()).row[2] == "all"
 
 
 def test_ways_have_names_of_their_own():
@@ -124,8 +127,8 @@ def test_ways_have_names_of_their_own():
 
 def test_what_the_paper_prints_is_of_the_fastest_eulerian_run_below_fifty_samples():
     def row(quadrature, points, wall, close=1e-9, error=1.0):
-        way = Way(quadrature, "linear", points, close=close)
-        raced = Raced(way, Spent(wall, 0.0), 1000 * points, Errors(error, 0.0, 0.0))
+        way = RunOptions(quadrature, "linear", points, preimage_tolerance=close)
+        raced = Raced(way, Spent(wall, 0.0), 1000 * points, PositionErrors(error, 0.0, 0.0))
         times = 8.0, 4.0, 24 * wall, 4.0 / wall, 8.0 / wall
         return dict(zip(tower.OWN, (7, *raced.row, *times), strict=True))
 

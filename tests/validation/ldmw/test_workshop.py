@@ -10,7 +10,7 @@ from figures.common import state_panels
 from figures.frame import draw_all
 from mpm_ref.rom.latent import start_state
 from mpm_ref.rom.model_file import load, save
-from mpm_ref.rom.study.case import case
+from mpm_ref.rom.study.full_model import ldm_full_model
 from validation.common import targets
 from validation.common.record import read_records
 from validation.common.results import ProfileResults
@@ -138,7 +138,7 @@ def test_with_neighbours_found_once_a_run_is_the_same(sheared_runs):
 
 
 def test_samples_of_a_push_are_held_pushed_and_free():
-    one = case(PUSHES.scene(*PUSHES.mu[0]))
+    one = ldm_full_model(PUSHES.scene(*PUSHES.mu[0]))
     samples = poke.samples(one, 0)
     assert len(samples) == poke.HYPER
     assert [len(np.intersect1d(samples, group)) >= 5 for group in one.held(0.0)] == [True, True]
@@ -191,7 +191,7 @@ def stood_in(study, numbers):
             yield [(3 * [(1.0 + 0.01 * (k + 1) * (level == 2)) * SOME], 3 * [SOME])
                    for level in range(3)]
 
-    cases = (case(study.scene(*study.mu[0])),)
+    cases = (ldm_full_model(study.scene(*study.mu[0])),)
     return SimpleNamespace(X=SOME, cases=cases, levels=levels,
                            full=SimpleNamespace(mu=study.mu[list(numbers)]))
 

@@ -1,12 +1,14 @@
 """Bread with other weak elements, and sand past its training."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from mpm_ref.rom.kinematics import NoBody
-from mpm_ref.rom.study import nsf_watch
-from mpm_ref.rom.study.nsf_case import whole
-from mpm_ref.rom.study.nsf_run import infer
+from mpm_ref.rom.study import monitor
+from mpm_ref.rom.study.full_model import nsf_full_model
+from mpm_ref.rom.study.run import nsf_run
 from validation.nsf import reduced_runs, unseen_runs
 from validation.nsf.studies import bread
 
@@ -39,7 +41,7 @@ def test_weak_boxes_are_shifted_in_both_bodies_and_stay_between_the_ends():
 def test_points_are_in_the_order_of_training(slice_of_bread):
     one = slice_of_bread
     scene = unseen_runs.shifted(one.study.run(unseen_runs.E), 0.3, 0)
-    assert not np.array_equal(whole(scene).X, one.runs.X)
+    assert not np.array_equal(nsf_full_model(scene).X, one.runs.X)
     test = unseen_runs.other(one, scene)
     assert np.abs(test.X - one.runs.X).max() < 1e-12
     assert np.abs(test.x[0, 0] - one.runs.X).max() < 1e-6
@@ -70,20 +72,25 @@ def test_the_farthest_state_is_that_of_the_whole_run(slice_of_bread, monkeypatch
     one, value = slice_of_bread, slice_of_bread.study.train[1]
     seen = []
 
-    def look(extent, at, report):
-        seen.append(nsf_watch.look(extent, at, report))
-        return seen[-1]
+    class Watched(monitor.FieldMonitor):
+        def check(self, state, last=None):
+            seen.append(super().check(state, last))
+            return seen[-1]
 
-    monkeypatch.setattr(unseen_runs, "look", look)
+    monkeypatch.setattr(unseen_runs, "field_monitor", lambda fields, xhat: Watched(
+        *monitor.field_monitor(fields, xhat)))
     far = unseen_runs.farthest(one, value)
-    assert len(seen) == whole(one.study.run(value)).problem.clock.steps + 1
+    assert len(seen) == nsf_full_model(one.study.run(value)).problem.clock.steps + 1
     assert far == max(sight.beyond for sight in seen)
 
     def breaks(*given):
-        for k, state in enumerate(infer(*given)):
-            if k == 3:
-                raise NoBody("gone")
-            yield state
+        def states():
+            for k, state in enumerate(nsf_run(*given).states()):
+                if k == 3:
+                    raise NoBody("gone")
+                yield state
 
-    monkeypatch.setattr(unseen_runs, "infer", breaks)
+        return SimpleNamespace(states=states)
+
+    monkeypatch.setattr(unseen_runs, "nsf_run", breaks)
     assert unseen_runs.farthest(one, value) == max(sight.beyond for sight in seen[:3])

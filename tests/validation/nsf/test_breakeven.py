@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.full_model import nsf_full_model
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.nsf import breakeven
@@ -25,7 +25,7 @@ def test_a_reduced_step_on_the_even_share_takes_as_long():
 @pytest.fixture(scope="module")
 def own():
     """The jelly cube with few points."""
-    return whole(jelly(4).run(0.4))
+    return nsf_full_model(jelly(4).run(0.4))
 
 
 def test_products_are_counted_by_layer(own):
@@ -50,7 +50,7 @@ def test_fields_answer_all_that_a_step_asks(own):
 
 def test_records_follow_from_times(tmp_path, monkeypatch):
     """One second a point, 2 a particle, of which half is not on the grid."""
-    n = len(whole(jelly(3).run(0.4)).X)
+    n = len(nsf_full_model(jelly(3).run(0.4)).X)
     monkeypatch.setattr(breakeven, "SCENES", {"jelly": SMALL})
     monkeypatch.setattr(breakeven, "seconds_of_a_point", lambda fields, points: 1.0)
     monkeypatch.setattr(breakeven, "passes", lambda fields, points: (2.0, 6.0))

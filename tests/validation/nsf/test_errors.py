@@ -1,13 +1,15 @@
 """Fields of NSF's studies and reduced runs on them, at the coarse grid of the quick profile."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from small_toys import Records
 
 from mpm_ref.core.grid import OutOfRange
 from mpm_ref.rom.fields.elastic import Deformed
-from mpm_ref.rom.study.nsf_case import whole
-from mpm_ref.rom.study.nsf_run import of_cells
+from mpm_ref.rom.study.full_model import nsf_full_model
+from mpm_ref.rom.study.samples import cell_samples
 from validation.nsf import errors, reduced_runs
 from validation.nsf.studies import bread, cake, jelly, metal, sand, toothpaste
 
@@ -35,7 +37,7 @@ def test_a_longer_study_has_more_steps_of_the_scene():
 
 def test_cake_is_sampled_in_the_middle_and_by_fewer_later():
     study = cake(3, train=3)
-    one = whole(study.run(15.0))
+    one = nsf_full_model(study.run(15.0))
     early, late = study.chosen(one, study.samples, 0)
     assert (len(early.points), len(late.points)) == (700, 400)
     assert (early.since, late.since) == (0.0, pytest.approx(0.256, rel=0.01))
@@ -106,7 +108,7 @@ def test_a_run_that_breaks_down_is_infinitely_off(cube, monkeypatch):
         raise OutOfRange("far away")
         yield
 
-    monkeypatch.setattr(reduced_runs, "infer", broken)
+    monkeypatch.setattr(reduced_runs, "nsf_run", lambda *_: SimpleNamespace(states=broken))
     found = cube.errors(TEST, 50)
     assert found.errors == (np.inf, np.inf, np.inf)
     assert found.stress == np.inf
@@ -114,7 +116,7 @@ def test_a_run_that_breaks_down_is_infinitely_off(cube, monkeypatch):
 
 
 def test_samples_that_weights_keep_are_counted(cube):
-    one = whole(cube.study.run(TEST))
+    one = nsf_full_model(cube.study.run(TEST))
     chosen, = cube.study.chosen(one, 50, 0, cube.fields)
     found, drawn = (cube.errors(TEST, 50, weighed=weighed) for weighed in (True, False))
     assert (found.kept, found.misfit) == (len(chosen.points), chosen.misfit)
@@ -129,13 +131,13 @@ def test_samples_that_weights_keep_are_counted(cube):
 
 
 def test_samples_of_a_study_may_be_those_of_cells(cube):
-    one = whole(cube.study.run(TEST))
+    one = nsf_full_model(cube.study.run(TEST))
     chosen, = cube.study._replace(by_cell=True).chosen(one, 5, 1, cube.fields)
-    expected = of_cells(cube.fields, one.problem, len(one.X), 5, 1)
+    expected = cell_samples(cube.fields, one.problem, len(one.X), 5, 1)
     assert np.array_equal(chosen.points, expected.points)
-    assert np.array_equal(chosen.w, expected.w)
+    assert np.array_equal(chosen.weights, expected.w)
     plain, = cube.study._replace(by_cell=True).chosen(one, 5, 1)
-    assert plain.w is None
+    assert plain.weights is None
 
 
 def test_records_of_weighted_samples_say_how_many_there_are(cube):

@@ -5,8 +5,8 @@ import pytest
 from small_toys import Records
 
 from mpm_ref.rom.fields.pod_fields import Sizes
-from mpm_ref.rom.study.nsf_case import whole
-from mpm_ref.rom.study.nsf_run import of_cells
+from mpm_ref.rom.study.full_model import nsf_full_model
+from mpm_ref.rom.study.samples import cell_samples
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.nsf import factors, reduced_runs
@@ -40,7 +40,8 @@ def clock(monkeypatch):
                 yield state
         return run
 
-    monkeypatch.setattr(factors, "infer", passing(factors.infer, 1.0))
+    reduced_run = factors.reduced_run
+    monkeypatch.setattr(factors, "reduced_run", passing(reduced_run, 1.0))
     monkeypatch.setattr(factors, "simulate", passing(factors.simulate, 50.0))
     monkeypatch.setattr(factors, "perf_counter", lambda: now[0])
 
@@ -56,14 +57,14 @@ def test_whole_runs_are_clocked_each_from_its_start(one):
 def test_samples_of_a_way_are_drawn_or_weighed(one):
     (drawn,), (weighed,), (cells,) = (factors.plan_of(one, way).samples
                                       for way in (DRAWN, WEIGHED, CELLS))
-    assert (len(drawn.points), drawn.w) == (30, None)
+    assert (len(drawn.points), drawn.weights) == (30, None)
     assert len(weighed.points) <= 12
-    assert (weighed.w > 0.0).all()
-    scene = whole(STUDY.run(0.35))
-    expected = of_cells(one.fields, scene.problem, len(scene.X), 4, 0)
+    assert (weighed.weights > 0.0).all()
+    scene = nsf_full_model(STUDY.run(0.35))
+    expected = cell_samples(one.fields, scene.problem, len(scene.X), 4, 0)
     assert np.array_equal(cells.points, expected.points)
     assert not np.array_equal(weighed.points, cells.points)
-    assert factors.plan_of(one, LONGER).faster == 2.0
+    assert factors.plan_of(one, LONGER).dt_factor == 2.0
 
 
 def test_samples_with_weights_are_anywhere(one):

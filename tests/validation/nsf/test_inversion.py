@@ -4,8 +4,8 @@ import pytest
 from small_toys import Records
 
 from mpm_ref.rom.fields.pod_fields import Sizes
-from mpm_ref.rom.study.nsf_case import whole
-from mpm_ref.rom.study.nsf_run import Plan, infer
+from mpm_ref.rom.study.full_model import nsf_full_model
+from mpm_ref.rom.study.run import FieldRunOptions, nsf_run
 from validation.common import targets
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
@@ -29,9 +29,10 @@ def test_gauss_newton_is_how_runs_are_usually_inverted(one, faster):
     for (value, draw), own in runs.items():
         assert own.errors == one.errors(value, 40, draw, faster).errors
     found = runs[0.4, 0]
-    scene = whole(STUDY.run(0.4))
-    plan = Plan(STUDY.chosen(scene, STUDY.samples, 0), faster)
-    taken = [report.iterations for _, _, report in infer(scene, one.of(0.4), plan, one.rest)
+    scene = nsf_full_model(STUDY.run(0.4))
+    plan = FieldRunOptions(STUDY.chosen(scene, STUDY.samples, 0), faster)
+    taken = [report.iterations for _, _, report, _ in
+             nsf_run(scene, one.of(0.4), plan, one.rest).states()
              if report is not None]
     assert found.iterations == tuple(taken)
     assert min(taken) > 1

@@ -8,8 +8,8 @@ from small_toys import Records
 
 from mpm_ref.rom.kinematics import NoBody
 from mpm_ref.rom.snapshots import Histories
-from mpm_ref.rom.study.errors import Errors
-from mpm_ref.rom.study.nsf_case import history
+from mpm_ref.rom.study.dataset import simulate_history
+from mpm_ref.rom.study.errors import PositionErrors
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.common.scenes import with_
@@ -41,8 +41,8 @@ def test_errors_are_those_beside_the_scenes_own_steps():
     assert (same.states, between.states, twice.states) == (levels, levels // 3, levels)
     assert 0.0 < between.errors.origin < twice.errors.origin < 0.05
     scene = STUDY.run(0.35)
-    ours = history(longer.stretched(scene, 2.0), [0.35])
-    theirs = history(scene, [0.35], np.float32, STUDY.spacing)
+    ours = simulate_history(longer.stretched(scene, 2.0), [0.35])
+    theirs = simulate_history(scene, [0.35], np.float32, STUDY.spacing)
     x, reference = ours.x[0, ::STUDY.spacing // 2][1:], theirs.x[0, 1:]
     assert len(x) == len(reference)
     assert twice.errors.origin == pytest.approx(
@@ -117,8 +117,9 @@ def test_errors_and_times_are_recorded(tmp_path, monkeypatch):
 
 def test_runs_that_broke_down_are_in_no_mean():
     run = Records()
-    good = longer.Ended(7, Errors(0.01, 0.02, 0.03), 0.4, "")
-    longer.record(run, "a", [good, longer.Ended(3, Errors(*3 * [inf]), inf, "step 4: no body")],
+    good = longer.Ended(7, PositionErrors(0.01, 0.02, 0.03), 0.4, "")
+    longer.record(run, "a",
+                  [good, longer.Ended(3, PositionErrors(*3 * [inf]), inf, "step 4: no body")],
                   (2.0, 3.0), "")
     value, note = run["a.error"]
     assert value == 1.0

@@ -9,8 +9,8 @@ from field_toys import R, networks
 from mpm_ref.rom.fields.network import Networks
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.model_file import Model, save
-from mpm_ref.rom.study.errors import Errors
-from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.errors import PositionErrors
+from mpm_ref.rom.study.full_model import nsf_full_model
 from validation.common import targets
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
@@ -79,7 +79,7 @@ def test_missing_weights_say_how_they_are_made():
 def test_weights_come_back_as_fields_of_the_scene(folder):
     save(folder / "jelly.npz", model())
     fields = fields_of(trained("jelly"), STUDY)
-    X, xhat, some = whole(STUDY.run(0.45)).X, np.array([0.2, -0.1, 0.4]), np.array([3, 40])
+    X, xhat, some = nsf_full_model(STUDY.run(0.45)).X, np.array([0.2, -0.1, 0.4]), np.array([3, 40])
     assert np.array_equal(fields.X, X)
     assert fields.place(some, xhat) == pytest.approx(model().field.g.place(X[some], xhat))
     assert fields.stress(some, xhat)[:, 0, 2] == pytest.approx(
@@ -146,11 +146,12 @@ class Ready(reduced_runs.Tested):
     def errors(self, value, count, draw, faster, weighed):
         """Errors that tell their draw, and whether samples have weights."""
         error = (0.001 if weighed else 0.01) * (draw + 1)
-        return reduced_runs.Found(Errors(error, 0.02, 0.03), 0.2, float(count), count, np.nan)
+        return reduced_runs.Found(PositionErrors(error, 0.02, 0.03), 0.2, float(count), count,
+                                  np.nan)
 
     def nearest(self, value):
         """Of the nearest states."""
-        return Errors(0.001, 0.002, 0.003)
+        return PositionErrors(0.001, 0.002, 0.003)
 
 
 def test_errors_are_means_in_per_cent(folder, monkeypatch):
@@ -185,7 +186,7 @@ def test_weights_of_samples_are_those_of_modes_of_the_same_runs(folder):
     """The networks know no modes."""
     save(folder / "jelly.npz", model())
     one, plain = runs.tested_on(trained("jelly"), STUDY), reduced_runs.tested(STUDY)
-    scene = whole(STUDY.run(0.45))
+    scene = nsf_full_model(STUDY.run(0.45))
     asked = []
     spied = STUDY.__class__.chosen
     expected, = spied(STUDY, scene, 20, 1, plain.fields)
@@ -198,4 +199,4 @@ def test_weights_of_samples_are_those_of_modes_of_the_same_runs(folder):
     one._replace(study=Spy(*STUDY)).errors(0.45, 20, 1, weighed=True)
     (found,), = asked
     assert np.array_equal(found.points, expected.points)
-    assert found.w == pytest.approx(expected.w)
+    assert found.weights == pytest.approx(expected.w)

@@ -7,7 +7,7 @@ torch = pytest.importorskip("torch")
 
 from mpm_ref.rom.fields.pod_fields import Sizes  # noqa: E402
 from mpm_ref.rom.snapshots import joined  # noqa: E402
-from mpm_ref.rom.study.nsf_case import history  # noqa: E402
+from mpm_ref.rom.study.dataset import simulate_history  # noqa: E402
 from mpm_ref.rom.train import session  # noqa: E402
 from mpm_ref.training import Machine  # noqa: E402
 from validation.nsf import networks as kept  # noqa: E402
@@ -44,7 +44,7 @@ def test_the_plan_is_that_of_the_net():
 
 def test_runs_are_those_of_the_study_at_its_spacing():
     runs = nsf.runs_of(STUDY._replace(every=8))
-    alone = history(STUDY.run(0.5), [0.5])
+    alone = simulate_history(STUDY.run(0.5), [0.5])
     assert runs.mu.tolist() == [[0.3], [0.5]]
     assert runs.x.shape[1] == 16                    # 30 steps, every second, and the start
     assert runs.x[1] == pytest.approx(alone.x[0, ::2], abs=1e-6)
@@ -126,7 +126,7 @@ def test_a_few_losses_are_kept_the_last_one_among_them():
 def test_errors_are_shares_of_what_is_learned(monkeypatch):
     """Of networks that answer a known part of the truth; of all levels."""
     monkeypatch.setattr(nsf, "LEVELS", 100)
-    runs = joined([history(STUDY.run(value), [value]) for value in STUDY.train])
+    runs = joined([simulate_history(STUDY.run(value), [value]) for value in STUDY.train])
     xhat = np.arange(62.0).reshape(2, 31, 1)        # tells the snapshot
 
     def part(values, share):
@@ -153,4 +153,4 @@ def test_a_long_training_has_few_checkpoints():
 
 
 def test_runs_are_joined_in_single_precision():
-    assert joined([history(STUDY.run(0.3), [0.3], np.float32)]).x.dtype == np.float32
+    assert joined([simulate_history(STUDY.run(0.3), [0.3], np.float32)]).x.dtype == np.float32

@@ -8,7 +8,7 @@ import pytest
 
 from figures.nsf import fig04
 from mpm_ref.rom.quadrature.stencil_overlap import reach
-from mpm_ref.rom.study.nsf_case import whole
+from mpm_ref.rom.study.full_model import nsf_full_model
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.ldm.published_bodies import keep, read
@@ -65,5 +65,5 @@ def test_all_samples_and_integration_points_are_kept_though_others_are_thinned(
 
 def half(study):
     """The run at its start, which needs no steps."""
-    one = whole(study.run(study.train[-1]))
+    one = nsf_full_model(study.run(study.train[-1]))
     return one, one.X

@@ -11,10 +11,17 @@ from small_toys import Records
 from mpm_ref.rom import model_file
 from mpm_ref.rom.cubature import misfit
 from mpm_ref.rom.fields.pod_fields import Sizes
-from mpm_ref.rom.study import nsf_run, nsf_watch
-from mpm_ref.rom.study.nsf_case import whole
-from mpm_ref.rom.study.nsf_record import plan_of
-from mpm_ref.rom.study.nsf_run import Chosen, Plan, drawn, infer, of_cells, weighed
+from mpm_ref.rom.study import monitor
+from mpm_ref.rom.study import samples as choice
+from mpm_ref.rom.study.full_model import nsf_full_model
+from mpm_ref.rom.study.run import FieldRunOptions, nsf_run
+from mpm_ref.rom.study.samples import (
+    SampleSet,
+    cell_samples,
+    chosen_samples,
+    drawn_samples,
+    weighted_samples,
+)
 from mpm_ref.rom.study.study import load
 from mpm_ref.store.results import Results as Stored
 from validation.common.results import ProfileResults
@@ -36,9 +43,9 @@ def made(tmp_path_factory):
 
 def test_they_are_told_by_the_command(made, tmp_path, monkeypatch):
     fields = model_file.load(made / "fields.npz").field
-    left = misfit(fields.U, 3, drawn(len(fields.X), 20, 0).points)
+    left = misfit(fields.U, 3, drawn_samples(len(fields.X), 20, 0).points)
     for bound, warned in ((0.99 * left, True), (1.01 * left, False)):
-        monkeypatch.setattr(nsf_watch, "SPARSE", bound)
+        monkeypatch.setattr(monitor, "SPARSE", bound)
         done = mpm_ref("rom", "run", made / "pairs.toml", "--map", made / "fields.npz", "--out",
                        tmp_path / "run.h5", "--set", "v=2", "--overwrite")
         assert done.exit_code == 0
@@ -47,22 +54,24 @@ def test_they_are_told_by_the_command(made, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(("asked", "pick", "words"), [
-    ("points = 9\nseed = 2\nweighed = true", lambda fields, one: weighed(fields, len(one.X), 9, 2),
+    ("points = 9\nseed = 2\nweighted = true", lambda fields,
+     one: weighted_samples(fields, len(one.X), 9, 2),
      "9 points at most, with weights"),
-    ("cells = 4\nseed = 2", lambda fields, one: of_cells(fields, one.problem, len(one.X), 4, 2),
+    ("cells = 4\nseed = 2", lambda fields, one: cell_samples(fields, one.problem, len(one.X), 4, 2),
      "points of 4 cells at most, with weights")])
 def test_a_run_on_samples_with_weights_is_that_of_their_plan(made, tmp_path, monkeypatch, asked,
                                                              pick, words):
     """By `rom run` and by `rom evaluate`; of networks there are none. The seed draws candidates."""
-    monkeypatch.setattr(nsf_run, "CANDIDATES", 40)
-    monkeypatch.setattr(nsf_run, "OFFERED", 12)
+    monkeypatch.setattr(choice, "CANDIDATES", 40)
+    monkeypatch.setattr(choice, "MAX_CELLS", 12)
     study, out = write(tmp_path, ("points = 20", asked)), tmp_path / "run.h5"
     done = mpm_ref("rom", "run", study, "--map", made / "fields.npz", "--out", out, "--set", "v=2")
     assert done.exit_code == 0, done.output
-    model, one = model_file.load(made / "fields.npz"), whole(load(study).scene([2.0]))
+    model, one = model_file.load(made / "fields.npz"), nsf_full_model(load(study).scene([2.0]))
     fields = model.field.of([2.0])
     chosen = pick(fields, one)
-    *_, (_, last, report) = infer(one, fields, Plan((chosen,)), model.rest)
+    run = nsf_run(one, fields, FieldRunOptions((chosen,)), model.rest)
+    *_, (_, last, report, _) = run.states()
     with Stored(out) as results:
         assert np.array_equal(results.h5["reduced/xhat"][-1], last.xhat)
         assert results.h5["reduced/samples"][-1] == report.samples == len(chosen.points)
@@ -70,19 +79,19 @@ def test_a_run_on_samples_with_weights_is_that_of_their_plan(made, tmp_path, mon
     errors = mpm_ref("rom", "evaluate", study, "--map", made / "fields.npz", "--data",
                      made / "data", "--out", tmp_path / "e.png", "--json")
     assert errors.exit_code == 0, errors.output
-    said = f"{asked.splitlines()[0 if 'cells' in asked else -1]}: weights of samples are told by"
+    said = f"{asked.splitlines()[0 if 'cells' in asked else -1]}: weights of samples are computed"
     with pytest.raises(ValueError, match=said):
-        plan_of(load(study).tables.run, one.problem, SimpleNamespace(dim=2, r=3, X=one.X))
+        chosen_samples(load(study).tables.run, one.problem, SimpleNamespace(dim=2, r=3, X=one.X))
 
 
 def test_of_networks_nothing_is_known():
-    assert not list(nsf_watch.sparse(SimpleNamespace(r=3), drawn(40, 1, 0)))
+    assert not list(monitor.sample_warnings(SimpleNamespace(r=3), drawn_samples(40, 1, 0)))
 
 
 def test_weights_tell_what_they_leave():
     for left, count in ((0.9, 1), (0.1, 0)):
-        one = Chosen(0.0, np.arange(4), np.ones(4), left)
-        assert len(list(nsf_watch.sparse(SimpleNamespace(r=3), one))) == count
+        one = SampleSet(0.0, np.arange(4), np.ones(4), left)
+        assert len(list(monitor.sample_warnings(SimpleNamespace(r=3), one))) == count
 
 
 def trial(error=2.0, flags=""):
@@ -110,7 +119,7 @@ def test_sets_are_few_drawn_ones_and_corners(rng):
     assert [(what, len(chosen.points)) for what, chosen in found] == [
         ("draw 0", 1), ("draw 0", 3), *((f"at the {place} corner", count)
                                         for place in ("lower", "upper") for count in (10, 100))]
-    assert np.array_equal(found[1][1].points, drawn(150, 3, 0).points)
+    assert np.array_equal(found[1][1].points, drawn_samples(150, 3, 0).points)
 
 
 def test_scenes_that_the_bound_has_not_seen_are_judged_by_it(tmp_path, monkeypatch):
@@ -124,7 +133,7 @@ def test_scenes_that_the_bound_has_not_seen_are_judged_by_it(tmp_path, monkeypat
     assert list(zip(table["map"], table["what"], table["samples"], strict=True)) == [
         ("cube", "draw 0", 3)]
     one = reduced_runs.tested(study)
-    points = drawn(len(one.fields.X), 3, 0).points
+    points = drawn_samples(len(one.fields.X), 3, 0).points
     assert table["left"] == pytest.approx([misfit(one.fields.U, 5, points)])
     records = {r.target: r for r in found.records("extremes.nsf.unseen")}
     assert {"extremes.nsf.unseen.told", "extremes.nsf.unseen.silent",

@@ -9,8 +9,8 @@ import pytest
 
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.step import ReducedStepper
-from mpm_ref.rom.study.nsf_case import whole
-from mpm_ref.rom.study.nsf_run import Plan, infer
+from mpm_ref.rom.study.full_model import nsf_full_model
+from mpm_ref.rom.study.run import FieldRunOptions, nsf_run
 from mpm_ref.simulate import simulate
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
@@ -76,9 +76,10 @@ def test_stages_are_parts_of_the_step(one):
 @pytest.mark.parametrize("steps", [1, 5])
 def test_integration_points_are_those_of_the_reduced_run(one, steps):
     """The mean over all steps, of the warm-up too; with all particles, all."""
-    scene = whole(one.study.run(0.4))
-    run = infer(scene, one.of(0.4), Plan(one.study.chosen(scene, FEW, 0)), one.rest)
-    reports = [report.points for _, _, report in islice(run, 1, 1 + speed.WARM + steps)]
+    scene = nsf_full_model(one.study.run(0.4))
+    options = FieldRunOptions(one.study.chosen(scene, FEW, 0))
+    run = nsf_run(scene, one.of(0.4), options, one.rest).states()
+    reports = [report.points for _, _, report, _ in islice(run, 1, 1 + speed.WARM + steps)]
     assert FEW < min(reports) < max(reports) <= N
     for count, points in ((FEW, np.mean(reports)), (N, N)):
         assert speed.reduced_steps(one, count, "nonlinear", steps)["points"] == points
@@ -99,7 +100,7 @@ def test_full_steps_are_all_from_the_start(monkeypatch):
 
     monkeypatch.setattr(speed, "simulate", run)
     speed.whole_steps(STUDY, 5)
-    rest = [body.particles.x for body in whole(STUDY.run(STUDY.test[0])).problem.bodies]
+    rest = [body.particles.x for body in nsf_full_model(STUDY.run(STUDY.test[0])).problem.bodies]
     assert len(begun) == 1 + speed.REPEATS
     for bodies in begun:
         for x, X in zip(bodies, rest, strict=True):

@@ -10,8 +10,8 @@ import pytest
 from figures.common import reduced
 from figures.nsf import fig18
 from mpm_ref.rom.kinematics import NoBody
-from mpm_ref.rom.study.nsf_case import whole
-from mpm_ref.rom.study.nsf_run import Plan, infer
+from mpm_ref.rom.study.full_model import nsf_full_model
+from mpm_ref.rom.study.run import FieldRunOptions, nsf_run
 from mpm_ref.rom.symmetric import tensor
 from validation.ldm.published_bodies import read
 from validation.nsf import reduced_runs, states
@@ -64,23 +64,24 @@ def test_a_run_on_samples_with_weights_is_kept_where_it_is_asked_for(cube, run):
     states.keep_states(run, cube, (TEST,), ("weighed",))
     kept = read(run.folder, ID)
     assert "0.45_map" not in kept
-    scene, shown = whole(cube.study.run(TEST)), np.arange(len(cube.runs.X))
-    plan = Plan(cube.study.chosen(scene, cube.study.samples, 0, cube.fields))
-    *_, (_, last, _) = infer(scene, cube.of(TEST), plan, cube.rest)
+    scene, shown = nsf_full_model(cube.study.run(TEST)), np.arange(len(cube.runs.X))
+    plan = FieldRunOptions(cube.study.chosen(scene, cube.study.samples, 0, cube.fields))
+    *_, (_, last, *_) = nsf_run(scene, cube.of(TEST), plan, cube.rest).states()
     assert kept["0.45_weighed"][-1] == pytest.approx(cube.fields.place(shown, last.xhat), abs=1e-4)
     assert np.abs(kept["0.45_weighed"] - kept["0.45_ours"]).max() > 1e-3
 
 
 def test_a_run_that_breaks_down_has_no_place_from_then_on(cube, monkeypatch):
-    infer, test = states.infer, cube.tests[TEST]
+    make_run, test = states.nsf_run, cube.tests[TEST]
 
     def breaks(*given):
-        for t, at, report in infer(*given):
-            if t > 0.5 * test.dt * (test.x.shape[1] - 1):
+        for state in make_run(*given).states():
+            if state.t > 0.5 * test.dt * (test.x.shape[1] - 1):
                 raise NoBody("gone")
-            yield t, at, report
+            yield state
 
-    monkeypatch.setattr(states, "infer", breaks)
+    monkeypatch.setattr(states, "nsf_run",
+                        lambda *given: SimpleNamespace(states=lambda: breaks(*given)))
     found = states.of_run("one", cube, TEST, np.arange(5))
     assert [np.isfinite(found["one"][k]).all() for k in range(3)] == [True, False, False]
 

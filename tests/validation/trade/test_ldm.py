@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mpm_ref.rom.fields.affine import Affine
-from mpm_ref.rom.study.case import case
-from mpm_ref.rom.study.run import Way
+from mpm_ref.rom.study.full_model import ldm_full_model
+from mpm_ref.rom.study.run import RunOptions
 from validation.common.scenes import with_
 from validation.ldm.networks import trained
 from validation.ldm.references import references
@@ -22,7 +22,7 @@ EXACT = Affine(3), Affine(3).rest
 @pytest.fixture(scope="module")
 def one():
     """The cylinder, a few steps."""
-    return case(with_(GRAVITY.scene(5.0), steps=4))
+    return ldm_full_model(with_(GRAVITY.scene(5.0), steps=4))
 
 
 def busy(seconds):
@@ -72,7 +72,7 @@ def test_a_step_asks_the_map_as_often_as_its_way_says(one):
     n = len(one.X)
     for velocity, derivatives, place, speeds in (("previous", 1, 0, 1), ("latest", 1, 0, 0),
                                                  ("difference", 1, 1, 0), ("transported", 2, 0, 1)):
-        spent, asked, points = split(one, EXACT, Way(velocity=velocity), 3)
+        spent, asked, points = split(one, EXACT, RunOptions(velocity=velocity), 3)
         assert points == n
         expected = dict(zip(EVALUATIONS, (derivatives * n, place * n, speeds * n), strict=True))
         assert asked == pytest.approx(expected, abs=0.0)
@@ -82,8 +82,8 @@ def test_a_step_asks_the_map_as_often_as_its_way_says(one):
 
 def test_near_preimages_ask_less(one):
     model = trained("gravity-r4")
-    way = Way("eulerian", points=20, velocity="latest")
-    paper, cheap = (split(one, (model.field, model.rest), way._replace(close=close), 2)
+    way = RunOptions("eulerian", points=20, velocity="latest")
+    paper, cheap = (split(one, (model.field, model.rest), way._replace(preimage_tolerance=close), 2)
                     for close in (1e-9, 1e-2))
     assert cheap[2] == paper[2]
     assert cheap[1]["derivatives"] < 0.7 * paper[1]["derivatives"]
@@ -99,7 +99,8 @@ def test_choices_differ_from_the_base_in_one_thing():
     ways = ldm.knobs()
     assert len(set(ways)) == len(ways)
     for way in ways:
-        other = [name for name in Way._fields if getattr(way, name) != getattr(ldm.BASE, name)]
+        other = [name for name in RunOptions._fields
+                 if getattr(way, name) != getattr(ldm.BASE, name)]
         if set(other) != {"velocity", "close", "precision"} | set(other) & {"points"}:
             assert len(other) <= 1 or set(other) == {"close", "precision"}
 
@@ -125,13 +126,13 @@ def test_what_saves_nothing_is_never_paid():
 
 def test_a_run_costs_as_many_steps_as_it_has(monkeypatch):
     tests = references(GRAVITY, 1)
-    one = Raced(Way(), Spent(9.0, 0.5), 0, None)
+    one = Raced(RunOptions(), Spent(9.0, 0.5), 0, None)
     monkeypatch.setattr(ldm, "alone", lambda *_: one)
-    assert ldm.steps_of(tests, EXACT, Way()) == 0.5 * tests.cases[0].problem.clock.steps
+    assert ldm.steps_of(tests, EXACT, RunOptions()) == 0.5 * tests.cases[0].problem.clock.steps
 
 
 def test_a_run_by_itself_has_the_errors_that_it_has_among_others():
     tests, model = references(GRAVITY, 1), trained("gravity-r4")
-    at, way = (model.field, model.rest), Way(points=20)
+    at, way = (model.field, model.rest), RunOptions(points=20)
     found = ldm.alone(tests.cases[0], at, way, tests.x[0])
     assert tuple(found.errors) == pytest.approx(tuple(tests.on(*at, way)), rel=1e-12)

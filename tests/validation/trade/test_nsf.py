@@ -7,7 +7,7 @@ import pytest
 
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.kinematics import NoBody
-from mpm_ref.rom.study.errors import Errors
+from mpm_ref.rom.study.errors import PositionErrors
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.extremes import nsf_runs
@@ -75,7 +75,7 @@ def test_a_run_that_breaks_down_has_no_time(one, monkeypatch):
         raise NoBody("gone")
         yield
 
-    monkeypatch.setattr(nsf, "infer", broken)
+    monkeypatch.setattr(nsf, "nsf_run", lambda *_: SimpleNamespace(states=broken))
     assert nsf.reduced_cpu(one, 30, False, 1) == np.inf
 
 
@@ -88,7 +88,7 @@ def test_steps_grow_until_a_run_breaks_down(one, results, monkeypatch):
         asked.append(faster)
         good = faster < 2.0
         return reduced_runs.Found(
-            Errors(0.1 if good else np.inf, np.inf, np.inf), 0.2, 30.0, 40.0, np.nan)
+            PositionErrors(0.1 if good else np.inf, np.inf, np.inf), 0.2, 30.0, 40.0, np.nan)
 
     monkeypatch.setattr(type(one), "errors", errors)
     monkeypatch.setattr(nsf, "full_end", lambda scene, factor: f"end {factor:g}")

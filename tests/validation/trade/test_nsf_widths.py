@@ -7,7 +7,7 @@ from field_toys import R, networks
 from mpm_ref.rom.fields.network import Networks
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.model_file import Model
-from mpm_ref.rom.study.errors import Errors
+from mpm_ref.rom.study.errors import PositionErrors
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.common.weights_needed import Untrained
@@ -30,7 +30,8 @@ class Ready(reduced_runs.Tested):
         """Errors that tell their draw."""
         assert (faster, weighed) == (1.0, False)
         error = 0.01 * (draw + 1) if count == STUDY.samples else 0.005
-        return reduced_runs.Found(Errors(error, 0.02, 0.03), 0.2, float(count), count, np.nan)
+        return reduced_runs.Found(PositionErrors(error, 0.02, 0.03), 0.2, float(count), count,
+                                  np.nan)
 
 
 @pytest.fixture

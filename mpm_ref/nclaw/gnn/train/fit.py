@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
-from ....training import Diverged, Session, train_epochs
+from ....training import Diverged, TrainingSession, train_epochs
 from ..features import HISTORY, FeatureSettings, Graph, SimulatorFailure
 from ..simulator import Simulator, free_run
 from .examples import example, random_walk, scales_of, single
@@ -79,7 +79,7 @@ class Round(NamedTuple):
     error: float        # mean squared, of free runs [m^2]; infinite where they break down
 
 
-class GraphSession(Session):
+class GraphSession(TrainingSession):
     """Network and optimiser of a training under way."""
 
     entry = Round._make

@@ -1,0 +1,117 @@
+"""The full-order model of a run, as its reduced model needs it: points, masses, law, conditions."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core.levelset import distances
+from ...materials import NoFlow
+from ...scene import build
+from ...shapes import Difference, Intersection, Union, level_set
+from ..step import MaterialPoints
+
+
+class FullModel(NamedTuple):
+    """The full-order model of one run; n points of all bodies, in the order of their sampling."""
+
+    problem: object         # `Problem`, which gives law, grid, clock and conditions
+    X: np.ndarray           # (n, d) points at the start [m]
+    m: np.ndarray           # (n,) mass [kg]
+    V0: np.ndarray          # (n,) volume at rest [m^d]
+    v: np.ndarray           # (n, d) velocity at the start [m/s]
+    shape: object = None    # of LDM's body at rest, as the scene has it
+    boundary_points: tuple = ()     # of LDM: index arrays of the points within a cell, at the
+                                    # start, of each prescribed region
+
+    @property
+    def rho(self):
+        """The density at rest [kg/m^d]."""
+        return float(self.m.sum() / self.V0.sum())
+
+    @property
+    def material(self):
+        """The `MaterialPoints` of all points."""
+        return MaterialPoints(self.m, self.V0, self.v)
+
+    def constrained_points(self, t):
+        """Return those of `boundary_points` whose region acts in the step from time t [s] on;
+        samples must not miss them (LDM-sec3.3-hyper).
+        """
+        middle = t + 0.5 * self.problem.clock.dt
+        regions = zip(self.boundary_points, prescribed_regions(self.problem), strict=True)
+        return tuple(points for points, region in regions if region.since < middle < region.until)
+
+
+def ldm_full_model(scene):
+    """Return the `FullModel` of a scene that LDM reduces. Raises ValueError for features that its
+    reduced runs do not have: more bodies, plastic flow, an affine transfer, a velocity at the
+    start, forces of single particles, a box.
+    """
+    problem = build(scene)
+    body = problem.bodies[0]
+    unsupported = {"more than one body": len(problem.bodies) > 1,
+                   "plastic flow": not isinstance(body.flow, NoFlow),
+                   f"the transfer {problem.scheme.transfer}": problem.scheme.transfer != "pic",
+                   "a start that moves": np.any(body.particles.v),
+                   "forces of single particles": body.particles.b.ndim > 1,
+                   "a box that clips": problem.clip is not None}
+    for feature in (name for name, present in unsupported.items() if present):
+        raise ValueError(f"the scene {problem.title!r} has {feature}: reduced runs know none")
+    X, m, V0, v = points_of(problem.bodies)
+    boundary = tuple(np.flatnonzero(distances(X, region.shape) <= problem.dx)
+                     for region in prescribed_regions(problem))
+    return FullModel(problem, X, m, V0, v, scene.body[0].shape, boundary)
+
+
+def nsf_full_model(scene):
+    """Return the `FullModel` of a scene that NSF reduces. Raises ValueError for features that its
+    reduced runs do not have: an implicit integrator, a transfer other than apic, a fluid, forces of
+    single particles, a box that clips.
+    """
+    problem = build(scene)
+    particles = [body.particles for body in problem.bodies]
+    unsupported = (
+        (problem.integrator != "explicit", f"the {problem.integrator} integrator",
+         'integrator = "explicit", whose step they make'),
+        (problem.scheme.transfer != "apic", f"the transfer {problem.scheme.transfer}",
+         'scheme.transfer = "apic", whose affine field is one of theirs'),
+        (any(p.F.ndim == 1 for p in particles), "a fluid", "solids, which have a shear stress"),
+        (any(p.b.ndim > 1 for p in particles), "forces of single particles", "gravity alone"),
+        (problem.clip is not None, "a box that clips", "none"))
+    for feature, expected in ((name, expected) for present, name, expected in unsupported
+                              if present):
+        raise ValueError(f"the scene {problem.title!r} has {feature}: reduced runs with inferred "
+                         f"stress expect {expected}")
+    return FullModel(problem, *points_of(problem.bodies))
+
+
+def points_of(bodies):
+    """Return x (n, d) [m], m (n,) [kg], V0 (n,) [m^d] and v (n, d) [m/s] of all bodies' points, as
+    they were sampled.
+    """
+    return tuple(field_of(bodies, name) for name in ("x", "m", "V0", "v"))
+
+
+def field_of(bodies, name):
+    """Return a field of all bodies' particles, each body's in the order of its sampling."""
+    return np.concatenate([getattr(body.particles, name)[np.argsort(body.id)] for body in bodies])
+
+
+def prescribed_regions(problem):
+    """Return the regions of a problem whose velocity is prescribed."""
+    return () if problem.conditions is None else problem.conditions.prescribed
+
+
+def signed_distance(X, shape):
+    """Return signed distances (n,) of points X (n, d) from a shape of a scene [m], negative inside;
+    of shapes made of others, a bound that is not larger.
+    """
+    match shape:
+        case Union():
+            return np.min([signed_distance(X, part) for part in shape.shapes], axis=0)
+        case Intersection():
+            return np.max([signed_distance(X, part) for part in shape.shapes], axis=0)
+        case Difference():
+            return np.maximum(signed_distance(X, shape.shape),
+                              -signed_distance(X, Union(shapes=shape.minus)))
+    return distances(X, level_set(shape))

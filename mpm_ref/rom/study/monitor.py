@@ -1,0 +1,218 @@
+"""The monitor of a reduced run tells when the run has left the data of its model, and when no body
+is left.
+
+Nothing in a reduced step fails where the model has learned nothing: the run goes on, smooth and
+wrong. It shows, in each state, at a few points and in the report of the step:
+
+    beyond      how far the latent coordinates are from the trained ones (`rom.extrapolation`)
+    off         how far the step took the samples off the map's states, in cells: forces that the
+                map cannot follow, and time steps that are too long. At the start, how far the body
+                is from where it should be: a map of another body
+    coverage    share of each motion of the body that the samples showed in the last steps: too few
+                samples, or all in one place
+    blind       latent coordinates that moved no sample, or not otherwise than others
+    lost        quadrature points that could not be traced back into the body
+    inverted    points with det F <= 0
+
+The bounds lie between the values of trial runs within the trained range, of gravity and torsion,
+and those of runs that had gone wrong. `python -m validation run extremes.ldm` records both anew,
+and how often the bounds err, also on maps that they were not chosen with. A run with inferred
+stress is checked for `beyond` and `blind` alone, with the same bounds.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..cubature import misfit
+from ..extrapolation import BEYOND, Extent, evenly, trained_extent
+from ..fields.pod_fields import Spanned
+from ..projection import RANK
+
+CHECKED = 64        # points of the body that are checked, and samples
+OFF = 0.033         # [dx]; hardly separates runs in range from those with twice the time step
+COVERAGE = 0.3      # low enough for ten samples and seven coordinates
+MEMORY = 0.8        # share of the earlier coverage in the present one: a poor draw is forgiven
+LOST = 0.01         # of the quadrature points; in range none
+NONSENSE = 0.1      # of the points checked; more that are inverted are no body,
+NOWHERE = 100.0     # nor are latent coordinates this many times as far from the trained mean as any
+                    # trained ones
+SPARSE = 0.74       # of `rom.cubature.misfit`, from runs of jelly cube and metal frame
+
+MESSAGES = {
+    "beyond": "the latent coordinates are {beyond:.3g} times as far from the training runs as "
+              "these are from each other",
+    "off": "the samples went {off:.2g} cells off the map's states",
+    "coverage": "of some motion of the body the samples saw only {coverage:.0%}",
+    "blind": "{blind} of the latent coordinates could not be told from the samples",
+    "lost": "{lost:.1%} of the quadrature points could not be traced back",
+    "inverted": "{inverted:.1%} of the points looked at are inverted, det F down to {J:.3g}",
+}
+
+
+class NoBodyLeft(RuntimeError):
+    """A reduced run in which no body is left."""
+
+
+class StateCheck(NamedTuple):
+    """Measures of a state of a reduced run; those that are not computed are within bounds."""
+
+    beyond: float           # distance of xhat from the trained ones, over their largest gap
+    blind: int              # r less the rank of dg/dxhat at the samples
+    off: float = 0.0        # rms distance from the map's states that the step was projected over
+                            # [dx]
+    coverage: float = 1.0   # rms motion of the samples over that of the body, in the direction of
+                            # xhat where it is least; a mean over the last steps
+    lost: float = 0.0       # share of quadrature points that were not traced back
+    J: float = np.nan       # smallest det F of the points checked
+    inverted: float = 0.0   # share of them whose det F is not above 0
+    far: float = 0.0        # distance of xhat from the mean of the trained ones, over their largest
+
+    @property
+    def nonsense(self):
+        """The reason why there is no body, in words; "" where there is one."""
+        if self.inverted > NONSENSE:
+            return f"{self.inverted:.0%} of the points looked at have no det F > 0"
+        if self.far > NOWHERE:
+            return (f"the latent coordinates are {self.far:.3g} times as far from the trained mean "
+                    "as any trained ones")
+        return ""
+
+    @property
+    def out_of_bounds(self):
+        """Names of the measures that are out of bounds."""
+        out = {"beyond": not self.beyond <= BEYOND, "off": not self.off <= OFF,
+               "coverage": not self.coverage >= COVERAGE, "blind": self.blind > 0,
+               "lost": not self.lost <= LOST, "inverted": self.inverted > 0.0}
+        return tuple(name for name, is_out in out.items() if is_out)
+
+    @property
+    def message(self):
+        """The measures that are out of bounds, in words."""
+        return "; ".join(MESSAGES[name].format(**self._asdict()) for name in self.out_of_bounds)
+
+
+def stored_check(rows, k):
+    """Return the `StateCheck` of frame k, as far as the rows of a results file have it; at the
+    start nothing was sampled.
+    """
+    blind = rows["xhat"].shape[1] - int(rows["rank"][k]) if k else 0
+    check = StateCheck(float(rows["beyond"][k]), blind)
+    if "lost" not in rows:
+        return check
+    points, lost = int(rows["points"][k]), int(rows["lost"][k])
+    return check._replace(lost=lost / max(points + lost, 1), J=1.0, **{
+        name: float(rows[name][k]) for name in ("off", "coverage", "inverted")})
+
+
+class MapMonitor(NamedTuple):
+    """The monitor of a run of LDM."""
+
+    g: object               # the map
+    X: np.ndarray           # (n, d) points that are checked, at rest [m]
+    extent: Extent          # of the training latents
+    dx: float               # of the grid [m]
+    dt: float               # [s]
+    all_points: np.ndarray  # (N, d) of which samples have numbers, at rest [m]
+
+    def check(self, state, last=None):
+        """Return the `StateCheck` of a `RunState`, whose predecessor's was `last`; raises
+        `NoBodyLeft`. It costs derivatives at CHECKED points, and at that many samples.
+        """
+        latent, report = state.latent, state.report
+        with np.errstate(all="ignore"):
+            x, F, G = self.g.derivatives(self.X, latent.xhat)
+            J = np.linalg.det(F)
+            off = float(np.sqrt(np.mean(np.sum((x - self.X) ** 2, axis=1))))
+        measures = {"off": off / self.dx, "blind": 0}
+        if report is not None:
+            lost = report.quadrature.get("lost", 0)
+            X = evenly(self.all_points[state.samples.points], CHECKED)
+            shown = coverage(G, self.g.derivatives(X, latent.xhat)[2])
+            measures = {"off": report.residual * self.dt / self.dx,
+                        "coverage": MEMORY * last.coverage + (1.0 - MEMORY) * shown,
+                        "blind": self.g.r - report.rank, "lost": lost / (lost + report.points)}
+        return StateCheck(float(self.extent.beyond(latent.xhat)), J=float(J.min()),
+                          inverted=float(np.mean(~(J > 0.0))),
+                          far=float(self.extent.outlying(latent.xhat)), **measures)
+
+    def describe(self, latent):
+        """Return the place of the smallest det F of a state without body, in words."""
+        with np.errstate(all="ignore"):
+            J = np.linalg.det(self.g.derivatives(self.X, latent.xhat)[1])
+        p = int(np.argmin(np.where(np.isfinite(J), J, -np.inf)))
+        place = ", ".join(f"{a:.3g}" for a in self.X[p])
+        return f"det F is least at X = {place} m, {float(J[p]):.3g}"
+
+
+class FieldMonitor(NamedTuple):
+    """The monitor of a run of NSF."""
+
+    extent: Extent      # of the training latents
+
+    def check(self, state, last=None):
+        """Return the `StateCheck` of a `RunState`."""
+        latent, report = state.latent, state.report
+        blind = 0 if report is None else len(latent.xhat) - report.rank
+        return StateCheck(float(self.extent.beyond(latent.xhat)), blind)
+
+
+def map_monitor(full, g, xhat):
+    """Return the `MapMonitor` of runs of a `FullModel` on a map with training latents xhat (s,
+    k + 1, r). Raises ValueError where these do not differ.
+    """
+    X, problem = evenly(full.X, CHECKED), full.problem
+    return MapMonitor(g, X, trained_extent(g, full.X, xhat), problem.dx, problem.clock.dt, full.X)
+
+
+def field_monitor(fields, xhat):
+    """Return the `FieldMonitor` of runs on fields with training latents xhat (s, k + 1, r). Raises
+    ValueError where these do not differ.
+    """
+    return FieldMonitor(trained_extent(fields, np.arange(len(fields.X)), xhat))
+
+
+def checked_states(run, monitor, earlier=()):
+    """Yield (`RunState`, `StateCheck`) of a `ReducedRun`, of earlier states too (see
+    `ReducedRun.states`). Raises `NoBodyLeft`, and what the run raises.
+    """
+    check, first = None, None
+    for k, state in enumerate(run.states(earlier)):
+        check = monitor.check(state, check)
+        first = first or ((k, check) if check.out_of_bounds else None)
+        if check.nonsense:
+            raise NoBodyLeft(
+                f"step {k}, t = {k * run.dt:.6g} s: no body is left, {check.nonsense}; "
+                f"{monitor.describe(state.latent)}; out of bounds since step {first[0]}: "
+                f"{first[1].message}. Keep to the parameters that the map was trained with, take "
+                "more samples or a smaller dt")
+        yield state, check
+
+
+def sample_warnings(fields, samples):
+    """Yield the warning, before a run, about a `SampleSet` that determines too little. Networks
+    have no modes: their samples are not judged.
+    """
+    left, points = samples.misfit, samples.points       # of weights; NaN without
+    if samples.weights is None and isinstance(fields, Spanned):
+        left = misfit(fields.U, fields.r, points)
+    if left > SPARSE:
+        yield (f"the {len(points)} samples leave {100.0 * left:.0f} % of the products of the "
+               f"modes, and most runs whose samples left more than {100.0 * SPARSE:.0f} % went "
+               "wrong (docs/howto/reduced-model.md); give [run] more of them, or another seed")
+
+
+def coverage(G, G_samples):
+    """Return the least, over all changes y of the latent coordinates that move the body, of the rms
+    motion G_samples y of samples over that of the body's points G y; G (n, d, r), G_samples (m, d,
+    r). 0 where no motion shows, or nothing is finite.
+    """
+    A, B = (a.reshape(-1, a.shape[2]) / np.sqrt(len(a)) for a in (G, G_samples))
+    if not (np.isfinite(A).all() and np.isfinite(B).all()):
+        return 0.0
+    _, s, Vt = np.linalg.svd(A, full_matrices=False)
+    moving = s > RANK * s[0]
+    B = B @ (Vt[moving].T / s[moving])
+    if len(B) < B.shape[1] or not moving.any():
+        return 0.0
+    return float(np.linalg.svd(B, compute_uv=False)[-1])
