@@ -8,7 +8,7 @@ runs that are flagged and of bad ones that are not, by where the vertical line i
 import matplotlib.pyplot as plt
 import numpy as np
 
-from mpm_ref.rom.study.monitor import BEYOND
+from mpm_ref.rom.extrapolation import BEYOND
 from validation.extremes.ldm_runs import BAD
 
 from ..common.orders import scales, series

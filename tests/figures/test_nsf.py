@@ -8,7 +8,7 @@ import pytest
 
 from figures.extremes import nsf as extremes_nsf
 from figures.trade import nsf as trade_nsf
-from mpm_ref.rom.study.monitor import BEYOND
+from mpm_ref.rom.extrapolation import BEYOND
 from validation.extremes.ldm_runs import BAD
 
 mpl.use("Agg")

@@ -1,5 +1,5 @@
 """Reduced runs at their extremes: how each ended, beside the full-order run, and what its watch
-said (see `mpm_ref.rom.study.watch`).
+said (see `mpm_ref.rom.study.monitor`).
 
 A run is bad where its error is above BAD times what is usual for its map, and above TOLERABLE. It
 ends in one of four ways: it stopped with a sentence; the watch flagged it in some step; it is fine;

@@ -8,10 +8,11 @@ from functools import partial
 import numpy as np
 from scipy.spatial import KDTree
 
+from mpm_ref.rom.extrapolation import BEYOND
 from mpm_ref.rom.step import BREAKDOWNS
 from mpm_ref.rom.study.dataset import simulate_history
 from mpm_ref.rom.study.full_model import nsf_full_model
-from mpm_ref.rom.study.monitor import BEYOND, field_monitor
+from mpm_ref.rom.study.monitor import field_monitor
 from mpm_ref.rom.study.run import FieldRunOptions, nsf_run
 
 from ..common.registry import experiment
