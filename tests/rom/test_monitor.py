@@ -5,7 +5,6 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 import rom_toys
-from validation.verification.scenes import with_
 
 from mpm_ref.rom.extrapolation import LATENTS, extent
 from mpm_ref.rom.fields.pod import basis
@@ -24,6 +23,7 @@ from mpm_ref.rom.study.monitor import (
 )
 from mpm_ref.rom.study.run import RunOptions, RunState, ldm_run
 from mpm_ref.rom.study.samples import SampleSet
+from validation.common.scenes import with_
 from validation.ldm.studies import GRAVITY
 
 WELL = StateCheck(beyond=0.3, off=0.01, coverage=0.9, blind=0, lost=0.0, J=0.8, inverted=0.0,
