@@ -8,8 +8,8 @@ import numpy as np
 from ..hot.methods import METHODS, SolverOptions
 from ..hot.multigrid.options import CycleOptions
 from . import sampled
+from .error_bounds import size
 from .implicit_stages import after
-from .scales import size
 
 CLOSER = 1e-3       # the golden increment's tolerance, of the scene's
 ROOM = 2.0          # others may be so much farther off than the two methods seen

@@ -7,24 +7,22 @@ seeds that the file holds, in which another code's adjoint begins.
 import numpy as np
 
 from ..adjoint import StepAdjoint, clip_adjoint, require_adjoint
-from . import adjoint_stages
-from .adjoint_material import Seeds
-from .adjoint_twin import Backwards, Stage
-from .plain_twin import on
+from . import adjoint_stages, error_bounds, plain_adjoint
+from .plain_adjoint import Seeds
+from .plain_twin import Twin
 from .recording import (
     MARGIN,
     UNSURE,
-    Sides,
+    Runs,
     copied,
-    golden,
+    in_order,
     measured,
     refuse_past_end,
-    unmirrored,
 )
-from .scales import size
-from .schema import WHERE
 
 SEED = 20270
+COARSE = 2.0**20        # ulps of the perturbations that tell a kink from a slope
+COARSE_SAMPLES = 4
 
 
 def run(problem, steps, state=None):
@@ -33,18 +31,17 @@ def run(problem, steps, state=None):
     Raises ValueError as that does, and for what has no adjoint.
     """
     require_adjoints(problem)
-    sides = Sides(problem, state)
-    refuse_past_end(problem.clock, state, sides.dt, steps)
+    runs = Runs(problem, state)
+    refuse_past_end(problem.clock, state, runs.dt, steps)
     for k in range(steps):
-        before = [tuple(copied(body, 1) for body in p.bodies) for p in sides.runs]
-        done = sides.step(k)
-        seeds = [seeds_of(problem, body, sides.dt, k) for body in before[0]]
+        before = [tuple(copied(body, 1) for body in p.bodies) for p in runs.problems]
+        done = runs.step(k)
+        seeds = [seeds_of(problem, body, runs.dt, k) for body in before[0]]
         x = [done.arrays[f"{body.name}/x"].value for body in before[0]]
-        arrays = backwards(sides, before, unclipped(problem.clip, seeds, x), done)
-        refuse_kinks(arrays, k)
-        beside = {f"{body.name}/{name}_seed": a for body, seed in zip(before[0], seeds)
+        arrays = StepGradients(runs, done, unclipped(problem.clip, seeds, x)).recorded(before, k)
+        inputs = {f"{body.name}/{name}_seed": a for body, seed in zip(before[0], seeds)
                   for name, a in seed._asdict().items() if a is not None}
-        yield done._replace(arrays=done.arrays | arrays, beside=beside)
+        yield done._replace(arrays=done.arrays | arrays, inputs=inputs)
 
 
 def require_adjoints(problem):
@@ -65,21 +62,6 @@ def unclipped(clip, seeds, x):
     return seeds
 
 
-def refuse_kinks(arrays, k):
-    """Raise ValueError where an own error is neither small nor what round-off explains: there the
-    runs took different branches, of which each has another gradient. A NaN is not small either.
-    """
-    for key, a in arrays.items():
-        own, largest = max(a.twin, a.reordered), abs(a.value).max()
-        if not (own <= UNSURE * largest or a.error <= MARGIN):
-            raise ValueError(
-                f"{key} in step {k}: kernels and plain twin differ by {own:.1e} beside its largest "
-                f"entry {largest:.1e}, {a.error:.1e} times what round-off explains; something "
-                "stands on a kink (a yield surface, a contact that opens, the face of a cell) and "
-                "has no definite gradient: take another state"
-            )
-
-
 def seeds_of(problem, body, dt, k):
     """`Seeds` of a body after step k: random, of a size at which all of them tell on a node."""
     q, dx = body.particles, problem.dx
@@ -90,26 +72,74 @@ def seeds_of(problem, body, dt, k):
                    for name in Seeds._fields for a in [getattr(q, name)]))
 
 
-def backwards(sides, before, seeds, done):
-    """{key: `Golden`} of the adjoint of the last step of the sides, which is `done`."""
-    when, last = (done.t, done.dt), sides.last
-    turned = [Seeds(*(None if a is None else a[::-1] for a in seed)) for seed in seeds]
-    seen, other = (adjoint_stages.step(p, bodies, after, s, when) for p, bodies, after, s in
-                   zip(sides.runs, before, last.seen, (seeds, turned)))
-    other = unmirrored(other, last.seen[1]["nodes"], done.nodes)
-    twin, box = sides.twin, last.done.nodes.box
-    on_empty = sides.runs[0].scheme.gravity_on_empty
-    stage = Stage(twin, last.before, last.done, last.found, last.errors, last.contacts, on_empty)
-    exact = Backwards(stage).seen([Seeds(*(None if a is None else a.astype(twin.real)
-                                           for a in seed)) for seed in seeds])
-    arrays = {}
-    for key, a in seen.items():
-        value, S = exact[key]
-        where = WHERE[key.split("/")[-1]]
-        if where == "nodes":
-            value, S = on(value, box, done.nodes), on(S, box, done.nodes)
-        if where in ("nodes", "particles"):
-            S = size(S[:, None])
-        judge = measured if where == "parameters" else golden   # parameters have units of their own
-        arrays[key] = judge(a, S.astype(float), value, other[key])
-    return arrays
+class StepGradients:
+    """The adjoint of the step `done` that the `Runs` have just made."""
+
+    def __init__(self, runs, done, seeds):
+        self.runs, self.done, self.seeds = runs, done, seeds
+
+    def recorded(self, before, k):
+        """Return {key: `Golden`} of all stages backwards; k is the number of the step.
+
+        `before` has the bodies of the kernels before it, in order and reversed. Raises ValueError
+        on a kink.
+        """
+        value, other = self.by_kernels(before)
+        exact = self.by_twin(self.runs.twin, self.runs.last.exact)
+        samples = [self.by_twin(twin, step) for twin, step in
+                   zip(self.runs.perturbed, self.runs.last.samples)]
+        S = error_bounds.scales(exact, samples, self.runs.count)
+        arrays = {key: measured(a, S[key], exact[key], other[key]) for key, a in value.items()}
+        self.refuse_kinks(arrays, exact, k)
+        return arrays
+
+    def by_kernels(self, before):
+        """Return {key: array} of the kernels, and of those with particles reversed."""
+        last, when = self.runs.last.kernels, (self.done.t, self.done.dt)
+        reversed_ = [seed.reversed() for seed in self.seeds]
+        value, other = (adjoint_stages.step(problem, bodies, after, seeds, when)
+                        for problem, bodies, after, seeds
+                        in zip(self.runs.problems, before, last, (self.seeds, reversed_)))
+        return value, in_order(other, last[1]["nodes"], self.done.nodes)
+
+    def by_twin(self, twin, step):
+        """Return {key: array} of a plain twin that made the `TwinStep` step."""
+        on_empty = self.runs.problems[0].scheme.gravity_on_empty
+        return plain_adjoint.gradients(twin, step, self.seeds, on_empty, self.done.nodes)
+
+    def refuse_kinks(self, arrays, exact, k):
+        """Raise ValueError where an own error is neither small nor what round-off explains: there
+        the runs took different branches, of which each has another gradient. A NaN is not small
+        either.
+
+        Samples on a kink are as far apart as the branches. What a smooth function may do is told
+        by perturbations that are COARSE times as large, whose effect is divided by COARSE.
+        """
+        own = {key: max(a.twin, a.reordered) for key, a in arrays.items()}
+        unsure = [key for key, a in arrays.items() if not own[key] <= UNSURE * abs(a.value).max()]
+        coarse = self.coarse_samples() if unsure else []
+        for key in unsure:
+            where, a = error_bounds.where_of(key), arrays[key]
+            smooth = error_bounds.entity_size(exact[key], where).astype(float)
+            spread = error_bounds.deviation(exact[key], [s[key] for s in coarse], where)
+            smooth = error_bounds.floored(smooth + error_bounds.SAFETY * spread / COARSE)
+            error = measured(a.value, smooth, exact[key], a.value).error
+            if not error <= MARGIN:
+                raise ValueError(
+                    f"{key} in step {k}: kernels and plain twin differ by {own[key]:.1e} beside "
+                    f"its largest entry {abs(a.value).max():.1e}, {error:.1e} times what round-off "
+                    "explains; something stands on a kink (a yield surface, a contact that opens, "
+                    "the face of a cell) and has no definite gradient: take another state"
+                )
+
+    def coarse_samples(self):
+        """Return the gradients {key: array} at states that are COARSE ulps away."""
+        step, twin = self.runs.last.exact, Twin(self.runs.problems[0], np.float64)
+        rng, samples = np.random.default_rng(error_bounds.SEED), []
+        contacts = {tuple(np.array(i) + step.stages.nodes.box.first): c
+                    for i, c in step.contacts.items()}
+        for _ in range(COARSE_SAMPLES):
+            twin.bodies = [error_bounds.perturbed_body(q.cast(np.float64), rng, COARSE)
+                           for q in step.before]
+            samples.append(self.by_twin(twin, twin.step(self.done.dt, self.done.nodes, contacts)))
+        return samples

@@ -58,7 +58,7 @@ def put(problem, path, when, run):
     if steps < 1 or begin < 0:
         raise ValueError(f"steps = {steps}, begin = {begin}: expected at least one step to record, "
                          "after 0 or more")
-    problem, state = recording.begun(problem, begin)
+    problem, state = recording.advanced(problem, begin)
     idle = []
     with replacing(path) as part, h5py.File(part, "w", libver=("v110", "v110")) as f:
         describe(f, problem)
@@ -169,7 +169,7 @@ def put_step(group, recorded):
     """One step: every array with its scale, its own error and its tolerances."""
     group.attrs.update({"t": recorded.t, "dt": recorded.dt})
     group.create_dataset("nodes", data=recorded.nodes.astype(np.int32), **PACKED)
-    for name, a in recorded.beside.items():
+    for name, a in recorded.inputs.items():
         group.create_dataset(name, data=a.astype(np.int32) if name in NODES else a, **PACKED)
     for name, a in recorded.bars.items():
         group.create_dataset(f"bar/{name}", data=a, **PACKED)

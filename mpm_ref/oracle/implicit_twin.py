@@ -5,6 +5,7 @@ they are; all else is computed from the particles. The Hessian is a product, nev
 levels: coarse ones are R H P, one factor after the other.
 """
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -16,8 +17,8 @@ from ..plain.laws import energy, principal
 from ..plain.spline import bspline, pairs
 from ..plain.step import Nodes, Step, after, deform, to_particles
 from ..plain.tensors import compose, det, svd
-from . import differential
-from .plain_twin import REAL, Twin, on
+from . import differential, error_bounds
+from .plain_twin import REAL, Twin, aligned, values_at
 
 DEGREE = {"linear": 1, "quadratic": 2}      # of the splines of HOT-sec4.2-kernel
 
@@ -34,9 +35,14 @@ class At(NamedTuple):
 class SolvedTwin(Twin):
     """The plain twin of an implicit problem, at the start of one step of dt [s]."""
 
-    def __init__(self, problem, unknowns, dt, real=REAL):
-        super().__init__(problem, real)
+    def __init__(self, problem, unknowns, dt, real=REAL, rng=None):
+        """With a random generator `rng`, the state and the projectors are off by up to an ulp."""
+        super().__init__(problem, real, rng)
         self.dt, self.unknowns = self.real(dt), unknowns
+        self.B = unknowns.B.astype(self.real)
+        if rng is not None:
+            self.bodies = [error_bounds.perturbed_body(q, rng) for q in self.bodies]
+            self.B = error_bounds.perturbed(self.B, rng, np.ones(len(self.B)))
         self.whole = [q._replace(V0=q.V0 * (1 if q.y is None else intact(q.y, q.flow)))
                       for q in self.bodies]
         self.clouds = [pairs(q.x, self.method.dx, self.method.degree) for q in self.bodies]
@@ -45,7 +51,7 @@ class SolvedTwin(Twin):
         self.m = sum(transfer.mass(q.m, ip, box) for q, ip in both)
         self.mv = sum(transfer.momentum(q.m, q.v, q.C, ip, box) for q, ip in both)
         self.v = self.mv / np.where(self.m > 0, self.m, 1)[..., None]
-        self.box, self.B = box, unknowns.B.astype(self.real)
+        self.box = box
 
     def over(self, u):
         """A nodal field (n, ..) over the box; nodes outside of it carry nothing."""
@@ -57,15 +63,56 @@ class SolvedTwin(Twin):
 
     def nodal(self, a):
         """An array over the box on the nodes (n, ..)."""
-        return on(a, self.box, self.unknowns.index)
+        return values_at(a, self.box, self.unknowns.index)
 
-    def before(self):
-        """{key: array} as `implicit.before`, without conditions and norms."""
-        seen = {"mass": self.m, "momentum": self.mv, "velocity_old": self.v}
-        seen = {name: self.nodal(a) for name, a in seen.items()}
+    def before(self, bases=None):
+        """Return {key: array} as `implicit_stages.before`, without conditions and norms.
+
+        Weights are those of the stencils that begin at bases[body name], by default the twin's.
+        """
+        arrays = {"mass": self.m, "momentum": self.mv, "velocity_old": self.v}
+        arrays = {name: self.nodal(a) for name, a in arrays.items()}
         for name, ip in zip(self.names, self.clouds):
-            seen[f"{name}/base"], seen[f"{name}/weights"] = ip.node[:, 0], ip.w
-        return seen
+            base = ip.node[:, 0]
+            arrays[f"{name}/weights"] = ip.w if bases is None else aligned(ip.w, base, bases[name])
+        return arrays
+
+    def before_solve(self, given, operands, levels):
+        """Return {key: array} of all stages before the solve, V-cycle and direction left out.
+
+        given = (bases, start) has the first nodes of the particles' stencils and what the solve
+        starts from, as the kernels see them; `operands` are those of `implicit_stages.draw`, and
+        `levels` = (the levels of the kernels' hierarchy, the kernel of their embedding), or None.
+        """
+        bases, start = given
+        arrays = self.before(bases) | self.conditions() | {"kappa": self.kappa()}
+        for name, dv in (("start", start), ("trial", operands.trial)):
+            ats = self.at(dv)
+            E, g = self.potential(dv)
+            arrays |= {f"E_{name}": E, f"gradient_{name}": g,
+                       f"product_{name}": self.product(ats, operands.probe)}
+            if name == "start" and levels is not None:
+                arrays |= self.coarse(ats, operands.coarse, *levels)
+        return arrays
+
+    def coarse(self, ats, probes, levels, kernel):
+        """Return {key: array} of prolongations and coarse products, for the vectors `probes` on the
+        nodes of the coarse levels.
+        """
+        W = [embedding(fine.index, coarse.index, kernel) for fine, coarse in pairwise(levels)]
+        B = [self.B, *(level.B.astype(self.real) for level in levels[1:])]
+        arrays = {}
+        for k, u in enumerate(probes, 1):
+            u = u.astype(self.real)
+            for l in reversed(range(k)):
+                u = spread(W[l], B[l], u)
+                if l == k - 1:
+                    arrays[f"prolonged{k}"] = u
+            g = self.product(ats, u)
+            for l in range(k):
+                g = collected(W[l], B[l], g)
+            arrays[f"coarse{k}"] = g
+        return arrays
 
     def conditions(self):
         """{key: array} that must follow from the kernels' projectors and increments: a projector is
@@ -114,8 +161,17 @@ class SolvedTwin(Twin):
             total -= self.dt**2 * transfer.internal_force(q.V0, T, ip, self.box)
         return self.project(self.nodal(total))
 
-    def moved(self, v):
-        """`plain.step.Step` of particles and deformation under the nodal velocities v (n, d)."""
+    def after_solve(self, v):
+        """Return {key: array} of particles and deformation under the nodal velocities v (n, d).
+
+        The bodies advance.
+        """
+        arrays = self.arrays(self.advance(v.astype(self.real)), self.unknowns.index)
+        return {key: a for key, a in arrays.items()
+                if "/" in key and not key.endswith("/weights")}
+
+    def advance(self, v):
+        """Return the `plain.step.Step` under the nodal velocities v (n, d)."""
         grid = Nodes(self.box, self.m, self.mv, 0 * self.mv, self.v, self.over(v))
         both = zip(self.bodies, self.clouds)
         moved = [to_particles(q, ip, grid, self.method, self.dt) for q, ip in both]

@@ -1,64 +1,112 @@
-"""The same stages by the plain twin, in extended precision, carried on from its own states."""
+"""The stages of an explicit step by the plain twin, carried on from its own states.
+
+In extended precision it is the reference for the kernels' own error; in double precision, from
+perturbed inputs, it samples what round-off does (see `error_bounds`).
+"""
+
+from typing import NamedTuple
 
 import numpy as np
 
 from ..plain import boundary
 from ..plain.laws import kirchhoff
 from ..plain.step import Matter, Method, after, energies, step, stress
+from . import error_bounds
+from .error_bounds import size
 
 REAL = np.longdouble
 
 
-class Twin:
-    """The plain twin of a problem: it starts from the same numbers and goes its own way."""
+class TwinStep(NamedTuple):
+    """One step of a `Twin`."""
 
-    def __init__(self, problem, real=REAL):
-        self.real, self.clip = real, problem.clip
+    arrays: dict        # {key: array} of its stages, grid arrays on the nodes of the kernels
+    before: list        # of `plain.step.Matter`, before the step
+    stages: object      # `plain.step.Step`
+    contacts: dict      # {index of a node in the twin's box: its `Contact`s}
+
+
+class Twin:
+    """The plain twin of a problem: it starts from the same numbers and goes its own way.
+
+    With a random generator `rng` it has errors of up to an ulp in its state before each step, and
+    in what boundary conditions return.
+    """
+
+    def __init__(self, problem, real=REAL, rng=None):
+        self.real, self.clip, self.rng = real, problem.clip, rng
         self.gravity = problem.gravity.astype(real)
         self.method = method(problem, real)
         self.names = [body.name for body in problem.bodies]
         self.bodies = [matter(body, real) for body in problem.bodies]
 
-    def step(self, dt, nodes, contacts):
-        """Advance by dt [s]: what was seen, with grid arrays on the given nodes, and the `Step`."""
-        def conditions(v, m, box):
-            return boundary.conditioned(v, placed(contacts, box, self.real))
+    def step(self, dt, nodes, contacts, bases=None):
+        """Advance by dt [s] and return the `TwinStep`.
 
-        done = step(self.bodies, self.method, self.gravity, self.real(dt), conditions)
+        Grid arrays are those of the given nodes (M, d); weights are those of the stencils that
+        begin at bases[body name] (N, d), by default the twin's own.
+        """
+        local = {}
+
+        def conditions(v, m, box):
+            local.update(contacts_in_box(contacts, box, self.real))
+            speeds = {i: size(v[i], 0) + sum(size(c.v, 0) for c in at_node)
+                      for i, at_node in local.items()}
+            return self.with_round_off(boundary.conditioned(v, local), speeds)
+
+        if self.rng is not None:
+            self.bodies = [error_bounds.perturbed_body(q, self.rng) for q in self.bodies]
+        before = self.bodies
+        done = step(before, self.method, self.gravity, self.real(dt), conditions)
         done = done._replace(moved=[self.clipped(new) for new in done.moved])
-        self.bodies = [after(*body) for body in zip(self.bodies, done.moved, done.deformed)]
-        return self.seen(done, nodes), done
+        self.bodies = [after(*body) for body in zip(before, done.moved, done.deformed)]
+        return TwinStep(self.arrays(done, nodes, bases), before, done, local)
+
+    def with_round_off(self, after, sizes):
+        """Return nodal vectors after the conditions, with errors if the twin has some; see
+        `error_bounds.perturbed_conditions`.
+        """
+        if self.rng is None:
+            return after
+        return error_bounds.perturbed_conditions(after, sizes, self.rng)
 
     def clipped(self, new):
-        """Positions kept inside the box of the problem, if it has one."""
+        """Return the particles' new state with positions inside the box of the problem, if any."""
         return new if self.clip is None else new._replace(x=np.clip(new.x, *self.clip))
 
-    def seen(self, done, nodes):
-        """{key: array} of a step, as `stages.step` returns it."""
+    def arrays(self, done, nodes, bases=None):
+        """Return {key: array} of a step, as `kernel_stages.step` does."""
         grid = done.nodes
         fields = {"mass": grid.m, "momentum": grid.mv, "force": grid.f,
                   "velocity": grid.v_free, "velocity_bc": grid.v}
-        seen = {name: on(a, grid.box, nodes) for name, a in fields.items()}
+        arrays = {name: values_at(a, grid.box, nodes) for name, a in fields.items()}
         for k, name in enumerate(self.names):
+            base, w = done.clouds[k].node[:, 0], done.clouds[k].w
             new, shape = done.moved[k], done.deformed[k]
-            own = {"base": done.clouds[k].node[:, 0], "weights": done.clouds[k].w,
-                   "v": new.v, "x": new.x, "C": new.C, "L": new.L, "F": shape.F,
+            own = {"weights": w if bases is None else aligned(w, base, bases[name]),
+                   "v": new.v, "x": new.x, "C": new.C, "L": new.L,
                    "F_trial": shape.F_trial if shape.F.ndim == 3 else None,
-                   "y": shape.y, "tau": shape.tau,
+                   "F": shape.F, "y": shape.y, "tau": shape.tau,
                    "energy": energies(self.bodies[k], self.method, self.gravity)}
-            seen |= {f"{name}/{field}": a for field, a in own.items() if a is not None}
-        return seen
+            arrays |= {f"{name}/{field}": a for field, a in own.items() if a is not None}
+        return arrays
+
+
+def perturbed_twins(problem):
+    """Return plain twins in double precision that sample round-off (see `error_bounds`)."""
+    rng = np.random.default_rng(error_bounds.SEED)
+    return [Twin(problem, np.float64, rng) for _ in range(error_bounds.SAMPLES)]
 
 
 def method(problem, real):
-    """`Method` of the problem's scheme."""
+    """Return the `Method` of the problem's scheme in a floating type."""
     s = problem.scheme
     return Method(real(problem.dx), s.degree, s.transfer,
                   real(s.flip), real(s.rpic), real(s.mass_eps))
 
 
 def matter(body, real):
-    """`Matter` of a body, with the stress of its F."""
+    """Return the `Matter` of a body in a floating type, with the stress of its F."""
     q = body.particles
 
     def cast(a, carried=True):
@@ -70,17 +118,32 @@ def matter(body, real):
     return twin._replace(tau=kirchhoff(F, body.law) if F.ndim == 1 else stress(F, y, twin))
 
 
-def placed(contacts, box, real):
-    """Contacts by the node's index in a box, for those inside of it."""
-    at = {tuple(np.array(i) - box.first): c for i, c in contacts.items()}
+def contacts_in_box(contacts, box, real):
+    """Return the contacts by the index of the node in a box, for the nodes inside of it."""
+    by_index = {tuple(np.array(i) - box.first): c for i, c in contacts.items()}
     return {i: [c._replace(n=c.n.astype(real), v=c.v.astype(real), mu=real(c.mu)) for c in cs]
-            for i, cs in at.items() if all(0 <= k < n for k, n in zip(i, box.shape))}
+            for i, cs in by_index.items() if all(0 <= k < n for k, n in zip(i, box.shape))}
 
 
-def on(a, box, nodes):
-    """Values of an array over a box at nodes (M, d), 0 outside of it."""
+def values_at(a, box, nodes):
+    """Return the values of an array over a box at nodes (M, d), 0 outside of it."""
     i = nodes - box.first
     inside = ((i >= 0) & (i < box.shape)).all(axis=1)
     out = np.zeros((len(nodes), *a.shape[len(box.shape):]), a.dtype)
     out[inside] = a[tuple(i[inside].T)]
     return out
+
+
+def aligned(w, base, to):
+    """Return the weights w (N, S) of stencils that begin at the nodes `base` (N, d), for stencils
+    that begin at `to`: 0 where the first do not reach.
+
+    At a tie, half-way between two nodes for quadratic splines, precisions differ on where a stencil
+    begins; the weight of the node in doubt is 0.
+    """
+    d = base.shape[1]
+    width = round(w.shape[1] ** (1.0 / d))
+    offset = (to - base)[:, None] + np.indices((width,) * d).reshape(d, -1).T
+    reached = ((offset >= 0) & (offset < width)).all(axis=2)
+    k = np.moveaxis(np.clip(offset, 0, width - 1), 2, 0)
+    return np.where(reached, np.take_along_axis(w, np.ravel_multi_index(k, (width,) * d), 1), 0)

@@ -3,8 +3,8 @@
 Three runs of the same problem go side by side, each from its own states: the kernels; the kernels
 with all particles in reverse order, hence with all sums in another order; and the plain twin in
 extended precision. The reference's own error of an array is the larger of its distances to the
-other two. In units of round-off times the scale of each entry (see `scales`) it becomes one number,
-from which the tolerances follow:
+other two. In units of round-off times the scale of each entry (see `error_bounds`, for which more
+plain twins go along) it becomes one number, from which the tolerances follow:
 
     tolerance of an entry = MARGIN max(own error, 1) eps * scale of the entry
 
@@ -19,14 +19,13 @@ import numpy as np
 from ..explicit import Stepper
 from ..simulate import State, advance, ended, frame_is_due, next_dt, swiftest, update_bound
 from ..store.words import counted
-from . import kernel_stages, scaling
-from .plain_twin import Twin, placed
+from . import error_bounds, kernel_stages
+from .plain_twin import Twin, TwinStep, perturbed_twins
 from .schema import WHERE
 
 MARGIN = 8.0            # another code's errors against the reference's own
-EPS = {"f64": float(np.finfo(np.float64).eps), "f32": float(np.finfo(np.float32).eps)}
+EPS = {"f64": error_bounds.EPS, "f32": float(np.finfo(np.float32).eps)}
 UNSURE = 1e-7           # of the largest entry: a larger own error is no reference
-FLOOR = 2.0**-24        # of the largest scale: no entry's scale is taken as smaller
 
 
 class Golden(NamedTuple):
@@ -39,12 +38,12 @@ class Golden(NamedTuple):
     error: float            # the larger of both in units of eps(f64) * scale, worst entry
 
     def tolerance(self, precision):
-        """Tolerance of an entry, divided by its scale."""
+        """Return the tolerance of an entry, divided by its scale."""
         return MARGIN * max(self.error, 1.0) * EPS[precision]
 
 
 class Recorded(NamedTuple):
-    """One step."""
+    """All that a golden file holds of one step."""
 
     t: float        # at its start [s]
     dt: float
@@ -52,14 +51,14 @@ class Recorded(NamedTuple):
     bases: dict     # {body name: first node of each particle}
     arrays: dict    # {key: Golden}
     bars: dict      # {key: what the tolerance of an implicit solve adds}
-    beside: dict    # {key: what operators of an implicit step are applied to}
+    inputs: dict    # {key: what operators of an implicit step are applied to, or seeds}
     report: object  # of an implicit solve, or None
 
 
-def begun(problem, steps):
-    """(`Problem`, `State`) after so many steps of a run; the given problem's arrays stay.
+def advanced(problem, steps):
+    """Return (`Problem`, `State`) after so many steps of a run; the given problem's arrays stay.
 
-    Raises as a run does: `Unstable`, `TooLarge`.
+    Raises as a run does: `Unstable`, `TooLarge`; ValueError where the run ends before.
     """
     problem = problem_of(problem, 1)
     state = State(problem.bodies, frame=1)        # a run has shown its start by then
@@ -82,57 +81,58 @@ def run(problem, steps, state=None):
     A run stands at `state`, by default at the start of the problem. Raises ValueError for steps
     past its end, and where the reference's own error is too large to judge others by.
     """
-    sides = Sides(problem, state)
-    refuse_past_end(problem.clock, state, sides.dt, steps)
+    runs = Runs(problem, state)
+    refuse_past_end(problem.clock, state, runs.dt, steps)
     for k in range(steps):
-        yield sides.step(k)
+        yield runs.step(k)
 
 
-class Sides:
-    """The three runs side by side, from a state on, by default the start of the problem."""
+class LastStep(NamedTuple):
+    """How the runs made a step."""
+
+    exact: TwinStep     # by the plain twin in extended precision
+    samples: list       # of `TwinStep`, by the perturbed twins
+    kernels: tuple      # {key: array} of the kernels, and of those with particles reversed
+
+
+class Runs:
+    """The runs side by side, from a state on, by default the start of the problem."""
 
     def __init__(self, problem, state=None):
-        self.runs = tuple(problem_of(problem, order) for order in (1, -1))
-        self.steppers = [started(p) for p in self.runs]
-        self.twin, self.errors = Twin(problem), [{} for _ in problem.bodies]
+        self.problems = tuple(problem_of(problem, order) for order in (1, -1))
+        self.steppers = [started(p) for p in self.problems]
+        self.twin, self.perturbed = Twin(problem), perturbed_twins(problem)
+        self.volumes = {body.name: body.particles.V0 for body in problem.bodies}
         self.dt = step_length(problem, self.steppers[0], state)
         self.start = 0.0 if state is None else state.t
         self.last = None
 
+    @property
+    def count(self):
+        """The number of particles."""
+        return sum(map(len, self.volumes.values()))
+
     def step(self, k):
-        """The `Recorded` of step k, which all runs make; `last` is how."""
-        t, twin, (ours, mirrored) = self.start + k * self.dt, self.twin, self.runs
-        seen, contacts = kernel_stages.step(ours, ours.bodies, self.steppers[0], t, self.dt)
+        """Advance all runs by step k and return its `Recorded`; `last` is how they made it."""
+        t, (ours, mirrored) = self.start + k * self.dt, self.problems
+        arrays, contacts = kernel_stages.step(ours, ours.bodies, self.steppers[0], t, self.dt)
         other, _ = kernel_stages.step(mirrored, mirrored.bodies, self.steppers[1], t, self.dt)
-        before = twin.bodies
-        exact, done = twin.step(self.dt, seen["nodes"], contacts)
-        held = placed(contacts, done.nodes.box, twin.real)
-        found = scaling.of_step(twin, before, done, held, self.errors)
-        self.last = Last(before, done, held, found, self.errors, (seen, other))
-        S = scaling.listed(found, done.nodes.box, seen["nodes"])
-        for name in twin.names:
-            at = exact[f"{name}/base"], seen[f"{name}/base"]
-            exact[f"{name}/weights"] = aligned(exact[f"{name}/weights"], *at)
-            S[f"{name}/weights"] = aligned(S[f"{name}/weights"], *at)
-        other = unmirrored(other, other["nodes"], seen["nodes"])
-        arrays = {key: golden(seen[key], S[key], exact[key], other[key])
-                  for key in S if key in seen}
-        refuse_unsure(arrays, k)
-        self.errors = [{field: arrays[f"{name}/{field}"].twin for field in "xvCF"
-                        if f"{name}/{field}" in arrays} for name in twin.names]
-        bases = {name: seen[f"{name}/base"] for name in twin.names}
-        return Recorded(t, self.dt, seen["nodes"], bases, arrays, {}, {}, None)
+        bases, nodes = bases_of(arrays, self.twin.names), arrays["nodes"]
+        exact = self.twin.step(self.dt, nodes, contacts, bases)
+        samples = [twin.step(self.dt, nodes, contacts, bases) for twin in self.perturbed]
+        self.last = LastStep(exact, samples, (arrays, other))
+        S = error_bounds.scales(exact.arrays, [sample.arrays for sample in samples], self.count)
+        S = error_bounds.with_stress_error(S, self.volumes)
+        other = in_order(other, other["nodes"], nodes)
+        recorded = {key: measured(arrays[key], S[key], exact.arrays[key], other[key])
+                    for key in S if key in arrays}
+        refuse_unsure(recorded, k)
+        return Recorded(t, self.dt, nodes, bases, recorded, {}, {}, None)
 
 
-class Last(NamedTuple):
-    """How the runs made their last step."""
-
-    before: list        # the twin's bodies before it
-    done: object        # the twin's `Step`
-    contacts: dict      # by the node's index in the twin's box
-    found: dict         # {key: scale}, grid arrays over that box
-    errors: list        # of what the bodies brought into the step, see `scales.inputs`
-    seen: tuple         # {key: array} of the kernels, and of those with particles reversed
+def bases_of(arrays, names):
+    """Return {body name: first node of each particle}."""
+    return {name: arrays[f"{name}/base"] for name in names}
 
 
 def refuse_past_end(clock, state, dt, steps):
@@ -144,19 +144,6 @@ def refuse_past_end(clock, state, dt, steps):
         if ended(clock, replace(at, step=at.step + k, t=at.t + k * dt)):
             raise ValueError(f"steps = {steps}: the run ends {counted(k, 'step')} after the "
                              f"{at.step} before them; record no more, or let the scene run longer")
-
-
-def aligned(w, base, to):
-    """Weights w (N, S) of stencils that begin at the nodes base (N, d), for stencils that begin at
-    `to`: 0 where the first do not reach. At a tie, half-way between two nodes for quadratic
-    splines, precisions differ on where a stencil begins; the weight of the node in doubt is 0.
-    """
-    d = base.shape[1]
-    width = round(w.shape[1] ** (1.0 / d))
-    offset = (to - base)[:, None] + np.indices((width,) * d).reshape(d, -1).T
-    reached = ((offset >= 0) & (offset < width)).all(axis=2)
-    k = np.moveaxis(np.clip(offset, 0, width - 1), 2, 0)
-    return np.where(reached, np.take_along_axis(w, np.ravel_multi_index(k, (width,) * d), 1), 0)
 
 
 def problem_of(problem, order):
@@ -190,34 +177,24 @@ def step_length(problem, stepper, state=None):
     return next_dt(problem.clock, state, swiftest(problem, stepper, state))
 
 
-def unmirrored(seen, nodes, golden_nodes):
-    """What the reversed run saw on its nodes, in the order of the other: particles, and grid arrays
-    on the golden nodes.
+def in_order(arrays, nodes, golden_nodes):
+    """Return the arrays {key: array} of the reversed run in the order of the other.
+
+    Particles are turned; grid arrays on `nodes` become those on the golden nodes.
     """
     place = {tuple(i): k for k, i in enumerate(nodes.tolist())}
-    at = np.array([place.get(tuple(i), -1) for i in golden_nodes.tolist()])
+    index = np.array([place.get(tuple(i), -1) for i in golden_nodes.tolist()])
 
-    def turned(name, a):
-        where = WHERE.get(name)
+    def ordered(where, a):
         if where == "nodes":
-            return np.where(shaped(at >= 0, a), a[at], 0)
+            return np.where(shaped_as(index >= 0, a), a[index], 0)
         return a[::-1] if where in ("particles", "pairs") else a
 
-    return {key: turned(key.split("/")[-1], a) for key, a in seen.items()}
-
-
-def shaped(mask, a):
-    """A mask over the first axis, in as many axes as a has."""
-    return mask.reshape(-1, *(1,) * (a.ndim - 1))
-
-
-def golden(value, scale, exact, other):
-    """The `Golden` of one array, from the twin's and the reversed run's."""
-    return measured(value, floored(scale), exact, other)
+    return {key: ordered(WHERE.get(key.split("/")[-1]), a) for key, a in arrays.items()}
 
 
 def measured(value, scale, exact, other):
-    """The `Golden` of one array with the scales as they are."""
+    """Return the `Golden` of one array, from the plain twin's values and the reversed run's."""
     off_twin = abs(value - exact).astype(float)
     off_order = abs(value - other)
     unit = EPS["f64"] * np.maximum(scale, np.finfo(float).tiny)
@@ -225,13 +202,8 @@ def measured(value, scale, exact, other):
     return Golden(value, scale, float(off_twin.max()), float(off_order.max()), float(worst))
 
 
-def floored(scale):
-    """Scales that are nowhere below FLOOR times the largest."""
-    return np.maximum(scale, FLOOR * scale.max())
-
-
 def shaped_as(scale, a):
-    """Scales of entities, for arrays that have components too."""
+    """Return values of entities (N,) with the axes of an array a (N, ..) that has components."""
     return scale.reshape(scale.shape + (1,) * (a.ndim - scale.ndim))
 
 
@@ -239,7 +211,7 @@ def refuse_unsure(arrays, k):
     """Raise ValueError where an own error is not small, which a NaN is not either."""
     for key, a in arrays.items():
         own, largest = max(a.twin, a.reordered), abs(a.value).max()
-        if not own <= UNSURE * max(largest, a.scale.max()):
+        if not own <= UNSURE * max(largest, error_bounds.typical(a.scale)):
             raise ValueError(
                 f"{key} in step {k}: the reference's own error is {own:.1e}, too much beside its "
                 f"largest entry {largest:.1e} to judge others by; take another state or a smaller "

@@ -25,7 +25,7 @@ from ..hot.krylov import CGOptions, pcg
 from ..hot.linearization import matrix_product
 from ..hot.multigrid.hierarchy import hierarchy
 from ..hot.multigrid.projectors import diagonal_blocks
-from .scales import size
+from .error_bounds import size
 
 MOVE = 2.0**-36         # of the scales
 MOVES = 8               # random moves of a matrix

@@ -32,6 +32,11 @@ class Matter(NamedTuple):
     law: tuple
     flow: tuple
 
+    def cast(self, real):
+        """Return the particles in another floating type."""
+        return self._replace(**{name: a.astype(real) for name, a in self._asdict().items()
+                                if isinstance(a, np.ndarray)})
+
 
 class Method(NamedTuple):
     """Spacing [m], degree of the spline, transfer and its options, as in `explicit.Scheme`."""

@@ -8,12 +8,10 @@ from mpm_ref.core.boundary import Collider, Conditions
 from mpm_ref.core.solids import half_space
 from mpm_ref.explicit import Scheme
 from mpm_ref.materials import NoFlow
-from mpm_ref.oracle import adjoint_recording, adjoint_stages, kernel_stages, recording, scaling
-from mpm_ref.oracle.adjoint_material import Seeds
-from mpm_ref.oracle.adjoint_twin import Backwards, Stage
-from mpm_ref.oracle.plain_twin import Twin, on, placed
+from mpm_ref.oracle import adjoint_recording, adjoint_stages, kernel_stages, recording
+from mpm_ref.oracle.plain_adjoint import gradients
+from mpm_ref.oracle.plain_twin import Twin
 from mpm_ref.oracle.recording import copied
-from mpm_ref.oracle.schema import WHERE
 from mpm_ref.problem import Clock, Problem
 
 STEPS, STEP = 2, 1e-3
@@ -52,16 +50,12 @@ def seen_by(problem, steps=STEPS, order=1):
     stepper, dt, out = recording.started(problem), problem.clock.dt, []
     for k in range(steps):
         before = tuple(copied(body, 1) for body in problem.bodies)
-        seeds = [turned(adjoint_recording.seeds_of(problem, body, dt, k), order) for body in before]
+        seeds = [adjoint_recording.seeds_of(problem, body, dt, k) for body in before]
+        seeds = seeds if order == 1 else [seed.reversed() for seed in seeds]
         seen, _ = kernel_stages.step(problem, problem.bodies, stepper, k * dt, dt)
         back = adjoint_stages.step(problem, before, seen, seeds, (k * dt, dt))
         out.append(seen | back | {f"{b.name}/id": b.id for b in problem.bodies})
     return out
-
-
-def turned(seed, order):
-    """Seeds in the order of the particles, or the reverse."""
-    return Seeds(*(None if a is None else a[::order] for a in seed))
 
 
 def twin_steps(problem, real, steps=STEPS):
@@ -71,19 +65,8 @@ def twin_steps(problem, real, steps=STEPS):
     for k in range(steps):
         seeds = [adjoint_recording.seeds_of(problem, body, dt, k) for body in ours.bodies]
         seen, contacts = kernel_stages.step(ours, ours.bodies, stepper, k * dt, dt)
-        before = twin.bodies
-        _, done = twin.step(dt, seen["nodes"], contacts)
-        held, errors = placed(contacts, done.nodes.box, real), [{} for _ in before]
-        found = scaling.of_step(twin, before, done, held, errors)
-        stage = Stage(twin, before, done, found, errors, held, problem.scheme.gravity_on_empty)
-        back = Backwards(stage).seen([cast(seed, real) for seed in seeds])
-        on_nodes = [key for key in back if WHERE[key.split("/")[-1]] == "nodes"]
-        values = {key: a.value for key, a in back.items()}
-        values |= {key: on(values[key], done.nodes.box, seen["nodes"]) for key in on_nodes}
-        out.append({"nodes": seen["nodes"], **values})
+        done = twin.step(dt, seen["nodes"], contacts)
+        on_empty = problem.scheme.gravity_on_empty
+        out.append({"nodes": seen["nodes"],
+                    **gradients(twin, done, seeds, on_empty, seen["nodes"])})
     return out
-
-
-def cast(seed, real):
-    """Seeds in a floating type."""
-    return Seeds(*(None if a is None else a.astype(real) for a in seed))

@@ -76,8 +76,7 @@ def step_of(problem, golden, k, real=np.float64):
     options = accepted_step.other_method(stepper.options, golden.attrs["eps"])
     pose, dv = accepted_step.accepted_by(stepper, posed.bodies, (t, dt), options)
     seen["dv"] = dv
-    after = twin.seen(twin.moved((pose.unknowns.v + dv).astype(real)), system.index)
-    return seen | {key: a for key, a in after.items() if "/" in key}
+    return seen | twin.after_solve((pose.unknowns.v + dv).astype(real))
 
 
 def multigrid(step, system, load):

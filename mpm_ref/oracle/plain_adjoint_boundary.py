@@ -5,7 +5,6 @@ type: along one direction after the other, in the branch that `plain.boundary` t
 import numpy as np
 
 from ..plain import boundary
-from .scales import LARGEST, STEP, size
 
 
 def matrix(v, contacts):
@@ -39,29 +38,12 @@ def rubbed(v, planes, e):
     return du - grip / speed * dt - slower * t
 
 
-def before(v, S_v, contacts, bar):
-    """Bars of velocities before the conditions, and their scales, over the box.
+def before_conditions(v, contacts, bar):
+    """Return the bars of velocities before the conditions, over the box.
 
-    v (.., d) are the velocities before them with the scales S_v; bar is that of those after, a pair
-    of values and scales. How a bar changes with v is found by differences.
+    v (.., d) are the velocities before them, `bar` is that of the velocities after.
     """
-    value, S = bar[0].copy(), bar[1].copy()
+    out = bar.copy()
     for i, at_node in contacts.items():
-        A = matrix(v[i], at_node)
-        value[i] = A.T @ bar[0][i]
-        change = sum(size(bar[0][i] @ (B - A), 0) for B in moved(v[i], S_v[i], at_node))
-        rounding = 2 * (1 + sum(c.mu for c in at_node)) * size(bar[0][i], 0)    # see `scales.held`
-        S[i] = size(A, 0) * S[i] + rounding + change
-    return value, S
-
-
-def moved(v, S_v, contacts):
-    """`matrix` where v is off by its scale, as the slope there predicts it: from both sides, along
-    each axis.
-    """
-    speed, here = size(v, 0), matrix(v, contacts)
-    h = min(STEP * S_v, LARGEST * speed) if speed > 0 else STEP * S_v
-    if h > 0:
-        for e in np.eye(len(v), dtype=v.dtype):
-            for step in (h, -h):
-                yield here + (matrix(v + step * e, contacts) - here) * (S_v / h)
+        out[i] = matrix(v[i], at_node).T @ bar[i]
+    return out

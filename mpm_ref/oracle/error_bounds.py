@@ -1,0 +1,132 @@
+"""Scales of round-off: how far each entry of a stage may be off in a right code, in units of eps.
+
+A scale is measured. The plain twin makes the stages SAMPLES times in double precision, each time
+from inputs that are perturbed at random by up to an ulp; its distances to the plain twin in
+extended precision show what the rounding of inputs and of all operations does to each entry.
+Errors of first order are proportional to eps, so that the scales serve every precision.
+
+    scale of an entity = ROUNDINGS * its size + SAFETY * root mean square of its distances / eps
+
+Samples may all be rounded alike, hence the first term. An entity is a pair, a node, a particle or an entry of a sum; its size is its Euclidean norm.
+Tolerances follow from scales in `recording`.
+"""
+
+import numpy as np
+
+from ..plain.step import stress
+from .schema import WHERE
+
+EPS = float(np.finfo(np.float64).eps)
+SAMPLES = 8
+SAFETY = 16.0           # of root mean squares of so few samples
+ROUNDINGS = 4.0         # of an entry itself, in one code and not in another
+FLOOR = 2.0**-24        # of the median scale of an array: no scale is taken as smaller
+SEED = 20310
+
+
+def size(a, first=1):
+    """Return the Euclidean norms of an array's entries over all axes from `first` on."""
+    return np.sqrt((a * a).sum(axis=tuple(range(first, a.ndim))))
+
+
+def entity_size(a, where):
+    """Return the sizes of the entities of an array, `where` being that of its `schema.Array`."""
+    if where in ("body", "parameters", "step"):
+        return abs(a)
+    first = 2 if where == "pairs" else 1
+    return size(a, first) if a.ndim > first else abs(a)
+
+
+# perturbed inputs
+
+def perturbed(a, rng, sizes, ulps=1.0):
+    """Return an array (N, ..) with random errors of up to so many ulps of `sizes` (N,)."""
+    if a is None:
+        return None
+    scale = np.reshape(sizes, (-1,) + (1,) * (a.ndim - 1))
+    noise = EPS * ulps * scale * rng.uniform(-1.0, 1.0, a.shape)
+    return a + noise.astype(a.dtype)
+
+
+def perturbed_body(q, rng, ulps=1.0):
+    """Return a body of the plain twin whose state, masses and volumes have random errors.
+
+    Errors are of up to so many ulps of the size of each particle's entry: zeros stay zero. The
+    stress is that of the perturbed state.
+    """
+    arrays = {name: a for name, a in q._asdict().items() if isinstance(a, np.ndarray)}
+    q = q._replace(**{name: perturbed(a, rng, size(a[:, None]), ulps)
+                      for name, a in arrays.items()})
+    return q._replace(tau=stress(q.F, q.y, q))
+
+
+def perturbed_conditions(after, sizes, rng):
+    """Return nodal vectors after the boundary conditions with errors of up to an ulp of `sizes`,
+    {index of a node: size of what enters its conditions}.
+
+    A condition takes components away; what it leaves of them is round-off of another size in every
+    code, and exactly 0 in some.
+    """
+    after = after.copy()
+    for i, entering in sizes.items():
+        after[i] = perturbed(after[i], rng, np.full(len(after[i]), entering))
+    return after
+
+
+# scales
+
+def scale(exact, samples, where, count=1):
+    """Return the scale of each entity of an array, from its exact values and samples of it.
+
+    `count` is the number of terms of what is summed over all particles or nodes: another code may
+    add them one by one.
+    """
+    own = ROUNDINGS * entity_size(exact, where).astype(float)
+    if where in ("body", "parameters", "step"):
+        own = np.sqrt(count) * own
+    return own + SAFETY * deviation(exact, samples, where)
+
+
+def deviation(exact, samples, where):
+    """Return the root mean squares of the samples' distances to the exact values, over eps."""
+    off = [entity_size((a - exact).astype(float), where) / EPS for a in samples]
+    return np.sqrt(np.mean(np.square(off), axis=0))
+
+
+def scales(exact, samples, count=1):
+    """Return {key: scale} of all arrays {key: array} of a step, from samples of the same arrays."""
+    found = {key: scale(a, [sample[key] for sample in samples], where_of(key), count)
+             for key, a in exact.items()}
+    return {key: S if where_of(key) == "parameters" else floored(S) for key, S in found.items()}
+
+
+def where_of(key):
+    """Return on what the array of a key lies: "nodes", "particles", .. (see `schema.Array`)."""
+    return WHERE[key.split("/")[-1]]
+
+
+def floored(S):
+    """Return scales none of which is below FLOOR times the median of those that are not 0."""
+    positive = S[S > 0.0]
+    return np.maximum(S, FLOOR * np.median(positive)) if positive.size else S
+
+
+def typical(S):
+    """Return the median of the scales that are not 0, or 0 if all are."""
+    positive = S[S > 0.0]
+    return float(np.median(positive)) if positive.size else 0.0
+
+
+def with_stress_error(S, volumes):
+    """Return scales {key: scale} in which each body's elastic energy has an error of first order.
+
+    At rest the energy is at its minimum, and samples in double precision show an error of second
+    order; in single precision that is larger. A stress that is off by its scale moves the energy by
+    that at a strain of 1. `volumes` has the rest volumes (N,) of each body.
+    """
+    S = dict(S)
+    for name, V0 in volumes.items():
+        energy = S[f"{name}/energy"].copy()
+        energy[1] += (V0 * S[f"{name}/tau"]).sum()
+        S[f"{name}/energy"] = energy
+    return S
