@@ -1,18 +1,38 @@
-"""The accepted step: solved tightly, with a bar for all that the scene's own tolerance admits."""
+"""The accepted step: solved tightly, with a bar for all that the scene's own tolerance admits.
+
+An accepted increment is any with ||g^||_2 <= eps sqrt(n) (HOT-eq9). Two correct codes differ by all
+that this admits: to first order dv is off by H^-1 g, so that its entry i may be off by
+
+    eps sqrt(n) ||row i of H^-1 K||_2,        K = diag(kappa),
+
+since a gradient may be concentrated where it hurts entry i most. The norms of the rows, and of what
+follows linearly from dv, are those of H^-1 K z over random z of unit variance.
+
+As it stands this admits any velocity at the rim, where a node has a millionth of the matter but the
+kappa of its stiffness. No code leaves such a gradient there: a gradient is a sum over the node's
+particles, and what a solve leaves of the energy g.H^-1 g is spread over all nodes. So the gradient
+of a node counts at most by sqrt(D_i / mean D), D the size of its diagonal block: then all nodes may
+hold as much energy. It is an assumption, and each file tests it on two methods.
+"""
 
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from ..hot.krylov import CGOptions, pcg
+from ..hot.linearization import matrix_product
 from ..hot.methods import METHODS, SolverOptions
+from ..hot.multigrid.hierarchy import hierarchy
 from ..hot.multigrid.options import CycleOptions
-from . import sampled
-from .error_bounds import size
+from ..hot.multigrid.projectors import diagonal_blocks
+from .error_bounds import size, spread_of
 from .implicit_stages import after
 
 CLOSER = 1e-3       # the golden increment's tolerance, of the scene's
 ROOM = 2.0          # others may be so much farther off than the two methods seen
+SAMPLES = 16        # of the increments that a tolerance admits
+TIGHT = 0.03        # of the linear solves, in the energy: samples are worth no more
 FAR = 4.0           # bars: two solutions farther apart are not the same minimum
 
 
@@ -44,11 +64,11 @@ def solve(stepper, bodies, dt, S_g, t):
     second = tightly(stepper, bodies, (t, dt), other_method(options, tight.eps))[1]
     system = stepper.system(pose)
     A = system.matrix(dv)
-    weight, factor = sampled.admitted(options, pose.kappa, A)
-    samples = sampled.increments(system, A, weight, 1)
-    bar = factor * sampled.spread_of([size(s) for s in samples])
-    rounded = sampled.increments(system, A, S_g, 2)
-    S = size(dv) + sampled.spread_of([size(s) for s in rounded])
+    weight, factor = admitted(options, pose.kappa, A)
+    samples = increments(system, A, weight, 1)
+    bar = factor * spread_of([size(s) for s in samples])
+    rounded = increments(system, A, S_g, 2)
+    S = size(dv) + spread_of([size(s) for s in rounded])
     near, again = (abs(u - dv) for u in (accepted, second))
     worst = max(ratio(size(off), bar + 8 * np.finfo(float).eps * S) for off in (near, again))
     if worst > FAR:
@@ -112,9 +132,36 @@ def bars(problem, copies, pose, solved, dt):
         there = after(problem, copies(), pose, v + s, dt)
         for key, a in there.items():
             moves[key].append(size((a - here[key])[:, None]))
-    return {key: solved.factor * sampled.spread_of(m) for key, m in moves.items()}
+    return {key: solved.factor * spread_of(m) for key, m in moves.items()}
 
 
 def options_of(problem):
     """The options of an implicit problem's solver."""
     return SolverOptions() if problem.solver is None else problem.solver
+
+
+# what a tolerance admits
+
+def solver(A, index, levels=3):
+    """b -> A^+ b by CG with the V-cycle, for many right-hand sides."""
+    cycle = hierarchy(A, index, levels, coarsest="direct").cycle
+    rule = CGOptions(lambda size: TIGHT)
+    return lambda b: pcg(matrix_product(A), b, cycle, rule).x
+
+
+def increments(system, A, weight, seed):
+    """SAMPLES random increments (n, d) [m/s]: A^+ of gradients with the sizes weight (n,)."""
+    rng, solve = np.random.default_rng(seed), solver(A, system.index)
+    return [solve(system.project(weight[:, None] * rng.normal(size=system.start.shape)))
+            for _ in range(SAMPLES)]
+
+
+def admitted(options, kappa, A):
+    """(weights (n,) [kg m/s], factor): the gradients that the tolerance of the options admits, for
+    the Hessian A, are those of ||g / weights||_2 <= factor.
+    """
+    D = size(diagonal_blocks(A))
+    share = np.minimum(1.0, np.sqrt(D / D.mean()))
+    if options.norm == "L2":
+        return options.eps * share, 1.0
+    return options.eps * kappa * share, np.sqrt(len(kappa))

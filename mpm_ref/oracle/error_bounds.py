@@ -7,12 +7,14 @@ Errors of first order are proportional to eps, so that the scales serve every pr
 
     scale of an entity = ROUNDINGS * its size + SAFETY * root mean square of its distances / eps
 
-Samples may all be rounded alike, hence the first term. An entity is a pair, a node, a particle or an entry of a sum; its size is its Euclidean norm.
-Tolerances follow from scales in `recording`.
+Samples may all be rounded alike, hence the first term. An entity is a pair, a node, a particle or
+an entry of a sum; its size is its Euclidean norm. Tolerances follow from scales in `recording`.
 """
 
 import numpy as np
+import scipy.sparse as sp
 
+from ..hot.multigrid.projectors import diagonal_blocks
 from ..plain.step import stress
 from .schema import WHERE
 
@@ -22,6 +24,9 @@ SAFETY = 16.0           # of root mean squares of so few samples
 ROUNDINGS = 4.0         # of an entry itself, in one code and not in another
 FLOOR = 2.0**-24        # of the median scale of an array: no scale is taken as smaller
 SEED = 20310
+MATRIX_STEP = 2.0**-36   # of the scales of a matrix: its perturbations
+MATRIX_SAMPLES = 8
+FEW = 2.0               # of root mean squares of samples of solutions
 
 
 def size(a, first=1):
@@ -130,3 +135,37 @@ def with_stress_error(S, volumes):
         energy[1] += (V0 * S[f"{name}/tau"]).sum()
         S[f"{name}/energy"] = energy
     return S
+
+
+# approximate inverses, which have no plain twin: the matrix and the right-hand side are perturbed
+
+def spread_of(samples):
+    """Return FEW times the root mean square, over the first axis, of sizes of entities."""
+    return FEW * np.sqrt(np.mean([s * s for s in samples], axis=0))
+
+
+def perturbed_matrix(A, B, rng):
+    """Return B (A + MATRIX_STEP Z) B, with Z symmetric and its blocks of the size of sqrt(D_i D_j).
+
+    By Cauchy and Schwarz no sum over particles has larger terms.
+    """
+    n, d = len(B), B.shape[1]
+    root = np.sqrt(size(diagonal_blocks(A)))
+    row = np.repeat(np.arange(n), np.diff(A.indptr))
+    Z = (root[row] * root[A.indices])[:, None, None] * rng.normal(size=(len(row), d, d))
+    Z = np.einsum("kab,kbc,kcd->kad", B[row], Z, B[A.indices])
+    Z = sp.bsr_array((Z, A.indices, A.indptr), shape=A.shape)
+    off = sp.bsr_array(A + MATRIX_STEP / np.sqrt(2.0) * (Z + Z.T), blocksize=(d, d))
+    off.sort_indices()
+    return off
+
+
+def scale_of_solve(solve, system, A, b, S_b):
+    """Return the scale (n,) of solve(A, b), for a right-hand side b (n, d) with the scale S_b (n,)."""
+    rng, exact = np.random.default_rng(0), solve(A, b)
+    changes = []
+    for _ in range(MATRIX_SAMPLES):
+        db = MATRIX_STEP * S_b[:, None] * system.project(rng.normal(size=b.shape))
+        perturbed_solution = solve(perturbed_matrix(A, system.unknowns.B, rng), b + db)
+        changes.append(size(perturbed_solution - exact) / MATRIX_STEP)
+    return size(exact) + spread_of(changes)

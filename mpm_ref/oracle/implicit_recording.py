@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from . import accepted_step, error_bounds, implicit_stages, sampled
+from . import accepted_step, error_bounds, implicit_stages
 from .error_bounds import size
 from .implicit_twin import SolvedTwin
 from .recording import (
@@ -148,10 +148,10 @@ class Step:
         """
         system, A, options, load = self.ours.system, self.ours.A, self.options, self.operands.load
         return {
-            "cycle": lambda: error_bounds.floored(sampled.scale(
+            "cycle": lambda: error_bounds.floored(error_bounds.scale_of_solve(
                 lambda A, b: implicit_stages.grids_of(A, system.index, options).cycle(b),
                 system, A, load, size(load))),
-            "direction": lambda: error_bounds.floored(sampled.scale(
+            "direction": lambda: error_bounds.floored(error_bounds.scale_of_solve(
                 lambda A, g: implicit_stages.direction(system, A, g, options),
                 system, A, self.ours.g, S_g)),
         }
