@@ -161,7 +161,7 @@ def perturbed_matrix(A, B, rng):
 
 
 def scale_of_solve(solve, system, A, b, S_b):
-    """Return the scale (n,) of solve(A, b), for a right-hand side b (n, d) with the scale S_b (n,)."""
+    """Return the scale (n,) of solve(A, b), for b (n, d) with the scale S_b (n,)."""
     rng, exact = np.random.default_rng(0), solve(A, b)
     changes = []
     for _ in range(MATRIX_SAMPLES):
