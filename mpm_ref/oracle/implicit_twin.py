@@ -138,8 +138,8 @@ class SolvedTwin(Twin):
         E, g = potential.evaluate(bodies, self.m, self.v, self.over(dv), self.dt, self.gravity)
         return np.array([E]), self.project(self.nodal(g))
 
-    def free(self, u):
-        """B u."""
+    def project(self, u):
+        """Return B u."""
         return np.einsum("nab,nb->na", self.B, u)
 
     def at(self, dv):
