@@ -124,7 +124,8 @@ class Step:
                           for each in (twin, *samples))
         S = error_bounds.scales(exact, others, count) | self.condition_scales(exact, others)
         if self.options.start == "gravity":
-            exact["start"] = exact["start"] + twin.project(0 * exact["start"] + twin.dt * twin.gravity)
+            fall = 0 * exact["start"] + twin.dt * twin.gravity
+            exact["start"] = exact["start"] + twin.project(fall)
         other = self.by_the_other_side()
         for name, scale in self.solve_scales(S["gradient_start"]).items():
             if name in values:

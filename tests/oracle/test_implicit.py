@@ -119,7 +119,7 @@ def test_methods_without_the_v_cycle_have_fewer_stages(problem, word, tmp_path):
 
 
 def test_a_step_that_is_not_solved_is_refused(problem, tmp_path):
-    capped = replace(problem, solver=replace(METHODS["hot"], iterations=1))
+    capped = replace(problem, solver=replace(METHODS["hot"], max_iterations=1))
     with pytest.raises(ValueError, match="the implicit step was not solved: 1 iterations, the cap"):
         oracle.record(capped, tmp_path / "golden.h5", 1)
     assert not list(tmp_path.iterdir())
