@@ -16,7 +16,7 @@ from .common.registry import discover, select
 from .common.report import write_report
 from .common.results import RESULTS, ROOT, ProfileResults
 from .common.run import RunSetting, run_all
-from .common.status import status_table, with_status
+from .common.status import status_table
 from .fingerprint.command import app as fingerprint
 
 app = typer.Typer(help=__doc__, add_completion=False, no_args_is_help=True,
@@ -81,14 +81,9 @@ def report(profile: Profile = "quick", results: Folder = RESULTS):
 
 
 @app.command()
-def status(profile: Profile = "standard", results: Folder = RESULTS, write: bool = False):
-    """Print README's status table, or write it into README.md."""
-    table = status_table(ProfileResults(results / profile), targets.load())
-    if not write:
-        typer.echo(table)
-        return
-    readme = ROOT / "README.md"
-    readme.write_text(with_status(readme.read_text(encoding="utf-8"), table), encoding="utf-8")
+def status(profile: Profile = "standard", results: Folder = RESULTS):
+    """Print the verdicts of all experiments as a Markdown table."""
+    typer.echo(status_table(ProfileResults(results / profile), targets.load()))
 
 
 def _write_report(folder, profile, printed):

@@ -1,12 +1,10 @@
-"""The README's table "paper -> experiment -> status", generated from published results."""
+"""The table "paper, experiment, status" of published results, in Markdown."""
 
 from .report import chapters
 
-BEGIN, END = "<!-- status:begin -->", "<!-- status:end -->"
-
 
 def status_table(results, targets):
-    """The table in Markdown; says so where there are no results."""
+    """Return the table, or a sentence where there are no results."""
     if not results.ids():
         return "No results are published yet; `make reproduce` makes those of the quick profile."
     lines = ["| paper | experiment | status |", "|---|---|---|"]
@@ -28,12 +26,3 @@ def _counts(rows):
     verdicts = [row.verdict for row in rows]
     shown = [f"{verdicts.count(v)} {v}" for v in ("pass", "miss", "info") if v in verdicts]
     return ", ".join(shown)
-
-
-def with_status(readme, table):
-    """The README's text with `table` between the two markers; ValueError where they are missing."""
-    head, begin, rest = readme.partition(BEGIN)
-    _, end, tail = rest.partition(END)
-    if not begin or not end:
-        raise ValueError(f"README has no lines {BEGIN} and {END}; add them where the table belongs")
-    return f"{head}{BEGIN}\n{table}\n{END}{tail}"

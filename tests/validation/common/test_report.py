@@ -1,4 +1,4 @@
-"""The report, the figures in it, and README's status table, from toy results."""
+"""The report, the figures in it, and the status table, from toy results."""
 
 import io
 import re
@@ -13,9 +13,8 @@ from figures.frame import Drawn, draw_all
 from validation import ProfileResults
 from validation.common.registry import Experiment
 from validation.common.report import chapters, preview, write_report
-from validation.common.results import RESULTS, ROOT
 from validation.common.run import RunSetting, run_all
-from validation.common.status import BEGIN, END, status_table, with_status
+from validation.common.status import status_table
 from validation.common.targets import Target, load
 
 
@@ -241,18 +240,3 @@ def test_unknown_figure_is_refused(folder, scripts):
 def test_status_table(folder):
     assert status_table(ProfileResults(folder), TARGETS).splitlines()[2:] == [
         "| NSF | `nsf.bread` | 2 pass, 1 miss |", "| NSF |  | not yet: 1 printed result |"]
-
-
-def test_status_is_put_between_the_markers():
-    readme = f"# A\n{BEGIN}\nold\n{END}\ntail\n"
-    assert with_status(readme, "new") == f"# A\n{BEGIN}\nnew\n{END}\ntail\n"
-    with pytest.raises(ValueError, match="README has no lines"):
-        with_status("# A\n", "new")
-
-
-def test_readme_is_current():
-    """Where results are published, README shows them: `python -m validation status --write`."""
-    published = ProfileResults(RESULTS / "standard")
-    if published.ids():
-        readme = (ROOT / "README.md").read_text(encoding="utf-8")
-        assert readme == with_status(readme, status_table(published, load()))
