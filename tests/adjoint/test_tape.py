@@ -30,6 +30,7 @@ print(json.dumps({f"{t}{k}": order(dive(t, k), (1, 3), 1e-3 * 0.5**np.arange(4))
 """
 
 
+@pytest.mark.slow
 def test_rollout():
     """Elastic and hardening bodies on one grid, in the whole state and all parameters; y goes along
     with tau_y, as in a body that is made with another one.

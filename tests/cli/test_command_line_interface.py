@@ -16,7 +16,7 @@ from small_runs import colliding
 
 from mpm_ref import __version__
 from mpm_ref.cli.run import Bar, Request
-from mpm_ref.simulate import State
+from mpm_ref.simulate import State, start
 from mpm_ref.store import atomic
 from mpm_ref.store.checkpoint import BadCheckpoint, summary
 from mpm_ref.store.results import Results
@@ -281,7 +281,7 @@ def test_time_left_is_counted_from_the_first_step(monkeypatch):
     monkeypatch.setattr(sys, "stderr", Terminal())
     problem = colliding()
     with Bar(Request("two blocks", Path("run.h5"))) as watch:
-        watch.begin(problem, None)
+        watch.begin(problem, start(problem, problem.stepper()))
         watch.bar.start_t -= 1000.0                     # as if kernels had compiled for so long
         watch.step(State(problem.bodies, step=1, t=5e-4), 5e-4)
         assert watch.bar.format_dict["elapsed"] < 100.0

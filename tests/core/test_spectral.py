@@ -293,7 +293,7 @@ def digits(d):
 
 
 def test_plain_python_gives_the_same_bits():
-    code = "import test_spectral as t; print(t.digits(2)); print(t.digits(3))"
-    env = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": f"{ROOT / 'tests'}:{ROOT}"}
+    code = "from tests.core import test_spectral as t; print(t.digits(2)); print(t.digits(3))"
+    env = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": f"{ROOT / 'tests/support'}:{ROOT}"}
     plain = subprocess.check_output([sys.executable, "-c", code], env=env, text=True)
     assert plain.splitlines() == [digits(2), digits(3)]

@@ -170,7 +170,7 @@ def test_bodies_of_task_c_are_run_with_baselines(tmp_path, monkeypatch):
 def test_runs_that_broke_down_are_told(tmp_path):
     notes = {}
     run = SimpleNamespace(
-        experiment=SimpleNamespace(id="e"), folder=tmp_path, kept=lambda name, make: make(),
+        experiment=SimpleNamespace(id="e"), folder=tmp_path, cached=lambda name, make: make(),
         progress=lambda items, said: items,
         record=lambda target, value, note, **rule: notes.update({target: note}))
     x = np.zeros((2, 5, 3))

@@ -33,6 +33,7 @@ def test_largest_velocity_is_that_of_a_particle(case):
     assert q.potential.largest_velocity(q.w) == pytest.approx(farthest, rel=1e-13)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("word", sorted(METHODS))
 def test_every_method_holds_the_error_that_is_asked(word, step):
     system, exact = step

@@ -70,7 +70,7 @@ def test_a_sound_file_of_something_else_is_told(tmp_path, said, change):
 def test_laws_and_simulators_are_not_taken_for_each_other(tmp_path):
     path = tmp_path / "a.npz"
     of_laws.save(path, laws(3))
-    refused(load, path, "its format, 1, is that of maps, laws or stress fields; name another file")
+    refused(load, path, "its format, 1, is that of laws; name another file")
     save(path, toys.simulator())
     with pytest.raises(ValueError, match=r"a\.npz holds no trained laws, format 1: its "
                                          "format, gnn 1, is that of graph networks; name another"):

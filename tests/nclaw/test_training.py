@@ -55,6 +55,7 @@ def bits(session):
 
 # Epochs.
 
+@pytest.mark.slow
 def test_training_lowers_the_error(run):
     recipe = replace(SHORT, epochs=40, last=3)
     history = train(recipe, laws(), *run).history

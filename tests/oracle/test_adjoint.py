@@ -45,6 +45,7 @@ def checked(golden, tmp_path):
 
 # what is recorded
 
+@pytest.mark.slow
 @pytest.mark.parametrize("run", [impact, splash, dive])
 def test_the_stages_end_in_the_adjoint_of_the_step_to_the_bit(run):
     problem = recording.problem_of(problem_of(run()), 1)

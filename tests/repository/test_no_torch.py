@@ -12,7 +12,7 @@ BLOCKED = "import sys; sys.modules['torch'] = None\n"        # any `import torch
 IMPORT_ALL = BLOCKED + """
 import importlib, pkgutil, mpm_ref
 for module in pkgutil.walk_packages(mpm_ref.__path__, "mpm_ref."):
-    if ".learn" not in module.name:
+    if ".train" not in module.name:
         importlib.import_module(module.name)
 """
 HELP = BLOCKED + """

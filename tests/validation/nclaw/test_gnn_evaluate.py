@@ -155,7 +155,7 @@ def test_weights_of_graph_networks_are_found_by_name(folder):
 
 def test_weights_that_are_not_there_or_of_another_training_are_told(folder):
     with pytest.raises(Untrained, match=r"^no weights sand-gnn-10\.npz: python -m "
-                                             r"validation\.train_laws sand-gnn-10$"):
+                                             r"validation\.training\.nclaw sand-gnn-10$"):
         trained("sand-gnn-10")
     about = identity(trained_laws.nets()["sand-gnn"])
     save(folder / "sand-gnn-10.npz", toys.simulator()._replace(about=about))
