@@ -105,7 +105,7 @@ def test_what_is_no_number_is_not_held(step):
 
 @pytest.mark.parametrize("cells", [-1.0, np.inf, np.nan])
 def test_impossible_errors_are_refused(cells):
-    with pytest.raises(ValueError, match=r"cells = .*expected"):
+    with pytest.raises(ValueError, match=r"displacement_tolerance = .*expected"):
         options_of("hot", displacement_tolerance=cells)
 
 

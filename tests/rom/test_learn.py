@@ -172,7 +172,7 @@ def training(**kw):
 
 
 def bits(trained):
-    arrays = (*trained.field.net, *trained.field.units, trained.xhat, trained.history)
+    arrays = (*trained.decoder.net, *trained.decoder.units, trained.xhat, trained.history)
     return [a.tobytes() for a in arrays]
 
 
@@ -189,7 +189,7 @@ def test_training_lowers_every_term(kind, monkeypatch):
     assert found.xhat.shape == (3, 5, 2)
     assert (found.history[-1] < [0.1, 0.1, 0.4, 0.1] * found.history[0]).all()
     for k in (3, 4):
-        x = found.field.place(snapshots.X, found.xhat[2, k])
+        x = found.decoder.place(snapshots.X, found.xhat[2, k])
         assert displacement_error(x, snapshots.x[2, k], snapshots.X) < 0.4
 
 
@@ -211,7 +211,7 @@ def test_units_are_those_of_the_training_runs():
     assert bits(one) == bits(other)
     u = (snapshots.x - snapshots.X)[[0, 2, 3]].reshape(-1, 2)
     expected = (snapshots.X.min(axis=0), np.ptp(snapshots.X, axis=0), u.mean(axis=0), u.std(axis=0))
-    assert np.array(one.field.units) == pytest.approx(np.array(expected))
+    assert np.array(one.decoder.units) == pytest.approx(np.array(expected))
 
 
 def test_the_exported_decoder_is_the_trained_one(kind):
@@ -222,7 +222,7 @@ def test_the_exported_decoder_is_the_trained_one(kind):
     assert found.xhat[1, 1] == pytest.approx(xhat[0].numpy(), rel=1e-5)
     y = session.f((session.data.X - scales.low) / scales.span, xhat.repeat(len(X), 1)).detach()
     place = X + (scales.mean + scales.std * y).numpy()
-    assert found.field.place(X, found.xhat[1, 1]) == pytest.approx(place, abs=1e-6)
+    assert found.decoder.place(X, found.xhat[1, 1]) == pytest.approx(place, abs=1e-6)
 
 
 def test_the_rate_falls_from_the_fastest_to_the_slowest():
@@ -235,7 +235,7 @@ def test_the_rate_is_that_of_the_share_of_all_steps(monkeypatch):
     progress = []
     monkeypatch.setitem(schedule.SCHEDULES, "cosine",
                         lambda share: progress.append(share) or 0.0)
-    one, seven = (train_decoder(training(epochs=k), stretching()).field.net.W for k in (1, 7))
+    one, seven = (train_decoder(training(epochs=k), stretching()).decoder.net.W for k in (1, 7))
     assert progress[3:] == pytest.approx(np.arange(21) / 21)      # three batches in an epoch
     assert np.array_equal(one, seven)
 

@@ -93,7 +93,7 @@ def overview(rows, method, count, nodes):
     cpu, n = sum(r.cpu for r in own), len(own)
     return Overview(own[0].scene, method, count, nodes, n, cpu / sum(r.cpu for r in hot),
                     max(ratios), cpu / n, sum(r.iterations for r in own) / n,
-                    sum(r.cg_iterations for r in own) / n, sum(not r.converged for r in own))
+                    sum(r.inner for r in own) / n, sum(not r.converged for r in own))
 
 
 def compiled(methods):

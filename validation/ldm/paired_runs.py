@@ -35,7 +35,7 @@ class Pair(NamedTuple):
     @property
     def size(self):
         """How much was run, in words."""
-        n, steps = len(self.case.X), self.case.problem.clock.steps
+        n, steps = len(self.ldm_full_model.X), self.ldm_full_model.problem.clock.steps
         samples = "all points" if self.samples == n else f"{self.samples} samples"
         return f"{n} particles, {steps} steps, {samples}"
 

@@ -100,7 +100,7 @@ class Online:
         if self.ended:
             return
         try:
-            (latent, report), spent = clocked(lambda: next(self.states))
+            (_, latent, report, _), spent = clocked(lambda: next(self.states))
         except BREAKDOWNS:
             self.ended = True
             return

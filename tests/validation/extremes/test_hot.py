@@ -46,7 +46,7 @@ def test_sound_solves_pass_and_leave_the_bodies_alone():
     (lambda dv, r: (100.0 * dv, r), "energy rose"),
     (lambda dv, r: (np.nan * dv, r), "increment not finite"),
     (lambda dv, r: (dv, r._replace(converged=False, message="")), "no reason given"),
-    (lambda dv, r: (dv, r._replace(max_iterations=501)), "more iterations than its caps"),
+    (lambda dv, r: (dv, r._replace(iterations=501)), "more iterations than its caps"),
     (lambda dv, r: (dv, r._replace(evaluations=10**6)), "more evaluations than its caps"),
 ])
 def test_unsound_solves_are_named(monkeypatch, change, said):

@@ -121,7 +121,7 @@ def test_the_watch_knows_the_trained_range(net):
 
 def test_samples_in_one_place_are_told(net):
     near = np.argsort(ldm_full_model(GRAVITY.scene(1.0)).X[:, 0])[:50]
-    found = fallen(net, 7.5, pick=lambda t: near)
+    found = fallen(net, 7.5, pick=lambda t, latent: near)
     assert found.error > 5.0
     assert found.flags == "coverage"
 

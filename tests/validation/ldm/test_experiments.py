@@ -70,7 +70,8 @@ def test_weights_of_another_training_are_refused(folder, key):
     assert networks.trained("gravity-r2").field.r == 2
     networks.trained.cache_clear()
     save(folder / "gravity-r2.npz", Model(*model[:3], {**model.about, key: "other"}))
-    with pytest.raises(ValueError, match=r"of .*'other'.*: python -m validation\.train gravity-r2"):
+    with pytest.raises(
+            ValueError, match=r"of .*'other'.*: python -m validation\.training\.ldm gravity-r2"):
         networks.trained("gravity-r2")
 
 

@@ -125,7 +125,7 @@ def test_the_affine_map_is_a_map_of_a_study_too(fall):
 
 def test_a_region_that_was_let_go_asks_for_no_samples():
     one = ldm_full_model(POKES.scene(0.0))
-    assert [len(one.held(t)) for t in (0.0, 0.24, 0.26, 1.0)] == [2, 2, 1, 1]
+    assert [len(one.constrained_points(t)) for t in (0.0, 0.24, 0.26, 1.0)] == [2, 2, 1, 1]
 
 
 @pytest.mark.parametrize(("scene", "said"), [

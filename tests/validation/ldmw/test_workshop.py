@@ -141,7 +141,7 @@ def test_samples_of_a_push_are_held_pushed_and_free():
     one = ldm_full_model(PUSHES.scene(*PUSHES.mu[0]))
     samples = poke.samples(one, 0)
     assert len(samples) == poke.HYPER
-    assert [len(np.intersect1d(samples, group)) >= 5 for group in one.held(0.0)] == [True, True]
+    assert [len(np.intersect1d(samples, group)) >= 5 for group in one.constrained_points(0.0)] == [True, True]
     assert set(samples) != set(poke.samples(one, 1))
 
 
@@ -153,7 +153,7 @@ def test_weights_of_another_training_are_refused(tmp_path, monkeypatch, key, val
     assert model.about["latent"] == "free"
     save(tmp_path / "shear17.npz", model._replace(about={**model.about, key: value}))
     monkeypatch.setattr(networks, "FOLDER", tmp_path)
-    with pytest.raises(ValueError, match=r"shear17\.npz are of .*train shear17"):
+    with pytest.raises(ValueError, match=r"shear17\.npz are of .*training\.ldm shear17"):
         networks.trained.__wrapped__("shear17")
 
 

@@ -135,7 +135,7 @@ def test_samples_of_a_study_may_be_those_of_cells(cube):
     chosen, = cube.study._replace(by_cell=True).chosen(one, 5, 1, cube.fields)
     expected = cell_samples(cube.fields, one.problem, len(one.X), 5, 1)
     assert np.array_equal(chosen.points, expected.points)
-    assert np.array_equal(chosen.weights, expected.w)
+    assert np.array_equal(chosen.weights, expected.weights)
     plain, = cube.study._replace(by_cell=True).chosen(one, 5, 1)
     assert plain.weights is None
 

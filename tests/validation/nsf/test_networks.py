@@ -199,4 +199,4 @@ def test_weights_of_samples_are_those_of_modes_of_the_same_runs(folder):
     one._replace(study=Spy(*STUDY)).errors(0.45, 20, 1, weighed=True)
     (found,), = asked
     assert np.array_equal(found.points, expected.points)
-    assert found.weights == pytest.approx(expected.w)
+    assert found.weights == pytest.approx(expected.weights)

@@ -53,7 +53,7 @@ def test_runs_are_those_of_the_study_at_its_spacing():
 def test_no_run_is_kept_beside_what_is_made_of_it(monkeypatch):
     """They are joined one by one, each before the next is made."""
     made, kept = [], []
-    monkeypatch.setattr(nsf, "history", lambda scene, mu, *_: made.append(*mu) or mu)
+    monkeypatch.setattr(nsf, "simulate_history", lambda scene, mu, *_: made.append(*mu) or mu)
 
     def joined(runs, count):
         assert count == len(STUDY.train)
@@ -101,7 +101,7 @@ def test_a_training_that_was_cut_off_goes_on(places, monkeypatch):
     nsf.main(["jelly"], *places)
     assert seen[9:] == [("h", 3), ("h", 4), ("h", 5), *(("l", k) for k in range(1, 5))]
     again = trained("jelly")
-    for one, other in zip((whole.g, whole.h, whole.l), (again.g, again.h, again.l), strict=True):
+    for one, other in zip(whole.field, again.field, strict=True):
         assert np.array_equal(one.net.W, other.net.W)
 
 

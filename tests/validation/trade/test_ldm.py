@@ -101,8 +101,8 @@ def test_choices_differ_from_the_base_in_one_thing():
     for way in ways:
         other = [name for name in RunOptions._fields
                  if getattr(way, name) != getattr(ldm.BASE, name)]
-        if set(other) != {"velocity", "close", "precision"} | set(other) & {"points"}:
-            assert len(other) <= 1 or set(other) == {"close", "precision"}
+        if set(other) != {"velocity", "preimage_tolerance", "precision"} | set(other) & {"points"}:
+            assert len(other) <= 1 or set(other) == {"preimage_tolerance", "precision"}
 
 
 def test_longer_steps_meet_the_same_answer_at_their_times():

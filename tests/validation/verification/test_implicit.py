@@ -29,7 +29,7 @@ def test_every_method_solves_to_the_same_tolerance():
 
 def test_course_says_which_solves_did_not_converge():
     assert displaced(implicit("pn-pcg"), 1).missed == []
-    missed = displaced(implicit("pn-pcg", iterations=1), 2).missed
+    missed = displaced(implicit("pn-pcg", max_iterations=1), 2).missed
     assert len(missed) == 2
     assert "the cap" in missed[0]
 
