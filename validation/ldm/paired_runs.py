@@ -23,7 +23,7 @@ ERROR_POINTS = 4000         # points that errors are of, at most
 class Pair(NamedTuple):
     """A reduced run beside the full one."""
 
-    ldm_full_model: FullModel              # that was run
+    full_model: FullModel              # that was run
     X: np.ndarray           # (n, d) points at rest that are shown [m]
     reduced: np.ndarray     # (shots, n, d) their positions [m]
     full: np.ndarray        # (shots, n, d)
@@ -35,7 +35,7 @@ class Pair(NamedTuple):
     @property
     def size(self):
         """How much was run, in words."""
-        n, steps = len(self.ldm_full_model.X), self.ldm_full_model.problem.clock.steps
+        n, steps = len(self.full_model.X), self.full_model.problem.clock.steps
         samples = "all points" if self.samples == n else f"{self.samples} samples"
         return f"{n} particles, {steps} steps, {samples}"
 

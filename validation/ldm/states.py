@@ -53,7 +53,8 @@ def gravities(run):
     found = {g: pair(fallen(g), "gravity-r7", last) for g in run.progress(GRAVITIES, "gravity")}
     for g, one in found.items():
         scale = f"{one.scale}, one run"
-        run.record(f"ldm.fig6.gravity.{g}", np.linalg.norm(one.case.problem.gravity), scale=scale)
+        gravity = one.full_model.problem.gravity
+        run.record(f"ldm.fig6.gravity.{g}", np.linalg.norm(gravity), scale=scale)
         share(run, f"ldm.fig6.error.g{g}", one.errors, scale, comparator="info")
     keep(run, X=one.X, g=GRAVITIES, reduced=[one.reduced[0] for one in found.values()],
          full=[one.full[0] for one in found.values()])
@@ -97,8 +98,8 @@ def superresolution(run):
           comparator="info")
     run.record("ldm.fig12.gain", baseline.origin / every.origin, unit="x", scale=scale,
                comparator=">=", bound=1.0, note="the tracers' error over that of the reduced run")
-    for name, value in (("low_points", len(few)), ("high_points", len(one.case.X)),
-                        ("refine", low.dx / one.case.problem.dx)):
+    for name, value in (("low_points", len(few)), ("high_points", len(one.full_model.X)),
+                        ("refine", low.dx / one.full_model.problem.dx)):
         run.record(f"ldm.fig12.{name}", value, scale=scale)
     keep(run, tracers=tracers[-1], low=few, reduced=one.reduced[-1], full=one.full[-1])
 
@@ -153,7 +154,7 @@ def tower(run):
     shots, shown = (0, scene.steps // 2, scene.steps), skin(ldm_full_model(scene).X)
     found = [pair(leaning(*mu), "tower", shots, shown)
              for mu in run.progress(LEANINGS, "runs")]
-    mu = [driven(one.case) for one in found]
+    mu = [driven(one.full_model) for one in found]
     for k, one in enumerate(found):
         scale = f"{one.scale}, one run"
         share(run, f"ldm.fig15.error.{k + 1}", one.errors, scale, comparator="info")

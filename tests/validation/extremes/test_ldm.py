@@ -11,6 +11,7 @@ from mpm_ref.rom.model_file import load
 from mpm_ref.rom.study.full_model import ldm_full_model
 from mpm_ref.rom.study.monitor import StateCheck
 from mpm_ref.rom.study.run import RunOptions
+from mpm_ref.rom.study.samples import SampleSet
 from validation.common.scenes import with_
 from validation.extremes import ldm_files as files
 from validation.extremes import ldm_long as long
@@ -69,10 +70,11 @@ def test_small_errors_are_not_bad_however_good_the_map_is():
 
 
 def test_the_extremes_of_a_run_are_kept():
-    sights = [WELL, WELL._replace(off=0.05, J=0.5), WELL._replace(beyond=4.0, seen=0.2, blind=1),
+    sights = [WELL, WELL._replace(off=0.05, J=0.5),
+              WELL._replace(beyond=4.0, coverage=0.2, blind=1),
               WELL]
     end = of_sights(sights, 4, 0.7, "gone")
-    assert end == End(0.7, 3, 1, "off beyond seen blind", 4.0, 0.05, 0.2, 3, 0.0, 0.5, "gone")
+    assert end == End(0.7, 3, 1, "off beyond coverage blind", 4.0, 0.05, 0.2, 3, 0.0, 0.5, "gone")
     assert of_sights([WELL], 4, 0.7, "").first == -1
 
 
@@ -121,7 +123,7 @@ def test_the_watch_knows_the_trained_range(net):
 
 def test_samples_in_one_place_are_told(net):
     near = np.argsort(ldm_full_model(GRAVITY.scene(1.0)).X[:, 0])[:50]
-    found = fallen(net, 7.5, pick=lambda t, latent: near)
+    found = fallen(net, 7.5, pick=lambda t, latent: SampleSet(t, near))
     assert found.error > 5.0
     assert found.flags == "coverage"
 

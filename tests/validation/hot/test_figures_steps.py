@@ -66,9 +66,9 @@ def test_a_spread_has_both_ends():
 
 
 def test_what_did_not_converge_is_noted(step):
-    report = iterates(step, ways("hot")[0], iterations=1).report
+    report = iterates(step, ways("hot")[0], max_iterations=1).report
     assert noted("here", report).startswith("here; 1 iterations, the cap")
-    assert noted("here", report._replace(converged=True, capped=0)) == "here"
+    assert noted("here", report._replace(converged=True, capped_solves=0)) == "here"
 
 
 def test_an_error_counts_as_reached_where_it_stays_below():

@@ -105,7 +105,7 @@ def made_up(monkeypatch):
     ways = [RunOptions(*scheme) for scheme in SCHEMES]
     for name, value in {
             "TORSION": TORSION._replace(test=TORSION.test[:2]), "trained": lambda name: None,
-            "case": lambda scene: SimpleNamespace(X=x[0], problem=problem),
+            "ldm_full_model": lambda scene: SimpleNamespace(X=x[0], problem=problem),
             "build": lambda scene: None, "threads_for": lambda bodies: nullcontext(),
             "history": lambda problem: SimpleNamespace(x=x),
             "reduced": lambda one, model, way: x * (1.0 + off * (1 + ways.index(way))),
