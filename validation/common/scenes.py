@@ -1,10 +1,11 @@
-"""Scenes in experiments: shipped ones with other sizes, and a body's mean motion."""
+"""Scenes of the catalogue with other keys, and helpers of experiments that run them."""
 
 from contextlib import contextmanager
 from pathlib import Path
 
 import msgspec
 import numba
+import numpy as np
 
 from mpm_ref.core.jit import set_threads
 from mpm_ref.scene import load
@@ -14,24 +15,34 @@ FEW = 5000
 
 
 def catalogue_scene(name, **changes):
-    """The scene ``scenes/<name>.toml`` with some of its keys replaced."""
+    """Return the scene ``scenes/<name>.toml`` with some of its keys replaced."""
     return with_(load(SCENES / f"{name}.toml"), **changes)
 
 
 def with_(record, **changes):
-    """A scene, or a table of one, with some of its keys replaced."""
+    """Return a scene, or a table of one, with some of its keys replaced."""
     return msgspec.structs.replace(record, **changes)
 
 
 def mean(body, name):
-    """Mean of a particle field weighted by mass: "x" the centre [m], "v" its velocity [m/s]."""
+    """Return the mean of a particle field weighted by mass: "x" [m] or "v" [m/s]."""
     q = body.particles
     return q.m @ getattr(q, name) / q.m.sum()
 
 
+def particle_count(bodies):
+    """Return the number of particles of all bodies."""
+    return sum(len(body.id) for body in bodies)
+
+
+def evenly(count, most):
+    """Return at most `most` indices below `count`, evenly, the first and the last among them."""
+    return np.unique(np.linspace(0, count - 1, most).round().astype(int))
+
+
 @contextmanager
 def threads_for(bodies):
-    """Run on one thread if there are FEW particles: a second one would wait more than it works.
+    """Run on one thread if there are FEW particles: a second thread would mostly wait.
 
     The results are the same to the last bit.
     """

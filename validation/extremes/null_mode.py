@@ -5,7 +5,7 @@ import numpy as np
 from mpm_ref.explicit import Scheme
 
 from ..common.registry import experiment
-from ..verification.periodic import Periodic
+from ..verification.lattice import Periodic
 from .blocks import bounds, problem, square, steps
 from .outcome import outcome
 

@@ -10,10 +10,9 @@ from mpm_ref.problem import Clock, Problem
 from ..common.registry import experiment
 from ..verification.axis_aligned import AxisAligned
 from ..verification.convergence import order, rms
-from ..verification.lattice import body
-from ..verification.manufactured_runs import CHECKS, put_on
+from ..verification.lattice import Periodic, body
+from ..verification.manufactured import CHECKS, put_on
 from ..verification.mms import LAW, RHO0, A, C
-from ..verification.periodic import Periodic
 from .front import EMULATED, record_points
 from .knobs import QUICK, STANDARD, settings
 from .measure import Trial, measure, sampled

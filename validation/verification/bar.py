@@ -19,8 +19,8 @@ from mpm_ref.materials import FixedCorotated, lame
 from ..common.registry import experiment
 from ..common.scenes import threads_for
 from .convergence import order, rms
+from .lattice import ON_WALL, strip, strip_stepper
 from .mms import name
-from .strip import ON_WALL, stepper, strip
 
 L, E, RHO, V = 25.0, 100.0, 1.0, 0.1
 LAW = FixedCorotated(*lame(E, 0.0))
@@ -30,17 +30,17 @@ PERIODS, CFL = 4, 0.4
 
 
 class Vibration(NamedTuple):
-    """What a run gave."""
+    """The errors and the amplitude of a run."""
 
     error: float        # largest RMS error of the displacement, relative to its amplitude V/omega
     frequency: float    # measured omega / exact omega - 1
-    kept: float         # largest velocity amplitude in the last period / V
+    final: float        # largest velocity amplitude in the last period / V
     t: np.ndarray       # (S,)  [s]
     amplitude: np.ndarray       # (S,)  of the velocity, its projection on the mode / V
 
 
 def put_in_motion(q, X, dt):
-    """Velocities of time -dt/2 at the undeformed state; see `follow.put_on`."""
+    """Set the velocities of time -dt/2 at the undeformed state; see `manufactured.put_on`."""
     speed = V * cos(0.5 * OMEGA * dt)
     q.v[:, 0] = speed * np.sin(BETA * X)
     if q.C.ndim == 3:
@@ -48,12 +48,12 @@ def put_in_motion(q, X, dt):
 
 
 def vibrate(scheme, cells, wall):
-    """`Vibration` of a bar with so many cells over the length L."""
+    """Return the `Vibration` of a bar with a number of cells over the length L."""
     dx = L / cells
     bar, X = strip(0.0 if wall else -L, L, dx, RHO, LAW, scheme)
     steps = ceil(PERIODS * 2.0 * pi / OMEGA * SOUND / dx / CFL)
     dt = PERIODS * 2.0 * pi / OMEGA / steps
-    advance = stepper(dx, scheme, ON_WALL if wall else None)
+    advance = strip_stepper(dx, scheme, ON_WALL if wall else None)
     advance.start([bar])
     put_in_motion(bar.particles, X, dt)
     shape, x0 = np.sin(BETA * X), bar.particles.x.copy()
@@ -70,7 +70,10 @@ def vibrate(scheme, cells, wall):
 
 
 def frequency(amplitude, dt):
-    """Of a cosine sampled at dt/2, 3 dt/2, ..: from its last zero, interpolated linearly."""
+    """Return the frequency of a cosine sampled at dt/2, 3 dt/2, .., by its last zero.
+
+    The zero is interpolated linearly.
+    """
     k = np.flatnonzero(amplitude[:-1] * amplitude[1:] < 0.0)
     last = k[-1] + amplitude[k[-1]] / (amplitude[k[-1]] - amplitude[k[-1] + 1])
     return (len(k) - 0.5) * pi / ((last + 0.5) * dt)
@@ -79,7 +82,7 @@ def frequency(amplitude, dt):
 @experiment("verification.bar", title="Axial vibration of a bar", profiles=("quick", "standard"),
             budget={"quick": 15, "standard": 60})
 def bar(run):
-    """Orders of displacement and frequency with and without a wall; what PIC loses."""
+    """Record orders of displacement and frequency with and without a wall; the loss of PIC."""
     cells = run.choose(quick=(8, 16, 32), standard=(8, 16, 32, 64, 128))
     schemes = run.choose(quick=(("mls", 2, 2),), standard=(
         ("mls", 2, 2), ("mls", 3, 2), ("apic", 2, 2), ("flip", 2, 2), ("pic", 2, 2)))
@@ -90,30 +93,30 @@ def bar(run):
             rows += [(*scheme, wall, n, *r[:3]) for n, r in zip(cells, results, strict=True)]
             if scheme == schemes[0]:
                 record_history(run, wall, results[0])
-            record(run, scheme, wall, cells, results)
+            record_orders(run, scheme, wall, cells, results)
     run.table("errors", ("transfer", "degree", "per_direction", "wall", "cells", "error",
                          "frequency_error", "amplitude_kept"), rows)
 
 
 def record_history(run, wall, result):
-    """The amplitude of the coarsest bar over time, beside cos(omega t)."""
+    """Write the amplitude of the coarsest bar over time, beside cos(omega t)."""
     rows = zip(result.t, result.amplitude, np.cos(OMEGA * result.t), strict=True)
     run.table("history-wall" if wall else "history-symmetric", ("t", "ours", "exact"), list(rows))
 
 
-def record(run, scheme, wall, cells, results):
-    """Orders, or for PIC its loss."""
-    held = "wall" if wall else "symmetric"
-    id, sizes = f"verification.bar.{held}.{name(scheme)}", [L / n for n in cells]
+def record_orders(run, scheme, wall, cells, results):
+    """Record the orders of a scheme, or for PIC its loss."""
+    support = "wall" if wall else "symmetric"
+    id, sizes = f"verification.bar.{support}.{name(scheme)}", [L / n for n in cells]
     scale = f"{cells} cells over the length, {PERIODS} periods"
     if scheme[0] == "pic":
-        run.record(f"{id}.kept", results[-1].kept, comparator="<=", bound=0.95, scale=scale,
+        run.record(f"{id}.kept", results[-1].final, comparator="<=", bound=0.95, scale=scale,
                    note="negative control: PIC damps; amplitude in the last period")
         return
     p = order(sizes, [r.error for r in results])
     if not wall:
         run.record(f"{id}.order", p, paper=2.0, comparator="band", bound=(1.8, 2.3), scale=scale)
-        run.record(f"{id}.kept", results[-1].kept, paper=1.0, comparator="band",
+        run.record(f"{id}.kept", results[-1].final, paper=1.0, comparator="band",
                    bound=(0.99, 1.01), scale=scale)
     else:
         run.record(f"{id}.order", p, paper=1.0, comparator="band", bound=(0.8, 1.3), scale=scale,

@@ -30,14 +30,14 @@ from mpm_ref.simulate import simulate
 
 from ..common.registry import experiment
 from ..common.scenes import mean, threads_for
-from .block import G
 
+G = 9.81            # [m/s^2]
 RADIUS, THICKNESS, HALF_ANGLE, START = 1.0, 0.2, 15.0, 60.0     # [m], [m], degrees, degrees
 AGREED = 1e-3       # relative error of the speed that a public code's test of such a slide allows
 
 
 class Swing(NamedTuple):
-    """From rest to the bottom, of S times."""
+    """A swing from rest to the bottom, at S times."""
 
     t: np.ndarray
     omega: np.ndarray       # (S,) angular momentum / m k^2 [rad/s]
@@ -49,8 +49,8 @@ class Swing(NamedTuple):
     steps: int
 
 
-def scene(dx):
-    """The saddle at rest in the bowl."""
+def bowl_scene(dx):
+    """Return the scene of the saddle at rest in the bowl."""
     a = np.radians(START)
     around = Sphere(center=(0.0, 0.0), radius=RADIUS)
     hollow = Sphere(center=(0.0, 0.0), radius=RADIUS - THICKNESS)
@@ -65,7 +65,7 @@ def scene(dx):
 
 def swing(dx):
     """Run until the centre of mass has passed the bottom."""
-    problem, rows = build(scene(dx)), []
+    problem, rows = build(bowl_scene(dx)), []
     q = problem.bodies[0].particles
     k2 = float(q.m @ np.sum(q.x**2, axis=1) / q.m.sum())
     center = mean(problem.bodies[0], "x")
@@ -85,8 +85,9 @@ def swing(dx):
 
 
 def pendulum_speed(l, k2, depth):
-    """omega at the bottom [rad/s], from rest where the centre of mass is `depth` [m] below the
-    axis; l [m] its distance from the axis, k2 [m^2] the mean square distance of the mass.
+    """Return omega at the bottom [rad/s], from rest at the depth [m] of the centre of mass.
+
+    l [m] is its distance from the axis, k2 [m^2] the mean square distance of the mass.
     """
     return float(np.sqrt(2.0 * G * (l - depth) / k2))
 
@@ -94,7 +95,7 @@ def pendulum_speed(l, k2, depth):
 @experiment("verification.bowl", title="Slide without friction along a curve",
             profiles=("quick", "standard"), budget={"quick": 4, "standard": 20})
 def bowl(run):
-    """Speed at the bottom against the pendulum's."""
+    """Record the speed at the bottom against the pendulum's."""
     rows = []
     for dx in run.progress(run.choose(quick=(0.1, 0.05), standard=(0.1, 0.05, 0.025)), "dx"):
         s = swing(dx)
@@ -103,6 +104,6 @@ def bowl(run):
     scale = f"{s.particles} particles, {s.steps} steps, dx = {dx} m, bowl of 1 m"
     run.record("verification.bowl.speed", s.bottom, unit="rad/s", paper=s.exact, comparator="=",
                tolerance=AGREED, scale=scale)
-    kept = 1.0 - (s.energy[0] - s.energy[-1]) / s.released
-    run.record("verification.bowl.energy_kept", float(kept), comparator="info", scale=scale,
+    ratio = 1.0 - (s.energy[0] - s.energy[-1]) / s.released
+    run.record("verification.bowl.energy_kept", float(ratio), comparator="info", scale=scale,
                note="of the energy of the height lost")

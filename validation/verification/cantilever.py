@@ -8,14 +8,25 @@ turn. The beam comes to rest by damping (see `settle`).
 With nu = 0 a clamped end restrains no contraction, and the fixed corotated law is linear in Biot's
 strain, hence bends linearly, M = EI phi', up to any curvature: beam theory is all but exact.
 
-small: L = 8 h; P would bend an ideal beam by L/500; shear factor 5/6 [Timoshenko1921].
-large: L = 10 h; P a^2/EI = 2: the end sinks by half the length [Bisshopp1945].
+*small*: L = 8 h; P would bend an ideal beam by L/500; shear factor 5/6 [Timoshenko1921].
+*large*: L = 10 h; P a^2/EI = 2: the end sinks by half the length [Bisshopp1945].
+
+The exact beam under a dead load is a boundary value problem in the arc length S. A section turns by
+phi and carries the moment M. With the load (0, -P) at S = a, its parts N along and Q across a
+section, and the stiffnesses EI, EA, GA (shear, with its factor),
+
+    phi' = M/EI,   M' = P x',   x' = (1 + N/EA) cos phi - Q/GA sin phi,   N = -P sin phi
+                                y' = (1 + N/EA) sin phi + Q/GA cos phi,   Q = -P cos phi
+
+phi = x = y = 0 at S = 0 and M = 0 at S = a. With EA = GA = inf this is the elastica of
+[Bisshopp1945]; for a small P its end sinks by P a^3/(3 EI) + P a/GA [Timoshenko1921].
 """
 
-from math import hypot, sqrt
+from math import hypot, inf, sqrt
 from typing import NamedTuple
 
 import numpy as np
+from scipy.integrate import solve_bvp
 
 from mpm_ref.core.boundary import BoxWalls, Conditions
 from mpm_ref.explicit import Scheme, Stepper
@@ -23,7 +34,6 @@ from mpm_ref.materials import FixedCorotated, lame, stiffness
 
 from ..common.registry import experiment
 from .convergence import extrapolated
-from .elastica import deflected, timoshenko
 from .lattice import body, lattice
 from .mms import name
 from .settle import Pace, settle
@@ -39,29 +49,62 @@ ON_WALL = Conditions(walls=BoxWalls((1, None), (None, None), "sticky"))
 
 
 class Beam(NamedTuple):
-    """A problem."""
+    """A beam and its load."""
 
     length: float       # L [m]
     bend: float         # P a^2 / EI
 
     @property
     def arm(self):
-        """Where the load acts, a [m]."""
+        """Return the place a where the load acts [m]."""
         return self.length - 0.25
 
     @property
     def load(self):
-        """P [N/m]."""
+        """Return the load P [N/m]."""
         return self.bend * EI / self.arm**2
 
 
 SMALL, LARGE = Beam(length=8.0, bend=3.0 / 500.0), Beam(length=10.0, bend=2.0)
 
 
-def bent(beam, scheme, cells, waits, ramp=0.0):
-    """Particles (N, 2) and displacement (u, v) of the loaded end [m], with so many cells over h.
+def deflected(load, length, EI, EA=inf, GA=inf):
+    """Return the places (K, 2) [m] of sections from the clamped end to the loaded one.
 
-    scheme is (transfer, degree, particles per cell and direction); waits, ramp: see `settle`.
+    load [N/m], length a [m], EI [N m], EA and GA [N/m].
+
+    Raises ArithmeticError if the solver does not converge.
+    """
+
+    def slopes(S, state):
+        phi, M, _, _ = state
+        c, s = np.cos(phi), np.sin(phi)
+        along, across = 1.0 - load * s / EA, -load * c / GA
+        dx, dy = along * c - across * s, along * s + across * c
+        return np.stack([M / EI, load * dx, dx, dy])
+
+    def ends(clamped, free):
+        return np.array([clamped[0], clamped[2] / length, clamped[3] / length,
+                         free[1] * length / EI])
+
+    S = np.linspace(0.0, length, 41)
+    straight = np.stack([0.0 * S, load * (S - length), S, 0.0 * S])
+    solution = solve_bvp(slopes, ends, S, straight, tol=1e-8, max_nodes=20000)
+    if not solution.success:
+        raise ArithmeticError(f"the elastica under {load} N/m did not converge: {solution.message}")
+    return solution.y[2:].T
+
+
+def timoshenko(load, length, EI, GA):
+    """Return the deflection of the loaded end under a small load [m]."""
+    return load * length**3 / (3.0 * EI) + load * length / GA
+
+
+def bent(beam, scheme, cells, waits, ramp=0.0):
+    """Return the particles (N, 2) and the displacement (u, v) of the loaded end [m] at rest.
+
+    scheme is (transfer, degree, particles per cell and direction); cells: number of cells over h;
+    waits, ramp: see `settle`.
     """
     transfer, degree, per = scheme
     dx = 1.0 / cells
@@ -77,33 +120,36 @@ def bent(beam, scheme, cells, waits, ramp=0.0):
 
 
 def small_error(scheme, cells):
-    """Error of the deflection relative to Timoshenko's."""
+    """Return the error of the deflection relative to Timoshenko's."""
     _, (_, v) = bent(SMALL, scheme, cells, waits=12.0)
     return float(-v / timoshenko(SMALL.load, SMALL.arm, EI, GA) - 1.0)
 
 
 def large_error(scheme, cells):
-    """Particles, and distance of the loaded end from the elastica's relative to the deflection."""
+    """Return the particles, and the distance of the loaded end from the elastica's.
+
+    The distance is relative to the deflection.
+    """
     places, (u, v) = bent(LARGE, scheme, cells, waits=8.0, ramp=2.0)
     x, y = elastica()[-1]
     return places, hypot(LARGE.arm + u - x, v - y) / abs(y)
 
 
 def elastica():
-    """Places (K, 2) of the large deflection's sections, from the wall to the load [m]."""
+    """Return the places (K, 2) of the large deflection's sections, from wall to load [m]."""
     return deflected(LARGE.load, LARGE.arm, EI, EA, GA)
 
 
 @experiment("verification.cantilever", title="Cantilever: Timoshenko's beam and the elastica",
             profiles=("quick", "standard"), budget={"quick": 14, "standard": 150})
 def cantilever(run):
-    """Deflections under a small and a large load."""
+    """Record the deflections under a small and a large load."""
     record_small(run)
     record_large(run)
 
 
 def record_small(run):
-    """A small load: the error must vanish with dx."""
+    """Record the errors under a small load: they must vanish with dx."""
     scheme, cells = ("mls", 2, 2), run.choose(quick=(4, 8), standard=(4, 8, 16))
     errors = [small_error(scheme, n) for n in run.progress(cells, "small")]
     run.table("small", ("cells", "error"), list(zip(cells, errors, strict=True)))
@@ -124,7 +170,7 @@ STANDARD = (*JUDGED, ("apic", 2, 2), ("apic", 2, 3), ("mls", 2, 3), ("mls", 2, 4
 
 
 def record_large(run):
-    """A large load: schemes side by side."""
+    """Record the errors under a large load, schemes side by side."""
     cells, rows = run.choose(quick=(4,), standard=(4, 8)), []
     for scheme in run.progress(run.choose(quick=QUICK, standard=STANDARD), "large"):
         results = [large_error(scheme, n) for n in cells]

@@ -29,29 +29,29 @@ BULK = 0.99                         # of the water lies behind the bulk of the f
 
 
 class Front(NamedTuple):
-    """Front at S times."""
+    """The front of the water at S times."""
 
     T: np.ndarray           # (S,) t sqrt(2 g/a)
     Z: np.ndarray           # (S,) foremost particle/a
-    bulk: np.ndarray        # (S,) what 99 percent lie behind/a
+    bulk: np.ndarray        # (S,) position behind which 99 percent lie/a
     J: tuple                # smallest and largest volume ratio
-    kept: float             # energy at the end over that at the start
+    energy_ratio: float     # energy at the end over that at the start
     particles: int
     steps: int
 
 
 def width():
-    """The column's width a [m]."""
+    """Return the column's width a [m]."""
     return catalogue_scene("dam_break").body[0].shape.upper[0]
 
 
 def ritter(T):
-    """Z of Ritter's front for h = 2 a: 1 + 2 t sqrt(2 g a)/a = 1 + 2 T."""
+    """Return Z of Ritter's front for h = 2 a: 1 + 2 t sqrt(2 g a)/a = 1 + 2 T."""
     return 1.0 + 2.0 * np.asarray(T)
 
 
 def front(cells, per_cell=2):
-    """Run the shipped scene with dx = a/cells."""
+    """Run the catalogue's scene with dx = a/cells."""
     scene, a = catalogue_scene("dam_break"), width()
     water = with_(scene.body[0], sampling=Regular(per_cell=per_cell))
     scene = with_(scene, dx=a / cells, end=END, interval=END / 60, body=(water,))
@@ -70,7 +70,7 @@ def front(cells, per_cell=2):
 @experiment("verification.dam_break", title="Dam break: front against Ritter's bound and points",
             profiles=("quick", "standard"), budget={"quick": 4, "standard": 40})
 def dam_break(run):
-    """Front over time, at two resolutions."""
+    """Record the front over time, at two resolutions."""
     rows = []
     for cells in run.progress(run.choose(quick=(10,), standard=(20, 40)), "cells per width"):
         f = front(cells)
@@ -78,10 +78,10 @@ def dam_break(run):
     run.table("front", ("cells", "T", "Z", "bulk", "ritter"), rows)
     run.table("measured", ("T", "Z"), MEASURED.tolist())
     scale = f"{f.particles} particles, {f.steps} steps, dx = a/{cells}, sound 10 m/s"
-    judge(run, f, scale)
+    record_front(run, f, scale)
 
 
-def judge(run, f, scale):
+def record_front(run, f, scale):
     """Record the numbers of the finest run."""
     run.record("verification.dam_break.ahead_of_ritter", float(np.max(f.Z - ritter(f.T))),
                paper=0.0, comparator="<=", bound=0.0, scale=scale,
@@ -89,26 +89,20 @@ def judge(run, f, scale):
     fastest = float(np.max(np.diff(f.Z) / np.diff(f.T)) / 2.0)
     run.record("verification.dam_break.fastest", fastest, paper=1.0, comparator="<=", scale=scale,
                note="largest speed of the front over 2 sqrt(g h)")
-    known = MEASURED[MEASURED[:, 0] <= f.T[-1]]
-    ratio = np.interp(known[:, 0], f.T, f.Z) / known[:, 1]
+    measured = MEASURED[MEASURED[:, 0] <= f.T[-1]]
+    ratio = np.interp(measured[:, 0], f.T, f.Z) / measured[:, 1]
     run.record("verification.dam_break.front", float(np.mean(ratio)), paper=1.0, comparator="info",
                scale=scale, note=f"unconfirmed: mean of Z over measured Z, {ratio.min():.2f} to "
                f"{ratio.max():.2f}; here walls are smooth and the dam vanishes at once")
-    run.record("verification.dam_break.speed", between(f, 2.0, 5.0) / measured_speed(2.0, 5.0),
-               paper=1.0, comparator="info", scale=scale,
+    speed = mean_speed(f.T, f.Z, 2.0, 5.0) / mean_speed(*MEASURED.T, 2.0, 5.0)
+    run.record("verification.dam_break.speed", speed, paper=1.0, comparator="info", scale=scale,
                note="unconfirmed: mean speed from Z = 2 to 5 over the measured one, which does not "
                "depend on when the dam went")
     run.record("verification.dam_break.volume", f.J[0], paper=1.0, comparator="info", scale=scale,
                note=f"smallest J; largest {f.J[1]:.4f}; rho g h/lam = 0.011 at rest")
-    run.record("verification.dam_break.energy_kept", f.kept, comparator="info", scale=scale)
+    run.record("verification.dam_break.energy_kept", f.energy_ratio, comparator="info", scale=scale)
 
 
-def between(f, start, stop):
-    """Mean dZ/dT of a front between two places."""
-    return float((stop - start) / (np.interp(stop, f.Z, f.T) - np.interp(start, f.Z, f.T)))
-
-
-def measured_speed(start, stop):
-    """The same of the measured points, interpolated."""
-    T, Z = MEASURED.T
+def mean_speed(T, Z, start, stop):
+    """Return the mean dZ/dT of a front between two places, interpolated."""
     return float((stop - start) / (np.interp(stop, Z, T) - np.interp(start, Z, T)))

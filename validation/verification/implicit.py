@@ -25,69 +25,69 @@ GRADIENT = np.array([[-2.0, 0.0], [1.5, 0.5]])      # of the initial velocity [1
 FREE = np.zeros(2)
 D = DX**2 / 4.0                                     # of the affine motion
 EPS = 1e-10                                         # tolerance of the implicit solves
-FALLING = ("hot", "hot-plus", "pn-pcg")             # whose energies are looked at
-OTHER = "pn-pcg"                                    # whose end state the others must find
+METHODS_OF_ENERGY = ("hot", "hot-plus", "pn-pcg")   # whose energies must fall
+REFERENCE = "pn-pcg"                                # whose end state the others must reach
 
 
 class EnergyHistory(NamedTuple):
-    """A run."""
+    """The end of a run, and its energy after every step."""
 
     x: np.ndarray           # (N, 2)        positions in the end, in the order of the start [m]
     energies: np.ndarray    # (steps + 1,)  before and after every step [J/m]
-    missed: list            # why solves did not converge
-
+    missed: list            # reasons of solves that did not converge
 
 
 def square():
-    """The body at its start."""
+    """Return the body at its start."""
     X = lattice([0.0, 0.0], [SIDE, SIDE], DX / 2)
-    made = body(X, DX / 2, RHO0, make_law("fixed_corotated", E=E, nu=NU), "apic")
-    made.particles.v[:] = (X - X.mean(axis=0)) @ GRADIENT.T
-    return made._replace(particles=made.particles._replace(b=NONE))
+    start = body(X, DX / 2, RHO0, make_law("fixed_corotated", E=E, nu=NU), "apic")
+    start.particles.v[:] = (X - X.mean(axis=0)) @ GRADIENT.T
+    return start._replace(particles=start.particles._replace(b=NONE))
 
 
-def displaced(stepper, steps):
-    """`EnergyHistory` of the square."""
-    made, missed = square(), []
-    stepper.start([made])
-    energies = [energy([made], FREE, D).sum]
+def energy_history(stepper, steps):
+    """Return the `EnergyHistory` of the square."""
+    moving, missed = square(), []
+    stepper.start([moving])
+    energies = [energy([moving], FREE, D).sum]
     for k in range(steps):
-        stepper.step([made], k * END / steps, END / steps)
-        energies.append(energy([made], FREE, D).sum)
+        stepper.step([moving], k * END / steps, END / steps)
+        energies.append(energy([moving], FREE, D).sum)
         if stepper.implicit and not stepper.report.converged:
             missed.append(stepper.report.message)
-    return EnergyHistory(made.particles.x, np.array(energies), missed)
+    return EnergyHistory(moving.particles.x, np.array(energies), missed)
 
 
 def explicit():
-    """The stepper to compare with."""
+    """Return the stepper to compare with."""
     return Stepper(Scheme(transfer="apic"), DX, 2, FREE)
 
 
 def implicit(method="hot", **changes):
-    """A stepper that solves to EPS in the characteristic norm."""
+    """Return a stepper that solves to EPS in the characteristic norm."""
     options = options_of(method, **{"eps": EPS, "norm": "characteristic", **changes})
     return ImplicitStepper(Scheme(transfer="apic"), DX, 2, FREE, None, options)
 
 
 @experiment("verification.implicit", title="Implicit steps: order in time, energy, one minimiser",
             profiles=("quick", "standard"), budget={"quick": 25, "standard": 90})
-def verify(run):
-    """Errors over time steps, energies, and the end states of all methods."""
+def implicit_steps(run):
+    """Record errors over time steps, energies, and the end states of all methods."""
     counts = run.choose(quick=(40, 80, 160), standard=(40, 80, 160, 320, 640))
     scale = f"2D, {len(square().id)} particles, {counts} steps"
-    histories = {method: [displaced(implicit(method), n) for n in run.progress(counts, method)]
-               for method in FALLING}
+    histories = {method: [energy_history(implicit(method), n) for n in run.progress(counts, method)]
+                 for method in METHODS_OF_ENERGY}
     record_order(run, counts, histories["hot"], scale)
-    for method, found in histories.items():
-        record_energy(run, method, found, scale)
-    record_minimisers(run, counts[0], histories[OTHER][0])
+    for method, runs in histories.items():
+        record_energy(run, method, runs, scale)
+    firsts = {method: runs[0] for method, runs in histories.items()}
+    record_minimisers(run, counts[0], firsts)
 
 
 def record_order(run, counts, histories, scale):
-    """Order in dt of the distance of HOT's runs from explicit ones of as many steps."""
+    """Record the order in dt of the distance of HOT's runs from explicit ones of as many steps."""
     steps = [END / n for n in counts]
-    errors = [rms(history.x - displaced(explicit(), n).x)
+    errors = [rms(history.x - energy_history(explicit(), n).x)
               for n, history in zip(counts, histories, strict=True)]
     run.record("verification.implicit.order", order(steps, errors), paper=1.0,
                comparator="band", bound=(0.8, 1.2), scale=scale,
@@ -98,22 +98,28 @@ def record_order(run, counts, histories, scale):
 
 
 def rise(history):
-    """Largest rise of the energy in a step, of the start's; below 0 if it falls in every step."""
+    """Return the largest rise of the energy in a step over its start; below 0 if all fall."""
     return float(np.diff(history.energies).max() / history.energies[0])
 
 
 def record_energy(run, method, histories, scale):
-    """That the energy falls in every step of a method's runs."""
+    """Record the largest rise of the energy in the steps of a method's runs."""
     target = "verification.implicit.gained" + ("" if method == "hot" else f".{method}")
     run.record(target, max(rise(history) for history in histories), comparator="<=", bound=1e-9,
                scale=scale, note="largest rise of the energy in a step, of the start's")
 
 
-def record_minimisers(run, steps, one):
-    """How far the runs of other methods end from `one`, that of OTHER; whether all converged."""
+def record_minimisers(run, steps, first_runs):
+    """Record how far the runs of other methods end from that of REFERENCE.
+
+    Solves that did not converge are recorded as well. first_runs: {method: history} of runs of
+    `steps` steps that were made before; REFERENCE must be one of them.
+    """
     scale = f"{steps} steps, eps = {EPS:g}"
-    others = {method: displaced(implicit(method), steps) for method in METHODS if method != OTHER}
-    missed = [f"{method}: {why}" for method, history in {OTHER: one, **others}.items()
+    one = first_runs[REFERENCE]
+    others = {method: first_runs.get(method) or energy_history(implicit(method), steps)
+              for method in METHODS if method != REFERENCE}
+    missed = [f"{method}: {why}" for method, history in {REFERENCE: one, **others}.items()
               for why in history.missed]
     run.record("verification.implicit.missed", len(missed), paper=0, comparator="=", scale=scale,
                note="; ".join((f"solves that did not converge, of {len(METHODS)} methods",
@@ -122,4 +128,4 @@ def record_minimisers(run, steps, one):
         run.record(f"verification.implicit.{method}",
                    float(np.abs(history.x - one.x).max() / DX),
                    unit="cells", comparator="<=", bound=1e-4, scale=scale,
-                   note=f"largest difference in position from the run with {OTHER}")
+                   note=f"largest difference in position from the run with {REFERENCE}")

@@ -14,12 +14,10 @@ from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.materials import LogNeoHookean, lame, stiffness
 
 from ..common.registry import experiment
-from .axis_aligned import AxisAligned, forcing
+from .axis_aligned import AxisAligned, forcing, forcing_by_differences
 from .convergence import order
-from .independent import axis_aligned_forcing
-from .lattice import body, lattice
-from .manufactured_runs import follow, steps_of
-from .periodic import Periodic
+from .lattice import Periodic, body, lattice
+from .manufactured import follow, step_count
 
 E, NU, RHO0, A = 1e7, 0.3, 1000.0, 0.05
 LAW = LogNeoHookean(*lame(E, NU))
@@ -40,8 +38,8 @@ COLUMNS = ("dim", "transfer", "degree", "per_direction", "cells", "dx", "dt", "c
 DEGREES = {1: "linear", 2: "quadratic", 3: "cubic"}
 
 
-class Case(NamedTuple):
-    """One run."""
+class MmsRun(NamedTuple):
+    """The settings of one run."""
 
     transfer: str
     degree: int
@@ -51,17 +49,17 @@ class Case(NamedTuple):
 
     @property
     def dt(self):
-        """Largest time step [s]."""
+        """Return the largest time step [s]."""
         return CFL / (self.cells * SOUND)
 
     @property
     def steps(self):
-        """Number of steps."""
-        return steps_of(2.0 / C, self.dt)
+        """Return the number of steps."""
+        return step_count(2.0 / C, self.dt)
 
 
 def error(case):
-    """Error of a run, relative to A."""
+    """Return the error of an `MmsRun`, relative to A."""
     d, spacing = case.dim, 1.0 / (case.cells * case.per)
     X = lattice([0.0] * d, [1.0] * d, spacing)
     square = body(X, spacing, RHO0, LAW, case.transfer)
@@ -71,8 +69,11 @@ def error(case):
 
 
 def sweep(family, cells, dim=2):
-    """Order of a (transfer, degree, per direction) over numbers of cells, and rows of the table."""
-    cases = [Case(*family, n, dim) for n in cells]
+    """Return the order of a family over numbers of cells, and the rows of the table.
+
+    family is (transfer, degree, particles per direction).
+    """
+    cases = [MmsRun(*family, n, dim) for n in cells]
     errors = [error(case) for case in cases]
     rows = [(dim, *family, case.cells, 1.0 / case.cells, 2.0 / C / case.steps, CFL, case.steps,
              (case.cells * case.per) ** dim, e) for case, e in zip(cases, errors, strict=True)]
@@ -80,7 +81,7 @@ def sweep(family, cells, dim=2):
 
 
 def name(family):
-    """mls-cubic-2."""
+    """Return the name of a family in targets, such as mls-cubic-2."""
     transfer, degree, per = family
     return f"{transfer}-{DEGREES[degree]}-{per}"
 
@@ -88,7 +89,7 @@ def name(family):
 @experiment("verification.mms", title="Axis-aligned manufactured solution: order of accuracy",
             profiles=("quick", "standard"), budget={"quick": 10, "standard": 240})
 def mms(run):
-    """Orders of all families; forcing against an evaluation without derivation."""
+    """Record the orders of all families, and the forcing against one without derivation."""
     record_forcing(run)
     families = run.choose(quick=(*SECOND_ORDER, CONTROL), standard=ALL)
     rows, orders = [], {}
@@ -104,11 +105,11 @@ def mms(run):
 
 
 def record_forcing(run):
-    """Largest relative error of the body force over random points, in 2D and 3D."""
+    """Record the largest relative error of the body force over random points, in 2D and 3D."""
     worst = 0.0
     for d in (2, 3):
         for X, t in ((run.rng.random(d), run.rng.random() * 2.0 / C) for _ in range(4)):
-            b = axis_aligned_forcing(LAW, RHO0, (A, C), X, t)
+            b = forcing_by_differences(LAW, RHO0, (A, C), X, t)
             ours = forcing(d)(LAW.mu, LAW.lam, RHO0, A, C, t, *X)
             worst = max(worst, float(np.max(abs(ours - b)) / np.max(np.abs(b))))
     run.record("verification.mms.forcing", worst, comparator="<=", bound=1e-10,
@@ -117,7 +118,7 @@ def record_forcing(run):
 
 
 def record_orders(run, orders):
-    """The orders that the theory of B-spline MPM promises, and those it denies."""
+    """Record the orders that the theory of B-spline MPM promises, and those it denies."""
     scale = f"{CELLS} cells per side, {CFL} of the CFL limit, one oscillation"
     for family in SECOND_ORDER:
         run.record(f"verification.mms.order.{name(family)}", orders[family], paper=2.0,
@@ -134,7 +135,7 @@ def record_orders(run, orders):
 
 
 def record_3d(run):
-    """One family in 3D; 8 cells would be too few for an order, as they are in 2D."""
+    """Record one family in 3D; 8 cells would be too few for an order, as they are in 2D."""
     family, cells = SECOND_ORDER[0], (16, 24, 32)
     p, rows = sweep(family, cells, dim=3)
     run.table("errors-3d", COLUMNS, rows)

@@ -26,9 +26,9 @@ from mpm_ref.materials import FixedCorotated, Hencky, LogNeoHookean, lame, stiff
 
 from ..common.registry import experiment
 from .convergence import order
+from .lattice import strip, strip_stepper
 from .mms import name
 from .settle import Pace, settle
-from .strip import stepper, strip
 
 H, RHO0, STRETCH, SCHEME = 1.0, 1000.0, 0.75, ("mls", 2, 2)
 MODULI = lame(1e6, 0.3)
@@ -38,7 +38,7 @@ CFL = 0.3           # of sound at rest: compressed matter is up to twice as stif
 
 
 def closed_form(law, s):
-    """P and tau_yy [Pa] at the stretch s."""
+    """Return P and tau_yy [Pa] at the stretch s."""
     mu, lam = law
     if isinstance(law, FixedCorotated):
         return (lam + 2.0 * mu) * (s - 1.0), lam * s * (s - 1.0)
@@ -55,20 +55,20 @@ class Pressed(NamedTuple):
 
 
 def press(law, cells):
-    """Result under load, with so many cells over H; mean over the middle half."""
+    """Return the result under load with a number of cells over H: means over the middle half."""
     dx, sound = H / cells, sqrt(stiffness(law) / RHO0)
     column, X = strip(-H, H, dx, RHO0, law, SCHEME)
     P, tau_yy = closed_form(law, STRETCH)
     load = np.zeros((len(X), 2))
     load[:, 0] = np.where(np.abs(X) > 0.75 * H, np.sign(X) * P / (0.25 * H * RHO0), 0.0)
-    settle(column, stepper(dx, SCHEME), load, Pace(0.5 * pi * sound / H, CFL * dx / sound))
+    settle(column, strip_stepper(dx, SCHEME), load, Pace(0.5 * pi * sound / H, CFL * dx / sound))
     q, middle = column.particles, np.abs(X) < 0.5 * H
     return Pressed(float(q.F[middle, 0, 0].mean()) / STRETCH - 1.0,
                    float(q.tau[middle, 1, 1].mean()) / tau_yy - 1.0)
 
 
 class Metered:
-    """Conditions that keep the forces on the matter in the last step [N/m per metre]."""
+    """Conditions that measure the forces on the matter in the last step [N/m per metre]."""
 
     moves = True
 
@@ -82,7 +82,7 @@ class Metered:
 
 
 def platen_force(law, cells):
-    """Force on the platen relative to P, less 1."""
+    """Return the force on the platen relative to P, less 1."""
     dx, sound = H / cells, sqrt(stiffness(law) / RHO0)
     lowest = pi * sound / H
     time = 20.0 / lowest
@@ -91,7 +91,7 @@ def platen_force(law, cells):
     floor = Collider(half_space((0.0, 0.0), (1.0, 0.0)))
     platen = Collider(half_space((H, 0.0), (-1.0, 0.0)), motion=down)
     metered = Metered(Conditions(colliders=(floor, platen)), dx)
-    settle(column, stepper(dx, SCHEME, metered), np.zeros((len(X), 2)),
+    settle(column, strip_stepper(dx, SCHEME, metered), np.zeros((len(X), 2)),
            Pace(lowest, CFL * dx / sound, waits=40.0))
     return float(metered.forces[1, 0]) / closed_form(law, STRETCH)[0] - 1.0
 
@@ -99,13 +99,13 @@ def platen_force(law, cells):
 @experiment("verification.oedometer", title="Compression without widening, against closed forms",
             profiles=("quick", "standard"), budget={"quick": 4, "standard": 15})
 def oedometer(run):
-    """Laws under load; what a platen costs."""
+    """Record the laws under load, and the error of a platen."""
     cells = run.choose(quick=16, standard=64)
     laws = run.choose(quick=[*LAWS][:2], standard=[*LAWS])
     for key in run.progress(laws, "laws"):
         result = press(LAWS[key], cells)
-        for what in ("stretch", "lateral"):
-            run.record(f"verification.oedometer.load.{key}.{what}", getattr(result, what),
+        for quantity in ("stretch", "lateral"):
+            run.record(f"verification.oedometer.load.{key}.{quantity}", getattr(result, quantity),
                        paper=0.0, comparator="band", bound=(-2e-3, 2e-3),
                        scale=f"{cells} cells over H, {name(SCHEME)}, s = {STRETCH}",
                        note="relative error; bound 1 / (2 cells of quick)^2: second order")
@@ -113,7 +113,7 @@ def oedometer(run):
 
 
 def record_platen(run):
-    """The error of the force on a platen."""
+    """Record the error of the force on a platen."""
     cells, law = run.choose(quick=(8, 16, 32), standard=(16, 32, 64, 128)), LAWS["log-neo-hookean"]
     errors = [platen_force(law, n) for n in run.progress(cells, "platen")]
     run.table("platen", ("cells", "force_error"), list(zip(cells, errors, strict=True)))

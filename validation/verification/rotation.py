@@ -10,7 +10,7 @@ from mpm_ref.scene import Body, Box, Material, Regular, Scene, Scheme, Sphere, V
 from mpm_ref.simulate import simulate
 
 from ..common.registry import experiment
-from ..common.scenes import threads_for
+from ..common.scenes import evenly, threads_for
 from .symplectic import allowed_gain
 
 RADIUS, DX, SPIN = 0.5, 0.1, 1.0        # [m], [m], [rad/s]
@@ -20,8 +20,8 @@ AXIS = np.array([1.0, 2.0, 2.0]) / 3.0  # of the cube: along no edge or diagonal
 MATERIAL = Material(law="fixed_corotated", E=1e4, nu=0.3)
 
 
-class History(NamedTuple):
-    """What is measured after each of S steps."""
+class SpinHistory(NamedTuple):
+    """Measurements after each of S steps."""
 
     t: np.ndarray           # (S,)     [s]
     L: np.ndarray           # (S, ..)  angular momentum, spin of the affine field included
@@ -30,14 +30,14 @@ class History(NamedTuple):
 
 
 def disk(transfer, revolutions):
-    """A disk of 3 x 3 particles per cell in 2D, at no special place of the grid."""
+    """Return the scene of a 2D disk of 3 x 3 particles per cell, anywhere in the grid."""
     body = Body(name="disk", density=1000.0, material=MATERIAL, sampling=Regular(per_cell=3),
                 shape=Sphere(center=(0.03, 0.02), radius=RADIUS), velocity=Velocity(angular=SPIN))
     return spinning(body, 2, transfer, revolutions)
 
 
 def cube(transfer, revolutions):
-    """A cube of 2 x 2 x 2 particles per cell, spinning about an oblique axis."""
+    """Return the scene of a cube of 2 x 2 x 2 particles per cell with an oblique axis of spin."""
     low, high = (0.03 - RADIUS,) * 3, (0.03 + RADIUS,) * 3
     body = Body(name="cube", density=1000.0, material=MATERIAL, sampling=Regular(per_cell=2),
                 shape=Box(lower=low, upper=high), velocity=Velocity(angular=tuple(SPIN * AXIS)))
@@ -45,21 +45,21 @@ def cube(transfer, revolutions):
 
 
 def spinning(body, dim, transfer, revolutions):
-    """Scene of one body in free space."""
+    """Return the scene of one body in free space."""
     return Scene(dim=dim, dx=DX, cfl=0.4, end=revolutions * 2.0 * pi / SPIN, every=1, body=(body,),
                  scheme=Scheme(transfer=transfer))
 
 
 def spin_matrix(dim):
-    """W with W x = angular velocity cross x."""
+    """Return W with W x = angular velocity cross x."""
     if dim == 2:
         return SPIN * np.array([[0.0, -1.0], [1.0, 0.0]])
     x, y, z = SPIN * AXIS
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
-def history(scene):
-    """Run a scene; the affine field, where there is one, starts as that of the rotation."""
+def spin_history(scene):
+    """Return the `SpinHistory` of a scene; an affine field starts as that of the rotation."""
     problem, rows = build(scene), []
     if problem.scheme.affine:
         problem.bodies[0].particles.C[:] = spin_matrix(scene.dim)
@@ -68,24 +68,28 @@ def history(scene):
             L = angular_momentum(frame.state.bodies, problem.inertia)
             E = energy(frame.state.bodies, problem.gravity, problem.inertia)
             rows.append((frame.t, L, E.kinetic, E.elastic))
-    return History(*map(np.array, zip(*rows, strict=True)))
+    return SpinHistory(*map(np.array, zip(*rows, strict=True)))
 
 
 def loss_per_step(L):
-    """Largest change of angular momentum in a step, relative to its size at the start."""
+    """Return the largest change of angular momentum in a step over its size at the start."""
     return float(np.max(np.linalg.norm(np.diff(L, axis=0), axis=1)) / np.linalg.norm(L[0]))
 
 
 def pic_loss():
-    """Share of L that PIC drops in its first step: 2 D m spin of m R^2/2 spin, D = dx^2/4."""
+    """Return the share of L that PIC drops in its first step.
+
+    It is 2 D m spin of m R^2/2 spin, D = dx^2/4.
+    """
     return DX**2 / RADIUS**2
 
 
 @experiment("verification.rotation", title="A free body spins: angular momentum and energy",
             profiles=("quick", "standard"), budget={"quick": 8, "standard": 120})
 def rotation(run):
-    """Disk (and cube) with each transfer: L per step, energy never above what the integrator may
-    add.
+    """Record L per step and the energy of a disk (and a cube) with each transfer.
+
+    The energy may grow no more than symplectic Euler allows.
     """
     revolutions = run.choose(quick=1, standard=10)
     bodies = run.choose(quick=(disk,), standard=(disk, cube))
@@ -93,13 +97,13 @@ def rotation(run):
     for make in bodies:
         for transfer in run.progress(("mls", "apic", "flip", "pic"), make.__name__):
             turns = revolutions if make is disk else 1
-            h = history(make(transfer, turns))
-            judge(run, make.__name__, transfer, h)
-            rows += table(make.__name__, transfer, h)
+            h = spin_history(make(transfer, turns))
+            record_spin(run, make.__name__, transfer, h)
+            rows += history_rows(make.__name__, transfer, h)
     run.table("history", ("body", "transfer", "turns", "L", "energy"), rows)
 
 
-def judge(run, body, transfer, h):
+def record_spin(run, body, transfer, h):
     """Record the numbers of one body and transfer."""
     name, total = f"verification.rotation.{body}.{transfer}", h.kinetic + h.elastic
     scale = f"{len(h.t) - 1} steps, {h.t[-1] * SPIN / (2.0 * pi):.3g} revolutions, dx = R/5"
@@ -120,9 +124,8 @@ def judge(run, body, transfer, h):
     run.record(f"{name}.energy_kept", float(total[-1] / total[0]), comparator="info", scale=scale)
 
 
-def table(body, transfer, h):
-    """Rows of the history, thinned."""
+def history_rows(body, transfer, h):
+    """Return SHOWN rows of the history."""
     total, size = h.kinetic + h.elastic, np.linalg.norm(h.L, axis=1)
-    chosen = np.unique(np.linspace(0, len(h.t) - 1, SHOWN).round().astype(int))
     return [(body, transfer, h.t[k] * SPIN / (2.0 * pi), size[k] / size[0], total[k] / total[0])
-            for k in chosen]
+            for k in evenly(len(h.t), SHOWN)]

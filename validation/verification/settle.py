@@ -1,9 +1,9 @@
 """Quasi-static states by damping: a dynamic run in which every particle is braked.
 
 The body force of a particle is its load less 2 omega v_p, where omega is the lowest frequency of
-the body: that mode is damped critically, all others decay as exp(-omega t). What is left of the
-lowest one after a time t is (1 + omega t) exp(-omega t). At rest the brake does nothing, so that
-the final state does not depend on it.
+the body: that mode is damped critically, all others decay as exp(-omega t). After a time t the part
+(1 + omega t) exp(-omega t) of the lowest one is left. At rest the brake does nothing, so that the
+final state does not depend on it.
 """
 
 from math import ceil
@@ -13,7 +13,7 @@ from ..common.scenes import threads_for
 
 
 class Pace(NamedTuple):
-    """How a body is brought to rest."""
+    """The settings with which a body is brought to rest."""
 
     omega: float            # its lowest frequency [1/s]
     dt: float               # largest step [s]

@@ -19,11 +19,17 @@ from mpm_ref.materials import LogNeoHookean, lame, stiffness
 
 from ..common.registry import experiment
 from .convergence import order
-from .independent import vortex_forcing
 from .lattice import body, lattice
-from .manufactured_runs import LOST, follow, steps_of
+from .manufactured import LOST, follow, step_count
 from .mms import SECOND_ORDER, name
-from .vortex_motion import INNER, OUTER, Vortex, forcing, printed_forcing
+from .vortex_motion import (
+    INNER,
+    OUTER,
+    Vortex,
+    forcing,
+    forcing_by_differences,
+    printed_forcing,
+)
 
 E, NU, RHO0, PERIOD = 1e6, 0.3, 1000.0, 1.0
 LAW = LogNeoHookean(*lame(E, NU))
@@ -37,8 +43,8 @@ TWIST = 0.1         # G [rad] of the orders: the largest shear is 0.7, particles
 TWISTED = ((pi / 12, 3, (16, 32, 64)), (pi / 4, 3, (16, 32)), (pi / 4, 6, (16, 32)))
 
 
-class Case(NamedTuple):
-    """One run."""
+class VortexRun(NamedTuple):
+    """The settings of one run."""
 
     transfer: str
     degree: int
@@ -48,25 +54,25 @@ class Case(NamedTuple):
 
     @property
     def stretch(self):
-        """Largest stretch: that of a simple shear by 7.1 G, see `vortex_motion`."""
+        """Return the largest stretch: that of a simple shear by 7.1 G, see `vortex_motion`."""
         half = 0.5 * 7.1 * self.twist
         return half + sqrt(1.0 + half**2)
 
     @property
     def dt(self):
-        """Largest time step [s]."""
+        """Return the largest time step [s]."""
         return CFL / (self.cells * SOUND * self.stretch)
 
 
-class Outcome(NamedTuple):
-    """What a run gave."""
+class VortexError(NamedTuple):
+    """The error of a run, and its smallest volume ratio."""
 
     error: float        # relative to the largest displacement of the middle circle
     J: float            # the smallest at the end; NaN if the run was lost
 
 
-def turned(case):
-    """`Outcome` of a run."""
+def vortex_error(case):
+    """Return the `VortexError` of a `VortexRun`."""
     dx, spacing = 1.0 / case.cells, 1.0 / (case.cells * case.per)
     half = dx * ceil(OUTER / dx + REST)
     X = lattice([-half] * 2, [half] * 2, spacing)
@@ -77,22 +83,22 @@ def turned(case):
     stepper = Stepper(Scheme(case.degree, case.transfer), dx, 2, np.zeros(2))
     error = follow(ring, motion, stepper, 0.5 * PERIOD, case.dt)
     J = np.linalg.det(ring.particles.F).min() if error < LOST else np.nan
-    return Outcome(error / case.twist, float(J))
+    return VortexError(error / case.twist, float(J))
 
 
 @experiment("verification.vortex", title="Generalized vortex: forcing and order of accuracy",
             profiles=("quick", "standard"), budget={"quick": 12, "standard": 1200})
 def vortex(run):
-    """Forcing, orders at a moderate twist, and what larger twists do."""
+    """Record the forcing, orders at a moderate twist, and errors at larger twists."""
     record_forcing(run)
     record_sign(run)
     cells = run.choose(quick=(8, 16, 32), standard=(16, 32, 64))
     families = run.choose(quick=SECOND_ORDER[:1], standard=SECOND_ORDER)
     rows = []
     for family in families:
-        cases = [Case(*family, n) for n in cells]
-        errors = [turned(case).error for case in run.progress(cases, name(family))]
-        rows += [(*family, case.cells, TWIST, steps_of(0.5 * PERIOD, case.dt), e)
+        cases = [VortexRun(*family, n) for n in cells]
+        errors = [vortex_error(case).error for case in run.progress(cases, name(family))]
+        rows += [(*family, case.cells, TWIST, step_count(0.5 * PERIOD, case.dt), e)
                  for case, e in zip(cases, errors, strict=True)]
         run.record(f"verification.vortex.order.{name(family)}",
                    order([1.0 / n for n in cells], errors), paper=2.0, comparator="band",
@@ -104,11 +110,11 @@ def vortex(run):
 
 
 def record_forcing(run):
-    """Largest relative error of the body force over random points of the ring and times."""
+    """Record the largest relative error of the body force over random points and times."""
     worst = 0.0
     for r, theta, t in run.rng.uniform((INNER, 0.0, 0.0), (OUTER, 2.0 * pi, PERIOD), (6, 3)):
         radial = np.array([np.cos(theta), np.sin(theta)])
-        b = vortex_forcing(LAW, RHO0, (1.0, PERIOD), r * radial, t)
+        b = forcing_by_differences(LAW, RHO0, (1.0, PERIOD), r * radial, t)
         b_r, b_t = forcing()(*MATTER, 1.0, PERIOD, t, r)
         ours = b_r * radial + b_t * np.array([-radial[1], radial[0]])
         worst = max(worst, float(np.max(abs(ours - b)) / np.hypot(*b)))
@@ -118,7 +124,7 @@ def record_forcing(run):
 
 
 def record_sign(run):
-    """How far the forcing with +R (g' h)^2 is from the exact one, relative to the largest |b|."""
+    """Record the error of the forcing with +R (g' h)^2, relative to the largest |b|."""
     r, times, rows = np.linspace(INNER, OUTER, 201), np.linspace(0.0, PERIOD, 101)[1:-1], []
     for turn, label in ((1.0, "1"), (pi, "pi")):
         exact = np.array([forcing()(*MATTER, turn, PERIOD, t, r) for t in times])
@@ -135,18 +141,18 @@ def record_sign(run):
 
 
 def record_twists(run):
-    """Errors at larger twists, and how many particles they ask for."""
+    """Record errors at larger twists, and the number of particles they ask for."""
     rows = []
     for twist, per, cells in run.progress(TWISTED, "twists"):
-        cases = [Case("mls", 3, per, n, twist) for n in cells]
-        outcomes = [turned(case) for case in cases]
-        rows += [(twist, per, case.cells, *o) for case, o in zip(cases, outcomes, strict=True)]
+        cases = [VortexRun("mls", 3, per, n, twist) for n in cells]
+        errors = [vortex_error(case) for case in cases]
+        rows += [(twist, per, case.cells, *o) for case, o in zip(cases, errors, strict=True)]
         gap = cases[0].stretch / per
         rule = {"comparator": "band", "bound": (1.8, 2.3)} if gap < 1.0 else {"comparator": "info"}
         run.record(f"verification.vortex.twist-{round(np.degrees(twist))}.{name(cases[0][:3])}",
-                   order([1.0 / n for n in cells], [o.error for o in outcomes]), paper=2.0,
+                   order([1.0 / n for n in cells], [o.error for o in errors]), paper=2.0,
                    **rule, scale=f"{cells} cells per metre",
-                   note=f"errors {', '.join(f'{o.error:.2g}' for o in outcomes)}, smallest J "
-                        f"{', '.join(f'{o.J:.2g}' for o in outcomes)}. The shear draws particles "
+                   note=f"errors {', '.join(f'{o.error:.2g}' for o in errors)}, smallest J "
+                        f"{', '.join(f'{o.J:.2g}' for o in errors)}. The shear draws particles "
                         f"apart to {gap:.2f} dx; beyond about one cell the body tears")
     run.table("twists", ("twist", "per_direction", "cells", "error", "smallest_J"), rows)

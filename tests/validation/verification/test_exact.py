@@ -11,11 +11,16 @@ from mpm_ref.materials import LogNeoHookean, lame
 from validation.verification import axis_aligned, oedometer, vortex_motion
 from validation.verification.axis_aligned import AxisAligned
 from validation.verification.bar import frequency
-from validation.verification.columns import Column, Settled, stress_errors
+from validation.verification.cantilever import deflected, timoshenko
 from validation.verification.convergence import extrapolated, order, rms
-from validation.verification.elastica import deflected, timoshenko
-from validation.verification.hydrostatic import WATER, place_error
-from validation.verification.independent import axis_aligned_forcing, energy, vortex_forcing
+from validation.verification.manufactured import energy_density
+from validation.verification.settled_columns import (
+    WATER,
+    Column,
+    Settled,
+    place_error,
+    stress_errors,
+)
 from validation.verification.vortex_motion import INNER, OUTER, Vortex, part_in_ring
 
 MU, LAM = lame(1e6, 0.3)
@@ -42,7 +47,7 @@ def vortex_closed_form(turn, period, t, r, sign=-1.0):
 
 def test_axis_aligned_forcing_is_that_of_the_motion(d, rng):
     for X, t in ((rng.random(d), rng.random()) for _ in range(2)):
-        b = axis_aligned_forcing(LAW, RHO0, (0.05, 30.0), X, t)
+        b = axis_aligned.forcing_by_differences(LAW, RHO0, (0.05, 30.0), X, t)
         ours = axis_aligned.forcing(d)(*MATTER, 0.05, 30.0, t, *X)
         np.testing.assert_allclose(ours, b, rtol=1e-12, atol=1e-12 * max(map(abs, b)))
 
@@ -60,7 +65,7 @@ def test_axis_aligned_forcing_is_the_closed_form(d, rng):
 
 def test_vortex_forcing_is_that_of_the_motion(rng):
     for X, t in zip(ring_points(rng, 3), rng.random(3), strict=True):
-        b = vortex_forcing(LAW, RHO0, (1.0, 1.0), X, t)
+        b = vortex_motion.forcing_by_differences(LAW, RHO0, (1.0, 1.0), X, t)
         radial = X / np.hypot(*X)
         b_r, b_t = vortex_motion.forcing()(*MATTER, 1.0, 1.0, t, np.hypot(*X))
         ours = b_r * radial + b_t * np.array([-radial[1], radial[0]])
@@ -81,7 +86,7 @@ def test_energy_of_the_differences_is_the_law(d, rng):
     F = np.eye(d) + 0.2 * rng.standard_normal((d, d))
     J = np.linalg.det(F)
     psi = MU / 2 * ((F * F).sum() - d) - MU * np.log(J) + LAM / 2 * np.log(J) ** 2
-    assert float(energy(LAW)(F.tolist())) == pytest.approx(psi, rel=1e-12)
+    assert float(energy_density(LAW)(F.tolist())) == pytest.approx(psi, rel=1e-12)
 
 
 @pytest.mark.parametrize("name", ["axis-aligned", "vortex"])

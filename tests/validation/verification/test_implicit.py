@@ -1,4 +1,4 @@
-"""Runs of the implicit step's verification: what a course keeps, and that a method cannot lie."""
+"""Runs of the implicit step's verification: histories, and solves that did not converge."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from validation.verification import implicit as module
 from validation.verification.implicit import (
     EPS,
     EnergyHistory,
-    displaced,
+    energy_history,
     implicit,
     record_minimisers,
     rise,
@@ -27,31 +27,31 @@ def test_every_method_solves_to_the_same_tolerance():
         assert (options.method, options.eps, options.norm) == (method, EPS, "characteristic")
 
 
-def test_course_says_which_solves_did_not_converge():
-    assert displaced(implicit("pn-pcg"), 1).missed == []
-    missed = displaced(implicit("pn-pcg", max_iterations=1), 2).missed
+def test_history_says_which_solves_did_not_converge():
+    assert energy_history(implicit("pn-pcg"), 1).missed == []
+    missed = energy_history(implicit("pn-pcg", max_iterations=1), 2).missed
     assert len(missed) == 2
     assert "the cap" in missed[0]
 
 
 def test_rise_is_the_largest_of_a_step():
-    course = EnergyHistory(np.zeros((1, 2)), np.array([4.0, 2.0, 3.0, 1.0]), [])
-    assert rise(course) == 0.25
-    assert rise(course._replace(energies=np.array([4.0, 3.0, 1.0]))) == -0.25
+    history = EnergyHistory(np.zeros((1, 2)), np.array([4.0, 2.0, 3.0, 1.0]), [])
+    assert rise(history) == 0.25
+    assert rise(history._replace(energies=np.array([4.0, 3.0, 1.0]))) == -0.25
 
 
-def test_methods_that_end_elsewhere_or_miss_are_told(monkeypatch):
-    ways = {"pn-pcg": 0.0, "hot": 0.0, "admm": 0.5}
-    monkeypatch.setattr(module, "METHODS", ways)
+def test_methods_that_end_at_other_states_or_miss_are_recorded(monkeypatch):
+    offsets = {"pn-pcg": 0.0, "hot": 0.0, "admm": 0.5}
+    monkeypatch.setattr(module, "METHODS", offsets)
     monkeypatch.setattr(module, "implicit", lambda method: method)
-    course = EnergyHistory(np.zeros((3, 2)), np.ones(2), [])
-    monkeypatch.setattr(module, "displaced", lambda method, steps: course._replace(
-        x=ways[method] * module.DX * np.eye(3, 2), missed=["capped"] if ways[method] else []))
-    found = Records()
-    record_minimisers(found, 1, course)
-    assert found["verification.implicit.hot"][0] == 0.0
-    assert found["verification.implicit.admm"][0] == pytest.approx(0.5)
-    value, note = found["verification.implicit.missed"]
+    history = EnergyHistory(np.zeros((3, 2)), np.ones(2), [])
+    monkeypatch.setattr(module, "energy_history", lambda method, steps: history._replace(
+        x=offsets[method] * module.DX * np.eye(3, 2), missed=["capped"] if offsets[method] else []))
+    records = Records()
+    record_minimisers(records, 1, {"pn-pcg": history})
+    assert records["verification.implicit.hot"][0] == 0.0
+    assert records["verification.implicit.admm"][0] == pytest.approx(0.5)
+    value, note = records["verification.implicit.missed"]
     assert value == 1
     assert "admm: capped" in note
-    assert "verification.implicit.pn-pcg" not in found
+    assert "verification.implicit.pn-pcg" not in records

@@ -13,8 +13,15 @@ from mpm_ref.scene import build
 from validation.common.scenes import catalogue_scene, mean, threads_for
 from validation.common.settings import record_settings
 from validation.nclaw.final_states import digest
-from validation.verification import block, bowl, collapse, column, dam_break, disks, rings, rotation
-from validation.verification.symplectic import allowed_gain, travelled
+from validation.verification import (
+    bowl,
+    collisions,
+    dam_break,
+    incline,
+    rotation,
+    sand_column,
+)
+from validation.verification.symplectic import allowed_gain, distance_travelled
 
 
 def oscillator(steps, dt, explicit=False):
@@ -37,12 +44,12 @@ def cloud(x, id=None):
 
 # symplectic Euler
 
-def test_way_is_the_sum_of_the_steps():
+def test_distance_is_the_sum_of_the_steps():
     v0, a, dt, x, v = 0.3, -1.7, 0.01, 0.0, 0.3
     for _ in range(250):
         v += dt * a
         x += dt * v
-    assert x == pytest.approx(travelled(v0, a, 2.5, dt), rel=1e-13)
+    assert x == pytest.approx(distance_travelled(v0, a, 2.5, dt), rel=1e-13)
 
 
 @pytest.mark.parametrize("dt", [0.05, 0.01])
@@ -73,8 +80,8 @@ def test_pic_drops_the_spin_of_each_particles_surroundings():
     """Sum of (x_i - x_p) cross v_i w_ip over the nodes, for v = spin cross x, over L of a disk."""
     D = rotation.DX**2 * 3.0 / 12.0
     per_mass = D * (rotation.spin_matrix(2)[1, 0] - rotation.spin_matrix(2)[0, 1])
-    whole = 0.5 * rotation.RADIUS**2 * rotation.SPIN
-    assert rotation.pic_loss() == pytest.approx(per_mass / whole)
+    total = 0.5 * rotation.RADIUS**2 * rotation.SPIN
+    assert rotation.pic_loss() == pytest.approx(per_mass / total)
 
 
 def test_loss_is_the_largest_of_all_steps():
@@ -84,7 +91,7 @@ def test_loss_is_the_largest_of_all_steps():
 # collisions
 
 def test_disks_touch_when_they_are_two_radii_apart():
-    scene, t = catalogue_scene("colliding_disks"), disks.touching_time()
+    scene, t = catalogue_scene("colliding_disks"), collisions.touching_time()
     a, b = (np.array(body.shape.center) + t * np.array(body.velocity.linear)
             for body in scene.body)
     assert np.linalg.norm(b - a) == pytest.approx(2.0 * scene.body[0].shape.radius)
@@ -99,11 +106,11 @@ def test_splines_of_particles_three_cells_apart_do_not_overlap():
     near = np.array([base_of(p + 2.01, 1.0, STENCILS[2]) for p in x])
     assert (far >= first + nodes).all()
     assert (near < first + nodes).any()
-    assert pytest.approx(nodes * sqrt(2.0)) == disks.REACH
+    assert pytest.approx(nodes * sqrt(2.0)) == collisions.OVERLAP
 
 
 def test_rings_have_the_published_energy():
-    bodies = build(rings.rings(0.4, "mls")).bodies
+    bodies = build(collisions.ring_scene(0.4, "mls")).bodies
     kinetic = sum(0.5 * float(b.particles.m @ np.sum(b.particles.v**2, axis=1)) for b in bodies)
     area = 2.0 * pi * (4.0**2 - 3.0**2)
     assert kinetic == pytest.approx(0.5 * 1000.0 * area * 30.0**2)
@@ -113,22 +120,22 @@ def test_rings_have_the_published_energy():
 
 @pytest.mark.parametrize("tilted", [False, True])
 def test_slope_turns_gravity_or_itself(tilted):
-    slope = block.Slope(24.0, 15.0, tilted)
+    slope = incline.Slope(24.0, 15.0, tilted)
     gravity = slope.pull * slope.along - slope.press * slope.normal
     assert slope.along @ slope.normal == pytest.approx(0.0, abs=1e-15)
-    assert np.linalg.norm(gravity) == pytest.approx(block.G)
+    assert np.linalg.norm(gravity) == pytest.approx(incline.G)
     if tilted:
-        assert gravity == pytest.approx([0.0, -block.G], abs=1e-14)
+        assert gravity == pytest.approx([0.0, -incline.G], abs=1e-14)
     else:
         assert slope.normal == pytest.approx([0.0, 1.0])
 
 
 def test_acceleration_is_newtons():
-    slope = block.Slope(24.0, 15.0, True)
-    expected = block.G * (sin(radians(24.0)) - np.tan(radians(15.0)) * cos(radians(24.0)))
+    slope = incline.Slope(24.0, 15.0, True)
+    expected = incline.G * (sin(radians(24.0)) - np.tan(radians(15.0)) * cos(radians(24.0)))
     assert slope.acceleration == pytest.approx(expected)
-    assert block.Slope(24.0, 24.1, True).acceleration == 0.0
-    assert block.Slope(24.0, 0.0, True).acceleration == pytest.approx(slope.pull)
+    assert incline.Slope(24.0, 24.1, True).acceleration == 0.0
+    assert incline.Slope(24.0, 0.0, True).acceleration == pytest.approx(slope.pull)
 
 
 def test_pendulum_speed_solves_its_equation():
@@ -136,7 +143,7 @@ def test_pendulum_speed_solves_its_equation():
     depth = l * cos(angle)
 
     def rate(y):
-        return np.array([y[1], -block.G * l * sin(y[0]) / k2])
+        return np.array([y[1], -incline.G * l * sin(y[0]) / k2])
 
     y = np.array([angle, omega])
     while y[0] > 0.0:
@@ -161,9 +168,9 @@ def test_ritters_flow_solves_the_shallow_water_equations():
     g, h0, x, t, eps = 9.81, 2.0, 1.3, 0.7, 1e-5
 
     def slope(f, axis):
-        at = np.array([x, t])
+        point = np.array([x, t])
         step = eps * np.eye(2)[axis]
-        return (f(*(at + step)) - f(*(at - step))) / (2.0 * eps)
+        return (f(*(point + step)) - f(*(point - step))) / (2.0 * eps)
 
     def h(x, t):
         return ritter_flow(x, t, h0, g)[0]
@@ -199,37 +206,38 @@ def test_measured_front_speeds_up_but_stays_behind_ritter():
 # columns of sand
 
 def test_quarter_of_a_cylinder_has_its_mass():
-    q = build(collapse.scene(collapse.Case(3, 2.0, 4))).bodies[0].particles
-    volume = pi * collapse.WIDTH**2 / 4.0 * 2.0 * collapse.WIDTH
+    q = build(sand_column.column_scene(sand_column.SandColumn(3, 2.0, 4))).bodies[0].particles
+    volume = pi * sand_column.WIDTH**2 / 4.0 * 2.0 * sand_column.WIDTH
     assert q.m.sum() == pytest.approx(1600.0 * volume, rel=1e-3)
     assert (q.x > 0.0).all()
 
 
 def test_surface_is_the_highest_particle_of_each_ring():
     x = [[0.04, 0.0, 0.5], [0.0, 0.03, 0.9], [0.09, 0.12, 0.2]]
-    assert collapse.surface(np.array(x), 0.1) == pytest.approx(np.array([[0.05, 0.9], [0.15, 0.2]]))
+    surface = sand_column.surface(np.array(x), 0.1)
+    assert surface == pytest.approx(np.array([[0.05, 0.9], [0.15, 0.2]]))
 
 
 @pytest.mark.parametrize(("dim", "exponent"), [(2, 2.0 / 3.0), (3, 0.5)])
 def test_quoted_laws_of_tall_columns_have_their_exponents(dim, exponent):
-    ratio = column.lube(dim, 8.0) / column.lube(dim, 4.0)
+    ratio = sand_column.lube(dim, 8.0) / sand_column.lube(dim, 4.0)
     assert np.log2(ratio) == pytest.approx(exponent)
 
 
 def test_quoted_law_leaves_the_gap_between_low_and_tall_open():
-    assert column.lube(2, 1.0) == pytest.approx(1.2)
-    assert column.lube(2, 2.0) is None
-    assert column.lube(3, 1.0) == pytest.approx(1.24)
+    assert sand_column.lube(2, 1.0) == pytest.approx(1.2)
+    assert sand_column.lube(2, 2.0) is None
+    assert sand_column.lube(3, 1.0) == pytest.approx(1.24)
 
 
 # states and settings
 
 def test_digest_knows_the_state_and_not_the_order():
     x = np.array([[0.1, 0.2], [0.3, 0.4], [0.5, 0.6]])
-    whole = digest(cloud(x))
-    assert digest(cloud(x[[2, 0, 1]], id=[2, 0, 1])) == whole
+    expected = digest(cloud(x))
+    assert digest(cloud(x[[2, 0, 1]], id=[2, 0, 1])) == expected
     x[1, 0] = np.nextafter(x[1, 0], 1.0)
-    assert digest(cloud(x)) != whole
+    assert digest(cloud(x)) != expected
 
 
 def test_mean_weighs_by_mass():

@@ -8,11 +8,9 @@ import pytest
 from mpm_ref.core.state import NONE
 from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.materials import LogNeoHookean, lame
-from validation.verification.lattice import body, lattice
-from validation.verification.manufactured_runs import put_on, steps_of
-from validation.verification.periodic import Periodic
+from validation.verification.lattice import Periodic, body, lattice, strip, strip_stepper
+from validation.verification.manufactured import put_on, step_count
 from validation.verification.settle import Pace, settle
-from validation.verification.strip import stepper, strip
 
 LAW = LogNeoHookean(*lame(1e4, 0.3))
 
@@ -75,7 +73,7 @@ def test_periodic_body_does_not_know_where_it_is_cut(rng):
 def test_strip_stays_one_dimensional():
     bar, X = strip(0.0, 4.0, 0.5, 1.0, LAW, ("mls", 2, 2))
     bar.particles.v[:, 0] = 0.1 * np.sin(X)
-    advance = stepper(0.5, ("mls", 2, 2))
+    advance = strip_stepper(0.5, ("mls", 2, 2))
     advance.start([bar])
     for k in range(5):
         advance.step([bar], k * 1e-3, 1e-3)
@@ -90,15 +88,15 @@ def test_settled_body_is_at_rest_and_carries_its_load():
     load = np.zeros((len(X), 2))
     load[:, 0] = np.where(np.abs(X) > 1.5, -np.sign(X) / 0.5, 0.0)
     sound = np.sqrt((LAW.lam + 2 * LAW.mu) / 1.0)
-    settle(bar, stepper(0.5, ("mls", 2, 2)), load, Pace(np.pi * sound / 4.0, 0.2 / sound))
+    settle(bar, strip_stepper(0.5, ("mls", 2, 2)), load, Pace(np.pi * sound / 4.0, 0.2 / sound))
     middle = np.abs(X) < 0.5      # farther out the jump of the load shows
     assert np.abs(bar.particles.v).max() < 1e-6 * sound
     np.testing.assert_allclose(bar.particles.tau[middle, 0, 0], -1.0, rtol=1e-3)
 
 
 def test_steps_meet_the_checks():
-    assert steps_of(1.0, 0.03) == 40
-    assert steps_of(1.0, 0.05) == 20
+    assert step_count(1.0, 0.03) == 40
+    assert step_count(1.0, 0.05) == 20
 
 
 def test_bodies_start_on_the_motion_half_a_step_back():
