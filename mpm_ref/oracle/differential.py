@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..plain.laws import principal
+from ..plain.laws import energy_and_stress
 from ..plain.tensors import compose, svd
 
 NEAR = 1e-2         # stretches nearer than this: the quotient would lose digits
@@ -35,7 +35,7 @@ class Modes(NamedTuple):
 
 def stresses(s, law):
     """Principal first Piola-Kirchhoff stresses (N, d)."""
-    return principal(s, law)[1] / s
+    return energy_and_stress(s, law)[1] / s
 
 
 def slopes(s, law):

@@ -13,9 +13,9 @@ import scipy.sparse as sp
 
 from ..plain import potential, transfer
 from ..plain.flows import intact
-from ..plain.laws import energy, principal
+from ..plain.laws import energy, energy_and_stress
 from ..plain.spline import bspline, pairs
-from ..plain.step import Nodes, Step, after, deform, to_particles
+from ..plain.step import Nodes, StepStages, deform, grid_to_particles, new_state
 from ..plain.tensors import compose, det, svd
 from . import differential, error_bounds
 from .plain_twin import REAL, Twin, aligned, values_at
@@ -45,9 +45,9 @@ class SolvedTwin(Twin):
             self.B = error_bounds.perturbed(self.B, rng, np.ones(len(self.B)))
         self.whole = [q._replace(V0=q.V0 * (1 if q.y is None else intact(q.y, q.flow)))
                       for q in self.bodies]
-        self.clouds = [pairs(q.x, self.method.dx, self.method.degree) for q in self.bodies]
-        box = transfer.box_of(*self.clouds)
-        both = list(zip(self.bodies, self.clouds))
+        self.stencils = [pairs(q.x, self.method.dx, self.method.degree) for q in self.bodies]
+        box = transfer.box_of(*self.stencils)
+        both = list(zip(self.bodies, self.stencils))
         self.m = sum(transfer.mass(q.m, ip, box) for q, ip in both)
         self.mv = sum(transfer.momentum(q.m, q.v, q.C, ip, box) for q, ip in both)
         self.v = self.mv / np.where(self.m > 0, self.m, 1)[..., None]
@@ -72,7 +72,7 @@ class SolvedTwin(Twin):
         """
         arrays = {"mass": self.m, "momentum": self.mv, "velocity_old": self.v}
         arrays = {name: self.nodal(a) for name, a in arrays.items()}
-        for name, ip in zip(self.names, self.clouds):
+        for name, ip in zip(self.names, self.stencils):
             base = ip.node[:, 0]
             arrays[f"{name}/weights"] = ip.w if bases is None else aligned(ip.w, base, bases[name])
         return arrays
@@ -127,14 +127,14 @@ class SolvedTwin(Twin):
         """Characteristic norms (n,) [kg m/s] (HOT-eq9)."""
         d = self.gravity.shape[0]
         xi = [rest_stiffness(q.law, d, self.real) for q in self.bodies]
-        shares = [transfer.mass(q.m, ip, self.box) for q, ip in zip(self.bodies, self.clouds)]
+        shares = [transfer.mass(q.m, ip, self.box) for q, ip in zip(self.bodies, self.stencils)]
         m = self.nodal(self.m)
         mean = self.nodal(sum(x * a for x, a in zip(xi, shares))) / np.where(m > 0, m, 1)
         return mean * 2 * d * (2 * self.method.dx) ** (d - 1) * self.dt
 
     def potential(self, dv):
         """E (1,) [J] and its gradient (n, d) on what is free [kg m/s]."""
-        bodies = [(q, ip, self.box) for q, ip in zip(self.whole, self.clouds)]
+        bodies = [(q, ip, self.box) for q, ip in zip(self.whole, self.stencils)]
         E, g = potential.evaluate(bodies, self.m, self.v, self.over(dv), self.dt, self.gravity)
         return np.array([E]), self.project(self.nodal(g))
 
@@ -144,7 +144,8 @@ class SolvedTwin(Twin):
 
     def at(self, dv):
         """`At` of every body at the increment dv (n, d)."""
-        return [self._at(q, ip, self.v + self.over(dv)) for q, ip in zip(self.bodies, self.clouds)]
+        v = self.v + self.over(dv)
+        return [self._at(q, ip, v) for q, ip in zip(self.bodies, self.stencils)]
 
     def _at(self, q, ip, u):
         A, F_n = potential.growth(u, self.dt, ip, self.box), as_matrices(q.F, self.gravity.shape[0])
@@ -155,7 +156,7 @@ class SolvedTwin(Twin):
         """B H B u (n, d) [kg m/s]."""
         u = self.over(self.project(u))
         total = self.m[..., None] * u
-        for q, ip, at in zip(self.whole, self.clouds, ats):
+        for q, ip, at in zip(self.whole, self.stencils, ats):
             dF = np.einsum("pab,pbc->pac", transfer.velocity_gradient(u, ip, self.box), at.F_n)
             T = np.einsum("pab,pcb->pac", differential.applied(at.modes, dF), at.F_n)
             total -= self.dt**2 * transfer.internal_force(q.V0, T, ip, self.box)
@@ -171,14 +172,14 @@ class SolvedTwin(Twin):
                 if "/" in key and not key.endswith("/weights")}
 
     def advance(self, v):
-        """Return the `plain.step.Step` under the nodal velocities v (n, d)."""
+        """Return the `plain.step.StepStages` under the nodal velocities v (n, d)."""
         grid = Nodes(self.box, self.m, self.mv, 0 * self.mv, self.v, self.over(v))
-        both = zip(self.bodies, self.clouds)
-        moved = [to_particles(q, ip, grid, self.method, self.dt) for q, ip in both]
-        moved = [self.clipped(new) for new in moved]
-        deformed = [deform(q, new.L, self.dt) for q, new in zip(self.bodies, moved)]
-        self.bodies = [after(*body) for body in zip(self.bodies, moved, deformed)]
-        return Step(self.clouds, grid, moved, deformed, self.dt)
+        both = zip(self.bodies, self.stencils)
+        motions = [grid_to_particles(q, ip, grid, self.method, self.dt) for q, ip in both]
+        motions = [self.clipped(motion) for motion in motions]
+        updates = [deform(q, motion.L, self.dt) for q, motion in zip(self.bodies, motions)]
+        self.bodies = [new_state(*body) for body in zip(self.bodies, motions, updates)]
+        return StepStages(self.stencils, grid, motions, updates, self.dt)
 
 
 def as_matrices(F, d):
@@ -198,7 +199,7 @@ def rest_stiffness(law, d, real):
 def kirchhoff_like(F, F_n, law):
     """P (F_n)^T (N, d, d) [Pa] at F, the stress that acts on the nodes (HOT-eq2)."""
     U, s, V = svd(F)
-    P = compose(U, principal(s, law)[1] / s, V)
+    P = compose(U, energy_and_stress(s, law)[1] / s, V)
     return np.einsum("pab,pcb->pac", P, F_n)
 
 

@@ -68,7 +68,7 @@ class Backwards:
         self.gravity_on_empty, self.dt = gravity_on_empty, done.stages.dt
         nodes = self.done.nodes
         self.box, self.D = nodes.box, plain_adjoint_sums.moment(self.method)
-        self.pairs = [curved_pairs(ip, self.method) for ip in self.done.clouds]
+        self.pairs = [curved_pairs(ip, self.method) for ip in self.done.stencils]
         self.full = nodes.m > 0
         m = np.where(self.full, nodes.m, 1)
         self.over_m = np.where(self.full, 1 / m, 0)
@@ -98,13 +98,13 @@ class Backwards:
 
     def deformation(self, k, seed):
         """Return the `DeformationBars` of one body."""
-        q, L = self.particles_before[k], self.done.moved[k].L
+        q, L = self.particles_before[k], self.done.motions[k].L
         G = np.eye(L.shape[1], dtype=L.dtype) + self.dt * L
         if q.F.ndim == 1:
             none = tuple(0 * q.m for _ in q.law)
             J_bar, L_bar = plain_adjoint_sums.swollen(G, q.F, seed.F, self.dt)
             return DeformationBars(None, None, J_bar, L_bar, none, ())
-        F_trial = self.done.deformed[k].F_trial
+        F_trial = self.done.updates[k].F_trial
         back = plain_adjoint_laws.of_return(q, F_trial, self.dt, seed.F, seed.y)
         F_bar, L_bar = plain_adjoint_sums.grown(G, q.F, back.F, self.dt)
         return DeformationBars(back.F, back.y, F_bar, L_bar, back.law, back.flow)
@@ -145,7 +145,7 @@ class Backwards:
 
     def positions(self, k, bar):
         """Return what g2p adds to the bar of x of one body."""
-        index = transfer.at(self.done.clouds[k], self.box)
+        index = transfer.node_index(self.done.stencils[k], self.box)
         v_old = None if bar.lag is None else self.v_old[index]
         return plain_adjoint_sums.positions(bar, self.pairs[k], self.done.nodes.v[index], v_old)
 
@@ -154,7 +154,7 @@ class Backwards:
         positions from g2p.
         """
         q = self.particles_before[k]
-        index, d = transfer.at(self.done.clouds[k], self.box), q.x.shape[1]
+        index, d = transfer.node_index(self.done.stencils[k], self.box), q.x.shape[1]
         tau = isotropic(q.tau, d) if q.tau.ndim == 1 else q.tau
         fields = ScatteredFields(q.m, q.V0, q.v, q.C, tau, q.b)
         new = plain_adjoint_sums.scattered(fields, self.pairs[k],

@@ -8,29 +8,30 @@ from ..plain import boundary
 
 
 def matrix(v, contacts):
-    """du/dv (d, d) of u = `plain.boundary.meet`(v, contacts)."""
+    """du/dv (d, d) of u = `plain.boundary.contact_velocity`(v, contacts)."""
     for kinds in (("prescribed",), ("prescribed", "sticky")):
-        if boundary.of_kind(contacts, v, *kinds):
+        if boundary.contacts_of_kind(contacts, v, *kinds):
             return np.zeros((len(v), len(v)), v.dtype)
-    planes = boundary.nearest(v, contacts)
+    planes = boundary.active_planes(v, contacts)
     if planes is None:
         return np.zeros((len(v), len(v)), v.dtype)
     return np.stack([rubbed(v, planes, e) for e in np.eye(len(v), dtype=v.dtype)], axis=1)
 
 
 def rubbed(v, planes, e):
-    """The change of `plain.boundary.rub`(v, planes) as v moves along e (d,)."""
+    """The change of `plain.boundary.apply_friction`(v, planes) as v moves along e (d,)."""
     still = [c._replace(v=0 * v) for c in planes]
-    u, du = v + boundary.change(v, planes), e + boundary.change(e, still)
-    loads = boundary.loads(v, planes)
+    u, du = v + boundary.correction(v, planes), e + boundary.correction(e, still)
+    loads = boundary.multipliers(v, planes)
     grips = [c.mu * abs(l) for c, l in zip(planes, loads)]
-    dgrips = [c.mu * np.sign(l) * dl for c, l, dl in zip(planes, loads, boundary.loads(e, still))]
+    changes = boundary.multipliers(e, still)
+    dgrips = [c.mu * np.sign(l) * dl for c, l, dl in zip(planes, loads, changes)]
     grip = sum(grips)
     if not grip > 0:
         return du
     drift = sum(g * c.v for g, c in zip(grips, planes)) / grip
     turning = sum(dg * (c.v - drift) for dg, c in zip(dgrips, planes)) / grip
-    t, dt = ((a + boundary.change(a, still)) for a in (u - drift, du - turning))
+    t, dt = ((a + boundary.correction(a, still)) for a in (u - drift, du - turning))
     speed = boundary.length(t)
     if grip >= speed:
         return du - dt

@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..plain.flows import FLOWS, in_type, intact
-from ..plain.laws import principal, volume
+from ..plain.flows import FLOWS, cast, intact
+from ..plain.laws import energy_and_stress, volume
 from ..plain.tensors import svd
 from .differential import COMPLEX, NEAR, TINY, derivatives, mean_slope
 
@@ -85,9 +85,9 @@ def of_stress(F, y, material, tau_bar):
     T = within(U, tau_bar, U)
     T = T if y is None else T * intact(y, flow)[:, None, None]
     diagonal = np.einsum("paa->pa", T)
-    c = divided(lambda s: principal(s, law)[1], s) / (s[:, :, None] + s[:, None, :])
+    c = divided(lambda s: energy_and_stress(s, law)[1], s) / (s[:, :, None] + s[:, None, :])
     Y = (T + np.swapaxes(T, 1, 2)) * c * s[:, None, :]
-    A = derivatives(lambda s: principal(s, law)[1], s)
+    A = derivatives(lambda s: energy_and_stress(s, law)[1], s)
     Y = on_diagonal(Y, np.einsum("pk,pkl->pl", diagonal, A))
     out = within(np.swapaxes(U, 1, 2), Y, np.swapaxes(V, 1, 2))
     return Stressed(out, tuple((diagonal * a).sum(axis=1) for a in by_moduli(s, law)))
@@ -95,7 +95,7 @@ def of_stress(F, y, material, tau_bar):
 
 def of_pressure(J, law, tau_bar):
     """The same of a fluid, of which J (N,) is carried; tau is isotropic."""
-    slope = principal(nudged(J[:, None]), law)[1][:, 0].imag / J.dtype.type(TINY)
+    slope = energy_and_stress(nudged(J[:, None]), law)[1][:, 0].imag / J.dtype.type(TINY)
     return Stressed(tau_bar * slope,
                     tuple(tau_bar * a[:, 0] for a in by_moduli(J[:, None], law)))
 
@@ -106,13 +106,13 @@ def by_moduli(s, law):
     moved = [list(map(z.dtype.type, law)) for _ in law]
     for k, moduli in enumerate(moved):
         moduli[k] += step * 1j
-    return [principal(z, type(law)(*moduli))[1].imag / step for moduli in moved]
+    return [energy_and_stress(z, type(law)(*moduli))[1].imag / step for moduli in moved]
 
 
 def returned(s, y, dt, law, flow):
     """Complex s and y after the return map of `plain.flows`."""
     real = s.dtype.type
-    s_new, y = FLOWS[type(flow).__name__](s, y, real(dt), in_type(law, real), in_type(flow, real))
+    s_new, y = FLOWS[type(flow).__name__](s, y, real(dt), cast(law, real), cast(flow, real))
     if type(flow).__name__ == "HerschelBulkley":
         s_new = at_volume(s_new, s)
     return s_new, y

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..plain import boundary
 from ..plain.laws import kirchhoff
-from ..plain.step import Matter, Method, after, energies, step, stress
+from ..plain.step import Matter, Method, energies, new_state, step, stress
 from . import error_bounds
 from .error_bounds import size
 
@@ -22,7 +22,7 @@ class TwinStep(NamedTuple):
 
     arrays: dict        # {key: array} of its stages, grid arrays on the nodes of the kernels
     before: list        # of `plain.step.Matter`, before the step
-    stages: object      # `plain.step.Step`
+    stages: object      # `plain.step.StepStages`
     contacts: dict      # {index of a node in the twin's box: its `Contact`s}
 
 
@@ -52,14 +52,14 @@ class Twin:
             local.update(contacts_in_box(contacts, box, self.real))
             speeds = {i: size(v[i], 0) + sum(size(c.v, 0) for c in at_node)
                       for i, at_node in local.items()}
-            return self.with_round_off(boundary.conditioned(v, local), speeds)
+            return self.with_round_off(boundary.apply_contacts(v, local), speeds)
 
         if self.rng is not None:
             self.bodies = [error_bounds.perturbed_body(q, self.rng) for q in self.bodies]
         before = self.bodies
         done = step(before, self.method, self.gravity, self.real(dt), conditions)
-        done = done._replace(moved=[self.clipped(new) for new in done.moved])
-        self.bodies = [after(*body) for body in zip(before, done.moved, done.deformed)]
+        done = done._replace(motions=[self.clipped(motion) for motion in done.motions])
+        self.bodies = [new_state(*body) for body in zip(before, done.motions, done.updates)]
         return TwinStep(self.arrays(done, nodes, bases), before, done, local)
 
     def with_round_off(self, after, sizes):
@@ -70,9 +70,9 @@ class Twin:
             return after
         return error_bounds.perturbed_conditions(after, sizes, self.rng)
 
-    def clipped(self, new):
+    def clipped(self, motion):
         """Return the particles' new state with positions inside the box of the problem, if any."""
-        return new if self.clip is None else new._replace(x=np.clip(new.x, *self.clip))
+        return motion if self.clip is None else motion._replace(x=np.clip(motion.x, *self.clip))
 
     def arrays(self, done, nodes, bases=None):
         """Return {key: array} of a step, as `kernel_stages.step` does."""
@@ -81,12 +81,12 @@ class Twin:
                   "velocity": grid.v_free, "velocity_bc": grid.v}
         arrays = {name: values_at(a, grid.box, nodes) for name, a in fields.items()}
         for k, name in enumerate(self.names):
-            base, w = done.clouds[k].node[:, 0], done.clouds[k].w
-            new, shape = done.moved[k], done.deformed[k]
+            base, w = done.stencils[k].node[:, 0], done.stencils[k].w
+            motion, update = done.motions[k], done.updates[k]
             own = {"weights": w if bases is None else aligned(w, base, bases[name]),
-                   "v": new.v, "x": new.x, "C": new.C, "L": new.L,
-                   "F_trial": shape.F_trial if shape.F.ndim == 3 else None,
-                   "F": shape.F, "y": shape.y, "tau": shape.tau,
+                   "v": motion.v, "x": motion.x, "C": motion.C, "L": motion.L,
+                   "F_trial": update.F_trial if update.F.ndim == 3 else None,
+                   "F": update.F, "y": update.y, "tau": update.tau,
                    "energy": energies(self.bodies[k], self.method, self.gravity)}
             arrays |= {f"{name}/{field}": a for field, a in own.items() if a is not None}
         return arrays

@@ -1,4 +1,11 @@
-"""B-splines by their recursion, and the nodes around a particle."""
+"""B-splines by their recursion, and the weights of the nodes around a particle (LDM-sec2.2-spaces).
+
+The weight of node i at particle p is a product over the axes a of a B-spline N of degree k:
+
+    w_ip = prod_a N((x_p - x_i)_a / dx)
+
+with N centred on the node; its support is k + 1 cells long.
+"""
 
 from typing import NamedTuple
 
@@ -10,6 +17,8 @@ def bspline(u, degree):
 
     N_0(u) = 1 for 0 <= u < 1, else 0
     N_k(u) = (u N_{k-1}(u) + (k + 1 - u) N_{k-1}(u - 1)) / k
+
+    u is an array of any shape, in cells from the first knot.
     """
     if degree == 0:
         return ((u >= 0) & (u < 1)).astype(u.dtype)
@@ -18,21 +27,24 @@ def bspline(u, degree):
 
 
 def slope(u, degree):
-    """dN/du = N_{k-1}(u) - N_{k-1}(u - 1)."""
+    """dN/du = N_{k-1}(u) - N_{k-1}(u - 1), the derivative of `bspline`."""
     return bspline(u, degree - 1) - bspline(u - 1, degree - 1)
 
 
 class Pairs(NamedTuple):
-    """All pairs ip of a particle p and one of the S = (degree + 1)^d nodes i that it reaches."""
+    """All pairs ip of N particles p with the S = (degree + 1)^d nodes i around each of them."""
 
-    node: np.ndarray     # (N, S, d)  integer coordinates of the node, which lies at node * dx
-    w: np.ndarray        # (N, S)     weight prod_a N((x_p - x_i)_a / dx), N centred
+    node: np.ndarray     # (N, S, d)  integer coordinates of node i, which lies at x_i = node * dx
+    w: np.ndarray        # (N, S)     weight w_ip
     dw: np.ndarray       # (N, S, d)  its gradient with respect to x_p [1/m]
-    r: np.ndarray        # (N, S, d)  x_i - x_p [m]
+    r: np.ndarray        # (N, S, d)  r_ip = x_i - x_p [m]
 
 
 def pairs(x, dx, degree):
-    """Pairs of particles at x (N, d) [m] and nodes of a grid of spacing dx (LDM-sec2.2-spaces)."""
+    """Return the `Pairs` of particles at x (N, d) [m] with the nodes of a grid of spacing dx [m].
+
+    With u_a = (x_p - x_i)_a / dx the gradient is dw_ip,a = N'(u_a) prod_{b != a} N(u_b) / dx.
+    """
     d, half = x.shape[1], x.dtype.type(degree + 1) / 2
     base = np.floor(x / dx - (half - 1)).astype(int)
     node = base[:, None] + np.array(list(np.ndindex(*d * (degree + 1,))))

@@ -1,6 +1,9 @@
-"""One step of explicit MPM, from the functions of `transfer`, `laws`, `flows` and `walls`:
+"""One step of explicit MPM (NSF-alg-mpm), from the functions of the other modules:
 
-tau(F) given -> p2g -> velocity -> boundaries -> g2p -> F trial -> return map -> stress
+1. P2G: mass, momentum and force of the particles, with the stress of their F, go to the nodes.
+2. Grid: the nodes' velocities advance by explicit Euler, and contact changes them.
+3. G2P: particles take velocity, position, affine field C and velocity gradient L from the nodes.
+4. Deformation: F_trial = (I + dt L) F, the return map of the material, and the new stress tau.
 """
 
 from typing import NamedTuple
@@ -8,116 +11,112 @@ from typing import NamedTuple
 import numpy as np
 
 from . import transfer
-from .flows import intact, project
+from .flows import intact, return_map
 from .laws import energy, kirchhoff
 from .spline import pairs
 from .tensors import det
 
 
 class Matter(NamedTuple):
-    """Particles of one material; the fields are those of `core.state`.
+    """The N material points of one body, with its law and flow; C, y, b are None if not carried."""
 
-    C, y, b are None where they are not carried; F and tau have shape (N,) in a fluid.
-    """
-
-    x: np.ndarray
-    v: np.ndarray
-    C: np.ndarray | None
-    F: np.ndarray
-    tau: np.ndarray
-    m: np.ndarray
-    V0: np.ndarray
-    y: np.ndarray | None
-    b: np.ndarray | None
-    law: tuple
-    flow: tuple
+    x: np.ndarray           # (N, d)     position [m]
+    v: np.ndarray           # (N, d)     velocity [m/s]
+    C: np.ndarray | None    # (N, d, d)  affine velocity field [1/s]
+    F: np.ndarray           # (N, d, d)  elastic deformation gradient; (N,) of J in a fluid
+    tau: np.ndarray         # (N, d, d)  Kirchhoff stress [Pa]; (N,) in a fluid, isotropic
+    m: np.ndarray           # (N,)       mass [kg]
+    V0: np.ndarray          # (N,)       volume at rest [m^d]
+    y: np.ndarray | None    # (N,)       plastic history
+    b: np.ndarray | None    # (N, d)     body force per mass [m/s^2]
+    law: tuple              # record of the elastic law's parameters
+    flow: tuple             # record of the plastic flow's parameters
 
     def cast(self, real):
-        """Return the particles in another floating type."""
+        """Return the material points with arrays of the floating type `real`."""
         return self._replace(**{name: a.astype(real) for name, a in self._asdict().items()
                                 if isinstance(a, np.ndarray)})
 
 
 class Method(NamedTuple):
-    """Spacing [m], degree of the spline, transfer and its options, as in `explicit.Scheme`."""
+    """The grid, the spline and the transfer of a step, as in `explicit.Scheme`."""
 
-    dx: float
-    degree: int
-    transfer: str
-    flip: float = 1
-    rpic: float = 0
-    mass_eps: float = 0
+    dx: float               # grid spacing [m]
+    degree: int             # of the B-splines
+    transfer: str           # "pic", "flip", "apic" or "mls"
+    flip: float = 1         # share of FLIP, see `transfer.flip`
+    rpic: float = 0         # damping, see `transfer.rpic`
+    mass_eps: float = 0     # see `transfer.grid_velocity` [kg]
 
     @property
     def moment(self):
-        """D, the moment of the weights [m^2]."""
+        """Return D [m^2], the second moment of the weights (see `transfer.moment`)."""
         return transfer.moment(self.dx, self.degree)
 
 
 class Nodes(NamedTuple):
-    """What the grid holds in one step, as arrays over `box`."""
+    """Nodal fields of one step, arrays over `box`."""
 
-    box: transfer.Box
-    m: np.ndarray
-    mv: np.ndarray
-    f: np.ndarray
-    v_free: np.ndarray     # velocity before boundary conditions
-    v: np.ndarray          # and after
-
-
-class Moved(NamedTuple):
-    """What the particles of one body get from the grid."""
-
-    v: np.ndarray
-    x: np.ndarray
-    C: np.ndarray | None
-    L: np.ndarray
+    box: transfer.NodeBox
+    m: np.ndarray          # (..)     mass [kg]
+    mv: np.ndarray         # (.., d)  momentum [kg m/s]
+    f: np.ndarray          # (.., d)  force [N]
+    v_free: np.ndarray     # (.., d)  velocity before the boundary conditions [m/s]
+    v: np.ndarray          # (.., d)  velocity after them [m/s]
 
 
-class Deformed(NamedTuple):
-    """What follows from the velocity gradient."""
+class ParticleMotion(NamedTuple):
+    """New velocity, position and velocity gradients that the particles of a body gather."""
 
-    F_trial: np.ndarray
-    F: np.ndarray
-    y: np.ndarray | None
-    tau: np.ndarray
+    v: np.ndarray           # (N, d)
+    x: np.ndarray           # (N, d)
+    C: np.ndarray | None    # (N, d, d)  after the damping of RPIC
+    L: np.ndarray           # (N, d, d)
 
 
-class Step(NamedTuple):
-    """Every stage of one step; the lists have one entry per body."""
+class ConstitutiveUpdate(NamedTuple):
+    """Deformation, plastic history and stress of a body that follow from its velocity gradient."""
 
-    clouds: list        # of Pairs
+    F_trial: np.ndarray     # (N, d, d), or (N,)
+    F: np.ndarray           # (N, d, d), or (N,)
+    y: np.ndarray | None    # (N,)
+    tau: np.ndarray         # (N, d, d), or (N,)
+
+
+class StepStages(NamedTuple):
+    """All intermediate results of one step; the lists have one entry for each body."""
+
+    stencils: list          # of `spline.Pairs`
     nodes: Nodes
-    moved: list         # of Moved
-    deformed: list      # of Deformed
-    dt: float           # [s]
+    motions: list           # of `ParticleMotion`
+    updates: list           # of `ConstitutiveUpdate`
+    dt: float               # [s]
 
 
 def step(bodies, method, gravity, dt, conditions=None):
-    """One step of length dt [s] of a list of `Matter`: its stages, as a `Step`.
+    """Return the `StepStages` of one step of length dt [s] of a list of `Matter`.
 
-    gravity is (d,) [m/s^2]; conditions(v, m, box) returns the velocities that satisfy the boundary
-    conditions.
+    gravity is (d,) [m/s^2]; conditions(v, m, box) returns the nodal velocities that satisfy the
+    boundary conditions. `new_state` gives each body at the end of the step.
     """
-    clouds = [pairs(q.x, method.dx, method.degree) for q in bodies]
-    nodes = to_grid(bodies, clouds, method, gravity, dt)
+    stencils = [pairs(q.x, method.dx, method.degree) for q in bodies]
+    nodes = particles_to_grid(bodies, stencils, method, gravity, dt)
     if conditions is not None:
         nodes = nodes._replace(v=conditions(nodes.v_free, nodes.m, nodes.box))
-    moved = [to_particles(q, ip, nodes, method, dt) for q, ip in zip(bodies, clouds)]
-    deformed = [deform(q, new.L, dt) for q, new in zip(bodies, moved)]
-    return Step(clouds, nodes, moved, deformed, dt)
+    motions = [grid_to_particles(q, ip, nodes, method, dt) for q, ip in zip(bodies, stencils)]
+    updates = [deform(q, motion.L, dt) for q, motion in zip(bodies, motions)]
+    return StepStages(stencils, nodes, motions, updates, dt)
 
 
-def after(q, moved, deformed):
-    """A body after the step."""
-    return q._replace(x=moved.x, v=moved.v, C=moved.C,
-                      F=deformed.F, y=deformed.y, tau=deformed.tau)
+def new_state(q, motion, update):
+    """Return a body at the end of a step, from its `ParticleMotion` and `ConstitutiveUpdate`."""
+    return q._replace(x=motion.x, v=motion.v, C=motion.C, F=update.F, y=update.y, tau=update.tau)
 
 
-def to_grid(bodies, clouds, method, gravity, dt):
-    """Mass, momentum and force of all bodies, and the velocity they give the nodes."""
-    box = transfer.box_of(*clouds)
-    both = list(zip(bodies, clouds))
+def particles_to_grid(bodies, stencils, method, gravity, dt):
+    """Return the `Nodes` with mass, momentum and force of all bodies, and the new velocity."""
+    box = transfer.box_of(*stencils)
+    both = list(zip(bodies, stencils))
     m = sum(transfer.mass(q.m, ip, box) for q, ip in both)
     mv = sum(transfer.momentum(q.m, q.v, q.C, ip, box) for q, ip in both)
     f = sum(force(q, ip, method, box) for q, ip in both)
@@ -126,7 +125,7 @@ def to_grid(bodies, clouds, method, gravity, dt):
 
 
 def force(q, ip, method, box):
-    """Internal and body forces of one body on the nodes."""
+    """Return the internal and body forces (.., d) [N] of one body on the nodes."""
     tau = isotropic(q.tau, q.x.shape[1]) if q.tau.ndim == 1 else q.tau
     if method.transfer == "mls":
         f = transfer.internal_force_mls(q.V0, tau, method.moment, ip, box)
@@ -136,12 +135,15 @@ def force(q, ip, method, box):
 
 
 def isotropic(s, d):
-    """s I (N, d, d)."""
+    """Return s I (N, d, d) of s (N,)."""
     return s[:, None, None] * np.eye(d, dtype=s.dtype)
 
 
-def to_particles(q, ip, nodes, method, dt):
-    """New velocity, position and velocity gradient of one body."""
+def grid_to_particles(q, ip, nodes, method, dt):
+    """Return the `ParticleMotion` of one body, with x' = x + dt sum_i w_ip v_i.
+
+    APIC and MLS-MPM carry C, and MLS-MPM takes it for the velocity gradient L as well.
+    """
     v, box = transfer.velocity(nodes.v, ip, nodes.box), nodes.box
     x, C, L = q.x + dt * v, None, transfer.velocity_gradient(nodes.v, ip, box)
     if method.transfer in ("apic", "mls"):
@@ -151,34 +153,37 @@ def to_particles(q, ip, nodes, method, dt):
     if method.transfer == "flip":
         v_old = nodes.mv / np.where(nodes.m > 0, nodes.m, 1)[..., None]
         v = transfer.flip(q.v, v, transfer.velocity(v_old, ip, box), method.flip)
-    return Moved(v, x, C, L)
+    return ParticleMotion(v, x, C, L)
 
 
 def deform(q, L, dt):
-    """Trial deformation, return map and stress of one body."""
-    F_trial = grown(q.F, L, dt)
-    F, y = project(F_trial, q.y, dt, q.law, q.flow)
-    return Deformed(F_trial, F, y, stress(F, y, q))
+    """Return the `ConstitutiveUpdate` of one body under the velocity gradient L (N, d, d)."""
+    F_trial = trial_deformation(q.F, L, dt)
+    F, y = return_map(F_trial, q.y, dt, q.law, q.flow)
+    return ConstitutiveUpdate(F_trial, F, y, stress(F, y, q))
 
 
-def grown(F, L, dt):
-    """F trial = (I + dt L) F (LDM-sec2.2-Frate); of a fluid its determinant det(I + dt L) J."""
+def trial_deformation(F, L, dt):
+    """F_trial = (I + dt L) F (LDM-sec2.2-Frate); of a fluid its determinant, det(I + dt L) J."""
     growth = np.eye(L.shape[1], dtype=L.dtype) + dt * L
     return det(growth) * F if F.ndim == 1 else growth @ F
 
 
 def stress(F, y, q):
-    """tau of the law where the material is whole, 0 where it has failed."""
+    """Return tau of the law (see `laws.kirchhoff`), and 0 where a softening material has failed."""
     tau = kirchhoff(F, q.law)
     return tau if q.y is None else tau * intact(y, q.flow)[:, None, None]
 
 
 def energies(q, method, gravity):
-    """Kinetic, elastic and gravitational energy of one body [J], as an array (3,)."""
+    """Return the kinetic, elastic and gravitational energy of one body [J], an array (3,).
+
+    sum_p m_p |v_p|^2/2 + D m_p |C_p|^2/2,  sum_p V0_p psi(F_p),  -sum_p m_p g . x_p
+    """
     kinetic = (q.m * (q.v**2).sum(axis=1)).sum() / 2
     if q.C is not None:
         kinetic = kinetic + method.moment * (q.m * (q.C**2).sum(axis=(1, 2))).sum() / 2
     psi = energy(q.F, q.law)
-    whole = 1 if q.y is None else intact(q.y, q.flow)
+    factor = 1 if q.y is None else intact(q.y, q.flow)
     height = (q.x * gravity).sum(axis=1)
-    return np.stack([kinetic, (q.V0 * whole * psi).sum(), -(q.m * height).sum()])
+    return np.stack([kinetic, (q.V0 * factor * psi).sum(), -(q.m * height).sum()])

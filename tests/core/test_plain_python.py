@@ -22,7 +22,7 @@ import numpy as np
 from clouds import DX, EVERY, AFFINE, cloud, over, plain_grid, scattered
 from mpm_ref.core.grid import update
 from mpm_ref.core.transfer import g2p, rpic
-from mpm_ref.plain.step import to_particles
+from mpm_ref.plain.step import grid_to_particles
 
 def off(a, b, scale=None):
     return float(abs(a - b).max() / abs(b if scale is None else scale).max())
@@ -31,7 +31,7 @@ def distances(case):
     q, dt, g = cloud(case, np.random.default_rng(1), n=12), 0.03, np.arange(1.0, 1.0 + case.d)
     matter, ip, nodes = plain_grid(case, q, dt, g)
     method = case.method._replace(rpic=0.3 if case.transfer in AFFINE else 0)
-    moved = to_particles(matter, ip, nodes, method, dt)
+    moved = grid_to_particles(matter, ip, nodes, method, dt)
     grid = scattered(case, q, dt)
     found = [off(grid.m, over(grid, nodes.m, nodes.box))]
     update(grid, g, dt)

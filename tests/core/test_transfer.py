@@ -10,7 +10,7 @@ from mpm_ref.core.grid import update
 from mpm_ref.core.transfer import g2p, rpic
 from mpm_ref.energy import angular_momentum, momentum
 from mpm_ref.plain import transfer as plain
-from mpm_ref.plain.step import to_particles
+from mpm_ref.plain.step import grid_to_particles
 
 DT = 0.03
 ROUND_OFF = 5e-15       # relative to the largest entry; sums of a few hundred terms
@@ -29,7 +29,7 @@ def trip(request):
     after = deep(q)
     gather(case, after, grid)
     return SimpleNamespace(case=case, before=before, grid=grid, after=after, nodes=nodes,
-                           moved=to_particles(matter, ip, nodes, case.method, DT))
+                           motion=grid_to_particles(matter, ip, nodes, case.method, DT))
 
 
 def gather(case, q, grid, flip=0.9):
@@ -57,11 +57,11 @@ def test_grid_update_equals_its_twin(trip):
 
 
 def test_gather_equals_its_twin(trip):
-    assert close(trip.after.v, trip.moved.v)
-    assert close(trip.after.x, trip.moved.x)
-    assert close(trip.after.L, trip.moved.L)
+    assert close(trip.after.v, trip.motion.v)
+    assert close(trip.after.x, trip.motion.x)
+    assert close(trip.after.L, trip.motion.L)
     if trip.case.transfer in AFFINE:
-        assert close(trip.after.C, trip.moved.C)
+        assert close(trip.after.C, trip.motion.C)
 
 
 def body(q):

@@ -7,7 +7,7 @@ from goldens_adjoint import strained
 from mpm_ref.oracle import error_bounds, recording
 from mpm_ref.oracle.plain_adjoint_boundary import matrix
 from mpm_ref.oracle.plain_twin import Twin
-from mpm_ref.plain.boundary import Contact, meet
+from mpm_ref.plain.boundary import Contact, contact_velocity
 
 REAL = np.longdouble
 
@@ -80,7 +80,7 @@ def test_the_scale_of_a_gradient_shows_a_kink(rng):
 def test_what_a_condition_takes_away_leaves_round_off(rng):
     """A node that sticks has exactly no velocity in one code, and an ulp of it in another."""
     v = np.array([[[-0.4, -1.0, 0.7]]])
-    after = np.array([[meet(v[0, 0], [contact("sticky")])]], float)
+    after = np.array([[contact_velocity(v[0, 0], [contact("sticky")])]], float)
     sizes = {(0, 0): error_bounds.size(v[0, 0], 0)}
     off = error_bounds.perturbed_conditions(after, sizes, rng)
     assert not after.any()

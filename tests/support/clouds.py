@@ -10,7 +10,7 @@ from mpm_ref.core.order import slabs_of
 from mpm_ref.core.spline import STENCILS
 from mpm_ref.core.transfer import p2g
 from mpm_ref.plain.spline import pairs
-from mpm_ref.plain.step import Matter, Method, to_grid
+from mpm_ref.plain.step import Matter, Method, particles_to_grid
 
 DX = 0.11
 AFFINE = ("apic", "mls")
@@ -116,4 +116,4 @@ def plain_grid(case, q, dt, gravity):
     """The plain twin of particles, its pairs, and its nodes."""
     matter = twin(q)
     ip = pairs(matter.x, DX, case.degree)
-    return matter, ip, to_grid([matter], [ip], case.method, gravity, dt)
+    return matter, ip, particles_to_grid([matter], [ip], case.method, gravity, dt)

@@ -68,10 +68,10 @@ def body_of(name, d, rng, spread=0.2, length=2.5):
 
 def grid_of(bodies, degree, rng):
     """The mass of all bodies, and random velocities of size SPEED, on a box with a rim to spare."""
-    clouds = [pairs(body.particles.x, DX, degree) for body in bodies]
-    box = transfer.box_of(*clouds)
-    box = transfer.Box(box.first - 1, tuple(k + 2 for k in box.shape))
-    m = sum(transfer.mass(b.particles.m, ip, box) for b, ip in zip(bodies, clouds))
+    stencils = [pairs(body.particles.x, DX, degree) for body in bodies]
+    box = transfer.box_of(*stencils)
+    box = transfer.NodeBox(box.first - 1, tuple(k + 2 for k in box.shape))
+    m = sum(transfer.mass(b.particles.m, ip, box) for b, ip in zip(bodies, stencils))
     v = SPEED * rng.normal(size=(*box.shape, len(box.shape)))
     return Grid(m, m[..., None] * v, NONE, NONE, np.array(box.first), DX)
 
@@ -79,9 +79,9 @@ def grid_of(bodies, degree, rng):
 def coarser_unknowns(problem, degree, level):
     """The unknowns of a problem's particles on a grid of 2^level times the spacing, at rest."""
     dx = 2**level * DX
-    clouds = [pairs(body.particles.x, dx, degree) for body in problem.bodies]
-    box = transfer.box_of(*clouds)
-    m = sum(transfer.mass(b.particles.m, ip, box) for b, ip in zip(problem.bodies, clouds))
+    stencils = [pairs(body.particles.x, dx, degree) for body in problem.bodies]
+    box = transfer.box_of(*stencils)
+    m = sum(transfer.mass(b.particles.m, ip, box) for b, ip in zip(problem.bodies, stencils))
     v = np.zeros((*box.shape, len(box.shape)))
     return unknowns_of(Grid(m, v, NONE, NONE, np.array(box.first), dx))
 
@@ -109,6 +109,6 @@ def over(problem, u):
 
 def plain_bodies(problem, degree):
     """Particles, pairs and box for `plain.potential`."""
-    box = transfer.Box(problem.grid.origin, problem.grid.m.shape)
+    box = transfer.NodeBox(problem.grid.origin, problem.grid.m.shape)
     return [(twin(b.particles, b.law), pairs(b.particles.x, DX, degree), box)
             for b in problem.bodies]
