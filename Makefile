@@ -45,7 +45,7 @@ standard: $(READY) ## every experiment at the standard profile (hours) -> result
 	$(PY) -m validation run --profile standard
 
 figures: $(READY) ## draw the figures again from the results of PROFILE (default: quick)
-	$(PY) -m figures --profile $(PROFILE)
+	$(PY) -m figures --profile $(PROFILE) --workers $(WORKERS)
 
 bench: $(READY)  ## our kernels beside Taichi and Warp (installs both), features, implicit steps
 	$(PIP) install -c constraints.txt -e '.[bench]'

@@ -12,6 +12,10 @@ import io
 import sys
 import textwrap
 import traceback
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 from typing import NamedTuple
 
@@ -45,7 +49,7 @@ def names(folder=HERE):
                   if file.parent.name != "common")
 
 
-def draw_all(results, names=(), about=(), folder=HERE):
+def draw_all(results, names=(), about=(), folder=HERE, workers=1):
     """Draw figures into ``<results>/figures/<name>.png`` and ``.pdf``.
 
     Args:
@@ -53,28 +57,49 @@ def draw_all(results, names=(), about=(), folder=HERE):
         names: figures to draw, or experiments that they need; empty for all.
         about: only those which need one of these experiments; empty for all.
         folder: the package of the scripts.
+        workers: number of processes that draw.
 
-    Says which figures are left out, and why. Returns `Drawn`.
+    Prints which figures are left out, and why. Returns `Drawn`.
     Raises ValueError for a name that does not exist.
     """
     chosen = _choose(names, folder)
+    draw = partial(_draw, folder=folder, results=results, about=frozenset(about))
     drawn = Drawn([], [], [])
-    mpl.use("Agg")
-    for name in tqdm(chosen, desc="figures", leave=False, disable=None, file=sys.stderr):
-        try:
-            script = _script(name, folder)
-            if about and set(about).isdisjoint(script.NEEDS):
-                continue
-            _check_results(script, results)
-            _save(script, name, results)
-            drawn.done.append(name)
-        except FileNotFoundError as gone:
-            drawn.left.append(name)
-            tqdm.write(f"figure {name} is left out: {gone}", file=sys.stderr)
-        except Exception:
-            drawn.failed.append(name)
-            tqdm.write(traceback.format_exc(), file=sys.stderr)
+    with _mapping(min(workers, len(chosen))) as mapping:
+        for name, (state, message) in tqdm(zip(chosen, mapping(draw, chosen)), "figures",
+                                           len(chosen), leave=False, disable=None,
+                                           file=sys.stderr):
+            if state:
+                getattr(drawn, state).append(name)
+            if message:
+                tqdm.write(message, file=sys.stderr)
     return drawn
+
+
+@contextmanager
+def _mapping(workers):
+    """`map`, or that of a pool of processes."""
+    if workers < 2:
+        yield map
+    else:
+        with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+            yield pool.map
+
+
+def _draw(name, folder, results, about):
+    """Draw a figure. Return the field of `Drawn` that it belongs to, if any, and a message."""
+    mpl.use("Agg")
+    try:
+        script = _script(name, folder)
+        if about and about.isdisjoint(script.NEEDS):
+            return None, None
+        _check_results(script, results)
+        _save(script, name, results)
+    except FileNotFoundError as error:
+        return "left", f"figure {name} is left out: {error}"
+    except Exception:
+        return "failed", traceback.format_exc()
+    return "done", None
 
 
 def _script(name, folder):

@@ -63,7 +63,8 @@ def run(ids: Ids = None, profile: Profile = "quick", seed: int = 0, results: Fol
         failed = run_side_by_side(chosen, setting, workers)
     else:
         failed = run_all(chosen, setting)
-    undrawn = draw_all(ProfileResults(folder), about=[e.id for e in chosen]).failed
+    undrawn = draw_all(ProfileResults(folder), about=[e.id for e in chosen],
+                       workers=workers).failed
     _write_report(folder, profile, printed)
     for name in (*failed, *(f"figure {name}" for name in undrawn)):
         typer.echo(f"failed: {name}", err=True)

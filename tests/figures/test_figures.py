@@ -61,6 +61,18 @@ def test_picture_and_caption_carry_the_scale(results, tmp_path, monkeypatch):
     assert seen == [(".png", said, f"A toy. {said}"), (".pdf", said, None)]
 
 
+def test_two_processes_draw_like_one(results, tmp_path, monkeypatch):
+    package = tmp_path / "pair_of_figures"
+    (package / "hot").mkdir(parents=True)
+    for name, text in (("toy", SCRIPT), ("bad", SCRIPT.replace("return Figure()", "raise OSError")),
+                       ("gone", SCRIPT.replace("a.b", "c.d"))):
+        (package / "hot" / f"{name}.py").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)       # a spawned process takes over sys.path
+    drawn = [draw_all(results, folder=package, workers=workers) for workers in (1, 2)]
+    assert drawn == [Drawn(["hot_toy"], ["hot_gone"], ["hot_bad"])] * 2
+    assert (results.folder / "figures" / "hot_toy.pdf").is_file()
+
+
 def test_scales_are_taken_from_the_records(results):
     assert scales(results, "a.b") == "8, dx = 0.1 m; 9, dx = 0.1 m"
     assert scales(results, "a.b", ".order") == "8, dx = 0.1 m"
@@ -79,7 +91,7 @@ def invoke(tmp_path, monkeypatch):
     """Run the command line; each of its words is what becomes of a figure of that name."""
     app = typer.Typer()
     app.command()(cli.main)
-    monkeypatch.setattr(cli, "draw_all", lambda results, names: Drawn(
+    monkeypatch.setattr(cli, "draw_all", lambda results, names, workers: Drawn(
         *([n for n in names if n == word] for word in ("done", "left", "failed"))))
     return lambda *words: CliRunner().invoke(app, [*words, "--results", str(tmp_path)])
 
