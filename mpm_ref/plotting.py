@@ -27,7 +27,7 @@ SHADE, EDGE = "0.88", "0.35"
 
 
 class Window(NamedTuple):
-    """What a picture shows: the (horizontal, vertical) axes and the ends of every axis [m]."""
+    """The region of a picture: its (horizontal, vertical) axes and the ends of every axis [m]."""
 
     view: tuple
     ends: np.ndarray          # (d, 2)

@@ -1,9 +1,9 @@
-"""What looks wrong in how a problem's bodies stand at the start: in a collider, or in each other.
+"""Warnings before a run about bodies that start inside a collider or a wall, or overlap.
 
     for sentence in misplaced(problem):
         print(sentence)
 
-Neither is an error: a run may mean it. The command line says it before a run and in `info`.
+Neither is an error: it may be intended. The command line prints them before a run and in `info`.
 """
 
 import json
@@ -22,11 +22,12 @@ CROWDED = 1.5       # of that ball; bodies that merely touch fill at most 1.3, a
 
 
 def misplaced(problem):
-    """Sentences about bodies that start inside a collider or a wall, or overlap; usually none.
+    """Return sentences about bodies that start inside a collider or a wall, or overlap; usually
+    none.
 
-    The regions of `fixed`, whose nodes are moved as told, are meant to hold particles. Two bodies
-    overlap where they have half as much material again as there is room: one in the other by a
-    particle spacing or two, less is not seen.
+    The regions of `fixed`, whose nodes have a given motion, may hold particles. Two bodies overlap
+    where they have half as much material again as there is room, which is at a depth of one or two
+    particle spacings; less is not detected.
     """
     return [*_in_solids(problem), *_in_each_other(problem.bodies)]
 

@@ -1,4 +1,4 @@
-"""What a run needs, apart from files: bodies, scheme, conditions, clock."""
+"""The input of a run in memory: bodies, scheme, conditions, clock."""
 
 from dataclasses import dataclass, field
 
@@ -14,12 +14,11 @@ from .monitor import Limits
 
 @dataclass(frozen=True)
 class Clock:
-    """When a run steps, shows a frame and ends.
+    """The times of a run's steps, frames and end.
 
-    dt [s] fixed, or None: then `cfl` times the stable time step (see `timestep`), at most `longest`
-    [s]. It ends after
-    `steps` steps or at time `end` [s], whichever is given; frames every `every` steps, or every
-    `interval` seconds.
+    dt [s] is fixed, or None: then `cfl` times the stable time step (see `timestep`), at most
+    `longest` [s]. The run ends after `steps` steps or at time `end` [s], whichever is given; it
+    shows a frame every `every` steps, or every `interval` seconds.
     """
 
     dt: float | None = None
@@ -89,7 +88,7 @@ class Problem:
         return 1.0 / inverse_inertia(self.dx, self.scheme.stencil) if affine else 0.0
 
     def may_invert(self, body):
-        """Whether the body's law recovers from det F <= 0."""
+        """Return whether the body's law recovers from det F <= 0."""
         return recovers(body.law)
 
     @property

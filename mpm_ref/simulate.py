@@ -35,7 +35,7 @@ class State:
 
 
 class Frame(NamedTuple):
-    """What the loop shows. The next step changes the arrays of the state: copy what you keep."""
+    """A state that `simulate` yields. The next step changes its arrays: copy what you keep."""
 
     index: int      # 0 for the initial state
     t: float        # [s]
@@ -174,13 +174,15 @@ def last_step(clock):
 
 
 def ended(clock, state):
-    """Whether the run is over."""
+    """Return whether the run has reached its end."""
     steps = last_step(clock)
     return state.step >= steps if steps is not None else state.t >= clock.end * (1.0 - EVEN)
 
 
 def frame_is_due(clock, state):
-    """Whether the state just reached is a frame: every so many steps or seconds, and the end."""
+    """Return whether the state just reached is a frame: every `every` steps or `interval` seconds,
+    and the end.
+    """
     if ended(clock, state):
         return True
     if clock.every is not None:

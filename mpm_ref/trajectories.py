@@ -10,7 +10,7 @@ from .body import restore_order
 from .simulate import simulate
 
 
-class History(NamedTuple):
+class RunHistory(NamedTuple):
     """One run: time levels 0 .. k, points in the body's own order."""
 
     x: np.ndarray       # (k + 1, n, d)     position [m]
@@ -19,7 +19,7 @@ class History(NamedTuple):
 
 
 class Observed(NamedTuple):
-    """One run in full: what particles carry from step to step."""
+    """One run with all fields that particles carry from step to step."""
 
     x: np.ndarray       # (k + 1, n, d)     position [m]
     v: np.ndarray       # (k + 1, n, d)     velocity [m/s]
@@ -28,27 +28,29 @@ class Observed(NamedTuple):
 
 
 def history(problem, every=1):
-    """`History` of a problem; of one point in so many. Raises ValueError as `recorded`."""
-    return recorded(problem, History, every)
+    """Return the `RunHistory` of one point in `every` of a problem. Raises ValueError as
+    `recorded`.
+    """
+    return recorded(problem, RunHistory, every)
 
 
 def observed(problem):
-    """`Observed` of a problem; F is J^(1/d) I of a fluid that carries J alone (NCLAW-eq21). Raises
-    ValueError as `recorded`, and for a body without C.
+    """Return the `Observed` run of a problem; F is J^(1/d) I of a fluid that carries J alone
+    (NCLAW-eq21). Raises ValueError as `recorded`, and for a body without C.
     """
     if problem.bodies[0].particles.C.ndim != 3:
         raise ValueError(f"{problem.title!r}: a body that carries no C: expected the transfer apic "
                          "or mls")
-    found = recorded(problem, Observed)
-    if found.F.ndim == 2:
-        d = found.x.shape[-1]
-        found = found._replace(F=found.F[..., None, None] ** (1.0 / d) * np.eye(d))
-    return found
+    run = recorded(problem, Observed)
+    if run.F.ndim == 2:
+        d = run.x.shape[-1]
+        run = run._replace(F=run.F[..., None, None] ** (1.0 / d) * np.eye(d))
+    return run
 
 
 def recorded(problem, kind, every=1):
-    """The fields of a NamedTuple `kind` over a run of a problem of one body that shows every step;
-    of one point in so many.
+    """Return the fields of a NamedTuple `kind`, of one point in `every`, over a run of a problem of
+    one body that shows every step.
 
     Raises ValueError for more bodies, and for a clock that shows fewer frames.
     """

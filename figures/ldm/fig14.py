@@ -9,7 +9,7 @@ from matplotlib.patheffects import withStroke
 from ..common.orders import scales
 
 NEEDS = ["ldm.fig13"]
-APART = 0.09        # of the picture's sides: what two numbers are from each other at least
+SPACING = 0.09      # least distance of two numbers, over the picture's sides
 EVERY = 5           # steps; others get no number
 
 
@@ -41,12 +41,12 @@ def draw(results):
 
 
 def numbered(place, first):
-    """Those of the places (n, 2) that get a number: `first`, and then in order one in EVERY that is
-    far from all these.
+    """Return the indices of the places (n, 2) that get a number: those of `first`, then every
+    EVERY-th that is far from all before.
     """
     place = (place - place.min(axis=0)) / np.ptp(place, axis=0)
-    found = []
+    chosen = []
     for k in (*first, *range(0, len(place), EVERY)):
-        if all(np.linalg.norm(place[k] - place[j]) > APART for j in found):
-            found.append(k)
-    return sorted(found)
+        if all(np.linalg.norm(place[k] - place[j]) > SPACING for j in chosen):
+            chosen.append(k)
+    return sorted(chosen)

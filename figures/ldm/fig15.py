@@ -19,18 +19,18 @@ def scale(results):
 
 
 def draw(results):
-    kept = read(results.folder, NEEDS[0])
-    X, apart, found = kept["X"], spacing(kept["X"]), []
-    for k, mu in enumerate(kept["mu"]):
-        for j, t in enumerate(kept["t"]):
-            x, y = (kept[name][k, j - 1] if j else X for name in ("full", "reduced"))
-            pair = side_by_side(body(x, FULL, apart), body(y, REDUCED, apart), VIEW)
-            found.append(Panel(pair, nothing(), "" if k else f"t = {t:.2f} s",
-                               "" if j else motion(*mu)))
-    return pictures(found, VIEW)
+    states = read(results.folder, NEEDS[0])
+    X, dx, panels = states["X"], spacing(states["X"]), []
+    for k, mu in enumerate(states["mu"]):
+        for j, t in enumerate(states["t"]):
+            x, y = (states[name][k, j - 1] if j else X for name in ("full", "reduced"))
+            pair = side_by_side(body(x, FULL, dx), body(y, REDUCED, dx), VIEW)
+            panels.append(Panel(pair, nothing(), "" if k else f"t = {t:.2f} s",
+                                "" if j else velocity_text(*mu)))
+    return pictures(panels, VIEW)
 
 
-def motion(r, theta, phi):
-    """How the top moves, in words."""
+def velocity_text(r, theta, phi):
+    """Return the speed of the top and its direction as text."""
     theta, phi = np.degrees((theta, phi))
     return f"{r:.2f} m/s, {theta:.0f}°, \N{MINUS SIGN}{-phi:.0f}°"

@@ -38,34 +38,34 @@ def draw(results):
 
 
 def panel(ax, table, colours):
-    """All ways at one size: marks by scheme, filled in single precision, colours by number of
-    samples.
+    """Plot all runs at one size: markers by scheme, filled in single precision, colours by number
+    of samples.
     """
     for (scheme, points, per_cell, single), rows in series(
-            table | told(table), ("scheme", "points", "per_cell", "single")).items():
-        words, mark = look(scheme, per_cell)
+            table | scheme_columns(table), ("scheme", "points", "per_cell", "single")).items():
+        words, mark = label_and_marker(scheme, per_cell)
         good = rows & np.isfinite(table["origin"])
         ax.loglog(table["wall_per_second"][good], 100.0 * table["origin"][good], mark,
                   color=colours[points], ms=7, fillstyle="full" if single else "none",
                   label=f"{words}, {points:.0f} samples" + ", single" * bool(single))
     ax.axvline(1.0, color="C2", label="real time")
-    some = np.argmax(table["speed_up"])         # one that did not break down
-    full = table["wall_per_second"][some] * table["speed_up"][some]
-    fastest = full * table["wall_fastest"][some] / table["wall_full"][some]
+    row = np.argmax(table["speed_up"])          # of a run that did not break down
+    full = table["wall_per_second"][row] * table["speed_up"][row]
+    fastest = full * table["wall_fastest"][row] / table["wall_full"][row]
     ax.axvline(full, color="C3", label="full model")
     ax.axvline(fastest, color="C3", ls="--", label="full model, fastest transfer")
 
 
-def told(table):
-    """Columns more: the scheme, as the targets call it, and whether it is in single precision."""
+def scheme_columns(table):
+    """Return further columns: the scheme, as targets name it, and whether precision is single."""
     names = zip(table["quadrature"], table["projection"], strict=True)
     double = np.full(len(table["quadrature"]), "double")
     return {"scheme": np.array(["_".join(name) for name in names]),
             "single": table.get("precision", double) == "single"}
 
 
-def look(scheme, per_cell):
-    """Words and marker of a scheme, or of quadrature with another sampling."""
+def label_and_marker(scheme, per_cell):
+    """Return label and marker of a scheme, or of quadrature with another sampling."""
     if scheme in MARKS:
         return MARKS[scheme]
     quadrature, projection = scheme.split("_")

@@ -18,34 +18,34 @@ WIDTH = 0.22        # of a field in a row
 
 
 def scale(results):
-    return "; ".join(f"{title.split(':')[0]}: {shared(results, id)}"
-                     for id, title in zip(NEEDS, TITLES, strict=True))
+    return "; ".join(f"{title.split(':')[0]}: {shared(results, name)}"
+                     for name, title in zip(NEEDS, TITLES, strict=True))
 
 
 def draw(results):
     figure, axes = plt.subplots(1, 2, figsize=(8.6, 3.8), sharey=True, width_ratios=(3, 4))
-    for ax, id, title in zip(axes, NEEDS, TITLES, strict=True):
-        panel(ax, {r.target: r for r in results.records(id)}, id)
+    for ax, name, title in zip(axes, NEEDS, TITLES, strict=True):
+        panel(ax, {r.target: r for r in results.records(name)}, name)
         ax.set_title(title, fontsize=9)
     axes[0].set_ylabel("error [%]")
     legend_below(figure, axes, columns=3)
     return figure
 
 
-def panel(ax, records, id):
-    """All rows of a table, a field beside the other."""
+def panel(ax, records, table):
+    """Plot all rows of a table, its fields side by side."""
     for j, (field, (words, colour)) in enumerate(FIELDS.items()):
-        at = np.arange(len(ROWS[id])) + (j - 1) * WIDTH
-        own = [records[f"{id}.{row}.{field}"] for row in ROWS[id]]
-        for x, record in zip(at, own, strict=True):
-            printed(ax, x, record)
-        ax.semilogy(at, [r.value for r in own], "o", color=colour, ms=5, label=words)
-    ax.set_xticks(range(len(ROWS[id])), ROWS[id].values(), fontsize=8)
+        at = np.arange(len(ROWS[table])) + (j - 1) * WIDTH
+        column = [records[f"{table}.{row}.{field}"] for row in ROWS[table]]
+        for x, record in zip(at, column, strict=True):
+            printed_bar(ax, x, record)
+        ax.semilogy(at, [r.value for r in column], "o", color=colour, ms=5, label=words)
+    ax.set_xticks(range(len(ROWS[table])), ROWS[table].values(), fontsize=8)
     ax.grid(visible=False, axis="x")
 
 
-def printed(ax, x, record):
-    """A bar at what is printed, with an arrow where that is the most it can be."""
+def printed_bar(ax, x, record):
+    """Plot a bar at the printed value, with an arrow where it is an upper bound."""
     ax.plot([x - 0.4 * WIDTH, x + 0.4 * WIDTH], 2 * [record.paper], color="0.3", lw=2.0)
     if record.comparator == "<=":
         ax.annotate("", (x, 0.6 * record.paper), (x, record.paper),

@@ -25,23 +25,25 @@ def scale(results):
 
 
 def draw(results):
-    kept, found = read(results.folder, NEEDS[0]), []
-    rows = {f"{name}_{task}": f"{name}, {said}" for task, said in TASKS.items() for name in NAMES}
-    words = present(kept, rows, WORDS)
+    states, panels = read(results.folder, NEEDS[0]), []
+    rows = {f"{name}_{task}": f"{name}, {label}" for task, label in TASKS.items() for name in NAMES}
+    words = present(states, rows, WORDS)
     shown = shades(np.zeros(1), top=TOP)[1]
-    for row, said in rows.items():
+    for row, label in rows.items():
         for word in words:
-            title = "" if found[len(words) - 1:] else TITLES[word]
-            panel = drawn(kept, row, word)._replace(side=said if word == words[0] else "")
-            found.append(panel._replace(title=f"{title}\n{panel.title}".strip()))
-    return pictures(found, View(len(words), 1.6 * len(words)), shown, "distance from the truth [m]")
+            title = "" if panels[len(words) - 1:] else TITLES[word]
+            panel = body_panel(states, row, word)._replace(
+                side=label if word == words[0] else "")
+            panels.append(panel._replace(title=f"{title}\n{panel.title}".strip()))
+    return pictures(panels, View(len(words), 1.6 * len(words)), shown,
+                    "distance from the truth [m]")
 
 
-def drawn(kept, row, word):
-    """The panel of a law in a row, with what is to be said if there is nothing to be seen."""
-    if f"{row}_{word}" not in kept:
+def body_panel(states, row, word):
+    """Return the panel of a law in a row; without a body, its text says why."""
+    if f"{row}_{word}" not in states:
         return Panel(nothing(), nothing(), "not trained")
-    x, true = (kept[f"{row}_{of}"].astype(float) for of in (word, "true"))
+    x, true = (states[f"{row}_{of}"].astype(float) for of in (word, "true"))
     if not np.isfinite(x).all():
         return Panel(nothing(), nothing(), titled("", x))
     paint = shades(away(x, true), top=TOP)[0]

@@ -27,29 +27,28 @@ def scale(results):
 
 
 def draw(results):
-    kept = read(results.folder, NEEDS[0])
-    found = sides(kept, {name: name for name in NAMES}, WORDS)
-    floor = floor_of(found)
+    panels = sides(read(results.folder, NEEDS[0]), {name: name for name in NAMES}, WORDS)
+    floor = floor_of(panels)
     return pictures([panel._replace(solid=turned(joined([panel.solid, floor])))
-                     for panel in found], VIEW)
+                     for panel in panels], VIEW)
 
 
 def turned(balls):
-    """Balls in axes of which the second is against gravity."""
+    """Return balls rotated to axes of which the second is against gravity."""
     up, side = -np.array(slope().gravity), np.array([1.0, 0.0, 0.0])
     up /= np.linalg.norm(up)
     R = np.stack([side, up, np.cross(side, up)])
     return balls._replace(x=balls.x @ R.T, n=balls.n @ R.T)
 
 
-def floor_of(found):
-    """Balls right below the part of the floor that bodies are above."""
-    x = np.concatenate([panel.solid.x for panel in found])
+def floor_of(panels):
+    """Return balls right below the part of the floor that bodies are above."""
+    x = np.concatenate([panel.solid.x for panel in panels])
     low, high = x.min(axis=0), x.max(axis=0)
-    apart = np.ptp(x[:, ::2], axis=0).max() / FINENESS
-    along, across = (np.arange(low[k], high[k] + 1.5 * apart, apart) for k in (0, 2))
+    spacing = np.ptp(x[:, ::2], axis=0).max() / FINENESS
+    along, across = (np.arange(low[k], high[k] + 1.5 * spacing, spacing) for k in (0, 2))
     X, Z = (a.ravel() for a in np.meshgrid(along, across))
-    radius, floor = 0.75 * apart, slope().walls.low[1] * slope().dx
+    radius, floor = 0.75 * spacing, slope().walls.low[1] * slope().dx
     places = np.stack([X, np.full(len(X), floor - radius), Z], axis=1)
     return Balls(places, np.tile([0.0, 1.0, 0.0], (len(X), 1)), np.full(len(X), radius),
                  np.tile(FLOOR, (len(X), 1)))

@@ -26,25 +26,28 @@ def scale(results):
 
 
 def draw(results):
-    kept, found = read(results.folder, NEEDS[0]), []
-    words = present(kept, BODIES, WORDS)
+    states, panels = read(results.folder, NEEDS[0]), []
+    words = present(states, BODIES, WORDS)
     shown = shades(np.zeros(1), top=TOP)[1]
-    for body, said in BODIES.items():
+    for body, label in BODIES.items():
         for k, when in TIMES.items():
-            title = "" if found else "start"
-            found.append(drawn(kept, (body, "true", 0), title)._replace(side=f"{said}, {when}"))
+            title = "" if panels else "start"
+            start = body_panel(states, (body, "true", 0), title)
+            panels.append(start._replace(side=f"{label}, {when}"))
             for word in words:
-                title = "" if found[1 + len(words):] else WORDS[word]
-                found.append(drawn(kept, (body, word, k), title))
+                title = "" if panels[1 + len(words):] else WORDS[word]
+                panels.append(body_panel(states, (body, word, k), title))
     columns = 1 + len(words)
-    return pictures(found, View(columns, 2.0 * columns, 12.0, 10.0), shown,
+    return pictures(panels, View(columns, 2.0 * columns, 12.0, 10.0), shown,
                     "distance from the truth [m]")
 
 
-def drawn(kept, which, title):
-    """The panel of a body with a law at a kept time; grey at the start."""
+def body_panel(states, which, title):
+    """Return the panel of a body with a law at a stored time, which = (body, law, number of the
+    time); grey at the start.
+    """
     body, word, k = which
-    x, true = (kept[f"{body}_{of}"].astype(float) for of in (word, "true"))
+    x, true = (states[f"{body}_{of}"].astype(float) for of in (word, "true"))
     if not np.isfinite(x[k]).all():
         return Panel(nothing(), nothing(), titled(title, x[k]))
     paint = shades(away(x[k], true[k]), top=TOP)[0]

@@ -1,6 +1,6 @@
 """NCLaw: errors in training, mean squared over points, axes and steps, from restarts; horizons grow
 from 25 to 200 steps. On plasticine, where there are others, the inset of section 4.7. A cross: the
-training diverged in the next epoch. What knows the right laws ("sys-id") goes on far below.
+training diverged in the next epoch. "sys-id", which has the right laws, reaches far lower errors.
 """
 
 import matplotlib.pyplot as plt
@@ -11,7 +11,7 @@ NEEDS = ["nclaw.loss"]
 COLOURS = {"jelly": "C0", "sand": "C1", "plasticine": "C3", "water": "C2"}
 WIDTH, HEIGHT = 4.2, 3.2        # of a panel [inch]
 COLUMNS = 3
-KNOWING = "sys-id"
+IDENTIFIED = "sys-id"
 ROOM = 0.003        # from the smallest error of others down
 
 
@@ -32,7 +32,7 @@ def draw(results):
             axes["ours"].plot(x, y, color=COLOURS[name], label=name)
         if name in others:
             line, = axes[name].plot(x, y, label=method)
-            if stopped(results, method, name):
+            if diverged(results, method, name):
                 axes[name].plot(x[-1], y[-1], "x", color=line.get_color())
     for title, ax in axes.items():
         ax.set(yscale="log", title=title, xlabel="epoch", ylabel="error of a step [m²]")
@@ -44,21 +44,21 @@ def draw(results):
 
 
 def panels(count):
-    """So many axes of a figure."""
+    """Return `count` axes of a new figure."""
     columns = min(count, COLUMNS)
     rows = -(-count // columns)
     figure = plt.figure(figsize=(WIDTH * columns, HEIGHT * rows))
     return [figure.add_subplot(rows, columns, 1 + k) for k in range(count)]
 
 
-def stopped(results, method, name):
-    """Whether a training diverged."""
+def diverged(results, method, name):
+    """Return whether a training diverged."""
     target = f"{NEEDS[0]}.{method}.{name}.epochs"
     return any(record.target == target for record in results.records(NEEDS[0]))
 
 
 def lowest(ax):
-    """Where the errors begin that a panel shows; None for all."""
+    """Return the smallest error that a panel shows; None for all."""
     errors = {line.get_label(): line.get_ydata().min() for line in ax.lines}
-    others = [error for word, error in errors.items() if word != KNOWING]
-    return ROOM * min(others) if others and KNOWING in errors else None
+    others = [error for word, error in errors.items() if word != IDENTIFIED]
+    return ROOM * min(others) if others and IDENTIFIED in errors else None

@@ -20,22 +20,22 @@ def scale(results):
 
 
 def draw(results):
-    kept = read(results.folder, NEEDS[0])
+    states = read(results.folder, NEEDS[0])
     figure, axes = plt.subplots(1, len(SIZES), figsize=(10.0, 4.2))
     for ax, name in zip(axes, SIZES, strict=True):
-        shown(ax, kept, name)
+        plot_points(ax, states, name)
     legend_below(figure, axes)
     return figure
 
 
-def shown(ax, kept, name):
-    """Points of a scene, those that matter on top."""
+def plot_points(ax, states, name):
+    """Plot the points of a scene, integration points and samples on top."""
     right, up = VIEW[name]
     for word, size in zip(COLOURS, SIZES[name], strict=True):
-        x = kept[f"{name}_{word}"]
+        x = states[f"{name}_{word}"]
         ax.scatter(x[:, right], x[:, up], size, COLOURS[word], lw=0, label=NAMES[word])
-    if f"{name}_nodes" in kept:
-        nodes = kept[f"{name}_nodes"]
+    if f"{name}_nodes" in states:
+        nodes = states[f"{name}_nodes"]
         ax.scatter(nodes[:, right], nodes[:, up], 30, "0.1", marker="+", lw=0.8, zorder=3,
                    label="nodes I")
     ax.set(aspect="equal", xlabel="m", title=name)

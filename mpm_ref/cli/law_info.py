@@ -144,7 +144,8 @@ def training_line(facts):
     if not facts["errors"]:
         return epochs
     about, method = facts["about"], facts["method"]
-    filmed, more = "camera" in about, WITH_VELOCITIES if weights.mixed(about) else ""
+    filmed = "camera" in about
+    more = WITH_VELOCITIES if weights.errors_include_velocities(about) else ""
     over = () if filmed else horizons(method, about.get("recipe", {}), facts["epochs"])
     return (f"{epochs}: {OF_MARKS if filmed else of_errors(method)}{more} "
             f"{provenance.ends(facts['errors'], over)}")

@@ -163,7 +163,7 @@ def map_of(name, study, path):
                          + (f" --out {path}" if path else ""))
     model = reduce.load(file, study)
     if path is None:
-        warn(unlike(file, study.tables.map, model))
+        warn(unlike(file, study.tables.reduced_model, model))
     return file, model
 
 

@@ -5,7 +5,7 @@ import numpy as np
 
 from ..rom import model_file
 from ..rom.fields.network import Decoder, Networks
-from ..rom.fields.pod_fields import Spanned
+from ..rom.fields.pod_fields import PodFields
 from ..rom.fields.polynomial_manifold import Curved
 from ..rom.study.record import supported_model
 from ..rom.study.study_file import parse_tables, read_toml
@@ -51,7 +51,7 @@ def of_study(name):
         "steps": study.base.steps, "runs": len(study.mu), "held_out": study.test,
         "parameters": ranges(study.names, study.mu),
         "keys": {one.name: one.key for one in tables.parameter},
-        "map": tables.map.settings,
+        "map": tables.reduced_model.settings,
         "run": msgspec.to_builtins(tables.run), "study_sha256": study.digest,
         **inferred_study_facts(study),
     }
@@ -162,7 +162,7 @@ def inferred_fields_facts(fields, levels):
     """Further facts of fields from the states of each run, whose steps they do not know; none of a
     map of another model.
     """
-    inferred = isinstance(fields, Networks | Spanned)
+    inferred = isinstance(fields, Networks | PodFields)
     return {"model": NSF, "states": levels, "steps": None} if inferred else {}
 
 

@@ -136,13 +136,13 @@ def train(
             checkpoint = out.with_suffix(".pt")
             require_map_place(out, study, overwrite)
             study = study.with_kind(kind)
-            require_device(study.tables.map.kind, machine.device)
+            require_device(study.tables.reduced_model.kind, machine.device)
             with writing():
                 snapshots = dataset.load(study, data, study.train)
             if study.tables.model == NSF:
                 warn(training_hints(study))
             about = {"command": f"mpm-ref rom train {name} --data {data} --out {out} "
-                                f"--kind {study.tables.map.kind} {typed(machine)}"}
+                                f"--kind {study.tables.reduced_model.kind} {typed(machine)}"}
             with writing(), on_interrupt(lambda: resuming(checkpoint)):
                 model = fitted(study, snapshots, about, checkpoint, machine)
             write(out, model)
@@ -175,10 +175,10 @@ def resuming(checkpoint):
 
 def fitted(study, snapshots, about, checkpoint, machine):
     """`Model` of a study's kind, with a bar of epochs."""
-    if study.tables.map.kind != NETWORK:
+    if study.tables.reduced_model.kind != NETWORK:
         with one_thread():
             return reduce.compute_model(study, snapshots, about)
-    with passing(total=study.tables.map.total, unit="epoch", desc=study.path.stem) as bar:
+    with passing(total=study.tables.reduced_model.total, unit="epoch", desc=study.path.stem) as bar:
         def show(history):
             bar.update(len(history) - bar.n)
             bar.set_postfix_str(f"loss {history[-1][0]:.2e}")

@@ -1,18 +1,18 @@
-"""How far latent coordinates lie from those that a map was trained with.
+"""Distance of latent coordinates from those that a map was trained with.
 
-A map has learned nothing beyond its training snapshots, and nothing else in a reduced run tells
-that it has left them. Training latents lie on low-dimensional curved sets, one trajectory for each
-run, so that neither their box nor an ellipsoid around them says where they are: its middle may be
-empty. What does is the distance to the nearest one, over the largest gap that the training set has
-itself.
+A map is trained on its snapshots alone, and nothing else in a reduced run shows that the run has
+left them. Training latents lie on low-dimensional curved sets, one trajectory for each run, so that
+neither a box nor an ellipsoid around them describes them: its middle may be empty. The distance to
+the nearest training latent does, over the largest gap within the training set.
 
-Which gap: that between a run and all others. Latents that follow one another in a run are close
-together however coarsely the parameters are sampled, so that any new run would seem far away.
+The gap is that between a run and all others. Successive latents of one run are close together
+however coarsely the parameters are sampled; measured by their distance, any new run would seem far
+away.
 
-Which distance: the entries of xhat have no common unit. With a `metric`, distance is the motion
-that a change of xhat causes, in m; a direction that moves nothing counts for nothing. Without one,
-the training latents' own spread is the unit in each direction; then a run that drifts along a
-direction that hardly moves a point seems far away.
+The entries of xhat have no common unit. With a `metric`, distance is the motion in m that a change
+of xhat causes; a direction that moves nothing counts for nothing. Without one, the spread of the
+training latents is the unit in each direction; then a run that drifts along a direction that hardly
+moves a point seems far away.
 """
 
 from typing import NamedTuple
@@ -20,50 +20,52 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import KDTree
 
-BEYOND = 1.5        # bound of `Extent.beyond`: a run beyond it has left its training data; 1 is as
-                    # far as training runs are from each other
-POINTS = 64         # of the body, that the metric is a mean over ...
+BEYOND = 1.5        # bound of `Extent.beyond`: farther out, a run has left its training data; 1 is
+                    # the distance of training runs from each other
+POINTS = 64         # points of the body in the mean of the metric, at most ...
 LATENTS = 100       # ... and training latents
-THIN = 0.1          # a direction with a smaller share of the largest spread counts as having it
+THIN = 0.1          # least spread of a direction, over the largest spread
 
 
 class Extent(NamedTuple):
     """Training latents in a common unit; r latent coordinates."""
 
     mean: np.ndarray    # (r,) of the training latents
-    ruler: np.ndarray   # (r, r): a change y is as long as y @ ruler
+    ruler: np.ndarray   # (r, r): the length of a change y is || y @ ruler ||
     tree: KDTree        # of all training latents, in that unit, from their mean
     gap: float          # largest distance from a latent to the nearest one of another run
     radius: float       # largest distance from a latent to the mean
 
     def beyond(self, xhat):
-        """Distance of xhat (.., r) from the nearest training latent, over the gap; shape (..).
+        """Return the distance (..) of xhat (.., r) from the nearest training latent, over the gap.
 
-        0 on a training latent; at most 1 inside, as near to a run as runs are to each other; more
-        outside; infinite for coordinates that are not finite.
+        It is 0 on a training latent, at most 1 between training runs, larger outside, and infinite
+        for coordinates that are not finite.
         """
         return self._over(xhat, lambda y: self.tree.query(y)[0]) / self.gap
 
     def outlying(self, xhat):
-        """Distance of xhat (.., r) from the mean, over that of the farthest training latent; shape
-        (..). Without a metric, the Mahalanobis distance. It does not see holes: see `beyond`.
+        """Return the distance (..) of xhat (.., r) from the mean, over that of the farthest
+        training latent; without a metric the Mahalanobis distance. It ignores holes, unlike
+        `beyond`.
         """
         return self._over(xhat, lambda y: np.linalg.norm(y, axis=1)) / self.radius
 
     def _over(self, xhat, distance):
-        """Distances of the finite ones of xhat (.., r), in the common unit; infinity elsewhere."""
+        """Return the distances (..) of xhat (.., r) in the common unit; infinity if not finite."""
         xhat = np.asarray(xhat, dtype=float)
         finite = np.isfinite(xhat).all(axis=-1)
-        found = np.full(finite.shape, np.inf)
-        found[finite] = distance((xhat[finite] - self.mean) @ self.ruler)
-        return found
+        result = np.full(finite.shape, np.inf)
+        result[finite] = distance((xhat[finite] - self.mean) @ self.ruler)
+        return result
 
 
 def extent(xhat, metric=None):
-    """`Extent` of training latents xhat (s, k + 1, r) of s runs, or (m, r) of snapshots that form
-    no runs; metric (r, r) as of `motion`, or the inverse of their covariance.
+    """Return the `Extent` of training latents xhat.
 
-    Of a single run, the gap is the largest step. Raises ValueError where latents are not finite or
+    xhat (s, k + 1, r): those of s runs, or (m, r): of snapshots that form no runs; metric (r, r):
+    see `motion_metric`, by default the inverse of the latents' covariance. The gap of a single run
+    is its largest step. Raises ValueError where latents are not finite or
     all the same.
     """
     xhat = np.asarray(xhat, dtype=float)
@@ -72,7 +74,7 @@ def extent(xhat, metric=None):
     if not np.isfinite(flat).all():
         raise ValueError("a training latent is not finite; train again")
     mean = flat.mean(axis=0)
-    ruler = ruler_of(flat - mean, metric)
+    ruler = unit_matrix(flat - mean, metric)
     runs = (runs - mean) @ ruler
     flat = runs.reshape(flat.shape)
     gap, radius = largest_gap(runs), np.linalg.norm(flat, axis=1).max()
@@ -84,11 +86,11 @@ def extent(xhat, metric=None):
 
 def trained_extent(field, points, xhat):
     """Return the `Extent` of the latent coordinates xhat (s, k + 1, r) that a field was trained
-    with, in the metric of `motion` at some of its points: the one distance of every reduced model.
-    Raises ValueError where the latents do not differ.
+    with, in the metric of `motion_metric` at some of its points. Raises ValueError where the
+    latents do not differ.
     """
     latents = evenly(np.reshape(xhat, (-1, field.r)), LATENTS)
-    return extent(xhat, motion(field, evenly(points, POINTS), latents))
+    return extent(xhat, motion_metric(field, evenly(points, POINTS), latents))
 
 
 def evenly(a, count):
@@ -96,36 +98,38 @@ def evenly(a, count):
     return a[::-(-len(a) // count)]
 
 
-def motion(map, X, xhat):
-    """Metric (r, r) [m^2] in which a change of latent coordinates is as long as the root mean
-    square motion of points X (n, d): G^T G with G = dg/dxhat, mean over them and latents (.., r).
-    A part of the points and of the training latents is enough.
+def motion_metric(field, X, xhat):
+    """Return the metric (r, r) [m^2] in which the length of a change of latent coordinates is the
+    root mean square motion of points X (n, d) that it causes.
+
+    It is the mean of G^T G, with G = dg/dxhat, over the points and latents xhat (.., r).
     """
-    total = np.zeros((map.r, map.r))
-    latents = np.reshape(xhat, (-1, map.r))
+    total = np.zeros((field.r, field.r))
+    latents = np.reshape(xhat, (-1, field.r))
     for y in latents:
-        G = map.derivatives(X, y)[2].reshape(-1, map.r)
+        G = field.derivatives(X, y)[2].reshape(-1, field.r)
         total += G.T @ G
     return total / (len(X) * len(latents))
 
 
-def ruler_of(off, metric):
-    """The matrix W with || y W ||^2 = y . metric y; without a metric, with unit spread of the
-    latents off (m, r) their mean, where they spread at all.
+def unit_matrix(deviations, metric):
+    """Return the matrix W (r, r) with || y W ||^2 = y . metric y; without a metric, the one that
+    gives the latents' deviations (m, r) from their mean a unit spread, where they spread at all.
     """
     if metric is not None:
         square, axes = np.linalg.eigh(metric)
         return axes * np.sqrt(np.maximum(square, 0.0))
-    square, axes = np.linalg.eigh(off.T @ off / len(off))
+    square, axes = np.linalg.eigh(deviations.T @ deviations / len(deviations))
     spread = np.sqrt(np.maximum(square, 0.0))
     if not spread[-1] > 0.0:
-        raise ValueError(f"{len(off)} training latents that are all the same: no range is trained")
+        raise ValueError(f"{len(deviations)} training latents that are all the same: expected "
+                         "runs of different parameters")
     return axes / np.maximum(spread, THIN * spread[-1])
 
 
 def largest_gap(runs):
-    """The largest distance from a latent of runs (s, k + 1, r) to the nearest one of another run;
-    between successive ones where there is one run.
+    """Return the largest distance from a latent of runs (s, k + 1, r) to the nearest one of another
+    run; of a single run, that between successive latents.
     """
     if len(runs) == 1:
         return np.linalg.norm(np.diff(runs[0], axis=0), axis=1).max(initial=0.0)

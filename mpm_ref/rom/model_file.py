@@ -13,15 +13,15 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..store.weights_file import read, stated, write
-from .fields.network import Decoder, Field, FieldUnits, Networks, Units, misfit
-from .fields.perceptron import Network, count, layers_of, network
-from .fields.pod import Modes
-from .fields.pod_fields import Cells, Part, Spanned
+from .fields.network import Decoder, DecoderUnits, Field, FieldUnits, Networks, mismatch
+from .fields.perceptron import Network, feature_count, layers_of, network
+from .fields.pod import PodModes
+from .fields.pod_fields import Cells, ModalField, PodFields
 from .fields.polynomial_manifold import Curved
 from .fields.radial_basis import Radial
 
 FORMAT = "reduced model 1"
-KINDS = {"network": Decoder, "network fields": Networks, "pod": Modes, "pod fields": Spanned,
+KINDS = {"network": Decoder, "network fields": Networks, "pod": PodModes, "pod fields": PodFields,
          "polynomial manifold": Curved}
 WHOLE = ("sizes", "octaves", "powers", "order", "start", "middle")  # last names of integer arrays
 SHOWN = 12          # values of a list that a sentence shows
@@ -107,7 +107,7 @@ def network_of(arrays, prefix):
 
 def decoder_of(arrays, prefix=""):
     """Return a `Decoder`."""
-    return Decoder(network_of(arrays, prefix), record(Units, arrays, f"{prefix}units."))
+    return Decoder(network_of(arrays, prefix), record(DecoderUnits, arrays, f"{prefix}units."))
 
 
 def networks_of(arrays):
@@ -118,24 +118,24 @@ def networks_of(arrays):
 
 
 def modes_of(arrays, prefix=""):
-    """Return the `Modes` of arrays whose names begin with a prefix."""
+    """Return the `PodModes` of arrays whose names begin with a prefix."""
     X, U, slope = (arrays[prefix + name] for name in ("X", "U", "slope"))
-    return Modes(X, U, slope, KDTree(X))
+    return PodModes(X, U, slope, KDTree(X))
 
 
 def manifold_of(arrays):
-    """Return a `Curved` map."""
+    """Return the `Curved` map of the arrays of a file."""
     return Curved(modes_of(arrays, "modes."), arrays["powers"], arrays["C"])
 
 
 def pod_fields_of(arrays):
-    """Return `Spanned` fields."""
+    """Return the `PodFields` of the arrays of a file."""
     def function(name):
         return record(Radial, arrays, f"{name}.") if f"{name}.w" in arrays else None
 
-    tau, C = (Part(arrays[f"{name}.modes"], function(f"{name}.coefficients"))
+    tau, C = (ModalField(arrays[f"{name}.modes"], function(f"{name}.coefficients"))
               if f"{name}.modes" in arrays else None for name in ("tau", "C"))
-    return Spanned(arrays["X"], arrays["U"], function("bend"), tau, C, arrays["mu"],
+    return PodFields(arrays["X"], arrays["U"], function("bend"), tau, C, arrays["mu"],
                    record(Cells, arrays, "cells."))
 
 
@@ -157,7 +157,7 @@ def fault_of(arrays):
 
 def needed(kind, arrays):
     """Return the names of the arrays that a field of a kind has, besides some of its own."""
-    units = [f"units.{name}" for name in Units._fields]
+    units = [f"units.{name}" for name in DecoderUnits._fields]
     field_units = [f"units.{name}" for name in FieldUnits._fields]
     net = [f"net.{name}" for name in Network._fields]
     modes = ["X", "U", "slope"]
@@ -195,7 +195,7 @@ def fault_of_decoder(arrays, prefix=""):
         return (f"layers of {prefix}net.sizes {in_short(sizes.tolist())}: expected d + r, .., d, "
                 "with r of 1 or more")
     shapes = net_shapes(sizes, f"{prefix}net.") | {
-        f"{prefix}units.{name}": (d,) for name in Units._fields}
+        f"{prefix}units.{name}": (d,) for name in DecoderUnits._fields}
     return (fault_of_numbers(arrays, shapes | latent_shapes(arrays, r))
             or fault_of_scales(arrays, [f"{prefix}units.{name}" for name in ("span", "std")]))
 
@@ -203,7 +203,7 @@ def fault_of_decoder(arrays, prefix=""):
 def fault_of_networks(arrays):
     """Return what is wrong with `Networks`, or None."""
     return (fault_of_decoder(arrays, "g.") or fault_of_field(arrays, "h.")
-            or fault_of_field(arrays, "l.") or misfit(*networks_of(arrays)))
+            or fault_of_field(arrays, "l.") or mismatch(*networks_of(arrays)))
 
 
 def fault_of_field(arrays, prefix):
@@ -217,7 +217,7 @@ def fault_of_field(arrays, prefix):
     if low.ndim != 1 or mu_mean.ndim != 1:
         return f"{prefix}units.low or mu_mean has not one axis"
     d, q, k = len(low), len(mu_mean), int(sizes[-1])
-    inputs = count(d, int(octaves)) + q
+    inputs = feature_count(d, int(octaves)) + q
     if sizes[0] <= inputs:
         return (f"the first layer of {prefix}net reads {sizes[0]} numbers, of which places and "
                 f"parameters are {inputs}: expected latent coordinates too")
@@ -250,7 +250,7 @@ def fault_of_manifold(arrays):
 
 
 def fault_of_pod_fields(arrays):
-    """Return what is wrong with `Spanned` fields, or None."""
+    """Return what is wrong with `PodFields`, or None."""
     axes = {"U": 3, "xhat": 3, "mu": 1, "cells.middle": 1, "tau.modes": 3, "C.modes": 3,
             "tau.coefficients.centers": 2, "C.coefficients.centers": 2, "bend.centers": 2}
     if fault := fault_of_axes(arrays, {name: axes[name] for name in axes if name in arrays}):

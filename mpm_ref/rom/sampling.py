@@ -1,4 +1,6 @@
-"""Which material points stand for the body in a reduced step (LDM-sec3.3-hyper, LDMW-sets)."""
+"""Samples: the material points that represent the body in a reduced step (LDM-sec3.3-hyper,
+LDMW-sets).
+"""
 
 from typing import NamedTuple
 
@@ -9,7 +11,7 @@ PER_GROUP = 5       # samples of each kinematic boundary, at least
 
 
 class Draw(NamedTuple):
-    """Random samples: `count` of n points, at least so many of each group of indices."""
+    """Random samples: `count` of n points, at least `per_group` of each group of indices."""
 
     n: int
     count: int
@@ -17,7 +19,7 @@ class Draw(NamedTuple):
     per_group: int = PER_GROUP
 
     def __call__(self, rng):
-        """Sorted indices, drawn uniformly without replacement, those of the groups first."""
+        """Return sorted indices, drawn uniformly without replacement, those of the groups first."""
         if self.count == self.n:
             return np.arange(self.n)
         forced = [rng.choice(group, min(self.per_group, len(group)), replace=False)
@@ -29,10 +31,10 @@ class Draw(NamedTuple):
 
 
 def draw(n, count, r, dim, groups=()):
-    """`Draw` of count samples for r latent coordinates in dim axes.
+    """Return the `Draw` of count samples for r latent coordinates in dim axes.
 
-    Raises ValueError where there are not so many points, too few samples for the latent coordinates
-    (LDM-X14), or fewer than the groups ask for.
+    Raises ValueError for more samples than points, for too few for the latent coordinates
+    (LDM-X14), and for fewer than the groups need.
     """
     if not 1 <= count <= n:
         raise ValueError(f"{count} samples of {n} points: expected 1 .. {n}")
@@ -50,16 +52,17 @@ def draw(n, count, r, dim, groups=()):
 
 
 def pivoted(G, count):
-    """Indices of so many of n points that tell latent coordinates best, from dg/dxhat there, G (n,
-    d, r): a QR factorisation with column pivoting takes the r most independent rows (Q-DEIM: Z.
-    Drmac and S. Gugercin, SIAM J. Sci. Comput. 38 (2016) A631), then those of the points left, and
-    so on.
+    """Return indices of `count` of n points that determine latent coordinates best, by Q-DEIM (Z.
+    Drmac and S. Gugercin, SIAM J. Sci. Comput. 38 (2016) A631).
+
+    G (n, d, r): dg/dxhat at the points. A QR factorisation with column pivoting takes the points of
+    the r most independent rows, then those among the points left, and so on.
     """
     left, chosen = np.arange(len(G)), []
     while len(chosen) < min(count, len(G)):
         rows = G[left].reshape(-1, G.shape[2])
         order = qr(rows.T, mode="r", pivoting=True)[1][:G.shape[2]] // G.shape[1]
-        found = left[np.sort(np.unique(order))]
-        chosen += found[:count - len(chosen)].tolist()
-        left = np.setdiff1d(left, found)
+        pivots = left[np.sort(np.unique(order))]
+        chosen += pivots[:count - len(chosen)].tolist()
+        left = np.setdiff1d(left, pivots)
     return np.array(chosen)

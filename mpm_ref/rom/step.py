@@ -44,7 +44,7 @@ class MaterialPoints(NamedTuple):
     v: np.ndarray       # (n, d) velocity at the start [m/s]
 
 
-class Report(NamedTuple):
+class StepReport(NamedTuple):
     """Counts and residual of a reduced step."""
 
     samples: int
@@ -108,7 +108,7 @@ class ReducedStepper:
                          f"place after the step, the first is point {lost[0]}; are the fields "
                          "damaged?")
         xhat, vhat, fit = self.project(latent, cloud.samples, trial, dt, weights)
-        report = Report(len(samples), cloud.report["points"], fit.rank, fit.residual,
+        report = StepReport(len(samples), cloud.report["points"], fit.rank, fit.residual,
                         fit.iterations, fit.converged, cloud.report)
         return latent.advance(xhat, vhat), report
 

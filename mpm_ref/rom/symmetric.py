@@ -1,17 +1,17 @@
-"""Symmetric tensors as their independent values: the upper triangle row by row."""
+"""Conversion of symmetric tensors to their independent values, the upper triangle row by row."""
 
 import numpy as np
 
 
 def values(a):
-    """(.., d (d + 1) / 2) of symmetric tensors a (.., d, d): 11, 12, 22, or 11, 12, 13, 22, 23,
-    33.
+    """Return the values (.., d (d + 1) / 2) of symmetric tensors a (.., d, d): 11, 12, 22, or 11,
+    12, 13, 22, 23, 33.
     """
     return a[(..., *np.triu_indices(a.shape[-1]))]
 
 
 def tensor(a, d):
-    """Symmetric tensors (.., d, d) of their values."""
+    """Return the symmetric tensors (.., d, d) of values a (.., d (d + 1) / 2)."""
     rows, columns = np.triu_indices(d)
     full = np.empty((*a.shape[:-1], d, d))
     full[..., rows, columns] = a

@@ -12,7 +12,7 @@ from small_nsf_studies import EVERY, RUNS, STEPS, modelled, write
 from small_studies import ended
 
 from mpm_ref.rom import model_file
-from mpm_ref.rom.fields.pod_fields import Sizes, spanned
+from mpm_ref.rom.fields.pod_fields import Sizes, fit_pod_fields
 from mpm_ref.rom.study import record, reduce, summary
 from mpm_ref.rom.study.dataset import load_histories, simulate_history
 from mpm_ref.rom.study.full_model import nsf_full_model
@@ -101,7 +101,7 @@ def test_runs_of_other_states_kept_are_not_taken(made, tmp_path):
 def test_fields_are_those_of_the_training_runs(made, pairs):
     model = reduce.load(made / "fields.npz", pairs)
     data = load_histories(pairs, made / "data", pairs.train)
-    fields, xhat = spanned(data, Sizes(3, 5, 8, 8, smoothing=1e-6), BLOCK * 0.1)
+    fields, xhat = fit_pod_fields(data, Sizes(3, 5, 8, 8, smoothing=1e-6), BLOCK * 0.1)
     assert np.array_equal(model.xhat, xhat)
     assert xhat.shape == (RUNS - 1, LEVELS, 3)
     assert np.array_equal(model.field.tau.coefficients.w, fields.tau.coefficients.w)

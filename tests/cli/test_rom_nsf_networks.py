@@ -8,7 +8,7 @@ import pytest
 from command_line import assert_told, mpm_ref
 from small_nsf_studies import modelled, write
 
-from mpm_ref.rom.fields.network import Networks, learned
+from mpm_ref.rom.fields.network import Networks, learned_fields
 from mpm_ref.rom.study import reduce
 from mpm_ref.rom.study.dataset import load_histories
 from mpm_ref.rom.study.study import load
@@ -43,7 +43,7 @@ def study(made):
 
 def test_networks_are_those_of_the_three_stages(made, study):
     data = load_histories(study, made / "data", study.train)
-    plan = settings.stage_plan(study.tables.map.settings, 2)
+    plan = settings.stage_plan(study.tables.reduced_model.settings, 2)
     own = stages.train_stages(plan, data)
     model = reduce.load(made / "nets.npz", study)
     assert isinstance(model.field, Networks)
@@ -58,7 +58,7 @@ def test_networks_are_those_of_the_three_stages(made, study):
 
 
 def test_a_plan_is_the_printed_one_with_the_studys_numbers(study):
-    plan = settings.stage_plan(study.tables.map.settings, 2)
+    plan = settings.stage_plan(study.tables.reduced_model.settings, 2)
     assert (plan.g.hidden, plan.h.hidden, plan.l.hidden) == (5 * (6,), 5 * (6,), 5 * (8,))
     assert (plan.g.r, plan.g.latent, plan.g.epochs) == (3, "free", 40)
     assert [(own.follows, own.epochs) for own in (plan.h, plan.l)] == [(True, 20), (False, 20)]
@@ -69,7 +69,7 @@ def test_a_plan_is_the_printed_one_with_the_studys_numbers(study):
 
 def test_latent_coordinates_of_modes_are_in_one_unit_and_can_be_trained(made, study):
     """Positions alone are known: no norm of the loss with gradients."""
-    plan = settings.stage_plan({**study.tables.map.settings, "latent": "modes"}, 2)
+    plan = settings.stage_plan({**study.tables.reduced_model.settings, "latent": "modes"}, 2)
     assert plan.g.latent == "directions"
     data = load_histories(study, made / "data", study.train)
     found = stages.train_decoder(replace(plan.g, epochs=1), stages.position_snapshots(data))
@@ -86,7 +86,7 @@ def test_a_run_is_one_on_the_networks(made, study, tmp_path):
         X = np.concatenate([results.field(body, "x", 0) for body in ("hard", "soft")])
         xhat, mu = results.h5["reduced/xhat"][0], [1.9]
         rest = load_histories(study, made / "data", (0,), float).X
-        fields = learned(rest, model.field, mu, 0.3)
+        fields = learned_fields(rest, model.field, mu, 0.3)
         tau = np.concatenate([results.field(body, "tau", 0) for body in ("hard", "soft")])
         assert np.array_equal(X, fields.place(np.arange(len(X)), xhat))
         assert np.array_equal(tau, fields.stress(np.arange(len(X)), xhat))

@@ -114,8 +114,8 @@ def test_the_papers_study_has_the_runs_of_the_experiment():
     shipped, experiment = load(shipped_studies()["jelly"], shipped_scenes()), jelly()
     assert shipped.mu[list(shipped.train), 0].tolist() == list(experiment.train)
     assert shipped.mu[list(shipped.test), 0].tolist() == list(experiment.test)
-    assert shipped.tables.map.sizes == experiment.sizes
-    assert shipped.tables.map.stress_sees_parameters == experiment.follows
+    assert shipped.tables.reduced_model.sizes == experiment.sizes
+    assert shipped.tables.reduced_model.stress_sees_parameters == experiment.follows
     assert shipped.tables.run.points == experiment.samples
     for value in (0.3, 0.45):
         assert shipped.scene([value]) == experiment.run(value)

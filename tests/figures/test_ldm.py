@@ -122,7 +122,7 @@ def test_cubes_have_two_colours_and_turn_at_their_faces():
 
 
 def test_motions_of_the_tower_are_told():
-    assert fig15.motion(0.75, np.pi / 3, -np.pi / 6) == "0.75 m/s, 60°, \N{MINUS SIGN}30°"
+    assert fig15.velocity_text(0.75, np.pi / 3, -np.pi / 6) == "0.75 m/s, 60°, \N{MINUS SIGN}30°"
 
 
 # Curves
@@ -182,7 +182,7 @@ def test_fig16_tells_ways_apart(results):
     found = [line for name, line in lines(ax).items() if "samples" in name]
     looks = {(line.get_marker(), line.get_color(), line.get_fillstyle()) for line in found}
     assert len(looks) == len(found) == 16
-    assert not {fig16.look("resampled_linear", k)[1] for k in (1, 2)} & {
+    assert not {fig16.label_and_marker("resampled_linear", k)[1] for k in (1, 2)} & {
         mark for _, mark in MARKS.values()}
 
 
@@ -196,8 +196,8 @@ def test_fig14_numbers_steps_that_are_apart(results):
     assert said[:2] == [0, 12]
     places = np.array([(np.cos(turn[k]), np.sin(turn[k])) for k in said]) / 2.0
     gaps = np.linalg.norm(places[:, None] - places, axis=2)[np.triu_indices(len(said), 1)]
-    assert 10 < len(said) < 2.0 * np.pi / 2.0 / fig14.APART
-    assert gaps.min() > fig14.APART
+    assert 10 < len(said) < 2.0 * np.pi / 2.0 / fig14.SPACING
+    assert gaps.min() > fig14.SPACING
     assert len(lines(ax)["driven"].get_xdata()) == 13
     assert "50 % of the variance" in fig14.scale(results)
 

@@ -7,7 +7,7 @@ from field_toys import MU, Q, field, latents, networks
 
 from mpm_ref.core.jit import kernel
 from mpm_ref.rom.fields.network import Networks
-from mpm_ref.rom.fields.perceptron import ROWS, count, features
+from mpm_ref.rom.fields.perceptron import ROWS, feature_count, features
 from mpm_ref.rom.model_file import Model, load, save
 from mpm_ref.rom.symmetric import tensor
 from validation.nsf.pointwise_networks import fill_features, infer
@@ -30,9 +30,9 @@ def test_features_of_a_place():
 def test_one_place_has_the_features_of_many(d, octaves, rng):
     Z = rng.uniform(size=(20, d))
     found = features(Z, octaves)
-    assert found.shape == (20, count(d, octaves))
+    assert found.shape == (20, feature_count(d, octaves))
     for z, row in zip(Z, found, strict=True):
-        a = np.concatenate([z, np.full(count(d, octaves) - d, np.nan)])
+        a = np.concatenate([z, np.full(feature_count(d, octaves) - d, np.nan)])
         filled(a, d, octaves)
         assert a == pytest.approx(row, abs=1e-13)
 

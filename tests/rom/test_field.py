@@ -65,8 +65,8 @@ def batches(g, h, l, X, xhat, mu):
     """The same as `infer`, layer by layer."""
     x, _, G = g.derivatives(X, xhat)
     d = X.shape[1]
-    return (x, G, tensor(h.values(X, xhat, h.own(mu)), d),
-            l.values(X, xhat, l.own(mu)).reshape(-1, d, d))
+    return (x, G, tensor(h.values(X, xhat, h.needed_parameters(mu)), d),
+            l.values(X, xhat, l.needed_parameters(mu)).reshape(-1, d, d))
 
 
 @GIVEN

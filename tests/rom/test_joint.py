@@ -14,10 +14,10 @@ from mpm_ref.rom.fields.joint_latent import (
     joint,
     stretch_of,
 )
-from mpm_ref.rom.fields.pod_fields import Sizes, spanned
+from mpm_ref.rom.fields.pod_fields import Sizes, fit_pod_fields
 from mpm_ref.rom.latent import Latent
 from mpm_ref.rom.quadrature.lagrangian import NumberedPoints
-from mpm_ref.rom.snapshots import Histories, joined
+from mpm_ref.rom.snapshots import Histories, join_histories
 from mpm_ref.rom.step import MaterialPoints, nsf_stepper
 from mpm_ref.rom.symmetric import values
 
@@ -61,7 +61,7 @@ def to_and_fro(d, reach):
 @pytest.fixture
 def runs(d):
     """Histories of three runs."""
-    return joined([to_and_fro(d, reach) for reach in (0.8, 1.0, 1.2)])
+    return join_histories([to_and_fro(d, reach) for reach in (0.8, 1.0, 1.2)])
 
 
 def test_places_that_have_two_stresses_are_told_apart(runs):
@@ -72,7 +72,7 @@ def test_places_that_have_two_stresses_are_told_apart(runs):
 
     both, xhat, _ = joint(runs, SIZES._replace(modes=2, tau=1, C=1), 0.3)
     assert off(both, xhat) < 1e-4
-    alone, xhat = spanned(runs, Sizes(r=1, modes=1, tau=1, C=1), 0.3, follows=False)
+    alone, xhat = fit_pod_fields(runs, Sizes(r=1, modes=1, tau=1, C=1), 0.3, follows=False)
     assert off(alone, xhat) > 0.5
 
 
@@ -163,5 +163,5 @@ def test_runs_without_stress_are_refused(runs):
     (LAW, make_flow("von_mises_hardening", LAW, 3, tau_y=1.0, xi=0.1))])
 def test_other_materials_are_refused(runs, law, flow):
     fields, _, scale = joint(runs, SIZES._replace(modes=2, tau=1, C=1), 0.3)
-    with pytest.raises(ValueError, match="expected Hencky's law, whose stress tells"):
+    with pytest.raises(ValueError, match="expected Hencky's law, whose stress determines"):
         stepper_of(fields, scale, law, flow)

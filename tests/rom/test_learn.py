@@ -207,7 +207,7 @@ def test_units_are_those_of_the_training_runs():
     snapshots = stretching(4)
     held = snapshots._replace(x=snapshots.x.copy())
     held.x[1] *= 3.0
-    one, other = (train_decoder(training(), s.of([0, 2, 3])) for s in (snapshots, held))
+    one, other = (train_decoder(training(), s.select([0, 2, 3])) for s in (snapshots, held))
     assert bits(one) == bits(other)
     u = (snapshots.x - snapshots.X)[[0, 2, 3]].reshape(-1, 2)
     expected = (snapshots.X.min(axis=0), np.ptp(snapshots.X, axis=0), u.mean(axis=0), u.std(axis=0))

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from mpm_ref.rom import model_file
-from mpm_ref.rom.fields.pod_fields import Sizes, spanned
+from mpm_ref.rom.fields.pod_fields import Sizes, fit_pod_fields
 from mpm_ref.rom.model_file import Model, arrays_of, load, save
-from mpm_ref.rom.snapshots import joined
+from mpm_ref.rom.snapshots import join_histories
 from mpm_ref.store.weights_file import sealed, stated
-from tests.rom.test_spanned import ALL, bent
+from tests.rom.test_pod_fields import ALL, bent
 
 ABOUT = {"command": "train", "map": {"kind": "modes", "r": 2}}
 KINDS = {"all": (Sizes(r=2, modes=3, tau=2, C=1), True), "straight": (Sizes(2, 2, 2, 1), True),
@@ -20,8 +20,8 @@ KINDS = {"all": (Sizes(r=2, modes=3, tau=2, C=1), True), "straight": (Sizes(2, 2
 
 def model(d=2, kind="all"):
     sizes, follows = KINDS[kind]
-    runs = joined([bent(d, mu) for mu in (0.4, 0.7, 1.0)])
-    fields, xhat = spanned(runs, sizes, 0.3, follows)
+    runs = join_histories([bent(d, mu) for mu in (0.4, 0.7, 1.0)])
+    fields, xhat = fit_pod_fields(runs, sizes, 0.3, follows)
     return Model(fields, xhat, xhat[:, 0].mean(axis=0), ABOUT)
 
 

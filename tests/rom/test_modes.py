@@ -6,7 +6,7 @@ import rom_toys
 import threadpoolctl
 
 from mpm_ref.rom.fields.pod import modes
-from mpm_ref.rom.snapshots import displacement_error, position_error, units
+from mpm_ref.rom.snapshots import decoder_units, displacement_error, position_error
 
 ROUND_OFF = 4e-14       # of the largest entry; seen: 3.8e-15
 S, N = 6, 40            # snapshots, points
@@ -166,19 +166,19 @@ def test_affine_map_has_the_derivatives_of_its_values(d, rng):
 def test_units_are_those_of_displacements(d):
     shots = rom_toys.snapshots(d)
     u = (shots.x - shots.X).reshape(-1, d)
-    found = units(shots)
+    found = decoder_units(shots)
     for a, b in zip(found, (shots.X.min(0), np.ptp(shots.X, 0), u.mean(0), u.std(0)), strict=True):
         assert a == pytest.approx(b, rel=1e-13)
     shots.x[..., 0] = shots.X[:, 0]
-    assert units(shots).std[0] == units(shots).std[1:].max()
-    assert units(shots).std[1:] == pytest.approx(u.std(0)[1:], rel=1e-13)
+    assert decoder_units(shots).std[0] == decoder_units(shots).std[1:].max()
+    assert decoder_units(shots).std[1:] == pytest.approx(u.std(0)[1:], rel=1e-13)
     shots.x[:] = shots.X
-    assert (units(shots).std == 1.0).all()
+    assert (decoder_units(shots).std == 1.0).all()
 
 
 def test_some_runs_of_snapshots(d):
     shots = rom_toys.snapshots(d)
-    some = shots.of([2, 0])
+    some = shots.select([2, 0])
     for name in ("mu", "x", "F", "v"):
         assert np.array_equal(getattr(some, name), getattr(shots, name)[[2, 0]])
     x, F = some.flat()

@@ -9,7 +9,7 @@ import rom_toys
 from mpm_ref.rom.extrapolation import LATENTS, extent
 from mpm_ref.rom.fields.pod import basis
 from mpm_ref.rom.latent import start_state
-from mpm_ref.rom.step import Report
+from mpm_ref.rom.step import StepReport
 from mpm_ref.rom.study import monitor as monitoring
 from mpm_ref.rom.study.full_model import ldm_full_model
 from mpm_ref.rom.study.monitor import (
@@ -32,7 +32,7 @@ DX, DT = 0.1, 0.02
 
 
 def report(map, residual=0.0, rank=None, lost=0):
-    return Report(9, 30, map.r if rank is None else rank, residual, 1, True, {"lost": lost})
+    return StepReport(9, 30, map.r if rank is None else rank, residual, 1, True, {"lost": lost})
 
 
 @pytest.fixture

@@ -10,8 +10,8 @@ import rom_toys
 import threadpoolctl
 from problems import elsewhere
 
-from mpm_ref.rom.fields.network import Decoder, Units
-from mpm_ref.rom.fields.perceptron import ROWS, layers_of, network, over
+from mpm_ref.rom.fields.network import Decoder, DecoderUnits
+from mpm_ref.rom.fields.perceptron import ROWS, for_batches, layers_of, network
 from validation.nsf import pointwise_networks
 
 R = 3
@@ -19,7 +19,7 @@ HIDDEN = {"none": (), "one": (7,), "uneven": (12, 5, 9), "four of 30": (30,) * 4
           "five of 30": (30,) * 5}
 ROUND_OFF = 1e-14       # of the largest entry; seen: 1.3e-15
 STEP = 1e-30            # of a derivative in the complex plane: no difference is formed
-UNITS = Units(np.array([-0.3, 2.0, 0.1]), np.array([1.4, 0.5, 0.8]),
+UNITS = DecoderUnits(np.array([-0.3, 2.0, 0.1]), np.array([1.4, 0.5, 0.8]),
               np.array([0.2, -0.1, 0.05]), np.array([0.3, 0.07, 0.2]))
 
 DIGEST = """
@@ -36,7 +36,7 @@ def hidden(request):
 
 def case(d, hidden, n=100, seed=0):
     """A map in units of its own, points of its box at rest, xhat and vhat."""
-    units = Units(*(a[:d] for a in UNITS))
+    units = DecoderUnits(*(a[:d] for a in UNITS))
     layers = rom_toys.layers((d + R, *hidden, d), seed)
     X = units.low + units.span * rom_toys.cloud(d, n, seed)
     xhat, vhat = np.random.default_rng(seed).uniform(-1.0, 1.0, (2, R))
@@ -256,7 +256,7 @@ def blas_threads():
 def test_batches_are_worked_on_with_one_thread_of_blas_each():
     seen = []
     with threadpoolctl.threadpool_limits(2):
-        over(5, lambda rows: seen.append(blas_threads()))
+        for_batches(5, lambda rows: seen.append(blas_threads()))
         assert blas_threads() == {2}
     assert seen == [{1}]
 

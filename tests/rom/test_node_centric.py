@@ -11,7 +11,7 @@ from mpm_ref.rom.fields.affine import Affine
 from mpm_ref.rom.latent import start_state
 from mpm_ref.rom.quadrature.eulerian import Eulerian
 from mpm_ref.rom.quadrature.lagrangian import neighbours
-from mpm_ref.rom.quadrature.node_centric import node_centric, nodes_of, whole_stencils
+from mpm_ref.rom.quadrature.node_centric import full_stencils, node_centric, nodes_of
 from mpm_ref.rom.quadrature.stencil_overlap import bases
 from mpm_ref.rom.step import ldm_stepper
 from tests.rom.test_step import (
@@ -69,10 +69,10 @@ def rows(nodes):
 def test_only_whole_stencils_count(d, degree):
     """One node less, and its block tells nothing."""
     nodes = block(d, degree, more=0)
-    assert whole_stencils(nodes, degree).tolist() == [[1] * d]
-    assert len(whole_stencils(nodes[:-1], degree)) == 0
+    assert full_stencils(nodes, degree).tolist() == [[1] * d]
+    assert len(full_stencils(nodes[:-1], degree)) == 0
     both = np.concatenate([nodes, nodes + degree + 1, nodes[:3]])
-    assert whole_stencils(both, degree).tolist() == [[1] * d, [degree + 2] * d]
+    assert full_stencils(both, degree).tolist() == [[1] * d, [degree + 2] * d]
 
 
 def test_places_are_all_that_share_a_node_of_a_whole_stencil(d, degree):

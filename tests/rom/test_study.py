@@ -54,7 +54,7 @@ def test_runs_differ_by_their_parameters_and_show_every_step(tmp_path):
 
 def test_a_network_may_have_more_latent_coordinates_than_there_are_states(tmp_path):
     bars = study(tmp_path, ('kind = "modes"\nr = 3', 'kind = "network"\nr = 100'))
-    assert bars.tables.map.r == 100
+    assert bars.tables.reduced_model.r == 100
 
 
 def test_two_parameters_make_every_pair_the_last_one_fastest(tmp_path):
@@ -258,6 +258,6 @@ def test_a_study_may_scale_the_weights_to_its_body_and_steps(tmp_path):
     assert size_ratios(own) == pytest.approx((1.0, 1.0))
     assert size_ratios(study(tmp_path).base) == pytest.approx((0.8 / 0.4, 0.01 * 144.0))
     network = '"network"\nlatent = "modes"\nweights = "scaled"'
-    assert study(tmp_path, ('"modes"', network)).tables.map.weights == "scaled"
+    assert study(tmp_path, ('"modes"', network)).tables.reduced_model.weights == "scaled"
     assert "weights = 'tower': expected one of 'code', 'printed', 'scaled'" in told(
         tmp_path, ('"modes"', '"network"\nweights = "tower"'))

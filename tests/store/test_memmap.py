@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from field_toys import histories
 
-from mpm_ref.rom.fields.pod_fields import Sizes, spanned
-from mpm_ref.rom.snapshots import joined
+from mpm_ref.rom.fields.pod_fields import Sizes, fit_pod_fields
+from mpm_ref.rom.snapshots import join_histories
 from mpm_ref.store import memmap
 
 SHAPE = 3, 5
@@ -101,16 +101,16 @@ def test_fields_of_them_are_the_same(monkeypatch):
     runs = [histories(runs=1)._replace(mu=np.array([[mu]]), v=np.full((1, 12, 2), mu))
             for mu in (1.0, 2.0, 3.0)]
     runs = [run._replace(x=run.x * run.mu[0], tau=run.tau * run.mu[0]) for run in runs]
-    known = joined(runs)
-    fields, xhat = spanned(known, SIZES, 0.3)
+    known = join_histories(runs)
+    fields, xhat = fit_pod_fields(known, SIZES, 0.3)
     monkeypatch.setattr(memmap, "LARGEST", 0)
-    far = joined(iter(runs), 3)
+    far = join_histories(iter(runs), 3)
     for name in ("v", "mu"):
         assert np.array_equal(getattr(far, name), [getattr(run, name)[0] for run in runs])
     for name in ("x", "tau", "C"):
         assert in_file(getattr(far, name))
         assert np.array_equal(getattr(far, name), getattr(known, name))
-    again, at = spanned(far, SIZES, 0.3)
+    again, at = fit_pod_fields(far, SIZES, 0.3)
     assert np.array_equal(at, xhat)
     assert np.array_equal(again.U, fields.U)
     assert np.array_equal(again.tau.modes, fields.tau.modes)
@@ -120,12 +120,12 @@ def test_fields_of_them_are_the_same(monkeypatch):
                                               (4, "3 runs: expected 4")])
 def test_another_number_of_runs_than_was_said_is_refused(count, words):
     with pytest.raises(ValueError, match=words):
-        joined(iter([histories(runs=1)] * 3), count)
+        join_histories(iter([histories(runs=1)] * 3), count)
 
 
 def test_no_runs_are_refused():
     with pytest.raises(ValueError, match="0 runs: expected some"):
-        joined([])
+        join_histories([])
 
 
 @pytest.mark.parametrize(("other", "words"), [
@@ -136,4 +136,4 @@ def test_no_runs_are_refused():
      "tau of run 1: float32 .* expected float64")])
 def test_runs_that_do_not_fit_each_other_are_refused(other, words):
     with pytest.raises(ValueError, match=words):
-        joined([histories(runs=1), other])
+        join_histories([histories(runs=1), other])

@@ -8,7 +8,7 @@ import pytest
 from mpm_ref.materials.learned import weights as of_laws
 from mpm_ref.nclaw.gnn import weights as of_graphs
 from mpm_ref.rom import model_file
-from mpm_ref.rom.fields.pod import Modes
+from mpm_ref.rom.fields.pod import PodModes
 from mpm_ref.rom.model_file import Model
 from mpm_ref.store.weights_file import read, stated, write
 from validation.nclaw import bundle
@@ -66,7 +66,7 @@ def test_files_of_another_kind_are_told_as_such(tmp_path, format, asked, said):
 @pytest.mark.parametrize("save", [model_file.save, bundle.save])
 def test_what_json_does_not_know_is_refused_with_the_file(tmp_path, save):
     about = {"x": np.zeros(2)}
-    modes = Modes(np.zeros((5, 2)), np.zeros((5, 2, 3)), np.zeros((5, 2, 2, 3)), None)
+    modes = PodModes(np.zeros((5, 2)), np.zeros((5, 2, 3)), np.zeros((5, 2, 2, 3)), None)
     made = bundle.Bundle({}, about) if save is bundle.save else Model(
         modes, np.zeros((1, 2, 3)), np.zeros(3), about)
     with pytest.raises(ValueError, match=r"a\.npz is not written: about: Object of type ndarray"):

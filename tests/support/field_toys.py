@@ -5,7 +5,7 @@ import numpy as np
 import rom_toys
 
 from mpm_ref.rom.fields.network import Field, FieldUnits
-from mpm_ref.rom.fields.perceptron import count, network
+from mpm_ref.rom.fields.perceptron import feature_count, network
 from mpm_ref.rom.snapshots import Histories
 from mpm_ref.rom.symmetric import values
 
@@ -21,7 +21,7 @@ def field(dim, outputs, q=0, seed=0, octaves=0):
     units = FieldUnits(np.full(dim, -0.1), np.full(dim, 1.3), rng.normal(size=outputs),
                        rng.uniform(0.5, 2.0, outputs), rng.normal(size=q) * 30.0,
                        rng.uniform(5.0, 10.0, q))
-    sizes = (count(dim, octaves) + R + q, *HIDDEN, outputs)
+    sizes = (feature_count(dim, octaves) + R + q, *HIDDEN, outputs)
     return Field(network(rom_toys.layers(sizes, seed)), units, octaves)
 
 

@@ -5,9 +5,11 @@ UNIQUE = ("mpm_ref", "validation")          # class names are unique across thes
 
 # Class names that several modules share on purpose, each with the reason.
 _KERNELS = "the record of a scene file, and in `core` that of the kernels it is built into"
+_BUILT = "the record of a scene file, and the object of a run that it is built into"
 SHARED_CLASS_NAMES: dict[str, str] = dict.fromkeys(
     ("HalfSpace", "Sphere", "Cylinder", "Capsule", "Torus", "Wedge", "Steady", "Keyframes", "Ramps",
-     "Oscillation", "Motion", "Collider"), _KERNELS) | {
+     "Oscillation", "Motion", "Collider", "Box"), _KERNELS) | dict.fromkeys(
+    ("Body", "Scheme", "Limits"), _BUILT) | {
     "Material": "the record of a scene file, and in `materials` the law and flow it is built into"}
 
 # Not even as one of the words of a name (`kept_bodies`, `HeldRun`; the plural counts as well).

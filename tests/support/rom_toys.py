@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm_ref.rom.fields.affine import Affine
-from mpm_ref.rom.fields.network import Decoder, Units
+from mpm_ref.rom.fields.network import Decoder, DecoderUnits
 from mpm_ref.rom.fields.perceptron import network
 from mpm_ref.rom.snapshots import Snapshots
 
@@ -26,7 +26,7 @@ def layers(sizes, seed=0):
 
 def decoder(dim, r, seed=0, hidden=(9, 8)):
     """A `Decoder` with F near I and det F > 0 in the unit box, for xhat within [-1, 1]."""
-    units = Units(np.zeros(dim), np.ones(dim), MEAN[:dim], STD[:dim])
+    units = DecoderUnits(np.zeros(dim), np.ones(dim), MEAN[:dim], STD[:dim])
     return Decoder(network(layers((dim + r, *hidden, dim), seed)), units)
 
 

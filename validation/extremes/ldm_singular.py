@@ -4,7 +4,7 @@ import numpy as np
 
 from mpm_ref.rom.fields.network import Decoder
 from mpm_ref.rom.fields.perceptron import layers_of, network
-from mpm_ref.rom.fields.pod import Modes
+from mpm_ref.rom.fields.pod import PodModes
 from mpm_ref.rom.study.run import SCHEMES, RunOptions
 
 from ..common.registry import experiment
@@ -49,7 +49,7 @@ def repeated(reduction, share, name):
     """POD modes with one more: a share of the first."""
     map = reduction.map
     U, slope = (np.concatenate([a, share * a[..., :1]], axis=-1) for a in (map.U, map.slope))
-    return reduction._replace(name=name, map=Modes(map.X, U, slope, map.tree),
+    return reduction._replace(name=name, map=PodModes(map.X, U, slope, map.tree),
                               xhat=with_zero(reduction.xhat), rest=with_zero(reduction.rest))
 
 
@@ -80,7 +80,7 @@ def singular(run):
     more, tried = [], []
     for reduction, rank in run.progress(redundant(sound, pod, NEAR[run.profile], run.rng),
                                         "maps"):
-        of = plain[isinstance(reduction.map, Modes)]
+        of = plain[isinstance(reduction.map, PodModes)]
         bench = Bench(reduction, usual=of.usual)
         more += [(bench.trial("redundant", way), of.ended(way).error, rank) for way in ways]
         tried.append(bench.trial("redundant", RunOptions(points=FEW)))

@@ -7,7 +7,7 @@ from tempfile import TemporaryDirectory
 from mpm_ref.nclaw.gnn.features import box_of
 from mpm_ref.nclaw.study import study as law_study
 from mpm_ref.nclaw.study.training import train_study
-from mpm_ref.rom.snapshots import joined
+from mpm_ref.rom.snapshots import join_histories
 from mpm_ref.rom.study.dataset import simulate_history, simulate_snapshots
 from mpm_ref.rom.study.reduce import train_model
 from mpm_ref.rom.study.study import load
@@ -65,7 +65,7 @@ def nsf(text):
     """Return three networks, latent coordinates and coordinates at rest of a study's training."""
     with study_file(text) as path:
         study = load(path, SCENES)
-        runs = joined((simulate_history(study.scene(study.mu[k]), study.mu[k],
+        runs = join_histories((simulate_history(study.scene(study.mu[k]), study.mu[k],
                                         every=study.base.every)
                        for k in study.train), len(study.train))
         model = train_model(study, runs, {}, path.parent / "stages", lambda history: None,

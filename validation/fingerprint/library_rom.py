@@ -8,16 +8,16 @@ import numba
 import numpy as np
 
 from mpm_ref.rom import model_file
-from mpm_ref.rom.fields.elastic import deformed
+from mpm_ref.rom.fields.elastic import elastic_modes
 from mpm_ref.rom.fields.joint_latent import joint, joint_stepper
-from mpm_ref.rom.fields.network import learned
+from mpm_ref.rom.fields.network import learned_fields
 from mpm_ref.rom.fields.pod import basis
-from mpm_ref.rom.fields.pod_fields import Sizes, spanned
+from mpm_ref.rom.fields.pod_fields import Sizes, fit_pod_fields
 from mpm_ref.rom.fields.polynomial_manifold import curved
 from mpm_ref.rom.latent import Latent
 from mpm_ref.rom.quadrature.lagrangian import neighbours
 from mpm_ref.rom.quadrature.node_centric import node_centric, nodes_of
-from mpm_ref.rom.snapshots import joined
+from mpm_ref.rom.snapshots import join_histories
 from mpm_ref.rom.study.dataset import simulate_history, simulate_snapshots
 from mpm_ref.rom.study.full_model import ldm_full_model, nsf_full_model
 from mpm_ref.rom.study.reduce import BLOCK, compute_model
@@ -153,7 +153,7 @@ def small_histories():
     small = study("jelly_small")
     runs = (simulate_history(small.scene(small.mu[k]), small.mu[k], every=small.base.every)
             for k in small.train)
-    return joined(runs, len(small.train))
+    return join_histories(runs, len(small.train))
 
 
 @cached_by_threads
@@ -191,7 +191,7 @@ def nsf_modes(samples, count, steps, map_alone=False, **options):
     fields, rest, setup = small_fields()
     chosen = samples_of(samples, fields, setup, count)
     if map_alone:
-        fields = deformed(fields, setup.problem.bodies)
+        fields = elastic_modes(fields, setup.problem.bodies)
     return {"samples": tuple(chosen)} | nsf(setup, fields, rest, (chosen, steps), **options)
 
 
@@ -200,7 +200,7 @@ def nsf_networks(name, scene_name, values, mu, count, steps):
     stored = model_file.load(NSF_WEIGHTS / f"{name}.npz")
     setup = nsf_full_model(scene(scene_name, **values))
     rest = stored.rest
-    fields = learned(setup.X, stored.field, mu, BLOCK * setup.problem.dx)
+    fields = learned_fields(setup.X, stored.field, mu, BLOCK * setup.problem.dx)
     return nsf(setup, fields, rest, (drawn_samples(len(setup.X), count, 0), steps))
 
 
@@ -221,12 +221,12 @@ def nsf_joint(name, key, train, values, sizes, plan):
     samples and of steps.
     """
     scenes = [scene(name, **values, **{key: value}) for value in train]
-    runs = joined((simulate_history(one, [value], every=values["every"])
+    runs = join_histories((simulate_history(one, [value], every=values["every"])
                    for one, value in zip(scenes, train, strict=True)), len(train))
     setup = nsf_full_model(scenes[len(train) // 2])
     size, chosen = BLOCK * setup.problem.dx, (drawn_samples(len(setup.X), plan[0], 0), plan[1])
     fields, xhat, scale = joint(runs, Sizes(*sizes), size)
-    alone, coordinates = spanned(runs, Sizes(*sizes), size, False)
+    alone, coordinates = fit_pod_fields(runs, Sizes(*sizes), size, False)
     return {"scale": tuple(scale),
             **joint_run(setup, fields, xhat[:, 0].mean(axis=0), scale, chosen),
             "positions alone": nsf(setup, alone, coordinates[:, 0].mean(axis=0), chosen)}

@@ -2,7 +2,7 @@
 4.7 among them); of graph networks, how far off they run freely.
 """
 
-from mpm_ref.materials.learned.weights import mixed
+from mpm_ref.materials.learned.weights import errors_include_velocities
 from mpm_ref.nclaw.gnn.simulator import Simulator
 
 from ..common.registry import experiment
@@ -61,7 +61,7 @@ def kind_of(method, about):
     """What the errors of a training are: unit and note."""
     if method == LABELED:
         return ANSWER
-    return MIXED if mixed(about) else STEP
+    return MIXED if errors_include_velocities(about) else STEP
 
 
 def record(run, target, errors, of):

@@ -17,9 +17,16 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm_ref.rom.fields.architecture import DEPTH
-from mpm_ref.rom.fields.network import Decoder, Field, FieldUnits, LearnedFields, Units, learned
+from mpm_ref.rom.fields.network import (
+    Decoder,
+    DecoderUnits,
+    Field,
+    FieldUnits,
+    LearnedFields,
+    learned_fields,
+)
 from mpm_ref.rom.fields.perceptron import network
-from mpm_ref.rom.fields.pod_fields import Part, Sizes, Spanned, cells
+from mpm_ref.rom.fields.pod_fields import ModalField, PodFields, Sizes, cells
 from mpm_ref.rom.fields.radial_basis import Radial
 from mpm_ref.rom.study.full_model import nsf_full_model
 from mpm_ref.rom.study.reduce import BLOCK
@@ -114,7 +121,7 @@ def kinds(own, scene, rng):
         nets = networks(widths, own.X, rng)
         place, stress, affine = (net[0].W.size for net in nets)
         yield (word, 2 * place + stress + affine,
-               learned(own.X, nets, (), BLOCK * own.problem.dx))
+               learned_fields(own.X, nets, (), BLOCK * own.problem.dx))
     fields, sizes = modes(own, rng), Sizes(6)
     products = 2 * 3 * sizes.modes + 6 * sizes.tau + 9 * sizes.C
     yield "modes", products, fields
@@ -129,12 +136,12 @@ def networks(widths, X, rng):
             for width, k in zip(widths, OUTPUTS, strict=True)]
     plain = [FieldUnits(low, span, np.zeros(k), np.ones(k), np.zeros(0), np.ones(0))
              for k in OUTPUTS[1:]]
-    return (Decoder(nets[0], Units(low, span, np.zeros(3), 1e-3 * span)), Field(nets[1], plain[0]),
-            Field(nets[2], plain[1]))
+    units = DecoderUnits(low, span, np.zeros(3), 1e-3 * span)
+    return Decoder(nets[0], units), Field(nets[1], plain[0]), Field(nets[2], plain[1])
 
 
 def modes(own, rng):
-    """`Spanned` fields of random modes, of usual `Sizes`."""
+    """`PodFields` of random modes, of usual `Sizes`."""
     sizes, n = Sizes(6), len(own.X)
 
     def radial(k):
@@ -142,9 +149,9 @@ def modes(own, rng):
                       rng.normal(size=(CENTRES, k)), np.zeros((1 + sizes.r, k)))
 
     U = rng.normal(size=(n, 3, sizes.modes))
-    tau, C = (Part(rng.normal(size=(n, k, R)), radial(R))
+    tau, C = (ModalField(rng.normal(size=(n, k, R)), radial(R))
               for k, R in ((6, sizes.tau), (9, sizes.C)))
-    return Spanned(own.X, U, radial(sizes.modes - sizes.r), tau, C, np.zeros(0),
+    return PodFields(own.X, U, radial(sizes.modes - sizes.r), tau, C, np.zeros(0),
                    cells(own.X, U, BLOCK * own.problem.dx))
 
 

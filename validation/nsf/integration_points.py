@@ -4,7 +4,7 @@ from itertools import product
 
 import numpy as np
 
-from mpm_ref.rom.quadrature.stencil_overlap import bases, reach
+from mpm_ref.rom.quadrature.stencil_overlap import bases, stencil_overlap
 from mpm_ref.rom.study.dataset import simulate_history
 from mpm_ref.rom.study.full_model import nsf_full_model
 
@@ -30,7 +30,8 @@ def sets(run):
         one, x = half_way(study)
         samples = study.chosen(one, count, 0)[0].points
         dx, degree = one.problem.dx, one.problem.scheme.degree
-        near, nodes = reach(x[samples], dx, degree).reached(x), nodes_of(x[samples], dx, degree)
+        near = stencil_overlap(x[samples], dx, degree).overlaps(x)
+        nodes = nodes_of(x[samples], dx, degree)
         record(run, f"nsf.fig4.{name}", samples, nodes, near)
         kept |= {f"{name}_{word}": some for word, some in
                  (("x", thinned(x)), ("integration", x[near]), ("sample", x[samples]))}

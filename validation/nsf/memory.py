@@ -8,10 +8,10 @@ from functools import partial
 import numpy as np
 
 from mpm_ref.rom.fields.joint_latent import Stacked, joint, joint_stepper
-from mpm_ref.rom.fields.pod_fields import Sizes, spanned
+from mpm_ref.rom.fields.pod_fields import Sizes, fit_pod_fields
 from mpm_ref.rom.latent import Latent
 from mpm_ref.rom.projection import project_position
-from mpm_ref.rom.snapshots import joined
+from mpm_ref.rom.snapshots import join_histories
 from mpm_ref.rom.study.dataset import simulate_history
 from mpm_ref.rom.study.evaluate import (
     history_reference,
@@ -47,7 +47,7 @@ def memory(run):
     """Errors of the displacement and of the stress, with few samples and with all particles."""
     rows = []
     for name, study in run.progress(studies(run).items(), "scenes"):
-        runs = joined((made(study, value) for value in study.train), len(study.train))
+        runs = join_histories((made(study, value) for value in study.train), len(study.train))
         tests = {value: made(study, value)
                  for value in study.test[:run.choose(quick=1, standard=2)]}
         for word, kind in (("position", of_positions), ("joint", of_both)):
@@ -75,7 +75,7 @@ def made(study, value):
 def of_positions(study, value, runs, test):
     """Rows (value, samples, errors) of a test, with latent coordinates of positions."""
     one = nsf_full_model(study.run(value))
-    fields, xhat = spanned(runs, study.sizes, BLOCK * one.problem.dx, follows=False)
+    fields, xhat = fit_pod_fields(runs, study.sizes, BLOCK * one.problem.dx, follows=False)
     rest = xhat[:, 0].mean(axis=0)
     yield value, NEAREST, *errors(fields, test, nearest_states(fields, test.x[0], rest))
     for samples in (study.samples, len(one.X)):

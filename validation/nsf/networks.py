@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from mpm_ref.rom.fields.architecture import DEPTH
-from mpm_ref.rom.fields.network import learned
+from mpm_ref.rom.fields.network import learned_fields
 from mpm_ref.rom.model_file import load
 from mpm_ref.rom.study.full_model import nsf_full_model
 from mpm_ref.rom.study.reduce import BLOCK
@@ -119,4 +119,4 @@ def fields_of(model, study):
     """`LearnedFields` of a `Model` in the first run of a study."""
     one = nsf_full_model(study.run(study.train[0]))
     mu = [study.train[0]] if study.follows else []
-    return learned(one.X, model.field, mu, BLOCK * one.problem.dx)
+    return learned_fields(one.X, model.field, mu, BLOCK * one.problem.dx)

@@ -69,7 +69,7 @@ def said_of(octaves):
 
 def weights_of(study, own, width, octaves=0):
     """Number of weights, without biases, of one network with hidden layers so wide."""
-    inputs = perceptron.count(DIM, octaves) + study.sizes.r + (own == "h" and study.follows)
+    inputs = perceptron.feature_count(DIM, octaves) + study.sizes.r + (own == "h" and study.follows)
     return sum(n * m for n, m in pairwise((inputs, *(width,) * DEPTH, OUTPUTS[own])))
 
 

@@ -159,7 +159,8 @@ def infer(g, h, l, X, xhat, mu=()):
     n, d = X.shape
     out = (np.empty((n, d)), np.empty((n, d, d)), np.empty((n, d, g.r)),
            np.empty((n, h.outputs)), np.empty((n, l.outputs)))
-    at = (X, np.asarray(xhat, dtype=float), *(f.coordinates(xhat, f.own(mu)) for f in (h, l)))
+    at = (X, np.asarray(xhat, dtype=float),
+          *(f.coordinates(xhat, f.needed_parameters(mu)) for f in (h, l)))
     networks = (Flat(*transposed(f.net), *f.units[:4], getattr(f, "octaves", 0)) for f in (g, h, l))
     _infer_all(*networks, at, out, tuple(scratch(f.net) for f in (g, h, l)))
     x, _, G, tau, C = out

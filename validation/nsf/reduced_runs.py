@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.rom.fields.elastic import deformed
-from mpm_ref.rom.fields.pod_fields import spanned
+from mpm_ref.rom.fields.elastic import elastic_modes
+from mpm_ref.rom.fields.pod_fields import fit_pod_fields
 from mpm_ref.rom.projection import INVERSIONS
-from mpm_ref.rom.snapshots import joined
+from mpm_ref.rom.snapshots import join_histories
 from mpm_ref.rom.study.dataset import simulate_history
 from mpm_ref.rom.study.errors import PositionErrors, Squares
 from mpm_ref.rom.study.evaluate import (
@@ -40,12 +40,12 @@ class Tested(NamedTuple):
     """Fields of a study's training runs, and its tests."""
 
     study: object
-    fields: object          # `Spanned`
+    fields: object          # `PodFields`
     xhat: np.ndarray        # (s, k + 1, r) of the training runs
     runs: object            # `Histories` of training
     tests: dict             # {value: `Histories` of a run}
     map_alone: bool = False     # whether stress is that of the map's gradient, without affine field
-    modes: object = None        # `Spanned` by which samples get weights; None: the fields
+    modes: object = None        # `PodFields` by which samples get weights; None: the fields
     known: dict | None = None   # modes of `runs`, kept from one fit to the next
     inversion: str = INVERSIONS[0]
 
@@ -72,9 +72,9 @@ class Tested(NamedTuple):
 
     def of(self, value):
         """The fields in a run with this value."""
-        fields = self.fields.of([value] if self.study.follows else [])
+        fields = self.fields.with_parameters([value] if self.study.follows else [])
         if self.map_alone:
-            return deformed(fields, nsf_full_model(self.study.run(value)).problem.bodies)
+            return elastic_modes(fields, nsf_full_model(self.study.run(value)).problem.bodies)
         return fields
 
     def errors(self, value, count, draw=0, faster=1.0, weighed=False):
@@ -124,7 +124,7 @@ def tested(study):
     def made(value):
         return simulate_history(study.run(value), [value], np.float32, study.spacing)
 
-    runs = joined(map(made, study.train), len(study.train))
+    runs = join_histories(map(made, study.train), len(study.train))
     tests = {value: made(value) for value in study.test}
     return refitted(Tested(study, None, None, runs, tests, known={}), study.sizes, study.follows)
 
@@ -132,6 +132,6 @@ def tested(study):
 def refitted(one, sizes, follows):
     """The same runs with other fields."""
     block = BLOCK * nsf_full_model(one.study.run(one.study.train[0])).problem.dx
-    fields, xhat = spanned(one.runs, sizes, block, follows, one.known)
+    fields, xhat = fit_pod_fields(one.runs, sizes, block, follows, one.known)
     return one._replace(study=one.study._replace(sizes=sizes, follows=follows), fields=fields,
                         xhat=xhat)

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.rom.snapshots import joined
+from mpm_ref.rom.snapshots import join_histories
 from mpm_ref.rom.study.dataset import simulate_history
 
 from ..common.registry import experiment
@@ -64,7 +64,7 @@ def of_modes(study, repeats):
         return simulate_history(study.run(value), [value], np.float32, study.spacing)
 
     tests = {study.test[0]: made(study.test[0])}        # first, as it compiles what is missing
-    runs, spent = clocked(lambda: joined(map(made, study.train), len(study.train)))
+    runs, spent = clocked(lambda: join_histories(map(made, study.train), len(study.train)))
     bare = Tested(study, None, None, runs, tests)
     one, made_in = clocked(lambda: refitted(bare, study.sizes, study.follows))
     return one, Bill(spent.cpu, made_in.cpu, full_cpu(one),

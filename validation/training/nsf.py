@@ -13,7 +13,7 @@ import typer
 from tqdm import tqdm
 
 from mpm_ref.rom.model_file import save
-from mpm_ref.rom.snapshots import joined
+from mpm_ref.rom.snapshots import join_histories
 from mpm_ref.rom.study.dataset import simulate_history
 from mpm_ref.rom.train.decoder import DecoderTraining
 from mpm_ref.rom.train.field import FieldTraining
@@ -44,7 +44,7 @@ def plan_of(net):
 def runs_of(study):
     """`Histories` of a study's training runs."""
     values = tqdm(study.train, desc="runs")
-    return joined((simulate_history(study.run(value), [value], np.float32, study.spacing)
+    return join_histories((simulate_history(study.run(value), [value], np.float32, study.spacing)
                    for value in values), len(study.train))
 
 
@@ -97,8 +97,8 @@ def errors_of(model, runs):
             xhat, X, (g, h, l) = model.xhat[run, k], runs.X, model.field
             for name, found, known in (
                     ("displacement", g.place(X, xhat) - X, runs.x[run, k] - X),
-                    ("stress", h.values(X, xhat, h.own(mu)), runs.tau[run, k]),
-                    ("affine", l.values(X, xhat, l.own(mu)), runs.C[run, k])):
+                    ("stress", h.values(X, xhat, h.needed_parameters(mu)), runs.tau[run, k]),
+                    ("affine", l.values(X, xhat, l.needed_parameters(mu)), runs.C[run, k])):
                 sums[name] += np.sum((found - known)**2), np.sum(known**2, dtype=float)
     return {name: float(np.sqrt(off / norm)) for name, (off, norm) in sums.items()}
 

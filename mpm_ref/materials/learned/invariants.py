@@ -1,11 +1,12 @@
-"""What a neural law is told of a deformation gradient, and what comes back of it.
+"""Invariants of a deformation gradient, the inputs of a neural law, and their adjoint.
 
-With F = U diag(s) V^T, all of proper rotations, a law reads (NCLAW-alg4, NCLAW-input-norm)
+With F = U diag(s) V^T, where U and V are proper rotations, a law reads (NCLAW-alg4,
+NCLAW-input-norm)
 
     a = (s - 1, F^T F - I, det F - 1),    d + d^2 + 1 numbers, 13 in 3D
 
-which rotations R* F leave alone (NCLAW-eq22 to NCLAW-eq30) and which vanish at F = I. Its answer is
-turned by R = U V^T. Pulled back, a gradient a' of a, and R' of R, is
+which do not change with rotations R* F (NCLAW-eq22 to NCLAW-eq30) and which vanish at F = I. Its
+answer is turned by R = U V^T. Pulled back, a gradient a' of a, and R' of R, is
 
     F' = U (diag(s') + X) V^T + F (C' + C'^T) + J' cof F,    X_ij = (M_ij - M_ji)/(s_i + s_j)
 

@@ -1,4 +1,4 @@
-"""What a neural law answers: a stress or a deformation gradient, turned by R of F = R S.
+"""Stress or deformation gradient from the outputs of a neural law, rotated by R of F = R S.
 
 With the d x d numbers Y that a network gives and T = (Y + Y^T)/2 (NCLAW-alg4, NCLAW-eq33 to
 NCLAW-eq37):
@@ -10,7 +10,7 @@ NCLAW-eq37):
     PlainStress         tau = unit Y F^T        without R, as the paper's ablation has them
     PlainCorrection     F' = F + alpha Y
 
-`bars` gives the gradients of Y, F and R from that of the answer.
+`bars` gives the gradients of Y, F and R from that of the stress or deformation gradient.
 """
 
 from typing import NamedTuple

@@ -68,9 +68,9 @@ def dim_of(laws):
     return dims[0] if dims else 3
 
 
-def mixed(about):
-    """Whether the errors of epochs in an `about` have the loss's term of velocities in them: such
-    files are older than `errors_of`, which says what errors are of.
+def errors_include_velocities(about):
+    """Return whether the errors of epochs in an `about` include the loss's term of velocities, as
+    in files without the entry `errors_of`.
     """
     return bool(about.get("recipe", {}).get("velocity")) and "errors_of" not in about
 

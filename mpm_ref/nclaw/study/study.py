@@ -55,17 +55,17 @@ class AnswerTable(LawStudyTable):
     strain: float | None = None     # below which a contraction reads strains as they are
 
 
-class LawStudyTables(LawStudyTable):
-    """A law study."""
+class LawStudyTables(LawStudyTable, rename={"overrides": "set"}):
+    """The tables of a file of a law study."""
 
-    scene: str                      # a file, from the folder of this one; or shipped
+    scene: str                      # a file, from the folder of this one; or bundled
     title: str = ""
     method: str = "ours"            # of `nclaw.train.methods`
-    set: dict = field(default_factory=dict)     # {path: value} of the scene
+    overrides: dict = field(default_factory=dict)   # {path: value} of the scene
     laws: AnswerTable = AnswerTable()
     train: Recipe = field(default_factory=Recipe)
     weights: str | None = None      # file, from the folder of this one
-    checkpoint: str | None = None   # likewise
+    checkpoint: str | None = None   # file, from there too
 
     def __post_init__(self):
         one_of("method", self.method, METHOD_KINDS)
@@ -74,7 +74,7 @@ class LawStudyTables(LawStudyTable):
 
     @property
     def records(self):
-        """Records of the kinds of answers of the elastic and of the plastic law; none of sys-id."""
+        """Records of the kinds of the elastic and of the plastic law; none of sys-id."""
         return records_of(self.method, self.laws)
 
 
@@ -88,14 +88,14 @@ def records_of(method, answers):
     if method == SYS_ID and any(given):
         raise ValueError(f'elastic, plastic: method = "{SYS_ID}" learns the constants of the '
                          "scene's own laws; leave them out")
-    names = [choose_kind(part, name, known) for part, name, known in
+    names = [choose_kind(part, name, kinds) for part, name, kinds in
              zip(PARTS, given, METHOD_KINDS[method], strict=False)]
     return with_constants([KINDS[name]() for name in names], unit=answers.unit,
                           alpha=answers.alpha, strain=answers.strain)
 
 
 def choose_kind(part, name, kinds):
-    """The name of a kind: the given one, else the usual. Raises ValueError for an unknown one."""
+    """Return the given name of a kind, or the usual one. Raises ValueError for an unknown one."""
     if name is None:
         return kinds[0]
     one_of(part, name, kinds)
@@ -103,7 +103,7 @@ def choose_kind(part, name, kinds):
 
 
 def with_constants(records, **constants):
-    """Records with those constants that are given. Raises ValueError for one that none has."""
+    """Return records with the constants that are given. Raises ValueError for one that none has."""
     for name, value in constants.items():
         if value is None:
             continue
@@ -116,8 +116,8 @@ def with_constants(records, **constants):
     return tuple(records)
 
 
-def checked(data):
-    """`LawStudyTables` of plain tables. Raises SceneError, which names the key."""
+def parse_tables(data):
+    """Return the `LawStudyTables` of plain tables. Raises SceneError, which names the key."""
     check_finite(data)
     require_keys(data, LawStudyTables.__struct_encode_fields__)
     require_keys(data.get("laws"), AnswerTable.__struct_encode_fields__, "laws")
@@ -126,49 +126,48 @@ def checked(data):
     if isinstance(given, dict) and isinstance(method, str):
         data = data | {"train": USUAL.get(method, {}) | given}
     try:
-        tables = msgspec.convert(data, LawStudyTables)
+        return msgspec.convert(data, LawStudyTables)
     except msgspec.ValidationError as fault:
         raise SceneError(rephrase(str(fault), data)) from None
-    return tables
 
 
 class LawStudy(NamedTuple):
     """A scene, and the settings of the laws that are learned from it."""
 
     path: Path
-    scene: Scene            # every step of which is shown
+    scene: Scene            # with a frame for every step
     tables: LawStudyTables
 
     def file(self, name):
-        """The path that a key of the study names, from its folder; or None."""
+        """Return the path that a key of the study names, from its folder; or None."""
         given = getattr(self.tables, name)
         return None if given is None else self.path.parent / given
 
     def problem(self):
-        """A new `Problem` of the scene."""
+        """Return a new `Problem` of the scene."""
         return build(self.scene, str(self.path))
 
     @property
     def material(self):
-        """The scene's record of what its body is made of."""
+        """The scene's record of its body's material."""
         return self.scene.body[0].material
 
 
-def load(path, shipped=None):
-    """The `LawStudy` of a TOML file; shipped {name: path} are scenes that it may name. Raises
+def load(path, scenes=None):
+    """Return the `LawStudy` of a TOML file; scenes {name: path} are those that it may name. Raises
     SceneError, which names the file and the key, also for a scene whose laws cannot be learned.
     """
     path = Path(path)
     data = read_toml(path)
     with opened_by(str(path)):
-        tables = checked(data)
-        study = LawStudy(path, base_scene(tables, path.parent, shipped or {}), tables)
+        tables = parse_tables(data)
+        study = LawStudy(path, base_scene(tables, path.parent, scenes or {}), tables)
         require_learnable(study)
         return study
 
 
 def require_learnable(study):
-    """Raise SceneError for a scene whose steps are not those that training knows (see
+    """Raise SceneError for a scene whose steps training does not have (see
     `nclaw.batched_step`), and for one whose constants "sys-id" cannot learn.
     """
     problem = build(study.scene)

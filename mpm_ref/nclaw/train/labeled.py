@@ -61,7 +61,7 @@ class LabeledSession(TrajectorySession):
         """
         for optimiser in self.optimisers:
             optimiser.zero_grad()
-        losses = [((law(asked) - told) ** 2).mean() for law, asked, told in
+        losses = [((law(F) - label) ** 2).mean() for law, F, label in
                   zip(self.laws, (labels.F, labels.trial), (labels.tau, labels.F_new), strict=True)]
         if not all(map(torch.isfinite, losses)):
             raise Diverged(f"epoch {self.number}: the loss is "
@@ -74,8 +74,8 @@ class LabeledSession(TrajectorySession):
 
 
 def train_labeled(recipe, laws, world, labels, checkpoint=None, on_epoch=None):
-    """As `fit.train`, on `Labels` of a `World`. `loss` of epochs is the mean squared error of tau
-    [Pa^2], `error` that of F.
+    """Train laws in place on `Labels` of a `World` and return the session, like `fit.train`. The
+    `loss` of an epoch is the mean squared error of tau [Pa^2], its `error` that of F.
     """
     session = LabeledSession(recipe, laws, world, labels)
     return train_epochs(session, recipe.epochs, SAVE, checkpoint, on_epoch)

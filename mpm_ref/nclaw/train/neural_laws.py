@@ -139,13 +139,13 @@ class UnshiftedLawModule(LawModule):
 
 
 class NoFlowModule(LawModule):
-    """F (n, d, d) as it is; nothing is learned."""
+    """The identity as a flow: F (n, d, d) stays the same, nothing is learned."""
 
     def __init__(self, kind=NO_FLOW):
         super().__init__(kind)
 
     def forward(self, F):
-        """Return F."""
+        """Return F (n, d, d) unchanged."""
         return F
 
     def weights(self):

@@ -8,7 +8,7 @@ import numpy as np
 
 
 class Affine(NamedTuple):
-    """The map of all affine deformations; xhat holds the rows (A_a, b_a), axis by axis."""
+    """The map of all affine deformations; xhat is the rows (A_a, b_a), axis by axis."""
 
     dim: int
 
@@ -23,12 +23,12 @@ class Affine(NamedTuple):
         return np.hstack([np.eye(self.dim), np.zeros((self.dim, 1))]).ravel()
 
     def place(self, X, xhat):
-        """x = A X + b."""
+        """Return x = A X + b."""
         A, b = self._parts(xhat)
         return X @ A.T + b
 
     def derivatives(self, X, xhat):
-        """x, F = A, and dg/dxhat, in which axis a knows row a alone."""
+        """Return x, F = A, and dg/dxhat, in which axis a depends on row a alone."""
         A, b = self._parts(xhat)
         n, d = X.shape
         G = np.zeros((n, d, d, d + 1))
@@ -38,7 +38,7 @@ class Affine(NamedTuple):
         return X @ A.T + b, np.tile(A, (n, 1, 1)), G.reshape(n, d, self.r)
 
     def velocity(self, X, xhat, vhat):
-        """A' X + b' with the rates of A and b."""
+        """Return A' X + b' with the rates of A and b."""
         return self.place(X, vhat)
 
     def _parts(self, xhat):

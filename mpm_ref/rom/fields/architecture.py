@@ -18,45 +18,47 @@ class Stack(NamedTuple):
 
 
 def hidden(beta, outputs):
-    """Widths of a field's hidden layers (NSF-arch)."""
+    """Return the widths of a field's hidden layers (NSF-arch)."""
     return (beta * outputs,) * DEPTH
 
 
 def lengths(n):
-    """Lengths of a row of n values before and after each convolution of the encoder: as many
-    convolutions as leave at least SHORTEST values.
+    """Return the lengths of a row of n values before and after each convolution of LDM's encoder:
+    as many convolutions as leave at least SHORTEST values.
     """
-    found = [n]
-    while shortened(found[-1], STRIDE) >= SHORTEST:
-        found.append(shortened(found[-1], STRIDE))
-    return found
+    row = [n]
+    while shortened(row[-1], STRIDE) >= SHORTEST:
+        row.append(shortened(row[-1], STRIDE))
+    return row
 
 
 def nsf_lengths(n):
-    """The same for NSF's: convolutions until at most NSF_LONGEST values are left (NSF-encoder)."""
-    found = [n]
-    while found[-1] > NSF_LONGEST:
-        found.append(shortened(found[-1], NSF_STRIDE))
-    return found
+    """Return the lengths of a row of n values before and after each convolution of NSF's encoder:
+    convolutions until at most NSF_LONGEST values are left (NSF-encoder).
+    """
+    row = [n]
+    while row[-1] > NSF_LONGEST:
+        row.append(shortened(row[-1], NSF_STRIDE))
+    return row
 
 
 def shortened(n, stride):
-    """Length of a row of n values after a convolution."""
+    """Return the length of a row of n values after a convolution."""
     return (n - KERNEL) // stride + 1
 
 
 def one_row(dim, n):
-    """`Stack` for all coordinates of n points in one row (LDM-tab1)."""
-    found = lengths(dim * n)
-    return Stack([1] * len(found), found, STRIDE)
+    """Return the `Stack` for all coordinates of n points in one row (LDM-tab1)."""
+    row = lengths(dim * n)
+    return Stack([1] * len(row), row, STRIDE)
 
 
 def row_per_axis(dim, n):
-    """`Stack` for n points, each axis in a row of its own. The paper does not say how the
+    """Return the `Stack` for n points with a row for each axis. The paper does not say how the
     coordinates are laid out; its three output channels fit this (NSF-encoder).
     """
-    found = nsf_lengths(n)
-    return Stack([dim] + [NSF_ROWS] * (len(found) - 1), found, NSF_STRIDE)
+    row = nsf_lengths(n)
+    return Stack([dim] + [NSF_ROWS] * (len(row) - 1), row, NSF_STRIDE)
 
 
 ENCODERS = {"encoder": one_row, "encoder-nsf": row_per_axis}

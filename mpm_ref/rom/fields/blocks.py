@@ -1,8 +1,9 @@
-"""Material points in blocks of the body at rest: where to look for those near the samples.
+"""Material points in blocks of the body at rest, for the search of points near the samples.
 
-A block's points lie, in motion, within L radius of its centre's image, where L bounds the stretch.
-So the points that can be near a sample are found from as many evaluations of the map as there are
-blocks, whatever the number of points. Many blocks' centres are points in larger blocks again.
+In motion, a block's points lie within L radius of its centre's image, where L bounds the stretch.
+So the points that can be near a sample follow from one evaluation of the map for each block,
+whatever the number of points. If there are many blocks, their centres are points in larger blocks
+again.
 """
 
 from typing import NamedTuple
@@ -12,7 +13,7 @@ from scipy.spatial import KDTree
 
 SAFETY = 1.5        # on the largest stretch at the centres, as a bound on that in between
 MANY = 500          # blocks, above which their centres are in larger ones ...
-LARGER = 3.0        # ... of so many times the size
+LARGER = 3.0        # ... of this many times the size
 
 
 class Blocks(NamedTuple):
@@ -25,22 +26,22 @@ class Blocks(NamedTuple):
     above: object           # `Blocks` of the centres, or None
 
     def near(self, g, xhat, x, distance, margin=0.0):
-        """Indices of all points that may be within a distance [m], by the largest axis, of one of
-        the positions x (m, d); or that have points within a margin [m] at rest which may be.
+        """Return indices of all points that may be within a distance [m], by the largest axis, of
+        one of the positions x (m, d); or that have points within a margin [m] at rest which may be.
         """
         k = np.arange(len(self.center))
         if self.above is not None:
             k = self.above.near(g, xhat, x, distance, margin + self.radius.max())
-        at, F, _ = g.derivatives(self.center[k], xhat)
+        x_center, F, _ = g.derivatives(self.center[k], xhat)
         stretch = SAFETY * np.linalg.norm(F, 2, axis=(1, 2)).max(initial=0.0)
-        gap, _ = KDTree(x).query(at, p=np.inf)
-        found = k[gap <= distance + stretch * (self.radius[k] + margin)]
-        parts = [self.order[self.start[k]:self.start[k + 1]] for k in found]
+        gap, _ = KDTree(x).query(x_center, p=np.inf)
+        near = k[gap <= distance + stretch * (self.radius[k] + margin)]
+        parts = [self.order[self.start[k]:self.start[k + 1]] for k in near]
         return np.concatenate([self.order[:0], *parts])
 
 
 def blocks(X, size):
-    """`Blocks` of cubes of a size [m] of points X (n, d) at rest."""
+    """Return the `Blocks` of cubes of a size [m] of points X (n, d) at rest."""
     _, block = np.unique(np.floor(X / size).astype(np.int64), axis=0, return_inverse=True)
     count = np.bincount(block)
     order = np.argsort(block, kind="stable")

@@ -18,7 +18,7 @@ from scipy.spatial import KDTree
 from ...body import Body, particles_at
 from ...explicit import initial_stress
 from ...materials import NoFlow
-from .pod_fields import Spanned
+from .pod_fields import PodFields
 
 NEIGHBOURS = 26         # of a point, in 3D those of a lattice; in 2D 8
 LEAST = 1e-10           # of a spread over the largest: across a plane there is no gradient
@@ -65,63 +65,65 @@ class Portion(NamedTuple):
     law: tuple
 
 
-class Deformed(NamedTuple):
-    """Fields (see `inferred`) of which the map alone is known."""
+class ElasticModes(NamedTuple):
+    """The modes of a map with the stress of its deformation gradient, for the points of bodies."""
 
-    map: Spanned
+    fields: PodFields
     D: np.ndarray       # (n, d, d, R) dU/dX of modes [1/m]
     bodies: tuple       # of `Portion`
 
     @property
     def X(self):
         """Points (n, d) at rest [m]."""
-        return self.map.X
+        return self.fields.X
 
     @property
     def dim(self):
         """Number of axes d."""
-        return self.map.dim
+        return self.fields.dim
 
     @property
     def r(self):
         """Number of latent coordinates."""
-        return self.map.r
+        return self.fields.r
 
     def place(self, points, xhat):
-        """x (m, d) [m] of points of these numbers."""
-        return self.map.place(points, xhat)
+        """Return x (m, d) [m] of points of these numbers."""
+        return self.fields.place(points, xhat)
 
     def derivatives(self, points, xhat):
-        """x (m, d), F (m, d, d) and dg/dxhat (m, d, r)."""
-        x, _, G = self.map.derivatives(points, xhat)
+        """Return x (m, d), F (m, d, d) and dg/dxhat (m, d, r)."""
+        x, _, G = self.fields.derivatives(points, xhat)
         return x, self.F(points, xhat), G
 
     def F(self, points, xhat):
-        """Deformation gradients (m, d, d) of the map."""
-        return np.eye(self.dim) + self.D[points] @ self.map.all(xhat)
+        """Return the deformation gradients (m, d, d) of the map."""
+        return np.eye(self.dim) + self.D[points] @ self.fields.all(xhat)
 
     def stress(self, points, xhat, F=None):
         """Return the Kirchhoff stress (m, d, d) [Pa] of F (m, d, d), if given, or of the map's."""
         F = self.F(points, xhat) if F is None else F
         tau = np.empty_like(F)
         for body in self.bodies:
-            own = (points >= body.first) & (points < body.last)
-            tau[own] = elastic_stress(F[own], body.law)
+            inside = (points >= body.first) & (points < body.last)
+            tau[inside] = elastic_stress(F[inside], body.law)
         return tau
 
     def affine(self, points, xhat):
-        """C (m, d, d) [1/s]: none."""
+        """Return C (m, d, d) [1/s], which is 0: there is no affine field."""
         return np.zeros((len(points), self.dim, self.dim))
 
     def near(self, xhat, x, distance):
-        """Numbers of all points that may be within a distance [m], by the largest axis, of one of
-        the positions x (m, d).
+        """Return numbers of all points that may be within a distance [m], by the largest axis, of
+        one of the positions x (m, d).
         """
-        return self.map.near(xhat, x, distance)
+        return self.fields.near(xhat, x, distance)
 
 
 def elastic_stress(F, law):
-    """Kirchhoff stress (m, d, d) [Pa] of deformation gradients (m, d, d), without plasticity."""
+    """Return the Kirchhoff stress (m, d, d) [Pa] of deformation gradients (m, d, d), without
+    plasticity.
+    """
     m, d = F.shape[:2]
     particles = particles_at(np.zeros((m, d)), np.zeros((m, d)), np.ones(m), np.ones(m), "pic")
     particles.F[:] = F
@@ -129,31 +131,32 @@ def elastic_stress(F, law):
     return particles.tau
 
 
-def deformed(map, bodies):
-    """`Deformed` of `Spanned` fields, whose points are those of a problem's bodies in order. Raises
-    ValueError for a body with too few points to tell a gradient.
+def elastic_modes(fields, bodies):
+    """Return the `ElasticModes` of `PodFields` whose points are those of a problem's bodies, in
+    order. Raises ValueError for a body with too few points for a gradient.
     """
     for body in bodies:
-        require_neighbours(body.name, len(body.id), map.dim)
+        require_neighbours(body.name, len(body.id), fields.dim)
     ends = np.cumsum([0] + [len(body.id) for body in bodies])
     portions = tuple(Portion(*pair, body.law)
                      for pair, body in zip(pairwise(ends), bodies, strict=True))
-    D = [gradients(map.X[own.first:own.last], map.U[own.first:own.last]) for own in portions]
-    return Deformed(map, np.concatenate(D), portions)
+    D = [gradients(fields.X[p.first:p.last], fields.U[p.first:p.last]) for p in portions]
+    return ElasticModes(fields, np.concatenate(D), portions)
 
 
 def require_neighbours(name, n, d):
     """Raise ValueError unless a body of n points in d dimensions has neighbours along all axes."""
     if n <= d:
-        raise ValueError(f"points in the body {name!r}: {n}, which tell no gradient of the map: "
+        raise ValueError(f"points in the body {name!r}: {n}, too few for a gradient of the map: "
                          f"expected at least {d + 1}; sample the body more finely, or take fields "
-                         "that know the stress")
+                         "with a stress of their own")
 
 
 def gradients(X, U):
-    """dU/dX (n, d, d, R), of component and axis, of modes U (n, d, R) at points X (n, d): planes
-    through each point that fit its neighbours with least squares, nearer ones counting more;
-    n > d.
+    """Return dU/dX (n, d, d, R), by component and axis, of modes U (n, d, R) at points X (n, d).
+
+    They are the slopes of planes through each point that fit its neighbours by least squares,
+    nearer ones counting more; n > d.
     """
     n, d = X.shape
     away, near = KDTree(X).query(X, min(n, 1 + (NEIGHBOURS if d == 3 else 8)))

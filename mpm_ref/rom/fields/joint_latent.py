@@ -1,16 +1,16 @@
-"""Latent coordinates of position and stress together, for matter that remembers more than where it
-is. Beyond the paper, which leaves path dependence for later work (section 7).
+"""Latent coordinates of position and stress together, for materials whose stress depends on their
+history. An extension: the paper leaves path dependence for later work (section 7).
 
-A metal that is sheared to and fro has been in every place with several stresses, so that NSF's
-fields, whose latent coordinates are told from positions alone, answer some mean of these. Here
-latent coordinates are the coefficients of modes that both share, and both are asked for:
+A metal that is sheared to and fro passes every position with several stresses. NSF's fields, whose
+latent coordinates are fitted to positions alone, give a mean of them. Here latent coordinates are
+the coefficients of modes that both share, and are fitted to both:
 
     [(x_p - X_p) / x_0, tau_p / tau_0] = sum_k xhat_k [U_kp / x_0, T_kp / tau_0] + the rest
     min_y sum_p |g(X_p; y) - x_p|^2 / x_0^2 + w^2 |h(X_p; y) - tau_p|^2 / tau_0^2
 
-x_p are the samples' positions after the step, as before. tau_p are their stresses after it, by the
-material's own law: stress tells the elastic strain of Hencky's law, the velocity gradient stretches
-it over the step, and the return map takes some back. So samples, and they alone, need singular
+x_p are the samples' positions after the step, as in NSF. tau_p are their stresses after it, by the
+material's law: the elastic strain of Hencky's law follows from the stress, the velocity gradient
+changes it over the step, and the return map limits it. So samples, and they alone, need singular
 values and a return map again.
 """
 
@@ -26,22 +26,22 @@ from ..projection import Projected, project_position
 from ..quadrature.lagrangian import NumberedPoints
 from ..step import ReducedStepper
 from ..symmetric import values
-from .pod_fields import Spanned, cells, modes_of, part
+from .pod_fields import PodFields, cells, fit_modal_field, modes_of
 from .radial_basis import through
 
 SHARE = 0.3         # of the stress in the modes, over that of the displacement
-WEIGHT = 0.03       # of the stress in the inversion: more, and what it says of a step drowns motion
+WEIGHT = 0.03       # of the stress in the inversion; with more it outweighs the motion of a step
 
 
 class Scale(NamedTuple):
-    """What positions and stresses are measured in: root mean squares over the snapshots."""
+    """Units of positions and stresses: root mean squares over the snapshots."""
 
     x: float            # of a displacement's value [m]
     tau: float          # of a stress's value [Pa]
 
 
 def joint(histories, sizes, size, share=SHARE):
-    """`Spanned` fields of `Histories` whose latent coordinates are shared by displacement and
+    """Return the `PodFields` of `Histories` whose latent coordinates are shared by displacement and
     stress, the latent coordinates (s, k + 1, r) of the snapshots, and their `Scale`; size [m] of
     blocks. Raises ValueError for more modes than the snapshots hold, and where nothing moves or
     nothing is stressed.
@@ -65,16 +65,16 @@ def joint(histories, sizes, size, share=SHARE):
         rest, a = modes_of(u - xhat @ U.T, sizes.modes - sizes.r, "modes")
         U, bend = np.hstack([U, rest]), fit(a)
     U = np.ascontiguousarray(U.reshape(n, d, -1))
-    fields = Spanned(histories.X, U, bend, part(histories.tau, sizes.tau, "tau", fit),
-                     part(histories.C, sizes.C, "C", fit) if sizes.C else None, np.zeros(0),
-                     cells(histories.X, U, size))
+    tau = fit_modal_field(histories.tau, sizes.tau, "tau", fit)
+    C = fit_modal_field(histories.C, sizes.C, "C", fit) if sizes.C else None
+    fields = PodFields(histories.X, U, bend, tau, C, np.zeros(0), cells(histories.X, U, size))
     return fields, xhat.reshape(s, levels, -1), scale
 
 
 class Stacked(NamedTuple):
-    """Place and stress of points as one vector each, over what they are measured in."""
+    """Position and stress of each point as one vector, in the units of a `Scale`."""
 
-    fields: Spanned
+    fields: PodFields
     scale: Scale
     weight: float
 
@@ -83,21 +83,23 @@ class Stacked(NamedTuple):
         """Number of latent coordinates."""
         return self.fields.r
 
-    def of(self, x, tau):
-        """Places x (m, d) [m] and stresses tau (m, d, d) [Pa] as vectors (m, d + d (d + 1)/2)."""
+    def vectors(self, x, tau):
+        """Return positions x (m, d) [m] and stresses tau (m, d, d) [Pa] as vectors (m, d + d (d +
+        1)/2).
+        """
         return np.hstack([x / self.scale.x, self.weight * values(tau) / self.scale.tau])
 
     def place(self, points, xhat):
-        """These of points of these numbers."""
-        return self.of(self.fields.place(points, xhat), self.fields.stress(points, xhat))
+        """Return the vectors (m, d + d (d + 1)/2) of points of these numbers."""
+        return self.vectors(self.fields.place(points, xhat), self.fields.stress(points, xhat))
 
     def derivatives(self, points, xhat):
-        """These, None, and their derivatives (m, d + d (d + 1)/2, r)."""
+        """Return the vectors, None, and the vectors' derivatives (m, d + d (d + 1)/2, r)."""
         x, _, G = self.fields.derivatives(points, xhat)
         tau = self.fields.tau
         H = tau.modes[points] @ tau.coefficients.slope(xhat)
         both = np.concatenate([G / self.scale.x, self.weight * H / self.scale.tau], axis=1)
-        return self.of(x, self.fields.stress(points, xhat)), None, both
+        return self.vectors(x, self.fields.stress(points, xhat)), None, both
 
 
 @dataclass(frozen=True)
@@ -117,14 +119,14 @@ class JointInversion:
             raise ValueError("samples with weights: expected samples that all count the same; "
                              "weights are made for positions alone")
         both = Stacked(field, self.scale, self.weight)
-        fit = project_position(both, samples.points, both.of(trial.x, trial.tau), latent.xhat)
+        fit = project_position(both, samples.points, both.vectors(trial.x, trial.tau), latent.xhat)
         return Projected(fit.y, None, fit)
 
 
 @dataclass
 class JointStepper(ReducedStepper):
-    """Advances latent coordinates of position and stress. All points are of one material: law and
-    flow. Raises ValueError for a law other than Hencky's, or a flow with a history of its own.
+    """Advance latent coordinates of position and stress, for a body of one law and flow. Raises
+    ValueError for a law other than Hencky's, or a flow with a history of its own.
     """
 
     law: object = None
@@ -135,7 +137,8 @@ class JointStepper(ReducedStepper):
         if not isinstance(self.law, Hencky) or isinstance(self.flow, Hardening | Softening):
             raise ValueError(f"joint latent coordinates of {type(self.law).__name__} with "
                              f"{type(self.flow).__name__}: expected Hencky's law, whose stress "
-                             "tells the elastic strain, and a flow without hardening or softening")
+                             "determines the elastic strain, and a flow without hardening or "
+                             "softening")
 
     def on_grid(self, body, samples, t, dt):
         """Return the samples' particles after a step on the grid, their stress carried along by the
@@ -162,8 +165,8 @@ def joint_stepper(fields, material, problem, scale, weight=WEIGHT):
 
 
 def stretch_of(tau, law):
-    """Elastic left stretches (m, d, d) whose Kirchhoff stresses by Hencky's law are tau (m, d, d)
-    [Pa]: exp of (tau - lam tr(tau) / (2 mu + d lam) I) / (2 mu).
+    """Return the elastic left stretches (m, d, d) whose Kirchhoff stresses by Hencky's law are tau
+    (m, d, d) [Pa]: exp of (tau - lam tr(tau) / (2 mu + d lam) I) / (2 mu).
     """
     d = tau.shape[1]
     pressure = law.lam * np.trace(tau, axis1=1, axis2=2) / (2.0 * law.mu + d * law.lam)

@@ -28,17 +28,17 @@ from .blocks import Blocks, blocks
 from .perceptron import (
     Network,
     backward,
-    count,
     directional,
+    feature_count,
     features,
+    for_batches,
     forward,
     layers_of,
-    over,
 )
 
 
-class Units(NamedTuple):
-    """What a decoder's inputs and outputs are measured in; d axes."""
+class DecoderUnits(NamedTuple):
+    """Units of a decoder's inputs and outputs; d axes."""
 
     low: np.ndarray     # (d,) corner of the body's box at rest [m]
     span: np.ndarray    # (d,) its sides [m]
@@ -50,7 +50,7 @@ class Decoder(NamedTuple):
     """A learned map: a perceptron with sizes (d + r, .., d), and its units."""
 
     net: Network
-    units: Units
+    units: DecoderUnits
 
     @property
     def dim(self):
@@ -63,11 +63,11 @@ class Decoder(NamedTuple):
         return int(self.net.sizes[0]) - self.dim
 
     def place(self, X, xhat):
-        """x = g(X; xhat) of points X (n, d) [m]."""
+        """Return x = g(X; xhat) of points X (n, d) [m]."""
         return X + self.units.mean + self.units.std * outputs(*self, X, xhat)
 
     def derivatives(self, X, xhat):
-        """x (n, d), F (n, d, d) and dg/dxhat (n, d, r) [m] of points X (n, d)."""
+        """Return x (n, d), F (n, d, d) and dg/dxhat (n, d, r) [m] of points X (n, d)."""
         (n, d), layers = X.shape, layers_of(self.net)
         y, dy = np.empty((n, d)), np.empty((n, d, d + self.r))
 
@@ -76,13 +76,13 @@ class Decoder(NamedTuple):
             for k in range(d):
                 dy[rows, k] = backward(layers, slopes, k)
 
-        over(n, work)
+        for_batches(n, work)
         dy *= self.units.std[:, None]
         return (X + self.units.mean + self.units.std * y,
                 np.eye(d) + dy[..., :d] / self.units.span, np.ascontiguousarray(dy[..., d:]))
 
     def velocity(self, X, xhat, vhat):
-        """dg/dxhat(X; xhat) vhat of points X (n, d) [m/s]."""
+        """Return dg/dxhat(X; xhat) vhat of points X (n, d) [m/s]."""
         layers, v = layers_of(self.net), np.empty(X.shape)
         along = np.concatenate([np.zeros(self.dim), vhat]).astype(self.net.W.dtype)
 
@@ -90,22 +90,22 @@ class Decoder(NamedTuple):
             _, slopes = forward(layers, inputs(*self, X[rows], xhat))
             v[rows] = directional(layers, slopes, along)
 
-        over(len(X), work)
+        for_batches(len(X), work)
         return self.units.std * v
 
     def single(self):
-        """The same map, its network in single precision: faster, with errors of round-off of the
-        displacements, below which `inverse` finds nothing.
+        """Return the map with its network in single precision: faster, with errors of round-off in
+        the displacements, below which `preimages` cannot converge.
         """
         net = self.net
         return self._replace(net=Network(net.sizes, *(a.astype(np.float32) for a in net[1:])))
 
 
 def inputs(net, units, X, y, octaves=0):
-    """What a network takes of points X (n, d): scaled positions at rest, or their `features`, and
-    the coordinates y of the state, which are the same for all; (n, d (1 + 2 octaves) + len(y)).
+    """Return the inputs (n, d (1 + 2 octaves) + len(y)) of a network at points X (n, d): scaled
+    positions at rest, or their `features`, and the coordinates y of the state.
     """
-    k = count(len(units.low), octaves)
+    k = feature_count(len(units.low), octaves)
     A = np.empty((len(X), net.sizes[0]), dtype=net.W.dtype)
     A[:, :k] = features((X - units.low) / units.span, octaves)
     A[:, k:] = y
@@ -113,18 +113,18 @@ def inputs(net, units, X, y, octaves=0):
 
 
 def outputs(net, units, X, y, octaves=0):
-    """Standardised outputs (n, k) of a network at points X (n, d) and coordinates y."""
-    layers, found = layers_of(net), np.empty((len(X), net.sizes[-1]))
+    """Return the standardised outputs (n, k) of a network at points X (n, d), coordinates y."""
+    layers, values = layers_of(net), np.empty((len(X), net.sizes[-1]))
 
     def work(rows):
-        found[rows] = forward(layers, inputs(net, units, X[rows], y, octaves))[0]
+        values[rows] = forward(layers, inputs(net, units, X[rows], y, octaves))[0]
 
-    over(len(X), work)
-    return found
+    for_batches(len(X), work)
+    return values
 
 
 class FieldUnits(NamedTuple):
-    """What a field's inputs and outputs are measured in; d axes, k values, q parameters."""
+    """Units of a field's inputs and outputs; d axes, k values, q parameters."""
 
     low: np.ndarray         # (d,) corner of the body's box at rest [m]
     span: np.ndarray        # (d,) its sides [m]
@@ -154,25 +154,25 @@ class Field(NamedTuple):
     @property
     def r(self):
         """Number of latent coordinates."""
-        return int(self.net.sizes[0]) - count(self.dim, self.octaves) - self.parameters
+        return int(self.net.sizes[0]) - feature_count(self.dim, self.octaves) - self.parameters
 
     @property
     def outputs(self):
         """Number k of values."""
         return int(self.net.sizes[-1])
 
-    def own(self, mu):
-        """Those of a run's parameters mu that it depends on: all, or none."""
+    def needed_parameters(self, mu):
+        """Return the parameters that the field depends on: all of a run's mu, or none."""
         return mu if self.parameters else ()
 
     def values(self, X, xhat, mu=()):
-        """Values (n, k) at points X (n, d) [m]. Raises ValueError as `coordinates` does."""
+        """Return the values (n, k) at points X (n, d) [m]. Raises ValueError as `coordinates`."""
         y = outputs(self.net, self.units, X, self.coordinates(xhat, mu), self.octaves)
         return self.units.mean + self.units.std * y
 
     def coordinates(self, xhat, mu=()):
-        """Latent coordinates and normalised parameters (r + q,), as the network takes them. Raises
-        ValueError for another number of either.
+        """Return latent coordinates and normalised parameters (r + q,), as the network takes them.
+        Raises ValueError for another number of either.
         """
         if np.shape(xhat) != (self.r,) or np.shape(mu) != (self.parameters,):
             raise ValueError(f"xhat of shape {np.shape(xhat)} and mu of shape {np.shape(mu)}: "
@@ -183,7 +183,7 @@ class Field(NamedTuple):
 
 
 class Networks(NamedTuple):
-    """Position, stress and affine field as networks, of no points in particular."""
+    """Position, stress and affine field as networks, which any points can be put into."""
 
     g: Decoder      # position
     h: Field        # stress, values of `symmetric`
@@ -221,55 +221,55 @@ class LearnedFields(NamedTuple):
         return self.g.r
 
     def place(self, points, xhat):
-        """x (m, d) [m] of points of these numbers."""
+        """Return x (m, d) [m] of points of these numbers."""
         return self.g.place(self.X[points], xhat)
 
     def derivatives(self, points, xhat):
-        """x (m, d), None (no step asks for dg/dX), and dg/dxhat (m, d, r)."""
+        """Return x (m, d), None (no step needs dg/dX), and dg/dxhat (m, d, r)."""
         x, _, G = self.g.derivatives(self.X[points], xhat)
         return x, None, G
 
     def stress(self, points, xhat, F=None):
-        """Return the Kirchhoff stress (m, d, d) [Pa]; F is of no use to it."""
+        """Return the Kirchhoff stress (m, d, d) [Pa]; F is not used."""
         return tensor(self._values(self.h, points, xhat), self.dim)
 
     def affine(self, points, xhat):
-        """C (m, d, d) [1/s]."""
+        """Return the affine velocity field C (m, d, d) [1/s]."""
         return self._values(self.l, points, xhat).reshape(-1, self.dim, self.dim)
 
     def near(self, xhat, x, distance):
-        """Numbers of all points that may be within a distance [m], by the largest axis, of one of
-        the positions x (m, d).
+        """Return numbers of all points that may be within a distance [m], by the largest axis, of
+        one of the positions x (m, d).
         """
         return self.blocks.near(self.g, xhat, x, distance)
 
-    def of(self, mu):
-        """The fields in a run with other parameters. Raises ValueError for more or fewer."""
-        return self._replace(mu=fitting(mu, self.h, self.l))
+    def with_parameters(self, mu):
+        """Return the fields in a run with parameters mu. Raises ValueError for more or fewer."""
+        return self._replace(mu=checked_parameters(mu, self.h, self.l))
 
     def _values(self, field, points, xhat):
-        return field.values(self.X[points], xhat, field.own(self.mu))
+        return field.values(self.X[points], xhat, field.needed_parameters(self.mu))
 
 
-def learned(X, networks, mu, size):
-    """`LearnedFields` of points X (n, d) at rest, `networks` (g, h, l) and parameters mu; size [m]
-    of blocks. The points need not be those of the training. Raises ValueError where the networks,
-    X and mu do not fit each other.
+def learned_fields(X, networks, mu, size):
+    """Return the `LearnedFields` of points X (n, d) at rest, `networks` (g, h, l) and parameters
+    mu; size [m] of blocks. The points need not be those of the training. Raises ValueError where
+    the networks, X and mu do not fit each other.
     """
-    fault = misfit(*networks)
-    if fault or X.shape[1:] != (networks[0].dim,):
-        raise ValueError(fault or f"points of shape {X.shape} for networks of {networks[0].dim} "
+    error = mismatch(*networks)
+    if error or X.shape[1:] != (networks[0].dim,):
+        raise ValueError(error or f"points of shape {X.shape} for networks of {networks[0].dim} "
                                   "axes: expected (n, d)")
-    return LearnedFields(X, *networks, fitting(mu, *networks[1:]), blocks(X, size))
+    return LearnedFields(X, *networks, checked_parameters(mu, *networks[1:]), blocks(X, size))
 
 
-def misfit(g, h, l):
-    """What keeps three networks from being those of one body, or None."""
+def mismatch(g, h, l):
+    """Return a sentence on why three networks cannot be those of one body, or None."""
     d = g.dim
     for name, field, k in (("stress", h, d * (d + 1) // 2), ("affine field", l, d * d)):
-        found = field.dim, field.r, field.outputs
-        if found != (d, g.r, k):
-            return (f"the {name} has {found[0]} axes, {found[1]} latent coordinates and {found[2]} "
+        sizes = field.dim, field.r, field.outputs
+        if sizes != (d, g.r, k):
+            return (f"the {name} has {sizes[0]} axes, {sizes[1]} latent coordinates and {sizes[2]} "
                     f"values: expected {d}, {g.r} and {k}, as the position has")
     if h.parameters and l.parameters and h.parameters != l.parameters:
         return (f"the stress depends on {h.parameters} parameters, the affine field on "
@@ -277,8 +277,8 @@ def misfit(g, h, l):
     return None
 
 
-def fitting(mu, h, l):
-    """Parameters mu (q,) for two fields. Raises ValueError where one depends on more or fewer."""
+def checked_parameters(mu, h, l):
+    """Return mu as an array (q,). Raises ValueError where two fields depend on more or fewer."""
     mu = np.array(mu, dtype=float)
     expected = h.parameters or l.parameters or mu.size
     if mu.shape != (expected,):

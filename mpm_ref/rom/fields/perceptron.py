@@ -10,16 +10,15 @@ elu(z) = z for z > 0, exp(z) - 1 else: once continuously differentiable, as F an
 
 The products are those of BLAS and the exponentials those of NumPy. Points are taken ROWS at a time,
 so that a batch stays in the cache, and threads share the batches, each with BLAS of its own: the
-numbers do not depend on the threads. On how many points share its batch, a point's numbers depend
-to round-off.
+numbers do not depend on the threads. A point's numbers do depend, to round-off, on how many points
+share its batch.
 
 A network may read Fourier features of a place [Tancik2020]: fields of them are sharper than those
 of places alone. They are, of places Z scaled to the unit box, d numbers each,
 
     Z -> (Z, sin(pi Z), cos(pi Z), sin(2 pi Z), cos(2 pi Z), sin(4 pi Z), cos(4 pi Z), ..),
 
-a sine and a cosine for each octave; no octave leaves Z as it is. NSF does not have them: it leaves
-better fields for later.
+a sine and a cosine for each octave; without octaves, Z as it is. NSF has no such features.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -32,7 +31,7 @@ import numpy as np
 from ...core.blas import one_thread
 
 ROWS = 1024
-WORTH = 2           # batches for which a thread is worth its start
+MIN_BATCHES = 2     # of a thread, so that it is worth its start
 
 
 class Network(NamedTuple):
@@ -44,7 +43,9 @@ class Network(NamedTuple):
 
 
 def network(layers):
-    """`Network` of layers [(W (in, out), b (out,))]. Raises ValueError where they do not fit."""
+    """Return the `Network` of layers [(W (in, out), b (out,))]. Raises ValueError where they do not
+    fit.
+    """
     if not layers:
         raise ValueError("layers = []: expected at least one (W, b)")
     sizes = [len(layers[0][0])]
@@ -61,23 +62,23 @@ def network(layers):
 
 
 def layers_of(net):
-    """The layers [(W (in, out), b (out,))] of a `Network`."""
-    found, w, k = [], 0, 0
+    """Return the layers [(W (in, out), b (out,))] of a `Network`."""
+    layers, w, k = [], 0, 0
     for n, m in zip(net.sizes[:-1], net.sizes[1:], strict=True):
-        found.append((net.W[w:w + n * m].reshape(n, m), net.b[k:k + m]))
+        layers.append((net.W[w:w + n * m].reshape(n, m), net.b[k:k + m]))
         w, k = w + n * m, k + m
-    return found
+    return layers
 
 
 def batches(n):
-    """Slices of n points."""
+    """Return slices of n points, ROWS long but the last."""
     return [slice(start, min(start + ROWS, n)) for start in range(0, n, ROWS)]
 
 
-def over(n, work):
+def for_batches(n, work):
     """Call work(rows) for all batches of n points, on as many threads as kernels run on."""
     parts = batches(n)
-    threads = min(len(parts) // WORTH, numba.get_num_threads())
+    threads = min(len(parts) // MIN_BATCHES, numba.get_num_threads())
     with one_thread():
         if threads < 2:
             for rows in parts:
@@ -88,7 +89,9 @@ def over(n, work):
 
 
 def forward(layers, A):
-    """Outputs (n, d) of inputs A (n, in), and the slopes D_l (n, width) of all hidden layers."""
+    """Return the outputs (n, d) of inputs A (n, in), and the slopes D_l (n, width) of all hidden
+    layers.
+    """
     slopes = []
     for W, b in layers[:-1]:
         Z = A @ W
@@ -105,7 +108,7 @@ def forward(layers, A):
 
 
 def backward(layers, slopes, k):
-    """Gradients (n, in) of output k with respect to the inputs."""
+    """Return the gradients (n, in) of output k with respect to the inputs."""
     U = layers[-1][0][:, k]
     for (W, _), D in zip(layers[-2::-1], slopes[::-1], strict=True):
         U = (U * D) @ W.T
@@ -113,20 +116,20 @@ def backward(layers, slopes, k):
 
 
 def directional(layers, slopes, u):
-    """Derivative (n, d) of the outputs in a direction u (in,) of the inputs."""
+    """Return the derivative (n, d) of the outputs in a direction u (in,) of the inputs."""
     U = u
     for (W, _), D in zip(layers[:-1], slopes, strict=True):
         U = (U @ W) * D
     return U @ layers[-1][0]
 
 
-def count(d, octaves):
-    """How many numbers a place of d becomes."""
+def feature_count(d, octaves):
+    """Return the number of features of a place with d numbers."""
     return d * (1 + 2 * octaves)
 
 
 def features(Z, octaves):
-    """What scaled places Z (n, d) become: (n, d (1 + 2 octaves))."""
+    """Return the Fourier features (n, d (1 + 2 octaves)) of scaled places Z (n, d)."""
     if octaves == 0:
         return Z
     waves = [wave(2.0**o * pi * Z) for o in range(octaves) for wave in (np.sin, np.cos)]

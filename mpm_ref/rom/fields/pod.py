@@ -20,8 +20,8 @@ SAME = 1e-9         # distance below which a point is one of the data, over the 
 LEAST = 1e-10       # singular value over the largest one: modes below are round-off
 
 
-class Modes(NamedTuple):
-    """A linear map on the points of its data."""
+class PodModes(NamedTuple):
+    """A linear map by POD modes on the points of its data."""
 
     X: np.ndarray       # (n, d)        points [m]
     U: np.ndarray       # (n, d, r)     modes [m]
@@ -39,16 +39,16 @@ class Modes(NamedTuple):
         return self.U.shape[2]
 
     def place(self, X, xhat):
-        """x of points X (n, d) [m]."""
+        """Return x of points X (n, d) [m]."""
         return X + self._at(X)[0] @ xhat
 
     def derivatives(self, X, xhat):
-        """x (n, d), F (n, d, d) and the modes at points X (n, d)."""
+        """Return x (n, d), F (n, d, d) and the modes at points X (n, d)."""
         U, slope = self._at(X)
         return X + U @ xhat, np.eye(self.dim) + slope @ xhat, U
 
     def velocity(self, X, xhat, vhat):
-        """Sum of the modes' rates at points X (n, d) [m/s]."""
+        """Return the velocities (n, d) [m/s] of points X (n, d)."""
         return self._at(X)[0] @ vhat
 
     def _at(self, X):
@@ -70,22 +70,22 @@ class Modes(NamedTuple):
 
 
 class Basis(NamedTuple):
-    """`Modes`, and the coordinates of the snapshots that they were made of."""
+    """`PodModes`, and the coordinates of the snapshots that they were made of."""
 
-    modes: Modes
+    modes: PodModes
     xhat: np.ndarray        # (s, r)
 
 
 def modes(X, x, F, r):
-    """The best `Modes` with r coordinates for snapshots x (s, n, d) [m], F (s, n, d, d) of points X
-    (n, d); coordinates are scaled to a root mean square of 1 over the snapshots. Raises ValueError
-    for more modes than the snapshots hold.
+    """Return the best `PodModes` with r coordinates for snapshots x (s, n, d) [m], F (s, n, d, d)
+    of points X (n, d); coordinates are scaled to a root mean square of 1 over the snapshots. Raises
+    ValueError for more modes than the snapshots hold.
     """
     return basis(X, x, F, r).modes
 
 
 def basis(X, x, F, r, lam_F=0.0, weights=1.0):
-    """The `Basis` of r modes that leaves the least sum over snapshots s of
+    """Return the `Basis` of r modes that leaves the least sum over snapshots s of
     weights_s^2 (|| x_s ||^2 + lam_F || F_s ||^2) [m^2]. Raises ValueError for more modes than the
     snapshots hold.
     """
@@ -94,14 +94,15 @@ def basis(X, x, F, r, lam_F=0.0, weights=1.0):
         shares = w[:, None] * left / np.sqrt(len(x))    # of the snapshots in a scaled mode
         U = np.tensordot(x - X, shares, axes=(0, 0))
         slope = np.tensordot(F - np.eye(X.shape[1]), shares, axes=(0, 0))
-    return Basis(Modes(X, U, slope, KDTree(X)), scaled(w, left))
+    return Basis(PodModes(X, U, slope, KDTree(X)), scaled(w, left))
 
 
 def directions(X, x, r):
-    """U (n, d, r) [m] of the r leading modes of snapshots x (s, n, d) [m], and the snapshots'
-    coordinates (s, r), all scaled by one number: the first has a root mean square of 1, and a mode
-    moves points by as much as any other that has its coordinate. No gradient is asked for. Raises
-    ValueError for more modes than the snapshots hold.
+    """Return the r leading modes U (n, d, r) [m] of snapshots x (s, n, d) [m], without gradients,
+    and the snapshots' coordinates (s, r).
+
+    All coordinates have one unit, in which the first has a root mean square of 1, and all modes
+    the same norm. Raises ValueError for more modes than the snapshots hold.
     """
     _, left = decomposed(X, x, None, r, 0.0, 1.0)
     with one_thread():
@@ -112,13 +113,15 @@ def directions(X, x, r):
 
 
 def scaled(w, left):
-    """Coordinates (s, r) of snapshots with weights w (s,) from their left singular vectors."""
+    """Return the coordinates (s, r) of snapshots with weights w (s,) from their left singular
+    vectors.
+    """
     return left * np.sqrt(len(left)) / w[:, None]
 
 
 def decomposed(X, x, F, r, lam_F, weights):
-    """Weights (s,) and the r leading left singular vectors (s, r) of weighted snapshots. Raises
-    ValueError for more than they hold.
+    """Return the weights (s,) and the r leading left singular vectors (s, r) of weighted snapshots.
+    Raises ValueError for more than they hold.
     """
     s, n, d = x.shape
     if not 1 <= r <= min(s, n * d):
@@ -126,19 +129,20 @@ def decomposed(X, x, F, r, lam_F, weights):
     w = np.broadcast_to(np.asarray(weights, dtype=float), s)
     with one_thread():
         left, sigma = leading(w[:, None] * measured(X, x, F, lam_F), r)
-    if held(sigma) < r:
-        raise ValueError(f"r = {r}: the snapshots hold only {held(sigma)} modes, more would be "
-                         "round-off; take fewer, or snapshots that differ more")
+    rank = numerical_rank(sigma)
+    if rank < r:
+        raise ValueError(f"r = {r}: the snapshots hold only {rank} modes, more would be round-off; "
+                         "take fewer, or snapshots that differ more")
     return w, left
 
 
-def held(sigma):
-    """How many of descending singular values are more than round-off."""
+def numerical_rank(sigma):
+    """Return the number of descending singular values that are more than round-off."""
     return int(np.sum(sigma > LEAST * sigma[0]))
 
 
 def measured(X, x, F, lam_F):
-    """Rows (s, ..) whose length is the norm of displacements [m], with F or without."""
+    """Return rows (s, ..) whose length is the norm of displacements [m], with F or without."""
     u = (x - X).reshape(len(x), -1)
     if not lam_F:
         return u
@@ -146,8 +150,8 @@ def measured(X, x, F, lam_F):
 
 
 def leading(A, r):
-    """The r leading left singular vectors (m, r) and values (r,) of a matrix, largest first. Of a
-    large one by Lanczos' method, always from the same start.
+    """Return the r leading left singular vectors (m, r) and values (r,) of a matrix, largest first;
+    of a large one by Lanczos' method, always from the same start.
     """
     if min(A.shape) <= SMALL:
         U, s, _ = np.linalg.svd(A, full_matrices=False)

@@ -1,4 +1,4 @@
-"""A manifold bent over POD modes: a few coordinates are free, the others follow from them.
+"""A curved manifold on POD modes: the first coordinates are free, the others polynomials of them.
 
     x = X + sum_k a_k U_k(X),    a = (xhat, C m(xhat)),    m all monomials of degree 2 .. p
 
@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .pod import Modes
+from .pod import PodModes
 
 RIDGE = 1e-6        # of the fit, over the sum of squares of each monomial
 
@@ -22,7 +22,7 @@ RIDGE = 1e-6        # of the fit, over the sum of squares of each monomial
 class Curved(NamedTuple):
     """A map with r free coordinates over R modes."""
 
-    modes: Modes
+    modes: PodModes
     powers: np.ndarray      # (monomials, r) of xhat, integer
     C: np.ndarray           # (R - r, monomials)
 
@@ -37,29 +37,29 @@ class Curved(NamedTuple):
         return self.powers.shape[1]
 
     def all(self, xhat):
-        """Coordinates (R,) of all modes."""
+        """Return the coordinates (R,) of all modes."""
         return np.concatenate([xhat, self.C @ monomials(xhat, self.powers)])
 
     def rates(self, xhat):
-        """Their derivatives (R, r)."""
+        """Return the derivatives (R, r) of the modes' coordinates by xhat."""
         return np.vstack([np.eye(self.r), self.C @ slopes(xhat, self.powers)])
 
     def place(self, X, xhat):
-        """x of points X (n, d) [m]."""
+        """Return x of points X (n, d) [m]."""
         return self.modes.place(X, self.all(xhat))
 
     def derivatives(self, X, xhat):
-        """x (n, d), F (n, d, d) and dg/dxhat (n, d, r) at points X (n, d)."""
+        """Return x (n, d), F (n, d, d) and dg/dxhat (n, d, r) at points X (n, d)."""
         x, F, U = self.modes.derivatives(X, self.all(xhat))
         return x, F, U @ self.rates(xhat)
 
     def velocity(self, X, xhat, vhat):
-        """dg/dxhat vhat of points X (n, d) [m/s]."""
+        """Return dg/dxhat vhat of points X (n, d) [m/s]."""
         return self.modes.velocity(X, None, self.rates(xhat) @ vhat)
 
 
 def curved(basis, r, degree, weights=1.0):
-    """The `Curved` map of the r leading modes of a `modes.Basis`, fitted to its snapshots with
+    """Return the `Curved` map of the r leading modes of a `pod.Basis`, fitted to its snapshots with
     these weights. Raises ValueError where no modes are left to follow, the degree is below 2, or
     there are more monomials than snapshots.
     """
@@ -83,15 +83,15 @@ def curved(basis, r, degree, weights=1.0):
 
 
 def monomials(xhat, powers):
-    """m (monomials,) at xhat (r,)."""
+    """Return the monomials (monomials,) at xhat (r,)."""
     return np.prod(xhat**powers, axis=1)
 
 
 def slopes(xhat, powers):
-    """dm/dxhat (monomials, r)."""
-    found = np.empty(powers.shape)
+    """Return the derivatives (monomials, r) of the monomials by xhat."""
+    derivatives = np.empty(powers.shape)
     for j in range(powers.shape[1]):
         lower = powers.copy()
         lower[:, j] = np.maximum(lower[:, j] - 1, 0)
-        found[:, j] = powers[:, j] * monomials(xhat, lower)
-    return found
+        derivatives[:, j] = powers[:, j] * monomials(xhat, lower)
+    return derivatives

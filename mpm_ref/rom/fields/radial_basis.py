@@ -4,8 +4,8 @@
 
 Of all functions through the values it is the one of least bending; no centre or width is to be
 chosen, and its derivative is as cheap as its value. (H. Wendland, Scattered Data Approximation,
-2004, chapter 8.) Where centres meet, as runs of different parameters do at rest, values may
-contradict each other: they are met up to a smoothing.
+2004, chapter 8.) Where centres coincide, as runs of different parameters do at rest, values may
+contradict each other; a smoothing lets the function miss them.
 """
 
 from contextlib import suppress
@@ -22,18 +22,18 @@ class Radial(NamedTuple):
     """A function of q coordinates with k values, through s centres."""
 
     centers: np.ndarray     # (s, q) over `unit`
-    unit: np.ndarray        # (q,) what coordinates are measured in
+    unit: np.ndarray        # (q,) units of the coordinates
     w: np.ndarray           # (s, k)
     tail: np.ndarray        # (1 + q, k) b, then A
 
     def value(self, y):
-        """f (k,) at coordinates y (q,)."""
+        """Return f (k,) at coordinates y (q,)."""
         y = y / self.unit
         away = np.sqrt(np.sum((y - self.centers) ** 2, axis=1))
         return away**3 @ self.w + self.tail[0] + y @ self.tail[1:]
 
     def slope(self, y):
-        """df/dy (k, q)."""
+        """Return df/dy (k, q) at coordinates y (q,)."""
         y = y / self.unit
         arms = y - self.centers
         away = np.sqrt(np.sum(arms**2, axis=1))
@@ -42,8 +42,8 @@ class Radial(NamedTuple):
 
 
 def through(y, values, unit, smoothing=SMOOTHING):
-    """`Radial` through values (s, k) at coordinates y (s, q), measured in unit (q,). A coordinate
-    that does not vary says nothing, then and later: it is measured in an infinite unit.
+    """Return the `Radial` through values (s, k) at coordinates y (s, q) with units (q,). A
+    coordinate that does not vary has no influence: its unit becomes infinite.
 
     Raises ValueError for fewer centres than the linear part has unknowns, and where they are not
     finite.
@@ -61,13 +61,13 @@ def through(y, values, unit, smoothing=SMOOTHING):
     A = np.block([[away**3 + smoothing * np.eye(s), P], [P.T, np.zeros((q + 1, q + 1))]])
     b = np.vstack([values, np.zeros((q + 1, values.shape[1]))])
     with one_thread():
-        found = solved(A, b, np.linalg.matrix_rank(P) < q + 1)
-    return Radial(centers, unit, found[:s], found[s:])
+        w = solve(A, b, np.linalg.matrix_rank(P) < q + 1)
+    return Radial(centers, unit, w[:s], w[s:])
 
 
-def solved(A, b, dependent):
-    """The solution of A w = b; of least length where coordinates depend on each other, and where
-    centres meet without smoothing.
+def solve(A, b, dependent):
+    """Return the solution of A w = b; that of least length where coordinates depend on each other,
+    and where centres coincide without smoothing.
     """
     if not dependent:
         with suppress(np.linalg.LinAlgError):

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..kinematics import CLOSE, evaluate, guesses, guesses_by_cell, preimages
 from . import Cloud
-from .stencil_overlap import reach
+from .stencil_overlap import stencil_overlap
 
 PER_CELL = 2        # quadrature points of a cell per axis, l
 FAR = 1.0           # distance of a first guess from the body at which its point is not in it [dx]
@@ -42,7 +42,7 @@ class Eulerian(NamedTuple):
         first = 0.5 * (self.degree - 1)         # points with a base begin so many cells after it
         s = np.sort(s + np.ceil(first - s))
         offsets = np.array(list(product(s, repeat=x.shape[1])))
-        return (reach(x, self.dx, self.degree).cells()[:, None] + offsets) * self.dx
+        return (stencil_overlap(x, self.dx, self.degree).cells()[:, None] + offsets) * self.dx
 
     def cloud(self, g, xhat, samples):
         """Return the `Cloud` of a step with these samples. A point whose preimage is not in the

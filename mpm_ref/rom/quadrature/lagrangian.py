@@ -13,7 +13,7 @@ import numpy as np
 from ..fields.blocks import Blocks, blocks
 from ..kinematics import Kinematics, evaluate
 from . import Cloud
-from .stencil_overlap import reach
+from .stencil_overlap import stencil_overlap
 
 CELLS = 2.0         # size of a block [dx]
 
@@ -40,8 +40,8 @@ class Lagrangian(NamedTuple):
     def neighbours(self, g, xhat, x):
         """Return numbers of all points that share a node with a position x (m, d)."""
         candidates = self.blocks.near(g, xhat, x, (self.degree + 1) * self.dx)
-        overlap = reach(x, self.dx, self.degree)
-        return candidates[overlap.reached(g.place(self.X[candidates], xhat))]
+        overlap = stencil_overlap(x, self.dx, self.degree)
+        return candidates[overlap.overlaps(g.place(self.X[candidates], xhat))]
 
     def cloud(self, g, xhat, samples):
         """Return the `Cloud` of a step with these samples."""
@@ -161,6 +161,6 @@ class NumberedPoints(NamedTuple):
         candidates = field.near(xhat, x, (self.degree + 1) * self.dx)
         candidates = candidates[~np.isin(candidates, samples)]
         x_candidates = field.place(candidates, xhat)
-        near = reach(x, self.dx, self.degree).reached(x_candidates)
+        near = stencil_overlap(x, self.dx, self.degree).overlaps(x_candidates)
         return (np.concatenate([samples, candidates[near]]),
                 np.concatenate([x, x_candidates[near]]))

@@ -14,7 +14,7 @@ from ...body import Body, particles_at
 from ...explicit import initial_stress
 from ...materials import NoFlow
 from ...sampling import Poisson
-from ..fields.pod import Modes
+from ..fields.pod import PodModes
 from ..fields.polynomial_manifold import Curved
 from ..kinematics import evaluate
 from ..latent import velocities
@@ -91,10 +91,10 @@ def tabulated(g, X):
     """
     if isinstance(g, Curved):
         return g._replace(modes=tabulated(g.modes, X))
-    if not isinstance(g, Modes):
+    if not isinstance(g, PodModes):
         return g
     slope = [g.derivatives(X, axis)[1] - np.eye(g.dim) for axis in np.eye(g.r)]
-    return Modes(X, g.derivatives(X, np.zeros(g.r))[2], np.stack(slope, axis=-1), KDTree(X))
+    return PodModes(X, g.derivatives(X, np.zeros(g.r))[2], np.stack(slope, axis=-1), KDTree(X))
 
 
 def resampled(scene, count):

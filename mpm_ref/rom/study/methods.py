@@ -142,7 +142,7 @@ NSF_METHOD = ReductionMethod(
     parameters="gravity, a material, a motion or a velocity at the start",
     frame_spacing=stored_spacing, full_model=nsf_full_model,
     require_samples=lambda study, full: require_enough_samples(study.tables.run, full.X,
-                                                               study.tables.map.r),
+                                                               study.tables.reduced_model.r),
     load=load_histories, compute=compute_fields, train=train_fields, misfit=fields_misfit,
     field_of_run=fields_of_run, reduced_run=nsf_reduced_run, recording=nsf_recording,
     reference=lambda full, data, k: history_reference(data, k),

@@ -26,7 +26,7 @@ import numpy as np
 
 from ..cubature import misfit
 from ..extrapolation import BEYOND, Extent, evenly, trained_extent
-from ..fields.pod_fields import Spanned
+from ..fields.pod_fields import PodFields
 from ..projection import RANK
 
 CHECKED = 64        # points of the body that are checked, and samples
@@ -194,7 +194,7 @@ def sample_warnings(fields, samples):
     have no modes: their samples are not judged.
     """
     left, points = samples.misfit, samples.points       # of weights; NaN without
-    if samples.weights is None and isinstance(fields, Spanned):
+    if samples.weights is None and isinstance(fields, PodFields):
         left = misfit(fields.U, fields.r, points)
     if left > SPARSE:
         yield (f"the {len(points)} samples leave {100.0 * left:.0f} % of the products of the "

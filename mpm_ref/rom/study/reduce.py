@@ -12,9 +12,9 @@ from ...shapes.inside import solid
 from ...store.manifest import source_hash, versions
 from ...training import part
 from .. import model_file
-from ..fields.network import Networks, learned
+from ..fields.network import Networks, learned_fields
 from ..fields.pod import basis
-from ..fields.pod_fields import spanned
+from ..fields.pod_fields import fit_pod_fields
 from ..fields.polynomial_manifold import curved
 from ..latent import initial
 from ..model_file import Model
@@ -68,7 +68,7 @@ def compute_map(study, snapshots):
     """Return POD modes of `Snapshots`, or a manifold over them, their latent coordinates (s, k + 1,
     r), and those at rest (r,).
     """
-    settings = study.tables.map
+    settings = study.tables.reduced_model
     is_curved = settings.kind == CURVED
     modes = basis(snapshots.X, *snapshots.flat(), settings.modes if is_curved else settings.r)
     g = curved(modes, settings.r, settings.degree) if is_curved else modes.modes
@@ -78,7 +78,7 @@ def compute_map(study, snapshots):
 
 def train_map(study, snapshots, about, checkpoint, on_epoch, machine):
     """Return the `Model` of a decoder trained on `Snapshots`."""
-    settings = {name: getattr(study.tables.map, name) for name in ("r", *KEYS[NETWORK])}
+    settings = {name: getattr(study.tables.reduced_model, name) for name in ("r", *KEYS[NETWORK])}
     settings["weights"] = trainer().loss_weights(settings["weights"], *size_ratios(study.base))
     trained = trainer().fit_decoder(settings, snapshots, checkpoint, on_epoch, machine)
     return decoder_model(trained, snapshots.X, about)
@@ -110,11 +110,11 @@ def map_misfit(g, snapshots, xhat):
 # NSF's fields.
 
 def compute_fields(study, histories):
-    """Return the `Spanned` fields of `Histories`, their latent coordinates (s, k + 1, r), and those
+    """Return the `PodFields` of `Histories`, their latent coordinates (s, k + 1, r), and those
     near the start (r,).
     """
-    settings = study.tables.map
-    fields, xhat = spanned(histories, settings.sizes, BLOCK * study.base.dx,
+    settings = study.tables.reduced_model
+    fields, xhat = fit_pod_fields(histories, settings.sizes, BLOCK * study.base.dx,
                            settings.stress_sees_parameters)
     return fields, xhat, xhat[:, 0].mean(axis=0)
 
@@ -124,7 +124,7 @@ def train_fields(study, histories, about, folder, on_epoch, machine):
     the stages, created if need be; on_epoch(history) is called after each epoch of any stage, with
     as many entries as epochs so far.
     """
-    settings = study.tables.map
+    settings = study.tables.reduced_model
     before = {"g": 0, "h": settings.epochs, "l": settings.epochs + settings.field_epochs}
 
     def show(stage, history):
@@ -142,12 +142,12 @@ def train_fields(study, histories, about, folder, on_epoch, machine):
 
 
 def fields_of_run(fields, full, mu):
-    """Return the fields, `Spanned` or `Networks`, in the run of a `FullModel` with parameters mu,
+    """Return the fields, `PodFields` or `Networks`, in the run of a `FullModel` with parameters mu,
     where the stress is a function of them.
     """
     if isinstance(fields, Networks):
-        return learned(full.X, fields, mu, BLOCK * full.problem.dx)
-    return fields.of(mu) if len(fields.mu) else fields
+        return learned_fields(full.X, fields, mu, BLOCK * full.problem.dx)
+    return fields.with_parameters(mu) if len(fields.mu) else fields
 
 
 def fields_misfit(fields, histories, xhat):
@@ -175,7 +175,7 @@ def forget_checkpoint(checkpoint):
 def identity(study):
     """Return the plain values that say of what a model is, and how it was made."""
     return {"study": study.digest, "name": study.path.stem, "title": study.tables.title,
-            "scene": study.tables.scene, "map": study.tables.map.settings,
+            "scene": study.tables.scene, "map": study.tables.reduced_model.settings,
             "parameters": list(study.names),
             "mu": study.mu[list(study.train)].tolist(), "source_sha256": source_hash(),
             "versions": versions(), **study.model_entry}

@@ -10,7 +10,7 @@ from ...store.results import Results
 from ...store.running import INTERRUPTED, Refused
 from ...store.words import counted
 from ..latent import Latent
-from ..step import Report
+from ..step import StepReport
 from .record import UNENDED, marked_problem
 
 COMPUTE = ("numpy", "scipy", "numba", "llvmlite")       # libraries that shape the bits
@@ -80,5 +80,5 @@ def stored_states(results):
 def stored_report(rows, k):
     """Return the `Report` of step k, as far as it is stored."""
     quadrature = {"lost": int(rows["lost"][k])} if "lost" in rows else {}
-    return Report(int(rows["samples"][k]), int(rows["points"][k]), int(rows["rank"][k]),
+    return StepReport(int(rows["samples"][k]), int(rows["points"][k]), int(rows["rank"][k]),
                   float(rows["residual"][k]), 0, True, quadrature)

@@ -13,7 +13,7 @@ from ..kinematics import CLOSE
 from ..latent import Latent, initial, nearest
 from ..quadrature.eulerian import Eulerian
 from ..quadrature.lagrangian import Resampled, lagrangian
-from ..step import Report, ldm_stepper, nsf_stepper
+from ..step import StepReport, ldm_stepper, nsf_stepper
 from .full_model import signed_distance
 from .samples import ENOUGH, SampleSet, ldm_sampler, nsf_sampler, require_valid_sets
 
@@ -31,7 +31,7 @@ class RunState(NamedTuple):
 
     t: float                        # [s]
     latent: Latent
-    report: Report | None = None    # None at the start, like the samples
+    report: StepReport | None = None    # None at the start, like the samples
     samples: SampleSet | None = None
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..cubature import CANDIDATES, cubature
-from ..fields.pod_fields import Spanned
+from ..fields.pod_fields import PodFields
 from ..quadrature.stencil_overlap import bases
 from ..sampling import PER_GROUP, draw, pivoted
 
@@ -98,7 +98,7 @@ def chosen_samples(run, problem, fields):
     require_enough_samples(run, fields.X, fields.r)
     if not (run.weighted or run.cells):
         return drawn_samples(n, count, run.seed)
-    if not isinstance(fields, Spanned):
+    if not isinstance(fields, PodFields):
         asked = "weighted = true" if run.weighted else f"cells = {run.cells}"
         raise ValueError(f"{asked}: weights of samples are computed from modes, which networks "
                          "have not; leave it out, or make fields of modes")
@@ -130,7 +130,7 @@ def drawn_samples(candidates, count, seed, since=0.0):
 
 def weighted_samples(fields, candidates, count, seed, since=0.0):
     """Return the `SampleSet` with weights, of at most `count` points, by `rom.cubature` of
-    `Spanned` fields; candidates: as for `drawn_samples`, a random part of them. Raises ValueError
+    `PodFields`; candidates: as for `drawn_samples`, a random part of them. Raises ValueError
     for too few.
     """
     offered = drawn_samples(candidates, min(CANDIDATES, len(numbers_of(candidates))), seed).points

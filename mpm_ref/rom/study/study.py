@@ -91,8 +91,8 @@ class Study(NamedTuple):
             return self
         replace = msgspec.structs.replace
         try:
-            table = replace(self.tables.map, kind=kind)
-            return self._replace(tables=replace(self.tables, map=table))
+            table = replace(self.tables.reduced_model, kind=kind)
+            return self._replace(tables=replace(self.tables, reduced_model=table))
         except ValueError as fault:
             hint = ""
             if kind == CURVED and self.tables.model != NSF:
@@ -187,7 +187,7 @@ def base_scene(tables, folder, scenes, frame_spacing=every_step):
                          f"that name; shipped scenes: {', '.join(scenes) or 'none'}")
     base = scene.load(path)
     with opened_by("set"):
-        changes = flat(tables.set)
+        changes = flat(tables.overrides)
         base = varied(base, changes | {"every": frame_spacing(base, changes), "interval": None})
     if base.dt is None or base.steps is None:
         raise SceneError(f"scene = {tables.scene!r}: expected one with `dt` and `steps`, so that "
@@ -211,7 +211,7 @@ def _require_one_body(study):
 
 def _require_states(study):
     """Raise SceneError for more modes than the training runs have states."""
-    base, table, runs = study.base, study.tables.map, len(study.train)
+    base, table, runs = study.base, study.tables.reduced_model, len(study.train)
     states = runs * (base.steps // base.every + 1)
     for name in ("r", *SUMMED) if table.kind != NETWORK else ():
         count = getattr(table, name, None) or 0
@@ -240,7 +240,7 @@ def _fixed_fields(scene, free):
 
 def training_hints(study):
     """Yield hints before fields are computed from a study's runs."""
-    table = study.tables.map
+    table = study.tables.reduced_model
     flowing = [body.name for body in study.base.body if body.material.flow.type != "none"]
     if (study.tables.model == NSF and table.kind == MODES and flowing
             and table.smoothing <= SIZES["smoothing"]):

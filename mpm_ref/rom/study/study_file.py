@@ -40,7 +40,7 @@ def parse_tables(data):
         tables = msgspec.convert(data, TABLES[model][0])
     except msgspec.ValidationError as fault:
         raise SceneError(rephrase(str(fault), data)) from None
-    kind, kinds = tables.map.kind, tables.map.keys
+    kind, kinds = tables.reduced_model.kind, tables.reduced_model.keys
     for key in sorted(set(data["map"]) - {"kind", "r", *kinds[kind]}):
         other = next(other for other, keys in kinds.items() if key in keys)
         raise SceneError(f'map.{key}: given, but the kind is "{kind}"; remove it, or take '

@@ -53,12 +53,15 @@ def require_nonlinear(kind, projection):
                          "since linear projection leaves the curve in every step")
 
 
+NAMES = {"reduced_model": "map", "overrides": "set"}       # of keys in a file
+
+
 class StudyTable(Struct, frozen=True, kw_only=True):
     """A table of a study file."""
 
 
 class Parameter(StudyTable, rename={"start": "from", "stop": "to"}):
-    """A parameter that differs between runs: its name, its place in the scene, and its values."""
+    """A parameter that differs between runs: its name, its key in the scene, and its values."""
 
     name: Word
     key: str                                    # path into the scene (see `scene.overrides`)
@@ -78,7 +81,7 @@ class Parameter(StudyTable, rename={"start": "from", "stop": "to"}):
             raise ValueError(f"values = {list(self.values)}: expected numbers that differ")
 
     def grid(self):
-        """Return its values on a grid. Raises ValueError where their number is not given."""
+        """Return the parameter's values on a grid. Raises ValueError without their number."""
         if self.values is not None:
             return np.array(self.values)
         if self.count is None:
@@ -104,8 +107,8 @@ class ReducedModelTable(StudyTable):
 
 
 class MapTable(ReducedModelTable, kw_only=True):
-    """LDM's map: POD modes, straight or bent (see `rom.fields.polynomial_manifold`), or a
-    network and how it is trained (see `rom.train.decoder.DecoderTraining`).
+    """LDM's map: POD modes, linear or curved (see `rom.fields.polynomial_manifold`), or a
+    network with the settings of its training (see `rom.train.decoder.DecoderTraining`).
     """
 
     keys = KEYS
@@ -162,14 +165,14 @@ class MapRunTable(StudyTable):
         return RunOptions(**{name: getattr(self, name) for name in RunOptions._fields})
 
 
-class CommonTables(StudyTable):
-    """The tables of a study file, without those that depend on its method."""
+class CommonTables(StudyTable, rename=NAMES):
+    """Keys of a study file of any method."""
 
-    scene: str                                  # a file, from the folder of this one; or shipped
+    scene: str                                  # a file, from the folder of this one; or bundled
     parameter: Annotated[tuple[Parameter, ...], Meta(min_length=1)]
     model: str = LDM
     title: str = ""
-    set: dict = field(default_factory=dict)     # {path: value} of the scene, in all runs
+    overrides: dict = field(default_factory=dict)   # {path: value} of the scene, in all runs
     sampling: str = GRID                        # of the parameters
     count: Count | None = None                  # runs of a Latin hypercube
     test: Natural = 0                           # runs held out, drawn at random
@@ -187,20 +190,20 @@ class CommonTables(StudyTable):
                 raise ValueError(f"parameter: two have the same {name}")
 
 
-class MapTables(CommonTables, kw_only=True):
+class MapTables(CommonTables, kw_only=True, rename=NAMES):
     """The tables of a study file of LDM."""
 
-    map: MapTable
+    reduced_model: MapTable
     run: MapRunTable = MapRunTable()
 
     def __post_init__(self):
-        require_nonlinear(self.map.kind, self.run.projection)
+        require_nonlinear(self.reduced_model.kind, self.run.projection)
         super().__post_init__()
 
 
 class FieldsTable(ReducedModelTable):
-    """NSF's fields: sums of modes (see `rom.fields.pod_fields`), or networks and how they are
-    trained (see `rom.train.settings.stage_plan`).
+    """NSF's fields: sums of modes (see `rom.fields.pod_fields`), or networks with the settings of
+    their training (see `rom.train.settings.stage_plan`).
     """
 
     keys: ClassVar[dict] = NSF_KEYS
@@ -230,7 +233,7 @@ class FieldsTable(ReducedModelTable):
 
     @property
     def sizes(self):
-        """The `Sizes`, as `spanned` takes them."""
+        """The `Sizes`, as `fit_pod_fields` takes them."""
         return Sizes(**{name: getattr(self, name) for name in ("r", *NUMBERS)})
 
     @property
@@ -259,10 +262,10 @@ class FieldsRunTable(StudyTable):
                              "samples")
 
 
-class FieldsTables(CommonTables, kw_only=True):
+class FieldsTables(CommonTables, kw_only=True, rename=NAMES):
     """The tables of a study file with model = "nsf"."""
 
-    map: FieldsTable
+    reduced_model: FieldsTable
     run: FieldsRunTable = FieldsRunTable()
 
 

@@ -11,7 +11,7 @@ import torch
 from ...training import TrainingTime, sha256, train_epochs
 from ..fields.architecture import ENCODERS, HIDDEN
 from ..fields.pod import basis, directions
-from ..snapshots import units
+from ..snapshots import decoder_units
 from .encoder import Encoder, FixedLatents, LatentTable, encode
 from .loss import CODE, LossWeights, batch_of, loss, tensors_of
 from .perceptron import FieldPerceptron, decoder_of
@@ -78,7 +78,7 @@ class DecoderSession(NetworkSession):
         s, levels, n, d = snapshots.x.shape
         digest = sha256(snapshots.dt, snapshots.X, snapshots.x, snapshots.F, snapshots.v)
         super().__init__(settings, digest, s * levels, n, device)
-        self.units = units(snapshots)
+        self.units = decoder_units(snapshots)
         self.data = tensors_of(snapshots, self.units, device=device)
         self.level = torch.arange(self.snapshots) % levels
         self.f = FieldPerceptron(d, settings.r, settings.hidden)

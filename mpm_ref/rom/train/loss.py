@@ -37,7 +37,7 @@ READINGS = {"printed": PRINTED, "code": CODE, "tower": TOWER}
 
 
 class UnitTensors(NamedTuple):
-    """`Units` as tensors."""
+    """`DecoderUnits` as tensors."""
 
     low: torch.Tensor
     span: torch.Tensor

@@ -8,8 +8,8 @@ import torch
 from torch import nn
 
 from ..fields.architecture import HIDDEN
-from ..fields.network import Decoder, Units
-from ..fields.perceptron import count, layers_of, network
+from ..fields.network import Decoder, DecoderUnits
+from ..fields.perceptron import feature_count, layers_of, network
 
 
 class FieldPerceptron(nn.Module):
@@ -21,7 +21,7 @@ class FieldPerceptron(nn.Module):
         super().__init__()
         self.octaves = octaves
         self.layers = nn.ModuleList(nn.Linear(n, m) for n, m in pairwise(
-            (count(dim, octaves) + r, *hidden, outputs or dim)))
+            (feature_count(dim, octaves) + r, *hidden, outputs or dim)))
         for layer in self.layers:
             nn.init.xavier_uniform_(layer.weight)           # LDM-appB
 
@@ -56,7 +56,7 @@ def network_of(f):
 
 def decoder_of(f, units):
     """Return the `Decoder` of a trained perceptron."""
-    return Decoder(network_of(f), Units(*(np.asarray(a, dtype=float) for a in units)))
+    return Decoder(network_of(f), DecoderUnits(*(np.asarray(a, dtype=float) for a in units)))
 
 
 def perceptron_of(field):
@@ -64,7 +64,7 @@ def perceptron_of(field):
     first, *hidden, last = field.net.sizes.tolist()
     octaves = getattr(field, "octaves", 0)
     d = field.dim
-    f = FieldPerceptron(d, first - count(d, octaves), hidden, last, octaves).double()
+    f = FieldPerceptron(d, first - feature_count(d, octaves), hidden, last, octaves).double()
     with torch.no_grad():
         for layer, (W, b) in zip(f.layers, layers_of(field.net), strict=True):
             layer.weight.copy_(torch.from_numpy(W.T.copy()))

@@ -7,7 +7,7 @@ import pytest
 from small_toys import Records
 
 from mpm_ref.core.grid import OutOfRange
-from mpm_ref.rom.fields.elastic import Deformed
+from mpm_ref.rom.fields.elastic import ElasticModes
 from mpm_ref.rom.study.full_model import nsf_full_model
 from mpm_ref.rom.study.samples import cell_samples
 from validation.nsf import errors, reduced_runs
@@ -50,7 +50,7 @@ def test_cake_is_sampled_in_the_middle_and_by_fewer_later():
 
 def test_the_map_alone_does_not_know_the_stress(cube):
     alone = cube._replace(map_alone=True)
-    assert isinstance(alone.of(TEST), Deformed)
+    assert isinstance(alone.of(TEST), ElasticModes)
     assert alone.errors(TEST, 50).errors.origin > 2.0 * cube.errors(TEST, 50).errors.origin
 
 

@@ -6,7 +6,7 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from mpm_ref.rom.fields.pod_fields import Sizes  # noqa: E402
-from mpm_ref.rom.snapshots import joined  # noqa: E402
+from mpm_ref.rom.snapshots import join_histories  # noqa: E402
 from mpm_ref.rom.study.dataset import simulate_history  # noqa: E402
 from mpm_ref.rom.train import session  # noqa: E402
 from mpm_ref.training import Machine  # noqa: E402
@@ -61,7 +61,7 @@ def test_no_run_is_kept_beside_what_is_made_of_it(monkeypatch):
             kept.append(*run)
             assert kept == made
 
-    monkeypatch.setattr(nsf, "joined", joined)
+    monkeypatch.setattr(nsf, "join_histories", joined)
     nsf.runs_of(STUDY)
     assert kept == [0.3, 0.5]
 
@@ -126,7 +126,7 @@ def test_a_few_losses_are_kept_the_last_one_among_them():
 def test_errors_are_shares_of_what_is_learned(monkeypatch):
     """Of networks that answer a known part of the truth; of all levels."""
     monkeypatch.setattr(nsf, "LEVELS", 100)
-    runs = joined([simulate_history(STUDY.run(value), [value]) for value in STUDY.train])
+    runs = join_histories([simulate_history(STUDY.run(value), [value]) for value in STUDY.train])
     xhat = np.arange(62.0).reshape(2, 31, 1)        # tells the snapshot
 
     def part(values, share):
@@ -153,4 +153,5 @@ def test_a_long_training_has_few_checkpoints():
 
 
 def test_runs_are_joined_in_single_precision():
-    assert joined([simulate_history(STUDY.run(0.3), [0.3], np.float32)]).x.dtype == np.float32
+    run = simulate_history(STUDY.run(0.3), [0.3], np.float32)
+    assert join_histories([run]).x.dtype == np.float32

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from figures.nsf import fig04
-from mpm_ref.rom.quadrature.stencil_overlap import reach
+from mpm_ref.rom.quadrature.stencil_overlap import stencil_overlap
 from mpm_ref.rom.study.full_model import nsf_full_model
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
@@ -25,7 +25,7 @@ def test_integration_points_are_those_that_see_a_node_of_a_sample(d, degree, rng
     sees = [not nodes.isdisjoint(map(tuple, integration_points.nodes_of(one[None], dx, degree)))
             for one in x]
     assert 3 < sum(sees) < 300
-    assert np.array_equal(reach(x[:3], dx, degree).reached(x), sees)
+    assert np.array_equal(stencil_overlap(x[:3], dx, degree).overlaps(x), sees)
 
 
 def test_a_sample_sees_three_nodes_an_axis_of_quadratic_splines():

@@ -68,7 +68,7 @@ def test_a_run_on_samples_with_weights_is_that_of_their_plan(made, tmp_path, mon
     done = mpm_ref("rom", "run", study, "--map", made / "fields.npz", "--out", out, "--set", "v=2")
     assert done.exit_code == 0, done.output
     model, one = model_file.load(made / "fields.npz"), nsf_full_model(load(study).scene([2.0]))
-    fields = model.field.of([2.0])
+    fields = model.field.with_parameters([2.0])
     chosen = pick(fields, one)
     run = nsf_run(one, fields, FieldRunOptions((chosen,)), model.rest)
     *_, (_, last, report, _) = run.states()

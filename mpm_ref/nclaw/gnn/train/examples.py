@@ -1,8 +1,9 @@
-"""What a graph network is shown: frames of runs, with noise on what came before [GNS].
+"""Examples for the training of graph networks: frames of runs with noise in their history [GNS].
 
-Noise is a walk: each velocity of the history is off by what the one before was off, and by a new
-random number. Positions are off by the sum. What is expected is the acceleration to the true next
-velocity, so that the network learns to take back the error of the last one, not that of positions.
+The noise is a random walk: the error of each velocity of the history is that of the one before plus
+a new random number. The error of a position is the sum of those of the velocities. The target is
+the acceleration to the true next velocity, so that the network learns to correct the error of the
+last velocity, not that of positions.
 """
 
 from typing import NamedTuple

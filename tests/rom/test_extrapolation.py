@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import rom_toys
 
-from mpm_ref.rom.extrapolation import THIN, extent, motion
+from mpm_ref.rom.extrapolation import THIN, extent, motion_metric
 
 H, STEP = 0.5, 0.1      # of `comb`: distance of runs, and of latents in a run
 
@@ -111,15 +111,15 @@ def test_motion_is_the_root_mean_square_motion_of_the_points(d, rng):
     """Exactly so for a map that is linear in its coordinates."""
     map, xhat = rom_toys.affine(d)
     X, change = rom_toys.cloud(d, 30), rng.normal(size=map.r)
-    metric = motion(map, X, np.stack([xhat, 2.0 * xhat]))
+    metric = motion_metric(map, X, np.stack([xhat, 2.0 * xhat]))
     moved = map.place(X, xhat + change) - map.place(X, xhat)
     assert change @ metric @ change == pytest.approx(np.sum(moved**2) / len(X), rel=1e-12)
 
 
 def test_motion_is_a_mean_over_latents_of_runs(d, rng):
     map, X, runs = rom_toys.decoder(d, 2), rom_toys.cloud(d, 10), rng.uniform(-1.0, 1.0, (2, 3, 2))
-    each = [motion(map, X, y) for y in runs.reshape(-1, 2)]
-    np.testing.assert_allclose(motion(map, X, runs), np.mean(each, axis=0), rtol=1e-12)
+    each = [motion_metric(map, X, y) for y in runs.reshape(-1, 2)]
+    np.testing.assert_allclose(motion_metric(map, X, runs), np.mean(each, axis=0), rtol=1e-12)
     assert np.ptp(each, axis=0).max() > 0.01 * np.abs(each).max()
 
 
@@ -130,7 +130,7 @@ def test_drift_where_no_point_moves_is_inside(d):
     runs = 0.4 * swing(np.linspace(1.0, 2.0, 6))
     runs[..., 2] *= 0.05
     drift = runs[3] + np.array([0.0, 0.0, 0.5])
-    assert extent(runs, motion(map, rom_toys.cloud(d, 20), runs)).beyond(drift).max() < 1e-6
+    assert extent(runs, motion_metric(map, rom_toys.cloud(d, 20), runs)).beyond(drift).max() < 1e-6
     assert extent(runs).beyond(drift).max() > 3.0
 
 

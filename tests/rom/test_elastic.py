@@ -6,8 +6,8 @@ import pytest
 from mpm_ref.body import Body, particles_at
 from mpm_ref.materials import NoFlow, fixed_corotated
 from mpm_ref.plain import laws
-from mpm_ref.rom.fields.elastic import deformed, elastic_stress, gradients
-from mpm_ref.rom.fields.pod_fields import Sizes, spanned
+from mpm_ref.rom.fields.elastic import elastic_modes, elastic_stress, gradients
+from mpm_ref.rom.fields.pod_fields import Sizes, fit_pod_fields
 from mpm_ref.rom.snapshots import Histories
 
 SOFT, HARD = fixed_corotated.from_E_nu(1.0, 0.3), fixed_corotated.from_E_nu(20.0, 0.2)
@@ -70,8 +70,8 @@ def test_each_body_has_its_own_gradient_and_law():
     X = np.concatenate([points(2), points(2, seed=5)])
     ends = len(X) // 2
     runs = stretched(X, ends, SOFT)
-    fields, xhat = spanned(runs, Sizes(r=2, modes=2, tau=3, C=3), 0.3, follows=False)
-    both = deformed(fields, [body(X[:ends], SOFT), body(X[ends:], HARD)])
+    fields, xhat = fit_pod_fields(runs, Sizes(r=2, modes=2, tau=3, C=3), 0.3, follows=False)
+    both = elastic_modes(fields, [body(X[:ends], SOFT), body(X[ends:], HARD)])
     some, y = np.arange(ends - 5, ends + 5), xhat[0, -1]
     F = np.where((some < ends)[:, None, None], 1.2 * np.eye(2), 0.9 * np.eye(2))
     assert np.abs(both.F(some, y) - F).max() < 1e-9
@@ -86,11 +86,11 @@ def test_each_body_has_its_own_gradient_and_law():
 def test_a_body_of_too_few_points_is_refused(d, n):
     """One has no neighbours at all; two tell nothing across the line through them."""
     X = np.concatenate([points(d), 5.0 + points(d)[:n]])
-    fields, _ = spanned(stretched(X, len(X) - n, SOFT), Sizes(r=2, modes=2, tau=3, C=3), 0.3,
+    fields, _ = fit_pod_fields(stretched(X, len(X) - n, SOFT), Sizes(r=2, modes=2, tau=3, C=3), 0.3,
                         follows=False)
-    with pytest.raises(ValueError, match=rf"^points in the body 'one': {n}, which tell no "
+    with pytest.raises(ValueError, match=rf"^points in the body 'one': {n}, too few for a "
                        rf"gradient of the map: expected at least {d + 1}; sample the body"):
-        deformed(fields, [body(X[:-n], SOFT), body(X[-n:], HARD)])
+        elastic_modes(fields, [body(X[:-n], SOFT), body(X[-n:], HARD)])
 
 
 @pytest.mark.parametrize("d", [2, 3])

@@ -6,11 +6,11 @@ import pytest
 import rom_toys
 from field_toys import MU, Q, latents, networks
 
-from mpm_ref.rom.fields.network import learned
+from mpm_ref.rom.fields.network import learned_fields
 from mpm_ref.rom.latent import Latent
 from mpm_ref.rom.projection import project_position
 from mpm_ref.rom.step import MaterialPoints, nsf_stepper
-from tests.rom.test_inferred import after_grid
+from tests.rom.test_nsf_step import after_grid
 from validation.nsf.pointwise_networks import infer
 
 POINTS = np.array([7, 3, 190, 3])
@@ -18,7 +18,7 @@ SIZE = 0.2
 
 
 def fields(d, q=Q, n=200):
-    return learned(rom_toys.cloud(d, n), networks(d, q), MU[:q], SIZE)
+    return learned_fields(rom_toys.cloud(d, n), networks(d, q), MU[:q], SIZE)
 
 
 def test_fields_are_those_of_the_networks_at_the_points_of_these_numbers(d):
@@ -47,14 +47,14 @@ def test_values_of_a_stress_are_the_upper_triangle_row_by_row():
 
 def test_a_run_with_other_parameters_has_another_stress_alone(d):
     one, xhat = fields(d), latents()
-    other = one.of(MU + 1.0)
+    other = one.with_parameters(MU + 1.0)
     assert abs(other.stress(POINTS, xhat) - one.stress(POINTS, xhat)).max() > 1e-3
     np.testing.assert_array_equal(other.place(POINTS, xhat), one.place(POINTS, xhat))
     np.testing.assert_array_equal(other.affine(POINTS, xhat), one.affine(POINTS, xhat))
 
 
 def test_fields_that_depend_on_no_parameter_may_be_told_some(d):
-    one = learned(rom_toys.cloud(d, 200), networks(d), MU, SIZE)
+    one = learned_fields(rom_toys.cloud(d, 200), networks(d), MU, SIZE)
     plain, xhat = fields(d, q=0), latents()
     np.testing.assert_array_equal(one.stress(POINTS, xhat), plain.stress(POINTS, xhat))
 
@@ -89,17 +89,17 @@ def test_latent_coordinates_are_found_from_positions_of_numbered_points(d):
 ], ids=["outputs", "latents of l", "latents of g", "axes", "parameters"])
 def test_networks_that_do_not_fit_are_refused(change, said):
     with pytest.raises(ValueError, match=said) as refusal:
-        learned(rom_toys.cloud(3, 20), change(*networks(3, Q)), MU, SIZE)
+        learned_fields(rom_toys.cloud(3, 20), change(*networks(3, Q)), MU, SIZE)
     assert "\n" not in str(refusal.value)
 
 
 def test_points_and_parameters_that_do_not_fit_are_refused():
     with pytest.raises(ValueError, match=r"points of shape \(20, 2\) for networks of 3 axes"):
-        learned(rom_toys.cloud(2, 20), networks(3, Q), MU, SIZE)
+        learned_fields(rom_toys.cloud(2, 20), networks(3, Q), MU, SIZE)
     with pytest.raises(ValueError, match=r"mu of shape \(1,\): expected \(2,\)"):
-        learned(rom_toys.cloud(3, 20), networks(3, Q), MU[:1], SIZE)
+        learned_fields(rom_toys.cloud(3, 20), networks(3, Q), MU[:1], SIZE)
     with pytest.raises(ValueError, match=r"mu of shape \(\): expected \(2,\)"):
-        fields(3).of(31.0)
+        fields(3).with_parameters(31.0)
 
 
 def test_a_step_on_networks_moves_samples_as_when_all_points_are_stepped(d):

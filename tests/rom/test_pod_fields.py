@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from mpm_ref.rom.fields import pod_fields as module
-from mpm_ref.rom.fields.pod_fields import Sizes, modes_of, spanned
+from mpm_ref.rom.fields.pod_fields import Sizes, fit_pod_fields, modes_of
 from mpm_ref.rom.fields.radial_basis import through
-from mpm_ref.rom.snapshots import Histories, joined
+from mpm_ref.rom.snapshots import Histories, join_histories
 from mpm_ref.rom.symmetric import tensor, values
 
 LEVELS, N, DT = 9, 60, 0.01
@@ -32,13 +32,13 @@ def bent(d, mu, seed=3):
 @pytest.fixture
 def runs(d):
     """Histories of four runs."""
-    return joined([bent(d, mu) for mu in (0.4, 0.6, 0.8, 1.0)])
+    return join_histories([bent(d, mu) for mu in (0.4, 0.6, 0.8, 1.0)])
 
 
 @pytest.fixture
 def made(runs):
     """Fields of these runs, and their latent coordinates."""
-    return spanned(runs, Sizes(r=2, modes=3, tau=2, C=1), 0.3)
+    return fit_pod_fields(runs, Sizes(r=2, modes=3, tau=2, C=1), 0.3)
 
 
 ALL = np.arange(N)
@@ -54,7 +54,7 @@ def test_tensors_and_their_values(d, rng):
 def test_fields_meet_the_runs_they_are_made_of(made, runs, d):
     fields, xhat = made
     for k in range(len(runs.mu)):
-        one = fields.of(runs.mu[k])
+        one = fields.with_parameters(runs.mu[k])
         for level in range(LEVELS):
             y = xhat[k, level]
             assert np.abs(one.place(ALL, y) - runs.x[k, level]).max() < 1e-6
@@ -66,7 +66,7 @@ def test_fields_meet_the_runs_they_are_made_of(made, runs, d):
 def test_fields_between_runs_are_between(made, d):
     fields, _ = made
     new = bent(d, 0.7)
-    one = fields.of(new.mu[0])
+    one = fields.with_parameters(new.mu[0])
     U = fields.U.reshape(-1, 3)
     for level in range(LEVELS):
         y = (U.T @ (new.x[0, level] - new.X).ravel())[:2]
@@ -77,19 +77,19 @@ def test_fields_between_runs_are_between(made, d):
 def test_parameters_tell_runs_apart_that_start_alike(made, runs):
     fields, xhat = made
     rest = xhat[:, 0].mean(axis=0)
-    low, high = (fields.of(mu).stress(ALL, rest) for mu in runs.mu[[0, -1]])
+    low, high = (fields.with_parameters(mu).stress(ALL, rest) for mu in runs.mu[[0, -1]])
     assert np.linalg.norm(high) == pytest.approx(2.5 * np.linalg.norm(low), rel=1e-3)
 
 
 def test_stress_that_knows_no_parameters_is_one_for_all(runs):
-    fields, xhat = spanned(runs, Sizes(r=2, modes=3, tau=2, C=1), 0.3, follows=False)
+    fields, xhat = fit_pod_fields(runs, Sizes(r=2, modes=3, tau=2, C=1), 0.3, follows=False)
     assert fields.mu.shape == (0,)
     assert fields.stress(ALL, xhat[0, 3]).shape == (N, runs.X.shape[1], runs.X.shape[1])
 
 
 @pytest.mark.parametrize("modes", [2, 3])
 def test_derivatives_by_differences(runs, modes, rng):
-    fields, xhat = spanned(runs, Sizes(r=2, modes=modes, tau=2, C=1), 0.3)
+    fields, xhat = fit_pod_fields(runs, Sizes(r=2, modes=modes, tau=2, C=1), 0.3)
     y, direction = xhat[1, 4], rng.normal(size=2) * np.abs(xhat).max()
     x, none, G = fields.derivatives(ALL, y)
     assert none is None
@@ -143,22 +143,22 @@ def test_no_point_that_is_near_is_overlooked(made, digits):
 
 
 def test_few_points_are_looked_at_where_few_are_near(runs):
-    fields, xhat = spanned(runs, Sizes(r=2, modes=2, tau=1, C=1), 0.1)
+    fields, xhat = fit_pod_fields(runs, Sizes(r=2, modes=2, tau=1, C=1), 0.1)
     x = fields.place(ALL, xhat[0, 0])
     assert len(fields.near(xhat[0, 0], x[[7]], 0.05)) < N // 2
 
 
 def test_without_an_affine_field(runs, d):
-    fields, xhat = spanned(runs, Sizes(r=2, modes=3, tau=2, C=0), 0.3)
+    fields, xhat = fit_pod_fields(runs, Sizes(r=2, modes=3, tau=2, C=0), 0.3)
     assert fields.C is None
     assert not fields.affine(ALL, xhat[0, 2]).any()
 
 
 def test_more_modes_than_the_runs_hold_are_refused(runs):
     with pytest.raises(ValueError, match=r"modes = 30: expected 1 \.\. \d+, as many modes as"):
-        spanned(runs, Sizes(r=2, modes=30), 0.3)
+        fit_pod_fields(runs, Sizes(r=2, modes=30), 0.3)
     with pytest.raises(ValueError, match=r"tau = 40: expected 1 \.\. 2"):
-        spanned(runs, Sizes(r=2, modes=3, tau=40), 0.3)
+        fit_pod_fields(runs, Sizes(r=2, modes=3, tau=40), 0.3)
 
 
 # radial functions
@@ -195,7 +195,7 @@ def test_values_that_contradict_each_other_are_met_in_the_middle(rng):
 def test_parameters_weigh_as_told(runs):
     """Spread for spread: twice the weight is half the unit."""
     for weight in (1.0, 2.0):
-        fields, _ = spanned(runs, Sizes(r=2, modes=3, tau=2, C=1, weight=weight), 0.3)
+        fields, _ = fit_pod_fields(runs, Sizes(r=2, modes=3, tau=2, C=1, weight=weight), 0.3)
         assert fields.tau.coefficients.unit[2:] == pytest.approx(runs.mu.std(axis=0) / weight)
 
 
@@ -240,22 +240,22 @@ def test_what_radial_functions_refuse():
         through(np.full((5, 1), np.nan), np.zeros((5, 1)), np.ones(1))
 
 
-def test_modes_that_are_known_are_not_found_again(runs, monkeypatch):
+def test_cached_modes_are_not_computed_again(runs, monkeypatch):
     """And the fields are the same to the last bit; of another number they are found."""
-    sizes, known, found = Sizes(r=2, modes=3, tau=2, C=1), {}, []
-    whole, xhat = spanned(runs, sizes, 0.3, known=known)
+    sizes, cache, found = Sizes(r=2, modes=3, tau=2, C=1), {}, []
+    whole, xhat = fit_pod_fields(runs, sizes, 0.3, cache=cache)
 
     def finding(A, count, name, origin=None):
         found.append(name)
         return modes_of(A, count, name, origin)
 
     monkeypatch.setattr(module, "modes_of", finding)
-    fewer, _ = spanned(runs, sizes._replace(r=1, C=0), 0.3, follows=False, known=known)
+    fewer, _ = fit_pod_fields(runs, sizes._replace(r=1, C=0), 0.3, follows=False, cache=cache)
     assert found == []
-    again, at = spanned(runs, sizes, 0.3, known=known)
+    again, at = fit_pod_fields(runs, sizes, 0.3, cache=cache)
     assert np.array_equal(at, xhat)
     for ours, theirs in ((again.U, whole.U), (again.tau.modes, whole.tau.modes),
                          (again.C.modes, whole.C.modes), (fewer.tau.modes, whole.tau.modes)):
         assert np.array_equal(ours, theirs)
-    spanned(runs, sizes._replace(modes=2), 0.3, known=known)
+    fit_pod_fields(runs, sizes._replace(modes=2), 0.3, cache=cache)
     assert found == ["modes"]

@@ -7,9 +7,9 @@ import pytest
 
 from mpm_ref import scene
 from mpm_ref.rom.cubature import cubature
-from mpm_ref.rom.fields.pod_fields import Sizes, spanned
+from mpm_ref.rom.fields.pod_fields import Sizes, fit_pod_fields
 from mpm_ref.rom.quadrature.stencil_overlap import bases
-from mpm_ref.rom.snapshots import joined
+from mpm_ref.rom.snapshots import join_histories
 from mpm_ref.rom.study import samples
 from mpm_ref.rom.study.dataset import simulate_history
 from mpm_ref.rom.study.full_model import nsf_full_model
@@ -63,7 +63,7 @@ def disks(tmp_path_factory):
 @pytest.fixture(scope="module")
 def runs(disks):
     """Histories of some speeds."""
-    return joined([simulate_history(disks(v), [v]) for v in SPEEDS])
+    return join_histories([simulate_history(disks(v), [v]) for v in SPEEDS])
 
 
 def test_points_of_all_bodies_are_in_one_list(disks, runs):
@@ -103,7 +103,7 @@ def test_a_history_of_one_step_in_several(disks, runs):
 def test_a_reduced_run_follows_the_full_one(disks, runs):
     v = 1.8
     full = simulate_history(disks(v), [v]).x[0]
-    fields, xhat = spanned(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
+    fields, xhat = fit_pod_fields(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
     n = len(runs.X)
 
     def worst(plan):
@@ -119,7 +119,7 @@ def test_a_reduced_run_follows_the_full_one(disks, runs):
 
 
 def test_times_of_longer_steps(disks, runs):
-    fields, xhat = spanned(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
+    fields, xhat = fit_pod_fields(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
     plan = FieldRunOptions((drawn_samples(len(runs.X), 12, 0),), dt_factor=1.5)
     run = nsf_run(nsf_full_model(disks(2.0)), fields, plan, xhat[1, 0])
     times = [state.t for state in run.states()]
@@ -139,7 +139,7 @@ def test_samples_switch_in_time():
 
 def test_a_run_takes_the_samples_of_its_time(disks, runs):
     """From half-way on others, and fewer; the states go on from those before."""
-    fields, xhat = spanned(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
+    fields, xhat = fit_pod_fields(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
     one, n = nsf_full_model(disks(2.0)), len(runs.X)
     early, late = drawn_samples(n, 12, 0), drawn_samples(n, 9, 1, since=0.015)
     both, first = ([(state.latent.xhat, state.report)
@@ -152,7 +152,7 @@ def test_a_run_takes_the_samples_of_its_time(disks, runs):
 
 def test_the_start_is_searched(disks, runs):
     """From latent coordinates a tenth of a radius off."""
-    fields, xhat = spanned(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
+    fields, xhat = fit_pod_fields(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
     one, near = nsf_full_model(disks(2.0)), xhat[1, 0] + 0.1 * np.abs(xhat).max()
     everything = np.arange(len(one.X))
     off = [np.abs(fields.place(everything, at) - one.X).max()
@@ -164,7 +164,7 @@ def test_weighted_samples_are_better_than_drawn_ones(disks, runs):
     """With so few, motion that the modes do not resolve disturbs those that are drawn."""
     v = 1.8
     full = simulate_history(disks(v), [v]).x[0]
-    fields, xhat = spanned(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
+    fields, xhat = fit_pod_fields(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
     n = len(runs.X)
 
     def worst(chosen):
@@ -183,7 +183,7 @@ def test_weighted_samples_are_better_than_drawn_ones(disks, runs):
 
 def test_samples_of_few_cells_have_the_nodes_of_each_other(disks, runs):
     """So that a step on them asks for fewer points than on as many that lie anywhere."""
-    fields, xhat = spanned(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
+    fields, xhat = fit_pod_fields(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
     scene, n = nsf_full_model(disks(1.8)), len(runs.X)
     few = cell_samples(fields, scene.problem, n, 3, 0)
     base = bases(scene.X, scene.problem.dx, scene.problem.scheme.degree)
@@ -197,7 +197,7 @@ def test_samples_of_few_cells_have_the_nodes_of_each_other(disks, runs):
 
 
 def test_samples_of_cells_are_some_of_those_asked_for(disks, runs):
-    fields, _ = spanned(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
+    fields, _ = fit_pod_fields(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
     among = np.arange(10, len(runs.X), 2)
     found = cell_samples(fields, nsf_full_model(disks(1.8)).problem, among, 5, 0, since=0.5)
     assert np.isin(found.points, among).all()
@@ -206,7 +206,7 @@ def test_samples_of_cells_are_some_of_those_asked_for(disks, runs):
 
 def test_cells_are_those_of_random_candidates(disks, runs, monkeypatch):
     monkeypatch.setattr(samples, "MAX_CELLS", 4)
-    fields, _ = spanned(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
+    fields, _ = fit_pod_fields(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
     problem, n = nsf_full_model(disks(1.8)).problem, len(runs.X)
     base = [tuple(one) for one in bases(runs.X, problem.dx, problem.scheme.degree)]
     for seed in range(3):
@@ -231,7 +231,7 @@ def test_samples_and_weights_that_mean_nothing_are_refused(points, w, words):
 
 
 def test_samples_are_there_from_the_start_on(disks, runs):
-    fields, xhat = spanned(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
+    fields, xhat = fit_pod_fields(runs, Sizes(r=3, modes=6, tau=15, C=15), 0.15, follows=False)
     with pytest.raises(ValueError, match="samples from a later time on: expected some"):
         nsf_run(nsf_full_model(disks(2.0)), fields,
                 FieldRunOptions((drawn_samples(40, 12, 0, 0.01),)), xhat[1, 0])

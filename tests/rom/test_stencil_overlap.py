@@ -12,7 +12,7 @@ from mpm_ref.rom.fields import blocks as block_module
 from mpm_ref.rom.fields.affine import Affine
 from mpm_ref.rom.fields.blocks import SAFETY, blocks
 from mpm_ref.rom.quadrature.lagrangian import CELLS, lagrangian
-from mpm_ref.rom.quadrature.stencil_overlap import reach
+from mpm_ref.rom.quadrature.stencil_overlap import stencil_overlap
 from mpm_ref.rom.sampling import PER_GROUP, draw
 
 DX = 0.11
@@ -77,14 +77,14 @@ def test_reached_points_are_those_that_share_a_node(points, d, degree, rng):
     samples, x, dx = points(d, rng)
     expected = sharing(x, samples, dx, degree)
     assert 0 < expected.sum() < len(x)
-    within = reach(samples, dx, degree)
-    assert np.array_equal(within.reached(x), expected)
+    within = stencil_overlap(samples, dx, degree)
+    assert np.array_equal(within.overlaps(x), expected)
     assert [point in within for point in x] == expected.tolist()
 
 
 def test_samples_reach_themselves(d, degree):
     x = cloud(d, 30)
-    assert reach(x, DX, degree).reached(x).all()
+    assert stencil_overlap(x, DX, degree).overlaps(x).all()
 
 
 def test_cells_are_exactly_the_bases_within_reach(d, degree, rng):
@@ -94,7 +94,8 @@ def test_cells_are_exactly_the_bases_within_reach(d, degree, rng):
     held = set().union(*stencils(samples, DX, degree))
     expected = [base for base in product(*map(range, low, high))
                 if not held.isdisjoint(product(*[range(k, k + degree + 1) for k in base]))]
-    assert reach(samples, DX, degree).cells().tolist() == [list(base) for base in expected]
+    overlap = stencil_overlap(samples, DX, degree)
+    assert overlap.cells().tolist() == [list(base) for base in expected]
 
 
 # blocks

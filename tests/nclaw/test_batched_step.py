@@ -29,7 +29,7 @@ H = 1e-3 * 0.5 ** np.arange(5)      # a displacement is at most H/10 m, less tha
 
 ADJOINT = """
 import json
-from tests.nclaw.test_apart import off_the_steppers_adjoint
+from tests.nclaw.test_batched_step import off_the_steppers_adjoint
 print(json.dumps(list(off_the_steppers_adjoint())))
 """
 
