@@ -16,12 +16,11 @@ from mpm_ref.hot.multigrid.blocks.product import planes_of, product
 from mpm_ref.hot.multigrid.blocks.sparse import blocks_of
 from mpm_ref.hot.multigrid.hierarchy import hierarchy
 from mpm_ref.hot.multigrid.options import CycleOptions
-from validation.hot.linear_system import frozen
-from validation.hot.measured_cg import Until
-from validation.hot.one_step import Step, after
+from validation.hot.linear_system import CGLimits, frozen
+from validation.hot.one_step import ImplicitStep, step_after
 from validation.hot.preconditioners import OURS, cost, one_thread
 from validation.hot.stiffness import bar
-from validation.hot.stretched import FRAME, stretched
+from validation.hot.stretched_box import FRAME, stretched
 
 THEIRS = "aggregation-rigid"        # pyamg's, of `validation.hot.preconditioners`
 METHODS = {                         # the first is what the others are relative to
@@ -42,14 +41,15 @@ class Part(NamedTuple):
 
 def twist(dx=0.0228):
     """`Step` of the twisted bar."""
-    return after(bar(dx, 1e9, "hot", 3), 3)
+    return step_after(bar(dx, 1e9, "hot", 3), 3)
 
 
 def box(dx=1.0 / 16.0):
     """`Step` of the stretched box."""
     problem = stretched("particle", dx)
     stepper = problem.stepper()
-    return Step(problem.bodies, stepper, stepper.problem(problem.bodies, 0.0, FRAME), FRAME, 0.0)
+    pose = stepper.problem(problem.bodies, 0.0, FRAME)
+    return ImplicitStep(problem.bodies, stepper, pose, FRAME, 0.0)
 
 
 STEPS = {"twist": twist, "box": box}
@@ -139,7 +139,7 @@ def solver_rows(step, repeats):
     matrix = frozen(A, system.index, -g, counts_of(step)["particle"])
     np.random.seed(0)               # noqa: NPY002  pyamg draws from it to estimate eigenvalues
     with one_thread():
-        costs = in_turn({case: partial(cost, matrix, case, Until()) for case in (OURS, THEIRS)},
+        costs = in_turn({case: partial(cost, matrix, case, CGLimits()) for case in (OURS, THEIRS)},
                         repeats)
     rows = [{"solver": case, "iterations": done[-1].iterations, "converged": done[-1].converged,
              "setup_s": float(np.median([c.setup for c in done])),

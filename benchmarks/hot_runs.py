@@ -17,7 +17,7 @@ from mpm_ref.scene import build, load
 from mpm_ref.simulate import simulate
 from validation.common.scenes import with_
 from validation.hot.stiffness import bar
-from validation.hot.warm_states import begun, particles, steps
+from validation.hot.warm_states import following_steps, warm_state
 
 SCENES = Path(__file__).parent / "scenes"
 VARIANTS = {                        # the first is what the others are relative to
@@ -45,8 +45,8 @@ RUNS = {
     "drop": Timed(lambda: started(load(SCENES / "drop.toml")), 12, 1.43),
     "sphere": Timed(lambda: started(load(SCENES / "sphere.toml")), 5, 3.1),
     "bar": Timed(lambda: started(bar(0.015, 1e9, "hot", 40)), 12, 1.1),
-    "metal": Timed(lambda: begun("aluminium", "quick"), 8, 0.39),
-    "metal-fine": Timed(lambda: begun("aluminium", "standard"), 5, None),
+    "metal": Timed(lambda: warm_state("aluminium", "quick"), 8, 0.39),
+    "metal-fine": Timed(lambda: warm_state("aluminium", "standard"), 5, None),
     "twist": Timed(lambda: started(bar(0.0228, 1e9, "hot", 40)), 12, None),
 }
 
@@ -58,10 +58,10 @@ def run_rows(name):
     run = RUNS[name]
     problem, state = run.begin()
     taken = {variant: [] for variant in VARIANTS}
-    for step in steps(problem, state, run.steps + 1):
+    for step in following_steps(problem, state, run.steps + 1):
         for variant, words in VARIANTS.items():
             taken[variant].append(timed(step, *words))
-    where = {"run": name, "particles": particles(problem), "nodes": len(step.pose.unknowns.m),
+    where = {"run": name, "particles": step.particles, "nodes": len(step.pose.unknowns.m),
              "steps": run.steps, "public_cpu_s": run.public}
     rows = [where | row_of(variant, done[1:]) for variant, done in taken.items()]
     return [row | {"cpu_ratio": row["cpu_s"] / rows[0]["cpu_s"]} for row in rows]

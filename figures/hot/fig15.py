@@ -19,16 +19,16 @@ def scale(results):
 
 def draw(results):
     table = results.table(NEEDS[0], "speedups")
-    found, places = series(table, ("method",)), {}
+    by_method, places = series(table, ("method",)), {}
     for name in table["scene"]:
         places.setdefault(name, len(places))
     figure, axes = plt.subplots(2, 1, figsize=(2.4 + 0.9 * len(places), 5.4), sharex=True)
     width = 0.9 / len(LABELS)
     for k, (method, label) in enumerate(LABELS.items()):
-        rows = found[method,]
-        at = np.array([places[name] for name in table["scene"][rows]]) + (k - 3.5) * width
-        for ax, what in zip(axes, ("total", "worst"), strict=True):
-            bars = ax.bar(at, table[what][rows], width, color=f"C{k}", label=label)
+        rows = by_method[method,]
+        x = np.array([places[name] for name in table["scene"][rows]]) + (k - 3.5) * width
+        for ax, ratio in zip(axes, ("total", "worst"), strict=True):
+            bars = ax.bar(x, table[ratio][rows], width, color=f"C{k}", label=label)
             mark_capped(bars, table["capped"][rows])
     for ax, title in zip(axes, ("all steps", "worst step"), strict=True):
         ax.set(yscale="log", ylabel=f"CPU time over HOT's,\n{title}")

@@ -13,20 +13,19 @@ LEAST = 1e-9        # colour of what is smaller still
 
 
 def scale(results):
-    found = [r for r in results.records(NEEDS[0]) if r.target == "hot.fig18.hot_iters"]
-    return found[0].scale
+    return next(r.scale for r in results.records(NEEDS[0]) if r.target == "hot.fig18.hot_iters")
 
 
 def draw(results):
     table = results.table(NEEDS[0], "slice")
-    most = max(len(shown(table, method)) for method in METHODS)
+    most = max(len(iterations(table, method)) for method in METHODS)
     figure, axes = plt.subplots(2, most, figsize=(2.2 * most + 0.8, 4.8), squeeze=False,
                                 layout="constrained")
     norm = LogNorm(LEAST, table["residual"].max())
     for row, (method, label) in zip(axes, METHODS.items(), strict=True):
         for ax in row:
             ax.axis("off")
-        for ax, k in zip(row, shown(table, method), strict=False):
+        for ax, k in zip(row, iterations(table, method), strict=False):
             image = panel(ax, table, (table["method"] == method) & (table["iteration"] == k), norm)
             ax.set_title(f"{label}, iteration {k:.0f}", fontsize=9)
     figure.colorbar(image, ax=axes, shrink=0.8, label="residual of a node")
@@ -35,14 +34,14 @@ def draw(results):
     return figure
 
 
-def shown(table, method):
-    """Iterations of a method, in order."""
+def iterations(table, method):
+    """Return the iterations of a method, in order."""
     return np.unique(table["iteration"][table["method"] == method])
 
 
-def panel(ax, table, at, norm):
-    """One plane as an image."""
-    x, y = (table[name][at].astype(int) for name in ("x", "y"))
+def panel(ax, table, rows, norm):
+    """Draw the chosen rows, one plane, as an image."""
+    x, y = (table[name][rows].astype(int) for name in ("x", "y"))
     image = np.full((np.ptp(y) + 1, np.ptp(x) + 1), np.nan)
-    image[y - y.min(), x - x.min()] = np.maximum(table["residual"][at], LEAST)
+    image[y - y.min(), x - x.min()] = np.maximum(table["residual"][rows], LEAST)
     return ax.imshow(image, origin="lower", norm=norm, cmap="turbo")

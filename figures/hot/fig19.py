@@ -19,14 +19,15 @@ def scale(results):
 
 
 def draw(results):
-    way, costs = (results.table(NEEDS[0], name) for name in ("iterates", "costs"))
+    iterates, costs = (results.table(NEEDS[0], name) for name in ("iterates", "costs"))
     figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.4))
     for method in METHODS:
         label, color, style = LOOKS[method]
-        at = way["method"] == method
-        left.plot(way["residual"][at], way["cg"][at], style, color=color, label=label, ms=3)
-        at = (costs["method"] == method) & (costs["scene"] == SCENE)
-        right.plot(costs["step"][at], costs["cg"][at], style, color=color, label=label, ms=4)
+        rows = iterates["method"] == method
+        left.plot(iterates["residual"][rows], iterates["cg"][rows], style, color=color,
+                  label=label, ms=3)
+        rows = (costs["method"] == method) & (costs["scene"] == SCENE)
+        right.plot(costs["step"][rows], costs["cg"][rows], style, color=color, label=label, ms=4)
     left.axvline(EPS, color="0.3", ls="--", lw=0.8)
     left.set(xscale="log", xlabel="residual", ylabel="CG iterations so far")
     left.invert_xaxis()

@@ -18,9 +18,9 @@ def scale(results):
 def draw(results):
     table = results.table(NEEDS[0], "costs")
     figure, axes = plt.subplots(1, 2, figsize=(8.4, 3.4))
-    found = series(table, ("method",))
+    by_method = series(table, ("method",))
     for k, (method, (label, style)) in enumerate(METHODS.items()):
-        rows = found[method,]
+        rows = by_method[method,]
         for ax, name in zip(axes, ("cpu", "iterations"), strict=True):
             ax.semilogx(table["E"][rows], table[name][rows], style, color=f"C{k}", label=label)
     for ax, name in zip(axes, ("CPU seconds per step", "outer iterations per step"), strict=True):

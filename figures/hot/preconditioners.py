@@ -40,9 +40,9 @@ def draw(results):
         panels.append(("particles", "ratio", table["E"] == STIFF))
     figure, axes = plt.subplots(1, len(panels), figsize=(3.7 * len(panels), 3.6))
     for (case,), rows in series(table, ("case",)).items():
-        for ax, (x, y, among) in zip(axes, panels, strict=True):
+        for ax, (x, y, mask) in zip(axes, panels, strict=True):
             if case in CASES:
-                line(ax, table, (x, y), rows & among)
+                line(ax, table, (x, y), rows & mask)
     for ax, (x, y, _) in zip(axes, panels, strict=True):
         ax.set(xscale="log", yscale="log", xlabel=LABELS[x], ylabel=LABELS[y])
     legend_below(figure, axes, columns=2 if len(panels) == 2 else 4)
@@ -50,9 +50,9 @@ def draw(results):
 
 
 def line(ax, table, names, rows):
-    """A case over a column, hollow where it did not converge."""
+    """Draw a case over a column, hollow where it did not converge."""
     label, color, style = CASES[table["case"][rows][0]]
     x, y = (table[name][rows] for name in names)
     ax.plot(x, y, style, color=color, label=label, ms=5)
-    open_ = table["converged"][rows] != "True"
-    ax.plot(x[open_], y[open_], style[0], color=color, mfc="w", ms=5)
+    hollow = table["converged"][rows] != "True"
+    ax.plot(x[hollow], y[hollow], style[0], color=color, mfc="w", ms=5)

@@ -16,18 +16,18 @@ def scale(results):
 
 def draw(results):
     figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.8))
-    for held, alpha in (("symmetric", 1.0), ("wall", 0.45)):
-        history = results.table(NEEDS[0], f"history-{held}")
-        left.plot(history["t"], history["ours"], color=TRANSFERS["mls"], alpha=alpha, label=held)
+    for support, alpha in (("symmetric", 1.0), ("wall", 0.45)):
+        history = results.table(NEEDS[0], f"history-{support}")
+        left.plot(history["t"], history["ours"], color=TRANSFERS["mls"], alpha=alpha, label=support)
     left.plot(history["t"], history["exact"], "k:", label="exact")
     left.set(xlabel="t [s]", ylabel="velocity amplitude / V", ylim=(-1.1, 1.5))
     left.legend(fontsize=8, ncol=3, loc="upper center")
     table = results.table(NEEDS[0], "errors")
     for (transfer, degree, wall), rows in series(table, ("transfer", "degree", "wall")).items():
-        held = "wall" if wall == "True" else "symmetric"
+        support = "wall" if wall == "True" else "symmetric"
         right.loglog(table["cells"][rows], table["error"][rows], **look(transfer, degree),
-                     mfc="w" if held == "wall" else None,
-                     label=f"{transfer} {DEGREES[degree]}, {held}")
+                     mfc="w" if support == "wall" else None,
+                     label=f"{transfer} {DEGREES[degree]}, {support}")
     cells = sorted(set(table["cells"]))
     slope(right, -2, (cells[0], cells[-1]), 0.05, "order 2")
     slope(right, -1, (cells[0], cells[-1]), 1.6, "order 1")

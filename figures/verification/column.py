@@ -14,7 +14,7 @@ COLORS = dict(zip(("plane", "axisymmetric"), OTHERS))
 def scale(results):
     table = results.table(NEEDS[0], "runout")
     cells = {kind: counts(table["cells"][table["kind"] == kind]) for kind in COLORS}
-    return "; ".join(f"{kind}: L of {some} cells" for kind, some in cells.items())
+    return "; ".join(f"{kind}: L of {sizes} cells" for kind, sizes in cells.items())
 
 
 def draw(results):

@@ -18,20 +18,20 @@ def scale(results):
 def draw(results):
     figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.8))
     left.plot((-1, 0), (0, 1), "k:", label="exact")
-    for held, fill in (("symmetric", None), ("wall", "w")):
-        profile = results.table(NEEDS[0], f"profile-{held}")
+    for support, fill in (("symmetric", None), ("wall", "w")):
+        profile = results.table(NEEDS[0], f"profile-{support}")
         left.plot(profile["stress"], profile["X"], "o", color=TRANSFERS["mls"], mfc=fill,
-                  ms=4, label=held)
+                  ms=4, label=support)
     left.set(xlabel="stress / pressure at the floor", ylabel="height X / H")
     left.legend(fontsize=8)
     table = results.table(NEEDS[0], "errors")
     keys = ("transfer", "degree", "per_direction", "column", "wall")
     for (transfer, degree, per, column, wall), rows in series(table, keys).items():
-        held = "wall" if wall == "True" else "symmetric"
+        support = "wall" if wall == "True" else "symmetric"
         right.loglog(table["cells"][rows], table["mean_error"][rows],
                      **look(transfer, degree, per), mfc="w" if wall == "True" else None,
                      alpha=0.5 if column == "soft" else 1.0,
-                     label=f"{transfer} {DEGREES[degree]} {int(per)}, {column}, {held}")
+                     label=f"{transfer} {DEGREES[degree]} {int(per)}, {column}, {support}")
     cells = sorted(set(table["cells"]))
     slope(right, -2, (cells[0], cells[-1]), 1.2e-3, "order 2")
     slope(right, -1, (cells[0], cells[-1]), 6e-2, "order 1")

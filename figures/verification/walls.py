@@ -1,4 +1,4 @@
-"""What a wall costs. Left: column of water, mean error of the pressure and largest error of a
+"""Errors at a wall. Left: column of water, mean error of the pressure and largest error of a
 particle's height, with a sticky floor and without a wall. Right: force on the platen of an
 oedometer that compresses by a quarter.
 """
@@ -22,10 +22,10 @@ def draw(results):
     figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.8))
     table = results.table(NEEDS[0], "errors")
     for wall, mark in (("False", "o"), ("True", "s")):
-        rows, held = table["wall"] == wall, "wall" if wall == "True" else "symmetric"
+        rows, support = table["wall"] == wall, "wall" if wall == "True" else "symmetric"
         for column, color in zip(("pressure_error", "place_error"), OTHERS):
             left.loglog(table["cells"][rows], table[column][rows], mark + "-", color=color, ms=4,
-                        label=f"{column.split('_')[0]}, {held}")
+                        label=f"{column.split('_')[0]}, {support}")
     cells = sorted(set(table["cells"]))
     slope(left, -2, (cells[0], cells[-1]), 8e-4, "order 2")
     slope(left, -1, (cells[0], cells[-1]), 2e-2, "order 1")

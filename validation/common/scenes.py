@@ -37,7 +37,9 @@ def particle_count(bodies):
 
 def evenly(count, most):
     """Return at most `most` indices below `count`, evenly, the first and the last among them."""
-    return np.unique(np.linspace(0, count - 1, most).round().astype(int))
+    if count <= most:
+        return list(range(count))
+    return np.linspace(0, count - 1, most).round().astype(int).tolist()
 
 
 @contextmanager

@@ -1,8 +1,8 @@
 """Figure 19: node embedding against geometric multigrid, on ArmaCat, in Newton's CG and in L-BFGS.
 
-CG iterations are counted on the finest level. The cycle's coarsest solve is inexact, so that it is
-not the same linear map each time; CG that allows for this ("flexible") is shown beside plain CG,
-which the paper and its release take.
+CG iterations are counted on the finest level. The cycle's coarsest solve is inexact, so that the
+cycle is not the same linear map each time; CG that allows for this ("flexible") is compared with
+plain CG, which the paper and its release take.
 """
 
 from typing import NamedTuple
@@ -10,21 +10,22 @@ from typing import NamedTuple
 from mpm_ref.scene import build
 
 from ..common.registry import experiment
-from .iterates import COLUMNS, EPS, Way, first, iterates, ways
-from .warm_states import BEGUN, begun, particles, scene, steps
+from ..common.scenes import particle_count
+from .iterates import COLUMNS, EPS, MethodSetup, initial_step, iterates, setups
+from .warm_states import START_TIMES, following_steps, scene, warm_state
 
 JACOBI, OURS, GEOMETRIC = "pn-pcg", "pn-mgpcg", "pn-gmg-pcg"
-NEWTONS = (*ways(JACOBI, OURS, GEOMETRIC),
-           *(Way(f"{m}-flexible", m, {"flexible": True}) for m in (OURS, GEOMETRIC)))
-DESCENTS = ways("hot", "lbfgs-gmg")
+NEWTONS = (*setups(JACOBI, OURS, GEOMETRIC),
+           *(MethodSetup(f"{m}-flexible", m, {"flexible": True}) for m in (OURS, GEOMETRIC)))
+DESCENTS = setups("hot", "lbfgs-gmg")
 SOFT = ("sauce", "faceless")            # the two scenes of soft matter alone
-ELSEWHERE = (*SOFT, "wheel")
+OTHER_SCENES = (*SOFT, "wheel")
 CAT = "armacat_stiff"
 CAP = 300                               # iterations of L-BFGS
 
 
-class Cost(NamedTuple):
-    """What one step took by one method."""
+class MultigridCost(NamedTuple):
+    """The work of one step by one method."""
 
     scene: str
     step: int
@@ -39,48 +40,49 @@ class Cost(NamedTuple):
             profiles=("quick", "standard", "paper"),
             budget={"quick": 15, "standard": 500, "paper": 14400})
 def coarse_grids(run):
-    """CG by residual in one step, and by step; L-BFGS with either multigrid."""
-    one = first(build(scene(CAT, "quick")))
-    for way in (*NEWTONS, *DESCENTS):
-        iterates(one, way, max_iterations=2)                        # compiles
+    """Record CG by residual in one step and by step, and L-BFGS with either multigrid."""
+    one = initial_step(build(scene(CAT, "quick")))
+    for setup in (*NEWTONS, *DESCENTS):
+        iterates(one, setup, max_iterations=2)                      # compiles
     costs, rows = [], []
-    problem, coming = armacat(run)
-    scale = f"{particles(problem)} particles (the paper: 403 000)"
-    for k, step in enumerate(coming):
-        for way in run.progress((*NEWTONS, *DESCENTS), f"step {k}"):
-            made = iterates(step, way, max_iterations=CAP)
-            costs.append(cost(CAT, k, way, made))
+    problem, tried = armacat(run)
+    scale = f"{particle_count(problem.bodies)} particles (the paper: 403 000)"
+    for k, step in enumerate(tried):
+        for setup in run.progress((*NEWTONS, *DESCENTS), f"step {k}"):
+            descent = iterates(step, setup, max_iterations=CAP)
+            costs.append(cost(CAT, k, setup, descent))
             if k == 0:
-                rows += [(way.name, *row) for row in made.rows]
+                rows += [(setup.name, *row) for row in descent.rows]
     record_step(run, [c for c in costs if c.step == 0], scale)
     record_all(run, costs, scale)
-    costs += elsewhere(run)
+    costs += other_scenes(run)
     run.table("iterates", COLUMNS, rows)
-    run.table("costs", Cost._fields, costs)
+    run.table("costs", MultigridCost._fields, costs)
 
 
 def armacat(run):
-    """(`Problem`, its `Step`s): from the fall, or after the landing."""
+    """Return the `Problem` and its `ImplicitStep`s: from the fall, or after the landing."""
     if run.profile == "quick":
         problem = build(scene(CAT, "quick"))
-        return problem, [first(problem)]
-    problem, state = begun(CAT, run.profile)
-    return problem, steps(problem, state, 10)
+        return problem, [initial_step(problem)]
+    problem, state = warm_state(CAT, run.profile)
+    return problem, following_steps(problem, state, 10)
 
 
-def cost(name, k, way, made):
-    """`Cost` of a solve."""
-    r = made.report
-    return Cost(name, k, way.name, r.iterations, r.cg_iterations, r.cpu_times[-1], r.converged)
+def cost(name, k, setup, descent):
+    """Return the `MultigridCost` of step k of a scene, solved by a `MethodSetup`."""
+    r = descent.report
+    return MultigridCost(name, k, setup.name, r.iterations, r.cg_iterations, r.cpu_times[-1],
+                         r.converged)
 
 
 def total(costs, method, field="cg"):
-    """Sum of a field over the steps of a method."""
+    """Return the sum of a field over the steps of a method."""
     return sum(getattr(c, field) for c in costs if c.method == method)
 
 
 def record_step(run, costs, scale):
-    """Gains in CG iterations in one step: the printed ones."""
+    """Record the printed gains: in CG iterations in one step."""
     jacobi = total(costs, JACOBI)
     for target, method in (("gmg_gain", GEOMETRIC), ("ours_gain", OURS)):
         plain, flexible = total(costs, method), total(costs, f"{method}-flexible")
@@ -90,14 +92,15 @@ def record_step(run, costs, scale):
 
 
 def record_all(run, costs, scale):
-    """CG iterations and times over all steps."""
+    """Record CG iterations and times over all steps."""
     count = 1 + max(c.step for c in costs)
-    where = f"{scale}, {times(count)}"
-    for way in NEWTONS:
-        run.record(f"hot.fig19.{way.name}.cg", total(costs, way.name) / count, comparator="info",
-                   scale=where, note=f"per step; {total(costs, way.name, 'cpu') / count:.3f} CPU "
-                   f"seconds, {total(costs, way.name, 'iterations') / count:.1f} Newton steps"
-                   + ("" if all_converged(costs, way.name) else "; not every step converged"))
+    where = f"{scale}, {step_text(count)}"
+    for setup in NEWTONS:
+        cg, cpu, steps = (total(costs, setup.name, field) / count
+                          for field in ("cg", "cpu", "iterations"))
+        run.record(f"hot.fig19.{setup.name}.cg", cg, comparator="info", scale=where,
+                   note=f"per step; {cpu:.3f} CPU seconds, {steps:.1f} Newton steps"
+                   + ("" if all_converged(costs, setup.name) else "; not every step converged"))
     slowest = max(total(costs, m, "cpu") for m in (JACOBI, OURS))
     run.record("hot.fig19.time_vs_gmg", total(costs, GEOMETRIC, "cpu") / slowest, scale=where,
                note="CPU time by geometric multigrid over that of the slower of Jacobi and ours")
@@ -105,39 +108,40 @@ def record_all(run, costs, scale):
 
 
 def all_converged(costs, method):
-    """Whether every step of a method did."""
+    """Return whether every step of a method converged."""
     return all(c.converged for c in costs if c.method == method)
 
 
-def elsewhere(run):
-    """`Cost`s of L-BFGS with either multigrid on other scenes."""
+def other_scenes(run):
+    """Return the costs of L-BFGS with either multigrid on other scenes."""
     count, costs = run.choose(quick=1, standard=5, paper=5), []
-    for name in ELSEWHERE:
-        problem, state = begun(name, run.profile)
-        new = [cost(name, k, way, iterates(step, way, max_iterations=CAP))
-               for k, step in enumerate(steps(problem, state, count)) for way in DESCENTS]
-        record_lbfgs(run, name, new, f"{particles(problem)} particles, {times(count)} "
-                     f"from {BEGUN[name]:g} s on")
+    for name in OTHER_SCENES:
+        problem, state = warm_state(name, run.profile)
+        new = [cost(name, k, setup, iterates(step, setup, max_iterations=CAP))
+               for k, step in enumerate(following_steps(problem, state, count))
+               for setup in DESCENTS]
+        record_lbfgs(run, name, new, f"{particle_count(problem.bodies)} particles, "
+                     f"{step_text(count)} from {START_TIMES[name]:g} s on")
         costs += new
     slower = [ratio([c for c in costs if c.scene == name], "cpu") for name in SOFT]
     run.record("hot.fig19.lbfgs_gmg_soft", min(slower), unit="1", comparator="info",
-               scale=f"{times(count)} each",
+               scale=f"{step_text(count)} each",
                note="the smaller of both scenes' ratios of CPU time, LBFGS-GMG over HOT")
     return costs
 
 
-def times(count):
-    """A number of steps in words."""
+def step_text(count):
+    """Return a number of steps as text."""
     return f"{count} step{'s' * (count > 1)}"
 
 
 def ratio(costs, field):
-    """LBFGS-GMG over HOT."""
+    """Return the sum of a field by LBFGS-GMG over that by HOT."""
     return total(costs, "lbfgs-gmg", field) / total(costs, "hot", field)
 
 
 def record_lbfgs(run, name, costs, scale):
-    """Iterations of LBFGS-GMG over HOT's."""
+    """Record the iterations of LBFGS-GMG over HOT's."""
     missed = [f"; {m} did not converge in every step" for m in ("hot", "lbfgs-gmg")
               if not all_converged(costs, m)]
     run.record(f"hot.fig19.{name}.lbfgs_gmg.iterations", ratio(costs, "iterations"),

@@ -1,10 +1,10 @@
-"""What HOT's multigrid is slow at: modes of nodes that hardly touch matter.
+"""Slow modes of HOT's multigrid: those of nodes that hardly touch matter.
 
 The V-cycle M of a small bar, its coarsest level solved directly, is written out as a matrix, and
 the eigenvalues of M H are counted: each is the share of its mode that one cycle removes. Few nodes
-at the rim, with a particle or two in reach, form modes in which no particle is strained: they have
-mass alone, their diagonal blocks say stiffness, and sweeps hardly move them. What such modes mean
-for the particles is told by their part in the error where a solve ends.
+at the rim, with a particle or two near them, form modes in which no particle is strained: they have
+mass alone, their diagonal blocks say stiffness, and sweeps hardly move them. Their part in the
+error where a solve ends shows their effect on the particles.
 """
 
 from typing import NamedTuple
@@ -15,7 +15,7 @@ from scipy.linalg import cholesky, eigh, solve_triangular
 from mpm_ref.hot.multigrid.hierarchy import hierarchy
 
 from ..common.registry import experiment
-from .one_step import Step, after, difference, solved
+from .one_step import ImplicitStep, difference, solve_step, step_after
 from .stiffness import bar
 
 DX, E, STEPS = 0.04, 1e9, 3         # of the bar and its middle
@@ -24,7 +24,7 @@ SLOW = 0.02                         # share that a cycle removes, at most
 PAPER, EXACT = 1e-7, 1e-13
 
 
-class Modes(NamedTuple):
+class CycleModes(NamedTuple):
     """Eigenvectors of M H, orthogonal in energy."""
 
     share: np.ndarray       # (k,)    removed by a cycle, ascending
@@ -32,8 +32,8 @@ class Modes(NamedTuple):
     dual: np.ndarray        # (n d, k)  H u: what measures their part in an error
 
 
-def modes(H, index, **choices):
-    """`Modes` of a V-cycle on a matrix H whose rows of held directions are zero."""
+def cycle_modes(H, index, **choices):
+    """Return the `CycleModes` of a V-cycle on a matrix H whose rows of held directions are zero."""
     n, d = index.shape
     free = np.flatnonzero(H.diagonal() > 0.0)
     A = H.toarray()[np.ix_(free, free)]
@@ -46,54 +46,57 @@ def modes(H, index, **choices):
     u, dual = np.zeros((2, n * d, len(free)))
     u[free] = solve_triangular(L.T, V, lower=False)
     dual[free] = L @ V
-    return Modes(share, u, dual)
+    return CycleModes(share, u, dual)
 
 
-def part(found, which, e):
-    """What of an error e (n, d) belongs to some modes (n, d), and its share of the energy."""
-    c = found.dual.T @ e.reshape(-1)
-    return (found.u[:, which] @ c[which]).reshape(e.shape), float(c[which] @ c[which] / (c @ c))
+def modal_part(modes, chosen, e):
+    """Return the part (n, d) of an error e (n, d) in chosen modes, and its share of the energy."""
+    c = modes.dual.T @ e.reshape(-1)
+    return (modes.u[:, chosen] @ c[chosen]).reshape(e.shape), float(c[chosen] @ c[chosen] / (c @ c))
 
 
-def on_light(found, which, m, d):
-    """Smallest share of |u|^2 that modes have on light nodes."""
+def light_share(modes, chosen, m, d):
+    """Return the smallest share of |u|^2 that chosen modes have on light nodes."""
     light = np.repeat(m < LIGHT * np.median(m), d)
-    squares = found.u[:, which] ** 2
+    squares = modes.u[:, chosen] ** 2
     return float((squares[light].sum(axis=0) / squares.sum(axis=0)).min())
 
 
 @experiment("hot.light_nodes", title="What HOT's multigrid is slow at: nodes at the rim of matter",
             profiles=("standard",), budget={"standard": 120})
 def light_nodes(run):
-    """Counts slow modes, says where they live, and what of HOT's error they are."""
-    step: Step = after(bar(DX, E, "pn-mgpcg", STEPS, eps=1e-9), STEPS)
-    exact = solved(step, "pn-mgpcg", eps=EXACT, flexible=True)
+    """Record the number of slow modes, their place, and their part in HOT's error."""
+    step: ImplicitStep = step_after(bar(DX, E, "pn-mgpcg", STEPS, eps=1e-9), STEPS)
+    exact = solve_step(step, "pn-mgpcg", eps=EXACT, flexible=True)
     system, m = step.stepper.system(step.pose), step.pose.unknowns.m
     H, d = system.matrix(exact.dv), system.index.shape[1]
-    scale = f"{sum(len(b.id) for b in step.bodies)} particles, {len(m)} nodes, middle {E:.0e} Pa"
+    scale = f"{step.particles} particles, {len(m)} nodes, middle {E:.0e} Pa"
     rows = []
     for sweeps in (1, 2):
-        found = modes(H, system.index, sweeps=sweeps)
-        slow = found.share < SLOW
+        modes = cycle_modes(H, system.index, sweeps=sweeps)
+        slow = modes.share < SLOW
         run.record(f"hot.light_nodes.sweeps{sweeps}.slow", int(slow.sum()), comparator="info",
                    scale=scale, note=f"modes of {len(slow)} of which a cycle removes less than "
-                   f"{SLOW:g}; {int((found.share < 0.5).sum())} less than a half")
-        run.record(f"hot.light_nodes.sweeps{sweeps}.light", on_light(found, slow, m, d),
+                   f"{SLOW:g}; {int((modes.share < 0.5).sum())} less than a half")
+        run.record(f"hot.light_nodes.sweeps{sweeps}.light", light_share(modes, slow, m, d),
                    comparator="info", scale=scale, note="smallest share of a slow mode's squared "
                    f"velocities on nodes below {LIGHT:g} of the median mass")
-        rows += [(sweeps, k, s) for k, s in enumerate(found.share)]
-    record_error(run, (step, exact.dv), modes(H, system.index), scale)
+        rows += [(sweeps, k, s) for k, s in enumerate(modes.share)]
+    record_error(run, (step, exact.dv), cycle_modes(H, system.index), scale)
     run.table("shares", ("sweeps", "mode", "share"), rows)
 
 
-def record_error(run, against, found, scale):
-    """The slow modes' part of what HOT leaves at the paper's tolerance and at a hundredth of it."""
-    step, exact = against
+def record_error(run, reference, modes, scale):
+    """Record the slow modes' part of HOT's error at the paper's tolerance and a hundredth of it.
+
+    reference: the step and its exact increment.
+    """
+    step, exact = reference
     for eps in (PAPER, PAPER / 100.0):
-        dv = solved(step, "hot", eps=eps).dv
-        own, energy = part(found, found.share < SLOW, dv - exact)
-        whole, felt = (difference(step, exact + e, exact)[0] for e in (dv - exact, own))
+        dv = solve_step(step, "hot", eps=eps).dv
+        part, energy = modal_part(modes, modes.share < SLOW, dv - exact)
+        total, felt = (difference(step, exact + e, exact)[0] for e in (dv - exact, part))
         run.record(f"hot.light_nodes.error.eps{eps:.0e}".replace("e-0", "e-"), energy,
                    comparator="info", scale=scale, note="slow modes' share of the error's energy; "
-                   f"particles feel {felt:.1e} of it, of {whole:.1e} in all, relative to their "
+                   f"particles feel {felt:.1e} of it, of {total:.1e} in all, relative to their "
                    "velocity increment")

@@ -1,22 +1,28 @@
-"""The linear system of one implicit step, frozen where the step starts, for linear solvers alone.
+"""The linear system of one implicit step, frozen where the step starts, and CG that measures it.
 
-Wholly held nodes are taken out: solvers that know nothing of conditions could not bear their rows
-of zeros. Nodes held in part, by slip planes, are refused.
+Nodes that are held in all directions are removed: solvers without conditions could not bear their
+rows of zeros. Nodes held in some directions, by slip planes, are refused.
+
+The stop of `krylov.pcg` is in the norm of the preconditioner: two preconditioners would stop at
+different errors. Here it is sqrt(r.D^-1 r) <= reduction sqrt(b.D^-1 b), D the diagonal blocks.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.linalg import eigvalsh_tridiagonal
 
 from mpm_ref.hot.multigrid.projectors import diagonal_blocks, inverses, onto_range
+from mpm_ref.hot.multigrid.smoothers import times
+from mpm_ref.hot.norms import dot
 
-from .one_step import after
+from .one_step import step_after
 from .stiffness import bar
 
 
-class Frozen(NamedTuple):
-    """H u = b, of n nodes that are free."""
+class FrozenSystem(NamedTuple):
+    """The system H u = b of n nodes that are free."""
 
     A: sp.bsr_array         # (n d, n d)  projected Hessian [kg]
     index: np.ndarray       # (n, d)      world indices
@@ -27,15 +33,24 @@ class Frozen(NamedTuple):
 
 
 def twisted(dx, E, steps):
-    """`Frozen` at the start of a step of the twisted bar, after so many steps by HOT."""
-    step = after(bar(dx, E, "hot", steps), steps)
+    """Return the `FrozenSystem` of a step of the twisted bar, after a number of steps by HOT."""
+    return frozen(*linearized(step_after(bar(dx, E, "hot", steps), steps)))
+
+
+def linearized(step):
+    """Return the Hessian, the world indices, minus the gradient and the number of particles.
+
+    They are those of an `ImplicitStep` at its start.
+    """
     system = step.stepper.system(step.pose)
     A, (_, g) = system.matrix(system.start), system.evaluate(system.start)
-    return frozen(A, system.index, -g, sum(len(body.id) for body in step.bodies))
+    return A, system.index, -g, step.particles
 
 
 def frozen(A, index, b, particles):
-    """`Frozen` of the free nodes among those with world indices index (n, d).
+    """Return the `FrozenSystem` of the free nodes of a matrix A, a right-hand side b (n, d).
+
+    index (n, d): world indices of all nodes; particles: number of particles.
 
     Raises ValueError for a node that is free in some directions only.
     """
@@ -48,11 +63,11 @@ def frozen(A, index, b, particles):
     A = sp.bsr_array(sp.csr_array(A)[rows][:, rows], blocksize=(d, d))
     A.sort_indices()
     D = diagonal_blocks(A)
-    return Frozen(A, index[free], b[free], D, inverses(D, onto_range(D)), particles)
+    return FrozenSystem(A, index[free], b[free], D, inverses(D, onto_range(D)), particles)
 
 
 def rigid_modes(index):
-    """Translations and rotations (n d, d (d + 1) / 2) of nodes with indices index (n, d)."""
+    """Return translations and rotations (n d, d (d + 1) / 2) of nodes of indices (n, d)."""
     n, d = index.shape
     x = index - index.mean(axis=0)
     modes = [np.tile(e, (n, 1)) for e in np.eye(d)]
@@ -62,3 +77,67 @@ def rigid_modes(index):
             spin[:, a], spin[:, b] = x[:, b], -x[:, a]
             modes.append(spin)
     return np.stack([mode.reshape(-1) for mode in modes], axis=1)
+
+
+class CGLimits(NamedTuple):
+    """The limits at which CG stops."""
+
+    reduction: float = 1e-6
+    cap: int = 1000             # iterations
+
+
+class CGHistory(NamedTuple):
+    """A solve; steps and ratios are the coefficients alpha and beta of its iterations."""
+
+    x: np.ndarray
+    converged: bool
+    steps: list
+    ratios: list
+
+    @property
+    def iterations(self):
+        """Return the number of iterations: products with the matrix."""
+        return len(self.steps)
+
+
+def cg(system, inverse, limits, flexible=False):
+    """Return the `CGHistory` of CG on a `FrozenSystem` from zero.
+
+    inverse: the preconditioner, r (n, d) -> (n, d). `flexible` bears one that varies. Lost
+    positivity ends the solve unconverged.
+    """
+    A, b, D_inv = system.A, system.b, system.D_inv
+    x, r, z = np.zeros_like(b), b.copy(), inverse(b)
+    p, rz, steps, ratios = z.copy(), dot(r, z), [], []
+    goal = limits.reduction**2 * dot(r, times(D_inv, r))
+    while (left := dot(r, times(D_inv, r))) > goal and len(steps) < limits.cap:
+        Ap = (A @ p.reshape(-1)).reshape(p.shape)
+        curvature = dot(p, Ap)
+        if not (rz > 0.0 and curvature > 0.0):
+            break
+        steps.append(rz / curvature)
+        x += steps[-1] * p
+        old, r = r, r - steps[-1] * Ap
+        z = inverse(r)
+        mixed = dot(old, z) if flexible else 0.0
+        ratios.append((dot(r, z) - mixed) / rz)
+        rz, p = dot(r, z), z + ratios[-1] * p
+    return CGHistory(x, left <= goal, steps, ratios)
+
+
+def spectrum(history):
+    """Return the smallest and the largest Ritz value of M A, from CG with M.
+
+    They lie between the extreme eigenvalues, and come near them before CG converges.
+    """
+    alpha, beta = np.array(history.steps), np.array(history.ratios[:-1])
+    diagonal = 1.0 / alpha
+    diagonal[1:] += beta / alpha[:-1]
+    values = eigvalsh_tridiagonal(diagonal, np.sqrt(beta) / alpha[:-1])
+    return float(values[0]), float(values[-1])
+
+
+def convergence_factor(history):
+    """Return the spectral radius of I - M A, the factor per cycle of M alone, by `spectrum`."""
+    low, high = spectrum(history)
+    return max(1.0 - low, high - 1.0)

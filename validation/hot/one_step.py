@@ -1,4 +1,4 @@
-"""One implicit step from a state that is given, solved in many ways: what each found and took."""
+"""One implicit step from a given state, solved by many methods, and the errors they leave."""
 
 from typing import NamedTuple
 
@@ -10,8 +10,10 @@ from mpm_ref.hot.step import write_velocities
 from mpm_ref.scene import build
 from mpm_ref.simulate import simulate
 
+from ..common.scenes import particle_count
 
-class Step(NamedTuple):
+
+class ImplicitStep(NamedTuple):
     """A state and the pose of its next step."""
 
     bodies: tuple
@@ -20,25 +22,38 @@ class Step(NamedTuple):
     dt: float
     t: float            # at its start [s]
 
+    @property
+    def particles(self):
+        """Return the number of particles."""
+        return particle_count(self.bodies)
 
-def after(scene, steps, **solver):
-    """`Step` of a scene after so many steps, which are solved as the scene says."""
+
+def step_after(scene, steps, **solver):
+    """Return the `ImplicitStep` after a number of steps of a scene, by the scene's own solver.
+
+    Raises ValueError if the scene ends earlier.
+    """
     problem = build(scene)
     frames = list(simulate(problem))
     state, dt = frames[-1].state, frames[-1].dt
     if state.step != steps:
-        raise ValueError(f"the scene made {state.step} steps: expected {steps}")
-    stepper = problem.stepper()
-    return Step(state.bodies, stepper, stepper.problem(state.bodies, state.t, dt), dt, state.t)
+        raise ValueError(f"the scene ended after {state.step} steps: expected {steps}")
+    return implicit_step(problem.stepper(), state, dt)
 
 
-def solved(step, method, **changes):
-    """`Solution` of the step by a method."""
+def implicit_step(stepper, state, dt):
+    """Return the `ImplicitStep` of length dt [s] that a stepper makes from a state."""
+    pose = stepper.problem(state.bodies, state.t, dt)
+    return ImplicitStep(state.bodies, stepper, pose, dt, state.t)
+
+
+def solve_step(step, method, **changes):
+    """Return the `Solution` of the step by a method."""
     return minimise(step.stepper.system(step.pose), method, **changes)
 
 
 def particle_velocities(step, dv):
-    """Velocities of all particles after the step with the increment dv, and their masses."""
+    """Return the velocities of all particles after the step by the increment dv, and the masses."""
     grid, q = step.pose.grid, step.pose.unknowns
     grid = grid._replace(v=grid.v.copy())
     write_velocities(grid, q, q.v + dv)
@@ -51,8 +66,8 @@ def particle_velocities(step, dv):
     return np.concatenate(v), np.concatenate(m)
 
 
-class Errors(NamedTuple):
-    """What an increment leaves in the particles, root mean squares being over their mass."""
+class ParticleErrors(NamedTuple):
+    """The particles' errors by an increment; root mean squares are over their mass."""
 
     velocity: float         # rms, over the rms increment of the velocity
     velocity_max: float     # largest of a particle, over the same
@@ -60,26 +75,28 @@ class Errors(NamedTuple):
     cells_max: float        # largest of a particle [dx]
 
 
-def errors(step, dv, exact):
-    """`Errors` of an increment dv (n, d) [m/s] beside the exact one."""
+def particle_errors(step, dv, exact):
+    """Return the `ParticleErrors` of an increment dv (n, d) [m/s], given the exact one."""
     v, m = particle_velocities(step, dv)
     u, _ = particle_velocities(step, exact)
     v0, _ = particle_velocities(step, np.zeros_like(dv))
     rms, most = _spread(v - u, m)
     length, _ = _spread(u - v0, m)
     cells = step.dt / step.pose.grid.dx
-    return Errors(rms / length, most / length, rms * cells, most * cells)
+    return ParticleErrors(rms / length, most / length, rms * cells, most * cells)
 
 
 def _spread(v, m):
-    """Root mean square over mass, and largest, of the lengths of v (N, d)."""
+    """Return the root mean square over mass, and the largest, of the lengths of v (N, d)."""
     squares = np.sum(v**2, axis=1)
     return float(np.sqrt(m @ squares / m.sum())), float(np.sqrt(squares.max()))
 
 
 def difference(step, dv, exact):
-    """Root mean square over the particles' mass of the error of their velocity increment, relative
-    to that of the increment; and the largest error of their displacement in cells.
+    """Return the relative error of the particles' velocity increment, and that in cells.
+
+    The first is a root mean square over the particles' mass, over that of the increment; the second
+    the largest error of a displacement in cells.
     """
-    found = errors(step, dv, exact)
-    return found.velocity, found.cells_max
+    errors = particle_errors(step, dv, exact)
+    return errors.velocity, errors.cells_max

@@ -1,4 +1,4 @@
-"""Figures 15 and 11: what every method takes for the same steps of every scene, over HOT's time.
+"""Figures 15 and 11: the time of every method for the same steps of every scene, over HOT's.
 
 All methods solve a step from the same state, then HOT's step is taken: methods left to themselves
 would soon solve different problems. The paper's numbers are of whole runs at ten and more times the
@@ -9,9 +9,10 @@ from typing import NamedTuple
 
 from ..common import targets
 from ..common.registry import experiment
-from .one_step import after, solved
+from ..common.scenes import particle_count
+from .one_step import solve_step, step_after
 from .stiffness import bar
-from .warm_states import BEGUN, PRINTED, QUICK, begun, particles, steps
+from .warm_states import PRINTED, QUICK, START_TIMES, following_steps, warm_state
 
 METHODS = ("hot", "hot-quadratic", "lbfgs-h", "pn-pcg", "pn-pcg-mf", "pn-mgpcg", "lbfgs-gmg",
            "gast15")
@@ -24,8 +25,8 @@ STIFF, GOAL = 1e9, 15.0     # [Pa], and what a prototype of ours gained there ov
                             # paper's number
 
 
-class Cost(NamedTuple):
-    """What one step took by one method."""
+class MethodCost(NamedTuple):
+    """The work of one step by one method."""
 
     scene: str
     method: str
@@ -48,7 +49,7 @@ class Overview(NamedTuple):
     nodes: int
     steps: int
     total: float        # CPU time over HOT's
-    worst: float        # the same of the step where it is largest
+    worst: float        # CPU time over HOT's of the step where it is largest
     cpu: float          # [s] per step
     iterations: float   # per step
     inner: float        # per step
@@ -56,81 +57,82 @@ class Overview(NamedTuple):
 
 
 def costs(step, about, methods, caps):
-    """`Cost` of each method for a `Step`; about: its scene, number and time; caps: options that
-    bound the work of Gast15, whose CG on stiff scenes would take minutes.
+    """Return the `MethodCost` of each method for an `ImplicitStep`.
+
+    about: its scene, number and time; caps: options that bound the work of Gast15, whose CG on
+    stiff scenes would take minutes.
     """
-    found = []
+    measured = []
     for method in methods:
-        report = solved(step, method, **options(method, caps)).report
-        found.append(Cost(about[0], method, *about[1:], sum(report.seconds.values()),
-                          report.iterations, report.cg_iterations, report.coarse_iterations,
-                          report.evaluations,
-                          report.converged))
-    return found
+        report = solve_step(step, method, **options(method, caps)).report
+        measured.append(MethodCost(
+            about[0], method, *about[1:], sum(report.seconds.values()), report.iterations,
+            report.cg_iterations, report.coarse_iterations, report.evaluations, report.converged))
+    return measured
 
 
 def options(method, caps):
-    """Changes of a method's options: Gast15 has a tolerance of its own, and caps."""
+    """Return changes of a method's options: Gast15 has a tolerance of its own, and caps."""
     if method != "gast15":
         return {}
     return {"eps": targets.load()["hot.sec7_1.gast_tol"].value, **caps}
 
 
-def of_scene(name, profile, count, caps):
-    """([`Cost`], [`Overview`]) of the next so many steps of a scene."""
-    problem, state = begun(name, profile)
+def scene_costs(name, profile, count, caps):
+    """Return ([`MethodCost`], [`Overview`]) of the next `count` steps of a scene."""
+    problem, state = warm_state(name, profile)
     rows = []
-    for k, step in enumerate(steps(problem, state, count)):
+    for k, step in enumerate(following_steps(problem, state, count)):
         rows += costs(step, (name, k, state.t), METHODS, caps)
     n = len(step.pose.unknowns.m)
-    return rows, [overview(rows, method, particles(problem), n) for method in METHODS]
+    return rows, [overview(rows, method, particle_count(problem.bodies), n) for method in METHODS]
 
 
 def overview(rows, method, count, nodes):
-    """`Overview` of the rows of one scene."""
-    own, hot = ([r for r in rows if r.method == word] for word in (method, "hot"))
-    ratios = [a.cpu / b.cpu for a, b in zip(own, hot, strict=True)]
-    cpu, n = sum(r.cpu for r in own), len(own)
-    return Overview(own[0].scene, method, count, nodes, n, cpu / sum(r.cpu for r in hot),
-                    max(ratios), cpu / n, sum(r.iterations for r in own) / n,
-                    sum(r.inner for r in own) / n, sum(not r.converged for r in own))
+    """Return the `Overview` of the rows of one scene."""
+    ours, hot = ([r for r in rows if r.method == word] for word in (method, "hot"))
+    ratios = [a.cpu / b.cpu for a, b in zip(ours, hot, strict=True)]
+    cpu, n = sum(r.cpu for r in ours), len(ours)
+    return Overview(ours[0].scene, method, count, nodes, n, cpu / sum(r.cpu for r in hot),
+                    max(ratios), cpu / n, sum(r.iterations for r in ours) / n,
+                    sum(r.inner for r in ours) / n, sum(not r.converged for r in ours))
 
 
-def compiled(methods):
-    """Compile what the methods need, on a small step cut short."""
-    problem, state = begun("faceless", "quick")
-    for step in steps(problem, state, 1):
+def compile_methods(methods):
+    """Compile the kernels of the methods, on a small step cut short."""
+    problem, state = warm_state("faceless", "quick")
+    for step in following_steps(problem, state, 1):
         for method in methods:
-            solved(step, method, max_iterations=2)
+            solve_step(step, method, max_iterations=2)
 
 
 @experiment("hot.fig15", title="Speed-up overview: every method on every scene, over HOT's time",
             profiles=("quick", "standard", "paper"),
             budget={"quick": 15, "standard": 750, "paper": 36000})
 def speedups(run):
-    """Total and worst-step time of all methods on all scenes, beside the printed ranges."""
+    """Record total and worst-step time of all methods on all scenes, and the printed ranges."""
     names, count = run.choose(quick=(QUICK, 1), standard=(PRINTED, 3), paper=(PRINTED, 3))
     caps = run.choose(quick={"max_iterations": 15, "max_cg_iterations": 300},
                       standard={"max_iterations": 30, "max_cg_iterations": 1000}, paper={})
-    compiled(METHODS)
+    compile_methods(METHODS)
     rows, table = [], {}
     for name in run.progress(names, "scenes"):
-        of_steps, of_methods = of_scene(name, run.profile, count, caps)
-        rows += of_steps
-        table[name] = {o.method: o for o in of_methods}
-        for o in of_methods:
+        step_costs, overviews = scene_costs(name, run.profile, count, caps)
+        rows += step_costs
+        table[name] = {o.method: o for o in overviews}
+        for o in overviews:
             record_overview(run, o)
     record_ranges(run, table)
     record_claims(run, table)
     record_stiff(run)
-    run.table("steps", Cost._fields, rows)
+    run.table("steps", MethodCost._fields, rows)
     run.table("speedups", Overview._fields, [o for row in table.values() for o in row.values()])
 
 
 def record_overview(run, o):
-    """Total and worst time of one method on one scene."""
+    """Record the total and the worst time of one method on one scene."""
     scale = (f"{o.particles} particles, {o.nodes} nodes; {o.steps} steps from "
-             f"{BEGUN[o.scene]:g} s on")
+             f"{START_TIMES[o.scene]:g} s on")
     cut = f"; {o.capped} steps not converged: at least" if o.capped else ""
     run.record(f"hot.fig15.{o.scene}.{o.method}.total", o.total, comparator="info", scale=scale,
                note=f"CPU time over HOT's; {o.cpu:.3f} s, {o.iterations:.1f} iterations, "
@@ -138,8 +140,9 @@ def record_overview(run, o):
 
 
 def record_ranges(run, table):
-    """Smallest and largest total speed-up over each method of the ablation, beside the printed
-    range; judged only where all scenes were run.
+    """Record the smallest and largest total speed-up over each method of the ablation.
+
+    They are judged only where all scenes were run.
     """
     rule = {} if set(table) == set(PRINTED) else {"comparator": "info"}
     hard = [name for name in table if name not in EASY]
@@ -147,30 +150,30 @@ def record_ranges(run, table):
         totals = {name: row[method].total for name, row in table.items()}
         least, most = min(totals, key=totals.get), max(totals, key=totals.get)
         name = "hot.sec7_2.speedup." + method.replace("-", "_")
-        run.record(f"{name}.min", min(totals[n] for n in hard), **rule, scale=in_words(table),
+        run.record(f"{name}.min", min(totals[n] for n in hard), **rule, scale=size_text(table),
                    note="the text excepts Sauce and the soft ArmaCat, so does this; of all it is "
                    f"{totals[least]:.2f} ({least})")
-        run.record(f"{name}.max", totals[most], **rule, scale=in_words(table), note=most)
+        run.record(f"{name}.max", totals[most], **rule, scale=size_text(table), note=most)
     best = max(max(row[m].total for m in ABLATION) for row in table.values())
-    run.record("hot.abstract.speedup", best, **rule, scale=in_words(table),
+    run.record("hot.abstract.speedup", best, **rule, scale=size_text(table),
                note="largest total speed-up over the methods of section 7.2")
     first = sum(all(row[m].total > 1.0 for m in ABLATION) for row in table.values())
-    run.record("hot.fig15.fastest", first, comparator="info", scale=in_words(table),
+    run.record("hot.fig15.fastest", first, comparator="info", scale=size_text(table),
                note=f"scenes, of {len(table)}, where HOT is faster than all methods of section "
                "7.2; the text: all but two")
 
 
 def record_claims(run, table):
-    """What the text says of single scenes."""
+    """Record the claims of the text on single scenes."""
     gmg = {name: table[name]["lbfgs-gmg"].total for name in SLOW_GMG}
-    run.record("hot.sec7_3.lbfgs_gmg_soft", min(gmg.values()), scale=in_words(table),
+    run.record("hot.sec7_3.lbfgs_gmg_soft", min(gmg.values()), scale=size_text(table),
                note=", ".join(f"{name} {total:.2f}" for name, total in gmg.items()))
     if "twist" in table:
         record_twist(run, [table["twist"][method] for method in (*ABLATION, "gast15")])
 
 
 def record_twist(run, others):
-    """Figure 1: over all other codes the least total gain, and the largest one in a step.
+    """Record Figure 1: over all other codes the least total gain, and the largest in a step.
 
     Where a step of the slowest was cut short, the largest is a bound from below and not judged.
     """
@@ -185,22 +188,22 @@ def record_twist(run, others):
 
 
 def record_stiff(run):
-    """Gast15 over HOT in the bar of Figure 20 with a stiff middle."""
+    """Record Gast15 over HOT in the bar of Figure 20 with a stiff middle."""
     count = 3
     dx = run.choose(quick=0.03, standard=0.02, paper=0.0075)
-    step = after(bar(dx, STIFF, "hot", count), count)
-    gast, hot = (solved(step, method, **options(method, {"max_iterations": 200})).report
+    step = step_after(bar(dx, STIFF, "hot", count), count)
+    gast, hot = (solve_step(step, method, **options(method, {"max_iterations": 200})).report
                  for method in ("gast15", "hot"))
-    size = sum(len(body.id) for body in step.bodies)
     run.record("hot.fig15.bar.gast15", sum(gast.seconds.values()) / sum(hot.seconds.values()),
-               comparator=">=", bound=GOAL, scale=f"{size} particles, middle {STIFF:.0e} Pa",
+               comparator=">=", bound=GOAL,
+               scale=f"{step.particles} particles, middle {STIFF:.0e} Pa",
                note=f"CPU time of Gast15 over HOT's; {gast.iterations} and {hot.iterations} "
                f"iterations, {gast.cg_iterations} of CG; Gast15: {gast.message}. No printed "
                "number: the goal is what a prototype gained with more particles")
 
 
-def in_words(table):
-    """How many scenes, and at which sizes."""
+def size_text(table):
+    """Return the number of scenes and their sizes as text."""
     sizes = [row["hot"].particles for row in table.values()]
     return f"{len(table)} of {len(PRINTED)} scenes, {min(sizes)} to {max(sizes)} particles"
 
@@ -209,22 +212,23 @@ def in_words(table):
             profiles=("quick", "standard", "paper"),
             budget={"quick": 6, "standard": 300, "paper": 3600})
 def faceless(run):
-    """Consecutive steps of one scene by three methods, from the same states."""
-    since, count = run.choose(quick=(BEGUN["faceless"], 10), standard=(0.0, PULLED),
+    """Record consecutive steps of one scene by three methods, from the same states."""
+    since, count = run.choose(quick=(START_TIMES["faceless"], 10), standard=(0.0, PULLED),
                               paper=(0.0, PULLED))
-    problem, state = begun("faceless", run.profile, since)
-    compiled(FACELESS)
+    problem, state = warm_state("faceless", run.profile, since)
+    compile_methods(FACELESS)
     rows = []
-    for k, step in run.progress(enumerate(steps(problem, state, count)), "steps"):
+    for k, step in run.progress(enumerate(following_steps(problem, state, count)), "steps"):
         rows += costs(step, ("faceless", k, state.t), FACELESS, {})
-    scale = f"{particles(problem)} particles (the paper: 110 000), {count} steps from {since:g} s"
-    found = [overview(rows, method, particles(problem), 0) for method in FACELESS[1:]]
-    said = ", ".join(f"{o.method} {o.total:.2f}, worst step {o.worst:.2f}" for o in found)
-    run.record("hot.sec7_2.faceless.avg_speedup", min(o.total for o in found), scale=scale,
-               note=f"the smaller one over both: {said}")
-    run.record("hot.sec7_2.faceless.max_frame_speedup", max(o.worst for o in found), scale=scale,
-               note=f"the larger one over both: {said}")
+    size = particle_count(problem.bodies)
+    scale = f"{size} particles (the paper: 110 000), {count} steps from {since:g} s"
+    overviews = [overview(rows, method, size, 0) for method in FACELESS[1:]]
+    totals = ", ".join(f"{o.method} {o.total:.2f}, worst step {o.worst:.2f}" for o in overviews)
+    run.record("hot.sec7_2.faceless.avg_speedup", min(o.total for o in overviews), scale=scale,
+               note=f"the smaller one over both: {totals}")
+    run.record("hot.sec7_2.faceless.max_frame_speedup", max(o.worst for o in overviews),
+               scale=scale, note=f"the larger one over both: {totals}")
     ahead = sum(min(rows[k + 1].cpu, rows[k + 2].cpu) > rows[k].cpu for k in range(0, len(rows), 3))
     run.record("hot.fig11.ahead", ahead / count, comparator="info", scale=scale,
                note="share of the steps in which HOT is the fastest; the text: almost every frame")
-    run.table("steps", Cost._fields, rows)
+    run.table("steps", MethodCost._fields, rows)

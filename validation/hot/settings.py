@@ -1,9 +1,9 @@
 """Settings that HOT prints, as the scenes and the methods here carry them.
 
 The spacings and numbers of particles of Table 2 are those of the scenes at the paper's size (see
-`sizes`). Not compared are the soft tissue of the wheel, which even the release leaves out, and the
-sauce's number of particles, which a source pours. Of the materials of Table 1, scenes name metal
-alone.
+`sizes`). The soft tissue of the wheel, which even the release leaves out, is not compared, nor is
+the sauce's number of particles, which a source pours. Of the materials of Table 1, scenes name
+metal alone.
 """
 
 from math import log10
@@ -22,7 +22,7 @@ from ..common import targets
 from ..common.registry import experiment
 from ..common.scenes import SCENES
 from ..common.settings import record_settings
-from . import stiffness, stretched, warm_states
+from . import stiffness, stretched_box, warm_states
 from .sizes import sized
 
 PARTS = {       # the bodies that are parts 0, 1, .. of Table 2
@@ -46,7 +46,7 @@ STAND_INS = 0.07    # of particles: bodies that stand for meshes have not quite 
 @experiment("hot.settings", title="Settings of HOT's scenes and methods",
             profiles=("quick", "standard"), budget={"quick": 2, "standard": 2})
 def settings(run):
-    """Materials of Tables 1 and 2, sizes, the time step's rules, and the solver's constants."""
+    """Record materials of Tables 1 and 2, sizes, rules of the time step, and solver constants."""
     for name in PARTS:
         record_settings(run, f"hot_{name}", materials(name), hot_table2_sauce_youngs_0=ROUNDED)
     for name, values in SINGLE.items():
@@ -68,46 +68,46 @@ def settings(run):
 
 
 def scene(name):
-    """The shipped scene of that name."""
+    """Return the scene of the catalogue with a name."""
     return load(SCENES / f"hot_{name}.toml")
 
 
 def bodies(name):
-    """Bodies of a scene by name."""
+    """Return the bodies of a scene by name."""
     return {body.name: body for body in scene(name).body}
 
 
 def materials(name):
-    """{target: value} of what Table 2 prints of each part's material (HOT-X1, HOT-X3, HOT-X4)."""
-    printed, values, there = targets.load(), {}, bodies(name)
+    """Return {target: value} of the materials in Table 2, by part (HOT-X1, HOT-X3, HOT-X4)."""
+    printed, values, by_name = targets.load(), {}, bodies(name)
     for k, body in enumerate(PARTS[name]):
         if body is not None:
-            values |= part(f"hot.table2.{name}", k, there[body])
+            values |= part(f"hot.table2.{name}", k, by_name[body])
     return {target: value for target, value in values.items() if target in printed}
 
 
 def part(table, k, body):
-    """Density, Young's modulus and Poisson's ratio of part k; nu is not printed for all of them."""
+    """Return density, Young's modulus and Poisson's ratio of part k; nu is not always printed."""
     return {f"{table}.density.{k}": body.density, f"{table}.youngs.{k}": body.material.E,
             f"{table}.poisson.{k}": body.material.nu}
 
 
-def boards(there):
-    """Table 2 prints ranges of moduli; the flow is that of the grains."""
-    flow = there["grains"].material.flow
-    moduli = [body.material.E for body in there.values()]
-    return {"hot.table2.boards.density.0": there["upper board"].density,
+def boards(by_name):
+    """Return the values of Boards: Table 2 prints ranges of moduli and the flow of the grains."""
+    flow = by_name["grains"].material.flow
+    moduli = [body.material.E for body in by_name.values()]
+    return {"hot.table2.boards.density.0": by_name["upper board"].density,
             "hot.table2.boards.youngs.0": min(moduli), "hot.table2.boards.youngs.1": max(moduli),
-            "hot.table2.boards.poisson.0": there["upper board"].material.nu,
+            "hot.table2.boards.poisson.0": by_name["upper board"].material.nu,
             "hot.table2.boards.clamp_min": flow.s_min, "hot.table2.boards.clamp_max": flow.s_max}
 
 
-def sheets(there):
-    """Figure 2: moduli relative to that of aluminium, and its yield stress."""
-    E = {name: body.material.E for name, body in there.items()}
+def sheets(by_name):
+    """Return the values of Figure 2: moduli relative to that of aluminium, and its yield stress."""
+    E = {name: body.material.E for name, body in by_name.items()}
     names = {10: "a tenth", 100: "a hundredth", 1000: "a thousandth"}
     values = {f"hot.fig2.divisor.{n}": E["aluminium"] / E[name] for n, name in names.items()}
-    return values | {"hot.fig2.aluminium_yield": there["aluminium"].material.flow.sigma_y}
+    return values | {"hot.fig2.aluminium_yield": by_name["aluminium"].material.flow.sigma_y}
 
 
 SINGLE = {
@@ -128,30 +128,31 @@ CLOCKS = {      # HOT-dt
 }
 
 
-def cells(made):
-    """Cells that the fastest particle of a scene goes in the longest step within its bound, thrown
-    by 1 m/s where there is no gravity (HOT-cfl).
+def cells(scene):
+    """Return the cells crossed by the fastest particle of a scene in its longest step (HOT-cfl).
+
+    Its particles get 1 m/s, without gravity.
     """
-    particles = build(made).bodies[0].particles
-    particles.v[:] = np.eye(made.dim)[0]
-    return advective(particles, made.dx, 0.0, np.zeros(made.dim)) / made.dx
+    particles = build(scene).bodies[0].particles
+    particles.v[:] = np.eye(scene.dim)[0]
+    return advective(particles, scene.dx, 0.0, np.zeros(scene.dim)) / scene.dx
 
 
 def variants():
-    """Modulus of the soft cat, as section 7.2 and the caption of Figure 15 give it."""
+    """Return the modulus of the soft cat, as section 7.2 and the caption of Figure 15 give it."""
     cat, = (body for body in warm_states.scene("armacat_soft", "quick").body if body.name == "cat")
     return dict.fromkeys(("hot.table2.armacat.youngs.cat_soft", "hot.sec7_2.armacat_youngs"),
                          cat.material.E)
 
 
 def sweep():
-    """Figure 20: moduli of the bar's middle (HOT-X17), and how many methods solve it."""
+    """Return Figure 20's moduli of the bar's middle (HOT-X17) and its number of methods."""
     moduli = {f"hot.sec7_4.middle.1e{round(log10(E))}": E for E in stiffness.SWEEP}
     return moduli | {"hot.sec7_4.methods": len(stiffness.METHODS)}
 
 
 def solver():
-    """Constants of the methods without options (HOT-X5, HOT-X11)."""
+    """Return the constants of the methods without options (HOT-X5, HOT-X11)."""
     hot = METHODS["hot"]
     return {
         "hot.sec7_1.eps": hot.eps, "hot.sec7_1.levels": hot.levels,
@@ -164,7 +165,7 @@ def solver():
 
 
 def sparsity():
-    """Bases of the most blocks in a row of the finest matrix and of a restriction (HOT-nnz)."""
+    """Return the bases of the most blocks in a row of matrix and restriction (HOT-nnz)."""
     n, d = 9, 3
     embedding = embed(np.indices((n,) * d).reshape(d, -1).T)
     rows = {"fine": pattern_of(np.arange(n**d).reshape((n,) * d), 2).indptr,
@@ -174,27 +175,27 @@ def sparsity():
 
 
 def stretches():
-    """Entries of the deformation gradient in Figure 18."""
-    return {"hot.fig18.stretch_min": stretched.LOW, "hot.fig18.stretch_max": stretched.HIGH}
+    """Return the bounds of the deformation gradient in Figure 18."""
+    return {"hot.fig18.stretch_min": stretched_box.LOW, "hot.fig18.stretch_max": stretched_box.HIGH}
 
 
 def record_size(run, name):
-    """Grid spacing and number of particles of Table 2, of a scene at the paper's size."""
-    made = sized(f"hot_{name}", "paper")
+    """Record grid spacing and particles of Table 2, of a scene at the paper's size."""
+    scene = sized(f"hot_{name}", "paper")
     scale = f"scenes/hot_{name}.toml at the paper's size"
-    run.record(f"hot.table2.{name}.dx", made.dx, tolerance=PRINTED_DX, scale=scale)
-    count = sum(body.sampling.count for body in made.body if body.name not in POURED)
+    run.record(f"hot.table2.{name}.dx", scene.dx, tolerance=PRINTED_DX, scale=scale)
+    count = sum(body.sampling.count for body in scene.body if body.name not in POURED)
     if count:
         run.record(f"hot.table2.{name}.particles", count, tolerance=STAND_INS, scale=scale)
 
 
 def record_metals(run):
-    """Smallest and largest constants of the scenes' metals, in the ranges of Table 1 (HOT-X12)."""
-    found = [bodies(name)[body] for name, metals in METALS.items() for body in metals]
-    constants = {"density": [b.density for b in found], "youngs": [b.material.E for b in found],
-                 "poisson": [b.material.nu for b in found],
-                 "yield": [b.material.flow.sigma_y for b in found]}
-    scale = f"{len(found)} metal bodies of {', '.join(METALS)}"
+    """Record the least and greatest constants of metals, in the ranges of Table 1 (HOT-X12)."""
+    metal = [bodies(name)[body] for name, metals in METALS.items() for body in metals]
+    constants = {"density": [b.density for b in metal], "youngs": [b.material.E for b in metal],
+                 "poisson": [b.material.nu for b in metal],
+                 "yield": [b.material.flow.sigma_y for b in metal]}
+    scale = f"{len(metal)} metal bodies of {', '.join(METALS)}"
     for word, values in constants.items():
         run.record(f"hot.table1.metal.{word}_min", min(values), comparator=">=", scale=scale)
         run.record(f"hot.table1.metal.{word}_max", max(values), comparator="<=", scale=scale)

@@ -1,11 +1,11 @@
-"""The scenes of HOT at three sizes: their grid spacings, and the particles that go with them."""
+"""The scenes of HOT at three sizes: their grid spacings and numbers of particles."""
 
 from typing import NamedTuple
 
 from ..common.scenes import catalogue_scene, with_
 
-FILL = 0.87         # of the release's particles per cell: what the numbers of Table 2 come to where
-                    # shapes are known (Chain 308 000, Boards 188 000), as for LDM-tab2-sampling
+FILL = 0.87         # of the release's particles per cell, by the numbers of Table 2 where shapes
+                    # are known (Chain 308 000, Boards 188 000), as for LDM-tab2-sampling
 
 
 class Size(NamedTuple):
@@ -32,7 +32,7 @@ SIZES = {
 
 
 def sized(name, profile, **changes):
-    """The scene ``scenes/<name>.toml`` at a size of `SIZES`, some other keys replaced.
+    """Return the scene ``scenes/<name>.toml`` at a size of `SIZES`, with other keys replaced.
 
     Each body keeps its particles per cell. Raises ValueError for an unknown name or profile, and
     where the paper prints no size.
@@ -47,6 +47,6 @@ def sized(name, profile, **changes):
     return with_(scene, dx=dx, body=tuple(_refined(body, finer) for body in scene.body))
 
 
-def _refined(body, finer):
-    """A body with so many times its particles."""
-    return with_(body, sampling=with_(body.sampling, count=round(body.sampling.count * finer)))
+def _refined(body, factor):
+    """Return a body with `factor` times its particles."""
+    return with_(body, sampling=with_(body.sampling, count=round(body.sampling.count * factor)))

@@ -7,7 +7,7 @@ from mpm_ref.scene import Limits, Solver, build
 from mpm_ref.simulate import simulate
 
 from ..common.registry import experiment
-from ..common.scenes import catalogue_scene, with_
+from ..common.scenes import catalogue_scene, particle_count, with_
 
 SCENE = "hot_stiffness"
 PER_CELL = 12
@@ -20,8 +20,8 @@ FLAT = 3.0      # growth of HOT's iterations over the sweep that still counts as
                 # prototype with few nodes saw 2.5, the authors' code 1.2 with more
 
 
-class Cost(NamedTuple):
-    """What a run of some steps took."""
+class StiffnessCost(NamedTuple):
+    """The work of a run of some steps."""
 
     method: str
     E: float            # of the middle [Pa]
@@ -33,9 +33,10 @@ class Cost(NamedTuple):
 
 
 def bar(dx, E, method, steps, **solver):
-    """The scene at another spacing and stiffness, solved by a method for some steps."""
-    scene = catalogue_scene(SCENE, dx=dx, integrator=method, steps=steps, end=None,
-                    unstable="allow", solver=Solver(**solver), limits=FIRST)
+    """Return the scene at another spacing and stiffness, solved by a method for some steps."""
+    scene = catalogue_scene(
+        SCENE, dx=dx, integrator=method, steps=steps, end=None,
+        unstable="allow", solver=Solver(**solver), limits=FIRST)
     count = ceil(PER_CELL * 0.12 * 0.12 * 0.3 / dx**3)
     bodies = tuple(with_(body, sampling=with_(body.sampling, count=count)) for body in scene.body)
     middle = with_(bodies[1], material=with_(bodies[1].material, E=E))
@@ -43,23 +44,23 @@ def bar(dx, E, method, steps, **solver):
 
 
 def cost(dx, E, method, steps, **solver):
-    """`Cost` of a run, and the number of its particles."""
+    """Return the `StiffnessCost` of a run, and the number of its particles."""
     reports = []
     problem = build(bar(dx, E, method, steps, **solver))
     for _ in simulate(problem, on_step=lambda state, dt: reports.append(state.solve)):
         pass
     n = len(reports)
-    return Cost(method, E, n, sum(r.iterations for r in reports) / n,
+    return StiffnessCost(method, E, n, sum(r.iterations for r in reports) / n,
                 sum(r.cg_iterations for r in reports) / n,
                 sum(sum(r.seconds.values()) for r in reports) / n,
-                all(r.converged for r in reports)), sum(len(b.id) for b in problem.bodies)
+                all(r.converged for r in reports)), particle_count(problem.bodies)
 
 
 @experiment("hot.fig20", title="A bar with a middle of growing stiffness: iterations and time",
             profiles=("quick", "standard", "paper"),
             budget={"quick": 12, "standard": 900, "paper": 7200})
 def stiffness(run):
-    """Sweep of the middle's modulus over the methods."""
+    """Record a sweep of the middle's modulus over the methods."""
     dx, steps = run.choose(quick=(0.03, 2), standard=(0.02, 12), paper=(0.0075, 12))
     moduli = run.choose(quick=(1e5, 1e9), standard=SWEEP, paper=SWEEP)
     for method in METHODS:
@@ -75,29 +76,29 @@ def stiffness(run):
                comparator="<=", bound=FLAT, scale=scale,
                note=f"outer iterations at E = {moduli[-1]:.0e} Pa over those at {moduli[0]:.0e} "
                "Pa; the paper calls its curve close to flat")
-    sizes(run, *run.choose(quick=((), ()), standard=(SPACINGS, (1e5, 1e9, 1e10)),
+    record_sizes(run, *run.choose(quick=((), ()), standard=(SPACINGS, (1e5, 1e9, 1e10)),
                            paper=((), ())))
-    run.table("costs", Cost._fields, list(costs.values()))
+    run.table("costs", StiffnessCost._fields, list(costs.values()))
 
 
-def sizes(run, spacings, moduli):
-    """HOT's iterations at some moduli over spacings [m], and how they grow with the first one."""
+def record_sizes(run, spacings, moduli):
+    """Record HOT's iterations at some moduli over spacings [m], and their growth."""
     for method in ("hot", "hot-plus"):
         for dx in run.progress(spacings, f"sizes, {method}"):
-            found = [cost(dx, E, method, STEPS_OF_SIZES) for E in moduli]
-            per_step = [c.iterations for c, _ in found]
-            run.record(f"hot.fig20.{method}.size{found[0][1]}", per_step[-1] / per_step[0],
-                       unit="1", comparator="info", scale=f"{found[0][1]} particles, "
+            costs = [cost(dx, E, method, STEPS_OF_SIZES) for E in moduli]
+            per_step = [c.iterations for c, _ in costs]
+            run.record(f"hot.fig20.{method}.size{costs[0][1]}", per_step[-1] / per_step[0],
+                       unit="1", comparator="info", scale=f"{costs[0][1]} particles, "
                        f"{STEPS_OF_SIZES} steps, dx = {dx} m",
                        note=f"iterations per step at {moduli[-1]:.0e} Pa over those at "
                        f"{moduli[0]:.0e} Pa; "
                        + ", ".join(f"{E:.0e}: {n:.1f}" for E, n in zip(moduli, per_step,
                                                                        strict=True))
-                       + ("" if all(c.converged for c, _ in found) else "; not all converged"))
+                       + ("" if all(c.converged for c, _ in costs) else "; not all converged"))
 
 
 def record_cost(run, c, hot, scale):
-    """Iterations of one method, and its time over HOT's."""
+    """Record the iterations of one method, and its time over HOT's."""
     name = f"hot.fig20.{c.method}.E{c.E:.0e}".replace("+0", "").replace("+", "")
     note = "" if c.converged else "not every step converged"
     run.record(f"{name}.iterations", c.iterations, unit="1", comparator="info", scale=scale,

@@ -1,9 +1,9 @@
-"""HOT's scenes in the middle of things: the states that steps are measured from, kept on disk.
+"""HOT's scenes in the middle of their motion: states from which steps are measured, on disk.
 
-A scene runs by HOT until what it is about has begun: a contact, a pull, a yield. The state then
-reached depends on the scene and on the code alone, so it is marched to once for each version of
-the package and kept as a checkpoint in the user's cache; experiments share it. Where there is no
-place to keep it, it is marched to again.
+A scene runs by HOT until its contact, pull or yield has begun. The state then reached depends on
+the scene and on the code alone, so it is computed once for each version of the package and stored
+as a checkpoint in the user's cache; experiments share it. Where there is no place to store it, it
+is computed again.
 """
 
 import os
@@ -29,11 +29,11 @@ from mpm_ref.store.checkpoint import BadCheckpoint, load, save
 from mpm_ref.store.manifest import scene_hash, source_hash
 
 from ..common.scenes import with_
-from .one_step import Step
+from .one_step import implicit_step
 from .sizes import sized
 
 SOFT_CAT = 1e6          # Young's modulus (Table 2) [Pa]
-BEGUN = {               # time at which a scene is in the middle of things [s]
+START_TIMES = {         # time at which a scene is in the middle of its motion [s]
     "twist": 0.5,
     "boxes": 0.3,
     "donut": 0.4,
@@ -46,73 +46,73 @@ BEGUN = {               # time at which a scene is in the middle of things [s]
     "sauce": 0.3,
     "aluminium": 0.004,
 }
-PRINTED = tuple(name for name in BEGUN if name != "aluminium")  # in Table 3 and Figure 15
-QUICK = ("boxes", "wheel", "faceless", "sauce")     # where little has to run before
-KEPT = 4                # versions of the package whose states stay on disk
+PRINTED = tuple(name for name in START_TIMES if name != "aluminium")  # in Table 3 and Figure 15
+QUICK = ("boxes", "wheel", "faceless", "sauce")     # whose states are reached quickly
+VERSIONS = 4            # of the package whose states stay on disk
 
 
 def scene(name, profile):
-    """A scene of `BEGUN` at a size, marched by HOT."""
-    soft = name == "armacat_soft"
-    made = sized("hot_" + name.removesuffix("_soft").removesuffix("_stiff"), profile,
+    """Return a scene of `START_TIMES` at a size, with HOT as its integrator."""
+    record = sized("hot_" + name.removesuffix("_soft").removesuffix("_stiff"), profile,
                  integrator="hot", unstable="allow")
-    if not soft:
-        return made
-    return with_(made, body=tuple(
+    if name != "armacat_soft":
+        return record
+    return with_(record, body=tuple(
         with_(body, material=with_(body.material, E=SOFT_CAT)) if body.name == "cat" else body
-        for body in made.body))
+        for body in record.body))
 
 
-def begun(name, profile, t=None):
-    """(`Problem`, `State`) of a scene at its time in `BEGUN` or at another [s], read where it has
-    been kept.
+def warm_state(name, profile, t=None):
+    """Return the `Problem` and the `State` of a scene at its time in `START_TIMES`, or at t [s].
+
+    The state is read if it is stored.
     """
-    problem, t = build(scene(name, profile)), BEGUN[name] if t is None else t
-    path = folder() / f"{name}-{scene_hash(problem)[:16]}-{t:g}s.h5"
+    problem, t = build(scene(name, profile)), START_TIMES[name] if t is None else t
+    path = cache_folder() / f"{name}-{scene_hash(problem)[:16]}-{t:g}s.h5"
     try:
         return problem, load(path, problem)[0]
     except (BadCheckpoint, OSError):
-        state = marched(problem, t)
+        state = march_to(problem, t)
     try:
         save(path, state, problem)
     except OSError:
-        pass                    # no place for it: the next one marches again
+        pass                    # no place to store it: it is computed again
     return problem, state
 
 
-def marched(problem, t):
-    """The `State` of a problem after the first step that reaches the time t [s].
+def march_to(problem, t):
+    """Return the `State` of a problem after the first step that reaches the time t [s].
 
-    Raises ValueError where the scene ends before.
+    Raises ValueError if the scene ends before.
     """
     state, stepper = next(simulate(problem)).state, problem.stepper()
     while state.t < t and not ended(problem.clock, state):
-        onward(problem, stepper, state)
+        take_step(problem, stepper, state)
     if state.t < t:
         raise ValueError(f"{problem.title}: it ends at {state.t:g} s, before {t:g} s")
     return state
 
 
-def onward(problem, stepper, state):
-    """One step of a run; a frame that is due is counted, since steps are cut to meet the next."""
+def take_step(problem, stepper, state):
+    """Advance by a step; a frame that is due is counted, since steps are cut to meet the next."""
     advance(problem, stepper, state)
     if frame_is_due(problem.clock, state):
         show(state, 0.0)
 
 
-def steps(problem, state, count):
-    """The next so many `Step`s of a state. Each holds until the next is asked for: the problem's
-    own method then makes it.
+def following_steps(problem, state, count):
+    """Yield the next `count` `ImplicitStep`s of a state.
+
+    Each is valid until the next is asked for: the problem's own method then takes it.
     """
     stepper = problem.stepper()
     for _ in range(count):
-        dt = coming(problem, stepper, state)
-        yield Step(state.bodies, stepper, stepper.problem(state.bodies, state.t, dt), dt, state.t)
-        onward(problem, stepper, state)
+        yield implicit_step(stepper, state, next_step_length(problem, stepper, state))
+        take_step(problem, stepper, state)
 
 
-def coming(problem, stepper, state):
-    """Length of the step that `simulate.advance` will make [s], particles sorted as it will."""
+def next_step_length(problem, stepper, state):
+    """Return the length of the next step of `simulate.advance` [s]; sort particles as it does."""
     if state.step % SORT == 0:
         stepper.sort(state.bodies)
     if bound_is_due(problem.clock, state):
@@ -120,23 +120,16 @@ def coming(problem, stepper, state):
     return next_dt(problem.clock, state, swiftest(problem, stepper, state))
 
 
-def particles(problem):
-    """Number of particles of a problem."""
-    return sum(len(body.id) for body in problem.bodies)
-
-
-def folder(root=None):
-    """Folder of this version's states, in the user's cache; those of older versions but a few are
-    removed.
-    """
-    root = Path(root or platformdirs.user_cache_dir("mpm_ref")) / "begun"
-    here = root / source_hash()[:16]
+def cache_folder(root=None):
+    """Return the folder of this version's states in the user's cache; remove old versions."""
+    root = Path(root or platformdirs.user_cache_dir("mpm_ref")) / "warm_states"
+    current = root / source_hash()[:16]
     try:
-        here.mkdir(parents=True, exist_ok=True)
-        os.utime(here)
-        others = [d for d in root.iterdir() if d.is_dir() and d != here]
-        for old in sorted(others, key=lambda d: d.stat().st_mtime)[:1 - KEPT]:
+        current.mkdir(parents=True, exist_ok=True)
+        os.utime(current)
+        others = [d for d in root.iterdir() if d.is_dir() and d != current]
+        for old in sorted(others, key=lambda d: d.stat().st_mtime)[:1 - VERSIONS]:
             shutil.rmtree(old, ignore_errors=True)
     except OSError:
-        pass                    # `begun` finds nothing there and keeps nothing
-    return here
+        pass                    # `warm_state` then computes the state and stores nothing
+    return current

@@ -6,11 +6,12 @@ bottom plots.
 """
 
 from ..common.registry import experiment
-from .iterates import COLUMNS, EPS, Way, iterates, noted, spread, swiftest, ways
-from .warm_states import BEGUN, begun, particles, steps
+from ..common.scenes import evenly
+from .iterates import COLUMNS, EPS, MethodSetup, iterates, quickest, setups, solve_note
+from .warm_states import START_TIMES, following_steps, warm_state
 
-FIVE = ways("pn-pcg", "pn-pcg-mf", "pn-mgpcg", "lbfgs-h", "hot")
-FLEXIBLE = Way("pn-mgpcg-flexible", "pn-mgpcg", {"flexible": True})
+FIVE = setups("pn-pcg", "pn-pcg-mf", "pn-mgpcg", "lbfgs-h", "hot")
+FLEXIBLE = MethodSetup("pn-mgpcg-flexible", "pn-mgpcg", {"flexible": True})
 CG_CAP = 10000          # of the paper, per linear solve
 ROWS = 300              # of the table, per method and tolerance
 
@@ -19,53 +20,54 @@ ROWS = 300              # of the table, per method and tolerance
             profiles=("quick", "standard", "paper"),
             budget={"quick": 10, "standard": 500, "paper": 14400})
 def wheel(run):
-    """Residuals at the paper's tolerance, and how the methods go on below it."""
+    """Record residuals at the paper's tolerance, and iterates below it."""
     further, cap = run.choose(quick=((1e-8,), 100), standard=((1e-8, 1e-9), 600),
                               paper=((1e-8, 1e-9), 600))
-    onward = run.choose(quick=(*ways("lbfgs-h", "hot"), FLEXIBLE), standard=(*FIVE, FLEXIBLE),
+    continued = run.choose(quick=(*setups("lbfgs-h", "hot"), FLEXIBLE), standard=(*FIVE, FLEXIBLE),
                         paper=(*FIVE, FLEXIBLE))
-    problem, state = begun("wheel", run.profile)
-    step = next(steps(problem, state, 1))
-    scale = (f"{particles(problem)} particles (the paper: 550 000), {len(step.pose.unknowns.m)} "
-             f"nodes, {BEGUN['wheel']:g} s after the start, dt = {step.dt:.3g} s")
-    rows, found = [], {}
-    for way in (*FIVE, FLEXIBLE):
-        iterates(step, way, max_iterations=2)                       # compiles
-        found[way.name] = swiftest(step, way, 3)
-        rows += table_rows(way, EPS, found[way.name])
-        record_method(run, f"hot.fig17.{way.name}", found[way.name].report, scale)
-    record_claims(run, found, scale)
+    problem, state = warm_state("wheel", run.profile)
+    step = next(following_steps(problem, state, 1))
+    scale = (f"{step.particles} particles (the paper: 550 000), {len(step.pose.unknowns.m)} nodes, "
+             f"{START_TIMES['wheel']:g} s after the start, dt = {step.dt:.3g} s")
+    rows, descents = [], {}
+    for setup in (*FIVE, FLEXIBLE):
+        iterates(step, setup, max_iterations=2)                     # compiles
+        descents[setup.name] = quickest(step, setup, 3)
+        rows += table_rows(setup, EPS, descents[setup.name])
+        record_method(run, f"hot.fig17.{setup.name}", descents[setup.name].report, scale)
+    record_claims(run, descents, scale)
     for eps in further:
-        for way in run.progress(onward, f"eps = {eps:g}"):
-            made = iterates(step, way, eps=eps, max_iterations=cap, max_cg_iterations=CG_CAP)
-            rows += table_rows(way, eps, made)
-            name = f"hot.fig17.{way.name}.eps{eps:.0e}".replace("e-0", "e-")
-            record_method(run, name, made.report, scale)
+        for setup in run.progress(continued, f"eps = {eps:g}"):
+            descent = iterates(step, setup, eps=eps, max_iterations=cap, max_cg_iterations=CG_CAP)
+            rows += table_rows(setup, eps, descent)
+            name = f"hot.fig17.{setup.name}.eps{eps:.0e}".replace("e-0", "e-")
+            record_method(run, name, descent.report, scale)
     run.table("iterates", (*COLUMNS, "eps"), rows)
 
 
-def table_rows(way, eps, made):
-    """Rows of the table, of a spread of the iterates."""
-    return [(way.name, *made.rows[k], eps) for k in spread(len(made.cg) - 1, ROWS)]
+def table_rows(setup, eps, descent):
+    """Return the rows of the table, of at most ROWS iterates, evenly."""
+    return [(setup.name, *descent.rows[k], eps) for k in evenly(len(descent.cg), ROWS)]
 
 
 def record_method(run, name, report, scale):
-    """Iterations of a solve, None where its tolerance was not met."""
+    """Record the iterations of a solve, None where its tolerance was not met."""
     run.record(f"{name}.iterations", report.iterations if report.converged else None,
                comparator="info", scale=scale,
-               note=noted(f"{report.cg_iterations} of CG, {report.coarse_iterations} on the "
+               note=solve_note(f"{report.cg_iterations} of CG, {report.coarse_iterations} on the "
                           f"coarsest level, {report.backtracks} back, "
                           f"{report.cpu_times[-1]:.2f} CPU seconds to "
                           f"{report.residuals[-1]:.1e}", report))
 
 
-def record_claims(run, found, scale):
-    """LBFGS-H's iterations, and whether HOT is the fastest at the paper's tolerance."""
-    slow, hot = found["lbfgs-h"].report, found["hot"].report
+def record_claims(run, descents, scale):
+    """Record LBFGS-H's iterations, and HOT's time at the paper's tolerance."""
+    slow, hot = descents["lbfgs-h"].report, descents["hot"].report
     run.record("hot.sec7_3.lbfgsh_wheel_outer", slow.iterations, scale=scale, note="the start's "
                f"residual is {slow.residuals[0] / EPS:.0f} times the tolerance here, so that "
                "neither method has far to go; below it see hot.fig17.lbfgs-h.*")
-    others = [made.report.cpu_times[-1] for name, made in found.items() if name != "hot"]
+    others = [descent.report.cpu_times[-1]
+              for name, descent in descents.items() if name != "hot"]
     run.record("hot.fig17.fastest", min(others) / hot.cpu_times[-1], comparator=">=", bound=1.0,
                scale=scale, note="least CPU time of the others over HOT's, at the paper's "
                "tolerance, which is not equal error")

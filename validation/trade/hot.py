@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..common.registry import experiment
-from ..hot.one_step import after, errors, solved
+from ..hot.one_step import particle_errors, solve_step, step_after
 from ..hot.stiffness import METHODS, bar
 
 EXACT = 1e-13           # tolerance of the reference
@@ -51,7 +51,7 @@ def equal_error(run):
     rows = []
     for E in run.progress(moduli, "moduli"):
         scene = bar(dx, E, "pn-pcg", steps, eps=1e-9)
-        found = one_stiffness(run, after(scene, steps), E, (ladder, repeats))
+        found = one_stiffness(run, step_after(scene, steps), E, (ladder, repeats))
         rows += [(E, *p) for p in found]
     run.table("points", ("E", *POINT), rows)
 
@@ -59,11 +59,10 @@ def equal_error(run):
 def one_stiffness(run, step, E, plan):
     """`Point`s for one modulus, by a plan (tolerances, repeats); records what they say."""
     ladder, repeats = plan
-    exact = solved(step, "pn-pcg", eps=EXACT)
-    check = solved(step, "pn-mgpcg", eps=EXACT)
-    least = errors(step, check.dv, exact.dv)
-    particles = sum(len(body.id) for body in step.bodies)
-    scale = f"{particles} particles, {len(exact.dv)} nodes, middle {E:.0e} Pa"
+    exact = solve_step(step, "pn-pcg", eps=EXACT)
+    check = solve_step(step, "pn-mgpcg", eps=EXACT)
+    least = particle_errors(step, check.dv, exact.dv)
+    scale = f"{step.particles} particles, {len(exact.dv)} nodes, middle {E:.0e} Pa"
     name = f"trade.hot.bar.E{E:.0e}".replace("+0", "").replace("+", "")
     run.record(f"{name}.references", least.velocity, unit="1", comparator="<=", bound=AGREE,
                scale=scale, note="difference of two references of different methods, relative to "
@@ -79,10 +78,10 @@ def point(step, exact, rule, repeats, **changes):
     median time; changes: further options.
     """
     method, eps = rule
-    solutions = [solved(step, method, eps=eps, **changes) for _ in range(repeats)]
+    solutions = [solve_step(step, method, eps=eps, **changes) for _ in range(repeats)]
     cpu = float(np.median([sum(s.report.seconds.values()) for s in solutions]))
     found, report = solutions[0], solutions[0].report
-    off = errors(step, found.dv, exact.dv)
+    off = particle_errors(step, found.dv, exact.dv)
     system = step.stepper.system(step.pose)
     gap = (found.E - exact.E) / (system.energy(system.start) - exact.E)
     return Point(method, eps, cpu, off.velocity, off.cells_max, report.iterations,

@@ -15,12 +15,12 @@ import numpy as np
 from mpm_ref.hot.displacement_stop import SAFETY
 
 from ..common.registry import experiment
-from ..hot.one_step import difference, solved
-from ..hot.warm_states import BEGUN, begun, particles, steps
+from ..hot.one_step import difference, solve_step
+from ..hot.warm_states import START_TIMES, following_steps, warm_state
 
 METHODS = ("hot", "hot-plus", "lbfgs-h", "pn-pcg", "pn-mgpcg")
 FITTED = ("wheel", "aluminium")         # scenes that the rule knows
-LATER = 3                               # steps from the states of `begun` to those tried
+LATER = 3                               # steps from the states of `warm_state` to those tried
 OPTIONS = {"pn-mgpcg": {"flexible": True}}      # else its CG takes thousands of iterations
 FIRST = 1e-6                            # tolerance of the gradient that it begins with
 PAPER = 1e-7
@@ -50,7 +50,7 @@ def hold(run):
     """Methods, scenes and errors asked for; shares held, and how near the estimate was."""
     names, asked = run.choose(
         quick=(("faceless",), (1e-3,)),
-        standard=(tuple(n for n in BEGUN if n not in FITTED), (1e-2, 1e-3, 1e-4)))
+        standard=(tuple(n for n in START_TIMES if n not in FITTED), (1e-2, 1e-3, 1e-4)))
     rows = []
     for name in run.progress(names, "scenes"):
         found, differ, scale = trials(name, asked)
@@ -67,23 +67,23 @@ def hold(run):
 
 def trials(name, asked):
     """([`Trial`], difference of two references [dx], scale) of one step of a scene."""
-    problem, state = begun(name, "quick")
-    step = next(islice(steps(problem, state, LATER), LATER - 1, None))
-    exact = solved(step, "pn-mgpcg", eps=EXACT, **OPTIONS["pn-mgpcg"], **CAPS)
-    check = solved(step, "pn-pcg", eps=EXACT, **CAPS)
+    problem, state = warm_state(name, "quick")
+    step = next(islice(following_steps(problem, state, LATER), LATER - 1, None))
+    exact = solve_step(step, "pn-mgpcg", eps=EXACT, **OPTIONS["pn-mgpcg"], **CAPS)
+    check = solve_step(step, "pn-pcg", eps=EXACT, **CAPS)
     for method in METHODS:
-        solved(step, method, displacement_tolerance=1.0, max_iterations=2)               # compiles
+        solve_step(step, method, displacement_tolerance=1.0, max_iterations=2)      # compiles
     rows = [trial(step, exact, name, method, cells)
             for cells in (0.0, *asked) for method in METHODS]
-    scale = (f"{particles(problem)} particles, {len(exact.dv)} nodes, step {LATER} from "
-             f"{BEGUN[name]:g} s on")
+    scale = (f"{step.particles} particles, {len(exact.dv)} nodes, step {LATER} from "
+             f"{START_TIMES[name]:g} s on")
     return rows, difference(step, check.dv, exact.dv)[1], scale
 
 
 def trial(step, exact, name, method, cells):
     """`Trial` of a method, by the rule or, where cells is 0, by the paper's tolerance."""
     changes = {**CAPS, **OPTIONS.get(method, {})}
-    found = solved(step, method, displacement_tolerance=cells,
+    found = solve_step(step, method, displacement_tolerance=cells,
                    eps=FIRST if cells else PAPER, **changes)
     r = found.report
     return Trial(name, method, cells, difference(step, found.dv, exact.dv)[1], r.particle_error,

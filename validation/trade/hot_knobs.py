@@ -12,9 +12,9 @@ import numpy as np
 from mpm_ref.hot.methods import METHODS, RULES
 
 from ..common.registry import experiment
-from ..hot.one_step import after, difference, solved
+from ..hot.one_step import difference, solve_step, step_after
 from ..hot.stiffness import bar
-from ..hot.warm_states import begun, particles, steps
+from ..hot.warm_states import following_steps, warm_state
 from .hot import time_for
 
 HOT = METHODS["hot"].cycle
@@ -58,7 +58,7 @@ def knobs(run):
                   (1e-6, 1e-7, 1e-8, 1e-9), tuple(SETTINGS), 1))
     rows, lengths = [], []
     for name in run.progress(names, "scenes"):
-        step, scale = made(name)
+        step, scale = initial_step(name)
         rows += settings(run, (name, step, scale), tried, (ladder, repeats))
         lengths += times(run, (name, step, scale))
     run.table("points", ("scene", "setting", "eps", "cpu", "error", "cells", "iterations",
@@ -66,20 +66,19 @@ def knobs(run):
     run.table("lengths", ("scene", "share", "dt", "cpu", "iterations", "error"), lengths)
 
 
-def made(name):
-    """(`Step`, scale in words) of a bar or of one of HOT's scenes in the middle of things."""
+def initial_step(name):
+    """Return the `ImplicitStep` of a bar or a scene of HOT, and its scale as text."""
     if name in BARS:
-        step = after(bar(0.03, BARS[name], "pn-mgpcg", 6, eps=1e-9), 6)
-        count = sum(len(body.id) for body in step.bodies)
+        step = step_after(bar(0.03, BARS[name], "pn-mgpcg", 6, eps=1e-9), 6)
     else:
-        problem, state = begun(name, "quick")
-        step, count = next(steps(problem, state, 1)), particles(problem)
-    return step, f"{count} particles, {len(step.pose.unknowns.m)} nodes, one step"
+        problem, state = warm_state(name, "quick")
+        step = next(following_steps(problem, state, 1))
+    return step, f"{step.particles} particles, {len(step.pose.unknowns.m)} nodes, one step"
 
 
 def reference(step):
-    """The increment of a `Step` that errors are measured from."""
-    return solved(step, "pn-mgpcg", eps=EXACT, flexible=True, **CAPS).dv
+    """Return the increment of an `ImplicitStep` that errors are measured from."""
+    return solve_step(step, "pn-mgpcg", eps=EXACT, flexible=True, **CAPS).dv
 
 
 def settings(run, about, tried, plan):
@@ -90,11 +89,11 @@ def settings(run, about, tried, plan):
     ladder, repeats = plan
     exact = reference(step)
     for setting in tried:
-        solved(step, SETTINGS[setting], max_iterations=2)               # compiles
+        solve_step(step, SETTINGS[setting], max_iterations=2)               # compiles
     rows = {}
     for eps in ladder:
         for setting in tried:
-            found = [solved(step, SETTINGS[setting], eps=eps, **CAPS) for _ in range(repeats)]
+            found = [solve_step(step, SETTINGS[setting], eps=eps, **CAPS) for _ in range(repeats)]
             cpu = float(np.median([sum(f.report.seconds.values()) for f in found]))
             rows.setdefault(setting, []).append(
                 (name, setting, eps, cpu, *difference(step, found[0].dv, exact),
@@ -124,7 +123,7 @@ def times(run, about):
         dt = share * step.dt
         pose = step.stepper.problem(step.bodies, step.t, dt)
         other = step._replace(pose=pose, dt=dt)
-        solution, exact = solved(other, "hot", **CAPS), reference(other)
+        solution, exact = solve_step(other, "hot", **CAPS), reference(other)
         cpu = sum(solution.report.seconds.values())
         error = difference(other, solution.dv, exact)[0]
         found.append((name, share, dt, cpu, solution.report.iterations, error))

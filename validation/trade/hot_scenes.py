@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 from ..common import targets
 from ..common.registry import experiment
-from ..hot.one_step import Errors, errors, solved
+from ..hot.one_step import ParticleErrors, particle_errors, solve_step
 from ..hot.stiffness import METHODS
-from ..hot.warm_states import BEGUN, PRINTED, begun, particles, steps
+from ..hot.warm_states import PRINTED, START_TIMES, following_steps, warm_state
 from .hot import PAPER, POINT, Point, bounded_below, record_equal_eps, times_for
 from .hot_methods import ALL, OPTIONS, SLOW, SOME, descended, tolerance_ladders
 
@@ -56,7 +56,7 @@ def plan(profile):
     few, many = (tuple(10.0**-k for k in range(*ends)) for ends in ((5, 9), (3, 11)))
     if profile == "quick":
         return [Trial(name, "quick", few, METHODS) for name in ("faceless", "sauce")]
-    return ([Trial(name, "quick", many, ALL) for name in BEGUN]
+    return ([Trial(name, "quick", many, ALL) for name in START_TIMES]
             + [Trial(name, "standard", few, SOME)
                for name in ("twist", "boxes", "wheel", "faceless")])
 
@@ -64,7 +64,7 @@ def plan(profile):
 class Reference(NamedTuple):
     """How sure the reference of a trial is, and what it was."""
 
-    least: Errors       # what its two methods differ by
+    least: ParticleErrors       # what its two methods differ by
     converged: bool     # both
     scale: str
 
@@ -96,21 +96,21 @@ def compiled(trials):
 
 def ladder(trial):
     """(`Point`s, `Reference`) of a trial."""
-    problem, state = begun(trial.scene, trial.size)
-    step = next(steps(problem, state, 1))
-    exact, check = (solved(step, method, eps=trial.eps, **MANY, **OPTIONS.get(method, {}))
+    problem, state = warm_state(trial.scene, trial.size)
+    step = next(following_steps(problem, state, 1))
+    exact, check = (solve_step(step, method, eps=trial.eps, **MANY, **OPTIONS.get(method, {}))
                     for method in (EXACT, CHECK))
     found = descended(step, exact, tolerance_ladders(trial.methods, trial.ladder))
-    scale = (f"{particles(problem)} particles, {len(exact.dv)} nodes, one step from "
-             f"{BEGUN[trial.scene]:g} s on")
-    return found, Reference(errors(step, check.dv, exact.dv),
+    scale = (f"{step.particles} particles, {len(exact.dv)} nodes, one step from "
+             f"{START_TIMES[trial.scene]:g} s on")
+    return found, Reference(particle_errors(step, check.dv, exact.dv),
                             exact.report.converged and check.report.converged, scale)
 
 
 def unpacked(ladder):
     """A `ladder` from plain lists, as it comes back from disk."""
     found, (least, converged, scale) = ladder
-    return [Point(*p) for p in found], Reference(Errors(*least), converged, scale)
+    return [Point(*p) for p in found], Reference(ParticleErrors(*least), converged, scale)
 
 
 def trust(points):

@@ -11,8 +11,8 @@ from mpm_ref.hot.methods import minimise
 from mpm_ref.hot.system import free_part
 
 from ..common.registry import experiment
-from ..hot.one_step import difference, solved
-from ..hot.warm_states import BEGUN, begun, particles, steps
+from ..hot.one_step import difference, solve_step
+from ..hot.warm_states import START_TIMES, following_steps, warm_state
 
 STARTS = ("zero", "gravity", "last")
 EPS, EXACT = 1e-8, 1e-10
@@ -24,7 +24,7 @@ COLUMNS = ("scene", "step", "start", "cpu", "iterations", "cells", "converged")
             profiles=("quick", "standard"), budget={"quick": 3, "standard": 300})
 def start(run):
     """Time of each start over that of zero, scene by scene."""
-    names, count = run.choose(quick=(("sauce",), 2), standard=(tuple(BEGUN), 4))
+    names, count = run.choose(quick=(("sauce",), 2), standard=(tuple(START_TIMES), 4))
     rows = []
     for name in run.progress(names, "scenes"):
         found, scale = scene_rows(name, count)
@@ -37,15 +37,15 @@ def scene_rows(name, count):
     """(rows of `COLUMNS`, scale) of so many steps of a scene; the first gives the second its last
     increment and no more.
     """
-    problem, state = begun(name, "quick")
+    problem, state = warm_state(name, "quick")
     rows, last = [], None
-    for k, step in enumerate(steps(problem, state, count)):
-        exact = solved(step, "pn-mgpcg", eps=EXACT, flexible=True, **CAPS).dv
+    for k, step in enumerate(following_steps(problem, state, count)):
+        exact = solve_step(step, "pn-mgpcg", eps=EXACT, flexible=True, **CAPS).dv
         if last is not None:
             rows += [(name, k, start, *solve(step, begin, exact))
                      for start, begin in beginnings(step, last).items()]
         last = step.pose.unknowns.index, exact
-    return rows, f"{particles(problem)} particles, {count - 1} steps, eps = {EPS:g}"
+    return rows, f"{step.particles} particles, {count - 1} steps, eps = {EPS:g}"
 
 
 def beginnings(step, last):

@@ -1,4 +1,4 @@
-"""States in the middle of HOT's scenes, and what their experiments make of times and errors."""
+"""States in the middle of HOT's scenes, and ratios of times and errors of their experiments."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from mpm_ref.simulate import SORT, simulate
 from mpm_ref.store.checkpoint import digest
 from validation.common import targets
 from validation.hot import warm_states as states
-from validation.hot.overview import ABLATION, Cost, options, overview
+from validation.hot.overview import ABLATION, MethodCost, options, overview
 from validation.trade.hot_start import beginnings, carried
 
 
@@ -21,9 +21,9 @@ def falling():
 
 
 @pytest.fixture
-def kept(monkeypatch, tmp_path):
-    """The scene "block", begun after 0.03 s, and an empty folder for its states."""
-    monkeypatch.setitem(states.BEGUN, "block", 0.03)
+def cache(monkeypatch, tmp_path):
+    """An empty folder for the states of the scene "block" after 0.03 s."""
+    monkeypatch.setitem(states.START_TIMES, "block", 0.03)
     monkeypatch.setattr(states, "scene", lambda name, profile: falling())
     monkeypatch.setattr(states.platformdirs, "user_cache_dir", lambda name: tmp_path)
     return tmp_path
@@ -33,56 +33,55 @@ def same(a, b):
     return digest(a) == digest(b)
 
 
-def test_a_state_that_was_kept_is_the_one_marched_to(kept, monkeypatch):
-    _, state = states.begun("block", "quick")
+def test_a_stored_state_is_the_computed_one(cache, monkeypatch):
+    _, state = states.warm_state("block", "quick")
     assert state.t >= 0.03 > state.t - 0.01
-    assert len(list(kept.rglob("block-*.h5"))) == 1
-    monkeypatch.setattr(states, "marched", lambda *_: pytest.fail("marched again"))
-    _, again = states.begun("block", "quick")
+    assert len(list(cache.rglob("block-*.h5"))) == 1
+    monkeypatch.setattr(states, "march_to", lambda *_: pytest.fail("computed again"))
+    _, again = states.warm_state("block", "quick")
     assert same(state, again)
 
 
-def test_a_damaged_file_is_marched_to_again(kept):
-    _, state = states.begun("block", "quick")
-    file, = kept.rglob("block-*.h5")
+def test_the_state_of_a_damaged_file_is_computed_again(cache):
+    _, state = states.warm_state("block", "quick")
+    file, = cache.rglob("block-*.h5")
     file.write_bytes(file.read_bytes()[:-100])
-    _, again = states.begun("block", "quick")
+    _, again = states.warm_state("block", "quick")
     assert same(state, again)
-    assert same(states.begun("block", "quick")[1], state)
+    assert same(states.warm_state("block", "quick")[1], state)
 
 
-def test_a_folder_that_cannot_be_made_costs_the_march_alone(kept, monkeypatch):
-    (kept / "begun").write_text("a file in its place")
-    _, state = states.begun("block", "quick")
+def test_a_state_is_computed_where_no_folder_can_be_made(cache):
+    (cache / "warm_states").write_text("a file in its place")
+    _, state = states.warm_state("block", "quick")
     assert state.t >= 0.03
 
 
 def test_a_scene_that_ends_before_is_refused():
     with pytest.raises(ValueError, match=r"ends at 0\.1 s, before 1 s"):
-        states.marched(build(falling()), 1.0)
+        states.march_to(build(falling()), 1.0)
 
 
 def test_old_versions_are_removed(tmp_path):
     for k in range(6):
-        (tmp_path / "begun" / f"old{k}").mkdir(parents=True)
-    here = states.folder(tmp_path)
-    assert here.is_dir()
-    assert len(list((tmp_path / "begun").iterdir())) == states.KEPT
+        (tmp_path / "warm_states" / f"old{k}").mkdir(parents=True)
+    assert states.cache_folder(tmp_path).is_dir()
+    assert len(list((tmp_path / "warm_states").iterdir())) == states.VERSIONS
 
 
-def test_steps_are_those_of_the_run(kept):
-    whole = []
-    list(simulate(build(falling()), on_step=lambda s, dt: whole.append((s.t, dt))))
-    problem, state = states.begun("block", "quick")
-    assert state.t == whole[3][0] == pytest.approx(0.03)
-    seen = [(state.t + step.dt, step.dt) for step in states.steps(problem, state, 3)]
-    np.testing.assert_array_equal(seen, whole[4:7])
-    assert {round(dt, 6) for _, dt in whole} == {0.0075, 0.01}
+def test_steps_are_those_of_the_run(cache):
+    expected = []
+    list(simulate(build(falling()), on_step=lambda s, dt: expected.append((s.t, dt))))
+    problem, state = states.warm_state("block", "quick")
+    assert state.t == expected[3][0] == pytest.approx(0.03)
+    steps = [(state.t + step.dt, step.dt) for step in states.following_steps(problem, state, 3)]
+    np.testing.assert_array_equal(steps, expected[4:7])
+    assert {round(dt, 6) for _, dt in expected} == {0.0075, 0.01}
     assert state.step < SORT
 
 
 def cost(method, cpu, step, converged=True):
-    return Cost("wheel", method, step, 0.0, cpu, 5, 7, 0, 6, converged)
+    return MethodCost("wheel", method, step, 0.0, cpu, 5, 7, 0, 6, converged)
 
 
 def test_overview_of_steps():
@@ -107,13 +106,13 @@ def test_every_range_of_the_text_is_recorded():
 
 def test_last_increments_are_carried_node_by_node():
     index, dv = np.array([[0, 1], [2, 3]]), np.array([[1.0, 2.0], [3.0, 4.0]])
-    found = carried(index, dv, np.array([[2, 3], [5, 5], [0, 1]]))
-    np.testing.assert_array_equal(found, [[3.0, 4.0], [0.0, 0.0], [1.0, 2.0]])
+    initial = carried(index, dv, np.array([[2, 3], [5, 5], [0, 1]]))
+    np.testing.assert_array_equal(initial, [[3.0, 4.0], [0.0, 0.0], [1.0, 2.0]])
 
 
-def test_starts_of_a_step_are_admissible(kept):
-    problem, state = states.begun("block", "quick")
-    first, second = states.steps(problem, state, 2)
+def test_starts_of_a_step_are_admissible(cache):
+    problem, state = states.warm_state("block", "quick")
+    first, second = states.following_steps(problem, state, 2)
     q = second.pose.unknowns
     begin = beginnings(second, (first.pose.unknowns.index, np.ones_like(first.pose.unknowns.v)))
     np.testing.assert_array_equal(begin["zero"], q.dv0)

@@ -10,7 +10,7 @@ from validation.common import targets
 from validation.common.scenes import SCENES, catalogue_scene
 from validation.hot.settings import PARTS
 from validation.hot.sizes import FILL, SIZES, Size, sized
-from validation.hot.stretched import HIGH, LOW, VARIANTS, stretched
+from validation.hot.stretched_box import HIGH, LOW, VARIANTS, stretched
 
 PER_CELL = {            # of the release, where it is not 8 for all bodies
     "hot_armacat": {"trampoline": 16}, "hot_boards": {"grains": 16}, "hot_faceless": {"bust": 20},

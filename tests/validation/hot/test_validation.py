@@ -9,13 +9,26 @@ from mpm_ref.hot.krylov import block_jacobi
 from mpm_ref.hot.multigrid.embedding import embed
 from mpm_ref.hot.multigrid.hierarchy import hierarchy
 from validation.common import targets
-from validation.hot.held_nodes import WAYS, cycle, found, mean_diagonal, on_free, with_held
-from validation.hot.linear_system import frozen, rigid_modes
-from validation.hot.measured_cg import Until, cg, convergence_factor, spectrum
-from validation.hot.sparsity import LEVELS, galerkin, geometric, of_particles
+from validation.hot.held_nodes import (
+    TREATMENTS,
+    constrained_matrix,
+    cycle_quality,
+    mean_diagonal,
+    on_free,
+    treated_hierarchy,
+)
+from validation.hot.hierarchy_levels import LEVELS, galerkin, geometric_levels, particle_pattern
+from validation.hot.linear_system import (
+    CGLimits,
+    cg,
+    convergence_factor,
+    frozen,
+    rigid_modes,
+    spectrum,
+)
 from validation.hot.warm_states import PRINTED, SOFT_CAT, scene
 
-TIGHT = Until(1e-12, 200)
+TIGHT = CGLimits(1e-12, 200)
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +40,7 @@ def clamped():
     A = sp.bsr_array(sp.csr_array(mask @ c.A @ mask), blocksize=(2, 2))
     A.sort_indices()
     b = free[:, None] * np.random.default_rng(1).standard_normal(c.index.shape)
-    return with_held(A, c.index, b, 0)
+    return constrained_matrix(A, c.index, b, 0)
 
 
 @pytest.fixture(scope="module")
@@ -68,15 +81,15 @@ def test_rigid_modes_meet_no_elastic_force(d):
 @pytest.mark.parametrize("flexible", [False, True])
 def test_cg_solves_and_stops_in_the_norm_of_the_diagonal_blocks(system, flexible):
     x = np.linalg.solve(system.A.toarray(), system.b.reshape(-1)).reshape(system.b.shape)
-    course = cg(system, two_grid(system).cycle, TIGHT, flexible)
-    assert course.converged
-    np.testing.assert_allclose(course.x, x, atol=1e-10 * abs(x).max())
+    history = cg(system, two_grid(system).cycle, TIGHT, flexible)
+    assert history.converged
+    np.testing.assert_allclose(history.x, x, atol=1e-10 * abs(x).max())
 
     def size(u):
         r = system.b - (system.A @ u.reshape(-1)).reshape(u.shape)
         return np.einsum("ia,iab,ib->", r, system.D_inv, r) ** 0.5
-    early = cg(system, two_grid(system).cycle, Until(1e-3, 200), flexible)
-    before = cg(system, two_grid(system).cycle, Until(1e-3, early.iterations - 1), flexible)
+    early = cg(system, two_grid(system).cycle, CGLimits(1e-3, 200), flexible)
+    before = cg(system, two_grid(system).cycle, CGLimits(1e-3, early.iterations - 1), flexible)
     assert size(early.x) <= 1e-3 * size(0.0 * x) < size(before.x)
     assert early.converged
     assert not before.converged
@@ -84,7 +97,7 @@ def test_cg_solves_and_stops_in_the_norm_of_the_diagonal_blocks(system, flexible
 
 def test_flexible_cg_is_cg_where_the_preconditioner_stays(system):
     # few iterations: with more, round-off grows until the two part
-    plain, flexible = (cg(system, block_jacobi(system.D), Until(cap=8), word)
+    plain, flexible = (cg(system, block_jacobi(system.D), CGLimits(cap=8), word)
                        for word in (False, True))
     np.testing.assert_allclose(flexible.steps, plain.steps, rtol=1e-10)
 
@@ -120,12 +133,13 @@ def coarse(grids):
             for i, j, block in zip(row, A.indices, A.data, strict=True)}
 
 
-@pytest.mark.parametrize(("way", "size"), [("leaking", 1.0), ("leaking-scaled", None)])
-def test_leak_adds_the_identity_of_held_nodes_to_the_coarse_matrix(clamped, way, size):
-    masked, leaking = (coarse(cycle(clamped, word, 2)) for word in ("masked", way))
+@pytest.mark.parametrize(("treatment", "size"), [("leaking", 1.0), ("leaking-scaled", None)])
+def test_leak_adds_the_identity_of_held_nodes_to_the_coarse_matrix(clamped, treatment, size):
+    masked, leaking = (coarse(treated_hierarchy(clamped, word, 2))
+                       for word in ("masked", treatment))
     size = mean_diagonal(clamped) if size is None else size
     W = embed(clamped.index)
-    leak = (W.W.T @ sp.diags_array(size * ~clamped.free) @ W.W).toarray()
+    leak = (W.W.T @ sp.diags_array(size * ~clamped.is_free) @ W.W).toarray()
     none = np.zeros((2, 2))
     for i, a in enumerate(map(tuple, W.index)):
         for j, b in enumerate(map(tuple, W.index)):
@@ -134,31 +148,31 @@ def test_leak_adds_the_identity_of_held_nodes_to_the_coarse_matrix(clamped, way,
     assert leak.any()
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_factor_of_a_cycle_is_that_on_free_nodes(clamped, way):
+@pytest.mark.parametrize("treatment", TREATMENTS)
+def test_factor_of_a_cycle_is_that_on_free_nodes(clamped, treatment):
     A, shape = clamped.system.A.toarray(), clamped.system.b.shape
-    inverse = on_free(clamped, cycle(clamped, way, 2))
+    inverse = on_free(clamped, treated_hierarchy(clamped, treatment, 2))
     M = np.stack([inverse(e.reshape(shape)).reshape(-1) for e in np.eye(len(A))], axis=1)
     np.testing.assert_allclose(M, M.T, atol=1e-13 * abs(M).max())
     radius = abs(np.linalg.eigvals(np.eye(len(A)) - M @ A)).max()
-    seen = found(clamped, way, 2, rough(shape))
-    assert seen.converged
-    assert seen.factor == pytest.approx(radius, rel=1e-6)
+    quality = cycle_quality(clamped, treatment, 2, noise(shape))
+    assert quality.converged
+    assert quality.factor == pytest.approx(radius, rel=1e-6)
 
 
 def test_masked_cycle_is_that_of_the_free_nodes_alone(clamped):
     alone, b = two_grid(clamped.system), clamped.system.b
-    u = on_free(clamped, cycle(clamped, "masked", 2))(b)
+    u = on_free(clamped, treated_hierarchy(clamped, "masked", 2))(b)
     np.testing.assert_allclose(u, alone.cycle(b), atol=1e-12 * abs(u).max())
 
 
 def test_leak_makes_two_grids_slower(clamped):
-    factors = [found(clamped, way, 2, rough(clamped.system.b.shape)).factor
-               for way in ("masked", "leaking")]
+    factors = [cycle_quality(clamped, treatment, 2, noise(clamped.system.b.shape)).factor
+               for treatment in ("masked", "leaking")]
     assert factors[0] < factors[1]
 
 
-def rough(shape):
+def noise(shape):
     return np.random.default_rng(2).standard_normal(shape)
 
 
@@ -167,15 +181,15 @@ def test_pattern_is_that_of_the_galerkin_matrices(kernel):
     x = points(lump(2, 9, 0.85, np.random.default_rng(0)))
     A, index = assembled(x, np.ones(len(x)))
     levels = hierarchy(A, index, 3, kernel, implementation="scipy").levels
-    pattern, there = of_particles(0.1 * x, 0.1)
+    pattern, nodes = particle_pattern(0.1 * x, 0.1)
     for level in levels:
-        np.testing.assert_array_equal(there, level.index)
+        np.testing.assert_array_equal(nodes, level.index)
         assert pattern.nnz == level.A.nnz // 4
-        pattern, there = galerkin(pattern, there, kernel)
+        pattern, nodes = galerkin(pattern, nodes, kernel)
 
 
-def test_two_particles_apart_meet_on_the_coarse_grids():
-    rows = geometric(np.array([[0.3, 0.4, 5.0], [0.7, 0.4, 5.0]]), 0.1)
+def test_two_distant_particles_share_nodes_on_the_coarse_grids():
+    rows = geometric_levels(np.array([[0.3, 0.4, 5.0], [0.7, 0.4, 5.0]]), 0.1)
     assert (rows[0].rows, rows[0].per_row) == (2 * 81, 81.0)
     assert (rows[-1].rows, rows[-1].per_row) == (81, 81.0)
     assert len(rows) == LEVELS

@@ -1,4 +1,4 @@
-"""Whole runs: what a course keeps, that it is read again, and pictures of its states."""
+"""Whole runs: the content of a history, that it is read again, and pictures of its states."""
 
 import numpy as np
 import pytest
@@ -9,9 +9,8 @@ from mpm_ref.scene import build
 from validation.common.registry import discover
 from validation.common.results import ProfileResults
 from validation.common.scenes import catalogue_scene, with_
-from validation.hot import run_history as courses
-from validation.hot import whole_runs
-from validation.hot.run_history import COLUMNS, FIELDS, SHOTS, course, read, run
+from validation.hot import run_history as histories
+from validation.hot.run_history import COLUMNS, FIELDS, read, run, run_history
 from validation.hot.sizes import SIZES
 from validation.trade.hot_energy import DT, End, StopRule, distance_in_cells, twisted
 
@@ -25,78 +24,69 @@ def small(steps=3, **changes):
 
 
 @pytest.fixture(scope="module")
-def known():
+def history():
     return run(small(), 1e3)
 
 
-def test_course_keeps_every_step_and_some_states(known):
-    assert known.facts["why"] == "end"
-    assert known.steps.shape == (3, len(COLUMNS))
-    np.testing.assert_allclose(known.column("t"), np.cumsum(known.column("dt")), rtol=1e-14)
-    np.testing.assert_allclose(known.times, np.arange(4) / 24.0, rtol=1e-14)
-    assert known.column("converged").all()
+def test_history_has_every_step_and_some_states(history):
+    assert history.facts["why"] == "end"
+    assert history.steps.shape == (3, len(COLUMNS))
+    np.testing.assert_allclose(history.column("t"), np.cumsum(history.column("dt")), rtol=1e-14)
+    np.testing.assert_allclose(history.times, np.arange(4) / 24.0, rtol=1e-14)
+    assert history.column("converged").all()
     for name in FIELDS:
-        assert getattr(known, name).shape[:2] == (4, 500)
-        assert getattr(known, name).dtype == np.float32
-    assert np.all(known.column("solve") <= known.column("cpu"))
+        assert getattr(history, name).shape[:2] == (4, 500)
+        assert getattr(history, name).dtype == np.float32
+    assert np.all(history.column("solve") <= history.column("cpu"))
 
 
-def test_particles_keep_their_places_in_a_course(known):
+def test_particles_have_the_same_places_throughout_a_history(history):
     body = build(small()).bodies[0]
-    np.testing.assert_array_equal(known.x[0], body.particles.x[np.argsort(body.id)]
+    np.testing.assert_array_equal(history.x[0], body.particles.x[np.argsort(body.id)]
                                   .astype(np.float32))
-    assert np.linalg.norm(known.x[1] - known.x[0], axis=1).max() < 0.06
+    assert np.linalg.norm(history.x[1] - history.x[0], axis=1).max() < 0.06
 
 
-def test_momentum_balances_only_with_what_the_conditions_give(known, monkeypatch):
-    assert known.column("gap").max() < 1e-13
-    monkeypatch.setattr(courses.Witness, "solve", courses.ImplicitStepper.solve)
+def test_momentum_balances_only_with_the_impulse_of_the_conditions(history, monkeypatch):
+    assert history.column("gap").max() < 1e-13
+    monkeypatch.setattr(histories.ImpulseStepper, "solve", histories.ImplicitStepper.solve)
     assert run(small(1), 1e3).column("gap").max() > 1e-3
 
 
-def test_course_is_read_where_it_was_run(tmp_path, monkeypatch):
+def test_history_is_read_where_it_was_run(tmp_path, monkeypatch):
     file = tmp_path / "states" / "bust.npz"
-    made = course(small(1), file, 1e3)
+    stored = run_history(small(1), file, 1e3)
     assert (file.parent / ".gitignore").read_text() == "*\n"
-    monkeypatch.setattr(courses, "run", lambda *_: pytest.fail("it is there"))
-    again = course(small(1), file, 1e3)
-    assert again.facts == made.facts
-    for a, b in zip(again[:-1], made[:-1], strict=True):
+    monkeypatch.setattr(histories, "run", lambda *_: pytest.fail("it is there"))
+    again = run_history(small(1), file, 1e3)
+    assert again.facts == stored.facts
+    for a, b in zip(again[:-1], stored[:-1], strict=True):
         np.testing.assert_array_equal(a, b)
 
 
-def test_course_of_another_scene_is_run_anew(tmp_path):
+def test_history_of_another_scene_is_run_anew(tmp_path):
     file = tmp_path / "bust.npz"
-    course(small(1), file, 1e3)
-    assert len(course(small(2), file, 1e3).steps) == 2
+    run_history(small(1), file, 1e3)
+    assert len(run_history(small(2), file, 1e3).steps) == 2
     assert len(read(file).steps) == 2
 
 
 def test_run_out_of_patience_says_so():
-    known = run(small(), 0.0)
-    assert known.facts["why"] == "more than 0.0 CPU seconds"
-    assert len(known.steps) == 0
+    history = run(small(), 0.0)
+    assert history.facts["why"] == "more than 0.0 CPU seconds"
+    assert len(history.steps) == 0
 
 
-def test_broken_run_is_kept_with_its_reason():
+def test_broken_run_is_stored_with_its_reason():
     scene = small()
-    known = run(with_(scene, limits=with_(scene.limits, J=(0.9999, 1.0001))), 1e3)
-    assert "J is outside" in known.facts["why"]
-    assert known.times[-1] > 0.0
+    history = run(with_(scene, limits=with_(scene.limits, J=(0.9999, 1.0001))), 1e3)
+    assert "J is outside" in history.facts["why"]
+    assert history.times[-1] > 0.0
 
 
 def test_every_scene_has_a_whole_run():
-    found = {id for id in discover().experiments if id.startswith("hot.scenes.")}
-    assert found == {name.replace("hot_", "hot.scenes.") for name in SIZES}
-
-
-def test_table_is_thinned_to_its_ends():
-    rows = np.arange(2001.0)[:, None]
-    thin = whole_runs.thinned(rows)
-    assert len(thin) == whole_runs.ROWS
-    assert (thin[0], thin[-1]) == ([0.0], [2000.0])
-    assert whole_runs.thinned(rows[:7]) == rows[:7].tolist()
-    assert SHOTS == 12
+    experiments = {id for id in discover().experiments if id.startswith("hot.scenes.")}
+    assert experiments == {name.replace("hot_", "hot.scenes.") for name in SIZES}
 
 
 # Pictures
@@ -140,11 +130,11 @@ def test_normals_of_a_cloud_point_outwards():
     assert np.all(n[abs(x).max(axis=1) < 0.5] == 0.0)
 
 
-def test_states_are_drawn_and_missing_ones_named(known, tmp_path):
+def test_states_are_drawn_and_missing_ones_named(history, tmp_path):
     results = ProfileResults(tmp_path)
     with pytest.raises(FileNotFoundError, match=r"hot\.scenes\.faceless"):
         states(results, "faceless", Look((0,), ("#e8a33d",)))
-    courses.write(tmp_path / "states" / "faceless.npz", known)
+    histories.write(tmp_path / "states" / "faceless.npz", history)
     figure = states(results, "faceless", Look((0, 7), ("viridis",),
                                               scalar=("speed", 1.0, "speed [m/s]")))
     assert [ax.get_title() for ax in figure.axes[:2]] == ["t = 0.00 s", "t = 0.12 s"]

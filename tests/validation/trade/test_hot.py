@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from mpm_ref.scene import Body, Box, Material, Regular, Scene, Scheme, Velocity, build
-from validation.hot.iterates import first
-from validation.hot.one_step import Errors, difference, errors
+from validation.hot.iterates import initial_step
+from validation.hot.one_step import ParticleErrors, difference, particle_errors
 from validation.hot.stiffness import METHODS
-from validation.hot.warm_states import BEGUN
+from validation.hot.warm_states import START_TIMES
 from validation.trade import hot_methods
 from validation.trade.hot import POINT, Point, bounded_below, times_for
 from validation.trade.hot_methods import (
@@ -40,7 +40,7 @@ def step():
                  velocity=Velocity(linear=[3.0, 0.0]))
     scene = Scene(dim=2, dx=0.1, gravity=[0.0, -9.8], integrator="hot", cfl=0.6, longest=0.01,
                   end=0.1, every=1, scheme=Scheme(transfer="apic"), body=(block,))
-    return first(build(scene))
+    return initial_step(build(scene))
 
 
 def fall(step):
@@ -50,7 +50,7 @@ def fall(step):
 
 def test_a_speed_that_all_have_too_much_is_every_error(step):
     extra = np.array([0.3, 0.4])
-    found = errors(step, fall(step) + extra, fall(step))
+    found = particle_errors(step, fall(step) + extra, fall(step))
     assert found.velocity == pytest.approx(0.5 / (9.8 * step.dt))
     assert found.velocity_max == pytest.approx(found.velocity)
     assert found.cells == pytest.approx(0.5 * step.dt / 0.1)
@@ -59,14 +59,15 @@ def test_a_speed_that_all_have_too_much_is_every_error(step):
 
 
 def test_nothing_done_is_an_error_of_one(step):
-    assert errors(step, np.zeros_like(fall(step)), fall(step)).velocity == pytest.approx(1.0)
-    assert errors(step, fall(step), fall(step)) == (0.0, 0.0, 0.0, 0.0)
+    errors = particle_errors(step, np.zeros_like(fall(step)), fall(step))
+    assert errors.velocity == pytest.approx(1.0)
+    assert particle_errors(step, fall(step), fall(step)) == (0.0, 0.0, 0.0, 0.0)
 
 
 def test_one_node_moves_the_particles_near_it_most(step):
     one = fall(step)
     one[0] += 1.0
-    found = errors(step, one, fall(step))
+    found = particle_errors(step, one, fall(step))
     assert found.velocity_max > 1.5 * found.velocity
     assert found.cells_max / found.cells == pytest.approx(found.velocity_max / found.velocity)
     assert found.cells_max < step.dt / 0.1
@@ -81,7 +82,7 @@ def made(method, eps, cpu, error, **others):
 def test_no_error_is_known_better_than_the_reference():
     points = [made("pn-pcg", 1e-7, 1.0, 0.0), made("pn-pcg", 1e-6, 1.0, 1e-2, cells=1e-2,
                                                    error_max=2e-2, cells_rms=3e-3)]
-    least = Errors(1e-4, 2e-4, 3e-5, 4e-5)
+    least = ParticleErrors(1e-4, 2e-4, 3e-5, 4e-5)
     small, large = bounded_below(points, least)
     assert (small.error, small.error_max, small.cells_rms, small.cells) == least
     assert large == points[1]
@@ -169,7 +170,7 @@ def test_every_method_is_tried_and_newton_with_multigrid_bears_its_cycle():
     quick, standard = plan("quick"), plan("standard")
     assert {trial.methods for trial in quick} == {METHODS}
     assert {(t.size, t.methods) for t in standard} == {("quick", ALL), ("standard", SOME)}
-    assert {t.scene for t in standard if t.size == "quick"} == set(BEGUN)
+    assert {t.scene for t in standard if t.size == "quick"} == set(START_TIMES)
     found = {way.method: way for way in tolerance_ladders(ALL, (1e-3, 1e-4))}
     assert {name for name, way in found.items() if "flexible" in way.options} == {
         "pn-mgpcg", "pn-gmg-pcg"}
