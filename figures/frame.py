@@ -1,4 +1,4 @@
-"""The frame of all figures.
+"""Draw figures from the results of experiments.
 
 Figure ``<paper>_<name>`` is the module ``figures/<paper>/<name>.py``. Its docstring is the caption,
 ``NEEDS`` lists the ids of the experiments whose results it reads (the report shows it under the
@@ -35,15 +35,15 @@ STYLE = {
 
 
 class Drawn(NamedTuple):
-    """What became of the figures, by name."""
+    """Names of the figures that were drawn, left out and failed."""
 
     done: list
     left: list          # their results, or unpublished states, are not here
-    failed: list        # their script raised
+    failed: list        # their script raised an error
 
 
 def names(folder=HERE):
-    """Names of all figures."""
+    """Return the names of all figures."""
     files = (file for file in folder.glob("*/*.py") if not file.stem.startswith("_"))
     return sorted(f"{file.parent.name}_{file.stem}" for file in files
                   if file.parent.name != "common")
@@ -108,21 +108,23 @@ def _script(name, folder):
 
 
 def _choose(wanted, folder):
-    known = names(folder)
-    chosen = [name for word in wanted for name in _named(word, known, folder)]
-    return list(dict.fromkeys(chosen)) or known
+    existing = names(folder)
+    chosen = [name for word in wanted for name in _matching(word, existing, folder)]
+    return list(dict.fromkeys(chosen)) or existing
 
 
-def _named(word, known, folder):
-    """The figure of that name, or those which need the experiment of that id."""
-    found = [word] if word in known else [n for n in known if word in _script(n, folder).NEEDS]
-    if not found:
-        raise ValueError(f"no figure {word!r}; there are: {', '.join(known) or 'none'}")
-    return found
+def _matching(word, existing, folder):
+    """Return the figure of that name, or those which need the experiment of that id."""
+    if word in existing:
+        return [word]
+    matches = [name for name in existing if word in _script(name, folder).NEEDS]
+    if not matches:
+        raise ValueError(f"no figure {word!r}; there are: {', '.join(existing) or 'none'}")
+    return matches
 
 
 def _check_results(script, results):
-    """Raises FileNotFoundError where an experiment that a script needs has no results."""
+    """Raise FileNotFoundError where an experiment that a script needs has no results."""
     for id in script.NEEDS:
         results.records(id)
 
@@ -141,7 +143,7 @@ def _save(script, name, results):
 
 
 def _scale(script, results):
-    """The sentence on the scale, of a script that has one."""
+    """Return the sentence on the scale, of a script that has one."""
     if not hasattr(script, "scale"):
         return ""
     return f"Scale ({results.folder.name}): {script.scale(results)}."

@@ -1,8 +1,8 @@
-"""What figures of LDM's four schemes share: their labels and markers, and curves by scheme."""
+"""Labels and markers of LDM's four schemes, and curves of errors by scheme."""
 
 import matplotlib.pyplot as plt
 
-from .orders import legend_below, series
+from .style import legend_below, series
 
 MARKS = {"lagrangian_nonlinear": ("Lagrangian, nonlinear", "o"),
          "lagrangian_linear": ("Lagrangian, linear", "s"),
@@ -11,15 +11,15 @@ MARKS = {"lagrangian_nonlinear": ("Lagrangian, nonlinear", "o"),
 
 
 def curves(table, column, label, line="", more=()):
-    """Figure of position errors [%] over a column of a table of errors, by scheme; `line` joins
-    the points, `more` holds further (scheme, label, style).
+    """Draw position errors [%] over a column of a table of errors, by scheme. `line` joins the
+    points, `more` holds further (scheme, label, style).
     """
     figure, ax = plt.subplots(figsize=(6.4, 4.0))
-    found = series(table, ("scheme",))
+    masks = series(table, ("scheme",))
     styles = [(name, words, mark + line) for name, (words, mark) in MARKS.items()]
     for name, words, style in (*styles, *more):
-        if (name,) in found:
-            rows = found[name,]
+        if (name,) in masks:
+            rows = masks[name,]
             ax.semilogy(table[column][rows], 100.0 * table["origin"][rows], style, label=words,
                         fillstyle="none")
     ax.set(xlabel=label, ylabel="position error [%]")

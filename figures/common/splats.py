@@ -1,5 +1,5 @@
-"""Pictures of particles as shaded balls, seen from far away: a depth buffer, and light by normal,
-hollows and outlines.
+"""Pictures of particles as shaded balls in parallel projection: a depth buffer, and light by
+normal, hollows and outlines.
 """
 
 from typing import NamedTuple
@@ -16,7 +16,7 @@ AROUND = 30                     # neighbours that give a particle its normal
 
 
 class Balls(NamedTuple):
-    """What is drawn."""
+    """Balls to draw: centres, normals, radii and colours."""
 
     x: np.ndarray               # (N, 3)  [m]
     n: np.ndarray               # (N, 3)  unit normals; 0 inside of a body
@@ -25,10 +25,10 @@ class Balls(NamedTuple):
 
 
 class Camera(NamedTuple):
-    """Orthographic: turned about the vertical axis, lifted, in degrees; what it sees; pixels."""
+    """An orthographic camera: its angles in degrees, the window that it shows, and its pixels."""
 
-    turn: float
-    lift: float
+    turn: float                 # about the vertical axis [degrees]
+    lift: float                 # above the horizon [degrees]
     low: np.ndarray             # (2,) right and up [m]
     high: np.ndarray            # (2,)
     pixels: int                 # along the longer side
@@ -48,9 +48,7 @@ class Camera(NamedTuple):
 
 
 def outward(x):
-    """Normals (N, 3) of a cloud: away from the mean of the nearest, 0 where that is in the middle
-    of them.
-    """
+    """Return the normals (N, 3) of a cloud: away from the mean of the nearest points, 0 inside."""
     if len(x) <= AROUND:
         return np.zeros_like(x)
     far, near = cKDTree(x).query(x, AROUND)
@@ -60,78 +58,81 @@ def outward(x):
 
 
 def image(balls, camera):
-    """RGBA picture (h, w, 4) of balls; nothing to be seen where there are none."""
+    """Return the RGBA picture (h, w, 4) of balls, transparent where there are none."""
     depth, normal, colour = buffers(balls, camera)
     if not len(balls.x):
         return coarsened(np.zeros((*depth.shape, 4)))
-    seen = np.isfinite(depth)
+    visible = np.isfinite(depth)
     light = np.clip(normal @ (LIGHT / np.linalg.norm(LIGHT)), 0.0, 1.0)
     bright = DARK + (1.0 - DARK) * light
     size = 2.0 * float(balls.radius.min())
-    bright *= 1.0 - HOLLOW * hollows(depth, seen, size, camera.per_metre)
-    bright[outlines(depth, seen, 2.5 * size)] *= LINE
+    bright *= 1.0 - HOLLOW * hollows(depth, visible, size, camera.per_metre)
+    bright[outlines(depth, visible, 2.5 * size)] *= LINE
     rgb = np.clip(colour * bright[..., None], 0.0, 1.0) + 0.18 * (light**24)[..., None]
-    return coarsened(np.dstack([np.clip(rgb, 0.0, 1.0) * seen[..., None], seen]))
+    return coarsened(np.dstack([np.clip(rgb, 0.0, 1.0) * visible[..., None], visible]))
 
 
 def buffers(balls, camera):
-    """Depth to the eye (-inf: nothing), normals and colours of all subpixels, top row first."""
+    """Return depth to the eye (-inf: nothing), normals and colours of all subpixels, top row
+    first.
+    """
     width, height = np.ceil((camera.high - camera.low) * camera.per_metre).astype(int)
     depth, which = np.full((height, width), -np.inf), np.zeros((height, width), dtype=int)
     place = balls.x @ camera.axes.T
     spot = (place[:, :2] - camera.low) * camera.per_metre
-    reach = balls.radius * camera.per_metre
+    extent = balls.radius * camera.per_metre
     for k in range(len(place)):
-        dab((depth, which), k, spot[k], (place[k, 2], balls.radius[k], reach[k]))
-    seen = np.isfinite(depth)
-    rows, columns = np.nonzero(seen)
-    k = which[seen]
-    disc = (np.stack([columns, rows], axis=1) + 0.5 - spot[k]) / reach[k, None]
+        rasterize((depth, which), k, spot[k], (place[k, 2], balls.radius[k], extent[k]))
+    visible = np.isfinite(depth)
+    rows, columns = np.nonzero(visible)
+    k = which[visible]
+    disc = (np.stack([columns, rows], axis=1) + 0.5 - spot[k]) / extent[k, None]
     round_ = np.column_stack([disc, np.sqrt(np.maximum(1.0 - (disc**2).sum(axis=1), 0.0))])
-    own = (balls.n @ camera.axes.T)[k]
-    blend = own + np.where(own.any(axis=1, keepdims=True), BUMPS, 1.0) * round_
+    cloud = (balls.n @ camera.axes.T)[k]
+    blend = cloud + np.where(cloud.any(axis=1, keepdims=True), BUMPS, 1.0) * round_
     normal, colour = np.zeros((height, width, 3)), np.zeros((height, width, 3))
-    normal[seen] = blend / np.linalg.norm(blend, axis=1, keepdims=True)
-    colour[seen] = balls.colour[k]
+    normal[visible] = blend / np.linalg.norm(blend, axis=1, keepdims=True)
+    colour[visible] = balls.colour[k]
     return depth[::-1], normal[::-1], colour[::-1]
 
 
-def dab(canvas, k, spot, ball):
-    """Ball k into the depths and the numbers of what is seen, around a spot in subpixels."""
-    (depth, which), (z, radius, reach) = canvas, ball
-    i0, j0 = (max(int(s - reach), 0) for s in spot)
-    i1, j1 = (int(s + reach) + 2 for s in spot)
+def rasterize(canvas, k, spot, ball):
+    """Write ball k, at a spot in subpixels, into the depths and the numbers of the front balls."""
+    (depth, which), (z, radius, extent) = canvas, ball
+    i0, j0 = (max(int(s - extent), 0) for s in spot)
+    i1, j1 = (int(s + extent) + 2 for s in spot)
     part = depth[j0:j1, i0:i1]
     if i1 < 0 or j1 < 0 or part.size == 0:
         return
-    u = (np.arange(i0, i0 + part.shape[1]) + 0.5 - spot[0]) / reach
-    v = (np.arange(j0, j0 + part.shape[0]) + 0.5 - spot[1]) / reach
+    u = (np.arange(i0, i0 + part.shape[1]) + 0.5 - spot[0]) / extent
+    v = (np.arange(j0, j0 + part.shape[0]) + 0.5 - spot[1]) / extent
     w2 = (1.0 - v * v)[:, None] - u * u
-    here = z + radius * np.sqrt(np.maximum(w2, 0.0))
-    front = (w2 >= 0.0) & (here > part)
-    part[front] = here[front]
+    surface = z + radius * np.sqrt(np.maximum(w2, 0.0))
+    front = (w2 >= 0.0) & (surface > part)
+    part[front] = surface[front]
     which[j0:j1, i0:i1][front] = k
 
 
-def hollows(depth, seen, size, per_metre):
-    """How far subpixels lie behind what is around them, 0 to 1."""
-    filled, width = np.where(seen, depth, 0.0), max(int(4.0 * size * per_metre), 1)
-    near = smooth(filled, width) / np.maximum(smooth(seen.astype(float), width), 1e-9)
-    return np.clip((near - filled) / (4.0 * size), 0.0, 1.0) * seen
+def hollows(depth, visible, size, per_metre):
+    """Return the share, 0 to 1, by which subpixels lie behind their surroundings."""
+    filled, width = np.where(visible, depth, 0.0), max(int(4.0 * size * per_metre), 1)
+    near = smooth(filled, width) / np.maximum(smooth(visible.astype(float), width), 1e-9)
+    return np.clip((near - filled) / (4.0 * size), 0.0, 1.0) * visible
 
 
 def smooth(a, width):
-    """Means over a square, twice: nearly a Gaussian, and cheap."""
+    """Average over a square, twice: nearly a Gaussian, and cheap."""
     return uniform_filter(uniform_filter(a, width), width)
 
 
-def outlines(depth, seen, step):
-    """Subpixels beside which the depth jumps towards the eye, or where a body ends."""
-    high = np.where(seen, depth, -1e3)
-    return seen & (grey_dilation(high, 3) - high > step) | ~seen & (grey_dilation(high, 3) > -1e3)
+def outlines(depth, visible, step):
+    """Mark subpixels next to which the depth jumps towards the eye, or where a body ends."""
+    high = np.where(visible, depth, -1e3)
+    front = grey_dilation(high, 3)
+    return visible & (front - high > step) | ~visible & (front > -1e3)
 
 
 def coarsened(rgba):
-    """Means over FINE x FINE subpixels."""
+    """Average over FINE x FINE subpixels."""
     h, w = (side // FINE * FINE for side in rgba.shape[:2])
     return rgba[:h, :w].reshape(h // FINE, FINE, w // FINE, FINE, 4).mean(axis=(1, 3))

@@ -5,7 +5,7 @@ Timoshenko's beam in plane strain, as Poisson's ratio goes to 1/2. Quadratic MLS
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..common.orders import counts
+from ..common.style import counts
 
 NEEDS = ["extremes.explicit.locking"]
 
@@ -19,8 +19,8 @@ def draw(results):
     curve = results.table(NEEDS[0], "curve")
     figure, ax = plt.subplots()
     for layers, per in sorted(set(zip(curve["layers"], curve["per_direction"], strict=True))):
-        mine = (curve["layers"] == layers) & (curve["per_direction"] == per)
-        ax.plot(0.5 - curve["nu"][mine], curve["swing"][mine], "o-", ms=4,
+        rows = (curve["layers"] == layers) & (curve["per_direction"] == per)
+        ax.plot(0.5 - curve["nu"][rows], curve["swing"][rows], "o-", ms=4,
                 label=f"{layers:g} cells high, {per:g} x {per:g} particles")
     ax.axhline(1.0, color="0.5", lw=1, ls="--")
     ax.set(xscale="log", ylabel="swing / Timoshenko (dashed: 1)", ylim=(0.0, None))

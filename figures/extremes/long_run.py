@@ -1,12 +1,12 @@
-"""Energy that symplectic Euler keeps, H - (dt/2) dU/dt, over a long run of oscillators at half the
-stable time step, with the state stored in double (f64) and in single precision (f32, emulated by
-rounding). A particle by itself is not damped; a block is, by the filter of its transfer.
+"""Energy that symplectic Euler conserves, H - (dt/2) dU/dt, over a long run of oscillators at half
+the stable time step, with the state stored in double (f64) and in single precision (f32, emulated
+by rounding). A particle by itself is not damped; a block is, by the filter of its transfer.
 """
 
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..common.orders import TRANSFERS, scales
+from ..common.style import TRANSFERS, scales
 
 NEEDS = ["extremes.explicit.long_run"]
 SHARES = {"f64": 1.0, "f32": 0.45}
@@ -24,11 +24,11 @@ def draw(results):
     figure, axes = plt.subplots(1, len(parts), figsize=(1.0 + 5.0 * len(parts), 3.6), squeeze=False)
     for ax, part in zip(axes[0], parts, strict=True):
         for name in part:
-            mine = table["run"] == name
+            rows = table["run"] == name
             what, transfer, storage = name.split(".")
-            ax.plot(table["step"][mine], table["kept"][mine], color=TRANSFERS[transfer],
+            ax.plot(table["step"][rows], table["kept"][rows], color=TRANSFERS[transfer],
                     alpha=SHARES[storage], label=f"{what}, {transfer}, {storage}")
-        ax.set(xlabel="step", ylabel="energy kept / its start")
+        ax.set(xlabel="step", ylabel="conserved energy / initial")
         ax.ticklabel_format(useOffset=False)
         if part[0].startswith("block") and np.nanmin(table["kept"]) > 0.0:
             ax.set_yscale("log")

@@ -13,7 +13,7 @@ import numpy as np
 from mpm_ref.nclaw.strain_watch import MAX_EXCESS
 from validation.extremes.nclaw_runs import BAD
 
-from ..common.orders import scales, series
+from ..common.style import scales, series
 from ..nclaw.loss import COLOURS
 from ..trade.ldm import readable
 
@@ -40,16 +40,16 @@ def draw(results):
     return figure
 
 
-def over_usual(table):
-    """Errors over the usual one of the law."""
+def over_baseline(table):
+    """Return errors over the baseline of the law."""
     return table["error"] / table["usual"]
 
 
 def strains(ax, table):
-    """A mark for each run that reached its end."""
+    """Draw a mark for each run that reached its end."""
     for (name,), rows in series(table, ("law",)).items():
         rows = rows & np.isfinite(table["error"])
-        ax.plot(table["beyond"][rows], over_usual(table)[rows], "o", color=COLOURS[name], ms=4,
+        ax.plot(table["beyond"][rows], over_baseline(table)[rows], "o", color=COLOURS[name], ms=4,
                 fillstyle="none", label=name)
     ax.axhline(BAD, color="0.5", lw=1)
     ax.axvline(MAX_EXCESS, color="0.5", lw=1)
@@ -61,13 +61,13 @@ def strains(ax, table):
 
 
 def rates(ax, table):
-    """Shares by the bound."""
+    """Draw the shares of false alarms and misses over the bound."""
     for group, dash in GROUPS.items():
         rows = (table["laws"] == group) & (table["error"] == BAD)
-        for wrong, of, words, mark in (("false_alarms", "good", "good, and flagged", "o"),
-                                       ("misses", "bad", "bad, and not flagged", "s")):
-            share = table[wrong][rows] / np.maximum(table[of][rows], 1)
-            label = words if group == "chosen" else f"{words}: other laws"
+        for wrong, total, text, mark in (("false_alarms", "good", "good, and flagged", "o"),
+                                         ("misses", "bad", "bad, and not flagged", "s")):
+            share = table[wrong][rows] / np.maximum(table[total][rows], 1)
+            label = text if group == "chosen" else f"{text}: other laws"
             ax.plot(table["beyond"][rows], share, f"{mark}{dash}", color="k", ms=4,
                     fillstyle="none", label=label)
     ax.axvline(MAX_EXCESS, color="0.5", lw=1)
@@ -75,16 +75,16 @@ def rates(ax, table):
 
 
 def by_factor(ax, table):
-    """A curve for each law; full marks where the run was flagged."""
+    """Draw a curve for each law; full marks where the run was flagged."""
     factor = np.array([1.0 if what == TRAINED else float(what.split()[0])
                        for what in table["what"]])
     for (name,), rows in series(table, ("law",)).items():
         rows = np.flatnonzero(rows & np.isfinite(table["error"]))
         rows = rows[np.argsort(factor[rows])]
-        x, y = factor[rows], over_usual(table)[rows]
+        x, y = factor[rows], over_baseline(table)[rows]
         ax.loglog(x, y, "o-", color=COLOURS[name], ms=5, fillstyle="none", label=name)
-        told = table["flags"][rows] != ""
-        ax.plot(x[told], y[told], "o", color=COLOURS[name], ms=5)
+        flagged = table["flags"][rows] != ""
+        ax.plot(x[flagged], y[flagged], "o", color=COLOURS[name], ms=5)
     ax.axhline(BAD, color="0.5", lw=1)
     ax.set_ylabel("error over that of the trained run")
     readable(ax.xaxis, (1.0, 2.0, 5.0))

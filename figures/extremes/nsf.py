@@ -11,7 +11,7 @@ import numpy as np
 from mpm_ref.rom.extrapolation import BEYOND
 from validation.extremes.ldm_runs import BAD
 
-from ..common.orders import scales, series
+from ..common.style import scales, series
 from ..trade.ldm import readable
 from ..trade.nsf import COLOURS
 
@@ -36,7 +36,7 @@ def draw(results):
 
 
 def runs(ax, table):
-    """A mark for each run that reached its end, with its parameter."""
+    """Draw a mark for each run that reached its end, with its parameter."""
     for (scene,), rows in series(table, ("map",)).items():
         rows = rows & np.isfinite(table["error"])
         x, y = table["beyond"][rows], table["error"][rows] / table["usual"][rows]
@@ -51,8 +51,8 @@ def runs(ax, table):
 
 
 def rates(ax, table):
-    """Shares by the bound."""
-    for name, words, style in (("false_alarms", "good, and flagged", "o-"),
+    """Draw the shares of false alarms and misses over the bound."""
+    for name, label, style in (("false_alarms", "good, and flagged", "o-"),
                                ("misses", "bad, and neither flagged nor stopped", "s--")):
-        ax.plot(table["bound"], table[name], style, color="k", ms=4, fillstyle="none", label=words)
+        ax.plot(table["bound"], table[name], style, color="k", ms=4, fillstyle="none", label=label)
     ax.set(xlabel="bound", ylabel="share", ylim=(-0.05, 1.05))

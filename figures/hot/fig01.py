@@ -1,13 +1,13 @@
 """HOT, Figure 1: four soft pillars with a stiff ball in each are twisted and pulled."""
 
-from ..common.state_panels import Look, said, states
+from ..common.state_panels import SceneView, scene_scale, states
 
 NEEDS = ["hot.scenes.twist"]
-LOOK = Look((0, 2, 4, 6), ("#e8a33d", "#3b5ba5"))
+LOOK = SceneView((0, 2, 4, 6), ("#e8a33d", "#3b5ba5"))
 
 
 def scale(results):
-    return said(results, "twist")
+    return scene_scale(results, "twist")
 
 
 def draw(results):

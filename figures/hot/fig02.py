@@ -2,15 +2,15 @@
 Young's modulus is a tenth, a hundredth and a thousandth, from left to right.
 """
 
-from ..common.state_panels import Look, said, states
+from ..common.state_panels import SceneView, scene_scale, states
 
 NEEDS = ["hot.scenes.aluminium"]
-LOOK = Look((0, 6, 12), ("#8d99ae", "#5c8fb5", "#3fa796", "#8cc084", "#e0a030"), turn=15.0,
-            lift=24.0, columns=1, held=False)
+LOOK = SceneView((0, 6, 12), ("#8d99ae", "#5c8fb5", "#3fa796", "#8cc084", "#e0a030"), turn=15.0,
+            lift=24.0, columns=1, show_prescribed=False)
 
 
 def scale(results):
-    return said(results, "aluminium")
+    return scene_scale(results, "aluminium")
 
 
 def draw(results):

@@ -1,13 +1,13 @@
 """HOT, Figure 4: a ball pushes a metal box down between two soft ones, until it tears off."""
 
-from ..common.state_panels import Look, said, states
+from ..common.state_panels import SceneView, scene_scale, states
 
 NEEDS = ["hot.scenes.boxes"]
-LOOK = Look((0, 3, 5, 9), ("#e07a5f", "#e07a5f", "#8d99ae"), high=(3.2, 4.35, 2.3))
+LOOK = SceneView((0, 3, 5, 9), ("#e07a5f", "#e07a5f", "#8d99ae"), high=(3.2, 4.35, 2.3))
 
 
 def scale(results):
-    return said(results, "boxes")
+    return scene_scale(results, "boxes")
 
 
 def draw(results):

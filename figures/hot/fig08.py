@@ -5,7 +5,7 @@ Crosses are printed; they belong to 403 000 particles.
 
 import matplotlib.pyplot as plt
 
-from ..common.orders import legend_below, series, shared
+from ..common.style import legend_below, series, shared_scale
 
 NEEDS = ["hot.fig8"]
 KINDS = {"linear": ("linear embedding", "C0", "o-"),
@@ -15,7 +15,7 @@ PRINTED = {("l0", 0): "C0", ("l4", 4): "C0", ("gmg4", 4): "C1"}
 
 
 def scale(results):
-    return shared(results, NEEDS[0])
+    return shared_scale(results, NEEDS[0])
 
 
 def draw(results):

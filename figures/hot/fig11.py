@@ -4,7 +4,7 @@ a matrix, all from the states that HOT went through.
 
 import matplotlib.pyplot as plt
 
-from ..common.orders import legend_below, scales, series
+from ..common.style import legend_below, scales, series
 from .fig20 import METHODS
 
 NEEDS = ["hot.fig11"]

@@ -1,13 +1,13 @@
 """HOT, Figure 14: sauce is poured onto a turkey."""
 
-from ..common.state_panels import Look, said, states
+from ..common.state_panels import SceneView, scene_scale, states
 
 NEEDS = ["hot.scenes.sauce"]
-LOOK = Look((0, 1, 3, 12), ("#b5302a",), low=(2.2, 2.97, 2.45), high=(3.7, 4.2, 3.6))
+LOOK = SceneView((0, 1, 3, 12), ("#b5302a",), low=(2.2, 2.97, 2.45), high=(3.7, 4.2, 3.6))
 
 
 def scale(results):
-    return said(results, "sauce")
+    return scene_scale(results, "sauce")
 
 
 def draw(results):

@@ -5,7 +5,7 @@ where that ratio is largest. Hatched: not every step converged within the caps, 
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..common.orders import legend_below, scales, series
+from ..common.style import legend_below, scales, series
 
 NEEDS = ["hot.fig15"]
 LABELS = {"gast15": "Gast15", "pn-pcg": "PN-PCG", "pn-pcg-mf": "PN-PCG (MF)",

@@ -5,8 +5,8 @@ meets the tolerance (dashed) long before its error meets that of the others.
 
 import matplotlib.pyplot as plt
 
-from ..common.descents import drawn
-from ..common.orders import legend_below, shared
+from ..common.method_curves import draw_methods
+from ..common.style import legend_below, shared_scale
 
 NEEDS = ["hot.fig16"]
 METHODS = ("hot", "hot-quadratic", "lbfgs-h", "lbfgs-gmg", "admm", "pn-pcg", "pn-pcg-mf",
@@ -15,14 +15,14 @@ PANELS = (("iteration", "residual"), ("cpu", "residual"), ("cpu", "error"))
 
 
 def scale(results):
-    return shared(results, NEEDS[0])
+    return shared_scale(results, NEEDS[0])
 
 
 def draw(results):
     table = results.table(NEEDS[0], "iterates")
     figure, axes = plt.subplots(1, 3, figsize=(11.0, 3.4))
     for ax, columns in zip(axes, PANELS, strict=True):
-        drawn(ax, table, columns, METHODS)
+        draw_methods(ax, table, columns, METHODS)
     axes[0].set_xscale("symlog", linthresh=10.0)
     legend_below(figure, axes, columns=5)
     return figure

@@ -4,15 +4,15 @@ CPU time at the paper's tolerance (dashed, top), and on the way to smaller ones 
 
 import matplotlib.pyplot as plt
 
-from ..common.descents import EPS, drawn
-from ..common.orders import legend_below, shared
+from ..common.method_curves import EPS, draw_methods
+from ..common.style import legend_below, shared_scale
 
 NEEDS = ["hot.fig17"]
 METHODS = ("hot", "lbfgs-h", "pn-pcg", "pn-pcg-mf", "pn-mgpcg", "pn-mgpcg-flexible")
 
 
 def scale(results):
-    return shared(results, NEEDS[0])
+    return shared_scale(results, NEEDS[0])
 
 
 def draw(results):
@@ -20,7 +20,7 @@ def draw(results):
     figure, axes = plt.subplots(2, 2, figsize=(8.4, 6.2))
     for row, eps in zip(axes, (EPS, table["eps"].min()), strict=True):
         for ax, x in zip(row, ("iteration", "cpu"), strict=True):
-            drawn(ax, table, (x, "residual"), METHODS, table["eps"] == eps)
+            draw_methods(ax, table, (x, "residual"), METHODS, table["eps"] == eps)
             ax.set_title(f"tolerance {eps:.0e}", fontsize=9)
     for ax in axes[1]:
         ax.set_xscale("log")

@@ -6,8 +6,8 @@ allows for a preconditioner which varies is dotted.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..common.descents import EPS, LOOKS
-from ..common.orders import legend_below, shared
+from ..common.method_curves import EPS, STYLES
+from ..common.style import legend_below, shared_scale
 
 NEEDS = ["hot.fig19"]
 METHODS = ("pn-pcg", "pn-mgpcg", "pn-mgpcg-flexible", "pn-gmg-pcg", "pn-gmg-pcg-flexible")
@@ -15,14 +15,14 @@ SCENE = "armacat_stiff"
 
 
 def scale(results):
-    return shared(results, NEEDS[0], ".cg")
+    return shared_scale(results, NEEDS[0], ".cg")
 
 
 def draw(results):
     iterates, costs = (results.table(NEEDS[0], name) for name in ("iterates", "costs"))
     figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.4))
     for method in METHODS:
-        label, color, style = LOOKS[method]
+        label, color, style = STYLES[method]
         rows = iterates["method"] == method
         left.plot(iterates["residual"][rows], iterates["cg"][rows], style, color=color,
                   label=label, ms=3)

@@ -4,7 +4,7 @@ outer iterations per step, at the paper's tolerance, which is not equal error.
 
 import matplotlib.pyplot as plt
 
-from ..common.orders import legend_below, series, shared
+from ..common.style import legend_below, series, shared_scale
 
 NEEDS = ["hot.fig20"]
 METHODS = {"hot": ("HOT", "o-"), "lbfgs-h": ("LBFGS-H", "s-"), "pn-pcg": ("PN-PCG", "^-"),
@@ -12,7 +12,7 @@ METHODS = {"hot": ("HOT", "o-"), "lbfgs-h": ("LBFGS-H", "s-"), "pn-pcg": ("PN-PC
 
 
 def scale(results):
-    return shared(results, NEEDS[0])
+    return shared_scale(results, NEEDS[0])
 
 
 def draw(results):

@@ -5,7 +5,7 @@ Hollow marks are solves that did not converge. Right: the stiff middle on finer 
 
 import matplotlib.pyplot as plt
 
-from ..common.orders import legend_below, series
+from ..common.style import legend_below, series
 
 NEEDS = ["hot.preconditioners"]
 STIFF = 1e9

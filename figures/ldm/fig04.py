@@ -7,9 +7,9 @@ from matplotlib.colors import to_rgb
 
 from validation.ldm.published_bodies import read
 
-from ..common.bodies import FULL, Panel, View, body, ghost, levelled, nothing, pictures
-from ..common.orders import scales
+from ..common.bodies import FULL, Panel, View, body, flattened, ghost, no_balls, pictures
 from ..common.state_panels import spacing
+from ..common.style import scales
 
 NEEDS = ["ldm.fig4"]
 COLOURS = ("#e8a33d", "#3b5ba5", "#c8473d")     # elsewhere, bottom, top
@@ -24,6 +24,6 @@ def draw(results):
     kept = read(results.folder, NEEDS[0])
     X, samples, view = kept["X"], kept["X"][kept["samples"]], View(2, 6.4)
     paint = np.array([to_rgb(COLOURS[k]) for k in np.arange(1, 3) @ kept["held"]])
-    large = levelled(body(samples, paint, spacing(X), LARGE), view)
-    return pictures([Panel(body(X, FULL, spacing(X)), nothing(), f"all {len(X)} points"),
+    large = flattened(body(samples, paint, spacing(X), LARGE), view)
+    return pictures([Panel(body(X, FULL, spacing(X)), no_balls(), f"all {len(X)} points"),
                      Panel(large, ghost(X), f"{len(samples)} samples")], view)

@@ -4,9 +4,9 @@ through. Colours: distance from the place at rest.
 
 from validation.ldm.published_bodies import read
 
-from ..common.bodies import Panel, View, away, body, ghost, pictures, shades
-from ..common.orders import scales
+from ..common.bodies import Panel, View, body, distance_to, ghost, pictures, shades
 from ..common.state_panels import spacing
+from ..common.style import scales
 
 NEEDS = ["ldm.fig6"]
 
@@ -18,7 +18,7 @@ def scale(results):
 def draw(results):
     kept = read(results.folder, NEEDS[0])
     X, x = kept["X"], kept["reduced"]
-    paint, shown = shades(1000.0 * away(x, X))
+    paint, shown = shades(1000.0 * distance_to(x, X))
     found = [Panel(body(x[k], paint[k], spacing(X)), ghost(X), f"g = {g:g} m/s²")
              for k, g in enumerate(kept["g"])]
     return pictures(found, View(3, 9.0), shown, "displacement [mm]")

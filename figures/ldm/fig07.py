@@ -5,7 +5,7 @@ points, for the four schemes.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..common.orders import shared
+from ..common.style import shared_scale
 
 NEEDS = ["ldm.fig7"]
 SCHEMES = {"lagrangian_nonlinear": "(a) Lagrangian, nonlinear",
@@ -16,7 +16,7 @@ DARK = 0.2          # colours of smaller errors are dark
 
 
 def scale(results):
-    return shared(results, NEEDS[0])
+    return shared_scale(results, NEEDS[0])
 
 
 def draw(results):

@@ -2,15 +2,15 @@
 the error of the nearest states of the learned map, and of POD of the same dimension.
 """
 
-from ..common.orders import shared
 from ..common.schemes import curves
+from ..common.style import shared_scale
 
 NEEDS = ["ldm.fig8"]
 NEAREST = ("nearest", "nearest state, no dynamics", "k:")
 
 
 def scale(results):
-    return shared(results, NEEDS[0])
+    return shared_scale(results, NEEDS[0])
 
 
 def draw(results):

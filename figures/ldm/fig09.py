@@ -2,14 +2,14 @@
 all random draws, and POD with as many points.
 """
 
-from ..common.orders import shared
 from ..common.schemes import curves
+from ..common.style import shared_scale
 
 NEEDS = ["ldm.fig9"]
 
 
 def scale(results):
-    return shared(results, NEEDS[0])
+    return shared_scale(results, NEEDS[0])
 
 
 def draw(results):

@@ -6,7 +6,7 @@ edge: runs that broke down; dotted: the most that the paper has with 10 to 100 p
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..common.orders import legend_below, series, shared
+from ..common.style import legend_below, series, shared_scale
 from .fig07 import SCHEMES
 
 NEEDS = ["ldm.fig10"]
@@ -17,7 +17,7 @@ GOOD = 1.0          # [%], with 10 to 100 points
 
 
 def scale(results):
-    return shared(results, NEEDS[0])
+    return shared_scale(results, NEEDS[0])
 
 
 def draw(results):

@@ -7,9 +7,9 @@ from matplotlib.colors import to_rgb
 
 from validation.ldm.published_bodies import read
 
-from ..common.bodies import FULL, REDUCED, Panel, View, body, nothing, pictures
-from ..common.orders import scales
+from ..common.bodies import FULL, REDUCED, Panel, View, body, no_balls, pictures
 from ..common.state_panels import spacing
+from ..common.style import scales
 
 NEEDS = ["ldm.fig11"]
 CUBES = 4           # along the block's longest side
@@ -23,7 +23,7 @@ def draw(results):
     kept = read(results.folder, NEEDS[0])
     X = kept["X"]
     states = {"before": X, "after, reduced": kept["reduced"], "after, full": kept["full"]}
-    found = [Panel(body(x, chequered(X), spacing(X)), nothing(), words)
+    found = [Panel(body(x, chequered(X), spacing(X)), no_balls(), words)
              for words, x in states.items()]
     return pictures(found, View(3, 7.0, lift=28.0))
 

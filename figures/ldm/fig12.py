@@ -7,27 +7,27 @@ import numpy as np
 
 from validation.ldm.published_bodies import read
 
-from ..common.bodies import FULL, Panel, View, away, body, nothing, pictures, shades
-from ..common.orders import shared
+from ..common.bodies import FULL, Panel, View, body, distance_to, no_balls, pictures, shades
 from ..common.state_panels import spacing
+from ..common.style import shared_scale
 
 NEEDS = ["ldm.fig12"]
 TOP = 0.99          # quantile of the distances at which the colours end
 
 
 def scale(results):
-    return shared(results, NEEDS[0])
+    return shared_scale(results, NEEDS[0])
 
 
 def draw(results):
     kept = read(results.folder, NEEDS[0])
     full, low = kept["full"], kept["low"]
-    off = [1000.0 * away(kept[name], full) for name in ("tracers", "reduced")]
+    off = [1000.0 * distance_to(kept[name], full) for name in ("tracers", "reduced")]
     (tracers, reduced), shown = shades(off, "plasma", np.quantile(off, TOP))
     near = spacing(full)
-    found = [Panel(body(kept["tracers"], tracers, near), nothing(), "(a) tracers in (b)"),
-             Panel(body(low, FULL, spacing(low)), nothing(), f"(b) full, {len(low)} points"),
-             Panel(body(kept["reduced"], reduced, near), nothing(),
+    found = [Panel(body(kept["tracers"], tracers, near), no_balls(), "(a) tracers in (b)"),
+             Panel(body(low, FULL, spacing(low)), no_balls(), f"(b) full, {len(low)} points"),
+             Panel(body(kept["reduced"], reduced, near), no_balls(),
                    f"(c) reduced, {len(full)} points"),
-             Panel(body(full, FULL, near), nothing(), f"(d) full, {len(full)} points")]
+             Panel(body(full, FULL, near), no_balls(), f"(d) full, {len(full)} points")]
     return pictures(found, View(4, 8.0), shown, "distance from (d) [mm]")

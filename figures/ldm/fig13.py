@@ -4,9 +4,9 @@ reduced (bottom). Colours: distance from the place at rest, where it shines thro
 
 from validation.ldm.published_bodies import read
 
-from ..common.bodies import Panel, View, away, body, ghost, pictures, shades
-from ..common.orders import scales
+from ..common.bodies import Panel, View, body, distance_to, ghost, pictures, shades
 from ..common.state_panels import spacing
+from ..common.style import scales
 
 NEEDS = ["ldm.fig13"]
 
@@ -18,7 +18,7 @@ def scale(results):
 def draw(results):
     kept = read(results.folder, NEEDS[0])
     X, found = kept["X"], []
-    paint, shown = shades([1000.0 * away(kept[name], X) for name in ("full", "reduced")])
+    paint, shown = shades([1000.0 * distance_to(kept[name], X) for name in ("full", "reduced")])
     for name, colours in zip(("full", "reduced"), paint, strict=True):
         for x, colour, t in zip(kept[name], colours, kept["t"], strict=True):
             found.append(Panel(body(x, colour, spacing(X)), ghost(X), f"{name}, t = {t:.2f} s"))

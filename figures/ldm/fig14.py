@@ -6,7 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.patheffects import withStroke
 
-from ..common.orders import scales
+from ..common.style import scales
 
 NEEDS = ["ldm.fig13"]
 SPACING = 0.09      # least distance of two numbers, over the picture's sides

@@ -6,16 +6,16 @@ import numpy as np
 
 from validation.ldm.published_bodies import read
 
-from ..common.bodies import FULL, REDUCED, Panel, View, body, nothing, pictures, side_by_side
-from ..common.orders import shared
+from ..common.bodies import FULL, REDUCED, Panel, View, body, no_balls, pictures, side_by_side
 from ..common.state_panels import spacing
+from ..common.style import shared_scale
 
 NEEDS = ["ldm.fig15"]
 VIEW = View(3, 8.0, turn=45.0, lift=8.0)
 
 
 def scale(results):
-    return shared(results, NEEDS[0], "ldm.fig15.error")
+    return shared_scale(results, NEEDS[0], "ldm.fig15.error")
 
 
 def draw(results):
@@ -25,7 +25,7 @@ def draw(results):
         for j, t in enumerate(states["t"]):
             x, y = (states[name][k, j - 1] if j else X for name in ("full", "reduced"))
             pair = side_by_side(body(x, FULL, dx), body(y, REDUCED, dx), VIEW)
-            panels.append(Panel(pair, nothing(), "" if k else f"t = {t:.2f} s",
+            panels.append(Panel(pair, no_balls(), "" if k else f"t = {t:.2f} s",
                                 "" if j else velocity_text(*mu)))
     return pictures(panels, VIEW)
 

@@ -6,8 +6,8 @@ precision. Runs that broke down are left out.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..common.orders import legend_below, series, shared
 from ..common.schemes import MARKS
+from ..common.style import legend_below, series, shared_scale
 
 NEEDS = ["ldm.fig16"]
 RESAMPLED = {1: "P", 2: "D"}        # by quadrature points per cell and axis
@@ -16,7 +16,7 @@ COLOURS = ("C0", "C1", "C4", "C5", "C6")
 
 
 def scale(results):
-    return shared(results, NEEDS[0], ".error")
+    return shared_scale(results, NEEDS[0], ".error")
 
 
 def draw(results):

@@ -5,9 +5,9 @@ phi, downwards. Colours: distance from the place at rest, where the cylinder shi
 
 from validation.ldm.published_bodies import read
 
-from ..common.bodies import Panel, View, away, body, ghost, pictures, shades
-from ..common.orders import shared
+from ..common.bodies import Panel, View, body, distance_to, ghost, pictures, shades
 from ..common.state_panels import spacing
+from ..common.style import shared_scale
 
 NEEDS = ["ldmw.fig1"]
 FOR_EACH = 2.4      # width of a picture [inch]
@@ -15,14 +15,14 @@ FOR_EACH = 2.4      # width of a picture [inch]
 
 def scale(results):
     own = [r.value for r in results.records(NEEDS[0]) if r.target.endswith(".position")]
-    return (f"{shared(results, NEEDS[0], '.position')}; position errors "
+    return (f"{shared_scale(results, NEEDS[0], '.position')}; position errors "
             + ", ".join(f"{value:.2g}" for value in own) + " % from left to right")
 
 
 def draw(results):
     kept = read(results.folder, NEEDS[0])
     X, found = kept["X"], []
-    paint, shown = shades([1000.0 * away(kept[name], X) for name in ("full", "reduced")])
+    paint, shown = shades([1000.0 * distance_to(kept[name], X) for name in ("full", "reduced")])
     for name, colours in zip(("full", "reduced"), paint, strict=True):
         for k, (x, colour, mu) in enumerate(zip(kept[name], colours, kept["mu"], strict=True)):
             found.append(Panel(body(x, colour, spacing(X)), ghost(X),

@@ -5,7 +5,7 @@ runs of one step (dots), and those that are printed (bars), or printed as the mo
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..common.orders import legend_below, shared
+from ..common.style import legend_below, shared_scale
 
 NEEDS = ["ldmw.table1", "ldmw.table2"]
 FIELDS = {"position": ("position", "C0"), "velocity": ("velocity", "C1"),
@@ -18,7 +18,7 @@ WIDTH = 0.22        # of a field in a row
 
 
 def scale(results):
-    return "; ".join(f"{title.split(':')[0]}: {shared(results, name)}"
+    return "; ".join(f"{title.split(':')[0]}: {shared_scale(results, name)}"
                      for name, title in zip(NEEDS, TITLES, strict=True))
 
 

@@ -8,10 +8,10 @@ from matplotlib.colors import to_rgb
 
 from validation.ldm.published_bodies import read
 
-from ..common.bodies import GHOST, Panel, View, away, nothing, pictures, shades
-from ..common.orders import shared
-from ..common.pairs import TITLES, present, titled
+from ..common.bodies import GHOST, Panel, View, distance_to, no_balls, pictures, shades
+from ..common.law_panels import TITLES, available, panel_title
 from ..common.state_panels import cloud, spacing
+from ..common.style import shared_scale
 
 NEEDS = ["nclaw.fig2"]
 NAMES = ("jelly", "sand", "plasticine", "water")
@@ -21,13 +21,13 @@ TOP = 0.3           # end of the colours [m]
 
 
 def scale(results):
-    return shared(results, NEEDS[0])
+    return shared_scale(results, NEEDS[0])
 
 
 def draw(results):
     states, panels = read(results.folder, NEEDS[0]), []
     rows = {f"{name}_{task}": f"{name}, {label}" for task, label in TASKS.items() for name in NAMES}
-    words = present(states, rows, WORDS)
+    words = available(states, rows, WORDS)
     shown = shades(np.zeros(1), top=TOP)[1]
     for row, label in rows.items():
         for word in words:
@@ -42,11 +42,11 @@ def draw(results):
 def body_panel(states, row, word):
     """Return the panel of a law in a row; without a body, its text says why."""
     if f"{row}_{word}" not in states:
-        return Panel(nothing(), nothing(), "not trained")
+        return Panel(no_balls(), no_balls(), "not trained")
     x, true = (states[f"{row}_{of}"].astype(float) for of in (word, "true"))
     if not np.isfinite(x).all():
-        return Panel(nothing(), nothing(), titled("", x))
-    paint = shades(away(x, true), top=TOP)[0]
+        return Panel(no_balls(), no_balls(), panel_title("", x))
+    paint = shades(distance_to(x, true), top=TOP)[0]
     if word == "start":
         paint[:] = to_rgb(GHOST)
-    return Panel(cloud(x, np.zeros(len(x)), paint, spacing(true)), nothing())
+    return Panel(cloud(x, np.zeros(len(x)), paint, spacing(true)), no_balls())

@@ -9,10 +9,10 @@ from validation.ldm.published_bodies import read
 from validation.nclaw.tasks import slope
 
 from ..common.bodies import View, pictures
-from ..common.orders import shared
-from ..common.pairs import sides
+from ..common.law_panels import comparison_rows
 from ..common.splats import Balls
-from ..common.state_panels import joined
+from ..common.state_panels import join_balls
+from ..common.style import shared_scale
 
 NEEDS = ["nclaw.slope"]
 NAMES = ("water", "jelly", "sand", "plasticine")
@@ -23,13 +23,13 @@ VIEW = View(4, 10.0, turn=60.0, lift=12.0)
 
 
 def scale(results):
-    return shared(results, NEEDS[0])
+    return shared_scale(results, NEEDS[0])
 
 
 def draw(results):
-    panels = sides(read(results.folder, NEEDS[0]), {name: name for name in NAMES}, WORDS)
+    panels = comparison_rows(read(results.folder, NEEDS[0]), {name: name for name in NAMES}, WORDS)
     floor = floor_of(panels)
-    return pictures([panel._replace(solid=turned(joined([panel.solid, floor])))
+    return pictures([panel._replace(solid=turned(join_balls([panel.solid, floor])))
                      for panel in panels], VIEW)
 
 

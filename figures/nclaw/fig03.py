@@ -5,8 +5,8 @@ ours at the end, the truth there. Colours: height at the start.
 from validation.ldm.published_bodies import read
 
 from ..common.bodies import View, pictures
-from ..common.orders import scales
-from ..common.pairs import sides
+from ..common.law_panels import comparison_rows
+from ..common.style import scales
 
 NEEDS = ["nclaw.fig3"]
 ROWS = {"dragon": "a dragon of water", "toys": "four toys of jelly"}
@@ -17,4 +17,4 @@ def scale(results):
 
 
 def draw(results):
-    return pictures(sides(read(results.folder, NEEDS[0]), ROWS), View(3, 9.0))
+    return pictures(comparison_rows(read(results.folder, NEEDS[0]), ROWS), View(3, 9.0))

@@ -5,16 +5,16 @@ sand; from left to right the start, ours at the end, the truth there. Colours: h
 from validation.ldm.published_bodies import read
 
 from ..common.bodies import View, pictures
-from ..common.orders import shared
-from ..common.pairs import sides
+from ..common.law_panels import comparison_rows
+from ..common.style import shared_scale
 
 NEEDS = ["nclaw.fig4"]
 ROWS = {"pool": "a duck on water", "melting": "what melts"}
 
 
 def scale(results):
-    return shared(results, NEEDS[0])
+    return shared_scale(results, NEEDS[0])
 
 
 def draw(results):
-    return pictures(sides(read(results.folder, NEEDS[0]), ROWS), View(3, 9.0))
+    return pictures(comparison_rows(read(results.folder, NEEDS[0]), ROWS), View(3, 9.0))

@@ -8,10 +8,10 @@ from matplotlib.colors import to_rgb
 
 from validation.ldm.published_bodies import read
 
-from ..common.bodies import GHOST, Panel, View, away, nothing, pictures, shades
-from ..common.orders import scales
-from ..common.pairs import present, titled
+from ..common.bodies import GHOST, Panel, View, distance_to, no_balls, pictures, shades
+from ..common.law_panels import available, panel_title
 from ..common.state_panels import cloud, spacing
+from ..common.style import scales
 
 NEEDS = ["nclaw.dough"]
 BODIES = {"block": "(c) block", "star": "(d) star"}
@@ -27,7 +27,7 @@ def scale(results):
 
 def draw(results):
     states, panels = read(results.folder, NEEDS[0]), []
-    words = present(states, BODIES, WORDS)
+    words = available(states, BODIES, WORDS)
     shown = shades(np.zeros(1), top=TOP)[1]
     for body, label in BODIES.items():
         for k, when in TIMES.items():
@@ -49,8 +49,8 @@ def body_panel(states, which, title):
     body, word, k = which
     x, true = (states[f"{body}_{of}"].astype(float) for of in (word, "true"))
     if not np.isfinite(x[k]).all():
-        return Panel(nothing(), nothing(), titled(title, x[k]))
-    paint = shades(away(x[k], true[k]), top=TOP)[0]
+        return Panel(no_balls(), no_balls(), panel_title(title, x[k]))
+    paint = shades(distance_to(x[k], true[k]), top=TOP)[0]
     if k == 0:
         paint[:] = to_rgb(GHOST)
-    return Panel(cloud(x[k], np.zeros(len(x[k])), paint, spacing(true[0])), nothing(), title)
+    return Panel(cloud(x[k], np.zeros(len(x[k])), paint, spacing(true[0])), no_balls(), title)

@@ -4,9 +4,9 @@ Colours: height at the start.
 
 from validation.ldm.published_bodies import read
 
-from ..common.bodies import Panel, View, nothing, pictures
-from ..common.orders import shared
-from ..common.pairs import dyed
+from ..common.bodies import Panel, View, no_balls, pictures
+from ..common.law_panels import colour_by_height
+from ..common.style import shared_scale
 
 NEEDS = ["nclaw.fig6"]
 NAMES = ("jelly", "sand", "plasticine", "water")
@@ -14,7 +14,7 @@ VIEW = View(5, 10.0)
 
 
 def scale(results):
-    return shared(results, NEEDS[0])
+    return shared_scale(results, NEEDS[0])
 
 
 def draw(results):
@@ -22,6 +22,7 @@ def draw(results):
     for name in NAMES:
         x = kept[name].astype(float)
         for k, t in enumerate(kept["t"]):
-            found.append(Panel(dyed(x[k], x[0]), nothing(), "" if found[4:] else f"t = {t:.3g} s",
+            title = "" if found[4:] else f"t = {t:.3g} s"
+            found.append(Panel(colour_by_height(x[k], x[0]), no_balls(), title,
                                "" if k else name))
     return pictures(found, VIEW)

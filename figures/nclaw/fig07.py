@@ -5,19 +5,19 @@ the baseline "neural" there, if it was kept, and the truth. Colours: height at t
 from validation.ldm.published_bodies import read
 
 from ..common.bodies import View, pictures
-from ..common.orders import shared
-from ..common.pairs import present, sides
+from ..common.law_panels import available, comparison_rows
+from ..common.style import shared_scale
 
 NEEDS = ["nclaw.fig7"]
 ROWS = {name: name for name in ("jelly", "sand", "plasticine", "water")}
 
 
 def scale(results):
-    return shared(results, NEEDS[0])
+    return shared_scale(results, NEEDS[0])
 
 
 def draw(results):
     kept = read(results.folder, NEEDS[0])
-    words = present(kept, ROWS, ("ours", "neural"))
+    words = available(kept, ROWS, ("ours", "neural"))
     columns = 2 + len(words)
-    return pictures(sides(kept, ROWS, words), View(columns, 3.0 * columns))
+    return pictures(comparison_rows(kept, ROWS, words), View(columns, 3.0 * columns))

@@ -5,7 +5,7 @@ training diverged in the next epoch. "sys-id", which has the right laws, reaches
 
 import matplotlib.pyplot as plt
 
-from ..common.orders import scales, series
+from ..common.style import scales, series
 
 NEEDS = ["nclaw.loss"]
 COLOURS = {"jelly": "C0", "sand": "C1", "plasticine": "C3", "water": "C2"}

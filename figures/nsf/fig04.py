@@ -6,7 +6,7 @@ import matplotlib.pyplot as plt
 
 from validation.ldm.published_bodies import read
 
-from ..common.orders import legend_below, scales
+from ..common.style import legend_below, scales
 
 NEEDS = ["nsf.fig4"]
 COLOURS = {"x": "0.85", "integration": "#e8b53d", "sample": "#b3282d"}

@@ -5,8 +5,8 @@ the networks at a hundred times as many, and the full-order run of these. From l
 from validation.ldm.published_bodies import read
 
 from ..common.bodies import View, pictures
-from ..common.orders import shared
-from ..common.reduced import COLOURS, row
+from ..common.field_panels import COLOURS, time_row
+from ..common.style import shared_scale
 
 NEEDS = ["nsf.fig6"]
 ROWS = {"few": ("ours", "points of the training"), "networks": ("ours", "networks, more points"),
@@ -14,11 +14,11 @@ ROWS = {"few": ("ours", "points of the training"), "networks": ("ours", "network
 
 
 def scale(results):
-    return shared(results, NEEDS[0], "many")
+    return shared_scale(results, NEEDS[0], "many")
 
 
 def draw(results):
     kept = read(results.folder, NEEDS[0])
     found = [panel for word, (colour, side) in ROWS.items()
-             for panel in row(kept[word], COLOURS[colour], side)]
+             for panel in time_row(kept[word], COLOURS[colour], side)]
     return pictures(found, View(len(kept["few"]), 8.0, 25.0, 15.0))

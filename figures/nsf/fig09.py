@@ -2,15 +2,15 @@
 order, and reduced below. From left to right: time.
 """
 
-from ..common.orders import shared
-from ..common.reduced import stresses
+from ..common.field_panels import stress_panels
+from ..common.style import shared_scale
 
 NEEDS = ["nsf.metal"]
 
 
 def scale(results):
-    return shared(results, NEEDS[0])
+    return shared_scale(results, NEEDS[0])
 
 
 def draw(results):
-    return stresses(results, NEEDS[0])
+    return stress_panels(results, NEEDS[0])

@@ -2,15 +2,15 @@
 fields of stress, and the one that knows the map alone. From left to right: time.
 """
 
-from ..common.orders import shared
-from ..common.reduced import beside
+from ..common.field_panels import reduced_and_full
+from ..common.style import shared_scale
 
 NEEDS = ["nsf.ball"]
 
 
 def scale(results):
-    return shared(results, NEEDS[0])
+    return shared_scale(results, NEEDS[0])
 
 
 def draw(results):
-    return beside(results, NEEDS[0], ("true", "ours", "map"))
+    return reduced_and_full(results, NEEDS[0], ("true", "ours", "map"))

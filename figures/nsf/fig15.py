@@ -2,15 +2,15 @@
 right: time.
 """
 
-from ..common.orders import shared
-from ..common.reduced import ends
+from ..common.field_panels import training_range
+from ..common.style import shared_scale
 
 NEEDS = ["nsf.bread"]
 
 
 def scale(results):
-    return shared(results, NEEDS[0])
+    return shared_scale(results, NEEDS[0])
 
 
 def draw(results):
-    return ends(results, NEEDS[0], turn=0.0, lift=75.0)
+    return training_range(results, NEEDS[0], turn=0.0, lift=75.0)

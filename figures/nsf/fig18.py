@@ -5,7 +5,7 @@ of the times. The paper's parts "network, projection" are here the first two and
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..common.orders import legend_below, scales
+from ..common.style import legend_below, scales
 
 NEEDS = ["nsf.speed"]
 PARTS = {"integration": "finding and placing points", "inferred": "velocity, stress, affine field",

@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.ticker import EngFormatter, FuncFormatter, LogLocator, NullFormatter
 
-from ..common.orders import OTHERS, TRANSFERS, scales
+from ..common.style import OTHERS, TRANSFERS, scales
 
 NEEDS = ["trade.explicit.mms", "trade.explicit.cantilever"]
 TITLES = ("manufactured solution", "cantilever")
@@ -39,16 +39,16 @@ def draw(results):
 
 
 def scatter(ax, points, cost, on_front):
-    """Points by knob, the front, and the failures at the top."""
+    """Draw points by knob, the Pareto front, and the failures at the top."""
     good = points["end"] == "finished"
     error, x = points["error"].astype(float), points[cost].astype(float)
     for (knob, mark), color in zip(MARKS.items(), OTHERS, strict=True):
-        mine = good & (points["knob"] == knob)
-        ax.plot(x[mine], error[mine], mark, color=color, ms=5, label=knob)
+        rows = good & (points["knob"] == knob)
+        ax.plot(x[rows], error[rows], mark, color=color, ms=5, label=knob)
     for transfer, color in TRANSFERS.items():
-        mine = good & (points["knob"] == "transfer") & (points["transfer"] == transfer)
-        if mine.any():
-            ax.plot(x[mine], error[mine], "P", color=color, ms=6, label=f"transfer {transfer}")
+        rows = good & (points["knob"] == "transfer") & (points["transfer"] == transfer)
+        if rows.any():
+            ax.plot(x[rows], error[rows], "P", color=color, ms=6, label=f"transfer {transfer}")
     first = points["knob"] == "default"
     ax.plot(x[first], error[first], "k*", ms=10, label="default")
     front = np.flatnonzero(on_front)[np.argsort(x[on_front])]

@@ -4,7 +4,7 @@ costs for the error it leaves in the particles. Large marks: the paper's toleran
 
 import matplotlib.pyplot as plt
 
-from ..common.orders import legend_below, scales, series
+from ..common.style import legend_below, scales, series
 from ..hot.fig20 import METHODS
 
 NEEDS = ["trade.hot.bar"]
@@ -22,11 +22,11 @@ def draw(results):
                                 squeeze=False)
     for ax, ((E,), rows) in zip(axes[0], stiff.items(), strict=True):
         for k, (method, (label, style)) in enumerate(METHODS.items()):
-            own = rows & (table["method"] == method)
-            ax.loglog(table["cpu"][own], table["error"][own], style, ms=4, color=f"C{k}",
+            curve = rows & (table["method"] == method)
+            ax.loglog(table["cpu"][curve], table["error"][curve], style, ms=4, color=f"C{k}",
                       label=label)
-            at = own & (table["eps"] == PAPER)
-            ax.loglog(table["cpu"][at], table["error"][at], style[0], ms=9, color=f"C{k}")
+            printed = curve & (table["eps"] == PAPER)
+            ax.loglog(table["cpu"][printed], table["error"][printed], style[0], ms=9, color=f"C{k}")
         ax.set(title=f"middle {E:.0e} Pa", xlabel="CPU time of the step [s]")
     axes[0][0].set_ylabel("error / velocity increment, rms over particles")
     legend_below(figure, axes[0], columns=5)

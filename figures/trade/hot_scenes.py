@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.ticker import NullFormatter
 
-from ..common.orders import legend_below, scales, series
+from ..common.style import legend_below, scales, series
 from .hot import PAPER
 from .hot_energy import METHODS as SOME
 
@@ -30,13 +30,13 @@ def draw(results):
     table = results.table(NEEDS[0], "points")
     trials = series(table, ("scene", "size"))
     columns = min(COLUMNS, len(trials))
-    rows = ceil(len(trials) / columns)
-    figure, axes = plt.subplots(rows, columns, figsize=(1.6 + 2.4 * columns, 0.8 + 2.4 * rows),
+    lines = ceil(len(trials) / columns)
+    figure, axes = plt.subplots(lines, columns, figsize=(1.6 + 2.4 * columns, 0.8 + 2.4 * lines),
                                 squeeze=False)
     for ax in axes.flat[len(trials):]:
         ax.axis("off")
-    for ax, ((scene, size), at) in zip(axes.flat, trials.items(), strict=False):
-        panel(ax, table, at)
+    for ax, ((scene, size), rows) in zip(axes.flat, trials.items(), strict=False):
+        panel(ax, table, rows)
         ax.set_title(scene.replace("_", ", ") + (", finer" if size == "standard" else ""),
                      fontsize=9)
     for ax in axes[:, 0]:
@@ -46,13 +46,13 @@ def draw(results):
     return figure
 
 
-def panel(ax, table, at):
-    """Curves of all methods for one trial."""
+def panel(ax, table, rows):
+    """Draw the curves of all methods in the rows of one trial."""
     error = np.maximum(table["error"], table["least"])
     for (method, (label, style)), colour in zip(METHODS.items(), COLOURS, strict=True):
-        own = at & (table["method"] == method) & (table["iterations"] > 0)
-        if own.any():
-            ax.loglog(table["cpu"][own], error[own], style, ms=3, color=colour, label=label)
-        paper = own & (table["eps"] == PAPER)
+        curve = rows & (table["method"] == method) & (table["iterations"] > 0)
+        if curve.any():
+            ax.loglog(table["cpu"][curve], error[curve], style, ms=3, color=colour, label=label)
+        paper = curve & (table["eps"] == PAPER)
         ax.loglog(table["cpu"][paper], error[paper], style[0], ms=8, color=colour)
     ax.xaxis.set_minor_formatter(NullFormatter())

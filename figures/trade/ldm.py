@@ -1,7 +1,7 @@
-"""LDM: error of reduced runs by how they are made. Left: error against wall time on the tower. The
-star is the paper's way, single marks differ from it in what the legend says; curves go over numbers
-of samples, which stand beside them. The dotted line joins what nothing beats in error and CPU time.
-Right: torsion with all samples, by how dense quadrature is. Runs that broke down are left out.
+"""LDM: error of reduced runs by their options. Left: error against wall time on the tower. The star
+is the paper's scheme, single marks differ from it as the legend shows; curves go over numbers of
+samples (their labels). The dotted line is the Pareto front of error and CPU time. Right: torsion
+with all samples, by the density of quadrature points. Runs that broke down are left out.
 """
 
 from itertools import cycle
@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from ..common.orders import OTHERS, legend_below, titled
+from ..common.style import OTHERS, legend_below, titled_scales
 
 NEEDS = ["trade.ldm.knobs", "trade.ldm.density"]
 TITLES = ("tower", "torsion")
@@ -24,7 +24,7 @@ DENSE = {"eulerian": ("Eulerian", "v-", "C4"), "resampled": ("resampled", "D--",
 
 
 def scale(results):
-    return titled(results, NEEDS, TITLES)
+    return titled_scales(results, NEEDS, TITLES)
 
 
 def draw(results):
@@ -46,21 +46,21 @@ def draw(results):
 
 
 def readable(axis, places=PLACES):
-    """Plain numbers at some places of each decade."""
+    """Label an axis with plain numbers at some places of each decade."""
     axis.set(major_locator=LogLocator(subs=places), minor_formatter=NullFormatter(),
              major_formatter=FuncFormatter(lambda x, _: f"{x:g}"))
 
 
 def choices(ax, table):
-    """Marks by what differs from the first row, joined where numbers of samples alone do."""
+    """Draw marks by what differs from the first row, joined where only the samples do."""
     x, y, points = 1e3 * table["wall"], 100.0 * table["origin"], table["points"]
     front = np.flatnonzero(table["pareto"])
     front = front[np.argsort(x[front])]
-    ax.loglog(x[front], y[front], ":", color="0.3", zorder=0, label="nothing beats these")
+    ax.loglog(x[front], y[front], ":", color="0.3", zorder=0, label="Pareto front")
     for (words, rows), mark, colour in zip(grouped(table).items(), cycle(MARKS), cycle(OTHERS)):
         rows = sorted(rows, key=lambda k: points[k])
         ax.plot(x[rows], y[rows], mark + "-" * (len(rows) > 1), color=colour, ms=6,
-                fillstyle="none", label=words or "the paper's way")
+                fillstyle="none", label=words or "the paper's scheme")
         for k in rows if len(rows) > 1 else ():
             ax.annotate(f"{points[k]:g}", (x[k], y[k]), fontsize=7, xytext=(3, 6),
                         textcoords="offset points")
@@ -68,17 +68,17 @@ def choices(ax, table):
 
 
 def grouped(table):
-    """{what differs from the first row but for the number of samples, in words: rows}."""
-    found = {}
+    """Return {difference from the first row other than the number of samples: rows}."""
+    rows = {}
     for k in range(len(table["points"])):
         words = ", ".join(form.format(table[name][k]) for name, form in WORDS.items()
                           if table[name][k] != table[name][0])
-        found.setdefault(words, []).append(k)
-    return found
+        rows.setdefault(words, []).append(k)
+    return rows
 
 
 def densities(ax, table):
-    """Curves by quadrature, and a line for material points."""
+    """Draw curves by quadrature, and a line for material points."""
     error = 100.0 * table["origin"]
     for name, (words, style, colour) in DENSE.items():
         rows = table["quadrature"] == name

@@ -1,4 +1,4 @@
-"""LDM on the tower. Left: where the time of a reduced step goes, in the paper's way and with all
+"""LDM on the tower. Left: where the time of a reduced step goes, by the paper's scheme and with all
 cheap choices, by number of particles. Right: after how many runs the time of data and training is
 paid, beside the full model with the transfer that the map was trained on, and with the fastest; a
 curve has no mark where it never is.
@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.ticker import NullLocator
 
-from ..common.orders import legend_below, series, titled
+from ..common.style import legend_below, series, titled_scales
 from .ldm import readable
 
 NEEDS = ["trade.ldm.split", "trade.ldm.offline"]
@@ -21,7 +21,7 @@ AGAINST = {"runs_same": ("the transfer it was trained on", "s-"),
 
 
 def scale(results):
-    return titled(results, NEEDS, TITLES)
+    return titled_scales(results, NEEDS, TITLES)
 
 
 def draw(results):
@@ -35,15 +35,15 @@ def draw(results):
 
 
 def split(ax, table):
-    """A bar for each size and way, the network's part at the bottom."""
-    sizes, at = series(table, ("particles",)), np.arange(len(table["cpu"]))
-    low = np.zeros(len(at))
+    """Draw a bar for each size and scheme, the network's part at the bottom."""
+    sizes, x = series(table, ("particles",)), np.arange(len(table["cpu"]))
+    low = np.zeros(len(x))
     for name, (words, colour, hatch) in PARTS.items():
-        ax.bar(at, 1e3 * table[name], 0.7, low, color=colour, hatch=hatch, edgecolor="k", lw=0.6,
+        ax.bar(x, 1e3 * table[name], 0.7, low, color=colour, hatch=hatch, edgecolor="k", lw=0.6,
                label=words)
         low += 1e3 * table[name]
-    ax.set_xticks(at, table["way"], fontsize=8)
-    ax.set_xticks([at[rows].mean() for rows in sizes.values()],
+    ax.set_xticks(x, table["way"], fontsize=8)
+    ax.set_xticks([x[rows].mean() for rows in sizes.values()],
                   [f"\n{thousand(n)}" for n, in sizes], minor=True, fontsize=9)
     ax.tick_params(axis="x", which="minor", length=0, pad=7)
     ax.set(xlabel="particles", ylabel="CPU time of a step [ms]", axisbelow=True)
@@ -51,19 +51,19 @@ def split(ax, table):
 
 
 def pays(ax, table):
-    """Runs after which training has paid, by size; those sizes where it never has say so."""
+    """Draw the runs after which training has paid, by size, and mark sizes where it never has."""
     n, runs = table["particles"], np.array([table[name] for name in AGAINST])
-    for own, (words, style) in zip(runs, AGAINST.values(), strict=True):
-        paid = np.isfinite(own)
-        ax.plot(n[paid], own[paid], style, color="C3", fillstyle="none", label=words)
+    for needed, (label, style) in zip(runs, AGAINST.values(), strict=True):
+        paid = np.isfinite(needed)
+        ax.plot(n[paid], needed[paid], style, color="C3", fillstyle="none", label=label)
     for count in n[~np.isfinite(runs).any(axis=0)]:
         ax.text(count, 0.3, "never", transform=ax.get_xaxis_transform(), rotation=90, ha="center",
                 va="center", fontsize=9, backgroundcolor="w")
-    known = runs[np.isfinite(runs)]
+    finite = runs[np.isfinite(runs)]
     ax.set(xscale="log", yscale="log", xlim=(n.min() / 2.0, 2.0 * n.max()),
-           ylim=(0.5 * np.min(known, initial=2.0), 2.0 * np.max(known, initial=50.0)),
+           ylim=(0.5 * np.min(finite, initial=2.0), 2.0 * np.max(finite, initial=50.0)),
            xlabel="particles", ylabel="runs until training has paid")
-    ax.legend(title="beside the full model with", title_fontsize=8, fontsize=8, loc="lower left",
+    ax.legend(title="against the full model with", title_fontsize=8, fontsize=8, loc="lower left",
               alignment="left")
     readable(ax.yaxis, (1.0, 2.0, 5.0))
     ax.set_xticks(n, [thousand(count) for count in n], fontsize=9)
@@ -71,5 +71,5 @@ def pays(ax, table):
 
 
 def thousand(count):
-    """A number of particles in words."""
+    """Return a number of particles as text."""
     return f"{count / 1e6:.3g} million" if count >= 1e6 else f"{count / 1e3:.0f} thousand"

@@ -1,10 +1,10 @@
-"""NCLaw: errors of small trainings, which see a run in few points on a coarse grid. Left: against
-the CPU time of the training, in the body of the paper where they were run there, else on the run
-that they learned from; curves go over epochs, which stand beside them, marks differ from the star
-in what the legend says; the dotted line joins what nothing beats. Middle: by what is seen of the
-run, on that run (full marks) and thrown otherwise (open ones); the grey band is of trainings that
-see all, by seed. Right: by the width of the networks, against the CPU time of an answer. What broke
-down is left out.
+"""NCLaw: errors of small trainings, on a run of few points on a coarse grid. Left: against the CPU
+time of the training, in the body of the paper where they were run there, else on the training run;
+curves go over epochs (their labels), marks differ from the star as the legend shows; the dotted
+line is the Pareto front. Middle: by what is observed of the run, on that run (full marks) and
+thrown differently (open marks); the grey band is of trainings on full observations, by seed. Right:
+by the width of the networks, against the CPU time of an evaluation. Runs that broke down are left
+out.
 """
 
 from itertools import cycle
@@ -15,17 +15,17 @@ import numpy as np
 from validation.nclaw.observation import Seen
 from validation.nclaw.small_trainings import Small
 
-from ..common.dots import below, dots, named
-from ..common.orders import OTHERS, scales, series
+from ..common.style import OTHERS, scales, series
+from ..common.training_errors import differences, error_rows, legend_outside
 from ..nclaw.loss import COLOURS
 from .ldm import MARKS, readable
 
 NEEDS = ["trade.nclaw.training", "trade.nclaw.sight", "trade.nclaw.width"]
-TITLES = ("training", "what is seen", "width of the networks")
+TITLES = ("training", "observations", "width of the networks")
 SIZES = {"edge": "{:g}³ points", "cells": "{:g} cells", "epochs": "{:g} epochs",
          "last": "horizon to {:g}"}
-SIGHTS = {"positions": "places alone", "every": "frames {:g} steps apart",
-          "share": "{:.2g} of the points", "noise": "{:g} m off"}
+OBSERVATIONS = {"positions": "positions only", "every": "a frame every {:g} steps",
+                "share": "{:.2g} of the points", "noise": "{:g} m of noise"}
 
 
 def scale(results):
@@ -36,7 +36,7 @@ def draw(results):
     figure, axes = plt.subplots(1, 3, figsize=(13.0, 5.4), width_ratios=(5, 3, 4),
                                 layout="constrained")
     trainings(axes[0], results.table(NEEDS[0], "trainings"))
-    sights(axes[1], results.table(NEEDS[1], "trainings"))
+    observations(axes[1], results.table(NEEDS[1], "trainings"))
     widths(axes[2], results.table(NEEDS[2], "widths"))
     for ax, title in zip(axes, TITLES, strict=True):
         ax.set_title(title, fontsize=9)
@@ -44,13 +44,13 @@ def draw(results):
         readable(ax.xaxis, (1.0, 2.0, 5.0))
         ax.set_ylabel("error [m²]")
     axes[2].legend(fontsize=7)
-    return below(figure, axes[:2], 5)
+    return legend_outside(figure, axes[:2], 5)
 
 
 def trainings(ax, table):
-    """A curve for each training of several epochs, a mark for each of the others."""
+    """Draw a curve for each training of several epochs, a mark for each of the others."""
     error = np.where(np.isnan(table["full"]), table["own"], table["full"])
-    x, looks, seen = table["cpu"], cycle(zip(MARKS, cycle(OTHERS))), set()
+    x, styles, labelled = table["cpu"], cycle(zip(MARKS, cycle(OTHERS))), set()
     for (name,), rows in series(table, ("environment",)).items():
         best = np.flatnonzero(rows & (table["pareto"] == 1))
         best = best[np.argsort(x[best])]
@@ -60,45 +60,45 @@ def trainings(ax, table):
         if rows.sum() > 1:
             name = table["environment"][k]
             ax.plot(x[rows], error[rows], ".-", color=COLOURS[name], label=f"{name}, by epochs")
-            annotated(ax, (x[rows], error[rows]), table["epoch"][rows])
+            annotate_points(ax, (x[rows], error[rows]), table["epoch"][rows])
             continue
-        words = named(table, k, SIZES, Small()) or "star"
-        mark, colour = ("*", "k") if words == "star" else next(looks)
+        words = differences(table, k, SIZES, Small()) or "star"
+        mark, colour = ("*", "k") if words == "star" else next(styles)
         ax.plot(x[k], error[k], mark, color=colour, ms=10 if words == "star" else 6,
                 fillstyle="full" if words == "star" else "none",
-                label=None if words in seen else sized(words))
-        seen.add(words)
+                label=None if words in labelled else size_label(words))
+        labelled.add(words)
     ax.set_xlabel("CPU time of the training [s]")
 
 
-def sized(words):
-    """The legend of a mark."""
-    if words != "star":
-        return words
+def size_label(difference):
+    """Return the legend of a mark: its difference from the star, or the sizes of the star."""
+    if difference != "star":
+        return difference
     return f"{', '.join(form.format(getattr(Small(), key)) for key, form in SIZES.items())}"
 
 
-def sights(ax, table):
-    """A row for each training that does not see all."""
-    words = [named(table, k, SIGHTS, Seen()) for k in range(len(table["own"]))]
-    dots(ax, table, words)
+def observations(ax, table):
+    """Draw a row for each training on reduced observations."""
+    labels = [differences(table, k, OBSERVATIONS, Seen()) for k in range(len(table["own"]))]
+    error_rows(ax, table, labels)
 
 
 def widths(ax, table):
-    """Errors on the run that was learned from, and thrown otherwise."""
+    """Draw the errors on the training run, and thrown differently."""
     rows = np.argsort(table["width"])
     x = 1e6 * table["cpu_point"][rows]
-    for key, style, words in (("own", "o-", "on the run that it learned from"),
-                              ("thrown", "s--", "thrown otherwise")):
-        ax.loglog(x, table[key][rows], style, color="k", ms=5, fillstyle="none", label=words)
-    annotated(ax, (x, table["own"][rows]), table["width"][rows])
+    for key, style, label in (("own", "o-", "on the training run"),
+                              ("thrown", "s--", "thrown differently")):
+        ax.loglog(x, table[key][rows], style, color="k", ms=5, fillstyle="none", label=label)
+    annotate_points(ax, (x, table["own"][rows]), table["width"][rows])
     ax.axvline(1e6 * table["true_cpu_point"][0], ls=":", color="0.4", label="the true laws")
-    ax.set_xlabel("CPU time of an answer [µs]")
+    ax.set_xlabel("CPU time of an evaluation [µs]")
 
 
-def annotated(ax, at, values):
-    """Numbers beside the points at (x, y) that are finite."""
-    for a, b, value in zip(*at, values, strict=True):
+def annotate_points(ax, points, values):
+    """Write numbers next to the points (x, y) that are finite."""
+    for a, b, value in zip(*points, values, strict=True):
         if np.isfinite(b):
             ax.annotate(f"{value:g}", (a, b), fontsize=7, xytext=(3, 5),
                         textcoords="offset points")

@@ -1,15 +1,15 @@
 """NCLaw: what a run of learned laws costs. Left: error and CPU time by the length of the step, in
-that of training, which stands beside the marks; true laws with the same step miss the trained one
-too. The dotted lines join what nothing beats. Right: error by how many binary digits of the weights
+that of training, the label of the marks; true laws with the same step miss the trained one
+too. The dotted lines are Pareto fronts. Right: error by how many binary digits of the weights
 are left; 53 is a double, 24 single precision. Runs that broke down are left out.
 """
 
 import matplotlib.pyplot as plt
 
-from ..common.orders import scales, series
+from ..common.style import scales, series
 from ..nclaw.loss import COLOURS
 from .ldm import readable
-from .nclaw import annotated
+from .nclaw import annotate_points
 
 NEEDS = ["trade.nclaw.dt", "trade.nclaw.digits"]
 TITLES = ("length of the step", "digits of the weights")
@@ -33,23 +33,23 @@ def draw(results):
 
 
 def steps(ax, table):
-    """For each material a curve of its learned laws, and one of its true laws."""
+    """Draw for each material a curve of its learned laws, and one of its true laws."""
     for (name,), rows in series(table, ("environment",)).items():
         ours, true = ((table[cpu][rows], table[error][rows]) for cpu, error in
                       (("cpu", "error"), ("true_cpu", "true_error")))
         best = rows & (table["pareto"] == 1)
         ax.loglog(*ours, "o", color=COLOURS[name], ms=5, fillstyle="none", label=f"{name}, learned")
         ax.plot(table["cpu"][best], table["error"][best], ":", color=COLOURS[name], zorder=0)
-        annotated(ax, ours, table["factor"][rows])
-        some = true[1] > 0.0        # with the trained step they have no error
-        ax.plot(true[0][some], true[1][some], "x", color=COLOURS[name], ms=5,
+        annotate_points(ax, ours, table["factor"][rows])
+        off = true[1] > 0.0         # with the trained step they have no error
+        ax.plot(true[0][off], true[1][off], "x", color=COLOURS[name], ms=5,
                 label=f"{name}, true laws")
-        annotated(ax, (true[0][some], true[1][some]), table["factor"][rows][some])
+        annotate_points(ax, (true[0][off], true[1][off]), table["factor"][rows][off])
     ax.set_xlabel("CPU time of the run [s]")
 
 
 def digits(ax, table):
-    """A curve for each material."""
+    """Draw a curve for each material."""
     for (name,), rows in series(table, ("environment",)).items():
         ax.loglog(table["bits"][rows], table["error"][rows], "o-", color=COLOURS[name], ms=5,
                   fillstyle="none", label=name)

@@ -8,13 +8,13 @@ down are left out.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..common.orders import legend_below, scales, series
+from ..common.style import legend_below, scales, series
 from .ldm import readable
 
 NEEDS = ["trade.nsf.samples", "trade.nsf.dt"]
 TITLES = ("samples", "time step")
 COLOURS = {"jelly": "C0", "metal": "C3"}
-WAYS = {"random": "o-", "cubature": "s--", "cells": "^:"}
+STYLES = {"random": "o-", "cubature": "s--", "cells": "^:"}
 
 
 def scale(results):
@@ -37,12 +37,12 @@ def draw(results):
 
 
 def samples(ax, table):
-    """A curve for each scene and way; a line where all particles are samples."""
+    """Draw a curve for each scene and sampling, and a line where all particles are samples."""
     most = {scene: table["samples"][rows].max() for (scene,), rows in
             series(table, ("scene",)).items()}
     for (scene, word), rows in series(table, ("scene", "fields")).items():
         few = rows & (table["samples"] < most[scene])
-        curve(ax, table, "samples", few, fmt=WAYS[word], color=COLOURS[scene],
+        curve(ax, table, "samples", few, fmt=STYLES[word], color=COLOURS[scene],
               label=f"{scene}, {word}")
     for scene, count in most.items():
         everything = (table["scene"] == scene) & (table["samples"] == count)
@@ -51,16 +51,16 @@ def samples(ax, table):
 
 
 def steps(ax, table):
-    """A curve for each scene."""
+    """Draw a curve for each scene."""
     for (scene,), rows in series(table, ("scene",)).items():
         curve(ax, table, "faster", rows, fmt="o-", color=COLOURS[scene])
 
 
-def curve(ax, table, name, rows, **look):
-    """Means of the finite errors over a column, with bars from the smallest to the largest."""
+def curve(ax, table, name, rows, **style):
+    """Draw means of the finite errors over a column, with bars from the smallest to the largest."""
     rows = rows & np.isfinite(table["origin"])
     x = np.unique(table[name][rows])
-    found = [100.0 * table["origin"][rows & (table[name] == a)] for a in x]
-    middle = np.array([own.mean() for own in found])
-    ends = np.array([[own.min(), own.max()] for own in found]).reshape(-1, 2).T
-    ax.errorbar(x, middle, np.abs(ends - middle), ms=4, lw=1, capsize=2, fillstyle="none", **look)
+    errors = [100.0 * table["origin"][rows & (table[name] == a)] for a in x]
+    middle = np.array([e.mean() for e in errors])
+    ends = np.array([[e.min(), e.max()] for e in errors]).reshape(-1, 2).T
+    ax.errorbar(x, middle, np.abs(ends - middle), ms=4, lw=1, capsize=2, fillstyle="none", **style)

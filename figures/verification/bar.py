@@ -5,7 +5,7 @@ falls with the second order of the method, at a sticky wall with the first order
 
 import matplotlib.pyplot as plt
 
-from ..common.orders import DEGREES, TRANSFERS, legend_below, look, scales, series, slope
+from ..common.style import DEGREES, TRANSFERS, legend_below, line_style, scales, series, slope
 
 NEEDS = ["verification.bar"]
 
@@ -25,7 +25,7 @@ def draw(results):
     table = results.table(NEEDS[0], "errors")
     for (transfer, degree, wall), rows in series(table, ("transfer", "degree", "wall")).items():
         support = "wall" if wall == "True" else "symmetric"
-        right.loglog(table["cells"][rows], table["error"][rows], **look(transfer, degree),
+        right.loglog(table["cells"][rows], table["error"][rows], **line_style(transfer, degree),
                      mfc="w" if support == "wall" else None,
                      label=f"{transfer} {DEGREES[degree]}, {support}")
     cells = sorted(set(table["cells"]))

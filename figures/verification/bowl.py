@@ -4,7 +4,7 @@ pendulum at the bottom.
 
 import matplotlib.pyplot as plt
 
-from ..common.orders import scales, series, shades
+from ..common.style import scales, series, shades
 
 NEEDS = ["verification.bowl"]
 

@@ -6,7 +6,7 @@ of the deflection by Timoshenko's beam. Both relative to the deflection.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..common.orders import DEGREES, TRANSFERS, counts, legend_below, look, series
+from ..common.style import DEGREES, TRANSFERS, counts, legend_below, line_style, series
 
 NEEDS = ["verification.cantilever"]
 
@@ -28,7 +28,7 @@ def draw(results):
     table = results.table(NEEDS[0], "large")
     for (transfer, degree, per), rows in series(
             table, ("transfer", "degree", "per_direction")).items():
-        right.plot(table["cells"][rows], table["error"][rows], **look(transfer, degree, per),
+        right.plot(table["cells"][rows], table["error"][rows], **line_style(transfer, degree, per),
                    label=f"{transfer} {DEGREES[degree]}, {int(per)} per direction")
     small = results.table(NEEDS[0], "small")
     right.plot(small["cells"], np.abs(small["error"]), "^:", color=TRANSFERS["mls"], ms=4,

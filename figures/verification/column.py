@@ -5,7 +5,7 @@ their initial width.
 
 import matplotlib.pyplot as plt
 
-from ..common.orders import OTHERS, counts, series
+from ..common.style import OTHERS, counts, series
 
 NEEDS = ["verification.column"]
 COLORS = dict(zip(("plane", "axisymmetric"), OTHERS))

@@ -6,7 +6,7 @@ strains (stiff); the numbers are particles per direction and cell.
 
 import matplotlib.pyplot as plt
 
-from ..common.orders import DEGREES, TRANSFERS, legend_below, look, scales, series, slope
+from ..common.style import DEGREES, TRANSFERS, legend_below, line_style, scales, series, slope
 
 NEEDS = ["verification.compaction"]
 
@@ -29,7 +29,7 @@ def draw(results):
     for (transfer, degree, per, column, wall), rows in series(table, keys).items():
         support = "wall" if wall == "True" else "symmetric"
         right.loglog(table["cells"][rows], table["mean_error"][rows],
-                     **look(transfer, degree, per), mfc="w" if wall == "True" else None,
+                     **line_style(transfer, degree, per), mfc="w" if wall == "True" else None,
                      alpha=0.5 if column == "soft" else 1.0,
                      label=f"{transfer} {DEGREES[degree]} {int(per)}, {column}, {support}")
     cells = sorted(set(table["cells"]))

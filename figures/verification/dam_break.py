@@ -4,7 +4,7 @@ Ritter's bound and the points measured by Martin and Moyce as others read them (
 
 import matplotlib.pyplot as plt
 
-from ..common.orders import scales, series, shades
+from ..common.style import scales, series, shades
 
 NEEDS = ["verification.dam_break"]
 

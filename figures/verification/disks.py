@@ -5,7 +5,7 @@ disks when they first act on each other, against dx; on a grid they meet up to 3
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..common.orders import TRANSFERS, scales, series, slope
+from ..common.style import TRANSFERS, scales, series, slope
 
 NEEDS = ["verification.disks"]
 

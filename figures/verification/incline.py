@@ -5,7 +5,7 @@ during which the foot of the elastic block sticks, and its hopping are what is l
 
 import matplotlib.pyplot as plt
 
-from ..common.orders import OTHERS, series, shared
+from ..common.style import OTHERS, series, shared_scale
 
 NEEDS = ["verification.incline"]
 COLORS = dict(zip(("sliding", "thrown", "sticking", "frictionless"), OTHERS))
@@ -14,7 +14,7 @@ LABELS = {"sliding": "15 degrees, from rest", "thrown": "15 degrees, thrown",
 
 
 def scale(results):
-    return f"2D; {shared(results, NEEDS[0])}"
+    return f"2D; {shared_scale(results, NEEDS[0])}"
 
 
 def draw(results):

@@ -5,7 +5,7 @@ against the number of cells, by scheme and particles per cell and direction. Lin
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..common.orders import DEGREES, legend_below, look, scales, series, slope
+from ..common.style import DEGREES, legend_below, line_style, scales, series, slope
 
 NEEDS = ["verification.mms"]
 
@@ -24,7 +24,7 @@ def draw(results):
                 table, ("transfer", "degree", "per_direction")).items():
             if per == count:
                 ax.loglog(table["cells"][rows], np.minimum(table["error"][rows], 1.0),
-                          **look(transfer, degree), label=f"{transfer} {DEGREES[degree]}")
+                          **line_style(transfer, degree), label=f"{transfer} {DEGREES[degree]}")
         slope(ax, -2, (16, 64), 3e-3, "order 2")
         ax.set(title=f"{int(count)} particles per direction", xlabel="cells per side",
                xticks=(16, 32, 64), xticklabels=("16", "32", "64"), xlim=(14, 90))

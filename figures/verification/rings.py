@@ -4,13 +4,13 @@ for the end, from randomly placed particles on the grid of the standard profile.
 
 import matplotlib.pyplot as plt
 
-from ..common.orders import TRANSFERS, series, shared
+from ..common.style import TRANSFERS, series, shared_scale
 
 NEEDS = ["verification.rings"]
 
 
 def scale(results):
-    return f"2D; {shared(results, NEEDS[0])}"
+    return f"2D; {shared_scale(results, NEEDS[0])}"
 
 
 def draw(results):

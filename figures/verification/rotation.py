@@ -4,7 +4,7 @@ keep it to round-off, PIC (the negative control) loses it. Right: mechanical ene
 
 import matplotlib.pyplot as plt
 
-from ..common.orders import TRANSFERS, series, shared
+from ..common.style import TRANSFERS, series, shared_scale
 
 NEEDS = ["verification.rotation"]
 
@@ -13,7 +13,7 @@ def scale(results):
     table = results.table(NEEDS[0], "history")
     turns = {body: max(table["turns"][rows]) for (body,), rows in series(table, ("body",)).items()}
     words = ", ".join(f"{body} over {n:.3g} revolutions" for body, n in turns.items())
-    return f"{words}; dx = {shared(results, NEEDS[0]).split('dx = ')[-1]}"
+    return f"{words}; dx = {shared_scale(results, NEEDS[0]).split('dx = ')[-1]}"
 
 
 def draw(results):

@@ -6,7 +6,7 @@ the motion asks for, relative to the largest force.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..common.orders import DEGREES, OTHERS, look, scales, series, slope
+from ..common.style import DEGREES, OTHERS, line_style, scales, series, slope
 
 NEEDS = ["verification.vortex"]
 
@@ -20,7 +20,7 @@ def draw(results):
     table = results.table(NEEDS[0], "errors")
     for (transfer, degree, per), rows in series(
             table, ("transfer", "degree", "per_direction")).items():
-        left.loglog(table["cells"][rows], table["error"][rows], **look(transfer, degree, per),
+        left.loglog(table["cells"][rows], table["error"][rows], **line_style(transfer, degree, per),
                     label=f"{transfer} {DEGREES[degree]}, {int(per)} per direction")
     cells = sorted(set(table["cells"]))
     slope(left, -2, (cells[0], cells[-1]), 0.7 * table["error"].max(), "order 2")

@@ -6,7 +6,7 @@ oedometer that compresses by a quarter.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..common.orders import OTHERS, TRANSFERS, counts, legend_below, scales, slope
+from ..common.style import OTHERS, TRANSFERS, counts, legend_below, scales, slope
 
 NEEDS = ["verification.hydrostatic", "verification.oedometer"]
 TICKS = (0.02, 0.05, 0.1, 0.2, 0.4)

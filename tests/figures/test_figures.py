@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from figures import __main__ as cli
 from figures import frame
-from figures.common.orders import OTHERS, TRANSFERS, scales, shared
+from figures.common.style import OTHERS, TRANSFERS, scales, shared_scale
 from figures.frame import Drawn, draw_all, names
 from validation.common.results import ProfileResults
 
@@ -76,7 +76,7 @@ def test_two_processes_draw_like_one(results, tmp_path, monkeypatch):
 def test_scales_are_taken_from_the_records(results):
     assert scales(results, "a.b") == "8, dx = 0.1 m; 9, dx = 0.1 m"
     assert scales(results, "a.b", ".order") == "8, dx = 0.1 m"
-    assert shared(results, "a.b") == "dx = 0.1 m"
+    assert shared_scale(results, "a.b") == "dx = 0.1 m"
 
 
 def test_no_colour_of_a_transfer_stands_for_anything_else():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from figures.common import state_panels
-from figures.common.bodies import body, levelled, nothing, shades, side_by_side
+from figures.common.bodies import body, flattened, no_balls, shades, side_by_side
 from figures.common.schemes import MARKS
 from figures.ldm import fig04, fig06, fig10, fig11, fig12, fig13, fig14, fig15, fig16
 from figures.ldmw import fig01, tables
@@ -83,7 +83,7 @@ def test_states_that_are_not_here_say_so(results, id):
 
 def test_bodies_stand_upright():
     view = fig15.VIEW._replace(lift=0.0)
-    axes = state_panels.framed([body(GRID, "w", 1.0)], view).axes
+    axes = state_panels.fitted_camera([body(GRID, "w", 1.0)], view).axes
     assert body(np.array([(0.0, 0.0, 1.0)]), "w", 1.0).x @ axes[1] == pytest.approx(1.0)
     assert np.linalg.det(body(np.eye(3), "w", 1.0).x) == pytest.approx(1.0)     # no mirror
 
@@ -91,15 +91,15 @@ def test_bodies_stand_upright():
 def test_second_body_is_beside_the_first():
     view, one = fig15.VIEW, body(GRID, "w", 1.0)
     both = side_by_side(one, one, view)
-    along = both.x @ state_panels.framed([one], view).axes[0]
+    along = both.x @ state_panels.fitted_camera([one], view).axes[0]
     assert len(both.x) == 2 * len(GRID)
     assert along[:len(GRID)].max() < along[len(GRID):].min()
 
 
 def test_levelled_balls_keep_their_places_in_the_picture():
     view, balls = fig15.VIEW, body(GRID, "w", 1.0)
-    axes = state_panels.framed([balls], view).axes
-    flat = levelled(balls, view)
+    axes = state_panels.fitted_camera([balls], view).axes
+    flat = flattened(balls, view)
     np.testing.assert_allclose(flat.x @ axes[:2].T, balls.x @ axes[:2].T, atol=1e-12)
     assert np.ptp(flat.x @ axes[2]) < 0.01 * np.ptp(balls.x @ axes[2])
 
@@ -109,7 +109,7 @@ def test_colours_go_from_nothing_to_the_largest():
     assert paint.shape == (2, 2, 3)
     assert shown.get_clim() == (0.0, 4.0)
     np.testing.assert_allclose(paint[0, 0], mpl.colormaps["viridis"](0.0)[:3])
-    assert len(nothing().x) == 0
+    assert len(no_balls().x) == 0
 
 
 def test_cubes_have_two_colours_and_turn_at_their_faces():

@@ -51,9 +51,9 @@ def tower():
 def test_numbers_of_samples_are_curves_and_other_choices_marks(tower):
     found = lines(tower[0])
     assert set(found) == {
-        "nothing beats these", "the paper's way", "projection: nonlinear",
+        "Pareto front", "the paper's scheme", "projection: nonlinear",
         "velocity: transported, preimages: 0.01 dx", "samples: kept", "50 samples, as single marks"}
-    paper = found["the paper's way"]
+    paper = found["the paper's scheme"]
     assert paper.get_xdata() == pytest.approx([100.0, 200.0, 400.0])
     assert paper.get_ydata() == pytest.approx([0.2, 0.2, 0.1])
     assert (paper.get_linestyle(), found["projection: nonlinear"].get_linestyle()) == ("-", "None")
@@ -63,7 +63,7 @@ def test_numbers_of_samples_are_curves_and_other_choices_marks(tower):
 
 
 def test_the_front_is_joined_in_order_of_its_cost(tower):
-    assert lines(tower[0])["nothing beats these"].get_xydata() == pytest.approx(
+    assert lines(tower[0])["Pareto front"].get_xydata() == pytest.approx(
         np.array([[50.0, 0.4], [400.0, 0.1]]))
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from figures.common.bodies import View, pictures
-from figures.common.pairs import sides
+from figures.common.law_panels import comparison_rows
 from figures.nclaw import fig02, fig03, fig06, fig07
 from mpm_ref.materials import Fluid, NoFlow
 from mpm_ref.nclaw.gnn.simulator import Simulator
@@ -131,7 +131,7 @@ def test_a_body_that_broke_down_leaves_its_place_empty():
     ours[-1] = np.nan
     ours[-1, :20] = 0.5
     gone = np.full_like(ours, np.nan)
-    panels = sides({"a_true": true, "a_ours": ours, "b_true": true, "b_ours": gone},
+    panels = comparison_rows({"a_true": true, "a_ours": ours, "b_true": true, "b_ours": gone},
                    {"a": "one", "b": "other"})
     assert [len(panel.solid.x) for panel in panels] == [50, 20, 50, 50, 0, 50]
     assert [panel.title for panel in panels] == ["start", "ours", "truth", "", "broke down", ""]
@@ -143,7 +143,7 @@ def test_a_body_that_broke_down_leaves_its_place_empty():
 def test_baselines_stand_between_ours_and_the_truth_if_they_were_kept():
     x = np.random.default_rng(0).random((2, 50, 3))
     kept = {"a_true": x, "a_ours": x, "a_neural": x + 1.0, "b_true": x, "b_ours": x}
-    panels = sides(kept, {"a": "one", "b": "other", "c": "not kept"}, ("ours", "neural"))
+    panels = comparison_rows(kept, {"a": "one", "b": "other", "c": "not kept"}, ("ours", "neural"))
     assert [panel.title for panel in panels] == ["start", "ours", "neural", "truth", "", "", ""]
     assert [panel.side for panel in panels] == ["one", "", "", "", "other", "", ""]
     assert panels[2].solid.x == pytest.approx(panels[1].solid.x + 1.0)

@@ -6,7 +6,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from figures.common.bodies import nothing
+from figures.common.bodies import no_balls
 from figures.nclaw import fig02d, fig04c
 from mpm_ref.materials import Fluid, NoFlow
 from validation.common.results import ProfileResults
@@ -61,7 +61,7 @@ def test_the_slope_is_run_with_true_laws_ours_and_admissible_ones(tmp_path, monk
 
 def test_gravity_points_down_in_the_picture():
     g = np.array([[0.0, -1.0, 0.866]])
-    balls = nothing()._replace(x=g, n=np.array([[0.0, 1.0, 0.0]]))
+    balls = no_balls()._replace(x=g, n=np.array([[0.0, 1.0, 0.0]]))
     turned = fig02d.turned(balls)
     assert turned.x == pytest.approx(np.array([[0.0, -np.linalg.norm(g), 0.0]]), abs=1e-12)
     assert turned.n @ turned.x[0] == pytest.approx(-1.0)     # as far as along the floor's own

@@ -6,7 +6,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from figures.common.dots import named
+from figures.common.training_errors import differences
 from figures.extremes import nclaw as extremes_nclaw
 from figures.extremes import nclaw_epochs
 from figures.trade import nclaw as trade_nclaw
@@ -41,9 +41,9 @@ def axes_of(script, **tables):
         found = {column: np.array(values) for column, values in tables[id].items()}
         return {column: a.astype(str) if a.dtype == bool else a for column, a in found.items()}
 
-    named = {id: id.split(".")[-1] for id in script.NEEDS}
+    short = {id: id.split(".")[-1] for id in script.NEEDS}
     return script.draw(SimpleNamespace(table=lambda id, name: table(
-        f"{named[id]}_{name}", name))).axes
+        f"{short[id]}_{name}", name))).axes
 
 
 def labelled(ax):
@@ -92,9 +92,9 @@ def test_what_is_seen_is_in_words_beside_a_band_of_seeds(trade):
 
 def test_all_is_seen_by_default():
     columns = {"every": [1.0], "share": [1.0], "noise": [0.0], "positions": ["False"]}
-    assert named(columns, 0, trade_nclaw.SIGHTS, Seen()) == ""
+    assert differences(columns, 0, trade_nclaw.SIGHTS, Seen()) == ""
     columns["positions"] = ["True"]
-    assert named(columns, 0, trade_nclaw.SIGHTS, Seen()) == "places alone"
+    assert differences(columns, 0, trade_nclaw.SIGHTS, Seen()) == "places alone"
 
 
 def test_widths_are_in_order(trade):

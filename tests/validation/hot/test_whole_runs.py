@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from figures.common.splats import DARK, Balls, Camera, image, outward
-from figures.common.state_panels import Look, states
+from figures.common.state_panels import SceneView, states
 from mpm_ref.scene import build
 from validation.common.registry import discover
 from validation.common.results import ProfileResults
@@ -133,9 +133,9 @@ def test_normals_of_a_cloud_point_outwards():
 def test_states_are_drawn_and_missing_ones_named(history, tmp_path):
     results = ProfileResults(tmp_path)
     with pytest.raises(FileNotFoundError, match=r"hot\.scenes\.faceless"):
-        states(results, "faceless", Look((0,), ("#e8a33d",)))
+        states(results, "faceless", SceneView((0,), ("#e8a33d",)))
     histories.write(tmp_path / "states" / "faceless.npz", history)
-    figure = states(results, "faceless", Look((0, 7), ("viridis",),
+    figure = states(results, "faceless", SceneView((0, 7), ("viridis",),
                                               scalar=("speed", 1.0, "speed [m/s]")))
     assert [ax.get_title() for ax in figure.axes[:2]] == ["t = 0.00 s", "t = 0.12 s"]
     assert len(figure.axes) == 3        # with the colour bar; of a short run, the last picture

@@ -7,7 +7,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from figures.common import reduced
+from figures.common import field_panels
 from figures.nsf import fig18
 from mpm_ref.rom.kinematics import NoBody
 from mpm_ref.rom.study.full_model import nsf_full_model
@@ -94,24 +94,24 @@ def results(cube, run):
 
 
 def test_a_row_for_each_way_and_a_column_for_each_time(results):
-    figure = reduced.beside(results, ID, ("true", "ours", "map"))
+    figure = field_panels.reduced_and_full(results, ID, ("true", "ours", "map"))
     assert len(figure.axes) == 9
     assert [ax.texts[0].get_text() for ax in figure.axes[::3]] == [
         "0.45: full order", "0.45: reduced", "0.45: map alone"]
-    assert len(reduced.ends(results, ID).axes) == 6
-    assert len(reduced.stresses(results, ID).axes) == 7        # with a colour bar
+    assert len(field_panels.training_range(results, ID).axes) == 6
+    assert len(field_panels.stress_panels(results, ID).axes) == 7        # with a colour bar
 
 
 def test_points_that_fly_away_are_left_out(rng):
     """A run may lose points; the box of the full-order runs and ROOM of its longest side stay."""
     x = rng.uniform(size=(30, 3)) * (1.0, 0.2, 0.2)
     x[:2] = [[0.0, 0.0, 0.0], [1.0, 0.2, 0.2]]
-    ends = reduced.room(x)
+    ends = field_panels.padded_box(x)
     assert ends == pytest.approx(np.array([[-0.4, -0.4, -0.4], [1.4, 0.6, 0.6]]))
     gone = np.concatenate([x, [[1.39, 0.0, 0.0], [1.41, 0.0, 0.0], [0.0, -5.0, 0.0]]])
-    solid, _ = reduced.drawn(gone, "#ffffff", 0.1, ends)
+    solid, _ = field_panels.clipped_body(gone, "#ffffff", 0.1, ends)
     assert len(solid.x) == 31
-    assert len(reduced.drawn(x + 10.0, "#ffffff", 0.1, ends)[0].x) == 0
+    assert len(field_panels.clipped_body(x + 10.0, "#ffffff", 0.1, ends)[0].x) == 0
 
 
 @pytest.mark.parametrize(("number", "values", "also", "sides"), [
@@ -146,7 +146,7 @@ def test_figures_show_all_that_experiments_keep(number, values, also, sides, tmp
 
 
 def test_a_run_that_broke_down_is_an_empty_panel():
-    gone, _ = reduced.drawn(np.full((4, 3), np.nan), "white", 0.1)
+    gone, _ = field_panels.clipped_body(np.full((4, 3), np.nan), "white", 0.1)
     assert len(gone.x) == 0
 
 

@@ -1,9 +1,9 @@
-"""What the figures of a step's descent share: the looks of the methods, and a panel of curves."""
+"""Labels and line styles of the methods that solve a step, and a panel of their descent."""
 
 EPS = 1e-7          # the paper's tolerance
 LABELS = {"iteration": "iteration", "cg": "CG iterations", "cpu": "CPU seconds",
           "residual": "residual", "error": "error of the particles"}
-LOOKS = {
+STYLES = {
     "hot": ("HOT", "C0", "o-"),
     "hot-quadratic": ("HOT-quadratic", "C9", "o--"),
     "lbfgs-h": ("LBFGS-H", "C1", "s-"),
@@ -14,17 +14,17 @@ LOOKS = {
     "pn-mgpcg": ("PN-MGPCG", "C4", "d-"),
     "pn-mgpcg-flexible": ("PN-MGPCG, flexible CG", "C4", "d:"),
     "pn-gmg-pcg": ("PN-MGPCG, geometric", "C6", "p-"),
-    "pn-gmg-pcg-flexible": ("the same, flexible CG", "C6", "p:"),
+    "pn-gmg-pcg-flexible": ("PN-MGPCG, geometric, flexible CG", "C6", "p:"),
     "sgs-pcg": ("SGS-PCG", "0.5", "x-"),
 }
 
 
-def drawn(ax, table, columns, methods, rows=True):
-    """Draw one column of a table of iterates over another, for methods; `rows` restricts them."""
+def draw_methods(ax, table, columns, methods, rows=True):
+    """Draw one column of a table of iterates over another, a curve for each method."""
     x, y = columns
     for method in methods:
         at = (table["method"] == method) & rows
-        label, color, style = LOOKS[method]
+        label, color, style = STYLES[method]
         ax.semilogy(table[x][at], table[y][at], style, color=color, label=label, ms=3)
     if y == "residual":
         ax.axhline(EPS, color="0.3", ls="--", lw=0.8)

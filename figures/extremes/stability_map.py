@@ -1,12 +1,12 @@
-"""Where explicit runs break: time step against stiffness, for Poisson's ratios. Colours say how a
-run ended; the line is the stable time step, past which a run is refused unless it is allowed, as
-all were here.
+"""Stability of explicit runs: time step against stiffness, for Poisson's ratios. Colours show how a
+run ended. The line is the stable time step; a run past it is refused unless its problem allows it,
+as all did here.
 """
 
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..common.orders import scales
+from ..common.style import scales
 
 NEEDS = ["extremes.explicit.map"]
 COLOURS = {"finished": "#cfe8cf", "energy": "#f0c36d", "J": "#b58fd1", "CFL": "#e07a6a",
@@ -34,9 +34,9 @@ def draw(results):
         ax.set_xlabel("E [Pa]")
     for ax in axes[:, 0]:
         ax.set_ylabel("dt [s]")
-    seen = [kind for kind in COLOURS if kind in table["end"]]
+    kinds = [kind for kind in COLOURS if kind in table["end"]]
     handles = [plt.Line2D([], [], marker="s", ls="", color=COLOURS[k], label=ENDS.get(k, k))
-               for k in seen]
+               for k in kinds]
     handles.append(plt.Line2D([], [], color="k", label="stable time step"))
     figure.legend(handles=handles, loc="upper center", ncol=len(handles),
                   bbox_to_anchor=(0.5, 1.05), fontsize=9)
@@ -45,11 +45,11 @@ def draw(results):
 
 
 def panel(ax, runs):
-    """One Poisson's ratio."""
+    """Draw the runs at one Poisson's ratio."""
     ax.grid(False)
     for kind, colour in COLOURS.items():
-        mine = runs["end"] == kind
-        ax.plot(runs["E"][mine], runs["dt"][mine], "s", color=colour, ms=9)
+        rows = runs["end"] == kind
+        ax.plot(runs["E"][rows], runs["dt"][rows], "s", color=colour, ms=9)
     bound = runs["dt"] / runs["of_bound"]
     order = np.argsort(runs["E"])
     ax.plot(runs["E"][order], bound[order], "k-")
