@@ -70,7 +70,7 @@ def test_gravity_points_down_in_the_picture():
 def test_the_floor_is_under_the_bodies(tmp_path):
     x = np.random.default_rng(0).uniform((0.4, 0.03, 0.2), (0.6, 0.1, 0.7), (2, 40, 3))
     results = kept(tmp_path, "nclaw.slope", water_true=x, water_ours=x, water_admissible=x)
-    panels = fig02d.sides({"water_true": x, "water_ours": x}, {"water": "water"})
+    panels = fig02d.comparison_rows({"water_true": x, "water_ours": x}, {"water": "water"})
     balls = fig02d.floor_of(panels)
     floor = balls.x
     assert floor[:, 1] + balls.radius == pytest.approx(3.0 / 128.0)

@@ -82,23 +82,23 @@ def test_kept_epochs_are_a_curve(trade):
 
 def test_what_is_seen_is_in_words_beside_a_band_of_seeds(trade):
     assert [text.get_text() for text in trade[1].get_yticklabels()] == [
-        "0.33 of the points", "places alone, 0.0001 m off"]
+        "0.33 of the points", "positions only, 0.0001 m of noise"]
     band, = trade[1].patches
     assert band.get_extents().transformed(trade[1].transData.inverted()).x0 == pytest.approx(1.0)
-    assert labelled(trade[1])["on the run that was learned from"].get_xdata() == pytest.approx(
+    assert labelled(trade[1])["on the training run"].get_xdata() == pytest.approx(
         [3.0, 4.0])
-    assert labelled(trade[1])["thrown otherwise"].get_xdata() == pytest.approx([6.0, 8.0])
+    assert labelled(trade[1])["thrown differently"].get_xdata() == pytest.approx([6.0, 8.0])
 
 
 def test_all_is_seen_by_default():
     columns = {"every": [1.0], "share": [1.0], "noise": [0.0], "positions": ["False"]}
-    assert differences(columns, 0, trade_nclaw.SIGHTS, Seen()) == ""
+    assert differences(columns, 0, trade_nclaw.OBSERVATIONS, Seen()) == ""
     columns["positions"] = ["True"]
-    assert differences(columns, 0, trade_nclaw.SIGHTS, Seen()) == "places alone"
+    assert differences(columns, 0, trade_nclaw.OBSERVATIONS, Seen()) == "positions only"
 
 
 def test_widths_are_in_order(trade):
-    line = labelled(trade[2])["on the run that it learned from"]
+    line = labelled(trade[2])["on the training run"]
     assert line.get_xydata() == pytest.approx(np.array([[1.0, 2.0], [4.0, 1.0]]))
     assert [text.get_text() for text in trade[2].texts] == ["8", "64"]
     assert list(labelled(trade[2])["the true laws"].get_xdata()) == pytest.approx([0.2, 0.2])
@@ -176,6 +176,6 @@ def test_unfinished_trainings_are_by_epoch_and_faults_in_words():
     assert curve.get_xydata() == pytest.approx(np.array([[10.0, 2.0], [300.0, 1.0]]))
     assert list(lost.get_xdata()) == [10.0]
     assert broken.get_xydata() == pytest.approx(np.array([[20.0, 1.0]]))
-    assert second.get_title() == "water, run freely"
+    assert second.get_title() == "water, beyond the horizon"
     assert [text.get_text() for text in last.get_yticklabels()] == [
         "100 steps without frames", "2 times the density"]
