@@ -13,7 +13,7 @@ from .. import scene
 from ..nclaw.strain_watch import time_step_warnings
 from ..preflight import misplaced
 from ..rom.model_file import is_model
-from ..rom.study import summary
+from ..rom.study import record
 from ..store import checkpoint, manifest
 from ..store.atomic import in_words
 from ..store.manifest import scene_hash
@@ -88,7 +88,7 @@ def of_results(path):
             "energy": dict(zip(ENERGIES, results.energy[-1].tolist(), strict=True)) if n else None,
             "checkpoint": str(checkpoint_of(path)) if checkpoint_of(path).exists() else None,
             "manifest": results.manifest,
-            "reduced": summary.summary(results),
+            "reduced": record.summary(results),
             "warnings": [*unsolved(manifest.unsolved(results.manifest)),
                          *manifest.astray(results.manifest)],
         }
@@ -153,7 +153,7 @@ def results_lines(facts):
     else:
         lines.append("no frame yet")
     if facts["reduced"]:
-        lines.append(summary.summary_line(facts["reduced"]))
+        lines.append(record.summary_line(facts["reduced"]))
     lines += map(part_line, facts["manifest"].get("parts", []))
     lines.append(f"checkpoint: {facts['checkpoint'] or 'none'}")
     return lines

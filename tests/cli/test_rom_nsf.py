@@ -13,7 +13,7 @@ from small_studies import ended
 
 from mpm_ref.rom import model_file
 from mpm_ref.rom.fields.pod_fields import Sizes, fit_pod_fields
-from mpm_ref.rom.study import record, reduce, summary
+from mpm_ref.rom.study import record, reduce
 from mpm_ref.rom.study.dataset import load_histories, simulate_history
 from mpm_ref.rom.study.full_model import nsf_full_model
 from mpm_ref.rom.study.generate import run_options
@@ -203,7 +203,7 @@ def test_states_that_the_fields_have_not_learned_are_warned_of(reduced):
     assert "v = 9 lies outside the range" in outside
     assert "times as far from the training runs" in beyond
     with Results(out) as results:
-        found = summary.summary(results)
+        found = record.summary(results)
         assert found["out_of_bounds"] == np.sum(results.h5["reduced/beyond"][()] > 1.5) > 0
     assert f"{found['out_of_bounds']} of {STEPS + 1} states" in beyond
 

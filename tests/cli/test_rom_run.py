@@ -9,7 +9,7 @@ from command_line import assert_told, mpm_ref
 from small_studies import CURVED, STEPS, ended, modelled, write
 
 from mpm_ref.rom import model_file
-from mpm_ref.rom.study import reduce, summary
+from mpm_ref.rom.study import record, reduce
 from mpm_ref.rom.study.full_model import ldm_full_model
 from mpm_ref.rom.study.record import LDM_SERIES
 from mpm_ref.rom.study.run import RunOptions, ldm_run
@@ -101,7 +101,7 @@ def test_a_run_beyond_the_training_is_warned_of(reduced):
     outside, beyond = done.stderr.splitlines()
     assert outside.startswith("mpm-ref: warning: g = 9 lies outside the range")
     with Results(out) as results:
-        found = summary.summary(results)
+        found = record.summary(results)
         t = results.time[STEPS + 1 - found["out_of_bounds"]]
     assert f"{found['out_of_bounds']} of {STEPS + 1} states, from t = {t:g} s on" in beyond
     said = (f"reduced: bars, modes r = 3, g = 9; a step has {found['mean_samples']:.4g} samples "
@@ -147,7 +147,7 @@ def test_a_run_is_told_to_machines_too(made, reduced):
     assert found["reduced"]["map"] == {"kind": "modes", "r": 3}
     assert "beyond" in found["out_of_bounds"][str(STEPS)]
     with Results(out) as results:
-        assert summary.summary(results)["out_of_bounds"] == len(found["out_of_bounds"])
+        assert record.summary(results)["out_of_bounds"] == len(found["out_of_bounds"])
 
 
 def test_a_curved_map_runs_and_is_evaluated(made, reduced, tmp_path):

@@ -10,7 +10,7 @@ from small_studies import modelled, write
 
 from mpm_ref.cli import rom
 from mpm_ref.cli.rom import astray
-from mpm_ref.rom.study import monitor, summary
+from mpm_ref.rom.study import monitor, record
 from mpm_ref.rom.study.monitor import StateCheck
 
 WELL = StateCheck(beyond=0.3, off=0.01, coverage=0.9, blind=0, lost=0.0, J=0.8, inverted=0.0,
@@ -27,9 +27,9 @@ def test_a_run_without_a_step_has_no_means():
     found = {"study": "ab", "name": "bars", "map": {"kind": "modes", "r": 3},
              "parameters": {"g": 2.0}, "states": 1, "out_of_bounds": 0, "mean_samples": None,
              "mean_points": None}
-    assert summary.summary_line(found) == (
+    assert record.summary_line(found) == (
         "reduced: bars, modes r = 3, g = 2; 0 of 1 states out of bounds")
-    some = summary.summary_line(found | {"mean_samples": 20.0, "mean_points": 101.25})
+    some = record.summary_line(found | {"mean_samples": 20.0, "mean_points": 101.25})
     assert "g = 2; a step has 20 samples and 101.2 integration points on average; 0 of 1" in some
 
 

@@ -58,7 +58,7 @@ def test_one_pass_equals_batches(d):
 
 def test_torch_reads_the_same_features(d):
     torch = pytest.importorskip("torch")
-    from mpm_ref.rom.train.perceptron import perceptron_of
+    from mpm_ref.rom.train.networks import perceptron_of
     one, X, xhat = field(d, 6, octaves=OCTAVES), rom_toys.cloud(d, 30), latents()
     Z = torch.from_numpy((X - one.units.low) / one.units.span)
     y = perceptron_of(one)(Z, torch.from_numpy(xhat).repeat(len(X), 1)).detach().numpy()

@@ -90,7 +90,7 @@ def test_the_affine_field_may_depend_on_parameters_and_the_stress_not(d):
 @GIVEN
 def test_one_pass_equals_torch(d, q):
     torch = pytest.importorskip("torch")
-    from mpm_ref.rom.train.perceptron import perceptron_of
+    from mpm_ref.rom.train.networks import perceptron_of
     (g, h, l), X, xhat, mu = networks(d, q), rom_toys.cloud(d, 30), latents(), MU[:q]
     x, G, tau, C = infer(g, h, l, X, xhat, mu)
 

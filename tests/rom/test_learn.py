@@ -18,7 +18,7 @@ from mpm_ref.rom.train.loss import (  # noqa: E402
     tensors_of,
     terms,
 )
-from mpm_ref.rom.train.perceptron import FieldPerceptron, perceptron_of  # noqa: E402
+from mpm_ref.rom.train.networks import FieldPerceptron, perceptron_of  # noqa: E402
 
 LEVELS = np.arange(5)
 ALL = LossWeights(1.0, 1.0)

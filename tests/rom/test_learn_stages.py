@@ -14,8 +14,8 @@ from mpm_ref.rom.fields.architecture import row_per_axis  # noqa: E402
 from mpm_ref.rom.snapshots import position_error  # noqa: E402
 from mpm_ref.rom.train import decoder, field, schedule, session, stages  # noqa: E402
 from mpm_ref.rom.train.decoder import DecoderTraining  # noqa: E402
-from mpm_ref.rom.train.encoder import Encoder  # noqa: E402
 from mpm_ref.rom.train.field import FieldData, FieldTraining  # noqa: E402
+from mpm_ref.rom.train.networks import Encoder  # noqa: E402
 from mpm_ref.rom.train.stages import POSITION, StagePlan, position_snapshots, printed_plan  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")

@@ -204,7 +204,7 @@ def doubles(torch):
 
 def test_derivatives_equal_torch(d, hidden):
     torch = pytest.importorskip("torch")
-    from mpm_ref.rom.train.perceptron import perceptron_of, with_derivatives
+    from mpm_ref.rom.train.networks import perceptron_of, with_derivatives
     map, _, X, xhat, _ = case(d, hidden)
     low, span, mean, std = map.units
     inputs = torch.from_numpy((X - low) / span), torch.from_numpy(xhat).repeat(len(X), 1)
@@ -218,7 +218,7 @@ def test_derivatives_equal_torch(d, hidden):
 
 def test_weights_survive_the_way_to_torch_and_back(d, hidden):
     torch = pytest.importorskip("torch")
-    from mpm_ref.rom.train.perceptron import decoder_of, perceptron_of
+    from mpm_ref.rom.train.networks import decoder_of, perceptron_of
     map = case(d, hidden)[0]
     with doubles(torch):
         back = decoder_of(perceptron_of(map), map.units)
@@ -229,7 +229,7 @@ def test_weights_survive_the_way_to_torch_and_back(d, hidden):
 def test_a_perceptron_of_torch_is_exported(d):
     """In double precision to round-off, in its own single precision to that one's."""
     torch = pytest.importorskip("torch")
-    from mpm_ref.rom.train.perceptron import FieldPerceptron, decoder_of
+    from mpm_ref.rom.train.networks import FieldPerceptron, decoder_of
     torch.manual_seed(0)
     f = FieldPerceptron(d, R)
     units = case(d, ())[0].units

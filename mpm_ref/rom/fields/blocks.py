@@ -36,18 +36,31 @@ class Blocks(NamedTuple):
         stretch = SAFETY * np.linalg.norm(F, 2, axis=(1, 2)).max(initial=0.0)
         gap, _ = KDTree(x).query(x_center, p=np.inf)
         near = k[gap <= distance + stretch * (self.radius[k] + margin)]
-        parts = [self.order[self.start[k]:self.start[k + 1]] for k in near]
-        return np.concatenate([self.order[:0], *parts])
+        return points_of_blocks(self.order, self.start, near)
 
 
 def blocks(X, size):
     """Return the `Blocks` of cubes of a size [m] of points X (n, d) at rest."""
+    order, start, center, distance = group(X, size)
+    radius = np.maximum.reduceat(distance[order], start[:-1])
+    above = blocks(center, LARGER * size) if len(center) > MANY else None
+    return Blocks(order, start, center, radius, above)
+
+
+def group(X, size):
+    """Group points X (n, d) by cubes of a size [m].
+
+    Returns order (n,) and start (blocks + 1,) as in `Blocks`, the centre (blocks, d) of each
+    block's points, and the distance (n,) of each point from its block's centre.
+    """
     _, block = np.unique(np.floor(X / size).astype(np.int64), axis=0, return_inverse=True)
     count = np.bincount(block)
     order = np.argsort(block, kind="stable")
     start = np.concatenate(([0], np.cumsum(count)))
     center = np.stack([np.bincount(block, X[:, a]) / count for a in range(X.shape[1])], axis=1)
-    far = np.linalg.norm(X - center[block], axis=1)
-    radius = np.maximum.reduceat(far[order], start[:-1])
-    above = blocks(center, LARGER * size) if len(center) > MANY else None
-    return Blocks(order, start, center, radius, above)
+    return order, start, center, np.linalg.norm(X - center[block], axis=1)
+
+
+def points_of_blocks(order, start, chosen):
+    """Return the points of the chosen blocks, in their order; order and start as in `Blocks`."""
+    return np.concatenate([order[:0], *(order[start[k]:start[k + 1]] for k in chosen)])

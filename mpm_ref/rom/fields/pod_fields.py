@@ -22,6 +22,7 @@ from scipy.spatial import KDTree
 from ...core.blas import one_thread
 from ...core.jit import CHUNKS, chunk, kernel, parallel, prange
 from ..symmetric import tensor
+from .blocks import group, points_of_blocks
 from .radial_basis import SMOOTHING, Radial, through
 
 LEAST = 1e-13           # square of a singular value over the largest: modes below are round-off
@@ -57,8 +58,7 @@ class Cells(NamedTuple):
         """
         gap, _ = KDTree(x).query(middles, p=np.inf)
         near = np.flatnonzero(gap <= distance + self.rest + self.spread @ np.abs(a))
-        parts = [self.order[self.start[b]:self.start[b + 1]] for b in near]
-        return np.concatenate([self.order[:0], *parts])
+        return points_of_blocks(self.order, self.start, near)
 
 
 class PodFields(NamedTuple):
@@ -226,14 +226,8 @@ def modes_of(A, count, name, origin=None):
 
 def cells(X, U, size):
     """Return the `Cells` of cubes of a size [m] of points X (n, d) with modes U (n, d, R)."""
-    _, block = np.unique(np.floor(X / size).astype(np.int64), axis=0, return_inverse=True)
-    order = np.argsort(block, kind="stable")
-    count = np.bincount(block)
-    start = np.concatenate(([0], np.cumsum(count)))
-    center = np.stack([np.bincount(block, X[:, a]) / count for a in range(X.shape[1])], axis=1)
-    off = np.linalg.norm(X - center[block], axis=1)
-    middle = np.array([order[b:e][np.argmin(off[order[b:e]])]
-                       for b, e in pairwise(start)])
+    order, start, _, distance = group(X, size)
+    middle = np.array([order[b:e][np.argmin(distance[order[b:e]])] for b, e in pairwise(start)])
     rest = spreads(X[..., None], order, start, middle)[:, 0]
     return Cells(order, start, middle, rest, spreads(U, order, start, middle))
 

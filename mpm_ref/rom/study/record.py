@@ -10,6 +10,7 @@ from math import inf
 from typing import NamedTuple
 
 import msgspec
+import numpy as np
 
 from ...energy import energy
 from ...monitor import Unstable, check
@@ -19,7 +20,7 @@ from ...store.manifest import Part, manifest
 from ...store.running import FINISHED, INTERRUPTED, checkpoint_of
 from ...store.writer import Fields, create, reopen
 from ..step import BREAKDOWNS
-from .monitor import NoBodyLeft, StateCheck, checked_states
+from .monitor import NoBodyLeft, StateCheck, checked_states, stored_check
 from .run import ReducedRun
 
 BROKEN = (*BREAKDOWNS, Unstable)
@@ -279,3 +280,31 @@ def _append(series, row):
     for name, dataset in series.items():
         dataset.resize(len(dataset) + 1, axis=0)
         dataset[-1] = row.get(name, 0)
+
+
+def summary(results):
+    """Return the summary of the reduced run in `Results`, or None of a full-order run.
+
+    It is the entry of the manifest with the number of states, of those that were out of bounds, and
+    the means of samples and of integration points over the steps.
+    """
+    facts = results.manifest.get("reduced")
+    if facts is None or "reduced" not in results.h5:
+        return None
+    n = len(results)
+    rows = {name: series[:n] for name, series in results.h5["reduced"].items()}
+    out = sum(bool(stored_check(rows, k).out_of_bounds) for k in range(n))
+    means = {f"mean_{name}": float(np.mean(rows[name][1:])) if n > 1 else None
+             for name in ("samples", "points")}
+    return facts | {"states": n, "out_of_bounds": out} | means
+
+
+def summary_line(facts):
+    """Return a `summary` as a line of text."""
+    name = facts.get("name", facts["study"][:12])
+    parameters = ", ".join(f"{key} = {value:g}" for key, value in facts["parameters"].items())
+    step = "" if facts["mean_points"] is None else (
+        f"a step has {facts['mean_samples']:.4g} samples and {facts['mean_points']:.4g} "
+        "integration points on average; ")
+    return (f"reduced: {name}, {facts['map']['kind']} r = {facts['map']['r']}, {parameters}; "
+            f"{step}{facts['out_of_bounds']} of {facts['states']} states out of bounds")

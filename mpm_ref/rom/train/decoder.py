@@ -12,9 +12,8 @@ from ...training import TrainingTime, sha256, train_epochs
 from ..fields.architecture import ENCODERS, HIDDEN
 from ..fields.pod import basis, directions
 from ..snapshots import decoder_units
-from .encoder import Encoder, FixedLatents, LatentTable, encode
 from .loss import CODE, LossWeights, batch_of, loss, tensors_of
-from .perceptron import FieldPerceptron, decoder_of
+from .networks import Encoder, FieldPerceptron, FixedLatents, LatentTable, decoder_of, encode
 from .session import (
     SAVE,
     NetworkSession,

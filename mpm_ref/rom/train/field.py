@@ -17,7 +17,7 @@ from torch.nn.functional import mse_loss, pad
 from ...training import TrainingTime, sha256, train_epochs
 from ..fields.network import Field
 from ..snapshots import field_units
-from .perceptron import FieldPerceptron, network_of
+from .networks import FieldPerceptron, network_of
 from .session import SAVE, NetworkSession, checkpoint_interval, require_valid
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import torch
 
-from .perceptron import with_derivatives
+from .networks import with_derivatives
 
 
 class LossWeights(NamedTuple):
