@@ -30,7 +30,7 @@ class DruckerPrager(NamedTuple):
 
 
 def build(dim, friction_angle, s_min=0.0):
-    """The cone of a friction angle in degrees.
+    """Return the cone of a friction angle in degrees.
 
     Raises ValueError unless 0 <= friction_angle < 90, 0 <= s_min < 1.
     """
@@ -42,7 +42,7 @@ def build(dim, friction_angle, s_min=0.0):
 
 
 def slope(friction_angle, dim):
-    """Slope alpha of the cone of a friction angle in degrees.
+    """Return the slope alpha of the cone of a friction angle in degrees.
 
     In 3D sqrt(2/3) 2 sin/(3 - sin), which equals Mohr-Coulomb in triaxial compression (NSF-F3,
     NCLAW-eq15); in 2D, with the deviator of the plane, sin/sqrt(2), which equals Mohr-Coulomb
@@ -54,7 +54,7 @@ def slope(friction_angle, dim):
 
 @kernel
 def project(s, y, dt, law, flow):
-    """Singular values after the return; y as it is."""
+    """Return the singular values after the return; y as it is."""
     s = lifted(s, flow.s_min)
     eps = log_strain(s)
     eps_hat = deviator(eps)
@@ -70,14 +70,14 @@ def project(s, y, dt, law, flow):
 
 @kernel
 def steepness(d, law, flow):
-    """alpha (d lam + 2 mu)/(2 mu), the cone's slope in strain."""
+    """Return alpha (d lam + 2 mu)/(2 mu), the cone's slope in strain."""
     return flow.alpha * (d * law.lam + 2.0 * law.mu) / (2.0 * law.mu)
 
 
 @kernel
 def project_vjp(state, bars, dt, law, flow):
-    """Bars before the return; those of mu, lam, alpha, s_min; the share -k tr eps/|eps_hat| of the
-    deviator that is left on the cone |eps_hat| = -k tr eps, k of `steepness`.
+    """Return the bars before the return; those of mu, lam, alpha, s_min; the share -k tr
+    eps/|eps_hat| of the deviator that is left on the cone |eps_hat| = -k tr eps, k of `steepness`.
     """
     s, (s_bar, y_bar) = state[0], bars
     eps = log_strain(lifted(s, flow.s_min))
@@ -100,7 +100,7 @@ def project_vjp(state, bars, dt, law, flow):
 
 @kernel
 def steepness_vjp(k_bar, d, law, flow):
-    """Bars of mu, lam, alpha."""
+    """Return the bars of mu, lam, alpha."""
     of_lam = flow.alpha * d / (2.0 * law.mu)
     of_alpha = (d * law.lam + 2.0 * law.mu) / (2.0 * law.mu)
     return -k_bar * of_lam * law.lam / law.mu, k_bar * of_lam, k_bar * of_alpha
@@ -108,7 +108,7 @@ def steepness_vjp(k_bar, d, law, flow):
 
 @kernel
 def gap_ratio(s, s_new, i, j, share, flow):
-    """(s'_i - s'_j)/(s_i - s_j)."""
+    """Return (s'_i - s'_j)/(s_i - s_j)."""
     return log_gap_ratio(s, s_new, i, j, share, flow.s_min)
 
 

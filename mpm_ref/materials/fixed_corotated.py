@@ -28,53 +28,57 @@ class FixedCorotated(NamedTuple):
 
 
 def from_E_nu(E, nu):
-    """The law with Young's modulus E [Pa] and Poisson's ratio nu at rest; errors as `lame`."""
+    """Return the law with Young's modulus E [Pa] and Poisson's ratio nu at rest; errors as
+    `lame`.
+    """
     return FixedCorotated(*lame(E, nu))
 
 
 @kernel
 def stiffness(law):
-    """The modulus lam + 2 mu [Pa]."""
+    """Return the modulus lam + 2 mu [Pa]."""
     return law.lam + 2.0 * law.mu
 
 
 @kernel
 def units(law):
-    """The law of each modulus alone, 1 Pa: stress is linear in the moduli."""
+    """Return the law of each modulus alone, 1 Pa: stress is linear in the moduli."""
     return FixedCorotated(1.0, 0.0), FixedCorotated(0.0, 1.0)
 
 
 @kernel
 def psi(F, law):
-    """Energy per rest volume [J/m^d]."""
+    """Return the energy per rest volume [J/m^d]."""
     D = mlin(1.0, F, -1.0, rotation(F))
     return law.mu * inner(D, D) + fluid.psi(F, law)
 
 
 @kernel
 def pk1(F, law):
-    """P = 2 mu (F - R) + lam (J - 1) cof(F) [Pa] (NCLAW-eq12)."""
+    """Return P = 2 mu (F - R) + lam (J - 1) cof(F) [Pa] (NCLAW-eq12)."""
     D = mlin(1.0, F, -1.0, rotation(F))
     return mlin(2.0 * law.mu, D, 1.0, fluid.pk1(F, law))
 
 
 @kernel
 def kirchhoff(F, law):
-    """Kirchhoff stress 2 mu (F - R) F^T + lam (J - 1) J I [Pa] (NSF-eq12, whose print lacks I)."""
+    """Return the Kirchhoff stress 2 mu (F - R) F^T + lam (J - 1) J I [Pa] (NSF-eq12, whose print
+    lacks I).
+    """
     D = mlin(1.0, mmt(F, F), -1.0, stretch(F))
     return mlin(2.0 * law.mu, D, 1.0, fluid.kirchhoff(F, law))
 
 
 @kernel
 def kirchhoff_hat(s, law):
-    """Principal tau_i = 2 mu s_i (s_i - 1) + lam (J - 1) J [Pa]."""
+    """Return the principal tau_i = 2 mu s_i (s_i - 1) + lam (J - 1) J [Pa]."""
     x = mul(s, lin(1.0, s, -1.0, fill(1.0, s)))
     return lin(2.0 * law.mu, x, 1.0, fluid.kirchhoff_hat(s, law))
 
 
 @kernel
 def pk1_hat(s, law):
-    """P_i = 2 mu (s_i - 1) + lam (J - 1) dJ/ds_i [Pa]."""
+    """Return P_i = 2 mu (s_i - 1) + lam (J - 1) dJ/ds_i [Pa]."""
     return lin(2.0 * law.mu, lin(1.0, s, -1.0, fill(1.0, s)), 1.0, fluid.pk1_hat(s, law))
 
 
@@ -86,7 +90,7 @@ def dpk1_hat(s, law):
 
 @kernel
 def pair(s, i, j, law):
-    """2 mu and 2 mu (1 - 2/(s_i + s_j)), each with the fluid's part [Pa]."""
+    """Return 2 mu and 2 mu (1 - 2/(s_i + s_j)), each with the fluid's part [Pa]."""
     a, b = fluid.pair(s, i, j, law)
     total = max(s[i] + s[j], LEAST_SUM)
     return 2.0 * law.mu + a, 2.0 * law.mu * (1.0 - 2.0 / total) + b

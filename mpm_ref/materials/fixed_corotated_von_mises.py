@@ -37,13 +37,13 @@ class FixedCorotatedVonMises(NamedTuple):
 
 
 def build(dim, sigma_y=None, tau_y=None):
-    """The flow with either yield stress [Pa]; errors as `yield_radius`."""
+    """Return the flow with either yield stress [Pa]; errors as `yield_radius`."""
     return FixedCorotatedVonMises(yield_radius(dim, sigma_y, tau_y))
 
 
 @kernel
 def project(s, y, dt, law, flow):
-    """Singular values after the return; y as it is."""
+    """Return the singular values after the return; y as it is."""
     x = lin(1.0, mul(s, s), -1.0, s)
     x_hat = deviator(x)
     size, radius = norm(x_hat), flow.tau_y / (2.0 * law.mu)
@@ -54,7 +54,7 @@ def project(s, y, dt, law, flow):
 
 @kernel
 def stretch_of(x):
-    """s_k >= 1/2 with s_k (s_k - 1) = x_k."""
+    """Return s_k >= 1/2 with s_k (s_k - 1) = x_k."""
     if len(x) == 2:
         return _upper(x[0]), _upper(x[1])
     else:
@@ -68,7 +68,9 @@ def _upper(x):
 
 @kernel
 def project_vjp(state, bars, dt, law, flow):
-    """Bars before the return; those of mu, lam, tau_y; the share of dev x that is left."""
+    """Return the bars before the return; those of mu, lam, tau_y; the share of dev x that is
+    left.
+    """
     s, (s_bar, y_bar) = state[0], bars
     x = lin(1.0, mul(s, s), -1.0, s)
     x_hat = deviator(x)
@@ -84,7 +86,7 @@ def project_vjp(state, bars, dt, law, flow):
 
 @kernel
 def d_stretch_of(s):
-    """ds_k/dx_k = 1/(2 s_k - 1); 0 at s_k = 1/2, where x_k is held at its least value."""
+    """Return ds_k/dx_k = 1/(2 s_k - 1); 0 at s_k = 1/2, where x_k is held at its least value."""
     if len(s) == 2:
         return _d_upper(s[0]), _d_upper(s[1])
     else:
@@ -98,7 +100,7 @@ def _d_upper(s):
 
 @kernel
 def gap_ratio(s, s_new, i, j, share, flow):
-    """(s'_i - s'_j)/(s_i - s_j), from x_i - x_j = (s_i - s_j)(s_i + s_j - 1)."""
+    """Return (s'_i - s'_j)/(s_i - s_j), from x_i - x_j = (s_i - s_j)(s_i + s_j - 1)."""
     below = s_new[i] + s_new[j] - 1.0
     if share == 1.0:
         return 1.0

@@ -23,7 +23,8 @@ class Fluid(NamedTuple):
 
 
 def build(lam=None, E=None, nu=None):
-    """A fluid of bulk modulus lam [Pa], or of the lam that belongs to E [Pa] and nu (NCLAW-mat).
+    """Return a fluid of bulk modulus lam [Pa], or of the lam that belongs to E [Pa] and nu
+    (NCLAW-mat).
 
     Raises ValueError unless lam > 0, and unless it is given either lam or both E and nu.
     """
@@ -36,75 +37,75 @@ def build(lam=None, E=None, nu=None):
 
 @kernel
 def stiffness(law):
-    """The modulus lam: rho times the square of the speed of sound at rest [Pa]."""
+    """Return the modulus lam: rho times the square of the speed of sound at rest [Pa]."""
     return law.lam
 
 
 @kernel
 def units(law):
-    """The law of lam = 1 Pa: stress is linear in it."""
+    """Return the law of lam = 1 Pa: stress is linear in it."""
     return (Fluid(1.0),)
 
 
 @kernel
 def psi(F, law):
-    """Energy per rest volume [J/m^d]."""
+    """Return the energy per rest volume [J/m^d]."""
     return psi_volume(det(F), law)
 
 
 @kernel
 def psi_volume(J, law):
-    """Energy per rest volume [J/m^d] of the volume ratio J."""
+    """Return the energy per rest volume [J/m^d] of the volume ratio J."""
     return 0.5 * law.lam * (J - 1.0) * (J - 1.0)
 
 
 @kernel
 def pk1(F, law):
-    """P = lam (J - 1) cof(F) [Pa]."""
+    """Return P = lam (J - 1) cof(F) [Pa]."""
     return mlin(law.lam * (det(F) - 1.0), cofactor(F), 0.0, F)
 
 
 @kernel
 def pressure(J, law):
-    """The isotropic tau = lam J (J - 1) [Pa], positive in tension (NCLAW-eq20)."""
+    """Return the isotropic tau = lam J (J - 1) [Pa], positive in tension (NCLAW-eq20)."""
     return law.lam * J * (J - 1.0)
 
 
 @kernel
 def d_pressure(J, law):
-    """d pressure / dJ = lam (2 J - 1) [Pa]."""
+    """Return d pressure / dJ = lam (2 J - 1) [Pa]."""
     return law.lam * (2.0 * J - 1.0)
 
 
 @kernel
 def kirchhoff(F, law):
-    """Kirchhoff stress lam J (J - 1) I [Pa]."""
+    """Return the Kirchhoff stress lam J (J - 1) I [Pa]."""
     return diag(fill(pressure(det(F), law), F))
 
 
 @kernel
 def kirchhoff_hat(s, law):
-    """Principal tau_i [Pa]."""
+    """Return the principal tau_i [Pa]."""
     return fill(pressure(volume(s), law), s)
 
 
 @kernel
 def pk1_hat(s, law):
-    """P_i = lam (J - 1) dJ/ds_i [Pa]."""
+    """Return P_i = lam (J - 1) dJ/ds_i [Pa]."""
     c = others(s)
     return lin(law.lam * (volume(s) - 1.0), c, 0.0, c)
 
 
 @kernel
 def dpk1_hat(s, law):
-    """A_ij = lam (dJ/ds_i dJ/ds_j + (J - 1) d2J/ds_i ds_j) [Pa]."""
+    """Return A_ij = lam (dJ/ds_i dJ/ds_j + (J - 1) d2J/ds_i ds_j) [Pa]."""
     c = others(s)
     return mlin(law.lam, outer(c, c), law.lam * (volume(s) - 1.0), d_others(s))
 
 
 @kernel
 def pair(s, i, j, law):
-    """a_ij = -b_ij = -lam (J - 1) d2J/ds_i ds_j [Pa]."""
+    """Return a_ij = -b_ij = -lam (J - 1) d2J/ds_i ds_j [Pa]."""
     b = law.lam * (volume(s) - 1.0) * d_others(s)[i][j]
     return -b, b
 

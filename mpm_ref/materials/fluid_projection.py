@@ -16,20 +16,20 @@ class FluidProjection(NamedTuple):
 
 
 def build():
-    """The flow; it has no parameter."""
+    """Return the flow; it has no parameter."""
     return FluidProjection()
 
 
 @kernel
 def project(s, y, dt, law, flow):
-    """J^(1/d) each, y as it is; s as it is unless J > 0."""
+    """Return J^(1/d) each, y as it is; s as it is unless J > 0."""
     J = volume(s)
     return (fill(J ** (1.0 / len(s)), s) if J > 0.0 else s), y
 
 
 @kernel
 def project_vjp(state, bars, dt, law, flow):
-    """Bars before it; that of lam, 0; no deviator is left. All as it is unless J > 0."""
+    """Return the bars before it; that of lam, 0; no deviator is left. All as it is unless J > 0."""
     s, (s_bar, y_bar) = state[0], bars
     J = volume(s)
     if J > 0.0:
@@ -41,7 +41,7 @@ def project_vjp(state, bars, dt, law, flow):
 
 @kernel
 def gap_ratio(s, s_new, i, j, share, flow):
-    """(s'_i - s'_j)/(s_i - s_j)."""
+    """Return (s'_i - s'_j)/(s_i - s_j)."""
     return share
 
 

@@ -28,25 +28,27 @@ class Hencky(NamedTuple):
 
 
 def from_E_nu(E, nu):
-    """The law with Young's modulus E [Pa] and Poisson's ratio nu at rest; errors as `lame`."""
+    """Return the law with Young's modulus E [Pa] and Poisson's ratio nu at rest; errors as
+    `lame`.
+    """
     return Hencky(*lame(E, nu))
 
 
 @kernel
 def stiffness(law):
-    """The modulus lam + 2 mu [Pa]."""
+    """Return the modulus lam + 2 mu [Pa]."""
     return law.lam + 2.0 * law.mu
 
 
 @kernel
 def units(law):
-    """The law of each modulus alone, 1 Pa: stress is linear in the moduli."""
+    """Return the law of each modulus alone, 1 Pa: stress is linear in the moduli."""
     return Hencky(1.0, 0.0), Hencky(0.0, 1.0)
 
 
 @kernel
 def psi(F, law):
-    """Energy per rest volume [J/m^d]; inf unless det F > 0."""
+    """Return the energy per rest volume [J/m^d]; inf unless det F > 0."""
     _, s, _, _ = svd(F)
     if not s[len(s) - 1] > 0.0:
         return inf
@@ -56,34 +58,36 @@ def psi(F, law):
 
 @kernel
 def pk1(F, law):
-    """P = U diag(pk1_hat(s)) V^T [Pa]; NaN unless det F > 0."""
+    """Return P = U diag(pk1_hat(s)) V^T [Pa]; NaN unless det F > 0."""
     U, s, V, _ = svd(F)
     return mmt(scale_columns(U, pk1_hat(s, law)), V)
 
 
 @kernel
 def kirchhoff(F, law):
-    """Kirchhoff stress U diag(kirchhoff_hat(s)) U^T [Pa] (NSF-eq13); NaN unless det F > 0."""
+    """Return the Kirchhoff stress U diag(kirchhoff_hat(s)) U^T [Pa] (NSF-eq13); NaN unless det F >
+    0.
+    """
     U, s, _, _ = svd(F)
     return mmt(scale_columns(U, kirchhoff_hat(s, law)), U)
 
 
 @kernel
 def kirchhoff_hat(s, law):
-    """Principal tau_i = 2 mu eps_i + lam sum(eps) [Pa]."""
+    """Return the principal tau_i = 2 mu eps_i + lam sum(eps) [Pa]."""
     eps = log_strain(s)
     return lin(2.0 * law.mu, eps, law.lam * total_of(eps), fill(1.0, eps))
 
 
 @kernel
 def pk1_hat(s, law):
-    """P_i = tau_i / s_i [Pa]."""
+    """Return P_i = tau_i / s_i [Pa]."""
     return mul(kirchhoff_hat(s, law), inverse(s))
 
 
 @kernel
 def dpk1_hat(s, law):
-    """dP_i/ds_j = lam / (s_i s_j), and (2 mu - tau_i) / s_i^2 more on the diagonal [Pa]."""
+    """Return dP_i/ds_j = lam / (s_i s_j), and (2 mu - tau_i) / s_i^2 more on the diagonal [Pa]."""
     r = inverse(s)
     own = lin(2.0 * law.mu, fill(1.0, s), -1.0, kirchhoff_hat(s, law))
     return mlin(law.lam, outer(r, r), 1.0, diag(mul(own, mul(r, r))))
@@ -91,7 +95,9 @@ def dpk1_hat(s, law):
 
 @kernel
 def pair(s, i, j, law):
-    """(2 mu s_j (eps_i - eps_j)/(s_i - s_j) - tau_j)/(s_i s_j), (P_i + P_j)/(s_i + s_j) [Pa]."""
+    """Return (2 mu s_j (eps_i - eps_j)/(s_i - s_j) - tau_j)/(s_i s_j), (P_i + P_j)/(s_i + s_j)
+    [Pa].
+    """
     P, tau, r = pk1_hat(s, law), kirchhoff_hat(s, law), inverse(s)
     a = (2.0 * law.mu * _log_ratio((s[i] - s[j]) * r[j]) - tau[j]) * r[i] * r[j]
     return a, (P[i] + P[j]) * r[i] * r[j] / (r[i] + r[j])
@@ -99,7 +105,7 @@ def pair(s, i, j, law):
 
 @kernel
 def _log_ratio(x):
-    """log(1 + x)/x, 1 at x = 0."""
+    """Return log(1 + x)/x, 1 at x = 0."""
     return log1p(x) / x if x != 0.0 else 1.0
 
 

@@ -30,13 +30,15 @@ class HerschelBulkley(NamedTuple):
 
 
 def build(dim, eta, sigma_y=None, tau_y=None):
-    """Flow with viscosity eta >= 0 [Pa s] beyond either yield stress; errors as `yield_radius`."""
+    """Return a flow with viscosity eta >= 0 [Pa s] beyond either yield stress; errors as
+    `yield_radius`.
+    """
     return HerschelBulkley(yield_radius(dim, sigma_y, tau_y), not_negative(eta=eta))
 
 
 @kernel
 def project(s, y, dt, law, flow):
-    """Singular values after the relaxation over dt [s]; y as it is."""
+    """Return the singular values after the relaxation over dt [s]; y as it is."""
     J = volume(s)
     if not J > 0.0:
         return s, y
@@ -53,14 +55,15 @@ def project(s, y, dt, law, flow):
 
 @kernel
 def relaxed(size, dt, law, flow):
-    """s_new [Pa] of a deviatoric stress of size s > tau_y (NSF-F5)."""
+    """Return s_new [Pa] of a deviatoric stress of size s > tau_y (NSF-F5)."""
     rate = 2.0 * law.mu * dt
     return flow.tau_y + (size - flow.tau_y) * flow.eta / (rate + flow.eta)
 
 
 @kernel
 def unimodular_shift(D, c):
-    """The c with det(diag(D) + c I) = 1 and all D_i + c > 0; D is traceless, c a bound from above.
+    """Return the c with det(diag(D) + c I) = 1 and all D_i + c > 0; D is traceless, c a bound from
+    above.
 
     In 2D sqrt(1 + |D|^2/2). In 3D the largest root of c^3 - |D|^2/2 c + det D - 1 = 0: Newton's
     method falls onto it from above, where the cubic is convex, until round-off stops it. Relaxed
@@ -85,7 +88,7 @@ def _newton(c, half, q):
 
 @kernel
 def roots(x):
-    """Square roots of the x_i."""
+    """Return the square roots of the x_i."""
     if len(x) == 2:
         return sqrt(x[0]), sqrt(x[1])
     else:
@@ -94,7 +97,8 @@ def roots(x):
 
 @kernel
 def project_vjp(state, bars, dt, law, flow):
-    """Bars before the relaxation; those of mu, kappa, tau_y, eta; the share of D that is left.
+    """Return the bars before the relaxation; those of mu, kappa, tau_y, eta; the share of D that is
+    left.
 
     B stands for b_bar here, B_bar for the gradient by it.
     """
@@ -121,15 +125,17 @@ def project_vjp(state, bars, dt, law, flow):
 
 @kernel
 def unimodular_vjp(B, B_bar):
-    """Bar of the traceless D of B = D + c I, det B = 1: sum_i (dD_i + dc)/B_i = 0 gives dc."""
+    """Return the bar of the traceless D of B = D + c I, det B = 1: sum_i (dD_i + dc)/B_i = 0 gives
+    dc.
+    """
     r = inverse(B)
     return lin(1.0, B_bar, -total_of(B_bar) / total_of(r), r)
 
 
 @kernel
 def share_vjp(share_bar, size, dt, law, flow):
-    """Bar of the size s, and of mu, kappa, tau_y, eta, of the share s_new/s = (tau_y/s) (1 - w) + w
-    with w = eta/(2 mu dt + eta) and s = mu |D|.
+    """Return the bar of the size s, and of mu, kappa, tau_y, eta, of the share s_new/s = (tau_y/s)
+    (1 - w) + w with w = eta/(2 mu dt + eta) and s = mu |D|.
     """
     rate = 2.0 * law.mu * dt
     flows = rate / (rate + flow.eta)            # 1 - w
@@ -143,7 +149,7 @@ def share_vjp(share_bar, size, dt, law, flow):
 
 @kernel
 def gap_ratio(s, s_new, i, j, share, flow):
-    """(s'_i - s'_j)/(s_i - s_j), as s'_i^2 - s'_j^2 is that share of s_i^2 - s_j^2."""
+    """Return (s'_i - s'_j)/(s_i - s_j), as s'_i^2 - s'_j^2 is that share of s_i^2 - s_j^2."""
     return share * (s[i] + s[j]) / (s_new[i] + s_new[j])
 
 

@@ -39,25 +39,27 @@ class LogNeoHookean(NamedTuple):
 
 
 def from_E_nu(E, nu):
-    """The law with Young's modulus E [Pa] and Poisson's ratio nu at rest; errors as `lame`."""
+    """Return the law with Young's modulus E [Pa] and Poisson's ratio nu at rest; errors as
+    `lame`.
+    """
     return LogNeoHookean(*lame(E, nu))
 
 
 @kernel
 def stiffness(law):
-    """The modulus lam + 2 mu [Pa]."""
+    """Return the modulus lam + 2 mu [Pa]."""
     return law.lam + 2.0 * law.mu
 
 
 @kernel
 def units(law):
-    """The law of each modulus alone, 1 Pa: stress is linear in the moduli."""
+    """Return the law of each modulus alone, 1 Pa: stress is linear in the moduli."""
     return LogNeoHookean(1.0, 0.0), LogNeoHookean(0.0, 1.0)
 
 
 @kernel
 def psi(F, law):
-    """Energy per rest volume [J/m^d]; inf unless det F > 0."""
+    """Return the energy per rest volume [J/m^d]; inf unless det F > 0."""
     J = det(F)
     if not J > 0.0:
         return inf
@@ -67,26 +69,26 @@ def psi(F, law):
 
 @kernel
 def isotropic(J, law):
-    """The c = lam log J - mu [Pa] of tau = mu F F^T + c I; NaN unless J > 0."""
+    """Return the c = lam log J - mu [Pa] of tau = mu F F^T + c I; NaN unless J > 0."""
     return law.lam * log(expanded(J)) - law.mu
 
 
 @kernel
 def pk1(F, law):
-    """P = mu F + c F^-T [Pa]; NaN unless det F > 0."""
+    """Return P = mu F + c F^-T [Pa]; NaN unless det F > 0."""
     J = expanded(det(F))
     return mlin(law.mu, F, isotropic(J, law) / J, cofactor(F))
 
 
 @kernel
 def kirchhoff(F, law):
-    """Kirchhoff stress mu F F^T + c I [Pa]; NaN unless det F > 0."""
+    """Return the Kirchhoff stress mu F F^T + c I [Pa]; NaN unless det F > 0."""
     return mlin(law.mu, mmt(F, F), isotropic(det(F), law), identity(F))
 
 
 @kernel
 def dpk1(F, dF, law):
-    """The differential dP = mu dF + lam (G : dF) G - c G dF^T G [Pa], with G = F^-T."""
+    """Return the differential dP = mu dF + lam (G : dF) G - c G dF^T G [Pa], with G = F^-T."""
     J = expanded(det(F))
     G = mlin(1.0 / J, cofactor(F), 0.0, F)
     turned = mm(G, mm(transpose(dF), G))
@@ -96,19 +98,19 @@ def dpk1(F, dF, law):
 
 @kernel
 def kirchhoff_hat(s, law):
-    """Principal tau_i = mu s_i^2 + c [Pa]."""
+    """Return the principal tau_i = mu s_i^2 + c [Pa]."""
     return lin(law.mu, mul(s, s), isotropic(volume(s), law), fill(1.0, s))
 
 
 @kernel
 def pk1_hat(s, law):
-    """P_i = mu s_i + c/s_i [Pa]."""
+    """Return P_i = mu s_i + c/s_i [Pa]."""
     return lin(law.mu, s, isotropic(volume(s), law), inverse(s))
 
 
 @kernel
 def dpk1_hat(s, law):
-    """dP_i/ds_j = lam/(s_i s_j), and mu - c/s_i^2 more on the diagonal [Pa]."""
+    """Return dP_i/ds_j = lam/(s_i s_j), and mu - c/s_i^2 more on the diagonal [Pa]."""
     r = inverse(s)
     own = lin(law.mu, fill(1.0, s), -isotropic(volume(s), law), mul(r, r))
     return mlin(law.lam, outer(r, r), 1.0, diag(own))
@@ -116,7 +118,7 @@ def dpk1_hat(s, law):
 
 @kernel
 def pair(s, i, j, law):
-    """The quotients mu - c/(s_i s_j) and mu + c/(s_i s_j) [Pa]."""
+    """Return the quotients mu - c/(s_i s_j) and mu + c/(s_i s_j) [Pa]."""
     r = inverse(s)
     twist = isotropic(volume(s), law) * r[i] * r[j]
     return law.mu - twist, law.mu + twist

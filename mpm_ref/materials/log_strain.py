@@ -9,7 +9,7 @@ from .stretches import positive_stretches
 
 @kernel
 def log_strain(s):
-    """eps_i = log s_i; all NaN where one s_i is not > 0."""
+    """Return eps_i = log s_i; all NaN where one s_i is not > 0."""
     return _log(positive_stretches(s))
 
 
@@ -23,7 +23,7 @@ def _log(s):
 
 @kernel
 def stretches(eps):
-    """s_i = exp eps_i."""
+    """Return s_i = exp eps_i."""
     if len(eps) == 2:
         return exp(eps[0]), exp(eps[1])
     else:
@@ -32,13 +32,13 @@ def stretches(eps):
 
 @kernel
 def deviator(x):
-    """The deviator x - mean(x); in 2D that of the plane (X-cross-15)."""
+    """Return the deviator x - mean(x); in 2D that of the plane (X-cross-15)."""
     return lin(1.0, x, -total_of(x) / len(x), fill(1.0, x))
 
 
 @kernel
 def clamp(s, low, high):
-    """Each s_i brought into [low, high]; NaN stays NaN."""
+    """Return each s_i brought into [low, high]; NaN stays NaN."""
     if len(s) == 2:
         return _clamp(s[0], low, high), _clamp(s[1], low, high)
     else:
@@ -55,13 +55,14 @@ def _clamp(x, low, high):
 
 @kernel
 def lifted(s, s_min):
-    """s_i < s_min lifted to s_min, where s_min > 0."""
+    """Return s_i < s_min lifted to s_min, where s_min > 0."""
     return clamp(s, s_min, inf) if s_min > 0.0 else s
 
 
 @kernel
 def radial_return(s, tau_y, law, s_min):
-    """Singular values on the surface |dev tau| = 2 mu |eps_hat| = tau_y, and dgamma; s, 0 inside.
+    """Return the singular values on the surface |dev tau| = 2 mu |eps_hat| = tau_y, and dgamma; s,
+    0 inside.
 
         dgamma = |eps_hat| - tau_y / (2 mu)                 (NSF-F4, NCLAW-eq18)
         eps   <- eps - dgamma eps_hat / |eps_hat|           (NSF-F4, NCLAW-eq19)

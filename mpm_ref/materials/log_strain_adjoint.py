@@ -16,7 +16,7 @@ from .stretches import inverse
 
 @kernel
 def radial_vjp(x, radius, x_bar, size_bar):
-    """x_bar and radius_bar of x' = mean(x) + radius n, n = dev x/|dev x|, from x'_bar.
+    """Return x_bar and radius_bar of x' = mean(x) + radius n, n = dev x/|dev x|, from x'_bar.
 
     size_bar is the bar of |dev x|, where it is used beside x'.
     """
@@ -32,8 +32,9 @@ def radial_vjp(x, radius, x_bar, size_bar):
 
 @kernel
 def radial_return_vjp(s, bars, tau_y, law, s_min):
-    """Bars of s, of tau_y/(2 mu) and of s_min, from bars = (s'_bar, dgamma_bar) of `radial_return`,
-    and the share tau_y/(2 mu)/|eps_hat| of the deviator that is left; 1 inside the surface.
+    """Return the bars of s, of tau_y/(2 mu) and of s_min, from bars = (s'_bar, dgamma_bar) of
+    `radial_return`, and the share tau_y/(2 mu)/|eps_hat| of the deviator that is left; 1 inside the
+    surface.
     """
     s_bar, dgamma_bar = bars
     eps = log_strain(lifted(s, s_min))
@@ -50,13 +51,13 @@ def radial_return_vjp(s, bars, tau_y, law, s_min):
 
 @kernel
 def log_strain_vjp(s, eps_bar, s_min):
-    """Bars of s and s_min of eps = log(lifted(s))."""
+    """Return the bars of s and s_min of eps = log(lifted(s))."""
     return lifted_vjp(s, mul(eps_bar, inverse(lifted(s, s_min))), s_min)
 
 
 @kernel
 def lifted_vjp(s, x_bar, s_min):
-    """Bars of s and s_min of x = lifted(s)."""
+    """Return the bars of s and s_min of x = lifted(s)."""
     if s_min > 0.0:
         s_bar, s_min_bar, _ = clamp_vjp(s, x_bar, s_min, inf)
         return s_bar, s_min_bar
@@ -66,7 +67,7 @@ def lifted_vjp(s, x_bar, s_min):
 
 @kernel
 def clamp_vjp(s, x_bar, low, high):
-    """Bars of s, low and high of x = clamp(s)."""
+    """Return the bars of s, low and high of x = clamp(s)."""
     low_bar, high_bar = 0.0, 0.0
     for i in range(len(s)):
         if s[i] < low:
@@ -78,7 +79,7 @@ def clamp_vjp(s, x_bar, low, high):
 
 @kernel
 def unclamped(s, low, high):
-    """1 for each s_i that a clamp leaves as it is, otherwise 0."""
+    """Return 1 for each s_i that a clamp leaves as it is, otherwise 0."""
     if len(s) == 2:
         return _unclamped(s[0], low, high), _unclamped(s[1], low, high)
     else:
@@ -92,7 +93,7 @@ def _unclamped(x, low, high):
 
 @kernel
 def clamp_gap_ratio(s, i, j, low, high):
-    """(x_i - x_j)/(s_i - s_j) of x = clamp(s); for equal ones the derivative."""
+    """Return (x_i - x_j)/(s_i - s_j) of x = clamp(s); for equal ones the derivative."""
     gap = s[i] - s[j]
     x = clamp(s, low, high)
     return (x[i] - x[j]) / gap if gap != 0.0 else _unclamped(s[i], low, high)
@@ -100,7 +101,7 @@ def clamp_gap_ratio(s, i, j, low, high):
 
 @kernel
 def log_gap_ratio(s, s_new, i, j, share, s_min):
-    """(s'_i - s'_j)/(s_i - s_j) where the return leaves that share of dev log(lifted(s))."""
+    """Return (s'_i - s'_j)/(s_i - s_j) where the return leaves that share of dev log(lifted(s))."""
     x = lifted(s, s_min)
     z = (x[i] - x[j]) / x[j]
     growth = expm1(share * log1p(z)) / z if z != 0.0 else share
@@ -109,5 +110,5 @@ def log_gap_ratio(s, s_new, i, j, share, s_min):
 
 @kernel
 def lifted_gap_ratio(s, i, j, s_min):
-    """(x_i - x_j)/(s_i - s_j) of x = lifted(s)."""
+    """Return (x_i - x_j)/(s_i - s_j) of x = lifted(s)."""
     return clamp_gap_ratio(s, i, j, s_min, inf) if s_min > 0.0 else 1.0

@@ -4,7 +4,7 @@ from math import isfinite, sqrt
 
 
 def lame(E, nu):
-    """mu, lam [Pa] of Young's modulus E [Pa] and Poisson's ratio nu (NSF-F0).
+    """Return mu, lam [Pa] of Young's modulus E [Pa] and Poisson's ratio nu (NSF-F0).
 
     The same in 2D, where the laws without a deviator are then in plane strain. Raises ValueError
     unless E > 0 and -1 < nu < 1/2.
@@ -19,13 +19,16 @@ def lame(E, nu):
 
 
 def bulk_modulus(E, nu):
-    """The bulk modulus E / (3 (1 - 2 nu)) = lam + 2 mu / 3 [Pa] (NSF-F0); errors as `lame`."""
+    """Return the bulk modulus E / (3 (1 - 2 nu)) = lam + 2 mu / 3 [Pa] (NSF-F0); errors as
+    `lame`.
+    """
     mu, lam = lame(E, nu)
     return lam + 2.0 * mu / 3.0
 
 
 def yield_radius(dim, sigma_y=None, tau_y=None):
-    """Radius tau_y of the yield surface |dev tau|_F = tau_y [Pa], the convention of all flows here.
+    """Return the radius tau_y of the yield surface |dev tau|_F = tau_y [Pa], the convention of all
+    flows here.
 
     The papers use two (X-cross-7): this radius itself (NSF-F4, NCLAW-eq18), or the yield stress
     in uniaxial tension, of which the radius is sqrt(2/3) sigma_y in 3D (NSF-F5, HOT-vonmises) and
@@ -43,17 +46,19 @@ def yield_radius(dim, sigma_y=None, tau_y=None):
 
 
 def positive(**named):
-    """The one given number as a float; ValueError unless finite and > 0."""
+    """Return the one given number as a float; ValueError unless finite and > 0."""
     return _checked(named, lambda x: x > 0.0, "a finite number > 0")
 
 
 def not_negative(**named):
-    """The one given number as a float; ValueError unless finite and >= 0."""
+    """Return the one given number as a float; ValueError unless finite and >= 0."""
     return _checked(named, lambda x: x >= 0.0, "a finite number >= 0")
 
 
 def least_stretch(s_min):
-    """The bound to which singular values are lifted, 0 for none; ValueError outside [0, 1)."""
+    """Return the bound to which singular values are lifted, 0 for none; ValueError outside
+    [0, 1).
+    """
     return _checked({"s_min": s_min}, lambda x: 0.0 <= x < 1.0, "0 <= s_min < 1, 0 for no bound")
 
 

@@ -43,25 +43,25 @@ class NeoHookean(NamedTuple):
 
 
 def from_E_nu(E, nu):
-    """The law with the mu and kappa of E [Pa] and nu (NSF-F0); errors as `lame`."""
+    """Return the law with the mu and kappa of E [Pa] and nu (NSF-F0); errors as `lame`."""
     return NeoHookean(lame(E, nu)[0], bulk_modulus(E, nu))
 
 
 @kernel
 def stiffness(law):
-    """The modulus lam + 2 mu = kappa + 4 mu / 3 [Pa]; in 2D the law has kappa + mu."""
+    """Return the modulus lam + 2 mu = kappa + 4 mu / 3 [Pa]; in 2D the law has kappa + mu."""
     return law.kappa + 4.0 * law.mu / 3.0
 
 
 @kernel
 def units(law):
-    """The law of each modulus alone, 1 Pa: stress is linear in the moduli."""
+    """Return the law of each modulus alone, 1 Pa: stress is linear in the moduli."""
     return NeoHookean(1.0, 0.0), NeoHookean(0.0, 1.0)
 
 
 @kernel
 def psi(F, law):
-    """Energy per rest volume [J/m^d]; inf unless det F > 0."""
+    """Return the energy per rest volume [J/m^d]; inf unless det F > 0."""
     J = det(F)
     if not J > 0.0:
         return inf
@@ -71,21 +71,23 @@ def psi(F, law):
 
 @kernel
 def parts(J, tr_b, law, like):
-    """m, t, A [Pa] with tau = m b + (A - t) I."""
+    """Return m, t, A [Pa] with tau = m b + (A - t) I."""
     m = law.mu * J ** (-2.0 / len(like))
     return m, m * (tr_b / len(like)), 0.5 * law.kappa * (J * J - 1.0)
 
 
 @kernel
 def kirchhoff(F, law):
-    """Kirchhoff stress kappa/2 (J^2 - 1) I + mu dev(J^(-2/d) F F^T) [Pa]; NaN unless det F > 0."""
+    """Return the Kirchhoff stress kappa/2 (J^2 - 1) I + mu dev(J^(-2/d) F F^T) [Pa]; NaN unless det
+    F > 0.
+    """
     m, t, A = parts(expanded(det(F)), inner(F, F), law, F)
     return mlin(m, mmt(F, F), A - t, identity(F))
 
 
 @kernel
 def pk1(F, law):
-    """P = m F + (A - t) F^-T [Pa], with m, t, A of `parts`."""
+    """Return P = m F + (A - t) F^-T [Pa], with m, t, A of `parts`."""
     J = expanded(det(F))
     m, t, A = parts(J, inner(F, F), law, F)
     return mlin(m, F, (A - t) / J, cofactor(F))
@@ -93,7 +95,9 @@ def pk1(F, law):
 
 @kernel
 def dpk1(F, dF, law):
-    """The differential dP [Pa], from d(F^-T) = -F^-T dF^T F^-T: no decomposition is needed."""
+    """Return the differential dP [Pa], from d(F^-T) = -F^-T dF^T F^-T: no decomposition is
+    needed.
+    """
     J, d = expanded(det(F)), len(F)
     m, t, A = parts(J, inner(F, F), law, F)
     G = mlin(1.0 / J, cofactor(F), 0.0, F)
@@ -107,21 +111,21 @@ def dpk1(F, dF, law):
 
 @kernel
 def kirchhoff_hat(s, law):
-    """Principal tau_i = m s_i^2 + A - t [Pa]."""
+    """Return the principal tau_i = m s_i^2 + A - t [Pa]."""
     m, t, A = parts(expanded(volume(s)), dot(s, s), law, s)
     return lin(m, mul(s, s), A - t, fill(1.0, s))
 
 
 @kernel
 def pk1_hat(s, law):
-    """P_i = m s_i + (A - t)/s_i [Pa]."""
+    """Return P_i = m s_i + (A - t)/s_i [Pa]."""
     m, t, A = parts(expanded(volume(s)), dot(s, s), law, s)
     return lin(m, s, A - t, inverse(s))
 
 
 @kernel
 def dpk1_hat(s, law):
-    """dP_i/ds_j = (kappa J^2 + 2 t/d)/(s_i s_j) - (2 m/d)(s_i/s_j + s_j/s_i) [Pa].
+    """Return dP_i/ds_j = (kappa J^2 + 2 t/d)/(s_i s_j) - (2 m/d)(s_i/s_j + s_j/s_i) [Pa].
 
     On the diagonal m + (t - A)/s_i^2 is added.
     """
@@ -134,7 +138,7 @@ def dpk1_hat(s, law):
 
 @kernel
 def pair(s, i, j, law):
-    """The quotients m + (t - A)/(s_i s_j) and m - (t - A)/(s_i s_j) [Pa]."""
+    """Return the quotients m + (t - A)/(s_i s_j) and m - (t - A)/(s_i s_j) [Pa]."""
     m, t, A = parts(expanded(volume(s)), dot(s, s), law, s)
     r = inverse(s)
     twist = (t - A) * r[i] * r[j]

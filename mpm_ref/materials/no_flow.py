@@ -10,25 +10,25 @@ class NoFlow(NamedTuple):
 
 
 def build():
-    """The flow; it has no parameter."""
+    """Return the flow; it has no parameter."""
     return NoFlow()
 
 
 @kernel
 def project(s, y, dt, law, flow):
-    """s, y as they are."""
+    """Return s, y as they are."""
     return s, y
 
 
 @kernel
 def project_vjp(state, bars, dt, law, flow):
-    """Bars as they are; none of the parameters; all of the deviator is left."""
+    """Return the bars as they are; none of the parameters; all of the deviator is left."""
     return bars, no_bars(law), 1.0
 
 
 @kernel
 def no_bars(law):
-    """A 0 for every modulus of the law."""
+    """Return a 0 for every modulus of the law."""
     if len(law) == 1:
         return (0.0,)
     else:
@@ -43,7 +43,7 @@ def gap_ratio(s, s_new, i, j, share, flow):
 
 @kernel
 def never_fails(y, flow):
-    """1: `intact` of every flow without damage."""
+    """Return 1: `intact` of every flow without damage."""
     return 1.0
 
 

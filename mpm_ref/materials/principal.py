@@ -24,7 +24,7 @@ pair = by_type("pair")              # (s, i, j, law) -> a_ij, b_ij
 
 @kernel
 def local(s, law):
-    """A, pairs of the exact differential at singular values s [Pa]."""
+    """Return A, pairs of the exact differential at singular values s [Pa]."""
     if len(s) == 2:
         return dpk1_hat(s, law), (pair(s, 0, 1, law),)
     else:
@@ -34,7 +34,8 @@ def local(s, law):
 
 @kernel
 def local_spd(s, law):
-    """A, pairs with their negative eigenvalues set to zero; `local` to the bit if there are none.
+    """Return A, pairs with their negative eigenvalues set to zero; `local` to the bit if there are
+    none.
 
     The nearest differential, in the Frobenius norm, without negative eigenvalues.
     """
@@ -48,13 +49,13 @@ def local_spd(s, law):
 
 @kernel
 def apply(A, pairs, X):
-    """U^T dP V for X = U^T dF V."""
+    """Return U^T dP V for X = U^T dF V."""
     return mixed(mv(A, diagonal(X)), pairs, X)
 
 
 @kernel
 def dpk1(F, dF, law):
-    """The differential dP = (d2psi/dF2) : dF [Pa]."""
+    """Return the differential dP = (d2psi/dF2) : dF [Pa]."""
     U, s, V, _ = svd(F)
     A, pairs = local(s, law)
     return mmt(mm(U, apply(A, pairs, mm(transpose(U), mm(dF, V)))), V)
@@ -62,7 +63,9 @@ def dpk1(F, dF, law):
 
 @kernel
 def dpk1_spd(F, dF, law):
-    """`dpk1` with its negative eigenvalues set to zero, as projected Newton needs it (HOT-alg1)."""
+    """Return `dpk1` with its negative eigenvalues set to zero, as projected Newton needs it
+    (HOT-alg1).
+    """
     U, s, V, _ = svd(F)
     A, pairs = local_spd(s, law)
     return mmt(mm(U, apply(A, pairs, mm(transpose(U), mm(dF, V)))), V)
@@ -70,8 +73,8 @@ def dpk1_spd(F, dF, law):
 
 @kernel
 def kirchhoff_vjp(s, T, law):
-    """U^T F_bar V at F = U diag(s) V^T, of T = U^T tau_bar U: as tau = P F^T and d2psi/dF2 is
-    symmetric, F_bar = (d2psi/dF2) : (tau_bar F) + tau_bar^T P.
+    """Return U^T F_bar V at F = U diag(s) V^T, of T = U^T tau_bar U: as tau = P F^T and d2psi/dF2
+    is symmetric, F_bar = (d2psi/dF2) : (tau_bar F) + tau_bar^T P.
     """
     A, pairs = local(s, law)
     from_F = scale_columns(transpose(T), pk1_hat(s, law))
@@ -80,7 +83,7 @@ def kirchhoff_vjp(s, T, law):
 
 @kernel
 def semidefinite(A):
-    """A symmetric matrix with its negative eigenvalues set to zero; A itself if none is."""
+    """Return a symmetric matrix with its negative eigenvalues set to zero; A itself if none is."""
     w, Q = eigh(A)
     if w[0] >= 0.0:
         return A
@@ -90,7 +93,7 @@ def semidefinite(A):
 
 @kernel
 def _not_negative(w):
-    """Negative components of a vector set to zero; NaN stays NaN."""
+    """Return the negative components of a vector set to zero; NaN stays NaN."""
     if len(w) == 2:
         return _at_least_zero(w[0]), _at_least_zero(w[1])
     else:

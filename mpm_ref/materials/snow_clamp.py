@@ -21,7 +21,7 @@ class SnowClamp(NamedTuple):
 
 
 def build(s_min, s_max):
-    """The clamp; ValueError unless 0 < s_min <= 1 <= s_max, finite."""
+    """Return the clamp; ValueError unless 0 < s_min <= 1 <= s_max, finite."""
     if not (0.0 < s_min <= 1.0 <= s_max and isfinite(s_max)):
         raise ValueError(f"s_min = {s_min}, s_max = {s_max}: expected 0 < s_min <= 1 <= s_max")
     return SnowClamp(float(s_min), float(s_max))
@@ -29,20 +29,22 @@ def build(s_min, s_max):
 
 @kernel
 def project(s, y, dt, law, flow):
-    """Clamped singular values, y as it is."""
+    """Return the clamped singular values, y as it is."""
     return clamp(s, flow.s_min, flow.s_max), y
 
 
 @kernel
 def project_vjp(state, bars, dt, law, flow):
-    """Bars before the clamp; those of mu, lam, s_min, s_max; a 1 for the share, not read."""
+    """Return the bars before the clamp; those of mu, lam, s_min, s_max; a 1 for the share, not
+    read.
+    """
     s_bar, low_bar, high_bar = clamp_vjp(state[0], bars[0], flow.s_min, flow.s_max)
     return (s_bar, bars[1]), (0.0, 0.0, low_bar, high_bar), 1.0
 
 
 @kernel
 def gap_ratio(s, s_new, i, j, share, flow):
-    """(s'_i - s'_j)/(s_i - s_j)."""
+    """Return (s'_i - s'_j)/(s_i - s_j)."""
     return clamp_gap_ratio(s, i, j, flow.s_min, flow.s_max)
 
 

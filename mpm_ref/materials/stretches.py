@@ -8,7 +8,7 @@ from ..core.tensor import fill
 
 @kernel
 def volume(s):
-    """J, the product of the singular values."""
+    """Return J, the product of the singular values."""
     J = s[0]
     for i in range(1, len(s)):
         J *= s[i]
@@ -17,7 +17,7 @@ def volume(s):
 
 @kernel
 def others(s):
-    """dJ/ds_i: the product of all singular values but the i-th."""
+    """Return dJ/ds_i: the product of all singular values but the i-th."""
     if len(s) == 2:
         return s[1], s[0]
     else:
@@ -26,7 +26,7 @@ def others(s):
 
 @kernel
 def d_others(s):
-    """d2J/ds_i ds_j: off the diagonal the product of the remaining singular values."""
+    """Return d2J/ds_i ds_j: off the diagonal the product of the remaining singular values."""
     if len(s) == 2:
         return (0.0, 1.0), (1.0, 0.0)
     else:
@@ -35,7 +35,7 @@ def d_others(s):
 
 @kernel
 def positive_stretches(s):
-    """s, or NaN where one of them is not > 0: some laws are not defined there."""
+    """Return s, or NaN where one of them is not > 0: some laws are not defined there."""
     for i in range(len(s)):
         if not s[i] > 0.0:
             return fill(nan, s)
@@ -44,13 +44,13 @@ def positive_stretches(s):
 
 @kernel
 def expanded(J):
-    """J; NaN unless J > 0."""
+    """Return J; NaN unless J > 0."""
     return J if J > 0.0 else nan
 
 
 @kernel
 def inverse(s):
-    """1/s_i; all NaN where one s_i is not > 0."""
+    """Return 1/s_i; all NaN where one s_i is not > 0."""
     return _inverse(positive_stretches(s))
 
 

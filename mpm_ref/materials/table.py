@@ -85,7 +85,9 @@ class Material(NamedTuple):
         return self.flow.tau_y if self.has_history else 0.0
 
     def wave_speed(self, rho):
-        """Speed of the compression wave at rest [m/s], for the density at rest [kg/m^d]."""
+        """Return the speed of the compression wave at rest [m/s], for the density at rest
+        [kg/m^d].
+        """
         return sqrt(stiffness(self.law) / rho)
 
 
@@ -98,7 +100,7 @@ def recovers(law):
 
 
 def make_law(name, /, **parameters):
-    """The law of that name, e.g. `make_law("hencky", E=1e6, nu=0.2)` [Pa].
+    """Return the law of that name, e.g. `make_law("hencky", E=1e6, nu=0.2)` [Pa].
 
     Raises ValueError for an unknown name, an unknown, missing or impossible parameter.
     """
@@ -107,7 +109,7 @@ def make_law(name, /, **parameters):
 
 
 def make_flow(name, law, dim, /, **parameters):
-    """The flow of that name on a law, in dim = 2 or 3 dimensions.
+    """Return the flow of that name on a law, in dim = 2 or 3 dimensions.
 
     E.g. `make_flow("drucker_prager", law, 3, friction_angle=25)` (degrees). Raises ValueError for
     an unknown name, a law it is not written for, an unknown, missing or impossible parameter.
@@ -131,7 +133,9 @@ def _entry(table, kind, name):
 
 
 def _built(build, what, parameters, dim=None):
-    """`build(**parameters)` after a check of the names; ValueError says `what` it was for."""
+    """Return `build(**parameters)` after a check of the names; ValueError says `what` it was
+    for.
+    """
     signature = inspect.signature(build).parameters
     accepted = {name: p.default is p.empty for name, p in signature.items()}
     given = dict(parameters)

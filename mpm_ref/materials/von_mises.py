@@ -40,31 +40,35 @@ class Softening(NamedTuple):
 
 
 def build(dim, sigma_y=None, tau_y=None, s_min=0.0):
-    """Perfect plasticity at either yield stress [Pa]; errors as `yield_radius`, `least_stretch`."""
+    """Return perfect plasticity at either yield stress [Pa]; errors as `yield_radius`,
+    `least_stretch`.
+    """
     return VonMises(yield_radius(dim, sigma_y, tau_y), least_stretch(s_min))
 
 
 def build_hardening(dim, xi, sigma_y=None, tau_y=None, s_min=0.0):
-    """Hardening with coefficient xi >= 0; other errors as `build`."""
+    """Return hardening with coefficient xi >= 0; other errors as `build`."""
     return Hardening(yield_radius(dim, sigma_y, tau_y), not_negative(xi=xi), least_stretch(s_min))
 
 
 def build_softening(dim, theta, sigma_y=None, tau_y=None, s_min=0.0):
-    """Softening with theta >= 0 [Pa]; other errors as `build`."""
+    """Return softening with theta >= 0 [Pa]; other errors as `build`."""
     radius = yield_radius(dim, sigma_y, tau_y)
     return Softening(radius, not_negative(theta=theta), least_stretch(s_min))
 
 
 @kernel
 def project(s, y, dt, law, flow):
-    """Singular values after the return; y as it is."""
+    """Return the singular values after the return; y as it is."""
     s, _ = radial_return(s, flow.tau_y, law, flow.s_min)
     return s, y
 
 
 @kernel
 def project_vjp(state, bars, dt, law, flow):
-    """Bars before the return; those of mu, lam, tau_y, s_min; the share of the deviator left."""
+    """Return the bars before the return; those of mu, lam, tau_y, s_min; the share of the deviator
+    left.
+    """
     s_bar, r_bar, s_min_bar, share = radial_return_vjp(
         state[0], (bars[0], 0.0), flow.tau_y, law, flow.s_min)
     mu_bar, tau_y_bar = radius_vjp(r_bar, flow.tau_y, law)
@@ -73,21 +77,25 @@ def project_vjp(state, bars, dt, law, flow):
 
 @kernel
 def radius_vjp(radius_bar, tau_y, law):
-    """Bars of mu and tau_y of the radius tau_y/(2 mu) in strain."""
+    """Return the bars of mu and tau_y of the radius tau_y/(2 mu) in strain."""
     tau_y_bar = radius_bar / (2.0 * law.mu)
     return -tau_y_bar * tau_y / law.mu, tau_y_bar
 
 
 @kernel
 def harden(s, y, dt, law, flow):
-    """Singular values after the return to the yield stress y; y + 2 mu xi dgamma (NSF-F4)."""
+    """Return the singular values after the return to the yield stress y; y + 2 mu xi dgamma
+    (NSF-F4).
+    """
     s, dgamma = radial_return(s, y, law, flow.s_min)
     return s, y + 2.0 * law.mu * flow.xi * dgamma
 
 
 @kernel
 def harden_vjp(state, bars, dt, law, flow):
-    """Bars of mu, lam, tau_y, xi, s_min, as `project_vjp`; tau_y, the first y, is not read here."""
+    """Return the bars of mu, lam, tau_y, xi, s_min, as `project_vjp`; tau_y, the first y, is not
+    read here.
+    """
     s, y = state
     s_bar, y_bar = bars
     dgamma_bar = 2.0 * law.mu * flow.xi * y_bar
@@ -101,7 +109,8 @@ def harden_vjp(state, bars, dt, law, flow):
 
 @kernel
 def soften(s, y, dt, law, flow):
-    """Singular values after the return to y; y - theta |eps - proj(eps)|, at least 0 (NSF-F4).
+    """Return the singular values after the return to y; y - theta |eps - proj(eps)|, at least 0
+    (NSF-F4).
 
     The plastic strain of the step is |eps - proj(eps)| = dgamma. NSF sets mu = lam = 0 in a
     failed particle, whose F is then of no consequence; here its elastic strain is released, s =
@@ -114,13 +123,15 @@ def soften(s, y, dt, law, flow):
 
 @kernel
 def carries(y, flow):
-    """1, or 0 once the yield stress of a softening particle is 0."""
+    """Return 1, or 0 once the yield stress of a softening particle is 0."""
     return 1.0 if y > 0.0 else 0.0
 
 
 @kernel
 def soften_vjp(state, bars, dt, law, flow):
-    """Bars as `harden_vjp`, with theta for xi; all are 0 once the particle has failed."""
+    """Return the bars as `harden_vjp`, with theta for xi; all are 0 once the particle has
+    failed.
+    """
     s, y = state
     s_bar, y_bar = bars
     _, dgamma = radial_return(s, y, law, flow.s_min)
@@ -135,7 +146,7 @@ def soften_vjp(state, bars, dt, law, flow):
 
 @kernel
 def gap_ratio(s, s_new, i, j, share, flow):
-    """(s'_i - s'_j)/(s_i - s_j); singular values that do not yield are not lifted."""
+    """Return (s'_i - s'_j)/(s_i - s_j); singular values that do not yield are not lifted."""
     return 1.0 if share == 1.0 else log_gap_ratio(s, s_new, i, j, share, flow.s_min)
 
 

@@ -25,13 +25,13 @@ from ..core.jit import by_type, kernel
 from .principal import dpk1_hat, pair
 
 stiffness = by_type("stiffness")        # (law) -> lam + 2 mu [Pa], the wave modulus at rest
-# (law) -> the same and `timestep.largest_modulus`, of a law whose derivatives are not known
+# (law) -> lam + 2 mu and `timestep.largest_modulus`, of a law without second derivatives
 moduli_at_rest = by_type("moduli_at_rest", 0)
 
 
 @kernel
 def wave_modulus(s, law):
-    """W [Pa]: no elastic wave at singular values s is faster than c = sqrt(W / rho_0).
+    """Return W [Pa]: no elastic wave at singular values s is faster than c = sqrt(W / rho_0).
 
     lam + 2 mu at rest, lam J^2 for a fluid, >= 0; NaN where the law is not defined. c is a speed
     in space, as the cell size is.
@@ -49,6 +49,6 @@ def wave_modulus(s, law):
 
 @kernel
 def _larger_eigenvalue(p, k, q):
-    """Of ((p, k), (k, q))."""
+    """Return the larger eigenvalue of ((p, k), (k, q))."""
     h = 0.5 * (p - q)
     return 0.5 * (p + q) + sqrt(h * h + k * k)

@@ -1,9 +1,9 @@
-"""One step of many bodies that do not interact, each on a grid of its own, and its adjoint.
+"""One step of a batch of bodies that do not interact, each on its own grid, and its adjoint.
 
 Training runs the segments of a trajectory at once (NCLAW-train). The step is that of `explicit`
-with the settings of NCLAW-sim, MLS-MPM with quadratic splines in a box of walls, but for two
-things: it takes the stress from outside, and leaves the trial deformation gradient as it is. Bodies
-share out the threads; each is stepped by one, so that results do not depend on how many there are.
+with the settings of NCLAW-sim, MLS-MPM with quadratic splines in a box of walls, with two
+differences: the stress is an input, and the output is the trial deformation gradient. Each body is
+stepped by one thread, so that results do not depend on the number of threads.
 """
 
 from typing import NamedTuple
@@ -25,9 +25,7 @@ NO_STRESS = np.empty((0, 0, 0, 0))
 
 
 class World(NamedTuple):
-    """The surroundings of all bodies: grid, walls, gravity, and their particles' constants
-    (NCLAW-sim); 3D.
-    """
+    """The data that all bodies share: grid, walls, gravity, masses and volumes (NCLAW-sim); 3D."""
 
     dx: float               # [m]
     dt: float               # [s]
@@ -42,9 +40,9 @@ class World(NamedTuple):
 
 
 class States(NamedTuple):
-    """The states of the n particles of each of b bodies; or the gradients of them.
+    """The states of the n particles of each of b bodies, or the gradients of states.
 
-    The stress is that of the start of a step; at its end there is none, and tau is empty.
+    The stress is an input of a step; in the states after it tau is empty.
     """
 
     x: np.ndarray       # (b, n, 3)    [m]
@@ -54,11 +52,11 @@ class States(NamedTuple):
     tau: np.ndarray = NO_STRESS   # (b, n, 3, 3) [Pa]
 
 
-ROWS = States((3,), (3,), (3, 3), (3, 3), (3, 3))       # shapes of one particle's
+ROWS = States((3,), (3,), (3, 3), (3, 3), (3, 3))       # shapes for one particle
 
 
 class BatchNodes(NamedTuple):
-    """Storage of a grid for each of b bodies, flat, and of its bars; reused from step to step."""
+    """Storage for the grid of each of b bodies, flat, and for its bars; reused in every step."""
 
     m: np.ndarray           # (b, most nodes)
     v: np.ndarray           # (b, 3 most nodes)
@@ -67,8 +65,8 @@ class BatchNodes(NamedTuple):
 
 
 def make_world(problem):
-    """Return the `World` of a problem of one body. Raises ValueError for a problem that is not as
-    in NCLAW-sim.
+    """Return the `World` of a problem of one body. Raises ValueError for a problem with other
+    features than those of NCLAW-sim.
     """
     walls, clip, scheme = getattr(problem.conditions, "walls", None), problem.clip, problem.scheme
     if problem.dim != 3 or (scheme.transfer, scheme.degree, scheme.rpic) != ("mls", 2, 0.0):
@@ -165,7 +163,7 @@ def require_inside(world, x):
 
 @kernel
 def reached_box(world, x):
-    """The first node that particles at x (n, 3) reach, and how many there are along each axis."""
+    """Return the first node of particles at x (n, 3), and the number of nodes along each axis."""
     first, shape = np.empty(3, np.int64), np.empty(3, np.int64)
     for a in range(3):
         low = high = x[0, a]
@@ -178,7 +176,7 @@ def reached_box(world, x):
 
 @kernel
 def body_grid(world, m, v, region):
-    """`Grid` of zeros in the storage of one body; at = (first node, shape)."""
+    """Return a `Grid` of zeros in the storage of one body; region = (first node, shape)."""
     first, (nx, ny, nz) = region
     size = nx * ny * nz
     m[:size] = 0.0
@@ -189,7 +187,7 @@ def body_grid(world, m, v, region):
 
 @kernel
 def scatter_velocities(world, particles, grid):
-    """Masses and velocities of the nodes, as they are before the walls."""
+    """Compute the masses and velocities of the nodes before the wall conditions."""
     scatter_mls3(particles, grid, QUADRATIC, world.dt, np.arange(len(world.m)))
     m, v = grid.m.reshape(-1), grid.v.reshape(-1, 3)
     for i in range(len(m)):
@@ -200,14 +198,14 @@ def scatter_velocities(world, particles, grid):
 
 @kernel
 def stop_at_walls(world, grid, masked):
-    """Zero, in an array like the velocities, those that go into walls."""
+    """Set entries of an array like the velocities to zero where velocities point into walls."""
     for a in range(3):
         stop_along(a, world.low[a] - grid.origin[a], world.high[a] - grid.origin[a], grid.v, masked)
 
 
 @kernel
 def stop_along(a, low, high, v, masked):
-    """Zero, of nodes below low or above high along axis a, what moves on that way."""
+    """Set component a to zero where a node below low or above high moves farther out along a."""
     for i in range(v.shape[0]):
         for j in range(v.shape[1]):
             for k in range(v.shape[2]):
@@ -218,7 +216,7 @@ def stop_along(a, low, high, v, masked):
 
 @kernel
 def particles_of(world, states, tau, b):
-    """`Particles` of body b."""
+    """Return the `Particles` of body b."""
     C = states.C[b]
     return Particles(states.x[b], states.v[b], C, C, states.F[b], tau, world.m, world.V0,
                      NO_HISTORY, NONE)
@@ -226,7 +224,7 @@ def particles_of(world, states, tau, b):
 
 @kernel
 def advance_one(world, before, after, nodes, b):
-    """The step of body b."""
+    """Make the step of body b."""
     grid = body_grid(world, nodes.m[b], nodes.v[b], reached_box(world, before.x[b]))
     tau = before.tau[b]
     scatter_velocities(world, particles_of(world, before, tau, b), grid)
@@ -266,7 +264,7 @@ def pull_back_one(world, before, after, bars, result, index):
 
 @kernel
 def pull_deformation(world, before, after, bars, mine, b):
-    """Start the bars of body b: of F before, of C after and of x; returns those of v."""
+    """Start the bars of body b: of F before, of C after and of x; return those of v."""
     n = len(world.m)
     u = np.empty((n, 3))
     for p in range(n):
@@ -284,7 +282,7 @@ def pull_deformation(world, before, after, bars, mine, b):
 
 @kernel
 def update_one(world, grid, bar):
-    """The adjoint of the update of one grid."""
+    """Compute the adjoint of the update of one grid."""
     flat = Grid(grid.m.reshape(-1), grid.v.reshape(-1, 3), NONE, NONE, grid.origin, world.dx)
     bars = Grid(bar.m.reshape(-1), bar.v.reshape(-1, 3), NONE, NONE, grid.origin, world.dx)
     update_bars(flat, bars, world.gravity, Update(world.dt, world.eps, False), np.zeros(3),

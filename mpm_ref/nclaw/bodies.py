@@ -1,4 +1,4 @@
-"""Bodies of other laws: the same particles, moved by laws of one's choice."""
+"""Copies of bodies with other laws, such as learned ones, and material points without a grid."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from ..materials.learned import learned_flow, learned_law
 def body_with_laws(body, law, flow):
     """Return a copy of a body with other laws.
 
-    J becomes F = J^(1/d) I where the laws read F, and F becomes J where they read that alone.
+    J becomes F = J^(1/d) I where the laws read F, and F becomes J where they read J alone.
     """
     q, material = body.particles, Material(law, flow)
     transfer = "mls" if q.L is q.C else "apic" if q.C.ndim == 3 else "pic"
@@ -19,8 +19,8 @@ def body_with_laws(body, law, flow):
     if q.C.ndim == 3:
         particles.C[:] = q.C
     if material.has_history:
-        kept = q.y.ndim == 1
-        y = q.y.copy() if kept else np.full(len(q.x), material.initial_y)
+        has_y = q.y.ndim == 1
+        y = q.y.copy() if has_y else np.full(len(q.x), material.initial_y)
         particles = particles._replace(y=y)
     return Body(body.name, particles._replace(b=q.b.copy()), law, flow, body.id.copy())
 
@@ -47,8 +47,8 @@ def body_maker(laws):
 
 
 def material_points(law, flow, F):
-    """A `Body` of material points at rest, of deformation gradients F (n, d, d), that belong to no
-    grid.
+    """Return a `Body` of material points at rest, of deformation gradients F (n, d, d), that belong
+    to no grid.
     """
     n, d, _ = F.shape
     still, one, material = np.zeros((n, d)), np.ones(n), Material(law, flow)
@@ -60,11 +60,11 @@ def material_points(law, flow, F):
 
 
 def deformation_gradients(body):
-    """F (n, d, d) of a body's particles, J^(1/d) I where they carry J alone."""
+    """Return F (n, d, d) of a body's particles, J^(1/d) I where they carry J alone."""
     return convert_gradients(body.particles.F, True, body.particles.x.shape[1])
 
 
 def kirchhoff_stresses(body):
-    """tau (n, d, d) [Pa] of a body's particles."""
+    """Return tau (n, d, d) [Pa] of a body's particles."""
     tau, d = body.particles.tau, body.particles.x.shape[1]
     return tau if tau.ndim == 3 else tau[:, None, None] * np.eye(d)

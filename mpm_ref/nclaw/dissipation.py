@@ -1,16 +1,16 @@
-"""Energy that laws take away or create: the work that deformation does on material points.
+"""Energy that laws dissipate or create: the work of deformation on material points.
 
     w = integral of P : dF from F to F_trial,    P = tau F^-T
 
-is what a step costs per rest volume, before the return map. Of a law with an energy it is psi's
-difference, to the error of the quadrature (Simpson's, along the straight line), and over any number
-of steps
+is the work of a step per rest volume, before the return map. For a law with an energy it is the
+difference of psi, to the error of the quadrature (Simpson's, along the straight line), and over any
+number of steps
 
     sum of w = psi(end) - psi(start) + D,    D = sum of psi(F_trial) - psi(F) over the returns
 
-Thermodynamics asks for D >= 0. So from rest, where psi is least, no path gains energy; of a closed
-path, whose whole deformation comes back to where it was, W = sum of w < 0 says that a law gave back
-more than was put in. That needs no energy, so that it can be asked of any law, as can
+Thermodynamics requires D >= 0. So from rest, where psi is least, no path gains energy; on a closed
+path, whose total deformation returns to its start, W = sum of w < 0 means that a law creates
+energy. This test needs no psi, so that it applies to any law, as does
 
     D of a return = integral of P : dF from F back to F_trial = integral of tau : l_p
 """
@@ -28,7 +28,7 @@ SIMPSON = ((0.0, 1.0 / 6.0), (0.5, 4.0 / 6.0), (1.0, 1.0 / 6.0))    # places and
 
 
 class Balance(NamedTuple):
-    """The energies of paths, per rest volume."""
+    """The work and dissipation of paths, per rest volume."""
 
     work: np.ndarray        # (n,) sum of w [J/m^3]
     exchanged: np.ndarray       # (n,) sum of |w| [J/m^3]
@@ -37,14 +37,14 @@ class Balance(NamedTuple):
 
     @property
     def share(self):
-        """W over what went in and out (n,), in [-1, 1]; 0 where nothing did."""
+        """W over the energy exchanged (n,), in [-1, 1]; 0 where none was."""
         return np.divide(self.work, self.exchanged, out=np.zeros_like(self.work),
                          where=self.exchanged != 0.0)
 
 
 def loops(n, size, steps, rng):
-    """Closed paths (steps + 1, n, 3, 3) of the whole deformation, ellipses in random directions of
-    all nine components:
+    """Return closed paths (steps + 1, n, 3, 3) of the whole deformation, ellipses in random
+    directions of all nine components:
 
         G(t) = I + size (A sin(2 pi t) + B (1 - cos(2 pi t))/2),    |A| = |B| = 1
     """
@@ -55,7 +55,9 @@ def loops(n, size, steps, rng):
 
 
 def balance(law, flow, G):
-    """`Balance` of points that start at rest and follow G (k + 1, n, 3, 3), from I on."""
+    """Return the `Balance` of points that start at rest and follow G (k + 1, n, 3, 3), from I
+    on.
+    """
     F, costs, taken = np.tile(np.eye(3), (G.shape[1], 1, 1)), [], []
     for before, after in pairwise(G):
         trial = after @ np.linalg.inv(before) @ F
@@ -67,20 +69,20 @@ def balance(law, flow, G):
 
 
 def work(law, F, after):
-    """w (n,) [J/m^3] from F to `after`, both (n, 3, 3), by an elastic law."""
+    """Return w (n,) [J/m^3] from F to `after`, both (n, 3, 3), by an elastic law."""
     return sum(share * np.einsum("pij,pij->p", first_piola(law, F + place * (after - F)), after - F)
                for place, share in SIMPSON)
 
 
 def first_piola(law, F):
-    """P (n, 3, 3) [Pa] of F (n, 3, 3)."""
+    """Return P (n, 3, 3) [Pa] of F (n, 3, 3)."""
     body = material_points(law, NoFlow(), F)
     initial_stress(body)
     return kirchhoff_stresses(body) @ np.linalg.inv(F).swapaxes(1, 2)
 
 
 def returned(law, flow, trial):
-    """F (n, 3, 3) after the return of trial ones."""
+    """Return F (n, 3, 3) after the return of trial ones."""
     if isinstance(flow, NoFlow):
         return trial
     body = material_points(law, flow, trial)

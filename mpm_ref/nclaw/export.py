@@ -1,7 +1,7 @@
-"""Trained laws for other programs: layers and constants as plain arrays and words, and pairs of
-questions and answers to test an implementation by.
+"""Export of trained laws to other programs: layers and constants as plain arrays, formulas as text,
+and pairs of inputs and outputs to test an implementation by.
 
-Nothing of `weights` is needed to read them. What each kind answers is said in words that go along;
+A reader needs no code of this package: the formula of each kind is part of the export;
 docs/reference/studies.md lists the names.
 """
 
@@ -52,7 +52,7 @@ SPLINES = ("tau = U diag(y s) U^T, y_i = f(s_i) + sum over j != i of g(s_i s_j) 
            "tables[0], [1], [2] are f, g, h [Pa]: piece p, of as many breaks below x, is the sum "
            "over m of tables[., p, m] (x - origins[p])^(3 - m)")
 KNOWN = "the law of that name in mpm_ref/materials, with these constants"
-ANSWERS = {     # kind -> what is done with what it reads
+ANSWERS = {     # kind -> formula from its inputs to its output
     response.Stress: f"{TURNED}; tau = unit R T F^T",
     response.SymmetricStress: f"{TURNED}; tau = unit R T R^T",
     response.PlainStress: f"{TURNED}; tau = unit Y F^T",
@@ -77,8 +77,8 @@ ANSWERS = {     # kind -> what is done with what it reads
 
 
 def export_tables(laws):
-    """{"format", "dim", "decomposition", "about", "elastic", "plastic", "check"} of `LearnedLaws`:
-    texts, numbers, arrays, and tables of them.
+    """Return {"format", "dim", "decomposition", "about", "elastic", "plastic", "check"} of
+    `LearnedLaws`: texts, numbers, arrays, and tables of them.
     """
     d = dim_of(laws)
     return {"format": FORMAT, "dim": d, "decomposition": OF_F, "about": laws.about,
@@ -87,7 +87,7 @@ def export_tables(laws):
 
 
 def part_of(weights, d):
-    """Return the table of a law: its kind, what it reads and answers, its constants and layers."""
+    """Return the table of a law: kind, inputs, formula, constants and layers."""
     kind = weights.kind
     constants = kind._asdict()
     if type(kind) in spline.READINGS:
@@ -100,8 +100,8 @@ def part_of(weights, d):
 
 
 def questions(d):
-    """Deformation gradients (n, d, d): rest, a turn, stretched, sheared, compressed; then random
-    ones, each turned at random.
+    """Return the deformation gradients (n, d, d): rest, a turn, stretched, sheared, compressed;
+    then random ones, each turned at random.
     """
     rng = np.random.default_rng(SEED)
     rest, turn = np.eye(d), np.eye(d)
@@ -116,7 +116,7 @@ def questions(d):
 
 
 def check_pairs(laws, F):
-    """Questions F (n, d, d) and the answers of both laws, with what their first layers read."""
+    """Return F (n, d, d) with the outputs of both laws and the inputs of their first layers."""
     law, flow = learned_law(laws.elastic), learned_flow(laws.plastic)
     elastic, plastic = material_points(law, NoFlow(), F), material_points(law, flow, F)
     initial_stress(elastic)
@@ -127,8 +127,8 @@ def check_pairs(laws, F):
 
 
 def flatten_tables(tables, path=""):
-    """{name: text, number or array} of nested tables, names joined by "_"; lists of words become
-    arrays, `about` JSON.
+    """Return {name: text, number or array} of nested tables, names joined by "_"; lists of words
+    become arrays, `about` JSON.
     """
     result = {}
     for key, value in tables.items():
@@ -154,8 +154,8 @@ def write(path, tables):
 
 
 def input_labels(weights, d):
-    """Return words (inputs) for what the first layer of `LawWeights` reads in d dimensions; none
-    without a network.
+    """Return labels for the inputs of the first layer of `LawWeights` in d dimensions; none without
+    a network.
     """
     kind = weights.kind
     if isinstance(kind, Energetic):
@@ -173,12 +173,12 @@ def input_labels(weights, d):
 
 
 def stretch_labels(d):
-    """Return words for the stretches, in descending order, without their value at rest."""
+    """Return labels for the stretches, in descending order, without their value at rest."""
     return [f"s_{i} - 1" for i in range(d)]
 
 
 def component_labels(d):
-    """Return words for the components of a matrix, row by row, without those of I."""
+    """Return labels for the components of a matrix, row by row, without those of I."""
     return [f"{i}{j} - 1" if i == j else f"{i}{j}" for i, j in product(range(d), repeat=2)]
 
 

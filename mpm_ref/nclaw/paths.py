@@ -2,8 +2,8 @@
 
     F_trial = G_{k+1} G_k^-1 F,   F = returned(F_trial),   tau = kirchhoff(F)
 
-G is the whole deformation, F what elasticity keeps of it. A learned return map acts once in a step,
-so that what comes of a path depends on how many steps it takes.
+G is the total deformation, F its elastic part. A learned return map acts once in a step, so that
+the response to a path depends on the number of steps.
 """
 
 from itertools import pairwise
@@ -33,7 +33,7 @@ class PathResponse(NamedTuple):
 
 
 class PathFamily(NamedTuple):
-    """The direction of a family of paths, G = I + strain A."""
+    """The direction of a family of paths, G = I + strain A, and the stress to record."""
 
     A: np.ndarray           # (d, d)
     reads: np.ndarray       # (d, d)
@@ -50,8 +50,8 @@ def path_families(d):
 
 
 def monotone(d, strain, steps):
-    """Return the `StrainPath`s from rest to strains of at most this size: stretched and compressed
-    along one axis, sheared, swollen and compressed in all directions. steps: their number on each.
+    """Return the `StrainPath`s from rest to strains of this size: extension and compression along
+    one axis, shear, expansion and compression in all directions. steps: their number on each path.
     """
     ends = {"uniaxial": (strain, -strain), "shear": (strain,), "volumetric": (strain, -strain)}
     return [path(name, kind, (0.0, end), steps) for name, kind in path_families(d).items()
@@ -59,16 +59,18 @@ def monotone(d, strain, steps):
 
 
 def cycles(d, strain, steps):
-    """Return the `StrainPath`s that load and unload: compressed along one axis and back; sheared,
-    back, the other way and back. steps: their number from turn to turn.
+    """Return the `StrainPath`s that load and unload: compression along one axis and back; shear,
+    back, shear in the opposite direction and back. steps: their number from turn to turn.
     """
-    known = path_families(d)
-    return [path("uniaxial cycle", known["uniaxial"], (0.0, -strain, 0.0), steps),
-            path("shear cycle", known["shear"], (0.0, strain, 0.0, -strain, 0.0), steps)]
+    families = path_families(d)
+    return [path("uniaxial cycle", families["uniaxial"], (0.0, -strain, 0.0), steps),
+            path("shear cycle", families["shear"], (0.0, strain, 0.0, -strain, 0.0), steps)]
 
 
 def path(name, kind, turns, steps):
-    """Return the `StrainPath` from turn to turn (strains), of `steps` even steps each."""
+    """Return the `StrainPath` through turning points (strains), with `steps` even steps between
+    successive ones.
+    """
     legs = [np.linspace(a, b, steps + 1)[1:] for a, b in pairwise(turns)]
     strain = np.concatenate([turns[:1], *legs])
     G = np.eye(len(kind.A)) + strain[:, None, None] * kind.A
@@ -90,6 +92,6 @@ def path_response(law, flow, path, dt):
 def path_stress(path, response):
     """Return the stress (k + 1,) [Pa] that a path records; NaN where it is not finite."""
     finite = np.isfinite(response.tau).all(axis=(1, 2))
-    found = np.full(len(finite), np.nan)
-    found[finite] = np.einsum("ij,kij->k", path.reads, response.tau[finite])
-    return found
+    stress = np.full(len(finite), np.nan)
+    stress[finite] = np.einsum("ij,kij->k", path.reads, response.tau[finite])
+    return stress

@@ -1,11 +1,10 @@
-"""Warnings about runs whose learned laws answer beyond the strains of their training.
+"""Warnings about runs in which learned laws are evaluated beyond the strains of their training.
 
-Nothing in a step fails where a law has learned nothing: it answers, smooth, and often wrong. The
-`excess` of `learned.strain_range` tells it, in the elastic deformation gradients of a state. A
-state is out of range where the excess of a point is above MAX_EXCESS, or the point is inverted
-where training met none that was, or has no finite F. Bounds do not say what such an answer is
-worth: `python -m validation run extremes.nclaw` records how often the watch warns of runs that are
-right, and is silent about wrong ones.
+No step fails where a law extrapolates: its values are smooth, and often wrong. The `excess` of
+`learned.strain_range` detects it, in the elastic deformation gradients of a state. A state is out
+of range where the excess of a point is above MAX_EXCESS, or the point is inverted where none was in
+training, or its F is not finite. This does not measure the error: `python -m validation run
+extremes.nclaw` records how often the watch warns about accurate runs, and misses wrong ones.
 """
 
 from typing import NamedTuple
@@ -37,7 +36,7 @@ class StrainReport(NamedTuple):
 
     @property
     def out_of_range(self):
-        """Return whether the law answers for a point beyond the strains of its training."""
+        """Whether a point is beyond the strains of the law's training."""
         return self.count > 0
 
 

@@ -83,33 +83,35 @@ class ContractionFlow(NamedTuple):
 
 
 def build_flow(weights):
-    """`ContractionFlow` of a `LawWeights` of kind `Contraction`."""
+    """Return the `ContractionFlow` of a `LawWeights` of kind `Contraction`."""
     return ContractionFlow(*flatten(weights.layers), weights.kind.strain)
 
 
 def strains_of(factors, kind):
-    """x (n, 3) of a `Spectrum`; NaN unless det F > 0."""
+    """Return x (n, 3) of a `Spectrum`; NaN unless det F > 0."""
     x = np.empty_like(factors.s)
     _strains(factors.s, kind.strain, x)
     return x
 
 
 def pull_back_strains(x_bar, factors, kind):
-    """Gradient of F (n, 3, 3) from that of x (n, 3)."""
+    """Return the gradient of F (n, 3, 3) from that of x (n, 3)."""
     s_bar = np.empty_like(factors.s)
     _pull_strains(x_bar, factors.s, kind.strain, s_bar)
     return pull_back_stretches(s_bar, factors)
 
 
 def contracted(c, factors):
-    """F (n, 3, 3) after the return, of c = (a, b) (n, 2) and the `Spectrum` of the trial."""
+    """Return F (n, 3, 3) after the return, of c = (a, b) (n, 2) and the `Spectrum` of the trial."""
     F = np.empty_like(factors.U)
     _contracted(c, factors, F)
     return F
 
 
 def pull_back(G, c, factors):
-    """Gradients of c (n, 2), and of the trial F (n, 3, 3) at fixed c, from that of F, G."""
+    """Return the gradients of c (n, 2), and of the trial F (n, 3, 3) at fixed c, from that of
+    F, G.
+    """
     c_bar, F_bar = np.empty_like(c), np.empty_like(factors.U)
     _pull(G, c, factors, c_bar, F_bar)
     return c_bar, F_bar
@@ -117,7 +119,7 @@ def pull_back(G, c, factors):
 
 @kernel
 def read(s, strain):
-    """x of singular values s."""
+    """Return x of singular values s."""
     eps = log_strain(s)
     theta = total_of(eps)
     return (log1p(norm(deviator(eps)) / strain), log1p(max(theta, 0.0) / strain),
@@ -126,7 +128,7 @@ def read(s, strain):
 
 @kernel
 def read_bars(x_bar, s, strain):
-    """Bar of s from that of x; 0 of |e| where e = 0, which has a kink."""
+    """Return the bar of s from that of x; 0 of |e| where e = 0, which has a kink."""
     eps = log_strain(s)
     e, theta = deviator(eps), total_of(eps)
     size = norm(e)
@@ -137,7 +139,7 @@ def read_bars(x_bar, s, strain):
 
 @kernel
 def left(s, a, b):
-    """Singular values after the return."""
+    """Return the singular values after the return."""
     eps = log_strain(s)
     theta = total_of(eps)
     kept = exp(-b) * theta if theta > 0.0 else theta
@@ -146,7 +148,7 @@ def left(s, a, b):
 
 @kernel
 def left_bars(s, s_new, s_new_bar, a, b):
-    """Bars of s, a, b from that of `left`."""
+    """Return the bars of s, a, b from that of `left`."""
     eps = log_strain(s)
     theta, bar = total_of(eps), mul(s_new, s_new_bar)
     opened, mean, share = theta > 0.0, total_of(bar) / len(s), exp(-a)
@@ -165,7 +167,9 @@ def pairs_of(s, s_new, share):
 
 @kernel
 def pair(s, s_new, i, j, share):
-    """(s'_i - s'_j)/(s_i - s_j), where a share of the deviator is left, and the same of sums."""
+    """Return (s'_i - s'_j)/(s_i - s_j), where a share of the deviator is left, and the same of
+    sums.
+    """
     total = s[i] + s[j]
     skew = (s_new[i] + s_new[j]) / total if total > UNDETERMINED * s[0] else 0.0
     return log_gap_ratio(s, s_new, i, j, share, 0.0), skew
@@ -173,21 +177,21 @@ def pair(s, s_new, i, j, share):
 
 @kernel
 def read_all(s, strain, x, bounds):
-    """x of the points bounds[0] .. bounds[1] - 1."""
+    """Compute x of the points bounds[0] .. bounds[1] - 1."""
     for p in range(bounds[0], bounds[1]):
         put_vec(x, p, read(vec(s, p, LIKE), strain))
 
 
 @kernel
 def pull_read(x_bar, s, strain, s_bar, bounds):
-    """Bars of s of the points bounds[0] .. bounds[1] - 1."""
+    """Compute the bars of s of the points bounds[0] .. bounds[1] - 1."""
     for p in range(bounds[0], bounds[1]):
         put_vec(s_bar, p, read_bars(vec(x_bar, p, LIKE), vec(s, p, LIKE), strain))
 
 
 @kernel
 def contract(c, factors, F, bounds):
-    """F after the return of the points bounds[0] .. bounds[1] - 1."""
+    """Compute F after the return of the points bounds[0] .. bounds[1] - 1."""
     for p in range(bounds[0], bounds[1]):
         s = left(vec(factors.s, p, LIKE), c[p, 0], c[p, 1])
         put_mat(F, p, mmt(scale_columns(mat(factors.U, p, LIKE), s), mat(factors.V, p, LIKE)))
@@ -195,7 +199,7 @@ def contract(c, factors, F, bounds):
 
 @kernel
 def pull(G, c, factors, bars, bounds):
-    """bars = (c_bar, F_bar) of the points bounds[0] .. bounds[1] - 1."""
+    """Compute bars = (c_bar, F_bar) of the points bounds[0] .. bounds[1] - 1."""
     for p in range(bounds[0], bounds[1]):
         U, s, V = mat(factors.U, p, LIKE), vec(factors.s, p, LIKE), mat(factors.V, p, LIKE)
         X, s_new = within(U, mat(G, p, LIKE), V), left(s, c[p, 0], c[p, 1])
@@ -229,7 +233,7 @@ def _pull(G, c, factors, c_bar, F_bar):
 
 @kernel
 def returned(F, flow):
-    """F after the return; NaN unless det F > 0."""
+    """Return F after the return; NaN unless det F > 0."""
     U, s, V, _ = svd(F)
     x = np.array(read(s, flow.strain))
     y = outputs(x, flow.sizes, flow.W, flow.b)

@@ -73,7 +73,7 @@ class EnergyLaw(NamedTuple):
 
 
 def build_law(weights):
-    """`EnergyLaw` of a `LawWeights` of kind `Energetic`."""
+    """Return the `EnergyLaw` of a `LawWeights` of kind `Energetic`."""
     law = EnergyLaw(*flatten(weights.layers), weights.kind.unit, 0.0, 0.0, 0.0)
     value, (q, r, u, w) = value_and_slopes((0.0, 0.0, 0.0, 0.0), law)
     return law._replace(rest=value, mu=2.0 * law.unit * (q + r),
@@ -81,28 +81,30 @@ def build_law(weights):
 
 
 def measures_of(F):
-    """q, r, u, w (n, 4) of F (n, 3, 3); NaN unless det F > 0."""
+    """Return q, r, u, w (n, 4) of F (n, 3, 3); NaN unless det F > 0."""
     out = np.empty((len(F), MEASURES))
     _measures(F, out)
     return out
 
 
 def stresses(g, F):
-    """sum_k g_k T_k (n, 3, 3) of slopes g (n, 4) and F (n, 3, 3)."""
+    """Return sum_k g_k T_k (n, 3, 3) of slopes g (n, 4) and F (n, 3, 3)."""
     tau = np.empty_like(F)
     _stresses(g, F, tau)
     return tau
 
 
 def pull_back(G, g, F):
-    """Gradients of g (n, 4), and of F (n, 3, 3) at fixed g, from that of the stress, G."""
+    """Return the gradients of g (n, 4), and of F (n, 3, 3) at fixed g, from that of the
+    stress, G.
+    """
     g_bar, F_bar = np.empty_like(g), np.empty_like(F)
     _pull(G, g, F, g_bar, F_bar)
     return g_bar, F_bar
 
 
 def pull_back_measures(m_bar, F):
-    """Gradient of F (n, 3, 3) from that of its measures (n, 4)."""
+    """Return the gradient of F (n, 3, 3) from that of its measures (n, 4)."""
     F_bar = np.empty_like(F)
     _pull_measures(m_bar, F, F_bar)
     return F_bar
@@ -110,7 +112,7 @@ def pull_back_measures(m_bar, F):
 
 @kernel
 def measures(F):
-    """q, r, u, w of one F with det F > 0."""
+    """Return q, r, u, w of one F with det F > 0."""
     J, K = det(F), cofactor(F)
     log_J = log(J)
     return (inner(F, F) - 3.0 - 2.0 * log_J, inner(K, K) - 3.0 - 4.0 * log_J,
@@ -119,7 +121,7 @@ def measures(F):
 
 @kernel
 def stress(g, F):
-    """sum_k g_k T_k."""
+    """Return sum_k g_k T_k."""
     b, J = mmt(F, F), det(F)
     shared = 2.0 * J * (J - 1.0) * g[2] + (J - 1.0) * g[3] - 2.0 * g[0] - 4.0 * g[1]
     tau = mlin(2.0 * g[0] + 2.0 * g[1] * trace(b), b, -2.0 * g[1], mmt(b, b))
@@ -128,7 +130,7 @@ def stress(g, F):
 
 @kernel
 def stress_bars(G, g, F):
-    """Bars of g, T_k : G, and of F at fixed g."""
+    """Return the bars of g, T_k : G, and of F at fixed g."""
     b, J = mmt(F, F), det(F)
     S, of_J, t = mlin(0.5, G, 0.5, transpose(G)), trace(G), trace(b)
     S_b, Sb = inner(S, b), mm(S, b)
@@ -141,40 +143,40 @@ def stress_bars(G, g, F):
 
 @kernel
 def measure_bars(m_bar, F):
-    """Bar of F, sum_k m_bar_k T_k F^-T."""
+    """Return the bar of F, sum_k m_bar_k T_k F^-T."""
     return mlin(1.0 / det(F), mm(stress(m_bar, F), cofactor(F)), 0.0, F)
 
 
 @kernel
 def row(a, p):
-    """Row p of an (n, 4) array."""
+    """Return row p of an (n, 4) array."""
     return a[p, 0], a[p, 1], a[p, 2], a[p, 3]
 
 
 @kernel
 def put_row(a, p, x):
-    """a[p] = x for an (n, 4) array."""
+    """Set a[p] = x for an (n, 4) array."""
     for k in range(MEASURES):
         a[p, k] = x[k]
 
 
 @kernel
 def measure(F, out, bounds):
-    """Measures of the points bounds[0] .. bounds[1] - 1."""
+    """Compute measures of the points bounds[0] .. bounds[1] - 1."""
     for p in range(bounds[0], bounds[1]):
         put_row(out, p, measures(mat(F, p, LIKE)))
 
 
 @kernel
 def respond(g, F, tau, bounds):
-    """Stresses of the points bounds[0] .. bounds[1] - 1."""
+    """Compute stresses of the points bounds[0] .. bounds[1] - 1."""
     for p in range(bounds[0], bounds[1]):
         put_mat(tau, p, stress(row(g, p), mat(F, p, LIKE)))
 
 
 @kernel
 def pull(G, given, bars, bounds):
-    """bars = (g_bar, F_bar) of the points bounds[0] .. bounds[1] - 1, of given = (g, F)."""
+    """Compute bars = (g_bar, F_bar) of the points bounds[0] .. bounds[1] - 1, of given = (g, F)."""
     for p in range(bounds[0], bounds[1]):
         g_bar, F_bar = stress_bars(mat(G, p, LIKE), row(given[0], p), mat(given[1], p, LIKE))
         put_row(bars[0], p, g_bar)
@@ -183,7 +185,7 @@ def pull(G, given, bars, bounds):
 
 @kernel
 def pull_measures(m_bar, F, F_bar, bounds):
-    """Bars of F of the points bounds[0] .. bounds[1] - 1."""
+    """Compute the bars of F of the points bounds[0] .. bounds[1] - 1."""
     for p in range(bounds[0], bounds[1]):
         put_mat(F_bar, p, measure_bars(row(m_bar, p), mat(F, p, LIKE)))
 
@@ -220,7 +222,7 @@ def slope(z):
 
 @kernel
 def value_and_slopes(m, law):
-    """N and its slopes at measures m."""
+    """Return N and its slopes at measures m."""
     z, a = before_last(m, law)
     sizes, w, k, value = law.sizes, len(law.W), len(z), 0.0
     g = law.W[w - len(a):].copy()
@@ -240,7 +242,7 @@ def value_and_slopes(m, law):
 
 @kernel
 def before_last(m, law):
-    """z of all layers but the last in a row, and what the last layer reads."""
+    """Return z of all layers but the last in a row, and what the last layer reads."""
     sizes, z = law.sizes, law.b[:len(law.b) - 1].copy()
     a, w, k = np.empty(MEASURES), 0, 0
     for i in range(MEASURES):
@@ -259,7 +261,7 @@ def before_last(m, law):
 
 @kernel
 def psi(F, law):
-    """Energy per rest volume [J/m^3]; inf unless det F > 0."""
+    """Return the energy per rest volume [J/m^3]; inf unless det F > 0."""
     if not det(F) > 0.0:
         return inf
     value, _ = value_and_slopes(measures(F), law)
@@ -268,20 +270,20 @@ def psi(F, law):
 
 @kernel
 def kirchhoff(F, law):
-    """tau = (dpsi/dF) F^T [Pa]; NaN unless det F > 0."""
+    """Return tau = (dpsi/dF) F^T [Pa]; NaN unless det F > 0."""
     _, g = value_and_slopes(measures(F), law)
     return mlin(law.unit, stress(g, F), 0.0, F)
 
 
 @kernel
 def wave(law):
-    """lam + 2 mu at rest [Pa]."""
+    """Return lam + 2 mu at rest [Pa]."""
     return law.lam + 2.0 * law.mu
 
 
 @kernel
 def at_rest(law):
-    """lam + 2 mu and 3 lam + 2 mu [Pa]."""
+    """Return lam + 2 mu and 3 lam + 2 mu [Pa]."""
     return law.lam + 2.0 * law.mu, 3.0 * law.lam + 2.0 * law.mu
 
 

@@ -37,7 +37,7 @@ def count(d):
 
 
 def spectrum(F):
-    """`Spectrum` of F (n, d, d); NaN where F is not finite."""
+    """Return the `Spectrum` of F (n, d, d); NaN where F is not finite."""
     n, d, _ = F.shape
     result = Spectrum(np.empty((n, d, d)), np.empty((n, d)), np.empty((n, d, d)))
     _spectra(F, result, tuple(range(d)))
@@ -45,14 +45,14 @@ def spectrum(F):
 
 
 def rotations(factors):
-    """R = U V^T (n, d, d) of a `Spectrum`."""
+    """Return R = U V^T (n, d, d) of a `Spectrum`."""
     R = np.empty_like(factors.U)
     _turn(factors, R, tuple(range(R.shape[1])))
     return R
 
 
 def invariants(F, factors):
-    """a (n, count(d)) of F (n, d, d) with its `Spectrum`."""
+    """Return a (n, count(d)) of F (n, d, d) with its `Spectrum`."""
     n, d, _ = F.shape
     a = np.empty((n, count(d)))
     _read(F, factors.s, a, tuple(range(d)))
@@ -60,8 +60,8 @@ def invariants(F, factors):
 
 
 def pull_back(F, factors, a_bar, R_bar):
-    """Gradient (n, d, d) with respect to F, of gradients a_bar (n, count(d)) and R_bar (n, d, d);
-    zero where F leaves R undetermined.
+    """Return the gradient (n, d, d) with respect to F, of gradients a_bar (n, count(d)) and R_bar
+    (n, d, d); zero where F leaves R undetermined.
     """
     F_bar = np.empty_like(F)
     _pull(F, factors, (a_bar, R_bar), F_bar, tuple(range(F.shape[1])))
@@ -70,7 +70,7 @@ def pull_back(F, factors, a_bar, R_bar):
 
 @kernel
 def decompose(F, factors, like, bounds):
-    """Singular value decompositions of the points bounds[0] .. bounds[1] - 1."""
+    """Compute the singular value decompositions of the points bounds[0] .. bounds[1] - 1."""
     for p in range(bounds[0], bounds[1]):
         U, s, V, _ = svd(mat(F, p, like))
         put_mat(factors.U, p, U)
@@ -80,21 +80,21 @@ def decompose(F, factors, like, bounds):
 
 @kernel
 def turn(factors, R, like, bounds):
-    """R = U V^T of the points bounds[0] .. bounds[1] - 1."""
+    """Compute R = U V^T of the points bounds[0] .. bounds[1] - 1."""
     for p in range(bounds[0], bounds[1]):
         put_mat(R, p, mmt(mat(factors.U, p, like), mat(factors.V, p, like)))
 
 
 @kernel
 def read(F, s, a, like, bounds):
-    """`describe` of the points bounds[0] .. bounds[1] - 1."""
+    """Apply `describe` to the points bounds[0] .. bounds[1] - 1."""
     for p in range(bounds[0], bounds[1]):
         describe(mat(F, p, like), vec(s, p, like), a, p)
 
 
 @kernel
 def describe(F, s, a, p):
-    """a[p] = (s - 1, F^T F - I, det F - 1), F^T F row by row."""
+    """Set a[p] = (s - 1, F^T F - I, det F - 1), F^T F row by row."""
     d = len(s)
     C = mm(transpose(F), F)
     for i in range(d):
@@ -106,7 +106,7 @@ def describe(F, s, a, p):
 
 @kernel
 def pull(F, factors, bars, F_bar, like, bounds):
-    """F_bar of the points bounds[0] .. bounds[1] - 1, from bars = (a_bar, R_bar)."""
+    """Compute F_bar of the points bounds[0] .. bounds[1] - 1, from bars = (a_bar, R_bar)."""
     d, (a_bar, R_bar) = len(like), bars
     for p in range(bounds[0], bounds[1]):
         F_p, U, V = mat(F, p, like), mat(factors.U, p, like), mat(factors.V, p, like)

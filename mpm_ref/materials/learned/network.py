@@ -88,7 +88,7 @@ FLOW_CLASSES = {response.Correction: NeuralCorrection,
 
 
 def dim_of_inputs(inputs):
-    """Number of space dimensions of a law that reads so many numbers."""
+    """Return the number of space dimensions of a law that reads so many numbers."""
     return {inputs_of(d): d for d in (2, 3) for inputs_of in (count, squared)}[int(inputs)]
 
 
@@ -98,14 +98,14 @@ def squared(d):
 
 
 def build_law(trained):
-    """`NeuralLaw` of a `LawWeights`. Raises ValueError for one that gives no stress."""
+    """Return the `NeuralLaw` of a `LawWeights`. Raises ValueError for one that gives no stress."""
     law = _made(LAW_CLASSES, trained, 0.0, 0.0)
     wave, largest = moduli_of(law)
     return law._replace(wave=wave, largest=largest)
 
 
 def build_flow(trained):
-    """`NeuralFlow` of a `LawWeights`. Raises ValueError for one that gives no F."""
+    """Return the `NeuralFlow` of a `LawWeights`. Raises ValueError for one that gives no F."""
     return _made(FLOW_CLASSES, trained)
 
 
@@ -119,7 +119,7 @@ def _made(classes, trained, *more):
 
 
 def flatten(layers):
-    """sizes, W, b of layers [(W (in, out), b (out,))]."""
+    """Return sizes, W, b of layers [(W (in, out), b (out,))]."""
     sizes = [len(layers[0][0]), *(len(b) for _, b in layers)]
     W, b = (np.concatenate([np.ravel(a) for a in arrays]).astype(float)
             for arrays in zip(*layers, strict=True))
@@ -127,9 +127,9 @@ def flatten(layers):
 
 
 def moduli_of(law):
-    """`NeuralLaw.wave` and `NeuralLaw.largest`, of its tangents at rest: along the stiffest axis,
-    and the norm of the whole map from strains to stresses. Pull and push differ, since singular
-    values are read in their order.
+    """Return the `NeuralLaw.wave` and `NeuralLaw.largest`, of its tangents at rest: along the
+    stiffest axis, and the norm of the whole map from strains to stresses. Pull and push differ,
+    since singular values are read in their order.
     """
     d = law.dim
     rest, strains = np.eye(d), np.eye(d * d).reshape(-1, d, d)
@@ -141,19 +141,19 @@ def moduli_of(law):
 
 
 def stress_of(F, law):
-    """tau (d, d) of one F (d, d)."""
+    """Return tau (d, d) of one F (d, d)."""
     return np.array(kirchhoff(tuple(map(tuple, F.tolist())), law))
 
 
 @kernel
 def gelu(z):
-    """z times the normal distribution's share below z."""
+    """Return z times the normal distribution's share below z."""
     return 0.5 * z * (1.0 + erf(ROOT * z))
 
 
 @kernel
 def softplus(z):
-    """log(1 + exp z)."""
+    """Return log(1 + exp z)."""
     return max(z, 0.0) + log1p(exp(-abs(z)))
 
 
@@ -177,7 +177,7 @@ def outputs(a, sizes, W, b):
 
 @kernel
 def network_answer(F, sizes, W, b):
-    """The network's Y at F, and R; NaN where F is not finite."""
+    """Return the network's Y at F, and R; NaN where F is not finite."""
     d = len(F)
     U, s, V, _ = svd(F)
     a = np.empty((1, d + d * d + 1))
@@ -191,26 +191,26 @@ def network_answer(F, sizes, W, b):
 
 @kernel
 def respond(F, law):
-    """The answer of a law or a flow at F."""
+    """Return the answer of a law or a flow at F."""
     Y, R = network_answer(F, law.sizes, law.W, law.b)
     return answer(Y, F, R, law)
 
 
 @kernel
 def kirchhoff(F, law):
-    """tau = P F^T."""
+    """Return tau = P F^T."""
     return respond(F, law)
 
 
 @kernel
 def wave(law):
-    """lam + 2 mu at rest [Pa]."""
+    """Return lam + 2 mu at rest [Pa]."""
     return law.wave
 
 
 @kernel
 def at_rest(law):
-    """`NeuralLaw.wave` and `NeuralLaw.largest` [Pa]."""
+    """Return the `NeuralLaw.wave` and `NeuralLaw.largest` [Pa]."""
     return law.wave, law.largest
 
 

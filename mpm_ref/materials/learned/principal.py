@@ -50,15 +50,15 @@ PAIRS = {2: ((0, 1),), 3: ((0, 1), (0, 2), (1, 2))}     # of axes, as `spectral.
 
 
 def stresses(y, factors):
-    """tau (n, d, d) of y (n, d) and a `Spectrum`."""
+    """Return tau (n, d, d) of y (n, d) and a `Spectrum`."""
     tau = np.empty_like(factors.U)
     _stresses(y, factors, tau, _like(y))
     return tau
 
 
 def pull_back(G, y, ratios, factors):
-    """Gradients of y (n, d), and of F (n, d, d) at fixed y, from that of tau, G (n, d, d); ratios
-    (n, pairs) are the a_ij.
+    """Return the gradients of y (n, d), and of F (n, d, d) at fixed y, from that of tau, G (n, d,
+    d); ratios (n, pairs) are the a_ij.
     """
     y_bar, F_bar = np.empty_like(y), np.empty_like(G)
     _pull((G, y, ratios), factors, (y_bar, F_bar), _like(y))
@@ -66,14 +66,18 @@ def pull_back(G, y, ratios, factors):
 
 
 def pull_back_stretches(s_bar, factors):
-    """Gradient of F (n, d, d) from that of s (n, d), counted as sorted: U diag(s') V^T."""
+    """Return the gradient of F (n, d, d) from that of s (n, d), counted as sorted: U diag(s')
+    V^T.
+    """
     F_bar = np.empty_like(factors.U)
     _pull_stretches(s_bar, factors, F_bar, _like(s_bar))
     return F_bar
 
 
 def bounded_ratios(y, s):
-    """a_ij (n, pairs) of y (n, d) and s (n, d), which descends; gaps count at least LEAST_GAP."""
+    """Return a_ij (n, pairs) of y (n, d) and s (n, d), which descends; gaps count at least
+    LEAST_GAP.
+    """
     i, j = np.transpose(PAIRS[s.shape[1]])
     return (y[:, i] - y[:, j]) / np.maximum(s[:, i] - s[:, j], LEAST_GAP)
 
@@ -100,7 +104,7 @@ def skew(y, s, i, j):
 
 @kernel
 def stress_of(U, s, y):
-    """U diag(y s) U^T."""
+    """Return U diag(y s) U^T."""
     return back(U, diag(mul(y, s)), U)
 
 
@@ -116,7 +120,7 @@ def kirchhoff(F, law):
 
 @kernel
 def respond(y, factors, tau, like, bounds):
-    """tau of the points bounds[0] .. bounds[1] - 1."""
+    """Compute tau of the points bounds[0] .. bounds[1] - 1."""
     for p in range(bounds[0], bounds[1]):
         U, s = mat(factors.U, p, like), vec(factors.s, p, like)
         put_mat(tau, p, stress_of(U, s, vec(y, p, like)))
@@ -124,7 +128,9 @@ def respond(y, factors, tau, like, bounds):
 
 @kernel
 def pull(given, factors, bars, like, bounds):
-    """bars = (y_bar, F_bar) of the points bounds[0] .. bounds[1] - 1, of given = (G, y, ratios)."""
+    """Compute bars = (y_bar, F_bar) of the points bounds[0] .. bounds[1] - 1, of given = (G, y,
+    ratios).
+    """
     G, ys, ratios = given
     for p in range(bounds[0], bounds[1]):
         U, V = mat(factors.U, p, like), mat(factors.V, p, like)
@@ -137,7 +143,7 @@ def pull(given, factors, bars, like, bounds):
 
 @kernel
 def pull_stretches(s_bar, factors, F_bar, like, bounds):
-    """U diag(s_bar) V^T of the points bounds[0] .. bounds[1] - 1."""
+    """Compute U diag(s_bar) V^T of the points bounds[0] .. bounds[1] - 1."""
     for p in range(bounds[0], bounds[1]):
         U, V = mat(factors.U, p, like), mat(factors.V, p, like)
         put_mat(F_bar, p, back(U, diag(vec(s_bar, p, like)), V))

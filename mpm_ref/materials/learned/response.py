@@ -70,14 +70,14 @@ bars = by_type("bars")          # (G, Y, F, R, kind) -> gradients of Y, F, R; G 
 
 
 def answers(Y, F, R, kind):
-    """Answers (n, d, d) to the networks' Y (n, d, d) at F (n, d, d) = R S."""
+    """Return the answers (n, d, d) to the networks' Y (n, d, d) at F (n, d, d) = R S."""
     out = np.empty_like(F)
     _answers((Y, F, R), kind, out, tuple(range(F.shape[1])))
     return out
 
 
 def pull_back(G, Y, F, R, kind):
-    """`Bars` of gradients G (n, d, d) of answers."""
+    """Return the `Bars` of gradients G (n, d, d) of answers."""
     result = Bars(*(np.empty_like(F) for _ in Bars._fields))
     _pull(G, (Y, F, R), kind, result, tuple(range(F.shape[1])))
     return result
@@ -85,7 +85,7 @@ def pull_back(G, Y, F, R, kind):
 
 @kernel
 def symmetric(Y):
-    """(Y + Y^T)/2."""
+    """Return (Y + Y^T)/2."""
     return mlin(0.5, Y, 0.5, transpose(Y))
 
 
@@ -97,26 +97,26 @@ def scaled(a, A):
 
 @kernel
 def stress(Y, F, R, kind):
-    """tau = unit R T F^T."""
+    """Return tau = unit R T F^T."""
     return scaled(kind.unit, mmt(mm(R, symmetric(Y)), F))
 
 
 @kernel
 def stress_bars(G, Y, F, R, kind):
-    """(R^T G F)_sym, G^T R T and G F T, in units."""
+    """Return (R^T G F)_sym, G^T R T and G F T, in units."""
     G, T = scaled(kind.unit, G), symmetric(Y)
     return symmetric(mm(transpose(R), mm(G, F))), mm(transpose(G), mm(R, T)), mm(G, mm(F, T))
 
 
 @kernel
 def symmetric_stress(Y, F, R, kind):
-    """tau = unit R T R^T."""
+    """Return tau = unit R T R^T."""
     return scaled(kind.unit, mmt(mm(R, symmetric(Y)), R))
 
 
 @kernel
 def symmetric_stress_bars(G, Y, F, R, kind):
-    """(R^T G R)_sym, 0 and (G + G^T) R T, in units."""
+    """Return (R^T G R)_sym, 0 and (G + G^T) R T, in units."""
     G = scaled(kind.unit, G)
     both = mlin(1.0, G, 1.0, transpose(G))
     return symmetric(mm(transpose(R), mm(G, R))), scaled(0.0, F), mm(both, mm(R, symmetric(Y)))
@@ -124,39 +124,39 @@ def symmetric_stress_bars(G, Y, F, R, kind):
 
 @kernel
 def plain_stress(Y, F, R, kind):
-    """tau = unit Y F^T."""
+    """Return tau = unit Y F^T."""
     return scaled(kind.unit, mmt(Y, F))
 
 
 @kernel
 def plain_stress_bars(G, Y, F, R, kind):
-    """G F, G^T Y and 0, in units."""
+    """Return G F, G^T Y and 0, in units."""
     G = scaled(kind.unit, G)
     return mm(G, F), mm(transpose(G), Y), scaled(0.0, R)
 
 
 @kernel
 def correction(Y, F, R, kind):
-    """F' = F + alpha R T."""
+    """Return F' = F + alpha R T."""
     return mlin(1.0, F, kind.alpha, mm(R, symmetric(Y)))
 
 
 @kernel
 def correction_bars(G, Y, F, R, kind):
-    """alpha (R^T G)_sym, G and alpha G T."""
+    """Return alpha (R^T G)_sym, G and alpha G T."""
     return (scaled(kind.alpha, symmetric(mm(transpose(R), G))), G,
             scaled(kind.alpha, mm(G, symmetric(Y))))
 
 
 @kernel
 def plain_correction(Y, F, R, kind):
-    """F' = F + alpha Y."""
+    """Return F' = F + alpha Y."""
     return mlin(1.0, F, kind.alpha, Y)
 
 
 @kernel
 def plain_correction_bars(G, Y, F, R, kind):
-    """alpha G, G and 0."""
+    """Return alpha G, G and 0."""
     return scaled(kind.alpha, G), G, scaled(0.0, R)
 
 
@@ -171,7 +171,7 @@ for _kind, _answer, _bars in ((Stress, stress, stress_bars),
 
 @kernel
 def respond(inputs, kind, out, like, bounds):
-    """Answers of the points bounds[0] .. bounds[1] - 1, of = (Y, F, R)."""
+    """Compute the answers of the points bounds[0] .. bounds[1] - 1, of = (Y, F, R)."""
     Y, F, R = inputs
     for p in range(bounds[0], bounds[1]):
         put_mat(out, p, answer(mat(Y, p, like), mat(F, p, like), mat(R, p, like), kind))
@@ -179,7 +179,7 @@ def respond(inputs, kind, out, like, bounds):
 
 @kernel
 def pull(G, inputs, kind, out, like, bounds):
-    """`Bars` of the points bounds[0] .. bounds[1] - 1, of = (Y, F, R)."""
+    """Compute the `Bars` of the points bounds[0] .. bounds[1] - 1, of = (Y, F, R)."""
     Y, F, R = inputs
     for p in range(bounds[0], bounds[1]):
         Y_bar, F_bar, R_bar = bars(mat(G, p, like), mat(Y, p, like), mat(F, p, like),

@@ -70,13 +70,13 @@ class SplineLaw(NamedTuple):
 
 
 def knots():
-    """The 21 knots, ascending."""
+    """Return the 21 knots, ascending."""
     return np.concatenate([np.linspace(0.0, 1.0, SIDE + 1),
                            np.linspace(1.0, LARGEST, SIDE + 1)[1:]])
 
 
 def fair(x):
-    """`Pieces` with a continuous derivative, of knots x."""
+    """Return the `Pieces` with a continuous derivative, of knots x."""
     width, slopes = np.diff(x), parabola_slopes(x)
     at = np.eye(len(x))
     left = at[:-1] + width[:, None] / 3.0 * slopes[:-1]
@@ -86,7 +86,7 @@ def fair(x):
 
 
 def parabola_slopes(x):
-    """Matrix (knots, knots) from values to slopes at knots x."""
+    """Return the matrix (knots, knots) from values to slopes at knots x."""
     n, slopes = len(x), np.zeros((len(x), len(x)))
     for k in range(n):
         i = np.clip(k, 1, n - 2) + np.arange(-1, 2)
@@ -97,7 +97,9 @@ def parabola_slopes(x):
 
 
 def released(x):
-    """`Pieces` as the authors' release evaluates them; of knots x the middle one is 1."""
+    """Return the `Pieces` as the authors' release evaluates them; of knots x the middle one
+    is 1.
+    """
     side, at = len(x) // 2, np.eye(len(x))
     inner = (at[2:] - at[:-2]) / 6.0
     left = np.vstack([(2.0 * at[0] + 2.0 * at[1] - at[2]) / 3.0, at[1:-1] + inner])
@@ -108,7 +110,7 @@ def released(x):
 
 
 def in_powers(matrix, points, width):
-    """Powers 3 .. 0 of x - origin, from those of (x - origin)/width of Bezier points."""
+    """Return the powers 3 .. 0 of x - origin, from those of (x - origin)/width of Bezier points."""
     return matrix @ points / width[:, None, None] ** np.arange(3, -1, -1)[:, None]
 
 
@@ -125,7 +127,7 @@ def build_law(weights):
 
 @kernel
 def splined(s, law):
-    """y_i = f(s_i) + sum_j g(s_i s_j) s_j + h(J) J/s_i."""
+    """Return y_i = f(s_i) + sum_j g(s_i s_j) s_j + h(J) J/s_i."""
     g01, g02 = value(law, 1, s[0] * s[1]), value(law, 1, s[0] * s[2])
     g12 = value(law, 1, s[1] * s[2])
     h = value(law, 2, s[0] * s[1] * s[2])
@@ -136,7 +138,7 @@ def splined(s, law):
 
 @kernel
 def value(law, k, x):
-    """f, g or h, of k = 0, 1, 2, at x."""
+    """Return f, g or h, of k = 0, 1, 2, at x."""
     p = np.searchsorted(law.breaks, x)
     c, t = law.tables[k, p], x - law.origins[p]
     return ((c[0] * t + c[1]) * t + c[2]) * t + c[3]

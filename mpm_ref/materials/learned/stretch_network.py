@@ -60,7 +60,7 @@ def build_law(weights):
 
 @kernel
 def averaged(s, law):
-    """The mean of what the network gives, over the orders in which it reads s."""
+    """Return the mean of what the network gives, over the orders in which it reads s."""
     y = np.zeros(3)
     for k in range(len(law.orders)):
         i = law.orders[k]
@@ -74,7 +74,7 @@ def averaged(s, law):
 
 @kernel
 def affine(a, W, b):
-    """a W + b."""
+    """Return a W + b."""
     out = b.copy()
     for i in range(len(a)):
         for j in range(len(b)):
@@ -84,7 +84,7 @@ def affine(a, W, b):
 
 @kernel
 def elu(a):
-    """a, or exp(a) - 1 where it is negative; in place."""
+    """Return a, or exp(a) - 1 where it is negative; in place."""
     for i in range(len(a)):
         a[i] = a[i] if a[i] > 0.0 else expm1(a[i])
     return a

@@ -76,7 +76,7 @@ def errors_include_velocities(about):
 
 
 def law_arrays(part, law):
-    """The arrays of a law by name."""
+    """Return the arrays of a law by name."""
     found = {f"{part}_kind": np.array(type(law.kind).__name__),
              f"{part}_constants": np.array(law.kind, dtype=float)}
     for k, (W, b) in enumerate(law.layers):
@@ -85,7 +85,7 @@ def law_arrays(part, law):
 
 
 def law_from_arrays(part, arrays):
-    """`LawWeights` from the arrays of a file."""
+    """Return the `LawWeights` from the arrays of a file."""
     kind = KINDS[str(arrays[f"{part}_kind"])]
     layers = tuple((arrays[f"{part}_W{k}"], arrays[f"{part}_b{k}"])
                    for k in range(depth(part, arrays)))

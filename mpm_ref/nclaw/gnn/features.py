@@ -1,18 +1,18 @@
-"""The features of points and edges that the network reads, and positions from its answers [GNS].
+"""Features of points and edges, the network's inputs, and positions from its outputs [GNS].
 
     point   u_-4, .., u_0 without their mean, over their deviation;    u_k = x_k - x_{k-1}
             distances to the walls over the radius, cut to [-1, 1]
     edge    r = (x_sender - x_receiver) / radius, and |r|
     answer  an acceleration without its mean, over its deviation;    x_1 = x_0 + u_0 + a
 
-Time counts in frames: velocities are in m, accelerations too. The features hold no place
-in space but distances to the walls, so that answers do not change where bodies and walls move
-together.
+The unit of time is a frame: velocities and accelerations are in m. Distances to the walls are the
+only features that depend on the position, so that a shift of bodies and walls together changes
+nothing.
 
-[GNS] is given six true frames to start from. A law is given positions and velocities at the start,
-and so is this: the points have flown straight before it (`straight_flight`), in training as in any
-other run. Each point is a neighbour of itself as well, as in the release of [GNS], so that none is
-without.
+[GNS] starts from six true frames. A law starts from positions and velocities, and so does this
+simulator: the frames before the start are those of a straight flight (`straight_flight`), in
+training as in any other run. Each point is a neighbour of itself too, as in the release of [GNS],
+so that none has no neighbour.
 """
 
 from typing import NamedTuple
@@ -25,7 +25,7 @@ MAX_EDGES = 1_000_000   # those of 1000 points in one place
 
 
 class SimulatorFailure(ValueError):
-    """A run cannot go on: a point has no finite place, or too many are in one place."""
+    """A run that cannot go on: a position is not finite, or there are too many neighbours."""
 
 
 class Graph(NamedTuple):
@@ -43,7 +43,7 @@ class Graph(NamedTuple):
 def neighbour_graph(x, radius):
     """Return the `Graph` of points x (n, d) [m] that are at most a radius [m] apart.
 
-    Raises `SimulatorFailure` for more than MOST edges.
+    Raises `SimulatorFailure` for more than MAX_EDGES edges.
     """
     tree = cKDTree(x)
     count = int(tree.count_neighbors(tree, radius))

@@ -1,4 +1,4 @@
-"""The graph network [GNS] in plain NumPy: it encodes, passes messages, and decodes.
+"""The graph network [GNS] in NumPy: encoder, message passing, decoder.
 
     v_i = points(a_i),    e_ij = edges(b_ij)
     m_ij = edges_k(e_ij, v_j, v_i),   w_i = points_k(v_i, sum_j m_ij),   e += m,   v += w
@@ -16,10 +16,10 @@ TINY = 1e-5         # added to the variance of outputs
 
 
 class PerceptronWeights(NamedTuple):
-    """Affine maps, and what outputs are scaled with once they are normalised."""
+    """Affine maps, and the scales of the outputs after normalisation."""
 
     layers: tuple       # ((W (in, out), b (out,)), ..)
-    norm: tuple = ()    # gain and shift (out,); none: outputs are left as they are
+    norm: tuple = ()    # gain and shift (out,); none: no normalisation
 
 
 class GraphWeights(NamedTuple):
@@ -32,7 +32,9 @@ class GraphWeights(NamedTuple):
 
 
 def answers(net, points, edges, graph):
-    """Answers (n, d) of a `GraphWeights` to what points (n, ..) and edges (k, ..) are told."""
+    """Return the outputs (n, d) of a network of `GraphWeights` for features of points (n, ..) and
+    of edges (k, ..).
+    """
     v, e = outputs(net.points, points), outputs(net.edges, edges)
     for of_edges, of_points in net.blocks:
         m = outputs(of_edges, np.hstack([e, v[graph.senders], v[graph.receivers]]))
@@ -51,6 +53,6 @@ def outputs(perceptron, a):
 
 
 def normalised(a, gain, shift):
-    """Rows without their mean over their deviation, times a gain, and a shift."""
+    """Return the rows without their mean over their deviation, times a gain, and a shift."""
     a = a - a.mean(axis=1, keepdims=True)
     return a / np.sqrt((a**2).mean(axis=1, keepdims=True) + TINY) * gain + shift

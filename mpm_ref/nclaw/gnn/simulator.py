@@ -1,4 +1,4 @@
-"""A trained graph network as a simulator: positions frame after frame, from those it found."""
+"""A trained graph network as a simulator: positions frame after frame, each from the last ones."""
 
 from functools import partial
 from typing import NamedTuple
@@ -18,23 +18,25 @@ from .network import GraphWeights, answers
 
 
 class Simulator(NamedTuple):
-    """A trained network, how it reads frames, and what is known of its training."""
+    """A trained network, the settings of its features, and the record of its training."""
 
     network: GraphWeights
     reading: FeatureSettings
     about: dict         # plain values
 
     def run(self, x, v, box):
-        """`free_run` of the network from positions x [m] and velocities v [m/s], (n, d)."""
+        """Return the generator `free_run` of the network from positions x [m] and velocities
+        v [m/s], (n, d).
+        """
         frames = straight_flight(x, v, self.reading.dt)
         return free_run(partial(answers, self.network), self.reading, frames, box)
 
 
 def free_run(answer, reading, frames, box):
-    """Positions (n, d) [m] in the last of frames (HISTORY + 1, n, d), and in all that follow,
-    without end.
+    """Yield the positions (n, d) [m] in the last of frames (HISTORY + 1, n, d), and in all that
+    follow, without end.
 
-    answer: function of what points and edges are told, and of the graph, to (n, d).
+    answer: function of the features of points and of edges, and of the graph, to (n, d).
     Raises `SimulatorFailure` as `features.neighbour_graph`, and for a point without a finite place.
     """
     while True:

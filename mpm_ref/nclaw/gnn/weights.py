@@ -1,4 +1,6 @@
-"""A trained graph network as a file (see `archive`); its weights are in single precision."""
+"""A trained graph network as a file (see `store.weights_file`); its weights are in single
+precision.
+"""
 
 from itertools import pairwise
 
@@ -32,7 +34,7 @@ def load(path):
 
 
 def named(network):
-    """(name, `PerceptronWeights`) of all of a network."""
+    """Yield (name, `PerceptronWeights`) of all of a network."""
     yield "points", network.points
     yield "edges", network.edges
     for k, (of_edges, of_points) in enumerate(network.blocks):
@@ -42,19 +44,19 @@ def named(network):
 
 
 def arrays_of(simulator):
-    """The numbers of a file by name."""
-    (radius, dt, scales), found = simulator.reading, {}
+    """Return the numbers of a file by name."""
+    (radius, dt, scales), arrays = simulator.reading, {}
     for name, perceptron in named(simulator.network):
         for l, (W, b) in enumerate(perceptron.layers):
-            found |= {f"{name}_W{l}": W, f"{name}_b{l}": b}
-        found |= dict(zip((f"{name}_gain", f"{name}_shift"), perceptron.norm, strict=False))
-    return {**{name: np.asarray(a, np.float32) for name, a in found.items()},
+            arrays |= {f"{name}_W{l}": W, f"{name}_b{l}": b}
+        arrays |= dict(zip((f"{name}_gain", f"{name}_shift"), perceptron.norm, strict=False))
+    return {**{name: np.asarray(a, np.float32) for name, a in arrays.items()},
             **{name: np.asarray(a, float) for name, a in scales._asdict().items()},
             "radius": np.array(float(radius)), "dt": np.array(float(dt))}
 
 
 def network_of(arrays):
-    """`GraphWeights` of the arrays of a file, in doubles."""
+    """Return the `GraphWeights` of the arrays of a file, in doubles."""
     def perceptron(name):
         layers = tuple((double(f"{name}_W{l}"), double(f"{name}_b{l}")) for l in range(LAYERS))
         norm = () if name == "answer" else (double(f"{name}_gain"), double(f"{name}_shift"))
@@ -76,10 +78,10 @@ def blocks_of(arrays):
 
 def fault_of(arrays):
     """Return a sentence on what is wrong with the arrays of a file, or None."""
-    found = arrays.get("points_W0"), arrays.get("v_mean")
-    if any(a is None for a in found) or (found[0].ndim, found[1].ndim) != (2, 1):
+    W, v_mean = arrays.get("points_W0"), arrays.get("v_mean")
+    if W is None or v_mean is None or (W.ndim, v_mean.ndim) != (2, 1):
         return "it lacks points_W0 or v_mean, or they are no matrix and no vector"
-    shapes = shapes_of(found[0].shape[1], blocks_of(arrays), len(found[1]))
+    shapes = shapes_of(W.shape[1], blocks_of(arrays), len(v_mean))
     missing = sorted(shapes.keys() - arrays.keys())
     if missing:
         return f"it lacks {', '.join(missing)}"
@@ -98,14 +100,14 @@ def fault_of(arrays):
 
 
 def shapes_of(width, blocks, d):
-    """{name: shape} of the arrays of a network of so many blocks in d dimensions."""
-    found = {**dict.fromkeys(NUMBERS, ()), **dict.fromkeys(MotionScales._fields, (d,))}
+    """Return {name: shape} of the arrays of a network with a number of blocks in d dimensions."""
+    shapes = {**dict.fromkeys(NUMBERS, ()), **dict.fromkeys(MotionScales._fields, (d,))}
     ends = {"points": ((HISTORY + 2) * d, width), "edges": (d + 1, width), "answer": (width, d)}
     for k in range(blocks):
         ends |= {f"edges_{k}": (3 * width, width), f"points_{k}": (2 * width, width)}
     for name, (inputs, outputs) in ends.items():
         for l, (n, m) in enumerate(pairwise((inputs, *(LAYERS - 1) * (width,), outputs))):
-            found |= {f"{name}_W{l}": (n, m), f"{name}_b{l}": (m,)}
+            shapes |= {f"{name}_W{l}": (n, m), f"{name}_b{l}": (m,)}
         if name != "answer":
-            found |= {f"{name}_gain": (width,), f"{name}_shift": (width,)}
-    return found
+            shapes |= {f"{name}_gain": (width,), f"{name}_shift": (width,)}
+    return shapes

@@ -48,14 +48,16 @@ class ComparedRun:
         self.total, self.count, self.broken = 0.0, 0, None
 
     def follow(self, x):
-        """The error of the next frame [m^2], where the true one is x."""
+        """Return the error of the next frame [m^2], where the true one is x."""
         error = float(np.mean((self.place() - x) ** 2))
         self.total += error
         self.count += 1
         return error
 
     def place(self):
-        """Positions in the next frame; the corner for all points of a run that broke down."""
+        """Return the positions in the next frame; the corner for all points of a run that broke
+        down.
+        """
         if self.broken is None:
             try:
                 return next(self.frames)
@@ -82,15 +84,15 @@ def compare_runs(problem, law):
 
 
 def threads_for(bodies):
-    """A context of one thread where there are few particles; bits do not depend on it."""
+    """Return a context of one thread where there are few particles; bits do not depend on it."""
     few = sum(len(body.id) for body in bodies) <= FEW
     return one_thread() if few else nullcontext()
 
 
 def positions(problem, bodies):
-    """Positions (n, d) of all points at the start and at each frame, bodies one after the other, in
-    their own order. The run is that of `simulate`, not stopped for its energy or its speed; raises
-    `RunBroken` where a point has no finite place.
+    """Yield the positions (n, d) of all points at the start and at each frame, bodies one after the
+    other, in their own order. The run is that of `simulate`, not stopped for its energy or its
+    speed; raises `RunBroken` where a point has no finite place.
     """
     clock, stepper = problem.clock, problem.stepper()
     stepper.start(bodies)
@@ -118,7 +120,7 @@ def body_positions(bodies):
 
 
 def problem_of(scene, source, steps=None):
-    """The `Problem` of a scene that `positions` runs: explicit steps of fixed length, of one
+    """Return the `Problem` of a scene that `positions` runs: explicit steps of fixed length, of one
     material; so many, if given. Frames are those of the scene, else all steps. Raises SceneError.
     """
     if scene.integrator != "explicit" or scene.dt is None:

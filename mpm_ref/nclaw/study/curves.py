@@ -51,8 +51,8 @@ class Curve(NamedTuple):
 
 
 def compare_curves(truth, learned, paths, dt, bounds=None):
-    """[`Curve`] of paths. truth, learned: (law, flow) each; dt [s] of a step; bounds: strains that
-    training has seen (see `learned.strain_range`), if known.
+    """Return [`Curve`] of paths. truth, learned: (law, flow) each; dt [s] of a step; bounds:
+    strains that training has seen (see `learned.strain_range`), if known.
     """
     curves = []
     for path in paths:
@@ -63,7 +63,7 @@ def compare_curves(truth, learned, paths, dt, bounds=None):
 
 
 def paths_for(flows, d, strain, steps):
-    """Paths to strains of this size: from rest, and where there is a flow also cycles."""
+    """Return paths to strains of this size: from rest, and where there is a flow also cycles."""
     flowing = any(not isinstance(flow, NoFlow) for flow in flows)
     return monotone(d, strain, steps) + (cycles(d, strain, steps) if flowing else [])
 

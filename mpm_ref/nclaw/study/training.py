@@ -73,8 +73,8 @@ def make_run(path, problem, watch=None):
 
 
 def read_run(path, problem):
-    """`Observed` of a results file that is `is_complete`. Raises BadResults for one that lacks a
-    field, or whose numbers are not all finite.
+    """Return the `Observed` of a results file that is `is_complete`. Raises BadResults for one that
+    lacks a field, or whose numbers are not all finite.
     """
     body, d = problem.bodies[0].name, problem.dim
     with Results(path) as results:

@@ -1,9 +1,9 @@
 """Laws that thermodynamics admits, as they are trained (`energetic`, `contraction`); in doubles.
 
-What is learned of a weight of the energy is its logarithm, so that it stays positive; biases are
-free. Training starts from moduli of about `kind.unit`, and from a return that takes START of the
-strain in a step, as much as NCLAW-alg4 adds. It starts with little of r, which grows with the
-fourth power of stretches: else the first epochs take all stress away to be rid of that.
+The logarithms of the energy's weights are learned, so that weights stay positive; biases are
+unconstrained. Training starts from moduli of about `kind.unit`, and from a return that removes a
+share START of the strain in a step, as much as NCLAW-alg4 adds. It starts with little of r, which
+grows with the fourth power of stretches: otherwise the first epochs remove all stress with it.
 """
 
 from itertools import pairwise
@@ -34,7 +34,7 @@ class Measures(Function):
 
     @staticmethod
     def backward(ctx, m_bar):
-        """Gradient of F."""
+        """Return the gradient of F."""
         return torch.from_numpy(energetic.pull_back_measures(m_bar.contiguous().numpy(), ctx.F))
 
 
@@ -49,13 +49,13 @@ class EnergyStress(Function):
 
     @staticmethod
     def backward(ctx, G):
-        """Gradients of g, and of F at fixed g."""
+        """Return the gradients of g, and of F at fixed g."""
         gradients = energetic.pull_back(G.contiguous().numpy(), *ctx.inputs)
         return tuple(map(torch.from_numpy, gradients))
 
 
 class Strains(Function):
-    """Trial F (n, 3, 3) and its `Spectrum` -> what a `Contraction` reads (n, 3)."""
+    """Trial F (n, 3, 3) and its `Spectrum` -> inputs of a `Contraction` (n, 3)."""
 
     @staticmethod
     def forward(ctx, F, factors, kind):
@@ -65,7 +65,7 @@ class Strains(Function):
 
     @staticmethod
     def backward(ctx, x_bar):
-        """Gradient of F."""
+        """Return the gradient of F."""
         gradients = contraction.pull_back_strains(x_bar.contiguous().numpy(), *ctx.inputs)
         return torch.from_numpy(gradients), None, None
 
@@ -81,7 +81,7 @@ class Contracted(Function):
 
     @staticmethod
     def backward(ctx, G):
-        """Gradients of c, and of F at fixed c."""
+        """Return the gradients of c, and of F at fixed c."""
         gradients = contraction.pull_back(G.contiguous().numpy(), *ctx.inputs)
         return *map(torch.from_numpy, gradients), None
 
@@ -118,7 +118,7 @@ class GrowingConvex(nn.Module):
         return g
 
     def layers(self):
-        """[(W (in, out), b (out,))] as arrays."""
+        """Return [(W (in, out), b (out,))] as arrays."""
         biases = [*self.b, torch.zeros(1, dtype=torch.float64)]
         return tuple((log_W.detach().exp().numpy().copy(), b.detach().numpy().copy())
                      for log_W, b in zip(self.log_W, biases, strict=True))
@@ -151,7 +151,7 @@ class ContractionModule(LawModule):
         nn.init.constant_(self.net.layers[-1].bias, log(START))
 
     def forward(self, F):
-        """F after the return."""
+        """Return F after the return."""
         factors = spectrum(F.detach().numpy())
         c = nn.functional.softplus(self.net(Strains.apply(F, factors, self.kind)))
         return Contracted.apply(c, F, factors)

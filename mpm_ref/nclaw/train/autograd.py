@@ -1,6 +1,6 @@
-"""The stages of a step as differentiable functions of PyTorch; their adjoints are ours.
+"""Stages of a step as differentiable functions of PyTorch, with the adjoints of `core`.
 
-States are tensors of doubles; what networks read and answer is in their own precision.
+States are tensors of doubles; inputs and outputs of networks have the networks' precision.
 """
 
 import torch
@@ -11,7 +11,7 @@ from .. import batched_step
 
 
 class Invariants(Function):
-    """F (n, d, d) -> what a law reads (n, count), in single precision, and R (n, d, d)."""
+    """Differentiable map F (n, d, d) -> invariants (n, count), in single precision, R (n, d, d)."""
 
     @staticmethod
     def forward(ctx, F):
@@ -23,7 +23,7 @@ class Invariants(Function):
 
     @staticmethod
     def backward(ctx, a_bar, R_bar):
-        """Gradient of F."""
+        """Return the gradient of F."""
         a_bar, R_bar = a_bar.double().numpy(), R_bar.contiguous().numpy()
         return torch.from_numpy(invariants.pull_back(ctx.F, ctx.factors, a_bar, R_bar))
 
@@ -40,14 +40,16 @@ class Answer(Function):
 
     @staticmethod
     def backward(ctx, G):
-        """Gradients of Y, F, R."""
+        """Return the gradients of Y, F, R."""
         gradients = response.pull_back(G.contiguous().numpy(), *ctx.inputs, ctx.kind)
         Y, F, R = map(torch.from_numpy, gradients)
         return Y.reshape(len(Y), -1).to(ctx.precision), F, R, None
 
 
 class Advance(Function):
-    """x, v, C, F, tau (b, n, ..) -> x, v, C and trial F after a step in a world (see `apart`)."""
+    """x, v, C, F, tau (b, n, ..) -> x, v, C and trial F after a step in a world (see
+    `batched_step`).
+    """
 
     @staticmethod
     def forward(ctx, world, nodes, *before):
@@ -59,7 +61,7 @@ class Advance(Function):
 
     @staticmethod
     def backward(ctx, *bars):
-        """Gradients of the states before and of tau."""
+        """Return the gradients of the states before and of tau."""
         bars = batched_step.States(*(bar.contiguous().numpy() for bar in bars))
         gradients = batched_step.pull_back(ctx.world, ctx.before, ctx.after, bars, ctx.nodes)
         return None, None, *map(torch.from_numpy, gradients)

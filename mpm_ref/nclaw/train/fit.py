@@ -29,7 +29,7 @@ class TrajectorySession(TrainingSession):
     """Laws, optimisers and schedules of a training under way."""
 
     entry = Epoch._make
-    errors_of = "positions"         # what the errors of epochs are of
+    errors_of = "positions"         # quantity of the errors of epochs
 
     def __init__(self, recipe, laws, world, observed):
         super().__init__()
@@ -60,11 +60,11 @@ class TrajectorySession(TrainingSession):
 
     @property
     def errors(self):
-        """Return the errors of all epochs and what they are of: plain values, for an `about`."""
+        """Return the errors of all epochs and their quantity: plain values, for an `about`."""
         return {"errors": [epoch.error for epoch in self.history], "errors_of": self.errors_of}
 
     def epoch(self):
-        """The trajectory once, in segments, and a step of each optimiser."""
+        """Run the trajectory once, in segments, and make a step of each optimiser."""
         steps, number = len(self.observed.x) - 1, len(self.history)
         asked = self.recipe.teacher.restarts(steps, number, self.recipe.epochs)
         cuts = self.observed.restarts(asked)
@@ -81,24 +81,24 @@ class TrajectorySession(TrainingSession):
         self.history.append(Epoch(weight * loss, error / cuts[-1], len(cuts) - 1, steepness))
 
     def show(self, cuts, weight):
-        """Add the gradients of some segments; returns their loss, not weighed yet, and the part of
-        it that is of positions.
+        """Add the gradients of some segments; return their loss, not yet weighted, and its part of
+        the positions.
         """
         try:
-            found = segment_errors(self.laws, self.world, self.observed, cuts[:-1], cuts[1:],
-                            self.recipe.velocity)
+            errors = segment_errors(self.laws, self.world, self.observed, cuts[:-1], cuts[1:],
+                                    self.recipe.velocity)
         except ValueError as fault:
             raise Diverged(f"epoch {self.number}, steps {cuts[0]} to {cuts[-1]}: {fault} {ADVICE}"
                            ) from None
-        if not torch.isfinite(found.loss):
+        if not torch.isfinite(errors.loss):
             raise Diverged(f"epoch {self.number}, steps {cuts[0]} to {cuts[-1]}: the loss is "
-                           f"{found.loss.item()}. {ADVICE}")
-        if found.loss.requires_grad:
-            (weight * found.loss).backward()
-        return found.loss.item(), found.positions.item()
+                           f"{errors.loss.item()}. {ADVICE}")
+        if errors.loss.requires_grad:
+            (weight * errors.loss).backward()
+        return errors.loss.item(), errors.positions.item()
 
     def cut_gradients(self):
-        """Cut each law's gradients to their norm; yields what it was."""
+        """Clip the gradients of each law; yield their norm before."""
         for own in self.parameters:
             norm = torch.nn.utils.clip_grad_norm_(own, self.recipe.clip).item() if own else 0.0
             if not norm < float("inf"):
@@ -111,7 +111,7 @@ class TrajectorySession(TrainingSession):
 
 
 def data_digest(world, observed):
-    """Digest of all that is trained on."""
+    """Return the sha256 of the training data."""
     digest = hashlib.sha256(repr((world.dx, world.dt, world.eps)).encode())
     for a in (*world[2:3], *world[4:]):
         digest.update(repr(a.shape).encode() + a.tobytes())

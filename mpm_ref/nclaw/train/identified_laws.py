@@ -1,10 +1,11 @@
 """The true laws with their constants trained, the paper's oracle "sys-id" (NCLAW-eq4).
 
-What is trained is the logarithm of Young's modulus and that of the return map's own constant, yield
-stress or slope of the cone; Poisson's ratio stays as it is. As in the authors' release log E starts
-at START of its value (1e5 Pa at 1e4), yield stress and friction angle at START of theirs. There
-these two are trained without a logarithm, and the return map has a modulus of its own, of which
-nothing can be known beside a yield stress. Adjoints are those of `core.adjoint.deform`.
+The unknowns are the logarithm of Young's modulus and that of the return map's constant, yield
+stress or slope of the cone; Poisson's ratio is given. As in the authors' release log E starts at
+START of its value (1e5 Pa at 1e4), yield stress and friction angle at START of theirs. In the
+release these two are trained without a logarithm, and the return map has a modulus of its own,
+which cannot be identified together with a yield stress. Adjoints are those of
+`core.adjoint.deform`.
 """
 
 from math import log
@@ -30,12 +31,12 @@ START = 0.8
 class MaterialFunction(Function):
     """F (n, d, d), constants (c,) of a law, then of a flow -> tau, or F after the return map.
 
-    of: types of law and flow; with NoFlow it is tau.
+    kinds: types of law and flow; with NoFlow the output is tau.
     """
 
     @staticmethod
     def forward(ctx, F, constants, kinds):
-        """tau or F."""
+        """Return tau or F."""
         law, flow = ctx.records = records(constants.tolist(), kinds)
         ctx.F, like = F.contiguous().numpy(), axes(F)
         q = particles(ctx.F.copy(), np.zeros(F.shape))
@@ -47,7 +48,7 @@ class MaterialFunction(Function):
 
     @staticmethod
     def backward(ctx, G):
-        """Gradients of F and of the constants."""
+        """Return the gradients of F and of the constants."""
         (law, flow), G, zero = ctx.records, G.contiguous().numpy(), np.zeros(G.shape)
         sums = np.zeros((CHUNKS, len(law) + len(flow)))
         if isinstance(flow, NoFlow):
@@ -61,19 +62,19 @@ class MaterialFunction(Function):
 
 
 def axes(F):
-    """A tuple of length d."""
+    """Return a tuple of length d."""
     return tuple(range(F.shape[-1]))
 
 
 def particles(F, tau):
-    """`Particles` at rest, of which deformation reads F and changes F and tau."""
+    """Return the `Particles` at rest, of which deformation reads F and changes F and tau."""
     still, at = np.zeros_like(F), np.zeros(F.shape[:2])
     return Particles(at, at, still, still, F, tau, at[:, 0].copy(), at[:, 0].copy(), NO_HISTORY,
                      NONE)
 
 
 def records(constants, kinds):
-    """The law and the flow of constants in a row."""
+    """Return the law and the flow of constants in a row."""
     law, flow = kinds
     moduli = len(law._fields)
     return law(*constants[:moduli]), flow(*constants[moduli:])
@@ -91,11 +92,11 @@ class IdentifiedLaw(nn.Module):
         self.log_E = nn.Parameter(torch.tensor(log_E, dtype=torch.float64))
 
     def extra_repr(self):
-        """The law for E = 1 Pa."""
+        """Return the law for E = 1 Pa."""
         return repr(self.law(*self.unit.tolist()))
 
     def moduli(self):
-        """Constants of the law [Pa]."""
+        """Return the constants of the law [Pa]."""
         return self.log_E.exp() * self.unit
 
     def forward(self, F):
@@ -115,25 +116,25 @@ class IdentifiedFlow(nn.Module):
 
     def __init__(self, elastic, flow):
         super().__init__()
-        self.moduli, self.of = elastic.moduli, (elastic.law, type(flow))
+        self.moduli, self.kinds = elastic.moduli, (elastic.law, type(flow))
         row = torch.tensor([*flow], dtype=torch.float64)
         self.log_own, self.fixed = nn.Parameter(row[:1].log()), row[1:]
 
     def extra_repr(self):
-        """The flow, and those of its constants that are not learned."""
-        return f"{self.of[1].__name__}, {self.fixed.tolist()}"
+        """Return the flow, and those of its constants that are not learned."""
+        return f"{self.kinds[1].__name__}, {self.fixed.tolist()}"
 
     def constants(self):
         """Return the constants of the flow."""
         return torch.cat([self.log_own.exp(), self.fixed])
 
     def forward(self, F):
-        """F after the return map."""
-        return MaterialFunction.apply(F, torch.cat([self.moduli(), self.constants()]), self.of)
+        """Return F after the return map."""
+        return MaterialFunction.apply(F, torch.cat([self.moduli(), self.constants()]), self.kinds)
 
     def weights(self):
         """Return `LawWeights` without layers: the flow's record."""
-        return LawWeights((), self.of[1](*self.constants().tolist()))
+        return LawWeights((), self.kinds[1](*self.constants().tolist()))
 
 
 def identified_laws(unit, E, flow):

@@ -1,9 +1,9 @@
-"""Laws trained on what they should answer, the paper's oracle "labeled" (NCLAW-methods).
+"""Laws trained on the true stresses and strains, the paper's oracle "labeled" (NCLAW-methods).
 
 Each point at each step of a recorded run gives pairs (F, tau) and (trial F, F). The authors'
-release sets 30 epochs, batches of 1000 pairs and rates of 0.1; schedule and cut of gradients are
-those of `fit`. Neither text nor release says what is minimised: here the mean squared error of all
-components, of tau in Pa. Pairs come in a new random order each epoch.
+release sets 30 epochs, batches of 1000 pairs and rates of 0.1; schedule and clipping of gradients
+are those of `fit`. Neither text nor release says what is minimised: here the mean squared error of
+all components, of tau in Pa. Pairs come in a new random order each epoch.
 """
 
 from typing import NamedTuple
@@ -21,7 +21,7 @@ BATCH = 1000        # pairs
 
 
 class Labels(NamedTuple):
-    """Questions and answers of all points and steps; (pairs, d, d) each, tensors of doubles."""
+    """Inputs and true outputs of laws at all points and steps; (pairs, d, d), in doubles."""
 
     F: torch.Tensor
     tau: torch.Tensor       # [Pa] of F
@@ -30,7 +30,7 @@ class Labels(NamedTuple):
 
 
 def labels_of(observed, law, dt):
-    """`Labels` of a `Trajectory` of an elastic law, steps of MLS-MPM of dt [s]."""
+    """Return the `Labels` of a `Trajectory` of an elastic law, steps of MLS-MPM of dt [s]."""
     shape = observed.F.shape[2:]
     F, F_new, C = (a.reshape(-1, *shape) for a in (observed.F[:-1], observed.F[1:], observed.C[1:]))
     q = particles(F.numpy(), np.zeros(F.shape))
@@ -44,7 +44,7 @@ class LabeledSession(TrajectorySession):
     errors_of = "F"
 
     def epoch(self):
-        """All pairs once."""
+        """Show all pairs once."""
         number, count = len(self.history), len(self.observed.F)
         draws = torch.Generator().manual_seed(self.recipe.seed + number)
         batches = torch.randperm(count, generator=draws).split(BATCH)
@@ -56,8 +56,8 @@ class LabeledSession(TrajectorySession):
         self.history.append(Epoch(elastic, plastic, len(batches), steepness[-1]))
 
     def learn(self, labels):
-        """A step of each optimiser; returns the mean squared errors of tau [Pa^2] and of F, and the
-        norms of the gradients.
+        """Make a step of each optimiser; return the mean squared errors of tau [Pa^2] and of F,
+        and the norms of the gradients.
         """
         for optimiser in self.optimisers:
             optimiser.zero_grad()

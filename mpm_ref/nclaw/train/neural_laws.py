@@ -1,16 +1,15 @@
 """Neural laws as they are trained, with the paper's ablations (NCLAW-alg4, NCLAW-ablation).
 
 Their networks are 13 -> 64 -> 64 -> 9 without biases (NCLAW-arch). GELU(0) = 0, so that without
-biases what vanishes at rest gives an answer that does (NCLAW-rest). Weights begin as Xavier's,
-drawn as the authors' release draws them: after those that PyTorch draws by itself, from the same
-generator.
+biases inputs that vanish at rest give outputs that do (NCLAW-rest). Initial weights are Xavier's,
+drawn as in the authors' release: after those that PyTorch draws by default, from one generator.
 
 `PlainLawModule`      "no rotation": reads F - I, 9 numbers in 3D, and answers without R.
 `UnshiftedLawModule`  "no undeformed": reads s, F^T F and det F as they are, and has biases. The
                       authors' release can leave the shift out of the elastic law alone; the text
-                      knows no such difference, and here both laws go without. Stored, what the
-                      shift would take away is part of the first layer's biases.
-`NoFlowModule`        no return map: the flow of baselines that know elasticity alone (NCLAW-eq13).
+                      has no such difference, and here neither law has it. In stored weights the
+                      shift is part of the first layer's biases.
+`NoFlowModule`        no return map: the flow of baselines with elasticity alone (NCLAW-eq13).
 """
 
 from itertools import pairwise
@@ -29,21 +28,19 @@ NO_FLOW = NoFlow()
 
 
 class LawModule(nn.Module):
-    """A law of a kind, of those that `weights` knows."""
+    """A law that is trained; its kind is one of those that `weights` can store."""
 
     def __init__(self, kind):
         super().__init__()
         self.kind = kind
 
     def extra_repr(self):
-        """The kind with its constants."""
+        """Return the kind with its constants."""
         return repr(self.kind)
 
 
 def describe(law):
-    """Return what identifies a law before training, as plain values: its class, its constants, the
-    sizes of its layers.
-    """
+    """Return plain values that identify a law before training: class, constants, layer sizes."""
     return [type(law).__name__, law.extra_repr(), [list(a.shape) for a in law.parameters()]]
 
 
@@ -62,20 +59,22 @@ class MultilayerPerceptron(nn.Module):
                 nn.init.zeros_(layer.bias)
 
     def forward(self, a):
-        """Outputs (n, outputs) of inputs (n, inputs)."""
+        """Return the outputs (n, outputs) of inputs (n, inputs)."""
         for layer in self.layers[:-1]:
             a = self.activation(layer(a))
         return self.layers[-1](a)
 
 
 def layers_of(net):
-    """Weights [(W (in, out), b (out,))] as arrays of doubles; b is zero where there is no bias."""
-    found = []
+    """Return the weights [(W (in, out), b (out,))] as arrays of doubles; b is zero where there is
+    no bias.
+    """
+    layers = []
     for layer in net.layers:
         W = layer.weight.detach().double().numpy().T.copy()
         bias = torch.zeros(len(layer.weight)) if layer.bias is None else layer.bias.detach()
-        found.append((W, bias.double().numpy().copy()))
-    return found
+        layers.append((W, bias.double().numpy().copy()))
+    return layers
 
 
 class NeuralLawModule(LawModule):
@@ -96,7 +95,9 @@ class NeuralLawModule(LawModule):
 
 
 def neural_laws(seed, elastic, plastic, dim=3):
-    """`LawPair` before training: the elastic one is drawn first, then the plastic one."""
+    """Return the `LawPair` before training: the elastic one is drawn first, then the plastic
+    one.
+    """
     torch.manual_seed(seed)
     return LawPair(NeuralLawModule(elastic, dim), NeuralLawModule(plastic, dim))
 

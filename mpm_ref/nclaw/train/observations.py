@@ -1,12 +1,12 @@
 """Observations that laws are trained on: a trajectory, a part of one, or marks in images.
 
-Each kind has `states(levels)` where segments begin, `restarts(cuts)`, the time levels at which they
-may, and `squared_error(name, a, levels)` of positions "x" or velocities "v".
+Each kind has `states(levels)` at the start of segments, `restarts(cuts)`, the time levels at which
+segments may start, and `squared_error(name, a, levels)` of positions "x" or velocities "v".
 
-Segments restart from states that were observed (`recipe`), and of images that is the first one
-alone (NCLAW-real). So an epoch runs from the start to its horizon, which grows to the whole run:
-the gradient is exact. Restarts from the run's own later states, without their gradients, would see
-those further than the horizon, but blame a law for errors that it made before.
+Segments restart from observed states (`recipe`); with images that is the first state alone
+(NCLAW-real). Then an epoch runs from the start to its horizon, which grows to the full run, and the
+gradient is exact. Restarts from later states of the run itself, without their gradients, would
+charge a law with errors that it made before.
 """
 
 from typing import NamedTuple
@@ -30,34 +30,35 @@ class Trajectory(NamedTuple):
         return tuple(a[levels] for a in self)
 
     def restarts(self, cuts):
-        """Return where segments begin and end: the time levels `cuts` as they are."""
+        """Return the time levels at which segments begin, and the end: `cuts` as they are."""
         return cuts
 
     def squared_error(self, name, a, levels):
-        """Squared errors of a field `a` (b, n, 3) at b time levels, their mean over points and
-        axes, summed over the levels.
+        """Return the squared errors of a field `a` (b, n, 3) at b time levels, their mean over
+        points and axes, summed over the levels.
         """
         return mean_squared(a, getattr(self, name)[levels])
 
 
 def trajectory_of(observed):
-    """`Trajectory` of `Observed`."""
+    """Return the `Trajectory` of `Observed`."""
     return Trajectory(*(torch.from_numpy(a) for a in (observed.x, observed.v, observed.C,
                                                       observed.F)))
 
 
 def mean_squared(a, b):
-    """Squared differences of a, b (b, n, 3), their mean over points and axes, summed over runs."""
+    """Return the squared differences of a, b (b, n, 3), their mean over points and axes, summed
+    over runs.
+    """
     return ((a - b) ** 2).mean(dim=(1, 2)).sum()
 
 
 class PartialTrajectory(NamedTuple):
-    """Observed states at time levels 0 .. k, and what they count, in place of a
-    `Trajectory`; tensors of doubles.
+    """Observed states at time levels 0 .. k with weights, in place of a `Trajectory`; tensors of
+    doubles.
 
-    What stands at a level where nothing counts is never read; the first level must be seen. Weights
-    with a mean of 1 over the levels after the first leave the size of a loss
-    as it is.
+    States with weight 0 are never read; the first level must be observed. Weights with a mean of 1
+    over the levels after the first keep the size of a loss.
     """
 
     x: torch.Tensor         # (k + 1, n, 3)    [m]
@@ -71,16 +72,16 @@ class PartialTrajectory(NamedTuple):
         return tuple(a[levels] for a in self[:4])
 
     def restarts(self, cuts):
-        """Return where segments begin, each at the last observed level before the one that `cuts`
-        asks for; and the end as it is.
+        """Return the time levels at which segments begin, each the last observed one up to that of
+        `cuts`, and the end.
         """
-        seen = np.flatnonzero(self.weight.any(dim=1).numpy())
-        begins = seen[np.searchsorted(seen, cuts[:-1], side="right") - 1]
+        observed = np.flatnonzero(self.weight.any(dim=1).numpy())
+        begins = observed[np.searchsorted(observed, cuts[:-1], side="right") - 1]
         return [*np.unique(begins).tolist(), cuts[-1]]
 
     def squared_error(self, name, a, levels):
-        """Weighted squared errors of a field `a` (b, n, 3) at b time levels, their mean over points
-        and axes, summed over the levels.
+        """Return the weighted squared errors of a field `a` (b, n, 3) at b time levels, their mean
+        over points and axes, summed over the levels.
         """
         weight = self.weight[levels]
         off = torch.where((weight > 0.0)[..., None], a - getattr(self, name)[levels], 0.0)
@@ -94,19 +95,21 @@ class ImageObservations(NamedTuple):
 
     x: torch.Tensor         # (k + 1, m, 2) places of marks [px]; finite also where no frame is
     weight: torch.Tensor    # (k + 1,) of squared errors in the image, 0 where no frame is
-    marked: torch.Tensor    # (m,) which points are marked; integer
+    marked: torch.Tensor    # (m,) numbers of the points that are marked; integer
     P: torch.Tensor         # (3, 4) of the camera, see `camera`
     depth: torch.Tensor     # (3,) unit vector along which it looks
-    x_0: torch.Tensor       # (n, 3) [m] the state at the start, which is known
+    x_0: torch.Tensor       # (n, 3) [m] the state at the start, which is given
     v_0: torch.Tensor       # (n, 3) [m/s]
     C_0: torch.Tensor       # (n, 3, 3) [1/s]
     F_0: torch.Tensor       # (n, 3, 3)
 
     def states(self, levels):
-        """The states (b, n, ..) at b time levels, all of them 0. Raises ValueError for others."""
+        """Return the states (b, n, ..) at b time levels, all of them 0. Raises ValueError for
+        others.
+        """
         if levels.any():
-            raise ValueError(f"states at time levels {levels.tolist()}: a film knows that at level "
-                             "0 alone")
+            raise ValueError(f"states at time levels {levels.tolist()}: images give them at "
+                             "level 0 alone")
         return tuple(a.expand(len(levels), *a.shape) for a in self[5:])
 
     def restarts(self, cuts):
@@ -131,8 +134,8 @@ class ImageObservations(NamedTuple):
 def observe_images(marks, P, start, every):
     """Return the `ImageObservations` of `camera.Marks` in frames `every` steps apart.
 
-    P (3, 4) is the camera's; start is the `Body` at the start. Frames weigh `every`, so that a mean
-    over steps is one over frames.
+    P (3, 4) is the camera's; start is the `Body` at the start. Frames have the weight `every`, so
+    that a mean over steps is one over frames.
     """
     frames, m, _ = marks.places.shape
     steps = every * (frames - 1)

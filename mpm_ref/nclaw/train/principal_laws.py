@@ -37,7 +37,7 @@ class Stretches(Function):
 
     @staticmethod
     def backward(ctx, s_bar):
-        """Gradient of F."""
+        """Return the gradient of F."""
         F_bar = principal.pull_back_stretches(s_bar.contiguous().numpy(), ctx.factors)
         return torch.from_numpy(F_bar), None
 
@@ -53,7 +53,7 @@ class PrincipalStress(Function):
 
     @staticmethod
     def backward(ctx, G):
-        """Gradients of y, and of F at fixed y."""
+        """Return the gradients of y, and of F at fixed y."""
         gradients = principal.pull_back(G.contiguous().numpy(), *ctx.given)
         return *map(torch.from_numpy, gradients), None, None
 
@@ -71,7 +71,7 @@ class PrincipalLawModule(LawModule):
         return self.kind.unit * PrincipalStress.apply(y, F, factors, ratios)
 
     def ratios(self, y, s):
-        """a_ij (n, pairs); stretches nearer than MEETING are first moved apart to that."""
+        """Return a_ij (n, pairs); stretches nearer than MEETING are first moved apart to that."""
         ratios = []
         for i, j in principal.PAIRS[s.shape[1]]:
             gap = s[:, i] - s[:, j]
@@ -106,7 +106,7 @@ class ReleasedStretchLawModule(PrincipalLawModule):
         return self.net(s - 1.0)
 
     def ratios(self, y, s):
-        """a_ij (n, pairs), bounded where stretches are equal."""
+        """Return a_ij (n, pairs), bounded where stretches are equal."""
         return torch.from_numpy(principal.bounded_ratios(y.numpy(), s.numpy()))
 
     def weights(self):
@@ -120,7 +120,7 @@ class StretchLawModule(ReleasedStretchLawModule):
     ratios = PrincipalLawModule.ratios
 
     def y(self, s):
-        """Means over orders p of what the network of s_p gives for each stretch (n, d)."""
+        """Return means over orders p of what the network of s_p gives for each stretch (n, d)."""
         orders = torch.tensor(list(permutations(range(s.shape[1]))))
         given = self.net(s[:, orders] - 1.0)
         return given.gather(2, orders.argsort(1).expand(len(s), -1, -1)).mean(1)
@@ -138,17 +138,17 @@ class SplineLawModule(PrincipalLawModule):
         self.values = nn.Parameter(start[:, None].repeat(1, 3))
 
     def tables(self):
-        """Coefficients (p, 4) of the pieces of f, g, h."""
+        """Return the coefficients (p, 4) of the pieces of f, g, h."""
         return torch.einsum("pmk,kf->fpm", self.basis, self.values)
 
     def value(self, table, x):
-        """A function of x, any shape."""
+        """Return a function of x, any shape."""
         k = torch.searchsorted(self.breaks, x)
         t, (c3, c2, c1, c0) = x - self.origins[k], table[k].unbind(-1)
         return ((c3 * t + c2) * t + c1) * t + c0
 
     def y(self, s):
-        """y_i = f(s_i) + sum_j g(s_i s_j) s_j + h(J) J/s_i (n, 3)."""
+        """Return y_i = f(s_i) + sum_j g(s_i s_j) s_j + h(J) J/s_i (n, 3)."""
         f, g, h = self.tables()
         of_pairs = self.value(g, s[:, I] * s[:, J])
         first, second = s[:, OTHERS[:, 0]], s[:, OTHERS[:, 1]]

@@ -14,7 +14,7 @@ import numpy as np
 
 RELEASE, PRINTED = "release", "printed"
 READINGS = (RELEASE, PRINTED)
-SEEDS = 2**32       # that PyTorch tells apart
+SEEDS = 2**32       # number of different seeds of PyTorch
 
 
 class TeacherForcing(NamedTuple):
@@ -40,11 +40,11 @@ class Recipe:
     """Settings of a training whose epoch is one trajectory, in segments (see `TeacherForcing`), and
     one step of Adam for each law.
 
-    Rates fall to 0 by half a cosine; the gradients of each law are cut to a norm of `clip`. The
+    Rates fall to 0 by half a cosine; the gradients of each law are clipped to a norm of `clip`. The
     loss of the authors' "release" is the sum over steps of mean squared errors [m^2] times `scale`
     times segments over steps: not printed, and part of the recipe, since gradients are small beside
     the 1e-8 that Adam adds to their size. The "printed" one is the mean over steps, in m^2.
-    `batch` segments run side by side, which changes nothing but time and round-off. `seed` is that
+    `batch` segments run at once, which affects only time and round-off. `seed` is that
     of the laws' start, and of the order of pairs (see `labeled`). `velocity` [s^2] weighs squared
     errors of velocities beside those of positions (NCLAW-aux, printed without its value).
     """

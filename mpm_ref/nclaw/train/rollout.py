@@ -2,7 +2,7 @@
 
     tau = E(F),    x, v, C, F_trial = step(x, v, C, F, tau),    F = P(F_trial)
 
-Segments do not know each other: each restarts from what was observed.
+Segments are independent: each restarts from an observed state.
 """
 
 from typing import NamedTuple
@@ -21,12 +21,12 @@ class LawPair(NamedTuple):
 
 
 def over_points(law, F):
-    """A law of F (b, n, 3, 3)."""
+    """Return a law of F (b, n, 3, 3)."""
     return law(F.reshape(-1, *F.shape[2:])).reshape(F.shape)
 
 
 def step(laws, world, state, nodes):
-    """The state (x, v, C, F) after a step."""
+    """Return the state (x, v, C, F) after a step."""
     tau = over_points(laws.elastic, state[3])
     x, v, C, F = Advance.apply(world, nodes, *state, tau)
     return x, v, C, over_points(laws.plastic, F)
@@ -35,7 +35,7 @@ def step(laws, world, state, nodes):
 class SegmentErrors(NamedTuple):
     """Squared errors of segments."""
 
-    loss: torch.Tensor          # what is learned from [m^2]
+    loss: torch.Tensor          # the loss of the training [m^2]
     positions: torch.Tensor     # its part that is of positions, without a gradient [m^2]
 
 

@@ -1,8 +1,8 @@
-"""The strains that a law has met in training: of the run that it learned from, and of its own.
+"""Range of the strains in a training: those of the observed run, and those of the law's segments.
 
-A training runs in segments, each from an observed state on (NCLAW-train). There a law is asked
-about strains that it has led to itself. A learned return map leaves another part of a deformation
-in F than the true one does, so that the bounds of both differ; what is met lies in either.
+A training runs in segments, each from an observed state (NCLAW-train), in which the law itself
+determines the strains. A learned return map leaves another part of a deformation in F than the true
+one, so that the bounds of both differ; the range includes both.
 """
 
 from itertools import pairwise
@@ -19,7 +19,7 @@ MAX_STRETCH = 100.0     # stretch or J, above which a segment has broken down
 
 
 def training_bounds(problem, observed, law, cuts):
-    """Return the bounds of the strains that a training meets, as of `strain_bounds`.
+    """Return the bounds of the strains in a training, like `strain_bounds`.
 
     problem: a `Problem` of one body, at its start; observed: `Observed` of its run, all steps; law:
     makes the body of learned laws (`bodies.body_maker`); cuts: time levels at which segments begin,
@@ -52,7 +52,7 @@ def restart(body, observed, k):
 
 
 def segment(problem, stepper, body, steps):
-    """[(low, high)] of the strains after each of so many steps."""
+    """Return [(low, high)] of the strains after each of `steps` steps."""
     measures, dt = [], problem.clock.dt
     for _ in range(steps):
         try:

@@ -9,8 +9,8 @@
     admissible      an energy and a contraction, which thermodynamics admits
     sys-id          the true laws, see `identified_laws`
 
-All but the last are drawn from a seed, the elastic law first. Of spline and neural there is a
-kind as the authors' release has it and one that is better founded (`learned.spline`,
+All but the last are drawn from a seed, the elastic law first. Spline and neural have two kinds
+each, that of the authors' release and a better founded one (`learned.spline`,
 `learned.stretch_network`).
 """
 

@@ -52,7 +52,7 @@ class PodModes(NamedTuple):
         return self._at(X)[0] @ vhat
 
     def _at(self, X):
-        """U and slope at points: of the data, or fitted between them."""
+        """Return U and slope at points: of the data, or fitted between them."""
         far, i = self.tree.query(X)
         U, slope = self.U[i], self.slope[i]
         off = far > SAME * np.ptp(self.X, axis=0).max()
@@ -61,7 +61,7 @@ class PodModes(NamedTuple):
         return U, slope
 
     def _fit(self, X):
-        """U and slope by moving least squares of first order."""
+        """Return U and slope by moving least squares of first order."""
         _, near = self.tree.query(X, range(1, min(NEAREST, len(self.X)) + 1))
         arms = self.X[near] - X[:, None]
         basis = np.concatenate([np.ones((*arms.shape[:2], 1)), arms], axis=2)

@@ -69,9 +69,7 @@ def generate(study, folder, workers=1):
 
 
 def _in_processes(study, folder, workers):
-    """`generate` on several processes, which are started anew: a fork of a process with threads
-    may hang.
-    """
+    """Yield what `generate` yields, on several new processes: a fork of one with threads may hang."""
     context = multiprocessing.get_context("spawn")
     stop = context.Event()
     with ProcessPoolExecutor(workers, context, _begin_worker, (stop,)) as pool:
@@ -93,7 +91,9 @@ def _in_processes(study, folder, workers):
 
 @contextmanager
 def _ignore_interrupts():
-    """Processes started in this block do not listen to Ctrl-C before they have begun."""
+    """Keep processes that are started in this block from receiving Ctrl-C before they have
+    begun.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -110,7 +110,7 @@ class _StopWatch(Watch):
     stop = None         # of a process that only makes runs
 
     def step(self, state, dt):
-        """After every step."""
+        """End the run after a step if a stop was asked for."""
         if self.asked:
             signal.raise_signal(signal.SIGINT)
 
@@ -124,8 +124,8 @@ STOP_WATCH = _StopWatch()
 
 
 def _begin_worker(stop):
-    """One thread, no Ctrl-C but by `stop`, and no life without the parent: as files stand at any
-    moment, a process may end at any.
+    """Set up a worker process: one thread, Ctrl-C by `stop` alone, an end with its parent. As files
+    are complete at any moment, a process may end at any.
     """
     def end_with_parent():
         wait([multiprocessing.parent_process().sentinel])

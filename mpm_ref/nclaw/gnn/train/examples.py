@@ -63,15 +63,15 @@ def scales_of(runs, noise):
     """Return the `MotionScales` of velocities and accelerations in some runs, and of noise."""
     u = [np.diff(run.frames[HISTORY - 1:], axis=0) for run in runs]
     d = u[0].shape[-1]
-    found = [np.concatenate([b.reshape(-1, d) for b in a])
+    rates = [np.concatenate([b.reshape(-1, d) for b in a])
              for a in (u, [np.diff(one, axis=0) for one in u])]
-    return MotionScales(*(b for a in found
+    return MotionScales(*(b for a in rates
                           for b in (a.mean(axis=0), np.hypot(a.std(axis=0), noise))))
 
 
 def random_walk(draws, shape, noise):
-    """Errors of positions (HISTORY + 1, n, d), the first ones zero; the last velocity's deviation
-    is `noise`. shape: n, d; draws: a `numpy.random.Generator`.
+    """Return the errors of positions (HISTORY + 1, n, d), the first ones zero; the last velocity's
+    deviation is `noise`. shape: n, d; draws: a `numpy.random.Generator`.
     """
     steps = draws.normal(scale=noise / np.sqrt(HISTORY), size=(HISTORY, *shape))
     return np.concatenate([np.zeros((1, *shape)), steps.cumsum(axis=0).cumsum(axis=0)])
@@ -92,5 +92,5 @@ def example(run, k, reading, noise):
 
 
 def single(a):
-    """An array as a tensor in single precision."""
+    """Return an array as a tensor in single precision."""
     return torch.from_numpy(a).float()

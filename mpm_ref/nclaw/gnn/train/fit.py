@@ -24,8 +24,8 @@ from .network import GraphNetwork, export_weights
 
 @dataclass(frozen=True)
 class GraphRecipe:
-    """Each step of Adam is shown a frame of a run, `batch` times at random, with noise on what came
-    before; its loss is that of answers, summed over axes, the mean over points.
+    """Settings of the training: each step of Adam takes `batch` random frames of runs, with noise
+    in their history; its loss is the squared error summed over axes, the mean over points.
 
     Rates fall from `first_rate` to `last_rate`, evenly in their logarithm. [GNS] has up to 20
     million steps with 10 blocks 128 wide, batches of 2, rates of 1e-4 to 1e-6, and deviations of
@@ -64,7 +64,7 @@ class GraphRecipe:
         return self.steps // self.check
 
     def rate(self, step):
-        """The rate of a step, counted from 0."""
+        """Return the rate of a step, counted from 0."""
         return self.first_rate * (self.last_rate / self.first_rate) ** (step / self.steps)
 
 
@@ -113,7 +113,7 @@ class GraphSession(TrainingSession):
             self.best = deepcopy(self.network)
 
     def step(self, number):
-        """One step of the optimiser; returns its loss."""
+        """Make one step of the optimiser and return its loss."""
         draws = np.random.default_rng((self.recipe.seed, number))
         self.optimiser.param_groups[0]["lr"] = self.recipe.rate(number)
         self.optimiser.zero_grad()
@@ -128,39 +128,39 @@ class GraphSession(TrainingSession):
         return total
 
     def loss(self, draws):
-        """The loss of a random frame with noise on it."""
+        """Return the loss of a random frame with noise on it."""
         run = self.runs[draws.integers(len(self.runs))]
         noise = random_walk(draws, run.frames.shape[1:], self.recipe.noise)
         shown = example(run, int(draws.integers(run.count)), self.reading, noise)
-        found = self.network(shown.points, shown.edges, shown.graph)
-        return ((found - shown.answer) ** 2).sum(dim=1).mean()
+        answers = self.network(shown.points, shown.edges, shown.graph)
+        return ((answers - shown.answer) ** 2).sum(dim=1).mean()
 
     def error(self):
-        """Mean squared error of free runs from the start [m^2], over frames, points and axes; the
-        first frame, which is true, counts.
+        """Return the mean squared error of free runs from the start [m^2], over frames, points and
+        axes; the first frame, which is true, counts.
         """
         return float(np.mean([self.error_along(run) for run in self.runs[:self.recipe.checked]]))
 
     def error_along(self, run):
-        """The error of a free run along a `Run`."""
+        """Return the error of a free run along a `Run`."""
         true = run.frames[HISTORY:]
-        found = free_run(self.answer, self.reading, run.frames[:HISTORY + 1], run.box)
+        frames = free_run(self.answer, self.reading, run.frames[:HISTORY + 1], run.box)
         try:
             error = np.mean([np.mean((x - y) ** 2) for x, y in
-                             zip(islice(found, len(true)), true, strict=True)])
+                             zip(islice(frames, len(true)), true, strict=True)])
         except SimulatorFailure:
             return np.inf
         return error if np.isfinite(error) else np.inf
 
     def answer(self, points, edges, graph):
-        """Answers of the network as it is now; arrays."""
+        """Return the answers of the network as it is now; arrays."""
         with torch.no_grad():
-            found = self.network(single(points), single(edges),
+            answers = self.network(single(points), single(edges),
                                  Graph(*map(torch.from_numpy, graph)))
-        return found.double().numpy()
+        return answers.double().numpy()
 
     def simulator(self, about):
-        """`Simulator` of the weights that were picked, with plain values that are known of it.
+        """Return the `Simulator` of the best weights, with plain values that describe it.
 
         Raises `Diverged` where all free runs broke down.
         """
@@ -169,12 +169,12 @@ class GraphSession(TrainingSession):
         return Simulator(export_weights(self.best), self.reading, about)
 
     def states(self):
-        """Return what a checkpoint has the states of: the network, the best one, the optimiser."""
+        """Return the objects with states in a checkpoint: network, best network, optimiser."""
         return {"network": [self.network], "best": [self.best], "optimiser": [self.optimiser]}
 
 
 def data_digest(runs, dt):
-    """Digest of all that is trained on."""
+    """Return the sha256 of the training data."""
     digest = hashlib.sha256(repr(dt).encode())
     for run in runs:
         for a in (run.frames, *run.box):
@@ -183,7 +183,7 @@ def data_digest(runs, dt):
 
 
 def train_graph(recipe, runs, dt, checkpoint=None, on_round=None):
-    """A `GraphSession`, trained on `Run`s of frames dt [s] apart.
+    """Return a `GraphSession`, trained on `Run`s of frames dt [s] apart.
 
     checkpoint: a file to go on from and to save to; on_round(history) is called after each round.
     Raises `Diverged`, with the step.

@@ -1,8 +1,8 @@
 """The graph network [GNS] as it is trained; single precision. See `gnn.network`.
 
 Weights are drawn from a normal distribution of variance 1/inputs, cut at two deviations; biases
-begin at zero. What an edge tells the first layer of its perceptron about its ends is found point by
-point, then carried to the edges: the same sum, of fewer products.
+begin at zero. The first layer of an edge's perceptron is applied to the points first and then
+gathered to the edges: an equal sum with fewer products.
 """
 
 from itertools import pairwise
@@ -29,18 +29,18 @@ class NormedPerceptron(nn.Module):
         self.norm = nn.LayerNorm(outputs, eps=network.TINY) if norm else nn.Identity()
 
     def forward(self, a):
-        """Outputs (n, outputs) of inputs (n, inputs)."""
+        """Return the outputs (n, outputs) of inputs (n, inputs)."""
         return self.onward(self.layers[0](a))
 
     def onward(self, z):
-        """Outputs of what the first layer gives (n, width)."""
+        """Return the outputs of what the first layer gives (n, width)."""
         for layer in self.layers[1:]:
             z = layer(torch.relu(z))
         return self.norm(z)
 
 
 class Block(nn.Module):
-    """One passing of messages."""
+    """One round of message passing."""
 
     def __init__(self, width):
         super().__init__()
@@ -48,10 +48,10 @@ class Block(nn.Module):
         self.points = NormedPerceptron(2 * width, width, width)
 
     def forward(self, v, e, senders, receivers):
-        """v (n, width) and e (k, width) after it."""
+        """Return v (n, width) and e (k, width) after it."""
         first = self.edges.layers[0]
-        own, sent, received = first.weight.split(v.shape[1], dim=1)
-        z = nn.functional.linear(e, own, first.bias)
+        of_edge, sent, received = first.weight.split(v.shape[1], dim=1)
+        z = nn.functional.linear(e, of_edge, first.bias)
         for weight, ends in ((sent, senders), (received, receivers)):
             z = z + nn.functional.linear(v, weight).index_select(0, ends)
         m = self.edges.onward(z)
@@ -70,7 +70,7 @@ class GraphNetwork(nn.Module):
         self.answer = NormedPerceptron(width, width, dim, norm=False)
 
     def forward(self, points, edges, graph):
-        """The answers; graph: `Graph` of tensors."""
+        """Return the answers; graph: `Graph` of tensors."""
         v, e = self.points(points), self.edges(edges)
         for block in self.blocks:
             v, e = block(v, e, *graph)
@@ -78,7 +78,7 @@ class GraphNetwork(nn.Module):
 
 
 def export_weights(net):
-    """`gnn.network.GraphWeights` of a `GraphNetwork`, in doubles."""
+    """Return the `gnn.network.GraphWeights` of a `GraphNetwork`, in doubles."""
     blocks = tuple((export_perceptron(block.edges), export_perceptron(block.points))
                    for block in net.blocks)
     return network.GraphWeights(export_perceptron(net.points), export_perceptron(net.edges),
@@ -86,12 +86,12 @@ def export_weights(net):
 
 
 def export_perceptron(perceptron):
-    """`gnn.network.PerceptronWeights` of a `NormedPerceptron`."""
+    """Return the `gnn.network.PerceptronWeights` of a `NormedPerceptron`."""
     layers = tuple((double(layer.weight).T.copy(), double(layer.bias))
                    for layer in perceptron.layers)
     return network.PerceptronWeights(layers, tuple(map(double, perceptron.norm.parameters())))
 
 
 def double(parameter):
-    """A parameter as an array of doubles, a copy."""
+    """Return a parameter as an array of doubles, a copy."""
     return parameter.detach().double().numpy().copy()
