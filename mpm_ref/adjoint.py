@@ -60,7 +60,9 @@ class StepAdjoint:
         return self._transfer(bodies, bars, (grid, free, touched), dt)
 
     def _grid(self, bodies, t, dt):
-        """The grid of the step, its velocities before conditions, and what touches its nodes."""
+        """Return the grid of the step, its velocities before conditions, and the contacts of its
+        nodes.
+        """
         scheme = self.scheme
         grid = scatter(bodies, self.storage, scheme, dt)
         update(grid, self.gravity, dt, scheme.mass_eps, scheme.gravity_on_empty)
@@ -71,7 +73,7 @@ class StepAdjoint:
         return grid, free, touched
 
     def _velocity_gradient(self, body, grid, dt):
-        """L of the step (N, d, d); the body keeps its own."""
+        """Return L of the step (N, d, d); the body keeps its own."""
         q = body.particles
         L = np.empty_like(q.L)
         C = L if q.L is q.C else np.empty_like(q.C)
@@ -80,14 +82,14 @@ class StepAdjoint:
         return L
 
     def _deform(self, body, L, bar, parts, dt):
-        """Bars of F and y before the step, and of C and L, which MLS-MPM has in one."""
+        """Compute the bars of F and y before the step, and of C and L, one array in MLS-MPM."""
         deform_body_adjoint(body, L, bar, parts, dt)
         damp(body._replace(particles=bar), self.scheme)         # symmetric, hence its own adjoint
         if self.scheme.transfer == "mls":
             bar.C[:] += bar.L
 
     def _transfer(self, bodies, bars, step, dt):
-        """From bars of x, v, C, L after the step to those of x, v, C, tau, m, V0, b before it."""
+        """Pull bars of x, v, C, L after the step back to x, v, C, tau, m, V0, b before it."""
         scheme, (grid, free, touched) = self.scheme, step
         nodes = self.storage_of_bars.cover([body.particles.x for body in bodies])
         how = Exchange(scheme.stencil, dt, scheme.flip, scheme.transfer == "mls")
@@ -104,12 +106,12 @@ class StepAdjoint:
 
 
 def zero_bars(body):
-    """Bars of a body, all zero."""
+    """Return the bars of a body, all zero."""
     return type(body.particles)(*(np.zeros_like(a) for a in body.particles))
 
 
 def zero_sums(body):
-    """Room for the bars of the parameters of a body's law and flow, chunk by chunk."""
+    """Return storage for the bars of the parameters of a body's law and flow, chunk by chunk."""
     return np.zeros((CHUNKS, len(body.law) + len(body.flow)))
 
 
@@ -122,9 +124,9 @@ def require_adjoint(body):
 
 
 def deform_body_adjoint(body, L, bar, parts, dt):
-    """Adjoint of `explicit.deform_body` with velocity gradient L: bar.F and bar.y of the values
-    after the step become those before it, bar.L is overwritten; bar.tau is read.
-    Raises ValueError for a law or a flow without adjoint.
+    """Apply the adjoint of `explicit.deform_body` with velocity gradient L: bar.F and bar.y of the
+    values after the step become those before it, bar.L is overwritten; bar.tau is read. Raises
+    ValueError for a law or a flow without adjoint.
     """
     require_adjoint(body)
     q, law, flow, bars = body.particles, body.law, body.flow, _of_deformation(bar)
@@ -138,15 +140,15 @@ def deform_body_adjoint(body, L, bar, parts, dt):
 
 
 def clip_adjoint(positions, bars, low, high):
-    """Adjoint of a clip to the box low .. high, (d,) each: bar.x of each body becomes 0 for the
-    coordinates that it holds. positions: x (N, d) of each body after it.
+    """Apply the adjoint of a clip to the box low .. high, (d,) each: bar.x of each body becomes 0
+    for the coordinates that it holds. positions: x (N, d) of each body after it.
     """
     for x, bar in zip(positions, bars):
         bar.x[(x <= low) | (x >= high)] = 0.0
 
 
 def initial_stress_adjoint(body, bar, parts):
-    """Adjoint of `explicit.initial_stress`: adds to bar.F what bar.tau says of it."""
+    """Apply the adjoint of `explicit.initial_stress`: bar.tau is pulled back and added to bar.F."""
     q, bars = body.particles, _of_deformation(bar)
     if q.F.ndim == 1:
         deform_adjoint.initial_pressure(q.F, bars, body.law, parts)

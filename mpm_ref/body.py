@@ -22,9 +22,10 @@ class Body(NamedTuple):
 
 
 def particles_at(x, v, m, V0, transfer="mls", fluid=False):
-    """Particles without stress (F = I) at x (N, d) with velocity v (N, d), mass m (N,), volume V0
-    (N,); all are copied. Only the fields that the transfer needs are allocated; `fluid` carries J
-    instead of F. Further fields are set by `_replace`: the history y (N,), a body force b (N, d).
+    """Return particles without stress (F = I) at x (N, d) with velocity v (N, d), mass m (N,),
+    volume V0 (N,); all are copied. Only the fields that the transfer needs are allocated; `fluid`
+    carries J instead of F. Further fields are set by `_replace`: the history y (N,), a body force b
+    (N, d).
     """
     n, d = x.shape
     L = np.zeros((n, d, d))

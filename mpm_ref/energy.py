@@ -51,8 +51,8 @@ def _psi_fluid_all(particles, law, out):
 
 
 def elastic(body):
-    """Elastic energy of every particle of a body (N,) [J]; NaN or inf where the law refuses F, NaN
-    of a law without energy.
+    """Return the elastic energy of every particle of a body (N,) [J]; NaN or inf where the law
+    refuses F, NaN of a law without energy.
     """
     out = np.full(len(body.particles.x), np.nan)
     if type(body.law) not in psi.methods:
@@ -66,8 +66,8 @@ def elastic(body):
 
 
 def kinetic(particles, inertia=0.0):
-    """Kinetic energy of every particle (N,) [J]; inertia D = dx^2 (degree + 1)/12 [m^2] adds the
-    affine motion, m D |C|^2 / 2.
+    """Return the kinetic energy of every particle (N,) [J]; inertia D = dx^2 (degree + 1)/12 [m^2]
+    adds the affine motion, m D |C|^2 / 2.
     """
     e = 0.5 * particles.m * np.einsum("pa,pa->p", particles.v, particles.v)
     if inertia and particles.C.ndim == 3:
@@ -76,7 +76,7 @@ def kinetic(particles, inertia=0.0):
 
 
 def energy(bodies, gravity, inertia=0.0):
-    """`Energy` of all bodies under the acceleration gravity (d,)."""
+    """Return the `Energy` of all bodies under the acceleration gravity (d,)."""
     parts = np.zeros(3)
     for body in bodies:
         q = body.particles
@@ -89,15 +89,15 @@ def energy(bodies, gravity, inertia=0.0):
 
 
 def momentum(bodies):
-    """Linear momentum sum_p m_p v_p (d,) [kg m/s]."""
+    """Return the linear momentum sum_p m_p v_p (d,) [kg m/s]."""
     d = bodies[0].particles.x.shape[1]
     sums = [[total(b.particles.m * b.particles.v[:, a]) for a in range(d)] for b in bodies]
     return np.sum(sums, axis=0)
 
 
 def angular_momentum(bodies, inertia=0.0, about=None):
-    """Angular momentum about a point: sum_p m_p (x_p x v_p) plus, where C is carried, the
-    particles' own spin sum_p m_p D eps : C_p^T [APIC]. A scalar (1,) in 2D, a vector (3,) in 3D
+    """Return the angular momentum about a point: sum_p m_p (x_p x v_p) plus, where C is carried,
+    the particles' own spin sum_p m_p D eps : C_p^T [APIC]. A scalar (1,) in 2D, a vector (3,) in 3D
     [kg m^2/s].
     """
     d = bodies[0].particles.x.shape[1]

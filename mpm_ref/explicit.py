@@ -128,8 +128,8 @@ class Stepper:
 
 
 def scatter(bodies, store, scheme, dt):
-    """Mass and momentum (with the impulse of the internal forces over dt) of all bodies on a grid
-    that covers them.
+    """Return the mass and momentum (with the impulse of the internal forces over dt) of all bodies
+    on a grid that covers them.
     """
     grid = store.cover([body.particles.x for body in bodies])
     for body in bodies:
@@ -139,21 +139,21 @@ def scatter(bodies, store, scheme, dt):
 
 
 def gather(body, grid, scheme, dt):
-    """Velocity, position and velocity gradient of a body's particles from the grid."""
+    """Update velocity, position and velocity gradient of a body's particles from the grid."""
     g2p(body.particles, grid, scheme.stencil, dt, scheme.flip, scheme.transfer == "mls")
 
 
 def damp(body, scheme):
-    """RPIC damping of the affine field. It comes after the deformation, which under MLS-MPM reads
-    the same array: what is handed on is damped, the strain is not (NSF-rpic).
+    """Apply the RPIC damping to the affine field, after the deformation, which under MLS-MPM reads
+    the same array: the field of the next step is damped, the strain is not (NSF-rpic).
     """
     if scheme.rpic:
         rpic(body.particles.C, scheme.rpic)
 
 
 def deform_body(body, dt):
-    """Deformation gradient, return map and stress of a body's particles; only what its material
-    needs.
+    """Update deformation gradient and stress, with the return map, of a body's particles; only what
+    its material needs.
     """
     particles, law, flow = body.particles, body.law, body.flow
     like = tuple(range(particles.x.shape[1]))
@@ -168,7 +168,7 @@ def deform_body(body, dt):
 
 
 def initial_stress(body):
-    """Kirchhoff stress of a body's state as it stands."""
+    """Compute the Kirchhoff stress of a body's current state."""
     like = tuple(range(body.particles.x.shape[1]))
     if body.particles.F.ndim == 1:
         deform.initial_pressure(body.particles, body.law)

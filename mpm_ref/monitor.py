@@ -50,8 +50,9 @@ class Account:
     noise: float
 
     def allowed(self, now, growth):
-        """Largest energy still credible: the start's, plus `growth` times what could have become
-        motion by now, namely the start's kinetic and elastic energy and the height lost since.
+        """Return the largest energy still credible: the start's, plus `growth` times what could
+        have become motion by now, namely the start's kinetic and elastic energy and the height lost
+        since.
         """
         released = max(self.start.gravity - now.gravity, 0.0)
         available = self.start.kinetic + self.start.elastic + released
@@ -59,8 +60,8 @@ class Account:
 
 
 def account(problem, bodies):
-    """`Account` of a run's first state; None where moving conditions or body forces of particles
-    put in energy that it could not know, or a law has no energy.
+    """Return the `Account` of a run's first state; None where moving conditions or body forces of
+    particles put in energy that it could not know, or a law has no energy.
     """
     driven = any(b.particles.b.ndim > 1 or type(b.law) not in psi.methods for b in bodies)
     if driven or (problem.conditions is not None and getattr(problem.conditions, "moves", True)):
@@ -81,7 +82,8 @@ def runs_away(problem, state, dt):
 
 
 def swing(dt, bound):
-    """Mechanical energy that symplectic Euler may show in excess, as a share of the true one.
+    """Return the mechanical energy that symplectic Euler may show in excess, as a share of the true
+    one.
 
     Of a vibration it keeps H - (dt/2) dU/dt, where |(dt/2) dU/dt| <= r H with r = dt/bound, so that
     H itself swings between its smallest value and (1 + r)/(1 - r) times that. Near the bound, and
@@ -92,12 +94,12 @@ def swing(dt, bound):
 
 
 def speed(particles):
-    """|v_p| (N,) [m/s]."""
+    """Return |v_p| (N,) [m/s]."""
     return np.sqrt(np.einsum("pa,pa->p", particles.v, particles.v))
 
 
 def volume_ratio(particles):
-    """J = det F (N,)."""
+    """Return J = det F (N,)."""
     return particles.F if particles.F.ndim == 1 else np.linalg.det(particles.F)
 
 
@@ -130,7 +132,9 @@ def _stop_where(problem, state, body, dt, broken, reason):
 
 
 def lost(problem, state, dt, reason):
-    """`Unstable` for a reason that concerns the run as a whole: its fastest particle is named."""
+    """Return an `Unstable` for a reason that concerns the run as a whole: its fastest particle is
+    named.
+    """
     body = max(state.bodies, key=lambda b: speed(b.particles).max())
     return unstable(problem, state, body, int(np.argmax(speed(body.particles))), dt, reason)
 
@@ -148,7 +152,7 @@ def advice(problem, solve):
 
 
 def unstable(problem, state, body, p, dt, reason):
-    """`Unstable` with what is to be said of particle p of a body."""
+    """Return an `Unstable` with the reason and the state of particle p of a body."""
     return Unstable(
         reason,
         advice=advice(problem, state.solve),

@@ -50,15 +50,17 @@ class Window(NamedTuple):
 
 
 def view_of(results):
-    """(horizontal, vertical) axes, as numbers: up is against gravity, or y without gravity."""
+    """Return (horizontal, vertical) axes, as numbers: up is against gravity, or y without
+    gravity.
+    """
     g = results.gravity
     up = int(np.argmax(np.abs(g))) if np.any(g) else 1
     return (1 if up == 0 else 0), up
 
 
 def draw(results, frame=-1, field="speed", view=None):
-    """Matplotlib `Figure` of the particles of one frame; `field` is one of `results.SCALARS`,
-    view the (horizontal, vertical) axes. Raises `BadResults`.
+    """Return a Matplotlib `Figure` of the particles of one frame; `field` is one of
+    `results.SCALARS`, view the (horizontal, vertical) axes. Raises `BadResults`.
     """
     frame = results.index(frame)
     return _drawing(results, frame, field, _window(results, [frame], view))
@@ -100,7 +102,7 @@ def animate(results, out, field="speed", view=None, fps=20):
 
 
 def particles(axes):
-    """The particles among what is drawn on axes."""
+    """Return the artists of particles on axes."""
     return next(a for a in axes.collections if a.get_gid() == "particles")
 
 
@@ -119,21 +121,21 @@ def _values(results, frame, field):
 
 
 def _order(results, frame, view):
-    """Particles from far to near."""
+    """Return particles from far to near."""
     x = _positions(results, frame)
     depth = [a for a in range(results.dim) if a not in view]
     return np.argsort(-x[:, depth[0]], kind="stable") if depth else np.arange(len(x))
 
 
 def _range(arrays):
-    """Smallest and largest finite value."""
+    """Return the smallest and largest finite value."""
     finite = [a[np.isfinite(a)] for a in arrays]
     ends = [(a.min(), a.max()) for a in finite if len(a)] or [(0.0, 1.0)]
     return min(low for low, _ in ends), max(high for _, high in ends)
 
 
 def _window(results, frames, view):
-    """Around the particles of some frames, with room for what they may touch."""
+    """Return the `Window` around the particles of frames, with a margin."""
     view = view or view_of(results)
     if max(view) >= results.dim:
         raise BadResults(f"{results.path}: there is no axis {AXES[max(view)]} in {results.dim}D")
@@ -144,7 +146,7 @@ def _window(results, frames, view):
 
 
 def _drawing(results, frame, field, window):
-    """The figure of a frame."""
+    """Return the figure of a frame."""
     from matplotlib.figure import Figure
 
     width, height = window.sides * window.inches
@@ -163,7 +165,7 @@ def _drawing(results, frame, field, window):
 
 
 def _explain_colours(figure, points, field, bodies):
-    """A legend of the bodies, or a colour bar with the field and its unit."""
+    """Add a legend of the bodies, or a colour bar with the field and its unit."""
     if field == "body":
         _name_bodies(points, bodies)
     else:
@@ -172,7 +174,7 @@ def _explain_colours(figure, points, field, bodies):
 
 
 def _name_bodies(points, bodies):
-    """One of ten colours for each body, named beside the axes."""
+    """Draw each body in one of ten colours, with a legend beside the axes."""
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
     from matplotlib.lines import Line2D
@@ -185,7 +187,9 @@ def _name_bodies(points, bodies):
 
 
 def _dots(results, frame, field, window):
-    """Places, values and sizes of the particles from far to near; as wide as they lie apart."""
+    """Return the places, values and sizes of the particles from far to near; as wide as they lie
+    apart.
+    """
     order = _order(results, frame, window.view)
     volume = np.concatenate([results.field(body, "V0") for body in results.bodies])
     sizes = (volume ** (1.0 / results.dim) * window.inches * POINT) ** 2
@@ -196,7 +200,9 @@ def _dots(results, frame, field, window):
 # What is drawn of the scene
 
 def _conditions(results):
-    """Colliders and walls of the scene; None if there are none or it cannot be made again."""
+    """Return the colliders and walls of the scene; None if there are none or it cannot be made
+    again.
+    """
     try:
         return build_conditions(loads(results.manifest.get("scene") or ""))
     except SceneError:
@@ -204,7 +210,7 @@ def _conditions(results):
 
 
 def _draw_solids(axes, conditions, window, t):
-    """Shade what is solid at time t and draw its contour, dotted where nodes are prescribed;
+    """Shade solids at time t and draw their contour, dotted where nodes are prescribed;
     returns what was drawn.
     """
     if conditions is None:
@@ -220,7 +226,9 @@ def _draw_solids(axes, conditions, window, t):
 
 
 def _shade(axes, field, style):
-    """The negative side of a field (right, up, values), and its zero contour if there is one."""
+    """Return the negative side of a field (right, up, values), and its zero contour if there is
+    one.
+    """
     low, high = field[2].min(), field[2].max()
     drawn = [axes.contourf(*field, [low, 0.0], colors=SHADE, zorder=0)]
     if high > 0.0:
@@ -230,7 +238,9 @@ def _shade(axes, field, style):
 
 
 def _plane(window):
-    """Points of the picture's plane: their right and up coordinates, and all of them (N, d)."""
+    """Return points of the picture's plane: their right and up coordinates, and all of them
+    (N, d).
+    """
     step = window.sides.max() / SAMPLES
     right, up = (np.linspace(*ends, int(np.ceil(side / step)) + 1)
                  for ends, side in zip(window.box, window.sides, strict=True))
@@ -241,8 +251,8 @@ def _plane(window):
 
 
 def _to_parts(parts, X, t):
-    """Distances (N,) at time t to the nearest collider or prescribed region, negative inside [m].
-    Far away where there is none.
+    """Return the distances (N,) at time t to the nearest collider or prescribed region, negative
+    inside [m]. Far away where there is none.
     """
     nearest = np.full(len(X), FAR)
     for part in parts:
@@ -255,7 +265,9 @@ def _to_parts(parts, X, t):
 
 
 def _to_walls(walls, X, dx):
-    """Distances (N,) to the walls counted in nodes: to the last of the nodes that they hold."""
+    """Return the distances (N,) to the walls counted in nodes: to the last of the nodes that they
+    hold.
+    """
     nearest = np.full(len(X), FAR)
     if walls is None:
         return nearest

@@ -35,7 +35,7 @@ def misplaced(problem):
 # in colliders and walls
 
 def _in_solids(problem):
-    """A sentence for each body that is partly in a solid, and for each such solid."""
+    """Yield a sentence for each body that is partly in a solid, and for each such solid."""
     for body in problem.bodies:
         for name, depth in _solids(problem, body.particles.x):
             inside = depth > ON * problem.dx
@@ -47,7 +47,7 @@ def _in_solids(problem):
 
 
 def _solids(problem, x):
-    """(name, depth (N,) [m] of the points x in it) of each collider and each wall."""
+    """Yield (name, depth (N,) [m] of the points x in it) of each collider and each wall."""
     colliders = getattr(problem.conditions, "colliders", ())
     for name, collider in zip(_names(problem, len(colliders)), colliders, strict=True):
         yield name, _depth(collider, x)
@@ -57,7 +57,7 @@ def _solids(problem, x):
 
 
 def _names(problem, n):
-    """n colliders by their keys, with their names where the scene gives any."""
+    """Return labels of n colliders: their keys, with names where the scene gives any."""
     try:
         tables = json.loads(problem.source)["collider"]
     except (ValueError, TypeError, KeyError):      # a problem made in Python has any source or none
@@ -67,7 +67,7 @@ def _names(problem, n):
 
 
 def _depth(collider, x):
-    """How deep points are in the solid of a collider at t = 0 [m]; negative outside."""
+    """Return the depth of points in the solid of a collider at t = 0 [m]; negative outside."""
     pose = collider.motion.pose(0.0, 1.0, x.shape[1])
     X = pose.origin + (x - pose.center) @ pose.R[0]         # R^T r for each row r
     side = 1.0 if collider.inside else -1.0
@@ -75,7 +75,7 @@ def _depth(collider, x):
 
 
 def _in_walls(walls, dx, x):
-    """Depths in the walls counted in nodes, each of which begins at its first node."""
+    """Yield depths in the walls counted in nodes, each of which begins at its first node."""
     for axis, (low, high) in enumerate(zip(walls.low, walls.high, strict=True)):
         if low is not None:
             yield f"the low wall of axis {axis}", (low - 1) * dx - x[:, axis]
@@ -86,7 +86,7 @@ def _in_walls(walls, dx, x):
 # in each other
 
 def _in_each_other(bodies):
-    """A sentence for each pair of bodies that overlap."""
+    """Yield a sentence for each pair of bodies that overlap."""
     for a, b in combinations(bodies, 2):
         x = _crowded(a, b)
         if len(x):
@@ -97,7 +97,9 @@ def _in_each_other(bodies):
 
 
 def _crowded(a, b):
-    """Positions of the particles of a around which both bodies have more material than fits."""
+    """Return the positions of the particles of a around which both bodies have more material than
+    fits.
+    """
     reach = REACH * max(_spacing(a), _spacing(b))
     near_a, near_b = _near(a, b, 2.0 * reach), _near(b, a, 2.0 * reach)
     if not near_a.any() or not near_b.any():
@@ -108,13 +110,15 @@ def _crowded(a, b):
 
 
 def _near(a, b, reach):
-    """Which particles of a are within reach of the bounding box of b."""
+    """Return the particles of a that are near the bounding box of b."""
     x, y = a.particles.x, b.particles.x
     return ((x > y.min(axis=0) - reach) & (x < y.max(axis=0) + reach)).all(axis=1)
 
 
 def _filled(body, near, x, reach):
-    """Share of the ball about each point x that the body's particles fill, on average ones."""
+    """Return the share of the ball about each point x that the body's particles fill, on average
+    ones.
+    """
     q = body.particles
     count = cKDTree(q.x[near]).query_ball_point(x, reach, return_length=True)
     ball = pi * reach**2 if x.shape[1] == 2 else 4.0 / 3.0 * pi * reach**3
@@ -122,7 +126,7 @@ def _filled(body, near, x, reach):
 
 
 def _volume(body):
-    """Mean volume of a particle as it is deformed [m^d]."""
+    """Return the mean volume of a particle as it is deformed [m^d]."""
     q = body.particles
     return float(np.mean(q.V0 * np.abs(volume_ratio(q))))
 

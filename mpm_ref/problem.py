@@ -73,7 +73,7 @@ class Problem:
             )
 
     def stepper(self):
-        """A new stepper of the integrator. Raises ValueError for one that does not exist."""
+        """Return a new stepper of the integrator. Raises ValueError for one that does not exist."""
         what = self.scheme, self.dx, self.dim, self.gravity, self.conditions
         if self.integrator == "explicit":
             return Stepper(*what)

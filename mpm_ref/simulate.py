@@ -90,7 +90,7 @@ def show(state, dt):
 
 
 def advance(problem, stepper, state):
-    """One step: sort now and then, choose dt, step, clip, check. Returns dt."""
+    """Make one step: sort now and then, choose dt, step, clip, check. Return dt."""
     if state.step % SORT == 0:
         stepper.sort(state.bodies)
     if bound_is_due(problem.clock, state):
@@ -135,7 +135,8 @@ def update_bound(problem, stepper, state):
 
 
 def swiftest(problem, stepper, state):
-    """Advective bound of dt as of now [s]; an adaptive step may not wait for `update_bound`.
+    """Return the advective bound of dt as of now [s]; an adaptive step may not wait for
+    `update_bound`.
 
     An implicit step ends with the velocities that parts give, so their speed now bounds it too, as
     in the release of HOT (HOT-dt).
@@ -152,8 +153,8 @@ def swiftest(problem, stepper, state):
 
 
 def next_dt(clock, state, advective_bound):
-    """Length of the next step [s]: fixed, or such that equal steps within the bounds meet the next
-    frame or the end.
+    """Return the length of the next step [s]: fixed, or such that equal steps within the bounds
+    meet the next frame or the end.
     """
     if clock.dt is not None:
         return clock.dt
@@ -167,7 +168,7 @@ def next_dt(clock, state, advective_bound):
 
 
 def last_step(clock):
-    """Number of steps of a run with fixed dt or fixed steps, else None."""
+    """Return the number of steps of a run with fixed dt or fixed steps, else None."""
     if clock.steps is not None:
         return clock.steps
     return ceil(clock.end / clock.dt - EVEN) if clock.dt is not None else None

@@ -99,8 +99,8 @@ class Tape:
         return len(self._times)
 
     def step(self, t, dt):
-        """`Stepper.step` of the bodies, and the clip; returns the grid. Raises ValueError for
-        bodies or a stepper that something else has changed since the step before.
+        """Make `Stepper.step` of the bodies and the clip; return the grid. Raises
+        ValueError for bodies or a stepper that something else has changed since the step before.
         """
         _require_same_rules(self.stepper, self._again)
         for body, twin, state in zip(self.bodies, self._twins, self._left):
@@ -113,8 +113,8 @@ class Tape:
         return grid
 
     def gradient(self, seeds):
-        """`Gradient` of a loss. seeds maps a number of steps n (0 .. steps) to one `Seed` or None
-        for each body: the loss's gradient with respect to the state after n steps.
+        """Return the `Gradient` of a loss. seeds maps a number of steps n (0 .. steps) to one
+        `Seed` or None for each body: the loss's gradient with respect to the state after n steps.
 
         Raises ValueError for seeds that do not fit.
         """
@@ -142,7 +142,7 @@ class Tape:
         return grid
 
     def _states_from(self, k):
-        """States before the steps from the k-th that was kept up to the next one."""
+        """Return the states before the steps from the k-th stored state to the next one."""
         states = [self._kept[k]]
         _restore(self._twins, states[0])
         stop = min((k + 1) * self.every, self.steps)
@@ -169,7 +169,7 @@ class Tape:
 
 
 def _box(clip, d):
-    """(low, high) of a clip, copied."""
+    """Return (low, high) of a clip, copied."""
     box = np.array(clip, dtype=float)
     if box.shape != (2, d) or not (box[0] < box[1]).all():
         raise ValueError(f"clip = {clip}: expected (low, high), two positions with {d} coordinates "
@@ -230,7 +230,7 @@ def _for_each(f, bodies):
 
 
 def _twin(body):
-    """A body with arrays of its own."""
+    """Return a body with arrays of its own."""
     q = body.particles
     own = type(q)(*(a.copy() for a in q))
     if q.L is q.C:
@@ -239,7 +239,9 @@ def _twin(body):
 
 
 def _started_twin(body):
-    """A twin of a body, whose stress must be that of its F, which `Stepper.start` sees to."""
+    """Return a twin of a body, whose stress must be that of its F, which `Stepper.start` sees
+    to.
+    """
     require_adjoint(body)
     twin = _twin(body)
     initial_stress(twin)

@@ -61,20 +61,22 @@ class TimeStep(NamedTuple):
         return float(np.min(self))
 
     def sentence(self):
-        """The bounds in words, without those that are infinite."""
+        """Return the bounds in words, without those that are infinite."""
         terms = [(name, bound) for name, bound in self._asdict().items() if bound != inf]
         return ", ".join(f"{name.replace('_', ' ')} {bound:.3g} s" for name, bound in terms)
 
 
 @kernel
 def dilation_modulus(s, law):
-    """K = d(tr tau)/dh / d under s -> s (1 + h) [Pa]: (s . A s + tr tau)/d, A = dpk1_hat(s)."""
+    """Return K = d(tr tau)/dh / d under s -> s (1 + h) [Pa]: (s . A s + tr tau)/d, A =
+    dpk1_hat(s).
+    """
     return (dot(s, mv(dpk1_hat(s, law), s)) + total_of(kirchhoff_hat(s, law))) / len(s)
 
 
 @kernel
 def largest_modulus(s, law):
-    """K [Pa] of the single-particle bound: no velocity gradient meets more stiffness.
+    """Return K [Pa] of the single-particle bound: no velocity gradient meets more stiffness.
 
     In principal axes the tangent falls into the matrix s_i s_j A_ij, here bounded by its rows, and
     the pairs of `wave_modulus`. At rest it is 2 mu + d lam, that of uniform dilation.
@@ -118,7 +120,9 @@ def _all_fluid_moduli(J, law, wave, largest, like):
 
 
 def moduli(body):
-    """Modulus of the fastest wave and `largest_modulus` of a body's particles, two (N,) [Pa]."""
+    """Return the modulus of the fastest wave and `largest_modulus` of a body's particles, two (N,)
+    [Pa].
+    """
     q = body.particles
     like = tuple(range(q.x.shape[1]))
     if type(body.law) in moduli_at_rest.methods:
@@ -131,7 +135,7 @@ def moduli(body):
 
 @kernel
 def _coupling(particles, grid, stencil, S, bounds):
-    """S_p of the module's text [1/m^2]."""
+    """Compute S_p of the module's text [1/m^2]."""
     d = grid.m.shape
     for p in range(bounds[0], bounds[1]):
         base, s = locate(vec(particles.x, p, d), grid, stencil)
@@ -150,7 +154,7 @@ def _coupling(particles, grid, stencil, S, bounds):
 
 @kernel
 def share(w_ip, m_p, m_i, stencil):
-    """1/w_ip; for linear splines m_p/m_i."""
+    """Return 1/w_ip; for linear splines m_p/m_i."""
     if len(stencil) == 2:
         return m_p / m_i
     else:
@@ -159,7 +163,7 @@ def share(w_ip, m_p, m_i, stencil):
 
 @kernel
 def largest_of(a):
-    """The largest entry of a vector."""
+    """Return the largest entry of a vector."""
     most = a[0]
     for a_i in a:
         most = max(most, a_i)
@@ -173,7 +177,9 @@ def _couplings(particles, grid, stencil, S):
 
 
 def single_particle_limit(particles, grid, scheme, stiffness):
-    """Smallest dt limit of any particle's own oscillation [s]; stiffness (N,) is V0_p K_p / m_p."""
+    """Return the smallest dt limit of any particle's own oscillation [s]; stiffness (N,) is V0_p
+    K_p / m_p.
+    """
     own, kept = inverse_inertia(grid.dx, scheme.stencil), 1.0 - scheme.rpic
     if scheme.transfer == "mls":
         return _limit(stiffness * own, 2.0 * (1.0 + kept))
@@ -184,14 +190,16 @@ def single_particle_limit(particles, grid, scheme, stiffness):
 
 
 def _limit(load, most):
-    """Largest dt with dt^2 load <= most for every particle; infinite where there is no load."""
+    """Return the largest dt with dt^2 load <= most for every particle; infinite where there is no
+    load.
+    """
     with np.errstate(divide="ignore"):
         return float(np.sqrt(most / np.max(load)))
 
 
 def stable_dt(bodies, stepper):
-    """`TimeStep` of the bodies' state under a `Stepper`'s scheme and grid spacing. An implicit step
-    is bound by its particles' speed alone (HOT-cfl).
+    """Return the `TimeStep` of the bodies' state under a `Stepper`'s scheme and grid spacing. An
+    implicit step is bound by its particles' speed alone (HOT-cfl).
     """
     scheme = stepper.scheme
     if stepper.implicit:
@@ -218,7 +226,7 @@ def _body_dt(body, grid, scheme, gravity):
 
 
 def advective(particles, dx, distance, gravity):
-    """Largest dt in which no particle, nor a point at a distance [m] that moves with its
+    """Return the largest dt in which no particle, nor a point at a distance [m] that moves with its
     velocity gradient, crosses a cell: dt u + dt^2 g = dx with the largest such speed u.
     """
     q = particles

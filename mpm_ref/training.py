@@ -97,8 +97,8 @@ class TrainingSession:
         weights_file.write_sealed(path, content.getvalue())
 
     def load(self, path):
-        """Go on from a checkpoint. Raises ValueError where it is damaged, or of another training or
-        other data.
+        """Continue from a checkpoint. Raises ValueError where it is damaged, or of another training
+        or other data.
         """
         import torch
 

@@ -38,7 +38,7 @@ def draw(results):
 
 
 def square(table, scheme):
-    """Errors [%] by term: rows without and with v, columns without and with F."""
+    """Return the errors [%] by term: rows without and with v, columns without and with F."""
     error = np.full((2, 2), np.nan)
     for of, F, v, origin in zip(table["scheme"], table["F"], table["v"], table["origin"],
                                 strict=True):

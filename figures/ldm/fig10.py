@@ -37,7 +37,7 @@ def draw(results):
 
 
 def panel(ax, table, scheme):
-    """Curves of a scheme: colours by loss, marks by latent dimension."""
+    """Plot the curves of a scheme: colours by loss, markers by latent dimension."""
     marks = dict(zip(sorted(set(table["r"])), MARKS, strict=False))
     ax.axhline(GOOD, color="0.4", lw=0.8, ls=":")
     for (r, loss), rows in series(table, ("r", "loss")).items():

@@ -29,7 +29,7 @@ def draw(results):
 
 
 def chequered(X):
-    """Colours (n, 3) by cube."""
+    """Return colours (n, 3) by cube."""
     low, side = X.min(axis=0), np.ptp(X, axis=0).max() / CUBES
     odd = ((X - low) // (1.001 * side)).sum(axis=1) % 2
     return np.where(odd[:, None] > 0, to_rgb(FULL), to_rgb(REDUCED))

@@ -32,5 +32,5 @@ def draw(results):
 
 
 def poked(rho, theta, phi):
-    """A poke in words: length over the radius, angles in degrees."""
+    """Return a poke as text: length over the radius, angles in degrees."""
     return rf"$\rho$ = {rho:.1f} R, $\theta$ = {theta:.1f}°, $\phi$ = {phi:.1f}°"

@@ -34,6 +34,6 @@ def draw(results):
 
 
 def first(table, scene):
-    """The row of a scene's most samples and Gauss-Newton."""
+    """Return the row of a scene's most samples and Gauss-Newton."""
     rows = np.flatnonzero((table["scene"] == scene) & (table["inversion"] == "nonlinear"))
     return rows[np.argmax(table["samples"][rows])]

@@ -36,7 +36,7 @@ class StrainReport(NamedTuple):
 
     @property
     def out_of_range(self):
-        """Whether a point is beyond the strains of the law's training."""
+        """True if a point is beyond the strains of the law's training."""
         return self.count > 0
 
 

@@ -69,7 +69,7 @@ def generate(study, folder, workers=1):
 
 
 def _in_processes(study, folder, workers):
-    """Yield what `generate` yields, on several new processes: a fork of one with threads may hang."""
+    """Yield as `generate`, with several new processes: a fork of one with threads may hang."""
     context = multiprocessing.get_context("spawn")
     stop = context.Event()
     with ProcessPoolExecutor(workers, context, _begin_worker, (stop,)) as pool:
