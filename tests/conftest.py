@@ -72,6 +72,16 @@ def one_torch_thread():
 
 
 @pytest.fixture
+def doubles_by_default():
+    """PyTorch makes tensors of doubles."""
+    torch = pytest.importorskip("torch")
+    before = torch.get_default_dtype()
+    torch.set_default_dtype(torch.float64)
+    yield
+    torch.set_default_dtype(before)
+
+
+@pytest.fixture
 def double(monkeypatch):
     """Networks of doubles read doubles."""
     torch = pytest.importorskip("torch")

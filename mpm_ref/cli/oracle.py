@@ -12,7 +12,7 @@ from .catalogue import find_scene, keep_scene
 from .errors import at_start, one_line, options
 from .terminal import compiling, warn
 
-DEPARTS = 1      # exit status of a check that another code fails
+DEPARTS = 1      # exit status of a check in which an array departs
 
 app = typer.Typer(no_args_is_help=True, help="Record golden files, and check other codes by them.")
 
@@ -23,7 +23,7 @@ def record(
     out: Annotated[Path, typer.Option("--out", "-o", help="Golden file.")] = Path("golden.h5"),
     steps: Annotated[int, typer.Option(help="Steps to record, every stage of each.")] = 3,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a golden file.")] = False,
-    begin: Annotated[int, typer.Option(help="Steps of the run to make before.")] = 0,
+    begin: Annotated[int, typer.Option(help="Steps to make before the recorded ones.")] = 0,
     eps: Annotated[float | None, typer.Option(help="Tolerance of implicit steps.")] = None,
     adjoint: Annotated[bool, typer.Option("--adjoint", help="Record gradients too.")] = False,
 ):
@@ -36,7 +36,7 @@ def record(
                 raise ValueError(f"--eps {eps}: expected a tolerance, a finite number > 0")
             if adjoint and eps is not None:
                 raise ValueError(f"--adjoint with --eps {eps}: implicit steps have no adjoint, and "
-                                 "explicit ones solve nothing; leave one of them out")
+                                 "explicit ones solve nothing; leave out one of the two options")
             problem, idle = scene.build(scene.load(path), str(path)), ()
             if adjoint:
                 oracle.record_adjoint(problem, out, steps, overwrite, begin)
@@ -47,21 +47,21 @@ def record(
 
 
 def nothing_to_solve(steps):
-    """The warnings about recorded steps that say nothing of a solver: one, or none."""
+    """Return the warnings about recorded steps that do not test a solver: one, or none."""
     if not steps:
         return []
     which = ", ".join(map(str, steps))
     return [f"nothing to solve in {'step' if len(steps) == 1 else 'steps'} {which}: dv is 0 "
-            "everywhere after 0 iterations; to say something of a solver, record later with "
-            "--begin, when something moves or bears"]
+            "everywhere after 0 iterations; to test a solver, record later steps with --begin, "
+            "when something moves or is in contact"]
 
 
 @app.command()
 def check(
     golden: Annotated[Path, typer.Argument(metavar="GOLDEN", help="A golden file.")],
-    other: Annotated[Path, typer.Argument(metavar="OTHER", help="What the other code wrote.")],
-    precision: Annotated[str, typer.Option(help="f64, f32, or auto: as it is stored.")] = "auto",
-    json: Annotated[bool, typer.Option("--json", help="Answer with JSON.")] = False,
+    other: Annotated[Path, typer.Argument(metavar="OTHER", help="Arrays of the other code.")],
+    precision: Annotated[str, typer.Option(help="f64, f32, or auto: that of the arrays.")] = "auto",
+    json: Annotated[bool, typer.Option("--json", help="Print the report as JSON.")] = False,
 ):
     """Name the first stage that departs, where and by how much. Exit status 0 if none, else 1."""
     with one_line(), options():

@@ -1,11 +1,11 @@
-"""The projected differential of the stress in any floating type, by another way than the kernels'.
+"""The projected differential of the stress in any floating type, computed unlike in the kernels.
 
-    A_kl = dP_k/ds_l                                by complex steps
-    a_kl = (P_k - P_l)/(s_k - s_l)                  of near stretches: a mean of A_kk - A_kl
+    A_kl = dP_k/ds_l                    by complex steps
+    a_kl = (P_k - P_l)/(s_k - s_l)      if s_k and s_l are close: a mean of A_kk - A_kl
     b_kl = (P_k + P_l)/(s_k + s_l)
 
-in principal space [Teran2005], with negative eigenvalues set to zero (HOT-alg1): see
-`materials.principal`, where laws give the quotients in closed form.
+in principal space [Teran2005], with negative eigenvalues set to zero (HOT-alg1). The laws in
+`materials` give the quotients in closed form (`materials.principal`).
 """
 
 from functools import partial
@@ -16,15 +16,15 @@ import numpy as np
 from ..plain.laws import energy_and_stress
 from ..plain.tensors import compose, svd
 
-NEAR = 1e-2         # stretches nearer than this: the quotient would lose digits
-POINTS = 8          # of the mean: exact to round-off over NEAR
-TINY = 1e-25        # complex step: nothing is subtracted, so it may be as small as one likes
+NEAR = 1e-2         # stretches closer than this: the quotient would lose digits
+POINTS = 8          # quadrature points of the mean: exact to round-off over NEAR
+TINY = 1e-25        # complex step; nothing is subtracted, so it may be arbitrarily small
 COMPLEX = {np.dtype(np.float32): np.complex64, np.dtype(np.float64): np.complex128,
            np.dtype(np.longdouble): np.clongdouble}
 
 
-class Modes(NamedTuple):
-    """Differentials of N particles, in principal space [Pa]."""
+class StressDifferential(NamedTuple):
+    """The differential dP/dF of N particles, in principal space [Pa]."""
 
     U: np.ndarray       # (N, d, d)
     V: np.ndarray       # (N, d, d)
@@ -33,44 +33,45 @@ class Modes(NamedTuple):
     b: np.ndarray       # (N, d, d)
 
 
-def stresses(s, law):
-    """Principal first Piola-Kirchhoff stresses (N, d)."""
+def piola(s, law):
+    """Return the principal first Piola-Kirchhoff stresses P_k = tau_k / s_k (N, d) [Pa]."""
     return energy_and_stress(s, law)[1] / s
 
 
 def slopes(s, law):
-    """A (N, d, d): dP_k/ds_l."""
-    return derivatives(partial(stresses, law=law), s)
+    """A_kl = dP_k/ds_l (N, d, d) [Pa]."""
+    return jacobian(partial(piola, law=law), s)
 
 
-def derivatives(f, s):
-    """df_k/ds_l (N, d, d) of a function f of principal stretches s (N, d)."""
+def jacobian(f, s):
+    """df_k/ds_l (N, d, d) of a function f of principal stretches s (N, d), by complex steps."""
     out = np.empty((*s.shape, s.shape[1]), s.dtype)
     for l in range(s.shape[1]):
-        moved = s.astype(COMPLEX[s.dtype])
-        moved[:, l] += s.dtype.type(TINY) * 1j
-        out[:, :, l] = f(moved).imag / s.dtype.type(TINY)
+        shifted = s.astype(COMPLEX[s.dtype])
+        shifted[:, l] += s.dtype.type(TINY) * 1j
+        out[:, :, l] = f(shifted).imag / s.dtype.type(TINY)
     return out
 
 
 def mean_slope(f, s, k, l):
-    """Mean of A_kk - A_kl, A the `derivatives` of an isotropic f, on the way that exchanges s_k and
-    s_l: it is (f_k - f_l)/(s_k - s_l).
+    """(f_k - f_l)/(s_k - s_l) of an isotropic f as the mean of A_kk - A_kl, A = df/ds.
+
+    The mean is along the line on which s_k and s_l exchange their values.
     """
     total = np.zeros(len(s), s.dtype)
     points, weights = (a.astype(s.dtype) for a in np.polynomial.legendre.leggauss(POINTS))
     for t, weight in zip(points, weights / weights.sum()):
-        at, way = s.copy(), (1 + t) / 2 * (s[:, l] - s[:, k])
-        at[:, k] += way
-        at[:, l] -= way
-        A = derivatives(f, at)
+        point, shift = s.copy(), (1 + t) / 2 * (s[:, l] - s[:, k])
+        point[:, k] += shift
+        point[:, l] -= shift
+        A = jacobian(f, point)
         total += weight * (A[:, k, k] - A[:, k, l])
     return total
 
 
-def quotients(s, law):
-    """a, b (N, d, d) of all pairs."""
-    f = partial(stresses, law=law)
+def difference_quotients(s, law):
+    """Return a_kl and b_kl (N, d, d) [Pa] of all pairs of axes; the diagonals are 0."""
+    f = partial(piola, law=law)
     P, d = f(s), s.shape[1]
     a, b = np.zeros((2, *s.shape, d), s.dtype)
     for k, l in zip(*np.tril_indices(d, -1)):
@@ -83,7 +84,10 @@ def quotients(s, law):
 
 
 def semidefinite(A):
-    """Symmetric A (N, d, d) without negative eigenvalues: by the singular values of A + c I."""
+    """Return symmetric A (N, d, d) with its negative eigenvalues set to zero.
+
+    By the singular values of A + c I, which is positive definite.
+    """
     c = 2 * np.sqrt((A * A).sum(axis=(1, 2)))[:, None]
     eye = np.eye(A.shape[1], dtype=A.dtype)
     _, s, V = svd(A + np.where(c > 0, c, 1)[:, :, None] * eye)
@@ -91,32 +95,19 @@ def semidefinite(A):
     return np.where((w.min(axis=1) < 0)[:, None, None], compose(V, np.maximum(w, 0), V), A)
 
 
-def modes(F, law):
-    """`Modes` at F (N, d, d), projected."""
+def stress_differential(F, law):
+    """Return the `StressDifferential` at F (N, d, d), projected to be positive semidefinite."""
     U, s, V = svd(F)
-    a, b = quotients(s, law)
-    return Modes(U, V, semidefinite(slopes(s, law)), np.maximum(a, 0), np.maximum(b, 0))
+    a, b = difference_quotients(s, law)
+    A = semidefinite(slopes(s, law))
+    return StressDifferential(U, V, A, np.maximum(a, 0), np.maximum(b, 0))
 
 
-def applied(m, dF):
-    """dP (N, d, d) [Pa] of dF."""
+def apply_differential(m, dF):
+    """dP = dP/dF : dF (N, d, d) [Pa] of the `StressDifferential` m and dF (N, d, d)."""
     X = np.einsum("pba,pbc,pcd->pad", m.U, dF, m.V)
     X_T = np.swapaxes(X, 1, 2)
     Y = m.a * (X + X_T) / 2 + m.b * (X - X_T) / 2
     axis = np.arange(dF.shape[1])
     Y[:, axis, axis] = np.einsum("pab,pb->pa", m.A, X[:, axis, axis])
     return np.einsum("pab,pbc,pdc->pad", m.U, Y, m.V)
-
-
-def stiffness(m):
-    """A bound (N,) on the eigenvalues of the differential [Pa]."""
-    A = np.sqrt((m.A * m.A).sum(axis=(1, 2)))
-    return np.maximum(A, np.maximum(m.a, m.b).max(axis=(1, 2)))
-
-
-def components(m):
-    """The differential as (N, d^2, d^2): column k is dP of the unit dF with entry k."""
-    d = m.U.shape[1]
-    units = np.eye(d * d, dtype=m.U.dtype).reshape(d * d, 1, d, d)
-    columns = [applied(m, np.broadcast_to(e, m.U.shape)) for e in units]
-    return np.stack([c.reshape(-1, d * d) for c in columns], axis=2)

@@ -1,4 +1,4 @@
-"""Golden files, and files to check against them: HDF5.
+"""Writing of golden files, and of files to check against them, in HDF5.
 
 docs/reference/golden-files.md has the layout.
 """
@@ -15,8 +15,8 @@ from ..plain.flows import FLOWS
 from ..plain.laws import LAWS
 from ..store.atomic import replacing, require_place
 from . import accepted_step, adjoint_recording, implicit_recording, recording
-from .comparison import refuse_no_numbers
-from .schema import BESIDE, EVERY, FORMAT, NODES, key, taken
+from .comparison import require_numbers
+from .schema import ALL_ARRAYS, AUXILIARY, FORMAT, NODES, key, reserved_names
 
 PACKED = {"compression": "gzip", "compression_opts": 9, "shuffle": True, "fletcher32": True}
 
@@ -26,16 +26,15 @@ def record(problem, path, steps, overwrite=False, begin=0, eps=None):
 
     The problem's own arrays stay as they are; all steps have the dt of a run's next step. eps > 0
     is the tolerance of implicit steps, by default the scene's. Returns the numbers of implicit
-    steps that had nothing to solve, which say nothing of a solver. Raises ValueError for steps < 1
-    or past the end of the run, for names of bodies that cannot name groups, for a state in which
-    the reference's own error is too large to judge others by, for an implicit step that is not
-    solved, and where `path` exists, unless it is a golden file that overwrite lets go; `Unstable`;
-    `NotWritten`.
+    steps that had nothing to solve, which do not test a solver. Raises ValueError for steps < 1 or
+    past the end of the run, for names of bodies that cannot name groups, for a state in which the
+    reference's own error is too large to judge others by, for an implicit step that is not solved,
+    and if `path` exists, unless it is a golden file and overwrite is set; `Unstable`; `NotWritten`.
     """
-    require_free(path, overwrite)
-    refuse_bodies(problem)
-    run = implicit_recording.run if problem.integrator == "implicit" else recording.run
-    return put(solved_to(problem, eps), path, (steps, begin), run)
+    require_writable(path, overwrite)
+    require_recordable(problem)
+    module = implicit_recording if problem.integrator == "implicit" else recording
+    return write_golden(with_tolerance(problem, eps), path, (steps, begin), module.record_steps)
 
 
 def record_adjoint(problem, path, steps, overwrite=False, begin=0):
@@ -44,52 +43,54 @@ def record_adjoint(problem, path, steps, overwrite=False, begin=0):
     Raises ValueError as that does, and for what has no adjoint: implicit steps, conditions, laws
     and flows without one.
     """
-    require_free(path, overwrite)
-    refuse_bodies(problem)
+    require_writable(path, overwrite)
+    require_recordable(problem)
     adjoint_recording.require_adjoints(problem)
-    put(problem, path, (steps, begin), adjoint_recording.run)
+    write_golden(problem, path, (steps, begin), adjoint_recording.record_steps)
 
 
-def put(problem, path, when, run):
-    """Write the golden file of the steps that `run` records, when = (steps, begin); returns the
-    numbers of those that had nothing to solve.
+def write_golden(problem, path, steps_and_begin, record_steps):
+    """Write the golden file of the steps that `record_steps` yields.
+
+    Returns the numbers of those that had nothing to solve.
     """
-    steps, begin = when
+    steps, begin = steps_and_begin
     if steps < 1 or begin < 0:
         raise ValueError(f"steps = {steps}, begin = {begin}: expected at least one step to record, "
                          "after 0 or more")
-    problem, state = recording.advanced(problem, begin)
+    problem, state = recording.state_after(problem, begin)
     idle = []
     with replacing(path) as part, h5py.File(part, "w", libver=("v110", "v110")) as f:
-        describe(f, problem)
-        for k, recorded in enumerate(run(problem, steps, state)):
-            put_step(f.create_group(f"steps/{k}"), recorded)
-            idle += [k] * has_nothing_to_solve(recorded)
+        put_problem(f, problem)
+        for k, golden in enumerate(record_steps(problem, steps, state)):
+            put_step(f.create_group(f"steps/{k}"), golden)
+            idle += [k] * has_nothing_to_solve(golden)
     return tuple(idle)
 
 
-def has_nothing_to_solve(recorded):
-    """Whether an implicit step was solved by the increment 0 that it began with."""
-    report = recorded.report
-    return report is not None and not report.iterations and not recorded.arrays["dv"].value.any()
+def has_nothing_to_solve(golden):
+    """Return whether an implicit step was solved by its initial increment, 0."""
+    report = golden.report
+    return report is not None and not report.iterations and not golden.arrays["dv"].value.any()
 
 
-def solved_to(problem, eps):
-    """The problem with the tolerance eps of its implicit steps. Raises ValueError for an explicit
-    one, or an eps that is none.
+def with_tolerance(problem, eps):
+    """Return the problem with the tolerance eps of its implicit steps; None leaves the scene's.
+
+    Raises ValueError for an explicit problem, or an eps that is not a finite number > 0.
     """
     if eps is None:
         return problem
     if not 0.0 < eps < np.inf:
         raise ValueError(f"eps = {eps}: expected a tolerance, a finite number > 0")
     if problem.integrator != "implicit":
-        raise ValueError(f"eps = {eps} with an explicit integrator: nothing is solved; leave it "
+        raise ValueError(f"eps = {eps} with an explicit integrator, which solves nothing: leave it "
                          "out")
-    return replace(problem, solver=replace(accepted_step.options_of(problem), eps=eps))
+    return replace(problem, solver=replace(accepted_step.solver_options(problem), eps=eps))
 
 
-def require_free(path, overwrite):
-    """Raise ValueError unless nothing stands at `path`, or a golden file that may be replaced."""
+def require_writable(path, overwrite):
+    """Raise ValueError unless `path` is free, or a golden file that may be replaced."""
     require_place(path)
     if not Path(path).exists():
         return
@@ -101,7 +102,7 @@ def require_free(path, overwrite):
 
 
 def is_golden(path):
-    """Whether a file is a golden one."""
+    """Return whether a file is a golden file."""
     try:
         with h5py.File(path, "r") as f:
             return f.attrs.get("format") == FORMAT
@@ -109,26 +110,26 @@ def is_golden(path):
         return False
 
 
-def refuse_bodies(problem):
-    """Raise ValueError for names that are not unique, or mean something else in the file, and for
-    laws and flows that the plain twin does not know.
+def require_recordable(problem):
+    """Raise ValueError for names of bodies that cannot name groups of the file, and for laws and
+    flows that the plain twin does not have.
     """
     names = [body.name for body in problem.bodies]
-    clash = sorted(taken(problem.integrator) & set(names))
+    clash = sorted(reserved_names(problem.integrator) & set(names))
     if len(set(names)) < len(names) or any("/" in name or name.strip(".") == "" for name in names):
-        raise ValueError(f"bodies {names}: expected a name of its own for each, without a slash")
+        raise ValueError(f"bodies {names}: expected a different name for each, without a slash")
     if clash:
         raise ValueError(f"body {clash[0]!r}: this names an array, or a group, of every "
                          f"{problem.integrator} step in the file; rename the body")
     for body in problem.bodies:
-        for part, known in ((body.law, LAWS), (body.flow, FLOWS)):
-            if type(part).__name__ not in known:
+        for part, table in ((body.law, LAWS), (body.flow, FLOWS)):
+            if type(part).__name__ not in table:
                 raise ValueError(f"body {body.name!r}: {type(part).__name__} is not known to the "
-                                 f"plain twin; expected one of {', '.join(sorted(known))}")
+                                 f"plain twin; expected one of {', '.join(sorted(table))}")
 
 
-def describe(f, problem):
-    """The problem: attributes of the file, and the initial state of each body."""
+def put_problem(f, problem):
+    """Write the problem: attributes of the file, and the initial state of each body."""
     s = problem.scheme
     f.attrs.update({
         "format": FORMAT, "title": problem.title, "scene": problem.source, "dim": problem.dim,
@@ -138,7 +139,7 @@ def describe(f, problem):
         "rule": "tolerance of an entry = tolerance_f64 or tolerance_f32 of its array * its scale",
     })
     if problem.integrator == "implicit":
-        f.attrs.update(solver_attributes(accepted_step.options_of(problem)))
+        f.attrs.update(solver_attributes(accepted_step.solver_options(problem)))
     if problem.clip is not None:
         f.attrs["clip"] = np.array(problem.clip)
     for body in problem.bodies:
@@ -146,39 +147,39 @@ def describe(f, problem):
 
 
 def solver_attributes(options):
-    """What of an implicit solve another code has to know."""
-    named = {"search": options.search._asdict(), "cycle": options.cycle._asdict()}
-    return {"integrator": "implicit", "options": json.dumps({**asdict(options), **named}),
+    """Return the attributes that describe an implicit solve to another code."""
+    records = {"search": options.search._asdict(), "cycle": options.cycle._asdict()}
+    return {"integrator": "implicit", "options": json.dumps({**asdict(options), **records}),
             **{name: getattr(options, name)
                for name in ("method", "eps", "displacement_tolerance", "norm", "start")}}
 
 
 def put_body(group, body):
-    """Material and initial state of a body."""
+    """Write the material and the initial state of a body."""
     for role in Body._fields[2:4]:
-        record_ = getattr(body, role)
-        group.attrs[role] = type(record_).__name__
-        group.attrs[f"{role}_parameters"] = json.dumps(record_._asdict())
+        parameters = getattr(body, role)
+        group.attrs[role] = type(parameters).__name__
+        group.attrs[f"{role}_parameters"] = json.dumps(parameters._asdict())
     for name, a in body.particles._asdict().items():
         if len(a) and name not in ("L", "tau"):         # both follow from the rest
             group.create_dataset(name, data=a, **PACKED)
     group.create_dataset("id", data=np.arange(len(body.id)), **PACKED)
 
 
-def put_step(group, recorded):
-    """One step: every array with its scale, its own error and its tolerances."""
-    group.attrs.update({"t": recorded.t, "dt": recorded.dt})
-    group.create_dataset("nodes", data=recorded.nodes.astype(np.int32), **PACKED)
-    for name, a in recorded.inputs.items():
+def put_step(group, golden):
+    """Write a `GoldenStep`: every array with its scale, its own error and its tolerances."""
+    group.attrs.update({"t": golden.t, "dt": golden.dt})
+    group.create_dataset("nodes", data=golden.nodes.astype(np.int32), **PACKED)
+    for name, a in golden.inputs.items():
         group.create_dataset(name, data=a.astype(np.int32) if name in NODES else a, **PACKED)
-    for name, a in recorded.bars.items():
+    for name, a in golden.bars.items():
         group.create_dataset(f"bar/{name}", data=a, **PACKED)
-    if recorded.report is not None:
-        put_report(group.create_group("report"), recorded.report)
-    for name, base in recorded.bases.items():
+    if golden.report is not None:
+        put_report(group.create_group("report"), golden.report)
+    for name, base in golden.bases.items():
         group.create_dataset(f"{name}/base", data=base.astype(np.int32), **PACKED)
-    stages = {array.name: array for array in EVERY}
-    for name, a in recorded.arrays.items():
+    stages = {array.name: array for array in ALL_ARRAYS}
+    for name, a in golden.arrays.items():
         data = group.create_dataset(name, data=a.value, **PACKED)
         group.create_dataset(f"scale/{name}", data=a.scale, **PACKED)
         array = stages[name.split("/")[-1]]
@@ -190,10 +191,10 @@ def put_step(group, recorded):
 
 
 def put_report(group, report):
-    """How the scene's method solved the step: numbers to look at, that no check compares."""
-    said = {name: a for name, a in report._asdict().items() if name not in ("clock", "seconds")}
+    """Write the solver's report on a step, for people: no check compares it."""
+    values = {name: a for name, a in report._asdict().items() if name not in ("clock", "seconds")}
     group.attrs.update({name: np.array(a) if name == "residuals" else a
-                        for name, a in said.items()})
+                        for name, a in values.items()})
 
 
 def write(path, steps):
@@ -204,22 +205,22 @@ def write(path, steps):
     `ball/C`, .. for the particles of the body "ball", or just `x`, `C` where there is one body.
     Grid arrays are lists over `nodes`, (M, d) integer coordinates (node i lies at i dx); or whole
     grids (n1, .., nd[, d]) with `origin` (d,), the coordinates of the first node. Particles in
-    another order come with `id` (N,), the number of each in the golden file. What is left out is
-    not checked. Raises ValueError for a key that no golden file has, and for what is no array of
-    numbers.
+    another order come with `id` (N,), the number of each in the golden file. Arrays that are left
+    out are not checked. Raises ValueError for a key that no golden file has, and for arrays that do
+    not hold numbers.
     """
-    refuse_no_list(steps)
+    require_dictionaries(steps)
     with replacing(path) as part, h5py.File(part, "w", libver=("v110", "v110")) as f:
         f.create_group("steps")
         for k, arrays in enumerate(steps):
-            for name, a in listed(arrays or {}).items():
-                refuse_key(name)
-                refuse_no_numbers(name, np.asarray(a))
+            for name, a in as_lists(arrays or {}).items():
+                require_key(name)
+                require_numbers(name, np.asarray(a))
                 f.create_dataset(f"steps/{k}/{name}", data=a)
 
 
-def refuse_no_list(steps):
-    """Raise ValueError unless steps is a list of dictionaries, and None."""
+def require_dictionaries(steps):
+    """Raise ValueError unless steps is a list of dictionaries and None."""
     if not isinstance(steps, list | tuple):
         raise ValueError(f"steps is a {type(steps).__name__}: expected a list with a dictionary of "
                          "arrays for each step")
@@ -229,24 +230,24 @@ def refuse_no_list(steps):
                              "arrays, or None for a step that was not computed")
 
 
-def refuse_key(name):
+def require_key(name):
     """Raise ValueError for a key that is not in the schema."""
-    known = [array.name for array in EVERY]
-    if name.split("/")[-1] not in (*known, *BESIDE):
-        raise ValueError(f"array {name!r}: expected one of {', '.join(known)}, for particles with "
-                         f"the name of their body in front, or {', '.join(BESIDE)}")
+    names = [array.name for array in ALL_ARRAYS]
+    if name.split("/")[-1] not in (*names, *AUXILIARY):
+        raise ValueError(f"array {name!r}: expected one of {', '.join(names)}, for particles with "
+                         f"the name of their body in front, or {', '.join(AUXILIARY)}")
 
 
-def listed(arrays):
-    """The arrays with whole grids, if there is an `origin`, as lists over their nodes with mass."""
+def as_lists(arrays):
+    """Return {key: array} with whole grids, given with `origin`, as lists over nodes with mass."""
     if "origin" not in arrays:
         return arrays
     if "mass" not in arrays:
-        raise ValueError("origin without mass: whole grids need `mass`, which tells their nodes")
-    full = np.asarray(arrays["mass"]) != 0.0       # NaN counts: it must be seen
+        raise ValueError("origin without mass: whole grids need `mass`, which selects their nodes")
+    full = np.asarray(arrays["mass"]) != 0.0       # includes NaN, which the check must find
     out = {name: a for name, a in arrays.items() if name != "origin"}
-    for array in EVERY:
-        if array.where == "nodes" and not array.level and key(array) in out:
+    for array in ALL_ARRAYS:
+        if array.location == "nodes" and not array.level and key(array) in out:
             out[key(array)] = np.asarray(out[key(array)])[full]
     out["nodes"] = np.argwhere(full) + np.asarray(arrays["origin"])
     return out

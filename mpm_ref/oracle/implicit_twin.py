@@ -1,8 +1,8 @@
 """The stages of one implicit step by the plain twin, in extended precision.
 
-Conditions, the nodes of the coarse levels and the accepted velocities are taken from the kernels as
-they are; all else is computed from the particles. The Hessian is a product, never a matrix, on all
-levels: coarse ones are R H P, one factor after the other.
+Conditions, the nodes of the coarse levels and the accepted velocities are those of the kernels; all
+else is computed from the particles. The Hessian is a product on all levels, never a matrix: the
+coarse ones are R H P, one factor after the other.
 """
 
 from itertools import pairwise
@@ -13,38 +13,41 @@ import scipy.sparse as sp
 
 from ..plain import potential, transfer
 from ..plain.flows import intact
-from ..plain.laws import energy, energy_and_stress
 from ..plain.spline import bspline, pairs
 from ..plain.step import Nodes, StepStages, deform, grid_to_particles, new_state
-from ..plain.tensors import compose, det, svd
-from . import differential, error_bounds
-from .plain_twin import REAL, Twin, aligned, values_at
+from . import error_bounds
+from .differential import (
+    StressDifferential,
+    apply_differential,
+    difference_quotients,
+    slopes,
+    stress_differential,
+)
+from .plain_twin import REAL, Twin, align, values_at
 
 DEGREE = {"linear": 1, "quadratic": 2}      # of the splines of HOT-sec4.2-kernel
 
 
-class At(NamedTuple):
-    """One body at an increment."""
+class BodyTangent(NamedTuple):
+    """The deformation and the stress differential of one body at an increment."""
 
-    A: np.ndarray           # (N, d, d)  growth
-    F: np.ndarray           # (N, d, d)  deformation gradient there
-    F_n: np.ndarray         # (N, d, d)  and before
-    modes: differential.Modes
+    F_n: np.ndarray         # (N, d, d)  deformation gradient before the step
+    differential: StressDifferential
 
 
-class SolvedTwin(Twin):
+class ImplicitTwin(Twin):
     """The plain twin of an implicit problem, at the start of one step of dt [s]."""
 
     def __init__(self, problem, unknowns, dt, real=REAL, rng=None):
-        """With a random generator `rng`, the state and the projectors are off by up to an ulp."""
+        """With a random generator `rng`, state and projectors have errors of up to an ulp."""
         super().__init__(problem, real, rng)
         self.dt, self.unknowns = self.real(dt), unknowns
         self.B = unknowns.B.astype(self.real)
         if rng is not None:
-            self.bodies = [error_bounds.perturbed_body(q, rng) for q in self.bodies]
-            self.B = error_bounds.perturbed(self.B, rng, np.ones(len(self.B)))
-        self.whole = [q._replace(V0=q.V0 * (1 if q.y is None else intact(q.y, q.flow)))
-                      for q in self.bodies]
+            self.bodies = [error_bounds.perturb_body(q, rng) for q in self.bodies]
+            self.B = error_bounds.perturb(self.B, rng, np.ones(len(self.B)))
+        self.intact = [q._replace(V0=q.V0 * (1 if q.y is None else intact(q.y, q.flow)))
+                       for q in self.bodies]
         self.stencils = [pairs(q.x, self.method.dx, self.method.degree) for q in self.bodies]
         box = transfer.box_of(*self.stencils)
         both = list(zip(self.bodies, self.stencils))
@@ -53,70 +56,71 @@ class SolvedTwin(Twin):
         self.v = self.mv / np.where(self.m > 0, self.m, 1)[..., None]
         self.box = box
 
-    def over(self, u):
-        """A nodal field (n, ..) over the box; nodes outside of it carry nothing."""
+    def on_box(self, u):
+        """Return a nodal field (n, ..) as an array over the box, 0 at nodes without particles."""
         k = self.unknowns.index - self.box.first
         inside = ((k >= 0) & (k < self.box.shape)).all(axis=1)
         out = np.zeros((*self.box.shape, *u.shape[1:]), self.real)
         out[tuple(k[inside].T)] = u[inside]
         return out
 
-    def nodal(self, a):
-        """An array over the box on the nodes (n, ..)."""
+    def on_nodes(self, a):
+        """Return the values (n, ..) of an array over the box on the nodes of the unknowns."""
         return values_at(a, self.box, self.unknowns.index)
 
-    def before(self, bases=None):
-        """Return {key: array} as `implicit_stages.before`, without conditions and norms.
+    def grid_arrays(self, bases=None):
+        """Return {key: array} of weights, mass, momentum and velocity.
 
         Weights are those of the stencils that begin at bases[body name], by default the twin's.
         """
         arrays = {"mass": self.m, "momentum": self.mv, "velocity_old": self.v}
-        arrays = {name: self.nodal(a) for name, a in arrays.items()}
+        arrays = {name: self.on_nodes(a) for name, a in arrays.items()}
         for name, ip in zip(self.names, self.stencils):
             base = ip.node[:, 0]
-            arrays[f"{name}/weights"] = ip.w if bases is None else aligned(ip.w, base, bases[name])
+            arrays[f"{name}/weights"] = ip.w if bases is None else align(ip.w, base, bases[name])
         return arrays
 
-    def before_solve(self, given, operands, levels):
+    def before_solve(self, bases_and_start, probes, levels):
         """Return {key: array} of all stages before the solve, V-cycle and direction left out.
 
-        given = (bases, start) has the first nodes of the particles' stencils and what the solve
-        starts from, as the kernels see them; `operands` are those of `implicit_stages.draw`, and
-        `levels` = (the levels of the kernels' hierarchy, the kernel of their embedding), or None.
+        bases_and_start has the first nodes of the particles' stencils and the increment that the
+        solve starts from, of the kernels; probes are `implicit_recording.ProbeVectors`, and levels
+        = (the levels of the kernels' hierarchy, the kernel of their embedding), or None.
         """
-        bases, start = given
-        arrays = self.before(bases) | self.conditions() | {"kappa": self.kappa()}
-        for name, dv in (("start", start), ("trial", operands.trial)):
-            ats = self.at(dv)
+        bases, start = bases_and_start
+        arrays = self.grid_arrays(bases) | self.conditions() | {"kappa": self.kappa()}
+        for name, dv in (("start", start), ("trial", probes.trial)):
+            tangents = self.tangents(dv)
             E, g = self.potential(dv)
             arrays |= {f"E_{name}": E, f"gradient_{name}": g,
-                       f"product_{name}": self.product(ats, operands.probe)}
+                       f"product_{name}": self.hessian_product(tangents, probes.probe)}
             if name == "start" and levels is not None:
-                arrays |= self.coarse(ats, operands.coarse, *levels)
+                arrays |= self.coarse_arrays(tangents, probes.coarse, *levels)
         return arrays
 
-    def coarse(self, ats, probes, levels, kernel):
-        """Return {key: array} of prolongations and coarse products, for the vectors `probes` on the
-        nodes of the coarse levels.
-        """
-        W = [embedding(fine.index, coarse.index, kernel) for fine, coarse in pairwise(levels)]
+    def coarse_arrays(self, tangents, vectors, levels, kernel):
+        """Return {key: array} of prolongations and coarse products, of vectors on coarse nodes."""
+        W = [embedding_weights(fine.index, coarse.index, kernel)
+             for fine, coarse in pairwise(levels)]
         B = [self.B, *(level.B.astype(self.real) for level in levels[1:])]
         arrays = {}
-        for k, u in enumerate(probes, 1):
+        for k, u in enumerate(vectors, 1):
             u = u.astype(self.real)
             for l in reversed(range(k)):
-                u = spread(W[l], B[l], u)
+                u = prolongate(W[l], B[l], u)
                 if l == k - 1:
                     arrays[f"prolonged{k}"] = u
-            g = self.product(ats, u)
+            g = self.hessian_product(tangents, u)
             for l in range(k):
-                g = collected(W[l], B[l], g)
+                g = restrict(W[l], B[l], g)
             arrays[f"coarse{k}"] = g
         return arrays
 
     def conditions(self):
-        """{key: array} that must follow from the kernels' projectors and increments: a projector is
-        3 B^2 - 2 B^3 of itself, and what conditions ask for has no free part.
+        """Return {key: array} that must follow from the kernels' projectors and increments.
+
+        A projector B is 3 B^2 - 2 B^3, and the increment that conditions prescribe has no free
+        part.
         """
         B, dv0 = self.B, self.unknowns.dv0.astype(self.real)
         B2 = np.einsum("nab,nbc->nac", B, B)
@@ -124,46 +128,48 @@ class SolvedTwin(Twin):
         return {"projector": 3 * B2 - 2 * np.einsum("nab,nbc->nac", B2, B), "start": start}
 
     def kappa(self):
-        """Characteristic norms (n,) [kg m/s] (HOT-eq9)."""
+        """Return the characteristic norms (n,) [kg m/s] (HOT-eq9)."""
         d = self.gravity.shape[0]
         xi = [rest_stiffness(q.law, d, self.real) for q in self.bodies]
         shares = [transfer.mass(q.m, ip, self.box) for q, ip in zip(self.bodies, self.stencils)]
-        m = self.nodal(self.m)
-        mean = self.nodal(sum(x * a for x, a in zip(xi, shares))) / np.where(m > 0, m, 1)
+        m = self.on_nodes(self.m)
+        mean = self.on_nodes(sum(x * a for x, a in zip(xi, shares))) / np.where(m > 0, m, 1)
         return mean * 2 * d * (2 * self.method.dx) ** (d - 1) * self.dt
 
     def potential(self, dv):
-        """E (1,) [J] and its gradient (n, d) on what is free [kg m/s]."""
-        bodies = [(q, ip, self.box) for q, ip in zip(self.whole, self.stencils)]
-        E, g = potential.evaluate(bodies, self.m, self.v, self.over(dv), self.dt, self.gravity)
-        return np.array([E]), self.project(self.nodal(g))
+        """Return E (1,) [J] and its gradient B g (n, d) [kg m/s] at the increment dv (n, d)."""
+        bodies = [(q, ip, self.box) for q, ip in zip(self.intact, self.stencils)]
+        E, g = potential.evaluate(bodies, self.m, self.v, self.on_box(dv), self.dt, self.gravity)
+        return np.array([E]), self.project(self.on_nodes(g))
 
     def project(self, u):
         """Return B u."""
         return np.einsum("nab,nb->na", self.B, u)
 
-    def at(self, dv):
-        """`At` of every body at the increment dv (n, d)."""
-        v = self.v + self.over(dv)
-        return [self._at(q, ip, v) for q, ip in zip(self.bodies, self.stencils)]
+    def tangents(self, dv):
+        """Return the `BodyTangent` of every body at the increment dv (n, d)."""
+        v = self.v + self.on_box(dv)
+        return [self._tangent(q, ip, v) for q, ip in zip(self.bodies, self.stencils)]
 
-    def _at(self, q, ip, u):
+    def _tangent(self, q, ip, u):
         A, F_n = potential.growth(u, self.dt, ip, self.box), as_matrices(q.F, self.gravity.shape[0])
         F = np.einsum("pab,pbc->pac", A, F_n)
-        return At(A, F, F_n, differential.modes(F, q.law))
+        return BodyTangent(F_n, stress_differential(F, q.law))
 
-    def product(self, ats, u):
-        """B H B u (n, d) [kg m/s]."""
-        u = self.over(self.project(u))
+    def hessian_product(self, tangents, u):
+        """Return B H B u (n, d) [kg m/s] of u (n, d), at the increment of the tangents."""
+        u = self.on_box(self.project(u))
         total = self.m[..., None] * u
-        for q, ip, at in zip(self.whole, self.stencils, ats):
-            dF = np.einsum("pab,pbc->pac", transfer.velocity_gradient(u, ip, self.box), at.F_n)
-            T = np.einsum("pab,pcb->pac", differential.applied(at.modes, dF), at.F_n)
+        for q, ip, tangent in zip(self.intact, self.stencils, tangents):
+            L = transfer.velocity_gradient(u, ip, self.box)
+            dF = np.einsum("pab,pbc->pac", L, tangent.F_n)
+            dP = apply_differential(tangent.differential, dF)
+            T = np.einsum("pab,pcb->pac", dP, tangent.F_n)
             total -= self.dt**2 * transfer.internal_force(q.V0, T, ip, self.box)
-        return self.project(self.nodal(total))
+        return self.project(self.on_nodes(total))
 
     def after_solve(self, v):
-        """Return {key: array} of particles and deformation under the nodal velocities v (n, d).
+        """Return {key: array} of the stages after the solve, for nodal velocities v (n, d).
 
         The bodies advance.
         """
@@ -172,8 +178,8 @@ class SolvedTwin(Twin):
                 if "/" in key and not key.endswith("/weights")}
 
     def advance(self, v):
-        """Return the `plain.step.StepStages` under the nodal velocities v (n, d)."""
-        grid = Nodes(self.box, self.m, self.mv, 0 * self.mv, self.v, self.over(v))
+        """Return the `plain.step.StepStages` of nodal velocities v (n, d); the bodies advance."""
+        grid = Nodes(self.box, self.m, self.mv, 0 * self.mv, self.v, self.on_box(v))
         both = zip(self.bodies, self.stencils)
         motions = [grid_to_particles(q, ip, grid, self.method, self.dt) for q, ip in both]
         motions = [self.clipped(motion) for motion in motions]
@@ -183,34 +189,23 @@ class SolvedTwin(Twin):
 
 
 def as_matrices(F, d):
-    """F (N, d, d); of a fluid the multiple of I that has its determinant (N,)."""
+    """Return F (N, d, d); for a fluid's J (N,) the multiple of I with that determinant."""
     if F.ndim == 3:
         return F
     return (F ** (1 / F.dtype.type(d)))[:, None, None] * np.eye(d, dtype=F.dtype)
 
 
 def rest_stiffness(law, d, real):
-    """||dP/dF||_F at F = I [Pa] (HOT-sec5.2)."""
+    """xi = ||dP/dF||_F at F = I [Pa] (HOT-sec5.2)."""
     s = np.ones((1, d), real)
-    A, (a, b) = differential.slopes(s, law), differential.quotients(s, law)
+    A, (a, b) = slopes(s, law), difference_quotients(s, law)
     return np.sqrt((A * A).sum() + (a * a + b * b).sum() / 2)
 
 
-def kirchhoff_like(F, F_n, law):
-    """P (F_n)^T (N, d, d) [Pa] at F, the stress that acts on the nodes (HOT-eq2)."""
-    U, s, V = svd(F)
-    P = compose(U, energy_and_stress(s, law)[1] / s, V)
-    return np.einsum("pab,pcb->pac", P, F_n)
+def embedding_weights(fine, coarse, kernel):
+    """W_ic = prod_a N(i_a/2 - c_a) (n, m) (HOT-eq3), exact in floats.
 
-
-def density(F, law):
-    """psi (N,) of F (N, d, d) of any law."""
-    return energy(det(F), law) if type(law).__name__ == "Fluid" else energy(F, law)
-
-
-def embedding(fine, coarse, kernel):
-    """Weights (n, m) of nodes with the world indices fine (n, d) on those of the next level (m, d):
-    prod_a N(i_a/2 - c_a) (HOT-eq3), exact in floats.
+    fine (n, d) and coarse (m, d) are the world indices i, c of the nodes of two levels.
     """
     degree = DEGREE[kernel]
     w = np.ones((len(fine), len(coarse)))
@@ -219,15 +214,15 @@ def embedding(fine, coarse, kernel):
     return sp.coo_array(w)
 
 
-def spread(W, B, u):
-    """P u: blocks W_ic B_i (HOT-eq4)."""
+def prolongate(W, B, u):
+    """P u (n, d) of u (m, d), with the blocks P_ic = W_ic B_i (HOT-eq4)."""
     out = np.zeros((W.shape[0], *u.shape[1:]), u.dtype)
     np.add.at(out, W.row, W.data[:, None] * u[W.col])
     return np.einsum("nab,nb->na", B, out)
 
 
-def collected(W, B, g):
-    """R g = P^T g (HOT-eq5)."""
+def restrict(W, B, g):
+    """R g = P^T g (m, d) of g (n, d) (HOT-eq5)."""
     out = np.zeros((W.shape[1], *g.shape[1:]), g.dtype)
     np.add.at(out, W.col, W.data[:, None] * np.einsum("nab,nb->na", B, g)[W.row])
     return out

@@ -1,4 +1,4 @@
-"""One step of the kernels, stopped after every stage."""
+"""One step of the kernels, stopped after every stage to copy its arrays."""
 
 import numpy as np
 
@@ -11,89 +11,105 @@ from ..core.jit import kernel
 from ..core.stencil import column, columns, locate, product, weights_per_axis
 from ..core.tensor import mat, mm, put_mat, vec
 from ..energy import energy
+from ..hot.step import write_velocities
 from ..plain.boundary import Contact
 
 KINDS = {PRESCRIBED: "prescribed", **{number: name for name, number in boundary.KINDS.items()}}
 
 
 def step(problem, bodies, stepper, t, dt):
-    """Advance the bodies as `Stepper.step` does; returns what was seen, {key: array}, and contacts.
+    """Advance the bodies as `Stepper.step` does; return {key: array} of the stages, and contacts.
 
     Keys are those of `schema`. The contacts of nodes with the boundary conditions are data for the
-    plain twin, see `contacts`.
+    plain twin, see `node_contacts`.
     """
-    scheme, seen = problem.scheme, {}
-    apart(bodies, stepper.storage, scheme, seen)
+    scheme, arrays = problem.scheme, {}
+    scatter_stages(bodies, stepper.storage, scheme, arrays)
     grid = explicit.scatter(bodies, stepper.storage, scheme, dt)
     explicit.update(grid, stepper.gravity, dt, scheme.mass_eps, scheme.gravity_on_empty)
     full = grid.m > 0.0
-    seen["velocity"] = grid.v[full]
-    touching = contacts(problem.conditions, grid, t + dt, dt)
+    arrays["velocity"] = grid.v[full]
+    contacts = node_contacts(problem.conditions, grid, t + dt, dt)
     if problem.conditions is not None:
         problem.conditions.apply(grid, t + dt, dt)
-    seen["velocity_bc"] = grid.v[full]
+    arrays["velocity_bc"] = grid.v[full]
     for body in bodies:
-        advance(problem, body, grid, dt, seen)
-    return seen, touching
+        advance_body(problem, body, grid, dt, arrays)
+    return arrays, contacts
 
 
-def apart(bodies, store, scheme, seen):
-    """Nodes with mass, and mass, momentum and force on them, each scattered by itself."""
-    grid = explicit.scatter(bodies, store, scheme, 0.0)
+def solved_stages(problem, bodies, step_problem, v, dt):
+    """Return {key: array} of the stages after an implicit solve, for nodal velocities v (n, d).
+
+    step_problem is the `hot.step.ImplicitProblem` of the step; the bodies advance.
+    """
+    write_velocities(step_problem.grid, step_problem.unknowns, v)
+    arrays = {}
+    for body in bodies:
+        advance_body(problem, body, step_problem.grid, dt, arrays)
+    return arrays
+
+
+def scatter_stages(bodies, storage, scheme, arrays):
+    """Put the nodes with mass, and their mass, momentum and force into `arrays`.
+
+    A step scatters momentum and force as one sum; here each has a sum of its own.
+    """
+    grid = explicit.scatter(bodies, storage, scheme, 0.0)
     full = grid.m > 0.0
-    seen["nodes"] = np.argwhere(full) + grid.origin
-    seen["mass"], seen["momentum"] = grid.m[full], grid.v[full]
+    arrays["nodes"] = np.argwhere(full) + grid.origin
+    arrays["mass"], arrays["momentum"] = grid.m[full], grid.v[full]
     for body in bodies:
-        base, w = weights(body.particles.x, grid, scheme.stencil)
-        seen[f"{body.name}/base"], seen[f"{body.name}/weights"] = base, w
-    grid = explicit.scatter([at_rest(body) for body in bodies], store, scheme, 1.0)
-    seen["force"] = (grid.v if grid.f.ndim == 1 else grid.f)[full]
+        base, w = stencil_weights(body.particles.x, grid, scheme.stencil)
+        arrays[f"{body.name}/base"], arrays[f"{body.name}/weights"] = base, w
+    grid = explicit.scatter([without_motion(body) for body in bodies], storage, scheme, 1.0)
+    arrays["force"] = (grid.v if grid.f.ndim == 1 else grid.f)[full]
 
 
-def at_rest(body):
-    """The body without motion, so that all momentum it scatters is the impulse of its forces."""
+def without_motion(body):
+    """Return the body with v = 0 and C = 0: all momentum that it scatters is due to its forces."""
     q = body.particles
     C = np.zeros_like(q.C)
     L = C if q.L is q.C else q.L
     return body._replace(particles=q._replace(v=np.zeros_like(q.v), C=C, L=L))
 
 
-def advance(problem, body, grid, dt, seen):
-    """Grid to particles and deformation of one body."""
+def advance_body(problem, body, grid, dt, arrays):
+    """Do G2P and the deformation of one body, and put their arrays into `arrays`."""
     q, name = body.particles, body.name
     F = q.F.copy()
     explicit.gather(body, grid, problem.scheme, dt)
     if problem.clip is not None:
         keep_inside((body,), *problem.clip)
     if q.F.ndim == 3:
-        seen[f"{name}/F_trial"] = trial(F, q.L, dt)
+        arrays[f"{name}/F_trial"] = trial_deformation(F, q.L, dt)
     explicit.deform_body(body, dt)
-    seen[f"{name}/L"] = q.L.copy()               # under MLS-MPM the array of C, damped next
+    arrays[f"{name}/L"] = q.L.copy()               # under MLS-MPM the array of C, damped next
     explicit.damp(body, problem.scheme)
     for field in ("v", "x", "C", "F", "y", "tau"):
         a = getattr(q, field)
         if len(a):
-            seen[f"{name}/{field}"] = a.copy()
-    seen[f"{name}/energy"] = np.array(energy([body], problem.gravity, problem.inertia))
+            arrays[f"{name}/{field}"] = a.copy()
+    arrays[f"{name}/energy"] = np.array(energy([body], problem.gravity, problem.inertia))
 
 
-def contacts(conditions, grid, t, dt):
-    """{integer coordinates of a node: its `Contact`s} with the boundary conditions at time t.
+def node_contacts(conditions, grid, t, dt):
+    """Return {integer coordinates of a node: its `Contact`s} with the conditions at time t.
 
-    Which nodes a condition holds, its normals and its velocities there are taken as they are.
+    The nodes, normals and velocities are those that the conditions themselves report.
     """
-    found = {}
+    contacts = {}
     if conditions is None:
-        return found
+        return contacts
     for touch, rule, friction in zip(*conditions.touched(grid, t, dt), strict=True):
         nodes = np.array(np.unravel_index(touch.node, grid.m.shape)).T + grid.origin
         for i, n, v in zip(nodes, touch.n, touch.v):
             contact = Contact(n, v, KINDS[rule], friction)
-            found.setdefault(tuple(map(int, i)), []).append(contact)
-    return found
+            contacts.setdefault(tuple(map(int, i)), []).append(contact)
+    return contacts
 
 
-# What the kernels compute in a step and do not store: weights and trial deformation.
+# intermediate results of a step that the kernels do not store: weights and trial deformation
 
 @kernel
 def _weights(x, grid, stencil, base, w):
@@ -115,10 +131,10 @@ def _trial(F, L, dt, like, out):
         put_mat(out, p, mm(growth(L, p, dt, like), mat(F, p, like)))
 
 
-def weights(x, grid, stencil):
-    """First node (N, d) that each particle at x reaches, and all its weights (N, (degree + 1)^d).
+def stencil_weights(x, grid, stencil):
+    """Return the first node (N, d) of each particle's stencil and its weights (N, (degree + 1)^d).
 
-    Nodes are in order, the last axis fastest.
+    The nodes of a stencil are in order, the last axis fastest.
     """
     base = np.empty(x.shape, dtype=np.int64)
     w = np.empty((len(x), len(stencil) ** x.shape[1]))
@@ -126,8 +142,8 @@ def weights(x, grid, stencil):
     return base, w
 
 
-def trial(F, L, dt):
-    """(I + dt L) F of all particles (N, d, d)."""
+def trial_deformation(F, L, dt):
+    """F_trial = (I + dt L) F (N, d, d), as the kernels compute it."""
     out = np.empty_like(F)
     _trial(F, L, dt, tuple(range(F.shape[1])), out)
     return out

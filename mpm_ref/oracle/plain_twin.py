@@ -1,4 +1,4 @@
-"""The stages of an explicit step by the plain twin, carried on from its own states.
+"""The stages of an explicit step by the plain twin, which goes on from its own states.
 
 In extended precision it is the reference for the kernels' own error; in double precision, from
 perturbed inputs, it samples what round-off does (see `error_bounds`).
@@ -27,10 +27,10 @@ class TwinStep(NamedTuple):
 
 
 class Twin:
-    """The plain twin of a problem: it starts from the same numbers and goes its own way.
+    """The plain twin of a problem: it starts from the same numbers and steps independently.
 
-    With a random generator `rng` it has errors of up to an ulp in its state before each step, and
-    in what boundary conditions return.
+    With a random generator `rng` its state before each step, and the velocities that boundary
+    conditions return, have random errors of up to an ulp.
     """
 
     def __init__(self, problem, real=REAL, rng=None):
@@ -55,40 +55,41 @@ class Twin:
             return self.with_round_off(boundary.apply_contacts(v, local), speeds)
 
         if self.rng is not None:
-            self.bodies = [error_bounds.perturbed_body(q, self.rng) for q in self.bodies]
+            self.bodies = [error_bounds.perturb_body(q, self.rng) for q in self.bodies]
         before = self.bodies
-        done = step(before, self.method, self.gravity, self.real(dt), conditions)
-        done = done._replace(motions=[self.clipped(motion) for motion in done.motions])
-        self.bodies = [new_state(*body) for body in zip(before, done.motions, done.updates)]
-        return TwinStep(self.arrays(done, nodes, bases), before, done, local)
+        stages = step(before, self.method, self.gravity, self.real(dt), conditions)
+        stages = stages._replace(motions=[self.clipped(motion) for motion in stages.motions])
+        self.bodies = [new_state(*body) for body in zip(before, stages.motions, stages.updates)]
+        return TwinStep(self.arrays(stages, nodes, bases), before, stages, local)
 
-    def with_round_off(self, after, sizes):
-        """Return nodal vectors after the conditions, with errors if the twin has some; see
-        `error_bounds.perturbed_conditions`.
+    def with_round_off(self, v, sizes):
+        """Return nodal vectors after the conditions, with random errors if the twin has a `rng`.
+
+        See `error_bounds.perturb_constrained`.
         """
         if self.rng is None:
-            return after
-        return error_bounds.perturbed_conditions(after, sizes, self.rng)
+            return v
+        return error_bounds.perturb_constrained(v, sizes, self.rng)
 
     def clipped(self, motion):
         """Return the particles' new state with positions inside the box of the problem, if any."""
         return motion if self.clip is None else motion._replace(x=np.clip(motion.x, *self.clip))
 
-    def arrays(self, done, nodes, bases=None):
-        """Return {key: array} of a step, as `kernel_stages.step` does."""
-        grid = done.nodes
+    def arrays(self, stages, nodes, bases=None):
+        """Return {key: array} of `plain.step.StepStages`, as `kernel_stages.step` does."""
+        grid = stages.nodes
         fields = {"mass": grid.m, "momentum": grid.mv, "force": grid.f,
                   "velocity": grid.v_free, "velocity_bc": grid.v}
         arrays = {name: values_at(a, grid.box, nodes) for name, a in fields.items()}
         for k, name in enumerate(self.names):
-            base, w = done.stencils[k].node[:, 0], done.stencils[k].w
-            motion, update = done.motions[k], done.updates[k]
-            own = {"weights": w if bases is None else aligned(w, base, bases[name]),
-                   "v": motion.v, "x": motion.x, "C": motion.C, "L": motion.L,
-                   "F_trial": update.F_trial if update.F.ndim == 3 else None,
-                   "F": update.F, "y": update.y, "tau": update.tau,
-                   "energy": energies(self.bodies[k], self.method, self.gravity)}
-            arrays |= {f"{name}/{field}": a for field, a in own.items() if a is not None}
+            base, w = stages.stencils[k].node[:, 0], stages.stencils[k].w
+            motion, update = stages.motions[k], stages.updates[k]
+            of_body = {"weights": w if bases is None else align(w, base, bases[name]),
+                       "v": motion.v, "x": motion.x, "C": motion.C, "L": motion.L,
+                       "F_trial": update.F_trial if update.F.ndim == 3 else None,
+                       "F": update.F, "y": update.y, "tau": update.tau,
+                       "energy": energies(self.bodies[k], self.method, self.gravity)}
+            arrays |= {f"{name}/{field}": a for field, a in of_body.items() if a is not None}
         return arrays
 
 
@@ -134,9 +135,9 @@ def values_at(a, box, nodes):
     return out
 
 
-def aligned(w, base, to):
+def align(w, base, to):
     """Return the weights w (N, S) of stencils that begin at the nodes `base` (N, d), for stencils
-    that begin at `to`: 0 where the first do not reach.
+    that begin at the nodes `to`: 0 outside of the first stencils.
 
     At a tie, half-way between two nodes for quadratic splines, precisions differ on where a stencil
     begins; the weight of the node in doubt is 0.

@@ -1,4 +1,4 @@
-"""What a check found, for a person and for a machine."""
+"""The report of a check, as a sentence for people and as JSON for programs."""
 
 import json
 from dataclasses import asdict, dataclass
@@ -18,46 +18,46 @@ class Departure:
     other: float | None = None
     difference: float | None = None
     tolerance: float | None = None
-    what: str = ""          # said instead where there are no numbers to show
+    what: str = ""          # a sentence instead, if there are no numbers to show
 
     @property
     def sentence(self):
-        """Where and by how much."""
-        at = f"step {self.step}, stage {self.stage}, array {self.array}"
+        """Return the place and the size of the departure in words."""
+        place = f"step {self.step}, stage {self.stage}, array {self.array}"
         if self.what:
-            return f"{at}: {self.what}"
-        return (f"{at}: {self.where} is {self.other:.17g} where the golden file has "
-                f"{self.golden:.17g}; the difference {self.difference:.3g} is {self._excess}")
+            return f"{place}: {self.what}"
+        return (f"{place}: {self.where} is {self.other:.17g}, but {self.golden:.17g} in the golden "
+                f"file; the difference {self.difference:.3g} is {self._excess}")
 
     @property
     def _excess(self):
-        """The difference against the tolerance, which is 0 where only 0 can be right."""
+        """The difference over the tolerance in words; the tolerance is 0 if only 0 is right."""
         if self.tolerance == 0.0:
             return "more than its tolerance, 0"
         return f"{self.difference / self.tolerance:.3g} times its tolerance {self.tolerance:.3g}"
 
 
 @dataclass(frozen=True)
-class Report:
-    """Whether another code's arrays agree with a golden file, and where they first do not."""
+class CheckReport:
+    """The result of comparing another code's arrays with a golden file."""
 
-    agrees: bool
+    agrees: bool            # no array departs, and at least one was compared
     precision: str          # "f64" or "f32"
-    steps: tuple            # how many were given, of how many
-    compared: int           # arrays
+    steps: tuple            # number of steps given, and of steps in the golden file
+    compared: int           # number of arrays
     nearest: float          # largest difference of an array that agrees, over its tolerance
-    departures: tuple       # of Departure, one for each array that departs, first stage first
-    missing: tuple          # what the golden file has and the other has not, not compared
-    unknown: tuple          # the reverse
+    departures: tuple       # of `Departure`, one for each array that departs, first stage first
+    missing: tuple          # arrays and steps of the golden file that the other code did not give
+    unknown: tuple          # arrays and steps that the golden file does not have
 
     @property
     def first(self):
-        """The first `Departure`, or None."""
+        """Return the first `Departure`, or None."""
         return self.departures[0] if self.departures else None
 
     @property
     def json(self):
-        """The report as JSON text."""
+        """Return the report as JSON text."""
         return json.dumps({**asdict(self), "sentence": str(self)}, indent=2)
 
     def __str__(self):
@@ -67,8 +67,8 @@ class Report:
             given, recorded = self.steps
             partly = f" as far as given ({given} of {recorded} steps)" if given < recorded else ""
             arrays = counted(self.compared, "array")
-            return (f"agrees{partly}: {arrays} at {self.precision} tolerance, the "
-                    f"largest difference is {self.nearest:.2g} of its tolerance{rest}")
+            return (f"agrees{partly}: {arrays} at {self.precision} tolerance; the largest "
+                    f"difference is {self.nearest:.2g} of its tolerance{rest}")
         if not self.first:
             return f"nothing to compare{rest}"
         return (f"departs first at {self.first.sentence} ({self.precision}); "

@@ -1,19 +1,24 @@
-"""The stages of a step, in order, and the arrays of each that a backend can compare."""
+"""The layout of golden files: the stages of a step, in order, and the arrays of each stage.
+
+A step in a file is a group of arrays. Each array lies on nodes, on particles, on pairs of both, or
+belongs to a body or to the step; `Array` says which, and in which unit and after which stage.
+docs/reference/golden-files.md explains every array.
+"""
 
 from typing import NamedTuple
 
-FORMAT = "mpm_ref golden 1"
-LEVELS = 8                          # of multigrid, the most that are recorded
+FORMAT = "mpm_ref golden 1"         # attribute `format` of a golden file
+LEVELS = 8                          # the most multigrid levels that are recorded
 
 
 class Array(NamedTuple):
-    """One array of a golden file. docs/reference/golden-files.md explains each."""
+    """An array of a golden file that other codes are compared with."""
 
     name: str
     stage: str
-    where: str      # "nodes", "particles", "pairs" of both, "body", its "parameters", or "step"
+    location: str   # "nodes", "particles", "pairs" of both, "body", its "parameters", or "step"
     unit: str
-    level: int = 0  # of multigrid: whose nodes
+    level: int = 0  # of multigrid, whose nodes the array lies on; 0 is the finest
 
 
 ARRAYS = (
@@ -37,7 +42,7 @@ MULTIGRID = tuple(array for k in range(1, LEVELS) for array in (
     Array(f"prolonged{k}", "prolongation", "nodes", "m/s", k - 1),
     Array(f"coarse{k}", "coarse matrix", "nodes", "kg m/s", k),
 ))
-SOLVED = (
+SOLVE_ARRAYS = (
     Array("velocity_old", "velocity", "nodes", "m/s"),
     Array("projector", "conditions", "nodes", "1"),
     Array("start", "conditions", "nodes", "m/s"),
@@ -53,8 +58,8 @@ SOLVED = (
     Array("direction", "direction", "nodes", "m/s"),
     Array("dv", "accepted step", "nodes", "m/s"),
 )
-IMPLICIT = (*ARRAYS[:3], *SOLVED, *ARRAYS[6:])
-# Backwards: gradients, by these fields, of a loss [m/s] of the state after the step.
+IMPLICIT = (*ARRAYS[:3], *SOLVE_ARRAYS, *ARRAYS[6:])
+# Stages backwards: the gradients by these fields of a loss [m/s] of the state after the step.
 ADJOINT = (
     Array("F_trial_grad", "return map adjoint", "particles", "m/s"),
     Array("y_grad", "return map adjoint", "particles", "m/(s Pa)"),
@@ -79,35 +84,38 @@ ADJOINT = (
     Array("law_grad", "stress adjoint", "parameters", "m/s over that of the parameter"),
     Array("flow_grad", "stress adjoint", "parameters", "m/s over that of the parameter"),
 )
-EVERY = (*ARRAYS, *SOLVED, *ADJOINT)
-WHERE = {array.name: array.where for array in EVERY}
-# Zero at a node that is not listed.
+ALL_ARRAYS = (*ARRAYS, *SOLVE_ARRAYS, *ADJOINT)
+LOCATION = {array.name: array.location for array in ALL_ARRAYS}
+# Sums over particles, which are 0 at a node that is not listed.
 SUMS = ("mass", "momentum", "force", "gradient_start", "gradient_trial", "product_start",
         "product_trial", *(array.name for array in MULTIGRID), "velocity_bc_grad",
         "velocity_old_grad", "velocity_grad")
 ENERGIES = ("kinetic", "elastic", "gravity")    # the entries of `energy`
 
-# Carried beside them, to find one's way and to apply operators to: no numbers to compare.
+# Arrays that no check compares: indices, the vectors that operators are applied to, and seeds.
 NODES = ("nodes", *(f"nodes{k}" for k in range(1, LEVELS)))
-GIVEN = ("trial", "probe", "load", *(f"probe{k}" for k in range(1, LEVELS)))
+PROBES = ("trial", "probe", "load", *(f"probe{k}" for k in range(1, LEVELS)))
 SEEDS = tuple(f"{name}_seed" for name in ("x", "v", "C", "F", "y"))     # of bodies
-COUNTED = (*NODES, "base", "id")                # whole numbers
-BESIDE = (*COUNTED, *GIVEN, *SEEDS)
+INTEGERS = (*NODES, "base", "id")
+AUXILIARY = (*INTEGERS, *PROBES, *SEEDS)
 
 
-def taken(integrator):
-    """What stands beside the groups of the bodies in a step of an integrator: no body's name."""
-    on_nodes = {a.name for a in arrays_of(integrator) if a.where in ("nodes", "step")}
+def reserved_names(integrator):
+    """Return the names in a step of an integrator that no body may have: those of other members."""
+    on_nodes = {a.name for a in stage_arrays(integrator) if a.location in ("nodes", "step")}
     if integrator == "implicit":
-        return {*on_nodes, *NODES, *GIVEN, "scale", "bar", "report"}
+        return {*on_nodes, *NODES, *PROBES, "scale", "bar", "report"}
     return {*on_nodes, "nodes", "scale"}
 
 
 def key(array, body=None):
-    """Name of an array within a step: `mass` on nodes, `ball/x` for the particles of a body."""
-    return array.name if array.where in ("nodes", "step") else f"{body}/{array.name}"
+    """Return an array's name within a step: `mass` on nodes, `ball/x` for particles of a body."""
+    return array.name if array.location in ("nodes", "step") else f"{body}/{array.name}"
 
 
-def arrays_of(integrator):
-    """The arrays of a step of an integrator, "explicit" or "implicit", in the order of stages."""
+def stage_arrays(integrator):
+    """Return the arrays of a step in the order of its stages.
+
+    integrator is "implicit"; anything else means explicit.
+    """
     return IMPLICIT if integrator == "implicit" else (*ARRAYS, *ADJOINT)

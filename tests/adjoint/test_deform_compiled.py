@@ -2,14 +2,13 @@
 as torch's automatic differentiation of the formulas.
 """
 
-import numba
 import numpy as np
 import pytest
 from deform_bars import DT, apart, materials, named, seeds, states
 from problems import elsewhere
+from threads import MOST, by_threads
 
 from mpm_ref.core.adjoint import deform
-from mpm_ref.core.jit import set_threads
 from mpm_ref.materials import NoFlow
 
 CASES = {"von_mises_hardening": 3, "none on fixed_corotated": 3, "fluid of J": 2}
@@ -75,16 +74,11 @@ def test_as_the_plain_text(plain, name):
     assert max(apart(named(*driven(name), law, flow), expected).values()) < 1e-13
 
 
-@pytest.mark.skipif(numba.config.NUMBA_NUM_THREADS < 2, reason="one core")
+@pytest.mark.skipif(MOST < 2, reason="one core")
 @pytest.mark.parametrize("name", CASES)
 def test_threads_do_not_change_a_bit(name):
-    try:
-        set_threads(1)
-        one = bits(*driven(name)), bits(*at_start(name))
-        set_threads(2)
-        assert (bits(*driven(name)), bits(*at_start(name))) == one
-    finally:
-        set_threads(min(2, numba.config.NUMBA_NUM_THREADS))
+    one, two = by_threads(lambda: (bits(*driven(name)), bits(*at_start(name))))
+    assert one == two
 
 
 # Automatic differentiation, which needs singular values that differ.

@@ -1,20 +1,18 @@
 """Adjoints of the grid update and of the conditions, against differences of the primal."""
 
-import numba
 import numpy as np
 import pytest
 from adjoints import H, like_grid, pairing, rate
 from grids import DX, floor, grid_of, random_grid
+from threads import MOST, by_threads
 
 from mpm_ref.core.adjoint.boundary import solve_adjoint
 from mpm_ref.core.adjoint.grid import Update, update_adjoint
 from mpm_ref.core.boundary import BoxWalls, Collider, Conditions, Prescribed, solve
 from mpm_ref.core.grid import Storage, update
-from mpm_ref.core.jit import set_threads
 from mpm_ref.core.motion import Motion, Steady
 from mpm_ref.core.solids import half_space, sphere
 
-MOST = numba.config.NUMBA_NUM_THREADS
 DT = 0.03
 H_NODE = 1e-6       # of central differences: round-off is 1e-10 of a velocity of order 1
 CLOSE = 1e-8
@@ -177,10 +175,10 @@ def test_no_condition_changes_nothing(d, rng):
 def test_two_threads_give_the_same_bits(rng):
     grid, bar = grid_of(rng.normal(size=(9, 9, 9, 3))), rng.normal(size=(9, 9, 9, 3))
     touched = conditions("edges", 3).touched(grid, 1.0, DT)
-    found = []
-    for threads in (1, 2):
-        set_threads(threads)
+
+    def bars():
         nodes = grid._replace(m=np.zeros_like(grid.m), v=bars_of(touched, grid, bar))
         g = update_adjoint(grid, nodes, np.ones(3), Update(DT, 0.0, False))
-        found.append((nodes.v.copy(), nodes.m.copy(), g))
-    assert all(np.array_equal(a, b) for a, b in zip(*found))
+        return nodes.v.copy(), nodes.m.copy(), g
+
+    assert all(np.array_equal(a, b) for a, b in zip(*by_threads(bars)))

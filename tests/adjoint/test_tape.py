@@ -3,19 +3,17 @@
 import json
 from types import SimpleNamespace
 
-import numba
 import numpy as np
 import pytest
 from adjoint_runs import along, dive, impact, line_of, loss, moved, seeds_of, splash, taped
 from adjoints import H, rate
 from problems import DT, DX, FREE, digest, elsewhere
+from threads import MOST, by_threads
 
-from mpm_ref.core.jit import set_threads
 from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.hot.step import ImplicitStepper
 from mpm_ref.tape import Seed, Tape
 
-MOST = numba.config.NUMBA_NUM_THREADS
 STEPS = 100
 STATE_AT_START = ("x", "v", "C", "F", "y")
 FINE = 4e-3 * H     # small enough that no particle passes a kink of its law or its contact
@@ -154,12 +152,8 @@ def test_gravity_that_changes_after_the_run_does_not_count():
 
 @pytest.mark.skipif(MOST < 2, reason="one core")
 def test_two_threads_give_the_same_bits():
-    found = []
-    for threads in (1, 2):
-        set_threads(threads)
-        seeds = seeds_of(impact(), (10,), np.random.default_rng(0))
-        found.append(flat(taped(impact(), seeds)))
-    assert np.array_equal(*found)
+    seeds = seeds_of(impact(), (10,), np.random.default_rng(0))
+    assert np.array_equal(*by_threads(lambda: flat(taped(impact(), seeds))))
 
 
 def test_momentum_is_the_gradient_of_momentum():

@@ -78,16 +78,7 @@ def state_of(case, rng):
     return run._replace(bodies=(body,), scheme=Scheme(mass_eps=EPS), conditions=walls), kirchhoff
 
 
-@pytest.fixture
-def double():
-    """Double precision while a test lasts."""
-    before = torch.get_default_dtype()
-    torch.set_default_dtype(torch.float64)
-    yield
-    torch.set_default_dtype(before)
-
-
-@pytest.mark.usefixtures("double")
+@pytest.mark.usefixtures("doubles_by_default")
 @pytest.mark.parametrize("case", ["jelly 2d", "fluid 3d"])
 def test_gradients_equal_those_of_torch(case, rng):
     run, kirchhoff = state_of(case, rng)

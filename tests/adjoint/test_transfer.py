@@ -1,6 +1,5 @@
 """Adjoints of p2g, g2p and damping, against the primal kernels."""
 
-import numba
 import numpy as np
 import pytest
 from adjoints import (
@@ -21,13 +20,11 @@ from adjoints import (
 )
 from clouds import Case, cloud, scattered
 from problems import elsewhere
+from threads import MOST, by_threads
 
 from mpm_ref.core.adjoint.shape_gradient import curvatures
-from mpm_ref.core.jit import set_threads
 from mpm_ref.core.spline import STENCILS, slopes
 from mpm_ref.core.transfer import rpic
-
-MOST = numba.config.NUMBA_NUM_THREADS
 
 # What is compiled costs seconds; every transfer and degree runs without compilation below.
 CASES = (Case("flip", 3, 2, body_force=True), Case("mls", 2, 3))
@@ -167,9 +164,9 @@ def test_two_threads_give_the_same_bits(case):
     q = cloud(case, rng, 200, width=12.0)
     grid = like_grid(scattered(case, q, DT), rng)
     seeds = direction(q, rng, ("x", "v", "C", "L"))
-    found = []
-    for threads in (1, 2):
-        set_threads(threads)
+
+    def bars():
         bars, nodes = g2p_bars(case, q, grid, seeds)
-        found.append((*bars, nodes.v, nodes.v_old, *p2g_bars(case, q, nodes)))
-    assert all(np.array_equal(a, b) for a, b in zip(*found))
+        return *bars, nodes.v, nodes.v_old, *p2g_bars(case, q, nodes)
+
+    assert all(np.array_equal(a, b) for a, b in zip(*by_threads(bars)))

@@ -2,14 +2,13 @@
 
 import importlib.util
 
-import numba
 import pytest
 from problems import digest, elsewhere, stepped, two_disks
+from threads import by_threads
 
 from mpm_ref.core.jit import set_threads
 
 STEPS, SORT = 100, 16
-MOST = numba.config.NUMBA_NUM_THREADS
 
 CODE = f"""
 import json, numba
@@ -50,18 +49,8 @@ def test_the_state_moves_on(here):
     assert digest(stepped(two_disks(), STEPS - 1, sort_every=SORT)) != here
 
 
-def test_one_thread_gives_the_same_bits(here):
-    try:
-        set_threads(1)
-        assert run() == here
-    finally:
-        set_threads(min(2, MOST))
-
-
-@pytest.mark.skipif(MOST < 2, reason="one core")
-def test_two_threads_give_the_same_bits(here):
-    set_threads(2)
-    assert run() == here
+def test_one_and_two_threads_give_the_same_bits(here):
+    assert by_threads(run) == [here, here]
 
 
 def test_four_threads_give_the_same_bits(here):

@@ -1,13 +1,12 @@
 """The node-wise characteristic norm (HOT-sec5.2, HOT-eq9) against sums written out."""
 
-import numba
 import numpy as np
 import pytest
 from clouds import DX, Case, cloud, scattered
 from constitutive import EPS, LAW, evaluate, lame_of
+from threads import by_threads
 
 from mpm_ref.body import Body
-from mpm_ref.core.jit import set_threads
 from mpm_ref.hot.norms import (
     characteristic_norms,
     dot,
@@ -107,11 +106,8 @@ def test_characteristic_norms_are_stiffness_times_surface_times_time():
 def test_same_bits_for_any_number_of_threads():
     bodies = two_bodies(3)
     unknowns = nodes_of(bodies, 3)
-    found = []
-    for threads in (1, min(2, numba.config.NUMBA_NUM_THREADS)):
-        set_threads(threads)
-        found.append(characteristic_norms(bodies, unknowns, case(3).stencil, DT))
-    assert np.array_equal(*found)
+    assert np.array_equal(*by_threads(
+        lambda: characteristic_norms(bodies, unknowns, case(3).stencil, DT)))
 
 
 def test_one_material_gives_the_l2_rule():

@@ -1,18 +1,16 @@
 """The incremental potential and its gradient (HOT-eq1, HOT-eq2)."""
 
-import numba
 import numpy as np
 import pytest
 from constitutive import rate
 from hot_cases import CASES, DEGREES, DT, over, plain_bodies, problem_of
+from threads import by_threads
 
-from mpm_ref.core.jit import set_threads
 from mpm_ref.hot import transfer
 from mpm_ref.hot.potential import Potential
 from mpm_ref.materials import Softening
 from mpm_ref.plain import potential
 
-MOST = numba.config.NUMBA_NUM_THREADS
 H = np.geomspace(1e-1, 1e-3, 5)
 LONG = 200.0        # cells: many slabs, for threads to meet in
 ALL = CASES + DEGREES
@@ -101,16 +99,13 @@ def test_the_fast_exchange_equals_the_plain_one(rng):
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_the_bits_do_not_depend_on_the_number_of_threads(case):
-    found = []
-    try:
-        for threads in (1, min(2, MOST)):
-            set_threads(threads)
-            q = problem_of(case, length=LONG)
-            E, g = q.potential.evaluate(q.dv)
-            found.append((E, g.tobytes()))
-    finally:
-        set_threads(min(2, MOST))
-    assert found[0] == found[1]
+    def evaluate():
+        q = problem_of(case, length=LONG)
+        E, g = q.potential.evaluate(q.dv)
+        return E, g.tobytes()
+
+    one, two = by_threads(evaluate)
+    assert one == two
 
 
 def test_energy_is_infinite_where_a_law_refuses():

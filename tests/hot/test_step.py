@@ -2,13 +2,12 @@
 
 from dataclasses import replace
 
-import numba
 import numpy as np
 import pytest
+from threads import by_threads
 
 from mpm_ref.body import Body, particles_at
 from mpm_ref.core.boundary import Collider, Conditions, Prescribed
-from mpm_ref.core.jit import set_threads
 from mpm_ref.core.levelset import half_space
 from mpm_ref.core.motion import Motion, Steady
 from mpm_ref.energy import angular_momentum, energy, momentum
@@ -151,13 +150,12 @@ def test_block_leaves_a_separate_floor_but_not_a_slip_one():
 
 
 def test_same_bits_for_any_number_of_threads():
-    runs = []
-    for threads in (1, min(2, numba.config.NUMBA_NUM_THREADS)):
-        set_threads(threads)
+    def particles():
         floor = Conditions((Collider(half_space((0.0, 0.2), (0.0, 1.0)), "separate"),))
         body, _ = stepped(block(v=squeezed), 0.01, 3, np.array([0.0, -9.8]), floor)
-        runs.append(body.particles)
-    assert all(np.array_equal(a, b) for a, b in zip(*runs, strict=True))
+        return body.particles
+
+    assert all(np.array_equal(a, b) for a, b in zip(*by_threads(particles), strict=True))
 
 
 def problem_of(**changes):

@@ -1,18 +1,16 @@
 """The Hessian of the incremental potential: exact, projected, as operator and as matrix."""
 
-import numba
 import numpy as np
 import pytest
 from clouds import DX
 from constitutive import LAW, evaluate, rate
 from hot_cases import CASES, DEGREES, DT, problem_of
 from scipy.sparse import block_diag, bsr_array, csr_array
+from threads import by_threads
 
-from mpm_ref.core.jit import set_threads
 from mpm_ref.hot.assembly import pattern_of
 from mpm_ref.plain.spline import pairs
 
-MOST = numba.config.NUMBA_NUM_THREADS
 H = np.geomspace(1e-1, 1e-3, 5)
 LONG = 200.0        # cells: many slabs, for threads to meet in
 ALL = CASES + DEGREES
@@ -137,16 +135,13 @@ def test_a_translation_meets_the_mass_alone(at):
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_the_bits_do_not_depend_on_the_number_of_threads(case):
-    found = []
-    try:
-        for threads in (1, min(2, MOST)):
-            set_threads(threads)
-            q = problem_of(case, length=LONG)
-            tangent = q.potential.tangent(q.dv)
-            found.append((tangent.product(q.w).tobytes(), tangent.matrix().data.tobytes()))
-    finally:
-        set_threads(min(2, MOST))
-    assert found[0] == found[1]
+    def evaluate():
+        q = problem_of(case, length=LONG)
+        tangent = q.potential.tangent(q.dv)
+        return tangent.product(q.w).tobytes(), tangent.matrix().data.tobytes()
+
+    one, two = by_threads(evaluate)
+    assert one == two
 
 
 def test_a_tangent_stays_when_the_potential_moves_on():

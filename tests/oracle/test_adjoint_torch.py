@@ -77,23 +77,14 @@ def step(q, law, gravity, kirchhoff, keep):
     return (x + STEP * new, new, C, F), (m, node)
 
 
-@pytest.fixture
-def double():
-    """Double precision while a test lasts."""
-    before = torch.get_default_dtype()
-    torch.set_default_dtype(torch.float64)
-    yield
-    torch.set_default_dtype(before)
-
-
-@pytest.mark.usefixtures("double", "one_torch_thread")
+@pytest.mark.usefixtures("doubles_by_default", "one_torch_thread")
 @pytest.mark.parametrize("case", CASES)
 def test_automatic_gradients_agree(case, tmp_path):
     make, kirchhoff = CASES[case]
     problem = make()
     oracle.record_adjoint(problem, tmp_path / "golden.h5", 1)
-    body, = recording.problem_of(problem, 1).bodies
-    seed = adjoint_recording.seeds_of(problem, body, STEP, 0)
+    body, = recording.copy_problem(problem, 1).bodies
+    seed = adjoint_recording.draw_seeds(problem, body, STEP, 0)
     q = {name: torch.tensor(getattr(body.particles, name), requires_grad=True)
          for name in (*FIELDS, "m", "V0")}
     law = torch.tensor(np.array(body.law), requires_grad=True)

@@ -21,8 +21,8 @@ from mpm_ref.materials import (
     Softening,
     VonMises,
 )
-from mpm_ref.oracle import plain_adjoint_boundary, plain_adjoint_laws
-from mpm_ref.oracle.plain_adjoint_sums import curved_pairs
+from mpm_ref.oracle import plain_adjoint, plain_adjoint_laws
+from mpm_ref.oracle.plain_adjoint_transfer import curved_pairs
 from mpm_ref.plain import boundary
 from mpm_ref.plain.boundary import Contact
 from mpm_ref.plain.flows import return_map
@@ -74,7 +74,7 @@ def test_bars_of_return_maps_are_their_derivatives(law, flow, y, d, rng):
     F_bar, dF, y_bar, dy = (rng.normal(size=s).astype(REAL) for s in (*2 * [F.shape],
                                                                      *2 * [len(F)]))
     dlaw, dflow = (rng.normal(size=len(a)).astype(REAL) for a in (law, flow))
-    bars = plain_adjoint_laws.of_return(q, F, DT, F_bar, None if y is None else y_bar)
+    bars = plain_adjoint_laws.return_map_adjoint(q, F, DT, F_bar, None if y is None else y_bar)
 
     def loss(h):
         at = None if y is None else q.y + h * dy
@@ -92,7 +92,7 @@ def test_a_yield_surface_between_near_stretches_is_seen(d, rng):
     F = strained(d, rng, spread=0.002)
     q = matter(F, SAND, VonMises(0.005, 0.0), None)
     F_bar, dF = rng.normal(size=(2, *F.shape)).astype(REAL)
-    bars = plain_adjoint_laws.of_return(q, F, DT, F_bar, None)
+    bars = plain_adjoint_laws.return_map_adjoint(q, F, DT, F_bar, None)
     theirs = slope(lambda h: (F_bar * return_map(F + h * dF, None, DT, *q[-2:])[0]).sum())
     assert abs((bars.F * dF).sum() - theirs) <= 1e-9 * abs(theirs)
 
@@ -102,7 +102,7 @@ def test_bars_of_stresses_are_their_derivatives(law, d, rng):
     F = strained(d, rng)
     F[1] = np.eye(d)
     tau_bar, dF, dlaw = (rng.normal(size=s).astype(REAL) for s in (F.shape, F.shape, len(law)))
-    bars = plain_adjoint_laws.of_stress(F, None, (law, NoFlow()), tau_bar)
+    bars = plain_adjoint_laws.stress_adjoint(F, None, (law, NoFlow()), tau_bar)
     ours = (bars.F * dF).sum() + sum(a.sum() * b for a, b in zip(bars.law, dlaw))
     theirs = slope(lambda h: (tau_bar * kirchhoff(F + h * dF, moved(law, dlaw, h))).sum())
     assert abs(ours - theirs) <= 1e-10 * abs(ours)
@@ -110,7 +110,7 @@ def test_bars_of_stresses_are_their_derivatives(law, d, rng):
 
 def test_bars_of_pressure_are_its_derivatives(rng):
     J, tau_bar, dJ = 1 + 0.1 * rng.normal(size=(3, 9)).astype(REAL)
-    bars = plain_adjoint_laws.of_stress(J, None, (WATER, NoFlow()), tau_bar)
+    bars = plain_adjoint_laws.stress_adjoint(J, None, (WATER, NoFlow()), tau_bar)
     ours = (bars.F * dJ).sum() + 2 * bars.law[0].sum()
     theirs = slope(lambda h: (tau_bar * kirchhoff(J + h * dJ, moved(WATER, (2.0,), h))).sum())
     assert abs(ours - theirs) <= 1e-10 * abs(ours)
@@ -139,7 +139,7 @@ WALLS = {
 @pytest.mark.parametrize("case", WALLS)
 def test_bars_of_walls_are_their_derivatives(case, rng):
     v, bar, dv = np.array([-0.4, -1.0, 0.7], REAL), *rng.normal(size=(2, 3)).astype(REAL)
-    ours = bar @ plain_adjoint_boundary.matrix(v, WALLS[case]) @ dv
+    ours = bar @ plain_adjoint.contact_jacobian(v, WALLS[case]) @ dv
     theirs = slope(lambda h: bar @ boundary.contact_velocity(v + h * dv, WALLS[case]))
     assert abs(ours - theirs) <= 1e-12
 

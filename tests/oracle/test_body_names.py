@@ -3,11 +3,11 @@
 from dataclasses import replace
 
 import pytest
-from goldens import seen_by, stretched
+from goldens import kernel_arrays, stretched
 from goldens_hot import EPS, problem_of
 
 from mpm_ref import oracle
-from mpm_ref.oracle.schema import taken
+from mpm_ref.oracle.schema import reserved_names
 
 
 def named(problem, *names):
@@ -22,13 +22,13 @@ def test_names_of_what_stands_elsewhere_are_taken(names, tmp_path):
     problem = named(stretched(), *names)
     golden, other = tmp_path / "golden.h5", tmp_path / "other.h5"
     oracle.record(problem, golden, 2)
-    oracle.write(other, seen_by(problem))
+    oracle.write(other, kernel_arrays(problem))
     report = oracle.check(golden, other)
     assert (report.agrees, report.compared, report.missing) == (True, 48, ())
     assert oracle.check(golden, golden).compared == 48
 
 
-@pytest.mark.parametrize("name", sorted(taken("explicit")))
+@pytest.mark.parametrize("name", sorted(reserved_names("explicit")))
 def test_names_that_clash_are_refused(name, tmp_path):
     with pytest.raises(ValueError, match=f"body '{name}': this names an array, or a group, of ev"):
         oracle.record(named(stretched(), name, "metal"), tmp_path / "golden.h5", 1)

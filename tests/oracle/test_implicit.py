@@ -16,15 +16,14 @@ from mpm_ref import oracle
 from mpm_ref.hot.methods import METHODS
 from mpm_ref.hot.multigrid import hierarchy
 from mpm_ref.hot.multigrid.projectors import block_diagonal
-from mpm_ref.oracle import accepted_step, differential, recording
-from mpm_ref.oracle.implicit_recording import started
-from mpm_ref.oracle.implicit_twin import SolvedTwin, embedding
+from mpm_ref.oracle import accepted_step, differential, implicit_twin, recording
+from mpm_ref.oracle.implicit_twin import ImplicitTwin, embedding_weights
 from mpm_ref.oracle.schema import IMPLICIT, MULTIGRID, key
 from mpm_ref.plain import potential
 from mpm_ref.simulate import simulate
 
 CHANGE = 1e-6
-SOLVED = 1e-2       # of an array that the tolerance of the solve leaves open: see the bars
+SOLVE_ARRAYS = 1e-2       # of an array that the tolerance of the solve leaves open: see the bars
 MOST = 3            # levels of the hierarchies here
 
 
@@ -91,7 +90,7 @@ def test_recording_leaves_the_problem_alone(problem):
 def test_a_file_begins_where_a_run_stands(problem, tmp_path):
     oracle.record(problem, tmp_path / "golden.h5", 1, begin=3)
     ran = [frame for frame in simulate(replace(
-        recording.problem_of(problem, 1), clock=replace(problem.clock, steps=3)))][-1]
+        recording.copy_problem(problem, 1), clock=replace(problem.clock, steps=3)))][-1]
     with h5py.File(tmp_path / "golden.h5") as f:
         assert f["steps/0"].attrs["t"] == ran.t
         np.testing.assert_array_equal(f["bodies/hard/x"][()], ran.state.bodies[1].particles.x)
@@ -163,7 +162,7 @@ def test_nodes_in_another_order_agree(checked, theirs):
     for seen in theirs:
         for level in ("", "1", "2"):
             on = [a.name for a in arrays_here()
-                  if a.where == "nodes" and str(a.level or "") == level]
+                  if a.location == "nodes" and str(a.level or "") == level]
             for name in [f"nodes{level}", *on]:
                 seen[name] = seen[name][::-1]
     assert checked(theirs).agrees
@@ -176,10 +175,10 @@ def test_what_any_method_accepts_is_within_the_bar(problem, golden, checked, wor
     with h5py.File(golden) as f:
         posed = replace(problem, bodies=bodies_at(problem, f, 0))
         nodes, dt = f["steps/0/nodes"][()], f["steps/0"].attrs["dt"]
-    stepper = started(posed)
+    stepper = recording.start_stepper(posed)
     for eps, agrees in ((EPS, True), (1e5 * EPS, False)):
         options = replace(METHODS[word], eps=eps)
-        _, dv = accepted_step.accepted_by(stepper, posed.bodies, (0.0, dt), options)
+        _, dv = accepted_step.solve_with(stepper, posed.bodies, (0.0, dt), options)
         report = checked([{"nodes": nodes, "dv": dv}])
         assert report.agrees is agrees, str(report)
 
@@ -192,7 +191,7 @@ def leaky(A, index, **options):
     free = [np.tile(np.eye(index.shape[1]), (len(level.index), 1, 1)) for level in grids.levels]
     A = A + block_diagonal(np.abs(A.data).max() * (free[0] - grids.levels[0].B))
     for k, (fine, coarse) in enumerate(zip(grids.levels, grids.levels[1:])):
-        W = sp.csr_array(embedding(fine.index, coarse.index, "linear"))
+        W = sp.csr_array(embedding_weights(fine.index, coarse.index, "linear"))
         A = hierarchy.galerkin(A, hierarchy.prolongation(W, free[k]))
         grids.levels[k] = fine._replace(B=free[k])
         grids.levels[k + 1] = coarse._replace(A=A)
@@ -206,18 +205,19 @@ def scaled(monkeypatch, module, name, factor):
 
 def unprojected(monkeypatch):
     monkeypatch.setattr(differential, "semidefinite", lambda A: A)
-    monkeypatch.setattr(differential, "modes", exact_modes)
+    monkeypatch.setattr(implicit_twin, "stress_differential", exact_differential)
 
 
-def exact_modes(F, law):
+def exact_differential(F, law):
     U, s, V = differential.svd(F)
-    return differential.Modes(U, V, differential.slopes(s, law), *differential.quotients(s, law))
+    A, quotients = differential.slopes(s, law), differential.difference_quotients(s, law)
+    return differential.StressDifferential(U, V, A, *quotients)
 
 
 def wrong_kappa(monkeypatch):
     """The surface of a cell, of side dx, in place of that of side 2 dx."""
-    real = SolvedTwin.kappa
-    monkeypatch.setattr(SolvedTwin, "kappa", lambda twin: real(twin) / 2)
+    real = ImplicitTwin.kappa
+    monkeypatch.setattr(ImplicitTwin, "kappa", lambda twin: real(twin) / 2)
 
 
 def twice_smoothed(A, index, **options):
@@ -264,7 +264,7 @@ def test_wrong_weights_of_the_embedding_are_refused(checked, theirs, golden):
 
 def test_an_increment_with_its_last_step_twice_is_refused(checked, theirs):
     """What the public release does: the direction once more."""
-    theirs[0]["dv"] = theirs[0]["dv"] + SOLVED * theirs[0]["direction"]
+    theirs[0]["dv"] = theirs[0]["dv"] + SOLVE_ARRAYS * theirs[0]["direction"]
     assert checked(theirs).first.array == "dv"
 
 
@@ -276,7 +276,7 @@ def test_a_change_of_one_entry_is_caught_and_located(array, golden, checked, the
     change, size = CHANGE, abs(a)
     with h5py.File(golden) as f:
         if f"bar/{name}" in f["steps/1"]:
-            change = SOLVED
+            change = SOLVE_ARRAYS
             bar = f[f"steps/1/bar/{name}"][()]
             size = (size.T / np.maximum(bar, 1e-3 * bar.max()).T).T
     i = np.unravel_index(np.argmax(size), a.shape)

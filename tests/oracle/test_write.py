@@ -5,12 +5,12 @@ and where it is read.
 import h5py
 import numpy as np
 import pytest
-from goldens import seen_by, stretched
+from goldens import kernel_arrays, stretched
 
 from mpm_ref import oracle
 
 
-@pytest.mark.parametrize(("steps", "said"), [
+@pytest.mark.parametrize(("steps", "message"), [
     ({"mass": np.ones(3)}, "steps is a dict: expected a list with a dictionary of arrays"),
     (np.ones(3), "steps is a ndarray"),
     ([[np.ones(3)]], r"steps\[0\] is a list: expected a dictionary of arrays"),
@@ -19,29 +19,29 @@ from mpm_ref import oracle
     ([{"nodes": np.ones((3, 2))}], "array 'nodes' has the type float64: expected whole numbers"),
     ([{"jelly/id": np.ones(3)}], "array 'jelly/id' has the type float64: expected whole numbers"),
 ])
-def test_what_is_no_array_of_numbers_is_not_written(steps, said, tmp_path):
-    with pytest.raises(ValueError, match=said):
+def test_what_is_no_array_of_numbers_is_not_written(steps, message, tmp_path):
+    with pytest.raises(ValueError, match=message):
         oracle.write(tmp_path / "other.h5", steps)
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(("name", "value", "said"), [
+@pytest.mark.parametrize(("name", "value", "message"), [
     ("mass", "heavy", "array 'mass' has the type object: expected real numbers"),
     ("nodes", [1, 2, 3], r"nodes has shape \(3,\): expected \(M, 2\) integer coordinates"),
     ("nodes", 1.0, "array 'nodes' has the type float64: expected whole numbers"),
 ])
-def test_nor_read(golden, name, value, said, tmp_path):
+def test_nor_read(golden, name, value, message, tmp_path):
     other = tmp_path / "other.h5"
-    oracle.write(other, seen_by(stretched()))
+    oracle.write(other, kernel_arrays(stretched()))
     with h5py.File(other, "r+") as f:
         del f[f"steps/0/{name}"]
         f[f"steps/0/{name}"] = value
-    with pytest.raises(oracle.NotComparable, match=said):
+    with pytest.raises(oracle.NotComparable, match=message):
         oracle.check(golden, other)
 
 
 def test_an_id_that_is_one_number_departs(golden, checked):
-    theirs = seen_by(stretched())
+    theirs = kernel_arrays(stretched())
     theirs[0]["jelly/id"] = 1
     assert "jelly/id does not number its" in checked(theirs).first.what
 

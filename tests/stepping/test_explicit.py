@@ -8,9 +8,9 @@ from mpm_ref.core.solids import half_space, sphere
 from mpm_ref.energy import angular_momentum, energy, momentum
 from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.materials import NoFlow
-from mpm_ref.oracle.kernel_stages import contacts
+from mpm_ref.oracle.kernel_stages import node_contacts
 from mpm_ref.oracle.plain_twin import Twin
-from mpm_ref.oracle.recording import problem_of
+from mpm_ref.oracle.recording import copy_problem
 
 STEPS = 10
 
@@ -23,9 +23,9 @@ def against_twin(problem, steps=STEPS):
     touched = 0
     for k in range(steps):
         grid = stepper.step(problem.bodies, k * DT, DT)
-        touching = contacts(problem.conditions, grid, (k + 1) * DT, DT)
-        touched += len(touching)
-        twin.step(DT, np.argwhere(grid.m > 0) + grid.origin, touching)
+        contacts = node_contacts(problem.conditions, grid, (k + 1) * DT, DT)
+        touched += len(contacts)
+        twin.step(DT, np.argwhere(grid.m > 0) + grid.origin, contacts)
     off = {}
     for body, matter in zip(problem.bodies, twin.bodies):
         for name in ("x", "v", "F", "tau"):
@@ -134,10 +134,10 @@ def test_the_first_stress_belongs_to_the_first_deformation():
     assert abs(problem.bodies[0].particles.v).max() > 0.0
 
 
-def test_particles_do_not_move_with_problem_of():
+def test_particles_do_not_move_with_copy_problem():
     """Copies share nothing with the problem, and keep L and C one array."""
     problem = two_disks()
-    copy = problem_of(problem, -1)
+    copy = copy_problem(problem, -1)
     for body, other in zip(problem.bodies, copy.bodies):
         assert other.particles.L is other.particles.C
         assert not any(np.shares_memory(a, b) for a, b in zip(body.particles, other.particles))

@@ -49,7 +49,7 @@ COVER = (
     Case("pic", 1, 2, body_force=True),
     Case("pic", 2, 3),
     Case("flip", 1, 3),
-    Case("flip", 3, 2),
+    Case("flip", 3, 2, body_force=True),
     Case("apic", 2, 2),
     Case("apic", 3, 3, body_force=True),
     Case("mls", 2, 2, fluid=True),

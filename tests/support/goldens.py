@@ -1,5 +1,11 @@
 """A golden file of two disks under stress, and another code that is our own, stage by stage."""
 
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 from problems import DX, FREE, JELLY, ball, moving, two_disks
 
@@ -9,8 +15,9 @@ from mpm_ref.oracle import kernel_stages, recording
 from mpm_ref.oracle.schema import ARRAYS
 from mpm_ref.problem import Clock, Problem
 
+ROOT = Path(__file__).resolve().parents[2]
 STEPS = 2
-ON_NODES = [a.name for a in ARRAYS if a.where == "nodes"]
+ON_NODES = [a.name for a in ARRAYS if a.location == "nodes"]
 
 
 def stretched():
@@ -22,10 +29,10 @@ def stretched():
     return problem
 
 
-def seen_by(problem, steps=STEPS, order=1):
+def kernel_arrays(problem, steps=STEPS, order=1):
     """What the kernels compute, as another code would hand it in."""
-    problem = recording.problem_of(problem, order)
-    stepper, dt = recording.started(problem), problem.clock.dt
+    problem = recording.copy_problem(problem, order)
+    stepper, dt = recording.start_stepper(problem), problem.clock.dt
     steps = [kernel_stages.step(problem, problem.bodies, stepper, k * dt, dt)[0]
              for k in range(steps)]
     return [seen | {f"{b.name}/id": b.id for b in problem.bodies} for seen in steps]
@@ -43,6 +50,20 @@ def checker(golden, path):
         oracle.write(path, steps)
         return oracle.check(golden, path, **how)
     return check
+
+
+def run_example(name, folder):
+    """Output of an example, from a copy of all examples in a folder; it leaves no files."""
+    shutil.copytree(ROOT / "examples", folder / "examples",
+                    ignore=shutil.ignore_patterns("__pycache__"))
+    (folder / "empty").mkdir()
+    files = sorted(folder.rglob("*"))
+    done = subprocess.run([sys.executable, "-B", folder / "examples" / name], cwd=folder / "empty",
+                          text=True, check=False, capture_output=True,
+                          env={**os.environ, "PYTHONPATH": str(ROOT)})
+    assert done.returncode == 0, done.stderr
+    assert sorted(folder.rglob("*")) == files
+    return done.stdout
 
 
 def alone(scheme, law=JELLY, **fields):

@@ -1,20 +1,27 @@
 """Golden files with adjoints, and other codes that hand in gradients: kernels and plain twin."""
 
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import h5py
 import numpy as np
+from adjoint_runs import dive, splash
 from problems import DX, JELLY, ball, moving
 
 from mpm_ref import oracle
+from mpm_ref.adjoint import StepAdjoint, initial_stress_adjoint, zero_sums
 from mpm_ref.core.boundary import Collider, Conditions
 from mpm_ref.core.solids import half_space
 from mpm_ref.explicit import Scheme
-from mpm_ref.materials import NoFlow
-from mpm_ref.oracle import adjoint_recording, adjoint_stages, kernel_stages, recording
+from mpm_ref.materials import Hencky, HerschelBulkley, NeoHookean, NoFlow, make_flow
+from mpm_ref.oracle import adjoint_recording, kernel_stages, recording
 from mpm_ref.oracle.plain_adjoint import gradients
 from mpm_ref.oracle.plain_twin import Twin
-from mpm_ref.oracle.recording import copied
+from mpm_ref.oracle.recording import copy_body
 from mpm_ref.problem import Clock, Problem
 
 STEPS, STEP = 2, 1e-3
+SAND = Hencky(4e4, 6e4)
 
 
 def problem_of(run):
@@ -38,32 +45,90 @@ def strained(d, law=JELLY, flow=None, y=None, scheme=None):
                    Conditions((Collider(ground, "separate", 0.3),)))
 
 
+def sand():
+    """A ball of sand under random strain, 2D."""
+    return strained(2, SAND, make_flow("drucker_prager", SAND, 2, friction_angle=30.0))
+
+
+STATES = {
+    "fluid and metal 3d": lambda: problem_of(splash()),
+    "flip 3": lambda: problem_of(dive()),
+    "pic 1": lambda: problem_of(dive("pic", 1)),
+    "sand 2d": sand,
+    "paste 2d": lambda: strained(2, NeoHookean(4e4, 6e4), HerschelBulkley(500.0, 3.0)),
+    "jelly 3d apic": lambda: strained(3, scheme=Scheme(transfer="apic", rpic=0.1)),
+}
+
+
+def agreement(state):
+    """How the kernels in reverse order agree with a golden file of a state, as JSON takes it."""
+    problem = STATES[state]()
+    with TemporaryDirectory() as folder:
+        golden, other = Path(folder) / "golden.h5", Path(folder) / "other.h5"
+        oracle.record_adjoint(problem, golden, 1)
+        oracle.write(other, kernel_arrays(problem, 1, order=-1))
+        report = oracle.check(golden, other)
+        with h5py.File(golden) as f:
+            units = max(a.attrs["error_in_units"] for a in arrays_in(f["steps/0"]).values())
+    return {"agrees": report.agrees, "text": str(report), "missing": report.missing,
+            "units": float(units)}
+
+
+def arrays_in(group):
+    """The arrays of a golden step that come with an error, by their keys."""
+    arrays = {}
+    group.visititems(lambda n, a: arrays.update({n: a}) if "error_in_units" in a.attrs else None)
+    return arrays
+
+
+def differences_from_step_adjoint(run):
+    """Names of the arrays in which the stages do not end in the adjoint of the step to the bit."""
+    problem = recording.copy_problem(problem_of(run), 1)
+    stepper = recording.start_stepper(problem)
+    before = tuple(copy_body(body, 1) for body in problem.bodies)
+    seeds = [adjoint_recording.draw_seeds(problem, body, STEP, 0) for body in before]
+    forward, _ = kernel_stages.step(problem, problem.bodies, stepper, 0.0, STEP)
+    stages = adjoint_recording.adjoint_stages(problem, before, forward, seeds, (0.0, STEP))
+    bars = [adjoint_recording.seed_bars(*pair) for pair in zip(before, seeds)]
+    sums = [zero_sums(body) for body in before]
+    expected = {"gravity": StepAdjoint(problem.stepper()).pull_back(before, bars, sums, 0.0, STEP)}
+    for body, bar, parts in zip(before, bars, sums):
+        initial_stress_adjoint(body, bar, parts)
+        expected |= {f"{body.name}/{name}": getattr(bar, name)
+                     for name in ("x", "v", "C", "F", "tau", "m", "V0", "b", "y")
+                     if len(getattr(body.particles, name))}
+        law, flow = np.split(parts.sum(axis=0), [len(body.law)])
+        expected |= {f"{body.name}/law": law, f"{body.name}/flow": flow}
+    return [name for name, a in expected.items()
+            if not np.array_equal(a, stages.get(f"{name}_grad", []))]
+
+
 def recorded(problem, path, steps=STEPS):
     """The path of a golden file with adjoints."""
     oracle.record_adjoint(problem, path, steps)
     return path
 
 
-def seen_by(problem, steps=STEPS, order=1):
+def kernel_arrays(problem, steps=STEPS, order=1):
     """What the kernels compute, as another code would hand it in, forwards and backwards."""
-    problem = recording.problem_of(problem, order)
-    stepper, dt, out = recording.started(problem), problem.clock.dt, []
+    problem = recording.copy_problem(problem, order)
+    stepper, dt, out = recording.start_stepper(problem), problem.clock.dt, []
     for k in range(steps):
-        before = tuple(copied(body, 1) for body in problem.bodies)
-        seeds = [adjoint_recording.seeds_of(problem, body, dt, k) for body in before]
+        before = tuple(copy_body(body, 1) for body in problem.bodies)
+        seeds = [adjoint_recording.draw_seeds(problem, body, dt, k) for body in before]
         seeds = seeds if order == 1 else [seed.reversed() for seed in seeds]
         seen, _ = kernel_stages.step(problem, problem.bodies, stepper, k * dt, dt)
-        back = adjoint_stages.step(problem, before, seen, seeds, (k * dt, dt))
+        back = adjoint_recording.adjoint_stages(problem, before, seen, seeds, (k * dt, dt))
         out.append(seen | back | {f"{b.name}/id": b.id for b in problem.bodies})
     return out
 
 
 def twin_steps(problem, real, steps=STEPS):
     """What the plain twin computes backwards in a floating type, from its own states."""
-    ours, twin, dt, out = recording.problem_of(problem, 1), Twin(problem, real), STEP, []
-    stepper = recording.started(ours)
+    ours, twin, dt, out = recording.copy_problem(problem, 1), Twin(problem, real), STEP, []
+    stepper = recording.start_stepper(ours)
     for k in range(steps):
-        seeds = [adjoint_recording.seeds_of(problem, body, dt, k) for body in ours.bodies]
+        seeds = [adjoint_recording.draw_seeds(problem, body, dt, k) for body in ours.bodies]
         seen, contacts = kernel_stages.step(ours, ours.bodies, stepper, k * dt, dt)
         done = twin.step(dt, seen["nodes"], contacts)
         on_empty = problem.scheme.gravity_on_empty

@@ -11,9 +11,8 @@ from mpm_ref.core.levelset import half_space
 from mpm_ref.explicit import Scheme
 from mpm_ref.hot.methods import SolverOptions
 from mpm_ref.hot.multigrid.hierarchy import hierarchy
-from mpm_ref.oracle import accepted_step, implicit_stages, recording
-from mpm_ref.oracle.implicit_recording import started
-from mpm_ref.oracle.implicit_twin import SolvedTwin, embedding, spread
+from mpm_ref.oracle import accepted_step, implicit_recording, recording
+from mpm_ref.oracle.implicit_twin import ImplicitTwin, embedding_weights, prolongate
 from mpm_ref.problem import Clock, Problem
 
 STEPS = 2
@@ -41,7 +40,7 @@ def floor(d, kind):
 
 def bodies_at(problem, golden, k):
     """The bodies at the start of step k of a golden file: for k > 0, the end of the one before."""
-    bodies = recording.problem_of(problem, 1).bodies
+    bodies = recording.copy_problem(problem, 1).bodies
     for body in bodies:
         first = golden[f"bodies/{body.name}"]
         last = golden[f"steps/{k - 1}/{body.name}"] if k else first
@@ -63,18 +62,18 @@ def step_of(problem, golden, k, real=np.float64):
     """What another code computes in step k: {key: array}, as `oracle.write` takes it."""
     step = golden[f"steps/{k}"]
     posed = replace(problem, bodies=bodies_at(problem, golden, k))
-    stepper, (t, dt) = started(posed), (step.attrs["t"], step.attrs["dt"])
+    stepper, (t, dt) = recording.start_stepper(posed), (step.attrs["t"], step.attrs["dt"])
     pose = stepper.problem(posed.bodies, t, dt)
-    system, twin = stepper.system(pose), SolvedTwin(posed, pose.unknowns, dt, real)
-    seen = twin.before() | twin.conditions() | {"kappa": twin.kappa(), "nodes": system.index}
+    system, twin = stepper.system(pose), ImplicitTwin(posed, pose.unknowns, dt, real)
+    seen = twin.grid_arrays() | twin.conditions() | {"kappa": twin.kappa(), "nodes": system.index}
     trial, probe, load = given(step)
     for name, dv in (("start", system.start), ("trial", trial)):
         E, g = twin.potential(dv.astype(real))
-        product = twin.product(twin.at(dv.astype(real)), probe.astype(real))
+        product = twin.hessian_product(twin.tangents(dv.astype(real)), probe.astype(real))
         seen |= {f"E_{name}": E, f"gradient_{name}": g, f"product_{name}": product}
     seen |= multigrid(step, system, load)
-    options = accepted_step.other_method(stepper.options, golden.attrs["eps"])
-    pose, dv = accepted_step.accepted_by(stepper, posed.bodies, (t, dt), options)
+    options = accepted_step.second_method(stepper.options, golden.attrs["eps"])
+    pose, dv = accepted_step.solve_with(stepper, posed.bodies, (t, dt), options)
     seen["dv"] = dv
     return seen | twin.after_solve((pose.unknowns.v + dv).astype(real))
 
@@ -86,11 +85,11 @@ def multigrid(step, system, load):
     seen = {"cycle": grids.cycle(load)}
     g = system.evaluate(system.start)[1]
     options = SolverOptions(implementation="scipy")
-    seen["direction"] = implicit_stages.direction(system, A, g, options)
+    seen["direction"] = implicit_recording.first_direction(system, A, g, options)
     for k, (fine, coarse) in enumerate(zip(grids.levels, grids.levels[1:]), 1):
-        W = embedding(fine.index, coarse.index, "linear")
+        W = embedding_weights(fine.index, coarse.index, "linear")
         u = given(step, k)
-        seen[f"prolonged{k}"] = spread(W, fine.B, u)
+        seen[f"prolonged{k}"] = prolongate(W, fine.B, u)
         seen[f"coarse{k}"] = (coarse.A @ u.reshape(-1)).reshape(u.shape)
         seen[f"nodes{k}"] = coarse.index
     return seen
