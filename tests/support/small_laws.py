@@ -2,6 +2,8 @@
 of 27 points that is thrown into a corner of NCLaw's box.
 """
 
+from edited_text import write_edited
+
 from mpm_ref.materials import NoFlow, make_law
 from mpm_ref.materials.learned.weights import LawWeights, LearnedLaws, save
 
@@ -42,21 +44,13 @@ FLOWING = ('law = "fixed_corotated", E = 100000.0, nu = 0.2',
 
 def write_scene(folder, *edits, name="cube.toml"):
     """Path of the scene in a folder, with (before, after) of some of its text."""
-    return _write(folder / name, SCENE, edits)
+    return write_edited(folder / name, SCENE, edits)
 
 
 def write_study(folder, *edits, scene=()):
     """Path of a study in a folder, and beside it the scene, each with edits."""
     write_scene(folder, *scene)
-    return _write(folder / "cubes.toml", STUDY, edits)
-
-
-def _write(path, text, edits):
-    for before, after in edits:
-        assert before in text
-        text = text.replace(before, after)
-    path.write_text(text)
-    return path
+    return write_edited(folder / "cubes.toml", STUDY, edits)
 
 
 def identified(E=E, name="fixed_corotated", flow=NO_FLOW):

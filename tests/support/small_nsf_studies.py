@@ -3,6 +3,7 @@ other at several speeds.
 """
 
 from command_line import mpm_ref
+from edited_text import write_edited
 
 STEPS, EVERY, RUNS = 16, 2, 4
 SCENE = f"""
@@ -58,13 +59,8 @@ points = 20
 
 def write(folder, *edits, scene=SCENE):
     """Path of the study in a folder, with (before, after) of some of its text."""
-    text = STUDY
-    for before, after in edits:
-        assert before in text
-        text = text.replace(before, after)
     (folder / "disks.toml").write_text(scene)
-    (folder / "pairs.toml").write_text(text)
-    return folder / "pairs.toml"
+    return write_edited(folder / "pairs.toml", STUDY, edits)
 
 
 def modelled(folder):

@@ -1,5 +1,7 @@
 """A small study for tests: a bar in 2D that is held at one end and bends under gravity."""
 
+from edited_text import write_edited
+
 from mpm_ref.rom import model_file
 from mpm_ref.rom.study import dataset, reduce
 from mpm_ref.rom.study.generate import FINISHED, generate
@@ -53,13 +55,8 @@ CURVED = (("r = 3", "r = 2\nmodes = 4"), ('"modes"', '"curved"'),
 
 def write(folder, *edits, scene=SCENE):
     """Path of the study in a folder, with (before, after) of some of its text."""
-    text = STUDY
-    for before, after in edits:
-        assert before in text
-        text = text.replace(before, after)
     (folder / "bar.toml").write_text(scene)
-    (folder / "bars.toml").write_text(text)
-    return folder / "bars.toml"
+    return write_edited(folder / "bars.toml", STUDY, edits)
 
 
 def study(folder, *edits, **scene):
