@@ -8,7 +8,7 @@ import pytest
 from constitutive import EPS, LAW
 from deform_bars import GAPS, families, materials
 from flows import CASES
-from problems import elsewhere
+from problems import run_python
 
 from mpm_ref.materials import FLOWS, LAWS, SnowClamp
 
@@ -32,7 +32,7 @@ BRANCHES = {
 
 @pytest.fixture(scope="module")
 def measured():
-    return elsewhere(CODE, NUMBA_DISABLE_JIT="1")
+    return run_python(CODE, NUMBA_DISABLE_JIT="1")
 
 
 @pytest.fixture(params=NAMES)

@@ -5,7 +5,7 @@ as torch's automatic differentiation of the formulas.
 import numpy as np
 import pytest
 from deform_bars import DT, apart, materials, named, seeds, states
-from problems import elsewhere
+from problems import run_python
 from threads import MOST, by_threads
 
 from mpm_ref.core.adjoint import deform
@@ -64,7 +64,7 @@ def bits(bars, sums):
 
 @pytest.fixture(scope="module")
 def plain():
-    return elsewhere(CODE, NUMBA_DISABLE_JIT="1")
+    return run_python(CODE, NUMBA_DISABLE_JIT="1")
 
 
 @pytest.mark.parametrize("name", CASES)

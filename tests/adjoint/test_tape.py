@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from adjoint_runs import along, dive, impact, line_of, loss, moved, seeds_of, splash, taped
 from adjoints import H, rate
-from problems import DT, DX, FREE, digest, elsewhere
+from problems import DT, DX, FREE, digest, run_python
 from threads import MOST, by_threads
 
 from mpm_ref.explicit import Scheme, Stepper
@@ -70,7 +70,7 @@ def test_particles_that_start_from_other_yield_stresses_leave_that_of_the_flow_o
 
 def test_every_transfer():
     """Three steps as plain Python, with a body force and a wall that holds. A wrong one has 1."""
-    found = elsewhere(SHORT, NUMBA_DISABLE_JIT="1")
+    found = run_python(SHORT, NUMBA_DISABLE_JIT="1")
     assert min(found.values()) > 1.8, json.dumps(found)
 
 

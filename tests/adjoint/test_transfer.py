@@ -19,7 +19,7 @@ from adjoints import (
     zeros,
 )
 from clouds import Case, cloud, scattered
-from problems import elsewhere
+from problems import run_python
 from threads import MOST, by_threads
 
 from mpm_ref.core.adjoint.shape_gradient import curvatures
@@ -86,7 +86,7 @@ def test_remainder_is_of_second_order(case):
 
 def test_remainder_is_of_second_order_in_every_case():
     """All transfers, degrees and dimensions, as plain Python. A gradient that is wrong has 1."""
-    found = elsewhere(EVERYTHING, NUMBA_DISABLE_JIT="1")
+    found = run_python(EVERYTHING, NUMBA_DISABLE_JIT="1")
     assert len(found) == 40
     assert min(min(pair) for pair in found.values()) > 1.7
 
@@ -139,7 +139,7 @@ def off_above(case):
 
 def test_derivative_at_kinks_is_that_from_above():
     """On nodes for degrees 1 and 3, between them for 2; all cases, as plain Python."""
-    assert max(elsewhere(KINKS, NUMBA_DISABLE_JIT="1").values()) < 1e-5
+    assert max(run_python(KINKS, NUMBA_DISABLE_JIT="1").values()) < 1e-5
 
 
 def test_damping_is_its_own_adjoint(d, rng):

@@ -3,7 +3,7 @@
 import importlib.util
 
 import pytest
-from problems import digest, elsewhere, stepped, two_disks
+from problems import digest, run_python, stepped, two_disks
 from threads import by_threads
 
 from mpm_ref.core.jit import set_threads
@@ -54,16 +54,16 @@ def test_one_and_two_threads_give_the_same_bits(here):
 
 
 def test_four_threads_give_the_same_bits(here):
-    sha, _, threads = elsewhere(CODE, NUMBA_NUM_THREADS="4")
+    sha, _, threads = run_python(CODE, NUMBA_NUM_THREADS="4")
     assert threads == 4
     assert sha == here
 
 
 @pytest.mark.parametrize("layer", LAYERS)
 def test_every_threading_layer_gives_the_same_bits(here, layer):
-    if layer == "tbb" and not elsewhere(LOADS, NUMBA_THREADING_LAYER=layer):
+    if layer == "tbb" and not run_python(LOADS, NUMBA_THREADING_LAYER=layer):
         pytest.skip("the tbb library is not installed")
-    sha, used, _ = elsewhere(CODE, NUMBA_THREADING_LAYER=layer)
+    sha, used, _ = run_python(CODE, NUMBA_THREADING_LAYER=layer)
     assert used == layer
     assert sha == here
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from problems import elsewhere, stepped, two_disks
+from problems import run_python, stepped, two_disks
 
 PLAIN = {"NUMBA_DISABLE_JIT": "1"}
 
@@ -149,7 +149,7 @@ def test_the_twin_shares_no_text_with_the_kernels():
 
 
 def test_plain_python_equals_the_compiled_step():
-    bodies, found = stepped(two_disks(), 2), elsewhere(STATE, **PLAIN)
+    bodies, found = stepped(two_disks(), 2), run_python(STATE, **PLAIN)
     for body, other in zip(bodies, found):
         for name, a in other.items():
             b = getattr(body.particles, name)
@@ -158,14 +158,14 @@ def test_plain_python_equals_the_compiled_step():
 
 def test_every_transfer_equals_its_twin():
     """All transfers, degrees and dimensions, full and isotropic stress, with and without b."""
-    found = elsewhere(TRANSFERS, **PLAIN)
+    found = run_python(TRANSFERS, **PLAIN)
     assert len(found) == 40
     assert max(found.values()) < 3e-15
 
 
 def test_every_material_equals_its_twin():
     """Deformation, return map, stress and energy of all laws and flows against longdouble."""
-    found = elsewhere(MATERIALS, **PLAIN)
+    found = run_python(MATERIALS, **PLAIN)
     assert len(found) >= 25
     bad = {name: off for name, off in found.items() if max(off[:2]) > 1e-14}
     assert not bad
@@ -177,6 +177,6 @@ def test_every_material_equals_its_twin():
 @pytest.mark.filterwarnings("ignore")
 def test_kernels_stay_within_their_arrays(tmp_path):
     """The serial kernels compiled with bounds checks; a grid too small must be noticed."""
-    inside, caught = elsewhere(BOUNDS, NUMBA_BOUNDSCHECK="1", NUMBA_CACHE_DIR=str(tmp_path))
+    inside, caught = run_python(BOUNDS, NUMBA_BOUNDSCHECK="1", NUMBA_CACHE_DIR=str(tmp_path))
     assert inside == [True, True]
     assert caught == ["apic2-2d", "mls2-2d-fluid"]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from adjoints import pairing, rate
 from nclaw_toys import CARRIED, DT, FIELDS, LOWER, UPPER, problem_of, random_like, states, world_of
-from problems import elsewhere
+from problems import run_python
 
 from mpm_ref.adjoint import StepAdjoint, zero_bars, zero_sums
 from mpm_ref.core.boundary import Collider, Conditions, nclaw_walls
@@ -189,7 +189,7 @@ def off_the_steppers_adjoint():
 
 def test_each_body_has_the_gradient_of_the_steppers_adjoint():
     """As plain Python: compiling that adjoint takes seconds."""
-    found = elsewhere(ADJOINT, NUMBA_DISABLE_JIT="1")
+    found = run_python(ADJOINT, NUMBA_DISABLE_JIT="1")
     assert len(found) == len(PLACES) * len(FIELDS)
     assert max(found) < 1e-12
 

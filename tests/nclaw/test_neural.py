@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from command_line import assert_told, mpm_ref
 from neural_toys import CORRECTIONS, STRESSES, UNIT, deformations, plain, rotations, trained
-from problems import DX, elsewhere, stepped
+from problems import DX, run_python, stepped
 from problems import digest as digest_of
 from small_runs import block
 
@@ -201,9 +201,9 @@ def test_bodies_of_both_kinds_share_a_grid():
 
 
 def test_bits_do_not_depend_on_threads():
-    own, alone = digest_of(stepped(mixed(), 3)), elsewhere(DIGEST, NUMBA_NUM_THREADS="1")
+    own, alone = digest_of(stepped(mixed(), 3)), run_python(DIGEST, NUMBA_NUM_THREADS="1")
     assert alone == [own, 1]
-    assert elsewhere(DIGEST, NUMBA_NUM_THREADS="2") == [own, 2]
+    assert run_python(DIGEST, NUMBA_NUM_THREADS="2") == [own, 2]
 
 
 def test_what_does_not_fit_is_refused():

@@ -17,7 +17,7 @@ from goldens_adjoint import (
     sand,
     twin_steps,
 )
-from problems import DX, elsewhere
+from problems import DX, run_python
 
 from mpm_ref import oracle
 from mpm_ref.explicit import Scheme
@@ -96,7 +96,7 @@ print(json.dumps({state: agreement(state) for state in STATES if state != "flip 
 
 @pytest.fixture(scope="module")
 def uncompiled():
-    return elsewhere(UNCOMPILED, NUMBA_DISABLE_JIT="1")
+    return run_python(UNCOMPILED, NUMBA_DISABLE_JIT="1")
 
 
 @pytest.mark.parametrize("state", STATES)

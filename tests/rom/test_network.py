@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import rom_toys
 import threadpoolctl
-from problems import elsewhere
+from problems import run_python
 
 from mpm_ref.rom.fields.network import Decoder, DecoderUnits
 from mpm_ref.rom.fields.perceptron import ROWS, for_batches, layers_of, network
@@ -152,7 +152,7 @@ def digest():
 @pytest.mark.parametrize("threads", [1, 2])
 def test_any_number_of_threads_gives_the_same_bits(threads):
     count = str(threads)
-    found = elsewhere(DIGEST, NUMBA_NUM_THREADS=count, OPENBLAS_NUM_THREADS=count)
+    found = run_python(DIGEST, NUMBA_NUM_THREADS=count, OPENBLAS_NUM_THREADS=count)
     assert found == [digest(), threads]
 
 

@@ -6,7 +6,7 @@ import hashlib
 import numpy as np
 import pytest
 from grids import positions
-from problems import elsewhere
+from problems import run_python
 from rom_toys import cloud, decoder
 
 from mpm_ref.body import Body, particles_at
@@ -279,4 +279,4 @@ print(json.dumps(found))
 
 
 def test_the_bits_do_not_depend_on_the_number_of_threads():
-    assert elsewhere(THREADS, NUMBA_NUM_THREADS="2") == 2 * [digests()]
+    assert run_python(THREADS, NUMBA_NUM_THREADS="2") == 2 * [digests()]

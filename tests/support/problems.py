@@ -80,8 +80,8 @@ def digest(bodies):
     return sha.hexdigest()
 
 
-def elsewhere(code, **environment):
-    """What `code` prints as JSON in a new Python process, with some environment variables."""
+def run_python(code, **environment):
+    """The JSON that `code` prints in a new Python process, with some environment variables."""
     env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(HERE), str(HERE.parents[1])]),
            **environment}
     done = subprocess.run([sys.executable, "-W", "error", "-c", code], env=env, check=False,
