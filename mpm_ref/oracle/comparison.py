@@ -196,7 +196,7 @@ def require_numbers(name, a):
     integers = name.split("/")[-1] in INTEGERS
     if a.dtype.kind not in ("iu" if integers else "iuf"):
         raise NotComparable(f"array {name!r} has the type {a.dtype}: expected "
-                            f"{'complete' if integers else 'real'} numbers")
+                            f"{'whole' if integers else 'real'} numbers")
 
 
 def match(group, theirs, array, name):

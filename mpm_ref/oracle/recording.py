@@ -60,7 +60,7 @@ def state_after(problem, steps):
     Raises as a run does: `Unstable`, `TooLarge`; ValueError where the run ends before.
     """
     problem = copy_problem(problem, 1)
-    state = State(problem.bodies, frame=1)        # the start is a frame of its own
+    state = State(problem.bodies, frame=1)        # the first frame is that of the start
     if steps:
         stepper = problem.stepper()
         stepper.start(problem.bodies)
