@@ -231,8 +231,8 @@ def wrong_levels(made):
 
 WRONG = {
     "no dt in the force": ("potential", lambda m: scaled(m, potential, "internal_force", 0.5)),
-    "energy": ("potential", lambda m: scaled(m, potential, "elastic", 1 + CHANGE)),
-    "Hessian": ("Hessian", lambda m: scaled(m, differential, "applied", 1 + CHANGE)),
+    "energy": ("potential", lambda m: scaled(m, potential, "elastic_energy", 1 + CHANGE)),
+    "Hessian": ("Hessian", lambda m: scaled(m, implicit_twin, "apply_differential", 1 + CHANGE)),
     "no projection": ("Hessian", unprojected),
     "norm": ("norms", wrong_kappa),
     "identity rows": ("prolongation", wrong_levels(leaky)),
