@@ -13,10 +13,9 @@ from .common import targets
 from .common.parallel import run_side_by_side
 from .common.provenance import commit
 from .common.registry import discover, select
-from .common.report import write_report
+from .common.report import status_table, write_report
 from .common.results import RESULTS, ROOT, ProfileResults
 from .common.run import RunSetting, run_all
-from .common.status import status_table
 from .fingerprint.command import app as fingerprint
 
 app = typer.Typer(help=__doc__, add_completion=False, no_args_is_help=True,

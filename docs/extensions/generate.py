@@ -13,9 +13,8 @@ import typer.main
 
 from validation.common import equations, targets
 from validation.common.citations import ROOT
-from validation.common.report import chapters
+from validation.common.report import chapters, status_table
 from validation.common.results import RESULTS, ProfileResults
-from validation.common.status import status_table
 
 DOCS = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "mpm_ref"

@@ -18,7 +18,7 @@ KEY = re.compile(r"\[([A-Z]{3,})\]|\b((?:de)?[A-Z][A-Za-z]{2,}(?:18|19|20)\d\d[a
 LOOSE = re.compile(r"\b(?:LDMW|LDM|NSF|NCLAW|HOT)\]?,? (?:eq|alg|algorithm|equation|F)\.? ?\d")
 LINK = re.compile(r"\b(?:mpm_ref|validation|figures|tests|scenes)/[\w/.-]+\.(?:py|toml)(?:::\w+)*")
 
-# files that are about ids and keys, and so name some without resting on them
+# files whose subject is ids and keys: they name some without using their formulas
 ABOUT = {
     "validation/common/citations.py", "validation/common/equations.py",
     "validation/common/targets.py",
@@ -37,28 +37,28 @@ class Citation(NamedTuple):
 
     @property
     def link(self) -> str:
-        """path::name, or the path alone."""
+        """Return path::name, or the path alone."""
         return f"{self.path}::{self.name}" if self.name else self.path
 
 
 def cited_ids(root: Path, folder: str, pattern: str = "*.py") -> list[Citation]:
-    """Every equation id named in the files below root/folder that match the pattern."""
+    """Return every equation id named in the files below root/folder that match the pattern."""
     return [hit for path in files(root, folder, pattern) for hit in ids_of(root, path)]
 
 
 def cited_keys(root: Path, folder: str) -> list[Citation]:
-    """Every KEY in the docstrings, strings and comments of the Python files below root/folder."""
+    """Return every KEY in docstrings, strings and comments of Python files below root/folder."""
     return [hit for path in files(root, folder, "*.py") for hit in keys_of(root, path)]
 
 
 def files(root: Path, folder: str, pattern: str) -> list[Path]:
-    """The files below root/folder that match the pattern, sorted, without those of ABOUT."""
-    found = sorted((root / folder).rglob(pattern))
-    return [path for path in found if path.relative_to(root).as_posix() not in ABOUT]
+    """Return the files below root/folder that match the pattern, sorted, without those of ABOUT."""
+    paths = sorted((root / folder).rglob(pattern))
+    return [path for path in paths if path.relative_to(root).as_posix() not in ABOUT]
 
 
 def documentation(root: Path = ROOT) -> list[Path]:
-    """The pages of the documentation that people write: those of the site that git tracks."""
+    """Return the pages of the documentation that people write: those that git tracks."""
     generated = {"_build", "api", "generated"}
     names = {"cli.md", "equations.md"}
     return [page for page in sorted((root / "docs").rglob("*.md"))
@@ -66,33 +66,33 @@ def documentation(root: Path = ROOT) -> list[Path]:
 
 
 def ids_of(root: Path, path: Path) -> list[Citation]:
-    """The ids one file names."""
+    """Return the ids that one file names."""
     text = path.read_text(encoding="utf-8")
-    found = [(i, m[0]) for i, line in enumerate(text.splitlines(), 1) for m in ID.finditer(line)]
-    return attributed(root, path, text, found)
+    mentions = [(i, m[0]) for i, line in enumerate(text.splitlines(), 1) for m in ID.finditer(line)]
+    return attributed(root, path, text, mentions)
 
 
 def keys_of(root: Path, path: Path) -> list[Citation]:
-    """The keys one Python file names; code is left out, where brackets index arrays."""
+    """Return the keys that one Python file names; code is left out, where brackets index arrays."""
     text = path.read_text(encoding="utf-8")
-    found = []
+    mentions = []
     for token in tokenize.generate_tokens(io.StringIO(text).readline):
         if token.type in (tokenize.STRING, tokenize.COMMENT):
             for i, line in enumerate(token.string.splitlines(), token.start[0]):
-                found += [(i, m[1] or m[2]) for m in KEY.finditer(line)]
-    return attributed(root, path, text, found)
+                mentions += [(i, m[1] or m[2]) for m in KEY.finditer(line)]
+    return attributed(root, path, text, mentions)
 
 
 def attributed(root: Path, path: Path, text: str,
                mentions: list[tuple[int, str]]) -> list[Citation]:
-    """Citations of the (line, source) pairs of a file, each with its definition's name."""
+    """Return citations of the (line, source) pairs of a file, each with its definition's name."""
     spans = definitions(ast.parse(text, str(path))) if path.suffix == ".py" else []
     relative = path.relative_to(root).as_posix()
     return [Citation(source, relative, owner(spans, line), line) for line, source in mentions]
 
 
 def definitions(tree: ast.AST, prefix: str = "") -> list[tuple[int, int, str]]:
-    """(first line, last line, name) of every function and class, outer ones first."""
+    """Return (first line, last line, name) of every function and class, outer ones first."""
     spans = []
     for node in ast.iter_child_nodes(tree):
         name = prefix
@@ -105,7 +105,7 @@ def definitions(tree: ast.AST, prefix: str = "") -> list[tuple[int, int, str]]:
 
 
 def owner(spans: list[tuple[int, int, str]], line: int) -> str:
-    """Name of the innermost definition around a line, or ""."""
+    """Return the name of the innermost definition around a line, or ""."""
     names = [name for first, last, name in spans if first <= line <= last]
     return names[-1] if names else ""
 

@@ -39,7 +39,7 @@ papers.
 
 
 class Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One id: who carries it, and what it says in our words."""
+    """One id: its carrier, and a summary in our words."""
 
     by: Literal["definition", "ruling", "A", "B", "C", "D", "E"]
     says: str
@@ -55,21 +55,21 @@ class Source(NamedTuple):
 
 
 class Citations(NamedTuple):
-    """Who cites ids: what computes with them, and what checks that."""
+    """The citations of ids: in code that computes with them, and in its checks."""
 
     carried: list[Citation]     # kernels and scenes; for issues also the tables of printed numbers
     checked: list[Citation]     # tests and experiments
 
 
 def read(root: Path = ROOT) -> Source:
-    """The source file; ValueError names the id of a malformed entry."""
+    """Return the source file; ValueError names the id of a malformed entry."""
     data = tomllib.loads((root / SOURCE).read_text(encoding="utf-8"))
     entries = {i: entry_of(i, e) for paper in PAPERS for i, e in data.get(paper, {}).items()}
     return Source(entries, data["milestones"], data["not_ids"])
 
 
 def entry_of(identifier: str, data: dict) -> Entry:
-    """One entry, strictly."""
+    """Return one entry, strictly validated."""
     try:
         return msgspec.convert(data, Entry)
     except msgspec.ValidationError as error:
@@ -77,42 +77,42 @@ def entry_of(identifier: str, data: dict) -> Entry:
 
 
 def scan(root: Path = ROOT) -> Citations:
-    """All citations of ids in the repository."""
+    """Return all citations of ids in the repository."""
     printed = [c for c in cited_ids(root, "validation/targets", "*.toml") if "-X" in c.source]
     carried = [*cited_ids(root, "mpm_ref"), *cited_ids(root, "scenes", "*.toml"), *printed]
     return Citations(carried, [*cited_ids(root, "tests"), *cited_ids(root, "validation")])
 
 
 def unknown(source: Source, citations: Citations) -> list[str]:
-    """A sentence for every cited id that the source does not list."""
-    known = {*source.entries, *source.not_ids}
+    """Return a sentence for every cited id that the source does not list."""
+    listed = {*source.entries, *source.not_ids}
     return [f"{c.path}:{c.line} cites {c.source}: not in {SOURCE}; correct it, or list it there"
-            for c in (*citations.carried, *citations.checked) if c.source not in known]
+            for c in (*citations.carried, *citations.checked) if c.source not in listed]
 
 
 def uncarried(source: Source, citations: Citations, milestone: str) -> list[str]:
-    """A sentence for every id of a milestone that no code, or no test, cites."""
+    """Return a sentence for every id of a milestone that no code, or no test, cites."""
     code = covered(source, citations.carried)
     tests = covered(source, [c for c in citations.checked if c.path.startswith("tests/")])
-    lacks = {i: [what for what, ids in (("code", code), ("test", tests)) if i not in ids]
+    lacks = {i: [kind for kind, ids in (("code", code), ("test", tests)) if i not in ids]
              for i, entry in source.entries.items() if entry.by == milestone}
-    return [f"{i} is cited by no {' and no '.join(what)}" for i, what in lacks.items() if what]
+    return [f"{i} is cited by no {' and no '.join(kinds)}" for i, kinds in lacks.items() if kinds]
 
 
 def covered(source: Source, citations: list[Citation]) -> set[str]:
-    """The ids cited, with those that say the same."""
+    """Return the cited ids, with those of equal meaning."""
     cited = {c.source for c in citations}
     return {i for i in source.entries if cited & names(source, i)}
 
 
 def names(source: Source, identifier: str) -> set[str]:
-    """The id, and the ids that say the same."""
+    """Return the id, and the ids of equal meaning."""
     same = {i for i, entry in source.entries.items() if entry.same_as == identifier}
     return {identifier, source.entries[identifier].same_as, *same}
 
 
 def render(source: Source, citations: Citations) -> str:
-    """The whole page."""
+    """Return the page."""
     parts = [INTRO, summary(source, citations)]
     for paper in PAPERS:
         parts.append(f"## {TITLES[paper]}\n")
@@ -127,7 +127,7 @@ def render(source: Source, citations: Citations) -> str:
 
 def summary(source: Source, citations: Citations) -> str:
     """Count the ids of each carrier, and those that code and tests cite."""
-    carried, checked = (covered(source, some) for some in citations)
+    carried, checked = (covered(source, one) for one in citations)
     names = {"definition": "definition only", **source.milestones, "ruling": "issue and ruling"}
     rows = ["| carrier | ids | cited by code | by tests or experiments |", "|---|---|---|---|"]
     for by, name in names.items():
@@ -137,17 +137,17 @@ def summary(source: Source, citations: Citations) -> str:
 
 
 def table(head: str, entries: dict[str, Entry], source: Source, citations: Citations) -> str:
-    """One table of entries."""
+    """Return one table of entries."""
     rows = ["```{table}", ":class: equations", "", head, "|---|---|---|---|"]
     for i, entry in entries.items():
-        code, tests = (links(some, names(source, i)) for some in citations)
+        code, tests = (links(one, names(source, i)) for one in citations)
         rows.append(f'| <span id="{i}"></span>{i} | {escaped(entry.says)} '
                     f"| {code or pending(entry, source)} | {tests} |")
     return "\n".join((*rows, "```")) + "\n"
 
 
 def escaped(text: str) -> str:
-    """Text with nothing that Markdown reads as markup."""
+    """Return a text with the markup of Markdown escaped."""
     return "".join(f"\\{c}" if c in "\\*_<>[]{}$`" else c for c in text)
 
 
@@ -157,20 +157,20 @@ def pending(entry: Entry, source: Source) -> str:
 
 
 def links(citations: list[Citation], ids: set[str]) -> str:
-    """Links to everything that cites one of the ids, as the role `source` of the site."""
-    found = sorted({c.link for c in citations if c.source in ids})
-    return "<br>".join(f"{{source}}`{short(link)} <{link}>`" for link in found)
+    """Return links to all that cite one of the ids, as the role `source` of the site."""
+    cited = sorted({c.link for c in citations if c.source in ids})
+    return "<br>".join(f"{{source}}`{short(link)} <{link}>`" for link in cited)
 
 
 def short(link: str) -> str:
-    """The dotted name of a citation, without the package and the folder of tests."""
+    """Return the dotted name of a citation, without the package and the folder of tests."""
     file, _, name = link.partition("::")
     stem = file.removesuffix(".py").removeprefix("mpm_ref/").removeprefix("tests/")
     return ".".join(filter(None, (*stem.split("/"), *name.split("::"))))
 
 
 def main() -> None:
-    """Write the page, and say what is wrong with the citations."""
+    """Write the page, and print wrong citations."""
     source, citations = read(), scan()
     (ROOT / PAGE).write_text(render(source, citations), encoding="utf-8")
     problems = unknown(source, citations)

@@ -1,8 +1,8 @@
 """Run experiments in parallel: the processes share the cores evenly.
 
 Kernels are compiled by one core whatever the number of threads, so that two experiments at a time
-take not much more than half the time of one after the other. Timings are CPU seconds; beside
-another experiment they are less quiet, and each record's `workers` says so.
+take not much more than half the time of one after the other. Timings are CPU seconds; with
+another experiment at work they vary more, and each record has the number of `workers`.
 """
 
 import os
@@ -38,11 +38,11 @@ def run_side_by_side(experiments, setting, workers, find=experiment_of):
     failed = []
     with (SuiteProgress([e.seconds(setting.profile) for e in experiments]) as progress,
           ProcessPoolExecutor(workers, get_context("spawn"), take_share, (workers,)) as pool):
-        coming = {pool.submit(attempt_in_process, find, e.id, setting): e for e in longest}
+        futures = {pool.submit(attempt_in_process, find, e.id, setting): e for e in longest}
         try:
-            for future in as_completed(coming):
-                experiment = coming[future]
-                summary, raised = what_came(future)
+            for future in as_completed(futures):
+                experiment = futures[future]
+                summary, raised = result_of(future)
                 if raised:
                     progress.say(raised)
                     failed.append(experiment.id)
@@ -58,8 +58,8 @@ def attempt_in_process(find, experiment_id, setting):
     return attempt(find(experiment_id), setting, Silent())
 
 
-def what_came(future):
-    """(summary, what was raised or None) of a future; that of a process which died says so."""
+def result_of(future):
+    """Return (summary, traceback or None) of a future, also of one whose process died."""
     try:
         outcome = future.result()
     except Exception as error:

@@ -18,7 +18,7 @@ class SuiteProgress:
         self.total, self.done, self.budget = float(sum(budgets)), 0.0, 0.0
         self.count, self.index = len(budgets), 0
         self.started = self.began = time.perf_counter()
-        self.bar = tqdm(total=self.total, position=0, **_look(),
+        self.bar = tqdm(total=self.total, position=0, **_bar_style(),
                         bar_format="{desc} {percentage:3.0f}% |{bar}| {elapsed}, {remaining} left")
 
     def __enter__(self):
@@ -28,7 +28,7 @@ class SuiteProgress:
         self.bar.close()
 
     def begin(self, label, budget):
-        """An experiment starts."""
+        """Show that an experiment starts."""
         self.index, self.budget, self.began = self.index + 1, budget, time.perf_counter()
         self.label = f"[{self.index}/{self.count}] {label}"
         self.bar.set_description_str(self.label)
@@ -36,14 +36,14 @@ class SuiteProgress:
             self.say(f"{self.label}: about {budget:.0f} s, {self.left():.0f} s left in all")
 
     def end(self, message):
-        """The experiment is over, however it went."""
+        """Show that the experiment has ended, with a message."""
         self.done += self.budget
         self.budget = 0.0
         self.tick()
         self.say(f"{self.label}: {message}")
 
     def ended(self, label, budget, message):
-        """One of several experiments that run at a time is over."""
+        """Show that one of several experiments that run at a time has ended."""
         self.index, self.done = self.index + 1, self.done + budget
         self.began = time.perf_counter()
         self.bar.set_description_str(f"[{self.index}/{self.count}]")
@@ -51,7 +51,7 @@ class SuiteProgress:
         self.say(f"[{self.index}/{self.count}] {label}: {message}; {self.left():.0f} s left in all")
 
     def left(self):
-        """Seconds left, from the budgets and from how fast they were spent so far."""
+        """Return the seconds left, from the budgets and their pace so far."""
         elapsed = time.perf_counter() - self.started
         pace = elapsed / self.done if self.done else 1.0
         return pace * (self.total - self.done)
@@ -66,23 +66,23 @@ class SuiteProgress:
         tqdm.write(text, file=sys.stderr)
 
     def inner(self, iterable, desc):
-        """A bar for one loop of the running experiment."""
+        """Return a bar for one loop of the running experiment."""
         items = range(iterable) if isinstance(iterable, int) else iterable
         return _Inner(items, desc=desc, tick=self.tick)
 
 
-def _look():
-    """Both bars: gone when done, none without a terminal, 80 wide where that tells no width."""
+def _bar_style():
+    """Return the style of both bars: removed when done, disabled without a terminal."""
     return {"leave": False, "disable": None, "file": sys.stderr,
             "ncols": shutil.get_terminal_size().columns}
 
 
 class _Inner(tqdm):
-    """The second line; moves the first one along."""
+    """The bar of a loop, in the second line; it also advances the first one."""
 
     def __init__(self, items, desc, tick):
         self._tick = tick
-        super().__init__(items, desc=f"  {desc}", position=1, **_look())
+        super().__init__(items, desc=f"  {desc}", position=1, **_bar_style())
 
     def update(self, n=1):
         """Advance by n items."""

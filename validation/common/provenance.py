@@ -10,7 +10,7 @@ PACKAGES = ("numpy", "scipy", "numba")
 
 
 def provenance(source):
-    """The fields of a `Record` that say by what it was made, `source` being the commit."""
+    """Return the fields of a `Measurement` on its origin, `source` being the commit."""
     return {
         "commit": source,
         "date": datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
@@ -20,7 +20,7 @@ def provenance(source):
 
 
 def commit(root):
-    """Commit of the source at `root`, with "+changes" where files other than results differ."""
+    """Return the commit of the source at `root`, with "+changes" if more than results differ."""
     head = _git(root, "rev-parse", "--short=12", "HEAD")
     if not head:
         return "unknown"
@@ -29,20 +29,20 @@ def commit(root):
 
 
 def _git(root, *arguments):
-    """Output of a git command, empty where git or the repository is missing."""
+    """Return the output of a git command, empty where git or the repository is missing."""
     try:
-        done = subprocess.run(
+        process = subprocess.run(
             ["git", *arguments], cwd=root, capture_output=True, text=True, check=True)
     except (OSError, subprocess.CalledProcessError):
         return ""
-    return done.stdout.strip()
+    return process.stdout.strip()
 
 
 def _versions():
-    found = {}
+    versions = {}
     for package in PACKAGES:
         try:
-            found[package] = version(package)
+            versions[package] = version(package)
         except PackageNotFoundError:
             continue
-    return found
+    return versions

@@ -26,7 +26,7 @@ ROUND_OFF = 1e-9
 
 
 class Measurement(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """A value beside the printed or analytic one; `results/<profile>/<id>.json` lists them."""
+    """A value and the printed or analytic one; `results/<profile>/<id>.json` lists them."""
 
     target: str                     # id of the number, of the paper's target where there is one
     value: int | float | None       # ours; None where the run gave no finite number
@@ -59,9 +59,9 @@ class Criterion(NamedTuple):
 
 
 def judge(value, rule):
-    """Verdict "pass", "miss" or "info" and the interval (low, high) that decided.
+    """Return the verdict "pass", "miss" or "info" and the interval (low, high) that decided.
 
-    A value that is None, NaN or infinite misses, whatever is asked. Raises ValueError where the
+    A value that is None, NaN or infinite misses, whatever the rule. Raises ValueError where the
     rule is incomplete or contradicts itself.
     """
     low, high = accepted(rule)
@@ -72,7 +72,7 @@ def judge(value, rule):
 
 
 def accepted(rule):
-    """Interval (low, high) of the values that pass."""
+    """Return the interval (low, high) of the values that pass."""
     if rule.comparator not in COMPARATORS:
         raise ValueError(f"unknown comparator {rule.comparator!r}; use one of {COMPARATORS}")
     _refuse_unused(rule)
@@ -88,7 +88,7 @@ def _at_least(rule):
 
 
 def _end(rule, factor):
-    """The one end of a one-sided interval: the bound, or the paper's value with some slack."""
+    """Return the end of a one-sided interval: the bound, or the paper's value with slack."""
     if rule.bound is not None:
         return float(rule.bound)
     if rule.paper is None:
@@ -141,18 +141,18 @@ def _refuse_unused(rule):
 
 
 def finite_ends(interval):
-    """The interval as it is stored: its finite end, both of them, or None."""
+    """Return the interval as it is stored: its finite end, both of them, or None."""
     ends = [end for end in interval if math.isfinite(end)]
     return tuple(ends) if len(ends) == 2 else (ends[0] if ends else None)
 
 
 def write_records(path, records):
-    """Write a list of `Record` as readable JSON."""
+    """Write a list of `Measurement`s as readable JSON."""
     write_whole(path, msgspec.json.format(msgspec.json.encode(records), indent=1) + b"\n")
 
 
 def read_records(path):
-    """Read what `write_records` wrote. Raises ValueError naming the file and the field at fault."""
+    """Read the records of a file. Raises ValueError with the file and the wrong field."""
     try:
         return msgspec.json.decode(Path(path).read_bytes(), type=list[Measurement])
     except msgspec.DecodeError as error:

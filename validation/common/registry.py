@@ -19,11 +19,11 @@ GROUPS = {
 }
 PROFILES = ("quick", "standard", "paper")
 BUDGETS = {"quick": 10.0, "standard": 600.0, "paper": 3600.0}     # where none is given [s]
-NEAR, OFFERED = 0.6, 5      # likeness from which an id is offered for an unknown one; so many
+NEAR, OFFERED = 0.6, 5      # likeness from which ids are offered for an unknown one, at most 5
 
 
 class Experiment(NamedTuple):
-    """One function that records numbers, and what it costs."""
+    """One function that records numbers, with its title and budget."""
 
     id: str                         # "<group>.<name>", also the name of its result files
     title: str
@@ -32,7 +32,7 @@ class Experiment(NamedTuple):
     function: Callable[[Any], None]
 
     def seconds(self, profile):
-        """Expected wall seconds at a profile."""
+        """Return the expected wall seconds at a profile."""
         return self.budget.get(profile, BUDGETS[profile])
 
 
@@ -72,31 +72,32 @@ def discover(root=HERE):
 
     One module that cannot be imported does not hide the others: it is listed as broken.
     """
-    found, broken = {}, {}
+    experiments, broken = {}, {}
     for group in GROUPS:
         for file in sorted((root / group).rglob("*.py")):
             name = ".".join((root.name, *file.relative_to(root).with_suffix("").parts))
             try:
-                _collect(importlib.import_module(name.removesuffix(".__init__")), group, found)
+                module = importlib.import_module(name.removesuffix(".__init__"))
+                _collect(module, group, experiments)
             except Exception as error:
                 broken[name] = error
-    return Catalogue(found, broken)
+    return Catalogue(experiments, broken)
 
 
-def _collect(module, group, found):
+def _collect(module, group, experiments):
     for thing in vars(module).values():
         declared = getattr(thing, "experiment", None)
         if not isinstance(declared, Experiment) or thing.__module__ != module.__name__:
             continue
-        if declared.id in found:
+        if declared.id in experiments:
             raise ValueError(f"experiment {declared.id} is declared again in {module.__name__}")
         if not declared.id.startswith(group + "."):
             raise ValueError(f"experiment {declared.id} stands in folder {group}; move either")
-        found[declared.id] = declared
+        experiments[declared.id] = declared
 
 
 def select(experiments, ids, profile):
-    """The experiments named by ids or leading parts of ids, in catalogue order; without ids, all.
+    """Return the experiments of ids or leading parts of ids, in catalogue order; without ids, all.
 
     Raises ValueError for an id that names none, or only experiments without that profile.
     """
@@ -114,22 +115,22 @@ def _names(wanted, id):
 
 
 def _no_such(wanted, experiments, profile):
-    elsewhere = [e for i, e in experiments.items() if _names(wanted, i)]
-    if elsewhere:
-        return f"{wanted} has no {profile} profile; it has: {', '.join(elsewhere[0].profiles)}"
+    others = [e for i, e in experiments.items() if _names(wanted, i)]
+    if others:
+        return f"{wanted} has no {profile} profile; it has: {', '.join(others[0].profiles)}"
     near = ", ".join(nearest(wanted, experiments)) or "none"
     return f"no experiment {wanted!r}; near it: {near}; see `python -m validation list`"
 
 
 def nearest(wanted, ids):
-    """The ids of which a part is like a text, whatever its case, nearest first."""
-    found = {id: _likeness(wanted.lower(), id.lower()) for id in ids}
-    near = sorted(found, key=found.get, reverse=True)
-    return [id for id in near if found[id][0] >= NEAR][:OFFERED]
+    """Return the ids of which a part is like a text, whatever its case, nearest first."""
+    likeness = {id: _likeness(wanted.lower(), id.lower()) for id in ids}
+    near = sorted(likeness, key=likeness.get, reverse=True)
+    return [id for id in near if likeness[id][0] >= NEAR][:OFFERED]
 
 
 def _likeness(wanted, id):
-    """How like a text the best part of an id is, and the whole id: each in [0, 1]."""
+    """Return the likeness of a text to the best part of an id, and to the entire id, in [0, 1]."""
     words = id.split(".")
     n = len(words)
     parts = [".".join(words[i:j]) for i in range(n) for j in range(i + 1, n + 1)]

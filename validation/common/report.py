@@ -1,7 +1,7 @@
 """The report: everything in ``results/<profile>/`` and every printed number, as HTML and Markdown.
 
-Made from the result files, the papers' targets and the drawn figures alone: no experiment is
-imported and nothing is computed here but ratios and counts.
+It is written from the result files, the papers' targets and the drawn figures alone: no experiment
+is imported and nothing is computed but ratios and counts.
 """
 
 import base64
@@ -83,7 +83,7 @@ class Chapter(NamedTuple):
 
 
 def write_report(folder, profile, targets):
-    """Write report.html and report.md into `folder`; returns their paths."""
+    """Write report.html and report.md into `folder` and return their paths."""
     content = {"profile": profile, "chapters": chapters(ProfileResults(folder), targets),
                "machine": machine(ProfileResults(folder)), "verdicts": VERDICTS}
     paths = []
@@ -103,17 +103,17 @@ def _environment():
 
 
 def chapters(results, targets):
-    """A `Chapter` per group that has results or printed numbers."""
-    figures, known = _figures(results.folder), printed(targets)
-    sections = [_section(results, id, figures.get(id, []), known)
+    """Return a `Chapter` per group that has results or printed numbers."""
+    figures, by_id = _figures(results.folder), printed(targets)
+    sections = [_section(results, id, figures.get(id, []), by_id)
                 for id in sorted({*results.ids(), *figures})]
     done = {r.target for id in results.ids() for r in results.records(id)}
-    made = [_chapter(key, sections, targets.values(), done) for key in GROUPS]
-    return [c for c in made if c.sections or c.missing or c.settings]
+    every = [_chapter(key, sections, targets.values(), done) for key in GROUPS]
+    return [c for c in every if c.sections or c.missing or c.settings]
 
 
 def printed(targets):
-    """{id: (`Target`, in words where it is printed, and what stands where it is printed again)}."""
+    """Return {id: (`Target`, text of its places in print, with values printed again)}."""
     repeated = {}
     for target in targets.values():
         if target.again:
@@ -138,15 +138,15 @@ def _group(id):
 
 
 def overruled(target):
-    """Return whether a printed value is kept for the record only, a ruling having replaced it."""
+    """Return whether a ruling has replaced a printed value, which stays for the record only."""
     return target.id.split(".")[1] == "printed"
 
 
-def _section(results, id, figures, known):
+def _section(results, id, figures, by_id):
     records = results.records(id) if id in results.ids() else []
     numbers = [r for r in records if not _is_remark(r, id)]
     return Section(id, [r.note for r in records if _is_remark(r, id)],
-                   [_row(r, id, *known.get(r.target, (None, ""))) for r in numbers],
+                   [_row(r, id, *by_id.get(r.target, (None, ""))) for r in numbers],
                    [_table(results, id, name) for name in results.tables(id)], figures,
                    provenance=_provenance(records[0]) if records else "no results")
 
@@ -170,7 +170,7 @@ def _row(record, id, target, where):
 
 
 def _words(record, id):
-    """What a number without a printed text measures: `verification.fall.error_x` -> `error x`.
+    """Return the text of a number without a printed one: `verification.fall.error_x` -> `error x`.
 
     Dots part the words, but for decimal points: after a 0, and after a number behind a letter or
     a hyphen, so that `body.nu0.45` has two parts and `mls.2.1` three.
@@ -182,7 +182,7 @@ def _words(record, id):
 
 
 def quantity(value, unit):
-    """A number with its unit, as short as reads well."""
+    """Return a number with its unit as a short text."""
     if value is None:
         return "—"
     return f"{value:.4g} {unit}".removesuffix(" 1").removesuffix(" nondim").strip()
@@ -199,7 +199,7 @@ def rule(record):
 
 
 def ratio(record):
-    """Ours over the paper's, where that is a number."""
+    """Return ours over the paper's, where that is a number."""
     if record.value is None or not record.paper:
         return "—"
     return f"{record.value / record.paper:.3g}"
@@ -212,14 +212,15 @@ def _table(results, id, name):
 
 
 def _figures(folder):
-    """Figures by the experiment under which they are shown; the drawn file says which it is."""
-    found = {}
+    """Return the figures by experiment, which is named in the drawn file."""
+    by_experiment = {}
     for file in sorted((Path(folder) / "figures").glob("*.png")):
         with Image.open(file) as image:
             owner, caption = image.text["Source"], image.text["Description"]
             data = base64.b64encode(preview(image)).decode()
-        found.setdefault(owner, []).append(Figure(file.stem, f"figures/{file.name}", caption, data))
-    return found
+        figure = Figure(file.stem, f"figures/{file.name}", caption, data)
+        by_experiment.setdefault(owner, []).append(figure)
+    return by_experiment
 
 
 def preview(image):
@@ -233,7 +234,7 @@ def preview(image):
 
 
 def machine(results):
-    """Facts of the runs behind the report: commits, cores, dates, versions, seconds in all."""
+    """Return facts of the runs behind the report: commits, cores, dates, versions, seconds."""
     first = [results.records(id)[0] for id in results.ids()]
     return {"experiments": len(first), "seconds": sum(r.seconds for r in first),
             "commits": _distinct(first, "commit"), "cores": _distinct(first, "cores"),
@@ -250,3 +251,29 @@ def _distinct(records: list[Measurement], field):
 
 def _ends(dates):
     return " to ".join(dict.fromkeys((dates[0], dates[-1]))) if dates else "none"
+
+
+def status_table(results, targets):
+    """Return the table "paper, experiment, status" of results in Markdown, or a sentence."""
+    if not results.ids():
+        return "No results are published yet; `make reproduce` makes those of the quick profile."
+    lines = ["| paper | experiment | status |", "|---|---|---|"]
+    for chapter in chapters(results, targets):
+        lines += [_status_line(chapter.title, s.id, _verdict_counts(s.rows))
+                  for s in chapter.sections if s.rows]
+        if chapter.missing:
+            left = len(chapter.missing)
+            noun = "printed result" if left == 1 else "printed results"
+            lines.append(_status_line(chapter.title, "", f"not yet: {left} {noun}"))
+    return "\n".join(lines)
+
+
+def _status_line(title, id, status):
+    experiment = f"`{id}`" if id else ""
+    return f"| {title.split(':')[0]} | {experiment} | {status} |"
+
+
+def _verdict_counts(rows):
+    verdicts = [row.verdict for row in rows]
+    shown = [f"{verdicts.count(v)} {v}" for v in ("pass", "miss", "info") if v in verdicts]
+    return ", ".join(shown)

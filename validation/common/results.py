@@ -22,7 +22,7 @@ class ProfileResults:
         return sorted(file.stem for file in self.folder.glob("*.json"))
 
     def records(self, experiment):
-        """All `Record`s of an experiment. Raises FileNotFoundError where it has not been run."""
+        """Return all `Measurement`s of an experiment; FileNotFoundError if it has not been run."""
         file = self.folder / f"{experiment}.json"
         if not file.exists():
             raise FileNotFoundError(f"no results of {experiment} in {self.folder}; "

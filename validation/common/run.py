@@ -1,9 +1,11 @@
-"""Running experiments: what an experiment is handed, and the loop over all of them."""
+"""Run experiments: the object that an experiment gets, its cache, and the loop over all."""
 
 import csv
 import io
+import json
 import math
 import re
+import shutil
 import time
 import traceback
 import zlib
@@ -14,7 +16,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .cache import Cache
 from .progress import SuiteProgress
 from .provenance import provenance
 from .record import (
@@ -39,8 +40,36 @@ class RunSetting(NamedTuple):
     workers: int = 1                # experiments at a time
 
 
+class Cache:
+    """The finished parts of one experiment, in a folder, so that an interrupted run can go on.
+
+    A part belongs to a commit and a seed. Nothing is cached for a working tree with changes, which
+    no commit names. All parts are removed once the experiment has ended well.
+    """
+
+    def __init__(self, folder, commit, seed):
+        self._folder, self._version = folder, f"{commit}-{seed}"
+        self._has_commit = commit != "unknown" and not commit.endswith("+changes")
+
+    def get(self, name, make):
+        """Return the cached part, or make(): numbers, texts, lists of them."""
+        path = self._folder / f"{name}-{self._version}.json"
+        if not self._has_commit:
+            return make()
+        try:
+            return json.loads(path.read_text())
+        except (OSError, ValueError):
+            text = json.dumps(make())
+        write_whole(path, text.encode())
+        return json.loads(text)
+
+    def clear(self):
+        """Remove all parts."""
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+
 class Run:
-    """Handed to an experiment: its profile, seed and random numbers; it takes records and tables.
+    """The run of one experiment: its profile, seed and random numbers, its records and tables.
 
     Nothing reaches the disk before `finish`, but for what is `cached`.
     """
@@ -59,17 +88,18 @@ class Run:
         return self._setting.folder
 
     def progress(self, iterable, desc=""):
-        """A bar over an iterable or a number of rounds; iterate it, or call its `update`."""
+        """Return a bar over an iterable or a number of rounds; iterate it, or call its `update`."""
         return self._progress.inner(iterable, desc)
 
     def cached(self, name, make):
-        """Return make(): numbers, texts and lists of them; or the value that an interrupted run of
-        the same commit has cached.
+        """Return make(), numbers, texts and lists of them, or its value from an interrupted run.
+
+        That run must have had the same commit and seed.
         """
         return self._cache.get(name, make)
 
     def choose(self, **by_profile):
-        """The value for the profile at hand: `n = run.choose(quick=16, standard=64, paper=128)`."""
+        """Return the value for the profile, as in `n = run.choose(quick=16, standard=64)`."""
         if self.profile not in by_profile:
             raise ValueError(f"nothing was given for profile {self.profile!r}, only {by_profile}")
         return by_profile[self.profile]
@@ -82,7 +112,7 @@ class Run:
             value: ours; None, NaN and infinity are recorded as misses.
             unit: of both numbers, "1" for a ratio.
             scale: the size it was run at, against the paper's.
-            note: what a reader must know; required where a factor is widened.
+            note: a remark for the reader; required where a factor is widened.
             rule: comparator, paper, bound, factor, tolerance: see `record.judge`.
         """
         printed = self._setting.targets.get(target)
@@ -99,7 +129,7 @@ class Run:
         return verdict
 
     def note(self, text):
-        """A remark on the whole experiment: a record without a value, under the experiment's id."""
+        """Record a remark on the entire experiment: a record without a value, under its id."""
         self.record(self.experiment.id, None, unit="", comparator="info", note=text)
 
     def table(self, name, columns, rows):
@@ -112,13 +142,13 @@ class Run:
         self._tables[name] = _csv(columns, rows)
 
     def fail(self, error):
-        """Record that the experiment raised; what it recorded before stands."""
+        """Record that the experiment raised; earlier records stay."""
         self._failed = True
         self.record(self.experiment.id, None, unit="", comparator="runs",
                     note=f"failed: {type(error).__name__}: {error}")
 
     def finish(self):
-        """Write records and tables, remove tables of an earlier run; returns the records."""
+        """Write records and tables, remove tables of an earlier run, and return the records."""
         common = {
             "seconds": round(time.perf_counter() - self._wall, 3),
             "cpu_seconds": round(time.process_time() - self._cpu, 3),
@@ -146,7 +176,7 @@ class Run:
 
 
 def _rule(target, given, printed):
-    """The rule as given, completed by what the paper prints."""
+    """Return the rule, completed by the printed number."""
     if printed is None:
         if "comparator" not in given:
             raise ValueError(f"{target} is no printed target: comparator= must be given")
@@ -169,7 +199,7 @@ def _widened(rule):
 
 
 def _number(value):
-    """The value as JSON can hold it, and a remark where it cannot."""
+    """Return the value as JSON can hold it, and a remark where it cannot."""
     if value is None:
         return None, ""
     value = value.item() if hasattr(value, "item") else value
@@ -190,8 +220,8 @@ class ExperimentOutcome(NamedTuple):
     """The outcome of an experiment."""
 
     id: str
-    summary: str                    # for a reader: how long, how many passed
-    raised: str | None              # what it raised, with where
+    summary: str                    # for a reader: seconds, numbers of verdicts
+    raised: str | None              # the traceback, if it raised
 
 
 def run_all(experiments, setting):
@@ -212,7 +242,7 @@ def run_all(experiments, setting):
 
 
 def attempt(experiment, setting, progress):
-    """`Outcome` of an experiment; what it recorded is written in any case."""
+    """Run an experiment and return its `ExperimentOutcome`; its records are written in any case."""
     run, raised = Run(experiment, setting, progress), None
     run.note(experiment.title)
     try:

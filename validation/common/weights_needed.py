@@ -1,21 +1,22 @@
-"""Weights that experiments need, and what they say of those that are not there yet."""
+"""Weights that experiments need: those that are available, and a record of the others."""
 
 
 class Untrained(ValueError):
-    """Weights are not there yet."""
+    """The error of weights that no training has written yet."""
 
 
-def there(run, names, load):
-    """{name: load(name)} of those trainings that are there; records how many are not, and how to
-    make them.
+def load_available(run, names, load):
+    """Return {name: load(name)} of the trainings whose weights exist; record the others.
+
+    load(name) raises `Untrained` for missing weights, with a sentence on how to make them.
     """
-    found, waiting = {}, []
+    bundles, missing = {}, []
     for name in names:
         try:
-            found[name] = load(name)
-        except Untrained as fault:
-            waiting.append(str(fault))
-    if waiting:
-        run.record(f"{run.experiment.id}.untrained", len(waiting), comparator="info",
-                   scale=f"of {len(names)} trainings", note="; ".join(waiting))
-    return found
+            bundles[name] = load(name)
+        except Untrained as error:
+            missing.append(str(error))
+    if missing:
+        run.record(f"{run.experiment.id}.untrained", len(missing), comparator="info",
+                   scale=f"of {len(names)} trainings", note="; ".join(missing))
+    return bundles

@@ -4,7 +4,7 @@ from mpm_ref.nclaw.bodies import body_maker
 
 from ..common.registry import experiment
 from ..common.scenes import with_
-from ..common.weights_needed import there
+from ..common.weights_needed import load_available
 from ..nclaw.small_trainings import OF_EPOCHS, bundled
 from .nclaw_runs import EVERY, SHORT, Law, Setup, record_silent, table_of, trials
 from .nclaw_strain import thrown
@@ -20,7 +20,7 @@ EPOCHS = {"quick": (10,), "standard": None}             # None: all that were ke
 def epochs(run):
     """How far runs go by epoch, material, time step and throw; small trainings."""
     names = run.choose(quick=list(OF_EPOCHS)[:1], standard=list(OF_EPOCHS))
-    found = [t for name, bundle in there(run, names, bundled).items()
+    found = [t for name, bundle in load_available(run, names, bundled).items()
              for t in of_training(run, OF_EPOCHS[name], bundle.laws)]
     if found:
         record_silent(run, found, "216 particles")

@@ -19,7 +19,7 @@ from mpm_ref.nclaw.study.compare import RunBroken, positions
 from mpm_ref.scene import build
 
 from ..common.scenes import threads_for
-from ..common.weights_needed import there
+from ..common.weights_needed import load_available
 from ..nclaw.environments import ENVIRONMENTS, environment
 from ..nclaw.strain_bounds import met_by
 from ..nclaw.trained_laws import trained
@@ -100,7 +100,7 @@ def law(name):
 def laws(run):
     """`Law`s of an experiment: at quick one, at standard all that are trained."""
     names = run.choose(quick=CHOSEN[:1], standard=ENVIRONMENTS)
-    return list(there(run, names, law).values())
+    return list(load_available(run, names, law).values())
 
 
 def scene_for(run, name, **changes):

@@ -20,8 +20,7 @@ from mpm_ref.timestep import advective
 
 from ..common import targets
 from ..common.registry import experiment
-from ..common.scenes import SCENES
-from ..common.settings import record_settings
+from ..common.scenes import SCENES, record_settings
 from . import stiffness, stretched_box, warm_states
 from .sizes import sized
 

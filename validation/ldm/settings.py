@@ -6,7 +6,7 @@ from mpm_ref.rom.fields.architecture import FEATURES, HIDDEN, KERNEL, SHORTEST, 
 from mpm_ref.scene import build
 
 from ..common.registry import experiment
-from ..common.settings import record_settings
+from ..common.scenes import record_settings
 from .networks import nets
 from .studies import GRAVITY, PHI, POKE, POKES, TORSION, TOWER, poked_again
 from .tower import GRIDS, POINTS, scene_of

@@ -6,7 +6,7 @@ from mpm_ref.rom.fields.architecture import HIDDEN
 from mpm_ref.scene import build
 
 from ..common.registry import experiment
-from ..common.settings import record_settings
+from ..common.scenes import record_settings
 from ..ldm.networks import SHARES, nets
 from ..ldm.workshop_studies import PUSHES, SHEAR3, SHEAR17
 from .poke import HYPER, NET

@@ -18,7 +18,7 @@ from mpm_ref.scene import build
 
 from ..common.registry import experiment
 from ..common.scenes import threads_for
-from ..common.weights_needed import there
+from ..common.weights_needed import load_available
 from .environments import ENVIRONMENTS, environment
 from .trained_laws import trained, weights_of
 
@@ -67,7 +67,7 @@ def known(run):
     """{(method, environment): `Pair`}; records which weights are not there yet."""
     names = {(method, name): weights_of(method, name)
              for name, method in product(ENVIRONMENTS, METHODS)}
-    laws = there(run, names.values(), trained)
+    laws = load_available(run, names.values(), trained)
     true = {(TRUE, name): build(environment(name)).bodies[0] for name in ENVIRONMENTS}
     return {**{key: Pair(body.law, body.flow) for key, body in true.items()},
             **{key: Pair(learned_law(laws[name].elastic), learned_flow(laws[name].plastic))

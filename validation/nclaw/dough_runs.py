@@ -10,7 +10,7 @@ from mpm_ref.nclaw.bodies import body_maker, body_with_laws, copy_body
 from mpm_ref.nclaw.camera import project
 
 from ..common.registry import experiment
-from ..common.weights_needed import there
+from ..common.weights_needed import load_available
 from ..ldm.published_bodies import keep
 from .diverged import diverged
 from .dough import (
@@ -69,7 +69,7 @@ def dough(run):
 
 def contestants(run):
     """{name: what makes a body of other laws}; records which weights are not there yet."""
-    laws = there(run, doughs(), trained)
+    laws = load_available(run, doughs(), trained)
     for name, net in doughs().items():
         about = diverged(name, identity(net))
         if about is not None:

@@ -1,7 +1,7 @@
 """How well graph networks run away from what they learned, of 1, 10 and 100 runs (Table 6)."""
 
 from ..common.registry import experiment
-from ..common.weights_needed import there
+from ..common.weights_needed import load_available
 from .errors import COLUMNS, errors, record_mean
 from .simulators import COUNTS, named
 from .trained_laws import nets, trained
@@ -14,7 +14,7 @@ METHODS = {named(WATER, count): f"gnn.{count}" for count in COUNTS} | {WATER: "o
             profiles=("quick", "standard"), budget={"quick": 20, "standard": 600})
 def table6(run):
     """Water thrown otherwise, by graph networks and by ours."""
-    found = there(run, METHODS, trained)
+    found = load_available(run, METHODS, trained)
     rows = errors(run, {METHODS[name]: {WATER: laws} for name, laws in found.items()}, (TASK,))
     for name in found:
         method = METHODS[name]

@@ -9,7 +9,7 @@ from mpm_ref.materials.learned import learned_flow, learned_law
 from mpm_ref.scene import build
 
 from ..common.registry import experiment
-from ..common.weights_needed import there
+from ..common.weights_needed import load_available
 from .environments import environment, trajectory
 from .trained_laws import trained
 
@@ -29,7 +29,7 @@ def table5(run):
     law = build(environment(NAME)).bodies[0].law
     F, trial = drawn(trajectory(NAME), environment(NAME).dt)
     truth = answers(law, NoFlow(), F, trial)[0], without_shear(trial)
-    for name, laws in there(run, METHODS, trained).items():
+    for name, laws in load_available(run, METHODS, trained).items():
         found = answers(learned_law(laws.elastic), learned_flow(laws.plastic), F, trial)
         for (term, unit), a, b in zip(TERMS.items(), found, truth, strict=True):
             run.record(f"nclaw.table5.{term}.{METHODS[name]}", np.mean((a - b) ** 2), unit=unit,

@@ -10,7 +10,7 @@ from mpm_ref.scene import build
 
 from ..common.registry import experiment
 from ..common.scenes import threads_for, with_
-from ..common.weights_needed import there
+from ..common.weights_needed import load_available
 from .environments import ENVIRONMENTS, environment
 from .errors import PRINTED, ready
 from .evaluate import frames
@@ -33,7 +33,7 @@ def table3(run):
     """
     steps, rows = run.choose(quick=20, standard=1000), []
     names = [weights_of(word, name) for name in ENVIRONMENTS for word in METHODS]
-    found = there(run, names, trained)
+    found = load_available(run, names, trained)
     for name in run.progress(ENVIRONMENTS, "environments"):
         laws = methods(name, found)
         if laws:

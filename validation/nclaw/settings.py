@@ -15,9 +15,8 @@ from mpm_ref.scene import build
 from mpm_ref.shapes.inside import solid
 
 from ..common.registry import experiment
-from ..common.scenes import catalogue_scene
-from ..common.settings import record_settings
-from ..common.weights_needed import there
+from ..common.scenes import catalogue_scene, record_settings
+from ..common.weights_needed import load_available
 from .environments import ENVIRONMENTS
 from .gallery import contact, large, pool
 from .identified import POINTS
@@ -39,7 +38,7 @@ def settings(run):
     jelly = scenes[JELLY]
     record_settings(run, f"nclaw_{JELLY}", of_environment(jelly, len(scenes)))
     record_settings(run, "nclaw_*", of_release(scenes))
-    found = there(run, (JELLY, GRAPHS), trained)
+    found = load_available(run, (JELLY, GRAPHS), trained)
     if JELLY in found:
         record(run, f"weights {JELLY}.npz", {**of_networks(found[JELLY]),
                                              **of_training(found[JELLY].about["recipe"])})

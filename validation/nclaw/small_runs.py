@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..common.scenes import with_
-from ..common.weights_needed import there
+from ..common.weights_needed import load_available
 from .environments import environment
 from .evaluate import body_maker, compare
 from .small_trainings import bundled, small_nets
@@ -38,7 +38,7 @@ def measured(run, names, full=True):
     """[`Measured`] of trainings by name, of all epochs that were kept; full: whether also in the
     body of the environment.
     """
-    bundles = there(run, names, bundled)
+    bundles = load_available(run, names, bundled)
     for name, bundle in bundles.items():
         if bundle.about.get("stopped"):
             run.note(f"{name}: the training stopped in {bundle.about['stopped']}")

@@ -9,7 +9,7 @@ from mpm_ref.scene import build
 
 from ..common.registry import experiment
 from ..common.scenes import threads_for, with_
-from ..common.weights_needed import there
+from ..common.weights_needed import load_available
 from ..ldm.published_bodies import keep
 from .environments import ENVIRONMENTS
 from .evaluate import RunBroken, body_maker, copy_body, frames
@@ -43,7 +43,7 @@ def away(run):
     ours, baselines as far as they are trained, ours before training.
     """
     names = [weights_of(word, name) for name in ENVIRONMENTS for word in BESIDE]
-    laws, found = there(run, names, trained), {}
+    laws, found = load_available(run, names, trained), {}
     for name in run.progress(ENVIRONMENTS, "environments"):
         beside = contestants(name, laws)
         for task, scene in (("time", time(name)), ("velocity", velocity(name, SEEDS[0]))):

@@ -1,7 +1,7 @@
 """Errors of NCLaw's laws: on the run they are trained on (Table 1), and away from it (Table 2)."""
 
 from ..common.registry import experiment
-from ..common.weights_needed import there
+from ..common.weights_needed import load_available
 from .environments import ENVIRONMENTS
 from .errors import COLUMNS, OURS, RELEASED, as_printed, errors, record, to_the_digits
 from .excerpts import NOT_RUN, record_excerpts
@@ -94,7 +94,7 @@ def known(run, names=None):
     records which are not.
     """
     names, found = nets() if names is None else names, {}
-    for name, laws in there(run, names, trained).items():
+    for name, laws in load_available(run, names, trained).items():
         net = nets()[name]
         found.setdefault(method_of(name, net), {})[net.environment] = laws
     return found

@@ -12,7 +12,7 @@ from mpm_ref.rom.study.errors import PositionErrors
 
 from ..common import targets
 from ..common.registry import experiment
-from ..common.weights_needed import there
+from ..common.weights_needed import load_available
 from .errors import COLUMNS, mean, rows_of, said, share, weights
 from .networks import fields_of, nets, trained
 from .reduced_runs import tested
@@ -33,7 +33,7 @@ def networks(run):
     for name, net in known.items():
         cost(run, name, net)
     rows = []
-    for name, model in there(run, list(known), trained).items():
+    for name, model in load_available(run, list(known), trained).items():
         one = tested_on(model, known[name].study)
         rows += of_scene(run, name, one, scale_of(known[name], one))
     run.table("errors", ("scene", *COLUMNS[1:]), rows)

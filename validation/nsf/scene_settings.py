@@ -6,8 +6,7 @@ What differs between runs of a scene (E, xi, angles) is that of the studies (`st
 from mpm_ref.scene import build
 
 from ..common.registry import experiment
-from ..common.scenes import catalogue_scene
-from ..common.settings import record_settings
+from ..common.scenes import catalogue_scene, record_settings
 from .study_settings import of_networks, of_studies
 
 ROUNDED = 0.01      # dx = 1/150 and 1/160 are printed with two digits, 0.0067 and 0.0063

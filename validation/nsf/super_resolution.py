@@ -12,7 +12,7 @@ from mpm_ref.scene import Poisson
 from mpm_ref.scene.overrides import varied
 
 from ..common.registry import experiment
-from ..common.weights_needed import there
+from ..common.weights_needed import load_available
 from ..ldm.published_bodies import keep
 from .networks import fields_of, nets, trained
 from .states import MOST, SHOTS
@@ -27,7 +27,7 @@ def boost(run):
     """Of the jelly cube, whose networks are trained; the paper shows sand. Latent coordinates are
     those of the states nearest to the run of the training's points.
     """
-    for model in there(run, [NAME], trained).values():
+    for model in load_available(run, [NAME], trained).values():
         study = nets()[NAME].study
         scene, fields = study.run(study.test[0]), fields_of(model, study)
         few = states(scene)

@@ -8,7 +8,7 @@ from mpm_ref.rom.snapshots import join_histories
 from mpm_ref.rom.study.dataset import simulate_history
 
 from ..common.registry import experiment
-from ..common.weights_needed import Untrained, there
+from ..common.weights_needed import Untrained, load_available
 from ..ldm.timing import clocked
 from ..nsf.networks import fields_of, nets, trained
 from ..nsf.reduced_runs import Tested, refitted
@@ -92,7 +92,7 @@ def trainings(run):
     """
     names = [name for name in nets() if name.endswith("-waves")]
     hours = {name: sum(model.about["cpu_seconds"].values()) / 3600.0
-             for name, model in there(run, names, trained).items()}
+             for name, model in load_available(run, names, trained).items()}
     for word, end in (("lo", min), ("hi", max)):
         name = end(hours, key=hours.get, default=None)
         if name is not None:

@@ -1,7 +1,7 @@
 """What NSF's networks cost and give by the width of their hidden layers."""
 
 from ..common.registry import experiment
-from ..common.weights_needed import there
+from ..common.weights_needed import load_available
 from ..nsf.errors import COLUMNS, mean, rows_of, share
 from ..nsf.networks import narrow, net_of, trained
 from ..nsf.networks_runs import OUTPUTS, TRAINED, scale_of, tested_on, weights_of
@@ -16,7 +16,7 @@ OWN = ("width", "bytes", "cpu", "cpu_full", *COLUMNS[1:])
             profiles=("standard",), budget={"standard": 300})
 def of_widths(run):
     """The jelly cube with features: the usual samples, drawn, and all particles."""
-    found = there(run, [*narrow(), "jelly-waves"], trained)
+    found = load_available(run, [*narrow(), "jelly-waves"], trained)
     rows = [row for name, model in run.progress(found.items(), "widths")
             for row in of_width(run, net_of(name), model)]
     run.table("widths", OWN, rows)

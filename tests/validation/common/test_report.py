@@ -12,9 +12,8 @@ from PIL import Image
 from figures.frame import Drawn, draw_all
 from validation import ProfileResults
 from validation.common.registry import Experiment
-from validation.common.report import chapters, preview, write_report
+from validation.common.report import chapters, preview, status_table, write_report
 from validation.common.run import RunSetting, run_all
-from validation.common.status import status_table
 from validation.common.targets import Target, load
 
 

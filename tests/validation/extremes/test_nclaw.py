@@ -12,7 +12,7 @@ from mpm_ref.nclaw.bodies import body_maker, body_with_laws
 from mpm_ref.nclaw.strain_watch import StrainReport
 from mpm_ref.scene import build
 from validation.common.scenes import with_
-from validation.common.weights_needed import Untrained, there
+from validation.common.weights_needed import Untrained, load_available
 from validation.extremes import nclaw_epochs, nclaw_long, nclaw_runs, nclaw_strain
 from validation.extremes import nclaw_observed as observed
 from validation.extremes.nclaw_runs import (
@@ -208,9 +208,9 @@ def test_what_is_not_trained_is_told():
         return name.upper()
 
     records = Records()
-    assert there(records, ["a", "b", "c"], load) == {"a": "A", "c": "C"}
+    assert load_available(records, ["a", "b", "c"], load) == {"a": "A", "c": "C"}
     assert records["trade.nclaw.x.untrained"] == (1, "no weights b.npz: train b")
-    assert there(Records(), ["a"], load) == {"a": "A"}
+    assert load_available(Records(), ["a"], load) == {"a": "A"}
 
 
 def test_bounds_are_those_that_weights_say(monkeypatch):

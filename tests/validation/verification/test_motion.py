@@ -10,8 +10,7 @@ from mpm_ref.body import Body, particles_at
 from mpm_ref.core.spline import STENCILS, base_of
 from mpm_ref.materials import FixedCorotated, NoFlow
 from mpm_ref.scene import build
-from validation.common.scenes import catalogue_scene, mean, threads_for
-from validation.common.settings import record_settings
+from validation.common.scenes import catalogue_scene, mean, record_settings, threads_for
 from validation.nclaw.final_states import digest
 from validation.verification import (
     bowl,
