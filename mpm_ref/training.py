@@ -1,7 +1,7 @@
-"""Parts that all trainings share: PyTorch on demand, the device, time taken, and checkpoints.
+"""Common parts of all trainings: import of PyTorch on demand, device, time and checkpoints.
 
-PyTorch is imported when it is asked for. A training that is cut off goes on from its checkpoint:
-`TrainingSession` saves and loads one, `train_epochs` says when.
+A training that is cut off continues from its checkpoint: `TrainingSession` saves and loads one, at
+the intervals of `train_epochs`.
 """
 
 import hashlib
@@ -25,10 +25,10 @@ class Machine(NamedTuple):
     device: str = "cpu"     # of DEVICES
 
 
-def part(name, what, instead):
+def import_with_torch(name, what, instead):
     """Return the module mpm_ref.NAME, which imports torch.
 
-    Raises ValueError without PyTorch; its sentence names what needs it, and what works instead.
+    Raises ValueError without PyTorch; the message says what needs it, and what works without.
     """
     try:
         return import_module(f"mpm_ref.{name}")
@@ -48,7 +48,7 @@ class TrainingTime(NamedTuple):
 
 
 class Meter:
-    """A stopwatch that starts when it is made, and adds the time of earlier parts."""
+    """A stopwatch that starts at once, and adds the time of earlier parts of the training."""
 
     def __init__(self):
         self.before, self.start = TrainingTime(0.0, 0.0), clocks()
@@ -66,14 +66,14 @@ def clocks():
 
 
 class Diverged(ValueError):
-    """A loss or a gradient is not finite, or a run of a training breaks down."""
+    """A training whose loss or gradient is not finite, or in which a run breaks down."""
 
 
 class TrainingSession:
     """A training under way: its history, its time, and its checkpoints.
 
     A subclass has `epoch()`, which appends an entry to `history`; `description`, one line of text
-    that says what is trained and on what; and `states()`.
+    on the networks and the data; and `states()`.
     """
 
     entry = list        # type of an entry of `history`, made from a row of a checkpoint

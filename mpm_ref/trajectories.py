@@ -10,7 +10,7 @@ from .body import restore_order
 from .simulate import simulate
 
 
-class RunHistory(NamedTuple):
+class BodyHistory(NamedTuple):
     """One run: time levels 0 .. k, points in the body's own order."""
 
     x: np.ndarray       # (k + 1, n, d)     position [m]
@@ -28,10 +28,10 @@ class Observed(NamedTuple):
 
 
 def history(problem, every=1):
-    """Return the `RunHistory` of one point in `every` of a problem. Raises ValueError as
+    """Return the `BodyHistory` of one point in `every` of a problem. Raises ValueError as
     `recorded`.
     """
-    return recorded(problem, RunHistory, every)
+    return recorded(problem, BodyHistory, every)
 
 
 def observed(problem):

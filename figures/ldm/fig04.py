@@ -21,9 +21,9 @@ def scale(results):
 
 
 def draw(results):
-    kept = read(results.folder, NEEDS[0])
-    X, samples, view = kept["X"], kept["X"][kept["samples"]], View(2, 6.4)
-    paint = np.array([to_rgb(COLOURS[k]) for k in np.arange(1, 3) @ kept["held"]])
+    states = read(results.folder, NEEDS[0])
+    X, samples, view = states["X"], states["X"][states["samples"]], View(2, 6.4)
+    paint = np.array([to_rgb(COLOURS[k]) for k in np.arange(1, 3) @ states["held"]])
     large = flattened(body(samples, paint, spacing(X), LARGE), view)
     return pictures([Panel(body(X, FULL, spacing(X)), no_balls(), f"all {len(X)} points"),
                      Panel(large, ghost(X), f"{len(samples)} samples")], view)

@@ -16,9 +16,9 @@ def scale(results):
 
 
 def draw(results):
-    kept = read(results.folder, NEEDS[0])
-    X, x = kept["X"], kept["reduced"]
+    states = read(results.folder, NEEDS[0])
+    X, x = states["X"], states["reduced"]
     paint, shown = shades(1000.0 * distance_to(x, X))
-    found = [Panel(body(x[k], paint[k], spacing(X)), ghost(X), f"g = {g:g} m/s²")
-             for k, g in enumerate(kept["g"])]
-    return pictures(found, View(3, 9.0), shown, "displacement [mm]")
+    panels = [Panel(body(x[k], paint[k], spacing(X)), ghost(X), f"g = {g:g} m/s²")
+              for k, g in enumerate(states["g"])]
+    return pictures(panels, View(3, 9.0), shown, "displacement [mm]")

@@ -20,12 +20,12 @@ def scale(results):
 
 
 def draw(results):
-    kept = read(results.folder, NEEDS[0])
-    X = kept["X"]
-    states = {"before": X, "after, reduced": kept["reduced"], "after, full": kept["full"]}
-    found = [Panel(body(x, chequered(X), spacing(X)), no_balls(), words)
-             for words, x in states.items()]
-    return pictures(found, View(3, 7.0, lift=28.0))
+    stored = read(results.folder, NEEDS[0])
+    X = stored["X"]
+    states = {"before": X, "after, reduced": stored["reduced"], "after, full": stored["full"]}
+    panels = [Panel(body(x, chequered(X), spacing(X)), no_balls(), words)
+              for words, x in states.items()]
+    return pictures(panels, View(3, 7.0, lift=28.0))
 
 
 def chequered(X):

@@ -20,14 +20,14 @@ def scale(results):
 
 
 def draw(results):
-    kept = read(results.folder, NEEDS[0])
-    full, low = kept["full"], kept["low"]
-    off = [1000.0 * distance_to(kept[name], full) for name in ("tracers", "reduced")]
+    states = read(results.folder, NEEDS[0])
+    full, low = states["full"], states["low"]
+    off = [1000.0 * distance_to(states[name], full) for name in ("tracers", "reduced")]
     (tracers, reduced), shown = shades(off, "plasma", np.quantile(off, TOP))
     near = spacing(full)
-    found = [Panel(body(kept["tracers"], tracers, near), no_balls(), "(a) tracers in (b)"),
-             Panel(body(low, FULL, spacing(low)), no_balls(), f"(b) full, {len(low)} points"),
-             Panel(body(kept["reduced"], reduced, near), no_balls(),
-                   f"(c) reduced, {len(full)} points"),
-             Panel(body(full, FULL, near), no_balls(), f"(d) full, {len(full)} points")]
-    return pictures(found, View(4, 8.0), shown, "distance from (d) [mm]")
+    panels = [Panel(body(states["tracers"], tracers, near), no_balls(), "(a) tracers in (b)"),
+              Panel(body(low, FULL, spacing(low)), no_balls(), f"(b) full, {len(low)} points"),
+              Panel(body(states["reduced"], reduced, near), no_balls(),
+                    f"(c) reduced, {len(full)} points"),
+              Panel(body(full, FULL, near), no_balls(), f"(d) full, {len(full)} points")]
+    return pictures(panels, View(4, 8.0), shown, "distance from (d) [mm]")

@@ -16,10 +16,10 @@ def scale(results):
 
 
 def draw(results):
-    kept = read(results.folder, NEEDS[0])
-    X, found = kept["X"], []
-    paint, shown = shades([1000.0 * distance_to(kept[name], X) for name in ("full", "reduced")])
+    states = read(results.folder, NEEDS[0])
+    X, panels = states["X"], []
+    paint, shown = shades([1000.0 * distance_to(states[name], X) for name in ("full", "reduced")])
     for name, colours in zip(("full", "reduced"), paint, strict=True):
-        for x, colour, t in zip(kept[name], colours, kept["t"], strict=True):
-            found.append(Panel(body(x, colour, spacing(X)), ghost(X), f"{name}, t = {t:.2f} s"))
-    return pictures(found, View(3, 5.4), shown, "displacement [mm]")
+        for x, colour, t in zip(states[name], colours, states["t"], strict=True):
+            panels.append(Panel(body(x, colour, spacing(X)), ghost(X), f"{name}, t = {t:.2f} s"))
+    return pictures(panels, View(3, 5.4), shown, "displacement [mm]")

@@ -20,15 +20,15 @@ def scale(results):
 
 
 def draw(results):
-    kept = read(results.folder, NEEDS[0])
-    X, found = kept["X"], []
-    paint, shown = shades([1000.0 * distance_to(kept[name], X) for name in ("full", "reduced")])
+    states = read(results.folder, NEEDS[0])
+    X, panels = states["X"], []
+    paint, shown = shades([1000.0 * distance_to(states[name], X) for name in ("full", "reduced")])
     for name, colours in zip(("full", "reduced"), paint, strict=True):
-        for k, (x, colour, mu) in enumerate(zip(kept[name], colours, kept["mu"], strict=True)):
-            found.append(Panel(body(x, colour, spacing(X)), ghost(X),
+        for k, (x, colour, mu) in enumerate(zip(states[name], colours, states["mu"], strict=True)):
+            panels.append(Panel(body(x, colour, spacing(X)), ghost(X),
                                poked(*mu) if name == "full" else "", "" if k else name))
-    count = len(kept["mu"])
-    return pictures(found, View(count, FOR_EACH * count), shown, "displacement [mm]")
+    count = len(states["mu"])
+    return pictures(panels, View(count, FOR_EACH * count), shown, "displacement [mm]")
 
 
 def poked(rho, theta, phi):

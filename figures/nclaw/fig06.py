@@ -18,11 +18,11 @@ def scale(results):
 
 
 def draw(results):
-    kept, found = read(results.folder, NEEDS[0]), []
+    states, panels = read(results.folder, NEEDS[0]), []
     for name in NAMES:
-        x = kept[name].astype(float)
-        for k, t in enumerate(kept["t"]):
-            title = "" if found[4:] else f"t = {t:.3g} s"
-            found.append(Panel(colour_by_height(x[k], x[0]), no_balls(), title,
+        x = states[name].astype(float)
+        for k, t in enumerate(states["t"]):
+            title = "" if panels[4:] else f"t = {t:.3g} s"
+            panels.append(Panel(colour_by_height(x[k], x[0]), no_balls(), title,
                                "" if k else name))
-    return pictures(found, VIEW)
+    return pictures(panels, VIEW)

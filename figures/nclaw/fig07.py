@@ -1,5 +1,5 @@
 """NCLaw, Figures 2 (c), 7 and 8: bodies of task (c); from left to right the start, ours half-way,
-the baseline "neural" there, if it was kept, and the truth. Colours: height at the start.
+the baseline "neural" there, if it was stored, and the truth. Colours: height at the start.
 """
 
 from validation.ldm.published_bodies import read
@@ -17,7 +17,7 @@ def scale(results):
 
 
 def draw(results):
-    kept = read(results.folder, NEEDS[0])
-    words = available(kept, ROWS, ("ours", "neural"))
+    states = read(results.folder, NEEDS[0])
+    words = available(states, ROWS, ("ours", "neural"))
     columns = 2 + len(words)
-    return pictures(comparison_rows(kept, ROWS, words), View(columns, 3.0 * columns))
+    return pictures(comparison_rows(states, ROWS, words), View(columns, 3.0 * columns))

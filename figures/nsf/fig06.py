@@ -18,7 +18,7 @@ def scale(results):
 
 
 def draw(results):
-    kept = read(results.folder, NEEDS[0])
-    found = [panel for word, (colour, side) in ROWS.items()
-             for panel in time_row(kept[word], COLOURS[colour], side)]
-    return pictures(found, View(len(kept["few"]), 8.0, 25.0, 15.0))
+    states = read(results.folder, NEEDS[0])
+    panels = [panel for word, (colour, side) in ROWS.items()
+              for panel in time_row(states[word], COLOURS[colour], side)]
+    return pictures(panels, View(len(states["few"]), 8.0, 25.0, 15.0))

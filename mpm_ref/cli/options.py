@@ -114,7 +114,7 @@ def examples(*commands):
 
 
 def studied(name):
-    """The `Study` of a file or a shipped name."""
+    """The `ReducedStudy` of a file or a shipped name."""
     return load(find_study(name), shipped_scenes())
 
 

@@ -39,7 +39,7 @@ def made(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def pairs(made):
-    """The `Study`."""
+    """The `ReducedStudy`."""
     return load(made / "pairs.toml")
 
 

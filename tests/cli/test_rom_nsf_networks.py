@@ -37,7 +37,7 @@ def made(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def study(made):
-    """The `Study`."""
+    """The `ReducedStudy`."""
     return load(made / "pairs.toml")
 
 

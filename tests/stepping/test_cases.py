@@ -10,7 +10,7 @@ from mpm_ref import simulate
 from mpm_ref.explicit import Scheme
 from mpm_ref.materials import NoFlow, make_flow, make_law
 from mpm_ref.problem import Clock, Problem
-from mpm_ref.trajectories import Observed, RunHistory, history, observed, recorded
+from mpm_ref.trajectories import BodyHistory, Observed, history, observed, recorded
 
 STEPS = 5
 
@@ -62,7 +62,7 @@ def test_points_stay_in_their_own_order_although_runs_sort_them(monkeypatch):
 
 def test_histories_are_less_and_of_fewer_points():
     whole, found = observed(metal()), history(metal())
-    assert isinstance(found, RunHistory)
+    assert isinstance(found, BodyHistory)
     for name in ("x", "F", "v"):
         assert np.array_equal(getattr(found, name), getattr(whole, name))
         thin = recorded(metal(), Observed, every=7)

@@ -8,7 +8,7 @@ from hidden_torch import hide
 from mpm_ref import rom
 from mpm_ref.nclaw.study import training
 from mpm_ref.rom.study import reduce
-from mpm_ref.training import part
+from mpm_ref.training import import_with_torch
 
 
 @pytest.mark.parametrize(("asked", "said"), [
@@ -27,7 +27,7 @@ def test_without_pytorch_one_sentence_says_what_to_do(without_torch, asked, said
 
 def test_another_module_that_is_missing_is_named():
     with pytest.raises(ModuleNotFoundError, match=r"mpm_ref\.nclaw\.train\.unheard"):
-        part("nclaw.train.unheard", "it is made", "")
+        import_with_torch("nclaw.train.unheard", "it is made", "")
 
 
 def test_with_pytorch_the_part_is_there():

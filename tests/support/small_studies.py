@@ -60,12 +60,12 @@ def write(folder, *edits, scene=SCENE):
 
 
 def study(folder, *edits, **scene):
-    """The `Study`."""
+    """The `ReducedStudy`."""
     return load(write(folder, *edits, **scene))
 
 
 def generated(folder, data="."):
-    """The `Study` in a folder, and the folder in it with its runs."""
+    """The `ReducedStudy` in a folder, and the folder in it with its runs."""
     bars, data = study(folder), folder / data
     data.mkdir(exist_ok=True)
     assert [(done.number, done.why) for done in generate(bars, data)] == [

@@ -12,7 +12,7 @@ from mpm_ref.rom.study.dataset import simulate_history, simulate_snapshots
 from mpm_ref.rom.study.reduce import train_model
 from mpm_ref.rom.study.study import load
 from mpm_ref.scene import build
-from mpm_ref.training import Machine, part
+from mpm_ref.training import Machine, import_with_torch
 from mpm_ref.trajectories import observed
 
 from .library import ROOT, problem, scene_names
@@ -42,9 +42,10 @@ def graph(scene, values, frames, recipe):
     world = problem(scene, values)
     box, dt = box_of(world.conditions.walls, world.dx), frames * world.clock.dt
     x, v, *_ = observed(world)
-    run = part("nclaw.gnn.train.examples", "", "").run_of(x[::frames], v[0], dt, box)
-    kind = part("nclaw.gnn.train.fit", "", "").GraphRecipe
-    session = part("nclaw.gnn.train.fit", "", "").train(kind(**recipe), [run], dt)
+    examples, fit = (import_with_torch(f"nclaw.gnn.train.{name}", "", "")
+                     for name in ("examples", "fit"))
+    run = examples.training_run(x[::frames], v[0], dt, box)
+    session = fit.train_graph(fit.GraphRecipe(**recipe), [run], dt)
     network, reading, _ = session.simulator({})
     return {"network": network, "reading": reading, "history": session.history}
 

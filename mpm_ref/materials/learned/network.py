@@ -1,4 +1,4 @@
-"""Trained laws as a material: what kernels are compiled for, without PyTorch, in doubles.
+"""Trained networks as materials: records that kernels are compiled for, in doubles, no PyTorch.
 
     tau = answer(net(a), F, R),    F' = answer(net'(a'), F_trial, R')
 
@@ -6,10 +6,10 @@ with a of `invariants` and the answers of `response` (NCLAW-alg2, NCLAW-alg4), p
 
     a_0 = a,   a_{l+1} = gelu(a_l W_l + b_l),   y = a_{L-1} W_{L-1} + b_{L-1}
 
-gelu(z) = z (1 + erf(z / sqrt 2)) / 2. Rows are walked so that a sum over inputs adds vectors of
-outputs: no sum is reordered, and the compiler may use vector registers all the same.
+gelu(z) = z (1 + erf(z / sqrt 2)) / 2. Loops run over the rows of W, so that a sum over inputs adds
+vectors of outputs: the compiler can use vector registers without reordering a sum.
 
-No energy belongs to such a stress. How stiff it is, is known at rest alone, from differences.
+Such a stress has no energy. Its stiffness is computed at rest alone, by finite differences.
 """
 
 from math import erf, exp, log1p, sqrt
@@ -32,14 +32,14 @@ ROOT = sqrt(0.5)
 
 
 class NeuralLaw(NamedTuple):
-    """F -> tau [Pa], with the answer of a kind of `response`: a class of its own for each."""
+    """F -> tau [Pa], with the answer of a kind of `response`, which each subclass fixes."""
 
     sizes: np.ndarray   # widths of the layers, inputs first, outputs last; integer
     W: np.ndarray       # weights: of layer l an array (sizes[l], sizes[l + 1]), flattened
     b: np.ndarray       # biases: of layer l an array (sizes[l + 1],)
     unit: float         # of the network's answer [Pa]
     wave: float         # at rest: modulus of a compression wave, lam + 2 mu [Pa], 0 if negative
-    largest: float      # ... and the most that any velocity gradient meets [Pa]
+    largest: float      # ... and the largest for any velocity gradient [Pa]
 
     @property
     def dim(self):

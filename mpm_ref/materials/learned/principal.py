@@ -14,15 +14,15 @@ where M has no diagonal and in each pair of axes, with X = T diag(s),
 
 b_ij is 0 where s_i + s_j = 0 to round-off, where R is not determined. Of a_ij there are two kinds:
 
-* y is isotropic: swapping two stretches swaps their y. Then y_i = y_j where s_i = s_j, tau does not
-  depend on which axes the decomposition picks there, and a_ij has the limit dy_i/ds_i - dy_i/ds_j.
-  As it is an even function of the gap, a law gives it at a gap of its choice, an error of the order
-  of the square of that (see `learn.stretches`).
-* y is any function of the sorted stretches, as is a network that reads them in a row. Where two of
-  them meet its y_i and y_j differ, tau depends on the axes picked, jumps with them, and has no
-  derivative: a_ij grows as one over the gap. `bounded_ratios` is a_ij with gaps below LEAST_GAP
-  counted as that, exact for wider ones. The authors' release bounds it so, by 1e-6 for s_i^2 -
-  s_j^2, and with it b_ij, which needs no bound. Gradients over tens of steps explode all the same.
+* y is isotropic: exchanging two stretches exchanges their y. Then y_i = y_j where s_i = s_j, tau
+does not depend on the axes that the decomposition picks there, and a_ij has the limit dy_i/ds_i -
+dy_i/ds_j. As it is an even function of the gap, a law may evaluate it at a small gap, with an error
+of the order of the gap squared (see `nclaw.train.principal_laws`). * y is any function of the
+sorted stretches, such as a network of them. Where two stretches are equal its y_i and y_j differ,
+tau depends on the axes picked, jumps with them, and has no derivative: a_ij grows as one over the
+gap. `bounded_ratios` computes a_ij with gaps of at least LEAST_GAP, and is exact for wider ones.
+The authors' release has such a bound, 1e-6 for s_i^2 - s_j^2, and also for b_ij, which needs none.
+Even so, gradients over tens of steps explode.
 """
 
 

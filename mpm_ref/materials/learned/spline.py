@@ -4,18 +4,19 @@
 
 is P in principal stretches of an energy F(s_i) + G(s_i s_j) + H(J) summed over axes and pairs, in
 3D; f, g, h are its derivatives. Each is given by values at 21 knots, 11 on [0, 1] and 11 on [1, 10]
-evenly, in Bezier pieces (NCLAW-methods says quadratic, the authors' release has cubics). As what a
-piece is depends on the values linearly, a reading of the pieces is a constant table (`Pieces`):
+evenly, in Bezier pieces (NCLAW-methods says quadratic, the authors' release has cubics). As a
+piece depends on the values linearly, each reading of the pieces is a constant table (`Pieces`):
 
 `fair`      Hermite cubics whose slope at a knot is that of the parabola through it and its
             neighbours: they have a continuous derivative and are exact for parabolas.
-`released`  as the release evaluates them. Its cubics are meant so for evenly spaced knots, with
-            other slopes at the ends. But its Bernstein matrix has -1 for the +1 of the constant
-            term, and its piece is the one after that of a number up to 0.8, and that of [0.9, 1]
-            from there on: so the function jumps at 0, 0.1, .., 0.8, reads 12 of the 21 values, and
-            four of them, those at 0.8, 0.9, 1 and 1.9, wherever stretches stay above 0.8.
+`released`  as the release evaluates them. Its cubics are intended to be such Hermite cubics on
+            evenly spaced knots, with other slopes at the ends. But its Bernstein matrix has -1
+            instead of +1 for the constant term; for numbers up to 0.8 it takes the piece after
+            the right one, and above that the piece of [0.9, 1]. So the function jumps at 0, 0.1,
+            .., 0.8, uses 12 of the 21 values, and only the four at 0.8, 0.9, 1 and 1.9 where
+            stretches stay above 0.8.
 
-Beyond the knots the last piece goes on.
+Beyond the knots the last piece continues.
 """
 
 from typing import NamedTuple
@@ -35,7 +36,7 @@ BERNSTEIN = np.array([[-1.0, 3.0, -3.0, 1.0], [3.0, -6.0, 3.0, 0.0], [-3.0, 3.0,
 class SplineStress(NamedTuple):
     """Kirchhoff stress of `fair` splines; values at knots are (21, 3), of f, g, h.
 
-    In kPa, a rate of 1 moves a value as far as the stiffness of the paper's materials asks for.
+    With values in kPa, a learning rate of 1 suits the stiffness of the paper's materials.
     """
 
     unit: float = 1e3       # of the values [Pa]

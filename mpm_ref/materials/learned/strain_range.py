@@ -1,7 +1,7 @@
-"""The strains that a law met in training, as bounds: of each stretch s_0 >= s_1 >= .. and of J.
+"""Bounds of the strains in a law's training: of each stretch s_0 >= s_1 >= .. and of J.
 
-Bounds say where there was nothing to learn from; within them there may be gaps. A point is out of
-them by
+Outside of the bounds there were no training data; inside there may be gaps. A point is out of
+bounds by
 
     excess_p = max over a of  max(low_a - a_p, a_p - high_a, 0) / (high_a - low_a)
 
@@ -12,8 +12,8 @@ import numpy as np
 
 from .invariants import spectrum
 
-ROUND_OFF = 1e-9        # of stretches and J, which count as within bounds
-MIN_WIDTH = 1e-9        # of bounds that have no width, of laws that met rest alone
+ROUND_OFF = 1e-9        # of stretches and J: so far out counts as within bounds
+MIN_WIDTH = 1e-9        # of bounds without width, of laws trained at rest alone
 
 
 def strain_measures(F):
@@ -29,14 +29,14 @@ def strain_bounds(F):
 
 
 def within_bounds(F, bounds):
-    """Return which (n,) of F (n, d, d) lie within bounds; none that are not finite."""
+    """Return whether each of F (n, d, d) is finite and lies within bounds, as (n,)."""
     measures, slack = strain_measures(F), ROUND_OFF
     low, high = (np.array(bounds[end]) for end in ("low", "high"))
     return np.all((measures >= low - slack) & (measures <= high + slack), axis=1)
 
 
 def excess(measures, bounds):
-    """Return how far (n,) points of strain measures (n, d + 1) are out of bounds.
+    """Return the excess (n,) of points with strain measures (n, d + 1) over the bounds.
 
     It is infinite for J <= 0 below the bounds, and where F is not finite.
     """
@@ -51,7 +51,7 @@ def excess(measures, bounds):
 def stored_bounds(about, d):
     """Return the bounds that the record of a training holds, and its `dt` [s] or None; or None.
 
-    Raises ValueError for bounds that are none in d dimensions.
+    Raises ValueError for bounds that are not those of d dimensions.
     """
     if "seen" not in about:
         return None

@@ -1,6 +1,7 @@
-"""Learned laws as a file (see `archive`): an elastic law and a flow, layers and kind of each.
+"""Files of learned laws: an elastic law and a flow, with layers and kind of each.
 
-A kind is a record of numbers, and its type says what layers (W (in, out), b (out,)) are for:
+A kind is a record of numbers, whose type determines the meaning of the layers (W (in, out), b
+(out,)); see `store.weights_file` for the bytes:
 
     answers of `response`       GELU between them; of the invariants, without R also of F - I
     `stretch_network`           ELU between them; from s - 1 to y, d numbers each
@@ -77,11 +78,11 @@ def errors_include_velocities(about):
 
 def law_arrays(part, law):
     """Return the arrays of a law by name."""
-    found = {f"{part}_kind": np.array(type(law.kind).__name__),
-             f"{part}_constants": np.array(law.kind, dtype=float)}
+    arrays = {f"{part}_kind": np.array(type(law.kind).__name__),
+              f"{part}_constants": np.array(law.kind, dtype=float)}
     for k, (W, b) in enumerate(law.layers):
-        found |= {f"{part}_W{k}": np.asarray(W, float), f"{part}_b{k}": np.asarray(b, float)}
-    return found
+        arrays |= {f"{part}_W{k}": np.asarray(W, float), f"{part}_b{k}": np.asarray(b, float)}
+    return arrays
 
 
 def law_from_arrays(part, arrays):

@@ -13,7 +13,7 @@ from ...store.manifest import source_hash, versions
 from ...store.results import BadResults, Results
 from ...store.running import Options, run
 from ...store.writer import Fields, require_run
-from ...training import part
+from ...training import import_with_torch
 from ...trajectories import Observed
 
 FIELDS = ("x", "v", "C", "F")
@@ -22,7 +22,7 @@ J_ALONE = "J"
 
 def trainer():
     """Return the module that trains laws. Raises ValueError without PyTorch."""
-    return part("nclaw.train.train", "laws are trained",
+    return import_with_torch("nclaw.train.train", "laws are trained",
                 "laws that were trained run, export and plot without it")
 
 
@@ -78,14 +78,14 @@ def read_run(path, problem):
     """
     body, d = problem.bodies[0].name, problem.dim
     with Results(path) as results:
-        found = {name: results.field(body, name) for name in FIELDS[:3]}
+        fields = {name: results.field(body, name) for name in FIELDS[:3]}
         last = J_ALONE if results.has(body, J_ALONE) else FIELDS[3]
-        found[last] = results.field(body, last)
-    require_finite(path, found)
-    J = found.pop(J_ALONE, None)
+        fields[last] = results.field(body, last)
+    require_finite(path, fields)
+    J = fields.pop(J_ALONE, None)
     if J is not None:
-        found["F"] = J[..., None, None] ** (1.0 / d) * np.eye(d)
-    return Observed(**found)
+        fields["F"] = J[..., None, None] ** (1.0 / d) * np.eye(d)
+    return Observed(**fields)
 
 
 def require_finite(path, fields):

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...shapes.inside import solid
 from ...store.manifest import source_hash, versions
-from ...training import part
+from ...training import import_with_torch
 from .. import model_file
 from ..fields.network import Networks, learned_fields
 from ..fields.pod import basis
@@ -58,7 +58,7 @@ def with_misfit(study, model, data):
 
 def trainer():
     """Return `rom.train.settings`, which trains networks. Raises ValueError without PyTorch."""
-    return part("rom.train.settings", "a network is trained",
+    return import_with_torch("rom.train.settings", "a network is trained",
                 f"or make modes, which need none: --kind {MODES}")
 
 

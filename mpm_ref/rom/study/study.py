@@ -1,4 +1,4 @@
-"""A study: a scene, the parameters of many runs of it, and the reduced model to be made of them.
+"""A study of reduced models: a scene, parameters of many runs of it, and the model of them.
 
 `load` reads it from a TOML file; docs/reference/studies.md explains the keys.
 """
@@ -25,11 +25,11 @@ SAME = ("dim", "dx", "dt", "steps", "every", "seed", "scheme", "integrator")    
 SUMMED = ("modes", "tau", "C")      # numbers of modes, of maps and fields that are sums of them
 
 
-class Study(NamedTuple):
-    """Runs of one scene, numbered, some of them held out."""
+class ReducedStudy(NamedTuple):
+    """Numbered runs of one scene, some of which are held out, and the settings of their model."""
 
     path: Path
-    base: object            # the `Scene` with what is set in all runs
+    base: object            # the `Scene` with the changes of all runs
     tables: CommonTables    # those of its method (see `TABLES`)
     mu: np.ndarray          # (runs, parameters)
     test: tuple             # numbers of the runs that are held out
@@ -109,8 +109,8 @@ class Study(NamedTuple):
 
 
 def load(path, scenes=None):
-    """Return the `Study` of a TOML file; scenes {name: path} are those that it may name. Raises
-    SceneError, which names the file and the key.
+    """Return the `ReducedStudy` of a TOML file; scenes {name: path} are those that it may name.
+    Raises SceneError, which names the file and the key.
     """
     path = Path(path)
     data = read_toml(path)
@@ -118,7 +118,7 @@ def load(path, scenes=None):
         tables = parse_tables(data)
         mu = parameters(tables)
         base = base_scene(tables, path.parent, scenes or {}, METHODS[tables.model].frame_spacing)
-        study = Study(path, base, tables, mu, held_out(len(mu), tables.test, tables.seed))
+        study = ReducedStudy(path, base, tables, mu, held_out(len(mu), tables.test, tables.seed))
         _require_one_body(study)
         _require_states(study)
         _require_step(study)
