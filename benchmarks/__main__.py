@@ -1,5 +1,7 @@
-"""`python -m benchmarks`: ours beside Taichi and Warp on one elastic block, what each feature of
-ours costs, and what an implicit step takes.
+"""Run the benchmarks: `python -m benchmarks COMMAND`.
+
+They compare mpm_ref with Taichi and Warp on an elastic block, and measure the cost of each feature
+and of an implicit step.
 """
 
 import json
@@ -29,7 +31,7 @@ AGREE = 1e-12       # relative difference of the kinetic energies that is allowe
 
 
 def backend(name, problem, threads):
-    """A stepper of the problem; imports the backend only when it is asked for."""
+    """Return a stepper of the problem; only the requested backend is imported."""
     if name == "mpm_ref":
         from .ours_block import OurBlock as Backend
     elif name == "taichi":
@@ -40,20 +42,21 @@ def backend(name, problem, threads):
 
 
 def timed(stepper, steps):
-    """Wall and CPU seconds of some steps."""
+    """Return the wall and CPU seconds of a number of steps."""
     wall, cpu = time.perf_counter(), time.process_time()
     stepper.step(steps)
     return time.perf_counter() - wall, time.process_time() - cpu
 
 
 def kinetic(stepper, mass):
-    """Kinetic energy of the particles [J]."""
+    """Return the kinetic energy of the particles [J]."""
     return 0.5 * mass * float(np.sum(stepper.velocity() ** 2))
 
 
 def compare(problem, names, threads, repeats):
-    """Median wall and CPU ns per particle-step of each backend, timed in turn; and their
-    energies.
+    """Return the median wall and CPU ns per particle-step of each backend, and their energies.
+
+    The backends are timed in turn.
     """
     steppers = {name: backend(name, problem, threads) for name in names}
     for stepper in steppers.values():
@@ -70,7 +73,7 @@ def compare(problem, names, threads, repeats):
 
 
 def disagreement(energies):
-    """Largest relative difference of the energies."""
+    """Return the largest relative difference of the energies."""
     values = np.array(list(energies.values()))
     return float(np.ptp(values) / np.abs(values).max())
 
@@ -83,27 +86,27 @@ def blocks(
     repeats: Annotated[int, typer.Option()] = 9,
     out: Annotated[Path, typer.Option()] = Path("results/benchmarks/block.json"),
 ):
-    """Ns per particle-step of every backend, lattice and shuffled order, with ratios."""
+    """Measure ns per particle-step of every backend, in lattice and shuffled order."""
     names, rows = backends.split(","), []
     for size in sizes.split(","):
         for shuffle in (False, True):
             problem = block(CELLS[size], shuffle)
             times, energies = compare(problem, names, threads, repeats)
-            apart = disagreement(energies)
-            if apart > AGREE:
-                raise SystemExit(f"the backends disagree by {apart:.1e} > {AGREE}: {energies}")
+            difference = disagreement(energies)
+            if difference > AGREE:
+                raise SystemExit(f"the backends disagree by {difference:.1e} > {AGREE}: {energies}")
             for name, (wall, cpu) in times.items():
                 rows.append({
                     "size": size, "particles": len(problem.x), "shuffled": shuffle,
                     "backend": name, "wall_ns": wall, "cpu_ns": cpu,
-                    "cpu_ratio_to_ours": cpu / times[names[0]][1], "disagreement": apart,
+                    "cpu_ratio_to_ours": cpu / times[names[0]][1], "disagreement": difference,
                 })
                 show(rows[-1])
     save(out, rows, threads, repeats)
 
 
 def show(row):
-    """One line of the table."""
+    """Print a row of the table of backends."""
     order = "shuffled" if row["shuffled"] else "lattice"
     typer.echo(
         f"{row['size']:>5} {order:8} {row['backend']:8} wall {row['wall_ns']:7.1f} ns  "
@@ -112,7 +115,7 @@ def show(row):
 
 
 def save(out, rows, threads, repeats):
-    """Results with what they were measured on."""
+    """Write the rows with the conditions of the measurement."""
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(json.dumps({
         "command": "python -m benchmarks " + " ".join(sys.argv[1:]),
@@ -127,7 +130,7 @@ def save(out, rows, threads, repeats):
 def features(
     threads: int = 2, repeats: int = 9, out: Path = Path("results/benchmarks/features.json")
 ):
-    """Ns per particle-step and bytes per particle of each feature, on the block of 100k."""
+    """Measure ns per particle-step and bytes per particle of each feature, on the block of 100k."""
     from .features import costs
 
     rows = costs(block(CELLS["100k"]), threads, repeats)
@@ -146,7 +149,7 @@ def hot(
     repeats: int = 7,
     out: Path = Path("results/benchmarks/hot.json"),
 ):
-    """CPU time of an implicit step and of each of its parts, and of pyamg on the same matrix."""
+    """Measure the CPU time of an implicit step, of each of its parts, and of pyamg."""
     from mpm_ref.core.jit import set_threads
 
     from .hot import costs
@@ -160,7 +163,7 @@ def hot(
 
 
 def hot_line(row):
-    """One line of the table of implicit steps."""
+    """Return a row of the table of implicit steps as text."""
     size = f"{row['step']:5} {row['particles']:6} particles {row['nodes']:6} nodes  "
     if "part" in row:
         return size + f"{row['part']:36} {row['cpu_ns']:9.1f} ns per {row['per']}"
@@ -176,7 +179,7 @@ def hot_runs(
     threads: int = 1,
     out: Path = Path("results/benchmarks/hot_runs.json"),
 ):
-    """CPU time of some implicit steps of whole runs, by our variants, beside the public code's."""
+    """Measure the CPU time of implicit steps of whole runs by our variants."""
     from mpm_ref.core.jit import set_threads
 
     from .hot_runs import RUNS, run_rows
@@ -185,15 +188,15 @@ def hot_runs(
     rows = []
     with threadpoolctl.threadpool_limits(threads):
         for name in runs.split(",") if runs else RUNS:
-            found = run_rows(name)
-            rows += found
-            for row in found:
+            new = run_rows(name)
+            rows += new
+            for row in new:
                 typer.echo(run_line(row))
     save(out, rows, threads, 1)
 
 
 def run_line(row):
-    """One line of the table of runs."""
+    """Return a row of the table of runs as text."""
     public = "" if row["public_cpu_s"] is None else (
         f"  x {row['cpu_s'] / row['public_cpu_s']:.2f} of the public code")
     return (f"{row['run']:12} {row['particles']:6} particles {row['nodes']:6} nodes  "
@@ -204,17 +207,18 @@ def run_line(row):
 
 @app.command()
 def start(name: str, size: str = "100k", threads: int = 2):
-    """Seconds to the end of the first step, and peak memory per particle, of one backend in this
-    process, as JSON.
+    """Print the seconds to the end of the first step and the peak memory per particle as JSON.
+
+    One backend is measured, in this process.
     """
     began = time.perf_counter()
     problem = block(CELLS[size])
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    initial = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     stepper = backend(name, problem, threads)
     stepper.step(1)
     seconds = time.perf_counter() - began
     stepper.step(WARM_UP)
-    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - initial
     typer.echo(json.dumps({
         "backend": name, "size": size, "first_step_s": round(seconds, 2),
         "peak_bytes_per_particle": round(grown * 1024 / len(problem.x)),
@@ -228,12 +232,12 @@ def starts(
     threads: int = 2,
     out: Annotated[Path, typer.Option()] = Path("results/benchmarks/start.json"),
 ):
-    """`start` of every backend in processes of their own: with empty kernel caches, then warm."""
+    """Run `start` for every backend in separate processes, with empty caches, then full ones."""
     rows = []
     for name in backends.split(","):
         with tempfile.TemporaryDirectory() as caches:
             rows += [
-                {"cache": cache} | fresh(["start", name, "--size", size], threads, caches)
+                {"cache": cache} | run_process(["start", name, "--size", size], threads, caches)
                 for cache in ("cold", "warm")
             ]
     for row in rows:
@@ -241,14 +245,15 @@ def starts(
     save(out, rows, threads, 1)
 
 
-def fresh(words, threads, caches):
-    """What a command of this module prints last in a process whose kernel caches lie in a folder;
-    with the seconds the process took.
+def run_process(command, threads, caches):
+    """Return what a command of this module prints last, and the seconds of its process.
+
+    command: list of arguments; caches: folder of the kernel caches.
     """
     places = ("NUMBA_CACHE_DIR", "TI_OFFLINE_CACHE_FILE_PATH", "WARP_CACHE_PATH")
     began = time.perf_counter()
     done = subprocess.run(
-        [sys.executable, "-m", "benchmarks", *words, "--threads", str(threads)],
+        [sys.executable, "-m", "benchmarks", *command, "--threads", str(threads)],
         env=os.environ | dict.fromkeys(places, caches), capture_output=True, text=True, check=True,
     )
     seconds = time.perf_counter() - began

@@ -1,4 +1,4 @@
-"""What each feature of a scene costs: the same block, with one thing changed at a time."""
+"""Measure the cost of each feature of a scene: one block, with one feature changed at a time."""
 
 import time
 from typing import NamedTuple
@@ -21,7 +21,7 @@ METAL = {"law": "hencky", "flow": "von_mises_hardening", "tau_y": 1e9, "xi": 0.1
 
 
 class Variant(NamedTuple):
-    """One way to step the block."""
+    """A variant of the steps of the block: scheme, material, boundary conditions, energies."""
 
     name: str
     scheme: Scheme = Scheme()
@@ -49,36 +49,36 @@ VARIANTS = (
 
 
 class Run:
-    """A block that is stepped one way."""
+    """A block that is advanced by one variant."""
 
     def __init__(self, variant, block):
         self.variant, self.dt = variant, block.dt
-        self.bodies = (body_of(variant, block),)
+        self.bodies = (make_body(variant, block),)
         self.gravity = (0.0, 0.0, GRAVITY)
-        conditions = conditions_of(variant.conditions, block)
+        conditions = make_conditions(variant.conditions, block)
         self.stepper = Stepper(variant.scheme, block.dx, 3, self.gravity, conditions)
         self.stepper.start(self.bodies)
         self.stepper.sort(self.bodies)
 
     def step(self):
-        """One step."""
+        """Advance the block by one step."""
         self.stepper.step(self.bodies, 0.0, self.dt)
         if self.variant.monitor:
             energy(self.bodies, self.gravity)
 
     @property
     def bytes_per_particle(self):
-        """Memory of the state per particle; arrays that share storage count once."""
+        """Return the bytes of the state per particle; shared arrays count once."""
         arrays = {id(a): a.nbytes for a in self.bodies[0].particles}
         return sum(arrays.values()) / len(self.bodies[0].id)
 
 
-def body_of(variant, block):
-    """The block's particles in the variant's material."""
-    words = dict(variant.material)
-    law_name, flow_name = words.pop("law"), words.pop("flow", "none")
+def make_body(variant, block):
+    """Return the block's particles with the material of a variant."""
+    parameters = dict(variant.material)
+    law_name, flow_name = parameters.pop("law"), parameters.pop("flow", "none")
     law = make_law(law_name, E=E, nu=NU)
-    material = Material(law, make_flow(flow_name, law, 3, **words))
+    material = Material(law, make_flow(flow_name, law, 3, **parameters))
     count = len(block.x)
     particles = particles_at(
         block.x.copy(), block.v.copy(), np.full(count, RHO * block.V0), np.full(count, block.V0),
@@ -89,8 +89,8 @@ def body_of(variant, block):
     return Body("block", particles, law, material.flow, np.arange(count))
 
 
-def conditions_of(name, block):
-    """Walls or a floor just below the block, or nothing."""
+def make_conditions(name, block):
+    """Return walls, a floor just below the block, or None."""
     if name == "walls":
         return Conditions(walls=nclaw_walls(block.n, WALL))
     if name == "floor":
@@ -100,7 +100,7 @@ def conditions_of(name, block):
 
 
 def costs(block, threads, repeats):
-    """Rows name, median wall ns and CPU ns per particle-step, ratio to the first, bytes."""
+    """Return a row per variant: median wall and CPU ns per particle-step, their ratio, bytes."""
     set_threads(threads)
     runs = [Run(variant, block) for variant in VARIANTS]
     rounds = {run.variant.name: [] for run in runs}
@@ -120,7 +120,7 @@ def costs(block, threads, repeats):
 
 
 def timed(run, steps=3):
-    """Wall and CPU seconds per step."""
+    """Return wall and CPU seconds per step."""
     wall, cpu = time.perf_counter(), time.process_time()
     for _ in range(steps):
         run.step()

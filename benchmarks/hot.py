@@ -1,8 +1,8 @@
-"""What an implicit step costs, part by part, on two steps that are given.
+"""Measure the cost of an implicit step, part by part, on two given steps.
 
 `twist` is the bar of Figure 20 with a middle of 1e9 Pa in its fourth step, 13 000 particles; `box`
 is the first step of Figure 18, 33 000 particles each stretched at random. Times are CPU seconds of
-all threads; what is compared is timed in turn, and the median of the rounds counts.
+all threads, alternatives are timed in turn, and results are medians of the rounds.
 """
 
 from functools import partial
@@ -33,7 +33,7 @@ METHODS = {                         # the first is what the others are relative 
 
 
 class Part(NamedTuple):
-    """A function to be timed, and what its time is counted by."""
+    """A function to be timed, and the unit to which its time refers."""
 
     run: callable
     per: str            # "particle" or "node"
@@ -45,7 +45,7 @@ def twist(dx=0.0228):
 
 
 def box(dx=1.0 / 16.0):
-    """`Step` of the stretched box."""
+    """Return the `Step` of the stretched box."""
     problem = stretched("particle", dx)
     stepper = problem.stepper()
     pose = stepper.problem(problem.bodies, 0.0, FRAME)
@@ -56,7 +56,7 @@ STEPS = {"twist": twist, "box": box}
 
 
 def parts(step):
-    """{name: `Part`} of a step at its start."""
+    """Return the parts of a step at its start, as {name: `Part`}."""
     system, potential = system_of(step), step.pose.potential
     dv, (_, g) = system.start, system.evaluate(system.start)
     tangent, A = potential.tangent(dv), system.matrix(dv)
@@ -76,50 +76,50 @@ def parts(step):
 
 
 def system_of(step):
-    """The `System` of a step, new, so that nothing of it is known yet."""
+    """Return a new `System` of a step, without cached matrices."""
     return step.stepper.system(step.pose)
 
 
 def in_turn(functions, repeats):
-    """{name: results} of functions called one after the other; the first round compiles."""
+    """Call functions in turn and return {name: results}; the first round compiles."""
     rounds = [{name: run() for name, run in functions.items()} for _ in range(repeats + 1)]
     return {name: [done[name] for done in rounds[1:]] for name in functions}
 
 
 def cpu(run):
-    """CPU seconds of a call."""
+    """Return the CPU seconds of a call."""
     start = process_time()
     run()
     return process_time() - start
 
 
 def cost_rows(step, repeats):
-    """A row for every part: median ns per particle or node."""
-    found = parts(step)
+    """Return a row for every part: median ns per particle or node."""
+    functions = parts(step)
     counts = counts_of(step)
-    times = in_turn({name: partial(cpu, part.run) for name, part in found.items()}, repeats)
+    times = in_turn({name: partial(cpu, part.run) for name, part in functions.items()}, repeats)
     return [{"part": name, "per": part.per,
              "cpu_ns": 1e9 * float(np.median(times[name])) / counts[part.per]}
-            for name, part in found.items()]
+            for name, part in functions.items()]
 
 
 def counts_of(step):
-    """Numbers of particles and nodes of a step."""
+    """Return the numbers of particles and nodes of a step."""
     return {"particle": sum(len(body.id) for body in step.bodies),
             "node": len(step.pose.unknowns.m)}
 
 
 def method_rows(step, repeats):
-    """A row for every method: median CPU seconds of the whole step and of its parts."""
+    """Return a row for every method: median CPU seconds of the step and of its parts."""
     def solve(method, changes):
         return minimise(system_of(step), method, **changes).report
-    reports = in_turn({name: partial(solve, *words) for name, words in METHODS.items()}, repeats)
+    reports = in_turn({name: partial(solve, *choice) for name, choice in METHODS.items()}, repeats)
     rows = [method_row(name, done) for name, done in reports.items()]
     return [row | {"cpu_ratio": row["cpu_s"] / rows[0]["cpu_s"]} for row in rows]
 
 
 def method_row(name, reports):
-    """What a method took, by the median of its reports."""
+    """Return the row of a method: iterations of the last report, median CPU seconds of all."""
     last = reports[-1]
     return {
         "method": name, "converged": last.converged, "iterations": last.iterations,
@@ -131,8 +131,9 @@ def method_row(name, reports):
 
 
 def solver_rows(step, repeats):
-    """CG to 1e-6 on the step's matrix with our V-cycle and with smoothed aggregation: rows with
-    median CPU seconds of set-up and solve, on one thread as pyamg is.
+    """Return rows for CG to 1e-6 on the step's matrix with our V-cycle and smoothed aggregation.
+
+    They hold median CPU seconds of set-up and solve, on one thread like pyamg.
     """
     system = system_of(step)
     A, (_, g) = system.matrix(system.start), system.evaluate(system.start)
@@ -148,7 +149,7 @@ def solver_rows(step, repeats):
 
 
 def costs(names, repeats):
-    """All rows of the named steps."""
+    """Return all rows of the named steps."""
     rows = []
     for name in names:
         step = STEPS[name]()

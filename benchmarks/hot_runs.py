@@ -1,4 +1,4 @@
-"""Steps of whole runs: HOT as published and our variants, on the same states in turn.
+"""Measure steps of whole runs by HOT as published and by our variants, on the same states in turn.
 
 The public code of HOT was timed for this project on two cores of the kind that ours runs on, on
 scenes that are not in its release. Those here have as many particles of as stiff a material, no
@@ -28,7 +28,7 @@ VARIANTS = {                        # the first is what the others are relative 
 
 
 class Timed(NamedTuple):
-    """Some steps of a run."""
+    """Steps of a run that are to be timed."""
 
     begin: callable             # -> (`Problem`, `State` before the first of them)
     steps: int
@@ -36,7 +36,7 @@ class Timed(NamedTuple):
 
 
 def started(scene):
-    """(`Problem`, `State` at its first frame) of a scene."""
+    """Return the `Problem` of a scene and its `State` at the first frame."""
     problem = build(with_(scene, unstable="allow"))
     return problem, next(simulate(problem)).state
 
@@ -52,8 +52,9 @@ RUNS = {
 
 
 def run_rows(name):
-    """A row for every variant: what the steps of a run took, the first one left out, in which
-    kernels are compiled.
+    """Return a row for every variant: times and iterations of the steps of a run.
+
+    The first step is left out, since kernels are compiled in it.
     """
     run = RUNS[name]
     problem, state = run.begin()
@@ -63,20 +64,20 @@ def run_rows(name):
             taken[variant].append(timed(step, *words))
     where = {"run": name, "particles": step.particles, "nodes": len(step.pose.unknowns.m),
              "steps": run.steps, "public_cpu_s": run.public}
-    rows = [where | row_of(variant, done[1:]) for variant, done in taken.items()]
+    rows = [where | variant_row(variant, done[1:]) for variant, done in taken.items()]
     return [row | {"cpu_ratio": row["cpu_s"] / rows[0]["cpu_s"]} for row in rows]
 
 
 def timed(step, method, options):
-    """(CPU seconds, report) of a step's solve, from its particles on."""
+    """Solve a step from its particles on and return CPU seconds and report."""
     start = process_time()
     pose = step.stepper.problem(step.bodies, step.t, step.dt)
     report = minimise(step.stepper.system(pose), method, **options).report
     return process_time() - start, report
 
 
-def row_of(variant, done):
-    """What a variant took, by (CPU seconds, report) of each step."""
+def variant_row(variant, done):
+    """Return the row of a variant from the CPU seconds and report of each step."""
     seconds, reports = zip(*done, strict=True)
     counts = [report.iterations for report in reports]
     return {"variant": variant, "cpu_s": float(np.mean(seconds)), "most_cpu_s": max(seconds),

@@ -1,4 +1,4 @@
-"""The block in mpm_ref, with the production kernels."""
+"""Step the block with the kernels of mpm_ref."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from .problem import GRAVITY, WALL
 
 
 class OurBlock:
-    """Steps a `Block`, sorting the particles by cell as often as `simulate` does."""
+    """A stepper of a `Block` that sorts the particles by cell as often as `simulate` does."""
 
     name = "mpm_ref"
 
@@ -40,5 +40,5 @@ class OurBlock:
             self.steps += 1
 
     def velocity(self):
-        """Velocities (N, 3)."""
+        """Return the velocities (N, 3)."""
         return self.bodies[0].particles.v

@@ -1,9 +1,8 @@
-"""The problem that every backend steps: an elastic cube of c^3 cells, 8 particles each, falling
-in a box of (2c)^3 cells.
+"""Define the problem for all backends: an elastic cube that falls in a box.
 
-MLS-MPM, quadratic splines, fixed corotated elasticity, gravity, slip walls three cells from the
-faces of the box; double precision. All backends get the same arrays and do the same arithmetic,
-up to its order.
+The cube has c^3 cells with 8 particles each, the box (2c)^3 cells. MLS-MPM, quadratic splines,
+fixed corotated elasticity, gravity, slip walls three cells from the faces of the box; double
+precision. All backends get the same arrays and do the same arithmetic, up to its order.
 """
 
 from typing import NamedTuple
@@ -16,7 +15,7 @@ WALL = 3                           # nodes
 
 
 class Block(NamedTuple):
-    """Initial state and constants."""
+    """Initial state and constants of the block."""
 
     x: np.ndarray     # (N, 3) [m]
     v: np.ndarray     # (N, 3) [m/s]
@@ -31,9 +30,7 @@ class Block(NamedTuple):
 
 
 def block(cells, shuffle=False, seed=0):
-    """A cube of cells^3 cells in the box [0, 1]^3 of (2 cells)^3 cells, slightly and smoothly
-    deformed.
-    """
+    """Return a `Block` of cells^3 cells in the box [0, 1]^3, with a small smooth deformation."""
     n = 2 * cells
     dx = 1.0 / n
     axis = 0.25 + (np.arange(2 * cells) + 0.5) * 0.5 * dx

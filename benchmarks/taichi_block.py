@@ -1,4 +1,4 @@
-"""The block in Taichi, as a user of Taichi would write it: fields and an atomic scatter."""
+"""Step the block with Taichi, as its users would write it: fields and an atomic scatter."""
 
 import numpy as np
 import taichi as ti
@@ -10,7 +10,7 @@ POLAR_ITERATIONS = 5
 
 @ti.func
 def polar(A):
-    """Rotation of A by Newton's iteration."""
+    """Return the rotation of A by Newton's iteration."""
     R = A
     for _ in ti.static(range(POLAR_ITERATIONS)):
         R = 0.5 * (R + R.inverse().transpose())
@@ -19,13 +19,13 @@ def polar(A):
 
 @ti.func
 def weights(f):
-    """Quadratic splines at the three nodes of every axis."""
+    """Return the quadratic splines at the three nodes of every axis."""
     return [0.5 * (1.5 - f) ** 2, 0.75 - (f - 1.0) ** 2, 0.5 * (f - 0.5) ** 2]
 
 
 @ti.data_oriented
 class TaichiBlock:
-    """Steps a `Block` on a number of threads."""
+    """A stepper of a `Block` on a number of threads."""
 
     name = "taichi"
 
@@ -53,26 +53,26 @@ class TaichiBlock:
         ti.sync()
 
     def velocity(self):
-        """Velocities (N, 3)."""
+        """Return the velocities (N, 3)."""
         return self.v.to_numpy()
 
     @ti.func
     def stress(self, F):
-        """Kirchhoff stress of fixed corotated elasticity."""
+        """Return the Kirchhoff stress of fixed corotated elasticity."""
         J = F.determinant()
         volume = ti.Matrix.identity(float, 3) * (self.lam * J * (J - 1.0))
         return 2.0 * self.mu * (F - polar(F)) @ F.transpose() + volume
 
     @ti.kernel
     def clear(self):
-        """Empty grid."""
+        """Set masses and momenta of the grid to zero."""
         for i in ti.grouped(self.grid_m):
             self.grid_m[i] = 0.0
             self.grid_v[i] = [0.0, 0.0, 0.0]
 
     @ti.kernel
     def p2g(self):
-        """Mass and momentum with the internal forces' impulse."""
+        """Scatter mass and momentum, with the impulse of internal forces."""
         for p in self.x:
             base = int(self.x[p] / self.dx - 0.5)
             f = self.x[p] / self.dx - base
@@ -88,7 +88,7 @@ class TaichiBlock:
 
     @ti.kernel
     def update(self):
-        """Velocity, gravity, walls."""
+        """Compute the velocities of nodes with gravity and walls."""
         for i in ti.grouped(self.grid_m):
             if self.grid_m[i] > 0.0:
                 u = self.grid_v[i] / self.grid_m[i]
@@ -100,7 +100,7 @@ class TaichiBlock:
 
     @ti.kernel
     def g2p(self):
-        """New velocity, affine field, position, deformation."""
+        """Update velocity, affine field, position and deformation of the particles."""
         for p in self.x:
             base = int(self.x[p] / self.dx - 0.5)
             f = self.x[p] / self.dx - base

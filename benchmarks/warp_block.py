@@ -1,4 +1,4 @@
-"""The block in Warp, as a user of Warp would write it; its CPU backend runs on one thread."""
+"""Step the block with Warp, as its users would write it; its CPU backend uses one thread."""
 
 import warp as wp
 
@@ -36,7 +36,7 @@ class State:
 
 @wp.func
 def polar(A: wp.mat33d):
-    """Rotation of A by Newton's iteration."""
+    """Return the rotation of A by Newton's iteration."""
     R = A
     for _ in range(POLAR_ITERATIONS):
         R = wp.float64(0.5) * (R + wp.transpose(wp.inverse(R)))
@@ -45,7 +45,7 @@ def polar(A: wp.mat33d):
 
 @wp.func
 def weights(f: wp.float64):
-    """Quadratic spline at the three nodes."""
+    """Return the quadratic spline at the three nodes."""
     a = wp.float64(1.5) - f
     b = f - wp.float64(1.0)
     c = f - wp.float64(0.5)
@@ -54,19 +54,19 @@ def weights(f: wp.float64):
 
 @wp.func
 def base_of(x: wp.float64, dx: wp.float64):
-    """First node that x reaches."""
+    """Return the index of the first node of the stencil at x."""
     return wp.int32(x / dx - wp.float64(0.5))
 
 
 @wp.func
 def arm(i: wp.int32, j: wp.int32, l: wp.int32, f: wp.vec3d, dx: wp.float64):
-    """x_i - x_p."""
+    """Return x_i - x_p."""
     return (wp.vec3d(wp.float64(i), wp.float64(j), wp.float64(l)) - f) * dx
 
 
 @wp.kernel
 def p2g(a: State, k: Constants):
-    """Mass and momentum with the internal forces' impulse."""
+    """Scatter mass and momentum, with the impulse of internal forces."""
     p = wp.tid()
     bx = base_of(a.x[p][0], k.dx)
     by = base_of(a.x[p][1], k.dx)
@@ -89,8 +89,8 @@ def p2g(a: State, k: Constants):
 
 
 @wp.func
-def stopped(u: wp.float64, i: wp.int32, n: wp.int32, wall: wp.int32):
-    """Slip wall."""
+def apply_wall(u: wp.float64, i: wp.int32, n: wp.int32, wall: wp.int32):
+    """Return a velocity component after the slip walls of its axis."""
     if i < wall and u < wp.float64(0.0):
         return wp.float64(0.0)
     if i > n - wall and u > wp.float64(0.0):
@@ -100,21 +100,21 @@ def stopped(u: wp.float64, i: wp.int32, n: wp.int32, wall: wp.int32):
 
 @wp.kernel
 def update(a: State, k: Constants):
-    """Velocity, gravity, walls."""
+    """Compute the velocities of nodes with gravity and walls."""
     i, j, l = wp.tid()
     if a.grid_m[i, j, l] > wp.float64(0.0):
         u = a.grid_v[i, j, l] / a.grid_m[i, j, l]
         w = u[2] + k.dt * k.g
         a.grid_v[i, j, l] = wp.vec3d(
-            stopped(u[0], i, k.n, k.wall),
-            stopped(u[1], j, k.n, k.wall),
-            stopped(w, l, k.n, k.wall),
+            apply_wall(u[0], i, k.n, k.wall),
+            apply_wall(u[1], j, k.n, k.wall),
+            apply_wall(w, l, k.n, k.wall),
         )
 
 
 @wp.kernel
 def g2p(a: State, k: Constants):
-    """Velocity, affine field, position, deformation."""
+    """Update velocity, affine field, position and deformation of the particles."""
     p = wp.tid()
     bx = base_of(a.x[p][0], k.dx)
     by = base_of(a.x[p][1], k.dx)
@@ -139,7 +139,7 @@ def g2p(a: State, k: Constants):
 
 
 class WarpBlock:
-    """Steps a `Block` on Warp's CPU device."""
+    """A stepper of a `Block` on Warp's CPU device."""
 
     name = "warp"
 
@@ -169,5 +169,5 @@ class WarpBlock:
                 wp.launch(phase, size, [self.a, self.k], device="cpu")
 
     def velocity(self):
-        """Velocities (N, 3)."""
+        """Return the velocities (N, 3)."""
         return self.a.v.numpy()

@@ -1,4 +1,4 @@
-"""The "other code" of check_my_backend.py: a step of MLS-MPM in 2D as a student might write it."""
+"""Advance MLS-MPM in 2D by one step: the "other code" that check_my_backend.py checks."""
 
 import numpy as np
 
@@ -10,14 +10,14 @@ OFFSETS = np.array([(i, j) for i in range(3) for j in range(3)])
 
 
 def step(s, dx, dt):
-    """Advance the particles s in place by one step; returns what `oracle.write` takes."""
-    seen, real = {}, s["x"].dtype
+    """Advance the particles s in place by one step and return the stages for `oracle.write`."""
+    stages, real = {}, s["x"].dtype
     dx, dt, inverse_D = real.type(dx), real.type(dt), real.type(4 / dx**2)
     m, V0 = s["m"][:, None], s["V0"][:, None, None]
-    seen["base"] = base = np.floor(s["x"] / dx - real.type(0.5)).astype(int)
+    stages["base"] = base = np.floor(s["x"] / dx - real.type(0.5)).astype(int)
     f = s["x"] / dx - base.astype(real)
     per_axis = np.stack([(1.5 - f) ** 2 / 2, 0.75 - (f - 1) ** 2, (f - 0.5) ** 2 / 2])
-    seen["weights"] = w = per_axis[OFFSETS[:, 0], :, 0].T * per_axis[OFFSETS[:, 1], :, 1].T
+    stages["weights"] = w = per_axis[OFFSETS[:, 0], :, 0].T * per_axis[OFFSETS[:, 1], :, 1].T
     r = (OFFSETS[None].astype(real) - f[:, None]) * dx
     at = tuple(np.moveaxis(base[:, None] + OFFSETS, -1, 0))
 
@@ -29,20 +29,20 @@ def step(s, dx, dt):
     np.add.at(force, at, -w[..., None] * np.einsum("pab,psb->psa", V0 * inverse_D * tau, r))
     v = (momentum + dt * force) / np.where(mass > 0, mass, 1)[..., None]
     v += (dt * GRAVITY).astype(real)
-    seen |= {"origin": (0, 0), "mass": mass, "momentum": momentum, "force": force}
-    seen["velocity"] = v.copy()
+    stages |= {"origin": (0, 0), "mass": mass, "momentum": momentum, "force": force}
+    stages["velocity"] = v.copy()
     v[:, np.arange(GRID) * dx <= FLOOR * (1 + 1e-6), 1] = 0
-    seen["velocity_bc"] = v
+    stages["velocity_bc"] = v
 
     s["v"] = np.einsum("ps,psa->pa", w, v[at])
     s["C"] = np.einsum("ps,psa,psb->pab", w, v[at], r) * inverse_D
     s["x"] = s["x"] + dt * s["v"]
     s["F"] = (np.eye(2, dtype=real) + dt * s["C"]) @ s["F"]
-    return seen | {name: s[name] for name in "xvCF"} | {"tau": kirchhoff(s["F"])}
+    return stages | {name: s[name] for name in "xvCF"} | {"tau": kirchhoff(s["F"])}
 
 
 def kirchhoff(F):
-    """Fixed corotated: tau = 2 mu (F - R) F^T + lam (J - 1) J I."""
+    """Return the fixed corotated stress tau = 2 mu (F - R) F^T + lam (J - 1) J I."""
     U, _, Vt = np.linalg.svd(F)
     J = np.linalg.det(F)[:, None, None]
     return 2 * MU * (F - U @ Vt) @ F.swapaxes(1, 2) + LAM * (J - 1) * J * np.eye(2, dtype=F.dtype)

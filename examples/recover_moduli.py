@@ -1,8 +1,8 @@
-"""Recover Young's modulus and Poisson's ratio of a block from how it was seen to move.
+"""Recover Young's modulus and Poisson's ratio of a block from its observed motion.
 
-A block falls on a floor; its particles' positions are seen at a few times. Starting from moduli
-that are far off, SciPy's L-BFGS-B minimises the squared distance to what was seen, with the exact
-gradient of the whole run with respect to mu and lam (`mpm_ref.tape`), in their logarithms.
+A block falls on a floor; the positions of its particles are observed at a few times. From wrong
+moduli, SciPy's L-BFGS-B minimises the squared distance to the observations, with the exact gradient
+of the whole run with respect to the logarithms of mu and lam (`mpm_ref.tape`).
 """
 
 import numpy as np
@@ -15,14 +15,14 @@ from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.materials import FixedCorotated, NoFlow, make_law
 from mpm_ref.tape import Seed, Tape
 
-DX, DT, STEPS, SEEN = 0.05, 4e-4, 150, (50, 100, 150)
+DX, DT, STEPS, OBSERVED = 0.05, 4e-4, 150, (50, 100, 150)
 RHO, GRAVITY = 1000.0, (0.0, -9.8)
 TRUE, GUESS = (1.0e5, 0.30), (4.0e4, 0.10)      # E [Pa], nu
-WIDE = 3.0      # so far from the guess, in logarithms, moduli are looked for; stiffer is unstable
+WIDE = 3.0      # bound of the search around the guess, in logarithms; stiffer is unstable
 
 
 def block(law):
-    """A block just above the floor, on its way down."""
+    """Return a block just above the floor, on its way down."""
     x = np.stack(np.meshgrid(np.arange(0.3, 0.7, DX / 2), np.arange(0.11, 0.4, DX / 2),
                              indexing="ij"), -1).reshape(-1, 2)
     v, V0 = np.tile((0.0, -2.0), (len(x), 1)), np.full(len(x), DX**2 / 4)
@@ -30,37 +30,38 @@ def block(law):
 
 
 def run(law):
-    """The tape of a run, and positions at the times SEEN."""
+    """Return the tape of a run, and the positions at the steps OBSERVED."""
     floor = Collider(half_space((0.0, 0.1), (0.0, 1.0)), "slip")
-    stepper, body, seen = Stepper(Scheme(), DX, 2, GRAVITY, Conditions((floor,))), block(law), {}
+    stepper, body = Stepper(Scheme(), DX, 2, GRAVITY, Conditions((floor,))), block(law)
+    positions = {}
     stepper.start([body])
     tape = Tape(stepper, [body], every=25)
     for n in range(STEPS):
         tape.step(n * DT, DT)
-        if n + 1 in SEEN:
-            seen[n + 1] = body.particles.x.copy()
-    return tape, seen
+        if n + 1 in OBSERVED:
+            positions[n + 1] = body.particles.x.copy()
+    return tape, positions
 
 
 def loss(logs, truth):
-    """Mean squared distance [cells^2] from what was seen, and its gradient by log mu, log lam."""
+    """Return the mean squared distance [cells^2] and its gradient by log mu and log lam."""
     law = FixedCorotated(*np.exp(logs))
-    tape, seen = run(law)
-    count = len(SEEN) * len(truth[SEEN[0]]) * DX**2
-    value = sum(np.sum((seen[n] - truth[n]) ** 2) for n in SEEN) / count
-    seeds = {n: [Seed(x=2.0 * (seen[n] - truth[n]) / count)] for n in SEEN}
-    found, = tape.gradient(seeds).bodies
-    return value, np.array(found.law) * np.array(law)
+    tape, positions = run(law)
+    count = len(OBSERVED) * len(truth[OBSERVED[0]]) * DX**2
+    value = sum(np.sum((positions[n] - truth[n]) ** 2) for n in OBSERVED) / count
+    seeds = {n: [Seed(x=2.0 * (positions[n] - truth[n]) / count)] for n in OBSERVED}
+    gradient, = tape.gradient(seeds).bodies
+    return value, np.array(gradient.law) * np.array(law)
 
 
 def moduli(law):
-    """E [Pa] and nu of a law's mu and lam."""
+    """Return E [Pa] and nu of a law's mu and lam."""
     return law.mu * (3 * law.lam + 2 * law.mu) / (law.lam + law.mu), (
         law.lam / (2 * (law.lam + law.mu)))
 
 
 def recover():
-    """`OptimizeResult`, and the moduli found."""
+    """Return the `OptimizeResult` and the recovered moduli."""
     _, truth = run(make_law("fixed_corotated", E=TRUE[0], nu=TRUE[1]))
     start = np.log(make_law("fixed_corotated", E=GUESS[0], nu=GUESS[1]))
     done = minimize(loss, start, (truth,), method="L-BFGS-B", jac=True,

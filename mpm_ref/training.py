@@ -94,7 +94,7 @@ class TrainingSession:
                   for name, parts in self.states().items()}
         torch.save({"training": self.description, "cost": tuple(self.meter.total),
                     "history": [tuple(entry) for entry in self.history], **states}, content)
-        weights_file.write_sealed(path, content.getvalue())
+        weights_file.write_checkpoint(path, content.getvalue())
 
     def load(self, path):
         """Continue from a checkpoint. Raises ValueError where it is damaged, or of another training
@@ -102,7 +102,7 @@ class TrainingSession:
         """
         import torch
 
-        stored = torch.load(io.BytesIO(weights_file.read_sealed(path)), map_location="cpu",
+        stored = torch.load(io.BytesIO(weights_file.read_checkpoint(path)), map_location="cpu",
                             weights_only=True)
         weights_file.require_same_training(path, stored["training"], self.description)
         for name, parts in self.states().items():

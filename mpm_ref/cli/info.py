@@ -15,12 +15,12 @@ from ..preflight import misplaced
 from ..rom.model_file import is_model
 from ..rom.study import record
 from ..store import checkpoint, manifest
-from ..store.atomic import in_words
+from ..store.atomic import size_text
 from ..store.manifest import scene_hash
 from ..store.results import ENERGIES, Results
 from ..store.running import checkpoint_of
-from ..store.weights_file import MAGIC, opened
-from ..store.words import counted
+from ..store.text import counted
+from ..store.weights_file import MAGIC, load_arrays
 from ..timestep import TimeStep, stable_dt
 from . import law_info, rom_info
 from .catalogue import find_scene, is_hdf5, study_named
@@ -89,8 +89,8 @@ def of_results(path):
             "checkpoint": str(checkpoint_of(path)) if checkpoint_of(path).exists() else None,
             "manifest": results.manifest,
             "reduced": record.summary(results),
-            "warnings": [*unsolved(manifest.unsolved(results.manifest)),
-                         *manifest.astray(results.manifest)],
+            "warnings": [*unsolved(manifest.count_unsolved(results.manifest)),
+                         *manifest.strain_warnings(results.manifest)],
         }
 
 
@@ -107,7 +107,7 @@ def problem_lines(facts):
     """Facts of a problem in words."""
     bodies = ", ".join(f"{name} {count}" for name, count in facts["bodies"].items())
     length = counted(facts["steps"], "step") if facts["steps"] else f"until t = {facts['end']:g} s"
-    memory = in_words(facts["particle_bytes"]), in_words(facts["grid_bytes"])
+    memory = size_text(facts["particle_bytes"]), size_text(facts["grid_bytes"])
     return [
         f"{facts['title'] or 'untitled'}: {facts['dim']}D, {facts['particles']} particles "
         f"({bodies}), dx = {facts['dx']:g} m, {facts['nodes']} nodes at the start",
@@ -169,7 +169,7 @@ def part_line(part):
     if "last_step" not in part:
         return f"part: from step {part['first_step']} on, began {part['began']}: {part['why']}"
     return (f"part: steps {part['first_step']} to {part['last_step']}, {part['wall_s']} s, "
-            f"{in_words(part['peak_bytes'])}, state sha256 {part['state_sha256'][:12]}: "
+            f"{size_text(part['peak_bytes'])}, state sha256 {part['state_sha256'][:12]}: "
             f"{part['why']}")
 
 
@@ -188,7 +188,7 @@ def _facts(name):
     """(facts, lines) of whatever a name stands for."""
     if not is_hdf5(name):
         return _facts_of_npz_or_text(name)
-    if checkpoint.is_one(name) or checkpoint.is_named_so(name):
+    if checkpoint.is_checkpoint(name) or checkpoint.has_checkpoint_name(name):
         facts = checkpoint.summary(name)
         return facts, [f"checkpoint: step {facts['step']}, t = {facts['t']:.6g} s, after "
                        f"{counted(facts['frames'], 'frame')}; "
@@ -238,7 +238,7 @@ def of_npz(name):
     Raises ValueError for a file that is damaged or none of these.
     """
     path = Path(name)
-    arrays = opened(path)
+    arrays = load_arrays(path)
     if is_model(arrays):
         facts = rom_info.of_map(path)
         return facts, rom_info.map_lines(facts)

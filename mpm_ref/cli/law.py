@@ -18,7 +18,7 @@ from ..nclaw.strain_watch import ComparisonWatch
 from ..nclaw.study.compare import RunBroken, compare_runs, write_errors
 from ..nclaw.study.curves import compare_curves, draw_curves, paths_for, write_curves
 from ..store.atomic import require_place
-from ..store.words import counted
+from ..store.text import counted
 from . import law_train
 from .errors import UNSTABLE, end, one_line, options, writing
 from .options import (

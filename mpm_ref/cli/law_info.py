@@ -13,8 +13,8 @@ from ..nclaw.gnn import weights as gnn_weights
 from ..nclaw.study.study import SYS_ID, load
 from ..rom.study.study_file import read_toml
 from ..scene import SceneError
-from ..store.weights_file import about_of, require_format
-from ..store.words import counted
+from ..store.text import counted
+from ..store.weights_file import read_provenance, require_format
 from . import provenance
 from .catalogue import shipped_scenes
 from .options import OF_ERRORS, horizons, of_errors
@@ -79,7 +79,7 @@ def of_layers(path, arrays):
                          "them again")
     return {"layers": str(path), "dim": int(arrays["dim"]), "questions": len(arrays["check_F"]),
             **{part: of_arrays(part, arrays) for part in weights.PARTS},
-            **of_training(about_of(path, arrays))}
+            **of_training(read_provenance(path, arrays))}
 
 
 def of_arrays(part, arrays):

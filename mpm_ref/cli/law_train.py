@@ -14,7 +14,7 @@ from ..nclaw.study.compare import threads_for
 from ..nclaw.study.study import load
 from ..store.atomic import require_place
 from ..store.running import Watch
-from ..store.words import counted
+from ..store.text import counted
 from ..trajectories import observed
 from . import provenance
 from .catalogue import find_study, keep_scene, shipped_scenes

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from .. import oracle, scene
-from ..store.words import counted
+from ..store.text import counted
 from .catalogue import find_scene, keep_scene
 from .errors import at_start, one_line, options
 from .terminal import compiling, warn

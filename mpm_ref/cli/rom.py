@@ -28,9 +28,9 @@ from ..rom.study.record import particle_bytes, record, recording
 from ..rom.study.resume import earlier_part
 from ..rom.study.tables import NSF
 from ..scene import SceneError
-from ..store.atomic import in_words, require_place, require_space
+from ..store.atomic import require_place, require_space, size_text
 from ..store.running import FINISHED
-from ..store.words import counted
+from ..store.text import counted
 from . import rom_info, rom_train
 from .catalogue import keep_scene
 from .errors import UNSTABLE, end, options, writing
@@ -118,7 +118,7 @@ def announce(out, size):
     has not so many, those of the file that they replace included.
     """
     if size > LARGE:
-        print(f"mpm-ref: {out}: {in_words(size)} will be written", file=sys.stderr)
+        print(f"mpm-ref: {out}: {size_text(size)} will be written", file=sys.stderr)
     there = out.stat().st_size if out.exists() else 0
     require_space(out, max(size - there, 0))
 

@@ -11,7 +11,7 @@ from ..rom.study.record import supported_model
 from ..rom.study.study_file import parse_tables, read_toml
 from ..rom.study.tables import CURVED, MODES, NETWORK, NSF
 from ..scene import SceneError
-from ..store.words import counted
+from ..store.text import counted
 from .catalogue import shipped_studies
 from .errors import one_line
 from .options import Json, studied

@@ -23,7 +23,7 @@ from ..rom.study.record import supported_model
 from ..rom.study.study import training_hints
 from ..rom.study.tables import KEYS, NETWORK, NSF
 from ..store.atomic import NotWritten, require_place
-from ..store.words import counted
+from ..store.text import counted
 from ..training import DEVICES, Machine
 from . import errors
 from .catalogue import keep_scene

@@ -31,8 +31,8 @@ from ..store.running import (
     Watch,
     checkpoint_of,
 )
-from ..store.words import counted
-from ..store.writer import Fields
+from ..store.text import counted
+from ..store.writer import StoredFields
 from ..timestep import TooLarge
 from . import info
 from .catalogue import find_scene, keep_scene
@@ -84,10 +84,10 @@ def run(
 
 
 def stored(fields, gzip):
-    """`Fields` of the two options; None where neither is given. Raises ValueError."""
+    """`StoredFields` of the two options; None where neither is given. Raises ValueError."""
     if fields is None and gzip is None:
         return None
-    return Fields(USUAL if fields is None else tuple(fields.split(",")), gzip or 0)
+    return StoredFields(USUAL if fields is None else tuple(fields.split(",")), gzip or 0)
 
 
 def use_threads(n):
@@ -169,10 +169,10 @@ class Bar(Watch):
         said = [f"{name} {value:.3g}" for name, value in known.items() if isfinite(value)]
         self.energies = f", {', '.join(said)} J" if said else ""
 
-    def astray(self, said):
+    def warn(self, message):
         """Say that a learned law is asked what it has not seen."""
         with self.bar.external_write_mode(file=sys.stderr):
-            warn([said])
+            warn([message])
 
     def close(self):
         """Leave the bar as it is."""

@@ -34,7 +34,8 @@ from ..materials.learned.energetic import Energetic
 from ..materials.learned.invariants import invariants, spectrum
 from ..materials.learned.stretch_network import ReleasedStretchStress, StretchStress
 from ..materials.learned.weights import PARTS, dim_of
-from ..store.weights_file import sealed, write_whole
+from ..store.atomic import write_bytes
+from ..store.weights_file import pack
 from .bodies import deformation_gradients, kirchhoff_stresses, material_points
 
 FORMAT = "mpm_ref law 1"
@@ -149,8 +150,8 @@ def write(path, tables):
     if path.suffix.lower() == ".json":
         content = json.dumps(tables, indent=1, default=lambda a: a.tolist()).encode()
     else:
-        content = sealed(flatten_tables(tables))
-    write_whole(path, content)
+        content = pack(flatten_tables(tables))
+    write_bytes(path, content)
 
 
 def input_labels(weights, d):

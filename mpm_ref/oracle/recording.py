@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..simulate import State, advance, ended, frame_is_due, next_dt, swiftest, update_bound
-from ..store.words import counted
+from ..store.text import counted
 from . import error_bounds, kernel_stages
 from .plain_twin import Twin, TwinStep, perturbed_twins
 from .schema import LOCATION

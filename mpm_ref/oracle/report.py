@@ -3,7 +3,7 @@
 import json
 from dataclasses import asdict, dataclass
 
-from ..store.words import counted
+from ..store.text import counted
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..store.weights_file import read, stated, write
+from ..store.weights_file import header, read, write
 from .fields.network import Decoder, DecoderUnits, Field, FieldUnits, Networks, mismatch
 from .fields.perceptron import Network, feature_count, layers_of, network
 from .fields.pod import PodModes
@@ -40,7 +40,7 @@ def save(path, model):
     """Write a `Model`, whole or not at all. Raises ValueError for arrays that do not fit, numbers
     that are not finite and an `about` with more than JSON knows, OSError where the system refuses.
     """
-    write(path, stated(path, FORMAT, model.about) | arrays_of(model), fault_of)
+    write(path, header(path, FORMAT, model.about) | arrays_of(model), fault_of)
 
 
 def load(path):

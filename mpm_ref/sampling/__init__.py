@@ -1,7 +1,7 @@
-"""Points that fill a solid, and the volume each stands for.
+"""Fill a solid with points, each of which represents a volume.
 
-Records describe a sampling as scene files do; `sample` carries one out. What each sampling is good
-for: docs/reference/scenes.md.
+The records are the samplings of scene files; `sample` carries one out. docs/reference/scenes.md
+compares them.
 """
 
 from functools import singledispatch
@@ -29,14 +29,14 @@ class Points(NamedTuple):
 
 
 class Regular(Kind, tag="regular"):
-    """per_cell^d points in every grid cell, at the centres of its equal sub-cells."""
+    """A sampling with per_cell^d points in every grid cell, at the centres of equal sub-cells."""
 
     per_cell: PerCell = 2
     volume: Literal["shape", "cell"] = "shape"
 
 
 class Jittered(Kind, tag="jittered"):
-    """As `Regular`, but each point is anywhere in the middle `amplitude` share of its sub-cell."""
+    """A random sampling with each point in the middle `amplitude` share of a `Regular` sub-cell."""
 
     per_cell: PerCell = 2
     amplitude: Share = 1.0
@@ -64,9 +64,10 @@ class Lattice(Kind, tag="lattice"):
 
 
 class Poisson(Kind, tag="poisson"):
-    """Random points no nearer than a radius.
+    """A Poisson-disk sampling: random points with a minimal distance.
 
-    Given is the `radius` [m], or how many points: `count`, or `fill` of per_cell^d per cell.
+    Give the distance, `radius` [m], or the number of points: `count`, or `fill` of per_cell^d per
+    cell.
     """
 
     radius: Length | None = None
@@ -84,15 +85,15 @@ Samplings = Regular | Jittered | Lattice | Poisson
 
 
 def sample(sampling, solid, dx, seed):
-    """`Points` of a solid (with inside(x), low, high, volume) for the grid spacing dx [m].
+    """Return the `Points` of a solid (with inside(x), low, high, volume) for a grid spacing dx [m].
 
-    `seed`, any seed of NumPy's default generator, serves where the record has none. The volumes are
-    equal and sum to the solid's; with volume = "cell" they are dx^d / per_cell^d, or that of the
-    lattice's cell. Raises ValueError where no point is inside.
+    seed: any seed of NumPy's default generator, for records without one. The volumes are equal and
+    sum to the solid's; with volume = "cell" they are dx^d / per_cell^d, or that of the lattice's
+    cell. Raises ValueError if no point is inside.
     """
     check_bounded(solid)
-    own = getattr(sampling, "seed", None)
-    x = points(sampling, solid, dx, seed if own is None else own)
+    record_seed = getattr(sampling, "seed", None)
+    x = points(sampling, solid, dx, seed if record_seed is None else record_seed)
     if len(x) == 0:
         raise ValueError(f"no sample point is inside the shape, whose box is {_text(solid)}; "
                          "take a finer sampling")
@@ -104,20 +105,20 @@ def sample(sampling, solid, dx, seed):
 
 @singledispatch
 def points(sampling, solid, dx, seed):
-    """Points (N, d) of a sampling record inside a solid."""
+    """Return the points (N, d) of a sampling record inside a solid."""
     raise TypeError(f"{type(sampling).__name__} is not a sampling")
 
 
 @points.register
 def _(sampling: Regular, solid, dx, seed):
-    return within(solid, _centres(solid, dx, sampling.per_cell))
+    return inside(solid, _centres(solid, dx, sampling.per_cell))
 
 
 @points.register
 def _(sampling: Jittered, solid, dx, seed):
     x = _centres(solid, dx, sampling.per_cell)
     jitter = np.random.default_rng(seed).uniform(-0.5, 0.5, x.shape)
-    return within(solid, x + jitter * (sampling.amplitude * dx / sampling.per_cell))
+    return inside(solid, x + jitter * (sampling.amplitude * dx / sampling.per_cell))
 
 
 @points.register
@@ -127,44 +128,44 @@ def _(sampling: Lattice, solid, dx, seed):
     _check_number(counts)
     axes = [m + _steps(n, h, step, sampling.faces)
             for m, h, n, step in zip(middle, half, counts, steps)]
-    return within(solid, _grid(axes))
+    return inside(solid, _grid(axes))
 
 
 @points.register
 def _(sampling: Poisson, solid, dx, seed):
     if sampling.radius is not None:
-        return throw(solid, sampling.radius, seed)
+        return poisson_points(solid, sampling.radius, seed)
     count = sampling.count
     if count is None:
         count = round(sampling.fill * solid.volume * (sampling.per_cell / dx) ** len(solid.low))
     if count < 1:
         raise ValueError(f"fill = {sampling.fill:g} asks for less than one point in the shape; "
                          "take a larger per_cell")
-    return exactly(solid, count, seed)
+    return poisson_count(solid, count, seed)
 
 
-def within(solid, x):
-    """Those of the points x (N, d) that lie inside the solid."""
+def inside(solid, x):
+    """Return the points of x (N, d) that lie inside the solid."""
     return np.ascontiguousarray(x[solid.inside(x)])
 
 
-def throw(solid, r, seed):
-    """Poisson-disk points of the solid's box, without those outside of the solid."""
-    return within(solid, poisson_disk(solid.low, solid.high, r, np.random.default_rng(seed)))
+def poisson_points(solid, r, seed):
+    """Return the Poisson-disk points of the solid's box that lie inside the solid."""
+    return inside(solid, poisson_disk(solid.low, solid.high, r, np.random.default_rng(seed)))
 
 
-def exactly(solid, count, seed):
-    """`count` Poisson-disk points of a solid, such as the 1368 of LDM-sec5.1.
+def poisson_count(solid, count, seed):
+    """Return `count` Poisson-disk points of a solid, such as the 1368 of LDM-sec5.1.
 
-    The number of points falls with the radius, but not steadily, so that hardly any radius gives a
-    number exactly: one that gives a few more is taken, and some points are left out at random.
-    Raises ValueError where no radius gives enough points.
+    The number of points falls with the radius, but not monotonically, so that few radii give an
+    exact number: a radius with a few more points is chosen, and some points are dropped at random.
+    Raises ValueError if no radius gives enough points.
     """
     d, best, n = len(solid.low), None, 0
     aim = count * (1.0 + 0.5 * SURPLUS)
     r = (PACKING[d] * solid.volume / aim) ** (1.0 / d)
     for _ in range(TRIALS):
-        x = throw(solid, r, seed)
+        x = poisson_points(solid, r, seed)
         n = len(x)
         if n >= count and (best is None or n < len(best)):
             best = x
@@ -179,14 +180,14 @@ def exactly(solid, count, seed):
 
 
 def cell_volume(sampling, solid, dx):
-    """Volume of a lattice's cell [m^d]."""
+    """Return the volume of a lattice's cell [m^d]."""
     if isinstance(sampling, Lattice):
         return float(np.prod(_lattice(sampling, solid)[1]))
     return float((dx / sampling.per_cell) ** len(solid.low))
 
 
 def _lattice(sampling, solid):
-    """Points per axis, and their distance along it [m]."""
+    """Return the number of points per axis, and their distance along it [m]."""
     size = solid.high - solid.low
     if sampling.counts is None:
         counts = np.maximum(np.floor(size / sampling.spacing * (1.0 + 1e-12)), 1)
@@ -198,14 +199,14 @@ def _lattice(sampling, solid):
 
 
 def _steps(n, half, step, faces):
-    """n coordinates about 0, `step` apart; with `faces` the ends are -half and half exactly."""
+    """Return n coordinates about 0, `step` apart; with `faces` exactly from -half to half."""
     if faces:
         return np.linspace(-half, half, int(n))
     return (np.arange(n) - 0.5 * (n - 1)) * step
 
 
 def _centres(solid, dx, k):
-    """Centres of the sub-cells of edge dx/k that meet the solid's box, aligned to the grid."""
+    """Return the centres of the sub-cells of edge dx/k, aligned to the grid, that meet the box."""
     h = dx / k
     first, last = np.floor(solid.low / h), np.ceil(solid.high / h)
     _check_number(last - first)
@@ -220,7 +221,7 @@ def _check_number(counts):
 
 
 def _grid(axes):
-    """All combinations (N, d) of coordinates, the last axis fastest."""
+    """Return all combinations (N, d) of coordinates, the last axis fastest."""
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
 
 

@@ -1,11 +1,11 @@
-"""Check arrays of particles, in memory or from a file (NPZ or HDF5), so that any state can be run.
+"""Read and check arrays of particles, from memory or from a file (NPZ or HDF5).
 
 Names are those of `core.state.Particles`; N particles in d dimensions:
 
     x (N, d)   needed            v (N, d)      C (N, d, d)      F (N, d, d), or J (N,) for a fluid
     two of m, V0 and density (N,)            y (N,) yield stress          body (N,) whole numbers
 
-A file may hold arrays of other names, which are left alone.
+Arrays of other names in a file are ignored.
 """
 
 from pathlib import Path
@@ -16,7 +16,7 @@ import numpy as np
 
 
 class Quantity(NamedTuple):
-    """The axes of an array besides that of the particles, and its text for messages."""
+    """The number of axes of an array besides that of the particles, and its description."""
 
     axes: int
     text: str
@@ -38,7 +38,7 @@ QUANTITIES = {
 
 
 class NoGroup(ValueError):
-    """An HDF5 file without the group asked for."""
+    """The requested group is missing in an HDF5 file."""
 
 
 def read_arrays(file, dim, group="/", select=None):

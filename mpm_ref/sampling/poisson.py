@@ -1,4 +1,4 @@
-"""Poisson-disk points in a box: no two nearer than r, by dart throwing [Bridson2007].
+"""Sample Poisson-disk points in a box, no two nearer than r, by dart throwing [Bridson2007].
 
 Points lie in a background lattice of cells of edge r/sqrt(d), which hold one point at most, so that
 a new dart is compared with the points of few cells. The result depends on the generator alone.
@@ -30,7 +30,7 @@ class Background(NamedTuple):
 
 
 def poisson_disk(low, high, r, rng):
-    """Points (N, d) in the box [low, high] with distances >= r, by the NumPy generator rng.
+    """Return points (N, d) in the box [low, high] with distances >= r, by the NumPy generator rng.
 
     Raises ValueError where r is not positive or too small for the box.
     """
@@ -45,7 +45,7 @@ def poisson_disk(low, high, r, rng):
 
 
 def background(span, r):
-    """Empty cells for the box [0, span] and the distance r."""
+    """Return empty `Background` cells for the box [0, span] and the distance r."""
     edge = r / sqrt(len(span))
     cells = np.floor(span / edge) + 1 + 2 * PAD
     if np.prod(cells) > MAX_CELLS:
@@ -58,7 +58,7 @@ def background(span, r):
 
 
 def _near(d):
-    """Offsets (k, d) of cells that come nearer than r = edge sqrt(d) to one, nearest first."""
+    """Return offsets (k, d) of cells nearer than r = edge sqrt(d) to a cell, nearest first."""
     offsets = np.array(list(product(range(-PAD, PAD + 1), repeat=d)))
     gap2 = (np.maximum(np.abs(offsets) - 1, 0) ** 2).sum(axis=1)
     offsets = offsets[gap2 < d]
@@ -66,27 +66,30 @@ def _near(d):
 
 
 def _most_points(back):
-    """Balls of diameter r cannot be packed denser than sqrt(2)/r^3, disks 2/sqrt(3)/r^2."""
+    """Return a bound of the number of points.
+
+    Balls of diameter r cannot be packed denser than sqrt(2)/r^3, disks 2/sqrt(3)/r^2.
+    """
     return int(sqrt(2.0) * np.prod(back.span / back.r + 1.0)) + 1
 
 
 @kernel
 def _throw(rng, points, active, back, like):
-    """Fill `points`; returns how many. `active`: points that may still have room around them."""
+    """Fill `points` and return their number; `active` are points that may have room around them."""
     n = _add(_anywhere(rng, back.span, like), points, 0, active, 0, back)
     alive = n
     while alive > 0:
         a = floor(rng.random() * alive)
         x = vec(points, active[a], like)
-        placed = False
+        accepted = False
         for _ in range(ATTEMPTS):
             y = lin(1.0, x, 1.0, _around(rng, back.r, like))
             if _is_free(y, points, back):
                 n = _add(y, points, n, active, alive, back)
                 alive += 1
-                placed = True
+                accepted = True
                 break
-        if not placed:
+        if not accepted:
             alive -= 1
             active[a] = active[alive]
     return n
@@ -94,7 +97,7 @@ def _throw(rng, points, active, back, like):
 
 @kernel
 def _add(x, points, n, active, alive, back):
-    """Store x as point n, active; returns n + 1."""
+    """Store x as the active point n and return n + 1."""
     put_vec(points, n, x)
     back.point[_cell(x, back)] = n
     active[alive] = n
@@ -103,7 +106,7 @@ def _add(x, points, n, active, alive, back):
 
 @kernel
 def _anywhere(rng, span, like):
-    """A uniform point of the box."""
+    """Return a uniform point of the box."""
     if len(like) == 2:
         return rng.random() * span[0], rng.random() * span[1]
     else:
@@ -112,7 +115,7 @@ def _anywhere(rng, span, like):
 
 @kernel
 def _in_cube(rng, like):
-    """A uniform point of [-1, 1]^d."""
+    """Return a uniform point of [-1, 1]^d."""
     if len(like) == 2:
         return 2.0 * rng.random() - 1.0, 2.0 * rng.random() - 1.0
     else:
@@ -121,7 +124,7 @@ def _in_cube(rng, like):
 
 @kernel
 def _around(rng, r, like):
-    """A uniform point of the shell r <= |y| <= 2r, by rejection."""
+    """Return a uniform point of the shell r <= |y| <= 2r, by rejection."""
     y = _in_cube(rng, like)
     while dot(y, y) > 1.0 or dot(y, y) < 0.25:
         y = _in_cube(rng, like)
@@ -130,7 +133,7 @@ def _around(rng, r, like):
 
 @kernel
 def _cell(x, back):
-    """Index of the cell of x."""
+    """Return the index of the cell of x."""
     c = 0
     for a in range(len(x)):
         c += (floor(x[a] / back.edge) + PAD) * back.strides[a]
@@ -139,7 +142,7 @@ def _cell(x, back):
 
 @kernel
 def _is_free(x, points, back):
-    """Whether x lies in the box, at least r from all points."""
+    """Return whether x lies in the box, at least r from all points."""
     for a in range(len(x)):
         if not 0.0 <= x[a] <= back.span[a]:
             return False

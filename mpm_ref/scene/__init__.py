@@ -1,8 +1,7 @@
-"""Scenes: a scene determines a run. It comes from a TOML file or from Python; `build` makes its
-`Problem`.
+"""Describe a run completely by a scene, from a TOML file or from Python.
 
     scene = load("scenes/hello.toml")           # or Scene(dim=2, dx=0.05, body=(Body(...),), ...)
-    problem = build(scene)                      # for simulate.simulate
+    problem = build(scene)                      # the `Problem` that `simulate` advances
     problem = problem_from_arrays(bodies, dx, ...)      # from particles in NumPy arrays
 
 The keys of the file are the fields of the records; docs/reference/scenes.md explains each of them.
@@ -17,9 +16,9 @@ from ..shapes import (
     HalfSpace,
     Intersection,
     Mesh,
-    Moved,
     Sphere,
     Torus,
+    Transformed,
     Union,
     Wedge,
 )
@@ -48,9 +47,46 @@ from .records import (
 from .toml import canonical, digest, dumps, load, loads
 
 __all__ = [
-    "Arrays", "Body", "Box", "Capsule", "Clip", "Collider", "Cylinder", "Difference", "Fixed",
-    "Flow", "HalfSpace", "Intersection", "Jittered", "Keyframes", "Lattice", "Limits", "Material",
-    "Mesh", "Motion", "Moved", "Oscillation", "Poisson", "Ramps", "Regular", "Scene", "SceneError",
-    "Scheme", "Solver", "Sphere", "Steady", "Torus", "Union", "Velocity", "Walls", "Wedge", "build",
-    "canonical", "digest", "dumps", "load", "loads", "problem_from_arrays",
+    "Arrays",
+    "Body",
+    "Box",
+    "Capsule",
+    "Clip",
+    "Collider",
+    "Cylinder",
+    "Difference",
+    "Fixed",
+    "Flow",
+    "HalfSpace",
+    "Intersection",
+    "Jittered",
+    "Keyframes",
+    "Lattice",
+    "Limits",
+    "Material",
+    "Mesh",
+    "Motion",
+    "Oscillation",
+    "Poisson",
+    "Ramps",
+    "Regular",
+    "Scene",
+    "SceneError",
+    "Scheme",
+    "Solver",
+    "Sphere",
+    "Steady",
+    "Torus",
+    "Transformed",
+    "Union",
+    "Velocity",
+    "Walls",
+    "Wedge",
+    "build",
+    "canonical",
+    "digest",
+    "dumps",
+    "load",
+    "loads",
+    "problem_from_arrays",
 ]

@@ -1,7 +1,7 @@
-"""Build a `Problem` of a checked scene: sampled bodies, colliders and motions, clock, limits.
+"""Build the parts of a `Problem` from a valid scene: bodies, colliders, motions, clock, limits.
 
-Each `build_*` takes a checked record, except for what only the built object can check: then it
-raises SceneError with the key's path.
+Each `build_*` takes a valid record. It raises SceneError, with the path of the key, for errors that
+only the built object can detect.
 """
 
 from math import inf, radians
@@ -23,7 +23,7 @@ from ..sampling import sample
 from ..sampling.arrays import read_arrays
 from ..shapes import level_set
 from ..shapes.inside import rotation, solid
-from .messages import SceneError, at
+from .messages import SceneError, errors_at
 from .records import Keyframes, Oscillation, Ramps, Steady
 
 NAMES = f'expected "explicit" or one of {", ".join(METHODS)}'
@@ -41,22 +41,23 @@ class SceneParts(NamedTuple):
 
 
 def build_parts(scene):
-    """Return the `SceneParts` of a scene. Raises SceneError for what building finds."""
+    """Return the `SceneParts` of a scene. Raises SceneError for a part that cannot be built."""
     materials = tuple(build_material(body, scene.dim, k) for k, body in enumerate(scene.body))
     return SceneParts(build_clock(scene), build_limits(scene), build_conditions(scene),
-                 build_solver(scene), tuple(None if record.material.is_neural else made[:2]
-                                            for record, made in zip(scene.body, materials)))
+                      build_solver(scene), tuple(
+                          None if record.material.is_neural else (law, flow)
+                          for record, (law, flow, _) in zip(scene.body, materials)))
 
 
 def build_material(body, dim, k):
     """Return law, return map and training range of body number k (see `records.Material.build`).
 
-    The range is None where no training is known. Raises SceneError.
+    The range is None unless the law is learned. Raises SceneError.
     """
     path = f"body[{k}].material"
-    with at(path + ("" if body.material.is_neural else ".flow")):
+    with errors_at(path + ("" if body.material.is_neural else ".flow")):
         law, flow, about = body.material.build(dim)
-    with at(f"{path}.weights"):
+    with errors_at(f"{path}.weights"):
         return law, flow, None if about is None else stored_bounds(about, dim)
 
 
@@ -88,18 +89,18 @@ def build_body(scene, k, material, arrays=None):
 
 
 def _sampled(scene, record, material, where):
-    """Particles that fill the body's shape; `where` is its path and its seed."""
+    """Return particles that fill the body's shape; `where` is its path and its seed."""
     path, seed = where
-    with at(f"{path}.shape"):
+    with errors_at(f"{path}.shape"):
         shape = solid(record.shape)
-    with at(f"{path}.sampling"):
+    with errors_at(f"{path}.sampling"):
         x, V0 = sample(record.sampling, shape, scene.dx, seed)
     m = record.density * V0
     return _at_rest(scene, material, x, velocity(record.velocity, x, m), (m, V0))
 
 
 def _at_rest(scene, material, x, v, sizes):
-    """Particles without deformation; `sizes` are their masses and volumes."""
+    """Return undeformed particles; `sizes` are their masses and volumes."""
     particles = particles_at(x, v, *sizes, scene.step_scheme.transfer, fluid=not material.needs_F)
     if not material.has_history:
         return particles
@@ -107,7 +108,7 @@ def _at_rest(scene, material, x, v, sizes):
 
 
 def velocity(record, x, m):
-    """v = linear + angular x (x - center) at points x (N, d) with masses m (N,)."""
+    """Return v = linear + angular x (x - center) at points x (N, d) with masses m (N,)."""
     v = np.zeros_like(x)
     if record.linear is not None:
         v += record.linear
@@ -119,9 +120,9 @@ def velocity(record, x, m):
 
 
 def _particles_of(scene, record, material, where):
-    """Particles from arrays: of a file, or handed over; `where` is the body's path and those."""
+    """Return particles from arrays of a file, or from `where`: the body's path and arrays."""
     (path, a), source = where, record.particles
-    with at(f"{path}.particles"):
+    with errors_at(f"{path}.particles"):
         if a is None and source.file is None:
             raise ValueError("its arrays were handed over in Python: use problem_from_arrays")
         if a is None:
@@ -143,7 +144,7 @@ def _particles_of(scene, record, material, where):
 
 
 def masses(a, density):
-    """Return masses [kg] and volumes at rest [m^d] of arrays, one from the other by the density.
+    """Return masses [kg] and volumes at rest [m^d] of particles from two of m, V0 and the density.
 
     density: a number, or None [kg/m^d]. Raises ValueError unless two of m, V0 and the density are
     given.
@@ -159,7 +160,7 @@ def masses(a, density):
 
 
 def _deformation(a, material):
-    """The arrays with F alone for what carries F, and with J, or det F, for what carries J."""
+    """Return the arrays with F if the material needs F, else with J, if need be from F."""
     if material.needs_F and "J" in a and "F" not in a:
         raise ValueError("the array F is missing; J alone is for a fluid that carries no F")
     if material.needs_F:
@@ -175,7 +176,7 @@ def _deformation(a, material):
 
 
 def build_clock(scene):
-    """When the run steps, shows frames and ends."""
+    """Return the `Clock` of a scene: time steps, frames and end."""
     for a, b in (("dt", "cfl"), ("steps", "end"), ("every", "interval")):
         if getattr(scene, a) is not None and getattr(scene, b) is not None:
             raise SceneError(f"{a}: given together with `{b}`; give one of the two")
@@ -191,7 +192,7 @@ def build_clock(scene):
 
 
 def build_solver(scene):
-    """Options of the implicit method that the scene names; None for the explicit integrator."""
+    """Return the options of the scene's implicit method; None for the explicit integrator."""
     if scene.integrator == "explicit":
         if scene.solver is not None:
             raise SceneError('solver: given, but the integrator is "explicit"; add integrator = '
@@ -199,7 +200,7 @@ def build_solver(scene):
         return None
     if scene.integrator not in METHODS:
         raise SceneError(f"integrator = {scene.integrator!r}: {NAMES}")
-    with at("scheme"):
+    with errors_at("scheme"):
         check_scheme(scene.step_scheme)
     parts = {f"collider[{k}]": part for k, part in enumerate(scene.collider)}
     for name, part in (parts | {"walls": scene.walls}).items():
@@ -210,7 +211,7 @@ def build_solver(scene):
 
 
 def build_limits(scene):
-    """What a healthy run stays within."""
+    """Return the `Limits` within which a run is healthy."""
     limits = scene.limits
     if not limits.J[0] < 1.0 < limits.J[1]:
         raise SceneError(f"limits.J = {list(limits.J)}: expected two numbers, one < 1, one > 1")
@@ -218,7 +219,7 @@ def build_limits(scene):
 
 
 def build_conditions(scene):
-    """Colliders, prescribed regions and walls; None where there are none."""
+    """Return colliders, prescribed regions and walls; None if there are none."""
     colliders = tuple(_collider(c, scene.dim, f"collider[{k}]")
                       for k, c in enumerate(scene.collider))
     prescribed = tuple(_prescribed(f, scene.dim, f"fixed[{k}]") for k, f in enumerate(scene.fixed))
@@ -229,32 +230,32 @@ def build_conditions(scene):
 
 
 def _collider(record, dim, path):
-    with at(f"{path}.shape"):
+    with errors_at(f"{path}.shape"):
         shape = level_set(record.shape)
     motion = _motion(record.motion, dim, f"{path}.motion")
-    with at(path):
+    with errors_at(path):
         return RigidCollider(shape, record.kind, record.friction, motion, record.inside)
 
 
 def _prescribed(record, dim, path):
-    with at(f"{path}.region"):
+    with errors_at(f"{path}.region"):
         shape = level_set(record.region)
     motion = _motion(record.motion, dim, f"{path}.motion")
     until = inf if record.until is None else record.until
-    with at(path):
+    with errors_at(path):
         return Prescribed(shape, motion, record.inside, record.follows, record.since, until)
 
 
 def _walls(record, dim):
     if record is None:
         return None
-    with at("walls"):
+    with errors_at("walls"):
         low, high = _nodes("low", record.low, dim), _nodes("high", record.high, dim)
         return BoxWalls(low, high, record.kind, record.friction)
 
 
 def _nodes(name, nodes, dim):
-    """Node indices per axis, None for "open"."""
+    """Return node indices per axis, None for "open"."""
     nodes = nodes or dim * ("open",)
     if len(nodes) != dim:
         raise ValueError(f"{name} = {list(nodes)}: expected {dim} node indices or 'open'")
@@ -262,21 +263,21 @@ def _nodes(name, nodes, dim):
 
 
 def _motion(record, dim, path):
-    """The rigid motion of a collider or region."""
+    """Return the rigid motion of a collider or region."""
     translation = _schedule(record.translation, dim, f"{path}.translation")
     turning = _schedule(record.rotation, 1, f"{path}.rotation")
-    with at(path):
+    with errors_at(path):
         orientation = rotation(record.angle, record.axis, dim) if record.angle else None
-        made = rigid.Motion(translation, turning, record.axis, record.center, orientation)
-        made.pose(1.0, 1.0, dim)        # checks what belongs together
-    return made
+        motion = rigid.Motion(translation, turning, record.axis, record.center, orientation)
+        motion.pose(1.0, 1.0, dim)        # checks what belongs together
+    return motion
 
 
 def _schedule(record, size, path):
-    """A schedule of vectors of that size, or of numbers for size 1."""
+    """Return a schedule of vectors of this size, or of numbers for size 1."""
     if record is None:
         return None
-    with at(path):
+    with errors_at(path):
         match record:
             case Steady():
                 return rigid.Steady(_value("rate", record.rate, size), record.start, _stop(record))
@@ -299,7 +300,7 @@ def _values(name, values, size):
 
 
 def _value(name, value, size):
-    """A vector of that size, or a number for size 1."""
+    """Return a vector of this size, or a number for size 1."""
     if np.shape(value) != (() if size == 1 else (size,)):
         expected = "a number" if size == 1 else f"{size} numbers"
         raise ValueError(f"{name} = {value}: expected {expected}")

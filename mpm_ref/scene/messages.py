@@ -1,4 +1,4 @@
-"""Errors of a scene: one sentence that begins with the key and its value."""
+"""Report errors of a scene, each in one sentence that begins with the key and its value."""
 
 import re
 from contextlib import contextmanager
@@ -19,19 +19,19 @@ OF_A_KEY = re.compile(r"(?:\w+ '[^']*': )?(?=[\w\[\]]+ = )")
 
 
 class SceneError(ValueError):
-    """A scene that cannot be run; the message is one sentence that begins with the key's path."""
+    """A scene that cannot run; the message is one sentence that begins with the path of a key."""
 
     def __init__(self, message):
         super().__init__(" ".join(str(message).split()))
 
 
 def joined(path, key):
-    """Path of a key of the table at `path`."""
+    """Return the path of a key of the table at `path`."""
     return f"{path}.{key}" if path else str(key)
 
 
-def placed(path, sentence):
-    """The sentence with the path before it; a key that it begins with joins the path."""
+def with_path(path, sentence):
+    """Return a sentence preceded by a path; a key at its beginning is joined to the path."""
     of_a_key = OF_A_KEY.match(sentence)
     if of_a_key:
         return joined(path, sentence[of_a_key.end():])
@@ -39,19 +39,19 @@ def placed(path, sentence):
 
 
 @contextmanager
-def at(path):
-    """Within this context a ValueError becomes a SceneError that begins with `path`."""
+def errors_at(path):
+    """Turn a ValueError in this context into a SceneError that begins with `path`."""
     try:
         yield
     except SceneError:
         raise
     except ValueError as fault:
-        raise SceneError(placed(path, str(fault))) from None
+        raise SceneError(with_path(path, str(fault))) from None
 
 
 @contextmanager
-def opened_by(source):
-    """Within this context the sentences of SceneErrors begin with `source`, unless it is empty."""
+def errors_of(source):
+    """Begin the message of a SceneError in this context with `source`, unless it is empty."""
     try:
         yield
     except SceneError as fault:
@@ -61,7 +61,7 @@ def opened_by(source):
 
 
 def shown(value):
-    """A value as text, not too long."""
+    """Return a value as text of limited length."""
     try:
         text = repr(value)
     except ValueError:          # a whole number of thousands of digits
@@ -70,27 +70,27 @@ def shown(value):
 
 
 def rephrase(message, data):
-    """The sentence for a message of msgspec about plain tables."""
-    said, _, where = message.rpartition(" - at `$")
-    said, where = (said, where.rstrip("`").lstrip(".")) if said else (where, "")
+    """Return our sentence for a message of msgspec about plain tables."""
+    text, _, where = message.rpartition(" - at `$")
+    text, where = (text, where.rstrip("`").lstrip(".")) if text else (where, "")
     steps = [int(step) if step.isdigit() else step for step in re.findall(r"[^.\[\]]+", where)]
-    key = re.fullmatch(r"Object (contains unknown|missing required) field `(.*)`", said, re.DOTALL)
+    key = re.fullmatch(r"Object (contains unknown|missing required) field `(.*)`", text, re.DOTALL)
     if key:
         about = _unknown if key[1] == "contains unknown" else _missing
         return about(where, key[2], _types_at(steps, data))
     value = _follow(data, steps)
-    if said.startswith("Invalid"):
+    if text.startswith("Invalid"):
         return f"{where} = {shown(value)}: expected {_choices(steps, data)}"
-    if said.startswith("Expected"):
-        said = re.sub(r"`([a-z| ]+)`", _in_words, said.partition(", got")[0])
-        return f"{where or 'the scene'} = {shown(value)}: e{said[1:]}"
-    return placed(where, said)
+    if text.startswith("Expected"):
+        text = re.sub(r"`([a-z| ]+)`", _in_words, text.partition(", got")[0])
+        return f"{where or 'the scene'} = {shown(value)}: e{text[1:]}"
+    return with_path(where, text)
 
 
 def _unknown(where, key, types):
-    known = sorted({name for kind in types if _is_record(kind) for name in _keys(kind)})
-    near = get_close_matches(key, known, 1)
-    hint = f"did you mean `{near[0]}`?" if near else f"the keys here are {', '.join(known)}"
+    keys = sorted({name for kind in types if _is_record(kind) for name in _keys(kind)})
+    near = get_close_matches(key, keys, 1)
+    hint = f"did you mean `{near[0]}`?" if near else f"the keys here are {', '.join(keys)}"
     return f"{joined(where, shown(key)[1:-1])}: unknown key; {hint}"
 
 
@@ -105,7 +105,7 @@ def _in_words(match):
 
 
 def _choices(steps, data):
-    """What a key that has a few values may be."""
+    """Return the values that a key may have, as text."""
     kinds = _types_at(steps, data)
     values = [repr(value) for kind in kinds if get_origin(kind) is Literal
               for value in get_args(kind)]
@@ -116,7 +116,7 @@ def _choices(steps, data):
 # the types of the records along a path
 
 def _types_at(steps, data):
-    """Types that the value at a path may have; tables by their `type` where they say it."""
+    """Return the types that the value at a path may have, narrowed by the `type` of tables."""
     kinds = [Scene]
     for step in steps:
         kinds = [part for kind in kinds for part in _parts(kind, step)]
@@ -127,15 +127,17 @@ def _types_at(steps, data):
 
 
 def _parts(kind, step):
-    """Types of an item of a list, or of a key of a table."""
+    """Return the types of an item of a list, or of a key of a table."""
     if isinstance(step, int):
         return _flat(get_args(kind)[0]) if get_origin(kind) is tuple else []
-    here = step in getattr(kind, "__struct_fields__", ())
-    return _flat(get_type_hints(kind)[step]) if here else []
+    keys = getattr(kind, "__struct_encode_fields__", ())
+    if step not in keys:
+        return []
+    return _flat(get_type_hints(kind)[kind.__struct_fields__[keys.index(step)]])
 
 
 def _flat(kind):
-    """The members of a union."""
+    """Return the members of a union."""
     if get_origin(kind) in (Union, UnionType):
         return [part for member in get_args(kind) for part in _flat(member)]
     return [kind]
@@ -146,7 +148,7 @@ def _is_record(kind):
 
 
 def _keys(kind):
-    return (*kind.__struct_fields__, *(["type"] if _tag(kind) else []))
+    return (*kind.__struct_encode_fields__, *(["type"] if _tag(kind) else []))
 
 
 def _tag(kind):
@@ -158,7 +160,7 @@ def _tags(kinds):
 
 
 def _follow(data, steps):
-    """The value at a path, or None."""
+    """Return the value at a path, or None."""
     for step in steps:
         try:
             data = data[step]

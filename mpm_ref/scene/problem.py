@@ -7,7 +7,7 @@ import numpy as np
 from ..problem import Problem
 from ..sampling.arrays import QUANTITIES, check_arrays
 from .builder import build_bodies
-from .messages import SceneError, at, opened_by
+from .messages import SceneError, errors_at, errors_of
 from .toml import canonical
 from .validate import plain, validate_scene
 
@@ -15,13 +15,13 @@ BODY_KEYS = "material", "density", "velocity", "offset"     # of a body, besides
 
 
 def build(scene, source=""):
-    """Return the `Problem` of a scene: bodies sampled, conditions and clock built.
+    """Return the `Problem` of a scene, with sampled bodies, boundary conditions and clock.
 
-    `source`, usually a file name, opens error messages. Raises SceneError, which names the key that
-    does not work.
+    source: usually a file name, with which error messages begin. Raises SceneError, which names the
+    key at fault.
     """
     scene = validate_scene(scene, source)
-    with opened_by(source):
+    with errors_of(source):
         return _problem_of(scene, {})
 
 
@@ -48,7 +48,7 @@ def problem_from_arrays(bodies, dx, **keys):
     """
     tables, arrays, dim = [], {}, _dimension(bodies)
     for name, body in bodies.items():
-        with at(f"bodies[{name!r}]"):
+        with errors_at(f"bodies[{name!r}]"):
             own, arrays[name] = _split(dict(body), dim)
         particles = {"sha256": _digest(arrays[name]), "offset": own.pop("offset", None)}
         tables.append({"name": name, "particles": particles, **own})
@@ -78,7 +78,7 @@ def _problem_of(scene, arrays):
 
 
 def _dimension(bodies):
-    """The d of the first body's x; SceneError without one."""
+    """Return d of the first body's x. Raises SceneError without one."""
     if not bodies:
         raise SceneError("bodies = {}: expected at least one")
     name, body = next(iter(bodies.items()))
@@ -90,7 +90,7 @@ def _dimension(bodies):
 
 
 def _split(body, dim):
-    """The keys of a body for its table, and its checked arrays."""
+    """Return the keys of a body for its table, and its checked arrays."""
     own = {key: body.pop(key) for key in BODY_KEYS
            if key in body and (key != "density" or np.ndim(body[key]) == 0)}
     allowed = {name: q.text for name, q in QUANTITIES.items() if name != "body"}
@@ -102,7 +102,7 @@ def _split(body, dim):
 
 
 def _digest(arrays):
-    """sha256 of arrays, by which equal problems have equal texts."""
+    """Return the sha256 of arrays, which stands for them in the text of a problem."""
     digest = hashlib.sha256()
     for name in sorted(arrays):
         digest.update(f"{name}{arrays[name].shape}".encode() + arrays[name].tobytes())

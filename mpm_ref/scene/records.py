@@ -1,8 +1,7 @@
-"""The tables of a scene file: one record each, with the names, units and bounds of their keys.
+"""Records of the tables of a scene file, with the names, units and bounds of their keys.
 
-Each key is explained in docs/reference/scenes.md. A record checks what one table can get wrong by
-itself; `validate` checks what belongs together across tables, and `builder` makes objects of
-records.
+docs/reference/scenes.md explains each key. A record checks conditions within its table; `validate`
+checks those across tables, and `builder` builds objects from records.
 """
 
 from typing import Annotated, Literal
@@ -41,10 +40,13 @@ Number = Annotated[float, Meta(ge=-1e30, le=1e30)]
 NEURAL = "neural"       # the law whose parameters are a file
 
 
-class Flow(Record):
-    """A return map by its name in `materials.FLOWS`, and those parameters that it takes."""
+class Flow(Record, rename={"name": "type"}):
+    """A return map by its name in `materials.FLOWS`, and its parameters.
 
-    type: str
+    The key in a scene file is `type`, as in all other tables that name a kind.
+    """
+
+    name: str
     friction_angle: Number | None = None        # [degrees]
     s_min: Number | None = None
     s_max: Number | None = None
@@ -56,8 +58,9 @@ class Flow(Record):
 
 
 class Material(Record):
-    """An elastic law by its name in `materials.LAWS`, those parameters it takes, a return map; or
-    "neural", and the file that holds both.
+    """A material: an elastic law by its name in `materials.LAWS`, its parameters and a return map.
+
+    The law "neural" is a file that holds a learned law and its return map.
     """
 
     law: str
@@ -66,7 +69,7 @@ class Material(Record):
     lam: Number | None = None                   # [Pa]
     weights: str | None = None                  # file of trained laws (see learned.weights)
     sha256: Sha256 | None = None                # of what that file must hold
-    flow: Flow = Flow(type="none")
+    flow: Flow = Flow(name="none")
 
     def __post_init__(self):
         if self.law == NEURAL:
@@ -78,7 +81,7 @@ class Material(Record):
 
     @property
     def is_neural(self):
-        """Whether its laws are learned."""
+        """Return whether the law is learned."""
         return self.law == NEURAL
 
     def build(self, dim):
@@ -91,21 +94,22 @@ class Material(Record):
             laws = self.trained(dim)
             return learned_law(laws.elastic), learned_flow(laws.plastic), laws.about
         law = self.elastic()
-        return law, make_flow(self.flow.type, law, dim, **_given(self.flow, "type")), None
+        return law, make_flow(self.flow.name, law, dim, **_given(self.flow, "name")), None
 
     def elastic(self):
         """Return the elastic law by its name. Raises ValueError as `build`."""
         return make_law(self.law, **_given(self, "law", "flow"))
 
     def trained(self, dim=None):
-        """`LearnedLaws` of its file. Raises ValueError for a file that holds none, or for
-        other dimensions, and for keys beside it.
+        """Return the `LearnedLaws` of the file.
+
+        Raises ValueError for a file without laws or of other dimensions, and for superfluous keys.
         """
-        beside = [*_given(self, "law", "weights", "sha256", "flow")]
-        beside += ["flow"] if self.flow != Flow(type="none") else []
-        if beside:
-            raise ValueError(f"law {NEURAL!r}: unknown parameter {', '.join(beside)}; all that it "
-                             "takes is `weights`, which hold the return map too")
+        superfluous = [*_given(self, "law", "weights", "sha256", "flow")]
+        superfluous += ["flow"] if self.flow != Flow(name="none") else []
+        if superfluous:
+            raise ValueError(f"law {NEURAL!r}: unknown parameter {', '.join(superfluous)}; all "
+                             "that it takes is `weights`, which hold the return map too")
         if self.weights is None:
             raise ValueError(f"law {NEURAL!r}: missing parameter weights, a file of trained laws")
         laws = weights.load(self.weights)
@@ -126,13 +130,13 @@ class Material(Record):
 
 
 def _given(record, *but):
-    """The keys of a record that have a value, except some."""
+    """Return the keys of a record that have a value, except those of `but`."""
     values = {name: getattr(record, name) for name in record.__struct_fields__ if name not in but}
     return {name: value for name, value in values.items() if value is not None}
 
 
 class Velocity(Record):
-    """v(x) = linear + angular x (x - center) at the start; center is that of mass if not given."""
+    """The initial velocity linear + angular x (x - center); default center: that of mass."""
 
     linear: Vector | None = None                # [m/s]
     angular: Coordinate | Vector = 0.0          # [rad/s], a number in 2D, a vector in 3D
@@ -140,14 +144,14 @@ class Velocity(Record):
 
     @property
     def moves(self):
-        """Whether it is not zero."""
+        """Return whether the velocity is not zero."""
         return self.linear is not None or self.angular != 0.0
 
 
 class Arrays(Record):
     """Particles from the arrays of an NPZ or HDF5 file.
 
-    Without `file`, the arrays with this `sha256` are handed over in Python (`problem_from_arrays`).
+    Without `file`, arrays with this `sha256` are passed in Python (`problem_from_arrays`).
     """
 
     file: str | None = None
@@ -238,7 +242,7 @@ class Collider(Record):
 
 
 class Fixed(Record):
-    """A region whose nodes move as told: at rest without a motion."""
+    """A region whose nodes have prescribed velocities, zero without a motion."""
 
     region: Analytic
     motion: Motion = Motion()
@@ -266,7 +270,7 @@ class Clip(Record):
 
 
 class Scheme(Record):
-    """How particles and grid exchange momentum; as `explicit.Scheme`."""
+    """The scheme of the transfer between particles and grid (see `explicit.Scheme`)."""
 
     degree: int = 2
     transfer: str | None = None                 # none: "mls", of an implicit step "apic"
@@ -276,10 +280,10 @@ class Scheme(Record):
     gravity_on_empty: bool = False
 
     def __post_init__(self):
-        self.of("explicit")
+        self.for_integrator("explicit")
 
-    def of(self, integrator):
-        """The scheme of a step by an integrator."""
+    def for_integrator(self, integrator):
+        """Return the `explicit.Scheme` of a step by an integrator."""
         values = {name: getattr(self, name) for name in self.__struct_fields__}
         if self.transfer is None:
             values["transfer"] = "mls" if integrator == "explicit" else "apic"
@@ -287,7 +291,7 @@ class Scheme(Record):
 
 
 class Solver(Record):
-    """Options of implicit steps; those not given are the method's, see `hot.methods`."""
+    """Options of implicit steps; the defaults are those of the method (see `hot.methods`)."""
 
     eps: Positive | None = None                 # tolerance of the scaled gradient
     displacement_tolerance: NotNegative | None = None       # error of a step [dx]
@@ -302,13 +306,13 @@ class Solver(Record):
     implementation: Literal["blocks", "scipy"] | None = None
 
     def given(self):
-        """The keys that are given, as a dictionary."""
+        """Return the keys that are given, as a dictionary."""
         values = {name: getattr(self, name) for name in self.__struct_fields__}
         return {name: value for name, value in values.items() if value is not None}
 
 
 class Limits(Record):
-    """What a healthy run stays within; as `monitor.Limits`."""
+    """Limits within which a run is healthy (see `monitor.Limits`)."""
 
     cfl: Positive = 1.0
     J: tuple[Positive, Positive] = (1e-3, 1e3)
@@ -316,9 +320,9 @@ class Limits(Record):
 
 
 class Scene(Record, dict=True):
-    """Everything that determines a run, apart from the program.
+    """A scene: all data that determine a run, apart from the program.
 
-    `validate_scene` keeps under `parts` what it built to check the scene.
+    `validate_scene` stores under `parts` the objects that it built to check the scene.
     """
 
     dim: Literal[2, 3]
@@ -346,10 +350,10 @@ class Scene(Record, dict=True):
 
     @property
     def parts(self):
-        """The `builder.SceneParts` of a scene that was validated, else None."""
+        """Return the `builder.SceneParts` of a scene that was validated, else None."""
         return vars(self).get("parts")
 
     @property
     def step_scheme(self):
-        """The scheme of its steps, as `explicit.Scheme`."""
-        return self.scheme.of(self.integrator)
+        """Return the `explicit.Scheme` of the scene's steps."""
+        return self.scheme.for_integrator(self.integrator)

@@ -1,4 +1,4 @@
-"""Scenes as text: TOML files, and a canonical JSON text with its hash."""
+"""Read and write scenes as TOML, and as a canonical JSON text with its hash."""
 
 import hashlib
 import json
@@ -15,7 +15,7 @@ FILES = "file", "weights"       # keys that name a file
 
 
 def load(path):
-    """The `Scene` of a TOML file; file names in it are taken from the folder of that file.
+    """Return the `Scene` of a TOML file; file names in it are relative to the folder of that file.
 
     Raises SceneError, which names the file and the key.
     """
@@ -29,9 +29,10 @@ def load(path):
 
 
 def loads(text, source="", folder="."):
-    """The `Scene` of a TOML text, or of JSON as `canonical` writes it.
+    """Return the `Scene` of a TOML text, or of JSON as `canonical` writes it.
 
-    `source` opens error messages, `folder` is where file names start. Raises SceneError.
+    source: text with which error messages begin; folder: to which file names are relative. Raises
+    SceneError.
     """
     try:
         data = json.loads(text) if text.lstrip().startswith("{") else tomllib.loads(text)
@@ -41,7 +42,7 @@ def loads(text, source="", folder="."):
 
 
 def _located(data, folder):
-    """Plain tables with the names of their files made to start at a folder."""
+    """Return plain tables in which the names of files start at a folder."""
     if isinstance(data, list):
         return [_located(item, folder) for item in data]
     if not isinstance(data, dict):
@@ -54,7 +55,7 @@ def _located(data, folder):
 
 
 def dumps(scene):
-    """TOML text of a scene, defaults left out; `loads` gives the same scene."""
+    """Return the TOML text of a scene without its defaults, which `loads` reads back."""
     tables = _tables(validate_scene(scene))
     many = {key: tables.pop(key) for key in ("body", "collider", "fixed") if key in tables}
     lines = [_pair(key, value) for key, value in tables.items()]
@@ -69,7 +70,7 @@ def _pair(key, value):
 
 
 def _toml(value):
-    """A value on one line of TOML."""
+    """Return a value on one line of TOML."""
     if isinstance(value, dict):
         return f"{{{', '.join(_pair(key, item) for key, item in value.items())}}}"
     if isinstance(value, list | tuple):
@@ -79,25 +80,26 @@ def _toml(value):
 
 
 def canonical(scene):
-    """JSON text of a scene: sorted keys, no defaults; files by their name and the sha256 of what
-    they hold. Equal scenes have equal texts, wherever they lie. Raises SceneError.
+    """Return the canonical JSON text of a scene: sorted keys, no defaults, files by name and hash.
+
+    Equal scenes have equal texts, independent of their folder. Raises SceneError.
     """
     tables = _by_content(_tables(validate_scene(scene)))
     return json.dumps(tables, sort_keys=True, separators=(",", ":"))
 
 
 def digest(scene):
-    """The scene's hash: sha256 of its canonical text."""
+    """Return the hash of a scene: the sha256 of its canonical text."""
     return hashlib.sha256(canonical(scene).encode()).hexdigest()
 
 
 def _tables(record):
-    """A record as plain tables without the keys that have their default value."""
+    """Return a record as plain tables without the keys that have their default value."""
     tables = {"type": record.__struct_config__.tag} if isinstance(record, Kind) else {}
     for field in msgspec.structs.fields(record):
         value = getattr(record, field.name)
         if value is not None and value != field.default:
-            tables[field.name] = _plain_but_defaults(value)
+            tables[field.encode_name] = _plain_but_defaults(value)
     return tables
 
 
@@ -108,7 +110,7 @@ def _plain_but_defaults(value):
 
 
 def _by_content(data, path=""):
-    """Plain tables in which a file is its name and the sha256 of what it holds."""
+    """Return plain tables in which a file is represented by its name and its sha256."""
     if isinstance(data, list | tuple):
         return [_by_content(item, f"{path}[{k}]") for k, item in enumerate(data)]
     if not isinstance(data, dict):

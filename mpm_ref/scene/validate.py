@@ -1,6 +1,6 @@
-"""Validate a scene: plain tables become a `Scene`, or one sentence names the key and the fault.
+"""Validate a scene: convert plain tables to a `Scene`, or raise an error that names the key.
 
-msgspec checks keys, types and bounds; this module checks what spans tables.
+msgspec checks keys, types and bounds; this module checks conditions across tables.
 """
 
 from math import isfinite
@@ -19,8 +19,8 @@ from .records import Scene
 def validate_scene(data, source=""):
     """Return the valid `Scene` of plain tables (dict), or of a Scene built in Python.
 
-    A scene that was validated before comes back as it is; its `parts` are what the check built.
-    `source`, usually a file name, opens the message. Raises SceneError for whatever is wrong.
+    A scene that was validated before is returned unchanged; its `parts` hold the objects built by
+    the validation. source: usually a file name, with which the message begins. Raises SceneError.
     """
     if isinstance(data, Scene) and data.parts is not None:
         return data
@@ -44,7 +44,7 @@ def _from(source, message):
 
 
 def plain(record):
-    """A record as tables of numbers, texts and lists; NumPy's numbers and arrays become plain."""
+    """Return a record as plain tables; NumPy's numbers and arrays become numbers and lists."""
     return msgspec.to_builtins(record, enc_hook=_plain_numpy)
 
 
@@ -67,7 +67,7 @@ def check_finite(data, path=""):
 
 
 def check_scene(scene):
-    """Return the `SceneParts` of a scene. Raises SceneError for the first misfit."""
+    """Return the `SceneParts` of a scene. Raises SceneError for the first inconsistency."""
     check_dimension(scene, scene.dim)
     for k, body in enumerate(scene.body):
         check_body(body, scene.dim, f"body[{k}]")
@@ -91,7 +91,7 @@ def check_body(body, dim, path):
 
 
 def check_dimension(record, dim, path=""):
-    """Raise SceneError for a vector without `dim` components, in a record or what it holds."""
+    """Raise SceneError for a vector without `dim` components in a record or its parts."""
     if dim == 2 and isinstance(record, Mesh):
         raise SceneError(f"{path[:-1]}: a mesh of triangles is for dim = 3")
     for field in msgspec.structs.fields(record):

@@ -1,7 +1,7 @@
-"""Shapes as scene files describe them: a record for each, and the level sets of the analytic ones.
+"""Define the shapes of scene files, and the level sets of the analytic ones.
 
-Boolean combinations, moved shapes and meshes are for bodies only (see `inside`): they have no
-distance. Collider and prescribed regions take the analytic ones.
+Boolean combinations, transformed shapes and meshes have no distance, so that only bodies can have
+them (see `inside`). Colliders and prescribed regions have analytic shapes.
 """
 
 from functools import singledispatch
@@ -17,7 +17,7 @@ Shapes = Annotated[tuple["Shape", ...], Meta(min_length=1, max_length=1000)]
 
 
 class HalfSpace(Kind, tag="half_space"):
-    """Everything behind the plane through `point`; `normal` points out of it, with any length."""
+    """All points behind the plane through `point`; `normal`, of any length, points out of it."""
 
     point: Vector
     normal: Vector
@@ -96,7 +96,7 @@ class Difference(Kind, tag="difference"):
     minus: Shapes
 
 
-class Moved(Kind, tag="moved"):
+class Transformed(Kind, tag="moved"):
     """A shape scaled, then turned by `angle` [degrees], both about `about`, then shifted."""
 
     shape: "Shape"
@@ -121,12 +121,12 @@ class Mesh(Kind, tag="mesh"):
 
 
 Analytic = HalfSpace | Box | Sphere | Cylinder | Capsule | Torus | Wedge
-Shape = Analytic | Union | Intersection | Difference | Moved | Mesh
+Shape = Analytic | Union | Intersection | Difference | Transformed | Mesh
 
 
 @singledispatch
 def level_set(shape):
-    """The level set (see core.levelset) of an analytic shape.
+    """Return the level set (see core.levelset) of an analytic shape.
 
     Raises ValueError for sizes that make no shape, and for shapes without a distance.
     """

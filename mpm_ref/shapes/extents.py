@@ -1,4 +1,4 @@
-"""Bounding boxes and volumes of the analytic shapes."""
+"""Compute bounding boxes and volumes of the analytic shapes."""
 
 from functools import singledispatch
 from math import hypot, inf, pi, radians, tan
@@ -9,13 +9,13 @@ from .. import shapes
 
 
 def hull(x):
-    """Corners of the bounding box of points (N, d)."""
+    """Return the corners of the bounding box of points (N, d)."""
     return x.min(axis=0), x.max(axis=0)
 
 
 @singledispatch
 def bounds(shape):
-    """Corners (low, high) of the bounding box of an analytic shape."""
+    """Return the corners (low, high) of the bounding box of an analytic shape."""
     raise TypeError(f"{type(shape).__name__} is not an analytic shape")
 
 
@@ -56,8 +56,8 @@ def _(shape: shapes.Cylinder):
 @bounds.register
 def _(shape: shapes.Torus):
     ring = np.ones(2) if shape.axis is None else _disk(np.array(shape.axis))
-    reach = shape.major * ring + shape.minor
-    return np.array(shape.center) - reach, np.array(shape.center) + reach
+    extent = shape.major * ring + shape.minor
+    return np.array(shape.center) - extent, np.array(shape.center) + extent
 
 
 @bounds.register
@@ -68,13 +68,13 @@ def _(shape: shapes.Wedge):
     across = np.cross(a, b) if d == 3 else np.array([-a[1], a[0], 0.0])
     back = [w.length * (a + s * tan(w.half_angle) * across) for s in (-1.0, 1.0)]
     low, high = hull(np.array([0.0 * a, *back])[:, :d] + shape.tip)
-    reach = np.array([abs(c) * w.half_width if c else 0.0 for c in b[:d]])
-    return low - reach, high + reach
+    half_width = np.array([abs(c) * w.half_width if c else 0.0 for c in b[:d]])
+    return low - half_width, high + half_width
 
 
 @singledispatch
 def volume(shape):
-    """Volume [m^d] of an analytic shape by its formula, or None where it is infinite."""
+    """Return the volume [m^d] of an analytic shape, or None if it is infinite."""
     return None
 
 
@@ -111,7 +111,7 @@ def _(shape: shapes.Wedge):
 
 
 def _ball(d, r):
-    """Volume of a ball of radius r in d dimensions [m^d]."""
+    """Return the volume of a ball of radius r in d dimensions [m^d]."""
     return {1: 2.0 * r, 2: pi * r**2, 3: 4.0 / 3.0 * pi * r**3}[d]
 
 
@@ -120,5 +120,5 @@ def _distance(a, b):
 
 
 def _disk(axis):
-    """Half sizes of the box about a unit disk at right angles to `axis`."""
+    """Return the half edges of the bounding box of a unit disk at right angles to `axis`."""
     return np.sqrt(np.maximum(1.0 - (axis / hypot(*axis)) ** 2, 0.0))

@@ -1,4 +1,4 @@
-"""The inside of shapes, from which bodies are sampled: a test, a bounding box, a volume."""
+"""Compute the inside of shapes, to sample bodies: a test of points, a bounding box, a volume."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -27,12 +27,12 @@ class Solid:
 
     @cached_property
     def volume(self):
-        """Volume [m^d]: by formula, or measured to about 1e-4 for boolean combinations."""
+        """Return the volume [m^d], for boolean combinations by sampling to about 1e-4."""
         return measured_volume(self) if self.exact_volume is None else self.exact_volume
 
 
 def measured_volume(solid):
-    """Volume by one random dart in each of many equal cells of the bounding box.
+    """Estimate the volume [m^d] by one random dart in each of many equal cells of the bounding box.
 
     With n cells per axis the standard error is about n^(-(d + 1)/2) of the box: 1e-5 in 2D, 4e-5 in
     3D. The darts are the same each time. Raises ValueError for an unbounded solid.
@@ -48,7 +48,7 @@ def measured_volume(solid):
 
 
 def check_bounded(solid):
-    """The solid. Raises ValueError if it is infinite."""
+    """Return the solid. Raises ValueError if it is infinite."""
     if not np.isfinite([solid.low, solid.high]).all():
         raise ValueError("the shape has no end; take its intersection with a box")
     return solid
@@ -56,7 +56,7 @@ def check_bounded(solid):
 
 @singledispatch
 def solid(shape):
-    """The `Solid` of a shape record. Raises ValueError for sizes that make no solid."""
+    """Return the `Solid` of a shape record. Raises ValueError for sizes that give no solid."""
     level = shapes.level_set(shape)
     (low, high), exact = bounds(shape), volume(shape)
     skin = SKIN * np.max(high - low, initial=0.0, where=np.isfinite(high - low))
@@ -93,16 +93,16 @@ def _(shape: shapes.Intersection):
 
 @solid.register
 def _(shape: shapes.Difference):
-    whole, holes = solid(shape.shape), [solid(part) for part in shape.minus]
+    base, holes = solid(shape.shape), [solid(part) for part in shape.minus]
 
     def inside(x):
-        return whole.inside(x) & ~np.logical_or.reduce([part.inside(x) for part in holes])
+        return base.inside(x) & ~np.logical_or.reduce([part.inside(x) for part in holes])
 
-    return Solid(inside, whole.low, whole.high)
+    return Solid(inside, base.low, base.high)
 
 
 @solid.register
-def _(shape: shapes.Moved):
+def _(shape: shapes.Transformed):
     part = solid(shape.shape)
     d = len(part.low)
     R = rotation(shape.angle, shape.axis, d)
@@ -140,7 +140,7 @@ def _corners(low, high):
 
 
 def rotation(angle, axis, d):
-    """Matrix that turns by `angle` [degrees]: counter-clockwise, in 3D about `axis`.
+    """Return the matrix of a rotation by `angle` [degrees]: counter-clockwise, in 3D about `axis`.
 
     Raises ValueError for an axis in 2D, and for an angle without an axis or a zero axis in 3D.
     """

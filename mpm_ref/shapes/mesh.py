@@ -1,9 +1,9 @@
-"""The inside of a closed triangle mesh, by its winding number along vertical lines.
+"""Compute the inside of a closed triangle mesh by its winding number along vertical lines.
 
-The line through a point along the last axis crosses triangles; each crossing above the point
-counts +1 or -1 by the triangle's orientation. The sum is the winding number: 1 inside a mesh whose
-normals point outward, 0 outside. Triangles are binned by their shadow on the other two axes, so
-that a point meets only few of them.
+The line through a point along the last axis crosses triangles; each crossing above the point counts
++1 or -1 by the triangle's orientation. The sum is the winding number: 1 inside a mesh whose normals
+point outward, 0 outside. Triangles are binned by their projection onto the other two axes, so that
+few of them are tested for a point.
 """
 
 from math import floor
@@ -14,15 +14,15 @@ import numpy as np
 
 from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
 
-# The line stands beside the point by these shares of the mesh's size, so that it misses edges and
+# The line is offset from the point by these shares of the mesh's size, so that it misses edges and
 # vertices: points and vertices often share a coordinate.
-BESIDE = (1.1e-9, 1.7e-9)
+OFFSET = (1.1e-9, 1.7e-9)
 PER_BIN = 2             # triangles per bin, on average
 MAX_SIDE = 1024         # bins along an axis
 
 
 class Bins(NamedTuple):
-    """Triangles by the square of a plane lattice that their shadows meet."""
+    """Triangles grouped by the squares of a plane lattice that their projections meet."""
 
     a: np.ndarray           # (M, 3)  first corners [m]
     b: np.ndarray           # (M, 3)  second corners
@@ -34,7 +34,7 @@ class Bins(NamedTuple):
 
 
 def bins_of(triangles):
-    """Bins of triangles (M, 3, 3): index, corner, coordinate."""
+    """Return the `Bins` of triangles (M, 3, 3): index, corner, coordinate."""
     corners = [np.ascontiguousarray(triangles[:, k], dtype=float) for k in range(3)]
     low, high = triangles.min(axis=(0, 1))[:2], triangles.max(axis=(0, 1))[:2]
     n = int(np.clip(np.sqrt(len(triangles) / PER_BIN), 1, MAX_SIDE))
@@ -52,7 +52,7 @@ def bins_of(triangles):
 
 
 def _squares(x, low, width, n):
-    """Squares (M, 2) of points, a square wider than round-off could move them."""
+    """Return the squares (M, 2) of points."""
     return np.clip(np.floor((x - low) / width), 0, n - 1).astype(np.int64)
 
 
@@ -75,7 +75,7 @@ def _enter(first, last, free, member):
 
 @kernel
 def _side(a, b, p):
-    """Twice the area of the plane triangle a, b, p.
+    """Return twice the signed area of the plane triangle a, b, p.
 
     Odd under a <-> b to the last bit: a line on an edge crosses one of its two triangles.
     """
@@ -87,7 +87,7 @@ def _side(a, b, p):
 
 @kernel
 def _crossing(a, b, c, p):
-    """+1 or -1 where the triangle lies above the point p, 0 where it does not."""
+    """Return +1 or -1, by orientation, if the triangle lies above the point p, else 0."""
     u, v, w = _side(b, c, p), _side(c, a, p), _side(a, b, p)
     if u > 0.0 and v > 0.0 and w > 0.0:
         sign = 1
@@ -100,11 +100,11 @@ def _crossing(a, b, c, p):
 
 
 @kernel
-def _wind(x, beside, bins, number, bounds):
-    """number[p] = winding number of the mesh around x_p."""
+def _wind(x, offset, bins, number, bounds):
+    """Set number[p] to the winding number of the mesh around x_p."""
     n = len(bins.start)
     for p in range(bounds[0], bounds[1]):
-        point = (x[p, 0] + beside[0], x[p, 1] + beside[1], x[p, 2])
+        point = (x[p, 0] + offset[0], x[p, 1] + offset[1], x[p, 2])
         i = floor((point[0] - bins.low[0]) / bins.width[0])
         j = floor((point[1] - bins.low[1]) / bins.width[1])
         number[p] = 0
@@ -115,30 +115,30 @@ def _wind(x, beside, bins, number, bounds):
 
 
 @parallel
-def _winding(x, beside, bins, number):
+def _winding(x, offset, bins, number):
     for c in prange(CHUNKS):
-        _wind(x, beside, bins, number, chunk(c, len(x)))
+        _wind(x, offset, bins, number, chunk(c, len(x)))
 
 
 def winding(x, bins):
-    """Winding number (N,) of the mesh around points x (N, 3).
+    """Return the winding number (N,) of the mesh around points x (N, 3).
 
     A point of the surface may count either way.
     """
     number = np.zeros(len(x), dtype=np.int64)
     size = (bins.width * len(bins.start)).max()
-    _winding(np.ascontiguousarray(x, dtype=float), tuple(s * size for s in BESIDE), bins, number)
+    _winding(np.ascontiguousarray(x, dtype=float), tuple(s * size for s in OFFSET), bins, number)
     return number
 
 
 def enclosed_volume(triangles):
-    """Volume in a closed mesh (M, 3, 3) [m^3]: sum of signed tetrahedra over its triangles."""
+    """Return the volume of a closed mesh (M, 3, 3) [m^3], a sum of signed tetrahedra."""
     about = triangles - triangles.mean(axis=(0, 1))
     return float(np.einsum("ma,ma->", about[:, 0], np.cross(about[:, 1], about[:, 2])) / 6.0)
 
 
 def read_triangles(file):
-    """Triangles (M, 3, 3) of a closed mesh file (STL, OBJ, PLY, OFF), normals outward.
+    """Return the triangles (M, 3, 3) of a closed mesh file (STL, OBJ, PLY, OFF), normals outward.
 
     Needs trimesh. Raises ValueError where the file is missing, cannot be read, or holds a mesh that
     is not closed.
@@ -163,8 +163,8 @@ def read_triangles(file):
 
 
 def _open_edges(mesh):
-    """Number of directed edges without exactly one opposite."""
-    there = {}
+    """Return the number of directed edges without exactly one opposite edge."""
+    count = {}
     for a, b in mesh.edges.tolist():
-        there[a, b] = there.get((a, b), 0) + 1
-    return sum(there.get((b, a), 0) != n or n != 1 for (a, b), n in there.items())
+        count[a, b] = count.get((a, b), 0) + 1
+    return sum(count.get((b, a), 0) != n or n != 1 for (a, b), n in count.items())

@@ -1,6 +1,6 @@
-"""Kinds of numbers in scene records, and the bounds within which they make sense.
+"""Types of numbers in scene records, with their bounds.
 
-SI units; angles are in degrees. The bounds keep every derived number far from overflow.
+Units are SI, angles in degrees. The bounds keep every derived number far from overflow.
 """
 
 from typing import Annotated
@@ -22,8 +22,8 @@ Seed = Annotated[int, Meta(ge=0, le=2**63 - 1)]
 
 
 class Record(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A table of a scene file: no unknown keys, no change once made."""
+    """A table of a scene file, immutable and without unknown keys."""
 
 
 class Kind(Record, frozen=True, kw_only=True, tag_field="type"):
-    """A table whose key `type` says what it is."""
+    """A table of a scene file whose key `type` selects its record."""

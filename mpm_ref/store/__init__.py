@@ -1,4 +1,4 @@
-"""Files of a run: results, checkpoints, manifests, weights; each is complete or not there.
+"""Files of runs: results, checkpoints, manifests and weights, each written atomically.
 
-This file imports nothing, so that low floors of the package can use `weights_file` and `memmap`.
+This module imports nothing, so that lower layers can use `weights_file` and `memmap`.
 """

@@ -1,4 +1,4 @@
-"""Files that are whole or not there: written beside their place, synced, then moved into it."""
+"""Replace files atomically: write a temporary file in the same folder, sync it, rename it."""
 
 import os
 import shutil
@@ -14,15 +14,16 @@ class NotWritten(OSError):
 
 @contextmanager
 def replacing(path):
-    """Yield the path of a file to write; it takes the place of `path` when the block ends well.
+    """Yield the path of a temporary file, which replaces `path` when the block ends without error.
 
-    Whoever reads `path`, and whatever kills the process, finds the old file or the new one. The
-    file to write lies in the same folder, since only within a file system is the move atomic.
-    Raises `NotWritten` where there is no such place, or the system refuses.
+    A reader of `path`, even after a crash, sees the old file or the new one, never a part of it.
+    The temporary file lies in the same folder, since a rename is atomic only within a file system,
+    and its name holds the process id, so that two processes never write to the same one. Raises
+    `NotWritten` if there is no such folder, or if the system refuses.
     """
     path = Path(path)
     require_place(path)
-    part = part_of(path)
+    part = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
     try:
         yield part
         sync(part)
@@ -31,19 +32,29 @@ def replacing(path):
     except NotWritten:
         raise
     except OSError as e:
-        raise not_written(path, e) from e
+        raise write_error(path, e) from e
     finally:
         part.unlink(missing_ok=True)
 
 
+def write_bytes(path, content):
+    """Replace the file at `path` by these bytes atomically. Raises `NotWritten`."""
+    with replacing(path) as part:
+        part.write_bytes(content)
+
+
 def part_of(path):
-    """Path of the file that is written in place of `path`, with its suffix, which says the kind."""
+    """Return the path of the file that is filled before it takes the place of `path`.
+
+    Its name is the same for every process, so that a lock on it admits one writer. It has the
+    suffix of `path`, by which programs recognise the format.
+    """
     path = Path(path)
     return path.with_name(f".{path.stem}.part{path.suffix}")
 
 
 def sync(path):
-    """Have the system put a file, or a folder's list of names, on the disk itself."""
+    """Flush a file, or the entries of a folder, to the disk (fsync)."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -52,7 +63,7 @@ def sync(path):
 
 
 def require_place(path):
-    """Raise `NotWritten` unless the folder of `path` is there, and `path` is not one itself."""
+    """Raise `NotWritten` unless the folder of `path` exists and `path` itself is not a folder."""
     folder = Path(path).resolve().parent
     if not folder.is_dir():
         raise NotWritten(f"{path}: there is no folder {folder}; create it or name another file")
@@ -67,19 +78,19 @@ def require_space(path, size):
     free = shutil.disk_usage(folder).free
     if free < size + MARGIN:
         raise NotWritten(
-            f"{path}: {in_words(size)} needed, {in_words(free)} free in {folder}; "
+            f"{path}: {size_text(size)} needed, {size_text(free)} free in {folder}; "
             "free some space or name a file on another disk"
         )
 
 
-def not_written(path, error):
-    """`NotWritten` for an error of the system."""
+def write_error(path, error):
+    """Return the `NotWritten` that reports an error of the system."""
     return NotWritten(f"{path} could not be written: {error.strerror or error}; "
                       "is the disk full, or the folder read-only?")
 
 
-def in_words(size):
-    """A number of bytes for people: 1.5 GB."""
+def size_text(size):
+    """Return a number of bytes as text with a unit, such as 1.5 GB."""
     for unit in ("B", "kB", "MB", "GB"):
         if size < 1000.0:
             return f"{size:.3g} {unit}"

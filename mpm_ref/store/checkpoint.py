@@ -1,7 +1,8 @@
-"""A run's complete state in a file, to continue bit for bit: all of it is there, or the one before.
+"""Save and load checkpoints: the complete state of a run, from which it resumes bit for bit.
 
-The file is HDF5 with a last line of our own: the sha256 of all bytes before it. HDF5 does not mind
-the line; and a file that is cut short, altered in a bit, or not ours is known before HDF5 reads it.
+A checkpoint is an HDF5 file followed by a line with the sha256 of all bytes before it, which HDF5
+ignores. The line shows that a file is truncated, altered or foreign before HDF5 reads it. A new
+checkpoint replaces the previous one atomically.
 """
 
 import hashlib
@@ -25,13 +26,13 @@ SUFFIX = ".checkpoint.h5"       # of the names of such files
 
 
 class BadCheckpoint(ValueError):
-    """A checkpoint cannot be continued from."""
+    """A checkpoint from which a run cannot resume."""
 
 
 def save(path, state, problem):
-    """Write a `State` of a problem to `path`, in place of the checkpoint before.
+    """Save a `State` of a problem to `path`, replacing the previous checkpoint.
 
-    The state must stand between two steps. Raises `NotWritten`; the checkpoint before then stands.
+    The state must stand between two steps. Raises `NotWritten` and leaves the previous checkpoint.
     """
     require_space(path, size_of(state))
     with replacing(path) as part:
@@ -42,11 +43,11 @@ def save(path, state, problem):
 
 
 def load(path, problem):
-    """The `State` that was saved to `path` for the same problem, and whether the code that saved it
-    was this one: only then is it certain that it continues bit for bit.
+    """Return the `State` saved to `path` for a problem, and whether the same code saved it.
 
-    Laws and return maps come from the problem, everything else from the file. Raises
-    `BadCheckpoint` for a file that is damaged or belongs to another scene, or that is not there.
+    A run is certain to resume bit for bit only under the same code. Laws and return maps come from
+    the problem, everything else from the file. Raises `BadCheckpoint` for a file that is missing,
+    damaged, or of another scene.
     """
     path = Path(path)
     _verify(path)
@@ -59,20 +60,20 @@ def load(path, problem):
         return _read(h5, problem), h5.attrs["source_sha256"] == source_hash()
 
 
-def is_one(path):
-    """Whether a file ends as checkpoints do; see `summary` for whether it is whole."""
+def is_checkpoint(path):
+    """Return whether a file ends as checkpoints do; `summary` verifies its checksum."""
     with open(path, "rb") as file:
         file.seek(max(Path(path).stat().st_size - SEALED, 0))
         return file.read(len(SEAL)) == SEAL
 
 
-def is_named_so(path):
-    """Whether a file has the name of a checkpoint."""
+def has_checkpoint_name(path):
+    """Return whether the name of a file is that of a checkpoint."""
     return str(path).endswith(SUFFIX)
 
 
 def summary(path):
-    """Step, time [s], frames and scene hash of a checkpoint, as a dict. Raises `BadCheckpoint`."""
+    """Return step, time [s], frames and scene hash of a checkpoint. Raises `BadCheckpoint`."""
     _verify(Path(path))
     with h5py.File(path, "r") as h5:
         return {"step": int(h5.attrs["step"]), "t": float(h5.attrs["t"]),
@@ -80,12 +81,12 @@ def summary(path):
 
 
 def size_of(state):
-    """Bytes of a state's arrays."""
+    """Return the size of a state's arrays [bytes]."""
     return sum(a.nbytes for body in state.bodies for a in (*body.particles, body.id))
 
 
 def digest(state):
-    """sha256 of a state: equal for two states if and only if they continue alike."""
+    """Return the sha256 of a state, equal for states from which a run continues identically."""
     a = state.account
     numbers = (state.step, state.t, state.frame, state.bound, *((*a.start, a.noise) if a else ()))
     out = hashlib.sha256(np.array(numbers, dtype=float))
@@ -134,7 +135,7 @@ def _particles(group):
 
 
 def _verify(path):
-    """Raise `BadCheckpoint` unless the file is whole and ours."""
+    """Raise `BadCheckpoint` unless the file is a checkpoint with a valid checksum."""
     if not path.is_file():
         raise BadCheckpoint(f"{path}: there is no such checkpoint")
     size = path.stat().st_size - SEALED
@@ -150,7 +151,7 @@ def _verify(path):
 
 
 def _sha256(path, size):
-    """Of the first `size` bytes of a file."""
+    """Return the sha256 of the first `size` bytes of a file."""
     out = hashlib.sha256()
     with open(path, "rb") as file:
         while size > 0 and (block := file.read(min(size, 1 << 20))):

@@ -1,18 +1,19 @@
-"""A file that goes from one committed state to the next, and is never found between two.
+"""Write HDF5 files in transactions: a crash leaves the file as of its last commit.
 
-HDF5 cannot do this by itself: killed while it writes, it may leave a file that does not open. So
-h5py is given a file object of ours, and `commit` is the moment at which changes come to stand:
+HDF5 alone cannot do this: a process killed while it writes may leave a file that does not open. So
+h5py writes through the file object `JournaledFile`, whose changes become permanent in `commit`:
 
-* bytes past the end of the last commit (a new frame) go to the file at once: nobody reads them;
-* bytes before it (HDF5's own tables: few) wait in memory, page by page;
-* `commit` syncs the new bytes, writes the waiting pages into a journal beside the file, atomically,
+* bytes beyond the end of the last commit (a new frame) go to the file at once, unread by others;
+* changes of earlier bytes (few: HDF5's own tables) stay in memory, page by page;
+* `commit` syncs the new bytes, writes the changed pages atomically to a journal in the same folder,
   copies them into the file, and removes the journal.
 
-Killed before the journal is there, the file is the old one; killed after, `recover` finishes the
-copy. Between commits the file is a plain HDF5 file, which any tool may read while a run goes on.
+After a crash before the journal exists the file is unchanged; after a later one `recover` finishes
+the copy. Between commits the file is plain HDF5, which any tool may read while the run continues.
 
-A write that the system refuses (disk full) is kept in memory and reported by `commit`: HDF5, which
-does not survive such an error, never sees it.
+If the system refuses a write (disk full), the bytes stay in memory and `commit` reports the error:
+HDF5, which may crash on such an error, never sees it. Alternatives: decision 17 and 73 in
+docs/explanation/decisions.md.
 """
 
 import fcntl
@@ -25,7 +26,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from .atomic import not_written, replacing, sync
+from .atomic import replacing, sync, write_error
 
 PAGE = 4096
 MAGIC = b"mpm_ref journal\n"
@@ -37,14 +38,14 @@ class InUse(OSError):
 
 
 class Damaged(OSError):
-    """A file is not what its checksum says."""
+    """A journal does not match its checksum."""
 
 
 class JournaledFile(io.RawIOBase):
-    """A file object for `h5py.File(file, mode)` whose changes stand only after `commit`.
+    """A file object for `h5py.File(file, mode)` whose changes become permanent in `commit`.
 
-    `new` creates an empty file in place of what was there. Holds a lock against other writers.
-    Raises `InUse`, `Damaged`, or `NotWritten` where the file cannot be opened.
+    `new` empties the file, or creates it. The object locks out other writers. Raises `InUse`,
+    `Damaged`, or `NotWritten` if the file cannot be opened.
     """
 
     def __init__(self, path, new=False):
@@ -58,9 +59,9 @@ class JournaledFile(io.RawIOBase):
         except BaseException:
             self._file.close()
             raise
-        self._at = 0
+        self._position = 0
         self._size = 0           # that HDF5 asked for; the file grows to it at a commit
-        self._waiting = {}       # page number -> its new bytes
+        self._pending = {}       # page number -> its new bytes
         self._error = None       # the first refused write
         self._freeze()
 
@@ -70,107 +71,107 @@ class JournaledFile(io.RawIOBase):
         self._size = max(self._size, end)
 
     def commit(self):
-        """Make all changes since the last commit stand, or none of them: raises `NotWritten`."""
+        """Make all changes since the last commit permanent, or none and raise `NotWritten`."""
         if self._error is None:
             try:
                 self._commit()
             except OSError as e:
                 self._error = e
         if self._error is not None:
-            raise not_written(self.path, self._error) from self._error
+            raise write_error(self.path, self._error) from self._error
 
     def _commit(self):
         handle = self._file.fileno()
         if os.fstat(handle).st_size < self._size:
             os.ftruncate(handle, self._size)
         os.fsync(handle)
-        if self._waiting:
-            _write_journal(journal_of(self.path), self._waiting)
+        if self._pending:
+            _write_journal(journal_of(self.path), self._pending)
             _apply_journal(self._file, self.path)
-        self._waiting.clear()
+        self._pending.clear()
         self._freeze()
 
     def move(self, path):
-        """Let the file take the place of `path`, in the same folder; what stood there is gone."""
+        """Rename the file to `path`, in the same folder, replacing a file there."""
         journal_of(path).unlink(missing_ok=True)
         os.replace(self.path, path)
         sync(Path(path).parent)
         self.path = Path(path)
 
     def write(self, data):
-        """Write bytes at the current position; never refuses, see `commit`."""
+        """Write bytes at the current position; errors are reported by `commit`."""
         data = memoryview(data).cast("B")
-        wait = len(data) if self._error else min(max(self._frozen - self._at, 0), len(data))
-        self._keep(self._at, data[:wait])
+        wait = len(data) if self._error else min(max(self._frozen - self._position, 0), len(data))
+        self._hold(self._position, data[:wait])
         try:
-            _write_at(self._file, data[wait:], self._at + wait)
+            _write_at(self._file, data[wait:], self._position + wait)
         except OSError as e:
             self._error = e
-            self._keep(self._at + wait, data[wait:])
-        self._at += len(data)
-        self._size = max(self._size, self._at)
+            self._hold(self._position + wait, data[wait:])
+        self._position += len(data)
+        self._size = max(self._size, self._position)
         return len(data)
 
-    def _keep(self, at, data):
-        """Let bytes wait in memory."""
+    def _hold(self, at, data):
+        """Hold changed bytes in memory until the commit."""
         while len(data):
             page, start = divmod(at, PAGE)
-            if page not in self._waiting:
+            if page not in self._pending:
                 old = os.pread(self._file.fileno(), PAGE, page * PAGE)
-                self._waiting[page] = bytearray(old.ljust(PAGE, b"\0"))
+                self._pending[page] = bytearray(old.ljust(PAGE, b"\0"))
             piece = data[:PAGE - start]
-            self._waiting[page][start:start + len(piece)] = piece
+            self._pending[page][start:start + len(piece)] = piece
             at, data = at + len(piece), data[len(piece):]
 
     def readinto(self, buffer):
-        """Read as much as there is, waiting bytes included."""
-        n = min(len(buffer), max(self._size - self._at, 0))
-        got = bytearray(os.pread(self._file.fileno(), n, self._at).ljust(n, b"\0"))
-        for page in range(self._at // PAGE, -(-(self._at + n) // PAGE)):
-            if page in self._waiting:
-                first, last = max(page * PAGE, self._at), min((page + 1) * PAGE, self._at + n)
-                got[first - self._at:last - self._at] = self._waiting[page][
+        """Read up to the end of the file, uncommitted bytes included."""
+        begin, n = self._position, min(len(buffer), max(self._size - self._position, 0))
+        data = bytearray(os.pread(self._file.fileno(), n, begin).ljust(n, b"\0"))
+        for page in range(begin // PAGE, -(-(begin + n) // PAGE)):
+            if page in self._pending:
+                first, last = max(page * PAGE, begin), min((page + 1) * PAGE, begin + n)
+                data[first - begin:last - begin] = self._pending[page][
                     first - page * PAGE:last - page * PAGE]
-        buffer[:n] = got
-        self._at += n
+        buffer[:n] = data
+        self._position += n
         return n
 
     def seek(self, offset, whence=io.SEEK_SET):
-        """Move the current position."""
-        start = {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: self._size}[whence]
-        self._at = start + offset
-        return self._at
+        """Set the current position and return it."""
+        start = {io.SEEK_SET: 0, io.SEEK_CUR: self._position, io.SEEK_END: self._size}[whence]
+        self._position = start + offset
+        return self._position
 
     def tell(self):
-        """The current position."""
-        return self._at
+        """Return the current position."""
+        return self._position
 
     def truncate(self, size=None):
-        """Note the size that HDF5 wants; a file never shrinks, which HDF5 does not mind."""
+        """Note the size that HDF5 asks for; the file never shrinks, which HDF5 allows."""
         self._size = max(self._size, size or 0)
         return self._size
 
     def readable(self):
-        """True."""
+        """Return True: the file can be read."""
         return True
 
     def writable(self):
-        """True."""
+        """Return True: the file can be written."""
         return True
 
     def seekable(self):
-        """True."""
+        """Return True: the file can be positioned."""
         return True
 
     def close(self):
-        """Close the file; what was not committed is forgotten."""
+        """Close the file and discard uncommitted changes."""
         self._file.close()
         super().close()
 
 
 @contextmanager
 def new_hdf5(path):
-    """An `h5py.File` to fill, committed when the block ends well. Raises `NotWritten`."""
+    """Yield a new `h5py.File`, committed when the block ends without error. Raises `NotWritten`."""
     file = JournaledFile(path, new=True)
     try:
         with h5py.File(file, "w", libver=LIBVER) as h5:
@@ -181,36 +182,36 @@ def new_hdf5(path):
 
 
 def recover(path):
-    """Finish the commit in which a writer of `path` was killed, if so; to be called by readers."""
+    """Finish the commit that a killed writer of `path` left unfinished; readers call this first."""
     if journal_of(path).exists():
         try:
             JournaledFile(path).close()
         except InUse:
-            pass             # its writer lives, and will finish by itself
+            pass             # its writer still runs and finishes the commit itself
 
 
 def journal_of(path):
-    """Path of the journal of a file."""
+    """Return the path of the journal of a file."""
     path = Path(path)
     return path.with_name(f".{path.name}.journal")
 
 
 def in_use(path):
-    """`InUse` for a file."""
+    """Return the `InUse` that names a file."""
     return InUse(f"{path} is being written by another process; wait for it, or write to another "
                  "file")
 
 
 def _locked(path, new):
-    """The file at `path`, created if it is not there and `new`, with other writers locked out."""
+    """Open and lock the file at `path`, created if it is missing and `new`."""
     while True:
         try:
             file = open(path, "r+b", buffering=0, opener=_create if new else None)
         except OSError as e:
-            raise not_written(path, e) from e
+            raise write_error(path, e) from e
         try:
             _lock(file, path)
-            if _stands_at(path, file):
+            if _is_current(path, file):
                 return file
         except BaseException:
             file.close()
@@ -223,15 +224,15 @@ def _create(path, flags):
 
 
 def _lock(file, path):
-    """Lock out other writers. A POSIX lock: HDF5's own locks, hence readers, do not mind it."""
+    """Lock out other writers by a POSIX lock, which HDF5's own locks, hence readers, ignore."""
     try:
         fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         raise in_use(path) from None
 
 
-def _stands_at(path, file):
-    """Whether an open file is the one at `path`: a writer that was faster may have moved it."""
+def _is_current(path, file):
+    """Return whether `path` still names an open file: another writer may have renamed it."""
     try:
         return os.path.samestat(os.stat(path), os.fstat(file.fileno()))
     except FileNotFoundError:
@@ -253,7 +254,7 @@ def _write_journal(journal, pages):
 
 
 def _apply_journal(file, path):
-    """Copy the pages of a file's journal into it, if there is one, and remove the journal."""
+    """Copy the pages of the journal, if there is one, into the file and remove the journal."""
     journal = journal_of(path)
     if not journal.exists():
         return

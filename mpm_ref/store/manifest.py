@@ -1,4 +1,4 @@
-"""What must be known to make a result again: scene, code, versions, machine; and what it took."""
+"""Describe a run so that it can be repeated: scene, code, versions, machine and resources used."""
 
 import hashlib
 import importlib.metadata
@@ -17,15 +17,16 @@ import numpy as np
 import threadpoolctl
 
 from .. import __version__
-from .words import plain
+from .text import plain
 
 POOL = ("user_api", "internal_api", "version", "num_threads")
 LIBRARIES = ("numpy", "numba", "llvmlite", "scipy", "h5py", "msgspec")
 
 
 def manifest(problem, seed=None):
-    """The facts of a run at its start, as a dict of what JSON knows. `parts` gets an entry for
-    every part of the run, as a resumed one has several; see `Part`.
+    """Return the description of a run at its start, as a dict of plain values.
+
+    `parts` is empty; every part of the run adds an entry (see `RunPart`), a resumed run several.
     """
     return {
         "title": problem.title,
@@ -39,8 +40,9 @@ def manifest(problem, seed=None):
 
 
 def scene_hash(problem):
-    """sha256 of the scene's canonical text; for a problem built in Python of its rules in words,
-    without the particles.
+    """Return the sha256 of the scene's canonical text.
+
+    For a problem built in Python it is that of its parameters as text, without the particles.
     """
     text = problem.source or repr((
         [(body.name, len(body.id), *map(_in_full, (body.law, body.flow)))
@@ -51,15 +53,15 @@ def scene_hash(problem):
 
 
 def _in_full(record):
-    """A record of parameters; one that holds arrays as plain values, since their text would leave
-    out most of them.
+    """Return a record of parameters; one with arrays as plain values, since the text of an array
+    leaves out most of it.
     """
     return plain(record) if any(isinstance(value, np.ndarray) for value in record) else record
 
 
 @cache
 def source_hash():
-    """sha256 over all Python files of the package, in the order of their paths."""
+    """Return the sha256 over all Python files of the package, in the order of their paths."""
     root = Path(__file__).parents[1]
     digest = hashlib.sha256()
     for file in sorted(root.rglob("*.py")):
@@ -68,18 +70,18 @@ def source_hash():
 
 
 def code():
-    """The code that computes, as facts: the hash of the package, and versions."""
+    """Return the hash of the package and the versions of the libraries."""
     return {"source_sha256": source_hash(), "versions": versions()}
 
 
 def versions():
-    """Versions of the package, of Python and of the libraries that compute."""
-    found = {name: importlib.metadata.version(name) for name in LIBRARIES}
-    return {"mpm_ref": __version__, "python": platform.python_version(), **found}
+    """Return the versions of the package, of Python and of the numerical libraries."""
+    libraries = {name: importlib.metadata.version(name) for name in LIBRARIES}
+    return {"mpm_ref": __version__, "python": platform.python_version(), **libraries}
 
 
 def machine():
-    """Processor, cores, threads, threading layers."""
+    """Return processor, cores, threads and threading layers."""
     return {
         "system": f"{platform.system()} {platform.machine()}",
         "cpu": cpu_model(),
@@ -91,7 +93,7 @@ def machine():
 
 
 def cpu_model():
-    """The processor's name."""
+    """Return the name of the processor."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -101,7 +103,7 @@ def cpu_model():
 
 
 def threading_layer():
-    """Numba's threading layer; the one it will take, if no parallel kernel has run yet."""
+    """Return Numba's threading layer, or the configured one before the first parallel kernel."""
     try:
         return numba.threading_layer()
     except ValueError:
@@ -109,42 +111,43 @@ def threading_layer():
 
 
 def peak_memory():
-    """Largest resident memory of this process so far [bytes]."""
+    """Return the largest resident memory of this process so far [bytes]."""
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak if sys.platform == "darwin" else 1024 * peak
 
 
 def now():
-    """Date and time with the offset from UTC, to the second."""
+    """Return date and time to the second, with the offset from UTC."""
     return datetime.now().astimezone().isoformat(timespec="seconds")
 
 
-def unsolved(facts):
-    """Implicit steps of all parts of a manifest whose solve did not converge."""
+def count_unsolved(facts):
+    """Return the number of implicit steps in a manifest whose solve did not converge."""
     return sum(part.get("unsolved", 0) for part in facts.get("parts", ()))
 
 
-def astray(facts):
-    """What all parts of a manifest say of strains that learned laws had not seen."""
-    return [said for part in facts.get("parts", ()) for said in part.get("astray", ())]
+def strain_warnings(facts):
+    """Return all warnings in a manifest about strains beyond the training of learned laws."""
+    return [one for part in facts.get("parts", ()) for one in part.get("strain_warnings", ())]
 
 
 @dataclass
-class Part:
-    """One uninterrupted part of a run: from its start, or a checkpoint, to wherever it ended."""
+class RunPart:
+    """One uninterrupted part of a run, from its start or a checkpoint to where it ended."""
 
     first_step: int
     unsolved: int = 0
-    astray: list = field(default_factory=list)      # sentences of `nclaw.strain_watch`
+    strain_warnings: list = field(default_factory=list)      # sentences of `nclaw.strain_watch`
     code: dict = field(default_factory=code)
     began: str = field(default_factory=now)
     wall_start: float = field(default_factory=time.perf_counter)
     cpu_start: float = field(default_factory=time.process_time)
 
     def ended(self, why, state, digest):
-        """The entry of `parts` in the manifest: why it ended, where, what it took, the implicit
-        steps that were not solved, what learned laws had not seen, the sha256 of the state it
-        ended with and the code that ran.
+        """Return the entry of this part in the manifest.
+
+        It says why and where the part ended, the resources used, the number of implicit steps that
+        did not converge, the warnings about strains, the sha256 of the last state, and the code.
         """
         return {
             "began": self.began,
@@ -157,7 +160,7 @@ class Part:
             "cpu_s": round(time.process_time() - self.cpu_start, 3),
             "peak_bytes": peak_memory(),
             "unsolved": self.unsolved,
-            "astray": self.astray,
+            "strain_warnings": self.strain_warnings,
             "state_sha256": digest,
             **self.code,
         }

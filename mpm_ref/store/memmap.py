@@ -1,8 +1,8 @@
-"""Arrays that may be larger than memory: above a size each is mapped from a nameless file.
+"""Allocate arrays that may exceed the memory: large ones are mapped from an unnamed file.
 
-The system keeps in memory what is in use, and the file is gone with the array. It lies where
-`tempfile` puts files: in the folder TMPDIR, if that is set. Where that folder is itself in memory,
-as /tmp is on some systems, nothing is gained.
+The system holds in memory the pages in use, and the file vanishes with the array. It lies where
+`tempfile` puts files, in the folder TMPDIR if that is set. If that folder is itself in memory, as
+/tmp is on some systems, nothing is gained.
 """
 
 import errno
@@ -17,8 +17,9 @@ UNKNOWN = errno.EOPNOTSUPP, errno.EINVAL    # of disks that cannot reserve room
 
 
 def empty(shape, kind):
-    """An array of a shape and kind whose values are anything. Raises OSError where its file has no
-    room, as far as the system can tell before it is written.
+    """Return an uninitialised array of a shape and dtype.
+
+    Raises OSError if its file does not fit on the disk, as far as the system can tell beforehand.
     """
     size = prod(shape) * np.dtype(kind).itemsize
     if size <= LARGEST:
@@ -29,12 +30,12 @@ def empty(shape, kind):
             return np.asarray(np.memmap(file, kind, "r+", shape=shape))
     except OSError as error:
         raise OSError(f"no file for {size / 2**30:.3g} GiB of snapshots ({error.strerror or error})"
-                      f": expected as much room in {folder()}; set TMPDIR to a folder that has "
-                      "it, or keep fewer states") from error
+                      f": expected as much room in {temporary_folder()}; set TMPDIR to a folder "
+                      "that has it, or store fewer states") from error
 
 
-def folder():
-    """Where files are put, in words."""
+def temporary_folder():
+    """Return the path of the folder for temporary files, or its description if there is none."""
     try:
         return gettempdir()
     except OSError:
@@ -42,7 +43,7 @@ def folder():
 
 
 def reserve(file, size):
-    """Make a file so many bytes long, on the disk too where the system can."""
+    """Extend a file to `size` bytes, allocated on the disk if the system supports it."""
     if hasattr(os, "posix_fallocate"):
         try:
             os.posix_fallocate(file.fileno(), 0, size)

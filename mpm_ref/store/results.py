@@ -1,7 +1,7 @@
-"""Read a results file, finished or not: frames, energies, and quantities that follow from fields.
+"""Read a results file, finished or not: frames, energies and quantities derived from fields.
 
-docs/reference/files.md has the schema. Particles are stored in the order in which their body was
-sampled, so that row p is the same particle in every frame. `writer` writes such files.
+The schema is in docs/reference/files.md. Particles are stored in the order in which their body was
+sampled, so that row p is the same particle in every frame. `writer` writes these files.
 """
 
 import json
@@ -19,7 +19,7 @@ UNITS = {                         # of what may be stored of particles in every 
 USUAL = ("x", "v", "F", "tau")
 CLOCK = {"time": ("f8", "s"), "dt": ("f8", "s"), "step": ("i8", "1")}
 ENERGIES = ("kinetic", "elastic", "gravity")
-SCALARS = {                       # name -> unit, what it is, and the fields it follows from
+SCALARS = {                       # name -> unit, what it is, and the fields it is computed from
     "speed": ("m/s", "magnitude of the velocity", ("v",)),
     "J": ("1", "volume ratio det F", ("F",)),
     "tau": ("Pa", "Frobenius norm of the Kirchhoff stress", ("tau",)),
@@ -37,10 +37,10 @@ class BadResults(ValueError):
 
 
 class Results:
-    """A results file, open for reading: a context manager.
+    """A results file open for reading, as a context manager.
 
-    title, dim, dx [m], gravity (d,), degree; time, dt [s], step (frames,); energy (frames, 3) [J],
-    see `ENERGIES`; bodies, their names; manifest, a dict. Raises `BadResults`.
+    Attributes: title, dim, dx [m], gravity (d,), degree; time and dt [s], step (frames,); energy
+    (frames, 3) [J], see `ENERGIES`; bodies, their names; manifest, a dict. Raises `BadResults`.
     """
 
     def __init__(self, path):
@@ -87,31 +87,32 @@ class Results:
         self.h5.close()
 
     def index(self, frame):
-        """A frame's number from 0; negative ones count from the end. Raises `BadResults`."""
+        """Return the index of a frame; negative ones count from the end. Raises `BadResults`."""
         n = len(self)
         if not -n <= frame < n:
             raise BadResults(f"{self.path}: there is no frame {frame}; it has {n}, counted from 0")
         return frame % n
 
     def count(self, body):
-        """Number of particles of a body."""
+        """Return the number of particles of a body."""
         return len(self.h5[f"bodies/{body}/m"])
 
     def has(self, body, name):
-        """Whether a field is stored of a body."""
+        """Return whether a field of a body is stored."""
         return name in self.h5[f"bodies/{body}"]
 
     def fields(self, body):
-        """Names of the fields that are stored of a body in every frame."""
+        """Return the names of the fields of a body that every frame stores."""
         return [name for name in UNITS if self.has(body, name)]
 
     def gzip(self, body):
-        """Level of compression of a body's fields, 0 for none."""
+        """Return the gzip level of a body's fields, 0 for none."""
         return self.h5[f"bodies/{body}/x"].compression_opts or 0
 
     def field(self, body, name, frame=None):
-        """A stored field of a body: of a frame (N, ..), or of all; m and V0 (N,) have none. Raises
-        `BadResults`.
+        """Return a stored field of a body at a frame (N, ..), or at all frames (frames, N, ..).
+
+        m and V0 (N,) do not depend on the frame. Raises `BadResults`.
         """
         if not self.has(body, name):
             stored = ", ".join(self.h5[f"bodies/{body}"])
@@ -125,13 +126,14 @@ class Results:
                              "other fields and frames may still be right") from e
 
     def offers(self, name):
-        """Whether every body stores what an entry of `SCALARS` follows from; J serves for F."""
+        """Return whether every body stores the fields that an entry of `SCALARS` needs (J or F)."""
         return all(self.has(body, need) or (need == "F" and self.has(body, "J"))
                    for body in self.bodies for need in SCALARS[name][2])
 
     def scalar(self, body, name, frame):
-        """One number per particle (N,): an entry of `SCALARS`. Raises `BadResults` where what it
-        follows from is not stored.
+        """Return an entry of `SCALARS`, one number per particle (N,).
+
+        Raises `BadResults` if a field that it is computed from is not stored.
         """
         if name not in SCALARS:
             raise BadResults(f"field {name!r}: expected one of {', '.join(SCALARS)}")
@@ -154,7 +156,7 @@ class Results:
         return np.linalg.det(self.field(body, "F", frame))
 
     def _norm(self, tau):
-        """|tau|; a fluid stores the isotropic value alone."""
+        """Return |tau|; a fluid stores the isotropic value alone."""
         if tau.ndim == 1:
             return np.sqrt(self.dim) * np.abs(tau)
         return np.linalg.norm(tau, axis=(1, 2))
@@ -165,5 +167,5 @@ class Results:
 
 
 def _first_line(error):
-    """The first line of HDF5's long messages."""
+    """Return the first line of one of HDF5's long messages."""
     return str(error).splitlines()[0]

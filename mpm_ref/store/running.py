@@ -1,7 +1,6 @@
-"""Run a problem into a results file, to be continued bit for bit after whatever ended it.
+"""Run a problem into a results file; an interrupted run can resume bit for bit.
 
-`run(problem, "out.h5")` is the whole interface; a `Session` stores frames and checkpoints while
-the run goes on.
+`run(problem, "out.h5")` is the interface; a `Session` stores frames and checkpoints meanwhile.
 """
 
 import signal
@@ -18,30 +17,30 @@ from ..simulate import Frame, ended, frame_is_due, simulate, start
 from ..timestep import TooLarge
 from . import checkpoint
 from .atomic import require_place
-from .manifest import Part, manifest, unsolved
+from .manifest import RunPart, count_unsolved, manifest
 from .results import BadResults, Results
-from .writer import Fields, create, reopen, require_run
+from .writer import StoredFields, create, reopen, require_run
 
 
 class Refused(ValueError):
-    """A run that was asked for would destroy, cannot find, or does not fit an earlier one."""
+    """A run would overwrite an earlier one, does not fit it, or cannot find it."""
 
 
 @dataclass(frozen=True)
 class Options:
-    """How a run is recorded.
+    """Options of recording a run.
 
-    steps: stop after this many steps in all, to be continued later; checkpoint_every: steps between
-    checkpoints, None for one a minute; fields: what is stored (`Fields`), None for the usual, or
-    what a resumed run began with, and nothing else is taken for that; resume: go on from the
-    checkpoint beside the results, or begin where there is none; overwrite: replace the results of
-    an earlier run; seed: of the scene, for the manifest; facts: what else that is to say, plain
-    values by name.
+    steps: stop after this many steps in all, to be resumed later; checkpoint_every: steps between
+    checkpoints (default: one a minute); fields: the `StoredFields`, by default the usual ones, or
+    for a resumed run those that it began with, which cannot change; resume: resume from the
+    checkpoint of the results file, or begin if there is none; overwrite: replace the results of an
+    earlier run; seed: seed of the scene, for the manifest; facts: further entries of the manifest,
+    plain values by name.
     """
 
     steps: int | None = None
     checkpoint_every: int | None = None
-    fields: Fields | None = None
+    fields: StoredFields | None = None
     resume: bool = False
     overwrite: bool = False
     seed: int | None = None
@@ -56,10 +55,12 @@ class Options:
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """How a run ended: why ("finished", "step limit", "interrupted", "terminated"), the `State` it
-    ended with, frames stored, whether it went on with the very code that began it, and how many
-    implicit steps of all its parts were not solved, which unstable = "allow" lets pass.
+class RunOutcome:
+    """The end of a run.
+
+    why: "finished", "step limit", "interrupted" or "terminated"; state: the last `State`; frames:
+    number of stored frames; same_code: whether the code that began the run also ended it; unsolved:
+    number of implicit steps of all parts that did not converge, which unstable = "allow" accepts.
     """
 
     why: str
@@ -70,35 +71,36 @@ class Outcome:
 
 
 def run(problem, out, options=None, watch=None):
-    """Run a `Problem` into the results file `out`, and return an `Outcome`.
+    """Run a `Problem` into the results file `out`, and return a `RunOutcome`.
 
-    SIGINT and SIGTERM end the run after the step being made, with a checkpoint. A run that becomes
-    unstable raises `Unstable` or `TooLarge`; the last checkpoint, of a state that
-    passed all checks, then stands. One that cannot even begin raises them, or `OutOfRange`, before
-    anything is written. Raises `Refused`, `BadCheckpoint`, `BadResults`, `InUse`
-    or `NotWritten` where files stand in the way. The arrays of the problem's bodies are changed.
+    SIGINT and SIGTERM end the run after the current step, with a checkpoint. A run that becomes
+    unstable raises `Unstable` or `TooLarge` and leaves the last checkpoint, of a state that passed
+    all checks. A run that cannot begin raises them, or `OutOfRange`, before anything is written.
+    Raises `Refused`, `BadCheckpoint`, `BadResults`, `InUse` or `NotWritten` if existing files do
+    not fit or cannot be written. The arrays of the problem's bodies are changed.
     """
     options, watch = options or Options(), watch or Watch()
     require_place(out)
-    state, same_code = _where_to_begin(problem, out, options)
+    state, same_code = _first_state(problem, out, options)
     _require_same_fields(problem, out, options)
-    over = _why_over(problem, state, options)
-    if over is not None:
-        return _as_it_stands(problem, out, Outcome(over, state, 0, same_code, 0))
+    complete = _why_complete(problem, state, options)
+    if complete is not None:
+        return _stored_outcome(problem, out, RunOutcome(complete, state, 0, same_code, 0))
     writer = _open(problem, out, options, state)
     try:
         session = Session(problem, writer, watch, options.steps, options.checkpoint_every)
         watch.begin(problem, state)
         why = session.loop(state)
-        return Outcome(why, session.state, len(writer), same_code, unsolved(writer.manifest))
+        return RunOutcome(why, session.state, len(writer), same_code,
+                          count_unsolved(writer.manifest))
     finally:
         writer.close()
 
 
-def _where_to_begin(problem, out, options):
-    """Return (state of the checkpoint, or the first one, whether this very code saved it)."""
+def _first_state(problem, out, options):
+    """Return the state of the checkpoint, or the first one, and whether the same code saved it."""
     path = checkpoint_of(out)
-    _require_leave(out, options)
+    _require_permission(out, options)
     if Path(out).exists():
         _require_results(out, options)
     if options.resume and path.exists():
@@ -109,15 +111,15 @@ def _where_to_begin(problem, out, options):
     return start(problem, problem.stepper()), True
 
 
-def _require_leave(out, options):
-    """Raise `Refused` where results stand that are neither to be continued nor replaced."""
+def _require_permission(out, options):
+    """Raise `Refused` if results exist that are neither to be resumed nor replaced."""
     if Path(out).exists() and not (options.resume or options.overwrite):
         raise Refused(f"{out} exists: add --resume to continue it, --overwrite to replace it, "
                       "or name another file")
 
 
 def _require_results(out, options):
-    """Raise `Refused` or `BadResults` for a file that no run wrote: what it holds would be lost."""
+    """Raise `Refused` or `BadResults` for a file that no run wrote, which would be lost."""
     try:
         Results(out).close()
     except BadResults as fault:
@@ -128,7 +130,7 @@ def _require_results(out, options):
 
 
 def _require_same_fields(problem, out, options):
-    """Raise `Refused` if a run that goes on is to store something else than it began with."""
+    """Raise `Refused` if a resumed run would store other fields than it began with."""
     if not options.resume or options.fields is None or not Path(out).exists():
         return
     with Results(out) as results:
@@ -136,7 +138,7 @@ def _require_same_fields(problem, out, options):
             if body.name not in results.bodies:
                 return                  # of another scene, which `reopen` refuses
             stored, gzip = results.fields(body.name), results.gzip(body.name)
-            asked = list(options.fields.of(body))
+            asked = list(options.fields.select(body))
             if set(asked) != set(stored) or options.fields.gzip != gzip:
                 raise Refused(
                     f"{out} was begun with the fields {','.join(stored)} and gzip {gzip}, not with "
@@ -144,27 +146,27 @@ def _require_same_fields(problem, out, options):
                     "to continue it, or write to another file")
 
 
-def _why_over(problem, state, options):
+def _why_complete(problem, state, options):
     """Return why a state needs no further step, or None."""
     if ended(problem.clock, state):
         return FINISHED
     return AT_LIMIT if options.steps is not None and state.step >= options.steps else None
 
 
-def _as_it_stands(problem, out, outcome):
-    """The `Outcome` of a run that needs no further step, with what its results hold."""
+def _stored_outcome(problem, out, outcome):
+    """Return the `RunOutcome` of a run that needs no further step, from its results file."""
     with Results(out) as results:
         require_run(results.h5, out, problem, outcome.state.frame)
-        return replace(outcome, frames=len(results), unsolved=unsolved(results.manifest))
+        return replace(outcome, frames=len(results), unsolved=count_unsolved(results.manifest))
 
 
 def _open(problem, out, options, state):
-    """`Writer` of the results, new ones or those of the run that goes on."""
+    """Return the `Writer` of new results, or of those of the run that resumes."""
     if options.resume and Path(out).exists():
         return reopen(out, problem, state.frame)
-    _require_leave(out, options)        # another run may have begun there meanwhile
+    _require_permission(out, options)        # another run may have begun there meanwhile
     facts = manifest(problem, options.seed) | options.facts
-    return create(out, problem, options.fields or Fields(), facts, beside=checkpoint_of(out))
+    return create(out, problem, options.fields or StoredFields(), facts, checkpoint_of(out))
 
 
 SECONDS = 60.0     # between checkpoints, unless a number of steps is given
@@ -173,19 +175,19 @@ SIGNALS = {signal.SIGINT: INTERRUPTED, signal.SIGTERM: TERMINATED}
 
 
 class Watch:
-    """What a run tells while it goes on; this one does not listen."""
+    """A listener that a run calls while it proceeds; the methods of this one do nothing."""
 
     def begin(self, problem, state):
-        """A run begins, or goes on from a state that has frames already."""
+        """Note that a run begins at `state`, or resumes if the state already has frames."""
 
     def step(self, state, dt):
-        """A step of length dt [s] was made."""
+        """Note that a step of length dt [s] ended in `state`."""
 
     def frame(self, frame, energy):
-        """A frame was stored."""
+        """Note that a frame with its energy was stored."""
 
-    def astray(self, said):
-        """A learned law is asked what it has not seen, in a sentence (see `nclaw.strain_watch`)."""
+    def warn(self, message):
+        """Note a warning that strains exceed the training of a law (see `nclaw.strain_watch`)."""
 
 
 class _Stop(Exception):
@@ -193,12 +195,12 @@ class _Stop(Exception):
 
 
 def checkpoint_of(out):
-    """Path of the checkpoint that belongs to a results file: run.h5 -> run.checkpoint.h5."""
+    """Return the path of the checkpoint of a results file: run.h5 -> run.checkpoint.h5."""
     return Path(out).with_suffix(checkpoint.SUFFIX)
 
 
 class Session:
-    """Runs a problem into a `Writer` until it ends, or until a step limit or a signal.
+    """A run into a `Writer`, until it ends or meets a step limit or a signal.
 
     steps and every are `Options.steps` and `Options.checkpoint_every`.
     """
@@ -212,8 +214,8 @@ class Session:
         self.range = strain_watch(problem)
 
     def loop(self, state):
-        """Run from a state; returns why it ended, see `Outcome`."""
-        self.part = Part(state.step)
+        """Run from a state and return why the run ended (see `RunOutcome`)."""
+        self.part = RunPart(state.step)
         self.state, self.shown = state, self.writer.last_step
         self.saved = state.step if state.frame else None
         try:
@@ -233,40 +235,40 @@ class Session:
         return why
 
     def after_step(self, state, dt):
-        """After every step; a frame that is due comes first."""
+        """Report a step; save and stop if it is time, unless a frame of this state follows."""
         self.state, self.dt = state, dt
         self.part.unsolved += state.solve is not None and not state.solve.converged
         self.watch.step(state, dt)
         if self.range is not None:
-            self.tell(self.range.news(state))
+            self.warn(self.range.news(state))
         if not frame_is_due(self.problem.clock, state):
-            self.rest()
+            self.save_or_stop()
 
-    def tell(self, sentences):
-        """Enter sentences about learned laws in this part of the run, and pass them on."""
-        self.part.astray += sentences
-        for said in sentences:
-            self.watch.astray(said)
+    def warn(self, sentences):
+        """Add warnings about learned laws to this part of the run, and pass them to the watch."""
+        self.part.strain_warnings += sentences
+        for message in sentences:
+            self.watch.warn(message)
 
     def show(self, frame):
-        """Store a frame of the run."""
+        """Store a regular frame of the run."""
         self.state, self.shown = frame.state, frame.state.step
         self.watch.frame(frame, self.store(frame))
-        self.rest()
+        self.save_or_stop()
 
     def show_last(self):
-        """Store the state at which a run broke off as a frame; a resumed run drops it again."""
+        """Store the state at which a run broke off as a frame, which a resumed run drops."""
         if self.shown != self.state.step:
             self.store(Frame(self.state.frame, self.state.t, self.dt, self.state))
 
     def store(self, frame):
-        """Append a frame to the results; returns its `Energy`."""
+        """Append a frame to the results and return its `Energy`."""
         now = energy(frame.state.bodies, self.problem.gravity, self.problem.inertia)
         self.writer.append(frame, now)
         return now
 
-    def rest(self):
-        """Save a checkpoint and stop, where it is time."""
+    def save_or_stop(self):
+        """Save a checkpoint and stop the run, if it is time."""
         stop = self.why_stop()
         if stop or self.is_due():
             self.save()
@@ -274,13 +276,13 @@ class Session:
             raise _Stop(stop)
 
     def why_stop(self):
-        """Why to stop here, or None."""
+        """Return the reason to stop after this step, or None."""
         if self.asked is not None:
             return SIGNALS[self.asked]
         return AT_LIMIT if self.steps is not None and self.state.step >= self.steps else None
 
     def is_due(self):
-        """Whether a checkpoint is due; the first one after the first frame."""
+        """Return whether a checkpoint is due; the first one follows the first frame."""
         if self.saved is None:
             return True
         if self.every is not None:
@@ -288,8 +290,9 @@ class Session:
         return time.perf_counter() - self.saved_at > SECONDS
 
     def save(self):
-        """Save a checkpoint, of a state that passes all checks; of another, the loop will judge at
-        its own time. Raises `NotWritten`.
+        """Save a checkpoint if the state passes all checks; the loop handles one that does not.
+
+        Raises `NotWritten`.
         """
         if self.saved == self.state.step:
             return
@@ -301,7 +304,7 @@ class Session:
         self.saved, self.saved_at = self.state.step, time.perf_counter()
 
     def end(self, why):
-        """Enter this part of the run in the manifest."""
+        """Add this part of the run to the manifest."""
         facts = self.writer.manifest
         facts["parts"].append(self.part.ended(why, self.state, checkpoint.digest(self.state)))
         self.writer.put_manifest(facts)
@@ -311,7 +314,7 @@ class Session:
 def _signals(session):
     """While the block runs, the first signal asks the session to stop; a second one interrupts."""
     if threading.current_thread() is not threading.main_thread():
-        yield            # only the main thread is told of signals
+        yield            # only the main thread receives signals
         return
 
     def ask(number, _):

@@ -1,10 +1,10 @@
-"""Results as VTKHDF, the file format of VTK and ParaView, written by h5py alone.
+"""Export results as VTKHDF, the file format of VTK and ParaView, with h5py alone.
 
-Particles become temporal PolyData: one vertex each, the vertices stored once and shared by all
-frames. The grid becomes ImageData: nodal density and velocity, made again from the particles by
-the transfer without affine motion, in one box of nodes at integer multiples of dx as in the run.
-Values are single precision, for looking at; the results file has them in full. 2D lies in the
-plane z = 0. Format: VTKHDF specification, version 2.0 (docs.vtk.org).
+Particles become temporal PolyData: one vertex each, the topology stored once for all frames. The
+grid becomes ImageData: nodal density and velocity, computed again from the particles by the PIC
+transfer, in one box of nodes at integer multiples of dx as in the run. Values are in single
+precision, for display; the results file has them in double. 2D lies in the plane z = 0. Format:
+VTKHDF specification, version 2.0 (docs.vtk.org).
 """
 
 import numpy as np
@@ -25,15 +25,15 @@ VALUES = {                 # name -> what offers it (see `results.SCALARS`), num
 def export_particles(results, out):
     """Write the particles of all frames of `Results` to `out`.
 
-    Point data: v [m/s], J, tau_norm [Pa], as far as they follow from what is stored, and the
-    body's number. Raises `NotWritten`, and `BadResults` without a frame.
+    Point data: v [m/s], J and tau_norm [Pa], if the stored fields suffice for them, and the index
+    of the body. Raises `NotWritten`, and `BadResults` without a frame.
     """
     results.index(0)            # there must be a frame
     names = [name for name, (scalar, _) in VALUES.items() if results.offers(scalar)]
     count, frames = sum(map(results.count, results.bodies)), len(results)
     require_space(out, 4 * count * (frames * (3 + sum(VALUES[name][1] for name in names)) + 5))
     with replacing(out) as part, new_hdf5(part) as h5:
-        root = root_of(h5, "PolyData")
+        root = create_root(h5, "PolyData")
         _topology(root, count)
         points = root.create_dataset("Points", (frames * count, 3), "f4")
         data = {name: _values(root, name, frames * count) for name in names}
@@ -52,18 +52,18 @@ def _value(results, body, name, frame):
     return results.scalar(body, VALUES[name][0], frame)
 
 
-def _gather(results, of):
-    """Rows of all bodies, one body after the other."""
-    return np.concatenate([of(body) for body in results.bodies])
+def _gather(results, rows):
+    """Return the rows of all bodies, one body after the other."""
+    return np.concatenate([rows(body) for body in results.bodies])
 
 
 def three(a):
-    """Vectors (.., d) with three components (.., 3), the third 0 in 2D."""
+    """Return vectors (.., d) with three components (.., 3), the third 0 in 2D."""
     return np.pad(a, [(0, 0)] * (a.ndim - 1) + [(0, 3 - a.shape[-1])])
 
 
-def root_of(h5, kind):
-    """The group that VTK reads, of a kind of data set."""
+def create_root(h5, kind):
+    """Create the group that VTK reads, for a kind of data set."""
     root = h5.create_group("VTKHDF")
     root.attrs["Version"] = np.array([2, 0], dtype="i8")
     root.attrs.create("Type", kind.encode("ascii"), dtype=f"S{len(kind)}")     # as VTK asks for it
@@ -71,7 +71,7 @@ def root_of(h5, kind):
 
 
 def _topology(root, count):
-    """One vertex per particle, no other cells."""
+    """Write the topology: one vertex per particle, no other cells."""
     root["NumberOfPoints"] = np.array([count], dtype="i8")
     for name in TOPOLOGIES:
         n = count if name == "Vertices" else 0
@@ -88,7 +88,7 @@ def _values(root, name, rows):
 
 
 def _steps(root, time, count, names):
-    """Times, and where each frame begins; the topology begins at 0 for all."""
+    """Write the times and the offset of each frame; the topology starts at 0 for all."""
     n = len(time)
     steps = root.create_group("Steps")
     steps.attrs["NSteps"] = n
@@ -113,7 +113,7 @@ def export_grid(results, out):
     first, shape = _box(results, scheme)
     require_space(out, 16 * len(results) * int(np.prod(shape)))
     with replacing(out) as part, new_hdf5(part) as h5:
-        root = root_of(h5, "ImageData")
+        root = create_root(h5, "ImageData")
         _place(root, first, shape, results.dx)
         images = (len(results), *shape[::-1])
         density = root.create_dataset("PointData/density", images, "f4")
@@ -138,7 +138,7 @@ def _body(results, name, frame):
 
 
 def _box(results, scheme):
-    """(index of the first node, shape) of the nodes that particles reach in any frame."""
+    """Return the index of the first node and the shape of the box that covers all frames."""
     ends = [(x.min(axis=0), x.max(axis=0)) for body in results.bodies
             for x in (results.field(body, "x", k) for k in range(len(results)))]
     corners = np.array([np.min(ends, axis=(0, 1)), np.max(ends, axis=(0, 1))])
@@ -147,26 +147,27 @@ def _box(results, scheme):
 
 
 def _velocity(grid):
-    """Momentum over mass, 0 on empty nodes."""
+    """Return momentum over mass, 0 on empty nodes."""
     m = grid.m[..., None]
     return np.divide(grid.v, m, out=np.zeros_like(grid.v), where=m > 0.0)
 
 
 def _image(a, dim):
-    """Nodal values (n1, .., nd[, components]) with the axes of an image: [z,] y, x[, components].
-    VTK wants no z axis where the image is flat.
+    """Transpose nodal values (n1, .., nd[, components]) to the axes of an image, [z,] y, x.
+
+    VTK expects no z axis in 2D.
     """
     return a.transpose(*range(dim)[::-1], *range(dim, a.ndim))
 
 
 def _within(grid, first):
-    """Where the nodes of a grid lie in the box, as slices along [z,] y, x."""
+    """Return the slices of the box that a grid covers, along [z,] y, x."""
     start = grid.origin - first
     return [slice(s, s + n) for s, n in zip(start, grid.m.shape, strict=True)][::-1]
 
 
 def _place(root, first, shape, dx):
-    """Extent and position of the box in space."""
+    """Write the extent and position of the box in space."""
     flat = 3 - len(shape)
     root.attrs["WholeExtent"] = np.array([[0, n - 1] for n in (*shape, *[1] * flat)], "i8").ravel()
     root.attrs["Origin"] = np.array([*(first * dx), *[0.0] * flat])

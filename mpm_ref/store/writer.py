@@ -1,7 +1,7 @@
-"""Write the results of a run into one HDF5 file: frames stream into it, each completely or not.
+"""Write the results of a run frame by frame into one HDF5 file; no frame is ever half written.
 
-The schema is in docs/reference/files.md. A frame stands once `Writer.append` returns, whatever
-happens to the process afterwards (see `journal`). `results` reads the files.
+The schema is in docs/reference/files.md. A frame is permanent once `Writer.append` returns, even if
+the process is killed afterwards (see `journal`). `results` reads these files.
 """
 
 import json
@@ -16,16 +16,16 @@ from .atomic import part_of, require_space
 from .journal import LIBVER, InUse, JournaledFile, in_use
 from .manifest import scene_hash
 from .results import CLOCK, ENERGIES, FORMAT, UNITS, USUAL, BadResults
-from .words import counted, plain
+from .text import counted, plain
 
 ROWS = 1 << 16                    # particles per chunk
 
 
 @dataclass(frozen=True)
-class Fields:
-    """What is stored of particles in every frame: names of `UNITS`; and the gzip level, 0 for none.
+class StoredFields:
+    """The fields of particles that every frame stores, names of `UNITS`, and the gzip level (0-9).
 
-    A body stores what it carries: J instead of F where only J is carried, no C under PIC or FLIP.
+    A body stores those that it has: J instead of F if it has only J, no C under PIC or FLIP.
     """
 
     names: tuple = USUAL
@@ -38,27 +38,27 @@ class Fields:
         if not 0 <= self.gzip <= 9:
             raise ValueError(f"gzip = {self.gzip}: expected a level from 0 (none) to 9")
 
-    def of(self, body):
-        """{name: array} of what is stored of a body."""
+    def select(self, body):
+        """Return the stored fields of a body as {name: array}."""
         have = carried(body)
         names = ["J" if name == "F" and "J" in have else name for name in self.names]
         return {name: have[name] for name in names if name in have}
 
 
 def carried(body):
-    """{name of `UNITS`: array (N, ..)} of what a body carries, particles in their current order."""
+    """Return the fields of a body as {name of `UNITS`: array (N, ..)}, in the current order."""
     q = body.particles
     have = {"J" if name == "F" and q.F.ndim == 1 else name: a for name, a in q._asdict().items()}
     return {name: a for name, a in have.items() if name in UNITS and len(a) == len(body.id)}
 
 
-def create(path, problem, fields, facts, beside=None):
-    """`Writer` of a new results file with the manifest `facts`, in place of what stood at `path`.
+def create(path, problem, fields, facts, checkpoint=None):
+    """Return the `Writer` of a new results file with the manifest `facts`, replacing one at `path`.
 
-    The file `beside` belongs to what stood there: it goes first, so that a process killed in
-    between leaves no pair that does not fit. A fault before then leaves both as they are.
-    Raises `InUse` while another process writes it, `NotWritten`, or ValueError for names of bodies
-    that HDF5 cannot tell apart.
+    The file `checkpoint`, of the results that are replaced, is removed first, so that a crash in
+    between leaves no checkpoint of other results. An error before that changes neither file. Raises
+    `InUse` while another process writes the file, `NotWritten`, or ValueError for names of bodies
+    that HDF5 cannot distinguish.
     """
     path = Path(path)
     _require_names(problem.bodies)
@@ -71,8 +71,8 @@ def create(path, problem, fields, facts, beside=None):
             _lay_out(h5, problem, fields)
             h5["manifest"] = json.dumps(facts, indent=1)
         file.commit()
-        if beside is not None:
-            Path(beside).unlink(missing_ok=True)
+        if checkpoint is not None:
+            Path(checkpoint).unlink(missing_ok=True)
         file.move(path)
     except BaseException:
         part_of(path).unlink(missing_ok=True)    # before the lock is gone, and it another's
@@ -82,9 +82,7 @@ def create(path, problem, fields, facts, beside=None):
 
 
 def _part_to_fill(path):
-    """A new file beside `path`, locked until it takes that place: of several first writers one
-    gets it.
-    """
+    """Return a new locked file that will replace `path`; one of several writers gets it."""
     try:
         return JournaledFile(part_of(path), new=True)
     except InUse:
@@ -92,9 +90,10 @@ def _part_to_fill(path):
 
 
 def reopen(path, problem, frames):
-    """`Writer` that goes on after the first so many frames of a results file, and drops the others.
+    """Return a `Writer` that continues a results file after the first `frames` frames.
 
-    Raises `BadResults` if the file is of another scene or has fewer frames, `InUse`, or OSError.
+    Later frames are dropped. Raises `BadResults` if the file is of another scene or has fewer
+    frames, `InUse`, or OSError.
     """
     writer = Writer(JournaledFile(path))
     try:
@@ -107,7 +106,7 @@ def reopen(path, problem, frames):
 
 
 def require_run(h5, path, problem, frames):
-    """Raise `BadResults` unless a results file is of the problem's scene and has so many frames."""
+    """Raise `BadResults` unless a results file is of the problem's scene and has these frames."""
     if h5.attrs["scene_sha256"] != scene_hash(problem):
         raise BadResults(f"{path} holds results of another scene; name another file, "
                          "or overwrite it")
@@ -117,7 +116,7 @@ def require_run(h5, path, problem, frames):
 
 
 class Writer:
-    """Appends frames to a results file; made by `create` and `reopen`, to be closed."""
+    """Append frames to a results file; `create` and `reopen` return one, the caller closes it."""
 
     def __init__(self, file):
         self._file = file
@@ -127,7 +126,7 @@ class Writer:
         return len(self.h5["time"])
 
     def append(self, frame, energy):
-        """Store a `Frame` and its `Energy`. Raises `NotWritten`; the frames before then stand."""
+        """Store a `Frame` and its `Energy`. Raises `NotWritten` and leaves the earlier frames."""
         rows = [(self.h5[name], value) for name, value in zip(
             (*CLOCK, "energy"), (frame.t, frame.dt, frame.state.step, energy), strict=True)]
         for body in frame.state.bodies:
@@ -141,34 +140,34 @@ class Writer:
 
     @property
     def path(self):
-        """Path of the file."""
+        """Return the path of the file."""
         return self._file.path
 
     @property
     def last_step(self):
-        """Steps made at the last frame, None without a frame."""
+        """Return the number of steps at the last frame, None without a frame."""
         steps = self.h5["step"]
         return int(steps[-1]) if len(steps) else None
 
     @property
     def manifest(self):
-        """The manifest, a dict."""
+        """Return the manifest as a dict."""
         return json.loads(self.h5["manifest"][()])
 
     def truncate(self, frames):
-        """Keep the first so many frames."""
+        """Drop all but the first `frames` frames."""
         for dataset in _per_frame(self.h5):
             dataset.resize(frames, axis=0)
         self._commit()
 
     def put_manifest(self, facts):
-        """Store the manifest (a dict of what JSON knows) in place of the one before."""
+        """Replace the manifest by a dict of plain values."""
         del self.h5["manifest"]
         self.h5["manifest"] = json.dumps(facts, indent=1)
         self._commit()
 
     def close(self):
-        """Close the file and let other writers have it."""
+        """Close the file and release its lock."""
         self.h5.close()
         self._file.close()
 
@@ -178,14 +177,14 @@ class Writer:
 
 
 def _put(dataset, value):
-    """Append a row."""
+    """Append a row to a dataset."""
     n = len(dataset)
     dataset.resize(n + 1, axis=0)
     dataset[n] = value
 
 
 def _lay_out(h5, problem, fields):
-    """Write what does not change, and the empty series of what does."""
+    """Write the constants of a run and create the empty series of its frames."""
     scheme = problem.scheme
     h5.attrs.update(format=FORMAT, scene_sha256=scene_hash(problem), title=problem.title,
                     dim=problem.dim, dx=problem.dx, gravity=np.array(problem.gravity, dtype=float),
@@ -195,16 +194,16 @@ def _lay_out(h5, problem, fields):
     _series(h5, "energy", (len(ENERGIES),), "f8", 0).attrs.update(unit="J", columns=list(ENERGIES))
     for k, body in enumerate(problem.bodies):
         group = h5.create_group(f"bodies/{body.name}")
-        group.attrs.update(index=k, law=_in_words(body.law), flow=_in_words(body.flow))
+        group.attrs.update(index=k, law=_json_text(body.law), flow=_json_text(body.flow))
         for name, unit in (("m", "kg"), ("V0", f"m^{problem.dim}")):
             a = restore_order(getattr(body.particles, name), body.id)
             group.create_dataset(name, data=a, fletcher32=a.size > 0).attrs["unit"] = unit
-        for name, a in fields.of(body).items():
+        for name, a in fields.select(body).items():
             _series(group, name, a.shape, "f8", fields.gzip).attrs["unit"] = UNITS[name]
 
 
 def _series(group, name, shape, kind, gzip):
-    """An empty dataset of one row of the given shape per frame; short rows share a chunk."""
+    """Create an empty dataset with a row of this shape per frame; short rows share a chunk."""
     rows = tuple(max(min(n, ROWS), 1) for n in shape[:1]) + shape[1:]
     return group.create_dataset(
         name, (0, *shape), kind, maxshape=(None, *shape),
@@ -214,15 +213,15 @@ def _series(group, name, shape, kind, gzip):
 
 
 def _per_frame(h5):
-    """All series of a file."""
+    """Return all datasets with a row per frame."""
     series = [h5[name] for name in (*CLOCK, "energy")]
     for group in h5["bodies"].values():
         series += [group[name] for name in UNITS if name in group]
     return series
 
 
-def _in_words(record):
-    """A NamedTuple of parameters as JSON."""
+def _json_text(record):
+    """Return a NamedTuple of parameters as JSON."""
     return json.dumps(plain(record))
 
 

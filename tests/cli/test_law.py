@@ -21,7 +21,7 @@ from mpm_ref.nclaw.train.labeled import labels_of, train_labeled  # noqa: E402
 from mpm_ref.nclaw.train.observations import trajectory_of  # noqa: E402
 from mpm_ref.scene import digest  # noqa: E402
 from mpm_ref.store.running import Options, checkpoint_of, run  # noqa: E402
-from mpm_ref.store.writer import Fields  # noqa: E402
+from mpm_ref.store.writer import StoredFields  # noqa: E402
 from mpm_ref.trajectories import observed  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
@@ -229,7 +229,8 @@ def test_a_fluid_is_kept_with_j_alone(tmp_path):
 
 def test_a_run_that_was_cut_off_goes_on(made, tmp_path):
     study = load(made / "cubes.toml")
-    run(study.problem(), tmp_path / "run.h5", Options(steps=7, fields=Fields(("x", "v", "C", "F"))))
+    options = Options(steps=7, fields=StoredFields(("x", "v", "C", "F")))
+    run(study.problem(), tmp_path / "run.h5", options)
     done = train(made / "cubes.toml", tmp_path / "laws.npz", "--data", tmp_path / "run.h5")
     assert done.exit_code == 0, done.output
     assert "part: steps 7 to 20" in mpm_ref("info", tmp_path / "run.h5").stdout
@@ -244,9 +245,9 @@ def test_ctrl_c_in_the_run_says_how_far_it_is(made, tmp_path, monkeypatch):
 
 def test_runs_of_other_scenes_and_of_fewer_fields_are_refused(made, tmp_path):
     study = load(made / "cubes.toml")
-    run(study.problem(), tmp_path / "few.h5", Options(fields=Fields(("x", "v", "F"))))
+    run(study.problem(), tmp_path / "few.h5", Options(fields=StoredFields(("x", "v", "F"))))
     other = load(write_study(tmp_path, ("[train]", "[set]\nsteps = 2\n[train]")))
-    run(other.problem(), tmp_path / "other.h5", Options(fields=Fields(("x", "v", "C", "F"))))
+    run(other.problem(), tmp_path / "other.h5", Options(fields=StoredFields(("x", "v", "C", "F"))))
     (tmp_path / "none.h5").write_bytes(b"x")
     for name, words in (("few.h5", "C of body 'cube' is not stored"),
                         ("other.h5", "holds results of another scene"),
@@ -259,7 +260,7 @@ def test_runs_of_other_scenes_and_of_fewer_fields_are_refused(made, tmp_path):
 @pytest.mark.parametrize("name", ["x", "C", "F"])
 def test_a_run_that_holds_no_numbers_is_refused(made, tmp_path, name):
     study = load(made / "cubes.toml")
-    run(study.problem(), tmp_path / "run.h5", Options(fields=Fields(("x", "v", "C", "F"))))
+    run(study.problem(), tmp_path / "run.h5", Options(fields=StoredFields(("x", "v", "C", "F"))))
     with h5py.File(tmp_path / "run.h5", "r+") as file:
         file[f"bodies/cube/{name}"][7, 5] = np.nan
     done = train(made / "cubes.toml", tmp_path / "laws.npz", "--data", tmp_path / "run.h5")

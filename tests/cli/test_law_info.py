@@ -14,7 +14,7 @@ from mpm_ref.materials import NoFlow, VonMises
 from mpm_ref.materials.learned import spline, weights
 from mpm_ref.materials.learned.weights import LawWeights, LearnedLaws
 from mpm_ref.nclaw.gnn import weights as of_graphs
-from mpm_ref.store.weights_file import sealed
+from mpm_ref.store.weights_file import pack
 from validation.nclaw.dough import doughs
 from validation.nclaw.trained_laws import nets
 
@@ -202,11 +202,11 @@ def test_a_graph_network_that_says_nothing_is_told_all_the_same(tmp_path):
 def test_weights_with_a_fault_are_told_as_what_they_are(tmp_path):
     path = tmp_path / "laws.npz"
     arrays = {"format": np.array(2), "about": np.array("{}"), "elastic_kind": np.array("Stress")}
-    path.write_bytes(sealed(arrays))
+    path.write_bytes(pack(arrays))
     assert_told(mpm_ref("info", path), 2, "laws.npz has format 2, this program reads 1")
-    path.write_bytes(sealed(arrays | {"format": np.array(1)}))
+    path.write_bytes(pack(arrays | {"format": np.array(1)}))
     assert_told(mpm_ref("info", path), 2, "laws.npz holds no trained laws: elastic law without")
-    path.write_bytes(sealed({"format": np.array("gnn 2")}))
+    path.write_bytes(pack({"format": np.array("gnn 2")}))
     assert_told(mpm_ref("info", path), 2, "laws.npz has format gnn 2, this program reads gnn 1")
     path.write_bytes((NCLAW / "jelly.npz").read_bytes()[:-1])
     assert_told(mpm_ref("info", path), 2, "laws.npz is damaged, cut short")
@@ -214,7 +214,7 @@ def test_weights_with_a_fault_are_told_as_what_they_are(tmp_path):
 
 def test_arrays_of_something_else_are_told(tmp_path):
     path = tmp_path / "other.npz"
-    path.write_bytes(sealed({name: np.ones(2) for name in "edcba"}))
+    path.write_bytes(pack({name: np.ones(2) for name in "edcba"}))
     assert_told(mpm_ref("info", path), 2, "other.npz holds no map, no laws and no graph network: it"
                 " has a, b, c, d, ..; name a file of `mpm-ref rom train`")
 

@@ -14,7 +14,7 @@ from mpm_ref.rom.study.methods import LDM_METHOD
 from mpm_ref.rom.study.study import load
 from mpm_ref.scene import build
 from mpm_ref.store.running import Options, run
-from mpm_ref.store.writer import Fields
+from mpm_ref.store.writer import StoredFields
 
 ONE = ("--workers", 1)
 
@@ -111,7 +111,7 @@ def test_a_run_that_was_cut_off_counts_as_continued(made, tmp_path):
     shutil.copy(made / "data" / "case-000.h5", tmp_path)
     bars = load(study)
     run(build(bars.scene(bars.mu[1])), tmp_path / "case-001.h5",
-        Options(steps=3, fields=Fields(LDM_METHOD.stored)))
+        Options(steps=3, fields=StoredFields(LDM_METHOD.stored)))
     done = mpm_ref("rom", "generate", study, "--out", tmp_path, *ONE)
     assert "made 2, continued 1, 1 were there; 1 held out" in done.stdout
     assert [line.split(": ")[-1] for line in done.stdout.splitlines()[1:-1]] == [

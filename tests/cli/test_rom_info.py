@@ -18,7 +18,7 @@ from mpm_ref.rom.model_file import Model
 from mpm_ref.rom.snapshots import displacement_error, position_error
 from mpm_ref.rom.study import dataset, errors
 from mpm_ref.rom.study.study import load
-from mpm_ref.store.weights_file import sealed
+from mpm_ref.store.weights_file import pack
 
 LDM = Path(__file__).parents[2] / "validation" / "ldm" / "weights"
 
@@ -92,7 +92,7 @@ def test_what_is_no_map_is_told(made, tmp_path):
     damaged[100] ^= 1
     (tmp_path / "map.npz").write_bytes(damaged)
     assert_told(mpm_ref("info", tmp_path / "map.npz"), 2, "map.npz is damaged")
-    (tmp_path / "map.npz").write_bytes(sealed({"format": np.array(model_file.FORMAT)}))
+    (tmp_path / "map.npz").write_bytes(pack({"format": np.array(model_file.FORMAT)}))
     assert_told(mpm_ref("info", tmp_path / "map.npz"), 2,
                 "map.npz holds no reduced model: its kind is None")
 

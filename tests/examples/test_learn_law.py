@@ -21,7 +21,7 @@ def example(monkeypatch, one_torch_thread):
 def short(example, monkeypatch):
     """It, with fewer steps."""
     monkeypatch.setattr(example, "STEPS", 20)
-    monkeypatch.setattr(example, "SEEN", (8, 20))
+    monkeypatch.setattr(example, "OBSERVED", (8, 20))
     return example
 
 
@@ -29,16 +29,16 @@ def test_its_gradient_is_that_of_its_loss(short):
     """By all weights together."""
     torch = pytest.importorskip("torch")
     torch.manual_seed(0)
-    law, seen = short.SmallLaw(), short.Seen(short.thrown())
+    law, corner_loss = short.SmallLaw(), short.CornerLoss(short.thrown_cube())
     weights = torch.nn.utils.parameters_to_vector(law.parameters()).detach()
     assert weights.numel() == 42
     along, h = torch.randn_like(weights), 1e-4
-    slope = torch.autograd.grad(seen(law), list(law.parameters()))
+    slope = torch.autograd.grad(corner_loss(law), list(law.parameters()))
     expected = (torch.cat([a.flatten() for a in slope]) @ along).item()
     ends = []
     for k in (1.0, -1.0):
         torch.nn.utils.vector_to_parameters(weights + k * h * along, law.parameters())
-        ends.append(seen(law).item())
+        ends.append(corner_loss(law).item())
     assert (ends[0] - ends[1]) / (2.0 * h) == pytest.approx(expected, rel=1e-6)
 
 
@@ -46,13 +46,13 @@ def test_the_start_has_a_gradient_too(short):
     """As docs/howto/gradients.md says: here by the velocity of one particle."""
     torch = pytest.importorskip("torch")
     torch.manual_seed(0)
-    law, seen = short.SmallLaw(), short.Seen(short.thrown())
+    law, corner_loss = short.SmallLaw(), short.CornerLoss(short.thrown_cube())
 
     def loss(v):
-        seen.run = start._replace(v=torch.cat([v[None], start.v[1:]]))
-        return seen(law)
+        corner_loss.run = start._replace(v=torch.cat([v[None], start.v[1:]]))
+        return corner_loss(law)
 
-    start, ends = seen.run, []
+    start, ends = corner_loss.run, []
     v = start.v[0].clone().requires_grad_()
     slope, = torch.autograd.grad(loss(v), [v])
     for h in (1e-3, -1e-3):
@@ -63,9 +63,9 @@ def test_the_start_has_a_gradient_too(short):
 
 
 def test_it_learns_the_law(example):
-    """Seen: the loss falls to 2e-4 of itself, mu is off by 2 %, k by 5 %, the stress by 5 %."""
+    """Observed: the loss falls to 2e-4 of itself, mu is off by 2 %, k by 5 %, the stress by 5 %."""
     law, losses = example.learn()
-    found, true, error = example.compared(law)
+    found, true, error = example.compare(law)
     assert losses[-1] < 1e-3 * losses[0]
     assert found == pytest.approx(true, rel=0.15)
     assert error < 0.15

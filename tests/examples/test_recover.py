@@ -17,7 +17,7 @@ def example(monkeypatch):
 
 
 def test_its_gradient_is_that_of_its_loss(example, monkeypatch):
-    monkeypatch.setattr(example, "SEEN", (10, 30))
+    monkeypatch.setattr(example, "OBSERVED", (10, 30))
     monkeypatch.setattr(example, "STEPS", 30)
     _, truth = example.run(example.make_law("fixed_corotated", E=1e5, nu=0.3))
     at, along = np.log((2e4, 1e4)), np.array((0.6, -0.8))

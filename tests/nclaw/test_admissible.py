@@ -11,7 +11,7 @@ from mpm_ref.materials.learned import contraction, energetic, weights
 from mpm_ref.materials.learned.contraction import Contraction
 from mpm_ref.materials.learned.invariants import spectrum
 from mpm_ref.nclaw.bodies import material_points
-from mpm_ref.store.weights_file import sealed
+from mpm_ref.store.weights_file import pack
 from mpm_ref.timestep import moduli
 from tests.nclaw.test_invariants import REPEATED, built, turns
 
@@ -234,9 +234,9 @@ def test_a_file_of_negative_weights_is_refused(tmp_path):
     arrays = {"format": np.array(weights.FORMAT), "about": np.array("{}"),
               **{name: a for part in weights.PARTS for name, a in
                  weights.law_arrays(part, getattr(made, part)).items()}}
-    path.write_bytes(sealed(arrays))
+    path.write_bytes(pack(arrays))
     assert weights.load(path).elastic.kind == made.elastic.kind
     arrays["elastic_W1"] = arrays["elastic_W1"] - 1.0
-    path.write_bytes(sealed(arrays))
+    path.write_bytes(pack(arrays))
     with pytest.raises(ValueError, match="elastic law of an energy with negative weights; train"):
         weights.load(path)

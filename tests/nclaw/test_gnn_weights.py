@@ -9,7 +9,7 @@ from neural_toys import laws
 from mpm_ref.materials.learned import weights as of_laws
 from mpm_ref.nclaw.gnn.network import PerceptronWeights
 from mpm_ref.nclaw.gnn.weights import FORMAT, arrays_of, load, named, save
-from mpm_ref.store.weights_file import sealed
+from mpm_ref.store.weights_file import pack
 
 
 def numbers(simulator):
@@ -63,7 +63,7 @@ FAULTS = {
 def test_a_sound_file_of_something_else_is_told(tmp_path, said, change):
     path = tmp_path / "gnn.npz"
     whole = arrays_of(toys.simulator()) | {"format": np.array(FORMAT), "about": np.array("{}")}
-    path.write_bytes(sealed(change(whole)))
+    path.write_bytes(pack(change(whole)))
     refused(load, path, said)
 
 

@@ -283,7 +283,7 @@ def test_the_command_says_it_once_and_the_results_keep_it(tmp_path):
     done = mpm_ref("run", scene, "--out", out)
     assert_told(done, 0, "warning: step 20, t = 0.02 s: body 'learned': particle", "is a guess")
     with Results(out) as results:
-        assert len(results.manifest["parts"][0]["astray"]) == 1
+        assert len(results.manifest["parts"][0]["strain_warnings"]) == 1
     info = mpm_ref("info", out)
     assert_told(info, 0, "warning: step 20", "is a guess")
     facts = json.loads(mpm_ref("info", out, "--json").stdout)

@@ -17,7 +17,7 @@ from mpm_ref.materials.learned.weights import (
     load,
     save,
 )
-from mpm_ref.store.weights_file import sealed
+from mpm_ref.store.weights_file import pack
 
 ABOUT = {"seed": 3, "command": "train jelly", "errors": [0.1, 1e-300], "scene": "Ärmel", "of": None}
 STRESS, CORRECTION = response.Stress(2.5), response.Correction()
@@ -117,7 +117,7 @@ FAULTS = {
 @pytest.mark.parametrize(("said", "change"), FAULTS.items(), ids=FAULTS.keys())
 def test_a_sound_file_of_something_else_is_told(tmp_path, said, change):
     path = tmp_path / "laws.npz"
-    path.write_bytes(sealed(change(file_of(laws()))))
+    path.write_bytes(pack(change(file_of(laws()))))
     assert " map" not in refused(load, path, said).removeprefix(str(path))      # of `rom`
 
 

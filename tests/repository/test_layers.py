@@ -26,7 +26,7 @@ FLOORS = (
     ("core.adjoint.boundary",),
     ("core core.adjoint",),
     ("materials", "plain", "store.atomic"),
-    ("body", "store.weights_file", "store.memmap"),
+    ("body", "store.atomic", "store.weights_file", "store.memmap"),
     ("training",),
     ("materials.learned",),
     ("explicit", "energy"),

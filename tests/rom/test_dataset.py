@@ -25,8 +25,8 @@ from mpm_ref.rom.study.generate import (
 from mpm_ref.scene import build
 from mpm_ref.store.results import BadResults, Results
 from mpm_ref.store.running import Options, checkpoint_of, run
-from mpm_ref.store.weights_file import sealed, stated
-from mpm_ref.store.writer import Fields
+from mpm_ref.store.weights_file import header, pack
+from mpm_ref.store.writer import StoredFields
 from mpm_ref.training import Machine
 
 # Data.
@@ -59,7 +59,7 @@ def test_finished_runs_are_not_made_again(made):
 def test_a_run_that_was_cut_off_goes_on(made, tmp_path):
     bars, folder = made
     path, scene = file_of(tmp_path, 1), bars.scene(bars.mu[1])
-    run(build(scene), path, Options(steps=3, fields=Fields(("x", "F", "v"))))
+    run(build(scene), path, Options(steps=3, fields=StoredFields(("x", "F", "v"))))
     assert not is_finished(path, scene)
     with pytest.raises(dataset.Missing, match=r"lacks 1 of 1 runs, the first is case-001\.h5"):
         dataset.load(bars, tmp_path, (1,))
@@ -195,9 +195,9 @@ def test_what_is_no_curved_map_is_refused(bent, tmp_path):
             model_file.save(tmp_path / "x.npz", model._replace(
                 field=model.field._replace(**{name: wrong})))
     assert not (tmp_path / "x.npz").exists()
-    content = stated("x.npz", model_file.FORMAT, {}) | model_file.arrays_of(model)
+    content = header("x.npz", model_file.FORMAT, {}) | model_file.arrays_of(model)
     del content["powers"]
-    (tmp_path / "x.npz").write_bytes(sealed(content))
+    (tmp_path / "x.npz").write_bytes(pack(content))
     with pytest.raises(ValueError, match="lacks powers"):
         model_file.load(tmp_path / "x.npz")
 
@@ -221,11 +221,11 @@ def test_a_damaged_map_is_refused(made, model, tmp_path, damage):
 def test_what_are_no_modes_is_refused(model, tmp_path):
     def written(**changes):
         map = model.field
-        arrays = stated("x.npz", model_file.FORMAT, {}) | {
+        arrays = header("x.npz", model_file.FORMAT, {}) | {
             "kind": np.array("pod"), "X": map.X, "U": map.U, "slope": map.slope,
             "xhat": model.xhat, "rest": model.rest} | changes
         path = tmp_path / "map.npz"
-        path.write_bytes(sealed({k: a for k, a in arrays.items() if a is not None}))
+        path.write_bytes(pack({k: a for k, a in arrays.items() if a is not None}))
         return path
 
     assert model_file.load(written()).field.r == 3

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from mpm_ref.rom import model_file
 from mpm_ref.rom.model_file import Model, arrays_of, load, save
-from mpm_ref.store.weights_file import seal, sealed, stated
+from mpm_ref.store.weights_file import checksum, header, pack
 
 ABOUT = {"seed": 3, "command": "train ldm", "weights": {"F": 1.0 / 30.0, "v": 0.08},
          "runs": [0.1, 1e-300, 2], "scene": "Ärmel \0 \n\"", "noted": None, "free": True}
@@ -26,7 +26,7 @@ def model(dim=3, r=2, seed=0):
 
 def file_of(model):
     """The arrays that are written."""
-    return stated("map.npz", model_file.FORMAT, model.about) | arrays_of(model)
+    return header("map.npz", model_file.FORMAT, model.about) | arrays_of(model)
 
 
 def flat(model):
@@ -62,7 +62,7 @@ def test_sizes_may_be_short_integers(saved):
     big = model()._replace(field=rom_toys.decoder(3, 2, hidden=(20, 20)))
     short = file_of(big) | {"net.sizes": np.array([5, 20, 20, 3], dtype=np.int8)}
     path = saved.with_name("short.npz")
-    path.write_bytes(sealed(short))
+    path.write_bytes(pack(short))
     X = rom_toys.cloud(3, 5)
     np.testing.assert_array_equal(load(path).field.place(X, big.rest),
                                   big.field.place(X, big.rest))
@@ -152,14 +152,14 @@ def test_nothing_is_unpickled(tmp_path):
     trap = np.empty(1, dtype=object)
     trap[0] = Trap()
     path = tmp_path / "trap.npz"
-    path.write_bytes(sealed({**file_of(model()), "format": trap}))
+    path.write_bytes(pack({**file_of(model()), "format": trap}))
     refused(load, path, "allow_pickle=False")
 
 
 def test_a_sealed_file_that_is_no_archive_is_told(saved):
     content = saved.read_bytes()[:-500]
     copy = saved.with_name("short.npz")
-    copy.write_bytes(content + seal(content))
+    copy.write_bytes(content + checksum(content))
     refused(load, copy, "is no archive of plain arrays")
 
 
@@ -168,7 +168,7 @@ def test_a_sealed_file_that_is_no_archive_is_told(saved):
 ])
 def test_a_file_that_says_nothing_of_its_map_is_told(tmp_path, about, said):
     path = tmp_path / "map.npz"
-    path.write_bytes(sealed({**file_of(model()), "about": np.array(about)}))
+    path.write_bytes(pack({**file_of(model()), "about": np.array(about)}))
     refused(load, path, said)
 
 
@@ -184,7 +184,7 @@ def test_another_format_is_told(tmp_path, monkeypatch):
 def test_what_is_no_format_is_told(kept, tmp_path):
     found = {} if kept is None else {"format": np.array(kept)}
     path = tmp_path / "map.npz"
-    path.write_bytes(sealed(without("format")(file_of(model())) | found))
+    path.write_bytes(pack(without("format")(file_of(model())) | found))
     said = "has format .*, this program reads reduced model 1; |holds no reduced model, format"
     with pytest.raises(ValueError, match=rf"map\.npz ({said})"):
         load(path)
@@ -231,7 +231,7 @@ FAULTS = {
 @pytest.mark.parametrize(("said", "change"), FAULTS.items(), ids=FAULTS.keys())
 def test_a_sound_file_of_something_else_is_told(tmp_path, said, change):
     path = tmp_path / "map.npz"
-    path.write_bytes(sealed(change(file_of(model()))))
+    path.write_bytes(pack(change(file_of(model()))))
     refused(load, path, said)
 
 

@@ -10,7 +10,7 @@ from mpm_ref.rom import model_file
 from mpm_ref.rom.fields.pod_fields import Sizes, fit_pod_fields
 from mpm_ref.rom.model_file import Model, arrays_of, load, save
 from mpm_ref.rom.snapshots import join_histories
-from mpm_ref.store.weights_file import sealed, stated
+from mpm_ref.store.weights_file import header, pack
 from tests.rom.test_pod_fields import ALL, bent
 
 ABOUT = {"command": "train", "map": {"kind": "modes", "r": 2}}
@@ -61,7 +61,7 @@ def test_equal_content_gives_equal_bytes(tmp_path):
 
 def changed(**changes):
     """The arrays of a file with others in place of some; None: without."""
-    found = stated("f", model_file.FORMAT, ABOUT) | arrays_of(model())
+    found = header("f", model_file.FORMAT, ABOUT) | arrays_of(model())
     found |= {name.replace("__", "."): a for name, a in changes.items()}
     return {name: a for name, a in found.items() if a is not None}
 
@@ -90,7 +90,7 @@ N = len(ALL)
 ])
 def test_what_does_not_fit_is_refused(tmp_path, changes, said):
     path = tmp_path / "fields.npz"
-    path.write_bytes(sealed(changed(**changes)))
+    path.write_bytes(pack(changed(**changes)))
     with pytest.raises(ValueError, match=said) as refusal:
         load(path)
     assert str(refusal.value).startswith(f"{path} holds no reduced model: ")
@@ -101,7 +101,7 @@ def test_blocks_whose_middle_is_no_point_are_refused(tmp_path):
     middle = arrays_of(model())["cells.middle"].copy()
     middle[0] = N
     path = tmp_path / "fields.npz"
-    path.write_bytes(sealed(changed(cells__middle=middle)))
+    path.write_bytes(pack(changed(cells__middle=middle)))
     with pytest.raises(ValueError, match="the middle of a block is no point"):
         load(path)
 

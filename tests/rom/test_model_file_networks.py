@@ -13,7 +13,7 @@ from field_toys import MU, Q, latents, networks
 from mpm_ref.rom import model_file
 from mpm_ref.rom.fields.network import Networks
 from mpm_ref.rom.model_file import Model, arrays_of, load, save
-from mpm_ref.store.weights_file import sealed, stated
+from mpm_ref.store.weights_file import header, pack
 from validation.nsf.pointwise_networks import infer
 
 ABOUT = {"seed": 3, "command": "train nsf", "betas": [48, 64, 64]}
@@ -33,7 +33,7 @@ def parts(**changes):
 
 def file_of(model):
     """The arrays that are written."""
-    return stated("fields.npz", model_file.FORMAT, model.about) | arrays_of(model)
+    return header("fields.npz", model_file.FORMAT, model.about) | arrays_of(model)
 
 
 @pytest.mark.parametrize("q", [0, Q], ids=["without mu", "with mu"])
@@ -75,7 +75,7 @@ def test_a_flipped_bit_and_a_cut_are_told(tmp_path, place):
 
 def test_a_file_of_another_kind_is_told(tmp_path):
     path = tmp_path / "fields.npz"
-    path.write_bytes(sealed(file_of(model()) | {"kind": np.array("network")}))
+    path.write_bytes(pack(file_of(model()) | {"kind": np.array("network")}))
     refused(load, path, "holds no reduced model: it lacks net.W, net.b")
 
 
@@ -110,7 +110,7 @@ FAULTS = {
 @pytest.mark.parametrize(("said", "change"), FAULTS.items(), ids=FAULTS.keys())
 def test_a_sound_file_of_something_else_is_told(tmp_path, said, change):
     path = tmp_path / "fields.npz"
-    path.write_bytes(sealed(change(file_of(model()))))
+    path.write_bytes(pack(change(file_of(model()))))
     refused(load, path, said)
 
 

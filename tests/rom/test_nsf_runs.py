@@ -22,7 +22,7 @@ from mpm_ref.rom.study.samples import (
     require_valid_sets,
     weighted_samples,
 )
-from mpm_ref.scene.overrides import varied
+from mpm_ref.scene.overrides import with_values
 
 TOML = """
 title = "two disks"
@@ -57,7 +57,7 @@ def disks(tmp_path_factory):
     path = tmp_path_factory.mktemp("disks") / "disks.toml"
     path.write_text(TOML)
     base = scene.load(path)
-    return lambda v, **changes: varied(base, {"body.hard.velocity.linear[0]": v, **changes})
+    return lambda v, **changes: with_values(base, {"body.hard.velocity.linear[0]": v, **changes})
 
 
 @pytest.fixture(scope="module")

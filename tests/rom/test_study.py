@@ -11,7 +11,7 @@ from mpm_ref.rom.study.run import RunOptions
 from mpm_ref.rom.study.study import load
 from mpm_ref.rom.study.tables import KEYS, MapRunTable, MapTable
 from mpm_ref.scene import SceneError, canonical
-from mpm_ref.scene.overrides import flat, varied
+from mpm_ref.scene.overrides import flat, with_values
 from validation.ldm.studies import STUDIES
 
 
@@ -91,9 +91,9 @@ def test_a_latin_hypercube_has_one_run_in_each_part_of_each_range(tmp_path):
 ])
 def test_a_path_sets_one_value(tmp_path, path, value, get):
     base = study(tmp_path).base
-    changed = varied(base, {path: value})
+    changed = with_values(base, {path: value})
     assert get(changed) == value != get(base)
-    assert varied(changed, {path: get(base)}) == base
+    assert with_values(changed, {path: get(base)}) == base
 
 
 @pytest.mark.parametrize(("path", "words"), [
@@ -107,7 +107,7 @@ def test_a_path_sets_one_value(tmp_path, path, value, get):
 ])
 def test_a_path_that_leads_nowhere_is_refused(tmp_path, path, words):
     with pytest.raises(SceneError) as fault:
-        varied(study(tmp_path).base, {path: 1.0})
+        with_values(study(tmp_path).base, {path: 1.0})
     assert repr(path) in str(fault.value)
     assert words in str(fault.value)
 

@@ -224,8 +224,8 @@ def some_shapes(d):
         st.builds(shapes.Wedge, tip=v, direction=v, half_angle=st.floats(1e-6, 89.999), length=SIZE,
                   edge=axis, width=SIZE if d == 3 else st.none()),
     )
-    return simple | st.builds(shapes.Moved, shape=simple, scale=SIZE, angle=st.floats(-1e6, 1e6),
-                              axis=axis, about=v, translate=v)
+    return simple | st.builds(shapes.Transformed, shape=simple, scale=SIZE,
+                              angle=st.floats(-1e6, 1e6), axis=axis, about=v, translate=v)
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from mpm_ref import shapes
-from mpm_ref.sampling import Jittered, Lattice, Poisson, Regular, exactly, sample
+from mpm_ref.sampling import Jittered, Lattice, Poisson, Regular, poisson_count, sample
 from mpm_ref.sampling.poisson import MAX_CELLS, poisson_disk
 from mpm_ref.shapes.inside import solid
 
@@ -141,13 +141,13 @@ def test_box_smaller_than_the_radius_holds_one_point():
 
 @pytest.mark.parametrize("count", [1, 2, 7, 100, 3000])
 def test_count_is_met_exactly(count):
-    x = exactly(DISK, count, 0)
+    x = poisson_count(DISK, count, 0)
     assert len(x) == count
-    assert np.array_equal(x, exactly(DISK, count, 0))
+    assert np.array_equal(x, poisson_count(DISK, count, 0))
 
 
 def test_count_keeps_the_points_apart_and_everywhere(rng):
-    x = exactly(LDM, 1368, 0)
+    x = poisson_count(LDM, 1368, 0)
     typical = (LDM.volume / 1368) ** (1.0 / 3.0)
     assert nearest(x).min() > 0.7 * typical
     inside = LDM.low + rng.uniform(size=(20_000, 3)) * (LDM.high - LDM.low)

@@ -118,7 +118,7 @@ def test_only_analytic_shapes_are_level_sets():
 def test_moved_shape_by_hand():
     # the unit square, doubled about (1, 0), turned by 90 degrees about it, then lifted by 5:
     # [0,1]^2 -> [-1,1] x [0,2] -> about (1,0): x' = 1 - y, y' = x - 1
-    moved = solid(shapes.Moved(shape=UNIT2, scale=2.0, angle=90.0, about=(1.0, 0.0),
+    moved = solid(shapes.Transformed(shape=UNIT2, scale=2.0, angle=90.0, about=(1.0, 0.0),
                                translate=(0.0, 5.0)))
     assert np.allclose([moved.low, moved.high], [[-1.0, 3.0], [1.0, 5.0]], atol=1e-12)
     assert moved.volume == 4.0
@@ -129,7 +129,7 @@ def test_moved_shape_by_hand():
 def test_moved_shape_holds_the_moved_points(shape, rng):
     d = len(bounds(shape)[0])
     axis, about, by = ((1.0, 2.0, 3.0) if d == 3 else None), rng.normal(size=d), rng.normal(size=d)
-    record = shapes.Moved(shape=shape, scale=1.7, angle=40.0, axis=axis, about=tuple(about),
+    record = shapes.Transformed(shape=shape, scale=1.7, angle=40.0, axis=axis, about=tuple(about),
                           translate=tuple(by))
     x = darts(*bounds(shape), 2000, rng)
     y = (x - about) @ rotation(40.0, axis, d).T * 1.7 + about + by
@@ -142,7 +142,7 @@ def test_moved_shape_holds_the_moved_points(shape, rng):
 
 def test_moved_infinity_stays_infinite():
     half = shapes.HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
-    moved = solid(shapes.Moved(shape=half, angle=30.0))
+    moved = solid(shapes.Transformed(shape=half, angle=30.0))
     assert np.isinf([moved.low, moved.high]).all()
 
 

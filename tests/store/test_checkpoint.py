@@ -107,8 +107,8 @@ def test_foreign_checkpoints_are_told(saved, tmp_path, problem):
         load(saved, replace(problem, source="other"))
     with pytest.raises(BadCheckpoint, match="other bodies"):
         load(saved, replace(problem, bodies=problem.bodies[:1]))
-    assert checkpoint.is_one(saved)
-    assert not checkpoint.is_one(other)
+    assert checkpoint.is_checkpoint(saved)
+    assert not checkpoint.is_checkpoint(other)
 
 
 def test_a_checkpoint_of_other_code_says_so(saved, problem, monkeypatch):

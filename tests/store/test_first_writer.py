@@ -12,7 +12,7 @@ from mpm_ref.store import atomic, journal, running
 from mpm_ref.store.journal import InUse, JournaledFile
 from mpm_ref.store.results import Results
 from mpm_ref.store.running import Refused, run
-from mpm_ref.store.writer import Fields, create
+from mpm_ref.store.writer import StoredFields, create
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -47,7 +47,7 @@ def test_the_first_of_two_writers_of_a_new_file_wins(tmp_path):
                              stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     wait_for(tmp_path / "run.began", first)
     with pytest.raises(InUse, match=f"{out} is being written by another process"):
-        create(out, colliding(), Fields(), {"made": "second"})
+        create(out, colliding(), StoredFields(), {"made": "second"})
     (tmp_path / "run.go").touch()
     said, faults = first.communicate(timeout=60)
     assert (first.returncode, said) == (0, "6\n"), faults

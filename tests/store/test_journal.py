@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mpm_ref.store import atomic
-from mpm_ref.store.atomic import NotWritten, in_words, replacing, require_space
+from mpm_ref.store.atomic import NotWritten, replacing, require_space, size_text
 from mpm_ref.store.journal import PAGE, Damaged, JournaledFile, journal_of, new_hdf5, recover
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -231,8 +231,8 @@ def test_space_is_asked_for_first(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(("size", "words"), [(12, "12 B"), (1.5e9, "1.5 GB"), (2e15, "2e+03 TB")])
-def test_sizes_in_words(size, words):
-    assert in_words(size) == words
+def test_sizes_as_text(size, words):
+    assert size_text(size) == words
 
 
 def test_plain_tools_read_while_a_writer_works(tmp_path):

@@ -8,13 +8,13 @@ from small_runs import ENERGY, block, colliding, frame_of, state_of
 
 from mpm_ref.store import atomic, writer
 from mpm_ref.store.atomic import NotWritten
-from mpm_ref.store.manifest import Part, manifest, scene_hash, source_hash
+from mpm_ref.store.manifest import RunPart, manifest, scene_hash, source_hash
 from mpm_ref.store.results import SCALARS, UNITS, BadResults, Results
-from mpm_ref.store.writer import Fields, create, reopen
+from mpm_ref.store.writer import StoredFields, create, reopen
 
 
 def written(path, problem, states, fields=None):
-    writer = create(path, problem, fields or Fields(), {"made": "here"})
+    writer = create(path, problem, fields or StoredFields(), {"made": "here"})
     for k, state in enumerate(states):
         writer.append(frame_of(state, k), ENERGY)
     writer.close()
@@ -35,7 +35,7 @@ def results(tmp_path, problem):
 
 def test_frames_come_back_in_the_order_of_sampling(tmp_path, problem):
     states = [state_of(problem, k) for k in range(3)]
-    path = written(tmp_path / "run.h5", problem, states, Fields(tuple(UNITS)))
+    path = written(tmp_path / "run.h5", problem, states, StoredFields(tuple(UNITS)))
     with Results(path) as results:
         assert len(results) == 3
         assert results.bodies == ["left", "right"]
@@ -94,7 +94,7 @@ def test_scalars(results, problem):
 def test_compression_changes_no_value(tmp_path, problem):
     states = [state_of(problem)]
     plain = written(tmp_path / "plain.h5", problem, states)
-    small = written(tmp_path / "small.h5", problem, states, Fields(gzip=4))
+    small = written(tmp_path / "small.h5", problem, states, StoredFields(gzip=4))
     with Results(plain) as a, Results(small) as b:
         assert b.h5["bodies/left/x"].compression == "gzip"
         np.testing.assert_array_equal(a.field("left", "tau", 0), b.field("left", "tau", 0))
@@ -103,14 +103,14 @@ def test_compression_changes_no_value(tmp_path, problem):
 @pytest.mark.parametrize("fields", [{"names": ("v",)}, {"names": ("x", "colour")}, {"gzip": 10}])
 def test_fields_are_checked(fields):
     with pytest.raises(ValueError, match="expected"):
-        Fields(**fields)
+        StoredFields(**fields)
 
 
 @pytest.mark.parametrize("name", ["", ".", "a/b", "right"])
 def test_names_of_bodies_are_checked(tmp_path, problem, name):
     bodies = (problem.bodies[0]._replace(name=name), problem.bodies[1])
     with pytest.raises(ValueError, match="names that differ"):
-        create(tmp_path / "run.h5", replace(problem, bodies=bodies), Fields(), {})
+        create(tmp_path / "run.h5", replace(problem, bodies=bodies), StoredFields(), {})
 
 
 def test_everything_is_checksummed(results):
@@ -186,7 +186,7 @@ def test_a_full_disk_keeps_the_frames_before(results, problem, monkeypatch):
 def test_nothing_is_left_of_a_file_that_could_not_begin(tmp_path, problem, monkeypatch):
     monkeypatch.setattr(writer, "_lay_out", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
-        create(tmp_path / "run.h5", problem, Fields(), {})
+        create(tmp_path / "run.h5", problem, StoredFields(), {})
     assert not list(tmp_path.iterdir())
 
 
@@ -203,7 +203,7 @@ def test_manifest_says_what_made_the_run(problem):
 
 
 def test_a_part_says_what_it_took(problem):
-    part = Part(first_step=10)
+    part = RunPart(first_step=10)
     sum(range(200_000))
     entry = part.ended("finished", state_of(problem), "abc")
     assert entry["wall_s"] > 0.0

@@ -7,13 +7,13 @@ from small_runs import ENERGY, block, colliding, frame_of, state_of
 
 from mpm_ref.store.results import BadResults, Results
 from mpm_ref.store.vtkhdf import export_grid, export_particles
-from mpm_ref.store.writer import Fields, create
+from mpm_ref.store.writer import StoredFields, create
 
 ULP = 2.0**-23        # of single precision
 
 
 def results_of(path, problem, fields=None, frames=3):
-    writer = create(path, problem, fields or Fields(), {})
+    writer = create(path, problem, fields or StoredFields(), {})
     for k in range(frames):
         writer.append(frame_of(state_of(problem, k), k), ENERGY)
     writer.close()
@@ -73,7 +73,7 @@ def test_vtk_reads_the_particles_back(tmp_path, results, d):
 
 
 def test_only_what_is_stored_is_exported(tmp_path):
-    with results_of(tmp_path / "run.h5", colliding(), Fields(("x", "F"))) as results:
+    with results_of(tmp_path / "run.h5", colliding(), StoredFields(("x", "F"))) as results:
         export_particles(results, tmp_path / "run.vtkhdf")
         with pytest.raises(BadResults, match="v of body 'left' is not stored"):
             export_grid(results, tmp_path / "grid.vtkhdf")

@@ -10,7 +10,7 @@ from mpm_ref.nclaw.gnn import weights as of_graphs
 from mpm_ref.rom import model_file
 from mpm_ref.rom.fields.pod import PodModes
 from mpm_ref.rom.model_file import Model
-from mpm_ref.store.weights_file import read, stated, write
+from mpm_ref.store.weights_file import header, read, write
 from validation.nclaw import bundle
 from validation.nclaw.small_trainings import small_nets
 
@@ -30,7 +30,7 @@ def test_committed_weights_are_written_again_to_the_same_bytes(tmp_path, module,
 def test_arrays_come_back_with_how_they_were_made(tmp_path):
     path, about = tmp_path / "a.npz", {"seed": 1, "runs": (1, 2), "noted": None}
     x = np.array([0.1, 1e-300, np.nan])
-    write(path, {"x": x, **stated(path, "toys 1", about)}, lambda arrays: None)
+    write(path, {"x": x, **header(path, "toys 1", about)}, lambda arrays: None)
     arrays, found = read(path, "toys 1", lambda arrays: None, "toys")
     assert arrays["x"].tobytes() == x.tobytes()
     assert found == about | {"runs": [1, 2]}
@@ -38,7 +38,7 @@ def test_arrays_come_back_with_how_they_were_made(tmp_path):
 
 def test_a_fault_is_told_on_writing_and_on_reading(tmp_path):
     path = tmp_path / "a.npz"
-    arrays = stated(path, 1, {})
+    arrays = header(path, 1, {})
     with pytest.raises(ValueError, match=r"a\.npz is not written: it lacks x$"):
         write(path, arrays, lambda found: "it lacks x" if "x" not in found else None)
     assert not list(tmp_path.iterdir())
@@ -58,7 +58,7 @@ def test_a_fault_is_told_on_writing_and_on_reading(tmp_path):
 ])
 def test_files_of_another_kind_are_told_as_such(tmp_path, format, asked, said):
     path = tmp_path / "a.npz"
-    write(path, stated(path, format, {}), lambda found: None)
+    write(path, header(path, format, {}), lambda found: None)
     with pytest.raises(ValueError, match=rf"a\.npz {said}"):
         read(path, asked, lambda found: None, "toys")
 

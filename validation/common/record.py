@@ -13,11 +13,12 @@ value lie in it?
 """
 
 import math
-import os
 from pathlib import Path
 from typing import NamedTuple
 
 import msgspec
+
+from mpm_ref.store.atomic import write_bytes
 
 Bound = float | tuple[float, float]
 COMPARATORS = ("<=", ">=", "~", "=", "band", "info", "runs")
@@ -162,11 +163,5 @@ def read_records(path):
 
 def write_whole(path, content):
     """Write bytes so that a reader, or a crash, sees the old file or the new one, never a part."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f"{path.name}.{os.getpid()}.part")
-    with open(part, "wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(part, path)
+    Path(path).parent.mkdir(parents=True, exist_ok=True)
+    write_bytes(path, content)

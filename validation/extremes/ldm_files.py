@@ -10,7 +10,7 @@ import numpy as np
 from mpm_ref.rom.fields.pod import basis
 from mpm_ref.rom.fields.polynomial_manifold import curved
 from mpm_ref.rom.model_file import Model, load, save
-from mpm_ref.store.weights_file import SEAL, opened, sealed
+from mpm_ref.store.weights_file import SEAL, load_arrays, pack
 
 from ..common.registry import experiment
 from ..ldm import networks
@@ -84,14 +84,14 @@ def unfit(arrays):
     def put(name, k, value):
         found = arrays[name].copy()
         found.flat[k] = value
-        return sealed({**arrays, name: found})
+        return pack({**arrays, name: found})
 
     for name in (name for name, a in arrays.items() if a.ndim and name != "net.sizes"):
         if arrays[name].dtype.kind == "f":
             yield "not finite", f"{name} with NaN", put(name, 0, np.nan)
             yield "not finite", f"{name} with infinity", put(name, -1, np.inf)
-        yield "wrong sizes", f"{name} shorter", sealed({**arrays, name: arrays[name][..., :-1]})
-        yield "wrong sizes", f"{name} left out", sealed(
+        yield "wrong sizes", f"{name} shorter", pack({**arrays, name: arrays[name][..., :-1]})
+        yield "wrong sizes", f"{name} left out", pack(
             {key: a for key, a in arrays.items() if key != name})
     for k, size in enumerate(arrays.get("net.sizes", ())):
         yield "wrong sizes", f"sizes[{k}] one more", put("net.sizes", k, size + 1)
@@ -136,7 +136,7 @@ def tried(run, folder):
         others = [other for other in files if other != path]
         yield "damaged", rows(path.stem, damages(path, count, run.rng))
         yield "damaged", rows(path.stem, (resealed(path, other) for other in others))
-        yield "unfit", rows(path.stem, unfit(opened(path)))
+        yield "unfit", rows(path.stem, unfit(load_arrays(path)))
     yield "other", rows("laws", [("of another kind", path.stem, path.read_bytes())
                                  for path in sorted(LAWS.glob("*-neural.npz"))])
     trainings = [("of another training", name, (networks.FOLDER / f"{name}.npz").read_bytes())

@@ -10,7 +10,7 @@ import numpy as np
 from mpm_ref.rom import model_file
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.model_file import Model
-from mpm_ref.store.weights_file import opened
+from mpm_ref.store.weights_file import load_arrays
 
 from ..common.registry import experiment
 from ..nsf.reduced_runs import refitted
@@ -92,7 +92,7 @@ def record_files(run, name, one):
     with tempfile.TemporaryDirectory() as folder:
         path, copy = Path(folder) / "fields.npz", Path(folder) / "copy.npz"
         model_file.save(path, Model(one.fields, one.xhat, one.xhat[0, 0], {}))
-        made = {"damaged": damages(path, count, run.rng), "unfit": unfit(opened(path))}
+        made = {"damaged": damages(path, count, run.rng), "unfit": unfit(load_arrays(path))}
         for group, files in made.items():
             rows = []
             for kind, what, content in files:

@@ -16,7 +16,7 @@ from mpm_ref.core.jit import set_threads
 from mpm_ref.energy import angular_momentum, energy, momentum
 from mpm_ref.hot.methods import METHODS
 from mpm_ref.scene import build, load
-from mpm_ref.scene.overrides import varied
+from mpm_ref.scene.overrides import with_values
 from mpm_ref.simulate import simulate
 from mpm_ref.tape import Seed, Tape
 
@@ -44,7 +44,7 @@ def scene_names():
 def scene(name, **values):
     """Return a scene with values {path: value} put into it."""
     base = load(ROOT / "scenes" / f"{name}.toml")
-    return varied(base, values) if values else base
+    return with_values(base, values) if values else base
 
 
 def problem(name, values=None):

@@ -15,7 +15,14 @@ from mpm_ref.materials.learned.weights import (
     law_arrays,
     law_from_arrays,
 )
-from mpm_ref.store.weights_file import about_of, opened, require_format, sealed, stated, write_whole
+from mpm_ref.store.atomic import write_bytes
+from mpm_ref.store.weights_file import (
+    header,
+    load_arrays,
+    pack,
+    read_provenance,
+    require_format,
+)
 
 FORMAT = 1
 
@@ -33,12 +40,12 @@ def save(path, bundle):
     """
     about = {**bundle.about, "laws": {str(epoch): laws.about for epoch, laws in
                                       bundle.laws.items()}}
-    arrays = stated(path, FORMAT, about)
+    arrays = header(path, FORMAT, about)
     for epoch, laws in bundle.laws.items():
         for part in PARTS:
             for name, a in law_arrays(part, getattr(laws, part)).items():
                 arrays[f"{epoch}.{name}"] = single(path, name, a)
-    write_whole(Path(path), sealed(arrays))
+    write_bytes(path, pack(arrays))
 
 
 def single(path, name, a):
@@ -54,9 +61,9 @@ def single(path, name, a):
 
 def load(path):
     """Read what `save` wrote. Raises ValueError saying what is wrong with the file."""
-    arrays = opened(Path(path))
+    arrays = load_arrays(Path(path))
     require_format(path, arrays, FORMAT, "laws of a small training")
-    about = about_of(path, arrays)
+    about = read_provenance(path, arrays)
     own = about.pop("laws", {})
     epochs = sorted(own, key=int)
     return Bundle({int(k): laws_of(path, arrays, k, own[k]) for k in epochs}, about)

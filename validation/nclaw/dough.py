@@ -23,9 +23,9 @@ from mpm_ref.scene import (
     Flow,
     Lattice,
     Material,
-    Moved,
     Scene,
     Scheme,
+    Transformed,
     Union,
     Velocity,
     Walls,
@@ -68,7 +68,7 @@ def doughs():
 
 def material(E=E, nu=NU, tau_y=TAU_Y):
     """The dough, or a guess of it."""
-    return Material(law="hencky", E=E, nu=nu, flow=Flow(type="von_mises", tau_y=tau_y, s_min=0.05))
+    return Material(law="hencky", E=E, nu=nu, flow=Flow(name="von_mises", tau_y=tau_y, s_min=0.05))
 
 
 def block():
@@ -86,7 +86,8 @@ def star():
 
 def turned(shape, angle, translate=(0.0, 0.0, 0.0)):
     """A shape turned about the axis of depth [degrees], then shifted."""
-    return Moved(shape=shape, angle=angle, axis=DEPTH, about=(0.0, 0.0, 0.0), translate=translate)
+    return Transformed(shape=shape, angle=angle, axis=DEPTH, about=(0.0, 0.0, 0.0),
+                       translate=translate)
 
 
 def scene(shape, of=None):

@@ -16,7 +16,7 @@ from mpm_ref.nclaw.bodies import copy_body
 from mpm_ref.nclaw.gnn.features import box_of
 from mpm_ref.nclaw.study.compare import positions
 from mpm_ref.scene import build
-from mpm_ref.store.words import counted
+from mpm_ref.store.text import counted
 
 from ..common.scenes import threads_for
 from .environments import ENVIRONMENTS

@@ -7,7 +7,7 @@ of its mesh as sampled by the authors' release. A mesh of a user's own is taken 
 
 from pathlib import Path
 
-from mpm_ref.scene import Capsule, Mesh, Moved, Sphere, Torus, Union
+from mpm_ref.scene import Capsule, Mesh, Sphere, Torus, Transformed, Union
 
 MESHES = Path(__file__).parent / "meshes"
 
@@ -93,7 +93,7 @@ def toy(name, size, center=(0.5, 0.5, 0.5)):
     """
     if has_mesh(name):
         return Mesh(file=str(MESHES / f"{name}.obj"), size=size, center=center)
-    return Moved(shape=STAND_INS[name], scale=size, about=(0.0, 0.0, 0.0), translate=center)
+    return Transformed(shape=STAND_INS[name], scale=size, about=(0.0, 0.0, 0.0), translate=center)
 
 
 def has_mesh(name):

@@ -20,7 +20,7 @@ from mpm_ref.rom.study.evaluate import (
 from mpm_ref.rom.study.full_model import nsf_full_model
 from mpm_ref.rom.study.reduce import BLOCK
 from mpm_ref.rom.study.run import FieldRunOptions, nsf_run
-from mpm_ref.store.words import counted
+from mpm_ref.store.text import counted
 
 FASTER = 1.5            # longer steps at deployment
 

@@ -13,7 +13,7 @@ import numpy as np
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.study.samples import cell_samples, drawn_samples, weighted_samples
 from mpm_ref.scene import Poisson
-from mpm_ref.scene.overrides import varied
+from mpm_ref.scene.overrides import with_values
 
 from ..common.scenes import catalogue_scene
 
@@ -41,7 +41,7 @@ class Study(NamedTuple):
         bodies = {f"body.{body.name}.sampling.count": round(body.sampling.count / self.coarser**3)
                   for body in base.body if isinstance(body.sampling, Poisson)}
         steps = (self.steps or base.steps) // self.coarser // self.spacing * self.spacing
-        return varied(base, {self.key: float(value), **bodies, "dx": base.dx * self.coarser,
+        return with_values(base, {self.key: float(value), **bodies, "dx": base.dx * self.coarser,
                              "dt": base.dt * self.coarser, "steps": steps})
 
     @property

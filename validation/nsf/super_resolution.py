@@ -9,7 +9,7 @@ from mpm_ref.rom.study.dataset import simulate_history
 from mpm_ref.rom.study.errors import Squares
 from mpm_ref.rom.study.evaluate import nearest_states
 from mpm_ref.scene import Poisson
-from mpm_ref.scene.overrides import varied
+from mpm_ref.scene.overrides import with_values
 
 from ..common.registry import experiment
 from ..common.weights_needed import load_available
@@ -66,7 +66,7 @@ def compared(run, g, few, many, xhat):
 
 def finer(scene, factor):
     """A scene with so many times as many points on the same grid."""
-    return varied(scene, {f"body.{body.name}.sampling.count": factor * body.sampling.count
+    return with_values(scene, {f"body.{body.name}.sampling.count": factor * body.sampling.count
                           for body in scene.body if isinstance(body.sampling, Poisson)})
 
 

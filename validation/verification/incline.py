@@ -20,7 +20,17 @@ import numpy as np
 from mpm_ref.body import particles_at
 from mpm_ref.explicit import Scheme
 from mpm_ref.problem import Clock
-from mpm_ref.scene import Body, Box, Collider, HalfSpace, Material, Moved, Regular, Scene, build
+from mpm_ref.scene import (
+    Body,
+    Box,
+    Collider,
+    HalfSpace,
+    Material,
+    Regular,
+    Scene,
+    Transformed,
+    build,
+)
 from mpm_ref.scene import Scheme as SceneScheme
 from mpm_ref.simulate import simulate
 
@@ -110,7 +120,7 @@ def block_scene(slope, E, dx, sudden):
     """
     box = Box(lower=(0.0, 0.0), upper=(LENGTH, HEIGHT))
     block = Body(name="block", density=RHO, sampling=Regular(per_cell=3),
-                 shape=Moved(shape=box, angle=-slope.theta) if slope.tilted else box,
+                 shape=Transformed(shape=box, angle=-slope.theta) if slope.tilted else box,
                  material=Material(law="fixed_corotated", E=E, nu=NU))
     plane = Collider(shape=HalfSpace(point=(0.0, 0.0), normal=tuple(slope.normal)),
                      kind="separate", friction=slope.friction)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...store.weights_file import read, stated, write
+from ...store.weights_file import header, read, write
 from .energetic import Energetic
 from .network import dim_of_inputs
 from .response import CORRECTIONS, STRESSES
@@ -50,7 +50,7 @@ def save(path, laws):
     Raises ValueError for numbers that are not finite, sizes that do not fit and an `about` with
     more than JSON knows, OSError where the system refuses.
     """
-    arrays = stated(path, FORMAT, laws.about)
+    arrays = header(path, FORMAT, laws.about)
     for part in PARTS:
         arrays |= law_arrays(part, getattr(laws, part))
     write(path, arrays, fault_of)

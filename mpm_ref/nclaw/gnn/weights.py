@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...store.weights_file import read, stated, write
+from ...store.weights_file import header, read, write
 from .features import HISTORY, FeatureSettings, MotionScales
 from .network import GraphWeights, PerceptronWeights
 from .simulator import Simulator
@@ -22,7 +22,7 @@ def save(path, simulator):
     Raises ValueError for sizes that do not fit, numbers that are not finite or not positive, and an
     `about` with more than JSON knows; OSError where the system refuses.
     """
-    write(path, arrays_of(simulator) | stated(path, FORMAT, simulator.about), fault_of)
+    write(path, arrays_of(simulator) | header(path, FORMAT, simulator.about), fault_of)
 
 
 def load(path):

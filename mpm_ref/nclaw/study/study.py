@@ -16,7 +16,7 @@ from ...rom.study.study import base_scene
 from ...rom.study.study_file import read_toml, require_keys
 from ...rom.study.tables import one_of
 from ...scene import Scene, SceneError, build
-from ...scene.messages import at, opened_by, rephrase
+from ...scene.messages import errors_at, errors_of, rephrase
 from ...scene.validate import check_finite
 from ..batched_step import make_world
 from ..train.recipe import Recipe
@@ -69,7 +69,7 @@ class LawStudyTables(LawStudyTable, rename={"overrides": "set"}):
 
     def __post_init__(self):
         one_of("method", self.method, METHOD_KINDS)
-        with at("laws"):
+        with errors_at("laws"):
             records_of(self.method, self.laws)
 
     @property
@@ -159,7 +159,7 @@ def load(path, scenes=None):
     """
     path = Path(path)
     data = read_toml(path)
-    with opened_by(str(path)):
+    with errors_of(str(path)):
         tables = parse_tables(data)
         study = LawStudy(path, base_scene(tables, path.parent, scenes or {}), tables)
         require_learnable(study)

@@ -12,7 +12,7 @@ from ...materials.learned.strain_range import strain_bounds
 from ...store.manifest import source_hash, versions
 from ...store.results import BadResults, Results
 from ...store.running import Options, run
-from ...store.writer import Fields, require_run
+from ...store.writer import StoredFields, require_run
 from ...training import import_with_torch
 from ...trajectories import Observed
 
@@ -68,7 +68,7 @@ def make_run(path, problem, watch=None):
     """Run a problem into a results file, from its checkpoint if there is one; returns the steps
     that it has then, fewer than all where it was interrupted. Raises as `store.running.run`.
     """
-    options = Options(fields=Fields(FIELDS), resume=True)
+    options = Options(fields=StoredFields(FIELDS), resume=True)
     return run(problem, path, options, watch).state.step
 
 

@@ -78,13 +78,13 @@ def initial_flow(flow, law):
     """Return the flow of a scene with its constant at START of its value. A fluid without one has
     F = J^(1/d) R here (NCLAW-eq21).
     """
-    if flow.type == "none":
+    if flow.name == "none":
         return FluidProjection() if isinstance(law, Fluid) else NoFlow()
     given = {name: START * getattr(flow, name) for name in IDENTIFIED
              if getattr(flow, name) is not None}
     if flow.s_min is not None:
         given["s_min"] = flow.s_min
-    return make_flow(flow.type, law, 3, **given)
+    return make_flow(flow.name, law, 3, **given)
 
 
 def train_laws(method, recipe, laws, run, checkpoint=None, on_epoch=None):

@@ -24,7 +24,7 @@ from ...scene import build, digest
 from ...store.atomic import NotWritten
 from ...store.results import BadResults, Results
 from ...store.running import FINISHED, Options, Watch, checkpoint_of, run
-from ...store.writer import Fields
+from ...store.writer import StoredFields
 from ...timestep import TooLarge
 
 SKIPPED, INTERRUPTED = "skipped", "interrupted"
@@ -164,7 +164,7 @@ def run_options(study, k):
     facts = {}
     if study.model_entry:
         facts = {"parameters": dict(zip(study.names, study.mu[k].tolist(), strict=True))}
-    return Options(fields=Fields(study.method.stored), resume=True, facts=facts)
+    return Options(fields=StoredFields(study.method.stored), resume=True, facts=facts)
 
 
 def is_finished(path, scene):

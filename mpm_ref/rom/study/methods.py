@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...scene import SceneError, build
-from ...store.writer import Fields
+from ...store.writer import StoredFields
 from .dataset import load_histories, load_snapshots
 from .display import FieldDisplay, map_display, resampled
 from .evaluate import ReferenceRun, history_reference
@@ -47,7 +47,7 @@ class ReductionMethod:
     reference: Callable         # (full, data, k) -> `ReferenceRun`: run k of the data
     point_names: Callable       # full -> names of all points, as the field takes them
     search_points: Callable     # full -> slice of the points that the search for states uses
-    shown_fields: Fields        # of particles, in results files of reduced runs
+    shown_fields: StoredFields        # of particles, in results files of reduced runs
     first_level: int            # the first time level whose error counts
 
 
@@ -135,7 +135,7 @@ LDM_METHOD = ReductionMethod(
     field_of_run=lambda g, full, mu: g, reduced_run=ldm_reduced_run, recording=ldm_recording,
     reference=lambda full, data, k: ReferenceRun(full.X, data.x[k], None),
     point_names=lambda full: full.X, search_points=lambda full: slice(None),
-    shown_fields=Fields(), first_level=0)
+    shown_fields=StoredFields(), first_level=0)
 
 NSF_METHOD = ReductionMethod(
     stored=("x", "C", "tau"), free_fields=("material", "velocity"),
@@ -148,6 +148,6 @@ NSF_METHOD = ReductionMethod(
     reference=lambda full, data, k: history_reference(data, k),
     point_names=lambda full: np.arange(len(full.X)),
     search_points=lambda full: slice(None, None, -(-len(full.X) // ENOUGH)),
-    shown_fields=Fields(("x", "v", "C", "tau")), first_level=1)
+    shown_fields=StoredFields(("x", "v", "C", "tau")), first_level=1)
 
 METHODS = {LDM: LDM_METHOD, NSF: NSF_METHOD}

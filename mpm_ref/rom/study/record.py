@@ -16,9 +16,9 @@ from ...energy import energy
 from ...monitor import Unstable, check
 from ...simulate import Frame, State
 from ...store import checkpoint
-from ...store.manifest import Part, manifest
+from ...store.manifest import RunPart, manifest
 from ...store.running import FINISHED, INTERRUPTED, checkpoint_of
-from ...store.writer import Fields, create, reopen
+from ...store.writer import StoredFields, create, reopen
 from ..step import BREAKDOWNS
 from .monitor import NoBodyLeft, StateCheck, checked_states, stored_check
 from .run import ReducedRun
@@ -61,7 +61,7 @@ class Recording:
     options: object         # [run] of the study
     facts: dict             # plain values that describe the run
     series: RunSeries
-    fields: Fields          # of particles, stored in each frame
+    fields: StoredFields          # of particles, stored in each frame
     warnings: tuple = ()    # before the run
 
     @property
@@ -120,7 +120,7 @@ def particle_bytes(study, mu, count=None):
     """
     full = supported_model(study, mu)
     steps = round(full.problem.clock.steps / getattr(study.tables.run, "dt_factor", 1.0))
-    fields = study.method.shown_fields.of(full.problem.bodies[0])
+    fields = study.method.shown_fields.select(full.problem.bodies[0])
     point = sum(a[0].nbytes for a in fields.values())
     return (steps + 1) * (count or len(full.X)) * point
 
@@ -213,7 +213,7 @@ def _show(writer, state, problem):
     writer.append(Frame(state.step, state.t, dt, state), now)
 
 
-class _Part(Part):
+class _Part(RunPart):
     """A part of a run, and its last state."""
 
     state = None

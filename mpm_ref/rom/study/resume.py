@@ -8,7 +8,7 @@ from typing import NamedTuple
 from ...store.manifest import code, scene_hash
 from ...store.results import Results
 from ...store.running import INTERRUPTED, Refused
-from ...store.words import counted
+from ...store.text import counted
 from ..latent import Latent
 from ..step import StepReport
 from .record import UNENDED, marked_problem

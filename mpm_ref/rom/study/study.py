@@ -15,8 +15,8 @@ import numpy as np
 
 from ... import scene
 from ...scene import SceneError
-from ...scene.messages import at, opened_by
-from ...scene.overrides import flat, varied
+from ...scene.messages import errors_at, errors_of
+from ...scene.overrides import flat, with_values
 from .methods import METHODS, every_step
 from .study_file import parse_tables, read_toml
 from .tables import CURVED, LATIN, LDM, MODES, NETWORK, NSF, SIZES, CommonTables
@@ -57,7 +57,7 @@ class ReducedStudy(NamedTuple):
 
     def scene(self, mu):
         """Return the scene of a run with parameters mu (parameters,)."""
-        return varied(self.base, {one.key: one.scale * float(value) for one, value in
+        return with_values(self.base, {one.key: one.scale * float(value) for one, value in
                                   zip(self.tables.parameter, mu, strict=True)})
 
     def parse_parameters(self, texts):
@@ -114,7 +114,7 @@ def load(path, scenes=None):
     """
     path = Path(path)
     data = read_toml(path)
-    with opened_by(str(path)):
+    with errors_of(str(path)):
         tables = parse_tables(data)
         mu = parameters(tables)
         base = base_scene(tables, path.parent, scenes or {}, METHODS[tables.model].frame_spacing)
@@ -142,7 +142,7 @@ def parameters(tables):
     if tables.sampling != LATIN:
         axes = []
         for k, one in enumerate(tables.parameter):
-            with at(f"parameter[{k}]"):
+            with errors_at(f"parameter[{k}]"):
                 axes.append(one.grid())
         return np.array(list(product(*axes)))
     for k, one in enumerate(tables.parameter):
@@ -186,9 +186,10 @@ def base_scene(tables, folder, scenes, frame_spacing=every_step):
         raise SceneError(f"scene = {tables.scene!r}: there is no such file, nor a shipped scene of "
                          f"that name; shipped scenes: {', '.join(scenes) or 'none'}")
     base = scene.load(path)
-    with opened_by("set"):
+    with errors_of("set"):
         changes = flat(tables.overrides)
-        base = varied(base, changes | {"every": frame_spacing(base, changes), "interval": None})
+        every = {"every": frame_spacing(base, changes), "interval": None}
+        base = with_values(base, changes | every)
     if base.dt is None or base.steps is None:
         raise SceneError(f"scene = {tables.scene!r}: expected one with `dt` and `steps`, so that "
                          "all runs have the same time levels")
@@ -199,7 +200,7 @@ def _require_one_body(study):
     """Raise SceneError where parameters lead nowhere, or change the particles, grid or steps."""
     first = None
     for mu in study.mu:
-        with opened_by("parameter"):
+        with errors_of("parameter"):
             fields = _fixed_fields(study.scene(mu), study.method.free_fields)
         first = first or fields
         for name, value in fields.items():

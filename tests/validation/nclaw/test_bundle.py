@@ -7,7 +7,7 @@ from small_toys import known
 
 from mpm_ref.materials.learned import response, weights
 from mpm_ref.scene import build
-from mpm_ref.store.weights_file import sealed
+from mpm_ref.store.weights_file import pack
 from validation.common.weights_needed import Untrained
 from validation.nclaw import bundle, small_trainings, trained_laws
 from validation.nclaw.bundle import Bundle
@@ -131,10 +131,10 @@ def test_files_of_something_else_are_told(tmp_path):
     path = tmp_path / "a.npz"
     with pytest.raises(ValueError, match="cannot be read"):
         bundle.load(path)
-    path.write_bytes(sealed({"format": np.array(9), "about": np.array("{}")}))
+    path.write_bytes(pack({"format": np.array(9), "about": np.array("{}")}))
     with pytest.raises(ValueError, match="has format 9, this program reads 1"):
         bundle.load(path)
-    path.write_bytes(sealed({"format": np.array(1), "about": np.array('{"laws": {"3": {}}}')}))
+    path.write_bytes(pack({"format": np.array(1), "about": np.array('{"laws": {"3": {}}}')}))
     with pytest.raises(ValueError, match="no trained laws of epoch 3: elastic law of kind None"):
         bundle.load(path)
 

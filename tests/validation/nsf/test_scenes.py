@@ -5,7 +5,7 @@ import pytest
 
 from mpm_ref.preflight import misplaced
 from mpm_ref.scene import build, digest
-from mpm_ref.scene.overrides import varied
+from mpm_ref.scene.overrides import with_values
 from validation.common.scenes import SCENES, catalogue_scene, with_
 
 VARIED = {      # scene: the key that sets the parameter of its experiment, and the parameter's ends
@@ -49,6 +49,6 @@ def test_one_key_sets_what_differs(name):
     """The key that the file names; bodies stand well at both ends of the range."""
     path, ends = VARIED[name]
     assert f"`{path}` alone sets" in (SCENES / f"nsf_{name}.toml").read_text()
-    low, high = (varied(catalogue_scene(f"nsf_{name}"), {path: value}) for value in ends)
+    low, high = (with_values(catalogue_scene(f"nsf_{name}"), {path: value}) for value in ends)
     assert digest(low) != digest(high)
     assert [misplaced(build(end)) for end in (low, high)] == [[], []]
