@@ -251,7 +251,7 @@ def test_every_byte_of_a_file_is_of_one_class(readers, kind, name):
     assert ranges[-1][1] == path.stat().st_size
     assert all(a[1] == b[0] for a, b in pairwise(ranges))
     begin, end = files.classes(path)[f"{name}.npy, numbers"]
-    stored = files.opened(path)[name].ravel()
+    stored = files.load_arrays(path)[name].ravel()
     numbers = np.frombuffer(path.read_bytes()[begin:end], dtype=stored.dtype)
     assert np.array_equal(np.sort(numbers), np.sort(stored))
 
@@ -278,7 +278,7 @@ def test_a_refusal_is_one_sentence_with_name_and_advice(tmp_path, error, clear):
 
 def test_unfit_files_are_those_that_the_loader_must_find(reader, tmp_path):
     (path, read), copy = reader, tmp_path / "copy.npz"
-    made = list(files.unfit(files.opened(path)))
+    made = list(files.unfit(files.load_arrays(path)))
     assert {"not finite", "wrong sizes"} <= {kind for kind, *_ in made}
     for _, what, content in made:
         copy.write_bytes(content)
