@@ -5,12 +5,13 @@ from typing import Annotated
 
 import typer
 
-from .cases import cases
-from .compare import compare, of_machines
+from . import adjoints, implicit, laws, ldm, nsf, oracle, scenes, training
+from .compare import compare, machine_differences
 from .machine import machine
-from .recording import entries_of, read, selected, write
+from .recording import read, run_cases, selected, write
 
 MOST = 6            # labels shown of a case that differs
+MODULES = (scenes, implicit, ldm, nsf, laws, adjoints, training, oracle)    # in the order of runs
 
 app = typer.Typer(help="Record the results of runs of every kind, to the bit, and compare them.",
                   no_args_is_help=True)
@@ -22,7 +23,7 @@ Only = Annotated[str | None, typer.Option(help='pattern of names of cases, such 
 @app.command()
 def record(file: File, only: Only = None):
     """Run all cases and write their fingerprints. Exits with 1 where threads change bits."""
-    entries = entries_of(selected(cases(), only), show)
+    entries = run_cases(selected(cases(), only), show)
     write(file, entries)
     typer.echo(f"wrote {file}: {summary(entries)}")
     raise typer.Exit(int(any(entry["threads_differ"] for entry in entries.values())))
@@ -32,13 +33,13 @@ def record(file: File, only: Only = None):
 def check(file: File, only: Only = None):
     """Run all cases and compare them with a record. Exits with 1 where anything differs."""
     reference = read(file)
-    for sentence in of_machines(reference["machine"], machine()):
+    for sentence in machine_differences(reference["machine"], machine()):
         typer.echo(f"another machine: {sentence}", err=True)
     chosen = selected(cases(), only)
     names = {case.name for case in chosen}
     recorded = {name: entry for name, entry in reference["cases"].items()
                 if only is None or name in names}
-    entries = entries_of(chosen, show)
+    entries = run_cases(chosen, show)
     differences = compare(recorded, entries)
     for name, labels in differences.items():
         more = f" and {len(labels) - MOST} more" if len(labels) > MOST else ""
@@ -55,6 +56,11 @@ def list_cases(only: Only = None):
         typer.echo(case.name)
 
 
+def cases():
+    """Return all `RunCase`s, in the order in which they run."""
+    return [case for module in MODULES for case in module.cases()]
+
+
 def show(name, entry):
     """Print the CPU seconds of a case, and its exception or dependence on threads."""
     seconds = " ".join(f"{s:7.2f}" for s in entry["seconds"])
@@ -66,7 +72,7 @@ def show(name, entry):
 
 
 def summary(entries):
-    """Return how many cases there are, how many raise, and their CPU seconds, in words."""
+    """Return the numbers of cases and of exceptions, and the CPU seconds, as text."""
     raising = sum(entry["raises"] is not None for entry in entries.values())
     seconds = sum(sum(entry["seconds"]) for entry in entries.values())
     return f"{len(entries)} cases, {raising} raise, {seconds:.0f} CPU seconds"

@@ -7,8 +7,7 @@ from pathlib import Path
 from time import process_time
 from typing import NamedTuple
 
-from .compare import of_entries
-from .digest import fingerprint
+from .compare import entry_differences, fingerprint
 from .library import threads
 from .machine import machine
 
@@ -28,7 +27,7 @@ def selected(cases, pattern=None):
     return [case for case in cases if pattern is None or fnmatch(case.name, pattern)]
 
 
-def entries_of(cases, show=lambda name, entry: None):
+def run_cases(cases, show=lambda name, entry: None):
     """Return {name: entry} of cases, and call show(name, entry) after each.
 
     An entry has `values` (the fingerprint under the first number of threads), `raises` (the
@@ -41,7 +40,7 @@ def entries_of(cases, show=lambda name, entry: None):
         first = attempts[0]
         entry = {"values": first["values"], "raises": first["raises"],
                  "threads_differ": [label for other in attempts[1:]
-                                    for label in of_entries(first, other)],
+                                    for label in entry_differences(first, other)],
                  "seconds": [round(one["seconds"], 2) for one in attempts]}
         entries[case.name] = entry
         show(case.name, entry)

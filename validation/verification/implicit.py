@@ -17,6 +17,7 @@ from mpm_ref.hot.step import ImplicitStepper
 from mpm_ref.materials import make_law
 
 from ..common.registry import experiment
+from ..common.scenes import threads_for
 from .convergence import order, rms
 from .lattice import body, lattice
 
@@ -50,11 +51,12 @@ def energy_history(stepper, steps):
     moving, missed = square(), []
     stepper.start([moving])
     energies = [energy([moving], FREE, D).sum]
-    for k in range(steps):
-        stepper.step([moving], k * END / steps, END / steps)
-        energies.append(energy([moving], FREE, D).sum)
-        if stepper.implicit and not stepper.report.converged:
-            missed.append(stepper.report.message)
+    with threads_for([moving]):
+        for k in range(steps):
+            stepper.step([moving], k * END / steps, END / steps)
+            energies.append(energy([moving], FREE, D).sum)
+            if stepper.implicit and not stepper.report.converged:
+                missed.append(stepper.report.message)
     return EnergyHistory(moving.particles.x, np.array(energies), missed)
 
 

@@ -8,9 +8,13 @@ import pytest
 from typer.testing import CliRunner
 
 from validation.fingerprint import command
-from validation.fingerprint.compare import compare, differing, of_machines
-from validation.fingerprint.digest import fingerprint
-from validation.fingerprint.recording import RunCase, entries_of, read, selected, write
+from validation.fingerprint.compare import (
+    compare,
+    differing,
+    fingerprint,
+    machine_differences,
+)
+from validation.fingerprint.recording import RunCase, read, run_cases, selected, write
 
 
 class Pair(NamedTuple):
@@ -54,7 +58,7 @@ def test_names_of_fields_do_not_count():
     assert [*fingerprint({"x": Pair(a, 0.1)})] == ["x.0", "x.1"]
 
 
-def test_bits_of_numbers_are_kept():
+def test_bits_of_numbers_are_the_text():
     assert fingerprint({"E": 0.1, "n": 3, "ok": True, "r": (0.5, 2)}) == {
         "E": (0.1).hex(), "n": "3", "ok": "1", "r": [(0.5).hex(), "2"]}
 
@@ -69,39 +73,39 @@ def entry(values, raises=None):
     return {"values": values, "raises": raises}
 
 
-def test_compare_names_what_differs():
+def test_compare_names_the_differences():
     recorded = {"a": entry({"x": "1", "v": "2"}), "b": entry({"x": "1"}), "c": entry({})}
     entries = {"a": entry({"x": "1", "v": "3"}), "b": entry({"x": "1"}), "d": entry({})}
     assert compare(recorded, entries) == {"a": ["v"], "c": ["the case is missing"],
                                         "d": ["the case was not recorded"]}
 
 
-def test_exceptions_agree_whatever_they_say():
+def test_exceptions_agree_whatever_their_text():
     one, other = entry({}, "ValueError: a"), entry({}, "KeyError: b")
     assert compare({"a": one}, {"a": other}) == {}
     assert "ValueError: a" in compare({"a": one}, {"a": entry({"x": "1"})})["a"][0]
 
 
 def test_machines_differ_by_fact():
-    assert of_machines({"numpy": "1"}, {"numpy": "2"}) == ["numpy: recorded with 1, here 2"]
+    assert machine_differences({"numpy": "1"}, {"numpy": "2"}) == ["numpy: recorded with 1, here 2"]
 
 
 def test_a_case_that_raises_is_an_entry():
-    entries = entries_of([RunCase("one", raising), case(np.ones(2))._replace(name="two")])
+    entries = run_cases([RunCase("one", raising), case(np.ones(2))._replace(name="two")])
     assert entries["one"]["raises"] == "ValueError: broken"
     assert entries["two"]["raises"] is None
     assert entries["two"]["threads_differ"] == []
 
 
-def test_what_threads_change_is_named():
+def test_labels_that_threads_change_are_named():
     counter = iter((0.1, 0.2))
-    entries = entries_of([RunCase("one", lambda: {"x": next(counter), "y": 1.0})])
+    entries = run_cases([RunCase("one", lambda: {"x": next(counter), "y": 1.0})])
     assert entries["one"]["threads_differ"] == ["x"]
 
 
 def test_a_record_is_read_back_and_others_are_refused(tmp_path):
     file = tmp_path / "record.json"
-    entries = entries_of([case(1.5)])
+    entries = run_cases([case(1.5)])
     write(file, entries)
     assert read(file)["cases"] == entries
     assert read(file)["machine"]["numpy"] == np.__version__
