@@ -8,7 +8,7 @@ of those without faults (grey, by seed); runs that broke down are left out.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from validation.nclaw.observation import Seen
+from validation.nclaw.observation import Observation
 from validation.nclaw.small_trainings import Small
 
 from ..common.style import scales
@@ -58,7 +58,7 @@ def epochs(ax, table, name):
 
 def observation_errors(ax, table):
     """Draw a row for each kind of fault."""
-    labels = [", ".join(filter(None, (differences(table, k, FAULTS, Seen()),
+    labels = [", ".join(filter(None, (differences(table, k, FAULTS, Observation()),
                                       differences(table, k, DENSITY, Small()))))
               for k in range(len(table["own"]))]
     error_rows(ax, table, labels)

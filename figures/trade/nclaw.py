@@ -12,7 +12,7 @@ from itertools import cycle
 import matplotlib.pyplot as plt
 import numpy as np
 
-from validation.nclaw.observation import Seen
+from validation.nclaw.observation import Observation
 from validation.nclaw.small_trainings import Small
 
 from ..common.style import OTHERS, scales, series
@@ -80,7 +80,7 @@ def size_label(difference):
 
 def observations(ax, table):
     """Draw a row for each training on reduced observations."""
-    labels = [differences(table, k, OBSERVATIONS, Seen()) for k in range(len(table["own"]))]
+    labels = [differences(table, k, OBSERVATIONS, Observation()) for k in range(len(table["own"]))]
     error_rows(ax, table, labels)
 
 

@@ -12,7 +12,7 @@ from mpm_ref.materials import Fluid, NoFlow
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.ldm.published_bodies import keep
-from validation.nclaw import other_bodies, slope
+from validation.nclaw import other_bodies
 from validation.nclaw.environments import ENVIRONMENTS, environment
 from validation.nclaw.evaluate import body_with_laws
 from validation.nclaw.tasks import reconstruction
@@ -34,7 +34,7 @@ def titles(figure):
 
 def test_the_slope_is_one_for_all_materials():
     for name in ENVIRONMENTS:
-        scene = slope.slope_of(name)
+        scene = other_bodies.slope_of(name)
         assert scene.body[0].material == environment(name).body[0].material
         assert scene.body[0].density == 5000.0
         assert scene.gravity == (0.0, -1.0, 0.866)
@@ -42,14 +42,14 @@ def test_the_slope_is_one_for_all_materials():
 
 def test_the_slope_is_run_with_true_laws_ours_and_admissible_ones(tmp_path, monkeypatch):
     """At quick water alone, in few points for a short time."""
-    monkeypatch.setattr(slope, "slope", lambda: reconstruction("water"))
-    monkeypatch.setattr(slope, "FEW", 60)
-    monkeypatch.setattr(slope, "SHORT", 20)
+    monkeypatch.setattr(other_bodies, "slope", lambda: reconstruction("water"))
+    monkeypatch.setattr(other_bodies, "FEW", 60)
+    monkeypatch.setattr(other_bodies, "SHORT", 20)
     monkeypatch.setattr(other_bodies, "trained", lambda name: name)
     monkeypatch.setattr(other_bodies, "body_maker", lambda name: other_bodies.copy_body
                         if name == "water-admissible"
                         else lambda body: body_with_laws(body, Fluid(0.0), NoFlow()))
-    assert run_all([slope.inclined.experiment], RunSetting("quick", tmp_path)) == []
+    assert run_all([other_bodies.inclined.experiment], RunSetting("quick", tmp_path)) == []
     results = ProfileResults(tmp_path)
     found = {r.target: r for r in results.records("nclaw.slope")}
     assert not [target for target in found if "jelly" in target]

@@ -13,7 +13,7 @@ from figures.trade import nclaw as trade_nclaw
 from figures.trade import nclaw_inference
 from mpm_ref.nclaw.strain_watch import MAX_EXCESS
 from validation.extremes.nclaw_runs import BAD
-from validation.nclaw.observation import Seen
+from validation.nclaw.observation import Observation
 from validation.nclaw.small_trainings import BASE, SEEDS, small_nets
 
 mpl.use("Agg")
@@ -32,7 +32,7 @@ def trainings(names, sizes, **changes):
 def sights(names, keys):
     """The same, of what is seen."""
     return trainings(names, (), **{
-        key: [getattr(small_nets()[name].seen, key) for name in names] for key in keys})
+        key: [getattr(small_nets()[name].observation, key) for name in names] for key in keys})
 
 
 def axes_of(script, **tables):
@@ -92,9 +92,9 @@ def test_what_is_seen_is_in_words_beside_a_band_of_seeds(trade):
 
 def test_all_is_seen_by_default():
     columns = {"every": [1.0], "share": [1.0], "noise": [0.0], "positions": ["False"]}
-    assert differences(columns, 0, trade_nclaw.OBSERVATIONS, Seen()) == ""
+    assert differences(columns, 0, trade_nclaw.OBSERVATIONS, Observation()) == ""
     columns["positions"] = ["True"]
-    assert differences(columns, 0, trade_nclaw.OBSERVATIONS, Seen()) == "positions only"
+    assert differences(columns, 0, trade_nclaw.OBSERVATIONS, Observation()) == "positions only"
 
 
 def test_widths_are_in_order(trade):

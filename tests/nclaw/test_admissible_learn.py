@@ -27,7 +27,7 @@ from mpm_ref.nclaw.train.rollout import segment_errors  # noqa: E402
 from mpm_ref.nclaw.train.train import drawn_laws  # noqa: E402
 from mpm_ref.trajectories import observed  # noqa: E402
 from validation.nclaw.trained_laws import nets  # noqa: E402
-from validation.training.nclaw import begun  # noqa: E402
+from validation.training.nclaw import untrained_laws  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
@@ -108,7 +108,7 @@ def test_stored_laws_answer_as_the_trained_ones(laws, tmp_path, rng):
 
 def test_training_begins_near_its_unit_and_with_little_flow(rng):
     net = nets()["plasticine-admissible"]
-    laws = begun(net)
+    laws = untrained_laws(net)
     law = learned_law(laws.elastic.weights())
     assert (net.elastic, net.plastic) == ("Energetic", "Contraction")
     assert 0.1 < law.mu / Energetic().unit < 10.0

@@ -27,8 +27,8 @@ from mpm_ref.nclaw.train.neural_laws import describe  # noqa: E402
 from mpm_ref.nclaw.train.principal_laws import ReleasedStretchLawModule, StretchLawModule  # noqa: E402
 from mpm_ref.nclaw.train.train import METHODS, drawn_laws  # noqa: E402
 from validation.nclaw.environments import ENVIRONMENTS  # noqa: E402
-from validation.nclaw.trained_laws import Net, identity, nets  # noqa: E402
-from validation.training.nclaw import begun  # noqa: E402
+from validation.nclaw.trained_laws import LawNet, identity, nets  # noqa: E402
+from validation.training.nclaw import untrained_laws  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
@@ -190,11 +190,11 @@ def test_no_two_nets_are_told_alike():
     assert len(set(told)) == len(told)
 
 
-@pytest.mark.parametrize("name", [name for name, net in nets().items() if isinstance(net, Net)])
+@pytest.mark.parametrize("name", [name for name, net in nets().items() if isinstance(net, LawNet)])
 def test_every_net_begins_and_is_stored(name, tmp_path):
     """With the method and the kinds that it names."""
     net = nets()[name]
-    stored = weights.LearnedLaws(*(law.weights() for law in begun(net)), identity(net))
+    stored = weights.LearnedLaws(*(law.weights() for law in untrained_laws(net)), identity(net))
     weights.save(tmp_path / "laws.npz", stored)
     back = weights.load(tmp_path / "laws.npz")
     kinds = [type(law.kind).__name__ for law in (back.elastic, back.plastic)]

@@ -16,7 +16,7 @@ from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.common.weights_needed import Untrained
 from validation.nclaw import dissipation, trained_laws
-from validation.nclaw.dissipation import CREATED, Pair
+from validation.nclaw.dissipation import CREATED, MaterialLaws
 from validation.nclaw.environments import ENVIRONMENTS
 
 JELLY, CLAY = FixedCorotated(4e4, 3e4), Hencky(1.2e5, 1.2e5)
@@ -100,7 +100,7 @@ def test_a_return_that_adds_strain_is_told(closed):
 # The experiment.
 
 def results(tmp_path, monkeypatch, laws):
-    monkeypatch.setattr(dissipation, "known", lambda run: laws)
+    monkeypatch.setattr(dissipation, "tested_laws", lambda run: laws)
     monkeypatch.setattr(dissipation, "SIZES", (0.1,))
     failed = run_all([dissipation.dissipation.experiment],
                      RunSetting("quick", tmp_path))
@@ -112,8 +112,9 @@ def results(tmp_path, monkeypatch, laws):
 def test_the_experiment_tells_laws_apart(tmp_path, monkeypatch):
     stress = network.build_law(neural_toys.trained(response.Stress(1e4), 3))
     records, found = results(tmp_path, monkeypatch, {
-        ("true", "jelly"): Pair(JELLY, NoFlow()), ("ours", "jelly"): Pair(stress, NoFlow()),
-        ("admissible", "plasticine"): Pair(*toys.deployed(shift=2.0))})
+        ("true", "jelly"): MaterialLaws(JELLY, NoFlow()),
+        ("ours", "jelly"): MaterialLaws(stress, NoFlow()),
+        ("admissible", "plasticine"): MaterialLaws(*toys.deployed(shift=2.0))})
     name = "nclaw.dissipation.{}.cycles.0.1.creating".format
     assert records[name("true.jelly")].value == 0.0
     assert records[name("true.jelly")].verdict == "pass"
@@ -129,7 +130,7 @@ def test_the_experiment_tells_laws_apart(tmp_path, monkeypatch):
 def test_laws_that_must_not_create_energy_miss_if_they_do(tmp_path, monkeypatch):
     stress = network.build_law(neural_toys.trained(response.Stress(1e4), 3))
     records, _ = results(tmp_path, monkeypatch, {
-        ("admissible", "jelly"): Pair(stress, NoFlow())})
+        ("admissible", "jelly"): MaterialLaws(stress, NoFlow())})
     assert records["nclaw.dissipation.admissible.jelly.cycles.0.1.creating"].verdict == "miss"
 
 
@@ -142,7 +143,7 @@ def test_known_laws_are_true_and_trained_ones(monkeypatch):
     run, said = SimpleNamespace(experiment=dissipation.dissipation.experiment), []
     run.record = lambda target, value, **more: said.append((target, value, more["note"]))
     monkeypatch.setattr(dissipation, "trained", trained)
-    laws = dissipation.known(run)
+    laws = dissipation.tested_laws(run)
     assert laws.keys() == {(method, name) for method in ("true", "ours", "admissible")
                            for name in ENVIRONMENTS} - {("admissible", "sand")}
     assert said == [("nclaw.dissipation.untrained", 1, "no weights sand-admissible.npz: train")]

@@ -40,7 +40,7 @@ from mpm_ref.nclaw.train.recipe import Recipe  # noqa: E402
 from mpm_ref.nclaw.train.rollout import LawPair, step  # noqa: E402
 from mpm_ref.nclaw.train.train import drawn_laws  # noqa: E402
 from validation.nclaw.trained_laws import nets  # noqa: E402
-from validation.training.nclaw import begun  # noqa: E402
+from validation.training.nclaw import untrained_laws  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
@@ -130,8 +130,8 @@ def test_gradient_by_constants_is_exact(k, rng):
 
 def test_constants_begin_as_in_the_release():
     """log E at 0.8 of its value, yield stress and friction angle too."""
-    jelly, sand, plastic = (begun(nets()[f"{name}-sys-id"]) for name in ("jelly", "sand",
-                                                                         "plasticine"))
+    jelly, sand, plastic = (untrained_laws(nets()[f"{name}-sys-id"]) for name in ("jelly", "sand",
+                                                                                  "plasticine"))
     assert jelly.elastic.weights().kind == pytest.approx(make_law("fixed_corotated", E=1e4,
                                                                     nu=0.2))
     assert sand.elastic.log_E.item() == pytest.approx(0.8 * log(1e6))

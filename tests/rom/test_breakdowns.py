@@ -23,9 +23,9 @@ from mpm_ref.rom.study.monitor import checked_states, map_monitor
 from mpm_ref.rom.study.run import RunOptions, ldm_run
 from validation.common.scenes import with_
 from validation.extremes import ldm_runs
-from validation.ldm import reduced_runs
+from validation.ldm import references
 from validation.ldm.studies import GRAVITY
-from validation.ldm.timing import Online
+from validation.ldm.timing import SteppedReducedRun
 
 FAULTS = [NoBody("no body"), OutOfRange("nowhere"), np.linalg.LinAlgError("singular")]
 X = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
@@ -63,13 +63,13 @@ def of_path(one, monkeypatch, fault):
 
 
 def of_compared(one, monkeypatch, fault):
-    monkeypatch.setattr(reduced_runs, "ldm_run",
+    monkeypatch.setattr(references, "ldm_run",
                         lambda *_: SimpleNamespace(states=lambda: broken(fault)))
-    return reduced_runs.compared([one], [one.X[None]], None, None, None).origin == np.inf
+    return references.run_errors([one], [one.X[None]], None, None, None).origin == np.inf
 
 
 def of_race(one, monkeypatch, fault):
-    run = object.__new__(Online)
+    run = object.__new__(SteppedReducedRun)
     run.ended, run.states = False, broken(fault)
     run.step(X)
     return run.ended

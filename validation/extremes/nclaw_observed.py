@@ -1,7 +1,7 @@
 """Laws learned from a run with faults: a time without frames, outliers, a wrong density."""
 
 from ..common.registry import experiment
-from ..nclaw.small_runs import Measured, measured, spread
+from ..nclaw.small_runs import COLUMNS, measured, seed_range
 from ..nclaw.small_trainings import BASE, OF_FAULTS, SEEDS, small_nets
 
 FAULTS = ("gap", "outliers")
@@ -15,11 +15,11 @@ def observed(run):
     """
     names = run.choose(quick=[BASE], standard=[*SEEDS, *OF_FAULTS])
     found = measured(run, names, full=False)
-    least, most = spread(found, SEEDS)
+    least, most = seed_range(found, SEEDS)
     for row in found:
-        run.record(f"extremes.nclaw.observed.{row.name}", row.own, unit="m^2", comparator="info",
-                   scale="216 particles, 100 epochs", note="without faults "
+        run.record(f"extremes.nclaw.observed.{row.name}", row.training_run, unit="m^2",
+                   comparator="info", scale="216 particles, 100 epochs", note="without faults "
                    f"{least:.3g} to {most:.3g} m^2 by seed; thrown otherwise {row.thrown:.3g} m^2")
-    run.table("trainings", (*Measured._fields, *FAULTS, "density"), [
-        (*row, *(getattr(small_nets()[row.name].seen, key) for key in FAULTS),
+    run.table("trainings", (*COLUMNS, *FAULTS, "density"), [
+        (*row, *(getattr(small_nets()[row.name].observation, key) for key in FAULTS),
          small_nets()[row.name].density) for row in found])

@@ -21,7 +21,7 @@ from mpm_ref.scene import build
 from ..common.scenes import threads_for
 from ..common.weights_needed import load_available
 from ..nclaw.environments import ENVIRONMENTS, environment
-from ..nclaw.strain_bounds import met_by
+from ..nclaw.strain_bounds import visited_bounds
 from ..nclaw.trained_laws import trained
 
 BAD = 3.0           # times the mean squared error that is usual for the law
@@ -94,7 +94,7 @@ class Trial(NamedTuple):
 def law(name):
     """`Law` of the weights of an environment. Raises `Untrained`."""
     laws = trained(name)
-    return Law(name, name, body_maker(laws), met_by(name), environment(name).dt)
+    return Law(name, name, body_maker(laws), visited_bounds(name), environment(name).dt)
 
 
 def laws(run):

@@ -13,7 +13,7 @@ from mpm_ref.rom.model_file import Model
 from mpm_ref.store.weights_file import load_arrays
 
 from ..common.registry import experiment
-from ..nsf.reduced_runs import refitted
+from ..nsf.reduced_runs import refit
 from .ldm_files import damages, flipped, refusal, unfit
 from .ldm_runs import FINE, SILENT, record_silent, table_of
 from .nsf_runs import ERRORS, Bench, scenes
@@ -64,7 +64,7 @@ def damage(run):
             one.fields, path, run.rng.random(), kind))
             for path, kind in run.progress(cases, f"{name}, damages")]
         if name == FILED:
-            record_files(run, name, refitted(one, Sizes(one.fields.r, *SMALL), follows=True))
+            record_files(run, name, refit(one, Sizes(one.fields.r, *SMALL), follows=True))
     record_ends(run, found)
     record_silent(run, "extremes.nsf.damage", found, ERRORS)
     table_of(run, found)

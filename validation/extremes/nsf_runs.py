@@ -20,7 +20,7 @@ from mpm_ref.rom.study.run import FieldRunOptions, nsf_run
 from mpm_ref.rom.study.samples import drawn_samples
 from mpm_ref.timestep import TooLarge
 
-from ..nsf.reduced_runs import tested
+from ..nsf.reduced_runs import fit_study
 from ..nsf.studies import jelly, metal
 from .ldm_runs import End as LdmEnd
 from .ldm_runs import Trial
@@ -41,9 +41,9 @@ def studies(run):
 
 
 def scenes(run):
-    """Yield (name, `Tested`) of each of the `studies`, made when it is its turn."""
+    """Yield (name, `FittedStudy`) of each of the `studies`, made when it is its turn."""
     for name, study in run.progress(studies(run).items(), "scenes"):
-        yield name, tested(study)
+        yield name, fit_study(study)
 
 
 class End(NamedTuple):
@@ -88,13 +88,13 @@ class Bench:
         states, sights, off, said = [], [], [], ""
         with np.errstate(all="ignore"):
             try:
-                for state in self.inferred(scene, one.of(value), chosen):
+                for state in self.inferred(scene, one.fields_of_run(value), chosen):
                     states.append((level_of(state.t / test.dt), state.latent.xhat))
                     sights.append(self.monitor.check(state))
                     off.append(state.report.residual / scene.problem.dx if state.report else 0.0)
             except BREAKDOWNS as stop:
                 said = " ".join(str(stop).split())
-            found = path_errors(one.of(value), history_reference(test), states)
+            found = path_errors(one.fields_of_run(value), history_reference(test), states)
         errors = np.array([found.errors.displacement, found.errors.origin,
                            stress_share(found.stress)])
         whole_run = len(states) == scene.problem.clock.steps + 1

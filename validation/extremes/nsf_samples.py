@@ -10,7 +10,7 @@ from mpm_ref.rom.study.monitor import SPARSE
 from mpm_ref.rom.study.samples import SampleSet
 
 from ..common.registry import experiment
-from ..nsf.reduced_runs import tested
+from ..nsf.reduced_runs import fit_study
 from ..nsf.studies import ball, bread, cake, sand
 from .ldm_runs import FLAGGED, SILENT, STOPPED, record_silent, table_of
 from .nsf_beyond import is_bad
@@ -46,7 +46,7 @@ def unseen(run):
     """
     found = []
     for name, study in run.progress(others(run).items(), "scenes"):
-        bench = Bench(name, tested(study))
+        bench = Bench(name, fit_study(study))
         sets = [(what, chosen) for what, chosen in few(bench, run.profile)
                 if suffices(bench, chosen)]
         found += [judged(bench, *own) for own in run.progress(sets, f"{name}, sets")]

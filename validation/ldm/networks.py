@@ -1,4 +1,4 @@
-"""The trained maps of LDM's experiments: which there are, and where they stand.
+"""The trained maps of LDM's experiments: their settings, and their stored weights.
 
 Where the paper says nothing, what worked in a study of this kind is taken (LDM-X7, LDM-appB): the
 loss's weights in the units of the public training code, half a cosine for the learning rate, some
@@ -14,6 +14,7 @@ from typing import NamedTuple
 from mpm_ref.rom.model_file import load
 from mpm_ref.scene.toml import canonical
 
+from ..common.weights_needed import load_weights
 from .studies import GRAVITY, POKES, TORSION, TOWER
 from .workshop_studies import PUSHES, SHEAR3, SHEAR17
 
@@ -26,8 +27,8 @@ SEEDS = 3                   # of trainings for torsion
 REPEATED = (7,)             # latent dimensions at which the loss's terms are left out
 
 
-class Net(NamedTuple):
-    """What is trained: a study's runs, and how."""
+class MapNet(NamedTuple):
+    """Settings of the training of a deformation map on a study's runs."""
 
     study: object
     r: int
@@ -43,46 +44,44 @@ class Net(NamedTuple):
 
 
 def nets():
-    """{name: `Net`} of all experiments."""
-    found = {f"gravity-r{r}": Net(GRAVITY, r) for r in range(1, 8)}
+    """{name: `MapNet`} of all experiments."""
+    trainings = {f"gravity-r{r}": MapNet(GRAVITY, r) for r in range(1, 8)}
     for r in REPEATED:
-        found |= {f"gravity-r{r}-{terms}": Net(GRAVITY, r, terms) for terms in TERMS
-                  if terms != BOTH}
-    found["gravity-r7-printed"] = Net(GRAVITY, 7, reading="printed")
-    found |= {f"torsion-{seed}": Net(TORSION, 7, seed=seed, epochs=850) for seed in range(SEEDS)}
-    found["poke"] = Net(POKES, 6, epochs=300, dense=40, thin=4)
-    found["tower"] = Net(TOWER, 6, reading="tower", latent="modes", epochs=100)
-    return found | workshop()
+        trainings |= {f"gravity-r{r}-{terms}": MapNet(GRAVITY, r, terms) for terms in TERMS if terms
+                      != BOTH}
+    trainings["gravity-r7-printed"] = MapNet(GRAVITY, 7, reading="printed")
+    trainings |= {f"torsion-{seed}": MapNet(TORSION, 7, seed=seed, epochs=850)
+                  for seed in range(SEEDS)}
+    trainings["poke"] = MapNet(POKES, 6, epochs=300, dense=40, thin=4)
+    trainings["tower"] = MapNet(TOWER, 6, reading="tower", latent="modes", epochs=100)
+    return trainings | workshop()
 
 
 def workshop():
-    """{name: `Net`} of the workshop paper, whose latent coordinates are free (LDMW-eq7)."""
-    unit = Net(SHEAR3, 1, epochs=10000, latent="free")
-    found = {f"shear3-{terms}": unit._replace(terms=terms) for terms in (NEITHER, NO_F, WORKSHOP)}
-    found["shear3-printed"] = unit._replace(terms=WORKSHOP, reading="printed")
-    found["shear17"] = unit._replace(study=SHEAR17, terms=WORKSHOP)
-    found["push"] = Net(PUSHES, 5, WORKSHOP, epochs=700, latent="free")
-    return found
+    """{name: `MapNet`} of the workshop paper, whose latent coordinates are free (LDMW-eq7)."""
+    unit = MapNet(SHEAR3, 1, epochs=10000, latent="free")
+    trainings = {f"shear3-{terms}": unit._replace(terms=terms) for terms in (NEITHER, NO_F,
+                                                                             WORKSHOP)}
+    trainings["shear3-printed"] = unit._replace(terms=WORKSHOP, reading="printed")
+    trainings["shear17"] = unit._replace(study=SHEAR17, terms=WORKSHOP)
+    trainings["push"] = MapNet(PUSHES, 5, WORKSHOP, epochs=700, latent="free")
+    return trainings
 
 
 @cache
 def trained(name):
-    """`Model` of a trained map. Raises ValueError where it is missing, damaged, or of another
-    training or other scenes than `nets` says now.
+    """Return the `Model` of a trained map. Raises ValueError where it is missing, damaged, or of
+    another training or other scenes than `nets` says now.
     """
-    path, again = FOLDER / f"{name}.npz", f"python -m validation.training.ldm {name}"
-    if not path.exists():
-        raise ValueError(f"no weights {path.name}: {again}")
-    model, now = load(path), identity(nets()[name])
-    was = {key: model.about.get(key, Net._field_defaults.get(key)) for key in now}
-    if was != now:
-        raise ValueError(f"weights {path.name} are of {was}, now it is {now}: {again}")
-    return model
+    return load_weights(FOLDER / f"{name}.npz", identity(nets()[name]), load,
+                        f"python -m validation.training.ldm {name}",
+                        defaults=MapNet._field_defaults)
 
 
 def identity(net):
-    """What a training is of: the runs' scenes, and how it is made; plain values."""
-    study, *how = net
+    """Return the plain values that identify a training: its scenes and its settings."""
+    study, *settings = net
     texts = "".join(canonical(study.scene(*study.mu[k])) for k in study.train)
     digest = hashlib.sha256(texts.encode()).hexdigest()[:16]
-    return {"study": study.name, "scenes": digest, **dict(zip(Net._fields[1:], how, strict=True))}
+    return {"study": study.name, "scenes": digest, **dict(zip(MapNet._fields[1:], settings,
+                                                              strict=True))}

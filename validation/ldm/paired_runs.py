@@ -1,4 +1,4 @@
-"""A reduced run of a scene beside the full one, step by step."""
+"""A reduced run of a scene and the full-order one, step by step."""
 
 from typing import NamedTuple
 
@@ -15,52 +15,53 @@ from mpm_ref.simulate import simulate
 from ..common.scenes import threads_for
 from .networks import trained
 
-SHOWN_WAY = RunOptions("lagrangian", "linear", 50)
-ALL = SHOWN_WAY._replace(points=None)       # as the paper's Table 4
+SHOWN = RunOptions("lagrangian", "linear", 50)
+ALL = SHOWN._replace(points=None)       # as the paper's Table 4
 ERROR_POINTS = 4000         # points that errors are of, at most
 
 
-class Pair(NamedTuple):
-    """A reduced run beside the full one."""
+class PairedRun(NamedTuple):
+    """A reduced run and the full-order run of the same scene."""
 
-    full_model: FullModel              # that was run
+    full_model: FullModel
     X: np.ndarray           # (n, d) points at rest that are shown [m]
     reduced: np.ndarray     # (shots, n, d) their positions [m]
     full: np.ndarray        # (shots, n, d)
     xhat: np.ndarray        # (k + 1, r) latent coordinates
-    errors: PositionErrors          # over all time levels
+    errors: PositionErrors  # over all time levels
     tracked: int            # points that errors are of
     samples: int            # of a step
 
     @property
     def size(self):
-        """How much was run, in words."""
+        """Describe particles, steps and samples in words."""
         n, steps = len(self.full_model.X), self.full_model.problem.clock.steps
         samples = "all points" if self.samples == n else f"{self.samples} samples"
         return f"{n} particles, {steps} steps, {samples}"
 
     @property
     def scale(self):
-        """How much was run, and of how many points the errors are, in words."""
+        """Describe the size of the run, and the number of points that errors are of, in words."""
         return f"{self.size}, errors of {self.tracked} points"
 
 
-def pair(scene, net, shots=None, shown=slice(None), way=SHOWN_WAY):
-    """`Pair` of a scene on a trained map: positions of the points `shown` at the steps `shots`,
-    None for all of them.
+def pair(scene, net, shots=None, shown=slice(None), options=SHOWN):
+    """Return the `PairedRun` of a scene on a trained map: positions of the points `shown` at the
+    steps `shots`, None for all of them.
     """
     one, model = ldm_full_model(scene), trained(net)
     tracked = slice(None, None, -(-len(one.X) // ERROR_POINTS))
-    place, sums, kept, seen = model.field.place, Squares(one.X[tracked]), [], []
+    place, sums, frames, history = model.field.place, Squares(one.X[tracked]), [], []
     with threads_for(one.problem.bodies), one_thread():
-        states = ldm_run(one, model.field, way, model.rest).states()
+        states = ldm_run(one, model.field, options, model.rest).states()
         for k, (x, (_, latent, report, _)) in enumerate(zip(positions(scene), states, strict=True)):
             sums.add(place(one.X[tracked], latent.xhat), x[tracked])
-            seen.append((latent.xhat, report))
+            history.append((latent.xhat, report))
             if shots is None or k in shots:
-                kept.append((place(one.X[shown], latent.xhat), x[shown]))
-    return Pair(one, one.X[shown], *np.stack(kept, axis=1), np.array([xhat for xhat, _ in seen]),
-                sums.errors, len(sums.X), seen[-1][1].samples)
+                frames.append((place(one.X[shown], latent.xhat), x[shown]))
+    return PairedRun(one, one.X[shown], *np.stack(frames, axis=1),
+                     np.array([xhat for xhat, _ in history]), sums.errors, len(sums.X),
+                     history[-1][1].samples)
 
 
 def positions(scene):
@@ -70,9 +71,11 @@ def positions(scene):
         yield restore_order(body.particles.x, body.id)
 
 
-def beside(X, found, reference):
-    """`PositionErrors` of states found (k, n, d) of points X (n, d) beside those of another run."""
+def position_errors(X, states, reference):
+    """Return the `PositionErrors` of states (k, n, d) of points X (n, d) against those of a
+    reference run.
+    """
     sums = Squares(X)
-    for x, other in zip(found, reference, strict=True):
+    for x, other in zip(states, reference, strict=True):
         sums.add(x, other)
     return sums.errors

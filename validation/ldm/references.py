@@ -1,16 +1,23 @@
-"""Test runs of a study, full order, and what reduced runs of them are off by."""
+"""Full-order test runs of a study, and the errors of reduced runs of them."""
 
 from functools import cache
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
+import threadpoolctl
 
 from mpm_ref.rom.fields.pod import basis, modes
 from mpm_ref.rom.fields.polynomial_manifold import curved
+from mpm_ref.rom.projection import project_position
+from mpm_ref.rom.step import BREAKDOWNS
+from mpm_ref.rom.study.errors import PositionErrors, Squares
 from mpm_ref.rom.study.full_model import ldm_full_model
+from mpm_ref.rom.study.run import ldm_run
 
+from ..common.position_errors import record_position_errors
+from ..common.scenes import threads_for
 from .networks import trained
-from .reduced_runs import compared, reconstructed
 from .studies import STUDIES
 
 MODES = 40          # that curved maps follow with
@@ -18,12 +25,12 @@ ORIGIN = "from the centre of the held end"
 
 
 class References(NamedTuple):
-    """Runs that reduced ones are compared with."""
+    """Full-order test runs that reduced runs are compared with."""
 
     study: str              # whose training runs POD modes are made of
-    cases: tuple            # `Case` of each
+    cases: tuple            # `FullModel` of each
     x: tuple                # full-order positions (k + 1, n, d) of each [m]
-    of: int                 # test runs that the study has
+    total: int              # test runs that the study has
 
     @property
     def X(self):
@@ -32,88 +39,112 @@ class References(NamedTuple):
 
     @property
     def scale(self):
-        """How much it is, in words."""
-        return (f"{len(self.X)} particles, {len(self.x[0]) - 1} steps, {len(self.x)} of {self.of} "
-                "test runs")
+        """Describe the size of the runs in words."""
+        return (f"{len(self.X)} particles, {len(self.x[0]) - 1} steps, "
+                f"{len(self.x)} of {self.total} test runs")
 
-    def on(self, map, rest, way, seed=0):
-        """`Errors` of reduced runs on a map."""
-        return compared(self.cases, self.x, map, way, rest, seed)
+    def run_errors(self, g, rest, options, seed=0):
+        """Return the `PositionErrors` of reduced runs on a map g."""
+        return run_errors(self.cases, self.x, g, options, rest, seed)
 
-    def near(self, map, rest):
-        """`Errors` of the nearest states of a map."""
-        return reconstructed(self.X, self.x, map, rest)
+    def nearest_errors(self, g, rest):
+        """Return the `PositionErrors` of the nearest states of a map g."""
+        return nearest_state_errors(self.X, self.x, g, rest)
 
-    def errors(self, name, way, seed=0):
-        """`Errors` of reduced runs on a trained map."""
+    def network_errors(self, name, options, seed=0):
+        """Return the `PositionErrors` of reduced runs on a trained map."""
         model = trained(name)
-        return self.on(model.field, model.rest, way, seed)
+        return self.run_errors(model.field, model.rest, options, seed)
 
-    def linear(self, r, way, seed=0):
-        """`Errors` of reduced runs on as many POD modes."""
-        return self.on(pod(self.study, r), np.zeros(r), way, seed)
+    def pod_errors(self, r, options, seed=0):
+        """Return the `PositionErrors` of reduced runs on r POD modes."""
+        return self.run_errors(pod(self.study, r), np.zeros(r), options, seed)
 
-    def nearest(self, name):
-        """`Errors` of the nearest states of a trained map."""
+    def nearest_network_errors(self, name):
+        """Return the `PositionErrors` of the nearest states of a trained map."""
         model = trained(name)
-        return self.near(model.field, model.rest)
+        return self.nearest_errors(model.field, model.rest)
 
-    def nearest_linear(self, r):
-        """`Errors` of the nearest states of as many POD modes."""
-        return self.near(pod(self.study, r), np.zeros(r))
+    def nearest_pod_errors(self, r):
+        """Return the `PositionErrors` of the nearest states of r POD modes."""
+        return self.nearest_errors(pod(self.study, r), np.zeros(r))
+
+
+def run_errors(cases, references, g, options, rest, seed=0):
+    """Return the `PositionErrors` of reduced runs of `FullModel`s on a map g over all runs;
+    infinite where a run does not reach its end. references: the full-order x (k + 1, n, d) of each.
+    """
+    sums = Squares(cases[0].X)
+    with threads_for((cases[0].problem.bodies[0],)), threadpoolctl.threadpool_limits(1):
+        for k, (one, x) in enumerate(zip(cases, references, strict=True)):
+            states = ldm_run(one, g, options, rest, seed + k).states()
+            try:
+                for state, reference in zip(states, x, strict=True):
+                    sums.add(g.place(one.X, state.latent.xhat), reference)
+            except BREAKDOWNS:
+                return PositionErrors(inf, inf, inf)
+    return sums.errors
+
+
+def nearest_state_errors(X, references, g, rest):
+    """Return the `PositionErrors` of the nearest states of a map g, without any dynamics: no
+    reduced run on the map is expected to beat them.
+    """
+    sums = Squares(X)
+    for x in references:
+        xhat = rest
+        for reference in x:
+            xhat = project_position(g, X, reference, xhat).y
+            sums.add(g.place(X, xhat), reference)
+    return sums.errors
 
 
 def references(study, count=None):
-    """`References` of some test runs of a study, evenly among them, or of all."""
+    """Return the `References` of `count` test runs of a study, evenly among them, or of all."""
     runs = study.test[::-(-len(study.test) // count)] if count else study.test
     cases = tuple(ldm_full_model(study.scene(*study.mu[k])) for k in runs)
     return References(study.name, cases, tuple(study.run(runs).x), len(study.test))
 
 
 @cache
-def training(name):
-    """X, x and F of all training runs of a study, full order."""
+def training_snapshots(name):
+    """Return X, x and F of all full-order training runs of a study."""
     full = STUDIES[name].run(STUDIES[name].train)
     return full.X, *full.flat()
 
 
 @cache
 def pod(name, r):
-    """`Modes` of the training runs of a study."""
-    return modes(*training(name), r)
+    """Return the POD `Modes` of the training runs of a study."""
+    return modes(*training_snapshots(name), r)
 
 
 @cache
-def based(name, lam_F=0.0, early=(0, 1.0)):
-    """`Basis` of the training runs of a study, in a norm with lam_F [m^2]; early = (levels, weight)
-    has the first time levels of each run weigh so much more.
+def weighted_basis(name, lam_F=0.0, early=(0, 1.0)):
+    """Return the `Basis` of the training runs of a study in a norm with lam_F [m^2], and the
+    weights of the snapshots. early = (levels, weight): the first time levels of each run have that
+    weight.
     """
     levels, weight = early
-    X, x, F = training(name)
+    X, x, F = training_snapshots(name)
     w = np.ones((len(STUDIES[name].train), len(x) // len(STUDIES[name].train)))
     w[:, :levels] = weight
     return basis(X, x, F, MODES, lam_F, w.ravel()), w.ravel()
 
 
 @cache
-def bent(name, r, degree, lam_F=0.0, early=(0, 1.0)):
-    """Map of r coordinates over the modes of `based`: `Modes` for degree 1, else `Curved`."""
-    found, w = based(name, lam_F, early)
+def curved_map(name, r, degree, lam_F=0.0, early=(0, 1.0)):
+    """Return a map of r coordinates over the modes of `weighted_basis`: `Modes` for degree 1, else
+    `Curved`.
+    """
+    basis_of_runs, w = weighted_basis(name, lam_F, early)
     if degree == 1:
-        return found.modes._replace(U=found.modes.U[..., :r], slope=found.modes.slope[..., :r])
-    return curved(found, r, degree, w)
+        modes = basis_of_runs.modes
+        return modes._replace(U=modes.U[..., :r], slope=modes.slope[..., :r])
+    return curved(basis_of_runs, r, degree, w)
 
 
-def share(run, name, errors, scale, note="", **rule):
-    """Record `Errors` in per cent: the paper's, which depends on the origin, and others beside."""
-    origin, centroid, displacement = (100.0 * error for error in errors)
-    run.record(name, origin, unit="%", scale=scale, note=f"{ORIGIN}; from the centroid "
-               f"{centroid:.3g} %, of the displacement {displacement:.3g} %"
-               + (f"; {note}" if note else ""), **rule)
-
-
-def mean_of(found, what):
-    """Mean of several `Errors`, and in words: of how many of what, and the largest."""
-    worst = 100.0 * max(errors.origin for errors in found)
-    mean = type(found[0])(*np.mean(found, axis=0))
-    return mean, f"mean of {len(found)} {what}, the largest {worst:.3g} %"
+def record_errors(run, name, errors, scale, note="", **rule):
+    """Record `PositionErrors` in per cent."""
+    record_position_errors(run, name, errors, scale, "; ".join(filter(None, (note, ORIGIN))),
+                           **rule)

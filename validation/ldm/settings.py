@@ -1,4 +1,4 @@
-"""What LDM prints of its experiments and networks, beside what is run here."""
+"""Printed settings of LDM's experiments and networks, compared with those of this code."""
 
 import numpy as np
 
@@ -22,16 +22,17 @@ def settings(run):
     """Settings of the scenes, of the studies made of them, and of the networks."""
     for study in (GRAVITY, TORSION, POKES):
         scene = study.scene(*study.mu[-1])
-        record_settings(run, f"ldm_{study.name}", {**of_table(study, scene), **of_study(study)})
-    record_settings(run, "ldm_gravity", of_gravity())
-    record_settings(run, "ldm_torsion", of_torsion())
-    record_settings(run, "ldm_poke", of_poke())
-    record_settings(run, "ldm_gravity", of_networks())
-    tower(run)
+        record_settings(run, f"ldm_{study.name}", {**table_settings(study, scene),
+                                                   **study_settings(study)})
+    record_settings(run, "ldm_gravity", gravity_settings())
+    record_settings(run, "ldm_torsion", torsion_settings())
+    record_settings(run, "ldm_poke", poke_settings())
+    record_settings(run, "ldm_gravity", network_settings())
+    record_tower(run)
 
 
-def of_table(study, scene):
-    """Table 2: of a scene of a study."""
+def table_settings(study, scene):
+    """Return the settings of Table 2, from a scene of a study."""
     material, name = scene.body[0].material, f"ldm.table2.{study.name}"
     return {f"{name}.youngs": material.E, f"{name}.poisson": material.nu,
             f"{name}.particles": len(build(scene).bodies[0].particles.x), f"{name}.dx": scene.dx,
@@ -39,23 +40,23 @@ def of_table(study, scene):
             f"{name}.n_train": len(study.train), f"{name}.n_test": len(study.test)}
 
 
-def of_study(study):
-    """The text's counts."""
+def study_settings(study):
+    """Return the counts that the text prints of a study."""
     name, steps = f"ldm.{SECTIONS[study.name]}", study.scene(*study.mu[0]).steps
     return {f"{name}.n_sims": len(study.mu), f"{name}.steps": steps,
             f"{name}.snapshots": len(study.mu) * (steps + 1), f"{name}.n_train": len(study.train),
             f"{name}.n_test": len(study.test)}
 
 
-def of_gravity():
-    """Section 5.1."""
+def gravity_settings():
+    """Return the settings of section 5.1."""
     shape = GRAVITY.scene(1.0).body[0].shape
     return {"ldm.sec5_1.radius": shape.radius, "ldm.sec5_1.height": shape.end[0] - shape.start[0],
             "ldm.sec5_1.g_min": GRAVITY.mu.min(), "ldm.sec5_1.g_max": GRAVITY.mu.max()}
 
 
-def of_torsion():
-    """Section 5.2."""
+def torsion_settings():
+    """Return the settings of section 5.2."""
     shape, (v, w) = TORSION.scene(0.0, 0.0).body[0].shape, TORSION.mu.T
     sides = np.subtract(shape.upper, shape.lower)
     return {**dict(zip(("ldm.sec5_2.wx", "ldm.sec5_2.wy", "ldm.sec5_2.h"), sides, strict=True)),
@@ -64,8 +65,8 @@ def of_torsion():
             "ldm.sec5_2.r": nets()["torsion-0"].r}
 
 
-def of_poke():
-    """Section 5.3."""
+def poke_settings():
+    """Return the settings of section 5.3."""
     scene, again = POKES.scene(0.0), poked_again(np.zeros(10))
     theta, trained = POKES.mu[:, 0], POKES.mu[list(POKES.train), 0]
     return {"ldm.sec5_3.poke_speed": POKE, "ldm.sec5_3.poke_time": scene.fixed[1].until,
@@ -76,10 +77,12 @@ def of_poke():
             "ldm.sec5_3_2.duration": again.steps * again.dt}
 
 
-def tower(run):
-    """Table 2 and section 5.4: the tower at the paper's size, and what was drawn for its runs."""
+def record_tower(run):
+    """Record the settings of Table 2 and section 5.4: the tower at the paper's size, and the
+    parameters drawn for its runs.
+    """
     large = scene_of(max(GRIDS))
-    table, notes = of_table(TOWER, large), of_tower(TOWER.scene(*TOWER.mu[0]))
+    table, notes = table_settings(TOWER, large), tower_notes(TOWER.scene(*TOWER.mu[0]))
     also = {"r": "; Figure 15 prints a tenth of it (LDM-X9)"}
     n, name, scale = table[f"{TABLE}.particles"], "ldm.sec5_4", "scenes/ldm_tower.toml"
     table |= {f"{TABLE}.ppc_per_dim": large.body[0].sampling.per_cell,
@@ -96,8 +99,10 @@ def tower(run):
         run.record(f"{name}.{parameter}_max", drawn.max(), scale=scale, note=note, comparator="<=")
 
 
-def of_tower(trained):
-    """{target: in what the tower differs from the print}, of the scene its map is trained on."""
+def tower_notes(trained):
+    """Return {target: a note on how the tower differs from the print}, for the scene that its map
+    is trained on.
+    """
     small = (f"of Figure 16's largest runs; the map's training and Figure 15 have dx {trained.dx:g}"
              f" m, {trained.body[0].sampling.per_cell} points per cell and axis")
     return {f"{TABLE}.dx": f"{small}; printed in cm (LDM-X1)", f"{TABLE}.ppc_per_dim": small,
@@ -106,8 +111,8 @@ def of_tower(trained):
             "ldm.sec5_4.reduction_resolved": "the print's remark says ten times as much (LDM-X8)"}
 
 
-def of_networks():
-    """Table 1, and the latent dimensions of section 5.1."""
+def network_settings():
+    """Return the settings of Table 1, and the latent dimensions of section 5.1."""
     rows = {n: lengths(3 * n) for n in ROWS}
     return {"ldm.table1.encoder.kernel": KERNEL, "ldm.table1.encoder.stride": STRIDE,
             "ldm.table1.encoder.dconv_min": SHORTEST, "ldm.table1.encoder.fc1_out": FEATURES,

@@ -1,6 +1,4 @@
-"""What LDM's state figures show: reduced runs beside full-order ones, and their points at some
-times.
-"""
+"""Points of reduced and full-order runs at some times, for LDM's figures of states."""
 
 from math import asin, atan2
 
@@ -13,9 +11,9 @@ from mpm_ref.rom.study.samples import ldm_sampler
 
 from ..common.registry import experiment
 from .networks import trained
-from .paired_runs import ALL, SHOWN_WAY, beside, pair, positions
+from .paired_runs import ALL, SHOWN, pair, position_errors, positions
 from .published_bodies import keep
-from .references import share
+from .references import record_errors
 from .studies import POKES, TORSION, TOWER, fallen, leaning, poked, twisted
 from .superres import REFINE, advected, fine
 
@@ -33,7 +31,7 @@ def sampled(run):
     """Keeps all points and one draw of samples; records how many are near what is held."""
     one = ldm_full_model(TOWER.scene(*TOWER.mu[TOWER.test[0]]))
     model, held = trained("tower"), one.constrained_points(0.0)
-    sampler = ldm_sampler(one, model.field, SHOWN_WAY, model.rest, run.seed)
+    sampler = ldm_sampler(one, model.field, SHOWN, model.rest, run.seed)
     samples = sampler(0.0, None).points
     counts = [int(np.isin(samples, near).sum()) for near in held]
     scale = f"{len(one.X)} particles"
@@ -55,7 +53,7 @@ def gravities(run):
         scale = f"{one.scale}, one run"
         gravity = one.full_model.problem.gravity
         run.record(f"ldm.fig6.gravity.{g}", np.linalg.norm(gravity), scale=scale)
-        share(run, f"ldm.fig6.error.g{g}", one.errors, scale, comparator="info")
+        record_errors(run, f"ldm.fig6.error.g{g}", one.errors, scale, comparator="info")
     keep(run, X=one.X, g=GRAVITIES, reduced=[one.reduced[0] for one in found.values()],
          full=[one.full[0] for one in found.values()])
 
@@ -66,12 +64,13 @@ def torsion(run):
     """Keeps the end of a test run."""
     scene = twisted(*PULLED)
     one = pair(scene, "torsion-0", {scene.steps})
-    share(run, "ldm.fig11.error", one.errors, f"{one.scale}, {of_torsion()}", comparator="info")
+    record_errors(run, "ldm.fig11.error", one.errors, f"{one.scale}, {torsion_label()}",
+                  comparator="info")
     keep(run, X=one.X, reduced=one.reduced[0], full=one.full[0])
 
 
-def of_torsion():
-    """Which test run of torsion is shown."""
+def torsion_label():
+    """Describe the test run of torsion that is shown."""
     v, w = PULLED
     return f"the test run of {v:.3g} m/s and {w:.3g} rad/s"
 
@@ -84,18 +83,19 @@ def superresolution(run):
     """
     low, high = twisted(*PULLED), fine(*PULLED)
     levels = range(0, high.steps + 1, REFINE)
-    one, sparse = (pair(high, "torsion-0", levels, way=way) for way in (ALL, SHOWN_WAY))
+    one, sparse = (pair(high, "torsion-0", levels, options=options) for options in (ALL, SHOWN))
     tracers, few = advected(low, one.X), list(positions(low))[-1]
-    every, some, baseline = (beside(one.X, x, one.full)
-                             for x in (one.reduced, sparse.reduced, tracers))
-    of = f"errors of {len(one.X)} points at {len(tracers)} times, {of_torsion()}"
-    scale = f"{one.size}, {of}"
-    share(run, "ldm.fig12.reduced_high", every, scale)
-    share(run, f"ldm.fig12.reduced_high.{sparse.samples}", some, f"{sparse.size}, {of}",
-          comparator="info")
-    share(run, "ldm.fig12.baseline", baseline, scale, f"tracers in our {low.steps} steps of "
-          f"{len(few)} points; not to be reached but to be beaten, see ldm.fig12.gain",
-          comparator="info")
+    every, sparse_errors, baseline = (position_errors(one.X, x, one.full)
+                                      for x in (one.reduced, sparse.reduced, tracers))
+    extent = f"errors of {len(one.X)} points at {len(tracers)} times, {torsion_label()}"
+    scale = f"{one.size}, {extent}"
+    record_errors(run, "ldm.fig12.reduced_high", every, scale)
+    record_errors(run, f"ldm.fig12.reduced_high.{sparse.samples}", sparse_errors,
+                  f"{sparse.size}, {extent}", comparator="info")
+    record_errors(run, "ldm.fig12.baseline", baseline, scale,
+                  f"tracers in our {low.steps} steps of "
+                  f"{len(few)} points; not to be reached but to be beaten, see ldm.fig12.gain",
+                  comparator="info")
     run.record("ldm.fig12.gain", baseline.origin / every.origin, unit="x", scale=scale,
                comparator=">=", bound=1.0, note="the tracers' error over that of the reduced run")
     for name, value in (("low_points", len(few)), ("high_points", len(one.full_model.X)),
@@ -115,11 +115,12 @@ def poke(run):
     shots = [0, round(scene.fixed[1].until / scene.dt), scene.steps]
     scale = f"{one.scale}, the test run of {np.degrees(POKED[0]):.0f} degrees"
     plane, spread = components(one.xhat)
-    share(run, "ldm.fig13.error", one.errors, scale, comparator="info")
-    run.record("ldm.fig14.return", returned(one.xhat), unit="1", scale=scale, comparator="info",
+    record_errors(run, "ldm.fig13.error", one.errors, scale, comparator="info")
+    run.record("ldm.fig14.return", return_distance(one.xhat), unit="1", scale=scale,
+               comparator="info",
                note="distance of the last latent state from the first, over the largest; "
-               f"of the body's points {returned(one.reduced):.3g}, in the full run "
-               f"{returned(one.full):.3g}")
+               f"of the body's points {return_distance(one.reduced):.3g}, in the full run "
+               f"{return_distance(one.full):.3g}")
     run.record("ldm.fig14.plane", spread, unit="1", scale=scale, comparator="info",
                note="share of the variance of the latent states in that plane")
     run.table("latent", ("step", "t", "pc1", "pc2", "driven"),
@@ -129,8 +130,8 @@ def poke(run):
 
 
 def components(xhat):
-    """Latent states xhat (k + 1, r) in the plane of their first two principal components, (k + 1,
-    2), each with its longest arm positive; and the share of their variance in it.
+    """Return latent states xhat (k + 1, r) in the plane of their first two principal components, (k
+    + 1, 2), each with its longest arm positive; and the share of their variance in it.
     """
     U, s, _ = np.linalg.svd(xhat - xhat.mean(axis=0), full_matrices=False)
     plane = U[:, :2] * s[:2]
@@ -138,12 +139,12 @@ def components(xhat):
     return plane * np.sign(longest), float(np.sum(s[:2] ** 2) / np.sum(s**2))
 
 
-def returned(a):
-    """Distance of the last of states a (k + 1, ..) from the first, over the largest: 0 where it has
-    come back.
+def return_distance(a):
+    """Return the distance of the last of states a (k + 1, ..) from the first over the largest: 0
+    where the body has come back.
     """
-    away = np.linalg.norm((a - a[0]).reshape(len(a), -1), axis=1)
-    return float(away[-1] / away.max())
+    distances = np.linalg.norm((a - a[0]).reshape(len(a), -1), axis=1)
+    return float(distances[-1] / distances.max())
 
 
 @experiment("ldm.fig15", title="LDM: four test runs of the tower",
@@ -154,11 +155,11 @@ def tower(run):
     shots, shown = (0, scene.steps // 2, scene.steps), skin(ldm_full_model(scene).X)
     found = [pair(leaning(*mu), "tower", shots, shown)
              for mu in run.progress(LEANINGS, "runs")]
-    mu = [driven(one.full_model) for one in found]
+    mu = [drive_parameters(one.full_model) for one in found]
     for k, one in enumerate(found):
         scale = f"{one.scale}, one run"
-        share(run, f"ldm.fig15.error.{k + 1}", one.errors, scale, comparator="info")
-        of_row(run, f"ldm.fig15.row{k + 1}", mu[k], scale)
+        record_errors(run, f"ldm.fig15.error.{k + 1}", one.errors, scale, comparator="info")
+        record_row(run, f"ldm.fig15.row{k + 1}", mu[k], scale)
     run.record("ldm.sec5_4.fig15_points", max(one.samples for one in found), scale=found[0].scale)
     times = scene.dt * np.array(shots)
     for name, t in zip(("0.0", "1.67", "3.33"), times, strict=True):
@@ -167,9 +168,9 @@ def tower(run):
          full=[one.full[1:] for one in found])
 
 
-def driven(one):
-    """r [m/s], theta and phi [rad] of the last region that a `Case` drives: of its mean velocity
-    r (cos phi cos theta, cos phi sin theta, sin phi).
+def drive_parameters(one):
+    """Return r [m/s], theta and phi [rad] of the last region that a `FullModel` drives, from its
+    mean velocity r (cos phi cos theta, cos phi sin theta, sin phi).
     """
     clock, motion = one.problem.clock, prescribed_regions(one.problem)[-1].motion
     end = clock.steps * clock.dt
@@ -178,7 +179,7 @@ def driven(one):
     return r, atan2(v[1], v[0]), asin(v[2] / r)
 
 
-def of_row(run, name, mu, scale):
+def record_row(run, name, mu, scale):
     """Record the parameters of a row of Figure 15."""
     r, theta, phi = mu
     run.record(f"{name}.r", r, scale=scale, comparator="info",
@@ -188,8 +189,8 @@ def of_row(run, name, mu, scale):
 
 
 def skin(X):
-    """Numbers of the points of a regular sampling X (n, 3) that are outermost or next to these; of
-    them every other one, as on a chessboard.
+    """Return the numbers of the points of a regular sampling X (n, 3) that are outermost or next to
+    these; of them every other one, as on a chessboard.
     """
     tree = cKDTree(X)
     h = tree.query(X[0], 2)[0][1]

@@ -16,7 +16,7 @@ PHI = 2.0 * pi / 3.0        # polar angle of the poke (LDM-X5)
 POKE = 0.48                 # its speed [m/s]
 
 
-class Study(NamedTuple):
+class LdmStudy(NamedTuple):
     """Parameters mu of all runs, the numbers of those that are tested, and the scene of one."""
 
     name: str
@@ -31,20 +31,20 @@ class Study(NamedTuple):
         return tuple(k for k in range(len(self.mu)) if k not in self.test)
 
     def problem(self, k):
-        """`Problem` of a run."""
+        """Return the `Problem` of a run."""
         return build(self.scene(*self.mu[k]))
 
     def run(self, numbers):
-        """`Snapshots` of the full-order runs of these numbers."""
+        """Return the `Snapshots` of the full-order runs of these numbers."""
         first = self.problem(numbers[0])
         with threads_for(first.bodies):
             return simulate_snapshots((self.problem(k) for k in numbers), self.mu[list(numbers)],
-                             self.every)
+                                      self.every)
 
 
-def drawn(count, of, seed=0):
-    """So many test runs, drawn at random."""
-    return tuple(sorted(np.random.default_rng(seed).permutation(of)[:count].tolist()))
+def draw_tests(count, runs, seed=0):
+    """Draw the numbers of `count` test runs of `runs` runs at random."""
+    return tuple(sorted(np.random.default_rng(seed).permutation(runs)[:count].tolist()))
 
 
 def fallen(g):
@@ -116,11 +116,12 @@ def scene_size(poke):
     return -x, z
 
 
-GRAVITY = Study("gravity", np.linspace(1.0, 10.0, 30)[:, None], drawn(6, 30), fallen)
-TORSION = Study("torsion", np.array([(v, w) for v in np.linspace(0.0, 0.6, 6)
-                                     for w in np.linspace(0.0, 2.0, 6)]), drawn(7, 36), twisted)
-POKES = Study("poke", np.arange(36)[:, None] * pi / 18.0,
-              tuple(k for k in range(36) if k % 3), poked)
-TOWER = Study("tower", latin_twice(((0.6, 0.8), (0.0, pi / 2.0), (-pi / 3.0, -pi / 6.0)), 16, 4),
-              (16, 17, 18, 19), leaning, every=16)
+GRAVITY = LdmStudy("gravity", np.linspace(1.0, 10.0, 30)[:, None], draw_tests(6, 30), fallen)
+TORSION = LdmStudy("torsion", np.array([(v, w) for v in np.linspace(0.0, 0.6, 6)
+                                        for w in np.linspace(0.0, 2.0, 6)]), draw_tests(7, 36),
+                   twisted)
+POKES = LdmStudy("poke", np.arange(36)[:, None] * pi / 18.0, tuple(k for k in range(36) if k % 3),
+                 poked)
+TOWER = LdmStudy("tower", latin_twice(((0.6, 0.8), (0.0, pi / 2.0), (-pi / 3.0, -pi / 6.0)), 16, 4),
+                 (16, 17, 18, 19), leaning, every=16)
 STUDIES = {study.name: study for study in (GRAVITY, TORSION, POKES, TOWER)}

@@ -12,7 +12,7 @@ from mpm_ref.trajectories import history
 from ..common.registry import experiment
 from ..common.scenes import threads_for, with_
 from .networks import trained
-from .references import share
+from .references import record_errors
 from .studies import TORSION
 
 FINE = 13900        # points
@@ -31,19 +31,19 @@ def fine(v, w):
 
 
 def advected(scene, X):
-    """x (k + 1, n, d) of points X (n, d) that go with the velocity field of a full-order run: the
-    paper's baseline. A node without mass stands still.
+    """Return x (k + 1, n, d) of points X (n, d) that go with the velocity field of a full-order
+    run, the paper's baseline. A node without mass stands still.
     """
     problem = build(scene)
     n, d = X.shape
     tracers = Body("tracers", particles_at(X, np.zeros((n, d)), np.zeros(n), np.zeros(n), "pic"),
                    problem.bodies[0].law, problem.bodies[0].flow, np.arange(n))
-    stepper, dt, found = problem.stepper(), problem.clock.dt, [X.copy()]
+    stepper, dt, levels = problem.stepper(), problem.clock.dt, [X.copy()]
     stepper.start(problem.bodies)
     for k in range(problem.clock.steps):
         stepper.step((*problem.bodies, tracers), k * dt, dt)
-        found.append(tracers.particles.x.copy())
-    return np.array(found)
+        levels.append(tracers.particles.x.copy())
+    return np.array(levels)
 
 
 @experiment("ldm.table4", title="LDM: more points than it was trained on",
@@ -60,39 +60,40 @@ def superresolution(run):
         one = ldm_full_model(fine(*mu))
         with threads_for(one.problem.bodies):
             x = history(build(fine(*mu))).x[::REFINE]
-        found = {RunOptions(*scheme).name: reduced(one, model, RunOptions(*scheme))[::REFINE]
-                 for scheme in schemes}
-        found[BASELINE] = advected(TORSION.scene(*mu), one.X)
-        for name, states in found.items():
-            own = Squares(one.X)
+        runs = {RunOptions(*scheme).name: reduced(one, model, RunOptions(*scheme))[::REFINE]
+                for scheme in schemes}
+        runs[BASELINE] = advected(TORSION.scene(*mu), one.X)
+        for name, states in runs.items():
+            squares = Squares(one.X)
             for state, reference in zip(states, x, strict=True):
-                own.add(state, reference)
-            sums.setdefault(name, Squares(one.X)).sums += own.sums
-            rows.append((*mu, name, *own.errors))
-    told(run, {name: total.errors for name, total in sums.items()},
-         f"{FINE} particles, {one.problem.clock.steps} steps, {len(tests)} of {len(TORSION.test)} "
-         f"test runs, errors of {len(one.X)} points at {len(x)} times each")
+                squares.add(state, reference)
+            sums.setdefault(name, Squares(one.X)).sums += squares.sums
+            rows.append((*mu, name, *squares.errors))
+    record_schemes(run, {name: total.errors for name, total in sums.items()},
+                   f"{FINE} particles, {one.problem.clock.steps} steps, "
+                   f"{len(tests)} of {len(TORSION.test)} test runs, "
+                   f"errors of {len(one.X)} points at {len(x)} times each")
     run.table("errors", ("v", "w", "scheme", "origin", "centroid", "displacement"), rows)
 
 
-def told(run, errors, scale):
-    """Record {scheme or BASELINE: `Errors`}; of the whole study also what the tracers' are over the
-    largest of the others.
+def record_schemes(run, errors, scale):
+    """Record the errors {scheme or BASELINE: `PositionErrors`}; of the whole study also the ratio
+    of the tracers' error to the largest of the others.
     """
     tracers = errors[BASELINE]
-    own = {name: found for name, found in errors.items() if name != BASELINE}
-    for name, found in own.items():
-        share(run, f"ldm.table4.{name}", found, scale)
-    share(run, f"ldm.table4.{BASELINE}", tracers, scale, "not to be reached but to be beaten",
-          comparator="info")
+    schemes = {name: one for name, one in errors.items() if name != BASELINE}
+    for name, one in schemes.items():
+        record_errors(run, f"ldm.table4.{name}", one, scale)
+    record_errors(run, f"ldm.table4.{BASELINE}", tracers, scale,
+                  "not to be reached but to be beaten", comparator="info")
     if run.profile == "standard":
-        worst = max(own, key=lambda name: own[name].origin)
-        run.record("ldm.table4.gain", tracers.origin / own[worst].origin, unit="x", scale=scale,
+        worst = max(schemes, key=lambda name: schemes[name].origin)
+        run.record("ldm.table4.gain", tracers.origin / schemes[worst].origin, unit="x", scale=scale,
                    comparator=">=", bound=1.0, note="the tracers' error over the largest of the "
                    f"reduced runs, {worst}")
 
 
-def reduced(one, model, way):
-    """x (k + 1, n, d) of a reduced run."""
-    run = ldm_run(one, model.field, way, model.rest)
+def reduced(one, model, options):
+    """Return x (k + 1, n, d) of a reduced run."""
+    run = ldm_run(one, model.field, options, model.rest)
     return np.array([model.field.place(one.X, state.latent.xhat) for state in run.states()])

@@ -1,4 +1,4 @@
-"""Errors of the four schemes on torsion and on pokes (Tables 3, 5 and 6), each beside POD."""
+"""Errors of the four schemes on torsion and on pokes (Tables 3, 5 and 6), compared with POD."""
 
 import numpy as np
 
@@ -8,10 +8,11 @@ from mpm_ref.rom.study.run import SCHEMES, RunOptions
 from mpm_ref.scene import build
 from mpm_ref.trajectories import history
 
+from ..common.position_errors import mean_errors
 from ..common.registry import experiment
 from ..common.scenes import threads_for
 from .networks import SEEDS
-from .references import References, mean_of, references, share
+from .references import References, record_errors, references
 from .studies import POKES, TORSION, poked_again
 
 DRAWS = {"torsion": 3, "poke": 2}    # of random samples
@@ -41,39 +42,43 @@ def pokes(run):
 
 def table(run, name, tests, nets):
     """Record a table's errors, by scheme and number of samples; rows of all runs. At the standard
-    profile also what is beside them: POD needs all training runs.
+    profile also those of POD, which needs all training runs.
     """
     schemes = run.choose(quick=SCHEMES[1:2], standard=SCHEMES)
     draws, rows = range(run.choose(quick=1, standard=DRAWS[tests.study])), []
     for scheme in run.progress(schemes, "schemes"):
         for points in (POINTS, None):
-            way = RunOptions(*scheme, points)
-            found = [(net, draw, kept(run, tests, net, way, draw)) for net in nets
-                     for draw in (draws if points else range(1))]
-            mean, words = mean_of([errors for *_, errors in found], "trainings and draws")
-            share(run, f"{name}.{way.name}.{points or 'all'}", mean, tests.scale, words)
-            rows += [(way.name, points or len(tests.X), net, draw, *errors)
-                     for net, draw, errors in found]
-    return rows + (beside(run, name, tests, nets, draws) if run.profile == "standard" else [])
+            options = RunOptions(*scheme, points)
+            results = [(net, draw, cached_errors(run, tests, net, options, draw)) for net in nets
+                       for draw in (draws if points else range(1))]
+            mean, note = mean_errors([errors for *_, errors in results], "trainings and draws")
+            record_errors(run, f"{name}.{options.name}.{points or 'all'}", mean, tests.scale, note)
+            rows += [(options.name, points or len(tests.X), net, draw, *errors)
+                     for net, draw, errors in results]
+    return rows + (compared_models(run, name, tests, nets, draws) if run.profile == "standard"
+                   else [])
 
 
-def kept(run, tests, net, way, draw):
-    """`PositionErrors` of one draw of samples, kept if the experiment is cut off."""
-    return PositionErrors(*run.cached(f"{net}.{way.name}.{way.points}.{draw}",
-                            lambda: tests.errors(net, way, 1000 * draw)))
+def cached_errors(run, tests, net, options, draw):
+    """Return the `PositionErrors` of one draw of samples, which an interrupted run has cached."""
+    return PositionErrors(*run.cached(f"{net}.{options.name}.{options.points}.{draw}",
+                                      lambda: tests.network_errors(net, options, 1000 * draw)))
 
 
-def beside(run, name, tests, nets, draws):
-    """Record the nearest states of the learned maps, and POD with the same samples."""
+def compared_models(run, name, tests, nets, draws):
+    """Record the errors of the nearest states of the learned maps, and of POD with the same
+    samples; return their rows.
+    """
     r = R[tests.study]
-    found = {"nearest": mean_of([tests.nearest(net) for net in nets], "")[0],
-             "pod.nearest": tests.nearest_linear(r), "pod": tests.linear(r, RunOptions()),
-             f"pod.{POINTS}": mean_of([tests.linear(r, RunOptions(points=POINTS), 1000 * draw)
-                                       for draw in draws], "")[0]}
-    for word, errors in found.items():
-        share(run, f"{name}.{word}", errors, tests.scale, comparator="info")
+    models = {"nearest": mean_errors([tests.nearest_network_errors(net) for net in nets], "")[0],
+              "pod.nearest": tests.nearest_pod_errors(r), "pod": tests.pod_errors(r, RunOptions()),
+              f"pod.{POINTS}": mean_errors([tests.pod_errors(r, RunOptions(points=POINTS),
+                                                             1000 * draw) for draw in draws],
+                                           "")[0]}
+    for word, errors in models.items():
+        record_errors(run, f"{name}.{word}", errors, tests.scale, comparator="info")
     return [(word, POINTS if word.endswith("50") else len(tests.X), "", 0, *errors)
-            for word, errors in found.items()]
+            for word, errors in models.items()]
 
 
 @experiment("ldm.table6", title="LDM: ten pokes in a row",
@@ -87,10 +92,10 @@ def in_a_row(run):
     tests, rows = References(POKES.name, (one,), (x,), 1), []
     for scheme in run.progress(SCHEMES, "schemes"):
         for points in (POINTS, None):
-            way = RunOptions(*scheme, points)
-            errors = kept(run, tests, "poke", way, 0)
-            share(run, f"ldm.table6.{way.name}.{points or 'all'}", errors, tests.scale)
-            rows.append((way.name, points or len(one.X), "poke", 0, *errors))
-    share(run, "ldm.table6.pod", tests.linear(R["poke"], RunOptions()), tests.scale,
-          comparator="info")
+            options = RunOptions(*scheme, points)
+            errors = cached_errors(run, tests, "poke", options, 0)
+            record_errors(run, f"ldm.table6.{options.name}.{points or 'all'}", errors, tests.scale)
+            rows.append((options.name, points or len(one.X), "poke", 0, *errors))
+    record_errors(run, "ldm.table6.pod", tests.pod_errors(R["poke"], RunOptions()), tests.scale,
+                  comparator="info")
     run.table("errors", COLUMNS, rows)

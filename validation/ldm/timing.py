@@ -1,5 +1,5 @@
-"""Full and reduced runs of one scene, a step of each in turn, so that a ratio of their times is of
-one run of the machine.
+"""Times of full and reduced runs of one scene, a step of each in turn: disturbances from other
+processes meet all of them alike.
 """
 
 from time import perf_counter, process_time
@@ -19,55 +19,55 @@ from mpm_ref.simulate import State, advance
 from ..common.scenes import with_
 
 TRACKED = 4000              # points that errors are of
-WAY = RunOptions._fields
-COLUMNS = (*WAY, "wall", "cpu", "quadrature_points", "origin", "centroid", "displacement")
+OPTIONS = RunOptions._fields
+COLUMNS = (*OPTIONS, "wall", "cpu", "quadrature_points", "origin", "centroid", "displacement")
 
 
-class Spent(NamedTuple):
-    """What a step takes."""
+class StepTime(NamedTuple):
+    """Time that a step takes."""
 
     wall: float         # [s]
     cpu: float          # [s], of all threads
 
 
-class Raced(NamedTuple):
-    """A reduced run beside the full one."""
+class TimedRun(NamedTuple):
+    """Times and errors of a reduced run."""
 
-    way: RunOptions
-    spent: Spent            # median over the steps
+    options: RunOptions
+    spent: StepTime         # median over the steps
     points: int             # quadrature points of a step, median
     errors: PositionErrors
 
     @property
     def row(self):
-        """Of a table with COLUMNS."""
-        return (*self.way._replace(points=self.way.points or "all"), *self.spent, self.points,
-                *self.errors)
+        """The row of a table with COLUMNS."""
+        return (*self.options._replace(points=self.options.points or "all"), *self.spent,
+                self.points, *self.errors)
 
     @property
-    def words(self):
-        """The way, as part of a name: what differs from the paper's."""
-        usual, points = RunOptions("eulerian", "linear")._asdict(), self.way.points or "all"
-        own = {name: a for name, a in self.way._asdict().items()
-               if name not in ("quadrature", "projection", "points") and a != usual[name]}
-        return "-".join(map(str, (self.way.quadrature, self.way.projection, points,
-                                  *own.values())))
+    def label(self):
+        """The options as part of a name: quadrature, projection, points and other choices."""
+        usual, points = RunOptions("eulerian", "linear")._asdict(), self.options.points or "all"
+        other = {name: a for name, a in self.options._asdict().items()
+                 if name not in ("quadrature", "projection", "points") and a != usual[name]}
+        return "-".join(map(str, (self.options.quadrature, self.options.projection, points,
+                                  *other.values())))
 
 
-def clocked(step):
-    """What step() gives, and what it `Spent`."""
+def timed(step):
+    """Return the result of step(), and its `StepTime`."""
     wall, cpu = perf_counter(), process_time()
-    found = step()
-    return found, Spent(perf_counter() - wall, process_time() - cpu)
+    result = step()
+    return result, StepTime(perf_counter() - wall, process_time() - cpu)
 
 
 def median(spent):
-    """`Spent` in the middle of a list."""
-    return Spent(*map(float, np.median(spent, axis=0)))
+    """Return the median of a list of `StepTime`."""
+    return StepTime(*map(float, np.median(spent, axis=0)))
 
 
-class Full:
-    """The full model, a step at a time."""
+class SteppedFullRun:
+    """A full-order run, a step at a time."""
 
     def __init__(self, scene):
         self.problem = build(scene)
@@ -76,31 +76,31 @@ class Full:
         self.spent = []
 
     def step(self):
-        """One step, and what it takes."""
-        self.spent.append(clocked(lambda: advance(self.problem, self.stepper, self.state))[1])
+        """Make one step, timed."""
+        self.spent.append(timed(lambda: advance(self.problem, self.stepper, self.state))[1])
 
     def positions(self, every):
-        """x (n, d) of one point in so many."""
+        """Return x (n, d) of one point in `every`."""
         body = self.state.bodies[0]
         return restore_order(body.particles.x, body.id)[::every]
 
 
-class Online:
-    """A reduced run, a step at a time; at its end where the coordinates give no body."""
+class SteppedReducedRun:
+    """A reduced run, a step at a time; it ends early where the coordinates give no body."""
 
-    def __init__(self, one, at, way, every):
-        (self.map, rest), self.X, self.way = at, one.X[::every], way
-        self.states = ldm_run(one, self.map, way, rest).states()
+    def __init__(self, one, mapping, options, every):
+        (self.map, rest), self.X, self.options = mapping, one.X[::every], options
+        self.states = ldm_run(one, self.map, options, rest).states()
         self.sums, self.spent, self.points, self.ended = Squares(self.X), [], [], False
         start = next(self.states)
         self.sums.add(self.map.place(self.X, start.latent.xhat), self.X)
 
     def step(self, reference):
-        """One step, what it takes, and its error."""
+        """Make one step, timed, and add its error."""
         if self.ended:
             return
         try:
-            (_, latent, report, _), spent = clocked(lambda: next(self.states))
+            (_, latent, report, _), spent = timed(lambda: next(self.states))
         except BREAKDOWNS:
             self.ended = True
             return
@@ -108,39 +108,45 @@ class Online:
         self.points.append(report.points)
         self.sums.add(self.map.place(self.X, latent.xhat), reference)
 
-    def raced(self):
-        """`Raced` after the last step; infinite if it did not get there."""
+    def result(self):
+        """Return the `TimedRun` after the last step; infinite if the run ended early."""
         if self.ended:
-            return Raced(self.way, Spent(np.inf, np.inf), 0, PositionErrors(np.inf, np.inf, np.inf))
-        return Raced(self.way, median(self.spent), int(np.median(self.points)), self.sums.errors)
+            return TimedRun(self.options, StepTime(np.inf, np.inf), 0,
+                            PositionErrors(np.inf, np.inf, np.inf))
+        return TimedRun(self.options, median(self.spent), int(np.median(self.points)),
+                        self.sums.errors)
 
 
-def alone(one, at, way, x):
-    """`Raced` of a reduced run of a `Case` beside positions x (k + 1, n, d) that are known."""
+def time_alone(one, mapping, options, x):
+    """Return the `TimedRun` of a reduced run of a `FullModel`, given the full-order positions
+    x (k + 1, n, d).
+    """
     with one_thread():
-        run = Online(one, at, way, 1)
+        run = SteppedReducedRun(one, mapping, options, 1)
         for reference in x[1:]:
             run.step(reference)
-    return run.raced()
+    return run.result()
 
 
-def race(scene, at, ways, steps):
-    """What a step of the full model `Spent`, and `Raced` of each way on at = (map, rest)."""
-    one, full = ldm_full_model(scene), Full(scene)
+def race(scene, mapping, options, steps):
+    """Return the `StepTime` of the full model, and the `TimedRun` of each `RunOptions` on
+    mapping = (map, rest).
+    """
+    one, full = ldm_full_model(scene), SteppedFullRun(scene)
     every = -(-len(one.X) // TRACKED)
     with one_thread():
-        online = [Online(one, at, way, every) for way in ways]
+        reduced = [SteppedReducedRun(one, mapping, own, every) for own in options]
         for _ in range(steps):
             full.step()
             reference = full.positions(every)
-            for run in online:
+            for run in reduced:
                 run.step(reference)
-    return median(full.spent), [run.raced() for run in online]
+    return median(full.spent), [run.result() for run in reduced]
 
 
 def fastest(scene, steps=4):
-    """What a step of the full model `Spent` with the fastest transfer there is."""
-    full = Full(with_(scene, scheme=Scheme(transfer="mls", degree=2)))
+    """Return the `StepTime` of the full model with the fastest transfer there is."""
+    full = SteppedFullRun(with_(scene, scheme=Scheme(transfer="mls", degree=2)))
     for _ in range(steps):
         full.step()
     return median(full.spent[1:])

@@ -8,15 +8,15 @@ from mpm_ref.scene import build
 
 from ..common.registry import experiment
 from .networks import trained
-from .references import share
+from .references import record_errors
 from .studies import TOWER, refined
-from .timing import COLUMNS, WAY, fastest, race
+from .timing import COLUMNS, OPTIONS, fastest, race
 
 NET = "tower"
-SOUND = 1.5         # times the error of the paper's way, up to which a faster one counts
+SOUND = 1.5         # times the error of the paper's options, up to which faster ones count
 GRIDS = {34: (1.44, 2), 385: (0.96, 3), 3076: (0.48, 3)}     # thousand points: dx [m], per axis
 POINTS = (25, 50)
-FEWEST = 10         # samples of the cheapest way
+FEWEST = 10         # samples of the cheapest options
 PAPER = RunOptions("eulerian", "linear")
 FAST = PAPER._replace(velocity="transported", preimage_tolerance=1e-2, precision="single")
 OWN = ("particles", *COLUMNS, "wall_full", "wall_fastest", "wall_per_second", "speed_up",
@@ -24,15 +24,15 @@ OWN = ("particles", *COLUMNS, "wall_full", "wall_fastest", "wall_per_second", "s
 
 
 def scene_of(size, k=TOWER.test[0]):
-    """A run of the study with about so many thousand points."""
+    """Return the scene of run k of the study with about `size` thousand points."""
     return refined(TOWER.scene(*TOWER.mu[k]), *GRIDS[size])
 
 
-def ways(points):
-    """The paper's schemes and cheaper ones, at numbers of samples."""
+def all_options(points):
+    """Return `RunOptions` of the paper's schemes and of cheaper ones, for numbers of samples."""
     cheap = (FAST, RunOptions("resampled", "linear"), FAST._replace(quadrature="resampled"))
     chosen = [*(RunOptions(*scheme) for scheme in SCHEMES), *cheap]
-    return [*(way._replace(points=n) for way in chosen for n in points),
+    return [*(options._replace(points=n) for options in chosen for n in points),
             FAST._replace(points=FEWEST)]
 
 
@@ -44,34 +44,34 @@ def speed(run):
     for size in run.progress(run.choose(quick=(34,), standard=GRIDS), "sizes"):
         scene = scene_of(size)
         chosen = run.choose(quick=[PAPER._replace(points=25), FAST._replace(points=25)],
-                            standard=ways(POINTS))
+                            standard=all_options(POINTS))
         steps = run.choose(quick=6, standard=scene.steps)
-        full, found = race(scene, (model.field, model.rest), chosen, steps)
+        full, runs = race(scene, (model.field, model.rest), chosen, steps)
         best, count = fastest(scene), len(build(scene).bodies[0].id)
         rows += [(count, *one.row, full.wall, best.wall, one.spent.wall / scene.dt,
-                  best.wall / one.spent.wall, full.wall / one.spent.wall) for one in found]
-        report(run, f"ldm.fig16.{size}", found, (full, best, scene.dt),
+                  best.wall / one.spent.wall, full.wall / one.spent.wall) for one in runs]
+        report(run, f"ldm.fig16.{size}", runs, (full, best, scene.dt),
                f"{count} particles, {steps} steps, one of {len(TOWER.test)} test runs")
     printed(run, [dict(zip(OWN, row, strict=True)) for row in rows])
     run.table("ways", OWN, rows)
 
 
-def report(run, name, found, times, scale):
-    """Record speed-ups and errors of all ways at a size."""
+def report(run, name, runs, times, scale):
+    """Record speed-ups and errors of all `TimedRun`s of a size."""
     full, best, dt = times
     run.record(f"{name}.full", full.wall, unit="s", comparator="info", scale=scale,
                note=f"wall time of a step; with the fastest transfer {best.wall:.3g}")
-    for one in found:
-        run.record(f"{name}.{one.words}.speed_up", best.wall / one.spent.wall, unit="x",
+    for one in runs:
+        run.record(f"{name}.{one.label}.speed_up", best.wall / one.spent.wall, unit="x",
                    comparator="info", scale=scale,
                    note=f"over the full model with its fastest transfer; "
                    f"{full.wall / one.spent.wall:.3g} x over the transfer it was trained on; "
                    f"{one.spent.wall / dt:.3g} s a second; {one.points} quadrature points")
-        share(run, f"{name}.{one.words}.error", one.errors, scale, comparator="info")
+        record_errors(run, f"{name}.{one.label}.error", one.errors, scale, comparator="info")
 
 
 def printed(run, rows):
-    """Record what the paper prints, of the largest size."""
+    """Record the numbers that the paper prints, for the largest size."""
     if run.profile != "standard":
         return
     rows = [r for r in rows if r["particles"] == rows[-1]["particles"]
@@ -79,12 +79,12 @@ def printed(run, rows):
     usual = next(r for r in rows if r["preimage_tolerance"] == PAPER.preimage_tolerance)
     sound = [r for r in rows if r["points"] < 50 and r["origin"] <= SOUND * usual["origin"]]
     best = min(sound, key=lambda r: r["wall"])
-    way = ", ".join(f"{name} {best[name]}" for name in WAY)
+    note = ", ".join(f"{name} {best[name]}" for name in OPTIONS)
     scale = f"{best['particles']} particles"
     run.record("ldm.fig16.speedup", best["speed_up"], scale=scale,
                note=f"over the full model with its fastest transfer; {best['speed_up_same']:.3g} x "
-               f"over the transfer it was trained on; {way}")
-    run.record("ldm.fig16.realtime", best["wall_per_second"], scale=scale, note=way)
+               f"over the transfer it was trained on; {note}")
+    run.record("ldm.fig16.realtime", best["wall_per_second"], scale=scale, note=note)
     most = next(r for r in rows if r["points"] == 50
                 and r["preimage_tolerance"] == PAPER.preimage_tolerance)
     run.record("ldm.sec5_4.quadrature_points", most["quadrature_points"],

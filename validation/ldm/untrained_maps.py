@@ -1,9 +1,9 @@
-"""Beyond the paper: maps that need no training by gradients, and samples that are chosen.
+"""Maps that need no training by gradients, and samples that are chosen; neither is in the paper.
 
 A curved map is POD with further modes that follow from the first
-(`rom.fields.polynomial_manifold`): one linear solve after the singular value decomposition. Beside
-it stand POD and the trained network of the same latent dimension, on the same test runs. Nonlinear
-projection is what it needs: over a step, linear projection leaves the curve by dt^2 / 2 g''(vhat,
+(`rom.fields.polynomial_manifold`): one linear solve after the singular value decomposition. It is
+compared with POD and the trained network of the same latent dimension, on the same test runs. It
+needs nonlinear projection: over a step, linear projection leaves the curve by dt^2 / 2 g''(vhat,
 vhat).
 """
 
@@ -11,9 +11,10 @@ import numpy as np
 
 from mpm_ref.rom.study.run import PROJECTIONS, RunOptions
 
+from ..common.position_errors import mean_errors
 from ..common.registry import experiment
 from .networks import trained
-from .references import bent, mean_of, references, share
+from .references import curved_map, record_errors, references
 from .studies import GRAVITY, POKES, TORSION
 
 DEGREES = (1, 2, 3)
@@ -38,9 +39,10 @@ def maps(run):
         tests = references(study, run.choose(quick=1, standard=None))
         for r in run.progress(dimensions, study.name):
             model = trained(net.format(r))
-            known = {f"degree-{p}": (bent(study.name, r, p), np.zeros(r)) for p in DEGREES}
-            for name, at in (known | {"network": (model.field, model.rest)}).items():
-                rows += both(run, f"ldm.curved.{study.name}.r{r}.{name}", tests, at)
+            curved = {f"degree-{p}": (curved_map(study.name, r, p), np.zeros(r)) for p in DEGREES}
+            for name, mapping in (curved | {"network": (model.field, model.rest)}).items():
+                rows += record_projections(run, f"ldm.curved.{study.name}.r{r}.{name}", tests,
+                                           mapping)
     run.table("errors", COLUMNS, rows)
 
 
@@ -55,10 +57,10 @@ def of_pokes(run):
         for early in ((0, 1.0), DRIVEN):
             for p in run.progress(DEGREES, f"lam_F {lam_F:.2g}, weight {early[1]}"):
                 name = f"degree-{p}{'-F' if lam_F else ''}{'-driven' if early[0] else ''}"
-                at = bent(POKES.name, 6, p, lam_F, early), np.zeros(6)
-                rows += both(run, f"ldm.curved-poke.{name}", tests, at)
+                mapping = curved_map(POKES.name, 6, p, lam_F, early), np.zeros(6)
+                rows += record_projections(run, f"ldm.curved-poke.{name}", tests, mapping)
     model = trained("poke")
-    rows += both(run, "ldm.curved-poke.network", tests, (model.field, model.rest))
+    rows += record_projections(run, "ldm.curved-poke.network", tests, (model.field, model.rest))
     run.table("errors", COLUMNS, rows)
 
 
@@ -68,29 +70,30 @@ def choices(run):
     """Errors on gravity, r = 4, linear projection, by number and choice of samples."""
     tests, rows, model = references(GRAVITY, run.choose(quick=1, standard=None)), [], trained(
         "gravity-r4")
-    known = {"network": (model.field, model.rest), "pod": (bent(GRAVITY.name, 4, 1), np.zeros(4))}
-    for name, at in run.choose(quick=dict(list(known.items())[:1]), standard=known).items():
+    network, modes = (model.field, model.rest), (curved_map(GRAVITY.name, 4, 1), np.zeros(4))
+    for name, mapping in run.choose(quick={"network": network},
+                                    standard={"network": network, "pod": modes}).items():
         for count in run.progress(run.choose(quick=(10,), standard=(5, 10, 25, 50)), name):
             for choice in CHOICES:
-                way = RunOptions(points=count, samples=choice)
-                found = [tests.on(*at, way, 1000 * k)
-                         for k in range(run.choose(quick=1, standard=DRAWS))]
-                mean, words = mean_of(found, "draws of samples")
-                share(run, f"ldm.samples.{name}.{count}.{choice}", mean, tests.scale, words,
-                      comparator="info")
-                rows += [(tests.study, 4, name, way.projection, count, choice, k, "", *errors)
-                         for k, errors in enumerate(found)]
+                options = RunOptions(points=count, samples=choice)
+                errors = [tests.run_errors(*mapping, options, 1000 * k)
+                          for k in range(run.choose(quick=1, standard=DRAWS))]
+                mean, note = mean_errors(errors, "draws of samples")
+                record_errors(run, f"ldm.samples.{name}.{count}.{choice}", mean, tests.scale, note,
+                              comparator="info")
+                rows += [(tests.study, 4, name, options.projection, count, choice, k, "", *one)
+                         for k, one in enumerate(errors)]
     run.table("errors", COLUMNS, rows)
 
 
-def both(run, name, tests, at):
-    """Record errors on a map, at = (map, rest), with both projections; rows of a table."""
-    rows, nearest = [], tests.near(*at).origin
+def record_projections(run, name, tests, mapping):
+    """Record the errors on a map, mapping = (map, rest), with both projections; return the rows."""
+    rows, nearest = [], tests.nearest_errors(*mapping).origin
     for projection in PROJECTIONS:
-        way = RunOptions(projection=projection)
-        errors = tests.on(*at, way)
-        share(run, f"{name}.{projection}", errors, tests.scale,
-              f"the nearest states {100.0 * nearest:.3g} %", comparator="info")
-        rows.append((tests.study, at[0].r, name.rsplit(".", 1)[-1], projection, len(tests.X), "all",
-                     0, nearest, *errors))
+        options = RunOptions(projection=projection)
+        errors = tests.run_errors(*mapping, options)
+        record_errors(run, f"{name}.{projection}", errors, tests.scale,
+                      f"the nearest states {100.0 * nearest:.3g} %", comparator="info")
+        rows.append((tests.study, mapping[0].r, name.rsplit(".", 1)[-1], projection, len(tests.X),
+                     "all", 0, nearest, *errors))
     return rows

@@ -15,7 +15,7 @@ import numpy as np
 from mpm_ref.scene import HalfSpace
 
 from ..common.scenes import catalogue_scene, with_
-from .studies import Study, drawn, scene_size
+from .studies import LdmStudy, draw_tests, scene_size
 
 CELLS = 4               # over the cylinder's height, in the unit tests
 TOP = 0.35              # [m] the nodes beyond are moved; between two layers of them
@@ -51,8 +51,8 @@ def pushed(rho, theta, phi):
                  fixed=(base, with_(poke, motion=with_(poke.motion, translation=path), until=None)))
 
 
-SHEAR3 = Study("shear3", SPEEDS, (2, 5), lambda v: sheared(3, v))
-SHEAR17 = Study("shear17", SPEEDS, (2, 5), lambda v: sheared(17, v))
-PUSHES = Study("push", np.array([(rho, theta, phi) for rho in RHO for theta in THETA
-                                 for phi in PHI]), drawn(5, 27), pushed)
+SHEAR3 = LdmStudy("shear3", SPEEDS, (2, 5), lambda v: sheared(3, v))
+SHEAR17 = LdmStudy("shear17", SPEEDS, (2, 5), lambda v: sheared(17, v))
+PUSHES = LdmStudy("push", np.array([(rho, theta, phi) for rho in RHO for theta in THETA
+                                    for phi in PHI]), draw_tests(5, 27), pushed)
 WORKSHOP = {study.name: study for study in (SHEAR3, SHEAR17, PUSHES)}

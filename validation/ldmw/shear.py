@@ -1,9 +1,9 @@
 """One step of a sheared cylinder: which terms of the loss are needed (Table 1), and the two
 hyper-reductions (Table 2), LDMW-unit.
 
-A step from rest is linear in the speed, so that one POD mode is exact: it stands beside. Forces are
-zero in it, but for those of a learned F that is not the identity at rest: errors without any force
-stand beside, too.
+A step from rest is linear in the speed, so that one POD mode is exact: its errors are recorded too.
+Forces are zero in the step, but for those of a learned F that is not the identity at rest: errors
+without any force are recorded as well.
 """
 
 from dataclasses import replace
@@ -13,7 +13,7 @@ import numpy as np
 from ..common.registry import experiment
 from ..ldm.networks import NEITHER, NO_F, WORKSHOP
 from ..ldm.workshop_studies import SHEAR3, SHEAR17
-from .runs import by_nodes, by_points, pod, record, runs, spread
+from .runs import by_nodes, by_points, pod, record, spread, study_runs
 
 R, HYPER = 1, 6             # latent coordinates; sample points of the hyper-reduction
 LOSSES = {"none": NEITHER, "temporal": NO_F, "both": WORKSHOP}
@@ -23,14 +23,14 @@ LOSSES = {"none": NEITHER, "temporal": NO_F, "both": WORKSHOP}
             profiles=("quick", "standard"), budget={"quick": 5, "standard": 5})
 def losses(run):
     """Errors by the terms of the loss; with the printed weights read as SI units; of POD."""
-    tests = of(run, SHEAR3)
+    tests = test_runs(run, SHEAR3)
     every = by_points(np.arange(len(tests.X)))
     for row, terms in LOSSES.items():
         net, name = f"shear3-{terms}", f"ldmw.table1.{row}"
-        record(run, name, tests.of_net(net, every), tests.scale)
-        record(run, f"{name}.forceless", tests.of_net(net, forceless(every)), tests.scale,
+        record(run, name, tests.network_errors(net, every), tests.scale)
+        record(run, f"{name}.forceless", tests.network_errors(net, forceless(every)), tests.scale,
                comparator="info")
-    record(run, "ldmw.table1.printed", tests.of_net("shear3-printed", every), tests.scale,
+    record(run, "ldmw.table1.printed", tests.network_errors("shear3-printed", every), tests.scale,
            "lambda_1 = 1e4 and lambda_2 = 0.01 in SI units", comparator="info")
     record(run, "ldmw.table1.pod", tests.errors(*pod(SHEAR3, R), every), tests.scale,
            comparator="info")
@@ -40,20 +40,20 @@ def losses(run):
             profiles=("quick", "standard"), budget={"quick": 5, "standard": 5})
 def approaches(run):
     """Errors of both approaches, with all points and with a few; of POD."""
-    tests = of(run, SHEAR17)
-    every, some = np.arange(len(tests.X)), spread(tests.X, HYPER)
+    tests = test_runs(run, SHEAR17)
+    every, few = np.arange(len(tests.X)), spread(tests.X, HYPER)
     rows = {"point": by_points(every), "node": by_nodes(every),
-            f"point_hyper{HYPER}": by_points(some), f"node_hyper{HYPER}": by_nodes(some, HYPER)}
+            f"point_hyper{HYPER}": by_points(few), f"node_hyper{HYPER}": by_nodes(few, HYPER)}
     for row, approach in rows.items():
-        record(run, f"ldmw.table2.{row}", tests.of_net("shear17", approach), tests.scale)
+        record(run, f"ldmw.table2.{row}", tests.network_errors("shear17", approach), tests.scale)
         record(run, f"ldmw.table2.{row}.pod", tests.errors(*pod(SHEAR17, R), approach),
                tests.scale, comparator="info")
 
 
 def forceless(approach):
-    """An approach whose material resists nothing."""
-    def softened(one, map):
-        stepper, choose = approach(one, map)
+    """Return an approach whose material has no stress."""
+    def softened(one, g):
+        stepper, choose = approach(one, g)
         field = stepper.field
         law = type(field.law)(*np.zeros(len(field.law)).tolist())
         return replace(stepper, field=field._replace(law=law)), choose
@@ -61,6 +61,6 @@ def forceless(approach):
     return softened
 
 
-def of(run, study):
-    """Test runs of a profile."""
-    return runs(study, study.test[:run.choose(quick=1, standard=None)])
+def test_runs(run, study):
+    """Return the `StudyRuns` of a profile's tests."""
+    return study_runs(study, study.test[:run.choose(quick=1, standard=None)])

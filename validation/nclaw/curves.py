@@ -1,16 +1,15 @@
-"""How the errors of NCLaw's laws fall in training, as their weights tell (the inset of section
-4.7 among them); of graph networks, how far off they run freely.
+"""Errors of NCLaw's laws in training, as stored with their weights (the inset of section 4.7 among
+them), and errors of graph networks in free runs.
 """
 
 from mpm_ref.materials.learned.weights import errors_include_velocities
 from mpm_ref.nclaw.gnn.simulator import Simulator
 
 from ..common.registry import experiment
-from .diverged import diverged
 from .simulators import GraphNet
 from .strain_bounds import LABELED
-from .tables import known, method_of
-from .trained_laws import identity, nets
+from .tables import available_laws, method_of
+from .trained_laws import diverged, identity, nets
 
 STEP = {"unit": "m^2", "note": "mean over steps from restarts of the horizon of that epoch"}
 MIXED = {"unit": "m^2", "note": f"{STEP['note']}; the loss's term of velocities is in it, which "
@@ -26,19 +25,19 @@ def loss(run):
     laws, which follow no motion, and where velocities are mixed in, first and last error alone.
     """
     rows = []
-    for method, own in known(run).items():
-        for name, laws in own.items():
+    for method, by_environment in available_laws(run).items():
+        for name, laws in by_environment.items():
             if isinstance(laws, Simulator):
                 record_picked(run, f"nclaw.loss.{method}.{name}", laws.about)
                 continue
-            errors, of = laws.about["errors"], kind_of(method, laws.about)
-            record(run, f"nclaw.loss.{method}.{name}", errors, of)
-            rows += rows_of(method, name, errors, of)
-    run.table("errors", COLUMNS, rows + of_diverged(run))
+            errors, kind = laws.about["errors"], error_kind(method, laws.about)
+            record(run, f"nclaw.loss.{method}.{name}", errors, kind)
+            rows += table_rows(method, name, errors, kind)
+    run.table("errors", COLUMNS, rows + diverged_rows(run))
 
 
-def of_diverged(run):
-    """Rows of the trainings that diverged; records how far they came."""
+def diverged_rows(run):
+    """Record the epochs of the trainings that diverged, and return their rows."""
     rows = []
     for name, net in nets().items():
         about = None if isinstance(net, GraphNet) else diverged(name, identity(net))
@@ -48,31 +47,31 @@ def of_diverged(run):
         run.record(f"nclaw.loss.{method}.{net.environment}.epochs", len(errors), unit="epochs",
                    comparator="info", scale=f"of {net.epochs} epochs",
                    note=f"the training diverged: {about['stopped']}")
-        rows += rows_of(method, net.environment, errors, kind_of(method, about))
+        rows += table_rows(method, net.environment, errors, error_kind(method, about))
     return rows
 
 
-def rows_of(method, name, errors, of):
-    """Rows of the table, if the errors are those of a step."""
-    return [(method, name, epoch, error) for epoch, error in enumerate(errors, 1) if of is STEP]
+def table_rows(method, name, errors, kind):
+    """Return rows of the table, if the errors are those of a step."""
+    return [(method, name, epoch, error) for epoch, error in enumerate(errors, 1) if kind is STEP]
 
 
-def kind_of(method, about):
-    """What the errors of a training are: unit and note."""
+def error_kind(method, about):
+    """Return the unit of a training's errors, and a note on them."""
     if method == LABELED:
         return ANSWER
     return MIXED if errors_include_velocities(about) else STEP
 
 
-def record(run, target, errors, of):
-    """Record where a training began and ended; of: unit and note."""
+def record(run, target, errors, kind):
+    """Record the first and the last error of a training; kind: unit and note."""
     for word, error in (("first", errors[0]), ("last", errors[-1])):
         run.record(f"{target}.{word}", error, comparator="info", scale=f"{len(errors)} epochs",
-                   **of)
+                   **kind)
 
 
 def record_picked(run, target, about):
-    """Record what a graph network was picked for."""
+    """Record the error for which a graph network was picked."""
     errors, checks = about["errors"], len(about["errors"])
     run.record(f"{target}.picked", errors[about["picked"]], unit="m^2", comparator="info",
                scale=f"{about['steps']} steps, {checks} checks",

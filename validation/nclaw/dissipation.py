@@ -1,5 +1,5 @@
-"""Whether laws create energy: closed strain cycles of one element, and the returns of whole runs
-(see `mpm_ref.nclaw.dissipation`).
+"""Energy that laws take away or create, in closed strain cycles of one element and in the returns
+of whole runs (see `mpm_ref.nclaw.dissipation`).
 """
 
 from functools import partial
@@ -33,8 +33,8 @@ CYCLES = ("method", "environment", "size", "cycles", "least_share", "least_work"
 RUNS = ("method", "environment", "steps", "taken", "created", "thrown", "why")
 
 
-class Pair(NamedTuple):
-    """What a body is made of."""
+class MaterialLaws(NamedTuple):
+    """The elastic and the plastic law of a body."""
 
     law: tuple
     flow: tuple
@@ -46,15 +46,15 @@ def dissipation(run):
     """True laws, the paper's network, and laws that thermodynamics admits, which are what its
     conclusion leaves for later: cycles from rest, and the training runs.
     """
-    laws = known(run)
+    laws = tested_laws(run)
     n, steps = run.choose(quick=(20, 100), standard=(1000, 200))
     length = run.choose(quick=50, standard=environment(ENVIRONMENTS[0]).steps)
     closed = {size: loops(n, size, steps, run.rng) for size in SIZES}
     cycles, runs = [], []
     for (method, name), pair in run.progress(laws.items(), "laws"):
         cycles += [(method, name, size, n, *cycled(pair, G)) for size, G in closed.items()]
-        found = run.cached(f"{method}.{name}", partial(returns, name, pair, length))
-        runs.append((method, name, length, *found))
+        energies = run.cached(f"{method}.{name}", partial(returns, name, pair, length))
+        runs.append((method, name, length, *energies))
     run.table("cycles", CYCLES, cycles)
     run.table("runs", RUNS, runs)
     for row in cycles:
@@ -63,39 +63,40 @@ def dissipation(run):
         record_run(run, row)
 
 
-def known(run):
-    """{(method, environment): `Pair`}; records which weights are not there yet."""
+def tested_laws(run):
+    """Return {(method, environment): `MaterialLaws`}; record which weights are missing."""
     names = {(method, name): weights_of(method, name)
              for name, method in product(ENVIRONMENTS, METHODS)}
     laws = load_available(run, names.values(), trained)
     true = {(TRUE, name): build(environment(name)).bodies[0] for name in ENVIRONMENTS}
-    return {**{key: Pair(body.law, body.flow) for key, body in true.items()},
-            **{key: Pair(learned_law(laws[name].elastic), learned_flow(laws[name].plastic))
+    return {**{key: MaterialLaws(body.law, body.flow) for key, body in true.items()},
+            **{key: MaterialLaws(learned_law(laws[name].elastic), learned_flow(laws[name].plastic))
                for key, name in names.items() if name in laws}}
 
 
 def cycled(pair, G):
-    """The least share and work [J/m^3] of a cycle, the share of cycles that create energy, and the
-    mean share.
+    """Return the least share and work [J/m^3] of a cycle, the share of cycles that create energy,
+    and the mean share.
     """
-    found = balance(*pair, G)
-    creating = np.mean(found.share < -CREATED)
-    return tuple(map(float, (found.share.min(), found.work.min(), creating, found.share.mean())))
+    cycles = balance(*pair, G)
+    creating = np.mean(cycles.share < -CREATED)
+    return tuple(map(float, (cycles.share.min(), cycles.work.min(), creating,
+                             cycles.share.mean())))
 
 
 def returns(name, pair, steps):
-    """Energy that the returns of a training run take away and create [J], that of its motion at the
-    start [J], and why it ended before so many steps, if it did.
+    """Return the energy that the returns of a training run take away and create [J], that of its
+    motion at the start [J], and why it ended before so many steps, if it did.
     """
     problem = build(environment(name, steps=steps, every=1))
-    body, found, why = body_with_laws(problem.bodies[0], *pair), [], ""
+    body, energies, why = body_with_laws(problem.bodies[0], *pair), [], ""
     thrown = float(kinetic(body.particles).sum())
     with threads_for(problem.bodies):
         try:
-            found += taken(body, pair.law, positions(problem, (body,)), problem.clock.dt)
+            energies += taken(body, pair.law, positions(problem, (body,)), problem.clock.dt)
         except RunBroken as end:
             why = str(end)
-    a = np.array(found)
+    a = np.array(energies)
     return float(a[a > 0.0].sum()), float(-a[a < 0.0].sum()), thrown, why
 
 
@@ -114,7 +115,7 @@ def taken(body, law, frames, dt):
 
 
 def record_cycles(run, row, steps):
-    """Record what cycles of a law gave."""
+    """Record the work of a law's cycles."""
     method, name, size, n, least, work, creating, _ = row
     target = f"nclaw.dissipation.{method}.{name}.cycles.{size}"
     scale = f"{n} cycles, {steps} steps each"
@@ -128,7 +129,7 @@ def record_cycles(run, row, steps):
 
 
 def record_run(run, row):
-    """Record what the returns of a run took away, and what they created beside."""
+    """Record the energy that the returns of a run took away, and that which they created."""
     method, name, steps, taken, created, thrown, why = row
     target, scale = f"nclaw.dissipation.{method}.{name}.run", f"{steps} steps"
     rule = {"comparator": "<=", "bound": ROUND_OFF} if method in BOUND else {"comparator": "info"}

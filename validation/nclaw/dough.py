@@ -3,7 +3,7 @@
 A known material stands for the dough, that of the authors' release: von Mises at 1 kPa on E = 10
 kPa, nu = 0.25. (The release gives stresses an E of 1 MPa beside it; here both laws have one.) It
 has fallen half a metre when the run begins, one cell above the floor, a corner first. A camera
-sees the points of the front layer, about fifty, at 960 frames a second, each place off by noise.
+observes the points of the front layer, about fifty, at 960 frames a second, with noise.
 Laws learn from those places alone, with the paper's prior that velocities in depth are small, and
 from how the run began. What they do is then compared with the truth, which is known here: on the
 run that was filmed, and on a star.
@@ -31,7 +31,7 @@ from mpm_ref.scene import (
     Walls,
 )
 
-from .trained_laws import named, stored
+from .trained_laws import scene_digest, stored
 
 FRAMES_PER_SECOND, EVERY, FRAMES = 960, 3, 40       # steps between frames; frames after the first
 DX, NODES, WALL = 0.01, 24, 3                       # [m], per axis, in each wall
@@ -46,7 +46,7 @@ NOISE, SEED = 0.5, 0                                # of each coordinate in the 
 
 
 class DoughNet(NamedTuple):
-    """Laws that are trained on the film, and how."""
+    """Settings of the training of laws on the images."""
 
     elastic: str = "Stress"
     plastic: str = "Correction"
@@ -61,38 +61,38 @@ class DoughNet(NamedTuple):
 
 
 def doughs():
-    """{name: `DoughNet`}."""
+    """Return {name: `DoughNet`} of all trainings."""
     return {"dough": DoughNet(), "dough-free": DoughNet(depth=0.0),
             "dough-admissible": DoughNet("Energetic", "Contraction", "admissible", guessed=0)}
 
 
 def material(E=E, nu=NU, tau_y=TAU_Y):
-    """The dough, or a guess of it."""
+    """Return the material of the dough, or a guess of it."""
     return Material(law="hencky", E=E, nu=nu, flow=Flow(name="von_mises", tau_y=tau_y, s_min=0.05))
 
 
 def block():
-    """A block that stands on a corner."""
+    """Return a block that stands on a corner."""
     box = Box(lower=(-0.035, -0.025, -0.015), upper=(0.035, 0.025, 0.015))
     return turned(box, 20.0, (MIDDLE, 0.075, MIDDLE))
 
 
 def star():
-    """A flat star of five arms."""
+    """Return a flat star of five arms."""
     arm = Box(lower=(-0.009, 0.0, -0.015), upper=(0.009, 0.045, 0.015))
     return turned(Union(shapes=tuple(turned(arm, 72.0 * k) for k in range(5))), 10.0,
                   (MIDDLE, 0.09, MIDDLE))
 
 
 def turned(shape, angle, translate=(0.0, 0.0, 0.0)):
-    """A shape turned about the axis of depth [degrees], then shifted."""
+    """Return a shape turned about the axis of depth [degrees], then shifted."""
     return Transformed(shape=shape, angle=angle, axis=DEPTH, about=(0.0, 0.0, 0.0),
                        translate=translate)
 
 
-def scene(shape, of=None):
-    """The end of the fall of a shape, of a material."""
-    body = Body(name="dough", density=1000.0, shape=shape, material=of or material(),
+def scene(shape, dough=None):
+    """Return the scene of the end of the fall of a shape; dough: its material (default: true)."""
+    body = Body(name="dough", density=1000.0, shape=shape, material=dough or material(),
                 sampling=Lattice(spacing=SPACING),
                 velocity=Velocity(linear=(0.0, -sqrt(2.0 * G * DROP), 0.0)))
     return Scene(
@@ -104,22 +104,22 @@ def scene(shape, of=None):
 
 
 def camera():
-    """P (3, 4) of the camera, in front of where the body comes down."""
+    """Return P (3, 4) of the camera, in front of where the body comes down."""
     return pinhole((MIDDLE, 0.06, MIDDLE + BACK), FOCAL, CENTER)
 
 
-def film(x):
-    """`Marks` that the camera sees in true frames x (f + 1, n, 3) of the run."""
+def observe(x):
+    """Return the `Marks` that the camera observes in true frames x (f + 1, n, 3) of the run."""
     return observe_marks(camera(), x, front_layer(x[0]), NOISE, np.random.default_rng(SEED))
 
 
 @cache
 def trained(name):
-    """`LearnedLaws` of `doughs` by name; errors as of `nets.trained`."""
+    """Return the `LearnedLaws` of `doughs` by name; raises as `trained_laws.trained` does."""
     return stored(name, identity(doughs()[name]))
 
 
 def identity(net):
-    """What a training is of, plain values."""
-    return {"scene": named(scene(block())), "camera": camera().ravel().tolist(), "noise": NOISE,
-            "noise_seed": SEED, **net._asdict()}
+    """Return the plain values that identify a training."""
+    return {"scene": scene_digest(scene(block())), "camera": camera().ravel().tolist(),
+            "noise": NOISE, "noise_seed": SEED, **net._asdict()}

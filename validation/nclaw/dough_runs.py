@@ -1,4 +1,4 @@
-"""What laws learned from the film of the dough do: on the run that was filmed, and on a star."""
+"""Errors of laws learned from images of the dough: on the run that was filmed, and on a star."""
 
 from functools import partial
 from typing import NamedTuple
@@ -12,7 +12,6 @@ from mpm_ref.nclaw.camera import project
 from ..common.registry import experiment
 from ..common.weights_needed import load_available
 from ..ldm.published_bodies import keep
-from .diverged import diverged
 from .dough import (
     DROP,
     EVERY,
@@ -22,23 +21,24 @@ from .dough import (
     block,
     camera,
     doughs,
-    film,
     identity,
     material,
+    observe,
     scene,
     star,
     trained,
 )
 from .initial_laws import untrained
 from .states import shots
+from .trained_laws import diverged
 
 BODIES = {"block": block, "star": star}
 COLUMNS = ("laws", "pixels", "block", "star", "broken")
 INFO = {"comparator": "info"}
 
 
-class Row(NamedTuple):
-    """How far laws are off; NaN where a run broke down."""
+class DoughRow(NamedTuple):
+    """Errors of laws; NaN where a run broke down."""
 
     laws: str
     pixels: float       # root mean square distance of marks in the image [px]
@@ -57,10 +57,10 @@ def dough(run):
     runs = {name: {body: shots(scene(shape()), law) for body, shape in BODIES.items()}
             for name, law in run.progress(laws.items(), "laws")}
     truth = runs["true"]
-    marks = film(truth["block"])
-    rows = [row(name, found, truth, marks) for name, found in runs.items()]
-    keep(run, **{f"{body}_{name}": x[::(len(x) - 1) // 2] for name, found in runs.items()
-                 for body, x in found.items()})
+    marks = observe(truth["block"])
+    rows = [row(name, frames, truth, marks) for name, frames in runs.items()]
+    keep(run, **{f"{body}_{name}": x[::(len(x) - 1) // 2] for name, frames in runs.items()
+                 for body, x in frames.items()})
     record_settings(run, marks, truth["block"])
     for one in rows:
         record(run, one, len(truth["star"][0]))
@@ -68,7 +68,7 @@ def dough(run):
 
 
 def contestants(run):
-    """{name: what makes a body of other laws}; records which weights are not there yet."""
+    """Return {name: function that gives a body other laws}; record which weights are missing."""
     laws = load_available(run, doughs(), trained)
     for name, net in doughs().items():
         about = diverged(name, identity(net))
@@ -81,29 +81,29 @@ def contestants(run):
 
 
 def guessed(body):
-    """A body of the wrong guess."""
-    of = material(**GUESS)
-    law = of.elastic()
-    return body_with_laws(body, law, make_flow(of.flow.type, law, 3, tau_y=of.flow.tau_y,
-                                      s_min=of.flow.s_min))
+    """Return a body with the laws of the wrong guess."""
+    guess = material(**GUESS)
+    law, flow = guess.elastic(), guess.flow
+    return body_with_laws(body, law, make_flow(flow.name, law, 3, tau_y=flow.tau_y,
+                                               s_min=flow.s_min))
 
 
-def row(name, found, truth, marks):
-    """`Row` of laws whose frames of both bodies were found."""
-    seen = project(camera(), found["block"][:, marks.points])
-    off = {body: apart(x, truth[body]) for body, x in found.items()}
-    broken = " and ".join(body for body, x in found.items() if np.isnan(x).any())
-    return Row(name, apart(seen, marks.places), *off.values(), broken)
+def row(name, frames, truth, marks):
+    """Return the `DoughRow` of laws from the frames of both bodies."""
+    image = project(camera(), frames["block"][:, marks.points])
+    errors = {body: rms_distance(x, truth[body]) for body, x in frames.items()}
+    broken = " and ".join(body for body, x in frames.items() if np.isnan(x).any())
+    return DoughRow(name, rms_distance(image, marks.places), *errors.values(), broken)
 
 
-def apart(a, b):
-    """Root mean square distance of points (.., d)."""
+def rms_distance(a, b):
+    """Return the root mean square distance of points (.., d)."""
     return float(np.sqrt(np.mean(np.sum((a - b) ** 2, axis=-1))))
 
 
 def record_settings(run, marks, x):
-    """Record the printed settings, and how fast the true body moves in depth, which the prior of
-    training wants small.
+    """Record the printed settings, and the speed of the true body in depth, which the prior of
+    training takes to be small.
     """
     scale = "synthetic"
     run.record("nclaw.appD3.drop_height", 100.0 * DROP, scale=scale)
@@ -116,12 +116,13 @@ def record_settings(run, marks, x):
 
 
 def record(run, one, points):
-    """Record a `Row`."""
+    """Record a `DoughRow`."""
     target = partial("nclaw.dough.{}.{}".format, one.laws)
     note = f"runs that broke down: {one.broken}" if one.broken else ""
     run.record(target("pixels"), one.pixels, unit="px", **INFO, scale=f"{EVERY} steps a frame",
-               note="; ".join(filter(None, (f"marks seen with noise of {NOISE} px along each axis",
-                                            note))))
+               note="; ".join(filter(None,
+                                     (f"marks observed with noise of {NOISE} px along each axis",
+                                      note))))
     run.record(target("block"), one.block, unit="m", **INFO, scale="the run that was filmed",
                note=note)
     run.record(target("star"), one.star, unit="m", **INFO,

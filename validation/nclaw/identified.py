@@ -1,4 +1,4 @@
-"""How far laws are off by themselves, not through a run (Table 5)."""
+"""Errors of laws themselves, without a run (Table 5)."""
 
 import numpy as np
 
@@ -30,37 +30,39 @@ def table5(run):
     F, trial = drawn(trajectory(NAME), environment(NAME).dt)
     truth = answers(law, NoFlow(), F, trial)[0], without_shear(trial)
     for name, laws in load_available(run, METHODS, trained).items():
-        found = answers(learned_law(laws.elastic), learned_flow(laws.plastic), F, trial)
-        for (term, unit), a, b in zip(TERMS.items(), found, truth, strict=True):
+        learned = answers(learned_law(laws.elastic), learned_flow(laws.plastic), F, trial)
+        for (term, unit), a, b in zip(TERMS.items(), learned, truth, strict=True):
             run.record(f"nclaw.table5.{term}.{METHODS[name]}", np.mean((a - b) ** 2), unit=unit,
                        scale=f"{POINTS} points of the training run, seed {SEED}", **RULES[term])
     unchanged(run, trial, truth[1])
 
 
 def unchanged(run, trial, F):
-    """Record how far off a law is that returns the trial as it is."""
+    """Record the error of a law that returns the trial gradient unchanged."""
     run.record("nclaw.table5.Fnew.unchanged", np.mean((trial - F) ** 2), unit="1",
                comparator="info", scale=f"{POINTS} points of the training run, seed {SEED}",
                note="of a law that answers F_trial")
 
 
 def drawn(observed, dt):
-    """Deformation gradients (n, 3, 3) of random points and steps of a run, and the trial ones that
-    follow.
+    """Return deformation gradients (n, 3, 3) of random points and steps of a run, and the trial
+    ones that follow.
     """
     steps, points = len(observed.F) - 1, observed.F.shape[1]
-    at = np.random.default_rng(SEED).integers((steps, points), size=(POINTS, 2)).T
-    F, C = observed.F[*at], observed.C[at[0] + 1, at[1]]
+    step, point = np.random.default_rng(SEED).integers((steps, points), size=(POINTS, 2)).T
+    F, C = observed.F[step, point], observed.C[step + 1, point]
     return F, F + dt * C @ F
 
 
 def without_shear(F):
-    """J^(1/3) I of gradients F (n, 3, 3), NCLAW-eq21; that of `FluidProjection` is turned as F."""
+    """Return J^(1/3) I of gradients F (n, 3, 3), NCLAW-eq21; `FluidProjection` returns it rotated
+    as F.
+    """
     return np.linalg.det(F)[:, None, None] ** (1.0 / 3.0) * np.eye(3)
 
 
 def answers(law, flow, F, trial):
-    """P (n, 3, 3) [Pa] of F and F of trial gradients (n, 3, 3) by a law and a flow."""
+    """Return P (n, 3, 3) [Pa] of F and F of trial gradients (n, 3, 3) by a law and a flow."""
     elastic, plastic = points(law, NoFlow(), F), points(law, flow, trial)
     initial_stress(elastic)
     deform_body(plastic, 0.0)
@@ -68,7 +70,7 @@ def answers(law, flow, F, trial):
 
 
 def points(law, flow, F):
-    """A `Body` at rest whose deformation gradients are F (n, 3, 3)."""
+    """Return a `Body` at rest whose deformation gradients are F (n, 3, 3)."""
     n = len(F)
     still, one = np.zeros((n, 3)), np.ones(n)
     particles = particles_at(still, still, one, one)._replace(F=F.copy())

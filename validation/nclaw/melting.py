@@ -17,24 +17,24 @@ HOLD = 20                   # steps between changes
 
 
 def melting(problem, before, after):
-    """Positions (n, 3) of the points of a problem's one body at the start and at each frame; NaN
-    from where it breaks down on.
+    """Yield positions (n, 3) of the points of a problem's one body at the start and at each frame;
+    NaN from where it breaks down on.
 
     before, after: functions that make of a body the same one of other laws. Frames are multiples of
     `HOLD` steps.
     """
     missing = 1 + problem.clock.steps // problem.clock.every
-    for x in as_far(problem, before, after):
+    for x in valid_positions(problem, before, after):
         missing -= 1
         yield x
     for _ in range(missing):
         yield np.full_like(x, np.nan)
 
 
-def as_far(problem, before, after):
-    """`melting` as far as every point has a finite place."""
+def valid_positions(problem, before, after):
+    """Yield the positions of `melting` as long as every point has a finite place."""
     clock, stepper = problem.clock, problem.stepper()
-    state = whole([before(problem.bodies[0])])
+    state = joined_body([before(problem.bodies[0])])
     rank = np.argsort(np.argsort(state.particles.x[:, 1]))
     yield state.particles.x.copy()
     for k in range(0, clock.steps, HOLD):
@@ -42,17 +42,17 @@ def as_far(problem, before, after):
         parts = [law(part(state, which)) for law, which in ((before, ~melted), (after, melted))
                  if which.any()]
         try:
-            hold(problem, stepper, parts, k)
+            step_parts(problem, stepper, parts, k)
         except OutOfRange:
             return
-        state = whole(parts)
+        state = joined_body(parts)
         if not np.isfinite(state.particles.x).all():
             return
         if (k + HOLD) % clock.every == 0:
             yield state.particles.x.copy()
 
 
-def hold(problem, stepper, parts, k):
+def step_parts(problem, stepper, parts, k):
     """Move parts from step k on until points change again. Raises `OutOfRange`."""
     dt = problem.clock.dt
     stepper.start(parts)
@@ -63,20 +63,20 @@ def hold(problem, stepper, parts, k):
 
 
 def melted_points(step, n):
-    """How many of n points have changed."""
+    """Return the number of n points that have changed."""
     return round(n * min(max((step - FIRST) / (LAST - FIRST), 0.0), 1.0))
 
 
 def part(body, which):
-    """The points of a body for which `which` (n,) is set; ids are those of the whole."""
+    """Return the points of a body for which `which` (n,) is set, with their ids in that body."""
     q = body.particles
     particles = particles_at(*(a[which] for a in (q.x, q.v, q.m, q.V0)))
     particles.C[:], particles.F[:] = q.C[which], q.F[which]
     return Body(body.name, particles, body.law, body.flow, body.id[which])
 
 
-def whole(parts):
-    """One body of all points of some parts, in their own order."""
+def joined_body(parts):
+    """Return one body of all points of some parts, in their own order."""
     ids = np.concatenate([one.id for one in parts])
     x, v, m, V0, C, F = (
         restore_order(np.concatenate([getattr(one.particles, name) for one in parts]), ids)

@@ -1,4 +1,4 @@
-"""How long NCLaw's laws and graph networks take (Table 3): half a second of each environment."""
+"""Times of NCLaw's laws and graph networks (Table 3): half a second of each environment."""
 
 from time import perf_counter, process_time
 
@@ -12,7 +12,7 @@ from ..common.registry import experiment
 from ..common.scenes import threads_for, with_
 from ..common.weights_needed import load_available
 from .environments import ENVIRONMENTS, environment
-from .errors import PRINTED, ready
+from .errors import PRINTED, run_of_laws
 from .evaluate import frames
 from .simulators import GraphNet
 from .trained_laws import nets, trained, weights_of
@@ -28,39 +28,39 @@ LOST = "broke down, so that no time stands here"
 @experiment("nclaw.table3", title="NCLaw: times of runs",
             profiles=("quick", "standard"), budget={"quick": 15, "standard": 1200})
 def table3(run):
-    """Ours and graph networks beside the true laws, in turn, on the threads that are given; for
+    """Ours and graph networks and the true laws, in turn, on the threads that are given; for
     orientation, since the paper's machine is another.
     """
     steps, rows = run.choose(quick=20, standard=1000), []
     names = [weights_of(word, name) for name in ENVIRONMENTS for word in METHODS]
-    found = load_available(run, names, trained)
+    models = load_available(run, names, trained)
     for name in run.progress(ENVIRONMENTS, "environments"):
-        laws = methods(name, found)
+        laws = methods(name, models)
         if laws:
             times = timed(environment(name, steps=steps), {**laws, TRUE: copy_body},
                           REPEATS[run.profile])
-            rows += [(name, word, *one) for word, some in times.items() for one in some]
+            rows += [(name, word, *one) for word, repeats in times.items() for one in repeats]
             for word in laws:
                 record(run, (name, word), times, steps)
     run.table("times", COLUMNS, rows)
 
 
-def methods(name, found):
-    """{method: what `frames` runs} of an environment, of those whose weights are found."""
+def methods(name, models):
+    """Return {method: argument of `frames`} of an environment, for methods that have `models`."""
     names = {word: weights_of(word, name) for word in METHODS}
-    return {word: ready(found[key]) for word, key in names.items() if key in found}
+    return {word: run_of_laws(models[key]) for word, key in names.items() if key in models}
 
 
 def timed(scene, laws, repeats):
-    """{name: [(wall, CPU)]} [s] of runs of a scene by {name: law}, in turn."""
+    """Return {name: [(wall, CPU)]} [s] of runs of a scene by {name: law}, in turn."""
     for law in laws.values():
-        took(with_(scene, steps=scene.every), law)      # compiles
-    turns = [{word: took(scene, law) for word, law in laws.items()} for _ in range(repeats)]
+        run_times(with_(scene, steps=scene.every), law)      # compiles
+    turns = [{word: run_times(scene, law) for word, law in laws.items()} for _ in range(repeats)]
     return {word: [one[word] for one in turns] for word in laws}
 
 
-def took(scene, law):
-    """Wall and CPU time [s] of a run; NaN of one that broke down."""
+def run_times(scene, law):
+    """Return the wall and CPU time [s] of a run; NaN of one that broke down."""
     problem = build(scene)
     with threads_for(problem.bodies):
         run = frames(problem, law)
@@ -81,10 +81,10 @@ def record(run, key, times, steps):
     (name, word), scale = key, f"1000 particles, {steps} steps"
     wall, cpu = np.median(times[word], axis=0)
     net = nets()[weights_of(word, name)]
-    words = [NOTE.format(len(times[word])), net.said if isinstance(net, GraphNet) else "",
+    notes = [NOTE.format(len(times[word])), net.description if isinstance(net, GraphNet) else "",
              "" if np.isfinite(wall) else LOST]
     target, rule = f"nclaw.table3.{word}.{PRINTED[name]}", {"comparator": "info", "scale": scale}
-    run.record(target, wall, note="; ".join(filter(None, words)), **rule)
+    run.record(target, wall, note="; ".join(filter(None, notes)), **rule)
     run.record(f"{target}.cpu", cpu / (1000 * steps), unit="s",
                note="CPU time of a step, per particle", **rule)
     run.record(f"{target}.over_true", cpu / np.median(times[TRUE], axis=0)[1], unit="1",

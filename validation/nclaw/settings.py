@@ -1,5 +1,5 @@
-"""What NCLaw and its release print of environments, networks, trainings and tasks, beside what is
-run here.
+"""Printed settings of NCLaw and its release, of environments, networks, trainings and tasks,
+compared with those of this code.
 
 Not here: what was weighed, kneaded and filmed for the dough, what other papers used, and that laws
 learn from one trajectory, which nothing here could have otherwise.
@@ -33,31 +33,31 @@ GRAPHS = named(JELLY, COUNTS[0])
 @experiment("nclaw.settings", title="Settings that NCLaw's text prints",
             profiles=("quick", "standard"), budget={"quick": 6, "standard": 6})
 def settings(run):
-    """Of the scenes nclaw_*.toml, of trained weights, and of the tasks."""
+    """Settings of the scenes nclaw_*.toml, of trained weights, and of the tasks."""
     scenes = {name: catalogue_scene(f"nclaw_{name}") for name in ENVIRONMENTS}
     jelly = scenes[JELLY]
-    record_settings(run, f"nclaw_{JELLY}", of_environment(jelly, len(scenes)))
-    record_settings(run, "nclaw_*", of_release(scenes))
-    found = load_available(run, (JELLY, GRAPHS), trained)
-    if JELLY in found:
-        record(run, f"weights {JELLY}.npz", {**of_networks(found[JELLY]),
-                                             **of_training(found[JELLY].about["recipe"])})
-    if GRAPHS in found:
-        record(run, f"weights {GRAPHS}.npz", of_graphs(found[GRAPHS], jelly))
-    record(run, "validation/nclaw/tasks.py", of_tasks(jelly))
-    record(run, "validation/nclaw/gallery.py", of_bodies())
-    record(run, "validation/nclaw", of_measurements())
+    record_settings(run, f"nclaw_{JELLY}", environment_settings(jelly, len(scenes)))
+    record_settings(run, "nclaw_*", release_settings(scenes))
+    models = load_available(run, (JELLY, GRAPHS), trained)
+    if JELLY in models:
+        record(run, f"weights {JELLY}.npz", {**network_settings(models[JELLY]),
+                                             **training_settings(models[JELLY].about["recipe"])})
+    if GRAPHS in models:
+        record(run, f"weights {GRAPHS}.npz", graph_settings(models[GRAPHS], jelly))
+    record(run, "validation/nclaw/tasks.py", task_settings(jelly))
+    record(run, "validation/nclaw/gallery.py", body_settings())
+    record(run, "validation/nclaw", measurement_settings())
 
 
 def record(run, scale, values):
-    """Record {target id: our value}; scale: where it stands."""
+    """Record {target id: our value}; scale: the file that has it."""
     for target, value in values.items():
         run.record(target, value, scale=scale)
 
 
-def of_environment(scene, materials):
-    """Section 4.1 and Appendix D.1: of one of so many scenes, whose walls, in cells from the
-    origin, are as far from both ends of the box.
+def environment_settings(scene, materials):
+    """Return the settings of section 4.1 and appendix D.1, from one of `materials` scenes, whose
+    walls, in cells from the origin, are as far from both ends of the box.
     """
     low, high = scene.body[0].shape.lower, scene.body[0].shape.upper
     walls = scene.walls
@@ -72,26 +72,28 @@ def of_environment(scene, materials):
         "nclaw.appF1.real_time": scene.steps * scene.dt, "nclaw.appF1.steps_ours": scene.steps}
 
 
-def of_release(scenes):
-    """Constants that the text leaves out and the authors' release sets."""
-    of = {name: scene.body[0].material for name, scene in scenes.items()}
+def release_settings(scenes):
+    """Return the constants that the text leaves out and the authors' release sets."""
+    materials = {name: scene.body[0].material for name, scene in scenes.items()}
     v = scenes[JELLY].body[0].velocity
     return {
-        "nclaw.ext.jello.E": of["jelly"].E, "nclaw.ext.jello.nu": of["jelly"].nu,
-        "nclaw.ext.sand.E": of["sand"].E, "nclaw.ext.sand.nu": of["sand"].nu,
-        "nclaw.ext.sand.friction_deg": of["sand"].flow.friction_angle,
-        "nclaw.ext.plasticine.E": of["plasticine"].E,
-        "nclaw.ext.plasticine.nu": of["plasticine"].nu,
-        "nclaw.ext.plasticine.yield_stress": of["plasticine"].flow.tau_y,
-        "nclaw.ext.water.E": of["water"].E, "nclaw.ext.water.nu": of["water"].nu,
+        "nclaw.ext.jello.E": materials["jelly"].E, "nclaw.ext.jello.nu": materials["jelly"].nu,
+        "nclaw.ext.sand.E": materials["sand"].E, "nclaw.ext.sand.nu": materials["sand"].nu,
+        "nclaw.ext.sand.friction_deg": materials["sand"].flow.friction_angle,
+        "nclaw.ext.plasticine.E": materials["plasticine"].E,
+        "nclaw.ext.plasticine.nu": materials["plasticine"].nu,
+        "nclaw.ext.plasticine.yield_stress": materials["plasticine"].flow.tau_y,
+        "nclaw.ext.water.E": materials["water"].E, "nclaw.ext.water.nu": materials["water"].nu,
         "nclaw.ext.rho": scenes[JELLY].body[0].density,
         "nclaw.ext.vel_bound_lin": FASTEST, "nclaw.ext.vel_bound_ang": FASTEST,
         **{f"nclaw.ext.vlin.{a}": u for a, u in zip(AXES, v.linear, strict=True)},
         **{f"nclaw.ext.vang.{a}": w for a, w in zip(AXES, v.angular, strict=True)}}
 
 
-def of_networks(laws):
-    """Section 4.1, Appendices C.1 and D.2: of trained laws. Biases that are zero do not count."""
+def network_settings(laws):
+    """Return the settings of section 4.1, appendices C.1 and D.2, from trained laws. Biases that
+    are zero do not count.
+    """
     parts = [getattr(laws, part) for part in PARTS]
     (first, _), *_, (last, _) = laws.elastic.layers
     return {
@@ -103,15 +105,15 @@ def of_networks(laws):
                                   for part in parts for W, b in part.layers)}
 
 
-def of_training(recipe):
-    """Appendix D.2: of the recipe of trained laws."""
+def training_settings(recipe):
+    """Return the settings of appendix D.2 from the recipe of trained laws."""
     printed = {"lr_elastic": "elastic_rate", "lr_plastic": "plastic_rate", "epochs": "epochs",
                "grad_clip": "clip", "teacher_start": "first", "teacher_end": "last"}
     return {f"nclaw.appD2.{theirs}": recipe[ours] for theirs, ours in printed.items()}
 
 
-def of_graphs(simulator, scene):
-    """Section 4.1, Appendices F.1 and F.4: of a trained graph network, beside a scene."""
+def graph_settings(simulator, scene):
+    """Return the settings of section 4.1, appendices F.1 and F.4: graph network and scene."""
     dt = simulator.reading.dt
     return {
         "nclaw.sec4_1.gnn_step_factor": dt / scene.dt,
@@ -119,9 +121,9 @@ def of_graphs(simulator, scene):
         "nclaw.appF4.data_ratio": COUNTS[-1] / COUNTS[0]}
 
 
-def of_tasks(scene):
-    """Section 4.3: of tasks, beside the scene of training. The body of task (d) is counted;
-    those of task (c) have 5 to 15 per cent more points.
+def task_settings(scene):
+    """Return the settings of section 4.3, from tasks and the scene of training. The body of task
+    (d) is counted; those of task (c) have 5 to 15 per cent more points.
     """
     count = slope().body[0].sampling.count
     return {
@@ -130,8 +132,8 @@ def of_tasks(scene):
         "nclaw.sec4_3.velocity_draws": len(SEEDS)}
 
 
-def of_bodies():
-    """Sections 4.4 and 4.5: bodies, and points in them."""
+def body_settings():
+    """Return the settings of sections 4.4 and 4.5: bodies, and points in them."""
     dragon, (duck, water) = large(), pool().body
     body, filled = dragon.body[0], prod(water.sampling.counts)
     return {
@@ -141,6 +143,6 @@ def of_bodies():
         "nclaw.sec4_5.total": duck.sampling.count + filled}
 
 
-def of_measurements():
-    """Appendices F.1 and F.3: how often times are taken, how many gradients are drawn."""
+def measurement_settings():
+    """Return the settings of appendices F.1 and F.3: repeated timings, drawn gradients."""
     return {"nclaw.appF1.repeats": REPEATS["standard"], "nclaw.appF3.samples": POINTS}

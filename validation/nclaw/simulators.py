@@ -1,10 +1,9 @@
-"""The graph networks that NCLaw's laws are compared with: which there are, and the runs that they
-learn from.
+"""The graph networks that NCLaw's laws are compared with, and the runs that they learn from.
 
 The paper trains them on 1, 10 and 100 runs, "as much as possible" as [GNS], and says no more. The
-first run is the one that laws learn from; the others are thrown like those of task (b), from other
-seeds. Frames are 5 steps apart. What is smaller here than in [GNS], and by how much, stands in
-docs/explanation/nclaw.md.
+first run is the one that laws learn from; the others have velocities like those of task (b), from
+other seeds. Frames are 5 steps apart. What is smaller here than in [GNS], and by how much, stands
+in docs/explanation/nclaw.md.
 """
 
 from typing import NamedTuple
@@ -42,15 +41,15 @@ class GraphNet(NamedTuple):
     method: str = "gnn"
 
     @property
-    def said(self):
-        """How much smaller the training is than that of [GNS], in words."""
+    def description(self):
+        """The size of the training compared with that of [GNS], in words."""
         return (f"a graph network {self.width} wide, trained on {counted(self.runs, 'run')} for "
                 f"{self.steps} steps with {counted(self.batch, 'frame')} each; that of [GNS]: "
                 f"{THEIR_WIDTH} wide, up to {THEIR_STEPS} steps with {THEIR_BATCH}")
 
 
-class Shown(NamedTuple):
-    """A run as it is seen: positions in its frames, velocities at its start, walls."""
+class FramedRun(NamedTuple):
+    """A run in frames: positions, velocities at the start, walls."""
 
     x: np.ndarray       # (k + 1, n, d) [m]
     v: np.ndarray       # (n, d) [m/s]
@@ -59,32 +58,36 @@ class Shown(NamedTuple):
 
 
 def simulators():
-    """{name: `GraphNet`} of all experiments: ENVIRONMENT-gnn of one run, ENVIRONMENT-gnn-10, .."""
+    """Return {name: `GraphNet`} of all experiments: ENVIRONMENT-gnn of one run, ENVIRONMENT-gnn-10,
+    ..
+    """
     return {named(name, count): GraphNet(name, count)
             for name in ENVIRONMENTS for count in COUNTS}
 
 
 def named(environment, count):
-    """The name of the one that learns from so many runs."""
+    """Return the name of the network that learns from `count` runs."""
     return f"{environment}-gnn" if count == 1 else f"{environment}-gnn-{count}"
 
 
 def scenes_of(net):
-    """The scenes that a `GraphNet` learns from."""
+    """Return the scenes that a `GraphNet` learns from."""
     others = range(FIRST_SEED, FIRST_SEED + net.runs - 1)
     return [reconstruction(net.environment), *(velocity(net.environment, k) for k in others)]
 
 
-def shown(scene):
-    """`Shown` of a scene."""
+def framed_run(scene):
+    """Return the `FramedRun` of a scene."""
     problem = build(scene)
     with threads_for(problem.bodies):
         x = np.array(list(positions(problem, tuple(map(copy_body, problem.bodies)))))
-    return Shown(x, *start(problem)[1:], problem.clock.every * problem.clock.dt)
+    return FramedRun(x, *start(problem)[1:], problem.clock.every * problem.clock.dt)
 
 
 def start(problem):
-    """Positions and velocities (n, d) of all points of a problem at the start, and its walls."""
+    """Return positions and velocities (n, d) of all points of a problem at the start, and its
+    walls.
+    """
     x, v = (np.concatenate([restore_order(getattr(body.particles, name), body.id)
                             for body in problem.bodies]) for name in "xv")
     return x, v, box_of(problem.conditions.walls, problem.dx)

@@ -1,26 +1,24 @@
-"""Small trainings: what errors cost in particles, grid, epochs, horizon, width, and in what is seen
-of the run that is learned from. Each is a few minutes at most.
+"""Small trainings: the errors by particles, grid, epochs, horizon, width, and by the observation of
+the run that is learned from. Each takes a few minutes at most.
 
 They learn from an environment's body in fewer points on a coarser grid. Each is a file of weights,
 remade by `python -m validation.training.nclaw NAME`.
 """
 
-import hashlib
 from functools import cache
 from typing import NamedTuple
 
 from mpm_ref.scene import Walls
-from mpm_ref.scene.toml import canonical
 
 from ..common.scenes import with_
-from ..common.weights_needed import Untrained
+from ..common.weights_needed import Untrained, load_weights
 from .bundle import load
 from .environments import ENVIRONMENTS, environment
-from .observation import Seen
-from .trained_laws import FOLDER
+from .observation import Observation
+from .trained_laws import COMMAND, FOLDER, scene_digest
 
 WALL = 0.1          # distance of the walls from the sides of the unit cube [m]
-KEPT = (10, 20, 30, 50, 75, 100, 150, 200, 300)     # epochs
+CHECKPOINTS = (10, 20, 30, 50, 75, 100, 150, 200, 300)     # epochs
 
 
 class Small(NamedTuple):
@@ -34,9 +32,9 @@ class Small(NamedTuple):
     last: int = 200
     width: int = 64             # of the hidden layers
     seed: int = 0
-    density: float = 1.0        # that the training takes, over the true one
-    kept: tuple = ()            # epochs whose laws are kept besides the last
-    seen: Seen = Seen()         # what of the run is seen
+    density: float = 1.0        # in the training, over the true one
+    checkpoints: tuple = ()     # epochs whose laws are stored besides the last
+    observation: Observation = Observation()    # of the run
 
     @property
     def scene(self):
@@ -50,14 +48,14 @@ class Small(NamedTuple):
                      body=(with_(body, sampling=sampling),))
 
     @property
-    def taken(self):
-        """The scene that a training steps, of the density that it takes."""
+    def trained_scene(self):
+        """The scene that a training steps, with its density."""
         scene = self.scene
         body = scene.body[0]
         return with_(scene, body=(with_(body, density=self.density * body.density),))
 
 
-OF_EPOCHS = {f"small-{name}-epochs": Small(name, epochs=300, kept=KEPT[:-1])
+OF_EPOCHS = {f"small-{name}-epochs": Small(name, epochs=300, checkpoints=CHECKPOINTS[:-1])
              for name in ENVIRONMENTS}
 OF_TRAINING = {
     "small": Small(),
@@ -70,55 +68,57 @@ OF_TRAINING = {
     "small-full-30": Small(edge=10, cells=20, epochs=30),
     "small-full-60": Small(edge=10, cells=20, epochs=60)}
 OF_WIDTH = {f"small-width-{width}": Small(width=width) for width in (4, 8, 16, 32, 128)}
-OF_SIGHT = {f"small-{words}": Small(seen=seen) for words, seen in {
-    "every-5": Seen(every=5), "every-20": Seen(every=20), "every-100": Seen(every=100),
-    "third": Seen(share=1.0 / 3.0), "tenth": Seen(share=0.1),
-    "noise-4": Seen(noise=1e-4), "noise-3": Seen(noise=1e-3), "noise-2": Seen(noise=1e-2),
-    "positions": Seen(positions=True), "positions-every-5": Seen(positions=True, every=5),
-    "positions-third": Seen(positions=True, share=1.0 / 3.0),
-    "positions-noise-4": Seen(positions=True, noise=1e-4),
-    "positions-noise-3": Seen(positions=True, noise=1e-3)}.items()}
-OF_FAULTS = {
-    "small-gap-100": Small(seen=Seen(gap=100)), "small-gap-400": Small(seen=Seen(gap=400)),
-    "small-outliers-3": Small(seen=Seen(outliers=1e-3)),
-    "small-outliers-2": Small(seen=Seen(outliers=1e-2)),
-    "small-density-0.5": Small(density=0.5), "small-density-2": Small(density=2.0)}
+OF_OBSERVATION = {f"small-{word}": Small(observation=observation) for word,
+                  observation in {"every-5": Observation(every=5),
+                                  "every-20": Observation(every=20),
+                                  "every-100": Observation(every=100),
+                                  "third": Observation(share=1.0 / 3.0),
+                                  "tenth": Observation(share=0.1),
+                                  "noise-4": Observation(noise=1e-4),
+                                  "noise-3": Observation(noise=1e-3),
+                                  "noise-2": Observation(noise=1e-2),
+                                  "positions": Observation(positions=True),
+                                  "positions-every-5": Observation(positions=True, every=5),
+                                  "positions-third": Observation(positions=True, share=1.0 / 3.0),
+                                  "positions-noise-4": Observation(positions=True, noise=1e-4),
+                                  "positions-noise-3": Observation(positions=True,
+                                                                   noise=1e-3)}.items()}
+OF_FAULTS = {"small-gap-100": Small(observation=Observation(gap=100)),
+             "small-gap-400": Small(observation=Observation(gap=400)),
+             "small-outliers-3": Small(observation=Observation(outliers=1e-3)),
+             "small-outliers-2": Small(observation=Observation(outliers=1e-2)),
+             "small-density-0.5": Small(density=0.5), "small-density-2": Small(density=2.0)}
 BASE = "small"
 SEEDS = (BASE, "small-seed-1", "small-seed-2")      # that differ by nothing else
 
 
 def small_nets():
-    """{name: `Small`} of all experiments."""
-    return {**OF_EPOCHS, **OF_TRAINING, **OF_WIDTH, **OF_SIGHT, **OF_FAULTS}
+    """Return {name: `Small`} of all experiments."""
+    return {**OF_EPOCHS, **OF_TRAINING, **OF_WIDTH, **OF_OBSERVATION, **OF_FAULTS}
 
 
 @cache
 def bundled(name):
-    """`bundle.Bundle` by name. Raises `Untrained` where it is missing, ValueError where it is
-    damaged, or of another training or another scene than `small_nets` says now.
+    """Return the `bundle.Bundle` of a name. Raises `Untrained` where it is missing, ValueError
+    where it is damaged, or of another training or another scene than `small_nets` says now.
     """
-    path, again = FOLDER / f"{name}.npz", f"python -m validation.training.nclaw {name}"
-    if not path.exists():
-        raise Untrained(f"no weights {path.name}: {again}")
-    found, now = load(path), identity(small_nets()[name])
-    was = {key: found.about.get(key) for key in now}
-    if was != now:
-        raise ValueError(f"weights {path.name} are of {was}, now it is {now}: {again}")
-    return found
+    return load_weights(FOLDER / f"{name}.npz", identity(small_nets()[name]), load,
+                        f"{COMMAND} {name}")
 
 
 def last(name):
-    """`Laws` of the last epoch of a training; errors as of `bundled`, and `Untrained` for one that
-    stopped before.
+    """Return the `LearnedLaws` of the last epoch of a training. Raises as `bundled`, and
+    `Untrained` for a training that stopped before.
     """
-    found, epochs = bundled(name), small_nets()[name].epochs
-    if epochs not in found.laws:
-        raise Untrained(f"{name} stopped: {found.about['stopped']}")
-    return found.laws[epochs]
+    bundle, epochs = bundled(name), small_nets()[name].epochs
+    if epochs not in bundle.laws:
+        raise Untrained(f"{name} stopped: {bundle.about['stopped']}")
+    return bundle.laws[epochs]
 
 
 def identity(net):
-    """What a training is of, plain values."""
-    text = canonical(net.scene)
-    told = {**net._asdict(), "kept": list(net.kept), "seen": net.seen._asdict()}
-    return {"scene": hashlib.sha256(text.encode()).hexdigest()[:16], **told}
+    """Return the plain values that identify a training, as its file has them."""
+    settings = net._asdict()
+    stored = {"kept": list(settings.pop("checkpoints")),
+              "seen": settings.pop("observation")._asdict()}
+    return {"scene": scene_digest(net.scene), **settings, **stored}

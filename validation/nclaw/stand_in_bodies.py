@@ -1,7 +1,7 @@
 """Bodies that stand for NCLaw's meshes, which are not here: capsules, balls and rings.
 
 Each is about the origin, y upwards, with 1 the largest edge of its box, and has roughly the volume
-of its mesh as sampled by the authors' release. A mesh of a user's own is taken instead where
+of its mesh as sampled by the authors' release. A mesh of the user's is used instead where
 `MESHES` holds NAME.obj.
 """
 
@@ -13,12 +13,12 @@ MESHES = Path(__file__).parent / "meshes"
 
 
 def limb(start, end, radius):
-    """A capsule."""
+    """Return a capsule."""
     return Capsule(start=start, end=end, radius=radius)
 
 
 def ball(center, radius):
-    """A ball."""
+    """Return a ball."""
     return Sphere(center=center, radius=radius)
 
 
@@ -88,8 +88,8 @@ STAND_INS = {
 
 
 def toy(name, size, center=(0.5, 0.5, 0.5)):
-    """The shape of a body [m], its box of that largest edge: the user's mesh, or what stands for
-    it.
+    """Return the shape of a body [m] with a box of that largest edge: the user's mesh, or its
+    stand-in.
     """
     if has_mesh(name):
         return Mesh(file=str(MESHES / f"{name}.obj"), size=size, center=center)
@@ -97,10 +97,10 @@ def toy(name, size, center=(0.5, 0.5, 0.5)):
 
 
 def has_mesh(name):
-    """Whether a mesh of the user's is taken."""
+    """Return whether a mesh of the user's is used."""
     return (MESHES / f"{name}.obj").is_file()
 
 
-def said(name):
-    """A body in words."""
+def body_label(name):
+    """Return a body in words."""
     return name if has_mesh(name) else f"a stand-in for {name}"

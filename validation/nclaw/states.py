@@ -1,6 +1,4 @@
-"""What NCLaw's state figures show: the four training runs, and laws beside the truth away from
-them.
-"""
+"""Points of the four training runs, and of laws in other runs, for NCLaw's figures of states."""
 
 import numpy as np
 
@@ -20,7 +18,7 @@ from .trained_laws import trained, weights_of
 SHOTS = (0, 250, 500, 750, 1000)        # steps, of Figure 6
 DISTANCE = "mean squared error of an axis, of the last states alone"
 BROKEN = "it broke down before: some points have no finite place"
-BESIDE = ("ours", "neural", "gnn")      # of Figure 2
+COMPARED = ("ours", "neural", "gnn")    # in Figure 2
 
 
 @experiment("nclaw.fig6", title="NCLaw: the four training runs",
@@ -42,22 +40,22 @@ def away(run):
     """Keeps the points of each environment at the start and at the end of tasks (a) and (b): true,
     ours, baselines as far as they are trained, ours before training.
     """
-    names = [weights_of(word, name) for name in ENVIRONMENTS for word in BESIDE]
-    laws, found = load_available(run, names, trained), {}
+    names = [weights_of(word, name) for name in ENVIRONMENTS for word in COMPARED]
+    laws, points = load_available(run, names, trained), {}
     for name in run.progress(ENVIRONMENTS, "environments"):
-        beside = contestants(name, laws)
+        makers = contestants(name, laws)
         for task, scene in (("time", time(name)), ("velocity", velocity(name, SEEDS[0]))):
-            runs = {word: ends(scene, law) for word, law in beside.items()}
+            runs = {word: ends(scene, law) for word, law in makers.items()}
             last = {word: x[-1] for word, x in runs.items()}
             record(run, f"nclaw.fig2.{name}.{task}", last, scene.steps)
             shown = {"start": runs["true"][0], **last}
-            found |= {f"{name}_{task}_{word}": x for word, x in shown.items()}
-    keep(run, **found)
+            points |= {f"{name}_{task}_{word}": x for word, x in shown.items()}
+    keep(run, **points)
 
 
 def contestants(name, laws):
-    """{word: what `shots` takes} of an environment, of those laws of `nets` that are there."""
-    own_nets = {word: laws.get(weights_of(word, name)) for word in BESIDE}
+    """Return {word: argument of `shots`} of an environment, for trainings that have laws."""
+    own_nets = {word: laws.get(weights_of(word, name)) for word in COMPARED}
     return {"true": copy_body,
             **{word: one if isinstance(one, Simulator) else body_maker(one)
                for word, one in own_nets.items() if one is not None},
@@ -65,29 +63,29 @@ def contestants(name, laws):
 
 
 def ends(scene, law):
-    """Positions (2, n, 3) of a scene with a law at the start and at the end; a graph network needs
-    all frames in between.
+    """Return positions (2, n, 3) of a scene with a law at the start and at the end; a graph network
+    needs all frames in between.
     """
     every = scene.every if isinstance(law, Simulator) else scene.steps
     return shots(with_(scene, every=every), law)[[0, -1]]
 
 
 def shots(scene, law):
-    """Positions (k, n, 3) of a scene's frames with a law, as of `evaluate.frames`; NaN from where
-    it breaks down on.
+    """Return positions (k, n, 3) of a scene's frames with a law, as of `evaluate.frames`; NaN from
+    where it breaks down on.
     """
-    problem, found = build(scene), []
+    problem, positions = build(scene), []
     with threads_for(problem.bodies):
         try:
-            found += frames(problem, law)
+            positions += frames(problem, law)
         except RunBroken:
-            missing = 1 + scene.steps // scene.every - len(found)
-            found += missing * [np.full_like(found[0], np.nan)]
-    return np.array(found)
+            missing = 1 + scene.steps // scene.every - len(positions)
+            positions += missing * [np.full_like(positions[0], np.nan)]
+    return np.array(positions)
 
 
 def record(run, target, last, steps):
-    """Record how far from the truth runs end, of last positions (n, 3) by word."""
+    """Record the distances of last positions (n, 3), by word, from the true ones."""
     for word, x in last.items():
         if word != "true":
             run.record(f"{target}.{word}", np.mean((x - last["true"]) ** 2), unit="m^2",

@@ -1,5 +1,5 @@
-"""The strains that the trained laws of the experiments have met: as their weights say, else as
-their training, made again as far as it needs to be, shows.
+"""The range of strains in the training of the experiments' laws: from their file of weights, else
+from the training run.
 """
 
 from functools import cache
@@ -17,14 +17,16 @@ LABELED = "labeled"     # the method that runs no segments
 
 
 @cache
-def met_by(name):
-    """Bounds (see `learned.strain_range`) of the laws of `nets` by name; errors as of `trained`."""
+def visited_bounds(name):
+    """Return the bounds (see `learned.strain_range`) of the laws of `nets` by name; raises as
+    `trained`.
+    """
     laws = trained(name)
     return laws.about["seen"] if "seen" in laws.about else bounds(nets()[name], laws)
 
 
 def bounds(net, laws):
-    """Bounds of the strains that laws have met, which were trained as a `Net` says."""
+    """Return the bounds of the strains in the training of a `LawNet`'s laws."""
     observed, problem = trajectory(net.environment), build(environment(net.environment))
     steps = len(observed.x) - 1
     cuts = () if net.method == LABELED else segment_cuts(Recipe(epochs=net.epochs), steps)

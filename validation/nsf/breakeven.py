@@ -1,5 +1,5 @@
-"""How few points a reduced run must be left with to pay: the time that its fields take for a point,
-beside the time that a full-order step takes for a particle (section 6, appendix C of the paper).
+"""The share of points at which a reduced run pays: the time that its fields take for a point,
+compared with that of a full-order step for a particle (section 6, appendix C of the paper).
 
 A reduced step on a share s of the particles takes at least s n (f + g): f for the fields of a point
 (its place now and a step ago, stress, affine field), g for its part of the step on the grid, which
@@ -7,7 +7,7 @@ is that of the full-order step without singular values, return map and stress. S
 g)) times faster at best, where p is the full-order step's time for a particle. Finding the points
 and the inversion come on top; `nsf.speed` has them.
 
-Fields are of random numbers: no time depends on what they say.
+Fields are of random numbers: no time depends on their values.
 """
 
 from itertools import pairwise
@@ -33,7 +33,7 @@ from mpm_ref.rom.study.reduce import BLOCK
 from validation.nsf.pointwise_networks import infer
 
 from ..common.registry import experiment
-from .speed import whole_steps
+from .speed import full_steps
 from .studies import cake, metal
 
 INFO = {"comparator": "info"}
@@ -43,19 +43,20 @@ CENTRES = 600                           # of radial functions: 12 runs of 50 sna
 INPUTS, OUTPUTS = 9, (3, 6, 9)          # a point and six latent coordinates; of g, h and l
 TWINS = "scene", "fields", "by_layer", "by_point"      # seconds of a point
 
-class Scene(NamedTuple):
-    """What is printed of a scene."""
+class PrintedScene(NamedTuple):
+    """Printed sizes of a scene."""
 
     study: object
     widths: tuple           # of g, h and l
     share: float            # of the particles that are integration points
 
 
-SCENES = {"metal": Scene(metal, (96, 288, 432), 0.09), "cake": Scene(cake, (144, 384, 576), 0.067)}
+SCENES = {"metal": PrintedScene(metal, (96, 288, 432), 0.09),
+          "cake": PrintedScene(cake, (144, 384, 576), 0.067)}
 
 
-class Row(NamedTuple):
-    """Fields of a kind in a scene."""
+class BreakEvenRow(NamedTuple):
+    """A row of the table: fields of a kind in a scene."""
 
     scene: str
     fields: str
@@ -79,57 +80,57 @@ def breakeven(run):
     rate, rows, twins = products_per_second(run.choose(quick=256, standard=1024)), [], []
     for name, scene in run.progress(SCENES.items(), "scenes"):
         study = scene.study(run.choose(quick=3, standard=1))
-        full, deform = whole_steps(study, run.choose(quick=10, standard=50))
-        own = nsf_full_model(study.run(study.test[0]))
-        n = len(own.X)
-        for word, products, fields in kinds(own, scene, run.rng):
+        full, deform = full_steps(study, run.choose(quick=10, standard=50))
+        model = nsf_full_model(study.run(study.test[0]))
+        n = len(model.X)
+        for word, products, fields in kinds(model, scene, run.rng):
             points = np.sort(run.rng.choice(n, round(scene.share * n), replace=False))
             f = seconds_of_a_point(fields, points)
-            cost = Cost(full / n, (full - deform) / n, f)
-            rows.append(Row(name, word, products, f, products / rate, cost.particle, cost.grid,
-                            cost.share(1.0), cost.share(10.0), scene.share,
-                            cost.faster(scene.share)))
-            recorded(run, rows[-1], n)
+            cost = PointCost(full / n, (full - deform) / n, f)
+            rows.append(BreakEvenRow(name, word, products, f, products / rate, cost.particle,
+                                     cost.grid, cost.share(1.0), cost.share(10.0), scene.share,
+                                     cost.speedup(scene.share)))
+            record_row(run, rows[-1], n)
             if isinstance(fields, LearnedFields):
                 twins.append((name, word, *passes(fields, points)))
     record_twins(run, twins)
     run.record("nsf.breakeven.rate", rate, unit="1/s", **INFO,
                note="products, each with a sum, of a matrix product in double precision")
-    run.table("shares", Row._fields, rows)
+    run.table("shares", BreakEvenRow._fields, rows)
     run.table("twins", TWINS, twins)
 
 
-class Cost(NamedTuple):
+class PointCost(NamedTuple):
     """Seconds of a step for a particle or point."""
 
     particle: float         # of a full-order step
     grid: float             # ... of its part on the grid
     fields: float           # of a reduced one
 
-    def faster(self, share):
-        """How many times as fast a reduced step on a share of the particles is, at best."""
+    def speedup(self, share):
+        """Return the speed-up of a reduced step on a share of the particles, at best."""
         return self.particle / (share * (self.fields + self.grid))
 
-    def share(self, times):
-        """The share of particles at which it is so many times as fast."""
-        return self.faster(1.0) / times
+    def share(self, speedup):
+        """Return the share of particles at which a reduced step has a speed-up."""
+        return self.speedup(1.0) / speedup
 
 
-def kinds(own, scene, rng):
-    """Yield (word, products that a point takes, fields) of a `Whole` scene."""
+def kinds(model, scene, rng):
+    """Yield (word, products that a point takes, fields) for a `FullModel`."""
     for word, widths in [("printed", scene.widths), *((f"networks-{w}", (w, w, w)) for w in SWEEP)]:
-        nets = networks(widths, own.X, rng)
+        nets = networks(widths, model.X, rng)
         place, stress, affine = (net[0].W.size for net in nets)
         yield (word, 2 * place + stress + affine,
-               learned_fields(own.X, nets, (), BLOCK * own.problem.dx))
-    fields, sizes = modes(own, rng), Sizes(6)
+               learned_fields(model.X, nets, (), BLOCK * model.problem.dx))
+    fields, sizes = modes(model, rng), Sizes(6)
     products = 2 * 3 * sizes.modes + 6 * sizes.tau + 9 * sizes.C
     yield "modes", products, fields
     yield "modes-single", products, fields.single()
 
 
 def networks(widths, X, rng):
-    """Position, stress and affine field as networks of random weights."""
+    """Return position, stress and affine field as networks of random weights."""
     low, span = X.min(axis=0), np.ptp(X, axis=0)
     nets = [network([(rng.normal(size=(a, b)) / np.sqrt(a), np.zeros(b))
                      for a, b in pairwise((INPUTS, *(width,) * DEPTH, k))])
@@ -140,9 +141,9 @@ def networks(widths, X, rng):
     return Decoder(nets[0], units), Field(nets[1], plain[0]), Field(nets[2], plain[1])
 
 
-def modes(own, rng):
-    """`PodFields` of random modes, of usual `Sizes`."""
-    sizes, n = Sizes(6), len(own.X)
+def modes(model, rng):
+    """Return `PodFields` fields of random modes, of usual `Sizes`."""
+    sizes, n = Sizes(6), len(model.X)
 
     def radial(k):
         return Radial(rng.normal(size=(CENTRES, sizes.r)), np.ones(sizes.r),
@@ -151,28 +152,28 @@ def modes(own, rng):
     U = rng.normal(size=(n, 3, sizes.modes))
     tau, C = (ModalField(rng.normal(size=(n, k, R)), radial(R))
               for k, R in ((6, sizes.tau), (9, sizes.C)))
-    return PodFields(own.X, U, radial(sizes.modes - sizes.r), tau, C, np.zeros(0),
-                   cells(own.X, U, BLOCK * own.problem.dx))
+    return PodFields(model.X, U, radial(sizes.modes - sizes.r), tau, C, np.zeros(0),
+                     cells(model.X, U, BLOCK * model.problem.dx))
 
 
 def seconds_of_a_point(fields, points):
-    """Seconds of all that a step asks of the fields at points, for each; the median. Points are
+    """Return the median of the seconds that fields take for a point in a step. Points are
     scattered at random: in a run they lie together around samples, so that some are read faster.
     """
     xhat = latent(fields)
 
-    def asked():
+    def evaluate():
         fields.place(points, xhat)
         fields.place(points, 0.9 * xhat)
         fields.stress(points, xhat)
         fields.affine(points, xhat)
 
-    return seconds(asked) / len(points)
+    return seconds(evaluate) / len(points)
 
 
 def passes(fields, points):
-    """Seconds for a point of networks' positions with their derivatives, stress and affine field:
-    layer by layer, and point by point in one compiled pass (`pointwise_networks`).
+    """Return the seconds for a point of networks' positions with their derivatives, stress and
+    affine field: layer by layer, and point by point in one compiled pass (`pointwise_networks`).
     """
     xhat, X = latent(fields), fields.X[points]
 
@@ -186,12 +187,12 @@ def passes(fields, points):
 
 
 def latent(fields):
-    """Latent coordinates (r,) to ask at."""
+    """Return latent coordinates (r,) at which fields are timed."""
     return np.linspace(-0.1, 0.1, fields.r)
 
 
 def seconds(work):
-    """Of a call, after a first one; the median of REPEATS."""
+    """Return the seconds of a call, after a first one; the median of REPEATS."""
     took = []
     for _ in range(1 + REPEATS):
         start = perf_counter()
@@ -201,7 +202,9 @@ def seconds(work):
 
 
 def products_per_second(size):
-    """Of a matrix product in double precision, on all threads; the best of several."""
+    """Return the products per second of a matrix product in doubles, on all threads, the best of
+    several.
+    """
     A, took = np.ones((size, size)), []
     for _ in range(1 + REPEATS):
         start = perf_counter()
@@ -219,15 +222,15 @@ def record_twins(run, twins):
                         f"{1e6 * by_layer:.3g} us")
 
 
-def recorded(run, row, n):
-    """Record the shares of a `Row`."""
+def record_row(run, row, n):
+    """Record the shares of a `BreakEvenRow`."""
     note = (f"{row.products:.3g} products and {1e6 * row.point:.3g} us a point "
             f"(at least {1e6 * row.bound:.2g} us at the rate of a matrix product), full-order "
             f"{1e6 * row.particle:.3g} us a particle; finding points and inversion left out")
-    for word, value, unit, said in (
+    for word, value, unit, meaning in (
             ("even", 100.0 * row.even, "%", "share of points at which both take as long"),
             ("ten", 100.0 * row.ten, "%", "share at which a reduced step takes a tenth"),
             ("speedup", row.speedup, "x", "at best, with the printed share of "
              f"{100.0 * row.printed_share:.3g} % of the particles")):
         run.record(f"nsf.breakeven.{row.scene}.{row.fields}.{word}", value, unit=unit,
-                   scale=f"{n} particles", note=f"{said}; {note}", **INFO)
+                   scale=f"{n} particles", note=f"{meaning}; {note}", **INFO)

@@ -1,4 +1,4 @@
-"""How nodes and integration points follow from samples (NSF-sec5.4, Figure 4)."""
+"""Nodes and integration points that follow from samples (NSF-sec5.4, Figure 4)."""
 
 from itertools import product
 
@@ -25,41 +25,41 @@ def sets(run):
     block in 2D, with the nodes of its samples, and of the cake.
     """
     pie = cake(run.choose(quick=3, standard=2))
-    kept = {}
+    arrays = {}
     for name, study, count in (("block", shear(), FEW), ("cake", pie, pie.samples)):
-        one, x = half_way(study)
+        one, x = middle_state(study)
         samples = study.chosen(one, count, 0)[0].points
         dx, degree = one.problem.dx, one.problem.scheme.degree
         near = stencil_overlap(x[samples], dx, degree).overlaps(x)
         nodes = nodes_of(x[samples], dx, degree)
         record(run, f"nsf.fig4.{name}", samples, nodes, near)
-        kept |= {f"{name}_{word}": some for word, some in
-                 (("x", thinned(x)), ("integration", x[near]), ("sample", x[samples]))}
+        arrays |= {f"{name}_{word}": points for word, points in
+                   (("x", thinned(x)), ("integration", x[near]), ("sample", x[samples]))}
         if x.shape[1] == FLAT:
-            kept[f"{name}_nodes"] = dx * nodes
-    keep(run, **kept)
+            arrays[f"{name}_nodes"] = dx * nodes
+    keep(run, **arrays)
 
 
 def thinned(x):
-    """At most `MOST` of points x (n, d)."""
+    """Return at most `MOST` of points x (n, d)."""
     return x[::-(-len(x) // MOST)]
 
 
-def half_way(study):
-    """`Whole` of a study's last training run, and where its points (n, d) are half-way [m]."""
+def middle_state(study):
+    """Return the `FullModel` of a study's last training run, and its points (n, d) half-way [m]."""
     scene = study.run(study.train[-1])
     x = simulate_history(scene, [study.train[-1]], every=study.spacing).x[0]
     return nsf_full_model(scene), x[len(x) // 2]
 
 
 def nodes_of(x, dx, degree):
-    """Numbers (k, d) of the nodes I that samples x (m, d) [m] see."""
+    """Return the numbers (k, d) of the nodes I in the supports of samples x (m, d) [m]."""
     offsets = np.array([*product(range(degree + 1), repeat=x.shape[1])])
     return np.unique((bases(x, dx, degree)[:, None] + offsets).reshape(-1, x.shape[1]), axis=0)
 
 
-def record(run, id, samples, nodes, near):
+def record(run, target, samples, nodes, near):
     """Record how many samples, nodes and integration points there are."""
     scale = f"{len(near)} particles"
     for word, count in (("samples", len(samples)), ("nodes", len(nodes)), ("points", near.sum())):
-        run.record(f"{id}.{word}", count, unit="1", comparator="info", scale=scale)
+        run.record(f"{target}.{word}", count, unit="1", comparator="info", scale=scale)

@@ -1,5 +1,5 @@
-"""Full-order runs with longer steps, as far as they go: what longer steps of reduced runs are to be
-seen beside, as a full-order run with them is faster too.
+"""Full-order runs with longer steps, as far as they go. Longer steps of reduced runs are compared
+with them, since a full-order run with longer steps is faster too.
 
 Bounds of the time step, which are sufficient and not needed everywhere, do not end them.
 """
@@ -29,17 +29,17 @@ COLUMNS = ("scene", "value", "faster", "states", "origin", "displacement", "stre
            "speedup")                       # times are those of the first test
 
 
-class Ended(NamedTuple):
-    """How a full-order run ended."""
+class EndedRun(NamedTuple):
+    """Errors of a full-order run with longer steps, and how it ended."""
 
     states: int             # that were compared
     errors: PositionErrors          # infinite where it ended before its time
     stress: float           # of the Kirchhoff stress, over its norm; likewise
-    said: str               # why it ended then
+    reason: str             # why it ended early; empty if it did not
 
 
-class Itself(NamedTuple):
-    """A full-order run in place of fields: what `path_errors` asks of its bodies."""
+class FullOrderField(NamedTuple):
+    """The bodies of a full-order run as the field that `path_errors` asks for."""
 
     X: np.ndarray           # (n, d) points at the start [m]
 
@@ -62,52 +62,52 @@ def longer(run):
     rows = []
     for name, study in zip(("metal", "cake"), studies, strict=True):
         values = study.test[1:run.choose(quick=2, standard=3)]
-        spent = taken(study.run(values[0]), run.choose(quick=1, standard=REPEATS))
-        ended = run.progress([ends_of(study, value) for value in values], f"{name}, errors")
-        for factor, time, *own in zip(FACTORS, spent, *ended, strict=True):
-            record(run, f"nsf.longer.{name}.x{factor:g}", own, (time, spent[0]), scale_of(study))
+        times = run_times(study.run(values[0]), run.choose(quick=1, standard=REPEATS))
+        ended = run.progress([ended_runs(study, value) for value in values], f"{name}, errors")
+        for factor, time, *runs in zip(FACTORS, times, *ended, strict=True):
+            record(run, f"nsf.longer.{name}.x{factor:g}", runs, (time, times[0]), scale_of(study))
             rows += [(name, value, factor, one.states, one.errors.origin, one.errors.displacement,
-                      one.stress, time, spent[0] / time)
-                     for value, one in zip(values, own, strict=True)]
+                      one.stress, time, times[0] / time)
+                     for value, one in zip(values, runs, strict=True)]
     run.table("steps", COLUMNS, rows)
 
 
 def stretched(scene, factor):
-    """The scene with steps so many times as long, each of which is a frame."""
+    """Return the scene with steps `factor` times as long, each of which is a frame."""
     return with_(scene, dt=factor * scene.dt, steps=step_count(scene, factor), every=1,
                  interval=None, unstable="allow")
 
 
-def taken(scene, repeats):
-    """Wall seconds of runs with steps of FACTORS: medians of runs in turn; infinite where they end
-    before their time.
+def run_times(scene, repeats):
+    """Return the wall seconds of runs with steps of FACTORS: medians of runs in turn; infinite
+    where they end before their time.
     """
     still = [with_(own, every=own.steps) for own in (stretched(scene, one) for one in FACTORS)]
     with one_thread():
-        spent = [[of_run(one) for one in still] for _ in range(repeats)]
-    return np.median(spent, axis=0).tolist()
+        times = [[run_seconds(one) for one in still] for _ in range(repeats)]
+    return np.median(times, axis=0).tolist()
 
 
-def of_run(scene):
-    """Wall seconds of a run; infinite where it ends before its time."""
+def run_seconds(scene):
+    """Return the wall seconds of a run; infinite where it ends before its time."""
     try:
         return seconds(lambda: simulate(nsf_full_model(scene).problem))
     except Unstable:
         return inf
 
 
-def ends_of(study, value):
-    """`Ended` of runs with steps of FACTORS of the test with a value, in their order."""
+def ended_runs(study, value):
+    """Return the `EndedRun`s of the test with a value, with steps of FACTORS, in their order."""
     scene = study.run(value)
     test = simulate_history(scene, [value], np.float32, study.spacing)
-    return [end_of(test, stretched(scene, factor)) for factor in FACTORS]
+    return [ended_run(test, stretched(scene, factor)) for factor in FACTORS]
 
 
-def end_of(test, scene):
-    """`Ended` of the run of a scene beside the states of a `Histories`."""
-    own = path_errors(Itself(test.X), history_reference(test), states(test, scene))
-    return Ended(int(np.isfinite(own.levels[1:]).sum()), own.errors, stress_share(own.stress),
-                 own.breakdown)
+def ended_run(test, scene):
+    """Return the `EndedRun` of a scene, compared with the states of a `Histories`."""
+    path = path_errors(FullOrderField(test.X), history_reference(test), states(test, scene))
+    return EndedRun(int(np.isfinite(path.levels[1:]).sum()), path.errors,
+                    stress_share(path.stress), path.breakdown)
 
 
 def states(test, scene):
@@ -122,28 +122,29 @@ def states(test, scene):
 
 
 def scale_of(study):
-    """What is run, in words."""
+    """Describe the size of the runs in words."""
     one = nsf_full_model(study.run(study.test[1]))
     coarse = f", dx and dt {study.coarser} times as long" if study.coarser > 1 else ""
     return f"{len(one.X)} particles, {one.problem.clock.steps} steps{coarse}"
 
 
-def record(run, start, own, times, scale):
+def record(run, target, runs, times, scale):
     """Record the mean error of runs with steps of one length that ended as they should, and how
-    many times faster the first is; own: their `Ended`, times: wall seconds with these steps, and
-    with the scene's.
+    many times faster the first is; runs: their `EndedRun`s, times: wall seconds with these steps,
+    and with the scene's.
     """
-    good, said = [one for one in own if not one.said], {one.said for one in own if one.said}
-    ended = f"; {len(own) - len(good)} end in {' and '.join(sorted(said))}" if said else ""
-    note = f"full-order run, {len(good)} of {len(own)} tests{ended}"
+    good = [one for one in runs if not one.reason]
+    reasons = sorted({one.reason for one in runs if one.reason})
+    ended = f"; {len(runs) - len(good)} end in {' and '.join(reasons)}" if reasons else ""
+    note = f"full-order run, {len(good)} of {len(runs)} tests{ended}"
     if good:
         origin, displacement, stress = np.mean(
             [(one.errors.origin, one.errors.displacement, one.stress) for one in good], axis=0)
-        run.record(f"{start}.error", 100.0 * origin, unit="%", comparator="info", scale=scale,
+        run.record(f"{target}.error", 100.0 * origin, unit="%", comparator="info", scale=scale,
                    note=f"{note}; {good[0].states} states; of the displacement "
                         f"{100.0 * displacement:.3g} %, of the stress {100.0 * stress:.3g} %")
     else:
-        run.record(f"{start}.ended", len(own), comparator="info", scale=scale, note=note)
+        run.record(f"{target}.ended", len(runs), comparator="info", scale=scale, note=note)
     if np.isfinite(times[0]):
-        run.record(f"{start}.speedup", times[1] / times[0], unit="x", comparator="info",
+        run.record(f"{target}.speedup", times[1] / times[0], unit="x", comparator="info",
                    scale=scale, note=f"of wall time of the first test: {times[0]:.3g} s")

@@ -1,6 +1,6 @@
-"""What latent coordinates of position and stress together give (`rom.fields.joint_latent`), beside
-those of positions alone: a block that is sheared to and fro, whose places say little of its stress,
-and the sand column, which flows one way.
+"""Latent coordinates of position and stress together (`rom.fields.joint_latent`), compared with
+those of positions alone: a block that is sheared to and fro, whose positions do not determine its
+stress, and the sand column, which flows one way.
 """
 
 from functools import partial
@@ -27,7 +27,7 @@ from mpm_ref.rom.study.samples import drawn_samples
 from mpm_ref.rom.symmetric import tensor
 
 from ..common.registry import experiment
-from .studies import Study, sand
+from .studies import NsfStudy, sand
 
 INFO = {"comparator": "info"}
 COLUMNS = ("scene", "latent", "value", "samples", "displacement", "stress")
@@ -35,10 +35,10 @@ NEAREST = 0         # samples of the nearest states, which are no run
 
 
 def shear():
-    """The block with several amplitudes."""
-    return Study("nsf_shear", "fixed.top.motion.translation.amplitude[0]", (0.02, 0.03, 0.04),
-                 (0.025, 0.035), Sizes(r=4, modes=20, tau=40, C=20, smoothing=1e-2), 40,
-                 follows=False, every=15)
+    """Return the study of the block with several amplitudes."""
+    return NsfStudy("nsf_shear", "fixed.top.motion.translation.amplitude[0]", (0.02, 0.03, 0.04),
+                    (0.025, 0.035), Sizes(r=4, modes=20, tau=40, C=20, smoothing=1e-2), 40,
+                    follows=False, every=15)
 
 
 @experiment("nsf.memory", title="NSF: latent coordinates of position and stress together",
@@ -47,15 +47,14 @@ def memory(run):
     """Errors of the displacement and of the stress, with few samples and with all particles."""
     rows = []
     for name, study in run.progress(studies(run).items(), "scenes"):
-        runs = join_histories((made(study, value) for value in study.train), len(study.train))
-        tests = {value: made(study, value)
+        runs = join_histories((simulated(study, value) for value in study.train), len(study.train))
+        tests = {value: simulated(study, value)
                  for value in study.test[:run.choose(quick=1, standard=2)]}
-        for word, kind in (("position", of_positions), ("joint", of_both)):
-            found = [(name, word, *row) for value, test in tests.items()
-                     for row in kind(study, value, runs, test)]
-            recorded(run, f"nsf.memory.{name}.{word}", found, study,
-                     next(iter(tests.values())))
-            rows += found
+        for word, rows_of_test in (("position", position_rows), ("joint", joint_rows)):
+            new = [(name, word, *row) for value, test in tests.items()
+                   for row in rows_of_test(study, value, runs, test)]
+            record(run, f"nsf.memory.{name}.{word}", new, study, next(iter(tests.values())))
+            rows += new
     run.table("errors", COLUMNS, rows)
 
 
@@ -67,24 +66,24 @@ def studies(run):
             "sand": column._replace(follows=False, test=column.test[1:3], sizes=sizes)}
 
 
-def made(study, value):
-    """`Histories` of a run."""
+def simulated(study, value):
+    """Return the `Histories` of a run."""
     return simulate_history(study.run(value), [value], every=study.spacing)
 
 
-def of_positions(study, value, runs, test):
-    """Rows (value, samples, errors) of a test, with latent coordinates of positions."""
+def position_rows(study, value, runs, test):
+    """Yield the rows (value, samples, errors) of a test, with latent coordinates of positions."""
     one = nsf_full_model(study.run(value))
     fields, xhat = fit_pod_fields(runs, study.sizes, BLOCK * one.problem.dx, follows=False)
     rest = xhat[:, 0].mean(axis=0)
     yield value, NEAREST, *errors(fields, test, nearest_states(fields, test.x[0], rest))
     for samples in (study.samples, len(one.X)):
-        found = states(one, nsf_model(one, fields), rest, samples, test.dt)
-        yield value, samples, *errors(fields, test, found)
+        path = states(one, nsf_model(one, fields), rest, samples, test.dt)
+        yield value, samples, *errors(fields, test, path)
 
 
-def of_both(study, value, runs, test):
-    """The same with joint ones."""
+def joint_rows(study, value, runs, test):
+    """Yield the rows (value, samples, errors) of a test, with joint latent coordinates."""
     one = nsf_full_model(study.run(value))
     fields, xhat, scale = joint(runs, study.sizes, BLOCK * one.problem.dx)
     rest = xhat[:, 0].mean(axis=0)
@@ -92,8 +91,8 @@ def of_both(study, value, runs, test):
     both = Stacked(fields, scale, 1.0)
     yield value, NEAREST, *errors(fields, test, nearest(both, test, rest))
     for samples in (study.samples, len(one.X)):
-        found = states(one, stepper, rest, samples, test.dt)
-        yield value, samples, *errors(fields, test, found)
+        path = states(one, stepper, rest, samples, test.dt)
+        yield value, samples, *errors(fields, test, path)
 
 
 def nearest(both, test, xhat):
@@ -105,25 +104,25 @@ def nearest(both, test, xhat):
         yield level, xhat
 
 
-def states(one, stepper, rest, samples, apart):
+def states(one, stepper, rest, samples, spacing):
     """Yield (level or None, latent coordinates) of a reduced run of a stepper, from those at rest;
-    levels are `apart` [s].
+    `spacing` is the time between levels [s].
     """
-    clock, some = one.problem.clock, drawn_samples(len(one.X), samples, 0).points
-    at = Latent(rest)
+    clock, points = one.problem.clock, drawn_samples(len(one.X), samples, 0).points
+    latent = Latent(rest)
     for k in range(clock.steps + 1):
-        yield level_of(k * clock.dt / apart), at.xhat
+        yield level_of(k * clock.dt / spacing), latent.xhat
         if k < clock.steps:
-            at, _ = stepper.step(at, some, k * clock.dt, clock.dt)
+            latent, _ = stepper.step(latent, points, k * clock.dt, clock.dt)
 
 
-def errors(fields, test, found):
-    """Errors of the displacement and of the stress, over their norms."""
-    path = path_errors(fields, history_reference(test), found)
+def errors(fields, test, path):
+    """Return the errors of the displacement and of the stress of a path, over their norms."""
+    path = path_errors(fields, history_reference(test), path)
     return path.errors.displacement, stress_share(path.stress)
 
 
-def recorded(run, target, rows, study, test):
+def record(run, target, rows, study, test):
     """Record the errors of a scene and kind of latent coordinates, means over tests."""
     n, levels = len(test.X), test.x.shape[1] - 1
     scale = (f"{n} particles, {levels} states kept, {len(study.train)} runs and "
@@ -131,7 +130,7 @@ def recorded(run, target, rows, study, test):
     for word, count, note in (("nearest", NEAREST, "nearest states that the fields know"),
                               ("few", study.samples, f"{study.samples} samples, one draw"),
                               ("all", n, "all particles are samples")):
-        of = np.mean([row[4:] for row in rows if row[3] == count], axis=0)
-        for kind, value in zip(("displacement", "stress"), of, strict=True):
+        means = np.mean([row[4:] for row in rows if row[3] == count], axis=0)
+        for kind, value in zip(("displacement", "stress"), means, strict=True):
             run.record(f"{target}.{word}.{kind}", 100.0 * value, unit="%", scale=scale, note=note,
                        **INFO)

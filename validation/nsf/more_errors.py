@@ -5,17 +5,17 @@
 from ..common.registry import experiment
 from .errors import (
     COLUMNS,
-    by_cubature,
-    compared,
-    known,
-    longer,
-    map_alone,
+    error_rows,
     mean,
-    rows_of,
-    share,
-    without_affine,
+    record_all_samples,
+    record_cubature,
+    record_longer_steps,
+    record_map_alone,
+    record_mean,
+    record_nearest,
+    record_without_affine,
 )
-from .reduced_runs import tested
+from .reduced_runs import fit_study
 from .states import keep_states
 from .studies import ball, bread, cake, metal, toothpaste
 
@@ -27,7 +27,7 @@ DRAWS = 3               # of samples
 def frame(run):
     """Errors with 50, 30 and 20 samples (section 6.3)."""
     one = prepared(run, metal, train=5)
-    counted(run, "nsf.metal", one, (50, 30, 20))
+    record_counts(run, "nsf.metal", one, (50, 30, 20))
     keep_states(run, one, one.study.test[::3], ("stress",))
 
 
@@ -36,7 +36,7 @@ def frame(run):
 def paste(run):
     """Errors with 50, 30 and 15 samples (Figures 10 and 11)."""
     one = prepared(run, toothpaste, train=5)
-    counted(run, "nsf.toothpaste", one, (50, 30, 15))
+    record_counts(run, "nsf.toothpaste", one, (50, 30, 15))
     keep_states(run, one, one.study.test, ("weighed",))
 
 
@@ -44,14 +44,14 @@ def paste(run):
             budget={"quick": 20, "standard": 600, "paper": 7200})
 def slice_of_bread(run):
     """Errors with 450 samples, and of the deformation-only model (Figure 5)."""
-    beside_the_map(run, "nsf.bread", prepared(run, bread, train=6))
+    record_with_map_alone(run, "nsf.bread", prepared(run, bread, train=6))
 
 
 @experiment("nsf.ball", title="NSF: a squishy ball falls onto an incline",
             budget={"quick": 20, "standard": 600, "paper": 7200})
 def squishy(run):
     """Errors with 300 samples, and of the deformation-only model (Figure 13)."""
-    beside_the_map(run, "nsf.ball", prepared(run, ball))
+    record_with_map_alone(run, "nsf.ball", prepared(run, ball))
 
 
 @experiment("nsf.cake", title="NSF: a cake is cut",
@@ -59,55 +59,57 @@ def squishy(run):
 def cut(run):
     """Errors with 700 samples in the middle, and 400 in the second half (section 6.1)."""
     one = prepared(run, cake, train=5)
-    rows = rows_of(one, "modal", one.study.samples, draws(run))
-    share(run, "nsf.cake.error", rows, one.scale, "700, then 400 samples in the middle")
-    whole = run.profile == "paper"
-    run.record("nsf.cake.integration_particles" if whole else "nsf.cake.points",
-               mean(rows, "points"), scale=one.scale, **({} if whole else {"comparator": "info"}))
-    rows += by_cubature(run, "nsf.cake.cubature", one, one.study.samples, draws(run))
-    run.table("errors", COLUMNS, rows + finished(run, "nsf.cake", one))
+    rows = error_rows(one, "modal", one.study.samples, draws(run))
+    record_mean(run, "nsf.cake.error", rows, one.scale, "700, then 400 samples in the middle")
+    printed_size = run.profile == "paper"
+    run.record("nsf.cake.integration_particles" if printed_size else "nsf.cake.points",
+               mean(rows, "points"), scale=one.scale, **({} if printed_size
+                                                         else {"comparator": "info"}))
+    rows += record_cubature(run, "nsf.cake.cubature", one, one.study.samples, draws(run))
+    run.table("errors", COLUMNS, rows + record_variants(run, "nsf.cake", one))
     keep_states(run, one, one.study.test)
 
 
 def prepared(run, study, **few):
-    """`Tested` of a study at a run's profile; few: its settings at the quick one, which has one
-    test.
+    """Return the `FittedStudy` of a study at a profile; few: its settings at the quick one, which
+    has one test.
     """
     quick = study(3, **few)
-    return tested(run.choose(quick=quick._replace(test=quick.test[:1]), standard=study(2),
-                             paper=study()))
+    return fit_study(run.choose(quick=quick._replace(test=quick.test[:1]), standard=study(2),
+                                paper=study()))
 
 
 def draws(run):
-    """Of samples."""
+    """Return the numbers of a profile's draws of samples."""
     return range(run.choose(quick=1, standard=DRAWS, paper=DRAWS))
 
 
-def counted(run, name, one, counts):
-    """Record errors with several numbers of samples, the most alone at the quick profile."""
+def record_counts(run, name, one, counts):
+    """Record errors with several numbers of samples; at the quick profile with the first alone."""
     rows = []
     for count in run.choose(quick=counts[:1], standard=counts, paper=counts):
-        found = rows_of(one, "modal", count, draws(run))
-        share(run, f"{name}.error.{count}", found, one.scale, f"{count} samples")
-        rows += found + by_cubature(run, f"{name}.cubature.{count}", one, count, draws(run))
-    run.table("errors", COLUMNS, rows + compared(run, name, one) + finished(run, name, one))
+        drawn = error_rows(one, "modal", count, draws(run))
+        record_mean(run, f"{name}.error.{count}", drawn, one.scale, f"{count} samples")
+        rows += drawn + record_cubature(run, f"{name}.cubature.{count}", one, count, draws(run))
+    rows += record_all_samples(run, name, one) + record_variants(run, name, one)
+    run.table("errors", COLUMNS, rows)
 
 
-def beside_the_map(run, name, one):
-    """Record errors, and those of the map alone."""
+def record_with_map_alone(run, name, one):
+    """Record the errors of a study, and those of the map alone."""
     study = one.study
-    few = rows_of(one, "modal", study.samples, draws(run))
-    share(run, f"{name}.error", few, one.scale, f"{study.samples} samples")
-    few += by_cubature(run, f"{name}.cubature", one, study.samples, draws(run))
-    rows = few + compared(run, name, one) + map_alone(run, name, one)
+    few = error_rows(one, "modal", study.samples, draws(run))
+    record_mean(run, f"{name}.error", few, one.scale, f"{study.samples} samples")
+    few += record_cubature(run, f"{name}.cubature", one, study.samples, draws(run))
+    rows = few + record_all_samples(run, name, one) + record_map_alone(run, name, one)
     keep_states(run, one, study.test[1:2] or study.test, ("map",))
-    run.table("errors", COLUMNS, rows + finished(run, name, one))
+    run.table("errors", COLUMNS, rows + record_variants(run, name, one))
 
 
-def finished(run, name, one):
-    """Record settings, and errors without the affine field, with longer steps, and of what is known
-    without a run; rows of the runs.
+def record_variants(run, name, one):
+    """Record the latent dimension, errors without the affine field and with longer steps, and those
+    of the nearest states and training run; return the rows of the runs.
     """
     run.record(f"{name}.r", one.study.sizes.r, scale=one.scale)
-    known(run, name, one)
-    return longer(run, name, one) + without_affine(run, name, one)
+    record_nearest(run, name, one)
+    return record_longer_steps(run, name, one) + record_without_affine(run, name, one)

@@ -3,7 +3,7 @@
 A point needs no more memory than its activations, and no library stands below. elu's slope is known
 from its value: 1 for a > 0, a + 1 else. So derivatives cost one backward pass for every output
 (`pull_back`), or one forward pass for every direction (`push_forward`). `infer` computes all that
-NSF asks of its three networks at a point (NSF-sec5.1), in one compiled pass.
+NSF needs of its three networks at a point (NSF-sec5.1), in one compiled pass.
 
 Rows are walked so that a sum over inputs adds vectors of outputs: no sum is reordered, and the
 compiler may use vector registers all the same. The backward pass walks the transposed weights.
@@ -19,25 +19,25 @@ from mpm_ref.rom.fields.perceptron import layers_of
 from mpm_ref.rom.symmetric import tensor
 
 
-def places(map, X, xhat):
-    """x = g(X; xhat) of points X (n, d) [m]."""
+def places(g, X, xhat):
+    """Return x = g(X; xhat) of points X (n, d) [m]."""
     x = np.empty(X.shape)
-    _place_all(transposed(map.net), map.units, (X, xhat), x, scratch(map.net))
+    _place_all(transposed(g.net), g.units, (X, xhat), x, scratch(g.net))
     return x
 
 
-def derivatives(map, X, xhat):
-    """x (n, d), F (n, d, d) and dg/dxhat (n, d, r) [m] of points X (n, d)."""
+def derivatives(g, X, xhat):
+    """Return x (n, d), F (n, d, d) and dg/dxhat (n, d, r) [m] of points X (n, d)."""
     n, d = X.shape
-    x, F, G = np.empty((n, d)), np.empty((n, d, d)), np.empty((n, d, map.r))
-    _derivatives_all(transposed(map.net), map.units, (X, xhat), (x, F, G), scratch(map.net))
+    x, F, G = np.empty((n, d)), np.empty((n, d, d)), np.empty((n, d, g.r))
+    _derivatives_all(transposed(g.net), g.units, (X, xhat), (x, F, G), scratch(g.net))
     return x, F, G
 
 
-def velocities(map, X, xhat, vhat):
-    """dg/dxhat(X; xhat) vhat of points X (n, d) [m/s]."""
+def velocities(g, X, xhat, vhat):
+    """Return dg/dxhat(X; xhat) vhat of points X (n, d) [m/s]."""
     v = np.empty(X.shape)
-    _velocity_all(transposed(map.net), map.units, (X, xhat, vhat), v, scratch(map.net))
+    _velocity_all(transposed(g.net), g.units, (X, xhat, vhat), v, scratch(g.net))
     return v
 
 
@@ -78,9 +78,9 @@ def output(units, X, p, y, x):
 
 
 @kernel
-def place(net, units, at, x, a, bounds):
-    """x_p = g(X_p; xhat), at = (X, xhat)."""
-    X, xhat = at
+def place(net, units, given, x, a, bounds):
+    """Fill x_p = g(X_p; xhat), given = (X, xhat)."""
+    X, xhat = given
     for p in range(bounds[0], bounds[1]):
         inputs(units, X, xhat, p, a[0])
         value(net, a)
@@ -88,9 +88,9 @@ def place(net, units, at, x, a, bounds):
 
 
 @kernel
-def derive(net, units, at, out, a, bounds):
-    """x_p, F_p = I + diag(std) df/dX diag(1/span), G_p = diag(std) df/dxhat."""
-    (X, xhat), (x, F, G) = at, out
+def derive(net, units, given, out, a, bounds):
+    """Fill x_p, F_p = I + diag(std) df/dX diag(1/span), G_p = diag(std) df/dxhat."""
+    (X, xhat), (x, F, G) = given, out
     d, u = len(units.low), a[-1]
     for p in range(bounds[0], bounds[1]):
         inputs(units, X, xhat, p, a[0])
@@ -105,9 +105,9 @@ def derive(net, units, at, out, a, bounds):
 
 
 @kernel
-def velocity(net, units, at, v, a, bounds):
-    """v_p = dg/dxhat(X_p; xhat) vhat, at = (X, xhat, vhat)."""
-    X, xhat, vhat = at
+def velocity(net, units, given, v, a, bounds):
+    """Fill v_p = dg/dxhat(X_p; xhat) vhat, given = (X, xhat, vhat)."""
+    X, xhat, vhat = given
     d, u = len(units.low), a[-1]
     for p in range(bounds[0], bounds[1]):
         inputs(units, X, xhat, p, a[0])
@@ -120,21 +120,21 @@ def velocity(net, units, at, v, a, bounds):
 
 
 @parallel
-def _place_all(net, units, at, x, a):
+def _place_all(net, units, given, x, a):
     for c in prange(CHUNKS):
-        place(net, units, at, x, a[c], chunk(c, len(at[0])))
+        place(net, units, given, x, a[c], chunk(c, len(given[0])))
 
 
 @parallel
-def _derivatives_all(net, units, at, out, a):
+def _derivatives_all(net, units, given, out, a):
     for c in prange(CHUNKS):
-        derive(net, units, at, out, a[c], chunk(c, len(at[0])))
+        derive(net, units, given, out, a[c], chunk(c, len(given[0])))
 
 
 @parallel
-def _velocity_all(net, units, at, v, a):
+def _velocity_all(net, units, given, v, a):
     for c in prange(CHUNKS):
-        velocity(net, units, at, v, a[c], chunk(c, len(at[0])))
+        velocity(net, units, given, v, a[c], chunk(c, len(given[0])))
 
 
 class Flat(NamedTuple):
@@ -152,17 +152,17 @@ class Flat(NamedTuple):
 
 
 def infer(g, h, l, X, xhat, mu=()):
-    """x (n, d) [m], dg/dxhat (n, d, r) [m], tau (n, d, d) [Pa] and C (n, d, d) [1/s] at points X
-    (n, d), from a `Decoder` and two `Field` of stress and affine field; mu: the parameters, for
-    fields that depend on them. Raises ValueError for other numbers of coordinates.
+    """Return x (n, d) [m], dg/dxhat (n, d, r) [m], tau (n, d, d) [Pa] and C (n, d, d) [1/s] at
+    points X (n, d), from a `Decoder` and two `Field` of stress and affine field; mu: the
+    parameters, for fields that depend on them. Raises ValueError for other numbers of coordinates.
     """
     n, d = X.shape
     out = (np.empty((n, d)), np.empty((n, d, d)), np.empty((n, d, g.r)),
            np.empty((n, h.outputs)), np.empty((n, l.outputs)))
-    at = (X, np.asarray(xhat, dtype=float),
-          *(f.coordinates(xhat, f.needed_parameters(mu)) for f in (h, l)))
+    given = (X, np.asarray(xhat, dtype=float),
+             *(f.coordinates(xhat, f.needed_parameters(mu)) for f in (h, l)))
     networks = (Flat(*transposed(f.net), *f.units[:4], getattr(f, "octaves", 0)) for f in (g, h, l))
-    _infer_all(*networks, at, out, tuple(scratch(f.net) for f in (g, h, l)))
+    _infer_all(*networks, given, out, tuple(scratch(f.net) for f in (g, h, l)))
     x, _, G, tau, C = out
     return x, G, tensor(tau, d), C.reshape(n, d, d)
 
@@ -176,9 +176,9 @@ def encoded(f, X, state, p, a):
 
 
 @kernel
-def fill(f, at, y, a, bounds):
-    """y_p = mean + std f(X_p, state), at = (X, state)."""
-    X, state = at
+def fill(f, given, y, a, bounds):
+    """Fill y_p = mean + std f(X_p, state), given = (X, state)."""
+    X, state = given
     for p in range(bounds[0], bounds[1]):
         encoded(f, X, state, p, a[0])
         value(f, a)
@@ -187,12 +187,12 @@ def fill(f, at, y, a, bounds):
 
 
 @parallel
-def _infer_all(g, h, l, at, out, a):
+def _infer_all(g, h, l, given, out, a):
     for c in prange(CHUNKS):
-        bounds = chunk(c, len(at[0]))
-        derive(g, g, (at[0], at[1]), (out[0], out[1], out[2]), a[0][c], bounds)
-        fill(h, (at[0], at[2]), out[3], a[1][c], bounds)
-        fill(l, (at[0], at[3]), out[4], a[2][c], bounds)
+        bounds = chunk(c, len(given[0]))
+        derive(g, g, (given[0], given[1]), (out[0], out[1], out[2]), a[0][c], bounds)
+        fill(h, (given[0], given[2]), out[3], a[1][c], bounds)
+        fill(l, (given[0], given[3]), out[4], a[2][c], bounds)
 
 
 @kernel

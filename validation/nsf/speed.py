@@ -1,5 +1,5 @@
-"""How long reduced runs with inferred stress take, and what they hold, beside our own full-order
-run on the same threads (appendix C and Figure 18 of the paper).
+"""Time and memory of reduced runs with inferred stress, compared with our own full-order run on the
+same threads (appendix C and Figure 18 of the paper).
 
 The printed speed-ups count a step that is 1.5 times as long (NSF-X6): both are recorded, and where
 the time of either goes. Fields are those of modes, of three training runs only: with twelve the
@@ -20,47 +20,47 @@ from mpm_ref.simulate import simulate
 
 from ..common.registry import experiment
 from ..common.scenes import with_
-from .reduced_runs import FASTER, tested
+from .reduced_runs import FASTER, fit_study
 from .studies import cake, metal, sand
 
 INFO = {"comparator": "info"}
 REPEATS, WARM = 3, 3        # timings; steps before them
-HELD = 120                  # steps of the sand, whose bytes alone are told
+SAND_STEPS = 120            # of the sand, of which only bytes are recorded
 STAGES = {"integration": "cloud", "inferred": "bodies", "moved": "on_grid",
           "inverted": "project"}        # columns of the table: methods of `ReducedStepper`
 COLUMNS = ("scene", "samples", "inversion", "points", "full", "deform", *STAGES, "reduced")
 STUDIES = {"metal": (metal, (30, 10)), "cake": (cake, (700, 100))}
 
 
-class Clocked(ReducedStepper):
-    """The reduced model, which keeps the seconds of its stages."""
+class TimedStepper(ReducedStepper):
+    """The reduced model, with the seconds of its stages."""
 
-    def begin(self):
-        """Forget what was spent."""
+    def reset(self):
+        """Set the seconds of all stages to zero."""
         self.spent = dict.fromkeys(STAGES, 0.0)
 
-    def clocked(self, stage, *given):
-        """Return the result of a stage."""
+    def timed(self, stage, *given):
+        """Return the result of a stage, and add its seconds."""
         start = perf_counter()
         result = getattr(super(), STAGES[stage])(*given)
         self.spent[stage] += perf_counter() - start
         return result
 
     def cloud(self, *given):
-        """Find the quadrature points, clocked."""
-        return self.clocked("integration", *given)
+        """Find the quadrature points, timed."""
+        return self.timed("integration", *given)
 
     def bodies(self, *given):
-        """Evaluate the fields, clocked."""
-        return self.clocked("inferred", *given)
+        """Evaluate the fields, timed."""
+        return self.timed("inferred", *given)
 
     def on_grid(self, *given):
-        """Make a step on the grid, clocked."""
-        return self.clocked("moved", *given)
+        """Make a step on the grid, timed."""
+        return self.timed("moved", *given)
 
     def project(self, *given):
-        """Project on latent coordinates, clocked."""
-        return self.clocked("inverted", *given)
+        """Project on latent coordinates, timed."""
+        return self.timed("inverted", *given)
 
 
 @experiment("nsf.speed", title="NSF: time beside the full-order run",
@@ -70,20 +70,20 @@ def speed(run):
     steps, rows = run.choose(quick=20, standard=100), []
     for name, (study, counts) in run.progress(STUDIES.items(), "scenes"):
         small = study(run.choose(quick=3, standard=1), train=3)
-        one = tested(small._replace(test=small.test[1:2]))
-        rows += of_scene(run, name, one, counts, steps)
+        one = fit_study(small._replace(test=small.test[1:2]))
+        rows += record_scene(run, name, one, counts, steps)
     column = sand(run.choose(quick=3, standard=1), train=3)
-    record_bytes(run, "sand", tested(column._replace(test=column.test[:1], steps=HELD)))
+    record_bytes(run, "sand", fit_study(column._replace(test=column.test[:1], steps=SAND_STEPS)))
     run.table("times", COLUMNS, rows)
 
 
-def of_scene(run, name, one, counts, steps):
-    """Record times and bytes of a scene; a row for each number of samples and inversion."""
-    full, rows = whole_steps(one.study, steps), []
+def record_scene(run, name, one, counts, steps):
+    """Record times and bytes of a scene; return a row for each number of samples and inversion."""
+    full, rows = full_steps(one.study, steps), []
     for count in counts:
         for inversion in ("nonlinear", "linear"):
-            found = [reduced_steps(one, count, inversion, steps) for _ in range(REPEATS)]
-            spent = {key: float(np.median([f[key] for f in found])) for key in found[0]}
+            repeats = [reduced_steps(one, count, inversion, steps) for _ in range(REPEATS)]
+            spent = {key: float(np.median([r[key] for r in repeats])) for key in repeats[0]}
             rows.append((name, count, inversion, spent["points"], *full,
                          *(spent[stage] for stage in STAGES), spent["reduced"]))
     record_times(run, name, one, rows, steps)
@@ -91,9 +91,9 @@ def of_scene(run, name, one, counts, steps):
     return rows
 
 
-def whole_steps(study, steps):
-    """Seconds of a full-order step, and of its update of deformation: singular values, return map
-    and stress; medians.
+def full_steps(study, steps):
+    """Return the seconds of a full-order step, and of its update of deformation: singular values,
+    return map and stress; medians.
     """
     scene = study.run(study.test[0])
     deque(simulate(nsf_full_model(with_(scene, steps=WARM, every=WARM, interval=None)).problem),
@@ -114,19 +114,21 @@ def whole_steps(study, steps):
 
 
 def reduced_steps(one, count, inversion, steps):
-    """{what: seconds of a reduced step; of its stages}, and integration points; means."""
+    """Return {"reduced": seconds of a reduced step, STAGE: seconds of it, "points": integration
+    points}, means over steps.
+    """
     value = one.study.test[0]
-    scene, fields = nsf_full_model(one.study.run(value)), one.of(value)
+    scene, fields = nsf_full_model(one.study.run(value)), one.fields_of_run(value)
     problem, plain = scene.problem, nsf_model(scene, fields, inversion)
-    stepper = Clocked(*(getattr(plain, option.name) for option in dataclasses.fields(plain)))
+    stepper = TimedStepper(*(getattr(plain, option.name) for option in dataclasses.fields(plain)))
     samples = one.study.chosen(scene, count, 0)[0].points
-    stepper.begin()
-    at, dt, points = nsf_start(scene, fields, one.rest), problem.clock.dt, []
+    stepper.reset()
+    latent, dt, points = nsf_start(scene, fields, one.rest), problem.clock.dt, []
     for k in range(WARM + steps):
         if k == WARM:
-            stepper.begin()
+            stepper.reset()
             start = perf_counter()
-        at, report = stepper.step(at, samples, k * dt, dt)
+        latent, report = stepper.step(latent, samples, k * dt, dt)
         points.append(report.points)
     took = {stage: spent / steps for stage, spent in stepper.spent.items()}
     return took | {"reduced": (perf_counter() - start) / steps, "points": float(np.mean(points))}
@@ -160,16 +162,16 @@ def record_times(run, name, one, rows, steps):
 
 def record_bytes(run, name, one):
     """Record the bytes of the fields, and of the particles of a full-order run; those printed are
-    of programs on a graphics processor, whose parts are not told, and do not judge ours.
+    of programs on a graphics processor, whose parts are not given, and do not judge ours.
     """
     fields, problem = one.fields, nsf_full_model(one.study.run(one.study.test[0])).problem
-    held = sum(a.nbytes for a in (fields.X, fields.U, fields.tau.modes, fields.C.modes))
-    particles = sum(a.nbytes for body in problem.bodies for a in body.particles)
+    field_bytes = sum(a.nbytes for a in (fields.X, fields.U, fields.tau.modes, fields.C.modes))
+    particle_bytes = sum(a.nbytes for body in problem.bodies for a in body.particles)
     scale = f"{len(fields.X)} particles"
-    for word, id, value, note in (
-            ("fields", "mem_reduced", held, "positions and modes; of doubles"),
-            ("particles", "mem_full", particles, "of a full-order run, without the grid")):
+    for word, target, value, note in (
+            ("fields", "mem_reduced", field_bytes, "positions and modes; of doubles"),
+            ("particles", "mem_full", particle_bytes, "of a full-order run, without the grid")):
         run.record(f"nsf.speed.{name}.bytes.{word}", value, unit="B", note=note, scale=scale,
                    **INFO)
-        run.record(f"nsf.{name}.{id}", value / 1e9, unit="GB", scale=scale,
+        run.record(f"nsf.{name}.{target}", value / 1e9, unit="GB", scale=scale,
                    note=f"{note}; printed: of a program on a graphics processor", **INFO)

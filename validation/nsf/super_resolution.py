@@ -1,5 +1,6 @@
-"""Networks at points that no training has seen, a hundred times as many (Figure 6): beside the
-full-order run of these points on the same grid, and beside what the nearest training point does.
+"""Networks at a hundred times as many points as in training (Figure 6), compared with the
+full-order run of these points on the same grid, and with the displacement of the nearest training
+point.
 """
 
 import numpy as np
@@ -24,38 +25,39 @@ SHOWN = 20000           # of the many points
 @experiment("nsf.fig6", title="NSF: a hundred times as many points",
             profiles=("quick", "standard"), budget={"quick": 20, "standard": 300})
 def boost(run):
-    """Of the jelly cube, whose networks are trained; the paper shows sand. Latent coordinates are
-    those of the states nearest to the run of the training's points.
+    """Errors of the jelly cube, whose networks are trained; the paper shows sand. Latent
+    coordinates are those of the states nearest to the run of the training's points.
     """
     for model in load_available(run, [NAME], trained).values():
         study = nets()[NAME].study
         scene, fields = study.run(study.test[0]), fields_of(model, study)
         few = states(scene)
         many = states(finer(scene, run.choose(quick=4, standard=100)))
-        found = [xhat for _, xhat in nearest_states(fields, few.x[0], model.rest)]
-        compared(run, fields.g, few, many, found)
+        path = [xhat for _, xhat in nearest_states(fields, few.x[0], model.rest)]
+        record_resolutions(run, fields.g, few, many, path)
 
 
-def compared(run, g, few, many, xhat):
+def record_resolutions(run, g, few, many, xhat):
     """Record errors of a map at few and at many points of the same run, and keep both; xhat: of
     each level of the run.
     """
     factor, scale = len(many.X) / len(few.X), f"{len(many.X)} points, trained at {len(few.X)}"
     run.record("nsf.fig6.resolution_boost", factor, scale=scale,
-               note="as many points as are asked for; what they are worth: see the errors",
+               note="as many points as are asked for; see the errors",
                **({} if run.profile == "standard" else {"comparator": "info"}))
     _, near = KDTree(few.X).query(many.X)
-    of_few, of_many, of_nearest = (Squares(X) for X in (few.X, many.X, many.X))
+    few_errors, many_errors, nearest_errors = (Squares(X) for X in (few.X, many.X, many.X))
     shown = []
     for k in range(1, SHOTS + 1):
         x = g.place(many.X, xhat[k])
-        of_few.add(g.place(few.X, xhat[k]), few.x[0, k])
-        of_many.add(x, many.x[0, k])
-        of_nearest.add(many.X + (few.x[0, k] - few.X)[near], many.x[0, k])
+        few_errors.add(g.place(few.X, xhat[k]), few.x[0, k])
+        many_errors.add(x, many.x[0, k])
+        nearest_errors.add(many.X + (few.x[0, k] - few.X)[near], many.x[0, k])
         shown.append(x)
-    for word, squares, note in (("few", of_few, "at the points of the training"),
-                                ("many", of_many, "at the many points"),
-                                ("nearest", of_nearest, "the many points, moved as the nearest of "
+    for word, squares, note in (("few", few_errors, "at the points of the training"),
+                                ("many", many_errors, "at the many points"),
+                                ("nearest", nearest_errors,
+                                 "the many points, moved as the nearest of "
                                  "the few are in the full-order run")):
         run.record(f"nsf.fig6.{word}", 100.0 * squares.errors.displacement, unit="%", scale=scale,
                    comparator="info", note=f"{note}; displacement of cube and wall, {SHOTS} times, "
@@ -65,16 +67,16 @@ def compared(run, g, few, many, xhat):
 
 
 def finer(scene, factor):
-    """A scene with so many times as many points on the same grid."""
+    """Return a scene with `factor` times as many points on the same grid."""
     return with_values(scene, {f"body.{body.name}.sampling.count": factor * body.sampling.count
-                          for body in scene.body if isinstance(body.sampling, Poisson)})
+                               for body in scene.body if isinstance(body.sampling, Poisson)})
 
 
 def states(scene):
-    """`Histories` of a run at `SHOTS` times after the start."""
+    """Return the `Histories` of a run at `SHOTS` times after the start."""
     return simulate_history(scene, [0.0], np.float32, scene.steps // SHOTS)
 
 
 def thinned(x, most):
-    """At most so many of the points of x (levels, n, d)."""
+    """Return at most `most` of the points of x (levels, n, d)."""
     return x[:, ::-(-x.shape[1] // most)]

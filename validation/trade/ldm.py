@@ -10,9 +10,9 @@ from mpm_ref.rom.study.run import RunOptions
 from ..common.registry import experiment
 from ..common.scenes import with_
 from ..ldm.networks import trained
-from ..ldm.references import References, pod, references, share
+from ..ldm.references import References, pod, record_errors, references
 from ..ldm.studies import GRAVITY, TORSION, TOWER
-from ..ldm.timing import COLUMNS, Full, alone, median, race
+from ..ldm.timing import COLUMNS, SteppedFullRun, median, race, time_alone
 from ..ldm.tower import FAST, NET, PAPER, scene_of
 from .front import front
 
@@ -45,9 +45,9 @@ def of_ways(run):
     full, found = race(scene, (model.field, model.rest), chosen, steps)
     scale = f"about {size} thousand particles, {steps} steps, one test run"
     for one in found:
-        share(run, f"trade.ldm.knobs.{one.words}", one.errors, scale,
-              f"{1e3 * one.spent.cpu:.3g} ms of CPU time a step, the full model "
-              f"{1e3 * full.cpu:.3g}; {one.points} quadrature points", comparator="info")
+        record_errors(run, f"trade.ldm.knobs.{one.label}", one.errors, scale,
+                      f"{1e3 * one.spent.cpu:.3g} ms of CPU time a step, the full model "
+                      f"{1e3 * full.cpu:.3g}; {one.points} quadrature points", comparator="info")
     best = front([one.spent.cpu for one in found], [one.errors.origin for one in found])
     run.table("ways", (*COLUMNS, "cpu_full", "pareto"),
               [(*one.row, full.cpu, int(on)) for one, on in zip(found, best, strict=True)])
@@ -73,13 +73,13 @@ class ReducedSetting:
     def measured(self, tests):
         """Errors, and CPU seconds of the steps of a run."""
         way, longer = RunOptions(points=self.points), lengthened(tests, self.longer)
-        return longer.on(*self.at, way), steps_of(longer, self.at, way)
+        return longer.run_errors(*self.at, way), steps_of(longer, self.at, way)
 
 
 def steps_of(tests, at, way):
     """CPU seconds of the steps of a reduced run: so many times the median."""
     one, x = tests.cases[0], tests.x[0]
-    return one.problem.clock.steps * alone(one, at, way, x).spent.cpu
+    return one.problem.clock.steps * time_alone(one, at, way, x).spent.cpu
 
 
 def lengthened(tests, longer):
@@ -87,7 +87,7 @@ def lengthened(tests, longer):
     scenes = (GRAVITY.scene(-one.problem.gravity[-1]) for one in tests.cases)
     cases = tuple(ldm_full_model(with_(scene, dt=longer * scene.dt, steps=scene.steps // longer))
                   for scene in scenes)
-    return References(tests.study, cases, tuple(x[::longer] for x in tests.x), tests.of)
+    return References(tests.study, cases, tuple(x[::longer] for x in tests.x), tests.total)
 
 
 @experiment("trade.ldm.gravity", title="LDM: error and cost by map, samples and time step",
@@ -110,14 +110,14 @@ def of_maps(run):
     for one, (errors, cpu), on in zip(chosen, measured, best, strict=True):
         if on:
             words = f"{one.map}-r{one.r}.{one.points or 'all'}.dt-{one.longer}"
-            share(run, f"trade.ldm.gravity.{words}", errors, tests.scale,
-                  f"{cpu:.3g} CPU s a run, the full model {full:.3g}: nothing is better and "
-                  "cheaper", comparator="info")
+            record_errors(run, f"trade.ldm.gravity.{words}", errors, tests.scale,
+                          f"{cpu:.3g} CPU s a run, the full model {full:.3g}: nothing is better "
+                          "and cheaper", comparator="info")
 
 
 def full_run(scene):
     """CPU seconds of the steps of a full-order run: so many times the median."""
-    full = Full(scene)
+    full = SteppedFullRun(scene)
     for _ in range(scene.steps):
         full.step()
     return scene.steps * median(full.spent).cpu
@@ -136,10 +136,10 @@ def of_density(run):
                 for quadrature in kinds for k in dense)]
     for way in run.progress(chosen, "densities"):
         at = model.field, model.rest
-        errors, cpu = tests.on(*at, way), steps_of(tests, at, way)
+        errors, cpu = tests.run_errors(*at, way), steps_of(tests, at, way)
         words = way.quadrature if way == chosen[0] else f"{way.quadrature}.{way.per_cell}"
-        share(run, f"trade.ldm.density.{words}", errors, tests.scale, f"{cpu:.3g} CPU s a run",
-              comparator="info")
+        record_errors(run, f"trade.ldm.density.{words}", errors, tests.scale,
+                      f"{cpu:.3g} CPU s a run", comparator="info")
         rows.append((way.quadrature, way.per_cell, cpu, *errors))
     run.table("densities", ("quadrature", "per_cell", "cpu_run", "origin", "centroid",
                             "displacement"), rows)

@@ -69,15 +69,15 @@ def width(run):
     body = build(small_nets()[BASE].scene).bodies[0]
     true, rows = cost(body.law, body.flow), []
     costs = [of_laws(last(row.name), body) for row in found]
-    best = front(costs, [row.own for row in found])
+    best = front(costs, [row.training_run for row in found])
     for row, seconds, on in zip(found, costs, best, strict=True):
         net = small_nets()[row.name]
-        rows.append((net.width, seconds, true, row.own, row.thrown, row.cpu, int(on)))
-        run.record(f"trade.nclaw.width.{net.width}", row.own, unit="m^2", comparator="info",
-                   scale="216 particles, 100 epochs",
+        rows.append((net.width, seconds, true, row.training_run, row.thrown, row.cpu, int(on)))
+        run.record(f"trade.nclaw.width.{net.width}", row.training_run, unit="m^2",
+                   comparator="info", scale="216 particles, 100 epochs",
                    note=f"{1e6 * seconds:.3g} us of CPU time for both laws of a point, without "
-                        f"the grid, the true laws {1e6 * true:.3g}; thrown otherwise "
-                        f"{row.thrown:.3g} m^2")
+                   f"the grid, the true laws {1e6 * true:.3g}; thrown otherwise "
+                   f"{row.thrown:.3g} m^2")
     run.table("widths", ("width", "cpu_point", "true_cpu_point", "own", "thrown", "cpu_training",
                          "pareto"), rows)
 

@@ -15,8 +15,8 @@ from ..common.registry import experiment
 from ..common.scenes import with_
 from ..extremes.nsf_runs import scenes
 from ..extremes.outcome import outcome
-from ..ldm.timing import clocked
-from ..nsf.errors import COLUMNS, mean, rows_of, share, weights
+from ..ldm.timing import timed
+from ..nsf.errors import COLUMNS, error_rows, mean, record_mean, weights_note
 from .front import front
 
 COUNTS = {"quick": (10, 50), "standard": (5, 10, 20, 30, 50, 100, 200, 400)}
@@ -61,13 +61,13 @@ def of_sampling(run, one, sampling, full):
     scene, way, count = sampling
     one = one._replace(study=one.study._replace(by_cell=way == CELLS))
     draws = range(DRAWS[run.profile] if count < len(one.fields.X) else 1)
-    rows = rows_of(one, way, count, draws, weighed=WAYS[way])
+    rows = error_rows(one, way, count, draws, weighted=WAYS[way])
     cpu = reduced_cpu(one, count, WAYS[way], run.choose(quick=1, standard=3))
-    what = SAID[way] + (f", {weights(rows)}" if WAYS[way] else "")
-    share(run, f"trade.nsf.samples.{scene}.{way}.{count}", rows, one.scale, f"{count} {what}; "
-          f"of the stress {100.0 * mean(rows, 'stress'):.3g} %; "
-          f"{mean(rows, 'points'):.0f} integration points; {WORDS.format(full, cpu)}",
-          comparator="info")
+    what = SAID[way] + (f", {weights_note(rows)}" if WAYS[way] else "")
+    record_mean(run, f"trade.nsf.samples.{scene}.{way}.{count}", rows, one.scale,
+                f"{count} {what}; " f"of the stress {100.0 * mean(rows, 'stress'):.3g} %; "
+                f"{mean(rows, 'points'):.0f} integration points; {WORDS.format(full, cpu)}",
+                comparator="info")
     return rows, cpu
 
 
@@ -75,7 +75,7 @@ def full_cpu(one):
     """CPU seconds of the steps of the full-order run of the first test."""
     scene = one.study.run(one.study.test[0])
     problem = nsf_full_model(with_(scene, every=scene.steps, interval=None)).problem
-    return clocked(lambda: deque(simulate(problem), maxlen=0))[1].cpu
+    return timed(lambda: deque(simulate(problem), maxlen=0))[1].cpu
 
 
 def reduced_cpu(one, count, weighed, repeats):
@@ -83,12 +83,12 @@ def reduced_cpu(one, count, weighed, repeats):
     Samples are chosen before.
     """
     value = one.study.test[0]
-    scene, fields = nsf_full_model(one.study.run(value)), one.of(value)
+    scene, fields = nsf_full_model(one.study.run(value)), one.fields_of_run(value)
     plan = FieldRunOptions(one.study.chosen(scene, count, 0, one.fields if weighed else None))
     try:
         with one_thread():
-            found = [clocked(lambda: deque(nsf_run(scene, fields, plan, one.rest).states(),
-                                           maxlen=0))[1].cpu for _ in range(repeats)]
+            found = [timed(lambda: deque(nsf_run(scene, fields, plan, one.rest).states(),
+                                         maxlen=0))[1].cpu for _ in range(repeats)]
     except BREAKDOWNS:
         return np.inf
     return float(np.median(found))
@@ -102,11 +102,12 @@ def of_steps(run):
     for name, one in scenes(run):
         draws = range(run.choose(quick=1, standard=3))
         for factor in run.progress(FACTORS, name):
-            found = rows_of(one, "modal", one.study.samples, draws, factor)
+            found = error_rows(one, "modal", one.study.samples, draws, factor)
             said = full_end(one.study.run(one.study.test[0]), factor)
-            share(run, f"trade.nsf.dt.{name}.x{factor:g}", found, one.scale, f"steps {factor:g} "
-                  f"times as long, {one.study.samples} samples; the full-order run: {said}",
-                  comparator="info")
+            record_mean(run, f"trade.nsf.dt.{name}.x{factor:g}", found, one.scale,
+                        f"steps {factor:g} "
+                        f"times as long, {one.study.samples} samples; the full-order run: {said}",
+                        comparator="info")
             rows += [(name, *row, said) for row in found]
             if not all(np.isfinite(row[COLUMNS.index("origin")]) for row in found):
                 break

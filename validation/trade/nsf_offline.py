@@ -9,9 +9,9 @@ from mpm_ref.rom.study.dataset import simulate_history
 
 from ..common.registry import experiment
 from ..common.weights_needed import Untrained, load_available
-from ..ldm.timing import clocked
+from ..ldm.timing import timed
 from ..nsf.networks import fields_of, nets, trained
-from ..nsf.reduced_runs import Tested, refitted
+from ..nsf.reduced_runs import FittedStudy, refit
 from ..nsf.studies import jelly, metal
 from .nsf import full_cpu, reduced_cpu
 
@@ -59,14 +59,14 @@ def offline(run):
 
 
 def of_modes(study, repeats):
-    """`Tested` of a study on fields of modes, and their `Bill`."""
+    """`FittedStudy` of a study on fields of modes, and their `Bill`."""
     def made(value):
         return simulate_history(study.run(value), [value], np.float32, study.spacing)
 
     tests = {study.test[0]: made(study.test[0])}        # first, as it compiles what is missing
-    runs, spent = clocked(lambda: join_histories(map(made, study.train), len(study.train)))
-    bare = Tested(study, None, None, runs, tests)
-    one, made_in = clocked(lambda: refitted(bare, study.sizes, study.follows))
+    runs, spent = timed(lambda: join_histories(map(made, study.train), len(study.train)))
+    bare = FittedStudy(study, None, None, runs, tests)
+    one, made_in = timed(lambda: refit(bare, study.sizes, study.follows))
     return one, Bill(spent.cpu, made_in.cpu, full_cpu(one),
                      reduced_cpu(one, study.samples, False, repeats))
 

@@ -11,8 +11,8 @@ from mpm_ref.rom.study.full_model import nsf_full_model
 
 from ..common.registry import experiment
 from ..extremes.nsf_runs import scenes
-from ..nsf.errors import COLUMNS, mean, rows_of, share
-from ..nsf.reduced_runs import refitted
+from ..nsf.errors import COLUMNS, error_rows, mean, record_mean
+from ..nsf.reduced_runs import refit
 
 LEVELS = {          # one at a time, from the study's own
     "quick": {"r": (3,), "tau": (10,), "C": (10,), "smoothing": (1.0,)},
@@ -26,7 +26,7 @@ class Change(NamedTuple):
 
     knob: str
     value: str
-    made: Callable      # () -> `Tested`
+    made: Callable      # () -> `FittedStudy`
 
 
 @experiment("trade.nsf.sizes", title="NSF: error and memory by latent coordinates and modes",
@@ -43,10 +43,10 @@ def of_sizes(run):
 
 def changes(one, levels):
     """[`Change`] of all changes, the study's own sizes first and modes in single precision last."""
-    def refit(knob, value):
-        return lambda: refitted(one, one.study.sizes._replace(**{knob: value}), one.study.follows)
+    def with_size(knob, value):
+        return lambda: refit(one, one.study.sizes._replace(**{knob: value}), one.study.follows)
 
-    found = [Change(knob, f"{value:g}", refit(knob, value)) for knob, values in levels.items()
+    found = [Change(knob, f"{value:g}", with_size(knob, value)) for knob, values in levels.items()
              for value in values if value != getattr(one.study.sizes, knob)]
     return [Change("own", "sizes", lambda: one), *found,
             Change("precision", "single", lambda: one._replace(fields=one.fields.single()))]
@@ -56,10 +56,11 @@ def of_change(run, name, change, full):
     """Record errors and bytes of a scene's fields with a `Change`; rows of its runs."""
     one, knob = change.made(), change.knob
     size, sizes = nbytes(one.fields), one.study.sizes
-    rows = rows_of(one, knob, one.study.samples, range(run.choose(quick=1, standard=3)))
-    share(run, f"trade.nsf.sizes.{name}.{knob}.{change.value}", rows, one.scale, "of the stress "
-          f"{100.0 * mean(rows, 'stress'):.3g} %; {size / 1e6:.3g} MB of fields, the particles of "
-          f"the full-order run {full / 1e6:.3g} MB", comparator="info")
+    rows = error_rows(one, knob, one.study.samples, range(run.choose(quick=1, standard=3)))
+    record_mean(run, f"trade.nsf.sizes.{name}.{knob}.{change.value}", rows, one.scale,
+                f"of the stress {100.0 * mean(rows, 'stress'):.3g} %; {size / 1e6:.3g} MB of "
+                f"fields, the particles of the full-order run {full / 1e6:.3g} MB",
+                comparator="info")
     return [(name, knob, sizes.r, sizes.modes, sizes.tau, sizes.C, sizes.smoothing, *row[1:], size,
              full) for row in rows]
 

@@ -2,9 +2,9 @@
 
 from ..common.registry import experiment
 from ..common.weights_needed import load_available
-from ..nsf.errors import COLUMNS, mean, rows_of, share
+from ..nsf.errors import COLUMNS, error_rows, mean, record_mean
 from ..nsf.networks import narrow, net_of, trained
-from ..nsf.networks_runs import OUTPUTS, TRAINED, scale_of, tested_on, weights_of
+from ..nsf.networks_runs import OUTPUTS, TRAINED, fit_to_networks, scale_of, weight_count
 from .nsf import full_cpu, reduced_cpu
 
 DOUBLE = 8              # bytes of a weight
@@ -24,16 +24,16 @@ def of_widths(run):
 
 def of_width(run, net, model):
     """Record errors and cost of a `Net`; its rows."""
-    one, width = tested_on(model, net.study), net.g.width
+    one, width = fit_to_networks(model, net.study), net.g.width
     scale, few = scale_of(net, one), net.study.samples
-    size = DOUBLE * sum(weights_of(net.study, own, width, net.octaves if own != "g" else 0)
+    size = DOUBLE * sum(weight_count(net.study, own, width, net.octaves if own != "g" else 0)
                         for own in OUTPUTS)
     cpu, full = reduced_cpu(one, few, False, REPEATS), full_cpu(one)
-    drawn = rows_of(one, f"{width} wide", few, range(DRAWS))
-    every = rows_of(one, f"{width} wide", len(one.fields.X), (0,))
+    drawn = error_rows(one, f"{width} wide", few, range(DRAWS))
+    every = error_rows(one, f"{width} wide", len(one.fields.X), (0,))
     for word, rows, note in (("", drawn, f"{few} samples; {cpu:.3g} CPU s beside {full:.3g} of the "
                               f"full-order run, {size / 1e3:.3g} kB of weights"),
                              (".all", every, "all particles are samples")):
-        share(run, f"trade.nsf.widths.{width}{word}", rows, scale,
-              f"{note}; of the stress {100.0 * mean(rows, 'stress'):.3g} %", **TRAINED)
+        record_mean(run, f"trade.nsf.widths.{width}{word}", rows, scale,
+                    f"{note}; of the stress {100.0 * mean(rows, 'stress'):.3g} %", **TRAINED)
     return [(width, size, cpu, full, *row[1:]) for row in drawn + every]

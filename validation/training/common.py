@@ -1,4 +1,4 @@
-"""Common options of the training commands, and the loop over the trainings."""
+"""Common parts of the training commands: options, provenance, and the loop over the trainings."""
 
 from pathlib import Path
 from typing import Annotated
@@ -8,12 +8,26 @@ import typer
 
 from mpm_ref.training import DEVICES
 
+from ..common.provenance import commit, provenance
+
 Names = Annotated[list[str] | None, typer.Argument(help="of nets; none: all")]
 Folder = Annotated[Path, typer.Option(help="where weights go")]
-Checkpoints = Annotated[Path, typer.Option(help="what an interrupted training goes on from")]
+Checkpoints = Annotated[Path, typer.Option(help="where an interrupted training continues from")]
 Threads = Annotated[int, typer.Option(help="of PyTorch")]
 Device = Annotated[str, typer.Option(help=f"where networks are trained: {', '.join(DEVICES)}")]
-KEPT = Path("results/training")
+CHECKPOINTS = Path("results/training")
+ROOT = Path(__file__).parents[2]
+
+
+def origin(paper, name):
+    """Return the plain values on how weights were made: command, versions, commit, date."""
+    return {"command": f"python -m validation.training.{paper} {name}", "torch": torch.__version__,
+            **provenance(commit(ROOT))}
+
+
+def times(meter):
+    """Return {"wall_seconds": .., "cpu_seconds": ..} of a training, rounded."""
+    return {f"{clock}_seconds": round(s, 1) for clock, s in meter.total._asdict().items()}
 
 
 def train_all(names, trainings, places, threads, make):

@@ -1,12 +1,10 @@
 """`python -m validation.training.ldm NAME...`: train the maps of LDM's experiments again.
 
-It needs PyTorch. A training that is cut off goes on from its checkpoint.
+It needs PyTorch. An interrupted training continues from its checkpoint.
 """
 
 from dataclasses import asdict
-from pathlib import Path
 
-import torch
 import typer
 from tqdm import tqdm
 
@@ -17,15 +15,12 @@ from mpm_ref.rom.train.loss import READINGS, LossWeights
 from mpm_ref.rom.train.settings import device_of
 from mpm_ref.training import DEVICES, Machine
 
-from ..common.provenance import commit, provenance
 from ..ldm.networks import FOLDER, SHARES, identity, nets
-from .common import KEPT, Checkpoints, Device, Folder, Names, Threads, train_all
-
-ROOT = Path(__file__).parents[2]
+from .common import CHECKPOINTS, Checkpoints, Device, Folder, Names, Threads, origin, train_all
 
 
 def training(net):
-    """`DecoderTraining` of a `Net`."""
+    """Return the `DecoderTraining` of a `MapNet`."""
     shares, weights = SHARES[net.terms], READINGS[net.reading]
     scaled = LossWeights(*(share * weight for share, weight in zip(shares, weights, strict=True)))
     return DecoderTraining(net.r, weights=scaled, epochs=net.epochs, batch=net.batch,
@@ -33,8 +28,8 @@ def training(net):
                            seed=net.seed)
 
 
-def made(name, checkpoints, machine):
-    """`Model` of a net by name, with what is to be known of it."""
+def trained_map(name, checkpoints, machine):
+    """Return the trained `Model` of a name, with how it was made."""
     net = nets()[name]
     plan, snapshots = training(net), net.study.run(net.study.train)
     with tqdm(total=plan.epochs, desc=name) as bar:
@@ -44,18 +39,16 @@ def made(name, checkpoints, machine):
         done = train_decoder(plan, snapshots, checkpoints / f"{name}.pt", show,
                              device_of(machine.device))
     return decoder_model(done, snapshots.X, {
-        **identity(net), "training": asdict(plan),
-        "command": f"python -m validation.training.ldm {name}",
-        **machine._asdict(), "torch": torch.__version__, **provenance(commit(ROOT))})
+        **identity(net), "training": asdict(plan), **machine._asdict(), **origin("ldm", name)})
 
 
-def main(names: Names = None, folder: Folder = FOLDER, checkpoints: Checkpoints = KEPT,
+def main(names: Names = None, folder: Folder = FOLDER, checkpoints: Checkpoints = CHECKPOINTS,
          threads: Threads = 1, device: Device = DEVICES[0]):
     """Train maps and write their weights."""
     machine = Machine(threads, device)
 
     def make(name, folder, checkpoints):
-        save(folder / f"{name}.npz", made(name, checkpoints, machine))
+        save(folder / f"{name}.npz", trained_map(name, checkpoints, machine))
 
     train_all(names, nets(), (folder, checkpoints), threads, make)
 

@@ -1,14 +1,12 @@
 """`python -m validation.training.nsf NAME...`: train the three networks of NSF's scenes anew.
 
-It needs PyTorch. A training that is cut off goes on from the checkpoints of its stages.
+It needs PyTorch. An interrupted training continues from the checkpoints of its stages.
 """
 
 from dataclasses import asdict
-from pathlib import Path
 from shutil import rmtree
 
 import numpy as np
-import torch
 import typer
 from tqdm import tqdm
 
@@ -21,36 +19,34 @@ from mpm_ref.rom.train.settings import device_of
 from mpm_ref.rom.train.stages import POSITION, StagePlan, train_stages
 from mpm_ref.training import DEVICES, Machine, TrainingTime
 
-from ..common.provenance import commit, provenance
 from ..nsf.networks import FOLDER, identity, narrow, net_of, nets
-from .common import KEPT, Checkpoints, Device, Folder, Names, Threads, train_all
+from .common import CHECKPOINTS, Checkpoints, Device, Folder, Names, Threads, origin, train_all
 
-ROOT = Path(__file__).parents[2]
-SHOWN = 50          # epochs of which the loss is kept in the file
-LEVELS = 12         # time levels of each run that errors are of, about
+SHOWN = 50          # epochs of which the loss is stored
+LEVELS = 12         # time levels of each run for the errors, about
 
 
 def plan_of(net):
-    """`StagePlan` of a `Net`."""
-    how = {name: getattr(net, name) for name in ("batch", "points", "schedule", "seed")}
+    """Return the `StagePlan` of a `FieldsNet`."""
+    options = {name: getattr(net, name) for name in ("batch", "points", "schedule", "seed")}
     follows = {"h": net.study.follows, "l": False}
     g = DecoderTraining(net.study.sizes.r, net.g.hidden, net.latent, POSITION, net.g.epochs,
-                        jitter=net.g.beside, **how)
-    return StagePlan(g, *(FieldTraining(own.hidden, follows[name], own.epochs, jitter=own.beside,
-                                        octaves=net.octaves, **how)
+                        jitter=net.g.jitter, **options)
+    return StagePlan(g, *(FieldTraining(own.hidden, follows[name], own.epochs, jitter=own.jitter,
+                                        octaves=net.octaves, **options)
                           for name, own in (("h", net.h), ("l", net.l))))
 
 
 def runs_of(study):
-    """`Histories` of a study's training runs."""
+    """Return the `Histories` of a study's training runs."""
     values = tqdm(study.train, desc="runs")
     return join_histories((simulate_history(study.run(value), [value], np.float32, study.spacing)
-                   for value in values), len(study.train))
+                           for value in values), len(study.train))
 
 
-class Work:
-    """Moves a bar as stages of a `Net`'s training go on; an epoch of a network counts as often as
-    its hidden layers have products.
+class ProgressBar:
+    """The bar of a `FieldsNet`'s training; an epoch of a network counts as many steps as its hidden
+    layers have products.
     """
 
     def __init__(self, net, bar):
@@ -59,68 +55,69 @@ class Work:
 
     @staticmethod
     def total(net):
-        """Of all stages."""
+        """Return the number of steps of all stages."""
         return sum(getattr(net, name).epochs * getattr(net, name).width**2 for name in "ghl")
 
     def show(self, stage, losses):
-        """After an epoch of a stage."""
+        """Move the bar after an epoch of a stage."""
         self.bar.update(self.each[stage] * (len(losses) - self.done[stage]))
         self.done[stage] = len(losses)
         self.bar.set_postfix(stage=stage, loss=f"{np.ravel(losses[-1])[0]:.1e}")
 
 
-def made(name, checkpoints, machine):
-    """`model_file.Model` of a net by name, with what is to be known of it."""
+def trained_fields(name, checkpoints, machine):
+    """Return the trained `Model` of a name, with how it was made."""
     net = net_of(name)
     checkpoints.mkdir(parents=True, exist_ok=True)
     runs = runs_of(net.study)
-    with tqdm(total=Work.total(net), desc=name, unit_scale=True) as bar:
-        done = train_stages(plan_of(net), runs, checkpoints, Work(net, bar).show,
+    with tqdm(total=ProgressBar.total(net), desc=name, unit_scale=True) as bar:
+        done = train_stages(plan_of(net), runs, checkpoints, ProgressBar(net, bar).show,
                             device_of(machine.device))
     stages = done._asdict().items()
-    took = {f"{clock}_seconds": {stage: round(getattr(own.cost, clock), 1) for stage, own in stages}
-            for clock in TrainingTime._fields}
+    seconds = {f"{clock}_seconds": {stage: round(getattr(own.cost, clock), 1)
+                                    for stage, own in stages}
+               for clock in TrainingTime._fields}
     plan = {stage: asdict(own) for stage, own in plan_of(net)._asdict().items()}
     return done.model({
         **identity(net), "plan": plan, "errors": errors_of(done.model({}), runs),
-        "losses": losses(done), **took, **machine._asdict(), "torch": torch.__version__,
-        "command": f"python -m validation.training.nsf {name}", **provenance(commit(ROOT))})
+        "losses": losses(done), **seconds, **machine._asdict(), **origin("nsf", name)})
 
 
 def errors_of(model, runs):
-    """How far the networks are off some of their training snapshots, over the norm of what they
-    learned.
+    """Return the errors of the networks on some of their training snapshots, over the norms of the
+    snapshots' fields.
     """
     sums = {name: np.zeros(2) for name in ("displacement", "stress", "affine")}
     for run, mu in enumerate(runs.mu):
         for k in range(0, runs.x.shape[1], -(-runs.x.shape[1] // LEVELS)):
             xhat, X, (g, h, l) = model.xhat[run, k], runs.X, model.field
-            for name, found, known in (
+            for name, prediction, reference in (
                     ("displacement", g.place(X, xhat) - X, runs.x[run, k] - X),
                     ("stress", h.values(X, xhat, h.needed_parameters(mu)), runs.tau[run, k]),
                     ("affine", l.values(X, xhat, l.needed_parameters(mu)), runs.C[run, k])):
-                sums[name] += np.sum((found - known)**2), np.sum(known**2, dtype=float)
+                sums[name] += (np.sum((prediction - reference)**2),
+                               np.sum(reference**2, dtype=float))
     return {name: float(np.sqrt(off / norm)) for name, (off, norm) in sums.items()}
 
 
 def losses(done):
-    """{stage: [loss of some epochs, the last one among them]} of `Stages`."""
-    found = {}
+    """Return {stage: [loss of some epochs, the last one among them]} of `Stages`."""
+    shown = {}
     for stage, own in done._asdict().items():
         every = own.history.reshape(len(own.history), -1)[:, 0]
-        found[stage] = every[::-1][::max(1, len(every) // SHOWN)][::-1].tolist()
-    return found
+        shown[stage] = every[::-1][::max(1, len(every) // SHOWN)][::-1].tolist()
+    return shown
 
 
-def main(names: Names = None, folder: Folder = FOLDER, checkpoints: Checkpoints = KEPT,
+def main(names: Names = None, folder: Folder = FOLDER, checkpoints: Checkpoints = CHECKPOINTS,
          threads: Threads = 1, device: Device = DEVICES[0]):
     """Train networks and write their weights."""
     machine = Machine(threads, device)
 
     def make(name, folder, checkpoints):
-        kept = checkpoints / f"fields-{name}"
-        save(folder / f"{name}.npz", made(name, kept, machine))
-        rmtree(kept)
+        stages = checkpoints / f"fields-{name}"
+        save(folder / f"{name}.npz", trained_fields(name, stages, machine))
+        rmtree(stages)
 
     train_all(names, nets() | narrow(), (folder, checkpoints), threads, make)
 

@@ -1,9 +1,8 @@
-"""Trains the small laws of NCLaw's trades, for `validation.training.nclaw`. They have no
-checkpoints: a training that is cut off begins anew.
+"""Training of the small laws of NCLaw's trades, for `validation.training.nclaw`. There are no
+checkpoints: an interrupted training starts again.
 """
 
 from dataclasses import asdict
-from pathlib import Path
 from time import process_time
 
 import torch
@@ -23,85 +22,82 @@ from mpm_ref.scene import build
 from mpm_ref.training import Diverged
 from mpm_ref.trajectories import observed
 
-from ..common.provenance import commit, provenance
 from ..common.scenes import threads_for, with_
 from ..nclaw.bundle import Bundle
-from ..nclaw.observation import observed_by
+from ..nclaw.observation import observe
 from ..nclaw.small_trainings import identity
+from .common import origin
 
-ROOT = Path(__file__).parents[2]
 BATCH = 40          # segments side by side: all of the first epoch
 
 
 def run_of(net):
-    """`Observed` of the run that a `Small` learns from, all steps."""
+    """Return the `Observed` run that a `Small` learns from, with all steps."""
     problem = build(with_(net.scene, every=1))
     with threads_for(problem.bodies):
         return observed(problem)
 
 
-def shown(net, true):
-    """Return what a training is given of a run: its `Observed`, and a `Trajectory` of it, or a
-    `PartialTrajectory`.
-    """
-    if net.seen.all:
+def training_data(net, true):
+    """Return the `Observed` run of a training, and its `Trajectory` or `PartialTrajectory`."""
+    if net.observation.complete:
         return true, trajectory_of(true)
-    found, weight = observed_by(net.seen, true, net.scene.dt, net.seed)
-    return found, PartialTrajectory(*trajectory_of(found), torch.from_numpy(weight))
+    run, weight = observe(net.observation, true, net.scene.dt, net.seed)
+    return run, PartialTrajectory(*trajectory_of(run), torch.from_numpy(weight))
 
 
-def begun(net):
-    """`rollout.LawPair` before training, drawn as those of NCLaw but for their width."""
+def untrained_laws(net):
+    """Return the `rollout.LawPair` before training, drawn like those of NCLaw, of another width."""
     torch.manual_seed(net.seed)
     return LawPair(*(NeuralLawModule(kind, hidden=(net.width,) * 2)
                      for kind in (Stress(), Correction())))
 
 
-class Keeper:
-    """Keeps laws of a training under way, with what strains they have met, errors and CPU seconds
-    of epochs, and shows it on a bar.
+class LawRecorder:
+    """Records laws of a training under way, with the strains of their training, and the errors and
+    CPU seconds of epochs; moves a bar.
 
-    of: (`Small`, `Recipe`, `rollout.LawPair`, what `shown` gives)
+    training: (`Small`, `Recipe`, `rollout.LawPair`, result of `training_data`)
     """
 
-    def __init__(self, of, bar):
-        self.of, self.bar, self.laws = of, bar, {}
+    def __init__(self, training, bar):
+        self.training, self.bar, self.laws = training, bar, {}
         self.errors, self.cpu, self.since = [], [], process_time()
 
     def show(self, history):
-        """After an epoch."""
-        net, epoch, last = self.of[0], len(history), history[-1]
+        """Record an epoch."""
+        net, epoch, last = self.training[0], len(history), history[-1]
         self.errors.append(last.error)
         self.cpu.append(round(process_time() - self.since, 3))
         self.bar.update()
         self.bar.set_postfix(error=f"{last.error:.1e}", segments=last.segments)
-        if epoch in (*net.kept, net.epochs):
-            self.laws[epoch] = self.stored(epoch)
+        if epoch in (*net.checkpoints, net.epochs):
+            self.laws[epoch] = self.learned_laws(epoch)
         self.since = process_time()
 
-    def stored(self, epoch):
-        """`LearnedLaws` as they are."""
-        net, recipe, laws, (seen, data) = self.of
-        made = weights.LearnedLaws(*(law.weights() for law in laws), {})
-        cuts = data.restarts(segment_cuts(recipe, len(seen.x) - 1, epoch))
-        bounds = training_bounds(build(net.taken), seen, body_maker(made), cuts)
-        return made._replace(about={"seen": bounds, "dt": net.scene.dt})
+    def learned_laws(self, epoch):
+        """Return the `LearnedLaws` after an epoch."""
+        net, recipe, laws, (run, data) = self.training
+        learned = weights.LearnedLaws(*(law.weights() for law in laws), {})
+        cuts = data.restarts(segment_cuts(recipe, len(run.x) - 1, epoch))
+        bounds = training_bounds(build(net.trained_scene), run, body_maker(learned), cuts)
+        return learned._replace(about={"seen": bounds, "dt": net.scene.dt})
 
 
 def bundled(name, net, threads):
-    """`Bundle` of a `Small` by name, with what is to be known of it; of a training that diverges,
-    as far as it came.
+    """Return the `Bundle` of a `Small`, with how it was made; of a training that diverges, the laws
+    up to there.
     """
     recipe = Recipe(epochs=net.epochs, first=net.first, last=net.last, seed=net.seed, batch=BATCH)
-    laws, given, stopped = begun(net), shown(net, run_of(net)), ""
+    laws, data, stopped = untrained_laws(net), training_data(net, run_of(net)), ""
     with tqdm(total=recipe.epochs, desc=name) as bar:
-        keeper = Keeper((net, recipe, laws, given), bar)
+        recorder = LawRecorder((net, recipe, laws, data), bar)
         try:
-            train(recipe, laws, make_world(build(net.taken)), given[1], None, keeper.show)
+            train(recipe, laws, make_world(build(net.trained_scene)), data[1], None,
+                  recorder.show)
         except Diverged as fault:
             stopped = str(fault)
-    return Bundle(keeper.laws, {
+    return Bundle(recorder.laws, {
         **identity(net), "recipe": asdict(recipe), "threads": threads,
-        "command": f"python -m validation.training.nclaw {name}", "torch": torch.__version__,
-        "errors": keeper.errors, "cpu_seconds": keeper.cpu, "stopped": stopped,
-        **provenance(commit(ROOT))})
+        "errors": recorder.errors, "cpu_seconds": recorder.cpu, "stopped": stopped,
+        **origin("nclaw", name)})

@@ -8,11 +8,13 @@ for blocks k = 0, 1, ..; edge ij is from j to i. Each name is a perceptron of it
 with max(z, 0) between them, and all but the last one have their outputs normalised (`normalised`).
 """
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 TINY = 1e-5         # added to the variance of outputs
+PART = 2048         # edges at a time, at least: their features stay in the processor's cache
 
 
 class PerceptronWeights(NamedTuple):
@@ -36,8 +38,11 @@ def answers(net, points, edges, graph):
     of edges (k, ..).
     """
     v, e = outputs(net.points, points), outputs(net.edges, edges)
+    ends = np.linspace(0, len(e), max(len(e) // PART, 1) + 1).astype(int)
+    parts = [slice(*part) for part in pairwise(ends)]
     for of_edges, of_points in net.blocks:
-        m = outputs(of_edges, np.hstack([e, v[graph.senders], v[graph.receivers]]))
+        m = np.concatenate([outputs(of_edges, np.hstack([
+            e[part], v[graph.senders[part]], v[graph.receivers[part]]])) for part in parts])
         w = outputs(of_points, np.hstack([v, np.add.reduceat(m, graph.first)]))
         v, e = v + w, e + m
     return outputs(net.answer, v)

@@ -38,7 +38,7 @@ from validation.nclaw.environments import environment
 from validation.nclaw.initial_laws import untrained
 from validation.nclaw.small_runs import Measured
 from validation.nclaw.small_trainings import Small
-from validation.nclaw.trained_laws import Net
+from validation.nclaw.trained_laws import LawNet
 
 GOOD = End(1e-4, 1000, -1, "", 0.1, -1, 0.9, "")
 WIDE = {"low": [0.0, -9.0, -9.0, -99.0], "high": [9.0, 9.0, 9.0, 99.0]}
@@ -215,7 +215,7 @@ def test_what_is_not_trained_is_told():
 
 def test_bounds_are_those_that_weights_say(monkeypatch):
     monkeypatch.setattr(met_of, "trained", lambda name: SimpleNamespace(about={"seen": NARROW}))
-    assert met_of.met_by.__wrapped__("jelly") is NARROW
+    assert met_of.visited_bounds.__wrapped__("jelly") is NARROW
 
 
 def test_bounds_that_weights_do_not_say_are_made(monkeypatch):
@@ -226,10 +226,10 @@ def test_bounds_that_weights_do_not_say_are_made(monkeypatch):
     monkeypatch.setattr(met_of, "trajectory", lambda name: short)
     monkeypatch.setattr(met_of, "training_bounds",
                         lambda *of: made.append(of[3]) or strain_bounds(of[1].F))
-    monkeypatch.setattr(met_of, "nets", lambda: {"jelly": Net("jelly"),
-                                                 "labels": Net("jelly", method="labeled")})
-    assert met_of.met_by.__wrapped__("jelly") == strain_bounds(short.F)
-    met_of.met_by.__wrapped__("labels")
+    monkeypatch.setattr(met_of, "nets", lambda: {"jelly": LawNet("jelly"),
+                                                 "labels": LawNet("jelly", method="labeled")})
+    assert met_of.visited_bounds.__wrapped__("jelly") == strain_bounds(short.F)
+    met_of.visited_bounds.__wrapped__("labels")
     assert made == [[0, 5], ()]         # the last horizon is longer than the run
 
 

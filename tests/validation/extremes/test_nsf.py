@@ -29,7 +29,7 @@ GOOD = runs.End(2.0, 0.2, 15.0, 30, -1, "", 0.4, 5, 0.01, "")
 @pytest.fixture(scope="module")
 def bench():
     """The small study."""
-    return runs.Bench("jelly", reduced_runs.tested(STUDY))
+    return runs.Bench("jelly", reduced_runs.fit_study(STUDY))
 
 
 def trial(end=GOOD, what="0.4", points=40, **changes):
@@ -176,7 +176,7 @@ def test_files_of_fields_are_refused_where_damaged(bench):
     found = Records()
     run = SimpleNamespace(rng=np.random.default_rng(0), choose=lambda **by: 1,
                           record=found.record)
-    damage.record_files(run, "jelly", reduced_runs.refitted(bench.one, STUDY.sizes, follows=True))
+    damage.record_files(run, "jelly", reduced_runs.refit(bench.one, STUDY.sizes, follows=True))
     assert {id: value for id, (value, _) in found.items()} == {
         f"extremes.nsf.damage.files.{name}": 1.0 for name in ("damaged", "unfit")}
 
@@ -189,7 +189,7 @@ def test_damaged_files_are_those_of_the_scene_that_is_named(monkeypatch):
     monkeypatch.setattr(damage, "Bench", lambda *_: SimpleNamespace(
         count=40, drawn=lambda count: count, trial=lambda what, *_: trial(what=what)))
     monkeypatch.setattr(damage, "damaged", lambda *_: None)
-    monkeypatch.setattr(damage, "refitted", lambda one, sizes, follows: (one, sizes, follows))
+    monkeypatch.setattr(damage, "refit", lambda one, sizes, follows: (one, sizes, follows))
     monkeypatch.setattr(damage, "record_files", lambda run, *given: filed.append(given))
     run = Records()
     run.profile, run.rng = "quick", np.random.default_rng(0)

@@ -10,12 +10,13 @@ from mpm_ref.rom.model_file import Model, load, save
 from mpm_ref.rom.study.errors import PositionErrors
 from mpm_ref.rom.study.run import SCHEMES, RunOptions
 from validation.common import targets
+from validation.common.position_errors import mean_errors
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.common.scenes import with_
 from validation.ldm import networks, settings, superres
-from validation.ldm.gravity import SAME, enough
-from validation.ldm.references import mean_of, references
+from validation.ldm.gravity import SAME, sufficient_points
+from validation.ldm.references import references
 from validation.ldm.studies import TORSION, TOWER
 from validation.ldm.tower import GRIDS, scene_of
 
@@ -28,14 +29,14 @@ def rows(**means):
 
 def test_enough_points_are_those_from_which_all_schemes_are_as_good_as_with_all():
     fine = {10: 3.0, 50: 1.05, 100: 1.0, 999: 1.0}
-    assert enough(rows(a=fine), 999) == 50
-    assert enough(rows(a=fine, b={**fine, 50: SAME + 0.02}), 999) == 100
-    assert enough(rows(a={**fine, 100: 2.0}), 999) == 999
+    assert sufficient_points(rows(a=fine), 999) == 50
+    assert sufficient_points(rows(a=fine, b={**fine, 50: SAME + 0.02}), 999) == 100
+    assert sufficient_points(rows(a={**fine, 100: 2.0}), 999) == 999
 
 
 def test_the_mean_says_of_how_many_it_is():
-    mean, words = mean_of([PositionErrors(0.01, 0.02, 0.1), PositionErrors(0.03, 0.04, 0.3)],
-                          "draws")
+    mean, words = mean_errors([PositionErrors(0.01, 0.02, 0.1), PositionErrors(0.03, 0.04, 0.3)],
+                              "draws")
     assert mean == pytest.approx((0.02, 0.03, 0.2))
     assert words == "mean of 2 draws, the largest 3 %"
 
@@ -44,7 +45,7 @@ def test_few_references_are_spread_over_the_tests(monkeypatch):
     short = TORSION._replace(scene=lambda v, w: with_(TORSION.scene(v, w), steps=2))
     found = references(short, 2)
     assert len(found.x) == 2
-    assert found.of == len(TORSION.test)
+    assert found.total == len(TORSION.test)
     assert found.x[0].shape == (3, 1757, 3)
     assert found.scale == "1757 particles, 2 steps, 2 of 7 test runs"
 

@@ -14,7 +14,7 @@ from mpm_ref.scene import build
 from validation.common.scenes import with_
 from validation.ldm import poke_parts
 from validation.ldm.paired_runs import ALL
-from validation.ldm.poke_parts import Parts, let_go, parts, swinging
+from validation.ldm.poke_parts import Parts, parts, release_step, swinging_states
 from validation.ldm.references import References
 from validation.ldm.studies import POKES, poked
 
@@ -38,16 +38,16 @@ def own(short, r):
 
 
 def test_the_patch_lets_go_after_a_quarter_of_a_second():
-    assert let_go(ldm_full_model(POKES.scene(0.0))) == 36
+    assert release_step(ldm_full_model(POKES.scene(0.0))) == 36
 
 
 def test_the_patch_is_found_wherever_it_stands():
     scene = POKES.scene(0.0)
     base, poke = scene.fixed
-    assert let_go(ldm_full_model(with_(scene, fixed=(poke, base)))) == 36
+    assert release_step(ldm_full_model(with_(scene, fixed=(poke, base)))) == 36
     for count, regions in ((0, (base,)), (2, (base, poke, with_(poke, name="other")))):
         with pytest.raises(ValueError, match=f"{count} prescribed regions let go: expected one"):
-            let_go(ldm_full_model(with_(scene, fixed=regions)))
+            release_step(ldm_full_model(with_(scene, fixed=regions)))
 
 
 def test_no_part_is_off_on_modes_that_span_the_run(short):
@@ -62,10 +62,10 @@ def test_a_run_from_the_start_is_told_from_one_that_begins_later(short):
     found, (x,) = parts(tests, *few, ALL), tests.x
     states = [few[0].place(tests.X, latent.xhat)
               for _, latent, *_ in ldm_run(tests.cases[0], *few[:1], ALL, few[1]).states()]
-    later = list(swinging(tests.cases[0], *few, ALL, x))
+    later = list(swinging_states(tests.cases[0], *few, ALL, x))
     assert np.sum((states[DRIVEN] - x[DRIVEN]) ** 2) > np.sum((later[0] - x[DRIVEN]) ** 2)
-    for errors, seen, true in ((found.whole, states, x), (found.driven, states[:DRIVEN + 1], x),
-                               (found.free, later, x[DRIVEN:])):
+    for errors, seen, true in ((found.total, states, x), (found.driven, states[:DRIVEN + 1], x),
+                               (found.swinging, later, x[DRIVEN:])):
         pairs = list(zip(seen, true, strict=False))
         off = sum(np.sum((a - b) ** 2) for a, b in pairs)
         assert errors.origin == pytest.approx((off / sum(np.sum(b**2) for _, b in pairs)) ** 0.5)

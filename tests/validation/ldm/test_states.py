@@ -53,12 +53,12 @@ def test_a_pair_is_one_run_in_two_models(short):
 
 def test_scales_say_of_how_many_points_errors_are(short, monkeypatch):
     monkeypatch.setattr(paired_runs, "ERROR_POINTS", 500)
-    one = paired_runs.pair(short, "any", way=paired_runs.ALL)
-    own = paired_runs.beside(one.X[::3], one.reduced[:, ::3], one.full[:, ::3])
+    one = paired_runs.pair(short, "any", options=paired_runs.ALL)
+    own = paired_runs.position_errors(one.X[::3], one.reduced[:, ::3], one.full[:, ::3])
     assert one.errors == pytest.approx(own)
     assert one.scale == "1368 particles, 3 steps, all points, errors of 456 points"
     with pytest.raises(ValueError, match="longer"):
-        paired_runs.beside(one.X, one.reduced[:2], one.full)
+        paired_runs.position_errors(one.X, one.reduced[:2], one.full)
 
 
 def test_errors_are_of_all_points_whatever_is_shown(short):
@@ -121,20 +121,19 @@ def test_components_are_the_plane_of_a_plane():
 
 def test_what_has_come_back_has_returned():
     path = np.array([0.0, 1.0, 4.0, -2.0])[:, None] * np.array([3.0, 4.0])
-    assert states.returned(path) == pytest.approx(0.5)
-    assert states.returned(np.vstack([path, path[:1]])) == 0.0
-    assert states.returned(path[:, None] + np.ones((1, 5, 1))) == pytest.approx(0.5)
+    assert states.return_distance(path) == pytest.approx(0.5)
+    assert states.return_distance(np.vstack([path, path[:1]])) == 0.0
+    assert states.return_distance(path[:, None] + np.ones((1, 5, 1))) == pytest.approx(0.5)
 
 
-def stood_in(scene, net, shots=None, shown=None, way=paired_runs.SHOWN_WAY):
-    """A `Pair` of a few points without any run."""
+def stood_in(scene, net, shots=None, shown=None, options=paired_runs.SHOWN):
+    """A `PairedRun` of a few points without any run."""
     k = scene.steps + 1 if shots is None else len(shots)
     x = np.arange(k)[:, None, None] * 0.01 + SOME
     xhat = np.random.default_rng(0).normal(size=(scene.steps + 1, 4))
-    return paired_runs.Pair(ldm_full_model(scene), SOME, 1.01 * x, x, xhat,
-                            PositionErrors(0.1, 0.2, 0.3),
-                            len(SOME),
-                      way.points or len(SOME))
+    return paired_runs.PairedRun(ldm_full_model(scene), SOME, 1.01 * x, x, xhat,
+                                 PositionErrors(0.1, 0.2, 0.3), len(SOME),
+                                 options.points or len(SOME))
 
 
 def judged(name, folder, monkeypatch):
@@ -190,7 +189,7 @@ def test_samples_are_near_what_is_held(tmp_path):
     found = published_bodies.read(tmp_path, "ldm.fig4")
     z = found["X"][found["samples"], 2]
     bottom, top = (z[held] for held in found["held"])
-    assert len(z) == paired_runs.SHOWN_WAY.points
+    assert len(z) == paired_runs.SHOWN.points
     assert min(len(bottom), len(top)) >= 5
     assert bottom.max() < 3.0
     assert top.min() > 36.0

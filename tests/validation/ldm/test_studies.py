@@ -13,7 +13,7 @@ from mpm_ref.rom.study.full_model import ldm_full_model
 from mpm_ref.rom.study.run import SCHEMES, RunOptions, ldm_run
 from mpm_ref.scene import build
 from validation.common.scenes import catalogue_scene, with_
-from validation.ldm.reduced_runs import compared, reconstructed
+from validation.ldm.references import nearest_state_errors, run_errors
 from validation.ldm.studies import GRAVITY, PHI, POKE, POKES, STUDIES, TORSION, poked_again
 
 STEPS = 4
@@ -71,7 +71,7 @@ def test_errors_are_relative_to_the_distance_from_each_origin():
 
 @pytest.fixture(scope="module")
 def fall():
-    """(`Case`, x, F) of the first steps of the cylinder under the strongest gravity."""
+    """(`FullModel`, x, F) of the first steps of the cylinder under the strongest gravity."""
     short = GRAVITY._replace(scene=lambda g: with_(GRAVITY.scene(g), steps=STEPS))
     full = short.run([29])
     return ldm_full_model(short.scene(*short.mu[29])), full.x[0], full.F[0]
@@ -85,8 +85,8 @@ def test_a_run_on_its_own_modes_is_the_full_one(fall, scheme):
     """
     one, x, F = fall
     own = modes(one.X, x, F, STEPS)
-    found = compared([one], [x], own, RunOptions(*scheme), np.zeros(STEPS))
-    assert reconstructed(one.X, [x], own, np.zeros(STEPS)).displacement < 1e-12
+    found = run_errors([one], [x], own, RunOptions(*scheme), np.zeros(STEPS))
+    assert nearest_state_errors(one.X, [x], own, np.zeros(STEPS)).displacement < 1e-12
     assert found.displacement < (1e-12 if scheme[0] == "lagrangian" else 0.02)
 
 
@@ -111,7 +111,7 @@ def test_samples_do_not_miss_the_end_that_is_held(fall):
 def test_other_draws_are_other_runs_and_the_same_draw_the_same(fall):
     one, x, F = fall
     own = modes(one.X, x, F, 3)
-    a, b, c = (compared([one], [x], own, RunOptions(points=10), np.zeros(3), seed)
+    a, b, c = (run_errors([one], [x], own, RunOptions(points=10), np.zeros(3), seed)
                for seed in (0, 0, 1))
     assert a == b != c
 
@@ -119,7 +119,7 @@ def test_other_draws_are_other_runs_and_the_same_draw_the_same(fall):
 def test_the_affine_map_is_a_map_of_a_study_too(fall):
     """The interface asks for no more than `rom` says; a bar that bends is far from affine."""
     one, x, _ = fall
-    found = compared([one], [x], Affine(3), RunOptions(), Affine(3).rest)
+    found = run_errors([one], [x], Affine(3), RunOptions(), Affine(3).rest)
     assert 0.0 < found.origin < 0.1
 
 
@@ -141,7 +141,7 @@ def test_what_a_reduced_run_does_not_know_is_refused(scene, said):
 def test_a_run_that_breaks_down_is_infinitely_off(fall):
     one, x, F = fall
     own = modes(one.X, x, F, 2)
-    assert compared([one], [x], own, RunOptions(), np.full(2, np.nan)).origin == np.inf
+    assert run_errors([one], [x], own, RunOptions(), np.full(2, np.nan)).origin == np.inf
 
 
 @pytest.mark.parametrize("v", TORSION.mu[:, 0])

@@ -15,7 +15,16 @@ from mpm_ref.scene import build
 from validation.common.scenes import with_
 from validation.ldm import tower
 from validation.ldm.studies import TOWER, latin_twice, refined
-from validation.ldm.timing import COLUMNS, Full, Raced, Spent, clocked, fastest, median, race
+from validation.ldm.timing import (
+    COLUMNS,
+    SteppedFullRun,
+    StepTime,
+    TimedRun,
+    fastest,
+    median,
+    race,
+    timed,
+)
 
 EXACT = Affine(3), Affine(3).rest       # a map that is exact for affine motions
 PRINTED = 3076115 * (0.48 / 3) ** 3     # [m^3]: points times volumes (LDM-tab2-sampling, LDM-X8)
@@ -57,7 +66,7 @@ def test_a_race_measures_every_way(small):
     full, found = race(small, EXACT, ways, 3)
     assert min(full) > 0.0
     for one, way in zip(found, ways, strict=True):
-        assert one.way == way
+        assert one.options == way
         assert min(one.spent) > 0.0
         assert 0 < one.points < 20000
         assert 0.0 < one.errors.origin < 0.1
@@ -66,10 +75,10 @@ def test_a_race_measures_every_way(small):
 def test_a_run_that_breaks_down_has_no_error(small, monkeypatch):
     sound, lost = (RunOptions("resampled", points=n) for n in (30, 29))
 
-    def breaking(one, map, way, rest):
+    def breaking(one, g, options, rest):
         def states():
-            for k, state in enumerate(ldm_run(one, map, way, rest).states()):
-                if way == lost and k == 2:
+            for k, state in enumerate(ldm_run(one, g, options, rest).states()):
+                if options == lost and k == 2:
                     raise NoBody("none is left")
                 yield state
 
@@ -91,7 +100,7 @@ def test_the_fastest_transfer_is_measured(small):
 
 
 def test_tracked_points_are_in_their_own_order(small):
-    full = Full(small)
+    full = SteppedFullRun(small)
     start = full.positions(7)
     full.step()
     assert np.array_equal(start, ldm_full_model(small).X[::7])
@@ -103,23 +112,24 @@ def test_time_is_counted_while_a_step_runs():
         sleep(0.02)
         return "done"
 
-    found, spent = clocked(idle)
+    found, spent = timed(idle)
     assert found == "done"
     assert spent.wall >= 0.02 > spent.cpu >= 0.0
-    assert median([Spent(1.0, 5.0), Spent(9.0, 6.0), Spent(2.0, 40.0)]) == (2.0, 6.0)
+    assert median([StepTime(1.0, 5.0), StepTime(9.0, 6.0), StepTime(2.0, 40.0)]) == (2.0, 6.0)
 
 
 def test_a_row_tells_the_way_in_order():
-    one = Raced(tower.FAST._replace(points=25), Spent(0.1, 0.2), 300, PositionErrors(1.0, 2.0, 3.0))
+    one = TimedRun(tower.FAST._replace(points=25), StepTime(0.1, 0.2), 300,
+                   PositionErrors(1.0, 2.0, 3.0))
     row = dict(zip(COLUMNS, one.row, strict=True))
     assert (row["quadrature"], row["points"], row["precision"]) == ("eulerian", 25, "single")
     assert (row["wall"], row["cpu"]) == (0.1, 0.2)
     assert (row["quadrature_points"], row["origin"]) == (300, 1.0)
-    assert one._replace(way=RunOptions()).row[2] == "all"
+    assert one._replace(options=RunOptions()).row[2] == "all"
 
 
 def test_ways_have_names_of_their_own():
-    names = [Raced(way, None, 0, None).words for way in tower.ways((25, 50))]
+    names = [TimedRun(way, None, 0, None).label for way in tower.all_options((25, 50))]
     assert names[:2] == ["lagrangian-nonlinear-25", "lagrangian-nonlinear-50"]
     assert "eulerian-linear-25-transported-0.01-single" in names
     assert len(set(names)) == len(names)
@@ -128,7 +138,7 @@ def test_ways_have_names_of_their_own():
 def test_what_the_paper_prints_is_of_the_fastest_eulerian_run_below_fifty_samples():
     def row(quadrature, points, wall, close=1e-9, error=1.0):
         way = RunOptions(quadrature, "linear", points, preimage_tolerance=close)
-        raced = Raced(way, Spent(wall, 0.0), 1000 * points, PositionErrors(error, 0.0, 0.0))
+        raced = TimedRun(way, StepTime(wall, 0.0), 1000 * points, PositionErrors(error, 0.0, 0.0))
         times = 8.0, 4.0, 24 * wall, 4.0 / wall, 8.0 / wall
         return dict(zip(tower.OWN, (7, *raced.row, *times), strict=True))
 

@@ -18,7 +18,7 @@ from validation.common.run import RunSetting, run_all
 from validation.ldm import networks, published_bodies
 from validation.ldm.workshop_studies import PUSHES, SHEAR3, SHEAR17, TOP, WORKSHOP, pushed, sheared
 from validation.ldmw import poke, settings, shear, states
-from validation.ldmw.runs import by_nodes, by_points, kept, pod, runs, spread
+from validation.ldmw.runs import by_nodes, by_points, pod, spread, study_runs, training_neighbours
 
 SHEARS = (SHEAR3, SHEAR17)
 
@@ -76,7 +76,7 @@ def test_pushes_are_all_triples_of_three_values():
 @pytest.fixture(scope="module")
 def sheared_runs():
     """Test runs of the 17 points."""
-    return runs(SHEAR17, SHEAR17.test)
+    return study_runs(SHEAR17, SHEAR17.test)
 
 
 @pytest.mark.parametrize("make", [
@@ -131,10 +131,11 @@ def test_samples_are_spread_from_the_bottom_to_the_top():
 def test_with_neighbours_found_once_a_run_is_the_same(sheared_runs):
     """The same bits, with those of all training states."""
     some = spread(sheared_runs.X, 6)
-    near = kept("shear17", sheared_runs.cases[0], some)
+    near = training_neighbours("shear17", sheared_runs.cases[0], some)
     assert not set(some) & set(near.around)
-    assert sheared_runs.of_net("shear17", by_points(some, near)) == sheared_runs.of_net(
-        "shear17", by_points(some))
+    found, expected = (sheared_runs.network_errors("shear17", by_points(some, *given))
+                       for given in ((near,), ()))
+    assert found == expected
 
 
 def test_samples_of_a_push_are_held_pushed_and_free():
@@ -186,7 +187,7 @@ SOME = np.stack(np.meshgrid(*3 * (np.arange(1.0, 3.0),), indexing="ij"), axis=-1
 
 
 def stood_in(study, numbers):
-    """`Runs` of a few points that go 1, 2, .. % too far in one of three time levels."""
+    """`StudyRuns` of a few points that go 1, 2, .. % too far in one of three time levels."""
     def levels(map, rest, approach):
         for k in range(len(numbers)):
             yield [(3 * [(1.0 + 0.01 * (k + 1) * (level == 2)) * SOME], 3 * [SOME])
@@ -198,8 +199,8 @@ def stood_in(study, numbers):
 
 
 def test_fig1_is_of_the_ends_of_test_runs(tmp_path, monkeypatch):
-    monkeypatch.setattr(states, "runs", stood_in)
-    monkeypatch.setattr(states, "kept", lambda *of: None)
+    monkeypatch.setattr(states, "study_runs", stood_in)
+    monkeypatch.setattr(states, "training_neighbours", lambda *of: None)
     monkeypatch.setattr(state_panels, "PIXELS", 40)
     found = recorded(states.pokes, tmp_path)
     for k in (1, 2, 3):

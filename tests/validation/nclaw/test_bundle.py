@@ -29,7 +29,7 @@ def folder(tmp_path, monkeypatch):
 
 def test_each_training_is_of_a_name_of_its_own():
     groups = (small_trainings.OF_EPOCHS, small_trainings.OF_TRAINING, small_trainings.OF_WIDTH,
-              small_trainings.OF_SIGHT, small_trainings.OF_FAULTS)
+              small_trainings.OF_OBSERVATION, small_trainings.OF_FAULTS)
     assert len(small_nets()) == sum(map(len, groups))
     assert len(set(small_nets().values())) == len(small_nets())
     assert not {*small_nets()} & {*trained_laws.nets()}
@@ -39,7 +39,7 @@ def test_each_training_is_of_a_name_of_its_own():
 def test_epochs_are_kept_of_all_materials():
     found = {net.environment: name for name, net in small_trainings.OF_EPOCHS.items()}
     assert found == {name: f"small-{name}-epochs" for name in ENVIRONMENTS}
-    assert {(net.epochs, net.kept) for net in small_trainings.OF_EPOCHS.values()} == {
+    assert {(net.epochs, net.checkpoints) for net in small_trainings.OF_EPOCHS.values()} == {
         (300, (10, 20, 30, 50, 75, 100, 150, 200))}
 
 
@@ -76,8 +76,9 @@ def test_points_share_the_mass_of_the_cube():
 
 def test_a_wrong_density_is_the_training_s_alone():
     net = Small(density=2.0)
-    m, taken = (build(scene).bodies[0].particles.m.sum() for scene in (net.scene, net.taken))
-    assert (m, taken) == (pytest.approx(125.0), pytest.approx(250.0))
+    m, trained = (build(scene).bodies[0].particles.m.sum() for scene in (net.scene,
+                                                                         net.trained_scene))
+    assert (m, trained) == (pytest.approx(125.0), pytest.approx(250.0))
 
 
 def test_what_a_training_is_of_tells_them_apart():

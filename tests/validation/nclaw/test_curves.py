@@ -8,10 +8,10 @@ import pytest
 from figures.nclaw import loss
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
-from validation.nclaw import curves, diverged, tables, trained_laws
+from validation.nclaw import curves, tables, trained_laws
 from validation.nclaw.environments import ENVIRONMENTS
 from validation.nclaw.initial_laws import untrained
-from validation.nclaw.trained_laws import Net, identity
+from validation.nclaw.trained_laws import LawNet, identity
 
 mpl.use("Agg")
 GONE = "plasticine-no-undeformed"
@@ -34,19 +34,19 @@ def lost(folder, **changes):
     about = {**identity(trained_laws.nets()[GONE]), "errors": [1e-3, 2e-3],
              "stopped": "epoch 3: gone",
              **changes}
-    return diverged.keep(folder / f"{GONE}.npz", about)
+    return trained_laws.store_diverged(folder / f"{GONE}.npz", about)
 
 
 def test_without_weights_no_curve_is_drawn(tmp_path, monkeypatch):
-    monkeypatch.setattr(curves, "known", lambda run: {})
+    monkeypatch.setattr(curves, "available_laws", lambda run: {})
     assert run_all([curves.loss.experiment], RunSetting("quick", tmp_path)) == []
     with pytest.raises(FileNotFoundError, match="the weights were missing"):
         loss.draw(ProfileResults(tmp_path))
 
 
 def test_curves_of_ablations_stand_beside_ours(tmp_path, monkeypatch):
-    found = {name: Net(name) for name in ENVIRONMENTS}
-    found["plasticine-no-rotation"] = Net("plasticine")
+    found = {name: LawNet(name) for name in ENVIRONMENTS}
+    found["plasticine-no-rotation"] = LawNet("plasticine")
     monkeypatch.setattr(tables, "nets", lambda: found)
     monkeypatch.setattr(tables, "trained", lambda name: untrained()._replace(
         about={"errors": [1e-3, 1e-4 * len(name)]}))
@@ -61,7 +61,8 @@ def test_curves_of_ablations_stand_beside_ours(tmp_path, monkeypatch):
 
 
 def test_errors_of_labels_are_told_as_what_they_are_and_not_drawn(tmp_path, monkeypatch):
-    monkeypatch.setattr(tables, "nets", lambda: {"sand": Net("sand"), "sand-labeled": Net("sand")})
+    monkeypatch.setattr(tables, "nets", lambda: {"sand": LawNet("sand"),
+                                                 "sand-labeled": LawNet("sand")})
     monkeypatch.setattr(tables, "trained", lambda name: untrained()._replace(
         about={"errors": [1e-3, 1e-4]}))
     results = done(tmp_path, curves.loss)
@@ -76,7 +77,7 @@ def test_errors_of_labels_are_told_as_what_they_are_and_not_drawn(tmp_path, monk
 def test_errors_with_velocities_in_them_are_told_and_not_drawn(tmp_path, monkeypatch):
     """Those of a training that says what its errors are of are as all others."""
     more = {"water-velocity": {}, "sand-velocity": {"errors_of": "positions"}}
-    monkeypatch.setattr(tables, "nets", lambda: {name: Net(name.split("-")[0]) for name in more})
+    monkeypatch.setattr(tables, "nets", lambda: {name: LawNet(name.split("-")[0]) for name in more})
     monkeypatch.setattr(tables, "trained", lambda name: untrained()._replace(about={
         "errors": [1e-3, 1e-4], "recipe": {"velocity": 1e-4}, **more[name]}))
     results = done(tmp_path, curves.loss)
@@ -91,7 +92,7 @@ def test_errors_with_velocities_in_them_are_told_and_not_drawn(tmp_path, monkeyp
 def test_a_training_that_diverged_has_a_curve_with_a_cross(tmp_path, folder, monkeypatch):
     lost(folder)
     known = untrained()._replace(about={"errors": [1e-3, 1e-4, 1e-5]})
-    monkeypatch.setattr(curves, "known", lambda run: {"ours": {"plasticine": known}})
+    monkeypatch.setattr(curves, "available_laws", lambda run: {"ours": {"plasticine": known}})
     results = done(tmp_path, curves.loss)
     record, = (r for r in results.records("nclaw.loss") if "no-undeformed" in r.target)
     assert record.target == "nclaw.loss.no-undeformed.plasticine.epochs"
@@ -107,18 +108,18 @@ def test_a_training_that_diverged_has_a_curve_with_a_cross(tmp_path, folder, mon
 def test_what_knows_the_laws_does_not_hide_the_others(tmp_path, monkeypatch):
     laws = {method: {"sand": untrained()._replace(about={"errors": [1e-6, error]})}
             for method, error in (("ours", 1e-7), ("sys-id", 1e-20))}
-    monkeypatch.setattr(curves, "known", lambda run: laws)
+    monkeypatch.setattr(curves, "available_laws", lambda run: laws)
     left, right = loss.draw(done(tmp_path, curves.loss)).axes
     assert right.get_ylim()[0] == pytest.approx(loss.ROOM * 1e-7)
     assert left.get_ylim()[0] > 1e-8
 
 
 def test_what_is_kept_must_be_of_that_training(folder):
-    assert diverged.diverged(GONE, trained_laws.identity(trained_laws.nets()[GONE])) is None
+    assert trained_laws.diverged(GONE, trained_laws.identity(trained_laws.nets()[GONE])) is None
     path = lost(folder, seed=7)
     with pytest.raises(ValueError,
                        match=r"is of .*'seed': 7.*now it is .*'seed': 0.*training\.nclaw"):
-        diverged.diverged(GONE, trained_laws.identity(trained_laws.nets()[GONE]))
+        trained_laws.diverged(GONE, trained_laws.identity(trained_laws.nets()[GONE]))
     path.write_text(json.dumps({"errors": []})[:-1])
     with pytest.raises(ValueError, match=f"{GONE}.diverged.json is damaged"):
-        diverged.diverged(GONE, trained_laws.identity(trained_laws.nets()[GONE]))
+        trained_laws.diverged(GONE, trained_laws.identity(trained_laws.nets()[GONE]))

@@ -7,8 +7,8 @@ torch = pytest.importorskip("torch")
 from mpm_ref.nclaw.train.fit import Epoch  # noqa: E402
 from mpm_ref.training import Diverged  # noqa: E402
 from validation.nclaw import trained_laws  # noqa: E402
-from validation.nclaw.diverged import beside, diverged  # noqa: E402
 from validation.nclaw.initial_laws import untrained  # noqa: E402
+from validation.nclaw.trained_laws import diverged, diverged_path  # noqa: E402
 from validation.training import nclaw  # noqa: E402
 
 NAME = "plasticine-no-undeformed"
@@ -34,7 +34,7 @@ def diverging(net, recipe, laws, checkpoint, show):
 
 
 def test_errors_of_a_training_that_diverges_are_kept(places, monkeypatch, capsys):
-    monkeypatch.setattr(nclaw, "taught", diverging)
+    monkeypatch.setattr(nclaw, "train_net", diverging)
     nclaw.main([NAME], *places)
     found = diverged(NAME, trained_laws.identity(trained_laws.nets()[NAME]))
     assert found["errors"] == [1e-3, 2e-3]
@@ -48,7 +48,7 @@ def test_errors_of_a_training_that_diverges_are_kept(places, monkeypatch, capsys
 
 def test_errors_before_a_checkpoint_are_found_again(places, monkeypatch):
     """A training that goes on and diverges at once has shown none."""
-    monkeypatch.setattr(nclaw, "taught", diverging)
+    monkeypatch.setattr(nclaw, "train_net", diverging)
     for place in places:
         place.mkdir()
     (places[1] / f"{NAME}.pt").write_text("two epochs")
@@ -60,8 +60,8 @@ def test_errors_before_a_checkpoint_are_found_again(places, monkeypatch):
 def test_weights_take_the_place_of_what_was_known(places):
     places[0].mkdir()
     path = places[0] / f"{NAME}.npz"
-    nclaw.written(path, {"errors": [], "stopped": "epoch 1: gone"})
-    assert beside(path).exists()
-    nclaw.written(path, untrained())
+    nclaw.write(path, {"errors": [], "stopped": "epoch 1: gone"})
+    assert diverged_path(path).exists()
+    nclaw.write(path, untrained())
     assert path.exists()
-    assert not beside(path).exists()
+    assert not diverged_path(path).exists()

@@ -35,7 +35,7 @@ def test_a_pinhole_sees_along_its_axis():
 
 
 def test_marks_are_those_of_the_front_off_by_noise(truth):
-    marks, P = dough.film(truth), dough.camera()
+    marks, P = dough.observe(truth), dough.camera()
     assert 45 <= len(marks.points) <= 55            # "around 50"
     layer = truth[0, marks.points, 2]
     assert (layer == layer[0]).all()
@@ -106,14 +106,14 @@ def test_the_experiment_says_how_far_laws_are_off(tmp_path, monkeypatch):
     dough.trained.cache_clear()
 
 
-def short(shape, of=None):
+def short(shape, material=None):
     """The first half of a run."""
-    return with_(dough.scene(shape, of), steps=60)
+    return with_(dough.scene(shape, material), steps=60)
 
 
 def test_a_run_that_breaks_down_is_told(truth):
     both, gone = ({body: x for body in ("block", "star")} for x in (truth, truth * np.nan))
-    row = dough_runs.row("wild", gone, both, dough.film(truth))
+    row = dough_runs.row("wild", gone, both, dough.observe(truth))
     assert row.broken == "block and star"
     assert np.isnan([row.pixels, row.block, row.star]).all()
 

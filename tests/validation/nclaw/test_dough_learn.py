@@ -22,7 +22,7 @@ from mpm_ref.nclaw.train.train import drawn_laws  # noqa: E402
 from mpm_ref.training import Diverged  # noqa: E402
 from validation.common.weights_needed import Untrained  # noqa: E402
 from validation.nclaw import dough  # noqa: E402
-from validation.nclaw.diverged import diverged  # noqa: E402
+from validation.nclaw.trained_laws import diverged  # noqa: E402
 from validation.training import dough as dough_training  # noqa: E402
 from validation.training.nclaw import main  # noqa: E402
 
@@ -41,7 +41,7 @@ def true():
 @pytest.fixture(scope="module")
 def seen():
     """`World` and `Film` of the block."""
-    return dough_training.seen()
+    return dough_training.training_data()
 
 
 def exact(problem):
@@ -67,7 +67,7 @@ def test_with_the_true_laws_noise_is_left(true, seen):
     assert film.weight.sum() == dough.EVERY * (1 + dough.FRAMES)
     with torch.no_grad():
         error = segment_errors(exact(problem), where, film, [0], [STEPS]).loss.item()
-    marks = dough.film(run.x[::dough.EVERY])
+    marks = dough.observe(run.x[::dough.EVERY])
     frames = slice(1, 1 + STEPS // dough.EVERY)
     noise = marks.places - project(dough.camera(), run.x[::dough.EVERY][:, marks.points])
     expected = (noise[frames] ** 2).sum(axis=2).mean()
@@ -112,11 +112,11 @@ def test_what_the_film_does_not_show_is_not_trained_on(true, seen):
     """Of the run only its start and the places of marks are kept."""
     problem, run = true
     later = run.x.copy()
-    marks = dough.film(later[::dough.EVERY])
+    marks = dough.observe(later[::dough.EVERY])
     hidden = np.setdiff1d(np.arange(later.shape[1]), marks.points)
     later[1:, hidden] = np.nan
-    other = observe_images(dough.film(later[::dough.EVERY]), dough.camera(), problem.bodies[0],
-                    dough.EVERY)
+    other = observe_images(dough.observe(later[::dough.EVERY]), dough.camera(), problem.bodies[0],
+                           dough.EVERY)
     assert all(torch.equal(a, b) for a, b in zip(other, seen[1], strict=True))
 
 

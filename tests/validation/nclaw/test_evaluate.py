@@ -26,6 +26,7 @@ from validation.nclaw.evaluate import (
     positions,
 )
 from validation.nclaw.initial_laws import untrained
+from validation.nclaw.simulators import simulators
 from validation.nclaw.tasks import reconstruction
 
 
@@ -137,7 +138,7 @@ def test_untrained_laws_are_those_that_pytorch_draws():
     ("sand", "sand", "ours"), ("spline-sand", "sand", "spline"), ("sand-spline", "sand", "spline"),
     ("plasticine-no-rotation", "plasticine", "no-rotation"), ("sys-id-water", "water", "sys-id")])
 def test_methods_are_told_by_the_names_of_nets(name, environment, method):
-    assert tables.method_of(name, trained_laws.Net(environment)) == method
+    assert tables.method_of(name, trained_laws.LawNet(environment)) == method
 
 
 @pytest.mark.parametrize(("value", "low", "high"), [
@@ -169,7 +170,7 @@ def made_up(monkeypatch):
     def compared(scene, laws, goes_on):
         return [ComparedError(float(next(count))) for _ in laws]
 
-    known = {name: trained_laws.Net(name) for name in ENVIRONMENTS}
+    known = {name: trained_laws.LawNet(name) for name in ENVIRONMENTS}
     for name, value in {"compare": compared, "body_maker": lambda laws: laws}.items():
         monkeypatch.setattr(errors, name, value)
     for name, value in {"trained": trained, "nets": lambda: known}.items():
@@ -208,7 +209,7 @@ def test_table_2_counts_each_velocity(tmp_path, made_up):
 
 def test_variants_of_ours_are_in_large_bodies_at_the_papers_profile_alone():
     runs = [SimpleNamespace(profile=profile) for profile in ("standard", "paper")]
-    assert [[errors.worth(run, method, task) for method in ("ours", "spline", "seed-1")]
+    assert [[errors.is_compared(run, method, task) for method in ("ours", "spline", "seed-1")]
             for run in runs for task in ("time", "geometry")] == [
         [True, True, True], [True, True, False], [True, True, True], [True, True, True]]
 
@@ -216,8 +217,9 @@ def test_variants_of_ours_are_in_large_bodies_at_the_papers_profile_alone():
 @pytest.fixture
 def beside(made_up, monkeypatch):
     """Of two environments ours and another method, as Tables 4 and 7 have them."""
-    known = {name: trained_laws.Net(name.split("-")[0]) for name in
+    known = {name: trained_laws.LawNet(name.split("-")[0]) for name in
              ("plasticine", "plasticine-gnn", "water", "water-velocity")}
+    known["plasticine-gnn"] = simulators()["plasticine-gnn"]
     made_up.update(known)
     monkeypatch.setattr(tables, "nets", lambda: known)
 
@@ -259,7 +261,8 @@ def test_tables_4_and_7_have_rows_of_table_2(tmp_path, beside):
 
 
 def test_table_4_says_the_size_of_its_graph_network(tmp_path, beside, monkeypatch):
-    monkeypatch.setattr(errors, "fits", lambda laws, task: "gnn" not in laws or task != "geometry")
+    monkeypatch.setattr(errors, "can_run", lambda laws, task: "gnn" not in laws or task
+                        != "geometry")
     _, found = recorded(tmp_path, tables.table2)
     assert "a graph network 32 wide" in found["nclaw.table4.time.gnn"].note
     assert found["nclaw.table4.time.ours"].note == ""

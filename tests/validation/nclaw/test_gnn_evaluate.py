@@ -1,4 +1,4 @@
-"""Graph networks beside laws: which there are, what they are shown, free runs, tables."""
+"""Graph networks beside laws: which there are, what they are framed_run, free runs, tables."""
 
 import gnn_toys as toys
 import numpy as np
@@ -14,11 +14,17 @@ from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.common.scenes import with_
 from validation.common.weights_needed import Untrained
-from validation.nclaw import curves, errors, gnn_runs, simulators, tables, trained_laws
+from validation.nclaw import curves, errors, simulators, tables, trained_laws
 from validation.nclaw.environments import ENVIRONMENTS
-from validation.nclaw.evaluate import ComparedError, RunBroken, compare, copy_body, positions
-from validation.nclaw.gnn_rollout import free
-from validation.nclaw.simulators import GraphNet, scenes_of, shown
+from validation.nclaw.evaluate import (
+    ComparedError,
+    RunBroken,
+    compare,
+    copy_body,
+    positions,
+    rollout,
+)
+from validation.nclaw.simulators import GraphNet, framed_run, scenes_of
 from validation.nclaw.tasks import SEEDS, reconstruction
 from validation.nclaw.trained_laws import identity, trained
 
@@ -79,10 +85,10 @@ def test_a_training_is_known_by_all_that_its_net_says():
     assert identity(GraphNet("water")) != told
 
 
-# what is shown
+# what is framed_run
 
 def test_a_run_is_shown_in_frames_of_five_steps():
-    seen = shown(water(20))
+    seen = framed_run(water(20))
     problem = build(water(20))
     assert np.array_equal(seen.x, list(positions(problem, tuple(map(copy_body, problem.bodies)))))
     assert seen.x.shape == (5, 1000, 3)
@@ -96,7 +102,7 @@ def test_a_run_is_shown_in_frames_of_five_steps():
 # free runs
 
 def test_a_free_run_begins_with_positions_and_velocities_of_the_scene():
-    straight = list(free(build(water(15)), still()))
+    straight = list(rollout(build(water(15)), still()))
     assert len(straight) == 4
     for k, x in enumerate(straight):
         assert x == pytest.approx(straight[0] + k * 2.5e-3 * thrown(straight[0]), abs=1e-12)
@@ -104,11 +110,11 @@ def test_a_free_run_begins_with_positions_and_velocities_of_the_scene():
 
 def test_points_may_leave_the_box():
     """No clip holds them, unlike points of laws."""
-    assert list(free(build(water(15)), still(a=1.0)))[-1].max() > 6.0
+    assert list(rollout(build(water(15)), still(a=1.0)))[-1].max() > 6.0
 
 
 def test_errors_of_a_graph_network_are_measured_like_those_of_laws():
-    seen = shown(water(15))
+    seen = framed_run(water(15))
     straight = [seen.x[0] + k * seen.dt * seen.v for k in range(4)]
     exact, found = compare(water(15), [copy_body, still()])
     assert exact == ComparedError(0.0)
@@ -123,7 +129,7 @@ def test_a_free_run_that_breaks_down_says_where():
     assert (found.error, found.step) == (np.inf, 5)
     assert "expected a finite place" in found.why
     with pytest.raises(RunBroken, match=r"^step 5: point 0 is at "):
-        list(free(build(water(15)), lost))
+        list(rollout(build(water(15)), lost))
 
 
 @pytest.mark.parametrize(("scene", "dt", "said"), [
@@ -190,7 +196,7 @@ def test_table_1_has_their_row_and_says_what_was_smaller(tmp_path, trained_ones)
     found = recorded(tmp_path, tables.table1)
     one = found["nclaw.table1.gnn.sand"]
     assert (one.value, one.paper, one.verdict) == (2.0, 0.011, "miss")
-    assert one.note == simulators.simulators()["sand-gnn"].said
+    assert one.note == simulators.simulators()["sand-gnn"].description
     assert one.note.startswith("a graph network 32 wide, trained on 1 run for 15000 steps with 1 "
                                "frame each; that of [GNS]: 128 wide, up to 20000000 steps")
     assert found["nclaw.table1.gnn.overall_mean"].value == 2.5
@@ -215,10 +221,10 @@ def test_what_was_picked_is_recorded(tmp_path, trained_ones):
 
 
 def test_table_6_is_of_1_10_and_100_runs_of_water(tmp_path, trained_ones, monkeypatch):
-    monkeypatch.setattr(gnn_runs, "trained", lambda name: still()._replace(about={"of": name}))
+    monkeypatch.setattr(tables, "trained", lambda name: still()._replace(about={"of": name}))
     monkeypatch.setattr(errors, "compare", lambda scene, laws, goes_on: [
         ComparedError(2.0 * ("gnn" in one.about["of"]) + len(one.about["of"])) for one in laws])
-    found = recorded(tmp_path, gnn_runs.table6)
+    found = recorded(tmp_path, tables.table6)
     assert {target: one.value for target, one in found.items() if target != "nclaw.table6"} == {
         "nclaw.table6.gnn.1.loss": 2.0 + len("water-gnn"), "nclaw.table6.gnn.1.trajectories": 1,
         "nclaw.table6.gnn.10.loss": 2.0 + len("water-gnn-10"),
@@ -235,8 +241,8 @@ def test_table_6_tells_what_is_not_trained_and_runs_nothing(tmp_path, trained_on
     def missing(name):
         raise Untrained(f"no weights {name}.npz")
 
-    monkeypatch.setattr(gnn_runs, "trained", missing)
+    monkeypatch.setattr(tables, "trained", missing)
     monkeypatch.setattr(errors, "compare", lambda *args: pytest.fail("ran"))
-    found = recorded(tmp_path, gnn_runs.table6)
+    found = recorded(tmp_path, tables.table6)
     assert found.keys() <= {"nclaw.table6", "nclaw.table6.untrained"}
     assert found["nclaw.table6.untrained"].value == 4

@@ -81,7 +81,7 @@ def test_the_threshold_moves_as_in_the_release(step, share):
 
 @pytest.mark.parametrize("name", ENVIRONMENTS)
 def test_materials_are_known_by_their_laws(name):
-    assert other_bodies.of(build(environment(name)).bodies[0]) == name
+    assert other_bodies.environment_of(build(environment(name)).bodies[0]) == name
 
 
 def test_parts_make_the_whole(scene):
@@ -89,6 +89,6 @@ def test_parts_make_the_whole(scene):
     body = copy_body(build(scene).bodies[0])
     body.particles.F[:] += np.arange(64)[:, None, None]
     which = np.random.default_rng(0).random(64) < 0.4
-    again = melting.whole([melting.part(body, ~which), melting.part(body, which)])
+    again = melting.joined_body([melting.part(body, ~which), melting.part(body, which)])
     assert np.array_equal(again.particles.F, body.particles.F)
     assert np.array_equal(again.id, np.arange(64))

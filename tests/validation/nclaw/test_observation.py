@@ -6,11 +6,11 @@ import pytest
 from mpm_ref.trajectories import Observed
 from validation.nclaw.observation import (
     OFF,
-    Seen,
+    Observation,
     affine,
     frames,
     from_positions,
-    observed_by,
+    observe,
     parabolas,
     points,
     weights,
@@ -35,19 +35,21 @@ def run():
                     np.broadcast_to(F[:, None], full).copy())
 
 
-@pytest.mark.parametrize(("seen", "levels"), [
-    (Seen(), range(61)), (Seen(every=20), [0, 20, 40, 60]), (Seen(gap=40), [*range(11),
-                                                                           *range(50, 61)]),
-    (Seen(every=7, gap=20), [0, 7, 14, 42, 49, 56]), (Seen(gap=1000), [0])])
+@pytest.mark.parametrize(("seen", "levels"), [(Observation(), range(61)), (Observation(every=20),
+                                                                           [0, 20, 40, 60]),
+                                              (Observation(gap=40), [*range(11), *range(50, 61)]),
+                                              (Observation(every=7, gap=20), [0, 7, 14, 42, 49,
+                                                                              56]),
+                                              (Observation(gap=1000), [0])])
 def test_frames_are_every_so_many_steps_but_for_a_gap(seen, levels):
     assert frames(seen, STEPS).tolist() == [*levels]
 
 
 def test_a_share_of_the_points_is_seen(rng):
-    mask = points(Seen(share=0.3), 50, rng)
+    mask = points(Observation(share=0.3), 50, rng)
     assert mask.sum() == 15
-    assert points(Seen(share=1e-9), 50, rng).sum() == 1
-    assert points(Seen(), 50, rng).all()
+    assert points(Observation(share=1e-9), 50, rng).sum() == 1
+    assert points(Observation(), 50, rng).all()
 
 
 def test_what_counts_counts_one_on_average():
@@ -59,15 +61,15 @@ def test_what_counts_counts_one_on_average():
 
 
 def test_a_run_that_is_seen_in_whole_is_the_run(run):
-    found, weight = observed_by(Seen(), run, DT)
+    found, weight = observe(Observation(), run, DT)
     assert all(map(np.array_equal, found, run))
     assert (weight == 1.0).all()
-    assert Seen().all
-    assert not Seen(noise=1e-9).all
+    assert Observation().complete
+    assert not Observation(noise=1e-9).complete
 
 
 def test_between_frames_nothing_is_known(run):
-    found, weight = observed_by(Seen(every=5), run, DT)
+    found, weight = observe(Observation(every=5), run, DT)
     for own, true in zip(found, run, strict=True):
         assert np.array_equal(own[::5], true[::5])
         assert np.isnan(np.delete(own, np.s_[::5], axis=0)).all()
@@ -75,7 +77,7 @@ def test_between_frames_nothing_is_known(run):
 
 
 def test_noise_is_in_positions_alone_and_not_at_the_start(run):
-    found, _ = observed_by(Seen(noise=1e-3), run, DT)
+    found, _ = observe(Observation(noise=1e-3), run, DT)
     off = found.x - run.x
     assert not off[0].any()
     assert np.std(off[1:]) == pytest.approx(1e-3, rel=0.05)
@@ -83,31 +85,31 @@ def test_noise_is_in_positions_alone_and_not_at_the_start(run):
 
 
 def test_outliers_are_few_and_far(run):
-    found, _ = observed_by(Seen(outliers=0.05), run, DT)
+    found, _ = observe(Observation(outliers=0.05), run, DT)
     far = np.linalg.norm(found.x - run.x, axis=2)
     assert far[far > 0.0] == pytest.approx(OFF)
     assert np.mean(far[1:] > 0.0) == pytest.approx(0.05, rel=0.3)
 
 
 def test_points_that_are_not_seen_keep_their_true_states(run):
-    found, weight = observed_by(Seen(share=0.3, noise=1e-3), run, DT)
+    found, weight = observe(Observation(share=0.3, noise=1e-3), run, DT)
     hidden = ~weight.any(axis=0)
     assert hidden.sum() == 35
     assert np.array_equal(found.x[:, hidden], run.x[:, hidden])
 
 
 def test_the_same_seed_sees_the_same(run):
-    one, again, other = (observed_by(Seen(noise=1e-3, share=0.5), run, DT, seed)
+    one, again, other = (observe(Observation(noise=1e-3, share=0.5), run, DT, seed)
                          for seed in (1, 1, 2))
     assert np.array_equal(one[0].x, again[0].x)
     assert np.array_equal(one[1], again[1])
     assert not np.array_equal(one[1], other[1])
 
 
-@pytest.mark.parametrize("seen", [Seen(positions=True), Seen(positions=True, every=5),
-                                  Seen(positions=True, share=0.5)])
+@pytest.mark.parametrize("seen", [Observation(positions=True), Observation(positions=True, every=5),
+                                  Observation(positions=True, share=0.5)])
 def test_affine_motion_is_known_from_positions(run, seen):
-    found, weight = observed_by(seen, run, DT)
+    found, weight = observe(seen, run, DT)
     levels = np.flatnonzero(weight.any(axis=1))
     for own, true in zip(found, run, strict=True):
         assert own[levels] == pytest.approx(true[levels], abs=1e-9)

@@ -20,7 +20,7 @@ def found(monkeypatch, tmp_path):
     monkeypatch.setattr(errors, "body_maker", lambda laws: laws)
     monkeypatch.setattr(tables, "trained", lambda name: name)
     monkeypatch.setattr(tables, "nets", lambda: {
-        n: trained_laws.Net(n.split("-")[0]) for n in NAMES})
+        n: trained_laws.LawNet(n.split("-")[0]) for n in NAMES})
 
     def of(experiment):
         failed = run_all([experiment], RunSetting("standard", tmp_path, targets=targets.load()))
@@ -50,6 +50,6 @@ def test_the_tables_have_the_repaired_ones(found):
 def test_the_largest_of_ours_is_generally_below_a_thousandth(found, monkeypatch):
     assert "nclaw.sec4_2.recon_ours_lt" not in found(tables.table1.experiment)
     monkeypatch.setattr(tables, "nets", lambda: {
-        n: trained_laws.Net(n) for n in tables.ENVIRONMENTS})
+        n: trained_laws.LawNet(n) for n in tables.ENVIRONMENTS})
     record = found(tables.table1.experiment)["nclaw.sec4_2.recon_ours_lt"]
     assert (record.value, record.paper, record.verdict) == (ERROR, 0.001, "miss")

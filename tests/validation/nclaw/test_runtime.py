@@ -36,7 +36,7 @@ def runs(monkeypatch):
         return k * {"true": 0.5, "ours": 1.0, "gnn": 3.0}[word], 10.0 * k
 
     monkeypatch.setattr(runtime, "trained", found)
-    monkeypatch.setattr(runtime, "took", took)
+    monkeypatch.setattr(runtime, "run_times", took)
     return asked
 
 
@@ -60,7 +60,7 @@ def test_medians_stand_beside_the_printed_times(tmp_path, runs):
     assert (ours.value, ours.paper, ours.verdict) == (5.5, 2.55, "info")
     assert (gnn.value, gnn.paper, gnn.verdict) == (16.5, 2.1, "info")
     assert f"of {REPEATS} runs" in ours.note
-    assert gnn.note.endswith(simulators()["sand-gnn"].said)
+    assert gnn.note.endswith(simulators()["sand-gnn"].description)
     assert found["nclaw.table3.gnn.sand.cpu"].value == pytest.approx(55.0 / 1e6)
     assert found["nclaw.table3.gnn.sand.over_true"].value == 1.0
 
@@ -73,18 +73,18 @@ def test_what_is_not_trained_is_told_and_not_run(tmp_path, runs):
 
 @pytest.mark.parametrize("law", [copy_body, still()], ids=["laws", "graph network"])
 def test_a_run_takes_time(law):
-    wall, cpu = runtime.took(water(5), law)
+    wall, cpu = runtime.run_times(water(5), law)
     assert 0.0 < wall < 60.0
     assert 0.0 < cpu
 
 
 def test_a_run_that_breaks_down_has_no_time():
-    assert np.isnan(runtime.took(water(15), still(a=np.inf))).all()
+    assert np.isnan(runtime.run_times(water(15), still(a=np.inf))).all()
 
 
 def test_times_of_runs_that_break_down_are_not_recorded(tmp_path, runs, monkeypatch):
-    timed = runtime.took
-    monkeypatch.setattr(runtime, "took", lambda scene, law: (
+    timed = runtime.run_times
+    monkeypatch.setattr(runtime, "run_times", lambda scene, law: (
         (np.nan, np.nan) if isinstance(law, Simulator) else timed(scene, law)))
     found = recorded(tmp_path)
     assert found["nclaw.table3.gnn.sand"].value is None

@@ -21,10 +21,10 @@ from mpm_ref.nclaw.train.rollout import segment_errors  # noqa: E402
 from mpm_ref.training import Diverged  # noqa: E402
 from mpm_ref.trajectories import Observed, observed  # noqa: E402
 from validation.common.scenes import with_  # noqa: E402
-from validation.nclaw.observation import Seen  # noqa: E402
+from validation.nclaw.observation import Observation  # noqa: E402
 from validation.nclaw.small_trainings import Small, identity  # noqa: E402
 from validation.training import small  # noqa: E402
-from validation.training.small import bundled, run_of, shown  # noqa: E402
+from validation.training.small import bundled, run_of, training_data  # noqa: E402
 
 STEPS = 11
 SHORT = Recipe(epochs=3, first=3, last=6, batch=2, elastic_rate=1e-2, plastic_rate=1e-3)
@@ -133,7 +133,7 @@ def toy(monkeypatch):
     """The trainer on a small cube of a few steps."""
     monkeypatch.setattr(small, "run_of", lambda net: observed(cube(STEPS)))
     monkeypatch.setattr(small, "build", lambda scene: cube(STEPS))
-    return Small(epochs=3, first=3, last=6, kept=(1, 2))
+    return Small(epochs=3, first=3, last=6, checkpoints=(1, 2))
 
 
 def test_a_bundle_holds_what_was_asked_for(toy):
@@ -150,7 +150,7 @@ def test_a_bundle_holds_what_was_asked_for(toy):
 
 
 def test_laws_are_as_wide_as_asked_for(toy):
-    made = bundled("toy", toy._replace(width=8, kept=()), 1)
+    made = bundled("toy", toy._replace(width=8, checkpoints=()), 1)
     assert [W.shape for W, _ in made.laws[3].elastic.layers] == [(13, 8), (8, 8), (8, 9)]
 
 
@@ -173,15 +173,16 @@ def test_a_training_that_diverges_is_kept_as_far_as_it_came(toy, monkeypatch):
     assert made.about["stopped"] == "epoch 2: the loss is nan; try smaller rates"
 
 
-@pytest.mark.parametrize("seen", [Seen(every=3), Seen(positions=True), Seen(share=0.5, noise=1e-4)])
-def test_a_training_takes_what_is_seen(toy, seen):
+@pytest.mark.parametrize("observation", [Observation(every=3), Observation(positions=True),
+                                         Observation(share=0.5, noise=1e-4)])
+def test_a_training_takes_what_is_observed(toy, observation):
     true = observed(cube(STEPS))
-    found, data = shown(toy._replace(seen=seen), true)
+    found, data = training_data(toy._replace(observation=observation), true)
     assert isinstance(data, PartialTrajectory)
     assert isinstance(found, Observed)
-    made = bundled("toy", toy._replace(seen=seen), 1)
+    made = bundled("toy", toy._replace(observation=observation), 1)
     assert np.isfinite(made.about["errors"]).all()
-    assert isinstance(shown(toy, true)[1], Trajectory)
+    assert isinstance(training_data(toy, true)[1], Trajectory)
 
 
 def test_a_run_is_of_all_steps(monkeypatch):

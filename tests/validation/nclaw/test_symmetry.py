@@ -40,7 +40,7 @@ def test_gradients_are_those_of_the_training_run(name, monkeypatch):
     """All points of each frame; at the start, at rest."""
     short = symmetry.environment(name, steps=20, every=10)
     monkeypatch.setattr(symmetry, "environment", lambda name, every: short)
-    F = symmetry.met(name, 10).reshape(3, 1000, 3, 3)
+    F = symmetry.visited_gradients(name, 10).reshape(3, 1000, 3, 3)
     assert np.array_equal(F[0], np.tile(np.eye(3), (1000, 1, 1)))
     assert abs(F[2] - F[1]).max() > 0.0
     assert np.isfinite(F).all()
@@ -49,9 +49,9 @@ def test_gradients_are_those_of_the_training_run(name, monkeypatch):
 def test_what_must_be_symmetric_is_judged(tmp_path, monkeypatch):
     """Of two states the larger stress counts for more."""
     law = SimpleNamespace(law="law")
-    monkeypatch.setattr(symmetry, "known", lambda run: {
+    monkeypatch.setattr(symmetry, "tested_laws", lambda run: {
         (method, name): law for method in ("ours", "admissible") for name in ENVIRONMENTS[:1]})
-    monkeypatch.setattr(symmetry, "met", lambda name, every: None)
+    monkeypatch.setattr(symmetry, "visited_gradients", lambda name, every: None)
     monkeypatch.setattr(symmetry, "split", lambda law, F: np.array([[3.0, 0.0], [5.0, 12.0]]))
     assert run_all([symmetry.symmetry.experiment], RunSetting("standard", tmp_path)) == []
     found = {r.target: r for r in ProfileResults(tmp_path).records("nclaw.symmetry")}

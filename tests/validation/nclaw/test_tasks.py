@@ -71,11 +71,11 @@ def test_stand_ins_are_as_long_and_as_large_as_the_meshes(toy):
 
 def test_a_mesh_of_the_users_is_taken_instead(tmp_path, monkeypatch):
     monkeypatch.setattr(stand_in_bodies, "MESHES", tmp_path)
-    assert stand_in_bodies.said("bunny") == "a stand-in for bunny"
+    assert stand_in_bodies.body_label("bunny") == "a stand-in for bunny"
     (tmp_path / "bunny.obj").write_text("v 0 0 0")
     assert stand_in_bodies.toy("bunny", 0.7) == Mesh(file=str(tmp_path / "bunny.obj"), size=0.7,
                                           center=(0.5, 0.5, 0.5))
-    assert stand_in_bodies.said("bunny") == "bunny"
+    assert stand_in_bodies.body_label("bunny") == "bunny"
     assert not isinstance(stand_in_bodies.toy("spot", 0.7), Mesh)
 
 

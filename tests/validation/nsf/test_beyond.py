@@ -15,7 +15,7 @@ from validation.nsf.studies import bread
 
 @pytest.fixture(scope="module")
 def slice_of_bread():
-    return reduced_runs.tested(bread(4, train=3)._replace(test=(unseen_runs.E,)))
+    return reduced_runs.fit_study(bread(4, train=3)._replace(test=(unseen_runs.E,)))
 
 
 def boxes(scene):
@@ -42,7 +42,7 @@ def test_points_are_in_the_order_of_training(slice_of_bread):
     one = slice_of_bread
     scene = unseen_runs.shifted(one.study.run(unseen_runs.E), 0.3, 0)
     assert not np.array_equal(nsf_full_model(scene).X, one.runs.X)
-    test = unseen_runs.other(one, scene)
+    test = unseen_runs.simulated(one, scene)
     assert np.abs(test.X - one.runs.X).max() < 1e-12
     assert np.abs(test.x[0, 0] - one.runs.X).max() < 1e-6
     usual = one.tests[unseen_runs.E]
@@ -53,13 +53,13 @@ def test_points_are_in_the_order_of_training(slice_of_bread):
 def test_other_points_are_refused(slice_of_bread):
     scene = bread(5).run(unseen_runs.E)
     with pytest.raises(ValueError, match="expected the same slice"):
-        unseen_runs.other(slice_of_bread, scene)
+        unseen_runs.simulated(slice_of_bread, scene)
 
 
 @pytest.mark.parametrize(("shift", "side", "end"), [(1.0, "upper", 0.6), (-1.0, "lower", 0.4)])
 def test_a_box_goes_no_farther_than_the_held_ends(shift, side, end):
     box = bread(2).run(unseen_runs.E).body[1].shape.shapes[0]
-    gone = unseen_runs.moved(box, shift)
+    gone = unseen_runs.shifted_box(box, shift)
     assert getattr(gone, side)[0] == pytest.approx(end)
     assert gone.upper[0] - gone.lower[0] == pytest.approx(box.upper[0] - box.lower[0])
     assert gone.lower[1:] == pytest.approx(box.lower[1:])

@@ -33,7 +33,7 @@ def recorded(rng, tmp_path):
         run = SimpleNamespace(profile="quick", folder=tmp_path,
                               experiment=SimpleNamespace(id="nsf.fig6"),
                               record=lambda id, value, **rule: found.update({id[9:]: value}))
-        super_resolution.compared(run, SimpleNamespace(place=place), few, many, xhat)
+        super_resolution.record_resolutions(run, SimpleNamespace(place=place), few, many, xhat)
         return found
 
     return of

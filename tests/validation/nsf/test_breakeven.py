@@ -7,19 +7,19 @@ from mpm_ref.rom.study.full_model import nsf_full_model
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.nsf import breakeven
-from validation.nsf.breakeven import Cost, kinds
+from validation.nsf.breakeven import PointCost, kinds
 from validation.nsf.studies import jelly
 
-SMALL = breakeven.Scene(jelly, (5, 7, 11), 0.25)
+SMALL = breakeven.PrintedScene(jelly, (5, 7, 11), 0.25)
 
 
 def test_a_reduced_step_on_the_even_share_takes_as_long():
-    cost = Cost(particle=3.0, grid=1.0, fields=5.0)
+    cost = PointCost(particle=3.0, grid=1.0, fields=5.0)
     share = cost.share(1.0)
     assert share * (cost.grid + cost.fields) == cost.particle
-    assert cost.faster(share) == 1.0
-    assert cost.faster(cost.share(10.0)) == pytest.approx(10.0)
-    assert cost.faster(0.1) == pytest.approx(5.0)
+    assert cost.speedup(share) == 1.0
+    assert cost.speedup(cost.share(10.0)) == pytest.approx(10.0)
+    assert cost.speedup(0.1) == pytest.approx(5.0)
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +54,7 @@ def test_records_follow_from_times(tmp_path, monkeypatch):
     monkeypatch.setattr(breakeven, "SCENES", {"jelly": SMALL})
     monkeypatch.setattr(breakeven, "seconds_of_a_point", lambda fields, points: 1.0)
     monkeypatch.setattr(breakeven, "passes", lambda fields, points: (2.0, 6.0))
-    monkeypatch.setattr(breakeven, "whole_steps", lambda study, steps: (2.0 * n, 1.0 * n))
+    monkeypatch.setattr(breakeven, "full_steps", lambda study, steps: (2.0 * n, 1.0 * n))
     assert not run_all([breakeven.breakeven.experiment], RunSetting("quick", tmp_path))
     results = ProfileResults(tmp_path)
     found = {r.target: r.value for r in results.records("nsf.breakeven")}

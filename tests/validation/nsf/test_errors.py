@@ -19,7 +19,7 @@ TEST = 0.45
 @pytest.fixture(scope="module")
 def cube():
     """The jelly cube at half the resolution."""
-    return reduced_runs.tested(jelly(2))
+    return reduced_runs.fit_study(jelly(2))
 
 
 def test_coarse_grids_keep_particles_to_a_cell_and_waves_to_a_step():
@@ -50,7 +50,7 @@ def test_cake_is_sampled_in_the_middle_and_by_fewer_later():
 
 def test_the_map_alone_does_not_know_the_stress(cube):
     alone = cube._replace(map_alone=True)
-    assert isinstance(alone.of(TEST), ElasticModes)
+    assert isinstance(alone.fields_of_run(TEST), ElasticModes)
     assert alone.errors(TEST, 50).errors.origin > 2.0 * cube.errors(TEST, 50).errors.origin
 
 
@@ -61,7 +61,7 @@ def test_snapshots_are_a_divisor_of_the_steps_apart():
 
 def test_reduced_runs_beat_the_nearest_run_and_not_the_nearest_states(cube):
     every = cube.errors(TEST, len(cube.runs.X))
-    nearest, taken = cube.nearest(TEST), cube.next_run(TEST)
+    nearest, taken = cube.nearest_state_errors(TEST), cube.nearest_run_errors(TEST)
     assert nearest.origin <= every.errors.origin < 0.1 * taken.origin
     assert every.errors.origin < every.errors.centroid < every.errors.displacement
     assert 0.0 < every.stress < 0.5
@@ -72,21 +72,21 @@ def test_the_next_run_is_the_one_of_the_nearest_value(cube):
     """Runs are of 0.3, 0.4 and 0.5: that of 0.4 is not off itself."""
     itself = cube.runs._replace(x=cube.runs.x[1:2])
     for value in (0.36, 0.44):
-        assert cube._replace(tests={value: itself}).next_run(value).origin == 0.0
+        assert cube._replace(tests={value: itself}).nearest_run_errors(value).origin == 0.0
 
 
 def test_tests_that_are_a_training_run_are_counted(cube):
     itself = cube.runs._replace(x=cube.runs.x[1:2])
     study, run = cube.study._replace(test=(0.36, TEST)), Records()
-    errors.known(run, "a", cube._replace(study=study, tests=cube.tests | {0.36: itself}))
+    errors.record_nearest(run, "a", cube._replace(study=study, tests=cube.tests | {0.36: itself}))
     value, note = run["a.next_run"]
     assert "in 1 of 2 tests it is the very same run" in note
-    assert value == pytest.approx(50.0 * cube.next_run(TEST).origin)
+    assert value == pytest.approx(50.0 * cube.nearest_run_errors(TEST).origin)
     assert "very same" not in run["a.nearest"][1]
 
 
 def test_the_affine_field_is_worth_its_modes(cube):
-    without = reduced_runs.refitted(cube, cube.study.sizes._replace(C=0), follows=False)
+    without = reduced_runs.refit(cube, cube.study.sizes._replace(C=0), follows=False)
     some = [one.errors(TEST, 50).errors.origin for one in (without, cube)]
     assert some[0] > 5.0 * some[1]
     assert without.xhat == pytest.approx(cube.xhat, abs=1e-9)
@@ -99,7 +99,7 @@ def test_draws_differ_and_repeat(cube):
 
 
 def test_longer_steps_are_compared_where_times_meet(cube):
-    longer = cube.errors(TEST, 50, faster=1.5)
+    longer = cube.errors(TEST, 50, dt_factor=1.5)
     assert longer.errors.origin < 0.0035       # 0.0038 where states between levels are compared
 
 
@@ -118,15 +118,15 @@ def test_a_run_that_breaks_down_is_infinitely_off(cube, monkeypatch):
 def test_samples_that_weights_keep_are_counted(cube):
     one = nsf_full_model(cube.study.run(TEST))
     chosen, = cube.study.chosen(one, 50, 0, cube.fields)
-    found, drawn = (cube.errors(TEST, 50, weighed=weighed) for weighed in (True, False))
-    assert (found.kept, found.misfit) == (len(chosen.points), chosen.misfit)
-    assert found.kept < drawn.kept == 50
+    found, drawn = (cube.errors(TEST, 50, weighted=weighed) for weighed in (True, False))
+    assert (found.samples, found.misfit) == (len(chosen.points), chosen.misfit)
+    assert found.samples < drawn.samples == 50
     assert 1e-3 < found.misfit < 1.0
     assert np.isnan(drawn.misfit)
     later = cube._replace(study=cube.study._replace(later=20))
     both = later.study.chosen(one, 50, 0, cube.fields)
-    found = later.errors(TEST, 50, weighed=True)
-    assert found.kept == np.mean([len(own.points) for own in both])
+    found = later.errors(TEST, 50, weighted=True)
+    assert found.samples == np.mean([len(own.points) for own in both])
     assert found.misfit == both[1].misfit > both[0].misfit
 
 
@@ -142,17 +142,17 @@ def test_samples_of_a_study_may_be_those_of_cells(cube):
 
 def test_records_of_weighted_samples_say_how_many_there_are(cube):
     records = Records()
-    row, = errors.by_cubature(records, "nsf.jelly.cubature", cube, 20, (0,))
-    found = cube.errors(TEST, 20, weighed=True)
-    assert row[errors.COLUMNS.index("kept")] == found.kept
+    row, = errors.record_cubature(records, "nsf.jelly.cubature", cube, 20, (0,))
+    found = cube.errors(TEST, 20, weighted=True)
+    assert row[errors.COLUMNS.index("kept")] == found.samples
     value, note = records["nsf.jelly.cubature"]
     assert value == 100.0 * found.errors.origin
-    assert (f"at most 20 samples with weights by cubature, of random candidates; {found.kept:g} "
+    assert (f"at most 20 samples with weights by cubature, of random candidates; {found.samples:g} "
             f"kept, whose weights leave {found.misfit:.2g} of the modes' products") in note
 
 
 def test_rows_are_told_by_their_columns(cube):
-    rows = errors.rows_of(cube, "modal", 50, (0, 1))
+    rows = errors.error_rows(cube, "modal", 50, (0, 1))
     assert len(rows) == 2
     assert all(len(row) == len(errors.COLUMNS) for row in rows)
     assert errors.mean(rows, "samples") == 50.0

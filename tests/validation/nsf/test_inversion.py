@@ -19,7 +19,7 @@ STUDY = jelly(4)._replace(train=(0.3, 0.5), test=(0.35, 0.4), samples=40,
 @pytest.fixture(scope="module")
 def one():
     """The small study."""
-    return reduced_runs.tested(STUDY)
+    return reduced_runs.fit_study(STUDY)
 
 
 @pytest.mark.parametrize("faster", [1.0, 1.5])
@@ -32,17 +32,18 @@ def test_gauss_newton_is_how_runs_are_usually_inverted(one, faster):
     scene = nsf_full_model(STUDY.run(0.4))
     plan = FieldRunOptions(STUDY.chosen(scene, STUDY.samples, 0), faster)
     taken = [report.iterations for _, _, report, _ in
-             nsf_run(scene, one.of(0.4), plan, one.rest).states()
+             nsf_run(scene, one.fields_of_run(0.4), plan, one.rest).states()
              if report is not None]
     assert found.iterations == tuple(taken)
     assert min(taken) > 1
-    assert inversion.spread(found._replace(iterations=(8, 3, 4, 4, 9))) == [3.0, 4.0, 9.0]
+    found = found._replace(iterations=(8, 3, 4, 4, 9))
+    assert inversion.iteration_quantiles(found) == [3.0, 4.0, 9.0]
 
 
 def test_its_first_step_alone_is_another_run(one):
     found, usual = (inversion.runs_of(one, kind, 1.0, (0,))[0.4, 0]
                     for kind in ("linear", "nonlinear"))
-    assert inversion.spread(found) == [1.0, 1.0, 1.0]
+    assert inversion.iteration_quantiles(found) == [1.0, 1.0, 1.0]
     assert found.errors.origin == pytest.approx(usual.errors.origin, rel=0.3)
     assert found.errors != usual.errors
 
@@ -50,7 +51,7 @@ def test_its_first_step_alone_is_another_run(one):
 def test_errors_and_iterations_are_recorded(one, tmp_path, monkeypatch):
     monkeypatch.setattr(inversion, "jelly", lambda coarser: STUDY)
     monkeypatch.setattr(inversion, "metal", lambda coarser, train: STUDY._replace(test=(0.4,)))
-    monkeypatch.setattr(inversion, "tested", lambda study: one._replace(study=study))
+    monkeypatch.setattr(inversion, "fit_study", lambda study: one._replace(study=study))
     setting = RunSetting("quick", tmp_path, targets=targets.load())
     assert not run_all([inversion.inversion.experiment], setting)
     found = ProfileResults(tmp_path)
@@ -65,9 +66,9 @@ def test_errors_and_iterations_are_recorded(one, tmp_path, monkeypatch):
     records = {r.target: r for r in found.records("nsf.inversion")}
     assert records["nsf.inversion.jelly.linear.x1.error"].value == pytest.approx(
         50.0 * sum(table["origin"][4:6]))
-    _, medians, most = zip(*(inversion.spread(own) for own in
+    _, medians, most = zip(*(inversion.iteration_quantiles(own) for own in
                              inversion.runs_of(one, "nonlinear", 1.0, (0,)).values()),
-                            strict=True)
+                           strict=True)
     assert records["nsf.sec5_3.gn_lo"].value == min(medians)
     assert records["nsf.sec5_3.gn_hi"].value == max(medians)
     assert f"the most in any step {max(most):g}" in records["nsf.sec5_3.gn_lo"].note
@@ -78,6 +79,6 @@ def test_printed_numbers_are_of_gauss_newton_with_the_scenes_own_steps():
                          ("a", 0.0, 0, "nonlinear", 1.5, *4 * [0.0], 9.0, 9.0, 9.0),
                          ("a", 0.0, 0, "nonlinear", 1.0, *4 * [0.0], 2.0, 3.0, 7.0),
                          ("b", 0.0, 0, "nonlinear", 1.0, *4 * [0.0], 3.0, 5.0, 6.0)]
-    inversion.counts(run, rows, "")
+    inversion.record_iterations(run, rows, "")
     assert [value for value, _ in run.values()] == [3.0, 5.0]
     assert list(run) == ["nsf.sec5_3.gn_lo", "nsf.sec5_3.gn_hi"]

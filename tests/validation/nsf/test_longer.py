@@ -35,7 +35,7 @@ def test_steps_are_longer_and_end_within_the_scene():
 
 
 def test_errors_are_those_beside_the_scenes_own_steps():
-    same, between, twice, refused = longer.ends_of(STUDY, 0.35)
+    same, between, twice, refused = longer.ended_runs(STUDY, 0.35)
     assert max(*same.errors, same.stress) < 1e-6        # states are compared in single precision
     levels = STUDY.run(0.35).steps // STUDY.spacing
     assert (same.states, between.states, twice.states) == (levels, levels // 3, levels)
@@ -51,20 +51,20 @@ def test_errors_are_those_beside_the_scenes_own_steps():
     assert twice.stress == pytest.approx(np.linalg.norm(tau - reference)
                                          / np.linalg.norm(reference))
     assert refused.errors.origin == refused.stress == inf
-    assert "crosses more than 1 dx in a step" in refused.said
+    assert "crosses more than 1 dx in a step" in refused.reason
 
 
 def test_times_are_medians_of_runs_in_turn(monkeypatch):
     spent = iter([4.0, 3.0, 2.0, 6.0, 1.0, 2.5, 5.0, 9.0, 2.0])
     monkeypatch.setattr(longer, "FACTORS", (1.0, 1.5, 2.0))
     monkeypatch.setattr(longer, "seconds", lambda made: next(spent))
-    assert longer.taken(STUDY.run(0.35), 3) == [5.0, 3.0, 2.0]
+    assert longer.run_times(STUDY.run(0.35), 3) == [5.0, 3.0, 2.0]
     assert next(spent, None) is None
 
 
 def test_a_run_that_ends_before_its_time_took_for_ever():
     scene = longer.stretched(STUDY.run(0.35), 20.0)
-    assert longer.of_run(scene) == inf
+    assert longer.run_seconds(scene) == inf
     with pytest.raises(NoBody, match="a particle crosses more than 1 dx"):
         list(longer.states(Histories(*9 * [None])._replace(dt=1.0), scene))
 
@@ -72,7 +72,7 @@ def test_a_run_that_ends_before_its_time_took_for_ever():
 def test_bounds_of_the_time_step_do_not_end_a_run():
     scene = metal(4).run(0.08)
     assert scene.unstable != "allow"
-    assert 0.0 < longer.of_run(longer.stretched(with_(scene, steps=8), 2.0)) < inf
+    assert 0.0 < longer.run_seconds(longer.stretched(with_(scene, steps=8), 2.0)) < inf
 
 
 def test_runs_that_are_clocked_show_their_last_frame_alone(monkeypatch):
@@ -84,7 +84,7 @@ def test_runs_that_are_clocked_show_their_last_frame_alone(monkeypatch):
 
     monkeypatch.setattr(longer, "FACTORS", (1.0, 2.0))
     monkeypatch.setattr(longer, "seconds", seconds)
-    assert longer.taken(STUDY.run(0.35), 1) == [1.0, 1.0]
+    assert longer.run_times(STUDY.run(0.35), 1) == [1.0, 1.0]
     steps = STUDY.run(0.35).steps
     assert shown == [[0, steps], [0, steps // 2]]
 
@@ -92,13 +92,13 @@ def test_runs_that_are_clocked_show_their_last_frame_alone(monkeypatch):
 def test_errors_and_times_are_recorded(tmp_path, monkeypatch):
     monkeypatch.setattr(longer, "metal", lambda coarser: STUDY)
     monkeypatch.setattr(longer, "cake", lambda coarser: STUDY)
-    monkeypatch.setattr(longer, "taken", lambda scene, repeats: [8.0, 6.0, 4.0, inf])
+    monkeypatch.setattr(longer, "run_times", lambda scene, repeats: [8.0, 6.0, 4.0, inf])
     assert not run_all([longer.longer.experiment], RunSetting("quick", tmp_path))
     found = ProfileResults(tmp_path)
     table = found.table("nsf.longer", "steps")
     assert table["scene"].tolist() == 4 * ["metal"] + 4 * ["cake"]
     assert table["faster"].tolist() == 2 * list(FACTORS)
-    expected = longer.ends_of(STUDY, 0.35)
+    expected = longer.ended_runs(STUDY, 0.35)
     for name, own in (("states", [one.states for one in expected]),
                       ("origin", [one.errors.origin for one in expected]),
                       ("displacement", [one.errors.displacement for one in expected]),
@@ -117,9 +117,9 @@ def test_errors_and_times_are_recorded(tmp_path, monkeypatch):
 
 def test_runs_that_broke_down_are_in_no_mean():
     run = Records()
-    good = longer.Ended(7, PositionErrors(0.01, 0.02, 0.03), 0.4, "")
+    good = longer.EndedRun(7, PositionErrors(0.01, 0.02, 0.03), 0.4, "")
     longer.record(run, "a",
-                  [good, longer.Ended(3, PositionErrors(*3 * [inf]), inf, "step 4: no body")],
+                  [good, longer.EndedRun(3, PositionErrors(*3 * [inf]), inf, "step 4: no body")],
                   (2.0, 3.0), "")
     value, note = run["a.error"]
     assert value == 1.0

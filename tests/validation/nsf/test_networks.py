@@ -18,12 +18,20 @@ from validation.common.weights_needed import Untrained
 from validation.nsf import networks as kept
 from validation.nsf import networks_runs as runs
 from validation.nsf import reduced_runs
-from validation.nsf.networks import Net, Part, fields_of, identity, net_of, nets, trained
+from validation.nsf.networks import (
+    FieldsNet,
+    NetworkPlan,
+    fields_of,
+    identity,
+    net_of,
+    nets,
+    trained,
+)
+from validation.nsf.settings import STUDIES
 from validation.nsf.studies import jelly
-from validation.nsf.study_settings import STUDIES
 
 STUDY = jelly(4)._replace(train=(0.3, 0.5), sizes=Sizes(r=R), samples=20)
-NET = Net(STUDY, Part(4, 2, 0.1), Part(5, 2, 0.0), Part(6, 2, 0.0))
+NET = FieldsNet(STUDY, NetworkPlan(4, 2, 0.1), NetworkPlan(5, 2, 0.0), NetworkPlan(6, 2, 0.0))
 
 
 @pytest.fixture
@@ -86,12 +94,14 @@ def test_weights_come_back_as_fields_of_the_scene(folder):
         model().field.h.values(X[some], xhat)[:, 2])
 
 
-@pytest.mark.parametrize("change", [
-    {"study": STUDY._replace(train=(0.3, 0.4))}, {"study": STUDY._replace(every=8)},
-    {"study": STUDY._replace(follows=True)}, {"study": STUDY._replace(sizes=Sizes(r=R + 1))},
-    {"g": Part(4, 2, 0.2)}, {"h": Part(5, 3, 0.0)}, {"l": Part(7, 2, 0.0)}, {"batch": 4},
-    {"points": 9}, {"latent": "free"}, {"schedule": "steps"}, {"seed": 1}],
-    ids=lambda change: next(iter(change)))
+@pytest.mark.parametrize("change", [{"study": STUDY._replace(train=(0.3, 0.4))},
+                                    {"study": STUDY._replace(every=8)},
+                                    {"study": STUDY._replace(follows=True)},
+                                    {"study": STUDY._replace(sizes=Sizes(r=R + 1))},
+                                    {"g": NetworkPlan(4, 2, 0.2)}, {"h": NetworkPlan(5, 3, 0.0)},
+                                    {"l": NetworkPlan(7, 2, 0.0)}, {"batch": 4}, {"points": 9},
+                                    {"latent": "free"}, {"schedule": "steps"}, {"seed": 1}],
+                         ids=lambda change: next(iter(change)))
 def test_weights_of_another_training_are_refused(folder, change):
     save(folder / "jelly.npz", model(NET._replace(**change)))
     with pytest.raises(ValueError, match=r"weights jelly.npz are of .*, now it is .*: python -m "
@@ -140,16 +150,16 @@ def test_the_printed_networks_of_jelly_are_those_of_table_1(folder, monkeypatch)
     assert recorded(folder)["jelly.weights.printed"].value == 37_920 + 595_200 + 1_336_896
 
 
-class Ready(reduced_runs.Tested):
-    """`Tested` with known errors, of each draw others."""
+class Ready(reduced_runs.FittedStudy):
+    """`FittedStudy` with known errors, of each draw others."""
 
-    def errors(self, value, count, draw, faster, weighed):
+    def errors(self, value, count, draw, dt_factor, weighted):
         """Errors that tell their draw, and whether samples have weights."""
-        error = (0.001 if weighed else 0.01) * (draw + 1)
-        return reduced_runs.Found(PositionErrors(error, 0.02, 0.03), 0.2, float(count), count,
-                                  np.nan)
+        error = (0.001 if weighted else 0.01) * (draw + 1)
+        return reduced_runs.RunErrors(PositionErrors(error, 0.02, 0.03), 0.2, float(count), count,
+                                      np.nan)
 
-    def nearest(self, value):
+    def nearest_state_errors(self, value):
         """Of the nearest states."""
         return PositionErrors(0.001, 0.002, 0.003)
 
@@ -162,7 +172,7 @@ def test_errors_are_means_in_per_cent(folder, monkeypatch):
         test = type("History", (), {"X": fields.X, "x": np.zeros((1, 31, 1, 3))})
         return Ready(study, fields, model.xhat, None, {0.45: test})
 
-    monkeypatch.setattr(runs, "tested_on", ready)
+    monkeypatch.setattr(runs, "fit_to_networks", ready)
     found = recorded(folder)
     assert found["jelly"].value == pytest.approx(2.0)           # mean of 1, 2, 3 %
     assert found["jelly"].note == (
@@ -185,7 +195,7 @@ def test_errors_are_means_in_per_cent(folder, monkeypatch):
 def test_weights_of_samples_are_those_of_modes_of_the_same_runs(folder):
     """The networks know no modes."""
     save(folder / "jelly.npz", model())
-    one, plain = runs.tested_on(trained("jelly"), STUDY), reduced_runs.tested(STUDY)
+    one, plain = runs.fit_to_networks(trained("jelly"), STUDY), reduced_runs.fit_study(STUDY)
     scene = nsf_full_model(STUDY.run(0.45))
     asked = []
     spied = STUDY.__class__.chosen
@@ -196,7 +206,7 @@ def test_weights_of_samples_are_those_of_modes_of_the_same_runs(folder):
             asked.append(spied(self, *given))
             return asked[-1]
 
-    one._replace(study=Spy(*STUDY)).errors(0.45, 20, 1, weighed=True)
+    one._replace(study=Spy(*STUDY)).errors(0.45, 20, 1, weighted=True)
     (found,), = asked
     assert np.array_equal(found.points, expected.points)
     assert found.weights == pytest.approx(expected.weights)

@@ -11,13 +11,14 @@ from mpm_ref.rom.study.dataset import simulate_history  # noqa: E402
 from mpm_ref.rom.train import session  # noqa: E402
 from mpm_ref.training import Machine  # noqa: E402
 from validation.nsf import networks as kept  # noqa: E402
-from validation.nsf.networks import Net, Part, fields_of, trained  # noqa: E402
+from validation.nsf.networks import FieldsNet, NetworkPlan, fields_of, trained  # noqa: E402
 from validation.nsf.studies import jelly  # noqa: E402
 from validation.training import nsf  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 STUDY = jelly(4)._replace(train=(0.3, 0.5), sizes=Sizes(r=3), samples=20)
-NET = Net(STUDY, Part(8, 6, 0.1), Part(6, 5, 0.01), Part(5, 4, 0.0), batch=8, points=16)
+NET = FieldsNet(STUDY, NetworkPlan(8, 6, 0.1), NetworkPlan(6, 5, 0.01), NetworkPlan(5, 4, 0.0),
+                batch=8, points=16)
 
 
 @pytest.fixture
@@ -83,10 +84,10 @@ def test_the_command_writes_weights_that_are_taken(places):
 
 def test_a_training_that_was_cut_off_goes_on(places, monkeypatch):
     """In the second stage; the weights are those of a training in one go."""
-    whole = nsf.made("jelly", places[1] / "whole", Machine())
+    whole = nsf.trained_fields("jelly", places[1] / "whole", Machine())
     monkeypatch.setattr("mpm_ref.rom.train.decoder.SAVE", 2)
     monkeypatch.setattr("mpm_ref.rom.train.field.SAVE", 2)
-    show, seen = nsf.Work.show, []
+    show, seen = nsf.ProgressBar.show, []
 
     def cut(self, stage, losses):
         seen.append((stage, len(losses)))
@@ -94,7 +95,7 @@ def test_a_training_that_was_cut_off_goes_on(places, monkeypatch):
         if seen[-1] == ("h", 3) and len(seen) == 9:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(nsf.Work, "show", cut)
+    monkeypatch.setattr(nsf.ProgressBar, "show", cut)
     with pytest.raises(KeyboardInterrupt):
         nsf.main(["jelly"], *places)
     assert not (places[0] / "jelly.npz").exists()
@@ -109,11 +110,11 @@ def test_the_bar_ends_where_its_total_is():
     moved = []
     bar = type("Bar", (), {"update": lambda _, n: moved.append(n),
                            "set_postfix": lambda *_, **__: None})()
-    work = nsf.Work(NET, bar)
+    work = nsf.ProgressBar(NET, bar)
     work.show("g", [[1.0]] * 4)                     # four epochs are in the checkpoint
     for stage, epochs in (("g", 6), ("h", 5), ("l", 4)):
         work.show(stage, np.ones(epochs))
-    assert sum(moved) == nsf.Work.total(NET) == 6 * 64 + 5 * 36 + 4 * 25
+    assert sum(moved) == nsf.ProgressBar.total(NET) == 6 * 64 + 5 * 36 + 4 * 25
 
 
 def test_a_few_losses_are_kept_the_last_one_among_them():
@@ -135,7 +136,7 @@ def test_errors_are_shares_of_what_is_learned(monkeypatch):
     class Net:
         def __init__(self, answer):
             self.place = self.values = answer
-            self.own = lambda mu: mu
+            self.needed_parameters = lambda mu: mu
 
     stages = (Net(lambda X, y: X + part(runs.x - X, 0.9)(X, y)), Net(part(runs.tau, 0.8)),
               Net(part(runs.C, 1.3)))

@@ -50,7 +50,7 @@ def test_the_figure_shows_what_is_kept(tmp_path, rng):
 def test_all_samples_and_integration_points_are_kept_though_others_are_thinned(
         tmp_path, monkeypatch):
     monkeypatch.setattr(integration_points, "MOST", 100)
-    monkeypatch.setattr(integration_points, "half_way", half)
+    monkeypatch.setattr(integration_points, "middle_state", half)
     failed = run_all([integration_points.sets.experiment], RunSetting("quick", tmp_path))
     assert failed == []
     found = {r.target: r.value for r in ProfileResults(tmp_path).records("nsf.fig4")}

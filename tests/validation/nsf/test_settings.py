@@ -6,7 +6,7 @@ from validation.common import targets
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.common.scenes import catalogue_scene, with_
-from validation.nsf import scene_settings
+from validation.nsf import settings
 
 STAND_INS = {"nsf.metal.particles", "nsf.table1.ball.particles"}
 SMALL = ("bread", "cake", "jelly")      # filled in a moment
@@ -14,7 +14,7 @@ SMALL = ("bread", "cake", "jelly")      # filled in a moment
 
 def records(folder):
     setting = RunSetting("quick", folder, targets=targets.load())
-    assert run_all([scene_settings.settings.experiment], setting) == []
+    assert run_all([settings.settings.experiment], setting) == []
     return {r.target: r for r in ProfileResults(folder).records("nsf.settings")
             if r.target != "nsf.settings"}
 
@@ -27,14 +27,14 @@ def test_settings_are_the_printed_ones(tmp_path):
     found = records(tmp_path)
     assert misses(found) == STAND_INS
     assert all(found[target].note for target in STAND_INS)
-    for name in scene_settings.NAMES:
+    for name in settings.STUDIES:
         assert {f"nsf.table1.{name}.dx", f"nsf.table1.{name}.dt"} <= found.keys()
 
 
 def test_stand_ins_have_nearly_the_printed_number_of_particles():
     """To a thousandth: as near as shapes of our own come."""
-    for name, (target, _) in scene_settings.STAND_INS.items():
-        ours = scene_settings.particles(catalogue_scene(f"nsf_{name}"))
+    for name, (target, _) in settings.STAND_INS.items():
+        ours = settings.particles(catalogue_scene(f"nsf_{name}"))
         paper = targets.load()[f"nsf.{target}"]
         assert ours != paper.value
         assert ours == pytest.approx(paper.value, rel=1e-3)
@@ -42,7 +42,7 @@ def test_stand_ins_have_nearly_the_printed_number_of_particles():
 
 def test_studies_and_networks_are_the_printed_ones(tmp_path):
     found = records(tmp_path)
-    for name in scene_settings.NAMES:
+    for name in settings.STUDIES:
         assert {f"nsf.table1.{name}.r", f"nsf.appA.{name}.train", f"nsf.table1.{name}.mlp.h.width"
                 } <= found.keys()
     assert found["nsf.cake.steps_reduced"].value == 213
@@ -58,8 +58,8 @@ def test_other_settings_miss(tmp_path, monkeypatch):
         material = with_(body.material, **({"E": 2.0} if name == "nsf_jelly" else {}))
         return with_(scene, dt=2.0 * scene.dt, body=(with_(body, material=material),))
 
-    monkeypatch.setattr(scene_settings, "NAMES", SMALL)
-    monkeypatch.setattr(scene_settings, "catalogue_scene", changed)
+    monkeypatch.setattr(settings, "STUDIES", {name: settings.STUDIES[name] for name in SMALL})
+    monkeypatch.setattr(settings, "catalogue_scene", changed)
     # one body of two is left out: their numbers of particles miss as well
     assert misses(records(tmp_path)) == {
         *(f"nsf.table1.{name}.dt" for name in SMALL), "nsf.table1.jelly.E",

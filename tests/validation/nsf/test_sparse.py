@@ -132,7 +132,7 @@ def test_scenes_that_the_bound_has_not_seen_are_judged_by_it(tmp_path, monkeypat
     table = found.table("extremes.nsf.unseen", "left")
     assert list(zip(table["map"], table["what"], table["samples"], strict=True)) == [
         ("cube", "draw 0", 3)]
-    one = reduced_runs.tested(study)
+    one = reduced_runs.fit_study(study)
     points = drawn_samples(len(one.fields.X), 3, 0).points
     assert table["left"] == pytest.approx([misfit(one.fields.U, 5, points)])
     records = {r.target: r for r in found.records("extremes.nsf.unseen")}

@@ -29,7 +29,7 @@ N, FEW = 156, 2                     # particles of both, and so few samples that
 @pytest.fixture(scope="module")
 def one():
     """The small study."""
-    return reduced_runs.tested(STUDY._replace(test=STUDY.test[1:]))
+    return reduced_runs.fit_study(STUDY._replace(test=STUDY.test[1:]))
 
 
 @pytest.fixture
@@ -78,7 +78,7 @@ def test_integration_points_are_those_of_the_reduced_run(one, steps):
     """The mean over all steps, of the warm-up too; with all particles, all."""
     scene = nsf_full_model(one.study.run(0.4))
     options = FieldRunOptions(one.study.chosen(scene, FEW, 0))
-    run = nsf_run(scene, one.of(0.4), options, one.rest).states()
+    run = nsf_run(scene, one.fields_of_run(0.4), options, one.rest).states()
     reports = [report.points for _, _, report, _ in islice(run, 1, 1 + speed.WARM + steps)]
     assert FEW < min(reports) < max(reports) <= N
     for count, points in ((FEW, np.mean(reports)), (N, N)):
@@ -87,7 +87,7 @@ def test_integration_points_are_those_of_the_reduced_run(one, steps):
 
 @pytest.mark.usefixtures("clock")
 def test_a_full_step_and_its_update_of_bodies(one):
-    assert speed.whole_steps(STUDY, 10) == (FULL, BODIES * DEFORM)
+    assert speed.full_steps(STUDY, 10) == (FULL, BODIES * DEFORM)
 
 
 def test_full_steps_are_all_from_the_start(monkeypatch):
@@ -99,7 +99,7 @@ def test_full_steps_are_all_from_the_start(monkeypatch):
         yield from simulate(problem)
 
     monkeypatch.setattr(speed, "simulate", run)
-    speed.whole_steps(STUDY, 5)
+    speed.full_steps(STUDY, 5)
     rest = [body.particles.x for body in nsf_full_model(STUDY.run(STUDY.test[0])).problem.bodies]
     assert len(begun) == 1 + speed.REPEATS
     for bodies in begun:
@@ -124,10 +124,10 @@ def recorded(one, clock, tmp_path, monkeypatch):
 
     monkeypatch.setattr(speed, "STUDIES", {"jelly": (small, (N, FEW))})
     monkeypatch.setattr(speed, "sand", small)
-    monkeypatch.setattr(speed, "tested", made)
+    monkeypatch.setattr(speed, "fit_study", made)
     assert not run_all([speed.speed.experiment], RunSetting("quick", tmp_path))
     assert asked == [(3, 3), STUDY._replace(test=STUDY.test[1:]),
-                     (3, 3), STUDY._replace(test=STUDY.test[:1], steps=speed.HELD)]
+                     (3, 3), STUDY._replace(test=STUDY.test[:1], steps=speed.SAND_STEPS)]
     results = ProfileResults(tmp_path)
     return ({r.target: r for r in results.records("nsf.speed") if r.target != "nsf.speed"},
             results.table("nsf.speed", "times"))

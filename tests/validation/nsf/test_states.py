@@ -24,7 +24,7 @@ TEST, ID = 0.45, "nsf.jelly"
 @pytest.fixture(scope="module")
 def cube():
     """The jelly cube at half the resolution."""
-    return reduced_runs.tested(jelly(2))
+    return reduced_runs.fit_study(jelly(2))
 
 
 @pytest.fixture
@@ -66,7 +66,7 @@ def test_a_run_on_samples_with_weights_is_kept_where_it_is_asked_for(cube, run):
     assert "0.45_map" not in kept
     scene, shown = nsf_full_model(cube.study.run(TEST)), np.arange(len(cube.runs.X))
     plan = FieldRunOptions(cube.study.chosen(scene, cube.study.samples, 0, cube.fields))
-    *_, (_, last, *_) = nsf_run(scene, cube.of(TEST), plan, cube.rest).states()
+    *_, (_, last, *_) = nsf_run(scene, cube.fields_of_run(TEST), plan, cube.rest).states()
     assert kept["0.45_weighed"][-1] == pytest.approx(cube.fields.place(shown, last.xhat), abs=1e-4)
     assert np.abs(kept["0.45_weighed"] - kept["0.45_ours"]).max() > 1e-3
 
@@ -82,7 +82,7 @@ def test_a_run_that_breaks_down_has_no_place_from_then_on(cube, monkeypatch):
 
     monkeypatch.setattr(states, "nsf_run",
                         lambda *given: SimpleNamespace(states=lambda: breaks(*given)))
-    found = states.of_run("one", cube, TEST, np.arange(5))
+    found = states.run_points("one", cube, TEST, np.arange(5))
     assert [np.isfinite(found["one"][k]).all() for k in range(3)] == [True, False, False]
 
 
@@ -133,7 +133,7 @@ def test_figures_show_all_that_experiments_keep(number, values, also, sides, tmp
     """A row for each parameter kept (of the stress, for one) and each way."""
     script = importlib.import_module(f"figures.nsf.fig{number}")
     names, x = [f"{0.1 * k:g}" for k in range(1, values + 1)], rng.uniform(size=(3, 40, 3))
-    words = ["true", "ours", *(word for word in states.WAYS if word in also)]
+    words = ["true", "ours", *(word for word in states.KINDS if word in also)]
     kept = {"values": np.array(names), "levels": np.arange(3), "first": x, "last": x}
     kept |= {f"{name}_{word}": x for name in names for word in words}
     if "stress" in also:

@@ -12,7 +12,7 @@ from validation.common.scenes import with_
 from validation.ldm.networks import trained
 from validation.ldm.references import references
 from validation.ldm.studies import GRAVITY
-from validation.ldm.timing import Raced, Spent
+from validation.ldm.timing import StepTime, TimedRun
 from validation.trade import ldm
 from validation.trade.ldm_cost import EVALUATIONS, PARTS, Clock, TimedCalls, cost, paid, split
 
@@ -126,13 +126,13 @@ def test_what_saves_nothing_is_never_paid():
 
 def test_a_run_costs_as_many_steps_as_it_has(monkeypatch):
     tests = references(GRAVITY, 1)
-    one = Raced(RunOptions(), Spent(9.0, 0.5), 0, None)
-    monkeypatch.setattr(ldm, "alone", lambda *_: one)
+    one = TimedRun(RunOptions(), StepTime(9.0, 0.5), 0, None)
+    monkeypatch.setattr(ldm, "time_alone", lambda *_: one)
     assert ldm.steps_of(tests, EXACT, RunOptions()) == 0.5 * tests.cases[0].problem.clock.steps
 
 
 def test_a_run_by_itself_has_the_errors_that_it_has_among_others():
     tests, model = references(GRAVITY, 1), trained("gravity-r4")
     at, way = (model.field, model.rest), RunOptions(points=20)
-    found = ldm.alone(tests.cases[0], at, way, tests.x[0])
-    assert tuple(found.errors) == pytest.approx(tuple(tests.on(*at, way)), rel=1e-12)
+    found = ldm.time_alone(tests.cases[0], at, way, tests.x[0])
+    assert tuple(found.errors) == pytest.approx(tuple(tests.run_errors(*at, way)), rel=1e-12)

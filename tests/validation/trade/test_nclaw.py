@@ -11,7 +11,7 @@ from mpm_ref.scene import build
 from validation.nclaw import bundle, small_runs, small_trainings
 from validation.nclaw.evaluate import ComparedError
 from validation.nclaw.initial_laws import untrained
-from validation.nclaw.small_runs import Measured, measured, spent, spread
+from validation.nclaw.small_runs import Measured, measured, seed_range, training_seconds
 from validation.nclaw.small_trainings import Small, bundled, identity, small_nets
 from validation.trade import nclaw as trade
 from validation.trade import nclaw_inference as inference
@@ -47,8 +47,8 @@ def test_trainings_are_run_side_by_side(folder, monkeypatch):
     assert asked == [*[(6, 2)] * 4, (10, 2), *[(5, 2)] * 4, (10, 2)]
     assert [(row.name, row.epoch) for row in found] == [("small", 10), ("small", 100),
                                                         ("small-edge-5", 10), ("small-edge-5", 100)]
-    assert found[0].own == pytest.approx(0.1)
-    assert found[1].own == pytest.approx(1.1)
+    assert found[0].training_run == pytest.approx(0.1)
+    assert found[1].training_run == pytest.approx(1.1)
     assert found[0].thrown == pytest.approx(0.3)
     assert found[0].full == found[0].compared == pytest.approx(0.5)
     assert [row.step for row in found] == [7, 7, -1, -1]
@@ -60,7 +60,7 @@ def test_trainings_are_run_side_by_side(folder, monkeypatch):
 
 def test_a_training_that_stopped_is_told(monkeypatch):
     gone = SimpleNamespace(laws={}, about={"stopped": "epoch 4, step 3: no place"})
-    monkeypatch.setattr(small_runs, "there", lambda run, names, load: {"small-gap-400": gone})
+    monkeypatch.setattr(small_runs, "load_available", lambda run, names, load: {"small-gap-400": gone})
     notes = []
     records = Records()
     records.note = notes.append
@@ -81,21 +81,21 @@ def row(name="small", **changes):
 
 
 def test_seeds_give_the_spread():
-    some = [row(), row("small-seed-1", own=3e-4), row("small-third", own=9.0)]
-    assert spread(some, small_trainings.SEEDS) == (1e-4, 3e-4)
-    assert np.isnan(spread([], small_trainings.SEEDS)).all()
+    some = [row(), row("small-seed-1", training_run=3e-4), row("small-third", training_run=9.0)]
+    assert seed_range(some, small_trainings.SEEDS) == (1e-4, 3e-4)
+    assert np.isnan(seed_range([], small_trainings.SEEDS)).all()
 
 
 def test_the_first_epoch_costs_as_much_as_others(monkeypatch):
     monkeypatch.setattr(small_runs, "bundled", lambda name: SimpleNamespace(
         about={"cpu_seconds": [40.0, 1.0, 2.0, 1.0, 3.0]}))
-    assert spent("small", 5) == pytest.approx(9.0)
-    assert spent("small", 3) == pytest.approx(5.0)
+    assert training_seconds("small", 5) == pytest.approx(9.0)
+    assert training_seconds("small", 3) == pytest.approx(5.0)
 
 
 def test_the_front_is_of_the_error_in_the_same_body(monkeypatch):
     """A training of its own size has the smaller error there, but not in the paper's body."""
-    some = [row(cpu=10.0, own=1e-5, full=3e-3), row("small-epochs-30", cpu=5.0, full=1e-3),
+    some = [row(cpu=10.0, training_run=1e-5, full=3e-3), row("small-epochs-30", cpu=5.0, full=1e-3),
             row("small-plasticine-epochs", cpu=50.0, full=9.0, step=3)]
     monkeypatch.setattr(trade, "measured", lambda *_: some)
     records = Records()
@@ -108,7 +108,7 @@ def test_the_front_is_of_the_error_in_the_same_body(monkeypatch):
 
 
 def test_what_is_seen_stands_beside_the_seeds(monkeypatch):
-    some = [row(), row("small-seed-1", own=3e-4), row("small-every-5", own=7e-4)]
+    some = [row(), row("small-seed-1", training_run=3e-4), row("small-every-5", training_run=7e-4)]
     monkeypatch.setattr(trade, "measured", lambda *_, **__: some)
     records = Records()
     trade.sight(records)

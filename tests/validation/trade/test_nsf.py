@@ -24,14 +24,14 @@ TEST = 0.4
 @pytest.fixture(scope="module")
 def one():
     """The small study."""
-    return reduced_runs.tested(STUDY)
+    return reduced_runs.fit_study(STUDY)
 
 
 @pytest.fixture
 def results(one, tmp_path, monkeypatch):
     """A function that runs an experiment on the small study alone; returns `ProfileResults`."""
     monkeypatch.setattr(nsf_runs, "studies", lambda run: {"jelly": STUDY})
-    monkeypatch.setattr(nsf_runs, "tested", lambda study: one)
+    monkeypatch.setattr(nsf_runs, "fit_study", lambda study: one)
 
     def made(function):
         assert not run_all([function.experiment], RunSetting("quick", tmp_path))
@@ -51,10 +51,10 @@ def test_each_kind_of_samples_is_run_and_all_particles(one, results, monkeypatch
     for word, weighed in nsf.WAYS.items():
         row = (table["fields"] == word) & (table["samples"] == 30) & (table["draw"] == 1)
         own = one._replace(study=STUDY._replace(by_cell=word == "cells"))
-        expected = own.errors(TEST, 30, 1, weighed=weighed)
+        expected = own.errors(TEST, 30, 1, weighted=weighed)
         assert table["origin"][row] == pytest.approx(expected.errors.origin)
         assert table["points"][row] == pytest.approx(expected.points)
-        assert table["kept"][row] == expected.kept
+        assert table["kept"][row] == expected.samples
     assert (table["cpu"] > 0.0).all()
     assert len(set(table["cpu_full"])) == 1
     records = {r.target: r for r in found.records("trade.nsf.samples")}
@@ -63,8 +63,9 @@ def test_each_kind_of_samples_is_run_and_all_particles(one, results, monkeypatch
         f"trade.nsf.samples.jelly.{way}.{count}" for way in nsf.WAYS for count in (5, 30))}
     told = {way: records[f"trade.nsf.samples.jelly.{way}.30"].note for way in nsf.WAYS}
     assert "30 samples, random; of the stress" in told["random"]
-    assert f"30 cells, cubature of their points, {expected.kept:g} kept, whose" in told["cells"]
-    kept = one.errors(TEST, 30, 0, weighed=True).kept, one.errors(TEST, 30, 1, weighed=True).kept
+    assert f"30 cells, cubature of their points, {expected.samples:g} kept, whose" in told["cells"]
+    kept = one.errors(TEST, 30, 0, weighted=True).samples, one.errors(TEST, 30, 1,
+                                                                      weighted=True).samples
     assert f"30 samples, cubature, {np.mean(kept):g} kept, whose weights" in told["cubature"]
 
 
@@ -84,10 +85,10 @@ def test_a_run_that_breaks_down_has_no_time(one, monkeypatch):
 def test_steps_grow_until_a_run_breaks_down(one, results, monkeypatch):
     asked = []
 
-    def errors(self, value, count, draw, faster, weighed):
-        asked.append(faster)
-        good = faster < 2.0
-        return reduced_runs.Found(
+    def errors(self, value, count, draw, dt_factor, weighted):
+        asked.append(dt_factor)
+        good = dt_factor < 2.0
+        return reduced_runs.RunErrors(
             PositionErrors(0.1 if good else np.inf, np.inf, np.inf), 0.2, 30.0, 40.0, np.nan)
 
     monkeypatch.setattr(type(one), "errors", errors)

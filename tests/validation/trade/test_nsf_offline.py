@@ -9,7 +9,7 @@ from mpm_ref.rom.fields.pod_fields import Sizes
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.common.weights_needed import Untrained
-from validation.ldm.timing import Spent
+from validation.ldm.timing import StepTime
 from validation.nsf.studies import jelly
 from validation.trade import nsf_offline
 from validation.trade.nsf_offline import Bill
@@ -22,7 +22,7 @@ STUDY = jelly(4)._replace(train=(0.3, 0.5), test=(0.4,), samples=40,
 def counted(monkeypatch):
     """Every clock shows 2, 4, 6, .. CPU seconds; a full-order run takes 10, a reduced one 4."""
     shown = iter(range(2, 100, 2))
-    monkeypatch.setattr(nsf_offline, "clocked", lambda step: (step(), Spent(0.0, next(shown))))
+    monkeypatch.setattr(nsf_offline, "timed", lambda step: (step(), StepTime(0.0, next(shown))))
     monkeypatch.setattr(nsf_offline, "full_cpu", lambda one: 10.0)
     monkeypatch.setattr(nsf_offline, "reduced_cpu", lambda one, count, weighed, repeats: 4.0)
 

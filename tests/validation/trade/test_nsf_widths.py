@@ -12,26 +12,26 @@ from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.common.weights_needed import Untrained
 from validation.nsf import reduced_runs
-from validation.nsf.networks import Net, Part, fields_of, narrow, net_of, nets
+from validation.nsf.networks import FieldsNet, NetworkPlan, fields_of, narrow, net_of, nets
 from validation.nsf.studies import jelly
 from validation.trade import nsf_widths
 
 STUDY = jelly(4)._replace(train=(0.3, 0.5), sizes=Sizes(r=R), samples=20)
-NARROW, WIDE = (Net(STUDY, *(Part(width, 2, 0.1) for _ in range(3)), octaves=octaves)
+NARROW, WIDE = (FieldsNet(STUDY, *(NetworkPlan(width, 2, 0.1) for _ in range(3)), octaves=octaves)
                 for width, octaves in ((4, 3), (6, 0)))
 NETS = {"small": NARROW, "jelly-waves": WIDE}
 FULL, REDUCED = 10.0, 4.0       # CPU seconds
 
 
-class Ready(reduced_runs.Tested):
-    """`Tested` with known errors: of few samples, of each draw others, and of all particles."""
+class Ready(reduced_runs.FittedStudy):
+    """`FittedStudy` with given errors: of few samples, of each draw others; of all particles."""
 
-    def errors(self, value, count, draw, faster, weighed):
+    def errors(self, value, count, draw, dt_factor, weighted):
         """Errors that tell their draw."""
-        assert (faster, weighed) == (1.0, False)
+        assert (dt_factor, weighted) == (1.0, False)
         error = 0.01 * (draw + 1) if count == STUDY.samples else 0.005
-        return reduced_runs.Found(PositionErrors(error, 0.02, 0.03), 0.2, float(count), count,
-                                  np.nan)
+        return reduced_runs.RunErrors(PositionErrors(error, 0.02, 0.03), 0.2, float(count), count,
+                                      np.nan)
 
 
 @pytest.fixture
@@ -60,7 +60,7 @@ def recorded(tmp_path, monkeypatch):
     monkeypatch.setattr(nsf_widths, "narrow", lambda: {"small": NARROW})
     monkeypatch.setattr(nsf_widths, "net_of", NETS.__getitem__)
     monkeypatch.setattr(nsf_widths, "trained", trained)
-    monkeypatch.setattr(nsf_widths, "tested_on", ready)
+    monkeypatch.setattr(nsf_widths, "fit_to_networks", ready)
     monkeypatch.setattr(nsf_widths, "full_cpu", lambda one: FULL)
     monkeypatch.setattr(nsf_widths, "reduced_cpu", lambda one, count, weighed, repeats: REDUCED)
     return recorded
