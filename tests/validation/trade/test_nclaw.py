@@ -60,7 +60,8 @@ def test_trainings_are_run_side_by_side(folder, monkeypatch):
 
 def test_a_training_that_stopped_is_told(monkeypatch):
     gone = SimpleNamespace(laws={}, about={"stopped": "epoch 4, step 3: no place"})
-    monkeypatch.setattr(small_runs, "load_available", lambda run, names, load: {"small-gap-400": gone})
+    monkeypatch.setattr(small_runs, "load_available",
+                        lambda run, names, load: {"small-gap-400": gone})
     notes = []
     records = Records()
     records.note = notes.append
