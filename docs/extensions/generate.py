@@ -156,7 +156,7 @@ def notes(rows):
 # --- tutorials
 
 def notebooks():
-    """{path: text} of the lessons."""
+    """{path: text} of the tutorials."""
     return {f"tutorials/{file.name}": file.read_text(encoding="utf-8")
             for file in sorted((ROOT / "notebooks").glob("*.ipynb"))}
 
