@@ -200,9 +200,9 @@ def test_stretched_bar_contracts(trip):
 
 def test_flip_keeps_what_the_grid_does_not_change():
     """Share 1 and no force: velocities stay as they are, checkerboards included; share 0 is PIC."""
-    case = Case("flip", 3, 2)
+    case = Case("flip", 3, 2, body_force=True)
     q = cloud(case, np.random.default_rng(3))
-    q.tau[:] = 0.0
+    q.tau[:], q.b[:] = 0.0, 0.0
     grid = scattered(case, q, DT)
     update(grid, np.zeros(2), DT)
     keeps, forgets = deep(q), deep(q)

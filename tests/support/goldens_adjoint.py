@@ -74,6 +74,19 @@ def agreement(state):
             "units": float(units)}
 
 
+def refusal_on_a_kink():
+    """Why sand at rest is not recorded, and the files that this leaves."""
+    problem = sand()
+    q = problem.bodies[0].particles
+    q.F[:], q.C[:], q.v[:] = np.eye(2), 0.0, (0.0, 1.0)
+    with TemporaryDirectory() as folder:
+        try:
+            oracle.record_adjoint(problem, Path(folder) / "golden.h5", 1)
+        except ValueError as error:
+            return str(error), [file.name for file in Path(folder).iterdir()]
+    return "", []
+
+
 def arrays_in(group):
     """The arrays of a golden step that come with an error, by their keys."""
     arrays = {}
