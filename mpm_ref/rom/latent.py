@@ -1,10 +1,11 @@
 """The reduced state, and the velocity of points that follows from it (X-cross-4).
 
-In LDM, rates vhat are fitted with dg/dxhat at the latent coordinates before they move. Which
-dg/dxhat turns them back into velocities is a choice; NSF keeps no rates:
+In LDM, rates vhat are fitted with dg/dxhat at the latent coordinates before the step. The
+velocities that they stand for depend on where dg/dxhat is evaluated, which is a choice; NSF has no
+rates:
 
-* "previous": dg/dxhat at the coordinates that the rates were fitted at. The velocity that the grid
-  gave is what the next step starts from, projected, no more.
+* "previous": dg/dxhat at the coordinates that the rates were fitted at. The next step
+  starts from the velocity of the grid, projected.
 * "latest": dg/dxhat at the coordinates reached, as LDM-alg3 and LDM-alg4 are printed. Over a step
   it adds dt g''(vhat, vhat) to the velocity, an acceleration that no force causes and that does not
   vanish with dt.

@@ -1,4 +1,4 @@
-"""A reduced model as a file: its field, its latent coordinates and how it was made.
+"""Files of reduced models: field, latent coordinates, and the record of how it was computed.
 
 The arrays of a file have the names of the records, with dots between them: "net.W",
 "tau.coefficients.w". The array "kind" names the field, one of KINDS. Arrays that single precision
@@ -28,7 +28,7 @@ SHOWN = 12          # values of a list that a sentence shows
 
 
 class Model(NamedTuple):
-    """A reduced model, and how it was made."""
+    """A reduced model, and the record of how it was computed."""
 
     field: object           # of one of KINDS
     xhat: np.ndarray        # (s, k + 1, r) latent coordinates of the training snapshots
@@ -181,7 +181,7 @@ def function_names(name):
 
 
 def part_names(name):
-    """Return the names of the arrays of a `Part`."""
+    """Return the names of the arrays of a `ModalField`."""
     return [f"{name}.modes", *function_names(f"{name}.coefficients")]
 
 
@@ -229,8 +229,8 @@ def fault_of_field(arrays, prefix):
 
 
 def fault_of_modes(arrays, prefix="", r=None):
-    """Return what is wrong with `Modes` and the r latent coordinates, those of all modes if None;
-    or None.
+    """Return what is wrong with `PodModes` and the r latent coordinates, those of all modes if
+    None; or None.
     """
     if fault := fault_of_axes(arrays, {f"{prefix}U": 3, "xhat": 3}):
         return fault
@@ -344,7 +344,7 @@ def latent_shapes(arrays, r):
 
 
 def function_shapes(arrays, name, inputs, outputs):
-    """Return {name: shape} of the arrays of a `Radial` with so many inputs and outputs."""
+    """Return {name: shape} of the arrays of a `Radial` with these numbers of inputs and outputs."""
     centers = arrays[f"{name}.centers"].shape[0]
     return {f"{name}.centers": (centers, inputs), f"{name}.unit": (inputs,),
             f"{name}.w": (centers, outputs), f"{name}.tail": (1 + inputs, outputs)}

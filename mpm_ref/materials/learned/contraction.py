@@ -6,25 +6,25 @@ V^T:
     e' = exp(-a) e,    theta' = exp(-b) theta where theta > 0, else theta
     a, b = softplus(network(x)),    x = log(1 + (|e|, max(theta, 0), max(-theta, 0))/strain)
 
-It is a function of F that turns with the body, is isotropic, and leaves rest alone. Yielding at a
-radius r is a = max(0, log(|e|/r)), and sand's at a share of -theta alike (NCLAW-eq19, NCLAW-eq16):
-in these numbers both surfaces are straight lines.
+It is objective and isotropic, and does not change F at rest. Yielding at a radius r is a = max(0,
+log(|e|/r)), and that of sand at a multiple of -theta has the same form (NCLAW-eq19, NCLAW-eq16): in
+these variables both yield surfaces are straight lines.
 
-Why it dissipates, with any energy that grows with q, r, u and w (`energetic`). The strain goes
-first from (e, theta) to (e', theta), then to (e', theta'). On the first way, where e shrinks by a
-factor h,
+It dissipates with any energy that grows with q, r, u and w (`energetic`). Take the strain first
+from (e, theta) to (e', theta), then to (e', theta'). On the first path, where e shrinks by a factor
+h,
 
     q = exp(2 theta/3) sum_i exp(2 h e_i) + .., and r with -e_i, are convex in h and flat at h = 0
 
-as sum_i e_i = 0: they fall as h does, and u and w stay. On the second way theta > 0 falls; with
-A = sum_i exp(2 e_i)/3 >= 1, dq/dtheta = 2 A exp(2 theta/3) - 2 > 0, of r alike, and (J - 1)^2 and
-J - 1 - log J grow with J > 1. So psi falls on both, and with the rate of plastic deformation l_p =
--d(eps)/dt in principal axes
+as sum_i e_i = 0: they decrease with h, and u and w do not change. On the second path theta > 0
+decreases; with A = sum_i exp(2 e_i)/3 >= 1, dq/dtheta = 2 A exp(2 theta/3) - 2 > 0, dr/dtheta > 0
+similarly, and (J - 1)^2 and J - 1 - log J grow with J > 1. So psi decreases on both, and with the
+rate of plastic deformation l_p = -d(eps)/dt in principal axes
 
     tau : l_p = -dpsi/dt >= 0,    psi(trial) - psi(returned) = integral of tau : l_p >= 0
 
-point by point and step by step, whatever the networks are. Compressed matter keeps its volume: at
-theta < 0 and e != 0 a way to theta = 0 may first go uphill.
+at every point in every step, for any networks. Compressed matter keeps its volume: from theta < 0
+and e != 0, psi may first increase on a path to theta = 0.
 """
 
 from math import exp, log1p

@@ -6,8 +6,8 @@
 
     T_q = 2 (b - I),  T_r = 2 (tr(b) b - b^2) - 4 I,  T_u = 2 J (J - 1) I,  T_w = (J - 1) I
 
-with J = det F, b = F F^T and N_k the slopes of N. Whatever N is, tau is symmetric, turns with the
-body, is isotropic, and vanishes at rest with psi: there is no value and no slope left to take away.
+with J = det F, b = F F^T and N_k the slopes of N. For any N, tau is symmetric, objective and
+isotropic, and vanishes at rest together with psi: no value or slope at rest must be subtracted.
 
 N is a network whose weights are all positive, with softplus between its layers: it is convex and
 grows with each measure. The measures are convex functions of (F, cof F, J), so that psi is
@@ -18,8 +18,8 @@ its layers, in doubles:
 
     a_{l+1} = softplus(a_l W_l + b_l),   N = a_{L-1} W_{L-1},   g_l = (g_{l+1} softplus'(z_l)) W_l^T
 
-That is more than thermodynamics asks for. Laws that are softer in strong compression than any
-polyconvex one, as fixed corotated (NCLAW-eq12), are out of its reach there.
+That is more than thermodynamics requires. Laws that are softer in strong compression than any
+polyconvex one, such as fixed corotated (NCLAW-eq12), cannot be represented there.
 """
 
 from math import exp, inf, log

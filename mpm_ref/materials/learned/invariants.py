@@ -6,12 +6,12 @@ NCLAW-input-norm)
     a = (s - 1, F^T F - I, det F - 1),    d + d^2 + 1 numbers, 13 in 3D
 
 which do not change with rotations R* F (NCLAW-eq22 to NCLAW-eq30) and which vanish at F = I. Its
-answer is turned by R = U V^T. Pulled back, a gradient a' of a, and R' of R, is
+output is rotated by R = U V^T. Pulled back, a gradient a' of a, and R' of R, is
 
     F' = U (diag(s') + X) V^T + F (C' + C'^T) + J' cof F,    X_ij = (M_ij - M_ji)/(s_i + s_j)
 
-with M = U^T R' V (`spectral.d_rotation` is its own transpose): U and V alone are never read, so
-that repeated singular values need no care. There s' counts the values as they are sorted.
+with M = U^T R' V (`spectral.d_rotation` is its own transpose): U and V do not occur alone, so
+that repeated singular values need no special treatment. s' is in the order of the sorted values.
 """
 
 from typing import NamedTuple

@@ -1,19 +1,19 @@
-"""Reduced fields: all that a reduced step asks of points, from r latent coordinates xhat.
+"""Reduced fields: positions and stresses of points as functions of r latent coordinates xhat.
 
 Any object with the members of `DeformationMap` is a map of positions g(X; xhat) (LDM-eq14); one
-with those of `ReducedField` also has a stress, and is what `step` advances. Where plasticity or a
-tear leaves F behind, stress and affine field are fields of their own (NSF):
+with those of `ReducedField` also has a stress, and is what `step` advances. Where plasticity or
+fracture makes F meaningless, stress and affine field are separate fields (NSF):
 
     network              perceptrons: LDM's map, and NSF's three fields
-    pod                  POD modes as a map: linear, and the honest baseline
+    pod                  POD modes as a map: linear, the baseline of nonlinear ones
     pod_fields           NSF's three fields as sums of POD modes
-    polynomial_manifold  a map with coordinates that follow from others
+    polynomial_manifold  a map on POD modes of which some are polynomials of the others
     elastic              the stress of a map's own F, on any of the maps above
     affine               all affine deformations, exactly
     joint_latent         latent coordinates of position and stress together
 
-How a field names its points is its own: a map that is continuous in space takes positions at rest,
-X (n, d) [m]; a field that is known at its data's points alone takes their numbers (n,).
+Points are given as the field needs them: a map that is continuous in space takes positions at rest,
+X (n, d) [m]; a field with values at the points of its data alone takes their numbers (n,).
 """
 
 from typing import Protocol, runtime_checkable
@@ -34,7 +34,7 @@ class DeformationMap(Protocol):
         """Return x (n, d) [m] at latent coordinates xhat (r,)."""
 
     def derivatives(self, points, xhat):
-        """Return x (n, d), F = dg/dX (n, d, d) or None where it is not known, and dg/dxhat
+        """Return x (n, d), F = dg/dX (n, d, d) or None where there is none, and dg/dxhat
         (n, d, r).
         """
 

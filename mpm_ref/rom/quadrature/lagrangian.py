@@ -1,9 +1,10 @@
-"""Lagrangian quadrature: the samples' own neighbours carry mass, momentum and stress (LDM-alg3,
-LDM-sec3.2.1-sets). Neighbours are other material points, or (`Resampled`) points of another
-sampling of the body, as coarse as the quadrature allows: then a step's cost does not grow with the
-number of material points, and no map needs to be inverted. `Neighbours` are found once, for all
-times and parameters (LDMW-sets). `NumberedPoints` are those of fields that know no other points
-(NSF-sec5.4).
+"""Lagrangian quadrature: neighbours of the samples carry mass, momentum and stress (LDM-alg3,
+LDM-sec3.2.1-sets).
+
+Neighbours are other material points, or (`Resampled`) points of another sampling of the body, as
+coarse as the quadrature allows: then the cost of a step does not grow with the number of material
+points, and no map is inverted. `Neighbours` are determined once, for all times and parameters
+(LDMW-sets). `NumberedPoints` are for fields with values at numbered points alone (NSF-sec5.4).
 """
 
 from typing import NamedTuple
@@ -54,8 +55,8 @@ def lagrangian(X, m, V0, dx, degree):
 
 
 def cloud_of(body, chosen, g, xhat, samples):
-    """Return the `Cloud` of the chosen ones, sorted, of points with X, m and V0, of which some are
-    the samples, sorted.
+    """Return the `Cloud` of chosen points of a body with X, m and V0; some of them are samples.
+    Both lists of numbers are sorted.
     """
     at = evaluate(g, body.X[chosen], xhat)
     return Cloud(at, body.m[chosen], body.V0[chosen], at.select(np.searchsorted(chosen, samples)),
@@ -91,10 +92,10 @@ class Resampled(NamedTuple):
 
 
 class Neighbours(NamedTuple):
-    """Lagrangian quadrature on a set of material points that does not change.
+    """Lagrangian quadrature on a fixed set of material points.
 
-    It equals that of `lagrangian`, to the last bit, as long as no other point comes to share a node
-    with a sample. It does not notice when one does, and then the sample's nodes lack its mass.
+    It equals that of `lagrangian`, to the last bit, unless another point comes to share a node with
+    a sample. This is not detected, and then the sample's nodes lack the point's mass.
     """
 
     X: np.ndarray           # (n, d) of all material points, at rest [m]
@@ -135,7 +136,9 @@ def neighbours(lagrangian, g, latents, samples):
 
 
 class NumberedPoints(NamedTuple):
-    """Lagrangian quadrature of a field that knows its points by number, and finds those nearby."""
+    """Lagrangian quadrature of a field with numbered points, which can search those near a
+    place.
+    """
 
     m: np.ndarray           # (n,) mass [kg]
     V0: np.ndarray          # (n,) volume at rest [m^d]

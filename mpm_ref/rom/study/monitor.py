@@ -1,16 +1,16 @@
-"""The monitor of a reduced run tells when the run has left the data of its model, and when no body
-is left.
+"""Monitor of a reduced run: has the run left the training data of its model, and is there still a
+body?
 
-Nothing in a reduced step fails where the model has learned nothing: the run goes on, smooth and
-wrong. It shows, in each state, at a few points and in the report of the step:
+No reduced step fails where the model extrapolates: the run continues, smooth and wrong. The monitor
+detects it in each state, at a few points and in the report of the step:
 
-    beyond      how far the latent coordinates are from the trained ones (`rom.extrapolation`)
-    off         how far the step took the samples off the map's states, in cells: forces that the
-                map cannot follow, and time steps that are too long. At the start, how far the body
-                is from where it should be: a map of another body
-    coverage    share of each motion of the body that the samples showed in the last steps: too few
-                samples, or all in one place
-    blind       latent coordinates that moved no sample, or not otherwise than others
+    beyond      distance of the latent coordinates from the trained ones (`rom.extrapolation`)
+    off         distance of the samples from the map's states after the step, in cells: due to
+                forces that the map cannot follow, and to long time steps. At the start, distance
+                of the body from its place at rest: due to a map of another body
+    coverage    share of each motion of the body in the motion of the samples of the last steps:
+                low for too few samples, or samples in one place
+    blind       number of latent coordinates that the samples do not determine
     lost        quadrature points that could not be traced back into the body
     inverted    points with det F <= 0
 

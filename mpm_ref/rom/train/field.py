@@ -1,4 +1,4 @@
-"""Training of a field on latent coordinates that are known and stay (NSF-sec4.5, stages 2 and 3).
+"""Training of a field on given, fixed latent coordinates (NSF-sec4.5, stages 2 and 3).
 
     min_f mean over snapshots, points and values of ( f(X_p, xhat_n, mu) - y_np )^2
 
