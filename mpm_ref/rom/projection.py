@@ -182,8 +182,8 @@ def least_squares(A, b):
     with one_thread():
         Q, R = np.linalg.qr(A)
         U, s, Vt = np.linalg.svd(R, full_matrices=False)
-    kept = s > RANK * s[0]
-    return Vt[kept].T @ ((U[:, kept].T @ (Q.T @ b)) / s[kept]), int(kept.sum())
+    sound = s > RANK * s[0]
+    return Vt[sound].T @ ((U[:, sound].T @ (Q.T @ b)) / s[sound]), int(sound.sum())
 
 
 def rms(a, n):

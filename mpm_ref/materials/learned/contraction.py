@@ -142,8 +142,8 @@ def left(s, a, b):
     """Return the singular values after the return."""
     eps = log_strain(s)
     theta = total_of(eps)
-    kept = exp(-b) * theta if theta > 0.0 else theta
-    return stretches(lin(exp(-a), deviator(eps), kept / len(s), fill(1.0, s)))
+    theta_new = exp(-b) * theta if theta > 0.0 else theta
+    return stretches(lin(exp(-a), deviator(eps), theta_new / len(s), fill(1.0, s)))
 
 
 @kernel
@@ -152,10 +152,10 @@ def left_bars(s, s_new, s_new_bar, a, b):
     eps = log_strain(s)
     theta, bar = total_of(eps), mul(s_new, s_new_bar)
     opened, mean, share = theta > 0.0, total_of(bar) / len(s), exp(-a)
-    kept = exp(-b) if opened else 1.0
+    rest = exp(-b) if opened else 1.0
     a_bar = -share * dot(bar, deviator(eps))
-    b_bar = -kept * theta * mean if opened else 0.0
-    s_bar = mul(lin(share, deviator(bar), kept * mean, fill(1.0, s)), inverse(s))
+    b_bar = -rest * theta * mean if opened else 0.0
+    s_bar = mul(lin(share, deviator(bar), rest * mean, fill(1.0, s)), inverse(s))
     return s_bar, a_bar, b_bar
 
 

@@ -88,7 +88,7 @@ FLOW_CLASSES = {response.Correction: NeuralCorrection,
 
 
 def dim_of_inputs(inputs):
-    """Return the number of space dimensions of a law that reads so many numbers."""
+    """Return the number of space dimensions of a law with this number of inputs."""
     return {inputs_of(d): d for d in (2, 3) for inputs_of in (count, squared)}[int(inputs)]
 
 

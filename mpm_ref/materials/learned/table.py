@@ -1,4 +1,4 @@
-"""The learned laws and flows, by the kind that is stored beside their weights.
+"""Table of the learned laws and flows, by the kind that is stored with their weights.
 
 A file of weights may also hold constants that were identified: records of `materials`, which have
 no layers and are the law themselves.

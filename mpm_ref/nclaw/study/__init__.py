@@ -1,1 +1,1 @@
-"""Laws learned from scenes: studies and their trainings; learned laws beside the true ones."""
+"""Laws learned from scenes: studies, their trainings, and comparisons with the true laws."""

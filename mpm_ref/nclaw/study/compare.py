@@ -1,9 +1,9 @@
-"""A run of a scene by other laws beside the run by its own (NCLAW-eval).
+"""Comparison of a run of a scene by other laws with the run by its own laws (NCLAW-eval).
 
-A frame's error is the mean over points and axes of (x - x_true)^2; a run's that over its frames,
-the first one, which is zero, included. Runs go side by side, none is kept.
+The error of a frame is the mean over points and axes of (x - x_true)^2, that of a run the mean over
+its frames, the first included, which is zero. Both runs advance together; neither is stored.
 
-A run breaks down where a coordinate of a point is not a number any more.
+A run breaks down where a coordinate of a point is not finite.
 """
 
 import csv
@@ -25,7 +25,7 @@ FEW = 5000      # particles, up to which a second thread would wait more than it
 
 
 class RunBroken(ValueError):
-    """A run does not go on: attributes step and why."""
+    """A run that cannot go on, with the attributes step and why."""
 
     def __init__(self, step, why):
         self.step, self.why = step, why
@@ -41,7 +41,7 @@ class ComparedError(NamedTuple):
 
 
 class ComparedRun:
-    """A run beside the true one, and the sum of the errors of its frames."""
+    """A run that is compared with the true one, and the sum of the errors of its frames."""
 
     def __init__(self, frames, corner):
         self.frames, self.corner = frames, corner
@@ -121,7 +121,8 @@ def body_positions(bodies):
 
 def problem_of(scene, source, steps=None):
     """Return the `Problem` of a scene that `positions` runs: explicit steps of fixed length, of one
-    material; so many, if given. Frames are those of the scene, else all steps. Raises SceneError.
+    material. steps: length of the run (default: the scene's). Frames are those of the scene, or
+    every step if it names none. Raises SceneError.
     """
     if scene.integrator != "explicit" or scene.dt is None:
         raise SceneError(f'{source}: expected the integrator "explicit" and a fixed `dt`, so that '

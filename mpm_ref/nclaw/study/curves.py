@@ -1,5 +1,5 @@
-"""Stress-strain curves of learned laws beside the true ones, along one-element paths: computed,
-written as CSV, and drawn. Matplotlib is imported when a picture is made.
+"""Stress-strain curves of learned and true laws along one-element paths: computed, written as CSV,
+and drawn. Matplotlib is imported when a picture is drawn.
 """
 
 from itertools import groupby
@@ -27,19 +27,19 @@ class Curve(NamedTuple):
     dt: float               # [s] of a step
     truth: np.ndarray       # (k + 1,) [Pa]
     learned: np.ndarray     # (k + 1,) [Pa]; NaN where the law broke down
-    in_range: np.ndarray | None     # (k + 1,) whether training met such strains; None: not known
+    in_range: np.ndarray | None     # (k + 1,) whether strains are in range of training, or None
 
     @property
     def error(self):
-        """The largest difference, of the largest true stress; NaN without true stress, or where the
-        learned law broke down.
+        """The largest difference over the largest true stress; NaN without true stress, or where
+        the learned law broke down.
         """
         largest = np.abs(self.truth).max()
         return float(np.abs(self.learned - self.truth).max() / largest) if largest > 0.0 else nan
 
     @property
     def range_exit(self):
-        """The first strain of the path that training did not meet, or None."""
+        """The first strain of the path out of the range of training, or None."""
         outside = () if self.in_range is None else np.flatnonzero(~self.in_range)
         return float(self.path.strain[outside[0]]) if len(outside) else None
 
@@ -52,18 +52,18 @@ class Curve(NamedTuple):
 
 def compare_curves(truth, learned, paths, dt, bounds=None):
     """Return [`Curve`] of paths. truth, learned: (law, flow) each; dt [s] of a step; bounds:
-    strains that training has seen (see `learned.strain_range`), if known.
+    strains that training (see `learned.strain_range`), if known.
     """
     curves = []
     for path in paths:
-        true, own = (path_response(*of, path, dt) for of in (truth, learned))
-        inside = None if bounds is None else within_bounds(own.F, bounds)
-        curves.append(Curve(path, dt, path_stress(path, true), path_stress(path, own), inside))
+        true, ours = (path_response(*laws, path, dt) for laws in (truth, learned))
+        inside = None if bounds is None else within_bounds(ours.F, bounds)
+        curves.append(Curve(path, dt, path_stress(path, true), path_stress(path, ours), inside))
     return curves
 
 
 def paths_for(flows, d, strain, steps):
-    """Return paths to strains of this size: from rest, and where there is a flow also cycles."""
+    """Return the paths to strains of this size: monotone ones, and cycles if there is a flow."""
     flowing = any(not isinstance(flow, NoFlow) for flow in flows)
     return monotone(d, strain, steps) + (cycles(d, strain, steps) if flowing else [])
 
@@ -112,7 +112,7 @@ def draw_curve(axes, curve):
 
 
 def add_legend(figure, curves):
-    """Say below the panels what lines are."""
+    """Add a legend below the panels."""
     from matplotlib.lines import Line2D
 
     known = curves[0].in_range is not None

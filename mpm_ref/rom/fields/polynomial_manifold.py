@@ -3,7 +3,7 @@
     x = X + sum_k a_k U_k(X),    a = (xhat, C m(xhat)),    m all monomials of degree 2 .. p
 
 C is the least-squares fit of the snapshots' further coordinates: no training but one linear solve,
-no more latent coordinates than the modes kept, and the modes' own gradients. Quadratic ones are
+fewer latent coordinates than modes, and the gradients of the modes. Quadratic ones are
 those of J. Barnett and C. Farhat, "Quadratic approximation manifold for mitigating the Kolmogorov
 barrier in nonlinear projection-based model order reduction", J. Comput. Phys. 464 (2022) 111348.
 """
