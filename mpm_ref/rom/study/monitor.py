@@ -1,8 +1,8 @@
-"""Monitor of a reduced run: has the run left the training data of its model, and is there still a
-body?
+"""Monitor of a reduced run: it detects that the run has left the training data of its model, or
+that no body is left.
 
-No reduced step fails where the model extrapolates: the run continues, smooth and wrong. The monitor
-detects it in each state, at a few points and in the report of the step:
+No reduced step fails where the model extrapolates: the run continues, smooth and wrong. This shows
+in each state, at a few points and in the report of the step:
 
     beyond      distance of the latent coordinates from the trained ones (`rom.extrapolation`)
     off         distance of the samples from the map's states after the step, in cells: due to
