@@ -1,4 +1,4 @@
-"""The command line `mpm-ref`: one module for each group of commands."""
+"""Define the command line `mpm-ref`, with one module for each group of commands."""
 
 from typing import Annotated
 
@@ -8,8 +8,8 @@ from .. import __version__
 from . import info, law, oracle, rom, run, view
 
 app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False, add_completion=False,
-                  help="The material point method, explicit and implicit: run scenes and look at "
-                       "the results.")
+                  help="Run scenes with the material point method, explicit or implicit, and "
+                       "show the results.")
 for name, command in (("run", run.run), ("info", info.describe), ("plot", view.plot),
                       ("animate", view.animate), ("export", view.export),
                       ("scenes", view.scenes)):
@@ -23,7 +23,7 @@ app.add_typer(law.app, name="law")
 def version(
     show: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
 ):
-    """Print the version, where no command is given."""
+    """Run the command, or print the version."""
     if show:
         print(f"mpm-ref {__version__}")
         raise typer.Exit

@@ -1,4 +1,4 @@
-"""The scenes and studies that come with the package, by their bare names."""
+"""Find the bundled scenes and studies by their names."""
 
 from pathlib import Path
 
@@ -9,17 +9,17 @@ SCENES = (".toml", ".json")      # suffixes of their files
 PACKAGE = Path(__file__).resolve().parents[1]
 
 
-def shipped_scenes():
-    """{name: path} of the scenes that come with the package; none if they were not installed."""
-    return _shipped("scenes")
+def bundled_scenes():
+    """Return {name: path} of the bundled scenes, empty if they are not installed."""
+    return _bundled("scenes")
 
 
-def shipped_studies():
-    """{name: path} of the studies that come with the package, likewise."""
-    return _shipped("studies")
+def bundled_studies():
+    """Return {name: path} of the bundled studies, empty if they are not installed."""
+    return _bundled("studies")
 
 
-def _shipped(folder):
+def _bundled(folder):
     places = [PACKAGE / folder]
     if (PACKAGE.parent / "pyproject.toml").exists():          # run from a clone
         places.append(PACKAGE.parent / folder)
@@ -27,14 +27,14 @@ def _shipped(folder):
 
 
 def find_scene(name):
-    """Path of a scene given by its file, or the bare name of a shipped one. Raises SceneError."""
+    """Return the path of a scene, given by its file or a bundled name. Raises SceneError."""
     file = Path(name)
     if file.suffix.lower() in (".h5", ".hdf5"):
         raise SceneError(f"{name}: {_wrong_with(file)}; expected a scene (a TOML file or a shipped "
                          "name), or for `mpm-ref info` what `mpm-ref run` wrote")
     if file.is_file():
         return file
-    scenes = shipped_scenes()
+    scenes = bundled_scenes()
     if name in scenes:
         return scenes[name]
     if file.is_dir():
@@ -46,10 +46,10 @@ def find_scene(name):
 
 
 def find_study(name):
-    """Path of a study given by its file, or the bare name of a shipped one. Raises SceneError."""
+    """Return the path of a study, given by its file or a bundled name. Raises SceneError."""
     if Path(name).is_file():
         return Path(name)
-    studies = shipped_studies()
+    studies = bundled_studies()
     if name not in studies:
         raise SceneError(f"{name}: there is no such file, nor a shipped study of that name; "
                          f"shipped studies: {', '.join(studies) or 'not installed'}")
@@ -57,17 +57,13 @@ def find_study(name):
 
 
 def study_named(name):
-    """The path of a file; else of a shipped study of that name, which no scene has; else the name
-    as a path.
-    """
+    """Return the path of a file or of a bundled study; a bundled scene of that name goes first."""
     path = Path(name)
-    return path if path.is_file() or name in shipped_scenes() else shipped_studies().get(name, path)
+    return path if path.is_file() or name in bundled_scenes() else bundled_studies().get(name, path)
 
 
 def keep_scene(path, out):
-    """Raise ValueError if the file to write, whatever its name, is the scene at `path` itself, or
-    is named as scenes are.
-    """
+    """Raise ValueError if the file to write is the scene at `path`, or is named like a scene."""
     if Path(out).exists() and path.samefile(out):
         raise ValueError(f"--out {out}: this is the scene itself; name another file")
     if Path(out).suffix.lower() in SCENES:
@@ -85,7 +81,7 @@ def _wrong_with(file):
 
 
 def is_hdf5(name):
-    """Whether a name is that of a file that begins as HDF5 files do."""
+    """Return whether a name is that of a file with the signature of HDF5."""
     if not Path(name).is_file():
         return False
     with open(name, "rb") as file:

@@ -1,4 +1,4 @@
-"""How faults end a command: one line on the error channel and an exit status, no traceback."""
+"""End a command on an error with one line on stderr and an exit status, without traceback."""
 
 import sys
 from contextlib import contextmanager
@@ -21,9 +21,7 @@ FAULTS = (SceneError, TooLarge, OutOfRange, Refused, BadCheckpoint, BadResults, 
 
 @contextmanager
 def one_line():
-    """Faults of the input, of files, and Ctrl-C where nothing waits for it; any other keeps its
-    traceback: it is a bug.
-    """
+    """End the command on bad input, file errors and Ctrl-C; others keep their traceback as bugs."""
     try:
         yield
     except FAULTS as fault:
@@ -36,7 +34,7 @@ def one_line():
 
 @contextmanager
 def options():
-    """While options are checked, any ValueError is a fault of the input."""
+    """End the command on any ValueError, as bad input, while options are checked."""
     try:
         yield
     except ValueError as fault:
@@ -45,7 +43,7 @@ def options():
 
 @contextmanager
 def writing():
-    """Errors of the system, of parts that know no `NotWritten`, are that."""
+    """Turn an OSError in this context into `NotWritten`."""
     try:
         yield
     except OSError as fault:
@@ -54,7 +52,7 @@ def writing():
 
 @contextmanager
 def at_start(name):
-    """Faults of a scene's first state begin with its name, as those of its text do."""
+    """End the command if the first state of a scene is faulty; the message begins with its name."""
     try:
         yield
     except (OutOfRange, TooLarge) as fault:
@@ -64,6 +62,6 @@ def at_start(name):
 
 
 def end(message, status):
-    """Say a sentence on the error channel and end the command."""
+    """Print a sentence on stderr and end the command with an exit status."""
     print(f"mpm-ref: {' '.join(str(message).split())}", file=sys.stderr)
     raise typer.Exit(status)

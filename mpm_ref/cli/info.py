@@ -1,6 +1,6 @@
-"""`mpm-ref info`: describe results, a checkpoint, a scene, a study, a model or learned laws.
+"""Implement `mpm-ref info`, which describes results, checkpoints, scenes, studies and models.
 
-Each kind of file gives facts, a dict for machines, and lines, which say the same to people.
+Each kind of file has facts, a dict for programs, and lines, the same content as text.
 """
 
 from math import isfinite, isnan
@@ -64,7 +64,7 @@ def of_problem(problem, state=None):
 
 
 def solver_of(stepper):
-    """Method and tolerances of an implicit stepper, else None."""
+    """Return method and tolerances of an implicit stepper, None for an explicit one."""
     if not stepper.implicit:
         return None
     options = stepper.options
@@ -73,7 +73,7 @@ def solver_of(stepper):
 
 
 def of_results(path):
-    """Frames, times, energies, bodies, manifest and checkpoint of a results file."""
+    """Return frames, times, energies, bodies, manifest and checkpoint of a results file."""
     with Results(path) as results:
         n = len(results)
         return {
@@ -95,7 +95,7 @@ def of_results(path):
 
 
 def unsolved(n):
-    """The warnings about n implicit steps of a run that were not solved: one, or none."""
+    """Return the warning that n implicit steps did not converge, as a list of one or none."""
     if n == 0:
         return []
     return [f"{counted(n, 'implicit step')} of the run did not meet the solver's tolerance, which "
@@ -104,7 +104,7 @@ def unsolved(n):
 
 
 def problem_lines(facts):
-    """Facts of a problem in words."""
+    """Return facts of a problem as lines of text."""
     bodies = ", ".join(f"{name} {count}" for name, count in facts["bodies"].items())
     length = counted(facts["steps"], "step") if facts["steps"] else f"until t = {facts['end']:g} s"
     memory = size_text(facts["particle_bytes"]), size_text(facts["grid_bytes"])
@@ -117,7 +117,7 @@ def problem_lines(facts):
 
 
 def method(facts):
-    """The wave speed of an explicit run, the solver of an implicit one."""
+    """Return the wave speed of an explicit run, or the solver of an implicit one, as text."""
     if facts["wave_speed"] is not None:
         return f"wave speed {facts['wave_speed']:.4g} m/s"
     solver = facts["solver"]
@@ -127,7 +127,7 @@ def method(facts):
 
 
 def step_line(facts):
-    """How dt is chosen, and its bound with those terms that bound it."""
+    """Return the choice of dt, and its bound with the finite terms, as text."""
     bound = TimeStep(**facts["bounds"])
     finite = ", ".join(f"{name.replace('_', ' ')} {term:.3g} s"
                        for name, term in bound._asdict().items() if isfinite(term))
@@ -140,7 +140,7 @@ def step_line(facts):
 
 
 def results_lines(facts):
-    """Facts of a results file in words."""
+    """Return facts of a results file as lines of text."""
     bodies = ", ".join(f"{name} {count} ({' '.join(facts['fields'][name])})"
                        for name, count in facts["bodies"].items())
     lines = [f"{facts['title'] or 'untitled'}: {facts['dim']}D, dx = {facts['dx']:g} m, "
@@ -160,12 +160,12 @@ def results_lines(facts):
 
 
 def energy_in_words(name, value):
-    """An energy [J]; one that is NaN, as that of laws without energy, is not known."""
+    """Return an energy [J] as text; NaN, for laws without energy, is unknown."""
     return f"{name} unknown" if isnan(value) else f"{name} {value:.6g} J"
 
 
 def part_line(part):
-    """A part of a run in words; of one that has not ended, its beginning."""
+    """Return a part of a run as text."""
     if "last_step" not in part:
         return f"part: from step {part['first_step']} on, began {part['began']}: {part['why']}"
     return (f"part: steps {part['first_step']} to {part['last_step']}, {part['wall_s']} s, "
@@ -175,9 +175,9 @@ def part_line(part):
 
 def describe(
     name: Annotated[str, typer.Argument(metavar="FILE|SCENE|STUDY")],
-    json: Annotated[bool, typer.Option("--json", help="Answer with JSON.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ):
-    """Say what results, a checkpoint, a scene, a study, a map or learned laws hold."""
+    """Describe a results file, checkpoint, scene, study, reduced model or learned law."""
     with one_line():
         facts, lines = _facts(name)
         warn(facts.get("warnings", []))
@@ -206,11 +206,11 @@ def _facts_of_npz_or_text(name):
             facts = rom_info.of_study(name)
             return facts, rom_info.study_lines(facts)
         if law_info.is_law_study(study):
-            facts = law_info.of_law_study(study)
+            facts = law_info.law_study_facts(study)
             return facts, law_info.law_study_lines(facts)
-        layers = law_info.in_text(Path(name))
+        layers = law_info.read_json_layers(Path(name))
         if layers is not None:
-            facts = law_info.of_layers(name, layers)
+            facts = law_info.layers_facts(name, layers)
             return facts, law_info.laws_lines(facts)
     return _facts_of_scene(find_scene(name))
 
@@ -225,7 +225,7 @@ SHOWN = 4           # names of arrays that a sentence shows
 
 
 def is_npz(name):
-    """Whether a name is that of a file that begins as npz files do."""
+    """Return whether a name is that of a file with the signature of npz files."""
     if not Path(name).is_file():
         return False
     with open(name, "rb") as file:
@@ -243,11 +243,11 @@ def of_npz(name):
         facts = rom_info.of_map(path)
         return facts, rom_info.map_lines(facts)
     if law_info.is_graph_network(arrays):
-        facts = law_info.of_graph_network(path)
+        facts = law_info.graph_network_facts(path)
         return facts, law_info.graph_network_lines(facts)
     if law_info.has_laws(arrays):
-        facts = law_info.of_layers(path, arrays) if law_info.is_exported(arrays) else (
-            law_info.of_laws(path))
+        facts = law_info.layers_facts(path, arrays) if law_info.is_exported(arrays) else (
+            law_info.laws_facts(path))
         return facts, law_info.laws_lines(facts)
     if epochs := law_info.epochs_of(arrays):
         raise ValueError(f"{path} holds the laws of several epochs, {', '.join(epochs)}, of a "

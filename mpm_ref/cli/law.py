@@ -1,8 +1,7 @@
-"""`mpm-ref law train | evaluate | export | plot`: laws learned from the motion of a scene (see
-`laws`).
+"""Implement `mpm-ref law train | evaluate | export | plot`: laws learned from motion.
 
-A study file names the scene, the method and its recipe; docs/reference/studies.md explains it.
-`law_train` has the command `train`.
+A study file names the scene, the method and its recipe (docs/reference/studies.md). `law_train` has
+the command `train`.
 """
 
 import sys
@@ -28,17 +27,17 @@ from .options import (
     Overwrite,
     SceneName,
     WeightsFile,
-    fitting,
-    not_true,
+    learned_law_warnings,
+    load_matching,
     on_interrupt,
-    other_steps,
     require_ending,
     require_free,
+    step_length_warnings,
 )
 from .terminal import as_json, passing, warn
 
-app = typer.Typer(no_args_is_help=True, help="Laws learned from the motion of a scene: train them, "
-                  "put them beside the true ones, hand them to other programs.")
+app = typer.Typer(no_args_is_help=True, help="Train laws on the motion of a scene, compare them "
+                  "with the true ones, and export them to other programs.")
 app.command()(law_train.train)
 
 
@@ -47,14 +46,14 @@ def evaluate(
     file: WeightsFile,
     name: SceneName,
     steps: Annotated[int | None, typer.Option(
-        help="Of both runs, default: as the scene says.", min=1)] = None,
+        help="Number of steps of both runs (default: as in the scene).", min=1)] = None,
     out: Annotated[Path | None, typer.Option(
         "--out", "-o", help="FILE.csv for the error of each frame.")] = None,
     json: Json = False,
 ):
-    """Run a scene with its own laws and with learned ones, side by side: how far do they part?
+    """Run a scene with its true laws and with learned ones, and report the difference.
 
-    The error is the mean of (x - x_true)^2 over points, axes and frames. Exit status: 0 done,
+    The error is the mean of (x - x_true)^2 over points, axes and frames. Exit status: 0 success,
     2 bad input, 3 a run broke down, 4 a file could not be written, 130 Ctrl-C.
     """
     with one_line():
@@ -62,8 +61,8 @@ def evaluate(
             if out is not None:
                 require_ending(out, NUMBERS)
                 require_place(out)
-            laws, problem = fitting(file, name, steps)
-            warn([*other_steps(laws, problem), *not_true(problem)])
+            laws, problem = load_matching(file, name, steps)
+            warn([*step_length_warnings(laws, problem), *learned_law_warnings(problem)])
             errors, found = compared(problem, laws, name)
         facts = facts_of(errors, found, problem)
         if out is not None:
@@ -76,7 +75,7 @@ def evaluate(
 
 
 def compared(problem, laws, name):
-    """(error of each frame [m^2], `Found`) of both runs, with a bar of frames."""
+    """Return the error of each frame [m^2] and the `Found` of both runs, with a progress bar."""
     errors, found, total = [], None, 1 + problem.clock.steps // problem.clock.every
     watched = ComparisonWatch(laws, problem)
     try:
@@ -94,19 +93,19 @@ def compared(problem, laws, name):
     return errors, found
 
 
-def facts_of(errors, found, problem):
-    """What came of a comparison, as plain values; errors in m^2."""
+def facts_of(errors, outcome, problem):
+    """Return the result of a comparison as plain values; errors in m^2."""
     sound = [error for error in errors if error < inf]
     worst = max(range(len(sound)), key=sound.__getitem__)
     return {"title": problem.title, "particles": sum(len(body.id) for body in problem.bodies),
-            "steps": problem.clock.steps, "frames": len(errors), "error": found.error,
+            "steps": problem.clock.steps, "frames": len(errors), "error": outcome.error,
             "sound": {"frames": len(sound), "error": sum(sound) / len(sound), "last": sound[-1]},
             "largest": {"frame": worst, "error": sound[worst]},
-            "broken": None if found.step < 0 else {"step": found.step, "why": found.why}}
+            "broken": None if outcome.step < 0 else {"step": outcome.step, "why": outcome.why}}
 
 
 def lines(facts, problem):
-    """The same in words."""
+    """Return the result of a comparison as lines of text."""
     clock, sound, broken = problem.clock, facts["sound"], facts["broken"]
     yield (f"{facts['title']}: {facts['particles']} particles, {counted(facts['steps'], 'step')} "
            f"of {clock.dt:g} s, {counted(facts['frames'], 'frame')}")
@@ -130,10 +129,10 @@ def export(
         "--out", "-o", help="FILE.npz or FILE.json, default: WEIGHTS.layers.npz.")] = None,
     overwrite: Overwrite = False,
 ):
-    """Write layers as plain arrays, with words on their use, and answers to test another program.
+    """Export the layers of learned laws as plain arrays, with test data for another program.
 
-    docs/reference/studies.md lists the names. Exit status: 0 done, 2 bad input, 4 a file could not
-    be written.
+    docs/reference/studies.md lists the names. Exit status: 0 success, 2 bad input, 4 a file could
+    not be written.
     """
     with one_line():
         with options():
@@ -152,7 +151,7 @@ def export(
 
 
 def described(trained):
-    """A `LawWeights` in words: its kind and the sizes of its layers."""
+    """Return a `LawWeights` as text: its kind and the sizes of its layers."""
     sizes = [len(W) for W, _ in trained.layers] + [len(b) for _, b in trained.layers[-1:]]
     return f"{type(trained.kind).__name__} {'-'.join(map(str, sizes))}".strip()
 
@@ -164,23 +163,23 @@ def plot(
     out: Annotated[Path | None, typer.Option(
         "--out", "-o", help="FILE.png, .pdf or .svg, default: WEIGHTS.curves.png.")] = None,
     csv: Annotated[Path | None, typer.Option(help="FILE.csv for the numbers.")] = None,
-    strain: Annotated[float, typer.Option(help="Largest, above 0 and below 1.")] = 0.1,
-    steps: Annotated[int, typer.Option(help="From rest to it, of the scene's dt.", min=1)] = 200,
+    strain: Annotated[float, typer.Option(help="Largest strain, between 0 and 1.")] = 0.1,
+    steps: Annotated[int, typer.Option(help="Steps to the largest strain.", min=1)] = 200,
 ):
-    """Draw stress-strain curves of learned laws beside the true ones, along one-element paths.
+    """Plot stress-strain curves of learned and true laws along one-element paths.
 
-    Uniaxial, simple shear, volumetric; where something flows, also loading and unloading. Exit
-    status: 0 done, 2 bad input, 4 a file could not be written.
+    The paths are uniaxial, simple shear and volumetric; for a plastic law also loading and
+    unloading. Exit status: 0 success, 2 bad input, 4 a file could not be written.
     """
     with one_line():
         with options():
-            laws, problem = fitting(file, against)
+            laws, problem = load_matching(file, against)
             out = out or file.with_suffix(".curves.png")
             require_outputs(out, csv)
             if not 0.0 < strain < 1.0:
                 raise ValueError(f"--strain {strain:g}: expected a number above 0 and below 1")
-            warn(other_steps(laws, problem))
-            found = beside_truth(laws, problem, strain, steps)
+            warn(step_length_warnings(laws, problem))
+            found = compare_with_truth(laws, problem, strain, steps)
         draw_curves(found, f"{file.name} against {problem.title or against}: {steps} steps of "
              f"{problem.clock.dt:g} s to a strain of {strain:g}", out)
         if csv is not None:
@@ -198,7 +197,7 @@ def require_outputs(out, csv):
         require_place(csv)
 
 
-def beside_truth(laws, problem, strain, steps):
+def compare_with_truth(laws, problem, strain, steps):
     """[`Curve`] of trained laws beside those of a problem's bodies."""
     body, dt = problem.bodies[0], problem.clock.dt
     learned = learned_law(laws.elastic), learned_flow(laws.plastic)
@@ -207,7 +206,7 @@ def beside_truth(laws, problem, strain, steps):
 
 
 def line(curve):
-    """How far a learned law is off along a path, in words."""
+    """Return the error of a learned law along a path as text."""
     end = curve.path.strain[abs(curve.path.strain).argmax()]
     off = f"off by at most {100.0 * curve.error:.3g} % of it" if isfinite(curve.error) else (
         f"the learned law breaks down at strain {curve.failure:.4g}" if curve.failure is not None

@@ -16,8 +16,8 @@ from ..scene import SceneError
 from ..store.text import counted
 from ..store.weights_file import read_provenance, require_format
 from . import provenance
-from .catalogue import shipped_scenes
-from .options import OF_ERRORS, horizons, of_errors
+from .catalogue import bundled_scenes
+from .options import OF_ERRORS, horizons, training_error_text
 
 LAYERS = "mpm_ref law"          # what the format of layers begins with
 AFTER = ".elastic_kind"         # what follows the epoch in such a file
@@ -27,7 +27,7 @@ SPLINES = {kind.__name__ for kind in spline.READINGS}
 
 
 def has_laws(arrays):
-    """Whether the arrays of a file are those of laws or of their layers, of any format."""
+    """Return whether arrays are those of laws or of their exported layers, of any format."""
     return "elastic_kind" in arrays
 
 
@@ -37,22 +37,20 @@ def epochs_of(arrays):
 
 
 def is_exported(arrays):
-    """Whether they are layers."""
+    """Return whether arrays are those of exported layers."""
     return str(arrays.get("format")).startswith(LAYERS)
 
 
-def of_laws(path):
-    """What a file of weights holds, and what it says of its making. Raises ValueError for a file
-    that is damaged or holds no laws.
-    """
+def laws_facts(path):
+    """Return the content and provenance of a file of laws. Raises ValueError for another file."""
     laws = weights.load(path)
-    found = {part: part_of(type(law.kind).__name__, [a for layer in law.layers for a in layer],
+    found = {part: law_facts(type(law.kind).__name__, [a for layer in law.layers for a in layer],
                            law.kind._asdict())
              for part, law in zip(weights.PARTS, laws[:2], strict=True)}
-    return {"laws": str(path), "dim": dim_of(laws), **found, **of_training(laws.about)}
+    return {"laws": str(path), "dim": dim_of(laws), **found, **training_facts(laws.about)}
 
 
-def in_text(path):
+def read_json_layers(path):
     """The arrays of layers as JSON, by the names that they have in an npz file; None for any other
     file. Raises ValueError for lists that are no arrays.
     """
@@ -70,32 +68,33 @@ def in_text(path):
         raise ValueError(f"{path} holds no layers of laws: {error}; export them again") from None
 
 
-def of_layers(path, arrays):
-    """The same of a file of `mpm-ref law export`, from its arrays."""
+def layers_facts(path, arrays):
+    """Return the content and provenance of exported layers. Raises ValueError for other arrays."""
     require_format(path, arrays, export.FORMAT, "layers of laws")
     needed = {"dim", "check_F", *(f"{part}_kind" for part in weights.PARTS)}
     if missing := sorted(needed - set(arrays)):
         raise ValueError(f"{path} holds no layers of laws: it lacks {', '.join(missing)}; export "
                          "them again")
     return {"layers": str(path), "dim": int(arrays["dim"]), "questions": len(arrays["check_F"]),
-            **{part: of_arrays(part, arrays) for part in weights.PARTS},
-            **of_training(read_provenance(path, arrays))}
+            **{part: facts_from_arrays(part, arrays) for part in weights.PARTS},
+            **training_facts(read_provenance(path, arrays))}
 
 
-def of_arrays(part, arrays):
-    """What a law is, from the arrays of layers."""
+def facts_from_arrays(part, arrays):
+    """Return the description of a law from the arrays of its exported layers."""
     own = {name.removeprefix(f"{part}_"): a for name, a in arrays.items() if name.startswith(part)}
     depth = len(list(takewhile(lambda k: f"W{k}" in own, count())))
     layers = [own[f"{name}{k}"] for k in range(depth) for name in "Wb"]
     scalars = {name: float(a) for name, a in own.items() if a.ndim == 0 and a.dtype.kind in "fiu"}
-    return part_of(str(own["kind"]), layers or [own[name] for name in own if name == "tables"],
+    return law_facts(str(own["kind"]), layers or [own[name] for name in own if name == "tables"],
                    scalars)
 
 
-def part_of(kind, learned, constants):
-    """What a law is, as plain values; learned: W and b of its layers in turn, or tables of splines.
+def law_facts(kind, learned, constants):
+    """Return the description of a law as plain values.
 
-    Weights are counted with biases, unless these are all zero: such a law has none.
+    learned: W and b of its layers in turn, or tables of splines. The number of weights includes
+    biases unless all are zero: such a law has none.
     """
     widths = [] if kind in SPLINES else [len(W) for W in learned[::2]] + [
         len(b) for b in learned[-1:]]
@@ -103,8 +102,8 @@ def part_of(kind, learned, constants):
             "weights": sum(a.size for a in learned if a.ndim > 1 or a.any())}
 
 
-def of_training(about):
-    """What a file says of the training of its laws; None for what it does not say."""
+def training_facts(about):
+    """Return the training data in a provenance, None for missing entries."""
     recipe, errors = about.get("recipe", {}), about.get("errors")
     return {"method": about.get("method"), "dt": about.get("dt"), "seen": about.get("seen"),
             "epochs": len(errors) if errors else recipe.get("epochs"), "errors": errors,
@@ -112,7 +111,7 @@ def of_training(about):
 
 
 def laws_lines(facts):
-    """Facts of laws in words."""
+    """Return facts of laws as lines of text."""
     file, what = (facts["laws"], "learned laws") if "laws" in facts else (
         facts["layers"], f"layers of learned laws, {counted(facts['questions'], 'question')} with "
                          "answers")
@@ -124,12 +123,12 @@ def laws_lines(facts):
     if facts["epochs"]:
         yield f"trained on {provenance.source(facts['about'])}, {training_line(facts)}"
     if facts["seen"]:
-        yield seen_line(facts["seen"])
+        yield training_range_line(facts["seen"])
     yield provenance.by(facts["about"])
 
 
 def part_line(part):
-    """A law in words."""
+    """Return a law as text."""
     said = [part["kind"]]
     if part["kind"] in SPLINES:
         said.append(f"splines of {counted(part['weights'], 'number')}")
@@ -139,7 +138,7 @@ def part_line(part):
 
 
 def training_line(facts):
-    """The length of a training and how far off its laws were, in words."""
+    """Return the length and the errors of a training as text."""
     epochs = counted(facts["epochs"], "epoch")
     if not facts["errors"]:
         return epochs
@@ -147,26 +146,24 @@ def training_line(facts):
     filmed = "camera" in about
     more = WITH_VELOCITIES if weights.errors_include_velocities(about) else ""
     over = () if filmed else horizons(method, about.get("recipe", {}), facts["epochs"])
-    return (f"{epochs}: {OF_MARKS if filmed else of_errors(method)}{more} "
+    return (f"{epochs}: {OF_MARKS if filmed else training_error_text(method)}{more} "
             f"{provenance.ends(facts['errors'], over)}")
 
 
-def seen_line(bounds):
-    """The strains that were met in training, in words (see `learned.strain_range`)."""
+def training_range_line(bounds):
+    """Return the strains of a training as text (see `learned.strain_range`)."""
     low, high = (np.array(bounds[end]) for end in ("low", "high"))
     return (f"met in training: stretches {low[:-1].min():.3g} .. {high[:-1].max():.3g}, "
             f"J {low[-1]:.3g} .. {high[-1]:.3g}")
 
 
 def is_graph_network(arrays):
-    """Whether the arrays of a file are those of a graph network, of any format."""
+    """Return whether arrays are those of a graph network, of any format."""
     return str(arrays.get("format")).startswith(gnn_weights.FORMAT.split()[0])
 
 
-def of_graph_network(path):
-    """What a file of weights holds, and what it says of its making. Raises ValueError for a file
-    that is damaged or no graph network.
-    """
+def graph_network_facts(path):
+    """Return the content and provenance of a graph network. Raises ValueError for another file."""
     network, reading, about = gnn_weights.load(path)
     return {
         "graph_network": str(path), "dim": len(reading.scales.v_mean),
@@ -180,7 +177,7 @@ def of_graph_network(path):
 
 
 def graph_network_lines(facts):
-    """Facts of a graph network in words."""
+    """Return facts of a graph network as lines of text."""
     about = facts["about"]
     yield (f"{facts['graph_network']}: a graph network, {facts['dim']}D, {facts['width']} wide, "
            f"{counted(facts['blocks'], 'block')}, {facts['weights']} weights and biases")
@@ -195,7 +192,7 @@ def graph_network_lines(facts):
 
 
 def error_text(error):
-    """The error of a free run; None is that of one that broke down."""
+    """Return the error of a rollout as text; None is that of one that broke down."""
     return "inf" if error is None else f"{error:.3g}"
 
 
@@ -203,18 +200,16 @@ OWN = {"scene", "method", "laws", "train"}      # keys that no scene has
 
 
 def is_law_study(path):
-    """Whether a path is that of a law study, whatever is wrong with its tables, of all files but
-    studies of reduced runs.
-    """
+    """Return whether a file is a law study, even one with invalid tables."""
     try:
         return bool(OWN & set(read_toml(path)))
     except SceneError:
         return False
 
 
-def of_law_study(path):
-    """Scene, method, laws and recipe of a study. Raises SceneError."""
-    study = load(path, shipped_scenes())
+def law_study_facts(path):
+    """Return scene, method, laws and recipe of a study. Raises SceneError."""
+    study = load(path, bundled_scenes())
     tables, scene, problem = study.tables, study.scene, study.problem()
     records = tables.records or (problem.bodies[0].law, problem.bodies[0].flow)
     return {
@@ -230,7 +225,7 @@ def of_law_study(path):
 
 
 def law_study_lines(facts):
-    """Facts of a law study in words."""
+    """Return facts of a law study as lines of text."""
     recipe, method = facts["recipe"], facts["method"]
     yield (f"{facts['law_study']}: a law study, {facts['title'] or 'untitled'}: laws of the scene "
            f'{facts["scene"]}, method "{method}"')
@@ -246,6 +241,6 @@ def law_study_lines(facts):
 
 
 def law_line(law):
-    """A law in words."""
+    """Return a law of a study as text."""
     return ", ".join([law["kind"], *(f"{name} = {value:g}" for name, value in
                                      law["constants"].items())])

@@ -1,4 +1,4 @@
-"""`mpm-ref law train`: the laws of a study, from a run of its scene."""
+"""Implement `mpm-ref law train`: train the laws of a study on a run of its scene."""
 
 from dataclasses import asdict
 from math import ceil, sqrt
@@ -17,7 +17,7 @@ from ..store.running import Watch
 from ..store.text import counted
 from ..trajectories import observed
 from . import provenance
-from .catalogue import find_study, keep_scene, shipped_scenes
+from .catalogue import bundled_scenes, find_study, keep_scene
 from .errors import INTERRUPT, UNSTABLE, at_start, end, one_line, options, writing
 from .options import (
     HDF5,
@@ -26,10 +26,10 @@ from .options import (
     Overwrite,
     StudyName,
     horizons,
-    of_errors,
     on_interrupt,
     require_ending,
     require_free,
+    training_error_text,
 )
 from .terminal import passing, warn
 
@@ -48,29 +48,29 @@ def train(
     threads: Annotated[int, typer.Option(help="Threads of PyTorch.", min=1)] = 1,
     overwrite: Overwrite = False,
 ):
-    """Learn the laws of a study from the motion of its scene; this needs PyTorch.
+    """Train the laws of a study on the motion of its scene (this needs PyTorch).
 
-    A training that is cut off goes on from its checkpoint, WEIGHTS.pt. Exit status: 0 done, 2 bad
+    An interrupted training resumes from its checkpoint, WEIGHTS.pt. Exit status: 0 success, 2 bad
     input, 3 the run became unstable or the training diverged, 4 a file could not be written,
     130 Ctrl-C.
     """
     with one_line():
         with options():
-            study = load(find_study(name), shipped_scenes())
+            study = load(find_study(name), bundled_scenes())
             out = out or study.file("weights") or Path(f"{study.path.stem}.npz")
             checkpoint = study.file("checkpoint") or out.with_suffix(".pt")
             require_outputs(study, out, data, overwrite)
             require_checkpoint(checkpoint, study.path, out, data)
             training.trainer()
             with at_start(study.path):
-                seen = motion(study, data)
+                observation = motion(study, data)
             with writing():
-                laws = learned(study, seen, checkpoint, threads=threads, command=typed(
+                laws = learned(study, observation, checkpoint, threads=threads, command=typed(
                     name, out, data, threads))
         with writing():
             weights.save(out, laws)
         checkpoint.unlink(missing_ok=True)
-        print(f"{out}: {in_short(study, seen, laws.about['errors'])}")
+        print(f"{out}: {summary_text(study, observation, laws.about['errors'])}")
 
 
 def require_outputs(study, out, data, overwrite):
@@ -130,19 +130,20 @@ class Steps(Watch):
         self.bar.update(state.step - self.bar.n)
 
 
-def learned(study, seen, checkpoint, **about):
-    """`LearnedLaws` of a study, with its progress; ends the command where it diverges."""
+def learned(study, observation, checkpoint, **about):
+    """Train the laws of a study with progress; the command ends if the training diverges."""
     how = training.trainer()
     try:
-        with on_interrupt(lambda: resuming(checkpoint)), Epochs(study, len(seen.x) - 1) as now:
-            return training.train_study(study, seen, checkpoint, now.show, **about)
+        with (on_interrupt(lambda: resume_hint(checkpoint)),
+              Epochs(study, len(observation.x) - 1) as now):
+            return training.train_study(study, observation, checkpoint, now.show, **about)
     except how.Diverged as fault:
         left = f"; {checkpoint} is of this training: remove it when the study changes"
         end(f"{study.path}: {fault}{left if checkpoint.exists() else ''}", UNSTABLE)
 
 
-def resuming(checkpoint):
-    """How a training goes on that was cut off."""
+def resume_hint(checkpoint):
+    """Return the hint on resuming an interrupted training."""
     if checkpoint.exists():
         return f"before the laws were learned; the same command again goes on from {checkpoint}"
     return "before there was a checkpoint; the same command again begins anew"
@@ -196,10 +197,11 @@ def epoch_in_words(study, epoch, steps):
             f"{counted(epoch.segments, 'segment')} of {steps / epoch.segments:.0f}")
 
 
-def in_short(study, seen, errors):
-    """What was learned from what, and the errors of the first and the last epoch."""
-    steps, points, method = len(seen.x) - 1, seen.x.shape[1], study.tables.method
+def summary_text(study, observation, errors):
+    """Return the amount of training data, and the errors of the first and last epoch, as text."""
+    steps, points, method = len(observation.x) - 1, observation.x.shape[1], study.tables.method
     over = horizons(method, asdict(study.tables.train), len(errors))
     return (f"{method}, {counted(len(errors), 'epoch')} on {counted(steps, 'step')} of "
-            f"{counted(points, 'point')}; {of_errors(method)} {provenance.ends(errors, over)}")
+            f"{counted(points, 'point')}; {training_error_text(method)} "
+            f"{provenance.ends(errors, over)}")
 

@@ -1,4 +1,4 @@
-"""Options that several commands share, the objects they stand for, and checks of output files."""
+"""Define options shared by commands, load the objects they name, and check output files."""
 
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,11 +15,11 @@ from ..rom.study import reduce
 from ..rom.study.generate import one_thread
 from ..rom.study.study import load
 from ..scene import SceneError
-from .catalogue import find_scene, find_study, shipped_scenes
+from .catalogue import bundled_scenes, find_scene, find_study
 from .errors import INTERRUPT, end, one_line
 from .terminal import warn
 
-Json = Annotated[bool, typer.Option("--json", help="Answer with JSON.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 HDF5, MAPS, PICTURES = (".h5", ".hdf5"), (".npz",), (".png", ".pdf", ".svg")
 FILES = (*HDF5, *MAPS, *PICTURES, ".toml", ".json")
 
@@ -47,14 +47,14 @@ def require_free(out, overwrite):
 
 
 WeightsFile = Annotated[Path, typer.Argument(metavar="WEIGHTS",
-                                             help="File of `mpm-ref law train`.")]
+                                             help="File written by `mpm-ref law train`.")]
 SceneName = Annotated[str, typer.Argument(metavar="SCENE",
-                                          help="A TOML file, or the name of a shipped scene.")]
+                                          help="A TOML file or the name of a bundled scene.")]
 NUMBERS = (".csv",)
 OF_ERRORS = {"labeled": "squared error of F"}       # of methods that follow no motion
 
 
-def fitting(file, name, steps=None):
+def load_matching(file, name, steps=None):
     """(`LearnedLaws`, `Problem`) of a file and of a scene that they fit, of so many steps if
     given. Raises ValueError.
     """
@@ -66,8 +66,8 @@ def fitting(file, name, steps=None):
     return laws, problem
 
 
-def of_errors(method):
-    """What the errors of a training's epochs are of, in words."""
+def training_error_text(method):
+    """Return the description of the errors of a training's epochs."""
     return OF_ERRORS.get(method, "mean squared error of a step [m^2]")
 
 
@@ -81,7 +81,7 @@ def horizons(method, recipe, epochs):
     return tuple(teacher.horizon(k, recipe["epochs"]) for k in (0, epochs - 1))
 
 
-def not_true(problem):
+def learned_law_warnings(problem):
     """The warnings about bodies whose law in the scene is a learned one, which says what it has
     met.
     """
@@ -90,7 +90,7 @@ def not_true(problem):
                "name the scene of the true one")
 
 
-def other_steps(laws, problem):
+def step_length_warnings(laws, problem):
     """The warning about steps of another length than in training; or none."""
     dt = laws.about.get("dt")
     if dt not in (None, problem.clock.dt):
@@ -100,34 +100,34 @@ def other_steps(laws, problem):
 
 
 StudyName = Annotated[str, typer.Argument(metavar="STUDY",
-                                          help="A TOML file, or the name of a shipped study.")]
+                                          help="A TOML file or the name of a bundled study.")]
 Data = Annotated[Path | None, typer.Option(
-    help="Folder of `generate`, default: STUDY-data here.")]
+    help="Folder of the training runs (default: STUDY-data in the current folder).")]
 MapFile = Annotated[Path | None, typer.Option(
-    "--map", help="Map of `train`, default: STUDY.npz here.")]
+    "--map", help="File of the reduced model (default: STUDY.npz in the current folder).")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the file of --out.")]
 
 
 def examples(*commands):
-    """The end of a command's help: how it is typed, a line each."""
+    """Return examples of commands, a line each, for the end of a help text."""
     return "\n\n".join(["Examples:", *(f"mpm-ref rom {command}" for command in commands)])
 
 
-def studied(name):
-    """The `ReducedStudy` of a file or a shipped name."""
-    return load(find_study(name), shipped_scenes())
+def load_study(name):
+    """Return the `Study` of a file or of a bundled name."""
+    return load(find_study(name), bundled_scenes())
 
 
 @contextmanager
-def at_work(name):
-    """The same, while reduced runs of it are made: on one thread, their faults in one line."""
+def open_study(name):
+    """Load a study for reduced runs, on one thread; errors end the command."""
     with one_line(), one_thread():
-        yield studied(name)
+        yield load_study(name)
 
 
 @contextmanager
 def on_interrupt(say):
-    """Ctrl-C in this block ends the command; say() tells how far it is, and how to go on."""
+    """End the command on Ctrl-C with the message say(): the progress, and how to resume."""
     try:
         yield
     except KeyboardInterrupt:
@@ -139,8 +139,8 @@ def named(path, study, ending):
     return path or Path(f"{study.path.stem}{ending}")
 
 
-def assigned(texts):
-    """Texts NAME=VALUE without blanks, each name once. Raises SceneError."""
+def parse_assignments(texts):
+    """Return texts NAME=VALUE without blanks, each name once. Raises SceneError."""
     found = {}
     for text in texts:
         name, sign, value = (part.strip() for part in text.partition("="))
@@ -153,7 +153,7 @@ def assigned(texts):
     return list(found.values())
 
 
-def map_of(name, study, path):
+def load_map(name, study, path):
     """(file, `Model`) of the map of a study by that name: the file given, else the study's own,
     with a warning where that was made otherwise than the study says. Raises ValueError.
     """
@@ -163,11 +163,11 @@ def map_of(name, study, path):
                          + (f" --out {path}" if path else ""))
     model = reduce.load(file, study)
     if path is None:
-        warn(unlike(file, study.tables.reduced_model, model))
+        warn(map_warnings(file, study.tables.reduced_model, model))
     return file, model
 
 
-def unlike(file, asked, model):
+def map_warnings(file, asked, model):
     """The warning about a map of another kind or r than is asked for, or else of other settings; or
     none.
     """

@@ -14,20 +14,21 @@ from .terminal import compiling, warn
 
 DEPARTS = 1      # exit status of a check in which an array departs
 
-app = typer.Typer(no_args_is_help=True, help="Record golden files, and check other codes by them.")
+app = typer.Typer(no_args_is_help=True, help="Record golden files, and check other codes against "
+                  "them.")
 
 
 @app.command()
 def record(
     name: Annotated[str, typer.Argument(metavar="SCENE")],
     out: Annotated[Path, typer.Option("--out", "-o", help="Golden file.")] = Path("golden.h5"),
-    steps: Annotated[int, typer.Option(help="Steps to record, every stage of each.")] = 3,
+    steps: Annotated[int, typer.Option(help="Number of steps to record.")] = 3,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a golden file.")] = False,
     begin: Annotated[int, typer.Option(help="Steps to make before the recorded ones.")] = 0,
     eps: Annotated[float | None, typer.Option(help="Tolerance of implicit steps.")] = None,
     adjoint: Annotated[bool, typer.Option("--adjoint", help="Record gradients too.")] = False,
 ):
-    """Run the first steps of a scene and record every stage with the error of each number."""
+    """Run the first steps of a scene and record every stage with the tolerance of each number."""
     with one_line():
         path = find_scene(name)
         with options(), at_start(path), compiling():
@@ -63,7 +64,7 @@ def check(
     precision: Annotated[str, typer.Option(help="f64, f32, or auto: that of the arrays.")] = "auto",
     json: Annotated[bool, typer.Option("--json", help="Print the report as JSON.")] = False,
 ):
-    """Name the first stage that departs, where and by how much. Exit status 0 if none, else 1."""
+    """Report the first deviating stage, where and by how much. Exit status: 0 if none, 1 if any."""
     with one_line(), options():
         report = oracle.check(golden, other, precision)
     print(report.json if json else report)

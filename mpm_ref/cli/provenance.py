@@ -1,9 +1,10 @@
-"""What weights say of their making, their `about`, in words."""
+"""Describe the provenance of weights, their `about`, as text."""
 
 
 def ends(errors, horizons=()):
-    """The first and the last of some errors, and over how many steps from a restart they are, where
-    that is given: errors of other horizons do not compare.
+    """Return the first and last error as text, and the horizons [steps] to which they refer.
+
+    Errors of different horizons do not compare.
     """
     first, last = f"{errors[0]:.3g} at first", f"{errors[-1]:.3g} at last"
     if not horizons:
@@ -13,14 +14,14 @@ def ends(errors, horizons=()):
 
 
 def source(about):
-    """What was learned from: an environment or a scene by name, and digits of the scene's hash."""
+    """Return the source of the training data: environment or scene, and digits of its hash."""
     name = about.get("environment") or about.get("title")
     digest = (about.get("scene_sha256") or about.get("scene", ""))[:12]
     return ", ".join(filter(None, (name, digest and f"scene {digest}"))) or "an unknown scene"
 
 
 def by(about):
-    """The command, the version of the program, and the date."""
+    """Return the command, the version of the program and the date."""
     said = [f"made by: {about.get('command', 'unknown')}"]
     if "commit" in about:
         said.append(f"commit {about['commit']}")

@@ -1,8 +1,7 @@
-"""`mpm-ref rom studies | generate | train | run | evaluate`: reduced models of a scene (see
-`rom.study`).
+"""Implement `mpm-ref rom studies | generate | train | run | evaluate`: reduced models of a scene.
 
-A study file names the scene, its parameters and the map; docs/reference/studies.md explains it.
-`rom_train` has the commands `generate` and `train`, `rom_info` has `studies`.
+A study file names the scene, its parameters and the map (docs/reference/studies.md). `rom_train`
+has the commands `generate` and `train`, `rom_info` has `studies`.
 """
 
 import sys
@@ -42,12 +41,12 @@ from .options import (
     MapFile,
     Overwrite,
     StudyName,
-    assigned,
-    at_work,
     examples,
-    map_of,
+    load_map,
     named,
     on_interrupt,
+    open_study,
+    parse_assignments,
     require_ending,
     require_free,
 )
@@ -56,17 +55,17 @@ from .terminal import as_json, passing, warn
 LARGE = 1e9         # bytes of a file that are told before it is written
 BROKE = "broke down"
 
-app = typer.Typer(no_args_is_help=True, help="Reduced models of a scene: learn from many runs, "
-                  "then run with a few numbers instead of particles.",
-                  epilog="`mpm-ref rom studies` lists the shipped studies; "
-                  "docs/reference/studies.md says how to write your own.")
+app = typer.Typer(no_args_is_help=True, help="Train a reduced model on many runs of a scene, then "
+                  "run it with a few numbers instead of particles.",
+                  epilog="`mpm-ref rom studies` lists the bundled studies; "
+                  "docs/reference/studies.md explains how to write one.")
 app.command(epilog=examples("studies"))(rom_info.studies)
 app.command("generate", epilog=examples(
     "generate gravity_small", "generate torsion --workers 1 --out runs"))(rom_train.make_data)
 app.command(epilog=examples("train gravity_small",
                             "train gravity --kind modes --out modes.npz"))(rom_train.train)
 Set = Annotated[list[str] | None, typer.Option(
-    "--set", help="NAME=VALUE, once for each parameter of the study.")]
+    "--set", help="NAME=VALUE for a parameter of the study; repeat it for each one.")]
 
 
 @app.command(epilog=examples("run gravity_small --set g=3.3",
@@ -74,58 +73,56 @@ Set = Annotated[list[str] | None, typer.Option(
 def run(
     name: StudyName,
     values: Set = None,
-    map: MapFile = None,
+    map_file: MapFile = None,
     out: Annotated[Path | None, typer.Option(
-        "--out", "-o", help="Results file, default: STUDY.h5 here.")] = None,
+        "--out", "-o", help="Results file (default: STUDY.h5).")] = None,
     points_out: Annotated[int | None, typer.Option(
-        help="Points to show the body at, default: those of the study.", min=1)] = None,
+        help="Number of points in the results (default: as in the study).", min=1)] = None,
     overwrite: Overwrite = False,
     json: Json = False,
 ):
-    """Run the reduced model into a results file.
+    """Run the reduced model of a study into a results file.
 
-    `mpm-ref info`, `plot`, `animate` and `export` take the file. A run that was cut off goes on,
-    bit for bit, where the same command is given again. Exit status: 0 done, 2 bad input, 3 the run
-    broke down, 4 a file could not be written, 130 Ctrl-C.
+    `mpm-ref info`, `plot`, `animate` and `export` take the file. The same command resumes an
+    interrupted run bit for bit. Exit status: 0 success, 2 bad input, 3 the run broke down, 4 a file
+    could not be written, 130 Ctrl-C.
     """
-    with at_work(name) as study:
+    with open_study(name) as study:
         out = named(out, study, ".h5")
         with options():
             keep_scene(study.path, out)
             require_ending(out, HDF5)
             require_place(out)
-            mu = study.parse_parameters(assigned(values or []))
-            file, model = map_of(name, study, map)
+            mu = study.parse_parameters(parse_assignments(values or []))
+            file, model = load_map(name, study, map_file)
             announce(out, particle_bytes(study, mu, points_out))
-            made = recording(study, model, mu, points_out)
-            made.facts["map_sha256"] = reduce.sha256(file)
-            earlier = earlier_part(made, out, overwrite)
-        warn([*study.range_warnings(mu), *made.warnings, *changed(earlier)])
-        outcome = recorded(made, out, earlier.states, overwrite)
+            plan = recording(study, model, mu, points_out)
+            plan.facts["map_sha256"] = reduce.sha256(file)
+            earlier = earlier_part(plan, out, overwrite)
+        warn([*study.range_warnings(mu), *plan.warnings, *changed(earlier)])
+        outcome = record_run(plan, out, earlier.states, overwrite)
         if json:
-            print(as_json(ran(made, out, outcome)))
+            print(as_json(run_facts(plan, out, outcome)))
         if outcome.breakdown:
             end(outcome.breakdown, UNSTABLE)
-        clock = made.problem.clock
-        warn(astray(outcome.out_of_bounds, clock.steps + 1, clock.dt))
+        clock = plan.problem.clock
+        warn(range_warnings(outcome.out_of_bounds, clock.steps + 1, clock.dt))
         if not json:
             print(f"{FINISHED}: {counted(clock.steps, 'step')} of {reduce.kind_of(model)}, r = "
-                  f"{model.field.r}, {made.count} points in {out}")
+                  f"{model.field.r}, {plan.count} points in {out}")
 
 
 def announce(out, size):
-    """Say how many bytes are to be written, where they are many. Raises NotWritten where the disk
-    has not so many, those of the file that they replace included.
-    """
+    """Announce output above 1 GB. Raises `NotWritten` without enough disk space for it."""
     if size > LARGE:
         print(f"mpm-ref: {out}: {size_text(size)} will be written", file=sys.stderr)
     there = out.stat().st_size if out.exists() else 0
     require_space(out, max(size - there, 0))
 
 
-def recorded(made, out, earlier, overwrite):
-    """Return the `RecordedRun` of a `Recording`, with a bar of steps."""
-    at, steps = max(len(earlier) - 1, 0), made.problem.clock.steps
+def record_run(plan, out, earlier, overwrite):
+    """Return the `RecordedRun` of a `Recording`, with a progress bar."""
+    at, steps = max(len(earlier) - 1, 0), plan.problem.clock.steps
     again = "the same command without --overwrite" if overwrite else "the same command again"
 
     def show(k):
@@ -135,30 +132,30 @@ def recorded(made, out, earlier, overwrite):
 
     with (on_interrupt(lambda: f"at step {at} of {steps}; {again} goes on"),
           passing(total=steps, unit="step", desc=str(out)) as bar):
-        return record(made, out, earlier, show)
+        return record(plan, out, earlier, show)
 
 
-def ran(made, out, outcome):
-    """A `Recording` that was made, or broke down, as plain values."""
-    clock, lost = made.problem.clock, outcome.breakdown
+def run_facts(plan, out, outcome):
+    """Return a `Recording` that finished, or broke down, as plain values."""
+    clock, lost = plan.problem.clock, outcome.breakdown
     step = lost.step if lost else clock.steps
     how = ({"why": BROKE, "reason": str(lost), "status": UNSTABLE} if lost else
            {"why": FINISHED, "status": 0})
     return how | {
         "out": str(out), "step": step, "t": step * clock.dt, "frames": step + (not lost),
-        "points_out": made.count, "reduced": made.facts,
+        "points_out": plan.count, "reduced": plan.facts,
         "out_of_bounds": {str(k): check.out_of_bounds for k,
                           check in outcome.out_of_bounds.items()}}
 
 
 def changed(earlier):
-    """Yield the warning about a run whose `EarlierPart` is of other code."""
+    """Yield the warning about a run whose `EarlierPart` was made by other code."""
     if not earlier.same_code:
         yield ("the run was made in part by another version of the code, or of NumPy, SciPy or "
                "Numba: it goes on, but not bit for bit; --overwrite makes it anew")
 
 
-def astray(out_of_bounds, states, dt):
+def range_warnings(out_of_bounds, states, dt):
     """Yield the warnings about a run with {step: `StateCheck`} out of bounds, of this number of
     states dt [s] apart.
     """
@@ -175,30 +172,29 @@ def astray(out_of_bounds, states, dt):
     "evaluate gravity_small", "evaluate gravity --map modes.npz --json"))
 def judge(
     name: StudyName,
-    map: MapFile = None,
+    map_file: MapFile = None,
     data: Data = None,
     out: Annotated[Path | None, typer.Option(
-        "--out", "-o", help="Picture of the errors over time (png, pdf or svg), default: "
-        "MAP.errors.png.")] = None,
+        "--out", "-o", help="Picture of the errors over time (png, pdf or svg; default: "
+        "MAP.errors.png).")] = None,
     overwrite: Overwrite = False,
     json: Json = False,
 ):
-    """Compare reduced runs with the full-order runs that were held out.
+    """Compare reduced runs with full-order runs that were held out from training.
 
-    Their position errors by three measures, beside those of the map's nearest states, which reduced
-    runs on it seldom beat, and of the training run with the nearest parameters, taken as it is.
-    Exit status: 0 done, 2 bad input, 3 a reduced run broke down, 4 a file could not be written, 130
-    Ctrl-C.
+    The position errors, in three measures, stand beside those of the nearest states of the map, a
+    lower bound in most cases, and of the training run with the nearest parameters. Exit status:
+    0 success, 2 bad input, 3 a reduced run broke down, 4 a file could not be written, 130 Ctrl-C.
     """
-    with at_work(name) as study:
-        picture = out or named(map, study, ".npz").with_suffix(".errors.png")
+    with open_study(name) as study:
+        picture = out or named(map_file, study, ".npz").with_suffix(".errors.png")
         with options():
             require_ending(picture, PICTURES)
             require_free(picture, overwrite)
             require_place(picture)
             if not study.test:
                 raise SceneError(f"{study.path}: test = 0: no run is held out to compare with")
-            _, model = map_of(name, study, map)
+            _, model = load_map(name, study, map_file)
             folder = named(data, study, "-data")
             with writing():
                 snapshots = dataset.load(study, folder, study.test)

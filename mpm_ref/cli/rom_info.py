@@ -1,4 +1,4 @@
-"""`mpm-ref info` of a study and of a reduced model, and `mpm-ref rom studies`."""
+"""Implement `mpm-ref info` for studies and reduced models, and `mpm-ref rom studies`."""
 
 import msgspec
 import numpy as np
@@ -12,9 +12,9 @@ from ..rom.study.study_file import parse_tables, read_toml
 from ..rom.study.tables import CURVED, MODES, NETWORK, NSF
 from ..scene import SceneError
 from ..store.text import counted
-from .catalogue import shipped_studies
+from .catalogue import bundled_studies
 from .errors import one_line
-from .options import Json, studied
+from .options import Json, load_study
 from .terminal import print_titles
 
 TABLES = {"parameter", "map"}       # of a study of reduced runs; nothing else has such
@@ -24,15 +24,15 @@ MEASURES = {"origin": "of the distance from the scene's origin",
 
 
 def studies(json: Json = False):
-    """List the studies that come with the package."""
+    """List the bundled studies."""
     with one_line():
         print_titles({name: parse_tables(read_toml(path)).title for name,
-                      path in shipped_studies().items()
+                      path in bundled_studies().items()
                 if is_study(path)}, json)
 
 
 def is_study(path):
-    """Whether a path is that of a study of reduced runs, whatever is wrong with its tables."""
+    """Return whether a file is a study of reduced runs, even one with invalid tables."""
     try:
         return bool(TABLES & set(read_toml(path)))
     except SceneError:
@@ -43,7 +43,7 @@ def of_study(name):
     """Scene, runs, parameters, map and reduced runs of a study. Raises SceneError, and ValueError
     for a scene that reduced runs do not know.
     """
-    study = studied(name)
+    study = load_study(name)
     tables, one = study.tables, supported_model(study, study.mu[0])
     return {
         "study": str(study.path), "title": tables.title, "scene": tables.scene,
@@ -53,12 +53,12 @@ def of_study(name):
         "keys": {one.name: one.key for one in tables.parameter},
         "map": tables.reduced_model.settings,
         "run": msgspec.to_builtins(tables.run), "study_sha256": study.digest,
-        **inferred_study_facts(study),
+        **stress_study_facts(study),
     }
 
 
 def study_lines(facts):
-    """Facts of a study in words."""
+    """Return facts of a study as lines of text."""
     map, run = facts["map"], facts["run"]
     inferred = "model" in facts
     return [
@@ -76,8 +76,9 @@ def study_lines(facts):
 
 
 def of_map(path):
-    """What a file of `mpm-ref rom train` holds, and what it says of its making; None for what it
-    does not say. Raises ValueError for a file that is damaged or no map.
+    """Return content and provenance of a file of `mpm-ref rom train`; None for missing entries.
+
+    Raises ValueError for a file that is damaged or no map.
     """
     model = model_file.load(path)
     about, map = model.about, model.field
@@ -88,12 +89,12 @@ def of_map(path):
         "points": fit.get("points", points_of(map)), "runs": runs, "steps": levels - 1,
         "parameters": ranges(names, about["mu"]) if names else None,
         "errors": fit.get("errors"), "last_loss": loss[-1] if loss else None, "about": about,
-        **inferred_fields_facts(map, levels),
+        **stress_field_facts(map, levels),
     }
 
 
 def map_lines(facts):
-    """Facts of a map in words."""
+    """Return facts of a map as lines of text."""
     points = f", {counted(facts['points'], 'point')}" if facts["points"] else ""
     varied = f", {in_ranges(facts['parameters'])}" if facts["parameters"] else ""
     inferred = "model" in facts
@@ -123,27 +124,27 @@ def source(about):
 
 
 def in_ranges(parameters, keys=None):
-    """{name: [least, largest]} in words, with the places in the scene."""
+    """Return {name: [least, largest]} as text, with the paths of the parameters in the scene."""
     return ", ".join(f"{name} = {low:g} .. {high:g}" + (f" ({keys[name]})" if keys else "")
                      for name, (low, high) in parameters.items())
 
 
-def kind_of(map):
-    """The kind of a map as study files name it."""
-    if isinstance(map, Decoder | Networks):
+def kind_of(field):
+    """Return the kind of a field as study files name it."""
+    if isinstance(field, Decoder | Networks):
         return NETWORK
-    return CURVED if isinstance(map, Curved) else MODES
+    return CURVED if isinstance(field, Curved) else MODES
 
 
-def points_of(map):
-    """How many points modes have; None of a network, which knows none."""
-    if isinstance(map, Decoder | Networks):
+def points_of(field):
+    """Return the number of points of modes; None for a network, which has none."""
+    if isinstance(field, Decoder | Networks):
         return None
-    return len((map.modes if isinstance(map, Curved) else map).X)
+    return len((field.modes if isinstance(field, Curved) else field).X)
 
 
 def ranges(names, mu):
-    """{name: [least, largest]} of parameters mu (runs, parameters)."""
+    """Return {name: [least, largest]} of parameters mu (runs, parameters)."""
     return {name: [min(values), max(values)] for name, values in
             zip(names, zip(*map(tuple, mu), strict=True), strict=True)}
 
@@ -151,14 +152,14 @@ def ranges(names, mu):
 OF = {"modes": "the displacement", "tau": "the stress", "C": "the affine field"}
 
 
-def inferred_study_facts(study):
+def stress_study_facts(study):
     """Further facts of a study; none of another model."""
     if study.tables.model != NSF:
         return {}
     return {"model": NSF, "every": study.base.every}
 
 
-def inferred_fields_facts(fields, levels):
+def stress_field_facts(fields, levels):
     """Further facts of fields from the states of each run, whose steps they do not know; none of a
     map of another model.
     """
@@ -167,13 +168,13 @@ def inferred_fields_facts(fields, levels):
 
 
 def stored_states(facts):
-    """Which states of a run a study keeps, in words."""
+    """Return the share of states of a run that a study stores, as text."""
     every = facts["every"]
     return f", one in {every} kept" if every > 1 else ""
 
 
 def fields_line(facts):
-    """Fields and reduced runs of a study in words."""
+    """Return fields and reduced runs of a study as text."""
     map, run = facts["map"], facts["run"]
     longer = f", steps {run['dt_factor']:g} times as long" if run["dt_factor"] != 1.0 else ""
     return (f"stress fields: {map['kind']}, r = {map['r']}, {sizes_text(map)}; reduced runs: "
@@ -181,7 +182,7 @@ def fields_line(facts):
 
 
 def samples_text(run):
-    """Which points are samples, in words."""
+    """Return the number and kind of the sample points as text."""
     if run.get("cells"):
         return f"points of {run['cells']} cells at most, with weights"
     return (f"{run['points'] or 'all'} points"
@@ -189,8 +190,9 @@ def samples_text(run):
 
 
 def training_lines(about):
-    """What fields say of their making, a line each; trainings of experiments have no study, and
-    keep the losses of several epochs.
+    """Yield the training data of fields as lines of text.
+
+    Trainings of experiments have no study, and store the losses of several epochs.
     """
     if "map" in about:
         yield sizes_text(about["map"])
@@ -200,12 +202,13 @@ def training_lines(about):
                                           for what, loss in losses)
 
 
-def sizes_text(map):
+def sizes_text(settings):
     """Return the numbers of modes or widths of networks, and whether the stress sees mu."""
-    sees = "sees" if map["stress_sees_parameters"] else "does not see"
+    sees = "sees" if settings["stress_sees_parameters"] else "does not see"
     sees = f"the stress {sees} the parameters"
-    if map["kind"] == NETWORK:
-        waves = f", octaves of sines and cosines: {map['octaves']}" if map["octaves"] else ""
-        return f"factors of width {', '.join(str(one) for one in map['beta'])}{waves}; {sees}"
-    modes = ", ".join(f"{map[name]} of {what}" for name, what in OF.items() if map[name])
+    if settings["kind"] == NETWORK:
+        octaves = settings["octaves"]
+        waves = f", octaves of sines and cosines: {octaves}" if octaves else ""
+        return f"factors of width {', '.join(str(one) for one in settings['beta'])}{waves}; {sees}"
+    modes = ", ".join(f"{settings[name]} of {what}" for name, what in OF.items() if settings[name])
     return f"modes: {modes}; {sees}"

@@ -1,4 +1,4 @@
-"""`mpm-ref rom generate` and `train`: the data of a study, and the map that is made of them."""
+"""Implement `mpm-ref rom generate` and `train`: the data of a study, and its reduced model."""
 
 import os
 from collections import Counter
@@ -33,12 +33,12 @@ from .options import (
     Data,
     Overwrite,
     StudyName,
+    load_study,
     named,
     on_interrupt,
     require_ending,
     require_folder_name,
     require_free,
-    studied,
 )
 from .terminal import passing, warn
 
@@ -49,18 +49,17 @@ STATUS = {UNSTABLE: errors.UNSTABLE, NOT_WRITTEN: errors.NOT_WRITTEN}
 def make_data(
     name: StudyName,
     out: Annotated[Path | None, typer.Option(
-        "--out", "-o", help="Folder for the runs, default: STUDY-data here.")] = None,
+        "--out", "-o", help="Folder for the runs (default: STUDY-data).")] = None,
     workers: Annotated[int | None, typer.Option(
-        help="Processes of one thread each, default: all cores.", min=1)] = None,
+        help="Number of processes with one thread each (default: all cores).", min=1)] = None,
 ):
-    """Make the full-order runs of a study.
+    """Generate the full-order runs of a study.
 
-    Finished ones are left as they are, one that was cut off goes on from its checkpoint; Ctrl-C
-    whenever you like. Exit status: 0 done, 2 bad input, 3 a run became unstable, 4 a file could not
-    be written, 130 Ctrl-C.
+    Finished runs are skipped, interrupted ones resume from their checkpoints. Exit status:
+    0 success, 2 bad input, 3 a run became unstable, 4 a file could not be written, 130 Ctrl-C.
     """
     with one_line():
-        study = studied(name)
+        study = load_study(name)
         folder, ended = named(out, study, "-data"), []
         with options():
             require_folder_name(folder)
@@ -83,22 +82,22 @@ def make_data(
                 bar.update()
                 if bar.disable:
                     print(f"{len(ended)} of {len(study.mu)}: {file_of(folder, done.number)}, "
-                          f"{parameter_text(study, study.mu[done.number])}: {came(done)}",
+                          f"{parameter_text(study, study.mu[done.number])}: {origin_word(done)}",
                           flush=True)
-        print(f"{folder}: {counted(len(study.mu), 'run')} of {study.path.stem}: {in_sum(ended)}; "
-              f"{len(study.test)} held out")
+        print(f"{folder}: {counted(len(study.mu), 'run')} of {study.path.stem}: "
+              f"{counts_text(ended)}; {len(study.test)} held out")
 
 
-def came(done):
-    """How a run came about, of a `GeneratedRun` that ended well, in a word."""
+def origin_word(done):
+    """Return a word on how a `GeneratedRun` that ended well came about."""
     if done.why == SKIPPED:
         return THERE
     return CONTINUED if done.continued else MADE
 
 
-def in_sum(ended):
-    """How many runs were made, continued, and there before, of a `GeneratedRun` of each."""
-    count = Counter(map(came, ended))
+def counts_text(ended):
+    """Return the numbers of runs made, continued and found, as text."""
+    count = Counter(map(origin_word, ended))
     made, continued, there = (count[word] for word in (MADE, CONTINUED, THERE))
     return f"made {made}, continued {continued}, {there} were there"
 
@@ -116,22 +115,22 @@ def train(
     name: StudyName,
     data: Data = None,
     out: Annotated[Path | None, typer.Option(
-        "--out", "-o", help="File for the map, default: STUDY.npz here.")] = None,
+        "--out", "-o", help="File for the reduced model (default: STUDY.npz).")] = None,
     kind: Annotated[str | None, typer.Option(
-        help=f"Kind of the map: {', '.join(KEYS)}; default: as the study says.")] = None,
+        help=f"Kind of the map: {', '.join(KEYS)} (default: as in the study).")] = None,
     threads: Annotated[str, typer.Option(
-        metavar="N|cuda", help="Threads of PyTorch; cuda: a graphics processor.")] = "1",
+        metavar="N|cuda", help="Threads of PyTorch, or cuda for a graphics processor.")] = "1",
     overwrite: Overwrite = False,
 ):
-    """Make the map of a study from its runs.
+    """Train the reduced model of a study on its runs.
 
-    POD modes, straight or curved, are made at once; a network is trained, which needs PyTorch. A
-    training that is cut off goes on from its checkpoint, MAP.pt. Exit status: 0 done, 2 bad input,
-    4 a file could not be written, 130 Ctrl-C.
+    POD modes and polynomial manifolds are computed directly; a network is trained, which needs
+    PyTorch. An interrupted training resumes from its checkpoint, MAP.pt. Exit status: 0 success,
+    2 bad input, 4 a file could not be written, 130 Ctrl-C.
     """
     with one_line():
         with options():
-            study, machine = studied(name), machine_of(threads)
+            study, machine = load_study(name), machine_of(threads)
             out, data = named(out, study, ".npz"), named(data, study, "-data")
             checkpoint = out.with_suffix(".pt")
             require_map_place(out, study, overwrite)
@@ -143,7 +142,7 @@ def train(
                 warn(training_hints(study))
             about = {"command": f"mpm-ref rom train {name} --data {data} --out {out} "
                                 f"--kind {study.tables.reduced_model.kind} {typed(machine)}"}
-            with writing(), on_interrupt(lambda: resuming(checkpoint)):
+            with writing(), on_interrupt(lambda: resume_hint(checkpoint)):
                 model = fitted(study, snapshots, about, checkpoint, machine)
             write(out, model)
         reduce.forget_checkpoint(checkpoint)
@@ -152,9 +151,7 @@ def train(
 
 
 def require_device(kind, device):
-    """Raise ValueError for a kind of map that is not made on such a device, and where there is
-    none, or no PyTorch.
-    """
+    """Raise ValueError for a kind of map that does not support a device, or if that is missing."""
     if kind == NETWORK:
         reduce.trainer().device_of(device)
     elif device != DEVICES[0]:
@@ -166,15 +163,15 @@ def typed(machine):
     return f"--threads {machine.threads if machine.device == DEVICES[0] else machine.device}"
 
 
-def resuming(checkpoint):
-    """How a training goes on that was cut off."""
+def resume_hint(checkpoint):
+    """Return the hint on resuming an interrupted training."""
     if checkpoint.exists():
         return f"before the map was made; the same command again goes on from {checkpoint}"
     return "before there was a checkpoint; the same command again begins anew"
 
 
 def fitted(study, snapshots, about, checkpoint, machine):
-    """`Model` of a study's kind, with a bar of epochs."""
+    """Return the `Model` of a study's kind, with a progress bar of epochs."""
     if study.tables.reduced_model.kind != NETWORK:
         with one_thread():
             return reduce.compute_model(study, snapshots, about)

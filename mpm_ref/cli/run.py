@@ -1,4 +1,4 @@
-"""`mpm-ref run`: a scene into a results file, with progress, and what each way to end returns.
+"""Implement `mpm-ref run`: run a scene into a results file, with progress on the terminal.
 
 Exit status: 0 finished, or stopped at --steps; 2 the scene, the options or the files do not fit;
 3 the run became unstable; 4 a file could not be written; 130 Ctrl-C; 143 terminated.
@@ -37,13 +37,13 @@ from ..timestep import TooLarge
 from . import info
 from .catalogue import find_scene, keep_scene
 from .errors import INTERRUPT, NOT_WRITTEN, UNSTABLE, at_start, end, one_line, options
-from .options import Json
+from .options import Json, SceneName
 from .terminal import COMPILING, as_json, compiling, passing, warn
 
-FIELDS = f"To store, of {','.join(UNITS)}; default: {','.join(USUAL)}."
-EVERY = "Steps between checkpoints, default: one a minute."
-RESULTS = "Results file, default: SCENE.h5 here."
-GZIP = "Compression, 1 to 9, default: none."
+FIELDS = f"Fields to store, of {','.join(UNITS)} (default: {','.join(USUAL)})."
+EVERY = "Steps between checkpoints (default: one a minute)."
+RESULTS = "Results file (default: SCENE.h5)."
+GZIP = "Level of compression, 1 to 9 (default: none)."
 EXIT = {FINISHED: 0, AT_LIMIT: 0, INTERRUPTED: INTERRUPT, TERMINATED: 143}
 # The bar takes what the rest leaves of the line.
 LINE = "{{percentage:3.0f}}%|{{bar}}| {done} [{{elapsed}}<{{remaining}}{{postfix}}]"
@@ -52,22 +52,22 @@ SECONDS = LINE.format(done="t {n:.4g}/{total:g} s")
 
 
 def run(
-    name: Annotated[str, typer.Argument(metavar="SCENE", help="A TOML file, or a shipped scene.")],
+    name: SceneName,
     out: Annotated[Path | None, typer.Option("--out", "-o", help=RESULTS)] = None,
-    steps: Annotated[int | None, typer.Option(help="Stop after so many steps in all.")] = None,
-    threads: Annotated[int | None, typer.Option(help="Number of threads, default: all.")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint.")] = False,
+    steps: Annotated[int | None, typer.Option(help="Stop after this many steps in all.")] = None,
+    threads: Annotated[int | None, typer.Option(help="Number of threads (default: all).")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Resume from the checkpoint.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the results.")] = False,
     checkpoint_every: Annotated[int | None, typer.Option(help=EVERY)] = None,
     fields: Annotated[str | None, typer.Option(help=FIELDS)] = None,
     gzip: Annotated[int | None, typer.Option(help=GZIP)] = None,
     json: Json = False,
-    quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress bar.")] = False,
 ):
     """Run a scene into a results file.
 
-    Ctrl-C ends the run after the step being made, with a checkpoint; after that, or whatever else
-    ends it, --resume continues bit for bit. Exit status: 0 done, 2 bad input, 3 the run became
+    Ctrl-C ends the run after the current step, with a checkpoint. --resume continues an interrupted
+    run bit for bit, whatever ended it. Exit status: 0 success, 2 bad input, 3 the run became
     unstable, 4 a file could not be written, 130 Ctrl-C, 143 terminated.
     """
     with one_line():
@@ -99,7 +99,7 @@ def use_threads(n):
 
 @dataclass(frozen=True)
 class Request:
-    """What the command line asked for."""
+    """The scene, the results file and the output options of a command."""
 
     scene: str
     out: Path
@@ -108,8 +108,10 @@ class Request:
 
 
 class Bar(Watch):
-    """What is run, on the output; and progress on the error channel of a terminal: steps or time
-    done, time left, dt, kinetic and total energy. A context manager.
+    """A `Watch` that prints the problem, and shows a progress bar on a terminal.
+
+    The bar shows steps or time done, time left, dt, and kinetic and total energy. It is a context
+    manager.
     """
 
     def __init__(self, request):
@@ -125,7 +127,7 @@ class Bar(Watch):
 
     @property
     def began(self):
-        """Whether the run began."""
+        """Return whether the run has begun."""
         return self.bar is not None
 
     def begin(self, problem, state):
@@ -145,7 +147,7 @@ class Bar(Watch):
         self.bar.set_postfix_str(COMPILING)
 
     def done(self, state):
-        """How far a state is."""
+        """Return the progress of a state: its step, or its time [s]."""
         return state.step if self.total else state.t
 
     def step(self, state, dt):
@@ -154,7 +156,7 @@ class Bar(Watch):
         if self.steps == 1:
             self.start_clock(state)
         t = f"t {state.t:.3g}, " if self.total else ""
-        solve = "" if state.solve is None else f", {in_short(state.solve)}"
+        solve = "" if state.solve is None else f", {solve_text(state.solve)}"
         self.bar.set_postfix_str(f"{t}dt {dt:.3g} s{solve}{self.energies}", refresh=False)
         self.bar.update(self.done(state) - self.bar.n)
 
@@ -181,13 +183,13 @@ class Bar(Watch):
             self.bar.close()
 
 
-def in_short(report):
-    """Iterations and last residual of an implicit step."""
+def solve_text(report):
+    """Return iterations and last residual of an implicit step as text."""
     return f"{report.iterations} it to {report.residuals[-1]:.0e}"
 
 
 def run_scene(problem, bar, options):
-    """Run a problem as asked; returns the exit status. Faults of the input are raised."""
+    """Run a problem and return the exit status. Errors of the input are raised."""
     request = bar.request
     try:
         outcome = running.run(problem, request.out, options, bar)
@@ -209,7 +211,7 @@ def _broke_off(fault, request):
     """End a run that could not end between two steps by itself."""
     said = str(fault) or "interrupted at once"
     status = {NotWritten: NOT_WRITTEN, KeyboardInterrupt: INTERRUPT}.get(type(fault), UNSTABLE)
-    next_ = last_good(request, again=status != UNSTABLE)
+    next_ = last_checkpoint(request, again=status != UNSTABLE)
     end(f"{said}{'' if said.endswith('?') else '.'} {next_}", status)
 
 
@@ -232,13 +234,14 @@ def _report(outcome, request, facts):
 
 
 def how_to_resume(request):
-    """The command that continues a run."""
+    """Return the command that resumes a run."""
     return f"mpm-ref run {request.scene} --out {request.out} --resume"
 
 
-def last_good(request, again):
-    """Where the last checkpoint of a run stands, and how to go on: from it, or, where the same
-    scene would break again, with another one.
+def last_checkpoint(request, again):
+    """Return a sentence on the last checkpoint of a run and on how to continue.
+
+    again: whether to resume from it; otherwise the same scene would break down again.
     """
     path = checkpoint_of(request.out)
     try:

@@ -12,7 +12,7 @@ COMPILING = "compiling kernels: seconds, once per version"
 
 
 def passing(quiet=False, **line):
-    """A line for people, a tqdm bar: on terminals only, and on none if quiet."""
+    """Return a tqdm progress bar, shown on terminals only, and not if quiet."""
     size = shutil.get_terminal_size((WIDEST, 24))
     return tqdm(file=sys.stderr, disable=quiet or None, ncols=min(size.columns, WIDEST),
                 nrows=size.lines, **line)      # tqdm shows nothing where they are unknown
@@ -20,7 +20,7 @@ def passing(quiet=False, **line):
 
 @contextmanager
 def compiling(quiet=False):
-    """While the block runs, a terminal says that kernels are compiled; then the line is gone."""
+    """Show on a terminal that kernels are compiled while the block runs."""
     line = passing(quiet, desc=COMPILING, bar_format="{desc}", leave=False)
     try:
         yield line
@@ -29,13 +29,13 @@ def compiling(quiet=False):
 
 
 def warn(sentences):
-    """Say warnings, a line each."""
+    """Print warnings on stderr, a line each."""
     for sentence in sentences:
         print(f"mpm-ref: warning: {sentence}", file=sys.stderr)
 
 
 def as_json(facts):
-    """Facts as JSON that every reader takes: numbers that are not finite become null."""
+    """Return facts as JSON; numbers that are not finite become null."""
     return json.dumps(_finite(facts), indent=1)
 
 

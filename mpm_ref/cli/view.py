@@ -1,4 +1,4 @@
-"""`mpm-ref plot | animate | export | scenes`: commands that look at results and scenes."""
+"""Implement `mpm-ref plot | animate | export | scenes`: show results and list scenes."""
 
 from pathlib import Path
 from typing import Annotated
@@ -9,25 +9,26 @@ from .. import plotting, scene
 from ..store.atomic import require_place
 from ..store.results import SCALARS, Results
 from ..store.vtkhdf import export_grid, export_particles
-from .catalogue import shipped_scenes
+from .catalogue import bundled_scenes
 from .errors import one_line, options
 from .options import PICTURES, Json, require_ending
 from .terminal import print_titles
 
 ResultsFile = Annotated[Path, typer.Argument(metavar="FILE", help="A results file.")]
-Scalar = Annotated[str, typer.Option(help=f"Colour: {', '.join(SCALARS)}.")]
-View = Annotated[str | None, typer.Option(help="Axes to the right and up, such as xz.")]
+Scalar = Annotated[str, typer.Option(help=f"Field shown by colour: {', '.join(SCALARS)}.")]
+View = Annotated[str | None, typer.Option(help="Axes to the right and upwards, such as xz.")]
 
 
 def plot(
     file: ResultsFile,
-    frame: Annotated[int, typer.Option(help="Number from 0; -1 is the last.")] = -1,
+    frame: Annotated[int, typer.Option(help="Frame, counted from 0; -1 is the last.")] = -1,
     field: Scalar = "speed",
     view: View = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="FILE.png")] = None,
 ):
-    """Draw the particles and the solids of one frame (png, pdf or svg); 3D solids are cut halfway
-    of the particles' depth.
+    """Plot the particles and solids of one frame (png, pdf or svg).
+
+    In 3D, solids are cut at half the depth of the particles.
     """
     what = {"frame": frame, "field": field, "view": _axes(view)}
     _to_file(plotting.save_plot, file, out, PICTURES, **what)
@@ -40,23 +41,23 @@ def animate(
     fps: Annotated[int, typer.Option(help="Frames per second.", min=1, max=100)] = 20,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="FILE.gif")] = None,
 ):
-    """Make a GIF of all frames."""
+    """Create a GIF animation of all frames."""
     _to_file(plotting.animate, file, out, (".gif",), field=field, view=_axes(view), fps=fps)
 
 
 def export(
     file: ResultsFile,
-    grid: Annotated[bool, typer.Option("--grid", help="Nodes, not particles.")] = False,
+    grid: Annotated[bool, typer.Option("--grid", help="Export nodes, not particles.")] = False,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="FILE.vtkhdf")] = None,
 ):
-    """Write VTKHDF, which ParaView and VTK open: particles, or density and velocity of nodes."""
+    """Export results as VTKHDF for ParaView: particles, or density and velocity of nodes."""
     _to_file(export_grid if grid else export_particles, file, out, (".vtkhdf", ".hdf"))
 
 
 def scenes(json: Json = False):
-    """List the scenes that come with the package."""
+    """List the bundled scenes."""
     with one_line():
-        titles = {name: scene.load(path).title for name, path in shipped_scenes().items()}
+        titles = {name: scene.load(path).title for name, path in bundled_scenes().items()}
         print_titles(titles, json)
 
 

@@ -5,7 +5,7 @@ import json
 import pytest
 from command_line import SCENE, mpm_ref
 
-from mpm_ref.cli.catalogue import shipped_scenes
+from mpm_ref.cli.catalogue import bundled_scenes
 from mpm_ref.cli.info import of_problem, problem_lines
 from mpm_ref.scene import build, load
 from mpm_ref.simulate import simulate
@@ -71,9 +71,9 @@ def test_steps_that_were_not_solved_are_told(tmp_path, iterations, all_solved):
     assert len(facts["warnings"]) == (not all_solved)
 
 
-@pytest.mark.parametrize("name", sorted(shipped_scenes()))
+@pytest.mark.parametrize("name", sorted(bundled_scenes()))
 def test_opening_lines_of_every_shipped_scene(name):
-    problem = build(load(shipped_scenes()[name]))
+    problem = build(load(bundled_scenes()[name]))
     lines = problem_lines(of_problem(problem))
     assert f"{sum(len(body.id) for body in problem.bodies)} particles" in lines[0]
     assert ("implicit: hot" if problem.integrator == "implicit" else "wave speed") in lines[1]

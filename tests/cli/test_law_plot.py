@@ -222,6 +222,6 @@ def test_pictures_are_what_their_names_say(tmp_path, ending, begins):
 ])
 def test_what_a_picture_needs_is_said_first(tmp_path, monkeypatch, options, status, words):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("mpm_ref.cli.law.beside_truth", None)
+    monkeypatch.setattr("mpm_ref.cli.law.compare_with_truth", None)
     assert_told(plot(tmp_path, identified(), *options), status, words)
     assert sorted(file.name for file in tmp_path.iterdir()) == ["cube.toml", "laws.npz"]

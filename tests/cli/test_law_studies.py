@@ -4,7 +4,7 @@ import pytest
 from command_line import assert_told, mpm_ref
 from small_laws import DT, E, write_study
 
-from mpm_ref.cli.catalogue import shipped_scenes, shipped_studies
+from mpm_ref.cli.catalogue import bundled_scenes, bundled_studies
 from mpm_ref.materials.learned.table import KINDS
 from mpm_ref.nclaw.study import study as law_study
 from mpm_ref.nclaw.study.study import load
@@ -21,7 +21,7 @@ def of_method(method):
 
 
 def test_shipped_studies_load():
-    found = {name: load(path, shipped_scenes()) for name, path in shipped_studies().items()
+    found = {name: load(path, bundled_scenes()) for name, path in bundled_studies().items()
              if name.startswith("law_")}
     assert found["law_jelly"].tables.train == Recipe()
     assert found["law_jelly"].scene.every == 1

@@ -181,6 +181,6 @@ def test_a_folder_in_place_of_the_file_is_told(scene, tmp_path, earlier):
 
 def test_help_says_what_is_the_default():
     said = " ".join(mpm_ref("run", "--help").stdout.replace("│", " ").split())
-    for words in ("Number of threads, default: all.", "Compression, 1 to 9, default: none."):
+    for words in ("Number of threads (default: all).", "Level of compression, 1 to 9"):
         assert words in said
     assert "The material point method, explicit and implicit:" in mpm_ref("--help").stdout

@@ -12,7 +12,7 @@ from small_studies import CURVED, STEPS, modelled, write
 from typer.main import get_command
 
 from mpm_ref.cli import rom
-from mpm_ref.cli.catalogue import shipped_studies
+from mpm_ref.cli.catalogue import bundled_studies
 from mpm_ref.rom import model_file
 from mpm_ref.rom.model_file import Model
 from mpm_ref.rom.snapshots import displacement_error, position_error
@@ -130,7 +130,7 @@ def test_a_study_with_a_fault_is_told_as_one(tmp_path, before, after, words):
 # lists and help
 
 def test_the_shipped_studies_are_listed_with_their_titles():
-    tables = {name: tomllib.loads(file.read_text()) for name, file in shipped_studies().items()}
+    tables = {name: tomllib.loads(file.read_text()) for name, file in bundled_studies().items()}
     titles = {name: found["title"] for name, found in tables.items() if "map" in found}
     assert len(titles) >= 3
     assert json.loads(mpm_ref("rom", "studies", "--json").stdout) == titles

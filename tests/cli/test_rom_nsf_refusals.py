@@ -6,7 +6,7 @@ import pytest
 from command_line import assert_told, mpm_ref
 from small_nsf_studies import SCENE, modelled, write
 
-from mpm_ref.cli.catalogue import shipped_scenes, shipped_studies
+from mpm_ref.cli.catalogue import bundled_scenes, bundled_studies
 from mpm_ref.rom.study.study import load
 from validation.nsf.studies import jelly
 
@@ -111,7 +111,7 @@ def test_more_modes_than_the_runs_hold_are_refused(made, tmp_path):
 # Shipped studies.
 
 def test_the_papers_study_has_the_runs_of_the_experiment():
-    shipped, experiment = load(shipped_studies()["jelly"], shipped_scenes()), jelly()
+    shipped, experiment = load(bundled_studies()["jelly"], bundled_scenes()), jelly()
     assert shipped.mu[list(shipped.train), 0].tolist() == list(experiment.train)
     assert shipped.mu[list(shipped.test), 0].tolist() == list(experiment.test)
     assert shipped.tables.reduced_model.sizes == experiment.sizes

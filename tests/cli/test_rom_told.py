@@ -9,7 +9,7 @@ from command_line import assert_told, mpm_ref
 from small_studies import modelled, write
 
 from mpm_ref.cli import rom
-from mpm_ref.cli.rom import astray
+from mpm_ref.cli.rom import range_warnings
 from mpm_ref.rom.study import monitor, record
 from mpm_ref.rom.study.monitor import StateCheck
 
@@ -35,10 +35,10 @@ def test_a_run_without_a_step_has_no_means():
 
 def test_states_out_of_bounds_are_counted_and_the_first_is_told():
     out, off = WELL._replace(beyond=2.0), WELL._replace(off=0.5)
-    assert list(astray({}, 16, 0.1)) == []
-    (said,) = astray({1: out, 4: off}, 16, 0.3)
+    assert list(range_warnings({}, 16, 0.1)) == []
+    (said,) = range_warnings({1: out, 4: off}, 16, 0.3)
     assert said.startswith("2 of 16 states, from t = 0.3 s on, are ")
-    rest, said = astray({0: off, 1: out}, 16, 0.1)
+    rest, said = range_warnings({0: off, 1: out}, 16, 0.1)
     assert rest == "the map does not give the body at rest: train longer, or another kind"
     assert said.startswith("2 of 16 states, from t = 0 s on, are ")
 

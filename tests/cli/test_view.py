@@ -9,7 +9,7 @@ from matplotlib.colors import to_rgba
 from PIL import Image
 
 from mpm_ref import oracle, plotting
-from mpm_ref.cli.catalogue import find_scene, shipped_scenes
+from mpm_ref.cli.catalogue import bundled_scenes, find_scene
 from mpm_ref.store.results import Results
 from mpm_ref.store.running import checkpoint_of
 
@@ -42,8 +42,8 @@ def test_info_of_damaged_files(finished, tmp_path):
 def test_scenes_are_listed():
     done = mpm_ref("scenes")
     assert done.exit_code == 0
-    assert set(json.loads(mpm_ref("scenes", "--json").stdout)) == set(shipped_scenes())
-    for name in shipped_scenes():
+    assert set(json.loads(mpm_ref("scenes", "--json").stdout)) == set(bundled_scenes())
+    for name in bundled_scenes():
         assert name in done.stdout
         assert find_scene(name) == ROOT / "scenes" / f"{name}.toml"
 

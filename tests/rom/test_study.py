@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from small_studies import STEPS, study, write
 
-from mpm_ref.cli.catalogue import shipped_scenes, shipped_studies
+from mpm_ref.cli.catalogue import bundled_scenes, bundled_studies
 from mpm_ref.rom.study.reduce import size_ratios
 from mpm_ref.rom.study.run import RunOptions
 from mpm_ref.rom.study.study import load
@@ -29,7 +29,7 @@ def told(folder, *edits, **scene):
 
 @pytest.mark.parametrize("name", ["gravity", "torsion"])
 def test_shipped_studies_are_the_experiments(name):
-    ours, theirs = load(shipped_studies()[name], shipped_scenes()), STUDIES[name]
+    ours, theirs = load(bundled_studies()[name], bundled_scenes()), STUDIES[name]
     assert np.array_equal(ours.mu, theirs.mu)
     assert (ours.test, ours.train) == (theirs.test, theirs.train)
     for mu in ours.mu[[0, 7, -1]]:
@@ -37,8 +37,8 @@ def test_shipped_studies_are_the_experiments(name):
 
 
 def test_all_shipped_studies_load():
-    assert {"gravity", "gravity_small", "torsion"} <= set(shipped_studies())
-    small = load(shipped_studies()["gravity_small"], shipped_scenes())
+    assert {"gravity", "gravity_small", "torsion"} <= set(bundled_studies())
+    small = load(bundled_studies()["gravity_small"], bundled_scenes())
     assert small.base.steps == 15
     assert small.base.body[0].sampling.count == 400
 
@@ -254,7 +254,7 @@ def test_every_key_of_a_map_belongs_to_one_kind():
 
 def test_a_study_may_scale_the_weights_to_its_body_and_steps(tmp_path):
     """Without a network or PyTorch: LDM's own studies need no other weights."""
-    own = load(shipped_studies()["gravity"], shipped_scenes()).base
+    own = load(bundled_studies()["gravity"], bundled_scenes()).base
     assert size_ratios(own) == pytest.approx((1.0, 1.0))
     assert size_ratios(study(tmp_path).base) == pytest.approx((0.8 / 0.4, 0.01 * 144.0))
     network = '"network"\nlatent = "modes"\nweights = "scaled"'
