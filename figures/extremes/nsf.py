@@ -37,7 +37,7 @@ def draw(results):
 
 def runs(ax, table):
     """Draw a mark for each run that reached its end, with its parameter."""
-    for (scene,), rows in series(table, ("map",)).items():
+    for (scene,), rows in series(table, ("model",)).items():
         rows = rows & np.isfinite(table["error"])
         x, y = table["beyond"][rows], table["error"][rows] / table["usual"][rows]
         ax.plot(x, y, "o", color=COLOURS[scene], ms=5, fillstyle="none", label=scene)

@@ -13,7 +13,7 @@ from ..common.style import OTHERS, TRANSFERS, scales
 NEEDS = ["trade.explicit.mms", "trade.explicit.cantilever"]
 TITLES = ("manufactured solution", "cantilever")
 MARKS = {"dt": "o", "dx": "s", "particles": "D", "sampling": "^", "degree": "v", "storage": "h"}
-FORMS = {"cpu": FuncFormatter(lambda x, _: f"{x:g}"), "bytes": EngFormatter(sep=" ")}
+FORMS = {"cpu": FuncFormatter(lambda x, _: f"{x:g}"), "nbytes": EngFormatter(sep=" ")}
 
 
 def scale(results):
@@ -25,7 +25,7 @@ def draw(results):
     figure, axes = plt.subplots(2, 2, figsize=(8.6, 6.8), sharex="col")
     for row, id, title in zip(axes, NEEDS, TITLES, strict=True):
         points = results.table(id, "points")
-        for ax, cost, on_front in zip(row, ("cpu", "bytes"), ("pareto_cpu", "pareto_bytes"),
+        for ax, cost, on_front in zip(row, ("cpu", "nbytes"), ("pareto_cpu", "pareto_bytes"),
                                       strict=True):
             scatter(ax, points, cost, points[on_front] > 0)
         row[0].set_ylabel(f"error, {title}")

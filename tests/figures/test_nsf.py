@@ -17,7 +17,7 @@ SAMPLES = {"scene": 4 * ["jelly"] + ["metal"], "fields": ["random", "random", "c
            "samples": [10, 10, 10, 90, 40], "origin": [0.002, 0.004, 0.001, 0.0005, np.inf]}
 STEPS = {"scene": ["jelly", "jelly", "metal", "jelly"], "faster": [1.0, 2.0, 1.0, 4.0],
          "origin": [0.002, 0.003, 0.001, np.inf]}
-RUNS = {"map": ["jelly", "jelly", "metal"], "what": [0.4, 1.0, 5.0], "usual": [2.0, 2.0, 1.0],
+RUNS = {"model": ["jelly", "jelly", "metal"], "what": [0.4, 1.0, 5.0], "usual": [2.0, 2.0, 1.0],
         "error": [2.0, 30.0, np.inf], "beyond": [0.2, 2.0, 9.0]}
 RATES = {"bound": [0.5, 1.0], "false_alarms": [0.5, 0.0], "misses": [0.0, 0.25]}
 

@@ -85,11 +85,11 @@ def of_record(one, monkeypatch, fault):
 
 
 def of_extremes(one, monkeypatch, fault):
-    net, way = ldm_runs.learned("gravity-r4"), RunOptions(points=20)
-    run = ldm_run(one, net.map, way, net.rest)
-    start = next(checked_states(run, map_monitor(one, net.map, net.xhat)))
+    net, options = ldm_runs.trained_reduction("gravity-r4"), RunOptions(points=20)
+    run = ldm_run(one, net.field, options, net.rest)
+    start = next(checked_states(run, map_monitor(one, net.field, net.xhat)))
     monkeypatch.setattr(ldm_runs, "checked_states", lambda *_, **__: broken(fault, start))
-    return ldm_runs.ended(one, [one.X], net, way).said
+    return ldm_runs.reduced_end(one, [one.X], net, options).message
 
 
 PLACES = [of_path, of_compared, of_race, of_record, of_extremes]

@@ -1,61 +1,61 @@
-"""The hardest states of the other experiments, each solved by every method there is.
+"""The hardest states of the other experiments, solved by every method.
 
-The others try five methods on many states. Here all twelve meet one state of each kind, in two
-dimensions, in one step of 1/24 s. What is judged is that none ends unsoundly; which of them
-converge is told.
+The other experiments try five methods on many states. Here all twelve solve one state of each kind,
+in two dimensions, in one step of 1/24 s. None may end unsoundly; how many converge is recorded.
 """
 
 from mpm_ref.hot.methods import METHODS as ALL
 
 from ..common.registry import experiment
-from .hot_bodies import DX, FRAME, elastic, gravity
-from .hot_broken import broken
-from .hot_solve import CONVERGED, EPS, OUTER, STOPPED, Setup, solve, table_of
-from .hot_sparse import bodies
-from .hot_stiffness import STIFFEST, bent
-from .hot_time_step import thrown
+from .blocks import DX, FRAME, elastic, gravity
+from .hot_broken import deformed_block
+from .hot_parameters import STIFFEST, strained_box, thrown_box
+from .hot_pieces import sparse_bodies
+from .hot_solve import CONVERGED, EPS, OUTER, STOPPED, StepSetup, solve, solve_table
 
-LIKE_ALL = {"gast15": {"norm": "characteristic", "eps": EPS}}   # printed with an L2 norm [kg m/s]
+# Gast15 is printed with an L2 norm [kg m/s].
+EQUAL_TOLERANCE = {"gast15": {"norm": "characteristic", "eps": EPS}}
 QUICK = ("inverted", "contrast")
 
 
 def setups(rng):
-    """{name: `Setup`} of the hard states."""
-    made = {
-        "inverted": (broken(2, 1e6, "inverted", "all", rng),),
-        "collapsed": (broken(2, 1e6, "flat", "all", rng),),
-        "stretched": (broken(2, 1e6, 3.0, "all", rng),),
-        "one per cell": bodies(2, 1e9, rng)["one per cell"],
-        "dust": bodies(2, 1e2, rng)["scattered dust"],
+    """Return {name: `StepSetup`} of the hard states."""
+    bodies = {
+        "inverted": (deformed_block(2, 1e6, "inverted", "all", rng),),
+        "collapsed": (deformed_block(2, 1e6, "flat", "all", rng),),
+        "stretched": (deformed_block(2, 1e6, 3.0, "all", rng),),
+        "one per cell": sparse_bodies(2, 1e9, rng)["one per cell"],
+        "dust": sparse_bodies(2, 1e2, rng)["scattered dust"],
     }
     return {
-        **{name: Setup(found, DX, FRAME, gravity(2)) for name, found in made.items()},
-        "stiff": bent(2, (elastic(STIFFEST), elastic(STIFFEST))),
-        "contrast": bent(2, (elastic(1e-8 * STIFFEST), elastic(STIFFEST))),
-        "incompressible": bent(2, (elastic(1e6, 0.4999), elastic(1e6, 0.4999))),
-        "past CFL 3": thrown(2, 1e9, FRAME, 3.0 * DX / FRAME),
+        **{name: StepSetup(own, DX, FRAME, gravity(2)) for name, own in bodies.items()},
+        "stiff": strained_box(2, (elastic(STIFFEST), elastic(STIFFEST))),
+        "contrast": strained_box(2, (elastic(1e-8 * STIFFEST), elastic(STIFFEST))),
+        "incompressible": strained_box(2, (elastic(1e6, 0.4999), elastic(1e6, 0.4999))),
+        "past CFL 3": thrown_box(2, 1e9, FRAME, 3.0 * DX / FRAME),
     }
 
 
-def ends_of(setup):
-    """`End`s of a setup by all methods, all to the same tolerance."""
-    return [solve(setup, method, **LIKE_ALL.get(method, {})) for method in ALL]
+def solve_by_all_methods(setup):
+    """Return the `SolveEnd`s of a setup by all methods, all to the same tolerance."""
+    return [solve(setup, method, **EQUAL_TOLERANCE.get(method, {})) for method in ALL]
 
 
 @experiment("extremes.hot.every_method", title="The hardest states by every method",
             profiles=("quick", "standard"), budget={"quick": 10, "standard": 15})
 def every_method(run):
-    """One step from every state by every method."""
-    made = setups(run.rng)
-    names = run.choose(quick=QUICK, standard=tuple(made))
-    rows = [(name, end) for name in run.progress(names, "states") for end in ends_of(made[name])]
+    """Solve one step from every state by every method."""
+    states = setups(run.rng)
+    names = run.choose(quick=QUICK, standard=tuple(states))
+    rows = [(name, end) for name in run.progress(names, "states")
+            for end in solve_by_all_methods(states[name])]
     for method in ALL:
         record_method(run, method, [(name, end) for name, end in rows if end.method == method])
-    table_of(run, ("state",), rows)
+    solve_table(run, ("state",), rows)
 
 
 def record_method(run, method, rows):
-    """How many of a method's solves, rows (state, `End`), were unsound, and how many converged."""
+    """Record how many of a method's solves, rows (state, `SolveEnd`), were unsound or converged."""
     target = f"extremes.hot.every_method.{method}"
     scale = f"2D, one step of 1/24 s from {len(rows)} states: {', '.join(name for name, _ in rows)}"
     unsound = [f"{name}: {e.kind}" for name, e in rows if e.kind not in (CONVERGED, STOPPED)]

@@ -1,12 +1,12 @@
-"""The extremes that tests hold already: where each of them is."""
+"""Extremes that the tests cover, with the place of each."""
 
 import ast
 
 from ..common.registry import experiment
 from ..common.results import ROOT
 
-# What, and the test file with a word that names of tests in it must contain.
-HELD = (
+# Extreme, test file, and a word that the names of its tests contain.
+TESTED = (
     ("affine fields are reproduced by G2P after P2G", "core/test_transfer", "affine"),
     ("partition of unity, gradients that sum to zero, at cell faces", "core/test_spline", "unity"),
     ("the SPD-projected differential", "materials/test_materials", "projected"),
@@ -20,19 +20,19 @@ HELD = (
 )
 
 
-@experiment("extremes.explicit.elsewhere", title="Extremes that the tests hold",
+@experiment("extremes.explicit.elsewhere", title="Extremes that the tests cover",
             profiles=("quick", "standard"), budget={"quick": 0.1, "standard": 0.1})
-def elsewhere(run):
-    """A pointer to each; they pass or fail with `make test`, not here."""
-    for what, file, word in HELD:
-        found = tests_of(file, word)
-        run.record(f"extremes.explicit.elsewhere.{file}{'.' + word if word else ''}", len(found),
+def tested_extremes(run):
+    """Record where each is tested; `make test` decides whether it passes."""
+    for what, file, word in TESTED:
+        names = tests_of(file, word)
+        run.record(f"extremes.explicit.elsewhere.{file}{'.' + word if word else ''}", len(names),
                    unit="tests", comparator="info", scale="run by `make test`",
-                   note=f"{what}: tests/{file}.py, {', '.join(found[:3]) or 'none'}")
+                   note=f"{what}: tests/{file}.py, {', '.join(names[:3]) or 'none'}")
 
 
 def tests_of(file, word):
-    """Names of the test functions of a file that contain a word."""
+    """Return the names of a file's test functions that contain a word."""
     path = ROOT / "tests" / f"{file}.py"
     if not path.exists():
         return []

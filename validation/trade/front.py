@@ -1,9 +1,9 @@
-"""Pareto fronts of measured points, and what they are recorded as."""
+"""Pareto fronts of measured settings, and their records."""
 
 import numpy as np
 
 from ..extremes.outcome import STOPS
-from .measure import COLUMNS, LOST
+from .measure import COLUMNS, WRONG
 
 EMULATED = (
     "32-bit storage is emulated: the state is rounded to single precision after every step, and "
@@ -14,7 +14,7 @@ TARGETS = (0.3, 0.1, 0.03, 0.01, 0.003, 0.001)
 
 
 def front(costs, errors):
-    """Mask (N,) of the points that no other one beats in both cost and error; NaN never is one."""
+    """Return the mask (N,) of points that no other beats in both cost and error; never of NaN."""
     costs, errors = np.asarray(costs, dtype=float), np.asarray(errors, dtype=float)
     mask = np.zeros(len(costs), dtype=bool)
     least = np.inf
@@ -25,16 +25,16 @@ def front(costs, errors):
 
 
 def cheapest(points, most, cost):
-    """The good point of least cost with an error of at most `most`, or None."""
+    """Return the good point of least cost with an error of at most `most`, or None."""
     fit = [p for p in points if p.good and p.error <= most]
     return min(fit, key=cost, default=None)
 
 
 def record_points(run, points, scale):
-    """Table of all points, the cheapest settings, and the failures."""
+    """Record the table of all points, the cheapest settings, and the failures."""
     errors = [p.error if p.good else np.nan for p in points]
     by_cpu = front([p.cpu for p in points], errors)
-    by_bytes = front([p.bytes for p in points], errors)
+    by_bytes = front([p.nbytes for p in points], errors)
     run.table("points", COLUMNS, [(p.knob, *p.setting, *p[2:], int(c), int(b))
                                   for p, c, b in zip(points, by_cpu, by_bytes, strict=True)])
     record_cheapest(run, points, scale)
@@ -42,40 +42,43 @@ def record_points(run, points, scale):
 
 
 def record_cheapest(run, points, scale):
-    """The table "cheapest setting with error at most x", by CPU seconds and by bytes."""
+    """Record the table "cheapest setting with error at most x", by CPU seconds and by bytes."""
     name, rows = run.experiment.id, []
     for most in TARGETS:
         fast = cheapest(points, most, lambda p: p.cpu)
-        small = cheapest(points, most, lambda p: p.bytes)
+        small = cheapest(points, most, lambda p: p.nbytes)
         if fast is None:
             rows.append((most, "none", np.nan, "none", 0))
             continue
-        rows.append((most, fast.setting.words(), fast.cpu, small.setting.words(), small.bytes))
+        fast_text, small_text = fast.setting.description(), small.setting.description()
+        rows.append((most, fast_text, fast.cpu, small_text, small.nbytes))
         run.record(f"{name}.cheapest.{most:g}", fast.cpu, unit="CPU s", comparator="info",
-                   scale=scale, note=f"with an error of at most {most:g}: {fast.setting.words()} "
-                   f"(error {fast.error:.2g}); least memory: {small.setting.words()}, "
-                   f"{small.bytes / 1e6:.2f} MB")
+                   scale=scale, note=f"with an error of at most {most:g}: {fast_text} "
+                   f"(error {fast.error:.2g}); least memory: {small_text}, "
+                   f"{small.nbytes / 1e6:.2f} MB")
     run.table("cheapest", ("error_at_most", "least_cpu", "cpu_s", "least_bytes", "bytes"), rows)
 
 
 def record_failures(run, points, scale):
-    """Failures are points too: how many, whether each was told, and none within the bound."""
+    """Record the failures: their number, that each stopped by a limit, and that the bound refuses
+    each.
+    """
     name, bad = run.experiment.id, [p for p in points if not p.good]
     run.record(f"{name}.failures", len(bad), unit="settings", comparator="info", scale=scale,
-               note="; ".join(f"{p.setting.words()}: {p.end}, step {p.steps}" for p in bad))
-    broken = [p for p in bad if p.end != LOST]
+               note="; ".join(f"{p.setting.description()}: {p.end}, step {p.steps}" for p in bad))
+    broken = [p for p in bad if p.end != WRONG]
     smooth = [p for p in broken if p.setting.degree > 1]
     run.record(f"{name}.broken_unrefused", sum(not p.refused for p in smooth),
                unit="settings", comparator="<=", bound=0, scale=scale,
-               note="quadratic and cubic settings that broke, all run in spite of the bound, and "
-                    "that it would not have refused at any step; a wrong answer (an error above 1) "
+               note="quadratic and cubic settings that broke, all run past the bound, and that "
+                    "it would not have refused at any step; a wrong answer (an error above 1) "
                     "is a failure, not a broken run")
     linear = sum(not p.refused for p in broken if p.setting.degree == 1)
     run.record(f"{name}.broken_unrefused_linear", linear, unit="settings", comparator="info",
-               scale=scale, note="the same for linear splines, whose bound is necessary only "
+               scale=scale, note="as above, for linear splines, whose bound is necessary only "
                "(docs/explanation/timestep.md): next to a node a particle's share of the mass goes "
-               "to zero, and with it the time step, for less steps than lie between two looks "
-               "at the bound")
+               "to zero, and with it the time step, for fewer steps than lie between two "
+               "checks of the bound")
     run.record(f"{name}.told", sum(p.end in STOPS for p in broken), paper=len(broken),
                unit="settings", comparator="=", scale=scale,
                note="broken runs that ended with the sentence of a limit")

@@ -21,7 +21,7 @@ LEVELS = (1e-1, 1e-2, 1e-3, 1e-4)       # errors at which times are read off
 PAPER = 1e-7            # tolerance of the paper
 
 
-class Point(NamedTuple):
+class SolvePoint(NamedTuple):
     """One solve of a step: what it took, and what it left in the particles."""
 
     method: str
@@ -37,7 +37,7 @@ class Point(NamedTuple):
     cells_rms: float    # of the displacement, root mean square [dx]
 
 
-POINT = Point._fields
+POINT_FIELDS = SolvePoint._fields
 
 
 @experiment("trade.hot.bar", title="HOT at equal error: one step of the twisted bar",
@@ -51,13 +51,13 @@ def equal_error(run):
     rows = []
     for E in run.progress(moduli, "moduli"):
         scene = bar(dx, E, "pn-pcg", steps, eps=1e-9)
-        found = one_stiffness(run, step_after(scene, steps), E, (ladder, repeats))
+        found = points_for_stiffness(run, step_after(scene, steps), E, (ladder, repeats))
         rows += [(E, *p) for p in found]
-    run.table("points", ("E", *POINT), rows)
+    run.table("points", ("E", *POINT_FIELDS), rows)
 
 
-def one_stiffness(run, step, E, plan):
-    """`Point`s for one modulus, by a plan (tolerances, repeats); records what they say."""
+def points_for_stiffness(run, step, E, plan):
+    """`SolvePoint`s for one modulus, by a plan (tolerances, repeats); records what they say."""
     ladder, repeats = plan
     exact = solve_step(step, "pn-pcg", eps=EXACT)
     check = solve_step(step, "pn-mgpcg", eps=EXACT)
@@ -67,14 +67,15 @@ def one_stiffness(run, step, E, plan):
     run.record(f"{name}.references", least.velocity, unit="1", comparator="<=", bound=AGREE,
                scale=scale, note="difference of two references of different methods, relative to "
                "the increment")
-    points = [point(step, exact, (method, eps), repeats) for eps in ladder for method in METHODS]
+    points = [measured_point(step, exact, (method, eps), repeats)
+              for eps in ladder for method in METHODS]
     record_equal_eps(run, name, points, scale)
     record_equal_error(run, name, bounded_below(points, least), scale)
     return points
 
 
-def point(step, exact, rule, repeats, **changes):
-    """`Point` of a rule (method, eps) beside the exact `Solution`, of so many equal solves the
+def measured_point(step, exact, rule, repeats, **changes):
+    """`SolvePoint` of a rule (method, eps) beside the exact `Solution`, of so many equal solves the
     median time; changes: further options.
     """
     method, eps = rule
@@ -84,14 +85,14 @@ def point(step, exact, rule, repeats, **changes):
     off = particle_errors(step, found.dv, exact.dv)
     system = step.stepper.system(step.pose)
     gap = (found.E - exact.E) / (system.energy(system.start) - exact.E)
-    return Point(method, eps, cpu, off.velocity, off.cells_max, report.iterations,
+    return SolvePoint(method, eps, cpu, off.velocity, off.cells_max, report.iterations,
                  report.cg_iterations,
                  report.converged, gap, off.velocity_max, off.cells)
 
 
 def bounded_below(points, least):
-    """`Point`s with no error below the reference's own `Errors`: a method that made the reference
-    would agree with it to the bit.
+    """`SolvePoint`s with no error below the reference's own `Errors`: a method that made the
+    reference would agree with it to the bit.
     """
     return [p._replace(error=max(p.error, least.velocity),
                        error_max=max(p.error_max, least.velocity_max),
@@ -123,8 +124,8 @@ def record_equal_error(run, name, points, scale):
 
 
 def times_for(points, methods, level, measure="error"):
-    """{method: CPU seconds at which a measure of its `Point`s falls to a level, or None}, between
-    solves that did something: one that takes no time is no end of a logarithmic line.
+    """{method: CPU seconds at which a measure of its `SolvePoint`s falls to a level, or None},
+    between solves that did something: one that takes no time is no end of a logarithmic line.
     """
     curves = {m: [(m, p.eps, p.cpu, getattr(p, measure)) for p in points
                   if p.method == m and p.iterations > 0] for m in methods}

@@ -27,27 +27,27 @@ PAPER = 1e-7
 EXACT = 1e-11                           # ... of the references
 CHECKED = 3.0                           # the references differ by less than 1 / 3 of what is asked
 CAPS = {"max_iterations": 1000, "max_cg_iterations": 20000}
-HELD = 0.95                             # share of the solves that the rule is to hold
+CONTROLLED_SHARE = 0.95                             # share of the solves that the rule is to hold
 
 
-class Trial(NamedTuple):
+class StopTrial(NamedTuple):
     """One solve with the rule, or at the paper's tolerance."""
 
     scene: str
     method: str
     asked: float        # error of the displacement [dx]; 0: the paper's tolerance
     true: float         # largest of a particle [dx]
-    off: float          # what the rule said [dx]
+    off: float          # estimate of the rule [dx]
     cpu: float          # [s]
     iterations: int
     checks: int         # CG iterations of Newton's methods and of the checks
     converged: bool
 
 
-@experiment("trade.hot.held", title="HOT: a stop that holds the error of displacement",
+@experiment("trade.hot.held", title="HOT: a stop that controls the error of displacement",
             profiles=("quick", "standard"), budget={"quick": 6, "standard": 900})
-def hold(run):
-    """Methods, scenes and errors asked for; shares held, and how near the estimate was."""
+def displacement_stop(run):
+    """Solve scenes to several tolerances of displacement; record the shares that met them."""
     names, asked = run.choose(
         quick=(("faceless",), (1e-3,)),
         standard=(tuple(n for n in START_TIMES if n not in FITTED), (1e-2, 1e-3, 1e-4)))
@@ -60,13 +60,15 @@ def hold(run):
                    "particle's displacement between pn-mgpcg and pn-pcg at "
                    f"eps = {EXACT:.0e}")
         record_scene(run, name, found, scale)
-    record_all(run, rows, f"{len(names)} scenes, {len(METHODS)} methods, asked: "
-               + ", ".join(f"{a:g}" for a in asked))
-    run.table("solves", Trial._fields, rows)
+    record_shares(run, rows, f"{len(names)} scenes, {len(METHODS)} methods, asked: "
+                  + ", ".join(f"{a:g}" for a in asked))
+    run.table("solves", StopTrial._fields, rows)
 
 
 def trials(name, asked):
-    """([`Trial`], difference of two references [dx], scale) of one step of a scene."""
+    """Solve one step of a scene. Returns `StopTrial`s, the difference of two references [dx], and
+    the scale.
+    """
     problem, state = warm_state(name, "quick")
     step = next(islice(following_steps(problem, state, LATER), LATER - 1, None))
     exact = solve_step(step, "pn-mgpcg", eps=EXACT, **OPTIONS["pn-mgpcg"], **CAPS)
@@ -81,43 +83,43 @@ def trials(name, asked):
 
 
 def trial(step, exact, name, method, cells):
-    """`Trial` of a method, by the rule or, where cells is 0, by the paper's tolerance."""
+    """`StopTrial` of a method, by the rule or, where cells is 0, by the paper's tolerance."""
     changes = {**CAPS, **OPTIONS.get(method, {})}
     found = solve_step(step, method, displacement_tolerance=cells,
                    eps=FIRST if cells else PAPER, **changes)
     r = found.report
-    return Trial(name, method, cells, difference(step, found.dv, exact.dv)[1], r.particle_error,
+    return StopTrial(name, method, cells, difference(step, found.dv, exact.dv)[1], r.particle_error,
                  sum(r.seconds.values()), r.iterations, r.cg_iterations, r.converged)
 
 
 def record_scene(run, name, rows, scale):
-    """Each method's largest excess over what was asked."""
+    """Record each method's largest error over its tolerance."""
     for method in METHODS:
-        own = [r for r in rows if r.method == method]
-        plain, held = own[0], own[1:]
-        worst = max(held, key=lambda r: r.true / r.asked)
-        said = "; ".join(f"{r.asked:g}: {r.true:.1e} in {r.cpu:.3f} s" for r in held)
+        plain, *controlled = [r for r in rows if r.method == method]
+        worst = max(controlled, key=lambda r: r.true / r.asked)
+        errors = "; ".join(f"{r.asked:g}: {r.true:.1e} in {r.cpu:.3f} s" for r in controlled)
         run.record(f"trade.hot.held.{name}.{method}", worst.true / worst.asked, comparator="<=",
                    bound=1.0, scale=scale, note=f"largest true error over what was asked; asked: "
-                   f"true error [dx] in CPU time {said}; at eps = {PAPER:g} {plain.true:.1e} in "
+                   f"true error [dx] in CPU time {errors}; at eps = {PAPER:g} {plain.true:.1e} in "
                    f"{plain.cpu:.3f} s")
 
 
-def record_all(run, rows, scale):
-    """Share of the solves that were held, and how the estimate lies beside the error before the
-    last step: what is left after it is less.
+def record_shares(run, rows, scale):
+    """Record the share of solves within their tolerance, and the true error over the estimate,
+    which bounds the error before the last step.
     """
     by_rule = [r for r in rows if r.asked]
-    kept = np.mean([r.true <= r.asked for r in by_rule])
+    within = np.mean([r.true <= r.asked for r in by_rule])
     silent = [r for r in by_rule if r.converged and r.true > r.asked]
-    run.record("trade.hot.held.share", float(kept), comparator=">=", bound=HELD, scale=scale,
+    run.record("trade.hot.held.share", float(within), comparator=">=",
+               bound=CONTROLLED_SHARE, scale=scale,
                note=f"share of {len(by_rule)} solves with no particle off by more than asked; "
-               f"{len(silent)} are off and do not say so: "
+               f"{len(silent)} are off without a report: "
                + (", ".join(f"{r.scene} {r.method} {r.asked:g} ({r.true:.1e})" for r in silent)
                   or "none"))
     run.record("trade.hot.held.sound", 1.0 - len(silent) / len(by_rule), comparator=">=",
-               bound=HELD, scale=scale, note="share of the solves that were held or say that they "
-               "may not be")
+               bound=CONTROLLED_SHARE, scale=scale, note="share of the solves within their "
+               "tolerance or that report otherwise")
     ratio = [r.true / r.off for r in by_rule if r.off > 0.0 and r.converged]
     run.record("trade.hot.held.left", float(np.median(ratio)), comparator="info", scale=scale,
                note=f"median of the error that is left over {SAFETY:g} times the length of the "
@@ -126,4 +128,4 @@ def record_all(run, rows, scale):
     spread = [r.true for r in plain if r.true > 0.0]
     run.record("trade.hot.held.alone", max(spread) / min(spread), comparator="info", scale=scale,
                note=f"largest over smallest error at eps = {PAPER:g}, from {min(spread):.1e} to "
-               f"{max(spread):.1e} dx: what a tolerance of the gradient holds")
+               f"{max(spread):.1e} dx, by a tolerance of the gradient")

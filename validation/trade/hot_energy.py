@@ -31,7 +31,7 @@ COLUMNS = ("method", "eps", "cells", "kinetic", "elastic", "total", "rms", "max"
 
 
 class StopRule(NamedTuple):
-    """A method, and what ends its solves: a gradient, or an error of displacement to hold [dx]."""
+    """A method and its stop: a gradient, or an error of displacement [dx]."""
 
     method: str
     eps: float
@@ -45,8 +45,8 @@ class StopRule(NamedTuple):
 
     @property
     def options(self):
-        """Of the solver. CG bears that the V-cycle's coarsest solve is inexact, and so varies,
-        only where it is flexible: plain CG takes thousands of iterations in PN-MGPCG's last steps.
+        """Options of the solver. CG is flexible where the V-cycle varies with its inexact coarsest
+        solve: plain CG takes thousands of iterations in PN-MGPCG's last steps.
         """
         flexible = {"flexible": True} if self.method == "pn-mgpcg" else {}
         return {"eps": self.eps, "displacement_tolerance": self.cells, **flexible}
@@ -55,8 +55,8 @@ class StopRule(NamedTuple):
 ANSWER = StopRule("pn-pcg", 1e-12)       # the run that others are compared with
 
 
-class End(NamedTuple):
-    """A whole run: energies [J], places of all particles [m], CPU time [s]."""
+class BarRunEnd(NamedTuple):
+    """The end of a run: energies [J], positions of all particles [m], CPU time [s]."""
 
     kinetic: float
     elastic: float
@@ -67,27 +67,28 @@ class End(NamedTuple):
 
     @property
     def total(self):
-        """Kinetic and elastic energy."""
+        """Kinetic plus elastic energy [J]."""
         return self.kinetic + self.elastic
 
 
 @experiment("trade.hot.energy", title="HOT: energy of a whole run at a tolerance",
             profiles=("quick", "standard"), budget={"quick": 10, "standard": 900})
 def energies(run):
-    """The bar by methods and tolerances, against one run that is nearly exact."""
+    """Run the bar by methods and tolerances, and compare with a nearly exact run."""
     dx, steps = run.choose(quick=(0.04, 6), standard=(0.024, 40))
     methods = run.choose(
         quick=("hot", "pn-pcg"), standard=("hot", "hot-plus", "lbfgs-h", "pn-pcg", "pn-mgpcg"))
     ladder = run.choose(quick=(1e-7, 1e-9), standard=(1e-5, 1e-7, 1e-9, 1e-11))
-    held = run.choose(quick=(), standard=(1e-2, 1e-3))
+    displacement_tolerances = run.choose(quick=(), standard=(1e-2, 1e-3))
     for method in methods:
         full_run(dx, 1, StopRule(method, 1e-3))                       # compiles
     answer = full_run(dx, steps, ANSWER)
-    ways = [StopRule(m, eps) for m in methods for eps in ladder]
-    ways += [StopRule(m, FIRST, cells) for m in methods for cells in held]
+    rules = [StopRule(m, eps) for m in methods for eps in ladder]
+    rules += [StopRule(m, FIRST, cells) for m in methods
+              for cells in displacement_tolerances]
     scale = (f"{len(answer.x)} particles, dx = {dx} m, middle {MIDDLE:.0e} Pa, {steps} steps of "
              f"{DT:.4f} s")
-    ends = {rule: full_run(dx, steps, rule) for rule in run.progress(ways, "runs")}
+    ends = {rule: full_run(dx, steps, rule) for rule in run.progress(rules, "runs")}
     for rule, end in ends.items():
         record_end(run, rule, end, answer, (dx, scale))
     record_agreement(run, ends, answer, scale)
@@ -98,8 +99,8 @@ def energies(run):
                                 for key, end in rows.items()])
 
 
-def twisted(dx, steps, rule):
-    """The scene: the bar of Figure 20, with fixed steps and fewer particles per cell."""
+def twisted_bar(dx, steps, rule):
+    """Return the bar of Figure 20, with fixed steps and fewer particles per cell."""
     scene = bar(dx, MIDDLE, rule.method, steps, **rule.options)
     count = round(PER_CELL * 0.12 * 0.12 * 0.3 / dx**3)
     bodies = tuple(with_(b, sampling=with_(b.sampling, count=count)) for b in scene.body)
@@ -107,42 +108,43 @@ def twisted(dx, steps, rule):
 
 
 def full_run(dx, steps, rule):
-    """`End` of a run."""
-    problem, reports = build(twisted(dx, steps, rule)), []
+    """Run the bar. Returns its `BarRunEnd`."""
+    problem, reports = build(twisted_bar(dx, steps, rule)), []
     for _ in simulate(problem, on_step=lambda state, dt: reports.append(state.solve)):
         pass
     E = energy(problem.bodies, problem.gravity, problem.inertia)
     x = np.concatenate([b.particles.x[np.argsort(b.id)] for b in problem.bodies])
-    return End(E.kinetic, E.elastic, x, sum(sum(r.seconds.values()) for r in reports),
+    return BarRunEnd(E.kinetic, E.elastic, x, sum(sum(r.seconds.values()) for r in reports),
                sum(r.iterations for r in reports) / len(reports),
                all(r.converged for r in reports))
 
 
 def distance_in_cells(end, answer, dx):
-    """Root mean square and largest distance of the particles from where they should be, in cells
-    (all have nearly the same mass).
+    """Return root mean square and largest distance of the particles from those of the answer, in
+    cells.
     """
     far = np.linalg.norm(end.x - answer.x, axis=1) / dx
     return float(np.sqrt(np.mean(far**2))), float(far.max())
 
 
 def record_end(run, rule, end, answer, size):
-    """Energies of one run over those of the answer, and how far its particles are off."""
+    """Record a run's energies over those of the answer, and the distance of its particles."""
     dx, scale = size
     name = f"trade.hot.energy.{rule.name}"
     rms, most = distance_in_cells(end, answer, dx)
-    say = partial(run.record, unit="1", comparator="info", scale=scale)
+    record = partial(run.record, unit="1", comparator="info", scale=scale)
     late = "" if end.converged else "; not every step converged"
-    say(f"{name}.kinetic", end.kinetic / answer.kinetic,
+    record(f"{name}.kinetic", end.kinetic / answer.kinetic,
         note=f"kinetic energy at the end, {end.kinetic:.4g} J, over that at eps = {ANSWER.eps:g}"
         f"{late}")
-    say(f"{name}.total", end.total / answer.total, note=f"kinetic and elastic: {end.total:.4g} J")
-    say(f"{name}.rms", rms, note=f"particles' distance from there, in cells; at most {most:.2g}; "
-        f"{end.cpu:.1f} CPU seconds, {end.iterations:.1f} outer iterations per step")
+    record(f"{name}.total", end.total / answer.total,
+           note=f"kinetic and elastic: {end.total:.4g} J")
+    record(f"{name}.rms", rms, note="particles' distance from there, in cells; at most "
+           f"{most:.2g}; {end.cpu:.1f} CPU seconds, {end.iterations:.1f} outer iterations per step")
 
 
 def record_agreement(run, ends, answer, scale):
-    """Whole runs of different solvers agree when each is converged; they do not before."""
+    """Record the spread of kinetic energies over methods, by tolerance."""
     plain = {rule: end for rule, end in ends.items() if not rule.cells}
     for eps in sorted({rule.eps for rule in plain}, reverse=True):
         share = [end.kinetic / answer.kinetic for rule, end in plain.items() if rule.eps == eps]

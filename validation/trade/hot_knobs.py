@@ -1,4 +1,4 @@
-"""HOT's knobs at equal error: what each costs or gains, one at a time and together.
+"""HOT's knobs at equal error: the cost of each, one at a time and together.
 
 One step is solved with each setting to a ladder of tolerances, and times are read off at which its
 error falls to given levels. Ratios of times of one run,
@@ -51,7 +51,9 @@ CAPS = {"max_iterations": 500}
 @experiment("trade.hot.knobs", title="HOT: levels, window, smoothing, rebuilds at equal error",
             profiles=("quick", "standard"), budget={"quick": 8, "standard": 900})
 def knobs(run):
-    """Time of every setting over the paper's, on several scenes; and the length of the step."""
+    """Compare the time of every setting with the paper's, on several scenes, and lengths of the
+    step.
+    """
     names, ladder, tried, repeats = run.choose(
         quick=(("bar 1e9",), (1e-7, 1e-8, 1e-9), SHORT, 1),
         standard=(("bar 1e6", "bar 1e9", "boxes", "faceless"),
@@ -82,8 +84,8 @@ def reference(step):
 
 
 def settings(run, about, tried, plan):
-    """Rows of the settings tried for one step, by a plan (tolerances, repeats); records their times
-    over the paper's.
+    """Solve one step with each setting, by a plan (tolerances, repeats), and record times over the
+    paper's. Returns the rows of the table.
     """
     name, step, _ = about
     ladder, repeats = plan
@@ -104,7 +106,7 @@ def settings(run, about, tried, plan):
 
 
 def record_level(run, about, rows, level):
-    """Times for one error, over the paper's."""
+    """Record times for one error, over the paper's."""
     name, _, scale = about
     seconds = {s: time_for([row[1:5] for row in group], level) for s, group in rows.items()}
     base = seconds.pop("paper")
@@ -116,7 +118,7 @@ def record_level(run, about, rows, level):
 
 
 def times(run, about):
-    """Rows of steps of other lengths from the same state, all to one tolerance."""
+    """Solve steps of other lengths from the same state, to one tolerance. Returns table rows."""
     name, step, scale = about
     found = []
     for share in CFL:
@@ -127,11 +129,11 @@ def times(run, about):
         cpu = sum(solution.report.seconds.values())
         error = difference(other, solution.dv, exact)[0]
         found.append((name, share, dt, cpu, solution.report.iterations, error))
-    whole = next(row[3] for row in found if row[1] == 1.0)
+    reference_cpu = next(row[3] for row in found if row[1] == 1.0)
     for _, share, _, cpu, iterations, error in found:
         if share != 1.0:
             run.record(f"trade.hot.knobs.{name}.dt-{share:g}".replace(" ", "-"),
-                       cpu / share / whole, comparator="info", scale=scale,
+                       cpu / share / reference_cpu, comparator="info", scale=scale,
                        note=f"CPU time per simulated time, over that of steps of {step.dt:.2e} s; "
                        f"{iterations} iterations, relative error {error:.1e} at eps = {PAPER:g}")
     return found

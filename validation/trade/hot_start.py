@@ -20,10 +20,10 @@ CAPS = {"max_iterations": 1000}
 COLUMNS = ("scene", "step", "start", "cpu", "iterations", "cells", "converged")
 
 
-@experiment("trade.hot.start", title="HOT: what a solve begins with",
+@experiment("trade.hot.start", title="HOT: the start of a solve",
             profiles=("quick", "standard"), budget={"quick": 3, "standard": 300})
 def start(run):
-    """Time of each start over that of zero, scene by scene."""
+    """Compare the time from each start with that from zero, scene by scene."""
     names, count = run.choose(quick=(("sauce",), 2), standard=(tuple(START_TIMES), 4))
     rows = []
     for name in run.progress(names, "scenes"):
@@ -34,8 +34,8 @@ def start(run):
 
 
 def scene_rows(name, count):
-    """(rows of `COLUMNS`, scale) of so many steps of a scene; the first gives the second its last
-    increment and no more.
+    """Solve `count` steps of a scene; the first only gives the second its last increment. Returns
+    rows of `COLUMNS`, and the scale.
     """
     problem, state = warm_state(name, "quick")
     rows, last = [], None
@@ -43,28 +43,30 @@ def scene_rows(name, count):
         exact = solve_step(step, "pn-mgpcg", eps=EXACT, flexible=True, **CAPS).dv
         if last is not None:
             rows += [(name, k, start, *solve(step, begin, exact))
-                     for start, begin in beginnings(step, last).items()]
+                     for start, begin in start_increments(step, last).items()]
         last = step.pose.unknowns.index, exact
     return rows, f"{step.particles} particles, {count - 1} steps, eps = {EPS:g}"
 
 
-def beginnings(step, last):
-    """{start: increment (n, d)} of a step, whose predecessor took the increments last."""
+def start_increments(step, last):
+    """Return {start: increment (n, d)} of a step after one with the increments `last`."""
     q = step.pose.unknowns
     fall = np.broadcast_to(step.pose.gravity_increment, q.dv0.shape)
     return {"zero": q.dv0, "gravity": q.dv0 + free_part(q, fall),
-            "last": q.dv0 + free_part(q, carried(*last, q.index))}
+            "last": q.dv0 + free_part(q, carry_increments(*last, q.index))}
 
 
-def carried(index, dv, to):
-    """The increments dv of the nodes `index` at the nodes `to`; zero where there was none."""
-    known = dict(zip(map(tuple, index.tolist()), dv, strict=True))
+def carry_increments(index, dv, new_index):
+    """Return the increments dv of the nodes `index` at the nodes `new_index`; zero at new nodes."""
+    by_node = dict(zip(map(tuple, index.tolist()), dv, strict=True))
     none = np.zeros(dv.shape[1])
-    return np.array([known.get(tuple(node), none) for node in to.tolist()])
+    return np.array([by_node.get(tuple(node), none) for node in new_index.tolist()])
 
 
 def solve(step, begin, exact):
-    """CPU seconds, iterations, error of displacement [dx], converged of HOT from an increment."""
+    """Solve with HOT from an increment. Returns CPU seconds, iterations, error of displacement
+    [dx], converged.
+    """
     system = step.stepper.system(step.pose)
     system.start = begin
     found = minimise(system, "hot", eps=EPS, **CAPS)
@@ -74,7 +76,7 @@ def solve(step, begin, exact):
 
 
 def record_scene(run, name, rows, scale):
-    """Times of the two others over that of zero, all steps together."""
+    """Record the times of the two others over that of zero, all steps together."""
     total = {start: sum(row[3] for row in rows if row[2] == start) for start in STARTS}
     for start in STARTS[1:]:
         own = [row for row in rows if row[2] == start]

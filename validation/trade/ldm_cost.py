@@ -1,4 +1,4 @@
-"""Where the time of a reduced step goes, and after how many runs training has paid."""
+"""CPU time of the parts of LDM's reduced step, and the number of runs until training has paid."""
 
 from collections import Counter
 from time import process_time
@@ -26,20 +26,20 @@ PAYS = ("particles", "steps", "cpu_data", "cpu_training", "cpu_full", "cpu_faste
         "cpu_reduced", "runs_same", "runs")
 
 
-class Clock:
-    """CPU seconds by part; a part inside another counts for itself alone."""
+class PartTimer:
+    """CPU seconds by part; the time of a part inside another counts for the inner one alone."""
 
     def __init__(self):
         self.spent, self.inside, self.since = Counter(), ["rest"], process_time()
 
     def turn(self):
-        """Count the time until now for the part that is on."""
+        """Count the time until now for the current part."""
         now = process_time()
         self.spent[self.inside[-1]] += now - self.since
         self.since = now
 
     def part(self, name, function):
-        """The function, its time counted for a part."""
+        """Return the function with its time counted for a part."""
         def timed(*args, **kwargs):
             self.turn()
             self.inside.append(name)
@@ -52,29 +52,29 @@ class Clock:
 
 
 class TimedCalls:
-    """An object of which some methods go through a function of (name, method)."""
+    """A proxy of an object that passes some of its methods through a function of (name, method)."""
 
-    def __init__(self, of, names, through):
-        self.of = of
+    def __init__(self, target, names, through):
+        self.target = target
         for name in names:
-            setattr(self, name, through(name, getattr(of, name)))
+            setattr(self, name, through(name, getattr(target, name)))
 
     def __getattr__(self, name):
-        return getattr(self.of, name)
+        return getattr(self.target, name)
 
 
-def split(one, at, way, steps=STEPS):
-    """CPU seconds of a step by part, points that the map was evaluated at by kind, and quadrature
-    points; means over steps, after one that compiles.
+def split_step(one, map_at_rest, options, steps=STEPS):
+    """Return means over steps, after one that compiles: CPU seconds by part, points of the map's
+    evaluations by kind, and quadrature points.
     """
-    (map, rest), clock, asked = at, Clock(), Counter()
-    stepper = ldm_model(one, map, way)
+    (field_map, rest), clock, evaluated = map_at_rest, PartTimer(), Counter()
+    stepper = ldm_model(one, field_map, options)
 
     def counted(name, method):
         timed = clock.part("network", method)
 
         def call(X, *args):
-            asked[name] += len(X)
+            evaluated[name] += len(X)
             return timed(X, *args)
         return call
 
@@ -84,110 +84,114 @@ def split(one, at, way, steps=STEPS):
                                  lambda name, method: clock.part("quadrature", method))
     stepper.on_grid = clock.part("grid", stepper.on_grid)
     stepper.project = clock.part("projection", stepper.project)
-    latent = ldm_start(one, map, rest)
-    pick, dt, points = ldm_sampler(one, map, way, latent.xhat, 0), one.problem.clock.dt, []
+    latent = ldm_start(one, field_map, rest)
+    pick = ldm_sampler(one, field_map, options, latent.xhat, 0)
+    dt, points = one.problem.clock.dt, []
     with one_thread():
         for k in range(steps + 1):
             if k == 1:
                 clock.turn()
                 clock.spent.clear()
-                asked.clear()
+                evaluated.clear()
             latent, report = stepper.step(latent, pick(k * dt, latent).points, k * dt, dt)
             points.append(report.points)
         clock.turn()
     return ({name: clock.spent[name] / steps for name in PARTS},
-            {name: asked[name] / steps for name in EVALUATIONS}, float(np.mean(points[1:])))
+            {name: evaluated[name] / steps for name in EVALUATIONS}, float(np.mean(points[1:])))
 
 
-@experiment("trade.ldm.split", title="LDM: where the time of a reduced step goes",
+@experiment("trade.ldm.split", title="LDM: CPU time of the parts of a reduced step",
             profiles=("quick", "standard"), budget={"quick": 10, "standard": 200})
-def of_parts(run):
-    """Of a step of the tower with 25 samples, the paper's way and the cheap one, by size."""
+def step_parts(run):
+    """Time a step of the tower with 25 samples, with the paper's options and cheap ones."""
     rows, model = [], trained(NET)
-    at = model.field, model.rest
+    map_at_rest = model.field, model.rest
     for size in run.progress(run.choose(quick=(34,), standard=GRIDS), "sizes"):
         one = ldm_full_model(scene_of(size))
-        for name, way in (("paper", PAPER), ("cheap", FAST)):
-            rows.append(parted(run, f"trade.ldm.split.{size}.{name}", one, at,
-                               way._replace(points=25)))
+        for name, options in (("paper", PAPER), ("cheap", FAST)):
+            rows.append(record_parts(run, f"trade.ldm.split.{size}.{name}", one, map_at_rest,
+                                     options._replace(points=25)))
     run.table("parts", SPLIT, rows)
 
 
-def parted(run, name, one, at, way):
-    """Record the parts of a way; a row of the table."""
-    spent, asked, points = split(one, at, way)
-    total, each = sum(spent.values()), cost(one, with_precision(at[0], way), at[1])
-    predicted = sum(asked[kind] * each[kind] for kind in EVALUATIONS)
+def record_parts(run, name, one, map_at_rest, options):
+    """Record the parts of a step with some options. Returns a row of the table."""
+    spent, evaluated, points = split_step(one, map_at_rest, options)
+    field, rest = map_at_rest
+    total = sum(spent.values())
+    each = evaluation_costs(one, with_precision(field, options), rest)
+    predicted = sum(evaluated[kind] * each[kind] for kind in EVALUATIONS)
     shares = ", ".join(f"{part} {spent[part] / total:.0%}" for part in PARTS)
-    scale = f"{len(one.X)} particles, {way.points} samples, {points:.0f} quadrature points"
+    scale = f"{len(one.X)} particles, {options.points} samples, {points:.0f} quadrature points"
     run.record(f"{name}.us_per_point", 1e6 * total / points, unit="us", comparator="info",
                scale=scale, note=f"{1e3 * total:.3g} ms of CPU time a step: {shares}; value and "
-               f"Jacobians at {asked['derivatives'] / points:.2f} times the points, each "
-               f"{1e6 * each['derivatives']:.2g} us by itself; so the network alone must take "
+               f"Jacobians at {evaluated['derivatives'] / points:.2f} times the points, each "
+               f"{1e6 * each['derivatives']:.2g} us by itself; so the network alone takes at least "
                f"{1e3 * predicted:.3g} ms")
-    return (len(one.X), name.rsplit(".", 1)[-1], points, total, *spent.values(), *asked.values(),
-            1e6 * each["derivatives"], predicted)
+    return (len(one.X), name.rsplit(".", 1)[-1], points, total, *spent.values(),
+            *evaluated.values(), 1e6 * each["derivatives"], predicted)
 
 
-def cost(one, map, rest):
-    """CPU seconds that each kind of evaluation takes for a point, among many."""
-    X, found = one.X[:: -(-len(one.X) // 20000)], {}
-    calls = {"derivatives": lambda: map.derivatives(X, rest), "place": lambda: map.place(X, rest),
-             "velocity": lambda: map.velocity(X, rest, rest)}
+def evaluation_costs(one, field, rest):
+    """Return the CPU seconds of each kind of evaluation for one of many points."""
+    X, costs = one.X[:: -(-len(one.X) // 20000)], {}
+    calls = {"derivatives": lambda: field.derivatives(X, rest),
+             "place": lambda: field.place(X, rest),
+             "velocity": lambda: field.velocity(X, rest, rest)}
     for name, call in calls.items():
         times = []
         for _ in range(REPEATS):
             begin = process_time()
             call()
             times.append(process_time() - begin)
-        found[name] = float(np.median(times)) / len(X)
-    return found
+        costs[name] = float(np.median(times)) / len(X)
+    return costs
 
 
-@experiment("trade.ldm.offline", title="LDM: after how many runs training has paid",
+@experiment("trade.ldm.offline", title="LDM: number of runs until training has paid",
             profiles=("quick", "standard"), budget={"quick": 10, "standard": 200})
 def offline(run):
-    """On the tower: a map trained on 34 thousand points, used at every size."""
+    """Compare costs on the tower, with a map trained on 34 thousand points, at every size."""
     rows, model = [], trained(NET)
     data = data_cost(run.choose(quick=3, standard=TOWER.scene(*TOWER.mu[0]).steps))
-    training = trained_in(model.about)
+    training = training_cpu(model.about)
     for size in run.progress(run.choose(quick=(34,), standard=GRIDS), "sizes"):
         scene = scene_of(size)
         full, (cheap,) = race(scene, (model.field, model.rest), [FAST._replace(points=25)],
                               run.choose(quick=3, standard=10))
         count, best = len(build(scene).bodies[0].id), fastest(scene)
-        known = [scene.steps * a.cpu for a in (full, best, cheap.spent)]
-        rows.append((count, scene.steps, data, training, *known,
-                     paid(known[0] - known[2], data + training),
-                     paid(known[1] - known[2], data + training)))
-        cost_summary(run, size, rows[-1])
+        costs = [scene.steps * a.cpu for a in (full, best, cheap.spent)]
+        rows.append((count, scene.steps, data, training, *costs,
+                     runs_to_pay(costs[0] - costs[2], data + training),
+                     runs_to_pay(costs[1] - costs[2], data + training)))
+        record_payback(run, size, rows[-1])
     run.table("pays", PAYS, rows)
 
 
-def trained_in(about):
-    """CPU seconds of a training; weights made before sums were kept have those of its last part."""
+def training_cpu(about):
+    """Return the CPU seconds of a training, or of its last part where the weights have no more."""
     return about["cpu_seconds" if "cpu_seconds" in about else "cpu_seconds_of_last_part"]
 
 
-def paid(gain, spent):
-    """Runs after which gains of so many seconds are as much as was spent; infinite without any."""
+def runs_to_pay(gain, spent):
+    """Return the number of runs whose gains equal the seconds spent; infinite without gain."""
     return spent / gain if gain > 0.0 else np.inf
 
 
-def cost_summary(run, size, row):
+def record_payback(run, size, row):
     """Record a row of the table."""
-    known = dict(zip(PAYS, row, strict=True))
-    run.record(f"trade.ldm.offline.{size}", known["cpu_fastest"] - known["cpu_reduced"],
+    costs = dict(zip(PAYS, row, strict=True))
+    run.record(f"trade.ldm.offline.{size}", costs["cpu_fastest"] - costs["cpu_reduced"],
                unit="CPU s", comparator="info",
-               scale=f"{known['particles']} particles, {known['steps']} steps, 25 samples",
-               note=f"saved by a run, beside the full model with its fastest transfer; "
-               f"{known['cpu_data']:.3g} s of data and {known['cpu_training']:.3g} s of training "
-               f"(the last part of it, where it was cut off) are paid after {known['runs']:.3g} "
-               f"runs, beside the transfer that it was trained on after {known['runs_same']:.3g}")
+               scale=f"{costs['particles']} particles, {costs['steps']} steps, 25 samples",
+               note=f"saved by a run, against the full model with its fastest transfer; "
+               f"{costs['cpu_data']:.3g} s of data and {costs['cpu_training']:.3g} s of training "
+               f"(the last part of it, where it was cut off) are paid after {costs['runs']:.3g} "
+               f"runs, against the transfer that it was trained on after {costs['runs_same']:.3g}")
 
 
 def data_cost(steps):
-    """CPU seconds of all training runs of the tower, from as many steps of one."""
+    """Return the CPU seconds of all training runs of the tower, from `steps` steps of one."""
     study = STUDIES[TOWER.name]
     scene = study.scene(*study.mu[study.train[0]])
     full, _ = race(scene, (None, None), [], steps)

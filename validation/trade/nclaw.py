@@ -1,4 +1,4 @@
-"""What the errors of learned laws cost in training, and what they owe to what was seen."""
+"""Errors of learned laws against the time of training, and against the observations."""
 
 from math import isnan
 
@@ -8,13 +8,13 @@ from ..nclaw.small_trainings import BASE, OF_EPOCHS, OF_OBSERVATION, OF_TRAINING
 from .front import front
 
 SIZE = ("environment", "edge", "cells", "epochs", "first", "last", "seed")
-SIGHT = ("every", "share", "noise", "positions")
+OBSERVATION = ("every", "share", "noise", "positions")
 
 
 @experiment("trade.nclaw.training", title="NCLaw: error against the time of training",
             profiles=("quick", "standard"), budget={"quick": 12, "standard": 500})
 def training(run):
-    """By epochs, horizon, particles and grid; small trainings, whose laws are then also run in the
+    """Vary epochs, horizon, particles and grid of small trainings, whose laws are also run in the
     body of the paper.
     """
     names = [*OF_TRAINING, *OF_EPOCHS]
@@ -26,37 +26,38 @@ def training(run):
         for row, on in zip(mine, best, strict=True):
             net = small_nets()[row.name]
             rows.append((*row, *(getattr(net, key) for key in SIZE), int(on)))
-            record(run, row, f"{net.edge**3} particles, {net.cells} cells along an axis", on)
+            scale = f"{net.edge**3} particles, {net.cells} cells along an axis"
+            record_training(run, row, scale, on)
     run.table("trainings", (*COLUMNS, *SIZE, "pareto"), rows)
 
 
-def record(run, row, scale, on):
-    """Record a training; on: whether its laws are on the front of error and cost."""
-    whole = "" if isnan(row.full) else f", in the body of the paper {row.full:.3g} m^2"
-    best = "; nothing is better and cheaper" if on else ""
+def record_training(run, row, scale, on_front):
+    """Record a training; on_front: whether its laws are on the Pareto front of error and cost."""
+    full = "" if isnan(row.full) else f", in the body of the paper {row.full:.3g} m^2"
+    best = "; nothing is better and cheaper" if on_front else ""
     run.record(f"{run.experiment.id}.{row.name}.{row.epoch}", row.training_run, unit="m^2",
                comparator="info", scale=scale,
-               note=f"{row.cpu:.3g} CPU s of training; thrown otherwise {row.thrown:.3g} m^2{whole}"
-                    f"{broken(row)}{best}")
+               note=f"{row.cpu:.3g} CPU s of training; thrown differently {row.thrown:.3g} m^2"
+                    f"{full}{breakdown_note(row)}{best}")
 
 
-def broken(row):
-    """The words on a run that broke down; none if none did."""
+def breakdown_note(row):
+    """Return the note on a run that broke down, "" if none did."""
     return f"; broke down in step {row.step}" if row.step >= 0 else ""
 
 
-@experiment("trade.nclaw.sight", title="NCLaw: error against what is seen of a run",
+@experiment("trade.nclaw.sight", title="NCLaw: error against the observations of a run",
             profiles=("quick", "standard"), budget={"quick": 12, "standard": 200})
-def sight(run):
-    """Frames, points, noise, and positions alone; beside trainings of other seeds that see all."""
+def observations(run):
+    """Vary frames, points, noise and positions alone; compare with full observations by seed."""
     names = run.choose(quick=[BASE], standard=[*SEEDS, *OF_OBSERVATION])
     found = measured(run, names, full=False)
     least, most = seed_range(found, SEEDS)
     for row in found:
         run.record(f"trade.nclaw.sight.{row.name}", row.training_run, unit="m^2", comparator="info",
-                   scale="216 particles, 100 epochs", note="seeing all "
-                   f"{least:.3g} to {most:.3g} m^2 by seed; thrown otherwise {row.thrown:.3g} m^2"
-                   + broken(row))
-    run.table("trainings", (*COLUMNS, *SIGHT),
-              [(*row, *(getattr(small_nets()[row.name].observation, key) for key in SIGHT))
-               for row in found])
+                   scale="216 particles, 100 epochs", note="full observations "
+                   f"{least:.3g} to {most:.3g} m^2 by seed; thrown differently {row.thrown:.3g} m^2"
+                   + breakdown_note(row))
+    run.table("trainings", (*COLUMNS, *OBSERVATION), [
+        (*row, *(getattr(small_nets()[row.name].observation, key) for key in OBSERVATION))
+        for row in found])

@@ -1,5 +1,5 @@
-"""What a step of a learned law costs, and the error: by the width of its networks, by the digits of
-their weights, by the length of the step.
+"""Error and cost of a step of learned laws: by the width of their networks, the digits of the
+weights and the length of the step.
 """
 
 from math import ceil, log2
@@ -31,22 +31,22 @@ EVERY = 20          # steps of the trained length between frames
 SHORT = 200         # steps, quick
 POINTS, REPEATS = 1000, 7
 STRAIN = 0.05       # of random F that the time is measured at
-BEST = "nothing is better and smaller"
+ON_FRONT = "nothing is better and smaller"
 
 
-class Step(NamedTuple):
+class TimedStep(NamedTuple):
     """A run with another time step."""
 
     environment: str
     factor: float       # of the trained step
     cpu: float          # of the run [s]
-    error: float        # beside the true laws with the trained step [m^2]
+    frames_error: float        # beside the true laws with the trained step [m^2]
     true_cpu: float     # of the true laws with this step [s]
     true_error: float   # ... [m^2]
 
 
-def cost(law, flow):
-    """CPU seconds of both laws for one point, median."""
+def point_cost(law, flow):
+    """Return the median CPU seconds of law and flow for one point."""
     body = material_points(law, flow, np.eye(3) + STRAIN * np.random.default_rng(0).normal(
         size=(POINTS, 3, 3)))
     start, seconds = body.particles.F.copy(), []
@@ -62,13 +62,13 @@ def cost(law, flow):
 @experiment("trade.nclaw.width", title="NCLaw: error and cost by the width of the networks",
             profiles=("quick", "standard"), budget={"quick": 10, "standard": 120})
 def width(run):
-    """Two hidden layers each; 64 wide are the paper's."""
+    """Vary the width of the two hidden layers; the paper's is 64."""
     names = run.choose(quick=[BASE], standard=[BASE, *OF_WIDTH])
     found = measured(run, names, full=False)
     found = [row for row in found if row.epoch == small_nets()[row.name].epochs]
     body = build(small_nets()[BASE].scene).bodies[0]
-    true, rows = cost(body.law, body.flow), []
-    costs = [of_laws(last(row.name), body) for row in found]
+    true, rows = point_cost(body.law, body.flow), []
+    costs = [learned_point_cost(last(row.name), body) for row in found]
     best = front(costs, [row.training_run for row in found])
     for row, seconds, on in zip(found, costs, best, strict=True):
         net = small_nets()[row.name]
@@ -76,34 +76,34 @@ def width(run):
         run.record(f"trade.nclaw.width.{net.width}", row.training_run, unit="m^2",
                    comparator="info", scale="216 particles, 100 epochs",
                    note=f"{1e6 * seconds:.3g} us of CPU time for both laws of a point, without "
-                   f"the grid, the true laws {1e6 * true:.3g}; thrown otherwise "
-                   f"{row.thrown:.3g} m^2")
+                        f"the grid, the true laws {1e6 * true:.3g}; thrown differently "
+                        f"{row.thrown:.3g} m^2")
     run.table("widths", ("width", "cpu_point", "true_cpu_point", "own", "thrown", "cpu_training",
                          "pareto"), rows)
 
 
-def of_laws(laws, body):
-    """`cost` of `LearnedLaws`, in place of those of a body."""
-    made = body_maker(laws)(body)
-    return cost(made.law, made.flow)
+def learned_point_cost(laws, body):
+    """Return the `point_cost` of `LearnedLaws` in place of a body's own laws."""
+    learned = body_maker(laws)(body)
+    return point_cost(learned.law, learned.flow)
 
 
-def rounded(laws, bits):
-    """`LearnedLaws` whose weights have so many binary digits."""
+def round_weights(laws, bits):
+    """Return `LearnedLaws` with weights rounded to a number of binary digits."""
     return laws._replace(**{part: getattr(laws, part)._replace(layers=tuple(
-        tuple(shorter(a, bits) for a in layer) for layer in getattr(laws, part).layers))
+        tuple(round_digits(a, bits) for a in layer) for layer in getattr(laws, part).layers))
         for part in PARTS})
 
 
-def shorter(a, bits):
-    """Numbers rounded to so many binary digits."""
+def round_digits(a, bits):
+    """Return numbers rounded to a number of binary digits."""
     mantissa, exponent = np.frexp(a)
     return np.ldexp(np.round(mantissa * 2.0**bits), exponent - bits)
 
 
-def size_of(laws, bits):
-    """Bytes of the weights of `LearnedLaws` of so many digits: each with a sign in place of the
-    leading one, and an exponent as wide as theirs and zero need. Biases that are zero take none.
+def weights_size(laws, bits):
+    """Return the bytes of the weights of `LearnedLaws` with a number of digits: a sign replaces the
+    leading digit, and the exponent is as wide as their range and zero need. Zero biases take none.
     """
     a = np.concatenate([a.ravel() for part in PARTS for layer in getattr(laws, part).layers
                         for a in layer if a.any()])
@@ -114,17 +114,17 @@ def size_of(laws, bits):
 @experiment("trade.nclaw.digits", title="NCLaw: error and size by the digits of the weights",
             profiles=("quick", "standard"), budget={"quick": 10, "standard": 120})
 def digits(run):
-    """Weights alone are rounded; answers are computed in doubles, so that no time is saved."""
+    """Round the weights alone; evaluation in doubles saves no time."""
     rows, bits = [], DIGITS[run.profile]
     for name in run.choose(quick=NAMES[:1], standard=NAMES):
         steps = run.choose(quick=SHORT, standard=environment(name).steps)
-        laws = [rounded(trained(name), k) for k in bits]
+        laws = [round_weights(trained(name), k) for k in bits]
         found = compare(environment(name, steps=steps, every=EVERY), [*map(body_maker, laws)])
-        sizes = [size_of(one, k) for one, k in zip(laws, bits, strict=True)]
+        sizes = [weights_size(one, k) for one, k in zip(laws, bits, strict=True)]
         best = front(sizes, [one.error for one in found])
         for k, size, one, on in zip(bits, sizes, found, best, strict=True):
             rows.append((name, k, size, *one, int(on)))
-            words = f"weights of {size:.0f} bytes", BEST if on else "", one.why
+            words = f"weights of {size:.0f} bytes", ON_FRONT if on else "", one.why
             run.record(f"trade.nclaw.digits.{name}.{k}", one.error, unit="m^2", comparator="info",
                        scale=f"{steps} steps, 1000 particles",
                        note="; ".join(filter(None, words)))
@@ -134,10 +134,10 @@ def digits(run):
 @experiment("trade.nclaw.dt", title="NCLaw: error and cost by the time step",
             profiles=("quick", "standard"), budget={"quick": 10, "standard": 120})
 def time_step(run):
-    """Beside the true laws with the trained step, which true laws with another one also miss."""
+    """Compare with the true laws at the trained step, which true laws at another one also miss."""
     rows = []
     for name in run.choose(quick=NAMES[:1], standard=NAMES):
-        rows += of_steps(name, FACTORS[run.profile],
+        rows += time_steps(name, FACTORS[run.profile],
                          run.choose(quick=SHORT, standard=environment(name).steps))
     best = {name: iter(front([row.cpu for row in own], [row.error for row in own]))
             for name in NAMES for own in [[row for row in rows if row.environment == name]]}
@@ -146,25 +146,26 @@ def time_step(run):
                    comparator="info", scale="1000 particles", note=f"{row.cpu:.3g} CPU s a run; "
                    f"the true laws with this step {row.true_cpu:.3g} CPU s, "
                    f"{row.true_error:.3g} m^2")
-    run.table("steps", (*Step._fields, "pareto"),
+    run.table("steps", (*TimedStep._fields, "pareto"),
               [(*row, int(next(best[row.environment]))) for row in rows])
 
 
-def of_steps(name, factors, steps):
-    """`Step`s of an environment: over the time of so many steps of the trained length."""
+def time_steps(name, factors, steps):
+    """Return the `TimedStep`s of an environment over the time of `steps` trained steps."""
     scene = environment(name, steps=steps, every=EVERY)
-    x, _ = timed(scene, copy_body)
+    x, _ = timed_run(scene, copy_body)
     rows = []
     for factor in factors:
         other = with_(scene, dt=factor * scene.dt, steps=round(steps / factor),
                       every=round(EVERY / factor))
-        found = [timed(other, make) for make in (body_maker(trained(name)), copy_body)]
-        rows.append(Step(name, factor, *(a for at, cpu in found for a in (cpu, error(at, x)))))
+        runs = [timed_run(other, make) for make in (body_maker(trained(name)), copy_body)]
+        costs = [a for frames, cpu in runs for a in (cpu, frames_error(frames, x))]
+        rows.append(TimedStep(name, factor, *costs))
     return rows
 
 
-def timed(scene, make):
-    """Positions in frames as far as a run goes, and CPU seconds of the run."""
+def timed_run(scene, make):
+    """Return positions in frames as far as a run goes, and its CPU seconds."""
     problem, frames = build(scene), []
     with threads_for(problem.bodies):
         begin = process_time()
@@ -176,8 +177,8 @@ def timed(scene, make):
         return frames, process_time() - begin
 
 
-def error(frames, x):
-    """Mean squared error of frames [m^2]; infinite where some are missing."""
+def frames_error(frames, x):
+    """Return the mean squared error of frames [m^2]; infinite where some are missing."""
     if len(frames) < len(x):
         return np.inf
     return float(np.mean([np.mean((a - b) ** 2) for a, b in zip(frames, x, strict=True)]))

@@ -1,4 +1,4 @@
-"""What a reduced run with inferred stress costs and gives: by its samples, and by its time step."""
+"""Error and cost of reduced runs with network stress, by their samples and by their time step."""
 
 from collections import deque
 from typing import NamedTuple
@@ -22,8 +22,8 @@ from .front import front
 COUNTS = {"quick": (10, 50), "standard": (5, 10, 20, 30, 50, 100, 200, 400)}
 CELLS = "cells"         # the points of so many
 DRAWS = {"quick": 2, "standard": 5}
-WAYS = {"random": False, "cubature": True, CELLS: True}     # whether samples have weights
-SAID = {"random": "samples, random", "cubature": "samples, cubature",
+WEIGHTED = {"random": False, "cubature": True, CELLS: True}     # kinds of samples
+DESCRIPTIONS = {"random": "samples, random", "cubature": "samples, cubature",
         CELLS: "cells, cubature of their points"}
 FACTORS = (1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 10.0)    # of the scene's step
 WORDS = "the full-order run {:.3g} CPU s, the reduced one {:.3g}"
@@ -33,89 +33,89 @@ class Sampling(NamedTuple):
     """Samples of a scene's runs."""
 
     scene: str
-    way: str            # of WAYS
+    kind: str           # of WEIGHTED
     count: int          # at most
 
 
 @experiment("trade.nsf.samples", title="NSF: error and cost by number and kind of samples",
             profiles=("quick", "standard"), budget={"quick": 15, "standard": 1700})
-def of_samples(run):
-    """Samples drawn at random, beside samples with weights by cubature, point by point or cell by
-    cell; several draws.
+def samples_experiment(run):
+    """Compare several draws of random samples with samples weighted by cubature, point by point or
+    cell by cell.
     """
     rows = []
     for name, one in scenes(run):
         full, found = full_cpu(one), []
-        settings = [Sampling(name, way, count) for count in COUNTS[run.profile] for way in WAYS]
+        settings = [Sampling(name, kind, count) for count in COUNTS[run.profile]
+                    for kind in WEIGHTED]
         every = Sampling(name, "random", len(one.fields.X))
         for sampling in run.progress([*settings, every], name):
-            found.append(of_sampling(run, one, sampling, full))
+            found.append(record_samples(run, one, sampling, full))
         best = front([cpu for _, cpu in found], [mean(own, "origin") for own, _ in found])
         rows += [(name, *row, cpu, full, int(on))
                  for (own, cpu), on in zip(found, best, strict=True) for row in own]
     run.table("samples", ("scene", *COLUMNS, "cpu", "cpu_full", "pareto"), rows)
 
 
-def of_sampling(run, one, sampling, full):
-    """Record the errors with a `Sampling`; rows of all runs, and CPU seconds of one."""
-    scene, way, count = sampling
-    one = one._replace(study=one.study._replace(by_cell=way == CELLS))
+def record_samples(run, one, sampling, full):
+    """Record the errors with a `Sampling`. Returns rows of all runs, and CPU seconds of one."""
+    scene, kind, count = sampling
+    one = one._replace(study=one.study._replace(by_cell=kind == CELLS))
     draws = range(DRAWS[run.profile] if count < len(one.fields.X) else 1)
-    rows = error_rows(one, way, count, draws, weighted=WAYS[way])
-    cpu = reduced_cpu(one, count, WAYS[way], run.choose(quick=1, standard=3))
-    what = SAID[way] + (f", {weights_note(rows)}" if WAYS[way] else "")
-    record_mean(run, f"trade.nsf.samples.{scene}.{way}.{count}", rows, one.scale,
-                f"{count} {what}; " f"of the stress {100.0 * mean(rows, 'stress'):.3g} %; "
+    rows = error_rows(one, kind, count, draws, weighted=WEIGHTED[kind])
+    cpu = reduced_cpu(one, count, WEIGHTED[kind], run.choose(quick=1, standard=3))
+    what = DESCRIPTIONS[kind] + (f", {weights_note(rows)}" if WEIGHTED[kind] else "")
+    record_mean(run, f"trade.nsf.samples.{scene}.{kind}.{count}", rows, one.scale,
+                f"{count} {what}; of the stress {100.0 * mean(rows, 'stress'):.3g} %; "
                 f"{mean(rows, 'points'):.0f} integration points; {WORDS.format(full, cpu)}",
                 comparator="info")
     return rows, cpu
 
 
 def full_cpu(one):
-    """CPU seconds of the steps of the full-order run of the first test."""
+    """Return the CPU seconds of the steps of the full-order run of the first test."""
     scene = one.study.run(one.study.test[0])
     problem = nsf_full_model(with_(scene, every=scene.steps, interval=None)).problem
     return timed(lambda: deque(simulate(problem), maxlen=0))[1].cpu
 
 
-def reduced_cpu(one, count, weighed, repeats):
-    """Median of the CPU seconds of reduced runs of the first test; infinite where they break down.
-    Samples are chosen before.
+def reduced_cpu(one, count, weighted, repeats):
+    """Return the median CPU seconds of reduced runs of the first test, without the choice of
+    samples; infinite where they break down.
     """
     value = one.study.test[0]
     scene, fields = nsf_full_model(one.study.run(value)), one.fields_of_run(value)
-    plan = FieldRunOptions(one.study.chosen(scene, count, 0, one.fields if weighed else None))
+    plan = FieldRunOptions(one.study.chosen(scene, count, 0, one.fields if weighted else None))
     try:
         with one_thread():
-            found = [timed(lambda: deque(nsf_run(scene, fields, plan, one.rest).states(),
-                                         maxlen=0))[1].cpu for _ in range(repeats)]
+            seconds = [timed(lambda: deque(nsf_run(scene, fields, plan, one.rest).states(),
+                                             maxlen=0))[1].cpu for _ in range(repeats)]
     except BREAKDOWNS:
         return np.inf
-    return float(np.median(found))
+    return float(np.median(seconds))
 
 
 @experiment("trade.nsf.dt", title="NSF: error by the length of the step",
             profiles=("quick", "standard"), budget={"quick": 15, "standard": 120})
-def of_steps(run):
-    """Until a run breaks down; beside them, how the full-order run with this step ends."""
+def steps_experiment(run):
+    """Lengthen the step until a run breaks down, and compare with the end of the full-order run."""
     rows = []
     for name, one in scenes(run):
         draws = range(run.choose(quick=1, standard=3))
         for factor in run.progress(FACTORS, name):
             found = error_rows(one, "modal", one.study.samples, draws, factor)
-            said = full_end(one.study.run(one.study.test[0]), factor)
+            full_kind = full_order_end(one.study.run(one.study.test[0]), factor)
             record_mean(run, f"trade.nsf.dt.{name}.x{factor:g}", found, one.scale,
-                        f"steps {factor:g} "
-                        f"times as long, {one.study.samples} samples; the full-order run: {said}",
-                        comparator="info")
-            rows += [(name, *row, said) for row in found]
+                        f"steps {factor:g} times as long, {one.study.samples} samples; "
+                        f"the full-order run: {full_kind}", comparator="info")
+            rows += [(name, *row, full_kind) for row in found]
             if not all(np.isfinite(row[COLUMNS.index("origin")]) for row in found):
                 break
     run.table("steps", ("scene", *COLUMNS, "full"), rows)
 
 
-def full_end(scene, factor):
-    """How a full-order run with a step so many times as long ends, a word of `outcome`."""
+def full_order_end(scene, factor):
+    """Return the kind of end of a full-order run with a step `factor` times as long."""
     steps = round(scene.steps / factor)
     longer = with_(scene, dt=factor * scene.dt, steps=steps, every=steps, interval=None)
     return outcome(nsf_full_model(longer).problem).kind

@@ -1,4 +1,4 @@
-"""What NSF's fields cost before the first reduced run, and when that is paid back."""
+"""Cost of NSF's fields before the first reduced run, and the number of runs that pays it back."""
 
 from typing import NamedTuple
 
@@ -19,8 +19,8 @@ INFO = {"comparator": "info", "unit": "s"}
 COLUMNS = ("scene", "fields", "runs", "making", "full", "reduced", "pays_after")
 
 
-class Bill(NamedTuple):
-    """CPU seconds of fields of one kind."""
+class OfflineCosts(NamedTuple):
+    """CPU seconds of one kind of fields."""
 
     runs: float         # of all training runs
     making: float       # of the fields of them
@@ -29,15 +29,15 @@ class Bill(NamedTuple):
 
     @property
     def pays_after(self):
-        """Runs after which reduced ones, with all that was before them, have cost less; infinite
-        where a reduced run takes longer.
+        """Number of runs after which the reduced ones, with all preparation, have cost less;
+        infinite where a reduced run takes longer.
         """
         saved = self.full - self.reduced
         return (self.runs + self.making) / saved if saved > 0.0 else np.inf
 
 
 def studies(run):
-    """{name: `Study`}: at the standard profile at the printed resolution, all training runs."""
+    """Return {name: `Study`}, at the standard profile with the printed resolution and all runs."""
     return run.choose(quick=lambda: {"jelly": jelly(4), "metal": metal(4, train=4)},
                       standard=lambda: {"jelly": jelly(), "metal": metal()})()
 
@@ -45,35 +45,35 @@ def studies(run):
 @experiment("trade.nsf.offline", title="NSF: the cost before the first reduced run",
             profiles=("quick", "standard"), budget={"quick": 15, "standard": 400})
 def offline(run):
-    """Fields of modes, and at the standard profile the jelly cube's trained networks, whose file
-    knows what training took; the usual number of samples, drawn at random.
+    """Compare fields of modes and, at the standard profile, the jelly cube's trained networks,
+    whose file stores the time of training; the usual number of random samples.
     """
     rows = []
     for name, study in run.progress(studies(run).items(), "scenes"):
-        one, bill = of_modes(study, run.choose(quick=1, standard=3))
-        rows.append(offline_summary(run, name, "modes", one, bill))
+        one, bill = mode_costs(study, run.choose(quick=1, standard=3))
+        rows.append(record_costs(run, name, "modes", one, bill))
         if run.profile == "standard" and name == "jelly":
-            rows += of_networks(run, name, one, bill)
+            rows += network_costs(run, name, one, bill)
     run.table("bills", COLUMNS, rows)
-    trainings(run)
+    record_trainings(run)
 
 
-def of_modes(study, repeats):
-    """`FittedStudy` of a study on fields of modes, and their `Bill`."""
-    def made(value):
+def mode_costs(study, repeats):
+    """Return the `FittedStudy` of a study on fields of modes, and their `OfflineCosts`."""
+    def simulated(value):
         return simulate_history(study.run(value), [value], np.float32, study.spacing)
 
-    tests = {study.test[0]: made(study.test[0])}        # first, as it compiles what is missing
-    runs, spent = timed(lambda: join_histories(map(made, study.train), len(study.train)))
+    tests = {study.test[0]: simulated(study.test[0])}       # first, since it compiles
+    runs, spent = timed(lambda: join_histories(map(simulated, study.train), len(study.train)))
     bare = FittedStudy(study, None, None, runs, tests)
     one, made_in = timed(lambda: refit(bare, study.sizes, study.follows))
-    return one, Bill(spent.cpu, made_in.cpu, full_cpu(one),
+    return one, OfflineCosts(spent.cpu, made_in.cpu, full_cpu(one),
                      reduced_cpu(one, study.samples, False, repeats))
 
 
-def of_networks(run, name, one, bill):
-    """Record what a scene's trained networks cost, of the same runs; rows: one, or none where they
-    are not trained.
+def network_costs(run, name, one, bill):
+    """Record the costs of a scene's trained networks, of the same runs. Returns one row, or none
+    where they are not trained.
     """
     try:
         model = trained(name)
@@ -82,14 +82,12 @@ def of_networks(run, name, one, bill):
         return []
     other = one._replace(fields=fields_of(model, one.study), xhat=model.xhat)
     training = sum(model.about["cpu_seconds"].values())
-    return [offline_summary(run, name, "networks", other, bill._replace(
+    return [record_costs(run, name, "networks", other, bill._replace(
         making=training, reduced=reduced_cpu(other, one.study.samples, False, 1)))]
 
 
-def trainings(run):
-    """Record what the shortest and the longest training took, of the seven scenes' networks with
-    features.
-    """
+def record_trainings(run):
+    """Record the shortest and the longest training of the seven scenes' networks with features."""
     names = [name for name in nets() if name.endswith("-waves")]
     hours = {name: sum(model.about["cpu_seconds"].values()) / 3600.0
              for name, model in load_available(run, names, trained).items()}
@@ -97,16 +95,16 @@ def trainings(run):
         name = end(hours, key=hours.get, default=None)
         if name is not None:
             run.record(f"nsf.sec7.train_time_{word}", hours[name], unit="h", comparator="info",
-                       note=f"{name}, CPU hours that its weights tell; printed: hours of wider "
+                       note=f"{name}, CPU hours stored with its weights; printed: hours of wider "
                             "networks on a graphics processor")
 
 
-def offline_summary(run, name, kind, one, bill):
-    """Record a `Bill`; its row."""
-    id, scale = f"trade.nsf.offline.{name}.{kind}", f"{one.size}, {one.study.samples} samples"
+def record_costs(run, name, kind, one, bill):
+    """Record `OfflineCosts`. Returns their row."""
+    target, scale = f"trade.nsf.offline.{name}.{kind}", f"{one.size}, {one.study.samples} samples"
     for word, value in bill._asdict().items():
-        run.record(f"{id}.{word}", value, scale=scale, note="CPU seconds", **INFO)
-    run.record(f"{id}.pays_after", bill.pays_after, unit="1", comparator="info", scale=scale,
+        run.record(f"{target}.{word}", value, scale=scale, note="CPU seconds", **INFO)
+    run.record(f"{target}.pays_after", bill.pays_after, unit="1", comparator="info", scale=scale,
                note="reduced runs until training runs and fields are paid back; infinite where a "
                     "reduced run takes longer than the full one")
     return (name, kind, *bill, bill.pays_after)

@@ -6,13 +6,13 @@ import pytest
 from mpm_ref.hot import step
 from mpm_ref.hot.methods import METHODS, minimise
 from validation.extremes import hot_every_method as every
-from validation.extremes.hot_bodies import DX, FRAME, brick, elastic, gravity, shaken
-from validation.extremes.hot_solve import CONVERGED, EPS, STOPPED, Setup, solve
-from validation.extremes.hot_units import SYSTEMS, converted, solved
+from validation.extremes.blocks import DX, FRAME, brick, elastic, gravity, shake
+from validation.extremes.hot_solve import CONVERGED, EPS, STOPPED, StepSetup, solve
+from validation.extremes.hot_units import SYSTEMS, convert_units, solve_step
 
 
 def setup():
-    return Setup(shaken((brick((3, 3)),)), DX, FRAME, gravity(2))
+    return StepSetup((shake(brick((3, 3))),), DX, FRAME, gravity(2))
 
 
 class Records(dict):
@@ -56,18 +56,18 @@ def test_unsound_solves_are_named(monkeypatch, change, said):
 
 def test_other_units_are_the_same_problem():
     given = setup()
-    report, dv = solved(given, "lbfgs-h")
-    there, dv_there = solved(converted(given, SYSTEMS["binary"]), "lbfgs-h")
+    report, dv = solve_step(given, "lbfgs-h")
+    there, dv_there = solve_step(convert_units(given, SYSTEMS["binary"]), "lbfgs-h")
     units = SYSTEMS["binary"]
     assert there.residuals == report.residuals
     assert np.array_equal(dv_there * units.T / units.L, dv)
-    wrong = converted(given, units)._replace(gravity=given.gravity)
-    assert solved(wrong, "lbfgs-h")[0].residuals[0] != report.residuals[0]
+    wrong = convert_units(given, units)._replace(gravity=given.gravity)
+    assert solve_step(wrong, "lbfgs-h")[0].residuals[0] != report.residuals[0]
 
 
 def test_every_method_is_tried_to_the_same_tolerance():
-    soft = setup()._replace(bodies=shaken((brick((3, 3), elastic(10.0)),)))
-    found = every.ends_of(soft)
+    soft = setup()._replace(bodies=(shake(brick((3, 3), elastic(10.0))),))
+    found = every.solve_by_all_methods(soft)
     assert [end.method for end in found] == list(METHODS)
     assert {end.kind for end in found} == {CONVERGED}
     assert max(end.least for end in found) <= EPS

@@ -13,26 +13,24 @@ from mpm_ref.nclaw.strain_watch import StrainReport
 from mpm_ref.scene import build
 from validation.common.scenes import with_
 from validation.common.weights_needed import Untrained, load_available
-from validation.extremes import nclaw_epochs, nclaw_long, nclaw_runs, nclaw_strain
-from validation.extremes import nclaw_observed as observed
+from validation.extremes import nclaw_extrapolation as extrapolation
+from validation.extremes import nclaw_runs
+from validation.extremes import nclaw_trainings as trainings
+from validation.extremes.nclaw_extrapolation import with_time_step
 from validation.extremes.nclaw_runs import (
     BAD,
     CHOSEN,
-    FINE,
-    FLAGGED,
     LOST,
-    SILENT,
-    STOPPED,
-    End,
     Law,
-    Setup,
-    Trial,
-    ended,
-    of_sights,
+    LawEnd,
+    LawSetup,
+    LawTrial,
+    law_end,
+    law_trials,
     record_silent,
-    trials,
+    summarize_reports,
 )
-from validation.extremes.nclaw_time_step import longer
+from validation.extremes.verdicts import FINE, FLAGGED, SILENT, STOPPED
 from validation.nclaw import strain_bounds as met_of
 from validation.nclaw.environments import environment
 from validation.nclaw.initial_laws import untrained
@@ -40,14 +38,14 @@ from validation.nclaw.small_runs import Measured
 from validation.nclaw.small_trainings import Small
 from validation.nclaw.trained_laws import LawNet
 
-GOOD = End(1e-4, 1000, -1, "", 0.1, -1, 0.9, "")
+GOOD = LawEnd(1e-4, 1000, -1, "", 0.1, -1, 0.9, "")
 WIDE = {"low": [0.0, -9.0, -9.0, -99.0], "high": [9.0, 9.0, 9.0, 99.0]}
 NARROW = {"low": [0.9, 0.9, 0.9, 0.8], "high": [1.1, 1.1, 1.1, 1.2]}
 DT = 5e-4
 
 
 def trial(what="what", law="jelly", usual=1e-4, **changes):
-    return Trial(law, what, usual, GOOD._replace(**changes))
+    return LawTrial(law, what, usual, GOOD._replace(**changes))
 
 
 def sight(beyond=0.0, J=1.0, count=0):
@@ -72,32 +70,32 @@ def small(**changes):
 @pytest.mark.parametrize(("changes", "kind"), [
     ({}, FINE), ({"error": 0.999e-4 * BAD}, FINE), ({"error": 1.001e-4 * BAD}, SILENT),
     ({"error": np.nan}, SILENT), ({"error": np.inf}, SILENT), ({"flags": "strain"}, FLAGGED),
-    ({"error": 1.0, "flags": "dt"}, FLAGGED), ({"flags": "strain", "said": "no place"}, STOPPED),
-    ({"error": np.inf, "said": "no place"}, STOPPED)])
+    ({"error": 1.0, "flags": "dt"}, FLAGGED), ({"flags": "strain", "message": "no place"}, STOPPED),
+    ({"error": np.inf, "message": "no place"}, STOPPED)])
 def test_a_run_ends_in_one_of_four_ways(changes, kind):
     assert trial(**changes).kind == kind
 
 
 def test_what_is_bad_depends_on_the_usual_error():
-    assert trial(error=4e-4).bad()
-    assert not trial(error=4e-4).bad(5.0)
-    assert not trial(error=4e-4, usual=1e-3).bad()
-    assert trial(error=np.nan).bad(1e9)
+    assert trial(error=4e-4).is_bad()
+    assert not trial(error=4e-4).is_bad(5.0)
+    assert not trial(error=4e-4, usual=1e-3).is_bad()
+    assert trial(error=np.nan).is_bad(1e9)
 
 
 def test_the_extremes_of_a_run_are_kept():
     sights = [sight(), sight(0.4, 0.5, 3), sight(LOST + 1.0, 0.7, 9), sight(0.2)]
-    assert of_sights(sights, 0.1, "", (20, False)) == End(0.1, 60, 20, "strain", LOST + 1.0, 40,
-                                                          0.5, "")
-    assert of_sights([sight(), sight(0.2)], 0.1, "", (20, True)) == End(0.1, 20, 0, "dt", 0.2, -1,
-                                                                        1.0, "")
-    stopped = of_sights([sight(), sight(0.4, count=1)], np.inf, "step 31: gone", (20, True))
-    assert (stopped.lost, stopped.flags, stopped.said) == (40, "strain dt", "step 31: gone")
+    assert summarize_reports(sights, 0.1, "", (20, False)) == LawEnd(
+        0.1, 60, 20, "strain", LOST + 1.0, 40, 0.5, "")
+    assert summarize_reports([sight(), sight(0.2)], 0.1, "", (20, True)) == LawEnd(
+        0.1, 20, 0, "dt", 0.2, -1, 1.0, "")
+    stopped = summarize_reports([sight(), sight(0.4, count=1)], np.inf, "step 31: gone", (20, True))
+    assert (stopped.lost, stopped.flags, stopped.message) == (40, "strain dt", "step 31: gone")
 
 
 def test_misses_and_false_alarms_are_counted_and_named():
     found = [trial(), trial("far", flags="strain"), trial("silent", error=4e-4),
-             trial("worse", error=4e-4, flags="strain"), trial("gone", error=np.inf, said="no")]
+             trial("worse", error=4e-4, flags="strain"), trial("gone", error=np.inf, message="no")]
     records = Records()
     record_silent(records, found, "some")
     value, note = records["trade.nclaw.x.silent"]
@@ -117,14 +115,14 @@ def test_misses_and_false_alarms_are_counted_and_named():
 
 def test_the_true_law_is_not_off_from_itself():
     law = Law("true", "jelly", as_true, WIDE, DT)
-    end = ended(law, Setup("as trained", small()))
-    assert end == End(0.0, 40, -1, "", 0.0, -1, end.J, "")
+    end = law_end(law, LawSetup("as trained", small()))
+    assert end == LawEnd(0.0, 40, -1, "", 0.0, -1, end.J, "")
 
 
 def test_strains_out_of_bounds_are_flagged_when_they_are():
     law = Law("true", "jelly", as_true, NARROW, DT)
-    calm = ended(law, Setup("calm", nclaw_strain.thrown(small(), 0.0)))
-    pressed = ended(law, Setup("pressed", small(steps=60), np.diag([0.8, 1.0, 1.0])))
+    calm = law_end(law, LawSetup("calm", extrapolation.thrown(small(), 0.0)))
+    pressed = law_end(law, LawSetup("pressed", small(steps=60), np.diag([0.8, 1.0, 1.0])))
     assert (calm.flags, pressed.flags, pressed.first) == ("", "strain", 0)
     assert calm.beyond < 0.3 < 0.499 < pressed.beyond       # 0.1 of 0.2 at the start
     assert pressed.error == 0.0         # both bodies are strained
@@ -132,43 +130,43 @@ def test_strains_out_of_bounds_are_flagged_when_they_are():
 
 def test_other_time_steps_are_flagged_from_the_start():
     law = Law("true", "jelly", as_true, WIDE, DT)
-    end = ended(law, Setup("2 dt", longer(small(), 2.0)))
+    end = law_end(law, LawSetup("2 dt", with_time_step(small(), 2.0)))
     assert (end.flags, end.first, end.steps, end.error) == ("dt", 0, 20, 0.0)
 
 
 def test_a_run_that_breaks_down_stops_with_a_sentence():
-    end = ended(Law("wild", "water", wild, WIDE, DT), Setup("any", small(steps=200)))
+    end = law_end(Law("wild", "water", wild, WIDE, DT), LawSetup("any", small(steps=200)))
     assert end.error == np.inf
-    assert "step" in end.said
+    assert "step" in end.message
     assert 0 <= end.lost <= 200
-    assert end.kind(1.0) == STOPPED
+    assert LawTrial("wild", "any", 1.0, end).kind == STOPPED
 
 
 def test_what_is_usual_is_the_first_run_s_error():
     law = Law("none", "jelly", body_maker(untrained()), WIDE, DT)
-    setups = [Setup("as trained", small(steps=20)), Setup("again", small(steps=40))]
-    first, second = trials(Records(), law, setups)
+    setups = [LawSetup("as trained", small(steps=20)), LawSetup("again", small(steps=40))]
+    first, second = law_trials(Records(), law, setups)
     assert first.usual == second.usual == first.end.error > 0.0
     assert second.end.error > first.end.error
-    assert trials(Records(), law, setups, usual=7.0)[1].usual == 7.0
+    assert law_trials(Records(), law, setups, usual=7.0)[1].usual == 7.0
 
 
 def test_fluids_start_at_the_volume_of_the_strain():
     one = body_with_laws(build(environment("water")).bodies[0], Fluid(1e5), NoFlow())
     assert one.particles.F.ndim == 1
-    nclaw_runs.strain(one, np.diag([0.5, 1.0, 1.0]))
+    nclaw_runs.set_deformation(one, np.diag([0.5, 1.0, 1.0]))
     assert one.particles.F == pytest.approx(0.5)
 
 
 def test_longer_steps_cover_the_same_time():
     for factor, expected in ((4.0, (2e-3, 250, 5)), (0.25, (1.25e-4, 4000, 80))):
-        scene = longer(environment("jelly", every=20), factor)
+        scene = with_time_step(environment("jelly", every=20), factor)
         assert (scene.dt, scene.steps, scene.every) == expected
 
 
 def test_bodies_are_thrown_and_made_denser():
     scene = environment("jelly")
-    fast, dense = nclaw_strain.thrown(scene, 2.0), nclaw_strain.denser(scene, 5.0)
+    fast, dense = extrapolation.thrown(scene, 2.0), extrapolation.denser(scene, 5.0)
     v, v_fast, v_dense = (build(one).bodies[0].particles.v for one in (scene, fast, dense))
     assert v_fast == pytest.approx(2.0 * v)
     assert np.array_equal(v_dense, v)
@@ -180,7 +178,7 @@ def test_bodies_are_thrown_and_made_denser():
 def test_rates_go_by_the_bound_and_by_the_law():
     found = [trial(beyond=0.35), trial(beyond=0.05), trial(beyond=0.45, error=4e-4),
              trial(beyond=0.15, error=9e-4), trial(law="sand", beyond=9.0)]
-    rows = {row[:3]: row[3:] for row in nclaw_strain.rates(found)}
+    rows = {row[:3]: row[3:] for row in extrapolation.rates(found)}
     assert rows["chosen", 3.0, 0.3] == (2, 1, 2, 1)
     assert rows["chosen", 3.0, 0.0] == (2, 0, 2, 2)
     assert rows["chosen", 3.0, 1.0] == (2, 2, 2, 0)
@@ -191,7 +189,7 @@ def test_rates_go_by_the_bound_and_by_the_law():
 
 def test_the_worst_and_the_farthest_good_run_are_named():
     records = Records()
-    nclaw_strain.record_farthest(records, [trial(), trial("far", beyond=0.9),
+    extrapolation.record_farthest(records, [trial(), trial("far", beyond=0.9),
                                            trial("bad", beyond=2.0, error=9e-4)])
     assert records["trade.nclaw.x.jelly.worst"] == (
         pytest.approx(9.0), "largest error over the usual one, 0.0001 m^2: bad")
@@ -237,7 +235,7 @@ def test_bounds_that_weights_do_not_say_are_made(monkeypatch):
 
 def test_long_runs_are_looked_at_beside_the_true_one():
     law = Law("true", "jelly", as_true, NARROW, DT)
-    rows, said = nclaw_long.drawn_out(law, small(steps=60))
+    rows, said = extrapolation.compare_long_run(law, small(steps=60))
     assert ([row.step for row in rows], said) == ([0, 20, 40, 60], "")
     for row in rows:
         assert (row.error, row.kinetic, row.volume, row.height) == (
@@ -245,15 +243,17 @@ def test_long_runs_are_looked_at_beside_the_true_one():
     assert rows[0].kinetic > 0.5 * 125.0 * 7.25         # of the flight alone
     assert rows[0].height == pytest.approx(0.5)
     assert rows[-1].height < rows[0].height
-    broken, said = nclaw_long.drawn_out(Law("wild", "jelly", wild, NARROW, DT), small(steps=400))
+    broken, said = extrapolation.compare_long_run(Law("wild", "jelly", wild, NARROW, DT),
+                                                  small(steps=400))
     assert len(broken) < 21
     assert "step" in said
 
 
 def test_drift_is_that_of_the_last_fifth():
-    rows = [nclaw_long.Row(k, float(k), 2.0 * k, k, 1.0, 1.0, 0.5, 0.4, 0.1) for k in range(10)]
+    rows = [extrapolation.LongRunRow(k, float(k), 2.0 * k, k, 1.0, 1.0, 0.5, 0.4, 0.1)
+            for k in range(10)]
     records = Records()
-    nclaw_long.record_drift(records, SimpleNamespace(name="jelly"), rows, "")
+    extrapolation.record_drift(records, SimpleNamespace(name="jelly"), rows, "")
     assert records["extremes.nclaw.long.jelly.steps"][0] == 9
     value, note = records["extremes.nclaw.long.jelly.error"]
     assert value == 4.5
@@ -270,10 +270,10 @@ def test_epochs_are_compared_with_the_last_one(monkeypatch):
         return [trial("as trained", law.name, usual or error, error=error, lost=120, first=60),
                 trial("thrown", law.name, usual or error, error=error)]
 
-    monkeypatch.setattr(nclaw_epochs, "trials", shown)
+    monkeypatch.setattr(trainings, "law_trials", shown)
     kept = {k: untrained()._replace(about={"seen": WIDE, "dt": DT}) for k in (10, 100)}
     records = Records()
-    found = nclaw_epochs.of_training(records, Small(), kept)
+    found = trainings.training_trials(records, Small(), kept)
     assert [t.usual for t in found] == [1e-4] * 4
     assert [t.law for t in found] == ["jelly after 100"] * 2 + ["jelly after 10"] * 2
     value, note = records["extremes.nclaw.epochs.jelly.10"]
@@ -282,7 +282,7 @@ def test_epochs_are_compared_with_the_last_one(monkeypatch):
 
 
 def test_epochs_are_run_at_the_training_s_size():
-    setups = nclaw_epochs.tried(Records(), Small())
+    setups = trainings.training_setups(Records(), Small())
     assert len(setups) == 5
     assert {setup.scene.body[0].sampling.counts[0] for setup in setups} == {6}
     assert {setup.scene.steps * setup.scene.dt for setup in setups} == {0.5}
@@ -291,9 +291,9 @@ def test_epochs_are_run_at_the_training_s_size():
 def test_faults_stand_beside_the_seeds(monkeypatch):
     rows = [Measured(name, 100, 60.0, own, 2e-4, np.nan, -1) for name, own in
             (("small", 1e-4), ("small-seed-1", 3e-4), ("small-density-2", 9e-4))]
-    monkeypatch.setattr(observed, "measured", lambda *_, **__: rows)
+    monkeypatch.setattr(trainings, "measured", lambda *_, **__: rows)
     records = Records()
-    observed.observed(records)
+    trainings.observed(records)
     value, note = records["extremes.nclaw.observed.small-density-2"]
     assert value == 9e-4
     assert "without faults 0.0001 to 0.0003 m^2" in note

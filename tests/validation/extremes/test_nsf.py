@@ -12,40 +12,40 @@ from mpm_ref.rom.study.monitor import StateCheck
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.common.scenes import with_
-from validation.extremes import nsf_beyond as beyond
 from validation.extremes import nsf_damage as damage
-from validation.extremes import nsf_long as long
+from validation.extremes import nsf_extrapolation as extrapolation
 from validation.extremes import nsf_runs as runs
 from validation.extremes import nsf_samples as samples
-from validation.extremes.ldm_runs import BAD, FINE, FLAGGED, SILENT, STOPPED, TOLERABLE, Trial
+from validation.extremes.ldm_runs import BAD, TOLERABLE, ReducedTrial
+from validation.extremes.verdicts import FINE, FLAGGED, SILENT, STOPPED
 from validation.nsf import reduced_runs
 from validation.nsf.studies import jelly
 
 STUDY = jelly(4)._replace(train=(0.3, 0.5), test=(0.4,), samples=40,
                           sizes=Sizes(r=5, modes=8, tau=12, C=12, smoothing=1e-4))
-GOOD = runs.End(2.0, 0.2, 15.0, 30, -1, "", 0.4, 5, 0.01, "")
+GOOD = runs.FieldEnd(2.0, 0.2, 15.0, 30, -1, "", 0.4, 5, 0.01, "")
 
 
 @pytest.fixture(scope="module")
 def bench():
     """The small study."""
-    return runs.Bench("jelly", reduced_runs.fit_study(STUDY))
+    return runs.FieldBench("jelly", reduced_runs.fit_study(STUDY))
 
 
 def trial(end=GOOD, what="0.4", points=40, **changes):
-    return Trial("jelly", what, "inferred", points, 2.0, end._replace(**changes))
+    return ReducedTrial("jelly", what, "inferred", points, 2.0, end._replace(**changes))
 
 
 # Ends.
 
 def test_errors_and_ends_are_those_of_the_runs_themselves(bench):
     value, count = STUDY.test[0], STUDY.samples
-    found, (end,) = bench.one.errors(value, count), bench.tests
+    found, (end,) = bench.tested.errors(value, count), bench.tests
     assert end.error == pytest.approx(100.0 * found.errors.displacement, rel=1e-5)
     assert end.origin == pytest.approx(100.0 * found.errors.origin, rel=1e-5)
     assert end.stress == pytest.approx(100.0 * found.stress, rel=1e-5)
-    assert (end.steps, end.first, end.flags, end.said) == (30, -1, "", "")
-    assert end.kind(bench.usual) == FINE
+    assert (end.steps, end.first, end.flags, end.message) == (30, -1, "", "")
+    assert trial(end)._replace(usual=bench.usual).kind == FINE
     assert bench.usual == end.error
     assert 0.0 < end.beyond < 1.0
 
@@ -53,54 +53,54 @@ def test_errors_and_ends_are_those_of_the_runs_themselves(bench):
 @pytest.mark.parametrize(("changes", "kind"), [
     ({}, FINE), ({"error": 1.01 * BAD * 2.0}, SILENT), ({"error": np.nan}, SILENT),
     ({"error": 90.0, "flags": "beyond"}, FLAGGED),
-    ({"error": np.inf, "flags": "beyond", "said": "no body"}, STOPPED)])
+    ({"error": np.inf, "flags": "beyond", "message": "no body"}, STOPPED)])
 def test_the_four_ends_are_those_of_ldm(changes, kind):
     assert trial(**changes).kind == kind
 
 
 def test_the_extremes_of_a_run_are_kept():
     sights = [StateCheck(0.1, 0), StateCheck(3.0, 0), StateCheck(0.2, 2)]
-    assert runs.of_sights(sights, 5) == (2, 1, "beyond blind", 3.0, 3)
-    steps, first, flags, beyond, rank = runs.of_sights([], 5)
+    assert runs.summarize_checks(sights, 5) == (2, 1, "beyond blind", 3.0, 3)
+    steps, first, flags, beyond, rank = runs.summarize_checks([], 5)
     assert (steps, first, flags, rank) == (-1, -1, "", 5)
     assert np.isnan(beyond)
 
 
 def test_a_full_order_run_that_stops_says_so(bench):
-    found, said = runs.made(STUDY, 0.45)
+    found, said = runs.simulate_test(STUDY, 0.45)
     assert (found.x.shape[1], said) == (31, "")
-    assert runs.made(STUDY, 50.0)[0] is None
-    assert "unstable" in runs.made(STUDY, 50.0)[1]
+    assert runs.simulate_test(STUDY, 50.0)[0] is None
+    assert "unstable" in runs.simulate_test(STUDY, 50.0)[1]
 
 
 # Parameters outside.
 
 def test_rates_are_of_good_and_of_bad_runs():
     found = [trial(), trial(beyond=2.0), trial(error=50.0, beyond=0.7),
-             trial(error=50.0, beyond=4.0), trial(error=np.inf, beyond=0.1, said="no body")]
-    assert beyond.rates(found, (0.3, 1.0, 3.0, 5.0)) == [
+             trial(error=50.0, beyond=4.0), trial(error=np.inf, beyond=0.1, message="no body")]
+    assert extrapolation.rates(found, (0.3, 1.0, 3.0, 5.0)) == [
         (0.3, 1.0, 0.0, 2, 3), (1.0, 0.5, 1 / 3, 2, 3), (3.0, 0.0, 1 / 3, 2, 3),
         (5.0, 0.0, 2 / 3, 2, 3)]
 
 
 def test_small_errors_are_not_bad_however_good_the_tests_are():
     small = trial()._replace(usual=0.01)
-    assert beyond.is_bad(small)
-    assert not beyond.is_bad(small._replace(end=GOOD._replace(error=0.99 * TOLERABLE)))
+    assert small.is_bad
+    assert not small._replace(end=GOOD._replace(error=0.99 * TOLERABLE)).is_bad
 
 
 def test_false_alarms_are_of_the_good_runs():
     found = Records()
-    beyond.record_false_alarms(found, [trial(), trial(flags="beyond"),
+    extrapolation.record_false_alarms(found, [trial(), trial(flags="beyond"),
                                        trial(error=90.0, flags="beyond")])
     assert found["extremes.nsf.beyond.false_alarms"][0] == 0.5
 
 
 def test_runs_inside_and_outside_are_told_apart(tmp_path, monkeypatch):
     monkeypatch.setattr(runs, "studies", lambda run: {"jelly": STUDY})
-    monkeypatch.setattr(beyond, "OUTSIDE", {"jelly": {"quick": (1.0, 50.0)}})
-    monkeypatch.setattr(beyond, "INSIDE", {"jelly": (0.35,)})
-    assert not run_all([beyond.beyond.experiment], RunSetting("quick", tmp_path))
+    monkeypatch.setattr(extrapolation, "OUTSIDE", {"jelly": {"quick": (1.0, 50.0)}})
+    monkeypatch.setattr(extrapolation, "INSIDE", {"jelly": (0.35,)})
+    assert not run_all([extrapolation.parameter_range.experiment], RunSetting("quick", tmp_path))
     results, id = ProfileResults(tmp_path), "extremes.nsf.beyond"
     table = results.table(id, "runs")
     assert table["what"].tolist() == [0.4, 0.35, 1.0]
@@ -129,7 +129,7 @@ def test_fewer_equations_than_coordinates_are_told(bench):
 
 
 def test_samples_in_a_corner_are_worse_than_any(bench):
-    X = bench.one.fields.X
+    X = bench.tested.fields.X
     corner = bench.trial("corner", samples.clustered(X, X.max(axis=0), 10))
     assert corner.end.error > 2.0 * bench.trial("draw 0", bench.drawn(10)).end.error
 
@@ -141,7 +141,7 @@ def test_samples_in_a_corner_are_worse_than_any(bench):
     ("lowest bit of the exponent", 0.5), ("highest bit of the exponent", np.inf), ("sign", -1.0),
     ("lowest bit", 1.0 + 2.0**-52)])
 def test_numbers_are_damaged_as_said(kind, value):
-    assert damage.spoilt(1.0, kind) == value
+    assert damage.damage_number(1.0, kind) == value
 
 
 @pytest.mark.parametrize("path", damage.ARRAYS)
@@ -155,8 +155,8 @@ def test_one_number_of_one_array_is_damaged(bench, path):
                       f"{name}.coefficients.centers": part.coefficients.centers}
         return found
 
-    fields = bench.one.fields
-    changed = damage.damaged(fields, path, 0.5, "NaN")
+    fields = bench.tested.fields
+    changed = damage.damage_array(fields, path, 0.5, "NaN")
     sizes = {name: int(np.sum(a != arrays(fields)[name])) for name, a in arrays(changed).items()}
     assert sizes == dict.fromkeys(sizes, 0) | {path: 1}
     assert np.isnan(arrays(changed)[path].flat[arrays(fields)[path].size // 2])
@@ -164,7 +164,8 @@ def test_one_number_of_one_array_is_damaged(bench, path):
 
 def test_damage_is_stopped_harmless_or_wrong(bench):
     def ended(path, kind):
-        return bench.trial(path, bench.drawn(40), damage.damaged(bench.one.fields, path, 0.5, kind))
+        fields = damage.damage_array(bench.tested.fields, path, 0.5, kind)
+        return bench.trial(path, bench.drawn(40), fields)
 
     assert ended("bend.w", "NaN").kind == STOPPED
     assert not np.isfinite(ended("bend.w", "NaN").end.error)
@@ -176,7 +177,8 @@ def test_files_of_fields_are_refused_where_damaged(bench):
     found = Records()
     run = SimpleNamespace(rng=np.random.default_rng(0), choose=lambda **by: 1,
                           record=found.record)
-    damage.record_files(run, "jelly", reduced_runs.refit(bench.one, STUDY.sizes, follows=True))
+    tested = reduced_runs.refit(bench.tested, STUDY.sizes, follows=True)
+    damage.record_files(run, "jelly", tested)
     assert {id: value for id, (value, _) in found.items()} == {
         f"extremes.nsf.damage.files.{name}": 1.0 for name in ("damaged", "unfit")}
 
@@ -185,18 +187,18 @@ def test_damaged_files_are_those_of_the_scene_that_is_named(monkeypatch):
     """Not of the last one."""
     filed = []
     one, other = (SimpleNamespace(fields=SimpleNamespace(r=r)) for r in (5, 6))
-    monkeypatch.setattr(damage, "scenes", lambda run: [(damage.FILED, one), ("jelly", other)])
-    monkeypatch.setattr(damage, "Bench", lambda *_: SimpleNamespace(
+    monkeypatch.setattr(damage, "scenes", lambda run: [(damage.FILE_SCENE, one), ("jelly", other)])
+    monkeypatch.setattr(damage, "FieldBench", lambda *_: SimpleNamespace(
         count=40, drawn=lambda count: count, trial=lambda what, *_: trial(what=what)))
-    monkeypatch.setattr(damage, "damaged", lambda *_: None)
+    monkeypatch.setattr(damage, "damage_array", lambda *_: None)
     monkeypatch.setattr(damage, "refit", lambda one, sizes, follows: (one, sizes, follows))
     monkeypatch.setattr(damage, "record_files", lambda run, *given: filed.append(given))
     run = Records()
     run.profile, run.rng = "quick", np.random.default_rng(0)
     monkeypatch.setattr(damage, "SHOWN", {"quick": ("U",)})
     damage.damage(run)
-    assert filed == [(damage.FILED, (one, Sizes(5, *damage.SMALL), True))]
-    assert damage.FILED in runs.studies(run)
+    assert filed == [(damage.FILE_SCENE, (one, Sizes(5, *damage.SMALL), True))]
+    assert damage.FILE_SCENE in runs.studies(run)
 
 
 def test_what_passes_is_recorded_with_its_largest_error():
@@ -204,7 +206,7 @@ def test_what_passes_is_recorded_with_its_largest_error():
     run = SimpleNamespace(profile="quick", record=found.record)
     damage.record_ends(run, [trial(what=f"U: {kind}") for kind in damage.KINDS["quick"]]
                        + [trial(what="tau.modes: huge", error=7.0),
-                          trial(what="C.modes: huge", said="no")])
+                          trial(what="C.modes: huge", message="no")])
     value, note = found["extremes.nsf.damage.huge"]
     assert value == pytest.approx(1.0 / 3.0)
     assert "7 %, jelly, tau.modes: huge" in note
@@ -215,8 +217,8 @@ def test_what_passes_is_recorded_with_its_largest_error():
 def test_long_runs_go_on_beside_the_full_order_run(bench):
     scene = STUDY.run(0.4)
     longer = with_(scene, steps=2 * scene.steps, every=10)
-    full, stopped = long.full_run(longer)
-    own, said = long.reduced_run(bench, longer, bench.drawn(40))
+    full, stopped = extrapolation.full_run(longer)
+    own, said = extrapolation.reduced_run(bench, longer, bench.drawn(40))
     assert (list(full), stopped, said) == ([0, 10, 20, 30, 40, 50, 60], "", "")
     assert list(own) == list(range(61))
     assert own[0][1] < 1e-3 * own[1][1]         # the nearest state to the start, not the start
@@ -226,20 +228,22 @@ def test_long_runs_go_on_beside_the_full_order_run(bench):
 
 
 def test_kinetic_energy():
-    assert long.kinetic(np.array([2.0, 1.0]), np.array([[3.0, 4.0], [0.0, 2.0]])) == 27.0
+    m, v = np.array([2.0, 1.0]), np.array([[3.0, 4.0], [0.0, 2.0]])
+    assert extrapolation.kinetic_energy(m, v) == 27.0
 
 
 def test_a_breakdown_is_recorded_with_its_step():
     found = Records()
     own = {0: (0.1, 0.0, 1.0), 1: (0.5, 0.2, 0.8), 2: (4.0, 0.4, 0.6)}
-    long.record_end(found, "jelly", (own, "no body"), ({0: (0.0, 1.0), 2: (0.3, 0.5)}, ""), 1)
+    full = {0: (0.0, 1.0), 2: (0.3, 0.5)}, ""
+    extrapolation.record_end(found, "jelly", (own, "no body"), full, 1)
     value, note = found["extremes.nsf.long.jelly.steps"]
     assert (value, note) == (2, "no body")
     value, note = found["extremes.nsf.long.jelly.beyond"]
     assert value == 4.0
     assert "within the trained steps 0.5; above 1 first in step 2" in note
     assert found["extremes.nsf.long.jelly.kinetic"][0] == 0.6
-    assert "the full-order run 0.5, at its most 1" in found["extremes.nsf.long.jelly.kinetic"][1]
+    assert "the full-order run 0.5, its peak 1" in found["extremes.nsf.long.jelly.kinetic"][1]
 
 
 def test_a_run_without_a_start_is_recorded(bench, monkeypatch):
@@ -248,34 +252,35 @@ def test_a_run_without_a_start_is_recorded(bench, monkeypatch):
         raise NoBody("no such body")
 
     monkeypatch.setattr("mpm_ref.rom.study.run.nsf_start", broken)
-    own, said = long.reduced_run(bench, STUDY.run(0.4), bench.drawn(40))
+    own, said = extrapolation.reduced_run(bench, STUDY.run(0.4), bench.drawn(40))
     assert (own, said) == ({}, "no such body")
     found = Records()
-    long.record_end(found, "jelly", (own, said), ({0: (0.0, 1.0)}, ""), 1)
+    extrapolation.record_end(found, "jelly", (own, said), ({0: (0.0, 1.0)}, ""), 1)
     assert found == {"extremes.nsf.long.jelly.steps": (-1, "no such body")}
 
 
 def test_a_full_order_run_without_a_start_is_recorded():
     found = Records()
-    long.record_end(found, "jelly", ({0: (0.1, 0.0, 1.0)}, ""), ({}, "the step is too large"), 1)
+    extrapolation.record_end(found, "jelly", ({0: (0.1, 0.0, 1.0)}, ""),
+                             ({}, "the step is too large"), 1)
     assert found["extremes.nsf.long.jelly.steps"] == (
-        0, "to its end; the full-order run the step is too large")
+        0, "finished; the full-order run the step is too large")
     assert {*found} == {f"extremes.nsf.long.jelly.{name}" for name in ("steps", "beyond")}
 
 
 def test_a_run_that_leaves_all_trained_states_is_ended(bench, monkeypatch):
     scene = STUDY.run(0.4)
-    monkeypatch.setattr(runs, "GONE", 0.5)
-    own, said = long.reduced_run(bench, scene, bench.drawn(40))
+    monkeypatch.setattr(runs, "MAX_OUTLYING", 0.5)
+    own, said = extrapolation.reduced_run(bench, scene, bench.drawn(40))
     assert 1 <= len(own) < 31
     assert "times as far off" in said
-    end = bench.ended(0.4, bench.drawn(40))
-    assert (end.error, end.said, end.steps) == (np.inf, "", len(own) - 1)
+    end = bench.end(0.4, bench.drawn(40))
+    assert (end.error, end.message, end.steps) == (np.inf, "", len(own) - 1)
 
 
 def test_stress_that_is_not_finite_ends_a_run(bench):
-    spoilt = damage.damaged(bench.one.fields, "tau.coefficients.w", 0.5, "NaN")
+    spoilt = damage.damage_array(bench.tested.fields, "tau.coefficients.w", 0.5, "NaN")
     end = bench.trial("NaN", bench.drawn(40), spoilt).end
     assert not np.isfinite(end.error)
-    assert (end.steps, "40 of 40 samples have no finite place" in end.said) == (0, True)
+    assert (end.steps, "40 of 40 samples have no finite place" in end.message) == (0, True)
     assert 0.0 < bench.tests[0].off < 1.0

@@ -9,7 +9,7 @@ from mpm_ref.store.checkpoint import digest
 from validation.common import targets
 from validation.hot import warm_states as states
 from validation.hot.overview import ABLATION, MethodCost, options, overview
-from validation.trade.hot_start import beginnings, carried
+from validation.trade.hot_start import carry_increments, start_increments
 
 
 def falling():
@@ -106,7 +106,7 @@ def test_every_range_of_the_text_is_recorded():
 
 def test_last_increments_are_carried_node_by_node():
     index, dv = np.array([[0, 1], [2, 3]]), np.array([[1.0, 2.0], [3.0, 4.0]])
-    initial = carried(index, dv, np.array([[2, 3], [5, 5], [0, 1]]))
+    initial = carry_increments(index, dv, np.array([[2, 3], [5, 5], [0, 1]]))
     np.testing.assert_array_equal(initial, [[3.0, 4.0], [0.0, 0.0], [1.0, 2.0]])
 
 
@@ -114,7 +114,8 @@ def test_starts_of_a_step_are_admissible(cache):
     problem, state = states.warm_state("block", "quick")
     first, second = states.following_steps(problem, state, 2)
     q = second.pose.unknowns
-    begin = beginnings(second, (first.pose.unknowns.index, np.ones_like(first.pose.unknowns.v)))
+    last = first.pose.unknowns.index, np.ones_like(first.pose.unknowns.v)
+    begin = start_increments(second, last)
     np.testing.assert_array_equal(begin["zero"], q.dv0)
     np.testing.assert_allclose(begin["gravity"], [[0.0, -9.8 * second.dt]] * len(q.m), rtol=1e-14)
     assert set(np.unique(begin["last"])) <= {0.0, 1.0}

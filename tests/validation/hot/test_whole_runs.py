@@ -12,7 +12,7 @@ from validation.common.scenes import catalogue_scene, with_
 from validation.hot import run_history as histories
 from validation.hot.run_history import COLUMNS, FIELDS, read, run, run_history
 from validation.hot.sizes import SIZES
-from validation.trade.hot_energy import DT, End, StopRule, distance_in_cells, twisted
+from validation.trade.hot_energy import DT, BarRunEnd, StopRule, distance_in_cells, twisted_bar
 
 
 def small(steps=3, **changes):
@@ -144,9 +144,9 @@ def test_states_are_drawn_and_missing_ones_named(history, tmp_path):
 # The trade
 
 def test_bar_of_the_trade_has_fixed_steps_and_the_count_of_the_authors():
-    scene = twisted(0.015, 40, StopRule("hot", 1e-9))
+    scene = twisted_bar(0.015, 40, StopRule("hot", 1e-9))
     assert sum(body.sampling.count for body in scene.body) == 30720
-    clock = build(with_(twisted(0.06, 2, StopRule("hot", 1e-9)))).clock
+    clock = build(with_(twisted_bar(0.06, 2, StopRule("hot", 1e-9)))).clock
     assert (clock.dt, clock.steps, clock.interval) == (DT, 2, None)
 
 
@@ -154,6 +154,6 @@ def test_distance_from_the_answer_is_in_cells():
     x = np.zeros((4, 3))
     y = x.copy()
     y[0, 2] = 0.3
-    ends = [End(1.0, 1.0, places, 0.0, 1.0, True) for places in (y, x)]
+    ends = [BarRunEnd(1.0, 1.0, places, 0.0, 1.0, True) for places in (y, x)]
     assert distance_in_cells(*ends, 0.1) \
         == pytest.approx((1.5, 3.0))

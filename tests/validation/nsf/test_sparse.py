@@ -27,12 +27,12 @@ from mpm_ref.store.results import Results as Stored
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.extremes import nsf_samples as samples
-from validation.extremes.ldm_runs import BAD, Trial
-from validation.extremes.nsf_runs import Bench, End
+from validation.extremes.ldm_runs import BAD, ReducedTrial
+from validation.extremes.nsf_runs import FieldBench, FieldEnd
 from validation.nsf import reduced_runs
 from validation.nsf.studies import jelly
 
-GOOD = End(2.0, 0.2, 15.0, 30, -1, "", 0.4, 5, 0.01, "")
+GOOD = FieldEnd(2.0, 0.2, 15.0, 30, -1, "", 0.4, 5, 0.01, "")
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +95,8 @@ def test_weights_tell_what_they_leave():
 
 
 def trial(error=2.0, flags=""):
-    return Trial("jelly", "draw 0", "inferred", 40, 2.0, GOOD._replace(error=error, flags=flags))
+    end = GOOD._replace(error=error, flags=flags)
+    return ReducedTrial("jelly", "draw 0", "inferred", 40, 2.0, end)
 
 
 def test_bad_runs_that_their_samples_tell_are_counted():
@@ -103,7 +104,7 @@ def test_bad_runs_that_their_samples_tell_are_counted():
     bad = 1.01 * BAD * 2.0
     found = [trial(bad), trial(bad), trial(bad, "beyond"), trial(), trial()]
     records = Records()
-    samples.record_told(records, "extremes.nsf.samples",
+    samples.record_misfit(records, "extremes.nsf.samples",
                         list(zip(found, [0.9, 0.1, 0.8, 0.9, 0.2], strict=True)))
     share, note = records["extremes.nsf.samples.told"]
     assert share == pytest.approx(2 / 3)
@@ -113,9 +114,9 @@ def test_bad_runs_that_their_samples_tell_are_counted():
 
 def test_sets_are_few_drawn_ones_and_corners(rng):
     fields = SimpleNamespace(X=rng.uniform(size=(150, 3)))
-    bench = SimpleNamespace(one=SimpleNamespace(fields=fields))
-    bench.drawn = lambda count, draw=0: Bench.drawn(bench, count, draw)
-    found = samples.sets_of(bench, "quick")
+    bench = SimpleNamespace(tested=SimpleNamespace(fields=fields))
+    bench.drawn = lambda count, draw=0: FieldBench.drawn(bench, count, draw)
+    found = samples.sample_sets(bench, "quick")
     assert [(what, len(chosen.points)) for what, chosen in found] == [
         ("draw 0", 1), ("draw 0", 3), *((f"at the {place} corner", count)
                                         for place in ("lower", "upper") for count in (10, 100))]
@@ -126,11 +127,11 @@ def test_scenes_that_the_bound_has_not_seen_are_judged_by_it(tmp_path, monkeypat
     """Others than those that it was chosen by, on samples anywhere; few, none in a corner."""
     study = jelly(4)._replace(train=(0.3, 0.5), test=(0.4,), samples=40,
                               sizes=Sizes(r=5, modes=8, tau=12, C=12, smoothing=1e-4))
-    monkeypatch.setattr(samples, "others", lambda run: {"cube": study})
-    assert not run_all([samples.unseen.experiment], RunSetting("quick", tmp_path))
+    monkeypatch.setattr(samples, "other_studies", lambda run: {"cube": study})
+    assert not run_all([samples.other_scenes.experiment], RunSetting("quick", tmp_path))
     found = ProfileResults(tmp_path)
     table = found.table("extremes.nsf.unseen", "left")
-    assert list(zip(table["map"], table["what"], table["samples"], strict=True)) == [
+    assert list(zip(table["model"], table["what"], table["samples"], strict=True)) == [
         ("cube", "draw 0", 3)]
     one = reduced_runs.fit_study(study)
     points = drawn_samples(len(one.fields.X), 3, 0).points
@@ -141,6 +142,6 @@ def test_scenes_that_the_bound_has_not_seen_are_judged_by_it(tmp_path, monkeypat
 
 
 def test_they_are_other_scenes_with_samples_anywhere():
-    studies = samples.others(Records())
+    studies = samples.other_studies(Records())
     assert {*studies}.isdisjoint({"jelly", "metal"})
     assert {(study.column, study.later) for study in studies.values()} == {(None, None)}

@@ -8,27 +8,25 @@ from validation.hot.iterates import initial_step
 from validation.hot.one_step import ParticleErrors, difference, particle_errors
 from validation.hot.stiffness import METHODS
 from validation.hot.warm_states import START_TIMES
-from validation.trade import hot_methods
-from validation.trade.hot import POINT, Point, bounded_below, times_for
-from validation.trade.hot_methods import (
-    ALL,
-    CAPS,
-    SLOW,
-    SOME,
-    ToleranceLadder,
-    descended,
-    tolerance_ladders,
-)
+from validation.trade import hot_scenes as hot_methods
+from validation.trade.hot import POINT_FIELDS, SolvePoint, bounded_below, times_for
 from validation.trade.hot_scenes import (
-    OVER,
-    Trial,
+    ALL_METHODS,
+    CAPS,
+    COMPARISONS,
+    FEW_METHODS,
+    SLOW,
+    SceneTrial,
+    ToleranceLadder,
+    compared_error,
+    descend_ladders,
     fastest,
-    over_hot,
     plan,
+    ratios_to_hot,
     record_ranges,
     record_ranking,
     seconds,
-    trust,
+    tolerance_ladders,
 )
 
 
@@ -74,9 +72,10 @@ def test_one_node_moves_the_particles_near_it_most(step):
 
 
 def made(method, eps, cpu, error, **others):
-    """A `Point`, whose other errors are tenths of this one."""
-    rest = dict.fromkeys(POINT, 0) | {"iterations": 1, "converged": True, "cells": 0.1 * error}
-    return Point(**rest | {"method": method, "eps": eps, "cpu": cpu, "error": error} | others)
+    """A `SolvePoint`, whose other errors are tenths of this one."""
+    rest = dict.fromkeys(POINT_FIELDS, 0) | {
+        "iterations": 1, "converged": True, "cells": 0.1 * error}
+    return SolvePoint(**rest | {"method": method, "eps": eps, "cpu": cpu, "error": error} | others)
 
 
 def test_no_error_is_known_better_than_the_reference():
@@ -104,13 +103,13 @@ def paired():
 
 
 def test_equal_error_is_that_of_hot_at_the_papers_tolerance():
-    assert trust(paired()) == 1e-2
+    assert compared_error(paired()) == 1e-2
     times = seconds(paired())
     assert times["equal-eps"] == {"hot": 2.0, "pn-pcg": 1.5, "pn-mgpcg": 9.0}
     assert times["equal-error"] == {"hot": 2.0, "pn-pcg": pytest.approx(3.0)}   # logarithmic scales
     assert times["cells"]["pn-pcg"] == pytest.approx(3.0)
     assert 1.0 < times["cells"]["hot"] < 2.0
-    over = over_hot(times)
+    over = ratios_to_hot(times)
     assert over["equal-eps"] == {"pn-pcg": 0.75, "pn-mgpcg": 4.5}
     assert over["equal-error"] == {"pn-pcg": pytest.approx(1.5)}
 
@@ -135,21 +134,21 @@ def test_solves_cut_short_are_not_fast():
 def test_an_error_of_a_solve_that_has_hardly_begun_is_not_compared():
     times = seconds([made("hot", 1e-7, 2.0, 0.6), made("pn-pcg", 1e-7, 1.0, 0.4)])
     assert times["equal-error"] == {}
-    assert set(over_hot(times)) == {"equal-eps"}        # nobody comes within a thousandth of a cell
+    assert set(ratios_to_hot(times)) == {"equal-eps"}       # none is within a thousandth of a cell
     assert fastest(times) == {"equal-eps": "pn-pcg", "equal-error": None, "cells": None}
 
 
 def stepped(monkeypatch, solve):
-    """`descended`'s (method, eps), where solve(method, eps) -> CPU seconds, converged."""
+    """`descend_ladders`'s (method, eps), where solve(method, eps) -> CPU seconds, converged."""
     def point(step, exact, way, repeats, **options):
         assert options.items() >= CAPS.items()
         cpu, converged = solve(*way)
         return made(*way, cpu, 0.1, converged=converged)
-    monkeypatch.setattr(hot_methods, "point", point)
+    monkeypatch.setattr(hot_methods, "measured_point", point)
     tried = [ToleranceLadder("hot", (1e-5, 1e-6, 1e-7, 1e-8)),
              ToleranceLadder("pn-pcg", (1e-5, 1e-6, 1e-7, 1e-8)),
              ToleranceLadder("gast15", (1.0, 0.1))]
-    return [(p.method, p.eps) for p in descended(None, None, tried)]
+    return [(p.method, p.eps) for p in descend_ladders(None, None, tried)]
 
 
 def test_ways_take_turns_down_their_ladders(monkeypatch):
@@ -169,9 +168,10 @@ def test_a_solve_cut_short_or_slow_is_a_ways_last(monkeypatch, answer):
 def test_every_method_is_tried_and_newton_with_multigrid_bears_its_cycle():
     quick, standard = plan("quick"), plan("standard")
     assert {trial.methods for trial in quick} == {METHODS}
-    assert {(t.size, t.methods) for t in standard} == {("quick", ALL), ("standard", SOME)}
+    assert {(t.size, t.methods) for t in standard} == {
+        ("quick", ALL_METHODS), ("standard", FEW_METHODS)}
     assert {t.scene for t in standard if t.size == "quick"} == set(START_TIMES)
-    found = {way.method: way for way in tolerance_ladders(ALL, (1e-3, 1e-4))}
+    found = {way.method: way for way in tolerance_ladders(ALL_METHODS, (1e-3, 1e-4))}
     assert {name for name, way in found.items() if "flexible" in way.options} == {
         "pn-mgpcg", "pn-gmg-pcg"}
     assert [name for name, way in found.items() if way.ladder != (1e-3, 1e-4)] == ["gast15"]
@@ -207,11 +207,11 @@ def test_ranges_name_their_scenes_and_where_a_method_changes_places_with_hot():
 def test_ranking_counts_trials_that_can_be_compared():
     run = Records()
     record_ranking(run, {
-        Trial("wheel", "quick", (), ()): seconds(paired()),
-        Trial("wheel", "standard", (), ()): seconds([made("hot", 1e-7, 2.0, 0.9),
+        SceneTrial("wheel", "quick", (), ()): seconds(paired()),
+        SceneTrial("wheel", "standard", (), ()): seconds([made("hot", 1e-7, 2.0, 0.9),
                                                      made("pn-pcg", 1e-7, 3.0, 0.9)])})
     short = {t.removeprefix("trade.hot.scenes."): value for t, (value, _) in run.items()}
     assert short["reordered"] == short["hardly-begun"] == 1
     assert run["trade.hot.scenes.hardly-begun"][1].endswith("wheel.fine")
-    assert [short[f"first.hot.{what}"] for what in OVER] == [1, 1, 1]
-    assert [short[f"first.pn-pcg.{what}"] for what in OVER] == [1, 0, 0]
+    assert [short[f"first.hot.{what}"] for what in COMPARISONS] == [1, 1, 1]
+    assert [short[f"first.pn-pcg.{what}"] for what in COMPARISONS] == [1, 0, 0]

@@ -14,7 +14,15 @@ from validation.ldm.references import references
 from validation.ldm.studies import GRAVITY
 from validation.ldm.timing import StepTime, TimedRun
 from validation.trade import ldm
-from validation.trade.ldm_cost import EVALUATIONS, PARTS, Clock, TimedCalls, cost, paid, split
+from validation.trade.ldm_cost import (
+    EVALUATIONS,
+    PARTS,
+    PartTimer,
+    TimedCalls,
+    evaluation_costs,
+    runs_to_pay,
+    split_step,
+)
 
 EXACT = Affine(3), Affine(3).rest
 
@@ -33,7 +41,7 @@ def busy(seconds):
 
 
 def test_a_part_inside_another_counts_for_itself():
-    clock = Clock()
+    clock = PartTimer()
     inner = clock.part("inner", lambda: busy(0.05))
 
     def work():
@@ -51,7 +59,7 @@ def test_a_part_inside_another_counts_for_itself():
 
 
 def test_a_part_that_raises_is_left():
-    clock = Clock()
+    clock = PartTimer()
     with pytest.raises(ZeroDivisionError):
         clock.part("broken", lambda: 1 / 0)()
     assert clock.inside == ["rest"]
@@ -63,7 +71,7 @@ def test_what_is_watched_is_the_same_but_for_the_named_methods():
                          lambda name, method: lambda: said.append(name) or method())
     watched.sort()
     watched.append(5)
-    assert watched.of == [1, 3, 5]
+    assert watched.target == [1, 3, 5]
     assert said == ["sort"]
 
 
@@ -72,7 +80,7 @@ def test_a_step_asks_the_map_as_often_as_its_way_says(one):
     n = len(one.X)
     for velocity, derivatives, place, speeds in (("previous", 1, 0, 1), ("latest", 1, 0, 0),
                                                  ("difference", 1, 1, 0), ("transported", 2, 0, 1)):
-        spent, asked, points = split(one, EXACT, RunOptions(velocity=velocity), 3)
+        spent, asked, points = split_step(one, EXACT, RunOptions(velocity=velocity), 3)
         assert points == n
         expected = dict(zip(EVALUATIONS, (derivatives * n, place * n, speeds * n), strict=True))
         assert asked == pytest.approx(expected, abs=0.0)
@@ -83,20 +91,20 @@ def test_a_step_asks_the_map_as_often_as_its_way_says(one):
 def test_near_preimages_ask_less(one):
     model = trained("gravity-r4")
     way = RunOptions("eulerian", points=20, velocity="latest")
-    paper, cheap = (split(one, (model.field, model.rest), way._replace(preimage_tolerance=close), 2)
-                    for close in (1e-9, 1e-2))
+    paper, cheap = (split_step(one, (model.field, model.rest),
+                               way._replace(preimage_tolerance=close), 2) for close in (1e-9, 1e-2))
     assert cheap[2] == paper[2]
     assert cheap[1]["derivatives"] < 0.7 * paper[1]["derivatives"]
 
 
 def test_each_evaluation_has_a_cost(one):
-    found = cost(one, *EXACT)
+    found = evaluation_costs(one, *EXACT)
     assert set(found) == set(EVALUATIONS)
     assert 0.0 < min(found.values()) < 1e-3
 
 
 def test_choices_differ_from_the_base_in_one_thing():
-    ways = ldm.knobs()
+    ways = ldm.single_choices()
     assert len(set(ways)) == len(ways)
     for way in ways:
         other = [name for name in RunOptions._fields
@@ -107,7 +115,7 @@ def test_choices_differ_from_the_base_in_one_thing():
 
 def test_longer_steps_meet_the_same_answer_at_their_times():
     tests = references(GRAVITY, 1)
-    longer = ldm.lengthened(tests, 3)
+    longer = ldm.with_longer_steps(tests, 3)
     (before,), (after,) = tests.cases, longer.cases
     assert after.problem.clock.dt == 3 * before.problem.clock.dt
     assert after.problem.clock.steps == before.problem.clock.steps // 3
@@ -120,15 +128,15 @@ def test_longer_steps_meet_the_same_answer_at_their_times():
 
 
 def test_what_saves_nothing_is_never_paid():
-    assert paid(2.0, 30.0) == 15.0
-    assert paid(0.0, 30.0) == paid(-1.0, 30.0) == np.inf
+    assert runs_to_pay(2.0, 30.0) == 15.0
+    assert runs_to_pay(0.0, 30.0) == runs_to_pay(-1.0, 30.0) == np.inf
 
 
 def test_a_run_costs_as_many_steps_as_it_has(monkeypatch):
     tests = references(GRAVITY, 1)
     one = TimedRun(RunOptions(), StepTime(9.0, 0.5), 0, None)
     monkeypatch.setattr(ldm, "time_alone", lambda *_: one)
-    assert ldm.steps_of(tests, EXACT, RunOptions()) == 0.5 * tests.cases[0].problem.clock.steps
+    assert ldm.run_cpu(tests, EXACT, RunOptions()) == 0.5 * tests.cases[0].problem.clock.steps
 
 
 def test_a_run_by_itself_has_the_errors_that_it_has_among_others():

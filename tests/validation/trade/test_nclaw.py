@@ -15,7 +15,7 @@ from validation.nclaw.small_runs import Measured, measured, seed_range, training
 from validation.nclaw.small_trainings import Small, bundled, identity, small_nets
 from validation.trade import nclaw as trade
 from validation.trade import nclaw_inference as inference
-from validation.trade.nclaw_inference import error, rounded, shorter
+from validation.trade.nclaw_inference import frames_error, round_digits, round_weights
 
 
 @pytest.fixture
@@ -112,10 +112,10 @@ def test_what_is_seen_stands_beside_the_seeds(monkeypatch):
     some = [row(), row("small-seed-1", training_run=3e-4), row("small-every-5", training_run=7e-4)]
     monkeypatch.setattr(trade, "measured", lambda *_, **__: some)
     records = Records()
-    trade.sight(records)
+    trade.observations(records)
     value, note = records["trade.nclaw.sight.small-every-5"]
     assert value == 7e-4
-    assert "seeing all 0.0001 to 0.0003 m^2 by seed" in note
+    assert "full observations 0.0001 to 0.0003 m^2 by seed" in note
     columns, rows = records["trainings"]
     assert dict(zip(columns, rows[2], strict=True))["every"] == 5
 
@@ -125,25 +125,25 @@ def test_what_is_seen_stands_beside_the_seeds(monkeypatch):
 @pytest.mark.parametrize("bits", [4, 8, 11, 24])
 def test_numbers_have_so_many_digits(rng, bits):
     a = rng.normal(size=1000) * 10.0 ** rng.integers(-9, 9, 1000)
-    short = shorter(a, bits)
+    short = round_digits(a, bits)
     assert np.abs(short / a - 1.0).max() <= 2.0**-bits
     assert np.abs(short / a - 1.0).max() > 2.0 ** -(bits + 2)
-    assert np.array_equal(shorter(short, bits), short)
+    assert np.array_equal(round_digits(short, bits), short)
     if bits == 24:
         assert np.array_equal(short, a.astype(np.float32))
 
 
 def test_all_weights_are_rounded():
     laws = untrained()
-    short = rounded(laws, 8)
+    short = round_weights(laws, 8)
     for part in weights.PARTS:
         assert getattr(short, part).kind == getattr(laws, part).kind
         for (W, _), (was, _) in zip(getattr(short, part).layers, getattr(laws, part).layers,
                                     strict=True):
-            assert np.array_equal(W, shorter(was, 8))
+            assert np.array_equal(W, round_digits(was, 8))
             assert not np.array_equal(W, was)
     assert all(np.array_equal(a[0], b[0]) for a, b in
-               zip(rounded(laws, 24).elastic.layers, laws.elastic.layers, strict=True))
+               zip(round_weights(laws, 24).elastic.layers, laws.elastic.layers, strict=True))
 
 
 def weights_of(*numbers):
@@ -157,7 +157,7 @@ def weights_of(*numbers):
     ((0.0, 0.5, 2.0**-15, 0.5), 4), ((0.0, 0.5, 2.0**-16, 0.5), 5)])
 def test_weights_take_digits_and_an_exponent_of_their_range(numbers, exponent):
     """16 weights: of 1, 3, 15 and 16 exponents, and one value for zero."""
-    assert inference.size_of(weights_of(*numbers), 8) == 16 * (8 + exponent) / 8
+    assert inference.weights_size(weights_of(*numbers), 8) == 16 * (8 + exponent) / 8
 
 
 def test_the_front_of_digits_is_of_error_and_bytes(monkeypatch):
@@ -178,24 +178,24 @@ def test_the_front_of_digits_is_of_error_and_bytes(monkeypatch):
     assert sizes[0] - sizes[1] == 11008 * 8 / 8
     assert records["trade.nclaw.digits.jelly.16"] == (1.0, f"weights of {sizes[1]:.0f} bytes")
     assert records["trade.nclaw.digits.jelly.8"] == (
-        3.0, f"weights of {sizes[3]:.0f} bytes; {inference.BEST}; lost")
+        3.0, f"weights of {sizes[3]:.0f} bytes; {inference.ON_FRONT}; lost")
 
 
 def test_wider_networks_cost_more():
     body = build(Small().scene).bodies[0]
-    cheap = inference.cost(body.law, body.flow)
-    dear = inference.of_laws(untrained(), body)
+    cheap = inference.point_cost(body.law, body.flow)
+    dear = inference.learned_point_cost(untrained(), body)
     assert 0.0 < 2.0 * cheap < dear < 1e-3
 
 
 def test_runs_that_break_down_are_infinitely_far():
     x = [np.zeros((2, 3)), np.ones((2, 3))]
-    assert error(x[:1], x) == np.inf
-    assert error([x[0], 3.0 * x[1]], x) == pytest.approx(2.0)
+    assert frames_error(x[:1], x) == np.inf
+    assert frames_error([x[0], 3.0 * x[1]], x) == pytest.approx(2.0)
 
 
 def test_longer_steps_meet_the_same_times():
-    laws = inference.of_steps("jelly", (1.0, 4.0), 80)
+    laws = inference.time_steps("jelly", (1.0, 4.0), 80)
     assert [one.factor for one in laws] == [1.0, 4.0]
     assert laws[0].true_error == 0.0
     assert 0.0 < laws[1].true_error < 1e-6

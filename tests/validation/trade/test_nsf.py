@@ -43,12 +43,12 @@ def results(one, tmp_path, monkeypatch):
 
 def test_each_kind_of_samples_is_run_and_all_particles(one, results, monkeypatch):
     monkeypatch.setattr(nsf, "COUNTS", {"quick": (5, 30)})
-    found = results(nsf.of_samples)
+    found = results(nsf.samples_experiment)
     table, n = found.table("trade.nsf.samples", "samples"), len(one.fields.X)
     assert set(zip(table["fields"], table["samples"], table["draw"], strict=True)) == {
-        ("random", n, 0), *((word, count, draw) for word in nsf.WAYS for count in (5, 30)
+        ("random", n, 0), *((word, count, draw) for word in nsf.WEIGHTED for count in (5, 30)
                             for draw in (0, 1))}
-    for word, weighed in nsf.WAYS.items():
+    for word, weighed in nsf.WEIGHTED.items():
         row = (table["fields"] == word) & (table["samples"] == 30) & (table["draw"] == 1)
         own = one._replace(study=STUDY._replace(by_cell=word == "cells"))
         expected = own.errors(TEST, 30, 1, weighted=weighed)
@@ -60,8 +60,8 @@ def test_each_kind_of_samples_is_run_and_all_particles(one, results, monkeypatch
     records = {r.target: r for r in found.records("trade.nsf.samples")}
     assert {r.comparator for r in records.values()} == {"info"}
     assert {*records} == {"trade.nsf.samples", f"trade.nsf.samples.jelly.random.{n}", *(
-        f"trade.nsf.samples.jelly.{way}.{count}" for way in nsf.WAYS for count in (5, 30))}
-    told = {way: records[f"trade.nsf.samples.jelly.{way}.30"].note for way in nsf.WAYS}
+        f"trade.nsf.samples.jelly.{way}.{count}" for way in nsf.WEIGHTED for count in (5, 30))}
+    told = {way: records[f"trade.nsf.samples.jelly.{way}.30"].note for way in nsf.WEIGHTED}
     assert "30 samples, random; of the stress" in told["random"]
     assert f"30 cells, cubature of their points, {expected.samples:g} kept, whose" in told["cells"]
     kept = one.errors(TEST, 30, 0, weighted=True).samples, one.errors(TEST, 30, 1,
@@ -92,16 +92,16 @@ def test_steps_grow_until_a_run_breaks_down(one, results, monkeypatch):
             PositionErrors(0.1 if good else np.inf, np.inf, np.inf), 0.2, 30.0, 40.0, np.nan)
 
     monkeypatch.setattr(type(one), "errors", errors)
-    monkeypatch.setattr(nsf, "full_end", lambda scene, factor: f"end {factor:g}")
-    table = results(nsf.of_steps).table("trade.nsf.dt", "steps")
+    monkeypatch.setattr(nsf, "full_order_end", lambda scene, factor: f"end {factor:g}")
+    table = results(nsf.steps_experiment).table("trade.nsf.dt", "steps")
     assert asked == [1.0, 1.25, 1.5, 2.0]
     assert table["faster"].tolist() == asked
     assert table["full"].tolist() == ["end 1", "end 1.25", "end 1.5", "end 2"]
 
 
 def test_full_order_runs_with_longer_steps_end_as_they_do():
-    assert nsf.full_end(STUDY.run(TEST), 1.0) == FINISHED
-    assert nsf.full_end(STUDY.run(TEST), 10.0) != FINISHED
+    assert nsf.full_order_end(STUDY.run(TEST), 1.0) == FINISHED
+    assert nsf.full_order_end(STUDY.run(TEST), 10.0) != FINISHED
 
 
 # Sizes.
@@ -128,7 +128,7 @@ def test_single_precision_halves_the_modes_and_hardly_changes_errors(one):
 
 
 def test_changes_are_one_at_a_time_and_leave_out_the_own_sizes(one):
-    found = nsf_sizes.changes(one, {"r": (2, 3), "smoothing": (1e-4, 1.0)})
+    found = nsf_sizes.field_changes(one, {"r": (2, 3), "smoothing": (1e-4, 1.0)})
     assert [(knob, value) for knob, value, _ in found] == [
         ("own", "sizes"), ("r", "2"), ("smoothing", "1"), ("precision", "single")]
     assert found[1][2]().study.sizes == STUDY.sizes._replace(r=2)
@@ -137,7 +137,7 @@ def test_changes_are_one_at_a_time_and_leave_out_the_own_sizes(one):
 
 def test_sizes_are_told_with_their_bytes(one, results, monkeypatch, tmp_path):
     monkeypatch.setattr(nsf_sizes, "LEVELS", {"quick": {"r": (2,), "C": (4,)}})
-    table = results(nsf_sizes.of_sizes).table("trade.nsf.sizes", "sizes")
+    table = results(nsf_sizes.sizes_experiment).table("trade.nsf.sizes", "sizes")
     assert table["knob"].tolist() == ["own", "r", "C", "precision"]
     assert (table["r"].tolist(), table["C"].tolist()) == ([3, 2, 3, 3], [12, 12, 4, 12])
     assert table["bytes"][0] == nsf_sizes.nbytes(one.fields)

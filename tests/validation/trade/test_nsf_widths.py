@@ -14,7 +14,7 @@ from validation.common.weights_needed import Untrained
 from validation.nsf import reduced_runs
 from validation.nsf.networks import FieldsNet, NetworkPlan, fields_of, narrow, net_of, nets
 from validation.nsf.studies import jelly
-from validation.trade import nsf_widths
+from validation.trade import nsf_sizes as nsf_widths
 
 STUDY = jelly(4)._replace(train=(0.3, 0.5), sizes=Sizes(r=R), samples=20)
 NARROW, WIDE = (FieldsNet(STUDY, *(NetworkPlan(width, 2, 0.1) for _ in range(3)), octaves=octaves)
@@ -51,7 +51,8 @@ def recorded(tmp_path, monkeypatch):
 
     def recorded(*lacking):
         recorded.lacking = lacking
-        assert run_all([nsf_widths.of_widths.experiment], RunSetting("standard", tmp_path)) == []
+        setting = RunSetting("standard", tmp_path)
+        assert run_all([nsf_widths.widths_experiment.experiment], setting) == []
         found = ProfileResults(tmp_path)
         start = "trade.nsf.widths."
         return ({r.target.removeprefix(start): r for r in found.records(start[:-1])},

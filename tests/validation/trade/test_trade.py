@@ -3,15 +3,22 @@
 import numpy as np
 import pytest
 
-from validation.extremes.long_run import round_state
+from validation.extremes.long_runs import round_state
+from validation.trade.explicit import prepare_manufactured
 from validation.trade.front import cheapest, front
-from validation.trade.knobs import DEFAULT, QUICK, STANDARD, settings
-from validation.trade.measure import Point, sampled, state_bytes
-from validation.trade.mms import prepare
+from validation.trade.measure import (
+    DEFAULT,
+    QUICK,
+    STANDARD,
+    MeasuredSetting,
+    sample_points,
+    settings,
+    state_bytes,
+)
 
 
 def point(cpu, error, end="finished"):
-    return Point("dt", DEFAULT, error, cpu, 100, 1, 0.5, end, "", False)
+    return MeasuredSetting("dt", DEFAULT, error, cpu, 100, 1, 0.5, end, "", False)
 
 
 def test_front_holds_what_no_point_beats():
@@ -45,7 +52,7 @@ def test_every_level_is_a_scheme_and_differs_from_the_default(levels):
 
 @pytest.mark.parametrize("sampling", ["lattice", "jittered", "poisson"])
 def test_samplings_have_the_same_number_of_points_in_the_box(sampling):
-    X = sampled(DEFAULT._replace(sampling=sampling), [0.0, -0.25], [1.0, 0.25], 3)
+    X = sample_points(DEFAULT._replace(sampling=sampling), [0.0, -0.25], [1.0, 0.25], 3)
     assert X.shape == (32 * 16, 2)
     assert np.all((X >= [0.0, -0.25]) & (X <= [1.0, 0.25]))
 
@@ -53,7 +60,7 @@ def test_samplings_have_the_same_number_of_points_in_the_box(sampling):
 def test_bytes_count_shared_arrays_once_and_f32_half():
     small = DEFAULT._replace(cells=8)
     n = (8 * 2) ** 2
-    problem = prepare(small).problem
+    problem = prepare_manufactured(small).problem
     per_particle = 8 * (2 + 2 + 4 + 4 + 4 + 1 + 1 + 2)          # x v C=L F tau m V0 b
     grid = state_bytes(problem, small) - n * per_particle
     assert 0 < grid < 20**2 * 3 * 8
@@ -62,7 +69,7 @@ def test_bytes_count_shared_arrays_once_and_f32_half():
 
 
 def test_rounded_state_is_single_precision():
-    problem = prepare(DEFAULT._replace(cells=8)).problem
+    problem = prepare_manufactured(DEFAULT._replace(cells=8)).problem
     x = problem.bodies[0].particles.x.copy()
     round_state(problem.bodies)
     rounded = problem.bodies[0].particles.x
