@@ -51,7 +51,8 @@ def field_changes(one, levels):
         return lambda: refit(one, one.study.sizes._replace(**{knob: value}), one.study.follows)
 
     found = [FieldChange(knob, f"{value:g}", with_size(knob, value))
-             for knob, values in levels.items() for value in values if value != getattr(one.study.sizes, knob)]
+             for knob, values in levels.items() for value in values
+             if value != getattr(one.study.sizes, knob)]
     return [FieldChange("own", "sizes", lambda: one), *found,
             FieldChange("precision", "single", lambda: one._replace(fields=one.fields.single()))]
 
