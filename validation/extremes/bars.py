@@ -142,7 +142,7 @@ def timoshenko(nu):
 
 def deflect(nu, layers, per):
     """Return the largest sinking of the tip within 0.7 periods of the beam [m], and the
-    `RunOutcome`.
+    `ExplicitOutcome`.
     """
     dx = HEIGHT / layers
     spacing = dx / per

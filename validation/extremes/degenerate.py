@@ -67,8 +67,8 @@ def _id(name):
 
 
 def run_with_deformed_particle(law, F, count):
-    """Return the `RunOutcome` of a run in which one particle has this F, its final over initial
-    energy, and the particle's final J.
+    """Return the `ExplicitOutcome` of a run in which one particle has this F, its final over
+    initial energy, and the particle's final J.
     """
     body = square(CELLS, DX, law)
     dt = 0.2 * step_limits(body, DX).dt

@@ -62,7 +62,7 @@ def least_mass(degree):
 
 def fall_of_particle(transfer, degree, count, allowed=True):
     """Return the largest speed of a stretched falling particle over that of free fall, and the
-    `RunOutcome`.
+    `ExplicitOutcome`.
     """
     scheme, v0 = Scheme(degree, transfer), 1e-3
     edge = 3.5 if degree == 2 else 3.0          # where the supports of quadratic splines end
@@ -115,8 +115,8 @@ def rise(E):
 
 
 def collide(left, right, cells, transfer):
-    """Return the `RunOutcome` of a block that runs into one at rest, and rows (t, energy, conserved
-    energy), both over the initial energy.
+    """Return the `ExplicitOutcome` of a block that runs into one at rest, and rows (t, energy,
+    conserved energy), both over the initial energy.
     """
     scheme, dx = Scheme(2, transfer), DX * 4.0 / cells
     X = lattice([0.0, 0.0], [0.5, 0.5], 0.5 * dx)

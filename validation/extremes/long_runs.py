@@ -47,7 +47,7 @@ class Oscillator:
         self.dt = 0.5 * step_limits(self.body, DX, self.scheme).dt
 
     def curve(self, count, single=False):
-        """Return the `RunOutcome`, and rows (step, mean `conserved_energy` over SWING steps)."""
+        """Return the `ExplicitOutcome`, and rows (step, mean conserved energy over SWING steps)."""
         sums, rows, every = [], [], max(count // POINTS, SWING)
         oscillation = problem(self.body, DX, fixed_clock(count, self.dt), self.scheme)
 
@@ -122,7 +122,7 @@ def free_flight(run):
 
 def fly(transfer, what, count):
     """Return the change of momentum, the error of position over the distance flown, and the
-    `RunOutcome` of a flight.
+    `ExplicitOutcome` of a flight.
     """
     body = one_particle([0.3, 0.7], DX, transfer=transfer) if what == "one" else square(
         4, DX, transfer=transfer)

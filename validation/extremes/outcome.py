@@ -14,7 +14,7 @@ FINISHED, REFUSED, OUT_OF_RANGE, UNFIT = "finished", "refused", "out of range", 
 STOPS = (*REASONS.values(), REFUSED)       # proper ends of a run that cannot go on
 
 
-class RunOutcome(NamedTuple):
+class ExplicitOutcome(NamedTuple):
     """The end of a run. UNFIT is a state that no run accepts."""
 
     kind: str           # FINISHED, one of STOPS, OUT_OF_RANGE or UNFIT
@@ -35,13 +35,13 @@ def outcome(problem, on_step=None):
         for _ in simulate(problem, on_step=count):
             pass
     except TooLarge as refusal:
-        return RunOutcome(REFUSED, last[0], str(refusal))
+        return ExplicitOutcome(REFUSED, last[0], str(refusal))
     except OutOfRange as error:
-        return RunOutcome(OUT_OF_RANGE, last[0], str(error))
+        return ExplicitOutcome(OUT_OF_RANGE, last[0], str(error))
     except ValueError as error:
-        return RunOutcome(UNFIT, last[0], str(error))
+        return ExplicitOutcome(UNFIT, last[0], str(error))
     except Unstable as stop:
         kinds = (kind for start, kind in REASONS.items() if stop.reason.startswith(start))
         kind = next(kinds, OUT_OF_RANGE)        # else the grid could not follow, and says why
-        return RunOutcome(kind, stop.step, str(stop))
-    return RunOutcome(FINISHED, last[0], "")
+        return ExplicitOutcome(kind, stop.step, str(stop))
+    return ExplicitOutcome(FINISHED, last[0], "")

@@ -31,7 +31,7 @@ class Rung(NamedTuple):
 
 
 def run_rung(rung, count, rng):
-    """Return the `RunOutcome` of an 8 x 8 block after `count` steps at most."""
+    """Return the `ExplicitOutcome` of an 8 x 8 block after `count` steps at most."""
     scheme = Scheme(rung.degree, rung.transfer)
     X = lattice([0.0, 0.0], [1.0, 1.0], 0.5 * DX)
     if rung.sampling == "jittered":
@@ -110,8 +110,8 @@ def single_particle(run):
 
 
 def oscillate(transfer, place, factor, count):
-    """Return the `RunOutcome` of a particle stretched by 1e-3, and its largest |J - 1| over the
-    initial one.
+    """Return the `ExplicitOutcome` of a particle stretched by 1e-3, and its largest |J - 1| over
+    the initial one.
     """
     scheme, x = Scheme(2, transfer), [(3.0 + place) * DX] * 2
     body = one_particle(x, DX, transfer=transfer)
@@ -178,7 +178,7 @@ def record_stability_map(run, rows, scale):
 
 
 def run_past_bound(dt, law, count):
-    """Return the stable time step of the block [s], and the `RunOutcome` of a run with dt."""
+    """Return the stable time step of the block [s], and the `ExplicitOutcome` of a run with dt."""
     body = shake(square(CELLS, DX, law), strain=0.05)
     bound = step_limits(body, DX).dt
     return bound, outcome(problem(body, DX, fixed_clock(count, dt), allow_unstable=True))

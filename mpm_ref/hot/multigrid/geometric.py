@@ -46,14 +46,14 @@ class CoarseGrids:
 
         modes has the `StressModes` of every body.
         """
-        levels, n = [], len(self.potential.unknowns.m)
+        matrices, n = [], len(self.potential.unknowns.m)
         for level in range(1, levels):
             grid = self.grid(level)
             if len(grid.unknowns.m) >= n:
                 break
             n = len(grid.unknowns.m)
-            levels.append((coarse_matrix(grid, modes), grid.unknowns.index))
-        return levels
+            matrices.append((coarse_matrix(grid, modes), grid.unknowns.index))
+        return matrices
 
     def grid(self, level):
         """`CoarseGrid` of a level >= 1."""

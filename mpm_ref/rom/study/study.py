@@ -242,7 +242,7 @@ def _fixed_fields(scene, free):
 def training_hints(study):
     """Yield hints before fields are computed from a study's runs."""
     table = study.tables.reduced_model
-    flowing = [body.name for body in study.base.body if body.material.flow.type != "none"]
+    flowing = [body.name for body in study.base.body if body.material.flow.name != "none"]
     if (study.tables.model == NSF and table.kind == MODES and flowing
             and table.smoothing <= SIZES["smoothing"]):
         yield (f"map.smoothing = {table.smoothing:g} is for elastic matter, and that of "
