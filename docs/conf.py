@@ -19,10 +19,12 @@ author = "The mpm_ref authors"
 copyright = "The mpm_ref authors, MIT licence"
 version = release = __version__
 language = "en"
+smartquotes = False                     # options keep their two hyphens
 
 extensions = [
     "myst_nb", "sphinx.ext.autodoc", "sphinx.ext.linkcode",
     "extensions.generate", "extensions.docstrings", "extensions.sources", "extensions.formulas",
+    "extensions.cross_links",
 ]
 exclude_patterns = ["_build", "results/generated", "extensions"]
 nitpicky = True
@@ -52,13 +54,14 @@ nb_merge_streams = True
 # HTML
 html_theme = "pydata_sphinx_theme"
 html_math_renderer = "mathml"
-html_title = "mpm_ref"
+html_title = "mpm_ref documentation"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sourcelink = False
 html_show_sphinx = False
 html_theme_options = {
+    "logo": {"text": "mpm_ref"},
     "show_toc_level": 2,
     "show_nav_level": 1,
     "navigation_depth": 3,

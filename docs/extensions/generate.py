@@ -1,43 +1,49 @@
 """Pages that are made from the repository whenever the site is built; git ignores them.
 
 `reference/api` from the modules, `reference/cli.md` from the command line, `reference/equations.md`
-from the citations in code and tests, `results/generated` from the records of experiments, and
-`tutorials` from the notebooks.
+from the citations in code and tests, `reference/packages` and `contributing.md` from the READMEs of
+packages and CONTRIBUTING, `results/generated` and `results/numbers` from the records of
+experiments, and `tutorials` from the notebooks.
 """
 
 import ast
+import re
 from pathlib import Path
 
 import typer.cli
 import typer.main
 
-from validation.common import equations, targets
+from validation.common import equations
 from validation.common.citations import ROOT
-from validation.common.report import chapters, status_table
-from validation.common.results import RESULTS, ProfileResults
+
+from . import packages, results
+from .markdown import cell
 
 DOCS = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "mpm_ref"
-PAPERS = ("hot", "ldm", "ldmw", "nclaw", "nsf")
-COLUMNS = ("what", "printed; accepted", "measured", "verdict", "scale")
+FOLDERS = ("reference/api", "reference/packages", "results/generated", "results/numbers")
 
 
 def write_all(app, config):
     """Write all generated pages, each only if its text has changed."""
-    pages = {**api_pages(), **result_pages(), **notebooks(),
+    pages = {**api_pages(), **packages.pages(), **results.pages(), **notebooks(),
              "reference/cli.md": cli_page(),
              "reference/equations.md": equations.render(equations.read(), equations.scan())}
     for name, text in pages.items():
         write(DOCS / name, text)
-    for stale in set((DOCS / "reference/api").glob("*")) - {DOCS / name for name in pages}:
-        stale.unlink()
+    kept = {DOCS / name for name in pages}
+    for folder in FOLDERS:
+        for file in (DOCS / folder).rglob("*.*"):
+            if file not in kept:
+                file.unlink()
 
 
 def write(path, text):
-    """Write a page if its text is new, so that an unchanged page is not read again."""
+    """Write a page, or a figure in bytes, if it is new: an unchanged one is not read again."""
+    content = text if isinstance(text, bytes) else text.encode()
     path.parent.mkdir(parents=True, exist_ok=True)
-    if not path.exists() or path.read_text(encoding="utf-8") != text:
-        path.write_text(text, encoding="utf-8")
+    if not path.exists() or path.read_bytes() != content:
+        path.write_bytes(content)
 
 
 # --- the Python interface
@@ -87,70 +93,23 @@ def api_index(modules):
     return "\n".join(parts)
 
 
-def cell(text):
-    """Text that may stand in a cell of a Markdown table, with nothing read as markup."""
-    text = text.replace("\\", "\\\\").replace("|", "\\|").replace("\n", " ")
-    return "".join(f"\\{c}" if c in "*_<>[]{}$" else c for c in text.replace("`", ""))
-
-
 # --- the command line
 
 def cli_page():
     """Every command with its arguments and options."""
     from mpm_ref.cli import app
     command = typer.main.get_command(app)
+    show_whole_summaries(command)
     context = typer.Context(command, info_name="mpm-ref")
-    text = typer.cli.get_docs_for_click(obj=command, ctx=context, name="mpm-ref",
+    return typer.cli.get_docs_for_click(obj=command, ctx=context, name="mpm-ref",
                                         title="Command line")
-    return text
 
 
-# --- results
-
-def result_pages():
-    """{path: text}: a page of numbers for each paper, and the list of all experiments."""
-    printed = targets.load()
-    made = {profile: {c.key: c for c in chapters(ProfileResults(RESULTS / profile), printed)}
-            for profile in ("standard", "paper")}
-    pages = {f"results/generated/{key}.md": numbers(key, made) for key in PAPERS}
-    table = status_table(ProfileResults(RESULTS / "standard"), printed)
-    return {**pages, "results/generated/experiments.md": table + "\n"}
-
-
-def numbers(key, made):
-    """Printed numbers beside ours, experiment by experiment, with the notes of those missed."""
-    parts = []
-    for profile, groups in made.items():
-        for section in groups[key].sections:
-            rows = [row for row in section.rows if row.paper != "—"]
-            if rows:
-                parts += [f"### {section.id} ({profile})", "", *map(cell, section.remarks), "",
-                          *table(rows), "", *notes(rows), ""]
-    missing = made["standard"][key].missing
-    if missing:
-        parts += ["### Not measured", "", *(f"- {cell(t.what)} ({cell(t.paper_ref)})"
-                                            for t in missing), ""]
-    return "\n".join(parts)
-
-
-def table(rows):
-    """A Markdown table of records; a scale that all share stands before it."""
-    scales = {row.scale for row in rows}
-    columns = COLUMNS if len(scales) > 1 else COLUMNS[:-1]
-    if len(scales) == 1:
-        yield from (f"Scale: {cell(scales.pop())}.", "")
-    yield "| " + " | ".join(columns) + " |"
-    yield "|" + "---|" * len(columns)
-    for row in rows:
-        printed = f"{row.paper}; {row.rule}" if row.rule else row.paper
-        values = (row.what, printed, row.ours, row.verdict, row.scale)
-        yield "| " + " | ".join(cell(text) for text in values[:len(columns)]) + " |"
-
-
-def notes(rows):
-    """The notes of missed numbers, each text once."""
-    missed = {row.note: row.what for row in reversed(rows) if row.verdict == "miss" and row.note}
-    return [f"- *Missed:* {cell(what)}: {cell(note)}" for note, what in reversed(missed.items())]
+def show_whole_summaries(command):
+    """Let lists of commands show the whole first sentence of each; by default they cut it."""
+    command.short_help = re.split(r"\.\s|\n\s*\n|\f", (command.help or "") + "\n\n")[0]
+    for child in getattr(command, "commands", {}).values():
+        show_whole_summaries(child)
 
 
 # --- tutorials

@@ -26,7 +26,7 @@ PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{path}</title><link rel="stylesheet" href="{up}_static/source.css"></head>
-<body><header><a href="{up}index.html">mpm_ref</a> <code>{path}</code></header>
+<body><header><a href="{up}index.html">mpm_ref</a> <code>{path}</code>{api}</header>
 {code}</body></html>
 """
 LINK = re.compile(rf'href="(?:\.\./)*{FOLDER}/([^"#]+)\.html')
@@ -103,8 +103,17 @@ def page(file):
     """A source file as a page, with a target for each line."""
     lexer = get_lexer_for_filename(file, stripnl=False)
     formatter = HtmlFormatter(linenos="inline", lineanchors="L", anchorlinenos=True)
-    return PAGE.format(path=html.escape(file), up="../" * (file.count("/") + 1),
+    up = "../" * (file.count("/") + 1)
+    return PAGE.format(path=html.escape(file), up=up, api=api_link(file, up),
                        code=highlight((ROOT / file).read_text(encoding="utf-8"), lexer, formatter))
+
+
+def api_link(file, up):
+    """Return the link from a module's source to its page of the interface; "" for other files."""
+    if not file.startswith("mpm_ref/") or file.endswith("__main__.py"):
+        return ""
+    module = file.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+    return f' <a href="{up}reference/api/{module}.html">documentation</a>'
 
 
 def linkcode_resolve(domain, info):

@@ -1,4 +1,4 @@
-"""The parts of the documentation site that need no Sphinx: pages, docstrings, links to sources."""
+"""The parts of the documentation site that need no Sphinx: pages, docstrings, links."""
 
 import re
 import sys
@@ -10,7 +10,7 @@ from validation.common.citations import ROOT, documentation, exists
 sys.path.insert(0, str(ROOT / "docs"))
 
 from check_links import main as check
-from extensions import docstrings, generate
+from extensions import docstrings, generate, packages, results
 
 SOURCE = re.compile(r"\{source\}`(?:[^`<]*<)?([^`>]+)>?`")
 
@@ -34,13 +34,50 @@ def test_the_command_line_page_has_every_command():
     page = generate.cli_page()
     for command in ("run", "info", "oracle record", "rom train", "law export"):
         assert f"`mpm-ref {command}`" in page
+    assert not [line for line in page.splitlines() if line.endswith(("…", "..."))
+                and line.startswith("* `")]
 
 
-def test_results_show_printed_and_measured_numbers():
-    pages = generate.result_pages()
-    for paper in generate.PAPERS:
-        page = pages[f"results/generated/{paper}.md"]
+@pytest.fixture(scope="module")
+def result_pages():
+    return results.pages()
+
+
+def test_results_show_printed_and_measured_numbers(result_pages):
+    for paper in results.PAPERS:
+        page = result_pages[f"results/numbers/{paper}.md"]
         assert page.count("| pass |") + page.count("| miss |") > 10
+        assert "| converged |" not in page
+
+
+def test_every_experiment_has_a_title_a_link_to_its_numbers_and_its_code(result_pages):
+    table = result_pages["results/generated/experiments.md"]
+    for experiment, (page, name) in results.experiment_places().items():
+        assert f"](#{experiment})" in table
+        assert f"({name})=" in result_pages[f"{page}.md"]
+    links = SOURCE.findall(table)
+    assert len(links) > 100
+    assert not [link for link in links if not exists(ROOT, link)]
+
+
+def test_settings_for_one_per_cent_come_from_the_records(result_pages):
+    tables = {name: result_pages[f"results/generated/settings-{name}.md"]
+              for name in ("explicit", "implicit", "ldm", "nsf", "nclaw")}
+    assert "| grid | 64 cells | **0.15 %** | 0.69 | **0.75 %** | 1.2 |" in tables["explicit"]
+    assert "| bar, middle of 1e9 Pa | 1e-8, 0.17 s | not run | 1e-8, 0.4 s |" in tables["implicit"]
+    assert "| the displacement | modes | 4 | all | 1 dt | **0.29 %** |" in tables["ldm"]
+    assert "| metal | random | 200 | 0.13 % |" in tables["nsf"]
+    assert "**0.73 %**" in tables["nclaw"]
+
+
+def test_maps_of_packages_link_to_the_code():
+    page = packages.pages()["reference/packages/hot.md"]
+    assert "<mpm_ref/hot/multigrid/hierarchy.py::v_cycle>`" in page
+    assert "(../../howto/implicit-steps.md)" in page
+    for text in packages.pages().values():
+        links = SOURCE.findall(text)
+        assert len(links) > 10
+        assert not [link for link in links if not exists(ROOT, link)]
 
 
 def test_formulas_keep_their_lines_and_signs():

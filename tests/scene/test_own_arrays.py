@@ -1,4 +1,4 @@
-"""Problems from arrays in memory, and the code of docs/howto/own-arrays.md."""
+"""Problems from arrays in memory, and the code of the how-to guides on arrays and additions."""
 
 import re
 import runpy
@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from mpm_ref.body import restore_order
-from mpm_ref.materials import LAWS
+from mpm_ref.constitutive import return_map
+from mpm_ref.materials import FLOWS, LAWS
 from mpm_ref.scene import SceneError, Sphere, Walls, build, loads, problem_from_arrays
 from mpm_ref.simulate import simulate
 from mpm_ref.store.manifest import scene_hash
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "howto" / "own-arrays.md"
+PAGES = Path(__file__).resolve().parents[2] / "docs" / "howto"
 SOLID = {"law": "hencky", "E": 100.0, "nu": 0.3}
 FLUID = {"law": "fluid", "lam": 10.0}
 N = 30
@@ -32,60 +33,117 @@ def of(bodies, **keys):
     return problem_from_arrays(bodies, **{"dx": 0.1, "cfl": 0.3, "steps": 3} | keys)
 
 
+def names_of(page, folder):
+    """Return the names that the code of a page defines, its blocks run as one file."""
+    text = (PAGES / f"{page}.md").read_text(encoding="utf-8")
+    file = folder.mktemp("page") / f"{page.replace('-', '_')}.py"
+    file.write_text("\n".join(re.findall(r"```python\n(.*?)```", text, re.DOTALL)))
+    return runpy.run_path(str(file), run_name="__main__")
+
+
 @pytest.fixture(scope="module")
-def page(tmp_path_factory):
-    """The names of the page's code, run as one file."""
-    blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
-    file = tmp_path_factory.mktemp("page") / "own_arrays.py"
-    file.write_text("\n".join(blocks))
-    laws = dict(LAWS)
-    yield runpy.run_path(str(file), run_name="__main__")
-    LAWS.clear()
-    LAWS.update(laws)
+def arrays_page(tmp_path_factory):
+    return names_of("own-arrays", tmp_path_factory)
 
 
-def test_the_code_of_the_page_runs(page):
-    assert page["positions"].shape == (4, 400, 2)
-    assert np.array_equal(page["positions"][0], page["x"])
-    assert page["times"] == pytest.approx([0.0, 3e-3, 6e-3, 9e-3])
-    assert page["du"].shape == page["place"].shape == page["nodes"].shape
-    inside = (page["place"] > 0.2) & (page["place"] < 0.6)
-    assert inside.all()
-    assert page["du"][:, 1].mean() < 0.0
-    assert page["t"] == pytest.approx(4.5e-4)
+@pytest.fixture(scope="module")
+def states_page(tmp_path_factory):
+    return names_of("read-states", tmp_path_factory)
 
 
-def test_loose_points_of_the_page_are_right(page):
-    assert np.allclose(page["elastic"].P @ page["F"].swapaxes(1, 2), page["elastic"].tau)
-    deviator = page["plastic"].tau - np.trace(
-        page["plastic"].tau, axis1=1, axis2=2)[:, None, None] / 2.0 * np.eye(2)
-    assert np.linalg.norm(deviator, axis=(1, 2)).max() <= 500.0 * (1.0 + 1e-9)
+@pytest.fixture(scope="module")
+def additions_page(tmp_path_factory):
+    tables = [(table, dict(table)) for table in (LAWS, FLOWS)]
+    yield names_of("add-a-law", tmp_path_factory)
+    for table, content in tables:
+        table.clear()
+        table.update(content)
 
 
-def test_the_law_of_the_page_runs_by_its_name(page):
-    body = page["block"] | {"material": {"law": "rubber", "E": 3e4, "lam": 1e4}}
-    law = page["Rubber"](1e4, 1e4)
-    problem = of({"block": body}, dx=0.05)
-    assert problem.bodies[0].law == law
+def test_the_code_on_own_arrays_runs(arrays_page):
+    assert arrays_page["frame"].t == pytest.approx(0.05)
+    assert arrays_page["t"] == pytest.approx(4.5e-4)
+
+
+def test_laws_without_a_simulation_are_right(arrays_page):
+    elastic, plastic = arrays_page["elastic"], arrays_page["plastic"]
+    assert np.allclose(elastic.P @ arrays_page["F"].swapaxes(1, 2), elastic.tau)
+    pressure = np.trace(plastic.tau, axis1=1, axis2=2)[:, None, None] / 2.0 * np.eye(2)
+    assert np.linalg.norm(plastic.tau - pressure, axis=(1, 2)).max() <= 500.0 * (1.0 + 1e-9)
+
+
+def test_states_have_the_original_order(states_page):
+    assert states_page["positions"].shape == (4, 400, 2)
+    assert np.array_equal(states_page["positions"][0], states_page["x"])
+    assert states_page["times"] == pytest.approx([0.0, 3e-3, 6e-3, 9e-3])
+    assert states_page["t"] == pytest.approx(4.5e-4)
+
+
+def test_increments_of_nodes_are_those_of_free_fall(states_page):
+    grid, filled, dv = (states_page[name] for name in ("grid", "filled", "dv"))
+    assert states_page["du"].shape == states_page["place"].shape == dv.shape
+    assert ((states_page["place"] > 0.2) & (states_page["place"] < 0.6)).all()
+    assert np.array_equal(filled, grid.m > 0.0)
+    momentum = (grid.m[filled][:, None] * dv).sum(axis=0)
+    assert momentum == pytest.approx((0.0, -9.8 * 1e-3 * 40.0), rel=1e-4, abs=1e-4)
+    assert states_page["stepper"].report.converged
+
+
+def block_of(page, **material):
+    points = page["points"]
+    return {"material": {"law": "rubber", "E": 3e4, "lam": 1e4, **material},
+            "x": points.x, "V0": points.V0, "density": 1000.0}
+
+
+def test_the_added_law_runs_by_its_name(additions_page):
+    problem = of({"block": block_of(additions_page)}, dx=0.05)
+    assert problem.bodies[0].law == additions_page["Rubber"](1e4, 1e4)
     assert list(simulate(problem))[-1].state.step == 3
 
 
-def test_the_transfer_of_the_page_damps(page):
-    problem = of({"block": page["block"]}, dx=0.05, scheme={"transfer": "apic"})
-    plain, stepper = problem.stepper(), page["stepper"]
-    other = of({"block": page["block"]}, dx=0.05, scheme={"transfer": "apic"}, gravity=(0.0, -9.8))
-    for one, made in ((plain, problem), (stepper, other)):
-        one.start(made.bodies)
-        made.bodies[0].particles.v[:] = made.bodies[0].particles.x
-        one.step(made.bodies, 0.0, 1e-4)
-    damped, kept = (made.bodies[0].particles.C for made in (other, problem))
+def test_the_added_law_has_right_derivatives(additions_page):
+    assert additions_page["error_P"] < 1e-7
+    assert additions_page["error_dP"] < 1e-7
+    law, F = additions_page["law"], additions_page["F"]
+    s = np.linalg.svd(F[0], compute_uv=False)
+    tau = np.linalg.eigvalsh(additions_page["response"](F, law).tau[0])[::-1]
+    assert additions_page["principal_stress"](tuple(s), law) == pytest.approx(tau)
+
+
+def test_the_added_law_makes_implicit_steps(additions_page):
+    stretch = np.tile(np.diag((1.1, 0.95)), (len(additions_page["points"].x), 1, 1))
+    block = block_of(additions_page) | {"F": stretch}
+    problem = of({"block": block}, dx=0.05, integrator="hot", cfl=None, dt=1e-3)
+    last = list(simulate(problem))[-1].state
+    assert last.solve.converged
+    assert last.solve.iterations > 0
+
+
+def test_the_added_flow_relaxes_shear_and_keeps_the_volume(additions_page):
+    problem = of({"block": block_of(additions_page, flow={"type": "maxwell", "eta": 1e3})}, dx=0.05)
+    assert list(simulate(problem))[-1].state.step == 3
+    after = return_map(additions_page["F"], additions_page["law"], problem.bodies[0].flow, dt=0.1)
+    before, s = (np.log(np.linalg.svd(F, compute_uv=False)) for F in (additions_page["F"], after.F))
+    assert np.allclose(s.sum(axis=1), before.sum(axis=1), rtol=1e-10, atol=1e-13)
+    assert np.allclose(s[:, 0] - s[:, 1], 0.5 * (before[:, 0] - before[:, 1]))
+
+
+def test_the_added_transfer_damps(additions_page):
+    material = {"material": SOLID}
+    made = [of({"block": block_of(additions_page) | material}, dx=0.05,
+               scheme={"transfer": "apic"}, gravity=(0.0, -9.8)) for _ in range(2)]
+    for problem, stepper in zip(made, (made[0].stepper(), additions_page["stepper"]), strict=True):
+        stepper.start(problem.bodies)
+        problem.bodies[0].particles.v[:] = problem.bodies[0].particles.x
+        stepper.step(problem.bodies, 0.0, 1e-4)
+    kept, damped = (problem.bodies[0].particles.C for problem in made)
     assert np.allclose(damped, 0.1 * kept, rtol=1e-6, atol=1e-12)
 
 
-def test_the_shape_of_the_page_has_its_area(page):
+def test_the_added_shape_has_its_area(additions_page):
     area = np.pi * (0.2**2 + 0.05**2 / 2.0)
-    assert page["points"].V0.sum() == pytest.approx(area, rel=1e-2)
-    assert page["problem"].bodies[0].name == "star"
+    assert additions_page["points"].V0.sum() == pytest.approx(area, rel=1e-2)
+    assert additions_page["problem"].bodies[0].name == "star"
 
 
 def test_all_arrays_arrive_and_are_copied(d, arrays):

@@ -59,8 +59,8 @@ def files(root: Path, folder: str, pattern: str) -> list[Path]:
 
 def documentation(root: Path = ROOT) -> list[Path]:
     """Return the pages of the documentation that people write: those that git tracks."""
-    generated = {"_build", "api", "generated"}
-    names = {"cli.md", "equations.md"}
+    generated = {"_build", "api", "generated", "numbers", "packages"}
+    names = {"cli.md", "contributing.md", "equations.md"}
     return [page for page in sorted((root / "docs").rglob("*.md"))
             if page.name not in names and generated.isdisjoint(page.relative_to(root).parts)]
 

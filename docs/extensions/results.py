@@ -1,0 +1,214 @@
+"""Pages of results: the numbers of each paper and group, and the list of all experiments."""
+
+import base64
+import inspect
+from collections import Counter
+from functools import cache
+from typing import NamedTuple
+
+from validation.common import targets
+from validation.common.citations import ROOT
+from validation.common.registry import GROUPS, discover
+from validation.common.report import VERDICTS, chapters
+from validation.common.results import RESULTS, ProfileResults
+
+from . import settings
+from .markdown import cell, grid_table
+
+FOLDER = "results/numbers"
+PAPERS = {"hot": ("hot",), "ldm": ("ldm", "ldmw"), "nsf": ("nsf",), "nclaw": ("nclaw",)}
+NAMES = {"hot": "HOT", "ldm": "LDM", "nsf": "NSF", "nclaw": "NCLaw", "explicit": "explicit MPM"}
+OPENINGS = {
+    "verification": "Verification, the numbers: analytic and manufactured solutions",
+    "trade": "Error against cost, the numbers: {}",
+    "extremes": "Where methods break, the numbers: {}",
+}
+COLUMNS = ("what", "printed; accepted", "measured", "verdict", "scale")
+OWN_COLUMNS = ("what", "expected; accepted", "measured", "verdict", "note")
+CHECKS = {"done", "converged", "mass"}      # of a run itself, which no paper prints
+MOST_ROWS = 150         # of an experiment without printed numbers; the others stand in its records
+
+
+class Shown(NamedTuple):
+    """An experiment's section, and where it is shown."""
+
+    section: object     # `report.Section`
+    profile: str
+    rows: list          # of `report.ReportRow`
+    title: str
+    page: str           # its name in FOLDER
+
+
+def pages():
+    """Return {path: text, or bytes of a figure} of the pages."""
+    by_page, missing = {}, missing_numbers()
+    for one in shown_experiments():
+        by_page.setdefault(one.page, []).append(one)
+    result = {f"{FOLDER}/{page}.md": numbers(page, shown, missing.get(page, ()))
+              for page, shown in by_page.items()}
+    result |= {f"{FOLDER}/figures/{figure.name}.webp": base64.b64decode(figure.data)
+               for one in shown_experiments() for figure in one.section.figures}
+    result["results/generated/experiments.md"] = experiments(missing)
+    return result | settings.pages(ProfileResults(RESULTS / "standard"))
+
+
+@cache
+def all_chapters(profile):
+    """Return the report's chapters of a profile by their key."""
+    return {c.key: c for c in chapters(ProfileResults(RESULTS / profile), targets.load())}
+
+
+@cache
+def declared():
+    """Return {id: `Experiment`} of all experiments."""
+    return discover().experiments
+
+
+@cache
+def shown_experiments():
+    """Return the `Shown` of all experiments with results, by profile and group."""
+    return [shown_experiment(section, profile) for profile in ("standard", "paper")
+            for chapter in all_chapters(profile).values()
+            for section in chapter.sections if section.rows]
+
+
+def shown_experiment(section, profile):
+    """Return the `Shown` of a section: if it has printed numbers, those alone."""
+    group, second = section.id.split(".")[:2]
+    page, rows = group, section.rows
+    if group in OPENINGS:
+        page = group if group == "verification" else f"{group}-{second}"
+    else:
+        printed = [row for row in rows if row.paper != "—" and row.what not in CHECKS]
+        paper = next(paper for paper, groups in PAPERS.items() if group in groups)
+        page, rows = (paper, printed) if printed else (f"{paper}-more", rows)
+    known = declared().get(section.id)
+    return Shown(section, profile, rows, known.title if known else section.id, page)
+
+
+@cache
+def experiment_places():
+    """Return {id: (page, name of the section)} of the experiments at the standard profile."""
+    return {one.section.id: (f"{FOLDER}/{one.page}", label(one))
+            for one in shown_experiments() if one.profile == "standard"}
+
+
+def missing_numbers():
+    """Return {paper: printed numbers that no experiment at the standard profile has}."""
+    made = all_chapters("standard")
+    return {paper: [t for group in groups if group in made for t in made[group].missing]
+            for paper, groups in PAPERS.items()}
+
+
+def label(one):
+    """Return the name of the place of an experiment's section."""
+    return one.section.id + ("" if one.profile == "standard" else f"-{one.profile}")
+
+
+# --- the numbers of a paper or of a group of experiments
+
+def numbers(page, shown, missing):
+    """Return the page of a paper or of a group."""
+    if page in PAPERS:
+        parts = [f"# {NAMES[page]}: printed and measured numbers", "",
+                 f"[The summary](../{page}.md) says what these numbers mean, and [How to read a "
+                 "verdict](../index.md#how-to-read-a-verdict) what stands in the tables."]
+    else:
+        parts = [f"# {heading(page)}", "",
+                 "[Experiments](../experiments.md) lists all experiments with links to their code."]
+    for one in shown:
+        parts += section_text(one, page not in PAPERS)
+    if missing:
+        parts += ["## Not measured", "", *(f"- {cell(t.what)} ({cell(t.paper_ref)})"
+                                           for t in missing), ""]
+    return "\n".join(parts)
+
+
+def heading(page):
+    """Return the heading of a page without printed numbers."""
+    first, _, second = page.partition("-")
+    if second == "more":
+        return f"{NAMES[first]}: numbers that the paper does not print"
+    return OPENINGS[first].format(NAMES.get(second, ""))
+
+
+def section_text(one, own):
+    """Return the lines of one experiment: figures, table and notes."""
+    section = one.section
+    size = "" if one.profile == "standard" else f" Profile: `{one.profile}`."
+    title = cell(one.title) + ("" if one.title.endswith("?") else ".")
+    lines = ["", f"({label(one)})=", f"## {cell(section.id)}", "", f"{title}{size}", ""]
+    for remark in section.remarks:
+        if remark != one.title:
+            lines += [cell(remark), ""]
+    for figure in section.figures:
+        lines += [f"![{cell(figure.name)}](figures/{figure.name}.webp)", "",
+                  cell(figure.caption), ""]
+    lines += own_table(one) if own else [*printed_table(one.rows), "", *notes(one.rows), ""]
+    return lines
+
+
+def printed_table(rows):
+    """Return the table of printed numbers; a scale that all share stands before it."""
+    scales = {row.scale for row in rows}
+    columns = COLUMNS if len(scales) > 1 else COLUMNS[:-1]
+    first = [f"Scale: {cell(scales.pop())}.", ""] if len(scales) == 1 else []
+    return first + grid_table(columns, (
+        list(map(cell, (row.what, expected(row), row.ours, row.verdict, row.scale)))[:len(columns)]
+        for row in rows))
+
+
+def own_table(one):
+    """Return the table of an experiment of our own, with a note for each row."""
+    rows = one.rows[:MOST_ROWS]
+    lines = grid_table(OWN_COLUMNS, (
+        list(map(cell, (row.what, expected(row), row.ours, row.verdict, row.note)))
+        for row in rows))
+    if len(rows) < len(one.rows):
+        lines += [f"{len(one.rows) - len(rows)} more numbers stand in "
+                  f"`results/{one.profile}/{one.section.id}.json`.", ""]
+    return lines
+
+
+def expected(row):
+    """Return the printed or analytic value with the accepted range."""
+    return f"{row.paper}; {row.rule}" if row.rule else row.paper
+
+
+def notes(rows):
+    """Return the notes of missed numbers, each text once."""
+    missed = {row.note: row.what for row in reversed(rows) if row.verdict == "miss" and row.note}
+    return [f"- *Missed:* {cell(what)}: {cell(note)}" for note, what in reversed(missed.items())]
+
+
+# --- the list of all experiments
+
+def experiments(missing):
+    """Return the tables of all experiments by group, each linked to its numbers and its code."""
+    parts = []
+    for group, title in GROUPS.items():
+        shown = [one for one in shown_experiments() if one.section.id.split(".")[0] == group]
+        parts += [f"## {cell(title)}", "",
+                  *grid_table(("numbers", "experiment", "verdicts"), map(experiment_row, shown))]
+        if missing.get(group):
+            left = "; ".join(f"{cell(t.what)} ({cell(t.paper_ref)})" for t in missing[group])
+            parts += [f"Printed numbers without an experiment: {left}.", ""]
+    return "\n".join(parts)
+
+
+def experiment_row(one):
+    """Return the cells of an experiment."""
+    counts = Counter(row.verdict for row in one.rows)
+    verdicts = ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS if counts[verdict])
+    known, title = declared().get(one.section.id), cell(one.title)
+    if known:
+        title = f"{{source}}`{one.title} <{source_of(known.function)}>`"
+    return [f"[{cell(label(one))}](#{label(one)})", title, verdicts]
+
+
+def source_of(function):
+    """Return `path::name` of an experiment's function; the path alone of one made in another."""
+    path = inspect.getsourcefile(function)
+    file = path.removeprefix(f"{ROOT}/")
+    name = function.__qualname__
+    return file if "<locals>" in name else f"{file}::{name}"
