@@ -102,6 +102,11 @@ def missing_numbers():
 
 def label(one):
     """Return the name of the place of an experiment's section."""
+    return f"numbers.{name_of(one)}"
+
+
+def name_of(one):
+    """Return the id of an experiment, with the profile unless it is the standard one."""
     return one.section.id + ("" if one.profile == "standard" else f"-{one.profile}")
 
 
@@ -203,7 +208,7 @@ def experiment_row(one):
     known, title = declared().get(one.section.id), cell(one.title)
     if known:
         title = f"{{source}}`{one.title} <{source_of(known.function)}>`"
-    return [f"[{cell(label(one))}](#{label(one)})", title, verdicts]
+    return [f"[{cell(name_of(one))}](#{label(one)})", title, verdicts]
 
 
 def source_of(function):

@@ -53,7 +53,8 @@ def test_results_show_printed_and_measured_numbers(result_pages):
 def test_every_experiment_has_a_title_a_link_to_its_numbers_and_its_code(result_pages):
     table = result_pages["results/generated/experiments.md"]
     for experiment, (page, name) in results.experiment_places().items():
-        assert f"](#{experiment})" in table
+        assert f"](#{name})" in table
+        assert name == f"numbers.{experiment}"
         assert f"({name})=" in result_pages[f"{page}.md"]
     links = SOURCE.findall(table)
     assert len(links) > 100
@@ -64,6 +65,7 @@ def test_settings_for_one_per_cent_come_from_the_records(result_pages):
     tables = {name: result_pages[f"results/generated/settings-{name}.md"]
               for name in ("explicit", "implicit", "ldm", "nsf", "nclaw")}
     assert "| grid | 64 cells | **0.15 %** | 0.69 | **0.75 %** | 1.2 |" in tables["explicit"]
+    assert "c dt/dx = 1.2; above the stable step" in tables["explicit"]
     assert "| bar, middle of 1e9 Pa | 1e-8, 0.17 s | not run | 1e-8, 0.4 s |" in tables["implicit"]
     assert "| the displacement | modes | 4 | all | 1 dt | **0.29 %** |" in tables["ldm"]
     assert "| metal | random | 200 | 0.13 % |" in tables["nsf"]
