@@ -110,6 +110,11 @@ def name_of(one):
     return one.section.id + ("" if one.profile == "standard" else f"-{one.profile}")
 
 
+def missing_label(paper):
+    """Return the name of the place that lists the printed numbers of a paper without ours."""
+    return f"numbers.{paper}.missing"
+
+
 # --- the numbers of a paper or of a group of experiments
 
 def numbers(page, shown, missing):
@@ -124,8 +129,8 @@ def numbers(page, shown, missing):
     for one in shown:
         parts += section_text(one, page not in PAPERS)
     if missing:
-        parts += ["## Not measured", "", *(f"- {cell(t.what)} ({cell(t.paper_ref)})"
-                                           for t in missing), ""]
+        parts += ["", f"({missing_label(page)})=", "## Not measured", "",
+                  *(f"- {cell(t.what)} ({cell(t.paper_ref)})" for t in missing), ""]
     return "\n".join(parts)
 
 
@@ -196,8 +201,8 @@ def experiments(missing):
         parts += [f"## {cell(title)}", "",
                   *grid_table(("numbers", "experiment", "verdicts"), map(experiment_row, shown))]
         if missing.get(group):
-            left = "; ".join(f"{cell(t.what)} ({cell(t.paper_ref)})" for t in missing[group])
-            parts += [f"Printed numbers without an experiment: {left}.", ""]
+            parts += [f"Not measured: [{len(missing[group])} printed numbers]"
+                      f"(#{missing_label(group)}).", ""]
     return "\n".join(parts)
 
 
