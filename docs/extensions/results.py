@@ -164,8 +164,15 @@ def printed_table(rows):
     columns = COLUMNS if len(scales) > 1 else COLUMNS[:-1]
     first = [f"Scale: {cell(scales.pop())}.", ""] if len(scales) == 1 else []
     return first + grid_table(columns, (
-        list(map(cell, (row.what, expected(row), row.ours, row.verdict, row.scale)))[:len(columns)]
+        list(map(cell, (described(row), expected(row), row.ours, row.verdict, row.scale)))
+        [:len(columns)]
         for row in rows))
+
+
+def described(row):
+    """Return what a row measures; a ratio of printed numbers is described by its note."""
+    printed = row.what.endswith(")")            # with the place in the paper
+    return row.what if printed or not row.note else f"{row.what}: {row.note}"
 
 
 def own_table(one):

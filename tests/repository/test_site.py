@@ -82,6 +82,15 @@ def test_maps_of_packages_link_to_the_code():
         assert not [link for link in links if not exists(ROOT, link)]
 
 
+def test_ids_of_equations_become_links():
+    pytest.importorskip("sphinx")
+    from docutils import nodes
+    from extensions.cross_links import linked
+    parts = linked(nodes.Text("by HOT-eq1 alone"), "equations.html#")
+    assert [part.astext() for part in parts] == ["by ", "HOT-eq1", " alone"]
+    assert parts[1]["refuri"] == "equations.html#HOT-eq1"
+
+
 def test_formulas_keep_their_lines_and_signs():
     text = docstrings.to_rest("Sums.\n\nm_i += sum_p w_ip m_p\nv_i = p_i/m_i * 2  # NSF-eq6")
     assert text.split("\n\n")[:3] == [
