@@ -200,7 +200,7 @@ def test_a_checkpoint_that_cannot_be_written_is_told(made, tmp_path, monkeypatch
         raise OSError(f"{path} could not be written: no space left; is the disk full?")
 
     monkeypatch.setattr(fit, "SAVE", 2)
-    monkeypatch.setattr(training.weights_file, "write_sealed", full)
+    monkeypatch.setattr(training.weights_file, "write_checkpoint", full)
     assert_told(train(made / "cubes.toml", tmp_path / "laws.npz"), 4, "laws.pt could not be writ")
     assert list(tmp_path.iterdir()) == []
 

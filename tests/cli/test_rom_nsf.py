@@ -145,7 +145,7 @@ def test_a_run_is_the_reduced_run_of_its_parameters(made, reduced, tmp_path, way
     pairs = load(made / "pairs.toml")
     assert (done.exit_code, done.stderr) == (0, "")
     model, one = reduce.load(made / "fields.npz", pairs), nsf_full_model(pairs.scene([1.9]))
-    (count, seed, *how), n, fields = plan, len(one.X), model.field.of([1.9])
+    (count, seed, *how), n, fields = plan, len(one.X), model.field.with_parameters([1.9])
     plan = FieldRunOptions((drawn_samples(n, count or n, seed),), *how)
     states = list(nsf_run(one, fields, plan, model.rest).states())
     with Results(out) as results:

@@ -99,7 +99,7 @@ def nearest(both, test, xhat):
     """Yield (level, latent coordinates) of the states nearest in position and stress."""
     everything, d = np.arange(len(test.X)), test.X.shape[1]
     for level, (x, tau) in enumerate(zip(test.x[0], test.tau[0], strict=True)):
-        target = both.of(x, tensor(tau, d))
+        target = both.vectors(x, tensor(tau, d))
         xhat = project_position(both, everything, target, xhat).y
         yield level, xhat
 
