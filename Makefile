@@ -10,6 +10,11 @@ READY := $(VENV)/.ready
 TRAINS := $(VENV)/.trains
 FAST  := tests/core tests/materials tests/stepping tests/scene
 
+# Processes that compile kernels grow, and end with each part: at most 4 GB at a time.
+STEPS   := tests/core tests/materials tests/adjoint tests/stepping
+METHODS := tests/hot tests/oracle tests/rom tests/nclaw
+OTHERS  := tests $(addprefix --ignore=,$(STEPS) $(METHODS))
+
 .DEFAULT_GOAL := help
 .PHONY: help reproduce test test-fast test-slow test-all docs standard figures bench learn clean
 
@@ -21,7 +26,9 @@ reproduce: $(READY) ## every experiment at the quick profile -> results/quick/re
 
 test: $(TRAINS)  ## lint and the tests but those marked slow; with PyTorch where a CPU build is on offer
 	$(PY) -m ruff check .
-	$(PY) -m pytest -n $(WORKERS) --dist loadfile -m "not slow"
+	@failed=0; for part in "$(STEPS)" "$(METHODS)" "$(OTHERS)"; do \
+	    $(PY) -m pytest -n $(WORKERS) --dist loadfile -m "not slow" $$part || failed=1; done; \
+	    exit $$failed
 
 test-fast: $(READY) ## lint and the tests of kernels, materials, steps and scenes: the inner loop
 	$(PY) -m ruff check .

@@ -9,6 +9,8 @@ from problems import FREE
 
 from mpm_ref.explicit import Scheme
 
+pytestmark = pytest.mark.slow
+
 STEPS = 100
 FINE = 6e-5 * 0.5 ** np.arange(4)   # no particle passes a kink of its law; finer is round-off in 3D
 COARSE = 4e-4 * 0.5 ** np.arange(4)     # of states without strain, far from any kink

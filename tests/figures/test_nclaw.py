@@ -19,6 +19,8 @@ from validation.nclaw import other_bodies, states
 from validation.nclaw.evaluate import body_with_laws
 from validation.nclaw.tasks import reconstruction
 
+pytestmark = pytest.mark.slow
+
 mpl.use("Agg")
 
 

@@ -17,6 +17,8 @@ from validation.nclaw.environments import ENVIRONMENTS, environment
 from validation.nclaw.evaluate import body_with_laws
 from validation.nclaw.tasks import reconstruction
 
+pytestmark = pytest.mark.slow
+
 mpl.use("Agg")
 
 

@@ -30,7 +30,7 @@ from validation.nclaw.environments import ENVIRONMENTS  # noqa: E402
 from validation.nclaw.trained_laws import LawNet, identity, nets  # noqa: E402
 from validation.training.nclaw import untrained_laws  # noqa: E402
 
-pytestmark = pytest.mark.usefixtures("one_torch_thread")
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("one_torch_thread")]
 
 KINDS = {"spline": spline.SplineStress(2.0), "released spline": spline.ReleasedSplineStress(2.0),
          "neural": stretch_network.StretchStress(2.0),

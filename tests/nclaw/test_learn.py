@@ -291,6 +291,7 @@ def test_gradients_in_single_precision_are_those_in_double(run, monkeypatch):
 
 # NCLaw's own numbers.
 
+@pytest.mark.slow
 def test_the_first_epoch_of_jelly_is_that_of_the_release():
     """Loss and norms of the gradients that the authors' code prints with four digits: 1000 steps in
     40 segments. Theirs is of single precision: positions are off by 3e-8 m a step, beside errors

@@ -148,7 +148,8 @@ def test_single_precision_agrees_at_its_own_tolerance(problem, golden, tmp_path)
     assert not oracle.check(golden, tmp_path / "other.h5", precision="f64").agrees
 
 
-@pytest.mark.parametrize("case", [(2, "separate"), (3, "slip")], ids=str)
+@pytest.mark.parametrize("case", [(2, "separate"),
+                                  pytest.param((3, "slip"), marks=pytest.mark.slow)], ids=str)
 def test_other_conditions_and_dimensions(case, tmp_path):
     problem, path = problem_of(*case), tmp_path / "golden.h5"
     oracle.record(problem, path, 1, eps=EPS)

@@ -14,6 +14,8 @@ from mpm_ref.scene import SceneError, Sphere, Walls, build, loads, problem_from_
 from mpm_ref.simulate import simulate
 from mpm_ref.store.manifest import scene_hash
 
+pytestmark = pytest.mark.slow
+
 PAGES = Path(__file__).resolve().parents[2] / "docs" / "howto"
 SOLID = {"law": "hencky", "E": 100.0, "nu": 0.3}
 FLUID = {"law": "fluid", "lam": 10.0}

@@ -12,6 +12,8 @@ from validation.hot.settings import PARTS
 from validation.hot.sizes import FILL, SIZES, Size, sized
 from validation.hot.stretched_box import HIGH, LOW, VARIANTS, stretched
 
+pytestmark = pytest.mark.slow
+
 PER_CELL = {            # of the release, where it is not 8 for all bodies
     "hot_armacat": {"trampoline": 16}, "hot_boards": {"grains": 16}, "hot_faceless": {"bust": 20},
     "hot_sauce": {"sauce": 16}, "hot_wheel": {"wheel": 12},

@@ -78,6 +78,7 @@ def fall():
 
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=lambda s: " ".join(s))
+@pytest.mark.slow
 def test_a_run_on_its_own_modes_is_the_full_one(fall, scheme):
     """As many modes as there are states beside the one at rest hold all states and, as velocities
     are differences of states, all velocities; what is left is round-off, and the quadrature of

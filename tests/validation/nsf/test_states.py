@@ -17,6 +17,8 @@ from validation.ldm.published_bodies import read
 from validation.nsf import reduced_runs, states
 from validation.nsf.studies import jelly
 
+pytestmark = pytest.mark.slow
+
 mpl.use("Agg")
 TEST, ID = 0.45, "nsf.jelly"
 
