@@ -90,7 +90,7 @@ def test_the_state_is_known_at_the_start_alone(true, seen):
     film = seen[1]
     for a, name in zip(film.states(torch.tensor([0])), "xvCF", strict=True):
         assert np.array_equal(a[0].numpy(), getattr(true[1], name)[0])
-    with pytest.raises(ValueError, match=r"states at time levels \[25\]: images give them at level 0 alone"):
+    with pytest.raises(ValueError, match=r"levels \[25\]: images give them at level 0 alone"):
         film.states(torch.tensor([25]))
 
 
