@@ -2,6 +2,7 @@
 
 import re
 import runpy
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -53,9 +54,17 @@ def states_page(tmp_path_factory):
     return names_of("read-states", tmp_path_factory)
 
 
+def registries():
+    """Return the tables of names and of kernels by type, to which a law or a flow is added."""
+    functions = {id(value): value for name, module in list(sys.modules.items())
+                 if name.startswith("mpm_ref.") for value in vars(module).values()
+                 if isinstance(getattr(value, "methods", None), dict)}
+    return [LAWS, FLOWS, *(function.methods for function in functions.values())]
+
+
 @pytest.fixture(scope="module")
 def additions_page(tmp_path_factory):
-    tables = [(table, dict(table)) for table in (LAWS, FLOWS)]
+    tables = [(table, dict(table)) for table in registries()]
     yield names_of("add-a-law", tmp_path_factory)
     for table, content in tables:
         table.clear()
