@@ -62,7 +62,7 @@ def study_named(name):
     return path if path.is_file() or name in bundled_scenes() else bundled_studies().get(name, path)
 
 
-def keep_scene(path, out):
+def require_other_file(path, out):
     """Raise ValueError if the file to write is the scene at `path`, or is named like a scene."""
     if Path(out).exists() and path.samefile(out):
         raise ValueError(f"--out {out}: this is the scene itself; name another file")

@@ -20,7 +20,7 @@ FAULTS = (SceneError, TooLarge, OutOfRange, Refused, BadCheckpoint, BadResults, 
 
 
 @contextmanager
-def one_line():
+def exit_on_errors():
     """End the command on bad input, file errors and Ctrl-C; others keep their traceback as bugs."""
     try:
         yield

@@ -24,7 +24,7 @@ from ..store.weights_file import MAGIC, load_arrays
 from ..timestep import TimeStep, stable_dt
 from . import law_info, rom_info
 from .catalogue import find_scene, is_hdf5, study_named
-from .errors import at_start, one_line, options
+from .errors import at_start, exit_on_errors, options
 from .terminal import as_json, compiling, warn
 
 
@@ -178,7 +178,7 @@ def describe(
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ):
     """Describe a results file, checkpoint, scene, study, reduced model or learned law."""
-    with one_line():
+    with exit_on_errors():
         facts, lines = _facts(name)
         warn(facts.get("warnings", []))
         print(as_json(facts) if json else "\n".join(lines))

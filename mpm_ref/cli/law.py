@@ -19,7 +19,7 @@ from ..nclaw.study.curves import compare_curves, draw_curves, paths_for, write_c
 from ..store.atomic import require_place
 from ..store.text import counted
 from . import law_train
-from .errors import UNSTABLE, end, one_line, options, writing
+from .errors import UNSTABLE, end, exit_on_errors, options, writing
 from .options import (
     NUMBERS,
     PICTURES,
@@ -56,14 +56,14 @@ def evaluate(
     The error is the mean of (x - x_true)^2 over points, axes and frames. Exit status: 0 success,
     2 bad input, 3 a run broke down, 4 a file could not be written, 130 Ctrl-C.
     """
-    with one_line():
+    with exit_on_errors():
         with options():
             if out is not None:
                 require_ending(out, NUMBERS)
                 require_place(out)
             laws, problem = load_matching(file, name, steps)
             warn([*step_length_warnings(laws, problem), *learned_law_warnings(problem)])
-            errors, found = compared(problem, laws, name)
+            errors, found = compare_with_progress(problem, laws, name)
         facts = facts_of(errors, found, problem)
         if out is not None:
             write_errors(errors, problem.clock, out)
@@ -74,7 +74,7 @@ def evaluate(
     raise typer.Exit(0 if isfinite(found.error) else UNSTABLE)
 
 
-def compared(problem, laws, name):
+def compare_with_progress(problem, laws, name):
     """Return the error of each frame [m^2] and the `Found` of both runs, with a progress bar."""
     errors, found, total = [], None, 1 + problem.clock.steps // problem.clock.every
     watched = ComparisonWatch(laws, problem)
@@ -134,7 +134,7 @@ def export(
     docs/reference/studies.md lists the names. Exit status: 0 success, 2 bad input, 4 a file could
     not be written.
     """
-    with one_line():
+    with exit_on_errors():
         with options():
             laws = weights.load(file)
             out = out or file.with_suffix(".layers.npz")
@@ -171,7 +171,7 @@ def plot(
     The paths are uniaxial, simple shear and volumetric; for a plastic law also loading and
     unloading. Exit status: 0 success, 2 bad input, 4 a file could not be written.
     """
-    with one_line():
+    with exit_on_errors():
         with options():
             laws, problem = load_matching(file, against)
             out = out or file.with_suffix(".curves.png")

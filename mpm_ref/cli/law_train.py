@@ -17,8 +17,8 @@ from ..store.running import Watch
 from ..store.text import counted
 from ..trajectories import observed
 from . import provenance
-from .catalogue import bundled_scenes, find_study, keep_scene
-from .errors import INTERRUPT, UNSTABLE, at_start, end, one_line, options, writing
+from .catalogue import bundled_scenes, find_study, require_other_file
+from .errors import INTERRUPT, UNSTABLE, at_start, end, exit_on_errors, options, writing
 from .options import (
     HDF5,
     MAPS,
@@ -54,7 +54,7 @@ def train(
     input, 3 the run became unstable or the training diverged, 4 a file could not be written,
     130 Ctrl-C.
     """
-    with one_line():
+    with exit_on_errors():
         with options():
             study = load(find_study(name), bundled_scenes())
             out = out or study.file("weights") or Path(f"{study.path.stem}.npz")
@@ -65,8 +65,8 @@ def train(
             with at_start(study.path):
                 observation = motion(study, data)
             with writing():
-                laws = learned(study, observation, checkpoint, threads=threads, command=typed(
-                    name, out, data, threads))
+                laws = learned(study, observation, checkpoint, threads=threads,
+                               command=command_line(name, out, data, threads))
         with writing():
             weights.save(out, laws)
         checkpoint.unlink(missing_ok=True)
@@ -75,7 +75,7 @@ def train(
 
 def require_outputs(study, out, data, overwrite):
     """Raise ValueError or NotWritten where no weights, or no run, are to be written."""
-    keep_scene(study.path, out)
+    require_other_file(study.path, out)
     require_ending(out, MAPS)
     require_place(out)
     require_free(out, overwrite)
@@ -97,8 +97,8 @@ def require_checkpoint(checkpoint, study, out, data):
                              "another one")
 
 
-def typed(name, out, data, threads):
-    """The command that trains again."""
+def command_line(name, out, data, threads):
+    """Return the command that repeats a training."""
     kept = "" if data is None else f" --data {data}"
     return f"mpm-ref law train {name} --out {out}{kept} --threads {threads}"
 

@@ -16,7 +16,7 @@ from ..rom.study.generate import one_thread
 from ..rom.study.study import load
 from ..scene import SceneError
 from .catalogue import bundled_scenes, find_scene, find_study
-from .errors import INTERRUPT, end, one_line
+from .errors import INTERRUPT, end, exit_on_errors
 from .terminal import warn
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
@@ -121,7 +121,7 @@ def load_study(name):
 @contextmanager
 def open_study(name):
     """Load a study for reduced runs, on one thread; errors end the command."""
-    with one_line(), one_thread():
+    with exit_on_errors(), one_thread():
         yield load_study(name)
 
 

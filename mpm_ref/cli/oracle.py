@@ -8,8 +8,8 @@ import typer
 
 from .. import oracle, scene
 from ..store.text import counted
-from .catalogue import find_scene, keep_scene
-from .errors import at_start, one_line, options
+from .catalogue import find_scene, require_other_file
+from .errors import at_start, exit_on_errors, options
 from .terminal import compiling, warn
 
 DEPARTS = 1      # exit status of a check in which an array departs
@@ -29,10 +29,10 @@ def record(
     adjoint: Annotated[bool, typer.Option("--adjoint", help="Record gradients too.")] = False,
 ):
     """Run the first steps of a scene and record every stage with the tolerance of each number."""
-    with one_line():
+    with exit_on_errors():
         path = find_scene(name)
         with options(), at_start(path), compiling():
-            keep_scene(path, out)
+            require_other_file(path, out)
             if eps is not None and not 0.0 < eps < inf:
                 raise ValueError(f"--eps {eps}: expected a tolerance, a finite number > 0")
             if adjoint and eps is not None:
@@ -65,7 +65,7 @@ def check(
     json: Annotated[bool, typer.Option("--json", help="Print the report as JSON.")] = False,
 ):
     """Report the first deviating stage, where and by how much. Exit status: 0 if none, 1 if any."""
-    with one_line(), options():
+    with exit_on_errors(), options():
         report = oracle.check(golden, other, precision)
     print(report.json if json else report)
     raise typer.Exit(0 if report.agrees else DEPARTS)

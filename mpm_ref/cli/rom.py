@@ -31,7 +31,7 @@ from ..store.atomic import require_place, require_space, size_text
 from ..store.running import FINISHED
 from ..store.text import counted
 from . import rom_info, rom_train
-from .catalogue import keep_scene
+from .catalogue import require_other_file
 from .errors import UNSTABLE, end, options, writing
 from .options import (
     HDF5,
@@ -90,7 +90,7 @@ def run(
     with open_study(name) as study:
         out = named(out, study, ".h5")
         with options():
-            keep_scene(study.path, out)
+            require_other_file(study.path, out)
             require_ending(out, HDF5)
             require_place(out)
             mu = study.parse_parameters(parse_assignments(values or []))
@@ -170,7 +170,7 @@ def range_warnings(out_of_bounds, states, dt):
 
 @app.command("evaluate", epilog=examples(
     "evaluate gravity_small", "evaluate gravity --map modes.npz --json"))
-def judge(
+def evaluate_runs(
     name: StudyName,
     map_file: MapFile = None,
     data: Data = None,

@@ -13,7 +13,7 @@ from ..rom.study.tables import CURVED, MODES, NETWORK, NSF
 from ..scene import SceneError
 from ..store.text import counted
 from .catalogue import bundled_studies
-from .errors import one_line
+from .errors import exit_on_errors
 from .options import Json, load_study
 from .terminal import print_titles
 
@@ -25,7 +25,7 @@ MEASURES = {"origin": "of the distance from the scene's origin",
 
 def studies(json: Json = False):
     """List the bundled studies."""
-    with one_line():
+    with exit_on_errors():
         print_titles({name: parse_tables(read_toml(path)).title for name,
                       path in bundled_studies().items()
                 if is_study(path)}, json)

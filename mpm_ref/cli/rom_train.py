@@ -26,8 +26,8 @@ from ..store.atomic import NotWritten, require_place
 from ..store.text import counted
 from ..training import DEVICES, Machine
 from . import errors
-from .catalogue import keep_scene
-from .errors import end, one_line, options, writing
+from .catalogue import require_other_file
+from .errors import end, exit_on_errors, options, writing
 from .options import (
     MAPS,
     Data,
@@ -58,7 +58,7 @@ def make_data(
     Finished runs are skipped, interrupted ones resume from their checkpoints. Exit status:
     0 success, 2 bad input, 3 a run became unstable, 4 a file could not be written, 130 Ctrl-C.
     """
-    with one_line():
+    with exit_on_errors():
         study = load_study(name)
         folder, ended = named(out, study, "-data"), []
         with options():
@@ -128,7 +128,7 @@ def train(
     PyTorch. An interrupted training resumes from its checkpoint, MAP.pt. Exit status: 0 success,
     2 bad input, 4 a file could not be written, 130 Ctrl-C.
     """
-    with one_line():
+    with exit_on_errors():
         with options():
             study, machine = load_study(name), machine_of(threads)
             out, data = named(out, study, ".npz"), named(data, study, "-data")
@@ -141,9 +141,10 @@ def train(
             if study.tables.model == NSF:
                 warn(training_hints(study))
             about = {"command": f"mpm-ref rom train {name} --data {data} --out {out} "
-                                f"--kind {study.tables.reduced_model.kind} {typed(machine)}"}
+                                f"--kind {study.tables.reduced_model.kind} "
+                                f"{threads_option(machine)}"}
             with writing(), on_interrupt(lambda: resume_hint(checkpoint)):
-                model = fitted(study, snapshots, about, checkpoint, machine)
+                model = compute_model(study, snapshots, about, checkpoint, machine)
             write(out, model)
         reduce.forget_checkpoint(checkpoint)
         print(f"{out}: {reduce.kind_of(model)}, r = {model.field.r}, of "
@@ -158,8 +159,8 @@ def require_device(kind, device):
         raise ValueError(f"--threads {device}: {kind} are made on the processor; leave it out")
 
 
-def typed(machine):
-    """The option of a `Machine` as it is typed."""
+def threads_option(machine):
+    """Return the command-line option that selects a `Machine`."""
     return f"--threads {machine.threads if machine.device == DEVICES[0] else machine.device}"
 
 
@@ -170,7 +171,7 @@ def resume_hint(checkpoint):
     return "before there was a checkpoint; the same command again begins anew"
 
 
-def fitted(study, snapshots, about, checkpoint, machine):
+def compute_model(study, snapshots, about, checkpoint, machine):
     """Return the `Model` of a study's kind, with a progress bar of epochs."""
     if study.tables.reduced_model.kind != NETWORK:
         with one_thread():
@@ -193,7 +194,7 @@ def make_folder(folder):
 
 def require_map_place(out, study, overwrite):
     """Raise ValueError or NotWritten where no map is to be written."""
-    keep_scene(study.path, out)
+    require_other_file(study.path, out)
     require_ending(out, MAPS)
     require_place(out)
     require_free(out, overwrite)

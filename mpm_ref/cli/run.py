@@ -35,8 +35,8 @@ from ..store.text import counted
 from ..store.writer import StoredFields
 from ..timestep import TooLarge
 from . import info
-from .catalogue import find_scene, keep_scene
-from .errors import INTERRUPT, NOT_WRITTEN, UNSTABLE, at_start, end, one_line, options
+from .catalogue import find_scene, require_other_file
+from .errors import INTERRUPT, NOT_WRITTEN, UNSTABLE, at_start, end, exit_on_errors, options
 from .options import Json, SceneName
 from .terminal import COMPILING, as_json, compiling, passing, warn
 
@@ -70,11 +70,11 @@ def run(
     run bit for bit, whatever ended it. Exit status: 0 success, 2 bad input, 3 the run became
     unstable, 4 a file could not be written, 130 Ctrl-C, 143 terminated.
     """
-    with one_line():
+    with exit_on_errors():
         path = find_scene(name)
         record, out = scene.load(path), out or Path(f"{path.stem}.h5")
         with options():
-            keep_scene(path, out)
+            require_other_file(path, out)
             how = Options(steps, checkpoint_every, stored(fields, gzip), resume, overwrite,
                           record.seed)
             use_threads(threads)

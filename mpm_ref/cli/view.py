@@ -10,7 +10,7 @@ from ..store.atomic import require_place
 from ..store.results import SCALARS, Results
 from ..store.vtkhdf import export_grid, export_particles
 from .catalogue import bundled_scenes
-from .errors import one_line, options
+from .errors import exit_on_errors, options
 from .options import PICTURES, Json, require_ending
 from .terminal import print_titles
 
@@ -56,7 +56,7 @@ def export(
 
 def scenes(json: Json = False):
     """List the bundled scenes."""
-    with one_line():
+    with exit_on_errors():
         titles = {name: scene.load(path).title for name, path in bundled_scenes().items()}
         print_titles(titles, json)
 
@@ -68,7 +68,7 @@ def _to_file(make, file, out, suffixes, **what):
         require_ending(out, suffixes)
         if out.exists() and file.exists() and out.samefile(file):
             raise ValueError(f"--out {out}: this is the results file itself; name another file")
-    with one_line(), Results(file) as results:
+    with exit_on_errors(), Results(file) as results:
         require_place(out)
         make(results, out, **what)
         print(out)

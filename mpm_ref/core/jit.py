@@ -16,6 +16,7 @@ Every option and its reason:
   default changes when another package installs TBB. The bits of our results do not depend on it.
 * Waiting OpenMP threads sleep instead of spinning: on a machine that does other work too, spinning
   made steps of small scenes 8 times slower. Set OMP_WAIT_POLICY=ACTIVE where the cores are yours.
+* ``no_cfunc_wrapper``: no kernel is handed to C, and the wrapper for that takes time to compile.
 * Parallel loops run over a fixed number of chunks, never over "one chunk per thread": a result is a
   function of the input alone. See `chunk` and `total`.
 """
@@ -27,21 +28,23 @@ import os
 import shutil
 import sys
 from contextlib import contextmanager, suppress
+from functools import update_wrapper
 from pathlib import Path
 from time import time
+from types import FunctionType
 
 import numba
 import numpy as np
 import platformdirs
 from numba import njit, prange
-from numba.extending import overload
+from numba.extending import overload, typeof_impl
 
 CHUNKS = 64          # of every parallel loop and reduction
 VERSIONS = 4         # of the package whose compiled kernels stay on disk, however old
 IN_USE = 86400.0     # [s] since a version was opened, in which it may still be in use: stays too
 
 DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef)
-_OPTIONS = {"error_model": "numpy", "cache": True}
+_OPTIONS = {"error_model": "numpy", "cache": True, "no_cfunc_wrapper": True}
 
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")     # read when the library is loaded
 if "NUMBA_SLP_VECTORIZE" not in os.environ:
@@ -141,16 +144,48 @@ def _our_cache():
         numba.config.CACHE_DIR = theirs
 
 
+class Kernel:
+    """A compiled function that kernels and Python may call.
+
+    It is compiled in two forms. Kernels link the one without an entry for Python, which takes
+    about half as long to compile; the other one is compiled where Python calls the function.
+    """
+
+    def __init__(self, function, **options):
+        update_wrapper(self, function)
+        self.py_func = function
+        with _our_cache():
+            self._entry = njit(**_OPTIONS, **options)(function)
+            self.linked = njit(no_cpython_wrapper=True, **_OPTIONS, **options)(_renamed(function))
+
+    def __call__(self, *args, **kwargs):
+        """Return what the function returns for the arguments."""
+        return self._entry(*args, **kwargs)
+
+
+def _renamed(function):
+    """Return a copy of a function with a name of its own, and so with a cache of its own."""
+    copy = FunctionType(function.__code__, function.__globals__, function.__name__,
+                        function.__defaults__, function.__closure__)
+    copy.__module__, copy.__qualname__ = function.__module__, f"{function.__qualname__}.linked"
+    copy.__doc__ = function.__doc__
+    return copy
+
+
+@typeof_impl.register(Kernel)
+def _type_of_kernel(function, context):
+    """Return the type by which compiled callers know a kernel: that of its linked form."""
+    return numba.types.Dispatcher(function.linked)
+
+
 def kernel(function):
     """Compile a formula, or a serial traversal (one loop calling formulas)."""
-    with _our_cache():
-        return njit(**_OPTIONS)(function)
+    return Kernel(function)
 
 
 def leaf(function):
     """Compile a formula that is worth inlining although it is long, as LLVM would not by itself."""
-    with _our_cache():
-        return njit(forceinline=True, **_OPTIONS)(function)
+    return Kernel(function, forceinline=True)
 
 
 def parallel(function):

@@ -132,7 +132,7 @@ def test_a_scene_in_2d_is_refused(tmp_path, scene):
 ])
 def test_what_an_evaluation_needs_is_said_first(
         tmp_path, monkeypatch, weights, options, status, words):
-    monkeypatch.setattr(law, "compared", None)
+    monkeypatch.setattr(law, "compare_with_progress", None)
     saved(tmp_path, identified())
     write_scene(tmp_path)
     monkeypatch.chdir(tmp_path)

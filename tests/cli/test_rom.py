@@ -157,7 +157,7 @@ def test_ctrl_c_in_a_training_says_how_to_go_on(made, tmp_path, monkeypatch, sav
         if saved:
             checkpoint.write_bytes(b"x")
         raise KeyboardInterrupt
-    monkeypatch.setattr("mpm_ref.cli.rom_train.fitted", interrupted)
+    monkeypatch.setattr("mpm_ref.cli.rom_train.compute_model", interrupted)
     done = mpm_ref("rom", "train", made / "bars.toml", "--data", made / "data",
                    "--out", tmp_path / "map.npz")
     assert_told(done, 130, f"goes on from {tmp_path / 'map.pt'}" if saved else
@@ -167,7 +167,7 @@ def test_ctrl_c_in_a_training_says_how_to_go_on(made, tmp_path, monkeypatch, sav
 def test_a_checkpoint_that_cannot_be_written_is_told(made, tmp_path, monkeypatch):
     def full(study, snapshots, about, checkpoint, threads):
         raise OSError(f"{checkpoint} could not be written: no space left; is the disk full?")
-    monkeypatch.setattr("mpm_ref.cli.rom_train.fitted", full)
+    monkeypatch.setattr("mpm_ref.cli.rom_train.compute_model", full)
     done = mpm_ref("rom", "train", made / "bars.toml", "--data", made / "data",
                    "--out", tmp_path / "map.npz")
     assert_told(done, 4, "map.pt could not be written: no space left")
