@@ -4,7 +4,7 @@
   u = |v_p| + |L_p| dx (degree + 1)/2;
 * elastic: no wave crosses more than a cell, dt c_p < dx, c_p that of `materials.waves` at the
   current stretches; of a law without derivatives, as a learned one, that at rest;
-* viscous: none of the shipped laws has an explicit viscosity (Bingham flow is integrated
+* viscous: none of our laws has an explicit viscosity (Bingham flow is integrated
   implicitly), so it is infinite;
 * single particle: the oscillation of a particle through nodes that it has to itself must not grow
   [BaiSchroeder2022]. With K its largest modulus, 2 mu + d lam at rest, 1/D of `inverse_inertia`,

@@ -30,7 +30,7 @@ def find_scene(name):
     """Return the path of a scene, given by its file or a bundled name. Raises SceneError."""
     file = Path(name)
     if file.suffix.lower() in (".h5", ".hdf5"):
-        raise SceneError(f"{name}: {_wrong_with(file)}; expected a scene (a TOML file or a shipped "
+        raise SceneError(f"{name}: {_wrong_with(file)}; expected a scene (a TOML file or a bundled "
                          "name), or for `mpm-ref info` what `mpm-ref run` wrote")
     if file.is_file():
         return file
@@ -38,10 +38,10 @@ def find_scene(name):
     if name in scenes:
         return scenes[name]
     if file.is_dir():
-        raise SceneError(f"{name}: this is a folder; expected a scene (a TOML file or a shipped "
+        raise SceneError(f"{name}: this is a folder; expected a scene (a TOML file or a bundled "
                          "name), or for `mpm-ref info` what `mpm-ref run` wrote")
     known = ", ".join(scenes) or "not installed"
-    raise SceneError(f"{name}: there is no such file, nor a shipped scene of that name; shipped "
+    raise SceneError(f"{name}: there is no such file, nor a bundled scene of that name; bundled "
                      f"scenes: {known}")
 
 
@@ -51,8 +51,8 @@ def find_study(name):
         return Path(name)
     studies = bundled_studies()
     if name not in studies:
-        raise SceneError(f"{name}: there is no such file, nor a shipped study of that name; "
-                         f"shipped studies: {', '.join(studies) or 'not installed'}")
+        raise SceneError(f"{name}: there is no such file, nor a bundled study of that name; "
+                         f"bundled studies: {', '.join(studies) or 'not installed'}")
     return studies[name]
 
 

@@ -83,7 +83,7 @@ def run(
 ):
     """Run the reduced model of a study into a results file.
 
-    `mpm-ref info`, `plot`, `animate` and `export` take the file. The same command resumes an
+    `mpm-ref info`, `plot`, `animate` and `export` take the file. Repeat the command to resume an
     interrupted run bit for bit. Exit status: 0 success, 2 bad input, 3 the run broke down, 4 a file
     could not be written, 130 Ctrl-C.
     """

@@ -123,15 +123,14 @@ def full(particles, law, flow, dt, like):
         deform_full(particles, law, flow, dt, like, chunk(c, len(particles.x)))
 
 
-@parallel
+# The stress at the start is computed once a run: a parallel driver takes longer to compile than it
+# saves.
+
 def initial_stress(particles, law, flow, like):
     """`stress` for all particles. `like` is any tuple of length d."""
-    for c in prange(CHUNKS):
-        stress(particles, law, flow, like, chunk(c, len(particles.x)))
+    stress(particles, law, flow, like, (0, len(particles.x)))
 
 
-@parallel
 def initial_pressure(particles, law):
     """`stress_fluid` for all particles."""
-    for c in prange(CHUNKS):
-        stress_fluid(particles, law, chunk(c, len(particles.x)))
+    stress_fluid(particles, law, (0, len(particles.x)))

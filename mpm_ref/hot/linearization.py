@@ -130,11 +130,9 @@ def _cycle(A, index, options, profiler):
 
 def _cycle_of(grids, profiler):
     """A cycle of a hierarchy; the profiler gets its iterations and time on the coarsest level."""
-    grids.coarsest = profiler.timed("coarse", grids.coarsest)
-
     def cycle(r):
         before = grids.iterations
-        u = grids.cycle(r)
+        u = grids.cycle(r, partial(profiler.part, "coarse"))
         profiler.coarse_iterations += grids.iterations - before
         return u
     return cycle

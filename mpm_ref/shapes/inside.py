@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, singledispatch
+from functools import cached_property, lru_cache, singledispatch
 from math import cos, hypot, inf, radians, sin
 
 import numpy as np
@@ -14,6 +14,7 @@ from .mesh import bins_of, enclosed_volume, read_triangles, winding
 
 SKIN = 1e-9                     # of a solid's size: points so little outside count as inside
 DARTS = {2: 2000, 3: 160}       # cells per axis in which `measured_volume` throws one dart each
+KNOWN = 64                      # measured volumes that are kept, as runs of a study repeat a body
 
 
 @dataclass(frozen=True)
@@ -24,11 +25,20 @@ class Solid:
     low: np.ndarray                     # (d,) [m]
     high: np.ndarray                    # (d,) [m]
     exact_volume: float | None = None   # [m^d], where a formula is known
+    shape: object = None                # the record, unless its files may change
 
     @cached_property
     def volume(self):
         """Return the volume [m^d], for boolean combinations by sampling to about 1e-4."""
-        return measured_volume(self) if self.exact_volume is None else self.exact_volume
+        if self.exact_volume is not None:
+            return self.exact_volume
+        return measured_volume(self) if self.shape is None else _volume_of(self.shape)
+
+
+@lru_cache(KNOWN)
+def _volume_of(shape):
+    """Return the measured volume [m^d] of a shape record."""
+    return measured_volume(solid(shape))
 
 
 def measured_volume(solid):
@@ -64,7 +74,7 @@ def solid(shape):
     def inside(x):
         return levelset.distances(x, level) <= skin
 
-    return Solid(inside, low, high, exact)
+    return Solid(inside, low, high, exact, shape)
 
 
 @solid.register
@@ -74,7 +84,8 @@ def _(shape: shapes.Union):
     def inside(x):
         return np.logical_or.reduce([part.inside(x) for part in parts])
 
-    return Solid(inside, *hull(np.concatenate([(part.low, part.high) for part in parts])))
+    box = hull(np.concatenate([(part.low, part.high) for part in parts]))
+    return Solid(inside, *box, shape=_lasting(shape, parts))
 
 
 @solid.register
@@ -88,7 +99,7 @@ def _(shape: shapes.Intersection):
     def inside(x):
         return np.logical_and.reduce([part.inside(x) for part in parts])
 
-    return Solid(inside, low, high)
+    return Solid(inside, low, high, shape=_lasting(shape, parts))
 
 
 @solid.register
@@ -98,7 +109,7 @@ def _(shape: shapes.Difference):
     def inside(x):
         return base.inside(x) & ~np.logical_or.reduce([part.inside(x) for part in holes])
 
-    return Solid(inside, base.low, base.high)
+    return Solid(inside, base.low, base.high, shape=_lasting(shape, [base, *holes]))
 
 
 @solid.register
@@ -116,7 +127,8 @@ def _(shape: shapes.Transformed):
     if np.isfinite([part.low, part.high]).all():
         low, high = hull((_corners(part.low, part.high) - about) @ R.T * shape.scale + to)
     exact = part.exact_volume
-    return Solid(inside, low, high, None if exact is None else exact * shape.scale**d)
+    return Solid(inside, low, high, None if exact is None else exact * shape.scale**d,
+                 _lasting(shape, [part]))
 
 
 @solid.register
@@ -133,6 +145,11 @@ def _(shape: shapes.Mesh):
         return winding(x, bins) > 0
 
     return Solid(inside, *hull(triangles.reshape(-1, 3)), enclosed_volume(triangles))
+
+
+def _lasting(shape, parts):
+    """Return the record of a shape, or None if the `Solid` of a part has none."""
+    return None if any(part.shape is None for part in parts) else shape
 
 
 def _corners(low, high):

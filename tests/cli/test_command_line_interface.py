@@ -151,7 +151,7 @@ def test_bad_options_are_told(scene, tmp_path, options, words):
 
 
 def test_a_name_that_is_no_scene_is_told(tmp_path):
-    assert_told(mpm_ref("run", tmp_path / "none.toml"), 2, "no such file", "shipped scenes")
+    assert_told(mpm_ref("run", tmp_path / "none.toml"), 2, "no such file", "bundled scenes")
 
 
 @pytest.mark.parametrize(("content", "what"), [

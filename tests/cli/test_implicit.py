@@ -72,7 +72,7 @@ def test_steps_that_were_not_solved_are_told(tmp_path, iterations, all_solved):
 
 
 @pytest.mark.parametrize("name", sorted(bundled_scenes()))
-def test_opening_lines_of_every_shipped_scene(name):
+def test_opening_lines_of_every_bundled_scene(name):
     problem = build(load(bundled_scenes()[name]))
     lines = problem_lines(of_problem(problem))
     assert f"{sum(len(body.id) for body in problem.bodies)} particles" in lines[0]

@@ -142,7 +142,7 @@ def test_what_an_evaluation_needs_is_said_first(
 
 def test_a_scene_that_does_not_exist_is_told_with_those_that_do(tmp_path):
     done = mpm_ref("law", "evaluate", saved(tmp_path, identified()), "none")
-    assert_told(done, 2, "nor a shipped scene of that name", "nclaw_jelly")
+    assert_told(done, 2, "nor a bundled scene of that name", "nclaw_jelly")
 
 
 NARROW = {"low": [0.999] * 4, "high": [1.001] * 4}

@@ -259,7 +259,7 @@ def test_studies_of_labels_have_no_horizon_and_those_of_constants_no_networks(tm
 
 
 @pytest.mark.parametrize("name", ["law_jelly", "law_jelly_small"])
-def test_shipped_law_studies_are_known_by_their_names(name):
+def test_bundled_law_studies_are_known_by_their_names(name):
     what, size, *_ = lines(name)
     assert f"{name}.toml: a law study, NCLaw: jelly" in what
     assert size.startswith("3D, ")

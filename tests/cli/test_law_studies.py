@@ -20,7 +20,7 @@ def of_method(method):
     return "[train]", f'method = "{method}"\n[train]'
 
 
-def test_shipped_studies_load():
+def test_bundled_studies_load():
     found = {name: load(path, bundled_scenes()) for name, path in bundled_studies().items()
              if name.startswith("law_")}
     assert found["law_jelly"].tables.train == Recipe()
@@ -81,7 +81,7 @@ def test_without_pytorch_one_sentence_says_so(tmp_path, without_torch):
     (("[train]", "[laws]\nstrain = 0.1\n[train]"), "laws.strain = 0.1: none of these laws has it"),
     (("[train]", '[laws]\nelastc = "Stress"\n[train]'), "laws.elastc: unknown key; did you mean"),
     (("[train]", "[set]\nbody.cub.density = 1.0\n[train]"), "set: 'body.cub.density' leads now"),
-    (("cube.toml", "none.toml"), "scene = 'none.toml': there is no such file, nor a shipped"),
+    (("cube.toml", "none.toml"), "scene = 'none.toml': there is no such file, nor a bundled"),
     (("[train]", "[train"), "not valid TOML"),
     (('scene = "cube.toml"', ""), "scene: this key is missing"),
 ])
@@ -148,4 +148,4 @@ def test_studies_of_reduced_models_are_refused():
 
 
 def test_a_study_that_does_not_exist_is_told_with_those_that_do():
-    assert_told(mpm_ref("law", "train", "none"), 2, "nor a shipped study", "law_jelly")
+    assert_told(mpm_ref("law", "train", "none"), 2, "nor a bundled study", "law_jelly")

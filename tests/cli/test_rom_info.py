@@ -112,7 +112,7 @@ def test_a_study_says_what_it_is_made_of(made):
     assert found["study_sha256"] == load(file).digest
 
 
-def test_a_shipped_study_is_known_by_its_name():
+def test_a_bundled_study_is_known_by_its_name():
     what, size, *_ = mpm_ref("info", "gravity_small").stdout.splitlines()
     assert "gravity_small.toml: a study, Cylinder under gravity, small: 8 runs" in what
     assert size.startswith("3D, 400 points, ")
@@ -129,7 +129,7 @@ def test_a_study_with_a_fault_is_told_as_one(tmp_path, before, after, words):
 
 # lists and help
 
-def test_the_shipped_studies_are_listed_with_their_titles():
+def test_the_bundled_studies_are_listed_with_their_titles():
     tables = {name: tomllib.loads(file.read_text()) for name, file in bundled_studies().items()}
     titles = {name: found["title"] for name, found in tables.items() if "map" in found}
     assert len(titles) >= 3

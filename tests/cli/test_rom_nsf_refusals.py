@@ -1,4 +1,4 @@
-"""What studies with model = "nsf" may not say, and what `mpm-ref rom` refuses of them; the shipped
+"""What studies with model = "nsf" may not say, and what `mpm-ref rom` refuses of them; the bundled
 study beside the experiment.
 """
 
@@ -108,14 +108,14 @@ def test_more_modes_than_the_runs_hold_are_refused(made, tmp_path):
     assert not (tmp_path / "f.npz").exists()
 
 
-# Shipped studies.
+# Bundled studies.
 
 def test_the_papers_study_has_the_runs_of_the_experiment():
-    shipped, experiment = load(bundled_studies()["jelly"], bundled_scenes()), jelly()
-    assert shipped.mu[list(shipped.train), 0].tolist() == list(experiment.train)
-    assert shipped.mu[list(shipped.test), 0].tolist() == list(experiment.test)
-    assert shipped.tables.reduced_model.sizes == experiment.sizes
-    assert shipped.tables.reduced_model.stress_sees_parameters == experiment.follows
-    assert shipped.tables.run.points == experiment.samples
+    bundled, experiment = load(bundled_studies()["jelly"], bundled_scenes()), jelly()
+    assert bundled.mu[list(bundled.train), 0].tolist() == list(experiment.train)
+    assert bundled.mu[list(bundled.test), 0].tolist() == list(experiment.test)
+    assert bundled.tables.reduced_model.sizes == experiment.sizes
+    assert bundled.tables.reduced_model.stress_sees_parameters == experiment.follows
+    assert bundled.tables.run.points == experiment.samples
     for value in (0.3, 0.45):
-        assert shipped.scene([value]) == experiment.run(value)
+        assert bundled.scene([value]) == experiment.run(value)

@@ -1,5 +1,6 @@
 """Every method on the incremental potential of particles, with the multigrid."""
 
+import gc
 from functools import partial
 
 import numpy as np
@@ -8,7 +9,9 @@ from hot_cases import CASES, coarser_unknowns, problem_of
 from hot_toys import lattice, tight
 
 from mpm_ref.hot.methods import METHODS, minimise, options_of
+from mpm_ref.hot.multigrid.blocks.hierarchy import BlockHierarchy
 from mpm_ref.hot.multigrid.geometric import CoarseGrids
+from mpm_ref.hot.multigrid.hierarchy import Hierarchy
 from mpm_ref.hot.multigrid.options import CycleOptions
 from mpm_ref.hot.norms import characteristic_norms
 from mpm_ref.hot.system import System
@@ -78,6 +81,24 @@ def test_paths_of_multigrid_agree():
                      for word in ("blocks", "scipy"))
     assert blocks.report.iterations == scipy.report.iterations
     assert np.allclose(blocks.dv, scipy.dv, atol=1e-10)
+
+
+def hierarchies():
+    return sum(type(thing) in (Hierarchy, BlockHierarchy) for thing in gc.get_objects())
+
+
+@pytest.mark.parametrize("implementation", ["blocks", "scipy"])
+def test_the_levels_of_a_solve_are_freed_when_it_ends(implementation):
+    """Not only when Python looks for cycles of references: levels are large and such cycles few."""
+    toy = lattice((10, 21))
+    gc.collect()
+    before = hierarchies()
+    gc.disable()
+    try:
+        minimise(toy, "hot", implementation=implementation)
+        assert hierarchies() == before
+    finally:
+        gc.enable()
 
 
 def test_choices_reach_the_hierarchy():

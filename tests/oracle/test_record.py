@@ -1,4 +1,4 @@
-"""Golden files: what they record, who agrees with them, and the one that is shipped."""
+"""Golden files: what they record, who agrees with them, and the bundled one."""
 
 import json
 from pathlib import Path
@@ -238,9 +238,9 @@ def test_what_is_not_given_is_listed(checked, theirs):
     assert not checked([None, None]).agrees
 
 
-# what is shipped
+# the bundled file
 
-def test_the_shipped_golden_file_is_what_we_compute(tmp_path):
+def test_the_bundled_golden_file_is_what_we_compute(tmp_path):
     problem = scene.build(scene.load(ROOT / "examples/golden.toml"))
     oracle.write(tmp_path / "other.h5", kernel_arrays(problem, steps=3))
     report = oracle.check(ROOT / "examples/golden.h5", tmp_path / "other.h5")
@@ -263,7 +263,7 @@ def test_the_example_in_single_precision(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("name", ["hello", "incline"])
-def test_shipped_scenes_with_particles_half_way_between_nodes_are_recorded(tmp_path, name):
+def test_bundled_scenes_with_particles_half_way_between_nodes_are_recorded(tmp_path, name):
     """There the twin's stencils begin at another node than ours, in extended precision."""
     problem = scene.build(scene.load(ROOT / f"scenes/{name}.toml"))
     oracle.record(problem, tmp_path / "golden.h5", steps=1)

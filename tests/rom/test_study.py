@@ -28,7 +28,7 @@ def told(folder, *edits, **scene):
 # What a file says.
 
 @pytest.mark.parametrize("name", ["gravity", "torsion"])
-def test_shipped_studies_are_the_experiments(name):
+def test_bundled_studies_are_the_experiments(name):
     ours, theirs = load(bundled_studies()[name], bundled_scenes()), STUDIES[name]
     assert np.array_equal(ours.mu, theirs.mu)
     assert (ours.test, ours.train) == (theirs.test, theirs.train)
@@ -36,7 +36,7 @@ def test_shipped_studies_are_the_experiments(name):
         assert canonical(ours.scene(mu)) == canonical(theirs.scene(*mu))
 
 
-def test_all_shipped_studies_load():
+def test_all_bundled_studies_load():
     assert {"gravity", "gravity_small", "torsion"} <= set(bundled_studies())
     small = load(bundled_studies()["gravity_small"], bundled_scenes())
     assert small.base.steps == 15
@@ -172,7 +172,7 @@ def test_what_is_set_is_set_in_all_runs(tmp_path):
     ("gravity[1]", "gravity", "parameter: gravity = -1.0: expected a list"),
     ("gravity[1]", "grav[1]", "parameter: 'grav[1]' leads nowhere"),
     ("gravity[1]", "body.bar.density", "parameter: body[0].density = -1.0"),
-    ('"bar.toml"', '"beam.toml"', "scene = 'beam.toml': there is no such file, nor a shipped"),
+    ('"bar.toml"', '"beam.toml"', "scene = 'beam.toml': there is no such file, nor a bundled"),
     ("[map]", "[set]\nsteps = 0.5\n[map]", "set: steps = 0.5: expected a whole number"),
     ("[map]", "[set]\nstep = 5\n[map]", "set: 'step' leads nowhere"),
     ("[map]", "[map", "not valid TOML"),

@@ -194,7 +194,7 @@ def test_every_parameter_of_the_tables_is_a_key():
     assert flows - {"dim"} == set(Flow.__struct_fields__) - {"name"}
 
 
-# the scenes that are shipped
+# the scenes that come with the package
 
 def test_all_scenes_are_here():
     asked = {"nclaw_jelly", "nclaw_sand", "nclaw_plasticine", "nclaw_water", "ldm_gravity",

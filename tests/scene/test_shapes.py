@@ -88,6 +88,22 @@ def test_measured_volume_of_booleans():
     assert abs(rest.volume - (1.0 - half_disk)) < 5e-5
 
 
+@pytest.fixture
+def measured(monkeypatch):
+    """Let every measured volume be 0.5, and return the list of the solids that were measured."""
+    solids = []
+    monkeypatch.setattr("mpm_ref.shapes.inside.measured_volume",
+                        lambda part: solids.append(part) or 0.5)
+    return solids
+
+
+def test_a_volume_is_measured_once_for_equal_records(measured):
+    for lower in (0.125, 0.125, 0.25):
+        hole = shapes.Box(lower=(lower, lower), upper=(0.75, 0.75))
+        assert solid(shapes.Difference(shape=UNIT2, minus=(hole,))).volume == 0.5
+    assert len(measured) == 2
+
+
 def test_unbounded_shapes():
     half = shapes.HalfSpace(point=(0.5, 0.0), normal=(2.0, 0.0))
     assert np.array_equal(solid(half).high, [0.5, np.inf])
@@ -228,6 +244,14 @@ def test_inward_normals_are_turned(stl):
     part = solid(shapes.Mesh(file=stl(body)))
     assert part.volume == pytest.approx(1.0)
     assert part.inside(np.zeros((1, 3))).all()
+
+
+def test_a_volume_with_a_mesh_is_measured_anew_as_its_file_may_change(measured, stl):
+    body = shapes.Mesh(file=stl(trimesh.creation.box((1.0, 1.0, 1.0))))
+    hole = shapes.Sphere(center=(0.0, 0.0, 0.0), radius=0.25)
+    for _ in range(2):
+        assert solid(shapes.Difference(shape=body, minus=(hole,))).volume == 0.5
+    assert len(measured) == 2
 
 
 def test_open_mesh_is_refused(stl):

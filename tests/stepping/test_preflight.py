@@ -135,5 +135,5 @@ def test_compressed_particles_take_less_room():
 @pytest.mark.parametrize(       # "nsf_sand" takes seconds to fill, HOT's are in test_hot_scenes
     "file", [f for f in SCENES if f.stem != "nsf_sand" and not f.stem.startswith("hot_")],
     ids=lambda file: file.stem)
-def test_shipped_scenes_stand_well(file):
+def test_bundled_scenes_stand_well(file):
     assert misplaced(build(load(file))) == []

@@ -8,6 +8,7 @@ another experiment at work they vary more, and each record has the number of `wo
 import os
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from functools import cache
+from math import ceil
 from multiprocessing import get_context
 
 import numba
@@ -19,6 +20,8 @@ from mpm_ref.core.jit import set_threads
 from .progress import SuiteProgress
 from .registry import discover
 from .run import attempt
+
+MOST = 80       # experiments that a process may see: compiled kernels stay in its memory
 
 
 @cache
@@ -34,11 +37,20 @@ def run_side_by_side(experiments, setting, workers, find=experiment_of):
     cannot be sent to a process.
     """
     longest = sorted(experiments, key=lambda e: -e.seconds(setting.profile))
+    pools = ceil(len(longest) / MOST)
     setting = setting._replace(targets=dict(setting.targets), workers=workers)
     failed = []
-    with (SuiteProgress([e.seconds(setting.profile) for e in experiments]) as progress,
-          ProcessPoolExecutor(workers, get_context("spawn"), take_share, (workers,)) as pool):
-        futures = {pool.submit(attempt_in_process, find, e.id, setting): e for e in longest}
+    with SuiteProgress([e.seconds(setting.profile) for e in experiments]) as progress:
+        for k in range(pools):
+            failed += run_in_pool(longest[k::pools], setting, find, progress)
+    return failed
+
+
+def run_in_pool(experiments, setting, find, progress):
+    """Run experiments in new processes, one for each worker. Return the ids of those that fail."""
+    failed, share = [], (setting.workers,)
+    with ProcessPoolExecutor(setting.workers, get_context("spawn"), take_share, share) as pool:
+        futures = {pool.submit(attempt_in_process, find, e.id, setting): e for e in experiments}
         try:
             for future in as_completed(futures):
                 experiment = futures[future]

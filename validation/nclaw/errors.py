@@ -50,15 +50,20 @@ def errors(run, laws, tasks, goes_on=False):
         for task in tasks:
             runnable = {method: one for method, one in methods.items()
                         if can_run(one, task) and is_compared(run, method, task)}
-            for draw, scene in enumerate(scenes(task, name) if runnable else ()):
-                if run.profile == "quick":
-                    scene = with_(scene, steps=SHORT)
+            for draw, scene in enumerate(scenes_of(run, task, name) if runnable else ()):
                 makers = [*map(run_of_laws, runnable.values())]
                 compared = run.cached(f"{task}.{name}.{draw}",
                                       partial(compare, scene, makers, goes_on))
                 rows += [ErrorRow(method, name, task, draw, *ComparedError(*one))
                          for method, one in zip(runnable, compared, strict=True)]
     return rows
+
+
+def scenes_of(run, task, name):
+    """Return the scenes of a task at a run's profile; at quick the start of the first."""
+    if run.profile == "quick":
+        return [with_(scenes(task, name)[0], steps=SHORT)]
+    return scenes(task, name)
 
 
 def run_of_laws(laws):

@@ -34,11 +34,11 @@ COLUMNS = ("scene", "latent", "value", "samples", "displacement", "stress")
 NEAREST = 0         # samples of the nearest states, which are no run
 
 
-def shear():
-    """Return the study of the block with several amplitudes."""
+def shear(steps=None):
+    """Return the study of the block with several amplitudes; 500 steps are half a period."""
     return NsfStudy("nsf_shear", "fixed.top.motion.translation.amplitude[0]", (0.02, 0.03, 0.04),
                     (0.025, 0.035), Sizes(r=4, modes=20, tau=40, C=20, smoothing=1e-2), 40,
-                    follows=False, every=15)
+                    follows=False, steps=steps, every=15)
 
 
 @experiment("nsf.memory", title="NSF: latent coordinates of position and stress together",
@@ -60,9 +60,9 @@ def memory(run):
 
 def studies(run):
     """{name: study} at a run's profile."""
-    column = run.choose(quick=partial(sand, 3, 4), standard=partial(sand, 2, 8))()
+    column = run.choose(quick=partial(sand, 4, 4), standard=partial(sand, 2, 8))()
     sizes = column.sizes._replace(smoothing=1e-2)
-    return {"shear": shear(),
+    return {"shear": shear(run.choose(quick=750, standard=None)),
             "sand": column._replace(follows=False, test=column.test[1:3], sizes=sizes)}
 
 

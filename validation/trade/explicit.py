@@ -102,7 +102,7 @@ def reference_sinking(setting):
 
 
 @experiment("trade.explicit.cantilever", title="Explicit MPM: swing of a cantilever against cost",
-            profiles=("quick", "standard"), budget={"quick": 15, "standard": 900})
+            profiles=("quick", "standard"), budget={"quick": 4, "standard": 900})
 def cantilever(run):
     """Vary one knob at a time from the default, against a finer grid of the default."""
     levels, fine, per = run.choose(quick=(QUICK, 48, 2), standard=(STANDARD, 192, 3))

@@ -41,7 +41,7 @@ POINT_FIELDS = SolvePoint._fields
 
 
 @experiment("trade.hot.bar", title="HOT at equal error: one step of the twisted bar",
-            profiles=("quick", "standard"), budget={"quick": 20, "standard": 900})
+            profiles=("quick", "standard"), budget={"quick": 10, "standard": 900})
 def equal_error(run):
     """Ladder of tolerances, times at equal error, and errors at equal tolerance."""
     dx, steps = run.choose(quick=(0.03, 3), standard=(0.02, 6))

@@ -40,7 +40,7 @@ class TimedStep(NamedTuple):
     environment: str
     factor: float       # of the trained step
     cpu: float          # of the run [s]
-    frames_error: float        # beside the true laws with the trained step [m^2]
+    error: float        # beside the true laws with the trained step [m^2]
     true_cpu: float     # of the true laws with this step [s]
     true_error: float   # ... [m^2]
 
@@ -139,10 +139,10 @@ def time_step(run):
     for name in run.choose(quick=NAMES[:1], standard=NAMES):
         rows += time_steps(name, FACTORS[run.profile],
                          run.choose(quick=SHORT, standard=environment(name).steps))
-    best = {name: iter(front([row.cpu for row in own], [row.frames_error for row in own]))
+    best = {name: iter(front([row.cpu for row in own], [row.error for row in own]))
             for name in NAMES for own in [[row for row in rows if row.environment == name]]}
     for row in rows:
-        run.record(f"trade.nclaw.dt.{row.environment}.{row.factor:g}", row.frames_error, unit="m^2",
+        run.record(f"trade.nclaw.dt.{row.environment}.{row.factor:g}", row.error, unit="m^2",
                    comparator="info", scale="1000 particles", note=f"{row.cpu:.3g} CPU s a run; "
                    f"the true laws with this step {row.true_cpu:.3g} CPU s, "
                    f"{row.true_error:.3g} m^2")

@@ -21,7 +21,7 @@ from .front import front
 
 COUNTS = {"quick": (10, 50), "standard": (5, 10, 20, 30, 50, 100, 200, 400)}
 CELLS = "cells"         # the points of so many
-DRAWS = {"quick": 2, "standard": 5}
+DRAWS = {"quick": 1, "standard": 5}
 WEIGHTED = {"random": False, "cubature": True, CELLS: True}     # kinds of samples
 DESCRIPTIONS = {"random": "samples, random", "cubature": "samples, cubature",
         CELLS: "cells, cubature of their points"}

@@ -72,7 +72,7 @@ def implicit(method="hot", **changes):
 
 
 @experiment("verification.implicit", title="Implicit steps: order in time, energy, one minimiser",
-            profiles=("quick", "standard"), budget={"quick": 25, "standard": 90})
+            profiles=("quick", "standard"), budget={"quick": 45, "standard": 90})
 def implicit_steps(run):
     """Record errors over time steps, energies, and the end states of all methods."""
     counts = run.choose(quick=(40, 80, 160), standard=(40, 80, 160, 320, 640))

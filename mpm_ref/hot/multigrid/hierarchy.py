@@ -6,6 +6,7 @@ products (HOT-eq6). Held directions are masked out of every prolongation, so tha
 get the conditions through the product alone and no identity rows leak into them (HOT-bc).
 """
 
+from contextlib import nullcontext
 from functools import partial
 from itertools import zip_longest
 from typing import NamedTuple
@@ -122,15 +123,22 @@ class Hierarchy:
         self.direct, self.D_inv = coarsest_solver(levels[-1], choices)
         self.iterations = 0           # of the coarsest CG, over all cycles
 
-    def cycle(self, b):
-        """u (n, d), roughly A^+ b, of b (n, d): one V-cycle from zero (HOT-alg2)."""
+    def cycle(self, b, on_coarsest=nullcontext):
+        """u (n, d), roughly A^+ b, of b (n, d): one V-cycle from zero (HOT-alg2).
+
+        The coarsest level is solved in the context that on_coarsest() returns.
+        """
         load = b.reshape(-1)
         for level in self.levels[:-1]:
             load = level.P.T @ load
+
+        def solve(r):
+            with on_coarsest():
+                return self.coarsest(r, load)
+
         flat = np.array(b, dtype=float).reshape(-1)
-        u = v_cycle(self.levels, self.smoothers, flat, lambda r: self.coarsest(r, load),
-                    self.choices.sweeps)
-        return u.reshape(b.shape)
+        return v_cycle(self.levels, self.smoothers, flat, solve, self.choices.sweeps).reshape(
+            b.shape)
 
     def coarsest(self, b, load):
         """The last level's u (m d,) of its b (m d,), in a cycle for `load`, restricted (m d,)."""

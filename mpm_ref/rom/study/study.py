@@ -183,8 +183,8 @@ def base_scene(tables, folder, scenes, frame_spacing=every_step):
     if not path.is_file():
         path = scenes.get(tables.scene)
     if path is None:
-        raise SceneError(f"scene = {tables.scene!r}: there is no such file, nor a shipped scene of "
-                         f"that name; shipped scenes: {', '.join(scenes) or 'none'}")
+        raise SceneError(f"scene = {tables.scene!r}: there is no such file, nor a bundled scene of "
+                         f"that name; bundled scenes: {', '.join(scenes) or 'none'}")
     base = scene.load(path)
     with errors_of("set"):
         changes = flat(tables.overrides)

@@ -3,6 +3,7 @@
 import os
 from types import MappingProxyType
 
+from validation.common import parallel
 from validation.common.parallel import experiment_of, run_side_by_side
 from validation.common.registry import Experiment, discover
 from validation.common.results import ProfileResults
@@ -74,3 +75,10 @@ def test_process_that_dies_is_a_failure(tmp_path, capsys):
     failed = run_side_by_side(toys("dies"), RunSetting("quick", tmp_path), 1, toy)
     assert failed == ["verification.dies"]
     assert "its process ended" in capsys.readouterr().err
+
+
+def test_processes_are_replaced_after_some_experiments(tmp_path, monkeypatch):
+    """Their memory is free again, and the death of one fails only experiments of its pool."""
+    monkeypatch.setattr(parallel, "MOST", 1)
+    failed = run_side_by_side(toys("dies", "fall"), RunSetting("quick", tmp_path), 1, toy)
+    assert failed == ["verification.dies"]

@@ -34,7 +34,7 @@ def test_every_scene_has_its_sizes():
 
 
 @pytest.mark.parametrize("name", SIZES)
-def test_scene_is_shipped_at_its_quick_size(name):
+def test_scene_is_bundled_at_its_quick_size(name):
     assert sized(name, "quick") == catalogue_scene(name)
     assert 3000 <= count(sized(name, "quick")) <= 6000
     assert 15_000 <= count(sized(name, "standard")) <= 60_000

@@ -19,12 +19,16 @@ def records(folder):
             if r.target != "nsf.settings"}
 
 
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    return records(tmp_path_factory.mktemp("settings"))
+
+
 def misses(found):
     return {target for target, r in found.items() if r.verdict == "miss"}
 
 
-def test_settings_are_the_printed_ones(tmp_path):
-    found = records(tmp_path)
+def test_settings_are_the_printed_ones(found):
     assert misses(found) == STAND_INS
     assert all(found[target].note for target in STAND_INS)
     for name in settings.STUDIES:
@@ -40,8 +44,7 @@ def test_stand_ins_have_nearly_the_printed_number_of_particles():
         assert ours == pytest.approx(paper.value, rel=1e-3)
 
 
-def test_studies_and_networks_are_the_printed_ones(tmp_path):
-    found = records(tmp_path)
+def test_studies_and_networks_are_the_printed_ones(found):
     for name in settings.STUDIES:
         assert {f"nsf.table1.{name}.r", f"nsf.appA.{name}.train", f"nsf.table1.{name}.mlp.h.width"
                 } <= found.keys()

@@ -43,6 +43,7 @@ def results(one, tmp_path, monkeypatch):
 
 def test_each_kind_of_samples_is_run_and_all_particles(one, results, monkeypatch):
     monkeypatch.setattr(nsf, "COUNTS", {"quick": (5, 30)})
+    monkeypatch.setattr(nsf, "DRAWS", {"quick": 2})
     found = results(nsf.samples_experiment)
     table, n = found.table("trade.nsf.samples", "samples"), len(one.fields.X)
     assert set(zip(table["fields"], table["samples"], table["draw"], strict=True)) == {

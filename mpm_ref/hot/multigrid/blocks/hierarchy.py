@@ -1,5 +1,6 @@
 """The V-cycle on block kernels: the tested twin of the one on SciPy matrices in `multigrid`."""
 
+from contextlib import nullcontext
 from functools import partial
 from itertools import zip_longest
 from typing import NamedTuple
@@ -138,14 +139,18 @@ class BlockHierarchy:
         self.coarse = None if self.direct else planes_of(levels[-1].blocks)
         self.iterations = 0           # of the coarsest CG, over all cycles
 
-    def cycle(self, b):
-        """u (n, d), roughly A^+ b, of b (n, d): one V-cycle from zero (HOT-alg2)."""
+    def cycle(self, b, on_coarsest=nullcontext):
+        """u (n, d), roughly A^+ b, of b (n, d): one V-cycle from zero (HOT-alg2).
+
+        The coarsest level is solved in the context that on_coarsest() returns.
+        """
         b = np.ascontiguousarray(b, dtype=float)
         sweeps, rhs = self.choices.sweeps, [b]
         for level, smooth in zip(self.levels, self.smoothers):
             _, r = smooth.before(rhs[-1], sweeps)
             rhs.append(restrict(level.transfer, r))
-        u = self.coarsest(rhs.pop(), b)
+        with on_coarsest():
+            u = self.coarsest(rhs.pop(), b)
         for level, smooth in zip(self.levels[-2::-1], self.smoothers[::-1]):
             u = smooth.after(rhs.pop(), prolong(level.transfer, u), sweeps)
         return u
