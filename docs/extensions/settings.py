@@ -9,8 +9,9 @@ LIMIT = 0.01            # error that counts as reached
 STABLE = 1.01          # time step over the stable one up to which it counts as stable
 BOX = 1.0               # [m] side of the box in which NCLaw's bodies move
 METHODS = ("hot", "hot-plus", "lbfgs-h", "pn-pcg-mf", "pn-mgpcg")
-CHOICES = {"default": "base (cfl about 0.6)", "dx": "grid", "dt": "time step", "particles": "particles",
-           "transfer": "transfer", "degree": "spline", "sampling": "sampling"}
+CHOICES = {"default": "base (cfl about 0.6)", "dx": "grid", "dt": "time step",
+           "particles": "particles", "transfer": "transfer", "degree": "spline",
+           "sampling": "sampling"}
 SCENES = {"mms": "manufactured solution", "cantilever": "cantilever"}
 SAMPLES = {"random": "random", "cubature": "weighted",
            "cells": "weighted, in few cells"}
