@@ -19,7 +19,7 @@ from .materials import Material
 class Response(NamedTuple):
     """Energy and stresses of N points."""
 
-    psi: np.ndarray     # (N,)       energy per rest volume [J/m^d]
+    psi: np.ndarray     # (N,)       energy per rest volume [J/m^3]
     P: np.ndarray       # (N, d, d)  first Piola-Kirchhoff stress [Pa]
     tau: np.ndarray     # (N, d, d)  Kirchhoff stress P F^T [Pa]
 

@@ -13,7 +13,7 @@ from .core.tensor import mat
 
 
 class Energy(NamedTuple):
-    """Mechanical energy of bodies [J] (per unit thickness in 2D)."""
+    """Mechanical energy of bodies [J]; in 2D of a slice 1 m thick."""
 
     kinetic: float      # sum_p m_p |v_p|^2 / 2, and of the affine motion where C is carried
     elastic: float      # sum_p V0_p psi(F_p)

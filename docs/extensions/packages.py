@@ -17,6 +17,7 @@ MAPS = {"hot": "How HOT works: ../../explanation/hot.md",
         "nclaw": "How NCLaw works: ../../explanation/nclaw.md"}
 CODE = re.compile(r"(?<!`)`([^`\n]+)`(?!`)")
 KEPT = re.compile(r"(^```.*?^```|^#.*?$)", re.MULTILINE | re.DOTALL)      # code and headings
+LINK = re.compile(r"\[`?([^`\]\n]+)`?\]\([\w./]+\.(?:py|md)\)")     # of a README on a Git host
 HEADING = re.compile(r"^# .*\n", re.MULTILINE)
 
 
@@ -42,7 +43,7 @@ def package_page(name, links):
 
 def with_links(text, package, page):
     """Return Markdown with its code spans as links, from a page of the site."""
-    parts = KEPT.split(text)
+    parts = KEPT.split(LINK.sub(r"`\1`", text))
     parts[::2] = (CODE.sub(lambda match: linked(match[1], package, page), part)
                   for part in parts[::2])
     return "".join(parts)

@@ -15,7 +15,7 @@ tau is linear in the moduli of every law: d tau / d mu is the tau of mu = 1 and 
 
 from .jit import by_type
 
-psi = by_type("psi")                      # (F, law) -> energy per rest volume [J/m^d]
+psi = by_type("psi")                      # (F, law) -> energy per rest volume [J/m^3]
 pk1 = by_type("pk1")                      # (F, law) -> P = dpsi/dF
 kirchhoff = by_type("kirchhoff")          # (F, law) -> tau = P F^T
 dpk1 = by_type("dpk1")                    # (F, dF, law) -> dP = (d2psi/dF2) : dF

@@ -5,8 +5,8 @@
     kappa_i = xi_i ell dt,    ell = 2 d (2 dx)^(d-1)                characteristic impulse [kg m/s]
     g^_i    = g_i / kappa_i,    residual = ||g^||_2 / sqrt(n)       without unit       (HOT-eq9)
 
-ell is the surface of the cube of side 2 dx about a node: 24 dx^2; in 2D the perimeter 8 dx, and
-impulses are per thickness [kg/s]. n counts all nodes with mass, held ones too.
+ell is the surface of the cube of side 2 dx about a node: 24 dx^2; in 2D the perimeter 8 dx, times
+the 1 m of thickness. n counts all nodes with mass, held ones too.
 """
 
 from math import sqrt
@@ -108,6 +108,6 @@ def nodal_stiffness(bodies, unknowns, stencil):
 
 
 def characteristic_norms(bodies, unknowns, stencil, dt):
-    """kappa_i (n,) [kg m/s; kg/s in 2D] of every unknown node, for a step dt [s] (HOT-eq9)."""
+    """kappa_i (n,) [kg m/s] of every unknown node, for a step dt [s] (HOT-eq9)."""
     ell = surface(unknowns.dx, unknowns.number.ndim)
     return nodal_stiffness(bodies, unknowns, stencil) * ell * dt

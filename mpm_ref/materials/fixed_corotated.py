@@ -48,7 +48,7 @@ def units(law):
 
 @kernel
 def psi(F, law):
-    """Return the energy per rest volume [J/m^d]."""
+    """Return the energy per rest volume [J/m^3]."""
     D = mlin(1.0, F, -1.0, rotation(F))
     return law.mu * inner(D, D) + fluid.psi(F, law)
 

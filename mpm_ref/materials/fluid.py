@@ -49,13 +49,13 @@ def units(law):
 
 @kernel
 def psi(F, law):
-    """Return the energy per rest volume [J/m^d]."""
+    """Return the energy per rest volume [J/m^3]."""
     return psi_volume(det(F), law)
 
 
 @kernel
 def psi_volume(J, law):
-    """Return the energy per rest volume [J/m^d] of the volume ratio J."""
+    """Return the energy per rest volume [J/m^3] of the volume ratio J."""
     return 0.5 * law.lam * (J - 1.0) * (J - 1.0)
 
 

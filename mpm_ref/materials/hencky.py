@@ -48,7 +48,7 @@ def units(law):
 
 @kernel
 def psi(F, law):
-    """Return the energy per rest volume [J/m^d]; inf unless det F > 0."""
+    """Return the energy per rest volume [J/m^3]; inf unless det F > 0."""
     _, s, _, _ = svd(F)
     if not s[len(s) - 1] > 0.0:
         return inf

@@ -61,7 +61,7 @@ def units(law):
 
 @kernel
 def psi(F, law):
-    """Return the energy per rest volume [J/m^d]; inf unless det F > 0."""
+    """Return the energy per rest volume [J/m^3]; inf unless det F > 0."""
     J = det(F)
     if not J > 0.0:
         return inf

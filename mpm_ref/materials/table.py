@@ -86,7 +86,7 @@ class Material(NamedTuple):
 
     def wave_speed(self, rho):
         """Return the speed of the compression wave at rest [m/s], for the density at rest
-        [kg/m^d].
+        [kg/m^3].
         """
         return sqrt(stiffness(self.law) / rho)
 

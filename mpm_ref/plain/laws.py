@@ -1,7 +1,7 @@
 """Isotropic elastic laws as functions of the principal stretches.
 
 F = U diag(s) V^T has the principal stretches s (N, d) and the volume ratio J = det F = prod_k s_k.
-An isotropic law is an energy density psi(s) [J/m^d of rest volume]. Its Kirchhoff stress is
+An isotropic law is an energy density psi(s) [J/m^3 of rest volume]. Its Kirchhoff stress is
 
     tau = U diag(tau_1 .. tau_d) U^T,      tau_k = s_k dpsi/ds_k  [Pa]
 
@@ -66,13 +66,13 @@ def volume(s):
 
 
 def energy_and_stress(s, law):
-    """Return psi (N,) [J/m^d] and the principal Kirchhoff stresses tau_k (N, d) [Pa] of a law."""
+    """Return psi (N,) [J/m^3] and the principal Kirchhoff stresses tau_k (N, d) [Pa] of a law."""
     psi, tau = LAWS[type(law).__name__](s, *map(s.dtype.type, law))
     return psi[:, 0], tau
 
 
 def energy(F, law):
-    """Return psi (N,) [J/m^d] of F (N, d, d); of a fluid, which carries J alone, of J (N,)."""
+    """Return psi (N,) [J/m^3] of F (N, d, d); of a fluid, which carries J alone, of J (N,)."""
     return energy_and_stress(F[:, None] if F.ndim == 1 else svd(F)[1], law)[0]
 
 

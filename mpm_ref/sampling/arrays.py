@@ -31,7 +31,7 @@ QUANTITIES = {
     "J": Quantity(0, "volume ratios det F [1]", positive=True),
     "m": Quantity(0, "masses [kg]", positive=True),
     "V0": Quantity(0, "volumes at rest [m^d]", positive=True),
-    "density": Quantity(0, "densities at rest [kg/m^d]", positive=True),
+    "density": Quantity(0, "densities at rest [kg/m^3]", positive=True),
     "y": Quantity(0, "yield stresses [Pa]"),
     "body": Quantity(0, "numbers of bodies"),
 }

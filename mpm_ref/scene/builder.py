@@ -146,13 +146,13 @@ def _particles_of(scene, record, material, where):
 def masses(a, density):
     """Return masses [kg] and volumes at rest [m^d] of particles from two of m, V0 and the density.
 
-    density: a number, or None [kg/m^d]. Raises ValueError unless two of m, V0 and the density are
+    density: a number, or None [kg/m^3]. Raises ValueError unless two of m, V0 and the density are
     given.
     """
     given = [name for name in ("m", "V0", "density") if name in a]
     given += ["density"] * (density is not None)
     if len(given) != 2 or given[0] == given[1]:
-        raise ValueError(f"given of m [kg], V0 [m^d] and density [kg/m^d]: "
+        raise ValueError(f"given of m [kg], V0 [m^d] and density [kg/m^3]: "
                          f"{', '.join(given) or 'none'}; expected two")
     density = a.get("density", density)
     return (a["m"] if "m" in a else density * a["V0"],

@@ -35,7 +35,7 @@ def problem_from_arrays(bodies, dx, **keys):
 
     bodies: {name: dict} with the `material` as in a scene and the arrays of N particles in d
     dimensions: x (N, d) [m]; two of m [kg], V0 (volume at rest [m^d]) and density (at rest
-    [kg/m^d], also as one number), each (N,); and any of v (N, d) [m/s], C (N, d, d) (affine
+    [kg/m^3], also as one number), each (N,); and any of v (N, d) [m/s], C (N, d, d) (affine
     velocity field [1/s]), F (N, d, d), or J = det F (N,) of a fluid, and the yield stress y (N,)
     [Pa]. Missing ones are those of undeformed particles at rest; `velocity`, as in a scene, stands
     for v. `offset` (d,) [m] is added to x: nodes lie at whole multiples of dx, so that a grid with

@@ -173,7 +173,7 @@ class Body(Record):
     shape: Shape | None = None
     sampling: Samplings = Regular()
     particles: Arrays | None = None
-    density: Positive | None = None             # at rest [kg/m^d]
+    density: Positive | None = None             # at rest [kg/m^3]
     velocity: Velocity = Velocity()
 
     def __post_init__(self):

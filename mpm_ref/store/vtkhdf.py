@@ -104,7 +104,7 @@ def _steps(root, time, count, names):
 
 
 def export_grid(results, out):
-    """Write nodal density [kg/m^d] and velocity [m/s] of all frames of `Results` to `out`.
+    """Write nodal density [kg/m^3] and velocity [m/s] of all frames of `Results` to `out`.
 
     Raises `NotWritten`, and `BadResults` without a frame or if v is not stored.
     """

@@ -82,6 +82,15 @@ def test_maps_of_packages_link_to_the_code():
         assert not [link for link in links if not exists(ROOT, link)]
 
 
+def test_links_in_the_readmes_of_packages_lead_to_files_and_to_pages():
+    for name in packages.MAPS:
+        folder = ROOT / "mpm_ref" / name
+        links = re.findall(r"\]\(([^)]+)\)", (folder / "README.md").read_text(encoding="utf-8"))
+        assert len(links) > 10
+        assert not [link for link in links if not (folder / link).is_file()]
+        assert ".py)" not in packages.pages()[f"reference/packages/{name}.md"]
+
+
 def test_ids_of_equations_become_links():
     pytest.importorskip("sphinx")
     from docutils import nodes

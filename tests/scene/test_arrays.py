@@ -139,7 +139,7 @@ def one(value, shape=(N,)):
     ({"m": np.ones(N, dtype=bool)}, "type bool: expected real numbers"),
     ({"m": np.full(N, "a")}, "expected real numbers"),
     ({"body": np.ones(N)}, "the array body has type float64: expected whole numbers"),
-    ({"V0": None}, r"given of m \[kg\], V0 \[m\^d\] and density \[kg/m\^d\]: m; expected two"),
+    ({"V0": None}, r"given of m \[kg\], V0 \[m\^d\] and density \[kg/m\^3\]: m; expected two"),
     ({"J": np.ones(N)}, "the array F is missing"),
     ({"x": np.full((N, 2), None)}, "cannot be read|allow_pickle|Object arrays"),
 ])

@@ -1,5 +1,6 @@
 """Problems from arrays in memory, and the code of the how-to guides on arrays and additions."""
 
+import contextlib
 import re
 import runpy
 import sys
@@ -14,6 +15,7 @@ from mpm_ref.materials import FLOWS, LAWS
 from mpm_ref.scene import SceneError, Sphere, Walls, build, loads, problem_from_arrays
 from mpm_ref.simulate import simulate
 from mpm_ref.store.manifest import scene_hash
+from mpm_ref.store.results import Results
 
 pytestmark = pytest.mark.slow
 
@@ -41,7 +43,8 @@ def names_of(page, folder):
     text = (PAGES / f"{page}.md").read_text(encoding="utf-8")
     file = folder.mktemp("page") / f"{page.replace('-', '_')}.py"
     file.write_text("\n".join(re.findall(r"```python\n(.*?)```", text, re.DOTALL)))
-    return runpy.run_path(str(file), run_name="__main__")
+    with contextlib.chdir(file.parent):             # the code of a page may write files
+        return runpy.run_path(str(file), run_name="__main__") | {"folder": file.parent}
 
 
 @pytest.fixture(scope="module")
@@ -74,6 +77,13 @@ def additions_page(tmp_path_factory):
 def test_the_code_on_own_arrays_runs(arrays_page):
     assert arrays_page["frame"].t == pytest.approx(0.05)
     assert arrays_page["t"] == pytest.approx(4.5e-4)
+
+
+def test_a_run_of_arrays_is_stored_in_their_order(arrays_page):
+    assert arrays_page["outcome"].why == "finished"
+    with Results(arrays_page["folder"] / "run.h5") as results:
+        assert len(results) == 6
+        assert np.array_equal(results.field("block", "x")[0], arrays_page["x"])
 
 
 def test_laws_without_a_simulation_are_right(arrays_page):
@@ -252,7 +262,7 @@ def test_order_is_restored(arrays):
                          r"masses \[kg\]"),
     ({"F": np.ones((N, 2, 2), dtype=complex)}, r"type complex128: expected real numbers, "
                                                r"deformation gradients \[1\]"),
-    ({"V0": None}, r"given of m \[kg\], V0 \[m\^d\] and density \[kg/m\^d\]: m; expected two"),
+    ({"V0": None}, r"given of m \[kg\], V0 \[m\^d\] and density \[kg/m\^3\]: m; expected two"),
     ({"density": 1.0}, "m, V0, density; expected two"),
     ({"mass": np.ones(N)}, r"unknown key 'mass'; expected material, .* m masses \[kg\]"),
     ({"material": None}, r"body\[0\].material: this key is missing"),

@@ -147,7 +147,7 @@ def record_map(run, name, flow, F):
 
 def apply_return_map(F, flow):
     """Return tau (N, d, d) [Pa] after the return, and the elastic energies before and after it
-    [J/m^d].
+    [J/m^3].
     """
     n, d = F.shape[:2]
     q = particles_at(np.zeros((n, d)), np.zeros((n, d)), np.ones(n), np.ones(n))

@@ -81,7 +81,7 @@ def fall_of_particle(transfer, degree, count, allowed=True):
     return worst[0], end
 
 
-# Two blocks that run into each other, as (E, density) of either [Pa, kg/m^2].
+# Two blocks that run into each other, as (E, density) of either [Pa, kg/m^3].
 PAIRS = {"mass": ((E, RHO), (E, 1e6 * RHO)), "stiffness": ((1e3, RHO), (1e9, RHO))}
 SPEED, GAP = 0.5, 0.02              # [m/s], [m]; matter meets on the grid at a gap of a cell
 

@@ -68,7 +68,7 @@ def mms(run):
              "may be busy: it is informative only.")
 
 
-E, NU, RHO = 1e6, 0.3, 1000.0               # [Pa], 1, [kg/m^2]
+E, NU, RHO = 1e6, 0.3, 1000.0               # [Pa], 1, [kg/m^3]
 LENGTH, HEIGHT, CLAMP = 1.0, 0.25, 0.25     # [m]; the clamp is two cells of the coarsest grid
 GRAVITY = np.array([0.0, -2.0])             # [m/s^2]: the tip goes down by a tenth of the length
 BEAM_LAW = make_law("fixed_corotated", E=E, nu=NU)

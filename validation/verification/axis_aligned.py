@@ -71,7 +71,7 @@ def forcing_by_differences(law, rho0, parameters, X, t):
 
 
 class AxisAligned:
-    """The motion at particles X (N, d) of a law and a density rho0 [kg/m^d].
+    """The motion at particles X (N, d) of a law and a density rho0 [kg/m^3].
 
     amplitude is A [m], c the speed [m/s]; one oscillation takes 2/c seconds.
     """

@@ -2,7 +2,7 @@
 
     v(x, t) = V cos(omega t) sin(beta X),     beta = pi / (2 L),    omega = beta sqrt(E / rho)
 
-L = 25 m, E = 100 Pa, rho = 1 kg/m^2, V = 0.1 m/s. With nu = 0 the fixed corotated law is linear in
+L = 25 m, E = 100 Pa, rho = 1 kg/m^3, V = 0.1 m/s. With nu = 0 the fixed corotated law is linear in
 this motion, P = E (F - 1), so the solution is exact at any amplitude.
 
 The bar is held in two ways: by a sticky wall, and without any wall as one half of a bar from -L to

@@ -40,7 +40,7 @@ from .settle import Pace, settle
 
 E, RHO0 = 1e6, 1000.0
 LAW = FixedCorotated(*lame(E, 0.0))
-EI, EA, GA = E / 12.0, E, 5.0 / 6.0 * LAW.mu        # of a section 1 m high [N m], [N/m], [N/m]
+EI, EA, GA = E / 12.0, E, 5.0 / 6.0 * LAW.mu        # of a section 1 m x 1 m [N m^2], [N], [N]
 SOUND = sqrt(stiffness(LAW) / RHO0)
 GRIP = 2            # cells of the beam behind the wall
 CFL = 0.5
@@ -61,7 +61,7 @@ class Beam(NamedTuple):
 
     @property
     def load(self):
-        """Return the load P [N/m]."""
+        """Return the load P [N]."""
         return self.bend * EI / self.arm**2
 
 
@@ -71,7 +71,7 @@ SMALL, LARGE = Beam(length=8.0, bend=3.0 / 500.0), Beam(length=10.0, bend=2.0)
 def deflected(load, length, EI, EA=inf, GA=inf):
     """Return the places (K, 2) [m] of sections from the clamped end to the loaded one.
 
-    load [N/m], length a [m], EI [N m], EA and GA [N/m].
+    load [N], length a [m], EI [N m^2], EA and GA [N].
 
     Raises ArithmeticError if the solver does not converge.
     """
@@ -91,7 +91,7 @@ def deflected(load, length, EI, EA=inf, GA=inf):
     straight = np.stack([0.0 * S, load * (S - length), S, 0.0 * S])
     solution = solve_bvp(slopes, ends, S, straight, tol=1e-8, max_nodes=20000)
     if not solution.success:
-        raise ArithmeticError(f"the elastica under {load} N/m did not converge: {solution.message}")
+        raise ArithmeticError(f"the elastica under {load} N did not converge: {solution.message}")
     return solution.y[2:].T
 
 

@@ -34,7 +34,7 @@ class EnergyHistory(NamedTuple):
     """The end of a run, and its energy after every step."""
 
     x: np.ndarray           # (N, 2)        positions in the end, in the order of the start [m]
-    energies: np.ndarray    # (steps + 1,)  before and after every step [J/m]
+    energies: np.ndarray    # (steps + 1,)  before and after every step [J]
     missed: list            # reasons of solves that did not converge
 
 

@@ -18,7 +18,7 @@ def lattice(lower, upper, spacing):
 
 
 def body(X, spacing, rho, law, transfer, fluid=False):
-    """Return a body at rest of density rho [kg/m^d] whose particles at X own spacing^d each.
+    """Return a body at rest of density rho [kg/m^3] whose particles at X own spacing^d each.
 
     Each particle has a body force, which is zero at first.
     """

@@ -1,6 +1,6 @@
 """Order of accuracy against the axis-aligned manufactured solution.
 
-The unit square is elastic (E = 1e7 Pa, nu = 0.3, rho0 = 1000 kg/m^2) and moves with A = 0.05 m for
+The unit square is elastic (E = 1e7 Pa, nu = 0.3, rho0 = 1000 kg/m^3) and moves with A = 0.05 m for
 one oscillation. Space repeats by a periodic grid, which is exact. The error is the RMS over the
 particles of the distance to where they should be, the largest over time, divided by A.
 """

@@ -68,7 +68,7 @@ def press(law, cells):
 
 
 class Metered:
-    """Conditions that measure the forces on the matter in the last step [N/m per metre]."""
+    """Conditions that measure the forces on the matter in the last step [N/m of width]."""
 
     moves = True
 

@@ -5,7 +5,7 @@ it balances the weight above, whatever the law: P_xx(X) = -rho0 g (H - X). The f
 ways: as a sticky wall, and without a wall by symmetry, as the middle of a column from -H to H whose
 weight points to its middle everywhere.
 
-*Compaction* of an elastic column [CoombsAugarde2020]: H = 50 m, rho0 = 80 kg/m^2, g = 10 m/s^2,
+*Compaction* of an elastic column [CoombsAugarde2020]: H = 50 m, rho0 = 80 kg/m^3, g = 10 m/s^2,
 nu = 0, and two stiffnesses: E = 1e6 Pa, where the column is compressed by 4 % at its floor and
 particles cross cells, and E = 1e8 Pa, where they do not.
 
@@ -15,7 +15,7 @@ in incompressible water, since dx = J dX:
 
     p = rho0 g (H - X),     x = X - rho0 g (H X - X^2/2) / lam
 
-H = 2 m, rho0 = 1000 kg/m^2; lam is such that sound has 10 times the speed sqrt(2 g H), as
+H = 2 m, rho0 = 1000 kg/m^3; lam is such that sound has 10 times the speed sqrt(2 g H), as
 weakly compressible codes take it: at the floor J = 1 - 1/200.
 """
 
@@ -41,7 +41,7 @@ class Column(NamedTuple):
 
     law: tuple
     height: float       # H at rest [m]
-    rho0: float         # [kg/m^2]
+    rho0: float         # [kg/m^3]
     g: float = 10.0     # [m/s^2]
 
     @property

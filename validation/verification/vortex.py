@@ -1,6 +1,6 @@
 """Order of accuracy against the generalized vortex, and the sign that public codes have wrong.
 
-A ring 0.75 m < R < 1.25 m (E = 1e6 Pa, nu = 0.3, rho0 = 1000 kg/m^2, period 1 s) shears until its
+A ring 0.75 m < R < 1.25 m (E = 1e6 Pa, nu = 0.3, rho0 = 1000 kg/m^3, period 1 s) shears until its
 twist is largest, at half the period. Particles lie on the lattice of the grid's cells. Those within
 four cells of the ring are part of the problem, at rest: they are put back after each step, which is
 the exact motion there, so that no wall is needed.

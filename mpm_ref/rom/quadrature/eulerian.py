@@ -19,7 +19,7 @@ class Eulerian(NamedTuple):
     """Midpoints of the sub-cells around the samples, with the mass of the body there."""
 
     X: np.ndarray       # (n, d) material points, of which samples are drawn [m]
-    rho: float          # density at rest [kg/m^d]
+    rho: float          # density at rest [kg/m^3]
     distance: callable  # X (n, d) -> signed distance from the body's surface at rest [m], negative
                         # inside
     seeds: np.ndarray   # (s, d) material points from which, and from the samples, the search for

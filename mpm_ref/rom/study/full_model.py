@@ -25,7 +25,7 @@ class FullModel(NamedTuple):
 
     @property
     def rho(self):
-        """The density at rest [kg/m^d]."""
+        """The density at rest [kg/m^3]."""
         return float(self.m.sum() / self.V0.sum())
 
     @property
