@@ -17,7 +17,7 @@ MAPS = {"hot": "How HOT works: ../../explanation/hot.md",
         "nclaw": "How NCLaw works: ../../explanation/nclaw.md"}
 CODE = re.compile(r"(?<!`)`([^`\n]+)`(?!`)")
 KEPT = re.compile(r"(^```.*?^```|^#.*?$)", re.MULTILINE | re.DOTALL)      # code and headings
-LINK = re.compile(r"\[`?([^`\]\n]+)`?\]\([\w./]+\.(?:py|md)\)")     # of a README on a Git host
+LINK = re.compile(r"\[`?([^`\]\n]+)`?\]\([\w./-]+\.(?:py|md)\)")     # of a README on a Git host
 HEADING = re.compile(r"^# .*\n", re.MULTILINE)
 
 

@@ -88,7 +88,9 @@ def test_links_in_the_readmes_of_packages_lead_to_files_and_to_pages():
         links = re.findall(r"\]\(([^)]+)\)", (folder / "README.md").read_text(encoding="utf-8"))
         assert len(links) > 10
         assert not [link for link in links if not (folder / link).is_file()]
-        assert ".py)" not in packages.pages()[f"reference/packages/{name}.md"]
+        page = packages.pages()[f"reference/packages/{name}.md"]
+        assert ".py)" not in page
+        assert "../docs/" not in page
 
 
 def test_ids_of_equations_become_links():
