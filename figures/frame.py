@@ -27,9 +27,10 @@ from validation.common.record import write_whole
 
 HERE = Path(__file__).parent
 LETTERS = 18         # of the note on the scale, per inch
+WIDTH = 7.0          # of a figure, at most, without its margins [inch]: text is legible in a page
 STYLE = {
-    "figure.figsize": (6.4, 4.0), "figure.dpi": 100, "savefig.dpi": 130, "savefig.bbox": "tight",
-    "font.size": 10, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
+    "figure.figsize": (6.4, 4.0), "figure.dpi": 100, "savefig.dpi": 180, "savefig.bbox": "tight",
+    "font.size": 9, "axes.titlesize": 9, "legend.fontsize": 8, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
     "grid.color": "#e6e6e6", "lines.linewidth": 1.4, "legend.frameon": False,
 }
 

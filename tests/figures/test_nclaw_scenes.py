@@ -100,7 +100,7 @@ def test_the_dough_is_drawn_half_way_and_at_the_end(tmp_path):
 
 def test_colours_are_distances_from_the_truth_at_that_time():
     x = np.random.default_rng(0).random((3, 30, 3))
-    far = x + fig04c.TOP * np.arange(3)[:, None, None]
+    far = x + 1e-3 * fig04c.TOP * np.arange(3)[:, None, None]
     at = {"block_true": x, "block_dough": far}
     same, end = (fig04c.body_panel(at, ("block", word, 2), "").solid.colour
                  for word in ("true", "dough"))
