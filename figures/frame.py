@@ -135,6 +135,7 @@ def _save(script, name, results):
     with mpl.rc_context(STYLE):
         figure = script.draw(results)
         scale = _scale(script, results)
+        _anchor_legends(figure)
         _sign(figure, scale)
         caption = " ".join([*script.__doc__.split(), *scale.split()])
         about = {"Source": script.NEEDS[0], "Description": caption, "Software": None}
@@ -148,6 +149,13 @@ def _scale(script, results):
     if not hasattr(script, "scale"):
         return ""
     return f"Scale ({results.folder.name}): {script.scale(results)}."
+
+
+def _anchor_legends(figure):
+    """Tie legends to the figure: else a tight bounding box, which has the note, moves them."""
+    for legend in figure.legends:
+        if legend._bbox_to_anchor is None:
+            legend.set_bbox_to_anchor((0.0, 0.0, 1.0, 1.0), figure.transFigure)
 
 
 def _sign(figure, text):

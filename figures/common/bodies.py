@@ -122,7 +122,7 @@ def pictures(contents, view, colour_scale=None, label=""):
     figure, axes = panels(camera, len(contents), view.columns, view.width)
     for ax, panel in zip(axes, contents, strict=True):
         ax.imshow(composite(image(panel.solid, camera), panel.ghost, camera))
-        ax.set_title(panel.title, fontsize=9)
+        ax.set_title(panel.title)
         ax.text(-0.02, 0.5, panel.side, transform=ax.transAxes, rotation=90, ha="right",
                 va="center", ma="center", fontsize=9)
         at, aligned = (0.0, "top") if len(panel.solid.x) else (0.5, "center")

@@ -46,7 +46,7 @@ def states(results, scene, view):
     figure, axes = panels(camera, len(shots), view.columns)
     for ax, k, (solid, prescribed) in zip(axes, shots, layers, strict=True):
         ax.imshow(composite(image(solid, camera), prescribed, camera))
-        ax.set_title(f"t = {history.times[k]:.2f} s", fontsize=9)
+        ax.set_title(f"t = {history.times[k]:.2f} s")
     return finish(figure, axes, colour_scale, view.scalar and view.scalar[2])
 
 

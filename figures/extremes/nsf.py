@@ -11,8 +11,7 @@ import numpy as np
 from mpm_ref.rom.extrapolation import BEYOND
 from validation.extremes.ldm_runs import BAD
 
-from ..common.style import scales, series
-from ..trade.ldm import readable
+from ..common.style import readable, scales, series
 from ..trade.nsf import COLOURS
 
 NEEDS = ["extremes.nsf.beyond"]
@@ -23,7 +22,7 @@ def scale(results):
 
 
 def draw(results):
-    figure, axes = plt.subplots(1, 2, figsize=(9.2, 3.8))
+    figure, axes = plt.subplots(1, 2, figsize=(7.0, 3.8))
     runs(axes[0], results.table(NEEDS[0], "runs"))
     rates(axes[1], results.table(NEEDS[0], "rates"))
     for ax in axes:

@@ -29,7 +29,7 @@ def draw(results):
         ax.set_visible(False)
     for ax, nu in zip(axes.flat, ratios, strict=False):
         panel(ax, {name: a[table["nu"] == nu] for name, a in table.items()})
-        ax.set_title(f"nu = {nu:g}", fontsize=10)
+        ax.set_title(f"nu = {nu:g}")
     for ax in axes[-1]:
         ax.set_xlabel("E [Pa]")
     for ax in axes[:, 0]:

@@ -27,7 +27,7 @@ def draw(results):
             ax.axis("off")
         for ax, k in zip(row, iterations(table, method), strict=False):
             image = panel(ax, table, (table["method"] == method) & (table["iteration"] == k), norm)
-            ax.set_title(f"{label}, iteration {k:.0f}", fontsize=9)
+            ax.set_title(f"{label}, iteration {k:.0f}")
     figure.colorbar(image, ax=axes, shrink=0.8, label="residual of a node")
     figure.draw_without_rendering()         # lays out, so that the scale goes below
     figure.set_layout_engine("none")

@@ -22,7 +22,7 @@ def scale(results):
 
 
 def draw(results):
-    figure, axes = plt.subplots(2, 2, figsize=(8.6, 6.8), sharex="col")
+    figure, axes = plt.subplots(2, 2, figsize=(7.0, 6.8), sharex="col")
     for row, id, title in zip(axes, NEEDS, TITLES, strict=True):
         points = results.table(id, "points")
         for ax, cost, on_front in zip(row, ("cpu", "nbytes"), ("pareto_cpu", "pareto_bytes"),

@@ -6,9 +6,8 @@ are left; 53 is a double, 24 single precision. Runs that broke down are left out
 
 import matplotlib.pyplot as plt
 
-from ..common.style import scales, series
+from ..common.style import readable, scales, series
 from ..nclaw.loss import COLOURS
-from .ldm import readable
 from .nclaw import annotate_points
 
 NEEDS = ["trade.nclaw.dt", "trade.nclaw.digits"]
@@ -20,11 +19,11 @@ def scale(results):
 
 
 def draw(results):
-    figure, axes = plt.subplots(1, 2, figsize=(9.2, 3.8), width_ratios=(3, 2))
+    figure, axes = plt.subplots(1, 2, figsize=(7.0, 3.8), width_ratios=(3, 2))
     steps(axes[0], results.table(NEEDS[0], "steps"))
     digits(axes[1], results.table(NEEDS[1], "digits"))
     for ax, title in zip(axes, TITLES, strict=True):
-        ax.set_title(title, fontsize=9)
+        ax.set_title(title)
         ax.set_ylabel("error [m²]")
         readable(ax.xaxis, (1.0, 2.0, 5.0))
         ax.legend(fontsize=8)
