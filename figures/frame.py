@@ -134,6 +134,7 @@ def _save(script, name, results):
     """Write the PNG, which carries its owner and caption for the report, and the PDF."""
     with mpl.rc_context(STYLE):
         figure = script.draw(results)
+        _check_width(figure)
         scale = _scale(script, results)
         _anchor_legends(figure)
         _sign(figure, scale)
@@ -142,6 +143,14 @@ def _save(script, name, results):
         _write(figure, results.folder / "figures" / f"{name}.png", about)
         _write(figure, results.folder / "figures" / f"{name}.pdf", {"CreationDate": None})
     plt.close(figure)
+
+
+def _check_width(figure):
+    """Raise ValueError for a figure whose text would be too small in a page."""
+    wide = figure.get_figwidth()
+    if wide > WIDTH:
+        raise ValueError(f"the figure is {wide:g} inches wide; expected at most {WIDTH:g}, so that "
+                         "its text is legible in a page: stack its panels")
 
 
 def _scale(script, results):

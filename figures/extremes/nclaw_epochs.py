@@ -30,8 +30,9 @@ def draw(results):
     materials = list(dict.fromkeys(law.split()[0] for law in runs["law"]))
     rows = 1 + -(-len(materials) // COLUMNS)
     figure = plt.figure(figsize=(WIDTH * COLUMNS, HEIGHT * rows), layout="constrained")
-    axes = [figure.add_subplot(rows, COLUMNS, 1 + k) for k in range(len(materials))]
-    axes.append(figure.add_subplot(rows, 1, rows))
+    grid = figure.add_gridspec(rows, COLUMNS)
+    axes = [figure.add_subplot(grid[divmod(k, COLUMNS)]) for k in range(len(materials))]
+    axes.append(figure.add_subplot(grid[-1, :]))
     for name, ax in zip(materials, axes, strict=False):
         epochs(ax, runs, name)
         ax.set_title(f"{name}, beyond the horizon")

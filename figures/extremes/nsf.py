@@ -35,12 +35,13 @@ def draw(results):
 
 
 def runs(ax, table):
-    """Draw a mark for each run that reached its end, with its parameter."""
+    """Draw a mark for each run that reached its end, with the parameter of flagged and bad ones."""
     for (scene,), rows in series(table, ("model",)).items():
         rows = rows & np.isfinite(table["error"])
         x, y = table["beyond"][rows], table["error"][rows] / table["usual"][rows]
         ax.plot(x, y, "o", color=COLOURS[scene], ms=5, fillstyle="none", label=scene)
-        for a, b, value in zip(x, y, table["what"][rows], strict=True):
+        told = (x > BEYOND) | (y > BAD)
+        for a, b, value in zip(x[told], y[told], table["what"][rows][told], strict=True):
             ax.annotate(f"{value:g}", (a, b), fontsize=7, xytext=(4, 3),
                         textcoords="offset points")
     ax.axhline(BAD, color="0.5", lw=1)

@@ -19,7 +19,7 @@ def scale(results):
 def draw(results):
     table = results.table(NEEDS[0], "slice")
     most = max(len(iterations(table, method)) for method in METHODS)
-    figure, axes = plt.subplots(2, most, figsize=(2.2 * most + 0.8, 4.8), squeeze=False,
+    figure, axes = plt.subplots(2, most, figsize=(7.0, 4.2), squeeze=False,
                                 layout="constrained")
     norm = LogNorm(LEAST, table["residual"].max())
     for row, (method, label) in zip(axes, METHODS.items(), strict=True):

@@ -57,7 +57,7 @@ def scatter(ax, points, cost, on_front):
     top = 2.0 * np.nanmax(error[good])
     ax.plot(x[bad], np.full(bad.sum(), top), "x", color="k", ms=6)
     for row, k in enumerate(np.flatnonzero(bad)):
-        ax.annotate(points["end"][k], (x[k], top), xytext=(4, 2 - 8 * (row % 2)),
+        ax.annotate(points["end"][k], (x[k], top), xytext=(4, 4 - 8 * row),
                     textcoords="offset points", fontsize=7)
     ax.set(xscale="log", yscale="log")
     ax.xaxis.set(minor_formatter=NullFormatter(), major_locator=LogLocator(subs=(1.0, 3.0)),
