@@ -30,7 +30,8 @@ LETTERS = 18         # of the note on the scale, per inch
 WIDTH = 7.0          # of a figure, at most, without its margins [inch]: text is legible in a page
 STYLE = {
     "figure.figsize": (6.4, 4.0), "figure.dpi": 100, "savefig.dpi": 180, "savefig.bbox": "tight",
-    "font.size": 9, "axes.titlesize": 9, "legend.fontsize": 8, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
+    "font.size": 9, "axes.titlesize": 9, "legend.fontsize": 8,
+    "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
     "grid.color": "#e6e6e6", "lines.linewidth": 1.4, "legend.frameon": False,
 }
 

@@ -46,7 +46,8 @@ def with_end_times(results, experiment_id, rows):
     for record in results.records(experiment_id):
         count = re.search(r"(\d+) steps", record.scale)
         if count:
-            steps[record.target.removeprefix(f"{experiment_id}.").split(".")[0]] = int(count[1])
+            name = record.target.removeprefix(f"{experiment_id}.").rpartition(".")[0]
+            steps[name.replace(".", "_")] = int(count[1])
     dt = environment("jelly").dt        # the same in all scenes of NCLaw
     return {name: f"{label}\nt = {steps[name] * dt:.3g} s" if name in steps else label
             for name, label in rows.items()}

@@ -61,7 +61,8 @@ def state_of(value):
     """Return what a run's name "2d, E = .., STATE" tells of its state; all else as it is."""
     parts = value.split(", ", 2) if isinstance(value, str) else ()
     if len(parts) == 3:
-        return f"{parts[2]} s" if parts[2].startswith("dt") else parts[2]
+        unit = " s" if parts[2].startswith("dt") else ""
+        return parts[2] + unit
     try:
         return float(value)
     except ValueError:
@@ -86,9 +87,7 @@ def panel(ax, rows, height):
                 continue
             colour = UNSOUND if unsound else STOPPED if converged < solves else CONVERGED
             ax.add_patch(plt.Rectangle((x - 0.5, y - 0.5), 1, 1, fc=colour, ec="white"))
-            failed = f"{solves - converged} of {solves}" if solves > 1 else "stopped"
-            ax.text(x, y, f"{most:g}" if converged == solves else failed, ha="center",
-                    va="center", fontsize=7)
+            ax.text(x, y, cell_text(solves, converged, most), ha="center", va="center", fontsize=7)
     ax.set(xlim=(-0.5, len(methods) - 0.5), ylim=(height - 0.5, -0.5))
     ax.set_xticks(range(len(methods)), [label_of(method) for method in methods], rotation=35,
                   ha="left", rotation_mode="anchor", fontsize=7)
@@ -98,6 +97,13 @@ def panel(ax, rows, height):
     ax.grid(False)
 
 
+def cell_text(solves, converged, most):
+    """Return the most iterations, or how many solves did not converge."""
+    if converged == solves:
+        return f"{most:g}"
+    return f"{solves - converged} of {solves}" if solves > 1 else "stopped"
+
+
 def label_of(method):
     """Return the label of a method."""
     return NEWER[method] if method in NEWER else STYLES[method][0]
@@ -105,8 +111,8 @@ def label_of(method):
 
 def legend(figure):
     """Draw the meaning of the colours under the figure."""
-    words = {CONVERGED: "all converged: most outer iterations", STOPPED: "some stopped, with a reason",
-             UNSOUND: "some ended unsoundly"}
+    words = {CONVERGED: "all converged: most outer iterations",
+             STOPPED: "some stopped, with a reason", UNSOUND: "some ended unsoundly"}
     handles = [plt.Line2D([], [], marker="s", ls="", ms=8, color=colour, label=label)
                for colour, label in words.items()]
     figure.legend(handles=handles, loc="outside lower center", ncols=3)

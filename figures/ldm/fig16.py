@@ -1,5 +1,5 @@
-"""LDM, Figure 16: position error and wall time of reduced runs of the tower, by number of particles;
-markers tell the scheme, colours the number of samples. Lines: real time, and the full model with
+"""LDM, Figure 16: position error and wall time of reduced runs of the tower, by their size; markers
+tell the scheme, colours the number of samples. Lines: real time, and the full model with
 the same transfer and with the fastest there is. A red cross at the top: a run that broke down.
 """
 
@@ -49,11 +49,11 @@ def panel(ax, table, colours):
     """
     for (scheme, points, per_cell, single), rows in series(
             table | scheme_columns(table), ("scheme", "points", "per_cell", "single")).items():
-        mark = label_and_marker(scheme, per_cell)[1]
+        words, mark = label_and_marker(scheme, per_cell)
         good = rows & np.isfinite(table["origin"])
         ax.loglog(table["wall_per_second"][good], 100.0 * table["origin"][good], mark,
                   color=colours[points], ms=6, fillstyle="full" if single else "none",
-                  label=f"_{scheme}, {points:.0f}")
+                  label=f"_{words}, {points:.0f} samples" + ", single" * bool(single))
     broken = ~np.isfinite(table["origin"]) & np.isfinite(table["wall_per_second"])
     mark_broken(ax, table["wall_per_second"][broken], "r")
     row = np.argmax(table["speed_up"])          # of a run that did not break down

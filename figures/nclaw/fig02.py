@@ -8,7 +8,6 @@ import numpy as np
 from matplotlib.colors import to_rgb
 
 from validation.ldm.published_bodies import read
-from validation.nclaw.tasks import SEEDS, time, velocity
 
 from ..common.bodies import (
     GHOST,
@@ -22,7 +21,7 @@ from ..common.bodies import (
     pictures,
     shades,
 )
-from ..common.law_panels import TITLES, available
+from ..common.law_panels import TITLES, available, with_end_times
 from ..common.state_panels import cloud, spacing
 from ..common.style import shared_scale
 
@@ -40,8 +39,8 @@ def scale(results):
 
 def draw(results):
     states, panels = read(results.folder, NEEDS[0]), []
-    rows = {f"{name}_{task}": f"{name}, {label}\nt = {end_of(task, name):.3g} s"
-            for task, label in TASKS.items() for name in NAMES}
+    rows = with_end_times(results, NEEDS[0], {
+        f"{name}_{task}": f"{name}, {label}" for task, label in TASKS.items() for name in NAMES})
     words = available(states, rows, WORDS)
     box = padded_box(np.concatenate([finite(states[f"{row}_{word}"]) for row in rows
                                      for word in SHOWN]), room=0.02)
@@ -52,12 +51,6 @@ def draw(results):
                 side=label if word == words[0] else "", title=title))
     shown = shades(np.zeros(1), "viridis", TOP, BOTTOM)[1]
     return pictures(panels, View(len(words)), shown, "distance from the truth [m]")
-
-
-def end_of(task, name):
-    """Return the time [s] at which the run of a task ends."""
-    scene = time(name) if task == "time" else velocity(name, SEEDS[0])
-    return scene.steps * scene.dt
 
 
 def finite(x):

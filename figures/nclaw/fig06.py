@@ -1,5 +1,4 @@
-"""NCLaw, Figure 6: the training runs of jelly, sand, plasticine and water (from top to bottom).
-"""
+"""NCLaw, Figure 6: the training runs of jelly, sand, plasticine and water (from top to bottom)."""
 
 from validation.ldm.published_bodies import read
 

@@ -10,7 +10,6 @@ from matplotlib.ticker import NullLocator
 
 from ..common.style import legend_below, readable, series, titled_scales
 
-
 NEEDS = ["trade.ldm.split", "trade.ldm.offline"]
 TITLES = ("where the time goes", "when training pays")
 PARTS = {"network": ("network", "0.35", ""),

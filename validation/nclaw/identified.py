@@ -21,8 +21,8 @@ SEEDS = {f"{NAME}-seed-{k}": f"ours.seed-{k}" for k in (1, 2)}
 UNITS = {"P": "Pa^2", "Fnew": "1"}
 STEPS = (*range(1, 20), *range(20, 1000, 20))       # of the table by frame
 FRAME = 9           # in free flight; F of "labeled" is there nearest to print
-CHOSEN = ("not judged: of all frames, this is the one where the error of F of \"labeled\" is nearest "
-          "to the printed one")
+CHOSEN = ("not judged: of all frames, the one where the error of F of \"labeled\" is nearest to "
+          "the printed one")
 COLUMNS = ("step", "t", "method", "P", "Fnew")
 NOTHING = {"P": "no_stress", "Fnew": "unchanged"}
 NOTES = {"P": "of a law that answers 0", "Fnew": "of a law that answers F_trial"}
@@ -46,22 +46,20 @@ def table5(run):
     """
     observed, dt = trajectory(NAME), environment(NAME).dt
     law = build(environment(NAME)).bodies[0].law
-    laws = load_available(run, {**METHODS, **SEEDS}, trained)
-    words = {**METHODS, **SEEDS}
+    laws = {METHODS.get(name) or SEEDS[name]: own
+            for name, own in load_available(run, (*METHODS, *SEEDS), trained).items()}
     whole = with_answers(law, *drawn(observed, dt))
-    record_errors(run, "nclaw.table5", {words[name]: errors(whole, laws[name]) for name in laws
-                                        if name in METHODS},
+    record_errors(run, "nclaw.table5", {word: errors(whole, own) for word, own in laws.items()
+                                        if word not in SEEDS.values()},
                   scale=f"{POINTS} points of the training run, seed {SEED}")
     record_nothing(run, "nclaw.table5", whole)
     frames = {step: with_answers(law, *at_step(observed, dt, step)) for step in STEPS}
-    by_frame = {(step, words[name]): errors(asked, laws[name])
-                for step, asked in frames.items() for name in laws}
+    by_frame = {step: {word: errors(asked, own) for word, own in laws.items()}
+                for step, asked in frames.items()}
     run.table("frames", COLUMNS, [(step, step * dt, word, e["P"], e["Fnew"])
-                                  for (step, word), e in by_frame.items()])
-    record_errors(run, "nclaw.table5.frame", {word: e for (step, word), e in by_frame.items()
-                                              if step == FRAME},
-                  scale=f"all points after {FRAME} steps of the training run, in free flight",
-                  comparator="info", note=CHOSEN)
+                                  for step, found in by_frame.items() for word, e in found.items()])
+    record_errors(run, "nclaw.table5.frame", by_frame[FRAME], comparator="info", note=CHOSEN,
+                  scale=f"all points after {FRAME} steps of the training run, in free flight")
     record_nothing(run, "nclaw.table5.frame", frames[FRAME])
 
 
