@@ -6,6 +6,7 @@ import pytest
 from mpm_ref.materials import Fluid, Hencky, NoFlow, VonMises
 from mpm_ref.materials.learned.weights import LearnedLaws
 from mpm_ref.trajectories import Observed
+from validation.common import targets
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.common.weights_needed import Untrained
@@ -46,7 +47,7 @@ def test_errors_are_of_the_whole_run_of_frames_and_of_doing_nothing(tmp_path, mo
         monkeypatch.setattr(identified, maker, lambda law: law)
     monkeypatch.setattr(identified, "trajectory", lambda name: short_run())
     monkeypatch.setattr(identified, "STEPS", (1, identified.FRAME))
-    assert run_all([identified.table5.experiment], RunSetting("quick", tmp_path)) == []
+    assert run_all([identified.table5.experiment], RunSetting("quick", tmp_path, targets=targets.load())) == []
     results = ProfileResults(tmp_path)
     found = {r.target.removeprefix("nclaw.table5."): r.value
              for r in results.records("nclaw.table5")}
