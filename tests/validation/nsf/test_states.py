@@ -130,8 +130,8 @@ def test_points_that_fly_away_are_left_out(rng):
 
 def test_points_taken_out_in_rows_are_as_far_apart_as_rows():
     """Balls then fill the body; on a whole lattice they are as large as its spacing."""
-    rows = np.stack(np.meshgrid(0.01 * np.arange(9), np.arange(6.0), np.arange(6.0)), -1)
-    assert field_panels.spread(rows.reshape(-1, 3)) == pytest.approx(0.015, rel=0.5)
+    rows = np.stack(np.meshgrid(0.25 * np.arange(20), np.arange(6.0), np.arange(6.0)), -1)
+    assert field_panels.spread(rows.reshape(-1, 3)) == pytest.approx(0.375)     # nearest: 0.25
     lattice = np.stack(np.meshgrid(*3 * [np.arange(6.0)]), -1).reshape(-1, 3)
     assert field_panels.spread(lattice) == pytest.approx(1.0)
 
