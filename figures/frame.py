@@ -27,9 +27,11 @@ from validation.common.record import write_whole
 
 HERE = Path(__file__).parent
 LETTERS = 18         # of the note on the scale, per inch
+WIDTH = 7.0          # of a figure, at most, without its margins [inch]: text is legible in a page
 STYLE = {
-    "figure.figsize": (6.4, 4.0), "figure.dpi": 100, "savefig.dpi": 130, "savefig.bbox": "tight",
-    "font.size": 10, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
+    "figure.figsize": (6.4, 4.0), "figure.dpi": 100, "savefig.dpi": 180, "savefig.bbox": "tight",
+    "font.size": 9, "axes.titlesize": 9, "legend.fontsize": 8,
+    "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
     "grid.color": "#e6e6e6", "lines.linewidth": 1.4, "legend.frameon": False,
 }
 
@@ -133,7 +135,9 @@ def _save(script, name, results):
     """Write the PNG, which carries its owner and caption for the report, and the PDF."""
     with mpl.rc_context(STYLE):
         figure = script.draw(results)
+        _check_width(figure)
         scale = _scale(script, results)
+        _anchor_legends(figure)
         _sign(figure, scale)
         caption = " ".join([*script.__doc__.split(), *scale.split()])
         about = {"Source": script.NEEDS[0], "Description": caption, "Software": None}
@@ -142,11 +146,26 @@ def _save(script, name, results):
     plt.close(figure)
 
 
+def _check_width(figure):
+    """Raise ValueError for a figure whose text would be too small in a page."""
+    wide = figure.get_figwidth()
+    if wide > WIDTH:
+        raise ValueError(f"the figure is {wide:g} inches wide; expected at most {WIDTH:g}, so that "
+                         "its text is legible in a page: stack its panels")
+
+
 def _scale(script, results):
     """Return the sentence on the scale, of a script that has one."""
     if not hasattr(script, "scale"):
         return ""
     return f"Scale ({results.folder.name}): {script.scale(results)}."
+
+
+def _anchor_legends(figure):
+    """Tie legends to the figure: else a tight bounding box, which has the note, moves them."""
+    for legend in figure.legends:
+        if legend._bbox_to_anchor is None:
+            legend.set_bbox_to_anchor((0.0, 0.0, 1.0, 1.0), figure.transFigure)
 
 
 def _sign(figure, text):

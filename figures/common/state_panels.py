@@ -17,7 +17,7 @@ from .style import scales
 
 SOLID, PRESCRIBED = "#d3d6dc", "#8fa3bf"    # of colliders; of prescribed regions, translucent
 OPACITY = 0.2
-PIXELS, WIDTH = 520, 10.0      # of a picture along its longer side; of the figure [inch]
+PIXELS, WIDTH = 520, 7.0       # of a picture along its longer side; of the figure [inch]
 FINENESS = 90       # of colliders: points along the longer side of the view
 
 
@@ -46,7 +46,7 @@ def states(results, scene, view):
     figure, axes = panels(camera, len(shots), view.columns)
     for ax, k, (solid, prescribed) in zip(axes, shots, layers, strict=True):
         ax.imshow(composite(image(solid, camera), prescribed, camera))
-        ax.set_title(f"t = {history.times[k]:.2f} s", fontsize=9)
+        ax.set_title(f"t = {history.times[k]:.2f} s")
     return finish(figure, axes, colour_scale, view.scalar and view.scalar[2])
 
 
@@ -64,7 +64,8 @@ def panels(camera, count, columns, width=WIDTH):
 def finish(figure, axes, colour_scale, label):
     """Add a colour bar for a colour scale, if there is one, and fix the layout of the figure."""
     if colour_scale is not None:
-        figure.colorbar(colour_scale, ax=axes, shrink=0.8, aspect=30, pad=0.01).set_label(label)
+        figure.colorbar(colour_scale, ax=axes, location="bottom", shrink=0.6, aspect=40,
+                        pad=0.02).set_label(label)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
     return figure
@@ -97,8 +98,15 @@ def colouring(history, view):
     field, factor, _ = view.scalar
     values = factor * getattr(history, field)
     top = np.quantile(values[shown_shots(history, view)], 0.95)
-    scale = plt.cm.ScalarMappable(Normalize(0.0, top), view.colours[0])
+    scale = plt.cm.ScalarMappable(Normalize(0.0, top), open_above(view.colours[0]))
     return (lambda k: scale.to_rgba(values[k])[:, :3]), scale
+
+
+def open_above(colours):
+    """Return a colour map by name whose colour bar shows that values may pass its end."""
+    shown = plt.get_cmap(colours).with_extremes()
+    shown.colorbar_extend = "max"
+    return shown
 
 
 def view_box(history, view):

@@ -2,11 +2,13 @@
 
 import numpy as np
 from matplotlib.colors import to_rgb
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 DEGREES = {1: "linear", 2: "quadratic", 3: "cubic"}
 TRANSFERS = {"pic": "C3", "flip": "C1", "apic": "C2", "mls": "C0"}
 OTHERS = ("C4", "C5", "C6", "C8", "C9", "0.5")     # curves that stand for no transfer
 DASHES = {1: ":", 2: "-", 3: "--"}
+PLACES = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)            # of a decade
 MARKERS = {1: "v", 2: "o", 3: "s", 4: "D"}
 
 
@@ -59,6 +61,12 @@ def legend_below(figure, axes, columns=4):
     figure.tight_layout()
     figure.legend(handles.values(), handles.keys(), ncol=columns, fontsize=7, handlelength=3.2,
                   loc="upper center", bbox_to_anchor=(0.5, 0.02))
+
+
+def readable(axis, places=PLACES):
+    """Label a logarithmic axis with plain numbers at some places of each decade."""
+    axis.set(major_locator=LogLocator(subs=places), minor_formatter=NullFormatter(),
+             major_formatter=FuncFormatter(lambda x, _: f"{x:g}"))
 
 
 def series(table, keys):

@@ -28,10 +28,20 @@ def error_rows(ax, table, labels):
     y = np.arange(len(shown))
     ax.plot(table["own"][shown], y, "ko", ms=5, label="on the training run")
     ax.plot(table["thrown"][shown], y, "ko", ms=5, fillstyle="none", label="thrown differently")
+    broken = ~np.isfinite(table["own"][shown]) | ~np.isfinite(table["thrown"][shown])
+    mark_broken(ax, y[broken], "k", upright=False)
     ax.set_yticks(y, [labels[k] for k in shown], fontsize=7)
     ax.set(xscale="log", xlabel="error [m²]")
     ax.xaxis.set_minor_formatter(NullFormatter())
     ax.invert_yaxis()
+
+
+def mark_broken(ax, places, colour, upright=True):
+    """Draw a cross on the upper edge, or the right one, at each place of a run that broke down."""
+    for place in places:
+        at = (place, 1.0) if upright else (1.0, place)
+        transform = ax.get_xaxis_transform() if upright else ax.get_yaxis_transform()
+        ax.plot(*at, "x", color=colour, ms=6, clip_on=False, transform=transform)
 
 
 def legend_outside(figure, axes, columns):

@@ -5,8 +5,9 @@ by rounding). A particle by itself is not damped; a block is, by the filter of i
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.ticker import EngFormatter
 
-from ..common.style import TRANSFERS, scales
+from ..common.style import TRANSFERS, legend_below, scales
 
 NEEDS = ["extremes.explicit.long_run"]
 SHARES = {"f64": 1.0, "f32": 0.45}
@@ -21,7 +22,7 @@ def draw(results):
     names = list(dict.fromkeys(table["run"]))
     parts = [[n for n in names if n.startswith(w)] for w in ("one", "block")]
     parts = [part for part in parts if part]
-    figure, axes = plt.subplots(1, len(parts), figsize=(1.0 + 5.0 * len(parts), 3.6), squeeze=False)
+    figure, axes = plt.subplots(1, len(parts), figsize=(7.0, 3.2), squeeze=False)
     for ax, part in zip(axes[0], parts, strict=True):
         for name in part:
             rows = table["run"] == name
@@ -32,6 +33,6 @@ def draw(results):
         ax.ticklabel_format(useOffset=False)
         if part[0].startswith("block") and np.nanmin(table["kept"]) > 0.0:
             ax.set_yscale("log")
-        ax.legend()
-    figure.tight_layout()
+        ax.xaxis.set_major_formatter(EngFormatter(sep=" "))
+    legend_below(figure, axes[0])
     return figure

@@ -13,9 +13,8 @@ import numpy as np
 from mpm_ref.nclaw.strain_watch import MAX_EXCESS
 from validation.extremes.nclaw_runs import BAD
 
-from ..common.style import scales, series
+from ..common.style import readable, scales, series
 from ..nclaw.loss import COLOURS
-from ..trade.ldm import readable
 
 NEEDS = ["extremes.nclaw.strain", "extremes.nclaw.density", "extremes.nclaw.dt"]
 TRAINED = "as trained"
@@ -28,7 +27,7 @@ def scale(results):
 
 
 def draw(results):
-    figure, axes = plt.subplots(2, 2, figsize=(9.2, 7.4))
+    figure, axes = plt.subplots(2, 2, figsize=(7.0, 7.4))
     strains(axes[0, 0], results.table(NEEDS[0], "runs"))
     rates(axes[0, 1], results.table(NEEDS[0], "rates"))
     for ax, id, what in zip(axes[1], NEEDS[1:], ("density", "length of the step"), strict=True):

@@ -2,7 +2,7 @@
 longer than the horizon of training: as trained, with other steps, thrown differently. A cross is a
 run that lost points, on the upper edge one that broke down. Last: laws learned from faulty
 observations, on the training run (full marks) and thrown differently (open marks), and the range
-of those without faults (grey, by seed); runs that broke down are left out.
+of those without faults (grey, by seed); a cross at the right edge is a run that broke down.
 """
 
 import matplotlib.pyplot as plt
@@ -12,13 +12,13 @@ from validation.nclaw.observation import Observation
 from validation.nclaw.small_trainings import Small
 
 from ..common.style import scales
-from ..common.training_errors import differences, error_rows, legend_outside
+from ..common.training_errors import differences, error_rows, legend_outside, mark_broken
 from .nclaw import TRAINED
 
 NEEDS = ["extremes.nclaw.epochs", "extremes.nclaw.observed"]
 FAULTS = {"gap": "{:g} steps without frames", "outliers": "{:.2g} of the positions are outliers"}
 DENSITY = {"density": "{:g} times the density"}
-COLUMNS, WIDTH, HEIGHT = 3, 4.0, 3.2        # of panels; of a panel [inch]
+COLUMNS, WIDTH, HEIGHT = 2, 3.5, 2.5        # of panels; of a panel [inch]
 
 
 def scale(results):
@@ -28,15 +28,17 @@ def scale(results):
 def draw(results):
     runs = results.table(NEEDS[0], "runs")
     materials = list(dict.fromkeys(law.split()[0] for law in runs["law"]))
-    rows = -(-(1 + len(materials)) // COLUMNS)
+    rows = 1 + -(-len(materials) // COLUMNS)
     figure = plt.figure(figsize=(WIDTH * COLUMNS, HEIGHT * rows), layout="constrained")
-    axes = [figure.add_subplot(rows, COLUMNS, 1 + k) for k in range(1 + len(materials))]
+    grid = figure.add_gridspec(rows, COLUMNS)
+    axes = [figure.add_subplot(grid[divmod(k, COLUMNS)]) for k in range(len(materials))]
+    axes.append(figure.add_subplot(grid[-1, :]))
     for name, ax in zip(materials, axes, strict=False):
         epochs(ax, runs, name)
-        ax.set_title(f"{name}, beyond the horizon", fontsize=9)
+        ax.set_title(f"{name}, beyond the horizon")
     observation_errors(axes[-1], results.table(NEEDS[1], "trainings"))
-    axes[-1].set_title("faulty observations", fontsize=9)
-    return legend_outside(figure, axes, 4)
+    axes[-1].set_title("faulty observations")
+    return legend_outside(figure, axes, 3)
 
 
 def epochs(ax, table, name):
@@ -50,9 +52,7 @@ def epochs(ax, table, name):
         colour, finite = "k" if what == TRAINED else f"C{k}", np.isfinite(y)
         ax.semilogy(x[finite], y[finite], ".-", color=colour, label=what)
         ax.plot(x[finite & lost], y[finite & lost], "x", color=colour, ms=6)
-        for broken in x[~finite]:
-            ax.plot(broken, 1.0, "x", color=colour, ms=6, clip_on=False,
-                    transform=ax.get_xaxis_transform())
+        mark_broken(ax, x[~finite], colour)
     ax.set(xlabel="epoch", ylabel="error [m²]")
 
 

@@ -11,8 +11,7 @@ import numpy as np
 from mpm_ref.rom.extrapolation import BEYOND
 from validation.extremes.ldm_runs import BAD
 
-from ..common.style import scales, series
-from ..trade.ldm import readable
+from ..common.style import readable, scales, series
 from ..trade.nsf import COLOURS
 
 NEEDS = ["extremes.nsf.beyond"]
@@ -23,7 +22,7 @@ def scale(results):
 
 
 def draw(results):
-    figure, axes = plt.subplots(1, 2, figsize=(9.2, 3.8))
+    figure, axes = plt.subplots(1, 2, figsize=(7.0, 3.8))
     runs(axes[0], results.table(NEEDS[0], "runs"))
     rates(axes[1], results.table(NEEDS[0], "rates"))
     for ax in axes:
@@ -36,12 +35,13 @@ def draw(results):
 
 
 def runs(ax, table):
-    """Draw a mark for each run that reached its end, with its parameter."""
+    """Draw a mark for each run that reached its end, with the parameter of flagged and bad ones."""
     for (scene,), rows in series(table, ("model",)).items():
         rows = rows & np.isfinite(table["error"])
         x, y = table["beyond"][rows], table["error"][rows] / table["usual"][rows]
         ax.plot(x, y, "o", color=COLOURS[scene], ms=5, fillstyle="none", label=scene)
-        for a, b, value in zip(x, y, table["what"][rows], strict=True):
+        told = (x > BEYOND) | (y > BAD)
+        for a, b, value in zip(x[told], y[told], table["what"][rows][told], strict=True):
             ax.annotate(f"{value:g}", (a, b), fontsize=7, xytext=(4, 3),
                         textcoords="offset points")
     ax.axhline(BAD, color="0.5", lw=1)

@@ -6,6 +6,7 @@ as all did here.
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ..common.state_panels import finish
 from ..common.style import scales
 
 NEEDS = ["extremes.explicit.map"]
@@ -21,15 +22,15 @@ def scale(results):
 def draw(results):
     table = results.table(NEEDS[0], "runs")
     ratios = np.unique(table["nu"])
-    columns = min(len(ratios), 4)
+    columns = min(len(ratios), 3)
     rows = -(-len(ratios) // columns)
-    figure, axes = plt.subplots(rows, columns, figsize=(1.2 + 2.9 * columns, 0.8 + 2.9 * rows),
-                                sharex=True, sharey=True, squeeze=False)
+    figure, axes = plt.subplots(rows, columns, figsize=(7.0, 0.6 + 2.4 * rows), sharex=True,
+                                sharey=True, squeeze=False, layout="constrained")
     for ax in axes.flat[len(ratios):]:
         ax.set_visible(False)
     for ax, nu in zip(axes.flat, ratios, strict=False):
         panel(ax, {name: a[table["nu"] == nu] for name, a in table.items()})
-        ax.set_title(f"nu = {nu:g}", fontsize=10)
+        ax.set_title(rf"$\nu$ = {nu:g}")
     for ax in axes[-1]:
         ax.set_xlabel("E [Pa]")
     for ax in axes[:, 0]:
@@ -38,10 +39,8 @@ def draw(results):
     handles = [plt.Line2D([], [], marker="s", ls="", color=COLOURS[k], label=ENDS.get(k, k))
                for k in kinds]
     handles.append(plt.Line2D([], [], color="k", label="stable time step"))
-    figure.legend(handles=handles, loc="upper center", ncol=len(handles),
-                  bbox_to_anchor=(0.5, 1.05), fontsize=9)
-    figure.tight_layout()
-    return figure
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    return finish(figure, (), None, "")
 
 
 def panel(ax, runs):
@@ -49,7 +48,7 @@ def panel(ax, runs):
     ax.grid(False)
     for kind, colour in COLOURS.items():
         rows = runs["end"] == kind
-        ax.plot(runs["E"][rows], runs["dt"][rows], "s", color=colour, ms=9)
+        ax.plot(runs["E"][rows], runs["dt"][rows], "s", color=colour, ms=6)
     bound = runs["dt"] / runs["of_bound"]
     order = np.argsort(runs["E"])
     ax.plot(runs["E"][order], bound[order], "k-")

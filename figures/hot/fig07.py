@@ -15,7 +15,7 @@ def scale(results):
 
 def draw(results):
     table = results.table(NEEDS[0], "curves")
-    figure, axes = plt.subplots(1, 2, figsize=(8.0, 3.2), sharey=True, layout="constrained")
+    figure, axes = plt.subplots(1, 2, figsize=(7.0, 3.2), sharey=True, layout="constrained")
     for ax, (short, title) in zip(axes, PANELS.items(), strict=True):
         for level in range(4):
             ax.plot(table["x"], table[f"{short}{level}"], color=SHADES(level / 3.5),

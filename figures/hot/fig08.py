@@ -21,7 +21,7 @@ def scale(results):
 def draw(results):
     table = results.table(NEEDS[0], "levels")
     paper = {record.target: record.paper for record in results.records(NEEDS[0])}
-    figure, axes = plt.subplots(1, 2, figsize=(8.4, 3.4))
+    figure, axes = plt.subplots(1, 2, figsize=(7.0, 3.4))
     for kind, rows in series(table, ("kind",)).items():
         label, color, style = KINDS[kind[0]]
         for ax, name in zip(axes, ("per_row", "nonzeros"), strict=True):

@@ -14,7 +14,8 @@ LABELS = {"gast15": "Gast15", "pn-pcg": "PN-PCG", "pn-pcg-mf": "PN-PCG (MF)",
 
 
 def scale(results):
-    return scales(results, NEEDS[0], ".hot.total")
+    clauses = scales(results, NEEDS[0], ".hot.total").split("; ")
+    return f"{len(clauses)} scenes, the first of {clauses[0]}, the last of {clauses[-1]}"
 
 
 def draw(results):
@@ -22,7 +23,7 @@ def draw(results):
     by_method, places = series(table, ("method",)), {}
     for name in table["scene"]:
         places.setdefault(name, len(places))
-    figure, axes = plt.subplots(2, 1, figsize=(2.4 + 0.9 * len(places), 5.4), sharex=True)
+    figure, axes = plt.subplots(2, 1, figsize=(7.0, 5.4), sharex=True)
     width = 0.9 / len(LABELS)
     for k, (method, label) in enumerate(LABELS.items()):
         rows = by_method[method,]
@@ -33,7 +34,8 @@ def draw(results):
     for ax, title in zip(axes, ("all steps", "worst step"), strict=True):
         ax.set(yscale="log", ylabel=f"CPU time over HOT's,\n{title}")
         ax.axhline(1.0, color="0.4", lw=0.8)
-    axes[1].set_xticks(range(len(places)), [name.replace("_", "\n") for name in places])
+    axes[1].set_xticks(range(len(places)), [name.replace("_", "\n") for name in places],
+                       fontsize=8)
     legend_below(figure, axes, columns=4)
     return figure
 

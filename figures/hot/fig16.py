@@ -20,7 +20,7 @@ def scale(results):
 
 def draw(results):
     table = results.table(NEEDS[0], "iterates")
-    figure, axes = plt.subplots(1, 3, figsize=(11.0, 3.4))
+    figure, axes = plt.subplots(1, 3, figsize=(7.0, 3.4))
     for ax, columns in zip(axes, PANELS, strict=True):
         draw_methods(ax, table, columns, METHODS)
     axes[0].set_xscale("symlog", linthresh=10.0)

@@ -17,11 +17,11 @@ def scale(results):
 
 def draw(results):
     table = results.table(NEEDS[0], "iterates")
-    figure, axes = plt.subplots(2, 2, figsize=(8.4, 6.2))
+    figure, axes = plt.subplots(2, 2, figsize=(7.0, 6.2))
     for row, eps in zip(axes, (EPS, table["eps"].min()), strict=True):
         for ax, x in zip(row, ("iteration", "cpu"), strict=True):
             draw_methods(ax, table, (x, "residual"), METHODS, table["eps"] == eps)
-            ax.set_title(f"tolerance {eps:.0e}", fontsize=9)
+            ax.set_title(f"tolerance {eps:.0e}")
     for ax in axes[1]:
         ax.set_xscale("log")
     legend_below(figure, axes.flat, columns=3)

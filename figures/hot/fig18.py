@@ -19,7 +19,7 @@ def scale(results):
 def draw(results):
     table = results.table(NEEDS[0], "slice")
     most = max(len(iterations(table, method)) for method in METHODS)
-    figure, axes = plt.subplots(2, most, figsize=(2.2 * most + 0.8, 4.8), squeeze=False,
+    figure, axes = plt.subplots(2, most, figsize=(7.0, 4.2), squeeze=False,
                                 layout="constrained")
     norm = LogNorm(LEAST, table["residual"].max())
     for row, (method, label) in zip(axes, METHODS.items(), strict=True):
@@ -27,7 +27,7 @@ def draw(results):
             ax.axis("off")
         for ax, k in zip(row, iterations(table, method), strict=False):
             image = panel(ax, table, (table["method"] == method) & (table["iteration"] == k), norm)
-            ax.set_title(f"{label}, iteration {k:.0f}", fontsize=9)
+            ax.set_title(f"{label}, iteration {k:.0f}")
     figure.colorbar(image, ax=axes, shrink=0.8, label="residual of a node")
     figure.draw_without_rendering()         # lays out, so that the scale goes below
     figure.set_layout_engine("none")

@@ -20,7 +20,7 @@ def scale(results):
 
 def draw(results):
     iterates, costs = (results.table(NEEDS[0], name) for name in ("iterates", "costs"))
-    figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.4))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(7.0, 3.4))
     for method in METHODS:
         label, color, style = STYLES[method]
         rows = iterates["method"] == method

@@ -4,7 +4,7 @@ outer iterations per step, at the paper's tolerance, which is not equal error.
 
 import matplotlib.pyplot as plt
 
-from ..common.style import legend_below, series, shared_scale
+from ..common.style import legend_below, scales, series
 
 NEEDS = ["hot.fig20"]
 METHODS = {"hot": ("HOT", "o-"), "lbfgs-h": ("LBFGS-H", "s-"), "pn-pcg": ("PN-PCG", "^-"),
@@ -12,12 +12,12 @@ METHODS = {"hot": ("HOT", "o-"), "lbfgs-h": ("LBFGS-H", "s-"), "pn-pcg": ("PN-PC
 
 
 def scale(results):
-    return shared_scale(results, NEEDS[0])
+    return scales(results, NEEDS[0], ".E1e5.time")
 
 
 def draw(results):
     table = results.table(NEEDS[0], "costs")
-    figure, axes = plt.subplots(1, 2, figsize=(8.4, 3.4))
+    figure, axes = plt.subplots(1, 2, figsize=(7.0, 3.4))
     by_method = series(table, ("method",))
     for k, (method, (label, style)) in enumerate(METHODS.items()):
         rows = by_method[method,]

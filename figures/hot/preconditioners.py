@@ -4,12 +4,13 @@ Hollow marks are solves that did not converge. Right: the stiff middle on finer 
 """
 
 import matplotlib.pyplot as plt
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from ..common.style import legend_below, series
 
 NEEDS = ["hot.preconditioners"]
 STIFF = 1e9
-LABELS = {"E": "Young's modulus of the middle [Pa]", "iterations": "iterations",
+LABELS = {"E": "E of the middle [Pa]", "iterations": "iterations",
           "ratio": "CPU time over ours", "particles": "particles; middle 1e9 Pa"}
 CASES = {
     "jacobi-block": ("block Jacobi", "0.6", "x-"),
@@ -38,14 +39,18 @@ def draw(results):
     panels = [("E", "iterations", coarse), ("E", "ratio", coarse)]
     if not coarse.all():
         panels.append(("particles", "ratio", table["E"] == STIFF))
-    figure, axes = plt.subplots(1, len(panels), figsize=(3.7 * len(panels), 3.6))
+    figure, axes = plt.subplots(1, len(panels), figsize=(7.0, 3.2))
     for (case,), rows in series(table, ("case",)).items():
         for ax, (x, y, mask) in zip(axes, panels, strict=True):
             if case in CASES:
                 line(ax, table, (x, y), rows & mask)
     for ax, (x, y, _) in zip(axes, panels, strict=True):
         ax.set(xscale="log", yscale="log", xlabel=LABELS[x], ylabel=LABELS[y])
-    legend_below(figure, axes, columns=2 if len(panels) == 2 else 4)
+        ax.xaxis.set(major_locator=LogLocator(numticks=4), minor_formatter=NullFormatter())
+    if len(panels) > 2:
+        places = sorted(set(table["particles"]))
+        axes[2].set_xticks(places, [f"{n / 1000:.0f} 000" for n in places], fontsize=8, rotation=30)
+    legend_below(figure, axes, columns=3)
     return figure
 
 

@@ -22,7 +22,7 @@ def scale(results):
 
 def draw(results):
     states = read(results.folder, NEEDS[0])
-    X, samples, view = states["X"], states["X"][states["samples"]], View(2, 6.4)
+    X, samples, view = states["X"], states["X"][states["samples"]], View(2, width=6.4)
     paint = np.array([to_rgb(COLOURS[k]) for k in np.arange(1, 3) @ states["held"]])
     large = flattened(body(samples, paint, spacing(X), LARGE), view)
     return pictures([Panel(body(X, FULL, spacing(X)), no_balls(), f"all {len(X)} points"),

@@ -21,4 +21,4 @@ def draw(results):
     paint, shown = shades(1000.0 * distance_to(x, X))
     panels = [Panel(body(x[k], paint[k], spacing(X)), ghost(X), f"g = {g:g} m/s²")
               for k, g in enumerate(states["g"])]
-    return pictures(panels, View(3, 9.0), shown, "displacement [mm]")
+    return pictures(panels, View(3), shown, "displacement [mm]")

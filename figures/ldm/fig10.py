@@ -23,11 +23,11 @@ def scale(results):
 def draw(results):
     table = results.table(NEEDS[0], "errors")
     known = [name for name in SCHEMES if name in table["scheme"]]
-    figure, axes = plt.subplots(2, -(-len(known) // 2), figsize=(8.0, 6.4), sharex=True,
+    figure, axes = plt.subplots(2, -(-len(known) // 2), figsize=(7.0, 6.4), sharex=True,
                                 sharey=True, squeeze=False)
     for ax, name in zip(axes.flat, known, strict=False):
         panel(ax, table, name)
-        ax.set_title(SCHEMES[name], fontsize=9)
+        ax.set_title(SCHEMES[name])
     for ax in axes[:, 0]:
         ax.set_ylabel("position error [%]")
     for ax in axes[-1]:

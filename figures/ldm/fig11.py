@@ -25,7 +25,7 @@ def draw(results):
     states = {"before": X, "after, reduced": stored["reduced"], "after, full": stored["full"]}
     panels = [Panel(body(x, chequered(X), spacing(X)), no_balls(), words)
               for words, x in states.items()]
-    return pictures(panels, View(3, 7.0, lift=28.0))
+    return pictures(panels, View(3, lift=28.0))
 
 
 def chequered(X):

@@ -30,4 +30,4 @@ def draw(results):
               Panel(body(states["reduced"], reduced, near), no_balls(),
                     f"(c) reduced, {len(full)} points"),
               Panel(body(full, FULL, near), no_balls(), f"(d) full, {len(full)} points")]
-    return pictures(panels, View(4, 8.0), shown, "distance from (d) [mm]")
+    return pictures(panels, View(4), shown, "distance from (d) [mm]")

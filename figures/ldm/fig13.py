@@ -22,4 +22,4 @@ def draw(results):
     for name, colours in zip(("full", "reduced"), paint, strict=True):
         for x, colour, t in zip(states[name], colours, states["t"], strict=True):
             panels.append(Panel(body(x, colour, spacing(X)), ghost(X), f"{name}, t = {t:.2f} s"))
-    return pictures(panels, View(3, 5.4), shown, "displacement [mm]")
+    return pictures(panels, View(3, width=5.4), shown, "displacement [mm]")

@@ -11,7 +11,7 @@ from ..common.state_panels import spacing
 from ..common.style import shared_scale
 
 NEEDS = ["ldm.fig15"]
-VIEW = View(3, 8.0, turn=45.0, lift=8.0)
+VIEW = View(3, turn=45.0, lift=8.0)
 
 
 def scale(results):

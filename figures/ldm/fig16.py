@@ -1,18 +1,22 @@
-"""LDM, Figure 16: position error and wall time of reduced runs of the tower. Green: real time; red:
-the full model, with the same transfer and (dashed) with the fastest there is. Filled: in single
-precision. Runs that broke down are left out.
+"""LDM, Figure 16: position error and wall time of reduced runs of the tower, by their size; markers
+tell the scheme, colours the number of samples. Lines: real time, and the full model with
+the same transfer and with the fastest there is. A red cross at the top: a run that broke down.
 """
 
 import matplotlib.pyplot as plt
 import numpy as np
 
 from ..common.schemes import MARKS
-from ..common.style import legend_below, series, shared_scale
+from ..common.style import legend_below, readable, series, shared_scale
+from ..common.training_errors import mark_broken
 
 NEEDS = ["ldm.fig16"]
 RESAMPLED = {1: "P", 2: "D"}        # by quadrature points per cell and axis
-DECADE = 10.0**0.5                  # up and down from the middle, at least
+RANGE = 2.0                         # up and down from the middle of errors, at least
 COLOURS = ("C0", "C1", "C4", "C5", "C6")
+WIDTH, HEIGHT = 7.0, 3.0            # of the figure [inch]
+LINES = {"real time": ("C2", "-"), "full model": ("C3", "-"),
+         "full model, fastest transfer": ("C3", "--")}
 
 
 def scale(results):
@@ -22,18 +26,20 @@ def scale(results):
 def draw(results):
     table = results.table(NEEDS[0], "ways")
     sizes = series(table, ("particles",))
-    figure, axes = plt.subplots(1, len(sizes), figsize=(1.6 + 3.2 * len(sizes), 3.8),
-                                squeeze=False, sharey=True)
+    figure, axes = plt.subplots(1, len(sizes), figsize=(WIDTH, HEIGHT), squeeze=False, sharey=True)
     colours = dict(zip(sorted(set(table["points"])), COLOURS, strict=False))
     for ax, ((particles,), rows) in zip(axes[0], sizes.items(), strict=True):
         panel(ax, {name: column[rows] for name, column in table.items()}, colours)
-        ax.set_title(f"{particles:.0f} particles", fontsize=9)
-        ax.set_xlabel("wall time per second of the run [s]")
+        ax.set_title(f"{particles:,.0f} particles".replace(",", " "))
+        readable(ax.xaxis, (1.0,))
+    figure.supxlabel("wall time for a second of the run [s]", fontsize=9)
     axes[0, 0].set_ylabel("position error [%]")
     low, high = axes[0, 0].get_ylim()
     middle = np.sqrt(low * high)
-    axes[0, 0].set_ylim(min(low, middle / DECADE), max(high, middle * DECADE))
-    legend_below(figure, axes[0], columns=3)
+    axes[0, 0].set_ylim(min(low, middle / RANGE), max(high, middle * RANGE))
+    readable(axes[0, 0].yaxis)
+    proxies(axes[0, 0], table, colours)
+    legend_below(figure, axes[0, :1], columns=3)
     return figure
 
 
@@ -46,14 +52,28 @@ def panel(ax, table, colours):
         words, mark = label_and_marker(scheme, per_cell)
         good = rows & np.isfinite(table["origin"])
         ax.loglog(table["wall_per_second"][good], 100.0 * table["origin"][good], mark,
-                  color=colours[points], ms=7, fillstyle="full" if single else "none",
-                  label=f"{words}, {points:.0f} samples" + ", single" * bool(single))
-    ax.axvline(1.0, color="C2", label="real time")
+                  color=colours[points], ms=6, fillstyle="full" if single else "none",
+                  label=f"_{words}, {points:.0f} samples" + ", single" * bool(single))
+    broken = ~np.isfinite(table["origin"]) & np.isfinite(table["wall_per_second"])
+    mark_broken(ax, table["wall_per_second"][broken], "r")
     row = np.argmax(table["speed_up"])          # of a run that did not break down
     full = table["wall_per_second"][row] * table["speed_up"][row]
     fastest = full * table["wall_fastest"][row] / table["wall_full"][row]
-    ax.axvline(full, color="C3", label="full model")
-    ax.axvline(fastest, color="C3", ls="--", label="full model, fastest transfer")
+    for (label, (colour, dashes)), x in zip(LINES.items(), (1.0, full, fastest), strict=True):
+        ax.axvline(x, color=colour, ls=dashes, label=label)
+
+
+def proxies(ax, table, colours):
+    """Add empty curves whose labels say what markers, colours and fillings mean."""
+    columns = table | scheme_columns(table)
+    marks = dict(label_and_marker(scheme, per_cell)
+                 for scheme, per_cell in series(columns, ("scheme", "per_cell")))
+    for label, mark in marks.items():
+        ax.plot([], [], mark, color="k", ms=6, fillstyle="none", label=label)
+    for points, colour in colours.items():
+        ax.plot([], [], "s", color=colour, ms=6, label=f"{points:.0f} samples")
+    if columns["single"].any():
+        ax.plot([], [], "o", color="0.5", ms=6, label="filled: single precision")
 
 
 def scheme_columns(table):

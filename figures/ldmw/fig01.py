@@ -10,7 +10,6 @@ from ..common.state_panels import spacing
 from ..common.style import shared_scale
 
 NEEDS = ["ldmw.fig1"]
-FOR_EACH = 2.4      # width of a picture [inch]
 
 
 def scale(results):
@@ -28,7 +27,7 @@ def draw(results):
             panels.append(Panel(body(x, colour, spacing(X)), ghost(X),
                                poked(*mu) if name == "full" else "", "" if k else name))
     count = len(states["mu"])
-    return pictures(panels, View(count, FOR_EACH * count), shown, "displacement [mm]")
+    return pictures(panels, View(count), shown, "displacement [mm]")
 
 
 def poked(rho, theta, phi):

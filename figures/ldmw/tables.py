@@ -23,10 +23,10 @@ def scale(results):
 
 
 def draw(results):
-    figure, axes = plt.subplots(1, 2, figsize=(8.6, 3.8), sharey=True, width_ratios=(3, 4))
+    figure, axes = plt.subplots(1, 2, figsize=(7.0, 3.8), sharey=True, width_ratios=(3, 4))
     for ax, name, title in zip(axes, NEEDS, TITLES, strict=True):
         panel(ax, {r.target: r for r in results.records(name)}, name)
-        ax.set_title(title, fontsize=9)
+        ax.set_title(title)
     axes[0].set_ylabel("error [%]")
     legend_below(figure, axes, columns=3)
     return figure

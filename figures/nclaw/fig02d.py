@@ -1,6 +1,6 @@
 """NCLaw, Figure 2 (d): a small body on an inclined plane (the floor of the scene, whose gravity is
 turned; here all is turned back, so that gravity points down). From left to right the start, ours,
-laws that thermodynamics admits, the truth. The paper's is of water. Colours: height at the start.
+laws that thermodynamics admits, the truth. The paper's is of water.
 """
 
 import numpy as np
@@ -8,8 +8,8 @@ import numpy as np
 from validation.ldm.published_bodies import read
 from validation.nclaw.tasks import slope
 
-from ..common.bodies import View, pictures
-from ..common.law_panels import comparison_rows
+from ..common.bodies import View
+from ..common.law_panels import comparison_rows, pictures_by_height, with_end_times
 from ..common.splats import Balls
 from ..common.state_panels import join_balls
 from ..common.style import shared_scale
@@ -19,7 +19,7 @@ NAMES = ("water", "jelly", "sand", "plasticine")
 WORDS = ("ours", "admissible")
 FINENESS = 90       # of the floor: points along its longer side
 FLOOR = np.array([0.7, 0.77, 0.86])
-VIEW = View(4, 10.0, turn=60.0, lift=12.0)
+VIEW = View(4, turn=60.0, lift=12.0)
 
 
 def scale(results):
@@ -27,10 +27,11 @@ def scale(results):
 
 
 def draw(results):
-    panels = comparison_rows(read(results.folder, NEEDS[0]), {name: name for name in NAMES}, WORDS)
+    rows = with_end_times(results, NEEDS[0], {name: name for name in NAMES})
+    panels = comparison_rows(read(results.folder, NEEDS[0]), rows, WORDS)
     floor = floor_of(panels)
-    return pictures([panel._replace(solid=turned(join_balls([panel.solid, floor])))
-                     for panel in panels], VIEW)
+    return pictures_by_height([panel._replace(solid=turned(join_balls([panel.solid, floor])))
+                               for panel in panels], VIEW)
 
 
 def turned(balls):

@@ -1,11 +1,11 @@
 """NCLaw, Figure 3: a large body of water, and four toys of jelly; from left to right the start,
-ours at the end, the truth there. Colours: height at the start.
+ours at the end, the truth there.
 """
 
 from validation.ldm.published_bodies import read
 
-from ..common.bodies import View, pictures
-from ..common.law_panels import comparison_rows
+from ..common.bodies import View
+from ..common.law_panels import comparison_rows, pictures_by_height, with_end_times
 from ..common.style import scales
 
 NEEDS = ["nclaw.fig3"]
@@ -17,4 +17,5 @@ def scale(results):
 
 
 def draw(results):
-    return pictures(comparison_rows(read(results.folder, NEEDS[0]), ROWS), View(3, 9.0))
+    rows = with_end_times(results, NEEDS[0], ROWS)
+    return pictures_by_height(comparison_rows(read(results.folder, NEEDS[0]), rows), View(3))

@@ -1,11 +1,16 @@
 """NCLaw, Figures 2 (c), 7 and 8: bodies of task (c); from left to right the start, ours half-way,
-the baseline "neural" there, if it was stored, and the truth. Colours: height at the start.
+the baseline "neural" there, if it was stored, and the truth.
 """
 
 from validation.ldm.published_bodies import read
 
-from ..common.bodies import View, pictures
-from ..common.law_panels import available, comparison_rows
+from ..common.bodies import View
+from ..common.law_panels import (
+    available,
+    comparison_rows,
+    pictures_by_height,
+    with_end_times,
+)
 from ..common.style import shared_scale
 
 NEEDS = ["nclaw.fig7"]
@@ -19,5 +24,5 @@ def scale(results):
 def draw(results):
     states = read(results.folder, NEEDS[0])
     words = available(states, ROWS, ("ours", "neural"))
-    columns = 2 + len(words)
-    return pictures(comparison_rows(states, ROWS, words), View(columns, 3.0 * columns))
+    rows = with_end_times(results, NEEDS[0], ROWS)
+    return pictures_by_height(comparison_rows(states, rows, words), View(2 + len(words)))

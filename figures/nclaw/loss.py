@@ -1,18 +1,25 @@
 """NCLaw: errors in training, mean squared over points, axes and steps, from restarts; horizons grow
-from 25 to 200 steps. On plasticine, where there are others, the inset of section 4.7. A cross: the
-training diverged in the next epoch. "sys-id", which has the right laws, reaches far lower errors.
+from 25 to 200 steps. On plasticine, where there are others, the inset of section 4.7. Curves are
+smoothed, as restarts differ; the raw ones are pale. A cross: the training diverged in the next
+epoch. "sys-id", which has the right laws, reaches far lower errors, below the panels.
 """
 
 import matplotlib.pyplot as plt
+import numpy as np
 
-from ..common.style import scales, series
+from ..common.style import legend_below, scales, series
 
 NEEDS = ["nclaw.loss"]
 COLOURS = {"jelly": "C0", "sand": "C1", "plasticine": "C3", "water": "C2"}
-WIDTH, HEIGHT = 4.2, 3.2        # of a panel [inch]
-COLUMNS = 3
+METHODS = {"ours": ("k", "-"), "spline": ("C0", "-"), "spline-released": ("C0", "--"),
+           "neural": ("C1", "-"), "neural-released": ("C1", "--"), "sys-id": ("C4", "-"),
+           "admissible": ("C2", "-"), "no-rotation": ("C3", "-"), "no-undeformed": ("C3", "--"),
+           "velocity": ("C5", "-"), "seed-1": ("0.6", "-"), "seed-2": ("0.6", "--")}
+OTHER = ("C8", ":")
+WIDTH, HEIGHT, COLUMNS = 7.0, 2.4, 2    # of the figure; of a panel [inch]
 IDENTIFIED = "sys-id"
-ROOM = 0.003        # from the smallest error of others down
+ROOM = 0.1          # from the smallest error of others down
+EPOCHS = 15         # over which a curve is smoothed
 
 
 def scale(results):
@@ -29,25 +36,40 @@ def draw(results):
     for (method, name), rows in curves.items():
         x, y = table["epoch"][rows], table["error"][rows]
         if method == "ours":
-            axes["ours"].plot(x, y, color=COLOURS[name], label=name)
+            draw_curve(axes["ours"], (x, y), name, (COLOURS[name], "-"))
         if name in others:
-            line, = axes[name].plot(x, y, label=method)
+            style = METHODS.get(method, OTHER)
+            draw_curve(axes[name], (x, y), method, style)
             if diverged(results, method, name):
-                axes[name].plot(x[-1], y[-1], "x", color=line.get_color())
+                axes[name].plot(x[-1], y[-1], "x", color=style[0])
     for title, ax in axes.items():
-        ax.set(yscale="log", title=title, xlabel="epoch", ylabel="error of a step [m²]")
+        ax.set(yscale="log", title="ours" if title == "ours" else f"{title}, by method",
+               xlabel="epoch", ylabel="error of a step [m²]")
         ax.set_ylim(bottom=lowest(ax))
-        ax.legend(fontsize=8, loc="upper right" if title == "ours" else "lower right")
+    axes["ours"].legend(ncols=2, loc="upper center")
     figure = axes["ours"].figure
-    figure.tight_layout()
+    legend_below(figure, [axes[name] for name in others], columns=5)
     return figure
+
+
+def draw_curve(ax, curve, label, style):
+    """Draw errors by epoch, and their geometric mean over the next and the last epochs."""
+    (x, y), (colour, dashes) = curve, style
+    ax.plot(x, y, color=colour, lw=0.5, alpha=0.3, label=f"_{label}")
+    ax.plot(x, smoothed(y), dashes, color=colour, label=label)
+
+
+def smoothed(y):
+    """Return the geometric mean over EPOCHS entries, fewer at the ends."""
+    half, logs = EPOCHS // 2, np.log(y)
+    return np.exp([logs[max(0, k - half):k + half + 1].mean() for k in range(len(y))])
 
 
 def panels(count):
     """Return `count` axes of a new figure."""
     columns = min(count, COLUMNS)
     rows = -(-count // columns)
-    figure = plt.figure(figsize=(WIDTH * columns, HEIGHT * rows))
+    figure = plt.figure(figsize=(WIDTH, HEIGHT * rows))
     return [figure.add_subplot(rows, columns, 1 + k) for k in range(count)]
 
 
@@ -60,5 +82,5 @@ def diverged(results, method, name):
 def lowest(ax):
     """Return the smallest error that a panel shows; None for all."""
     errors = {line.get_label(): line.get_ydata().min() for line in ax.lines}
-    others = [error for word, error in errors.items() if word != IDENTIFIED]
+    others = [error for word, error in errors.items() if word.strip("_") != IDENTIFIED]
     return ROOM * min(others) if others and IDENTIFIED in errors else None

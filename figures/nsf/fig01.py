@@ -1,11 +1,14 @@
-"""NSF, Figure 1: a cake is cut at several angles; the full-order runs, and below each the reduced
-one on samples in the middle. From left to right: time.
+"""NSF, Figure 1: a cake is cut at several angles; the ends of the full-order runs, and below
+of reduced ones on samples in the middle.
 """
 
-from ..common.field_panels import reduced_and_full
+from validation.nsf.studies import cake
+
+from ..common.field_panels import RunView, ends_by_value
 from ..common.style import shared_scale
 
 NEEDS = ["nsf.cake"]
+VIEW = RunView(NEEDS[0], cake, "cut at {}°", lift=35.0)
 
 
 def scale(results):
@@ -13,4 +16,4 @@ def scale(results):
 
 
 def draw(results):
-    return reduced_and_full(results, NEEDS[0], choice=slice(None), lift=35.0)
+    return ends_by_value(results, VIEW)

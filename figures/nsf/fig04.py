@@ -21,7 +21,7 @@ def scale(results):
 
 def draw(results):
     states = read(results.folder, NEEDS[0])
-    figure, axes = plt.subplots(1, len(SIZES), figsize=(10.0, 4.2))
+    figure, axes = plt.subplots(1, len(SIZES), figsize=(7.0, 4.2))
     for ax, name in zip(axes, SIZES, strict=True):
         plot_points(ax, states, name)
     legend_below(figure, axes)

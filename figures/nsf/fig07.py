@@ -1,11 +1,14 @@
 """NSF, Figure 7: a sand column collapses, with the smallest and the largest angle of friction of
-the tests [degrees]: full order, and reduced below. From left to right: time.
+the tests: full order, and reduced below.
 """
 
-from ..common.field_panels import reduced_and_full
+from validation.nsf.studies import sand
+
+from ..common.field_panels import RunView, reduced_and_full
 from ..common.style import shared_scale
 
 NEEDS = ["nsf.sand"]
+VIEW = RunView(NEEDS[0], sand, "friction {}°")
 
 
 def scale(results):
@@ -13,4 +16,4 @@ def scale(results):
 
 
 def draw(results):
-    return reduced_and_full(results, NEEDS[0], choice=slice(None))
+    return reduced_and_full(results, VIEW, choice=slice(None))

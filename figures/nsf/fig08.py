@@ -1,11 +1,14 @@
 """NSF, Figure 8: a metal frame is squeezed and let go, with the smallest and the largest
-coefficient of hardening of the tests: full order, and reduced below. From left to right: time.
+coefficient of hardening, xi, of the tests: full order, and reduced below.
 """
 
-from ..common.field_panels import reduced_and_full
+from validation.nsf.studies import metal
+
+from ..common.field_panels import RunView, reduced_and_full
 from ..common.style import shared_scale
 
 NEEDS = ["nsf.metal"]
+VIEW = RunView(NEEDS[0], metal, r"$\xi$ = {}")
 
 
 def scale(results):
@@ -13,4 +16,4 @@ def scale(results):
 
 
 def draw(results):
-    return reduced_and_full(results, NEEDS[0], choice=slice(None))
+    return reduced_and_full(results, VIEW, choice=slice(None))

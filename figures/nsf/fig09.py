@@ -1,11 +1,14 @@
 """NSF, Figure 9: stress of the metal frame, the Frobenius norm of the Kirchhoff stress: full
-order, and reduced below. From left to right: time.
+order, and reduced below.
 """
 
-from ..common.field_panels import stress_panels
+from validation.nsf.studies import metal
+
+from ..common.field_panels import RunView, stress_panels
 from ..common.style import shared_scale
 
 NEEDS = ["nsf.metal"]
+VIEW = RunView(NEEDS[0], metal, r"$\xi$ = {}")
 
 
 def scale(results):
@@ -13,4 +16,4 @@ def scale(results):
 
 
 def draw(results):
-    return stress_panels(results, NEEDS[0])
+    return stress_panels(results, VIEW)

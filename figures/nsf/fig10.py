@@ -1,11 +1,15 @@
-"""NSF, Figure 10: toothpaste on brushes of several inclinations [degrees]: full order, and reduced
-below each, on samples drawn at random and on such with weights. From left to right: time.
+"""NSF, Figure 10: toothpaste on brushes of several inclinations, at the end: full order, and
+reduced on samples drawn at random and on such with weights. A note says what share of the points
+lies outside of the picture: such a run failed.
 """
 
-from ..common.field_panels import reduced_and_full
+from validation.nsf.studies import toothpaste
+
+from ..common.field_panels import RunView, ends_by_value
 from ..common.style import shared_scale
 
 NEEDS = ["nsf.toothpaste"]
+VIEW = RunView(NEEDS[0], toothpaste, "{}°")
 
 
 def scale(results):
@@ -13,4 +17,4 @@ def scale(results):
 
 
 def draw(results):
-    return reduced_and_full(results, NEEDS[0], ("true", "ours", "weighed"), slice(None))
+    return ends_by_value(results, VIEW, ("true", "ours", "weighed"))

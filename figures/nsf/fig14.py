@@ -1,11 +1,14 @@
 """NSF, Figure 14: bread whose weak elements lie up to 8 % ("mild") and 30 % ("aggressive") of its
-width elsewhere: full order, and reduced below each. From left to right: time.
+width elsewhere: full order, and reduced below each.
 """
 
-from ..common.field_panels import reduced_and_full
+from validation.nsf.studies import bread
+
+from ..common.field_panels import RunView, reduced_and_full
 from ..common.style import shared_scale
 
 NEEDS = ["nsf.fig14"]
+VIEW = RunView(NEEDS[0], bread, "{}", turn=0.0, lift=75.0)
 
 
 def scale(results):
@@ -13,4 +16,4 @@ def scale(results):
 
 
 def draw(results):
-    return reduced_and_full(results, NEEDS[0], choice=slice(None), turn=0.0, lift=75.0)
+    return reduced_and_full(results, VIEW, choice=slice(None))

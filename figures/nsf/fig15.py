@@ -1,11 +1,12 @@
-"""NSF, Figure 15: bread, training runs with the smallest and the largest modulus. From left to
-right: time.
-"""
+"""NSF, Figure 15: bread, training runs with the smallest and the largest modulus."""
 
-from ..common.field_panels import training_range
+from validation.nsf.studies import bread
+
+from ..common.field_panels import RunView, training_range
 from ..common.style import shared_scale
 
 NEEDS = ["nsf.bread"]
+VIEW = RunView(NEEDS[0], bread, "E = {} Pa", turn=0.0, lift=75.0)
 
 
 def scale(results):
@@ -13,4 +14,4 @@ def scale(results):
 
 
 def draw(results):
-    return training_range(results, NEEDS[0], turn=0.0, lift=75.0)
+    return training_range(results, VIEW)

@@ -1,11 +1,12 @@
-"""NSF, Figure 16: sand, training runs with the smallest and the largest angle of friction. From
-left to right: time.
-"""
+"""NSF, Figure 16: sand, training runs with the smallest and the largest angle of friction."""
 
-from ..common.field_panels import training_range
+from validation.nsf.studies import sand
+
+from ..common.field_panels import RunView, training_range
 from ..common.style import shared_scale
 
 NEEDS = ["nsf.sand"]
+VIEW = RunView(NEEDS[0], sand, "friction {}°")
 
 
 def scale(results):
@@ -13,4 +14,4 @@ def scale(results):
 
 
 def draw(results):
-    return training_range(results, NEEDS[0])
+    return training_range(results, VIEW)

@@ -1,11 +1,14 @@
 """NSF, Figure 17: sand steeper than all that was trained, 44 and 55 degrees: full order, and
-reduced below each. From left to right: time.
+reduced below each.
 """
 
-from ..common.field_panels import reduced_and_full
+from validation.nsf.studies import sand
+
+from ..common.field_panels import RunView, reduced_and_full
 from ..common.style import shared_scale
 
 NEEDS = ["nsf.fig17"]
+VIEW = RunView(NEEDS[0], sand, "friction {}°")
 
 
 def scale(results):
@@ -13,4 +16,4 @@ def scale(results):
 
 
 def draw(results):
-    return reduced_and_full(results, NEEDS[0], choice=slice(None))
+    return reduced_and_full(results, VIEW, choice=slice(None))

@@ -20,7 +20,7 @@ def draw(results):
     table = results.table(NEEDS[0], "times")
     rows = [first(table, scene) for scene in ("cake", "metal") if scene in table["scene"]]
     most = max(table["reduced"][k] for k in rows)
-    figure, axes = plt.subplots(1, len(rows), figsize=(3.6 * len(rows), 3.8), squeeze=False)
+    figure, axes = plt.subplots(1, len(rows), figsize=(3.5 * len(rows), 3.8), squeeze=False)
     for ax, k in zip(axes.flat, rows, strict=True):
         spent = [1e3 * table[part][k] for part in PARTS]
         wedges, *_ = ax.pie(spent, radius=np.sqrt(table["reduced"][k] / most), startangle=90,

@@ -22,7 +22,7 @@ def scale(results):
 
 
 def draw(results):
-    figure, axes = plt.subplots(2, 2, figsize=(8.6, 6.8), sharex="col")
+    figure, axes = plt.subplots(2, 2, figsize=(7.0, 6.8), sharex="col")
     for row, id, title in zip(axes, NEEDS, TITLES, strict=True):
         points = results.table(id, "points")
         for ax, cost, on_front in zip(row, ("cpu", "nbytes"), ("pareto_cpu", "pareto_bytes"),
@@ -57,7 +57,7 @@ def scatter(ax, points, cost, on_front):
     top = 2.0 * np.nanmax(error[good])
     ax.plot(x[bad], np.full(bad.sum(), top), "x", color="k", ms=6)
     for row, k in enumerate(np.flatnonzero(bad)):
-        ax.annotate(points["end"][k], (x[k], top), xytext=(4, 2 - 8 * (row % 2)),
+        ax.annotate(points["end"][k], (x[k], top), xytext=(4, 4 - 8 * row),
                     textcoords="offset points", fontsize=7)
     ax.set(xscale="log", yscale="log")
     ax.xaxis.set(minor_formatter=NullFormatter(), major_locator=LogLocator(subs=(1.0, 3.0)),

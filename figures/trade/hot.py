@@ -18,7 +18,7 @@ def scale(results):
 def draw(results):
     table = results.table(NEEDS[0], "points")
     stiff = series(table, ("E",))
-    figure, axes = plt.subplots(1, len(stiff), figsize=(2.2 + 3.2 * len(stiff), 3.6), sharey=True,
+    figure, axes = plt.subplots(1, len(stiff), figsize=(7.0, 3.2), sharey=True,
                                 squeeze=False)
     for ax, ((E,), rows) in zip(axes[0], stiff.items(), strict=True):
         for k, (method, (label, style)) in enumerate(METHODS.items()):

@@ -21,7 +21,7 @@ def scale(results):
 def draw(results):
     table = results.table(NEEDS[0], "ends")
     answer = table["eps"].argmin()
-    figure, axes = plt.subplots(1, 2, figsize=(8.4, 3.4))
+    figure, axes = plt.subplots(1, 2, figsize=(7.0, 3.4))
     shown, controlled = table["eps"] > table["eps"][answer], table["cells"] > 0.0
     for (method,), rows in series(table, ("method",)).items():
         by_gradient, by_displacement = rows & shown & ~controlled, rows & controlled

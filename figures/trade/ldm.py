@@ -8,9 +8,9 @@ from itertools import cycle
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import MaxNLocator
 
-from ..common.style import OTHERS, legend_below, titled_scales
+from ..common.style import OTHERS, legend_below, readable, titled_scales
 
 NEEDS = ["trade.ldm.knobs", "trade.ldm.density"]
 TITLES = ("tower", "torsion")
@@ -19,7 +19,6 @@ WORDS = {"quadrature": "quadrature: {}", "per_cell": "quadrature points to a cel
          "preimage_tolerance": "preimages: {:g} dx", "precision": "precision: {}"}
 MARKS = "oD^v<>PXHdp+x12s"
 RANGE = 2.0         # up and down from the middle of errors, at least
-PLACES = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
 DENSE = {"eulerian": ("Eulerian", "v-", "C4"), "resampled": ("resampled", "D--", "C5")}
 
 
@@ -28,11 +27,11 @@ def scale(results):
 
 
 def draw(results):
-    figure, axes = plt.subplots(1, 2, figsize=(9.2, 4.2), width_ratios=(3, 2))
+    figure, axes = plt.subplots(1, 2, figsize=(7.0, 4.2), width_ratios=(3, 2))
     choices(axes[0], results.table(NEEDS[0], "ways"))
     densities(axes[1], results.table(NEEDS[1], "densities"))
     for ax, title in zip(axes, TITLES, strict=True):
-        ax.set_title(title, fontsize=9)
+        ax.set_title(title)
         ax.set_ylabel("position error [%]")
         low, high = ax.get_ylim()
         middle = np.sqrt(low * high)
@@ -43,12 +42,6 @@ def draw(results):
     axes[1].set_xlabel("quadrature points of a cell along each axis")
     legend_below(figure, axes[:1], columns=3)
     return figure
-
-
-def readable(axis, places=PLACES):
-    """Label an axis with plain numbers at some places of each decade."""
-    axis.set(major_locator=LogLocator(subs=places), minor_formatter=NullFormatter(),
-             major_formatter=FuncFormatter(lambda x, _: f"{x:g}"))
 
 
 def choices(ax, table):

@@ -8,8 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.ticker import NullLocator
 
-from ..common.style import legend_below, series, titled_scales
-from .ldm import readable
+from ..common.style import legend_below, readable, series, titled_scales
 
 NEEDS = ["trade.ldm.split", "trade.ldm.offline"]
 TITLES = ("where the time goes", "when training pays")
@@ -25,11 +24,11 @@ def scale(results):
 
 
 def draw(results):
-    figure, axes = plt.subplots(1, 2, figsize=(9.2, 3.8), width_ratios=(5, 4))
+    figure, axes = plt.subplots(1, 2, figsize=(7.0, 3.8), width_ratios=(5, 4))
     split(axes[0], results.table(NEEDS[0], "parts"))
     pays(axes[1], results.table(NEEDS[1], "pays"))
     for ax, title in zip(axes, TITLES, strict=True):
-        ax.set_title(title, fontsize=9)
+        ax.set_title(title)
     legend_below(figure, axes[:1], columns=5)
     return figure
 

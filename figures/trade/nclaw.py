@@ -1,10 +1,10 @@
-"""NCLaw: errors of small trainings, on a run of few points on a coarse grid. Left: against the CPU
+"""NCLaw: errors of small trainings, on a run of few points on a coarse grid. Above: against the CPU
 time of the training, in the body of the paper where they were run there, else on the training run;
 curves go over epochs (their labels), marks differ from the star as the legend shows; the dotted
-line is the Pareto front. Middle: by what is observed of the run, on that run (full marks) and
+line is the Pareto front. Below, left: by what is observed of the run, on that run (full marks) and
 thrown differently (open marks); the grey band is of trainings on full observations, by seed. Right:
-by the width of the networks, against the CPU time of an evaluation. Runs that broke down are left
-out.
+by the width of the networks, against the CPU time of an evaluation. Crosses at the edge of large
+errors: runs that broke down.
 """
 
 from itertools import cycle
@@ -15,10 +15,10 @@ import numpy as np
 from validation.nclaw.observation import Observation
 from validation.nclaw.small_trainings import Small
 
-from ..common.style import OTHERS, scales, series
-from ..common.training_errors import differences, error_rows, legend_outside
+from ..common.style import OTHERS, readable, scales, series
+from ..common.training_errors import differences, error_rows, legend_outside, mark_broken
 from ..nclaw.loss import COLOURS
-from .ldm import MARKS, readable
+from .ldm import MARKS
 
 NEEDS = ["trade.nclaw.training", "trade.nclaw.sight", "trade.nclaw.width"]
 TITLES = ("training", "observations", "width of the networks")
@@ -33,18 +33,19 @@ def scale(results):
 
 
 def draw(results):
-    figure, axes = plt.subplots(1, 3, figsize=(13.0, 5.4), width_ratios=(5, 3, 4),
-                                layout="constrained")
+    figure, panels = plt.subplot_mosaic([["above", "above"], ["left", "right"]],
+                                        figsize=(7.0, 7.6), layout="constrained")
+    axes = list(panels.values())
     trainings(axes[0], results.table(NEEDS[0], "trainings"))
     observations(axes[1], results.table(NEEDS[1], "trainings"))
     widths(axes[2], results.table(NEEDS[2], "widths"))
     for ax, title in zip(axes, TITLES, strict=True):
-        ax.set_title(title, fontsize=9)
+        ax.set_title(title)
     for ax in axes[::2]:
         readable(ax.xaxis, (1.0, 2.0, 5.0))
         ax.set_ylabel("error [m²]")
     axes[2].legend(fontsize=7)
-    return legend_outside(figure, axes[:2], 5)
+    return legend_outside(figure, axes[:2], 3)
 
 
 def trainings(ax, table):
@@ -61,6 +62,7 @@ def trainings(ax, table):
             name = table["environment"][k]
             ax.plot(x[rows], error[rows], ".-", color=COLOURS[name], label=f"{name}, by epochs")
             annotate_points(ax, (x[rows], error[rows]), table["epoch"][rows])
+            mark_broken(ax, x[rows & ~np.isfinite(error)], COLOURS[name])
             continue
         words = differences(table, k, SIZES, Small()) or "star"
         mark, colour = ("*", "k") if words == "star" else next(styles)
@@ -92,6 +94,7 @@ def widths(ax, table):
                               ("thrown", "s--", "thrown differently")):
         ax.loglog(x, table[key][rows], style, color="k", ms=5, fillstyle="none", label=label)
     annotate_points(ax, (x, table["own"][rows]), table["width"][rows])
+    mark_broken(ax, x[~np.isfinite(table["own"][rows])], "k")
     ax.axvline(1e6 * table["true_cpu_point"][0], ls=":", color="0.4", label="the true laws")
     ax.set_xlabel("CPU time of an evaluation [µs]")
 

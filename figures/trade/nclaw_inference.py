@@ -1,14 +1,15 @@
 """NCLaw: what a run of learned laws costs. Left: error and CPU time by the length of the step, in
 that of training, the label of the marks; true laws with the same step miss the trained one
 too. The dotted lines are Pareto fronts. Right: error by how many binary digits of the weights
-are left; 53 is a double, 24 single precision. Runs that broke down are left out.
+are left; 53 is a double, 24 single precision. Crosses at the upper edge: runs that broke down.
 """
 
 import matplotlib.pyplot as plt
+import numpy as np
 
-from ..common.style import scales, series
+from ..common.style import readable, scales, series
+from ..common.training_errors import mark_broken
 from ..nclaw.loss import COLOURS
-from .ldm import readable
 from .nclaw import annotate_points
 
 NEEDS = ["trade.nclaw.dt", "trade.nclaw.digits"]
@@ -20,11 +21,11 @@ def scale(results):
 
 
 def draw(results):
-    figure, axes = plt.subplots(1, 2, figsize=(9.2, 3.8), width_ratios=(3, 2))
+    figure, axes = plt.subplots(1, 2, figsize=(7.0, 3.8), width_ratios=(3, 2))
     steps(axes[0], results.table(NEEDS[0], "steps"))
     digits(axes[1], results.table(NEEDS[1], "digits"))
     for ax, title in zip(axes, TITLES, strict=True):
-        ax.set_title(title, fontsize=9)
+        ax.set_title(title)
         ax.set_ylabel("error [m²]")
         readable(ax.xaxis, (1.0, 2.0, 5.0))
         ax.legend(fontsize=8)
@@ -41,8 +42,9 @@ def steps(ax, table):
         ax.loglog(*ours, "o", color=COLOURS[name], ms=5, fillstyle="none", label=f"{name}, learned")
         ax.plot(table["cpu"][best], table["error"][best], ":", color=COLOURS[name], zorder=0)
         annotate_points(ax, ours, table["factor"][rows])
+        mark_broken(ax, ours[0][~np.isfinite(ours[1])], COLOURS[name])
         off = true[1] > 0.0         # with the trained step they have no error
-        ax.plot(true[0][off], true[1][off], "x", color=COLOURS[name], ms=5,
+        ax.plot(true[0][off], true[1][off], "+", color=COLOURS[name], ms=6,
                 label=f"{name}, true laws")
         annotate_points(ax, (true[0][off], true[1][off]), table["factor"][rows][off])
     ax.set_xlabel("CPU time of the run [s]")

@@ -8,8 +8,7 @@ down are left out.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..common.style import legend_below, scales, series
-from .ldm import readable
+from ..common.style import legend_below, readable, scales, series
 
 NEEDS = ["trade.nsf.samples", "trade.nsf.dt"]
 TITLES = ("samples", "time step")
@@ -22,11 +21,11 @@ def scale(results):
 
 
 def draw(results):
-    figure, axes = plt.subplots(1, 2, figsize=(9.2, 3.8), width_ratios=(3, 2), sharey=True)
+    figure, axes = plt.subplots(1, 2, figsize=(7.0, 3.8), width_ratios=(3, 2), sharey=True)
     samples(axes[0], results.table(NEEDS[0], "samples"))
     steps(axes[1], results.table(NEEDS[1], "steps"))
     for ax, title in zip(axes, TITLES, strict=True):
-        ax.set_title(title, fontsize=9)
+        ax.set_title(title)
         ax.set(xscale="log", yscale="log")
         readable(ax.xaxis)
     readable(axes[0].yaxis, (1.0, 2.0, 5.0))

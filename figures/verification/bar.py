@@ -15,7 +15,7 @@ def scale(results):
 
 
 def draw(results):
-    figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.8))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(7.0, 3.8))
     for support, alpha in (("symmetric", 1.0), ("wall", 0.45)):
         history = results.table(NEEDS[0], f"history-{support}")
         left.plot(history["t"], history["ours"], color=TRANSFERS["mls"], alpha=alpha, label=support)

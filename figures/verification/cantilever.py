@@ -18,7 +18,7 @@ def scale(results):
 
 
 def draw(results):
-    figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.8), width_ratios=(1.3, 1))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(7.0, 3.8), width_ratios=(1.3, 1))
     places, axis = (results.table(NEEDS[0], name) for name in ("places", "elastica"))
     left.plot(places["x"], places["y"], ".", color="C0", ms=2, label="particles")
     left.plot(axis["x"], axis["y"], "k-", lw=1, label="elastica")

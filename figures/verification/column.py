@@ -19,7 +19,7 @@ def scale(results):
 
 def draw(results):
     table, deposit = (results.table(NEEDS[0], name) for name in ("runout", "deposit"))
-    figure, (left, right) = plt.subplots(1, 2, figsize=(8.8, 3.8))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(7.0, 3.8))
     finest = {kind: max(table["cells"][table["kind"] == kind]) for kind in COLORS}
     for (kind, cells), rows in series(table, ("kind", "cells")).items():
         left.loglog(table["a"][rows], table["runout"][rows], "o-", color=COLORS[kind],

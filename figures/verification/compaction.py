@@ -16,7 +16,7 @@ def scale(results):
 
 
 def draw(results):
-    figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.8))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(7.0, 3.8))
     left.plot((-1, 0), (0, 1), "k:", label="exact")
     for support, fill in (("symmetric", None), ("wall", "w")):
         profile = results.table(NEEDS[0], f"profile-{support}")

@@ -16,7 +16,7 @@ def scale(results):
 
 def draw(results):
     energy, contact = (results.table(NEEDS[0], name) for name in ("energy", "contact"))
-    figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.6), width_ratios=(1.4, 1))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(7.0, 3.6), width_ratios=(1.4, 1))
     for (transfer,), rows in series(energy, ("transfer",)).items():
         total = energy["kinetic"][rows] + energy["elastic"][rows]
         left.plot(energy["t"][rows], total, color=TRANSFERS[transfer], label=transfer,

@@ -19,7 +19,7 @@ def scale(results):
 
 def draw(results):
     table = results.table(NEEDS[0], "course")
-    figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.8))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(7.0, 3.8))
     for (plane, case), rows in series(table, ("plane", "case")).items():
         style = {"color": COLORS[case], "ls": "-" if plane == "flat" else "--"}
         t, x, exact = (table[name][rows] for name in ("t", "x", "exact"))

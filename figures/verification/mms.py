@@ -8,6 +8,7 @@ import numpy as np
 from ..common.style import DEGREES, legend_below, line_style, scales, series, slope
 
 NEEDS = ["verification.mms"]
+COLUMNS = 2
 
 
 def scale(results):
@@ -17,9 +18,12 @@ def scale(results):
 def draw(results):
     table = results.table(NEEDS[0], "errors")
     counts = sorted(set(table["per_direction"]))
-    figure, axes = plt.subplots(1, len(counts), sharey=True, squeeze=False,
-                                figsize=(max(7.0, 3.0 * len(counts)), 3.8))
-    for ax, count in zip(axes[0], counts, strict=True):
+    rows = -(-len(counts) // COLUMNS)
+    figure, axes = plt.subplots(rows, COLUMNS, sharex=True, sharey=True, squeeze=False,
+                                figsize=(7.0, 0.8 + 2.6 * rows))
+    for ax in axes.flat[len(counts):]:
+        ax.axis("off")
+    for ax, count in zip(axes.flat, counts, strict=False):
         for (transfer, degree, per), rows in series(
                 table, ("transfer", "degree", "per_direction")).items():
             if per == count:
@@ -29,6 +33,7 @@ def draw(results):
         ax.set(title=f"{int(count)} particles per direction", xlabel="cells per side",
                xticks=(16, 32, 64), xticklabels=("16", "32", "64"), xlim=(14, 90))
         ax.minorticks_off()
-    axes[0, 0].set_ylabel("error / A, cut at 1")
-    legend_below(figure, axes[0], columns=5)
+    for ax in axes[:, 0]:
+        ax.set_ylabel("error / A, cut at 1")
+    legend_below(figure, axes.flat, columns=5)
     return figure

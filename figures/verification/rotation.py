@@ -18,7 +18,7 @@ def scale(results):
 
 def draw(results):
     table = results.table(NEEDS[0], "history")
-    figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.6), sharex=True)
+    figure, (left, right) = plt.subplots(1, 2, figsize=(7.0, 3.6), sharex=True)
     for (body, transfer), rows in series(table, ("body", "transfer")).items():
         style = {"color": TRANSFERS[transfer], "ls": "-" if body == "disk" else ":",
                  "lw": 3.0 if transfer == "mls" else 1.4}      # APIC lies upon MLS

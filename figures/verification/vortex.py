@@ -16,7 +16,7 @@ def scale(results):
 
 
 def draw(results):
-    figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.8))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(7.0, 3.8))
     table = results.table(NEEDS[0], "errors")
     for (transfer, degree, per), rows in series(
             table, ("transfer", "degree", "per_direction")).items():

@@ -19,7 +19,7 @@ def scale(results):
 
 
 def draw(results):
-    figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.8))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(7.0, 3.8))
     table = results.table(NEEDS[0], "errors")
     for wall, mark in (("False", "o"), ("True", "s")):
         rows, support = table["wall"] == wall, "wall" if wall == "True" else "symmetric"

@@ -3,15 +3,17 @@
 import importlib
 import json
 
+import matplotlib.pyplot as plt
 import pytest
 import typer
+from matplotlib.transforms import Bbox
 from typer.testing import CliRunner
 
 from figures import __main__ as cli
 from figures import frame
 from figures.common.style import OTHERS, TRANSFERS, scales, shared_scale
 from figures.frame import Drawn, draw_all, names
-from validation.common.results import ProfileResults
+from validation.common.results import RESULTS, ProfileResults
 
 SCALES = {"a.b.order": "8, dx = 0.1 m; twice", "a.b.end": "9, dx = 0.1 m"}
 RECORDS = [{"target": target, "value": 1.0, "unit": "1", "paper": None, "comparator": "info",
@@ -28,7 +30,7 @@ def scale(results):
 
 
 def draw(results):
-    return Figure()
+    return Figure(figsize=(6.4, 4.0))
 '''
 
 
@@ -61,10 +63,43 @@ def test_picture_and_caption_carry_the_scale(results, tmp_path, monkeypatch):
     assert seen == [(".png", said, f"A toy. {said}"), (".pdf", said, None)]
 
 
+def test_figure_that_is_too_wide_for_a_page_is_refused(results, tmp_path, monkeypatch, capsys):
+    package = tmp_path / "wide_figures"
+    (package / "hot").mkdir(parents=True)
+    (package / "hot" / "toy.py").write_text(SCRIPT.replace("6.4, 4.0", "7.1, 4.0"))
+    monkeypatch.syspath_prepend(tmp_path)
+    assert draw_all(results, folder=package).failed == ["hot_toy"]
+    assert "the figure is 7.1 inches wide; expected at most 7" in capsys.readouterr().err
+
+
+def test_legend_outside_stays_above_the_note():
+    """A tight bounding box moves legends that are anchored to the box of the figure."""
+    figure, ax = plt.subplots(layout="constrained")
+    ax.plot([1.0, 2.0], label="a")
+    figure.legend(loc="outside lower center")
+    figure.draw_without_rendering()
+    frame._anchor_legends(figure)
+    frame._sign(figure, "8 cells")
+    before = figure.legends[0].get_window_extent().bounds
+    figure.bbox = Bbox.from_bounds(0.0, -50.0, *figure.bbox.size)       # as printing does
+    assert figure.legends[0].get_window_extent().bounds == pytest.approx(before)
+
+
+@pytest.mark.parametrize("name", names())
+def test_published_results_say_their_scale(name):
+    """A sentence "Scale (standard): ." tells nothing."""
+    script = importlib.import_module("figures." + name.replace("_", ".", 1))
+    try:
+        said = script.scale(ProfileResults(RESULTS / "standard"))
+    except FileNotFoundError:
+        pytest.skip("its results are not published")
+    assert said.strip(" ;:,.")
+
+
 def test_two_processes_draw_like_one(results, tmp_path, monkeypatch):
     package = tmp_path / "pair_of_figures"
     (package / "hot").mkdir(parents=True)
-    for name, text in (("toy", SCRIPT), ("bad", SCRIPT.replace("return Figure()", "raise OSError")),
+    for name, text in (("toy", SCRIPT), ("bad", SCRIPT.replace("return Figure(", "raise OSError(")),
                        ("gone", SCRIPT.replace("a.b", "c.d"))):
         (package / "hot" / f"{name}.py").write_text(text)
     monkeypatch.syspath_prepend(tmp_path)       # a spawned process takes over sys.path

@@ -10,7 +10,7 @@ import pytest
 from figures.common import state_panels
 from figures.common.bodies import body, flattened, no_balls, shades, side_by_side
 from figures.common.schemes import MARKS
-from figures.ldm import fig04, fig06, fig10, fig11, fig12, fig13, fig14, fig15, fig16
+from figures.ldm import fig04, fig06, fig07, fig10, fig11, fig12, fig13, fig14, fig15, fig16
 from figures.ldmw import fig01, tables
 from validation.common.results import ProfileResults
 from validation.ldm.published_bodies import file_of
@@ -154,36 +154,59 @@ def of_sizes(sizes):
     schemes = [(*name.split("_"), 2, "double") for name in SCHEMES]
     schemes += [("resampled", "linear", k, "double") for k in (1, 2)]
     schemes += [(quadrature, "linear", 2, "single") for quadrature in ("eulerian", "resampled")]
-    return [(n, quadrature, projection, points, per_cell, precision, 2.0, 1.0, 24.0 * wall,
-             2.0 / wall, "inf" if wall == np.inf else 0.01 / points, "?")
+    return [(n, quadrature, projection, points, per_cell, precision, 2.0, 1.0,
+             24.0 * min(wall, 1.0), 2.0 / wall, "inf" if wall == np.inf else 0.01 / points, "?")
             for n in sizes for points in (25, 50)
             for quadrature, projection, per_cell, precision in schemes
             for wall in [np.inf if quadrature == "eulerian" and points == 25 else points / 100]]
 
 
+def runs(ax):
+    """{label: line} of the runs, which the legend explains by their parts."""
+    return {line.get_label()[1:]: line for line in ax.lines if "samples" in line.get_label()[1:]
+            and line.get_label().startswith("_")}
+
+
 def test_fig16_has_a_panel_for_each_size(results):
-    table(results, "ldm.fig16", "ways", WAYS, of_sizes((34, 385)))
+    table(results, "ldm.fig16", "ways", WAYS, of_sizes((34, 3085)))
     figure = fig16.draw(results)
-    assert [ax.get_title() for ax in figure.axes] == ["34 particles", "385 particles"]
+    assert [ax.get_title() for ax in figure.axes] == ["34 particles", "3 085 particles"]
     for ax in figure.axes:
         found = lines(ax)
         assert found["real time"].get_xdata() == [1.0, 1.0]
         assert found["full model"].get_xdata() == pytest.approx([48.0, 48.0])
         assert found["full model, fastest transfer"].get_xdata() == pytest.approx([24.0, 24.0])
-        own = found["Lagrangian, linear, 50 samples"]
+        own = runs(ax)["Lagrangian, linear, 50 samples"]
         assert own.get_xdata() == pytest.approx([12.0])
         assert own.get_ydata() == pytest.approx([0.02])
-        assert len(found["Eulerian, linear, 25 samples"].get_xdata()) == 0      # it broke down
+        assert len(runs(ax)["Eulerian, linear, 25 samples"].get_xdata()) == 0
+        crosses = [line for line in ax.lines if line.get_marker() == "x"]
+        assert len(crosses) == 3                    # of runs that broke down, at the top
+        assert {tuple(line.get_ydata()) for line in crosses} == {(1.0,)}
 
 
 def test_fig16_tells_ways_apart(results):
     table(results, "ldm.fig16", "ways", WAYS, of_sizes((34,)))
     ax = fig16.draw(results).axes[0]
-    found = [line for name, line in lines(ax).items() if "samples" in name]
+    found = [*runs(ax).values()]
     looks = {(line.get_marker(), line.get_color(), line.get_fillstyle()) for line in found}
     assert len(looks) == len(found) == 16
     assert not {fig16.label_and_marker("resampled_linear", k)[1] for k in (1, 2)} & {
         mark for _, mark in MARKS.values()}
+
+
+def test_fig07_has_colours_up_to_the_largest_error(results):
+    """Logarithmic, so that none of the cells is beyond the scale."""
+    rows = [(scheme, F, v, 1e-5 * (1 + 9 * F + 90 * v)) for scheme in SCHEMES
+            for F in (True, False) for v in (True, False)]
+    table(results, "ldm.fig7", "errors", ("scheme", "F", "v", "origin"), rows)
+    *cells, bar = fig07.draw(results).axes
+    assert [ax.get_title()[:3] for ax in cells] == ["(a)", "(b)", "(c)", "(d)"]
+    image = cells[0].images[0]
+    assert np.asarray(image.get_array()) == pytest.approx(
+        np.array([[0.001, 0.01], [0.091, 0.1]]))
+    assert image.get_clim() == pytest.approx((0.001, 0.3))
+    assert list(bar.lines[-1].get_ydata()) == [fig07.PRINTED] * 2
 
 
 def test_fig14_numbers_steps_that_are_apart(results):
@@ -214,8 +237,9 @@ def test_pokes_of_the_workshop_are_told_with_their_errors(results):
 def test_fig16_needs_no_precision(results):
     table(results, "ldm.fig16", "ways", [name if name != "precision" else "other" for name in WAYS],
           of_sizes((34,)))
-    assert {line.get_fillstyle() for name, line in lines(fig16.draw(results).axes[0]).items()
-            if "samples" in name} == {"none"}
+    ax = fig16.draw(results).axes[0]
+    assert {line.get_fillstyle() for line in runs(ax).values()} == {"none"}
+    assert "filled: single precision" not in lines(ax)
 
 
 def test_workshop_tables_stand_beside_what_is_printed(results):

@@ -75,6 +75,26 @@ def test_trainings_are_told_by_what_they_differ_in(trade):
     assert sum(line.get_marker() == "*" for line in trade[0].lines) == 2
 
 
+def test_runs_that_broke_down_are_crosses_at_the_edge_of_large_errors():
+    """A cross at its CPU time, or in its row."""
+    names = (SEEDS[0], "small-horizon-25", *3 * ["small-sand-epochs"])
+    left, middle, right = axes_of(
+        trade_nclaw, training_trainings=trainings(
+            names, SIZES, epoch=[100, 100, 10, 20, 300], full=[1.0, 2.0, 3.0, np.inf, np.inf]),
+        sight_trainings=sights((*SEEDS[:2], "small-third", "small-positions"),
+                               ("every", "share", "noise", "positions"))
+        | {"own": [1.0, 2.0, 3.0, np.inf]}, width_widths=WIDTHS | {"own": [np.inf, 2.0]})
+    assert crosses(left) == [(40.0, 1.0), (50.0, 1.0)]
+    assert crosses(middle) == [(1.0, 1.0)]
+    assert crosses(right) == [(4.0, 1.0)]
+
+
+def crosses(ax):
+    """Places of the crosses."""
+    return [tuple(np.ravel(line.get_xydata())) for line in ax.lines if line.get_marker() == "x"
+            and line.get_transform() != ax.transData]
+
+
 def test_kept_epochs_are_a_curve(trade):
     assert labelled(trade[0])["sand, by epochs"].get_ydata() == pytest.approx([9.0] * 3)
     assert [text.get_text() for text in trade[0].texts] == ["10", "20", "300"]

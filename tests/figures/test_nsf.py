@@ -70,7 +70,7 @@ def test_runs_stand_by_their_distance_with_their_parameter(extremes):
     jelly, metal = (labelled(extremes[0])[name] for name in ("jelly", "metal"))
     assert jelly.get_xydata() == pytest.approx(np.array([[0.2, 1.0], [2.0, 15.0]]))
     assert len(metal.get_xydata()) == 0
-    assert [text.get_text() for text in extremes[0].texts] == ["0.4", "1"]
+    assert [text.get_text() for text in extremes[0].texts] == ["1"]     # bad, and flagged
 
 
 def test_the_bounds_are_those_of_the_watch(extremes):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from figures.common import field_panels
+from figures.common.bodies import ROOM, padded_box
 from figures.nsf import fig18
 from mpm_ref.rom.kinematics import NoBody
 from mpm_ref.rom.study.full_model import nsf_full_model
@@ -96,47 +97,65 @@ def results(cube, run):
 
 
 def test_a_row_for_each_way_and_a_column_for_each_time(results):
-    figure = field_panels.reduced_and_full(results, ID, ("true", "ours", "map"))
+    view = field_panels.RunView(ID, jelly, "{} m/s")
+    figure = field_panels.reduced_and_full(results, view, ("true", "ours", "map"))
     assert len(figure.axes) == 9
     assert [ax.texts[0].get_text() for ax in figure.axes[::3]] == [
-        "0.45: full order", "0.45: reduced", "0.45: map alone"]
-    assert len(field_panels.training_range(results, ID).axes) == 6
-    assert len(field_panels.stress_panels(results, ID).axes) == 7        # with a colour bar
+        "0.45 m/s\nfull order", "reduced", "map alone"]
+    assert [ax.get_title() for ax in figure.axes] == [
+        "t = 0.4 s", "t = 0.8 s", "t = 1.2 s", *6 * [""]]
+    training = field_panels.training_range(results, view)
+    assert [ax.texts[0].get_text() for ax in training.axes[::3]] == ["0.3 m/s", "0.5 m/s"]
+    assert len(field_panels.stress_panels(results, view).axes) == 7     # with a colour bar
+    ends = field_panels.ends_by_value(results, view, ("true", "ours", "map"))
+    assert [ax.get_title() for ax in ends.axes] == ["0.45 m/s, t = 1.2 s", "", ""]
 
 
 def test_points_that_fly_away_are_left_out(rng):
     """A run may lose points; the box of the full-order runs and ROOM of its longest side stay."""
     x = rng.uniform(size=(30, 3)) * (1.0, 0.2, 0.2)
     x[:2] = [[0.0, 0.0, 0.0], [1.0, 0.2, 0.2]]
-    ends = field_panels.padded_box(x)
-    assert ends == pytest.approx(np.array([[-0.4, -0.4, -0.4], [1.4, 0.6, 0.6]]))
-    gone = np.concatenate([x, [[1.39, 0.0, 0.0], [1.41, 0.0, 0.0], [0.0, -5.0, 0.0]]])
-    solid, _ = field_panels.clipped_body(gone, "#ffffff", 0.1, ends)
-    assert len(solid.x) == 31
-    assert len(field_panels.clipped_body(x + 10.0, "#ffffff", 0.1, ends)[0].x) == 0
+    ends = padded_box(x)
+    assert ends == pytest.approx(np.array([3 * [-ROOM], [1.0 + ROOM, 0.2 + ROOM, 0.2 + ROOM]]))
+    far = 1.0 + ROOM
+    gone = np.concatenate([x, [[far - 0.01, 0, 0], [far + 0.01, 0, 0], [0, -5.0, 0]]])
+    panel = field_panels.clipped_panel(gone, "#ffffff", 0.1, ends)
+    assert len(panel.solid.x) == 31
+    assert panel.note == "6.1 % outside"
+    assert field_panels.clipped_panel(x, "#ffffff", 0.1, ends).note == ""
+    away = field_panels.clipped_panel(x + 10.0, "#ffffff", 0.1, ends)
+    assert len(away.solid.x) == 0
+    assert away.note == "1e+02 % outside"
+
+
+def test_points_taken_out_in_rows_are_as_far_apart_as_rows():
+    """Balls then fill the body; on a whole lattice they are as large as its spacing."""
+    rows = np.stack(np.meshgrid(0.25 * np.arange(20), np.arange(6.0), np.arange(6.0)), -1)
+    assert field_panels.spread(rows.reshape(-1, 3)) == pytest.approx(0.375)     # nearest: 0.25
+    lattice = np.stack(np.meshgrid(*3 * [np.arange(6.0)]), -1).reshape(-1, 3)
+    assert field_panels.spread(lattice) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(("number", "values", "also", "sides"), [
-    ("01", 3, (), ["{0}: full order", "{0}: reduced", "{1}: full order", "{1}: reduced",
-                   "{2}: full order", "{2}: reduced"]),
-    ("05", 1, ("map",), ["{0}: full order", "{0}: reduced", "{0}: map alone"]),
-    ("07", 2, (), ["{0}: full order", "{0}: reduced", "{1}: full order", "{1}: reduced"]),
-    ("08", 2, ("stress",), ["{0}: full order", "{0}: reduced", "{1}: full order", "{1}: reduced"]),
-    ("09", 2, ("stress",), ["full order", "reduced"]),
-    ("10", 2, ("weighed",), ["{0}: full order", "{0}: reduced", "{0}: with weights",
-                             "{1}: full order", "{1}: reduced", "{1}: with weights"]),
-    ("12", 1, ("map",), ["{0}: full order", "{0}: reduced", "{0}: map alone"]),
-    ("13", 1, ("map",), ["{0}: full order", "{0}: reduced", "{0}: map alone"]),
-    ("14", 2, (), ["{0}: full order", "{0}: reduced", "{1}: full order", "{1}: reduced"]),
-    ("17", 2, (), ["{0}: full order", "{0}: reduced", "{1}: full order", "{1}: reduced"]),
-    ("15", 1, ("map",), ["first of training", "last of training"]),
-    ("16", 2, (), ["first of training", "last of training"])])
+    ("01", 3, (), ["full order", "reduced"]),
+    ("05", 1, ("map",), ["E = {0} Pa\nfull order", "reduced", "map alone"]),
+    ("07", 2, (), ["friction {0}°\nfull order", "reduced", "friction {1}°\nfull order", "reduced"]),
+    ("08", 2, ("stress",), ["$\\xi$ = {0}\nfull order", "reduced", "$\\xi$ = {1}\nfull order",
+                            "reduced"]),
+    ("09", 2, ("stress",), ["$\\xi$ = {0}\nfull order", "reduced"]),
+    ("10", 2, ("weighed",), ["full order", "reduced", "with weights"]),
+    ("12", 1, ("map",), ["{0} m/s\nfull order", "reduced", "map alone"]),
+    ("13", 1, ("map",), ["plane at {0}°\nfull order", "reduced", "map alone"]),
+    ("14", 2, (), ["{0}\nfull order", "reduced", "{1}\nfull order", "reduced"]),
+    ("17", 2, (), ["friction {0}°\nfull order", "reduced", "friction {1}°\nfull order", "reduced"]),
+    ("15", 1, ("map",), ["E = 1 Pa", "E = 13 Pa"]),
+    ("16", 2, (), ["friction 21°", "friction 38.5°"])])
 def test_figures_show_all_that_experiments_keep(number, values, also, sides, tmp_path, rng):
     """A row for each parameter kept (of the stress, for one) and each way."""
     script = importlib.import_module(f"figures.nsf.fig{number}")
     names, x = [f"{0.1 * k:g}" for k in range(1, values + 1)], rng.uniform(size=(3, 40, 3))
     words = ["true", "ours", *(word for word in states.KINDS if word in also)]
-    kept = {"values": np.array(names), "levels": np.arange(3), "first": x, "last": x}
+    kept = {"values": np.array(names), "levels": np.arange(1, 4), "first": x, "last": x}
     kept |= {f"{name}_{word}": x for name in names for word in words}
     if "stress" in also:
         kept |= {f"{name}_{word}_tau": x[..., 0] for name in names for word in words}
@@ -148,8 +167,9 @@ def test_figures_show_all_that_experiments_keep(number, values, also, sides, tmp
 
 
 def test_a_run_that_broke_down_is_an_empty_panel():
-    gone, _ = field_panels.clipped_body(np.full((4, 3), np.nan), "white", 0.1)
-    assert len(gone.x) == 0
+    gone = field_panels.clipped_panel(np.full((4, 3), np.nan), "white", 0.1)
+    assert len(gone.solid.x) == 0
+    assert gone.note == "broke down"
 
 
 def test_time_shares_are_of_the_most_samples_and_gauss_newton():
