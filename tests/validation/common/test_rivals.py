@@ -1,0 +1,109 @@
+"""Reduced runs beside their simplest rivals: the parts that all studies share."""
+
+from math import inf
+
+import numpy as np
+import pytest
+from small_toys import Records
+
+from mpm_ref.monitor import Unstable
+from mpm_ref.rom.study.errors import PositionErrors
+from mpm_ref.rom.study.full_model import field_of
+from mpm_ref.scene import build
+from mpm_ref.simulate import simulate
+from validation.common import rivals
+from validation.common.rivals import (
+    PositionSource,
+    Rival,
+    TestRun,
+    record_beats,
+    run_errors,
+    state_errors,
+)
+from validation.common.scenes import catalogue_scene, with_
+from validation.common.tracers import advected
+
+
+def scene_of_a_few_steps():
+    return with_(catalogue_scene("hello"), scheme=with_(catalogue_scene("hello").scheme,
+                                                        transfer="apic"),
+                 dt=2e-3, end=None, interval=None, steps=70, every=70)
+
+
+def test_tracers_at_the_particles_go_with_them():
+    """70 steps: the particles are sorted on the way, the tracers are not."""
+    scene = scene_of_a_few_steps()
+    problem = build(scene)
+    X = field_of(problem.bodies, "x") + [0.0, 0.0]
+    *_, (t, x) = advected(problem, X)
+    *_, last = simulate(build(scene))
+    assert t == pytest.approx(last.t)
+    np.testing.assert_allclose(x, field_of(last.state.bodies, "x"), atol=1e-13)
+    assert np.abs(x - X).max() > 0.01
+
+
+def test_tracers_outside_of_matter_stand_still():
+    problem = build(scene_of_a_few_steps())
+    far = np.array([[3.0, 3.0]])
+    *_, (_, x) = advected(problem, far)
+    assert x.tolist() == far.tolist()
+
+
+def source(x, raises=None):
+    def states():
+        for level, state in enumerate(x):
+            yield 0.1 * level, state
+        if raises:
+            raise raises
+    return PositionSource("toy", states, lambda state: state, 8)
+
+
+@pytest.fixture
+def test_run(rng):
+    return TestRun(rng.uniform(size=(4, 2)), rng.uniform(size=(3, 4, 2)), 0.1, 1)
+
+
+def test_errors_leave_out_levels_before_the_first(test_run):
+    off = test_run.x * [[[7.0]], [[1.01]], [[1.01]]]
+    assert run_errors(source(off), test_run).origin == pytest.approx(0.01)
+    assert state_errors(off, test_run).origin == pytest.approx(0.01)
+    assert state_errors(off, test_run._replace(first=0)).origin > 1.0
+    assert run_errors(source(off), test_run._replace(first=0)).origin > 1.0
+
+
+def test_errors_of_runs_that_end_early_or_are_not_finite_are_infinite(test_run):
+    fault = Unstable("toy", step=1, t=0.1, body="a", particle=0, cfl=1.0, J=1.0, energy=1.0,
+                     advice="")
+    assert run_errors(source(test_run.x, fault), test_run) == PositionErrors(inf, inf, inf)
+    off = test_run.x.copy()
+    off[2, 0, 0] = np.nan
+    assert run_errors(source(off), test_run) == PositionErrors(inf, inf, inf)
+
+
+def test_the_longest_step_is_the_last_with_which_a_run_ends_well(monkeypatch):
+    monkeypatch.setattr(rivals, "ends", lambda scene: scene.dt < 2.0e-3)
+    scene = with_(scene_of_a_few_steps(), dt=1e-3)
+    assert rivals.longest_step(scene) == 1.5
+    assert rivals.longest_step(with_(scene, dt=1.0)) == 1.0
+
+
+def test_reduced_runs_are_compared_with_the_cheapest_run_of_no_larger_error():
+    def rival(name, error, cpu):
+        return name, Rival(name, PositionErrors(error, error, error), cpu, 0)
+
+    others = dict([rival("full", 0.0, 8.0), rival("mls.x1", 0.01, 4.0),
+                   rival("coarse.2", 0.03, 0.5), rival("nearest", 0.05, 0.0),
+                   rival("interpolated", 0.01, 0.0)])
+    run = Records()
+    record_beats(run, "beats", rival("drawn", 0.02, 2.0)[1], others, "")
+    assert {name: value for name, (value, _) in run.items()} == pytest.approx({
+        "beats.nearest": 2.5, "beats.interpolated": 0.5, "beats.full": 2.0})
+
+
+def test_a_reduced_run_that_broke_down_beats_none():
+    broken = Rival("drawn", PositionErrors(inf, inf, inf), 1.0, 0)
+    full = Rival("full", PositionErrors(0.0, 0.0, 0.0), 8.0, 0)
+    near = Rival("nearest", PositionErrors(0.1, 0.1, 0.1), 0.0, 0)
+    run = Records()
+    record_beats(run, "beats", broken, {"full": full, "nearest": near}, "")
+    assert [value for value, _ in run.values()] == [0.0, 0.0]
