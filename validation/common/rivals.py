@@ -72,6 +72,13 @@ class TestRivals(NamedTuple):
     trained: dict
 
 
+class Comparison(NamedTuple):
+    """Rivals over some tests, and the errors of each."""
+
+    rivals: list            # `Rival`s with their mean errors
+    errors: dict            # {test: {rival: `PositionErrors`}}
+
+
 def full_source(name, scene):
     """Return the `PositionSource` of a full-order run, each step of which is a frame."""
     def states():
@@ -187,52 +194,65 @@ def cpu_of(source):
 
 
 def compare(tests, repeats):
-    """Return the `Rival`s of {name of a test: `TestRivals`}, with mean errors and the times of the
-    first, and {name: {rival: `PositionErrors`}}.
-    """
+    """Return the `Comparison` of {name of a test: `TestRivals`}; times are of the first test."""
     errors = {name: {source.name: run_errors(source, one.test) for source in one.sources} | {
         rival: state_errors(x, one.test) for rival, x in one.trained.items()}
         for name, one in tests.items()}
     first = next(iter(tests.values()))
-    cpu = cpu_seconds(first.sources, repeats)
+    cpu, size = cpu_seconds(first.sources, repeats), first.test.x.nbytes
     sizes = {source.name: source.size for source in first.sources} | {
-        rival: count * first.test.x.nbytes
-        for rival, count in ((NEAREST, 1), (INTERPOLATED, 2)) if rival in first.trained}
-    rivals = [Rival(name, PositionErrors(*np.mean([one[name] for one in errors.values()], axis=0)),
-                    cpu.get(name, 0.0), size) for name, size in sizes.items()]
-    return rivals, errors
+        NEAREST: size, INTERPOLATED: 2 * size}
+    rivals = [Rival(name, mean_errors(errors, name), cpu.get(name, 0.0), size)
+              for name, size in sizes.items() if any(name in own for own in errors.values())]
+    return Comparison(rivals, errors)
 
 
-def record_rivals(run, target, rivals, reduced, scale, origin):
-    """Record the errors, CPU time and bytes of each `Rival`, and by how much the reduced ones, by
-    their names, beat the others; origin: that of the errors, in words.
+def mean_errors(errors, name, where=None):
+    """Return the mean `PositionErrors` of a rival over {test: {rival: errors}}, of the tests that
+    have it and the rival `where`: outside of the training's parameters nothing is interpolated.
     """
-    by_name = {rival.name: rival for rival in rivals}
-    for rival in rivals:
+    return PositionErrors(*np.mean([own[name] for own in errors.values()
+                                    if name in own and (where or name) in own], axis=0))
+
+
+def record_rivals(run, target, comparison, reduced, scale, origin):
+    """Record the errors, CPU time and bytes of each `Rival` of a `Comparison`, and by how much the
+    reduced ones, by their names, beat the others; origin: that of the errors, in words.
+    """
+    for rival in comparison.rivals:
         cost = f"{rival.cpu:.3g} CPU s a run" if rival.cpu else "looked up"
+        count = sum(rival.name in own for own in comparison.errors.values())
         record_position_errors(run, f"{target}.{rival.name}", rival.errors, scale,
-                               f"{cost}; {rival.size / 1e6:.3g} MB; {origin}", comparator="info")
+                               f"{cost}; {rival.size / 1e6:.3g} MB; {count} of {len(comparison.errors)} "
+                               f"tests; {origin}", comparator="info")
     for name in reduced:
-        record_beats(run, f"{target}.{name}.beats", by_name[name],
-                     {other: rival for other, rival in by_name.items() if other not in reduced},
-                     scale)
+        record_lookups(run, f"{target}.{name}.beats", comparison, name, scale)
+        record_cost(run, f"{target}.{name}.beats.full", comparison, (name, reduced), scale)
 
 
-def record_beats(run, target, reduced, rivals, scale):
-    """Record how many times the error of each training rival exceeds that of a reduced run, and how
-    many times the CPU time of the cheapest full-order run of no larger error does. A reduced run
-    that broke down beats none.
+def record_lookups(run, target, comparison, name, scale):
+    """Record how many times the error of each training rival exceeds that of a reduced run, over
+    the tests that have both. A reduced run that broke down beats none.
     """
-    finite = np.isfinite(reduced.errors.origin)
-    for name in (name for name in (NEAREST, INTERPOLATED) if name in rivals):
-        gain = rivals[name].errors.origin / reduced.errors.origin if finite else 0.0
-        run.record(f"{target}.{name}", gain, unit="x", comparator=">=", bound=1.0, scale=scale,
+    for other in (one.name for one in comparison.rivals if one.name in (NEAREST, INTERPOLATED)):
+        own = mean_errors(comparison.errors, name, other).origin
+        gain = mean_errors(comparison.errors, other).origin / own if np.isfinite(own) else 0.0
+        run.record(f"{target}.{other}", gain, unit="x", comparator=">=", bound=1.0, scale=scale,
                    note="its error over that of the reduced run, of the distance from the origin")
-    full = [rival for rival in rivals.values() if rival.name not in (NEAREST, INTERPOLATED)
-            and rival.errors.origin <= reduced.errors.origin]
-    cheapest = min(full, key=lambda rival: rival.cpu)
-    run.record(f"{target}.full", cheapest.cpu / reduced.cpu if finite else 0.0, unit="x",
-               comparator=">=", bound=1.0, scale=scale,
+
+
+def record_cost(run, target, comparison, names, scale):
+    """Record how many times the CPU time of the cheapest full-order run of no larger error exceeds
+    that of a reduced run; names: its own, and those of all reduced runs. One that broke down saves
+    nothing.
+    """
+    name, reduced = names
+    own = next(one for one in comparison.rivals if one.name == name)
+    full = [one for one in comparison.rivals if one.name not in (NEAREST, INTERPOLATED, *reduced)
+            and one.errors.origin <= own.errors.origin]
+    cheapest = min(full, key=lambda one: one.cpu)
+    gain = cheapest.cpu / own.cpu if np.isfinite(own.errors.origin) else 0.0
+    run.record(target, gain, unit="x", comparator=">=", bound=1.0, scale=scale,
                note=f"CPU time of {cheapest.name}, the cheapest full-order run tried with at most "
                "the error of the reduced run, over its own")
 

@@ -57,10 +57,10 @@ def compare_rivals(run):
         with one_thread():
             tests = {k: rivals_of(contest, k, factor) for k in study.test[::-(-len(study.test)
                                                                              // count)]}
-            found, errors = rivals.compare(tests, run.choose(quick=1, standard=REPEATS))
+            found = rivals.compare(tests, run.choose(quick=1, standard=REPEATS))
         rivals.record_rivals(run, f"ldm.rivals.{name}", found, reduced_names(contest),
                              scale_of(contest, tests), ORIGIN)
-        rows += rivals.rows_of(name, errors)
+        rows += rivals.rows_of(name, found.errors)
     run.table("runs", rivals.COLUMNS, rows)
 
 

@@ -30,11 +30,11 @@ def compare_rivals(run):
         one = fit_study(study_of(run, name))
         factor = rivals.longest_step(one.study.run(one.study.train[0]))
         with one_thread():
-            found, errors = rivals.compare(
+            found = rivals.compare(
                 {value: rivals_of(one, value, factor) for value in one.study.test},
                 run.choose(quick=1, standard=REPEATS))
         rivals.record_rivals(run, f"nsf.rivals.{name}", found, tuple(REDUCED), one.scale, ORIGIN)
-        rows += rivals.rows_of(name, errors)
+        rows += rivals.rows_of(name, found.errors)
     run.table("runs", rivals.COLUMNS, rows)
 
 

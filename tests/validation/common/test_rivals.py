@@ -13,10 +13,11 @@ from mpm_ref.scene import build
 from mpm_ref.simulate import simulate
 from validation.common import rivals
 from validation.common.rivals import (
+    Comparison,
     PositionSource,
     Rival,
     TestRun,
-    record_beats,
+    record_rivals,
     run_errors,
     state_errors,
 )
@@ -87,23 +88,41 @@ def test_the_longest_step_is_the_last_with_which_a_run_ends_well(monkeypatch):
     assert rivals.longest_step(with_(scene, dt=1.0)) == 1.0
 
 
-def test_reduced_runs_are_compared_with_the_cheapest_run_of_no_larger_error():
-    def rival(name, error, cpu):
-        return name, Rival(name, PositionErrors(error, error, error), cpu, 0)
+def comparison(rivals, errors=None):
+    """A `Comparison` of {name: (error, CPU seconds)}, of one test unless {test: {name: error}} is
+    given.
+    """
+    errors = errors or {"a": {name: error for name, (error, _) in rivals.items()}}
+    return Comparison(
+        [Rival(name, PositionErrors(*3 * (error,)), cpu, 0)
+         for name, (error, cpu) in rivals.items()],
+        {test: {name: PositionErrors(*3 * (error,)) for name, error in own.items()}
+         for test, own in errors.items()})
 
-    others = dict([rival("full", 0.0, 8.0), rival("mls.x1", 0.01, 4.0),
-                   rival("coarse.2", 0.03, 0.5), rival("nearest", 0.05, 0.0),
-                   rival("interpolated", 0.01, 0.0)])
+
+def recorded(found, names):
     run = Records()
-    record_beats(run, "beats", rival("drawn", 0.02, 2.0)[1], others, "")
-    assert {name: value for name, (value, _) in run.items()} == pytest.approx({
-        "beats.nearest": 2.5, "beats.interpolated": 0.5, "beats.full": 2.0})
+    record_rivals(run, "r", found, names, "", "")
+    return {name.removeprefix("r."): value for name, (value, _) in run.items() if "beats" in name}
+
+
+def test_reduced_runs_are_compared_with_the_cheapest_run_of_no_larger_error():
+    found = comparison({"drawn": (0.02, 2.0), "weighted": (0.005, 0.5), "full": (0.0, 8.0),
+                        "mls.x1": (0.01, 4.0), "coarse.2": (0.03, 0.1), "nearest": (0.05, 0.0),
+                        "interpolated": (0.01, 0.0)})
+    assert recorded(found, ("drawn", "weighted")) == pytest.approx({
+        "drawn.beats.nearest": 2.5, "drawn.beats.interpolated": 0.5, "drawn.beats.full": 2.0,
+        "weighted.beats.nearest": 10.0, "weighted.beats.interpolated": 2.0,
+        "weighted.beats.full": 16.0})
+
+
+def test_interpolation_is_compared_where_there_is_one():
+    found = comparison({"drawn": (0.05, 2.0), "full": (0.0, 8.0), "interpolated": (0.01, 0.0)}, {
+        "inside": {"drawn": 0.02, "full": 0.0, "interpolated": 0.01},
+        "outside": {"drawn": 0.08, "full": 0.0}})
+    assert recorded(found, ("drawn",))["drawn.beats.interpolated"] == pytest.approx(0.5)
 
 
 def test_a_reduced_run_that_broke_down_beats_none():
-    broken = Rival("drawn", PositionErrors(inf, inf, inf), 1.0, 0)
-    full = Rival("full", PositionErrors(0.0, 0.0, 0.0), 8.0, 0)
-    near = Rival("nearest", PositionErrors(0.1, 0.1, 0.1), 0.0, 0)
-    run = Records()
-    record_beats(run, "beats", broken, {"full": full, "nearest": near}, "")
-    assert [value for value, _ in run.values()] == [0.0, 0.0]
+    found = comparison({"drawn": (inf, 1.0), "full": (0.0, 8.0), "nearest": (0.1, 0.0)})
+    assert set(recorded(found, ("drawn",)).values()) == {0.0}
