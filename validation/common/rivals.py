@@ -221,10 +221,11 @@ def record_rivals(run, target, comparison, reduced, scale, origin):
     """
     for rival in comparison.rivals:
         cost = f"{rival.cpu:.3g} CPU s a run" if rival.cpu else "looked up"
-        count = sum(rival.name in own for own in comparison.errors.values())
+        tests = comparison.errors.values()
+        count = f"{sum(rival.name in own for own in tests)} of {len(tests)} tests"
         record_position_errors(run, f"{target}.{rival.name}", rival.errors, scale,
-                               f"{cost}; {rival.size / 1e6:.3g} MB; {count} of {len(comparison.errors)} "
-                               f"tests; {origin}", comparator="info")
+                               f"{cost}; {rival.size / 1e6:.3g} MB; {count}; {origin}",
+                               comparator="info")
     for name in reduced:
         record_lookups(run, f"{target}.{name}.beats", comparison, name, scale)
         record_cost(run, f"{target}.{name}.beats.full", comparison, (name, reduced), scale)
