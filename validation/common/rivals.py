@@ -9,6 +9,7 @@ points and times of a test run.
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from math import inf
 from time import process_time
 from typing import NamedTuple
@@ -21,7 +22,7 @@ from mpm_ref.rom.study.errors import PositionErrors, Squares
 from mpm_ref.rom.study.evaluate import level_of
 from mpm_ref.rom.study.full_model import field_of
 from mpm_ref.rom.study.run import step_count
-from mpm_ref.scene import build
+from mpm_ref.scene import SceneError, build
 from mpm_ref.simulate import simulate
 
 from .position_errors import record_position_errors
@@ -88,11 +89,22 @@ def full_source(name, scene):
                           particle_bytes(build(scene)))
 
 
-def coarse_source(name, scene, X):
-    """Return the `PositionSource` of points X (n, d) that go with a run on a coarser grid."""
-    def states():
-        yield from advected(build(scene), X)
-    return PositionSource(name, states, lambda x: x, particle_bytes(build(scene)) + 2 * X.nbytes)
+def coarse_sources(scenes, X):
+    """Yield the `PositionSource`s of points X (n, d) that go with runs of {times: scene} on coarser
+    grids. A scene is left out where the coarse sampling has no point in a body.
+    """
+    for times, scene in scenes.items():
+        try:
+            size = particle_bytes(build(scene))
+        except SceneError:
+            continue
+        yield PositionSource(f"coarse.{times}", partial(coarse_states, scene, X), lambda x: x,
+                             size + 2 * X.nbytes)
+
+
+def coarse_states(scene, X):
+    """Yield (t, x) of points X that go with a run."""
+    yield from advected(build(scene), X)
 
 
 def stretched(scene, factor):

@@ -91,8 +91,7 @@ def rivals_of(contest, number, factor):
     sources = [*reduced_sources(contest, number),
                rivals.full_source("full", rivals.stretched(scene, 1)),
                *rivals.mls_sources(scene, factor),
-               *(rivals.coarse_source(f"coarse.{times}", coarser(scene, times), test.X)
-                 for times in COARSER)]
+               *rivals.coarse_sources({times: coarser(scene, times) for times in COARSER}, test.X)]
     return TestRivals(test, sources, looked_up)
 
 

@@ -51,10 +51,10 @@ def rivals_of(one, value, factor):
     MLS-MPM.
     """
     test, study, scene = one.tests[value], one.study, one.study.run(value)
-    coarse = [rivals.coarse_source(f"coarse.{times}", study._replace(
-        coarser=study.coarser * times).run(value), test.X) for times in COARSER]
+    coarse = {times: study._replace(coarser=study.coarser * times).run(value)
+              for times in COARSER}
     sources = [*reduced_sources(one, value), rivals.full_source("full", rivals.stretched(scene, 1)),
-               *rivals.mls_sources(scene, factor), *coarse]
+               *rivals.mls_sources(scene, factor), *rivals.coarse_sources(coarse, test.X)]
     weights = interpolation_weights(one.runs.mu, np.array([value]))
     k = int(np.argmin(np.abs(one.runs.mu[:, 0] - value)))
     return TestRivals(TestRun(test.X, test.x[0], test.dt, 1), sources, {

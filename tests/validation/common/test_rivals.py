@@ -50,6 +50,17 @@ def test_tracers_outside_of_matter_stand_still():
     assert x.tolist() == far.tolist()
 
 
+def test_grids_on_which_a_body_has_no_point_are_left_out():
+    scene = scene_of_a_few_steps()
+    body = with_(scene.body[0], sampling=with_(scene.body[0].sampling, per_cell=1))
+    scenes = {k: with_(scene, dx=k * scene.dx, body=(body,)) for k in (2, 50)}
+    X = np.array([[0.5, 0.7]])
+    (coarse,) = rivals.coarse_sources(scenes, X)
+    assert coarse.name == "coarse.2"
+    *_, (_, x) = coarse.states()
+    assert 0.55 < x[0, 1] < 0.65        # after a fall of 0.14 s, 0.096 m
+
+
 def source(x, raises=None):
     def states():
         for level, state in enumerate(x):
