@@ -183,8 +183,9 @@ def evaluate_runs(
     """Compare reduced runs with full-order runs that were held out from training.
 
     The position errors, in three measures, stand beside those of the nearest states of the map, a
-    lower bound in most cases, and of the training run with the nearest parameters. Exit status:
-    0 success, 2 bad input, 3 a reduced run broke down, 4 a file could not be written, 130 Ctrl-C.
+    lower bound in most cases, of the training run with the nearest parameters, and of the linear
+    interpolation between training runs. Exit status: 0 success, 2 bad input, 3 a reduced run broke
+    down, 4 a file could not be written, 130 Ctrl-C.
     """
     with open_study(name) as study:
         picture = out or named(map_file, study, ".npz").with_suffix(".errors.png")
@@ -201,17 +202,20 @@ def evaluate_runs(
             runs = passing(unit="run", iterable=evaluate(study, model, snapshots),
                            total=len(study.test))
             found = list(runs)
-            trained = list(baselines.nearest_training_runs(study, folder, snapshots))
+            nearest, interpolated = (list(runs(study, folder, snapshots)) for runs in (
+                baselines.nearest_training_runs, baselines.interpolated_training_runs))
         all_runs, has_stress = total_errors(found, snapshots.X), study.tables.model == NSF
         draw(found, study.names, snapshots.dt, picture)
         if json:
             stress = {"stress": stress_facts(found)} if has_stress else {}
             print(as_json({"study": str(study.path), "picture": str(picture),
-                           **facts(study, found, all_runs), "baseline": baselines.facts(trained),
-                           **stress}))
+                           **facts(study, found, all_runs), "nearest_run": baselines.facts(nearest),
+                           "interpolated_run": baselines.facts(interpolated), **stress}))
         else:
             stress = stress_lines(found) if has_stress else ()
-            print("\n".join([*lines(study, found, all_runs), *baselines.lines(trained), *stress,
+            print("\n".join([*lines(study, found, all_runs),
+                             *baselines.lines(nearest, baselines.NEAREST),
+                             *baselines.lines(interpolated, baselines.INTERPOLATED), *stress,
                              str(picture)]))
         warn(breakdown_warnings(study, found))
     raise typer.Exit(0 if isfinite(all_runs[REDUCED].origin) else UNSTABLE)

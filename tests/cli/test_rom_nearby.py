@@ -1,4 +1,6 @@
-"""`mpm-ref rom evaluate`: the training run with the nearest parameters, taken as it is."""
+"""`mpm-ref rom evaluate`: training runs in place of the reduced model, the nearest one as it is and
+the linear interpolation between several.
+"""
 
 import json
 import shutil
@@ -11,7 +13,14 @@ import small_studies
 from command_line import mpm_ref
 
 from mpm_ref.rom.study import baselines, dataset
-from mpm_ref.rom.study.baselines import NearestRun, facts, lines, nearest_parameters
+from mpm_ref.rom.study.baselines import (
+    NEAREST,
+    TrainingBaseline,
+    facts,
+    interpolation_weights,
+    lines,
+    nearest_parameters,
+)
 from mpm_ref.rom.study.errors import Squares
 from mpm_ref.rom.study.study import load
 
@@ -60,15 +69,15 @@ def test_its_errors_are_those_of_its_states_beside_the_run_held_out(made, tmp_pa
     folder, *_, first = made
     number, taken, own = expected(made, slice(first, None))
     out = tmp_path / "e.png"
-    found = json.loads(evaluated(made, folder / "data", "--json", "--out", out))["baseline"]
+    found = json.loads(evaluated(made, folder / "data", "--json", "--out", out))["nearest_run"]
     assert found["all"] == pytest.approx(own, rel=1e-6)
-    assert found["runs"] == [{"number": number, "training_run": taken, **found["all"]}]
+    assert found["runs"] == [{"number": number, "weights": {str(taken): 1.0}, **found["all"]}]
     heading = "position errors [%] of the training run with the nearest parameters"
     told = evaluated(made, folder / "data", "--out", out).splitlines()
     at, = (k for k, line in enumerate(told) if line.startswith(heading))
     shares = [f"{100.0 * share:.3g}" for share in own.values()]
     assert [row.split() for row in told[at + 1:at + 4]] == [
-        ["run", "training", "run", "origin", "centroid", "displaced"],
+        ["run", "training", "runs", "origin", "centroid", "displaced"],
         [str(number), str(taken), *shares], ["all", *shares]]
 
 
@@ -79,9 +88,10 @@ def test_longer_steps_are_compared_at_the_same_states(made, tmp_path):
     study = small_nsf_studies.write(tmp_path, ("points = 20", "points = 20\ndt_factor = 1.5"))
     number, taken, own = expected(made, [3, 6])
     found = json.loads(evaluated(made, folder / "data", "--json", "--out", tmp_path / "e.png",
-                                 study=study))["baseline"]
+                                 study=study))["nearest_run"]
     assert found["all"] == pytest.approx(own, rel=1e-6)
-    assert [(one["number"], one["training_run"]) for one in found["runs"]] == [(number, taken)]
+    assert [(one["number"], one["weights"]) for one in found["runs"]] == [
+        (number, {str(taken): 1.0})]
 
 
 @pytest.mark.parametrize("damaged", [False, True])
@@ -93,9 +103,9 @@ def test_without_its_data_it_is_left_out(made, tmp_path, damaged):
     for k in study.train if damaged else ():
         (tmp_path / f"case-{k:03d}.h5").write_bytes(b"no results")
     out = tmp_path / "e.png"
-    found = json.loads(evaluated(made, tmp_path, "--json", "--out", out))["baseline"]
+    found = json.loads(evaluated(made, tmp_path, "--json", "--out", out))["nearest_run"]
     taken = nearest_parameters(study, number)[0]
-    assert found == {"all": None, "runs": [{"number": number, "training_run": taken}]}
+    assert found == {"all": None, "runs": [{"number": number, "weights": {str(taken): 1.0}}]}
     assert [str(number), str(taken), "no", "data"] in [
         row.split() for row in evaluated(made, tmp_path, "--out", out).splitlines()]
 
@@ -115,14 +125,14 @@ def test_of_runs_that_are_equally_near_the_better_one_is_taken(monkeypatch):
                             test=(1,))
     snapshots = SimpleNamespace(X=None, x=[None])
     off = {0: 3.0, 2: 2.0, 3: 1.0}
-    monkeypatch.setattr(baselines, "_squares", lambda study, folder, k, X, x: SimpleNamespace(
-        errors=SimpleNamespace(origin=off[k])))
+    monkeypatch.setattr(baselines, "_squares", lambda study, folder, weights, X, x: SimpleNamespace(
+        errors=SimpleNamespace(origin=off[next(iter(weights))])))
     assert nearest_parameters(study, 1) == [0, 2]
     (found,) = baselines.nearest_training_runs(study, "", snapshots)
-    assert found.training_run == 2
+    assert found.weights == {2: 1.0}
     off[2] = 4.0
     (found,) = baselines.nearest_training_runs(study, "", snapshots)
-    assert found.training_run == 0
+    assert found.weights == {0: 1.0}
 
 
 def test_all_runs_are_one_where_all_have_data(rng):
@@ -131,11 +141,52 @@ def test_all_runs_are_one_where_all_have_data(rng):
     for k in range(2):
         squares = Squares(X)
         squares.add(*x[k])
-        found.append(NearestRun(k, 7, squares))
+        found.append(TrainingBaseline(k, {7: 1.0}, squares))
     every = facts(found)
     assert every["all"] == pytest.approx(errors(X, x[:, 0], x[:, 1]))
-    assert [row.split()[0] for row in lines(found)[2:]] == ["0", "1", "all"]
-    some = [found[0], NearestRun(3, 2, None)]
+    assert [row.split()[0] for row in lines(found, NEAREST)[2:]] == ["0", "1", "all"]
+    some = [found[0], TrainingBaseline(3, {2: 1.0}, None)]
     assert facts(some) == {"all": None, "runs": [
-        every["runs"][0], {"number": 3, "training_run": 2}]}
-    assert [row.split()[:3] for row in lines(some)[3:]] == [["3", "2", "no"]]
+        every["runs"][0], {"number": 3, "weights": {"2": 1.0}}]}
+    assert [row.split()[:3] for row in lines(some, NEAREST)[3:]] == [["3", "2", "no"]]
+    outside = [found[0], TrainingBaseline(3, {}, None)]
+    assert [row.split() for row in lines(outside, NEAREST)[3:]] == [["3", "outside"]]
+
+
+def test_interpolated_states_are_weighted_sums(made, tmp_path):
+    folder, name, *_, first = made
+    study = load(folder / name)
+    (number,) = study.test
+    found = json.loads(evaluated(made, folder / "data", "--json", "--out", tmp_path / "e.png"))[
+        "interpolated_run"]
+    weights = {int(k): w for k, w in found["runs"][0]["weights"].items()}
+    mu = study.mu[:, 0]
+    assert sum(weights.values()) == pytest.approx(1.0)
+    assert sum(w * mu[k] for k, w in weights.items()) == pytest.approx(mu[number])
+    data = dataset.load(study, folder / "data", (number, *weights))
+    mean = np.tensordot(list(weights.values()), data.x[1:, first:].astype(float), 1)
+    rounding = 1e-3                 # of errors of 2e-5, as NSF's histories are single precision
+    assert found["all"] == pytest.approx(errors(data.X, mean, data.x[0, first:].astype(float)),
+                                         rel=rounding)
+
+
+def test_one_parameter_is_interpolated_between_its_neighbours():
+    mu = np.array([[3.0], [0.0], [1.0]])
+    assert interpolation_weights(mu, np.array([1.5])) == pytest.approx({2: 0.75, 0: 0.25})
+    assert interpolation_weights(mu, np.array([1.0])) == {2: 1.0}
+    assert interpolation_weights(mu, np.array([0.0])) == {1: 1.0}
+    assert interpolation_weights(mu, np.array([3.1])) == {}
+
+
+def test_several_parameters_are_interpolated_within_a_simplex(rng):
+    """Linear functions are met exactly, on whatever scales the parameters have; one that does not
+    vary is left out, but has to be the same.
+    """
+    mu = np.column_stack([rng.uniform(size=12), 1e6 * rng.uniform(size=12), np.full(12, 2.0)])
+    target = np.array([*mu[:, :2].mean(axis=0), 2.0])
+    weights = interpolation_weights(mu, target)
+    assert 1 < len(weights) <= 3
+    assert sum(w * mu[k] for k, w in weights.items()) == pytest.approx(target)
+    assert min(weights.values()) > 0.0
+    assert interpolation_weights(mu, np.array([2.0, 0.0, 2.0])) == {}
+    assert interpolation_weights(mu, np.array([*target[:2], 3.0])) == {}

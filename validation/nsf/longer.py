@@ -16,10 +16,10 @@ from mpm_ref.rom.study.dataset import simulate_history
 from mpm_ref.rom.study.errors import PositionErrors
 from mpm_ref.rom.study.evaluate import history_reference, level_of, path_errors, stress_share
 from mpm_ref.rom.study.full_model import field_of, nsf_full_model
-from mpm_ref.rom.study.run import step_count
 from mpm_ref.simulate import simulate
 
 from ..common.registry import experiment
+from ..common.rivals import stretched
 from ..common.scenes import with_
 from .factors import REPEATS, seconds
 from .studies import cake, metal
@@ -70,12 +70,6 @@ def longer(run):
                       one.stress, time, times[0] / time)
                      for value, one in zip(values, runs, strict=True)]
     run.table("steps", COLUMNS, rows)
-
-
-def stretched(scene, factor):
-    """Return the scene with steps `factor` times as long, each of which is a frame."""
-    return with_(scene, dt=factor * scene.dt, steps=step_count(scene, factor), every=1,
-                 interval=None, unstable="allow")
 
 
 def run_times(scene, repeats):

@@ -5,11 +5,10 @@ particles of the full-order run, and the width of networks.
 from collections.abc import Callable
 from typing import NamedTuple
 
-import numpy as np
-
 from mpm_ref.rom.study.full_model import nsf_full_model
 
 from ..common.registry import experiment
+from ..common.rivals import nbytes
 from ..common.weights_needed import load_available
 from ..extremes.nsf_runs import scenes
 from ..nsf.errors import COLUMNS, error_rows, mean, record_mean
@@ -68,20 +67,6 @@ def record_change(run, name, change, full):
                 comparator="info")
     return [(name, knob, sizes.r, sizes.modes, sizes.tau, sizes.C, sizes.smoothing, *row[1:], size,
              full) for row in rows]
-
-
-def nbytes(record):
-    """Return the bytes of all arrays of nested records, each counted once."""
-    return sum(a.nbytes for a in {id(a): a for a in arrays_of(record)}.values())
-
-
-def arrays_of(record):
-    """Yield the arrays of nested records."""
-    for a in record:
-        if isinstance(a, np.ndarray):
-            yield a
-        elif isinstance(a, tuple):
-            yield from arrays_of(a)
 
 
 def particle_bytes(study):

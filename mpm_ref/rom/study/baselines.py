@@ -1,11 +1,16 @@
-"""The training run whose parameters are nearest to those of a run that was held out, taken for it
-unchanged. A reduced run with a larger error gains nothing in position over looking it up; where
-many training runs cover one parameter, that may say more of the test than of the model.
+"""Training runs in place of a reduced model: the run whose parameters are nearest to those of a
+run that was held out, taken unchanged, and the linear interpolation between training runs in the
+parameters.
+
+A reduced run with a larger error gains nothing in position over looking them up; where many
+training runs cover one parameter, that may say more of the test than of the model.
 """
 
+from contextlib import ExitStack
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import Delaunay
 
 from ...store.results import BadResults, Results
 from .dataset import frame_field
@@ -14,26 +19,41 @@ from .evaluate import levels_of
 from .generate import file_of, is_finished
 
 EVEN = 1e-9         # of a squared distance: training runs within it are equally near
+LEAST = 1e-12       # weight of a training run that an interpolation uses
+NEAREST, INTERPOLATED = "the training run with the nearest parameters, taken as it is", (
+    "the linear interpolation between training runs")
 
 
-class NearestRun(NamedTuple):
-    """The training run nearest to a run that was held out."""
+class TrainingBaseline(NamedTuple):
+    """Training runs in place of a run that was held out."""
 
     number: int             # of the one that was held out
-    training_run: int       # number of the training run
+    weights: dict           # {number of a training run: its weight}; empty where the parameters lie
+                            # outside those of training
     squares: Squares | None     # of its errors; None where it has no data that can be read
 
 
 def nearest_training_runs(study, folder, data):
-    """Yield a `NearestRun` of each run of `Snapshots` or `Histories`, those of `study.test`: over
-    the time levels that `evaluate` compares. Of several training runs that are equally near it is
-    the one with the least error.
+    """Yield the `TrainingBaseline` of the nearest training run for each run of `Snapshots` or
+    `Histories`, those of `study.test`: over the time levels that `evaluate` compares. Of several
+    training runs that are equally near it is the one with the least error.
     """
     for number, x in zip(study.test, data.x, strict=True):
-        runs = [NearestRun(number, k, _squares(study, folder, k, data.X, x))
+        runs = [baseline(study, folder, number, {k: 1.0}, (data.X, x))
                 for k in nearest_parameters(study, number)]
         yield min((run for run in runs if run.squares), key=lambda run: run.squares.errors.origin,
                   default=runs[0])
+
+
+def interpolated_training_runs(study, folder, data):
+    """Yield the `TrainingBaseline` of the linear interpolation for each run, as
+    `nearest_training_runs` does.
+    """
+    train = np.array(study.train)
+    for number, x in zip(study.test, data.x, strict=True):
+        weights = interpolation_weights(study.mu[train], study.mu[number])
+        yield baseline(study, folder, number, {int(train[k]): w for k, w in weights.items()},
+                       (data.X, x))
 
 
 def nearest_parameters(study, number):
@@ -47,26 +67,78 @@ def nearest_parameters(study, number):
     return [study.train[k] for k in np.flatnonzero(squared <= squared.min() + EVEN)]
 
 
-def _squares(study, folder, number, X, x):
-    """Return the `Squares` of a training run compared with positions x (k + 1, n, d) of points X,
-    or None.
+def interpolation_weights(mu, target):
+    """Return {row: weight} of the linear interpolation in parameters mu (runs, parameters) at a
+    target (parameters,); empty where it lies outside their convex hull.
+
+    One parameter is interpolated between its two neighbours, several within the simplex of a
+    Delaunay triangulation, each parameter measured in its range.
     """
-    path, squares = file_of(folder, number), Squares(X)
-    first = study.method.first_level
-    levels = sorted(level for level in levels_of(study) if first <= level < len(x))
+    span = np.ptp(mu, axis=0)
+    varies = span > 0.0
+    if not np.allclose(target[~varies], mu[0, ~varies]):
+        return {}
+    points, point = mu[:, varies] / span[varies], target[varies] / span[varies]
+    rows, weights = _barycentric(points, point) if points.shape[1] > 1 else _between(
+        points[:, 0], float(point[0]))
+    return {int(k): float(w) for k, w in zip(rows, weights, strict=True) if w > LEAST}
+
+
+def _between(points, point):
+    """Return the neighbours of a point on a line, and their weights."""
+    order = np.argsort(points, kind="stable")
+    ordered = points[order]
+    if not ordered[0] <= point <= ordered[-1]:
+        return (), ()
+    right = max(int(np.searchsorted(ordered, point)), 1)
+    low, high = ordered[right - 1], ordered[right]
+    share = (point - low) / (high - low)
+    return order[right - 1:right + 1], (1.0 - share, share)
+
+
+def _barycentric(points, point):
+    """Return the corners of the simplex around a point, and its barycentric coordinates."""
+    mesh = Delaunay(points)
+    simplex = int(mesh.find_simplex(point))
+    if simplex < 0:
+        return (), ()
+    affine = mesh.transform[simplex]
+    first = affine[:-1] @ (point - affine[-1])
+    return mesh.simplices[simplex], (*first, 1.0 - first.sum())
+
+
+def baseline(study, folder, number, weights, reference):
+    """Return the `TrainingBaseline` of weighted training runs, compared with reference = (points X
+    (n, d), positions x (k + 1, n, d)).
+    """
+    return TrainingBaseline(number, weights, _squares(study, folder, weights, *reference))
+
+
+def _squares(study, folder, weights, X, x):
+    """Return the `Squares` of weighted training runs compared with positions x (k + 1, n, d) of
+    points X, or None.
+    """
+    first, squares = study.method.first_level, Squares(X)
+    paths = {k: file_of(folder, k) for k in weights}
     try:
-        if not is_finished(path, study.scene(study.mu[number])):
+        if not weights or not all(is_finished(path, study.scene(study.mu[k]))
+                                  for k, path in paths.items()):
             return None
-        with Results(path) as results:
-            for level in levels:
-                squares.add(frame_field(results, "x", level), x[level].astype(float))
+        with ExitStack() as files:
+            runs = {k: files.enter_context(Results(path)) for k, path in paths.items()}
+            for level in sorted(level for level in levels_of(study) if first <= level < len(x)):
+                mean = sum(weight * frame_field(runs[k], "x", level)
+                           for k, weight in weights.items())
+                squares.add(mean, x[level].astype(float))
     except BadResults:
         return None
     return squares
 
 
 def total_errors(runs):
-    """Return the `PositionErrors` of all `NearestRun`s together; None unless all have data."""
+    """Return the `PositionErrors` of all `TrainingBaseline`s together; None unless all have
+    data.
+    """
     if not all(run.squares for run in runs):
         return None
     total = Squares(runs[0].squares.X)
@@ -75,23 +147,30 @@ def total_errors(runs):
 
 
 def facts(runs):
-    """Return `NearestRun`s as plain values, errors as shares."""
+    """Return `TrainingBaseline`s as plain values, errors as shares."""
     total = total_errors(runs)
     return {"all": total and total._asdict(), "runs": [
-        {"number": run.number, "training_run": run.training_run,
+        {"number": run.number, "weights": {str(k): w for k, w in run.weights.items()},
          **(run.squares.errors._asdict() if run.squares else {})} for run in runs]}
 
 
-def lines(runs):
-    """Return `NearestRun`s as a table in per cent."""
-    rows = [("run", "training run", "origin", "centroid", "displaced")]
+def lines(runs, kind):
+    """Return `TrainingBaseline`s as a table in per cent; kind: NEAREST or INTERPOLATED."""
+    rows = [("run", "training runs", "origin", "centroid", "displaced")]
     for run in runs:
-        shares = _in_per_cent(run.squares.errors) if run.squares else ["no data"]
-        rows.append((run.number, run.training_run, *shares))
+        shares = _in_per_cent(run.squares.errors) if run.squares else [
+            "no data" if run.weights else "outside"]
+        rows.append((run.number, " + ".join(map(_term, run.weights.items())), *shares))
     total = total_errors(runs)
     rows += [("all", "", *_in_per_cent(total))] if total else []
-    return ["position errors [%] of the training run with the nearest parameters, taken as it is",
+    return [f"position errors [%] of {kind}",
             *("".join(f"{cell:>14}" for cell in row) for row in rows)]
+
+
+def _term(weighted):
+    """Return a training run with its weight as text: `3`, or `0.25*3`."""
+    number, weight = weighted
+    return str(number) if weight == 1.0 else f"{weight:.2f}*{number}"
 
 
 def _in_per_cent(errors: PositionErrors):
