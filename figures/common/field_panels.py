@@ -29,13 +29,13 @@ EVERYWHERE = (-np.inf, np.inf)
 
 
 class RunView(NamedTuple):
-    """How the runs of an experiment are shown: its id, the study of its runs, what the parameter is
-    called ("{}": its value), and the camera.
+    """The runs that a figure shows, and its camera: the id of their experiment, their study, and
+    the label of a run ("{}": the value of its parameter).
     """
 
     experiment: str
     study: object           # function of `validation.nsf.studies`
-    words: str = "{}"
+    label: str = "{}"
     turn: float = 25.0
     lift: float = 15.0
 
@@ -49,9 +49,9 @@ def reduced_and_full(results, shown, runs=("true", "ours"), choice=slice(1)):
     box = box_of_full_order(bodies, values)
     for value in values:
         for run in runs:
-            words = shown.words.format(value)
+            label = shown.label.format(value)
             contents += time_row(bodies[f"{value}_{run}"], COLOURS[run],
-                                 f"{words}\n{LABELS[run]}" if run == "true" else LABELS[run], box)
+                                 f"{label}\n{LABELS[run]}" if run == "true" else LABELS[run], box)
     return over_time(contents, bodies["levels"], shown)
 
 
@@ -63,7 +63,7 @@ def ends_by_value(results, shown, runs=("true", "ours")):
     for run in runs:
         for value in values:
             x = bodies[f"{value}_{run}"]
-            title = f"{shown.words.format(value)}, {end}" if run == runs[0] else ""
+            title = f"{shown.label.format(value)}, {end}" if run == runs[0] else ""
             contents.append(clipped_panel(x[-1], COLOURS[run], spread(x[0]), box)._replace(
                 title=title, side=LABELS[run] if value == values[0] else ""))
     return pictures(contents, View(len(values), shown.turn, shown.lift))
@@ -79,7 +79,7 @@ def stress_panels(results, shown):
     for run, (x, tau) in runs.items():
         colours, colour_scale = shades(np.nan_to_num(tau), "viridis", top)
         distance = spread(x[0])
-        side = LABELS[run] if contents else f"{shown.words.format(value)}\n{LABELS[run]}"
+        side = LABELS[run] if contents else f"{shown.label.format(value)}\n{LABELS[run]}"
         contents += [clipped_panel(one, colour, distance)._replace(side="" if k else side)
                      for k, (one, colour) in enumerate(zip(x, colours, strict=True))]
     return over_time(contents, bodies["levels"], shown, colour_scale, r"$|\tau|$ [Pa]")
@@ -90,7 +90,7 @@ def training_range(results, shown):
     bodies, train = read(results.folder, shown.experiment), shown.study().train
     contents = [panel for end, value in (("first", train[0]), ("last", train[-1]))
                 for panel in time_row(bodies[end], COLOURS["true"],
-                                      shown.words.format(f"{value:g}"))]
+                                      shown.label.format(f"{value:g}"))]
     return over_time(contents, bodies["levels"], shown)
 
 

@@ -47,14 +47,14 @@ def draw(results):
     return finish(figure, (), None, "")
 
 
-def cell_rows(table, column, words):
+def cell_rows(table, column, label):
     """Return {label: {method: (solves, converged, unsound, iterations)}} of a table of solves, a
     row for each state, which a run's name tells after its dimension and modulus.
     """
-    labels = np.array([words.format(state_of(value)) for value in table[column]])
-    return {label: {method: cell(table, (labels == label) & (table["method"] == method))
-                    for method in dict.fromkeys(table["method"])}
-            for label in dict.fromkeys(labels)}
+    labels = np.array([label.format(state_of(value)) for value in table[column]])
+    return {row: {method: cell(table, (labels == row) & (table["method"] == method))
+                  for method in dict.fromkeys(table["method"])}
+            for row in dict.fromkeys(labels)}
 
 
 def state_of(value):

@@ -47,7 +47,8 @@ def test_errors_are_of_the_whole_run_of_frames_and_of_doing_nothing(tmp_path, mo
         monkeypatch.setattr(identified, maker, lambda law: law)
     monkeypatch.setattr(identified, "trajectory", lambda name: short_run())
     monkeypatch.setattr(identified, "STEPS", (1, identified.FRAME))
-    assert run_all([identified.table5.experiment], RunSetting("quick", tmp_path, targets=targets.load())) == []
+    setting = RunSetting("quick", tmp_path, targets=targets.load())
+    assert run_all([identified.table5.experiment], setting) == []
     results = ProfileResults(tmp_path)
     found = {r.target.removeprefix("nclaw.table5."): r.value
              for r in results.records("nclaw.table5")}
