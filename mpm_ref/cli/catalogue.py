@@ -3,8 +3,9 @@
 from pathlib import Path
 
 from ..scene import SceneError
+from ..store.checksums import has_head
 
-HDF5 = b"\x89HDF\r\n\x1a\n"      # how such files begin
+HDF5 = b"\x89HDF\r\n\x1a\n"      # how such files begin, but for results
 SCENES = (".toml", ".json")      # suffixes of their files
 PACKAGE = Path(__file__).resolve().parents[1]
 
@@ -81,8 +82,10 @@ def _wrong_with(file):
 
 
 def is_hdf5(name):
-    """Return whether a name is that of a file with the signature of HDF5."""
+    """Return whether a name is that of results, or of another file with HDF5's signature."""
     if not Path(name).is_file():
         return False
+    if has_head(name):
+        return True
     with open(name, "rb") as file:
         return file.read(len(HDF5)) == HDF5

@@ -10,7 +10,8 @@ from ..monitor import Unstable
 from ..scene import SceneError
 from ..store.atomic import NotWritten
 from ..store.checkpoint import BadCheckpoint
-from ..store.journal import Damaged, InUse
+from ..store.checksums import Damaged
+from ..store.journal import InUse
 from ..store.results import BadResults
 from ..store.running import Refused
 from ..timestep import TooLarge
