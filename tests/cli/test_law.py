@@ -20,7 +20,7 @@ from mpm_ref.nclaw.train import train as law_trainer  # noqa: E402
 from mpm_ref.nclaw.train.labeled import labels_of, train_labeled  # noqa: E402
 from mpm_ref.nclaw.train.observations import trajectory_of  # noqa: E402
 from mpm_ref.scene import digest  # noqa: E402
-from mpm_ref.store.journal import JournaledFile
+from mpm_ref.store.journal import JournaledFile  # noqa: E402
 from mpm_ref.store.running import Options, checkpoint_of, run  # noqa: E402
 from mpm_ref.store.writer import StoredFields  # noqa: E402
 from mpm_ref.trajectories import observed  # noqa: E402
