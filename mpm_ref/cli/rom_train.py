@@ -40,7 +40,7 @@ from .options import (
     require_folder_name,
     require_free,
 )
-from .terminal import announce_compilation_elsewhere, passing, tell, warn
+from .terminal import announce_compilation_of_workers, passing, tell, warn
 
 MADE, CONTINUED, THERE = "made", "continued", "was there"
 STATUS = {UNSTABLE: errors.UNSTABLE, NOT_WRITTEN: errors.NOT_WRITTEN}
@@ -72,7 +72,7 @@ def make_data(
             if bar.disable:
                 print(f"{folder}: {counted(len(study.mu), 'run')} of {study.path.stem}, "
                       f"{min(workers, len(study.mu))} at a time", flush=True)
-            announce_compilation_elsewhere()
+            announce_compilation_of_workers()
             for done in generate(study, folder, workers):
                 if done.why == INTERRUPTED:
                     raise KeyboardInterrupt

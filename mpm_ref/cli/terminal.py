@@ -21,7 +21,7 @@ FIRST, EVERY = 10.0, 60.0       # [s] of silence before the first line of progre
 
 
 class Telling:
-    """Whether lines of progress are printed, and whether compilation was announced."""
+    """Hold whether lines of progress are printed, and whether compilation was announced."""
 
     active = False
     compiling = False
@@ -75,7 +75,7 @@ def announce_compilation():
         tell(COMPILING)
 
 
-def announce_compilation_elsewhere():
+def announce_compilation_of_workers():
     """Tell that other processes, which print nothing, will compile, if no kernel is stored."""
     if jit.CACHE_DIR is None or not any(Path(jit.CACHE_DIR).glob("*.kernel")):
         announce_compilation()

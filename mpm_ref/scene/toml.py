@@ -30,7 +30,7 @@ def read_tables(path):
     path = Path(path)
     try:
         if path.exists() and not path.is_file():
-            raise SceneError(f"{path}: this is no file; expected one in TOML")
+            raise SceneError(f"{path}: cannot be read (this is no file); expected one in TOML")
         if path.stat().st_size > LARGEST:
             raise SceneError(f"{path}: has {size_text(path.stat().st_size)}, expected a text of at "
                              f"most {size_text(LARGEST)}; put arrays of particles into an NPZ file")

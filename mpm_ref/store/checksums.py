@@ -31,7 +31,7 @@ def digest(data):
     return blake2b(data, digest_size=DIGEST).digest()
 
 
-class Blocks:
+class BlockDigests:
     """The digests of the blocks of `size` bytes of content."""
 
     def __init__(self, size=0, digests=b""):
@@ -75,7 +75,7 @@ def has_head(path):
 
 
 def read_blocks(file):
-    """Return the `Blocks` of an open file. Raises `Damaged` where head or digests are damaged."""
+    """Return the `BlockDigests` of an open file. Raises `Damaged` where they or the head are."""
     handle, n = file.fileno(), len(MAGIC) + 8 + DIGEST
     head = os.pread(handle, HEAD, 0)
     text = head[:n]
@@ -85,11 +85,11 @@ def read_blocks(file):
     digests = os.pread(handle, -(-size // BLOCK) * DIGEST, size)
     if digest(digests) != text[-DIGEST:]:
         raise Damaged("it is cut short, or its checksums are damaged")
-    return Blocks(size, digests)
+    return BlockDigests(size, digests)
 
 
 def require_intact(file):
-    """Return the `Blocks` of an open file. Raises `Damaged` unless all of them fit."""
+    """Return the `BlockDigests` of an open file. Raises `Damaged` unless all of them fit."""
     blocks = read_blocks(file)
     for k in range(blocks.count()):
         if not blocks.fits(lambda at, n: os.pread(file.fileno(), n, at), k):

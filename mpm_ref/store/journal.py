@@ -27,7 +27,7 @@ import h5py
 import numpy as np
 
 from .atomic import replacing, sync, write_error
-from .checksums import Blocks, Damaged, require_intact
+from .checksums import BlockDigests, Damaged, require_intact
 
 PAGE = 4096
 MAGIC = b"mpm_ref journal\n"
@@ -68,7 +68,7 @@ class JournaledFile(io.RawIOBase):
 
     def _opened_blocks(self, new):
         try:
-            return Blocks() if new else require_intact(self._file)
+            return BlockDigests() if new else require_intact(self._file)
         except Damaged as fault:
             raise Damaged(f"{self.path} is damaged: {fault}; take a copy, or start anew") from None
 

@@ -66,10 +66,10 @@ def test_a_quiet_command_and_one_that_is_tested_tell_nothing(telling, capsys, mo
 def test_processes_that_will_compile_are_told_of(telling, capsys, monkeypatch, tmp_path):
     (tmp_path / "f.kernel").write_text("")
     monkeypatch.setattr(terminal.jit, "CACHE_DIR", str(tmp_path))
-    terminal.announce_compilation_elsewhere()
+    terminal.announce_compilation_of_workers()
     assert capsys.readouterr().err == ""
     (tmp_path / "f.kernel").unlink()
-    terminal.announce_compilation_elsewhere()
+    terminal.announce_compilation_of_workers()
     assert capsys.readouterr().err == f"mpm-ref: {terminal.COMPILING}\n"
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from small_runs import ENERGY, colliding, frame_of, state_of
 
 from mpm_ref.store import checksums
-from mpm_ref.store.checksums import BLOCK, HEAD, Blocks, Damaged, require_intact
+from mpm_ref.store.checksums import BLOCK, HEAD, BlockDigests, Damaged, require_intact
 from mpm_ref.store.results import BadResults, Results
 from mpm_ref.store.writer import StoredFields, create, reopen
 
@@ -40,7 +40,7 @@ def everything(path):
 
 @given(st.lists(pieces, min_size=1, max_size=6))
 def test_only_changed_blocks_are_hashed_and_all_fit(writes):
-    content, blocks, read_at = bytearray(HEAD), Blocks(), []
+    content, blocks, read_at = bytearray(HEAD), BlockDigests(), []
 
     def read(at, n):
         read_at.append(at // BLOCK)
@@ -54,7 +54,7 @@ def test_only_changed_blocks_are_hashed_and_all_fit(writes):
         blocks.update(read, len(content), [(at, at + len(data))])
         first = min(at, old) // BLOCK
         assert len(read_at) == len(set(read_at)) <= -(-len(content) // BLOCK) - first
-    fresh = Blocks()
+    fresh = BlockDigests()
     fresh.update(read, len(content), [])
     assert fresh.digests == blocks.digests
     assert fresh.head() == blocks.head()
