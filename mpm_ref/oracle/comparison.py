@@ -90,7 +90,10 @@ def require_whole(path, expected):
         raise NotComparable(f"{path} is damaged: its bytes are not those that were written; copy "
                             "it again from where it came, or make it again")
     if found == UNSEALED and expected == RECORDED:
-        raise NotComparable(f"{path} is cut short, or no golden file; expected {expected}")
+        why = ("it is empty" if Path(path).stat().st_size == 0 else
+               "it is cut short, or no golden file" if h5py.is_hdf5(path) else
+               "it cannot be read as HDF5")
+        raise NotComparable(f"{path}: {why}; expected {expected}")
 
 
 def given_arrays(group, bodies):

@@ -24,7 +24,8 @@ def test_every_flipped_bit_is_told(golden, other, tmp_path):
     for at in (0, 3792, len(content) - 1, *rng.integers(len(content), size=40)):
         bad.write_bytes(content[:at] + bytes([content[at] ^ 1 << rng.integers(8)])
                         + content[at + 1:])
-        with pytest.raises(oracle.NotComparable, match=r"is damaged: its bytes|is cut short, or"):
+        with pytest.raises(oracle.NotComparable,
+                           match=r"is damaged: its bytes|it is cut short, or|be read as HDF5"):
             oracle.check(bad, other)
 
 
@@ -32,7 +33,7 @@ def test_every_cut_is_told(golden, other, tmp_path):
     bad, content = tmp_path / "bad.h5", golden.read_bytes()
     for share in (0.0, 1e-3, 0.5, 0.99):
         bad.write_bytes(content[:int(share * len(content))])
-        with pytest.raises(oracle.NotComparable, match="is cut short, or no golden file"):
+        with pytest.raises(oracle.NotComparable, match=r"it is cut short, or no golden|it is empty"):
             oracle.check(bad, other)
 
 
