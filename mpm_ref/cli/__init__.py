@@ -6,6 +6,7 @@ import typer
 
 from .. import __version__
 from . import info, law, oracle, rom, run, view
+from .terminal import tell_progress
 
 app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False, add_completion=False,
                   help="Run scenes with the material point method, explicit or implicit, and "
@@ -30,5 +31,6 @@ def version(
 
 
 def main():
-    """Entry point of the console script."""
+    """Run the command line."""
+    tell_progress()
     app(prog_name="mpm-ref")

@@ -1,10 +1,14 @@
 """Find the bundled scenes and studies by their names."""
 
+from difflib import get_close_matches
 from pathlib import Path
 
 from ..scene import SceneError
+from ..store.checksums import has_head
 
-HDF5 = b"\x89HDF\r\n\x1a\n"      # how such files begin
+HDF5 = b"\x89HDF\r\n\x1a\n"      # how such files begin, but for results
+LISTS = {"scenes": "scenes", "studies": "rom studies"}      # commands
+LONGEST = 100                    # characters of a name that are compared with others
 SCENES = (".toml", ".json")      # suffixes of their files
 PACKAGE = Path(__file__).resolve().parents[1]
 
@@ -29,6 +33,11 @@ def _bundled(folder):
 def find_scene(name):
     """Return the path of a scene, given by its file or a bundled name. Raises SceneError."""
     file = Path(name)
+    if file.suffix.lower() == ".npz" and file.is_file():
+        what = "the file is empty" if file.stat().st_size == 0 else "the file is no scene"
+        raise SceneError(f"{name}: {what}; expected a scene (a TOML file or a bundled name), "
+                         "or for `mpm-ref info` a map or laws, as `mpm-ref rom train` and "
+                         "`mpm-ref law train` write them")
     if file.suffix.lower() in (".h5", ".hdf5"):
         raise SceneError(f"{name}: {_wrong_with(file)}; expected a scene (a TOML file or a bundled "
                          "name), or for `mpm-ref info` what `mpm-ref run` wrote")
@@ -40,9 +49,8 @@ def find_scene(name):
     if file.is_dir():
         raise SceneError(f"{name}: this is a folder; expected a scene (a TOML file or a bundled "
                          "name), or for `mpm-ref info` what `mpm-ref run` wrote")
-    known = ", ".join(scenes) or "not installed"
-    raise SceneError(f"{name}: there is no such file, nor a bundled scene of that name; bundled "
-                     f"scenes: {known}")
+    raise SceneError(f"{name}: there is no such file, nor a bundled scene of that name; "
+                     f"{_meant(name, scenes, 'scenes')}")
 
 
 def find_study(name):
@@ -52,8 +60,15 @@ def find_study(name):
     studies = bundled_studies()
     if name not in studies:
         raise SceneError(f"{name}: there is no such file, nor a bundled study of that name; "
-                         f"bundled studies: {', '.join(studies) or 'not installed'}")
+                         f"{_meant(name, studies, 'studies')}")
     return studies[name]
+
+
+def _meant(name, bundled, what):
+    """Return the bundled name that is nearest to a name, or all of them."""
+    if near := get_close_matches(name[:LONGEST], bundled, 1):
+        return f"did you mean {near[0]}? `mpm-ref {LISTS[what]}` lists all {what}"
+    return f"bundled {what}: {', '.join(bundled) or 'not installed'}"
 
 
 def study_named(name):
@@ -81,8 +96,10 @@ def _wrong_with(file):
 
 
 def is_hdf5(name):
-    """Return whether a name is that of a file with the signature of HDF5."""
+    """Return whether a name is that of results, or of another file with HDF5's signature."""
     if not Path(name).is_file():
         return False
+    if has_head(name):
+        return True
     with open(name, "rb") as file:
         return file.read(len(HDF5)) == HDF5

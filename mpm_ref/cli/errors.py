@@ -1,5 +1,7 @@
 """End a command on an error with one line on stderr and an exit status, without traceback."""
 
+import errno
+import re
 import sys
 from contextlib import contextmanager
 
@@ -10,11 +12,14 @@ from ..monitor import Unstable
 from ..scene import SceneError
 from ..store.atomic import NotWritten
 from ..store.checkpoint import BadCheckpoint
-from ..store.journal import Damaged, InUse
+from ..store.checksums import Damaged
+from ..store.journal import InUse
 from ..store.results import BadResults
 from ..store.running import Refused
 from ..timestep import TooLarge
 
+LONGEST, LONGEST_WORD, SHOWN = 2000, 300, 100       # characters of a sentence, of a word in it
+UNREADABLE = (errno.ENAMETOOLONG, errno.EACCES, errno.ELOOP)    # of files named by the user
 BAD_INPUT, UNSTABLE, NOT_WRITTEN, INTERRUPT = 2, 3, 4, 130
 FAULTS = (SceneError, TooLarge, OutOfRange, Refused, BadCheckpoint, BadResults, InUse, Damaged)
 
@@ -28,6 +33,10 @@ def exit_on_errors():
         end(fault, BAD_INPUT)
     except NotWritten as fault:
         end(fault, NOT_WRITTEN)
+    except OSError as fault:
+        if fault.errno not in UNREADABLE:
+            raise
+        end(f"{fault.filename}: {fault.strerror}; name another file", BAD_INPUT)
     except KeyboardInterrupt:
         end("interrupted", INTERRUPT)
 
@@ -63,5 +72,15 @@ def at_start(name):
 
 def end(message, status):
     """Print a sentence on stderr and end the command with an exit status."""
-    print(f"mpm-ref: {' '.join(str(message).split())}", file=sys.stderr)
+    print(f"mpm-ref: {shortened(' '.join(str(message).split()))}", file=sys.stderr)
     raise typer.Exit(status)
+
+
+def shortened(sentence):
+    """Return a sentence without the middle of its long words, and of itself if it is long."""
+    sentence = re.sub(rf"\S{{{LONGEST_WORD},}}", lambda word: _ends(word[0], SHOWN), sentence)
+    return sentence if len(sentence) <= LONGEST else _ends(sentence, LONGEST)
+
+
+def _ends(text, length):
+    return f"{text[:length // 2]}...{text[-length // 2:]}"

@@ -34,7 +34,7 @@ from .options import (
     require_free,
     step_length_warnings,
 )
-from .terminal import as_json, passing, warn
+from .terminal import as_json, passing, tell, warn
 
 app = typer.Typer(no_args_is_help=True, help="Train laws on the motion of a scene, compare them "
                   "with the true ones, and export them to other programs.")
@@ -143,6 +143,7 @@ def export(
             if out.exists() and out.samefile(file):
                 raise ValueError(f"--out {out}: these are the weights; name another file")
             require_free(out, overwrite)
+            tell("computing answers of the laws for test")
             tables = export_tables(laws)
         with writing():
             write(out, tables)
@@ -179,6 +180,7 @@ def plot(
             if not 0.0 < strain < 1.0:
                 raise ValueError(f"--strain {strain:g}: expected a number above 0 and below 1")
             warn(step_length_warnings(laws, problem))
+            tell("comparing the laws along paths of strain")
             found = compare_with_truth(laws, problem, strain, steps)
         draw_curves(found, f"{file.name} against {problem.title or against}: {steps} steps of "
              f"{problem.clock.dt:g} s to a strain of {strain:g}", out)

@@ -11,8 +11,8 @@ from ..materials.learned.weights import PARTS, dim_of
 from ..nclaw import export
 from ..nclaw.gnn import weights as gnn_weights
 from ..nclaw.study.study import SYS_ID, load
-from ..rom.study.study_file import read_toml
 from ..scene import SceneError
+from ..scene.toml import read_tables
 from ..store.text import counted
 from ..store.weights_file import read_provenance, require_format
 from . import provenance
@@ -58,7 +58,7 @@ def read_json_layers(path):
         return None
     try:
         found = json.loads(path.read_bytes())
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
     if not isinstance(found, dict) or not is_exported(found):
         return None
@@ -202,7 +202,7 @@ OWN = {"scene", "method", "laws", "train"}      # keys that no scene has
 def is_law_study(path):
     """Return whether a file is a law study, even one with invalid tables."""
     try:
-        return bool(OWN & set(read_toml(path)))
+        return bool(OWN & set(read_tables(path)))
     except SceneError:
         return False
 

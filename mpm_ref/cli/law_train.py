@@ -31,7 +31,7 @@ from .options import (
     require_free,
     training_error_text,
 )
-from .terminal import passing, warn
+from .terminal import passing, tell, warn
 
 SAID = 10           # lines about a training where there is no terminal
 LEAST_OFF = 1e-6    # [dx] root mean squared error of laws in their first epoch
@@ -108,6 +108,7 @@ def motion(study, data):
     problem = study.problem()
     with threads_for(problem.bodies):
         if data is None:
+            tell(f"computing the full-order run of {study.path}")
             with passing(desc="full-order run", bar_format="{desc}", leave=False):
                 return observed(problem)
         if not training.is_complete(data, problem):

@@ -50,7 +50,7 @@ from .options import (
     require_ending,
     require_free,
 )
-from .terminal import as_json, passing, warn
+from .terminal import as_json, passing, tell, warn
 
 LARGE = 1e9         # bytes of a file that are told before it is written
 BROKE = "broke down"
@@ -197,11 +197,14 @@ def evaluate_runs(
                 raise SceneError(f"{study.path}: test = 0: no run is held out to compare with")
             _, model = load_map(name, study, map_file)
             folder = named(data, study, "-data")
+            tell(f"reading {counted(len(study.test), 'run')} in {folder}")
             with writing():
                 snapshots = dataset.load(study, folder, study.test)
+            tell("comparing reduced runs with them")
             runs = passing(unit="run", iterable=evaluate(study, model, snapshots),
                            total=len(study.test))
             found = list(runs)
+            tell("comparing training runs with them")
             nearest, interpolated = (list(runs(study, folder, snapshots)) for runs in (
                 baselines.nearest_training_runs, baselines.interpolated_training_runs))
         all_runs, has_stress = total_errors(found, snapshots.X), study.tables.model == NSF

@@ -8,9 +8,10 @@ from ..rom.fields.network import Decoder, Networks
 from ..rom.fields.pod_fields import PodFields
 from ..rom.fields.polynomial_manifold import Curved
 from ..rom.study.record import supported_model
-from ..rom.study.study_file import parse_tables, read_toml
+from ..rom.study.study_file import parse_tables
 from ..rom.study.tables import CURVED, MODES, NETWORK, NSF
 from ..scene import SceneError
+from ..scene.toml import read_tables
 from ..store.text import counted
 from .catalogue import bundled_studies
 from .errors import exit_on_errors
@@ -26,7 +27,7 @@ MEASURES = {"origin": "of the distance from the scene's origin",
 def studies(json: Json = False):
     """List the bundled studies."""
     with exit_on_errors():
-        print_titles({name: parse_tables(read_toml(path)).title for name,
+        print_titles({name: parse_tables(read_tables(path)).title for name,
                       path in bundled_studies().items()
                 if is_study(path)}, json)
 
@@ -34,7 +35,7 @@ def studies(json: Json = False):
 def is_study(path):
     """Return whether a file is a study of reduced runs, even one with invalid tables."""
     try:
-        return bool(TABLES & set(read_toml(path)))
+        return bool(TABLES & set(read_tables(path)))
     except SceneError:
         return False
 

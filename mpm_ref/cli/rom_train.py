@@ -40,7 +40,7 @@ from .options import (
     require_folder_name,
     require_free,
 )
-from .terminal import passing, warn
+from .terminal import announce_compilation_of_workers, passing, tell, warn
 
 MADE, CONTINUED, THERE = "made", "continued", "was there"
 STATUS = {UNSTABLE: errors.UNSTABLE, NOT_WRITTEN: errors.NOT_WRITTEN}
@@ -72,6 +72,7 @@ def make_data(
             if bar.disable:
                 print(f"{folder}: {counted(len(study.mu), 'run')} of {study.path.stem}, "
                       f"{min(workers, len(study.mu))} at a time", flush=True)
+            announce_compilation_of_workers()
             for done in generate(study, folder, workers):
                 if done.why == INTERRUPTED:
                     raise KeyboardInterrupt
@@ -136,6 +137,7 @@ def train(
             require_map_place(out, study, overwrite)
             study = study.with_kind(kind)
             require_device(study.tables.reduced_model.kind, machine.device)
+            tell(f"reading {counted(len(study.train), 'run')} in {data}")
             with writing():
                 snapshots = dataset.load(study, data, study.train)
             if study.tables.model == NSF:
@@ -174,6 +176,7 @@ def resume_hint(checkpoint):
 def compute_model(study, snapshots, about, checkpoint, machine):
     """Return the `Model` of a study's kind, with a progress bar of epochs."""
     if study.tables.reduced_model.kind != NETWORK:
+        tell(f"computing {study.tables.reduced_model.kind} of {counted(len(study.train), 'run')}")
         with one_thread():
             return reduce.compute_model(study, snapshots, about)
     with passing(total=study.tables.reduced_model.total, unit="epoch", desc=study.path.stem) as bar:

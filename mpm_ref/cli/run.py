@@ -141,7 +141,7 @@ class Bar(Watch):
         self.total = last_step(problem.clock)
         self.bar = passing(
             self.request.quiet, total=self.total or problem.clock.end, mininterval=0.2,
-            initial=self.done(state),
+            initial=self.done(state), unit="step" if self.total else "t =",
             bar_format=STEPS if self.total else SECONDS,
         )
         self.bar.set_postfix_str(COMPILING)

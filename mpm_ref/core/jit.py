@@ -8,10 +8,10 @@ Every option and its reason:
   do not depend on the width of the machine's vector registers.
 * ``SLP_VECTORIZE`` on: the compiler may use vector registers for the d components of a node. It
   reorders no sum, hence changes no bit, and makes particle-to-grid transfer 1.3 times faster.
-* ``cache=True`` in a folder named by the hash of every file that shapes kernels. Numba looks only
-  at the file of the cached function: after an edit of a *callee in another file* it would
-  silently run the old code. Docstrings and comments shape no kernel and are left out of the hash:
-  after an edit of them, Numba compiles the kernels of that file again, and no others.
+* A cache of our own (`kernel_cache`), in a folder named by the hash of every file that shapes
+  kernels. Numba's own looks only at the file of the cached function: after an edit of a *callee in
+  another file* it would silently run the old code. Docstrings and comments shape no kernel and are
+  left out of the hash. Kernels of types or methods from outside of the package are not stored.
 * The threading layer is pinned (OpenMP where present, else Numba's own work queue): Numba's
   default changes when another package installs TBB. The bits of our results do not depend on it.
 * Waiting OpenMP threads sleep instead of spinning: on a machine that does other work too, spinning
@@ -27,8 +27,8 @@ import importlib.util
 import os
 import shutil
 import sys
-from contextlib import contextmanager, suppress
-from functools import update_wrapper
+from contextlib import suppress
+from functools import partial, update_wrapper
 from pathlib import Path
 from time import time
 from types import FunctionType
@@ -39,12 +39,14 @@ import platformdirs
 from numba import njit, prange
 from numba.extending import overload, typeof_impl
 
+from .kernel_cache import WRITING, KernelCache, compilations, mark_altered, report
+
 CHUNKS = 64          # of every parallel loop and reduction
 VERSIONS = 4         # of the package whose compiled kernels stay on disk, however old
 IN_USE = 86400.0     # [s] since a version was opened, in which it may still be in use: stays too
 
 DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef)
-_OPTIONS = {"error_model": "numpy", "cache": True, "no_cfunc_wrapper": True}
+_OPTIONS = {"error_model": "numpy", "no_cfunc_wrapper": True}
 
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")     # read when the library is loaded
 if "NUMBA_SLP_VECTORIZE" not in os.environ:
@@ -119,15 +121,19 @@ def _remove_old(root):
 
 
 def _cache_dir():
-    """Return the folder of this version's compiled kernels, and remove versions long unused."""
+    """Return the folder of this version's compiled kernels, and remove versions long unused.
+
+    Returns None, of which the first compilation tells, if there can be no such folder.
+    """
     root = Path(numba.config.CACHE_DIR or platformdirs.user_cache_dir("mpm_ref")) / "kernels"
     here = root / _source_hash(Path(__file__).parents[1], root)
     try:
         here.mkdir(parents=True, exist_ok=True)
+    except OSError as fault:
+        compilations.append(partial(report, root, WRITING, fault))
+        return None
+    with suppress(OSError):         # others may own the folder, or remove the same versions
         os.utime(here)
-    except OSError:
-        return ""          # Numba then falls back to a folder of its own, or compiles anew
-    with suppress(OSError):         # another process may remove the same
         _remove_old(root)
     return str(here)
 
@@ -135,13 +141,11 @@ def _cache_dir():
 CACHE_DIR = _cache_dir()
 
 
-@contextmanager
-def _our_cache():
-    theirs, numba.config.CACHE_DIR = numba.config.CACHE_DIR, CACHE_DIR
-    try:
-        yield
-    finally:
-        numba.config.CACHE_DIR = theirs
+def _compiled(function, **options):
+    """Return Numba's dispatcher of a function, with our cache."""
+    dispatcher = njit(**_OPTIONS, **options)(function)
+    dispatcher._cache = KernelCache(function, CACHE_DIR)
+    return dispatcher
 
 
 class Kernel:
@@ -154,9 +158,8 @@ class Kernel:
     def __init__(self, function, **options):
         update_wrapper(self, function)
         self.py_func = function
-        with _our_cache():
-            self._entry = njit(**_OPTIONS, **options)(function)
-            self.linked = njit(no_cpython_wrapper=True, **_OPTIONS, **options)(_renamed(function))
+        self._entry = _compiled(function, **options)
+        self.linked = _compiled(_renamed(function), no_cpython_wrapper=True, **options)
 
     def __call__(self, *args, **kwargs):
         """Return what the function returns for the arguments."""
@@ -195,8 +198,7 @@ def parallel(function):
     which compiles faster and can be run with ``NUMBA_BOUNDSCHECK=1`` (not honoured in parallel
     code).
     """
-    with _our_cache():
-        return njit(parallel=True, **_OPTIONS)(function)
+    return _compiled(function, parallel=True)
 
 
 def by_type(name, position=-1):
@@ -216,8 +218,12 @@ def by_type(name, position=-1):
         method = _find(methods, name, getattr(types[position], "instance_class", None))
         return lambda *arguments: method(*arguments)
 
+    def add(cls, method):
+        mark_altered(cls, method)
+        methods[cls] = method
+
     dispatch.__name__ = dispatch.__qualname__ = name
-    dispatch.method = methods.__setitem__
+    dispatch.method = add
     dispatch.methods = methods
     overload(dispatch, jit_options={"error_model": "numpy"}, strict=False)(resolve)
     return dispatch

@@ -1,12 +1,14 @@
 """Compare another code's arrays with a golden file: which stage departs first, and where."""
 
 import json
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
 import h5py
 import numpy as np
 
+from ..store.seal import DAMAGED, GOLDEN, UNSEALED, verify
 from .recording import expand_like
 from .report import CheckReport, Departure
 from .schema import ALL_ARRAYS, AUXILIARY, ENERGIES, FORMAT, INTEGERS, SUMS, key, stage_arrays
@@ -36,11 +38,12 @@ def check(golden, other, precision="auto"):
 
     precision "f64" or "f32" selects the tolerances; "auto" takes f32 if an array of the other file
     has that type. NaN and infinity on either side depart; arrays that are not given are listed.
-    Raises NotComparable for a file without the layout, or without the order of its nodes.
+    Raises NotComparable for a file that is damaged, without the layout, or without the order of its
+    nodes.
     """
     if precision not in ("auto", "f64", "f32"):
         raise NotComparable(f"precision = {precision!r}: expected 'f64', 'f32' or 'auto'")
-    with open_file(golden, RECORDED) as g, open_file(other, WRITTEN) as o:
+    with open_file(golden, RECORDED) as g, open_file(other, WRITTEN) as o, readable(other):
         if g.attrs.get("format") != FORMAT:
             raise NotComparable(f"{golden}: not a golden file, its format is "
                                 f"{g.attrs.get('format')!r}; expected {RECORDED}")
@@ -60,10 +63,37 @@ def open_file(path, expected):
         what = "this is a folder" if Path(path).is_dir() else "there is no such file"
         raise NotComparable(f"{path}: {what}; expected {expected}")
     try:
+        require_whole(path, expected)
         return h5py.File(path, "r")
     except OSError as e:
         why = "it is empty" if Path(path).stat().st_size == 0 else str(e).splitlines()[0]
         raise NotComparable(f"{path}: cannot be read as HDF5 ({why}); expected {expected}") from e
+
+
+@contextmanager
+def readable(other):
+    """Turn what HDF5 raises on damaged tables, of a file without checksum, into NotComparable."""
+    try:
+        yield
+    except (OSError, RuntimeError, KeyError) as fault:
+        raise NotComparable(f"{other} cannot be read ({' '.join(str(fault).split())}); expected "
+                            f"{WRITTEN}") from fault
+
+
+def require_whole(path, expected):
+    """Raise NotComparable unless a file's checksum fits; only golden files must have one.
+
+    On damaged tables HDF5 may crash or never return, so that this comes first.
+    """
+    found = verify(path, GOLDEN)
+    if found == DAMAGED:
+        raise NotComparable(f"{path} is damaged: its bytes are not those that were written; copy "
+                            "it again from where it came, or make it again")
+    if found == UNSEALED and expected == RECORDED:
+        why = ("it is empty" if Path(path).stat().st_size == 0 else
+               "it is cut short, or no golden file" if h5py.is_hdf5(path) else
+               "it cannot be read as HDF5")
+        raise NotComparable(f"{path}: {why}; expected {expected}")
 
 
 def given_arrays(group, bodies):

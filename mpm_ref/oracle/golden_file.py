@@ -1,9 +1,10 @@
-"""Writing of golden files, and of files to check against them, in HDF5.
+"""Writing of golden files, and of files to check against them, in HDF5, sealed (`store.seal`).
 
 docs/reference/golden-files.md has the layout.
 """
 
 import json
+from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from ..body import Body
 from ..plain.flows import FLOWS
 from ..plain.laws import LAWS
 from ..store.atomic import replacing, require_place
+from ..store.seal import GOLDEN, WHOLE, seal, verify
 from . import accepted_step, adjoint_recording, implicit_recording, recording
 from .comparison import require_numbers
 from .schema import ALL_ARRAYS, AUXILIARY, FORMAT, NODES, key, reserved_names
@@ -60,12 +62,21 @@ def write_golden(problem, path, steps_and_begin, record_steps):
                          "after 0 or more")
     problem, state = recording.state_after(problem, begin)
     idle = []
-    with replacing(path) as part, h5py.File(part, "w", libver=("v110", "v110")) as f:
+    with new_file(path) as f:
         put_problem(f, problem)
         for k, golden in enumerate(record_steps(problem, steps, state)):
             put_step(f.create_group(f"steps/{k}"), golden)
             idle += [k] * has_nothing_to_solve(golden)
     return tuple(idle)
+
+
+@contextmanager
+def new_file(path):
+    """Yield a new `h5py.File`, which is sealed and replaces `path` when the block ends."""
+    with replacing(path) as part:
+        with h5py.File(part, "w", libver=("v110", "v110")) as f:
+            yield f
+        seal(part, GOLDEN)
 
 
 def has_nothing_to_solve(golden):
@@ -97,17 +108,16 @@ def require_writable(path, overwrite):
     if not overwrite:
         raise ValueError(f"{path} exists: add --overwrite to replace it, or name another file")
     if not is_golden(path):
-        raise ValueError(f"{path} is not a golden file, and only those are overwritten; remove it "
-                         "yourself, or name another file")
+        raise ValueError(f"{path} is not a golden file, or a damaged one, and only whole ones are "
+                         "overwritten; remove it yourself, or name another file")
 
 
 def is_golden(path):
-    """Return whether a file is a golden file."""
-    try:
-        with h5py.File(path, "r") as f:
-            return f.attrs.get("format") == FORMAT
-    except OSError:
+    """Return whether a file is a golden file, and whole."""
+    if not Path(path).is_file() or verify(path, GOLDEN) != WHOLE:
         return False
+    with h5py.File(path, "r") as f:
+        return f.attrs.get("format") == FORMAT
 
 
 def require_recordable(problem):
@@ -210,7 +220,7 @@ def write(path, steps):
     not hold numbers.
     """
     require_dictionaries(steps)
-    with replacing(path) as part, h5py.File(part, "w", libver=("v110", "v110")) as f:
+    with new_file(path) as f:
         f.create_group("steps")
         for k, arrays in enumerate(steps):
             for name, a in as_lists(arrays or {}).items():

@@ -126,7 +126,7 @@ def _particles_of(scene, record, material, where):
         if a is None and source.file is None:
             raise ValueError("its arrays were handed over in Python: use problem_from_arrays")
         if a is None:
-            a = read_arrays(source.file, scene.dim, source.group, source.select)
+            a = read_arrays(source.file, scene.dim, source.group, source.select, source.ignore)
         m, V0 = masses(a, record.density)
         a = _deformation(a, material)
     if "v" in a and record.velocity.moves:

@@ -19,6 +19,7 @@ from ..shapes.quantities import (
     Angle,
     Coordinate,
     Count,
+    Friction,
     Kind,
     Length,
     Natural,
@@ -158,6 +159,7 @@ class Arrays(Record):
     sha256: Sha256 | None = None                # of what the file must hold
     group: str = "/"                            # of an HDF5 file
     select: Annotated[int, Meta(ge=0)] | None = None    # particles whose `body` has this value
+    ignore: tuple[str, ...] = ()                # other arrays in the file
     offset: Vector | None = None                # added to the positions [m]
 
     def __post_init__(self):
@@ -235,7 +237,7 @@ class Collider(Record):
 
     shape: Analytic
     kind: Literal["sticky", "slip", "separate", "noslip"] = "sticky"
-    friction: NotNegative = 0.0
+    friction: Friction = 0.0
     inside: bool = False                        # a container: the nodes outside of the shape
     motion: Motion = Motion()
     name: str = ""
@@ -259,7 +261,7 @@ class Walls(Record):
     low: WallNodes | None = None
     high: WallNodes | None = None
     kind: Literal["sticky", "slip", "separate", "noslip"] = "separate"
-    friction: NotNegative = 0.0
+    friction: Friction = 0.0
 
 
 class Clip(Record):

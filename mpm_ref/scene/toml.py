@@ -8,10 +8,13 @@ from pathlib import Path
 import msgspec
 
 from ..shapes.quantities import Kind, Record
+from ..store.atomic import size_text
 from .messages import SceneError, joined
 from .validate import validate_scene
 
 FILES = "file", "weights"       # keys that name a file
+LARGEST = 10_000_000            # bytes of a text
+DEEPEST = 50                    # tables and lists within each other
 
 
 def load(path):
@@ -19,13 +22,47 @@ def load(path):
 
     Raises SceneError, which names the file and the key.
     """
+    return _scene_of(read_tables(path), str(path), Path(path).parent)
+
+
+def read_tables(path):
+    """Return the plain tables of a file in TOML or JSON. Raises SceneError, which names it."""
+    path = Path(path)
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        if path.exists() and not path.is_file():
+            raise SceneError(f"{path}: cannot be read (this is no file); expected one in TOML")
+        if path.stat().st_size > LARGEST:
+            raise SceneError(f"{path}: has {size_text(path.stat().st_size)}, expected a text of at "
+                             f"most {size_text(LARGEST)}; put arrays of particles into an NPZ file")
+        text = path.read_text(encoding="utf-8")
     except OSError as fault:
         raise SceneError(f"{path}: cannot be read ({fault.strerror})") from None
     except UnicodeDecodeError:
         raise SceneError(f"{path}: not a text file in UTF-8") from None
-    return loads(text, source=str(path), folder=Path(path).parent)
+    return parse(text, str(path))
+
+
+def parse(text, source=""):
+    """Return the plain tables of a text in TOML or JSON. Raises SceneError."""
+    try:
+        data = json.loads(text) if text.lstrip().startswith("{") else tomllib.loads(text)
+    except (ValueError, RecursionError) as fault:
+        why = "too deeply nested" if isinstance(fault, RecursionError) else fault
+        raise SceneError(f"{source or 'the scene'}: not valid TOML: {why}") from None
+    if depth(data) > DEEPEST:
+        raise SceneError(f"{source or 'the scene'}: more than {DEEPEST} tables and lists within "
+                         "each other; expected at most ten or so")
+    return data
+
+
+def depth(data):
+    """Return how many tables and lists lie within each other, at most one more than DEEPEST."""
+    level, inside = 0, [data]
+    while inside and level <= DEEPEST + 1:
+        inside = [item for one in inside if isinstance(one, dict | list)
+                  for item in (one.values() if isinstance(one, dict) else one)]
+        level += 1
+    return level - 1
 
 
 def loads(text, source="", folder="."):
@@ -34,11 +71,11 @@ def loads(text, source="", folder="."):
     source: text with which error messages begin; folder: to which file names are relative. Raises
     SceneError.
     """
-    try:
-        data = json.loads(text) if text.lstrip().startswith("{") else tomllib.loads(text)
-    except (ValueError, RecursionError) as fault:
-        raise SceneError(f"{source or 'the scene'}: not valid TOML: {fault}") from None
-    return validate_scene(_located(data, Path(folder)), source)
+    return _scene_of(parse(text, source), source, Path(folder))
+
+
+def _scene_of(data, source, folder):
+    return validate_scene(_located(data, folder), source)
 
 
 def _located(data, folder):

@@ -12,6 +12,7 @@ Vector = Annotated[tuple[Coordinate, ...], Meta(min_length=2, max_length=3)]    
 Length = Annotated[float, Meta(ge=1e-9, le=1e9)]                    # [m]
 Positive = Annotated[float, Meta(ge=1e-30, le=1e30)]
 NotNegative = Annotated[float, Meta(ge=0, le=1e30)]
+Friction = Annotated[float, Meta(ge=0, le=10)]      # a coefficient, no angle: rubber has about 1
 Share = Annotated[float, Meta(ge=0, le=1)]
 Angle = Annotated[float, Meta(ge=-1e6, le=1e6)]                     # [degrees]
 Count = Annotated[int, Meta(ge=1, le=1_000_000_000)]

@@ -1,8 +1,7 @@
 """Save and load checkpoints: the complete state of a run, from which it resumes bit for bit.
 
-A checkpoint is an HDF5 file followed by a line with the sha256 of all bytes before it, which HDF5
-ignores. The line shows that a file is truncated, altered or foreign before HDF5 reads it. A new
-checkpoint replaces the previous one atomically.
+A checkpoint is a sealed HDF5 file (see `seal`): that it is truncated, altered or foreign is noticed
+before HDF5 reads it. A new checkpoint replaces the previous one atomically.
 """
 
 import hashlib
@@ -18,10 +17,9 @@ from ..simulate import State
 from .atomic import replacing, require_space
 from .journal import new_hdf5
 from .manifest import scene_hash, source_hash
+from .seal import CHECKPOINT, DAMAGED, UNSEALED, is_sealed, seal, verify
 
 FORMAT = "mpm_ref checkpoint 1"
-SEAL = b"\nmpm_ref sha256 "
-SEALED = len(SEAL) + 64
 SUFFIX = ".checkpoint.h5"       # of the names of such files
 
 
@@ -38,8 +36,7 @@ def save(path, state, problem):
     with replacing(path) as part:
         with new_hdf5(part) as h5:
             _write(h5, state, problem)
-        with open(part, "ab") as end:
-            end.write(SEAL + _sha256(part, part.stat().st_size).encode())
+        seal(part, CHECKPOINT)
 
 
 def load(path, problem):
@@ -62,9 +59,7 @@ def load(path, problem):
 
 def is_checkpoint(path):
     """Return whether a file ends as checkpoints do; `summary` verifies its checksum."""
-    with open(path, "rb") as file:
-        file.seek(max(Path(path).stat().st_size - SEALED, 0))
-        return file.read(len(SEAL)) == SEAL
+    return is_sealed(path, CHECKPOINT)
 
 
 def has_checkpoint_name(path):
@@ -138,23 +133,10 @@ def _verify(path):
     """Raise `BadCheckpoint` unless the file is a checkpoint with a valid checksum."""
     if not path.is_file():
         raise BadCheckpoint(f"{path}: there is no such checkpoint")
-    size = path.stat().st_size - SEALED
-    with open(path, "rb") as file:
-        file.seek(max(size, 0))
-        end = file.read()
-    if size < 0 or not end.startswith(SEAL):
+    found = verify(path, CHECKPOINT)
+    if found == UNSEALED:
         raise BadCheckpoint(f"{path} is cut short or is not a checkpoint of mpm_ref; "
                             "take another one, or start the run anew")
-    if end != SEAL + _sha256(path, size).encode():
+    if found == DAMAGED:
         raise BadCheckpoint(f"{path} is damaged: its bytes are not those that were written; "
                             "take a copy, or start the run anew")
-
-
-def _sha256(path, size):
-    """Return the sha256 of the first `size` bytes of a file."""
-    out = hashlib.sha256()
-    with open(path, "rb") as file:
-        while size > 0 and (block := file.read(min(size, 1 << 20))):
-            out.update(block)
-            size -= len(block)
-    return out.hexdigest()

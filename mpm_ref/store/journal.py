@@ -27,6 +27,7 @@ import h5py
 import numpy as np
 
 from .atomic import replacing, sync, write_error
+from .checksums import BlockDigests, Damaged, require_intact
 
 PAGE = 4096
 MAGIC = b"mpm_ref journal\n"
@@ -37,18 +38,16 @@ class InUse(OSError):
     """Another process is writing the file."""
 
 
-class Damaged(OSError):
-    """A journal does not match its checksum."""
-
-
 class JournaledFile(io.RawIOBase):
     """A file object for `h5py.File(file, mode)` whose changes become permanent in `commit`.
 
-    `new` empties the file, or creates it. The object locks out other writers. Raises `InUse`,
-    `Damaged`, or `NotWritten` if the file cannot be opened.
+    `new` empties the file, or creates it. checked: each commit writes the checksums of
+    `checksums`, which are verified first; the content then begins with a user block. The object
+    locks out other writers. Raises `InUse`, `Damaged`, or `NotWritten` if the file cannot be
+    opened.
     """
 
-    def __init__(self, path, new=False):
+    def __init__(self, path, new=False, checked=False):
         self.path = Path(path)
         self._file = _locked(self.path, new)
         try:
@@ -56,19 +55,28 @@ class JournaledFile(io.RawIOBase):
                 self._file.truncate(0)
                 journal_of(self.path).unlink(missing_ok=True)
             _apply_journal(self._file, self.path)
+            self._blocks = self._opened_blocks(new) if checked else None
         except BaseException:
             self._file.close()
             raise
         self._position = 0
-        self._size = 0           # that HDF5 asked for; the file grows to it at a commit
+        # What HDF5 asked for; the file grows to it at a commit.
+        self._size = self._blocks.size if checked else 0
         self._pending = {}       # page number -> its new bytes
         self._error = None       # the first refused write
         self._freeze()
 
+    def _opened_blocks(self, new):
+        try:
+            return BlockDigests() if new else require_intact(self._file)
+        except Damaged as fault:
+            raise Damaged(f"{self.path} is damaged: {fault}; take a copy, or start anew") from None
+
     def _freeze(self):
         end = os.fstat(self._file.fileno()).st_size
         self._frozen = -(-end // PAGE) * PAGE
-        self._size = max(self._size, end)
+        if self._blocks is None:
+            self._size = max(self._size, end)
 
     def commit(self):
         """Make all changes since the last commit permanent, or none and raise `NotWritten`."""
@@ -84,12 +92,22 @@ class JournaledFile(io.RawIOBase):
         handle = self._file.fileno()
         if os.fstat(handle).st_size < self._size:
             os.ftruncate(handle, self._size)
+        if self._blocks is not None:
+            self._put_checksums()
+            if self._error is not None:
+                return
         os.fsync(handle)
         if self._pending:
             _write_journal(journal_of(self.path), self._pending)
             _apply_journal(self._file, self.path)
         self._pending.clear()
         self._freeze()
+
+    def _put_checksums(self):
+        pages = [(page * PAGE, (page + 1) * PAGE) for page in self._pending]
+        self._blocks.update(self._content, self._size, pages)
+        self._put(self._size, self._blocks.digests)
+        self._put(0, self._blocks.head())
 
     def move(self, path):
         """Rename the file to `path`, in the same folder, replacing a file there."""
@@ -101,16 +119,20 @@ class JournaledFile(io.RawIOBase):
     def write(self, data):
         """Write bytes at the current position; errors are reported by `commit`."""
         data = memoryview(data).cast("B")
-        wait = len(data) if self._error else min(max(self._frozen - self._position, 0), len(data))
-        self._hold(self._position, data[:wait])
-        try:
-            _write_at(self._file, data[wait:], self._position + wait)
-        except OSError as e:
-            self._error = e
-            self._hold(self._position + wait, data[wait:])
+        self._put(self._position, data)
         self._position += len(data)
         self._size = max(self._size, self._position)
         return len(data)
+
+    def _put(self, at, data):
+        """Write bytes that no commit has, and hold others in memory."""
+        wait = len(data) if self._error else min(max(self._frozen - at, 0), len(data))
+        self._hold(at, data[:wait])
+        try:
+            _write_at(self._file, data[wait:], at + wait)
+        except OSError as e:
+            self._error = e
+            self._hold(at + wait, data[wait:])
 
     def _hold(self, at, data):
         """Hold changed bytes in memory until the commit."""
@@ -125,16 +147,20 @@ class JournaledFile(io.RawIOBase):
 
     def readinto(self, buffer):
         """Read up to the end of the file, uncommitted bytes included."""
-        begin, n = self._position, min(len(buffer), max(self._size - self._position, 0))
+        n = min(len(buffer), max(self._size - self._position, 0))
+        buffer[:n] = self._content(self._position, n)
+        self._position += n
+        return n
+
+    def _content(self, begin, n):
+        """Return n bytes from `begin` on, uncommitted ones included."""
         data = bytearray(os.pread(self._file.fileno(), n, begin).ljust(n, b"\0"))
         for page in range(begin // PAGE, -(-(begin + n) // PAGE)):
             if page in self._pending:
                 first, last = max(page * PAGE, begin), min((page + 1) * PAGE, begin + n)
                 data[first - begin:last - begin] = self._pending[page][
                     first - page * PAGE:last - page * PAGE]
-        buffer[:n] = data
-        self._position += n
-        return n
+        return data
 
     def seek(self, offset, whence=io.SEEK_SET):
         """Set the current position and return it."""

@@ -10,7 +10,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from .checksums import CheckedFile, Damaged, has_head
 from .journal import recover
+from .seal import CHECKPOINT, GOLDEN, is_sealed
 
 FORMAT = "mpm_ref results 1"
 UNITS = {                         # of what may be stored of particles in every frame
@@ -27,10 +29,11 @@ SCALARS = {                       # name -> unit, what it is, and the fields it 
     "y": ("Pa", "yield stress, where a return map changes it", ("y",)),
     "body": ("1", "number of the body", ()),
 }
-OTHERS = {                        # formats of files of ours -> what they are
-    "mpm_ref checkpoint 1": "a checkpoint, from which `mpm-ref run --resume` goes on",
-    "mpm_ref golden 1": "a golden file, for `mpm-ref oracle check`",
+OTHERS = {                        # other files of ours -> what they are
+    CHECKPOINT: "a checkpoint, from which `mpm-ref run --resume` goes on",
+    GOLDEN: "a golden file, for `mpm-ref oracle check`",
 }
+
 
 class BadResults(ValueError):
     """A file is not a results file that can be read, or continued."""
@@ -48,19 +51,18 @@ class Results:
         if not self.path.is_file():
             what = "this is a folder" if self.path.is_dir() else "there is no such file"
             raise BadResults(f"{path}: {what}; expected a results file, as `mpm-ref run` writes it")
+        recover(self.path)
+        _require_head(self.path)
         try:
-            recover(self.path)
-            self.h5 = h5py.File(self.path, "r")
-        except OSError as e:
-            why = "it is empty" if self.path.stat().st_size == 0 else _first_line(e)
-            raise BadResults(f"{path} cannot be read as HDF5 ({why}); expected a results file, as "
-                             "`mpm-ref run` writes it: is it one, and whole?") from e
-        kind = self.h5.attrs.get("format")
-        if kind != FORMAT:
-            self.close()
-            raise BadResults(f"{path} is {OTHERS.get(kind, 'HDF5')}, but not a results file of "
-                             f"mpm_ref (format {FORMAT!r}); give a file that `mpm-ref run` wrote")
-        self._read_heads()
+            self._file = CheckedFile(self.path)
+        except Damaged as fault:
+            raise _damaged(self.path, fault) from None
+        try:
+            self.h5 = h5py.File(self._file, "r")
+            self._read_heads()
+        except (OSError, RuntimeError, KeyError, ValueError) as fault:
+            self._file.close()
+            raise _damaged(self.path, fault) from fault
 
     def _read_heads(self):
         attrs = self.h5.attrs
@@ -85,6 +87,7 @@ class Results:
     def close(self):
         """Close the file."""
         self.h5.close()
+        self._file.close()
 
     def index(self, frame):
         """Return the index of a frame; negative ones count from the end. Raises `BadResults`."""
@@ -164,6 +167,24 @@ class Results:
     def _mean(self, tau):
         """tr(tau)/d."""
         return tau if tau.ndim == 1 else np.trace(tau, axis1=1, axis2=2) / self.dim
+
+
+def _require_head(path):
+    """Raise `BadResults` for a file that does not begin as results do, unread by HDF5."""
+    if has_head(path):
+        return
+    others = [what for kind, what in OTHERS.items() if is_sealed(path, kind)]
+    if others or h5py.is_hdf5(path):
+        raise BadResults(f"{path} is {others[0] if others else 'HDF5'}, but not a results file of "
+                         f"mpm_ref (format {FORMAT!r}); give a file that `mpm-ref run` wrote")
+    why = "it is empty" if path.stat().st_size == 0 else "it does not begin as one"
+    raise BadResults(f"{path} cannot be read as HDF5 ({why}); expected a results file, as "
+                     "`mpm-ref run` writes it: is it one, and whole?")
+
+
+def _damaged(path, fault):
+    """Return the `BadResults` about a damaged file."""
+    return BadResults(f"{path} is damaged ({_first_line(fault)}); take a copy, or make it again")
 
 
 def _first_line(error):

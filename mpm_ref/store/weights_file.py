@@ -11,13 +11,14 @@ trainings are bytes of PyTorch that end in the same checksum.
 import hashlib
 import io
 import json
+import os
 import re
 import zipfile
 from pathlib import Path
 
 import numpy as np
 
-from .atomic import write_bytes
+from .atomic import size_text, write_bytes
 
 SEAL = 64           # bytes: a sha256 in hexadecimal digits
 MAGIC = b"PK"       # what every zip archive begins with
@@ -121,22 +122,46 @@ def is_intact(content):
 
 def load_arrays(path):
     """Return the arrays of a file. Raises ValueError if it is no npz file or its checksum fails."""
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise ValueError(f"{path} cannot be read: {error.strerror}; name another file, or make "
-                         "this one") from None
+    content = read_file(path)
     if not content.startswith(MAGIC):
         raise ValueError(f"{path} is not an npz file; name another one, or make it again")
     if not is_intact(content):
         raise ValueError(f"{path} is damaged, cut short or none of ours: its checksum does not "
                          "fit; copy it again from where it came, or make it again")
     try:
+        require_uncompressed(path, content)
         with np.load(io.BytesIO(content), allow_pickle=False) as file:
             return dict(file)
-    except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
+    except (ValueError, OSError, EOFError, zipfile.BadZipFile, KeyError,
+            NotImplementedError, RuntimeError) as error:
         raise ValueError(f"{path} is no archive of plain arrays ({error}); copy it again from "
                          "where it came, or make it again") from None
+
+
+def read_file(path):
+    """Return the bytes of a file. Raises ValueError unless it is an ordinary one that fits into the
+    memory: a pipe may wait for ever, a device has no end.
+    """
+    try:
+        size = path.stat().st_size
+        if not path.is_file():
+            raise ValueError(f"{path} cannot be read: it is no ordinary file; name another one")
+        memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+        if size > memory:
+            raise ValueError(f"{path} has {size_text(size)}, and this machine {size_text(memory)} "
+                             "of memory; name another file")
+        with open(path, "rb") as file:
+            return file.read(size)
+    except OSError as error:
+        raise ValueError(f"{path} cannot be read: {error.strerror}; name another file, or make "
+                         "this one") from None
+
+
+def require_uncompressed(path, content):
+    """Raise ValueError for an archive that would grow: ours are not compressed."""
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        if sum(entry.file_size for entry in archive.infolist()) > len(content):
+            raise ValueError("its arrays are compressed, which no file of ours is")
 
 
 def write_checkpoint(path, content):
@@ -146,7 +171,7 @@ def write_checkpoint(path, content):
 
 def read_checkpoint(path):
     """Return the bytes of a checkpoint of a training. Raises ValueError if it is damaged."""
-    content = path.read_bytes()
+    content = read_file(path)
     if not is_intact(content):
         raise ValueError(f"{path} is damaged or no checkpoint: its checksum does not fit; remove "
                          "it to train from the start, or name another file")

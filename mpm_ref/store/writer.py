@@ -13,6 +13,7 @@ import numpy as np
 
 from ..body import restore_order
 from .atomic import part_of, require_space
+from .checksums import HEAD
 from .journal import LIBVER, InUse, JournaledFile, in_use
 from .manifest import scene_hash
 from .results import CLOCK, ENERGIES, FORMAT, UNITS, USUAL, BadResults
@@ -67,7 +68,7 @@ def create(path, problem, fields, facts, checkpoint=None):
     try:
         if path.exists():
             JournaledFile(path).close()          # raises if it is being written
-        with h5py.File(file, "w", libver=LIBVER) as h5:
+        with h5py.File(file, "w", libver=LIBVER, userblock_size=HEAD) as h5:
             _lay_out(h5, problem, fields)
             h5["manifest"] = json.dumps(facts, indent=1)
         file.commit()
@@ -84,7 +85,7 @@ def create(path, problem, fields, facts, checkpoint=None):
 def _part_to_fill(path):
     """Return a new locked file that will replace `path`; one of several writers gets it."""
     try:
-        return JournaledFile(part_of(path), new=True)
+        return JournaledFile(part_of(path), new=True, checked=True)
     except InUse:
         raise in_use(path) from None
 
@@ -93,9 +94,9 @@ def reopen(path, problem, frames):
     """Return a `Writer` that continues a results file after the first `frames` frames.
 
     Later frames are dropped. Raises `BadResults` if the file is of another scene or has fewer
-    frames, `InUse`, or OSError.
+    frames, `InUse`, `Damaged`, or OSError.
     """
-    writer = Writer(JournaledFile(path))
+    writer = Writer(JournaledFile(path, checked=True))
     try:
         require_run(writer.h5, path, problem, frames)
         writer.truncate(frames)

@@ -20,6 +20,7 @@ from mpm_ref.nclaw.train import train as law_trainer  # noqa: E402
 from mpm_ref.nclaw.train.labeled import labels_of, train_labeled  # noqa: E402
 from mpm_ref.nclaw.train.observations import trajectory_of  # noqa: E402
 from mpm_ref.scene import digest  # noqa: E402
+from mpm_ref.store.journal import JournaledFile  # noqa: E402
 from mpm_ref.store.running import Options, checkpoint_of, run  # noqa: E402
 from mpm_ref.store.writer import StoredFields  # noqa: E402
 from mpm_ref.trajectories import observed  # noqa: E402
@@ -261,8 +262,10 @@ def test_runs_of_other_scenes_and_of_fewer_fields_are_refused(made, tmp_path):
 def test_a_run_that_holds_no_numbers_is_refused(made, tmp_path, name):
     study = load(made / "cubes.toml")
     run(study.problem(), tmp_path / "run.h5", Options(fields=StoredFields(("x", "v", "C", "F"))))
-    with h5py.File(tmp_path / "run.h5", "r+") as file:
-        file[f"bodies/cube/{name}"][7, 5] = np.nan
+    with JournaledFile(tmp_path / "run.h5", checked=True) as file:
+        with h5py.File(file, "r+") as h5:
+            h5[f"bodies/cube/{name}"][7, 5] = np.nan
+        file.commit()
     done = train(made / "cubes.toml", tmp_path / "laws.npz", "--data", tmp_path / "run.h5")
     assert_told(done, 2, f"run.h5: {name} of particle 5 after step 7 is [", "make the run again")
 

@@ -13,7 +13,8 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = {"plain", "materials", "materials.learned", "hot", "rom", "rom.study", "nclaw",
             "nclaw.study", "shapes", "sampling", "scene", "oracle", "cli"}
 FLOORS = (
-    ("core.jit", "core.blas"),
+    ("core.kernel_cache", "core.blas"),
+    ("core.jit",),
     ("core.tensor",),
     ("core.law", "core.spectral core.deflation core.scaling", "core.spline", "core.solids"),
     ("core.stencil", "core.state"),

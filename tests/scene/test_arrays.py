@@ -141,13 +141,40 @@ def one(value, shape=(N,)):
     ({"body": np.ones(N)}, "the array body has type float64: expected whole numbers"),
     ({"V0": None}, r"given of m \[kg\], V0 \[m\^d\] and density \[kg/m\^3\]: m; expected two"),
     ({"J": np.ones(N)}, "the array F is missing"),
-    ({"x": np.full((N, 2), None)}, "cannot be read|allow_pickle|Object arrays"),
+    ({"x": np.full((N, 2), None)}, "the array x has type object: expected real numbers"),
 ])
 def test_bad_array_is_refused(tmp_path, arrays, said):
     file = npz(tmp_path, changed(**arrays))
     with pytest.raises(SceneError, match=rf"^body\[0\].particles.*({said})") as caught:
         particles(file, 2)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("write", [npz, hdf5])
+def test_a_misnamed_array_is_refused(tmp_path, write):
+    file = write(tmp_path, changed(vel=np.ones((N, 2)), v0=np.ones(N)))
+    with pytest.raises(SceneError, match=r"the array v0 has no meaning: did you mean V0\?|"
+                       r"the array vel has no meaning: .*; the file has V0, m, v0, vel, x; rename"):
+        particles(file, 2)
+    made = particles(file, 2, more=', ignore = ["vel", "v0", "none"]')
+    assert (made.v == 0.0).all()
+
+
+@pytest.mark.parametrize(("x", "words"), [
+    (np.ones((300_000, 100), np.int8), "the array x has shape"),
+    (np.ones((300_000, 2), bool), "the array x has type bool"),
+])
+def test_what_cannot_be_particles_is_refused_unread(tmp_path, monkeypatch, x, words):
+    np.savez_compressed(tmp_path / "state.npz", x=x, m=np.ones(N), V0=np.ones(N))
+    monkeypatch.setattr(np.lib.npyio.NpzFile, "__getitem__", lambda *_: 1 / 0)
+    with pytest.raises(SceneError, match=words):
+        particles(tmp_path / "state.npz", 2)
+
+
+def test_arrays_beyond_the_memory_are_refused_unread(tmp_path, monkeypatch):
+    monkeypatch.setattr("os.sysconf", lambda _: 10)
+    with pytest.raises(SceneError, match="GB: this machine has 1e-07 GB of memory"):
+        particles(npz(tmp_path, changed()), 2)
 
 
 def test_negative_volume_ratio_of_a_fluid_is_refused(tmp_path):

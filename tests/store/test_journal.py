@@ -52,8 +52,16 @@ KILLED = """
 import os, sys
 from pathlib import Path
 import h5py, numpy as np
-from mpm_ref.store import atomic, journal
-path = Path(sys.argv[1])
+from mpm_ref.store import atomic, checksums, journal
+path, checked = Path(sys.argv[1]), sys.argv[2] == "checked"
+
+def new():
+    file = journal.JournaledFile(path, new=True, checked=checked)
+    with h5py.File(file, "w", libver=journal.LIBVER, userblock_size=512 * checked) as h5:
+        h5.create_dataset("x", (0, 3000), "f8", maxshape=(None, 3000), chunks=(1, 1000),
+                          fletcher32=True)
+    file.commit()
+    file.close()
 
 class Mortal:
     def __init__(self, k):
@@ -72,7 +80,7 @@ class Mortal:
         return call
 
 def write(frames):
-    file = journal.JournaledFile(path)
+    file = journal.JournaledFile(path, checked=checked)
     h5 = h5py.File(file, "r+", libver=journal.LIBVER)
     for k in range(frames):
         h5["x"].resize(k + 1, axis=0)
@@ -83,9 +91,7 @@ def write(frames):
 
 seen = set()
 for k in range(10_000):
-    with journal.new_hdf5(path) as h5:
-        h5.create_dataset("x", (0, 3000), "f8", maxshape=(None, 3000), chunks=(1, 1000),
-                          fletcher32=True)
+    new()
     path.with_suffix(".count").write_text("0")
     child = os.fork()
     if child == 0:
@@ -95,6 +101,8 @@ for k in range(10_000):
     status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
     kept = int(path.with_suffix(".count").read_text())
     journal.recover(path)
+    if checked:
+        checksums.require_intact(open(path, "rb", buffering=0))
     with h5py.File(path) as h5:
         x = h5["x"][()]
     assert len(x) in (kept, kept + 1), (k, len(x), kept)
@@ -107,8 +115,9 @@ print(k, sorted(seen))
 """
 
 
-def test_killed_at_any_call_every_committed_frame_stands(tmp_path):
-    done = subprocess.run([sys.executable, "-c", KILLED, tmp_path / "x.h5"], cwd=ROOT,
+@pytest.mark.parametrize("kind", ["plain", "checked"])
+def test_killed_at_any_call_every_committed_frame_stands(tmp_path, kind):
+    done = subprocess.run([sys.executable, "-c", KILLED, tmp_path / "x.h5", kind], cwd=ROOT,
                           capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     calls, seen = done.stdout.split(" ", 1)

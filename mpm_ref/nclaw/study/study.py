@@ -13,10 +13,11 @@ from msgspec import Struct, field
 from ...materials.learned.table import KINDS, is_identified
 from ...materials.learned.weights import PARTS
 from ...rom.study.study import base_scene
-from ...rom.study.study_file import read_toml, require_keys
+from ...rom.study.study_file import require_keys
 from ...rom.study.tables import one_of
 from ...scene import Scene, SceneError, build
 from ...scene.messages import errors_at, errors_of, rephrase
+from ...scene.toml import read_tables
 from ...scene.validate import check_finite
 from ..batched_step import make_world
 from ..train.recipe import Recipe
@@ -158,7 +159,7 @@ def load(path, scenes=None):
     SceneError, which names the file and the key, also for a scene whose laws cannot be learned.
     """
     path = Path(path)
-    data = read_toml(path)
+    data = read_tables(path)
     with errors_of(str(path)):
         tables = parse_tables(data)
         study = LawStudy(path, base_scene(tables, path.parent, scenes or {}), tables)

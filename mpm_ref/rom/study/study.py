@@ -17,8 +17,9 @@ from ... import scene
 from ...scene import SceneError
 from ...scene.messages import errors_at, errors_of
 from ...scene.overrides import flat, with_values
+from ...scene.toml import read_tables
 from .methods import METHODS, every_step
-from .study_file import parse_tables, read_toml
+from .study_file import parse_tables
 from .tables import CURVED, LATIN, LDM, MODES, NETWORK, NSF, SIZES, CommonTables
 
 SAME = ("dim", "dx", "dt", "steps", "every", "seed", "scheme", "integrator")    # in all runs
@@ -113,7 +114,7 @@ def load(path, scenes=None):
     Raises SceneError, which names the file and the key.
     """
     path = Path(path)
-    data = read_toml(path)
+    data = read_tables(path)
     with errors_of(str(path)):
         tables = parse_tables(data)
         mu = parameters(tables)

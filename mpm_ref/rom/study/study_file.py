@@ -1,24 +1,13 @@
 """A study file as its tables: keys that they do not have are refused in one sentence."""
 
-import tomllib
 from difflib import get_close_matches
 
 import msgspec
 
 from ...scene import SceneError
-from ...scene.messages import joined, rephrase
+from ...scene.messages import joined, rephrase, shown
 from ...scene.validate import check_finite
 from .tables import LDM, TABLES, Parameter
-
-
-def read_toml(path):
-    """Return the plain tables of a TOML file. Raises SceneError, which names it."""
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as fault:
-        raise SceneError(f"{path}: cannot be read ({fault.strerror})") from None
-    except ValueError as fault:
-        raise SceneError(f"{path}: not valid TOML: {fault}") from None
 
 
 def parse_tables(data):
@@ -28,7 +17,7 @@ def parse_tables(data):
     check_finite(data)
     model = data.get("model", LDM)
     if not isinstance(model, str) or model not in TABLES:
-        raise SceneError(f"model = {model!r}: expected one of {', '.join(map(repr, TABLES))}")
+        raise SceneError(f"model = {shown(model)}: expected one of {', '.join(map(repr, TABLES))}")
     for k, path in enumerate(("", "map", "run")):
         others = {name: records[k].__struct_encode_fields__ for name, records in TABLES.items()}
         keys = others.pop(model)
