@@ -9,7 +9,7 @@ from hot_steps import DT, DX, block, conditions, unit
 from mpm_ref.core.boundary import Collider, Conditions
 from mpm_ref.core.levelset import half_space
 from mpm_ref.explicit import Scheme
-from mpm_ref.hot.methods import SolverOptions
+from mpm_ref.hot.methods import PRINTED, SolverOptions
 from mpm_ref.hot.multigrid.hierarchy import hierarchy
 from mpm_ref.oracle import accepted_step, implicit_recording, recording
 from mpm_ref.oracle.implicit_twin import ImplicitTwin, embedding_weights, prolongate
@@ -84,7 +84,7 @@ def multigrid(step, system, load):
     grids = hierarchy(A, system.index, implementation="scipy")
     seen = {"cycle": grids.cycle(load)}
     g = system.evaluate(system.start)[1]
-    options = SolverOptions(implementation="scipy")
+    options = SolverOptions(implementation="scipy", **PRINTED)
     seen["direction"] = implicit_recording.first_direction(system, A, g, options)
     for k, (fine, coarse) in enumerate(zip(grids.levels, grids.levels[1:]), 1):
         W = embedding_weights(fine.index, coarse.index, "linear")
