@@ -212,5 +212,5 @@ def stalls(system, options, dv):
     """
     if options.balance == "rigid":
         return False
-    neglected = system.balanced(dv) - dv
-    return system.particle_displacement(neglected) > (options.displacement_tolerance or options.eps)
+    balanced, tolerance = system.balanced(dv), options.displacement_tolerance or options.eps
+    return balanced is not dv and system.particle_displacement(balanced - dv) > tolerance
