@@ -20,7 +20,7 @@ from scipy.sparse.csgraph import connected_components
 ROUND_OFF = 1e-13       # of the momenta in a sum, below which it counts as zero
 DEPENDENT = 1e-10       # share of the largest inertia below which a motion is that of others
 ADMITTED = 1e-10        # largest share of a motion that conditions may take from an admitted one
-ROUNDS = 4              # of Newton: y depends on dv
+ROUNDS = 12             # of corrections, at most: y depends on dv
 
 
 class RigidMotions:
