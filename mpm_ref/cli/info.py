@@ -118,7 +118,7 @@ def stalled(n):
 
 def rejected_line(n):
     """Return the number of rejected steps as a list of one line or none."""
-    return [f"rejected: {counted(n, 'step')}, made with a shorter dt"] if n else []
+    return [f"{counted(n, 'rejected step')}, tried again with half of dt"] if n else []
 
 
 def problem_lines(facts):
