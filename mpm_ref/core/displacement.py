@@ -1,4 +1,4 @@
-"""How far a step will move the particles, known from the grid before they are changed.
+"""The largest speed of a particle after a step, read from the grid before a particle changes.
 
     |dx_p| = dt |sum_i w_ip v_i|
 

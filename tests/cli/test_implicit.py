@@ -84,7 +84,8 @@ def test_a_stiff_body_that_hovers_is_told(tmp_path, solver, n):
     for command in (run, ("info", out), (*run, "--resume"), ("info", out, "--json")):
         done = mpm_ref(*command)
         assert done.exit_code == 0
-        assert (f"warning: {n} implicit steps of the run ended at its start" in done.stderr) is (n > 0)
+        told = f"warning: {n} implicit steps of the run ended at its start" in done.stderr
+        assert told is (n > 0)
         assert "run" not in command or json.loads(done.stdout)["stalled"] == n
     facts = json.loads(done.stdout)
     assert (facts["stalled"], len(facts["warnings"])) == (n, n > 0)

@@ -19,7 +19,7 @@ from mpm_ref.hot.methods import options_of
 from mpm_ref.materials import NoFlow, make_law
 from mpm_ref.monitor import Unstable
 from mpm_ref.problem import Clock
-from mpm_ref.simulate import State, simulate
+from mpm_ref.simulate import State, simulate, start
 from mpm_ref.store import checkpoint
 from mpm_ref.store.checkpoint import digest
 from mpm_ref.store.results import Results
@@ -105,10 +105,9 @@ def test_a_fixed_step_that_is_not_solved_is_made_in_equal_parts():
 
 def test_a_step_that_fails_at_every_length_ends_the_run():
     problem = replace(capped(), solver=options_of("pn-pcg", max_iterations=0, eps=1e-12))
-    state = State(problem.bodies)
+    state = start(problem, problem.stepper())
     with pytest.raises(Unstable, match=r"was not solved.*also with dt = 3\.91e-05 s"):
-        for frame in simulate(problem):
-            state = frame.state
+        last(problem, state=state)
     assert state.rejected == HALVINGS
 
 
