@@ -8,7 +8,8 @@ import pytest
 from small_runs import DX, block, colliding
 from threads import by_threads
 
-from mpm_ref.attempt import HALVINGS, fault_of
+from mpm_ref import attempt
+from mpm_ref.attempt import HALVINGS, fault_of, take_step
 from mpm_ref.body import Body, particles_at
 from mpm_ref.core.boundary import Conditions, Prescribed
 from mpm_ref.core.displacement import largest_speed, speed_bound
@@ -101,6 +102,38 @@ def test_a_fixed_step_that_is_not_solved_is_made_in_equal_parts():
     assert [t for t, _ in times] == [0.01 * k for k in range(1, 7)]
     assert min(dt for _, dt in times) in [0.01 / 2**k for k in range(1, HALVINGS + 1)]
     assert frames[-1].state.solve.converged
+
+
+class Recorder:
+    """A stepper that notes the parts of a step, from t to t + dt."""
+
+    implicit, report = True, None
+
+    def __init__(self):
+        self.tried, self.parts = None, []
+
+    def advance_grid(self, bodies, t, dt):
+        self.tried = t, dt
+
+    def update_particles(self, bodies, grid, dt):
+        self.parts.append(self.tried)
+
+
+@pytest.mark.parametrize(("clock", "parts", "rejected"), [
+    (Clock(dt=1.0, steps=1), [(0.0, 0.5), *((0.5 + k / 8, 0.125) for k in range(4))], 3),
+    (Clock(end=1.0), [(0.0, 0.5)], 1),
+], ids=["fixed dt", "adaptive dt"])
+def test_parts_follow_each_other(monkeypatch, clock, parts, rejected):
+    """At first a half is short enough, later an eighth."""
+    def fault(problem, stepper, state, grid, dt):
+        return "too long" if dt > (0.5 if stepper.tried[0] < 0.5 else 0.125) else None
+
+    monkeypatch.setattr(attempt, "fault_of", fault)
+    problem, stepper = colliding(clock), Recorder()
+    state = State(problem.bodies)
+    assert take_step(problem, stepper, state, 1.0) == parts[-1][1]
+    assert stepper.parts == parts
+    assert state.rejected == rejected
 
 
 def test_a_step_that_fails_at_every_length_ends_the_run():
