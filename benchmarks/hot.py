@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.hot.methods import minimise
+from mpm_ref.hot.methods import minimise, printed
 from mpm_ref.hot.multigrid.blocks.product import planes_of, product
 from mpm_ref.hot.multigrid.blocks.sparse import blocks_of
 from mpm_ref.hot.multigrid.hierarchy import hierarchy
@@ -112,7 +112,7 @@ def counts_of(step):
 def method_rows(step, repeats):
     """Return a row for every method: median CPU seconds of the step and of its parts."""
     def solve(method, changes):
-        return minimise(system_of(step), method, **changes).report
+        return minimise(system_of(step), printed(method, **changes)).report
     reports = in_turn({name: partial(solve, *choice) for name, choice in METHODS.items()}, repeats)
     rows = [method_row(name, done) for name, done in reports.items()]
     return [row | {"cpu_ratio": row["cpu_s"] / rows[0]["cpu_s"]} for row in rows]

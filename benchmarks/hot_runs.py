@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.hot.methods import minimise
+from mpm_ref.hot.methods import minimise, printed
 from mpm_ref.scene import build, load
 from mpm_ref.simulate import simulate
 from validation.common.scenes import with_
@@ -72,7 +72,7 @@ def timed(step, method, options):
     """Solve a step from its particles on and return CPU seconds and report."""
     start = process_time()
     pose = step.stepper.problem(step.bodies, step.t, step.dt)
-    report = minimise(step.stepper.system(pose), method, **options).report
+    report = minimise(step.stepper.system(pose), printed(method, **options)).report
     return process_time() - start, report
 
 

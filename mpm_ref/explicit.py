@@ -106,17 +106,28 @@ class Stepper:
         """Advance from time t [s] by dt [s]; returns the grid, which holds m and the new v.
         Changes the bodies in place. Raises ValueError unless dt > 0.
         """
+        grid = self.advance_grid(bodies, t, dt)
+        self.update_particles(bodies, grid, dt)
+        return grid
+
+    def advance_grid(self, bodies, t, dt):
+        """Return the grid of the step from time t [s] by dt [s], which holds m and the new v. The
+        bodies stay as they are. Raises ValueError unless dt > 0.
+        """
         if not 0.0 < dt < np.inf:
             raise ValueError(f"dt = {dt}: expected a positive, finite time in s")
         grid = scatter(bodies, self.storage, self.scheme, dt)
         update(grid, self.gravity, dt, self.scheme.mass_eps, self.scheme.gravity_on_empty)
         if self.conditions is not None:
             self.conditions.apply(grid, t + dt, dt)
+        return grid
+
+    def update_particles(self, bodies, grid, dt):
+        """Update the bodies in place from the grid that `advance_grid` returned for them."""
         for body in bodies:
             gather(body, grid, self.scheme, dt)
             deform_body(body, dt)
             damp(body, self.scheme)
-        return grid
 
     def sort(self, bodies):
         """Sort every body's particles by cell, for locality; results do not depend on it but for

@@ -2,14 +2,14 @@
 run becomes unstable.
 
 A run is resumed from a `State`, bit for bit: whatever the loop decides (dt, when to sort, when to
-check) is a function of the state alone.
+check, whether to shorten a step) is a function of the state alone. `attempt` has the shortening.
 """
 
 from dataclasses import dataclass
 from math import ceil, inf
 from typing import NamedTuple
 
-from .body import keep_inside
+from .attempt import take_step
 from .core.grid import OutOfRange
 from .monitor import CHECK, Account, account, check, lost, runs_away
 from .timestep import TimeStep, advective, refuse, stable_dt
@@ -32,6 +32,8 @@ class State:
     terms: TimeStep | None = None      # the bounds behind it; none in a state from a file
     account: Account | None = None     # energy at the start
     solve: object = None               # `hot` report of the last step, if it was implicit
+    rejected: int = 0                  # steps that failed their checks and were made shorter
+    stalled: int = 0                   # implicit steps that ended at their start, out of balance
 
 
 class Frame(NamedTuple):
@@ -39,7 +41,7 @@ class Frame(NamedTuple):
 
     index: int      # 0 for the initial state
     t: float        # [s]
-    dt: float       # length of the step that led here [s]; 0 for the initial state
+    dt: float       # length of the step that led here [s], see `advance`; 0 for the initial state
     state: State
 
 
@@ -90,23 +92,20 @@ def show(state, dt):
 
 
 def advance(problem, stepper, state):
-    """Make one step: sort now and then, choose dt, step, clip, check. Return dt."""
+    """Make one step: sort now and then, choose dt, step, clip, check. Return dt; of an implicit
+    step in parts (see `attempt`), the length of the last part.
+    """
     if state.step % SORT == 0:
         stepper.sort(state.bodies)
     if bound_is_due(problem.clock, state):
         update_bound(problem, stepper, state)
     dt = next_dt(problem.clock, state, swiftest(problem, stepper, state))
-    stepper.step(state.bodies, state.t, dt)
-    if problem.clip is not None:
-        keep_inside(state.bodies, *problem.clip)
+    dt = take_step(problem, stepper, state, dt)
     state.step += 1
-    state.solve = stepper.report
-    state.t = state.step * dt if problem.clock.dt else state.t + dt
+    state.t = state.step * problem.clock.dt if problem.clock.dt else state.t + dt
     due = state.step % CHECK == 0 or ended(problem.clock, state)
     if due or runs_away(problem, state, dt):
         check(problem, state, dt)
-    if state.solve is not None and not (state.solve.converged or problem.allow_unstable):
-        raise lost(problem, state, dt, f"the implicit step was not solved: {state.solve.message}")
     return dt
 
 

@@ -89,7 +89,10 @@ def of_results(path):
             "checkpoint": str(checkpoint_of(path)) if checkpoint_of(path).exists() else None,
             "manifest": results.manifest,
             "reduced": record.summary(results),
+            "rejected": manifest.count_so_far(results.manifest, "rejected"),
+            "stalled": manifest.count_so_far(results.manifest, "stalled"),
             "warnings": [*unsolved(manifest.count_unsolved(results.manifest)),
+                         *stalled(manifest.count_so_far(results.manifest, "stalled")),
                          *manifest.strain_warnings(results.manifest)],
         }
 
@@ -101,6 +104,21 @@ def unsolved(n):
     return [f"{counted(n, 'implicit step')} of the run did not meet the solver's tolerance, which "
             'unstable = "allow" lets pass: what follows may be wrong; give the solver more '
             "`iterations`, or a larger `eps` or `cells`, or take a smaller dt"]
+
+
+def stalled(n):
+    """Return the warning that n implicit steps stood still, as a list of one or none."""
+    if n == 0:
+        return []
+    return [f"{counted(n, 'implicit step')} of the run ended at its start, within its tolerance, "
+            "although gravity or spin would move free matter by more than that: stiff bodies may "
+            'hover; leave `start` and `balance` of the solver out, or say start = "gravity" and '
+            'balance = "rigid"']
+
+
+def rejected_line(n):
+    """Return the number of rejected steps as a list of one line or none."""
+    return [f"{counted(n, 'rejected step')}, tried again with half of dt"] if n else []
 
 
 def problem_lines(facts):
@@ -152,6 +170,7 @@ def results_lines(facts):
                      f"{counted(facts['steps'], 'step')}; at the end: {energies}")
     else:
         lines.append("no frame yet")
+    lines += rejected_line(facts["rejected"])
     if facts["reduced"]:
         lines.append(record.summary_line(facts["reduced"]))
     lines += map(part_line, facts["manifest"].get("parts", []))

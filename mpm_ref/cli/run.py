@@ -218,17 +218,19 @@ def _broke_off(fault, request):
 def _report(outcome, request, facts):
     """Say how the run ended and how to go on."""
     state = outcome.state
-    warn(info.unsolved(outcome.unsolved))
+    warn([*info.unsolved(outcome.unsolved), *info.stalled(state.stalled)])
     if request.json:
         print(as_json({
             "why": outcome.why, "out": str(request.out), "step": state.step, "t": state.t,
             "frames": outcome.frames, "unsolved": outcome.unsolved,
+            "rejected": state.rejected, "stalled": state.stalled,
             "checkpoint": str(checkpoint_of(request.out)),
             "state_sha256": checkpoint.digest(state), "problem": facts,
         }))
     else:
         print(f"{outcome.why}: step {state.step}, t = {state.t:.6g} s, "
               f"{counted(outcome.frames, 'frame')} in {request.out}")
+        print("".join(f"{line}\n" for line in info.rejected_line(state.rejected)), end="")
     if outcome.why != FINISHED:
         print(f"to go on: {how_to_resume(request)}", file=sys.stderr)
 

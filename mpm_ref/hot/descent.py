@@ -68,7 +68,7 @@ def iterate(system, start, advance, stop, profiler):
     best = BestIterate(ROUND_OFF)
     for k in range(stop.max_iterations + 1):
         profiler.record(scaled_norm(now.g, system.kappa))
-        size = profiler.residuals[-1] if stop.norm == "characteristic" else length(now.g)
+        size = gradient_size(now, system.kappa, stop.norm)
         best.update(now, size)
         if np.isfinite(now.E) and size <= stop.eps:
             return now, None
@@ -78,6 +78,11 @@ def iterate(system, start, advance, stop, profiler):
         now, message = advance(now)
         if message is not None:
             return best.best, message
+
+
+def gradient_size(point, kappa, norm):
+    """Return the size of an iterate's gradient in a norm of `StoppingRule`."""
+    return scaled_norm(point.g, kappa) if norm == "characteristic" else length(point.g)
 
 
 def failure_message(now, size, k, idle, stop):

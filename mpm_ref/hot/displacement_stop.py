@@ -32,13 +32,14 @@ CHECK = CGOptions(lambda size: 0.02, 50, flexible=True)     # a cap of 16 let mo
                             # where nodes at the rim make CG slow
 
 
-def iterate_to_displacement(system, advance, inverse, stop, options, profiler):
-    """Iterate until the error of displacement is small; return (`Iterate`, None) or (its, message).
+def iterate_to_displacement(system, start, steps, stop, options, profiler):
+    """Iterate from start (n, d) until the error of displacement is small; return (`Iterate`, None)
+    or (its, message).
 
-    advance(`Iterate`) is as for `descent.iterate`; inverse(dv) -> the preconditioner of the check
-    at an increment; stop.eps is the first tolerance of the gradient.
+    steps are advance(`Iterate`), as for `descent.iterate`, and inverse(dv) -> the preconditioner of
+    the check at an increment; stop.eps is the first tolerance of the gradient.
     """
-    start = system.start
+    advance, inverse = steps
     for _ in range(ROUNDS):
         before = len(profiler.residuals)
         point, message = iterate(system, start, advance, stop, profiler)

@@ -9,17 +9,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .admm import ADMM
-from .descent import StoppingRule, iterate, line_search_steps
+from .descent import StoppingRule, gradient_size, iterate, line_search_steps
 from .displacement_stop import iterate_to_displacement, lazy_v_cycle
 from .krylov import JACOBI, stiffest_tolerance
 from .lbfgs import LBFGS, REBUILD_RULES
-from .line_search import LineSearchOptions
+from .line_search import Iterate, LineSearchOptions
 from .linearization import INVERSES, initial_inverse, linearizer
 from .multigrid.options import CycleOptions, cycle_options
 from .newton import Forcing, Newton
+from .norms import scaled_norm
 from .report import ProfiledSystem, Profiler, Solution
 
 RULES, CYCLE = LineSearchOptions(), CycleOptions()
+PRINTED = {"start": "zero", "balance": "none"}      # where HOT as printed is not our default
+BALANCES = 5        # rounds of a method and a balance of rigid motions, at most
 CHOICES = {
     "descent": ("lbfgs", "newton", "admm"),
     "inverse": (*INVERSES, "geometric"),
@@ -27,7 +30,8 @@ CHOICES = {
     "jacobi": tuple(JACOBI),
     "forcing": ("energy", "L2"),
     "norm": ("characteristic", "L2"),
-    "start": ("zero", "gravity"),
+    "start": ("gravity", "zero"),
+    "balance": ("rigid", "none"),
     "rebuild_when": REBUILD_RULES,
     "kernel": ("linear", "quadratic"),
     "implementation": ("blocks", "scipy"),
@@ -36,7 +40,7 @@ CHOICES = {
 
 @dataclass(frozen=True)
 class SolverOptions:
-    """Options of all methods; the defaults are those of HOT as printed.
+    """Options of all methods; the defaults are those of HOT as printed, but for `PRINTED`.
 
     Raises ValueError for an unknown word or a number out of its range.
     """
@@ -52,7 +56,9 @@ class SolverOptions:
     displacement_tolerance: float = 0.0     # error of the particles' displacement in a step [dx],
                                         # with eps as a first guess (see `displacement_stop`);
                                         # 0: eps alone decides
-    start: str = "zero"                 # of the increment, or "gravity": g dt (the release)
+    start: str = "gravity"              # of the increment: g dt (the release), or "zero" (printed)
+    balance: str = "rigid"              # rigid motions balance to round-off, or "none" (printed):
+                                        # within the tolerance alone (see `rigid`)
     window: int = 8                     # pairs of L-BFGS
     rebuild_every: int = 0              # steps after which L-BFGS takes a new Hessian; 0: never
     rebuild_when: str = "never"         # also where a step was "shortened", or shows it "stale"
@@ -119,12 +125,44 @@ def options_of(method, **changes):
     return replace(METHODS[method], **changes)
 
 
+def printed(method, **changes):
+    """Return the `SolverOptions` of a method by its name with `PRINTED` and changes.
+
+    Raises ValueError for unknown ones.
+    """
+    return options_of(method, **{**PRINTED, **changes})
+
+
 def solve(system, options, stop, profiler):
     """Return (`Iterate`, None) or (`Iterate`, message) of a system by the method of the options."""
-    advance, inverse = method_steps(system, options, profiler)
-    if options.displacement_tolerance > 0.0:
-        return iterate_to_displacement(system, advance, inverse, stop, options, profiler)
-    return iterate(system, system.start, advance, stop, profiler)
+    steps = method_steps(system, options, profiler)
+
+    def minimise_from(start):
+        if options.displacement_tolerance > 0.0:
+            return iterate_to_displacement(system, start, steps, stop, options, profiler)
+        return iterate(system, start, steps[0], stop, profiler)
+    if options.balance == "none":
+        return minimise_from(system.start)
+    return balanced_iterate(system, minimise_from, stop, profiler)
+
+
+def balanced_iterate(system, minimise_from, stop, profiler):
+    """Return (`Iterate`, None) that is within its tolerance and balances rigid motions, or
+    (`Iterate`, message); minimise_from(start (n, d)) returns the same without the balance.
+    """
+    start = system.start
+    for _ in range(BALANCES):
+        point, message = minimise_from(start)
+        dv = point.dv if message is not None else system.balanced(point.dv)
+        if dv is point.dv:
+            return point, message
+        point = Iterate(dv, *system.evaluate(dv))
+        if gradient_size(point, system.kappa, stop.norm) <= stop.eps:
+            profiler.record(scaled_norm(point.g, system.kappa))
+            return point, None
+        start = dv
+    return point, (f"the tolerance and the balance of rigid motions were not met together in "
+                   f"{BALANCES} rounds")
 
 
 def method_steps(system, options, profiler):
@@ -163,4 +201,16 @@ def minimise(system, method="hot", **changes):
         watched = ProfiledSystem(system, profiler)
         stop = StoppingRule(options.eps, options.norm, options.max_iterations, options.patience)
         point, message = solve(watched, options, stop, profiler)
-    return Solution(point.dv, point.E, profiler.report(options.method, message))
+        report = profiler.report(options.method, message)
+        stalled = message is None and not report.iterations and stalls(system, options, point.dv)
+    return Solution(point.dv, point.E, report._replace(stalled=stalled))
+
+
+def stalls(system, options, dv):
+    """Return whether the balance of rigid motions would displace a particle by more than the
+    tolerance of the step, `displacement_tolerance` or else eps [dx], from the increment dv.
+    """
+    if options.balance == "rigid":
+        return False
+    balanced, tolerance = system.balanced(dv), options.displacement_tolerance or options.eps
+    return balanced is not dv and system.particle_displacement(balanced - dv) > tolerance

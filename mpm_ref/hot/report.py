@@ -26,6 +26,7 @@ class SolveReport(NamedTuple):
     cpu_times: tuple        # CPU seconds of the solve when each of them was known
     particle_error: float   # estimated by the last check of `displacement_stop` [dx]; else NaN
     seconds: dict           # CPU seconds of all threads by part; their sum is the whole solve
+    stalled: bool = False   # it ended at its start, although free matter was not in balance
 
 
 COUNTS = ("iterations", "cg_iterations", "coarse_iterations", "capped_solves", "hessians",
@@ -37,7 +38,8 @@ def combined_report(reports):
     sums = {name: sum(getattr(r, name) for r in reports) for name in COUNTS}
     parts = dict.fromkeys(part for r in reports for part in r.seconds)
     seconds = {part: sum(r.seconds.get(part, 0.0) for r in reports) for part in parts}
-    return reports[-1]._replace(**sums, seconds=seconds)
+    return reports[-1]._replace(**sums, seconds=seconds,
+                                stalled=all(report.stalled for report in reports))
 
 
 class Solution(NamedTuple):
@@ -144,6 +146,10 @@ class ProfiledSystem:
     def particle_displacement(self, u):
         """Largest displacement [dx] of a particle in the step by nodal velocities u (n, d)."""
         return self.system.particle_displacement(u)
+
+    def balanced(self, dv):
+        """Return dv (n, d) [m/s] with the balance of rigid motions."""
+        return self.system.balanced(dv)
 
     def matrix(self, dv):
         """The projected Hessian, assembled [kg]."""

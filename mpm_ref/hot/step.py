@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core.grid import Storage
 from ..core.state import Grid
-from ..explicit import Stepper, damp, deform_body, gather, scatter
+from ..explicit import Stepper, scatter
 from .constraints import ActiveSet
 from .methods import SolverOptions, minimise
 from .multigrid.geometric import CoarseGrids, coarse_conditions
@@ -61,18 +61,14 @@ class ImplicitStepper(Stepper):
                 raise ValueError(f"body {body.name!r} has body forces b of its own: expected "
                                  "gravity alone with an implicit integrator")
 
-    def step(self, bodies, t, dt):
-        """Advance from time t [s] by dt [s]; returns the grid, which holds m and the new v.
-        Changes the bodies in place. Raises ValueError unless dt > 0.
+    def advance_grid(self, bodies, t, dt):
+        """Return the grid of the step from time t [s] by dt [s], which holds m and the new v. The
+        bodies stay as they are. Raises ValueError unless dt > 0.
         """
         if not 0.0 < dt < np.inf:
             raise ValueError(f"dt = {dt}: expected a positive, finite time in s")
         problem = self.problem(bodies, t, dt)
         write_velocities(problem.grid, problem.unknowns, problem.unknowns.v + self.solve(problem))
-        for body in bodies:
-            gather(body, problem.grid, self.scheme, dt)
-            deform_body(body, dt)
-            damp(body, self.scheme)
         return problem.grid
 
     def driven_speed(self, bodies, t, dt):

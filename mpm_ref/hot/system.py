@@ -7,6 +7,7 @@ import numpy as np
 from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
 from ..core.tensor import mat, mm, put_mat
 from .assembly import diagonal
+from .rigid import RigidMotions
 
 
 class Unknowns(NamedTuple):
@@ -57,6 +58,7 @@ class System:
         self.kappa, self.start, self.coarse_grids = kappa, start, coarse_grids
         self.index, self.n = unknowns.index, len(unknowns.m)
         self._at, self._tangent = None, None
+        self._rigid = None
 
     def energy(self, dv):
         """Return E(dv) [J]."""
@@ -74,6 +76,12 @@ class System:
     def particle_displacement(self, u):
         """Largest displacement [dx] of a particle in the step by nodal velocities u (n, d)."""
         return self.potential.largest_velocity(u) * self.potential.dt / self.unknowns.dx
+
+    def balanced(self, dv):
+        """Return dv (n, d) [m/s] with the balance of rigid motions; see `rigid.RigidMotions`."""
+        if self._rigid is None:
+            self._rigid = RigidMotions(self.potential, self.unknowns)
+        return self._rigid.balanced(dv)
 
     def tangent(self, dv):
         """The potential's `Tangent` at dv; the last one is cached."""

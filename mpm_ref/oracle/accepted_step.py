@@ -118,7 +118,7 @@ def second_method(options, eps):
     """
     name = "hot" if options.descent == "newton" else "pn-mgpcg"
     other = replace(METHODS[name], implementation=options.implementation, start=options.start,
-                    cycle=CycleOptions(coarsest="direct"))
+                    balance=options.balance, cycle=CycleOptions(coarsest="direct"))
     if options.norm == "L2":
         return replace(other, norm="L2", eps=eps)
     return replace(other, eps=eps)

@@ -297,7 +297,8 @@ class Solver(Record):
 
     eps: Positive | None = None                 # tolerance of the scaled gradient
     displacement_tolerance: NotNegative | None = None       # error of a step [dx]
-    start: Literal["zero", "gravity"] | None = None
+    start: Literal["gravity", "zero"] | None = None         # of the increment
+    balance: Literal["rigid", "none"] | None = None         # of rigid motions
     window: Natural | None = None               # pairs of L-BFGS
     rebuild_every: Natural | None = None        # steps between Hessians of L-BFGS
     rebuild_when: Literal["never", "shortened", "stale"] | None = None

@@ -96,7 +96,7 @@ def _write(h5, state, problem):
     h5.attrs["format"] = FORMAT
     h5.attrs["scene_sha256"] = scene_hash(problem)
     h5.attrs["source_sha256"] = source_hash()
-    for name in ("step", "t", "frame", "bound"):
+    for name in ("step", "t", "frame", "bound", "rejected", "stalled"):
         h5.attrs[name] = getattr(state, name)
     if state.account is not None:
         h5.attrs["account"] = [*state.account.start, state.account.noise]
@@ -119,7 +119,8 @@ def _read(h5, problem):
     account = None if numbers is None else Account(
         Energy(*map(float, numbers[:-1])), noise=float(numbers[-1]))
     return State(bodies, step=int(h5.attrs["step"]), t=float(h5.attrs["t"]),
-                 frame=int(h5.attrs["frame"]), bound=float(h5.attrs["bound"]), account=account)
+                 frame=int(h5.attrs["frame"]), bound=float(h5.attrs["bound"]), account=account,
+                 rejected=int(h5.attrs["rejected"]), stalled=int(h5.attrs["stalled"]))
 
 
 def _particles(group):

@@ -126,6 +126,13 @@ def count_unsolved(facts):
     return sum(part.get("unsolved", 0) for part in facts.get("parts", ()))
 
 
+def count_so_far(facts, name):
+    """Return the count "rejected" or "stalled" of `simulate.State` at the end of the last part in a
+    manifest.
+    """
+    return max((part.get(name, 0) for part in facts.get("parts", ())), default=0)
+
+
 def strain_warnings(facts):
     """Return all warnings in a manifest about strains beyond the training of learned laws."""
     return [one for part in facts.get("parts", ()) for one in part.get("strain_warnings", ())]
@@ -147,7 +154,8 @@ class RunPart:
         """Return the entry of this part in the manifest.
 
         It says why and where the part ended, the resources used, the number of implicit steps that
-        did not converge, the warnings about strains, the sha256 of the last state, and the code.
+        did not converge, the rejected and stalled steps of the whole run so far, the warnings about
+        strains, the sha256 of the last state, and the code.
         """
         return {
             "began": self.began,
@@ -160,6 +168,8 @@ class RunPart:
             "cpu_s": round(time.process_time() - self.cpu_start, 3),
             "peak_bytes": peak_memory(),
             "unsolved": self.unsolved,
+            "rejected": state.rejected,
+            "stalled": state.stalled,
             "strain_warnings": self.strain_warnings,
             "state_sha256": digest,
             **self.code,

@@ -1,6 +1,7 @@
 """The command line on implicit scenes: what it says before, during and after a run."""
 
 import json
+import re
 
 import pytest
 from command_line import SCENE, mpm_ref
@@ -9,6 +10,7 @@ from mpm_ref.cli.catalogue import bundled_scenes
 from mpm_ref.cli.info import of_problem, problem_lines
 from mpm_ref.scene import build, load
 from mpm_ref.simulate import simulate
+from mpm_ref.store.results import Results
 
 
 def implicit(tmp_path, solver=""):
@@ -69,6 +71,41 @@ def test_steps_that_were_not_solved_are_told(tmp_path, iterations, all_solved):
     facts = json.loads(done.stdout)
     assert facts["manifest"]["parts"][0]["unsolved"] == n
     assert len(facts["warnings"]) == (not all_solved)
+
+
+PRINTED = 'solver = { start = "zero", balance = "none" }\n'
+
+
+@pytest.mark.parametrize(("solver", "n"), [(PRINTED, 40), ("", 0)], ids=["printed", "default"])
+def test_a_stiff_body_that_hovers_is_told(tmp_path, solver, n):
+    scene, out = implicit(tmp_path, solver), tmp_path / "run.h5"
+    scene.write_text(scene.read_text().replace("E = 1e5", "E = 6.9e10"))
+    run = "run", scene, "--out", out, "--json"
+    for command in (run, ("info", out), (*run, "--resume"), ("info", out, "--json")):
+        done = mpm_ref(*command)
+        assert done.exit_code == 0
+        told = f"warning: {n} implicit steps of the run ended at its start" in done.stderr
+        assert told is (n > 0)
+        assert "run" not in command or json.loads(done.stdout)["stalled"] == n
+    facts = json.loads(done.stdout)
+    assert (facts["stalled"], len(facts["warnings"])) == (n, n > 0)
+    v = -9.8 * 0.04 if n == 0 else 0.0
+    with Results(out) as results:
+        assert results.field("disk", "v", -1)[:, 1] == pytest.approx(v, abs=1e-12)
+
+
+def test_rejected_steps_are_told(tmp_path):
+    scene, out = implicit(tmp_path, "solver = { max_iterations = 2 }\n"), tmp_path / "run.h5"
+    scene.write_text(scene.read_text().replace("dt = 0.001", "dt = 0.01").replace(
+        "[[body]]", 'walls = { low = ["open", 3] }\n[[body]]', 1))
+    told = r"[1-9]\d* rejected steps?, tried again with half of dt\n"
+    for command in (("run", scene, "--out", out), ("info", out)):
+        done = mpm_ref(*command)
+        assert done.exit_code == 0, done.output
+        assert re.search(told, done.stdout)
+    n = json.loads(mpm_ref("info", out, "--json").stdout)["rejected"]
+    assert n == json.loads(mpm_ref("run", scene, "--out", out, "--resume", "--json").stdout)[
+        "rejected"] > 0
 
 
 @pytest.mark.parametrize("name", sorted(bundled_scenes()))

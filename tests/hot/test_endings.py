@@ -11,7 +11,15 @@ from mpm_ref.hot.descent import StoppingRule, descend
 from mpm_ref.hot.lbfgs import LBFGS
 from mpm_ref.hot.line_search import Iterate, LineSearchOptions, search
 from mpm_ref.hot.linearization import Linearization
-from mpm_ref.hot.methods import CHOICES, METHODS, SolverOptions, minimise, options_of
+from mpm_ref.hot.methods import (
+    CHOICES,
+    METHODS,
+    PRINTED,
+    SolverOptions,
+    minimise,
+    options_of,
+    printed,
+)
 from mpm_ref.hot.norms import scaled_norm
 from mpm_ref.hot.report import Profiler
 
@@ -171,9 +179,9 @@ def test_patience_bears_a_slow_descent():
 
 # Options.
 
-def test_default_is_hot_as_printed():                                  # HOT-alg3, HOT-smoother
-    hot = METHODS["hot"]
-    assert hot == SolverOptions()
+def test_default_is_hot_as_printed_but_for_what_printed_names():       # HOT-alg3, HOT-smoother
+    hot = printed("hot")
+    assert hot == replace(METHODS["hot"], **PRINTED) == replace(SolverOptions(), **PRINTED)
     assert (hot.window, hot.levels, hot.kernel, hot.eps) == (8, 3, "linear", 1e-7)
     assert (hot.start, hot.norm, hot.rebuild_every) == ("zero", "characteristic", 0)
     assert minimise(bar()).report.method == minimise(bar(), SolverOptions()).report.method == "hot"

@@ -10,13 +10,13 @@ from nclaw_toys import CARRIED, DT, FIELDS, LOWER, UPPER, problem_of, random_lik
 from problems import run_python
 
 from mpm_ref.adjoint import StepAdjoint, zero_bars, zero_sums
+from mpm_ref.body import keep_inside
 from mpm_ref.core.boundary import Collider, Conditions, nclaw_walls
 from mpm_ref.core.jit import set_threads
 from mpm_ref.core.solids import half_space
 from mpm_ref.explicit import Scheme
 from mpm_ref.nclaw.batched_step import States, advance, make_nodes, make_world, pull_back
 from mpm_ref.problem import Clock
-from mpm_ref.simulate import keep_inside
 
 MOST = numba.config.NUMBA_NUM_THREADS
 WALLS = nclaw_walls(20, 3)

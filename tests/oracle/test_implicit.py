@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from goldens_hot import EPS, STEPS, bodies_at, problem_of, steps_of
 
 from mpm_ref import oracle
-from mpm_ref.hot.methods import METHODS
+from mpm_ref.hot.methods import METHODS, printed
 from mpm_ref.hot.multigrid import hierarchy
 from mpm_ref.hot.multigrid.projectors import block_diagonal
 from mpm_ref.oracle import accepted_step, differential, implicit_twin, recording
@@ -108,7 +108,7 @@ def test_bars_follow_the_tolerance(problem, golden, tmp_path):
 
 @pytest.mark.parametrize("word", ["gast15", "admm", "hot-quadratic"])
 def test_methods_without_the_v_cycle_have_fewer_stages(problem, word, tmp_path):
-    oracle.record(replace(problem, solver=METHODS[word]), tmp_path / "golden.h5", 1)
+    oracle.record(replace(problem, solver=printed(word)), tmp_path / "golden.h5", 1)
     with h5py.File(tmp_path / "golden.h5") as f:
         step = f["steps/0"]
         assert ("cycle" in step) == (METHODS[word].inverse == "cycle")
@@ -118,7 +118,7 @@ def test_methods_without_the_v_cycle_have_fewer_stages(problem, word, tmp_path):
 
 
 def test_a_step_that_is_not_solved_is_refused(problem, tmp_path):
-    capped = replace(problem, solver=replace(METHODS["hot"], max_iterations=1))
+    capped = replace(problem, solver=printed("hot", max_iterations=1))
     with pytest.raises(ValueError, match="the implicit step was not solved: 1 iterations, the cap"):
         oracle.record(capped, tmp_path / "golden.h5", 1)
     assert not list(tmp_path.iterdir())
@@ -178,7 +178,7 @@ def test_what_any_method_accepts_is_within_the_bar(problem, golden, checked, wor
         nodes, dt = f["steps/0/nodes"][()], f["steps/0"].attrs["dt"]
     stepper = recording.start_stepper(posed)
     for eps, agrees in ((EPS, True), (1e5 * EPS, False)):
-        options = replace(METHODS[word], eps=eps)
+        options = printed(word, eps=eps)
         _, dv = accepted_step.solve_with(stepper, posed.bodies, (0.0, dt), options)
         report = checked([{"nodes": nodes, "dv": dv}])
         assert report.agrees is agrees, str(report)

@@ -8,7 +8,7 @@ import pytest
 from goldens_hot import EPS, problem_of
 
 from mpm_ref import oracle
-from mpm_ref.hot.methods import METHODS
+from mpm_ref.hot.methods import printed
 from mpm_ref.oracle.schema import LEVELS
 
 
@@ -27,7 +27,7 @@ def test_options_are_named_in_the_file(problem, tmp_path):
 
 
 def test_more_levels_than_are_recorded_are_refused(problem, tmp_path):
-    many = replace(problem, solver=replace(METHODS["hot"], levels=LEVELS + 1))
+    many = replace(problem, solver=printed("hot", levels=LEVELS + 1))
     with pytest.raises(ValueError, match=f"levels = {LEVELS + 1}: expected at most {LEVELS}"):
         oracle.record(many, tmp_path / "golden.h5", 1, eps=EPS)
 

@@ -20,7 +20,7 @@ FLOORS = (
     ("core.stencil", "core.state"),
     ("core.order", "core.adjoint.shape_gradient"),
     ("core.grid", "core.transfer core.transfer_mls3", "core.deform", "core.levelset"),
-    ("core.motion", "core.contact",
+    ("core.motion", "core.contact", "core.displacement",
      "core.adjoint.transfer core.adjoint.transfer_mls3",
      "core.adjoint.grid", "core.adjoint.deform"),
     ("core.boundary",),
@@ -34,7 +34,7 @@ FLOORS = (
     ("timestep", "monitor", "adjoint", "constitutive"),
     ("tape",),
     ("hot", "rom", "nclaw"),
-    ("problem", "shapes"),
+    ("problem", "shapes", "attempt"),
     ("simulate", "sampling", "preflight"),
     ("scene",),
     ("store store.*",),     # but for its modules on lower floors

@@ -8,12 +8,12 @@ from clouds import AFFINE
 from constitutive import rotations
 from problems import DT, DX, JELLY, METAL, ball, moving
 
+from mpm_ref.body import keep_inside
 from mpm_ref.core.boundary import BoxWalls, Collider, Conditions
 from mpm_ref.core.motion import Motion, Oscillation, Steady
 from mpm_ref.core.solids import half_space
 from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.materials import Fluid, NoFlow, make_flow, make_law
-from mpm_ref.simulate import keep_inside
 from mpm_ref.tape import STATE, Seed, Tape
 
 CONSTANTS = ("m", "V0", "b")

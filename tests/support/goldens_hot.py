@@ -9,7 +9,7 @@ from hot_steps import DT, DX, block, conditions, unit
 from mpm_ref.core.boundary import Collider, Conditions
 from mpm_ref.core.levelset import half_space
 from mpm_ref.explicit import Scheme
-from mpm_ref.hot.methods import SolverOptions
+from mpm_ref.hot.methods import PRINTED, SolverOptions, printed
 from mpm_ref.hot.multigrid.hierarchy import hierarchy
 from mpm_ref.oracle import accepted_step, implicit_recording, recording
 from mpm_ref.oracle.implicit_twin import ImplicitTwin, embedding_weights, prolongate
@@ -21,7 +21,9 @@ SIDE = {2: 8, 3: 3}
 
 
 def problem_of(d, kind="slip", **rules):
-    """Two blocks, the second stiffer, on a floor askew; held on a side if it is "slip"."""
+    """Two blocks, the second stiffer, on a floor askew; held on a side if it is "slip". Solves
+    start as HOT prints it.
+    """
     shift = SIDE[d] * DX / 2 * np.array(unit(d, 0))
     soft = block(d, 1e5, np.zeros(d), SIDE[d])._replace(name="soft")
     hard = block(d, 1e6, shift, SIDE[d])._replace(name="hard")
@@ -29,7 +31,7 @@ def problem_of(d, kind="slip", **rules):
     held = conditions(d) if kind == "slip" else floor(d, kind)
     scheme = rules.pop("scheme", Scheme(transfer="apic"))
     return Problem((soft, hard), DX, Clock(dt=DT, steps=9), g, scheme, held,
-                   integrator="implicit", **rules)
+                   integrator="implicit", solver=printed("hot"), **rules)
 
 
 def floor(d, kind):
@@ -84,7 +86,7 @@ def multigrid(step, system, load):
     grids = hierarchy(A, system.index, implementation="scipy")
     seen = {"cycle": grids.cycle(load)}
     g = system.evaluate(system.start)[1]
-    options = SolverOptions(implementation="scipy")
+    options = SolverOptions(implementation="scipy", **PRINTED)
     seen["direction"] = implicit_recording.first_direction(system, A, g, options)
     for k, (fine, coarse) in enumerate(zip(grids.levels, grids.levels[1:]), 1):
         W = embedding_weights(fine.index, coarse.index, "linear")

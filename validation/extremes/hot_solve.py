@@ -5,7 +5,6 @@ the incremental energy, and reports its end correctly: a recomputed gradient con
 converged (HOT-eq9), or a sentence gives the reason why it did not.
 """
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +12,7 @@ import numpy as np
 from mpm_ref.core.state import Particles
 from mpm_ref.explicit import Scheme, deform_body, gather
 from mpm_ref.hot.methods import METHODS as ALL
+from mpm_ref.hot.methods import printed
 from mpm_ref.hot.norms import scaled_norm
 from mpm_ref.hot.step import MAX_UPDATES, ImplicitStepper, write_velocities
 
@@ -50,8 +50,8 @@ class SolveEnd(NamedTuple):
 
 
 def options(method, **changes):
-    """Return the method's `Options` with the caps of these experiments."""
-    return replace(ALL[method], **{"max_iterations": OUTER, "max_cg_iterations": CG, **changes})
+    """Return the method's `SolverOptions`, as HOT prints them, with the caps used here."""
+    return printed(method, **{"max_iterations": OUTER, "max_cg_iterations": CG, **changes})
 
 
 def stepper_of(setup, method, **changes):

@@ -18,6 +18,7 @@ VARIANTS = {        # of HOT: changes of its options
     "displacement-stop": {"displacement_tolerance": 1e-3},
     "scipy": {"implementation": "scipy"},
     "rebuild": {"rebuild_every": 2, "start": "gravity"},
+    "balance": {"start": "gravity", "balance": "rigid"},
     "shortened": {"rebuild_when": "shortened", "jacobi": "scalar"},
 }
 STEPS = 4

@@ -14,7 +14,7 @@ import numpy as np
 from mpm_ref.core.blas import one_thread
 from mpm_ref.core.jit import set_threads
 from mpm_ref.energy import angular_momentum, energy, momentum
-from mpm_ref.hot.methods import METHODS
+from mpm_ref.hot.methods import METHODS, printed
 from mpm_ref.scene import build, load
 from mpm_ref.scene.overrides import with_values
 from mpm_ref.simulate import simulate
@@ -89,13 +89,13 @@ def report_of(solve):
     """Return the counts and residuals of an implicit step's report, without times and text."""
     if solve is None:
         return ()
-    _, converged, _, *counts, residuals, _, off, _ = solve
+    _, converged, _, *counts, residuals, _, off, _, _ = solve
     return converged, tuple(counts), np.array(residuals), off
 
 
 def solvers():
-    """Return the options of every implicit method, in their order."""
-    return tuple(METHODS.values())
+    """Return the options of every implicit method as HOT prints them, in their order."""
+    return tuple(map(printed, METHODS))
 
 
 def with_solver(problem, options, **changes):

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm_ref.hot.descent import StoppingRule
-from mpm_ref.hot.methods import options_of, solve
+from mpm_ref.hot.methods import printed, solve
 from mpm_ref.hot.report import ProfiledSystem, Profiler, SolveReport
 from mpm_ref.simulate import State
 
@@ -82,7 +82,7 @@ def initial_step(problem):
 
 def iterates(step, setup, **changes):
     """Return the `Iterates` of a step by a `MethodSetup`, solved as by `methods.minimise`."""
-    options = options_of(setup.method, **{**setup.changes, **changes})
+    options = printed(setup.method, **{**setup.changes, **changes})
     profiler = IterateRecorder()
     system = RecordedSystem(step.stepper.system(step.pose), profiler)
     with profiler.part("other"), np.errstate(all="ignore"):

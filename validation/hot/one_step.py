@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm_ref.explicit import gather
-from mpm_ref.hot.methods import minimise
+from mpm_ref.hot.methods import minimise, printed
 from mpm_ref.hot.step import write_velocities
 from mpm_ref.scene import build
 from mpm_ref.simulate import simulate
@@ -48,8 +48,9 @@ def implicit_step(stepper, state, dt):
 
 
 def solve_step(step, method, **changes):
-    """Return the `Solution` of the step by a method."""
-    return minimise(step.stepper.system(step.pose), method, **changes)
+    """Return the `Solution` of the step by a method: its name, as HOT prints it, or options."""
+    options = printed(method) if isinstance(method, str) else method
+    return minimise(step.stepper.system(step.pose), options, **changes)
 
 
 def particle_velocities(step, dv):

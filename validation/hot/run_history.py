@@ -39,7 +39,8 @@ class RunHistory(NamedTuple):
     x: np.ndarray           # (shots, N, 3) [m], single precision as the next two
     speed: np.ndarray       # (shots, N) [m/s]
     stress: np.ndarray      # (shots, N) Frobenius norm of the Kirchhoff stress [Pa]
-    facts: dict             # scene and source (hashes), patience, end, why it ended, mass, commit
+    facts: dict             # scene and source (hashes), patience, end, why it ended, mass, commit,
+                            # rejected steps
 
     def column(self, name):
         """Return one entry of `COLUMNS` at every step."""
@@ -145,6 +146,7 @@ class Log:
         times, pictures = zip(*self.shots, strict=True)
         body = np.concatenate([np.full(len(b.id), k, np.uint8) for k, b in enumerate(state.bodies)])
         facts = {"why": why, "end": self.problem.clock.end, "dx": self.problem.dx,
+                 "rejected": state.rejected,
                  "mass": [self.mass, sum(float(b.particles.m.sum()) for b in state.bodies)]}
         return RunHistory(np.array(self.rows, dtype=float).reshape(-1, len(COLUMNS)),
                       np.array(times), body, *map(np.stack, zip(*pictures, strict=True)), facts)

@@ -3,6 +3,7 @@
 from math import ceil
 from typing import NamedTuple
 
+from mpm_ref.hot.methods import PRINTED
 from mpm_ref.scene import Limits, Solver, build
 from mpm_ref.simulate import simulate
 
@@ -36,7 +37,7 @@ def bar(dx, E, method, steps, **solver):
     """Return the scene at another spacing and stiffness, solved by a method for some steps."""
     scene = catalogue_scene(
         SCENE, dx=dx, integrator=method, steps=steps, end=None,
-        unstable="allow", solver=Solver(**solver), limits=FIRST)
+        unstable="allow", solver=Solver(**PRINTED, **solver), limits=FIRST)
     count = ceil(PER_CELL * 0.12 * 0.12 * 0.3 / dx**3)
     bodies = tuple(with_(body, sampling=with_(body.sampling, count=count)) for body in scene.body)
     middle = with_(bodies[1], material=with_(bodies[1].material, E=E))

@@ -17,7 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.scene import Body, Box, Limits, Material, Regular, Scene, Scheme, build
+from mpm_ref.hot.methods import PRINTED
+from mpm_ref.scene import Body, Box, Limits, Material, Regular, Scene, Scheme, Solver, build
 
 from ..common import targets
 from ..common.registry import experiment
@@ -53,7 +54,7 @@ def box(dx, nu, E):
         sampling=Regular(per_cell=2), material=Material(law="fixed_corotated", E=E, nu=nu))
     return Scene(
         title="Stretched box", dim=3, dx=dx, body=(body,), cfl=0.6, longest=FRAME, steps=1,
-        integrator="hot", scheme=Scheme(transfer="apic"),
+        integrator="hot", solver=Solver(**PRINTED), scheme=Scheme(transfer="apic"),
         limits=Limits(cfl=100.0))       # the first step, from rest, crosses cells
 
 

@@ -62,8 +62,8 @@ def record_end(run, name, history):
     id, scale = f"hot.scenes.{name}", scale_text(history)
     run.record(f"{id}.done", history.column("t")[-1] / history.facts["end"], unit="1",
                comparator="=", paper=1.0, scale=scale,
-               note=f"share of the scene's time; it ended by: {history.facts['why']}; run at "
-               f"{history.facts['commit']}")
+               note=f"share of the scene's time; it ended by: {history.facts['why']}; "
+               f"{history.facts['rejected']} rejected steps; run at {history.facts['commit']}")
     eps = METHODS[METHOD].eps
     run.record(f"{id}.converged", float(history.column("converged").mean()), unit="1",
                comparator="=", paper=1.0, scale=scale,

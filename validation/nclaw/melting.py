@@ -8,9 +8,8 @@ one grid. Positions, velocities and deformation gradients stay as they are when 
 
 import numpy as np
 
-from mpm_ref.body import Body, particles_at, restore_order
+from mpm_ref.body import Body, keep_inside, particles_at, restore_order
 from mpm_ref.core.grid import OutOfRange
-from mpm_ref.simulate import keep_inside
 
 FIRST, LAST = 500, 1500     # steps
 HOLD = 20                   # steps between changes

@@ -5,11 +5,10 @@ error falls to given levels. Ratios of times of one run,
 settings in turn, so that load bears on all of them.
 """
 
-from dataclasses import replace
 
 import numpy as np
 
-from mpm_ref.hot.methods import METHODS, RULES
+from mpm_ref.hot.methods import METHODS, RULES, printed
 
 from ..common.registry import experiment
 from ..hot.one_step import difference, solve_step, step_after
@@ -38,8 +37,8 @@ KNOBS = {
     "start gravity": {"start": "gravity"},
     "shorter trials": {"search": RULES._replace(shrink=0.2)},
 }
-SETTINGS = {name: replace(METHODS["hot"], **knob) for name, knob in KNOBS.items()}
-SETTINGS["hot-plus"] = METHODS["hot-plus"]
+SETTINGS = {name: printed("hot", **knob) for name, knob in KNOBS.items()}
+SETTINGS["hot-plus"] = printed("hot-plus")
 SHORT = ("paper", "hot-plus")      # of the quick profile
 LEVELS = (1e-2, 1e-4)               # errors at which times are compared
 EXACT = 1e-12

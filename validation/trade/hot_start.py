@@ -7,7 +7,7 @@ three solve the same steps to the same tolerance, and are compared with what is 
 
 import numpy as np
 
-from mpm_ref.hot.methods import minimise
+from mpm_ref.hot.methods import minimise, printed
 from mpm_ref.hot.system import free_part
 
 from ..common.registry import experiment
@@ -69,7 +69,7 @@ def solve(step, begin, exact):
     """
     system = step.stepper.system(step.pose)
     system.start = begin
-    found = minimise(system, "hot", eps=EPS, **CAPS)
+    found = minimise(system, printed("hot", eps=EPS, **CAPS))
     r = found.report
     return (sum(r.seconds.values()), r.iterations, difference(step, found.dv, exact)[1],
             r.converged)
