@@ -94,9 +94,10 @@ class Material(NamedTuple):
 def recovers(law):
     """Return whether the law turns inverted matter, det F <= 0, back: fixed corotated does.
 
-    A fluid's energy is finite there too, but no run should go on with a fluid of J <= 0.
+    A fluid's energy is finite there too, but no run should go on with a fluid of J <= 0. A learned
+    law with a guard reads inverted matter as the most compressed one of its training.
     """
-    return isinstance(law, FixedCorotated)
+    return isinstance(law, FixedCorotated) or len(getattr(law, "low", ())) > 0
 
 
 def make_law(name, /, **parameters):

@@ -51,7 +51,7 @@ name = "learned"
 density = 1000.0
 shape = {{ type = "box", lower = [0.3, 0.2], upper = [0.5, 0.4] }}
 velocity = {{ linear = [0.0, {speed}] }}
-material = {{ law = "neural", weights = "laws.npz" }}
+material = {{ law = "neural", weights = "laws.npz", guard = false }}
 """
 
 
@@ -304,7 +304,7 @@ def test_another_time_step_is_told_before_the_run(tmp_path):
 
 def test_a_run_without_learned_laws_is_never_looked_at(tmp_path, monkeypatch):
     monkeypatch.setattr(watching, "strain_report", None)
-    text = SCENE.format(speed=-3.0).replace('law = "neural", weights = "laws.npz"',
+    text = SCENE.format(speed=-3.0).replace('law = "neural", weights = "laws.npz", guard = false',
                                             'law = "fixed_corotated", E = 1e5, nu = 0.3')
     (tmp_path / "scene.toml").write_text(text)
     done = mpm_ref("run", tmp_path / "scene.toml", "--out", tmp_path / "run.h5")
