@@ -94,10 +94,9 @@ class Material(NamedTuple):
 def recovers(law):
     """Return whether the law turns inverted matter, det F <= 0, back: fixed corotated does.
 
-    A fluid's energy is finite there too, but no run should go on with a fluid of J <= 0. A learned
-    law with a guard reads inverted matter as the most compressed one of its training.
+    A fluid's energy is finite there too, but no run should go on with a fluid of J <= 0.
     """
-    return isinstance(law, FixedCorotated) or len(getattr(law, "low", ())) > 0
+    return isinstance(law, FixedCorotated)
 
 
 def make_law(name, /, **parameters):

@@ -8,6 +8,7 @@ import rom_toys
 
 from mpm_ref.rom.extrapolation import LATENTS, extent
 from mpm_ref.rom.fields.pod import basis
+from mpm_ref.rom.integrity import DamagedModel
 from mpm_ref.rom.latent import start_state
 from mpm_ref.rom.step import StepReport
 from mpm_ref.rom.study import monitor as monitoring
@@ -42,7 +43,7 @@ def toy(d, rng):
     runs = map.rest + 0.1 * rng.normal(size=(2, 5, map.r))
     runs[0, 0] = xhat
     X = rom_toys.cloud(d, 20)
-    return MapMonitor(map, X, extent(runs, np.eye(map.r)), DX, DT, X), xhat
+    return MapMonitor(map, X, extent(runs, np.eye(map.r)), DX, DT, X, {}), xhat
 
 
 def look(monitor, latent, report=None, samples=None, last=None):
@@ -258,6 +259,18 @@ def test_a_checked_run_is_the_run_and_is_well(fall):
         assert plain.report == state.report
         assert check.out_of_bounds == ()
         assert check.beyond < 1.0
+
+
+def test_a_run_whose_map_is_damaged_meanwhile_says_so_at_its_end(fall):
+    one, modes, xhat = fall
+    modes = modes._replace(U=modes.U.copy())
+    run = ldm_run(one, modes, RunOptions(points=20), np.zeros(2), seed=3)
+    states = checked_states(run, map_monitor(one, modes, xhat))
+    for _ in range(5):
+        next(states)
+    modes.U[-1, -1, -1] = np.nextafter(modes.U[-1, -1, -1], 1.0)
+    with pytest.raises(DamagedModel, match="changed in memory: U;"):
+        next(states)
 
 
 def test_samples_of_others_choice_are_taken_and_looked_at(fall):

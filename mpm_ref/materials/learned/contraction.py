@@ -55,7 +55,7 @@ from ..log_strain import deviator, log_strain, stretches
 from ..log_strain_adjoint import log_gap_ratio
 from ..no_flow import never_fails
 from ..stretches import inverse
-from .guard import NONE, corrected, cut
+from .guard import NONE, cut, with_half_the_rest
 from .network import flatten, outputs, softplus
 from .principal import pull_back_stretches
 
@@ -248,7 +248,7 @@ def returned(F, flow):
     """Return F after the return map; NaN unless det F > 0."""
     F_cut, is_cut = cut(F, flow.low, flow.high)
     F_new = contracted_point(F_cut, flow)
-    return corrected(F, F_cut, F_new) if is_cut else F_new
+    return with_half_the_rest(F, F_cut, F_new) if is_cut else F_new
 
 
 registry.returned.method(ContractionFlow, returned)

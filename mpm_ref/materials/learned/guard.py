@@ -6,13 +6,14 @@ can get a stress that destroys a whole run. With bounds, of F = U diag(s) V^T a 
     F_cut = U diag(c) V^T,    c_a = min(max(s_a, low_a), high_a)
 
 and where det F_cut is outside of its own bounds, c is scaled by a common factor, each c_a within
-its bounds, to the nearer one. Stress and energy are those of F_cut. A return map corrects F
-as much as it corrects F_cut:
+its bounds, to the nearer one. Stress and energy are those of F_cut. A return map
+reads F_cut too, and leaves half of what was cut:
 
-    tau = kirchhoff(F_cut),    returned(F) = F + returned(F_cut) - F_cut
+    tau = kirchhoff(F_cut),    returned(F) = returned(F_cut) + (F - F_cut)/2
 
-F itself is not cut: a point keeps the deformation of its motion, and may come back. Within the box
-nothing changes, to the bit; without bounds no F is cut.
+so that a point in the spray, which strains more and more, does not stretch without end; and a point
+that was cut stays out of the box for a step, where it can be counted. Within the box nothing
+changes, to the bit; without bounds no F is cut.
 """
 
 from math import exp, log
@@ -153,6 +154,6 @@ def same(a, b):
 
 
 @kernel
-def corrected(F, F_cut, F_new):
-    """Return F + F_new - F_cut."""
-    return mlin(1.0, F, 1.0, mlin(1.0, F_new, -1.0, F_cut))
+def with_half_the_rest(F, F_cut, F_new):
+    """Return F_new + (F - F_cut)/2."""
+    return mlin(1.0, F_new, 0.5, mlin(1.0, F, -1.0, F_cut))

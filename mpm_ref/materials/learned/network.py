@@ -24,7 +24,7 @@ from ...core.tensor import mat, mmt
 from ..no_flow import never_fails
 from ..waves import moduli_at_rest, stiffness
 from . import response
-from .guard import NONE, corrected, cut
+from .guard import NONE, cut, with_half_the_rest
 from .invariants import count, describe
 from .response import answer
 
@@ -213,7 +213,7 @@ def returned(F, flow):
     """Return F after the return map."""
     F_cut, is_cut = cut(F, flow.low, flow.high)
     F_new = respond(F_cut, flow)
-    return corrected(F, F_cut, F_new) if is_cut else F_new
+    return with_half_the_rest(F, F_cut, F_new) if is_cut else F_new
 
 
 @kernel

@@ -27,6 +27,7 @@ import numpy as np
 from ..cubature import misfit
 from ..extrapolation import BEYOND, Extent, evenly, trained_extent
 from ..fields.pod_fields import PodFields
+from ..integrity import require_intact, seal
 from ..projection import RANK
 
 CHECKED = 64        # points of the body that are checked, and samples
@@ -114,6 +115,12 @@ class MapMonitor(NamedTuple):
     dx: float               # of the grid [m]
     dt: float               # [s]
     all_points: np.ndarray  # (N, d) of which samples have numbers, at rest [m]
+    seal: dict              # of the map (see `rom.integrity`)
+
+    @property
+    def field(self):
+        """The map."""
+        return self.g
 
     def check(self, state, last=None):
         """Return the `StateCheck` of a `RunState`, whose predecessor's was `last`; raises
@@ -149,6 +156,8 @@ class FieldMonitor(NamedTuple):
     """The monitor of a run of NSF."""
 
     extent: Extent      # of the training latents
+    field: object       # of the run
+    seal: dict          # of the field (see `rom.integrity`)
 
     def check(self, state, last=None):
         """Return the `StateCheck` of a `RunState`."""
@@ -162,19 +171,22 @@ def map_monitor(full, g, xhat):
     k + 1, r). Raises ValueError where these do not differ.
     """
     X, problem = evenly(full.X, CHECKED), full.problem
-    return MapMonitor(g, X, trained_extent(g, full.X, xhat), problem.dx, problem.clock.dt, full.X)
+    return MapMonitor(g, X, trained_extent(g, full.X, xhat), problem.dx, problem.clock.dt, full.X,
+                      seal(g))
 
 
 def field_monitor(fields, xhat):
     """Return the `FieldMonitor` of runs on fields with training latents xhat (s, k + 1, r). Raises
     ValueError where these do not differ.
     """
-    return FieldMonitor(trained_extent(fields, np.arange(len(fields.X)), xhat))
+    return FieldMonitor(trained_extent(fields, np.arange(len(fields.X)), xhat), fields,
+                        seal(fields))
 
 
 def checked_states(run, monitor, earlier=()):
     """Yield (`RunState`, `StateCheck`) of a `ReducedRun`, of earlier states too (see
-    `ReducedRun.states`). Raises `NoBodyLeft`, and what the run raises.
+    `ReducedRun.states`). Raises `NoBodyLeft`, after the last state `integrity.DamagedModel` if
+    arrays of the model have changed meanwhile, and what the run raises.
     """
     check, first = None, None
     for k, state in enumerate(run.states(earlier)):
@@ -187,6 +199,7 @@ def checked_states(run, monitor, earlier=()):
                 f"{first[1].message}. Keep to the parameters that the map was trained with, take "
                 "more samples or a smaller dt")
         yield state, check
+    require_intact(monitor.field, monitor.seal)
 
 
 def sample_warnings(fields, samples):
