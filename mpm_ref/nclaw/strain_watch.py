@@ -24,6 +24,9 @@ from ..monitor import CHECK
 from .bodies import body_maker, deformation_gradients
 
 MAX_EXCESS = 0.3        # runs of task (b) reach 0.2, those thrown twice as fast 0.8
+POOR = 0.16             # error on the training run over its motion; from unfinished trainings of
+                        # small laws (`extremes.nclaw.epochs`): good ones have up to 0.137, bad ones
+                        # from 0.17 on
 
 
 class StrainReport(NamedTuple):
@@ -127,6 +130,23 @@ class ComparisonWatch:
 def strain_watch(problem):
     """Return the `StrainWatch` of a run of a `Problem`; None where no law has bounds."""
     return StrainWatch(problem.strain_bounds) if problem.strain_bounds else None
+
+
+def is_poor(run_error):
+    """Return whether laws with an error on their own training run, over its motion, are poor; None
+    is that of a run that broke down.
+    """
+    return run_error is None or not run_error <= POOR
+
+
+def poor_law_warnings(problem):
+    """Yield a warning for each body whose laws had a large error on their own training run."""
+    for name, bounds in problem.strain_bounds.items():
+        error = bounds.get("run_error", 0.0)
+        if is_poor(error):
+            share = "broke down on" if error is None else f"missed {error:.0%} of the motion of"
+            yield (f"body {name!r}: its laws {share} the run that they were trained on: most runs "
+                   f"of laws that missed more than {POOR:.0%} went wrong; train longer")
 
 
 def time_step_warnings(problem):

@@ -74,7 +74,8 @@ def describe_bounds(bounds):
 
 
 def stored_bounds(about, d):
-    """Return the bounds that the record of a training holds, and its `dt` [s] or None; or None.
+    """Return the bounds that the record of a training holds, and its `dt` [s] or None; with the
+    laws' error on their own run, `run_error`, where the record has it; or None.
 
     Raises ValueError for bounds that are not those of d dimensions.
     """
@@ -92,4 +93,5 @@ def stored_bounds(about, d):
     if dt is not None and not (isinstance(dt, int | float) and 0.0 < dt < np.inf):
         raise ValueError(f"time step of training: {dt}; expected a number above 0, in s; train "
                          "again")
-    return {"low": low.tolist(), "high": high.tolist(), "dt": dt}
+    own = {name: about[name] for name in ("run_error",) if name in about}
+    return {"low": low.tolist(), "high": high.tolist(), "dt": dt, **own}

@@ -148,7 +148,6 @@ def test_what_is_usual_is_the_first_run_s_error():
     first, second = law_trials(Records(), law, setups)
     assert first.usual == second.usual == first.end.error > 0.0
     assert second.end.error > first.end.error
-    assert law_trials(Records(), law, setups, usual=7.0)[1].usual == 7.0
 
 
 def test_fluids_start_at_the_volume_of_the_strain():
@@ -265,10 +264,10 @@ def test_drift_is_that_of_the_last_fifth():
 # Unfinished trainings, and faults of what is seen.
 
 def test_epochs_are_compared_with_the_last_one(monkeypatch):
-    def shown(run, law, setups, usual):
+    def shown(run, law, setups):
         error = {"jelly after 10": 5e-4, "jelly after 100": 1e-4}[law.name]
-        return [trial("as trained", law.name, usual or error, error=error, lost=120, first=60),
-                trial("thrown", law.name, usual or error, error=error)]
+        return [trial("as trained", law.name, error, error=error, lost=120, first=60),
+                trial("thrown", law.name, error, error=error)]
 
     monkeypatch.setattr(trainings, "law_trials", shown)
     kept = {k: untrained()._replace(about={"seen": WIDE, "dt": DT}) for k in (10, 100)}
