@@ -83,7 +83,7 @@ def points(run):
 
 
 def few_samples_trials(run, name):
-    """Return the `ReducedTrial`s of a trained map with few samples and with samples in one place."""
+    """Return the `ReducedTrial`s of a trained map with few samples, or with some in one place."""
     schemes = run.choose(quick=SCHEMES[1:2], standard=SCHEMES[:2])
     bench = ReductionBench(trained_reduction(name), name.partition("-")[0])
     few = [bench.trial("few", RunOptions(*scheme, count)) for scheme in schemes

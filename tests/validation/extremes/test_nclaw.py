@@ -14,6 +14,7 @@ from mpm_ref.scene import build
 from validation.common.scenes import with_
 from validation.common.weights_needed import Untrained, load_available
 from validation.extremes import nclaw_extrapolation as extrapolation
+from validation.extremes import nclaw_guard as guards
 from validation.extremes import nclaw_runs
 from validation.extremes import nclaw_trainings as trainings
 from validation.extremes.nclaw_extrapolation import with_time_step
@@ -298,3 +299,32 @@ def test_faults_stand_beside_the_seeds(monkeypatch):
     assert "without faults 0.0001 to 0.0003 m^2" in note
     columns, table = records["trainings"]
     assert dict(zip(columns, table[2], strict=True))["density"] == 2.0
+
+
+# The guard.
+
+def guarded_trial(what, free=GOOD, kept=GOOD):
+    return guards.GuardedTrial("water", what, free, kept)
+
+
+def test_runs_that_break_down_with_and_without_the_guard_are_counted():
+    stopped = GOOD._replace(error=np.inf, message="lost")
+    records = Records()
+    guards.record_guard(records, [
+        guarded_trial("as trained"), guarded_trial("thrown", stopped),
+        guarded_trial("Table 2 (c)", stopped, GOOD._replace(error=3e-4)),
+        guarded_trial("pressed", stopped, stopped),
+        guarded_trial("turned", GOOD, GOOD._replace(error=2.0 * GOOD.error))])
+    values = {id: value for id, (value, _) in records.items()}
+    assert values == {"extremes.nclaw.guard.broken": 1, "extremes.nclaw.guard.harm": 2.0,
+                      "extremes.nclaw.guard.water.geometry": 3e-4}
+    assert "finish 2; water, pressed" in records["extremes.nclaw.guard.broken"][1]
+
+
+def test_a_run_that_stops_is_bad_whatever_is_usual():
+    assert trial(error=np.inf, usual=np.inf, message="lost").is_bad()
+
+
+def test_laws_with_a_large_error_on_their_own_run_are_flagged():
+    assert nclaw_runs.flagged_as_poor(GOOD).flags == "poor"
+    assert nclaw_runs.flagged_as_poor(GOOD._replace(flags="dt", first=3))[2:4] == (0, "dt poor")
