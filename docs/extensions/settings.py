@@ -96,11 +96,11 @@ def holds(change, others):
 def advice_text(title, best, floor):
     """Return the advice for a scene as a sentence."""
     lead = f"Cheapest stable setting with at most 1 % on the {title}"
-    own = f"; the reference's own error of {100.0 * floor:.2g} % is added" if floor else ""
+    added = f"; the reference's own error of {100.0 * floor:.2g} % is added" if floor else ""
     if best is None:
-        return f"{lead}: none that was tried{own}."
+        return f"{lead}: none that was tried{added}."
     return (f"{lead}: {explicit_setting(best)} (error {100.0 * best['error']:.2g} %, "
-            f"{best['cpu']:.2g} CPU s{own}).")
+            f"{best['cpu']:.2g} CPU s{added}).")
 
 
 def stability(pair):

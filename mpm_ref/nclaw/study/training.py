@@ -57,8 +57,8 @@ def run_error(problem, maker, x):
     run = positions(problem, tuple(map(maker, problem.bodies)))
     try:
         with threads_for(problem.bodies):
-            errors = [np.mean((own - true) ** 2)
-                      for own, true in zip(run, x[::problem.clock.every or 1], strict=True)]
+            errors = [np.mean((learned - true) ** 2)
+                      for learned, true in zip(run, x[::problem.clock.every or 1], strict=True)]
     except RunBroken:
         return None
     motion = np.mean((x - x[0]) ** 2)

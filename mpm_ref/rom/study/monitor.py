@@ -135,7 +135,7 @@ class MapMonitor(NamedTuple):
 
     @property
     def field(self):
-        """The map."""
+        """Return the map of the run."""
         return self.g
 
     def check(self, state, last=None):
