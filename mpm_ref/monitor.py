@@ -7,6 +7,8 @@ import numpy as np
 from .core.law import psi
 from .energy import Energy, energy
 from .materials import stiffness
+from .materials.learned.guard import is_guarded
+from .materials.learned.strain_range import describe_bounds, describe_strains, farthest
 
 CHECK = 20      # steps between checks, so that a broken bound is reported well within 100 steps
 REST = 1e-6     # a strain taken for none: less energy than it stores is round-off
@@ -22,10 +24,16 @@ class Unstable(RuntimeError):
         self.__dict__.update(where)
         super().__init__(
             f"unstable at step {self.step}, t = {self.t:.6g} s: {reason}; body {self.body!r}, "
-            f"particle {self.particle}: CFL number {self.cfl:.3g}, J = {self.J:.3g}, energy of "
-            f"the run {self.energy:.6g} J; "
+            f"particle {self.particle}: {self.finite_values()}; "
             + (self.advice if self.step else "the run cannot start from this state")
         )
+
+    def finite_values(self):
+        """Return the CFL number, J and energy in words, without those that are not finite."""
+        words = {f"CFL number {self.cfl:.3g}": self.cfl, f"J = {self.J:.3g}": self.J,
+                 f"energy of the run {self.energy:.6g} J": self.energy}
+        finite = [word for word, value in words.items() if np.isfinite(value)]
+        return ", ".join(finite) or "nothing of it is finite"
 
 
 @dataclass(frozen=True)
@@ -110,6 +118,8 @@ def check(problem, state, dt):
         low, high = problem.limits.J
         J = volume_ratio(body.particles)
         low = -high if problem.may_invert(body) else low
+        if is_guarded(body.law):            # it reads no J of a point that is out of its training
+            low, high = -np.inf, np.inf
         _stop_where(problem, state, body, dt, ~((low <= J) & (J <= high)),
                     f"J is outside [{low:g}, {high:g}]")
         cfl = speed(body.particles) * (dt / problem.dx)
@@ -139,8 +149,14 @@ def lost(problem, state, dt, reason):
     return unstable(problem, state, body, int(np.argmax(speed(body.particles))), dt, reason)
 
 
-def advice(problem, solve):
-    """Return advice for a run whose last implicit step, if it was one, has the report `solve`."""
+def advice(problem, solve, body):
+    """Return advice for a run whose last implicit step, if it was one, has the report `solve`, and
+    in which this body broke a bound.
+    """
+    if body.name in problem.strain_bounds:
+        p, strains, out = farthest(body.particles.F, problem.strain_bounds[body.name])
+        if out > 0.0:
+            return learned_law_advice(problem, body, int(body.id[p]), strains)
     if solve is None or solve.converged:
         return "take a smaller dt, or look at the last checkpoint"
     options, key = problem.solver, "eps"
@@ -151,11 +167,21 @@ def advice(problem, solve):
     return f"give the solver a larger `{key}`, or take a smaller dt"
 
 
+def learned_law_advice(problem, body, p, strains):
+    """Return advice for a run whose particle p has strains beyond the training of its law."""
+    guard = ("" if is_guarded(body.law) else
+             "let its material say guard = true, which cuts strains to those of training, or ")
+    return (f"the learned law of {body.name!r} has particle {p} at {describe_strains(strains)}, "
+            "outside its training, which had "
+            f"{describe_bounds(problem.strain_bounds[body.name])}: {guard}train on a run that "
+            "strains as much")
+
+
 def unstable(problem, state, body, p, dt, reason):
     """Return an `Unstable` with the reason and the state of particle p of a body."""
     return Unstable(
         reason,
-        advice=advice(problem, state.solve),
+        advice=advice(problem, state.solve, body),
         step=state.step,
         t=state.t,
         body=body.name,

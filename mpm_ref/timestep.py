@@ -1,11 +1,9 @@
-"""The stable time step of the explicit method: four bounds, each reported.
+"""The stable time step of the explicit method: three bounds, each reported.
 
 * advective: no part of a particle's support crosses more than a cell, dt u + dt^2 |g| < dx with
   u = |v_p| + |L_p| dx (degree + 1)/2;
 * elastic: no wave crosses more than a cell, dt c_p < dx, c_p that of `materials.waves` at the
   current stretches; of a law without derivatives, as a learned one, that at rest;
-* viscous: none of our laws has an explicit viscosity (Bingham flow is integrated
-  implicitly), so it is infinite;
 * single particle: the oscillation of a particle through nodes that it has to itself must not grow
   [BaiSchroeder2022]. With K its largest modulus, 2 mu + d lam at rest, 1/D of `inverse_inertia`,
 
@@ -16,6 +14,9 @@
   It is the limit of an isolated particle, and no cloud of particles has a smaller one: derived in
   docs/explanation/timestep.md. Linear splines have no such limit (S is infinite at a node); for
   them m_p/m_i with the nodes' masses stands for 1/w_ip, and the bound is necessary, not sufficient.
+
+A viscosity has no bound of its own: return maps relax the elastic stress, and that never shortens
+the stable step (docs/explanation/timestep.md).
 """
 
 from math import inf
@@ -52,7 +53,6 @@ class TimeStep(NamedTuple):
 
     advective: float
     elastic: float
-    viscous: float
     single_particle: float
 
     @property
@@ -205,7 +205,7 @@ def stable_dt(bodies, stepper):
     if stepper.implicit:
         particles = (body.particles for body in bodies)
         bounds = [advective(q, stepper.dx, 0.0, stepper.gravity) for q in particles]
-        return TimeStep(min(bounds), inf, inf, inf)
+        return TimeStep(min(bounds), inf, inf)
     if scheme.degree == 1:
         grid = scatter(bodies, stepper.storage, scheme, 0.0)
     else:
@@ -220,7 +220,6 @@ def _body_dt(body, grid, scheme, gravity):
     return (
         advective(q, dx, 0.5 * (scheme.degree + 1) * dx, gravity),
         _limit(np.maximum(wave, 0.0) * q.V0 / q.m, dx**2),
-        inf,
         single_particle_limit(q, grid, scheme, np.maximum(largest, 0.0) * q.V0 / q.m),
     )
 

@@ -1,17 +1,20 @@
 """Tables of the guide "Choose settings": the recorded settings that reach an error of 1 %."""
 
 from collections import defaultdict
-from math import isfinite, sqrt
+from math import inf, isfinite, sqrt
 
 from .markdown import grid_table
 
 LIMIT = 0.01            # error that counts as reached
-STABLE = 1.01          # time step over the stable one up to which it counts as stable
+TIE = 1.1               # times the least CPU time: as cheap
+WORSE = 2.0             # times the error of the default that a change may have on other scenes
 BOX = 1.0               # [m] side of the box in which NCLaw's bodies move
 METHODS = ("hot", "hot-plus", "lbfgs-h", "pn-pcg-mf", "pn-mgpcg")
 CHOICES = {"default": "base (cfl about 0.6)", "dx": "grid", "dt": "time step",
            "particles": "particles", "transfer": "transfer", "degree": "spline",
            "sampling": "sampling"}
+PRINTED = 1e-7          # HOT's tolerance
+KNOBS = "transfer", "flip", "degree", "cells", "per", "sampling", "cfl", "storage"
 SCENES = {"mms": "manufactured solution", "cantilever": "cantilever"}
 SAMPLES = {"random": "random", "cubature": "weighted",
            "cells": "weighted, in few cells"}
@@ -19,7 +22,8 @@ SAMPLES = {"random": "random", "cubature": "weighted",
 
 def pages(results):
     """Return {path: text} of the tables, from the `ProfileResults` of a profile."""
-    tables = {"explicit": explicit, "implicit": implicit, "ldm": ldm, "nsf": nsf, "nclaw": nclaw}
+    tables = {"explicit": explicit, "implicit": implicit, "implicit-runs": implicit_runs,
+              "ldm": ldm, "nsf": nsf, "nclaw": nclaw}
     return {f"results/generated/settings-{name}.md": "\n".join(table(results)) + "\n"
             for name, table in tables.items()}
 
@@ -47,11 +51,9 @@ def explicit(results):
     """Yield the cheapest setting and all settings of the two explicit scenes."""
     points = {scene: records(results, f"trade.explicit.{scene}", "points") for scene in SCENES}
     for scene, title in SCENES.items():
-        fit = (p for p in points[scene] if p["error"] <= LIMIT and p["of_bound"] <= STABLE)
-        best = min(fit, key=lambda p: p["cpu"])
-        yield (f"- Cheapest stable setting with at most 1 % on the {title} alone: "
-               f"{explicit_setting(best)} "
-               f"(error {100.0 * best['error']:.2g} %, {best['cpu']:.2g} CPU s).")
+        floor = reference_error(results, scene)
+        best = advised(points, scene, floor)
+        yield f"- {advice_text(title, best, floor)}"
     yield ""
     header = ["changed", "setting"]
     for title in SCENES.values():
@@ -64,9 +66,47 @@ def explicit(results):
         for pair in pairs))
 
 
+def reference_error(results, scene):
+    """Return the error of the reference of an explicit scene, relative."""
+    name = f"trade.explicit.{scene}"
+    return results.value(name, f"{name}.reference_error")
+
+
+def advised(points, scene, floor):
+    """Return the cheapest row of a scene that keeps LIMIT for certain, or None; of those as cheap
+    that with the least error.
+
+    points: rows {scene: [..]}; floor: error of the scene's reference, which is added. The step is
+    stable, and on no other scene does the same change have more than WORSE times the error of the
+    default there: what helps by chance on one scene is no advice.
+    """
+    fit = [p for p in points[scene] if p["knob"] in CHOICES and p["of_bound"] <= 1.0
+           and p["error"] + floor <= LIMIT
+           and all(holds(p, others) for name, others in points.items() if name != scene)]
+    least = min((p["cpu"] for p in fit), default=0.0)
+    return min((p for p in fit if p["cpu"] <= TIE * least), key=lambda p: p["error"], default=None)
+
+
+def holds(change, others):
+    """Return whether a change keeps the error on another scene, by that scene's rows."""
+    error = {tuple(p[key] for key in KNOBS): p["error"] for p in others}
+    default = next(p["error"] for p in others if p["knob"] == "default")
+    return error.get(tuple(change[key] for key in KNOBS), inf) <= WORSE * default
+
+
+def advice_text(title, best, floor):
+    """Return the advice for a scene as a sentence."""
+    lead = f"Cheapest stable setting with at most 1 % on the {title}"
+    added = f"; the reference's own error of {100.0 * floor:.2g} % is added" if floor else ""
+    if best is None:
+        return f"{lead}: none that was tried{added}."
+    return (f"{lead}: {explicit_setting(best)} (error {100.0 * best['error']:.2g} %, "
+            f"{best['cpu']:.2g} CPU s{added}).")
+
+
 def stability(pair):
-    """Return a remark on a setting whose time step exceeds the stable one in all scenes."""
-    return "; above the stable step" if min(p["of_bound"] for p in pair) > STABLE else ""
+    """Return a remark on a setting whose time step exceeds the stable one in a scene."""
+    return "; above the stable step" if max(p["of_bound"] for p in pair) > 1.0 else ""
 
 
 def explicit_setting(point):
@@ -106,6 +146,40 @@ def tolerance(ladder, method):
         return "none" if tried else "not run"
     best = min(good, key=lambda p: p["cpu"])
     return f"{best['eps']:.0e}, {best['cpu']:.2g} s".replace("e-0", "e-")
+
+
+RUN_SPREAD = "trade.hot.energy.spread.eps1e-11"     # between methods: the reference's own error
+
+
+def implicit_runs(results):
+    """Yield the rules with which whole implicit runs keep LIMIT, by method."""
+    *rows, answer = records(results, "trade.hot.energy", "ends")
+    floor = results.value("trade.hot.energy", RUN_SPREAD)
+    header = ["method", "stop", "kinetic energy off by", "particles off by (rms)", "CPU s"]
+    tables = []
+    for method in dict.fromkeys(row["method"] for row in rows):
+        mine = [row for row in rows if row["method"] == method]
+        best = advised_run(mine, answer, floor)
+        printed = next((row for row in mine if row["eps"] == PRINTED and not row["cells"]), None)
+        tables += [row for row in (printed, best) if row is not None]
+    yield from grid_table(header, (run_row(row, answer) for row in tables))
+
+
+def advised_run(rows, answer, floor):
+    """Return the cheapest run whose kinetic energy keeps LIMIT for certain, and whose particles
+    are within LIMIT cells on average; or None.
+    """
+    fit = [row for row in rows if row["converged"] == "True" and row["rms"] <= LIMIT
+           and abs(row["kinetic"] / answer["kinetic"] - 1.0) + floor <= LIMIT]
+    return min(fit, key=lambda row: row["cpu"], default=None)
+
+
+def run_row(row, answer):
+    """Return the cells of a whole run."""
+    stop = (f"`displacement_tolerance = {row['cells']:g}`" if row["cells"] else
+            f"`eps = {row['eps']:.0e}`".replace("e-0", "e-"))
+    return [row["method"], stop, percent(abs(row["kinetic"] / answer["kinetic"] - 1.0)),
+            f"{row['rms']:.2g} cells", f"{row['cpu']:.2g}"]
 
 
 def ldm(results):

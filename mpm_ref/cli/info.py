@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from .. import scene
-from ..nclaw.strain_watch import time_step_warnings
+from ..nclaw.strain_watch import poor_law_warnings, time_step_warnings
 from ..preflight import misplaced
 from ..rom.model_file import is_model
 from ..rom.study import record
@@ -59,7 +59,8 @@ def of_problem(problem, state=None):
                               if not (name == "C" and a is body.particles.L)),
         "grid_bytes": sum(a.nbytes for a in grid[:4]),
         "scene_sha256": scene_hash(problem),
-        "warnings": [*misplaced(problem), *time_step_warnings(problem)],
+        "warnings": [*misplaced(problem), *time_step_warnings(problem),
+                     *poor_law_warnings(problem)],
     }
 
 

@@ -5,6 +5,7 @@ import numpy as np
 from ..body import Body, particles_at
 from ..materials import Material
 from ..materials.learned import learned_flow, learned_law
+from ..materials.learned.guard import guarded, strain_box
 
 
 def body_with_laws(body, law, flow):
@@ -37,12 +38,18 @@ def copy_body(body):
     return body_with_laws(body, body.law, body.flow)
 
 
-def body_maker(laws):
+def body_maker(laws, bounds=None):
     """Return a function that gives a body the laws of `LearnedLaws`.
+
+    bounds: those of a training, to which the guard cuts strains (see `learned.guard`); by default
+    there is no guard, and the laws are as they were trained.
 
     Raises ValueError for an elastic law that is no stress, and a plastic one that is no return map.
     """
     elastic, plastic = learned_law(laws.elastic), learned_flow(laws.plastic)
+    if bounds is not None:
+        box = strain_box(bounds)
+        elastic, plastic = guarded(elastic, box), guarded(plastic, box)
     return lambda body: body_with_laws(body, elastic, plastic)
 
 

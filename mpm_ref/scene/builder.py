@@ -16,6 +16,7 @@ from ..core.boundary import Collider as RigidCollider
 from ..hot.methods import METHODS, options_of
 from ..hot.step import check_scheme
 from ..materials import Material
+from ..materials.learned.guard import guarded, strain_box
 from ..materials.learned.strain_range import stored_bounds
 from ..monitor import Limits
 from ..problem import Clock
@@ -58,7 +59,11 @@ def build_material(body, dim, k):
     with errors_at(path + ("" if body.material.is_neural else ".flow")):
         law, flow, about = body.material.build(dim)
     with errors_at(f"{path}.weights"):
-        return law, flow, None if about is None else stored_bounds(about, dim)
+        bounds = None if about is None else stored_bounds(about, dim)
+    if bounds is not None and body.material.guard:
+        box = strain_box(bounds)
+        law, flow = guarded(law, box), guarded(flow, box)
+    return law, flow, bounds
 
 
 def build_bodies(scene, arrays):

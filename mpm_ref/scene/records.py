@@ -70,9 +70,13 @@ class Material(Record):
     lam: Number | None = None                   # [Pa]
     weights: str | None = None                  # file of trained laws (see learned.weights)
     sha256: Sha256 | None = None                # of what that file must hold
+    guard: bool = True                          # whether strains are cut (see learned.guard)
     flow: Flow = Flow(name="none")
 
     def __post_init__(self):
+        if self.law != NEURAL and not self.guard:
+            raise ValueError(f"guard = false: expected with the law {NEURAL!r} alone, whose "
+                             "strains it cuts to those of training")
         if self.law == NEURAL:
             self.trained()
         elif self.law in LAWS:
@@ -99,18 +103,19 @@ class Material(Record):
 
     def elastic(self):
         """Return the elastic law by its name. Raises ValueError as `build`."""
-        return make_law(self.law, **_given(self, "law", "flow"))
+        return make_law(self.law, **_given(self, "law", "guard", "flow"))
 
     def trained(self, dim=None):
         """Return the `LearnedLaws` of the file.
 
         Raises ValueError for a file without laws or of other dimensions, and for superfluous keys.
         """
-        superfluous = [*_given(self, "law", "weights", "sha256", "flow")]
+        superfluous = [*_given(self, "law", "weights", "sha256", "guard", "flow")]
         superfluous += ["flow"] if self.flow != Flow(name="none") else []
         if superfluous:
             raise ValueError(f"law {NEURAL!r}: unknown parameter {', '.join(superfluous)}; all "
-                             "that it takes is `weights`, which hold the return map too")
+                             "that it takes is `weights`, which hold the return map too, and "
+                             "`guard`")
         if self.weights is None:
             raise ValueError(f"law {NEURAL!r}: missing parameter weights, a file of trained laws")
         laws = weights.load(self.weights)

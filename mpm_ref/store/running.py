@@ -240,6 +240,7 @@ class Session:
         self.part.unsolved += state.solve is not None and not state.solve.converged
         self.watch.step(state, dt)
         if self.range is not None:
+            self.range.count(state)
             self.warn(self.range.news(state))
         if not frame_is_due(self.problem.clock, state):
             self.save_or_stop()
@@ -305,6 +306,9 @@ class Session:
 
     def end(self, why):
         """Add this part of the run to the manifest."""
+        if self.range is not None:
+            self.part.cut_particle_steps = self.range.cut
+            self.warn(self.range.summary())
         facts = self.writer.manifest
         facts["parts"].append(self.part.ended(why, self.state, checkpoint.digest(self.state)))
         self.writer.put_manifest(facts)

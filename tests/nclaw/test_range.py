@@ -23,10 +23,12 @@ from mpm_ref.nclaw.bodies import body_with_laws, copy_body
 from mpm_ref.nclaw.strain_watch import (
     MAX_EXCESS,
     StrainWatch,
+    poor_law_warnings,
     strain_report,
     strain_watch,
     time_step_warnings,
 )
+from mpm_ref.nclaw.study.training import run_error
 from mpm_ref.nclaw.train.recipe import Recipe
 from mpm_ref.nclaw.train.strains import MAX_STRETCH, segment_cuts, training_bounds
 from mpm_ref.problem import Clock, Problem
@@ -51,7 +53,7 @@ name = "learned"
 density = 1000.0
 shape = {{ type = "box", lower = [0.3, 0.2], upper = [0.5, 0.4] }}
 velocity = {{ linear = [0.0, {speed}] }}
-material = {{ law = "neural", weights = "laws.npz" }}
+material = {{ law = "neural", weights = "laws.npz", guard = false }}
 """
 
 
@@ -200,6 +202,34 @@ def test_other_time_steps_are_told(clock, said):
                for one, words in zip(found, said, strict=True))
 
 
+@pytest.mark.parametrize(("error", "said"), [
+    (0.1, []), (0.3, ["missed 30% of the motion"]), (None, ["broke down on"]), ("none", [])])
+def test_poor_laws_are_told(error, said):
+    """Of weights without the entry nothing is known."""
+    bounds = BOUNDS if error == "none" else {**BOUNDS, "run_error": error}
+    problem = Problem((body(np.eye(2)),), 0.1, Clock(dt=1e-3, steps=1), np.zeros(2),
+                      strain_bounds={"one": bounds})
+    found = list(poor_law_warnings(problem))
+    assert len(found) == len(said)
+    assert all(words in one for one, words in zip(found, said, strict=True))
+
+
+def test_the_error_on_the_own_run_is_read_where_it_is_stored():
+    about = {"seen": {"low": [0.9, 0.8, 0.7], "high": [1.4, 1.0, 1.2]}, "run_error": None}
+    assert stored_bounds(about, 2) == {**BOUNDS, "run_error": None}
+
+
+def test_the_error_of_a_run_is_over_its_motion():
+    """The same laws have none, softer ones some, hopeless ones no number."""
+    run = observed(cube(12))
+    assert run_error(cube(12), copy_body, run.x) == 0.0
+    moved = np.concatenate([run.x[:1], run.x[1:] + 0.1])
+    assert run_error(cube(12), copy_body, moved) == pytest.approx(
+        np.sqrt(0.01 * 12 / 13 / np.mean((moved - moved[0]) ** 2)))
+    assert 0.0 < run_error(cube(12), soft, run.x) < 1.0
+    assert run_error(cube(12), stiff(1e200, 1e200), run.x) is None
+
+
 # what a training has met
 
 def soft(one):
@@ -304,7 +334,7 @@ def test_another_time_step_is_told_before_the_run(tmp_path):
 
 def test_a_run_without_learned_laws_is_never_looked_at(tmp_path, monkeypatch):
     monkeypatch.setattr(watching, "strain_report", None)
-    text = SCENE.format(speed=-3.0).replace('law = "neural", weights = "laws.npz"',
+    text = SCENE.format(speed=-3.0).replace('law = "neural", weights = "laws.npz", guard = false',
                                             'law = "fixed_corotated", E = 1e5, nu = 0.3')
     (tmp_path / "scene.toml").write_text(text)
     done = mpm_ref("run", tmp_path / "scene.toml", "--out", tmp_path / "run.h5")

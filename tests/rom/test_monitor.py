@@ -8,6 +8,7 @@ import rom_toys
 
 from mpm_ref.rom.extrapolation import LATENTS, extent
 from mpm_ref.rom.fields.pod import basis
+from mpm_ref.rom.integrity import DamagedModel
 from mpm_ref.rom.latent import start_state
 from mpm_ref.rom.step import StepReport
 from mpm_ref.rom.study import monitor as monitoring
@@ -42,7 +43,8 @@ def toy(d, rng):
     runs = map.rest + 0.1 * rng.normal(size=(2, 5, map.r))
     runs[0, 0] = xhat
     X = rom_toys.cloud(d, 20)
-    return MapMonitor(map, X, extent(runs, np.eye(map.r)), DX, DT, X), xhat
+    return MapMonitor(map, X, extent(runs, np.eye(map.r)), DX, DT, X,
+                      monitoring.principal_axes(X), {}), xhat
 
 
 def look(monitor, latent, report=None, samples=None, last=None):
@@ -132,11 +134,31 @@ def test_a_poor_draw_is_forgiven_and_many_are_not(toy):
     one, sight, count = monitor.X[:1], WELL, 0
     first = look(monitor, start_state(xhat), report(monitor.g), one, WELL)
     assert first.coverage == pytest.approx(MEMORY * WELL.coverage)     # one point tells nothing
-    assert first.out_of_bounds == ()
-    while not sight.out_of_bounds:
+    assert first.spread == pytest.approx(MEMORY * WELL.spread)
+    assert first.out_of_bounds == ("surplus",)
+    while "coverage" not in sight.out_of_bounds:
         sight, count = look(monitor, start_state(xhat), report(monitor.g), one, sight), count + 1
-    assert sight.out_of_bounds == ("coverage",)
     assert 3 <= count <= 9
+
+
+def test_samples_in_one_place_are_within_a_small_part_of_the_body(toy, rng):
+    """Whatever the body's axes; the spread of many random samples is that of the body."""
+    monitor, xhat = toy
+    d = monitor.g.dim
+    X = rng.normal(size=(4000, d)) * np.array([3.0, 1.0, 0.5])[:d]
+    Q = np.linalg.qr(rng.normal(size=(d, d)))[0]
+    for turn in (np.eye(d), Q):
+        axes = monitoring.principal_axes(X @ turn)
+        assert monitoring.spread(X @ turn, axes) == pytest.approx(1.0)
+        near = np.abs(X[:, 0]) < 0.3
+        assert monitoring.spread(X[near] @ turn, axes) == pytest.approx(0.058, abs=0.01)
+    flat = X * (np.arange(d) != 1)
+    assert monitoring.principal_axes(flat).shape == (d, d - 1)
+    monitor, together = monitor._replace(axes=monitoring.principal_axes(X)), X[near][:30]
+    found = look(monitor, start_state(xhat), report(monitor.g), together, WELL)
+    assert found.spread == pytest.approx(
+        MEMORY * WELL.spread + 0.2 * monitoring.spread(together, monitor.axes))
+    assert found.surplus == 30 * d / monitor.g.r
 
 
 def test_far_latents_and_inverted_points_are_told(toy):
@@ -171,6 +193,8 @@ def test_latents_that_are_no_numbers_are_nonsense(toy, broken):
 @pytest.mark.parametrize(("changes", "name", "said"), [
     ({"beyond": 1.6}, "beyond", "1.6 times as far from the training runs"),
     ({"off": 0.05}, "off", "0.05 cells"), ({"coverage": 0.25}, "coverage", "saw only 25%"),
+    ({"spread": 0.2}, "spread", "within 20% of the body's extent"),
+    ({"surplus": 3.5}, "surplus", "3.5 equations for each"),
     ({"blind": 1}, "blind", "1 of the latent coordinates"), ({"lost": 0.02}, "lost", "2.0%"),
     ({"inverted": 0.03, "J": -0.1}, "inverted", "det F down to -0.1"),
     ({"beyond": np.nan}, "beyond", "nan times"),
@@ -258,6 +282,18 @@ def test_a_checked_run_is_the_run_and_is_well(fall):
         assert plain.report == state.report
         assert check.out_of_bounds == ()
         assert check.beyond < 1.0
+
+
+def test_a_run_whose_map_is_damaged_meanwhile_says_so_at_its_end(fall):
+    one, modes, xhat = fall
+    modes = modes._replace(U=modes.U.copy())
+    run = ldm_run(one, modes, RunOptions(points=20), np.zeros(2), seed=3)
+    states = checked_states(run, map_monitor(one, modes, xhat))
+    for _ in range(5):
+        next(states)
+    modes.U[-1, -1, -1] = np.nextafter(modes.U[-1, -1, -1], 1.0)
+    with pytest.raises(DamagedModel, match="changed in memory: U;"):
+        next(states)
 
 
 def test_samples_of_others_choice_are_taken_and_looked_at(fall):

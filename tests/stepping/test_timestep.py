@@ -7,20 +7,21 @@ import pytest
 
 from mpm_ref.body import Body, particles_at
 from mpm_ref.explicit import Scheme, Stepper
-from mpm_ref.materials import FixedCorotated, NoFlow
+from mpm_ref.materials import FixedCorotated, HerschelBulkley, NeoHookean, NoFlow
 from mpm_ref.timestep import TooLarge, largest_modulus, moduli, refuse, stable_dt
 
 DX, RHO, LAW = 0.1, 1000.0, FixedCorotated(4e4, 6e4)
+ELASTIC = LAW, NoFlow()
 K = 2.0 * LAW.mu + 2.0 * LAW.lam                # at rest, d = 2
 TRANSFERS = ("mls", "apic", "pic", "flip")
 
 
-def cloud(x, transfer, rpic=0.0):
+def cloud(x, transfer, rpic=0.0, material=ELASTIC):
     """Particles of 0.0025 m^2 at rest at x (N, 2), and their stepper."""
     x = np.array(x, dtype=float)
     n, V = len(x), 0.25 * DX**2
     q = particles_at(x, np.zeros((n, 2)), np.full(n, RHO * V), np.full(n, V), transfer)
-    body = Body("cloud", q, LAW, NoFlow(), np.arange(n))
+    body = Body("cloud", q, *material, np.arange(n))
     stepper = Stepper(Scheme(2, transfer, rpic=rpic), DX, 2, np.zeros(2))
     stepper.start([body])
     return body, stepper
@@ -35,9 +36,9 @@ def test_one_particle_has_the_limit_of_its_recurrence(transfer, place, S):
     assert stable_dt([body], stepper).single_particle == pytest.approx(limit, rel=1e-5)
 
 
-def spectral_radius(x, transfer, factor, rpic=0.0):
+def spectral_radius(x, transfer, factor, **of_cloud):
     """Of the linear map that one step at `factor` times the bound makes of (v, C, F) near rest."""
-    body, stepper = cloud(x, transfer, rpic)
+    body, stepper = cloud(x, transfer, **of_cloud)
     dt = factor * stable_dt([body], stepper).single_particle
     rest = [a.copy() for a in body.particles]
     carried = ["v", "F", *(["C"] if stepper.scheme.affine else [])]
@@ -79,8 +80,17 @@ def test_one_particle_grows_past_the_bound(transfer):
 @pytest.mark.parametrize("transfer", ["apic", "mls"])
 @pytest.mark.parametrize("rpic", [0.3, 1.0])
 def test_damping_moves_the_bound_of_one_particle(transfer, rpic):
-    assert spectral_radius(CLOUDS["one"], transfer, 0.99, rpic) <= 1.0 + 1e-3
-    assert spectral_radius(CLOUDS["one"], transfer, 1.05, rpic) > 1.01
+    assert spectral_radius(CLOUDS["one"], transfer, 0.99, rpic=rpic) <= 1.0 + 1e-3
+    assert spectral_radius(CLOUDS["one"], transfer, 1.05, rpic=rpic) > 1.01
+
+
+@pytest.mark.parametrize("transfer", TRANSFERS)
+@pytest.mark.parametrize("eta", [0.0, 1.0, 5e2, 1e9])
+def test_a_viscosity_needs_no_bound(transfer, eta):
+    """Yield begins at rest. At 5e2 Pa s a step relaxes about half of the stress."""
+    viscous = NeoHookean(4e4, 8e4), HerschelBulkley(0.0, eta)
+    for name in ("one", "row"):
+        assert spectral_radius(CLOUDS[name], transfer, 0.99, material=viscous) <= 1.0 + 1e-3
 
 
 def test_largest_modulus_at_rest_is_that_of_dilation():

@@ -25,7 +25,7 @@ from mpm_ref.simulate import simulate
 from ..common.scenes import threads_for
 from ..ldm.networks import trained
 from .blocks import message_of
-from .verdicts import SILENT, flag_history, verdict, verdict_counts
+from .verdicts import FLAGGED, SILENT, STOPPED, flag_history, verdict, verdict_counts
 
 BAD = 5.0           # times the usual error of the map
 TOLERABLE = 1.0     # [%], the axis of LDM's Figure 9
@@ -164,3 +164,15 @@ def record_silent(run, name, trials, scale, note=""):
                note=f"share of the {len(bad)} runs with errors above {BAD:g} times the usual one "
                     f"of the model, and above {TOLERABLE:g} %, that were neither flagged nor "
                     "stopped")
+
+
+def record_false_alarms(run, name, trials):
+    """Record the share of good runs that were flagged or stopped; one that is refused before its
+    first step is none.
+    """
+    good = [t for t in trials if not t.is_bad and t.end.steps > 0]
+    alarms = [t for t in good if t.kind in (FLAGGED, STOPPED)]
+    flags = sorted({flag for t in alarms for flag in t.end.flags.split()})
+    run.record(f"{name}.false_alarms", len(alarms) / max(len(good), 1), comparator="info",
+               scale=f"{len(good)} runs that are not bad", note="share flagged or stopped"
+               + (f", as {', '.join(flags)}" if flags else ""))

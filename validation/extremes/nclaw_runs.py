@@ -1,9 +1,10 @@
 """Runs of learned laws at their extremes: the end of each, compared with the same run of the true
 laws, and its strain reports (see `mpm_ref.nclaw.strain_watch`).
 
-A run is bad where its error is above BAD times that of the law on its training run. It stops where
-a point has no finite position any more, and is flagged where strains are outside of those of
-training or the time step is another one; `verdicts` has the four verdicts. Runs are not stopped for
+A run is bad where its error is above BAD times the usual one, that of the law on its training run,
+and where it stops. It stops where a point has no finite position any more, and is flagged where
+strains are outside of those of training, the time step is another one, or the law is poor: its
+error on its own training run is large; `verdicts` has the four verdicts. Runs are not stopped for
 their energy: a wrong law usually ends at the walls.
 """
 
@@ -13,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm_ref.nclaw.bodies import body_maker, copy_body
-from mpm_ref.nclaw.strain_watch import strain_report
+from mpm_ref.nclaw.strain_watch import is_poor, strain_report
 from mpm_ref.nclaw.study.compare import RunBroken, positions
 from mpm_ref.scene import build
 
@@ -78,7 +79,7 @@ class LawTrial(NamedTuple):
 
     def is_bad(self, factor=BAD):
         """Return whether the error is above `factor` times the usual one, or infinite."""
-        return not self.end.error <= factor * self.usual
+        return not (np.isfinite(self.end.error) and self.end.error <= factor * self.usual)
 
 
 @cache
@@ -142,12 +143,27 @@ def summarize_reports(reports, error, message, stepping):
                   min(report.J for report in reports), message)
 
 
-def law_trials(run, law, setups, usual=None):
-    """Return the `LawTrial`s of setups; the usual error is that of the first, unless given."""
+def law_trials(run, law, setups):
+    """Return the `LawTrial`s of setups, of which the first is the training run: it has the usual
+    error, and says whether the law is poor.
+    """
     ends = [law_end(law, setup) for setup in run.progress(setups, law.name)]
-    usual = ends[0].error if usual is None else usual
-    return [LawTrial(law.name, setup.what, usual, end)
+    poor = is_poor(np.sqrt(ends[0].error / motion_of(setups[0].scene)))
+    return [LawTrial(law.name, setup.what, ends[0].error, flagged_as_poor(end) if poor else end)
             for setup, end in zip(setups, ends, strict=True)]
+
+
+def motion_of(scene):
+    """Return the mean square displacement of the points of a scene's own run [m^2]."""
+    problem = build(scene)
+    with threads_for(problem.bodies):
+        x = np.array(list(positions(problem, (copy_body(problem.bodies[0]),))))
+    return float(np.mean((x - x[0]) ** 2))
+
+
+def flagged_as_poor(end):
+    """Return a `LawEnd` that is flagged before its first step for the law's poor training."""
+    return end._replace(first=0, flags=" ".join(filter(None, (end.flags, "poor"))))
 
 
 def record_silent(run, trials, scale):

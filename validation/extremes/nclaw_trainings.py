@@ -31,17 +31,19 @@ def epochs(run):
 
 
 def training_trials(run, net, by_epoch):
-    """Return the `LawTrial`s of laws {epoch: laws} of a `Small`; the last has the usual error."""
+    """Return the `LawTrial`s of laws {epoch: laws} of a `Small`. The usual error is the smallest
+    that any epoch has on the training run: the last may break down.
+    """
     setups, trials = training_setups(run, net), {}
     for epoch in sorted({*by_epoch} & {*(EPOCHS[run.profile] or by_epoch), max(by_epoch)},
                         reverse=True):
         laws = by_epoch[epoch]
         law = Law(f"{net.environment} after {epoch}", net.environment, body_maker(laws),
                   laws.about["seen"], laws.about["dt"])
-        usual = trials[max(by_epoch)][0].usual if trials else None
-        trials[epoch] = law_trials(run, law, setups, usual)
+        trials[epoch] = law_trials(run, law, setups)
         record_epoch(run, f"extremes.nclaw.epochs.{net.environment}.{epoch}", trials[epoch])
-    return [t for same_epoch in trials.values() for t in same_epoch]
+    usual = min(same_epoch[0].usual for same_epoch in trials.values())
+    return [t._replace(usual=usual) for same_epoch in trials.values() for t in same_epoch]
 
 
 def training_setups(run, net):

@@ -1,5 +1,8 @@
-"""Fields of modes with a single damaged number, in memory and in their file: which damage the
-monitor or the reader notices, and the errors of runs with the rest.
+"""Fields of modes with a single damaged number, in memory and in their file: which damage the seal
+of the arrays, the monitor or the reader notices, and the errors of runs with the rest.
+
+Each damaged run is judged twice: as a run of the program is, which compares the arrays with their
+seal (`rom.integrity`) and stops, and without the seal, by its states alone.
 """
 
 import tempfile
@@ -9,6 +12,7 @@ import numpy as np
 
 from mpm_ref.rom import model_file
 from mpm_ref.rom.fields.pod_fields import Sizes
+from mpm_ref.rom.integrity import damaged_arrays
 from mpm_ref.rom.model_file import Model
 from mpm_ref.store.weights_file import load_arrays
 
@@ -63,22 +67,43 @@ def damage_array(record, path, share, kind):
             profiles=("quick", "standard"), budget={"quick": 15, "standard": 280})
 def damage(run):
     """Count harmless, noticed and silent damage in memory; a damaged file must be refused."""
-    trials = []
+    trials, sealed = [], []
     for name, tested in scenes(run):
         bench = FieldBench(name, tested)
         cases = [(path, kind) for path in SHOWN[run.profile] for kind in KINDS[run.profile]]
-        trials += [bench.trial(f"{path}: {kind}", bench.drawn(bench.count), damage_array(
-            tested.fields, path, run.rng.random(), kind))
-            for path, kind in run.progress(cases, f"{name}, damages")]
+        for path, kind in run.progress(cases, f"{name}, damages"):
+            fields = damage_array(tested.fields, path, run.rng.random(), kind)
+            trials.append(bench.trial(f"{path}: {kind}", bench.drawn(bench.count), fields))
+            sealed.append(sealed_trial(bench, trials[-1], fields))
+        sealed.append(sealed_trial(bench, bench.trial("none", bench.drawn(bench.count))))
         if name == FILE_SCENE:
             record_files(run, name, refit(tested, Sizes(tested.fields.r, *SMALL), follows=True))
     record_ends(run, trials)
-    record_silent(run, "extremes.nsf.damage", trials, ERRORS)
+    record_silent(run, "extremes.nsf.damage", sealed, ERRORS)
+    record_seal(run, trials, sealed)
     trial_table(run, trials)
 
 
+def sealed_trial(bench, trial, fields=None):
+    """Return the `ReducedTrial` of a run that compares its fields with the seal of the bench's."""
+    names = damaged_arrays(bench.tested.fields if fields is None else fields, bench.monitor.seal)
+    message = f"changed in memory: {', '.join(names)}" if names else trial.end.message
+    return trial._replace(end=trial.end._replace(message=message))
+
+
+def record_seal(run, trials, sealed):
+    """Record the number of silent runs without the seal, and whether it lets sound fields pass."""
+    run.record("extremes.nsf.damage.without_seal", sum(t.kind == SILENT for t in trials),
+               unit="runs", comparator="info", scale=f"{len(trials)} runs, {ERRORS}",
+               note="silent runs of the same damage, judged by the states of the run alone")
+    sound = [t for t in sealed if t.what == "none"]
+    run.record("extremes.nsf.damage.sound_refused", sum(t.kind != FINE for t in sound),
+               unit="runs", paper=0, comparator="=", scale=f"{len(sound)} runs of sound fields",
+               note="runs without damage that were stopped or flagged")
+
+
 def record_ends(run, trials):
-    """Record the share of runs flagged or stopped by the kind of damage."""
+    """Record the share of runs flagged or stopped by the kind of damage, without the seal."""
     for kind in KINDS[run.profile]:
         runs = [t for t in trials if t.what.endswith(f": {kind}")]
         passed = [t for t in runs if t.kind in (FINE, SILENT)]
@@ -88,7 +113,7 @@ def record_ends(run, trials):
             f"{worst.what}, usual {worst.usual:.3g} %")
         run.record(f"extremes.nsf.damage.{kind.replace(' ', '-')}", 1.0 - len(passed) / len(runs),
                    comparator="info", scale=f"{len(runs)} runs with one damaged number, {ERRORS}",
-                   note=f"share flagged or stopped; {largest}")
+                   note=f"share flagged or stopped without the seal; {largest}")
 
 
 def record_files(run, name, tested):

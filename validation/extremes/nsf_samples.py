@@ -12,7 +12,7 @@ from mpm_ref.rom.study.samples import SampleSet
 from ..common.registry import experiment
 from ..nsf.reduced_runs import fit_study
 from ..nsf.studies import ball, bread, cake, sand
-from .ldm_runs import record_silent
+from .ldm_runs import record_false_alarms, record_silent
 from .nsf_runs import ERRORS, FieldBench, scenes
 from .verdicts import FLAGGED, SILENT, STOPPED, trial_table
 
@@ -81,6 +81,7 @@ def record_sampling(run, experiment_id, sampled):
     record_errors(run, experiment_id, trials)
     record_misfit(run, experiment_id, sampled)
     record_silent(run, experiment_id, trials, ERRORS)
+    record_false_alarms(run, experiment_id, trials)
     run.table("left", LEFT, [(t.model, t.what, t.points, left, t.end.error, t.kind)
                              for t, left in sampled])
     trial_table(run, trials)

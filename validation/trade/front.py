@@ -24,38 +24,61 @@ def front(costs, errors):
     return mask
 
 
-def cheapest(points, most, cost):
-    """Return the good point of least cost with an error of at most `most`, or None."""
-    fit = [p for p in points if p.good and p.error <= most]
+def cheapest(points, most, cost, floor=0.0):
+    """Return the point of least cost whose error is at most `most` for certain, or None.
+
+    floor: error of the reference itself, relative, which is added to that of a point. Runs past the
+    bound of their time step are no advice, whether they finished or not.
+    """
+    fit = [p for p in points if p.good and p.is_stable and p.error + floor <= most]
     return min(fit, key=cost, default=None)
 
 
-def record_points(run, points, scale):
-    """Record the table of all points, the cheapest settings, and the failures."""
-    errors = [p.error if p.good else np.nan for p in points]
+def richardson(coarse, half, fine):
+    """Return the observed order and the error of `fine`, relative, of values on three grids, each
+    of half the spacing of the one before.
+
+    The error is |half - fine|/(2^order - 1), with an order of at most 2; infinite where the values
+    do not converge.
+    """
+    ratio = (coarse - half) / (half - fine) if half != fine else np.inf
+    if not ratio > 1.0:
+        return np.nan, np.inf
+    order = min(float(np.log2(ratio)), 2.0)
+    return order, float(abs(half - fine) / (2.0**order - 1.0) / abs(fine))
+
+
+def record_points(run, points, scale, floor=0.0):
+    """Record the table of all points, the cheapest settings, and the failures.
+
+    floor: error of the reference itself, relative: smaller ones are equal to it.
+    """
+    errors = [max(p.error, floor) if p.good and p.is_stable else np.nan for p in points]
     by_cpu = front([p.cpu for p in points], errors)
     by_bytes = front([p.nbytes for p in points], errors)
     run.table("points", COLUMNS, [(p.knob, *p.setting, *p[2:], int(c), int(b))
                                   for p, c, b in zip(points, by_cpu, by_bytes, strict=True)])
-    record_cheapest(run, points, scale)
+    run.record(f"{run.experiment.id}.reference_error", floor, comparator="info", scale=scale,
+               note="error of the reference itself, relative: no smaller error is resolved")
+    record_cheapest(run, points, scale, floor)
     record_failures(run, points, scale)
 
 
-def record_cheapest(run, points, scale):
+def record_cheapest(run, points, scale, floor):
     """Record the table "cheapest setting with error at most x", by CPU seconds and by bytes."""
     name, rows = run.experiment.id, []
     for most in TARGETS:
-        fast = cheapest(points, most, lambda p: p.cpu)
-        small = cheapest(points, most, lambda p: p.nbytes)
+        fast = cheapest(points, most, lambda p: p.cpu, floor)
+        small = cheapest(points, most, lambda p: p.nbytes, floor)
         if fast is None:
             rows.append((most, "none", np.nan, "none", 0))
             continue
         fast_text, small_text = fast.setting.description(), small.setting.description()
         rows.append((most, fast_text, fast.cpu, small_text, small.nbytes))
         run.record(f"{name}.cheapest.{most:g}", fast.cpu, unit="CPU s", comparator="info",
-                   scale=scale, note=f"with an error of at most {most:g}: {fast_text} "
-                   f"(error {fast.error:.2g}); least memory: {small_text}, "
-                   f"{small.nbytes / 1e6:.2f} MB")
+                   scale=scale, note=f"with an error of at most {most:g}, that of the reference "
+                   f"included, and a stable step: {fast_text} (error {fast.error:.2g}); least "
+                   f"memory: {small_text}, {small.nbytes / 1e6:.2f} MB")
     run.table("cheapest", ("error_at_most", "least_cpu", "cpu_s", "least_bytes", "bytes"), rows)
 
 

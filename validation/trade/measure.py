@@ -113,6 +113,11 @@ class MeasuredSetting(NamedTuple):
         """True where the run finished with an answer."""
         return self.end == FINISHED
 
+    @property
+    def is_stable(self):
+        """True where the time step was within its bound at the start."""
+        return self.of_bound <= 1.0
+
 
 COLUMNS = ("knob", *ExplicitSetting._fields, *MeasuredSetting._fields[2:], "pareto_cpu",
            "pareto_bytes")

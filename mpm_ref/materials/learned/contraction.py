@@ -55,6 +55,7 @@ from ..log_strain import deviator, log_strain, stretches
 from ..log_strain_adjoint import log_gap_ratio
 from ..no_flow import never_fails
 from ..stretches import inverse
+from .guard import NONE, cut, with_half_the_rest
 from .network import flatten, outputs, softplus
 from .principal import pull_back_stretches
 
@@ -75,6 +76,8 @@ class ContractionFlow(NamedTuple):
     W: np.ndarray
     b: np.ndarray
     strain: float       # see `Contraction`
+    low: np.ndarray = NONE      # bounds of strains (see `guard`)
+    high: np.ndarray = NONE
 
     @property
     def dim(self):
@@ -232,12 +235,20 @@ def _pull(G, c, factors, c_bar, F_bar):
 
 
 @kernel
-def returned(F, flow):
-    """Return F after the return; NaN unless det F > 0."""
+def contracted_point(F, flow):
+    """Return one F after the return; NaN unless det F > 0."""
     U, s, V, _ = svd(F)
     x = np.array(read(s, flow.strain))
     y = outputs(x, flow.sizes, flow.W, flow.b)
     return mmt(scale_columns(U, left(s, softplus(y[0]), softplus(y[1]))), V)
+
+
+@kernel
+def returned(F, flow):
+    """Return F after the return map; NaN unless det F > 0."""
+    F_cut, is_cut = cut(F, flow.low, flow.high)
+    F_new = contracted_point(F_cut, flow)
+    return with_half_the_rest(F, F_cut, F_new) if is_cut else F_new
 
 
 registry.returned.method(ContractionFlow, returned)

@@ -43,6 +43,7 @@ from ...core.tensor import (
     transpose,
 )
 from ..waves import moduli_at_rest, stiffness
+from .guard import NONE, cut
 from .network import flatten, softplus
 
 MEASURES = 4
@@ -65,6 +66,8 @@ class EnergyLaw(NamedTuple):
     rest: float         # N at rest
     mu: float           # moduli at rest [Pa]
     lam: float
+    low: np.ndarray = NONE      # bounds of strains (see `guard`)
+    high: np.ndarray = NONE
 
     @property
     def dim(self):
@@ -262,17 +265,19 @@ def before_last(m, law):
 @kernel
 def psi(F, law):
     """Return the energy per rest volume [J/m^3]; inf unless det F > 0."""
-    if not det(F) > 0.0:
+    F_cut, _ = cut(F, law.low, law.high)
+    if not det(F_cut) > 0.0:
         return inf
-    value, _ = value_and_slopes(measures(F), law)
+    value, _ = value_and_slopes(measures(F_cut), law)
     return law.unit * (value - law.rest)
 
 
 @kernel
 def kirchhoff(F, law):
     """Return tau = (dpsi/dF) F^T [Pa]; NaN unless det F > 0."""
-    _, g = value_and_slopes(measures(F), law)
-    return mlin(law.unit, stress(g, F), 0.0, F)
+    F_cut, _ = cut(F, law.low, law.high)
+    _, g = value_and_slopes(measures(F_cut), law)
+    return mlin(law.unit, stress(g, F_cut), 0.0, F_cut)
 
 
 @kernel

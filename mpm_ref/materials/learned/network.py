@@ -24,6 +24,7 @@ from ...core.tensor import mat, mmt
 from ..no_flow import never_fails
 from ..waves import moduli_at_rest, stiffness
 from . import response
+from .guard import NONE, cut, with_half_the_rest
 from .invariants import count, describe
 from .response import answer
 
@@ -40,6 +41,8 @@ class NeuralLaw(NamedTuple):
     unit: float         # of the network's answer [Pa]
     wave: float         # at rest: modulus of a compression wave, lam + 2 mu [Pa], 0 if negative
     largest: float      # ... and the largest for any velocity gradient [Pa]
+    low: np.ndarray = NONE      # bounds of strains (see `guard`)
+    high: np.ndarray = NONE
 
     @property
     def dim(self):
@@ -66,6 +69,8 @@ class NeuralFlow(NamedTuple):
     W: np.ndarray
     b: np.ndarray
     alpha: float        # what the network's answer is multiplied with
+    low: np.ndarray = NONE      # bounds of strains (see `guard`)
+    high: np.ndarray = NONE
 
     @property
     def dim(self):
@@ -199,7 +204,16 @@ def respond(F, law):
 @kernel
 def kirchhoff(F, law):
     """Return tau = P F^T."""
-    return respond(F, law)
+    F_cut, _ = cut(F, law.low, law.high)
+    return respond(F_cut, law)
+
+
+@kernel
+def returned(F, flow):
+    """Return F after the return map."""
+    F_cut, is_cut = cut(F, flow.low, flow.high)
+    F_new = respond(F_cut, flow)
+    return with_half_the_rest(F, F_cut, F_new) if is_cut else F_new
 
 
 @kernel
@@ -221,5 +235,5 @@ for _kind, _class in LAW_CLASSES.items():
     moduli_at_rest.method(_class, at_rest)
 for _kind, _class in FLOW_CLASSES.items():
     answer.method(_class, answer.methods[_kind])
-    names.returned.method(_class, respond)
+    names.returned.method(_class, returned)
     names.intact.method(_class, never_fails)

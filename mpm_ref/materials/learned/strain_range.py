@@ -48,8 +48,34 @@ def excess(measures, bounds):
     return np.where(inverted | ~np.isfinite(measures).all(axis=1), np.inf, worst)
 
 
+def farthest(F, bounds):
+    """Return the point of F (n, d, d) that is farthest out of bounds, its strain measures and its
+    excess; of points that are not finite only where all are.
+    """
+    with np.errstate(invalid="ignore", over="ignore"):
+        measures = strain_measures(F)
+    out = excess(measures, bounds)
+    finite = np.isfinite(measures).all(axis=1)
+    p = int(np.argmax(np.where(finite | ~finite.any(), out, -1.0)))
+    return p, measures[p], float(out[p])
+
+
+def describe_strains(measures):
+    """Return stretches and J in words."""
+    *s, J = (f"{a:.4g}" for a in measures)
+    return f"principal stretches {', '.join(s)}, J = {J}"
+
+
+def describe_bounds(bounds):
+    """Return the ranges of stretches and of J in words."""
+    *ranges, of_J = (f"{low:.4g} to {high:.4g}"
+                     for low, high in zip(bounds["low"], bounds["high"], strict=True))
+    return f"{', '.join(ranges)}, J {of_J}"
+
+
 def stored_bounds(about, d):
-    """Return the bounds that the record of a training holds, and its `dt` [s] or None; or None.
+    """Return the bounds that the record of a training holds, and its `dt` [s] or None; with the
+    laws' error on their own run, `run_error`, where the record has it; or None.
 
     Raises ValueError for bounds that are not those of d dimensions.
     """
@@ -67,4 +93,5 @@ def stored_bounds(about, d):
     if dt is not None and not (isinstance(dt, int | float) and 0.0 < dt < np.inf):
         raise ValueError(f"time step of training: {dt}; expected a number above 0, in s; train "
                          "again")
-    return {"low": low.tolist(), "high": high.tolist(), "dt": dt}
+    own = {name: about[name] for name in ("run_error",) if name in about}
+    return {"low": low.tolist(), "high": high.tolist(), "dt": dt, **own}

@@ -15,6 +15,8 @@ from ...store.running import Options, run
 from ...store.writer import StoredFields, require_run
 from ...training import import_with_torch
 from ...trajectories import Observed
+from ..bodies import body_maker
+from .compare import RunBroken, positions, threads_for
 
 FIELDS = ("x", "v", "C", "F")
 J_ALONE = "J"
@@ -39,9 +41,29 @@ def train_study(study, observed, checkpoint=None, on_epoch=None, **about):
     done = how.train_laws(study.tables.method, recipe, laws, (problem, observed), checkpoint,
                           on_epoch)
     took = {f"{clock}_seconds": round(s, 1) for clock, s in done.meter.total._asdict().items()}
-    return how.learned_laws(laws, {
+    trained = how.learned_laws(laws, {
         **about, **identity(study), **took, **done.errors, "seen": strain_bounds(observed.F),
         "torch": how.version()})
+    error = run_error(study.problem(), body_maker(trained), observed.x)
+    return trained._replace(about={**trained.about, "run_error": error})
+
+
+def run_error(problem, maker, x):
+    """Return the root mean square error of a run by other laws over the motion of the true one,
+    with positions x (k + 1, n, d) after every step; None where it breaks down.
+
+    maker: a function that gives a body the laws (see `nclaw.bodies.body_maker`).
+    """
+    run = positions(problem, tuple(map(maker, problem.bodies)))
+    try:
+        with threads_for(problem.bodies):
+            errors = [np.mean((learned - true) ** 2)
+                      for learned, true in zip(run, x[::problem.clock.every or 1], strict=True)]
+    except RunBroken:
+        return None
+    motion = np.mean((x - x[0]) ** 2)
+    error = float(np.sqrt(np.mean(errors) / motion)) if motion > 0.0 else np.inf
+    return error if np.isfinite(error) else None
 
 
 def identity(study):

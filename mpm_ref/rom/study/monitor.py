@@ -13,11 +13,16 @@ in each state, at a few points and in the report of the step:
     blind       number of latent coordinates that the samples do not determine
     lost        quadrature points that could not be traced back into the body
     inverted    points with det F <= 0
+    spread      standard deviation of the samples' places over that of the body's, along the axis
+                of the body where it is least: low for samples in one place
+    surplus     equations of the samples for each latent coordinate
 
 The bounds lie between the values of trial runs within the trained range, of gravity and torsion,
 and those of runs that had gone wrong. `python -m validation run extremes.ldm` records both anew,
 and how often the bounds err, also on maps that they were not chosen with. A run with inferred
-stress is checked for `beyond` and `blind` alone, with the same bounds.
+stress is checked for `beyond` and `blind` with the same bounds, and for `coverage` by the latent
+coordinates' modes with a bound of its own, FIELD_COVERAGE, as `off`, `spread` and `surplus` do not
+separate its runs; samples with weights are not: their weights make up for it.
 """
 
 from typing import NamedTuple
@@ -27,11 +32,15 @@ import numpy as np
 from ..cubature import misfit
 from ..extrapolation import BEYOND, Extent, evenly, trained_extent
 from ..fields.pod_fields import PodFields
+from ..integrity import require_intact, seal
 from ..projection import RANK
 
 CHECKED = 64        # points of the body that are checked, and samples
 OFF = 0.033         # [dx]; hardly separates runs in range from those with twice the time step
 COVERAGE = 0.3      # low enough for ten samples and seven coordinates
+SPREAD = 0.25       # from maps r2 and r4 of gravity and of torsion, like SURPLUS
+SURPLUS = 4.0
+FIELD_COVERAGE = 0.15       # from random samples and samples in corners of the jelly cube and frame
 MEMORY = 0.8        # share of the earlier coverage in the present one: a poor draw is forgiven
 LOST = 0.01         # of the quadrature points; in range none
 NONSENSE = 0.1      # of the points checked; more that are inverted are no body,
@@ -47,6 +56,8 @@ MESSAGES = {
     "blind": "{blind} of the latent coordinates could not be told from the samples",
     "lost": "{lost:.1%} of the quadrature points could not be traced back",
     "inverted": "{inverted:.1%} of the points looked at are inverted, det F down to {J:.3g}",
+    "spread": "the samples lie within {spread:.0%} of the body's extent",
+    "surplus": "the samples give {surplus:.2g} equations for each latent coordinate",
 }
 
 
@@ -67,6 +78,10 @@ class StateCheck(NamedTuple):
     J: float = np.nan       # smallest det F of the points checked
     inverted: float = 0.0   # share of them whose det F is not above 0
     far: float = 0.0        # distance of xhat from the mean of the trained ones, over their largest
+    spread: float = 1.0     # of the samples over that of the body, where it is least; a mean over
+                            # the last steps
+    surplus: float = np.inf     # equations of the samples for each latent coordinate
+    least_coverage: float = COVERAGE        # that is within bounds
 
     @property
     def nonsense(self):
@@ -82,8 +97,9 @@ class StateCheck(NamedTuple):
     def out_of_bounds(self):
         """Names of the measures that are out of bounds."""
         out = {"beyond": not self.beyond <= BEYOND, "off": not self.off <= OFF,
-               "coverage": not self.coverage >= COVERAGE, "blind": self.blind > 0,
-               "lost": not self.lost <= LOST, "inverted": self.inverted > 0.0}
+               "coverage": not self.coverage >= self.least_coverage, "blind": self.blind > 0,
+               "lost": not self.lost <= LOST, "inverted": self.inverted > 0.0,
+               "spread": not self.spread >= SPREAD, "surplus": not self.surplus >= SURPLUS}
         return tuple(name for name, is_out in out.items() if is_out)
 
     @property
@@ -114,6 +130,13 @@ class MapMonitor(NamedTuple):
     dx: float               # of the grid [m]
     dt: float               # [s]
     all_points: np.ndarray  # (N, d) of which samples have numbers, at rest [m]
+    axes: np.ndarray        # of the body's extent (see `principal_axes`)
+    seal: dict              # of the map (see `rom.integrity`)
+
+    @property
+    def field(self):
+        """Return the map of the run."""
+        return self.g
 
     def check(self, state, last=None):
         """Return the `StateCheck` of a `RunState`, whose predecessor's was `last`; raises
@@ -127,11 +150,15 @@ class MapMonitor(NamedTuple):
         measures = {"off": off / self.dx, "blind": 0}
         if report is not None:
             lost = report.quadrature.get("lost", 0)
-            X = evenly(self.all_points[state.samples.points], CHECKED)
+            X_samples = self.all_points[state.samples.points]
+            X = evenly(X_samples, CHECKED)
             shown = coverage(G, self.g.derivatives(X, latent.xhat)[2])
+            spread_now = spread(X_samples, self.axes)
             measures = {"off": report.residual * self.dt / self.dx,
                         "coverage": MEMORY * last.coverage + (1.0 - MEMORY) * shown,
-                        "blind": self.g.r - report.rank, "lost": lost / (lost + report.points)}
+                        "blind": self.g.r - report.rank, "lost": lost / (lost + report.points),
+                        "spread": MEMORY * last.spread + (1.0 - MEMORY) * spread_now,
+                        "surplus": X_samples.size / self.g.r}
         return StateCheck(float(self.extent.beyond(latent.xhat)), J=float(J.min()),
                           inverted=float(np.mean(~(J > 0.0))),
                           far=float(self.extent.outlying(latent.xhat)), **measures)
@@ -149,12 +176,20 @@ class FieldMonitor(NamedTuple):
     """The monitor of a run of NSF."""
 
     extent: Extent      # of the training latents
+    moving: np.ndarray  # see `modes_of_motion`; () of fields without modes
+    field: object       # of the run
+    seal: dict          # of the field (see `rom.integrity`)
 
     def check(self, state, last=None):
         """Return the `StateCheck` of a `RunState`."""
         latent, report = state.latent, state.report
         blind = 0 if report is None else len(latent.xhat) - report.rank
-        return StateCheck(float(self.extent.beyond(latent.xhat)), blind)
+        check = StateCheck(float(self.extent.beyond(latent.xhat)), blind,
+                           least_coverage=FIELD_COVERAGE)
+        if report is None or not len(self.moving) or state.samples.weights is not None:
+            return check
+        U = latent_modes(self.field, state.samples.points)
+        return check._replace(coverage=share_of_motion(U, self.moving))
 
 
 def map_monitor(full, g, xhat):
@@ -162,19 +197,24 @@ def map_monitor(full, g, xhat):
     k + 1, r). Raises ValueError where these do not differ.
     """
     X, problem = evenly(full.X, CHECKED), full.problem
-    return MapMonitor(g, X, trained_extent(g, full.X, xhat), problem.dx, problem.clock.dt, full.X)
+    return MapMonitor(g, X, trained_extent(g, full.X, xhat), problem.dx, problem.clock.dt, full.X,
+                      principal_axes(full.X), seal(g))
 
 
 def field_monitor(fields, xhat):
     """Return the `FieldMonitor` of runs on fields with training latents xhat (s, k + 1, r). Raises
     ValueError where these do not differ.
     """
-    return FieldMonitor(trained_extent(fields, np.arange(len(fields.X)), xhat))
+    points = np.arange(len(fields.X))
+    moving = (modes_of_motion(latent_modes(fields, points)) if isinstance(fields, PodFields)
+              else np.zeros((0, 0)))
+    return FieldMonitor(trained_extent(fields, points, xhat), moving, fields, seal(fields))
 
 
 def checked_states(run, monitor, earlier=()):
     """Yield (`RunState`, `StateCheck`) of a `ReducedRun`, of earlier states too (see
-    `ReducedRun.states`). Raises `NoBodyLeft`, and what the run raises.
+    `ReducedRun.states`). Raises `NoBodyLeft`, after the last state `integrity.DamagedModel` if
+    arrays of the model have changed meanwhile, and what the run raises.
     """
     check, first = None, None
     for k, state in enumerate(run.states(earlier)):
@@ -187,6 +227,7 @@ def checked_states(run, monitor, earlier=()):
                 f"{first[1].message}. Keep to the parameters that the map was trained with, take "
                 "more samples or a smaller dt")
         yield state, check
+    require_intact(monitor.field, monitor.seal)
 
 
 def sample_warnings(fields, samples):
@@ -202,17 +243,53 @@ def sample_warnings(fields, samples):
                "wrong (docs/howto/reduced-model.md); give [run] more of them, or another seed")
 
 
+def latent_modes(fields, points):
+    """Return the modes of the latent coordinates (m, d, r) of `PodFields` at points by number."""
+    return fields.U[points][:, :, :fields.r]
+
+
+def principal_axes(X):
+    """Return the principal axes (d, k) of places X (n, d) over the standard deviation along each;
+    axes along which X is flat are left out.
+    """
+    centered = X - X.mean(axis=0)
+    variance, axes = np.linalg.eigh(centered.T @ centered / len(X))
+    extended = variance > RANK * variance[-1]
+    return axes[:, extended] / np.sqrt(variance[extended])
+
+
+def spread(X_samples, axes):
+    """Return the standard deviation of the places X_samples (m, d) over that of the body, along the
+    one of its `principal_axes` where it is least.
+    """
+    return float((X_samples @ axes).std(axis=0).min())
+
+
 def coverage(G, G_samples):
     """Return the least, over all changes y of the latent coordinates that move the body, of the rms
     motion G_samples y of samples over that of the body's points G y; G (n, d, r), G_samples (m, d,
     r). 0 where no motion shows, or nothing is finite.
     """
-    A, B = (a.reshape(-1, a.shape[2]) / np.sqrt(len(a)) for a in (G, G_samples))
-    if not (np.isfinite(A).all() and np.isfinite(B).all()):
-        return 0.0
+    return share_of_motion(G_samples, modes_of_motion(G))
+
+
+def modes_of_motion(G):
+    """Return the changes of the latent coordinates (r, k) that move the body's points by 1 rms
+    each, in orthogonal ways, of G (n, d, r); none where G is not finite.
+    """
+    A = G.reshape(-1, G.shape[2]) / np.sqrt(len(G))
+    if not np.isfinite(A).all():
+        return np.zeros((A.shape[1], 0))
     _, s, Vt = np.linalg.svd(A, full_matrices=False)
     moving = s > RANK * s[0]
-    B = B @ (Vt[moving].T / s[moving])
-    if len(B) < B.shape[1] or not moving.any():
+    return Vt[moving].T / s[moving]
+
+
+def share_of_motion(G_samples, moving):
+    """Return the least rms motion of samples, G_samples (m, d, r), by the changes `moving` (r, k)
+    of `modes_of_motion`.
+    """
+    B = G_samples.reshape(-1, G_samples.shape[2]) @ moving / np.sqrt(len(G_samples))
+    if len(B) < B.shape[1] or not B.shape[1] or not np.isfinite(B).all():
         return 0.0
     return float(np.linalg.svd(B, compute_uv=False)[-1])

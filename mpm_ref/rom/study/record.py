@@ -19,6 +19,7 @@ from ...store import checkpoint
 from ...store.manifest import RunPart, manifest
 from ...store.running import FINISHED, INTERRUPTED, checkpoint_of
 from ...store.writer import StoredFields, create, reopen
+from ..integrity import DamagedModel
 from ..step import BREAKDOWNS
 from .monitor import NoBodyLeft, StateCheck, checked_states, stored_check
 from .run import ReducedRun
@@ -185,7 +186,7 @@ def shown_states(recording, earlier=()):
                 check(bounds, state, dt if k else 0.0)
             yield ShownState(reduced, state_check, state)
             k += 1
-    except NoBodyLeft as fault:
+    except (NoBodyLeft, DamagedModel) as fault:
         raise BrokenRun(str(fault), k) from fault
     except BROKEN as fault:
         factor = getattr(recording.options, "dt_factor", 1.0)

@@ -14,6 +14,7 @@ from mpm_ref.scene import build
 from validation.common.scenes import with_
 from validation.common.weights_needed import Untrained, load_available
 from validation.extremes import nclaw_extrapolation as extrapolation
+from validation.extremes import nclaw_guard as guards
 from validation.extremes import nclaw_runs
 from validation.extremes import nclaw_trainings as trainings
 from validation.extremes.nclaw_extrapolation import with_time_step
@@ -148,7 +149,6 @@ def test_what_is_usual_is_the_first_run_s_error():
     first, second = law_trials(Records(), law, setups)
     assert first.usual == second.usual == first.end.error > 0.0
     assert second.end.error > first.end.error
-    assert law_trials(Records(), law, setups, usual=7.0)[1].usual == 7.0
 
 
 def test_fluids_start_at_the_volume_of_the_strain():
@@ -265,10 +265,10 @@ def test_drift_is_that_of_the_last_fifth():
 # Unfinished trainings, and faults of what is seen.
 
 def test_epochs_are_compared_with_the_last_one(monkeypatch):
-    def shown(run, law, setups, usual):
+    def shown(run, law, setups):
         error = {"jelly after 10": 5e-4, "jelly after 100": 1e-4}[law.name]
-        return [trial("as trained", law.name, usual or error, error=error, lost=120, first=60),
-                trial("thrown", law.name, usual or error, error=error)]
+        return [trial("as trained", law.name, error, error=error, lost=120, first=60),
+                trial("thrown", law.name, error, error=error)]
 
     monkeypatch.setattr(trainings, "law_trials", shown)
     kept = {k: untrained()._replace(about={"seen": WIDE, "dt": DT}) for k in (10, 100)}
@@ -299,3 +299,31 @@ def test_faults_stand_beside_the_seeds(monkeypatch):
     assert "without faults 0.0001 to 0.0003 m^2" in note
     columns, table = records["trainings"]
     assert dict(zip(columns, table[2], strict=True))["density"] == 2.0
+
+
+# The guard.
+
+def guarded_trial(what, unguarded=GOOD, guarded=GOOD):
+    return guards.GuardedTrial("water", what, unguarded, guarded)
+
+
+def test_runs_that_break_down_with_and_without_the_guard_are_counted():
+    stopped = GOOD._replace(error=np.inf, message="lost")
+    records = Records()
+    guards.record_guard(records, [
+        guarded_trial("as trained"), guarded_trial("thrown", stopped),
+        guarded_trial("stretched", stopped, GOOD._replace(error=3e-4)),
+        guarded_trial("pressed", stopped, stopped),
+        guarded_trial("turned", GOOD, GOOD._replace(error=2.0 * GOOD.error))])
+    values = {id: value for id, (value, _) in records.items()}
+    assert values == {"extremes.nclaw.guard.broken": 1, "extremes.nclaw.guard.harm": 2.0}
+    assert "finish 2; water, pressed" in records["extremes.nclaw.guard.broken"][1]
+
+
+def test_a_run_that_stops_is_bad_whatever_is_usual():
+    assert trial(error=np.inf, usual=np.inf, message="lost").is_bad()
+
+
+def test_laws_with_a_large_error_on_their_own_run_are_flagged():
+    assert nclaw_runs.flagged_as_poor(GOOD).flags == "poor"
+    assert nclaw_runs.flagged_as_poor(GOOD._replace(flags="dt", first=3))[2:4] == (0, "dt poor")

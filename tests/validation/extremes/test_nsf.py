@@ -173,6 +173,18 @@ def test_damage_is_stopped_harmless_or_wrong(bench):
     assert ended("tau.coefficients.w", "huge").kind in (STOPPED, FLAGGED)
 
 
+def test_any_damage_is_stopped_by_the_seal_and_sound_fields_are_not(bench):
+    """The lowest bit of a mode changes no error, and is found all the same."""
+    for path in damage.ARRAYS:
+        if not path.startswith("bend"):
+            fields = damage.damage_array(bench.tested.fields, path, 0.5, "lowest bit")
+            found = damage.sealed_trial(bench, trial(), fields)
+            assert found.kind == STOPPED
+            assert found.end.message == f"changed in memory: {path}"
+    assert damage.sealed_trial(bench, trial()).kind == FINE
+    assert damage.sealed_trial(bench, trial(error=90.0)).kind == SILENT
+
+
 def test_files_of_fields_are_refused_where_damaged(bench):
     found = Records()
     run = SimpleNamespace(rng=np.random.default_rng(0), choose=lambda **by: 1,
@@ -187,9 +199,11 @@ def test_damaged_files_are_those_of_the_scene_that_is_named(monkeypatch):
     """Not of the last one."""
     filed = []
     one, other = (SimpleNamespace(fields=SimpleNamespace(r=r)) for r in (5, 6))
+    sealed = SimpleNamespace(monitor=SimpleNamespace(seal={}), tested=one)
     monkeypatch.setattr(damage, "scenes", lambda run: [(damage.FILE_SCENE, one), ("jelly", other)])
     monkeypatch.setattr(damage, "FieldBench", lambda *_: SimpleNamespace(
-        count=40, drawn=lambda count: count, trial=lambda what, *_: trial(what=what)))
+        count=40, drawn=lambda count: count, trial=lambda what, *_: trial(what=what),
+        **vars(sealed)))
     monkeypatch.setattr(damage, "damage_array", lambda *_: None)
     monkeypatch.setattr(damage, "refit", lambda one, sizes, follows: (one, sizes, follows))
     monkeypatch.setattr(damage, "record_files", lambda run, *given: filed.append(given))

@@ -1,11 +1,13 @@
 """Pareto fronts, the cheapest setting, and the bytes of a state."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from validation.extremes.long_runs import round_state
 from validation.trade.explicit import prepare_manufactured
-from validation.trade.front import cheapest, front
+from validation.trade.front import cheapest, front, record_points, richardson
 from validation.trade.measure import (
     DEFAULT,
     QUICK,
@@ -17,8 +19,8 @@ from validation.trade.measure import (
 )
 
 
-def point(cpu, error, end="finished"):
-    return MeasuredSetting("dt", DEFAULT, error, cpu, 100, 1, 0.5, end, "", False)
+def point(cpu, error, end="finished", of_bound=0.5):
+    return MeasuredSetting("dt", DEFAULT, error, cpu, 100, 1, of_bound, end, "", False)
 
 
 def test_front_holds_what_no_point_beats():
@@ -41,6 +43,56 @@ def test_cheapest_takes_no_failure():
     points = [point(1.0, 0.05, "CFL"), point(2.0, 0.05), point(3.0, 0.01), point(0.5, 0.2)]
     assert cheapest(points, 0.1, lambda p: p.cpu).cpu == 2.0
     assert cheapest(points, 0.001, lambda p: p.cpu) is None
+
+
+def test_cheapest_takes_no_step_past_its_bound():
+    points = [point(1.0, 0.05, of_bound=1.0005), point(2.0, 0.05, of_bound=1.0)]
+    assert cheapest(points, 0.1, lambda p: p.cpu).cpu == 2.0
+
+
+def test_cheapest_adds_the_error_of_the_reference():
+    """A run that is nearer to the reference than that to the truth may be there by chance."""
+    points = [point(1.0, 0.001), point(2.0, 0.0)]
+    assert cheapest(points, 0.004, lambda p: p.cpu, floor=0.003).cpu == 1.0
+    assert cheapest(points, 0.003, lambda p: p.cpu, floor=0.003).cpu == 2.0
+    assert cheapest(points, 0.0029, lambda p: p.cpu, floor=0.003) is None
+
+
+@pytest.mark.parametrize("p", [1.0, 1.5, 2.0])
+def test_richardson_finds_order_and_error_of_a_power_of_dx(p):
+    coarse, half, fine = (2.0 + 0.1 * h**p for h in (1.0, 0.5, 0.25))
+    order, error = richardson(coarse, half, fine)
+    assert order == pytest.approx(p)
+    assert error == pytest.approx(0.1 * 0.25**p / fine)
+
+
+def test_richardson_trusts_no_order_above_two_and_no_values_that_diverge():
+    assert richardson(2.0 + 1.0, 2.0 + 0.1, 2.0)[1] == pytest.approx(0.1 / 3.0 / 2.0)
+    assert richardson(2.0, 2.1, 2.3)[1] == np.inf
+    assert richardson(2.0, 2.1, 2.05)[1] == np.inf
+
+
+class Run:
+    """Records and tables of an experiment."""
+
+    def __init__(self):
+        self.experiment, self.records, self.tables = SimpleNamespace(id="trade.x"), {}, {}
+
+    def record(self, target, value, **_):
+        self.records[target] = value
+
+    def table(self, name, columns, rows):
+        self.tables[name] = [dict(zip(columns, row, strict=True)) for row in rows]
+
+
+def test_records_name_no_unstable_setting_and_none_below_the_reference():
+    run = Run()
+    record_points(run, [point(1.0, 0.001, of_bound=1.2), point(2.0, 0.001), point(3.0, 0.0005)],
+                  "", floor=0.002)
+    assert run.records["trade.x.reference_error"] == 0.002
+    assert run.records["trade.x.cheapest.0.003"] == 2.0
+    assert "trade.x.cheapest.0.001" not in run.records
+    assert [row["pareto_cpu"] for row in run.tables["points"]] == [0, 1, 0]
 
 
 @pytest.mark.parametrize("levels", [QUICK, STANDARD])
