@@ -50,6 +50,7 @@ class Measurement(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
     cpu_seconds: float = 0.0
     versions: dict[str, str] = {}
     workers: int = 1                # experiments that shared the cores
+    scatter: float | None = None    # relative, of another run; see `recheck`
     origin: Origin | None = None
 
 

@@ -98,7 +98,7 @@ class Run:
             raise ValueError(f"nothing was given for profile {self.profile!r}, only {by_profile}")
         return by_profile[self.profile]
 
-    def record(self, target, value, *, unit=None, scale="", note="", **rule):
+    def record(self, target, value, *, unit=None, scale="", note="", scatter=None, **rule):
         """Record a number and return its verdict.
 
         Args:
@@ -109,6 +109,7 @@ class Run:
             unit: of the number, "1" for a ratio.
             scale: the size it was run at, against the paper's.
             note: a remark for the reader; required where a factor is given.
+            scatter: by how much another run may differ, relative: see `recheck`.
             rule: of a number that is not printed: comparator, paper (the value that is expected),
                 bound, factor, tolerance: see `judge`.
         """
@@ -116,7 +117,7 @@ class Run:
         value, remark = _number(value)
         self._drafts.append({
             "target": target, "value": value, "unit": _unit(target, unit, printed),
-            "scale": scale, "note": "; ".join(filter(None, (remark, note))),
+            "scale": scale, "note": "; ".join(filter(None, (remark, note))), "scatter": scatter,
             **(_own_rule(target, rule, note) if printed is None else {"comparator": PRINTED})})
         return self._verdict(self._drafts[-1])
 

@@ -20,6 +20,7 @@ Groups name numbers by patterns of ids, `*` for any text:
     [[tolerance]]  how far a number may be off, and why; each "~" needs one
     [[chosen]]     records whose settings were picked on the runs that are judged: "chosen"
     [[cause]]      why numbers are missed, and the experiment that shows it
+    [[headline]]   a claim of the paper, with the numbers that stand for it
 """
 
 import math
@@ -76,6 +77,13 @@ class Cause(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     shown_by: str = ""
 
 
+class Headline(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A claim that a reader takes from the paper, and the ids of its numbers."""
+
+    claim: str
+    ids: list[str]
+
+
 class TargetFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The content of one file."""
 
@@ -84,6 +92,7 @@ class TargetFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     tolerance: list[Tolerance] = []
     chosen: list[Choice] = []
     cause: list[Cause] = []
+    headline: list[Headline] = []
 
 
 class Targets(dict):
@@ -94,6 +103,7 @@ class Targets(dict):
         self.tolerances = [group for file in files for group in file.tolerance]
         self.choices = [group for file in files for group in file.chosen]
         self.causes = [group for file in files for group in file.cause]
+        self.headlines = {file.paper: file.headline for file in files}
 
     def criterion(self, id):
         """Return the `Criterion` of a printed number."""
@@ -148,12 +158,12 @@ def load(folder: Path = FOLDER) -> Targets:
 
 
 def require_used(content, targets, file):
-    """Raise ValueError where a pattern of a tolerance matches no target of its file."""
-    for group in content.tolerance:
+    """Raise ValueError where a pattern of a tolerance or headline matches no target of its file."""
+    for group in (*content.tolerance, *content.headline):
         for pattern in group.ids:
             if not any(fnmatchcase(target.id, pattern) for target in targets):
-                raise ValueError(f"{file}: no target matches ids = {pattern!r} of a tolerance; "
-                                 "correct the pattern or drop it")
+                raise ValueError(f"{file}: no target matches ids = {pattern!r} of a "
+                                 f"{type(group).__name__.lower()}; correct the pattern or drop it")
 
 
 def require_rules(targets):

@@ -147,9 +147,12 @@ def test_each_broken_judge_changes_a_verdict(name, other, monkeypatch):
         key for key, function in broken.items() if function is other}
 
 
-def sound_interval(rule, intervals=dict(judges._INTERVALS)):
+SOUND = dict(judges._INTERVALS)
+
+
+def sound_interval(rule):
     """Return the interval of a rule by the judges as they are."""
-    return intervals[rule.comparator](rule)
+    return SOUND[rule.comparator](rule)
 
 
 def test_every_comparator_is_among_the_cases():
