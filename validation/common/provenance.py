@@ -34,7 +34,7 @@ def origin_of(function, load_before):
     return Origin(
         digest=source_digest(function.__module__), cpu=cpu_model(), memory_gb=memory_gb(),
         threads=numba.get_num_threads(), system=platform.platform(), blas=blas(),
-        torch=getattr(torch, "__version__", ""), load=(load_before, load_average()))
+        torch=str(getattr(torch, "__version__", "")), load=(load_before, load_average()))
 
 
 def load_average():
