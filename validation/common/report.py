@@ -211,11 +211,10 @@ def rule(interval, comparator):
     """Return an accepted interval as text."""
     if comparator == "runs":
         return "must run"
-    low, high = interval
-    if len(ends := [end for end in interval if math.isfinite(end)]) == 2:
-        texts = [f"{end:.4g}" for end in ends]
-        return f"{texts[0]} … {texts[1]}" if texts[0] != texts[1] else f"= {texts[0]}"
-    return f"{'≤' if math.isinf(low) else '≥'} {ends[0]:.4g}" if ends else ""
+    ends = [f"{end:.4g}" for end in interval if math.isfinite(end)]
+    if len(ends) == 2:
+        return " … ".join(ends) if ends[0] != ends[1] else f"= {ends[0]}"
+    return f"{'≤' if math.isinf(interval[0]) else '≥'} {ends[0]}" if ends else ""
 
 
 def ratio(value, paper):

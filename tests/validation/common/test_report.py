@@ -13,6 +13,7 @@ from figures.frame import Drawn, draw_all
 from validation import ProfileResults
 from validation.common.registry import Experiment
 from validation.common.report import chapters, preview, status_table, write_report
+from validation.common.results import RESULTS, ROOT
 from validation.common.run import RunSetting, run_all
 from validation.common.targets import Target, Targets, load
 
@@ -245,3 +246,15 @@ def test_unknown_figure_is_refused(folder, scripts):
 def test_status_table(folder):
     assert status_table(ProfileResults(folder), TARGETS).splitlines()[2:] == [
         "| NSF | 3 | 1 | 0 | 1 | 0 | 0 | 1 | 0 |"]
+
+
+def test_the_readme_has_the_counts_of_the_published_records():
+    """Of each paper: printed results, and how many are reproduced, better, missed, not compared."""
+    told = [[int(cell) for cell in row.split("|")[2:7]] for row in
+            (ROOT / "README.md").read_text(encoding="utf-8").splitlines()
+            if row.endswith(".md) |") and "docs/results" in row]
+    found = {c.key: c.printed for c in chapters(ProfileResults(RESULTS / "standard"), load())}
+    papers = [found[key] for key in ("hot", "ldm", "ldmw", "nsf", "nclaw")]
+    assert told == [[sum(p.values()), p["pass"], p["better"], p["miss"],
+                     sum(p[state] for state in ("chosen", "info", "other", "absent"))]
+                    for p in papers]
