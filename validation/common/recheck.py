@@ -19,7 +19,7 @@ TIME_UNITS = {"s", "us", "h", "CPU s", "s/frame", "s/100 frames", "s/s", "x"}
 TIME_NOTE = re.compile(r"\bCPU\b|\bwall time|\bms a step\b")
 
 
-class Difference(NamedTuple):
+class ChangedNumber(NamedTuple):
     """A number that came out otherwise; None where there was none."""
 
     target: str
@@ -39,7 +39,7 @@ def sample(results, experiments, count, seed=None):
 
 def recheck(experiment, results, setting, folder):
     """Run an experiment again into a folder, with the seed of its records, and return the
-    `Difference`s; setting: the `RunSetting` of the profile.
+    `ChangedNumber`s; setting: the `RunSetting` of the profile.
     """
     seed = results.records(experiment.id)[0].seed
     run_all([experiment], RunSetting(setting.profile, Path(folder), seed, setting.targets,
@@ -49,7 +49,7 @@ def recheck(experiment, results, setting, folder):
 
 
 def differences(stored, new):
-    """Return the `Difference`s of two lists of records."""
+    """Return the `ChangedNumber`s of two lists of records."""
     old, again = ({r.target: r for r in records if r.comparator != "remark"}
                   for records in (stored, new))
     found = []
@@ -57,7 +57,7 @@ def differences(stored, new):
         a, b = (records[target].value if target in records else None for records in (old, again))
         relative = relative_difference(a, b, target in old and target in again)
         if relative > allowed(old.get(target) or again[target]):
-            found.append(Difference(target, a, b, relative))
+            found.append(ChangedNumber(target, a, b, relative))
     return found
 
 

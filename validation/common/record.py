@@ -17,7 +17,7 @@ PRINTED = "printed"     # stands where the rule is that of the printed number
 
 
 class Origin(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """Where the records of a file come from; the first record has it."""
+    """Source and machine of a file's records; the first record has it."""
 
     digest: str = ""                    # of the source that made them: see `source_digest`
     seal: str = ""                      # of records and tables: see `seal_of`

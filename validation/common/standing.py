@@ -1,4 +1,4 @@
-"""How stored records stand to the source of today: current, stale, edited by hand, or unknown."""
+"""Compare stored records with the source of today: current, stale, edited by hand, or orphaned."""
 
 from typing import NamedTuple
 
@@ -26,11 +26,12 @@ def standings(results, experiments, root=ROOT):
     return [Standing(id, state_of(results, id, experiments.get(id), root)) for id in results.ids()]
 
 
-def state_of(results, id, experiment, root=ROOT):
+def state_of(results, experiment_id, experiment, root=ROOT):
     """Return the state of the records of an experiment."""
-    records = results.records(id)
+    records = results.records(experiment_id)
     origin = records[0].origin
-    if origin and origin.seal and origin.seal != seal_of(records, results.table_bytes(id)):
+    tables = results.table_bytes(experiment_id)
+    if origin and origin.seal and origin.seal != seal_of(records, tables):
         return "edited"
     if experiment is None:
         return "orphaned"

@@ -53,7 +53,7 @@ class Target(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Tolerance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """How far numbers may be off: a factor, a relative tolerance of "=", or digits of "~"."""
+    """Slack of numbers: a factor, a relative tolerance of "=", or digits of "~"; and its reason."""
 
     ids: list[str]
     why: str
@@ -105,16 +105,16 @@ class Targets(dict):
         self.causes = [group for file in files for group in file.cause]
         self.headlines = {file.paper: file.headline for file in files}
 
-    def criterion(self, id):
+    def criterion(self, target_id):
         """Return the `Criterion` of a printed number."""
-        target, group = self[id], first_of(self.tolerances, id)
+        target, group = self[target_id], first_of(self.tolerances, target_id)
         own = {} if group is None else {
             name: getattr(group, name) for name in ("factor", "tolerance", "digits")}
         return Criterion(target.comparator, float(target.value), **own)
 
-    def why(self, id):
+    def why(self, target_id):
         """Return the reason of a number's tolerance, empty where it has none."""
-        group = first_of(self.tolerances, id)
+        group = first_of(self.tolerances, target_id)
         return group.why if group else ""
 
     def choice(self, record_id):
@@ -127,10 +127,10 @@ class Targets(dict):
         return first_of(self.causes, record_id)
 
 
-def first_of(groups, id):
-    """Return the first group with a pattern that matches an id, or None."""
+def first_of(groups, number):
+    """Return the first group with a pattern that matches the id of a number, or None."""
     return next((group for group in groups
-                 if any(fnmatchcase(id, pattern) for pattern in group.ids)), None)
+                 if any(fnmatchcase(number, pattern) for pattern in group.ids)), None)
 
 
 def load(folder: Path = FOLDER) -> Targets:

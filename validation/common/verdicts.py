@@ -18,6 +18,7 @@ VARIANTS = {        # words behind the id of a printed number
     "admissible": "laws that thermodynamics admits in place of the paper's",
     "narrow": "a graph network of another size than the paper's",
     "stand-in": "a body in place of one whose mesh is not public",
+    "displacement": "relative to the displacement instead of the distance from the origin",
     "partial": "over fewer runs than the printed number",
     "small": "at another size than the printed number",
 }
@@ -34,9 +35,9 @@ class Judged(NamedTuple):
     variants: tuple         # words of VARIANTS
 
 
-def printed_id(id, targets):
+def printed_id(record_id, targets):
     """Return (id of the printed number, words of VARIANTS behind it), or (None, ()) of others."""
-    base, variants = id, []
+    base, variants = record_id, []
     while base not in targets:
         base, _, word = base.rpartition(".")
         if word not in VARIANTS:

@@ -32,9 +32,9 @@ def overall_id(table, method, what, variants=()):
     return extended(f"{table}.{printed}.overall_{what}", (word, *variants))
 
 
-def extended(id, words):
-    """Return an id with words behind it."""
-    return ".".join((id, *filter(None, words)))
+def extended(target, variants):
+    """Return the id of a target with words of `verdicts.VARIANTS` behind it, but for empty ones."""
+    return ".".join((target, *filter(None, variants)))
 
 
 def run_variants(quick, name, task):

@@ -9,13 +9,13 @@ from typer.testing import CliRunner
 
 from validation import __main__ as cli
 from validation.common import standing
-from validation.common.recheck import Difference, differences, recheck, sample
+from validation.common.recheck import ChangedNumber, differences, recheck, sample
 from validation.common.record import Measurement, read_records, write_records
 from validation.common.registry import Catalogue, Experiment
-from validation.common.results import ProfileResults
+from validation.common.results import RESULTS, ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.common.source_digest import closure, source_digest
-from validation.common.standing import standing_text, standings
+from validation.common.standing import standing_text, standings, state_of
 from validation.hot.table3 import table3
 
 ID = "verification.toy"
@@ -170,7 +170,7 @@ def test_numbers_are_compared_within_their_scatter(old, new, differs):
 
 
 def test_a_missing_number_differs_without_bound():
-    assert differences([measured(1.0)], []) == [Difference(ID, 1.0, None, float("inf"))]
+    assert differences([measured(1.0)], []) == [ChangedNumber(ID, 1.0, None, float("inf"))]
 
 
 def test_the_cheapest_are_sampled_or_drawn_with_a_seed(tmp_path):
@@ -213,3 +213,10 @@ def test_recheck_runs_a_sample_and_leaves_the_records(invoke, results):
     told = invoke("recheck", "--sample", "1")
     assert (told.exit_code, f"{ID}.error: 0.6 stored, 0.5 now" in told.output) == (1, True)
     assert results.value(ID, f"{ID}.error") == 0.6
+
+
+@pytest.mark.parametrize("profile", ["standard", "paper"])
+def test_no_published_record_was_edited(profile):
+    published = ProfileResults(RESULTS / profile)
+    assert len(published.ids()) > 5
+    assert not [id for id in published.ids() if state_of(published, id, None) == "edited"]

@@ -15,7 +15,8 @@ from validation.common.judge import (
     judge_printed,
 )
 from validation.common.record import Measurement
-from validation.common.targets import Choice, Target, TargetFile, Targets, Tolerance
+from validation.common.results import RESULTS, ProfileResults
+from validation.common.targets import Choice, Target, TargetFile, Targets, Tolerance, load
 from validation.common.verdicts import VARIANTS, judged, printed_counts, printed_id
 
 NOT_FINITE = (None, math.nan, math.inf, -math.inf)
@@ -234,3 +235,13 @@ def test_a_printed_result_counts_once_and_for_the_papers_own_method():
 
 def test_a_record_stores_no_verdict():
     assert "verdict" not in {field.name for field in msgspec.structs.fields(Measurement)}
+
+
+@pytest.mark.parametrize("profile", ["standard", "paper"])
+def test_every_judged_number_that_is_published_can_miss(profile):
+    """Its interval has an end, so that some value lies beyond."""
+    published, numbers = ProfileResults(RESULTS / profile), load()
+    found = [judged(record, numbers) for id in published.ids() for record in published.records(id)]
+    passing = [one for one in found if one.verdict in ("pass", "better", "chosen")]
+    assert len(passing) > 5
+    assert all(any(map(math.isfinite, one.interval)) for one in passing)
