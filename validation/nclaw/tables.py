@@ -19,11 +19,11 @@ from .errors import (
     record_mean,
 )
 from .initial_laws import untrained
-from .printed_ids import RELEASED, extended, run_variants
+from .printed_ids import RELEASED, error_id, extended, run_variants
 from .simulators import COUNTS, named
 from .stand_in_bodies import has_mesh
 from .tasks import TOYS
-from .trained_laws import nets, trained
+from .trained_laws import diverged, identity, nets, trained
 
 INIT = "ours-init"
 AWAY = ("time", "velocity", "geometry")     # tasks of Table 2
@@ -88,7 +88,20 @@ def released(run):
     first = [row for row in rows if row.task == "reconstruction"]
     record(run, "nclaw.table1", first)
     record(run, "nclaw.table2", [row for row in rows if row not in first], AWAY)
+    record_diverged(run, tasks)
     run.table("errors", COLUMNS, rows)
+
+
+def record_diverged(run, tasks):
+    """Record a miss for each printed error of a reading as released whose training diverged."""
+    for name in names_of(as_released=True):
+        net = nets()[name]
+        about = diverged(name, identity(net))
+        for task in tasks if about else ():
+            table = "nclaw.table1" if task == "reconstruction" else "nclaw.table2"
+            words = run_variants(run.profile == "quick", net.environment, task)
+            run.record(error_id(table, method_of(name, net), net.environment, task, words), None,
+                       note=f"the training diverged: {about['stopped']}")
 
 
 @experiment("nclaw.table6", title="NCLaw: graph networks of more and more runs",

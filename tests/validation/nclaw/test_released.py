@@ -55,3 +55,16 @@ def test_the_largest_of_ours_is_generally_below_a_thousandth(found, monkeypatch)
         n: trained_laws.LawNet(n) for n in tables.ENVIRONMENTS})
     record = found(tables.table1.experiment)["nclaw.sec4_2.recon_ours_lt"]
     assert (record.value, expected(record), verdict(record)) == (ERROR, 0.001, "miss")
+
+
+def test_a_training_that_diverged_misses_its_printed_errors(found, monkeypatch):
+    monkeypatch.setattr(tables, "identity", lambda net: {})
+    monkeypatch.setattr(tables, "diverged", lambda name, expected: {
+        "stopped": "in epoch 165"} if name == "sand-neural-released" else None)
+    monkeypatch.setattr(tables, "load_available", lambda run, names, load: {})
+    records = found(tables.released.experiment)
+    missed = [f"nclaw.{id}" for id in ("table1.neural.sand", "table2.neural.sand.time",
+                                       "table2.neural.sand.velocity")]
+    assert {target for target, r in records.items() if verdict(r) == "miss"} == {*missed}
+    assert {records[target].value for target in missed} == {None}
+    assert "diverged: in epoch 165" in records[missed[0]].note
