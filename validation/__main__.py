@@ -3,6 +3,7 @@
 import sys
 import traceback
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated, Literal
 
 import typer
@@ -12,10 +13,12 @@ from figures.frame import draw_all
 from .common import targets
 from .common.parallel import run_side_by_side
 from .common.provenance import commit
+from .common.recheck import recheck, sample
 from .common.registry import discover, select
 from .common.report import status_table, write_report
 from .common.results import RESULTS, ROOT, ProfileResults
 from .common.run import RunSetting, run_all
+from .common.standing import WRONG, standing_text, standings
 from .fingerprint.command import app as fingerprint
 
 app = typer.Typer(help=__doc__, add_completion=False, no_args_is_help=True,
@@ -27,6 +30,8 @@ Profile = Annotated[
     typer.Option(help="quick: a minute at most each; standard: hours in all; paper: as printed")]
 Folder = Annotated[Path, typer.Option("--results", help="holds a folder for each profile")]
 Workers = Annotated[int, typer.Option(min=1, help="experiments at a time, sharing the cores")]
+Strict = Annotated[
+    bool, typer.Option("--strict", help="exit code 1 where records are edited, stale or orphaned")]
 Ids = Annotated[list[str] | None, typer.Argument(help="ids or their leading parts; none: all")]
 
 
@@ -81,9 +86,37 @@ def report(profile: Profile = "quick", results: Folder = RESULTS):
 
 
 @app.command()
-def status(profile: Profile = "standard", results: Folder = RESULTS):
-    """Print the verdicts of all experiments as a Markdown table."""
-    typer.echo(status_table(ProfileResults(results / profile), targets.load()))
+def status(profile: Profile = "standard", results: Folder = RESULTS, strict: Strict = False):
+    """Print the verdicts on the papers' printed results, and which records are not current."""
+    stored, catalogue = ProfileResults(results / profile), discover()
+    typer.echo(status_table(stored, targets.load()))
+    found = standings(stored, catalogue.experiments)
+    typer.echo("\n" + standing_text(found))
+    wrong = strict and any(one.state in WRONG for one in found)
+    raise typer.Exit(max(_report_broken(catalogue.broken), int(wrong)))
+
+
+@app.command("recheck")
+def recheck_sample(
+        profile: Profile = "standard", results: Folder = RESULTS,
+        count: Annotated[int, typer.Option("--sample", min=1, help="experiments to run")] = 5,
+        seed: Annotated[int | None, typer.Option(help="draw them; else the cheapest")] = None):
+    """Run stored experiments again and list the numbers that differ by more than their scatter.
+
+    The stored records stay as they are. The exit code is 1 where a number differs.
+    """
+    stored, catalogue = ProfileResults(results / profile), discover()
+    setting = RunSetting(profile, stored.folder, targets=targets.load(), commit=commit(ROOT))
+    differ = False
+    for experiment in sample(stored, catalogue.experiments, count, seed):
+        with TemporaryDirectory() as folder:
+            found = recheck(experiment, stored, setting, folder)
+        differ = differ or bool(found)
+        typer.echo(f"{experiment.id}: {len(found)} numbers differ" if found else
+                   f"{experiment.id}: the same")
+        for one in found:
+            typer.echo(f"  {one.target}: {one.stored} stored, {one.new} now")
+    raise typer.Exit(max(_report_broken(catalogue.broken), int(differ)))
 
 
 def _write_report(folder, profile, printed):

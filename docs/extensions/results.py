@@ -1,4 +1,7 @@
-"""Pages of results: the numbers of each paper and group, and the list of all experiments."""
+"""Pages of results: the numbers of each paper and group, and the list of all experiments.
+
+Printed results, printed settings and our own numbers have pages of their own.
+"""
 
 import base64
 import inspect
@@ -8,11 +11,12 @@ from typing import NamedTuple
 
 from validation.common import targets
 from validation.common.citations import ROOT
+from validation.common.judge import VERDICTS
 from validation.common.registry import GROUPS, discover
-from validation.common.report import VERDICTS, chapters
+from validation.common.report import chapters
 from validation.common.results import RESULTS, ProfileResults
 
-from . import settings
+from . import settings, verdict_pages
 from .markdown import cell, grid_table
 
 FOLDER = "results/numbers"
@@ -25,14 +29,19 @@ OPENINGS = {
 }
 COLUMNS = ("what", "printed; accepted", "measured", "verdict", "scale")
 OWN_COLUMNS = ("what", "expected; accepted", "measured", "verdict", "note")
-CHECKS = {"done", "converged", "mass"}      # of a run itself, which no paper prints
-MOST_ROWS = 150         # of an experiment without printed numbers; the others stand in its records
+PARTS = {           # of a paper's experiment: kinds of its rows
+    "": ("result", "variant"), "settings": ("setting",), "more": ("own",)}
+COUNTED = {"printed": ("result",), "another method or body": ("variant",),
+           "settings": ("setting",), "own": ("own",)}
+HEADINGS = {"more": "numbers that the paper does not print", "settings": "printed settings"}
+MOST_ROWS = 150         # of our own numbers of an experiment; the others stand in its records
 
 
 class Shown(NamedTuple):
-    """An experiment's section, and where it is shown."""
+    """A part of an experiment's section, and where it is shown."""
 
     section: object     # `report.Section`
+    part: str           # of PARTS, "" of the first that an experiment has
     profile: str
     rows: list          # of `report.ReportRow`
     title: str
@@ -49,6 +58,8 @@ def pages():
     result |= {f"{FOLDER}/figures/{figure.name}.webp": base64.b64decode(figure.data)
                for one in shown_experiments() for figure in one.section.figures}
     result["results/generated/experiments.md"] = experiments(missing)
+    result |= verdict_pages.pages(targets.load(), [
+        (label(one), row) for one in shown_experiments() for row in one.rows])
     return result | settings.pages(ProfileResults(RESULTS / "standard"))
 
 
@@ -67,30 +78,32 @@ def declared():
 @cache
 def shown_experiments():
     """Return the `Shown` of all experiments with results, by profile and group."""
-    return [shown_experiment(section, profile) for profile in ("standard", "paper")
+    return [one for profile in ("standard", "paper")
             for chapter in all_chapters(profile).values()
-            for section in chapter.sections if section.rows]
+            for section in chapter.sections for one in shown_parts(section, profile)]
 
 
-def shown_experiment(section, profile):
-    """Return the `Shown` of a section: if it has printed numbers, those alone."""
+def shown_parts(section, profile):
+    """Return the `Shown`s of a section: a paper's experiment has one for each of PARTS."""
     group, second = section.id.split(".")[:2]
-    page, rows = group, section.rows
+    known = declared().get(section.id)
+    title = known.title if known else section.id
     if group in OPENINGS:
         page = group if group == "verification" else f"{group}-{second}"
-    else:
-        printed = [row for row in rows if row.paper != "—" and row.what not in CHECKS]
-        paper = next(paper for paper, groups in PAPERS.items() if group in groups)
-        page, rows = (paper, printed) if printed else (f"{paper}-more", rows)
-    known = declared().get(section.id)
-    return Shown(section, profile, rows, known.title if known else section.id, page)
+        return [Shown(section, "", profile, section.rows, title, page)] if section.rows else []
+    paper = next(paper for paper, groups in PAPERS.items() if group in groups)
+    by_part = {part: [row for row in section.rows if row.kind in kinds]
+               for part, kinds in PARTS.items()}
+    present = [part for part, rows in by_part.items() if rows]
+    return [Shown(section, part if part != present[0] else "", profile, by_part[part], title,
+                  "-".join(filter(None, (paper, part)))) for part in present]
 
 
 @cache
 def experiment_places():
     """Return {id: (page, name of the section)} of the experiments at the standard profile."""
     return {one.section.id: (f"{FOLDER}/{one.page}", label(one))
-            for one in shown_experiments() if one.profile == "standard"}
+            for one in shown_experiments() if one.profile == "standard" and not one.part}
 
 
 def missing_numbers():
@@ -101,8 +114,8 @@ def missing_numbers():
 
 
 def label(one):
-    """Return the name of the place of an experiment's section."""
-    return f"numbers.{name_of(one)}"
+    """Return the name of the place of a part of an experiment's section."""
+    return "-".join(filter(None, (f"numbers.{name_of(one)}", one.part)))
 
 
 def name_of(one):
@@ -127,7 +140,7 @@ def numbers(page, shown, missing):
         parts = [f"# {heading(page)}", "",
                  "[Experiments](../experiments.md) lists all experiments with links to their code."]
     for one in shown:
-        parts += section_text(one, page not in PAPERS)
+        parts += section_text(one, page not in PAPERS and not page.endswith("-settings"))
     if missing:
         parts += ["", f"({missing_label(page)})=", "## Not measured", "",
                   *(f"- {cell(t.what)} ({cell(t.paper_ref)})" for t in missing), ""]
@@ -137,8 +150,8 @@ def numbers(page, shown, missing):
 def heading(page):
     """Return the heading of a page without printed numbers."""
     first, _, second = page.partition("-")
-    if second == "more":
-        return f"{NAMES[first]}: numbers that the paper does not print"
+    if second in HEADINGS:
+        return f"{NAMES[first]}: {HEADINGS[second]}"
     return OPENINGS[first].format(NAMES.get(second, ""))
 
 
@@ -151,7 +164,7 @@ def section_text(one, own):
     for remark in section.remarks:
         if remark != one.title:
             lines += [cell(remark), ""]
-    for figure in section.figures:
+    for figure in section.figures if not one.part else ():
         lines += [f"![{cell(figure.name)}](figures/{figure.name}.webp)", "",
                   cell(figure.caption), ""]
     lines += own_table(one) if own else [*printed_table(one.rows), "", *notes(one.rows), ""]
@@ -170,9 +183,8 @@ def printed_table(rows):
 
 
 def described(row):
-    """Return what a row measures; a ratio of printed numbers is described by its note."""
-    printed = row.what.endswith(")")            # with the place in the paper
-    return row.what if printed or not row.note else f"{row.what}: {row.note}"
+    """Return what a row measures; a number without a printed one is described by its note."""
+    return row.what if row.kind != "own" or not row.note else f"{row.what}: {row.note}"
 
 
 def own_table(one):
@@ -204,7 +216,8 @@ def experiments(missing):
     """Return the tables of all experiments by group, each linked to its numbers and its code."""
     parts = []
     for group, title in GROUPS.items():
-        shown = [one for one in shown_experiments() if one.section.id.split(".")[0] == group]
+        shown = [one for one in shown_experiments()
+                 if one.section.id.split(".")[0] == group and not one.part]
         parts += [f"## {cell(title)}", "",
                   *grid_table(("numbers", "experiment", "verdicts"), map(experiment_row, shown))]
         if missing.get(group):
@@ -215,12 +228,19 @@ def experiments(missing):
 
 def experiment_row(one):
     """Return the cells of an experiment."""
-    counts = Counter(row.verdict for row in one.rows)
-    verdicts = ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS if counts[verdict])
+    verdicts = "; ".join(filter(None, (verdict_counts(one.section.rows, name, kinds)
+                                       for name, kinds in COUNTED.items())))
     known, title = declared().get(one.section.id), cell(one.title)
     if known:
         title = f"{{source}}`{one.title} <{source_of(known.function)}>`"
     return [f"[{cell(name_of(one))}](#{label(one)})", title, verdicts]
+
+
+def verdict_counts(rows, name, kinds):
+    """Return the counts of verdicts on rows of some kinds as text, empty where there are none."""
+    counts = Counter(row.verdict for row in rows if row.kind in kinds)
+    text = ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS if counts[verdict])
+    return f"{name}: {text}" if text else ""
 
 
 def source_of(function):

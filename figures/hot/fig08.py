@@ -5,6 +5,8 @@ Crosses are printed; they belong to 403 000 particles.
 
 import matplotlib.pyplot as plt
 
+from validation.common import targets
+
 from ..common.style import legend_below, series, shared_scale
 
 NEEDS = ["hot.fig8"]
@@ -20,7 +22,7 @@ def scale(results):
 
 def draw(results):
     table = results.table(NEEDS[0], "levels")
-    paper = {record.target: record.paper for record in results.records(NEEDS[0])}
+    printed = targets.load()
     figure, axes = plt.subplots(1, 2, figsize=(7.0, 3.4))
     for kind, rows in series(table, ("kind",)).items():
         label, color, style = KINDS[kind[0]]
@@ -28,7 +30,7 @@ def draw(results):
             ax.plot(table["level"][rows], table[name][rows], style, color=color, label=label)
     for (short, level), color in PRINTED.items():
         for ax, name in zip(axes, ("nnz_row", "nnz"), strict=True):
-            ax.plot(level, paper[f"hot.fig8.{short}.{name}"], "x", color=color, ms=9, mew=2)
+            ax.plot(level, printed[f"hot.fig8.{short}.{name}"].value, "x", color=color, ms=9, mew=2)
     axes[0].set(ylabel="non-zeros per row", ylim=(0.0, None))
     axes[1].set(ylabel="non-zeros", yscale="log")
     for ax in axes:

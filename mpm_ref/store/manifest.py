@@ -156,8 +156,8 @@ class RunPart:
 
         It says why and where the part ended, the resources used, the number of implicit steps that
         did not converge, the rejected and stalled steps of the whole run so far, the warnings about
-        strains, how often the guard of a learned law cut them, the sha256 of the last state, and the
-        code.
+        strains, how often the guard of a learned law cut them, the sha256 of the last state, and
+        the code.
         """
         return {
             "began": self.began,

@@ -13,6 +13,7 @@ from figures.common.schemes import MARKS
 from figures.ldm import fig04, fig06, fig07, fig10, fig11, fig12, fig13, fig14, fig15, fig16
 from figures.ldmw import fig01, tables
 from validation.common.results import ProfileResults
+from validation.common.targets import load
 from validation.ldm.published_bodies import file_of
 
 mpl.use("Agg")
@@ -45,9 +46,9 @@ def results(tmp_path):
 
 def recorded(results, id, *targets, **more):
     """Write records of an experiment, of the value 0.5 each."""
-    rows = [{"target": target, "value": 0.5, "unit": "%", "paper": 0.3, "comparator": "<=",
-             "verdict": "miss", "scale": "3 particles, one run", "seconds": 1.0, "seed": 0,
-             "command": "", "commit": "", "date": "", "cores": 1, **more} for target in targets]
+    rows = [{"target": target, "value": 0.5, "unit": "%", "scale": "3 particles, one run",
+             "seconds": 1.0, "seed": 0, "command": "", "commit": "", "date": "", "cores": 1, **more}
+            for target in targets]
     (results.folder / f"{id}.json").write_text(json.dumps(rows))
 
 
@@ -251,5 +252,7 @@ def test_workshop_tables_stand_beside_what_is_printed(results):
         assert set(found) == {"position", "velocity", "deformation gradient"}
         assert found["velocity"].get_ydata() == pytest.approx([0.5] * rows)
         bars = [line for line in ax.lines if line.get_label().startswith("_")]
-        assert [list(line.get_ydata()) for line in bars] == 3 * rows * [[0.3, 0.3]]
+        printed = [load()[f"{id}.{row}.{field}"].value for field in tables.FIELDS
+                   for row in tables.ROWS[id]]
+        assert [list(line.get_ydata()) for line in bars] == [[one, one] for one in printed]
         assert len(ax.texts) == 3 * rows            # arrows: printed as the most

@@ -6,6 +6,8 @@ import sys
 import pytest
 
 from validation.common.citations import ROOT, documentation, exists
+from validation.common.targets import load
+from validation.common.verdicts import VARIANTS
 
 sys.path.insert(0, str(ROOT / "docs"))
 
@@ -148,3 +150,36 @@ def test_dead_links_and_requests_are_named(site, capsys, addition, problem):
     (site / "b.html").write_text(addition)
     assert check(site)
     assert problem in capsys.readouterr().out
+
+
+# Verdicts on pages
+
+def test_every_headline_and_every_miss_stands_on_a_page(result_pages):
+    numbers = load()
+    page = result_pages["results/generated/headlines.md"]
+    assert page.count("\n| ") - page.count("\n| claim") - page.count("\n| word |") == sum(
+        map(len, numbers.headlines.values())) + len(VARIANTS)
+    rows = [row for one in results.shown_experiments() for row in one.rows
+            if row.verdict == "miss" and row.kind != "own"]
+    misses = result_pages["results/generated/misses.md"]
+    assert misses.count("](#numbers.") >= len(rows) > 100
+    assert 0 < misses.count("cause not known") < len(rows)
+
+
+def test_printed_results_settings_and_our_own_numbers_are_on_pages_of_their_own(result_pages):
+    assert "| miss |" in result_pages["results/numbers/hot.md"]
+    for one in results.shown_experiments():
+        kinds = {row.kind for row in one.rows}
+        if one.page in results.PAPERS:
+            assert kinds <= {"result", "variant"}
+        elif one.page.endswith("-settings"):
+            assert kinds == {"setting"}
+        elif one.page.endswith("-more"):
+            assert kinds == {"own"}
+
+
+def test_links_to_numbers_lead_to_places_that_exist(result_pages):
+    text = "\n".join(page for page in result_pages.values() if isinstance(page, str))
+    places = re.findall(r"^\((numbers[^)]*)\)=", text, re.MULTILINE)
+    assert len(places) == len(set(places))
+    assert set(re.findall(r"\(#(numbers[^)]*)\)", text)) <= set(places)

@@ -38,7 +38,7 @@ def run_side_by_side(experiments, setting, workers, find=experiment_of):
     """
     longest = sorted(experiments, key=lambda e: -e.seconds(setting.profile))
     pools = ceil(len(longest) / MOST)
-    setting = setting._replace(targets=dict(setting.targets), workers=workers)
+    setting = setting._replace(workers=workers)
     failed = []
     with SuiteProgress([e.seconds(setting.profile) for e in experiments]) as progress:
         for k in range(pools):

@@ -5,11 +5,15 @@ import numpy as np
 
 def record_position_errors(run, name, errors, scale, note, **rule):
     """Record `PositionErrors` in per cent: that from the origin, as the papers measure it; the note
-    goes on with those from the centroid and of the displacement.
+    goes on with those from the centroid and of the displacement. Beside a printed number, for which
+    no rule is given, the error relative to the displacement is judged as well: positions are mostly
+    distance from the origin, which no model has to find.
     """
     origin, centroid, displacement = (100.0 * error for error in errors)
     run.record(name, origin, unit="%", scale=scale, note=f"{note}; from the centroid "
                f"{centroid:.3g} %, of the displacement {displacement:.3g} %", **rule)
+    if not rule:
+        run.record(f"{name}.displacement", displacement, unit="%", scale=scale, note=note)
 
 
 def mean_errors(errors, noun):

@@ -3,8 +3,15 @@
 import os
 import platform
 import subprocess
+import sys
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
+
+import numba
+import threadpoolctl
+
+from .record import Origin
+from .source_digest import source_digest
 
 PACKAGES = ("numpy", "scipy", "numba")
 
@@ -17,6 +24,45 @@ def provenance(source):
         "cores": os.cpu_count() or 1,
         "versions": {"python": platform.python_version(), **_versions()},
     }
+
+
+def origin_of(function, load_before):
+    """Return the `Origin` of the records that a function has made; load_before: see
+    `load_average`. A function of no module in the repository has no digest.
+    """
+    torch = sys.modules.get("torch")
+    return Origin(
+        digest=source_digest(function.__module__), cpu=cpu_model(), memory_gb=memory_gb(),
+        threads=numba.get_num_threads(), system=platform.platform(), blas=blas(),
+        torch=str(getattr(torch, "__version__", "")), load=(load_before, load_average()))
+
+
+def load_average():
+    """Return the mean number of running processes over the last minute."""
+    return round(os.getloadavg()[0], 2)
+
+
+def cpu_model():
+    """Return the name of the processor, as far as the system tells it."""
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as file:
+            names = [line.partition(":")[2].strip() for line in file
+                     if line.startswith("model name")]
+    except OSError:
+        names = []
+    return names[0] if names else platform.processor() or platform.machine()
+
+
+def memory_gb():
+    """Return the size of the main memory [GB]."""
+    return round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e9, 1)
+
+
+def blas():
+    """Return the names, versions and threads of the linear algebra libraries that are loaded."""
+    libraries = [one for one in threadpoolctl.threadpool_info() if one["user_api"] == "blas"]
+    return ", ".join(sorted({f"{one['internal_api']} {one['version']}, {one['num_threads']} threads"
+                             for one in libraries}))
 
 
 def commit(root):

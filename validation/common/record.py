@@ -1,40 +1,41 @@
-"""One number of one experiment, and the only place where numbers are judged.
+"""One number of one experiment, as it is stored: `results/<profile>/<id>.json` lists them.
 
-Every comparator is an interval of accepted values, so that a verdict is one question: does the
-value lie in it?
-
-    <=     value <= factor * paper           or value <= bound        (factor 1)
-    >=     value >= paper / factor           or value >= bound        (factor 1)
-    ~      paper / factor <= value <= paper * factor                  (factor 3)
-    =      abs(value - paper) <= tolerance * abs(paper)               (tolerance 1e-9: round-off)
-    band   bound[0] <= value <= bound[1]
-    info   everything; recorded for the reader, not judged
-    runs   nothing; written for an experiment that raised, so that the report shows it
+No verdict is stored. A printed number is judged by the rule in `validation/targets`, a check of our
+own by the rule that its experiment recorded; both when records are read (see `verdicts`).
 """
 
-import math
+import hashlib
 from pathlib import Path
-from typing import NamedTuple
 
 import msgspec
 
 from mpm_ref.store.atomic import write_bytes
 
-Bound = float | tuple[float, float]
-COMPARATORS = ("<=", ">=", "~", "=", "band", "info", "runs")
-SAME_SIZE = 3.0
-ROUND_OFF = 1e-9
+from .judge import Bound
+
+PRINTED = "printed"     # stands where the rule is that of the printed number
+
+
+class Origin(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """Source and machine of a file's records; the first record has it."""
+
+    digest: str = ""                    # of the source that made them: see `source_digest`
+    seal: str = ""                      # of records and tables: see `seal_of`
+    cpu: str = ""
+    memory_gb: float = 0.0
+    threads: int = 1
+    system: str = ""
+    blas: str = ""
+    torch: str = ""                     # its version, where the experiment imported it
+    load: tuple[float, float] = (0.0, 0.0)      # average of a minute, before and after
 
 
 class Measurement(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """A value and the printed or analytic one; `results/<profile>/<id>.json` lists them."""
+    """A value, and the rule by which it is judged unless the number is printed."""
 
     target: str                     # id of the number, of the paper's target where there is one
     value: int | float | None       # ours; None where the run gave no finite number
     unit: str
-    paper: int | float | None       # the printed or analytic value
-    comparator: str
-    verdict: str                    # "pass", "miss" or "info": see `judge`
     scale: str                      # at which size it was run, against the paper's
     seconds: float                  # wall time of the whole experiment
     seed: int
@@ -42,114 +43,25 @@ class Measurement(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
     commit: str
     date: str
     cores: int
+    comparator: str = PRINTED       # of a check of our own
+    paper: int | float | None = None    # the value that such a check expects
+    bound: Bound | None = None          # end or ends of the interval that such a check accepts
     note: str = ""
-    bound: Bound | None = None      # end or ends of the interval that was accepted
     cpu_seconds: float = 0.0
     versions: dict[str, str] = {}
     workers: int = 1                # experiments that shared the cores
-
-
-class Criterion(NamedTuple):
-    """The rule by which a value is judged; fields that a comparator does not use must stay None."""
-
-    comparator: str
-    paper: float | None = None
-    bound: Bound | None = None
-    factor: float | None = None
-    tolerance: float | None = None
-
-
-def judge(value, rule):
-    """Return the verdict "pass", "miss" or "info" and the interval (low, high) that decided.
-
-    A value that is None, NaN or infinite misses, whatever the rule. Raises ValueError where the
-    rule is incomplete or contradicts itself.
-    """
-    low, high = accepted(rule)
-    if rule.comparator == "info":
-        return "info", (low, high)
-    inside = value is not None and math.isfinite(value) and low <= value <= high
-    return ("pass" if inside else "miss"), (low, high)
-
-
-def accepted(rule):
-    """Return the interval (low, high) of the values that pass."""
-    if rule.comparator not in COMPARATORS:
-        raise ValueError(f"unknown comparator {rule.comparator!r}; use one of {COMPARATORS}")
-    _refuse_unused(rule)
-    return _INTERVALS[rule.comparator](rule)
-
-
-def _at_most(rule):
-    return -math.inf, _end(rule, rule.factor or 1.0)
-
-
-def _at_least(rule):
-    return _end(rule, 1.0 / (rule.factor or 1.0)), math.inf
-
-
-def _end(rule, factor):
-    """Return the end of a one-sided interval: the bound, or the paper's value with slack."""
-    if rule.bound is not None:
-        return float(rule.bound)
-    if rule.paper is None:
-        raise ValueError(f"comparator {rule.comparator!r} needs paper= or bound=; neither is given")
-    if factor != 1.0 and rule.paper <= 0.0:
-        raise ValueError(f"a factor on paper = {rule.paper} widens nothing; give bound= instead")
-    return factor * rule.paper
-
-
-def _same_size(rule):
-    if not rule.paper:
-        raise ValueError(f"comparator '~' needs a paper value that is not zero, not {rule.paper}")
-    factor = rule.factor or SAME_SIZE
-    return tuple(sorted((rule.paper / factor, rule.paper * factor)))
-
-
-def _equal(rule):
-    if rule.paper is None:
-        raise ValueError("comparator '=' needs paper=; none was given")
-    tolerance = ROUND_OFF if rule.tolerance is None else rule.tolerance
-    return rule.paper - tolerance * abs(rule.paper), rule.paper + tolerance * abs(rule.paper)
-
-
-def _band(rule):
-    try:
-        low, high = rule.bound
-    except TypeError:
-        raise ValueError(f"comparator 'band' needs bound=(low, high), not {rule.bound}") from None
-    return float(low), float(high)
-
-
-_INTERVALS = {
-    "<=": _at_most, ">=": _at_least, "~": _same_size, "=": _equal, "band": _band,
-    "info": lambda rule: (-math.inf, math.inf),
-    "runs": lambda rule: (math.inf, -math.inf),
-}
-_USED = {"<=": {"bound", "factor"}, ">=": {"bound", "factor"}, "~": {"factor"},
-         "=": {"tolerance"}, "band": {"bound"}, "info": set(), "runs": set()}
-
-
-def _refuse_unused(rule):
-    for name in ("bound", "factor", "tolerance"):
-        given = getattr(rule, name)
-        if given is not None and name not in _USED[rule.comparator]:
-            raise ValueError(f"{name} = {given} means nothing to comparator {rule.comparator!r}")
-    if rule.factor is not None and rule.factor < 1.0:
-        raise ValueError(f"factor = {rule.factor}: slack is a factor >= 1, in either direction")
-    if rule.bound is not None and rule.factor is not None:
-        raise ValueError("give bound= or factor=, not both: a bound needs no factor")
-
-
-def finite_ends(interval):
-    """Return the interval as it is stored: its finite end, both of them, or None."""
-    ends = [end for end in interval if math.isfinite(end)]
-    return tuple(ends) if len(ends) == 2 else (ends[0] if ends else None)
+    scatter: float | None = None    # relative, of another run; see `recheck`
+    origin: Origin | None = None
 
 
 def write_records(path, records):
     """Write a list of `Measurement`s as readable JSON."""
-    write_whole(path, msgspec.json.format(msgspec.json.encode(records), indent=1) + b"\n")
+    write_whole(path, encoded(records))
+
+
+def encoded(records):
+    """Return the readable JSON of a list of `Measurement`s."""
+    return msgspec.json.format(msgspec.json.encode(records), indent=1) + b"\n"
 
 
 def read_records(path):
@@ -159,6 +71,30 @@ def read_records(path):
     except msgspec.DecodeError as error:
         raise ValueError(f"{path} is not a list of records: {error}; run the experiment again") \
             from error
+
+
+def sealed(records, tables):
+    """Return the records, as they are read again, with the seal of all their content and of {name:
+    bytes} of the tables.
+    """
+    first, *others = msgspec.json.decode(encoded(records), type=list[Measurement])
+    origin = first.origin or Origin()
+    seal = seal_of([first, *others], tables)
+    return [msgspec.structs.replace(first, origin=msgspec.structs.replace(origin, seal=seal)),
+            *others]
+
+
+def seal_of(records, tables):
+    """Return the hash of records, but for their seal, and of {name: bytes} of their tables."""
+    first, *others = records
+    if first.origin:
+        unsealed = msgspec.structs.replace(first.origin, seal="")
+        first = msgspec.structs.replace(first, origin=unsealed)
+    content = hashlib.sha256(msgspec.json.encode([first, *others]))
+    for name, table in sorted(tables.items()):
+        content.update(f"\n{name}\n".encode())
+        content.update(table)
+    return content.hexdigest()
 
 
 def write_whole(path, content):

@@ -1,11 +1,12 @@
 """The report: everything in ``results/<profile>/`` and every printed number, as HTML and Markdown.
 
 It is written from the result files, the papers' targets and the drawn figures alone: no experiment
-is imported and nothing is computed but ratios and counts.
+is imported and nothing is computed but verdicts, ratios and counts.
 """
 
 import base64
 import io
+import math
 import re
 from collections import Counter
 from pathlib import Path
@@ -14,15 +15,22 @@ from typing import NamedTuple
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from PIL import Image
 
+from .judge import VERDICTS
 from .record import Measurement, write_whole
 from .registry import GROUPS
 from .results import ProfileResults
+from .verdicts import VARIANTS, judged, overruled, printed_counts
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
 SHOWN_ROWS = 40          # of a table; a longer one is named and linked
 PREVIEW_WIDTH = 960      # [pixels] of a figure in report.html, which links to the drawn file
 PREVIEW_QUALITY = 45     # of its WebP compression, 0 to 100
-VERDICTS = ("pass", "miss", "info")
+STATE_NAMES = {"pass": "reproduced", "better": "better", "miss": "missed",
+               "chosen": "chosen on these runs", "info": "another machine",
+               "other": "another method or body", "absent": "not measured"}
+KINDS = ("result", "setting", "variant", "own")
+OTHERS = {"setting": "Printed settings", "variant": "Printed numbers by another method, of another "
+          "body or at another size", "own": "Our own checks"}
 PART = re.compile(r"(?:0|[^.]*[A-Za-z-]\d+)\.\d+(?![^.])|[^.]+")      # of an id; see `_words`
 
 
@@ -30,6 +38,8 @@ class ReportRow(NamedTuple):
     """One record, as the reader sees it; `key` is the paper or group for which it counts."""
 
     key: str
+    kind: str           # of KINDS
+    id: str
     what: str
     paper: str
     rule: str
@@ -38,6 +48,7 @@ class ReportRow(NamedTuple):
     verdict: str
     scale: str
     note: str
+    why: str            # of the tolerance, or of a verdict "chosen"
 
 
 class ReportTable(NamedTuple):
@@ -75,7 +86,8 @@ class Chapter(NamedTuple):
 
     key: str
     title: str
-    counts: Counter
+    printed: Counter        # of STATE_NAMES, over the printed results
+    counts: dict            # {kind: `Counter` of verdicts on the records of the other kinds}
     sections: list
     missing: list
     settings: list
@@ -84,8 +96,10 @@ class Chapter(NamedTuple):
 
 def write_report(folder, profile, targets):
     """Write report.html and report.md into `folder` and return their paths."""
-    content = {"profile": profile, "chapters": chapters(ProfileResults(folder), targets),
-               "machine": machine(ProfileResults(folder)), "verdicts": VERDICTS}
+    results = ProfileResults(folder)
+    content = {"profile": profile, "chapters": chapters(results, targets),
+               "machine": machine(results), "verdicts": VERDICTS, "states": STATE_NAMES,
+               "others": OTHERS}
     paths = []
     for name in ("report.html", "report.md"):
         text = _environment().get_template(f"{name}.jinja").render(content)
@@ -104,55 +118,48 @@ def _environment():
 
 def chapters(results, targets):
     """Return a `Chapter` per group that has results or printed numbers."""
-    figures, by_id = _figures(results.folder), printed(targets)
-    sections = [_section(results, id, figures.get(id, []), by_id)
+    figures, places = _figures(results.folder), printed(targets)
+    sections = [_section(results, id, figures.get(id, []), targets, places)
                 for id in sorted({*results.ids(), *figures})]
-    done = {r.target for id in results.ids() for r in results.records(id)}
-    every = [_chapter(key, sections, targets.values(), done) for key in GROUPS]
+    records = [r for id in results.ids() for r in results.records(id)]
+    every = [_chapter(key, sections, targets, records) for key in GROUPS]
     return [c for c in every if c.sections or c.missing or c.settings]
 
 
 def printed(targets):
-    """Return {id: (`Target`, text of its places in print, with values printed again)}."""
+    """Return {id: text of its places in print, with values printed again}."""
     repeated = {}
     for target in targets.values():
         if target.again:
             repeated.setdefault(target.again, []).append(
                 f"{target.paper_ref}: {quantity(target.value, target.unit)}")
-    return {id: (target, "; ".join([target.paper_ref, *repeated.get(id, [])]))
+    return {id: "; ".join([target.paper_ref, *repeated.get(id, [])])
             for id, target in targets.items()}
 
 
-def _chapter(key, sections, targets, done):
-    counts = Counter(row.verdict for s in sections for row in s.rows if row.key == key)
-    targets = [t for t in targets if _group(t.id) == key]
-    left = [t for t in targets if done.isdisjoint((t.id, t.again)) and not overruled(t)]
-    return Chapter(key, GROUPS[key], counts, [s for s in sections if _group(s.id) == key],
+def _chapter(key, sections, targets, records):
+    rows = [row for s in sections for row in s.rows if row.key == key]
+    counts = {kind: Counter(row.verdict for row in rows if row.kind == kind) for kind in KINDS}
+    done = {r.target for r in records}
+    of_paper = [t for t in targets.values() if _group(t.id) == key]
+    left = [t for t in of_paper if t.id not in done and not t.again and not overruled(t)]
+    return Chapter(key, GROUPS[key], printed_counts(key, records, targets), counts,
+                   [s for s in sections if _group(s.id) == key],
                    missing=[t for t in left if t.kind != "setting"],
                    settings=[t for t in left if t.kind == "setting"],
-                   overruled=sum(overruled(t) for t in targets))
+                   overruled=sum(map(overruled, of_paper)))
 
 
 def _group(id):
     return id.split(".")[0]
 
 
-def overruled(target):
-    """Return whether a ruling has replaced a printed value, which stays for the record only."""
-    return target.id.split(".")[1] == "printed"
-
-
-def _section(results, id, figures, by_id):
+def _section(results, id, figures, targets, places):
     records = results.records(id) if id in results.ids() else []
-    numbers = [r for r in records if not _is_remark(r, id)]
-    return Section(id, [r.note for r in records if _is_remark(r, id)],
-                   [_row(r, id, *by_id.get(r.target, (None, ""))) for r in numbers],
-                   [_table(results, id, name) for name in results.tables(id)], figures,
-                   provenance=_provenance(records[0]) if records else "no results")
-
-
-def _is_remark(record, id):
-    return record.target == id and record.comparator == "info"
+    remarks = [r.note for r in records if r.comparator == "remark"]
+    rows = [_row(r, id, targets, places) for r in records if r.comparator != "remark"]
+    return Section(id, remarks, rows, [_table(results, id, name) for name in results.tables(id)],
+                   figures, provenance=_provenance(records[0]) if records else "no results")
 
 
 def _provenance(record):
@@ -160,13 +167,25 @@ def _provenance(record):
             f"{record.command}")
 
 
-def _row(record, id, target, where):
-    key = _group(target.id if target else id)
-    what = f"{target.what} ({where})" if target else _words(record, id)
+def _row(record, id, targets, places):
+    one = judged(record, targets)
+    target, paper = one.target, one.target.value if one.target else record.paper
+    what = _words(record, id)
+    if target:
+        others = "".join(f"; {VARIANTS[word]}" for word in one.variants)
+        what = f"{target.what} ({places[target.id]}){others}"
     doubt = f" ({target.confidence})" if target and target.confidence != "exact" else ""
-    return ReportRow(key, what, quantity(record.paper, record.unit) + doubt, rule(record),
-               quantity(record.value, record.unit), ratio(record), record.verdict, record.scale,
-               record.note)
+    return ReportRow(_group(target.id if target else id), one.kind, record.target, what,
+                     quantity(paper, record.unit) + doubt, rule(one.interval, record.comparator),
+                     quantity(record.value, record.unit), ratio(record.value, paper), one.verdict,
+                     record.scale, record.note, _why(one, record, targets))
+
+
+def _why(one, record, targets):
+    """Return the reason of a verdict "chosen", or of the tolerance of a printed number."""
+    if one.verdict == "chosen":
+        return targets.choice(record.target)
+    return targets.why(one.target.id) if one.target else ""
 
 
 def _words(record, id):
@@ -188,21 +207,19 @@ def quantity(value, unit):
     return f"{value:.4g} {unit}".removesuffix(" 1").removesuffix(" nondim").strip()
 
 
-def rule(record):
-    """Return the accepted range as text."""
-    if isinstance(record.bound, tuple):
-        low, high = (f"{end:.4g}" for end in record.bound)
-        return f"{low} … {high}" if low != high else f"= {low}"
-    if record.bound is not None:
-        return f"{'≤' if record.comparator == '<=' else '≥'} {record.bound:.4g}"
-    return {"runs": "must run"}.get(record.comparator, "")
+def rule(interval, comparator):
+    """Return an accepted interval as text."""
+    if comparator == "runs":
+        return "must run"
+    ends = [f"{end:.4g}" for end in interval if math.isfinite(end)]
+    if len(ends) == 2:
+        return " … ".join(ends) if ends[0] != ends[1] else f"= {ends[0]}"
+    return f"{'≤' if math.isinf(interval[0]) else '≥'} {ends[0]}" if ends else ""
 
 
-def ratio(record):
+def ratio(value, paper):
     """Return ours over the paper's, where that is a number."""
-    if record.value is None or not record.paper:
-        return "—"
-    return f"{record.value / record.paper:.3g}"
+    return f"{value / paper:.3g}" if value is not None and paper else "—"
 
 
 def _table(results, id, name):
@@ -254,26 +271,13 @@ def _ends(dates):
 
 
 def status_table(results, targets):
-    """Return the table "paper, experiment, status" of results in Markdown, or a sentence."""
+    """Return the table of the printed results of each paper in Markdown, or a sentence."""
     if not results.ids():
         return "No results are published yet; `make reproduce` makes those of the quick profile."
-    lines = ["| paper | experiment | status |", "|---|---|---|"]
+    lines = [f"| paper | printed | {' | '.join(STATE_NAMES.values())} |",
+             f"|---|---:|{'---:|' * len(STATE_NAMES)}"]
     for chapter in chapters(results, targets):
-        lines += [_status_line(chapter.title, s.id, _verdict_counts(s.rows))
-                  for s in chapter.sections if s.rows]
-        if chapter.missing:
-            left = len(chapter.missing)
-            noun = "printed result" if left == 1 else "printed results"
-            lines.append(_status_line(chapter.title, "", f"not yet: {left} {noun}"))
+        if total := sum(chapter.printed.values()):
+            counts = " | ".join(str(chapter.printed[state]) for state in STATE_NAMES)
+            lines.append(f"| {chapter.title.split(':')[0]} | {total} | {counts} |")
     return "\n".join(lines)
-
-
-def _status_line(title, id, status):
-    experiment = f"`{id}`" if id else ""
-    return f"| {title.split(':')[0]} | {experiment} | {status} |"
-
-
-def _verdict_counts(rows):
-    verdicts = [row.verdict for row in rows]
-    shown = [f"{verdicts.count(v)} {v}" for v in ("pass", "miss", "info") if v in verdicts]
-    return ", ".join(shown)

@@ -42,6 +42,11 @@ class ProfileResults:
         names = (file.stem.removeprefix(f"{experiment}.") for file in files)
         return sorted(name for name in names if "." not in name)
 
+    def table_bytes(self, experiment):
+        """Return {name: content of the file} of the tables that an experiment wrote."""
+        return {name: (self.folder / f"{experiment}.{name}.csv").read_bytes()
+                for name in self.tables(experiment)}
+
     def rows(self, experiment, name):
         """A table as its list of column names and its rows of text."""
         with open(self.folder / f"{experiment}.{name}.csv", newline="") as file:

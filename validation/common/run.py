@@ -9,24 +9,17 @@ import shutil
 import time
 import traceback
 import zlib
-from collections.abc import Mapping
 from pathlib import Path
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
+from .judge import Criterion, finite_ends, judge
 from .progress import SuiteProgress
-from .provenance import provenance
-from .record import (
-    SAME_SIZE,
-    Criterion,
-    Measurement,
-    finite_ends,
-    judge,
-    write_records,
-    write_whole,
-)
+from .provenance import load_average, origin_of, provenance
+from .record import PRINTED, Measurement, sealed, write_records, write_whole
+from .targets import Targets
+from .verdicts import VARIANTS, judged, printed_id
 
 
 class RunSetting(NamedTuple):
@@ -35,7 +28,7 @@ class RunSetting(NamedTuple):
     profile: str
     folder: Path                    # where results go
     seed: int = 0
-    targets: Mapping = MappingProxyType({})     # the papers' printed numbers by id
+    targets: Targets = Targets({})  # the papers' printed numbers
     commit: str = "unknown"         # of the source that runs
     workers: int = 1                # experiments at a time
 
@@ -81,6 +74,7 @@ class Run:
         self._drafts, self._tables, self._failed = [], {}, False
         self._cache = Cache(setting.folder / ".parts" / experiment.id, setting.commit, setting.seed)
         self._wall, self._cpu = time.perf_counter(), time.process_time()
+        self._load = load_average()
 
     @property
     def folder(self):
@@ -104,33 +98,37 @@ class Run:
             raise ValueError(f"nothing was given for profile {self.profile!r}, only {by_profile}")
         return by_profile[self.profile]
 
-    def record(self, target, value, *, unit=None, scale="", note="", **rule):
+    def record(self, target, value, *, unit=None, scale="", note="", scatter=None, **rule):
         """Record a number and return its verdict.
 
         Args:
-            target: id of the number; if the papers print it, their value and unit are used.
+            target: id of the number; if a paper prints it, its unit and its rule in
+                `validation/targets` are used. By another method, or of another body, than the
+                paper's, with a word of `verdicts.VARIANTS` behind it.
             value: ours; None, NaN and infinity are recorded as misses.
-            unit: of both numbers, "1" for a ratio.
+            unit: of the number, "1" for a ratio.
             scale: the size it was run at, against the paper's.
-            note: a remark for the reader; required where a factor is widened.
-            rule: comparator, paper, bound, factor, tolerance: see `record.judge`.
+            note: a remark for the reader; required where a factor is given.
+            scatter: by how much another run may differ, relative: see `recheck`.
+            rule: of a number that is not printed: comparator, paper (the value that is expected),
+                bound, factor, tolerance: see `judge`.
         """
-        printed = self._setting.targets.get(target)
-        rule = _rule(target, rule, printed)
-        if _widened(rule) and not note:
-            raise ValueError(f"{target}: factor = {rule.factor} widens it; say why in note=")
+        printed = _printed(target, self._setting.targets, rule)
         value, remark = _number(value)
-        verdict, interval = judge(value, rule)
         self._drafts.append({
             "target": target, "value": value, "unit": _unit(target, unit, printed),
-            "paper": rule.paper, "comparator": rule.comparator, "verdict": verdict,
-            "bound": finite_ends(interval), "scale": scale,
-            "note": "; ".join(filter(None, (remark, note)))})
-        return verdict
+            "scale": scale, "note": "; ".join(filter(None, (remark, note))), "scatter": scatter,
+            **(_own_rule(target, rule, note) if printed is None else {"comparator": PRINTED})})
+        return self._verdict(self._drafts[-1])
+
+    def _verdict(self, draft):
+        """Return the verdict on a draft of a record."""
+        nowhere = dict(seconds=0.0, seed=0, command="", commit="", date="", cores=1)
+        return judged(Measurement(**draft, **nowhere), self._setting.targets).verdict
 
     def note(self, text):
         """Record a remark on the entire experiment: a record without a value, under its id."""
-        self.record(self.experiment.id, None, unit="", comparator="info", note=text)
+        self.record(self.experiment.id, None, unit="", comparator="remark", note=text)
 
     def table(self, name, columns, rows):
         """Write `<id>.<name>.csv`. Raises ValueError where a row does not fit the columns."""
@@ -148,13 +146,17 @@ class Run:
                     note=f"failed: {type(error).__name__}: {error}")
 
     def finish(self):
-        """Write records and tables, remove tables of an earlier run, and return the records."""
+        """Write records and tables, remove tables of an earlier run, and return the records.
+
+        The first record has the origin of all, and the seal.
+        """
         common = {
             "seconds": round(time.perf_counter() - self._wall, 3),
             "cpu_seconds": round(time.process_time() - self._cpu, 3),
             "seed": self.seed, "command": self._command(),
             "workers": self._setting.workers, **provenance(self._setting.commit)}
-        records = [Measurement(**draft, **common) for draft in self._drafts]
+        self._drafts[0]["origin"] = origin_of(self.experiment.function, self._load)
+        records = sealed([Measurement(**draft, **common) for draft in self._drafts], self._tables)
         self._write_tables()
         write_records(self._setting.folder / f"{self.experiment.id}.json", records)
         if not self._failed:
@@ -175,15 +177,34 @@ class Run:
             write_whole(folder / f"{id}.{name}.csv", content)
 
 
-def _rule(target, given, printed):
-    """Return the rule, completed by the printed number."""
-    if printed is None:
-        if "comparator" not in given:
-            raise ValueError(f"{target} is no printed target: comparator= must be given")
-        return Criterion(**given)
-    if given.get("paper", printed.value) != printed.value:
-        raise ValueError(f"{target}: paper = {given['paper']}, but it prints {printed.value}")
-    return Criterion(**{"comparator": printed.comparator, **given, "paper": printed.value})
+def _printed(target, targets, rule):
+    """Return the printed `Target` of an id, None where none is printed.
+
+    Raises ValueError where a rule is given for a printed number, whose rule is in
+    `validation/targets` alone, and where the number repeats another.
+    """
+    base, _ = printed_id(target, targets)
+    if base is None:
+        return None
+    if rule:
+        raise ValueError(f"{target}: {', '.join(rule)} given, but the number is printed: its rule "
+                         f"is in validation/targets/; drop it, or put one of {[*VARIANTS]} behind "
+                         "the id where the method is not the paper's")
+    if targets[base].again:
+        raise ValueError(f"{target} repeats {targets[base].again}: record that one alone")
+    return targets[base]
+
+
+def _own_rule(target, rule, note):
+    """Return the fields of a record that judge a check of our own."""
+    if "comparator" not in rule:
+        raise ValueError(f"{target} is no printed target: comparator= must be given")
+    criterion = Criterion(**rule)
+    if criterion.factor is not None and not note:
+        raise ValueError(f"{target}: factor = {criterion.factor} widens it; say why in note=")
+    _, interval = judge(0.0, criterion)
+    return {"comparator": criterion.comparator, "paper": criterion.paper,
+            "bound": finite_ends(interval)}
 
 
 def _unit(target, unit, printed):
@@ -192,10 +213,6 @@ def _unit(target, unit, printed):
     if unit not in (None, printed.unit):
         raise ValueError(f"{target}: unit {unit!r}, but the paper's number is in {printed.unit!r}")
     return printed.unit
-
-
-def _widened(rule):
-    return rule.factor is not None and rule.factor > (SAME_SIZE if rule.comparator == "~" else 1.0)
 
 
 def _number(value):
@@ -250,10 +267,11 @@ def attempt(experiment, setting, progress):
     except Exception as error:
         raised = "".join(traceback.format_exception(error))
         run.fail(error)
-    return ExperimentOutcome(experiment.id, _summary(run.finish(), raised), raised)
+    return ExperimentOutcome(experiment.id, _summary(run.finish(), setting.targets, raised), raised)
 
 
-def _summary(records, raised):
-    counts = {verdict: sum(r.verdict == verdict for r in records) for verdict in ("pass", "miss")}
-    outcome = "FAILED" if raised else "done"
-    return f"{outcome} in {records[0].seconds:.1f} s, {counts['pass']} pass, {counts['miss']} miss"
+def _summary(records, targets, raised):
+    verdicts = [judged(record, targets).verdict for record in records]
+    counts = ", ".join(f"{verdicts.count(verdict)} {verdict}"
+                       for verdict in ("pass", "better", "miss"))
+    return f"{'FAILED' if raised else 'done'} in {records[0].seconds:.1f} s, {counts}"

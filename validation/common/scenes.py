@@ -57,13 +57,7 @@ def threads_for(bodies):
         set_threads(before)
 
 
-def record_settings(run, scene, values, **tolerances):
-    """Record {target id: our value} of a scene's settings, beside those that a paper prints.
-
-    A setting agrees to round-off, or to the relative `tolerances` {id with _ for .: tolerance}
-    where the paper prints it rounded.
-    """
+def record_settings(run, scene, values):
+    """Record {target id: our value} of a scene's settings, beside those that a paper prints."""
     for target, value in values.items():
-        tolerance = tolerances.get(target.replace(".", "_"))
-        rule = {} if tolerance is None else {"tolerance": tolerance}
-        run.record(target, value, scale=f"scenes/{scene}.toml", **rule)
+        run.record(target, value, scale=f"scenes/{scene}.toml")

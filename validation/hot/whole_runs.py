@@ -17,7 +17,6 @@ from .sizes import SIZES, sized
 METHOD = "hot"
 ROWS = 500          # of the table, at most
 PATIENCE = 900      # CPU seconds of a whole run, at most, unless it is of the printed size
-BALANCE = 1e-9      # round-off of a sum over all particles and nodes, with forces that cancel
 
 
 def scene_experiment(scene, seconds, quick=None):
@@ -46,7 +45,6 @@ def record_run(run, name, scene, patience):
     run.table("steps", COLUMNS, history.steps[evenly(len(history.steps), ROWS)].tolist())
     record_end(run, name, history)
     record_cost(run, name, history)
-    record_balance(run, name, history)
 
 
 def scale_text(history):
@@ -82,16 +80,6 @@ def record_cost(run, name, history):
     run.record(f"{id}.cpu", 1e6 * cpu / (len(history.steps) * len(history.body)), unit="us",
                comparator="info", scale=scale, note=f"CPU time per particle and step; "
                f"{cpu:.0f} s in all, {history.column('solve').sum() / cpu:.0%} of it in the solves")
-
-
-def record_balance(run, name, history):
-    """Record the balances of mass, and of momentum with gravity and the conditions."""
-    id, scale, (before, after) = f"hot.scenes.{name}", scale_text(history), history.facts["mass"]
-    run.record(f"{id}.mass", after / before, unit="1", comparator="=", paper=1.0, scale=scale,
-               note="of all particles, end over start")
-    run.record(f"{id}.momentum", history.column("gap").max(), unit="1", comparator="<=",
-               bound=BALANCE, scale=scale, note="largest gap in a step between its change and the "
-               "impulses of gravity and of the conditions, relative to all momenta in it")
 
 
 sauce = scene_experiment("sauce", 20)

@@ -91,12 +91,12 @@ def record_tower(run):
     for target, value in table.items():
         run.record(target, value, scale=scale, note=notes.get(target, ""))
     for target, value in (("total", n), ("reduction", n / max(POINTS))):
-        run.record(f"{name}.remark_{target}", value, scale=scale, comparator="info",
+        run.record(f"{name}.remark_{target}", value, scale=scale,
                    note="the print contradicts its Table 2 here (LDM-X8)")
     for parameter, drawn in zip(("r", "theta", "phi"), TOWER.mu.T, strict=True):
         note = f"of {len(drawn)} draws, Latin hypercubes within the range{also.get(parameter, '')}"
-        run.record(f"{name}.{parameter}_min", drawn.min(), scale=scale, note=note, comparator=">=")
-        run.record(f"{name}.{parameter}_max", drawn.max(), scale=scale, note=note, comparator="<=")
+        run.record(f"{name}.{parameter}_min", drawn.min(), scale=scale, note=note)
+        run.record(f"{name}.{parameter}_max", drawn.max(), scale=scale, note=note)
 
 
 def tower_notes(trained):

@@ -13,7 +13,6 @@ from ..common.registry import experiment
 from ..common.weights_needed import load_available
 from ..ldm.published_bodies import keep
 from .dough import (
-    DROP,
     EVERY,
     FRAMES_PER_SECOND,
     GUESS,
@@ -61,7 +60,7 @@ def dough(run):
     rows = [row(name, frames, truth, marks) for name, frames in runs.items()]
     keep(run, **{f"{body}_{name}": x[::(len(x) - 1) // 2] for name, frames in runs.items()
                  for body, x in frames.items()})
-    record_settings(run, marks, truth["block"])
+    record_depth_speed(run, truth["block"])
     for one in rows:
         record(run, one, len(truth["star"][0]))
     run.table("errors", COLUMNS, rows)
@@ -101,15 +100,8 @@ def rms_distance(a, b):
     return float(np.sqrt(np.mean(np.sum((a - b) ** 2, axis=-1))))
 
 
-def record_settings(run, marks, x):
-    """Record the printed settings, and the speed of the true body in depth, which the prior of
-    training takes to be small.
-    """
-    scale = "synthetic"
-    run.record("nclaw.appD3.drop_height", 100.0 * DROP, scale=scale)
-    run.record("nclaw.appD3.fps", FRAMES_PER_SECOND, scale=scale)
-    run.record("nclaw.appD3.dots", len(marks.points), scale=scale, comparator="~", factor=1.1,
-               note='the text says "around 50"')
+def record_depth_speed(run, x):
+    """Record the speed of the true body in depth, which the prior of training takes to be small."""
     speed = np.diff(x[..., 2], axis=0) * FRAMES_PER_SECOND
     run.record("nclaw.dough.depth_speed", float(np.sqrt(np.mean(speed**2))), unit="m/s", **INFO,
                scale=f"{x.shape[1]} particles", note="root mean square of the true run in depth")

@@ -7,24 +7,20 @@ import numpy as np
 
 from mpm_ref.nclaw.gnn.simulator import Simulator
 
-from ..common import targets
 from ..common.scenes import with_
 from .environments import ENVIRONMENTS
 from .evaluate import ComparedError, body_maker, compare
+from .printed_ids import error_id, is_printed, overall_id, run_variants
 from .simulators import GraphNet
-from .stand_in_bodies import body_label, has_mesh
+from .stand_in_bodies import body_label
 from .tasks import TOYS, scenes
 from .trained_laws import nets
 
-PRINTED = {"jelly": "jello", "sand": "sand", "plasticine": "plasticine", "water": "water"}
 OURS = "ours"
-METHODS = ("spline", "neural", "gnn", "ours-init", "ours", "labeled", "sys-id")     # printed ones
-REPAIRED, RELEASED = ("spline", "neural"), "-released"      # the printed numbers are of the latter
 # methods that are in task (c) at standard: no seeds, no ablations
 LARGE = (OURS, "ours-init", "velocity", "admissible", "spline", "neural", "labeled", "sys-id")
 INFO = {"comparator": "info"}
 COLUMNS = ("method", "environment", "task", "draw", "error", "step", "why")
-DIGITS = 2          # of a printed error
 SHORT = 100         # steps, quick
 
 
@@ -85,42 +81,51 @@ def is_compared(run, method, task):
     return task != "geometry" or run.profile == "paper" or method in LARGE
 
 
-def record(run, table, rows, rule, tasks=()):
-    """Record the errors of a table by a rule, and over its environments mean and sample standard
-    deviation (NCLAW-overall): of Table 2 over 20 runs, since each velocity counts.
+def record(run, table, rows, tasks=()):
+    """Record the errors of a table, and over its environments mean and sample standard deviation
+    (NCLAW-overall): of Table 2 over 20 runs, since each velocity counts.
     """
     for method in dict.fromkeys(row.method for row in rows):
         mine = [row for row in rows if row.method == method]
         for (name, task), group in grouped(mine).items():
-            target = f"{table}.{method}.{PRINTED[name]}"
-            target += "" if task == "reconstruction" else f".{task}"
-            record_mean(run, target, group, nets().get(f"{name}-{method}"), **rule(target))
+            words = run_variants(run.profile == "quick", name, task) if is_printed(method) else ()
+            record_mean(run, error_id(table, method, name, task, words), group,
+                        nets().get(f"{name}-{method}"), **own_rule(method))
         if {row.environment for row in mine} == set(ENVIRONMENTS):
-            overall(run, f"{table}.{method}", mine, tasks)
+            overall(run, table, method, mine, tasks)
+
+
+def own_rule(method):
+    """Return the rule of a method's errors: none of a method in the papers' tables, whose rule
+    stands with the printed number.
+    """
+    return {} if is_printed(method) else INFO
 
 
 def record_mean(run, target, rows, net, **rule):
-    """Record the mean error of a method, whose net is given, over its runs of one task; by the
-    paper's rule or another one, but not judged where the runs are not the paper's.
-    """
+    """Record the mean error of a method, whose net is given, over its runs of one task."""
     name, task = rows[0].environment, rows[0].task
     run.record(target, np.mean([row.error for row in rows]), unit="m^2",
-               scale=scale(run, name, task), note=runs_note(rows, net),
-               **(INFO if differs_from_paper(run, name, task) else rule))
+               scale=scale(run, name, task), note=runs_note(rows, net), **rule)
 
 
-def overall(run, target, rows, asked):
-    """Record mean and sample standard deviation of errors; not judged where a task that was asked
-    for is missing.
+def overall(run, table, method, rows, asked):
+    """Record mean and sample standard deviation of errors; as partial where a task that was asked
+    for is missing, or where runs are cut short.
     """
     values, tasks = [row.error for row in rows], dict.fromkeys(row.task for row in rows)
-    differs = not {*asked} <= {*tasks} or any(
-        differs_from_paper(run, row.environment, row.task) for row in rows)
+    partial_ = run.profile == "quick" or not {*asked} <= {*tasks}
+    words = ("partial",) * (partial_ and is_printed(method))
     scale = f"{len(values)} runs: {', '.join(tasks)}{quick_note(run)}"
     deviation = np.std(values, ddof=1) if np.isfinite(values).all() else np.inf
     for name, value in (("mean", np.mean(values)), ("std", deviation)):
-        run.record(f"{target}.overall_{name}", value, unit="m^2", scale=scale,
-                   **(INFO if differs else as_printed(target)))
+        run.record(overall_id(table, method, name, words), value, unit="m^2", scale=scale,
+                   note=bodies_note(tasks), **own_rule(method))
+
+
+def bodies_note(tasks):
+    """Return the note on the bodies of task (c), where runs of it are among all."""
+    return "bodies of task (c) are stand-ins" if "geometry" in tasks else ""
 
 
 def grouped(rows):
@@ -146,34 +151,6 @@ def runs_note(rows, net):
 def corner_note(row):
     """Return the note on the error of a run that broke down."""
     return ", from where all points count as in the upper corner" if np.isfinite(row.error) else ""
-
-
-def as_printed(target):
-    """Return the rule of a record: the paper's, of a method that is in its tables; of one that is
-    repaired here, for its released reading.
-    """
-    paper, table, method, *rest = target.split(".")
-    if method.endswith(RELEASED):
-        as_it_was = ".".join((paper, table, method.removesuffix(RELEASED), *rest))
-        printed = targets.load().get(as_it_was)
-        return {"paper": printed.value, "comparator": printed.comparator} if printed else INFO
-    return {} if method in METHODS and method not in REPAIRED else INFO
-
-
-def to_the_digits(target):
-    """Return the rule of a record that must be the printed number as far as that goes."""
-    return {"comparator": "band", "bound": rounded_to(targets.load()[target].value)}
-
-
-def rounded_to(value):
-    """Return the interval that is rounded to a number of `DIGITS` digits."""
-    half = 0.5 * 10.0 ** (np.floor(np.log10(value)) + 1 - DIGITS)
-    return float(value - half), float(value + half)
-
-
-def differs_from_paper(run, name, task):
-    """Return whether runs are not the paper's: cut short, or of a body that stands for another."""
-    return run.profile == "quick" or (task == "geometry" and not has_mesh(TOYS[name].name))
 
 
 def scale(run, name, task):

@@ -12,8 +12,9 @@ from ..common.registry import experiment
 from ..common.scenes import threads_for, with_
 from ..common.weights_needed import load_available
 from .environments import ENVIRONMENTS, environment
-from .errors import PRINTED, run_of_laws
+from .errors import run_of_laws
 from .evaluate import frames
+from .printed_ids import PRINTED, extended
 from .simulators import GraphNet
 from .trained_laws import nets, trained, weights_of
 
@@ -84,7 +85,8 @@ def record(run, key, times, steps):
     notes = [NOTE.format(len(times[word])), net.description if isinstance(net, GraphNet) else "",
              "" if np.isfinite(wall) else LOST]
     target, rule = f"nclaw.table3.{word}.{PRINTED[name]}", {"comparator": "info", "scale": scale}
-    run.record(target, wall, note="; ".join(filter(None, notes)), **rule)
+    run.record(extended(target, ("narrow",) * isinstance(net, GraphNet)), wall, scale=scale,
+               note="; ".join(filter(None, notes)))
     run.record(f"{target}.cpu", cpu / (1000 * steps), unit="s",
                note="CPU time of a step, per particle", **rule)
     run.record(f"{target}.over_true", cpu / np.median(times[TRUE], axis=0)[1], unit="1",

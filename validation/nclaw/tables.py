@@ -1,13 +1,11 @@
 """Errors of NCLaw's laws: on the run they are trained on (Table 1), and on others (Table 2); of
 graph networks of 1, 10 and 100 runs (Table 6).
 
-Tables 4 and 7 have errors of one environment, which Tables 1 and 2 have too: they are recorded with
-those, from the same runs. Table 4 is of plasticine ("more recent comparison"). Table 7 (water,
-"auxiliary loss") has laws that were trained without and with a term of velocities in the loss,
-whose weight is not printed; the errors are those of positions.
+Tables 4 and 7 have errors of one environment. Those of Table 4 (plasticine, "more recent
+comparison") and of the first column of Table 7 (water, "auxiliary loss") repeat Tables 1 and 2. The
+second column is of laws that were trained with a term of velocities in the loss, whose weight is
+not printed; the errors are those of positions.
 """
-
-from typing import NamedTuple
 
 from ..common.registry import experiment
 from ..common.weights_needed import load_available
@@ -15,36 +13,25 @@ from .environments import ENVIRONMENTS
 from .errors import (
     COLUMNS,
     OURS,
-    RELEASED,
-    as_printed,
     errors,
     grouped,
     record,
     record_mean,
-    to_the_digits,
 )
 from .initial_laws import untrained
+from .printed_ids import RELEASED, error_id, extended, run_variants
 from .simulators import COUNTS, named
 from .stand_in_bodies import has_mesh
 from .tasks import TOYS
-from .trained_laws import nets, trained
+from .trained_laws import diverged, identity, nets, trained
 
 INIT = "ours-init"
 AWAY = ("time", "velocity", "geometry")     # tasks of Table 2
 NOT_RUN = "Table 4: the simulator of Li & Farimani (2022) is another paper's and is not run"
 WATER = "water"
 TRAJECTORIES = {named(WATER, count): f"gnn.{count}" for count in COUNTS} | {WATER: "ours.1"}
-
-
-class Excerpt(NamedTuple):
-    """A table of one environment."""
-
-    environment: str
-    methods: dict       # column -> method
-
-
-EXCERPTS = {"nclaw.table4": Excerpt("plasticine", {"ours": OURS, "gnn": "gnn"}),
-            "nclaw.table7": Excerpt("water", {"without": OURS, "with": "velocity"})}
+REPEATED = "gnn.1", "ours.1"                # of Table 6: errors of Table 2
+VELOCITY_TERM = "velocity"                  # the laws of Table 7, "with"
 
 
 @experiment("nclaw.init", title="NCLaw: laws before training",
@@ -62,19 +49,16 @@ def init(run):
         with_mesh = {name: law for name, law in laws.items() if has_mesh(TOYS[name].name)}
         rows += errors(run, {INIT: with_mesh}, ("geometry",), goes_on=True)
     first = [row for row in rows if row.task == "reconstruction"]
-    record(run, "nclaw.table1", first, to_the_digits)
+    record(run, "nclaw.table1", first)
     if run.profile == "standard":
-        record(run, "nclaw.table2", [row for row in rows if row not in first], to_the_digits,
-               AWAY)
+        record(run, "nclaw.table2", [row for row in rows if row not in first], AWAY)
     run.table("errors", COLUMNS, rows)
 
 
 @experiment("nclaw.table1", title="NCLaw: reconstruction",
             profiles=("quick", "standard"), budget={"quick": 20, "standard": 60})
 def table1(run):
-    """All trained methods, compared with one true run of each environment. Tables 4 and 7 have
-    some of these errors, and some of Table 2's (see `EXCERPTS`).
-    """
+    """All trained methods, compared with one true run of each environment."""
     rows = contest(run, ("reconstruction",))
     ours = [row.error for row in rows if row.method == OURS]
     if run.profile == "standard" and len(ours) == len(ENVIRONMENTS):
@@ -102,9 +86,22 @@ def released(run):
     laws = available_laws(run, names_of(as_released=True))
     rows = errors(run, laws, tasks) if laws else []
     first = [row for row in rows if row.task == "reconstruction"]
-    record(run, "nclaw.table1", first, as_printed)
-    record(run, "nclaw.table2", [row for row in rows if row not in first], as_printed, AWAY)
+    record(run, "nclaw.table1", first)
+    record(run, "nclaw.table2", [row for row in rows if row not in first], AWAY)
+    record_diverged(run, tasks)
     run.table("errors", COLUMNS, rows)
+
+
+def record_diverged(run, tasks):
+    """Record a miss for each printed error of a reading as released whose training diverged."""
+    for name in names_of(as_released=True):
+        net = nets()[name]
+        about = diverged(name, identity(net))
+        for task in tasks if about else ():
+            table = "nclaw.table1" if task == "reconstruction" else "nclaw.table2"
+            words = run_variants(run.profile == "quick", net.environment, task)
+            run.record(error_id(table, method_of(name, net), net.environment, task, words), None,
+                       note=f"the training diverged: {about['stopped']}")
 
 
 @experiment("nclaw.table6", title="NCLaw: graph networks of more and more runs",
@@ -114,12 +111,12 @@ def table6(run):
     models = load_available(run, TRAJECTORIES, trained)
     rows = errors(run, {TRAJECTORIES[name]: {WATER: laws} for name, laws in models.items()},
                   ("velocity",))
+    short = ("partial",) * (run.profile == "quick")
     for name in models:
         method = TRAJECTORIES[name]
-        mine = [row for row in rows if row.method == method]
-        record_mean(run, f"nclaw.table6.{method}.loss", mine, nets()[name])
-        run.record(f"nclaw.table6.{method}.trajectories", int(method.split(".")[1]), unit="1",
-                   scale=f"weights {name}.npz")
+        if method not in REPEATED:
+            record_mean(run, extended(f"nclaw.table6.{method}.loss", ("narrow", *short)),
+                        [row for row in rows if row.method == method], nets()[name])
     run.table("errors", COLUMNS, rows)
 
 
@@ -127,20 +124,19 @@ def contest(run, tasks):
     """Record the errors of all methods, and which are not trained yet; return their `ErrorRow`s."""
     laws = available_laws(run, names_of(as_released=False))
     rows = errors(run, laws, tasks) if laws else []
-    record(run, run.experiment.id, rows, as_printed, tasks)
-    record_excerpts(run, rows)
+    record(run, run.experiment.id, rows, tasks)
+    record_velocity_term(run, rows)
     run.table("errors", COLUMNS, rows)
     return rows
 
 
-def record_excerpts(run, rows):
-    """Record the errors that EXCERPTS have, from the `ErrorRow`s of all methods."""
-    for table, (environment, methods) in EXCERPTS.items():
-        for column, method in methods.items():
-            mine = [row for row in rows if (row.environment, row.method) == (environment, method)]
-            for (_, task), group in grouped(mine).items():
-                record_mean(run, f"{table}.{task}.{column}", group,
-                            nets().get(f"{environment}-{method}"))
+def record_velocity_term(run, rows):
+    """Record the errors of Table 7 that Tables 1 and 2 have not, from the rows of all methods."""
+    mine = [row for row in rows if (row.environment, row.method) == (WATER, VELOCITY_TERM)]
+    for (name, task), group in grouped(mine).items():
+        words = run_variants(run.profile == "quick", name, task)
+        record_mean(run, extended(f"nclaw.table7.{task}.with", words), group,
+                    nets().get(f"{WATER}-{VELOCITY_TERM}"))
 
 
 def names_of(as_released):

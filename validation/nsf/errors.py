@@ -17,6 +17,7 @@ from .studies import jelly, sand
 
 ORIGIN = "from the corner of the unit box that scenes stand in"
 MODAL = "fields of modes, no networks"
+MODES = "modes"         # behind the ids of printed numbers, which are of networks
 DRAWS, FEW = 10, 3      # of samples; at the printed resolution
 ENDS = (23.0, 36.5)     # angles of friction [degrees] that are tested at quick, and whose states
                         # are kept
@@ -32,10 +33,6 @@ def cube(run):
     """
     one = fit_study(jelly(run.choose(quick=2, standard=1)))
     rows = record_study(run, "nsf.jelly", one, range(run.choose(quick=1, standard=DRAWS)))
-    run.record("nsf.jelly.samples", one.study.samples, scale=one.scale)
-    run.record("nsf.jelly.r", one.study.sizes.r, scale=one.scale)
-    if run.profile == "standard":
-        run.record("nsf.jelly.particles", len(one.runs.X), scale=one.scale)
     rows += record_without_affine(run, "nsf.jelly", one) + record_map_alone(run, "nsf.jelly", one)
     keep_states(run, one, one.study.test, ("map",))
     run.table("errors", COLUMNS, rows)
@@ -52,8 +49,6 @@ def column(run):
                        standard=partial(sand, 2), paper=sand)
     one = fit_study(study())
     rows = record_study(run, "nsf.sand", one, range(run.choose(quick=1, standard=DRAWS, paper=FEW)))
-    run.record("nsf.sand.samples", one.study.samples, scale=one.scale)
-    run.record("nsf.sand.r", one.study.sizes.r, scale=one.scale)
     rows += record_without_affine(run, "nsf.sand", one)
     fewer = refit(one, one.study.sizes._replace(r=3, smoothing=1e-4), follows=True)
     rows += record_variant(run, "nsf.sand.r3", fewer, "r3",
@@ -68,7 +63,7 @@ def column(run):
 def record_study(run, name, one, draws):
     """Record the errors of a study; return the rows of all runs."""
     few = error_rows(one, "modal", one.study.samples, draws)
-    record_mean(run, f"{name}.error", few, one.scale, f"{one.study.samples} samples")
+    record_mean(run, f"{name}.error.{MODES}", few, one.scale, f"{one.study.samples} samples")
     record_nearest(run, name, one)
     few += record_cubature(run, f"{name}.cubature", one, one.study.samples, draws)
     return few + record_all_samples(run, name, one) + record_longer_steps(run, name, one)
@@ -116,8 +111,8 @@ def record_without_affine(run, name, one):
 def record_map_alone(run, name, one):
     """Record the errors of the model of the map alone, which the paper compares with."""
     rows = error_rows(one._replace(map_alone=True), "map-alone", one.study.samples, (0,))
-    record_mean(run, f"{name}.baseline_error", rows, one.scale,
-                "stress of the map's gradient, no affine " "field (NSF-X12)")
+    record_mean(run, f"{name}.baseline_error.{MODES}", rows, one.scale,
+                "stress of the map's gradient, no affine field (NSF-X12)")
     return rows
 
 

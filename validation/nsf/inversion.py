@@ -7,6 +7,7 @@ import numpy as np
 from mpm_ref.rom.projection import INVERSIONS
 
 from ..common.registry import experiment
+from .errors import MODES
 from .reduced_runs import FASTER, fit_study
 from .studies import jelly, metal
 
@@ -69,6 +70,6 @@ def record_iterations(run, rows, scale):
     printed = [one for one in entries if (one["inversion"], one["faster"]) == (GAUSS_NEWTON, 1.0)]
     medians, most = [one["median"] for one in printed], max(one["most"] for one in printed)
     for word, value in (("lo", min(medians)), ("hi", max(medians))):
-        run.record(f"nsf.sec5_3.gn_{word}", value, unit="1", scale=scale,
+        run.record(f"nsf.sec5_3.gn_{word}.{MODES}", value, unit="1", scale=scale,
                    note="median of a run's steps, until nothing but round-off is left to gain; the "
                         f"most in any step {most:g}")

@@ -5,6 +5,7 @@
 from ..common.registry import experiment
 from .errors import (
     COLUMNS,
+    MODES,
     error_rows,
     mean,
     record_all_samples,
@@ -60,9 +61,10 @@ def cut(run):
     """Errors with 700 samples in the middle, and 400 in the second half (section 6.1)."""
     one = prepared(run, cake, train=5)
     rows = error_rows(one, "modal", one.study.samples, draws(run))
-    record_mean(run, "nsf.cake.error", rows, one.scale, "700, then 400 samples in the middle")
+    record_mean(run, f"nsf.cake.error.{MODES}", rows, one.scale,
+                "700, then 400 samples in the middle")
     printed_size = run.profile == "paper"
-    run.record("nsf.cake.integration_particles" if printed_size else "nsf.cake.points",
+    run.record(f"nsf.cake.integration_particles.{MODES}" if printed_size else "nsf.cake.points",
                mean(rows, "points"), scale=one.scale, **({} if printed_size
                                                          else {"comparator": "info"}))
     rows += record_cubature(run, "nsf.cake.cubature", one, one.study.samples, draws(run))
@@ -89,7 +91,7 @@ def record_counts(run, name, one, counts):
     rows = []
     for count in run.choose(quick=counts[:1], standard=counts, paper=counts):
         drawn = error_rows(one, "modal", count, draws(run))
-        record_mean(run, f"{name}.error.{count}", drawn, one.scale, f"{count} samples")
+        record_mean(run, f"{name}.error.{count}.{MODES}", drawn, one.scale, f"{count} samples")
         rows += drawn + record_cubature(run, f"{name}.cubature.{count}", one, count, draws(run))
     rows += record_all_samples(run, name, one) + record_variants(run, name, one)
     run.table("errors", COLUMNS, rows)
@@ -99,7 +101,7 @@ def record_with_map_alone(run, name, one):
     """Record the errors of a study, and those of the map alone."""
     study = one.study
     few = error_rows(one, "modal", study.samples, draws(run))
-    record_mean(run, f"{name}.error", few, one.scale, f"{study.samples} samples")
+    record_mean(run, f"{name}.error.{MODES}", few, one.scale, f"{study.samples} samples")
     few += record_cubature(run, f"{name}.cubature", one, study.samples, draws(run))
     rows = few + record_all_samples(run, name, one) + record_map_alone(run, name, one)
     keep_states(run, one, study.test[1:2] or study.test, ("map",))
@@ -107,9 +109,8 @@ def record_with_map_alone(run, name, one):
 
 
 def record_variants(run, name, one):
-    """Record the latent dimension, errors without the affine field and with longer steps, and those
-    of the nearest states and training run; return the rows of the runs.
+    """Record errors without the affine field and with longer steps, and those of the nearest states
+    and training run; return the rows of the runs.
     """
-    run.record(f"{name}.r", one.study.sizes.r, scale=one.scale)
     record_nearest(run, name, one)
     return record_longer_steps(run, name, one) + record_without_affine(run, name, one)

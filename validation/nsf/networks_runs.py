@@ -20,6 +20,7 @@ from .reduced_runs import fit_study
 DIM, DRAWS = 3, 3
 OUTPUTS = {"g": 3, "h": 6, "l": 9}
 WEIGHTED = "samples with weights"
+PRINTED = {"metal": "error.50", "toothpaste": "error.50"}       # of the others: "error"
 TRAINED = {"fields": "trained networks", "comparator": "info"}
 
 
@@ -89,6 +90,20 @@ def scale_of(net, one):
     return f"{one.size}, {widths}{features_note(net.octaves)}, seed {net.seed}"
 
 
+def printed_error(name, target):
+    """Return the id of the printed error of networks with features; of those without, with a word
+    behind it; of other seeds and widths, an id of our own.
+    """
+    scene, _, kind = name.partition("-")
+    printed = f"nsf.{scene}.{PRINTED.get(scene, 'error')}"
+    return {"waves": printed, "": f"{printed}.plain"}.get(kind, target)
+
+
+def own_rule(name):
+    """Return the rule of the error of networks that no printed number stands for."""
+    return {} if name.partition("-")[2] in ("", "waves") else {"comparator": "info"}
+
+
 def record_scene(run, name, one, scale):
     """Record the errors of a scene's reduced runs; return their rows."""
     target, few = f"nsf.networks.{name}", one.study.samples
@@ -97,15 +112,17 @@ def record_scene(run, name, one, scale):
          for row in error_rows(one, name, count, (draw,), weighted=words == WEIGHTED)]
         for words, count, draws in (("samples", few, DRAWS), (WEIGHTED, few, DRAWS),
                                     ("all particles", len(one.fields.X), 1)))
+    record_mean(run, printed_error(name, target), drawn, scale, f"{few} samples",
+                fields=TRAINED["fields"], **own_rule(name))
     for word, rows, note in (
-            ("", drawn, f"{few} samples"),
             (".cubature", weighted, f"at most {few} samples with weights by cubature of modes of "
              f"the same runs; {weights_note(weighted)}"),
             (".all", every, "all particles are samples")):
         record_mean(run, f"{target}{word}", rows, scale, note, **TRAINED)
+    for word, rows in (("", drawn), (".cubature", weighted), (".all", every)):
         run.record(f"{target}{word}.stress", 100.0 * mean(rows, "stress"), unit="%",
                    comparator="info", scale=scale,
-                   note=f"{note}; of the Kirchhoff stress, all particles and times")
+                   note="of the Kirchhoff stress, all particles and times")
     nearest = [one.nearest_state_errors(value) for value in run.progress(one.study.test,
                                                                          f"{name}, nearest")]
     record_errors(run, f"{target}.nearest", PositionErrors(*np.mean(nearest, axis=0)), scale,

@@ -5,17 +5,14 @@ and E (NSF-X1 to NSF-X18), compared with those of this code.
 from mpm_ref.rom.fields import architecture
 from mpm_ref.rom.study.full_model import nsf_full_model
 from mpm_ref.rom.study.run import step_count
-from mpm_ref.rom.train.schedule import PRINTED
 from mpm_ref.scene import build
 
-from ..common import targets
 from ..common.registry import experiment
 from ..common.scenes import catalogue_scene, record_settings
 from .reduced_runs import FASTER
 from .studies import ball, bread, cake, jelly, metal, sand, toothpaste
 from .unseen_runs import ANGLES
 
-ROUNDED = 0.01      # dx = 1/150 and 1/160 are printed with two digits, 0.0067 and 0.0063
 PARTICLES = {       # where the scene has the printed number
     "bread": ("table1.bread.particles", "bread.particles"),
     "cake": ("table1.cake.particles", "cake.particles"),
@@ -47,16 +44,14 @@ def settings(run):
     """Settings of the scenes nsf_*.toml, of the studies of them, and of the networks."""
     for name in STUDIES:
         scene = catalogue_scene(f"nsf_{name}")
-        dx = f"nsf.table1.{name}.dx"
-        record_settings(run, f"nsf_{name}", printed_settings(name, scene),
-                        **{dx.replace(".", "_"): ROUNDED})
+        record_settings(run, f"nsf_{name}", printed_settings(name, scene))
         if name in STAND_INS:
             target, note = STAND_INS[name]
             run.record(f"nsf.{target}", particles(scene), scale=f"scenes/nsf_{name}.toml",
                        note=note)
     for values, scale in ((studied_settings(),
                            "studies of the standard profile at the printed resolution"),
-                          (network_settings(), "rom/architecture.py, rom/train/schedule.py")):
+                          (network_settings(), "mpm_ref/rom/fields/architecture.py")):
         for target, value in values.items():
             run.record(target, value, scale=scale)
 
@@ -117,17 +112,14 @@ def study_settings(name, study):
 
 
 def network_settings():
-    """Return {target id: our value} of the networks' sizes and the learning rates."""
-    numbers = targets.load()
-    values = {f"appD.lr.{k}": rate for k, rate in enumerate(PRINTED)}
-    values |= {"appE.hidden_layers": architecture.DEPTH, "appE.enc_kernel": architecture.KERNEL,
-               "appE.enc_stride": architecture.NSF_STRIDE,
-               "appE.enc_channels": architecture.NSF_ROWS,
-               "appE.enc_stop": architecture.NSF_LONGEST, "appE.enc_fc": architecture.FEATURES}
-    for network, outputs in OUTPUTS.items():
-        values[f"appE.{network}.out"] = outputs
-        for name in STUDIES:
-            target = f"table1.{name}.mlp.{network}"
-            layers = architecture.hidden(int(numbers[f"nsf.{target}.beta"].value), outputs)
-            values |= {f"{target}.layers": len(layers), f"{target}.width": layers[0]}
+    """Return {target id: our value} of the networks' architecture.
+
+    The printed widths and learning rates are not here: no network of that width is trained, and
+    none by that schedule.
+    """
+    values = {"appE.hidden_layers": architecture.DEPTH, "appE.enc_kernel": architecture.KERNEL,
+              "appE.enc_stride": architecture.NSF_STRIDE,
+              "appE.enc_channels": architecture.NSF_ROWS,
+              "appE.enc_stop": architecture.NSF_LONGEST, "appE.enc_fc": architecture.FEATURES}
+    values |= {f"appE.{network}.out": outputs for network, outputs in OUTPUTS.items()}
     return {f"nsf.{target}": value for target, value in values.items()}

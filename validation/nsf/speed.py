@@ -20,6 +20,7 @@ from mpm_ref.simulate import simulate
 
 from ..common.registry import experiment
 from ..common.scenes import with_
+from .errors import MODES
 from .reduced_runs import FASTER, fit_study
 from .studies import cake, metal, sand
 
@@ -137,20 +138,18 @@ def reduced_steps(one, count, inversion, steps):
 def record_times(run, name, one, rows, steps):
     """Record speed-ups, shares and times of a scene's rows; the printed ones are of the first."""
     scale = f"{len(one.fields.X)} particles, {steps} steps, the first of a run"
-    printed = run.choose(quick=INFO, standard={})
     (_, count, _, points, full, deform, *stages, reduced), n = rows[0], len(one.fields.X)
     note = f"{count} samples, Gauss-Newton; median of {REPEATS}"
-    for target, value, rule in (
-            (f"nsf.appC.{name}.speedup_per_step", full / reduced, printed),
-            (f"nsf.{name}.speedup", FASTER * full / reduced, printed)):
-        run.record(target, value, unit="x", scale=scale, note=note, **rule)
-    for target, value in (("full", 100.0 * full), ("reduced_mpm", 100.0 * stages[2]),
-                          ("network", 100.0 * (reduced - stages[2]))):
+    for target, value in ((f"nsf.appC.{name}.speedup_per_step", full / reduced),
+                          (f"nsf.{name}.speedup", FASTER * full / reduced)):
+        run.record(f"{target}.{MODES}", value, unit="x", scale=scale, note=note)
+    for target, value in (("full", 100.0 * full), (f"reduced_mpm.{MODES}", 100.0 * stages[2]),
+                          (f"network.{MODES}", 100.0 * (reduced - stages[2]))):
         run.record(f"nsf.appC.{name}.{target}", value, unit="s/100 frames", scale=scale,
-                   note=f"{note}; printed: a graphics processor", **INFO)
+                   note=f"{note}; printed: a graphics processor")
     for target, value in (("particle_share", points / n), ("runtime_share", stages[2] / full)):
-        run.record(f"nsf.appC.{name}.{target}", 100.0 * value, unit="%", scale=scale, note=note,
-                   **INFO)
+        run.record(f"nsf.appC.{name}.{target}.{MODES}", 100.0 * value, unit="%", scale=scale,
+                   note=note)
     run.record(f"nsf.speed.{name}.deform", 100.0 * deform / full, unit="%", scale=scale, **INFO,
                note="of the full-order step: singular values, return map and stress, which a "
                     "reduced run skips")
@@ -162,16 +161,16 @@ def record_times(run, name, one, rows, steps):
 
 def record_bytes(run, name, one):
     """Record the bytes of the fields, and of the particles of a full-order run; those printed are
-    of programs on a graphics processor, whose parts are not given, and do not judge ours.
+    of programs on a graphics processor, whose parts are not given.
     """
     fields, problem = one.fields, nsf_full_model(one.study.run(one.study.test[0])).problem
     field_bytes = sum(a.nbytes for a in (fields.X, fields.U, fields.tau.modes, fields.C.modes))
     particle_bytes = sum(a.nbytes for body in problem.bodies for a in body.particles)
     scale = f"{len(fields.X)} particles"
     for word, target, value, note in (
-            ("fields", "mem_reduced", field_bytes, "positions and modes; of doubles"),
+            ("fields", f"mem_reduced.{MODES}", field_bytes, "positions and modes; of doubles"),
             ("particles", "mem_full", particle_bytes, "of a full-order run, without the grid")):
         run.record(f"nsf.speed.{name}.bytes.{word}", value, unit="B", note=note, scale=scale,
                    **INFO)
         run.record(f"nsf.{name}.{target}", value / 1e9, unit="GB", scale=scale,
-                   note=f"{note}; printed: of a program on a graphics processor", **INFO)
+                   note=f"{note}; printed: of a program on a graphics processor")

@@ -17,7 +17,7 @@ from mpm_ref.rom.study.run import FieldRunOptions, nsf_run
 
 from ..common.registry import experiment
 from ..common.scenes import with_
-from .errors import COLUMNS, error_rows, mean, record_mean
+from .errors import COLUMNS, MODES, error_rows, mean, record_mean
 from .reduced_runs import fit_study
 from .states import keep_runs, keep_states
 from .studies import bread, sand
@@ -44,8 +44,7 @@ def weak(run):
             test = simulated(one, shifted(one.study.run(E), scale, seed))
             last_draws[name] = one._replace(tests={E: test}), E
             new += error_rows(last_draws[name][0], name, one.study.samples, (seed,))
-        run.record(f"nsf.appB.bread.{name}.perturb", 100.0 * scale, unit="%", scale=one.scale)
-        record_mean(run, f"nsf.appB.bread.{name}.error", new, one.scale,
+        record_mean(run, f"nsf.appB.bread.{name}.error.{MODES}", new, one.scale,
                     f"weak boxes shifted by {100 * scale:g} % of the slice's width at most, "
                     f"E = {E:g}")
         rows += new
@@ -67,7 +66,7 @@ def steep(run):
     errors = error_rows(one, "steep", one.study.samples, draws)
     by_angle = {value: [row for row in errors if row[1] == value] for value in ANGLES}
     last = 100.0 * one.nearest_run_errors(ANGLES[0]).origin
-    record_mean(run, "nsf.appB.sand.extrap_error", by_angle[44.0], one.scale,
+    record_mean(run, f"nsf.appB.sand.extrap_error.{MODES}", by_angle[44.0], one.scale,
                 f"44 degrees; the steepest training run, taken as it is: {last:.3g} %")
     record_mean(run, "nsf.fig17.55", by_angle[55.0], one.scale,
                 "55 degrees; the paper shows that it fails", comparator="info")

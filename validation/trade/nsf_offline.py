@@ -94,7 +94,7 @@ def record_trainings(run):
     for word, end in (("lo", min), ("hi", max)):
         name = end(hours, key=hours.get, default=None)
         if name is not None:
-            run.record(f"nsf.sec7.train_time_{word}", hours[name], unit="h", comparator="info",
+            run.record(f"nsf.sec7.train_time_{word}", hours[name], unit="h",
                        note=f"{name}, CPU hours stored with its weights; printed: hours of wider "
                             "networks on a graphics processor")
 

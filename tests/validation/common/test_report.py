@@ -13,8 +13,9 @@ from figures.frame import Drawn, draw_all
 from validation import ProfileResults
 from validation.common.registry import Experiment
 from validation.common.report import chapters, preview, status_table, write_report
+from validation.common.results import RESULTS, ROOT
 from validation.common.run import RunSetting, run_all
-from validation.common.targets import Target, load
+from validation.common.targets import Target, Targets, load
 
 
 def target(id, kind="error", **fields):
@@ -23,10 +24,10 @@ def target(id, kind="error", **fields):
                   **fields)
 
 
-TARGETS = {t.id: t for t in (
+TARGETS = Targets({t.id: t for t in (
     target("nsf.table1.bread"), target("nsf.table1.cake", confidence="ocr-uncertain"),
     target("nsf.table1.jelly", what="a <b> & c | d"), target("nsf.table1.dt", kind="setting"),
-    target("nsf.printed.dt", kind="setting"))}
+    target("nsf.printed.dt", kind="setting"))})
 
 FIGURE = '''"""Error of the {name} over cells."""
 
@@ -46,6 +47,7 @@ def draw(results):
 def bread(run):
     run.record("nsf.table1.bread", 1.0, scale="1/10 of the particles")
     run.record("nsf.table1.cake", 3.4567, note="the coarse grid <locks>")
+    run.record("nsf.table1.jelly.modes", 1.0)
     run.record("nsf.bread.own_number", 7.0, comparator="band", bound=(6, 8), unit="m")
     run.table("errors", ["n", "error"], [(16, 1e-3), (32, 2.5e-4)])
 
@@ -71,19 +73,22 @@ def text(folder, name, targets=TARGETS):
 
 def test_chapter_counts(folder):
     chapter, = chapters(ProfileResults(folder), TARGETS)
-    assert chapter.counts == {"pass": 2, "miss": 1}
+    assert chapter.printed == {"pass": 1, "miss": 1, "other": 1}
+    assert chapter.counts == {"result": {"pass": 1, "miss": 1}, "setting": {},
+                              "variant": {"pass": 1}, "own": {"pass": 1}}
     assert [t.id for t in chapter.missing] == ["nsf.table1.jelly"]
     assert [t.id for t in chapter.settings] == ["nsf.table1.dt"]
     assert chapter.overruled == 1
 
 
 def test_a_number_that_repeats_another_is_told_beside_it(folder):
-    """And is not missing, unless that one is."""
+    """And neither counts nor is missing."""
     more = {t.id: t for t in (
         target("nsf.bread.again", again="nsf.table1.bread"), target("nsf.jelly.again",
                                                                     again="nsf.table1.jelly"))}
-    chapter, = chapters(ProfileResults(folder), TARGETS | more)
-    assert [t.id for t in chapter.missing] == ["nsf.table1.jelly", "nsf.jelly.again"]
+    chapter, = chapters(ProfileResults(folder), Targets({**TARGETS, **more}))
+    assert chapter.printed == {"pass": 1, "miss": 1, "other": 1}
+    assert [t.id for t in chapter.missing] == ["nsf.table1.jelly"]
     words = [row.what for section in chapter.sections for row in section.rows]
     assert "the bread (Table 1; Table 1: 1.2 %)" in words
     assert "the cake (Table 1)" in words
@@ -97,7 +102,7 @@ def test_printed_number_counts_for_its_paper(tmp_path):
     setting = RunSetting("quick", tmp_path, targets=TARGETS)
     run_all([Experiment("trade.other", "Cost", ("quick",), {}, other)], setting)
     trade, nsf = chapters(ProfileResults(tmp_path), TARGETS)
-    assert (trade.counts, nsf.counts) == ({"info": 1}, {"pass": 1})
+    assert (trade.counts["own"], nsf.counts["result"]) == ({"info": 1}, {"pass": 1})
     assert "nsf.table1.bread" not in [t.id for t in nsf.missing]
 
 
@@ -109,8 +114,10 @@ def test_markdown_has_the_rows(folder):
     assert doubtful in said
     assert "| own number | —; 6 … 8 | 7 m | — | pass |  |" in said
     assert "- the cake (Table 1), miss: the coarse grid <locks>" in said
-    assert "[NSF: neural stress fields](#nsf) | 2 | 1 | 0 | 1 | 1 |" in said
-    assert "Results not reproduced yet: 1" in said
+    assert "[NSF: neural stress fields](#nsf) | 3 | 1 | 0 | 1 | 0 | 0 | 1 | 0 |" in said
+    assert "\n| NSF: neural stress fields | 0 | 0 | 0 | 0 | 0 | 1 |\n" in said
+    assert "Printed results that no record of the paper's own method has: 1" in said
+    assert "(Table 1); fields of modes in place of the paper's networks | 1.2 %" in said
     assert "a <b> & c \\| d" in said
     assert "Bread of NSF" in said
 
@@ -136,7 +143,7 @@ def test_words_of_an_id_are_parted_at_dots_but_not_at_decimal_points(tmp_path, t
         run.record(target, 1.0, comparator="info")
 
     run_all([Experiment("hot.map", "", ("quick",), {}, numbers)], RunSetting("quick", tmp_path))
-    section, = chapters(ProfileResults(tmp_path), {})[0].sections
+    section, = chapters(ProfileResults(tmp_path), Targets({}))[0].sections
     assert [row.what for row in section.rows] == [said]
 
 
@@ -153,7 +160,7 @@ def test_long_table_is_linked_not_shown(folder):
 def test_report_without_results_lists_what_is_missing(tmp_path):
     said = text(tmp_path / "quick", "report.md", load())
     assert "0 experiments" in said
-    assert said.count("Results not reproduced yet") == 5
+    assert said.count("no record of the paper's own method has") == 5
 
 
 @pytest.fixture
@@ -191,7 +198,7 @@ def test_rows_carry_what_the_filter_reads(folder):
     page = text(folder, "report.html")
     assert '<div class="chapter" data-group="nsf">' in page
     assert '<option value="nsf">NSF</option>' in page
-    assert Counter(re.findall(r'<tr data-verdict="(\w+)">', page)) == {"pass": 2, "miss": 1}
+    assert Counter(re.findall(r'<tr data-verdict="(\w+)">', page)) == {"pass": 3, "miss": 1}
     assert '<a href="#nsf.bread">nsf.bread</a>' in page
 
 
@@ -238,4 +245,16 @@ def test_unknown_figure_is_refused(folder, scripts):
 
 def test_status_table(folder):
     assert status_table(ProfileResults(folder), TARGETS).splitlines()[2:] == [
-        "| NSF | `nsf.bread` | 2 pass, 1 miss |", "| NSF |  | not yet: 1 printed result |"]
+        "| NSF | 3 | 1 | 0 | 1 | 0 | 0 | 1 | 0 |"]
+
+
+def test_the_readme_has_the_counts_of_the_published_records():
+    """Of each paper: printed results, and how many are reproduced, better, missed, not compared."""
+    told = [[int(cell) for cell in row.split("|")[2:7]] for row in
+            (ROOT / "README.md").read_text(encoding="utf-8").splitlines()
+            if row.endswith(".md) |") and "docs/results" in row]
+    found = {c.key: c.printed for c in chapters(ProfileResults(RESULTS / "standard"), load())}
+    papers = [found[key] for key in ("hot", "ldm", "ldmw", "nsf", "nclaw")]
+    assert told == [[sum(p.values()), p["pass"], p["better"], p["miss"],
+                     sum(p[state] for state in ("chosen", "info", "other", "absent"))]
+                    for p in papers]

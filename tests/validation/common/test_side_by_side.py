@@ -1,13 +1,13 @@
 """Experiments in several processes leave what they leave one after the other."""
 
 import os
-from types import MappingProxyType
 
 from validation.common import parallel
 from validation.common.parallel import experiment_of, run_side_by_side
 from validation.common.registry import Experiment, discover
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
+from validation.common.targets import Target, Targets
 
 
 def fall(run):
@@ -19,7 +19,7 @@ def fall(run):
 def rise(run):
     with run.progress(2, "heights") as bar:
         bar.update(2)
-    run.record("verification.rise.error", 1.0, comparator="info")
+    run.record("verification.rise.error", 1.0)      # a printed number
 
 
 def breaks(run):
@@ -44,11 +44,14 @@ def toys(*names):
 
 
 def numbers(folder, id):
-    return [(r.target, r.value, r.verdict, r.note) for r in ProfileResults(folder).records(id)]
+    return [(r.target, r.value, r.comparator, r.note) for r in ProfileResults(folder).records(id)]
 
 
 def test_results_are_those_of_one_process(tmp_path):
-    setting = RunSetting("quick", tmp_path / "one", commit="abc", targets=MappingProxyType({}))
+    printed = Target(id="verification.rise.error", value=2.0, unit="1", what="error",
+                     paper_ref="Table 1", kind="error", comparator="<=", confidence="exact")
+    setting = RunSetting("quick", tmp_path / "one", commit="abc",
+                         targets=Targets({printed.id: printed}))
     apart = setting._replace(folder=tmp_path / "two")
     three = toys("fall", "rise", "breaks")
     assert run_all(three, setting) == ["verification.breaks"]

@@ -2,11 +2,15 @@
 
 import re
 from collections import Counter
+from fnmatch import fnmatchcase
 
 import pytest
 
 from validation.common import equations, targets
 from validation.common.citations import ID
+from validation.common.judge import Criterion
+from validation.common.registry import discover
+from validation.common.verdicts import VARIANTS
 
 GOOD = ('{id = "toy.a", value = 1.5, unit = "m", what = "length", paper_ref = "Table 1", '
         'kind = "setting", comparator = "=", confidence = "exact"}')
@@ -98,7 +102,7 @@ def test_a_record_round_trips(tmp_path):
     (GOOD.replace("1.5", "true"), r"target 'toy\.a'.*got `bool`"),
     (GOOD.replace("1.5", "nan"), r"target 'toy\.a': value is nan, expected a finite number"),
     (GOOD.replace("1.5", "-inf"), r"target 'toy\.a': value is -inf, expected a finite number"),
-    (GOOD.replace('comparator = "="', 'comparator = "<"'), r"Invalid enum value '<'.*comparator"),
+    (GOOD.replace('comparator = "="', 'comparator = "=<"'), r"Invalid enum value '=<'.*comparator"),
     (GOOD.replace("toy.a", "other.a"), r"toy\.toml: target 'other\.a' must begin with 'toy\.'"),
 ])
 def test_a_bad_record_is_refused_with_file_and_key(tmp_path, record, message):
@@ -131,3 +135,69 @@ def test_a_number_repeats_one_of_its_kind_that_repeats_none(tmp_path, other):
 def test_an_unknown_key_of_the_file_is_refused(tmp_path):
     with pytest.raises(ValueError, match=r"toy\.toml: .*`count`"):
         targets.load(write(tmp_path, GOOD, head='paper = "toy"\ncount = 1'))
+
+
+# How numbers are judged
+
+ABOUT = '''
+[[tolerance]]
+ids = ["toy.a"]
+{}
+why = "printed with two digits"
+'''
+SAME = GOOD.replace('"="', '"~"')
+
+
+def about(folder, group, record=GOOD):
+    """Write a target file with a group behind it."""
+    path = write(folder, record) / "toy.toml"
+    path.write_text(path.read_text() + group)
+    return folder
+
+
+def test_a_tolerance_gives_the_rule_and_its_reason(tmp_path):
+    numbers = targets.load(about(tmp_path, ABOUT.format("tolerance = 0.01")))
+    assert numbers.criterion("toy.a") == Criterion("=", 1.5, tolerance=0.01)
+    assert numbers.why("toy.a") == "printed with two digits"
+
+
+@pytest.mark.parametrize(("group", "record", "fault"), [
+    ("", SAME, r"target 'toy\.a': comparator '~' needs factor= or digits=.* \[\[tolerance\]\]"),
+    (ABOUT.format("factor = 2"), GOOD, r"'toy\.a': factor = 2.0 means nothing to comparator '='"),
+    (ABOUT.format("factor = 2").replace("toy.a", "toy.b"), SAME, r"no target matches .*'toy\.b'"),
+    (ABOUT.format("").replace("why", "reason"), GOOD, r"toy\.toml: .*`reason`"),
+    (ABOUT.format("side = 2"), GOOD, r"toy\.toml: .*`side`"),
+], ids=["none", "unused", "unmatched", "no-reason", "unknown"])
+def test_a_rule_that_is_not_complete_is_refused(tmp_path, group, record, fault):
+    with pytest.raises(ValueError, match=fault):
+        targets.load(about(tmp_path, group, record))
+
+
+def test_choices_and_causes_are_found_by_the_id_of_a_record(tmp_path):
+    groups = '[[chosen]]\nids = ["toy.*.modes"]\nwhy = "on the tests"\n' \
+             '[[cause]]\nids = ["toy.a*"]\ntext = "coarse"\nshown_by = "toy.cells"\n'
+    numbers = targets.load(about(tmp_path, groups))
+    assert (numbers.choice("toy.a.modes"), numbers.choice("toy.a")) == ("on the tests", "")
+    assert numbers.cause("toy.a.modes") == targets.Cause(["toy.a*"], "coarse", "toy.cells")
+    assert numbers.cause("toy.b") is None
+
+
+def test_every_tolerance_has_a_reason_and_every_choice_and_cause_a_number(printed):
+    assert not [g.ids for g in printed.tolerances if len(g.why) < 10]
+    known = {*printed, *(f"{i}.{word}" for i in printed for word in VARIANTS)}
+    known |= {f"{i}.stand-in" for i in known} | {f"{i}.partial" for i in known}
+    patterns = [p for g in (*printed.choices, *printed.causes) for p in g.ids]
+    own = {"hot.fig18.gain"}            # a ratio of two printed numbers
+    assert not [p for p in patterns if not any(fnmatchcase(i, p) for i in known | own)]
+
+
+def test_causes_are_shown_by_experiments_that_exist(printed):
+    shown = {group.shown_by for group in printed.causes if group.shown_by}
+    assert shown <= discover().experiments.keys()
+
+
+def test_only_times_of_another_machine_have_nothing_to_compare_with(printed):
+    assert {t.kind for t in printed.values() if t.comparator == "none"} == {"time"}
+    absolute = [t for t in printed.values() if t.kind == "time"
+                and t.unit.split("/")[0] in ("s", "h") and t.unit != "s/s"]
+    assert {t.comparator for t in absolute} == {"none"}

@@ -5,6 +5,7 @@ import math
 import os
 import subprocess
 
+import msgspec
 import pytest
 from typer.testing import CliRunner
 
@@ -14,14 +15,15 @@ from validation.common.record import read_records, write_whole
 from validation.common.registry import Catalogue, Experiment, nearest
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
-from validation.common.targets import Target
+from validation.common.targets import Target, Targets
+from validation.common.verdicts import judged
 
-KEYS = {"target", "value", "unit", "paper", "comparator", "verdict", "scale", "seconds", "seed",
-        "command", "commit", "date", "cores"}
-OPTIONAL = {"note", "bound", "cpu_seconds", "versions", "workers"}
+KEYS = {"target", "value", "unit", "scale", "seconds", "seed", "command", "commit", "date", "cores"}
+OPTIONAL = {"comparator", "paper", "note", "bound", "cpu_seconds", "versions", "workers", "origin"}
 
 PRINTED = Target(id="nsf.table1.bread.error", value=1.2, unit="%", what="position error of bread",
                  paper_ref="Table 1", kind="error", comparator="<=", confidence="exact")
+TARGETS = Targets({PRINTED.id: PRINTED})
 
 
 def make(function):
@@ -48,36 +50,59 @@ def test_records_have_the_agreed_keys(tmp_path):
     remark, record = json.loads((tmp_path / "verification.fall.json").read_text())
     assert set(record) >= KEYS
     assert set(record) <= KEYS | OPTIONAL
-    assert (record["verdict"], record["value"], record["bound"]) == ("pass", 1e-13, 1e-12)
+    assert (record["comparator"], record["value"], record["bound"]) == ("<=", 1e-13, 1e-12)
     assert (record["seed"], record["commit"], record["cores"]) == (7, "abc", os.cpu_count())
     assert record["command"] \
         == "python -m validation run verification.fall --profile quick --seed 7"
     assert (remark["target"], remark["note"]) == ("verification.fall", "A toy")
+    assert (remark["comparator"], "origin" in record) == ("remark", False)
+    assert set(remark["origin"]) >= {"cpu", "memory_gb", "system", "seal", "load"}
 
 
 def test_printed_number_is_used(tmp_path):
     def bread(run):
         assert run.record(PRINTED.id, 1.1) == "pass"
+        assert run.record(PRINTED.id, 0.5) == "better"
         assert run.record(PRINTED.id, 1.3) == "miss"
-        assert run.record(PRINTED.id, 2.0, factor=2.0, note="coarser by two") == "pass"
+        assert run.record(f"{PRINTED.id}.modes", 1.1) == "pass"
 
-    failed, results = run(tmp_path, bread, targets={PRINTED.id: PRINTED})
+    failed, results = run(tmp_path, bread, targets=TARGETS)
     assert failed == []
-    kept = {(r.paper, r.unit, r.comparator) for r in numbers(results, "verification.bread")}
-    assert kept == {(1.2, "%", "<=")}
+    stored = {(r.paper, r.unit, r.comparator) for r in numbers(results, "verification.bread")}
+    assert stored == {(None, "%", "printed")}
 
 
-@pytest.mark.parametrize(("fields", "said"), [
-    ({"paper": 1.3}, "it prints 1.2"),
+@pytest.mark.parametrize("id", [PRINTED.id, f"{PRINTED.id}.modes"])
+@pytest.mark.parametrize(("fields", "fault"), [
     ({"unit": "1"}, "the paper's number is in '%'"),
-    ({"factor": 2.0}, "say why in note="),
+    ({"paper": 1.3}, "paper given, but the number is printed"),
+    ({"comparator": "info"}, "comparator given, but the number is printed: its rule is in "),
+    ({"factor": 2.0, "note": "coarser"}, "factor given"),
 ])
-def test_printed_number_is_not_overridden(tmp_path, fields, said):
+def test_the_rule_of_a_printed_number_is_in_the_target_file_alone(tmp_path, id, fields, fault):
     def bread(run):
-        with pytest.raises(ValueError, match=said):
-            run.record(PRINTED.id, 1.0, **fields)
+        with pytest.raises(ValueError, match=fault):
+            run.record(id, 1.0, **fields)
 
-    assert run(tmp_path, bread, targets={PRINTED.id: PRINTED})[0] == []
+    assert run(tmp_path, bread, targets=TARGETS)[0] == []
+
+
+def test_a_number_that_repeats_another_is_not_recorded(tmp_path):
+    again = msgspec.structs.replace(PRINTED, id="nsf.again", again=PRINTED.id)
+
+    def bread(run):
+        with pytest.raises(ValueError, match=f"nsf.again repeats {PRINTED.id}"):
+            run.record("nsf.again", 1.0)
+
+    assert run(tmp_path, bread, targets=Targets({**TARGETS, again.id: again}))[0] == []
+
+
+def test_a_widened_check_says_why(tmp_path):
+    def toy(run):
+        with pytest.raises(ValueError, match="say why in note="):
+            run.record("verification.toy.size", 1.0, comparator="~", paper=1.0, factor=2.0)
+
+    assert run(tmp_path, toy)[0] == []
 
 
 def test_number_without_paper_needs_a_comparator(tmp_path):
@@ -93,7 +118,7 @@ def test_not_finite_is_a_miss_that_says_so(tmp_path):
         run.record("verification.blown.x", math.nan, comparator="<=", bound=1.0, note="at t = 1")
 
     record, = numbers(run(tmp_path, blown)[1], "verification.blown")
-    assert (record.value, record.verdict) == (None, "miss")
+    assert (record.value, judged(record, TARGETS).verdict) == (None, "miss")
     assert record.note == "the run gave nan; at t = 1"
 
 
@@ -109,7 +134,8 @@ def test_failure_is_reported_and_others_go_on(tmp_path, capsys):
     assert failed == ["verification.broken"]
     *_, before, failure = results.records("verification.broken")
     assert before.target == "verification.broken.before"
-    assert (failure.verdict, failure.comparator, failure.value) == ("miss", "runs", None)
+    assert (failure.comparator, failure.value) == ("runs", None)
+    assert judged(failure, TARGETS).verdict == "miss"
     assert failure.note == "failed: RuntimeError: particle 3 left the domain"
     assert results.value("verification.sound", "verification.sound.x") == 1.0
     assert "Traceback" in capsys.readouterr().err

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from record_verdicts import verdict
 
 from figures.common import state_panels
 from figures.frame import draw_all
@@ -180,7 +181,10 @@ def test_all_printed_numbers_are_recorded(function, tmp_path):
 
 
 def test_settings_are_the_printed_ones(tmp_path):
-    assert {r.verdict for r in recorded(settings.settings, tmp_path).values()} == {"pass", "info"}
+    """But for the number of snapshots, of which the print has one level too few (LDMW-X1)."""
+    found = recorded(settings.settings, tmp_path)
+    assert {target for target, r in found.items() if verdict(r) == "miss"} == {
+        "ldmw.poke.snapshots"}
 
 
 SOME = np.stack(np.meshgrid(*3 * (np.arange(1.0, 3.0),), indexing="ij"), axis=-1).reshape(-1, 3)
@@ -206,7 +210,7 @@ def test_fig1_is_of_the_ends_of_test_runs(tmp_path, monkeypatch):
     for k in (1, 2, 3):
         one = found[f"ldmw.fig1.error.{k}.position"]
         assert one.value == pytest.approx(k / np.sqrt(3.0))
-        assert (one.verdict, one.scale) == (
+        assert (verdict(one), one.scale) == (
             "info", "8 particles, 2 steps, r = 5, 15 sample points, one run each")
     ends = published_bodies.read(tmp_path, "ldmw.fig1")
     assert ends["full"] == pytest.approx(np.stack(3 * [SOME]))

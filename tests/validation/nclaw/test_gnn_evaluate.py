@@ -3,6 +3,7 @@
 import gnn_toys as toys
 import numpy as np
 import pytest
+from record_verdicts import expected, verdict
 
 from mpm_ref.nclaw.gnn.features import MotionScales
 from mpm_ref.nclaw.gnn.network import GraphWeights, PerceptronWeights
@@ -194,29 +195,29 @@ def recorded(folder, experiment, profile="standard"):
 
 def test_table_1_has_their_row_and_says_what_was_smaller(tmp_path, trained_ones):
     found = recorded(tmp_path, tables.table1)
-    one = found["nclaw.table1.gnn.sand"]
-    assert (one.value, one.paper, one.verdict) == (2.0, 0.011, "miss")
+    one = found["nclaw.table1.gnn.sand.narrow"]
+    assert (one.value, expected(one), verdict(one)) == (2.0, 0.011, "miss")
     assert one.note == simulators.simulators()["sand-gnn"].description
     assert one.note.startswith("a graph network 32 wide, trained on 1 run for 15000 steps with 1 "
                                "frame each; that of [GNS]: 128 wide, up to 20000000 steps")
-    assert found["nclaw.table1.gnn.overall_mean"].value == 2.5
-    assert found["nclaw.table1.gnn.overall_mean"].verdict == "miss"
+    mean = found["nclaw.table1.gnn.overall_mean.narrow"]
+    assert (mean.value, verdict(mean)) == (2.5, "miss")
     assert "water-gnn-10" in found["nclaw.table1.untrained"].note
 
 
-def test_table_2_leaves_other_bodies_out_and_judges_no_mean_without_them(tmp_path, trained_ones):
+def test_table_2_leaves_other_bodies_out_and_its_mean_is_partial(tmp_path, trained_ones):
     found = recorded(tmp_path, tables.table2)
-    assert found["nclaw.table2.gnn.jello.time"].value == 1.0
-    assert found["nclaw.table2.gnn.jello.velocity"].value == 3.0        # of 2, 3, 4
-    assert "nclaw.table2.gnn.jello.geometry" not in found
-    mean = found["nclaw.table2.gnn.overall_mean"]
-    assert (mean.value, mean.verdict) == (np.mean(range(1, 17)), "info")
+    assert found["nclaw.table2.gnn.jello.time.narrow"].value == 1.0
+    assert found["nclaw.table2.gnn.jello.velocity.narrow"].value == 3.0         # of 2, 3, 4
+    assert not [target for target in found if "gnn" in target and "geometry" in target]
+    mean = found["nclaw.table2.gnn.overall_mean.narrow.partial"]
+    assert (mean.value, verdict(mean)) == (np.mean(range(1, 17)), "miss")
     assert "16 runs: time, velocity" in mean.scale
 
 
 def test_what_was_picked_is_recorded(tmp_path, trained_ones):
     one = recorded(tmp_path, curves.loss)["nclaw.loss.gnn.jelly.picked"]
-    assert (one.value, one.verdict, one.scale) == (0.1, "info", "40 steps, 4 checks")
+    assert (one.value, verdict(one), one.scale) == (0.1, "info", "40 steps, 4 checks")
     assert "at check 3; at the last one 0.2 m^2" in one.note
 
 
@@ -226,15 +227,12 @@ def test_table_6_is_of_1_10_and_100_runs_of_water(tmp_path, trained_ones, monkey
         ComparedError(2.0 * ("gnn" in one.about["of"]) + len(one.about["of"])) for one in laws])
     found = recorded(tmp_path, tables.table6)
     assert {target: one.value for target, one in found.items() if target != "nclaw.table6"} == {
-        "nclaw.table6.gnn.1.loss": 2.0 + len("water-gnn"), "nclaw.table6.gnn.1.trajectories": 1,
-        "nclaw.table6.gnn.10.loss": 2.0 + len("water-gnn-10"),
-        "nclaw.table6.gnn.10.trajectories": 10,
-        "nclaw.table6.gnn.100.loss": 2.0 + len("water-gnn-100"),
-        "nclaw.table6.gnn.100.trajectories": 100,
-        "nclaw.table6.ours.1.loss": len("water"), "nclaw.table6.ours.1.trajectories": 1}
-    assert found["nclaw.table6.gnn.10.loss"].paper == 0.025
-    assert "trained on 10 runs" in found["nclaw.table6.gnn.10.loss"].note
-    assert found["nclaw.table6.ours.1.loss"].note == ""
+        "nclaw.table6.gnn.10.loss.narrow": 2.0 + len("water-gnn-10"),
+        "nclaw.table6.gnn.100.loss.narrow": 2.0 + len("water-gnn-100")}
+    assert expected(found["nclaw.table6.gnn.10.loss.narrow"]) == 0.025
+    assert "trained on 10 runs" in found["nclaw.table6.gnn.10.loss.narrow"].note
+    table = (tmp_path / "nclaw.table6.errors.csv").read_text()
+    assert [f"\n{method},water" in table for method in ("gnn.1", "gnn.10", "ours.1")] == [True] * 3
 
 
 def test_table_6_tells_what_is_not_trained_and_runs_nothing(tmp_path, trained_ones, monkeypatch):

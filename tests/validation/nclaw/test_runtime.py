@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from record_verdicts import expected, verdict
 
 from mpm_ref.nclaw.bodies import copy_body
 from mpm_ref.nclaw.gnn.simulator import Simulator
@@ -56,9 +57,9 @@ def test_laws_and_graph_networks_are_timed_in_turn(tmp_path, runs):
 
 def test_medians_stand_beside_the_printed_times(tmp_path, runs):
     found = recorded(tmp_path)
-    ours, gnn = (found[f"nclaw.table3.{word}.sand"] for word in ("ours", "gnn"))
-    assert (ours.value, ours.paper, ours.verdict) == (5.5, 2.55, "info")
-    assert (gnn.value, gnn.paper, gnn.verdict) == (16.5, 2.1, "info")
+    ours, gnn = (found[f"nclaw.table3.{id}"] for id in ("ours.sand", "gnn.sand.narrow"))
+    assert (ours.value, expected(ours), verdict(ours)) == (5.5, 2.55, "info")
+    assert (gnn.value, expected(gnn), verdict(gnn)) == (16.5, 2.1, "info")
     assert f"of {REPEATS} runs" in ours.note
     assert gnn.note.endswith(simulators()["sand-gnn"].description)
     assert found["nclaw.table3.gnn.sand.cpu"].value == pytest.approx(55.0 / 1e6)
@@ -87,7 +88,7 @@ def test_times_of_runs_that_break_down_are_not_recorded(tmp_path, runs, monkeypa
     monkeypatch.setattr(runtime, "run_times", lambda scene, law: (
         (np.nan, np.nan) if isinstance(law, Simulator) else timed(scene, law)))
     found = recorded(tmp_path)
-    assert found["nclaw.table3.gnn.sand"].value is None
-    assert runtime.LOST in found["nclaw.table3.gnn.sand"].note
+    assert found["nclaw.table3.gnn.sand.narrow"].value is None
+    assert runtime.LOST in found["nclaw.table3.gnn.sand.narrow"].note
     assert found["nclaw.table3.ours.sand"].value == 5.5
     assert runtime.LOST not in found["nclaw.table3.ours.sand"].note

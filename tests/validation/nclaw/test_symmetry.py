@@ -6,6 +6,7 @@ import neural_toys
 import numpy as np
 import pytest
 from neural_toys import deformations, plain, trained
+from record_verdicts import verdict
 
 from mpm_ref.materials import FixedCorotated, Fluid
 from mpm_ref.materials.learned import network, response
@@ -59,4 +60,4 @@ def test_what_must_be_symmetric_is_judged(tmp_path, monkeypatch):
     assert ours.value == pytest.approx(3.0 / 13.0)
     assert "0.3 in the median, 0.6 at most" in ours.note
     assert ours.scale == "2 states of the training run"
-    assert (ours.verdict, admissible.verdict) == ("info", "miss")
+    assert (verdict(ours), verdict(admissible)) == ("info", "miss")

@@ -174,8 +174,8 @@ def test_errors_are_means_in_per_cent(folder, monkeypatch):
 
     monkeypatch.setattr(runs, "fit_to_networks", ready)
     found = recorded(folder)
-    assert found["jelly"].value == pytest.approx(2.0)           # mean of 1, 2, 3 %
-    assert found["jelly"].note == (
+    assert found["nsf.jelly.error.plain"].value == pytest.approx(2.0)           # mean of 1, 2, 3 %
+    assert found["nsf.jelly.error.plain"].note == (
         "20 samples; mean of 3, the largest 3 %; trained networks; from the corner of the unit "
         "box that scenes stand in; from the centroid 2 %, of the displacement 3 %")
     assert found["jelly.cubature"].value == pytest.approx(0.2)
@@ -184,7 +184,7 @@ def test_errors_are_means_in_per_cent(folder, monkeypatch):
     for words in ("stress", "cubature.stress", "all.stress"):
         assert found[f"jelly.{words}"].value == pytest.approx(20.0)
     assert "2 runs and 1 test, dx and dt 4 times as long; r = 3, widths 4, 5 and 6, seed 0" in (
-        found["jelly"].scale)
+        found["nsf.jelly.error.plain"].scale)
     assert "untrained" not in found
     table = ProfileResults(folder / "out").table("nsf.networks", "errors")
     assert table["draw"].tolist() == [0, 1, 2, 0, 1, 2, 0]
@@ -210,3 +210,19 @@ def test_weights_of_samples_are_those_of_modes_of_the_same_runs(folder):
     (found,), = asked
     assert np.array_equal(found.points, expected.points)
     assert found.weights == pytest.approx(expected.weights)
+
+
+@pytest.mark.parametrize(("name", "id"), [
+    ("jelly-waves", "nsf.jelly.error"), ("metal-waves", "nsf.metal.error.50"),
+    ("jelly", "nsf.jelly.error.plain"), ("metal", "nsf.metal.error.50.plain"),
+    ("toothpaste-waves", "nsf.toothpaste.error.50"), ("jelly-seed-1", "nsf.networks.jelly-seed-1")])
+def test_networks_have_the_ids_of_the_printed_errors(name, id):
+    assert runs.printed_error(name, f"nsf.networks.{name}") == id
+    assert (runs.own_rule(name) == {}) is ("networks" not in id)
+
+
+def test_every_scene_has_the_id_of_a_printed_error():
+    printed = targets.load()
+    names = [name for name in kept.nets() if name.endswith("-waves")]
+    assert len(names) == 7
+    assert all(runs.printed_error(name, "") in printed for name in names)

@@ -12,6 +12,7 @@ from mpm_ref.rom.step import ReducedStepper
 from mpm_ref.rom.study.full_model import nsf_full_model
 from mpm_ref.rom.study.run import FieldRunOptions, nsf_run
 from mpm_ref.simulate import simulate
+from validation.common import targets
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.nsf import reduced_runs, speed
@@ -122,10 +123,11 @@ def recorded(one, clock, tmp_path, monkeypatch):
         asked.append(study)
         return one
 
-    monkeypatch.setattr(speed, "STUDIES", {"jelly": (small, (N, FEW))})
+    monkeypatch.setattr(speed, "STUDIES", {"metal": (small, (N, FEW))})
     monkeypatch.setattr(speed, "sand", small)
     monkeypatch.setattr(speed, "fit_study", made)
-    assert not run_all([speed.speed.experiment], RunSetting("quick", tmp_path))
+    assert not run_all([speed.speed.experiment], RunSetting("quick", tmp_path,
+                                                              targets=targets.load()))
     assert asked == [(3, 3), STUDY._replace(test=STUDY.test[1:]),
                      (3, 3), STUDY._replace(test=STUDY.test[:1], steps=speed.SAND_STEPS)]
     results = ProfileResults(tmp_path)
@@ -141,27 +143,28 @@ def test_records_are_ratios_and_shares_of_the_table(one, recorded):
         assert (table[name] == spent).all()
     reduced = sum(SPENT.values())
     assert (table["reduced"] == reduced).all()
-    names = {f"nsf.speed.jelly.{inversion}.{count}": FULL / reduced
+    names = {f"nsf.speed.metal.{inversion}.{count}": FULL / reduced
              for count in (N, FEW) for inversion in ("nonlinear", "linear")}
     fields = sum(a.nbytes for a in (one.fields.X, one.fields.U, one.fields.tau.modes,
                                     one.fields.C.modes))
     particles = particle_bytes(STUDY)
-    held = {name: value for scene in ("jelly", "sand") for name, value in (
-        (f"nsf.speed.{scene}.bytes.fields", fields), (f"nsf.{scene}.mem_reduced", 1e-9 * fields),
+    held = {name: value for scene in ("metal", "sand") for name, value in (
+        (f"nsf.speed.{scene}.bytes.fields", fields),
+        (f"nsf.{scene}.mem_reduced.modes", 1e-9 * fields),
         (f"nsf.speed.{scene}.bytes.particles", particles),
         (f"nsf.{scene}.mem_full", 1e-9 * particles))}
     found = {target: one.value for target, one in records.items()}
     assert found == pytest.approx(names | held | {
-        "nsf.appC.jelly.speedup_per_step": FULL / reduced,
-        "nsf.jelly.speedup": 1.5 * FULL / reduced,
-        "nsf.appC.jelly.full": 100.0 * FULL,
-        "nsf.appC.jelly.reduced_mpm": 100.0 * SPENT["moved"],
-        "nsf.appC.jelly.network": 100.0 * (reduced - SPENT["moved"]),
-        "nsf.appC.jelly.particle_share": 100.0,
-        "nsf.appC.jelly.runtime_share": 100.0 * SPENT["moved"] / FULL,
-        "nsf.speed.jelly.deform": 100.0 * BODIES * DEFORM / FULL})
-    assert {r.comparator for r in records.values()} == {"info"}
+        "nsf.appC.metal.speedup_per_step.modes": FULL / reduced,
+        "nsf.metal.speedup.modes": 1.5 * FULL / reduced,
+        "nsf.appC.metal.full": 100.0 * FULL,
+        "nsf.appC.metal.reduced_mpm.modes": 100.0 * SPENT["moved"],
+        "nsf.appC.metal.network.modes": 100.0 * (reduced - SPENT["moved"]),
+        "nsf.appC.metal.particle_share.modes": 100.0,
+        "nsf.appC.metal.runtime_share.modes": 100.0 * SPENT["moved"] / FULL,
+        "nsf.speed.metal.deform": 100.0 * BODIES * DEFORM / FULL})
+    assert {r.comparator for r in records.values()} == {"info", "printed"}
     points = table["points"][2]
     assert f"{FEW} samples, {points:.0f} integration points" in (
-        records[f"nsf.speed.jelly.nonlinear.{FEW}"].note)
+        records[f"nsf.speed.metal.nonlinear.{FEW}"].note)
     assert FEW < points < N == table["points"][0]

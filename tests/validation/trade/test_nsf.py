@@ -59,7 +59,7 @@ def test_each_kind_of_samples_is_run_and_all_particles(one, results, monkeypatch
     assert (table["cpu"] > 0.0).all()
     assert len(set(table["cpu_full"])) == 1
     records = {r.target: r for r in found.records("trade.nsf.samples")}
-    assert {r.comparator for r in records.values()} == {"info"}
+    assert {r.comparator for r in records.values()} == {"info", "remark"}
     assert {*records} == {"trade.nsf.samples", f"trade.nsf.samples.jelly.random.{n}", *(
         f"trade.nsf.samples.jelly.{way}.{count}" for way in nsf.WEIGHTED for count in (5, 30))}
     told = {way: records[f"trade.nsf.samples.jelly.{way}.30"].note for way in nsf.WEIGHTED}

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mpm_ref.rom.fields.pod_fields import Sizes
+from validation.common import targets
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.common.weights_needed import Untrained
@@ -80,7 +81,8 @@ def recording():
 @pytest.mark.usefixtures("counted")
 def test_all_is_recorded(tmp_path, monkeypatch):
     monkeypatch.setattr(nsf_offline, "studies", lambda run: {"jelly": STUDY})
-    assert not run_all([nsf_offline.offline.experiment], RunSetting("quick", tmp_path))
+    assert not run_all([nsf_offline.offline.experiment],
+                       RunSetting("quick", tmp_path, targets=targets.load()))
     found = ProfileResults(tmp_path)
     records = {r.target.split(".")[-1]: r for r in found.records("trade.nsf.offline")}
     trainings = {"train_time_lo", "train_time_hi"}

@@ -252,12 +252,14 @@ def test_few_particles_run_on_one_thread_for_a_while():
     assert numba.get_num_threads() == before
 
 
-def test_rounded_settings_have_their_tolerance():
+def test_settings_are_recorded_without_a_rule():
+    """It stands with the printed number, in `validation/targets`."""
     taken = {}
 
     class Toy:
-        def record(self, target, value, scale, **rule):
-            taken[target] = (value, rule)
+        def record(self, target, value, **others):
+            taken[target] = (value, others)
 
-    record_settings(Toy(), "hello", {"a.b.dx": 1.0 / 150.0, "a.b.n": 3}, a_b_dx=0.01)
-    assert taken == {"a.b.dx": (1.0 / 150.0, {"tolerance": 0.01}), "a.b.n": (3, {})}
+    record_settings(Toy(), "hello", {"a.b.dx": 1.0 / 150.0, "a.b.n": 3})
+    assert taken == {"a.b.dx": (1.0 / 150.0, {"scale": "scenes/hello.toml"}),
+                     "a.b.n": (3, {"scale": "scenes/hello.toml"})}
