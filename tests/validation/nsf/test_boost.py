@@ -63,7 +63,7 @@ def test_a_figure_of_three_rows(recorded, tmp_path):
     recorded(stretched)
     axes = fig06.draw(SimpleNamespace(folder=tmp_path)).axes
     assert [ax.texts[0].get_text() for ax in axes[::3]] == [
-        "points of the training", "networks, more points", "full order, more points"]
+        "points of\nthe training", "networks,\nmore points", "full order,\nmore points"]
 
 
 def test_without_weights_it_says_how_they_are_made(tmp_path, monkeypatch):
