@@ -55,7 +55,7 @@ def pages():
         by_page.setdefault(one.page, []).append(one)
     result = {f"{FOLDER}/{page}.md": numbers(page, shown, missing.get(page, ()))
               for page, shown in by_page.items()}
-    result |= {f"{FOLDER}/figures/{figure.name}.webp": base64.b64decode(figure.data)
+    result |= {f"{FOLDER}/{figure_file(one, figure)}": base64.b64decode(figure.data)
                for one in shown_experiments() for figure in one.section.figures}
     result["results/generated/experiments.md"] = experiments(missing)
     result |= verdict_pages.pages(targets.load(), [
@@ -155,6 +155,11 @@ def heading(page):
     return OPENINGS[first].format(NAMES.get(second, ""))
 
 
+def figure_file(one, figure):
+    """Return the path of a figure, which each profile has one of, beside the page."""
+    return f"figures/{one.profile}/{figure.name}.webp"
+
+
 def section_text(one, own):
     """Return the lines of one experiment: figures, table and notes."""
     section = one.section
@@ -165,7 +170,7 @@ def section_text(one, own):
         if remark != one.title:
             lines += [cell(remark), ""]
     for figure in section.figures if not one.part else ():
-        lines += [f"![{cell(figure.name)}](figures/{figure.name}.webp)", "",
+        lines += [f"![{cell(figure.name)}]({figure_file(one, figure)})", "",
                   cell(figure.caption), ""]
     lines += own_table(one) if own else [*printed_table(one.rows), "", *notes(one.rows), ""]
     return lines

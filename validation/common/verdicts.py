@@ -22,6 +22,7 @@ VARIANTS = {        # words behind the id of a printed number
     "partial": "over fewer runs than the printed number",
     "small": "at another size than the printed number",
 }
+INCOMPLETE = {"partial", "small"}       # such a number gets no credit, as fewer steps err less
 KINDS = ("result", "setting", "variant", "own", "remark")
 
 
@@ -57,13 +58,19 @@ def judged(record, targets):
     target = targets[base]
     verdict, interval = judge_printed(record.value, targets.criterion(base))
     kind = "variant" if variants else "setting" if target.kind == "setting" else "result"
+    if passes(verdict) and INCOMPLETE & {*variants}:
+        verdict = "info"
     return Judged(kind, chosen(record, targets, verdict), interval, target, variants)
 
 
 def chosen(record, targets, verdict):
     """Return the verdict, or "chosen" where a value that passes was picked on its own runs."""
-    passes = verdict in ("pass", "better")
-    return "chosen" if passes and targets.choice(record.target) else verdict
+    return "chosen" if passes(verdict) and targets.choice(record.target) else verdict
+
+
+def passes(verdict):
+    """Return whether a verdict says that a number is as printed or better."""
+    return verdict in ("pass", "better")
 
 
 def overruled(target):
