@@ -8,6 +8,7 @@ package, is not run again: records say at which commit it was.
 from math import inf
 
 from mpm_ref.hot.methods import METHODS
+from mpm_ref.store.text import counted
 
 from ..common.registry import experiment
 from ..common.scenes import evenly
@@ -61,7 +62,8 @@ def record_end(run, name, history):
     run.record(f"{id}.done", history.column("t")[-1] / history.facts["end"], unit="1",
                comparator="=", paper=1.0, scale=scale,
                note=f"share of the scene's time; it ended by: {history.facts['why']}; "
-               f"{history.facts['rejected']} rejected steps; run at {history.facts['commit']}")
+               f"{counted(history.facts['rejected'], 'rejected step')}; run at "
+               f"{history.facts['commit']}")
     eps = METHODS[METHOD].eps
     run.record(f"{id}.converged", float(history.column("converged").mean()), unit="1",
                comparator="=", paper=1.0, scale=scale,
