@@ -33,8 +33,7 @@ def test_every_cut_is_told(golden, other, tmp_path):
     bad, content = tmp_path / "bad.h5", golden.read_bytes()
     for share in (0.0, 1e-3, 0.5, 0.99):
         bad.write_bytes(content[:int(share * len(content))])
-        refused = r"it is cut short, or no golden|it is empty"
-        with pytest.raises(oracle.NotComparable, match=refused):
+        with pytest.raises(oracle.NotComparable, match=r"cut short, or no golden|it is empty"):
             oracle.check(bad, other)
 
 
@@ -54,15 +53,15 @@ def test_a_file_that_other_tools_write_or_change_needs_none(golden, other):
 
 
 def test_damage_without_a_checksum_is_told(golden, other):
+    """Of the header of an array, which HDF5 itself notices when the array is opened."""
     with h5py.File(other, "r+") as f:
         f["steps/0/mass"][0] *= 1.0
-        at = f["steps/0/mass"].id.get_offset()
+        at = h5py.h5o.get_info(f["steps/0/mass"].id).addr
     content = bytearray(other.read_bytes())
-    if at is None:
-        at = content.index(b"TREE") if b"TREE" in content else len(content) // 2
-    content[64:at] = bytes(at - 64)
+    assert content[at:at + 4] == b"OHDR"
+    content[at + 9] ^= 1
     other.write_bytes(content)
-    with pytest.raises(oracle.NotComparable, match=r"other\.h5"):
+    with pytest.raises(oracle.NotComparable, match=r"other\.h5 cannot be read .*; expected"):
         oracle.check(golden, other)
 
 

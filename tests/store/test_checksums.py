@@ -12,7 +12,15 @@ from hypothesis import strategies as st
 from small_runs import ENERGY, colliding, frame_of, state_of
 
 from mpm_ref.store import checksums
-from mpm_ref.store.checksums import BLOCK, HEAD, BlockDigests, Damaged, require_intact
+from mpm_ref.store.checksums import (
+    BLOCK,
+    HEAD,
+    BlockDigests,
+    CheckedFile,
+    Damaged,
+    require_intact,
+)
+from mpm_ref.store.journal import JournaledFile
 from mpm_ref.store.results import BadResults, Results
 from mpm_ref.store.writer import StoredFields, create, reopen
 
@@ -124,6 +132,19 @@ def test_a_reader_follows_a_writer(tmp_path):
     writer.close()
     with open(path, "rb") as file:
         require_intact(file)
+
+
+def test_a_block_that_was_written_again_is_read(tmp_path):
+    with JournaledFile(tmp_path / "a", new=True, checked=True) as writer:
+        writer.seek(HEAD)
+        writer.write(bytes(3 * BLOCK))
+        writer.commit()
+        with CheckedFile(tmp_path / "a") as reader:
+            writer.seek(2 * BLOCK + 5)
+            writer.write(b"new")
+            writer.commit()
+            reader.seek(2 * BLOCK + 5)
+            assert reader.read(3) == b"new"
 
 
 def test_resumed_results_have_checksums(results):
