@@ -13,8 +13,10 @@ from mpm_ref.cli import law_train  # noqa: E402
 from mpm_ref.materials.learned import weights  # noqa: E402
 from mpm_ref.materials.learned.strain_range import strain_bounds  # noqa: E402
 from mpm_ref.nclaw.batched_step import make_world  # noqa: E402
+from mpm_ref.nclaw.bodies import body_maker  # noqa: E402
 from mpm_ref.nclaw.study import study as law_study  # noqa: E402
 from mpm_ref.nclaw.study.study import load  # noqa: E402
+from mpm_ref.nclaw.study.training import run_error  # noqa: E402
 from mpm_ref.nclaw.train import fit  # noqa: E402
 from mpm_ref.nclaw.train import train as law_trainer  # noqa: E402
 from mpm_ref.nclaw.train.labeled import labels_of, train_labeled  # noqa: E402
@@ -77,6 +79,8 @@ def test_weights_say_how_they_were_made(made):
     assert about["recipe"]["epochs"] == len(about["errors"]) == 4
     assert about["torch"] == torch.__version__
     assert about["seen"] == strain_bounds(observed(study.problem()).F)
+    assert about["run_error"] == run_error(
+        study.problem(), body_maker(weights.load(made / "whole.npz")), observed(study.problem()).x)
     assert about["command"] == (f"mpm-ref law train {made / 'cubes.toml'} --out "
                                 f"{made / 'whole.npz'} --threads 1")
 

@@ -2,7 +2,7 @@
 and the laws with the record of their training.
 """
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -54,11 +54,12 @@ def run_error(problem, maker, x):
 
     maker: a function that gives a body the laws (see `nclaw.bodies.body_maker`).
     """
-    run = positions(problem, tuple(map(maker, problem.bodies)))
+    clock = replace(problem.clock, steps=len(x) - 1, end=None, every=1, interval=None)
+    run = positions(replace(problem, clock=clock), tuple(map(maker, problem.bodies)))
     try:
         with threads_for(problem.bodies):
             errors = [np.mean((learned - true) ** 2)
-                      for learned, true in zip(run, x[::problem.clock.every or 1], strict=True)]
+                      for learned, true in zip(run, x, strict=True)]
     except RunBroken:
         return None
     motion = np.mean((x - x[0]) ** 2)
