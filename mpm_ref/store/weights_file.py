@@ -144,7 +144,7 @@ def read_file(path):
     """
     try:
         size = path.stat().st_size
-        if not path.is_file():
+        if not (path.is_file() or path.is_dir()):        # opening a folder says so by itself
             raise ValueError(f"{path} cannot be read: it is no ordinary file; name another one")
         memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
         if size > memory:
