@@ -15,7 +15,9 @@ from command_line import SCENE, assert_told, mpm_ref
 from small_runs import colliding
 
 from mpm_ref import __version__
+from mpm_ref.cli import terminal
 from mpm_ref.cli.run import Bar, Request
+from mpm_ref.core import kernel_cache
 from mpm_ref.simulate import State, start
 from mpm_ref.store import atomic
 from mpm_ref.store.checkpoint import BadCheckpoint, summary
@@ -43,6 +45,8 @@ def test_run_says_what_is_run_and_how_it_ended(scene, tmp_path):
 
 def test_the_package_is_the_command(monkeypatch, capsys):
     monkeypatch.setattr("sys.argv", ["mpm_ref", "--version"])
+    monkeypatch.setattr(terminal.Telling, "active", False)      # the program tells its progress
+    monkeypatch.setattr(kernel_cache, "compilations", [])
     with pytest.raises(SystemExit) as ended:
         runpy.run_module("mpm_ref", run_name="__main__")
     assert ended.value.code == 0

@@ -255,12 +255,14 @@ def test_errors_are_those_of_the_run_that_was_held_out(made, reduced, tmp_path):
 
 def test_the_table_has_a_row_for_each_run_and_one_for_all(made, tmp_path):
     done = evaluate(made, "--out", tmp_path / "errors.png")
-    heading, head, *rows, beside, _, _, _, picture = done.stdout.splitlines()
+    heading, head, *rows, nearest, _, _, _, interpolated, _, _, _, picture = (
+        done.stdout.splitlines())
     assert "[%]" in heading
     assert head.split()[:3] == ["run", "g", "origin"]
     assert [row.split()[0] for row in rows] == [str(load(made / "bars.toml").test[0]), "all"]
     assert rows[0].split()[2:] == rows[1].split()[1:]
-    assert beside.startswith("position errors [%] of the training run")
+    assert nearest.startswith("position errors [%] of the training run")
+    assert interpolated.startswith("position errors [%] of the linear interpolation")
     assert picture == str(tmp_path / "errors.png")
 
 

@@ -190,7 +190,8 @@ def test_every_parameter_of_the_tables_is_a_key():
     laws = {name for make in materials.LAWS.values() for name in signature(make).parameters}
     flows = {name for entry in materials.FLOWS.values()
              for name in signature(entry.build).parameters}
-    assert laws == set(Material.__struct_fields__) - {"law", "flow", "weights", "sha256"}
+    assert laws == set(Material.__struct_fields__) - {"law", "flow", "weights", "sha256",
+                                                      "guard"}
     assert flows - {"dim"} == set(Flow.__struct_fields__) - {"name"}
 
 

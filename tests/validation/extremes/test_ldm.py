@@ -124,7 +124,7 @@ def test_samples_in_one_place_are_told(net):
     near = np.argsort(ldm_full_model(GRAVITY.scene(1.0)).X[:, 0])[:50]
     found = fallen(net, 7.5, sampler=lambda t, latent: SampleSet(t, near))
     assert found.error > 5.0
-    assert found.flags == "coverage"
+    assert found.flags == "coverage spread"
 
 
 def test_too_few_samples_are_refused_before_the_first_step(net):
