@@ -6,6 +6,8 @@ be in Pa². Free flight ends where all curves rise.
 
 import matplotlib.pyplot as plt
 
+from validation.common import targets
+
 from ..common.style import legend_below, scales, series
 
 NEEDS = ["nclaw.table5"]
@@ -21,7 +23,7 @@ def scale(results):
 
 
 def draw(results):
-    table = results.table(NEEDS[0], "frames")
+    table, printed = results.table(NEEDS[0], "frames"), targets.load()
     records = {r.target.removeprefix(f"{NEEDS[0]}."): r for r in results.records(NEEDS[0])}
     figure, axes = plt.subplots(1, 2, figsize=(7.0, 3.2))
     for ax, (term, label) in zip(axes, TERMS.items(), strict=True):
@@ -32,7 +34,8 @@ def draw(results):
             record, colour = records[f"{term}.{method}"], STYLES[method][1]
             ax.plot(WHOLE, record.value, "s", color=colour, ms=6,
                     label=f"{method}, whole run")
-            ax.axhline(record.paper, color=colour, ls="--", lw=1.0, label=f"{method}, printed")
+            ax.axhline(printed[record.target].value, color=colour, ls="--", lw=1.0,
+                       label=f"{method}, printed")
         ax.set(xlabel="step of the frame", ylabel=label)
     legend_below(figure, axes, columns=4)
     return figure

@@ -8,10 +8,11 @@ import pytest
 
 from figures.common.bodies import View, pictures
 from figures.common.law_panels import comparison_rows
-from figures.nclaw import fig02, fig03, fig06, fig07
+from figures.nclaw import fig02, fig03, fig06, fig07, table5
 from mpm_ref.materials import Fluid, NoFlow
 from mpm_ref.nclaw.gnn.simulator import Simulator
-from validation.common.results import ProfileResults
+from validation.common import targets
+from validation.common.results import RESULTS, ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.common.scenes import with_
 from validation.common.weights_needed import Untrained
@@ -190,3 +191,13 @@ def test_runs_that_broke_down_are_told(tmp_path):
     assert [target for target, note in notes.items() if note == states.BROKEN] == [
         "s.init", "e.a.init"]
     assert len(notes) == 4
+
+
+def test_table_5_shows_the_printed_errors_beside_ours():
+    """Drawn from the published records, which hold no printed values."""
+    figure = table5.draw(ProfileResults(RESULTS / "standard"))
+    shown = [{line.get_ydata()[0] for line in ax.lines if line.get_linestyle() == "--"}
+             for ax in figure.axes]
+    printed = targets.load()
+    assert shown == [{printed[f"nclaw.table5.{term}.{method}"].value for method in table5.BOTH}
+                     for term in table5.TERMS]
