@@ -13,6 +13,7 @@ Readers pass a `CheckedFile` to h5py, which verifies a block when it is first re
 import io
 import os
 import time
+from functools import partial
 from hashlib import blake2b
 
 HEAD = 512              # bytes: the smallest user block of HDF5
@@ -116,7 +117,7 @@ class CheckedFile(io.RawIOBase):
         begin, n = self._position, min(len(buffer), max(self._end - self._position, 0))
         for k in range(begin // BLOCK, -(-(begin + n) // BLOCK)):
             if k not in self._verified:
-                self._patiently(lambda: self._verify(k))        # noqa: B023
+                self._patiently(partial(self._verify, k))
                 self._verified.add(k)
         buffer[:n] = self._read(begin, n)
         self._position += n

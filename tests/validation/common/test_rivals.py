@@ -22,7 +22,7 @@ from validation.common.rivals import (
     state_errors,
 )
 from validation.common.scenes import catalogue_scene, with_
-from validation.common.tracers import advected
+from validation.common.tracers import CoveringStorage, advected
 
 
 def scene_of_a_few_steps():
@@ -41,6 +41,17 @@ def test_tracers_at_the_particles_go_with_them():
     assert t == pytest.approx(last.t)
     np.testing.assert_allclose(x, field_of(last.state.bodies, "x"), atol=1e-13)
     assert np.abs(x - X).max() > 0.01
+
+
+def test_the_grid_covers_tracers_wherever_they_are():
+    """Reading beyond the grid would go unnoticed."""
+    problem = build(scene_of_a_few_steps())
+    far = problem.bodies[0]._replace(particles=problem.bodies[0].particles._replace(
+        x=np.array([[3.0, -2.0]])))
+    grid = CoveringStorage(problem.stepper().storage, far).cover([problem.bodies[0].particles.x])
+    nodes = np.round(far.particles.x[0] / problem.dx) - grid.origin
+    assert (nodes >= 1).all()
+    assert (nodes <= np.array(grid.m.shape) - 2).all()
 
 
 def test_tracers_outside_of_matter_stand_still():
