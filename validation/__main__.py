@@ -18,7 +18,14 @@ from .common.registry import discover, select
 from .common.report import status_table, write_report
 from .common.results import RESULTS, ROOT, ProfileResults
 from .common.run import RunSetting, run_all
-from .common.standing import WRONG, standing_text, standings
+from .common.standing import (
+    disturbed,
+    read_markers,
+    refusals,
+    standing_text,
+    standings,
+    with_verdicts,
+)
 from .fingerprint.command import app as fingerprint
 
 app = typer.Typer(help=__doc__, add_completion=False, no_args_is_help=True,
@@ -31,7 +38,8 @@ Profile = Annotated[
 Folder = Annotated[Path, typer.Option("--results", help="holds a folder for each profile")]
 Workers = Annotated[int, typer.Option(min=1, help="experiments at a time, sharing the cores")]
 Strict = Annotated[
-    bool, typer.Option("--strict", help="exit code 1 where records are edited, stale or orphaned")]
+    bool, typer.Option("--strict", help="exit code 1 where records are edited or orphaned, or not "
+                       "current and not marked in stale.toml")]
 Ids = Annotated[list[str] | None, typer.Argument(help="ids or their leading parts; none: all")]
 
 
@@ -88,12 +96,17 @@ def report(profile: Profile = "quick", results: Folder = RESULTS):
 @app.command()
 def status(profile: Profile = "standard", results: Folder = RESULTS, strict: Strict = False):
     """Print the verdicts on the papers' printed results, and which records are not current."""
-    stored, catalogue = ProfileResults(results / profile), discover()
-    typer.echo(status_table(stored, targets.load()))
+    stored, catalogue, printed = ProfileResults(results / profile), discover(), targets.load()
+    typer.echo(status_table(stored, printed))
     found = standings(stored, catalogue.experiments)
     typer.echo("\n" + standing_text(found))
-    wrong = strict and any(one.state in WRONG for one in found)
-    raise typer.Exit(max(_report_broken(catalogue.broken), int(wrong)))
+    if beside := disturbed(stored, printed):
+        typer.echo(f"{len(beside)} with judged times measured beside other work: "
+                   f"{', '.join(beside)}")
+    wrong = refusals(found, read_markers(results, profile), with_verdicts(stored, printed))
+    for sentence in wrong if strict else ():
+        typer.echo(sentence, err=True)
+    raise typer.Exit(max(_report_broken(catalogue.broken), int(strict and bool(wrong))))
 
 
 @app.command("recheck")

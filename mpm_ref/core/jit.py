@@ -66,7 +66,7 @@ def _sources(package):
             if path.parts[0] in ("core", "materials") or b"jit import" in text]
 
 
-def _syntax(text):
+def syntax(text):
     """Return the syntax tree of a text, without comments, docstrings and positions, as bytes."""
     tree = ast.parse(text)
     for node in ast.walk(tree):
@@ -97,7 +97,7 @@ def _source_hash(package, root):
         found = ""
     if len(found) == 16:            # neither missing nor half written by another process
         return found
-    found = _hash(map(_syntax, texts))
+    found = _hash(map(syntax, texts))
     with suppress(OSError):
         root.mkdir(parents=True, exist_ok=True)
         known.write_text(found, encoding="ascii")

@@ -4,16 +4,29 @@ import os
 import platform
 import subprocess
 import sys
+import time
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
+from typing import NamedTuple
 
 import numba
 import threadpoolctl
 
+from . import input_files
 from .record import Origin
 from .source_digest import source_digest
 
 PACKAGES = ("numpy", "scipy", "numba")
+IDLE = (3, 4)           # columns of /proc/stat: idle, and waiting for a disk
+COUNTED = 8             # its columns without those of guests, which others contain
+
+
+class Occupation(NamedTuple):
+    """CPU seconds since the start of the machine, and of this process and its children."""
+
+    wall: float
+    machine: float | None           # None where the system does not tell
+    process: float
 
 
 def provenance(source):
@@ -26,20 +39,47 @@ def provenance(source):
     }
 
 
-def origin_of(function, load_before):
-    """Return the `Origin` of the records that a function has made; load_before: see
-    `load_average`. A function of no module in the repository has no digest.
+def origin_of(function, load_before, occupied_before):
+    """Return the `Origin` of the records that a function has made.
+
+    load_before: see `load_average`; occupied_before: `Occupation` at its start. A function of no
+    module in the repository has no digest.
     """
     torch = sys.modules.get("torch")
     return Origin(
         digest=source_digest(function.__module__), cpu=cpu_model(), memory_gb=memory_gb(),
         threads=numba.get_num_threads(), system=platform.platform(), blas=blas(),
-        torch=str(getattr(torch, "__version__", "")), load=(load_before, load_average()))
+        torch=str(getattr(torch, "__version__", "")), load=(load_before, load_average()),
+        others=busy_cores(occupied_before, occupation()), inputs=input_files.opened())
 
 
 def load_average():
     """Return the mean number of running processes over the last minute."""
     return round(os.getloadavg()[0], 2)
+
+
+def occupation():
+    """Return the `Occupation` of the machine now."""
+    return Occupation(time.monotonic(), machine_seconds(), sum(os.times()[:4]))
+
+
+def machine_seconds():
+    """Return the CPU seconds of all processes since the start, None where the system is silent."""
+    try:
+        with open("/proc/stat", encoding="utf-8") as file:
+            ticks = [int(text) for text in file.readline().split()[1:1 + COUNTED]]
+    except (OSError, ValueError):
+        return None
+    return (sum(ticks) - sum(ticks[k] for k in IDLE)) / os.sysconf("SC_CLK_TCK")
+
+
+def busy_cores(before, after):
+    """Return the mean number of cores that other processes kept busy between two `Occupation`s."""
+    wall = after.wall - before.wall
+    if before.machine is None or after.machine is None or wall <= 0:
+        return None
+    others = (after.machine - before.machine) - (after.process - before.process)
+    return round(max(others / wall, 0.0), 3)
 
 
 def cpu_model():

@@ -72,5 +72,9 @@ def allowed(record):
     """Return the relative scatter of a record's number."""
     if record.scatter is not None:
         return record.scatter
-    timed = record.unit in TIME_UNITS or TIME_NOTE.search(record.note)
-    return TIMED if timed else SAME
+    return TIMED if is_timed(record) else SAME
+
+
+def is_timed(record):
+    """Return whether a record's number is a time or a ratio of times."""
+    return record.unit in TIME_UNITS or bool(TIME_NOTE.search(record.note))

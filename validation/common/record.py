@@ -28,6 +28,8 @@ class Origin(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     blas: str = ""
     torch: str = ""                     # its version, where the experiment imported it
     load: tuple[float, float] = (0.0, 0.0)      # average of a minute, before and after
+    others: float | None = None         # cores that other processes kept busy, in the mean
+    inputs: dict[str, str] = {}         # hashes of the data files: see `input_files`
 
 
 class Measurement(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):

@@ -16,7 +16,7 @@ import numpy as np
 
 from .judge import Criterion, finite_ends, judge
 from .progress import SuiteProgress
-from .provenance import load_average, origin_of, provenance
+from .provenance import load_average, occupation, origin_of, provenance
 from .record import PRINTED, Measurement, sealed, write_records, write_whole
 from .targets import Targets
 from .verdicts import VARIANTS, judged, printed_id
@@ -74,7 +74,7 @@ class Run:
         self._drafts, self._tables, self._failed = [], {}, False
         self._cache = Cache(setting.folder / ".parts" / experiment.id, setting.commit, setting.seed)
         self._wall, self._cpu = time.perf_counter(), time.process_time()
-        self._load = load_average()
+        self._load, self._occupied = load_average(), occupation()
 
     @property
     def folder(self):
@@ -155,7 +155,8 @@ class Run:
             "cpu_seconds": round(time.process_time() - self._cpu, 3),
             "seed": self.seed, "command": self._command(),
             "workers": self._setting.workers, **provenance(self._setting.commit)}
-        self._drafts[0]["origin"] = origin_of(self.experiment.function, self._load)
+        self._drafts[0]["origin"] = origin_of(self.experiment.function, self._load,
+                                              self._occupied)
         records = sealed([Measurement(**draft, **common) for draft in self._drafts], self._tables)
         self._write_tables()
         write_records(self._setting.folder / f"{self.experiment.id}.json", records)

@@ -2,7 +2,8 @@
 
 Imports are read from the syntax trees, also those inside functions; modules outside `mpm_ref` and
 `validation` count by their version alone, which each record has. Docstrings and comments are left
-out of the hash. Scenes, studies and weights are no source: their change shows in no digest.
+out of the hash, and so is the STORAGE of numbers, which changes none. For scenes, studies and
+weights see `input_files`.
 """
 
 import ast
@@ -10,10 +11,13 @@ import hashlib
 from functools import cache
 from pathlib import Path
 
-from mpm_ref.core.jit import _syntax
+from mpm_ref.core.jit import syntax
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("mpm_ref", "validation")
+STORAGE = {f"validation.common.{name}" for name in (
+    "input_files", "judge", "progress", "provenance", "record", "registry", "results", "run",
+    "source_digest", "targets", "verdicts")}
 
 
 def source_digest(module, root=ROOT):
@@ -31,11 +35,11 @@ def source_digest(module, root=ROOT):
 
 
 def closure(module, root=ROOT):
-    """Return the names of a module and of all that it imports, directly or not."""
+    """Return the names of a module and of all that it imports, directly or not, but STORAGE."""
     found, left = set(), [module]
     while left:
         name = left.pop()
-        if name not in found:
+        if name not in found | STORAGE:
             found.add(name)
             left += imports(name, root)
     return found
@@ -44,7 +48,7 @@ def closure(module, root=ROOT):
 @cache
 def syntax_of(file):
     """Return the syntax tree of a file, without docstrings, as bytes."""
-    return _syntax(file.read_bytes())
+    return syntax(file.read_bytes())
 
 
 @cache

@@ -1,17 +1,44 @@
-"""Compare stored records with the source of today: current, stale, edited by hand, or orphaned."""
+"""Compare stored records with the source of today: current, stale, edited by hand, or orphaned.
 
+`results/stale.toml` marks records that are known to be of another source, each with its reason.
+"""
+
+from fnmatch import fnmatchcase
+from pathlib import Path
 from typing import NamedTuple
 
+import msgspec
+
+from .input_files import file_hash
+from .recheck import is_timed
 from .record import seal_of
 from .source_digest import ROOT, source_digest
+from .verdicts import judged
+
+QUIET = 0.1             # cores that others keep busy, in the mean, up to which times are judged
+MARKERS = "stale.toml"  # in the folder that holds the profiles
 
 WORDS = {       # of states, as the command line lists them
     "edited": "changed by hand after they were made",
-    "stale": "made by another source than today's",
+    "stale": "made by another source, or from other data files, than today's",
     "orphaned": "of experiments that do not exist any more",
     "early": "made before records had digests and seals",
 }
-WRONG = ("edited", "stale", "orphaned")     # states that a strict check does not accept
+MARKED = ("stale", "early")     # states that a marker excuses
+
+
+class Marker(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Records of a profile that are known not to be current: patterns of ids, and why."""
+
+    profile: str
+    ids: list[str]
+    reason: str
+
+
+class MarkerFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The content of `results/stale.toml`."""
+
+    marker: list[Marker] = []
 
 
 class Standing(NamedTuple):
@@ -38,7 +65,56 @@ def state_of(results, experiment_id, experiment, root=ROOT):
     if not (origin and origin.digest):
         return "early"
     current = source_digest(experiment.function.__module__, root)
-    return "current" if origin.digest == current else "stale"
+    same_inputs = all(file_hash(root / path) == known for path, known in origin.inputs.items())
+    return "current" if origin.digest == current and same_inputs else "stale"
+
+
+def read_markers(folder, profile):
+    """Return the `Marker`s of a profile; folder: holds the profiles."""
+    file = Path(folder) / MARKERS
+    if not file.is_file():
+        return []
+    markers = msgspec.toml.decode(file.read_bytes(), type=MarkerFile).marker
+    return [marker for marker in markers if marker.profile == profile]
+
+
+def refusals(all_standings, markers, judged_ids):
+    """Return sentences on what a strict check refuses.
+
+    That is a judged record that is not current and has no marker, one that was edited or has no
+    experiment, and a pattern of a marker that marks nothing. judged_ids: experiments with verdicts.
+    """
+    patterns = {pattern for marker in markers for pattern in marker.ids}
+    excused = {one.experiment for one in all_standings if one.state in MARKED}
+    found = [f"{one.experiment}: {WORDS[one.state]}" for one in all_standings
+             if one.state != "current" and one.experiment in judged_ids
+             and not (one.state in MARKED and matches(one.experiment, patterns))]
+    return found + [f"{MARKERS}: {pattern!r} marks nothing that is not current; remove it"
+                    for pattern in sorted(patterns)
+                    if not any(fnmatchcase(id, pattern) for id in excused)]
+
+
+def matches(experiment_id, patterns):
+    """Return whether the id of an experiment matches one of the patterns."""
+    return any(fnmatchcase(experiment_id, pattern) for pattern in patterns)
+
+
+def with_verdicts(results, targets):
+    """Return the ids of experiments with a record that is judged."""
+    return {id for id in results.ids() if any(
+        judged(record, targets).verdict != "info" for record in results.records(id))}
+
+
+def disturbed(results, targets):
+    """Return the ids of experiments whose judged times were measured beside other work."""
+    return [id for id in results.ids() if was_disturbed(results.records(id), targets)]
+
+
+def was_disturbed(records, targets):
+    """Return whether records have a judged time, and other processes more than QUIET cores."""
+    origin = records[0].origin
+    return bool(origin and origin.others is not None and origin.others > QUIET and any(
+        is_timed(record) and judged(record, targets).verdict != "info" for record in records))
 
 
 def standing_text(all_standings):

@@ -1,6 +1,8 @@
 """Records that were edited, or whose source has changed, are found; and made again, compared."""
 
+import hashlib
 import json
+import time
 from pathlib import Path
 
 import msgspec
@@ -8,14 +10,29 @@ import pytest
 from typer.testing import CliRunner
 
 from validation import __main__ as cli
-from validation.common import standing
+from validation.common import input_files, standing
+from validation.common.input_files import opened
+from validation.common.provenance import Occupation, busy_cores, occupation
 from validation.common.recheck import ChangedNumber, differences, recheck, sample
-from validation.common.record import Measurement, read_records, write_records
-from validation.common.registry import Catalogue, Experiment
+from validation.common.record import Measurement, Origin, read_records, sealed, write_records
+from validation.common.registry import Catalogue, Experiment, discover
 from validation.common.results import RESULTS, ProfileResults
 from validation.common.run import RunSetting, run_all
-from validation.common.source_digest import closure, source_digest
-from validation.common.standing import standing_text, standings, state_of
+from validation.common.scenes import catalogue_scene
+from validation.common.source_digest import ROOT, STORAGE, closure, file_of, source_digest
+from validation.common.standing import (
+    WORDS,
+    Marker,
+    Standing,
+    disturbed,
+    read_markers,
+    refusals,
+    standing_text,
+    standings,
+    state_of,
+    with_verdicts,
+)
+from validation.common.targets import Targets, load
 from validation.hot.table3 import table3
 
 ID = "verification.toy"
@@ -81,6 +98,16 @@ def test_another_source_makes_records_stale(results, monkeypatch):
     assert state(results) == "stale"
 
 
+def test_a_changed_data_file_makes_records_stale(results):
+    records = results.records(ID)
+    inputs = {"scenes/hello.toml": "0" * 16}
+    origin = msgspec.structs.replace(records[0].origin, inputs=inputs, seal="")
+    write_records(results.folder / f"{ID}.json", sealed(
+        [msgspec.structs.replace(records[0], origin=origin), *records[1:]],
+        results.table_bytes(ID)))
+    assert state(results) == "stale"
+
+
 def test_records_without_an_experiment_are_orphaned(results):
     assert state(results, {}) == "orphaned"
 
@@ -133,6 +160,110 @@ def write(root, file, text):
     path = Path(root, file)
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text)
+
+
+def test_the_storage_of_numbers_is_no_source():
+    names = closure("validation.hot.table3")
+    assert not names & STORAGE
+    assert {"validation.common.scenes", "mpm_ref.hot.step"} <= names
+    assert all(file_of(name, ROOT) for name in STORAGE)
+
+
+# Data files
+
+def test_data_files_that_are_opened_are_noted_with_their_hash(tmp_path):
+    for file in ("scenes/a.toml", "validation/nsf/weights/b.npz", "validation/targets/c.toml",
+                 "mpm_ref/code.py", "results/d.json"):
+        write(tmp_path, file, file)
+        (tmp_path / file).read_bytes()
+    write(tmp_path, "scenes/unread.toml", "")
+    (tmp_path / "scenes/unread.toml").unlink()
+    assert opened(tmp_path) == {file: hashlib.sha256(file.encode()).hexdigest()[:16]
+                                for file in ("scenes/a.toml", "validation/nsf/weights/b.npz")}
+
+
+def test_an_experiment_records_the_scene_that_it_reads(tmp_path, monkeypatch):
+    monkeypatch.setattr(input_files, "_opened", set())
+
+    def reads_a_scene(run):
+        catalogue_scene("hello")
+        run.record(f"{ID}.error", 0.5, comparator="<=", bound=1.0)
+
+    assert run_all([TOY._replace(function=reads_a_scene)], RunSetting("quick", tmp_path)) == []
+    inputs = ProfileResults(tmp_path).records(ID)[0].origin.inputs
+    assert inputs == {"scenes/hello.toml": input_files.file_hash(ROOT / "scenes/hello.toml")}
+
+
+# Markers
+
+def marked(state, *patterns, judged=(ID,)):
+    return refusals([Standing(ID, state)], [Marker("quick", [*patterns], "of late")], {*judged})
+
+
+def test_a_judged_record_that_is_not_current_needs_a_marker():
+    assert marked("current") == [] == marked("stale", ID) == marked("early", "verification.*")
+    assert marked("stale") == [f"{ID}: {WORDS['stale']}"]
+    assert len(marked("early")) == 1
+    assert marked("stale", judged=()) == []
+
+
+@pytest.mark.parametrize("state", ["edited", "orphaned"])
+def test_no_marker_excuses_an_edit_or_a_record_without_experiment(state):
+    assert f"{ID}: {WORDS[state]}" in marked(state, ID)
+
+
+def test_a_marker_that_marks_nothing_is_a_fault():
+    assert len(marked("current", ID)) == 1
+    assert len(marked("stale", ID, "nsf.*")) == 1
+
+
+def test_markers_are_read_by_profile(tmp_path):
+    assert read_markers(tmp_path, "quick") == []
+    (tmp_path / "stale.toml").write_text(
+        '[[marker]]\nprofile = "quick"\nids = ["a.*"]\nreason = "of late"\n')
+    assert read_markers(tmp_path, "quick") == [Marker("quick", ["a.*"], "of late")]
+    assert read_markers(tmp_path, "standard") == []
+
+
+@pytest.mark.parametrize("profile", ["standard", "paper"])
+def test_published_records_are_current_or_marked(profile):
+    published = ProfileResults(RESULTS / profile)
+    found = standings(published, discover().experiments)
+    assert refusals(found, read_markers(RESULTS, profile), with_verdicts(published, load())) == []
+
+
+# Times beside other work
+
+@pytest.mark.parametrize(("others", "unit", "rule", "expected"), [
+    (0.5, "x", {"comparator": "<=", "bound": 2.0}, [ID]),
+    (0.05, "x", {"comparator": "<=", "bound": 2.0}, []),
+    (None, "x", {"comparator": "<=", "bound": 2.0}, []),
+    (0.5, "x", {"comparator": "info"}, []),
+    (0.5, "%", {"comparator": "<=", "bound": 2.0}, []),
+])
+def test_judged_times_measured_beside_other_work_are_listed(tmp_path, others, unit, rule, expected):
+    fields = {"note": "", **rule}
+    record = msgspec.structs.replace(measured(1.0, unit=unit), origin=Origin(others=others),
+                                     **fields)
+    write_records(tmp_path / f"{ID}.json", [record])
+    assert disturbed(ProfileResults(tmp_path), Targets({})) == expected
+
+
+def test_cores_that_other_processes_keep_busy():
+    before = Occupation(10.0, 100.0, 5.0)
+    assert busy_cores(before, Occupation(20.0, 118.0, 15.0)) == 0.8
+    assert busy_cores(before, Occupation(20.0, 109.0, 15.0)) == 0.0
+    assert busy_cores(before, Occupation(20.0, None, 15.0)) is None
+
+
+def test_own_work_does_not_count_as_that_of_others():
+    before = occupation()
+    end = time.process_time() + 0.5
+    while time.process_time() < end:
+        pass
+    after = occupation()
+    assert after.process - before.process >= 0.45
+    assert after.machine is None or after.machine - before.machine >= 0.4
 
 
 # Records that are made again
@@ -204,6 +335,15 @@ def test_status_lists_what_is_not_current_and_is_strict_on_request(invoke, resul
     told = invoke("status")
     assert (told.exit_code, invoke("status", "--strict").exit_code) == (0, 1)
     assert f"1 changed by hand after they were made: {ID}" in told.output
+
+
+def test_status_accepts_what_is_marked(invoke, results, monkeypatch):
+    monkeypatch.setattr(standing, "source_digest", lambda module, root: "0" * 16)
+    strict = invoke("status", "--strict")
+    assert (strict.exit_code, f"{ID}: {WORDS['stale']}" in strict.output) == (1, True)
+    (results.folder.parent / "stale.toml").write_text(
+        f'[[marker]]\nprofile = "quick"\nids = ["{ID}"]\nreason = "of late"\n')
+    assert invoke("status", "--strict").exit_code == 0
 
 
 def test_recheck_runs_a_sample_and_leaves_the_records(invoke, results):
