@@ -1,0 +1,70 @@
+"""Table 3 over entire runs: the work of projected Newton depends on where in its motion a scene is.
+
+`table3` measures five steps of each scene once its contact or pull has begun. Here each scene runs
+by HOT to its end, at the size of the quick profile, and the steps that are measured lie evenly over
+the run, as the paper's means do. With so few particles they are no reproduction.
+"""
+
+import numpy as np
+
+from mpm_ref.scene import build
+from mpm_ref.simulate import EVEN, ended, simulate
+
+from ..common.registry import experiment
+from ..common.scenes import particle_count
+from .one_step import implicit_step, solve_step
+from .table3 import METHODS, cost
+from .warm_states import PRINTED, next_step_length, scene, take_step
+
+SIZE = "quick"
+COLUMNS = ("scene", "t", "dt", "particles", "preconditioner", "newton", "cg", "converged")
+
+
+def steps_evenly(problem, count):
+    """Yield (state, `ImplicitStep`) of `count` steps evenly over a run by the problem's method.
+
+    Each is valid until the next is asked for. There are fewer where a step leads to the end.
+    """
+    state, stepper = next(simulate(problem)).state, problem.stepper()
+    due = problem.clock.end * (np.arange(count) + 0.5) / count
+    for t in due:
+        while state.t < t * (1.0 - EVEN) and not ended(problem.clock, state):
+            take_step(problem, stepper, state)
+        if ended(problem.clock, state):
+            return
+        yield state, implicit_step(stepper, state, next_step_length(problem, stepper, state))
+        take_step(problem, stepper, state)
+
+
+def measure(name, count):
+    """Return ({preconditioner: `RowCost`}, rows of COLUMNS) of a scene's entire run."""
+    problem = build(scene(name, SIZE))
+    size, by_method = particle_count(problem.bodies), {short: [] for short in METHODS}
+    advanced, rows = 0.0, []
+    for state, step in steps_evenly(problem, count):
+        advanced += step.dt
+        for short, method in METHODS.items():
+            report = solve_step(step, method).report
+            by_method[short].append(report)
+            rows.append((name, state.t, step.dt, size, short, report.iterations,
+                         report.cg_iterations, report.converged))
+    return {short: cost((name, short, size), reports, advanced)
+            for short, reports in by_method.items()}, rows
+
+
+@experiment("hot.table3-runs", title="Newton's CG iterations over entire runs",
+            profiles=("quick", "standard"), budget={"quick": 12, "standard": 900})
+def table3_runs(run):
+    """Record mean CG iterations of a step by both preconditioners, and those of each step."""
+    names, count = run.choose(quick=(("faceless",), 2), standard=(PRINTED, 10))
+    table = []
+    for name in run.progress(names, "scenes"):
+        costs, rows = measure(name, count)
+        table += rows
+        for short, mean in costs.items():
+            few, most = np.quantile([row[6] for row in rows if row[4] == short], (0.0, 1.0))
+            run.record(f"hot.table3.{name}.{short}.cg_iters.small", mean.cg,
+                       scale=f"{mean.particles} particles, {mean.steps} steps evenly over the run",
+                       note=f"{few:.0f} to {most:.0f} by step; {mean.newton:.1f} Newton steps"
+                       + ("" if mean.converged else "; not every step converged"))
+    run.table("steps", COLUMNS, table)
