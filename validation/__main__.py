@@ -20,10 +20,12 @@ from .common.results import RESULTS, ROOT, ProfileResults
 from .common.run import RunSetting, run_all
 from .common.standing import WRONG, standing_text, standings
 from .fingerprint.command import app as fingerprint
+from .mutations.command import mutate
 
 app = typer.Typer(help=__doc__, add_completion=False, no_args_is_help=True,
                   pretty_exceptions_enable=False)
 app.add_typer(fingerprint, name="fingerprint")
+app.command()(mutate)
 
 Profile = Annotated[
     Literal["quick", "standard", "paper"],
