@@ -2,7 +2,7 @@
 
 The statements of `before` and `after` see the arguments of a call by their names, and those of
 `after` also `result`, which they may assign; the expression of `value` sees what it replaces as
-`old`. All see NumPy as `np`. Kernels that Numba compiles have their callees and constants within
+`old`. All see NumPy as `np`, and `scaled` of `scaling`. Kernels that Numba compiles have their callees and constants within
 them, so that such an attribute of `mpm_ref` is refused.
 """
 
@@ -13,7 +13,11 @@ from functools import wraps
 
 import numpy as np
 
+from .scaling import scaled
+
 PACKAGES = ("mpm_ref", "validation")
+INLINED = (bool, int, float, tuple, np.ndarray)
+NAMES = {"np": np, "scaled": scaled}
 
 
 def apply(mutation):
@@ -51,7 +55,7 @@ def owner_of(mutation):
 def require_seen(mutation, old):
     """Raise ValueError where compiled kernels hold a copy of an attribute."""
     compiled = hasattr(old, "py_func")
-    constant = not callable(old) and mutation.where.startswith("mpm_ref")
+    constant = isinstance(old, INLINED) and mutation.where.startswith("mpm_ref")
     if compiled or constant:
         raise ValueError(f"mutation {mutation.name!r}: kernels hold a copy of {mutation.where}; "
                          "break a Python function that calls them")
@@ -60,7 +64,7 @@ def require_seen(mutation, old):
 def replacement(mutation, old):
     """Return what stands in the place of an attribute."""
     if mutation.value:
-        return eval(mutation.value, {"np": np, "old": old})
+        return eval(mutation.value, {**NAMES, "old": old})
     if mutation.before:
         return with_arguments(old, mutation.before)
     return with_result(old, mutation.after)
@@ -73,7 +77,7 @@ def with_arguments(function, statements):
     @wraps(function)
     def broken(*args, **kwargs):
         given = signature.bind(*args, **kwargs)
-        names = {"np": np, **given.arguments}
+        names = {**NAMES, **given.arguments}
         exec(code, names)
         given.arguments.update((name, names[name]) for name in given.arguments)
         return function(*given.args, **given.kwargs)
@@ -87,7 +91,7 @@ def with_result(function, statements):
 
     @wraps(function)
     def broken(*args, **kwargs):
-        names = {"np": np, **signature.bind(*args, **kwargs).arguments,
+        names = {**NAMES, **signature.bind(*args, **kwargs).arguments,
                  "result": function(*args, **kwargs)}
         exec(code, names)
         return names["result"]
