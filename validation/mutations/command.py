@@ -27,33 +27,39 @@ def mutate(ids: Ids = None, table_file: Table = table.FILE, only: Only = None,
 
     The exit code is 1 where an experiment with verdicts survives all its mutations.
     """
-    mutations = listing.load()
+    mutations, outcomes = listing.load(), {}
     chosen = [e.id for e in select(discover().experiments, ids, "quick") if mutations.of(e.id)]
     with TemporaryDirectory() as folder:
-        outcomes = outcomes_of(mutations, chosen, only, Path(folder), sound)
-    rows = {id: table.row_of(found, commit(ROOT)) for id, found in outcomes.items()}
-    table.write(table_file, (table.read(table_file) | rows).values())
-    for row in rows.values():
+        for found in trials(mutations, chosen, only, Path(folder), sound):
+            for one in found:
+                outcomes.setdefault(one.experiment, []).append(one)
+            store(table_file, outcomes)         # an interrupted pass leaves what it has found
+    rows = store(table_file, outcomes)
+    for row in rows:
         typer.echo(f"{row.experiment}: {row.broken} of {row.checks} checks broken by "
                    f"{row.mutations or 'none'}" + (f"; not: {row.unbroken}" * bool(row.unbroken)))
-    raise typer.Exit(int(any(row.checks and not row.broken for row in rows.values())))
+    raise typer.Exit(int(any(row.checks and not row.broken for row in rows)))
 
 
-def outcomes_of(mutations, ids, only, folder, sound=None):
-    """Return {experiment: its `Outcome`s} of experiments, run broken and, unless the results in the
-    folder `sound` are given, as they are.
+def store(table_file, outcomes):
+    """Write the rows of experiments' `Outcome`s, by experiment, into a table, and return them."""
+    rows = {id: table.row_of(found, commit(ROOT)) for id, found in outcomes.items()}
+    table.write(table_file, (table.read(table_file) | rows).values())
+    return list(rows.values())
+
+
+def trials(mutations, ids, only, folder, sound=None):
+    """Yield the list of `Outcome`s of each mutation: experiments are run broken and, unless the
+    results in the folder `sound` are given, as they are.
     """
     setting = RunSetting("quick", sound or folder / "sound", targets=targets.load())
     if sound is None:
         run_in_new_process(ids, setting)
-    outcomes = {}
     for k, mutation in enumerate(mutations.mutation):
         some = [id for id in ids if listing.matches(mutation.experiments, id)]
         if some and (not only or mutation.name in only):
             typer.echo(f"{mutation.name}: {mutation.breaks} ({len(some)} experiments)")
             broken = setting._replace(folder=folder / str(k))
             run_in_new_process(some, broken, mutation)
-            for id in some:
-                outcomes.setdefault(id, []).append(
-                    compare(id, mutation, setting.folder, broken.folder, setting.targets))
-    return outcomes
+            yield [compare(id, mutation, setting.folder, broken.folder, setting.targets)
+                   for id in some]

@@ -1,9 +1,9 @@
 """The committed list of mutations, `validation/mutations.toml`, and what it covers.
 
-    [[mutation]]        name, experiments (patterns of ids), breaks (a sentence), where
-                        ("module:attribute" or "module:Class.method"), and one of
-                        before, after (statements) or value (an expression): see `patch`
-    [[without]]         experiments whose verdicts no mutation can change, and why
+[[mutation]]    name, experiments (patterns of ids), breaks (a sentence), where
+                ("module:attribute" or "module:Class.method"), and one of before, after
+                (statements) or value (an expression): see `patch`
+[[without]]     experiments whose verdicts no mutation can change, and why
 """
 
 import tomllib

@@ -2,8 +2,8 @@
 
 The statements of `before` and `after` see the arguments of a call by their names, and those of
 `after` also `result`, which they may assign; the expression of `value` sees what it replaces as
-`old`. All see NumPy as `np`, and `scaled` of `scaling`. Kernels that Numba compiles have their callees and constants within
-them, so that such an attribute of `mpm_ref` is refused.
+`old`. All see NumPy as `np`, and `scaled` of `scaling`. Kernels that Numba compiles have their
+callees and constants within them, so that such an attribute of `mpm_ref` is refused.
 """
 
 import importlib

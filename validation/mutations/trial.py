@@ -16,6 +16,7 @@ from ..common.verdicts import judged
 from ..hot import warm_states
 from .patch import apply
 
+
 class Outcome(NamedTuple):
     """The checks of an experiment that pass as it is, and those of them that a mutation breaks."""
 
@@ -49,7 +50,8 @@ def run_here(ids, setting, mutation, find):
 def keep_cache_sound(folder):
     """Let the states of HOT's scenes be read from, and written to, a copy in a folder."""
     sound = warm_states.cache_folder()
-    shutil.copytree(sound, folder / "warm_states" / sound.name)
+    if sound.is_dir():
+        shutil.copytree(sound, folder / "warm_states" / sound.name)
     warm_states.cache_folder = partial(warm_states.cache_folder, folder)
 
 
