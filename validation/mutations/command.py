@@ -28,7 +28,8 @@ def mutate(ids: Ids = None, table_file: Table = table.FILE, only: Only = None,
     The exit code is 1 where an experiment with verdicts survives all its mutations.
     """
     mutations, outcomes = listing.load(), {}
-    chosen = [e.id for e in select(discover().experiments, ids, "quick") if mutations.of(e.id)]
+    chosen = [e.id for e in select(discover().experiments, ids, "quick")
+              if mutations.mutations_of(e.id)]
     with TemporaryDirectory() as folder:
         for found in trials(mutations, chosen, only, Path(folder), sound):
             for one in found:

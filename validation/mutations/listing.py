@@ -44,7 +44,7 @@ class MutationList(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     mutation: list[Mutation]
     without: list[Without] = []
 
-    def of(self, experiment_id):
+    def mutations_of(self, experiment_id):
         """Return the mutations of an experiment."""
         return [one for one in self.mutation if matches(one.experiments, experiment_id)]
 
@@ -79,7 +79,7 @@ def load(path=FILE):
 def unlisted(mutations, experiment_ids):
     """Return the ids that have neither a mutation nor a reason."""
     return [id for id in experiment_ids
-            if not (mutations.of(id) or mutations.reason_without(id))]
+            if not (mutations.mutations_of(id) or mutations.reason_without(id))]
 
 
 def unused(mutations, experiment_ids):

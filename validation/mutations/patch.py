@@ -27,7 +27,7 @@ def apply(mutation):
     """
     owner, name = owner_of(mutation)
     old = getattr(owner, name)
-    require_seen(mutation, old)
+    require_uncompiled(mutation, old)
     new = replacement(mutation, old)
     setattr(owner, name, new)
     if not inspect.isclass(owner):
@@ -52,7 +52,7 @@ def owner_of(mutation):
     return owner, name
 
 
-def require_seen(mutation, old):
+def require_uncompiled(mutation, old):
     """Raise ValueError where compiled kernels hold a copy of an attribute."""
     compiled = hasattr(old, "py_func")
     constant = isinstance(old, INLINED) and mutation.where.startswith("mpm_ref")

@@ -13,7 +13,7 @@ FILE = RESULTS / "mutations.csv"
 
 
 class Row(NamedTuple):
-    """What the mutations of an experiment did to its checks at the quick profile."""
+    """The effect of mutations on the checks of an experiment at the quick profile."""
 
     experiment: str
     mutations: str          # names of those that broke a check, in the order of the list
