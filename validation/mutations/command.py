@@ -16,7 +16,8 @@ from .trial import compare, run_in_new_process
 
 Ids = Annotated[list[str] | None, typer.Argument(help="ids or their leading parts; none: all")]
 Table = Annotated[Path, typer.Option("--table", help="CSV file whose rows are replaced")]
-Only = Annotated[list[str] | None, typer.Option("--only", help="names of mutations; none: all")]
+Only = Annotated[list[str] | None, typer.Option("--only", help="names of mutations, whose outcomes "
+                                                            "are added; none: all")]
 Sound = Annotated[Path | None, typer.Option("--sound", help="quick results of this source, made "
                                                             "before; none: run them first")]
 
@@ -27,25 +28,29 @@ def mutate(ids: Ids = None, table_file: Table = table.FILE, only: Only = None,
 
     The exit code is 1 where an experiment with verdicts survives all its mutations.
     """
-    mutations, outcomes = listing.load(), {}
+    mutations, outcomes, rows = listing.load(), {}, []
     chosen = [e.id for e in select(discover().experiments, ids, "quick")
               if mutations.mutations_of(e.id)]
     with TemporaryDirectory() as folder:
         for found in trials(mutations, chosen, only, Path(folder), sound):
             for one in found:
                 outcomes.setdefault(one.experiment, []).append(one)
-            store(table_file, outcomes)         # an interrupted pass leaves what it has found
-    rows = store(table_file, outcomes)
+            rows = store(table_file, outcomes, bool(only))      # also of an interrupted pass
     for row in rows:
         typer.echo(f"{row.experiment}: {row.broken} of {row.checks} checks broken by "
                    f"{row.mutations or 'none'}" + (f"; not: {row.unbroken}" * bool(row.unbroken)))
     raise typer.Exit(int(any(row.checks and not row.broken for row in rows)))
 
 
-def store(table_file, outcomes):
-    """Write the rows of experiments' `Outcome`s, by experiment, into a table, and return them."""
-    rows = {id: table.row_of(found, commit(ROOT)) for id, found in outcomes.items()}
-    table.write(table_file, (table.read(table_file) | rows).values())
+def store(table_file, outcomes, add):
+    """Write the rows of experiments' `Outcome`s, by experiment, into a table, and return them; add:
+    keep what earlier mutations broke.
+    """
+    rows, stored = {}, table.read(table_file)
+    for id, found in outcomes.items():
+        row = table.row_of(found, commit(ROOT))
+        rows[id] = table.merged(stored.get(id), row) if add else row
+    table.write(table_file, (stored | rows).values())
     return list(rows.values())
 
 

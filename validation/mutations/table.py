@@ -35,6 +35,25 @@ def row_of(outcomes, commit):
                len(broken), "; ".join(left), commit, datetime.now(UTC).strftime("%Y-%m-%d"))
 
 
+def merged(stored, row):
+    """Return a `Row` with what it and an earlier one of the experiment, or None, found: of other
+    mutations.
+    """
+    if stored is None or stored.checks != row.checks:
+        return row
+    left = [id for id in parts(row.unbroken) if id in parts(stored.unbroken)]
+    effective = dict.fromkeys([*parts(stored.mutations), *parts(row.mutations)])
+    others = dict.fromkeys([*parts(stored.without_effect), *parts(row.without_effect)])
+    return row._replace(
+        mutations="; ".join(effective), unbroken="; ".join(left), broken=row.checks - len(left),
+        without_effect="; ".join(name for name in others if name not in effective))
+
+
+def parts(text):
+    """Return the list of names in a cell."""
+    return text.split("; ") if text else []
+
+
 def names_of(outcomes):
     """Return the names of the outcomes' mutations, and which ended in an error."""
     return "; ".join(f"{one.mutation} (raised)" if one.raised else one.mutation

@@ -104,6 +104,14 @@ def test_an_experiment_that_raises_is_no_changed_verdict(tmp_path):
     assert "changed (raised)" in table.row_of([outcome], "abc").without_effect
 
 
+def test_a_row_is_merged_with_what_other_mutations_broke():
+    first = table.Row(TOY, "a", "b (raised)", 3, 1, "y; z", "1", "2026-01-01")
+    second = table.Row(TOY, "c", "d", 3, 1, "x; z", "2", "2026-01-02")
+    assert table.merged(None, second) == second
+    assert table.merged(first, second) == table.Row(
+        TOY, "a; c", "b (raised); d", 3, 2, "z", "2", "2026-01-02")
+
+
 def test_what_kernels_hold_a_copy_of_is_refused():
     for where in ("mpm_ref.core.spline:base_of", "mpm_ref.core.spline:STENCILS_OF_NOTHING"):
         with pytest.raises(ValueError, match=r"kernels hold a copy|has no attribute"):
