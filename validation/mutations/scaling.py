@@ -4,7 +4,7 @@ import msgspec
 import numpy as np
 
 COUNTED = ("steps", "every")        # integers that may be scaled too
-FIXED = ("dim", "seed", "low", "high", "interval", "end")
+FIXED = ("dim", "seed", "low", "high", "interval", "end", "scheme")
 
 
 def scaled(value, factor, name=""):
