@@ -27,10 +27,12 @@ from .common.standing import (
     with_verdicts,
 )
 from .fingerprint.command import app as fingerprint
+from .mutations.command import mutate
 
 app = typer.Typer(help=__doc__, add_completion=False, no_args_is_help=True,
                   pretty_exceptions_enable=False)
 app.add_typer(fingerprint, name="fingerprint")
+app.command()(mutate)
 
 Profile = Annotated[
     Literal["quick", "standard", "paper"],

@@ -16,7 +16,7 @@ from validation.common.registry import GROUPS, discover
 from validation.common.report import chapters
 from validation.common.results import RESULTS, ProfileResults
 
-from . import settings, verdict_pages
+from . import mutation_page, settings, verdict_pages
 from .markdown import cell, grid_table
 
 FOLDER = "results/numbers"
@@ -60,7 +60,7 @@ def pages():
     result["results/generated/experiments.md"] = experiments(missing)
     result |= verdict_pages.pages(targets.load(), [
         (label(one), row) for one in shown_experiments() for row in one.rows])
-    return result | settings.pages(ProfileResults(RESULTS / "standard"))
+    return result | mutation_page.pages() | settings.pages(ProfileResults(RESULTS / "standard"))
 
 
 @cache
