@@ -1,4 +1,4 @@
-"""What the papers' claims come to: verdicts and ratios of the numbers that stand for each.
+"""Verdicts and ratios of the numbers that stand for the claims of the papers.
 
 Rows are pairs (name of the place where it is shown, `report.ReportRow`).
 """
@@ -18,13 +18,13 @@ class Selected(NamedTuple):
     """The numbers that stand for a headline."""
 
     ids: list           # of printed numbers
-    own: list           # pairs of the paper's own method
-    others: list        # pairs of other methods and bodies
+    printed: list       # pairs of the paper's method
+    variants: list      # pairs of other methods and bodies
 
     @property
     def shown(self):
-        """The pairs whose ratios are given: the paper's own method, or else the others."""
-        return self.own or self.others
+        """Return the pairs whose ratios are given: of the paper's method, or else all others."""
+        return self.printed or self.variants
 
 
 def selected(headline, targets, pairs):
@@ -41,14 +41,14 @@ def selected(headline, targets, pairs):
 
 def verdict_text(one):
     """Return the counts of verdicts on the paper's own method, then on each other one."""
-    parts = [counted([row for _, row in one.own])] if one.own else []
+    parts = [counted([row for _, row in one.printed])] if one.printed else []
     by_words = {}
-    for _, row in one.others:
+    for _, row in one.variants:
         words = row.id.removeprefix(next(id for id in one.ids if row.id.startswith(f"{id}.")))
         by_words.setdefault(words.removeprefix(".").replace(".", ", "), []).append(row)
     parts += [f"*{words}*: {counted(rows)}" for words, rows in by_words.items()]
-    absent = len(one.ids) - len({row.id for _, row in one.own})
-    if absent and not one.others:
+    absent = len(one.ids) - len({row.id for _, row in one.printed})
+    if absent and not one.variants:
         parts.append(f"{absent} not measured")
     return "; ".join(parts)
 
