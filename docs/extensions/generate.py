@@ -2,8 +2,8 @@
 
 `reference/api` from the modules, `reference/cli.md` from the command line, `reference/equations.md`
 from the citations in code and tests, `reference/packages` and `contributing.md` from the READMEs of
-packages and CONTRIBUTING, `results/generated` and `results/numbers` from the records of
-experiments, and `tutorials` from the notebooks.
+packages and CONTRIBUTING, `results/generated`, `results/numbers` and `results/paper-figures` from
+the records of experiments, and `tutorials` from the notebooks.
 """
 
 import ast
@@ -21,7 +21,8 @@ from .markdown import cell
 
 DOCS = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "mpm_ref"
-FOLDERS = ("reference/api", "reference/packages", "results/generated", "results/numbers")
+FOLDERS = ("reference/api", "reference/packages", "results/generated", "results/numbers",
+           "results/paper-figures")
 
 
 def write_all(app, config):

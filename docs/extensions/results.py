@@ -16,7 +16,7 @@ from validation.common.registry import GROUPS, discover
 from validation.common.report import chapters
 from validation.common.results import RESULTS, ProfileResults
 
-from . import mutation_page, settings, verdict_pages
+from . import mutation_page, paper_figures, settings, verdict_pages
 from .markdown import cell, grid_table
 
 FOLDER = "results/numbers"
@@ -58,8 +58,10 @@ def pages():
     result |= {f"{FOLDER}/{figure_file(one, figure)}": base64.b64decode(figure.data)
                for one in shown_experiments() for figure in one.section.figures}
     result["results/generated/experiments.md"] = experiments(missing)
-    result |= verdict_pages.pages(targets.load(), [
-        (label(one), row) for one in shown_experiments() for row in one.rows])
+    printed = targets.load()
+    rows = [(label(one), row) for one in shown_experiments() for row in one.rows]
+    result |= verdict_pages.pages(printed, rows)
+    result |= paper_figures.pages(printed, rows, images())
     return result | mutation_page.pages() | settings.pages(ProfileResults(RESULTS / "standard"))
 
 
@@ -158,6 +160,13 @@ def heading(page):
 def figure_file(one, figure):
     """Return the path of a figure, which each profile has one of, beside the page."""
     return f"figures/{one.profile}/{figure.name}.webp"
+
+
+def images():
+    """Return {name: (path from a neighbouring folder, caption)} of the standard figures."""
+    return {figure.name: (f"../numbers/{figure_file(one, figure)}", figure.caption)
+            for one in shown_experiments() if one.profile == "standard"
+            for figure in one.section.figures}
 
 
 def section_text(one, own):

@@ -4,10 +4,10 @@ Rows are those of the report, each with the name of the place where it is shown.
 """
 
 from collections import Counter
-from fnmatch import fnmatchcase
 
-from validation.common.report import STATE_NAMES, ratio
-from validation.common.verdicts import VARIANTS, printed_id
+from validation.common import summary
+from validation.common.summary import STATE_NAMES
+from validation.common.verdicts import VARIANTS
 
 from .markdown import cell, grid_table
 
@@ -44,46 +44,10 @@ def headlines(targets, rows):
 
 def headline_row(headline, targets, rows):
     """Return the cells of a headline."""
-    ids = [id for id in targets if not targets[id].again
-           and any(fnmatchcase(id, pattern) for pattern in headline.ids)]
-    by_id = {}
-    for place, row in rows:
-        by_id.setdefault(printed_id(row.id, targets)[0], []).append((place, row))
-    own = [pair for id in ids for pair in by_id.get(id, ()) if pair[1].id == id]
-    others = [pair for id in ids for pair in by_id.get(id, ()) if pair[1].id != id]
-    shown = own or others
-    return [cell(headline.claim), verdict_text(ids, own, others), ratio_text(shown),
-            cell(shown[0][1].scale) if shown else "",
-            f"[{len(ids)}](#{shown[0][0]})" if shown else str(len(ids))]
-
-
-def verdict_text(ids, own, others):
-    """Return the counts of verdicts on the paper's own method, then on each other one."""
-    parts = [counted([row for _, row in own])] if own else []
-    by_words = {}
-    for _, row in others:
-        words = row.id.removeprefix(next(id for id in ids if row.id.startswith(f"{id}.")))
-        by_words.setdefault(words.removeprefix(".").replace(".", ", "), []).append(row)
-    parts += [f"*{words}*: {counted(rows)}" for words, rows in by_words.items()]
-    absent = len(ids) - len({row.id for _, row in own})
-    if absent and not others:
-        parts.append(f"{absent} not measured")
-    return "; ".join(parts)
-
-
-def counted(rows):
-    """Return the counts of verdicts as text."""
-    found = Counter(STATE_NAMES[row.verdict] for row in rows)
-    return ", ".join(f"{count} {name}" for name, count in found.items())
-
-
-def ratio_text(pairs):
-    """Return the range of the ratios of numbers."""
-    values = sorted(float(row.ratio) for _, row in pairs if row.ratio != ratio(None, 1.0))
-    if not values:
-        return "—"
-    ends = f"{values[0]:.2g}", f"{values[-1]:.2g}"
-    return ends[0] if ends[0] == ends[1] else " to ".join(ends)
+    one = summary.selected(headline, targets, rows)
+    return [cell(headline.claim), summary.verdict_text(one), summary.ratio_text(one.shown),
+            cell(one.shown[0][1].scale) if one.shown else "",
+            f"[{len(one.ids)}](#{one.shown[0][0]})" if one.shown else str(len(one.ids))]
 
 
 # --- counts

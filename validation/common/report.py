@@ -1,4 +1,5 @@
-"""The report: everything in ``results/<profile>/`` and every printed number, as HTML and Markdown.
+"""The report: everything in ``results/<profile>/`` and every printed number as HTML, and a summary
+of it in Markdown.
 
 It is written from the result files, the papers' targets and the drawn figures alone: no experiment
 is imported and nothing is computed but verdicts, ratios and counts.
@@ -19,15 +20,13 @@ from .judge import VERDICTS
 from .record import Measurement, write_whole
 from .registry import GROUPS
 from .results import ProfileResults
+from .summary import STATE_NAMES, ratio_text, selected, verdict_text
 from .verdicts import VARIANTS, judged, overruled, printed_counts
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
 SHOWN_ROWS = 40          # of a table; a longer one is named and linked
 PREVIEW_WIDTH = 960      # [pixels] of a figure in report.html, which links to the drawn file
 PREVIEW_QUALITY = 45     # of its WebP compression, 0 to 100
-STATE_NAMES = {"pass": "reproduced", "better": "better", "miss": "missed",
-               "chosen": "chosen on these runs", "info": "another machine",
-               "other": "another method or body", "absent": "not measured"}
 KINDS = ("result", "setting", "variant", "own")
 OTHERS = {"setting": "Printed settings", "variant": "Printed numbers by another method, of another "
           "body or at another size", "own": "Our own checks"}
@@ -95,11 +94,15 @@ class Chapter(NamedTuple):
 
 
 def write_report(folder, profile, targets):
-    """Write report.html and report.md into `folder` and return their paths."""
+    """Write report.html, which has everything, and the short report.md into `folder`; return
+    their paths.
+    """
     results = ProfileResults(folder)
-    content = {"profile": profile, "chapters": chapters(results, targets),
-               "machine": machine(results), "verdicts": VERDICTS, "states": STATE_NAMES,
-               "others": OTHERS}
+    parts = chapters(results, targets)
+    content = {"profile": profile, "chapters": parts, "machine": machine(results),
+               "verdicts": VERDICTS, "states": STATE_NAMES, "others": OTHERS,
+               "claims": claims(parts, targets), "misses": misses(parts, targets),
+               "counted_by_kind": counted_by_kind}
     paths = []
     for name in ("report.html", "report.md"):
         text = _environment().get_template(f"{name}.jinja").render(content)
@@ -124,6 +127,40 @@ def chapters(results, targets):
     records = [r for id in results.ids() for r in results.records(id)]
     every = [_chapter(key, sections, targets, records) for key in GROUPS]
     return [c for c in every if c.sections or c.missing or c.settings]
+
+
+def claims(parts, targets):
+    """Return {key of a chapter: [(claim, verdicts, ratios)]} of the headlines of the papers."""
+    rows = [(section.id, row) for chapter in parts for section in chapter.sections
+            for row in section.rows if row.kind in ("result", "variant", "setting")]
+    return {paper: [(headline.claim, verdict_text(one), ratio_text(one.shown))
+                    for headline in headlines
+                    for one in [selected(headline, targets, rows)]]
+            for paper, headlines in targets.headlines.items()}
+
+
+def misses(parts, targets):
+    """Return {key of a chapter: [(id of the experiment, `ReportRow`, cause)]} of the missed printed
+    results.
+    """
+    found = {}
+    for section in (section for chapter in parts for section in chapter.sections):
+        for row in section.rows:
+            if (row.kind, row.verdict) == ("result", "miss"):
+                cause = targets.cause(row.id)
+                found.setdefault(row.key, []).append(
+                    (section.id, row, cause.text if cause else "not known"))
+    return found
+
+
+def counted_by_kind(rows):
+    """Return the counts of verdicts of an experiment as text, by kind of its numbers."""
+    words = {"result": "printed", "variant": "by another method", "setting": "settings",
+             "own": "our checks"}
+    parts = [(words[kind], Counter(row.verdict for row in rows if row.kind == kind))
+             for kind in KINDS]
+    return "; ".join(f"{name}: {', '.join(f'{n} {verdict}' for verdict, n in found.items())}"
+                     for name, found in parts if found)
 
 
 def printed(targets):

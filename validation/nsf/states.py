@@ -8,6 +8,7 @@ from mpm_ref.rom.study.full_model import nsf_full_model
 from mpm_ref.rom.study.run import FieldRunOptions, nsf_run
 from mpm_ref.rom.symmetric import tensor
 
+from ..common.even_points import even_subset
 from ..ldm.published_bodies import keep
 
 SHOTS = 3               # times, evenly spaced, the last among them
@@ -27,7 +28,7 @@ def keep_runs(run, tests, also=()):
     "stress", sizes |tau| [Pa] of the Kirchhoff stress.
     """
     runs = next(iter(tests.values()))[0].runs
-    shown = np.arange(0, len(runs.X), -(-len(runs.X) // MOST))
+    shown = even_subset(runs.X, MOST)
     arrays = {"values": np.array(list(tests)), "levels": levels_of(runs)}
     for name, (one, value) in tests.items():
         arrays |= history_points(f"{name}_true", one.tests[value], 0, shown)

@@ -15,7 +15,7 @@ from validation.common.registry import Experiment
 from validation.common.report import chapters, preview, status_table, write_report
 from validation.common.results import RESULTS, ROOT
 from validation.common.run import RunSetting, run_all
-from validation.common.targets import Target, Targets, load
+from validation.common.targets import Cause, Headline, Target, TargetFile, Targets, load
 
 
 def target(id, kind="error", **fields):
@@ -106,25 +106,31 @@ def test_printed_number_counts_for_its_paper(tmp_path):
     assert "nsf.table1.bread" not in [t.id for t in nsf.missing]
 
 
-def test_markdown_has_the_rows(folder):
-    said = text(folder, "report.md")
-    table = "the bread (Table 1) | 1.2 %; ≤ 1.2 | 1 % | 0.833 | pass | 1/10 of the particles |"
-    assert table in said
-    doubtful = "the cake (Table 1) | 1.2 % (ocr-uncertain); ≤ 1.2 | 3.457 % | 2.88 | **miss** |  |"
-    assert doubtful in said
-    assert "| own number | —; 6 … 8 | 7 m | — | pass |  |" in said
-    assert "- the cake (Table 1), miss: the coarse grid <locks>" in said
-    assert "[NSF: neural stress fields](#nsf) | 3 | 1 | 0 | 1 | 0 | 0 | 1 | 0 |" in said
-    assert "\n| NSF: neural stress fields | 0 | 0 | 0 | 0 | 0 | 1 |\n" in said
-    assert "Printed results that no record of the paper's own method has: 1" in said
-    assert "(Table 1); fields of modes in place of the paper's networks | 1.2 %" in said
-    assert "a <b> & c \\| d" in said
-    assert "Bread of NSF" in said
+def test_markdown_is_a_summary(folder):
+    """Counts, missed results with their causes, and a line for each experiment."""
+    cause = Cause(["nsf.table1.cake"], "The grid is too coarse")
+    claim = Headline("Bread and cake are accurate", ["nsf.table1.bread", "nsf.table1.cake"])
+    more = TargetFile("nsf", [], cause=[cause], headline=[claim])
+    page = text(folder, "report.md", Targets(TARGETS, [more]))
+    assert "[NSF: neural stress fields](#nsf) | 3 | 1 | 0 | 1 | 0 | 0 | 1 | 0 |" in page
+    assert "\n| NSF: neural stress fields | 0 | 0 | 0 | 0 | 0 | 1 |\n" in page
+    assert ("| Bread and cake are accurate | 1 reproduced, 1 missed | 0.83 to 2.9 |") in page
+    assert ("| [the cake (Table 1)](nsf.bread.json) | 1.2 % (ocr-uncertain); ≤ 1.2 | 3.457 % | "
+            "2.88 | The grid is too coarse |") in page
+    assert "the bread (Table 1)" not in page
+    assert ("| [nsf.bread](nsf.bread.json) | printed: 1 pass, 1 miss; by another method: 1 pass; "
+            "our checks: 1 pass |  | [errors](nsf.bread.errors.csv) |") in page
+    assert "1 printed result has no record of the paper's own method." in page
+
+
+def test_markdown_names_a_miss_without_a_cause(folder):
+    assert "3.457 % | 2.88 | not known |" in text(folder, "report.md")
 
 
 def test_html_has_the_same_and_escapes(folder):
     said = text(folder, "report.html")
-    for part in ("the bread (Table 1)", "0.833", '<span class="miss">miss</span>', "commit abc",
+    for part in ("the bread (Table 1)", "0.833", "Bread of NSF", "own number",
+                 '<span class="miss">miss</span>', "commit abc",
                  "the coarse grid &lt;locks&gt;", "a &lt;b&gt; &amp; c | d", "<td>0.00025</td>"):
         assert part in said, part
     assert not re.search(r'(src|href)="https?:', said), "the report must stand alone"
@@ -160,7 +166,7 @@ def test_long_table_is_linked_not_shown(folder):
 def test_report_without_results_lists_what_is_missing(tmp_path):
     said = text(tmp_path / "quick", "report.md", load())
     assert "0 experiments" in said
-    assert said.count("no record of the paper's own method has") == 5
+    assert said.count("have no record of the paper's own method") == 5
 
 
 @pytest.fixture
@@ -183,7 +189,7 @@ def test_figure_is_drawn_and_shown_under_its_experiment(folder, scripts):
     assert section.figures[0].caption == "Error of the bread over cells."
     page = text(folder, "report.html")
     assert '<a href="figures/nsf_bread.png"><img src="data:image/webp;base64,UklGR' in page
-    assert "![nsf_bread](figures/nsf_bread.png)" in text(folder, "report.md")
+    assert "| [nsf_bread](figures/nsf_bread.png) |" in text(folder, "report.md")
 
 
 def test_preview_of_a_large_figure_is_small_and_keeps_its_shape():

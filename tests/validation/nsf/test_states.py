@@ -43,8 +43,8 @@ def test_states_are_those_of_both_runs_at_the_same_times(cube, run, monkeypatch)
     x, last = cube.tests[TEST].x[0], cube.tests[TEST].x.shape[1] - 1
     assert kept["values"].tolist() == ["0.45"]
     assert kept["levels"].tolist() == [round(last / 3), round(2 * last / 3), last]
-    shown = np.arange(0, len(cube.runs.X), -(-len(cube.runs.X) // 100))
-    assert len(shown) <= 100
+    shown = states.even_subset(cube.runs.X, 100)
+    assert len(shown) == 100
     assert kept["0.45_true"] == pytest.approx(x[kept["levels"]][:, shown], abs=1e-4)
     own, alone = (np.abs(kept[f"0.45_{word}"] - kept["0.45_true"]).max()
                   for word in ("ours", "map"))
