@@ -25,6 +25,7 @@ BEYOND = 1.5        # bound of `Extent.beyond`: farther out, a run has left its 
 POINTS = 64         # points of the body in the mean of the metric, at most ...
 LATENTS = 100       # ... and training latents
 THIN = 0.1          # least spread of a direction, over the largest spread
+AHEAD = 0.5         # of a training run: so much later `Paths` compares where states go
 
 
 class Extent(NamedTuple):
@@ -58,6 +59,41 @@ class Extent(NamedTuple):
         result = np.full(finite.shape, np.inf)
         result[finite] = distance((xhat[finite] - self.mean) @ self.ruler)
         return result
+
+
+class Paths(NamedTuple):
+    """Training latents with the steps that led to them."""
+
+    extent: Extent
+    tree: KDTree        # of latents, and of their steps `ahead` times over, in the extent's unit
+    ahead: float        # steps of a run
+
+    def distance(self, before, xhat):
+        """Return the distance of a step from latent coordinates `before` (r,) to xhat (r,), from
+        the nearest one of the training runs, over the gap.
+
+        It compares where the states are, and where they go from there in `ahead` steps at the same
+        rate. So it is large, unlike `Extent.beyond`, for a run that is among the trained states and
+        moves otherwise; and infinite for coordinates that are not finite.
+        """
+        if not (np.isfinite(before).all() and np.isfinite(xhat).all()):
+            return np.inf
+        place, start = ((y - self.extent.mean) @ self.extent.ruler for y in (xhat, before))
+        return float(self.tree.query(np.concatenate([place, self.ahead * (place - start)]))[0]
+                     / self.extent.gap)
+
+
+def trained_paths(inside, xhat, spacing=1.0):
+    """Return the `Paths` of training latents xhat (s, k + 1, r) of an `Extent`, with the number of
+    a run's steps between two of them, `spacing`; None where they form no runs.
+    """
+    if np.ndim(xhat) != 3 or xhat.shape[1] < 2:
+        return None
+    places = (xhat - inside.mean) @ inside.ruler
+    steps = np.diff(places, axis=1) / spacing
+    ahead = AHEAD * steps.shape[1] * spacing
+    pairs = np.concatenate([places[:, 1:], ahead * steps], axis=-1)
+    return Paths(inside, KDTree(pairs.reshape(-1, pairs.shape[-1])), ahead)
 
 
 def extent(xhat, metric=None):

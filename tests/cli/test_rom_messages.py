@@ -46,12 +46,15 @@ def test_states_out_of_bounds_are_counted_and_the_first_is_told():
 def test_each_bound_that_is_stored_is_counted():
     rows = {"beyond": [0.1] * 7, "off": [0.0] * 7, "coverage": [1.0] * 7, "lost": [0] * 7,
             "points": [0, *[30] * 6], "rank": [0, *[2] * 6], "xhat": np.zeros((7, 2)),
-            "inverted": [0.0] * 7}
-    changes = {"beyond": 9.0, "off": 1.0, "coverage": 0.1, "lost": 10, "rank": 1, "inverted": 0.5}
+            "inverted": [0.0] * 7, "departure": [1.0] * 7}
+    rows["off"][0] = 1.0
+    changes = {"beyond": 9.0, "departure": 90.0, "lost": 10, "rank": 1, "inverted": 0.5}
     for k, (name, value) in enumerate(changes.items(), 1):
         rows[name][k] = value
     assert [monitor.stored_check(rows, k).out_of_bounds for k in range(7)] == [
-        (), ("beyond",), ("off",), ("coverage",), ("lost",), ("blind",), ("inverted",)]
+        ("off",), ("beyond",), ("departure",), ("lost",), ("blind",), ("inverted",), ()]
+    fields = {name: rows[name] for name in ("beyond", "rank", "xhat")} | {"departure": [0.9] * 7}
+    assert "departure" in monitor.stored_check(fields, 6).out_of_bounds     # of NSF, lower
 
 
 @pytest.mark.parametrize(("edit", "asked"), [

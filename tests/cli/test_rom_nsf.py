@@ -12,11 +12,13 @@ from small_nsf_studies import EVERY, RUNS, STEPS, modelled, write
 from small_studies import ended
 
 from mpm_ref.rom import model_file
+from mpm_ref.rom.extrapolation import BEYOND
 from mpm_ref.rom.fields.pod_fields import Sizes, fit_pod_fields
 from mpm_ref.rom.study import record, reduce
 from mpm_ref.rom.study.dataset import load_histories, simulate_history
 from mpm_ref.rom.study.full_model import nsf_full_model
 from mpm_ref.rom.study.generate import run_options
+from mpm_ref.rom.study.monitor import FIELD_DEPARTURE
 from mpm_ref.rom.study.reduce import BLOCK
 from mpm_ref.rom.study.run import FieldRunOptions, nsf_run
 from mpm_ref.rom.study.samples import drawn_samples
@@ -204,7 +206,10 @@ def test_states_that_the_fields_have_not_learned_are_warned_of(reduced):
     assert "times as far from the training runs" in beyond
     with Results(out) as results:
         found = record.summary(results)
-        assert found["out_of_bounds"] == np.sum(results.h5["reduced/beyond"][()] > 1.5) > 0
+        beyond_bound = results.h5["reduced/beyond"][()] > BEYOND
+        departed = results.h5["reduced/departure"][()] > FIELD_DEPARTURE
+        assert found["out_of_bounds"] == np.sum(beyond_bound | departed) > beyond_bound.sum() > 0
+    assert np.argmax(departed) < np.argmax(beyond_bound)        # the speed shows before the place
     assert f"{found['out_of_bounds']} of {STEPS + 1} states" in beyond
 
 

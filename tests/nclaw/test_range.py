@@ -110,8 +110,24 @@ def test_the_farthest_point_is_named_by_its_own_number():
     assert (sight.particle, sight.count, sight.out_of_range) == (2, 1, True)
     assert sight.measures == pytest.approx((1.8, 0.9, 1.62))
     assert sight.J == sight.measures[-1]
-    assert not strain_report(body(np.eye(2), near), BOUNDS).out_of_range
+    assert not strain_report(body(*[np.eye(2)] * 3, near), BOUNDS).out_of_range
     assert 0.0 < strain_report(body(np.eye(2), near), BOUNDS).excess <= MAX_EXCESS
+
+
+def test_a_body_that_is_strained_as_a_whole_is_out_of_range():
+    """Each of its points is within the bound of a single one."""
+    near = np.diag([1.5, 0.9])                          # an excess of 0.2 of the width, ...
+    found = strain_report(body(*[near] * 4), {**BOUNDS, "high": [1.4, 1.0, 1.4]})
+    assert 0.1 < found.excess <= MAX_EXCESS             # ... less than it takes for one point
+    assert (found.count, found.mean) == (0, pytest.approx(found.excess))
+    assert found.out_of_range
+    mixed = strain_report(body(near, *[np.eye(2)] * 3), {**BOUNDS, "high": [1.4, 1.0, 1.4]})
+    assert mixed.mean == pytest.approx(0.25 * found.excess)
+    assert not mixed.out_of_range
+    bounds = {**BOUNDS, "high": [1.4, 1.0, 1.4]}
+    (said,) = StrainWatch({"one": bounds}).news(State((body(*[near] * 4),), step=CHECK, t=0.5))
+    assert ("particle 0 and most others, on average by 0.2 of the range's width, more than 0.1: "
+            "principal stretches 1.5, 0.9") in said
 
 
 def test_fluids_that_carry_J_are_looked_at():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import rom_toys
 
-from mpm_ref.rom.extrapolation import THIN, extent, motion_metric
+from mpm_ref.rom.extrapolation import THIN, extent, motion_metric, trained_paths
 
 H, STEP = 0.5, 0.1      # of `comb`: distance of runs, and of latents in a run
 
@@ -163,3 +163,35 @@ def test_training_latents_without_extent_are_refused(xhat, said):
     with pytest.raises(ValueError, match=said) as refusal:
         extent(xhat)
     assert "\n" not in str(refusal.value)
+
+
+# Paths.
+
+def test_a_step_is_compared_in_place_and_in_rate():
+    """Along parallel runs: a trained step; one twice as long, to a trained place; one back; one
+    beside the runs.
+    """
+    runs = comb()
+    found = trained_paths(extent(runs, np.eye(2)), runs)
+    assert found.ahead == 4.0           # half of eight steps
+    at, step = np.array([3.0 * STEP, H]), np.array([STEP, 0.0])
+    assert found.distance(at - step, at) < 1e-12
+    assert found.distance(at - 2.0 * step, at) == pytest.approx(4.0 * STEP / H)
+    assert found.distance(at + step, at) == pytest.approx(8.0 * STEP / H)
+    beside = np.array([0.0, 0.5 * H])
+    assert found.distance(at - step + beside, at + beside) == pytest.approx(0.5)
+    assert found.distance(at, np.full(2, np.nan)) == np.inf
+
+
+def test_latents_that_are_steps_apart_are_compared_by_the_step():
+    runs = comb()
+    found = trained_paths(extent(runs, np.eye(2)), runs, spacing=2.0)
+    at, half = np.array([3.0 * STEP, H]), np.array([0.5 * STEP, 0.0])
+    assert found.distance(at - half, at) < 1e-12
+    assert found.distance(at - 2.0 * half, at) == pytest.approx(8.0 * 0.5 * STEP / H)
+
+
+def test_latents_that_form_no_runs_have_no_paths():
+    flat = comb().reshape(-1, 2)
+    assert trained_paths(extent(flat, np.eye(2)), flat) is None
+    assert trained_paths(extent(flat[:, None], np.eye(2)), flat[:, None]) is None

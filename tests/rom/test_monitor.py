@@ -1,12 +1,13 @@
 """The monitor of a reduced run: each check by itself, and the run that leaves no body."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 import rom_toys
 
-from mpm_ref.rom.extrapolation import LATENTS, extent
+from mpm_ref.rom.extrapolation import LATENTS, extent, trained_paths
 from mpm_ref.rom.fields.pod import basis
 from mpm_ref.rom.integrity import DamagedModel
 from mpm_ref.rom.latent import start_state
@@ -14,7 +15,9 @@ from mpm_ref.rom.step import StepReport
 from mpm_ref.rom.study import monitor as monitoring
 from mpm_ref.rom.study.full_model import ldm_full_model
 from mpm_ref.rom.study.monitor import (
+    DEPARTURE,
     MEMORY,
+    OFF,
     MapMonitor,
     NoBodyLeft,
     StateCheck,
@@ -126,19 +129,37 @@ def test_reports_are_read(toy):
     assert found.off == pytest.approx(0.4 * DT / DX)
     assert found.blind == 2
     assert found.lost == pytest.approx(10 / 40)
-    assert found.out_of_bounds == ("off", "blind", "lost")
+    assert found.out_of_bounds == ("blind", "lost")      # off has a bound at the start alone
 
 
 def test_a_poor_draw_is_forgiven_and_many_are_not(toy):
+    """What strays from the training counts by the share of it that the samples show."""
     monitor, xhat = toy
+    runs = np.stack([xhat + 0.01 * np.outer(np.arange(5), np.ones(monitor.g.r)) + k
+                     for k in (0.0, 1.0)])
+    inside = extent(runs, np.eye(monitor.g.r))
+    monitor = monitor._replace(extent=inside, paths=trained_paths(inside, runs))
     one, sight, count = monitor.X[:1], WELL, 0
-    first = look(monitor, start_state(xhat), report(monitor.g), one, WELL)
-    assert first.coverage == pytest.approx(MEMORY * WELL.coverage)     # one point tells nothing
+    latent = start_state(xhat).advance(xhat + 0.03)     # a step three times as long as the trained
+    first = look(monitor, latent, report(monitor.g), one, WELL)
+    assert first.coverage == pytest.approx(MEMORY * WELL.coverage)     # one point shows nothing
     assert first.spread == pytest.approx(MEMORY * WELL.spread)
-    assert first.out_of_bounds == ("surplus",)
-    while "coverage" not in sight.out_of_bounds:
-        sight, count = look(monitor, start_state(xhat), report(monitor.g), one, sight), count + 1
-    assert 3 <= count <= 9
+    bare = monitor.paths.distance(xhat, xhat + 0.03)
+    assert first.departure == pytest.approx(bare / (first.coverage * first.spread))
+    assert first.out_of_bounds == ()
+    while "departure" not in sight.out_of_bounds:
+        sight, count = look(monitor, latent, report(monitor.g), one, sight), count + 1
+    assert 3 <= count <= 20
+    assert sight.sum_squares == pytest.approx(count * bare**2)
+    assert sight.departure == pytest.approx(bare / (sight.coverage * sight.spread))
+
+
+def test_samples_that_show_nothing_leave_any_departure(toy):
+    monitor, xhat = toy
+    found = look(monitor, start_state(xhat), report(monitor.g), monitor.X[:1],
+                 WELL._replace(coverage=0.0))
+    assert found.departure == np.inf
+    assert found.out_of_bounds == ("departure",)
 
 
 def test_samples_in_one_place_are_within_a_small_part_of_the_body(toy, rng):
@@ -158,7 +179,6 @@ def test_samples_in_one_place_are_within_a_small_part_of_the_body(toy, rng):
     found = look(monitor, start_state(xhat), report(monitor.g), together, WELL)
     assert found.spread == pytest.approx(
         MEMORY * WELL.spread + 0.2 * monitoring.spread(together, monitor.axes))
-    assert found.surplus == 30 * d / monitor.g.r
 
 
 def test_far_latents_and_inverted_points_are_told(toy):
@@ -187,14 +207,17 @@ def test_latents_that_are_no_numbers_are_nonsense(toy, broken):
     found = look(monitor, start_state(np.where(xhat == xhat[0], broken, xhat)),
                        report(monitor.g, broken), monitor.X[:9], WELL)
     assert found.nonsense
-    assert {"beyond", "off"} <= set(found.out_of_bounds)
+    assert "beyond" in found.out_of_bounds
 
 
 @pytest.mark.parametrize(("changes", "name", "said"), [
     ({"beyond": 1.6}, "beyond", "1.6 times as far from the training runs"),
-    ({"off": 0.05}, "off", "0.05 cells"), ({"coverage": 0.25}, "coverage", "saw only 25%"),
-    ({"spread": 0.2}, "spread", "within 20% of the body's extent"),
-    ({"surplus": 3.5}, "surplus", "3.5 equations for each"),
+    ({"off": 0.05, "most_off": OFF}, "off", "0.05 cells from the body at rest"),
+    ({"coverage": 0.25, "least_coverage": 0.3}, "coverage", "saw only 25%"),
+    ({"departure": 2.0 * DEPARTURE}, "departure",
+     f"{2.0 * DEPARTURE:.3g} times as far from those of the training runs as these are from each "
+     f"other, above {DEPARTURE:g}: take more samples"),
+    ({"departure": 2.0, "most_departure": 0.5}, "departure", "above 0.5"),
     ({"blind": 1}, "blind", "1 of the latent coordinates"), ({"lost": 0.02}, "lost", "2.0%"),
     ({"inverted": 0.03, "J": -0.1}, "inverted", "det F down to -0.1"),
     ({"beyond": np.nan}, "beyond", "nan times"),
@@ -282,6 +305,21 @@ def test_a_checked_run_is_the_run_and_is_well(fall):
         assert plain.report == state.report
         assert check.out_of_bounds == ()
         assert check.beyond < 1.0
+
+
+def test_a_run_among_trained_states_that_moves_otherwise_is_out_of_bounds(fall):
+    """Steps twice as long: each state is one that training has, and no other check sees it."""
+    one, modes, xhat = fall
+    clock = one.problem.clock
+    longer = one._replace(problem=replace(one.problem, clock=replace(
+        clock, dt=2.0 * clock.dt, steps=clock.steps // 2)))
+    ends = {}
+    for name, full in (("trained", one), ("longer", longer)):
+        run = ldm_run(full, modes, RunOptions(points=50), np.zeros(2))
+        *_, (_, ends[name]) = checked_states(run, map_monitor(full, modes, xhat))
+    assert ends["longer"].beyond < 1.0
+    assert ends["trained"].departure < 1.0
+    assert ends["longer"].departure > 5.0 * ends["trained"].departure
 
 
 def test_a_run_whose_map_is_damaged_meanwhile_says_so_at_its_end(fall):

@@ -67,6 +67,7 @@ class ReducedEnd(NamedTuple):
     rank: int               # smallest
     lost: float             # largest
     J: float                # smallest
+    departure: float        # largest
     message: str            # the sentence with which it stopped, "" if it ran to its end
 
 
@@ -112,7 +113,7 @@ def summarize_checks(checks, r, error, message):
     first, flags = flag_history(checks)
     beyond, blind, off, coverage, lost, J, *_ = zip(*checks, strict=True)
     return ReducedEnd(error, len(checks) - 1, first, flags, max(beyond), max(off), min(coverage),
-                      r - max(blind), max(lost), min(J), message)
+                      r - max(blind), max(lost), min(J), max(c.departure for c in checks), message)
 
 
 def full_positions(problem):

@@ -61,6 +61,7 @@ class LawEnd(NamedTuple):
     beyond: float       # largest
     lost: int           # the step in which a point was LOST out of bounds, or stopped; -1 for none
     J: float            # smallest, of the points that were farthest out of bounds
+    mean: float         # largest mean over all points of their distance out of bounds
     message: str        # the sentence with which it stopped, "" if it ran to its end
 
 
@@ -140,7 +141,8 @@ def summarize_reports(reports, error, message, stepping):
     first = 0 if other_dt else outside[0] if outside else -1
     return LawEnd(float(error), (len(reports) - 1) * every, first, " ".join(flags),
                   max(report.excess for report in reports), lost[0] if lost else -1,
-                  min(report.J for report in reports), message)
+                  min(report.J for report in reports), max(report.mean for report in reports),
+                  message)
 
 
 def law_trials(run, law, setups):

@@ -56,6 +56,7 @@ class FieldEnd(NamedTuple):
     flags: str              # all quantities that were ever out of bounds
     beyond: float           # largest
     rank: int               # smallest
+    departure: float        # largest
     off: float              # largest rms distance of trial positions from the manifold; NaN where
                             # they were not finite [dx]
     message: str            # the sentence with which it stopped, "" if it ran to its end
@@ -66,7 +67,7 @@ class FieldBench:
 
     def __init__(self, name, tested):
         self.name, self.tested, study = name, tested, tested.study
-        self.monitor = field_monitor(tested.fields, tested.xhat)
+        self.monitor = field_monitor(tested.fields, tested.xhat, tested.study.spacing)
         self.value, self.count = study.test[0], study.samples
         self.tests = [self.end(value, self.drawn(self.count)) for value in study.test]
         self.usual = max(end.error for end in self.tests)
@@ -86,7 +87,7 @@ class FieldBench:
             try:
                 for state in self.states(full, tested.fields_of_run(value), samples):
                     states.append((level_of(state.t / test.dt), state.latent.xhat))
-                    checks.append(self.monitor.check(state))
+                    checks.append(self.monitor.check(state, checks[-1] if checks else None))
                     off.append(state.report.residual / full.problem.dx if state.report else 0.0)
             except BREAKDOWNS as stop:
                 message = " ".join(str(stop).split())
@@ -117,10 +118,13 @@ class FieldBench:
 
 
 def summarize_checks(checks, r):
-    """Return steps, first, flags, beyond and rank of a `FieldEnd` from a run's `StateCheck`s."""
+    """Return steps, first, flags, beyond, rank and departure of a `FieldEnd` from a run's
+    `StateCheck`s.
+    """
     return (len(checks) - 1, *flag_history(checks),
             max((check.beyond for check in checks), default=np.nan),
-            r - max((check.blind for check in checks), default=0))
+            r - max((check.blind for check in checks), default=0),
+            max((check.departure for check in checks), default=np.nan))
 
 
 def simulate_test(study, value):

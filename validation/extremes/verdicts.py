@@ -4,6 +4,8 @@ step; it is fine; or it is silent: wrong, and neither stopped nor flagged. No ru
 A trial is a record whose last field `end` has the fields `message` and `flags`.
 """
 
+import numpy as np
+
 STOPPED, FLAGGED, FINE, SILENT = "stopped", "flagged", "fine", "silent"
 
 
@@ -33,3 +35,34 @@ def flag_history(checks):
     flagged = [k for k, check in enumerate(checks) if check.out_of_bounds]
     flags = dict.fromkeys(flag for check in checks for flag in check.out_of_bounds)
     return flagged[0] if flagged else -1, " ".join(flags)
+
+
+# Calibration: a bound on one measure of runs that are not those it is judged by.
+
+CURVE = ("bound", "misses", "false_alarms", "wrong", "good")
+
+
+def rates_at(trials, measure, bound):
+    """Return the share of wrong trials whose measure is not above a bound, that of good ones whose
+    measure is, and both numbers of trials.
+    """
+    above = {True: [], False: []}
+    for t in trials:
+        above[t.is_bad].append(not measure(t) <= bound)
+    wrong, good = above[True], above[False]
+    return (wrong.count(False) / max(len(wrong), 1), sum(good) / max(len(good), 1), len(wrong),
+            len(good))
+
+
+def record_bound(run, name, trials, measure, bound):
+    """Record how often a bound of `measure` errs on calibration trials, and write the table `curve`
+    of other bounds: the values of the wrong trials.
+    """
+    misses, alarms, wrong, good = rates_at(trials, measure, bound)
+    for what, share, count in (("misses", misses, f"{wrong} wrong runs that are not above"),
+                               ("false_alarms", alarms, f"{good} good runs that are above")):
+        run.record(f"{name}.{what}", share, comparator="info",
+                   scale=f"{len(trials)} calibration runs", note=f"share of the {count} the bound "
+                   f"{bound:g}")
+    values = sorted({measure(t) for t in trials if t.is_bad and np.isfinite(measure(t))})
+    run.table("curve", CURVE, [(value, *rates_at(trials, measure, value)) for value in values])

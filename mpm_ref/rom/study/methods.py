@@ -122,7 +122,8 @@ def nsf_recording(study, full, fields, model, facts, count):
     options = FieldRunOptions((samples,), table.dt_factor, table.inversion)
     run = nsf_run(full, fields, options, model.rest)
     clock = replace(problem.clock, dt=run.dt, steps=run.steps, every=1)
-    return Recording(run, field_monitor(fields, model.xhat), FieldDisplay(full, fields),
+    monitor = field_monitor(fields, model.xhat, (problem.clock.every or 1) / table.dt_factor)
+    return Recording(run, monitor, FieldDisplay(full, fields),
                      replace(problem, clock=clock), table, facts, NSF_SERIES,
                      NSF_METHOD.shown_fields, tuple(sample_warnings(fields, samples)))
 

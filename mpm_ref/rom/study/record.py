@@ -38,9 +38,10 @@ class RunSeries(NamedTuple):
 
 LDM_SERIES = RunSeries(
     {"xhat": "1", "vhat": "1/s"}, {"samples": "1", "points": "1", "rank": "1", "lost": "1"},
-    {"residual": "m/s", "beyond": "1", "off": "1", "coverage": "1", "inverted": "1"})
+    {"residual": "m/s", "beyond": "1", "off": "1", "coverage": "1", "inverted": "1",
+     "departure": "1"})
 NSF_SERIES = RunSeries({"xhat": "1"}, {"samples": "1", "points": "1", "rank": "1"},
-                    {"residual": "m", "beyond": "1"})
+                    {"residual": "m", "beyond": "1", "departure": "1"})
 
 
 class BrokenRun(RuntimeError):

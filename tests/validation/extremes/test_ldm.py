@@ -9,10 +9,11 @@ import pytest
 from mpm_ref.rom.fields.pod import basis
 from mpm_ref.rom.model_file import load
 from mpm_ref.rom.study.full_model import ldm_full_model
-from mpm_ref.rom.study.monitor import StateCheck
+from mpm_ref.rom.study.monitor import DEPARTURE, StateCheck
 from mpm_ref.rom.study.run import RunOptions
 from mpm_ref.rom.study.samples import SampleSet
 from validation.common.scenes import with_
+from validation.extremes import ldm_calibration
 from validation.extremes import ldm_extrapolation as extrapolation
 from validation.extremes import ldm_files as files
 from validation.extremes import ldm_rank as rank_study
@@ -30,10 +31,17 @@ from validation.extremes.ldm_runs import (
     summarize_checks,
     trained_reduction,
 )
-from validation.extremes.verdicts import FINE, FLAGGED, SILENT, STOPPED
+from validation.extremes.verdicts import (
+    FINE,
+    FLAGGED,
+    SILENT,
+    STOPPED,
+    rates_at,
+    record_bound,
+)
 from validation.ldm.studies import GRAVITY, TORSION
 
-GOOD = ReducedEnd(0.3, 30, -1, "", 0.4, 0.01, 0.9, 4, 0.0, 0.7, "")
+GOOD = ReducedEnd(0.3, 30, -1, "", 0.4, 0.01, 0.9, 4, 0.0, 0.7, 2.0, "")
 WELL = StateCheck(beyond=0.3, off=0.01, coverage=0.9, blind=0, lost=0.0, J=0.8, inverted=0.0,
                   far=0.9)
 
@@ -67,12 +75,12 @@ def test_small_errors_are_not_bad_however_good_the_map_is():
 
 
 def test_the_extremes_of_a_run_are_kept():
-    sights = [WELL, WELL._replace(off=0.05, J=0.5),
-              WELL._replace(beyond=4.0, coverage=0.2, blind=1),
+    sights = [WELL, WELL._replace(off=0.05, most_off=0.03, J=0.5, departure=2.0),
+              WELL._replace(beyond=4.0, coverage=0.2, least_coverage=0.3, blind=1),
               WELL]
     end = summarize_checks(sights, 4, 0.7, "gone")
     assert end == ReducedEnd(0.7, 3, 1, "off beyond coverage blind", 4.0, 0.05, 0.2, 3, 0.0, 0.5,
-                             "gone")
+                             2.0, "gone")
     assert summarize_checks([WELL], 4, 0.7, "").first == -1
 
 
@@ -124,7 +132,8 @@ def test_samples_in_one_place_are_told(net):
     near = np.argsort(ldm_full_model(GRAVITY.scene(1.0)).X[:, 0])[:50]
     found = fallen(net, 7.5, sampler=lambda t, latent: SampleSet(t, near))
     assert found.error > 5.0
-    assert found.flags == "coverage spread"
+    assert found.flags == "departure"
+    assert found.departure > 2.0 * DEPARTURE
 
 
 def test_too_few_samples_are_refused_before_the_first_step(net):
@@ -305,3 +314,32 @@ def test_files_with_the_seal_of_another_one_are_refused_for_it(readers, tmp_path
             copy.write_bytes(files.with_other_seal(path, other)[2])
             ok, said = files.read_refusal(lambda read=read: read(copy), copy)
             assert (ok, "checksum" in said) == (2 * (other != path,))
+
+
+# Calibration.
+
+def test_the_rates_of_a_bound_are_of_wrong_and_of_good_runs():
+    trials = [trial(GOOD, departure=1.0), trial(GOOD, departure=4.0),
+              trial(GOOD, departure=np.inf), trial(GOOD, error=50.0, departure=2.0),
+              trial(GOOD, error=50.0, departure=7.0)]
+
+    def measure(t):
+        return t.end.departure
+
+    assert rates_at(trials, measure, 3.0) == (0.5, 2 / 3, 2, 3)
+    assert rates_at(trials[:1], measure, 3.0) == (0.0, 0.0, 0, 1)
+    tables, found = {}, Records()
+    found.table = lambda name, columns, rows: tables.update({name: rows})
+    record_bound(found, "bound", trials, measure, 3.0)
+    assert found["bound.misses"][0] == 0.5
+    assert found["bound.false_alarms"][0] == 2 / 3
+    assert tables["curve"] == [(2.0, 0.5, 2 / 3, 2, 3), (7.0, 1.0, 1 / 3, 2, 3)]
+
+
+def test_calibration_runs_are_none_that_the_bound_is_judged_by():
+    values = ldm_calibration.VALUES
+    for study in (GRAVITY, TORSION):
+        tests = [tuple(study.mu[k]) for k in study.test]
+        assert not {*values[study.name]} & {*tests, MU[study.name]}
+        assert {*values[study.name]} <= {tuple(study.mu[k]) for k in study.train}
+    assert not {*rank_study.OTHERS[::2]} & {*ldm_calibration.MAPS["standard"]}

@@ -39,7 +39,7 @@ from validation.nclaw.small_runs import Measured
 from validation.nclaw.small_trainings import Small
 from validation.nclaw.trained_laws import LawNet
 
-GOOD = LawEnd(1e-4, 1000, -1, "", 0.1, -1, 0.9, "")
+GOOD = LawEnd(1e-4, 1000, -1, "", 0.1, -1, 0.9, 0.01, "")
 WIDE = {"low": [0.0, -9.0, -9.0, -99.0], "high": [9.0, 9.0, 9.0, 99.0]}
 NARROW = {"low": [0.9, 0.9, 0.9, 0.8], "high": [1.1, 1.1, 1.1, 1.2]}
 DT = 5e-4
@@ -87,9 +87,9 @@ def test_what_is_bad_depends_on_the_usual_error():
 def test_the_extremes_of_a_run_are_kept():
     sights = [sight(), sight(0.4, 0.5, 3), sight(LOST + 1.0, 0.7, 9), sight(0.2)]
     assert summarize_reports(sights, 0.1, "", (20, False)) == LawEnd(
-        0.1, 60, 20, "strain", LOST + 1.0, 40, 0.5, "")
+        0.1, 60, 20, "strain", LOST + 1.0, 40, 0.5, 0.0, "")
     assert summarize_reports([sight(), sight(0.2)], 0.1, "", (20, True)) == LawEnd(
-        0.1, 20, 0, "dt", 0.2, -1, 1.0, "")
+        0.1, 20, 0, "dt", 0.2, -1, 1.0, 0.0, "")
     stopped = summarize_reports([sight(), sight(0.4, count=1)], np.inf, "step 31: gone", (20, True))
     assert (stopped.lost, stopped.flags, stopped.message) == (40, "strain dt", "step 31: gone")
 
@@ -117,7 +117,7 @@ def test_misses_and_false_alarms_are_counted_and_named():
 def test_the_true_law_is_not_off_from_itself():
     law = Law("true", "jelly", as_true, WIDE, DT)
     end = law_end(law, LawSetup("as trained", small()))
-    assert end == LawEnd(0.0, 40, -1, "", 0.0, -1, end.J, "")
+    assert end == LawEnd(0.0, 40, -1, "", 0.0, -1, end.J, 0.0, "")
 
 
 def test_strains_out_of_bounds_are_flagged_when_they_are():

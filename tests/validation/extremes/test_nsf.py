@@ -8,7 +8,10 @@ from small_toys import Records
 
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.kinematics import NoBody
+from mpm_ref.rom.latent import start_state
+from mpm_ref.rom.step import StepReport
 from mpm_ref.rom.study.monitor import StateCheck
+from mpm_ref.rom.study.run import RunState
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.common.scenes import with_
@@ -23,7 +26,7 @@ from validation.nsf.studies import jelly
 
 STUDY = jelly(4)._replace(train=(0.3, 0.5), test=(0.4,), samples=40,
                           sizes=Sizes(r=5, modes=8, tau=12, C=12, smoothing=1e-4))
-GOOD = runs.FieldEnd(2.0, 0.2, 15.0, 30, -1, "", 0.4, 5, 0.01, "")
+GOOD = runs.FieldEnd(2.0, 0.2, 15.0, 30, -1, "", 0.4, 5, 0.2, 0.01, "")
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +51,7 @@ def test_errors_and_ends_are_those_of_the_runs_themselves(bench):
     assert trial(end)._replace(usual=bench.usual).kind == FINE
     assert bench.usual == end.error
     assert 0.0 < end.beyond < 1.0
+    assert 0.0 < end.departure < 1.0
 
 
 @pytest.mark.parametrize(("changes", "kind"), [
@@ -60,10 +64,11 @@ def test_the_four_ends_are_those_of_ldm(changes, kind):
 
 def test_the_extremes_of_a_run_are_kept():
     sights = [StateCheck(0.1, 0), StateCheck(3.0, 0), StateCheck(0.2, 2)]
-    assert runs.summarize_checks(sights, 5) == (2, 1, "beyond blind", 3.0, 3)
-    steps, first, flags, beyond, rank = runs.summarize_checks([], 5)
+    sights[1] = sights[1]._replace(departure=0.4)
+    assert runs.summarize_checks(sights, 5) == (2, 1, "beyond blind", 3.0, 3, 0.4)
+    steps, first, flags, beyond, rank, departure = runs.summarize_checks([], 5)
     assert (steps, first, flags, rank) == (-1, -1, "", 5)
-    assert np.isnan(beyond)
+    assert np.isnan([beyond, departure]).all()
 
 
 def test_a_full_order_run_that_stops_says_so(bench):
@@ -71,6 +76,22 @@ def test_a_full_order_run_that_stops_says_so(bench):
     assert (found.x.shape[1], said) == (31, "")
     assert runs.simulate_test(STUDY, 50.0)[0] is None
     assert "unstable" in runs.simulate_test(STUDY, 50.0)[1]
+
+
+def test_a_body_that_hardly_moves_departs_from_those_that_fly(bench):
+    """A state at rest is one of the training, at the start; a run that stays there is not."""
+    still = bench.tested.study.samples
+    fields = bench.tested.fields_of_run(STUDY.test[0])
+    rest = start_state(bench.tested.rest)
+    report = StepReport(still, 9, fields.r, 0.0, 1, True, {})
+    samples = bench.drawn(still)
+    last, plain = None, bench.monitor._replace(paths=None)
+    for k in range(1, 30):
+        state = RunState(float(k), rest.advance(rest.xhat), report, samples)
+        assert plain.check(state).out_of_bounds == ()
+        last = bench.monitor.check(state, last)
+    assert last.out_of_bounds == ("departure",)
+    assert "above 0.8" in last.message
 
 
 # Parameters outside.
