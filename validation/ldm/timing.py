@@ -1,5 +1,5 @@
-"""Times of full and reduced runs of one scene, a step of each in turn: disturbances from other
-processes meet all of them alike.
+"""Times of full and reduced runs of one scene, a step of each in turn, from the start to the end of
+the motion: disturbances from other processes meet all of them alike.
 """
 
 from time import perf_counter, process_time
@@ -52,6 +52,14 @@ class TimedRun(NamedTuple):
                  if name not in ("quadrature", "projection", "points") and a != usual[name]}
         return "-".join(map(str, (self.options.quadrature, self.options.projection, points,
                                   *other.values())))
+
+
+class Race(NamedTuple):
+    """Times of a full-order run, of the same with the fastest transfer, and of reduced runs."""
+
+    full: StepTime
+    fastest: StepTime
+    reduced: list           # of `TimedRun`, one for each `RunOptions`
 
 
 def timed(step):
@@ -129,24 +137,31 @@ def time_alone(one, mapping, options, x):
 
 
 def race(scene, mapping, options, steps):
-    """Return the `StepTime` of the full model, and the `TimedRun` of each `RunOptions` on
-    mapping = (map, rest).
+    """Return the `Race` of the full model, of the same with MLS-MPM, and of a reduced run with each
+    `RunOptions` on mapping = (map, rest): each makes a step in turn.
     """
-    one, full = ldm_full_model(scene), SteppedFullRun(scene)
+    one = ldm_full_model(scene)
     every = -(-len(one.X) // TRACKED)
+    full, fastest = SteppedFullRun(scene), SteppedFullRun(fastest_scene(scene))
     with one_thread():
         reduced = [SteppedReducedRun(one, mapping, own, every) for own in options]
         for _ in range(steps):
             full.step()
+            fastest.step()
             reference = full.positions(every)
             for run in reduced:
                 run.step(reference)
-    return median(full.spent), [run.result() for run in reduced]
+    return Race(median(full.spent), median(fastest.spent), [run.result() for run in reduced])
 
 
-def fastest(scene, steps=4):
-    """Return the `StepTime` of the full model with the fastest transfer there is."""
-    full = SteppedFullRun(with_(scene, scheme=Scheme(transfer="mls", degree=2)))
+def fastest_scene(scene):
+    """Return the scene with MLS-MPM, the fastest transfer there is."""
+    return with_(scene, scheme=Scheme(transfer="mls", degree=2))
+
+
+def full_step(scene, steps):
+    """Return the `StepTime` of the full model over the first steps of a run."""
+    full = SteppedFullRun(scene)
     for _ in range(steps):
         full.step()
-    return median(full.spent[1:])
+    return median(full.spent)

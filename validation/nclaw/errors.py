@@ -11,6 +11,7 @@ from ..common.scenes import with_
 from .environments import ENVIRONMENTS
 from .evaluate import ComparedError, body_maker, compare
 from .printed_ids import error_id, is_printed, overall_id, run_variants
+from .rivals import RIVALS, PositionRival
 from .simulators import GraphNet
 from .stand_in_bodies import body_label
 from .tasks import TOYS, scenes
@@ -18,7 +19,8 @@ from .trained_laws import nets
 
 OURS = "ours"
 # methods that are in task (c) at standard: no seeds, no ablations
-LARGE = (OURS, "ours-init", "velocity", "admissible", "spline", "neural", "labeled", "sys-id")
+LARGE = (OURS, "ours-init", "velocity", "admissible", "spline", "neural", "labeled", "sys-id",
+         *RIVALS)
 INFO = {"comparator": "info"}
 COLUMNS = ("method", "environment", "task", "draw", "error", "step", "why")
 SHORT = 100         # steps, quick
@@ -63,8 +65,8 @@ def scenes_of(run, task, name):
 
 
 def run_of_laws(laws):
-    """Return the argument of `compare` for trained laws or a trained graph network."""
-    return laws if isinstance(laws, Simulator) else body_maker(laws)
+    """Return the argument of `compare` for trained laws, a trained graph network or a rival."""
+    return laws if isinstance(laws, Simulator | PositionRival) else body_maker(laws)
 
 
 def can_run(laws, task):

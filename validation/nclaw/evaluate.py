@@ -21,6 +21,7 @@ from mpm_ref.nclaw.study.compare import ComparedError, ComparedRun, RunBroken, p
 from mpm_ref.scene import build
 
 from ..common.scenes import threads_for
+from .rivals import PositionRival
 from .simulators import start
 
 __all__ = ["ComparedError", "RunBroken", "body_maker", "body_with_laws", "compare", "copy_body",
@@ -47,8 +48,10 @@ def compare(scene, laws, goes_on=False):
 
 def frames(problem, law):
     """Yield positions in the frames of a problem with a law: a function that gives a body other
-    laws, see `body_with_laws`; or a graph network, which needs no bodies.
+    laws, see `body_with_laws`; or a graph network or a rival, which need no bodies.
     """
+    if isinstance(law, PositionRival):
+        return law.frames(problem)
     if isinstance(law, Simulator):
         return rollout(problem, law)
     return positions(problem, tuple(map(law, problem.bodies)))

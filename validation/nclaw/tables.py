@@ -9,6 +9,7 @@ not printed; the errors are those of positions.
 
 from ..common.registry import experiment
 from ..common.weights_needed import load_available
+from .beats import record_beats
 from .environments import ENVIRONMENTS
 from .errors import (
     COLUMNS,
@@ -20,6 +21,7 @@ from .errors import (
 )
 from .initial_laws import untrained
 from .printed_ids import RELEASED, error_id, extended, run_variants
+from .rivals import RIVALS
 from .simulators import COUNTS, named
 from .stand_in_bodies import has_mesh
 from .tasks import TOYS
@@ -121,10 +123,14 @@ def table6(run):
 
 
 def contest(run, tasks):
-    """Record the errors of all methods, and which are not trained yet; return their `ErrorRow`s."""
-    laws = available_laws(run, names_of(as_released=False))
-    rows = errors(run, laws, tasks) if laws else []
+    """Record the errors of all methods, beside their simplest rivals, and which are not trained
+    yet; return their `ErrorRow`s.
+    """
+    laws = available_laws(run, names_of(as_released=False)) | {
+        name: dict.fromkeys(ENVIRONMENTS, rival) for name, rival in RIVALS.items()}
+    rows = errors(run, laws, tasks)
     record(run, run.experiment.id, rows, tasks)
+    record_beats(run, run.experiment.id, rows)
     record_velocity_term(run, rows)
     run.table("errors", COLUMNS, rows)
     return rows

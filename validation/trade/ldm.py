@@ -42,7 +42,7 @@ def options(run):
     chosen = run.choose(quick=quick, standard=single_choices())
     scene = scene_of(size, TOWER.test[1])
     steps = run.choose(quick=4, standard=scene.steps)
-    full, found = race(scene, (model.field, model.rest), chosen, steps)
+    full, _, found = race(scene, (model.field, model.rest), chosen, steps)
     scale = f"about {size} thousand particles, {steps} steps, one test run"
     for one in found:
         record_errors(run, f"trade.ldm.knobs.{one.label}", one.errors, scale,

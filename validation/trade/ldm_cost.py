@@ -14,7 +14,7 @@ from mpm_ref.scene import build
 from ..common.registry import experiment
 from ..ldm.networks import trained
 from ..ldm.studies import STUDIES, TOWER
-from ..ldm.timing import fastest, race
+from ..ldm.timing import full_step, race
 from ..ldm.tower import FAST, GRIDS, NET, PAPER, scene_of
 
 EVALUATIONS = ("derivatives", "place", "velocity")
@@ -157,9 +157,9 @@ def offline(run):
     training = training_cpu(model.about)
     for size in run.progress(run.choose(quick=(34,), standard=GRIDS), "sizes"):
         scene = scene_of(size)
-        full, (cheap,) = race(scene, (model.field, model.rest), [FAST._replace(points=25)],
-                              run.choose(quick=3, standard=10))
-        count, best = len(build(scene).bodies[0].id), fastest(scene)
+        full, best, (cheap,) = race(scene, (model.field, model.rest), [FAST._replace(points=25)],
+                                    run.choose(quick=3, standard=10))
+        count = len(build(scene).bodies[0].id)
         costs = [scene.steps * a.cpu for a in (full, best, cheap.spent)]
         rows.append((count, scene.steps, data, training, *costs,
                      runs_to_pay(costs[0] - costs[2], data + training),
@@ -194,5 +194,4 @@ def data_cost(steps):
     """Return the CPU seconds of all training runs of the tower, from `steps` steps of one."""
     study = STUDIES[TOWER.name]
     scene = study.scene(*study.mu[study.train[0]])
-    full, _ = race(scene, (None, None), [], steps)
-    return full.cpu * scene.steps * len(study.train)
+    return full_step(scene, steps).cpu * scene.steps * len(study.train)

@@ -18,9 +18,10 @@ from validation.ldm.studies import TOWER, latin_twice, refined
 from validation.ldm.timing import (
     COLUMNS,
     SteppedFullRun,
+    SteppedReducedRun,
     StepTime,
     TimedRun,
-    fastest,
+    full_step,
     median,
     race,
     timed,
@@ -63,8 +64,8 @@ def test_the_top_moves_as_it_is_told():
 
 def test_a_race_measures_every_way(small):
     ways = [RunOptions("resampled", points=30), RunOptions("eulerian", points=30)]
-    full, found = race(small, EXACT, ways, 3)
-    assert min(full) > 0.0
+    full, fastest, found = race(small, EXACT, ways, 3)
+    assert min(full) > 0.0 < min(fastest)
     for one, way in zip(found, ways, strict=True):
         assert one.options == way
         assert min(one.spent) > 0.0
@@ -85,7 +86,7 @@ def test_a_run_that_breaks_down_has_no_error(small, monkeypatch):
         return SimpleNamespace(states=states)
 
     monkeypatch.setattr("validation.ldm.timing.ldm_run", breaking)
-    _, (broken, fine) = race(small, EXACT, [lost, sound], 2)
+    *_, (broken, fine) = race(small, EXACT, [lost, sound], 2)
     assert broken.errors.origin == broken.spent.wall == np.inf
     assert np.isfinite(fine.errors.origin)
 
@@ -95,8 +96,39 @@ def test_a_race_with_too_few_samples_is_a_mistake(small):
         race(small, EXACT, [RunOptions("resampled", points=2)], 1)
 
 
-def test_the_fastest_transfer_is_measured(small):
-    assert min(fastest(small)) > 0.0
+def test_full_and_reduced_steps_are_made_in_turn(small, monkeypatch):
+    """The full model, the same with the fastest transfer, and each reduced run, until the end."""
+    order = []
+
+    def record_step(step, name):
+        def recorded(self, *given):
+            order.append(name(self))
+            return step(self, *given)
+        return recorded
+
+    monkeypatch.setattr(SteppedFullRun, "step", record_step(
+        SteppedFullRun.step, lambda run: run.problem.scheme.transfer))
+    monkeypatch.setattr(SteppedReducedRun, "step", record_step(
+        SteppedReducedRun.step, lambda run: run.options.points))
+    race(small, EXACT, [RunOptions("resampled", points=n) for n in (30, 29)], small.steps)
+    assert order == [small.scheme.transfer, "mls", 30, 29] * small.steps
+
+
+def test_times_of_a_race_are_medians_of_steps_in_motion(small, monkeypatch):
+    """Of the transfers each its own; the step from rest, here a slow one, counts as one of many."""
+    spent = {small.scheme.transfer: iter((90.0, 8.0, 7.0)), "mls": iter((80.0, 4.0, 3.0))}
+
+    def step(self):
+        wall = next(spent[self.problem.scheme.transfer])
+        self.spent.append(StepTime(wall, 2.0 * wall))
+
+    monkeypatch.setattr(SteppedFullRun, "step", step)
+    full, fastest, _ = race(small, EXACT, [], 3)
+    assert (full, fastest) == ((8.0, 16.0), (4.0, 8.0))
+
+
+def test_a_full_step_is_measured(small):
+    assert min(full_step(small, 2)) > 0.0
 
 
 def test_tracked_points_are_in_their_own_order(small):
@@ -148,5 +180,6 @@ def test_what_the_paper_prints_is_of_the_fastest_eulerian_run_below_fifty_sample
     tower.printed(run, [row("eulerian", 25, 0.5), row("eulerian", 25, 0.25, 1e-2),
                         row("eulerian", 25, 0.03, 1e-2, 2.0), row("eulerian", 50, 0.1),
                         row("resampled", 25, 0.01)])
-    assert said == {"ldm.fig16.speedup": 16.0, "ldm.fig16.realtime": 6.0,
+    assert said == {"ldm.fig16.speedup": 16.0, "ldm.abstract.speedup": 16.0,
+                    "ldm.fig16.realtime": 6.0,
                     "ldm.sec5_4.quadrature_points": 50000}
