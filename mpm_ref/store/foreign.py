@@ -9,6 +9,7 @@ copy. This file imports nothing of the package, since a process that loads NumPy
 begins in a third of a second.
 """
 
+import io
 import os
 import resource
 import signal
@@ -37,7 +38,7 @@ def copied(path, group):
     """Yield the path of a temporary file with the arrays below a group of an HDF5 file.
 
     Arrays that hold no numbers come without entries. Where the file has no such group, neither has
-    the copy. Raises `Unreadable` for a file that HDF5 cannot read, or not to an end, or not without a crash.
+    the copy. Raises `Unreadable` for a file that HDF5 cannot read within the bounds.
     """
     seconds = SECONDS + int(Path(path).stat().st_size / RATE)
     with tempfile.TemporaryDirectory(prefix="mpm_ref-") as folder:
@@ -75,24 +76,34 @@ def copy_arrays(path, group, out):
 
     Raises `Unreadable` for arrays that lie in other files or are larger than the file can hold.
     """
-    left = MOST_RATIO * Path(path).stat().st_size
-    with h5py.File(path, "r") as f, h5py.File(out, "w") as new:
-        if not isinstance(f.get(group, getlink=True), h5py.HardLink) or not isinstance(
-                f[group], h5py.Group):
-            return
-        datasets = {}
-        f[group].visititems(lambda name, item: datasets.update({name: item}) if isinstance(
-            item, h5py.Dataset) else None)
-        target = new.require_group(group)
-        for name, item in datasets.items():
-            left -= _size(name, item)
-            if left < 0:
-                raise Unreadable(f"its array {name} has the shape {item.shape}, more than a file "
-                                 "of this size holds")
-            if item.shape is None or item.dtype.kind not in "iuf":
-                target.create_dataset(name, shape=(0,), dtype=item.dtype)
-            else:
-                target.create_dataset(name, data=item[()])
+    image = io.BytesIO()            # HDF5 may crash where a disk is full
+    with h5py.File(path, "r") as f, h5py.File(image, "w") as new:
+        _copy_group(f, group, new, MOST_RATIO * Path(path).stat().st_size)
+    try:
+        Path(out).write_bytes(image.getbuffer())
+    except OSError as fault:
+        raise Unreadable(f"no copy fits in {Path(out).parent.parent}: {fault.strerror}; set TMPDIR "
+                         "to a folder with room") from fault
+
+
+def _copy_group(f, group, new, left):
+    """Copy the arrays below a group between open files, `left` bytes at most."""
+    link = f.get(group, getlink=True)
+    if not isinstance(link, h5py.HardLink) or not isinstance(f[group], h5py.Group):
+        return
+    datasets = {}
+    f[group].visititems(lambda name, item: datasets.update({name: item}) if isinstance(
+        item, h5py.Dataset) else None)
+    target = new.require_group(group)
+    for name, item in datasets.items():
+        left -= _size(name, item)
+        if left < 0:
+            raise Unreadable(f"its array {name} has the shape {item.shape}, more than a file "
+                             "of this size holds")
+        if item.shape is None or item.dtype.kind not in "iuf":
+            target.create_dataset(name, shape=(0,), dtype=item.dtype)
+        else:
+            target.create_dataset(name, data=item[()])
 
 
 def _size(name, item):

@@ -115,3 +115,24 @@ def test_flipped_bits_of_the_tables_end_the_process(mine):
     assert len(endings) == len(flips)
     assert set(endings) <= set(ends)
     assert np.mean([end == foreign.REFUSED for end in endings]) > 0.02
+
+
+FULL_DISK = """
+import resource, signal, sys
+from mpm_ref.store import foreign
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+try:
+    with foreign.copied(sys.argv[1], "steps"):
+        pass
+except foreign.Unreadable as fault:
+    print(fault)
+"""
+
+
+def test_a_full_temporary_folder_is_not_the_fault_of_the_file(mine):
+    done = subprocess.run([sys.executable, "-c", FULL_DISK, mine], capture_output=True, text=True,
+                          check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "no copy fits in" in done.stdout
+    assert "File too large; set TMPDIR to a folder with room" in done.stdout
