@@ -1,6 +1,7 @@
 """End a command on an error with one line on stderr and an exit status, without traceback."""
 
 import errno
+import os
 import re
 import sys
 from contextlib import contextmanager
@@ -34,6 +35,8 @@ def exit_on_errors():
     except NotWritten as fault:
         end(fault, NOT_WRITTEN)
     except OSError as fault:
+        if fault.errno == errno.ENOSPC and fault.filename is None:
+            end_without_output(fault)
         if fault.errno not in UNREADABLE:
             raise
         end(f"{fault.filename}: {fault.strerror}; name another file", BAD_INPUT)
@@ -68,6 +71,12 @@ def at_start(name):
         end(f"{name}: {fault}", BAD_INPUT)
     except Unstable as fault:
         end(f"{name}: {fault}", UNSTABLE)
+
+
+def end_without_output(fault):
+    """End the command when its answer cannot be printed, as on a full disk."""
+    sys.stdout = open(os.devnull, "w", encoding="utf-8")        # Python flushes it at the end
+    end(f"the answer could not be printed: {fault.strerror}; is the disk full?", NOT_WRITTEN)
 
 
 def end(message, status):

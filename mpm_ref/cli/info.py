@@ -104,7 +104,7 @@ def unsolved(n):
         return []
     return [f"{counted(n, 'implicit step')} of the run did not meet the solver's tolerance, which "
             'unstable = "allow" lets pass: what follows may be wrong; give the solver more '
-            "`iterations`, or a larger `eps` or `cells`, or take a smaller dt"]
+            "`max_iterations`, or a larger `eps` or `displacement_tolerance`, or take a smaller dt"]
 
 
 def stalled(n):

@@ -1,13 +1,14 @@
 """Compare another code's arrays with a golden file: which stage departs first, and where."""
 
 import json
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
 import h5py
 import numpy as np
 
+from ..store.foreign import Unreadable, copied
 from ..store.seal import DAMAGED, GOLDEN, UNSEALED, verify
 from .recording import expand_like
 from .report import CheckReport, Departure
@@ -43,7 +44,7 @@ def check(golden, other, precision="auto"):
     """
     if precision not in ("auto", "f64", "f32"):
         raise NotComparable(f"precision = {precision!r}: expected 'f64', 'f32' or 'auto'")
-    with open_file(golden, RECORDED) as g, open_file(other, WRITTEN) as o, readable(other):
+    with open_file(golden, RECORDED) as g, open_other(other) as o, readable(other):
         if g.attrs.get("format") != FORMAT:
             raise NotComparable(f"{golden}: not a golden file, its format is "
                                 f"{g.attrs.get('format')!r}; expected {RECORDED}")
@@ -71,11 +72,21 @@ def open_file(path, expected):
 
 
 @contextmanager
+def open_other(path):
+    """Yield the other code's open file, or a copy of it if it has no checksum (`store.foreign`)."""
+    with ExitStack() as stack:
+        if Path(path).is_file() and h5py.is_hdf5(path) and verify(path, GOLDEN) == UNSEALED:
+            with readable(path):
+                path = stack.enter_context(copied(path, "steps"))
+        yield stack.enter_context(open_file(path, WRITTEN))
+
+
+@contextmanager
 def readable(other):
     """Turn what HDF5 raises on damaged tables, of a file without checksum, into NotComparable."""
     try:
         yield
-    except (OSError, RuntimeError, KeyError) as fault:
+    except (OSError, RuntimeError, KeyError, Unreadable) as fault:
         raise NotComparable(f"{other} cannot be read ({' '.join(str(fault).split())}); expected "
                             f"{WRITTEN}") from fault
 

@@ -14,7 +14,8 @@ import numpy as np
 from ..body import Body
 from ..plain.flows import FLOWS
 from ..plain.laws import LAWS
-from ..store.atomic import replacing, require_place
+from ..store.atomic import NotWritten, replacing, require_place
+from ..store.journal import JournaledFile
 from ..store.seal import GOLDEN, WHOLE, seal, verify
 from . import accepted_step, adjoint_recording, implicit_recording, recording
 from .comparison import require_numbers
@@ -72,10 +73,20 @@ def write_golden(problem, path, steps_and_begin, record_steps):
 
 @contextmanager
 def new_file(path):
-    """Yield a new `h5py.File`, which is sealed and replaces `path` when the block ends."""
+    """Yield a new `h5py.File`, which is sealed and replaces `path` when the block ends.
+
+    HDF5 writes to memory, since it may crash where a disk is full. Raises `NotWritten`.
+    """
     with replacing(path) as part:
-        with h5py.File(part, "w", libver=("v110", "v110")) as f:
-            yield f
+        file = JournaledFile(part, new=True)
+        try:
+            with h5py.File(file, "w", libver=("v110", "v110")) as f:
+                yield f
+            file.commit()
+        except NotWritten as fault:
+            raise NotWritten(str(fault).replace(str(part), str(path))) from fault
+        finally:
+            file.close()
         seal(part, GOLDEN)
 
 
@@ -173,7 +184,6 @@ def put_body(group, body):
     for name, a in body.particles._asdict().items():
         if len(a) and name not in ("L", "tau"):         # both follow from the rest
             group.create_dataset(name, data=a, **PACKED)
-    group.create_dataset("id", data=np.arange(len(body.id)), **PACKED)
 
 
 def put_step(group, golden):

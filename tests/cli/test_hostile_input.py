@@ -124,3 +124,12 @@ def test_the_same_seed_gives_the_same_cases(files):
     first, again, other = (list(cases(files, seed, 30)) for seed in (3, 3, 4))
     assert first == again != other
     assert len({name for name, _ in first}) > 5
+
+
+def test_an_answer_that_cannot_be_printed_is_told(scene):
+    with open("/dev/full", "w", encoding="utf-8") as full:
+        done = subprocess.run([sys.executable, "-m", "mpm_ref", "info", scene], stdout=full,
+                              stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 4
+    assert done.stderr == ("mpm-ref: the answer could not be printed: No space left on device; is "
+                           "the disk full?\n")

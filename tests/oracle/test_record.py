@@ -16,6 +16,7 @@ from mpm_ref.oracle import comparison, kernel_stages, recording
 from mpm_ref.oracle.plain_twin import Twin, align
 from mpm_ref.oracle.schema import ARRAYS
 from mpm_ref.problem import Clock, Problem
+from mpm_ref.sampling.arrays import read_arrays
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -255,7 +256,7 @@ def test_the_example_in_single_precision(tmp_path, monkeypatch):
     from other_code import step
     path = ROOT / "examples/golden.h5"
     with h5py.File(path) as f:
-        state = {n: a[()].astype(np.float32) for n, a in f["bodies/disk"].items() if n != "id"}
+        state = {n: a[()].astype(np.float32) for n, a in f["bodies/disk"].items()}
     oracle.write(tmp_path / "other.h5", [step(state, 0.1, 2e-3) for _ in range(3)])
     report = oracle.check(path, tmp_path / "other.h5")
     assert report.precision == "f32"
@@ -276,3 +277,13 @@ def test_weights_move_to_another_first_node():
     shifted = align(w, np.array([[5, 5]]), np.array([[6, 4]]))
     assert shifted.reshape(3, 3).tolist() == [[0.0, 4.0, 5.0], [0.0, 7.0, 8.0], [0.0, 0.0, 0.0]]
     assert np.array_equal(align(w, np.array([[5, 5]]), np.array([[5, 5]])), w)
+
+
+def test_a_scene_reads_the_bodies_of_a_golden_file(golden):
+    """As particles of its own, with nothing to ignore; fluids have F where a scene takes J."""
+    with h5py.File(golden) as f:
+        for name, group in f["bodies"].items():
+            arrays = read_arrays(golden, 2, f"/bodies/{name}")
+            assert set(arrays) == set(group)
+            for key, a in arrays.items():
+                np.testing.assert_array_equal(a, group[key][()])

@@ -2,6 +2,10 @@
 and where it is read.
 """
 
+import subprocess
+import sys
+from pathlib import Path
+
 import h5py
 import numpy as np
 import pytest
@@ -51,3 +55,29 @@ def test_steps_that_are_no_group_are_told(golden, tmp_path):
         f["steps"] = np.ones(3)
     with pytest.raises(oracle.NotComparable, match="no group 'steps'"):
         oracle.check(golden, tmp_path / "other.h5")
+
+
+FULL_DISK = """
+import resource, signal, sys
+sys.path[:0] = [{support!r}]
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+from goldens import kernel_arrays, stretched
+from mpm_ref import oracle
+from mpm_ref.store.atomic import NotWritten
+arrays = kernel_arrays(stretched(), 1)
+resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+try:
+    oracle.write(sys.argv[1], arrays)
+except NotWritten as fault:
+    print(fault)
+"""
+
+
+def test_a_full_disk_is_told(tmp_path):
+    """In a process of its own, which HDF5 crashed when a file could not grow."""
+    support = str(Path(__file__).parents[1] / "support")
+    done = subprocess.run([sys.executable, "-c", FULL_DISK.format(support=support),
+                           tmp_path / "other.h5"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "other.h5 could not be written: File too large" in done.stdout
+    assert not list(tmp_path.iterdir())
