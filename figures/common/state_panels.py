@@ -9,8 +9,8 @@ from scipy.spatial import cKDTree
 
 from mpm_ref.core.levelset import distances, normals
 from mpm_ref.scene.builder import build_conditions
-from validation.hot.run_history import read
 from validation.hot.sizes import sized
+from validation.ldm.published_bodies import read
 
 from .splats import Balls, Camera, image, outward
 from .style import scales
@@ -21,6 +21,16 @@ PIXELS, WIDTH = 520, 7.0       # of a picture along its longer side; of the figu
 FINENESS = 90       # of colliders: points along the longer side of the view
 
 
+class SceneStates(NamedTuple):
+    """Particles of a scene at some times of its run."""
+
+    times: np.ndarray       # (shots,) [s]
+    body: np.ndarray        # (N,) number of each particle's body
+    x: np.ndarray           # (shots, N, 3) [m]
+    stress: np.ndarray | None = None    # (shots, N) Frobenius norm of the Kirchhoff stress [Pa],
+                                        # of the scenes whose pictures show it
+
+
 class SceneView(NamedTuple):
     """The pictures, colours and camera with which a figure shows a scene."""
 
@@ -28,7 +38,7 @@ class SceneView(NamedTuple):
     colours: tuple                  # of the bodies; with a scalar, the name of its colour map
     turn: float = 25.0              # of the camera: see `Camera`
     lift: float = 15.0
-    scalar: tuple | None = None     # (field of the run's history, factor, label)
+    scalar: tuple | None = None     # (field of `SceneStates`, factor, label)
     low: tuple | None = None        # corner of the box that is shown at least [m]
     high: tuple | None = None
     columns: int = 4
@@ -72,12 +82,8 @@ def finish(figure, axes, colour_scale, label):
 
 
 def load_history(results, scene):
-    """Return the stored history of a scene's run. Raises FileNotFoundError where there is none."""
-    file = results.folder / "states" / f"{scene}.npz"
-    history = read(file)
-    if history is None:
-        raise FileNotFoundError(f"{file} is not published: run hot.scenes.{scene} again for it")
-    return history
+    """Return the `SceneStates` that are kept; FileNotFoundError where there are none."""
+    return SceneStates(**read(results.folder, f"hot.scenes.{scene}"))
 
 
 def scene_scale(results, scene):

@@ -1,8 +1,8 @@
 """Every scene of HOT from its start to its end, by HOT: the steps, and pictures of the states.
 
-The particles at some times are stored as ``results/<profile>/states/<scene>.npz``, which the state
-figures draw and which is not published. A scene that is there, run by the same version of the
-package, is not run again: records say at which commit it was.
+The particles at some times are stored as ``results/<profile>/states/<scene>.npz``, which is not
+published. A scene that is there, run by the same version of the package, is not run again: records
+say at which commit it was. What the state figures draw is kept among ``results/<profile>/bodies``.
 """
 
 from math import inf
@@ -10,13 +10,17 @@ from math import inf
 from mpm_ref.hot.methods import METHODS
 from mpm_ref.store.text import counted
 
+from ..common.even_points import even_subset
 from ..common.registry import experiment
 from ..common.scenes import evenly
+from ..ldm.published_bodies import keep
 from .run_history import COLUMNS, run_history
 from .sizes import SIZES, sized
 
 METHOD = "hot"
 ROWS = 500          # of the table, at most
+MOST = 20_000       # particles that are kept for pictures
+COLOURED = ("wheel",)       # scenes whose pictures show the stress
 PATIENCE = 900      # CPU seconds of a whole run, at most, unless it is of the printed size
 
 
@@ -46,6 +50,14 @@ def record_run(run, name, scene, patience):
     run.table("steps", COLUMNS, history.steps[evenly(len(history.steps), ROWS)].tolist())
     record_end(run, name, history)
     record_cost(run, name, history)
+    keep_states(run, history, stress=name in COLOURED)
+
+
+def keep_states(run, history, stress):
+    """Keep particles at the times of the pictures, few and rounded enough to be published."""
+    shown = even_subset(history.x[0], MOST)
+    scalars = {"stress": history.stress[:, shown]} if stress else {}
+    keep(run, times=history.times, body=history.body[shown], x=history.x[:, shown], **scalars)
 
 
 def scale_text(history):

@@ -1,15 +1,18 @@
 """Whole runs: the content of a history, that it is read again, and pictures of its states."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from figures.common.splats import DARK, Balls, Camera, image, outward
-from figures.common.state_panels import SceneView, states
+from figures.common.state_panels import SceneView, load_history, states
 from mpm_ref.scene import build
 from validation.common.registry import discover
 from validation.common.results import ProfileResults
 from validation.common.scenes import catalogue_scene, with_
 from validation.hot import run_history as histories
+from validation.hot import whole_runs
 from validation.hot.run_history import COLUMNS, FIELDS, read, run, run_history
 from validation.hot.sizes import SIZES
 from validation.trade.hot_energy import DT, BarRunEnd, StopRule, distance_in_cells, twisted_bar
@@ -130,13 +133,27 @@ def test_normals_of_a_cloud_point_outwards():
     assert np.all(n[abs(x).max(axis=1) < 0.5] == 0.0)
 
 
+def test_kept_states_are_those_of_the_run_and_few(history, tmp_path, monkeypatch):
+    run = SimpleNamespace(folder=tmp_path, experiment=SimpleNamespace(id="hot.scenes.faceless"))
+    whole_runs.keep_states(run, history, stress=True)
+    kept = load_history(ProfileResults(tmp_path), "faceless")
+    np.testing.assert_allclose(kept.x, history.x, atol=2e-4)
+    np.testing.assert_array_equal(kept.body, history.body)
+    monkeypatch.setattr(whole_runs, "MOST", 60)
+    whole_runs.keep_states(run, history, stress=True)
+    assert load_history(ProfileResults(tmp_path), "faceless").x.shape == (4, 60, 3)
+    whole_runs.keep_states(run, history, stress=False)
+    assert load_history(ProfileResults(tmp_path), "faceless").stress is None
+
+
 def test_states_are_drawn_and_missing_ones_named(history, tmp_path):
     results = ProfileResults(tmp_path)
     with pytest.raises(FileNotFoundError, match=r"hot\.scenes\.faceless"):
         states(results, "faceless", SceneView((0,), ("#e8a33d",)))
-    histories.write(tmp_path / "states" / "faceless.npz", history)
+    run = SimpleNamespace(folder=tmp_path, experiment=SimpleNamespace(id="hot.scenes.faceless"))
+    whole_runs.keep_states(run, history, stress=True)
     figure = states(results, "faceless", SceneView((0, 7), ("viridis",),
-                                              scalar=("speed", 1.0, "speed [m/s]")))
+                                              scalar=("stress", 1e-6, "stress [MPa]")))
     assert [ax.get_title() for ax in figure.axes[:2]] == ["t = 0.00 s", "t = 0.12 s"]
     assert len(figure.axes) == 3        # with the colour bar; of a short run, the last picture
 
