@@ -115,7 +115,7 @@ def record_scene(run, name, one, counts, steps):
     return rows
 
 
-def times_in_turn(one, ways, steps):
+def times_in_turn(one, options, steps):
     """Return the `FullTimes`, and {(samples, inversion): what `reduced_steps` returns}: medians of
     runs of a `FittedStudy` in turn.
     """
@@ -126,10 +126,10 @@ def times_in_turn(one, ways, steps):
     for _ in range(REPEATS):
         took, last = full_run(scene, steps)
         full.append((took, full_run(mls(scene), steps)[0], deform_seconds(last, scene.dt)))
-        reduced.append([reduced_steps(one, *way, steps) for way in ways])
+        reduced.append([reduced_steps(one, *own, steps) for own in options])
     return (FullTimes(*np.median(full, axis=0).tolist()),
-            {way: {key: float(np.median([r[key] for r in repeats])) for key in repeats[0]}
-             for way, repeats in zip(ways, zip(*reduced, strict=True), strict=True)})
+            {own: {key: float(np.median([r[key] for r in repeats])) for key in repeats[0]}
+             for own, repeats in zip(options, zip(*reduced, strict=True), strict=True)})
 
 
 def full_steps(study, steps):
@@ -205,15 +205,15 @@ def record_times(run, name, one, rows, steps):
     first, n = dict(zip(COLUMNS, rows[0], strict=True)), len(one.fields.X)
     full, reduced, grid = first["full"], first["reduced"], first["moved"]
     best = first[first["baseline"]]
-    note = (f"{first['samples']} samples, Gauss-Newton; median of {REPEATS} in turn, over "
-            f"{TRANSFERS[first['baseline']]}")
+    timed = f"{first['samples']} samples, Gauss-Newton; median of {REPEATS} in turn"
+    note = f"{timed}, over {TRANSFERS[first['baseline']]}"
     for target, value in ((f"nsf.appC.{name}.speedup_per_step", best / reduced),
                           (f"nsf.{name}.speedup", FASTER * best / reduced)):
         run.record(f"{target}.{MODES}", value, unit="x", scale=scale, note=note)
     for target, value in (("full", 100.0 * full), (f"reduced_mpm.{MODES}", 100.0 * grid),
                           (f"network.{MODES}", 100.0 * (reduced - grid))):
         run.record(f"nsf.appC.{name}.{target}", value, unit="s/100 frames", scale=scale,
-                   note=f"{note}; printed: a graphics processor")
+                   note=f"{timed}; printed: a graphics processor")
     for target, value in (("particle_share", first["points"] / n), ("runtime_share", grid / best)):
         run.record(f"nsf.appC.{name}.{target}.{MODES}", 100.0 * value, unit="%", scale=scale,
                    note=note)
