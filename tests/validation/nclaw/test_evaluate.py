@@ -181,7 +181,7 @@ def made_up(monkeypatch):
     known = {name: trained_laws.LawNet(name) for name in ENVIRONMENTS}
     for name, value in {"compare": compared, "body_maker": lambda laws: laws}.items():
         monkeypatch.setattr(errors, name, value)
-    for name, value in {"trained": trained, "nets": lambda: known}.items():
+    for name, value in {"trained": trained, "nets": lambda: known, "RIVALS": {}}.items():
         monkeypatch.setattr(tables, name, value)
     return there
 

@@ -183,6 +183,7 @@ def trained_ones(monkeypatch):
         return still()._replace(about={"errors": [0.3, None, 0.1, 0.2], "picked": 2, "steps": 40})
 
     monkeypatch.setattr(tables, "trained", found)
+    monkeypatch.setattr(tables, "RIVALS", {})
     monkeypatch.setattr(errors, "compare", lambda scene, laws, goes_on: [
         ComparedError(float(next(count))) for _ in laws])
 

@@ -20,6 +20,7 @@ def found(monkeypatch, tmp_path):
                         lambda scene, laws, goes_on: [ComparedError(ERROR)] * len(laws))
     monkeypatch.setattr(errors, "body_maker", lambda laws: laws)
     monkeypatch.setattr(tables, "trained", lambda name: name)
+    monkeypatch.setattr(tables, "RIVALS", {})
     monkeypatch.setattr(tables, "nets", lambda: {
         n: trained_laws.LawNet(n.split("-")[0]) for n in NAMES})
 

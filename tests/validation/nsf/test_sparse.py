@@ -32,7 +32,7 @@ from validation.extremes.nsf_runs import FieldBench, FieldEnd
 from validation.nsf import reduced_runs
 from validation.nsf.studies import jelly
 
-GOOD = FieldEnd(2.0, 0.2, 15.0, 30, -1, "", 0.4, 5, 0.01, "")
+GOOD = FieldEnd(2.0, 0.2, 15.0, 30, -1, "", 0.4, 5, 0.2, 0.01, "")
 
 
 @pytest.fixture(scope="module")
