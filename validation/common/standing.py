@@ -10,7 +10,7 @@ from typing import NamedTuple
 import msgspec
 
 from .input_files import file_hash
-from .recheck import is_timed
+from .recheck import TIME_NOTE, is_timed
 from .record import seal_of
 from .source_digest import ROOT, source_digest
 from .verdicts import judged
@@ -114,7 +114,19 @@ def was_disturbed(records, targets):
     """Return whether records have a judged time, and other processes more than QUIET cores."""
     origin = records[0].origin
     return bool(origin and origin.others is not None and origin.others > QUIET and any(
-        is_timed(record) and judged(record, targets).verdict != "info" for record in records))
+        is_judged_time(record, judged(record, targets)) for record in records))
+
+
+def is_judged_time(record, one):
+    """Return whether a record with its `Judged` is a time, or a ratio of times, with a verdict.
+
+    Of our own checks a number in seconds is one of the motion, unless its note says CPU or wall.
+    """
+    if one.verdict == "info":
+        return False
+    if one.target:
+        return one.target.kind in ("time", "speedup")
+    return is_timed(record) and (record.unit != "s" or bool(TIME_NOTE.search(record.note)))
 
 
 def standing_text(all_standings):

@@ -30,12 +30,14 @@ from validation.common.standing import (
     standing_text,
     standings,
     state_of,
+    was_disturbed,
     with_verdicts,
 )
 from validation.common.targets import Targets, load
 from validation.hot.table3 import table3
 
 ID = "verification.toy"
+SHORT, FEW = 20.0, 5        # CPU seconds and number of the published records that are made again
 
 
 def toy(run):
@@ -232,6 +234,13 @@ def test_published_records_are_current_or_marked(profile):
     assert refusals(found, read_markers(RESULTS, profile), with_verdicts(published, load())) == []
 
 
+def test_a_printed_setting_in_seconds_is_no_time():
+    settings = ProfileResults(RESULTS / "standard").records("hot.settings")
+    origin = msgspec.structs.replace(settings[0].origin or Origin(), others=2.0)
+    first = msgspec.structs.replace(settings[0], origin=origin)
+    assert not was_disturbed([first, *settings[1:]], load())
+
+
 # Times beside other work
 
 @pytest.mark.parametrize(("others", "unit", "rule", "expected"), [
@@ -240,6 +249,8 @@ def test_published_records_are_current_or_marked(profile):
     (None, "x", {"comparator": "<=", "bound": 2.0}, []),
     (0.5, "x", {"comparator": "info"}, []),
     (0.5, "%", {"comparator": "<=", "bound": 2.0}, []),
+    (0.5, "s", {"comparator": "<=", "bound": 2.0}, []),
+    (0.5, "s", {"comparator": "<=", "bound": 2.0, "note": "CPU time of a step"}, [ID]),
 ])
 def test_judged_times_measured_beside_other_work_are_listed(tmp_path, others, unit, rule, expected):
     fields = {"note": "", **rule}
@@ -317,6 +328,20 @@ def test_the_cheapest_are_sampled_or_drawn_with_a_seed(tmp_path):
     drawn = {tuple(e.id for e in sample(stored, experiments, 2, seed)) for seed in range(8)}
     assert len(drawn) > 2
     assert sample(stored, {}, 2) == []
+
+
+@pytest.mark.slow
+def test_some_published_records_come_out_again(tmp_path):
+    """A few short ones whose source is today's, drawn; within their scatter."""
+    published, experiments = ProfileResults(RESULTS / "standard"), discover().experiments
+    short = {one.experiment: experiments[one.experiment]
+             for one in standings(published, experiments) if one.state == "current"
+             and published.records(one.experiment)[0].cpu_seconds < SHORT}
+    assert len(short) >= FEW
+    setting = RunSetting("standard", published.folder, targets=load())
+    for experiment in sample(published, short, FEW, seed=1):
+        found = recheck(experiment, published, setting, tmp_path)
+        assert not found, (experiment.id, found)
 
 
 # The command line
