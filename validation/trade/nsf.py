@@ -17,6 +17,7 @@ from ..extremes.nsf_runs import scenes
 from ..extremes.outcome import outcome
 from ..ldm.timing import timed
 from ..nsf.errors import COLUMNS, error_rows, mean, record_mean, weights_note
+from ..nsf.reduced_runs import FASTER
 from .front import front
 
 COUNTS = {"quick": (10, 50), "standard": (5, 10, 20, 30, 50, 100, 200, 400)}
@@ -25,6 +26,7 @@ DRAWS = {"quick": 1, "standard": 5}
 WEIGHTED = {"random": False, "cubature": True, CELLS: True}     # kinds of samples
 DESCRIPTIONS = {"random": "samples, random", "cubature": "samples, cubature",
         CELLS: "cells, cubature of their points"}
+ENOUGH = 1.5            # times the error with all particles as samples
 FACTORS = (1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 10.0)    # of the scene's step
 WORDS = "the full-order run {:.3g} CPU s, the reduced one {:.3g}"
 
@@ -51,6 +53,8 @@ def samples_experiment(run):
         every = Sampling(name, "random", len(one.fields.X))
         for sampling in run.progress([*settings, every], name):
             found.append(record_samples(run, one, sampling, full))
+        record_sampling(run, one, dict(zip([*settings, every], (own for own, _ in found),
+                                           strict=True)))
         best = front([cpu for _, cpu in found], [mean(own, "origin") for own, _ in found])
         rows += [(name, *row, cpu, full, int(on))
                  for (own, cpu), on in zip(found, best, strict=True) for row in own]
@@ -70,6 +74,28 @@ def record_samples(run, one, sampling, full):
                 f"{mean(rows, 'points'):.0f} integration points; {WORDS.format(full, cpu)}",
                 comparator="info")
     return rows, cpu
+
+
+def record_sampling(run, one, rows):
+    """Judge the study's number of samples, and weights, by the rows of {`Sampling`: rows}."""
+    error = {(sampling.kind, sampling.count): mean(own, "origin") for sampling, own in rows.items()}
+    scene, counts, every = next(iter(rows)).scene, COUNTS[run.profile], len(one.fields.X)
+    few = min((count for count in counts if count >= one.study.samples), default=max(counts))
+    record_ratio(run, f"trade.nsf.samples.{scene}.enough", (error["random", few],
+                                                            error["random", every]), ENOUGH,
+                 one.scale, f"error with {few} random samples, the study's number or the next "
+                 "that is tried, over that with all")
+    gains = [error["cubature", count] / error["random", count] for count in counts]
+    record_ratio(run, f"trade.nsf.samples.{scene}.weights", (float(np.exp(np.mean(np.log(gains)))),
+                                                             1.0), 1.0, one.scale,
+                 "error with weights over that of as many random samples, geometric mean over "
+                 "their numbers")
+
+
+def record_ratio(run, target, errors, bound, scale, note):
+    """Judge the ratio of two errors, which is not to exceed a bound."""
+    over, under = errors
+    run.record(target, over / under, unit="1", comparator="<=", bound=bound, scale=scale, note=note)
 
 
 def full_cpu(one):
@@ -101,7 +127,7 @@ def steps_experiment(run):
     """Lengthen the step until a run breaks down, and compare with the end of the full-order run."""
     rows = []
     for name, one in scenes(run):
-        draws = range(run.choose(quick=1, standard=3))
+        draws, errors = range(run.choose(quick=1, standard=3)), {}
         for factor in run.progress(FACTORS, name):
             found = error_rows(one, "modal", one.study.samples, draws, factor)
             full_kind = full_order_end(one.study.run(one.study.test[0]), factor)
@@ -109,8 +135,12 @@ def steps_experiment(run):
                         f"steps {factor:g} times as long, {one.study.samples} samples; "
                         f"the full-order run: {full_kind}", comparator="info")
             rows += [(name, *row, full_kind) for row in found]
+            errors[factor] = mean(found, "origin")
             if not all(np.isfinite(row[COLUMNS.index("origin")]) for row in found):
                 break
+        record_ratio(run, f"trade.nsf.dt.{name}.printed", (errors.get(FASTER, np.inf), errors[1.0]),
+                     FASTER, one.scale, f"error in steps {FASTER:g} times as long, as the paper's, "
+                     "over that in the scene's own; of first order in the step it would be as much")
     run.table("steps", ("scene", *COLUMNS, "full"), rows)
 
 

@@ -5,6 +5,8 @@ particles of the full-order run, and the width of networks.
 from collections.abc import Callable
 from typing import NamedTuple
 
+import numpy as np
+
 from mpm_ref.rom.study.full_model import nsf_full_model
 
 from ..common.registry import experiment
@@ -15,12 +17,13 @@ from ..nsf.errors import COLUMNS, error_rows, mean, record_mean
 from ..nsf.networks import narrow, net_of, trained
 from ..nsf.networks_runs import OUTPUTS, TRAINED, fit_to_networks, scale_of, weight_count
 from ..nsf.reduced_runs import refit
-from .nsf import full_cpu, reduced_cpu
+from .nsf import full_cpu, record_ratio, reduced_cpu
 
 LEVELS = {          # one at a time, from the study's own
     "quick": {"r": (3,), "tau": (10,), "C": (10,), "smoothing": (1.0,)},
     "standard": {"r": (2, 3, 4, 6, 8), "modes": (8, 12, 40), "tau": (5, 10, 20, 80),
                  "C": (5, 10, 20, 80), "smoothing": (1e-8, 1e-6, 1e-4, 1e-2, 1.0, 100.0)}}
+NEAR = 2.0          # times the smallest error of all sizes tried
 OWN = ("scene", "knob", "r", "modes", "tau", "C", "smoothing", *COLUMNS[1:], "bytes", "bytes_full")
 
 
@@ -38,9 +41,13 @@ def sizes_experiment(run):
     """Vary latent coordinates, modes of each field, smoothing, and the precision of modes."""
     rows = []
     for name, one in scenes(run):
-        full = particle_bytes(one.study)
+        full, errors = particle_bytes(one.study), []
         for change in run.progress(field_changes(one, LEVELS[run.profile]), name):
-            rows += record_change(run, name, change, full)
+            found, error = record_change(run, name, change, full)
+            rows += found
+            errors.append(error)
+        record_ratio(run, f"trade.nsf.sizes.{name}.best", (errors[0], min(errors)), NEAR, one.scale,
+                     "error with the study's sizes over the smallest with one of them changed")
     run.table("sizes", OWN, rows)
 
 
@@ -57,7 +64,9 @@ def field_changes(one, levels):
 
 
 def record_change(run, name, change, full):
-    """Record errors and bytes of fields with a `FieldChange`. Returns rows of its runs."""
+    """Record errors and bytes of fields with a `FieldChange`. Returns rows of its runs, and their
+    mean error.
+    """
     one, knob = change.compute(), change.knob
     size, sizes = nbytes(one.fields), one.study.sizes
     rows = error_rows(one, knob, one.study.samples, range(run.choose(quick=1, standard=3)))
@@ -66,7 +75,7 @@ def record_change(run, name, change, full):
                 f"fields, the particles of the full-order run {full / 1e6:.3g} MB",
                 comparator="info")
     return [(name, knob, sizes.r, sizes.modes, sizes.tau, sizes.C, sizes.smoothing, *row[1:], size,
-             full) for row in rows]
+             full) for row in rows], mean(rows, "origin")
 
 
 def particle_bytes(study):
@@ -87,7 +96,21 @@ def widths_experiment(run):
     found = load_available(run, [*narrow(), "jelly-waves"], trained)
     rows = [row for name, model in run.progress(found.items(), "widths")
             for row in record_width(run, net_of(name), model)]
+    if len(found) > 1:
+        record_gain(run, rows)
     run.table("widths", WIDTH_COLUMNS, rows)
+
+
+def record_gain(run, rows):
+    """Judge whether wider networks err less, by rows of WIDTH_COLUMNS with the samples drawn."""
+    width, samples, origin = map(WIDTH_COLUMNS.index, ("width", "samples", "origin"))
+    few, widths = min(row[samples] for row in rows), sorted({row[width] for row in rows})
+    by_width = {w: [row[origin] for row in rows if (row[width], row[samples]) == (w, few)]
+                for w in widths}
+    errors = [float(np.mean(own)) for own in by_width.values()]
+    worst = max(zip(errors[1:], errors[:-1], strict=True), key=lambda pair: pair[0] / pair[1])
+    record_ratio(run, "trade.nsf.widths.falls", worst, 1.0, f"widths {widths}",
+                 "error of networks over that of the next narrower ones, the largest")
 
 
 def record_width(run, net, model):

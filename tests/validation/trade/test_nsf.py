@@ -59,7 +59,16 @@ def test_each_kind_of_samples_is_run_and_all_particles(one, results, monkeypatch
     assert (table["cpu"] > 0.0).all()
     assert len(set(table["cpu_full"])) == 1
     records = {r.target: r for r in found.records("trade.nsf.samples")}
+    judged = {target: records.pop(f"trade.nsf.samples.jelly.{target}")
+              for target in ("enough", "weights")}
     assert {r.comparator for r in records.values()} == {"info", "remark"}
+    value = {target: r.value for target, r in records.items()}
+    drawn, weighted = ([value[f"trade.nsf.samples.jelly.{kind}.{count}"] for count in (5, 30)]
+                       for kind in ("random", "cubature"))
+    assert judged["enough"].value == pytest.approx(
+        drawn[1] / value[f"trade.nsf.samples.jelly.random.{n}"])
+    assert judged["weights"].value == pytest.approx(
+        np.sqrt(weighted[0] * weighted[1] / (drawn[0] * drawn[1])))
     assert {*records} == {"trade.nsf.samples", f"trade.nsf.samples.jelly.random.{n}", *(
         f"trade.nsf.samples.jelly.{way}.{count}" for way in nsf.WEIGHTED for count in (5, 30))}
     told = {way: records[f"trade.nsf.samples.jelly.{way}.30"].note for way in nsf.WEIGHTED}
@@ -94,7 +103,9 @@ def test_steps_grow_until_a_run_breaks_down(one, results, monkeypatch):
 
     monkeypatch.setattr(type(one), "errors", errors)
     monkeypatch.setattr(nsf, "full_order_end", lambda scene, factor: f"end {factor:g}")
-    table = results(nsf.steps_experiment).table("trade.nsf.dt", "steps")
+    found = results(nsf.steps_experiment)
+    assert found.value("trade.nsf.dt", "trade.nsf.dt.jelly.printed") == 1.0
+    table = found.table("trade.nsf.dt", "steps")
     assert asked == [1.0, 1.25, 1.5, 2.0]
     assert table["faster"].tolist() == asked
     assert table["full"].tolist() == ["end 1", "end 1.25", "end 1.5", "end 2"]
@@ -145,8 +156,11 @@ def test_sizes_are_told_with_their_bytes(one, results, monkeypatch, tmp_path):
     assert table["bytes"][2] < table["bytes"][0]
     assert table["bytes_full"][0] == nsf_sizes.particle_bytes(STUDY)
     assert table["origin"][1] > table["origin"][0]
-    targets = {r.target for r in ProfileResults(tmp_path).records("trade.nsf.sizes")}
-    assert targets == {"trade.nsf.sizes", *(f"trade.nsf.sizes.jelly.{words}" for words in (
+    value = {r.target: r.value for r in ProfileResults(tmp_path).records("trade.nsf.sizes")}
+    errors = [value[f"trade.nsf.sizes.jelly.{words}"] for words in ("own.sizes", "r.2", "C.4",
+                                                                    "precision.single")]
+    assert value.pop("trade.nsf.sizes.jelly.best") == pytest.approx(errors[0] / min(errors))
+    assert {*value} == {"trade.nsf.sizes", *(f"trade.nsf.sizes.jelly.{words}" for words in (
         "own.sizes", "r.2", "C.4", "precision.single"))}
 
 

@@ -82,12 +82,14 @@ def test_errors_stand_beside_time_and_memory(recorded):
     assert table["origin"].tolist() == 2 * [0.01, 0.02, 0.03, 0.005]
     assert set(table["cpu"]) == {REDUCED}
     assert "untrained" not in found
+    assert found["falls"].value == pytest.approx(1.0)       # of the samples drawn alone
 
 
 def test_widths_without_weights_are_told(recorded):
     found, table = recorded("small")
     assert found["untrained"].value == 1
     assert set(table["width"]) == {6}
+    assert "falls" not in found
 
 
 def test_narrow_nets_differ_in_their_widths_alone():
