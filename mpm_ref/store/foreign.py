@@ -23,6 +23,7 @@ from pathlib import Path
 import h5py
 
 MOST_RATIO = 1032           # bytes that a byte of deflate gives at most
+ALWAYS = 100e6              # bytes of arrays that any file may hold: entries may never be written
 SPARE = 2 << 30             # bytes of addresses beyond those of the arrays: programs and buffers
 SECONDS, RATE = 20, 5e6     # of processor time, and more for each so many bytes of the file
 WAIT = 10                   # times as long on the clock, for a disk or a machine that is slow
@@ -78,7 +79,7 @@ def copy_arrays(path, group, out):
     """
     image = io.BytesIO()            # HDF5 may crash where a disk is full
     with h5py.File(path, "r") as f, h5py.File(image, "w") as new:
-        _copy_group(f, group, new, MOST_RATIO * Path(path).stat().st_size)
+        _copy_group(f, group, new, max(MOST_RATIO * Path(path).stat().st_size, ALWAYS))
     try:
         Path(out).write_bytes(image.getbuffer())
     except OSError as fault:
@@ -91,11 +92,8 @@ def _copy_group(f, group, new, left):
     link = f.get(group, getlink=True)
     if not isinstance(link, h5py.HardLink) or not isinstance(f[group], h5py.Group):
         return
-    datasets = {}
-    f[group].visititems(lambda name, item: datasets.update({name: item}) if isinstance(
-        item, h5py.Dataset) else None)
     target = new.require_group(group)
-    for name, item in datasets.items():
+    for name, item in _arrays(f[group]):
         left -= _size(name, item)
         if left < 0:
             raise Unreadable(f"its array {name} has the shape {item.shape}, more than a file "
@@ -106,6 +104,23 @@ def _copy_group(f, group, new, left):
             target.create_dataset(name, data=item[()])
 
 
+def _arrays(group, path="", above=()):
+    """Yield (path, array) of all arrays below a group, under each of their names: HDF5's own walk
+    follows no soft links, and visits an array with several names once.
+
+    Raises `Unreadable` for a link to another file. A group within itself is not entered again.
+    """
+    above = (*above, h5py.h5o.get_info(group.id).addr)
+    for name in group:
+        if isinstance(group.get(name, getlink=True), h5py.ExternalLink):
+            raise Unreadable(f"its entry {path}{name} lies in another file")
+        item = group.get(name)
+        if isinstance(item, h5py.Dataset):
+            yield path + name, item
+        elif isinstance(item, h5py.Group) and h5py.h5o.get_info(item.id).addr not in above:
+            yield from _arrays(item, f"{path}{name}/", above)
+
+
 def _size(name, item):
     """Return the bytes of an array. Raises `Unreadable` for one that lies in other files."""
     if item.external or item.is_virtual:
@@ -113,12 +128,19 @@ def _size(name, item):
     return 0 if item.shape is None else prod(item.shape) * item.dtype.itemsize
 
 
+def _limit(kind, soft, hard):
+    """Set the limits of a resource of this process, at most those that it has."""
+    least = [min(wanted, given) if given != resource.RLIM_INFINITY else wanted
+             for wanted, given in zip((soft, hard), resource.getrlimit(kind), strict=True)]
+    resource.setrlimit(kind, least)
+
+
 def main(path, group, out, seconds):
     """Copy within bounds and return the exit status; a sentence on stdout says why it failed."""
     addresses = SPARE + 2 * MOST_RATIO * Path(path).stat().st_size
-    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    resource.setrlimit(resource.RLIMIT_AS, (addresses, addresses))
+    _limit(resource.RLIMIT_CPU, seconds, seconds + 5)
+    _limit(resource.RLIMIT_CORE, 0, 0)
+    _limit(resource.RLIMIT_AS, addresses, addresses)
     try:
         copy_arrays(path, group, out)
     except MemoryError:

@@ -33,6 +33,37 @@ def test_a_file_of_another_program_is_compared(golden, mine):
     assert oracle.check(golden, mine).first.array == "mass"
 
 
+@pytest.mark.parametrize("soft", [True, False], ids=["soft", "hard"])
+def test_links_inside_a_file_are_followed_under_each_name(golden, mine, soft):
+    """A wrong array that stands under another name too is compared, not left out."""
+    with h5py.File(mine, "r+") as f:
+        f["elsewhere"] = 2.0 * f["steps/0/mass"][()]
+        del f["steps/0/mass"]
+        f["steps/0/mass"] = h5py.SoftLink("/elsewhere") if soft else f["elsewhere"]
+        f["steps/0/again"] = f["elsewhere"]
+    assert oracle.check(golden, mine).first.array == "mass"
+
+
+def test_a_group_within_itself_and_a_link_to_another_file(golden, mine, tmp_path):
+    with h5py.File(mine, "r+") as f:
+        f["steps/0/self"] = f["steps"]
+    assert oracle.check(golden, mine).agrees
+    with h5py.File(mine, "r+") as f:
+        f["steps/0/other"] = h5py.ExternalLink(str(tmp_path / "sealed.h5"), "/steps")
+    assert_told(mpm_ref("oracle", "check", golden, mine), 2, "0/other lies in another file")
+
+
+def test_entries_that_were_never_written_and_a_lower_limit_of_memory(mine, tmp_path):
+    with h5py.File(mine, "r+") as f:
+        f.create_dataset("steps/0/sparse", (2_000_000,), "f8", chunks=(1000,))
+    with foreign.copied(mine, "steps") as copy, h5py.File(copy) as f:
+        assert not f["steps/0/sparse"][()].any()
+    command = f"ulimit -v 1900000; exec {sys.executable} -m mpm_ref.store.foreign " \
+              f"{mine} steps {tmp_path / 'copy.h5'} 20"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_an_array_in_a_pipe_is_not_waited_for(golden, mine, tmp_path):
     os.mkfifo(tmp_path / "pipe")
     with h5py.File(mine, "r+") as f:

@@ -2,15 +2,18 @@
 
 An experiment depends on them as on its source. A file that an earlier experiment of the process
 opened counts too, since its content may be cached. Files that a library opens by itself (HDF5) are
-not noticed.
+not noticed. The printed values in `validation/targets`, which some experiments compute with, and
+the random numbers count for every experiment.
 """
 
 import hashlib
 import os
 import sys
+import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+ALWAYS = ("validation/common/seeding.py", "validation/targets")     # of the last the values alone
 FOLDERS = ("mpm_ref", "scenes", "studies", "validation")
 IGNORED = ("validation/targets/", "validation/templates/")      # rules and layout, no input
 CODE = {".py", ".pyc", ".nbi", ".nbc"}
@@ -31,8 +34,25 @@ def _note(event, arguments):
 def opened(root=ROOT):
     """Return {path relative to `root`: hash} of the data files that were opened and are there."""
     inside = {relative(path, root) for path in list(_opened)} - {None}
-    return {path: file_hash(root / path) for path in sorted(inside)
-            if is_input(path) and (root / path).is_file()}
+    found = {path for path in inside if is_input(path) and (root / path).is_file()}
+    return {path: hash_now(path, root) for path in sorted(found)}
+
+
+def always(root=ROOT):
+    """Return {path relative to `root`: hash} of what counts for every experiment."""
+    return {path: hash_now(path, root) for path in ALWAYS}
+
+
+def hash_now(path, root):
+    """Return the hash of an input by its relative path: of a file, or of the printed values."""
+    return file_hash(root / path) if path != ALWAYS[1] else values_hash(root / path)
+
+
+def values_hash(folder):
+    """Return the hash of the printed values in a folder, whatever their rules and reasons."""
+    values = sorted((target["id"], target["value"]) for file in Path(folder).glob("*.toml")
+                    for target in tomllib.loads(file.read_text(encoding="utf-8"))["targets"])
+    return hashlib.sha256(repr(values).encode()).hexdigest()[:16]
 
 
 def relative(path, root):

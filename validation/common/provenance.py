@@ -50,7 +50,8 @@ def origin_of(function, load_before, occupied_before):
         digest=source_digest(function.__module__), cpu=cpu_model(), memory_gb=memory_gb(),
         threads=numba.get_num_threads(), system=platform.platform(), blas=blas(),
         torch=str(getattr(torch, "__version__", "")), load=(load_before, load_average()),
-        others=busy_cores(occupied_before, occupation()), inputs=input_files.opened())
+        others=busy_cores(occupied_before, occupation()),
+        inputs=input_files.opened() | input_files.always())
 
 
 def load_average():

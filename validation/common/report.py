@@ -20,7 +20,7 @@ from .judge import VERDICTS
 from .record import Measurement, write_whole
 from .registry import GROUPS
 from .results import ProfileResults
-from .summary import STATE_NAMES, ratio_text, selected, verdict_text
+from .summary import NO_RATIO, STATE_NAMES, ratio_text, selected, verdict_text
 from .verdicts import VARIANTS, judged, overruled, printed_counts
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
@@ -256,7 +256,7 @@ def rule(interval, comparator):
 
 def ratio(value, paper):
     """Return ours over the paper's, where that is a number."""
-    return f"{value / paper:.3g}" if value is not None and paper else "—"
+    return f"{value / paper:.3g}" if value is not None and paper else NO_RATIO
 
 
 def _table(results, id, name):

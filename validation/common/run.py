@@ -8,16 +8,14 @@ import re
 import shutil
 import time
 import traceback
-import zlib
 from pathlib import Path
 from typing import NamedTuple
-
-import numpy as np
 
 from .judge import Criterion, finite_ends, judge
 from .progress import SuiteProgress
 from .provenance import load_average, occupation, origin_of, provenance
 from .record import PRINTED, Measurement, sealed, write_records, write_whole
+from .seeding import generator
 from .targets import Targets
 from .verdicts import VARIANTS, judged, printed_id
 
@@ -69,7 +67,7 @@ class Run:
 
     def __init__(self, experiment, setting, progress):
         self.experiment, self.profile, self.seed = experiment, setting.profile, setting.seed
-        self.rng = np.random.default_rng([setting.seed, zlib.crc32(experiment.id.encode())])
+        self.rng = generator(setting.seed, experiment.id)
         self._setting, self._progress = setting, progress
         self._drafts, self._tables, self._failed = [], {}, False
         self._cache = Cache(setting.folder / ".parts" / experiment.id, setting.commit, setting.seed)

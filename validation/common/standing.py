@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from .input_files import file_hash
+from .input_files import hash_now
 from .recheck import TIME_NOTE, is_timed
 from .record import seal_of
 from .source_digest import ROOT, source_digest
@@ -25,6 +25,7 @@ WORDS = {       # of states, as the command line lists them
     "early": "made before records had digests and seals",
 }
 MARKED = ("stale", "early")     # states that a marker excuses
+NEVER = ("edited", "orphaned")  # states that nothing excuses
 
 
 class Marker(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -65,7 +66,7 @@ def state_of(results, experiment_id, experiment, root=ROOT):
     if not (origin and origin.digest):
         return "early"
     current = source_digest(experiment.function.__module__, root)
-    same_inputs = all(file_hash(root / path) == known for path, known in origin.inputs.items())
+    same_inputs = all(hash_now(path, root) == known for path, known in origin.inputs.items())
     return "current" if origin.digest == current and same_inputs else "stale"
 
 
@@ -87,8 +88,8 @@ def refusals(all_standings, markers, judged_ids):
     patterns = {pattern for marker in markers for pattern in marker.ids}
     excused = {one.experiment for one in all_standings if one.state in MARKED}
     found = [f"{one.experiment}: {WORDS[one.state]}" for one in all_standings
-             if one.state != "current" and one.experiment in judged_ids
-             and not (one.state in MARKED and matches(one.experiment, patterns))]
+             if one.state in NEVER or (one.state in MARKED and one.experiment in judged_ids
+                                       and not matches(one.experiment, patterns))]
     return found + [f"{MARKERS}: {pattern!r} marks nothing that is not current; remove it"
                     for pattern in sorted(patterns)
                     if not any(fnmatchcase(id, pattern) for id in excused)]

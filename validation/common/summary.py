@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from .verdicts import printed_id
 
+NO_RATIO = "—"      # of a number to a printed one, where either is missing
 STATE_NAMES = {"pass": "reproduced", "better": "better", "miss": "missed",
                "chosen": "chosen on these runs", "info": "another machine",
                "other": "another method or body", "absent": "not measured"}
@@ -61,8 +62,8 @@ def counted(rows):
 
 def ratio_text(pairs):
     """Return the range of the ratios of numbers."""
-    values = sorted(float(row.ratio) for _, row in pairs if row.ratio != "—")
+    values = sorted(float(row.ratio) for _, row in pairs if row.ratio != NO_RATIO)
     if not values:
-        return "—"
+        return NO_RATIO
     ends = f"{values[0]:.2g}", f"{values[-1]:.2g}"
     return ends[0] if ends[0] == ends[1] else " to ".join(ends)

@@ -162,6 +162,7 @@ def fastest_scene(scene):
 def full_step(scene, steps):
     """Return the `StepTime` of the full model over the first steps of a run."""
     full = SteppedFullRun(scene)
-    for _ in range(steps):
-        full.step()
+    with one_thread():
+        for _ in range(steps):
+            full.step()
     return median(full.spent)

@@ -85,11 +85,12 @@ def record_sampling(run, one, rows):
                                                             error["random", every]), ENOUGH,
                  one.scale, f"error with {few} random samples, the study's number or the next "
                  "that is tried, over that with all")
-    gains = [error["cubature", count] / error["random", count] for count in counts]
-    record_ratio(run, f"trade.nsf.samples.{scene}.weights", (float(np.exp(np.mean(np.log(gains)))),
-                                                             1.0), 1.0, one.scale,
-                 "error with weights over that of as many random samples, geometric mean over "
-                 "their numbers")
+    gains = [error["cubature", count] / error["random", count] for count in counts
+             if count >= few or count == max(counts)]
+    run.record(f"trade.nsf.samples.{scene}.weights", float(np.median(gains)), unit="1",
+               comparator="<=", bound=1.0, scale=one.scale,
+               note=f"error with weights over that of as many random samples, median over {few} "
+               "samples and more")
 
 
 def record_ratio(run, target, errors, bound, scale, note):

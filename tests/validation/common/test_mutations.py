@@ -3,15 +3,17 @@
 import math
 
 import pytest
+from typer.testing import CliRunner
 
 from mpm_ref.core.spline import base_of
 from mpm_ref.explicit import Scheme
+from validation import __main__ as suite
 from validation.common import targets
 from validation.common.registry import Experiment, discover
 from validation.common.results import RESULTS, ProfileResults
 from validation.common.run import RunSetting
 from validation.common.verdicts import judged
-from validation.mutations import command, listing, patch, table, trial
+from validation.mutations import listing, patch, table, trial
 from validation.mutations.listing import Mutation, MutationList, Without
 from validation.mutations.scaling import scaled
 from validation.verification import convergence
@@ -141,4 +143,6 @@ def test_a_wrong_list_is_refused_in_a_sentence(tmp_path):
 
 
 def test_the_command_is_one_of_the_suite():
-    assert command.mutate.__doc__
+    told = CliRunner().invoke(suite.app, ["mutate", "--help"])
+    assert told.exit_code == 0
+    assert "Break the subject" in told.output

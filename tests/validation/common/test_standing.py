@@ -193,7 +193,18 @@ def test_an_experiment_records_the_scene_that_it_reads(tmp_path, monkeypatch):
 
     assert run_all([TOY._replace(function=reads_a_scene)], RunSetting("quick", tmp_path)) == []
     inputs = ProfileResults(tmp_path).records(ID)[0].origin.inputs
-    assert inputs == {"scenes/hello.toml": input_files.file_hash(ROOT / "scenes/hello.toml")}
+    assert inputs == input_files.always() | {
+        "scenes/hello.toml": input_files.file_hash(ROOT / "scenes/hello.toml")}
+
+
+def test_printed_values_count_and_their_rules_do_not(tmp_path):
+    text = 'paper = "a"\ntargets = [{id = "a.b", value = 1.0, what = "x"}]\n'
+    write(tmp_path, "validation/targets/a.toml", text)
+    before = input_files.hash_now("validation/targets", tmp_path)
+    for new, same in ((text.replace('"x"', '"y"'), True), (text + '[[cause]]\nids = []\n', True),
+                      (text.replace("1.0", "2.0"), False)):
+        write(tmp_path, "validation/targets/a.toml", new)
+        assert (input_files.hash_now("validation/targets", tmp_path) == before) is same
 
 
 # Markers
@@ -212,6 +223,7 @@ def test_a_judged_record_that_is_not_current_needs_a_marker():
 @pytest.mark.parametrize("state", ["edited", "orphaned"])
 def test_no_marker_excuses_an_edit_or_a_record_without_experiment(state):
     assert f"{ID}: {WORDS[state]}" in marked(state, ID)
+    assert marked(state, judged=()) == [f"{ID}: {WORDS[state]}"]
 
 
 def test_a_marker_that_marks_nothing_is_a_fault():
