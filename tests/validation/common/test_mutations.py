@@ -69,6 +69,7 @@ def test_the_committed_table_has_each_experiment_of_the_list_and_none_survives_w
     survivors = {id for id, row in rows.items() if row.checks and not row.broken}
     assert {id for id in {*(listed - set(rows)), *survivors}
             if not mutations.reason_without(id)} == set()
+    assert [id for id, row in rows.items() if row.broken and mutations.reason_without(id)] == []
 
 
 def test_all_mutations_of_the_list_name_what_exists_and_kernels_see():
