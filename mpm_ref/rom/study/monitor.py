@@ -40,8 +40,8 @@ from ..projection import RANK
 
 CHECKED = 64        # points of the body that are checked, and samples
 OFF = 0.033         # [dx] at the start
-DEPARTURE = 4.5     # of LDM; 2 % of the wrong calibration runs are below, 10 % of the good above
-FIELD_DEPARTURE = 0.8       # of NSF; 4 % and 5 %
+DEPARTURE = 4.5     # of LDM; 8 % of the wrong calibration runs are below, 10 % of the good above
+FIELD_DEPARTURE = 0.8       # of NSF; 6 % and 5 %
 FIELD_COVERAGE = 0.15       # from random samples and samples in corners of the jelly cube and frame
 MEMORY = 0.8        # share of the earlier coverage in the present one: a poor draw is forgiven
 LOST = 0.01         # of the quadrature points; in range none
