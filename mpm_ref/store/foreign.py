@@ -108,13 +108,14 @@ def _arrays(group, path="", above=()):
     """Yield (path, array) of all arrays below a group, under each of their names: HDF5's own walk
     follows no soft links, and visits an array with several names once.
 
-    Raises `Unreadable` for a link to another file. A group within itself is not entered again.
+    Raises `Unreadable` for a link to another file, and KeyError for an entry that is damaged or
+    leads nowhere. A group within itself is not entered again.
     """
     above = (*above, h5py.h5o.get_info(group.id).addr)
     for name in group:
         if isinstance(group.get(name, getlink=True), h5py.ExternalLink):
             raise Unreadable(f"its entry {path}{name} lies in another file")
-        item = group.get(name)
+        item = group[name]              # `get` would leave out what is damaged
         if isinstance(item, h5py.Dataset):
             yield path + name, item
         elif isinstance(item, h5py.Group) and h5py.h5o.get_info(item.id).addr not in above:
