@@ -54,9 +54,9 @@ def test_a_group_within_itself_and_a_link_to_another_file(golden, mine, tmp_path
 
 
 def test_entries_that_were_never_written_and_a_lower_limit_of_memory(mine, tmp_path):
-    with h5py.File(mine, "r+") as f:
-        f.create_dataset("steps/0/sparse", (2_000_000,), "f8", chunks=(1000,))
-    with foreign.copied(mine, "steps") as copy, h5py.File(copy) as f:
+    with h5py.File(tmp_path / "small.h5", "w") as f:
+        f.create_dataset("steps/0/sparse", (2_000_000,), "f8", chunks=(100_000,))
+    with foreign.copied(tmp_path / "small.h5", "steps") as copy, h5py.File(copy) as f:
         assert not f["steps/0/sparse"][()].any()
     command = f"ulimit -v 1900000; exec {sys.executable} -m mpm_ref.store.foreign " \
               f"{mine} steps {tmp_path / 'copy.h5'} 20"

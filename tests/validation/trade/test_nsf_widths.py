@@ -1,5 +1,7 @@
 """NSF: what networks cost and give by their width; which networks there are for it."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from field_toys import R, networks
@@ -83,6 +85,17 @@ def test_errors_stand_beside_time_and_memory(recorded):
     assert set(table["cpu"]) == {REDUCED}
     assert "untrained" not in found
     assert found["falls"].value == pytest.approx(1.0)       # of the samples drawn alone
+
+
+def test_wider_networks_are_compared_with_the_next_narrower_ones_on_the_samples_drawn():
+    found = {}
+    run = SimpleNamespace(record=lambda target, value, **rule: found.update({target: value}))
+    columns = nsf_widths.WIDTH_COLUMNS
+    rows = [tuple({"width": w, "samples": n, "origin": e}.get(c, 0.0) for c in columns)
+            for w, n, e in ((16, 50, 4.0), (16, 50, 2.0), (16, 900, 9.0), (32, 50, 1.0),
+                            (32, 900, 9.0), (64, 50, 0.8), (64, 900, 0.1))]
+    nsf_widths.record_gain(run, rows)
+    assert found == {"trade.nsf.widths.falls": pytest.approx(0.8)}
 
 
 def test_widths_without_weights_are_told(recorded):
