@@ -10,7 +10,8 @@ from validation.common import equations, targets
 from validation.common.citations import ID
 from validation.common.judge import Criterion
 from validation.common.registry import discover
-from validation.common.verdicts import VARIANTS
+from validation.common.results import RESULTS, ProfileResults
+from validation.common.verdicts import VARIANTS, judged
 
 GOOD = ('{id = "toy.a", value = 1.5, unit = "m", what = "length", paper_ref = "Table 1", '
         'kind = "setting", comparator = "=", confidence = "exact"}')
@@ -194,6 +195,15 @@ def test_every_tolerance_has_a_reason_and_every_choice_and_cause_a_number(printe
 def test_causes_are_shown_by_experiments_that_exist(printed):
     shown = {group.shown_by for group in printed.causes if group.shown_by}
     assert shown <= discover().experiments.keys()
+
+
+@pytest.mark.parametrize("profile", ["standard", "paper"])
+def test_each_printed_number_that_is_missed_has_a_cause(printed, profile):
+    results = ProfileResults(RESULTS / profile)
+    missed = [record.target for id in results.ids() for record in results.records(id)
+              for one in [judged(record, printed)] if one.target and one.verdict == "miss"]
+    assert missed
+    assert [id for id in missed if printed.cause(id) is None] == []
 
 
 def test_only_times_of_another_machine_have_nothing_to_compare_with(printed):
