@@ -21,7 +21,7 @@ OTHERS  := tests $(addprefix --ignore=,$(STEPS) $(METHODS))
 help:            ## this list
 	@sed -n 's/^\([a-z-]*\): [^#]*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 14
 
-reproduce: $(READY) ## every experiment at the quick profile -> results/quick/report.html and report.md
+reproduce: $(READY) ## the experiments with a quick profile -> results/quick/report.html and report.md
 	$(PY) -m validation run --profile quick --workers $(WORKERS)
 
 test: $(TRAINS)  ## lint and the tests but those marked slow; with PyTorch where a CPU build is on offer
@@ -62,17 +62,17 @@ bench: $(READY)  ## our kernels beside Taichi and Warp (installs both), features
 	$(PY) -m benchmarks hot-runs
 
 # PyPI's torch for Linux is the CUDA build: about 2.7 GB of wheels. The CPU build (0.2 GB) has an
-# index of its own, which the README tells how to find: make learn TORCH_INDEX=<that address>.
+# index of its own; docs/howto/rerun-experiments.md tells how to find it: make learn TORCH_INDEX=<that address>.
 # So pip is first asked what it would take; a CUDA build is installed only on request (TORCH=any).
 TORCH_INDEX ?=
 TORCH       ?= cpu
 TORCH_FROM  := $(if $(TORCH_INDEX),--extra-index-url $(TORCH_INDEX))
 
-learn: $(READY)  ## add PyTorch (CPU build) for what trains; see README before
+learn: $(READY)  ## add PyTorch (CPU build) for what trains; see docs/howto/rerun-experiments.md
 	@if [ "$(TORCH)" != any ] && $(PIP) install --dry-run --no-deps --quiet --report - \
 	        $(TORCH_FROM) -c constraints.txt torch | grep -Eq '"(nvidia|cuda)-'; then \
 	    echo "make learn: pip would take the CUDA build of torch, about 2.7 GB. Either name the"; \
-	    echo "index of the CPU builds, make learn TORCH_INDEX=..., (README, Installing),"; \
+	    echo "index of the CPU builds, make learn TORCH_INDEX=... (docs/howto/rerun-experiments.md),"; \
 	    echo "or accept the CUDA build: make learn TORCH=any. Nothing was installed."; \
 	    exit 1; \
 	fi

@@ -69,6 +69,9 @@ def counts(targets, rows):
 
 def misses(targets, rows):
     """Yield the tables of all missed printed numbers, each with its cause."""
+    causes = [targets.cause(row.id) for _, row in rows if row.verdict == "miss"]
+    certain = sum(cause is not None and cause.certain for cause in causes)
+    yield f"Of {len(causes)} missed numbers {certain} have a cause that is certain.\n"
     for kind, title in KINDS.items():
         yield f"## {title}\n"
         for paper, name in PAPERS.items():
@@ -93,7 +96,7 @@ def cause_text(cause):
     if cause is None:
         return NO_CAUSE
     shown = f" ([{cause.shown_by}](#numbers.{cause.shown_by}))" if cause.shown_by else ""
-    return f"{cell(cause.text)}{shown}"
+    return f"{cell(cause.sentence)}{shown}"
 
 
 def chosen(rows):

@@ -226,17 +226,26 @@ def write(path, steps):
     Grid arrays are lists over `nodes`, (M, d) integer coordinates (node i lies at i dx); or whole
     grids (n1, .., nd[, d]) with `origin` (d,), the coordinates of the first node. Particles in
     another order come with `id` (N,), the number of each in the golden file. Arrays that are left
-    out are not checked. Raises ValueError for a key that no golden file has, and for arrays that do
-    not hold numbers.
+    out are not checked. Raises ValueError, with the step, for a key that no golden file has, for
+    arrays that do not hold numbers, and for grids that differ in shape.
     """
     require_dictionaries(steps)
     with new_file(path) as f:
         f.create_group("steps")
         for k, arrays in enumerate(steps):
-            for name, a in as_lists(arrays or {}).items():
-                require_key(name)
-                require_numbers(name, np.asarray(a))
-                f.create_dataset(f"steps/{k}/{name}", data=a)
+            try:
+                if arrays:
+                    put_given(f.create_group(f"steps/{k}"), arrays)
+            except ValueError as fault:
+                raise ValueError(f"steps[{k}]: {fault}") from fault
+
+
+def put_given(group, arrays):
+    """Put the arrays of a step of another code. Raises ValueError."""
+    for name, a in as_lists(arrays).items():
+        require_key(name)
+        require_numbers(name, np.asarray(a))
+        group.create_dataset(name, data=a)
 
 
 def require_dictionaries(steps):
@@ -263,11 +272,19 @@ def as_lists(arrays):
     if "origin" not in arrays:
         return arrays
     if "mass" not in arrays:
-        raise ValueError("origin without mass: whole grids need `mass`, which selects their nodes")
+        raise ValueError("origin without mass: whole grids need `mass`, which selects their nodes; "
+                         f"the keys are {', '.join(arrays)}")
     full = np.asarray(arrays["mass"]) != 0.0       # includes NaN, which the check must find
+    if full.ndim != len(arrays["origin"]):
+        raise ValueError(f"mass has the shape {full.shape}: expected {len(arrays['origin'])} axes, "
+                         "one for each coordinate of origin")
     out = {name: a for name, a in arrays.items() if name != "origin"}
     for array in ALL_ARRAYS:
         if array.location == "nodes" and not array.level and key(array) in out:
-            out[key(array)] = np.asarray(out[key(array)])[full]
+            grid = np.asarray(out[key(array)])
+            if grid.shape[:full.ndim] != full.shape:
+                raise ValueError(f"array {key(array)!r} has the shape {grid.shape}: expected that "
+                                 f"of mass, {full.shape}, in its first {full.ndim} axes")
+            out[key(array)] = grid[full]
     out["nodes"] = np.argwhere(full) + np.asarray(arrays["origin"])
     return out

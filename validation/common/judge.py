@@ -22,7 +22,7 @@ from typing import NamedTuple
 Bound = float | tuple[float, float]
 COMPARATORS = ("<=", ">=", "<", ">", "~", "=", "band", "info", "none", "runs", "remark")
 UNJUDGED = ("info", "none", "remark")
-VERDICTS = ("pass", "better", "miss", "chosen", "info")
+VERDICTS = ("pass", "better", "miss", "chosen", "uncredited", "info")
 ROUND_OFF = 1e-9
 CLEARLY = 1.25      # the least ratio by which a value is better than the printed one
 

@@ -20,6 +20,7 @@ from .judge import VERDICTS
 from .record import Measurement, write_whole
 from .registry import GROUPS
 from .results import ProfileResults
+from .standing import read_markers
 from .summary import NO_RATIO, STATE_NAMES, ratio_text, selected, verdict_text
 from .verdicts import VARIANTS, judged, overruled, printed_counts
 
@@ -101,7 +102,11 @@ def write_report(folder, profile, targets):
     parts = chapters(results, targets)
     content = {"profile": profile, "chapters": parts, "machine": machine(results),
                "verdicts": VERDICTS, "states": STATE_NAMES, "others": OTHERS,
-               "claims": claims(parts, targets), "misses": misses(parts, targets),
+               "claims": claims(parts, targets), "variants": VARIANTS,
+               "misses": listed(parts, "miss", lambda id: cause_of(targets, id)),
+               "chosen": listed(parts, "chosen", targets.choice),
+               "marked": len({id for one in read_markers(Path(folder).parent, profile)
+                              for id in one.ids}),
                "counted_by_kind": counted_by_kind}
     paths = []
     for name in ("report.html", "report.md"):
@@ -139,18 +144,22 @@ def claims(parts, targets):
             for paper, headlines in targets.headlines.items()}
 
 
-def misses(parts, targets):
-    """Return {key of a chapter: [(id of the experiment, `ReportRow`, cause)]} of the missed printed
-    results.
+def listed(parts, verdict, reason):
+    """Return {key of a chapter: [(id of the experiment, `ReportRow`, reason(id of the row))]} of
+    the printed results with a verdict.
     """
     found = {}
     for section in (section for chapter in parts for section in chapter.sections):
         for row in section.rows:
-            if (row.kind, row.verdict) == ("result", "miss"):
-                cause = targets.cause(row.id)
-                found.setdefault(row.key, []).append(
-                    (section.id, row, cause.text if cause else "not known"))
+            if (row.kind, row.verdict) == ("result", verdict):
+                found.setdefault(row.key, []).append((section.id, row, reason(row.id)))
     return found
+
+
+def cause_of(targets, number):
+    """Return the cause of a missed number as text."""
+    cause = targets.cause(number)
+    return cause.sentence if cause else "not known"
 
 
 def counted_by_kind(rows):

@@ -13,6 +13,7 @@ NO_RATIO = "—"      # of a number to a printed one, where either is missing
 STATE_NAMES = {"pass": "reproduced", "better": "better", "miss": "missed",
                "chosen": "chosen on these runs", "info": "another machine",
                "other": "another method or body", "absent": "not measured"}
+UNCREDITED = "as printed, without credit"      # of verdicts on numbers that `verdicts.INCOMPLETE` marks
 
 
 class Selected(NamedTuple):
@@ -56,7 +57,7 @@ def verdict_text(one):
 
 def counted(rows):
     """Return the counts of verdicts as text."""
-    found = Counter(STATE_NAMES[row.verdict] for row in rows)
+    found = Counter(STATE_NAMES.get(row.verdict, UNCREDITED) for row in rows)
     return ", ".join(f"{count} {name}" for name, count in found.items())
 
 

@@ -75,6 +75,12 @@ class Cause(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     ids: list[str]
     text: str
     shown_by: str = ""
+    certain: bool = True    # false: a part of the cause, or a guess, is all that is known
+
+    @property
+    def sentence(self):
+        """Return the text, marked where the cause is not certain."""
+        return self.text if self.certain else f"not certain: {self.text}"
 
 
 class Headline(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

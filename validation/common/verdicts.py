@@ -21,6 +21,7 @@ VARIANTS = {        # words behind the id of a printed number
     "displacement": "relative to the displacement instead of the distance from the origin",
     "partial": "over fewer runs than the printed number",
     "small": "at another size than the printed number",
+    "cheap": "with options that the paper does not have, chosen for speed",
 }
 INCOMPLETE = {"partial", "small"}       # such a number gets no credit, as fewer steps err less
 KINDS = ("result", "setting", "variant", "own", "remark")
@@ -59,7 +60,7 @@ def judged(record, targets):
     verdict, interval = judge_printed(record.value, targets.criterion(base))
     kind = "variant" if variants else "setting" if target.kind == "setting" else "result"
     if passes(verdict) and INCOMPLETE & {*variants}:
-        verdict = "info"
+        verdict = "uncredited"
     return Judged(kind, chosen(record, targets, verdict), interval, target, variants)
 
 

@@ -15,7 +15,7 @@ from validation.common.registry import Experiment
 from validation.common.report import chapters, preview, status_table, write_report
 from validation.common.results import RESULTS, ROOT
 from validation.common.run import RunSetting, run_all
-from validation.common.targets import Cause, Headline, Target, TargetFile, Targets, load
+from validation.common.targets import Cause, Choice, Headline, Target, TargetFile, Targets, load
 
 
 def target(id, kind="error", **fields):
@@ -113,7 +113,7 @@ def test_markdown_is_a_summary(folder):
     more = TargetFile("nsf", [], cause=[cause], headline=[claim])
     page = text(folder, "report.md", Targets(TARGETS, [more]))
     assert "[NSF: neural stress fields](#nsf) | 3 | 1 | 0 | 1 | 0 | 0 | 1 | 0 |" in page
-    assert "\n| NSF: neural stress fields | 0 | 0 | 0 | 0 | 0 | 1 |\n" in page
+    assert "\n| NSF: neural stress fields | 0 | 0 | 0 | 0 | 0 | 0 | 1 |\n" in page
     assert ("| Bread and cake are accurate | 1 reproduced, 1 missed | 0.83 to 2.9 |") in page
     assert ("| [the cake (Table 1)](nsf.bread.json) | 1.2 % (ocr-uncertain); ≤ 1.2 | 3.457 % | "
             "2.88 | The grid is too coarse |") in page
@@ -121,6 +121,21 @@ def test_markdown_is_a_summary(folder):
     assert ("| [nsf.bread](nsf.bread.json) | printed: 1 pass, 1 miss; by another method: 1 pass; "
             "our checks: 1 pass |  | [errors](nsf.bread.errors.csv) |") in page
     assert "1 printed result has no record of the paper's own method." in page
+
+
+def test_markdown_lists_what_was_chosen_on_its_own_runs(folder):
+    more = TargetFile("nsf", [], chosen=[Choice(["nsf.table1.bread"], "cells of the tests")])
+    page = text(folder, "report.md", Targets(TARGETS, [more]))
+    assert "| [the bread (Table 1)](nsf.bread.json) | 1.2 %" in page
+    assert "| cells of the tests |" in page
+    assert "Chosen on the runs" not in text(folder, "report.md")
+
+
+def test_markdown_counts_the_records_that_are_marked_as_not_current(folder):
+    (folder.parent / "stale.toml").write_text(
+        '[[marker]]\nprofile = "quick"\nids = ["nsf.bread", "nsf.long_table"]\nreason = "old"\n')
+    assert "2 experiments with verdicts have records of an earlier source" in text(
+        folder, "report.md")
 
 
 def test_markdown_names_a_miss_without_a_cause(folder):
