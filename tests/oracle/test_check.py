@@ -178,7 +178,7 @@ def test_misuse_is_one_sentence(golden, checked, theirs, tmp_path):
         checked(theirs, precision="f16")
     with pytest.raises(ValueError, match="array 'jelly/speed': expected one of weights, mass"):
         checked([{"jelly/speed": np.ones(3)}])
-    with pytest.raises(ValueError, match=r"steps\[0\]: origin without mass: .* keys are origin, vel"):
+    with pytest.raises(ValueError, match=r"steps\[0\]: origin without mass: .* are origin, vel"):
         checked([{"origin": (0, 0), "velocity": np.ones((3, 3, 2))}])
     grids = {"origin": (0, 0), "mass": np.ones((3, 3)), "velocity": np.ones((2, 3, 2))}
     with pytest.raises(ValueError, match=r"steps\[1\]: array 'velocity' has the shape \(2, 3, 2\): "

@@ -13,7 +13,7 @@ NO_RATIO = "—"      # of a number to a printed one, where either is missing
 STATE_NAMES = {"pass": "reproduced", "better": "better", "miss": "missed",
                "chosen": "chosen on these runs", "info": "another machine",
                "other": "another method or body", "absent": "not measured"}
-UNCREDITED = "as printed, without credit"      # of verdicts on numbers that `verdicts.INCOMPLETE` marks
+UNCREDITED = "as printed, without credit"      # of numbers that `verdicts.INCOMPLETE` marks
 
 
 class Selected(NamedTuple):
