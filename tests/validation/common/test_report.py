@@ -3,6 +3,7 @@
 import io
 import re
 from collections import Counter
+from types import SimpleNamespace
 from uuid import uuid4
 
 import numpy as np
@@ -15,6 +16,7 @@ from validation.common.registry import Experiment
 from validation.common.report import chapters, preview, status_table, write_report
 from validation.common.results import RESULTS, ROOT
 from validation.common.run import RunSetting, run_all
+from validation.common.summary import counted
 from validation.common.targets import Cause, Choice, Headline, Target, TargetFile, Targets, load
 
 
@@ -121,6 +123,16 @@ def test_markdown_is_a_summary(folder):
     assert ("| [nsf.bread](nsf.bread.json) | printed: 1 pass, 1 miss; by another method: 1 pass; "
             "our checks: 1 pass |  | [errors](nsf.bread.errors.csv) |") in page
     assert "1 printed result has no record of the paper's own method." in page
+
+
+def test_a_number_without_credit_is_no_time_on_another_machine():
+    rows = [SimpleNamespace(verdict=verdict) for verdict in ("uncredited", "info", "miss")]
+    assert counted(rows) == "1 as printed, without credit, 1 another machine, 1 missed"
+
+
+def test_markdown_marks_a_cause_that_is_not_certain(folder):
+    more = TargetFile("nsf", [], cause=[Cause(["nsf.table1.cake"], "Perhaps", certain=False)])
+    assert "2.88 | not certain: Perhaps |" in text(folder, "report.md", Targets(TARGETS, [more]))
 
 
 def test_markdown_lists_what_was_chosen_on_its_own_runs(folder):

@@ -183,6 +183,12 @@ def test_choices_and_causes_are_found_by_the_id_of_a_record(tmp_path):
     assert numbers.cause("toy.b") is None
 
 
+def test_a_cause_that_is_not_certain_says_so(tmp_path):
+    group = '[[cause]]\nids = ["toy.a"]\ntext = "coarse"\ncertain = false\n'
+    assert targets.load(about(tmp_path, group)).cause("toy.a").sentence == "not certain: coarse"
+    assert targets.Cause(["toy.a"], "coarse").sentence == "coarse"
+
+
 def test_every_tolerance_has_a_reason_and_every_choice_and_cause_a_number(printed):
     assert not [g.ids for g in printed.tolerances if len(g.why) < 10]
     known = {*printed, *(f"{i}.{word}" for i in printed for word in VARIANTS)}
