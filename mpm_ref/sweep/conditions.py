@@ -1,0 +1,56 @@
+"""Boundary conditions that also sum the impulses of their parts over a run."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from .quantity import AXES
+
+EVEN = 1e-12        # of a step: a step that begins before another ended replaces it
+
+
+class ImpulseRecorder:
+    """Conditions of a problem, with the impulse that each part gave to the matter so far."""
+
+    def __init__(self, conditions, names, dim):
+        self._conditions, self._names = conditions, names
+        self._total, self._steps = np.zeros((len(names), dim)), []
+
+    def __getattr__(self, name):
+        return getattr(self._conditions, name)
+
+    def apply(self, grid, t, dt):
+        """Apply the conditions in the step of length dt [s] that ends at t [s]."""
+        J = self._conditions.apply(grid, t, dt)
+        if J is not None:
+            while self._steps and self._steps[-1][0] > t - dt + EVEN * dt:
+                self._steps.pop()           # of a step that was rejected
+            self._steps.append((t, J))
+        return J
+
+    def impulses(self):
+        """Return {part: impulse (d,) [N s]} since the start of the run."""
+        for _, J in self._steps:
+            self._total = self._total + J
+        self._steps = []
+        return dict(zip(self._names, self._total, strict=True))
+
+
+def record_impulses(problem, scene):
+    """Return (problem with an `ImpulseRecorder`, the recorder); (problem, None) without
+    conditions, or for an implicit step, which does not state impulses.
+    """
+    if problem.conditions is None or problem.integrator != "explicit":
+        return problem, None
+    recorder = ImpulseRecorder(problem.conditions, part_names(scene), problem.dim)
+    return replace(problem, conditions=recorder), recorder
+
+
+def part_names(scene):
+    """Return the names of a scene's parts in the order of their impulses; "collider0" and the like
+    where the scene gives none.
+    """
+    colliders = [part.name or f"collider{k}" for k, part in enumerate(scene.collider)]
+    fixed = [part.name or f"fixed{k}" for k, part in enumerate(scene.fixed)]
+    sides = [f"wall {axis}{side}" for axis in AXES[:scene.dim] for side in "-+"]
+    return [*colliders, *fixed, *(sides if scene.walls is not None else [])]

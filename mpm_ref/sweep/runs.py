@@ -1,0 +1,113 @@
+"""Observe scenes side by side within a budget of time, each at most once."""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..scene import SceneError
+from ..scene.toml import canonical
+from .observation import REFUSED, STOPPED, ObservedRun, RunCost, RunObservation, observe
+
+CRASHED = "crashed"     # outcome of a run whose process was killed, or failed otherwise
+
+
+@dataclass(frozen=True)
+class RunRequest:
+    """A scene to be observed, or the SceneError that says why it is none."""
+
+    scene: object
+    most_cpu: float = np.inf        # [s]
+    seed: int | None = None         # of a perturbation of the particles' positions
+    probes: tuple | None = None     # other than those of the `SceneRuns`
+
+
+class SceneRuns:
+    """Runs of variants of a scene, all with the same quantities at the same times."""
+
+    def __init__(self, observed, executor, store, budget=np.inf, on_run=None):
+        """Prepare runs.
+
+        observed: an `ObservedRun` whose quantities, times and probes are those of all runs;
+        executor: see `executor.open_executor`; store: a `RunStore`; budget: wall time [s] after
+        which no run begins; on_run(label, observation) is called after each.
+        """
+        self._observed, self._executor, self._store = observed, executor, store
+        self._deadline, self._on_run = time.monotonic() + budget, on_run
+        self.count = 0
+
+    @property
+    def left(self):
+        """Return the wall time left [s]."""
+        return self._deadline - time.monotonic()
+
+    @property
+    def workers(self):
+        """Return the number of runs at a time."""
+        return self._executor.workers
+
+    def observe(self, requests):
+        """Return {label: `RunObservation`} of {label: `RunRequest`}, in that order.
+
+        Stored runs are not made again. One whose turn comes after the budget is stopped.
+        """
+        observations, runs = {}, {}
+        for label, request in requests.items():
+            run = self._run_of(request)
+            stored = run if isinstance(run, RunObservation) else self._store.get(run)
+            if stored is None:
+                runs[label] = run
+            else:
+                observations[label] = stored
+        self._make(runs, observations)
+        return {label: observations[label] for label in requests}
+
+    def _run_of(self, request):
+        """Return the `ObservedRun` of a request, or the observation of one that is refused."""
+        try:
+            if isinstance(request.scene, SceneError):
+                raise request.scene
+            text = canonical(request.scene)
+        except SceneError as fault:
+            return RunObservation(blank_values(self._observed), RunCost(), REFUSED, str(fault))
+        probes = self._observed.probes if request.probes is None else request.probes
+        most = max(min(request.most_cpu, self.left), 0.0)
+        return self._observed._replace(scene=text, most_cpu=most, seed=request.seed, probes=probes)
+
+    def _make(self, runs, observations):
+        labels = list(runs)
+        tasks = [Deadlined(runs[label], time.time() + self.left) for label in labels]
+        for outcome in self._executor.run(observe_in_time, tasks):
+            label = labels[outcome.index]
+            observation = outcome.value
+            if outcome.error is not None:
+                observation = RunObservation(blank_values(runs[label]), RunCost(), CRASHED,
+                                             outcome.error)
+            elif observation.cost.steps:
+                self._store.put(runs[label], observation)
+            self.count += 1
+            observations[label] = observation
+            if self._on_run is not None:
+                self._on_run(label, observation)
+
+
+@dataclass(frozen=True)
+class Deadlined:
+    """A run with the time [s since 1970] after which it does not begin."""
+
+    run: ObservedRun
+    deadline: float
+
+
+def observe_in_time(task):
+    """Return the observation of a `Deadlined` run; one that is late is stopped before it begins."""
+    left = task.deadline - time.time()
+    if left <= 0.0:
+        return RunObservation(blank_values(task.run), RunCost(cpu=0.0), STOPPED,
+                              "not begun within the budget")
+    return observe(task.run._replace(most_cpu=min(task.run.most_cpu, left)))
+
+
+def blank_values(run):
+    """Return the values of a run that did not begin."""
+    return {text: np.full((len(run.times), 0), np.nan) for text in run.quantities}

@@ -1,0 +1,177 @@
+"""Settings: a scene with another grid spacing, particles, time step, transfer or integrator.
+
+A setting is a dictionary of some of these knobs; what it leaves out stays as the scene says.
+
+    dx          factor of the grid spacing; points per cell stay, and a fixed dt goes along
+    particles   factor of the points per cell and axis
+    sampling    "regular", "jittered" or "poisson", with as many points per cell
+    cfl         share of the stable time step (of an implicit step: cells that a particle crosses)
+    degree      of the B-spline: 1, 2 or 3
+    transfer    "mls", "apic", "flip 0.95" (with its share of FLIP), "apic rpic 0.5", "pic", ...
+    integrator  "explicit", or the word of an implicit method such as "hot-plus"
+"""
+
+from dataclasses import dataclass
+from math import isclose
+
+from ..scene import SceneError
+from ..scene.validate import plain, validate_scene
+
+USUAL_PER_CELL = 2      # points per cell and axis, where the scene does not say
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Knobs and their values, in the order of `KNOBS`; equal settings are equal and hashable."""
+
+    items: tuple = ()
+
+    def __or__(self, other):
+        return setting(**(dict(self.items) | dict(other.items)))
+
+    def get(self, knob, default=None):
+        """Return the value of a knob."""
+        return dict(self.items).get(knob, default)
+
+    @property
+    def text(self):
+        """Return the setting in words."""
+        return ", ".join(f"{name} {_shown(name, value)}" for name, value in self.items) or "as given"
+
+
+def setting(**knobs):
+    """Return the `Setting` of some knobs. Raises ValueError for an unknown one."""
+    if unknown := sorted(knobs.keys() - KNOBS.keys()):
+        raise ValueError(f"knob {unknown[0]!r}: expected one of {', '.join(KNOBS)}")
+    return Setting(tuple((name, knobs[name]) for name in KNOBS if name in knobs))
+
+
+def _shown(name, value):
+    return f"x {value:.4g}" if name in ("dx", "particles") else str(value)
+
+
+def scene_at(scene, chosen):
+    """Return a scene under a `Setting`. Raises SceneError where the two do not fit."""
+    tables = in_seconds(scene)
+    for name, value in chosen.items:
+        KNOBS[name](tables, value)
+    return validate_scene(tables)
+
+
+def in_seconds(scene):
+    """Return the tables of a scene whose end and frames are times, not counts of steps.
+
+    Raises SceneError for a number of steps without a time step.
+    """
+    tables = {key: value for key, value in plain(scene).items() if value is not None}
+    dt = tables.get("dt")
+    if "steps" in tables and dt is None:
+        raise SceneError(f"steps = {tables['steps']} without dt: runs with other settings end at "
+                         "the same time; expected `end`, or `dt` with `steps`")
+    if "steps" in tables:
+        tables["end"] = tables.pop("steps") * dt
+    if "every" in tables:
+        every = tables.pop("every")
+        if dt is not None:
+            tables["interval"] = every * dt
+    return tables
+
+
+# knobs: each changes the tables of a scene
+
+def scale_dx(tables, factor):
+    """Multiply the grid spacing; walls, which are counted in nodes, stay where they are."""
+    tables["dx"] *= factor
+    if "dt" in tables:
+        tables["dt"] = min(tables["dt"] * factor, tables.get("interval", float("inf")))
+    if tables.get("walls") is not None:
+        for key, inner in (("low", 1), ("high", -1)):
+            nodes = tables["walls"].get(key)
+            if nodes is not None:
+                tables["walls"][key] = [_node_at(node, inner, factor) for node in nodes]
+    for body in tables["body"]:
+        sampling = body["sampling"]
+        if body.get("shape") is not None:
+            scale_points(sampling, 1.0 / factor, tables["dim"], per_cell=False)
+
+
+def _node_at(node, inner, factor):
+    """Return the index of a wall's limit on a grid with spacing times factor."""
+    if node == "open":
+        return node
+    index = (node - inner) / factor
+    if not isclose(index, round(index), abs_tol=1e-6):
+        raise SceneError(f"walls: node {node - inner} lies between two nodes of a grid with "
+                         f"{factor:g} times the spacing; give the wall as a collider instead")
+    return round(index) + inner
+
+
+def scale_particles(tables, factor):
+    """Multiply the points per cell and axis of all bodies with a shape."""
+    shaped = [body for body in tables["body"] if body.get("shape") is not None]
+    if not shaped:
+        raise SceneError("particles: the bodies are arrays, whose number of particles is given")
+    for body in shaped:
+        scale_points(body["sampling"], factor, tables["dim"], per_cell=True)
+
+
+def scale_points(sampling, factor, dim, per_cell):
+    """Multiply the points per axis of a sampling; per_cell: also where they are per cell."""
+    if sampling.get("counts") is not None:
+        sampling["counts"] = [max(round(n * factor), 2) for n in sampling["counts"]]
+    if sampling.get("count") is not None:
+        sampling["count"] = max(round(sampling["count"] * factor**dim), 1)
+    for key in ("spacing", "radius"):
+        if sampling.get(key) is not None:
+            sampling[key] /= factor
+    if per_cell and sampling.get("per_cell") is not None:
+        sampling["per_cell"] = max(round(sampling["per_cell"] * factor), 1)
+
+
+def change_sampling(tables, kind):
+    """Sample all bodies with a shape in another way."""
+    for body in tables["body"]:
+        if body.get("shape") is not None:
+            per_cell = body["sampling"].get("per_cell") or USUAL_PER_CELL
+            body["sampling"] = {"type": kind, "per_cell": per_cell}
+
+
+def change_cfl(tables, share):
+    """Follow the stable time step; a fixed dt, and a bound on it, are dropped."""
+    tables.pop("dt", None)
+    tables["cfl"] = share
+    if tables["integrator"] == "explicit":
+        tables["unstable"] = "refuse"
+
+
+def change_degree(tables, degree):
+    """Take B-splines of another degree."""
+    tables["scheme"]["degree"] = degree
+
+
+def change_transfer(tables, text):
+    """Take another transfer, with its blend."""
+    name, *options = text.split()
+    scheme = tables["scheme"] | {"transfer": name, "rpic": 0.0, "flip": 1.0}
+    if name == "flip":
+        scheme["flip"], scheme["mass_eps"] = float(options[0]) if options else 1.0, 0.0
+    elif options:
+        scheme["rpic"] = float(options[1])
+    tables["scheme"] = scheme
+
+
+def change_integrator(tables, word):
+    """Step explicitly, or by an implicit method, whose transfer is APIC unless it is chosen."""
+    tables["integrator"] = word
+    if word == "explicit":
+        tables.pop("solver", None)
+        tables.pop("longest", None)
+    elif tables["scheme"].get("transfer") in (None, "mls"):
+        tables["scheme"]["transfer"] = "apic"
+
+
+KNOBS = {
+    "dx": scale_dx, "particles": scale_particles, "sampling": change_sampling,
+    "integrator": change_integrator, "cfl": change_cfl, "degree": change_degree,
+    "transfer": change_transfer,
+}

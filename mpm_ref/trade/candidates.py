@@ -1,0 +1,43 @@
+"""The settings that a search tries: single knobs, grids between the halved ones, and pairs."""
+
+from ..sweep.setting import setting
+
+CFL, CELLS = (0.9, 0.5, 0.25), (0.9, 0.6, 0.3)      # of the explicit bound; of implicit steps
+PARTICLES = (0.5, 2 / 3, 1.5, 2.0)                  # per cell and axis, times the scene's
+TRANSFERS = ("mls", "apic", "apic rpic 0.1", "flip 0.95", "flip", "pic")
+DEGREES = (1, 2, 3)
+IMPLICIT = "hot-plus"
+GRIDS = (4.0, 3.0, 2.0, 1.5, 1.0, 0.75, 0.5, 0.375, 0.25, 0.1875, 0.125)    # factors of dx
+
+
+def single_knobs(scene):
+    """Return the settings that change one knob of a scene, cheapest first by experience."""
+    cells = CFL if scene.integrator == "explicit" else CELLS
+    cfl = [value for value in cells if scene.dt is not None or value != (scene.cfl or 0.5)]
+    transfer = scene.step_scheme.transfer
+    settings = [setting(cfl=value) for value in cfl]
+    settings += [setting(particles=factor) for factor in PARTICLES]
+    settings += [setting(transfer=text) for text in TRANSFERS if text != transfer]
+    settings += [setting(degree=degree) for degree in DEGREES if degree != scene.scheme.degree]
+    settings += [setting(sampling=kind) for kind in other_samplings(scene)]
+    other = IMPLICIT if scene.integrator == "explicit" else "explicit"
+    return [*settings, setting(integrator=other, cfl=CELLS[1] if other == IMPLICIT else CFL[1])]
+
+
+def other_samplings(scene):
+    """Return the kinds of sampling that differ from that of the first body with a shape."""
+    kinds = [body.sampling.__struct_config__.tag for body in scene.body if body.shape is not None]
+    return [kind for kind in ("regular", "poisson") if kinds and kind != kinds[0]]
+
+
+def neighbouring_grid(factor, coarser=1):
+    """Return the grid of `GRIDS` so many places coarser than a factor, or None past the ends."""
+    k = min(range(len(GRIDS)), key=lambda k: abs(GRIDS[k] - factor)) - coarser
+    return GRIDS[k] if 0 <= k < len(GRIDS) else None
+
+
+def pairs(settings):
+    """Return the unions of two settings that change different knobs."""
+    return [a | b for k, a in enumerate(settings) for b in settings[k + 1:]
+            if not {name for name, _ in a.items if name != "dx"}
+            & {name for name, _ in b.items if name != "dx"}]
