@@ -28,7 +28,8 @@ FIRST = 2               # steps whose time is that of loading or compiling kerne
 class ObservedRun(NamedTuple):
     """A run to be made: plain data, so that any process can make it."""
 
-    scene: str              # canonical text
+    scene: str              # JSON text of all its keys
+    digest: str             # hash of the scene and of the files that it names
     quantities: tuple       # of texts
     times: tuple            # [s] at which they are sampled, increasing, the first is 0
     probes: tuple           # of (body, positions): `probes.Probe`

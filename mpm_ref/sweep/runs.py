@@ -3,10 +3,11 @@
 import time
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 
 from ..scene import SceneError
-from ..scene.toml import canonical
+from ..scene.toml import digest
 from .observation import REFUSED, STOPPED, ObservedRun, RunCost, RunObservation, observe
 
 CRASHED = "crashed"     # outcome of a run whose process was killed, or failed otherwise
@@ -33,7 +34,7 @@ class SceneRuns:
         which no run begins; on_run(label, observation) is called after each.
         """
         self._observed, self._executor, self._store = observed, executor, store
-        self._deadline, self._on_run = time.monotonic() + budget, on_run
+        self._deadline, self.on_run = time.monotonic() + budget, on_run
         self.count = 0
 
     @property
@@ -67,12 +68,14 @@ class SceneRuns:
         try:
             if isinstance(request.scene, SceneError):
                 raise request.scene
-            text = canonical(request.scene)
+            text = msgspec.json.encode(request.scene).decode()
+            name = digest(request.scene)
         except SceneError as fault:
             return RunObservation(blank_values(self._observed), RunCost(), REFUSED, str(fault))
         probes = self._observed.probes if request.probes is None else request.probes
         most = max(min(request.most_cpu, self.left), 0.0)
-        return self._observed._replace(scene=text, most_cpu=most, seed=request.seed, probes=probes)
+        return self._observed._replace(scene=text, digest=name, most_cpu=most,
+                                      seed=request.seed, probes=probes)
 
     def _make(self, runs, observations):
         labels = list(runs)
@@ -87,8 +90,8 @@ class SceneRuns:
                 self._store.put(runs[label], observation)
             self.count += 1
             observations[label] = observation
-            if self._on_run is not None:
-                self._on_run(label, observation)
+            if self.on_run is not None:
+                self.on_run(label, observation)
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,8 @@ class Setting:
     @property
     def text(self):
         """Return the setting in words."""
-        return ", ".join(f"{name} {_shown(name, value)}" for name, value in self.items) or "as given"
+        texts = [f"{name} {_shown(name, value)}" for name, value in self.items]
+        return ", ".join(texts) or "as given"
 
 
 def setting(**knobs):

@@ -54,7 +54,7 @@ class RunStore:
 def key_of(run):
     """Return the name of a run: a hash of all that determines its observation but `most_cpu`."""
     digest = hashlib.sha256(source_hash().encode())
-    digest.update(repr((run.scene, run.quantities, run.times, run.seed)).encode())
+    digest.update(repr((run.digest, run.quantities, run.times, run.seed)).encode())
     for body, X in run.probes:
         digest.update(body.encode() + np.ascontiguousarray(X, dtype=float).tobytes())
     return digest.hexdigest()[:32]

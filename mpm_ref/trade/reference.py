@@ -8,6 +8,7 @@ runs do not converge, and nothing is claimed.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -40,7 +41,7 @@ def reference_of(levels):
     """
     scale = largest_change(levels[-1])
     pairs = [running_maximum(relative_difference(coarse, fine, scale))
-             for coarse, fine in zip(levels[:-1], levels[1:], strict=True)]
+             for coarse, fine in pairwise(levels)]
     order = observed_order(pairs)
     believed = np.clip(order, LEAST, MOST)
     with np.errstate(invalid="ignore"):
