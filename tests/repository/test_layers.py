@@ -11,7 +11,7 @@ ROOT = Path(__file__).resolve().parents[2]
 # Ground floor first. What stands on one line does not know each other, except within a room: names
 # in one string may import each other, without cycles. A package in PACKAGES is such a room.
 PACKAGES = {"plain", "materials", "materials.learned", "hot", "rom", "rom.study", "nclaw",
-            "nclaw.study", "shapes", "sampling", "scene", "oracle", "cli"}
+            "nclaw.study", "shapes", "sampling", "scene", "oracle", "cli", "executor"}
 FLOORS = (
     ("core.kernel_cache", "core.blas"),
     ("core.jit",),
@@ -28,7 +28,7 @@ FLOORS = (
     ("core core.adjoint",),
     ("materials", "plain", "store.atomic"),
     ("body", "store.atomic", "store.weights_file", "store.memmap"),
-    ("training",),
+    ("training", "executor"),
     ("materials.learned",),
     ("explicit", "energy"),
     ("timestep", "monitor", "adjoint", "constitutive"),
@@ -46,7 +46,8 @@ FLOORS = (
 )
 OUTSIDE = {"validation", "figures", "benchmarks", "tests"}      # floor 9 and what tests it
 TRAINING = ("rom.train", "nclaw.train", "nclaw.gnn.train", "training")   # files that know torch
-LATE = {"torch", "matplotlib", "vtk", "trimesh", "taichi", "warp", "PIL"}   # also in functions
+LATE = {"torch", "matplotlib", "vtk", "trimesh", "taichi", "warp", "PIL",
+        "distributed"}      # also in functions
 
 
 def modules(root, package):
