@@ -30,15 +30,9 @@ def answer_of(search, name):
 def reference_facts(search, text):
     """Return what is known of the reference of a quantity."""
     reference = search.references[text]
-    last = last_index(search, search.horizon())
-    return {"error": float(reference.error[last]), "error_at_end": float(reference.error[-1]),
-            "order_at_end": float(reference.order[-1]), "differences": list(reference.differences),
-            "scale": reference.scale}
-
-
-def last_index(search, until):
-    """Return the index of the last time of observation until a time."""
-    return int(np.searchsorted(search.times, until * (1.0 + 1e-9), side="right")) - 1
+    return {"error": float(reference.error[search.last]),
+            "error_at_end": float(reference.error[-1]), "order_at_end": float(reference.order[-1]),
+            "differences": list(reference.differences), "scale": float(reference.scale[-1])}
 
 
 def ranked(search):
@@ -145,7 +139,7 @@ def shortfall(facts):
         if error is None or not isfinite(error):
             texts.append(f"the grids do not approach one solution of {text} yet (order "
                          f"{order:.2g}); a larger --budget halves the grid further")
-        elif error > HALF * facts["error"]:
+        elif error > HALF * facts["error"] and order > 0.0:
             halvings = max(1, int(np.ceil(log2(error / (HALF * facts["error"])) / order)))
             finest = facts["grids"][-1] / 2**halvings
             texts.append(f"{text} is known to {percent(error)}; a reference of "

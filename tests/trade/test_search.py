@@ -129,7 +129,8 @@ def test_a_real_scene_keeps_the_error_against_the_exact_motion(tmp_path):
         exact = X + t * [1.0, 0.5] - 0.5 * t**2 * [0.0, 9.8]
         best = search.observations[search.best()].values["positions"]
         error = np.sqrt(np.mean((best - exact.reshape(len(t), -1)) ** 2, axis=1))
-        assert error.max() / search.references["positions"].scale <= 0.02
+        assert error.max() / search.references["positions"].scale[-1] <= 0.02
+        assert search.horizon() == scene.end
         count = runs.count
         again = TradeSearch(scene, runs, ("positions",), np.array(run.times), 0.02)
         again.run()
