@@ -8,6 +8,7 @@ from .. import __version__
 from ..scene import dumps
 from ..sweep.observation import FINISHED
 from ..sweep.setting import scene_at
+from .reference import LEAST
 from .search import HALF, without_grid
 
 
@@ -136,10 +137,11 @@ def shortfall(facts):
     for text in facts["quantities"]:
         reference = facts["references"][text]
         error, order = reference["error_at_end"], reference["order_at_end"]
-        if error is None or not isfinite(error):
+        if error is None or not isfinite(error) or order < LEAST:
             texts.append(f"the grids do not approach one solution of {text} yet (order "
-                         f"{order:.2g}); a larger --budget halves the grid further")
-        elif error > HALF * facts["error"] and order > 0.0:
+                         f"{order:.2g}; it is known to {percent(error)}); a larger --budget halves "
+                         "the grid further")
+        elif error > HALF * facts["error"]:
             halvings = max(1, int(np.ceil(log2(error / (HALF * facts["error"])) / order)))
             finest = facts["grids"][-1] / 2**halvings
             texts.append(f"{text} is known to {percent(error)}; a reference of "

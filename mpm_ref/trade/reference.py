@@ -4,9 +4,10 @@ Time step and particles follow the grid. Until each time t, E is the largest dif
 successive grids so far, and p = log2(E_coarse/E_fine) the observed order of the last three grids.
 The reference is the Richardson extrapolation q + (q - q_coarser)/(2^p - 1), and its error the grid
 convergence index F E/(2^p - 1) [Roache1994]: with F = 1.25 if the orders of the last four grids
-agree, else with F = 3 and p at most 1, without extrapolation. p is at most 2; with p below 0.5 the
-runs do not converge, and nothing is claimed. Errors are relative to the largest change of the
-quantity until t.
+agree, else with F = 3 and p at most 1, without extrapolation. p is at most 2. Where p is below 0.5
+the runs show no convergence: the reference is that on the finest grid, and its error three times
+the larger of the two last differences [EcaHoekstra2014]. Errors are relative to the largest change
+of the quantity until t.
 """
 
 from dataclasses import dataclass, replace
@@ -16,7 +17,7 @@ import numpy as np
 
 from ..sweep.difference import change_so_far, difference_so_far, relative_difference
 
-SAFE, CAUTIOUS = 1.25, 3.0      # factors of the grid convergence index
+SAFE, CAUTIOUS = 1.25, 3.0      # factors of differences of grids
 LEAST, MOST = 0.5, 2.0          # orders that are believed
 AGREEMENT = 1.0                 # of two successive orders
 NOTHING = 1e-12                 # of the change: a difference that is round-off
@@ -59,7 +60,8 @@ def reference_of(levels):
     factor = np.where(safe, 1.0 / (2.0**p - 1.0), 0.0)
     values = levels[-1] + factor[:, None] * (levels[-1] - levels[-2])
     error = np.where(safe, SAFE, CAUTIOUS) / (2.0**p - 1.0) * relative(pairs[-1], scale)
-    error = np.where(order < LEAST, np.inf, error)
+    spread = np.max(pairs[-2:], axis=0) if len(pairs) > 1 else np.full(len(scale), np.inf)
+    error = np.where(order < LEAST, CAUTIOUS * relative(spread, scale), error)
     error = np.where(pairs[-1] <= NOTHING * scale, NOTHING, error)
     error[0] = np.inf       # where nothing has changed yet
     last = tuple(float(relative(pair, scale)[-1]) for pair in pairs)
@@ -76,9 +78,9 @@ def observed_order(pairs, scale):
         return np.zeros(len(scale)), np.zeros(len(scale), dtype=bool)
     orders = [log_ratio(coarse, fine, scale) for coarse, fine in pairwise(pairs)]
     if len(orders) < 2:
-        return orders[-1], np.ones(len(scale), dtype=bool)
-    safe = (orders[-2] >= LEAST) & (np.abs(orders[-1] - orders[-2]) <= AGREEMENT)
-    return orders[-1], safe
+        return orders[-1], orders[-1] >= LEAST
+    agree = np.abs(orders[-1] - orders[-2]) <= AGREEMENT
+    return orders[-1], agree & (np.minimum(orders[-1], orders[-2]) >= LEAST)
 
 
 def log_ratio(coarse, fine, scale):
