@@ -11,6 +11,8 @@ from ..sweep.setting import scene_at
 from .reference import LEAST
 from .search import HALF, without_grid
 
+USEFUL = 0.1        # error to which a quantity is known that is worth a line
+
 
 def answer_of(search, name):
     """Return the answer as plain data, for JSON; errors are relative, times in s, memory in bytes.
@@ -122,7 +124,8 @@ def advice_lines(facts):
 def companion_lines(facts):
     """Return how well other quantities are known over the whole run, where single paths are not."""
     others = {text: reference["error_at_end"] for text, reference in facts["references"].items()
-              if text not in facts["quantities"] and reference["error_at_end"] is not None}
+              if text not in facts["quantities"] and reference["error_at_end"] is not None
+              and reference["error_at_end"] <= USEFUL}
     if not others:
         return []
     texts = ", ".join(f"{text} to {percent(error)}" for text, error in others.items())

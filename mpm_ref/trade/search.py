@@ -74,10 +74,21 @@ class TradeSearch:
             if factor < self.finest or expected > REFERENCE_SHARE * self.runs.left:
                 break
             n = len(self.levels)
-            self.observe([setting(dx=factor)], most_cpu=np.inf)
+            self.observe([setting(dx=factor), *self.side_runs(expected)], most_cpu=np.inf)
             self.update_references()
             if len(self.levels) == n or (before > 0.0 and self.horizon() <= before):
                 break
+
+    def side_runs(self, cpu):
+        """Return candidates that the other workers can run during a reference run of so much CPU
+        time [s].
+        """
+        grid = setting(dx=(self.best() or setting(dx=1.0)).get("dx"))
+        candidates = [family | grid for family in single_knobs(self.scene)
+                      if family | grid not in self.observations]
+        total = np.cumsum([self.expected_cpu(chosen) for chosen in candidates])
+        return [c for c, t in zip(candidates, total, strict=True)
+                if t <= (self.runs.workers - 1) * cpu]
 
     def update_references(self):
         """Compute the references from the finest unbroken sequence of halved grids."""

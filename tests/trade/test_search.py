@@ -33,6 +33,18 @@ def test_references_are_refined_until_half_the_error():
     assert min(search.levels) > 1 / 64
 
 
+def test_other_workers_run_candidates_beside_the_reference():
+    runs = ModelRuns()
+    search = search_of(runs)
+    search.start()
+    assert search.side_runs(1e9) == []
+    runs.workers = 2
+    cpu = search.expected_cpu(setting(dx=0.25))
+    beside = search.side_runs(cpu)
+    assert beside
+    assert sum(search.expected_cpu(chosen) for chosen in beside) <= cpu
+
+
 def test_without_convergence_nothing_is_recommended():
     search = search_of(ModelRuns(order=0.2))
     search.run()
