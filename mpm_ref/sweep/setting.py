@@ -11,6 +11,7 @@ A setting is a dictionary of some of these knobs; what it leaves out stays as th
     integrator  "explicit", or the word of an implicit method such as "hot-plus"
 """
 
+import re
 from dataclasses import dataclass
 from math import isclose
 
@@ -152,13 +153,13 @@ def change_degree(tables, degree):
 
 def change_transfer(tables, text):
     """Take another transfer, with its blend."""
-    name, *options = text.split()
-    scheme = tables["scheme"] | {"transfer": name, "rpic": 0.0, "flip": 1.0}
-    if name == "flip":
-        scheme["flip"], scheme["mass_eps"] = float(options[0]) if options else 1.0, 0.0
-    elif options:
-        scheme["rpic"] = float(options[1])
-    tables["scheme"] = scheme
+    match = re.fullmatch(r"(flip)(?: ([0-9.]+))?|(\w+)(?: rpic ([0-9.]+))?", text)
+    if match is None:
+        raise SceneError(f"transfer {text!r}: expected a text such as mls, flip 0.95 or apic rpic "
+                         "0.5")
+    flip, share, name, damping = match.groups()
+    scheme = {"transfer": flip or name, "flip": float(share or 1.0), "rpic": float(damping or 0.0)}
+    tables["scheme"] |= scheme | ({"mass_eps": 0.0} if flip else {})
 
 
 def change_integrator(tables, word):
