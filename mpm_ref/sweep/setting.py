@@ -9,6 +9,7 @@ A setting is a dictionary of some of these knobs; what it leaves out stays as th
     degree      of the B-spline: 1, 2 or 3
     transfer    "mls", "apic", "flip 0.95" (with its share of FLIP), "apic rpic 0.5", "pic", ...
     integrator  "explicit", or the word of an implicit method such as "hot-plus"
+eps         tolerance of an implicit step
 """
 
 import re
@@ -172,8 +173,15 @@ def change_integrator(tables, word):
         tables["scheme"]["transfer"] = "apic"
 
 
+def change_eps(tables, eps):
+    """Solve implicit steps to another tolerance."""
+    if tables["integrator"] == "explicit":
+        raise SceneError(f"eps = {eps}: an explicit step solves nothing; expected an implicit one")
+    tables["solver"] = (tables.get("solver") or {}) | {"eps": eps}
+
+
 KNOBS = {
     "dx": scale_dx, "particles": scale_particles, "sampling": change_sampling,
     "integrator": change_integrator, "cfl": change_cfl, "degree": change_degree,
-    "transfer": change_transfer,
+    "transfer": change_transfer, "eps": change_eps,
 }

@@ -11,7 +11,8 @@ from pathlib import Path
 from ..scene import SceneError
 from ..sweep.setting import setting
 
-TYPES = {"dx": float, "particles": float, "cfl": float, "degree": int}      # else texts
+TYPES = {"dx": float, "particles": float, "cfl": float, "eps": float,
+         "degree": int}      # else texts
 
 
 def read_answer(path):
