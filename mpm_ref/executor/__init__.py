@@ -17,11 +17,12 @@ import re
 from contextlib import contextmanager
 
 from .cluster import SchedulerLost, connect, open_local_cluster
-from .dask_tasks import WorkerMismatch
 from .processes import LocalProcesses, SameProcess
 from .tasks import TaskOutcome, stop_asked
+from .versions import BadScheduler, WorkerMismatch
 
-__all__ = ["SchedulerLost", "TaskOutcome", "WorkerMismatch", "open_executor", "stop_asked"]
+__all__ = ["BadScheduler", "SchedulerLost", "TaskOutcome", "WorkerMismatch", "open_executor",
+           "stop_asked"]
 
 LOCAL = re.compile(r"local:0*([1-9]\d*)", re.ASCII)
 ADDRESS = re.compile(r"(tcp|tls|ucx|ws|wss)://\S+:\d+", re.ASCII)
@@ -37,8 +38,9 @@ def open_executor(scheduler=None, workers=2, setup=None):
         workers: number of new processes without a scheduler; 1 performs the tasks in this process.
         setup: function of a module without arguments, which each process calls before its tasks.
 
-    Raises ValueError for a bad value, for dask that is not installed, for a scheduler that does not
-    answer or has no workers, and for workers with other versions of the software than this process.
+    Raises ValueError for a bad number of workers, and its subclass `BadScheduler` for a bad text,
+    for dask that is not installed, for a scheduler that does not answer or has no workers, and for
+    workers with other versions of the software than this process.
     """
     executor = _executor(scheduler, workers, setup)
     try:
@@ -56,5 +58,6 @@ def _executor(scheduler, workers, setup):
         return open_local_cluster(int(match[1]), setup)
     if ADDRESS.fullmatch(scheduler):
         return connect(scheduler, setup)
-    raise ValueError(f"scheduler {scheduler!r}: expected local:N for N processes of this machine, "
-                     "as in local:4, or the address of a dask scheduler, as in tcp://host:8786")
+    raise BadScheduler(
+        f"scheduler {scheduler!r}: expected local:N for N processes of this machine, as in "
+        "local:4, or the address of a dask scheduler, as in tcp://host:8786")

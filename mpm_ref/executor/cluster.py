@@ -12,9 +12,9 @@ from contextlib import ExitStack, suppress
 from functools import partial
 from queue import Empty, SimpleQueue
 
-from .dask_tasks import WorkerMismatch, count_tasks, perform_on_worker, worker_facts
+from .dask_tasks import count_tasks, perform_on_worker, worker_facts
 from .tasks import ATTEMPTS, TaskOutcome, pack_job, pack_tasks, sentence, unpack
-from .versions import disagreement, versions
+from .versions import BadScheduler, WorkerMismatch, disagreement, versions
 from .worker import GRACE, blocked_interrupts
 
 CONNECT = 15.0      # [s] that a scheduler has to answer at first
@@ -22,6 +22,7 @@ FIRST = 60.0        # [s] that the first worker has to connect
 CHECK = 10.0        # [s] without an outcome, after which the scheduler is asked for its workers
 ANSWER = 60.0       # [s] that it has to answer then
 FETCH = 30.0        # [s] for a value to arrive, before others are looked at
+CLOSE = 60.0        # [s] that the processes of a local cluster have to end
 ALONE = 300.0       # [s] that a run waits for a worker when all have left
 
 LOCAL = {       # options of dask for processes of this machine
@@ -34,12 +35,12 @@ class SchedulerLost(RuntimeError):
 
 
 def load_dask():
-    """Return the modules (dask, distributed). Raises ValueError where they are not installed."""
+    """Return the modules (dask, distributed). Raises BadScheduler where they are not installed."""
     try:
         import dask
         import distributed
     except ImportError:
-        raise ValueError("several machines need dask: pip install 'mpm_ref[sweep]'") from None
+        raise BadScheduler("several machines need dask: pip install 'mpm_ref[sweep]'") from None
     return dask, distributed
 
 
@@ -58,21 +59,27 @@ def open_local_cluster(count, setup=None):
             n_workers=count, threads_per_worker=1, processes=True, memory_limit=None,
             dashboard_address="127.0.0.1:0",
             silence_logs=logging.CRITICAL, scheduler_kwargs={"allowed_failures": ATTEMPTS - 1})
-        resources.callback(cluster.close, timeout=GRACE)
+        resources.callback(close_cluster, cluster)
         client = distributed.Client(cluster, set_as_default=False)
         return DaskCluster(client, setup, resources.pop_all())
 
 
+def close_cluster(cluster):
+    """End the processes of a local cluster; a late one ends with this process."""
+    with suppress(TimeoutError):
+        cluster.close(timeout=CLOSE)
+
+
 def connect(address, setup=None):
-    """Return a `DaskCluster` of the scheduler at an address. Raises ValueError for no scheduler, no
+    """Return a `DaskCluster` of the scheduler at an address. Raises BadScheduler for none, for no
     workers, or workers with other software than this process.
     """
     _, distributed = load_dask()
     try:
         client = distributed.Client(address, timeout=CONNECT, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
-        raise ValueError(f"scheduler {address}: no dask scheduler answers there "
-                         f"({sentence(error)}); start one with `dask scheduler`") from None
+        raise BadScheduler(f"scheduler {address}: no dask scheduler answers there "
+                           f"({sentence(error)}); start one with `dask scheduler`") from None
     cluster = DaskCluster(client, setup)
     try:
         cluster.require_workers()
@@ -91,6 +98,7 @@ class DaskCluster:
     def __init__(self, client, setup=None, local=None):
         self._client, self._setup, self._local = client, setup, local
         self._address, self._alone_since = client.scheduler.address, None
+        self._is_lost = False
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # we raise SchedulerLost
 
     @property
@@ -106,17 +114,17 @@ class DaskCluster:
         return self._client.dashboard_link or None
 
     def require_workers(self):
-        """Wait for a worker. Raises ValueError for none, or one with other software than here."""
+        """Wait for a worker. Raises BadScheduler for none, or one with other software than here."""
         try:
             self._client.wait_for_workers(1, timeout=FIRST)
         except TimeoutError:
-            raise ValueError(f"scheduler {self._address}: no worker connected within {FIRST:g} s; "
-                             f"start some with `dask worker {self._address} --nthreads 1`"
-                             ) from None
+            raise BadScheduler(
+                f"scheduler {self._address}: no worker connected within {FIRST:g} s; start some "
+                f"with `dask worker {self._address} --nthreads 1`") from None
         for worker, facts in self._client.run(worker_facts, on_error="return").items():
             reason = disagreement(worker, facts, versions())
             if reason:
-                raise ValueError(reason)
+                raise WorkerMismatch(reason)
 
     def run(self, function, tasks):
         """Yield the `TaskOutcome` of function(task) for each task, as they end.
@@ -194,12 +202,13 @@ class DaskCluster:
             return TaskOutcome(index, error=sentence(error))
 
     def _lost(self, reason):
+        self._is_lost = True
         return SchedulerLost(f"the dask scheduler at {self._address} {reason}: finished results "
                              "are kept, and the same command goes on with a scheduler that runs")
 
     def _cancel(self, futures, run):
         """Cancel pending tasks, ask those under way to stop, and wait for them at most GRACE."""
-        if self._client.status != "running":
+        if self._is_lost or self._client.status != "running":
             return
         latest = time.monotonic() + GRACE
         with suppress(OSError, TimeoutError):

@@ -1,13 +1,9 @@
 """Perform one task in a dask worker. `cluster` sends these functions there."""
 
 from .tasks import perform_packed, set_stop_source
-from .versions import disagreement, versions
+from .versions import WorkerMismatch, disagreement, versions
 
 STOPPED = ("cancelled", "resumed")      # states of a running task that nobody awaits
-
-
-class WorkerMismatch(ValueError):
-    """A dask worker has other software than the process that sends the tasks."""
 
 
 def worker_facts(dask_worker):

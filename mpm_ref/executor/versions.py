@@ -13,6 +13,14 @@ PACKAGES = ("numba", "numpy", "scipy")      # which decide on the bits of result
 SOURCE = "source of mpm_ref"
 
 
+class BadScheduler(ValueError):
+    """The text, the address or the workers of a scheduler are not fit for use."""
+
+
+class WorkerMismatch(BadScheduler):
+    """A dask worker has other software than the process that sends the tasks."""
+
+
 @cache
 def versions():
     """Return {name: version} of what must be the same wherever tasks run."""

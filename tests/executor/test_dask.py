@@ -5,6 +5,8 @@ import signal
 import subprocess
 import sys
 import textwrap
+import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -137,30 +139,42 @@ SCRIPT = """
 """
 
 
-@pytest.mark.parametrize("is_killed", [False, True])
-def test_local_cluster_ends_with_its_command(tmp_path, is_killed):
-    script = tmp_path / "script.py"
-    script.write_text(textwrap.dedent(SCRIPT))
-    process = subprocess.Popen([sys.executable, script, tmp_path], env=environment(),
+@contextmanager
+def script(folder, scheduler):
+    """The process of the script, in a group of its own, once its tasks run."""
+    file = folder / "script.py"
+    file.write_text(textwrap.dedent(SCRIPT).replace("local:2", scheduler))
+    process = subprocess.Popen([sys.executable, file, folder], env=environment(),
                                stderr=subprocess.PIPE, text=True, start_new_session=True)
-    numbers = process_numbers(tmp_path, 2)
-    if is_killed:
+    try:
+        process_numbers(folder, 2)
+        yield process
+    finally:
         process.kill()
         process.communicate(timeout=60)
-    else:
+
+
+def test_local_cluster_ends_with_its_command(tmp_path):
+    with script(tmp_path, "local:2") as process:
+        process.kill()
+    assert all_end(process_numbers(tmp_path, 2))
+
+
+def test_ctrl_c_stops_tasks_of_a_local_cluster(tmp_path):
+    with script(tmp_path, "local:2") as process:
         os.killpg(process.pid, signal.SIGINT)       # as a terminal does, to all of the group
         message = process.communicate(timeout=60)[1]
-        assert message.splitlines()[-1] == "KeyboardInterrupt"
-        assert message.count("Traceback") == 1      # no other process prints one
-        assert len(list(tmp_path.glob("stopped-*"))) == 2
-    assert all_end(numbers)
+    assert message.splitlines()[-1] == "KeyboardInterrupt"
+    assert message.count("Traceback") == 1          # no other process prints one
+    assert len(list(tmp_path.glob("stopped-*"))) == 2
+    assert all_end(process_numbers(tmp_path, 2))
 
 
 def test_processes_of_tasks_that_do_not_stop_are_ended(tmp_path, monkeypatch):
     monkeypatch.setattr(cluster, "GRACE", 0.5)
     with open_executor("local:1") as executor:
-        future_loop = executor.run(first_or_sleep, [(str(tmp_path), k) for k in range(2)])
-        assert next(future_loop).value == 0
+        loop = executor.run(first_or_sleep, [(str(tmp_path), k) for k in range(2)])
+        assert next(loop).value == 0
         numbers = process_numbers(tmp_path, 1)
     assert all_end(numbers)
 
@@ -197,22 +211,17 @@ def test_break_asks_tasks_of_remote_workers_to_stop(remote, tmp_path):
 
 
 def test_tasks_stop_when_their_client_is_killed(remote, tmp_path):
-    script = tmp_path / "script.py"
-    script.write_text(textwrap.dedent(SCRIPT).replace("local:2", remote.address))
-    process = subprocess.Popen([sys.executable, script, tmp_path], env=environment())
-    process_numbers(tmp_path, 2)
-    process.kill()
-    process.wait()
+    with script(tmp_path, remote.address) as process:
+        process.kill()
     assert wait_for_files(tmp_path, "stopped-*", 2)
 
 
 def wait_for_files(folder, pattern, count):
     """Return whether so many files come soon."""
-    for _ in range(300):
-        if len(list(Path(folder).glob(pattern))) == count:
-            return True
-        signal.sigtimedwait([], 0.1)
-    return False
+    latest = time.monotonic() + 30.0
+    while len(list(Path(folder).glob(pattern))) != count and time.monotonic() < latest:
+        time.sleep(0.05)
+    return len(list(Path(folder).glob(pattern))) == count
 
 
 def test_killed_worker_and_killed_scheduler(tmp_path):
@@ -228,7 +237,7 @@ def test_killed_worker_and_killed_scheduler(tmp_path):
         assert wait_for_files(tmp_path, "stopped-*", 1)
         processes.start_worker()
         processes.workers[1].wait(timeout=60)
-        for file in tmp_path.glob("*.pid"):
+        for file in (*tmp_path.glob("*.pid"), *tmp_path.glob("stopped-*")):
             file.unlink()
         process_numbers(tmp_path, 1)
         processes.scheduler.kill()
@@ -236,7 +245,7 @@ def test_killed_worker_and_killed_scheduler(tmp_path):
                            "are kept, and the same command goes on"):
             next(loop)
         processes.workers[2].wait(timeout=60)
-        assert len(list(tmp_path.glob("stopped-*"))) == 2
+        assert len(list(tmp_path.glob("stopped-*"))) == 1
 
 
 def test_scheduler_that_does_not_answer(remote, monkeypatch, tmp_path):
