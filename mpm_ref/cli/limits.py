@@ -2,14 +2,13 @@
 
 from pathlib import Path
 
-import typer
-
 from ..limits.answer import answer_lines, answer_of
 from ..limits.figure import save_figure
 from ..limits.search import LimitsSearch
 from ..limits.verdict import CellJudge, NoReference
 from ..store.atomic import write_bytes
-from .errors import end, exit_on_errors, options
+from ..sweep.observation import REFUSED
+from .errors import BAD_INPUT, end, exit_on_errors, options
 from .options import Json, SceneName, on_interrupt
 from .sweep_options import (
     BudgetOption,
@@ -76,7 +75,8 @@ def run_search(record, observed, request):
             try:
                 judge.start()
             except NoReference as fault:
-                end(f"{request.name}: {fault}", NO_ANSWER)
+                end(f"{request.name}: {fault}",
+                    BAD_INPUT if fault.outcome == REFUSED else NO_ANSWER)
             search = LimitsSearch(judge, request.quantities)
             search.run()
     return search

@@ -1,5 +1,6 @@
 """The answer of a search as plain data for JSON, and as sentences."""
 
+import re
 from math import inf, isfinite, log10
 
 from .. import __version__
@@ -124,11 +125,12 @@ def wrong_lines(facts):
     silent = sum(not one["warnings"] for one in cells)
     if not cells:
         return ["no cell finished with a wrong result"]
-    lines = [f"finished and wrong: {len(cells)} of {len(facts['cells'])} cells, of {silent} of "
-             "them nothing warned"]
+    lines = [f"finished and wrong: {len(cells)} of {len(facts['cells'])} cells, {silent} of them "
+             "without a warning"]
     for one in cells[:SHOWN_WRONG]:
         notice = f"; warning: {one['warnings'][0]}" if one["warnings"] else ""
-        lines.append(f"  {one['text']}: {wrong_text(one)} from {one['reference']}{notice}")
+        lines.append(f"  {one['text']}: {wrong_text(one)}, beside {one['reference']}"
+                     f"{notice}")
     if len(cells) > SHOWN_WRONG:
         lines.append(f"  {len(cells) - SHOWN_WRONG} more stand in the JSON")
     return lines
@@ -136,7 +138,7 @@ def wrong_lines(facts):
 
 def wrong_text(cell):
     """Return the error of a cell beside its tolerance."""
-    return (f"{cell['quantity']} differs by {percent(cell['error'])} (tolerance "
+    return (f"{percent(cell['error'])} off in {cell['quantity']} (tolerance "
             f"{percent(cell['tolerance'])})")
 
 
@@ -152,14 +154,14 @@ def sentence(facts):
     verb = "grow" if facts["direction"] == UP else "fall"
     begin = f"{facts['text']} may {verb}"
     if facts["margin"] > 1.0:
-        begin += f" {facts['margin']:.3g} times" + changed(facts, "good_value")
+        begin += f" {number(facts['margin'])} times" + changed(facts, "good_value")
     else:
         begin += " by less than was tried"
     if facts["bad"] is None:
         return begin + ("; the budget ended the search" if facts["end"] == BUDGET_END
                         else ", as far as was tried")
     times = max(facts["bad"], 1.0 / facts["bad"])
-    then = f"at {times:.3g} times{changed(facts, 'bad_value')}: {reason(facts['first_bad'])}"
+    then = f"at {number(times)} times{changed(facts, 'bad_value')}: {reason(facts['first_bad'])}"
     late = " (the budget ended the search between them)" if facts["end"] == BUDGET_END else ""
     return f"{begin}; {then}{late}"
 
@@ -172,7 +174,7 @@ def changed(facts, key):
 def reason(cell):
     """Return why a cell is not right, in the first clause of its message."""
     if cell["outcome"] == WRONG:
-        return f"wrong, {wrong_text(cell)}"
+        return f"wrong, {wrong_text(cell)}, beside {cell['reference']}"
     if cell["outcome"] == STOPPED:
         return f"the run takes more than {MOST_LONGER:g} times as long as now"
     if cell["outcome"] == UNCHECKED:
@@ -181,8 +183,8 @@ def reason(cell):
 
 
 def shortened(message):
-    """Return the first clause of a message."""
-    text = message.split(";")[0]
+    """Return the first clause of a message, without what stands in brackets."""
+    text = re.sub(r"\s*\([^()]*\)", "", message.split(";")[0])
     return text if len(text) <= SHOWN_MESSAGE else f"{text[:SHOWN_MESSAGE]}..."
 
 
@@ -215,6 +217,11 @@ def tolerance_lines(facts):
         if tolerance > 0.5:
             lines.append(f"  the grid does not resolve {text}: right and wrong mean little here")
     return lines
+
+
+def number(value):
+    """Return a factor as text, with powers of ten from a million on."""
+    return f"{value:.3g}" if value < 1e3 or value >= 1e6 else f"{value:.0f}"
 
 
 def percent(share):

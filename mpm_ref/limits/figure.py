@@ -8,7 +8,7 @@ from math import log10
 from ..store.atomic import replacing
 from ..sweep.observation import REFUSED, STOPPED, UNSTABLE
 from ..sweep.runs import CRASHED
-from .answer import BUDGET_END, LAST_RUNG
+from .answer import BUDGET_END, LAST_RUNG, number
 from .axes import UP
 from .verdict import RIGHT, UNCHECKED, WRONG
 
@@ -73,16 +73,16 @@ def draw_bar(axes, row, one):
     length = min(abs(log10(one["good"])), DECADES)
     sign = 1.0 if one["direction"] == UP else -1.0
     axes.barh(row, sign * length, BAR, color=COLOURS[RIGHT])
+    end = length
     if one["bad"] is not None:
-        at = sign * min(abs(log10(one["bad"])), DECADES)
-        axes.plot([at, at], [row - 0.5 * BAR, row + 0.5 * BAR], linewidth=3.0,
+        end = min(abs(log10(one["bad"])), DECADES)
+        axes.plot(2 * [sign * end], [row - 0.5 * BAR, row + 0.5 * BAR], linewidth=3.0,
                   color=COLOURS[one["first_bad"]["outcome"]], solid_capstyle="butt")
-    text = f"{one['margin']:.3g}" + {BUDGET_END: " ?", LAST_RUNG: " +"}.get(one["end"], "")
+    text = number(one["margin"]) + {BUDGET_END: " ?", LAST_RUNG: " +"}.get(one["end"], "")
     inside = length > 0.6 * DECADES
-    place = sign * (length - 0.06) if inside else sign * (length + 0.06)
+    place = sign * (length - 0.06) if inside else sign * (end + 0.08)
     axes.text(place, row, text, fontsize=7, va="center", color="white" if inside else "0.2",
-              ha="right" if (sign > 0.0) == inside else "left",
-              bbox=None if inside else {"color": "white", "alpha": 0.75, "pad": 0.6})
+              ha="right" if (sign > 0.0) == inside else "left")
 
 
 def draw_map(axes, one):
@@ -94,7 +94,7 @@ def draw_map(axes, one):
                 origin="lower", aspect="auto")
     for axis, factors, name in zip((axes.yaxis, axes.xaxis), one["factors"], one["axes"],
                                    strict=True):
-        axis.set_ticks(range(len(factors)), [f"{factor:.3g}" for factor in factors], fontsize=6)
+        axis.set_ticks(range(len(factors)), [number(factor) for factor in factors], fontsize=6)
         axis.set_label_text(name.replace("_", " "), fontsize=8)
     axes.plot(one["factors"][1].index(1.0), one["factors"][0].index(1.0), "o", color="white",
               markersize=4)

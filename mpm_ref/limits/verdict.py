@@ -55,7 +55,14 @@ class CellVerdict:
 
 
 class NoReference(Exception):
-    """The scene as given has no reference: the message says why, and what it would take."""
+    """The scene as given has no reference: the message says why, and what it would take.
+
+    outcome: that of its run.
+    """
+
+    def __init__(self, message, outcome):
+        self.outcome = outcome
+        super().__init__(message)
 
 
 class CellJudge:
@@ -79,8 +86,9 @@ class CellJudge:
         for dx in (1.0, FINE):
             run = self.base[dx]
             if not run.finished:
-                raise NoReference(f"{labels[dx]}: {run.outcome}: {run.message}"
-                                  + self._price(dx) * (run.outcome == STOPPED))
+                price = self._price(dx) * (run.outcome == STOPPED)
+                raise NoReference(f"{labels[dx]}: {run.outcome}: {run.message}{price}",
+                                  run.outcome)
         differences = self._differences(self.base[1.0], self.base[FINE], False)
         self.tolerance = {text: max(self.error, SLACK * difference)
                           for text, difference in differences.items()}
