@@ -28,6 +28,7 @@ from .sweep_options import (
     parse_workers,
 )
 from .terminal import as_json
+from .trade import with_companions
 
 NO_ANSWER = 1
 
@@ -57,7 +58,8 @@ def measure(
                                    parse_quantities(quantity), parse_workers(workers), scheduler,
                                    out, quiet)
             record, path = load_sweep(name)
-            observed = observed_of(record, path, request.quantities)
+            texts = with_companions(request.quantities, record.dim)     # `trade` has these runs
+            observed = observed_of(record, path, texts)
         search = run_search(record, observed, request)
         facts = answer_of(search, record, path.stem)
         facts |= {"budget": request.budget, "command": command_of(request)}
@@ -71,13 +73,13 @@ def run_search(record, observed, request):
     with options(), open_runs(request, observed) as runs:
         with on_interrupt(lambda: f"after {runs.count} runs, which are stored in "
                           f"{request.stem}.trade; the same command goes on"):
-            judge = CellJudge(record, runs, observed, request.error)
+            judge = CellJudge(record, runs, observed.probes, request.quantities, request.error)
             try:
                 judge.start()
             except NoReference as fault:
                 end(f"{request.name}: {fault}",
                     BAD_INPUT if fault.outcome == REFUSED else NO_ANSWER)
-            search = LimitsSearch(judge, request.quantities)
+            search = LimitsSearch(judge)
             search.run()
     return search
 

@@ -81,11 +81,11 @@ class PairMap:
 class LimitsSearch:
     """All directions and maps of a search."""
 
-    def __init__(self, judge, quantities):
-        """Prepare a search; judge has `scenes`, `judge(cells)` and `runs.left` (see `verdict`)."""
+    def __init__(self, judge):
+        """Prepare a search by a `verdict.CellJudge`."""
         self.judge = judge
         tables = judge.scenes.tables()
-        self.axes, self.left_out = applicable(tables, quantities)
+        self.axes, self.left_out = applicable(tables, judge.quantities)
         self.directions = [
             Direction(axis, direction, rungs(axis, tables, direction), is_discrete(axis, direction))
             for axis in self.axes for direction in (DOWN, UP)

@@ -1,8 +1,8 @@
 """Judge cells: right, wrong, or with the outcome of a run that did not finish.
 
 A cell that finished is compared with its own physical problem on other grids. Its time step and its
-particles follow the grid. The difference of two runs is the largest root mean square one so far of
-a quantity, relative to the quantity's largest change during the reference run.
+particles follow the grid. The difference of two runs is the largest root mean square one of a
+quantity, or with "@end" the last one, relative to its largest change during the reference run.
 
 * The tolerance of a quantity is the error asked, or twice the difference of the scene as given from
   itself at dx/2, whichever is larger: nobody expects of a changed scene what the scene as given
@@ -20,8 +20,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..sweep.difference import largest_change, relative_difference, running_maximum
+from ..sweep.difference import largest_change, relative_difference
 from ..sweep.observation import REFUSED, STOPPED, UNSTABLE
+from ..sweep.quantity import OutputQuantity
 from ..sweep.runs import CRASHED, RunRequest
 from .axes import AXIS, MOST_LONGER
 from .cell import COARSE, FINE, CellScenes, cell_text, physical
@@ -68,14 +69,14 @@ class NoReference(Exception):
 class CellJudge:
     """Runs cells and their references, each once, and judges them."""
 
-    def __init__(self, scene, runs, observed, error):
+    def __init__(self, scene, runs, probes, quantities, error):
         """Prepare to judge the cells of a scene whose end is a time.
 
-        runs: `sweep.runs.SceneRuns`; observed: the `ObservedRun` that they came from, with the
-        quantities and the probes of the scene as given; error: relative.
+        runs: `sweep.runs.SceneRuns`; probes: those of the scene as given; quantities: texts of
+        those of the runs that are judged; error: relative.
         """
-        self.scenes = CellScenes(scene, observed.probes)
-        self.runs, self.quantities, self.error = runs, observed.quantities, error
+        self.scenes = CellScenes(scene, probes)
+        self.runs, self.quantities, self.error = runs, quantities, error
         self.verdicts, self.base = {}, {}       # {cell: CellVerdict}, {dx: RunObservation}
         self.tolerance = {}                     # {quantity: relative}
 
@@ -196,12 +197,14 @@ class CellJudge:
 
     def _differences(self, run, reference, shifted):
         """Return {quantity: largest relative difference of two runs}."""
-        return {text: difference(run.values[text], reference.values[text], shifted)
-                for text in self.quantities}
+        errors = {text: differences(run.values[text], reference.values[text], shifted)
+                  for text in self.quantities}
+        return {text: float(error[-1] if OutputQuantity(text).at_end else error.max())
+                for text, error in errors.items()}
 
 
-def difference(values, reference, shifted):
-    """Return the largest difference of values (T, k), relative to the largest change of the
+def differences(values, reference, shifted):
+    """Return the differences (T,) of values (T, k), relative to the largest change of the
     reference; infinite where they cannot be compared.
 
     shifted: whether the changes since the start are compared.
@@ -209,7 +212,8 @@ def difference(values, reference, shifted):
     scale = largest_change(reference)
     if shifted:
         values, reference = values - values[0], reference - reference[0]
-    return float(running_maximum(relative_difference(values, reference, scale))[-1])
+    error = relative_difference(values, reference, scale)
+    return np.where(np.isnan(error), np.inf, error)
 
 
 def is_late(run, most):

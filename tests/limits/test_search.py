@@ -118,8 +118,8 @@ def test_search_maps_the_pairs_of_the_nearest_axes():
     """Stiffness and density fail together where their product is too large."""
     judge = SyntheticJudge(lambda f: RIGHT if f.get("stiffness", 1.0) * f.get("density", 1.0) < 50.0
                            else WRONG)
-    judge.scenes = SyntheticScenes()
-    search = LimitsSearch(judge, ("positions",))
+    judge.scenes, judge.quantities = SyntheticScenes(), ("positions",)
+    search = LimitsSearch(judge)
     search.run()
     assert [sorted(axis.name for axis in one.axes) for one in search.maps] == [
         ["density", "stiffness"]]

@@ -1,6 +1,6 @@
 """Verdicts by synthetic runs of known values: which reference decides, and when there is none."""
 
-from types import SimpleNamespace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -68,11 +68,8 @@ class SyntheticRuns:
 
 
 def judge_of(error=0.01, **cells):
-    observations = BASE | {label.replace("__", ", ").replace("_x_", " x "): answer
-                           for label, answer in cells.items()}
-    runs = SyntheticRuns(observations | cells)
-    observed = SimpleNamespace(probes=PROBES, quantities=("positions",))
-    judge = CellJudge(loads(SCENE), runs, observed, error)
+    runs = SyntheticRuns(BASE | cells)
+    judge = CellJudge(loads(SCENE), runs, PROBES, ("positions",), error)
     judge.start()
     return judge
 
@@ -169,6 +166,17 @@ def test_missing_values_are_no_agreement():
     verdict, _ = verdict_on({"density": 2.0}, **labels(
         "density x 2", 3.0, observation(np.nan), observation(np.nan)))
     assert verdict.outcome == WRONG
+
+
+def test_quantity_at_the_end_is_compared_there_alone():
+    values = {"as given": [0.0, 5.0, 1.1], "as given, dx/2": [0.0, 1.0, 1.0]}
+    runs = SyntheticRuns({label: replace(observation(), values={
+        text: np.array([values.get(label, values["as given"])]).T
+        for text in ("positions", "positions@end")}) for label in BASE})
+    judge = CellJudge(loads(SCENE), runs, PROBES, ("positions", "positions@end"), 0.01)
+    judge.start()
+    assert judge.tolerance == {"positions": pytest.approx(8.0),
+                               "positions@end": pytest.approx(0.2)}
 
 
 def test_no_run_is_asked_for_twice():
