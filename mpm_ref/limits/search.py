@@ -2,8 +2,9 @@
 
 Along each direction of each axis the factors of `axes.rungs` are tried from 1 outward until one is
 not right. Between the last good factor and the first bad one, the interval is halved in the
-logarithm until it spans at most `NARROW`. All directions take their steps together, so that a small
-budget gives a coarse answer for all of them; a failure between two good rungs is not found.
+logarithm until it spans at most `NARROW`. A failure between two good rungs is not found. The half
+of the directions that has cost least so far goes first, so that a small budget gives a coarse
+answer for all of them, and a fine one for what is refused at once.
 
 A bad factor whose run is too long or not checked ends its direction without halving: that is the
 end of what was looked at, no failure of the scene.
@@ -11,7 +12,7 @@ end of what was looked at, no failure of the scene.
 
 from dataclasses import dataclass
 from itertools import combinations
-from math import inf, log10, sqrt
+from math import inf, isnan, log10, sqrt
 
 from ..sweep.observation import STOPPED
 from .axes import DOWN, UP, applicable, is_discrete, rungs
@@ -36,6 +37,7 @@ class Direction:
     bad: float | None = None            # the nearest one that is not
     verdict: CellVerdict | None = None  # on the bad one
     is_late: bool = False               # whether the budget ended the search
+    cpu: float = 0.0                    # [s] of its runs so far
 
     @property
     def failed(self):
@@ -61,6 +63,7 @@ class Direction:
 
     def note(self, factor, verdict):
         """Take the verdict on the factor that was tried; None ends the search as late."""
+        self.cpu += 0.0 if verdict is None or isnan(verdict.cpu) else verdict.cpu
         if verdict is None:
             self.is_late = True
         elif verdict.is_right:
@@ -94,7 +97,7 @@ class LimitsSearch:
 
     def run(self):
         """Search along all directions, then on the pairs of the axes with the least margins."""
-        explore(self.directions, self.judge.judge)
+        explore(self.directions, self.judge.judge, self.judge.runs.workers)
         for pair in combinations(nearest_axes(self.directions), 2):
             self.maps.append(self._mapped(pair))
 
@@ -114,16 +117,17 @@ class LimitsSearch:
                 if verdict.outcome == WRONG}
 
 
-def explore(directions, judge):
-    """Move all directions on together until each is at its end.
+def explore(directions, judge, workers=1):
+    """Move all directions on, the half that has cost least so far first, until each is at its end.
 
-    judge(cells) returns {cell: verdict}; see `verdict.CellJudge.judge`.
+    judge(cells) returns {cell: verdict}; see `verdict.CellJudge.judge`. workers: runs at a time.
     """
     while True:
-        factors = [(one, factor) for one in directions
+        factors = [(one, factor) for one in sorted(directions, key=lambda one: one.cpu)
                    if (factor := one.next_factor()) is not None]
         if not factors:
             return
+        factors = factors[:max((len(factors) + 1) // 2, workers)]
         cells = [cell_of({one.axis.name: factor}) for one, factor in factors]
         verdicts = judge(cells)
         for (one, factor), cell in zip(factors, cells, strict=True):

@@ -1,5 +1,7 @@
 """Margins and maps of synthetic verdicts with failures at given factors."""
 
+from types import SimpleNamespace
+
 import pytest
 
 from mpm_ref.limits.axes import AXIS, DECADES, DOWN, SHORTER, UP
@@ -23,16 +25,18 @@ def direction(name, way=UP, steps=DECADES, discrete=False):
 
 
 class SyntheticJudge:
-    """Verdicts by a function of {axis's name: factor}; counts the rounds and the cells."""
+    """Verdicts and CPU times by functions of {axis's name: factor}; counts the rounds."""
 
-    def __init__(self, outcome, most=10**9):
+    def __init__(self, outcome, most=10**9, cpu=lambda factors: 1.0):
         self.outcome, self.most, self.rounds, self.verdicts = outcome, most, 0, {}
+        self.cpu = cpu
 
     def judge(self, cells):
         self.rounds += 1
         for cell in cells:
             if cell not in self.verdicts and len(self.verdicts) < self.most:
-                self.verdicts[cell] = CellVerdict(self.outcome(dict(cell)))
+                self.verdicts[cell] = CellVerdict(self.outcome(dict(cell)),
+                                                  cpu=self.cpu(dict(cell)))
         return {cell: self.verdicts.get(cell) for cell in cells}
 
 
@@ -50,13 +54,22 @@ def test_margin_is_found_within_ten_percent(limit):
         assert max(one.bad, 1.0 / one.bad) > limit
 
 
-def test_directions_move_on_together():
-    judge = SyntheticJudge(lambda f: RIGHT)
+def test_directions_without_failure_end_with_the_rungs():
     directions = [direction("stiffness"), direction("density"), direction("gravity", DOWN)]
-    explore(directions, judge.judge)
-    assert judge.rounds == 3
+    explore(directions, SyntheticJudge(lambda f: RIGHT).judge)
     assert [one.margin for one in directions] == [1000.0, 1000.0, pytest.approx(1000.0)]
     assert not any(one.failed for one in directions)
+
+
+def test_directions_that_cost_least_go_first():
+    """With a budget of cells, that refused at once is searched to its end, the dear one is not."""
+    dear, cheap = direction("stiffness"), direction("poisson")
+    judge = SyntheticJudge(lambda f: RIGHT if "stiffness" in f else REFUSED, 7,
+                           lambda f: 100.0 if "stiffness" in f else 0.0)
+    explore([dear, cheap], judge.judge)
+    assert (cheap.is_late, cheap.failed) == (False, True)
+    assert cheap.bad / cheap.good <= 1.1
+    assert dear.is_late
 
 
 @pytest.mark.parametrize("outcome", [STOPPED, UNCHECKED])
@@ -119,6 +132,7 @@ def test_search_maps_the_pairs_of_the_nearest_axes():
     judge = SyntheticJudge(lambda f: RIGHT if f.get("stiffness", 1.0) * f.get("density", 1.0) < 50.0
                            else WRONG)
     judge.scenes, judge.quantities = SyntheticScenes(), ("positions",)
+    judge.runs = SimpleNamespace(workers=2)
     search = LimitsSearch(judge)
     search.run()
     assert [sorted(axis.name for axis in one.axes) for one in search.maps] == [
