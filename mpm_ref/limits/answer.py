@@ -39,8 +39,8 @@ def answer_of(search, scene, name):
         "nearest": nearest(directions), "directions": directions, "left_out": search.left_out,
         "maps": [map_facts(one) for one in search.maps],
         "cells": [cell_facts(cell, verdict) for cell, verdict in judge.verdicts.items()],
-        "complete": not any(one.is_late for one in search.directions)
-        and all(v is not None for one in search.maps for row in one.verdicts for v in row),
+        "cpu": judge.cpu, "missing_cpu": search.remaining() * judge.cpu / len(judge.verdicts),
+        "complete": search.remaining() == 0,
     }
 
 
@@ -115,7 +115,8 @@ def answer_lines(facts):
               for name, why in facts["left_out"].items()]
     lines += ["", *map_lines(facts), *tolerance_lines(facts)]
     if not facts["complete"]:
-        lines.append("the budget ended the search; the same command with a larger --budget goes on")
+        lines.append("the budget ended the search; the same command with a larger --budget goes "
+                     f"on: about {time_text(facts['missing_cpu'])} of CPU time are missing")
     return lines
 
 
@@ -152,6 +153,8 @@ def nearest_lines(facts):
 def sentence(facts):
     """Return how far one axis may change in one direction, and what happens then."""
     verb = "grow" if facts["direction"] == UP else "fall"
+    if facts["margin"] == 1.0 and facts["bad"] is None:
+        return f"{facts['text']}: whether it may {verb} was not tried within the budget"
     begin = f"{facts['text']} may {verb}"
     if facts["margin"] > 1.0:
         begin += f" {number(facts['margin'])} times" + changed(facts, "good_value")
@@ -222,6 +225,13 @@ def tolerance_lines(facts):
 def number(value):
     """Return a factor as text, with powers of ten from a million on."""
     return f"{value:.3g}" if value < 1e3 or value >= 1e6 else f"{value:.0f}"
+
+
+def time_text(seconds):
+    """Return a time as text, in the unit that suits it."""
+    unit, name = next((pair for pair in ((3600.0, "h"), (60.0, "min")) if seconds >= 2.0 * pair[0]),
+                      (1.0, "s"))
+    return f"{seconds / unit:.2g} {name}"
 
 
 def percent(share):

@@ -2,9 +2,9 @@
 
 Along each direction of each axis the factors of `axes.rungs` are tried from 1 outward until one is
 not right. Between the last good factor and the first bad one, the interval is halved in the
-logarithm until it spans at most `NARROW`. A failure between two good rungs is not found. The half
-of the directions that has cost least so far goes first, so that a small budget gives a coarse
-answer for all of them, and a fine one for what is refused at once.
+logarithm until it spans at most `NARROW`. A failure between two good rungs is not found. The
+directions that have cost least so far go first, so that a small budget gives a coarse answer for
+all of them, and a fine one for what is refused at once.
 
 A bad factor whose run is too long or not checked ends its direction without halving: that is the
 end of what was looked at, no failure of the scene.
@@ -12,7 +12,7 @@ end of what was looked at, no failure of the scene.
 
 from dataclasses import dataclass
 from itertools import combinations
-from math import inf, isnan, log10, sqrt
+from math import ceil, inf, isnan, log2, log10, sqrt
 
 from ..sweep.observation import STOPPED
 from .axes import DOWN, UP, applicable, is_discrete, rungs
@@ -21,6 +21,8 @@ from .verdict import UNCHECKED, WRONG, CellVerdict
 
 NARROW = 1.1            # ratio of the first bad to the last good factor
 NARROW_SHIFT = 2.0      # of a shift's
+EVEN = 1e-9             # of a halving, which round-off may leave
+PER_WORKER = 2          # cells of a round, so that few workers wait for the last one
 WIDEST = 3              # axes whose pairs are mapped
 SIDE = 5                # factors of an axis on a map
 
@@ -54,12 +56,25 @@ class Direction:
         if self.is_late:
             return None
         if self.bad is None:
-            return next((f for f in self.rungs if abs(log10(f)) > abs(log10(self.good))), None)
+            return next(iter(self.rungs_left()), None)
+        return sqrt(self.good * self.bad) if self.halvings() else None
+
+    def rungs_left(self):
+        """Return the rungs past the last good factor."""
+        return [factor for factor in self.rungs if abs(log10(factor)) > abs(log10(self.good))]
+
+    def halvings(self):
+        """Return the number of factors between the last good and the bad one that narrow the
+        interval down.
+        """
+        if self.is_discrete or not self.failed:
+            return 0
         narrow = NARROW_SHIFT if self.axis.name == "origin" else NARROW
-        ratio = max(self.bad / self.good, self.good / self.bad)
-        if self.is_discrete or not self.failed or ratio <= narrow:
-            return None
-        return sqrt(self.good * self.bad)
+        return max(ceil(log2(abs(log10(self.bad / self.good)) / log10(narrow)) - EVEN), 0)
+
+    def remaining(self):
+        """Return about how many factors are missing to the end of the search."""
+        return len(self.rungs_left()) if self.bad is None else self.halvings()
 
     def note(self, factor, verdict):
         """Take the verdict on the factor that was tried; None ends the search as late."""
@@ -111,6 +126,11 @@ class LimitsSearch:
         return PairMap(pair, factors, tuple(tuple(verdicts[cell] for cell in row)
                                             for row in cells))
 
+    def remaining(self):
+        """Return about how many cells the budget has left out."""
+        return sum(one.remaining() for one in self.directions) + sum(
+            verdict is None for one in self.maps for row in one.verdicts for verdict in row)
+
     def wrong_cells(self):
         """Return the cells that finished with a wrong result, each with its verdict."""
         return {cell: verdict for cell, verdict in self.judge.verdicts.items()
@@ -118,7 +138,7 @@ class LimitsSearch:
 
 
 def explore(directions, judge, workers=1):
-    """Move all directions on, the half that has cost least so far first, until each is at its end.
+    """Move all directions on to their ends, first those that have cost least so far.
 
     judge(cells) returns {cell: verdict}; see `verdict.CellJudge.judge`. workers: runs at a time.
     """
@@ -127,7 +147,7 @@ def explore(directions, judge, workers=1):
                    if (factor := one.next_factor()) is not None]
         if not factors:
             return
-        factors = factors[:max((len(factors) + 1) // 2, workers)]
+        factors = factors[:PER_WORKER * workers]
         cells = [cell_of({one.axis.name: factor}) for one, factor in factors]
         verdicts = judge(cells)
         for (one, factor), cell in zip(factors, cells, strict=True):

@@ -79,6 +79,7 @@ class CellJudge:
         self.runs, self.quantities, self.error = runs, quantities, error
         self.verdicts, self.base = {}, {}       # {cell: CellVerdict}, {dx: RunObservation}
         self.tolerance = {}                     # {quantity: relative}
+        self.cpu = 0.0                          # [s] of all runs, references included
 
     def start(self):
         """Run the scene as given and its companions. Raises NoReference where one fails."""
@@ -162,6 +163,7 @@ class CellJudge:
                                       probes=self.scenes.probes(cell))
                     for cell, dx, most, label in wanted.values()}
         runs = self.runs.observe(requests)
+        self.cpu += float(np.nansum([run.cost.cpu for run in runs.values()]))
         return {key: runs[label] for key, (*_, label) in wanted.items()}
 
     def _most(self, dx):

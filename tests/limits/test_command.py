@@ -108,9 +108,9 @@ def test_small_budget_says_so_and_the_next_command_goes_on(tmp_path, monkeypatch
         done, facts = limits(tmp_path, SCENE)
     assert done.exit_code == 0
     assert not facts["complete"]
-    assert "the time step may grow by less than was tried; the budget ended the search" in (
-        done.stdout)
-    assert "larger --budget goes on" in done.stdout
+    assert "the time step: whether it may grow was not tried within the budget" in done.stdout
+    assert "larger --budget goes on: about" in done.stdout
+    assert facts["missing_cpu"] == pytest.approx(6.0 * facts["cpu"])        # rungs, of one cell
     assert limits(tmp_path, SCENE)[1]["complete"]
 
 

@@ -62,14 +62,15 @@ def test_directions_without_failure_end_with_the_rungs():
 
 
 def test_directions_that_cost_least_go_first():
-    """With a budget of cells, that refused at once is searched to its end, the dear one is not."""
-    dear, cheap = direction("stiffness"), direction("poisson")
-    judge = SyntheticJudge(lambda f: RIGHT if "stiffness" in f else REFUSED, 7,
-                           lambda f: 100.0 if "stiffness" in f else 0.0)
-    explore([dear, cheap], judge.judge)
+    """With a budget of cells, what is refused at once is searched to its end, the rest is not."""
+    dear = [direction(name) for name in ("stiffness", "density", "gravity")]
+    cheap = direction("poisson")
+    judge = SyntheticJudge(lambda f: REFUSED if "poisson" in f else RIGHT, 14,
+                           lambda f: 0.0 if "poisson" in f else 100.0)
+    explore([*dear, cheap], judge.judge)
     assert (cheap.is_late, cheap.failed) == (False, True)
     assert cheap.bad / cheap.good <= 1.1
-    assert dear.is_late
+    assert any(one.is_late for one in dear)
 
 
 @pytest.mark.parametrize("outcome", [STOPPED, UNCHECKED])
@@ -99,6 +100,19 @@ def test_end_of_the_budget_leaves_the_interval():
     explore([one], SyntheticJudge(lambda f: RIGHT if f["stiffness"] < 5.0 else WRONG, 2).judge)
     assert one.is_late
     assert (one.good, one.bad) == (pytest.approx(10.0**0.5), 10.0)
+
+
+def test_missing_cells_are_counted():
+    one = direction("stiffness")
+    assert one.remaining() == 3
+    one.note(10.0, CellVerdict(RIGHT))
+    assert one.remaining() == 2
+    one.note(100.0, CellVerdict(WRONG))
+    assert one.remaining() == 5             # 10^(1/32) = 1.075
+    judge = SyntheticJudge(lambda f: RIGHT if f["stiffness"] < 50.0 else WRONG)
+    explore([one], judge.judge)
+    assert len(judge.verdicts) == 5
+    assert one.remaining() == 0
 
 
 def test_nearest_axes_are_those_that_fail_first():
