@@ -5,10 +5,15 @@ import json
 import pytest
 from command_line import SCENE, assert_told, mpm_ref
 
+from mpm_ref.cli.sweep_options import load_sweep, observed_of
+from mpm_ref.cli.trade import with_companions
+from mpm_ref.executor import open_executor
 from mpm_ref.limits import axes
 from mpm_ref.limits.figure import draw_limits
 from mpm_ref.limits.verdict import CellJudge
 from mpm_ref.scene import build, load
+from mpm_ref.sweep.runs import RunRequest, SceneRuns
+from mpm_ref.sweep.setting import scene_at, setting
 from mpm_ref.sweep.store import RunStore
 from mpm_ref.timestep import stable_dt
 
@@ -99,6 +104,18 @@ def test_second_command_makes_no_new_run(falling, monkeypatch):
     again, facts_again = limits(folder, SCENE, "--json")
     assert facts_again == facts
     assert json.loads(again.stdout) == facts
+
+
+def test_the_scene_as_given_and_its_grids_are_runs_of_trade(falling, monkeypatch):
+    _, _, folder = falling
+    monkeypatch.setattr(RunStore, "put", lambda *_: pytest.fail("a new run"))
+    record, path = load_sweep(folder / "disk.toml")
+    observed = observed_of(record, path, with_companions(("positions",), 2))
+    with open_executor(workers=1) as executor:
+        runs = SceneRuns(observed, executor, RunStore(folder / "disk.trade"))
+        chosen = {factor: setting(dx=factor) for factor in (2.0, 1.0, 0.5)}
+        assert all(run.finished for run in runs.observe(
+            {factor: RunRequest(scene_at(record, one)) for factor, one in chosen.items()}).values())
 
 
 def test_small_budget_says_so_and_the_next_command_goes_on(tmp_path, monkeypatch):
