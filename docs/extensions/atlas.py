@@ -49,7 +49,7 @@ def pages(shown):
 
 def entry_cell(ids, method, entries):
     """Return the cell of a method: the experiments of a kind of extreme, one below the other."""
-    return "<br>".join(badge(name, entries[name]) for name in ids
+    return " ".join(badge(name, entries[name]) for name in ids
                        if name.startswith(f"{method}.") and name in entries)
 
 
@@ -57,8 +57,8 @@ def badge(name, one):
     """Return an experiment as a coloured link with the counts of its verdicts."""
     counts = Counter(row.verdict for row in one.rows)
     text = ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS if counts[verdict])
-    title = one.title.partition(": ")[2] or one.title
-    return (f'<span class="atlas-{colour(counts)}">[{cell(title)}](#numbers.{GROUP}.{name}): '
+    title = one.title.removeprefix(f"{METHODS[name.partition('.')[0]]}: ")
+    return (f'<span class="atlas-{colour(counts)}">[{cell(title[0].upper() + title[1:])}](#numbers.{GROUP}.{name}): '
             f"{text}</span>")
 
 

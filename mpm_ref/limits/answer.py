@@ -116,7 +116,7 @@ def answer_lines(facts):
     lines += ["", *map_lines(facts), *tolerance_lines(facts)]
     if not facts["complete"]:
         lines.append("the budget ended the search; the same command with a larger --budget goes "
-                     f"on: about {time_text(facts['missing_cpu'])} of CPU time are missing")
+                     f"on: at least {time_text(facts['missing_cpu'])} of CPU time are missing")
     return lines
 
 

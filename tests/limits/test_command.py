@@ -126,7 +126,7 @@ def test_small_budget_says_so_and_the_next_command_goes_on(tmp_path, monkeypatch
     assert done.exit_code == 0
     assert not facts["complete"]
     assert "the time step: whether it may grow was not tried within the budget" in done.stdout
-    assert "larger --budget goes on: about" in done.stdout
+    assert "larger --budget goes on: at least" in done.stdout
     assert facts["missing_cpu"] == pytest.approx(6.0 * facts["cpu"])        # rungs, of one cell
     assert limits(tmp_path, SCENE)[1]["complete"]
 
