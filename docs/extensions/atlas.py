@@ -58,8 +58,8 @@ def badge(name, one):
     counts = Counter(row.verdict for row in one.rows)
     text = ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS if counts[verdict])
     title = one.title.removeprefix(f"{METHODS[name.partition('.')[0]]}: ")
-    return (f'<span class="atlas-{colour(counts)}">[{cell(title[0].upper() + title[1:])}](#numbers.{GROUP}.{name}): '
-            f"{text}</span>")
+    link = f"[{cell(title[0].upper() + title[1:])}](#numbers.{GROUP}.{name})"
+    return f'<span class="atlas-{colour(counts)}">{link}: {text}</span>'
 
 
 def colour(counts):

@@ -250,7 +250,7 @@ AXES = (
     ScaleAxis("yield", "the yield stress", scale_yield, flow_reading("sigma_y", "tau_y")),
     ScaleAxis("particles", "the number of points per cell and axis", change_points, point_reading,
               is_numerical=True),
-    ScaleAxis("origin", "the distance from where it stands, in sizes,", scale_origin,
+    ScaleAxis("origin", "the distance from where it stands (in sizes)", scale_origin,
               lambda tables: "shift", is_numerical=True, is_geometric=True),
     ScaleAxis("size", "the size", change_size, size_reading, is_geometric=True),
 )
