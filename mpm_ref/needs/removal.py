@@ -63,11 +63,12 @@ class NeedsResult:
 
     first: object           # `SceneVariant` as given
     base: object            # `RunObservation`
+    cpu: float              # [s] of the scene as given: the less of two runs
     errors: SceneErrors
     singles: tuple          # of `RemovalRun`: each removal alone
     order: tuple            # of `RemovalRun`: removals one after the other, the last is the lean
     lean: object            # `SceneVariant`
-    complete: bool          # whether the budget sufficed for the order
+    complete: bool          # whether the budget sufficed
     missing_cpu: float      # [s] of the runs that were not made, estimated
 
 
@@ -76,7 +77,7 @@ class RemovalStudy:
 
     def __init__(self, runs, first, error):
         self.runs, self.first, self.error = runs, first, error
-        self.base = self.missing_cpu = None
+        self.base, self.cpu, self.missing_cpu = None, inf, 0.0
 
     def result(self):
         """Return the `NeedsResult`; None, with the observation in `base`, if the scene as given
@@ -85,12 +86,14 @@ class RemovalStudy:
         self.base = self.observe({"as given": self.first})["as given"]
         if self.base.outcome != FINISHED:
             return None
-        self.missing_cpu = 0.0
-        singles = self.measured(self.first, self.first.offers.values(), self.base.cost.cpu)
-        errors = self.scene_errors()
+        perturbed = self.observe({"perturbed": self.first}, seed=SEED)["perturbed"]
+        self.cpu = float(np.nanmin((self.base.cost.cpu, perturbed.cost.cpu)))
+        singles = self.measured(self.first, self.first.offers.values(), self.cpu)
+        errors = self.scene_errors(self.change_of(perturbed))
         order, lean, complete = self.reduced(singles)
-        return NeedsResult(self.first, self.base, errors, tuple(singles), tuple(order), lean,
-                           complete, self.missing_cpu)
+        complete &= all(run.verdict != UNMEASURED for run in singles)
+        return NeedsResult(self.first, self.base, self.cpu, errors, tuple(singles), tuple(order),
+                           lean, complete, self.missing_cpu)
 
     def observe(self, variants, most_cpu=inf, seed=None):
         """Return {label: observation} of {label: `SceneVariant` or SceneError}."""
@@ -104,7 +107,7 @@ class RemovalStudy:
     def measured(self, variant, removals, cpu):
         """Return a `RemovalRun` for each removal from a variant, whose CPU time is given [s]."""
         variants = {removal.label: attempt(variant, removal) for removal in removals}
-        most = max(MOST_CPU * self.base.cost.cpu, LEAST_CPU)
+        most = max(MOST_CPU * self.cpu, LEAST_CPU)
         observations = self.observe(variants, most)
         return [self.judged(label, variants[label], observation, cpu)
                 for label, observation in observations.items()]
@@ -129,17 +132,16 @@ class RemovalStudy:
             return REQUIRED
         if observation.outcome == REFUSED:
             return IMPOSSIBLE
-        if observation.outcome == STOPPED and observation.cost.cpu > MOST_CPU * self.base.cost.cpu:
+        if observation.outcome == STOPPED and observation.cost.cpu > MOST_CPU * self.cpu:
             return COSTLY
-        self.missing_cpu += self.base.cost.cpu
+        self.missing_cpu += self.cpu
         return UNMEASURED
 
     # the errors of the scene itself
 
-    def scene_errors(self):
-        """Return the `SceneErrors` of the scene as given."""
-        perturbed = self.observe({"perturbed": self.first}, seed=SEED)["perturbed"]
-        fine_cpu = self.base.cost.cpu * 2.0 ** (self.first.scene.dim + GRID_POWER)
+    def scene_errors(self, perturbation):
+        """Return the `SceneErrors` of the scene as given; perturbation: {quantity: change}."""
+        fine_cpu = self.cpu * 2.0 ** (self.first.scene.dim + GRID_POWER)
         affordable = fine_cpu < FINE_SHARE * self.runs.left
         message = "" if affordable else f"half of dx would take about {fine_cpu:.3g} s of CPU time"
         factor = FINE if affordable else COARSE
@@ -147,7 +149,7 @@ class RemovalStudy:
         if not grid and factor == FINE:
             factor, message = COARSE, "the scene with half of dx did not reach its end"
             grid = self.on_grid(factor)
-        return SceneErrors(grid, factor, self.change_of(perturbed), message)
+        return SceneErrors(grid, factor, perturbation, message)
 
     def on_grid(self, factor):
         """Return {quantity: change} of the scene as given by a factor of dx; {} if it fails."""
@@ -201,12 +203,12 @@ class RemovalStudy:
             if after is not None and not isinstance(after, SceneError):
                 variant, labels = after, [*labels, run.label]
         if not labels:
-            return [], self.first, self.base.cost.cpu
+            return [], self.first, self.cpu
         together = " and ".join(labels)
         observation = self.observe({together: variant})[together]
         run = self.judged(together, variant, observation, inf)
         if run.verdict != NOT_REQUIRED or run.change > NOTHING:
-            return [], self.first, self.base.cost.cpu
+            return [], self.first, self.cpu
         return [run], variant, run.cpu
 
 

@@ -5,6 +5,7 @@ left, and energies of a symmetric half count twice.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -26,7 +27,7 @@ class SceneVariant:
     share: float = 1.0
     removals: tuple = ()
 
-    @property
+    @cached_property
     def offers(self):
         """Return {label: `Removal`} of what can be removed from the scene."""
         return {removal.label: removal
