@@ -1,5 +1,6 @@
 """The settings that a search tries: single knobs, grids between the halved ones, and pairs."""
 
+from ..body import AFFINE
 from ..sweep.setting import setting
 
 CFL, CELLS = (0.9, 0.5, 0.25), (0.9, 0.6, 0.3)      # of the explicit bound; of implicit steps
@@ -18,10 +19,20 @@ def single_knobs(scene):
     settings = [setting(cfl=value) for value in cfl]
     settings += [setting(particles=factor) for factor in PARTICLES]
     settings += [setting(transfer=text) for text in TRANSFERS if text != transfer]
-    settings += [setting(degree=degree) for degree in DEGREES if degree != scene.scheme.degree]
+    settings += [with_degree(degree, transfer) for degree in DEGREES
+                 if degree != scene.scheme.degree]
     settings += [setting(sampling=kind) for kind in other_samplings(scene)]
     other = IMPLICIT if scene.integrator == "explicit" else "explicit"
     return [*settings, setting(integrator=other, cfl=CELLS[1] if other == IMPLICIT else CFL[1])]
+
+
+def with_degree(degree, transfer):
+    """Return the setting of a degree; linear splines carry no affine field, so that an affine
+    transfer becomes FLIP.
+    """
+    if degree == 1 and transfer in AFFINE:
+        return setting(degree=1, transfer="flip 0.95")
+    return setting(degree=degree)
 
 
 def other_samplings(scene):

@@ -7,7 +7,7 @@ convergence index 1.25 E_2/(2^p - 1) [Roache1994]. p is bounded above by 2; with
 runs do not converge, and nothing is claimed.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -28,6 +28,10 @@ class QuantityReference:
     error: np.ndarray       # (T,) estimate, relative, never falling; infinite where not known
     order: np.ndarray       # (T,) observed
     differences: tuple      # of the last value of the error between successive grids
+
+    def raised(self, error):
+        """Return this reference with at least another estimate (T,) of its error."""
+        return replace(self, error=running_maximum(np.maximum(self.error, error)))
 
     def error_of(self, values):
         """Return the largest relative difference so far (T,) of a run's values (T, k)."""

@@ -11,7 +11,8 @@ ROOT = Path(__file__).resolve().parents[2]
 # Ground floor first. What stands on one line does not know each other, except within a room: names
 # in one string may import each other, without cycles. A package in PACKAGES is such a room.
 PACKAGES = {"plain", "materials", "materials.learned", "hot", "rom", "rom.study", "nclaw",
-            "nclaw.study", "shapes", "sampling", "scene", "oracle", "cli"}
+            "nclaw.study", "shapes", "sampling", "scene", "oracle", "cli", "executor", "sweep",
+            "trade", "limits", "needs"}
 FLOORS = (
     ("core.kernel_cache", "core.blas"),
     ("core.jit",),
@@ -38,9 +39,11 @@ FLOORS = (
     ("simulate", "sampling", "preflight"),
     ("scene",),
     ("store store.*",),     # but for its modules on lower floors
+    ("executor",),
     ("oracle", "sweep", "plotting", "trajectories"),
     ("rom.study",),
     ("nclaw.study",),
+    ("trade", "limits", "needs"),
     ("cli",),
     ("__main__",),
 )

@@ -1,0 +1,137 @@
+"""Options of the commands that run a scene many times: `trade`, `limits` and `needs`."""
+
+import re
+from contextlib import contextmanager
+from math import isfinite
+from pathlib import Path
+from typing import Annotated, NamedTuple
+
+import numpy as np
+import typer
+
+from .. import scene
+from ..executor import open_executor
+from ..scene.validate import validate_scene
+from ..sweep.observation import ObservedRun
+from ..sweep.probes import choose_probes
+from ..sweep.quantity import DEFAULT, OutputQuantity
+from ..sweep.runs import SceneRuns
+from ..sweep.setting import in_seconds
+from ..sweep.store import RunStore
+from .catalogue import find_scene
+from .terminal import passing
+
+UNITS = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
+TIMES = 33              # at which quantities are sampled, the start and the end included
+SHORTEST = 1.0          # [s] of a budget
+
+ErrorOption = Annotated[str, typer.Option("--error", help="Error asked, such as 1% or 0.01, "
+                                          "relative to the largest change of the quantity.")]
+BudgetOption = Annotated[str, typer.Option("--budget", help="Time after which no run begins, such "
+                                           "as 90s, 20min or 2h.")]
+QuantityOption = Annotated[list[str] | None, typer.Option(
+    "--quantity", help="Quantity of interest, such as positions (default), front:x+, kinetic or "
+    "impulse:floor; may be given several times.")]
+WorkersOption = Annotated[int, typer.Option(help="Number of runs at a time.")]
+SchedulerOption = Annotated[str | None, typer.Option(
+    help="Where runs are made: local:N, or the address of a Dask scheduler (default: processes "
+         "of this machine).")]
+OutOption = Annotated[Path, typer.Option("--out", "-o", help="Folder of the files written.")]
+QuietOption = Annotated[bool, typer.Option("--quiet", help="Show no progress bar.")]
+
+
+class SweepRequest(NamedTuple):
+    """The options that all of these commands have."""
+
+    name: str               # of the scene
+    error: float
+    budget: float           # [s]
+    quantities: tuple       # of texts
+    workers: int
+    scheduler: str | None
+    out: Path
+    quiet: bool
+
+    @property
+    def stem(self):
+        """Return the name that output files begin with."""
+        return Path(self.name).stem
+
+
+def parse_error(text):
+    """Return the relative error of a text such as "1%" or "0.01". Raises ValueError."""
+    match = re.fullmatch(r"\s*([0-9.eE+-]+)\s*(%?)\s*", text)
+    try:
+        value = float(match[1]) / (100.0 if match[2] else 1.0)
+    except (TypeError, ValueError):
+        value = np.nan
+    if not 0.0 < value < 1.0:
+        raise ValueError(f"--error {text}: expected a share between 0 and 1, such as 1% or 0.01")
+    return value
+
+
+def parse_budget(text):
+    """Return the seconds of a text such as "90s", "20min" or "2h". Raises ValueError."""
+    match = re.fullmatch(r"\s*([0-9.eE+-]+)\s*(s|min|h|)\s*", text)
+    try:
+        value = float(match[1]) * UNITS[match[2]]
+    except (TypeError, ValueError):
+        value = np.nan
+    if not (isfinite(value) and value >= SHORTEST):
+        raise ValueError(f"--budget {text}: expected a time of at least {SHORTEST:g} s, such as "
+                         "90s, 20min or 2h")
+    return value
+
+
+def parse_quantities(texts):
+    """Return the texts of quantities, each once. Raises ValueError for one that names none."""
+    unique = tuple(dict.fromkeys(texts or DEFAULT))
+    for text in unique:
+        OutputQuantity(text)
+    return unique
+
+
+def parse_workers(workers):
+    """Return the number of workers. Raises ValueError unless it is positive."""
+    if workers < 1:
+        raise ValueError(f"--workers {workers}: expected at least 1")
+    return workers
+
+
+def load_sweep(name):
+    """Return (scene, path) by the scene's name, with its end as a time.
+
+    Raises SceneError for a scene that cannot be read, or whose run has no end in seconds.
+    """
+    path = find_scene(name)
+    return validate_scene(in_seconds(scene.load(path)), str(path)), path
+
+
+def observed_of(record, path, quantities):
+    """Return the `ObservedRun` of a scene: its quantities, times, and probes of its particles.
+
+    Raises SceneError for a scene that cannot be built.
+    """
+    probes = choose_probes(scene.build(record, str(path)).bodies)
+    times = tuple(np.linspace(0.0, record.end, TIMES).tolist())
+    return ObservedRun("", "", tuple(quantities), times, tuple((p.body, p.X) for p in probes))
+
+
+@contextmanager
+def open_runs(request, observed):
+    """Yield the `SceneRuns` of a request, with a bar that counts runs; its store is the folder
+    SCENE.trade beside the output. Raises ValueError for a scheduler that does not exist.
+    """
+    store = RunStore(request.out / f"{request.stem}.trade")
+    with open_executor(request.scheduler, request.workers) as executor, \
+            passing(request.quiet, total=request.budget, unit="s", desc=request.stem,
+                    bar_format="{desc} {bar}| {postfix} [{elapsed}]") as bar:
+        runs = SceneRuns(observed, executor, store, request.budget)
+
+        def show(label, observation):
+            bar.set_postfix_str(f"{runs.count} runs, {max(runs.left, 0.0):.0f} s left, last: "
+                                f"{label}: {observation.outcome}")
+            bar.update(request.budget - max(runs.left, 0.0) - bar.n)
+
+        runs.on_run = show
+        yield runs

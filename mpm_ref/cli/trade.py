@@ -1,0 +1,105 @@
+"""Implement `mpm-ref trade`: measure accuracy against time, and recommend a setting."""
+
+from math import isfinite
+from pathlib import Path
+
+import numpy as np
+import typer
+
+from ..store.atomic import write_bytes
+from ..sweep.quantity import CHAOTIC
+from ..trade.answer import answer_lines, answer_of, best_scene
+from ..trade.page import page_of
+from ..trade.search import TradeSearch
+from .errors import exit_on_errors, options
+from .options import Json, SceneName, on_interrupt
+from .sweep_options import (
+    BudgetOption,
+    ErrorOption,
+    OutOption,
+    QuantityOption,
+    QuietOption,
+    SchedulerOption,
+    SweepRequest,
+    WorkersOption,
+    load_sweep,
+    observed_of,
+    open_runs,
+    parse_budget,
+    parse_error,
+    parse_quantities,
+    parse_workers,
+)
+from .terminal import as_json
+
+NO_ANSWER = 1
+
+
+def measure(
+    name: SceneName,
+    error: ErrorOption = "1%",
+    budget: BudgetOption = "5min",
+    quantity: QuantityOption = None,
+    workers: WorkersOption = 2,
+    scheduler: SchedulerOption = None,
+    out: OutOption = Path(),
+    json: Json = False,
+    quiet: QuietOption = False,
+):
+    """Measure which settings of a scene keep an error, and which of them is the cheapest.
+
+    Writes SCENE.trade.json, the page SCENE.trade.html, and the runnable scene SCENE.best.toml.
+    Runs are stored in SCENE.trade: the same command with a larger budget goes on. Exit status: 0
+    a setting is recommended, 1 none keeps the error within the budget, 2 bad input, 130 Ctrl-C.
+    """
+    with exit_on_errors():
+        with options():
+            texts = parse_quantities(quantity)
+            request = SweepRequest(name, parse_error(error), parse_budget(budget), texts,
+                                   parse_workers(workers), scheduler, out, quiet)
+            record, path = load_sweep(name)
+            observed = observed_of(record, path, with_companions(texts, record.dim))
+        search = run_search(record, observed, request)
+        facts = as_plain(answer_of(search, path.stem))
+        write_answer(search, facts, request)
+        print(as_json(facts) if json else "\n".join(answer_lines(facts)))
+    raise typer.Exit(0 if facts["best"] is not None else NO_ANSWER)
+
+
+def with_companions(texts, dim):
+    """Return quantities and those that still have a meaning where paths diverge, each once."""
+    profiles = [f"profile:{axis}" for axis in "xyz"[:dim]]
+    return tuple(dict.fromkeys((*texts, *CHAOTIC, *profiles)))
+
+
+def run_search(record, observed, request):
+    """Return a `TradeSearch` after its runs."""
+    request.out.mkdir(parents=True, exist_ok=True)
+    with options(), open_runs(request, observed) as runs:
+        search = TradeSearch(record, runs, request.quantities, np.array(observed.times),
+                             request.error)
+        with on_interrupt(lambda: f"after {runs.count} runs, which are stored in "
+                          f"{request.stem}.trade; the same command goes on"):
+            search.run()
+    return search
+
+
+def write_answer(search, facts, request):
+    """Write the JSON, the page, and the recommended scene. Raises `NotWritten`."""
+    base = request.out / request.stem
+    write_bytes(f"{base}.trade.json", as_json(facts).encode())
+    write_bytes(f"{base}.trade.html", page_of(facts).encode())
+    text = best_scene(search, request.stem)
+    if text is not None:
+        write_bytes(f"{base}.best.toml", text.encode())
+
+
+def as_plain(value):
+    """Return facts whose numbers are plain and finite, or None."""
+    if isinstance(value, dict):
+        return {key: as_plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [as_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not isfinite(value) else value

@@ -1,0 +1,168 @@
+"""The answer of a search: rows of all settings, the recommended one, and what is not known."""
+
+from math import isfinite, log2
+
+import numpy as np
+
+from .. import __version__
+from ..scene import dumps
+from ..sweep.observation import FINISHED
+from ..sweep.setting import scene_at
+from .search import HALF, without_grid
+
+
+def answer_of(search, name):
+    """Return the answer as plain data, for JSON; errors are relative, times in s, memory in bytes.
+
+    name: that of the scene.
+    """
+    best, horizon = search.best(), search.horizon()
+    return {
+        "scene": name, "version": __version__, "error": search.error, "end": search.times[-1],
+        "quantities": list(search.quantities), "until": horizon, "chaos": search.chaos,
+        "grids": [search.scene.dx * factor for factor in search.levels],
+        "references": {text: reference_facts(search, text) for text in search.references},
+        "best": None if best is None else best.text,
+        "rows": [row(search, chosen) for chosen in ranked(search)],
+    }
+
+
+def reference_facts(search, text):
+    """Return what is known of the reference of a quantity."""
+    reference = search.references[text]
+    last = last_index(search, search.horizon())
+    return {"error": float(reference.error[last]), "error_at_end": float(reference.error[-1]),
+            "order_at_end": float(reference.order[-1]), "differences": list(reference.differences),
+            "scale": reference.scale}
+
+
+def last_index(search, until):
+    """Return the index of the last time of observation until a time."""
+    return int(np.searchsorted(search.times, until * (1.0 + 1e-9), side="right")) - 1
+
+
+def ranked(search):
+    """Return all settings, those that finished by their CPU time first."""
+    def rank(chosen):
+        run = search.observations[chosen]
+        return (run.outcome != FINISHED, run.cost.cpu if isfinite(run.cost.cpu) else 0.0)
+    return sorted(search.settings(), key=rank)
+
+
+def row(search, chosen):
+    """Return the facts of one setting."""
+    run, best = search.observations[chosen], search.best()
+    errors = {text: search.error_of(chosen, (text,)) for text in search.references}
+    return {"setting": dict(chosen.items), "text": chosen.text, "outcome": run.outcome,
+            "message": run.message, "error": search.error_of(chosen), "errors": errors,
+            "keeps": bool(search.horizon() > 0.0 and search.keeps(chosen)),
+            "best": chosen == best, "dominated": is_dominated(search, chosen),
+            "family": without_grid(chosen).text, **vars(run.cost)}
+
+
+def is_dominated(search, chosen):
+    """Return whether another setting has at most the error and the CPU time of this one."""
+    run = search.observations[chosen]
+    if run.outcome != FINISHED:
+        return True
+    error, cpu = search.error_of(chosen), run.cost.cpu
+    others = [s for s in search.settings() if s != chosen
+              and search.observations[s].outcome == FINISHED]
+    return any(search.error_of(s) <= error and search.observations[s].cost.cpu < cpu
+               for s in others)
+
+
+# in words
+
+def answer_lines(facts):
+    """Return the answer as lines of text: the front, the advice, and what is not known."""
+    return [*front_lines(facts), "", *reference_lines(facts), *advice_lines(facts)]
+
+
+def front_lines(facts):
+    """Return the table of the settings on the front, and how many others there are."""
+    lines = [f"{'setting':44} {'error':>9} {'CPU [s]':>9} {'particles':>9} {'steps':>7}"]
+    shown = [one for one in facts["rows"] if not one["dominated"] and one["error"] is not None]
+    for one in shown:
+        mark = "  <- recommended" if one["best"] else ""
+        lines.append(f"{one['text']:44} {percent(one['error']):>9} {one['cpu']:9.3g} "
+                     f"{one['particles']:9d} {one['steps']:7d}{mark}")
+    outcomes = [one["outcome"] for one in facts["rows"]]
+    counts = ", ".join(f"{outcomes.count(word)} {word}" for word in dict.fromkeys(outcomes))
+    return [*lines, f"({len(shown)} settings on the front; of {len(outcomes)} settings {counts})"]
+
+
+def reference_lines(facts):
+    """Return how far the solution is known."""
+    if len(facts["grids"]) < 2:
+        return ["fewer than two grids finished: nothing is known of the solution"]
+    grids = ", ".join(f"{dx:.3g}" for dx in facts["grids"])
+    lines = [f"reference: grids of dx = {grids} m, extrapolated"]
+    for text in facts["quantities"]:
+        reference = facts["references"][text]
+        between = ", ".join(percent(value) for value in reference["differences"])
+        lines.append(f"  {text}: known to {percent(reference['error'])} until t = "
+                     f"{facts['until']:.4g} s; differences of grids over the whole run: {between}")
+    if facts["chaos"] is not None and isfinite(facts["chaos"]):
+        lines.append(f"  from t = {facts['chaos']:.4g} s on a run perturbed by round-off diverges: "
+                     "single paths have no meaning there; ask for profile:x or energies")
+    return lines
+
+
+def advice_lines(facts):
+    """Return the recommendation, or what it would take."""
+    if facts["best"] is None:
+        return [f"no setting keeps {percent(facts['error'])}: {shortfall(facts)}"]
+    best = next(one for one in facts["rows"] if one["best"])
+    margin = max(facts["references"][text]["error"] for text in facts["quantities"])
+    lines = [f"recommended: {best['text']}: error {percent(best['error'])} (the reference's own: "
+             f"{percent(margin)}), {best['cpu']:.3g} s of CPU time"]
+    if facts["until"] < facts["end"] * (1.0 - 1e-9):
+        lines.append(f"this holds until t = {facts['until']:.4g} s of {facts['end']:.4g} s; for "
+                     f"the whole run: {shortfall(facts)}")
+    return lines
+
+
+def shortfall(facts):
+    """Return what it would take to know the quantities for the whole run."""
+    if len(facts["grids"]) < 2:
+        return "at least two grids must finish; give a larger --budget"
+    texts = []
+    for text in facts["quantities"]:
+        reference = facts["references"][text]
+        error, order = reference["error_at_end"], reference["order_at_end"]
+        if error is None or not isfinite(error):
+            texts.append(f"the grids do not approach one solution of {text} yet (order "
+                         f"{order:.2g}); a larger --budget halves the grid further")
+        elif error > HALF * facts["error"]:
+            halvings = max(1, int(np.ceil(log2(error / (HALF * facts["error"])) / order)))
+            finest = facts["grids"][-1] / 2**halvings
+            texts.append(f"{text} is known to {percent(error)}; a reference of "
+                         f"{percent(HALF * facts['error'])} would take dx = {finest:.3g} m")
+    return "; ".join(texts) or "chaos ends what can be known"
+
+
+def percent(value):
+    """Return a relative error as text."""
+    return "unknown" if value is None or not isfinite(value) else f"{100.0 * value:.3g} %"
+
+
+def best_scene(search, name):
+    """Return the TOML text of the scene under the recommended setting, with comments on its error
+    and cost; None without one.
+    """
+    best = search.best()
+    if best is None:
+        return None
+    run, error = search.observations[best], search.error_of(best)
+    quantities = ", ".join(search.quantities)
+    head = [
+        f"# {name}, with the setting that `mpm-ref trade` recommends: {best.text}",
+        f"# Error asked: {percent(search.error)} of {quantities}, until t = "
+        f"{search.horizon():.4g} s.",
+        f"# Expected error: {percent(error)}; the reference's own: "
+        f"{percent(search.reference_error())}.",
+        f"# Cost: {run.cost.cpu:.3g} s of CPU time, {run.cost.steps} steps, "
+        f"{run.cost.particles} particles.",
+    ]
+    return "\n".join([*head, "", dumps(scene_at(search.scene, best))])

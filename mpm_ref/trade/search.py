@@ -1,0 +1,264 @@
+"""Search the settings of a scene for the cheapest one that keeps an error, within a budget.
+
+1. The scene's own setting runs on halved grids until their reference is known to half the error
+   asked for the whole run, stops improving, or the next grid does not fit into the budget.
+2. Each single knob walks over the grids: coarser as long as it keeps the error, else finer as long
+   as it can still be cheaper than the best so far.
+3. Pairs of the knobs that beat the scene's own setting walk likewise.
+
+A setting that fails has its outcome recorded, and its walk ends.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..scene import SceneError
+from ..sweep.difference import largest_change, relative_difference, running_maximum
+from ..sweep.observation import FINISHED
+from ..sweep.quantity import OutputQuantity
+from ..sweep.runs import RunRequest
+from ..sweep.setting import Setting, scene_at, setting
+from .candidates import neighbouring_grid, pairs, single_knobs
+from .reference import reference_horizon, reference_of
+
+COARSEST, FINEST = 4.0, 1.0 / 64.0      # factors of dx on halved grids
+AT_START = (4.0, 2.0, 1.0, 0.5)
+REFERENCE_SHARE = 0.7       # of the time left that the next grid of the reference may take
+HALF = 0.5                  # of the error asked: as much may be the reference's own
+DIVERGED = 0.01             # of the error asked, by which a perturbed run shows chaos
+CHEAPER = 0.5               # a setting is tried if it is expected to cost less than best / this
+HOPELESS = 3.0              # times the best cost, after which a candidate's run is stopped
+BEST_SINGLES = 4            # whose pairs are tried
+PERTURBED = "perturbed"     # label of the perturbed run
+ALTERNATIVE = {"mls": "apic", "apic": "mls", "flip": "apic", "pic": "apic"}
+
+
+@dataclass
+class TradeSearch:
+    """All runs of a search, and the references of each quantity."""
+
+    scene: object
+    runs: object                        # `sweep.runs.SceneRuns`
+    quantities: tuple                   # of texts, for which the error is asked
+    times: np.ndarray                   # (T,) [s]
+    error: float
+    observations: dict = field(default_factory=dict)    # Setting: RunObservation
+    references: dict = field(default_factory=dict)      # text: QuantityReference
+    levels: tuple = ()                  # factors of dx of the reference
+    chaos: float = np.inf               # [s] from which a perturbed run diverges
+
+    def run(self):
+        """Make all runs."""
+        self.start()
+        self.refine()
+        self.compare_families()
+        self.walk(single_knobs(self.scene))
+        self.walk(self.promising_pairs())
+
+    # the reference
+
+    def start(self):
+        """Run the first grids, and the scene with perturbed positions."""
+        perturbed = {PERTURBED: RunRequest(self.scene, seed=1)}
+        self.observe([setting(dx=factor) for factor in AT_START], perturbed)
+        self.update_references()
+
+    def refine(self):
+        """Halve the grid until the reference is known, stops improving, or the budget says so."""
+        while self.levels and self.horizon() < self.times[-1]:
+            factor, before = self.levels[-1] / 2.0, self.horizon()
+            expected = self.expected_cpu(setting(dx=factor))
+            if factor < FINEST or expected > REFERENCE_SHARE * self.runs.left:
+                break
+            n = len(self.levels)
+            self.observe([setting(dx=factor)], most_cpu=np.inf)
+            self.update_references()
+            if len(self.levels) == n or (before > 0.0 and self.horizon() <= before):
+                break
+
+    def update_references(self):
+        """Compute the references from the finest unbroken sequence of halved grids."""
+        factors, factor = [], COARSEST
+        while factor >= FINEST:
+            run = self.observations.get(setting(dx=factor))
+            if run is not None and run.finished:
+                factors.append(factor)
+            elif factors and run is not None:
+                break
+            factor /= 2.0
+        self.levels = tuple(factors)
+        if len(factors) >= 2:
+            texts = self.observations[setting(dx=factors[-1])].values
+            self.references = {text: reference_of(
+                [self.observations[setting(dx=f)].values[text] for f in factors])
+                for text in texts}
+        self.chaos = self.time_of_divergence()
+
+    def time_of_divergence(self):
+        """Return the time [s] at which the perturbed run leaves the scene's; infinite if never."""
+        a = self.observations.get(setting(dx=1.0))
+        b = self.observations.get(PERTURBED)
+        if not (a and b and a.finished and b.finished):
+            return np.inf
+        for text in self.quantities:
+            q, p = a.values[text], b.values[text]
+            difference = running_maximum(relative_difference(p, q, largest_change(q)))
+            if (difference > DIVERGED * self.error).any():
+                return float(self.times[np.argmax(difference > DIVERGED * self.error)])
+        return np.inf
+
+    def compare_families(self):
+        """Raise the references' errors where another transfer approaches another solution.
+
+        It runs on the second finest grid; the error that it would have on the finest one, at the
+        observed order, is a second estimate of how far the reference is from the solution.
+        """
+        other = ALTERNATIVE[self.scene.step_scheme.transfer]
+        if len(self.levels) < 3 or self.scene.scheme.degree == 1:
+            return
+        chosen = setting(dx=self.levels[-2], transfer=other)
+        self.observe([chosen], most_cpu=np.inf)
+        run = self.observations[chosen]
+        for text, reference in self.references.items():
+            if run.finished:
+                shrunk = reference.error_of(run.values[text]) / 2.0**np.clip(reference.order, 0, 2)
+                self.references[text] = reference.raised(shrunk)
+
+    def horizon(self):
+        """Return the time [s] until which all quantities asked for are known to half the error."""
+        if not self.references:
+            return 0.0
+        until = min(reference_horizon(self.references[text], self.times, HALF * self.error)
+                    for text in self.quantities)
+        before_chaos = self.times[self.times < self.chaos]
+        return min(until, float(before_chaos[-1]) if len(before_chaos) else 0.0)
+
+    # errors and costs of settings
+
+    def error_of(self, chosen, texts=None):
+        """Return the largest error of a setting until the horizon, of the quantities asked for (or
+        those given); infinite where it did not finish.
+        """
+        run = self.observations.get(chosen)
+        if run is None or not run.finished or not self.references:
+            return np.inf
+        last = int(np.searchsorted(self.times, self.horizon() * (1.0 + 1e-9), side="right")) - 1
+        return max(self._error_at(run, text, last) for text in texts or self.quantities)
+
+    def _error_at(self, run, text, last):
+        reference = self.references[text]
+        if OutputQuantity(text).at_end:
+            difference = relative_difference(run.values[text], reference.values, reference.scale)
+            return float(difference[last])
+        return float(reference.error_of(run.values[text])[last])
+
+    def reference_error(self):
+        """Return the largest error of the references until the horizon."""
+        last = int(np.searchsorted(self.times, self.horizon() * (1.0 + 1e-9), side="right")) - 1
+        return max(float(self.references[text].error[last]) for text in self.quantities)
+
+    def keeps(self, chosen):
+        """Return whether a setting keeps the error asked, that of the reference included."""
+        return self.error_of(chosen) + self.reference_error() <= self.error
+
+    def best(self):
+        """Return the cheapest setting that keeps the error, or None."""
+        if not self.references or self.horizon() <= 0.0:
+            return None
+        good = [s for s in self.settings() if self.keeps(s)]
+        return min(good, key=lambda s: self.observations[s].cost.cpu, default=None)
+
+    def settings(self):
+        """Return all settings with an observation."""
+        return [label for label in self.observations if isinstance(label, Setting)]
+
+    def expected_cpu(self, chosen):
+        """Return the CPU time [s] expected of a setting: that of the same knobs on the nearest
+        grid, or of the scene's own, times (dx ratio)^-(d + 1).
+        """
+        knobs = without_grid(chosen)
+        family = [s for s in self.settings() if without_grid(s) == knobs and self._cost(s)]
+        base = [s for s in self.settings() if not without_grid(s).items and self._cost(s)]
+        ratio, pool = (1.0, family) if family else (guessed_ratio(self.scene, knobs), base)
+        if not pool:
+            return 0.0
+        dx = chosen.get("dx", 1.0)
+        nearest = min(pool, key=lambda s: abs(np.log(s.get("dx", 1.0) / dx)))
+        power = self.scene.dim + 1
+        return ratio * self._cost(nearest) * (nearest.get("dx", 1.0) / dx) ** power
+
+    def _cost(self, chosen):
+        run = self.observations[chosen]
+        return run.cost.cpu if run.outcome == FINISHED else 0.0
+
+    # walks over the grids
+
+    def walk(self, families):
+        """Let settings without a grid walk to the coarsest grid on which they keep the error."""
+        start = self.best()
+        if start is None:
+            return
+        places = {family: start.get("dx", 1.0) for family in families}
+        while places:
+            batch = {family: family | setting(dx=factor) for family, factor in places.items()
+                     if self.worth_trying(family | setting(dx=factor))}
+            self.observe(sorted(batch.values(), key=self.expected_cpu))
+            places = {family: factor for family, chosen in batch.items()
+                      if (factor := self.next_grid(chosen)) is not None}
+
+    def worth_trying(self, chosen):
+        """Return whether a setting may still be cheaper than the best one."""
+        best = self._cost(self.best())
+        return chosen in self.observations or CHEAPER * self.expected_cpu(chosen) < best
+
+    def next_grid(self, chosen):
+        """Return the factor of dx to which the walk of a setting goes on, or None at its end."""
+        run, dx = self.observations[chosen], chosen.get("dx")
+        if not run.finished:
+            return None
+        coarser = self.keeps(chosen)
+        factor = neighbouring_grid(dx, 1 if coarser else -1)
+        if factor is None or (without_grid(chosen) | setting(dx=factor)) in self.observations:
+            return None
+        return factor
+
+    def promising_pairs(self):
+        """Return the pairs of the single knobs that keep the error cheapest."""
+        best = {}
+        for chosen in self.settings():
+            knobs = without_grid(chosen)
+            if len(knobs.items) == 1 and self.best() is not None and self.keeps(chosen):
+                best[knobs] = min(best.get(knobs, np.inf), self._cost(chosen))
+        return pairs(sorted(best, key=best.get)[:BEST_SINGLES])
+
+    def observe(self, settings, others=None, most_cpu=None):
+        """Observe settings that were not observed yet, and other requests by their labels.
+
+        most_cpu: CPU time [s] that each may take; usually `HOPELESS` times that of the best one.
+        """
+        if most_cpu is None:
+            best = self.best()
+            most_cpu = np.inf if best is None else HOPELESS * self._cost(best)
+        requests = {s: RunRequest(self._scene_at(s), most_cpu=most_cpu) for s in settings
+                    if s not in self.observations}
+        self.observations |= self.runs.observe((others or {}) | requests)
+
+    def _scene_at(self, chosen):
+        try:
+            return scene_at(self.scene, chosen)
+        except SceneError as fault:
+            return fault
+
+
+def without_grid(chosen):
+    """Return a setting without its grid."""
+    return Setting(tuple(item for item in chosen.items if item[0] != "dx"))
+
+
+def guessed_ratio(scene, knobs):
+    """Return the expected ratio of a setting's cost to that of the scene on the same grid."""
+    ratio = knobs.get("particles", 1.0) ** scene.dim
+    if knobs.get("cfl") and scene.dt is None and knobs.get("integrator") in (None, "explicit"):
+        ratio *= (scene.cfl or 0.5) / knobs.get("cfl")
+    return ratio
