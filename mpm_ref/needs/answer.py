@@ -86,9 +86,8 @@ def scene_lines(result):
     if errors.perturbation:
         lines.append(f"a perturbation by 1e-10 cells changes {changed_text(errors.perturbation)}")
     if errors.grid:
-        word = "half" if errors.grid_factor < 1.0 else "twice"
         note = f" ({errors.message})" if errors.message else ""
-        lines.append(f"{word} the grid spacing changes {changed_text(errors.grid)}{note}")
+        lines.append(f"{grid_text(errors)} instead of dx changes {changed_text(errors.grid)}{note}")
     return lines
 
 
@@ -122,7 +121,12 @@ def grid_note(run, result):
     below = errors.grid and all(run.changes[text] < errors.grid[text] for text in run.changes)
     if not below:
         return ""
-    return f", less than {'half' if errors.grid_factor < 1.0 else 'twice'} the grid spacing does"
+    return f"; {grid_text(errors)} instead of dx changes more"
+
+
+def grid_text(errors):
+    """Return the other grid spacing as text."""
+    return "dx/2" if errors.grid_factor < 1.0 else "2 dx"
 
 
 def saving_text(share):
