@@ -9,6 +9,7 @@ from .. import __version__
 from ..scene.toml import FILES, digest, dumps
 from ..store.manifest import code
 from ..sweep.observation import FINISHED
+from .code_parts import table_lines
 from .ingredients import lists_and_tables
 from .removal import (
     COSTLY,
@@ -19,8 +20,6 @@ from .removal import (
     UNMEASURED,
     saving,
 )
-
-LEAST_SAVING = 0.02     # of the CPU time: less is within the noise of a measurement
 
 
 @dataclass(frozen=True)
@@ -36,11 +35,10 @@ class NeedsAnswer:
     @property
     def lines(self):
         """Return the answer as lines of text."""
-        result, given = self.result, self.code["as given"]
+        result = self.result
         return [*scene_lines(result), "",
                 *(removal_line(run, self) for run in result.singles), "",
-                *lean_lines(self), "", "what the code uses, of the scene as given, "
-                + given.lines[0], *given.lines[1:], *lean_code_lines(self.code)]
+                *lean_lines(self), "", *table_lines(self.code)]
 
     @property
     def facts(self):
@@ -54,7 +52,7 @@ class NeedsAnswer:
             **code(),
             "error": self.error,
             "quantities": list(result.base.values),
-            "given": asdict(result.base.cost) | {"cpu": result.cpu},
+            "given": asdict(result.base.cost) | {"cpu": result.cpu, "noise": result.noise},
             "errors": asdict(result.errors),
             "removals": [run_facts(run, result) | {"text": removal_line(run, self),
                                                    "output": run.label in outputs}
@@ -82,7 +80,7 @@ def scene_lines(result):
     """Return lines on the scene as given: its cost and its errors."""
     scene, cost, errors = result.first.scene, result.base.cost, result.errors
     lines = [f"{scene.title or 'scene'}: {cost.particles} particles, {cost.steps} steps, "
-             f"{result.cpu:.3g} s of CPU time"]
+             f"{result.cpu:.3g} s of CPU time (equal runs differ by {percent(result.noise)})"]
     if errors.perturbation:
         lines.append(f"a perturbation by 1e-10 cells changes {changed_text(errors.perturbation)}")
     if errors.grid:
@@ -105,7 +103,7 @@ def verdict_text(run, answer):
         return f"required (changes {changed_text(run.changes)}{grid_note(run, answer.result)})"
     if run.verdict == NOT_REQUIRED:
         return (f"not required at {error} ({changed_text(run.changes)}), "
-                f"{saving_text(saving(run, cpu))}")
+                f"{saving_text(saving(run, cpu), answer.result.noise)}")
     if run.verdict == COSTLY and run.outcome == FINISHED:
         return (f"not required at {error} ({changed_text(run.changes)}), but without it a run "
                 f"takes {percent(-saving(run, cpu))} more CPU time")
@@ -129,20 +127,22 @@ def grid_text(errors):
     return "dx/2" if errors.grid_factor < 1.0 else "2 dx"
 
 
-def saving_text(share):
-    """Return a saving of CPU time in words."""
-    return f"saves {percent(share)} of CPU time" if share >= LEAST_SAVING else "saves no CPU time"
+def saving_text(share, noise):
+    """Return a saving of CPU time in words; one within the noise of times is none."""
+    return f"saves {percent(share)} of CPU time" if share > noise else "saves no CPU time"
 
 
 def lean_lines(answer):
     """Return lines on the lean scene and what led to it."""
     result = answer.result
     if not result.order:
-        lines = ["lean scene: nothing can be removed"]
+        lines = ["lean scene: the scene as given, nothing "
+                 + ("can be removed" if result.complete else "was removed within the budget")]
     else:
         last = result.order[-1]
         lines = [f"lean scene, {answer.name}.lean.toml: changes {changed_text(last.changes)}, "
-                 f"{last.cpu:.3g} s of CPU time ({saving_text(saving(last, result.cpu))})"]
+                 f"{last.cpu:.3g} s of CPU time "
+                 f"({saving_text(saving(last, result.cpu), result.noise)})"]
         lines += [f"  without {step}" for step in order_lines(result)]
     if not result.complete:
         lines.append(f"the budget ended first: about {result.missing_cpu:.3g} s of CPU time more "
@@ -154,14 +154,6 @@ def order_lines(result):
     """Return a line for each step of the order: removals, change so far, CPU time."""
     return [f"{run.label} ({changed_text(run.changes)} so far, {run.cpu:.3g} s)"
             for run in result.order]
-
-
-def lean_code_lines(parts):
-    """Return what the code uses of the lean scene, if that is another one."""
-    if "lean" not in parts:
-        return []
-    lean = parts["lean"].lines
-    return ["", f"of the lean scene, {lean[0]}", *lean[1:]]
 
 
 def run_facts(run, result):

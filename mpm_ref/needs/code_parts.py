@@ -62,26 +62,39 @@ class CodeParts:
                        for name, size in fields.items()} for body, fields in self.arrays.items()}
 
     @property
-    def lines(self):
-        """Return the table as lines of text."""
-        rows = [f"in the first {self.steps} steps:"]
-        for body, fields in self.numbers.items():
-            carried = [f"{name} {count}" for name, count in fields.items() if count]
-            absent = [f"{name} 0" for name, count in fields.items() if not count]
-            rows.append(f"doubles per particle of {body}: {', '.join([*carried, *absent])}, "
-                        f"in all {sum(fields.values())}; SVD: {self.svd[body]}")
-        entered = [stage for stage, names in self.stages.items() if names]
-        skipped = [stage for stage, names in self.stages.items() if not names]
-        rows.append(f"stages entered: {', '.join(entered)}")
-        rows.append(f"not entered: {', '.join(skipped)}")
-        rows.append(f"kernels called from Python: {len(self.kernels)}; PyTorch: "
-                    f"{'loaded' if self.torch else 'not loaded'}")
-        return rows
-
-    @property
     def facts(self):
         """Return the parts as plain values."""
         return vars(self) | {"doubles_per_particle": self.numbers, "stages": self.stages}
+
+
+def table_lines(parts):
+    """Return a table of {name of a scene: `CodeParts`}, a column for each, as lines of text."""
+    columns = list(parts.values())
+    rows = [("in the first steps", [str(column.steps) for column in columns])]
+    for bodies in alike_bodies(columns[0]):
+        rows.append((f"doubles per particle of {', '.join(bodies)}", []))
+        fields = columns[0].numbers[bodies[0]]
+        counts = [column.numbers.get(bodies[0], {}) for column in columns]
+        rows += [(f"  {name}", [str(count.get(name, 0)) for count in counts]) for name in fields]
+        rows.append(("  together", [str(sum(count.values())) for count in counts]))
+        rows.append(("  SVD for its stress", [c.svd.get(bodies[0], "-") for c in columns]))
+    rows.append(("kernels that a stage calls", []))
+    rows += [(f"  {stage}", [str(len(column.stages[stage])) for column in columns])
+             for stage in STAGES]
+    rows.append(("  all, with those outside of steps", [str(len(c.kernels)) for c in columns]))
+    rows.append(("PyTorch", ["loaded" if c.torch else "not loaded" for c in columns]))
+    width = max(len(label) for label, _ in rows)
+    head = "  ".join([f"{'what the code uses':{width}}", *(f"{name:>12}" for name in parts)])
+    return [head, *("  ".join([f"{label:{width}}", *(f"{value:>12}" for value in values)]).rstrip()
+                    for label, values in rows)]
+
+
+def alike_bodies(parts):
+    """Return lists of bodies with the same numbers of doubles and the same SVD."""
+    groups = {}
+    for body, numbers in parts.numbers.items():
+        groups.setdefault((tuple(numbers.items()), parts.svd[body]), []).append(body)
+    return list(groups.values())
 
 
 def code_parts(scene, folder=None):

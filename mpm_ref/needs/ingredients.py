@@ -220,6 +220,8 @@ def part_removals(scene):
             yield Removal(f"{word} {part.name}", item_edit(key, k))
             if getattr(part, "friction", 0.0):
                 yield Removal(f"friction of {word} {part.name}", item_edit(key, k, "friction"))
+            if getattr(part, "kind", "") == "separate":
+                yield Removal(f"separation from {word} {part.name}", kind_edit(key, k), "slip")
             if part.motion.translation is not None or part.motion.rotation is not None:
                 yield Removal(f"motion of {word} {part.name}", rest_edit(key, k))
     if scene.walls is not None:
@@ -233,6 +235,11 @@ def part_removals(scene):
 def item_edit(key, k, inner=None):
     """Return the edit that takes item k of a list away, or a key of that item."""
     return lambda tables: tables[key].pop(k) if inner is None else tables[key][k].pop(inner)
+
+
+def kind_edit(key, k):
+    """Return the edit to a part that matter slides along and does not leave."""
+    return lambda tables: tables[key][k].update(kind="slip")
 
 
 def rest_edit(key, k):

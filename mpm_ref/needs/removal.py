@@ -21,14 +21,14 @@ from .variant import changes
 REQUIRED, NOT_REQUIRED, COSTLY = "required", "not required", "costly"
 IMPOSSIBLE, UNMEASURED = "impossible", "not measured"
 NOTHING = 1e-9          # a change that is round-off
-DEAREST = 1.05          # of the CPU time before a removal: more is no saving
+NOISE = 0.05            # of CPU times, at least: less is no saving
 MOST_CPU = 2.0          # of the base run, after which a run is stopped
 LEAST_CPU = 1.0         # [s] that a run may take in any case
 FINE, COARSE = 0.5, 2.0         # factors of dx, one of which shows the grid's error
-FINE_SHARE = 0.4        # of the time left that the run on the fine grid may take
+FINE_SHARE = 0.25        # of the time left that the run on the fine grid may take
 GRID_POWER = 1          # of the time step: cost grows as dx^-(dim + 1)
 SHORT = 5.0             # [s] of CPU time: a run so short is made twice, for the less of its times
-SEED = 1                # of the perturbation of second runs
+SEEDS = 1, 2            # of the perturbations of second and third runs
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,8 @@ class NeedsResult:
 
     first: object           # `SceneVariant` as given
     base: object            # `RunObservation`
-    cpu: float              # [s] of the scene as given: the less of two runs
+    cpu: float              # [s] of the scene as given: the least of its runs
+    noise: float            # of CPU times: how far those runs differ, relative
     errors: SceneErrors
     singles: tuple          # of `RemovalRun`: each removal alone
     order: tuple            # of `RemovalRun`: removals one after the other, the last is the lean
@@ -78,7 +79,8 @@ class RemovalStudy:
 
     def __init__(self, runs, first, error):
         self.runs, self.first, self.error = runs, first, error
-        self.base, self.cpu, self.missing_cpu = None, inf, 0.0
+        self.base, self.missing_cpu = None, 0.0
+        self.cpu, self.noise = inf, NOISE
 
     def result(self):
         """Return the `NeedsResult`; None, with the observation in `base`, if the scene as given
@@ -87,14 +89,21 @@ class RemovalStudy:
         self.base = self.observe({"as given": self.first})["as given"]
         if self.base.outcome != FINISHED:
             return None
-        perturbed = self.observe({"perturbed": self.first}, seed=SEED)["perturbed"]
-        self.cpu = float(np.nanmin((self.base.cost.cpu, perturbed.cost.cpu)))
-        singles = self.measured(self.first, self.first.offers.values(), self.cpu)
+        perturbed = self.measure_cpu()
         errors = self.scene_errors(self.change_of(perturbed))
+        singles = self.measured(self.first, self.first.offers.values(), self.cpu)
         order, lean, complete = self.reduced(singles)
         complete &= all(run.verdict != UNMEASURED for run in singles)
-        return NeedsResult(self.first, self.base, self.cpu, errors, tuple(singles), tuple(order),
-                           lean, complete, self.missing_cpu)
+        return NeedsResult(self.first, self.base, self.cpu, self.noise, errors, tuple(singles),
+                           tuple(order), lean, complete, self.missing_cpu)
+
+    def measure_cpu(self):
+        """Set CPU time and noise from perturbed runs of the scene as given; return the first."""
+        seeds = SEEDS if self.base.cost.cpu < SHORT else SEEDS[:1]
+        runs = [self.observe({"perturbed": self.first}, seed=seed)["perturbed"] for seed in seeds]
+        times = [run.cost.cpu for run in (self.base, *runs) if run.outcome == FINISHED]
+        self.cpu, self.noise = min(times), max(max(times) / min(times) - 1.0, NOISE)
+        return runs[0]
 
     def observe(self, variants, most_cpu=inf, seed=None):
         """Return {label: observation} of {label: `SceneVariant` or SceneError}."""
@@ -116,7 +125,7 @@ class RemovalStudy:
             return runs
         again = {run.label: variants[run.label] for run in runs
                  if run.outcome == FINISHED and run.verdict != REQUIRED}
-        second = self.observe(again, most, SEED)
+        second = self.observe(again, most, SEEDS[0])
         return [self.with_less_cpu(run, second.get(run.label), cpu) for run in runs]
 
     def with_less_cpu(self, run, second, cpu):
@@ -124,7 +133,8 @@ class RemovalStudy:
         if second is None or second.outcome != FINISHED:
             return run
         least = min(run.cpu, second.cost.cpu)
-        return replace(run, cpu=least, verdict=COSTLY if least > DEAREST * cpu else NOT_REQUIRED)
+        is_costly = least > (1.0 + self.noise) * cpu
+        return replace(run, cpu=least, verdict=COSTLY if is_costly else NOT_REQUIRED)
 
     def judged(self, label, variant, observation, cpu):
         """Return the `RemovalRun` of an observation; cpu is the time before the removal [s]."""
@@ -136,7 +146,7 @@ class RemovalStudy:
                   in changes(self.base, observation, variant, self.first).items()}
         largest = max(change.values())
         verdict = REQUIRED if not largest <= self.error else NOT_REQUIRED
-        if verdict == NOT_REQUIRED and cost > DEAREST * cpu:
+        if verdict == NOT_REQUIRED and cost > (1.0 + self.noise) * cpu:
             verdict = COSTLY
         return RemovalRun(label, verdict, change, cost, outcome)
 

@@ -95,8 +95,6 @@ def alike(part, other, axis, same):
     return not np.atleast_2d(getattr(shift, key))[:, axis].any()
 
 
-# bodies: (side of each, 1 above, -1 below, 0 across), or None without symmetry
-
 def body_sides(scene, bodies, axis, c):
     """Return the side of each body, 1 above the plane, -1 below or 0 across; None where the plane
     mirrors no particles, or a body across has no shape that can be cut.
@@ -106,7 +104,8 @@ def body_sides(scene, bodies, axis, c):
     if any(side == 0 and record.shape is None for side, record in zip(sides, scene.body)):
         return None
     for k, body in enumerate(bodies):
-        partners = [k] if sides[k] == 0 else [j for j, side in enumerate(sides) if side == -sides[k]]
+        partners = [k] if sides[k] == 0 else [
+            j for j, side in enumerate(sides) if side == -sides[k]]
         if not any(scene.body[j].material == scene.body[k].material
                    and is_image(body.particles, bodies[j].particles, scene.dx, (axis, c))
                    for j in partners):

@@ -4,7 +4,7 @@ A quantity is compared as it is, with two exceptions: positions are those of the
 left, and energies of a symmetric half count twice.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -38,11 +38,11 @@ class SceneVariant:
         scene = removed(self.scene, removal)
         masks = [probe_mask(body, X, removal) for body, X in self.probes]
         left = [k for k, mask in enumerate(masks) if mask.any()]
-        return SceneVariant(
-            scene,
-            tuple((self.probes[k][0], self.probes[k][1][masks[k]]) for k in left),
-            tuple((self.rows[k][0], self.rows[k][1][masks[k]]) for k in left),
-            self.share * (1.0 if removal.plane is None else 0.5), (*self.removals, removal))
+        return replace(
+            self, scene=scene, removals=(*self.removals, removal),
+            probes=tuple((self.probes[k][0], self.probes[k][1][masks[k]]) for k in left),
+            rows=tuple((self.rows[k][0], self.rows[k][1][masks[k]]) for k in left),
+            share=self.share * (1.0 if removal.plane is None else 0.5))
 
 
 def first_variant(scene, probes):
