@@ -107,7 +107,7 @@ def verdicts(result):
 
 
 def test_verdicts():
-    result, _ = result_of({"a": 0.5, "b": 0.01, "c": 0.001, "d": 0.001, "weak": 0.0, "vital": 0.0,
+    result, _ = result_of({"a": 0.5, "b": 0.009, "c": 0.001, "d": 0.001, "weak": 0.0, "vital": 0.0,
                            "slow": 0.0, "broken": 0.0}, {"c": 0.5, "d": 1.5})
     assert verdicts(result) == {
         "a": REQUIRED, "b": NOT_REQUIRED, "c": NOT_REQUIRED, "d": COSTLY, "weak": REQUIRED,
