@@ -62,7 +62,7 @@ material = { law = "fluid", lam = 1e4 }
 
 [[collider]]
 name = "floor"
-shape = { type = "half_space", point = [0.0, 0.1], normal = [0.1, 1.0] }
+shape = { type = "half_space", point = [0.0, 0.1], normal = [-0.1, 1.0] }
 
 [[collider]]
 name = "roof"
