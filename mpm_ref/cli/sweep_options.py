@@ -12,7 +12,8 @@ import typer
 from .. import scene
 from ..executor import open_executor
 from ..scene.validate import validate_scene
-from ..sweep.observation import ObservedRun
+from ..sweep.conditions import record_impulses
+from ..sweep.observation import ObservedRun, RunObserver
 from ..sweep.probes import choose_probes
 from ..sweep.quantity import DEFAULT, OutputQuantity
 from ..sweep.runs import SceneRuns
@@ -110,11 +111,15 @@ def load_sweep(name):
 def observed_of(record, path, quantities):
     """Return the `ObservedRun` of a scene: its quantities, times, and probes of its particles.
 
-    Raises SceneError for a scene that cannot be built.
+    Raises SceneError for a scene that cannot be built, ValueError for a quantity that does not fit
+    it.
     """
-    probes = choose_probes(scene.build(record, str(path)).bodies)
+    problem, recorder = record_impulses(scene.build(record, str(path)), record)
+    probes = tuple((p.body, p.X) for p in choose_probes(problem.bodies))
     times = tuple(np.linspace(0.0, record.end, TIMES).tolist())
-    return ObservedRun("", "", tuple(quantities), times, tuple((p.body, p.X) for p in probes))
+    observed = ObservedRun("", "", tuple(quantities), times, probes)
+    RunObserver(problem, observed, recorder).start()
+    return observed
 
 
 @contextmanager

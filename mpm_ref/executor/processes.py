@@ -1,33 +1,17 @@
 """Perform tasks in this process, or in several new processes of this machine.
 
-A worker process has a pipe of its own, so that a killed one costs the task that it performed and no
-other: `concurrent.futures` and `multiprocessing.Pool` give up all tasks under way, or hang.
+A killed worker process costs the task that it performed and no other: `concurrent.futures` gives up
+all tasks under way then, and `multiprocessing.Pool` waits for ever.
 """
 
-import multiprocessing
-import os
-import signal
 import threading
-import time
 from collections import Counter, deque
-from contextlib import contextmanager, suppress
 from functools import partial
 from multiprocessing.connection import wait
+from queue import SimpleQueue
 
-from .tasks import (
-    ATTEMPTS,
-    TaskOutcome,
-    pack_job,
-    pack_tasks,
-    perform,
-    perform_packed,
-    set_stop_source,
-    unpack,
-)
-
-READY = b"ready"
-GRACE = 30.0        # [s] that a task has to stop, and to end after SIGTERM, before it is killed
-THREADS = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+from .tasks import ATTEMPTS, TaskOutcome, pack_job, pack_tasks, perform, unpack
+from .worker import CONTEXT, READY, WorkerProcess, end_all, shared_stop
 
 
 class SameProcess:
@@ -64,9 +48,9 @@ class LocalProcesses:
     dashboard = None
 
     def __init__(self, workers, setup=None):
-        self.workers, self._setup, self._members = workers, setup, []
-        self._context = multiprocessing.get_context("spawn")
-        self._stop, self._failed_starts = None, 0
+        self.workers, self._setup = workers, setup
+        self._members, self._stop, self._dispatcher = [], None, None
+        self._failed_starts = 0
 
     def run(self, function, tasks):
         """Yield the `TaskOutcome` of function(task) for each task, as they end.
@@ -79,86 +63,105 @@ class LocalProcesses:
         return self._outcomes(_Batch(pack_job(function, self._setup), pack_tasks(tasks)))
 
     def _outcomes(self, batch):
+        remaining = len(batch.tasks)
         try:
-            self._start(min(self.workers, batch.remaining))
-            while batch.remaining:
-                self._assign(batch)
-                for member in self._members_with_news():
-                    outcome = self._outcome(member, batch)
-                    if outcome is not None:
-                        self._assign(batch)
-                        batch.remaining -= 1
-                        yield outcome
+            self._begin(batch)
+            while remaining:
+                outcome = batch.ended.get()
+                if isinstance(outcome, BaseException):
+                    raise outcome
+                remaining -= 1
+                yield outcome
         finally:
-            if batch.remaining:
+            if remaining:
                 self.close()
 
-    def _assign(self, batch):
-        """Send pending tasks to idle members."""
-        for member in self._members:
-            if batch.pending and member.is_idle:
-                member.send(*batch.take())
+    def _begin(self, batch):
+        """Start processes as needed, and the thread that sends them the tasks of a batch."""
+        if self._dispatcher is not None:
+            self._dispatcher.join()
+        if self._stop is None:
+            self._stop, self._failed_starts = shared_stop(), 0
+            self._woken, self._wake = CONTEXT.Pipe(duplex=False)
+        while len(self._members) < min(self.workers, len(batch.tasks)):
+            self._members.append(WorkerProcess(self._stop))
+        self._dispatcher = threading.Thread(target=self._dispatch, args=(batch,), daemon=True)
+        self._dispatcher.start()
 
-    def _members_with_news(self):
-        """Wait, and return the members whose processes sent something or ended."""
-        news = set(wait([handle for member in self._members for handle in member.handles]))
-        return [member for member in self._members if news.intersection(member.handles)]
+    def _dispatch(self, batch):
+        """Send tasks and receive outcomes until the batch ends or `close` wakes this thread."""
+        try:
+            while batch.is_under_way:
+                for member in self._members:
+                    if batch.pending and member.is_idle:
+                        member.send(*batch.take())
+                handles = [handle for member in self._members for handle in member.handles]
+                news = set(wait([*handles, self._woken]))
+                if self._woken in news:
+                    return
+                for member in list(self._members):
+                    if news.intersection(member.handles):
+                        self._attend(member, batch)
+        except BaseException as error:
+            batch.ended.put(error)
 
-    def _outcome(self, member, batch):
-        """Return the `TaskOutcome` of a member with news, or None if no task came to its end."""
+    def _attend(self, member, batch):
+        """Take the message of a member with news, or put a new one in its place if it died."""
         message = member.receive()
         if message == READY and not member.is_ready:
             member.is_ready, self._failed_starts = True, 0
-            return None
+            return
         index, member.index = member.index, None
         if message is not None:
-            return unpack(index, message)
-        end = self._replace(member)
-        if index is None or batch.puts_back(index):
-            return None
-        return TaskOutcome(index, error=f"its worker process {end} {ATTEMPTS} times, for want of "
-                           "memory perhaps: try fewer workers")
+            batch.end(unpack(index, message))
+            return
+        reason = self._replace(member)
+        if index is not None and not batch.puts_back(index):
+            batch.end(TaskOutcome(index, error=f"its worker process {reason} {ATTEMPTS} times, for "
+                                  "want of memory perhaps: try fewer workers"))
 
     def _replace(self, member):
         """Put a new process in the place of one that ended, and return how that ended."""
-        end = member.end_text()
+        reason = member.end_text()
         self._failed_starts += not member.is_ready
         if self._failed_starts >= ATTEMPTS:
-            raise RuntimeError(f"no worker process starts, the last one {end}: a script that opens "
-                               'an executor needs `if __name__ == "__main__":` around its commands')
-        self._members[self._members.index(member)] = _Member(self._context, self._stop)
-        return end
-
-    def _start(self, count):
-        """Start processes until there are `count` of them."""
-        if self._stop is None:
-            self._stop = self._context.RawValue("b", 0)     # no lock, which a killed process keeps
-        while len(self._members) < count:
-            self._members.append(_Member(self._context, self._stop))
+            raise RuntimeError(
+                f"no worker process starts, the last one {reason}: a script that opens an executor "
+                'needs `if __name__ == "__main__":` around its commands')
+        self._members[self._members.index(member)] = WorkerProcess(self._stop)
+        return reason
 
     def close(self):
-        """End all processes: tasks under way are asked to stop, and killed after GRACE."""
+        """End all processes: tasks under way are asked to stop, and killed if they do not."""
+        if self._stop is None:
+            return
+        self._stop.value, self._stop = 1, None
+        self._wake.send_bytes(b"")
+        if self._dispatcher is not None:
+            self._dispatcher.join()
+        for end in (self._wake, self._woken):
+            end.close()
         members, self._members = self._members, []
-        if self._stop is not None:
-            self._stop.value = 1
-            self._stop = None
-        for member in members:
-            member.connection.close()
-        try:
-            for act in (None, "terminate", "kill"):
-                _end(members, act)
-        except BaseException:           # the second Ctrl-C
-            _end(members, "kill")
-            raise
+        end_all(members)
 
 
 class _Batch:
-    """A job, its tasks, and the numbers of those that no process has, with their attempts."""
+    """A job, its tasks, those that no process has, their attempts, and a queue of outcomes."""
 
     def __init__(self, job, tasks):
         self.job, self.tasks = job, tasks
-        self.pending, self.remaining = deque(range(len(tasks))), len(tasks)
-        self.attempts = Counter()
+        self.pending, self.attempts = deque(range(len(tasks))), Counter()
+        self.ended, self._remaining = SimpleQueue(), len(tasks)
+
+    @property
+    def is_under_way(self):
+        """Whether tasks have not ended."""
+        return self._remaining > 0
+
+    def end(self, outcome):
+        """Pass on the outcome of a task."""
+        self._remaining -= 1
+        self.ended.put(outcome)
 
     def take(self):
         """Return the index, the job and the task that come next."""
@@ -172,84 +175,3 @@ class _Batch:
             return False
         self.pending.append(index)
         return True
-
-
-def _end(members, act):
-    """Call a method of the processes that are alive, and wait for all at most GRACE."""
-    latest = time.monotonic() + GRACE
-    for member in members:
-        if act is not None and member.process.is_alive():
-            getattr(member.process, act)()
-    for member in members:
-        member.process.join(max(latest - time.monotonic(), 0.0))
-
-
-class _Member:
-    """A worker process, the pipe to it, and the index of the task that it performs or None."""
-
-    def __init__(self, context, stop):
-        self.connection, other_end = context.Pipe()
-        self.process = context.Process(target=serve, args=(other_end, stop))
-        with ignored_interrupts():
-            self.process.start()
-        other_end.close()
-        self.handles = (self.connection, self.process.sentinel)
-        self.is_ready, self.index = False, None
-
-    @property
-    def is_idle(self):
-        """Whether the process waits for a task."""
-        return self.is_ready and self.index is None
-
-    def send(self, index, job, task):
-        """Send a task. The death of the process is noticed later, by `receive`."""
-        self.index = index
-        with suppress(OSError):
-            self.connection.send_bytes(job)
-            self.connection.send_bytes(task)
-
-    def receive(self):
-        """Return the bytes that the process sent, or None if it died."""
-        with suppress(EOFError, OSError):
-            if self.connection.poll():
-                return self.connection.recv_bytes()
-        return None
-
-    def end_text(self):
-        """Wait for the end of the process, and return the cause in words."""
-        self.connection.close()
-        self.process.join()
-        code = self.process.exitcode
-        if code < 0:
-            return f"was killed ({signal.Signals(-code).name})"
-        return f"ended with exit code {code}"
-
-
-@contextmanager
-def ignored_interrupts():
-    """Keep processes that start in this block from receiving Ctrl-C before they are set up."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
-def serve(connection, stop):
-    """Perform tasks from a connection until its other end closes, in a process of its own."""
-    def end_with_parent():
-        wait([multiprocessing.parent_process().sentinel])
-        os._exit(1)         # at any moment: files are complete at any
-
-    os.setpgrp()            # Ctrl-C of the terminal goes to the parent alone
-    os.environ.update(THREADS)      # libraries that are loaded later read them
-    set_stop_source(lambda: stop.value)
-    threading.Thread(target=end_with_parent, daemon=True).start()
-    with suppress(EOFError, OSError):       # the parent closed the pipe
-        connection.send_bytes(READY)
-        while True:
-            job, task = connection.recv_bytes(), connection.recv_bytes()
-            connection.send_bytes(perform_packed(job, task))

@@ -9,6 +9,7 @@ import numpy as np
 from ..scene import SceneError
 from ..scene.toml import digest
 from .observation import REFUSED, STOPPED, ObservedRun, RunCost, RunObservation, observe
+from .store import key_of
 
 CRASHED = "crashed"     # outcome of a run whose process was killed, or failed otherwise
 
@@ -50,17 +51,20 @@ class SceneRuns:
     def observe(self, requests):
         """Return {label: `RunObservation`} of {label: `RunRequest`}, in that order.
 
-        Stored runs are not made again. One whose turn comes after the budget is stopped.
+        Stored runs are not made again, nor equal ones twice. One whose turn comes after the budget
+        is stopped.
         """
-        observations, runs = {}, {}
+        observations, runs, keys = {}, {}, {}
         for label, request in requests.items():
             run = self._run_of(request)
             stored = run if isinstance(run, RunObservation) else self._store.get(run)
             if stored is None:
-                runs[label] = run
+                keys[label] = key_of(run)
+                runs.setdefault(keys[label], (label, run))
             else:
                 observations[label] = stored
-        self._make(runs, observations)
+        new = self._make(dict(runs.values()))
+        observations |= {label: new[runs[key][0]] for label, key in keys.items()}
         return {label: observations[label] for label in requests}
 
     def _run_of(self, request):
@@ -77,8 +81,8 @@ class SceneRuns:
         return self._observed._replace(scene=text, digest=name, most_cpu=most,
                                       seed=request.seed, probes=probes)
 
-    def _make(self, runs, observations):
-        labels = list(runs)
+    def _make(self, runs):
+        labels, observations = list(runs), {}
         tasks = [Deadlined(runs[label], time.time() + self.left) for label in labels]
         for outcome in self._executor.run(observe_in_time, tasks):
             label = labels[outcome.index]
@@ -86,12 +90,13 @@ class SceneRuns:
             if outcome.error is not None:
                 observation = RunObservation(blank_values(runs[label]), RunCost(), CRASHED,
                                              outcome.error)
-            elif observation.cost.steps:
+            elif observation.outcome != STOPPED or observation.cost.steps:
                 self._store.put(runs[label], observation)
             self.count += 1
             observations[label] = observation
             if self.on_run is not None:
                 self.on_run(label, observation)
+        return observations
 
 
 @dataclass(frozen=True)

@@ -83,11 +83,11 @@ def packed(observation):
 def read(path):
     """Return the observation in a file, or None where it is absent or damaged."""
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as file:
             facts = json.loads(str(file["facts"]))
             values = {name.removeprefix("value "): file[name] for name in file.files
                       if name != "facts"}
         cost = RunCost(**facts.pop("cost"))
         return RunObservation(values, cost, **facts)
-    except (OSError, ValueError, KeyError, TypeError, BadZipFile):
+    except (OSError, EOFError, ValueError, KeyError, TypeError, BadZipFile):
         return None

@@ -118,9 +118,20 @@ def advice_lines(facts):
     lines = [f"recommended: {best['text']}: error {percent(best['error'])} (the reference's own: "
              f"{percent(margin)}), {best['cpu']:.3g} s of CPU time"]
     if facts["until"] < facts["end"] * (1.0 - 1e-9):
+        lines += companion_lines(facts)
         lines.append(f"this holds until t = {facts['until']:.4g} s of {facts['end']:.4g} s; for "
                      f"the whole run: {shortfall(facts)}")
     return lines
+
+
+def companion_lines(facts):
+    """Return how well other quantities are known over the whole run, where single paths are not."""
+    others = {text: reference["error_at_end"] for text, reference in facts["references"].items()
+              if text not in facts["quantities"] and reference["error_at_end"] is not None}
+    if not others:
+        return []
+    texts = ", ".join(f"{text} to {percent(error)}" for text, error in others.items())
+    return [f"over the whole run these are known: {texts}; ask for one of them by --quantity"]
 
 
 def shortfall(facts):

@@ -26,7 +26,8 @@ COARSEST, FINEST = 4.0, 1.0 / 64.0      # factors of dx on halved grids
 AT_START = (4.0, 2.0, 1.0, 0.5)
 REFERENCE_SHARE = 0.7       # of the time left that the next grid of the reference may take
 HALF = 0.5                  # of the error asked: as much may be the reference's own
-DIVERGED = 0.01             # of the error asked, by which a perturbed run shows chaos
+DIVERGED = 0.5      # of the error asked, by which a perturbed run shows chaos: that it has another
+                    # number of steps makes a small difference
 CHEAPER = 0.5               # a setting is tried if it is expected to cost less than best / this
 HOPELESS = 3.0              # times the best cost, after which a candidate's run is stopped
 BEST_SINGLES = 4            # whose pairs are tried

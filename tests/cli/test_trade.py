@@ -1,0 +1,77 @@
+import json
+
+import pytest
+from command_line import assert_told, mpm_ref
+from sweep_scenes import FLIGHT
+
+from mpm_ref.cli.sweep_options import parse_budget, parse_error
+from mpm_ref.scene import load
+
+FAST = "--budget", "60s", "--workers", "1", "--quiet"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with a scene, after `mpm-ref trade` on it."""
+    folder = tmp_path_factory.mktemp("trade")
+    (folder / "flight.toml").write_text(FLIGHT)
+    done = mpm_ref("trade", folder / "flight.toml", "--error", "4%", "--out", folder, *FAST)
+    assert done.exit_code == 0, done.stderr
+    (folder / "stdout").write_text(done.stdout)
+    return folder
+
+
+def test_it_writes_an_answer_a_page_and_a_scene(folder):
+    facts = json.loads((folder / "flight.trade.json").read_text())
+    assert facts["scene"] == "flight"
+    assert facts["error"] == 0.04
+    assert facts["best"] in (folder / "stdout").read_text()
+    assert "<svg" in (folder / "flight.trade.html").read_text()
+    assert load(folder / "flight.best.toml").dim == 2
+    assert mpm_ref("run", folder / "flight.best.toml", "--out", folder / "best.h5",
+                   "--steps", "2", "--quiet").exit_code == 0
+
+
+def test_a_second_call_makes_no_run_again(folder):
+    stored = {file: file.stat().st_mtime_ns for file in (folder / "flight.trade").iterdir()}
+    done = mpm_ref("trade", folder / "flight.toml", "--error", "4%", "--out", folder, "--json",
+                   *FAST)
+    assert json.loads(done.stdout)["best"] is not None
+    again = {file: file.stat().st_mtime_ns for file in (folder / "flight.trade").iterdir()}
+    assert {file: again[file] for file in stored} == stored
+
+
+def test_without_a_budget_there_is_no_answer(folder, tmp_path):
+    done = mpm_ref("trade", folder / "flight.toml", "--error", "0.0001%", "--out", tmp_path,
+                   "--budget", "1s", "--workers", "1", "--quiet")
+    assert done.exit_code == 1
+    assert "no setting keeps" in done.stdout
+    assert not (tmp_path / "flight.best.toml").exists()
+
+
+@pytest.mark.parametrize(("option", "value", "word"), [
+    ("--error", "fast", "--error fast"), ("--error", "0%", "share between 0 and 1"),
+    ("--error", "200%", "share between 0 and 1"), ("--budget", "soon", "--budget soon"),
+    ("--budget", "nan", "--budget nan"), ("--workers", "0", "--workers 0"),
+    ("--quantity", "beauty", "beauty"), ("--quantity", "impulse:floor", "no collider"),
+    ("--scheduler", "somewhere", "somewhere")])
+def test_bad_options_get_one_sentence(folder, tmp_path, option, value, word):
+    done = mpm_ref("trade", folder / "flight.toml", option, value, "--out", tmp_path, "--quiet")
+    assert_told(done, 2, word)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_scene_without_an_end_is_refused(tmp_path):
+    (tmp_path / "endless.toml").write_text(FLIGHT.replace("end = 0.2", "steps = 20"))
+    assert_told(mpm_ref("trade", tmp_path / "endless.toml", "--out", tmp_path), 2, "without dt")
+
+
+@pytest.mark.parametrize(("text", "value"), [("1%", 0.01), ("0.5 %", 0.005), ("0.02", 0.02)])
+def test_errors_are_shares_or_percent(text, value):
+    assert parse_error(text) == pytest.approx(value)
+
+
+@pytest.mark.parametrize(("text", "value"), [("90s", 90), ("20min", 1200), ("2h", 7200),
+                                             ("30", 30)])
+def test_budgets_have_units(text, value):
+    assert parse_budget(text) == value

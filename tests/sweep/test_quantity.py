@@ -1,0 +1,78 @@
+import numpy as np
+import pytest
+from sweep_scenes import BOUNCE, observed_run, scene_of
+
+from mpm_ref.energy import energy
+from mpm_ref.scene import build
+from mpm_ref.sweep.observation import observe
+from mpm_ref.sweep.quantity import OutputQuantity, Snapshot
+
+
+@pytest.fixture
+def snapshot():
+    problem = build(scene_of(BOUNCE))
+    x = problem.bodies[0].particles.x
+    probes = {"block": x[:7]}
+    return Snapshot(problem, problem.bodies, probes, probes, {"floor": np.array([1.0, 2.0])})
+
+
+def value(text, snapshot):
+    return OutputQuantity(text).sample(snapshot)
+
+
+def test_shapes_and_values(snapshot):
+    problem, x = snapshot.problem, snapshot.bodies[0].particles.x
+    now = energy(snapshot.bodies, problem.gravity, problem.inertia)
+    assert value("positions", snapshot) == pytest.approx(x[:7].ravel())
+    assert value("centroid", snapshot) == pytest.approx([0.4, 0.5])
+    assert value("path:0.3,0.4", snapshot).shape == (2,)
+    assert value("kinetic", snapshot) == pytest.approx([now.kinetic])
+    assert value("energy", snapshot) == pytest.approx([now.sum])
+    assert value("impulse:floor", snapshot) == pytest.approx([1.0, 2.0])
+
+
+def test_fronts_are_the_faces_of_a_box(snapshot):
+    faces = [value(f"front:{side}", snapshot)[0] for side in ("x-", "x+", "y-", "y+")]
+    assert faces == pytest.approx([0.2, 0.6, 0.3, 0.7])
+
+
+def test_profile_of_a_box_is_uniform(snapshot):
+    from mpm_ref.sweep.quantity import QUANTILES
+    assert value("profile:x", snapshot) == pytest.approx(0.2 + 0.4 * QUANTILES)
+
+
+def test_means_in_a_box(snapshot):
+    assert value("mean:J:0,0,1,1", snapshot) == pytest.approx([1.0])
+    assert value("mean:speed:0,0,1,1", snapshot) == pytest.approx([np.hypot(0.5, 1.0)])
+    assert np.isnan(value("mean:J:5,5,6,6", snapshot)).all()
+
+
+def test_pressure_is_minus_the_mean_stress(snapshot):
+    q = snapshot.bodies[0].particles
+    q.tau[:] = -7.0 * np.eye(2)
+    assert value("mean:pressure:0,0,1,1", snapshot) == pytest.approx([7.0])
+
+
+@pytest.mark.parametrize("text", [
+    "", "speed", "positions@middle", "front:x", "front:q+", "profile:z", "path:1", "path:a,b",
+    "region:5,5,6,6", "impulse:ceiling", "mean:T:0,0,1,1", "mean:J:0,0", "positions:sphere",
+    "kinetic:block:block", "centroid:a:b:c"])
+def test_bad_texts_get_one_sentence(snapshot, text):
+    with pytest.raises(ValueError, match="expected") as error:
+        value(text, snapshot)
+    assert "\n" not in str(error.value)
+
+
+def test_impulse_of_the_floor_is_the_change_of_momentum():
+    scene = scene_of(BOUNCE)
+    run = observe(observed_run(scene, ("impulse:floor", "centroid"), n=3))
+    problem = build(scene)
+    m = problem.bodies[0].particles.m.sum()
+    from mpm_ref.energy import momentum
+    from mpm_ref.simulate import simulate
+    start = momentum(problem.bodies).copy()
+    for _ in simulate(problem):
+        pass
+    change = momentum(problem.bodies) - start - m * np.array([0.0, -9.8]) * 0.3
+    assert change[1] > 100.0
+    assert run.values["impulse:floor"][-1] == pytest.approx(change, rel=1e-9, abs=1e-9)

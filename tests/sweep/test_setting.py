@@ -1,0 +1,95 @@
+import numpy as np
+import pytest
+from sweep_scenes import BOUNCE, FLIGHT, scene_of
+
+from mpm_ref.scene import SceneError, build, digest, loads
+from mpm_ref.sweep.setting import in_seconds, scene_at, setting
+
+
+def particles(scene):
+    return len(build(scene).bodies[0].id)
+
+
+def test_the_empty_setting_is_the_scene():
+    scene = scene_of(BOUNCE)
+    assert digest(scene_at(scene, setting())) == digest(scene)
+
+
+def test_a_finer_grid_has_as_many_points_per_cell():
+    scene = scene_of(BOUNCE)
+    fine = scene_at(scene, setting(dx=0.5))
+    assert fine.dx == 0.05
+    assert particles(fine) == 4 * particles(scene)
+
+
+@pytest.mark.parametrize(("sampling", "share"), [
+    ('{ type = "lattice", counts = [6, 6] }', 4), ('{ type = "lattice", spacing = 0.1 }', 4),
+    ('{ type = "poisson", count = 40 }', 4)])
+def test_other_samplings_follow_the_grid(sampling, share):
+    scene = loads(BOUNCE.replace("velocity", f"sampling = {sampling}\nvelocity"))
+    assert particles(scene_at(scene, setting(dx=0.5))) == pytest.approx(share * particles(scene))
+    assert particles(scene_at(scene, setting(particles=2.0))) == pytest.approx(
+        share * particles(scene))
+
+
+def test_knobs_change_what_they_name():
+    scene = scene_of(BOUNCE)
+    assert scene_at(scene, setting(cfl=0.9)).cfl == 0.9
+    assert scene_at(scene, setting(degree=3)).scheme.degree == 3
+    assert scene_at(scene, setting(transfer="flip 0.95")).step_scheme.flip == 0.95
+    assert scene_at(scene, setting(transfer="apic rpic 0.5")).step_scheme.rpic == 0.5
+    assert scene_at(scene, setting(sampling="poisson")).body[0].sampling.per_cell == 2
+    assert particles(scene_at(scene, setting(particles=1.5))) == particles(scene) * 9 // 4
+    implicit = scene_at(scene, setting(integrator="hot-plus"))
+    assert (implicit.integrator, implicit.step_scheme.transfer) == ("hot-plus", "apic")
+
+
+def test_an_implicit_scene_becomes_explicit():
+    scene = loads('integrator = "hot"\nlongest = 0.01\nsolver = { eps = 1e-5 }' + FLIGHT)
+    explicit = scene_at(scene, setting(integrator="explicit", cfl=0.5))
+    assert (explicit.integrator, explicit.solver, explicit.longest) == ("explicit", None, None)
+
+
+def test_steps_become_seconds():
+    scene = loads(FLIGHT.replace("end = 0.2", "dt = 0.001\nsteps = 200\nevery = 10"))
+    tables = in_seconds(scene)
+    assert tables["end"] == pytest.approx(0.2)
+    assert tables["interval"] == pytest.approx(0.01)
+    with pytest.raises(SceneError, match="without dt"):
+        in_seconds(loads(FLIGHT.replace("end = 0.2", "steps = 200")))
+
+
+def test_a_fixed_dt_follows_the_grid_and_ends_with_cfl():
+    scene = loads("dt = 0.001" + FLIGHT)
+    assert scene_at(scene, setting(dx=0.5)).dt == 0.0005
+    assert scene_at(scene, setting(cfl=0.5)).dt is None
+
+
+def test_walls_stay_in_place():
+    scene = loads(FLIGHT + "\n[walls]\nlow = [3, 3]\nhigh = [19, 'open']\n")
+    fine, coarse = scene_at(scene, setting(dx=0.5)), scene_at(scene, setting(dx=2.0))
+    place = [((w.low[0] - 1) * s.dx, (w.high[0] + 1) * s.dx)
+             for s in (scene, fine, coarse) for w in [s.walls]]
+    assert place[1] == pytest.approx(place[0])
+    assert place[2] == pytest.approx(place[0])
+    assert fine.walls.high[1] == "open"
+    with pytest.raises(SceneError, match="between two nodes"):
+        scene_at(scene, setting(dx=3.0))
+
+
+def test_bad_settings_get_one_sentence():
+    with pytest.raises(ValueError, match="knob 'speed'"):
+        setting(speed=1)
+    with pytest.raises(SceneError, match="degree"):
+        scene_at(scene_of(BOUNCE), setting(degree=4))
+    with pytest.raises(SceneError, match="integrator"):
+        scene_at(scene_of(BOUNCE), setting(integrator="euler"))
+
+
+def test_settings_are_values():
+    a = setting(cfl=0.9) | setting(dx=0.5)
+    assert a == setting(dx=0.5, cfl=0.9)
+    assert len({a, setting(cfl=0.9, dx=0.5)}) == 1
+    assert a.get("dx") == 0.5
+    assert a.text == "dx x 0.5, cfl 0.9"
+    assert np.isnan(a.get("particles", np.nan))

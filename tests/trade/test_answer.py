@@ -1,0 +1,87 @@
+import json
+import re
+
+import pytest
+from model_runs import ModelRuns, search_of
+
+from mpm_ref.cli.trade import as_plain
+from mpm_ref.scene import loads
+from mpm_ref.trade.answer import answer_lines, answer_of, best_scene
+from mpm_ref.trade.page import page_of
+
+
+def facts_of(runs=None, error=0.01):
+    search = search_of(runs or ModelRuns(), error)
+    search.run()
+    return search, as_plain(answer_of(search, "toy"))
+
+
+def test_rows_hold_all_settings_and_the_recommended_one():
+    search, facts = facts_of()
+    assert len(facts["rows"]) == len(search.settings())
+    best, = (row for row in facts["rows"] if row["best"])
+    assert best["text"] == facts["best"] == search.best().text
+    assert best["keeps"]
+    assert facts["until"] == facts["end"] == 1.0
+
+
+def test_front_is_what_no_other_setting_dominates():
+    _, facts = facts_of()
+    rows = [row for row in facts["rows"] if row["outcome"] == "finished"]
+    for row in rows:
+        better = [one for one in rows if one["error"] <= row["error"] and one["cpu"] < row["cpu"]]
+        assert row["dominated"] == bool(better)
+    assert any(not row["dominated"] for row in rows)
+
+
+def test_words_name_the_setting_its_error_and_cost():
+    search, facts = facts_of()
+    text = "\n".join(answer_lines(facts))
+    assert f"recommended: {search.best().text}: error " in text
+    assert "known to" in text
+    assert "until t = 1 s" in text
+
+
+def test_without_an_answer_words_say_what_it_would_take():
+    _, facts = facts_of(ModelRuns(order=0.2))
+    text = "\n".join(answer_lines(facts))
+    assert facts["best"] is None
+    assert "no setting keeps 1 %" in text
+    assert "do not approach one solution" in text
+    _, facts = facts_of(ModelRuns(left=20.0), error=1e-3)
+    text = "\n".join(answer_lines(facts))
+    assert re.search(r"a reference of 0\.05 % would take dx = \S+ m", text)
+
+
+def test_the_grid_that_it_would_take_is_the_one_that_suffices():
+    _, facts = facts_of(ModelRuns(left=20.0), error=6e-3)
+    dx = float(re.search(r"would take dx = (\S+) m", "\n".join(answer_lines(facts)))[1])
+    search = search_of(ModelRuns(), 6e-3)
+    search.run()
+    assert dx == pytest.approx(search.scene.dx * search.levels[-1], rel=2e-3)
+
+
+def test_the_best_scene_can_be_run_and_says_its_error():
+    search, _ = facts_of()
+    text = best_scene(search, "toy")
+    scene = loads(text)
+    assert scene.dx == pytest.approx(0.1 * search.best().get("dx"))
+    assert "Expected error" in text
+    assert "# Cost: " in text
+    search.error = 1e-9
+    assert best_scene(search, "toy") is None
+
+
+def test_the_page_holds_the_facts_and_loads_nothing():
+    _, facts = facts_of()
+    facts["rows"][0]["message"] = "</script><script>alert(1)</script>"
+    page = page_of(facts)
+    stored = re.search(r'<script type="application/json" id="facts">(.*?)</script>', page, re.S)[1]
+    assert json.loads(stored) == facts
+    assert page.count("</script>") == 2
+    assert not re.search(r'(src|href)\s*=|@import|url\(|fetch\(|https?://(?!www\.w3\.org)', page)
+
+
+def test_facts_are_plain_and_finite():
+    _, facts = facts_of(ModelRuns(order=0.2))
+    json.dumps(facts, allow_nan=False)

@@ -1,0 +1,75 @@
+import numpy as np
+import pytest
+
+from mpm_ref.trade.reference import reference_horizon, reference_of
+
+T = np.linspace(0.0, 1.0, 11)
+EXACT = np.stack((np.sin(T), T**2), axis=1)
+
+
+def levels(order, n=4, size=0.1):
+    """Values on n halved grids with an error of a given order that grows in time."""
+    pattern = np.stack((T, -(T**2)), axis=1)
+    return [EXACT + size * 2.0 ** (-order * k) * pattern for k in range(n)]
+
+
+@pytest.mark.parametrize("order", [0.8, 1.0, 1.7, 2.0])
+def test_order_is_observed_and_the_error_vanishes(order):
+    reference = reference_of(levels(order))
+    assert reference.order[1:] == pytest.approx(order)
+    assert reference.values == pytest.approx(EXACT, abs=1e-12)
+
+
+def test_error_estimate_bounds_the_error_of_the_finest_grid():
+    runs = levels(1.0)
+    reference = reference_of(runs)
+    finest = np.sqrt(np.mean((runs[-1] - EXACT) ** 2, axis=1)) / reference.scale
+    assert (reference.error >= finest).all()
+    assert reference.error[-1] == pytest.approx(1.25 * finest[-1], rel=1e-6)
+
+
+def test_an_order_above_two_is_not_believed():
+    runs = levels(4.0)
+    reference = reference_of(runs)
+    assert reference.order[-1] == pytest.approx(4.0)
+    assert reference.error[-1] == pytest.approx(1.25 / 3.0 * reference.differences[-1])
+
+
+@pytest.mark.parametrize("order", [0.3, 0.1, -0.5])
+def test_nothing_is_claimed_without_convergence(order):
+    reference = reference_of(levels(order))
+    assert np.isinf(reference.error[1:]).all()
+    assert reference_horizon(reference, T, 0.01) == 0.0
+
+
+def test_two_grids_have_no_order():
+    assert np.isinf(reference_of(levels(1.0, n=2)).error[1:]).all()
+
+
+def test_equal_runs_are_exact():
+    reference = reference_of([EXACT, EXACT, EXACT])
+    assert reference.error.max() < 1e-11
+    assert reference_horizon(reference, T, 0.01) == 1.0
+
+
+def test_the_horizon_is_the_last_time_before_the_error_is_exceeded():
+    reference = reference_of(levels(1.0))
+    k = 6
+    assert reference_horizon(reference, T, reference.error[k]) == T[k]
+    assert reference_horizon(reference, T, 1e9) == T[-1]
+
+
+def test_a_run_that_stopped_has_an_infinite_error_from_there():
+    reference, values = reference_of(levels(1.0)), EXACT.copy()
+    values[5:] = np.nan
+    error = reference.error_of(values)
+    assert np.isfinite(error[:5]).all()
+    assert np.isinf(error[5:]).all()
+
+
+def test_another_estimate_can_only_raise_the_error():
+    reference = reference_of(levels(1.0))
+    raised = reference.raised(np.full(len(T), 0.5))
+    assert (raised.error >= reference.error).all()
+    assert raised.error[0] == 0.5
+    assert (reference.raised(np.zeros(len(T))).error == reference.error).all()
