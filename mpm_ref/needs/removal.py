@@ -18,6 +18,7 @@ from ..sweep.runs import RunRequest
 from ..sweep.setting import scene_at, setting
 from .variant import changes
 
+AS_GIVEN = "as given"
 REQUIRED, NOT_REQUIRED, COSTLY = "required", "not required", "costly"
 IMPOSSIBLE, UNMEASURED = "impossible", "not measured"
 NOTHING = 1e-9          # a change that is round-off
@@ -27,8 +28,8 @@ LEAST_CPU = 1.0         # [s] that a run may take in any case
 FINE, COARSE = 0.5, 2.0         # factors of dx, one of which shows the grid's error
 FINE_SHARE = 0.25        # of the time left that the run on the fine grid may take
 GRID_POWER = 1          # of the time step: cost grows as dx^-(dim + 1)
-SHORT = 5.0             # [s] of CPU time: a run so short is made twice, for the less of its times
-SEEDS = 1, 2            # of the perturbations of second and third runs
+SHORT = 2.0             # [s] of CPU time: runs so short are made three times
+SEEDS = 1, 2, 3         # of perturbations: of the scene as given, and of repeated runs
 
 
 @dataclass(frozen=True)
@@ -79,31 +80,35 @@ class RemovalStudy:
 
     def __init__(self, runs, first, error):
         self.runs, self.first, self.error = runs, first, error
-        self.base, self.missing_cpu = None, 0.0
-        self.cpu, self.noise = inf, NOISE
+        self.base, self.missing_cpu, self.times = None, 0.0, {AS_GIVEN: []}
+
+    @property
+    def cpu(self):
+        """Return the CPU time of the scene as given [s]: the least of its runs."""
+        return min(self.times[AS_GIVEN])
+
+    @property
+    def noise(self):
+        """Return the relative difference of CPU times of the scene as given, at least `NOISE`."""
+        return max(max(self.times[AS_GIVEN]) / self.cpu - 1.0, NOISE)
 
     def result(self):
         """Return the `NeedsResult`; None, with the observation in `base`, if the scene as given
         does not reach its end.
         """
-        self.base = self.observe({"as given": self.first})["as given"]
+        given = self.observe({AS_GIVEN: self.first})
+        self.base = given[AS_GIVEN]
         if self.base.outcome != FINISHED:
             return None
-        perturbed = self.measure_cpu()
-        errors = self.scene_errors(self.change_of(perturbed))
-        singles = self.measured(self.first, self.first.offers.values(), self.cpu)
+        perturbed = self.observe({AS_GIVEN: self.first}, seed=SEEDS[0])
+        self.note_times(given, self.times)
+        self.note_times(perturbed, self.times)
+        errors = self.scene_errors(self.change_of(perturbed[AS_GIVEN]))
+        singles = self.measured(attempts(self.first, self.first.offers))
         order, lean, complete = self.reduced(singles)
         complete &= all(run.verdict != UNMEASURED for run in singles)
         return NeedsResult(self.first, self.base, self.cpu, self.noise, errors, tuple(singles),
                            tuple(order), lean, complete, self.missing_cpu)
-
-    def measure_cpu(self):
-        """Set CPU time and noise from perturbed runs of the scene as given; return the first."""
-        seeds = SEEDS if self.base.cost.cpu < SHORT else SEEDS[:1]
-        runs = [self.observe({"perturbed": self.first}, seed=seed)["perturbed"] for seed in seeds]
-        times = [run.cost.cpu for run in (self.base, *runs) if run.outcome == FINISHED]
-        self.cpu, self.noise = min(times), max(max(times) / min(times) - 1.0, NOISE)
-        return runs[0]
 
     def observe(self, variants, most_cpu=inf, seed=None):
         """Return {label: observation} of {label: `SceneVariant` or SceneError}."""
@@ -114,41 +119,51 @@ class RemovalStudy:
                                          variant.probes if is_scene else None)
         return self.runs.observe(requests)
 
-    def measured(self, variant, removals, cpu):
-        """Return a `RemovalRun` for each removal from a variant, whose CPU time is given [s]."""
-        variants = {removal.label: attempt(variant, removal) for removal in removals}
+    def measured(self, variants, cpu=None):
+        """Return a `RemovalRun` for each of {label: `SceneVariant` or SceneError}.
+
+        cpu: CPU time before the removals [s]; that of the scene as given if None. Short runs are
+        made again and again, all in turn, since what else a machine does changes their times.
+        """
+        if not variants:
+            return []
         most = max(MOST_CPU * self.cpu, LEAST_CPU)
         observations = self.observe(variants, most)
-        runs = [self.judged(label, variants[label], observation, cpu)
+        runs = [self.judged(label, variants[label], observation)
                 for label, observation in observations.items()]
-        if self.cpu > SHORT:
-            return runs
-        again = {run.label: variants[run.label] for run in runs
-                 if run.outcome == FINISHED and run.verdict != REQUIRED}
-        second = self.observe(again, most, SEEDS[0])
-        return [self.with_less_cpu(run, second.get(run.label), cpu) for run in runs]
+        times = {run.label: [run.cpu] for run in runs}
+        if self.base.cost.cpu < SHORT:
+            again = {run.label: variants[run.label] for run in runs if run.verdict == NOT_REQUIRED}
+            for seed in SEEDS[1:]:
+                self.note_times(self.observe({AS_GIVEN: self.first}, seed=seed), self.times)
+                self.note_times(self.observe(again, most, seed), times)
+        before = self.cpu if cpu is None else cpu
+        return [self.costed(run, min(times[run.label]), before) for run in runs]
 
-    def with_less_cpu(self, run, second, cpu):
-        """Return a `RemovalRun` with the less of its CPU time and that of a second run, if any."""
-        if second is None or second.outcome != FINISHED:
-            return run
-        least = min(run.cpu, second.cost.cpu)
-        is_costly = least > (1.0 + self.noise) * cpu
-        return replace(run, cpu=least, verdict=COSTLY if is_costly else NOT_REQUIRED)
+    def note_times(self, observations, times):
+        """Add the CPU times of finished runs to lists in a dictionary."""
+        for label, observation in observations.items():
+            if observation.outcome == FINISHED:
+                times[label].append(observation.cost.cpu)
 
-    def judged(self, label, variant, observation, cpu):
-        """Return the `RemovalRun` of an observation; cpu is the time before the removal [s]."""
-        outcome, cost = observation.outcome, observation.cost.cpu
+    def judged(self, label, variant, observation):
+        """Return the `RemovalRun` of an observation, whatever its CPU time."""
+        outcome, cpu = observation.outcome, observation.cost.cpu
         if outcome != FINISHED:
             verdict = self.verdict_of_failure(observation)
-            return RemovalRun(label, verdict, {}, cost, outcome, observation.message)
+            return RemovalRun(label, verdict, {}, cpu, outcome, observation.message)
         change = {text: float(error[-1]) for text, error
                   in changes(self.base, observation, variant, self.first).items()}
-        largest = max(change.values())
-        verdict = REQUIRED if not largest <= self.error else NOT_REQUIRED
-        if verdict == NOT_REQUIRED and cost > (1.0 + self.noise) * cpu:
-            verdict = COSTLY
-        return RemovalRun(label, verdict, change, cost, outcome)
+        verdict = NOT_REQUIRED if max(change.values()) <= self.error else REQUIRED
+        return RemovalRun(label, verdict, change, cpu, outcome)
+
+    def costed(self, run, cpu, before):
+        """Return a `RemovalRun` with its CPU time [s], and the verdict that follows: without a part
+        that changes nothing a run cannot take longer.
+        """
+        is_costly = (run.verdict == NOT_REQUIRED and run.change > NOTHING
+                     and cpu > (1.0 + self.noise) * before)
+        return replace(run, cpu=cpu, verdict=COSTLY if is_costly else run.verdict)
 
     def verdict_of_failure(self, observation):
         """Return the verdict of a run that did not reach its end."""
@@ -204,7 +219,7 @@ class RemovalStudy:
             candidates = {label: removal for label, removal in variant.offers.items()
                           if label not in hopeless and not removal.is_output}
             runs = {run.label: run
-                    for run in self.measured(variant, candidates.values(), current)}
+                    for run in self.measured(attempts(variant, candidates), current)}
             hopeless |= {run.label for run in runs.values() if run.verdict != NOT_REQUIRED}
             if any(run.verdict == UNMEASURED for run in runs.values()):
                 return order, variant, False
@@ -229,11 +244,15 @@ class RemovalStudy:
         if not labels:
             return [], self.first, self.cpu
         together = " and ".join(labels)
-        observation = self.observe({together: variant})[together]
-        run = self.judged(together, variant, observation, inf)
+        run, = self.measured({together: variant}, inf)
         if run.verdict != NOT_REQUIRED or run.change > NOTHING:
             return [], self.first, self.cpu
         return [run], variant, run.cpu
+
+
+def attempts(variant, offers):
+    """Return {label: `SceneVariant` or SceneError} after each of {label: `Removal`}."""
+    return {label: attempt(variant, removal) for label, removal in offers.items()}
 
 
 def attempt(variant, removal):

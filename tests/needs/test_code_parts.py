@@ -1,5 +1,8 @@
 """The code uses no array, stage, kernel or library that a scene has no use for."""
 
+import json
+import subprocess
+
 import pytest
 from needs_toys import BLOCK, DROP, FLOOR, HEAD
 
@@ -164,14 +167,20 @@ def test_table_has_a_column_for_each_scene(drop, block):
 
 
 def test_stored_parts_are_read_unless_damaged(drop, tmp_path, monkeypatch):
-    scene = loads(DROP.partition("[[collider]]")[0])
-    assert code_parts(scene, tmp_path) == drop
+    calls, stdout = [], json.dumps(vars(drop)).encode()
+
+    def run(*arguments, **options):
+        calls.append(arguments)
+        return subprocess.CompletedProcess(arguments, 0, stdout)
+
+    monkeypatch.setattr(module.subprocess, "run", run)
+    scene = loads(DROP)
+    assert code_parts(scene, tmp_path) == code_parts(scene, tmp_path) == drop
+    assert len(calls) == 1
     file, = tmp_path.iterdir()
-    monkeypatch.setattr(module.subprocess, "run", None)
-    assert code_parts(scene, tmp_path) == drop
     file.write_text("{")
-    with pytest.raises(TypeError):
-        code_parts(scene, tmp_path)
+    assert code_parts(scene, tmp_path) == drop
+    assert len(calls) == 2
 
 
 def test_failure_of_the_process_is_one_sentence(monkeypatch):
