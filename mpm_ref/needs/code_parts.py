@@ -39,7 +39,7 @@ DOUBLE = 8          # bytes
 
 @dataclass(frozen=True)
 class CodeParts:
-    """What of the code the first steps of a scene used."""
+    """Parts of the code that the first steps of a scene used."""
 
     steps: int
     arrays: dict        # {body: {field: bytes}}, 0 where it is not carried

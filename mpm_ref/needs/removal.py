@@ -61,7 +61,7 @@ class SceneErrors:
 
 @dataclass(frozen=True)
 class NeedsResult:
-    """All that was measured of a scene."""
+    """Measurements of a scene: its errors, each removal alone, and the best order."""
 
     first: object           # `SceneVariant` as given
     base: object            # `RunObservation`
