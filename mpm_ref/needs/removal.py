@@ -28,7 +28,7 @@ LEAST_CPU = 1.0         # [s] that a run may take in any case
 FINE, COARSE = 0.5, 2.0         # factors of dx, one of which shows the grid's error
 FINE_SHARE = 0.25        # of the time left that the run on the fine grid may take
 GRID_POWER = 1          # of the time step: cost grows as dx^-(dim + 1)
-SHORT = 2.0             # [s] of CPU time: runs so short are made three times
+SHORT = 5.0             # [s] of CPU time: runs so short are made three times
 SEEDS = 1, 2, 3         # of perturbations: of the scene as given, and of repeated runs
 
 
