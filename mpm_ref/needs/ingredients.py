@@ -59,7 +59,6 @@ def named_scene(scene):
         for k, part in enumerate(tables.get(key, ())):
             if not part.get("name"):
                 part["name"] = unused_name(f"{key}{k}", used)
-                used.add(part["name"])
     return validate_scene(tables)
 
 

@@ -78,6 +78,9 @@ def test_parts_after_removal():
     assert without(EXTRAS, "collider press").collider == ()
     press, = without(EXTRAS, "motion of collider press").collider
     assert press.motion.translation is None
+    turned = EXTRAS.replace("motion = { translation", "motion = { angle = 10.0, translation")
+    press, = without(turned, "motion of collider press").collider
+    assert (press.motion.translation, press.motion.angle) == (None, 10.0)
     press, = without(EXTRAS, "separation from collider press (slip instead)").collider
     assert press.kind == "slip"
     assert without(EXTRAS, "frames every 0.002 s (a tenth instead)").interval == 0.02
