@@ -92,6 +92,7 @@ def test_pair_of_bodies_and_regions():
     ("radius = 0.2 }", "radius = 0.2 }\nvelocity = { linear = [0.1, 0.0] }"),
     ("radius = 0.2 }", "radius = 0.2 }\nvelocity = { angular = 1.0 }"),
     ("radius = 0.2 }", 'radius = 0.2 }\nsampling = { type = "poisson", count = 50 }'),
+    ("radius = 0.2 }", 'radius = 0.2 }\nsampling = { type = "jittered", amplitude = 0.1 }'),
 ])
 def test_broken_symmetry_is_noticed(old, new):
     assert old in DISK
