@@ -8,7 +8,10 @@ from .. import __version__
 from ..scene import dumps
 from ..sweep.observation import FINISHED
 from ..sweep.setting import scene_at
+from .reference import LEAST
 from .search import HALF, without_grid
+
+USEFUL = 0.1        # error to which a quantity is known that is worth a line
 
 
 def answer_of(search, name):
@@ -21,24 +24,26 @@ def answer_of(search, name):
         "scene": name, "version": __version__, "error": search.error, "end": search.times[-1],
         "quantities": list(search.quantities), "until": horizon, "chaos": search.chaos,
         "grids": [search.scene.dx * factor for factor in search.levels],
+        "cells": largest_extent(search.runs.probes) / search.scene.dx,
         "references": {text: reference_facts(search, text) for text in search.references},
         "best": None if best is None else best.text,
         "rows": [row(search, chosen) for chosen in ranked(search)],
     }
 
 
+def largest_extent(probes):
+    """Return the largest extent of a body along an axis at the start [m]; probes: of all bodies,
+    (name, positions (n, d)).
+    """
+    return max(float(np.ptp(np.asarray(X), axis=0).max()) for _, X in probes)
+
+
 def reference_facts(search, text):
     """Return what is known of the reference of a quantity."""
     reference = search.references[text]
-    last = last_index(search, search.horizon())
-    return {"error": float(reference.error[last]), "error_at_end": float(reference.error[-1]),
-            "order_at_end": float(reference.order[-1]), "differences": list(reference.differences),
-            "scale": reference.scale}
-
-
-def last_index(search, until):
-    """Return the index of the last time of observation until a time."""
-    return int(np.searchsorted(search.times, until * (1.0 + 1e-9), side="right")) - 1
+    return {"error": float(reference.error[search.last]),
+            "error_at_end": float(reference.error[-1]), "order_at_end": float(reference.order[-1]),
+            "differences": list(reference.differences), "scale": float(reference.scale[-1])}
 
 
 def ranked(search):
@@ -127,7 +132,8 @@ def advice_lines(facts):
 def companion_lines(facts):
     """Return how well other quantities are known over the whole run, where single paths are not."""
     others = {text: reference["error_at_end"] for text, reference in facts["references"].items()
-              if text not in facts["quantities"] and reference["error_at_end"] is not None}
+              if text not in facts["quantities"] and reference["error_at_end"] is not None
+              and reference["error_at_end"] <= USEFUL}
     if not others:
         return []
     texts = ", ".join(f"{text} to {percent(error)}" for text, error in others.items())
@@ -142,9 +148,10 @@ def shortfall(facts):
     for text in facts["quantities"]:
         reference = facts["references"][text]
         error, order = reference["error_at_end"], reference["order_at_end"]
-        if error is None or not isfinite(error):
+        if error is None or not isfinite(error) or order < LEAST:
             texts.append(f"the grids do not approach one solution of {text} yet (order "
-                         f"{order:.2g}); a larger --budget halves the grid further")
+                         f"{order:.2g}; it is known to {percent(error)}); a larger --budget halves "
+                         "the grid further")
         elif error > HALF * facts["error"]:
             halvings = max(1, int(np.ceil(log2(error / (HALF * facts["error"])) / order)))
             finest = facts["grids"][-1] / 2**halvings

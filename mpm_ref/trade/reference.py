@@ -1,10 +1,13 @@
 """A reference solution with an error estimate, from runs on grids halved again and again.
 
-Time step and particles follow the grid. Of three grids with differences E_1 (coarser pair) and E_2
-(finer pair), each the largest so far in the run, p = log2(E_1/E_2) is the observed order; the
-reference is the Richardson extrapolation q + (q - q_coarser)/(2^p - 1), and its error the grid
-convergence index 1.25 E_2/(2^p - 1) [Roache1994]. p is bounded above by 2; with p below 0.5 the
-runs do not converge, and nothing is claimed.
+Time step and particles follow the grid. Until each time t, E is the largest difference of two
+successive grids so far, and p = log2(E_coarse/E_fine) the observed order of the last three grids.
+The reference is the Richardson extrapolation q + (q - q_coarser)/(2^p - 1), and its error the grid
+convergence index F E/(2^p - 1) [Roache1994]: with F = 1.25 if the orders of the last four grids
+agree, else with F = 3 and p at most 1, without extrapolation. p is at most 2. Where p is below 0.5
+the runs show no convergence: the reference is that on the finest grid, and its error three times
+the larger of the two last differences [EcaHoekstra2014]. Errors are relative to the largest change
+of the quantity until t.
 """
 
 from dataclasses import dataclass, replace
@@ -12,30 +15,37 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..sweep.difference import largest_change, relative_difference, running_maximum
+from ..sweep.difference import change_so_far, difference_so_far, relative_difference
 
-SAFETY = 1.25           # of the grid convergence index for three grids
-LEAST, MOST = 0.5, 2.0  # orders that are believed
-NOTHING = 1e-12         # a difference that is round-off
+SAFE, CAUTIOUS = 1.25, 3.0      # factors of differences of grids
+LEAST, MOST = 0.5, 2.0          # orders that are believed
+AGREEMENT = 1.0                 # of two successive orders
+NOTHING = 1e-12                 # of the change: a difference that is round-off
 
 
 @dataclass(frozen=True)
 class QuantityReference:
-    """The reference of one quantity."""
+    """The reference of one quantity. Index k of an error stands for the run until time k."""
 
     values: np.ndarray      # (T, k) extrapolated
-    scale: float            # the change that errors are relative to
-    error: np.ndarray       # (T,) estimate, relative, never falling; infinite where not known
+    scale: np.ndarray       # (T,) largest change so far
+    error: np.ndarray       # (T,) estimate, relative; infinite where nothing is known
     order: np.ndarray       # (T,) observed
-    differences: tuple      # of the last value of the error between successive grids
+    differences: tuple      # between successive grids over the whole run, relative
 
     def raised(self, error):
         """Return this reference with at least another estimate (T,) of its error."""
-        return replace(self, error=running_maximum(np.maximum(self.error, error)))
+        return replace(self, error=np.maximum(self.error, error))
 
-    def error_of(self, values):
-        """Return the largest relative difference so far (T,) of a run's values (T, k)."""
-        return running_maximum(relative_difference(values, self.values, self.scale))
+    def error_of(self, values, at_end=False):
+        """Return the largest difference so far (T,) of a run's values (T, k), relative to the
+        largest change so far; at_end: the difference at each time alone.
+        """
+        if at_end:
+            difference = relative_difference(values, self.values, 1.0)
+        else:
+            difference = difference_so_far(values, self.values)
+        return relative(np.where(np.isnan(difference), np.inf, difference), self.scale)
 
 
 def reference_of(levels):
@@ -43,34 +53,49 @@ def reference_of(levels):
 
     With two grids there is no observed order: the error is infinite.
     """
-    scale = largest_change(levels[-1])
-    pairs = [running_maximum(relative_difference(coarse, fine, scale))
-             for coarse, fine in pairwise(levels)]
-    order = observed_order(pairs)
-    believed = np.clip(order, LEAST, MOST)
-    with np.errstate(invalid="ignore"):
-        factor = 1.0 / (2.0**believed - 1.0)
-        values = levels[-1] + factor[:, None] * (levels[-1] - levels[-2])
-        error = SAFETY * factor * pairs[-1]
-    error = np.where(order < LEAST, np.inf, error)
-    error = np.where(pairs[-1] <= NOTHING, NOTHING, error)
-    last = tuple(float(pair[-1]) for pair in pairs)
-    return QuantityReference(values, scale, running_maximum(error), order, last)
+    scale = change_so_far(levels[-1])
+    pairs = [difference_so_far(coarse, fine) for coarse, fine in pairwise(levels)]
+    order, safe = observed_order(pairs, scale)
+    p = np.clip(order, LEAST, np.where(safe, MOST, 1.0))
+    factor = np.where(safe, 1.0 / (2.0**p - 1.0), 0.0)
+    values = levels[-1] + factor[:, None] * (levels[-1] - levels[-2])
+    error = np.where(safe, SAFE, CAUTIOUS) / (2.0**p - 1.0) * relative(pairs[-1], scale)
+    spread = np.max(pairs[-2:], axis=0) if len(pairs) > 1 else np.full(len(scale), np.inf)
+    error = np.where(order < LEAST, CAUTIOUS * relative(spread, scale), error)
+    error = np.where(pairs[-1] <= NOTHING * scale, NOTHING, error)
+    error[0] = np.inf       # where nothing has changed yet
+    last = tuple(float(relative(pair, scale)[-1]) for pair in pairs)
+    return QuantityReference(values, scale, error, order, last)
 
 
-def observed_order(pairs):
-    """Return log2 of the ratio of the two last differences (T,); 0 with less than two."""
+def observed_order(pairs, scale):
+    """Return the observed order (T,) of differences (T,) between successive grids, and whether it
+    agrees with that of the grids before (T,), as it does where there are none.
+
+    The order is 0 with less than two differences.
+    """
     if len(pairs) < 2:
-        return np.zeros(len(pairs[-1]))
-    coarse, fine = np.maximum(pairs[-2], NOTHING), np.maximum(pairs[-1], NOTHING)
+        return np.zeros(len(scale)), np.zeros(len(scale), dtype=bool)
+    orders = [log_ratio(coarse, fine, scale) for coarse, fine in pairwise(pairs)]
+    if len(orders) < 2:
+        return orders[-1], orders[-1] >= LEAST
+    agree = np.abs(orders[-1] - orders[-2]) <= AGREEMENT
+    return orders[-1], agree & (np.minimum(orders[-1], orders[-2]) >= LEAST)
+
+
+def log_ratio(coarse, fine, scale):
+    """Return log2(coarse/fine) (T,), both at least round-off; 0 where it is not a number."""
+    floor = NOTHING * np.where(scale > 0.0, scale, 1.0)
     with np.errstate(invalid="ignore"):
-        order = np.log2(coarse / fine)
+        order = np.log2(np.maximum(coarse, floor) / np.maximum(fine, floor))
     return np.where(np.isfinite(order), order, 0.0)
 
 
-def reference_horizon(reference, times, error):
-    """Return the last time [s] up to which a reference's own error is at most an error; 0 where it
-    never is after the start.
-    """
-    good = reference.error <= error
-    return float(times[int(np.argmin(good)) - 1] if not good.all() else times[-1])
+def relative(difference, scale):
+    """Return a difference (T,) over the change so far (T,); infinite where nothing has changed."""
+    return np.divide(difference, scale, out=np.full(len(scale), np.inf), where=scale > 0.0)
+
+
+def known_times(references, error):
+    """Return the mask (T,) of times until which all references are known to an error."""
+    return np.logical_and.reduce([reference.error <= error for reference in references])

@@ -14,15 +14,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..scene import SceneError
-from ..sweep.difference import largest_change, relative_difference, running_maximum
+from ..sweep.difference import difference_so_far, largest_change
 from ..sweep.observation import FINISHED
 from ..sweep.quantity import OutputQuantity
 from ..sweep.runs import RunRequest
 from ..sweep.setting import Setting, scene_at, setting
 from .candidates import neighbouring_grid, pairs, single_knobs
-from .reference import reference_horizon, reference_of
+from .reference import known_times, reference_of
 
-COARSEST, FINEST = 4.0, 1.0 / 64.0      # factors of dx on halved grids
+COARSEST, FINEST = 4.0, 1.0 / 64.0      # factors of dx on halved grids; the latter may be set
 AT_START = (4.0, 2.0, 1.0, 0.5)
 REFERENCE_SHARE = 0.7       # of the time left that the next grid of the reference may take
 HALF = 0.5                  # of the error asked: as much may be the reference's own
@@ -44,6 +44,7 @@ class TradeSearch:
     quantities: tuple                   # of texts, for which the error is asked
     times: np.ndarray                   # (T,) [s]
     error: float
+    finest: float = FINEST              # factor of dx of the finest grid of the reference
     observations: dict = field(default_factory=dict)    # Setting: RunObservation
     references: dict = field(default_factory=dict)      # text: QuantityReference
     levels: tuple = ()                  # factors of dx of the reference
@@ -70,13 +71,24 @@ class TradeSearch:
         while self.levels and self.horizon() < self.times[-1]:
             factor, before = self.levels[-1] / 2.0, self.horizon()
             expected = self.expected_cpu(setting(dx=factor))
-            if factor < FINEST or expected > REFERENCE_SHARE * self.runs.left:
+            if factor < self.finest or expected > REFERENCE_SHARE * self.runs.left:
                 break
             n = len(self.levels)
-            self.observe([setting(dx=factor)], most_cpu=np.inf)
+            self.observe([setting(dx=factor), *self.side_runs(expected)], most_cpu=np.inf)
             self.update_references()
             if len(self.levels) == n or (before > 0.0 and self.horizon() <= before):
                 break
+
+    def side_runs(self, cpu):
+        """Return candidates that the other workers can run during a reference run of so much CPU
+        time [s].
+        """
+        grid = setting(dx=(self.best() or setting(dx=1.0)).get("dx"))
+        candidates = [family | grid for family in single_knobs(self.scene)
+                      if family | grid not in self.observations]
+        total = np.cumsum([self.expected_cpu(chosen) for chosen in candidates])
+        return [c for c, t in zip(candidates, total, strict=True)
+                if t <= (self.runs.workers - 1) * cpu]
 
     def update_references(self):
         """Compute the references from the finest unbroken sequence of halved grids."""
@@ -104,9 +116,9 @@ class TradeSearch:
             return np.inf
         for text in self.quantities:
             q, p = a.values[text], b.values[text]
-            difference = running_maximum(relative_difference(p, q, largest_change(q)))
-            if (difference > DIVERGED * self.error).any():
-                return float(self.times[np.argmax(difference > DIVERGED * self.error)])
+            diverged = difference_so_far(p, q) > DIVERGED * self.error * largest_change(q)
+            if diverged.any():
+                return float(self.times[np.argmax(diverged)])
         return np.inf
 
     def compare_families(self):
@@ -126,14 +138,20 @@ class TradeSearch:
                 shrunk = reference.error_of(run.values[text]) / 2.0**np.clip(reference.order, 0, 2)
                 self.references[text] = reference.raised(shrunk)
 
+    @property
+    def last(self):
+        """Return the index of the last time until which all quantities asked for are known to half
+        the error, and which is not chaotic; 0 where they never are.
+        """
+        if not self.references:
+            return 0
+        known = known_times([self.references[text] for text in self.quantities],
+                            HALF * self.error) & (self.times < self.chaos)
+        return int(np.max(np.flatnonzero(known), initial=0))
+
     def horizon(self):
         """Return the time [s] until which all quantities asked for are known to half the error."""
-        if not self.references:
-            return 0.0
-        until = min(reference_horizon(self.references[text], self.times, HALF * self.error)
-                    for text in self.quantities)
-        before_chaos = self.times[self.times < self.chaos]
-        return min(until, float(before_chaos[-1]) if len(before_chaos) else 0.0)
+        return float(self.times[self.last])
 
     # errors and costs of settings
 
@@ -144,20 +162,13 @@ class TradeSearch:
         run = self.observations.get(chosen)
         if run is None or not run.finished or not self.references:
             return np.inf
-        last = int(np.searchsorted(self.times, self.horizon() * (1.0 + 1e-9), side="right")) - 1
-        return max(self._error_at(run, text, last) for text in texts or self.quantities)
-
-    def _error_at(self, run, text, last):
-        reference = self.references[text]
-        if OutputQuantity(text).at_end:
-            difference = relative_difference(run.values[text], reference.values, reference.scale)
-            return float(difference[last])
-        return float(reference.error_of(run.values[text])[last])
+        return max(float(self.references[text].error_of(
+            run.values[text], OutputQuantity(text).at_end)[self.last])
+            for text in texts or self.quantities)
 
     def reference_error(self):
         """Return the largest error of the references until the horizon."""
-        last = int(np.searchsorted(self.times, self.horizon() * (1.0 + 1e-9), side="right")) - 1
-        return max(float(self.references[text].error[last]) for text in self.quantities)
+        return max(float(self.references[text].error[self.last]) for text in self.quantities)
 
     def keeps(self, chosen):
         """Return whether a setting keeps the error asked, that of the reference included."""

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from mpm_ref.trade.reference import reference_horizon, reference_of
+from mpm_ref.trade.reference import known_times, reference_of
 
 T = np.linspace(0.0, 1.0, 11)
 EXACT = np.stack((np.sin(T), T**2), axis=1)
@@ -23,9 +23,17 @@ def test_order_is_observed_and_the_error_vanishes(order):
 def test_error_estimate_bounds_the_error_of_the_finest_grid():
     runs = levels(1.0)
     reference = reference_of(runs)
-    finest = np.sqrt(np.mean((runs[-1] - EXACT) ** 2, axis=1)) / reference.scale
-    assert (reference.error >= finest).all()
+    finest = np.sqrt(np.mean((runs[-1] - EXACT) ** 2, axis=1))[1:] / reference.scale[1:]
+    assert (reference.error[1:] >= finest).all()
     assert reference.error[-1] == pytest.approx(1.25 * finest[-1], rel=1e-6)
+
+
+def test_orders_that_disagree_are_not_extrapolated():
+    pattern = levels(1.0)[0] - EXACT
+    *_, finest = wobbling = [EXACT + share * pattern for share in (1.0, 0.55, 0.1, 0.0)]
+    reference = reference_of(wobbling)
+    assert (reference.values == finest).all()
+    assert reference.error[-1] == pytest.approx(3.0 * reference.differences[-1], rel=1e-6)
 
 
 def test_an_order_above_two_is_not_believed():
@@ -36,10 +44,11 @@ def test_an_order_above_two_is_not_believed():
 
 
 @pytest.mark.parametrize("order", [0.3, 0.1, -0.5])
-def test_nothing_is_claimed_without_convergence(order):
-    reference = reference_of(levels(order))
-    assert np.isinf(reference.error[1:]).all()
-    assert reference_horizon(reference, T, 0.01) == 0.0
+def test_without_convergence_the_error_is_three_times_the_spread(order):
+    runs = levels(order)
+    reference = reference_of(runs)
+    assert (reference.values == runs[-1]).all()
+    assert reference.error[-1] == pytest.approx(3.0 * max(reference.differences[-2:]))
 
 
 def test_two_grids_have_no_order():
@@ -48,22 +57,39 @@ def test_two_grids_have_no_order():
 
 def test_equal_runs_are_exact():
     reference = reference_of([EXACT, EXACT, EXACT])
-    assert reference.error.max() < 1e-11
-    assert reference_horizon(reference, T, 0.01) == 1.0
+    assert reference.error[1:].max() < 1e-11
+    assert known_times([reference], 0.01)[1:].all()
 
 
-def test_the_horizon_is_the_last_time_before_the_error_is_exceeded():
+def test_nothing_is_known_at_the_start():
+    assert not known_times([reference_of(levels(1.0))], 1e9)[0]
+
+
+def test_known_times_are_those_of_all_references():
+    good, bad = reference_of(levels(1.0)), reference_of(levels(1.0, size=0.2))
+    error = bad.error[5]
+    assert known_times([good], error).sum() > known_times([good, bad], error).sum() > 0
+    assert (known_times([good, bad], error) == known_times([bad], error)).all()
+
+
+def test_errors_are_relative_to_the_change_so_far():
     reference = reference_of(levels(1.0))
-    k = 6
-    assert reference_horizon(reference, T, reference.error[k]) == T[k]
-    assert reference_horizon(reference, T, 1e9) == T[-1]
+    twice = EXACT + 0.1 * np.maximum.accumulate(np.abs(EXACT - EXACT[0]))
+    assert reference.error_of(twice)[1:] == pytest.approx(0.1, rel=0.3)
+
+
+def test_an_error_at_the_end_forgets_what_was_before():
+    reference, values = reference_of(levels(1.0)), EXACT.copy()
+    values[4] += 1.0
+    assert reference.error_of(values)[-1] > 0.1
+    assert reference.error_of(values, at_end=True)[-1] < 1e-9
 
 
 def test_a_run_that_stopped_has_an_infinite_error_from_there():
     reference, values = reference_of(levels(1.0)), EXACT.copy()
     values[5:] = np.nan
     error = reference.error_of(values)
-    assert np.isfinite(error[:5]).all()
+    assert np.isfinite(error[1:5]).all()
     assert np.isinf(error[5:]).all()
 
 
@@ -71,5 +97,5 @@ def test_another_estimate_can_only_raise_the_error():
     reference = reference_of(levels(1.0))
     raised = reference.raised(np.full(len(T), 0.5))
     assert (raised.error >= reference.error).all()
-    assert raised.error[0] == 0.5
+    assert raised.error[3] == 0.5
     assert (reference.raised(np.zeros(len(T))).error == reference.error).all()

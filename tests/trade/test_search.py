@@ -33,6 +33,18 @@ def test_references_are_refined_until_half_the_error():
     assert min(search.levels) > 1 / 64
 
 
+def test_other_workers_run_candidates_beside_the_reference():
+    runs = ModelRuns()
+    search = search_of(runs)
+    search.start()
+    assert search.side_runs(1e9) == []
+    runs.workers = 2
+    cpu = search.expected_cpu(setting(dx=0.25))
+    beside = search.side_runs(cpu)
+    assert beside
+    assert sum(search.expected_cpu(chosen) for chosen in beside) <= cpu
+
+
 def test_without_convergence_nothing_is_recommended():
     search = search_of(ModelRuns(order=0.2))
     search.run()
@@ -103,6 +115,8 @@ def test_single_knobs_are_not_those_of_the_scene():
     assert len(set(texts)) == len(texts)
     implicit = [one.text for one in single_knobs(loads('integrator = "hot"' + FLIGHT))]
     assert "integrator explicit, cfl 0.5" in implicit
+    assert "eps 0.001" in implicit
+    assert "eps 1e-07" not in implicit
 
 
 def test_neighbouring_grids_end_with_the_list():
@@ -129,7 +143,8 @@ def test_a_real_scene_keeps_the_error_against_the_exact_motion(tmp_path):
         exact = X + t * [1.0, 0.5] - 0.5 * t**2 * [0.0, 9.8]
         best = search.observations[search.best()].values["positions"]
         error = np.sqrt(np.mean((best - exact.reshape(len(t), -1)) ** 2, axis=1))
-        assert error.max() / search.references["positions"].scale <= 0.02
+        assert error.max() / search.references["positions"].scale[-1] <= 0.02
+        assert search.horizon() == scene.end
         count = runs.count
         again = TradeSearch(scene, runs, ("positions",), np.array(run.times), 0.02)
         again.run()

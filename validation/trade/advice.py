@@ -1,0 +1,162 @@
+"""Is the advice of `mpm-ref trade` right? Twelve scenes, three quantities, four errors asked.
+
+The search may use grids down to a quarter of the scene's spacing. The truth is a closed form, or
+the reference of grids down to an eighth with its own error, that of another transfer included; a
+case is judged where that error is at most a quarter of the error asked. The rivals of the search
+are the settings of a plain sweep: each single knob on each grid.
+"""
+
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+
+from mpm_ref.executor import open_executor
+from mpm_ref.scene import build, digest
+from mpm_ref.sweep.difference import change_so_far
+from mpm_ref.sweep.observation import ObservedRun
+from mpm_ref.sweep.probes import choose_probes
+from mpm_ref.sweep.runs import SceneRuns
+from mpm_ref.sweep.setting import Setting, setting
+from mpm_ref.sweep.store import RunStore
+from mpm_ref.trade.candidates import GRIDS, single_knobs
+from mpm_ref.trade.reference import QuantityReference
+from mpm_ref.trade.search import TradeSearch
+
+from ..common.registry import experiment
+from .advice_scenes import advice_scenes
+
+ERRORS = (0.1, 0.05, 0.02, 0.01)
+TIMES = 17
+SEARCHED, TRUE = 0.25, 0.125    # factors of dx of the finest grids of searches and of the truth
+KNOWN = 0.25                    # of the error asked, which that of the truth may be
+KEPT, DEAR = 0.95, 1.5          # the aims: share of advice that is right, its cost over the least
+COLUMNS = ("scene", "quantity", "asked", "until", "setting", "claimed", "error", "truth", "cpu",
+           "least", "cheapest", "status")
+RIGHT, WRONG, UNKNOWN, NONE = "right", "wrong", "not judged", "no advice"
+
+
+class AdviceCase(NamedTuple):
+    """One case: what was asked, advised and measured."""
+
+    scene: str
+    quantity: str
+    asked: float
+    until: float        # [s] to which the advice holds
+    setting: str
+    claimed: float      # error of the setting as the search estimates it
+    error: float        # as the truth says
+    truth: float        # error of the truth
+    cpu: float          # [s] of the setting
+    least: float        # [s] of the cheapest setting that keeps the error
+    cheapest: str
+    status: str
+
+
+def cases_of(one, sweep):
+    """Return the `AdviceCase`s of an `AdviceScene`; sweep: whether the plain sweep is run."""
+    probes = tuple((p.body, p.X) for p in choose_probes(build(one.scene).bodies))
+    times = np.linspace(0.0, one.scene.end, TIMES)
+    observed = ObservedRun(msgspec.json.encode(one.scene).decode(), digest(one.scene),
+                           one.quantities, tuple(times.tolist()), probes)
+    with open_executor(workers=1) as executor:
+        runs = SceneRuns(observed, executor, RunStore())
+        searches = {(text, asked): search(one, runs, times, text, asked)
+                    for text in one.quantities for asked in ERRORS}
+        truth = true_search(one, runs, times, probes)
+        if sweep:
+            truth.observe(plain_sweep(one.scene), most_cpu=np.inf)
+    for other in searches.values():
+        truth.observations |= {s: other.observations[s] for s in other.settings()}
+    return [case_of(one.name, search, truth) for search in searches.values()]
+
+
+def search(one, runs, times, text, asked):
+    """Return the search for a quantity and an error, as `mpm-ref trade` makes it."""
+    result = TradeSearch(one.scene, runs, (text,), times, asked, finest=SEARCHED)
+    result.run()
+    return result
+
+
+def true_search(one, runs, times, probes):
+    """Return a search whose references are the truth of all quantities."""
+    truth = TradeSearch(one.scene, runs, one.quantities, times, 1e-9, finest=TRUE)
+    truth.start()
+    truth.refine()
+    truth.compare_families()
+    if one.exact is not None:
+        X = np.concatenate([X for _, X in probes])
+        values = one.exact(times, X).reshape(len(times), -1)
+        zero = np.zeros(len(times))
+        truth.references["positions"] = QuantityReference(
+            values, change_so_far(values), zero, zero, ())
+    return truth
+
+
+def plain_sweep(scene):
+    """Return each single knob on each grid that a search may use."""
+    grids = [factor for factor in GRIDS if factor >= SEARCHED]
+    families = [Setting(), *single_knobs(scene)]
+    return [family | setting(dx=factor) for family in families for factor in grids]
+
+
+def case_of(name, search, truth):
+    """Return the `AdviceCase` of a search."""
+    (text,), asked, until = search.quantities, search.error, search.horizon()
+    own = float(truth.references[text].error[search.last])
+    best = search.best()
+
+    def error(chosen):
+        run = truth.observations[chosen]
+        return float(truth.references[text].error_of(run.values[text])[search.last])
+
+    finished = [s for s in truth.settings() if truth.observations[s].finished
+                and s.get("dx", 1.0) >= SEARCHED]
+    good = [s for s in finished if error(s) <= asked] if until > 0.0 else []
+    least = min(good, key=lambda s: truth.observations[s].cost.cpu, default=None)
+    cost = {s: truth.observations[s].cost.cpu for s in (best, least) if s is not None}
+    if best is None:
+        return AdviceCase(name, text, asked, until, "", np.nan, np.nan, own, np.nan,
+                          cost.get(least, np.nan), "" if least is None else least.text, NONE)
+    status = UNKNOWN if own > KNOWN * asked else RIGHT if error(best) <= asked else WRONG
+    return AdviceCase(name, text, asked, until, best.text, search.error_of(best), error(best), own,
+                      cost[best], cost.get(least, np.nan),
+                      "" if least is None else least.text, status)
+
+
+@experiment("trade.advice", title="The advice of `mpm-ref trade`, judged on scenes not used in its "
+            "making", profiles=("quick", "standard"), budget={"quick": 60, "standard": 3600})
+def advice(run):
+    """Judge the advice on all scenes."""
+    scenes = advice_scenes()
+    chosen = run.choose(quick=[s for s in scenes if s.name == "flight"], standard=scenes)
+    sweep = run.choose(quick=False, standard=True)
+    cases = []
+    for one in run.progress(chosen, "scenes"):
+        rows = run.cached(one.name, lambda one=one: [list(c) for c in cases_of(one, sweep)])
+        cases += [AdviceCase(*row) for row in rows]
+    run.table("cases", COLUMNS, [tuple(case) for case in cases])
+    record_cases(run, cases, f"{len(chosen)} scenes, {len(cases)} cases, dx down to {SEARCHED} of "
+                 "the scene's")
+
+
+def record_cases(run, cases, scale):
+    """Record how often the advice was right, and what it costs over the least."""
+    judged = [case for case in cases if case.status in (RIGHT, WRONG)]
+    right = [case for case in judged if case.status == RIGHT]
+    wrong = [f"{c.scene} {c.quantity} {c.asked:g}: {c.error:.3g}" for c in judged
+             if c.status == WRONG]
+    none, unknown = (sum(c.status == status for c in cases) for status in (NONE, UNKNOWN))
+    run.record("trade.advice.judged", len(judged), comparator="info", scale=scale,
+               note=f"of {len(cases)} cases; {none} without advice, {unknown} whose truth is not "
+               "known well enough")
+    run.record("trade.advice.right", len(right) / len(judged) if judged else None, comparator=">=",
+               paper=KEPT, scale=scale, note="share of judged advice that keeps the error asked"
+               + ("; wrong: " + ", ".join(wrong) if wrong else ""))
+    ratios = np.array([case.cpu / case.least for case in right if case.least > 0.0])
+    run.record("trade.advice.cost", float(np.median(ratios)) if len(ratios) else None,
+               comparator="<=", paper=DEAR, scale=scale,
+               note="median CPU time of the advice over that of the cheapest setting of the search "
+               "and of a plain sweep that keeps the error")
+    run.record("trade.advice.dear", float(np.mean(ratios > DEAR)) if len(ratios) else None,
+               comparator="info", scale=scale, note=f"share that costs over {DEAR} times the least")

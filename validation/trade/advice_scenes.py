@@ -1,0 +1,135 @@
+"""Small scenes on which the advice of `mpm-ref trade` is judged; none was used to make it.
+
+Two have a closed form: free flight, and a column between slip walls that is released under its
+weight, small strains of which obey the wave equation
+
+    u_tt = c^2 u_yy - g,  u(0) = 0,  u_y(H) = 0,
+    u = -g/c^2 (H y - y^2/2) + sum_n b_n sin(k_n y) cos(c k_n t),
+    k_n = (n + 1/2) pi/H,  b_n = 2 g/(c^2 H k_n^3).
+"""
+
+from math import pi, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from mpm_ref.materials import make_law, stiffness
+from mpm_ref.scene import loads
+
+G, RHO = 9.8, 1000.0
+TERMS = 200             # of the series
+HEAD = "dim = {dim}\ndx = {dx}\nend = {end}\ngravity = {gravity}\n{more}\n"
+BODY = """
+[[body]]
+name = "{name}"
+density = 1000.0
+shape = {{ {shape} }}
+sampling = {{ type = "regular", per_cell = 2 }}
+material = {{ {material} }}
+velocity = {{ {velocity} }}
+"""
+FLOOR = """
+[[collider]]
+name = "floor"
+kind = "{kind}"
+friction = {friction}
+shape = {{ type = "half_space", point = {point}, normal = {normal} }}
+"""
+SOFT, STIFF = ('law = "fixed_corotated", E = 1e5, nu = 0.3',
+               'law = "fixed_corotated", E = 1e6, nu = 0.3')
+PLASTIC = 'law = "hencky", E = 1e6, nu = 0.3, flow = { type = "von_mises", sigma_y = 2e4 }'
+SAND = 'law = "hencky", E = 1e6, nu = 0.3, flow = { type = "drucker_prager", friction_angle = 30 }'
+WATER = 'law = "fluid", lam = 1e5'
+
+
+class AdviceScene(NamedTuple):
+    """A scene, its quantities, and its exact positions (T, n, d) of times and probes, if any."""
+
+    name: str
+    scene: object
+    quantities: tuple
+    exact: object = None
+
+
+def head(dx, end, dim=2, gravity=(0.0, -G), more=""):
+    """Return the top of a scene file."""
+    return HEAD.format(dim=dim, dx=dx, end=end, gravity=list(gravity), more=more)
+
+
+def solid(shape, material, name="body", velocity=""):
+    """Return a body of a scene file."""
+    return BODY.format(name=name, shape=shape, material=material, velocity=velocity)
+
+
+def floor(point=(0.0, 0.0), normal=(0.0, 1.0), kind="separate", friction=0.0):
+    """Return a half-space of a scene file."""
+    return FLOOR.format(kind=kind, friction=friction, point=list(point), normal=list(normal))
+
+
+def box(*corners):
+    """Return a box as a shape of a scene file."""
+    d = len(corners) // 2
+    return f'type = "box", lower = {list(corners[:d])}, upper = {list(corners[d:])}'
+
+
+def disk(x, y, r):
+    """Return a disk as a shape of a scene file."""
+    return f'type = "sphere", center = [{x}, {y}], radius = {r}'
+
+
+def fly(t, X):
+    """Return the positions (T, n, 2) of points X in free flight."""
+    t = t[:, None, None]
+    return X + t * [1.0, 0.5] - 0.5 * t**2 * [0.0, G]
+
+
+def column(t, X, E=1e6, H=0.8):
+    """Return the positions (T, n, 2) of points X of the released column."""
+    c = sqrt(stiffness(make_law("fixed_corotated", E=E, nu=0.3)) / RHO)
+    k = (np.arange(TERMS) + 0.5) * pi / H
+    b = 2.0 * G / (c**2 * H * k**3)
+    y = X[:, 1]
+    wave = np.einsum("n,ny,tn->ty", b, np.sin(k[:, None] * y), np.cos(c * np.outer(t, k)))
+    u = wave - G / c**2 * (H * y - 0.5 * y**2)
+    x = np.repeat(X[None], len(t), axis=0)
+    x[..., 1] += u
+    return x
+
+
+def advice_scenes():
+    """Return all `AdviceScene`s."""
+    sides = floor((0.0, 0.0), (1.0, 0.0), "slip") + floor((0.2, 0.0), (-1.0, 0.0), "slip")
+    texts = {
+        "column": (head(0.05, 0.08) + solid(box(0.0, 0.0, 0.2, 0.8), STIFF) + sides
+                   + floor(kind="sticky"), "front:y+", column),
+        "flight": (head(0.1, 0.2) + solid(disk(0.5, 0.7, 0.25), SOFT,
+                                          velocity="linear = [1.0, 0.5]"), "front:x+", fly),
+        "spin": (head(0.05, 0.15, gravity=(0.0, 0.0)) + solid(
+            disk(0.5, 0.5, 0.2), SOFT, velocity="angular = 20.0"), "front:x+", None),
+        "bounce": (head(0.05, 0.12) + solid(disk(0.3, 0.21, 0.2), STIFF,
+                                            velocity="linear = [0.0, -2.0]") + floor(),
+                   "front:y-", None),
+        "slide": (head(0.05, 0.3, gravity=(3.0, -G)) + solid(
+            box(0.0, 0.0, 0.4, 0.2), STIFF) + floor(friction=0.2), "front:x+", None),
+        "stick": (head(0.05, 0.1, gravity=(0.0, -G)) + solid(
+            box(0.0, 0.0, 0.4, 0.2), SOFT, velocity="linear = [1.0, 0.0]") + floor(friction=0.5),
+            "front:x+", None),
+        "beam": (head(0.05, 0.3, gravity=(0.0, -4.0)) + solid(
+            box(-0.1, 0.0, 0.8, 0.2), STIFF) + '[[fixed]]\nname = "clamp"\nregion = { '
+            + box(-0.2, -0.1, 0.0, 0.3) + " }\n", "front:y-", None),
+        "pair": (head(0.05, 0.12, gravity=(0.0, 0.0)) + solid(
+            disk(0.2, 0.3, 0.15), SOFT, "left", "linear = [2.0, 0.0]") + solid(
+            disk(0.6, 0.3, 0.15), SOFT, "right", "linear = [-2.0, 0.0]"), "front:x-", None),
+        "dam": (head(0.02, 0.12) + solid(box(0.0, 0.0, 0.1, 0.2), WATER) + floor(kind="slip")
+                + floor((0.0, 0.0), (1.0, 0.0), "slip"), "front:x+", None),
+        "sand": (head(0.02, 0.15) + solid(box(0.0, 0.0, 0.2, 0.2), SAND) + floor(friction=0.5)
+                 + floor((0.0, 0.0), (1.0, 0.0), "slip"), "front:x+", None),
+        "impact": (head(0.05, 0.08) + solid(box(0.0, 0.0, 0.3, 0.6), PLASTIC,
+                                            velocity="linear = [0.0, -4.0]") + floor(),
+                   "front:y+", None),
+        "cube": (head(0.1, 0.1, 3, (0.0, 0.0, -G)) + solid(
+            box(0.0, 0.0, 0.0, 0.4, 0.4, 0.4), SOFT, velocity="linear = [0.0, 0.0, -1.0]")
+            + floor((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), "front:z+", None),
+    }
+    return [AdviceScene(name, loads(text, name), ("positions", front, "kinetic"), exact)
+            for name, (text, front, exact) in texts.items()]
