@@ -137,7 +137,7 @@ class CellJudge:
         runs = {cell: run for cell, run in runs.items() if physical(cell) == cell}
         coarse = self._companions(runs, COARSE)
         verdicts = {cell: self._compared(run, coarse[cell], cell, AT_COARSE)
-                    for cell, run in runs.items() if coarse[cell].finished}
+                    for cell, run in runs.items()}
         return {cell: verdict for cell, verdict in verdicts.items() if verdict.is_right}
 
     def _by_fine_grids(self, runs):

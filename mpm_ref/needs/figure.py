@@ -9,7 +9,7 @@ from .removal import NOT_REQUIRED, REQUIRED, saving
 COLORS = {REQUIRED: "0.35", NOT_REQUIRED: "tab:green"}
 OTHER = "0.75"          # of removals that cost time, or were not measured
 LEAST = 1e-8            # a change that is drawn for less, on a logarithmic axis
-WIDTH, ROW, FRAME = 7.0, 0.28, 1.4      # [inch]
+WIDTH, ROW, FRAME = 7.0, 0.28, 1.6      # [inch]
 
 
 def draw_needs(answer):
@@ -27,7 +27,7 @@ def draw_needs(answer):
     left.set_xscale("log")
     left.axvline(100.0 * answer.error, color="tab:red", label="error asked")
     draw_grid_error(left, answer.result.errors)
-    left.legend(fontsize=8)
+    figure.legend(loc="outside lower center", ncols=2, fontsize=8)
     left.set_xlabel("change without it [%]")
     right.axvline(0.0, color="0.35", linewidth=0.8)
     right.set_xlabel("CPU time saved [%]")
