@@ -45,7 +45,9 @@ def test_lean_scene_keeps_the_error(study):
     lean = study.observe({"lean": result.lean})["lean"]
     error = changes(result.base, lean, result.lean, result.first)["positions"]
     assert error[-1] == result.order[-1].change <= 0.01
-    assert {one.label for one in result.lean.removals} == IDLE - {"friction of collider collider1"}
+    # its friction goes before it or with it: both cost the same
+    friction = {"friction of collider collider1"}
+    assert {one.label for one in result.lean.removals} | friction == IDLE | friction
     assert [part.name for part in result.lean.scene.collider] == ["floor"]
 
 
