@@ -85,11 +85,10 @@ def true_search(one, runs, times, probes):
     truth.refine()
     truth.compare_families()
     if one.exact is not None:
-        X = np.concatenate([X for _, X in probes])
-        values = one.exact(times, X).reshape(len(times), -1)
         zero = np.zeros(len(times))
-        truth.references["positions"] = QuantityReference(
-            values, change_so_far(values), zero, zero, ())
+        for text, values in one.exact(times, np.concatenate([X for _, X in probes])).items():
+            truth.references[text] = QuantityReference(
+                values, change_so_far(values), zero, zero, ())
     return truth
 
 

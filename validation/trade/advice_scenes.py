@@ -43,7 +43,10 @@ WATER = 'law = "fluid", lam = 1e5'
 
 
 class AdviceScene(NamedTuple):
-    """A scene, its quantities, and its exact positions (T, n, d) of times and probes, if any."""
+    """A scene, its quantities, and the function of its exact values, if it has a closed form.
+
+    exact(t (T,), X (n, d)) returns {quantity: values (T, k)} at times t, of probes X.
+    """
 
     name: str
     scene: object
@@ -77,13 +80,23 @@ def disk(x, y, r):
     return f'type = "sphere", center = [{x}, {y}], radius = {r}'
 
 
-def fly(t, X):
-    """Return the positions (T, n, 2) of points X in free flight."""
-    t = t[:, None, None]
-    return X + t * [1.0, 0.5] - 0.5 * t**2 * [0.0, G]
+def fly(t, X, radius=0.25):
+    """Return the exact values in free flight of a disk about (0.5, 0.7)."""
+    s = t[:, None, None]
+    x = X + s * [1.0, 0.5] - 0.5 * s**2 * [0.0, G]
+    mass = RHO * pi * radius**2
+    return {"positions": x.reshape(len(t), -1), "front:x+": (0.5 + radius + t)[:, None],
+            "kinetic": 0.5 * mass * (1.0 + (0.5 - G * t) ** 2)[:, None]}
 
 
-def column(t, X, E=1e6, H=0.8):
+def release(t, X, H=0.8):
+    """Return the exact values of the released column."""
+    x = column_positions(t, X)
+    top = column_positions(t, np.array([[0.0, H]]))[..., 1]
+    return {"positions": x.reshape(len(t), -1), "front:y+": top}
+
+
+def column_positions(t, X, E=1e6, H=0.8):
     """Return the positions (T, n, 2) of points X of the released column."""
     c = sqrt(stiffness(make_law("fixed_corotated", E=E, nu=0.3)) / RHO)
     k = (np.arange(TERMS) + 0.5) * pi / H
@@ -101,7 +114,7 @@ def advice_scenes():
     sides = floor((0.0, 0.0), (1.0, 0.0), "slip") + floor((0.2, 0.0), (-1.0, 0.0), "slip")
     texts = {
         "column": (head(0.05, 0.08) + solid(box(0.0, 0.0, 0.2, 0.8), STIFF) + sides
-                   + floor(kind="sticky"), "front:y+", column),
+                   + floor(kind="sticky"), "front:y+", release),
         "flight": (head(0.1, 0.2) + solid(disk(0.5, 0.7, 0.25), SOFT,
                                           velocity="linear = [1.0, 0.5]"), "front:x+", fly),
         "spin": (head(0.05, 0.15, gravity=(0.0, 0.0)) + solid(
