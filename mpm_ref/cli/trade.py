@@ -2,15 +2,19 @@
 
 from math import isfinite
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 import typer
 
+from ..scene import dumps
 from ..store.atomic import write_bytes
 from ..sweep.quantity import CHAOTIC
-from ..trade.answer import answer_lines, answer_of, best_scene
+from ..sweep.setting import scene_at
+from ..trade.answer import answer_lines, answer_of, best_scene, largest_extent, percent
 from ..trade.page import page_of
 from ..trade.search import TradeSearch
+from ..trade.similar import carried_over, cheapest_row, read_answer
 from .errors import exit_on_errors, options
 from .options import Json, SceneName, on_interrupt
 from .sweep_options import (
@@ -33,6 +37,8 @@ from .sweep_options import (
 from .terminal import as_json
 
 NO_ANSWER = 1
+LikeOption = Annotated[str | None, typer.Option(
+    "--like", help="Answer at once from SCENE.trade.json of this similar scene, without a run.")]
 
 
 def measure(
@@ -43,6 +49,7 @@ def measure(
     workers: WorkersOption = 2,
     scheduler: SchedulerOption = None,
     out: OutOption = Path(),
+    like: LikeOption = None,
     json: Json = False,
     quiet: QuietOption = False,
 ):
@@ -59,11 +66,32 @@ def measure(
                                    parse_workers(workers), scheduler, out, quiet)
             record, path = load_sweep(name)
             observed = observed_of(record, path, with_companions(texts, record.dim))
+        if like is not None:
+            raise typer.Exit(answer_from(like, record, observed, request))
         search = run_search(record, observed, request)
         facts = as_plain(answer_of(search, path.stem))
         write_answer(search, facts, request)
         print(as_json(facts) if json else "\n".join(answer_lines(facts)))
     raise typer.Exit(0 if facts["best"] is not None else NO_ANSWER)
+
+
+def answer_from(like, record, observed, request):
+    """Write and say the advice that the answer on a similar scene gives; return the exit status."""
+    name = Path(like).stem
+    facts = read_answer(request.out / f"{name}.trade.json")
+    row = cheapest_row(facts, request.error)
+    if row is None:
+        print(f"{name}: no setting of its answer keeps {percent(request.error)}")
+        return NO_ANSWER
+    with options():
+        cells = largest_extent(observed.probes) / record.dx
+        chosen = carried_over(row, facts["cells"], cells)
+        text = dumps(scene_at(record, chosen))
+    said = (f"as on {name}: {chosen.text}, which had an error of {percent(row['error'])} there; "
+            f"nothing was measured on {request.stem}")
+    write_bytes(request.out / f"{request.stem}.best.toml", f"# {said}\n\n{text}".encode())
+    print(said)
+    return 0
 
 
 def with_companions(texts, dim):

@@ -101,10 +101,10 @@ class RunObserver:
         self._problem, self._run, self._recorder = problem, run, recorder
         self._quantities = [OutputQuantity(text) for text in run.quantities]
         self._starts = {body: np.asarray(X, dtype=float) for body, X in run.probes}
-        if run.seed is not None:
-            perturb(problem, run.seed)
         self._weights = {body.name: interpolation(initial_order(body), self._starts[body.name])
                          for body in problem.bodies if body.name in self._starts}
+        if run.seed is not None:        # after the weights, which depend on ties of distances
+            perturb(problem, run.seed)
         self._rows, self._before, self._t = [], None, 0.0
         self._clock = StepClock()
         self._nodes = 0

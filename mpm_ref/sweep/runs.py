@@ -44,6 +44,11 @@ class SceneRuns:
         return self._deadline - time.monotonic()
 
     @property
+    def probes(self):
+        """Return the probes of all runs, (body, positions)."""
+        return self._observed.probes
+
+    @property
     def workers(self):
         """Return the number of runs at a time."""
         return self._executor.workers

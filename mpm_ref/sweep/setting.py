@@ -9,8 +9,10 @@ A setting is a dictionary of some of these knobs; what it leaves out stays as th
     degree      of the B-spline: 1, 2 or 3
     transfer    "mls", "apic", "flip 0.95" (with its share of FLIP), "apic rpic 0.5", "pic", ...
     integrator  "explicit", or the word of an implicit method such as "hot-plus"
+    eps         tolerance of an implicit step
 """
 
+import re
 from dataclasses import dataclass
 from math import isclose
 
@@ -152,13 +154,13 @@ def change_degree(tables, degree):
 
 def change_transfer(tables, text):
     """Take another transfer, with its blend."""
-    name, *options = text.split()
-    scheme = tables["scheme"] | {"transfer": name, "rpic": 0.0, "flip": 1.0}
-    if name == "flip":
-        scheme["flip"], scheme["mass_eps"] = float(options[0]) if options else 1.0, 0.0
-    elif options:
-        scheme["rpic"] = float(options[1])
-    tables["scheme"] = scheme
+    match = re.fullmatch(r"(flip)(?: ([0-9.]+))?|(\w+)(?: rpic ([0-9.]+))?", text)
+    if match is None:
+        raise SceneError(f"transfer {text!r}: expected a text such as mls, flip 0.95 or apic rpic "
+                         "0.5")
+    flip, share, name, damping = match.groups()
+    scheme = {"transfer": flip or name, "flip": float(share or 1.0), "rpic": float(damping or 0.0)}
+    tables["scheme"] |= scheme | ({"mass_eps": 0.0} if flip else {})
 
 
 def change_integrator(tables, word):
@@ -171,8 +173,15 @@ def change_integrator(tables, word):
         tables["scheme"]["transfer"] = "apic"
 
 
+def change_eps(tables, eps):
+    """Solve implicit steps to another tolerance."""
+    if tables["integrator"] == "explicit":
+        raise SceneError(f"eps = {eps}: an explicit step solves nothing; expected an implicit one")
+    tables["solver"] = (tables.get("solver") or {}) | {"eps": eps}
+
+
 KNOBS = {
     "dx": scale_dx, "particles": scale_particles, "sampling": change_sampling,
     "integrator": change_integrator, "cfl": change_cfl, "degree": change_degree,
-    "transfer": change_transfer,
+    "transfer": change_transfer, "eps": change_eps,
 }

@@ -24,10 +24,18 @@ def answer_of(search, name):
         "scene": name, "version": __version__, "error": search.error, "end": search.times[-1],
         "quantities": list(search.quantities), "until": horizon, "chaos": search.chaos,
         "grids": [search.scene.dx * factor for factor in search.levels],
+        "cells": largest_extent(search.runs.probes) / search.scene.dx,
         "references": {text: reference_facts(search, text) for text in search.references},
         "best": None if best is None else best.text,
         "rows": [row(search, chosen) for chosen in ranked(search)],
     }
+
+
+def largest_extent(probes):
+    """Return the largest extent of a body along an axis at the start [m]; probes: of all bodies,
+    (name, positions (n, d)).
+    """
+    return max(float(np.ptp(np.asarray(X), axis=0).max()) for _, X in probes)
 
 
 def reference_facts(search, text):

@@ -41,6 +41,43 @@ def test_a_second_call_makes_no_run_again(folder):
     assert {file: again[file] for file in stored} == stored
 
 
+def test_a_similar_scene_answers_without_a_run(folder):
+    larger = FLIGHT.replace("radius = 0.25", "radius = 0.5").replace("dx = 0.1", "dx = 0.2")
+    (folder / "larger.toml").write_text(larger)
+    done = mpm_ref("trade", folder / "larger.toml", "--like", "flight", "--error", "4%",
+                   "--out", folder)
+    assert done.exit_code == 0
+    assert "nothing was measured on larger" in done.stdout
+    assert not (folder / "larger.trade").exists()
+    ours, theirs = (load(folder / f"{name}.best.toml") for name in ("larger", "flight"))
+    assert ours.dx == pytest.approx(2.0 * theirs.dx, rel=0.1)
+    assert (ours.cfl, ours.scheme) == (theirs.cfl, theirs.scheme)
+
+
+@pytest.mark.parametrize(("content", "words"), [
+    (None, "No such file"), ("{}", "not an answer"), ("[1", "not an answer"),
+    ('{"rows": [{}], "cells": 3}', "not an answer"), ('{"rows": [], "cells": "x"}', "not an")])
+def test_an_answer_that_is_none_is_refused(folder, tmp_path, content, words):
+    if content is not None:
+        (tmp_path / "other.trade.json").write_text(content)
+    done = mpm_ref("trade", folder / "flight.toml", "--like", "other", "--out", tmp_path)
+    assert_told(done, 2, words)
+
+
+@pytest.mark.parametrize("knobs", [
+    {"transfer": "mls\nend = 1"}, {"dx": "1"}, {"speed": 2.0}, {"integrator": 3},
+    {"sampling": "import os"}, {"degree": 7}])
+def test_a_forged_answer_writes_no_scene(folder, tmp_path, knobs):
+    facts = json.loads((folder / "flight.trade.json").read_text())
+    best = next(row for row in facts["rows"] if row["best"])
+    facts["rows"] = [best | {"setting": knobs, "text": "harmless"}]
+    (tmp_path / "other.trade.json").write_text(json.dumps(facts))
+    done = mpm_ref("trade", folder / "flight.toml", "--like", "other", "--error", "4%",
+                   "--out", tmp_path)
+    assert_told(done, 2)
+    assert not list(tmp_path.glob("*.toml"))
+
+
 def test_without_a_budget_there_is_no_answer(folder, tmp_path):
     done = mpm_ref("trade", folder / "flight.toml", "--error", "0.0001%", "--out", tmp_path,
                    "--budget", "1s", "--workers", "1", "--quiet")

@@ -19,6 +19,7 @@ class ModelRuns:
 
     def __init__(self, order=1.0, left=1e9):
         self.order, self.left, self.labels = order, left, []
+        self.probes = (("disk", np.array([[0.25, 0.45], [0.75, 0.95]])),)
         self.fails, self.chaos = lambda text: False, 0.0
 
     def observe(self, requests):

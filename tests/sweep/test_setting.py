@@ -42,6 +42,9 @@ def test_knobs_change_what_they_name():
     assert particles(scene_at(scene, setting(particles=1.5))) == particles(scene) * 9 // 4
     implicit = scene_at(scene, setting(integrator="hot-plus"))
     assert (implicit.integrator, implicit.step_scheme.transfer) == ("hot-plus", "apic")
+    assert scene_at(implicit, setting(eps=1e-3)).solver.eps == 1e-3
+    with pytest.raises(SceneError, match="solves nothing"):
+        scene_at(scene, setting(eps=1e-3))
 
 
 def test_an_implicit_scene_becomes_explicit():

@@ -115,6 +115,8 @@ def test_single_knobs_are_not_those_of_the_scene():
     assert len(set(texts)) == len(texts)
     implicit = [one.text for one in single_knobs(loads('integrator = "hot"' + FLIGHT))]
     assert "integrator explicit, cfl 0.5" in implicit
+    assert "eps 0.001" in implicit
+    assert "eps 1e-07" not in implicit
 
 
 def test_neighbouring_grids_end_with_the_list():

@@ -1,0 +1,95 @@
+"""A scene after some removals, the probes that it shares with the scene as given, and the change.
+
+A quantity is compared as it is, with two exceptions: positions are those of the probes that are
+left, and energies of a symmetric half count twice.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ..sweep.difference import largest_change, relative_difference, running_maximum
+from ..sweep.quantity import ENERGIES, OutputQuantity
+from .ingredients import named_scene, removals_of, removed
+from .symmetry import mirror_removals
+
+
+@dataclass(frozen=True)
+class SceneVariant:
+    """A scene, the probes left of it, the share of the matter that it stands for, and the removals
+    that led to it.
+    """
+
+    scene: object
+    probes: tuple               # of (body, X (n, d))
+    rows: tuple                 # of (body, indices (n,) of these probes among those at first)
+    share: float = 1.0
+    removals: tuple = ()
+
+    @cached_property
+    def offers(self):
+        """Return {label: `Removal`} of what can be removed from the scene."""
+        return {removal.label: removal
+                for removal in (*removals_of(self.scene), *mirror_removals(self.scene))}
+
+    def without(self, removal):
+        """Return the variant after a `Removal`. Raises SceneError where that is no scene."""
+        scene = removed(self.scene, removal)
+        masks = [probe_mask(body, X, removal) for body, X in self.probes]
+        left = [k for k, mask in enumerate(masks) if mask.any()]
+        return replace(
+            self, scene=scene, removals=(*self.removals, removal),
+            probes=tuple((self.probes[k][0], self.probes[k][1][masks[k]]) for k in left),
+            rows=tuple((self.rows[k][0], self.rows[k][1][masks[k]]) for k in left),
+            share=self.share * (1.0 if removal.plane is None else 0.5))
+
+
+def first_variant(scene, probes):
+    """Return the variant of a scene as given, with names for its parts."""
+    rows = tuple((body, np.arange(len(X))) for body, X in probes)
+    return SceneVariant(named_scene(scene), tuple(probes), rows)
+
+
+def probe_mask(body, X, removal):
+    """Return which probes (n,) of a body are left after a removal."""
+    if removal.body == body:
+        return np.zeros(len(X), dtype=bool)
+    if removal.plane is None:
+        return np.ones(len(X), dtype=bool)
+    axis, c = removal.plane
+    return X[:, axis] > c
+
+
+def changes(base, observation, variant, first):
+    """Return {quantity: largest relative change (T,) so far} of a variant's run.
+
+    base: the `RunObservation` of the scene as given; first: its `SceneVariant`.
+    """
+    result = {}
+    for text, reference in base.values.items():
+        kind = OutputQuantity(text).kind
+        values = observation.values[text]
+        if kind == "positions":
+            reference = reference[:, columns(text, variant, first)]
+        elif kind in ENERGIES:
+            values = values / variant.share
+        if OutputQuantity(text).at_end:
+            reference, values = reference[[0, -1]], values[[0, -1]]
+        error = relative_difference(values, reference, largest_change(reference))
+        result[text] = running_maximum(error)
+    return result
+
+
+def columns(text, variant, first):
+    """Return the columns of a quantity "positions[:BODY]" at first that are left in a variant."""
+    name = OutputQuantity(text).arguments
+    left, result, start = dict(variant.rows), [], 0
+    for body, X in first.probes:
+        if name and name[0] != body:
+            continue
+        n, d = X.shape
+        remaining = left.get(body, np.empty(0, dtype=int))
+        result.append(start + (remaining[:, None] * d + np.arange(d)).ravel())
+        start += n * d
+    return np.concatenate(result).astype(int)

@@ -1,0 +1,81 @@
+"""The change of a variant is that of the matter that is left, energies of a half counting twice."""
+
+import numpy as np
+import pytest
+from needs_toys import HEAD, SCENE, variant_of
+
+from mpm_ref.needs.variant import changes
+from mpm_ref.sweep.observation import FINISHED, RunCost, RunObservation
+
+TIMES = 5
+
+
+def observation(**values):
+    """An observation of some values (T, k) by quantity."""
+    return RunObservation(values, RunCost(), FINISHED)
+
+
+def positions_of(variant):
+    """Positions at TIMES of all probes of a variant, each shifted to the right with time."""
+    x = np.concatenate([X for _, X in variant.probes])
+    return np.stack([(x + [0.1 * k, 0.0]).ravel() for k in range(TIMES)])
+
+
+@pytest.fixture(scope="module")
+def first():
+    return variant_of(SCENE)
+
+
+def test_positions_without_a_body(first):
+    variant = first.without(first.offers["body block"])
+    base, run = positions_of(first), positions_of(variant)
+    assert run.shape[1] < base.shape[1]
+    assert changes(observation(positions=base), observation(positions=run), variant,
+                   first)["positions"].max() == 0.0
+    shift = run.copy()
+    shift[-1, ::2] += 0.04
+    change = changes(observation(positions=base), observation(positions=shift), variant, first)
+    assert change["positions"] == pytest.approx([0.0, 0.0, 0.0, 0.0, 0.1])
+
+
+def test_positions_of_a_named_body(first):
+    variant = first.without(first.offers["body block"])
+    text, n = "positions:distant", first.probes[0][1].size
+    base, run = positions_of(first)[:, n:], positions_of(variant)
+    change = changes(observation(**{text: base}), observation(**{text: run}), variant, first)
+    assert change[text].max() == 0.0
+
+
+def test_positions_of_a_half():
+    first = variant_of(HEAD + """
+[[body]]
+name = "disk"
+density = 1000.0
+shape = { type = "sphere", center = [0.5, 0.3], radius = 0.2 }
+material = { law = "fixed_corotated", E = 1e5, nu = 0.3 }
+""")
+    label, = (label for label in first.offers if label.startswith("half x"))
+    variant = first.without(first.offers[label])
+    base, run = positions_of(first), positions_of(variant)
+    kinetic = np.arange(TIMES)[:, None] + 1.0
+    change = changes(observation(positions=base, kinetic=kinetic),
+                     observation(positions=run, kinetic=0.5 * kinetic), variant, first)
+    assert change["positions"].max() == change["kinetic"].max() == 0.0
+
+
+def test_largest_change_so_far_and_at_the_end(first):
+    base = np.arange(TIMES)[:, None] * 1.0
+    run = base.copy()
+    run[2] += 1.0
+    names = {"kinetic": base, "kinetic@end": base}
+    change = changes(observation(**names), observation(**dict.fromkeys(names, run)), first, first)
+    assert change["kinetic"] == pytest.approx([0.0, 0.0, 0.25, 0.25, 0.25])
+    assert change["kinetic@end"].max() == 0.0
+
+
+def test_run_that_stopped_changes_infinitely(first):
+    base = np.arange(TIMES)[:, None] * 1.0
+    run = base.copy()
+    run[3:] = np.nan
+    change = changes(observation(kinetic=base), observation(kinetic=run), first, first)["kinetic"]
+    assert change[-1] == np.inf
