@@ -147,7 +147,7 @@ def schedules(tables):
 
 
 def scale_gravity(tables, factor, size):
-    """Multiply gravity."""
+    """Multiply the acceleration of gravity."""
     multiply(tables, ("gravity",), factor)
 
 
