@@ -1,7 +1,7 @@
 """Run the benchmarks: `python -m benchmarks COMMAND`.
 
-They compare mpm_ref with Taichi and Warp on an elastic block, and measure the cost of each feature
-and of an implicit step.
+They compare mpm_ref with Taichi and Warp on an elastic block, measure the cost of each feature
+and of an implicit step, and simulate many workers.
 """
 
 import json
@@ -203,6 +203,18 @@ def run_line(row):
             f"{row['variant']:20} {row['cpu_s']:7.3f} s a step, most {row['most_cpu_s']:.3f}  "
             f"x {row['cpu_ratio']:.2f}  iterations {row['iterations']:.1f}, most "
             f"{row['most_iterations']}{public}")
+
+
+@app.command()
+def workers(out: Path = Path("results/benchmarks/workers.json")):
+    """Simulate many workers of a dask scheduler, from times that are measured here."""
+    from .many_workers import worker_rows
+
+    rows = worker_rows()
+    for row in rows:
+        typer.echo(f"{row['workload']:30} {row['workers']:5} workers  wall {row['wall_s']:9.1f} s  "
+                   f"efficiency {row['efficiency']:.3f}")
+    save(out, rows, 1, 1)
 
 
 @app.command()

@@ -9,8 +9,10 @@ from typing import Annotated, Literal
 import typer
 
 from figures.frame import draw_all
+from mpm_ref.executor import BadScheduler, SchedulerLost
 
 from .common import targets
+from .common.cluster_run import run_on_cluster
 from .common.parallel import run_side_by_side
 from .common.provenance import commit
 from .common.recheck import recheck, sample
@@ -39,6 +41,9 @@ Profile = Annotated[
     typer.Option(help="quick: a minute at most each; standard: hours in all; paper: as printed")]
 Folder = Annotated[Path, typer.Option("--results", help="holds a folder for each profile")]
 Workers = Annotated[int, typer.Option(min=1, help="experiments at a time, sharing the cores")]
+Scheduler = Annotated[str | None, typer.Option(
+    metavar="local:N|tcp://HOST:PORT", help="dask cluster that runs the experiments instead, a "
+    "thread each; its workers need the results folder under the same path")]
 Strict = Annotated[
     bool, typer.Option("--strict", help="exit code 1 where records are edited or orphaned, or not "
                        "current and not marked in stale.toml")]
@@ -59,7 +64,7 @@ def list_experiments(profile: Profile = "quick"):
 
 @app.command()
 def run(ids: Ids = None, profile: Profile = "quick", seed: int = 0, results: Folder = RESULTS,
-        workers: Workers = 1):
+        workers: Workers = 1, scheduler: Scheduler = None):
     """Run experiments, draw their figures and write the report.
 
     A miss is a result; only an experiment or a figure that raises makes the exit code 1.
@@ -73,10 +78,13 @@ def run(ids: Ids = None, profile: Profile = "quick", seed: int = 0, results: Fol
     folder = results / profile
     printed = targets.load()
     setting = RunSetting(profile, folder, seed, printed, commit(ROOT))
-    if workers > 1:
-        failed = run_side_by_side(chosen, setting, workers)
-    else:
-        failed = run_all(chosen, setting)
+    try:
+        failed = (run_on_cluster(chosen, setting, scheduler) if scheduler else
+                  run_side_by_side(chosen, setting, workers) if workers > 1 else
+                  run_all(chosen, setting))
+    except (BadScheduler, SchedulerLost) as error:
+        typer.echo(f"{error}", err=True)
+        raise typer.Exit(2) from None
     undrawn = draw_all(ProfileResults(folder), about=[e.id for e in chosen],
                        workers=workers).failed
     _write_report(folder, profile, printed)

@@ -16,7 +16,7 @@ from validation.common.registry import GROUPS, discover
 from validation.common.report import chapters
 from validation.common.results import RESULTS, ProfileResults
 
-from . import mutation_page, paper_figures, settings, verdict_pages
+from . import atlas, mutation_page, paper_figures, settings, verdict_pages
 from .markdown import cell, grid_table
 
 FOLDER = "results/numbers"
@@ -62,6 +62,7 @@ def pages():
     rows = [(label(one), row) for one in shown_experiments() for row in one.rows]
     result |= verdict_pages.pages(printed, rows)
     result |= paper_figures.pages(printed, rows, images())
+    result |= atlas.pages(shown_experiments())
     return result | mutation_page.pages() | settings.pages(ProfileResults(RESULTS / "standard"))
 
 

@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from .. import __version__
-from . import info, law, needs, oracle, rom, run, trade, view
+from . import info, law, limits, needs, oracle, rom, run, trade, view
 from .terminal import tell_progress
 
 app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False, add_completion=False,
@@ -14,7 +14,7 @@ app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False, add_comp
 for name, command in (("run", run.run), ("info", info.describe), ("plot", view.plot),
                       ("animate", view.animate), ("export", view.export),
                       ("scenes", view.scenes),
-                      ("trade", trade.measure),
+                      ("trade", trade.measure), ("limits", limits.measure),
                       ("needs", needs.find)):
     app.command(name)(command)
 app.add_typer(oracle.app, name="oracle")

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 import typer
 
 from ..core.grid import OutOfRange
+from ..executor import BadScheduler, SchedulerLost
 from ..monitor import Unstable
 from ..scene import SceneError
 from ..store.atomic import NotWritten
@@ -22,7 +23,8 @@ from ..timestep import TooLarge
 LONGEST, LONGEST_WORD, SHOWN = 2000, 300, 100       # characters of a sentence, of a word in it
 UNREADABLE = (errno.ENAMETOOLONG, errno.EACCES, errno.ELOOP)    # of files named by the user
 BAD_INPUT, UNSTABLE, NOT_WRITTEN, INTERRUPT = 2, 3, 4, 130
-FAULTS = (SceneError, TooLarge, OutOfRange, Refused, BadCheckpoint, BadResults, InUse, Damaged)
+FAULTS = (SceneError, TooLarge, OutOfRange, Refused, BadCheckpoint, BadResults, InUse, Damaged,
+          BadScheduler)
 
 
 @contextmanager
@@ -32,7 +34,7 @@ def exit_on_errors():
         yield
     except FAULTS as fault:
         end(fault, BAD_INPUT)
-    except NotWritten as fault:
+    except (NotWritten, SchedulerLost) as fault:
         end(fault, NOT_WRITTEN)
     except OSError as fault:
         if fault.errno == errno.ENOSPC and fault.filename is None:

@@ -105,6 +105,9 @@ Data = Annotated[Path | None, typer.Option(
     help="Folder of the training runs (default: STUDY-data in the current folder).")]
 MapFile = Annotated[Path | None, typer.Option(
     "--map", help="File of the reduced model (default: STUDY.npz in the current folder).")]
+Scheduler = Annotated[str | None, typer.Option(
+    metavar="local:N|tcp://HOST:PORT", help="Dask cluster that performs the tasks: N new processes "
+    "of this machine, or the workers of a scheduler (docs/howto/many-machines.md).")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the file of --out.")]
 
 

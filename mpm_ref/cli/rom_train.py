@@ -9,6 +9,7 @@ import typer
 
 from ..rom import model_file
 from ..rom.study import dataset, reduce
+from ..rom.study.distribute import generate_on
 from ..rom.study.generate import (
     INTERRUPTED,
     NOT_WRITTEN,
@@ -32,6 +33,7 @@ from .options import (
     MAPS,
     Data,
     Overwrite,
+    Scheduler,
     StudyName,
     load_study,
     named,
@@ -52,10 +54,12 @@ def make_data(
         "--out", "-o", help="Folder for the runs (default: STUDY-data).")] = None,
     workers: Annotated[int | None, typer.Option(
         help="Number of processes with one thread each (default: all cores).", min=1)] = None,
+    scheduler: Scheduler = None,
 ):
     """Generate the full-order runs of a study.
 
-    Finished runs are skipped, interrupted ones resume from their checkpoints. Exit status:
+    Finished runs are skipped, interrupted ones resume from their checkpoints. The workers of a
+    scheduler write the runs, so that all machines need the folder under the same path. Exit status:
     0 success, 2 bad input, 3 a run became unstable, 4 a file could not be written, 130 Ctrl-C.
     """
     with exit_on_errors():
@@ -63,6 +67,7 @@ def make_data(
         folder, ended = named(out, study, "-data"), []
         with options():
             require_folder_name(folder)
+            require_one(workers, scheduler)
             supported_model(study, study.mu[0])     # refuses what reduced runs do not know
         make_folder(folder)
         workers = workers or os.cpu_count() or 1
@@ -70,10 +75,13 @@ def make_data(
                            "same command again goes on"),
               passing(total=len(study.mu), unit="run", desc=str(folder)) as bar):
             if bar.disable:
-                print(f"{folder}: {counted(len(study.mu), 'run')} of {study.path.stem}, "
-                      f"{min(workers, len(study.mu))} at a time", flush=True)
+                place = (f"on workers of {scheduler}" if scheduler else
+                         f"{min(workers, len(study.mu))} at a time")
+                print(f"{folder}: {counted(len(study.mu), 'run')} of {study.path.stem}, {place}",
+                      flush=True)
             announce_compilation_of_workers()
-            for done in generate(study, folder, workers):
+            for done in (generate_on(scheduler, study, folder) if scheduler else
+                         generate(study, folder, workers)):
                 if done.why == INTERRUPTED:
                     raise KeyboardInterrupt
                 if not done.has_data:
@@ -87,6 +95,13 @@ def make_data(
                           flush=True)
         print(f"{folder}: {counted(len(study.mu), 'run')} of {study.path.stem}: "
               f"{counts_text(ended)}; {len(study.test)} held out")
+
+
+def require_one(workers, scheduler):
+    """Raise ValueError where both a number of processes and a scheduler are given."""
+    if workers is not None and scheduler is not None:
+        raise ValueError(f"--workers {workers} and --scheduler {scheduler}: give one of the two; "
+                         "the scheduler has workers of its own")
 
 
 def origin_word(done):

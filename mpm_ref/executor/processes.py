@@ -155,7 +155,7 @@ class _Batch:
 
     @property
     def is_under_way(self):
-        """Whether tasks have not ended."""
+        """Return whether tasks have not ended."""
         return self._remaining > 0
 
     def end(self, outcome):

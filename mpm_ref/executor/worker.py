@@ -34,7 +34,7 @@ class WorkerProcess:
 
     @property
     def is_idle(self):
-        """Whether the process waits for a task."""
+        """Return whether the process waits for a task."""
         return self.is_ready and self.index is None
 
     def send(self, index, job, task):

@@ -9,7 +9,7 @@ A setting is a dictionary of some of these knobs; what it leaves out stays as th
     degree      of the B-spline: 1, 2 or 3
     transfer    "mls", "apic", "flip 0.95" (with its share of FLIP), "apic rpic 0.5", "pic", ...
     integrator  "explicit", or the word of an implicit method such as "hot-plus"
-eps         tolerance of an implicit step
+    eps         tolerance of an implicit step
 """
 
 import re

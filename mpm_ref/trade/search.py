@@ -2,7 +2,7 @@
 
 1. The scene's own setting runs on halved grids until their reference is known to half the error
    asked for the whole run, stops improving, or the next grid does not fit into the budget.
-2. Each single knob walks over the grids: coarser as long as it keeps the error, else finer as long
+2. The scene's own setting, and each single knob, walk over the grids: coarser as long as it keeps the error, else finer as long
    as it can still be cheaper than the best so far.
 3. Pairs of the knobs that beat the scene's own setting walk likewise.
 
@@ -55,7 +55,7 @@ class TradeSearch:
         self.start()
         self.refine()
         self.compare_families()
-        self.walk(single_knobs(self.scene))
+        self.walk([Setting(), *single_knobs(self.scene)])
         self.walk(self.promising_pairs())
 
     # the reference

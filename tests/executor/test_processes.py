@@ -22,6 +22,7 @@ from executor_tasks import (
     interrupt,
     note_setup,
     noted,
+    noted_again,
     process_number,
     process_numbers,
     sleep_on,
@@ -74,9 +75,10 @@ def test_no_task_needs_no_process():
 
 
 def test_one_worker_is_this_process_and_lazy():
+    tasks = iter(range(3))
     with open_executor(workers=1) as executor:
-        results = executor.run(process_number, iter([0, 1]))
-        assert next(results).value == os.getpid()
+        assert next(executor.run(process_number, tasks)).value == os.getpid()
+    assert list(tasks) == [1, 2]
     assert (executor.workers, executor.dashboard) == (1, None)
 
 
@@ -111,7 +113,7 @@ def test_exit_ends_a_task_alone(executors, workers):
 def test_setup_runs_once_in_each_process(workers):
     with open_executor(workers=workers, setup=note_setup) as executor:
         first = [o.value for o in executor.run(noted, range(4))]
-        second = [o.value for o in executor.run(noted, range(4))]
+        second = [o.value for o in executor.run(noted_again, range(4))]
     assert len(set(first + second)) == 1
     assert len(first[0]) == 1
 

@@ -49,7 +49,8 @@ FLOORS = (
 )
 OUTSIDE = {"validation", "figures", "benchmarks", "tests"}      # floor 9 and what tests it
 TRAINING = ("rom.train", "nclaw.train", "nclaw.gnn.train", "training")   # files that know torch
-LATE = {"torch", "matplotlib", "vtk", "trimesh", "taichi", "warp", "PIL"}   # also in functions
+LATE = {"torch", "matplotlib", "vtk", "trimesh", "taichi", "warp", "PIL",
+        "dask", "distributed"}      # also in functions
 
 
 def modules(root, package):

@@ -16,6 +16,7 @@ PARAMETERS = 6              # without self and cls
 # More parameters than six, each with its reason.
 MANY_PARAMETERS: dict[str, str] = {
     "mpm_ref/cli/run.py::run": "typer: one parameter per option",
+    "mpm_ref/cli/limits.py::measure": "typer: one parameter per option",
     "mpm_ref/cli/oracle.py::record": "typer: one parameter per option",
     "mpm_ref/cli/rom.py::run": "typer: one parameter per option",
     "mpm_ref/cli/trade.py::measure": "typer: one parameter per option",

@@ -12,7 +12,7 @@ from validation.common.verdicts import VARIANTS
 sys.path.insert(0, str(ROOT / "docs"))
 
 from check_links import main as check
-from extensions import docstrings, generate, packages, results
+from extensions import atlas, docstrings, generate, packages, results
 
 SOURCE = re.compile(r"\{source\}`(?:[^`<]*<)?([^`>]+)>?`")
 
@@ -61,6 +61,24 @@ def test_every_experiment_has_a_title_a_link_to_its_numbers_and_its_code(result_
     links = SOURCE.findall(table)
     assert len(links) > 100
     assert not [link for link in links if not exists(ROOT, link)]
+
+
+def test_the_atlas_has_every_extreme_once_with_its_worst_verdict(result_pages):
+    page = result_pages["results/generated/atlas.md"]
+    names = [name for name in results.experiment_places() if name.startswith("extremes.")]
+    listed = [f"extremes.{name}" for ids in atlas.KINDS.values() for name in ids]
+    assert sorted(listed) == sorted(names)
+    for name in names:
+        assert page.count(f"](#numbers.{name}):") == 1
+    assert ('<span class="atlas-pass">[Multiples of the stable time step]'
+            "(#numbers.extremes.explicit.cfl_ladder): 12 pass</span>") in page
+    assert page.count('"atlas-miss"') == sum(
+        any(row.verdict == "miss" for row in one.rows) for one in results.shown_experiments()
+        if one.section.id.startswith("extremes.") and one.profile == "standard")
+    css = (ROOT / "docs/_static/site.css").read_text(encoding="utf-8")
+    for kind in ("pass", "miss", "info"):
+        assert f"span.atlas-{kind} {{" in css
+        assert f'"atlas-{kind}"' in page
 
 
 def test_settings_for_one_per_cent_come_from_the_records(result_pages):

@@ -57,6 +57,10 @@ def noted(x):
     return tuple(NUMBERS)
 
 
+def noted_again(x):
+    return tuple(NUMBERS)
+
+
 def failing_setup():
     raise OSError("no disk")
 

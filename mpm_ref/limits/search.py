@@ -1,0 +1,178 @@
+"""Search outward from a scene for its nearest failures, along each axis, then on pairs of axes.
+
+Along each direction of each axis the factors of `axes.rungs` are tried from 1 outward until one is
+not right. Between the last good factor and the first bad one, the interval is halved in the
+logarithm until it spans at most `NARROW`. A failure between two good rungs is not found. The
+directions that have cost least so far go first, so that a small budget gives a coarse answer for
+all of them, and a fine one for what is refused at once.
+
+A bad factor whose run is too long or not checked ends its direction without halving: that is the
+end of what was looked at, no failure of the scene.
+"""
+
+from dataclasses import dataclass
+from itertools import combinations
+from math import ceil, inf, isnan, log2, log10, sqrt
+
+from ..sweep.observation import STOPPED
+from .axes import DOWN, UP, applicable, is_discrete, rungs
+from .cell import cell_of
+from .verdict import UNCHECKED, WRONG, CellVerdict
+
+NARROW = 1.1            # ratio of the first bad to the last good factor
+NARROW_SHIFT = 2.0      # of a shift's
+EVEN = 1e-9             # of a halving, which round-off may leave
+PER_WORKER = 2          # cells of a round, so that few workers wait for the last one
+WIDEST = 3              # axes whose pairs are mapped
+SIDE = 5                # factors of an axis on a map
+
+
+@dataclass
+class Direction:
+    """The search along one direction of an axis."""
+
+    axis: object                        # `axes.ScaleAxis`
+    direction: str                      # DOWN or UP
+    rungs: tuple                        # factors, from 1 outward
+    is_discrete: bool
+    good: float = 1.0                   # the farthest factor that is right
+    bad: float | None = None            # the nearest one that is not
+    verdict: CellVerdict | None = None  # on the bad one
+    is_late: bool = False               # whether the budget ended the search
+    cpu: float = 0.0                    # [s] of its runs so far
+
+    @property
+    def failed(self):
+        """Return whether the bad factor is a failure, not the end of what was looked at."""
+        return self.verdict is not None and self.verdict.outcome not in (STOPPED, UNCHECKED)
+
+    @property
+    def margin(self):
+        """Return the factor > 1 by which the axis may change in this direction."""
+        return max(self.good, 1.0 / self.good)
+
+    def next_factor(self):
+        """Return the factor to be tried next, or None at the end of the search."""
+        if self.is_late:
+            return None
+        if self.bad is None:
+            return next(iter(self.rungs_left()), None)
+        return sqrt(self.good * self.bad) if self.halvings() else None
+
+    def rungs_left(self):
+        """Return the rungs past the last good factor."""
+        return [factor for factor in self.rungs if abs(log10(factor)) > abs(log10(self.good))]
+
+    def halvings(self):
+        """Return the number of factors between the last good and the bad one that narrow the
+        interval down.
+        """
+        if self.is_discrete or not self.failed:
+            return 0
+        narrow = NARROW_SHIFT if self.axis.name == "origin" else NARROW
+        return max(ceil(log2(abs(log10(self.bad / self.good)) / log10(narrow)) - EVEN), 0)
+
+    def remaining(self):
+        """Return about how many factors are missing to the end of the search."""
+        return len(self.rungs_left()) if self.bad is None else self.halvings()
+
+    def note(self, factor, verdict):
+        """Take the verdict on the factor that was tried; None ends the search as late."""
+        self.cpu += 0.0 if verdict is None or isnan(verdict.cpu) else verdict.cpu
+        if verdict is None:
+            self.is_late = True
+        elif verdict.is_right:
+            self.good = factor
+        else:
+            self.bad, self.verdict = factor, verdict
+
+
+@dataclass(frozen=True)
+class PairMap:
+    """The verdicts on a pair of axes: verdicts[i][j] with factors[0][i] and factors[1][j]."""
+
+    axes: tuple         # of two `axes.ScaleAxis`
+    factors: tuple      # of two tuples of factors, each increasing
+    verdicts: tuple     # of tuples of `CellVerdict`, None where the budget ended first
+
+
+class LimitsSearch:
+    """All directions and maps of a search."""
+
+    def __init__(self, judge):
+        """Prepare a search by a `verdict.CellJudge`."""
+        self.judge = judge
+        tables = judge.scenes.tables()
+        self.axes, self.left_out = applicable(tables, judge.quantities)
+        self.directions = [
+            Direction(axis, direction, rungs(axis, tables, direction), is_discrete(axis, direction))
+            for axis in self.axes for direction in (DOWN, UP)
+            if rungs(axis, tables, direction)]
+        self.maps = []
+
+    def run(self):
+        """Search along all directions, then on the pairs of the axes with the least margins."""
+        explore(self.directions, self.judge.judge, self.judge.runs.workers)
+        for pair in combinations(nearest_axes(self.directions), 2):
+            self.maps.append(self._mapped(pair))
+
+    def _mapped(self, pair):
+        """Return the `PairMap` of two axes."""
+        factors = tuple(map_factors([one for one in self.directions if one.axis is axis])
+                        for axis in pair)
+        cells = [[cell_of({pair[0].name: a, pair[1].name: b}) for b in factors[1]]
+                 for a in factors[0]]
+        verdicts = self.judge.judge([cell for row in cells for cell in row])
+        return PairMap(pair, factors, tuple(tuple(verdicts[cell] for cell in row)
+                                            for row in cells))
+
+    def remaining(self):
+        """Return about how many cells the budget has left out."""
+        return sum(one.remaining() for one in self.directions) + sum(
+            verdict is None for one in self.maps for row in one.verdicts for verdict in row)
+
+    def wrong_cells(self):
+        """Return the cells that finished with a wrong result, each with its verdict."""
+        return {cell: verdict for cell, verdict in self.judge.verdicts.items()
+                if verdict.outcome == WRONG}
+
+
+def explore(directions, judge, workers=1):
+    """Move all directions on to their ends, first those that have cost least so far.
+
+    judge(cells) returns {cell: verdict}; see `verdict.CellJudge.judge`. workers: runs at a time.
+    """
+    while True:
+        factors = [(one, factor) for one in sorted(directions, key=lambda one: one.cpu)
+                   if (factor := one.next_factor()) is not None]
+        if not factors:
+            return
+        factors = factors[:PER_WORKER * workers]
+        cells = [cell_of({one.axis.name: factor}) for one, factor in factors]
+        verdicts = judge(cells)
+        for (one, factor), cell in zip(factors, cells, strict=True):
+            one.note(factor, verdicts[cell])
+
+
+def nearest_axes(directions, most=WIDEST):
+    """Return the axes with the least margins to a failure, nearest first, at most so many."""
+    margins = {}
+    for one in directions:
+        if one.failed:
+            margins.setdefault(one.axis.name, (inf, one.axis))
+            margins[one.axis.name] = min(margins[one.axis.name], (one.margin, one.axis),
+                                         key=lambda pair: pair[0])
+    return [axis for _, axis in sorted(margins.values(), key=lambda pair: pair[0])][:most]
+
+
+def map_factors(directions):
+    """Return at most `SIDE` increasing factors of an axis: 1, the nearest bad factor (or the
+    farthest good one) in each direction, and one between.
+    """
+    factors = {1.0}
+    for one in directions:
+        end = one.bad if one.bad is not None else one.good
+        middle = [f for f in one.rungs if abs(log10(f)) < abs(log10(end))][-1:] \
+            if one.is_discrete else [sqrt(end)]
+        factors |= {end, *middle}
+    return tuple(sorted(factors))

@@ -1,0 +1,223 @@
+"""Judge cells: right, wrong, or with the outcome of a run that did not finish.
+
+A cell that finished is compared with its own physical problem on other grids. Its time step and its
+particles follow the grid. The difference of two runs is the largest root mean square one of a
+quantity, or with "@end" the last one, relative to its largest change during the reference run.
+
+* The tolerance of a quantity is the error asked, or twice the difference of the scene as given from
+  itself at dx/2, whichever is larger: nobody expects of a changed scene what the scene as given
+  does not have.
+* A cell is right if it differs from itself at 2 dx by at most the tolerance (the grids converge,
+  and the finer of them is nearer), which costs least. Otherwise itself at dx/2 decides.
+* Cells that change numerical axes alone are compared with the scene as given at dx/2, which is one
+  run for all of them; of shifted scenes the changes since the start are compared.
+* A cell is not checked where its run at dx/2 does not finish.
+* A run is too long if it takes more than `MOST_LONGER` times the CPU time of the scene as given, on
+  the grid of that run. Runs that the budget ended have no verdict.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..sweep.difference import largest_change, relative_difference
+from ..sweep.observation import REFUSED, STOPPED, UNSTABLE
+from ..sweep.quantity import OutputQuantity
+from ..sweep.runs import CRASHED, RunRequest
+from .axes import AXIS, MOST_LONGER
+from .cell import COARSE, FINE, CellScenes, cell_text, physical
+
+RIGHT, WRONG, UNCHECKED = "right", "wrong", "not checked"
+OUTCOMES = (RIGHT, WRONG, UNCHECKED, UNSTABLE, REFUSED, STOPPED, CRASHED)
+SLACK = 2.0             # times the scene's own difference from its refinement
+LEAST_CPU = 2.0         # [s] that any run may take
+BUDGET = 0.9            # of the CPU time allowed, below which a stopped run was stopped early
+AT_FINE, AT_COARSE, AS_GIVEN = "itself at dx/2", "itself at 2 dx", "the scene as given at dx/2"
+
+
+@dataclass(frozen=True)
+class CellVerdict:
+    """The verdict on a cell; errors and tolerances are relative, that of the worst quantity."""
+
+    outcome: str                # of OUTCOMES
+    message: str = ""           # of the run that did not finish
+    error: float = np.nan       # difference from the reference
+    tolerance: float = np.nan
+    quantity: str = ""
+    reference: str = ""         # in words
+    cpu: float = np.nan         # [s] of the cell's run
+    steps: int = 0
+    until: float = 0.0          # [s] that it reached
+
+    @property
+    def is_right(self):
+        """Return whether the cell finished and agrees with its reference."""
+        return self.outcome == RIGHT
+
+
+class NoReference(Exception):
+    """The scene as given has no reference: the message says why, and what it would take.
+
+    outcome: that of its run.
+    """
+
+    def __init__(self, message, outcome):
+        self.outcome = outcome
+        super().__init__(message)
+
+
+class CellJudge:
+    """Runs cells and their references, each once, and judges them."""
+
+    def __init__(self, scene, runs, probes, quantities, error):
+        """Prepare to judge the cells of a scene whose end is a time.
+
+        runs: `sweep.runs.SceneRuns`; probes: those of the scene as given; quantities: texts of
+        those of the runs that are judged; error: relative.
+        """
+        self.scenes = CellScenes(scene, probes)
+        self.runs, self.quantities, self.error = runs, quantities, error
+        self.verdicts, self.base = {}, {}       # {cell: CellVerdict}, {dx: RunObservation}
+        self.tolerance = {}                     # {quantity: relative}
+        self.cpu = 0.0                          # [s] of all runs, references included
+
+    def start(self):
+        """Run the scene as given and its companions. Raises NoReference where one fails."""
+        labels = {1.0: "as given", COARSE: "as given, 2 dx", FINE: "as given, dx/2"}
+        self.base |= self._observe({dx: ((), dx, np.inf, text) for dx, text in labels.items()})
+        for dx in (1.0, FINE):
+            run = self.base[dx]
+            if not run.finished:
+                price = self._price(dx) * (run.outcome == STOPPED)
+                raise NoReference(f"{labels[dx]}: {run.outcome}: {run.message}{price}",
+                                  run.outcome)
+        differences = self._differences(self.base[1.0], self.base[FINE], False)
+        self.tolerance = {text: max(self.error, SLACK * difference)
+                          for text, difference in differences.items()}
+        self.verdicts[()] = self._compared(self.base[1.0], self.base[FINE], (), AT_FINE)
+
+    def _price(self, dx):
+        """Return what the run would take, as far as the others say."""
+        cpu, d = self.base[1.0].cost.cpu, self.scenes.tables()["dim"]
+        if dx == 1.0 or not cpu > 0.0:
+            return "; give a larger --budget"
+        return (f"; it may take {cpu * 2.0 ** (d + 1):.0f} s of CPU time (the scene as given took "
+                f"{cpu:.3g} s), and all limits about 100 times that: give a larger --budget")
+
+    def judge(self, cells):
+        """Return {cell: `CellVerdict`, or None where the budget ended first}."""
+        new = [cell for cell in dict.fromkeys(cells) if cell not in self.verdicts]
+        runs = self._observe({cell: (cell, 1.0, self._most(1.0), cell_text(cell))
+                              for cell in new})
+        finished = [cell for cell in new if runs[cell].finished]
+        for cell in new:
+            if not runs[cell].finished:
+                self._note(cell, self._unfinished(runs[cell], self._most(1.0)))
+        for stage in (self._by_the_scene, self._by_coarse_grids, self._by_fine_grids):
+            for cell, verdict in stage({c: runs[c] for c in finished}).items():
+                self._note(cell, verdict)
+                finished.remove(cell)
+        return {cell: self.verdicts.get(cell) for cell in cells}
+
+    def _note(self, cell, verdict):
+        if verdict is not None:
+            self.verdicts[cell] = verdict
+
+    # three kinds of references; each returns the verdicts that it can give
+
+    def _by_the_scene(self, runs):
+        """Compare cells of numerical axes alone with the scene as given at dx/2."""
+        return {cell: self._compared(run, self.base[FINE], cell, AS_GIVEN)
+                for cell, run in runs.items() if not physical(cell)}
+
+    def _by_coarse_grids(self, runs):
+        """Compare cells of physical axes alone with themselves at 2 dx; those that agree are
+        right.
+        """
+        runs = {cell: run for cell, run in runs.items() if physical(cell) == cell}
+        coarse = self._companions(runs, COARSE)
+        verdicts = {cell: self._compared(run, coarse[cell], cell, AT_COARSE)
+                    for cell, run in runs.items()}
+        return {cell: verdict for cell, verdict in verdicts.items() if verdict.is_right}
+
+    def _by_fine_grids(self, runs):
+        """Compare cells with their physical problem at dx/2."""
+        fine, verdicts = self._companions(runs, FINE), {}
+        for cell, run in runs.items():
+            reference = fine[physical(cell)]
+            if reference.finished:
+                verdicts[cell] = self._compared(run, reference, cell, AT_FINE)
+            else:
+                verdicts[cell] = self._unchecked(run, reference)
+        return verdicts
+
+    def _companions(self, cells, dx):
+        """Return {physical cell: `RunObservation` at dx times a factor}."""
+        words = {COARSE: "2 dx", FINE: "dx/2"}[dx]
+        return self._observe({cell: (cell, dx, self._most(dx), f"{cell_text(cell)}, {words}")
+                              for cell in dict.fromkeys(map(physical, cells))})
+
+    def _observe(self, wanted):
+        """Return {key: `RunObservation`} of {key: (cell, factor of dx, most CPU time, label)}."""
+        requests = {label: RunRequest(self.scenes.scene(cell, dx), most,
+                                      probes=self.scenes.probes(cell))
+                    for cell, dx, most, label in wanted.values()}
+        runs = self.runs.observe(requests)
+        self.cpu += float(np.nansum([run.cost.cpu for run in runs.values()]))
+        return {key: runs[label] for key, (*_, label) in wanted.items()}
+
+    def _most(self, dx):
+        """Return the CPU time [s] that a run at dx times a factor may take."""
+        cpu = self.base[1.0 if dx == COARSE else dx].cost.cpu
+        return max(MOST_LONGER * np.nan_to_num(cpu), LEAST_CPU)
+
+    # verdicts
+
+    def _unfinished(self, run, most):
+        """Return the verdict on a run that did not finish; None where the budget ended it."""
+        if is_late(run, most):
+            return None
+        return CellVerdict(run.outcome, run.message, cpu=run.cost.cpu, steps=run.cost.steps,
+                           until=run.until)
+
+    def _unchecked(self, run, reference):
+        """Return the verdict on a run whose reference did not finish."""
+        if is_late(reference, self._most(FINE)):
+            return None
+        return CellVerdict(UNCHECKED, f"the reference at dx/2: {reference.outcome}: "
+                           f"{reference.message}", cpu=run.cost.cpu, steps=run.cost.steps,
+                           until=run.until)
+
+    def _compared(self, run, reference, cell, text):
+        """Return RIGHT or WRONG of a run beside a reference."""
+        shifted = any(AXIS[name].name == "origin" for name, _ in cell)
+        errors = self._differences(run, reference, shifted)
+        worst = max(errors, key=lambda name: errors[name] / self.tolerance[name])
+        outcome = RIGHT if errors[worst] <= self.tolerance[worst] else WRONG
+        return CellVerdict(outcome, "", errors[worst], self.tolerance[worst], worst, text,
+                           run.cost.cpu, run.cost.steps, run.until)
+
+    def _differences(self, run, reference, shifted):
+        """Return {quantity: largest relative difference of two runs}."""
+        errors = {text: differences(run.values[text], reference.values[text], shifted)
+                  for text in self.quantities}
+        return {text: float(error[-1] if OutputQuantity(text).at_end else error.max())
+                for text, error in errors.items()}
+
+
+def differences(values, reference, shifted):
+    """Return the differences (T,) of values (T, k), relative to the largest change of the
+    reference; infinite where they cannot be compared.
+
+    shifted: whether the changes since the start are compared.
+    """
+    scale = largest_change(reference)
+    if shifted:
+        values, reference = values - values[0], reference - reference[0]
+    error = relative_difference(values, reference, scale)
+    return np.where(np.isnan(error), np.inf, error)
+
+
+def is_late(run, most):
+    """Return whether the budget stopped a run, not the CPU time [s] that it might take."""
+    return run.outcome == STOPPED and not run.cost.cpu >= BUDGET * most

@@ -1,0 +1,198 @@
+"""Verdicts by synthetic runs of known values: which reference decides, and when there is none."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mpm_ref.limits.cell import cell_of
+from mpm_ref.limits.verdict import (
+    AS_GIVEN,
+    AT_COARSE,
+    AT_FINE,
+    RIGHT,
+    UNCHECKED,
+    WRONG,
+    CellJudge,
+    NoReference,
+)
+from mpm_ref.scene import SceneError, loads
+from mpm_ref.sweep.observation import (
+    FINISHED,
+    REFUSED,
+    STOPPED,
+    UNSTABLE,
+    RunCost,
+    RunObservation,
+)
+
+SCENE = """
+dim = 2
+dx = 0.1
+end = 1.0
+gravity = [0.0, -1.0]
+[[body]]
+name = "block"
+density = 1.0
+shape = { type = "box", lower = [0.0, 0.0], upper = [1.0, 1.0] }
+material = { law = "fixed_corotated", E = 1.0, nu = 0.3 }
+"""
+PROBES = (("block", np.array([[0.0, 0.0], [1.0, 1.0]])),)
+BASE = {"as given": 1.10, "as given, 2 dx": 1.25, "as given, dx/2": 1.0}
+
+
+def observation(displacement=1.0, outcome=FINISHED, cpu=1.0, start=0.0):
+    """A run whose two numbers grow from `start` by a displacement; not finished: NaN."""
+    values = start + np.array([[0.0, 0.0], [displacement, displacement]])
+    if outcome != FINISHED:
+        values[1:] = np.nan
+    return RunObservation({"positions": values}, RunCost(cpu, cpu, 10, 4, 1), outcome,
+                          "" if outcome == FINISHED else f"it was {outcome}")
+
+
+class SyntheticRuns:
+    """Observations by the label of a request; notes the labels and the requests."""
+
+    def __init__(self, observations):
+        self.observations, self.requests = observations, {}
+
+    def observe(self, requests):
+        self.requests |= requests
+        return {label: self.answer(label, request) for label, request in requests.items()}
+
+    def answer(self, label, request):
+        if isinstance(request.scene, SceneError):
+            return observation(outcome=REFUSED)
+        answer = self.observations[label]
+        return answer if isinstance(answer, RunObservation) else observation(answer)
+
+
+def judge_of(error=0.01, **cells):
+    runs = SyntheticRuns(BASE | cells)
+    judge = CellJudge(loads(SCENE), runs, PROBES, ("positions",), error)
+    judge.start()
+    return judge
+
+
+def verdict_on(factors, error=0.01, **runs):
+    judge = judge_of(error, **runs)
+    cell = cell_of(factors)
+    return judge.judge([cell])[cell], judge
+
+
+def labels(text, own, coarse=None, fine=None):
+    """Observations of a cell and its companions by their labels."""
+    answers = {text: own, f"{text}, 2 dx": coarse, f"{text}, dx/2": fine}
+    return {label: answer for label, answer in answers.items() if answer is not None}
+
+
+def test_tolerance_is_twice_the_scenes_own_difference_or_the_error():
+    assert judge_of().tolerance["positions"] == pytest.approx(0.2)
+    assert judge_of(error=0.5).tolerance["positions"] == 0.5
+
+
+def test_agreement_with_the_coarse_grid_suffices():
+    verdict, judge = verdict_on({"density": 2.0}, **labels("density x 2", 3.0, 3.5))
+    assert (verdict.outcome, verdict.reference) == (RIGHT, AT_COARSE)
+    assert verdict.error == pytest.approx(0.5 / 3.5)
+    assert "density x 2, dx/2" not in judge.runs.requests
+
+
+@pytest.mark.parametrize(("fine", "outcome"), [(2.6, RIGHT), (2.4, WRONG)])
+def test_otherwise_the_fine_grid_decides(fine, outcome):
+    verdict, _ = verdict_on({"density": 2.0}, **labels("density x 2", 3.0, 9.0, fine))
+    assert (verdict.outcome, verdict.reference) == (outcome, AT_FINE)
+    assert verdict.error == pytest.approx((3.0 - fine) / fine)
+    assert verdict.quantity == "positions"
+
+
+def test_coarse_run_that_fails_leaves_it_to_the_fine_one():
+    verdict, _ = verdict_on({"density": 2.0}, **labels(
+        "density x 2", 3.0, observation(outcome=UNSTABLE), 2.9))
+    assert (verdict.outcome, verdict.reference) == (RIGHT, AT_FINE)
+
+
+@pytest.mark.parametrize(("own", "outcome"), [(1.15, RIGHT), (1.25, WRONG)])
+def test_numerical_axes_are_compared_with_the_scene_as_given(own, outcome):
+    verdict, judge = verdict_on({"time_step": 0.5}, **{"time_step x 0.5": own})
+    assert (verdict.outcome, verdict.reference) == (outcome, AS_GIVEN)
+    assert len(judge.runs.requests) == 4
+
+
+def test_mixed_cell_is_compared_with_its_physical_problem():
+    verdict, judge = verdict_on({"time_step": 0.5, "density": 2.0}, **{
+        "time_step x 0.5, density x 2": 3.0, "density x 2, dx/2": 2.9})
+    assert (verdict.outcome, verdict.reference) == (RIGHT, AT_FINE)
+    reference = judge.runs.requests["density x 2, dx/2"].scene
+    assert (reference.dx, reference.body[0].density, reference.cfl) == (0.05, 2.0, None)
+
+
+def test_shifted_scene_is_compared_by_its_changes():
+    shifted = {"origin x 100": observation(1.1, start=99.0)}
+    verdict, judge = verdict_on({"origin": 100.0}, **shifted)
+    assert verdict.outcome == RIGHT
+    assert judge.runs.requests["origin x 100"].probes[0][1] == pytest.approx(PROBES[0][1] + 99.0)
+    stuck = {"origin x 100": observation(0.0, start=99.0)}
+    assert verdict_on({"origin": 100.0}, **stuck)[0].outcome == WRONG
+
+
+@pytest.mark.parametrize("outcome", [UNSTABLE, REFUSED])
+def test_run_that_does_not_finish_has_its_outcome(outcome):
+    verdict, _ = verdict_on({"density": 2.0}, **{"density x 2": observation(outcome=outcome)})
+    assert (verdict.outcome, verdict.message) == (outcome, f"it was {outcome}")
+
+
+def test_impossible_scene_is_refused():
+    verdict, _ = verdict_on({"time_step": 10.0})        # cfl 5
+    assert verdict.outcome == REFUSED
+
+
+def test_long_run_is_told_from_one_that_the_budget_ended():
+    for cpu, outcome in ((20.0, STOPPED), (3.0, None)):
+        run = observation(outcome=STOPPED, cpu=cpu)
+        verdict, judge = verdict_on({"density": 2.0}, **{"density x 2": run})
+        assert judge.runs.requests["density x 2"].most_cpu == 20.0
+        assert (verdict and verdict.outcome) == outcome
+
+
+def test_cell_without_reference_is_not_checked():
+    for cpu, outcome in ((20.0, UNCHECKED), (3.0, None)):
+        runs = labels("density x 2", 3.0, 9.0, observation(outcome=STOPPED, cpu=cpu))
+        verdict, _ = verdict_on({"density": 2.0}, **runs)
+        assert (verdict and verdict.outcome) == outcome
+
+
+def test_missing_values_are_no_agreement():
+    verdict, _ = verdict_on({"density": 2.0}, **labels(
+        "density x 2", 3.0, observation(np.nan), observation(np.nan)))
+    assert verdict.outcome == WRONG
+
+
+def test_quantity_at_the_end_is_compared_there_alone():
+    values = {"as given": [0.0, 5.0, 1.1], "as given, dx/2": [0.0, 1.0, 1.0]}
+    runs = SyntheticRuns({label: replace(observation(), values={
+        text: np.array([values.get(label, values["as given"])]).T
+        for text in ("positions", "positions@end")}) for label in BASE})
+    judge = CellJudge(loads(SCENE), runs, PROBES, ("positions", "positions@end"), 0.01)
+    judge.start()
+    assert judge.tolerance == {"positions": pytest.approx(8.0),
+                               "positions@end": pytest.approx(0.2)}
+
+
+def test_no_run_is_asked_for_twice():
+    judge = judge_of(**labels("density x 2", 3.0, 3.0))
+    cell = cell_of({"density": 2.0})
+    judge.judge([cell])
+    judge.runs.requests.clear()
+    assert judge.judge([cell, cell])[cell].outcome == RIGHT
+    assert judge.judge([()])[()].outcome == RIGHT
+    assert not judge.runs.requests
+
+
+@pytest.mark.parametrize(("label", "outcome", "message"), [
+    ("as given", UNSTABLE, "as given: unstable: it was unstable"),
+    ("as given, dx/2", STOPPED, "it may take 8 s of CPU time"),
+])
+def test_scene_without_reference_is_said_so(label, outcome, message):
+    with pytest.raises(NoReference, match=message):
+        judge_of(**{label: observation(outcome=outcome)})
