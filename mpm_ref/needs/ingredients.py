@@ -82,10 +82,12 @@ def removed(scene, removal):
 
 
 def removals_of(scene):
-    """Return the removals that a scene with named parts offers, a tuple of `Removal`."""
-    return (*scheme_removals(scene), *resolution_removals(scene),
+    """Return the removals that a scene with named parts offers, a tuple of `Removal`: first those
+    that save time, last those that may cost some.
+    """
+    return (*part_removals(scene), *load_removals(scene),
             *(removal for body in scene.body for removal in body_removals(scene, body)),
-            *part_removals(scene), *load_removals(scene))
+            *resolution_removals(scene), *scheme_removals(scene))
 
 
 # the transfer

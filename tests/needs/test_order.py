@@ -168,6 +168,12 @@ def test_budget_ends_the_order_and_says_what_is_missing():
     assert result.missing_cpu >= CPU
 
 
+def test_order_that_the_budget_ends_is_not_complete():
+    result, _ = result_of({"a": 0.5, "b": 0.002, "c": 0.002}, budget=5)
+    assert verdicts(result) == {"a": REQUIRED, "b": NOT_REQUIRED, "c": NOT_REQUIRED}
+    assert (result.order, result.complete) == ((), False)
+
+
 def test_scene_that_does_not_run_has_no_result():
     runs = ToyRuns({"a": 0.0}, {}, budget=0)
     study = RemovalStudy(runs, ToyVariant(ToyScene(frozenset("a"))), 0.01)
