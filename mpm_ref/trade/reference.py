@@ -96,6 +96,6 @@ def relative(difference, scale):
     return np.divide(difference, scale, out=np.full(len(scale), np.inf), where=scale > 0.0)
 
 
-def known_times(references, error):
+def reliable_times(references, error):
     """Return the mask (T,) of times until which all references are known to an error."""
     return np.logical_and.reduce([reference.error <= error for reference in references])

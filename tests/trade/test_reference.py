@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from mpm_ref.trade.reference import known_times, reference_of
+from mpm_ref.trade.reference import reliable_times, reference_of
 
 T = np.linspace(0.0, 1.0, 11)
 EXACT = np.stack((np.sin(T), T**2), axis=1)
@@ -58,18 +58,18 @@ def test_two_grids_have_no_order():
 def test_equal_runs_are_exact():
     reference = reference_of([EXACT, EXACT, EXACT])
     assert reference.error[1:].max() < 1e-11
-    assert known_times([reference], 0.01)[1:].all()
+    assert reliable_times([reference], 0.01)[1:].all()
 
 
 def test_nothing_is_known_at_the_start():
-    assert not known_times([reference_of(levels(1.0))], 1e9)[0]
+    assert not reliable_times([reference_of(levels(1.0))], 1e9)[0]
 
 
-def test_known_times_are_those_of_all_references():
+def test_reliable_times_are_those_of_all_references():
     good, bad = reference_of(levels(1.0)), reference_of(levels(1.0, size=0.2))
     error = bad.error[5]
-    assert known_times([good], error).sum() > known_times([good, bad], error).sum() > 0
-    assert (known_times([good, bad], error) == known_times([bad], error)).all()
+    assert reliable_times([good], error).sum() > reliable_times([good, bad], error).sum() > 0
+    assert (reliable_times([good, bad], error) == reliable_times([bad], error)).all()
 
 
 def test_errors_are_relative_to_the_change_so_far():
