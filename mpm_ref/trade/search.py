@@ -20,7 +20,7 @@ from ..sweep.quantity import OutputQuantity
 from ..sweep.runs import RunRequest
 from ..sweep.setting import Setting, scene_at, setting
 from .candidates import neighbouring_grid, pairs, single_knobs
-from .reference import reliable_times, reference_of
+from .reference import reference_of, reliable_times
 
 COARSEST, FINEST = 4.0, 1.0 / 64.0      # factors of dx on halved grids; the latter may be set
 AT_START = (4.0, 2.0, 1.0, 0.5)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from mpm_ref.trade.reference import reliable_times, reference_of
+from mpm_ref.trade.reference import reference_of, reliable_times
 
 T = np.linspace(0.0, 1.0, 11)
 EXACT = np.stack((np.sin(T), T**2), axis=1)
