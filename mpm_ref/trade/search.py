@@ -2,8 +2,8 @@
 
 1. The scene's own setting runs on halved grids until their reference is known to half the error
    asked for the whole run, stops improving, or the next grid does not fit into the budget.
-2. The scene's own setting, and each single knob, walk over the grids: coarser as long as it keeps the error, else finer as long
-   as it can still be cheaper than the best so far.
+2. The scene's own setting, and each single knob, walk over the grids: coarser as long as they keep
+   the error, else finer as long as they can still be cheaper than the best so far.
 3. Pairs of the knobs that beat the scene's own setting walk likewise.
 
 A setting that fails has its outcome recorded, and its walk ends.
