@@ -130,10 +130,12 @@ def test_eight_workers_perform_tasks_at_a_time(tmp_path):
 
 
 SCRIPT = """
+    import signal
     import sys
     import executor_tasks
     from mpm_ref.executor import open_executor
     if __name__ == "__main__":
+        signal.signal(signal.SIGINT, signal.default_int_handler)    # also where tests ignore it
         with open_executor("local:2") as executor:
             for _ in executor.run(executor_tasks.await_stop, [(sys.argv[1], k) for k in range(4)]):
                 pass

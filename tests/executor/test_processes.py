@@ -7,6 +7,7 @@ import subprocess
 import sys
 import textwrap
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -222,10 +223,12 @@ def test_no_stop_is_asked_in_the_callers_process():
 
 
 SCRIPT = """
+    import signal
     import sys
     import executor_tasks
     from mpm_ref.executor import open_executor
     if __name__ == "__main__":
+        signal.signal(signal.SIGINT, signal.default_int_handler)    # also where tests ignore it
         with open_executor(workers=2) as executor:
             tasks = [(sys.argv[1], k) for k in range(4)]
             for _ in executor.run(getattr(executor_tasks, sys.argv[2]), tasks):
@@ -237,38 +240,44 @@ def environment():
     return os.environ | {"PYTHONPATH": f"{ROOT}{os.pathsep}{SUPPORT}"}
 
 
-def started_script(folder, task):
-    script = folder / "script.py"
-    script.write_text(textwrap.dedent(SCRIPT))
-    process = subprocess.Popen([sys.executable, script, folder, task], env=environment(),
+@contextmanager
+def script(folder, task):
+    """The process of the script, in a group of its own, once two of its tasks run."""
+    file = folder / "script.py"
+    file.write_text(textwrap.dedent(SCRIPT))
+    process = subprocess.Popen([sys.executable, file, folder, task], env=environment(),
                                stderr=subprocess.PIPE, text=True, start_new_session=True)
-    return process, process_numbers(folder, 2)
+    try:
+        process_numbers(folder, 2)
+        yield process
+    finally:
+        process.kill()
+        process.communicate(timeout=60)
 
 
 def test_ctrl_c_asks_tasks_to_stop(tmp_path):
-    process, numbers = started_script(tmp_path, "await_stop")
-    os.killpg(process.pid, signal.SIGINT)           # as a terminal does, to all of the group
-    message = process.communicate(timeout=60)[1]
+    with script(tmp_path, "await_stop") as process:
+        os.killpg(process.pid, signal.SIGINT)       # as a terminal does, to all of the group
+        message = process.communicate(timeout=60)[1]
     assert message.splitlines()[-1] == "KeyboardInterrupt"
     assert message.count("Traceback") == 1          # no other process prints one
-    assert all_end(numbers)
+    assert all_end(process_numbers(tmp_path, 2))
     assert len(list(tmp_path.glob("stopped-*"))) == 2
 
 
 def test_second_ctrl_c_kills_at_once(tmp_path):
-    process, numbers = started_script(tmp_path, "sleep_on")
-    for _ in range(2):
-        os.killpg(process.pid, signal.SIGINT)
-        time.sleep(1.0)
-    process.communicate(timeout=worker.GRACE / 2)
-    assert all_end(numbers)
+    with script(tmp_path, "sleep_on") as process:
+        for _ in range(2):
+            os.killpg(process.pid, signal.SIGINT)
+            time.sleep(1.0)
+        process.communicate(timeout=worker.GRACE / 2)
+    assert all_end(process_numbers(tmp_path, 2))
 
 
 def test_workers_end_with_a_killed_parent(tmp_path):
-    process, numbers = started_script(tmp_path, "sleep_on")
-    process.kill()
-    process.communicate(timeout=60)
-    assert all_end(numbers)
+    with script(tmp_path, "sleep_on") as process:
+        process.kill()
+    assert all_end(process_numbers(tmp_path, 2))
 
 
 def test_same_bits_everywhere(executors):
