@@ -7,7 +7,9 @@ import sys
 import textwrap
 import time
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from executor_scene import final_positions
@@ -31,10 +33,19 @@ from executor_tasks import (
     value_that_cannot_travel,
 )
 
-from mpm_ref.executor import SchedulerLost, WorkerMismatch, cluster, open_executor, versions
+from mpm_ref.executor import (
+    SchedulerLost,
+    WorkerMismatch,
+    cluster,
+    dask_tasks,
+    open_executor,
+    tasks,
+    versions,
+)
 
 pytest.importorskip("distributed")
 
+import distributed
 from dask_processes import dask_processes, environment
 
 
@@ -91,8 +102,8 @@ def test_dashboard_needs_bokeh(local, monkeypatch):
 
 def test_tasks_of_killed_workers_run_again(local, tmp_path):
     deaths = {0: 9, 3: 1}
-    tasks = [(str(tmp_path), k, deaths.get(k, 0)) for k in range(8)]
-    ended = outcomes(local, die_at_first, tasks)
+    ended = outcomes(local, die_at_first,
+                     [(str(tmp_path), k, deaths.get(k, 0)) for k in range(8)])
     assert ended[0].error.startswith("its workers were killed, each time that it was tried, for ")
     assert [ended[k].value for k in range(1, 8)] == list(range(1, 8))
     visits = [len(list((tmp_path / str(k)).iterdir())) for k in range(8)]
@@ -230,8 +241,7 @@ def wait_for_files(folder, pattern, count):
 def test_killed_worker_and_killed_scheduler(tmp_path):
     """The task of a killed worker runs on the other one; without a scheduler the loop ends."""
     with dask_processes(tmp_path, 2) as processes, open_executor(processes.address) as executor:
-        tasks = [(str(tmp_path), k) for k in range(4)]
-        loop = executor.run(await_stop_but_first, tasks)
+        loop = executor.run(await_stop_but_first, [(str(tmp_path), k) for k in range(4)])
         assert next(loop).index == 0
         process_numbers(tmp_path, 2)
         processes.workers[0].kill()
@@ -249,6 +259,22 @@ def test_killed_worker_and_killed_scheduler(tmp_path):
             next(loop)
         processes.workers[2].wait(timeout=60)
         assert len(list(tmp_path.glob("stopped-*"))) == 1
+
+
+@pytest.mark.parametrize("is_closing", [False, True])
+def test_task_of_a_closing_worker_begins_again_elsewhere(is_closing, monkeypatch):
+    status = distributed.Status.closing if is_closing else distributed.Status.running
+    state = SimpleNamespace(nthreads=1, tasks={"key": SimpleNamespace(state="executing")})
+    worker = SimpleNamespace(status=status, state=state, address="tcp://a:1",
+                             get_current_task=lambda: "key")
+    monkeypatch.setattr(distributed, "get_worker", lambda: worker)
+    perform = partial(dask_tasks.perform_on_worker, tasks.pack_job(square, None),
+                      versions.versions(), *tasks.pack_tasks([3]))
+    if is_closing:
+        with pytest.raises(distributed.Reschedule):
+            perform()
+    else:
+        assert tasks.unpack(0, perform()).value == 9
 
 
 def test_scheduler_that_does_not_answer(remote, monkeypatch, tmp_path):

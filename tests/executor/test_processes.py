@@ -15,6 +15,7 @@ from executor_scene import final_positions
 from executor_tasks import (
     all_end,
     await_stop_but_first,
+    catches_its_signal,
     die_at_first,
     exit_on_odd,
     fail_on_odd,
@@ -129,6 +130,10 @@ def test_failing_setup_is_the_error_of_each_task(workers):
 @pytest.mark.parametrize("workers", [1, 2])
 def test_tasks_have_one_thread(executors, workers):
     assert outcomes(executors[workers], thread_numbers, [0])[0].value == (1, 1)
+
+
+def test_workers_leave_the_terminal_and_receive_their_own_signals(executors):
+    assert outcomes(executors[2], catches_its_signal, [0])[0].value == (True, True, True)
 
 
 def test_interrupt_of_a_task_stops_all():

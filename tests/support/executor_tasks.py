@@ -49,6 +49,15 @@ def interrupt(x):
     raise KeyboardInterrupt
 
 
+def catches_its_signal(x):
+    """Return whether the process receives SIGINT from itself, as runs that stop do."""
+    received = []
+    before = signal.signal(signal.SIGINT, lambda *_: received.append(x))
+    signal.raise_signal(signal.SIGINT)
+    signal.signal(signal.SIGINT, before)
+    return received == [x], before == signal.SIG_IGN, os.getpgrp() == os.getpid()
+
+
 def note_setup():
     NUMBERS.append(len(NUMBERS))
 
