@@ -233,8 +233,7 @@ class RemovalStudy:
         """Return (removals, variant, its CPU time) after all removals that change nothing; none
         where they change something together.
         """
-        idle = sorted((run for run in singles if run.verdict == NOT_REQUIRED
-                       and run.change <= NOTHING), key=lambda run: run.cpu)
+        idle = [run for run in singles if run.verdict == NOT_REQUIRED and run.change <= NOTHING]
         variant, labels = self.first, []
         for run in idle:
             removal = variant.offers.get(run.label)
