@@ -8,8 +8,9 @@ from ..limits.search import LimitsSearch
 from ..limits.verdict import CellJudge, NoReference
 from ..store.atomic import write_bytes
 from ..sweep.observation import REFUSED
+from ..sweep.quantity import with_companions
 from .errors import BAD_INPUT, end, exit_on_errors, options
-from .options import Json, SceneName, on_interrupt
+from .options import Json, SceneName
 from .sweep_options import (
     BudgetOption,
     ErrorOption,
@@ -22,13 +23,8 @@ from .sweep_options import (
     load_sweep,
     observed_of,
     open_runs,
-    parse_budget,
-    parse_error,
-    parse_quantities,
-    parse_workers,
 )
 from .terminal import as_json
-from .trade import with_companions
 
 NO_ANSWER = 1
 
@@ -54,9 +50,8 @@ def measure(
     """
     with exit_on_errors():
         with options():
-            request = SweepRequest(name, parse_error(error), parse_budget(budget),
-                                   parse_quantities(quantity), parse_workers(workers), scheduler,
-                                   out, quiet)
+            request = SweepRequest(name, error, budget, quantity, workers, scheduler, out,
+                                   quiet).parsed()
             record, path = load_sweep(name)
             texts = with_companions(request.quantities, record.dim)     # `trade` has these runs
             observed = observed_of(record, path, texts)
@@ -69,18 +64,14 @@ def measure(
 
 def run_search(record, observed, request):
     """Return a `LimitsSearch` after its runs; ends the command where it cannot begin."""
-    request.out.mkdir(parents=True, exist_ok=True)
-    with options(), open_runs(request, observed) as runs:
-        with on_interrupt(lambda: f"after {runs.count} runs, which are stored in "
-                          f"{request.stem}.trade; the same command goes on"):
-            judge = CellJudge(record, runs, observed.probes, request.quantities, request.error)
-            try:
-                judge.start()
-            except NoReference as fault:
-                end(f"{request.name}: {fault}",
-                    BAD_INPUT if fault.outcome == REFUSED else NO_ANSWER)
-            search = LimitsSearch(judge)
-            search.run()
+    with open_runs(request, observed) as runs:
+        judge = CellJudge(record, runs, observed.probes, request.quantities, request.error)
+        try:
+            judge.start()
+        except NoReference as fault:
+            end(f"{request.name}: {fault}", BAD_INPUT if fault.outcome == REFUSED else NO_ANSWER)
+        search = LimitsSearch(judge)
+        search.run()
     return search
 
 

@@ -14,7 +14,7 @@ from ..store.atomic import write_bytes
 from ..sweep.observation import STOPPED
 from ..sweep.runs import CRASHED
 from .errors import BAD_INPUT, end, exit_on_errors, options
-from .options import Json, SceneName, on_interrupt
+from .options import Json, SceneName
 from .sweep_options import (
     BudgetOption,
     ErrorOption,
@@ -27,10 +27,6 @@ from .sweep_options import (
     load_sweep,
     observed_of,
     open_runs,
-    parse_budget,
-    parse_error,
-    parse_quantities,
-    parse_workers,
 )
 from .terminal import as_json
 
@@ -57,9 +53,8 @@ def find(
     """
     with exit_on_errors():
         with options():
-            request = SweepRequest(name, parse_error(error), parse_budget(budget),
-                                   parse_quantities(quantity), parse_workers(workers), scheduler,
-                                   out, quiet)
+            request = SweepRequest(name, error, budget, quantity, workers, scheduler, out,
+                                   quiet).parsed()
             record, path = load_sweep(name)
             observed = observed_of(record, path, request.quantities)
         answer = answer_of(first_variant(record, observed.probes), observed, request)
@@ -70,11 +65,8 @@ def find(
 
 def answer_of(first, observed, request):
     """Return the `NeedsAnswer` of a `SceneVariant` after its runs; the command ends without one."""
-    request.out.mkdir(parents=True, exist_ok=True)
     store = request.out / f"{request.stem}.trade"
-    with options(), open_runs(request, observed) as runs, on_interrupt(
-            lambda: f"after {runs.count} runs, which are stored in {store}; the same command goes "
-                    "on"):
+    with open_runs(request, observed) as runs:
         study = RemovalStudy(runs, first, request.error)
         result = study.result()
         if result is None:

@@ -1,7 +1,7 @@
 """Options of the commands that run a scene many times: `trade`, `limits` and `needs`."""
 
 import re
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from math import isfinite
 from pathlib import Path
 from typing import Annotated, NamedTuple
@@ -20,6 +20,8 @@ from ..sweep.runs import SceneRuns
 from ..sweep.setting import in_seconds
 from ..sweep.store import RunStore
 from .catalogue import find_scene
+from .errors import options
+from .options import on_interrupt
 from .terminal import passing
 
 UNITS = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
@@ -42,16 +44,23 @@ QuietOption = Annotated[bool, typer.Option("--quiet", help="Show no progress bar
 
 
 class SweepRequest(NamedTuple):
-    """The options that all of these commands have."""
+    """The options that all of these commands have, as texts before `parsed`."""
 
     name: str               # of the scene
-    error: float
-    budget: float           # [s]
-    quantities: tuple       # of texts
+    error: float | str
+    budget: float | str     # [s]
+    quantities: tuple | list | None     # of texts
     workers: int
     scheduler: str | None
     out: Path
     quiet: bool
+
+    def parsed(self):
+        """Return the request with numbers for its texts. Raises ValueError."""
+        if self.workers < 1:
+            raise ValueError(f"--workers {self.workers}: expected at least 1")
+        return self._replace(error=parse_error(self.error), budget=parse_budget(self.budget),
+                             quantities=parse_quantities(self.quantities))
 
     @property
     def stem(self):
@@ -92,13 +101,6 @@ def parse_quantities(texts):
     return unique
 
 
-def parse_workers(workers):
-    """Return the number of workers. Raises ValueError unless it is positive."""
-    if workers < 1:
-        raise ValueError(f"--workers {workers}: expected at least 1")
-    return workers
-
-
 def load_sweep(name):
     """Return (scene, path) by the scene's name, with its end as a time.
 
@@ -125,13 +127,19 @@ def observed_of(record, path, quantities):
 @contextmanager
 def open_runs(request, observed):
     """Yield the `SceneRuns` of a request, with a bar that counts runs; its store is the folder
-    SCENE.trade beside the output. Raises ValueError for a scheduler that does not exist.
+    SCENE.trade beside the output. A bad scheduler and Ctrl-C end the command.
     """
-    store = RunStore(request.out / f"{request.stem}.trade")
-    with open_executor(request.scheduler, request.workers) as executor, \
-            passing(request.quiet, total=request.budget, unit="s", desc=request.stem,
-                    bar_format="{desc} {bar}| {postfix} [{elapsed}]") as bar:
-        runs = SceneRuns(observed, executor, store, request.budget)
+    request.out.mkdir(parents=True, exist_ok=True)
+    folder = request.out / f"{request.stem}.trade"
+    with ExitStack() as stack:
+        with options():
+            executor = stack.enter_context(open_executor(request.scheduler, request.workers))
+        bar = stack.enter_context(passing(
+            request.quiet, total=request.budget, unit="s", desc=request.stem,
+            bar_format="{desc} {bar}| {postfix} [{elapsed}]"))
+        runs = SceneRuns(observed, executor, RunStore(folder), request.budget)
+        stack.enter_context(on_interrupt(lambda: f"after {runs.count} runs, which are stored in "
+                                         f"{folder}; the same command goes on"))
 
         def show(label, observation):
             bar.set_postfix_str(f"{runs.count} runs, {max(runs.left, 0.0):.0f} s left, last: "

@@ -1,6 +1,6 @@
 """Implement `mpm-ref trade`: measure accuracy against time, and recommend a setting."""
 
-from math import isfinite
+from json import loads as json_loads
 from pathlib import Path
 from typing import Annotated
 
@@ -9,14 +9,14 @@ import typer
 
 from ..scene import dumps
 from ..store.atomic import write_bytes
-from ..sweep.quantity import CHAOTIC
+from ..sweep.quantity import with_companions
 from ..sweep.setting import scene_at
 from ..trade.answer import answer_lines, answer_of, best_scene, largest_extent, percent
 from ..trade.page import page_of
 from ..trade.search import TradeSearch
 from ..trade.similar import carried_over, cheapest_row, read_answer
 from .errors import exit_on_errors, options
-from .options import Json, SceneName, on_interrupt
+from .options import Json, SceneName
 from .sweep_options import (
     BudgetOption,
     ErrorOption,
@@ -29,10 +29,6 @@ from .sweep_options import (
     load_sweep,
     observed_of,
     open_runs,
-    parse_budget,
-    parse_error,
-    parse_quantities,
-    parse_workers,
 )
 from .terminal import as_json
 
@@ -61,15 +57,15 @@ def measure(
     """
     with exit_on_errors():
         with options():
-            texts = parse_quantities(quantity)
-            request = SweepRequest(name, parse_error(error), parse_budget(budget), texts,
-                                   parse_workers(workers), scheduler, out, quiet)
+            request = SweepRequest(name, error, budget, quantity, workers, scheduler, out,
+                                   quiet).parsed()
             record, path = load_sweep(name)
-            observed = observed_of(record, path, with_companions(texts, record.dim))
+            texts = with_companions(request.quantities, record.dim)
+            observed = observed_of(record, path, texts)
         if like is not None:
             raise typer.Exit(answer_from(like, record, observed, request))
         search = run_search(record, observed, request)
-        facts = as_plain(answer_of(search, path.stem))
+        facts = json_loads(as_json(answer_of(search, path.stem)))
         write_answer(search, facts, request)
         print(as_json(facts) if json else "\n".join(answer_lines(facts)))
     raise typer.Exit(0 if facts["best"] is not None else NO_ANSWER)
@@ -87,28 +83,19 @@ def answer_from(like, record, observed, request):
         cells = largest_extent(observed.probes) / record.dx
         chosen = carried_over(row, facts["cells"], cells)
         text = dumps(scene_at(record, chosen))
-    said = (f"as on {name}: {chosen.text}, which had an error of {percent(row['error'])} there; "
-            f"nothing was measured on {request.stem}")
-    write_bytes(request.out / f"{request.stem}.best.toml", f"# {said}\n\n{text}".encode())
-    print(said)
+    sentence = (f"as on {name}: {chosen.text}, which had an error of {percent(row['error'])} "
+                f"there; nothing was measured on {request.stem}")
+    write_bytes(request.out / f"{request.stem}.best.toml", f"# {sentence}\n\n{text}".encode())
+    print(sentence)
     return 0
-
-
-def with_companions(texts, dim):
-    """Return quantities and those that still have a meaning where paths diverge, each once."""
-    profiles = [f"profile:{axis}" for axis in "xyz"[:dim]]
-    return tuple(dict.fromkeys((*texts, *CHAOTIC, *profiles)))
 
 
 def run_search(record, observed, request):
     """Return a `TradeSearch` after its runs."""
-    request.out.mkdir(parents=True, exist_ok=True)
-    with options(), open_runs(request, observed) as runs:
+    with open_runs(request, observed) as runs:
         search = TradeSearch(record, runs, request.quantities, np.array(observed.times),
                              request.error)
-        with on_interrupt(lambda: f"after {runs.count} runs, which are stored in "
-                          f"{request.stem}.trade; the same command goes on"):
-            search.run()
+        search.run()
     return search
 
 
@@ -120,14 +107,3 @@ def write_answer(search, facts, request):
     text = best_scene(search, request.stem)
     if text is not None:
         write_bytes(f"{base}.best.toml", text.encode())
-
-
-def as_plain(value):
-    """Return facts whose numbers are plain and finite, or None."""
-    if isinstance(value, dict):
-        return {key: as_plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [as_plain(item) for item in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    return None if isinstance(value, float) and not isfinite(value) else value

@@ -28,7 +28,7 @@ QUANTILES = np.linspace(0.02, 0.98, 33)
 ENERGIES = ("kinetic", "elastic", "gravity", "energy")
 FIELDS = ("J", "speed", "pressure")
 DEFAULT = ("positions",)
-CHAOTIC = ("kinetic", "elastic")        # and the profile along each axis, where paths diverge
+CHAOTIC = ("kinetic", "elastic")        # see `with_companions`
 EXPECTED = ("expected positions, centroid, path:X,Y, region:X0,Y0,X1,Y1, front:x+, profile:x, "
             "kinetic, elastic, gravity, energy, impulse:NAME or mean:J:X0,Y0,X1,Y1, with @end for "
             "the last state alone")
@@ -82,6 +82,14 @@ class OutputQuantity:
             return np.atleast_1d(SAMPLES[self.kind](snapshot, *self.arguments)).ravel()
         except TypeError:
             raise ValueError(f"quantity {self.text!r}: {EXPECTED}") from None
+
+
+def with_companions(texts, dim):
+    """Return texts of quantities and of those that keep a meaning where paths diverge, each once:
+    energies, and the profile along each axis.
+    """
+    profiles = [f"profile:{axis}" for axis in AXES[:dim]]
+    return tuple(dict.fromkeys((*texts, *CHAOTIC, *profiles)))
 
 
 def named_bodies(snapshot, name):

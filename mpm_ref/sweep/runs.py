@@ -88,7 +88,7 @@ class SceneRuns:
 
     def _make(self, runs):
         labels, observations = list(runs), {}
-        tasks = [Deadlined(runs[label], time.time() + self.left) for label in labels]
+        tasks = [RunWithDeadline(runs[label], time.time() + self.left) for label in labels]
         for outcome in self._executor.run(observe_in_time, tasks):
             label = labels[outcome.index]
             observation = outcome.value
@@ -105,7 +105,7 @@ class SceneRuns:
 
 
 @dataclass(frozen=True)
-class Deadlined:
+class RunWithDeadline:
     """A run with the time [s since 1970] after which it does not begin."""
 
     run: ObservedRun
@@ -113,7 +113,7 @@ class Deadlined:
 
 
 def observe_in_time(task):
-    """Return the observation of a `Deadlined` run; one that is late is stopped before it begins."""
+    """Return the observation of a `RunWithDeadline`, which is not begun after the deadline."""
     left = task.deadline - time.time()
     if left <= 0.0:
         return RunObservation(blank_values(task.run), RunCost(cpu=0.0), STOPPED,

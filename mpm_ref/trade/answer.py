@@ -9,7 +9,7 @@ from ..scene import dumps
 from ..sweep.observation import FINISHED
 from ..sweep.setting import scene_at
 from .reference import LEAST
-from .search import HALF, without_grid
+from .search import REFERENCE_PART, without_grid
 
 USEFUL = 0.1        # error to which a quantity is known that is worth a line
 
@@ -152,11 +152,11 @@ def shortfall(facts):
             texts.append(f"the grids do not approach one solution of {text} yet (order "
                          f"{order:.2g}; it is known to {percent(error)}); a larger --budget halves "
                          "the grid further")
-        elif error > HALF * facts["error"]:
-            halvings = max(1, int(np.ceil(log2(error / (HALF * facts["error"])) / order)))
+        elif error > (asked := REFERENCE_PART * facts["error"]):
+            halvings = max(1, int(np.ceil(log2(error / asked) / order)))
             finest = facts["grids"][-1] / 2**halvings
-            texts.append(f"{text} is known to {percent(error)}; a reference of "
-                         f"{percent(HALF * facts['error'])} would take dx = {finest:.3g} m")
+            texts.append(f"{text} is known to {percent(error)}; a reference of {percent(asked)} "
+                         f"would take dx = {finest:.3g} m")
     return "; ".join(texts) or "chaos ends what can be known"
 
 

@@ -25,7 +25,7 @@ from .reference import reference_of, reliable_times
 COARSEST, FINEST = 4.0, 1.0 / 64.0      # factors of dx on halved grids; the latter may be set
 AT_START = (4.0, 2.0, 1.0, 0.5)
 REFERENCE_SHARE = 0.7       # of the time left that the next grid of the reference may take
-HALF = 0.5                  # of the error asked: as much may be the reference's own
+REFERENCE_PART = 0.5        # of the error asked, which the reference's own may be
 DIVERGED = 0.5      # of the error asked, by which a perturbed run shows chaos: that it has another
                     # number of steps makes a small difference
 CHEAPER = 0.5               # a setting is tried if it is expected to cost less than best / this
@@ -114,12 +114,11 @@ class TradeSearch:
         b = self.observations.get(PERTURBED)
         if not (a and b and a.finished and b.finished):
             return np.inf
+        diverged = np.zeros(len(self.times), dtype=bool)
         for text in self.quantities:
             q, p = a.values[text], b.values[text]
-            diverged = difference_so_far(p, q) > DIVERGED * self.error * largest_change(q)
-            if diverged.any():
-                return float(self.times[np.argmax(diverged)])
-        return np.inf
+            diverged |= difference_so_far(p, q) > DIVERGED * self.error * largest_change(q)
+        return float(self.times[np.argmax(diverged)]) if diverged.any() else np.inf
 
     def compare_families(self):
         """Raise the references' errors where another transfer approaches another solution.
@@ -145,9 +144,9 @@ class TradeSearch:
         """
         if not self.references:
             return 0
-        known = reliable_times([self.references[text] for text in self.quantities],
-                            HALF * self.error) & (self.times < self.chaos)
-        return int(np.max(np.flatnonzero(known), initial=0))
+        references = [self.references[text] for text in self.quantities]
+        reliable = reliable_times(references, REFERENCE_PART * self.error)
+        return int(np.max(np.flatnonzero(reliable & (self.times < self.chaos)), initial=0))
 
     def horizon(self):
         """Return the time [s] until which all quantities asked for are known to half the error."""

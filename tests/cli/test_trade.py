@@ -6,6 +6,7 @@ from sweep_scenes import FLIGHT
 
 from mpm_ref.cli.sweep_options import parse_budget, parse_error
 from mpm_ref.scene import load
+from mpm_ref.trade.search import TradeSearch
 
 FAST = "--budget", "60s", "--workers", "1", "--quiet"
 
@@ -96,6 +97,22 @@ def test_bad_options_get_one_sentence(folder, tmp_path, option, value, word):
     done = mpm_ref("trade", folder / "flight.toml", option, value, "--out", tmp_path, "--quiet")
     assert_told(done, 2, word)
     assert not list(tmp_path.iterdir())
+
+
+def test_ctrl_c_says_how_to_go_on(folder, tmp_path, monkeypatch):
+    def interrupt(self):
+        raise KeyboardInterrupt
+    monkeypatch.setattr(TradeSearch, "run", interrupt)
+    done = mpm_ref("trade", folder / "flight.toml", "--out", tmp_path, "--workers", "1", "--quiet")
+    assert_told(done, 130, "after 0 runs", "flight.trade", "the same command goes on")
+
+
+def test_an_error_of_the_search_is_no_bad_input(folder, tmp_path, monkeypatch):
+    def fail(self):
+        raise ValueError("a bug")
+    monkeypatch.setattr(TradeSearch, "run", fail)
+    with pytest.raises(ValueError, match="a bug"):
+        mpm_ref("trade", folder / "flight.toml", "--out", tmp_path, "--workers", "1", "--quiet")
 
 
 def test_a_scene_without_an_end_is_refused(tmp_path):

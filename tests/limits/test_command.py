@@ -6,12 +6,12 @@ import pytest
 from command_line import SCENE, assert_told, mpm_ref
 
 from mpm_ref.cli.sweep_options import load_sweep, observed_of
-from mpm_ref.cli.trade import with_companions
 from mpm_ref.executor import open_executor
 from mpm_ref.limits import axes
 from mpm_ref.limits.figure import draw_limits
 from mpm_ref.limits.verdict import CellJudge
 from mpm_ref.scene import build, load
+from mpm_ref.sweep.quantity import with_companions
 from mpm_ref.sweep.runs import RunRequest, SceneRuns
 from mpm_ref.sweep.setting import scene_at, setting
 from mpm_ref.sweep.store import RunStore

@@ -32,13 +32,16 @@ class ModelRuns:
         error = 0.05 * dx**self.order * (0.3 if chosen.get("transfer") == "apic" else 1.0)
         error /= chosen.get("particles", 1.0) ** 3
         values = EXACT + error * PATTERN
+        later = values.copy()
         if label == PERTURBED:
             values = values + self.chaos * (TIMES > 0.6)[:, None]
+            later = later + self.chaos * (TIMES > 0.8)[:, None]
         cpu = dx**-3.0 * (chosen.get("particles", 1.0) ** 2) * (
             0.5 if chosen.get("cfl") == 0.9 else 1.0)
         if self.fails(text):
             return RunObservation({"positions": values[:, :0]}, RunCost(), REFUSED, "refused")
-        return RunObservation({"positions": values}, RunCost(cpu, cpu, 10, 100, 1), FINISHED)
+        both = {"positions": values, "kinetic": later}
+        return RunObservation(both, RunCost(cpu, cpu, 10, 100, 1), FINISHED)
 
 
 def search_of(runs, error=0.01):

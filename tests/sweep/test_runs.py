@@ -53,10 +53,10 @@ def test_after_the_budget_no_run_begins():
 
 
 def test_each_run_is_reported(runs):
-    seen = []
-    runs.on_run = lambda label, observation: seen.append((label, observation.outcome))
+    reports = []
+    runs.on_run = lambda label, observation: reports.append((label, observation.outcome))
     runs.observe({"a": request_at(dx=2.0)})
-    assert seen == [("a", FINISHED)]
+    assert reports == [("a", FINISHED)]
 
 
 def fail(task):

@@ -4,7 +4,7 @@ import re
 import pytest
 from model_runs import ModelRuns, search_of
 
-from mpm_ref.cli.trade import as_plain
+from mpm_ref.cli.terminal import as_json
 from mpm_ref.scene import loads
 from mpm_ref.trade.answer import answer_lines, answer_of, best_scene
 from mpm_ref.trade.page import page_of
@@ -13,7 +13,7 @@ from mpm_ref.trade.page import page_of
 def facts_of(runs=None, error=0.01):
     search = search_of(runs or ModelRuns(), error)
     search.run()
-    return search, as_plain(answer_of(search, "toy"))
+    return search, json.loads(as_json(answer_of(search, "toy")))
 
 
 def test_rows_hold_all_settings_and_the_recommended_one():

@@ -70,6 +70,18 @@ def test_chaos_ends_the_horizon():
     assert search.best() is not None
 
 
+def test_chaos_begins_with_the_first_quantity_that_diverges():
+    runs = ModelRuns()
+    runs.chaos = 0.02
+    search = search_of(runs)
+    search.start()
+    for quantities in (("kinetic", "positions"), ("positions", "kinetic")):
+        search.quantities = quantities
+        assert search.time_of_divergence() == 0.625
+    search.quantities = ("kinetic",)
+    assert search.time_of_divergence() == 0.875
+
+
 def test_a_setting_that_fails_is_recorded_and_not_recommended():
     runs = ModelRuns()
     runs.fails = lambda text: "apic" in text
@@ -93,7 +105,8 @@ def test_another_family_raises_the_error_of_the_reference():
     search.start()
     search.refine()
     own, run = search.reference_error(), runs.run
-    shifted = RunObservation({"positions": EXACT + 0.2}, RunCost(1.0, 1.0, 1, 1, 1), FINISHED)
+    values = dict.fromkeys(("positions", "kinetic"), EXACT + 0.2)
+    shifted = RunObservation(values, RunCost(1.0, 1.0, 1, 1, 1), FINISHED)
     runs.run = lambda label: shifted if "apic" in label.text else run(label)
     search.compare_families()
     assert search.references["positions"].error[-1] > 5.0 * own
