@@ -1,7 +1,8 @@
 """Run stored experiments again and compare the numbers, each within the scatter that is stated.
 
 A number of the same seed and source is expected to be the same to SAME, which allows for other
-processors; a time, or a ratio of times, to TIMED. A record may state a scatter of its own.
+processors; a time, or a ratio of times, to TIMED. A record may state a scatter of its own. Numbers
+under ROUND_OFF are the rounding errors of a processor: any two of them count as the same.
 """
 
 import re
@@ -14,6 +15,7 @@ from .results import ProfileResults
 from .run import RunSetting, run_all
 
 SAME = 1e-5         # relative
+ROUND_OFF = 1e-12
 TIMED = 1.0         # relative: a machine that does other work too may take twice as long
 TIME_UNITS = {"s", "us", "h", "CPU s", "s/frame", "s/100 frames", "s/s", "x"}
 TIME_NOTE = re.compile(r"\bCPU\b|\bwall time|\bms a step\b")
@@ -62,10 +64,14 @@ def differences(stored, new):
 
 
 def relative_difference(a, b, both):
-    """Return |a - b| over the larger; infinite where one of both is missing."""
+    """Return |a - b| over the larger, 0 for two rounding errors; infinite where one of both is
+    missing.
+    """
     if not both or (a is None) != (b is None):
         return inf
-    return abs(a - b) / max(abs(a), abs(b)) if a != b else 0.0
+    if a == b or max(abs(a), abs(b)) < ROUND_OFF:
+        return 0.0
+    return abs(a - b) / max(abs(a), abs(b))
 
 
 def allowed(record):
