@@ -88,6 +88,8 @@ def observe(run):
         outcome, message = REFUSED, str(fault) or "no memory for it"
     except _TooLong:
         outcome, message = STOPPED, f"stopped after {run.most_cpu:.3g} s of CPU time"
+    finally:
+        observer.close()
     return observer.result(outcome, message)
 
 
@@ -148,6 +150,10 @@ class RunObserver:
         snapshot = Snapshot(self._problem, bodies, probes, self._starts, impulses)
         return [quantity.sample(snapshot) for quantity in self._quantities]
 
+    def close(self):
+        """End the step that has begun, if any."""
+        self._clock.close()
+
     def result(self, outcome, message):
         """Return the `RunObservation`."""
         n, values = len(self._run.times), {}
@@ -169,6 +175,7 @@ class StepClock:
     def __init__(self):
         self.steps = self.usual = 0
         self.measured = 0.0, 0.0        # CPU and wall time of the usual steps [s]
+        self._compiled = None
 
     def start(self):
         """Begin a step."""
@@ -179,11 +186,18 @@ class StepClock:
     def stop(self):
         """End a step."""
         cpu, wall = time.process_time() - self._begin[0], time.perf_counter() - self._begin[1]
-        kernel_cache.compilations.remove(self._compiled)
+        compiled = self._compiled.raised
+        self.close()
         self.steps += 1
-        if self.steps > FIRST and not self._compiled.raised:
+        if self.steps > FIRST and not compiled:
             self.usual += 1
             self.measured = self.measured[0] + cpu, self.measured[1] + wall
+
+    def close(self):
+        """Forget a step that has begun."""
+        if self._compiled is not None:
+            kernel_cache.compilations.remove(self._compiled)
+        self._compiled = None
 
     def total(self):
         """Return the CPU and wall time of all steps [s]; NaN before a usual step."""

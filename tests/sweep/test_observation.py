@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from sweep_scenes import BOUNCE, FLIGHT, observed_run, scene_of
 
+from mpm_ref.core import kernel_cache
 from mpm_ref.scene import build, loads
 from mpm_ref.simulate import simulate
 from mpm_ref.sweep import observation
@@ -45,7 +46,52 @@ def test_cost_counts_steps_particles_and_time():
     assert done.cost.steps == 100
     assert done.cost.particles == len(build(scene_of(FLIGHT)).bodies[0].id)
     assert 0.0 < done.cost.cpu < 60.0
-    assert done.cost.memory > 8 * 100
+
+
+def test_memory_is_that_of_particles_and_of_the_grid_around_them():
+    problem = build(scene_of(FLIGHT))
+    x, dx = problem.bodies[0].particles.x, problem.dx
+    particles = sum(a.nbytes for a in problem.bodies[0].particles)
+    nodes = np.prod(np.ceil(np.ptp(x, axis=0) / dx) + problem.scheme.degree + 1)
+    assert observation.nodes_around(problem) == nodes * 3 * 8     # a mass and two velocities each
+    done = observe(observed_run(scene_of(FLIGHT)))
+    assert done.cost.memory == particles + nodes * 3 * 8
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """A `StepClock` whose times of steps are set by the function that is returned too."""
+    now = [0.0]
+    monkeypatch.setattr(observation.time, "process_time", lambda: now[0])
+    monkeypatch.setattr(observation.time, "perf_counter", lambda: 2.0 * now[0])
+    clock = observation.StepClock()
+
+    def step(seconds, compiles=False):
+        clock.start()
+        if compiles:
+            for note in kernel_cache.compilations:
+                note()
+        now[0] += seconds
+        clock.stop()
+    return clock, step
+
+
+def test_steps_that_load_or_compile_count_as_usual_ones(clock):
+    clock, step = clock
+    step(50.0)
+    step(30.0)
+    assert np.isnan(clock.total()).all()
+    step(1.0)
+    step(100.0, compiles=True)
+    step(3.0)
+    assert clock.total() == pytest.approx((5 * 2.0, 5 * 4.0))
+
+
+@pytest.mark.parametrize("most_cpu", [0.0, np.inf])
+def test_a_run_leaves_nothing_behind_that_watches_compilations(most_cpu):
+    before = list(kernel_cache.compilations)
+    observe(observed_run(scene_of(FLIGHT), most_cpu=most_cpu))
+    assert kernel_cache.compilations == before
 
 
 def test_a_run_past_its_cpu_time_is_stopped():

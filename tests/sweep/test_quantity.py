@@ -5,7 +5,7 @@ from sweep_scenes import BOUNCE, observed_run, scene_of
 from mpm_ref.energy import energy
 from mpm_ref.scene import build
 from mpm_ref.sweep.observation import observe
-from mpm_ref.sweep.quantity import OutputQuantity, Snapshot
+from mpm_ref.sweep.quantity import OutputQuantity, Snapshot, with_companions
 
 
 @pytest.fixture
@@ -51,11 +51,35 @@ def test_pressure_is_minus_the_mean_stress(snapshot):
     q = snapshot.bodies[0].particles
     q.tau[:] = -7.0 * np.eye(2)
     assert value("mean:pressure:0,0,1,1", snapshot) == pytest.approx([7.0])
+    q.F[:] = 2.0 * np.eye(2)            # tau = J sigma, and J = 4
+    assert value("mean:J:0,0,1,1", snapshot) == pytest.approx([4.0])
+    assert value("mean:pressure:0,0,1,1", snapshot) == pytest.approx([7.0 / 4.0])
+
+
+def test_the_centroid_is_that_of_the_mass(snapshot):
+    q = snapshot.bodies[0].particles
+    q.m[:] = 0.0
+    q.m[3], q.m[-1] = 1.0, 3.0
+    assert value("centroid", snapshot) == pytest.approx(0.25 * q.x[3] + 0.75 * q.x[-1])
+
+
+def test_a_path_is_that_of_the_nearest_probe(snapshot):
+    X = snapshot.starts["block"]
+    moved = snapshot._replace(probes={"block": X + [[10.0 * k, 0.0] for k in range(len(X))]})
+    for k in (0, 3, 6):
+        x, y = X[k] + 1e-3
+        assert value(f"path:{x},{y}", moved) == pytest.approx(X[k] + [10.0 * k, 0.0])
+
+
+def test_companions_are_energies_and_profiles_each_once():
+    assert with_companions(("elastic", "front:x+"), 2) == (
+        "elastic", "front:x+", "kinetic", "profile:x", "profile:y")
+    assert with_companions(("positions",), 3)[-1] == "profile:z"
 
 
 @pytest.mark.parametrize("text", [
     "", "speed", "positions@middle", "front:x", "front:q+", "profile:z", "path:1", "path:a,b",
-    "region:5,5,6,6", "impulse:ceiling", "mean:T:0,0,1,1", "mean:J:0,0", "positions:sphere",
+    "region:5,5,6,6", "impulse:ceiling", "mean:T:0,0,1,1", "mean:J:0,0", "path:nan,0.3", "mean:J:0,0,inf,1", "positions:sphere",
     "kinetic:block:block", "centroid:a:b:c"])
 def test_bad_texts_get_one_sentence(snapshot, text):
     with pytest.raises(ValueError, match="expected") as error:

@@ -37,6 +37,7 @@ def test_knobs_change_what_they_name():
     assert scene_at(scene, setting(cfl=0.9)).cfl == 0.9
     assert scene_at(scene, setting(degree=3)).scheme.degree == 3
     assert scene_at(scene, setting(transfer="flip 0.95")).step_scheme.flip == 0.95
+    assert scene_at(scene, setting(transfer="flip 0.95")).step_scheme.mass_eps == 0.0
     assert scene_at(scene, setting(transfer="apic rpic 0.5")).step_scheme.rpic == 0.5
     assert scene_at(scene, setting(sampling="poisson")).body[0].sampling.per_cell == 2
     assert particles(scene_at(scene, setting(particles=1.5))) == particles(scene) * 9 // 4
