@@ -12,6 +12,7 @@ from ..store.atomic import write_bytes
 from ..sweep.quantity import with_companions
 from ..sweep.setting import scene_at
 from ..trade.answer import answer_lines, answer_of, best_scene, largest_extent, percent
+from ..trade.figure import save_figure
 from ..trade.page import page_of
 from ..trade.search import TradeSearch
 from ..trade.similar import carried_over, cheapest_row, read_answer
@@ -51,7 +52,8 @@ def measure(
 ):
     """Measure which settings of a scene keep an error, and which of them is the cheapest.
 
-    Writes SCENE.trade.json, the page SCENE.trade.html, and the runnable scene SCENE.best.toml.
+    Writes SCENE.trade.json, the page SCENE.trade.html, the figure SCENE.trade.png, and the runnable
+    scene SCENE.best.toml.
     Runs are stored in SCENE.trade: the same command with a larger budget goes on. Exit status: 0
     a setting is recommended, 1 none keeps the error within the budget, 2 bad input, 130 Ctrl-C.
     """
@@ -74,16 +76,16 @@ def measure(
 def answer_from(like, record, observed, request):
     """Write and say the advice that the answer on a similar scene gives; return the exit status."""
     name = Path(like).stem
-    facts = read_answer(request.out / f"{name}.trade.json")
-    row = cheapest_row(facts, request.error)
+    answer = read_answer(request.out / f"{name}.trade.json")
+    row = cheapest_row(answer, request.error)
     if row is None:
         print(f"{name}: no setting of its answer keeps {percent(request.error)}")
         return NO_ANSWER
     with options():
         cells = largest_extent(observed.probes) / record.dx
-        chosen = carried_over(row, facts["cells"], cells)
+        chosen = carried_over(row, answer.cells, cells)
         text = dumps(scene_at(record, chosen))
-    sentence = (f"as on {name}: {chosen.text}, which had an error of {percent(row['error'])} "
+    sentence = (f"as on {name}: {chosen.text}, which had an error of {percent(row.error)} "
                 f"there; nothing was measured on {request.stem}")
     write_bytes(request.out / f"{request.stem}.best.toml", f"# {sentence}\n\n{text}".encode())
     print(sentence)
@@ -100,10 +102,11 @@ def run_search(record, observed, request):
 
 
 def write_answer(search, facts, request):
-    """Write the JSON, the page, and the recommended scene. Raises `NotWritten`."""
+    """Write the JSON, the page, the figure, and the recommended scene. Raises `NotWritten`."""
     base = request.out / request.stem
     write_bytes(f"{base}.trade.json", as_json(facts).encode())
     write_bytes(f"{base}.trade.html", page_of(facts).encode())
+    save_figure(facts, f"{base}.trade.png")
     text = best_scene(search, request.stem)
     if text is not None:
         write_bytes(f"{base}.best.toml", text.encode())

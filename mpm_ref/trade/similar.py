@@ -1,54 +1,98 @@
 """Advice for a scene from the answer on a similar one, without a run.
 
 What carries over is the number of cells over the largest body, and all other knobs. Whether the
-error carries over is not known.
+error carries over is not known. A stored answer may come from a stranger: only values of known
+knobs are taken from it.
 """
 
-import json
-from math import isfinite
+from math import inf
 from pathlib import Path
+from typing import Annotated
+
+import msgspec
+from msgspec import UNSET, Meta, UnsetType
 
 from ..scene import SceneError
+from ..sweep.observation import FINISHED
 from ..sweep.setting import setting
 
-TYPES = {"dx": float, "particles": float, "cfl": float, "eps": float,
-         "degree": int}      # else texts
+Factor = Annotated[float, Meta(gt=0.0, le=1e6)]
+Word = Annotated[str, Meta(pattern=r"^[a-z0-9_. -]+$", max_length=40)]
+
+
+class StoredSetting(msgspec.Struct, forbid_unknown_fields=True):
+    """The knobs of a row; see `sweep.setting`."""
+
+    dx: Factor | UnsetType = UNSET
+    particles: Factor | UnsetType = UNSET
+    sampling: Word | UnsetType = UNSET
+    integrator: Word | UnsetType = UNSET
+    cfl: Factor | UnsetType = UNSET
+    degree: int | UnsetType = UNSET
+    transfer: Word | UnsetType = UNSET
+    eps: Factor | UnsetType = UNSET
+
+    def knobs(self):
+        """Return {knob: value} of those that are set."""
+        return {name: value for name, value in msgspec.structs.asdict(self).items()
+                if value is not UNSET}
+
+
+class StoredRow(msgspec.Struct):
+    """What is read of a row; None where it is not known."""
+
+    setting: StoredSetting
+    outcome: str
+    error: float | None
+    cpu: float | None
+
+
+class StoredReference(msgspec.Struct):
+    """What is read of a reference."""
+
+    error: float | None
+
+
+class StoredAnswer(msgspec.Struct):
+    """What is read of a file SCENE.trade.json."""
+
+    cells: Factor
+    quantities: Annotated[list[str], Meta(min_length=1)]
+    references: dict[str, StoredReference]
+    rows: list[StoredRow]
+
+    def margin(self):
+        """Return the largest error of the references of the quantities asked for."""
+        errors = [self.references[text].error for text in self.quantities
+                  if text in self.references]
+        known = len(errors) == len(self.quantities) and None not in errors
+        return max(errors) if known else inf
 
 
 def read_answer(path):
-    """Return the facts in a file SCENE.trade.json. Raises SceneError for another file."""
+    """Return the `StoredAnswer` in a file SCENE.trade.json. Raises SceneError for another file."""
     try:
-        facts = json.loads(Path(path).read_text(encoding="utf-8"))
-        rows, cells = facts["rows"], float(facts["cells"])
-        complete = isfinite(cells) and all({"setting", "error", "cpu", "outcome", "text"}
-                                           <= row.keys() for row in rows)
+        return msgspec.json.decode(Path(path).read_bytes(), type=StoredAnswer)
     except OSError as fault:
         raise SceneError(f"{path}: {fault.strerror}; expected the answer that `mpm-ref trade` "
                          "writes for the similar scene") from None
-    except (ValueError, KeyError, TypeError, AttributeError):
-        complete = False
-    if not complete:
-        raise SceneError(f"{path}: not an answer of `mpm-ref trade`; run it on the similar scene")
-    return facts
+    except (msgspec.DecodeError, UnicodeDecodeError) as fault:
+        raise SceneError(f"{path}: not an answer of `mpm-ref trade` ({fault}); run it on the "
+                         "similar scene") from None
 
 
-def cheapest_row(facts, error):
-    """Return the row of the cheapest setting of an answer that keeps an error, its reference's
+def cheapest_row(answer, error):
+    """Return the `StoredRow` of the cheapest setting that keeps an error, the reference's
     included, or None.
     """
-    margin = max(facts["references"][text]["error"] or float("inf")
-                 for text in facts["quantities"])
-    good = [row for row in facts["rows"] if row["outcome"] == "finished"
-            and row["error"] is not None and row["error"] + margin <= error]
-    return min(good, key=lambda row: row["cpu"], default=None)
+    good = [row for row in answer.rows if row.outcome == FINISHED and row.error is not None
+            and row.cpu is not None and row.error + answer.margin() <= error]
+    return min(good, key=lambda row: row.cpu, default=None)
 
 
 def carried_over(row, cells, own_cells):
     """Return the setting of a row for a scene with so many cells over its largest body, where the
-    row's scene had `cells`. Raises ValueError for a knob that does not exist, or its value.
+    row's scene had `cells`.
     """
-    knobs = dict(row["setting"])
-    for name, value in knobs.items():
-        if not isinstance(value, TYPES.get(name, str)):
-            raise ValueError(f"{name} = {value!r}: expected a value as `mpm-ref trade` writes it")
+    knobs = row.setting.knobs()
     return setting(**knobs | {"dx": knobs.get("dx", 1.0) * own_cells / cells})

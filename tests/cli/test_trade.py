@@ -56,7 +56,7 @@ def test_a_similar_scene_answers_without_a_run(folder):
 
 
 @pytest.mark.parametrize(("content", "words"), [
-    (None, "No such file"), ("{}", "not an answer"), ("[1", "not an answer"),
+    (None, "No such file"), ("{}", "missing required field `cells`"), ("[1", "not an answer"),
     ('{"rows": [{}], "cells": 3}', "not an answer"), ('{"rows": [], "cells": "x"}', "not an")])
 def test_an_answer_that_is_none_is_refused(folder, tmp_path, content, words):
     if content is not None:
@@ -66,8 +66,8 @@ def test_an_answer_that_is_none_is_refused(folder, tmp_path, content, words):
 
 
 @pytest.mark.parametrize("knobs", [
-    {"transfer": "mls\nend = 1"}, {"dx": "1"}, {"speed": 2.0}, {"integrator": 3},
-    {"sampling": "import os"}, {"degree": 7}])
+    {"transfer": "mls\nend = 1"}, {"dx": "1"}, {"dx": -1.0}, {"dx": 1e300}, {"speed": 2.0},
+    {"integrator": 3}, {"sampling": "import os"}, {"degree": 7}, {"cfl": None}])
 def test_a_forged_answer_writes_no_scene(folder, tmp_path, knobs):
     facts = json.loads((folder / "flight.trade.json").read_text())
     best = next(row for row in facts["rows"] if row["best"])

@@ -79,8 +79,8 @@ def test_companions_are_energies_and_profiles_each_once():
 
 @pytest.mark.parametrize("text", [
     "", "speed", "positions@middle", "front:x", "front:q+", "profile:z", "path:1", "path:a,b",
-    "region:5,5,6,6", "impulse:ceiling", "mean:T:0,0,1,1", "mean:J:0,0", "path:nan,0.3", "mean:J:0,0,inf,1", "positions:sphere",
-    "kinetic:block:block", "centroid:a:b:c"])
+    "region:5,5,6,6", "impulse:ceiling", "mean:T:0,0,1,1", "mean:J:0,0", "positions:sphere",
+    "path:nan,0.3", "mean:J:0,0,inf,1", "kinetic:block:block", "centroid:a:b:c"])
 def test_bad_texts_get_one_sentence(snapshot, text):
     with pytest.raises(ValueError, match="expected") as error:
         value(text, snapshot)

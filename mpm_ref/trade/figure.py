@@ -1,0 +1,80 @@
+"""Draw the error of all settings against their CPU time, wall time and memory.
+
+Matplotlib is imported when a figure is made.
+"""
+
+from ..store.atomic import replacing
+from ..sweep.observation import FINISHED
+
+COSTS = {"cpu": "CPU time [s]", "wall": "wall time [s]", "memory": "memory [bytes]"}
+LEAST = 1e-8            # an error that is drawn for less, on a logarithmic axis
+WIDTH, HEIGHT = 11.0, 3.6       # [inch]
+MARGIN = 1.6            # factor by which an axis goes on past its values
+FRONT, OTHER, BEST, FAILED = "tab:blue", "0.75", "tab:orange", "tab:red"
+
+
+def save_figure(facts, path):
+    """Write the figure of `answer.answer_of` to an image file. Raises `NotWritten`."""
+    figure = draw_trade(facts)
+    with replacing(path) as part:
+        figure.savefig(part, dpi=150)
+
+
+def draw_trade(facts):
+    """Return a Matplotlib `Figure` of three fronts: filled settings have no other one that is at
+    most as wrong at less cost; crosses at the top failed.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure((WIDTH, HEIGHT), layout="constrained")
+    panels = figure.subplots(1, len(COSTS), sharey=True)
+    for axes, (key, label) in zip(panels, COSTS.items(), strict=True):
+        draw_costs(axes, facts["rows"], key)
+        axes.axhline(facts["error"], color="0.35", linestyle=":", label="error asked")
+        axes.set(xscale="log", yscale="log", xlabel=label,
+                 xlim=limits([row[key] for row in known_rows(facts["rows"], key)]),
+                 ylim=limits([facts["error"], *(row["error"] for row in
+                                                known_rows(facts["rows"], key))]))
+    panels[0].set_ylabel(f"error of {', '.join(facts['quantities'])}")
+    draw_failures(panels[0], facts["rows"])
+    handles = {label: handle for axes in panels[:1]
+               for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=5,
+                  fontsize=8, frameon=False)
+    figure.suptitle(f"{facts['scene']}, until t = {facts['until']:.4g} s", fontsize=10)
+    return figure
+
+
+def known_rows(rows, key):
+    """Return the rows with an error and a cost."""
+    return [row for row in rows if row["error"] is not None and (row[key] or 0.0) > 0.0]
+
+
+def limits(values):
+    """Return the ends of a logarithmic axis that shows some values."""
+    shown = [max(value, LEAST) for value in values] or [1.0]
+    return min(shown) / MARGIN, max(shown) * MARGIN
+
+
+def draw_costs(axes, rows, key):
+    """Draw the settings with a known error as points over one cost."""
+    known = known_rows(rows, key)
+    front = [row for row in known if is_on_front(row, known, key)]
+    others = [row for row in known if row not in front]
+    for chosen, color, label in ((others, OTHER, "dominated"), (front, FRONT, "front"),
+                                 ([row for row in known if row["best"]], BEST, "recommended")):
+        axes.plot([row[key] for row in chosen], [max(row["error"], LEAST) for row in chosen], "o",
+                  color=color, markersize=5, label=label)
+
+
+def is_on_front(row, rows, key):
+    """Return whether no other row is at most as wrong at less cost."""
+    return not any(other["error"] <= row["error"] and other[key] < row[key] for other in rows)
+
+
+def draw_failures(axes, rows):
+    """Mark settings that did not finish at the top, at the CPU time that they took."""
+    failed = [row["cpu"] for row in rows if row["outcome"] != FINISHED and (row["cpu"] or 0.0) > 0]
+    top = [1.0] * len(failed)
+    axes.plot(failed, top, "x", color=FAILED, transform=axes.get_xaxis_transform(), clip_on=False,
+              label="did not finish")
