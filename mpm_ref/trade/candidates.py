@@ -46,12 +46,6 @@ def other_samplings(scene):
     return [kind for kind in ("regular", "poisson") if kinds and kind != kinds[0]]
 
 
-def neighbouring_grid(factor, coarser=1):
-    """Return the grid of `GRIDS` so many places coarser than a factor, or None past the ends."""
-    k = min(range(len(GRIDS)), key=lambda k: abs(GRIDS[k] - factor)) - coarser
-    return GRIDS[k] if 0 <= k < len(GRIDS) else None
-
-
 def pairs(settings):
     """Return the unions of two settings that change different knobs."""
     return [a | b for k, a in enumerate(settings) for b in settings[k + 1:]

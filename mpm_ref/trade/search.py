@@ -2,11 +2,11 @@
 
 1. The scene's own setting runs on halved grids until their reference is known to half the error
    asked for the whole run, stops improving, or the next grid does not fit into the budget.
-2. The scene's own setting, and each single knob, walk over the grids: coarser as long as they keep
-   the error, else finer as long as they can still be cheaper than the best so far.
-3. Pairs of the knobs that beat the scene's own setting walk likewise.
+2. The scene's own setting, and each single knob, walk over the grids from the coarsest on, whose
+   runs cost least, until they keep the error or can no longer be cheaper than the best so far.
+3. Pairs of the single knobs that keep the error cheapest walk likewise.
 
-A setting that fails has its outcome recorded, and its walk ends.
+A setting that fails has its outcome recorded.
 """
 
 from dataclasses import dataclass, field
@@ -19,7 +19,7 @@ from ..sweep.observation import FINISHED
 from ..sweep.quantity import OutputQuantity
 from ..sweep.runs import RunRequest
 from ..sweep.setting import Setting, scene_at, setting
-from .candidates import neighbouring_grid, pairs, single_knobs
+from .candidates import GRIDS, pairs, single_knobs
 from .reference import reference_of, reliable_times
 
 COARSEST, FINEST = 4.0, 1.0 / 64.0      # factors of dx on halved grids; the latter may be set
@@ -206,33 +206,23 @@ class TradeSearch:
     # walks over the grids
 
     def walk(self, families):
-        """Let settings without a grid walk to the coarsest grid on which they keep the error."""
-        start = self.best()
-        if start is None:
-            return
-        places = {family: start.get("dx", 1.0) for family in families}
-        while places:
-            batch = {family: family | setting(dx=factor) for family, factor in places.items()
-                     if self.worth_trying(family | setting(dx=factor))}
+        """Run settings without a grid from the coarsest grid to the first on which they keep the
+        error, or on which they are not worth trying.
+        """
+        walking = list(families)
+        for factor in GRIDS:
+            batch = {family: chosen for family in walking
+                     if self.worth_trying(chosen := family | setting(dx=factor))}
             self.observe(sorted(batch.values(), key=self.expected_cpu))
-            places = {family: factor for family, chosen in batch.items()
-                      if (factor := self.next_grid(chosen)) is not None}
+            walking = [family for family, chosen in batch.items() if not self.keeps(chosen)]
 
     def worth_trying(self, chosen):
-        """Return whether a setting may still be cheaper than the best one."""
-        best = self._cost(self.best())
-        return chosen in self.observations or CHEAPER * self.expected_cpu(chosen) < best
-
-    def next_grid(self, chosen):
-        """Return the factor of dx to which the walk of a setting goes on, or None at its end."""
-        run, dx = self.observations[chosen], chosen.get("dx")
-        if not run.finished:
-            return None
-        coarser = self.keeps(chosen)
-        factor = neighbouring_grid(dx, 1 if coarser else -1)
-        if factor is None or (without_grid(chosen) | setting(dx=factor)) in self.observations:
-            return None
-        return factor
+        """Return whether a setting may still be cheaper than the best one; none without one."""
+        best = self.best()
+        if best is None:
+            return False
+        return (chosen in self.observations
+                or CHEAPER * self.expected_cpu(chosen) < self._cost(best))
 
     def promising_pairs(self):
         """Return the pairs of the single knobs that keep the error cheapest."""

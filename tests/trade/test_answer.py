@@ -53,6 +53,20 @@ def test_without_an_answer_words_say_what_it_would_take():
     assert re.search(r"a reference of 0\.05 % would take dx = \S+ m", text)
 
 
+def test_words_say_until_when_the_advice_holds_and_what_is_known_longer():
+    _, facts = facts_of()
+    assert "this holds until" not in "\n".join(answer_lines(facts))
+    runs = ModelRuns()
+    runs.chaos = 0.02
+    _, facts = facts_of(runs)
+    text = "\n".join(answer_lines(facts))
+    assert "from t = 0.625 s on a run perturbed by round-off diverges" in text
+    assert "this holds until t = 0.5 s of 1 s" in text
+    assert "over the whole run these are known: kinetic to " in text
+    facts["references"]["kinetic"]["error_at_end"] = 0.2
+    assert "these are known" not in "\n".join(answer_lines(facts))
+
+
 def test_the_grid_that_it_would_take_is_the_one_that_suffices():
     _, facts = facts_of(ModelRuns(left=20.0), error=6e-3)
     dx = float(re.search(r"would take dx = (\S+) m", "\n".join(answer_lines(facts)))[1])
@@ -80,6 +94,11 @@ def test_the_page_holds_the_facts_and_loads_nothing():
     assert json.loads(stored) == facts
     assert page.count("</script>") == 2
     assert not re.search(r'(src|href)\s*=|@import|url\(|fetch\(|https?://(?!www\.w3\.org)', page)
+
+
+def test_a_page_of_numbers_that_are_none_is_refused():
+    with pytest.raises(ValueError, match="JSON"):
+        page_of({"rows": [float("nan")]})
 
 
 def test_facts_are_plain_and_finite():

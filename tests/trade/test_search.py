@@ -1,29 +1,141 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from model_runs import EXACT, ModelRuns, search_of
+from model_runs import EXACT, TIMES, ModelRuns, search_of
 from sweep_scenes import FLIGHT, observed_run, scene_of
 
 from mpm_ref.executor import open_executor
-from mpm_ref.scene import loads
+from mpm_ref.scene import SceneError, loads
 from mpm_ref.sweep.observation import FINISHED, REFUSED, STOPPED, RunCost, RunObservation
 from mpm_ref.sweep.runs import SceneRuns
 from mpm_ref.sweep.setting import setting
 from mpm_ref.sweep.store import RunStore
-from mpm_ref.trade.candidates import GRIDS, neighbouring_grid, pairs, single_knobs
-from mpm_ref.trade.search import PERTURBED, TradeSearch, guessed_ratio
+from mpm_ref.trade.candidates import GRIDS, pairs, single_knobs
+from mpm_ref.trade.search import (
+    CHEAPER,
+    HOPELESS,
+    PERTURBED,
+    TradeSearch,
+    guessed_ratio,
+    without_grid,
+)
 
 
 def test_the_cheapest_setting_that_keeps_the_error_is_recommended():
     search = search_of(ModelRuns())
     search.run()
-    best, runs = search.best(), search.observations
+    best = search.best()
     assert search.horizon() == 1.0
-    assert best.get("transfer") == "apic"
-    assert best.get("cfl") == 0.9
     assert search.error_of(best) + search.reference_error() <= 0.01
-    cheaper = [s for s in search.settings() if runs[s].cost.cpu < runs[best].cost.cpu]
-    assert cheaper
-    assert not any(search.keeps(s) for s in cheaper)
+    singles = single_knobs(search.scene)
+    every = [family | setting(dx=factor) for family in [setting(), *singles, *pairs(singles)]
+             for factor in GRIDS]
+    search.observe(every, most_cpu=np.inf)
+    assert search.observations[search.best()].cost.cpu == search.observations[best].cost.cpu
+
+
+def test_walks_begin_on_the_coarsest_grid_and_end_where_the_error_is_kept():
+    search = search_of(ModelRuns())
+    search.start()
+    search.refine()
+    search.walk([setting(transfer="apic"), setting(cfl=0.25)])
+    def grids(**knobs):
+        return [s.get("dx") for s in search.settings() if without_grid(s) == setting(**knobs)]
+    kept = grids(transfer="apic")
+    assert kept == list(GRIDS[:len(kept)])
+    keeps = [search.keeps(setting(transfer="apic", dx=factor)) for factor in kept]
+    assert keeps == [False] * (len(kept) - 1) + [True]
+    dear = grids(cfl=0.25)
+    assert dear == list(GRIDS[:len(dear)])
+    assert not any(search.keeps(setting(cfl=0.25, dx=factor)) for factor in dear)
+    following = setting(cfl=0.25, dx=GRIDS[len(dear)])
+    assert search.expected_cpu(following) > search.expected_cpu(search.best()) / CHEAPER
+
+
+def test_a_family_that_fails_on_coarse_grids_goes_on():
+    runs = ModelRuns()
+    runs.fails = lambda text: "apic" in text and text.startswith(("dx x 4", "dx x 3"))
+    search = search_of(runs)
+    search.run()
+    assert "apic" in search.best().text
+
+
+def test_runs_past_the_best_cost_are_stopped():
+    search = search_of(ModelRuns())
+    search.start()
+    search.refine()
+    most, observe = [], search.runs.observe
+
+    def note(requests):
+        most.extend(request.most_cpu for request in requests.values())
+        return observe(requests)
+    search.runs.observe = note
+    cost = search.observations[search.best()].cost.cpu
+    search.walk([setting(transfer="apic")])
+    assert most[0] == HOPELESS * cost
+    assert len(most) > 1
+    assert (np.array(most) <= HOPELESS * cost).all()
+
+
+def test_no_grid_is_finer_than_the_finest():
+    runs = ModelRuns()
+    search = TradeSearch(scene_of(FLIGHT), runs, ("positions",), TIMES, 1e-5, finest=0.25)
+    search.run()
+    assert search.levels[-1] == 0.25
+
+
+def test_refinement_ends_where_it_no_longer_helps():
+    runs = ModelRuns()
+    runs.chaos = 0.02               # no grid is known past it
+    search = search_of(runs)
+    search.run()
+    assert search.horizon() == 0.5
+    assert search.levels[-1] == 1 / 32      # one grid past that which knows the first half
+
+
+def test_a_grid_past_one_that_failed_is_no_reference():
+    runs = ModelRuns()
+    runs.fails = lambda text: text == "dx x 0.25"
+    search = search_of(runs, error=1e-3)
+    search.run()
+    search.observe([setting(dx=0.125)], most_cpu=np.inf)
+    search.update_references()
+    assert search.levels == (4.0, 2.0, 1.0, 0.5)
+
+
+def test_at_the_end_only_the_last_state_counts():
+    runs = ModelRuns()
+    run = runs.run
+
+    def off_in_the_middle(label):
+        done = run(label)
+        if label != setting(cfl=0.9, dx=1.0):
+            return replace(done, values={"positions@end": done.values["positions"]})
+        middle = (TIMES == 0.5)[:, None] * 10.0
+        return replace(done, values={"positions@end": done.values["positions"] + middle})
+    runs.run = off_in_the_middle
+    search = TradeSearch(scene_of(FLIGHT), runs, ("positions@end",), TIMES, 0.01)
+    search.start()
+    search.refine()
+    chosen = [setting(dx=1.0), setting(cfl=0.9, dx=1.0)]
+    search.observe(chosen, most_cpu=np.inf)
+    assert search.error_of(chosen[1]) == search.error_of(chosen[0]) < 0.1
+
+
+def test_a_setting_that_does_not_fit_the_scene_is_refused():
+    observe = ModelRuns.observe
+    runs = ModelRuns()
+
+    def refuse(requests):
+        return {label: RunObservation({}, RunCost(), REFUSED, str(request.scene))
+                if isinstance(request.scene, SceneError) else observe(runs, {label: request})[label]
+                for label, request in requests.items()}
+    runs.observe = refuse
+    search = search_of(runs)
+    search.observe([setting(eps=1e-3)])
+    done = search.observations[setting(eps=1e-3)]
+    assert (done.outcome, "solves nothing" in done.message) == (REFUSED, True)
 
 
 def test_references_are_refined_until_half_the_error():
@@ -124,19 +236,13 @@ def test_single_knobs_are_not_those_of_the_scene():
     texts = [one.text for one in single_knobs(scene_of(FLIGHT))]
     assert "cfl 0.5" not in texts
     assert "transfer mls" not in texts
+    assert [text for text in texts if "sampling" in text] == ["sampling poisson"]
     assert "degree 1, transfer flip 0.95" in texts
     assert len(set(texts)) == len(texts)
     implicit = [one.text for one in single_knobs(loads('integrator = "hot"' + FLIGHT))]
     assert "integrator explicit, cfl 0.5" in implicit
     assert "eps 0.001" in implicit
     assert "eps 1e-07" not in implicit
-
-
-def test_neighbouring_grids_end_with_the_list():
-    assert neighbouring_grid(1.0) == 1.5
-    assert neighbouring_grid(1.0, -1) == 0.75
-    assert neighbouring_grid(GRIDS[0]) is None
-    assert neighbouring_grid(GRIDS[-1], -1) is None
 
 
 def test_pairs_change_different_knobs():
