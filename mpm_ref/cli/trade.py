@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from ..scene import dumps
+from ..scene import SceneError, dumps
 from ..store.atomic import write_bytes
 from ..sweep.quantity import with_companions
 from ..sweep.setting import scene_at
@@ -34,8 +34,17 @@ from .sweep_options import (
 from .terminal import as_json
 
 NO_ANSWER = 1
+PROBLEM = {     # what scenes of the same problem share
+    "dim =": lambda record: record.dim,
+    "end =": lambda record: f"{record.end:.9g} s",
+    "bodies": lambda record: ", ".join(sorted(body.name for body in record.body)),
+}
 LikeOption = Annotated[str | None, typer.Option(
     "--like", help="Answer at once from SCENE.trade.json of this similar scene, without a run.")]
+
+BesideOption = Annotated[list[str] | None, typer.Option(
+    "--beside", help="Another scene of the same problem, such as one with a learned law, whose "
+    "settings are tried too; may be given several times.")]
 
 
 def measure(
@@ -47,6 +56,7 @@ def measure(
     scheduler: SchedulerOption = None,
     out: OutOption = Path(),
     like: LikeOption = None,
+    beside: BesideOption = None,
     json: Json = False,
     quiet: QuietOption = False,
 ):
@@ -64,9 +74,10 @@ def measure(
             record, path = load_sweep(name)
             texts = with_companions(request.quantities, record.dim)
             observed = observed_of(record, path, texts)
+            others = load_others(record, beside or ())
         if like is not None:
             raise typer.Exit(answer_from(like, record, observed, request))
-        search = run_search(record, observed, request)
+        search = run_search(record, observed, request, others)
         facts = json_loads(as_json(answer_of(search, path.stem)))
         write_answer(search, facts, request)
         print(as_json(facts) if json else "\n".join(answer_lines(facts)))
@@ -92,11 +103,25 @@ def answer_from(like, record, observed, request):
     return 0
 
 
-def run_search(record, observed, request):
+def load_others(record, names):
+    """Return {name: scene} of scenes of the same problem. Raises SceneError for one of another."""
+    others = {}
+    for name in names:
+        other, path = load_sweep(name)
+        for what, of in PROBLEM.items():
+            if of(record) != of(other):
+                raise SceneError(f"--beside {name}: {what} {of(other)}, in the scene "
+                                 f"{of(record)}; expected another scene of the same problem")
+        if others.setdefault(path.stem, other) is not other:
+            raise SceneError(f"--beside {name}: two scenes are called {path.stem}; rename one")
+    return others
+
+
+def run_search(record, observed, request, others):
     """Return a `TradeSearch` after its runs."""
     with open_runs(request, observed) as runs:
         search = TradeSearch(record, runs, request.quantities, np.array(observed.times),
-                             request.error)
+                             request.error, others=others)
         search.run()
     return search
 

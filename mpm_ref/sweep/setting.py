@@ -2,6 +2,7 @@
 
 A setting is a dictionary of some of these knobs; what it leaves out stays as the scene says.
 
+    scene       another scene of the same problem, by its name: with a learned law, for instance
     dx          factor of the grid spacing; points per cell stay, and a fixed dt goes along
     particles   factor of the points per cell and axis
     sampling    "regular", "jittered" or "poisson", with as many points per cell
@@ -44,7 +45,7 @@ class Setting:
 
 def setting(**knobs):
     """Return the `Setting` of some knobs. Raises ValueError for an unknown one."""
-    if unknown := sorted(knobs.keys() - KNOBS.keys()):
+    if unknown := sorted(knobs.keys() - set(KNOBS)):
         raise ValueError(f"knob {unknown[0]!r}: expected one of {', '.join(KNOBS)}")
     return Setting(tuple((name, knobs[name]) for name in KNOBS if name in knobs))
 
@@ -53,11 +54,15 @@ def _shown(name, value):
     return f"x {value:.4g}" if name in ("dx", "particles") else str(value)
 
 
-def scene_at(scene, chosen):
-    """Return a scene under a `Setting`. Raises SceneError where the two do not fit."""
-    tables = in_seconds(scene)
+def scene_at(scene, chosen, others=None):
+    """Return a scene under a `Setting`, or the one of `others`, {name: scene}, that it names.
+
+    Raises SceneError where the two do not fit.
+    """
+    tables = in_seconds(scene if chosen.get("scene") is None else others[chosen.get("scene")])
     for name, value in chosen.items:
-        KNOBS[name](tables, value)
+        if name != "scene":
+            CHANGES[name](tables, value)
     return validate_scene(tables)
 
 
@@ -180,8 +185,9 @@ def change_eps(tables, eps):
     tables["solver"] = (tables.get("solver") or {}) | {"eps": eps}
 
 
-KNOBS = {
+CHANGES = {
     "dx": scale_dx, "particles": scale_particles, "sampling": change_sampling,
     "integrator": change_integrator, "cfl": change_cfl, "degree": change_degree,
     "transfer": change_transfer, "eps": change_eps,
 }
+KNOBS = ("scene", *CHANGES)

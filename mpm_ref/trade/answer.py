@@ -183,4 +183,4 @@ def best_scene(search, name):
         f"# Cost: {run.cost.cpu:.3g} s of CPU time, {run.cost.steps} steps, "
         f"{run.cost.particles} particles.",
     ]
-    return "\n".join([*head, "", dumps(scene_at(search.scene, best))])
+    return "\n".join([*head, "", dumps(scene_at(search.scene, best, search.others))])

@@ -45,6 +45,7 @@ class TradeSearch:
     times: np.ndarray                   # (T,) [s]
     error: float
     finest: float = FINEST              # factor of dx of the finest grid of the reference
+    others: dict = field(default_factory=dict)          # name: another scene of the same problem
     observations: dict = field(default_factory=dict)    # Setting: RunObservation
     references: dict = field(default_factory=dict)      # text: QuantityReference
     levels: tuple = ()                  # factors of dx of the reference
@@ -55,8 +56,12 @@ class TradeSearch:
         self.start()
         self.refine()
         self.compare_families()
-        self.walk([Setting(), *single_knobs(self.scene)])
+        self.walk([Setting(), *self.singles()])
         self.walk(self.promising_pairs())
+
+    def singles(self):
+        """Return the settings that change one knob."""
+        return [*single_knobs(self.scene), *(setting(scene=name) for name in self.others)]
 
     # the reference
 
@@ -84,7 +89,7 @@ class TradeSearch:
         time [s].
         """
         grid = setting(dx=(self.best() or setting(dx=1.0)).get("dx"))
-        candidates = [family | grid for family in single_knobs(self.scene)
+        candidates = [family | grid for family in self.singles()
                       if family | grid not in self.observations]
         total = np.cumsum([self.expected_cpu(chosen) for chosen in candidates])
         return [c for c, t in zip(candidates, total, strict=True)
@@ -247,7 +252,7 @@ class TradeSearch:
 
     def _scene_at(self, chosen):
         try:
-            return scene_at(self.scene, chosen)
+            return scene_at(self.scene, chosen, self.others)
         except SceneError as fault:
             return fault
 

@@ -23,6 +23,7 @@ Word = Annotated[str, Meta(pattern=r"^[a-z0-9_. -]+$", max_length=40)]
 class StoredSetting(msgspec.Struct, forbid_unknown_fields=True):
     """The knobs of a row; see `sweep.setting`."""
 
+    scene: Word | UnsetType = UNSET
     dx: Factor | UnsetType = UNSET
     particles: Factor | UnsetType = UNSET
     sampling: Word | UnsetType = UNSET
@@ -82,11 +83,12 @@ def read_answer(path):
 
 
 def cheapest_row(answer, error):
-    """Return the `StoredRow` of the cheapest setting that keeps an error, the reference's
-    included, or None.
+    """Return the `StoredRow` of the cheapest setting of the scene itself that keeps an error, the
+    reference's included, or None.
     """
-    good = [row for row in answer.rows if row.outcome == FINISHED and row.error is not None
-            and row.cpu is not None and row.error + answer.margin() <= error]
+    good = [row for row in answer.rows if row.outcome == FINISHED and row.setting.scene is UNSET
+            and row.error is not None and row.cpu is not None
+            and row.error + answer.margin() <= error]
     return min(good, key=lambda row: row.cpu, default=None)
 
 

@@ -55,6 +55,32 @@ def test_a_similar_scene_answers_without_a_run(folder):
     assert (ours.cfl, ours.scheme) == (theirs.cfl, theirs.scheme)
 
 
+def test_another_scene_of_the_same_problem_is_tried_too(folder, tmp_path):
+    stiff = FLIGHT.replace("E = 1e4", "E = 2e4")
+    assert stiff != FLIGHT
+    (tmp_path / "stiff.toml").write_text(stiff)
+    mpm_ref("trade", folder / "flight.toml", "--error", "4%", "--out", tmp_path, *FAST,
+            "--beside", tmp_path / "stiff.toml")
+    facts = json.loads((tmp_path / "flight.trade.json").read_text())
+    rows = [row for row in facts["rows"] if row["setting"].get("scene") == "stiff"]
+    assert rows
+    assert all(row["text"].startswith("scene stiff") and row["outcome"] == "finished"
+               for row in rows)
+
+
+@pytest.mark.parametrize(("old", "new", "words"), [
+    ("end = 0.2", "end = 0.3", "end = 0.3 s, in the scene 0.2 s"),
+    ('name = "disk"', 'name = "ball"', "bodies ball, in the scene disk"), ("", "", "two scenes")])
+def test_a_scene_of_another_problem_is_refused(folder, tmp_path, old, new, words):
+    assert old in FLIGHT
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "other.toml").write_text(FLIGHT.replace(old, new))
+    done = mpm_ref("trade", folder / "flight.toml", "--out", tmp_path, "--quiet", "--beside",
+                   tmp_path / "a" / "other.toml", "--beside", tmp_path / "b" / "other.toml")
+    assert_told(done, 2, words)
+
+
 @pytest.mark.parametrize(("content", "words"), [
     (None, "No such file"), ("{}", "missing required field `cells`"), ("[1", "not an answer"),
     ('{"rows": [{}], "cells": 3}', "not an answer"), ('{"rows": [], "cells": "x"}', "not an")])

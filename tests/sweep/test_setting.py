@@ -37,7 +37,9 @@ def test_knobs_change_what_they_name():
     assert scene_at(scene, setting(cfl=0.9)).cfl == 0.9
     assert scene_at(scene, setting(degree=3)).scheme.degree == 3
     assert scene_at(scene, setting(transfer="flip 0.95")).step_scheme.flip == 0.95
-    assert scene_at(scene, setting(transfer="flip 0.95")).step_scheme.mass_eps == 0.0
+    eps = loads("scheme = { mass_eps = 1e-3 }" + BOUNCE)
+    assert scene_at(eps, setting(transfer="apic")).step_scheme.mass_eps == 1e-3
+    assert scene_at(eps, setting(transfer="flip 0.95")).step_scheme.mass_eps == 0.0
     assert scene_at(scene, setting(transfer="apic rpic 0.5")).step_scheme.rpic == 0.5
     assert scene_at(scene, setting(sampling="poisson")).body[0].sampling.per_cell == 2
     assert particles(scene_at(scene, setting(particles=1.5))) == particles(scene) * 9 // 4
@@ -46,6 +48,12 @@ def test_knobs_change_what_they_name():
     assert scene_at(implicit, setting(eps=1e-3)).solver.eps == 1e-3
     with pytest.raises(SceneError, match="solves nothing"):
         scene_at(scene, setting(eps=1e-3))
+
+
+def test_another_scene_takes_the_same_knobs():
+    other = loads(FLIGHT.replace("end = 0.2", "end = 0.2\ntitle = \"other\""))
+    changed = scene_at(scene_of(FLIGHT), setting(scene="b", dx=0.5), {"b": other})
+    assert (changed.title, changed.dx) == ("other", 0.05)
 
 
 def test_an_implicit_scene_becomes_explicit():

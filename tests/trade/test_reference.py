@@ -57,7 +57,13 @@ def test_two_grids_have_no_order():
 
 def test_equal_runs_are_exact():
     reference = reference_of([EXACT, EXACT, EXACT])
-    assert reference.error[1:].max() < 1e-11
+    assert (reference.error[1:] == 1e-12).all()
+
+
+def test_differences_of_round_off_are_no_spread():
+    noise = 1e-13 * (EXACT - EXACT[0])
+    reference = reference_of([EXACT + 1e9 * noise, EXACT, EXACT + noise])
+    assert (reference.error[1:] == 1e-12).all()
     assert reliable_times([reference], 0.01)[1:].all()
 
 

@@ -9,7 +9,7 @@ from mpm_ref.executor import open_executor
 from mpm_ref.scene import SceneError, loads
 from mpm_ref.sweep.observation import FINISHED, REFUSED, STOPPED, RunCost, RunObservation
 from mpm_ref.sweep.runs import SceneRuns
-from mpm_ref.sweep.setting import setting
+from mpm_ref.sweep.setting import scene_at, setting
 from mpm_ref.sweep.store import RunStore
 from mpm_ref.trade.candidates import GRIDS, pairs, single_knobs
 from mpm_ref.trade.search import (
@@ -222,6 +222,28 @@ def test_another_family_raises_the_error_of_the_reference():
     runs.run = lambda label: shifted if "apic" in label.text else run(label)
     search.compare_families()
     assert search.references["positions"].error[-1] > 5.0 * own
+
+
+def test_settings_of_another_scene_are_tried():
+    runs, scenes = ModelRuns(), {}
+    observe, other = runs.observe, loads(FLIGHT.replace("E = 1e4", "E = 2e4"))
+
+    def note(requests):
+        scenes.update({label: request.scene for label, request in requests.items()})
+        return observe(requests)
+    runs.observe = note
+    search = search_of(runs)
+    search.others = {"stiff": other}
+    search.run()
+    tried = [label for label in search.settings() if label.get("scene") == "stiff"]
+    assert tried
+    assert other.body != search.scene.body
+    assert all(scenes[label].body == scene_at(other, without_scene(label)).body for label in tried)
+    assert "scene" not in search.best().text
+
+
+def without_scene(chosen):
+    return setting(**{name: value for name, value in chosen.items if name != "scene"})
 
 
 def test_expected_cost_follows_the_grid_and_the_knob():

@@ -18,6 +18,7 @@ ANSWER = {
         {"setting": {"dx": 2.0, "cfl": 0.9}, "outcome": "finished", "error": 0.02, "cpu": 1.0},
         {"setting": {"dx": 4.0}, "outcome": "finished", "error": 0.05, "cpu": 0.5},
         {"setting": {"degree": 1}, "outcome": "unstable", "error": 0.0, "cpu": 0.1},
+        {"setting": {"scene": "learned"}, "outcome": "finished", "error": 0.0, "cpu": 0.1},
         {"setting": {"degree": 3}, "outcome": "finished", "error": None, "cpu": 0.1},
     ]}
 JSON = st.recursive(st.none() | st.booleans() | st.floats() | st.text(printable),
@@ -49,7 +50,7 @@ def test_cells_over_the_body_carry_over(tmp_path):
 
 
 def test_every_knob_can_be_stored():
-    assert StoredSetting.__struct_fields__ == tuple(KNOBS)
+    assert StoredSetting.__struct_fields__ == KNOBS
 
 
 @given(key=st.sampled_from([*ANSWER, "rows setting", "rows error", "rows outcome"]), value=JSON)
@@ -77,4 +78,4 @@ def test_any_bytes_are_refused(tmp_path_factory, data):
 def test_a_row_may_hold_more_than_is_read(tmp_path):
     facts = msgspec.to_builtins(ANSWER)
     facts["rows"][0] |= {"message": "", "steps": 3}
-    assert len(stored(tmp_path, facts | {"version": "1"}).rows) == 5
+    assert len(stored(tmp_path, facts | {"version": "1"}).rows) == 6
