@@ -9,10 +9,10 @@ import typer
 
 from ..scene import dumps
 from ..store.atomic import write_bytes
+from ..store.page import page_of
 from ..sweep.quantity import with_companions
 from ..sweep.setting import scene_at
 from ..trade.answer import answer_lines, answer_of, best_scene, largest_extent, percent
-from ..trade.page import page_of
 from ..trade.search import TradeSearch
 from ..trade.similar import carried_over, cheapest_row, read_answer
 from .errors import exit_on_errors, options
@@ -103,7 +103,7 @@ def write_answer(search, facts, request):
     """Write the JSON, the page, and the recommended scene. Raises `NotWritten`."""
     base = request.out / request.stem
     write_bytes(f"{base}.trade.json", as_json(facts).encode())
-    write_bytes(f"{base}.trade.html", page_of(facts).encode())
+    write_bytes(f"{base}.trade.html", page_of(facts, "trade").encode())
     text = best_scene(search, request.stem)
     if text is not None:
         write_bytes(f"{base}.best.toml", text.encode())
