@@ -31,10 +31,21 @@ class PageReader(HTMLParser):
             self.scripts[-1] += data
 
 
-def assert_holds(page, facts):
-    """The page holds the facts, loads nothing, and no text of them is markup."""
+def read(page):
+    """The `PageReader` of a page."""
     reader = PageReader()
     reader.feed(page)
+    return reader
+
+
+def facts_of(page):
+    """The facts that a page holds."""
+    return json.loads(read(page).scripts[0])
+
+
+def assert_holds(page, facts):
+    """The page holds the facts, loads nothing, and no text of them is markup."""
+    reader = read(page)
     scripts = [attrs for tag, attrs in reader.elements if tag == "script"]
     assert scripts == [{"type": "application/json", "id": "facts"}, {}, {}]
     assert reader.depth == 0
