@@ -2,7 +2,6 @@
 
 from math import isfinite
 
-from ..sweep.observation import FINISHED
 from .answer import grid_note, grid_text, lean_lines, scene_lines
 from .code_parts import table_rows
 from .removal import (
@@ -48,9 +47,9 @@ def verdict_cases(run, result):
     """Return the verdicts on a removal: (x, verdict, words), x increasing. One holds from where a
     change of at most its x counts as not required up to the next x.
 
-    A verdict that does not follow from the size of the change holds for every x.
+    Where no change was measured the verdict holds for every x.
     """
-    if run.outcome != FINISHED or not isfinite(run.change):
+    if not isfinite(run.change):
         words = DEARER if run.verdict == COSTLY else WORDS[run.verdict]
         return [(0.0, run.verdict, words)]
     within = run.verdict
