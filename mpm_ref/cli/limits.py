@@ -4,9 +4,11 @@ from pathlib import Path
 
 from ..limits.answer import answer_lines, answer_of
 from ..limits.figure import save_figure
+from ..limits.page import page_facts
 from ..limits.search import LimitsSearch
 from ..limits.verdict import CellJudge, NoReference
 from ..store.atomic import write_bytes
+from ..store.page import page_of
 from ..sweep.observation import REFUSED
 from ..sweep.quantity import with_companions
 from .errors import BAD_INPUT, end, exit_on_errors, options
@@ -24,7 +26,7 @@ from .sweep_options import (
     observed_of,
     open_runs,
 )
-from .terminal import as_json
+from .terminal import as_json, finite
 
 NO_ANSWER = 1
 
@@ -44,9 +46,9 @@ def measure(
 
     Changes stiffness, Poisson's ratio, density, speed, gravity, friction, yield stress, time step,
     points per cell, size and place by factors over decades, one and two at a time. Writes
-    SCENE.limits.json and the figure SCENE.limits.png. Runs are stored in SCENE.trade: the same
-    command with a larger budget goes on. Exit status: 0 an answer is given, 1 the scene as given
-    has no reference within the budget, 2 bad input, 130 Ctrl-C.
+    SCENE.limits.json, the page SCENE.limits.html, and the figure SCENE.limits.png. Runs are stored
+    in SCENE.trade: the same command with a larger budget goes on. Exit status: 0 an answer is
+    given, 1 the scene as given has no reference within the budget, 2 bad input, 130 Ctrl-C.
     """
     with exit_on_errors():
         with options():
@@ -83,7 +85,8 @@ def command_of(request):
 
 
 def write_answer(facts, request):
-    """Write the JSON and the figure. Raises `NotWritten`."""
+    """Write the JSON, the page and the figure. Raises `NotWritten`."""
     base = request.out / request.stem
     write_bytes(f"{base}.limits.json", as_json(facts).encode())
+    write_bytes(f"{base}.limits.html", page_of(finite(page_facts(facts)), "limits").encode())
     save_figure(facts, f"{base}.limits.png")

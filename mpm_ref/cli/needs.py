@@ -8,9 +8,11 @@ import typer
 from ..needs.answer import NeedsAnswer, lean_text
 from ..needs.code_parts import code_parts
 from ..needs.figure import save_figure
+from ..needs.page import page_facts
 from ..needs.removal import RemovalStudy
 from ..needs.variant import first_variant
 from ..store.atomic import write_bytes
+from ..store.page import page_of
 from ..sweep.observation import STOPPED
 from ..sweep.runs import CRASHED
 from .errors import BAD_INPUT, end, exit_on_errors, options
@@ -28,7 +30,7 @@ from .sweep_options import (
     observed_of,
     open_runs,
 )
-from .terminal import as_json
+from .terminal import as_json, finite
 
 NO_ANSWER = 1
 
@@ -47,9 +49,10 @@ def find(
     """Find which ingredients of a scene its quantities of interest require.
 
     Takes them away one by one, then together in the best order, and measures the change of the
-    quantities and the CPU time saved. Writes SCENE.needs.json, SCENE.needs.png and the runnable
-    scene SCENE.lean.toml. Runs are stored in SCENE.trade: the same command with a larger budget
-    goes on. Exit status: 0 the answer, 1 part of it within the budget, 2 bad input, 130 Ctrl-C.
+    quantities and the CPU time saved. Writes SCENE.needs.json, the page SCENE.needs.html, the
+    figure SCENE.needs.png and the runnable scene SCENE.lean.toml. Runs are stored in SCENE.trade:
+    the same command with a larger budget goes on. Exit status: 0 the answer, 1 part of it within
+    the budget, 2 bad input, 130 Ctrl-C.
     """
     with exit_on_errors():
         with options():
@@ -94,8 +97,9 @@ def command_of(request):
 
 
 def write_answer(answer, out):
-    """Write the JSON, the figure and the lean scene. Raises `NotWritten`."""
+    """Write the JSON, the page, the figure and the lean scene. Raises `NotWritten`."""
     base = Path(out) / answer.name
     write_bytes(f"{base}.needs.json", as_json(answer.facts).encode())
+    write_bytes(f"{base}.needs.html", page_of(finite(page_facts(answer)), "needs").encode())
     write_bytes(f"{base}.lean.toml", lean_text(answer, out).encode())
     save_figure(answer, f"{base}.needs.png")

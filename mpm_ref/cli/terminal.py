@@ -107,14 +107,15 @@ def warn(sentences):
 
 def as_json(facts):
     """Return facts as JSON; numbers that are not finite become null."""
-    return json.dumps(_finite(facts), indent=1)
+    return json.dumps(finite(facts), indent=1)
 
 
-def _finite(value):
+def finite(value):
+    """Return plain data with None for numbers that are not finite."""
     if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
+        return {key: finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
+        return [finite(item) for item in value]
     if isinstance(value, float) and not abs(value) < float("inf"):
         return None
     return value

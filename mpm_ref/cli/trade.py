@@ -9,11 +9,11 @@ import typer
 
 from ..scene import SceneError, dumps
 from ..store.atomic import write_bytes
+from ..store.page import page_of
 from ..sweep.quantity import with_companions
 from ..sweep.setting import scene_at
 from ..trade.answer import answer_lines, answer_of, best_scene, largest_extent, percent
 from ..trade.figure import save_figure
-from ..trade.page import page_of
 from ..trade.search import TradeSearch
 from ..trade.similar import carried_over, cheapest_row, read_answer
 from .errors import exit_on_errors, options
@@ -130,7 +130,7 @@ def write_answer(search, facts, request):
     """Write the JSON, the page, the figure, and the recommended scene. Raises `NotWritten`."""
     base = request.out / request.stem
     write_bytes(f"{base}.trade.json", as_json(facts).encode())
-    write_bytes(f"{base}.trade.html", page_of(facts).encode())
+    write_bytes(f"{base}.trade.html", page_of(facts, "trade").encode())
     save_figure(facts, f"{base}.trade.png")
     text = best_scene(search, request.stem)
     if text is not None:

@@ -111,13 +111,8 @@ def answer_lines(facts):
     """Return the answer as lines of text."""
     lines = [*wrong_lines(facts), "", *nearest_lines(facts), ""]
     lines += [one["sentence"] for one in facts["directions"]]
-    lines += [f"{AXIS[name].text}: not changed, {why}"
-              for name, why in facts["left_out"].items()]
-    lines += ["", *map_lines(facts), *tolerance_lines(facts)]
-    if not facts["complete"]:
-        lines.append("the budget ended the search; the same command with a larger --budget goes "
-                     f"on: at least {time_text(facts['missing_cpu'])} of CPU time are missing")
-    return lines
+    lines += [*left_out_lines(facts), "", *map_lines(facts), *tolerance_lines(facts)]
+    return lines + budget_lines(facts)
 
 
 def wrong_lines(facts):
@@ -189,6 +184,19 @@ def shortened(message):
     """Return the first clause of a message, without what stands in brackets."""
     text = re.sub(r"\s*\([^()]*\)", "", message.split(";")[0])
     return text if len(text) <= SHOWN_MESSAGE else f"{text[:SHOWN_MESSAGE]}..."
+
+
+def left_out_lines(facts):
+    """Return a line for each axis that is not changed, with the reason."""
+    return [f"{AXIS[name].text}: not changed, {why}" for name, why in facts["left_out"].items()]
+
+
+def budget_lines(facts):
+    """Return what is missing where the budget ended the search."""
+    if facts["complete"]:
+        return []
+    return ["the budget ended the search; the same command with a larger --budget goes on: at "
+            f"least {time_text(facts['missing_cpu'])} of CPU time are missing"]
 
 
 def map_lines(facts):

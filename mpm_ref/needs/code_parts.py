@@ -67,8 +67,10 @@ class CodeParts:
         return vars(self) | {"doubles_per_particle": self.numbers, "stages": self.stages}
 
 
-def table_lines(parts):
-    """Return a table of {name of a scene: `CodeParts`}, a column for each, as lines of text."""
+def table_rows(parts):
+    """Return the rows of a table of {name of a scene: `CodeParts`}: (label, texts), a text for each
+    scene. Rows without texts are headings; the labels below them begin with spaces.
+    """
     columns = list(parts.values())
     rows = [("in the first steps", [str(column.steps) for column in columns])]
     for bodies in alike_bodies(columns[0]):
@@ -82,7 +84,12 @@ def table_lines(parts):
     rows += [(f"  {stage}", [str(len(column.stages[stage])) for column in columns])
              for stage in STAGES]
     rows.append(("  all, with those outside of steps", [str(len(c.kernels)) for c in columns]))
-    rows.append(("PyTorch", ["loaded" if c.torch else "not loaded" for c in columns]))
+    return [*rows, ("PyTorch", ["loaded" if c.torch else "not loaded" for c in columns])]
+
+
+def table_lines(parts):
+    """Return the table of `table_rows` as lines of text."""
+    rows = table_rows(parts)
     width = max(len(label) for label, _ in rows)
     head = "  ".join([f"{'what the code uses':{width}}", *(f"{name:>12}" for name in parts)])
     return [head, *("  ".join([f"{label:{width}}", *(f"{value:>12}" for value in values)]).rstrip()

@@ -161,9 +161,9 @@ class RemovalStudy:
         """Return a `RemovalRun` with its CPU time [s], and the verdict that follows: without a part
         that changes nothing a run cannot take longer.
         """
-        is_costly = (run.verdict == NOT_REQUIRED and run.change > NOTHING
-                     and cpu > (1.0 + self.noise) * before)
-        return replace(run, cpu=cpu, verdict=COSTLY if is_costly else run.verdict)
+        run = replace(run, cpu=cpu)
+        is_costly = run.verdict == NOT_REQUIRED and takes_longer(run, before, self.noise)
+        return replace(run, verdict=COSTLY) if is_costly else run
 
     def verdict_of_failure(self, observation):
         """Return the verdict of a run that did not reach its end."""
@@ -269,6 +269,11 @@ def best_of(runs, cpu_alone):
     allowed = [run for run in runs if run.verdict == NOT_REQUIRED]
     return min(allowed, key=lambda run: (run.cpu, cpu_alone.get(run.label, inf), run.change),
                default=None) if allowed else None
+
+
+def takes_longer(run, before, noise):
+    """Return whether a run that changes something takes longer than before [s] and the noise."""
+    return run.change > NOTHING and run.cpu > (1.0 + noise) * before
 
 
 def saving(run, base_cpu):

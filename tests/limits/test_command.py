@@ -4,11 +4,14 @@ import json
 
 import pytest
 from command_line import SCENE, assert_told, mpm_ref
+from offline_page import assert_holds
 
 from mpm_ref.cli.sweep_options import load_sweep, observed_of
+from mpm_ref.cli.terminal import as_json
 from mpm_ref.executor import open_executor
 from mpm_ref.limits import axes
 from mpm_ref.limits.figure import draw_limits
+from mpm_ref.limits.page import page_facts
 from mpm_ref.limits.verdict import CellJudge
 from mpm_ref.scene import build, load
 from mpm_ref.sweep.quantity import with_companions
@@ -95,6 +98,12 @@ def test_figure_shows_margins_and_maps(falling):
     assert len(maps) == len(facts["maps"]) == 1
     assert {text.get_text() for text in figure.legends[0].texts} >= {"right", "finished and wrong"}
     assert (folder / "disk.limits.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_page_is_written(falling):
+    _, facts, folder = falling
+    page = (folder / "disk.limits.html").read_text()
+    assert_holds(page, json.loads(as_json(page_facts(facts))))
 
 
 def test_second_command_makes_no_new_run(falling, monkeypatch):

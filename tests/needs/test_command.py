@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 from command_line import assert_told, mpm_ref
 from needs_toys import DROP, SCENE, variant_of
+from offline_page import assert_holds, facts_of
 
 import mpm_ref.cli.needs as command
 from mpm_ref.needs.answer import lean_text, percent
@@ -64,6 +65,18 @@ def test_json_has_all_that_was_measured(drop):
 
 def test_figure_is_written(drop):
     assert (drop[0] / "drop.needs.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_page_is_written(drop):
+    folder, _ = drop
+    facts = json.loads((folder / "drop.needs.json").read_text())
+    page = (folder / "drop.needs.html").read_text()
+    shown = facts_of(page)
+    assert_holds(page, shown)
+    for key in ("removals", "order"):
+        assert all(one.items() <= both.items() for one, both
+                   in zip(facts.pop(key), shown.pop(key), strict=True))
+    assert facts.items() <= shown.items()
 
 
 def test_second_command_makes_no_run(drop, monkeypatch):
