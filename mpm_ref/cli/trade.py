@@ -42,9 +42,9 @@ PROBLEM = {     # what scenes of the same problem share
 LikeOption = Annotated[str | None, typer.Option(
     "--like", help="Answer at once from SCENE.trade.json of this similar scene, without a run.")]
 
-BesideOption = Annotated[list[str] | None, typer.Option(
-    "--beside", help="Another scene of the same problem, such as one with a learned law, whose "
-    "settings are tried too; may be given several times.")]
+AlternativeOption = Annotated[list[str] | None, typer.Option(
+    "--alternative", help="Another scene of the same problem, such as one with a learned law, "
+    "whose settings are tried too; may be given several times.")]
 
 
 def measure(
@@ -56,7 +56,7 @@ def measure(
     scheduler: SchedulerOption = None,
     out: OutOption = Path(),
     like: LikeOption = None,
-    beside: BesideOption = None,
+    alternative: AlternativeOption = None,
     json: Json = False,
     quiet: QuietOption = False,
 ):
@@ -74,7 +74,7 @@ def measure(
             record, path = load_sweep(name)
             texts = with_companions(request.quantities, record.dim)
             observed = observed_of(record, path, texts)
-            others = load_others(record, beside or ())
+            others = load_alternatives(record, alternative or ())
         if like is not None:
             raise typer.Exit(answer_from(like, record, observed, request))
         search = run_search(record, observed, request, others)
@@ -103,17 +103,17 @@ def answer_from(like, record, observed, request):
     return 0
 
 
-def load_others(record, names):
+def load_alternatives(record, names):
     """Return {name: scene} of scenes of the same problem. Raises SceneError for one of another."""
     others = {}
     for name in names:
         other, path = load_sweep(name)
         for what, of in PROBLEM.items():
             if of(record) != of(other):
-                raise SceneError(f"--beside {name}: {what} {of(other)}, in the scene "
+                raise SceneError(f"--alternative {name}: {what} {of(other)}, in the scene "
                                  f"{of(record)}; expected another scene of the same problem")
         if others.setdefault(path.stem, other) is not other:
-            raise SceneError(f"--beside {name}: two scenes are called {path.stem}; rename one")
+            raise SceneError(f"--alternative {name}: two scenes are called {path.stem}; rename one")
     return others
 
 

@@ -32,9 +32,9 @@ def draw_trade(facts):
         draw_costs(axes, facts["rows"], key)
         axes.axhline(facts["error"], color="0.35", linestyle=":", label="error asked")
         axes.set(xscale="log", yscale="log", xlabel=label,
-                 xlim=limits([row[key] for row in known_rows(facts["rows"], key)]),
+                 xlim=limits([row[key] for row in rows_with_error(facts["rows"], key)]),
                  ylim=limits([facts["error"], *(row["error"] for row in
-                                                known_rows(facts["rows"], key))]))
+                                                rows_with_error(facts["rows"], key))]))
     panels[0].set_ylabel(f"error of {', '.join(facts['quantities'])}")
     draw_failures(panels[0], facts["rows"])
     handles = {label: handle for axes in panels[:1]
@@ -45,7 +45,7 @@ def draw_trade(facts):
     return figure
 
 
-def known_rows(rows, key):
+def rows_with_error(rows, key):
     """Return the rows with an error and a cost."""
     return [row for row in rows if row["error"] is not None and (row[key] or 0.0) > 0.0]
 
@@ -58,11 +58,11 @@ def limits(values):
 
 def draw_costs(axes, rows, key):
     """Draw the settings with a known error as points over one cost."""
-    known = known_rows(rows, key)
-    front = [row for row in known if is_on_front(row, known, key)]
-    others = [row for row in known if row not in front]
+    drawn = rows_with_error(rows, key)
+    front = [row for row in drawn if is_on_front(row, drawn, key)]
+    others = [row for row in drawn if row not in front]
     for chosen, color, label in ((others, OTHER, "dominated"), (front, FRONT, "front"),
-                                 ([row for row in known if row["best"]], BEST, "recommended")):
+                                 ([row for row in drawn if row["best"]], BEST, "recommended")):
         axes.plot([row[key] for row in chosen], [max(row["error"], LEAST) for row in chosen], "o",
                   color=color, markersize=5, label=label)
 

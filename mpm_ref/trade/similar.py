@@ -40,7 +40,7 @@ class StoredSetting(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class StoredRow(msgspec.Struct):
-    """What is read of a row; None where it is not known."""
+    """The entries of a row that are read; None for a number that is not known."""
 
     setting: StoredSetting
     outcome: str
@@ -49,13 +49,13 @@ class StoredRow(msgspec.Struct):
 
 
 class StoredReference(msgspec.Struct):
-    """What is read of a reference."""
+    """The entry of a reference that is read; None if it is not known."""
 
     error: float | None
 
 
 class StoredAnswer(msgspec.Struct):
-    """What is read of a file SCENE.trade.json."""
+    """The entries of a file SCENE.trade.json that are read."""
 
     cells: Factor
     quantities: Annotated[list[str], Meta(min_length=1)]

@@ -60,7 +60,7 @@ def test_another_scene_of_the_same_problem_is_tried_too(folder, tmp_path):
     assert stiff != FLIGHT
     (tmp_path / "stiff.toml").write_text(stiff)
     mpm_ref("trade", folder / "flight.toml", "--error", "4%", "--out", tmp_path, *FAST,
-            "--beside", tmp_path / "stiff.toml")
+            "--alternative", tmp_path / "stiff.toml")
     facts = json.loads((tmp_path / "flight.trade.json").read_text())
     rows = [row for row in facts["rows"] if row["setting"].get("scene") == "stiff"]
     assert rows
@@ -76,8 +76,8 @@ def test_a_scene_of_another_problem_is_refused(folder, tmp_path, old, new, words
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "other.toml").write_text(FLIGHT.replace(old, new))
-    done = mpm_ref("trade", folder / "flight.toml", "--out", tmp_path, "--quiet", "--beside",
-                   tmp_path / "a" / "other.toml", "--beside", tmp_path / "b" / "other.toml")
+    done = mpm_ref("trade", folder / "flight.toml", "--out", tmp_path, "--quiet", "--alternative",
+                   tmp_path / "a" / "other.toml", "--alternative", tmp_path / "b" / "other.toml")
     assert_told(done, 2, words)
 
 

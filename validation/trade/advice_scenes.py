@@ -119,8 +119,16 @@ def column_positions(t, X, E=1e6, H=0.8):
 
 def advice_scenes():
     """Return all `AdviceScene`s."""
+    texts = texts_of_choice() | texts_of_solids() | texts_of_flow()
+    return [AdviceScene(name, loads(text, name),
+                        ("positions", front, "kinetic", "centroid", "elastic"), exact)
+            for name, (text, front, exact) in texts.items()]
+
+
+def texts_of_choice():
+    """Return {name: (text, front, exact values)} of the scenes in `TUNED`."""
     sides = floor((0.0, 0.0), (1.0, 0.0), "slip") + floor((0.2, 0.0), (-1.0, 0.0), "slip")
-    texts = {
+    return {
         "column": (head(0.05, 0.08) + solid(box(0.0, 0.0, 0.2, 0.8), STIFF) + sides
                    + floor(kind="sticky"), "front:y+", release),
         "flight": (head(0.1, 0.2) + solid(disk(0.5, 0.7, 0.25), SOFT,
@@ -130,23 +138,22 @@ def advice_scenes():
         "bounce": (head(0.05, 0.12) + solid(disk(0.3, 0.21, 0.2), STIFF,
                                             velocity="linear = [0.0, -2.0]") + floor(),
                    "front:y-", None),
-        "slide": (head(0.05, 0.3, gravity=(3.0, -G)) + solid(
-            box(0.0, 0.0, 0.4, 0.2), STIFF) + floor(friction=0.2), "front:x+", None),
-        "stick": (head(0.05, 0.1, gravity=(0.0, -G)) + solid(
-            box(0.0, 0.0, 0.4, 0.2), SOFT, velocity="linear = [1.0, 0.0]") + floor(friction=0.5),
-            "front:x+", None),
         "beam": (head(0.05, 0.3, gravity=(0.0, -4.0)) + solid(
             box(-0.1, 0.0, 0.8, 0.2), STIFF) + clamp(box(-0.2, -0.1, 0.0, 0.3)), "front:y-", None),
         "pair": (head(0.05, 0.12, gravity=(0.0, 0.0)) + solid(
             disk(0.2, 0.3, 0.15), SOFT, "left", "linear = [2.0, 0.0]") + solid(
             disk(0.6, 0.3, 0.15), SOFT, "right", "linear = [-2.0, 0.0]"), "front:x-", None),
-        "dam": (head(0.02, 0.12) + solid(box(0.0, 0.0, 0.1, 0.2), WATER) + floor(kind="slip")
-                + floor((0.0, 0.0), (1.0, 0.0), "slip"), "front:x+", None),
-        "sand": (head(0.02, 0.15) + solid(box(0.0, 0.0, 0.2, 0.2), SAND) + floor(friction=0.5)
-                 + floor((0.0, 0.0), (1.0, 0.0), "slip"), "front:x+", None),
-        "impact": (head(0.05, 0.08) + solid(box(0.0, 0.0, 0.3, 0.6), PLASTIC,
-                                            velocity="linear = [0.0, -4.0]") + floor(),
-                   "front:y+", None),
+    }
+
+
+def texts_of_solids():
+    """Return {name: (text, front, None)} of elastic bodies."""
+    return {
+        "slide": (head(0.05, 0.3, gravity=(3.0, -G)) + solid(
+            box(0.0, 0.0, 0.4, 0.2), STIFF) + floor(friction=0.2), "front:x+", None),
+        "stick": (head(0.05, 0.1, gravity=(0.0, -G)) + solid(
+            box(0.0, 0.0, 0.4, 0.2), SOFT, velocity="linear = [1.0, 0.0]") + floor(friction=0.5),
+            "front:x+", None),
         "cube": (head(0.1, 0.1, 3, (0.0, 0.0, -G)) + solid(
             box(0.0, 0.0, 0.0, 0.4, 0.4, 0.4), SOFT, velocity="linear = [0.0, 0.0, -1.0]")
             + floor((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), "front:z+", None),
@@ -157,15 +164,6 @@ def advice_scenes():
                 box(-0.2, -0.1, 0.0, 0.25)), "front:y+", None),
         "lean": (head(0.05, 0.25, gravity=(4.0, -G)) + solid(box(0.0, 0.0, 0.2, 0.6), SOFT)
                  + floor(kind="sticky"), "front:x+", None),
-        "splash": (head(0.02, 0.1) + solid(disk(0.2, 0.1, 0.1), WATER,
-                                           velocity="linear = [0.0, -1.0]")
-                   + floor(kind="slip"), "front:x+", None),
-        "forge": (head(0.05, 0.06) + solid(box(0.0, 0.0, 0.4, 0.3), PLASTIC) + floor(
-            friction=0.3) + solid(
-                box(0.05, 0.3, 0.35, 0.5), STIFF, "hammer", "linear = [0.0, -5.0]"),
-            "front:x+:body", None),
-        "slope": (head(0.02, 0.15, gravity=(6.0, -8.0)) + solid(box(0.0, 0.0, 0.2, 0.1), SAND)
-                  + floor(friction=0.6), "front:x+", None),
         "shove": (head(0.05, 0.15, gravity=(0.0, 0.0)) + solid(
             box(0.0, 0.0, 0.3, 0.2), STIFF, "first", "linear = [2.0, 0.0]") + solid(
                 box(0.35, 0.0, 0.65, 0.2), SOFT, "second"), "front:x+", None),
@@ -179,6 +177,25 @@ def advice_scenes():
             disk(0.3, 0.21, 0.2), SOFT, velocity="linear = [0.0, -2.0]") + floor(),
             "front:y-", None),
     }
-    return [AdviceScene(name, loads(text, name),
-                        ("positions", front, "kinetic", "centroid", "elastic"), exact)
-            for name, (text, front, exact) in texts.items()]
+
+
+def texts_of_flow():
+    """Return {name: (text, front, None)} of water, sand and metal."""
+    return {
+        "dam": (head(0.02, 0.12) + solid(box(0.0, 0.0, 0.1, 0.2), WATER) + floor(kind="slip")
+                + floor((0.0, 0.0), (1.0, 0.0), "slip"), "front:x+", None),
+        "sand": (head(0.02, 0.15) + solid(box(0.0, 0.0, 0.2, 0.2), SAND) + floor(friction=0.5)
+                 + floor((0.0, 0.0), (1.0, 0.0), "slip"), "front:x+", None),
+        "impact": (head(0.05, 0.08) + solid(box(0.0, 0.0, 0.3, 0.6), PLASTIC,
+                                            velocity="linear = [0.0, -4.0]") + floor(),
+                   "front:y+", None),
+        "splash": (head(0.02, 0.1) + solid(disk(0.2, 0.1, 0.1), WATER,
+                                           velocity="linear = [0.0, -1.0]")
+                   + floor(kind="slip"), "front:x+", None),
+        "forge": (head(0.05, 0.06) + solid(box(0.0, 0.0, 0.4, 0.3), PLASTIC) + floor(
+            friction=0.3) + solid(
+                box(0.05, 0.3, 0.35, 0.5), STIFF, "hammer", "linear = [0.0, -5.0]"),
+            "front:x+:body", None),
+        "slope": (head(0.02, 0.15, gravity=(6.0, -8.0)) + solid(box(0.0, 0.0, 0.2, 0.1), SAND)
+                  + floor(friction=0.6), "front:x+", None),
+    }
