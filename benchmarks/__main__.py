@@ -1,7 +1,7 @@
 """Run the benchmarks: `python -m benchmarks COMMAND`.
 
 They compare mpm_ref with Taichi and Warp on an elastic block, measure the cost of each feature
-and of an implicit step, and simulate many workers.
+and of an implicit step, time a sweep on several workers, and simulate many workers.
 """
 
 import json
@@ -214,6 +214,18 @@ def workers(out: Path = Path("results/benchmarks/workers.json")):
     for row in rows:
         typer.echo(f"{row['workload']:30} {row['workers']:5} workers  wall {row['wall_s']:9.1f} s  "
                    f"efficiency {row['efficiency']:.3f}")
+    save(out, rows, 1, 1)
+
+
+@app.command()
+def cluster(out: Path = Path("results/benchmarks/cluster.json")):
+    """Time a sweep on 1, 2, 4, ... workers up to the number of cores, and compare the results."""
+    from .cluster import measured_rows
+
+    rows = measured_rows()
+    for row in rows:
+        typer.echo(f"{row['executor']:10} {row['workers']:3} workers  wall {row['wall_s']:7.2f} s  "
+                   f"x {row['speed_up']:.2f}  same bits: {row['same_bits']}")
     save(out, rows, 1, 1)
 
 
