@@ -121,7 +121,8 @@ def save(out, rows, threads, repeats):
         "command": "python -m benchmarks " + " ".join(sys.argv[1:]),
         "commit": commit(Path(__file__).parents[1]),
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "machine": platform.machine(), "cpu": cpu_model(), "cores": os.cpu_count(), "threads": threads, "repeats": repeats, "rows": rows,
+        "machine": platform.machine(), "cpu": cpu_model(), "cores": os.cpu_count(),
+        "threads": threads, "repeats": repeats, "rows": rows,
     }, indent=1) + "\n")
     typer.echo(f"wrote {out}")
 

@@ -28,13 +28,12 @@ def draw_trade(facts):
 
     figure = Figure((WIDTH, HEIGHT), layout="constrained")
     panels = figure.subplots(1, len(COSTS), sharey=True)
+    errors = [row["error"] for row in facts["rows"] if row["error"] is not None]
     for axes, (key, label) in zip(panels, COSTS.items(), strict=True):
         draw_costs(axes, facts["rows"], key)
         axes.axhline(facts["error"], color="0.35", linestyle=":", label="error asked")
-        axes.set(xscale="log", yscale="log", xlabel=label,
-                 xlim=limits([row[key] for row in rows_with_error(facts["rows"], key)]),
-                 ylim=limits([facts["error"], *(row["error"] for row in
-                                                rows_with_error(facts["rows"], key))]))
+        axes.set(xscale="log", yscale="log", xlabel=label, ylim=limits([facts["error"], *errors]),
+                 xlim=limits([row[key] for row in facts["rows"] if (row[key] or 0.0) > 0.0]))
     panels[0].set_ylabel(f"error of {', '.join(facts['quantities'])}")
     draw_failures(panels[0], facts["rows"])
     handles = {label: handle for axes in panels[:1]

@@ -1,7 +1,8 @@
 """Search the settings of a scene for the cheapest one that keeps an error, within a budget.
 
-1. The scene's own setting runs on halved grids until their reference is known to half the error
-   asked for the whole run, stops improving, or the next grid does not fit into the budget.
+1. The scene's own setting runs on at least four halved grids, until their reference is known to
+   half the error asked for the whole run, stops improving, or the next grid does not fit into the
+   budget.
 2. The scene's own setting, and each single knob, walk over the grids from the coarsest on, whose
    runs cost least, until they keep the error or can no longer be cheaper than the best so far.
 3. Pairs of the single knobs that keep the error cheapest walk likewise.
@@ -23,7 +24,8 @@ from .candidates import GRIDS, pairs, single_knobs
 from .reference import reference_of, reliable_times
 
 COARSEST, FINEST = 4.0, 1.0 / 64.0      # factors of dx on halved grids; the latter may be set
-AT_START = (4.0, 2.0, 1.0, 0.5)
+AT_START = (4.0, 2.0, 1.0)
+GRIDS_OF_REFERENCE = 4      # at least, where the budget allows them
 REFERENCE_SHARE = 0.7       # of the time left that the next grid of the reference may take
 REFERENCE_PART = 0.5        # of the error asked, which the reference's own may be
 DIVERGED = 0.5      # of the error asked, by which a perturbed run shows chaos: that it has another
@@ -73,7 +75,8 @@ class TradeSearch:
 
     def refine(self):
         """Halve the grid until the reference is known, stops improving, or the budget says so."""
-        while self.levels and self.horizon() < self.times[-1]:
+        while self.levels and (len(self.levels) < GRIDS_OF_REFERENCE
+                               or self.horizon() < self.times[-1]):
             factor, before = self.levels[-1] / 2.0, self.horizon()
             expected = self.expected_cpu(setting(dx=factor))
             if factor < self.finest or expected > REFERENCE_SHARE * self.runs.left:
@@ -81,7 +84,8 @@ class TradeSearch:
             n = len(self.levels)
             self.observe([setting(dx=factor), *self.side_runs(expected)], most_cpu=np.inf)
             self.update_references()
-            if len(self.levels) == n or (before > 0.0 and self.horizon() <= before):
+            is_no_better = before > 0.0 and self.horizon() <= before
+            if len(self.levels) == n or (is_no_better and n >= GRIDS_OF_REFERENCE):
                 break
 
     def side_runs(self, cpu):
@@ -145,13 +149,15 @@ class TradeSearch:
     @property
     def last(self):
         """Return the index of the last time until which all quantities asked for are known to half
-        the error, and which is not chaotic; 0 where they never are.
+        the error, the finest grid keeps it, and no chaos has begun; 0 where there is none.
         """
         if not self.references:
             return 0
         references = [self.references[text] for text in self.quantities]
         reliable = reliable_times(references, REFERENCE_PART * self.error)
-        return int(np.max(np.flatnonzero(reliable & (self.times < self.chaos)), initial=0))
+        kept = self.errors_of(setting(dx=self.levels[-1])) + np.max(
+            [reference.error for reference in references], axis=0) <= self.error
+        return int(np.max(np.flatnonzero(reliable & kept & (self.times < self.chaos)), initial=0))
 
     def horizon(self):
         """Return the time [s] until which all quantities asked for are known to half the error."""
@@ -166,9 +172,13 @@ class TradeSearch:
         run = self.observations.get(chosen)
         if run is None or not run.finished or not self.references:
             return np.inf
-        return max(float(self.references[text].error_of(
-            run.values[text], OutputQuantity(text).at_end)[self.last])
-            for text in texts or self.quantities)
+        return float(self.errors_of(chosen, texts)[self.last])
+
+    def errors_of(self, chosen, texts=None):
+        """Return the largest error (T,) until each time of a setting that finished."""
+        values = self.observations[chosen].values
+        return np.max([self.references[text].error_of(values[text], OutputQuantity(text).at_end)
+                       for text in texts or self.quantities], axis=0)
 
     def reference_error(self):
         """Return the largest error of the references until the horizon."""
@@ -215,11 +225,16 @@ class TradeSearch:
         error, or on which they are not worth trying.
         """
         walking = list(families)
-        for factor in GRIDS:
+        for factor in self.grids():
             batch = {family: chosen for family in walking
                      if self.worth_trying(chosen := family | setting(dx=factor))}
             self.observe(sorted(batch.values(), key=self.expected_cpu))
             walking = [family for family, chosen in batch.items() if not self.keeps(chosen)]
+
+    def grids(self):
+        """Return the factors of dx of the grids that the scene can have, the coarsest first."""
+        return [factor for factor in GRIDS
+                if not isinstance(self._scene_at(setting(dx=factor)), SceneError)]
 
     def worth_trying(self, chosen):
         """Return whether a setting may still be cheaper than the best one; none without one."""
