@@ -58,3 +58,14 @@ def test_nothing_known_is_drawn_too():
     search = search_of(ModelRuns(order=0.2))
     search.run()
     draw_trade(json.loads(as_json(answer_of(search, "toy"))))
+
+
+def test_failures_beside_one_setting_are_drawn_without_a_warning(facts, recwarn):
+    best, = (row for row in facts["rows"] if row["best"])
+    failed = [row | {next(iter(COSTS)): cpu} for cpu in (1e-3, 1e3)
+              for row in facts["rows"] if row["error"] is None]
+    figure = draw_trade(facts | {"rows": [best, *failed]})
+    figure.canvas.draw()
+    low, high = figure.axes[0].get_xlim()
+    assert low < 1e-3 < 1e3 < high
+    assert not recwarn

@@ -16,6 +16,7 @@ from mpm_ref.trade.search import (
     CHEAPER,
     HOPELESS,
     PERTURBED,
+    REFERENCE_PART,
     TradeSearch,
     guessed_ratio,
     without_grid,
@@ -102,6 +103,42 @@ def test_a_grid_past_one_that_failed_is_no_reference():
     search.observe([setting(dx=0.125)], most_cpu=np.inf)
     search.update_references()
     assert search.levels == (4.0, 2.0, 1.0, 0.5)
+
+
+def test_four_grids_are_the_least_where_the_budget_allows():
+    search = search_of(ModelRuns(), error=1.0)
+    search.run()
+    assert search.levels == (4.0, 2.0, 1.0, 0.5)
+    runs = ModelRuns(left=10.0)
+    search = search_of(runs, error=1.0)
+    search.run()
+    assert search.levels == (4.0, 2.0, 1.0)
+    assert all(label.get("dx", 1.0) > 0.5 for label in runs.labels if label != PERTURBED)
+
+
+def test_the_horizon_ends_where_the_finest_grid_misses_the_error():
+    search = search_of(ModelRuns(), error=0.1)
+    search.run()
+    assert search.horizon() == 1.0
+    reference = search.references["positions"]
+    off = reference.values + 0.2 * (TIMES > 0.6)[:, None]
+    search.references["positions"] = replace(reference, values=off)
+    assert reference.error[-1] < REFERENCE_PART * search.error
+    assert search.errors_of(setting(dx=search.levels[-1]))[-1] > search.error
+    assert search.horizon() == 0.5
+    assert search.best() is not None
+
+
+def test_grids_that_the_scene_cannot_have_are_skipped():
+    text = "walls = { low = [2, 2], high = [12, 12] }\n" + FLIGHT
+    search = TradeSearch(loads(text), ModelRuns(), ("positions",), TIMES, 0.01)
+    possible = [factor for factor in GRIDS
+                if not isinstance(search._scene_at(setting(dx=factor)), SceneError)]
+    assert 0 < len(possible) < len(GRIDS)
+    search.run()
+    tried = {s.get("dx", 1.0) for s in search.settings() if without_grid(s) != setting()}
+    assert tried & set(GRIDS)
+    assert tried & set(GRIDS) <= set(possible)
 
 
 def test_at_the_end_only_the_last_state_counts():
