@@ -22,8 +22,8 @@ SAMPLES = {"random": "random", "cubature": "weighted",
 
 def pages(results):
     """Return {path: text} of the tables, from the `ProfileResults` of a profile."""
-    tables = {"explicit": explicit, "implicit": implicit, "implicit-runs": implicit_runs,
-              "ldm": ldm, "nsf": nsf, "nclaw": nclaw}
+    tables = {"scenes": scenes, "explicit": explicit, "implicit": implicit,
+              "implicit-runs": implicit_runs, "ldm": ldm, "nsf": nsf, "nclaw": nclaw}
     return {f"results/generated/settings-{name}.md": "\n".join(table(results)) + "\n"
             for name, table in tables.items()}
 
@@ -45,6 +45,23 @@ def percent(error):
 def number(x):
     """Return two digits of a number, or all before the point."""
     return f"{x:.0f}" if abs(x) >= 100.0 else f"{x:.2g}"
+
+
+def scenes(results):
+    """Yield what `mpm-ref trade` recommends on shipped scenes."""
+    header = ["scene", "error asked", "holds until", "recommended setting", "error", "CPU s",
+              "error of the scene's own", "its CPU s"]
+    yield from grid_table(header, (
+        [f"`{row['scene']}`", f"{100.0 * row['asked']:g} %",
+         f"{row['until']:.2g} of {row['end']:.2g} s", row["setting"] or "none",
+         *(measured(row) if row["setting"] else ("", "", "", f"{row['own_cpu']:.2g}"))]
+        for row in records(results, "trade.scenes", "advice")))
+
+
+def measured(row):
+    """Return the errors and costs of an advice as cells."""
+    return (f"{number(100.0 * row['error'])} %", f"{row['cpu']:.2g}",
+            f"{number(100.0 * row['own_error'])} %", f"{row['own_cpu']:.2g}")
 
 
 def explicit(results):

@@ -80,15 +80,10 @@ RECORDS = ProfileResults(RESULTS / "standard")
 def test_the_recorded_advice_is_stable_and_resolved(scene):
     name, floor = f"trade.explicit.{scene}", settings.reference_error(RECORDS, scene)
     points = settings.records(RECORDS, name, "points")
-    rows = [dict(zip(("most", "text", "cpu"), one, strict=True)) for one in zip(
-        *(RECORDS.table(name, "cheapest")[key] for key in ("error_at_most", "least_cpu", "cpu_s")),
-        strict=True)]
-    advised = [one for one in rows if one["text"] != "none"]
-    assert advised
-    for one in advised:
-        point = next(p for p in points if p["cpu"] == one["cpu"])
-        assert point["of_bound"] <= 1.0
-        assert point["error"] + floor <= one["most"]
+    best = settings.advised({one: settings.records(RECORDS, f"trade.explicit.{one}", "points")
+                             for one in settings.SCENES}, scene, floor)
+    assert best is None or best in points
+    assert best is None or (best["of_bound"] <= 1.0 and best["error"] + floor <= settings.LIMIT)
 
 
 def test_hot_at_the_printed_tolerance_is_no_advice():

@@ -10,7 +10,6 @@ EMULATED = (
     "half the bytes of what is rounded are counted; the kernels compute in double precision, so "
     "that no time is saved."
 )
-TARGETS = (0.3, 0.1, 0.03, 0.01, 0.003, 0.001)
 
 
 def front(costs, errors):
@@ -22,16 +21,6 @@ def front(costs, errors):
         if errors[k] < least:
             least, mask[k] = errors[k], True
     return mask
-
-
-def cheapest(points, most, cost, floor=0.0):
-    """Return the point of least cost whose error is at most `most` for certain, or None.
-
-    floor: error of the reference itself, relative, which is added to that of a point. Runs past the
-    bound of their time step are no advice, whether they finished or not.
-    """
-    fit = [p for p in points if p.good and p.is_stable and p.error + floor <= most]
-    return min(fit, key=cost, default=None)
 
 
 def richardson(coarse, half, fine):
@@ -49,7 +38,7 @@ def richardson(coarse, half, fine):
 
 
 def record_points(run, points, scale, floor=0.0):
-    """Record the table of all points, the cheapest settings, and the failures.
+    """Record the table of all points, the error of the reference, and the failures.
 
     floor: error of the reference itself, relative: smaller ones are equal to it.
     """
@@ -60,26 +49,7 @@ def record_points(run, points, scale, floor=0.0):
                                   for p, c, b in zip(points, by_cpu, by_bytes, strict=True)])
     run.record(f"{run.experiment.id}.reference_error", floor, comparator="info", scale=scale,
                note="error of the reference itself, relative: no smaller error is resolved")
-    record_cheapest(run, points, scale, floor)
     record_failures(run, points, scale)
-
-
-def record_cheapest(run, points, scale, floor):
-    """Record the table "cheapest setting with error at most x", by CPU seconds and by bytes."""
-    name, rows = run.experiment.id, []
-    for most in TARGETS:
-        fast = cheapest(points, most, lambda p: p.cpu, floor)
-        small = cheapest(points, most, lambda p: p.nbytes, floor)
-        if fast is None:
-            rows.append((most, "none", np.nan, "none", 0))
-            continue
-        fast_text, small_text = fast.setting.description(), small.setting.description()
-        rows.append((most, fast_text, fast.cpu, small_text, small.nbytes))
-        run.record(f"{name}.cheapest.{most:g}", fast.cpu, unit="CPU s", comparator="info",
-                   scale=scale, note=f"with an error of at most {most:g}, that of the reference "
-                   f"included, and a stable step: {fast_text} (error {fast.error:.2g}); least "
-                   f"memory: {small_text}, {small.nbytes / 1e6:.2f} MB")
-    run.table("cheapest", ("error_at_most", "least_cpu", "cpu_s", "least_bytes", "bytes"), rows)
 
 
 def record_failures(run, points, scale):

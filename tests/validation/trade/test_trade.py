@@ -1,4 +1,4 @@
-"""Pareto fronts, the cheapest setting, and the bytes of a state."""
+"""Pareto fronts and the bytes of a state."""
 
 from types import SimpleNamespace
 
@@ -7,7 +7,7 @@ import pytest
 
 from validation.extremes.long_runs import round_state
 from validation.trade.explicit import prepare_manufactured
-from validation.trade.front import cheapest, front, record_points, richardson
+from validation.trade.front import front, record_points, richardson
 from validation.trade.measure import (
     DEFAULT,
     QUICK,
@@ -39,25 +39,6 @@ def test_front_against_its_definition(rng):
     assert front(costs, errors).tolist() == [not b for b in beaten]
 
 
-def test_cheapest_takes_no_failure():
-    points = [point(1.0, 0.05, "CFL"), point(2.0, 0.05), point(3.0, 0.01), point(0.5, 0.2)]
-    assert cheapest(points, 0.1, lambda p: p.cpu).cpu == 2.0
-    assert cheapest(points, 0.001, lambda p: p.cpu) is None
-
-
-def test_cheapest_takes_no_step_past_its_bound():
-    points = [point(1.0, 0.05, of_bound=1.0005), point(2.0, 0.05, of_bound=1.0)]
-    assert cheapest(points, 0.1, lambda p: p.cpu).cpu == 2.0
-
-
-def test_cheapest_adds_the_error_of_the_reference():
-    """A run that is nearer to the reference than that to the truth may be there by chance."""
-    points = [point(1.0, 0.001), point(2.0, 0.0)]
-    assert cheapest(points, 0.004, lambda p: p.cpu, floor=0.003).cpu == 1.0
-    assert cheapest(points, 0.003, lambda p: p.cpu, floor=0.003).cpu == 2.0
-    assert cheapest(points, 0.0029, lambda p: p.cpu, floor=0.003) is None
-
-
 @pytest.mark.parametrize("p", [1.0, 1.5, 2.0])
 def test_richardson_finds_order_and_error_of_a_power_of_dx(p):
     coarse, half, fine = (2.0 + 0.1 * h**p for h in (1.0, 0.5, 0.25))
@@ -85,13 +66,11 @@ class Run:
         self.tables[name] = [dict(zip(columns, row, strict=True)) for row in rows]
 
 
-def test_records_name_no_unstable_setting_and_none_below_the_reference():
+def test_no_unstable_setting_is_on_the_front_and_none_below_the_reference():
     run = Run()
     record_points(run, [point(1.0, 0.001, of_bound=1.2), point(2.0, 0.001), point(3.0, 0.0005)],
                   "", floor=0.002)
     assert run.records["trade.x.reference_error"] == 0.002
-    assert run.records["trade.x.cheapest.0.003"] == 2.0
-    assert "trade.x.cheapest.0.001" not in run.records
     assert [row["pareto_cpu"] for row in run.tables["points"]] == [0, 1, 0]
 
 
