@@ -11,6 +11,7 @@ from ..scene import SceneError, dumps
 from ..store.atomic import write_bytes
 from ..store.page import page_of
 from ..sweep.quantity import with_companions
+from ..sweep.recorded import observe_results
 from ..sweep.setting import scene_at
 from ..trade.answer import answer_lines, answer_of, best_scene, largest_extent, percent
 from ..trade.figure import save_figure
@@ -45,6 +46,9 @@ LikeOption = Annotated[str | None, typer.Option(
 AlternativeOption = Annotated[list[str] | None, typer.Option(
     "--alternative", help="Another scene of the same problem, such as one with a learned law, "
     "whose settings are tried too; may be given several times.")]
+CompareOption = Annotated[list[Path] | None, typer.Option(
+    "--compare", help="A results file of the same problem, such as that of a reduced model or of "
+    "another code, whose error is measured too; may be given several times.")]
 
 
 def measure(
@@ -57,6 +61,7 @@ def measure(
     out: OutOption = Path(),
     like: LikeOption = None,
     alternative: AlternativeOption = None,
+    compare: CompareOption = None,
     json: Json = False,
     quiet: QuietOption = False,
 ):
@@ -75,10 +80,11 @@ def measure(
             texts = with_companions(request.quantities, record.dim)
             observed = observed_of(record, path, texts)
             others = load_alternatives(record, alternative or ())
+            compared = load_compared(compare or (), observed, request)
         if like is not None:
             raise typer.Exit(answer_from(like, record, observed, request))
         search = run_search(record, observed, request, others)
-        facts = json_loads(as_json(answer_of(search, path.stem)))
+        facts = json_loads(as_json(answer_of(search, path.stem, compared)))
         write_answer(search, facts, request)
         print(as_json(facts) if json else "\n".join(answer_lines(facts)))
     raise typer.Exit(0 if facts["best"] is not None else NO_ANSWER)
@@ -115,6 +121,16 @@ def load_alternatives(record, names):
         if others.setdefault(path.stem, other) is not other:
             raise SceneError(f"--alternative {name}: two scenes are called {path.stem}; rename one")
     return others
+
+
+def load_compared(files, observed, request):
+    """Return {name: `RunObservation`} of results files. Raises ValueError for one that does not
+    fit.
+    """
+    asked = observed._replace(quantities=request.quantities)
+    for file in files:
+        observe_results(file, asked, request.error)
+    return {str(file): observe_results(file, observed) for file in files}
 
 
 def run_search(record, observed, request, others):

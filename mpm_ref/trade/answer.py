@@ -14,10 +14,10 @@ from .search import REFERENCE_PART, without_grid
 USEFUL = 0.1        # error to which a quantity is known that is worth a line
 
 
-def answer_of(search, name):
+def answer_of(search, name, compared=None):
     """Return the answer as plain data, for JSON; errors are relative, times in s, memory in bytes.
 
-    name: that of the scene.
+    name: that of the scene; compared: {name: `RunObservation`} of results files.
     """
     best, horizon = search.best(), search.horizon()
     return {
@@ -28,6 +28,7 @@ def answer_of(search, name):
         "references": {text: reference_facts(search, text) for text in search.references},
         "best": None if best is None else best.text,
         "rows": [row(search, chosen) for chosen in ranked(search)],
+        "compared": [compared_row(search, file, run) for file, run in (compared or {}).items()],
     }
 
 
@@ -56,32 +57,40 @@ def ranked(search):
 
 def row(search, chosen):
     """Return the facts of one setting."""
-    run, best = search.observations[chosen], search.best()
-    errors = {text: search.error_of(chosen, (text,)) for text in search.references}
-    return {"setting": dict(chosen.items), "text": chosen.text, "outcome": run.outcome,
-            "message": run.message, "error": search.error_of(chosen), "errors": errors,
-            "keeps": bool(search.horizon() > 0.0 and search.keeps(chosen)),
-            "best": chosen == best, "dominated": is_dominated(search, chosen),
-            "family": without_grid(chosen).text, **vars(run.cost)}
-
-
-def is_dominated(search, chosen):
-    """Return whether another setting has at most the error and the CPU time of this one."""
     run = search.observations[chosen]
-    if run.outcome != FINISHED:
+    return {"setting": dict(chosen.items), "text": chosen.text, **run_facts(search, run),
+            "keeps": bool(search.horizon() > 0.0 and search.keeps(chosen)),
+            "best": chosen == search.best(), "family": without_grid(chosen).text}
+
+
+def compared_row(search, file, run):
+    """Return the facts of a results file, which is no setting that could be recommended."""
+    return {"setting": {}, "text": file, **run_facts(search, run), "keeps": False, "best": False,
+            "family": "results file"}
+
+
+def run_facts(search, run):
+    """Return how a run ended, its errors and its cost."""
+    errors = {text: search.error_of_run(run, (text,)) for text in search.references}
+    return {"outcome": run.outcome, "message": run.message, "error": search.error_of_run(run),
+            "errors": errors, "dominated": is_dominated(search, run), **vars(run.cost)}
+
+
+def is_dominated(search, run):
+    """Return whether a setting has at most the error and less CPU time than a run."""
+    if not run.finished:
         return True
-    error, cpu = search.error_of(chosen), run.cost.cpu
-    others = [s for s in search.settings() if s != chosen
-              and search.observations[s].outcome == FINISHED]
-    return any(search.error_of(s) <= error and search.observations[s].cost.cpu < cpu
-               for s in others)
+    error, cpu = search.error_of_run(run), run.cost.cpu
+    return any(search.error_of(chosen) <= error and search.observations[chosen].cost.cpu < cpu
+               for chosen in search.settings() if search.observations[chosen].finished)
 
 
 # in words
 
 def answer_lines(facts):
     """Return the answer as lines of text: the front, the advice, and what is not known."""
-    return [*front_lines(facts), "", *reference_lines(facts), *advice_lines(facts)]
+    return [*front_lines(facts), "", *reference_lines(facts), *advice_lines(facts),
+            *map(compared_line, facts["compared"])]
 
 
 def front_lines(facts):
@@ -127,6 +136,13 @@ def advice_lines(facts):
         lines.append(f"this holds until t = {facts['until']:.4g} s of {facts['end']:.4g} s; for "
                      f"the whole run: {shortfall(facts)}")
     return lines
+
+
+def compared_line(one):
+    """Return the error and cost of a results file."""
+    cost = "no CPU time given" if one["cpu"] is None else f"{one['cpu']:.3g} s of CPU time"
+    return (f"{one['text']}: error {percent(one['error'])}, {cost} with start and output"
+            + ("; a setting above is at most as wrong and cheaper" if one["dominated"] else ""))
 
 
 def companion_lines(facts):

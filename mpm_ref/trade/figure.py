@@ -11,6 +11,7 @@ LEAST = 1e-8            # an error that is drawn for less, on a logarithmic axis
 WIDTH, HEIGHT = 11.0, 3.6       # [inch]
 MARGIN = 1.6            # factor by which an axis goes on past its values
 FRONT, OTHER, BEST, FAILED = "tab:blue", "0.75", "tab:orange", "tab:red"
+COMPARED = "tab:green"
 
 
 def save_figure(facts, path):
@@ -28,12 +29,14 @@ def draw_trade(facts):
 
     figure = Figure((WIDTH, HEIGHT), layout="constrained")
     panels = figure.subplots(1, len(COSTS), sharey=True)
-    errors = [row["error"] for row in facts["rows"] if row["error"] is not None]
+    rows = [*facts["rows"], *facts["compared"]]
+    errors = [row["error"] for row in rows if row["error"] is not None]
     for axes, (key, label) in zip(panels, COSTS.items(), strict=True):
         draw_costs(axes, facts["rows"], key)
+        draw_compared(axes, facts["compared"], key)
         axes.axhline(facts["error"], color="0.35", linestyle=":", label="error asked")
         axes.set(xscale="log", yscale="log", xlabel=label, ylim=limits([facts["error"], *errors]),
-                 xlim=limits([row[key] for row in facts["rows"] if (row[key] or 0.0) > 0.0]))
+                 xlim=limits([row[key] for row in rows if (row[key] or 0.0) > 0.0]))
     panels[0].set_ylabel(f"error of {', '.join(facts['quantities'])}")
     draw_failures(panels[0], facts["rows"])
     handles = {label: handle for axes in panels[:1]
@@ -64,6 +67,14 @@ def draw_costs(axes, rows, key):
                                  ([row for row in drawn if row["best"]], BEST, "recommended")):
         axes.plot([row[key] for row in chosen], [max(row["error"], LEAST) for row in chosen], "o",
                   color=color, markersize=5, label=label)
+
+
+def draw_compared(axes, rows, key):
+    """Draw results files as diamonds."""
+    drawn = rows_with_error(rows, key)
+    if drawn:
+        axes.plot([row[key] for row in drawn], [max(row["error"], LEAST) for row in drawn], "D",
+                  color=COMPARED, markersize=5, label="compared")
 
 
 def is_on_front(row, rows, key):

@@ -155,8 +155,8 @@ class TradeSearch:
             return 0
         references = [self.references[text] for text in self.quantities]
         reliable = reliable_times(references, REFERENCE_PART * self.error)
-        kept = self.errors_of(setting(dx=self.levels[-1])) + np.max(
-            [reference.error for reference in references], axis=0) <= self.error
+        finest = self.errors_of_run(self.observations[setting(dx=self.levels[-1])])
+        kept = finest + np.max([one.error for one in references], axis=0) <= self.error
         return int(np.max(np.flatnonzero(reliable & kept & (self.times < self.chaos)), initial=0))
 
     def horizon(self):
@@ -170,14 +170,17 @@ class TradeSearch:
         those given); infinite where it did not finish.
         """
         run = self.observations.get(chosen)
-        if run is None or not run.finished or not self.references:
-            return np.inf
-        return float(self.errors_of(chosen, texts)[self.last])
+        return np.inf if run is None else self.error_of_run(run, texts)
 
-    def errors_of(self, chosen, texts=None):
-        """Return the largest error (T,) until each time of a setting that finished."""
-        values = self.observations[chosen].values
-        return np.max([self.references[text].error_of(values[text], OutputQuantity(text).at_end)
+    def error_of_run(self, run, texts=None):
+        """Return the error of a `RunObservation`, as `error_of` does of a setting's."""
+        if not run.finished or not self.references:
+            return np.inf
+        return float(self.errors_of_run(run, texts)[self.last])
+
+    def errors_of_run(self, run, texts=None):
+        """Return the largest error (T,) until each time of a run that finished."""
+        return np.max([self.references[text].error_of(run.values[text], OutputQuantity(text).at_end)
                        for text in texts or self.quantities], axis=0)
 
     def reference_error(self):

@@ -81,6 +81,44 @@ def test_a_scene_of_another_problem_is_refused(folder, tmp_path, old, new, words
     assert_told(done, 2, words)
 
 
+def test_a_results_file_is_compared(tmp_path):
+    scene = tmp_path / "flight.toml"
+    scene.write_text("interval = 0.005\n" + FLIGHT)
+    assert mpm_ref("run", scene, "--out", tmp_path / "run.h5", "--quiet").exit_code == 0
+    done = mpm_ref("trade", scene, "--error", "4%", "--out", tmp_path, "--budget", "6s",
+                   "--workers", "1", "--quiet", "--compare", tmp_path / "run.h5")
+    facts = json.loads((tmp_path / "flight.trade.json").read_text())
+    row, = facts["compared"]
+    own, = (one for one in facts["rows"] if one["setting"] == {"dx": 1.0})
+    assert row["error"] == pytest.approx(own["error"], rel=0.02)
+    assert row["cpu"] > 0.0
+    assert f"{tmp_path / 'run.h5'}: error" in done.stdout
+    assert "run.h5" in (tmp_path / "flight.trade.html").read_text()
+    assert facts["best"] != row["text"]
+
+
+@pytest.mark.parametrize(("old", "new", "words"), [
+    ("end = 0.2", "end = 0.2", "2 frames, between which positions is known to"),
+    ("end = 0.2", "end = 0.1", "expected a run from 0 to the scene's end at 0.2 s"),
+    ('name = "disk"', 'name = "ball"', "bodies ball; expected those of the scene: disk")])
+def test_a_results_file_of_another_problem_is_refused(folder, tmp_path, old, new, words):
+    assert old in FLIGHT
+    (tmp_path / "other.toml").write_text(FLIGHT.replace(old, new))
+    mpm_ref("run", tmp_path / "other.toml", "--out", tmp_path / "run.h5", "--quiet")
+    done = mpm_ref("trade", folder / "flight.toml", "--out", tmp_path, "--quiet", "--compare",
+                   tmp_path / "run.h5")
+    assert_told(done, 2, words)
+
+
+@pytest.mark.parametrize("content", [None, b"", b"not HDF5"])
+def test_what_is_no_results_file_is_refused(folder, tmp_path, content):
+    if content is not None:
+        (tmp_path / "run.h5").write_bytes(content)
+    done = mpm_ref("trade", folder / "flight.toml", "--out", tmp_path, "--quiet", "--compare",
+                   tmp_path / "run.h5")
+    assert_told(done, 2, "run.h5")
+
+
 @pytest.mark.parametrize(("content", "words"), [
     (None, "No such file"), ("{}", "missing required field `cells`"), ("[1", "not an answer"),
     ('{"rows": [{}], "cells": 3}', "not an answer"), ('{"rows": [], "cells": "x"}', "not an")])

@@ -45,6 +45,14 @@ def test_the_front_falls_with_the_cost(facts):
     assert sorted(front[:, 1]) == pytest.approx(sorted(expected))
 
 
+def test_results_files_are_diamonds(facts):
+    row = facts["rows"][0] | {"cpu": 1e4, "error": 0.02, "best": False}
+    axes = draw_trade(facts | {"compared": [row]}).axes[0]
+    assert points(axes, "compared").tolist() == [[1e4, 0.02]]
+    assert axes.get_xlim()[1] > 1e4
+    assert [1e4, 0.02] not in points(axes, "front").tolist()
+
+
 def test_failures_are_crosses(facts):
     assert points(draw_trade(facts).axes[0], "did not finish").tolist() == [[0.25, 1.0]]
 

@@ -124,7 +124,8 @@ def test_the_horizon_ends_where_the_finest_grid_misses_the_error():
     off = reference.values + 0.2 * (TIMES > 0.6)[:, None]
     search.references["positions"] = replace(reference, values=off)
     assert reference.error[-1] < REFERENCE_PART * search.error
-    assert search.errors_of(setting(dx=search.levels[-1]))[-1] > search.error
+    finest = search.observations[setting(dx=search.levels[-1])]
+    assert search.errors_of_run(finest)[-1] > search.error
     assert search.horizon() == 0.5
     assert search.best() is not None
 

@@ -48,7 +48,7 @@ QUICK = (TradeCase("hello", "", "10s"),)
 
 
 class Advice(NamedTuple):
-    """What a search found; NaN and "" without a recommended setting."""
+    """The setting that a search recommends; NaN and "" without one."""
 
     scene: str
     asked: float
@@ -73,9 +73,7 @@ def scenes(run):
     answers, points = [], []
     for case in run.progress(run.choose(quick=QUICK, standard=STANDARD), "scenes"):
         advice, rows = run.cached(case.scene, lambda case=case: searched(case))
-        found = [Advice(*row) for row in advice]
-        record_advice(run, case, found)
-        answers += found
+        answers += record_advice(run, case, [Advice(*row) for row in advice])
         points += rows
     run.table("advice", COLUMNS, [one[:len(COLUMNS)] for one in answers])
     run.table("points", POINTS, points)
@@ -122,19 +120,20 @@ def points_of(search, name):
             for row in answer_of(search, name)["rows"]]
 
 
-def record_advice(run, case, found):
-    """Record the time of the searches of a scene, and what they found."""
+def record_advice(run, case, answers):
+    """Record the time of the searches of a scene, and their `Advice`; return it."""
     base, scale = f"trade.scenes.{case.scene}", f"{case.scene}, {WORKERS} runs at a time"
     aim = AIMS.get(case.scene, AIM)
-    run.record(f"{base}.wall", sum(one.wall for one in found), unit="s", comparator="<=",
+    run.record(f"{base}.wall", sum(one.wall for one in answers), unit="s", comparator="<=",
                bound=aim, scale=scale, note=f"both searches, for {' and '.join(ASKED)}, with a "
                f"budget of {case.budget} each")
-    advised = [one for one in found if one.setting]
+    advised = [one for one in answers if one.setting]
     run.record(f"{base}.advised", len(advised), unit="errors", comparator=">=", bound=1,
-               scale=scale, note="; ".join(sentence(one) for one in found))
+               scale=scale, note="; ".join(sentence(one) for one in answers))
     run.record(f"{base}.changed", sum(not one.same for one in advised), unit="scenes",
                comparator="<=", bound=0, scale=scale,
                note="recommended scenes that differ from those that were measured when read again")
+    return answers
 
 
 def sentence(one):
