@@ -1,12 +1,14 @@
 """Small scenes on which the advice of `mpm-ref trade` is judged.
 
-The rules of the search were chosen on results of the scenes in `TUNED` alone. Two have a closed
-form: free flight, and a column between slip walls that is
-released under its weight, small strains of which obey the wave equation
+The rules of the search were chosen on results of the scenes in `TUNED` alone. Four have a closed
+form: two of free flight, and two of a column between slip walls that is released under its weight,
+standing or hanging, small strains of which obey the wave equation
 
     u_tt = c^2 u_yy - g,  u(0) = 0,  u_y(H) = 0,
     u = -g/c^2 (H y - y^2/2) + sum_n b_n sin(k_n y) cos(c k_n t),
-    k_n = (n + 1/2) pi/H,  b_n = 2 g/(c^2 H k_n^3).
+    k_n = (n + 1/2) pi/H,  b_n = 2 g/(c^2 H k_n^3),
+
+where y is the distance from the end that is held.
 """
 
 from math import pi, sqrt
@@ -72,6 +74,11 @@ def floor(point=(0.0, 0.0), normal=(0.0, 1.0), kind="separate", friction=0.0):
     return FLOOR.format(kind=kind, friction=friction, point=list(point), normal=list(normal))
 
 
+def sides():
+    """Return slip walls at both sides of a column."""
+    return floor((0.0, 0.0), (1.0, 0.0), "slip") + floor((0.2, 0.0), (-1.0, 0.0), "slip")
+
+
 def clamp(region):
     """Return a fixed region of a scene file."""
     return f'[[fixed]]\nname = "clamp"\nregion = {{ {region} }}\n'
@@ -97,6 +104,25 @@ def fly(t, X, radius=0.25):
             "kinetic": 0.5 * mass * (1.0 + (0.5 - G * t) ** 2)[:, None]}
 
 
+def toss(t, X):
+    """Return the exact values in free flight of a box of 0.4 x 0.3 x 0.3 m."""
+    s = t[:, None, None]
+    x = X + s * [2.0, 0.0, 3.0] - 0.5 * s**2 * [0.0, 0.0, G]
+    mass = RHO * 0.4 * 0.3 * 0.3
+    return {"positions": x.reshape(len(t), -1), "front:x+": (0.4 + 2.0 * t)[:, None],
+            "kinetic": 0.5 * mass * (4.0 + (3.0 - G * t) ** 2)[:, None]}
+
+
+def hang(t, X, H=0.6):
+    """Return the exact values of the hanging column."""
+    def at(X):
+        mirrored = X * [1.0, -1.0] + [0.0, H]
+        u = column_positions(t, mirrored, H=H) - mirrored
+        return X + u
+    return {"positions": at(X).reshape(len(t), -1),
+            "front:y-": at(np.array([[0.0, 0.0]]))[..., 1]}
+
+
 def release(t, X, H=0.8):
     """Return the exact values of the released column."""
     x = column_positions(t, X)
@@ -119,7 +145,8 @@ def column_positions(t, X, E=1e6, H=0.8):
 
 def advice_scenes():
     """Return all `AdviceScene`s."""
-    texts = texts_of_choice() | texts_of_solids() | texts_of_flow()
+    texts = (texts_of_choice() | texts_with_closed_forms() | texts_of_solids()
+             | texts_of_flow())
     return [AdviceScene(name, loads(text, name),
                         ("positions", front, "kinetic", "centroid", "elastic"), exact)
             for name, (text, front, exact) in texts.items()]
@@ -127,9 +154,8 @@ def advice_scenes():
 
 def texts_of_choice():
     """Return {name: (text, front, exact values)} of the scenes in `TUNED`."""
-    sides = floor((0.0, 0.0), (1.0, 0.0), "slip") + floor((0.2, 0.0), (-1.0, 0.0), "slip")
     return {
-        "column": (head(0.05, 0.08) + solid(box(0.0, 0.0, 0.2, 0.8), STIFF) + sides
+        "column": (head(0.05, 0.08) + solid(box(0.0, 0.0, 0.2, 0.8), STIFF) + sides()
                    + floor(kind="sticky"), "front:y+", release),
         "flight": (head(0.1, 0.2) + solid(disk(0.5, 0.7, 0.25), SOFT,
                                           velocity="linear = [1.0, 0.5]"), "front:x+", fly),
@@ -143,6 +169,17 @@ def texts_of_choice():
         "pair": (head(0.05, 0.12, gravity=(0.0, 0.0)) + solid(
             disk(0.2, 0.3, 0.15), SOFT, "left", "linear = [2.0, 0.0]") + solid(
             disk(0.6, 0.3, 0.15), SOFT, "right", "linear = [-2.0, 0.0]"), "front:x-", None),
+    }
+
+
+def texts_with_closed_forms():
+    """Return {name: (text, front, exact values)} of other scenes with a closed form."""
+    return {
+        "toss": (head(0.1, 0.25, 3, (0.0, 0.0, -G)) + solid(
+            box(0.0, 0.0, 0.0, 0.4, 0.3, 0.3), RUBBER, velocity="linear = [2.0, 0.0, 3.0]"),
+            "front:x+", toss),
+        "hang": (head(0.05, 0.06) + solid(box(0.0, 0.0, 0.2, 0.6), STIFF) + sides()
+                 + floor((0.0, 0.6), (0.0, -1.0), "sticky"), "front:y-", hang),
     }
 
 
