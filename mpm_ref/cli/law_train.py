@@ -10,20 +10,20 @@ import typer
 
 from ..materials.learned import weights
 from ..nclaw.study import training
-from ..nclaw.study.compare import threads_for
 from ..nclaw.study.study import load
 from ..store.atomic import require_place
-from ..store.running import Watch
 from ..store.text import counted
-from ..trajectories import observed
 from . import provenance
 from .catalogue import bundled_scenes, find_study, require_other_file
-from .errors import INTERRUPT, UNSTABLE, at_start, end, exit_on_errors, options, writing
+from .errors import UNSTABLE, at_start, end, exit_on_errors, options, writing
+from .law_motion import motion
+from .law_seeds import SeedOptions, train_seeds
 from .options import (
     HDF5,
     MAPS,
     OF_ERRORS,
     Overwrite,
+    Scheduler,
     StudyName,
     horizons,
     on_interrupt,
@@ -31,7 +31,7 @@ from .options import (
     require_free,
     training_error_text,
 )
-from .terminal import passing, tell, warn
+from .terminal import passing, warn
 
 SAID = 10           # lines about a training where there is no terminal
 LEAST_OFF = 1e-6    # [dx] root mean squared error of laws in their first epoch
@@ -46,11 +46,17 @@ def train(
         help="FILE.h5 with the run to learn from, made if it is not there; default: made anew, "
              "not kept.")] = None,
     threads: Annotated[int, typer.Option(help="Threads of PyTorch.", min=1)] = 1,
+    seeds: Annotated[int, typer.Option(
+        help="Number of trainings, with the study's seed and those after it; each has weights of "
+             "its own, WEIGHTS.seed-K.npz.", min=1)] = 1,
+    workers: Annotated[int, typer.Option(help="Number of trainings at a time.", min=1)] = 2,
+    scheduler: Scheduler = None,
     overwrite: Overwrite = False,
 ):
     """Train the laws of a study on the motion of its scene (this needs PyTorch).
 
-    An interrupted training resumes from its checkpoint, WEIGHTS.pt. Exit status: 0 success, 2 bad
+    An interrupted training resumes from its checkpoint, WEIGHTS.pt. With --seeds several trainings
+    run at a time, and their errors are printed with median and range. Exit status: 0 success, 2 bad
     input, 3 the run became unstable or the training diverged, 4 a file could not be written,
     130 Ctrl-C.
     """
@@ -58,19 +64,28 @@ def train(
         with options():
             study = load(find_study(name), bundled_scenes())
             out = out or study.file("weights") or Path(f"{study.path.stem}.npz")
-            checkpoint = study.file("checkpoint") or out.with_suffix(".pt")
-            require_outputs(study, out, data, overwrite)
-            require_checkpoint(checkpoint, study.path, out, data)
-            training.trainer()
-            with at_start(study.path):
-                observation = motion(study, data)
-            with writing():
-                laws = learned(study, observation, checkpoint, threads=threads,
-                               command=command_line(name, out, data, threads))
+        if seeds > 1:
+            train_seeds(study, name, SeedOptions(seeds, out, data, workers, scheduler, overwrite))
+        else:
+            train_one(study, name, out, data, threads, overwrite)
+
+
+def train_one(study, name, out, data, threads, overwrite):
+    """Train the laws of a study, and write the weights."""
+    with options():
+        checkpoint = study.file("checkpoint") or out.with_suffix(".pt")
+        require_outputs(study, out, data, overwrite)
+        require_checkpoint(checkpoint, study.path, out, data)
+        training.trainer()
+        with at_start(study.path):
+            observation = motion(study, data)
         with writing():
-            weights.save(out, laws)
-        checkpoint.unlink(missing_ok=True)
-        print(f"{out}: {summary_text(study, observation, laws.about['errors'])}")
+            laws = learned(study, observation, checkpoint, threads=threads,
+                           command=command_line(name, out, data, threads))
+    with writing():
+        weights.save(out, laws)
+    checkpoint.unlink(missing_ok=True)
+    print(f"{out}: {summary_text(study, observation, laws.about['errors'])}")
 
 
 def require_outputs(study, out, data, overwrite):
@@ -101,34 +116,6 @@ def command_line(name, out, data, threads):
     """Return the command that repeats a training."""
     kept = "" if data is None else f" --data {data}"
     return f"mpm-ref law train {name} --out {out}{kept} --threads {threads}"
-
-
-def motion(study, data):
-    """`Observed` of a study's scene: made, or of a results file, which is made if need be."""
-    problem = study.problem()
-    with threads_for(problem.bodies):
-        if data is None:
-            tell(f"computing the full-order run of {study.path}")
-            with passing(desc="full-order run", bar_format="{desc}", leave=False):
-                return observed(problem)
-        if not training.is_complete(data, problem):
-            with passing(total=problem.clock.steps, unit="step", desc=str(data)) as bar:
-                made = training.make_run(data, study.problem(), Steps(bar))
-            if made < problem.clock.steps:
-                end(f"interrupted at step {made} of {problem.clock.steps} of the run to learn "
-                    "from; the same command again goes on", INTERRUPT)
-    return training.read_run(data, problem)
-
-
-class Steps(Watch):
-    """A run on a bar of steps."""
-
-    def __init__(self, bar):
-        self.bar = bar
-
-    def step(self, state, dt):
-        """Move the bar."""
-        self.bar.update(state.step - self.bar.n)
 
 
 def learned(study, observation, checkpoint, **about):
