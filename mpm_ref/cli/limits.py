@@ -1,6 +1,7 @@
 """Implement `mpm-ref limits`: find how far a scene is from its nearest failures."""
 
 from pathlib import Path
+from shlex import quote
 
 from ..limits.answer import answer_lines, answer_of
 from ..limits.figure import save_figure
@@ -79,8 +80,8 @@ def run_search(record, observed, request):
 
 def command_of(request):
     """Return the command of a request."""
-    quantities = "".join(f" --quantity {text}" for text in request.quantities)
-    return (f"mpm-ref limits {request.name} --error {request.error:g} --budget "
+    quantities = "".join(f" --quantity {quote(text)}" for text in request.quantities)
+    return (f"mpm-ref limits {quote(request.name)} --error {request.error:g} --budget "
             f"{request.budget:g}s{quantities} --workers {request.workers}")
 
 

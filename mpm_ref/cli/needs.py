@@ -13,8 +13,7 @@ from ..needs.removal import RemovalStudy
 from ..needs.variant import first_variant
 from ..store.atomic import write_bytes
 from ..store.page import page_of
-from ..sweep.observation import STOPPED
-from ..sweep.runs import CRASHED
+from ..sweep.observation import CRASHED, STOPPED
 from .errors import BAD_INPUT, end, exit_on_errors, options
 from .options import Json, SceneName
 from .sweep_options import (
@@ -30,7 +29,7 @@ from .sweep_options import (
     observed_of,
     open_runs,
 )
-from .terminal import as_json, finite
+from .terminal import as_json, finite, warn
 
 NO_ANSWER = 1
 
@@ -74,10 +73,22 @@ def answer_of(first, observed, request):
         result = study.result()
         if result is None:
             end_without_base(study.base, request)
+        parts = parts_of(first, result, store)
+    return NeedsAnswer(request.stem, command_of(request), request.error, result, parts)
+
+
+def parts_of(first, result, store):
+    """Return {"as given" and "lean": `CodeParts`}; empty, with a warning, where they cannot be
+    had.
+    """
+    try:
         parts = {"as given": code_parts(first.scene, store)}
         if result.order:
             parts["lean"] = code_parts(result.lean.scene, store)
-    return NeedsAnswer(request.stem, command_of(request), request.error, result, parts)
+    except RuntimeError as fault:
+        warn([f"no table of the code: {fault}"])
+        return {}
+    return parts
 
 
 def end_without_base(base, request):

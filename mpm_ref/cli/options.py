@@ -15,6 +15,7 @@ from ..rom.study import reduce
 from ..rom.study.generate import one_thread
 from ..rom.study.study import load
 from ..scene import SceneError
+from ..store.atomic import NotWritten
 from .catalogue import bundled_scenes, find_scene, find_study
 from .errors import INTERRUPT, end, exit_on_errors
 from .terminal import warn
@@ -38,6 +39,15 @@ def require_folder_name(out):
     if ending in FILES and not Path(out).exists():
         raise ValueError(f"--out {out}: expected the name of a folder, but files' names end in "
                          f"{ending}; leave the ending out")
+
+
+def make_folder(folder):
+    """Make a folder for data. Raises NotWritten."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as fault:
+        raise NotWritten(f"--out {folder}: this is no folder, and none can be made there "
+                         f"({fault.strerror})") from None
 
 
 def require_free(out, overwrite):

@@ -23,7 +23,7 @@ from ..rom.study.generate import (
 from ..rom.study.record import supported_model
 from ..rom.study.study import training_hints
 from ..rom.study.tables import KEYS, NETWORK, NSF
-from ..store.atomic import NotWritten, require_place
+from ..store.atomic import require_place
 from ..store.text import counted
 from ..training import DEVICES, Machine
 from . import errors
@@ -36,6 +36,7 @@ from .options import (
     Scheduler,
     StudyName,
     load_study,
+    make_folder,
     named,
     on_interrupt,
     require_ending,
@@ -199,15 +200,6 @@ def compute_model(study, snapshots, about, checkpoint, machine):
             bar.update(len(history) - bar.n)
             bar.set_postfix_str(f"loss {history[-1][0]:.2e}")
         return reduce.train_model(study, snapshots, about, checkpoint, show, machine)
-
-
-def make_folder(folder):
-    """Make a folder for data. Raises NotWritten."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as fault:
-        raise NotWritten(f"--out {folder}: this is no folder, and none can be made there "
-                         f"({fault.strerror})") from None
 
 
 def require_map_place(out, study, overwrite):

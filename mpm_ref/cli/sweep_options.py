@@ -21,7 +21,7 @@ from ..sweep.setting import in_seconds
 from ..sweep.store import RunStore
 from .catalogue import find_scene
 from .errors import options
-from .options import on_interrupt
+from .options import make_folder, on_interrupt
 from .terminal import passing
 
 UNITS = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
@@ -129,7 +129,7 @@ def open_runs(request, observed):
     """Yield the `SceneRuns` of a request, with a bar that counts runs; its store is the folder
     SCENE.trade beside the output. A bad scheduler and Ctrl-C end the command.
     """
-    request.out.mkdir(parents=True, exist_ok=True)
+    make_folder(request.out)
     folder = request.out / f"{request.stem}.trade"
     with ExitStack() as stack:
         with options():

@@ -7,16 +7,22 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from ..scene import SceneError, dumps
+from ..scene import SceneError
 from ..store.atomic import write_bytes
 from ..store.page import page_of
 from ..sweep.quantity import with_companions
 from ..sweep.recorded import observe_results
+from ..sweep.scene_text import scene_text
 from ..sweep.setting import scene_at
 from ..trade.answer import answer_lines, answer_of, best_scene, largest_extent, percent
 from ..trade.figure import save_figure
 from ..trade.search import TradeSearch
-from ..trade.similar import carried_over, cheapest_row, read_answer
+from ..trade.similar import (
+    carried_over,
+    cheapest_row,
+    read_answer,
+    require_same_quantities,
+)
 from .errors import exit_on_errors, options
 from .options import Json, SceneName
 from .sweep_options import (
@@ -76,6 +82,9 @@ def measure(
         with options():
             request = SweepRequest(name, error, budget, quantity, workers, scheduler, out,
                                    quiet).parsed()
+            if like is not None and (alternative or compare):
+                raise ValueError(f"--like {like}: it measures nothing, so that --alternative and "
+                                 "--compare have no meaning beside it")
             record, path = load_sweep(name)
             texts = with_companions(request.quantities, record.dim)
             observed = observed_of(record, path, texts)
@@ -94,6 +103,8 @@ def answer_from(like, record, observed, request):
     """Write and say the advice that the answer on a similar scene gives; return the exit status."""
     name = Path(like).stem
     answer = read_answer(request.out / f"{name}.trade.json")
+    with options():
+        require_same_quantities(answer, request.quantities, name)
     row = cheapest_row(answer, request.error)
     if row is None:
         print(f"{name}: no setting of its answer keeps {percent(request.error)}")
@@ -101,10 +112,12 @@ def answer_from(like, record, observed, request):
     with options():
         cells = largest_extent(observed.probes) / record.dx
         chosen = carried_over(row, answer.cells, cells)
-        text = dumps(scene_at(record, chosen))
-    sentence = (f"as on {name}: {chosen.text}, which had an error of {percent(row.error)} "
-                f"there; nothing was measured on {request.stem}")
-    write_bytes(request.out / f"{request.stem}.best.toml", f"# {sentence}\n\n{text}".encode())
+        scene = scene_at(record, chosen)
+    sentence = (f"as on {name}: {chosen.text}, which had an error of {percent(row.error)} of "
+                f"{', '.join(answer.quantities)} there, until t = {answer.until:.4g} s of "
+                f"{answer.end:.4g} s; nothing was measured on {request.stem}")
+    text = scene_text([sentence], scene, request.out)
+    write_bytes(request.out / f"{request.stem}.best.toml", text.encode())
     print(sentence)
     return 0
 
@@ -148,6 +161,6 @@ def write_answer(search, facts, request):
     write_bytes(f"{base}.trade.json", as_json(facts).encode())
     write_bytes(f"{base}.trade.html", page_of(facts, "trade").encode())
     save_figure(facts, f"{base}.trade.png")
-    text = best_scene(search, request.stem)
+    text = best_scene(search, request.stem, request.out)
     if text is not None:
         write_bytes(f"{base}.best.toml", text.encode())

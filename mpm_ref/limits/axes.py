@@ -154,10 +154,12 @@ def scale_gravity(tables, factor, size):
 # discretisation and place
 
 def scale_time_step(tables, factor, size):
-    """Multiply a fixed dt, or else the share of the stable one and the longest step."""
+    """Multiply a fixed dt, or else the share of the stable one, the longest step, and the interval
+    of frames, which bounds it.
+    """
     if tables.get("dt") is None:
         tables["cfl"] = (tables.get("cfl") or USUAL_CFL) * factor
-        multiply(tables, ("longest",), factor)
+        multiply(tables, ("longest", "interval"), factor)
         return
     tables["dt"] *= factor
     if tables.get("interval") is not None:

@@ -6,8 +6,7 @@ Matplotlib is imported when a figure is made.
 from math import log10
 
 from ..store.atomic import replacing
-from ..sweep.observation import REFUSED, STOPPED, UNSTABLE
-from ..sweep.runs import CRASHED
+from ..sweep.observation import CRASHED, REFUSED, STOPPED, UNSTABLE
 from .answer import BUDGET_END, LAST_RUNG, number
 from .axes import UP
 from .verdict import RIGHT, UNCHECKED, WRONG

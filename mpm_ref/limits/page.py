@@ -1,7 +1,6 @@
 """The facts of the page of an answer: those of `answer.answer_of`, with words and colours."""
 
-from ..sweep.observation import REFUSED, STOPPED, UNSTABLE
-from ..sweep.runs import CRASHED
+from ..sweep.observation import CRASHED, REFUSED, STOPPED, UNSTABLE
 from .answer import (
     BUDGET_END,
     LAST_RUNG,

@@ -17,13 +17,14 @@ quantity, or with "@end" the last one, relative to its largest change during the
 """
 
 from dataclasses import dataclass
+from math import isfinite
 
 import numpy as np
 
 from ..sweep.difference import largest_change, relative_difference
-from ..sweep.observation import REFUSED, STOPPED, UNSTABLE
+from ..sweep.observation import CRASHED, REFUSED, STOPPED, UNSTABLE
 from ..sweep.quantity import OutputQuantity
-from ..sweep.runs import CRASHED, RunRequest
+from ..sweep.runs import RunRequest
 from .axes import AXIS, MOST_LONGER
 from .cell import COARSE, FINE, CellScenes, cell_text, physical
 
@@ -83,7 +84,7 @@ class CellJudge:
 
     def start(self):
         """Run the scene as given and its companions. Raises NoReference where one fails."""
-        labels = {1.0: "as given", COARSE: "as given, 2 dx", FINE: "as given, dx/2"}
+        labels = {1.0: "as given", FINE: "as given, dx/2"}
         self.base |= self._observe({dx: ((), dx, np.inf, text) for dx, text in labels.items()})
         for dx in (1.0, FINE):
             run = self.base[dx]
@@ -92,6 +93,11 @@ class CellJudge:
                 raise NoReference(f"{labels[dx]}: {run.outcome}: {run.message}{price}",
                                   run.outcome)
         differences = self._differences(self.base[1.0], self.base[FINE], False)
+        unknown = [text for text, difference in differences.items() if not isfinite(difference)]
+        if unknown:
+            raise NoReference(f"{unknown[0]} is not a number at some time of the scene as given, "
+                              "so that nothing can be compared with it; ask for another quantity",
+                              REFUSED)
         self.tolerance = {text: max(self.error, SLACK * difference)
                           for text, difference in differences.items()}
         self.verdicts[()] = self._compared(self.base[1.0], self.base[FINE], (), AT_FINE)

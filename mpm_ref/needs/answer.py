@@ -1,16 +1,14 @@
 """State what a scene requires: the table on the terminal, the JSON file, the lean scene."""
 
-import json
-import os
 from dataclasses import asdict, dataclass
 from math import isfinite
 
 from .. import __version__
-from ..scene.toml import FILES, digest, dumps
+from ..scene.toml import digest
 from ..store.manifest import code
 from ..sweep.observation import FINISHED
+from ..sweep.scene_text import scene_text
 from .code_parts import table_lines
-from .ingredients import lists_and_tables
 from .removal import (
     COSTLY,
     IMPOSSIBLE,
@@ -172,22 +170,4 @@ def lean_text(answer, folder):
     gone = [removal for removal in result.lean.removals if removal.body or removal.plane]
     head += [f"{removal.label}: positions are compared on the matter that is left."
              for removal in gone]
-    text = "".join(f"# {line}".rstrip() + "\n" for line in head) + "\n"
-    return text + with_relative_files(dumps(result.lean.scene), result.lean.scene, folder)
-
-
-def with_relative_files(text, scene, folder):
-    """Return the TOML text of a scene with files named from a folder, as a scene's file does."""
-    for name in file_names(lists_and_tables(scene)):
-        text = text.replace(json.dumps(name), json.dumps(os.path.relpath(name, folder)))
-    return text
-
-
-def file_names(data):
-    """Return the names of all files in nested tables and lists."""
-    if isinstance(data, list):
-        return {name for item in data for name in file_names(item)}
-    if not isinstance(data, dict):
-        return set()
-    names = {data[key] for key in FILES if isinstance(data.get(key), str)}
-    return names.union(*(file_names(item) for item in data.values()))
+    return scene_text(head, result.lean.scene, folder)

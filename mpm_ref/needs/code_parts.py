@@ -15,6 +15,7 @@ import msgspec
 
 from ..scene.toml import digest
 from ..store.atomic import write_bytes
+from ..store.foreign import environment
 from ..sweep.store import source_hash
 from . import code_probe
 
@@ -35,6 +36,7 @@ STAGES = {          # of a step: beginnings of the names of the kernels that it 
     "RPIC damping": ("core.transfer._damp",),
 }
 DOUBLE = 8          # bytes
+LONGEST = 600       # [s] that the first steps may take
 
 
 @dataclass(frozen=True)
@@ -69,9 +71,12 @@ class CodeParts:
 
 def table_rows(parts):
     """Return the rows of a table of {name of a scene: `CodeParts`}: (label, texts), a text for each
-    scene. Rows without texts are headings; the labels below them begin with spaces.
+    scene. Rows without texts are headings; the labels below them begin with spaces. No rows of no
+    scene.
     """
     columns = list(parts.values())
+    if not columns:
+        return []
     rows = [("in the first steps", [str(column.steps) for column in columns])]
     for bodies in alike_bodies(columns[0]):
         rows.append((f"doubles per particle of {', '.join(bodies)}", []))
@@ -90,6 +95,8 @@ def table_rows(parts):
 def table_lines(parts):
     """Return the table of `table_rows` as lines of text."""
     rows = table_rows(parts)
+    if not rows:
+        return []
     width = max(len(label) for label, _ in rows)
     head = "  ".join([f"{'what the code uses':{width}}", *(f"{name:>12}" for name in parts)])
     return [head, *("  ".join([f"{label:{width}}", *(f"{value:>12}" for value in values)]).rstrip()
@@ -107,13 +114,18 @@ def alike_bodies(parts):
 def code_parts(scene, folder=None):
     """Return the `CodeParts` of a scene, stored in a folder if one is given.
 
-    Raises RuntimeError, with the last line of its error, where the process fails.
+    Raises RuntimeError, with the last line of its error, where the process fails or takes too long.
     """
     path = None if folder is None else Path(folder) / f"code-{key_of_parts(scene)}.json"
     if (stored := stored_parts(path)) is not None:
         return stored
-    done = subprocess.run([sys.executable, "-m", code_probe.__name__], capture_output=True,
-                          input=msgspec.json.encode(scene), check=False)
+    try:
+        done = subprocess.run([sys.executable, "-P", "-m", code_probe.__name__], check=False,
+                              capture_output=True, input=msgspec.json.encode(scene),
+                              env=environment(), timeout=LONGEST)
+    except subprocess.TimeoutExpired:
+        raise RuntimeError(f"the first steps of the scene in a process of their own took over "
+                           f"{LONGEST} s") from None
     if done.returncode:
         lines = done.stderr.decode(errors="replace").strip().splitlines()
         raise RuntimeError(f"the first steps of the scene in a process of their own failed: "

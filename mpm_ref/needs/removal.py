@@ -13,7 +13,7 @@ from math import inf
 import numpy as np
 
 from ..scene import SceneError
-from ..sweep.observation import FINISHED, REFUSED, STOPPED, UNSTABLE
+from ..sweep.observation import CRASHED, FINISHED, REFUSED, STOPPED, UNSTABLE
 from ..sweep.runs import RunRequest
 from ..sweep.setting import scene_at, setting
 from .variant import changes
@@ -169,7 +169,7 @@ class RemovalStudy:
         """Return the verdict of a run that did not reach its end."""
         if observation.outcome == UNSTABLE:
             return REQUIRED
-        if observation.outcome == REFUSED:
+        if observation.outcome in (REFUSED, CRASHED):
             return IMPOSSIBLE
         if observation.outcome == STOPPED and observation.cost.cpu > MOST_CPU * self.cpu:
             return COSTLY

@@ -74,9 +74,10 @@ def changes(base, observation, variant, first):
             reference = reference[:, columns(text, variant, first)]
         elif kind in ENERGIES:
             values = values / variant.share
+        scale = largest_change(reference)
         if OutputQuantity(text).at_end:
             reference, values = reference[[0, -1]], values[[0, -1]]
-        error = relative_difference(values, reference, largest_change(reference))
+        error = relative_difference(values, reference, scale)
         result[text] = running_maximum(error)
     return result
 

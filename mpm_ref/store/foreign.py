@@ -44,10 +44,10 @@ def copied(path, group):
     seconds = SECONDS + int(Path(path).stat().st_size / RATE)
     with tempfile.TemporaryDirectory(prefix="mpm_ref-") as folder:
         copy = Path(folder) / "copy.h5"
-        command = [sys.executable, "-m", "mpm_ref.store.foreign", str(path), group, str(copy),
+        command = [sys.executable, "-P", "-m", "mpm_ref.store.foreign", str(path), group, str(copy),
                    str(seconds)]
         try:
-            done = subprocess.run(command, capture_output=True, check=False, env=_environment(),
+            done = subprocess.run(command, capture_output=True, check=False, env=environment(),
                                   timeout=WAIT * seconds, stdin=subprocess.DEVNULL)
         except subprocess.TimeoutExpired:
             raise Unreadable(_ending(-signal.SIGXCPU)) from None
@@ -57,8 +57,11 @@ def copied(path, group):
         yield copy
 
 
-def _environment():
-    """Return variables under which a process finds this package and needs few threads."""
+def environment():
+    """Return variables under which a process finds this package and needs few threads.
+
+    With `python -P` it finds no module in the current folder, which may be a stranger's.
+    """
     root = str(Path(__file__).resolve().parents[2])
     paths = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH"))))
     return {**os.environ, "PYTHONPATH": paths, "OPENBLAS_NUM_THREADS": "1"}

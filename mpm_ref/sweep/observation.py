@@ -20,6 +20,7 @@ from .probes import initial_order, interpolation
 from .quantity import OutputQuantity, Snapshot
 
 FINISHED, UNSTABLE, REFUSED, STOPPED = "finished", "unstable", "refused", "too long"
+CRASHED = "crashed"     # its process was killed, it had no memory, or a file could not be read
 NEAR = 1.5              # steps before an observation from which on quantities are evaluated
 PERTURBATION = 1e-10    # cells by which positions are perturbed
 FIRST = 2               # steps whose time is that of loading or compiling kernels
@@ -54,7 +55,7 @@ class RunObservation:
 
     values: dict
     cost: RunCost
-    outcome: str            # FINISHED, UNSTABLE, REFUSED, STOPPED
+    outcome: str            # FINISHED, UNSTABLE, REFUSED, STOPPED, CRASHED
     message: str = ""
     until: float = 0.0      # [s] that the run reached
 
@@ -75,8 +76,10 @@ def observe(run):
         scene = validate_scene(parse(run.scene))
         problem, recorder = record_impulses(build(scene), scene)
         observer = RunObserver(problem, run, recorder)
-    except (ValueError, OSError, MemoryError) as fault:
-        return RunObservation(blank, RunCost(), REFUSED, str(fault) or "no memory for it")
+    except (OSError, MemoryError) as fault:
+        return RunObservation(blank, RunCost(), CRASHED, str(fault) or "no memory for it")
+    except ValueError as fault:
+        return RunObservation(blank, RunCost(), REFUSED, str(fault))
     try:
         for frame in simulate(problem, on_step=observer.step):
             if frame.index == 0:
@@ -84,8 +87,10 @@ def observe(run):
         outcome, message = FINISHED, ""
     except Unstable as fault:
         outcome, message = UNSTABLE, str(fault)
-    except (TooLarge, OutOfRange, ValueError, MemoryError) as fault:
-        outcome, message = REFUSED, str(fault) or "no memory for it"
+    except (TooLarge, OutOfRange, ValueError) as fault:
+        outcome, message = REFUSED, str(fault)
+    except MemoryError:
+        outcome, message = CRASHED, "no memory for it"
     except _TooLong:
         outcome, message = STOPPED, f"stopped after {run.most_cpu:.3g} s of CPU time"
     finally:
@@ -174,7 +179,7 @@ class StepClock:
 
     def __init__(self):
         self.steps = self.usual = 0
-        self.measured = 0.0, 0.0        # CPU and wall time of the usual steps [s]
+        self.measured = self.all = 0.0, 0.0     # CPU and wall time of usual and of all steps [s]
         self._compiled = None
 
     def start(self):
@@ -189,6 +194,7 @@ class StepClock:
         compiled = self._compiled.raised
         self.close()
         self.steps += 1
+        self.all = self.all[0] + cpu, self.all[1] + wall
         if self.steps > FIRST and not compiled:
             self.usual += 1
             self.measured = self.measured[0] + cpu, self.measured[1] + wall
@@ -200,9 +206,13 @@ class StepClock:
         self._compiled = None
 
     def total(self):
-        """Return the CPU and wall time of all steps [s]; NaN before a usual step."""
-        if not self.usual:
+        """Return the CPU and wall time of all steps [s]: as measured, with the loading of kernels,
+        where no step was usual; NaN without a step.
+        """
+        if not self.steps:
             return np.nan, np.nan
+        if not self.usual:
+            return self.all
         return tuple(sum_ * self.steps / self.usual for sum_ in self.measured)
 
 

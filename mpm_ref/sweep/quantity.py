@@ -65,15 +65,6 @@ class OutputQuantity:
         object.__setattr__(self, "arguments", tuple(argument.strip() for argument in arguments))
         object.__setattr__(self, "at_end", bool(at))
 
-    @property
-    def unit(self):
-        """Return the unit of the values."""
-        if self.kind in ENERGIES:
-            return "J"
-        if self.kind == "mean":
-            return {"J": "1", "speed": "m/s", "pressure": "Pa"}.get(self.arguments[0], "")
-        return "N s" if self.kind == "impulse" else "m"
-
     def sample(self, snapshot):
         """Return the value (k,) in a `Snapshot`. Raises ValueError for arguments that do not fit
         the scene.

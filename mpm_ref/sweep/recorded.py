@@ -4,9 +4,11 @@ Between two frames a quantity is interpolated linearly in time. Particles that b
 the file carry the scene's probes along, with weights from their positions in its first frame.
 """
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
+import msgspec
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..scene import SceneError
 from ..store.results import ENERGIES, Results
@@ -19,6 +21,19 @@ LATE = 1e-6             # of the run by which a file may end before it
 SHARE = 0.1             # of the error asked, which the interpolation between frames may have
 NEAR = 1e-9             # of the run, within which a frame is at a time
 COLUMNS = {"energy": (0, 1, 2), **{name: (k,) for k, name in enumerate(ENERGIES)}}
+
+
+class PartCost(msgspec.Struct):
+    """The cost of a part of a run, as a manifest has it [s]."""
+
+    cpu_s: Annotated[float, msgspec.Meta(ge=0.0)]
+    wall_s: Annotated[float, msgspec.Meta(ge=0.0)]
+
+
+class RunParts(msgspec.Struct):
+    """The parts of a run in a manifest."""
+
+    parts: list[PartCost]
 
 
 class RecordedParticles(NamedTuple):
@@ -55,6 +70,7 @@ def observe_results(path, observed, error=np.inf):
     """
     with Results(path) as results:
         require_same_problem(results, observed)
+        require_same_start(results, observed)
         series, times = series_of(results, observed), observed.times
         if not has_frames_at(times, results.time):
             require_dense(path, series, error)
@@ -72,10 +88,22 @@ def require_same_problem(results, observed):
     dim = len(observed.probes[0][1][0])
     if results.dim != dim:
         raise SceneError(f"{results.path}: a run in {results.dim}D; the scene is in {dim}D")
+    if not len(results) or not (np.diff(results.time) > 0.0).all():
+        raise SceneError(f"{results.path}: expected frames at increasing times")
     first, last, end = results.time[0], results.time[-1], observed.times[-1]
     if first > LATE * end or last < end * (1.0 - LATE):
         raise SceneError(f"{results.path}: frames from t = {first:.6g} to {last:.6g} s; expected "
                          f"a run from 0 to the scene's end at {end:.6g} s")
+
+
+def require_same_start(results, observed):
+    """Raise SceneError where a body of a results file is not at first where the scene has it."""
+    for body, X in observed.probes:
+        distance = np.max(cKDTree(results.field(body, "x", 0)).query(X)[0])
+        if not distance <= results.dx:
+            raise SceneError(f"{results.path}: {body} has no matter within {results.dx:.3g} m of "
+                             "where it is at the start of the scene; expected a run of the same "
+                             "problem")
 
 
 def has_frames_at(times, t):
@@ -142,7 +170,10 @@ def body_of(results, name, frame):
 
 def cost_of(results):
     """Return the `RunCost` of the whole run of a results file, NaN where it does not say."""
-    parts = results.manifest.get("parts") or []
-    cpu, wall = (sum(part[key] for part in parts) if parts and all(key in p for p in parts)
-                 else np.nan for key in ("cpu_s", "wall_s"))
+    try:
+        parts = msgspec.convert(results.manifest, RunParts).parts
+    except msgspec.ValidationError:
+        parts = []
+    cpu, wall = (sum(getattr(part, key) for part in parts) if parts else np.nan
+                 for key in ("cpu_s", "wall_s"))
     return RunCost(cpu, wall, int(results.step[-1]), sum(map(results.count, results.bodies)))

@@ -8,10 +8,10 @@ import numpy as np
 
 from ..scene import SceneError
 from ..scene.toml import digest
-from .observation import REFUSED, STOPPED, ObservedRun, RunCost, RunObservation, observe
+from .observation import CRASHED, REFUSED, STOPPED, ObservedRun, RunCost, RunObservation, observe
 from .store import key_of
 
-CRASHED = "crashed"     # outcome of a run whose process was killed, or failed otherwise
+LATE = "not begun within the budget"
 
 
 @dataclass(frozen=True)
@@ -95,13 +95,20 @@ class SceneRuns:
             if outcome.error is not None:
                 observation = RunObservation(blank_values(runs[label]), RunCost(), CRASHED,
                                              outcome.error)
-            elif observation.outcome != STOPPED or observation.cost.steps:
+            elif is_lasting(observation):
                 self._store.put(runs[label], observation)
             self.count += 1
             observations[label] = observation
             if self.on_run is not None:
                 self.on_run(label, observation)
         return observations
+
+
+def is_lasting(observation):
+    """Return whether the same run would end in the same way another time."""
+    if observation.outcome == STOPPED:
+        return observation.cost.steps > 0
+    return observation.outcome != CRASHED
 
 
 @dataclass(frozen=True)
@@ -117,7 +124,7 @@ def observe_in_time(task):
     left = task.deadline - time.time()
     if left <= 0.0:
         return RunObservation(blank_values(task.run), RunCost(cpu=0.0), STOPPED,
-                              "not begun within the budget")
+                              LATE)
     return observe(task.run._replace(most_cpu=min(task.run.most_cpu, left)))
 
 

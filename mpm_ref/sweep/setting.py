@@ -3,9 +3,10 @@
 A setting is a dictionary of some of these knobs; what it leaves out stays as the scene says.
 
     scene       another scene of the same problem, by its name: with a learned law, for instance
-    dx          factor of the grid spacing; points per cell stay, and a fixed dt goes along
+    dx          factor of the grid spacing; points per cell stay, and the time step goes along
     particles   factor of the points per cell and axis
-    sampling    "regular", "jittered" or "poisson", with as many points per cell
+    sampling    "regular", "jittered" or "poisson", with as many points per cell; 2 per axis where
+                the scene gives them otherwise
     cfl         share of the stable time step (of an implicit step: cells that a particle crosses)
     degree      of the B-spline: 1, 2 or 3
     transfer    "mls", "apic", "flip 0.95" (with its share of FLIP), "apic rpic 0.5", "pic", ...
@@ -15,7 +16,7 @@ A setting is a dictionary of some of these knobs; what it leaves out stays as th
 
 import re
 from dataclasses import dataclass
-from math import isclose
+from math import inf, isclose
 
 from ..scene import SceneError
 from ..scene.validate import plain, validate_scene
@@ -91,7 +92,9 @@ def scale_dx(tables, factor):
     """Multiply the grid spacing; walls, which are counted in nodes, stay where they are."""
     tables["dx"] *= factor
     if "dt" in tables:
-        tables["dt"] = min(tables["dt"] * factor, tables.get("interval", float("inf")))
+        tables["dt"] = min(tables["dt"] * factor, tables.get("interval", inf))
+    else:
+        scale_longest(tables, factor)
     if tables.get("walls") is not None:
         for key, inner in (("low", 1), ("high", -1)):
             nodes = tables["walls"].get(key)
@@ -101,6 +104,17 @@ def scale_dx(tables, factor):
         sampling = body["sampling"]
         if body.get("shape") is not None:
             scale_points(sampling, 1.0 / factor, tables["dim"], per_cell=False)
+
+
+def scale_longest(tables, factor):
+    """Multiply the bound of a time step that is not fixed; on a finer grid, frames bound it too,
+    since no step is longer than their interval.
+    """
+    bound = tables.get("longest") or inf
+    if factor < 1.0:
+        bound = min(bound, tables.get("interval") or inf)
+    if bound < inf:
+        tables["longest"] = bound * factor
 
 
 def _node_at(node, inner, factor):
@@ -137,7 +151,9 @@ def scale_points(sampling, factor, dim, per_cell):
 
 
 def change_sampling(tables, kind):
-    """Sample all bodies with a shape in another way."""
+    """Sample all bodies with a shape in another way, with two points per cell and axis where they
+    are not given per cell.
+    """
     for body in tables["body"]:
         if body.get("shape") is not None:
             per_cell = body["sampling"].get("per_cell") or USUAL_PER_CELL
@@ -147,6 +163,7 @@ def change_sampling(tables, kind):
 def change_cfl(tables, share):
     """Follow the stable time step; a fixed dt, and a bound on it, are dropped."""
     tables.pop("dt", None)
+    tables.pop("longest", None)
     tables["cfl"] = share
     if tables["integrator"] == "explicit":
         tables["unstable"] = "refuse"

@@ -7,6 +7,7 @@ damaged file counts as absent: the run is made again.
 import hashlib
 import io
 import json
+import zlib
 from functools import cache
 from pathlib import Path
 from zipfile import BadZipFile
@@ -20,6 +21,8 @@ from .observation import STOPPED, RunCost, RunObservation
 PACKAGE = Path(__file__).resolve().parents[1]
 COMPUTES = ("core", "hot", "materials", "sampling", "scene", "shapes", "sweep", "*.py")
 TEXTS = ("outcome", "message", "until")
+UNREADABLE = (OSError, EOFError, ValueError, KeyError, TypeError, AttributeError, MemoryError,
+              BadZipFile, zlib.error)       # of a damaged file
 
 
 class RunStore:
@@ -89,5 +92,5 @@ def read(path):
                       if name != "facts"}
         cost = RunCost(**facts.pop("cost"))
         return RunObservation(values, cost, **facts)
-    except (OSError, EOFError, ValueError, KeyError, TypeError, BadZipFile):
+    except UNREADABLE:
         return None

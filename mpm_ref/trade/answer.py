@@ -5,8 +5,10 @@ from math import isfinite, log2
 import numpy as np
 
 from .. import __version__
-from ..scene import dumps
+from ..store.text import counted
 from ..sweep.observation import FINISHED
+from ..sweep.runs import LATE
+from ..sweep.scene_text import scene_text
 from ..sweep.setting import scene_at
 from .reference import LEAST
 from .search import REFERENCE_PART, without_grid
@@ -23,6 +25,7 @@ def answer_of(search, name, compared=None):
     return {
         "scene": name, "version": __version__, "error": search.error, "end": search.times[-1],
         "quantities": list(search.quantities), "until": horizon, "chaos": search.chaos,
+        "compared_with": search.compared_with,
         "grids": [search.scene.dx * factor for factor in search.levels],
         "cells": largest_extent(search.runs.probes) / search.scene.dx,
         "references": {text: reference_facts(search, text) for text in search.references},
@@ -99,7 +102,7 @@ def front_lines(facts):
     shown = [one for one in facts["rows"] if not one["dominated"] and one["error"] is not None]
     for one in shown:
         mark = "  <- recommended" if one["best"] else ""
-        lines.append(f"{one['text']:44} {percent(one['error']):>9} {one['cpu']:9.3g} "
+        lines.append(f"{one['text']:44} {percent(one['error']):>9} {one['cpu'] or 0.0:9.3g} "
                      f"{one['particles']:9d} {one['steps']:7d}{mark}")
     outcomes = [one["outcome"] for one in facts["rows"]]
     counts = ", ".join(f"{outcomes.count(word)} {word}" for word in dict.fromkeys(outcomes))
@@ -127,6 +130,11 @@ def advice_lines(facts):
     """Return the recommendation, or what it would take."""
     if facts["best"] is None:
         return [f"no setting keeps {percent(facts['error'])}: {shortfall(facts)}"]
+    return [*recommendation(facts), *caveats(facts)]
+
+
+def recommendation(facts):
+    """Return the recommended setting, and until when it holds."""
     best = next(one for one in facts["rows"] if one["best"])
     margin = max(facts["references"][text]["error"] for text in facts["quantities"])
     lines = [f"recommended: {best['text']}: error {percent(best['error'])} (the reference's own: "
@@ -135,6 +143,18 @@ def advice_lines(facts):
         lines += companion_lines(facts)
         lines.append(f"this holds until t = {facts['until']:.4g} s of {facts['end']:.4g} s; for "
                      f"the whole run: {shortfall(facts)}")
+    return lines
+
+
+def caveats(facts):
+    """Return what was not tried or not checked."""
+    late = sum(one["message"] == LATE for one in facts["rows"])
+    lines = [] if not late else [
+        f"{counted(late, 'setting')} {'was' if late == 1 else 'were'} not run within the budget, "
+        "among them perhaps a cheaper one; the same command with a larger --budget goes on"]
+    if facts["compared_with"] is None:
+        lines.append("no other transfer was run on a fine grid, so that the reference's error does "
+                     "not include what transfers differ by")
     return lines
 
 
@@ -159,7 +179,10 @@ def companion_lines(facts):
 def shortfall(facts):
     """Return what it would take to know the quantities for the whole run."""
     if len(facts["grids"]) < 2:
-        return "at least two grids must finish; give a larger --budget"
+        own = next((one for one in facts["rows"] if one["setting"] == {"dx": 1.0}), None)
+        why = ("" if own is None or own["outcome"] == FINISHED else
+               f" (the scene as given: {own['outcome']}: {own['message']})")
+        return f"at least two grids must finish{why}; give a larger --budget"
     texts = []
     for text in facts["quantities"]:
         reference = facts["references"][text]
@@ -173,7 +196,12 @@ def shortfall(facts):
             finest = facts["grids"][-1] / 2**halvings
             texts.append(f"{text} is known to {percent(error)}; a reference of {percent(asked)} "
                          f"would take dx = {finest:.3g} m")
-    return "; ".join(texts) or "chaos ends what can be known"
+    if texts:
+        return "; ".join(texts)
+    if facts["chaos"] is not None and isfinite(facts["chaos"]):
+        return "chaos ends what can be known"
+    return (f"the finest grid, dx = {facts['grids'][-1]:.3g} m, does not keep the error; a larger "
+            "--budget halves it further")
 
 
 def percent(value):
@@ -181,9 +209,9 @@ def percent(value):
     return "unknown" if value is None or not isfinite(value) else f"{100.0 * value:.3g} %"
 
 
-def best_scene(search, name):
-    """Return the TOML text of the scene under the recommended setting, with comments on its error
-    and cost; None without one.
+def best_scene(search, name, folder="."):
+    """Return the TOML text of the scene under the recommended setting, for a file in a folder, with
+    comments on its error and cost; None without one.
     """
     best = search.best()
     if best is None:
@@ -191,12 +219,12 @@ def best_scene(search, name):
     run, error = search.observations[best], search.error_of(best)
     quantities = ", ".join(search.quantities)
     head = [
-        f"# {name}, with the setting that `mpm-ref trade` recommends: {best.text}",
-        f"# Error asked: {percent(search.error)} of {quantities}, until t = "
+        f"{name}, with the setting that `mpm-ref trade` recommends: {best.text}",
+        f"Error asked: {percent(search.error)} of {quantities}, until t = "
         f"{search.horizon():.4g} s.",
-        f"# Expected error: {percent(error)}; the reference's own: "
+        f"Expected error: {percent(error)}; the reference's own: "
         f"{percent(search.reference_error())}.",
-        f"# Cost: {run.cost.cpu:.3g} s of CPU time, {run.cost.steps} steps, "
+        f"Cost: {run.cost.cpu:.3g} s of CPU time, {run.cost.steps} steps, "
         f"{run.cost.particles} particles.",
     ]
-    return "\n".join([*head, "", dumps(scene_at(search.scene, best, search.others))])
+    return scene_text(head, scene_at(search.scene, best, search.others), folder)

@@ -3,11 +3,11 @@
 Time step and particles follow the grid. Until each time t, E is the largest difference of two
 successive grids so far, and p = log2(E_coarse/E_fine) the observed order of the last three grids.
 The reference is the Richardson extrapolation q + (q - q_coarser)/(2^p - 1), and its error the grid
-convergence index F E/(2^p - 1) [Roache1994]: with F = 1.25 if the orders of the last four grids
-agree, else with F = 3 and p at most 1, without extrapolation. p is at most 2. Where p is below 0.5
-the runs show no convergence: the reference is that on the finest grid, and its error three times
-the larger of the two last differences [EcaHoekstra2014]. Errors are relative to the largest change
-of the quantity until t.
+convergence index F E/(2^p - 1) [Roache1994]: with F = 1.25 and p at most 2 if the orders of the
+last four grids agree (of three grids: if it is at most 3, since a larger one may be an accident),
+else with F = 3 and p at most 1, without extrapolation. Where p is below 0.5 the runs show no convergence: the reference is that
+on the finest grid, and its error three times the larger of the two last differences
+[EcaHoekstra2014]. Errors are relative to the largest change of the quantity until t.
 """
 
 from dataclasses import dataclass, replace
@@ -77,10 +77,11 @@ def observed_order(pairs, scale):
     if len(pairs) < 2:
         return np.zeros(len(scale)), np.zeros(len(scale), dtype=bool)
     orders = [log_ratio(coarse, fine, scale) for coarse, fine in pairwise(pairs)]
+    last = orders[-1]
     if len(orders) < 2:
-        return orders[-1], orders[-1] >= LEAST
-    agree = np.abs(orders[-1] - orders[-2]) <= AGREEMENT
-    return orders[-1], agree & (np.minimum(orders[-1], orders[-2]) >= LEAST)
+        return last, (last >= LEAST) & (last <= MOST + AGREEMENT)
+    agree = np.abs(last - orders[-2]) <= AGREEMENT
+    return last, agree & (np.minimum(last, orders[-2]) >= LEAST)
 
 
 def log_ratio(coarse, fine, scale):

@@ -12,6 +12,7 @@ A setting that fails has its outcome recorded.
 
 from dataclasses import dataclass, field
 
+import msgspec
 import numpy as np
 
 from ..scene import SceneError
@@ -35,6 +36,7 @@ HOPELESS = 3.0              # times the best cost, after which a candidate's run
 BEST_SINGLES = 4            # whose pairs are tried
 PERTURBED = "perturbed"     # label of the perturbed run
 ALTERNATIVE = {"mls": "apic", "apic": "mls", "flip": "apic", "pic": "apic"}
+IMPLICIT_ALTERNATIVE = {"apic": "flip", "flip": "apic", "pic": "apic"}  # MLS has no implicit step
 
 
 @dataclass
@@ -52,6 +54,7 @@ class TradeSearch:
     references: dict = field(default_factory=dict)      # text: QuantityReference
     levels: tuple = ()                  # factors of dx of the reference
     chaos: float = np.inf               # [s] from which a perturbed run diverges
+    compared_with: str | None = None    # another transfer, which the references' errors include
 
     def run(self):
         """Make all runs."""
@@ -62,8 +65,15 @@ class TradeSearch:
         self.walk(self.promising_pairs())
 
     def singles(self):
-        """Return the settings that change one knob."""
-        return [*single_knobs(self.scene), *(setting(scene=name) for name in self.others)]
+        """Return the settings that change one knob, each scene once: 0.5 and 2/3 of two points per
+        cell are one.
+        """
+        scenes = {}
+        for chosen in single_knobs(self.scene):
+            scene = self._scene_at(chosen)
+            key = chosen if isinstance(scene, SceneError) else msgspec.json.encode(scene)
+            scenes.setdefault(key, chosen)
+        return [*scenes.values(), *(setting(scene=name) for name in self.others)]
 
     # the reference
 
@@ -135,14 +145,17 @@ class TradeSearch:
         It runs on the second finest grid; the error that it would have on the finest one, at the
         observed order, is a second estimate of how far the reference is from the solution.
         """
-        other = ALTERNATIVE[self.scene.step_scheme.transfer]
+        explicit = self.scene.integrator == "explicit"
+        others = ALTERNATIVE if explicit else IMPLICIT_ALTERNATIVE
+        other = others[self.scene.step_scheme.transfer]
         if len(self.levels) < 3 or self.scene.scheme.degree == 1:
             return
         chosen = setting(dx=self.levels[-2], transfer=other)
         self.observe([chosen], most_cpu=np.inf)
         run = self.observations[chosen]
-        for text, reference in self.references.items():
-            if run.finished:
+        if run.finished:
+            self.compared_with = other
+            for text, reference in self.references.items():
                 shrunk = reference.error_of(run.values[text]) / 2.0**np.clip(reference.order, 0, 2)
                 self.references[text] = reference.raised(shrunk)
 
@@ -150,6 +163,8 @@ class TradeSearch:
     def last(self):
         """Return the index of the last time until which all quantities asked for are known to half
         the error, the finest grid keeps it, and no chaos has begun; 0 where there is none.
+
+        What is asked for at the end has no other time than that.
         """
         if not self.references:
             return 0
@@ -157,7 +172,10 @@ class TradeSearch:
         reliable = reliable_times(references, REFERENCE_PART * self.error)
         finest = self.errors_of_run(self.observations[setting(dx=self.levels[-1])])
         kept = finest + np.max([one.error for one in references], axis=0) <= self.error
-        return int(np.max(np.flatnonzero(reliable & kept & (self.times < self.chaos)), initial=0))
+        known = reliable & kept & (self.times < self.chaos)
+        if any(OutputQuantity(text).at_end for text in self.quantities):
+            known[:-1] = False
+        return int(np.max(np.flatnonzero(known), initial=0))
 
     def horizon(self):
         """Return the time [s] until which all quantities asked for are known to half the error."""

@@ -6,7 +6,6 @@ knobs are taken from it.
 """
 
 from math import inf
-from pathlib import Path
 from typing import Annotated
 
 import msgspec
@@ -16,7 +15,9 @@ from ..scene import SceneError
 from ..sweep.observation import FINISHED
 from ..sweep.setting import setting
 
-Factor = Annotated[float, Meta(gt=0.0, le=1e6)]
+LARGEST = 64 << 20      # bytes of a stored answer
+Factor = Annotated[float, Meta(ge=1e-6, le=1e6)]
+NotNegative = Annotated[float, Meta(ge=0.0)]
 Word = Annotated[str, Meta(pattern=r"^[a-z0-9_. -]+$", max_length=40)]
 
 
@@ -44,20 +45,22 @@ class StoredRow(msgspec.Struct):
 
     setting: StoredSetting
     outcome: str
-    error: float | None
-    cpu: float | None
+    error: NotNegative | None
+    cpu: NotNegative | None
 
 
 class StoredReference(msgspec.Struct):
     """The entry of a reference that is read; None if it is not known."""
 
-    error: float | None
+    error: NotNegative | None
 
 
 class StoredAnswer(msgspec.Struct):
     """The entries of a file SCENE.trade.json that are read."""
 
     cells: Factor
+    until: NotNegative
+    end: NotNegative
     quantities: Annotated[list[str], Meta(min_length=1)]
     references: dict[str, StoredReference]
     rows: list[StoredRow]
@@ -73,13 +76,25 @@ class StoredAnswer(msgspec.Struct):
 def read_answer(path):
     """Return the `StoredAnswer` in a file SCENE.trade.json. Raises SceneError for another file."""
     try:
-        return msgspec.json.decode(Path(path).read_bytes(), type=StoredAnswer)
+        with open(path, "rb") as file:
+            text = file.read(LARGEST + 1)
+        if len(text) > LARGEST:
+            raise SceneError(f"{path}: over {LARGEST >> 20} MB; expected the answer that `mpm-ref "
+                             "trade` writes")
+        return msgspec.json.decode(text, type=StoredAnswer)
     except OSError as fault:
         raise SceneError(f"{path}: {fault.strerror}; expected the answer that `mpm-ref trade` "
                          "writes for the similar scene") from None
     except (msgspec.DecodeError, UnicodeDecodeError) as fault:
         raise SceneError(f"{path}: not an answer of `mpm-ref trade` ({fault}); run it on the "
                          "similar scene") from None
+
+
+def require_same_quantities(answer, quantities, name):
+    """Raise SceneError unless a stored answer is about the quantities asked for."""
+    if sorted(answer.quantities) != sorted(quantities):
+        raise SceneError(f"{name}: its answer is about {', '.join(answer.quantities)}; asked is "
+                         f"{', '.join(quantities)}: name the same by --quantity")
 
 
 def cheapest_row(answer, error):

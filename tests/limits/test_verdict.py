@@ -116,7 +116,7 @@ def test_coarse_run_that_fails_leaves_it_to_the_fine_one():
 def test_numerical_axes_are_compared_with_the_scene_as_given(own, outcome):
     verdict, judge = verdict_on({"time_step": 0.5}, **{"time_step x 0.5": own})
     assert (verdict.outcome, verdict.reference) == (outcome, AS_GIVEN)
-    assert len(judge.runs.requests) == 4
+    assert len(judge.runs.requests) == 3
 
 
 def test_mixed_cell_is_compared_with_its_physical_problem():

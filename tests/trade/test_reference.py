@@ -43,6 +43,14 @@ def test_an_order_above_two_is_not_believed():
     assert reference.error[-1] == pytest.approx(1.25 / 3.0 * reference.differences[-1])
 
 
+def test_an_order_of_three_grids_that_is_too_large_is_an_accident():
+    reference = reference_of(levels(4.0, n=3))
+    assert reference.error[-1] == pytest.approx(3.0 * reference.differences[-1])
+    assert (reference.values == levels(4.0, n=3)[-1]).all()
+    safe = reference_of(levels(2.9, n=3))
+    assert safe.error[-1] == pytest.approx(1.25 / 3.0 * safe.differences[-1])
+
+
 @pytest.mark.parametrize("order", [0.3, 0.1, -0.5])
 def test_without_convergence_the_error_is_three_times_the_spread(order):
     runs = levels(order)

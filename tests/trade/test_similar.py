@@ -12,7 +12,7 @@ from mpm_ref.sweep.setting import KNOBS, setting
 from mpm_ref.trade.similar import StoredSetting, carried_over, cheapest_row, read_answer
 
 ANSWER = {
-    "cells": 10.0, "quantities": ["positions"], "references": {"positions": {"error": 0.01}},
+    "cells": 10.0, "until": 0.2, "end": 0.2, "quantities": ["positions"], "references": {"positions": {"error": 0.01}},
     "rows": [
         {"setting": {}, "outcome": "finished", "error": 0.0, "cpu": 4.0},
         {"setting": {"dx": 2.0, "cfl": 0.9}, "outcome": "finished", "error": 0.02, "cpu": 1.0},
