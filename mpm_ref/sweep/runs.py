@@ -72,6 +72,11 @@ class SceneRuns:
         observations |= {label: new[runs[key][0]] for label, key in keys.items()}
         return {label: observations[label] for label in requests}
 
+    def has(self, request):
+        """Return whether a `RunRequest` needs no run: it is stored, or refused."""
+        run = self._run_of(request)
+        return isinstance(run, RunObservation) or self._store.get(run) is not None
+
     def _run_of(self, request):
         """Return the `ObservedRun` of a request, or the observation of one that is refused."""
         try:

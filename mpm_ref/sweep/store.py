@@ -22,7 +22,7 @@ PACKAGE = Path(__file__).resolve().parents[1]
 COMPUTES = ("core", "hot", "materials", "sampling", "scene", "shapes", "sweep", "*.py")
 TEXTS = ("outcome", "message", "until")
 UNREADABLE = (OSError, EOFError, ValueError, KeyError, TypeError, AttributeError, MemoryError,
-              BadZipFile, zlib.error)       # of a damaged file
+              RuntimeError, BadZipFile, zlib.error)       # of a damaged file
 
 
 class RunStore:

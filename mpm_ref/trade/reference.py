@@ -5,9 +5,10 @@ successive grids so far, and p = log2(E_coarse/E_fine) the observed order of the
 The reference is the Richardson extrapolation q + (q - q_coarser)/(2^p - 1), and its error the grid
 convergence index F E/(2^p - 1) [Roache1994]: with F = 1.25 and p at most 2 if the orders of the
 last four grids agree (of three grids: if it is at most 3, since a larger one may be an accident),
-else with F = 3 and p at most 1, without extrapolation. Where p is below 0.5 the runs show no convergence: the reference is that
-on the finest grid, and its error three times the larger of the two last differences
-[EcaHoekstra2014]. Errors are relative to the largest change of the quantity until t.
+else with F = 3 and p at most 1, without extrapolation. Where p is below 0.5 the runs show no
+convergence: the reference is that on the finest grid, and its error three times the larger of the
+two last differences [EcaHoekstra2014]. Errors are relative to the largest change of the quantity
+until t.
 """
 
 from dataclasses import dataclass, replace

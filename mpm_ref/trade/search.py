@@ -89,7 +89,7 @@ class TradeSearch:
                                or self.horizon() < self.times[-1]):
             factor, before = self.levels[-1] / 2.0, self.horizon()
             expected = self.expected_cpu(setting(dx=factor))
-            if factor < self.finest or expected > REFERENCE_SHARE * self.runs.left:
+            if factor < self.finest or not self.fits(setting(dx=factor), expected):
                 break
             n = len(self.levels)
             self.observe([setting(dx=factor), *self.side_runs(expected)], most_cpu=np.inf)
@@ -97,6 +97,11 @@ class TradeSearch:
             is_no_better = before > 0.0 and self.horizon() <= before
             if len(self.levels) == n or (is_no_better and n >= GRIDS_OF_REFERENCE):
                 break
+
+    def fits(self, chosen, cpu):
+        """Return whether a setting of so much CPU time [s] fits into the budget, or is stored."""
+        return (cpu <= REFERENCE_SHARE * self.runs.left
+                or self.runs.has(RunRequest(self._scene_at(chosen))))
 
     def side_runs(self, cpu):
         """Return candidates that the other workers can run during a reference run of so much CPU

@@ -1,5 +1,6 @@
 import json
 
+import numpy as np
 import pytest
 from command_line import assert_told, mpm_ref
 from sweep_scenes import FLIGHT
@@ -141,6 +142,41 @@ def test_a_forged_answer_writes_no_scene(folder, tmp_path, knobs):
                    "--out", tmp_path)
     assert_told(done, 2)
     assert not list(tmp_path.glob("*.toml"))
+
+
+def test_a_similar_answer_about_another_quantity_is_refused(folder, tmp_path):
+    done = mpm_ref("trade", folder / "flight.toml", "--like", "flight", "--out", folder,
+                   "--quantity", "kinetic")
+    assert_told(done, 2, "flight: its answer is about positions; asked is kinetic")
+
+
+def test_a_similar_answer_measures_nothing(folder):
+    done = mpm_ref("trade", folder / "flight.toml", "--like", "flight", "--out", folder,
+                   "--compare", folder / "run.h5")
+    assert_told(done, 2, "--like flight: it measures nothing")
+
+
+def test_an_output_that_is_a_file_is_refused(folder, tmp_path):
+    (tmp_path / "file").write_text("")
+    done = mpm_ref("trade", folder / "flight.toml", "--out", tmp_path / "file", *FAST)
+    assert_told(done, 4, "this is no folder")
+
+
+def test_files_of_the_recommended_scene_are_named_from_its_folder(tmp_path):
+    (tmp_path / "scenes").mkdir()
+    np.savez(tmp_path / "scenes" / "points.npz",
+             x=np.random.default_rng(0).uniform(0.3, 0.7, (60, 2)), V0=np.full(60, 0.002))
+    shape = 'shape = { type = "sphere", center = [0.5, 0.7], radius = 0.25 }'
+    assert shape in FLIGHT
+    (tmp_path / "scenes" / "flight.toml").write_text(
+        FLIGHT.replace(shape, 'particles = { file = "points.npz" }'))
+    done = mpm_ref("trade", tmp_path / "scenes" / "flight.toml", "--out", tmp_path / "out",
+                   "--error", "20%", "--budget", "20s", "--workers", "1", "--quiet")
+    assert done.exit_code == 0, done.output
+    best = tmp_path / "out" / "flight.best.toml"
+    assert 'file = "../scenes/points.npz"' in best.read_text()
+    assert mpm_ref("run", best, "--out", tmp_path / "best.h5", "--steps", "2",
+                   "--quiet").exit_code == 0
 
 
 def test_without_a_budget_there_is_no_answer(folder, tmp_path):

@@ -135,6 +135,12 @@ def test_origin_shifts_everything_by_whole_cells(sand):
     assert "collider[0].shape.normal[1]" not in shifted
 
 
+def test_the_interval_of_frames_which_bounds_the_step_is_scaled():
+    scenes = scenes_of(SAND.replace("longest = 0.01", "longest = 0.01\ninterval = 0.002"))
+    tables = scenes.tables(cell_of({"time_step": 4.0}))
+    assert (tables["longest"], tables["interval"]) == (0.04, 0.008)
+
+
 def test_fixed_step_is_scaled_and_frames_follow():
     scenes = scenes_of(SAND.replace("cfl = 0.4\nlongest = 0.01", "dt = 0.001\ninterval = 0.002"))
     tables = scenes.tables(cell_of({"time_step": 4.0}))

@@ -91,6 +91,13 @@ def test_tolerance_is_twice_the_scenes_own_difference_or_the_error():
     assert judge_of(error=0.5).tolerance["positions"] == 0.5
 
 
+def test_a_quantity_that_is_no_number_is_no_reference():
+    values = np.array([[np.nan, np.nan], [1.0, 1.0]])
+    empty = RunObservation({"positions": values}, RunCost(1.0, 1.0, 10, 4, 1), FINISHED)
+    with pytest.raises(NoReference, match="positions is not a number at some time"):
+        judge_of(**{"as given": empty})
+
+
 def test_agreement_with_the_coarse_grid_suffices():
     verdict, judge = verdict_on({"density": 2.0}, **labels("density x 2", 3.0, 3.5))
     assert (verdict.outcome, verdict.reference) == (RIGHT, AT_COARSE)

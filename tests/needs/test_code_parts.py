@@ -189,6 +189,22 @@ def test_failure_of_the_process_is_one_sentence(monkeypatch):
         code_parts(loads(DROP))
 
 
+def test_no_module_of_the_current_folder_is_loaded(drop, tmp_path, monkeypatch):
+    (tmp_path / "numba.py").write_text("raise SystemExit('a stranger')\n")
+    monkeypatch.chdir(tmp_path)
+    assert code_parts(loads(DROP.partition("[[collider]]")[0])) == drop
+
+
+def test_a_process_that_takes_too_long_is_one_sentence(monkeypatch):
+    monkeypatch.setattr(module, "LONGEST", 0.01)
+    with pytest.raises(RuntimeError, match=r"took over 0\.01 s"):
+        code_parts(loads(DROP))
+
+
+def test_without_scenes_there_is_no_table():
+    assert table_lines({}) == []
+
+
 def test_facts_are_plain(drop):
     assert CodeParts(**{name: drop.facts[name] for name in vars(drop)}) == drop
     assert drop.facts["stages"]["multigrid"] == []

@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 
+import msgspec
 import pytest
 from command_line import assert_told, mpm_ref
 from needs_toys import DROP, SCENE, variant_of
@@ -11,9 +12,15 @@ from offline_page import assert_holds, facts_of
 import mpm_ref.cli.needs as command
 from mpm_ref.needs.answer import lean_text, percent
 from mpm_ref.needs.removal import RemovalStudy
-from mpm_ref.scene import load
-from mpm_ref.sweep.observation import REFUSED, STOPPED, UNSTABLE, RunCost, RunObservation
-from mpm_ref.sweep.runs import CRASHED
+from mpm_ref.scene import digest, load, loads
+from mpm_ref.sweep.observation import (
+    CRASHED,
+    REFUSED,
+    STOPPED,
+    UNSTABLE,
+    RunCost,
+    RunObservation,
+)
 
 
 @pytest.fixture(scope="module")
@@ -144,18 +151,30 @@ def test_part_of_the_answer_ends_with_status_1(drop, monkeypatch):
     assert "about 7 s of CPU time more" in done.stdout
 
 
-def test_files_of_a_lean_scene_are_named_from_its_folder(drop, tmp_path, monkeypatch):
+def test_without_a_table_of_the_code_the_answer_is_written(drop, tmp_path, monkeypatch):
+    def fail(scene, store):
+        raise RuntimeError("the first steps failed")
+    monkeypatch.setattr(command, "code_parts", fail)
+    folder, _ = drop
+    done = mpm_ref("needs", folder / "drop.toml", "--budget", "5min", "--workers", "1", "--out",
+                   folder, "--quiet")
+    assert done.exit_code == 0, done.output
+    assert "no table of the code: the first steps failed" in done.stderr
+    assert "lean scene, drop.lean.toml" in done.stdout
+    assert json.loads((folder / "drop.needs.json").read_text())["code"] == {}
+
+
+def test_a_title_cannot_write_into_the_lean_scene(drop, monkeypatch):
     answers = []
     monkeypatch.setattr(command, "write_answer", lambda answer, out: answers.append(answer))
     folder, _ = drop
-    assert mpm_ref("needs", folder / "drop.toml", "--budget", "5min", "--workers", "1", "--out",
-                   folder, "--quiet").exit_code == 0
+    mpm_ref("needs", folder / "drop.toml", "--budget", "5min", "--workers", "1", "--out", folder,
+            "--quiet")
     answer, = answers
-    mesh = '{ type = "mesh", file = "shapes/cat.stl" }'
-    monkeypatch.setattr("mpm_ref.needs.answer.lists_and_tables",
-                        lambda scene: {"body": [{"shape": {"file": "shapes/cat.stl"}}]})
-    monkeypatch.setattr("mpm_ref.needs.answer.dumps", lambda scene: f"shape = {mesh}\n")
-    assert 'file = "../shapes/cat.stl"' in lean_text(answer, "results")
+    first = answer.result.first
+    scene = msgspec.structs.replace(first.scene, title="nice\n[evil]\nx = 1 #")
+    evil = replace(answer, result=replace(answer.result, first=replace(first, scene=scene)))
+    assert digest(loads(lean_text(evil, "."))) == digest(answer.result.lean.scene)
 
 
 @pytest.mark.parametrize(("share", "text"), [

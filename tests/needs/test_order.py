@@ -20,6 +20,7 @@ from mpm_ref.needs.removal import (
 )
 from mpm_ref.scene import SceneError
 from mpm_ref.sweep.observation import (
+    CRASHED,
     FINISHED,
     REFUSED,
     STOPPED,
@@ -29,7 +30,7 @@ from mpm_ref.sweep.observation import (
 )
 
 CPU = 100.0         # [s] of the scene as given
-ENDS = {"weak": UNSTABLE, "vital": REFUSED, "slow": STOPPED}
+ENDS = {"weak": UNSTABLE, "vital": REFUSED, "slow": STOPPED, "dark": CRASHED}
 
 
 @dataclass(frozen=True)
@@ -109,10 +110,10 @@ def verdicts(result):
 
 def test_verdicts():
     result, _ = result_of({"a": 0.5, "b": 0.009, "c": 0.001, "d": 0.001, "weak": 0.0, "vital": 0.0,
-                           "slow": 0.0, "broken": 0.0}, {"c": 0.5, "d": 1.5})
+                           "dark": 0.0, "slow": 0.0, "broken": 0.0}, {"c": 0.5, "d": 1.5})
     assert verdicts(result) == {
         "a": REQUIRED, "b": NOT_REQUIRED, "c": NOT_REQUIRED, "d": COSTLY, "weak": REQUIRED,
-        "vital": IMPOSSIBLE, "slow": COSTLY, "broken": IMPOSSIBLE}
+        "vital": IMPOSSIBLE, "dark": IMPOSSIBLE, "slow": COSTLY, "broken": IMPOSSIBLE}
     runs = {run.label: run for run in result.singles}
     assert runs["a"].changes == pytest.approx({"kinetic": 0.5})
     assert saving(runs["c"], result.cpu) == pytest.approx(0.5)

@@ -73,6 +73,13 @@ def test_largest_change_so_far_and_at_the_end(first):
     assert change["kinetic@end"].max() == 0.0
 
 
+def test_at_the_end_the_change_is_relative_to_the_largest(first):
+    swing = np.array([[0.0], [1.0], [0.1]])
+    base = RunObservation({"kinetic@end": swing}, RunCost(), FINISHED)
+    other = RunObservation({"kinetic@end": swing + [[0.0], [0.0], [0.05]]}, RunCost(), FINISHED)
+    assert changes(base, other, first, first)["kinetic@end"][-1] == pytest.approx(0.05)
+
+
 def test_run_that_stopped_changes_infinitely(first):
     base = np.arange(TIMES)[:, None] * 1.0
     run = base.copy()

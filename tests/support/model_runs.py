@@ -22,6 +22,9 @@ class ModelRuns:
         self.probes = (("disk", np.array([[0.25, 0.45], [0.75, 0.95]])),)
         self.fails, self.chaos = lambda text: False, 0.0
 
+    def has(self, request):
+        return False
+
     def observe(self, requests):
         return {label: self.run(label) for label in requests}
 

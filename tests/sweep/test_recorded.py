@@ -7,7 +7,13 @@ from mpm_ref.scene import SceneError
 from mpm_ref.store.results import BadResults, Results
 from mpm_ref.sweep.difference import largest_change
 from mpm_ref.sweep.observation import observe
-from mpm_ref.sweep.recorded import SHARE, at_times, cost_of, observe_results
+from mpm_ref.sweep.recorded import (
+    SHARE,
+    at_times,
+    cost_of,
+    observe_results,
+    require_same_problem,
+)
 
 FIXED = BOUNCE.replace("end = 0.3", "end = 0.3\ndt = 0.001\nevery = 30")
 QUANTITIES = ("positions", "centroid", "front:x+", "profile:y", "path:0.3,0.4",
@@ -67,6 +73,23 @@ def test_a_file_of_another_problem_is_refused(recorded, changes, words):
         observe_results(path, run._replace(**changes))
 
 
+def test_a_body_in_another_place_is_refused(recorded):
+    run, path = recorded
+    (name, X), = run.probes
+    observe_results(path, run._replace(probes=((name, np.asarray(X) + 0.05),)))
+    with pytest.raises(SceneError, match=r"no matter within 0\.1 m of where it is at the start"):
+        observe_results(path, run._replace(probes=((name, np.asarray(X) + 0.2),)))
+
+
+@pytest.mark.parametrize("times", [[], [0.0, 0.2, 0.1, 0.3], [0.0, 0.0, 0.3], [0.0, np.nan, 0.3]])
+def test_frames_need_increasing_times(recorded, times):
+    run, path = recorded
+    with Results(path) as results:
+        results.time = np.array(times)
+        with pytest.raises(SceneError, match="expected frames at increasing times"):
+            require_same_problem(results, run)
+
+
 def test_too_few_frames_are_refused(recorded):
     run, path = recorded
     between = run._replace(times=(0.0, 0.015, 0.3), quantities=("positions",))
@@ -89,7 +112,8 @@ def test_a_damaged_file_is_refused(recorded, tmp_path):
 
 
 @pytest.mark.parametrize("parts", [[], [{"why": "killed"}],
-                                   [{"cpu_s": 1.0, "wall_s": 1.0}, {"why": "killed"}]])
+                                   [{"cpu_s": 1.0, "wall_s": 1.0}, {"why": "killed"}],
+                                   [{"cpu_s": "1", "wall_s": 1.0}], [3], "parts"])
 def test_a_file_without_times_of_its_run_has_no_cost(recorded, parts):
     with Results(recorded[1]) as results:
         results.manifest = {"parts": parts}

@@ -50,6 +50,20 @@ def test_knobs_change_what_they_name():
         scene_at(scene, setting(eps=1e-3))
 
 
+@pytest.mark.parametrize(("keys", "factor", "longest"), [
+    ("longest = 0.01", 0.5, 0.005), ("longest = 0.01", 2.0, 0.02), ("interval = 0.02", 0.5, 0.01),
+    ("interval = 0.02", 2.0, None), ("longest = 0.01\ninterval = 0.004", 0.25, 0.001),
+    ("", 0.5, None), ("interval = 0.02", 1.0, None)])
+def test_the_bound_of_the_time_step_follows_the_grid(keys, factor, longest):
+    scene = scene_at(loads(f"{keys}\n{FLIGHT}"), setting(dx=factor))
+    assert scene.longest == longest
+    assert scene.interval == loads(f"{keys}\n{FLIGHT}").interval
+
+
+def test_a_step_by_cfl_has_no_other_bound():
+    assert scene_at(loads(f"longest = 0.01\n{FLIGHT}"), setting(cfl=0.9)).longest is None
+
+
 def test_another_scene_takes_the_same_knobs():
     other = loads(FLIGHT.replace("end = 0.2", "end = 0.2\ntitle = \"other\""))
     changed = scene_at(scene_of(FLIGHT), setting(scene="b", dx=0.5), {"b": other})

@@ -64,3 +64,18 @@ def test_a_damaged_file_counts_as_absent(tmp_path, damage):
     file.write_bytes(content[:len(content) // 2] if damage is None else damage)
     assert read(file) is None
     assert read(tmp_path / "absent.npz") is None
+
+
+def test_a_file_with_any_byte_changed_counts_as_absent_or_is_the_same(tmp_path):
+    content = packed(observation())
+    path = tmp_path / "run.npz"
+    for k in range(len(content)):
+        path.write_bytes(content[:k] + bytes([content[k] ^ 0x41]) + content[k + 1:])
+        stored = read(path)
+        assert stored is None or equal(stored, observation())
+
+
+@pytest.mark.parametrize("facts", ["[1]", "3", '"text"', "{}", '{"cost": 3}'])
+def test_facts_of_another_kind_count_as_absent(tmp_path, facts):
+    np.savez(tmp_path / "run.npz", facts=np.array(facts))
+    assert read(tmp_path / "run.npz") is None

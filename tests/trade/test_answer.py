@@ -8,7 +8,10 @@ from offline_page import HOSTILE, assert_holds
 from mpm_ref.cli.terminal import as_json
 from mpm_ref.scene import loads
 from mpm_ref.store.page import page_of
-from mpm_ref.trade.answer import answer_lines, answer_of, best_scene
+from mpm_ref.sweep.observation import STOPPED, RunCost, RunObservation
+from mpm_ref.sweep.runs import LATE
+from mpm_ref.sweep.setting import setting
+from mpm_ref.trade.answer import answer_lines, answer_of, best_scene, shortfall
 
 
 def facts_of(runs=None, error=0.01):
@@ -52,6 +55,36 @@ def test_without_an_answer_words_say_what_it_would_take():
     _, facts = facts_of(ModelRuns(left=20.0), error=1e-3)
     text = "\n".join(answer_lines(facts))
     assert re.search(r"a reference of 0\.05 % would take dx = \S+ m", text)
+
+
+def test_words_say_what_was_not_tried_and_not_checked():
+    search, facts = facts_of()
+    text = "\n".join(answer_lines(facts))
+    assert "not run within the budget" not in text
+    assert "no other transfer" not in text
+    late = RunObservation({}, RunCost(cpu=0.0), STOPPED, LATE)
+    search.observations[setting(cfl=0.1)] = late
+    search.compared_with = None
+    facts = json.loads(as_json(answer_of(search, "toy")))
+    text = "\n".join(answer_lines(facts))
+    assert "1 setting was not run within the budget" in text
+    assert "no other transfer was run on a fine grid" in text
+
+
+def test_words_name_the_reason_that_ends_what_is_known():
+    _, facts = facts_of()
+    facts["references"]["positions"]["error_at_end"] = 0.001
+    assert "the finest grid" in shortfall(facts)
+    assert "chaos" not in shortfall(facts)
+    assert shortfall(facts | {"chaos": 0.5}) == "chaos ends what can be known"
+
+
+def test_words_say_why_no_grid_finished():
+    runs = ModelRuns()
+    runs.fails = lambda text: True
+    _, facts = facts_of(runs)
+    text = "\n".join(answer_lines(facts))
+    assert "at least two grids must finish (the scene as given: refused: refused)" in text
 
 
 def test_words_say_until_when_the_advice_holds_and_what_is_known_longer():

@@ -161,6 +161,25 @@ def test_at_the_end_only_the_last_state_counts():
     assert search.error_of(chosen[1]) == search.error_of(chosen[0]) < 0.1
 
 
+def test_what_is_asked_at_the_end_holds_there_or_not_at_all():
+    runs = ModelRuns()
+    run = runs.run
+
+    def named(label):
+        done = run(label)
+        return replace(done, values={"positions@end": done.values["positions"]})
+    runs.run = named
+    search = TradeSearch(scene_of(FLIGHT), runs, ("positions@end",), TIMES, 0.01)
+    search.run()
+    assert search.horizon() == 1.0
+    runs.chaos = 0.02
+    search = TradeSearch(scene_of(FLIGHT), runs, ("positions@end",), TIMES, 0.01)
+    search.run()
+    assert search.chaos == 0.625
+    assert search.horizon() == 0.0
+    assert search.best() is None
+
+
 def test_a_setting_that_does_not_fit_the_scene_is_refused():
     observe = ModelRuns.observe
     runs = ModelRuns()
@@ -262,6 +281,35 @@ def test_another_family_raises_the_error_of_the_reference():
     assert search.references["positions"].error[-1] > 5.0 * own
 
 
+@pytest.mark.parametrize(("head", "other"), [
+    ("", "apic"), ('integrator = "hot"\n', "flip"),
+    ('integrator = "hot"\nscheme = { transfer = "flip" }\n', "apic")])
+def test_the_other_transfer_is_one_that_the_integrator_has(head, other):
+    search = TradeSearch(loads(head + FLIGHT), ModelRuns(), ("positions",), TIMES, 0.01)
+    search.start()
+    search.refine()
+    assert search.compared_with is None
+    search.compare_families()
+    assert search.compared_with == other
+    chosen = setting(dx=search.levels[-2], transfer=other)
+    assert chosen in search.settings()
+    assert not isinstance(search._scene_at(chosen), SceneError)
+
+
+def test_without_another_transfer_nothing_is_compared():
+    runs = ModelRuns()
+    runs.fails = lambda text: "apic" in text
+    search = search_of(runs)
+    search.run()
+    assert search.compared_with is None
+
+
+def test_knobs_that_give_the_same_scene_are_tried_once():
+    singles = search_of(ModelRuns()).singles()
+    assert setting(particles=0.5) in singles
+    assert setting(particles=2 / 3) not in singles      # both have one point per cell and axis
+
+
 def test_settings_of_another_scene_are_tried():
     runs, scenes = ModelRuns(), {}
     observe, other = runs.observe, loads(FLIGHT.replace("E = 1e4", "E = 2e4"))
@@ -324,10 +372,10 @@ def test_a_real_scene_keeps_the_error_against_the_exact_motion(tmp_path):
         error = np.sqrt(np.mean((best - exact.reshape(len(t), -1)) ** 2, axis=1))
         assert error.max() / search.references["positions"].scale[-1] <= 0.02
         assert search.horizon() == scene.end
-        count = runs.count
+        runs = SceneRuns(run, executor, RunStore(tmp_path), budget=0.0)     # all are stored
         again = TradeSearch(scene, runs, ("positions",), np.array(run.times), 0.02)
         again.run()
-        assert runs.count == count
+        assert again.levels == search.levels
         assert again.best() == search.best()
 
 

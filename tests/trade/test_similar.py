@@ -9,10 +9,18 @@ from hypothesis import strategies as st
 
 from mpm_ref.scene import SceneError
 from mpm_ref.sweep.setting import KNOBS, setting
-from mpm_ref.trade.similar import StoredSetting, carried_over, cheapest_row, read_answer
+from mpm_ref.trade import similar
+from mpm_ref.trade.similar import (
+    StoredSetting,
+    carried_over,
+    cheapest_row,
+    read_answer,
+    require_same_quantities,
+)
 
 ANSWER = {
-    "cells": 10.0, "until": 0.2, "end": 0.2, "quantities": ["positions"], "references": {"positions": {"error": 0.01}},
+    "cells": 10.0, "until": 0.2, "end": 0.2, "quantities": ["positions"],
+    "references": {"positions": {"error": 0.01}},
     "rows": [
         {"setting": {}, "outcome": "finished", "error": 0.0, "cpu": 4.0},
         {"setting": {"dx": 2.0, "cfl": 0.9}, "outcome": "finished", "error": 0.02, "cpu": 1.0},
@@ -41,6 +49,28 @@ def test_the_error_of_the_reference_counts(tmp_path, error, chosen):
 @pytest.mark.parametrize("references", [{}, {"positions": {"error": None}}])
 def test_without_a_known_reference_there_is_no_advice(tmp_path, references):
     assert cheapest_row(stored(tmp_path, ANSWER | {"references": references}), 0.9) is None
+
+
+def test_another_quantity_is_refused(tmp_path):
+    answer = stored(tmp_path, ANSWER)
+    require_same_quantities(answer, ("positions",), "other")
+    with pytest.raises(SceneError, match="about positions; asked is kinetic"):
+        require_same_quantities(answer, ("kinetic",), "other")
+
+
+@pytest.mark.parametrize("change", [
+    {"error": -3.0}, {"cpu": -1.0}, {"setting": {"dx": 1e-320}}, {"setting": {"dx": 1e7}}])
+def test_numbers_that_cannot_be_are_refused(tmp_path, change):
+    facts = json.loads(json.dumps(ANSWER))
+    facts["rows"][0] |= change
+    with pytest.raises(SceneError, match="not an answer"):
+        stored(tmp_path, facts)
+
+
+def test_a_file_that_is_too_large_is_not_read(tmp_path, monkeypatch):
+    monkeypatch.setattr(similar, "LARGEST", 100)
+    with pytest.raises(SceneError, match="expected the answer that `mpm-ref trade` writes"):
+        stored(tmp_path, ANSWER)
 
 
 def test_cells_over_the_body_carry_over(tmp_path):

@@ -127,8 +127,8 @@ def record_advice(run, case, answers):
     base, scale = f"trade.scenes.{case.scene}", f"{case.scene}, {WORKERS} runs at a time"
     aim = AIMS.get(case.scene, AIM)
     run.record(f"{base}.wall", sum(one.wall for one in answers), unit="s", comparator="<=",
-               bound=aim, scale=scale, note=f"both searches, for {' and '.join(case.asked)}, with a "
-               f"budget of {case.budget} each")
+               bound=aim, scale=scale, note=f"both searches, for {' and '.join(case.asked)}, with "
+               f"a budget of {case.budget} each")
     advised = [one for one in answers if one.setting]
     run.record(f"{base}.advised", len(advised), unit="errors", comparator=">=", bound=1,
                scale=scale, note="; ".join(sentence(one) for one in answers))
