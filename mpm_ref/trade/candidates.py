@@ -19,7 +19,8 @@ def single_knobs(scene):
     transfer = scene.step_scheme.transfer
     settings = [setting(cfl=value) for value in cfl]
     settings += [setting(particles=factor) for factor in PARTICLES]
-    settings += [setting(transfer=text) for text in TRANSFERS if text != transfer]
+    settings += [setting(transfer=text) for text in TRANSFERS
+                 if text != transfer and not (scene.integrator != "explicit" and text == "mls")]
     settings += [with_degree(degree, transfer) for degree in DEGREES
                  if degree != scene.scheme.degree]
     settings += [setting(sampling=kind) for kind in other_samplings(scene)]
