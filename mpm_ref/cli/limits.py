@@ -49,7 +49,8 @@ def measure(
     points per cell, size and place by factors over decades, one and two at a time. Writes
     SCENE.limits.json, the page SCENE.limits.html, and the figure SCENE.limits.png. Runs are stored
     in SCENE.trade: the same command with a larger budget goes on. Exit status: 0 an answer is
-    given, 1 the scene as given has no reference within the budget, 2 bad input, 130 Ctrl-C.
+    given, 1 the scene as given has no reference within the budget, 2 bad input, 4 a
+    file could not be written, 130 Ctrl-C.
     """
     with exit_on_errors():
         with options():

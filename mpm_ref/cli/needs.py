@@ -51,7 +51,7 @@ def find(
     quantities and the CPU time saved. Writes SCENE.needs.json, the page SCENE.needs.html, the
     figure SCENE.needs.png and the runnable scene SCENE.lean.toml. Runs are stored in SCENE.trade:
     the same command with a larger budget goes on. Exit status: 0 the answer, 1 part of it within
-    the budget, 2 bad input, 130 Ctrl-C.
+    the budget, 2 bad input, 4 a file could not be written, 130 Ctrl-C.
     """
     with exit_on_errors():
         with options():

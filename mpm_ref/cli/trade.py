@@ -14,7 +14,14 @@ from ..sweep.quantity import with_companions
 from ..sweep.recorded import observe_results
 from ..sweep.scene_text import scene_text
 from ..sweep.setting import scene_at
-from ..trade.answer import answer_lines, answer_of, best_scene, largest_extent, percent
+from ..trade.answer import (
+    answer_lines,
+    answer_of,
+    best_scene,
+    is_whole,
+    largest_extent,
+    percent,
+)
 from ..trade.figure import save_figure
 from ..trade.search import TradeSearch
 from ..trade.similar import (
@@ -76,7 +83,8 @@ def measure(
     Writes SCENE.trade.json, the page SCENE.trade.html, the figure SCENE.trade.png, and the runnable
     scene SCENE.best.toml.
     Runs are stored in SCENE.trade: the same command with a larger budget goes on. Exit status: 0
-    a setting is recommended, 1 none keeps the error within the budget, 2 bad input, 130 Ctrl-C.
+    a setting is recommended for the whole run, 1 none, or one until an earlier time, 2 bad input,
+    4 a file could not be written, 130 Ctrl-C.
     """
     with exit_on_errors():
         with options():
@@ -96,7 +104,7 @@ def measure(
         facts = json_loads(as_json(answer_of(search, path.stem, compared)))
         write_answer(search, facts, request)
         print(as_json(facts) if json else "\n".join(answer_lines(facts)))
-    raise typer.Exit(0 if facts["best"] is not None else NO_ANSWER)
+    raise typer.Exit(0 if facts["best"] is not None and is_whole(facts) else NO_ANSWER)
 
 
 def answer_from(like, record, observed, request):
@@ -118,7 +126,7 @@ def answer_from(like, record, observed, request):
                 f"{answer.end:.4g} s; nothing was measured on {request.stem}")
     text = scene_text([sentence], scene, request.out)
     write_bytes(request.out / f"{request.stem}.best.toml", text.encode())
-    print(sentence)
+    print(f"{sentence}\nwrote {request.out / request.stem}.best.toml")
     return 0
 
 

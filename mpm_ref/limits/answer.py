@@ -6,7 +6,7 @@ from math import inf, isfinite, log10
 from .. import __version__
 from ..preflight import misplaced
 from ..scene import build, digest
-from ..sweep.observation import STOPPED
+from ..sweep.observation import REFUSED, STOPPED
 from .axes import AXIS, MOST_LONGER, UP
 from .cell import cell_of, cell_text
 from .search import NARROW
@@ -90,10 +90,13 @@ def end_of(one):
 
 
 def nearest(directions):
-    """Return the facts of the direction with the least margin to a failure, or None."""
+    """Return the facts of the direction with the least margin to a failure, or None. A refusal
+    counts where nothing else fails: it warns before the run.
+    """
     failing = [one for one in directions if one["bad"] is not None
                and one["first_bad"]["outcome"] not in (STOPPED, UNCHECKED)]
-    return min(failing, key=lambda one: one["margin"], default=None)
+    return min(failing, key=lambda one: (one["first_bad"]["outcome"] == REFUSED, one["margin"]),
+               default=None)
 
 
 def map_facts(one):

@@ -6,7 +6,7 @@
     density     density of all bodies
     speed       initial velocities, and all displacements of parts in the times that they have
     gravity     gravity
-    friction    tangent of the friction angle of all flows
+    friction    tangent of the friction angle of all flows, and friction of colliders and walls
     yield       sigma_y and tau_y of all flows
     particles   points per cell and axis, whole numbers
     size        all lengths (see `geometry`); velocities, gravity and times stay
@@ -110,7 +110,9 @@ def scale_poisson(tables, factor, size):
 
 
 def scale_friction(tables, factor, size):
-    """Multiply the tangent of all friction angles."""
+    """Multiply the tangent of all friction angles, and the friction of colliders and walls."""
+    for part in (*tables["collider"], *tables["fixed"], tables.get("walls") or {}):
+        multiply(part, ("friction",), factor)
     for body in tables["body"]:
         angle = body["material"]["flow"].get("friction_angle")
         if angle is not None:
@@ -184,6 +186,14 @@ def flow_reading(*keys):
     return lambda tables: first(tables, lambda body: body["material"]["flow"], keys)
 
 
+def friction_reading(tables):
+    """Return the first friction angle, or else the friction of the first part that has some."""
+    parts = (*tables["collider"], *tables["fixed"], tables.get("walls") or {})
+    frictions = [part["friction"] for part in parts if part.get("friction")]
+    return (flow_reading("friction_angle")(tables)
+            or (f"friction = {frictions[0]:.6g}" if frictions else ""))
+
+
 def first(tables, part, keys):
     """Return "key = value" of the first body whose part has one of some keys, else ""."""
     values = [(key, part(body)[key]) for body in tables["body"] for key in keys
@@ -248,7 +258,7 @@ AXES = (
     ScaleAxis("speed", "the speed", scale_speed, speed_reading),
     ScaleAxis("gravity", "gravity", scale_gravity, gravity_reading),
     ScaleAxis("friction", "the friction (tangent)", scale_friction,
-              flow_reading("friction_angle")),
+              friction_reading),
     ScaleAxis("yield", "the yield stress", scale_yield, flow_reading("sigma_y", "tau_y")),
     ScaleAxis("particles", "the number of points per cell and axis", change_points, point_reading,
               is_numerical=True),
@@ -260,7 +270,8 @@ AXIS = {axis.name: axis for axis in AXES}
 ABSENT = {
     "time_step": "", "stiffness": "no material has E or lam", "poisson": "no material has nu",
     "density": "no body has a density", "speed": "nothing has a velocity of its own",
-    "gravity": "there is none", "friction": "no material has a friction angle",
+    "gravity": "there is none",
+    "friction": "no material has a friction angle, no collider friction",
     "yield": "no material has a yield stress", "particles": "all bodies are arrays",
     "origin": "", "size": "a body is an array of particles, whose lengths stand in a file",
 }

@@ -6,6 +6,9 @@ logarithm until it spans at most `NARROW`. A failure between two good rungs is n
 directions that have cost least so far go first, so that a small budget gives a coarse answer for
 all of them, and a fine one for what is refused at once.
 
+The farthest good factor of a direction must be right beside the grid of half the spacing. If it is
+not, the direction goes back to 1, and all its factors are compared with that grid.
+
 A bad factor whose run is too long or not checked ends its direction without halving: that is the
 end of what was looked at, no failure of the scene.
 """
@@ -39,6 +42,7 @@ class Direction:
     bad: float | None = None            # the nearest one that is not
     verdict: CellVerdict | None = None  # on the bad one
     is_late: bool = False               # whether the budget ended the search
+    by_fine_grids: bool = False         # whether agreement with coarse grids does not suffice
     cpu: float = 0.0                    # [s] of its runs so far
 
     @property
@@ -58,6 +62,21 @@ class Direction:
         if self.bad is None:
             return next(iter(self.rungs_left()), None)
         return sqrt(self.good * self.bad) if self.halvings() else None
+
+    @property
+    def is_unconfirmed(self):
+        """Return whether the farthest good factor is still to be compared with a fine grid."""
+        return not (self.by_fine_grids or self.is_late or self.good == 1.0)
+
+    def confirm(self, verdict):
+        """Take the verdict by a fine grid on the farthest good factor; where it is wrong, the
+        search begins anew between 1 and that factor.
+        """
+        self.by_fine_grids = True
+        if verdict is None:
+            self.is_late = True
+        elif not verdict.is_right and verdict.outcome != UNCHECKED:
+            self.good, self.bad, self.verdict = 1.0, self.good, verdict
 
     def rungs_left(self):
         """Return the rungs past the last good factor."""
@@ -140,18 +159,33 @@ class LimitsSearch:
 def explore(directions, judge, workers=1):
     """Move all directions on to their ends, first those that have cost least so far.
 
-    judge(cells) returns {cell: verdict}; see `verdict.CellJudge.judge`. workers: runs at a time.
+    judge(cells, by_fine_grids) returns {cell: verdict}; see `verdict.CellJudge.judge`.
+    workers: runs at a time.
     """
     while True:
         factors = [(one, factor) for one in sorted(directions, key=lambda one: one.cpu)
                    if (factor := one.next_factor()) is not None]
-        if not factors:
+        if not factors and not confirm(directions, judge):
             return
         factors = factors[:PER_WORKER * workers]
-        cells = [cell_of({one.axis.name: factor}) for one, factor in factors]
-        verdicts = judge(cells)
-        for (one, factor), cell in zip(factors, cells, strict=True):
-            one.note(factor, verdicts[cell])
+        for strict in (False, True):
+            chosen = [pair for pair in factors if pair[0].by_fine_grids == strict]
+            cells = [cell_of({one.axis.name: factor}) for one, factor in chosen]
+            verdicts = judge(cells, strict) if cells else {}
+            for (one, factor), cell in zip(chosen, cells, strict=True):
+                one.note(factor, verdicts[cell])
+
+
+def confirm(directions, judge):
+    """Compare the farthest good factors of directions with fine grids; return whether there were
+    any left.
+    """
+    chosen = [one for one in directions if one.is_unconfirmed]
+    cells = [cell_of({one.axis.name: one.good}) for one in chosen]
+    verdicts = judge(cells, True) if cells else {}
+    for one, cell in zip(chosen, cells, strict=True):
+        one.confirm(verdicts[cell])
+    return bool(chosen)
 
 
 def nearest_axes(directions, most=WIDEST):

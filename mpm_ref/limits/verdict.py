@@ -7,8 +7,9 @@ quantity, or with "@end" the last one, relative to its largest change during the
 * The tolerance of a quantity is the error asked, or twice the difference of the scene as given from
   itself at dx/2, whichever is larger: nobody expects of a changed scene what the scene as given
   does not have.
-* A cell is right if it differs from itself at 2 dx by at most the tolerance (the grids converge,
-  and the finer of them is nearer), which costs least. Otherwise itself at dx/2 decides.
+* A cell is right if it differs from itself at 2 dx by at most the tolerance, which costs least.
+  Otherwise itself at dx/2 decides; so it does of the farthest cell of each direction that is right,
+  since two coarse grids may agree by chance.
 * Cells that change numerical axes alone are compared with the scene as given at dx/2, which is one
   run for all of them; of shifted scenes the changes since the start are compared.
 * A cell is not checked where its run at dx/2 does not finish.
@@ -110,20 +111,35 @@ class CellJudge:
         return (f"; it may take {cpu * 2.0 ** (d + 1):.0f} s of CPU time (the scene as given took "
                 f"{cpu:.3g} s), and all limits about 100 times that: give a larger --budget")
 
-    def judge(self, cells):
-        """Return {cell: `CellVerdict`, or None where the budget ended first}."""
-        new = [cell for cell in dict.fromkeys(cells) if cell not in self.verdicts]
+    def judge(self, cells, by_fine_grids=False):
+        """Return {cell: `CellVerdict`, or None where the budget ended first}.
+
+        by_fine_grids: whether agreement with the coarse grid does not suffice.
+        """
+        new = [cell for cell in dict.fromkeys(cells)
+               if self.needs_verdict(cell, by_fine_grids)]
         runs = self._observe({cell: (cell, 1.0, self._most(1.0), cell_text(cell))
                               for cell in new})
         finished = [cell for cell in new if runs[cell].finished]
         for cell in new:
             if not runs[cell].finished:
                 self._note(cell, self._unfinished(runs[cell], self._most(1.0)))
-        for stage in (self._by_the_scene, self._by_coarse_grids, self._by_fine_grids):
+        stages = [self._by_the_scene, self._by_coarse_grids, self._by_fine_grids]
+        if by_fine_grids:
+            stages.remove(self._by_coarse_grids)
+        for stage in stages:
             for cell, verdict in stage({c: runs[c] for c in finished}).items():
                 self._note(cell, verdict)
                 finished.remove(cell)
-        return {cell: self.verdicts.get(cell) for cell in cells}
+        return {cell: None if self.needs_verdict(cell, by_fine_grids) else self.verdicts[cell]
+                for cell in cells}
+
+    def needs_verdict(self, cell, by_fine_grids):
+        """Return whether a cell has no verdict yet, or one by a coarse grid where a fine one is
+        asked for.
+        """
+        verdict = self.verdicts.get(cell)
+        return verdict is None or (by_fine_grids and verdict.reference == AT_COARSE)
 
     def _note(self, cell, verdict):
         if verdict is not None:

@@ -14,6 +14,7 @@ The suffix "@end" compares the last state alone, not the whole run. A difference
 largest change of the quantity during the reference run.
 """
 
+import difflib
 import re
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -60,7 +61,9 @@ class OutputQuantity:
         name, at, when = self.text.partition("@")
         kind, *arguments = name.strip().split(":")
         if kind not in SAMPLES or (at and when.strip() != "end"):
-            raise ValueError(f"quantity {self.text!r}: {EXPECTED}")
+            near = difflib.get_close_matches(kind, SAMPLES, 1)
+            hint = f"did you mean {near[0]}? " if near else ""
+            raise ValueError(f"quantity {self.text!r}: {hint}{EXPECTED}")
         object.__setattr__(self, "kind", kind)
         object.__setattr__(self, "arguments", tuple(argument.strip() for argument in arguments))
         object.__setattr__(self, "at_end", bool(at))
@@ -73,6 +76,8 @@ class OutputQuantity:
             return np.atleast_1d(SAMPLES[self.kind](snapshot, *self.arguments)).ravel()
         except TypeError:
             raise ValueError(f"quantity {self.text!r}: {EXPECTED}") from None
+        except ValueError as fault:
+            raise ValueError(f"quantity {self.text!r}: {fault}") from None
 
 
 def with_companions(texts, dim):
@@ -88,7 +93,7 @@ def named_bodies(snapshot, name):
     chosen = [body for body in snapshot.bodies if name in ("", body.name)]
     if not chosen:
         names = ", ".join(body.name for body in snapshot.bodies)
-        raise ValueError(f"quantity of body {name!r}: expected one of {names}")
+        raise ValueError(f"body {name!r}: expected one of {names}")
     return chosen
 
 
@@ -118,7 +123,7 @@ def region(snapshot, box):
     starts = np.concatenate(list(snapshot.starts.values()))
     inside = ((low <= starts) & (starts <= high)).all(axis=1)
     if not inside.any():
-        raise ValueError(f"quantity region:{box}: no probe starts in this box; expected a box that "
+        raise ValueError("no probe starts in this box; expected a box that "
                          "holds material")
     return np.concatenate(list(snapshot.probes.values()))[inside].mean(axis=0)
 
@@ -127,7 +132,7 @@ def front(snapshot, side, body=""):
     """Return the farthest material along an axis: the outermost particle and half its width."""
     axis, sign = axis_of(side[:-1], snapshot), {"+": 1.0, "-": -1.0}.get(side[-1:])
     if sign is None:
-        raise ValueError(f"quantity front:{side}: expected an axis with its side, such as x+")
+        raise ValueError("expected an axis with its side, such as x+")
     d = snapshot.problem.dim
     return sign * max(np.max(sign * b.particles.x[:, axis] + 0.5 * b.particles.V0 ** (1.0 / d))
                       for b in named_bodies(snapshot, body))
@@ -160,14 +165,14 @@ def impulse(snapshot, name):
     """Return the impulse (d,) of a part of the conditions on the matter since the start."""
     if name not in snapshot.impulses:
         names = ", ".join(snapshot.impulses) or "none; the scene has no collider, region or wall"
-        raise ValueError(f"quantity impulse:{name}: expected one of {names}")
+        raise ValueError(f"expected one of {names}")
     return snapshot.impulses[name]
 
 
 def mean(snapshot, name, box):
     """Return the mean of a field over the mass in a box; NaN where the box is empty."""
     if name not in FIELDS:
-        raise ValueError(f"quantity mean:{name}: expected one of {', '.join(FIELDS)}")
+        raise ValueError(f"expected one of {', '.join(FIELDS)}")
     low, high = corners(box, snapshot.problem.dim)
     top = bottom = 0.0
     for body in snapshot.bodies:

@@ -4,6 +4,7 @@ Between two frames a quantity is interpolated linearly in time. Particles that b
 the file carry the scene's probes along, with weights from their positions in its first frame.
 """
 
+from math import ceil, sqrt
 from typing import Annotated, NamedTuple
 
 import msgspec
@@ -120,9 +121,11 @@ def require_dense(path, series, error):
         second = np.diff(rows, 2, axis=0) if len(rows) > 2 else rows[-1:] - rows[:1]
         gap = np.max(np.sqrt(np.mean(second**2, axis=1))) / 8.0 / largest_change(rows)
         if gap > SHARE * error:
+            enough = ceil(len(rows) * sqrt(gap / (SHARE * error)))
             raise SceneError(f"{path}: {len(rows)} frames, between which {text} is known to "
                              f"{100.0 * gap:.2g} % only; expected at most {100.0 * SHARE:g} % of "
-                             "the error asked: store more of them (`interval` of the scene)")
+                             f"the error asked: about {enough} frames would do (`interval` of the "
+                             "scene)")
 
 
 def series_of(results, observed):

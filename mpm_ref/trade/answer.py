@@ -13,7 +13,7 @@ from ..sweep.setting import scene_at
 from .reference import LEAST
 from .search import REFERENCE_PART, without_grid
 
-USEFUL = 0.1        # error to which a quantity is known that is worth a line
+NOT_RUN = "not run"   # outcome of a setting that the budget left out
 
 
 def answer_of(search, name, compared=None):
@@ -75,8 +75,9 @@ def compared_row(search, file, run):
 def run_facts(search, run):
     """Return how a run ended, its errors and its cost."""
     errors = {text: search.error_of_run(run, (text,)) for text in search.references}
-    return {"outcome": run.outcome, "message": run.message, "error": search.error_of_run(run),
-            "errors": errors, "dominated": is_dominated(search, run), **vars(run.cost)}
+    return {"outcome": NOT_RUN if run.message == LATE else run.outcome, "message": run.message,
+            "error": search.error_of_run(run), "errors": errors,
+            "dominated": is_dominated(search, run), **vars(run.cost)}
 
 
 def is_dominated(search, run):
@@ -86,6 +87,11 @@ def is_dominated(search, run):
     error, cpu = search.error_of_run(run), run.cost.cpu
     return any(search.error_of(chosen) <= error and search.observations[chosen].cost.cpu < cpu
                for chosen in search.settings() if search.observations[chosen].finished)
+
+
+def is_whole(facts):
+    """Return whether the errors hold until the end of the run."""
+    return facts["until"] >= facts["end"] * (1.0 - 1e-9)
 
 
 # in words
@@ -98,7 +104,8 @@ def answer_lines(facts):
 
 def front_lines(facts):
     """Return the table of the settings on the front, and how many others there are."""
-    lines = [f"{'setting':44} {'error':>9} {'CPU [s]':>9} {'particles':>9} {'steps':>7}"]
+    lines = [] if is_whole(facts) else [f"errors until t = {facts['until']:.4g} s:"]
+    lines.append(f"{'setting':44} {'error':>9} {'CPU [s]':>9} {'particles':>9} {'steps':>7}")
     shown = [one for one in facts["rows"] if not one["dominated"] and one["error"] is not None]
     for one in shown:
         mark = "  <- recommended" if one["best"] else ""
@@ -139,7 +146,7 @@ def recommendation(facts):
     margin = max(facts["references"][text]["error"] for text in facts["quantities"])
     lines = [f"recommended: {best['text']}: error {percent(best['error'])} (the reference's own: "
              f"{percent(margin)}), {best['cpu']:.3g} s of CPU time"]
-    if facts["until"] < facts["end"] * (1.0 - 1e-9):
+    if not is_whole(facts):
         lines += companion_lines(facts)
         lines.append(f"this holds until t = {facts['until']:.4g} s of {facts['end']:.4g} s; for "
                      f"the whole run: {shortfall(facts)}")
@@ -148,7 +155,7 @@ def recommendation(facts):
 
 def caveats(facts):
     """Return what was not tried or not checked."""
-    late = sum(one["message"] == LATE for one in facts["rows"])
+    late = sum(one["outcome"] == NOT_RUN for one in facts["rows"])
     lines = [] if not late else [
         f"{counted(late, 'setting')} {'was' if late == 1 else 'were'} not run within the budget, "
         "among them perhaps a cheaper one; the same command with a larger --budget goes on"]
@@ -161,15 +168,15 @@ def caveats(facts):
 def compared_line(one):
     """Return the error and cost of a results file."""
     cost = "no CPU time given" if one["cpu"] is None else f"{one['cpu']:.3g} s of CPU time"
-    return (f"{one['text']}: error {percent(one['error'])}, {cost} with start and output"
-            + ("; a setting above is at most as wrong and cheaper" if one["dominated"] else ""))
+    return f"{one['text']}: error {percent(one['error'])}, {cost} with start and output"
 
 
 def companion_lines(facts):
     """Return how well other quantities are known over the whole run, where single paths are not."""
+    enough = REFERENCE_PART * facts["error"]
     others = {text: reference["error_at_end"] for text, reference in facts["references"].items()
               if text not in facts["quantities"] and reference["error_at_end"] is not None
-              and reference["error_at_end"] <= USEFUL}
+              and reference["error_at_end"] <= enough}
     if not others:
         return []
     texts = ", ".join(f"{text} to {percent(error)}" for text, error in others.items())

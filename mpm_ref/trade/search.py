@@ -27,6 +27,7 @@ from .reference import reference_of, reliable_times
 COARSEST, FINEST = 4.0, 1.0 / 64.0      # factors of dx on halved grids; the latter may be set
 AT_START = (4.0, 2.0, 1.0)
 GRIDS_OF_REFERENCE = 4      # at least, where the budget allows them
+PATIENCE = 1                # grids past one that did not make the reference better known
 REFERENCE_SHARE = 0.7       # of the time left that the next grid of the reference may take
 REFERENCE_PART = 0.5        # of the error asked, which the reference's own may be
 DIVERGED = 0.5      # of the error asked, by which a perturbed run shows chaos: that it has another
@@ -85,23 +86,29 @@ class TradeSearch:
 
     def refine(self):
         """Halve the grid until the reference is known, stops improving, or the budget says so."""
+        idle = 0                # grids since the last that made it better known
         while self.levels and (len(self.levels) < GRIDS_OF_REFERENCE
                                or self.horizon() < self.times[-1]):
-            factor, before = self.levels[-1] / 2.0, self.horizon()
-            expected = self.expected_cpu(setting(dx=factor))
-            if factor < self.finest or not self.fits(setting(dx=factor), expected):
+            chosen, n, before = setting(dx=self.levels[-1] / 2.0), len(self.levels), self.horizon()
+            if not self.is_next_grid(chosen, idle):
                 break
-            n = len(self.levels)
-            self.observe([setting(dx=factor), *self.side_runs(expected)], most_cpu=np.inf)
+            side_runs = self.side_runs(self.expected_cpu(chosen))
+            self.observe([chosen, *side_runs], most_cpu=np.inf)
             self.update_references()
-            is_no_better = before > 0.0 and self.horizon() <= before
-            if len(self.levels) == n or (is_no_better and n >= GRIDS_OF_REFERENCE):
+            idle = idle + 1 if 0.0 < self.horizon() <= before else 0
+            if len(self.levels) == n:
                 break
 
-    def fits(self, chosen, cpu):
-        """Return whether a setting of so much CPU time [s] fits into the budget, or is stored."""
-        return (cpu <= REFERENCE_SHARE * self.runs.left
-                or self.runs.has(RunRequest(self._scene_at(chosen))))
+    def is_next_grid(self, chosen, idle):
+        """Return whether a finer grid is run for the reference, after `idle` grids that did not
+        make it better known; one that is stored always is.
+        """
+        if chosen.get("dx") < self.finest:
+            return False
+        if self.runs.has(RunRequest(self._scene_at(chosen))):
+            return True
+        helps = idle <= PATIENCE or len(self.levels) < GRIDS_OF_REFERENCE
+        return helps and self.expected_cpu(chosen) <= REFERENCE_SHARE * self.runs.left
 
     def side_runs(self, cpu):
         """Return candidates that the other workers can run during a reference run of so much CPU

@@ -130,7 +130,7 @@ def test_the_scene_as_given_and_its_grids_are_runs_of_trade(falling, monkeypatch
 def test_small_budget_says_so_and_the_next_command_goes_on(tmp_path, monkeypatch):
     limit_to(monkeypatch, "time_step")
     with monkeypatch.context() as patch:
-        patch.setattr(CellJudge, "judge", lambda self, cells: dict.fromkeys(cells))
+        patch.setattr(CellJudge, "judge", lambda self, cells, *_: dict.fromkeys(cells))
         done, facts = limits(tmp_path, SCENE)
     assert done.exit_code == 0
     assert not facts["complete"]

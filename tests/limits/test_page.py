@@ -53,7 +53,7 @@ class SyntheticJudge:
         self.runs = SimpleNamespace(workers=1)
         self.verdicts, self.most = {(): self.verdict({})}, most
 
-    def judge(self, cells):
+    def judge(self, cells, by_fine_grids=False):
         for cell in cells:
             if cell not in self.verdicts and len(self.verdicts) < self.most:
                 self.verdicts[cell] = self.verdict(dict(cell))

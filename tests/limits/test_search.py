@@ -27,12 +27,14 @@ def direction(name, way=UP, steps=DECADES, discrete=False):
 class SyntheticJudge:
     """Verdicts and CPU times by functions of {axis's name: factor}; counts the rounds."""
 
-    def __init__(self, outcome, most=10**9, cpu=lambda factors: 1.0):
+    def __init__(self, outcome, most=10**9, cpu=lambda factors: 1.0, by_fine_grids=None):
         self.outcome, self.most, self.rounds, self.verdicts = outcome, most, 0, {}
-        self.cpu = cpu
+        self.cpu, self.by_fine_grids = cpu, by_fine_grids or outcome
 
-    def judge(self, cells):
+    def judge(self, cells, by_fine_grids=False):
         self.rounds += 1
+        if by_fine_grids:
+            return {cell: CellVerdict(self.by_fine_grids(dict(cell))) for cell in cells}
         for cell in cells:
             if cell not in self.verdicts and len(self.verdicts) < self.most:
                 self.verdicts[cell] = CellVerdict(self.outcome(dict(cell)),
@@ -79,7 +81,7 @@ def test_the_end_of_what_was_looked_at_is_no_failure(outcome):
     judge = SyntheticJudge(lambda f: RIGHT if f["stiffness"] < 50.0 else outcome)
     explore([one], judge.judge)
     assert (one.good, one.bad, one.failed) == (10.0, 100.0, False)
-    assert judge.rounds == 2
+    assert judge.rounds == 3        # two factors, and the fine grid of the first
 
 
 def test_discrete_axis_is_not_halved():
@@ -100,6 +102,31 @@ def test_end_of_the_budget_leaves_the_interval():
     explore([one], SyntheticJudge(lambda f: RIGHT if f["stiffness"] < 5.0 else WRONG, 2).judge)
     assert one.is_late
     assert (one.good, one.bad) == (pytest.approx(10.0**0.5), 10.0)
+
+
+@pytest.mark.parametrize("limit", [3.0, 50.0])
+def test_what_a_fine_grid_does_not_confirm_is_searched_anew(limit):
+    one = direction("stiffness")
+    judge = SyntheticJudge(lambda f: RIGHT if f["stiffness"] < 400.0 else WRONG,
+                           by_fine_grids=lambda f: RIGHT if f["stiffness"] < limit else WRONG)
+    explore([one], judge.judge)
+    assert one.good < limit <= one.bad < 1.1 * one.good
+    assert one.verdict.outcome == WRONG
+
+
+def test_what_a_fine_grid_confirms_stays():
+    one = direction("stiffness")
+    judge = SyntheticJudge(lambda f: RIGHT if f["stiffness"] < 400.0 else WRONG)
+    explore([one], judge.judge)
+    assert one.good < 400.0 <= one.bad < 1.1 * one.good
+    assert one.by_fine_grids
+
+
+def test_without_a_fine_grid_the_coarse_one_decides():
+    one = direction("stiffness")
+    explore([one], SyntheticJudge(lambda f: RIGHT if f["stiffness"] < 400.0 else WRONG,
+                                  by_fine_grids=lambda f: UNCHECKED).judge)
+    assert one.good < 400.0 <= one.bad
 
 
 def test_missing_cells_are_counted():

@@ -91,6 +91,15 @@ def test_tolerance_is_twice_the_scenes_own_difference_or_the_error():
     assert judge_of(error=0.5).tolerance["positions"] == 0.5
 
 
+def test_a_fine_grid_decides_where_it_is_asked_for():
+    judge = judge_of(**labels("density x 2", 3.0, 3.5, 9.0))
+    cell = cell_of({"density": 2.0})
+    assert judge.judge([cell])[cell].outcome == RIGHT
+    assert judge.judge([cell], by_fine_grids=True)[cell].outcome == WRONG
+    assert judge.verdicts[cell].reference == AT_FINE
+    assert judge.judge([cell])[cell].outcome == WRONG
+
+
 def test_a_quantity_that_is_no_number_is_no_reference():
     values = np.array([[np.nan, np.nan], [1.0, 1.0]])
     empty = RunObservation({"positions": values}, RunCost(1.0, 1.0, 10, 4, 1), FINISHED)

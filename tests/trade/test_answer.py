@@ -11,7 +11,14 @@ from mpm_ref.store.page import page_of
 from mpm_ref.sweep.observation import STOPPED, RunCost, RunObservation
 from mpm_ref.sweep.runs import LATE
 from mpm_ref.sweep.setting import setting
-from mpm_ref.trade.answer import answer_lines, answer_of, best_scene, shortfall
+from mpm_ref.trade.answer import (
+    NOT_RUN,
+    answer_lines,
+    answer_of,
+    best_scene,
+    is_whole,
+    shortfall,
+)
 
 
 def facts_of(runs=None, error=0.01):
@@ -57,6 +64,17 @@ def test_without_an_answer_words_say_what_it_would_take():
     assert re.search(r"a reference of 0\.05 % would take dx = \S+ m", text)
 
 
+def test_words_say_until_when_the_errors_of_the_table_hold():
+    _, facts = facts_of()
+    assert is_whole(facts)
+    assert not answer_lines(facts)[0].startswith("errors until")
+    runs = ModelRuns()
+    runs.chaos = 0.02
+    _, facts = facts_of(runs)
+    assert not is_whole(facts)
+    assert answer_lines(facts)[0] == "errors until t = 0.5 s:"
+
+
 def test_words_say_what_was_not_tried_and_not_checked():
     search, facts = facts_of()
     text = "\n".join(answer_lines(facts))
@@ -68,6 +86,7 @@ def test_words_say_what_was_not_tried_and_not_checked():
     facts = json.loads(as_json(answer_of(search, "toy")))
     text = "\n".join(answer_lines(facts))
     assert "1 setting was not run within the budget" in text
+    assert [row["outcome"] for row in facts["rows"]].count(NOT_RUN) == 1
     assert "no other transfer was run on a fine grid" in text
 
 
@@ -97,7 +116,7 @@ def test_words_say_until_when_the_advice_holds_and_what_is_known_longer():
     assert "from t = 0.625 s on a run perturbed by round-off diverges" in text
     assert "this holds until t = 0.5 s of 1 s" in text
     assert "over the whole run these are known: kinetic to " in text
-    facts["references"]["kinetic"]["error_at_end"] = 0.2
+    facts["references"]["kinetic"]["error_at_end"] = 0.006      # half of 1 % is asked for
     assert "these are known" not in "\n".join(answer_lines(facts))
 
 

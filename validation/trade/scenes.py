@@ -39,12 +39,12 @@ class TradeCase(NamedTuple):
 
 
 STANDARD = (
-    TradeCase("hello", "", "80s"),
-    TradeCase("hot_stiffness", "HOT", "7min", COARSE),
+    TradeCase("hello", "", "70s"),
+    TradeCase("hot_stiffness", "HOT", "6min", COARSE),
     TradeCase("ldm_torsion", "LDM", "5min"),
-    TradeCase("ldm_poke", "LDM workshop", "5min", COARSE),
-    TradeCase("nsf_jelly", "NSF", "5min"),
-    TradeCase("nclaw_jelly", "NCLaw", "5min"),
+    TradeCase("ldm_poke", "LDM workshop", "3min", COARSE),
+    TradeCase("nsf_jelly", "NSF", "4min"),
+    TradeCase("nclaw_jelly", "NCLaw", "4min"),
 )
 QUICK = (TradeCase("hello", "", "10s"),)
 
