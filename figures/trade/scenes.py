@@ -1,6 +1,7 @@
 """Answers of mpm-ref trade on shipped scenes: error of the positions, until the time to which they
 are known, against the CPU time of a run. Blue points are on the front: no cheaper setting is as
-accurate. The star is the setting recommended for 5 %, the ring the scene's own.
+accurate. The star is the setting recommended for the largest error that was asked, which its error
+and that of the reference keep together; the ring is the scene's own.
 """
 
 from math import ceil
@@ -20,7 +21,6 @@ def scale(results):
 
 def draw(results):
     table, advice = results.table(NEEDS[0], "points"), results.table(NEEDS[0], "advice")
-    loosest = advice["asked"].max()
     scenes = series(table, ("scene",))
     columns = min(COLUMNS, len(scenes))
     lines = ceil(len(scenes) / columns)
@@ -28,6 +28,7 @@ def draw(results):
     for ax in axes.flat[len(scenes):]:
         ax.axis("off")
     for ax, ((scene,), rows) in zip(axes.flat, scenes.items(), strict=False):
+        loosest = advice["asked"][advice["scene"] == scene].max()
         panel(ax, table, rows & (table["asked"] == loosest), loosest)
         one = (advice["scene"] == scene) & (advice["asked"] == loosest)
         until, end = advice["until"][one][0], advice["end"][one][0]
