@@ -98,7 +98,7 @@ def test_what_becomes_of_the_process_is_told(golden, mine, tmp_path, monkeypatch
     (tmp_path / "python").write_text(
         f"#!{sys.executable}\nimport os, sys\nfrom mpm_ref.store import foreign\n\n"
         f"def misbehave(*_):\n    {body}\n\nforeign.copy_arrays = misbehave\n"
-        "sys.exit(foreign.main(*sys.argv[3:6], int(sys.argv[6])))\n")
+        "sys.exit(foreign.main(*sys.argv[4:7], int(sys.argv[7])))\n")
     (tmp_path / "python").chmod(0o755)
     monkeypatch.setattr(foreign.sys, "executable", str(tmp_path / "python"))
     monkeypatch.setattr(foreign, "SECONDS", 1)
