@@ -247,7 +247,8 @@ def experiment_row(one):
                                        for name, kinds in COUNTED.items())))
     known, title = declared().get(one.section.id), cell(one.title)
     if known:
-        title = f"{{source}}`{one.title} <{source_of(known.function)}>`"
+        text = one.title.replace("`", "")        # a role's text holds no other markup
+        title = f"{{source}}`{text} <{source_of(known.function)}>`"
     return [f"[{cell(name_of(one))}](#{label(one)})", title, verdicts]
 
 
