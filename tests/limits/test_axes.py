@@ -93,6 +93,15 @@ def test_axis_multiplies_its_keys_alone(sand, name, paths):
     assert ratios(sand, {name: 1.7}) == {path: pytest.approx(1.7) for path in paths}
 
 
+def test_friction_of_colliders_and_walls_is_an_axis():
+    tables = {"body": [], "fixed": [], "collider": [{"friction": 0.2}, {"friction": 0.0}, {}],
+              "walls": {"friction": 0.5}}
+    assert AXIS["friction"].reading(tables) == "friction = 0.2"
+    AXIS["friction"].change(tables, 2.0, 1.0)
+    assert tables["collider"] == [{"friction": 0.4}, {"friction": 0.0}, {}]
+    assert tables["walls"] == {"friction": 1.0}
+
+
 def test_size_multiplies_lengths_alone(sand):
     changed = ratios(sand, {"size": 1.7})
     assert all(ratio == pytest.approx(1.7) for ratio in changed.values())
