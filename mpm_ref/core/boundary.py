@@ -226,15 +226,23 @@ def touch(nodes, shape, inside, region, pose):
 
     Their velocities are those of the rigid motion `pose`, the same one where the region follows it.
     """
-    d = nodes.m.ndim
+    return nodes_within(nodes, shape, inside, (region, pose), ON)[0]
+
+
+def nodes_within(nodes, shape, inside, poses, margin):
+    """The nodes inside a shape, or up to `margin` cells in front of it, and their signed distances
+    (K,) [cells]. poses is (region, pose) of `touch`.
+    """
+    d, (region, pose) = nodes.m.ndim, poses
     X = np.empty((len(nodes.flat), d))
     _pull_back_all(nodes, region, X)
     side = -1.0 if inside else 1.0
-    near = np.flatnonzero(side * distances(X, shape) <= ON * nodes.dx)
+    away = side * distances(X, shape)
+    near = np.flatnonzero(away <= margin * nodes.dx)
     n, v = side * normals(X[near], shape), np.empty((len(near), d))
     nodes = nodes._replace(flat=nodes.flat[near])
     _carry_all(nodes, region, pose, n, v)
-    return Touch(nodes.flat, n, v)
+    return Touch(nodes.flat, n, v), away[near] / nodes.dx
 
 
 def touch_wall(grid, axis, limit, below):

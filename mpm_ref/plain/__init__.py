@@ -9,7 +9,7 @@ values from Jacobi rotations, stresses from principal stretches. Every function 
 floating type, `np.longdouble` included.
 
 Read them in this order: `spline` (weights), `transfer` (the sums between particles and nodes),
-`laws` (elasticity), `flows` (plasticity), `boundary` (contact at the nodes), `step` (one explicit
-step), `potential` (what an implicit step minimises); `tensors` has the singular value
-decomposition.
+`laws` (elasticity), `flows` (plasticity), `boundary` (contact at the nodes), `surface` (contact
+between them), `step` (one explicit step), `potential` (what an implicit step minimises); `tensors`
+has the singular value decomposition.
 """

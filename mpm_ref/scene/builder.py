@@ -13,6 +13,7 @@ from ..body import AFFINE, Body, particles_at
 from ..core import motion as rigid
 from ..core.boundary import BoxWalls, Conditions, Prescribed
 from ..core.boundary import Collider as RigidCollider
+from ..core.surface import SurfaceConditions
 from ..hot.methods import METHODS, options_of
 from ..hot.step import check_scheme
 from ..materials import Material
@@ -212,6 +213,9 @@ def build_solver(scene):
         if part is not None and part.friction:
             raise SceneError(f"{name}.friction = {part.friction}: expected 0 with an implicit "
                              "integrator; friction has no potential")
+    if scene.boundary != "nodes":
+        raise SceneError(f"boundary = {scene.boundary!r}: expected \"nodes\" with an implicit "
+                         "integrator, whose constraints hold at nodes")
     return options_of(scene.integrator, **(scene.solver.given() if scene.solver else {}))
 
 
@@ -231,7 +235,8 @@ def build_conditions(scene):
     walls = _walls(scene.walls, scene.dim)
     if not colliders and not prescribed and walls is None:
         return None
-    return Conditions(colliders, prescribed, walls)
+    conditions = SurfaceConditions if scene.boundary == "surface" else Conditions
+    return conditions(colliders, prescribed, walls)
 
 
 def _collider(record, dim, path):

@@ -353,6 +353,7 @@ class Scene(Record, dict=True):
     collider: tuple[Collider, ...] = ()
     fixed: tuple[Fixed, ...] = ()
     walls: Walls | None = None
+    boundary: Literal["nodes", "surface"] = "nodes"     # where the conditions of colliders hold
     clip: Clip | None = None
     limits: Limits = Limits()
 

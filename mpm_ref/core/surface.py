@@ -1,0 +1,306 @@
+"""Conditions at the surface of a part, between the nodes: second order in dx.
+
+Nodes behind a wall carry the velocity that puts the wall's velocity v_w on its surface. Let node j
+lie at the signed distance d_j <= NEAR dx of a surface with the outward normal n, which meets it at
+the point x_j - d_j n, and let x_r be the point on the same normal at the distance D >= NEAR dx
+where it crosses the first plane of nodes. The velocity of the matter at the surface is the linear
+interpolation (d_j < 0) or extrapolation (d_j > 0)
+
+    u_j = (D v_j - d_j v(x_r)) / (D - d_j),     v(x_r) = sum_k w_k v_k
+
+with v(x_r) linear between the nodes of that plane. The rules of `contact` hold for u_j in place of
+the velocity of a node, with an impulse l_j for each node j that changes the nodal momenta by
+
+    m_i dv_i = a_ji l_j,                        u_j = sum_i a_ji v_i,   sum_i a_ji = 1
+
+so that the momentum and the moment of l_j act at the surface. All rules are satisfied at once, by
+projected Gauss-Seidel sweeps over the impulses in a fixed order, which converge for convex rules:
+
+    l_j <- P(l_j - (u_j - v_w) / sum_i a_ji^2 / m_i)
+
+where P is the identity (sticky), n n^T (slip), or the projection on the cone of Coulomb's law.
+Ghost values by mirrors and by extrapolation are common for grids [Mittal2008]; constraints in the
+metric of the nodal masses keep the step's momentum exact and its bound of the time step.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from .boundary import Conditions, nodes_with_mass, nodes_within, solve
+from .contact import NOSLIP, SEPARATE, SLIP, STICKY
+from .jit import CHUNKS, chunk, kernel, parallel, prange
+from .tensor import dot, fill, lin, norm, put_vec, vec
+
+NEAR = 0.75         # cells in front of a surface, up to which nodes carry its condition
+EDGE = 1e-6         # cells: nodes this near to NEAR do not, so that D - d >= 1 for those that do
+DEEP = 2.0          # cells behind a surface, out of reach of matter in front of it
+LIGHTEST = 1e-200   # [kg] least mass of a node, so that its inverse is finite
+SWEEPS = 200        # at most
+CLOSE = 1e-11       # of the largest speed: change of a velocity at the surface in the last sweep
+
+
+class SurfacePoints(NamedTuple):
+    """Points of surfaces at which conditions hold, each with the nodes that interpolate to it."""
+
+    node: np.ndarray      # (K, n)  index in the grid's flattened arrays; first the node behind
+    a: np.ndarray         # (K, n)  weight of each; 0 for a node that does not count
+    n: np.ndarray         # (K, d)  outward normal of the part
+    v: np.ndarray         # (K, d)  velocity of the part there [m/s]
+
+
+class Rules(NamedTuple):
+    """What holds at each point, and the inverse mass of its nodes."""
+
+    share: np.ndarray     # (K, n)  1/m [1/kg]; 0 for a node whose velocity is prescribed
+    kind: np.ndarray      # (K,)    PRESCRIBED .. SEPARATE, see `contact`
+    mu: np.ndarray        # (K,)    coefficient of friction
+
+
+@dataclass(frozen=True)
+class SurfaceConditions(Conditions):
+    """Conditions that hold at the surfaces of the colliders.
+
+    Prescribed regions and walls counted in nodes act on nodes, as in `Conditions`.
+    """
+
+    def apply(self, grid, t, dt):
+        """Change the velocities of an updated grid; see `Conditions.apply`."""
+        nodes, dim = nodes_with_mass(grid), grid.m.ndim
+        regions = [part.touch(nodes, t, dt) for part in self.prescribed]
+        J_regions = solve(regions, *rules_of(self.prescribed), grid)
+        walls = [] if self.walls is None else self.walls.touches(grid)
+        points = [surface_points(nodes, grid, part, (t, dt)) for part in self.colliders]
+        points += [node_points(wall, dim) for wall in walls]
+        rules = rules_of([*self.colliders, *[self.walls] * len(walls)])
+        J = satisfy(points, rules, [node for touch in regions for node in touch.node], grid)
+        count = len(self.colliders)
+        return np.concatenate((J[:count], J_regions, J[count:]))
+
+    def touched(self, grid, t, dt):
+        """Raise ValueError: a condition is not one of a single node."""
+        raise ValueError('boundary = "surface": expected "nodes" for the adjoint, the stages of an '
+                         "oracle and implicit steps, which know conditions at nodes alone")
+
+
+def rules_of(parts):
+    """Return the rule and the coefficient of friction of each part, two lists."""
+    return [part.rule for part in parts], [part.friction for part in parts]
+
+
+def surface_points(nodes, grid, part, time):
+    """Return the `SurfacePoints` of a collider in the step of length dt that ends at t; time is
+    (t, dt).
+    """
+    pose = part.motion.pose(*time, grid.m.ndim)
+    near, d = nodes_within(nodes, part.shape, part.inside, (pose, pose), NEAR - EDGE)
+    points = node_points(near, grid.m.ndim)
+    points.v[:] -= np.einsum("ab,kb,k->ka", pose.W[0], points.n, d * grid.dx)
+    _attach_all(points, d, grid.m)
+    return points
+
+
+def node_points(touch, dim):
+    """Return `SurfacePoints` at the nodes of a `Touch`."""
+    K, n = len(touch.node), 1 + 2 ** (dim - 1)
+    node, a = np.zeros((K, n), dtype=np.int64), np.zeros((K, n))
+    node[:, 0], a[:, 0] = touch.node, 1.0
+    return SurfacePoints(node, a, touch.n, touch.v)
+
+
+def satisfy(points, rules, prescribed, grid):
+    """Change grid.v to satisfy all parts; return the impulse of each, (P, d) [kg m/s].
+
+    points has one `SurfacePoints` for each part, rules its kinds and frictions (see `rules_of`);
+    the velocities of the nodes `prescribed`, indices in the flattened arrays, stay as they are.
+    """
+    d, sizes = grid.m.ndim, [len(p.node) for p in points]
+    if not sum(sizes):
+        return np.zeros((len(sizes), d))
+    every = SurfacePoints(*(np.concatenate(column) for column in zip(*points, strict=True)))
+    v = grid.v.reshape(-1, d)
+    m = np.maximum(grid.m.reshape(-1)[every.node], LIGHTEST)
+    share = np.where(every.a != 0.0, 1.0 / m, 0.0)
+    share[np.isin(every.node, prescribed)] = 0.0
+    kind, mu = (np.repeat(rule, sizes) for rule in rules)
+    kind = by_approach(every, kind, v)
+    J = np.zeros((len(kind), d))
+    solve_impulses(every, Rules(share, kind, mu.astype(float)), J, v, tuple(range(d)))
+    return np.array([part.sum(axis=0) for part in np.split(J, np.cumsum(sizes)[:-1])])
+
+
+def by_approach(points, kind, v):
+    """Return the kinds, where noslip is sticky for matter that approaches and else separate."""
+    u = np.einsum("kc,kca->ka", points.a, v[points.node]) - points.v
+    approaches = np.einsum("ka,ka->k", u, points.n) < 0.0
+    return np.where(kind == NOSLIP, np.where(approaches, STICKY, SEPARATE), kind)
+
+
+@kernel
+def steepest(n):
+    """Return the axis of the largest component of n."""
+    axis = 0
+    for b in range(1, len(n)):
+        if abs(n[b]) > abs(n[axis]):
+            axis = b
+    return axis
+
+
+@kernel
+def reference(x, d, n):
+    """Return the distance D and the point x_r on the first plane of nodes at D >= NEAR [cells], on
+    the normal n through the node x, which lies at the distance d; and the axis of that plane.
+    """
+    axis = steepest(n)
+    foot = lin(1.0, x, -d, n)
+    start = foot[axis] + NEAR * n[axis]
+    nearest = round(start)
+    if abs(start - nearest) > 1e-9:
+        nearest = np.ceil(start) if n[axis] > 0.0 else np.floor(start)
+    D = (nearest - foot[axis]) / n[axis]
+    return D, lin(1.0, foot, D, n), axis
+
+
+@kernel
+def corner(r, c, axis):
+    """Return corner c of the cell of a plane of nodes around r, and its weight for linear
+    interpolation in the plane.
+    """
+    k, w, bit = fill(0, r), 1.0, c
+    for b in range(len(r)):
+        whole = np.floor(r[b] + 1e-9)
+        part = max(r[b] - whole, 0.0)
+        if b == axis:
+            k = with_entry(k, b, round(r[b]))
+        else:
+            k = with_entry(k, b, whole + bit % 2)
+            w *= part if bit % 2 else 1.0 - part
+            bit //= 2
+    return k, w
+
+
+@kernel
+def with_entry(k, b, value):
+    """Return the integers k with another b-th entry."""
+    if len(k) == 2:
+        return int(value) if b == 0 else k[0], int(value) if b == 1 else k[1]
+    else:
+        return (int(value) if b == 0 else k[0], int(value) if b == 1 else k[1],
+                int(value) if b == 2 else k[2])
+
+
+@kernel
+def flat_index(k, shape):
+    """Return the index of node k in the flattened arrays of a grid, -1 outside of it."""
+    i = 0
+    for b in range(len(shape)):
+        if not 0 <= k[b] < shape[b]:
+            return -1
+        i = i * shape[b] + k[b]
+    return i
+
+
+@kernel
+def position_of(i, shape):
+    """Return the indices of a node, as floats, from that in the flattened arrays."""
+    if len(shape) == 2:
+        return float(i // shape[1]), float(i % shape[1])
+    else:
+        j = i // shape[2]
+        return float(j // shape[1]), float(j % shape[1]), float(i % shape[2])
+
+
+@kernel
+def attach(points, d, m, bounds):
+    """Nodes and weights of the points bounds[0] .. bounds[1] - 1; points.node[:, 0] and n are
+    given, d (K,) is the distance of that node [cells], m the nodal masses.
+
+    A point whose plane of reference has no mass, or too deep in the part, is the node itself.
+    """
+    shape, masses = m.shape, m.reshape(-1)
+    for j in range(bounds[0], bounds[1]):
+        x = position_of(points.node[j, 0], shape)
+        D, r, axis = reference(x, d[j], vec(points.n, j, shape))
+        total = 0.0
+        for c in range(points.a.shape[1] - 1):
+            k, w = corner(r, c, axis)
+            i = flat_index(k, shape)
+            if i >= 0 and w > 0.0 and masses[i] > 0.0:
+                points.node[j, 1 + c], points.a[j, 1 + c] = i, w
+                total += w
+        if total > 0.0 and d[j] >= -DEEP:
+            points.a[j, 0] = D / (D - d[j])
+            for c in range(1, points.a.shape[1]):
+                points.a[j, c] *= -d[j] / (D - d[j]) / total
+        else:
+            points.a[j, 0] = 1.0
+            points.a[j, 1:] = 0.0
+
+
+@kernel
+def velocity_at(points, j, v, like):
+    """u_j - v_w, u_j = sum_i a_ji v_i."""
+    u = vec(points.v, j, like)
+    u = lin(-1.0, u, 0.0, u)
+    for c in range(points.a.shape[1]):
+        if points.a[j, c] != 0.0:
+            u = lin(1.0, u, points.a[j, c], vec(v, points.node[j, c], like))
+    return u
+
+
+@kernel
+def projected_impulse(l, n, kind, mu):
+    """P(l): the nearest impulse that a part of this kind can give."""
+    if kind <= STICKY:
+        return l
+    normal = dot(l, n)
+    t = lin(1.0, l, -normal, n)
+    if kind != SLIP and normal < 0.0:
+        normal = 0.0
+    size, most = norm(t), mu * abs(normal)
+    scale = most / size if size > most else 1.0
+    return lin(normal, n, scale, t)
+
+
+@kernel
+def relax(points, rules, J, v, like):
+    """One sweep: improve the impulse J_j of each point and the nodal velocities v; returns the
+    largest change of a velocity at a surface.
+    """
+    worst = 0.0
+    for j in range(len(points.node)):
+        u, weight = velocity_at(points, j, v, like), 0.0
+        for c in range(points.a.shape[1]):
+            weight += points.a[j, c] ** 2 * rules.share[j, c]
+        if weight > 0.0:
+            before = vec(J, j, like)
+            l = projected_impulse(lin(1.0, before, -1.0 / weight, u), vec(points.n, j, like),
+                                  rules.kind[j], rules.mu[j])
+            put_vec(J, j, l)
+            dl = lin(1.0, l, -1.0, before)
+            worst = max(worst, weight * norm(dl))
+            for c in range(points.a.shape[1]):
+                i, share = points.node[j, c], points.a[j, c] * rules.share[j, c]
+                put_vec(v, i, lin(1.0, vec(v, i, like), share, dl))
+    return worst
+
+
+@kernel
+def solve_impulses(points, rules, J, v, like):
+    """Sweep until the velocities at the surfaces change by CLOSE of the largest; returns the number
+    of sweeps.
+    """
+    scale = 0.0
+    for j in range(len(points.node)):
+        scale = max(scale, norm(velocity_at(points, j, v, like)))
+    for k in range(SWEEPS):
+        if not relax(points, rules, J, v, like) > CLOSE * scale:
+            return k + 1
+    return SWEEPS
+
+
+@parallel
+def _attach_all(points, d, m):
+    for c in prange(CHUNKS):
+        attach(points, d, m, chunk(c, len(d)))
