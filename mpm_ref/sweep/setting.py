@@ -12,6 +12,7 @@ A setting is a dictionary of some of these knobs; what it leaves out stays as th
     transfer    "mls", "apic", "flip 0.95" (with its share of FLIP), "apic rpic 0.5", "pic", ...
     integrator  "explicit", or the word of an implicit method such as "hot-plus"
     eps         tolerance of an implicit step
+    boundary    "nodes" or "surface": where the conditions of colliders hold
 """
 
 import re
@@ -186,12 +187,16 @@ def change_transfer(tables, text):
 
 
 def change_integrator(tables, word):
-    """Step explicitly, or by an implicit method, whose transfer is APIC unless it is chosen."""
+    """Step explicitly, or by an implicit method, whose transfer is APIC unless it is chosen and
+    whose conditions hold at nodes.
+    """
     tables["integrator"] = word
     if word == "explicit":
         tables.pop("solver", None)
         tables.pop("longest", None)
-    elif tables["scheme"].get("transfer") in (None, "mls"):
+        return
+    tables["boundary"] = "nodes"
+    if tables["scheme"].get("transfer") in (None, "mls"):
         tables["scheme"]["transfer"] = "apic"
 
 
@@ -202,9 +207,16 @@ def change_eps(tables, eps):
     tables["solver"] = (tables.get("solver") or {}) | {"eps": eps}
 
 
+def change_boundary(tables, boundary):
+    """Impose the conditions of colliders at nodes or at their surface."""
+    if not tables.get("collider"):
+        raise SceneError(f"boundary = {boundary!r}: the scene has no collider")
+    tables["boundary"] = boundary
+
+
 CHANGES = {
     "dx": scale_dx, "particles": scale_particles, "sampling": change_sampling,
     "integrator": change_integrator, "cfl": change_cfl, "degree": change_degree,
-    "transfer": change_transfer, "eps": change_eps,
+    "transfer": change_transfer, "eps": change_eps, "boundary": change_boundary,
 }
 KNOBS = ("scene", *CHANGES)

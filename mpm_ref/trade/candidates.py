@@ -24,6 +24,8 @@ def single_knobs(scene):
     settings += [with_degree(degree, transfer) for degree in DEGREES
                  if degree != scene.scheme.degree]
     settings += [setting(sampling=kind) for kind in other_samplings(scene)]
+    if scene.collider and scene.integrator == "explicit":
+        settings += [setting(boundary="nodes" if scene.boundary == "surface" else "surface")]
     if scene.integrator != "explicit":
         solver = scene.solver
         given = TOLERANCES[-1] if solver is None or solver.eps is None else solver.eps

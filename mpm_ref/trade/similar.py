@@ -33,6 +33,7 @@ class StoredSetting(msgspec.Struct, forbid_unknown_fields=True):
     degree: int | UnsetType = UNSET
     transfer: Word | UnsetType = UNSET
     eps: Factor | UnsetType = UNSET
+    boundary: Word | UnsetType = UNSET
 
     def knobs(self):
         """Return {knob: value} of those that are set."""

@@ -1,7 +1,7 @@
 """Deflection of a cantilever, small against Timoshenko's beam and large against the elastica.
 
-The beam lies along x, gripped by sticky walls: its matter goes on for GRIP cells behind x = 0, and
-all nodes at x <= 0 rest. It is h = 1 m high and loaded by the force P, down, spread over the last
+The beam lies along x, gripped by sticky walls: its matter goes on for two cells behind x = 0, and
+all nodes at x <= 0 rest (`GRIPPED`). It is h = 1 m high and loaded by the force P, down, spread over the last
 half metre; the deflection is that of the middle of this part, at a = L - h/4. The load does not
 turn. The beam comes to rest by damping (see `settle`).
 
@@ -42,10 +42,18 @@ E, RHO0 = 1e6, 1000.0
 LAW = FixedCorotated(*lame(E, 0.0))
 EI, EA, GA = E / 12.0, E, 5.0 / 6.0 * LAW.mu        # of a section 1 m x 1 m [N m^2], [N], [N]
 SOUND = sqrt(stiffness(LAW) / RHO0)
-GRIP = 2            # cells of the beam behind the wall
 CFL = 0.5
 FIRST = 1.8751      # first root of cos b cosh b = -1: omega = b^2 sqrt(EI/(rho h))/L^2
-ON_WALL = Conditions(walls=BoxWalls((1, None), (None, None), "sticky"))
+
+
+class Support(NamedTuple):
+    """How a beam is clamped at x = 0."""
+
+    grip: int               # cells of the beam behind the wall
+    conditions: object      # see `core.boundary`
+
+
+GRIPPED = Support(2, Conditions(walls=BoxWalls((1, None), (None, None), "sticky")))
 
 
 class Beam(NamedTuple):
@@ -100,28 +108,28 @@ def timoshenko(load, length, EI, GA):
     return load * length**3 / (3.0 * EI) + load * length / GA
 
 
-def bent(beam, scheme, cells, waits, ramp=0.0):
+def bent(beam, scheme, cells, pace, support=GRIPPED):
     """Return the particles (N, 2) and the displacement (u, v) of the loaded end [m] at rest.
 
     scheme is (transfer, degree, particles per cell and direction); cells: number of cells over h;
-    waits, ramp: see `settle`.
+    pace: (waits, ramp) of `settle`.
     """
     transfer, degree, per = scheme
     dx = 1.0 / cells
-    X = lattice([-GRIP * dx, -0.5], [beam.length, 0.5], dx / per)
+    X = lattice([-support.grip * dx, -0.5], [beam.length, 0.5], dx / per)
     matter = body(X, dx / per, RHO0, LAW, transfer)
     load = np.zeros_like(X)
     load[X[:, 0] > beam.length - 0.5, 1] = -beam.load / (0.5 * RHO0)
     lowest = FIRST**2 * sqrt(EI / RHO0) / beam.length**2
-    stepper = Stepper(Scheme(degree, transfer), dx, 2, np.zeros(2), ON_WALL)
-    settle(matter, stepper, load, Pace(lowest, CFL * dx / SOUND, waits, ramp))
+    stepper = Stepper(Scheme(degree, transfer), dx, 2, np.zeros(2), support.conditions)
+    settle(matter, stepper, load, Pace(lowest, CFL * dx / SOUND, *pace))
     at_load = np.abs(X[:, 0] - beam.arm) < 0.5 * dx
     return matter.particles.x, (matter.particles.x - X)[at_load].mean(axis=0)
 
 
-def small_error(scheme, cells):
+def small_error(scheme, cells, support=GRIPPED):
     """Return the error of the deflection relative to Timoshenko's."""
-    _, (_, v) = bent(SMALL, scheme, cells, waits=12.0)
+    _, (_, v) = bent(SMALL, scheme, cells, (12.0, 0.0), support)
     return float(-v / timoshenko(SMALL.load, SMALL.arm, EI, GA) - 1.0)
 
 
@@ -130,7 +138,7 @@ def large_error(scheme, cells):
 
     The distance is relative to the deflection.
     """
-    places, (u, v) = bent(LARGE, scheme, cells, waits=8.0, ramp=2.0)
+    places, (u, v) = bent(LARGE, scheme, cells, (8.0, 2.0))
     x, y = elastica()[-1]
     return places, hypot(LARGE.arm + u - x, v - y) / abs(y)
 

@@ -58,6 +58,7 @@ class Slope(NamedTuple):
     theta: float
     phi: float
     tilted: bool                # the plane itself, not gravity in the grid's frame
+    boundary: str = "nodes"     # or "surface": where the condition of the plane holds
 
     @property
     def along(self):
@@ -125,6 +126,7 @@ def block_scene(slope, E, dx, sudden):
     plane = Collider(shape=HalfSpace(point=(0.0, 0.0), normal=tuple(slope.normal)),
                      kind="separate", friction=slope.friction)
     return Scene(dim=2, dx=dx, cfl=0.5, end=SETTLING, body=(block,), collider=(plane,),
+                 boundary=slope.boundary,
                  gravity=tuple(-slope.press * slope.normal if sudden else slope.gravity),
                  scheme=SceneScheme(transfer="pic"))
 
