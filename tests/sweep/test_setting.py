@@ -4,6 +4,7 @@ from sweep_scenes import BOUNCE, FLIGHT, scene_of
 
 from mpm_ref.scene import SceneError, build, digest, loads
 from mpm_ref.sweep.setting import in_seconds, scene_at, setting
+from mpm_ref.trade.candidates import single_knobs
 
 
 def particles(scene):
@@ -48,6 +49,18 @@ def test_knobs_change_what_they_name():
     assert scene_at(implicit, setting(eps=1e-3)).solver.eps == 1e-3
     with pytest.raises(SceneError, match="solves nothing"):
         scene_at(scene, setting(eps=1e-3))
+
+
+def test_boundary_is_a_knob_of_scenes_with_colliders():
+    scene = scene_of(BOUNCE)
+    at_surface = scene_at(scene, setting(boundary="surface"))
+    assert at_surface.boundary == "surface"
+    assert scene_at(at_surface, setting(integrator="hot-plus")).boundary == "nodes"
+    assert setting(boundary="surface") in single_knobs(scene)
+    with pytest.raises(SceneError, match="has no collider"):
+        scene_at(scene_of(FLIGHT), setting(boundary="surface"))
+    assert "boundary" not in {name for knob in single_knobs(scene_of(FLIGHT))
+                              for name, _ in knob.items}
 
 
 @pytest.mark.parametrize(("keys", "factor", "longest"), [

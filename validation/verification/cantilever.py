@@ -1,9 +1,9 @@
 """Deflection of a cantilever, small against Timoshenko's beam and large against the elastica.
 
 The beam lies along x, gripped by sticky walls: its matter goes on for two cells behind x = 0, and
-all nodes at x <= 0 rest (`GRIPPED`). It is h = 1 m high and loaded by the force P, down, spread over the last
-half metre; the deflection is that of the middle of this part, at a = L - h/4. The load does not
-turn. The beam comes to rest by damping (see `settle`).
+all nodes at x <= 0 rest (`GRIPPED`). It is h = 1 m high and loaded by the force P, down, spread
+over the last half metre; the deflection is that of the middle of this part, at a = L - h/4. The
+load does not turn. The beam comes to rest by damping (see `settle`).
 
 With nu = 0 a clamped end restrains no contraction, and the fixed corotated law is linear in Biot's
 strain, hence bends linearly, M = EI phi', up to any curvature: beam theory is all but exact.
