@@ -116,11 +116,20 @@ class Stepper:
         """
         if not 0.0 < dt < np.inf:
             raise ValueError(f"dt = {dt}: expected a positive, finite time in s")
+        grid = self.accelerate(bodies, dt)
+        self.constrain(grid, t, dt)
+        return grid
+
+    def accelerate(self, bodies, dt):
+        """Return the grid with the velocities that forces and gravity give it in dt [s]."""
         grid = scatter(bodies, self.storage, self.scheme, dt)
         update(grid, self.gravity, dt, self.scheme.mass_eps, self.scheme.gravity_on_empty)
+        return grid
+
+    def constrain(self, grid, t, dt):
+        """Apply the conditions to a grid, in the step from time t [s] by dt [s]."""
         if self.conditions is not None:
             self.conditions.apply(grid, t + dt, dt)
-        return grid
 
     def update_particles(self, bodies, grid, dt):
         """Update the bodies in place from the grid that `advance_grid` returned for them."""

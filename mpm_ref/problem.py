@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .core.stencil import inverse_inertia
+from .energy_budget import BudgetStepper, EnergyBudget
 from .explicit import Scheme, Stepper
 from .hot.methods import SolverOptions
 from .hot.step import ImplicitStepper
@@ -62,6 +63,7 @@ class Problem:
     integrator: str = "explicit"        # or "implicit"
     solver: SolverOptions | None = None     # of an implicit step; None: HOT's
     strain_bounds: dict = field(default_factory=dict)   # {body: strains of its laws' training}
+    budget: EnergyBudget | None = None  # to which an explicit run adds its steps
 
     def __post_init__(self):
         if not self.bodies:
@@ -71,10 +73,15 @@ class Problem:
                 f"cfl = {self.clock.cfl}: expected at most 1, the bound of the time step; past it "
                 "a run must say that it may be unstable"
             )
+        if self.budget is not None and self.integrator != "explicit":
+            raise ValueError(f"energy budget with the integrator {self.integrator!r}: expected "
+                             "'explicit'")
 
     def stepper(self):
         """Return a new stepper of the integrator. Raises ValueError for one that does not exist."""
         what = self.scheme, self.dx, self.dim, self.gravity, self.conditions
+        if self.budget is not None:
+            return BudgetStepper(self.budget, *what)
         if self.integrator == "explicit":
             return Stepper(*what)
         if self.integrator == "implicit":

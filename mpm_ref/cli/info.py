@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from .. import scene
+from ..energy_budget import Terms
 from ..nclaw.strain_watch import poor_law_warnings, time_step_warnings
 from ..preflight import misplaced
 from ..rom.model_file import is_model
@@ -174,7 +175,8 @@ def results_lines(facts):
     lines += rejected_line(facts["rejected"])
     if facts["reduced"]:
         lines.append(record.summary_line(facts["reduced"]))
-    lines += map(part_line, facts["manifest"].get("parts", []))
+    for part in facts["manifest"].get("parts", []):
+        lines += [part_line(part), *budget_line(part)]
     lines.append(f"checkpoint: {facts['checkpoint'] or 'none'}")
     return lines
 
@@ -191,6 +193,16 @@ def part_line(part):
     return (f"part: steps {part['first_step']} to {part['last_step']}, {part['wall_s']} s, "
             f"{size_text(part['peak_bytes'])}, state sha256 {part['state_sha256'][:12]}: "
             f"{part['why']}")
+
+
+def budget_line(part):
+    """Return the energy budget of a part of a run as a list of one line or none."""
+    budget = part.get("energy_budget")
+    if not budget:
+        return []
+    terms = ", ".join(f"{name} {budget[name]:+.4g}" for name in Terms._fields)
+    return [f"  energy {budget['first']:.6g} to {budget['last']:.6g} J, changed by: {terms} "
+            f"(gap {budget['gap']:.1g})"]
 
 
 def describe(

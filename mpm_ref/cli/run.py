@@ -6,7 +6,7 @@ Exit status: 0 finished, or stopped at --steps; 2 the scene, the options or the 
 
 import sys
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 from typing import Annotated
@@ -17,6 +17,7 @@ import typer
 from .. import scene
 from ..core.grid import OutOfRange
 from ..core.jit import set_threads
+from ..energy_budget import EnergyBudget
 from ..monitor import Unstable
 from ..simulate import last_step
 from ..store import checkpoint, running
@@ -43,6 +44,7 @@ from .terminal import COMPILING, as_json, compiling, passing, warn
 FIELDS = f"Fields to store, of {','.join(UNITS)} (default: {','.join(USUAL)})."
 EVERY = "Steps between checkpoints (default: one a minute)."
 RESULTS = "Results file (default: SCENE.h5)."
+BUDGET = "Sum which parts of the steps change the energy; see `mpm-ref info` on the results."
 GZIP = "Level of compression, 1 to 9 (default: none)."
 EXIT = {FINISHED: 0, AT_LIMIT: 0, INTERRUPTED: INTERRUPT, TERMINATED: 143}
 # The bar takes what the rest leaves of the line.
@@ -61,6 +63,7 @@ def run(
     checkpoint_every: Annotated[int | None, typer.Option(help=EVERY)] = None,
     fields: Annotated[str | None, typer.Option(help=FIELDS)] = None,
     gzip: Annotated[int | None, typer.Option(help=GZIP)] = None,
+    energy_budget: Annotated[bool, typer.Option("--energy-budget", help=BUDGET)] = False,
     json: Json = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress bar.")] = False,
 ):
@@ -78,8 +81,12 @@ def run(
             how = Options(steps, checkpoint_every, stored(fields, gzip), resume, overwrite,
                           record.seed)
             use_threads(threads)
+        problem = scene.build(record, str(path))
+        if energy_budget:
+            with options():
+                problem = replace(problem, budget=EnergyBudget())
         with Bar(Request(name, out, json, quiet)) as bar:
-            status = run_scene(scene.build(record, str(path)), bar, how)
+            status = run_scene(problem, bar, how)
         raise typer.Exit(status)
 
 

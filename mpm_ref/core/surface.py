@@ -51,7 +51,7 @@ class SurfacePoints(NamedTuple):
 
 
 class Rules(NamedTuple):
-    """What holds at each point, and the inverse mass of its nodes."""
+    """The rule of each point, and the inverse mass of its nodes."""
 
     share: np.ndarray     # (K, n)  1/m [1/kg]; 0 for a node whose velocity is prescribed
     kind: np.ndarray      # (K,)    PRESCRIBED .. SEPARATE, see `contact`

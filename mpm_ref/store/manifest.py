@@ -146,6 +146,7 @@ class RunPart:
     unsolved: int = 0
     strain_warnings: list = field(default_factory=list)      # sentences of `nclaw.strain_watch`
     cut_particle_steps: dict = field(default_factory=dict)   # {body: count}, see `learned.guard`
+    energy_budget: dict = field(default_factory=dict)       # [J], see `energy_budget`
     code: dict = field(default_factory=code)
     began: str = field(default_factory=now)
     wall_start: float = field(default_factory=time.perf_counter)
@@ -156,8 +157,8 @@ class RunPart:
 
         It says why and where the part ended, the resources used, the number of implicit steps that
         did not converge, the rejected and stalled steps of the whole run so far, the warnings about
-        strains, how often the guard of a learned law cut them, the sha256 of the last state, and
-        the code.
+        strains, how often the guard of a learned law cut them, the energy budget, the sha256 of the
+        last state, and the code.
         """
         return {
             "began": self.began,
@@ -174,6 +175,7 @@ class RunPart:
             "stalled": state.stalled,
             "strain_warnings": self.strain_warnings,
             "cut_particle_steps": self.cut_particle_steps,
+            "energy_budget": self.energy_budget,
             "state_sha256": digest,
             **self.code,
         }

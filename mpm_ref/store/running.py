@@ -309,6 +309,8 @@ class Session:
         if self.range is not None:
             self.part.cut_particle_steps = self.range.cut
             self.warn(self.range.summary())
+        if self.problem.budget is not None:
+            self.part.energy_budget = self.problem.budget.facts()
         facts = self.writer.manifest
         facts["parts"].append(self.part.ended(why, self.state, checkpoint.digest(self.state)))
         self.writer.put_manifest(facts)

@@ -47,7 +47,7 @@ FIRST = 1.8751      # first root of cos b cosh b = -1: omega = b^2 sqrt(EI/(rho 
 
 
 class Support(NamedTuple):
-    """How a beam is clamped at x = 0."""
+    """The clamp of a beam at x = 0."""
 
     grip: int               # cells of the beam behind the wall
     conditions: object      # see `core.boundary`

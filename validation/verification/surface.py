@@ -44,9 +44,7 @@ ORDER = {"paper": 2.0, "comparator": "band", "bound": (1.8, 2.3)}
 # the bar
 
 class Placement(NamedTuple):
-    """Where the bar stands: its angle to the x axis [degrees], and the offset of its end from a
-    node [cells].
-    """
+    """The angle of a bar to the x axis [degrees], and the offset of its end from a node [cells]."""
 
     angle: float
     offset: float
@@ -190,11 +188,11 @@ def record_bars(run, schemes):
                        "depth"), rows)
 
 
-def record_depth(run, id, depths, scale):
+def record_depth(run, name, depths, scale):
     """Record the largest depth on the finest grid, with a bound where the surface is meant."""
-    rule = {"paper": 0.0, "comparator": "<=", "bound": 0.05} if ".surface." in id else {
+    rule = {"paper": 0.0, "comparator": "<=", "bound": 0.05} if ".surface." in name else {
         "comparator": "info"}
-    run.record(f"verification.surface.{id}.depth", max(abs(row[-1]) for row in depths), unit="dx",
+    run.record(f"verification.surface.{name}.depth", max(abs(row[-1]) for row in depths), unit="dx",
                scale=scale, **rule,
                note="how far behind its surface the wall acts, the largest over the placements of "
                     "the table; bound: a twentieth of a cell")
