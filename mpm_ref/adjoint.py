@@ -36,6 +36,11 @@ class StepAdjoint:
                 f"a {type(stepper).__name__} is implicit: expected an explicit Stepper, the only "
                 "one that has an adjoint"
             )
+        if stepper.scheme.relaxation:
+            raise ValueError(
+                f"relaxation = {stepper.scheme.relaxation} has no adjoint: expected a scheme "
+                "without it"
+            )
         if stepper.conditions is not None and not hasattr(stepper.conditions, "touched"):
             raise ValueError(
                 f"conditions of type {type(stepper.conditions).__name__} have no adjoint: "

@@ -195,6 +195,11 @@ def test_what_has_no_adjoint_is_refused(options, said):
         empty_tape(**options)
 
 
+def test_relaxation_is_refused():
+    with pytest.raises(ValueError, match=r"relaxation = 0\.001 has no adjoint: expected a scheme"):
+        Tape(Stepper(Scheme(relaxation=1e-3), DX, 2, dive().gravity, FREE), dive().bodies)
+
+
 def test_an_implicit_stepper_is_refused():
     with pytest.raises(ValueError, match="ImplicitStepper is implicit: expected an explicit"):
         Tape(object.__new__(ImplicitStepper), dive().bodies)

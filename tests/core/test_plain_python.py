@@ -30,7 +30,7 @@ def off(a, b, scale=None):
 def distances(case):
     q, dt, g = cloud(case, np.random.default_rng(1), n=12), 0.03, np.arange(1.0, 1.0 + case.d)
     matter, ip, nodes = plain_grid(case, q, dt, g)
-    method = case.method._replace(rpic=0.3 if case.transfer in AFFINE else 0)
+    method = case.method._replace(rpic=0.3 if case.transfer in AFFINE and not case.relaxed else 0)
     moved = grid_to_particles(matter, ip, nodes, method, dt)
     grid = scattered(case, q, dt)
     found = [off(grid.m, over(grid, nodes.m, nodes.box))]
