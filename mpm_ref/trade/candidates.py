@@ -1,10 +1,7 @@
 """The settings that a search tries: single knobs, grids between the halved ones, and pairs."""
 
-from math import sqrt
-
 from ..body import AFFINE
-from ..materials import stiffness
-from ..scene.validate import check_scene
+from ..scene.crossing import crossing_time
 from ..sweep.setting import setting
 
 CFL, CELLS = (0.9, 0.5, 0.25), (0.9, 0.6, 0.3)      # of the explicit bound; of implicit steps
@@ -41,12 +38,9 @@ def relaxed_transfers(scene):
     """Return the affine transfers with the time in which a wave crosses a cell as relaxation, for
     explicit scenes whose bodies all have a density and a law that is no network.
     """
-    materials = (scene.parts or check_scene(scene)).materials
-    densities = [body.density for body in scene.body]
-    if scene.integrator != "explicit" or None in (*materials, *densities):
+    crossing = crossing_time(scene) if scene.integrator == "explicit" else None
+    if crossing is None:
         return []
-    crossing = scene.dx / max(sqrt(stiffness(law) / rho)
-                              for (law, _), rho in zip(materials, densities, strict=True))
     return [f"{name} relaxation {crossing:.3g}" for name in AFFINE]
 
 
