@@ -56,7 +56,7 @@ def test_knobs_change_what_they_name():
 
 @pytest.mark.parametrize("text", ["apic 0.5", "mls relaxation", "mls relaxation -1", "flip, 0.9"])
 def test_texts_that_are_no_transfer_are_refused(text):
-    with pytest.raises(SceneError, match="expected a text such as mls, flip 0.95"):
+    with pytest.raises(SceneError, match=r"expected a text such as mls, flip 0\.95"):
         scene_at(scene_of(BOUNCE), setting(transfer=text))
 
 

@@ -113,8 +113,7 @@ def bar_error(choice, cells, cfl):
     body, X, stepper = bar_between(-L, cells, choice)
     put_in_motion(body.particles, X, dt)
     shape, x0 = np.sin(BETA * X), body.particles.x[:, 0].copy()
-    omega = 2.0 / dt * asin(0.5 * OMEGA * dt)
-    size = V / OMEGA * cos(0.5 * OMEGA * dt) / cos(0.5 * omega * dt)
+    omega, size = euler_vibration(dt)
     worst = 0.0
     with threads_for([body]):
         for k in range(count):
@@ -122,6 +121,14 @@ def bar_error(choice, cells, cfl):
             u = size * sin(omega * (k + 1) * dt) * shape
             worst = max(worst, rms((body.particles.x[:, 0] - x0 - u)[:, None]))
     return worst * OMEGA / V
+
+
+def euler_vibration(dt):
+    """Return the frequency [1/s] and the amplitude [m] of symplectic Euler steps of length dt [s]
+    for u'' = -OMEGA^2 u with u = 0 at t = 0 and u' = V cos(OMEGA dt/2) at t = -dt/2.
+    """
+    omega = 2.0 / dt * asin(0.5 * OMEGA * dt)
+    return omega, V / OMEGA * cos(0.5 * OMEGA * dt) / cos(0.5 * omega * dt)
 
 
 def bar_between(start, cells, choice, conditions=None):
