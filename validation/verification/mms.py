@@ -51,6 +51,7 @@ class MmsRun(NamedTuple):
     dim: int = 2
     cfl: float = CFL
     crossings: float = 0.0      # relaxation of the transfer, in times dx/SOUND
+    rpic: float = 0.0           # damping of the strain rate in C
 
     @property
     def dt(self):
@@ -60,7 +61,8 @@ class MmsRun(NamedTuple):
     @property
     def scheme(self):
         """Return the `explicit.Scheme` of the run."""
-        return Scheme(self.degree, self.transfer, relaxation=self.crossings / (self.cells * SOUND))
+        relaxation = self.crossings / (self.cells * SOUND)
+        return Scheme(self.degree, self.transfer, rpic=self.rpic, relaxation=relaxation)
 
     @property
     def steps(self):

@@ -18,9 +18,9 @@ from ..common.registry import experiment
 from ..common.scenes import threads_for
 from .bar import BETA, LAW, OMEGA, PERIODS, RHO, SOUND, L, V, put_in_motion
 from .convergence import rms
-from .filter import CELLS, expected_rate, measured_rate
 from .lattice import ON_WALL, Periodic, fitted, strip
 from .mms import MmsRun, error
+from .mode_decay import CELLS, expected_rate, measured_rate
 from .rotation import ROUND_OFF, cube, disk, loss_per_step, spin_history
 from .sand_column import STEADY, SandColumn, collapse
 
@@ -85,7 +85,7 @@ def record_filter(run, choices):
             rows.append((choice.name, theta, ours, formula))
         run.record(f"verification.steps.filter.{choice.name}", worst, comparator="<=", bound=RATE,
                    scale=f"1 and 2 waves in {CELLS} cells, 2 x 2 particles per cell, 10 steps",
-                   note="decay rate per step without stress, relative to the formula of `filter`")
+                   note="decay rate per step without stress, relative to that of `mode_decay`")
     run.table("filter", ("transfer", "theta", "rate", "formula"), rows)
 
 

@@ -8,7 +8,7 @@ import pytest
 from mpm_ref.explicit import Scheme
 from mpm_ref.scene.crossing import crossing_time
 from validation.verification.bar import OMEGA, V
-from validation.verification.filter import CELLS, amplification, expected_rate, measured_rate
+from validation.verification.mode_decay import CELLS, amplification, expected_rate, measured_rate
 from validation.verification.rotation import disk
 from validation.verification.sand_column import SandColumn, column_scene
 from validation.verification.steps import ALL, MLS, TransferChoice, bar_between, euler_vibration
