@@ -256,7 +256,7 @@ def pull_back_one(world, before, after, bars, result, index):
     free = grid.v.copy()
     stop_at_walls(world, grid, free)
     stopped = Grid(grid.m, free, NONE, NONE, grid.origin, world.dx)
-    scatter_bars_mls3(Advection(particles.x, u), stopped, mine, bar, QUADRATIC,
+    scatter_bars_mls3(Advection(particles.x, u, NONE), stopped, mine, bar, QUADRATIC,
                       np.arange(len(world.m)))
     stop_at_walls(world, grid, bar.v)
     update_one(world, grid, bar)
