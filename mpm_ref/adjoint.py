@@ -43,7 +43,8 @@ class StepAdjoint:
             )
         self.scheme, self.gravity = stepper.scheme, stepper.gravity.copy()
         self.conditions = stepper.conditions
-        sizes = stepper.dx, self.scheme.stencil, len(self.gravity), self.scheme.transfer == "flip"
+        sizes = (stepper.dx, self.scheme.stencil, len(self.gravity),
+                 self.scheme.keeps_old_velocity)
         self.storage, self.storage_of_bars = Storage(*sizes), Storage(*sizes)
 
     def pull_back(self, bodies, bars, sums, t, dt):
@@ -76,26 +77,28 @@ class StepAdjoint:
         """Return L of the step (N, d, d); the body keeps its own."""
         q = body.particles
         L = np.empty_like(q.L)
-        C = L if q.L is q.C else np.empty_like(q.C)
+        C = L if q.L is q.C else q.C.copy()
         moved = body._replace(particles=q._replace(x=q.x.copy(), v=q.v.copy(), C=C, L=L))
         gather(moved, grid, self.scheme, dt)
         return L
 
     def _deform(self, body, L, bar, parts, dt):
-        """Compute the bars of F and y before the step, and of C and L, one array in MLS-MPM."""
+        """Compute the bars of F and y before the step, and of C and L, one array in MLS-MPM without
+        relaxation.
+        """
         deform_body_adjoint(body, L, bar, parts, dt)
         damp(body._replace(particles=bar), self.scheme)         # symmetric, hence its own adjoint
-        if self.scheme.transfer == "mls":
+        if self.scheme.one_gradient:
             bar.C[:] += bar.L
 
     def _transfer(self, bodies, bars, step, dt):
         """Pull bars of x, v, C, L after the step back to x, v, C, tau, m, V0, b before it."""
         scheme, (grid, free, touched) = self.scheme, step
         nodes = self.storage_of_bars.cover([body.particles.x for body in bodies])
-        how = Exchange(scheme.stencil, dt, scheme.flip, scheme.transfer == "mls")
+        how = Exchange(scheme.stencil, dt, scheme.share(dt), scheme.transfer == "mls")
         for body, bar in zip(bodies, bars):
-            x = body.particles.x
-            g2p_adjoint(x, grid, bar, nodes, how, slabs_of(x, grid, scheme.stencil))
+            slabs = slabs_of(body.particles.x, grid, scheme.stencil)
+            g2p_adjoint(body.particles, grid, bar, nodes, how, slabs)
         grid = grid._replace(v=free)
         solve_adjoint(touched, grid, nodes)
         options = Update(dt, scheme.mass_eps, scheme.gravity_on_empty)

@@ -55,7 +55,7 @@ def fault_of(problem, stepper, state, grid, dt):
     if speed_bound(grid, state.bodies) <= limit:
         return None
     scheme = stepper.scheme
-    if all(largest_speed(body.particles, grid, scheme.stencil, scheme.flip) <= limit
+    if all(largest_speed(body.particles, grid, scheme.stencil, scheme.share(dt)) <= limit
            for body in state.bodies):
         return None
     return f"a particle crosses more than {problem.limits.cfl:g} dx in a step"

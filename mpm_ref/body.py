@@ -45,6 +45,13 @@ def particles_at(x, v, m, V0, transfer="mls", fluid=False):
     )
 
 
+def with_separate_gradient(particles):
+    """Return particles whose velocity gradient L (N, d, d) is another array than C, as an affine
+    transfer with relaxation needs: MLS-MPM has one array for both otherwise.
+    """
+    return particles._replace(L=particles.L.copy())
+
+
 def permute(body, order):
     """Put the particles of a body into the given order, in place."""
     for name, a in zip(Particles._fields, body.particles, strict=True):
@@ -105,8 +112,9 @@ def _wrong_fields(body, scheme):
     if (q.C.ndim == 3) != (transfer in AFFINE):
         has, needs = ("a", "none") if q.C.ndim == 3 else ("no", "one")
         yield f"it carries {has} C, the transfer {transfer!r} needs {needs}; see particles_at"
-    elif (q.L is q.C) != (transfer == "mls"):
-        yield f"L must be the same array as C for 'mls', and only then; transfer is {transfer!r}"
+    elif (q.L is q.C) != scheme.one_gradient:
+        yield ("L must be the same array as C for 'mls' without relaxation, and only then; the "
+               f"transfer is {transfer!r}, relaxation {scheme.relaxation}")
     fluid = isinstance(body.law, Fluid) and isinstance(body.flow, NoFlow)
     if q.F.shape not in (q.L.shape, (n,)) or (q.F.ndim == 1) > fluid:
         yield f"F has shape {q.F.shape}, expected {q.L.shape}, or ({n},) for a fluid without flow"

@@ -90,7 +90,7 @@ class BudgetStepper(Stepper):
     def __init__(self, budget, scheme, dx, dim, gravity, conditions=None):
         super().__init__(scheme, dx, dim, gravity, conditions)
         self.budget = budget
-        self.momenta = Storage(dx, scheme.stencil, dim, flip=scheme.transfer == "flip")
+        self.momenta = Storage(dx, scheme.stencil, dim, flip=scheme.keeps_old_velocity)
         self.inertia = 1.0 / inverse_inertia(dx, scheme.stencil) if scheme.affine else 0.0
 
     def start(self, bodies):

@@ -8,6 +8,7 @@ the next one.
 """
 
 from dataclasses import dataclass
+from math import exp, inf
 
 import numpy as np
 
@@ -28,8 +29,9 @@ class Scheme:
     """The exchange of momentum between particles and grid.
 
     degree of the B-spline (1, 2, 3); transfer "pic", "flip", "apic" or "mls"; flip is the share
-    of FLIP (1) against PIC (0); rpic in [0, 1] damps the strain rate in C (NSF-rpic); mass_eps
-    [kg] and gravity_on_empty are NCLAW's, the latter without effect on particles. Raises
+    of FLIP (1) against PIC (0); rpic in [0, 1] damps the strain rate in C (NSF-rpic); relaxation
+    [s] is the time in which v and C of the particles relax to those of the grid, 0 for at once;
+    mass_eps [kg] and gravity_on_empty are NCLAW's, the latter without effect on particles. Raises
     ValueError for a combination that does not exist.
     """
 
@@ -37,6 +39,7 @@ class Scheme:
     transfer: str = "mls"
     flip: float = 1.0
     rpic: float = 0.0
+    relaxation: float = 0.0
     mass_eps: float = 0.0
     gravity_on_empty: bool = False
 
@@ -63,11 +66,41 @@ class Scheme:
             raise ValueError(f"mass_eps = {self.mass_eps}: expected a mass >= 0 in kg")
         if self.mass_eps and self.transfer == "flip":
             raise ValueError("mass_eps with transfer 'flip': take it with pic, apic or mls")
+        self._check_relaxation()
+
+    def _check_relaxation(self):
+        if not 0.0 <= self.relaxation < inf:
+            raise ValueError(f"relaxation = {self.relaxation}: expected a time >= 0 in s, such as "
+                             "dx/c with the speed c of the fastest wave")
+        if self.relaxation and not self.affine:
+            raise ValueError(f"relaxation = {self.relaxation} with transfer {self.transfer!r}: it "
+                             "belongs to apic and mls; FLIP has its share, flip")
+        for name in ("rpic", "mass_eps"):
+            if self.relaxation and getattr(self, name):
+                raise ValueError(f"relaxation = {self.relaxation} with {name} = "
+                                 f"{getattr(self, name)}: these two have no common step; leave one "
+                                 "of them out")
 
     @property
     def affine(self):
         """True if particles carry C."""
         return self.transfer in AFFINE
+
+    @property
+    def keeps_old_velocity(self):
+        """True if the grid carries its velocity before the forces, and these separately."""
+        return self.transfer == "flip" or self.relaxation > 0.0
+
+    @property
+    def one_gradient(self):
+        """True if L and C of the particles are one array."""
+        return self.transfer == "mls" and not self.relaxation
+
+    def share(self, dt):
+        """Return the share of a particle's own change, against the grid, that a step of dt [s]
+        leaves: `flip`, or exp(-dt/relaxation).
+        """
+        return exp(-dt / self.relaxation) if self.relaxation else self.flip
 
     @property
     def stencil(self):
@@ -92,7 +125,7 @@ class Stepper:
             raise ValueError(f"gravity = {gravity}: expected {dim} finite numbers, in m/s^2")
         if not 0.0 < dx < np.inf:
             raise ValueError(f"dx = {dx}: expected a positive, finite length in m")
-        self.storage = Storage(dx, scheme.stencil, dim, flip=scheme.transfer == "flip")
+        self.storage = Storage(dx, scheme.stencil, dim, flip=scheme.keeps_old_velocity)
 
     def start(self, bodies):
         """Check that the bodies fit the scheme, and compute their stress; needed once, before the
@@ -160,7 +193,8 @@ def scatter(bodies, store, scheme, dt):
 
 def gather(body, grid, scheme, dt):
     """Update velocity, position and velocity gradient of a body's particles from the grid."""
-    g2p(body.particles, grid, scheme.stencil, dt, scheme.flip, scheme.transfer == "mls")
+    share, mls = scheme.share(dt), scheme.transfer == "mls"
+    g2p(body.particles, grid, scheme.stencil, dt, share, mls)
 
 
 def damp(body, scheme):

@@ -10,7 +10,8 @@
       S_p = max_a sum_i (dw_ip/dx_a)^2/w_ip,
 
   dt^2 V0 K/m times S, S - 1/(2 D) and 1/D is at most 2, 2 and 4 for PIC and FLIP, APIC and
-  MLS-MPM; RPIC damping z makes it S - (1 - z)/(2 - z)/D and 2 (2 - z) for the last two.
+  MLS-MPM; RPIC damping z makes it S - (1 - z)/(2 - z)/D and 2 (2 - z) for the last two, and
+  relaxation 16/9 the 2 of APIC.
   It is the limit of an isolated particle, and no cloud of particles has a smaller one: derived in
   docs/explanation/timestep.md. Linear splines have no such limit (S is infinite at a node); for
   them m_p/m_i with the nodes' masses stands for 1/w_ip, and the bound is necessary, not sufficient.
@@ -186,7 +187,7 @@ def single_particle_limit(particles, grid, scheme, stiffness):
     S = np.empty(len(particles.x))
     _couplings(particles, grid, scheme.stencil, S)
     memory = kept / (1.0 + kept) * own if scheme.transfer == "apic" else 0.0
-    return _limit(stiffness * (S - memory), 2.0)
+    return _limit(stiffness * (S - memory), 16.0 / 9.0 if scheme.relaxation else 2.0)
 
 
 def _limit(load, most):

@@ -8,7 +8,9 @@ and NCLAW-alg3 are special cases. There are two forms of force and velocity grad
     gradient form   f_i = -sum_p V0_p tau_p dw_ip             L_p = sum_i v_i dw_ip^T
     MLS form        f_i = -sum_p V0_p tau_p D^-1 w_ip r_ip    L_p = sum_i w_ip v_i r_ip^T D^-1 = C_p
 
-with D = sum_i w_ip r_ip r_ip^T = dx^2 (degree + 1)/12 I, for degrees 2 and 3 only. `scatter*` and
+with D = sum_i w_ip r_ip r_ip^T = dx^2 (degree + 1)/12 I, for degrees 2 and 3 only. Where an affine
+transfer carries v_old on the grid, v and C relax to those of the grid, so that the filter of the
+exchange acts per time, not per step (docs/explanation/transfers.md). `scatter*` and
 `gather*` are the loops over particles; `p2g` and `g2p` run them in parallel. Which fields the
 particles and the grid carry (see `state`) selects the transfer, when the kernel is compiled.
 """
@@ -70,26 +72,47 @@ def add_momentum_and_force(v, f, i, mv, force, dt):
 
 @kernel
 def scatter_mls(particles, grid, stencil, dt, members):
-    """MLS form: the force is part of the affine momentum.
+    """MLS form: the force is part of the affine momentum, unless the grid carries it separately.
 
     m_i += sum_p w_ip m_p
     m_i v_i += sum_p w_ip (m_p (v_p + dt b_p) + Q_p r_ip)
     Q_p = m_p C_p - dt V0_p tau_p D^-1                                          # NCLAW-mls
     """
     d = grid.m.shape
+    joined = joined_time(grid.f, dt)
     for p in members:
         base, s = locate(vec(particles.x, p, d), grid, stencil)
         w = weights_per_axis(s, stencil)
         m, C, tau = particles.m[p], affine(particles.C, p, d), full(particles.tau, p, d)
-        Q = mlin(m, C, -dt * inverse_inertia(grid.dx, stencil) * particles.V0[p], tau)
-        mv_p = lin(m, vec(particles.v, p, d), m * dt, body_force(particles.b, p, d))
+        b, D_inv = body_force(particles.b, p, d), inverse_inertia(grid.dx, stencil)
+        Q = mlin(m, C, -joined * D_inv * particles.V0[p], tau)
+        mv_p = lin(m, vec(particles.v, p, d), m * joined, b)
         for c in range(columns(s, stencil)):
             k = column(c, stencil, d)
             for l in range(len(stencil)):
                 i = node(base, k, l)
                 w_ip = product(k, l, w)
+                r_ip = arm(k, l, s, grid.dx)
                 grid.m[i] += w_ip * m
-                add_to_node(grid.v, i, lin(w_ip, mv_p, w_ip, mv(Q, arm(k, l, s, grid.dx))))
+                add_to_node(grid.v, i, lin(w_ip, mv_p, w_ip, mv(Q, r_ip)))
+                f_ip = lin(w_ip * m, b, -w_ip * D_inv * particles.V0[p], mv(tau, r_ip))
+                add_separate_force(grid.f, i, f_ip)
+
+
+@kernel
+def joined_time(f, dt):
+    """dt, or 0 where the grid carries forces separately: the time for which they join momenta."""
+    if f.ndim == 1:
+        return dt
+    else:
+        return 0.0
+
+
+@kernel
+def add_separate_force(f, i, force):
+    """f_i += force, where the grid carries forces separately."""
+    if f.ndim > 1:
+        add_to_node(f, i, force)
 
 
 @kernel
@@ -99,27 +122,68 @@ def gather(particles, grid, stencil, dt, flip, bounds):
     u_p = sum_i w_ip v_i,   x_p += dt u_p,   L_p = sum_i v_i dw_ip^T            # NSF-alg-mpm step 3
     C_p = sum_i w_ip v_i r_ip^T D^-1                       where C is carried (APIC)
     v_p = u_p + flip (v_p - sum_i w_ip v_old_i)            where v_old is carried (FLIP), else u_p
+    C_p = C_p + flip (C_p - sum_i w_ip v_old_i r_ip^T D^-1) - `shift_spin`       where both are
     """
     d = grid.m.shape
+    D = 1.0 / inverse_inertia(grid.dx, stencil)
     for p in range(bounds[0], bounds[1]):
         x = vec(particles.x, p, d)
         base, s = locate(x, grid, stencil)
         w, dw = weights_per_axis(s, stencil), slopes_per_axis(s, stencil)
         u, lag = fill(0.0, d), vec(particles.v, p, d)
         L, B = outer(u, u), outer(u, u)
+        lag_B = moment(particles.C, p, D, d)
         for c in range(columns(s, stencil)):
             k = column(c, stencil, d)
             for l in range(len(stencil)):
                 i = node(base, k, l)
-                w_ip, v_i = product(k, l, w), of_node(grid.v, i)
+                w_ip, v_i, r_ip = product(k, l, w), of_node(grid.v, i), arm(k, l, s, grid.dx)
                 u = lin(1.0, u, w_ip, v_i)
                 L = mlin(1.0, L, 1.0, outer(v_i, gradient(k, l, w, dw, grid.dx)))
-                B = mlin(1.0, B, w_ip, outer(v_i, arm(k, l, s, grid.dx)))
+                B = mlin(1.0, B, w_ip, outer(v_i, r_ip))
                 lag = minus_old(lag, w_ip, grid.v_old, i)
+                lag_B = minus_old_moment(lag_B, w_ip, grid.v_old, i, r_ip)
         put_vec(particles.x, p, lin(1.0, x, dt, u))
         put_mat(particles.L, p, L)
+        B = blend_moment(B, flip, lag_B, shift_spin(u, lag, flip, dt), grid.v_old)
         put_affine(particles.C, p, inverse_inertia(grid.dx, stencil), B)
         put_vec(particles.v, p, blend(u, flip, lag, grid.v_old))
+
+
+@kernel
+def moment(C, p, D, like):
+    """D C_p, the moment sum_i w_ip v_i r_ip^T of an affine field; zero where none is carried."""
+    A = affine(C, p, like)
+    return mlin(D, A, 0.0, A)
+
+
+@kernel
+def minus_old_moment(lag, w_ip, v_old, i, r_ip):
+    """lag - w_ip v_old_i r_ip^T, where the old velocity is carried."""
+    if v_old.ndim == 1:
+        return lag
+    else:
+        return mlin(1.0, lag, -w_ip, outer(of_node(v_old, i), r_ip))
+
+
+@kernel
+def shift_spin(u, lag, flip, dt):
+    """(q s^T - s q^T)/2 with q = flip lag and s = dt u.
+
+    A particle with velocity u + q that moves by s gains the angular momentum m s x q about any
+    point; a moment that is smaller by this one takes it back.
+    """
+    A = outer(lag, u)
+    return mlin(0.5 * dt * flip, A, -0.5 * dt * flip, transpose(A))
+
+
+@kernel
+def blend_moment(B, flip, lag, spin, v_old):
+    """B + flip lag - spin, where the old velocity is carried."""
+    if v_old.ndim == 1:
+        return B
+    else:
+        return mlin(1.0, mlin(1.0, B, flip, lag), -1.0, spin)
 
 
 @kernel
@@ -141,24 +205,40 @@ def blend(u, flip, lag, v_old):
 
 
 @kernel
-def gather_mls(particles, grid, stencil, dt, bounds):
-    """MLS form: v_p = sum_i w_ip v_i, x_p += dt v_p, L_p = C_p = sum_i w_ip v_i r_ip^T D^-1."""
+def gather_mls(particles, grid, stencil, dt, flip, bounds):
+    """MLS form: u_p = sum_i w_ip v_i, x_p += dt u_p, L_p = C_p = sum_i w_ip v_i r_ip^T D^-1.
+
+    v_p = u_p; where v_old is carried, L is another array and v and C relax as in `gather`.
+    """
     d = grid.m.shape
+    D_inv = inverse_inertia(grid.dx, stencil)
     for p in range(bounds[0], bounds[1]):
         x = vec(particles.x, p, d)
         base, s = locate(x, grid, stencil)
         w = weights_per_axis(s, stencil)
-        v = fill(0.0, d)
-        B = outer(v, v)
+        u, lag = fill(0.0, d), vec(particles.v, p, d)
+        B, lag_B = outer(u, u), moment(particles.C, p, 1.0 / D_inv, d)
         for c in range(columns(s, stencil)):
             k = column(c, stencil, d)
             for l in range(len(stencil)):
-                w_ip, v_i = product(k, l, w), of_node(grid.v, node(base, k, l))
-                v = lin(1.0, v, w_ip, v_i)
-                B = mlin(1.0, B, w_ip, outer(v_i, arm(k, l, s, grid.dx)))
-        put_vec(particles.v, p, v)
-        put_vec(particles.x, p, lin(1.0, x, dt, v))
-        put_affine(particles.C, p, inverse_inertia(grid.dx, stencil), B)
+                i, w_ip, r_ip = node(base, k, l), product(k, l, w), arm(k, l, s, grid.dx)
+                v_i = of_node(grid.v, i)
+                u = lin(1.0, u, w_ip, v_i)
+                B = mlin(1.0, B, w_ip, outer(v_i, r_ip))
+                lag = minus_old(lag, w_ip, grid.v_old, i)
+                lag_B = minus_old_moment(lag_B, w_ip, grid.v_old, i, r_ip)
+        put_vec(particles.v, p, blend(u, flip, lag, grid.v_old))
+        put_vec(particles.x, p, lin(1.0, x, dt, u))
+        put_separate_gradient(particles.L, p, D_inv, B, grid.v_old)
+        B = blend_moment(B, flip, lag_B, shift_spin(u, lag, flip, dt), grid.v_old)
+        put_affine(particles.C, p, D_inv, B)
+
+
+@kernel
+def put_separate_gradient(L, p, D_inv, B, v_old):
+    """L_p = D^-1 B, where the old velocity is carried; else L is the array of C."""
+    if v_old.ndim > 1:
+        put_affine(L, p, D_inv, B)
 
 
 @kernel
@@ -190,9 +270,9 @@ def _gather(particles, grid, stencil, dt, flip):
 
 
 @parallel
-def _gather_mls(particles, grid, stencil, dt):
+def _gather_mls(particles, grid, stencil, dt, flip):
     for c in prange(CHUNKS):
-        gather_mls(particles, grid, stencil, dt, chunk(c, len(particles.x)))
+        gather_mls(particles, grid, stencil, dt, flip, chunk(c, len(particles.x)))
 
 
 @parallel
@@ -207,7 +287,7 @@ def p2g(particles, grid, stencil, dt, slabs, mls):
     Slabs of one colour are far enough apart to share no node, so they run in parallel; within a
     slab particles come in a fixed order. Hence the same bits for any number of threads.
     """
-    if fits(grid, stencil, mls):
+    if grid.f.ndim == 1 and fits(grid, stencil, mls):
         run = scatter_mls3_color
     else:
         run = _scatter_mls_color if mls else _scatter_color
@@ -219,10 +299,10 @@ def g2p(particles, grid, stencil, dt, flip, mls):
     """New velocity, position and velocity gradient of all particles; see `gather` and
     `gather_mls`.
     """
-    if fits(grid, stencil, mls):
+    if grid.f.ndim == 1 and fits(grid, stencil, mls):
         gather_mls3_all(particles, grid, stencil, dt)
     elif mls:
-        _gather_mls(particles, grid, stencil, dt)
+        _gather_mls(particles, grid, stencil, dt, flip)
     else:
         _gather(particles, grid, stencil, dt, flip)
 

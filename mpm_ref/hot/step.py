@@ -162,6 +162,9 @@ def check_scheme(scheme):
         raise ValueError("transfer = 'mls' with an implicit integrator: expected 'apic', 'pic' or "
                          "'flip', whose force is the gradient of an energy of the nodes; write "
                          "scheme = { transfer = \"apic\" }")
+    if scheme.relaxation:
+        raise ValueError(f"relaxation = {scheme.relaxation} with an implicit integrator: it "
+                         "belongs to explicit steps; leave it out")
     if scheme.mass_eps or scheme.gravity_on_empty:
         raise ValueError("mass_eps and gravity_on_empty belong to explicit NCLaw scenes: leave "
                          "them out with an implicit integrator")

@@ -69,9 +69,10 @@ def make_world(problem):
     features than those of NCLAW-sim.
     """
     walls, clip, scheme = getattr(problem.conditions, "walls", None), problem.clip, problem.scheme
-    if problem.dim != 3 or (scheme.transfer, scheme.degree, scheme.rpic) != ("mls", 2, 0.0):
+    expected = scheme.one_gradient and (scheme.degree, scheme.rpic) == (2, 0.0)
+    if problem.dim != 3 or not expected:
         raise ValueError(f"{problem.title!r}: expected MLS-MPM with quadratic splines in 3D, "
-                         "without damping")
+                         "without damping and relaxation")
     if len(problem.bodies) != 1 or problem.clock.dt is None:
         raise ValueError(f"{problem.title!r}: expected one body and a fixed dt")
     if clip is None or not is_nclaw_box(walls) or problem.conditions.parts:
@@ -255,7 +256,7 @@ def pull_back_one(world, before, after, bars, result, index):
     free = grid.v.copy()
     stop_at_walls(world, grid, free)
     stopped = Grid(grid.m, free, NONE, NONE, grid.origin, world.dx)
-    scatter_bars_mls3(Advection(particles.x, u), stopped, mine, bar, QUADRATIC,
+    scatter_bars_mls3(Advection(particles.x, u, NONE), stopped, mine, bar, QUADRATIC,
                       np.arange(len(world.m)))
     stop_at_walls(world, grid, bar.v)
     update_one(world, grid, bar)

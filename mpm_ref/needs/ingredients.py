@@ -100,7 +100,8 @@ def scheme_removals(scene):
             yield Removal("affine field", transfer_edit(text), name)
     if scheme.transfer == "flip" and scheme.flip > 0.0:
         yield Removal("FLIP part", transfer_edit("pic"), "PIC")
-    for key, name in (("rpic", "RPIC damping"), ("mass_eps", "mass added to nodes"),
+    for key, name in (("rpic", "RPIC damping"), ("relaxation", "relaxation of the transfer"),
+                      ("mass_eps", "mass added to nodes"),
                       ("gravity_on_empty", "gravity on empty nodes")):
         if getattr(scheme, key):
             yield Removal(name, default_edit("scheme", key))

@@ -66,8 +66,13 @@ def record_steps(problem, steps, state=None):
 
 
 def require_adjoints(problem):
-    """Raise ValueError for an integrator, conditions, a law or a flow without an adjoint."""
+    """Raise ValueError for an integrator, a scheme, conditions, a law or a flow without an adjoint
+    of the kernels or of the plain twin.
+    """
     StepAdjoint(problem.stepper())
+    if problem.scheme.relaxation:
+        raise ValueError(f"relaxation = {problem.scheme.relaxation}: the plain twin has no adjoint "
+                         "of it; record the steps without gradients, or leave it out")
     for body in problem.bodies:
         require_adjoint(body)
 
@@ -187,8 +192,8 @@ def adjoint_stages(problem, bodies, forward, seeds, when):
     exchange = Exchange(scheme.stencil, dt, scheme.flip, scheme.transfer == "mls")
     nodes = storage(problem).cover([body.particles.x for body in bodies])
     for body, bar in zip(bodies, bars):
-        x = body.particles.x
-        g2p_adjoint(x, grid, bar, nodes, exchange, slabs_of(x, grid, scheme.stencil))
+        slabs = slabs_of(body.particles.x, grid, scheme.stencil)
+        g2p_adjoint(body.particles, grid, bar, nodes, exchange, slabs)
         arrays[f"{body.name}/x_g2p_grad"] = bar.x.copy()
     grid_adjoint(problem, (grid._replace(v=v_free), contacts), nodes, dt, arrays)
     for body, bar, parts in zip(bodies, bars, sums):

@@ -155,7 +155,7 @@ def put_problem(f, problem):
     f.attrs.update({
         "format": FORMAT, "title": problem.title, "scene": problem.source, "dim": problem.dim,
         "dx": problem.dx, "gravity": problem.gravity, "degree": s.degree, "transfer": s.transfer,
-        "flip": s.flip, "rpic": s.rpic, "mass_eps": s.mass_eps,
+        "flip": s.flip, "rpic": s.rpic, "relaxation": s.relaxation, "mass_eps": s.mass_eps,
         "gravity_on_empty": s.gravity_on_empty, "conditions": str(problem.conditions),
         "rule": "tolerance of an entry = tolerance_f64 or tolerance_f32 of its array * its scale",
     })

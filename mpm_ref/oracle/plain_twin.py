@@ -102,8 +102,8 @@ def perturbed_twins(problem):
 def method(problem, real):
     """Return the `Method` of the problem's scheme in a floating type."""
     s = problem.scheme
-    return Method(real(problem.dx), s.degree, s.transfer,
-                  real(s.flip), real(s.rpic), real(s.mass_eps))
+    return Method(real(problem.dx), s.degree, s.transfer, real(s.flip), real(s.rpic),
+                  real(s.relaxation), real(s.mass_eps))
 
 
 def matter(body, real):

@@ -46,6 +46,7 @@ class Method(NamedTuple):
     transfer: str           # "pic", "flip", "apic" or "mls"
     flip: float = 1         # share of FLIP, see `transfer.flip`
     rpic: float = 0         # damping, see `transfer.rpic`
+    relaxation: float = 0   # time in which v and C relax to the grid [s]; 0: in each step
     mass_eps: float = 0     # see `transfer.grid_velocity` [kg]
 
     @property
@@ -144,6 +145,8 @@ def grid_to_particles(q, ip, nodes, method, dt):
 
     APIC and MLS-MPM carry C, and MLS-MPM takes it for the velocity gradient L as well.
     """
+    if method.relaxation:
+        return relaxed_motion(q, ip, nodes, method, dt)
     v, box = transfer.velocity(nodes.v, ip, nodes.box), nodes.box
     x, C, L = q.x + dt * v, None, transfer.velocity_gradient(nodes.v, ip, box)
     if method.transfer in ("apic", "mls"):
@@ -151,9 +154,29 @@ def grid_to_particles(q, ip, nodes, method, dt):
         L = C if method.transfer == "mls" else L
         C = transfer.rpic(C, method.rpic)
     if method.transfer == "flip":
-        v_old = nodes.mv / np.where(nodes.m > 0, nodes.m, 1)[..., None]
-        v = transfer.flip(q.v, v, transfer.velocity(v_old, ip, box), method.flip)
+        v_old = transfer.velocity(old_velocity(nodes), ip, box)
+        v = transfer.flip(q.v, v, v_old, method.flip)
     return ParticleMotion(v, x, C, L)
+
+
+def old_velocity(nodes):
+    """Return the nodal velocities before the forces (.., d) [m/s]; 0 where there is no mass."""
+    return nodes.mv / np.where(nodes.m > 0, nodes.m, 1)[..., None]
+
+
+def relaxed_motion(q, ip, nodes, method, dt):
+    """Return the `ParticleMotion` of one body whose v and C relax to the grid in a time.
+
+    What a particle has beyond the grid, v - u_old and C - C_old, is multiplied by
+    exp(-dt/relaxation); the spin of C makes up for a shift dt u that is not along v.
+    """
+    box, share, D = nodes.box, np.exp(-dt / method.relaxation), method.moment
+    u, u_old = (transfer.velocity(v, ip, box) for v in (nodes.v, old_velocity(nodes)))
+    affine = tuple(transfer.affine(v, D, ip, box) for v in (nodes.v, old_velocity(nodes)))
+    v = transfer.flip(q.v, u, u_old, share)
+    spin = transfer.shift_spin(dt * u, v - u)
+    L = affine[0] if method.transfer == "mls" else transfer.velocity_gradient(nodes.v, ip, box)
+    return ParticleMotion(v, q.x + dt * u, transfer.relaxed_affine(q.C, affine, D, share, spin), L)
 
 
 def deform(q, L, dt):

@@ -117,6 +117,26 @@ def flip(v, v_new, v_old, share):
     return v_new + share * (v - v_old)
 
 
+def shift_spin(shift, change):
+    """(q s^T - s q^T)/2 (N, d, d) of the shifts s (N, d) [m] and changes of velocity q (N, d).
+
+    A particle of mass m whose velocity is not that of its shift, but differs by q, gains the
+    angular momentum m s x q; m times this moment has as much spin.
+    """
+    A = np.einsum("pa,pb->pab", change, shift)
+    return (A - np.swapaxes(A, 1, 2)) / 2
+
+
+def relaxed_affine(C, pair, D, share, spin):
+    """C_p = new + share (C - old) - spin/D [1/s], with pair (new, old) of `affine` fields.
+
+    C is the particle's own field before the step; new and old are those of the nodal velocities
+    after the step and before the forces; spin is a `shift_spin`.
+    """
+    new, old = pair
+    return new + share * (C - old) - spin / D
+
+
 def rpic(C, damping):
     """C' = (1 - damping) sym C + skew C, which damps strain and keeps rotation (NSF-rpic)."""
     T = np.swapaxes(C, 1, 2)

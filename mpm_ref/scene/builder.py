@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..body import AFFINE, Body, particles_at
+from ..body import AFFINE, Body, particles_at, with_separate_gradient
 from ..core import motion as rigid
 from ..core.boundary import BoxWalls, Conditions, Prescribed
 from ..core.boundary import Collider as RigidCollider
@@ -107,7 +107,10 @@ def _sampled(scene, record, material, where):
 
 def _at_rest(scene, material, x, v, sizes):
     """Return undeformed particles; `sizes` are their masses and volumes."""
-    particles = particles_at(x, v, *sizes, scene.step_scheme.transfer, fluid=not material.needs_F)
+    scheme = scene.step_scheme
+    particles = particles_at(x, v, *sizes, scheme.transfer, fluid=not material.needs_F)
+    if scheme.relaxation:
+        particles = with_separate_gradient(particles)
     if not material.has_history:
         return particles
     return particles._replace(y=np.full(len(x), material.initial_y))

@@ -283,6 +283,7 @@ class Scheme(Record):
     transfer: str | None = None                 # none: "mls", of an implicit step "apic"
     flip: Share = 1.0
     rpic: Share = 0.0
+    relaxation: NotNegative = 0.0               # [s]
     mass_eps: NotNegative = 0.0                 # [kg]
     gravity_on_empty: bool = False
 

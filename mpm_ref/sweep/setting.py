@@ -9,7 +9,8 @@ A setting is a dictionary of some of these knobs; what it leaves out stays as th
                 the scene gives them otherwise
     cfl         share of the stable time step (of an implicit step: cells that a particle crosses)
     degree      of the B-spline: 1, 2 or 3
-    transfer    "mls", "apic", "flip 0.95" (with its share of FLIP), "apic rpic 0.5", "pic", ...
+    transfer    "mls", "apic", "flip 0.95" (with its share of FLIP), "apic rpic 0.5", "pic",
+                "mls relaxation 1e-3" (with its time in s, whatever the grid), ...
     integrator  "explicit", or the word of an implicit method such as "hot-plus"
     eps         tolerance of an implicit step
     boundary    "nodes" or "surface": where the conditions of colliders hold
@@ -92,6 +93,8 @@ def in_seconds(scene):
 def scale_dx(tables, factor):
     """Multiply the grid spacing; walls, which are counted in nodes, stay where they are."""
     tables["dx"] *= factor
+    if "relaxation" in tables["scheme"]:
+        tables["scheme"]["relaxation"] *= factor
     if "dt" in tables:
         tables["dt"] = min(tables["dt"] * factor, tables.get("interval", inf))
     else:
@@ -177,13 +180,18 @@ def change_degree(tables, degree):
 
 def change_transfer(tables, text):
     """Take another transfer, with its blend."""
-    match = re.fullmatch(r"(flip)(?: ([0-9.]+))?|(\w+)(?: rpic ([0-9.]+))?", text)
-    if match is None:
-        raise SceneError(f"transfer {text!r}: expected a text such as mls, flip 0.95 or apic rpic "
-                         "0.5")
-    flip, share, name, damping = match.groups()
-    scheme = {"transfer": flip or name, "flip": float(share or 1.0), "rpic": float(damping or 0.0)}
-    tables["scheme"] |= scheme | ({"mass_eps": 0.0} if flip else {})
+    number = r"([0-9.]+(?:e-?[0-9]+)?)"
+    match = re.fullmatch(rf"(\w+)(?: {number}| (rpic|relaxation) {number})?", text)
+    if match is None or (match[2] and match[1] != "flip"):
+        raise SceneError(f"transfer {text!r}: expected a text such as mls, flip 0.95, apic rpic "
+                         "0.5 or mls relaxation 1e-3")
+    name, share, key, value = match.groups()
+    scheme = {"transfer": name, "flip": float(share or 1.0), "rpic": 0.0, "relaxation": 0.0}
+    if key:
+        scheme[key] = float(value)
+    if name == "flip" or key == "relaxation":
+        scheme["mass_eps"] = 0.0
+    tables["scheme"] |= scheme
 
 
 def change_integrator(tables, word):

@@ -1,6 +1,7 @@
 """The settings that a search tries: single knobs, grids between the halved ones, and pairs."""
 
 from ..body import AFFINE
+from ..scene.crossing import crossing_time
 from ..sweep.setting import setting
 
 CFL, CELLS = (0.9, 0.5, 0.25), (0.9, 0.6, 0.3)      # of the explicit bound; of implicit steps
@@ -21,6 +22,7 @@ def single_knobs(scene):
     settings += [setting(particles=factor) for factor in PARTICLES]
     settings += [setting(transfer=text) for text in TRANSFERS
                  if text != transfer and not (scene.integrator != "explicit" and text == "mls")]
+    settings += [setting(transfer=text) for text in relaxed_transfers(scene)]
     settings += [with_degree(degree, transfer) for degree in DEGREES
                  if degree != scene.scheme.degree]
     settings += [setting(sampling=kind) for kind in other_samplings(scene)]
@@ -32,6 +34,16 @@ def single_knobs(scene):
         settings += [setting(eps=eps) for eps in TOLERANCES if eps != given]
     other = IMPLICIT if scene.integrator == "explicit" else "explicit"
     return [*settings, setting(integrator=other, cfl=CELLS[1] if other == IMPLICIT else CFL[1])]
+
+
+def relaxed_transfers(scene):
+    """Return the affine transfers with the time in which a wave crosses a cell as relaxation, for
+    explicit scenes whose bodies all have a density and a law that is no network.
+    """
+    crossing = crossing_time(scene) if scene.integrator == "explicit" else None
+    if crossing is None:
+        return []
+    return [f"{name} relaxation {crossing:.3g}" for name in AFFINE]
 
 
 def with_degree(degree, transfer):

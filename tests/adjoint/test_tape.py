@@ -22,9 +22,10 @@ SHORT = """
 import json
 import numpy as np
 from adjoint_runs import dive, order
-KINDS = [("pic", 1), ("pic", 2), ("flip", 2), ("flip", 3), ("apic", 2), ("apic", 3), ("mls", 3)]
-print(json.dumps({f"{t}{k}": order(dive(t, k), (1, 3), 1e-3 * 0.5**np.arange(4))
-                  for t, k in KINDS}))
+KINDS = [("pic", 1), ("pic", 2), ("flip", 2), ("flip", 3), ("apic", 2), ("apic", 3), ("mls", 3),
+         ("apic", 3, 2e-3), ("mls", 2, 2e-3)]
+print(json.dumps({str(kind): order(dive(*kind), (1, 3), 1e-3 * 0.5**np.arange(4))
+                  for kind in KINDS}))
 """
 
 

@@ -7,6 +7,7 @@ from problems import digest, run_python, stepped, two_disks
 from threads import by_threads
 
 from mpm_ref.core.jit import set_threads
+from mpm_ref.explicit import Scheme
 
 STEPS, SORT = 100, 16
 
@@ -51,6 +52,16 @@ def test_the_state_moves_on(here):
 
 def test_one_and_two_threads_give_the_same_bits(here):
     assert by_threads(run) == [here, here]
+
+
+@pytest.mark.parametrize("transfer", ["apic", "mls"])
+def test_relaxation_gives_the_same_bits_with_two_threads(transfer):
+    def relaxed():
+        scheme = Scheme(transfer=transfer, relaxation=2e-3)
+        return digest(stepped(two_disks(scheme), STEPS, sort_every=SORT))
+
+    one, two = by_threads(relaxed)
+    assert one == two
 
 
 def test_four_threads_give_the_same_bits(here):

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from clouds import AFFINE, COVER, DX, Case, cloud, deep, over, plain_grid, scattered
+from clouds import AFFINE, COVER, DX, SHARE, Case, cloud, deep, over, plain_grid, scattered
 
 from mpm_ref.core.grid import update
 from mpm_ref.core.transfer import g2p, rpic
@@ -32,7 +32,7 @@ def trip(request):
                            motion=grid_to_particles(matter, ip, nodes, case.method, DT))
 
 
-def gather(case, q, grid, flip=0.9):
+def gather(case, q, grid, flip=SHARE):
     g2p(q, grid, case.stencil, DT, flip, case.transfer == "mls")
 
 
@@ -44,7 +44,7 @@ def test_scatter_equals_its_twin(trip):
     """NSF-alg-mpm with NSF-eq6 (apic), LDM-alg1 and NCLAW-alg3 (pic), NCLAW-mls (mls)."""
     nodes, before = trip.nodes, trip.before
     assert close(before.m, over(trip.grid, nodes.m, nodes.box))
-    if trip.case.transfer == "flip":
+    if trip.case.separate:
         assert close(before.mv, over(trip.grid, nodes.mv, nodes.box))
         assert close(before.f, over(trip.grid, nodes.f, nodes.box))
     else:
@@ -74,7 +74,7 @@ def test_scatter_conserves_mass_and_momentum(trip):
     assert before.m.sum() == pytest.approx(q.m.sum(), rel=1e-14)
     mv = before.mv.reshape(-1, trip.case.d).sum(axis=0)
     expected = momentum([body(q)])
-    if trip.case.body_force and trip.case.transfer != "flip":      # forces are separate there
+    if trip.case.body_force and not trip.case.separate:            # forces are separate there
         expected += DT * q.m @ q.b
     assert mv == pytest.approx(expected, abs=1e-13 * (q.m @ abs(q.v)).max())
 
@@ -82,7 +82,7 @@ def test_scatter_conserves_mass_and_momentum(trip):
 def test_forces_add_up_to_the_body_forces(trip):
     """The internal ones add up to nothing, since the dw_ip do (NCLAW-eq10)."""
     case, q, f = trip.case, trip.before.q, trip.before.f
-    if case.transfer == "flip":
+    if case.separate:
         expected = q.m @ q.b if case.body_force else 0.0
         assert abs(f.reshape(-1, case.d).sum(axis=0) - expected).max() <= 1e-13 * abs(f).sum()
 
@@ -135,6 +135,70 @@ def test_pic_loses_angular_momentum(spin):
         assert abs(last - middle).max() > 1e-3 * scale
 
 
+RELAXED = [case for case in COVER if case.relaxed]
+
+
+@pytest.fixture(params=RELAXED, ids=lambda case: case.name)
+def free(request):
+    """A relaxed case, its particles without forces, and the grid that they are on."""
+    case = request.param
+    q = cloud(case, np.random.default_rng(5))
+    q.tau[:] = 0.0
+    if case.body_force:
+        q.b[:] = 0.0
+    grid = scattered(case, q, DT)
+    update(grid, np.zeros(case.d), DT)
+    return case, q, grid
+
+
+@pytest.mark.parametrize("share", [0.0, SHARE, 1.0])
+def test_relaxation_conserves_momenta_while_particles_move(free, share):
+    """Linear and angular momentum at the new positions, of particles whose velocities differ from
+    those that move them."""
+    case, q, grid = free
+    before = momentum([body(q)]), angular_momentum([body(q)], case.moment)
+    size = (q.m * np.linalg.norm(q.v, axis=1)).sum()
+    gather(case, q, grid, flip=share)
+    after = momentum([body(q)]), angular_momentum([body(q)], case.moment)
+    assert abs(after[0] - before[0]).max() <= 1e-14 * size
+    assert abs(after[1] - before[1]).max() <= 1e-13 * size * 5.0 * DX
+
+
+def test_the_shift_alone_changes_the_angular_momentum(free):
+    """The negative control of the test above: without the spin that makes up for it."""
+    case, q, grid = free
+    before, x = angular_momentum([body(q)], case.moment), q.x.copy()
+    gather(case, q, grid)
+    shift = q.x - x
+    q.C[:] += plain.shift_spin(shift, q.v - shift / DT) / case.moment
+    size = (q.m * np.linalg.norm(q.v, axis=1)).sum() * 5.0 * DX
+    assert abs(angular_momentum([body(q)], case.moment) - before).max() > 1e-6 * size
+
+
+def test_full_memory_changes_nothing_without_forces(free):
+    """Share 1: v stays, whatever the grid cannot show; share 0 is the transfer without memory."""
+    case, q, grid = free
+    keeps = deep(q)
+    gather(case, keeps, grid, flip=1.0)
+    assert close(keeps.v, q.v, 1e-13)
+    strain = keeps.C + np.swapaxes(keeps.C, 1, 2)
+    assert close(strain, q.C + np.swapaxes(q.C, 1, 2), 1e-13)
+    assert np.linalg.norm(keeps.L - q.C) > 0.1 * np.linalg.norm(q.C)
+
+
+def test_no_memory_is_the_transfer_without_relaxation(free):
+    case, q, grid = free
+    plainly = case._replace(relaxed=False)
+    first, second = deep(q), deep(q)
+    gather(case, first, grid, flip=0.0)
+    if case.transfer == "mls":
+        second = second._replace(L=second.C)
+    without = grid._replace(f=np.empty(0), v_old=np.empty(0))
+    gather(plainly, second, without, flip=0.0)
+    for name in ("x", "v", "C", "L"):
+        assert close(getattr(first, name), getattr(second, name), 1e-13)
+
+
 def affine_field(d, x):
     rng = np.random.default_rng(2)
     A, c = rng.normal(size=(d, d)) / DX, rng.normal(size=d)
@@ -147,8 +211,10 @@ def test_gather_reproduces_an_affine_field(trip):
     nodes = DX * (np.moveaxis(np.indices(trip.grid.m.shape), 0, -1) + trip.grid.origin)
     A, v_i = affine_field(case.d, nodes)
     expected = affine_field(case.d, q.x)[1]
-    v_old = v_i.copy() if case.transfer == "flip" else trip.grid.v_old
+    v_old = v_i.copy() if case.separate else trip.grid.v_old
     q.v[:] = expected
+    if case.relaxed:
+        q.C[:] = A
     gather(case, q, trip.grid._replace(v=v_i, v_old=v_old))
     assert close(q.v, expected, 1e-12)
     assert abs(q.L - A).max() <= 1e-12 * abs(A).max()

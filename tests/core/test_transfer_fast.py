@@ -36,9 +36,9 @@ def scattered(kernel, q):
     return grid
 
 
-def gathered(kernel, q, grid):
+def gathered(kernel, q, grid, *share):
     after = deep(q)
-    kernel(after, grid, STENCIL, DT, (10, len(q.x) - 10))
+    kernel(after, grid, STENCIL, DT, *share, (10, len(q.x) - 10))
     return after
 
 
@@ -51,7 +51,8 @@ def test_scatter_equals_the_general_one(particles):
 def test_gather_equals_the_general_one(particles):
     grid = Storage(DX, STENCIL, 3).cover([particles.x])
     grid.v[:] = np.random.default_rng(2).normal(size=grid.v.shape)
-    fast, general = (gathered(k, particles, grid) for k in (gather_mls3, transfer.gather_mls))
+    fast = gathered(gather_mls3, particles, grid)
+    general = gathered(transfer.gather_mls, particles, grid, 0.0)
     assert close(fast.x, general.x)
     assert close(fast.v, general.v)
     assert fast.C.shape == particles.C.shape
@@ -60,16 +61,18 @@ def test_gather_equals_the_general_one(particles):
         assert np.all(fast.C[:10] == particles.C[:10])
 
 
-@pytest.mark.parametrize(("degree", "d", "mls", "fast"), [
-    (2, 3, True, True), (3, 3, True, False), (2, 2, True, False), (2, 3, False, False),
+@pytest.mark.parametrize(("degree", "d", "mls", "old", "fast"), [
+    (2, 3, True, False, True), (3, 3, True, False, False), (2, 2, True, False, False),
+    (2, 3, False, False, False), (2, 3, True, True, False),
 ])
-def test_it_runs_where_it_applies_and_nowhere_else(degree, d, mls, fast, monkeypatch):
+def test_it_runs_where_it_applies_and_nowhere_else(degree, d, mls, old, fast, monkeypatch):
+    """old: the grid carries its old velocity, for relaxation."""
     ran = []
     for name in ("scatter_mls3_color", "_scatter_mls_color", "_scatter_color",
                  "gather_mls3_all", "_gather_mls", "_gather"):
         monkeypatch.setattr(transfer, name, lambda *arguments, name=name: ran.append(name))
     q = cloud(Case("mls", degree, d), np.random.default_rng(1), n=4)
-    grid = Storage(DX, STENCILS[degree], d).cover([q.x])
+    grid = Storage(DX, STENCILS[degree], d, flip=old).cover([q.x])
     slabs = slabs_of(q.x, grid, STENCILS[degree])
     transfer.p2g(q, grid, STENCILS[degree], DT, slabs, mls)
     transfer.g2p(q, grid, STENCILS[degree], DT, 0.0, mls)

@@ -8,7 +8,9 @@ from mpm_ref.core.grid import Grid
 from mpm_ref.core.levelset import half_space, sphere
 from mpm_ref.core.motion import Motion, Steady
 from mpm_ref.core.state import NONE
+from mpm_ref.explicit import Scheme
 from mpm_ref.hot.constraints import FIXED, FREE, PLANE, RELEASES, ActiveSet
+from mpm_ref.hot.step import ImplicitStepper
 from mpm_ref.hot.system import free_part, unknowns_of
 
 DX = 0.5
@@ -108,6 +110,12 @@ def test_separate_bears_only_on_approach_and_lets_go_of_what_pulls():
     u = q.v + q.dv0
     u[pulled, 1] = 1.0
     assert active_set.update(u, g * (g > 0)) == 0
+
+
+def test_relaxation_is_refused():
+    scheme = Scheme(transfer="apic", relaxation=1e-3)
+    with pytest.raises(ValueError, match=r"relaxation = 0\.001 with an implicit integrator"):
+        ImplicitStepper(scheme, 0.1, 2, (0.0, 0.0))
 
 
 def test_friction_is_refused():

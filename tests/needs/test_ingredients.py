@@ -51,6 +51,11 @@ def test_removal_from_the_transfer(label, key, value):
     assert getattr(without(EXTRAS, label).scheme, key) == value
 
 
+def test_removal_of_the_relaxation():
+    text = HEAD + "scheme = { relaxation = 1e-3 }" + BLOCK
+    assert without(text, "relaxation of the transfer").scheme.relaxation == 0.0
+
+
 def test_flip_part_and_degree_of_a_transfer_without_affine_field():
     text = HEAD + 'scheme = { transfer = "flip", flip = 0.9 }' + BLOCK
     offers = variant_of(text).offers

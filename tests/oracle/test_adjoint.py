@@ -226,6 +226,7 @@ def with_(problem, **changes):
 @pytest.mark.parametrize(("changes", "message"), [
     ({"conditions": Shaken()}, "conditions of type Shaken have no adjoint"),
     ({"integrator": "implicit", "scheme": Scheme(transfer="apic")}, "is implicit: expected an"),
+    ({"scheme": Scheme(relaxation=1e-3)}, r"relaxation = 0\.001: the plain twin has no adjoint"),
 ])
 def test_what_has_no_adjoint_is_refused(changes, message, tmp_path):
     with pytest.raises(ValueError, match=message):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mpm_ref.body import Body, check_fit, particles_at, permute
+from mpm_ref.body import Body, check_fit, particles_at, permute, with_separate_gradient
 from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.materials import NoFlow, make_flow, make_law
 
@@ -26,6 +26,13 @@ def spoiled(field, p, value):
 @pytest.mark.parametrize("transfer", ["pic", "flip", "apic", "mls"])
 def test_a_body_made_for_the_transfer_fits(transfer):
     check_fit(body(transfer), Scheme(transfer=transfer), 2)
+
+
+def test_relaxation_needs_a_gradient_of_its_own():
+    relaxed = Scheme(relaxation=1e-3)
+    with pytest.raises(ValueError, match=r"same array as C for 'mls' without.* relaxation 0\.001"):
+        check_fit(body(), relaxed, 2)
+    check_fit(body()._replace(particles=with_separate_gradient(body().particles)), relaxed, 2)
 
 
 @pytest.mark.parametrize(("made", "transfer", "said"), [

@@ -17,6 +17,7 @@ MATERIALS = {
 }
 TRANSFERS = ('transfer = "mls"', 'transfer = "mls"\nmass_eps = 0.1',
              'transfer = "apic"', 'transfer = "apic"\nrpic = 0.5',
+             'transfer = "apic"\nrelaxation = 0.01', 'transfer = "mls"\nrelaxation = 0.01',
              'transfer = "flip"\nflip = 0.9', 'transfer = "pic"')
 
 

@@ -38,6 +38,8 @@ SCHEMES = {
     "mls": Scheme(),
     "regularised": Scheme(mass_eps=1e-3, gravity_on_empty=True),
     "rpic": Scheme(2, "mls", rpic=0.2),
+    "relaxed mls": Scheme(2, "mls", relaxation=2.0 * DT),
+    "relaxed apic": Scheme(3, "apic", relaxation=2.0 * DT),
 }
 
 
@@ -73,9 +75,10 @@ def test_conditions_equal_the_twin(name):
     assert off < 2e-13
 
 
-def test_momentum_is_conserved_without_conditions():
+@pytest.mark.parametrize("name", ["mls", "relaxed mls", "relaxed apic"])
+def test_momentum_is_conserved_without_conditions(name):
     """Two bodies collide: linear and angular momentum to round-off, energy never gained."""
-    problem = two_disks(conditions=FREE, gravity=(0.0, 0.0))
+    problem = two_disks(SCHEMES[name], conditions=FREE, gravity=(0.0, 0.0))
     bodies, D = problem.bodies, problem.inertia
     p, L = momentum(bodies), angular_momentum(bodies, D)
     E = energy(bodies, problem.gravity, D).sum
@@ -154,6 +157,11 @@ def test_particles_do_not_move_with_copy_problem():
     ({"mass_eps": -1.0}, "mass >= 0"),
     ({"mass_eps": float("nan")}, "mass >= 0"),
     ({"mass_eps": 1e-7, "transfer": "flip"}, "pic, apic or mls"),
+    ({"relaxation": -1.0}, "relaxation = -1.0: expected a time >= 0 in s"),
+    ({"relaxation": float("inf")}, "expected a time >= 0 in s"),
+    ({"relaxation": 1e-3, "transfer": "flip"}, "FLIP has its share"),
+    ({"relaxation": 1e-3, "rpic": 0.1}, "with rpic = 0.1: these two have no common step"),
+    ({"relaxation": 1e-3, "mass_eps": 1e-7}, "with mass_eps = 1e-07"),
 ])
 def test_schemes_that_do_not_exist_are_refused(wrong, said):
     with pytest.raises(ValueError, match=said):

@@ -5,7 +5,7 @@ from math import sqrt
 import numpy as np
 import pytest
 
-from mpm_ref.body import Body, particles_at
+from mpm_ref.body import Body, particles_at, with_separate_gradient
 from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.materials import FixedCorotated, HerschelBulkley, NeoHookean, NoFlow
 from mpm_ref.timestep import TooLarge, largest_modulus, moduli, refuse, stable_dt
@@ -16,13 +16,16 @@ K = 2.0 * LAW.mu + 2.0 * LAW.lam                # at rest, d = 2
 TRANSFERS = ("mls", "apic", "pic", "flip")
 
 
-def cloud(x, transfer, rpic=0.0, material=ELASTIC):
+def cloud(x, transfer, rpic=0.0, material=ELASTIC, relaxation=0.0):
     """Particles of 0.0025 m^2 at rest at x (N, 2), and their stepper."""
     x = np.array(x, dtype=float)
     n, V = len(x), 0.25 * DX**2
     q = particles_at(x, np.zeros((n, 2)), np.full(n, RHO * V), np.full(n, V), transfer)
+    if relaxation:
+        q = with_separate_gradient(q)
     body = Body("cloud", q, *material, np.arange(n))
-    stepper = Stepper(Scheme(2, transfer, rpic=rpic), DX, 2, np.zeros(2))
+    scheme = Scheme(2, transfer, rpic=rpic, relaxation=relaxation)
+    stepper = Stepper(scheme, DX, 2, np.zeros(2))
     stepper.start([body])
     return body, stepper
 
@@ -82,6 +85,25 @@ def test_one_particle_grows_past_the_bound(transfer):
 def test_damping_moves_the_bound_of_one_particle(transfer, rpic):
     assert spectral_radius(CLOUDS["one"], transfer, 0.99, rpic=rpic) <= 1.0 + 1e-3
     assert spectral_radius(CLOUDS["one"], transfer, 1.05, rpic=rpic) > 1.01
+
+
+@pytest.mark.parametrize("transfer", ["apic", "mls"])
+@pytest.mark.parametrize("crossings", [0.1, 1.0, 10.0, 1e6])
+def test_no_cloud_grows_at_the_bound_with_relaxation(transfer, crossings):
+    """relaxation is a number of times dx/c, in which a wave crosses a cell."""
+    relaxation = crossings * DX * sqrt(RHO / (LAW.lam + 2.0 * LAW.mu))
+    for x in CLOUDS.values():
+        assert spectral_radius(x, transfer, 0.99, relaxation=relaxation) <= 1.0 + 1e-3
+
+
+def test_relaxation_shortens_the_step_of_apic_alone():
+    bounds = {}
+    for transfer in ("apic", "mls"):
+        for relaxation in (0.0, 1.0):
+            body, stepper = cloud(CLOUDS["one"], transfer, relaxation=relaxation)
+            bounds[transfer, relaxation] = stable_dt([body], stepper).single_particle
+    assert bounds["mls", 1.0] == bounds["mls", 0.0]
+    assert bounds["apic", 1.0] == pytest.approx(bounds["apic", 0.0] * sqrt(8.0 / 9.0))
 
 
 @pytest.mark.parametrize("transfer", TRANSFERS)

@@ -8,7 +8,7 @@ from clouds import AFFINE
 from constitutive import rotations
 from problems import DT, DX, JELLY, METAL, ball, moving
 
-from mpm_ref.body import keep_inside
+from mpm_ref.body import keep_inside, with_separate_gradient
 from mpm_ref.core.boundary import BoxWalls, Collider, Conditions
 from mpm_ref.core.motion import Motion, Oscillation, Steady
 from mpm_ref.core.solids import half_space
@@ -76,15 +76,18 @@ def splash():
                Conditions(walls=walls))
 
 
-def dive(transfer="flip", degree=3):
+def dive(transfer="flip", degree=3, relaxation=0.0):
     """2D: an elastic disk with a body force of its own meets a wall that rises and holds it."""
     body = moving(ball("jelly", (0.31, 0.14), JELLY, NoFlow(), transfer=transfer, radius=1.7),
                   (0.5, -2.0), 4.0)
     q = body.particles
     body = body._replace(particles=q._replace(b=np.sin(30.0 * q.x)))
+    if relaxation:
+        body = body._replace(particles=with_separate_gradient(body.particles))
     rising = Motion(translation=Steady((0.0, 0.5)))
     floor = Collider(half_space((0.0, 0.07), (0.3, 1.0)), "noslip", motion=rising)
-    scheme = Scheme(degree, transfer, flip=0.95, rpic=0.2 * (transfer in AFFINE))
+    rpic = 0.2 * (transfer in AFFINE and not relaxation)
+    scheme = Scheme(degree, transfer, flip=0.95, rpic=rpic, relaxation=relaxation)
     return Run((body,), scheme, np.array((0.0, -9.8)), Conditions((floor,)))
 
 

@@ -86,7 +86,7 @@ def g2p_loss(case, q, grid, seeds):
     """<seeds, g2p(q, grid)> of x, v, C, L; under MLS L is C and counts once."""
     after = deep(q)
     g2p(after, grid, case.stencil, DT, FLIP, case.transfer == "mls")
-    names = "xvC" if case.transfer == "mls" else "xvCL"
+    names = "xvC" if case.transfer == "mls" and not case.relaxed else "xvCL"
     return pairing((getattr(seeds, n) for n in names), (getattr(after, n) for n in names))
 
 
@@ -94,7 +94,7 @@ def g2p_bars(case, q, grid, seeds):
     """Its gradient with respect to particles and to nodes."""
     bars = Particles(*(a.copy() for a in seeds))
     nodes = grid._replace(v=np.zeros_like(grid.v), v_old=np.zeros_like(grid.v_old))
-    g2p_adjoint(q.x, grid, bars, nodes, how_of(case), slabs_of(q.x, grid, case.stencil))
+    g2p_adjoint(q, grid, bars, nodes, how_of(case), slabs_of(q.x, grid, case.stencil))
     return bars, nodes
 
 

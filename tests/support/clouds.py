@@ -1,10 +1,11 @@
 """Random particles on a grid, the transfers to test them with, and their plain twins."""
 
+from math import log
 from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.body import particles_at
+from mpm_ref.body import particles_at, with_separate_gradient
 from mpm_ref.core.grid import Storage
 from mpm_ref.core.order import slabs_of
 from mpm_ref.core.spline import STENCILS
@@ -14,6 +15,8 @@ from mpm_ref.plain.step import Matter, Method, particles_to_grid
 
 DX = 0.11
 AFFINE = ("apic", "mls")
+SHARE = 0.9                             # that a step leaves, of FLIP and of relaxation
+RELAXATION = 0.03 / log(1.0 / SHARE)    # for steps of 0.03 s
 
 
 class Case(NamedTuple):
@@ -24,6 +27,7 @@ class Case(NamedTuple):
     d: int
     body_force: bool = False
     fluid: bool = False
+    relaxed: bool = False
 
     @property
     def stencil(self):
@@ -31,7 +35,13 @@ class Case(NamedTuple):
 
     @property
     def method(self):
-        return Method(DX, self.degree, self.transfer, flip=0.9)
+        return Method(DX, self.degree, self.transfer, flip=SHARE,
+                      relaxation=RELAXATION * self.relaxed)
+
+    @property
+    def separate(self):
+        """Whether the grid carries its old velocity, and forces separately."""
+        return self.transfer == "flip" or self.relaxed
 
     @property
     def moment(self):
@@ -39,7 +49,7 @@ class Case(NamedTuple):
 
     @property
     def name(self):
-        marks = "-b" * self.body_force + "-fluid" * self.fluid
+        marks = "-b" * self.body_force + "-fluid" * self.fluid + "-relaxed" * self.relaxed
         return f"{self.transfer}{self.degree}-{self.d}d{marks}"
 
 
@@ -54,13 +64,18 @@ COVER = (
     Case("apic", 3, 3, body_force=True),
     Case("mls", 2, 2, fluid=True),
     Case("mls", 2, 3),
+    Case("apic", 3, 2, fluid=True, relaxed=True),
+    Case("apic", 2, 3, relaxed=True),
+    Case("mls", 2, 2, body_force=True, relaxed=True),
+    Case("mls", 3, 3, relaxed=True),
 )
 EVERY = tuple(
-    Case(transfer, degree, d, body_force, fluid)
+    Case(transfer, degree, d, body_force, fluid, relaxed)
     for transfer in ("pic", "flip", "apic", "mls")
     for degree in ((2, 3) if transfer in AFFINE else (1, 2, 3))
     for d in (2, 3)
     for body_force, fluid in ((False, False), (True, True))
+    for relaxed in ((False, True) if transfer in AFFINE else (False,))
 )
 
 
@@ -72,6 +87,8 @@ def cloud(case, rng, n=300, width=5.0):
     q = particles_at(x, rng.normal(size=(n, d)), m, V0, case.transfer, fluid=case.fluid)
     if case.body_force:
         q = q._replace(b=rng.normal(size=(n, d)))
+    if case.relaxed:
+        q = with_separate_gradient(q)
     if case.transfer in AFFINE:
         q.C[:] = rng.normal(size=(n, d, d)) / DX
     tau = rng.normal(size=q.tau.shape)
@@ -98,7 +115,7 @@ def twin(q, law=None, flow=None, dtype=float):
 
 def scattered(case, q, dt):
     """Grid that holds the particles' mass and momentum."""
-    store = Storage(DX, case.stencil, case.d, flip=case.transfer == "flip")
+    store = Storage(DX, case.stencil, case.d, flip=case.separate)
     grid = store.cover([q.x])
     p2g(q, grid, case.stencil, dt, slabs_of(q.x, grid, case.stencil), case.transfer == "mls")
     return grid

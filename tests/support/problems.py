@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mpm_ref.body import Body, particles_at
+from mpm_ref.body import Body, particles_at, with_separate_gradient
 from mpm_ref.core.boundary import Collider, Conditions
 from mpm_ref.core.solids import half_space
 from mpm_ref.explicit import Scheme, Stepper
@@ -49,6 +49,9 @@ def two_disks(scheme=None, conditions=None, gravity=(0.0, -9.8)):
     jelly = ball("jelly", (0.31, 0.13), JELLY, NoFlow(), transfer=scheme.transfer)
     metal = ball("metal", (0.33, 0.36), METAL, flow, transfer=scheme.transfer)
     metal = metal._replace(particles=metal.particles._replace(y=np.full(len(metal.id), 50.0)))
+    if scheme.relaxation:
+        jelly, metal = (body._replace(particles=with_separate_gradient(body.particles))
+                        for body in (jelly, metal))
     bodies = moving(jelly, (0.0, -1.0), 3.0), moving(metal, (0.2, -3.0))
     if conditions is None:
         floor = Collider(half_space((0.0, 0.04), (0.0, 1.0)), "separate", 0.3)

@@ -42,6 +42,10 @@ def test_knobs_change_what_they_name():
     assert scene_at(eps, setting(transfer="apic")).step_scheme.mass_eps == 1e-3
     assert scene_at(eps, setting(transfer="flip 0.95")).step_scheme.mass_eps == 0.0
     assert scene_at(scene, setting(transfer="apic rpic 0.5")).step_scheme.rpic == 0.5
+    relaxed = scene_at(eps, setting(transfer="mls relaxation 1e-3"))
+    assert (relaxed.step_scheme.relaxation, relaxed.step_scheme.mass_eps) == (1e-3, 0.0)
+    assert scene_at(relaxed, setting(transfer="pic")).step_scheme.relaxation == 0.0
+    assert scene_at(relaxed, setting(dx=0.5)).step_scheme.relaxation == 0.5e-3
     assert scene_at(scene, setting(sampling="poisson")).body[0].sampling.per_cell == 2
     assert particles(scene_at(scene, setting(particles=1.5))) == particles(scene) * 9 // 4
     implicit = scene_at(scene, setting(integrator="hot-plus"))
@@ -61,6 +65,12 @@ def test_boundary_is_a_knob_of_scenes_with_colliders():
         scene_at(scene_of(FLIGHT), setting(boundary="surface"))
     assert "boundary" not in {name for knob in single_knobs(scene_of(FLIGHT))
                               for name, _ in knob.items}
+
+
+@pytest.mark.parametrize("text", ["apic 0.5", "mls relaxation", "mls relaxation -1", "flip, 0.9"])
+def test_texts_that_are_no_transfer_are_refused(text):
+    with pytest.raises(SceneError, match=r"expected a text such as mls, flip 0\.95"):
+        scene_at(scene_of(BOUNCE), setting(transfer=text))
 
 
 @pytest.mark.parametrize(("keys", "factor", "longest"), [

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from math import sqrt
 
 import numpy as np
 import pytest
@@ -181,6 +182,8 @@ def test_single_knobs_are_not_those_of_the_scene():
     assert "transfer mls" not in texts
     assert [text for text in texts if "sampling" in text] == ["sampling poisson"]
     assert "degree 1, transfer flip 0.95" in texts
+    crossing = 0.1 / sqrt(1e4 * 0.7 / (1.3 * 0.4) / 1000.0)
+    assert f"transfer mls relaxation {crossing:.3g}" in texts
     assert len(set(texts)) == len(texts)
     implicit = [one.text for one in single_knobs(loads('integrator = "hot"' + FLIGHT))]
     assert "integrator explicit, cfl 0.5" in implicit
@@ -188,6 +191,7 @@ def test_single_knobs_are_not_those_of_the_scene():
     assert "eps 1e-07" not in implicit
     assert "transfer mls" not in implicit           # it has no implicit step
     assert "transfer pic" in implicit
+    assert not any("relaxation" in text for text in implicit)
 
 
 def test_pairs_change_different_knobs():

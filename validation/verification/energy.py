@@ -18,7 +18,7 @@ from mpm_ref.sweep.setting import scene_at, setting
 from ..common.registry import experiment
 from ..common.scenes import SCENES, threads_for
 
-TRANSFERS = ("mls", "apic", "apic rpic 0.1", "flip 0.95", "flip", "pic")
+TRANSFERS = ("mls", "apic", "mls relaxation 0.004", "apic rpic 0.1", "flip 0.95", "flip", "pic")
 CFL = (0.5, 0.25)
 ROUND_OFF = 1e-11           # of the sum of the terms' sizes
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mpm_ref.body import Body, particles_at
+from mpm_ref.body import Body, particles_at, with_separate_gradient
 from mpm_ref.core.boundary import BoxWalls, Conditions
 from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.materials import Fluid, NoFlow
@@ -25,6 +25,13 @@ def body(X, spacing, rho, law, transfer, fluid=False):
     V0 = np.full(len(X), spacing ** X.shape[1])
     at_rest = particles_at(X.copy(), np.zeros_like(X), rho * V0, V0, transfer, fluid=fluid)
     return Body("body", at_rest._replace(b=np.zeros_like(X)), law, NoFlow(), np.arange(len(X)))
+
+
+def fitted(body, scheme):
+    """Return a body whose arrays are those that an `explicit.Scheme` needs."""
+    if not scheme.relaxation:
+        return body
+    return body._replace(particles=with_separate_gradient(body.particles))
 
 
 class Periodic:

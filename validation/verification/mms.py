@@ -16,7 +16,7 @@ from mpm_ref.materials import LogNeoHookean, lame, stiffness
 from ..common.registry import experiment
 from .axis_aligned import AxisAligned, forcing, forcing_by_differences
 from .convergence import order
-from .lattice import Periodic, body, lattice
+from .lattice import Periodic, body, fitted, lattice
 from .manufactured import follow, step_count
 
 E, NU, RHO0, A = 1e7, 0.3, 1000.0, 0.05
@@ -49,11 +49,20 @@ class MmsRun(NamedTuple):
     per: int            # particles per cell and direction
     cells: int          # per side
     dim: int = 2
+    cfl: float = CFL
+    crossings: float = 0.0      # relaxation of the transfer, in times dx/SOUND
+    rpic: float = 0.0           # damping of the strain rate in C
 
     @property
     def dt(self):
         """Return the largest time step [s]."""
-        return CFL / (self.cells * SOUND)
+        return self.cfl / (self.cells * SOUND)
+
+    @property
+    def scheme(self):
+        """Return the `explicit.Scheme` of the run."""
+        relaxation = self.crossings / (self.cells * SOUND)
+        return Scheme(self.degree, self.transfer, rpic=self.rpic, relaxation=relaxation)
 
     @property
     def steps(self):
@@ -65,9 +74,8 @@ def error(case):
     """Return the error of an `MmsRun`, relative to A."""
     d, spacing = case.dim, 1.0 / (case.cells * case.per)
     X = lattice([0.0] * d, [1.0] * d, spacing)
-    square = body(X, spacing, RHO0, LAW, case.transfer)
-    stepper = Stepper(Scheme(case.degree, case.transfer), 1.0 / case.cells, d, np.zeros(d),
-                      Periodic([case.cells] * d))
+    square = fitted(body(X, spacing, RHO0, LAW, case.transfer), case.scheme)
+    stepper = Stepper(case.scheme, 1.0 / case.cells, d, np.zeros(d), Periodic([case.cells] * d))
     return follow(square, AxisAligned(X, LAW, RHO0, A, C), stepper, 2.0 / C, case.dt) / A
 
 

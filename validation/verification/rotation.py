@@ -7,10 +7,11 @@ import numpy as np
 
 from mpm_ref.energy import angular_momentum, energy
 from mpm_ref.scene import Body, Box, Material, Regular, Scene, Scheme, Sphere, Velocity, build
+from mpm_ref.scene.crossing import crossing_time
 from mpm_ref.simulate import simulate
 
 from ..common.registry import experiment
-from ..common.scenes import evenly, threads_for
+from ..common.scenes import evenly, threads_for, with_
 from .symplectic import allowed_gain
 
 RADIUS, DX, SPIN = 0.5, 0.1, 1.0        # [m], [m], [rad/s]
@@ -58,9 +59,13 @@ def spin_matrix(dim):
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
-def spin_history(scene):
-    """Return the `SpinHistory` of a scene; an affine field starts as that of the rotation."""
-    problem, rows = build(scene), []
+def spin_history(scene, crossings=0.0):
+    """Return the `SpinHistory` of a scene; an affine field starts as that of the rotation.
+
+    crossings: relaxation of the transfer, in times in which a wave crosses a cell.
+    """
+    scheme = with_(scene.scheme, relaxation=crossings * crossing_time(scene))
+    problem, rows = build(with_(scene, scheme=scheme)), []
     if problem.scheme.affine:
         problem.bodies[0].particles.C[:] = spin_matrix(scene.dim)
     with threads_for(problem.bodies):

@@ -26,6 +26,7 @@ from mpm_ref.scene import (
     Scheme,
     build,
 )
+from mpm_ref.scene.crossing import crossing_time
 from mpm_ref.simulate import simulate
 
 from ..common.registry import experiment
@@ -56,6 +57,7 @@ class SandColumn(NamedTuple):
     transfer: str = "flip"
     cfl: float = 0.9                # share of the stable time step
     friction_angle: float = 30.0    # degrees
+    crossings: float = 0.0          # relaxation of the transfer, in times dx/c of the sand at rest
 
     @property
     def kind(self):
@@ -93,9 +95,10 @@ def column_scene(column):
     sand = with_(sand, shape=column_shape(dim, height), sampling=Regular(per_cell=2),
                  material=with_(sand.material, flow=flow))
     end = DURATION * sqrt(max(height, WIDTH) / G)
-    return Scene(dim=dim, dx=dx, cfl=column.cfl, end=end, interval=end / FRAMES, body=(sand,),
-                 gravity=tuple(-G * unit(dim - 1, dim)), collider=walls(dim),
-                 scheme=Scheme(transfer=column.transfer))
+    scene = Scene(dim=dim, dx=dx, cfl=column.cfl, end=end, interval=end / FRAMES, body=(sand,),
+                  gravity=tuple(-G * unit(dim - 1, dim)), collider=walls(dim))
+    relaxation = column.crossings * crossing_time(scene)
+    return with_(scene, scheme=Scheme(transfer=column.transfer, relaxation=relaxation))
 
 
 def column_shape(dim, height):

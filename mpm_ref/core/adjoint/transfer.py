@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..jit import CHUNKS, chunk, kernel, parallel, prange
-from ..state import NONE, add_body_force, affine, body_force, full, put_affine, put_full
+from ..state import NONE, add_body_force, affine, body_force, full, put_full
 from ..stencil import (
     add_to_node,
     arm,
@@ -18,11 +18,27 @@ from ..stencil import (
     columns,
     gradient,
     inverse_inertia,
+    locate,
     node,
     of_node,
     product,
+    weights_per_axis,
 )
-from ..tensor import dot, fill, inner, lin, mat, mlin, mv, outer, put_vec, vec, vm
+from ..tensor import (
+    dot,
+    fill,
+    inner,
+    lin,
+    mat,
+    mlin,
+    mv,
+    outer,
+    put_mat,
+    put_vec,
+    vec,
+    vm,
+)
+from ..transfer import minus_old
 from ..transfer_mls3 import fits
 from .shape_gradient import (
     GradientForm,
@@ -36,10 +52,13 @@ from .transfer_mls3 import gather_bars_mls3_all, scatter_bars_mls3_color
 
 
 class Advection(NamedTuple):
-    """Positions of particles before g2p, and the bars of sum_i w_ip v_i."""
+    """Positions of particles before g2p, and the bars of sum_i w_ip v_i and, with relaxation, of
+    C_p - sum_i w_ip v_old_i r_ip^T D^-1, else (0,).
+    """
 
     x: np.ndarray       # (N, d)
     u: np.ndarray       # (N, d)
+    lag_affine: np.ndarray   # (N, d, d)
 
 
 class Exchange(NamedTuple):
@@ -47,7 +66,7 @@ class Exchange(NamedTuple):
 
     stencil: tuple
     dt: float       # [s]
-    flip: float     # share of FLIP; used where the grid carries v_old
+    flip: float     # share of FLIP or of relaxation; used where the grid carries v_old
     mls: bool
 
 
@@ -59,6 +78,7 @@ def scatter_bars(advection, grid, bars, nodes, stencil, members):
     v_i += w_ip U_ip + L_p dw_ip,   v_old_i -= w_ip flip v'_p
     x_p += sum_i (v_i . U_ip - v_old_i . flip v'_p) dw_ip - w_ip (D^-1 C_p)^T v_i
                  + (d^2 w_ip/dx_p^2) L_p^T v_i
+    With relaxation U_old_ip = flip v'_p + D^-1 lag_affine_p r_ip stands for flip v'_p.
     """
     d = grid.m.shape
     D_inv = inverse_inertia(grid.dx, stencil)
@@ -74,12 +94,71 @@ def scatter_bars(advection, grid, bars, nodes, stencil, members):
                 w_ip, v_i = product(k, l, splines.w), of_node(grid.v, i)
                 U_ip = lin(1.0, u, 1.0, mv(B, arm(k, l, splines.s, grid.dx)))
                 add_to_node(nodes.v, i, lin(w_ip, U_ip, 1.0, stretch(bars.L, p, k, l, splines)))
-                add_old(nodes.v_old, i, -w_ip, lag)
-                along = dot(v_i, U_ip) - dot(old(grid.v_old, i, d), lag)
+                r_ip, v_old_i = arm(k, l, splines.s, grid.dx), old(grid.v_old, i, d)
+                U_old_ip = with_lag(lag, advection.lag_affine, p, D_inv, r_ip)
+                add_old(nodes.v_old, i, -w_ip, U_old_ip)
+                along = dot(v_i, U_ip) - dot(v_old_i, U_old_ip)
                 x = lin(1.0, x, along, gradient(k, l, splines.w, splines.dw, grid.dx))
                 turned = stretch_bar(bars.L, p, v_i, k, l, splines)
                 x = lin(1.0, x, 1.0, lin(-w_ip, vm(v_i, B), 1.0, turned))
+                x = plus_lag_arm(x, advection.lag_affine, p, w_ip * D_inv, v_old_i)
         put_vec(bars.x, p, x)
+
+
+@kernel
+def with_lag(lag, lag_affine, p, D_inv, r_ip):
+    """lag + D^-1 lag_affine_p r_ip, where lag_affine is carried (relaxation)."""
+    if lag_affine.ndim == 3:
+        return lin(1.0, lag, D_inv, mv(mat(lag_affine, p, lag), r_ip))
+    else:
+        return lag
+
+
+@kernel
+def plus_lag_arm(x, lag_affine, p, scale, v_old_i):
+    """x + scale lag_affine_p^T v_old_i, where lag_affine is carried: r_ip moves against x_p."""
+    if lag_affine.ndim == 3:
+        return lin(1.0, x, scale, vm(v_old_i, mat(lag_affine, p, x)))
+    else:
+        return x
+
+
+@kernel
+def velocities(particles, grid, stencil, u, lag, bounds):
+    """u_p = sum_i w_ip v_i and lag_p = v_p - sum_i w_ip v_old_i, for the particles bounds[0] ..
+    bounds[1] - 1.
+    """
+    d = grid.m.shape
+    for p in range(bounds[0], bounds[1]):
+        base, s = locate(vec(particles.x, p, d), grid, stencil)
+        w, u_p, lag_p = weights_per_axis(s, stencil), fill(0.0, d), vec(particles.v, p, d)
+        for c in range(columns(s, stencil)):
+            k = column(c, stencil, d)
+            for l in range(len(stencil)):
+                i, w_ip = node(base, k, l), product(k, l, w)
+                u_p = lin(1.0, u_p, w_ip, of_node(grid.v, i))
+                lag_p = minus_old(lag_p, w_ip, grid.v_old, i)
+        put_vec(u, p, u_p)
+        put_vec(lag, p, lag_p)
+
+
+@parallel
+def _velocities(particles, grid, stencil, u, lag):
+    for c in prange(CHUNKS):
+        velocities(particles, grid, stencil, u, lag, chunk(c, len(particles.x)))
+
+
+def add_spin_bars(particles, grid, bars, of_u, how):
+    """Adjoint of `shift_spin`: with A = D^-1 (C_p - C_p^T) of the bars C_p,
+
+    u_p += flip dt/2 A lag_p,    v_p -= flip dt/2 A u_p        (u_p in `of_u`, v_p in `bars`)
+    """
+    u, lag = np.empty_like(of_u), np.empty_like(of_u)
+    _velocities(particles, grid, how.stencil, u, lag)
+    scale = 0.5 * how.flip * how.dt * inverse_inertia(grid.dx, how.stencil)
+    A = scale * (bars.C - np.swapaxes(bars.C, 1, 2))
+    of_u += np.einsum("pab,pb->pa", A, lag)
+    bars.v[:] -= np.einsum("pab,pb->pa", A, u)
 
 
 @kernel
@@ -124,7 +203,8 @@ def gather_bars(particles, nodes, bars, stencil, form, bounds):
     x_p += sum_i m_p phi_ip dw_ip - m_p w_ip C_p^T v_i - V0_p (da_ip/dx_p)^T tau_p^T f_i
     v_p += sum_i w_ip m_p v_i,   m_p += sum_i w_ip phi_ip,   V0_p -= tau_p : sum_i f_i a_ip^T
     b_p += sum_i w_ip m_p f_i    (added to)
-    C_p = sum_i w_ip m_p v_i r_ip^T,   tau_p = -V0_p sum_i f_i a_ip^T       (overwritten)
+    C_p = sum_i w_ip m_p v_i r_ip^T,   tau_p = -V0_p sum_i f_i a_ip^T       (overwritten; with
+    relaxation C_p is added to)
     """
     d = nodes.m.shape
     for p in range(bounds[0], bounds[1]):
@@ -150,11 +230,21 @@ def gather_bars(particles, nodes, bars, stencil, form, bounds):
                 x = lin(1.0, x, -V0, shape_gradient_bar(k, l, splines, vm(f_i, tau), form))
         put_vec(bars.x, p, lin(1.0, x, -m, vm(mv_p, C)))
         put_vec(bars.v, p, lin(1.0, vec(bars.v, p, d), m, mv_p))
-        put_affine(bars.C, p, m, B)
+        put_affine_bar(bars.C, p, m, B, nodes.v_old)
         put_full(bars.tau, p, mlin(-V0, T, 0.0, T))
         add_body_force(bars.b, p, m, f_p)
         bars.m[p] += mass
         bars.V0[p] -= inner(tau, T)
+
+
+@kernel
+def put_affine_bar(C, p, m, B, v_old):
+    """C_p = m B, where an affine field is carried; added to, where the old velocity is as well."""
+    if C.ndim == 3:
+        if v_old.ndim == 1:
+            put_mat(C, p, mlin(m, B, 0.0, B))
+        else:
+            put_mat(C, p, mlin(m, B, 1.0, mat(C, p, v_old.shape[:-1])))
 
 
 @kernel
@@ -179,28 +269,38 @@ def _gather(particles, nodes, bars, stencil, form):
         gather_bars(particles, nodes, bars, stencil, form, chunk(c, len(particles.x)))
 
 
-def g2p_adjoint(x, grid, bars, nodes, how, slabs):
-    """Adjoint of `g2p` of particles at x (N, d): bars of x, v, C, L after it add to those of nodes
-    (v, v_old) and become those of x and v before it.
+def g2p_adjoint(particles, grid, bars, nodes, how, slabs):
+    """Adjoint of `g2p` of particles, of which x (N, d) and with relaxation v are read: bars of x,
+    v, C, L after it add to those of nodes (v, v_old) and become those of x, v and with relaxation
+    C before it.
 
-    Slabs of one colour run in parallel (see `p2g`). Under MLS the bar of C is that of L too, and
-    bars.L is not read.
+    Slabs of one colour run in parallel (see `p2g`). Under MLS without relaxation the bar of C is
+    that of L too, and bars.L is not read.
     """
-    advection = Advection(x, bars.v + how.dt * bars.x)
-    bars.v[:] *= how.flip if grid.v_old.ndim > 1 else 0.0
+    remembers = grid.v_old.ndim > 1
+    relaxed = remembers and bars.C.ndim == 3
+    advection = Advection(particles.x, bars.v + how.dt * bars.x,
+                          how.flip * bars.C if relaxed else NONE)
+    bars.v[:] *= how.flip if remembers else 0.0
+    if relaxed:
+        add_spin_bars(particles, grid, bars, advection.u, how)
+    of_grid = bars
     if how.mls:
-        bars = bars._replace(L=NONE)
-    run = scatter_bars_mls3_color if fits(grid, how.stencil, how.mls) else _scatter_color
+        of_grid = bars._replace(C=bars.C + bars.L if relaxed else bars.C, L=NONE)
+    fast = not remembers and fits(grid, how.stencil, how.mls)
+    run = scatter_bars_mls3_color if fast else _scatter_color
     for color in (0, 1):
         of_color = slabs._replace(start=slabs.start[color:])
-        run(advection, grid, bars, nodes, how.stencil, of_color)
+        run(advection, grid, of_grid, nodes, how.stencil, of_color)
+    if relaxed:
+        bars.C[:] = advection.lag_affine
 
 
 def p2g_adjoint(particles, nodes, bars, how):
     """Adjoint of `p2g`: from the bars `nodes` of m, v, f to those of particles; those of x, v, b,
-    m, V0 are added to, those of C and tau overwritten.
+    m, V0 and with relaxation C are added to, those of tau and else of C overwritten.
     """
-    if fits(nodes, how.stencil, how.mls):
+    if nodes.f.ndim == 1 and fits(nodes, how.stencil, how.mls):
         gather_bars_mls3_all(particles, nodes, bars, how.stencil, how.dt)
         return
     form = GradientForm(how.dt)
