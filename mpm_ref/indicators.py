@@ -3,21 +3,19 @@
     watch = IndicatorWatch(problem)         # before the first step
     watch.news(state, dt)                   # after each: sentences on bounds that were passed
 
-    gap           longest distance [cells] of particles of a solid that were neighbours at the
-                  start: numerical fracture, where they share no node any more
+    gap           by how much farther apart particles of an elastic solid are that were neighbours
+                  at the start [cells]: numerical fracture, where they share no node any more
     dissipation   mechanical energy that the whole run lost, as a share of what could have become
                   motion; only where nothing drives, rubs or flows, so that none should be lost
     dispersion    error of the phase of elastic waves: their crossings of a body so far, over the
                   square of the cells across it, times the share of the motion that deforms it;
-                  implicit steps damp such waves anyway
-    steps         number of steps of a run until a given time
+                  implicit steps and return maps damp such waves anyway
 
 A scheme of second order has waves that are slower by a share (pi/n)^2/24 where half a wave has n
 cells [Trefethen1982], so that crossings add up to an error. The bounds were chosen on other scenes
 than those on which `trade.limits` counts what they notice, and how often in vain.
 """
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -26,18 +24,18 @@ from scipy.spatial import cKDTree
 from .body import Body
 from .core.law import psi
 from .energy import energy
-from .materials import DruckerPrager, NoFlow, stiffness
+from .materials import NoFlow, stiffness
 from .simulate import ended
 
 SAMPLES = 16        # times in a run at which states are measured, besides its end
-GAP, DISPERSION, DISSIPATION, STEPS = 2.5, 1.0, 0.6, 8
+GAP, DISPERSION, DISSIPATION = 2.0, 1.0, 0.6
 
 
 class BodyAtRest(NamedTuple):
-    """What the indicators need of a body's start, in the order of its sampling."""
+    """A body at its start, as the indicators compare it, in the order of its sampling."""
 
     x: np.ndarray           # (N, d) positions [m]
-    neighbours: np.ndarray | None   # (N, 2 d) numbers of the nearest particles; None: not a solid
+    neighbours: np.ndarray | None   # (N, 2 d) numbers of the nearest particles; None: not elastic
     speed: float            # of elastic waves at rest [m/s]
     length: float           # largest extent [m]
     thickness: float        # smallest extent [m]
@@ -49,7 +47,7 @@ def at_rest(body: Body):
     extent = np.ptp(q.x, axis=0) + np.mean(q.V0) ** (1.0 / d)
     speed = np.sqrt(stiffness(body.law) * q.V0.sum() / q.m.sum())
     x = in_order(body, q.x)
-    return BodyAtRest(x, nearest(x, 2 * d) if is_solid(body) else None, float(speed),
+    return BodyAtRest(x, nearest(x, 2 * d) if is_elastic(body) else None, float(speed),
                       float(extent.max()), float(extent.min()))
 
 
@@ -68,16 +66,23 @@ def nearest(x, k):
     return cKDTree(x).query(x, k + 1)[1].reshape(len(x), -1)[:, 1:]
 
 
-def is_solid(body):
-    """Return whether a body's particles are to stay together: it is no fluid and no sand."""
-    return body.particles.F.ndim > 1 and not isinstance(body.flow, DruckerPrager)
+def is_elastic(body):
+    """Return whether a body's particles stay neighbours: it is no fluid, and does not flow."""
+    return body.particles.F.ndim > 1 and isinstance(body.flow, NoFlow)
 
 
 # formulas
 
-def longest_gap(x, neighbours):
-    """Return the longest distance [m] between points x (N, d) and their neighbours (N, k)."""
-    return float(np.sqrt(np.sum((x[neighbours] - x[:, None]) ** 2, axis=2)).max(initial=0.0))
+def widest_gap(X, x, neighbours):
+    """Return by how much farther [m] points are from their neighbours (N, k) at x (N, d) than they
+    were at X, at most; 0 where none is.
+    """
+    return float(np.max(distances(x, neighbours) - distances(X, neighbours), initial=0.0))
+
+
+def distances(x, neighbours):
+    """Return the distances (N, k) [m] of points x (N, d) from their neighbours (N, k)."""
+    return np.sqrt(np.sum((x[neighbours] - x[:, None]) ** 2, axis=2))
 
 
 def deformation_share(X, x):
@@ -122,31 +127,27 @@ def conserves_energy(problem):
 # the bounds, and their sentences
 
 class Indicator(NamedTuple):
-    """The bound of an indicator, and its sentence with {value}, {bound}, {body}, {t} [s]."""
+    """The bound that an indicator is not to exceed, and its sentence with {value}, {bound}, {body},
+    {t} [s].
+    """
 
     bound: float
-    is_lowest: bool         # whether values below the bound are noticed, not those above
     sentence: str
     advice: str
 
-    def is_past(self, value):
-        """Return whether a value is past the bound."""
-        return value < self.bound if self.is_lowest else not value <= self.bound
-
 
 INDICATORS = {
-    "gap": Indicator(GAP, False, "particles of body {body!r} that were neighbours are {value:.3g} "
-                     "cells apart (bound {bound:g}) at t = {t:.4g} s: it tears where the grid does "
-                     "not see it whole", "take more points per cell, or less load"),
-    "dissipation": Indicator(DISSIPATION, False, "the run has lost {value:.0%} of its mechanical "
+    "gap": Indicator(GAP, "neighbours of body {body!r} are {value:.3g} cells farther apart at "
+                     "t = {t:.4g} s than at the start (bound {bound:g}): numerical fracture, the "
+                     "body tears where its particles share no node", "take more points per cell, "
+                     "or less load"),
+    "dissipation": Indicator(DISSIPATION, "the run has lost {value:.0%} of its mechanical "
                              "energy (bound {bound:.0%}), though nothing rubs or flows", "take a "
                              "finer grid, or longer steps if they are far below their bound"),
-    "dispersion": Indicator(DISPERSION, False, "elastic waves cross body {body!r} so often on so "
+    "dispersion": Indicator(DISPERSION, "elastic waves cross body {body!r} so often on so "
                             "few cells that their phases err (indicator {value:.3g}, bound "
                             "{bound:g}, from t = {t:.4g} s on)", "take a finer grid, or an earlier "
                             "end"),
-    "steps": Indicator(STEPS, True, "the whole run took {value:.0f} steps (bound {bound:g})",
-                       "take a shorter time step"),
 }
 
 
@@ -188,9 +189,8 @@ class IndicatorWatch:
             return []
         sentences = []
         for name, value, body in self._measured(state):
-            worse: Callable = min if INDICATORS[name].is_lowest else max
-            self._worst[name] = worse(value, self._worst.get(name, value))
-            if INDICATORS[name].is_past(value) and name not in self._reported:
+            self._worst[name] = max(value, self._worst.get(name, value))
+            if value > INDICATORS[name].bound and name not in self._reported:
                 self._reported.add(name)
                 sentences.append(sentence_of(name, value, body, state.t))
         return sentences
@@ -203,10 +203,7 @@ class IndicatorWatch:
             now = energy(state.bodies, self._problem.gravity, self._problem.inertia)
             self._least = min(self._least, now.sum)
             self._lowest = min(self._lowest, now.gravity)
-        if ended(self._problem.clock, state):
-            if self._problem.clock.end is not None:
-                yield "steps", state.step, ""
-            if self._conserves:
+            if ended(self._problem.clock, state):
                 yield "dissipation", energy_lost(self._start, self._least, self._lowest), ""
 
     def _measured_body(self, body, t):
@@ -215,8 +212,8 @@ class IndicatorWatch:
         if not np.isfinite(x).all():            # the monitor says so
             return
         if rest.neighbours is not None:
-            yield "gap", longest_gap(x, rest.neighbours) / dx, body.name
-        if self._problem.integrator == "explicit":
+            yield "gap", widest_gap(rest.x, x, rest.neighbours) / dx, body.name
+        if self._problem.integrator == "explicit" and isinstance(body.flow, NoFlow):
             share = deformation_share(rest.x, x)
             yield "dispersion", phase_error(rest, share, dx, t), body.name
 

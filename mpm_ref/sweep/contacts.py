@@ -1,4 +1,4 @@
-"""Which bodies come near a collider, a wall or another body during a run.
+"""Contacts of bodies with colliders, walls and each other during a run.
 
 Two surfaces are in contact where they come within one cell: particles reach half their spacing
 beyond their position, and the grid joins what shares a node.

@@ -88,7 +88,7 @@ def bounds(run):
     cells = []
     for name, scene in run.progress(scenes_of(names).items(), "scenes"):
         rows = run.cached(name, lambda name=name, scene=scene: cell_rows(
-            name, searched(scene, observed_scene(scene), budget)))
+            name, searched(scene, observed_scene(scene), budget).judge))
         cells += [SearchedCell(*row) for row in rows]
     run.table("cells", COLUMNS, table_rows(cells))
     record_notices(run, cells, FALSE)
@@ -108,7 +108,7 @@ def claims_of(name, scene, budget, rng):
     with open_executor(workers=1) as executor:
         free = SceneRuns(observed, executor, RunStore())
         claims = [list(claim) for claim in compared(name, tested, search.judge.scenes, free)]
-    return claims, cell_rows(name, search)
+    return claims, cell_rows(name, search.judge)
 
 
 def drawn_cells(directions, rng):

@@ -40,6 +40,7 @@ class SearchedCell(NamedTuple):
     limit: str              # of `mpm_ref.limits.cause`
     coarse_error: float     # of the run at 2 dx
     warnings: str           # of CAUSES, with spaces between them
+    message: str            # of a run that did not finish
     values: tuple           # worst values of INDICATORS, NaN where not measured
 
     @property
@@ -70,16 +71,16 @@ def searched(scene, observed, budget):
     return search
 
 
-def cell_rows(name, search):
-    """Return the rows of all cells of a search: lists for `SearchedCell`s."""
-    return [cell_row(name, cell_text(cell), verdict)
-            for cell, verdict in search.judge.verdicts.items()]
+def cell_rows(name, judge):
+    """Return the rows of all cells of a `CellJudge`: lists for `SearchedCell`s."""
+    return [cell_row(name, cell_text(cell), verdict) for cell, verdict in judge.verdicts.items()]
 
 
 def cell_row(name, text, verdict):
     """Return the fields of a `SearchedCell` as a list."""
     return [name, text, verdict.outcome, verdict.error, verdict.tolerance, verdict.limit,
             verdict.coarse_error, " ".join(dict.fromkeys(map(cause_of, verdict.warnings))),
+            verdict.message,
             [verdict.indicators.get(one, np.nan) for one in INDICATORS]]
 
 

@@ -118,11 +118,11 @@ def test_records_count_the_claims():
 
 def test_silent_cells_are_counted_by_their_limits():
     def cell(error, limit, warnings=""):
-        return SearchedCell("toy", "density x 2", WRONG, error, 0.1, limit, 0.4, warnings, ())
+        return SearchedCell("toy", "density x 2", WRONG, error, 0.1, limit, 0.4, warnings, "", ())
     records = Records()
     record_silent(records, [cell(0.15, "resolution"), cell(0.3, "resolution"),
                             cell(0.25, "no convergence"), cell(0.9, "resolution", "gap"),
-                            SearchedCell("toy", "as given", RIGHT, 0.0, 0.1, "", 0.0, "", ())])
+                            SearchedCell("toy", "as given", RIGHT, 0.0, 0.1, "", 0.0, "", "", ())])
     assert records.values == {
         "trade.limits.silent": 3, "trade.limits.far_silent": 2,
         "trade.limits.limit.resolution": 2, "trade.limits.limit.no_convergence": 1,

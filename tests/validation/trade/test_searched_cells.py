@@ -25,12 +25,12 @@ from validation.trade.searched_cells import (
 
 
 def cell(outcome, error, warnings=""):
-    return SearchedCell("toy", "density x 2", outcome, error, 0.1, "resolution", 0.4, warnings,
+    return SearchedCell("toy", "density x 2", outcome, error, 0.1, "resolution", 0.4, warnings, "",
                         (1.0,) * len(INDICATORS))
 
 
-CELLS = (cell(WRONG, 0.15), cell(WRONG, 0.15, "gap"), cell(WRONG, 0.3, "gap steps"),
-         cell(WRONG, np.inf), cell(RIGHT, 0.01), cell(RIGHT, 0.02, "steps"),
+CELLS = (cell(WRONG, 0.15), cell(WRONG, 0.15, "gap"), cell(WRONG, 0.3, "gap dispersion"),
+         cell(WRONG, np.inf), cell(RIGHT, 0.01), cell(RIGHT, 0.02, "dispersion"),
          cell("refused", np.nan, "preflight"))
 
 
@@ -59,7 +59,8 @@ def test_records_have_the_shares_and_each_cause():
     assert records.values == {
         "trade.toy.noticed": 0.5, "trade.toy.far_noticed": 0.5, "trade.toy.false_alarms": 0.5,
         "trade.toy.clear_false_alarms": 0.5,
-        **{f"trade.toy.{cause}": 0 for cause in CAUSES}, "trade.toy.gap": 2, "trade.toy.steps": 1}
+        **{f"trade.toy.{cause}": 0 for cause in CAUSES}, "trade.toy.gap": 2,
+        "trade.toy.dispersion": 1}
     assert records.rules["trade.toy.false_alarms"]["bound"] == 0.05
 
 
@@ -80,19 +81,19 @@ def test_a_warning_has_the_name_of_its_indicator(name):
 
 
 def test_rows_fit_the_columns():
-    verdict = CellVerdict(WRONG, "", 0.2, 0.1, warnings=("gap: a", "gap: b", "steps: c"),
+    verdict = CellVerdict(WRONG, "", 0.2, 0.1, warnings=("gap: a", "gap: b", "dispersion: c"),
                           limit="setting", indicators={"gap": 3.0})
     row = cell_row("toy", "density x 2", verdict)
-    assert row[7] == "gap steps"
+    assert row[7] == "gap dispersion"
     table, = table_rows([SearchedCell(*row)])
     assert len(table) == len(COLUMNS)
     assert table[COLUMNS.index("gap")] == 3.0
-    assert np.isnan(table[COLUMNS.index("steps")])
+    assert np.isnan(table[COLUMNS.index("dispersion")])
 
 
 def test_a_search_gives_rows_of_all_its_cells():
     scene = next(one.scene for one in advice_scenes() if one.name == "flight")
     search = searched(scene, observed_scene(scene), 3.0)        # [s]
-    rows = cell_rows("flight", search)
+    rows = cell_rows("flight", search.judge)
     assert rows[0][:3] == ["flight", "as given", RIGHT]
     assert len(rows) == len(search.judge.verdicts)
