@@ -71,7 +71,8 @@ def explicit_scenes(run):
     map_scenes(run, run.choose(quick=EXPLICIT[:1], standard=EXPLICIT))
 
 
-@experiment("extremes.hot.scenes", title="An elastic bust, each property changed over decades", profiles=("quick", "standard"), budget={"quick": 30, "standard": 500})
+@experiment("extremes.hot.scenes", title="An elastic bust, each property changed over decades",
+            profiles=("quick", "standard"), budget={"quick": 30, "standard": 500})
 def hot_scenes(run):
     """Map a scene of implicit steps."""
     map_scenes(run, HOT)
