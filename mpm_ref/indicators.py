@@ -90,7 +90,7 @@ def deformation_share(X, x):
     square; 0 where nothing moved [Kabsch1976].
     """
     A, b = X - X.mean(axis=0), x - x.mean(axis=0)
-    U, _, Vt = np.linalg.svd(A.T @ b)
+    U, _, Vt = np.linalg.svd(np.einsum("pa,pb->ab", A, b))     # the same bits for any threads
     U[:, -1] *= np.sign(np.linalg.det(U @ Vt))
     motion = np.sum((x - X) ** 2)
     return float(np.sqrt(np.sum((b - A @ U @ Vt) ** 2) / motion)) if motion > 0.0 else 0.0

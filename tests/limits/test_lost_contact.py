@@ -34,7 +34,7 @@ IMPLICIT = 'integrator = "pn-pcg"\nlongest = 0.02\nscheme = { transfer = "apic" 
 
 
 def drop(dim, more):
-    """Return the scene of a ball that meets the floor 0.5 m below it, with what is observed of it."""
+    """Return the scene of a ball that meets the floor 0.5 m below, and its `ObservedRun`."""
     rest = [0.0] * (dim - 1)
     scene = loads(DROP.format(
         dim=dim, gravity=[*rest, -9.8], center=[*rest, 0.7], zero=[*rest, 0.0],
