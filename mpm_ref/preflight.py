@@ -37,7 +37,7 @@ def misplaced(problem):
 def _in_solids(problem):
     """Yield a sentence for each body that is partly in a solid, and for each such solid."""
     for body in problem.bodies:
-        for name, depth in _solids(problem, body.particles.x):
+        for name, depth in depths_in_solids(problem, body.particles.x):
             inside = depth > ON * problem.dx
             if inside.any():
                 yield (f"{inside.sum()} of the {len(depth)} particles of body {body.name!r} start "
@@ -46,11 +46,13 @@ def _in_solids(problem):
                        "it is meant to hold them")
 
 
-def _solids(problem, x):
-    """Yield (name, depth (N,) [m] of the points x in it) of each collider and each wall."""
+def depths_in_solids(problem, x, t=0.0):
+    """Yield (name, depth (N,) [m] of the points x (N, d) in it) of each collider and each wall as
+    they stand at t [s]; negative outside.
+    """
     colliders = getattr(problem.conditions, "colliders", ())
     for name, collider in zip(_names(problem, len(colliders)), colliders, strict=True):
-        yield name, _depth(collider, x)
+        yield name, _depth(collider, x, t)
     walls = getattr(problem.conditions, "walls", None)
     if walls is not None:
         yield from _in_walls(walls, problem.dx, x)
@@ -66,9 +68,9 @@ def _names(problem, n):
     return [f"collider[{k}] {name!r}".removesuffix(" ''") for k, name in enumerate(names)]
 
 
-def _depth(collider, x):
-    """Return the depth of points in the solid of a collider at t = 0 [m]; negative outside."""
-    pose = collider.motion.pose(0.0, 1.0, x.shape[1])
+def _depth(collider, x, t):
+    """Return the depth of points in the solid of a collider at t [s]; negative outside [m]."""
+    pose = collider.motion.pose(t, 1.0, x.shape[1])
     X = pose.origin + (x - pose.center) @ pose.R[0]         # R^T r for each row r
     side = 1.0 if collider.inside else -1.0
     return side * distances(X, collider.shape)

@@ -31,6 +31,7 @@ KINDS = {       # of extremes: ids of experiments without "extremes."
     "outside of training": ("ldm.range", "ldm.mismatch", "nsf.beyond", "nclaw.density"),
     "poor training": ("nclaw.epochs", "nclaw.observed"),
     "damaged files and memory": ("ldm.files", "nsf.damage"),
+    "each property of a scene over decades": ("explicit.scenes", "hot.scenes", "nclaw.scenes"),
     "bounds and guards": ("ldm.bound", "nsf.bound", "nclaw.bound", "nclaw.guard",
                           "nclaw.guarded_body"),
     "every method on the hardest states": ("hot.every_method",),

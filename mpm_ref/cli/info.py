@@ -95,7 +95,8 @@ def of_results(path):
             "stalled": manifest.count_so_far(results.manifest, "stalled"),
             "warnings": [*unsolved(manifest.count_unsolved(results.manifest)),
                          *stalled(manifest.count_so_far(results.manifest, "stalled")),
-                         *manifest.strain_warnings(results.manifest)],
+                         *manifest.strain_warnings(results.manifest),
+                         *manifest.error_warnings(results.manifest)],
         }
 
 

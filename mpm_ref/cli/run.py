@@ -123,6 +123,7 @@ class Bar(Watch):
 
     def __init__(self, request):
         self.request, self.facts, self.energies, self.steps = request, None, "", 0
+        self.warnings = []
         self.bar, self.stack = None, ExitStack()
 
     def __enter__(self):
@@ -179,7 +180,8 @@ class Bar(Watch):
         self.energies = f", {', '.join(said)} J" if said else ""
 
     def warn(self, message):
-        """Say that a learned law is asked what it has not seen."""
+        """Print a warning above the bar, and note it."""
+        self.warnings.append(message)
         with self.bar.external_write_mode(file=sys.stderr):
             warn([message])
 
@@ -210,7 +212,7 @@ def run_scene(problem, bar, options):
     if not outcome.same_code:
         print("mpm-ref: the checkpoint was saved by another version of the code: the run went on, "
               "but not bit for bit", file=sys.stderr)
-    _report(outcome, request, bar.facts)
+    _report(outcome, bar)
     return EXIT[outcome.why]
 
 
@@ -222,9 +224,9 @@ def _broke_off(fault, request):
     end(f"{said}{'' if said.endswith('?') else '.'} {next_}", status)
 
 
-def _report(outcome, request, facts):
-    """Say how the run ended and how to go on."""
-    state = outcome.state
+def _report(outcome, bar):
+    """Say how the run of a `Bar` ended and how to go on."""
+    state, request = outcome.state, bar.request
     warn([*info.unsolved(outcome.unsolved), *info.stalled(state.stalled)])
     if request.json:
         print(as_json({
@@ -232,7 +234,8 @@ def _report(outcome, request, facts):
             "frames": outcome.frames, "unsolved": outcome.unsolved,
             "rejected": state.rejected, "stalled": state.stalled,
             "checkpoint": str(checkpoint_of(request.out)),
-            "state_sha256": checkpoint.digest(state), "problem": facts,
+            "warnings": bar.warnings, "state_sha256": checkpoint.digest(state),
+            "problem": bar.facts,
         }))
     else:
         print(f"{outcome.why}: step {state.step}, t = {state.t:.6g} s, "

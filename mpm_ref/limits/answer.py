@@ -4,13 +4,13 @@ import re
 from math import inf, isfinite, log10
 
 from .. import __version__
-from ..preflight import misplaced
-from ..scene import build, digest
+from ..scene import digest
 from ..sweep.observation import REFUSED, STOPPED
 from .axes import AXIS, MOST_LONGER, UP
+from .cause import RESOLUTION, SETTING, limit_counts
 from .cell import cell_of, cell_text
 from .search import NARROW
-from .verdict import RIGHT, SLACK, UNCHECKED, WRONG
+from .verdict import LOST, RIGHT, SLACK, UNCHECKED, WRONG
 
 MARGIN, TOO_LONG, NOT_CHECKED, BUDGET_END, LAST_RUNG = (
     "failure", "too long", "not checked", "budget", "not tried farther")
@@ -23,19 +23,19 @@ def answer_of(search, scene, name):
 
     Axes are changed by factors; each direction has its margin, what ended it (`end`) and the first
     bad cell. Cells that finished with a wrong result come first, with the warnings that
-    `mpm-ref run` gives of them.
+    `mpm-ref run` gives of them, and `limits` counts these cells by warning or limit.
     """
     judge, scenes = search.judge, search.judge.scenes
     wrong = sorted(search.wrong_cells().items(), key=lambda item: distance(item[0]))
     directions = [direction_facts(one, scenes) for one in search.directions]
     base = judge.base[1.0]
+    wrong = [cell_facts(cell, verdict) for cell, verdict in wrong]
     return {
         "scene": name, "title": scene.title, "digest": digest(scene), "version": __version__,
         "end": scene.end, "error": judge.error, "quantities": list(judge.quantities),
         "tolerance": dict(judge.tolerance), "slack": SLACK, "most_longer": MOST_LONGER,
         "narrow": NARROW, "size": scenes.size, "base": {"outcome": base.outcome, **vars(base.cost)},
-        "wrong": [cell_facts(cell, verdict) | {"warnings": warnings_of(scenes.scene(cell))}
-                  for cell, verdict in wrong],
+        "wrong": wrong, "limits": limit_counts(wrong),
         "nearest": nearest(directions), "directions": directions, "left_out": search.left_out,
         "maps": [map_facts(one) for one in search.maps],
         "cells": [cell_facts(cell, verdict) for cell, verdict in judge.verdicts.items()],
@@ -47,11 +47,6 @@ def answer_of(search, scene, name):
 def distance(cell):
     """Return the decades between a cell and the scene as given, along its farthest axis."""
     return max((abs(log10(factor)) for _, factor in cell), default=0.0)
-
-
-def warnings_of(scene):
-    """Return the warnings that a run of a scene begins with."""
-    return list(misplaced(build(scene)))
 
 
 def cell_facts(cell, verdict):
@@ -90,13 +85,13 @@ def end_of(one):
 
 
 def nearest(directions):
-    """Return the facts of the direction with the least margin to a failure, or None. A refusal
-    counts where nothing else fails: it warns before the run.
+    """Return the facts of the direction with the least margin to a failure, or None. A refusal,
+    which warns before the run, and a lost contact count where nothing else fails.
     """
     failing = [one for one in directions if one["bad"] is not None
                and one["first_bad"]["outcome"] not in (STOPPED, UNCHECKED)]
-    return min(failing, key=lambda one: (one["first_bad"]["outcome"] == REFUSED, one["margin"]),
-               default=None)
+    return min(failing, key=lambda one: (one["first_bad"]["outcome"] in (REFUSED, LOST),
+                                         one["margin"]), default=None)
 
 
 def map_facts(one):
@@ -121,24 +116,35 @@ def answer_lines(facts):
 def wrong_lines(facts):
     """Return the cells that finished with a wrong result, those without a warning first."""
     cells = sorted(facts["wrong"], key=lambda one: bool(one["warnings"]))
-    silent = sum(not one["warnings"] for one in cells)
     if not cells:
         return ["no cell finished with a wrong result"]
-    lines = [f"finished and wrong: {len(cells)} of {len(facts['cells'])} cells, {silent} of them "
-             "without a warning"]
+    lines = [f"finished and wrong: {len(cells)} of {len(facts['cells'])} cells, "
+             f"{counts_text(facts['limits'])}"]
     for one in cells[:SHOWN_WRONG]:
         notice = f"; warning: {one['warnings'][0]}" if one["warnings"] else ""
-        lines.append(f"  {one['text']}: {wrong_text(one)}, beside {one['reference']}"
-                     f"{notice}")
+        lines.append(f"  {one['text']}: {wrong_text(one)}{notice}")
     if len(cells) > SHOWN_WRONG:
         lines.append(f"  {len(cells) - SHOWN_WRONG} more stand in the JSON")
     return lines
 
 
+def counts_text(counts):
+    """Return the numbers of wrong cells by warning or limit as text."""
+    return ", ".join(f"{n} by {name}" for name, n in counts.items())
+
+
 def wrong_text(cell):
-    """Return the error of a cell beside its tolerance."""
-    return (f"{percent(cell['error'])} off in {cell['quantity']} (tolerance "
-            f"{percent(cell['tolerance'])})")
+    """Return the limit that a wrong cell met, with its error beside its tolerance."""
+    return (f"by {cell['limit']}, {percent(cell['error'])} off in {cell['quantity']} (tolerance "
+            f"{percent(cell['tolerance'])}), beside {cell['reference']}{coarse_text(cell)}")
+
+
+def coarse_text(cell):
+    """Return the error of a wrong cell's run at 2 dx, where the limit follows from it."""
+    if cell["limit"] == SETTING or not isfinite(cell["coarse_error"]):
+        return ""
+    less = "" if cell["limit"] == RESOLUTION else " no more than"
+    return f", where 2 dx is{less} {percent(cell['coarse_error'])} off"
 
 
 def nearest_lines(facts):
@@ -175,7 +181,7 @@ def changed(facts, key):
 def reason(cell):
     """Return why a cell is not right, in the first clause of its message."""
     if cell["outcome"] == WRONG:
-        return f"wrong, {wrong_text(cell)}, beside {cell['reference']}"
+        return f"wrong {wrong_text(cell)}"
     if cell["outcome"] == STOPPED:
         return f"the run takes more than {MOST_LONGER:g} times as long as now"
     if cell["outcome"] == UNCHECKED:
@@ -212,7 +218,7 @@ def map_lines(facts):
         judged = [cell for cell in cells if cell["outcome"] is not None]
         alone = {(*cell["factors"].items(),)[0]: cell["outcome"] for cell in judged
                  if len(cell["factors"]) == 1}
-        both = [cell for cell in judged if cell["outcome"] not in (RIGHT, STOPPED, UNCHECKED)
+        both = [cell for cell in judged if cell["outcome"] not in (RIGHT, STOPPED, UNCHECKED, LOST)
                 and len(cell["factors"]) == 2
                 and all(alone.get(pair) == RIGHT for pair in cell["factors"].items())]
         right = sum(cell["outcome"] == RIGHT for cell in judged)

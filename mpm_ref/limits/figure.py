@@ -7,12 +7,13 @@ from math import log10
 
 from ..store.atomic import replacing
 from ..sweep.observation import CRASHED, REFUSED, STOPPED, UNSTABLE
-from .answer import BUDGET_END, LAST_RUNG, number
+from .answer import BUDGET_END, LAST_RUNG, counts_text, number
 from .axes import UP
-from .verdict import RIGHT, UNCHECKED, WRONG
+from .verdict import LOST, RIGHT, UNCHECKED, WRONG
 
-COLOURS = {RIGHT: "#4c9f70", WRONG: "#c0392b", UNSTABLE: "#e08e2b", REFUSED: "#7a6fb0",
-           STOPPED: "#9aa5b1", UNCHECKED: "#cfd6dd", CRASHED: "#222222", None: "white"}
+COLOURS = {RIGHT: "#4c9f70", WRONG: "#c0392b", LOST: "#3b7fb5", UNSTABLE: "#e08e2b",
+           REFUSED: "#7a6fb0", STOPPED: "#9aa5b1", UNCHECKED: "#cfd6dd", CRASHED: "#222222",
+           None: "white"}
 NAMES = {WRONG: "finished and wrong", None: "not run"}      # of outcomes in the legend
 DECADES = 3.3               # shown on each side; a longer bar is cut, and its number says how far
 ROW, BAR = 0.42, 0.62       # height of an axis [inch], share of it that its bar takes
@@ -41,6 +42,8 @@ def draw_limits(facts):
         for axes, one in zip(parts[1].subplots(1, len(maps), squeeze=False)[0], maps, strict=True):
             draw_map(axes, one)
     explain_colours(figure, facts, maps)
+    if facts["wrong"]:
+        figure.supxlabel(f"finished and wrong: {counts_text(facts['limits'])}", fontsize=7)
     return figure
 
 
@@ -78,6 +81,8 @@ def draw_bar(axes, row, one):
         axes.plot(2 * [sign * end], [row - 0.5 * BAR, row + 0.5 * BAR], linewidth=3.0,
                   color=COLOURS[one["first_bad"]["outcome"]], solid_capstyle="butt")
     text = number(one["margin"]) + {BUDGET_END: " ?", LAST_RUNG: " +"}.get(one["end"], "")
+    if one["bad"] is not None and one["first_bad"]["limit"]:
+        text += f" {one['first_bad']['limit']}"
     inside = length > 0.6 * DECADES
     place = sign * (length - 0.06) if inside else sign * (end + 0.08)
     axes.text(place, row, text, fontsize=7, va="center", color="white" if inside else "0.2",

@@ -13,10 +13,10 @@ from .answer import (
     wrong_lines,
 )
 from .figure import COLOURS, DECADES, NAMES
-from .verdict import RIGHT, UNCHECKED, WRONG
+from .verdict import LOST, RIGHT, UNCHECKED, WRONG
 
-MARKS = {RIGHT: "✓", WRONG: "W", UNSTABLE: "U", REFUSED: "R", STOPPED: "T", UNCHECKED: "?",
-         CRASHED: "C", None: "·"}       # of outcomes, beside their colours
+MARKS = {RIGHT: "✓", WRONG: "W", LOST: "L", UNSTABLE: "U", REFUSED: "R", STOPPED: "T",
+         UNCHECKED: "?", CRASHED: "C", None: "·"}       # of outcomes, beside their colours
 ENDS = {LAST_RUNG: (RIGHT, "right as far as was tried"),
         BUDGET_END: (None, "the budget ended the search")}      # of directions without a failure
 

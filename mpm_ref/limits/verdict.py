@@ -12,12 +12,16 @@ quantity, or with "@end" the last one, relative to its largest change during the
   since two coarse grids may agree by chance.
 * Cells that change numerical axes alone are compared with the scene as given at dx/2, which is one
   run for all of them; of shifted scenes the changes since the start are compared.
+* A wrong cell has the name of its limit (see `cause`), for which its run at 2 dx is compared with
+  that at dx/2 as well, and the warnings of its run.
+* A cell that changes the physical problem and has no contact that the scene as given has is another
+  scene, whether it is right or wrong: its contact is lost.
 * A cell is not checked where its run at dx/2 does not finish.
 * A run is too long if it takes more than `MOST_LONGER` times the CPU time of the scene as given, on
   the grid of that run. Runs that the budget ended have no verdict.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from math import isfinite
 
 import numpy as np
@@ -27,10 +31,11 @@ from ..sweep.observation import CRASHED, REFUSED, STOPPED, UNSTABLE
 from ..sweep.quantity import OutputQuantity
 from ..sweep.runs import RunRequest
 from .axes import AXIS, MOST_LONGER
+from .cause import limit_of
 from .cell import COARSE, FINE, CellScenes, cell_text, physical
 
-RIGHT, WRONG, UNCHECKED = "right", "wrong", "not checked"
-OUTCOMES = (RIGHT, WRONG, UNCHECKED, UNSTABLE, REFUSED, STOPPED, CRASHED)
+RIGHT, WRONG, UNCHECKED, LOST = "right", "wrong", "not checked", "contact lost"
+OUTCOMES = (RIGHT, WRONG, UNCHECKED, LOST, UNSTABLE, REFUSED, STOPPED, CRASHED)
 SLACK = 2.0             # times the scene's own difference from its refinement
 LEAST_CPU = 2.0         # [s] that any run may take
 BUDGET = 0.9            # of the CPU time allowed, below which a stopped run was stopped early
@@ -50,6 +55,10 @@ class CellVerdict:
     cpu: float = np.nan         # [s] of the cell's run
     steps: int = 0
     until: float = 0.0          # [s] that it reached
+    warnings: tuple = ()        # of the cell's run
+    limit: str = ""             # of a wrong cell, of `cause.LIMITS`
+    coarse_error: float = np.nan        # of the run at 2 dx of a wrong cell, as `error`
+    indicators: dict = field(default_factory=dict)      # {name: worst value} of the cell's run
 
     @property
     def is_right(self):
@@ -124,7 +133,8 @@ class CellJudge:
         for cell in new:
             if not runs[cell].finished:
                 self._note(cell, self._unfinished(runs[cell], self._most(1.0)))
-        stages = [self._by_the_scene, self._by_coarse_grids, self._by_fine_grids]
+        stages = [self._by_contacts, self._by_the_scene, self._by_coarse_grids,
+                  self._by_fine_grids]
         if by_fine_grids:
             stages.remove(self._by_coarse_grids)
         for stage in stages:
@@ -145,7 +155,21 @@ class CellJudge:
         if verdict is not None:
             self.verdicts[cell] = verdict
 
-    # three kinds of references; each returns the verdicts that it can give
+    # what the verdicts rest on; each returns those that it can give
+
+    def _by_contacts(self, runs):
+        """Return the verdicts on cells with a physical change that lost a contact of the scene as
+        given.
+        """
+        verdicts = {}
+        for cell, run in runs.items():
+            lost = [text for text in self.base[1.0].contacts if text not in run.contacts]
+            if lost and physical(cell):
+                verdicts[cell] = CellVerdict(
+                    LOST, f"no contact of {lost[0]}, which the scene as given has",
+                    cpu=run.cost.cpu, steps=run.cost.steps, until=run.until,
+                    warnings=run.warnings)
+        return verdicts
 
     def _by_the_scene(self, runs):
         """Compare cells of numerical axes alone with the scene as given at dx/2."""
@@ -171,7 +195,23 @@ class CellJudge:
                 verdicts[cell] = self._compared(run, reference, cell, AT_FINE)
             else:
                 verdicts[cell] = self._unchecked(run, reference)
-        return verdicts
+        return verdicts | self._with_coarse_errors(verdicts, fine)
+
+    def _with_coarse_errors(self, verdicts, fine):
+        """Return the verdicts that are wrong, with the error of their runs at 2 dx and the limit
+        that follows from it; fine: the runs at dx/2 of {physical cell}.
+        """
+        wrong = {cell: one for cell, one in verdicts.items()
+                 if one is not None and one.outcome == WRONG}
+        coarse = self._companions(wrong, COARSE)
+        named = {}
+        for cell, one in wrong.items():
+            own = physical(cell)
+            error = self._differences(coarse[own], fine[own], False)[one.quantity]
+            is_setting = own != cell and own in self.verdicts and self.verdicts[own].is_right
+            named[cell] = replace(one, coarse_error=error,
+                                  limit=limit_of(one.error, error, is_setting))
+        return named
 
     def _companions(self, cells, dx):
         """Return {physical cell: `RunObservation` at dx times a factor}."""
@@ -216,8 +256,10 @@ class CellJudge:
         errors = self._differences(run, reference, shifted)
         worst = max(errors, key=lambda name: errors[name] / self.tolerance[name])
         outcome = RIGHT if errors[worst] <= self.tolerance[worst] else WRONG
+        limit = limit_of(errors[worst], np.nan, not physical(cell)) if outcome == WRONG else ""
         return CellVerdict(outcome, "", errors[worst], self.tolerance[worst], worst, text,
-                           run.cost.cpu, run.cost.steps, run.until)
+                           run.cost.cpu, run.cost.steps, run.until, run.warnings, limit,
+                           indicators=run.indicators)
 
     def _differences(self, run, reference, shifted):
         """Return {quantity: largest relative difference of two runs}."""

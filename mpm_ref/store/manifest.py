@@ -138,6 +138,11 @@ def strain_warnings(facts):
     return [one for part in facts.get("parts", ()) for one in part.get("strain_warnings", ())]
 
 
+def error_warnings(facts):
+    """Return all warnings in a manifest about errors that the run showed in itself."""
+    return [one for part in facts.get("parts", ()) for one in part.get("error_warnings", ())]
+
+
 @dataclass
 class RunPart:
     """One uninterrupted part of a run, from its start or a checkpoint to where it ended."""
@@ -145,6 +150,7 @@ class RunPart:
     first_step: int
     unsolved: int = 0
     strain_warnings: list = field(default_factory=list)      # sentences of `nclaw.strain_watch`
+    error_warnings: list = field(default_factory=list)       # sentences of `indicators`
     cut_particle_steps: dict = field(default_factory=dict)   # {body: count}, see `learned.guard`
     energy_budget: dict = field(default_factory=dict)       # [J], see `energy_budget`
     code: dict = field(default_factory=code)
@@ -157,8 +163,8 @@ class RunPart:
 
         It says why and where the part ended, the resources used, the number of implicit steps that
         did not converge, the rejected and stalled steps of the whole run so far, the warnings about
-        strains, how often the guard of a learned law cut them, the energy budget, the sha256 of the
-        last state, and the code.
+        strains and about errors that the run showed, how often the guard of a learned law cut
+        strains, the energy budget, the sha256 of the last state, and the code.
         """
         return {
             "began": self.began,
@@ -174,6 +180,7 @@ class RunPart:
             "rejected": state.rejected,
             "stalled": state.stalled,
             "strain_warnings": self.strain_warnings,
+            "error_warnings": self.error_warnings,
             "cut_particle_steps": self.cut_particle_steps,
             "energy_budget": self.energy_budget,
             "state_sha256": digest,

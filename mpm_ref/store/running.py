@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ..energy import energy
+from ..indicators import IndicatorWatch
 from ..monitor import Unstable, check
 from ..nclaw.strain_watch import strain_watch
 from ..simulate import Frame, ended, frame_is_due, simulate, start
@@ -187,7 +188,9 @@ class Watch:
         """Note that a frame with its energy was stored."""
 
     def warn(self, message):
-        """Note a warning that strains exceed the training of a law (see `nclaw.strain_watch`)."""
+        """Note a warning that strains exceed the training of a law (see `nclaw.strain_watch`), or
+        of an error that the run shows (see `indicators`).
+        """
 
 
 class _Stop(Exception):
@@ -211,7 +214,7 @@ class Session:
         self.state, self.part, self.dt, self.asked = None, None, 0.0, None
         self.shown = self.saved = None        # steps at which a frame, a checkpoint was last stored
         self.saved_at = time.perf_counter()
-        self.range = strain_watch(problem)
+        self.range, self.indicators = strain_watch(problem), IndicatorWatch(problem)
 
     def loop(self, state):
         """Run from a state and return why the run ended (see `RunOutcome`)."""
@@ -239,15 +242,16 @@ class Session:
         self.state, self.dt = state, dt
         self.part.unsolved += state.solve is not None and not state.solve.converged
         self.watch.step(state, dt)
+        self.warn(self.indicators.news(state, dt), self.part.error_warnings)
         if self.range is not None:
             self.range.count(state)
-            self.warn(self.range.news(state))
+            self.warn(self.range.news(state), self.part.strain_warnings)
         if not frame_is_due(self.problem.clock, state):
             self.save_or_stop()
 
-    def warn(self, sentences):
-        """Add warnings about learned laws to this part of the run, and pass them to the watch."""
-        self.part.strain_warnings += sentences
+    def warn(self, sentences, warnings):
+        """Add sentences to the warnings of this part of the run, and pass them to the watch."""
+        warnings += sentences
         for message in sentences:
             self.watch.warn(message)
 
@@ -308,7 +312,7 @@ class Session:
         """Add this part of the run to the manifest."""
         if self.range is not None:
             self.part.cut_particle_steps = self.range.cut
-            self.warn(self.range.summary())
+            self.warn(self.range.summary(), self.part.strain_warnings)
         if self.problem.budget is not None:
             self.part.energy_budget = self.problem.budget.facts()
         facts = self.writer.manifest

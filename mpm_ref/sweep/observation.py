@@ -1,7 +1,7 @@
 """One run of a scene, observed: quantities at given times, cost, and how the run ended."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -9,13 +9,16 @@ import numpy as np
 from ..core import kernel_cache
 from ..core.grid import OutOfRange
 from ..executor import stop_asked
+from ..indicators import IndicatorWatch
 from ..monitor import Unstable
+from ..preflight import misplaced
 from ..scene import build
 from ..scene.toml import parse
 from ..scene.validate import validate_scene
 from ..simulate import simulate
 from ..timestep import TooLarge
 from .conditions import record_impulses
+from .contacts import ContactRecorder
 from .probes import initial_order, interpolation
 from .quantity import OutputQuantity, Snapshot
 
@@ -51,13 +54,18 @@ class RunCost:
 
 @dataclass(frozen=True)
 class RunObservation:
-    """The values of each quantity (T, k), NaN after the run stopped; its cost and its end."""
+    """The values of each quantity (T, k), NaN after the run stopped; its cost and its end, and
+    what it warned of.
+    """
 
     values: dict
     cost: RunCost
     outcome: str            # FINISHED, UNSTABLE, REFUSED, STOPPED, CRASHED
     message: str = ""
     until: float = 0.0      # [s] that the run reached
+    warnings: tuple = ()    # sentences of `preflight` and `indicators`
+    indicators: dict = field(default_factory=dict)      # {name: worst value}: `indicators`
+    contacts: tuple = ()    # texts of `contacts`
 
     @property
     def finished(self):
@@ -115,6 +123,9 @@ class RunObserver:
         self._rows, self._before, self._t = [], None, 0.0
         self._clock = StepClock()
         self._nodes = 0
+        self._contacts = ContactRecorder(problem)
+        self._indicators = IndicatorWatch(problem)
+        self._warnings = misplaced(problem)
 
     def start(self):
         """Sample the first state, and start the clock."""
@@ -127,6 +138,7 @@ class RunObserver:
         """Count a step, and sample the quantities where a time of observation is near."""
         self._clock.stop()
         self._t = state.t
+        self._warnings += self._indicators.news(state, dt)
         times, k = self._run.times, len(self._rows)
         if k < len(times) and state.t + NEAR * dt >= times[k]:
             self._sample_step(state.t, times)
@@ -149,6 +161,7 @@ class RunObserver:
 
     def _sample(self):
         bodies = self._problem.bodies
+        self._contacts.note(bodies, self._t)
         probes = {body.name: self._weights[body.name] @ initial_order(body) for body in bodies
                   if body.name in self._weights}
         impulses = {} if self._recorder is None else self._recorder.impulses()
@@ -169,7 +182,8 @@ class RunObserver:
         particles = sum(len(body.id) for body in self._problem.bodies)
         cost = RunCost(*self._clock.total(), self._clock.steps, particles,
                        bytes_of(self._problem.bodies) + self._nodes)
-        return RunObservation(values, cost, outcome, message, self._t)
+        return RunObservation(values, cost, outcome, message, self._t, tuple(self._warnings),
+                              self._indicators.values(), tuple(self._contacts.contacts))
 
 
 class StepClock:

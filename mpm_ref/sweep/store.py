@@ -20,7 +20,7 @@ from .observation import STOPPED, RunCost, RunObservation
 
 PACKAGE = Path(__file__).resolve().parents[1]
 COMPUTES = ("core", "hot", "materials", "sampling", "scene", "shapes", "sweep", "*.py")
-TEXTS = ("outcome", "message", "until")
+PLAIN = ("outcome", "message", "until", "warnings", "indicators", "contacts")
 UNREADABLE = (OSError, EOFError, ValueError, KeyError, TypeError, AttributeError, MemoryError,
               RuntimeError, BadZipFile, zlib.error)       # of a damaged file
 
@@ -76,7 +76,7 @@ def source_hash():
 
 def packed(observation):
     """Return an observation as the bytes of an NPZ file."""
-    facts = {name: getattr(observation, name) for name in TEXTS} | {"cost": vars(observation.cost)}
+    facts = {name: getattr(observation, name) for name in PLAIN} | {"cost": vars(observation.cost)}
     arrays = {f"value {text}": value for text, value in observation.values.items()}
     stream = io.BytesIO()
     np.savez_compressed(stream, facts=np.array(json.dumps(facts)), **arrays)
@@ -91,6 +91,7 @@ def read(path):
             values = {name.removeprefix("value "): file[name] for name in file.files
                       if name != "facts"}
         cost = RunCost(**facts.pop("cost"))
+        facts |= {name: tuple(facts[name]) for name in ("warnings", "contacts")}
         return RunObservation(values, cost, **facts)
     except UNREADABLE:
         return None

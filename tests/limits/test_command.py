@@ -77,9 +77,10 @@ def falling(tmp_path_factory):
 def test_wrong_cells_come_first(falling):
     done, facts, _ = falling
     assert facts["wrong"]
+    assert facts["limits"] == {"setting": len(facts["wrong"])}
     assert done.stdout.startswith(f"finished and wrong: {len(facts['wrong'])} of "
-                                  f"{len(facts['cells'])} cells, {len(facts['wrong'])} of them "
-                                  "without a warning\n  time_step x")
+                                  f"{len(facts['cells'])} cells, {len(facts['wrong'])} by setting"
+                                  "\n  time_step x")
     one = direction(facts, "time_step", "up")
     assert one["first_bad"]["outcome"] == "wrong"
     assert one["first_bad"]["error"] > facts["tolerance"]["positions"]
@@ -97,6 +98,9 @@ def test_figure_shows_margins_and_maps(falling):
     assert len(bars.patches) == 4
     assert len(maps) == len(facts["maps"]) == 1
     assert {text.get_text() for text in figure.legends[0].texts} >= {"right", "finished and wrong"}
+    assert figure.get_supxlabel() == f"finished and wrong: {len(facts['wrong'])} by setting"
+    labels = [text.get_text() for text in bars.texts]
+    assert any(label.endswith(" setting") for label in labels)
     assert (folder / "disk.limits.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -180,7 +184,7 @@ def test_warning_of_a_wrong_cell_is_shown(tmp_path, monkeypatch):
     done, facts = limits(tmp_path, text)
     assert facts["wrong"]
     assert all("start inside collider[0]" in cell["warnings"][0] for cell in facts["wrong"])
-    assert ", 0 of them without a warning" in done.stdout
+    assert f", {len(facts['wrong'])} by a warning of the run\n" in done.stdout
 
 
 def test_interval_is_no_bound_of_a_longer_step(tmp_path, monkeypatch):

@@ -5,11 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mpm_ref.limits.cause import NO_CONVERGENCE, RESOLUTION, SETTING
 from mpm_ref.limits.cell import cell_of
 from mpm_ref.limits.verdict import (
     AS_GIVEN,
     AT_COARSE,
     AT_FINE,
+    LOST,
     RIGHT,
     UNCHECKED,
     WRONG,
@@ -176,6 +178,54 @@ def test_cell_without_reference_is_not_checked():
         runs = labels("density x 2", 3.0, 9.0, observation(outcome=STOPPED, cpu=cpu))
         verdict, _ = verdict_on({"density": 2.0}, **runs)
         assert (verdict and verdict.outcome) == outcome
+
+
+@pytest.mark.parametrize(("coarse", "limit"), [(9.0, RESOLUTION), (2.5, NO_CONVERGENCE),
+                                               (np.nan, RESOLUTION)])
+def test_wrong_cell_has_the_name_of_its_limit(coarse, limit):
+    verdict, judge = verdict_on({"density": 2.0}, **labels("density x 2", 3.0, coarse, 2.0))
+    if coarse == 2.5:                   # it agrees with the cell, so that a fine grid is asked for
+        verdict = judge.judge([cell_of({"density": 2.0})], True)[cell_of({"density": 2.0})]
+    assert (verdict.outcome, verdict.limit) == (WRONG, limit)
+    expected = np.inf if np.isnan(coarse) else abs(coarse - 2.0) / 2.0
+    assert verdict.coarse_error == pytest.approx(expected)
+
+
+def test_numerical_axes_meet_the_limit_of_a_setting():
+    verdict, _ = verdict_on({"time_step": 0.5}, **{"time_step x 0.5": 1.25})
+    assert (verdict.outcome, verdict.limit) == (WRONG, SETTING)
+    assert verdict_on({"time_step": 0.5}, **{"time_step x 0.5": 1.15})[0].limit == ""
+
+
+@pytest.mark.parametrize(("own", "limit"), [(3.0, SETTING), (4.5, RESOLUTION)])
+def test_mixed_cell_meets_the_limit_of_a_setting_where_its_physical_problem_is_right(own, limit):
+    judge = judge_of(**labels("density x 2", own, 6.0, 3.0),
+                     **{"time_step x 0.5, density x 2": 4.0})
+    physical, mixed = cell_of({"density": 2.0}), cell_of({"time_step": 0.5, "density": 2.0})
+    judge.judge([physical])
+    verdict = judge.judge([mixed])[mixed]
+    assert (verdict.outcome, verdict.limit) == (WRONG, limit)
+
+
+def test_warnings_and_indicators_of_the_run_belong_to_the_verdict():
+    own = replace(observation(3.0), warnings=("gap: wide",), indicators={"gap": 3.0})
+    verdict, _ = verdict_on({"density": 2.0}, **labels("density x 2", own, 3.5))
+    assert verdict.outcome == RIGHT
+    assert (verdict.warnings, verdict.indicators) == (("gap: wide",), {"gap": 3.0})
+
+
+@pytest.mark.parametrize(("factors", "outcome"), [({"size": 2.0}, LOST), ({"density": 2.0}, LOST),
+                                                  ({"time_step": 0.5}, RIGHT)])
+def test_scene_without_a_contact_is_another_scene(factors, outcome):
+    text = ", ".join(f"{name} x {factor:g}" for name, factor in factors.items())
+    base = {label: replace(observation(x), contacts=("body 'block' with the floor",))
+            for label, x in BASE.items()}
+    verdict, judge = verdict_on(factors, **base, **{text: 1.1, f"{text}, 2 dx": 1.1})
+    assert verdict.outcome == outcome
+    if outcome == LOST:
+        assert verdict.message == ("no contact of body 'block' with the floor, which the scene as "
+                                   "given has")
+        assert f"{text}, 2 dx" not in judge.runs.requests
 
 
 def test_missing_values_are_no_agreement():

@@ -37,6 +37,7 @@ FLOORS = (
     ("hot", "rom", "nclaw"),
     ("problem", "shapes", "attempt"),
     ("simulate", "sampling", "preflight"),
+    ("indicators",),
     ("scene",),
     ("store store.*",),     # but for its modules on lower floors
     ("executor",),

@@ -9,31 +9,40 @@ it differs from its reference by at most twice as much as the scene as given dif
 from math import log10
 from typing import NamedTuple
 
-import msgspec
 import numpy as np
 
 from mpm_ref.executor import open_executor
-from mpm_ref.limits.answer import warnings_of
+from mpm_ref.limits.cause import LIMITS
 from mpm_ref.limits.cell import cell_of, cell_text, physical
-from mpm_ref.limits.search import LimitsSearch
-from mpm_ref.limits.verdict import RIGHT, SLACK, WRONG, CellJudge, differences
-from mpm_ref.scene import SceneError, build, digest
-from mpm_ref.sweep.observation import ObservedRun
-from mpm_ref.sweep.probes import choose_probes
+from mpm_ref.limits.verdict import RIGHT, SLACK, WRONG, differences
+from mpm_ref.scene import SceneError
 from mpm_ref.sweep.runs import RunRequest, SceneRuns
 from mpm_ref.sweep.store import RunStore
 
 from ..common.registry import experiment
 from ..common.seeding import generator
-from .advice_scenes import advice_scenes
+from .advice_scenes import TUNED, advice_scenes
+from .searched_cells import (
+    COLUMNS,
+    ERROR,
+    QUANTITY,
+    SearchedCell,
+    cell_rows,
+    observed_scene,
+    record_notices,
+    searched,
+    silent_cells,
+    table_rows,
+)
 
 JUDGED = ("slide", "stick", "swing", "lean", "dam", "sand", "splash", "impact")
-QUANTITY, ERROR, TIMES = "positions", 0.05, 17
+CHOSEN = (*TUNED, "shove", "roll")     # for the bounds of `mpm_ref.indicators`
 FINER = 0.25            # factor of dx of the reference
 DRAWS = 3               # factors of a direction
 KEPT = 0.95             # the aim: share of claims that are right
+FALSE = 0.05            # the aim: share of right cells that have a warning
 LONGEST = 60.0          # [s] of CPU time of one run
-COLUMNS = ("scene", "cell", "claim", "error", "tolerance", "status")
+CLAIMS = ("scene", "cell", "claim", "error", "tolerance", "status")
 
 
 class Claim(NamedTuple):
@@ -52,42 +61,54 @@ class Claim(NamedTuple):
 @experiment("trade.limits", title="The claims of `mpm-ref limits`, on cells that it did not run",
             profiles=("quick", "standard"), budget={"quick": 60, "standard": 2400})
 def limits(run):
-    """Judge the claims on all scenes."""
+    """Judge the claims on all scenes, and the warnings of the runs of their searches."""
     names = run.choose(quick=("dam",), standard=JUDGED)
-    scenes = {one.name: one.scene for one in advice_scenes() if one.name in names}
     budget = run.choose(quick=10.0, standard=np.inf)
-    claims, silent, cells = [], 0, 0
-    for name, scene in run.progress(scenes.items(), "scenes"):
+    claims, cells = [], []
+    for name, scene in run.progress(scenes_of(names).items(), "scenes"):
         rng = generator(run.seed, f"{run.experiment.id}.{name}")
-        rows, counts = run.cached(name, lambda name=name, scene=scene, rng=rng: claims_of(
+        rows, of_search = run.cached(name, lambda name=name, scene=scene, rng=rng: claims_of(
             name, scene, budget, rng))
         claims += [Claim(*row) for row in rows]
-        silent, cells = silent + counts[0], cells + counts[1]
-    run.table("claims", COLUMNS, claims)
-    record_claims(run, claims, silent, cells)
+        cells += [SearchedCell(*row) for row in of_search]
+    run.table("claims", CLAIMS, claims)
+    run.table("cells", COLUMNS, table_rows(cells))
+    record_claims(run, claims, len(cells))
+    record_notices(run, cells, FALSE)
+    record_silent(run, cells)
+
+
+@experiment("trade.bounds", title="The bounds of the indicators of error, on the scenes on which "
+            "they were chosen", profiles=("quick", "standard"),
+            budget={"quick": 60, "standard": 2400})
+def bounds(run):
+    """Count what the bounds notice on the scenes on which they were chosen."""
+    names = run.choose(quick=("spin",), standard=CHOSEN)
+    budget = run.choose(quick=10.0, standard=np.inf)
+    cells = []
+    for name, scene in run.progress(scenes_of(names).items(), "scenes"):
+        rows = run.cached(name, lambda name=name, scene=scene: cell_rows(
+            name, searched(scene, observed_scene(scene), budget).judge))
+        cells += [SearchedCell(*row) for row in rows]
+    run.table("cells", COLUMNS, table_rows(cells))
+    record_notices(run, cells, FALSE)
+
+
+def scenes_of(names):
+    """Return {name: scene} of some scenes of advice."""
+    return {one.name: one.scene for one in advice_scenes() if one.name in names}
 
 
 def claims_of(name, scene, budget, rng):
-    """Return the `Claim`s about a scene as lists, and [the number of wrong cells without a warning,
-    that of all cells].
-    """
-    probes = tuple((p.body, p.X) for p in choose_probes(build(scene).bodies))
-    times = tuple(np.linspace(0.0, scene.end, TIMES).tolist())
-    observed = ObservedRun(msgspec.json.encode(scene).decode(), digest(scene), (QUANTITY,), times,
-                           probes)
+    """Return the `Claim`s about a scene as lists, and the rows of the cells of its search."""
+    observed = observed_scene(scene)
+    search = searched(scene, observed, budget)
+    tested = {cell: RIGHT for cell in drawn_cells(search.directions, rng)}
+    tested |= {cell: WRONG for cell in search.wrong_cells() if len(cell) == 1}
     with open_executor(workers=1) as executor:
-        runs = SceneRuns(observed, executor, RunStore(), budget)
-        judge = CellJudge(scene, runs, probes, (QUANTITY,), ERROR)
-        judge.start()
-        search = LimitsSearch(judge)
-        search.run()
-        wrong = search.wrong_cells()
-        tested = {cell: RIGHT for cell in drawn_cells(search.directions, rng)}
-        tested |= {cell: WRONG for cell in wrong if len(cell) == 1}
         free = SceneRuns(observed, executor, RunStore())
-        claims = [list(claim) for claim in compared(name, tested, judge.scenes, free)]
-    silent = sum(not warnings_of(judge.scenes.scene(cell)) for cell in wrong)
-    return claims, [silent, len(judge.verdicts)]
+        claims = [list(claim) for claim in compared(name, tested, search.judge.scenes, free)]
+    return claims, cell_rows(name, search.judge)
 
 
 def drawn_cells(directions, rng):
@@ -112,7 +133,7 @@ def compared(name, cells, scenes, runs):
         if ours.finished and not reference.finished:
             status = f"the reference: {reference.outcome}"
         elif ours.finished:
-            error = difference(ours, reference)
+            error = difference(ours, reference, "origin" in dict(cell))
             status = RIGHT if error <= tolerance else WRONG
         yield Claim(name, cell_text(cell), claim, error, tolerance, status)
 
@@ -125,13 +146,13 @@ def request(scenes, cell, dx):
     return RunRequest(scene, LONGEST, probes=scenes.probes(cell))
 
 
-def difference(run, reference):
-    """Return the largest relative difference of two runs."""
-    return float(differences(run.values[QUANTITY], reference.values[QUANTITY], False).max())
+def difference(run, reference, shifted=False):
+    """Return the largest relative difference of two runs; shifted: of their changes."""
+    return float(differences(run.values[QUANTITY], reference.values[QUANTITY], shifted).max())
 
 
-def record_claims(run, claims, silent, cells):
-    """Record the share of claims that a finer reference confirms."""
+def record_claims(run, claims, cells):
+    """Record the share of claims that a finer reference confirms; cells: number of all cells."""
     scale = f"{len({one.scene for one in claims})} scenes, {cells} cells of their searches"
     for claim, words, rule in (
             (RIGHT, "cells between 1 and the farthest factor that is right",
@@ -145,5 +166,21 @@ def record_claims(run, claims, silent, cells):
                    "the spacing confirms" + "".join(
                        f"; {one.scene} {one.cell}: {one.status} {one.error:.3g}"
                        for one in others[:10]), **rule)
-    run.record("trade.limits.silent", silent, unit="cells", comparator="<=", bound=0, scale=scale,
-               note="cells that finish with a wrong result, without a warning as the run begins")
+
+
+def record_silent(run, cells):
+    """Record the wrong `SearchedCell`s that their runs do not notice, by the limits that the search
+    names.
+    """
+    silent = silent_cells(cells)
+    far = [one for one in silent if one.is_far]
+    scale = f"{len({one.scene for one in cells})} scenes, {len(cells)} cells of their searches"
+    for name, group, words in (("silent", silent, ""), ("far_silent", far, ", far from right")):
+        run.record(f"trade.limits.{name}", len(group), unit="cells", comparator="<=", bound=0,
+                   scale=scale, note=f"cells with a wrong result without a warning of their run"
+                   f"{words}" + "".join(f"; {one.scene} {one.cell}: {one.error:.3g} (tolerance "
+                                        f"{one.tolerance:.3g}), {one.limit}" for one in group[:5]))
+    for limit in LIMITS:
+        run.record(f"trade.limits.limit.{limit.replace(' ', '_')}",
+                   sum(one.limit == limit for one in silent), unit="cells", comparator="info",
+                   scale=scale, note="silent cells to which the search gives this limit by name")

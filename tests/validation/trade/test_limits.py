@@ -8,7 +8,14 @@ from mpm_ref.scene import SceneError
 from mpm_ref.sweep.observation import FINISHED, UNSTABLE, RunCost, RunObservation
 from validation.trade import limits
 from validation.trade.advice_scenes import advice_scenes
-from validation.trade.limits import Claim, compared, drawn_cells, record_claims
+from validation.trade.limits import (
+    Claim,
+    compared,
+    drawn_cells,
+    record_claims,
+    record_silent,
+)
+from validation.trade.searched_cells import SearchedCell
 
 
 def direction(name, way, good, is_discrete=False):
@@ -16,7 +23,12 @@ def direction(name, way, good, is_discrete=False):
 
 
 def test_scenes_exist():
-    assert set(limits.JUDGED) <= {one.name for one in advice_scenes()}
+    assert {*limits.JUDGED, *limits.CHOSEN} <= {one.name for one in advice_scenes()}
+    assert set(limits.scenes_of(limits.JUDGED)) == set(limits.JUDGED)
+
+
+def test_bounds_are_chosen_on_other_scenes_than_those_that_judge_them():
+    assert not set(limits.JUDGED) & set(limits.CHOSEN)
 
 
 def test_cells_are_drawn_within_what_is_right():
@@ -99,7 +111,31 @@ def test_records_count_the_claims():
     records = Records()
     record_claims(records, [claim(RIGHT, RIGHT), claim(RIGHT, RIGHT), claim(RIGHT, WRONG),
                             claim(RIGHT, "unstable"), claim(WRONG, WRONG), claim(WRONG, RIGHT),
-                            claim(WRONG, "the reference: unstable")], 3, 50)
-    assert records.values == {"trade.limits.right": 0.5, "trade.limits.wrong": 0.5,
-                              "trade.limits.silent": 3}
+                            claim(WRONG, "the reference: unstable")], 50)
+    assert records.values == {"trade.limits.right": 0.5, "trade.limits.wrong": 0.5}
     assert "toy density x 2: wrong 0.2" in records.notes["trade.limits.right"]
+
+
+def test_silent_cells_are_counted_by_their_limits():
+    def cell(error, limit, warnings=""):
+        return SearchedCell("toy", "density x 2", WRONG, error, 0.1, limit, 0.4, warnings, "", ())
+    records = Records()
+    record_silent(records, [cell(0.15, "resolution"), cell(0.3, "resolution"),
+                            cell(0.25, "no convergence"), cell(0.9, "resolution", "gap"),
+                            SearchedCell("toy", "as given", RIGHT, 0.0, 0.1, "", 0.0, "", "", ())])
+    assert records.values == {
+        "trade.limits.silent": 3, "trade.limits.far_silent": 2,
+        "trade.limits.limit.resolution": 2, "trade.limits.limit.no_convergence": 1,
+        "trade.limits.limit.setting": 0}
+    note = records.notes["trade.limits.far_silent"]
+    assert "toy density x 2: 0.3 (tolerance 0.1), resolution; toy density x 2: 0.25" in note
+
+
+def test_an_error_after_a_shift_is_that_of_the_changes():
+    class Shifted(Runs):
+        def run(self, cell, dx):
+            start = 7.0 if dict(cell).get("origin") else 0.0
+            values = start + np.array([[0.0], [1.0]])
+            return RunObservation({"positions": values}, RunCost(), FINISHED)
+    one, = compared("toy", {(("origin", 10.0),): WRONG}, Scenes(), Shifted())
+    assert (one.status, one.error) == (RIGHT, 0.0)

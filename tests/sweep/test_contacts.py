@@ -1,0 +1,81 @@
+"""Contacts by the distance of surfaces: of disks and colliders placed at given gaps."""
+
+import numpy as np
+import pytest
+from sweep_scenes import BOUNCE, observed_run, scene_of
+
+from mpm_ref.scene import build, loads
+from mpm_ref.sweep.contacts import body_contacts, distance, solid_contacts, spacing
+from mpm_ref.sweep.observation import observe
+
+BLOCKS = """
+dim = {dim}
+dx = 0.1
+end = 0.1
+gravity = {gravity}
+walls = {{ low = {low}, high = {high} }}
+[[body]]
+name = "left"
+density = 1000.0
+sampling = {{ type = "regular", per_cell = 2 }}
+shape = {{ type = "box", lower = {lower}, upper = {upper} }}
+material = {{ law = "fixed_corotated", E = 1e5, nu = 0.3 }}
+[[body]]
+name = "right"
+density = 1000.0
+sampling = {{ type = "regular", per_cell = 2 }}
+shape = {{ type = "box", lower = {next_lower}, upper = {next_upper} }}
+material = {{ law = "fluid", lam = 1e5 }}
+"""
+
+
+def blocks(dim, gap):
+    """Return the problem of two cubes of 0.4 m with a gap [m]; the left is 0.4 m from a wall."""
+    rest, high = [0.4] * (dim - 1), ["open"] * dim
+    return build(loads(BLOCKS.format(
+        dim=dim, gravity=[0.0] * dim, low=[1] + ["open"] * (dim - 1), high=high,
+        lower=[0.4, *rest], upper=[0.8] * dim, next_lower=[0.8 + gap, *rest],
+        next_upper=[1.2 + gap] + [0.8] * (dim - 1)).replace("'", '"')))
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize(("gap", "touches"), [(0.0, True), (0.05, True), (0.15, False)])
+def test_bodies_are_in_contact_within_a_cell(dim, gap, touches):
+    problem = blocks(dim, gap)
+    assert list(body_contacts(problem.bodies, problem.dx)) == (
+        ["body 'left' with body 'right'"] if touches else [])
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_walls_are_solids(dim):
+    problem = blocks(dim, 1.0)
+    assert list(solid_contacts(problem, problem.bodies, 0.0)) == []
+    problem.bodies[0].particles.x[:, 0] -= 0.31
+    assert list(solid_contacts(problem, problem.bodies, 0.0)) == [
+        "body 'left' with the low wall of axis 0"]
+
+
+def test_spacing_is_that_of_the_sampling():
+    assert spacing(blocks(2, 0.0).bodies[0]) == pytest.approx(0.05)
+
+
+def test_distance_is_that_of_all_pairs():
+    rng = np.random.default_rng(0)
+    x, y = rng.random((20, 3)), rng.random((30, 3)) + [1.2, 0.0, 0.0]
+    pairs = np.linalg.norm(x[:, None] - y, axis=2).min()
+    assert distance(x, y, 2.0) == pytest.approx(pairs)
+    assert distance(x, y + 5.0, 2.0) == np.inf
+
+
+def test_contact_is_noted_during_the_run_alone():
+    scene = scene_of(BOUNCE)
+    assert observe(observed_run(scene)).contacts == ("body 'block' with collider[0] 'floor'",)
+    problem = build(scene)
+    assert list(solid_contacts(problem, problem.bodies, 0.0)) == []
+
+
+def test_a_moving_collider_comes_near():
+    text = BOUNCE + 'motion = { translation = { type = "steady", rate = [0.0, 0.5] } }\n'
+    problem = build(loads(text))
+    assert list(solid_contacts(problem, problem.bodies, 0.0)) == []
+    assert list(solid_contacts(problem, problem.bodies, 0.25))
