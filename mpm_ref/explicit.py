@@ -13,6 +13,7 @@ import numpy as np
 
 from .body import AFFINE, check_fit, permute
 from .core import deform
+from .core.f_bar import NODES, averaged
 from .core.grid import Storage, update
 from .core.law import returned
 from .core.order import by_cell, slabs_of
@@ -29,8 +30,9 @@ class Scheme:
 
     degree of the B-spline (1, 2, 3); transfer "pic", "flip", "apic" or "mls"; flip is the share
     of FLIP (1) against PIC (0); rpic in [0, 1] damps the strain rate in C (NSF-rpic); mass_eps
-    [kg] and gravity_on_empty are NCLAW's, the latter without effect on particles. Raises
-    ValueError for a combination that does not exist.
+    [kg] and gravity_on_empty are NCLAW's, the latter without effect on particles; f_bar averages
+    the growth of volume over cells, against locking (see `core.f_bar`). Raises ValueError for a
+    combination that does not exist.
     """
 
     degree: int = 2
@@ -39,6 +41,7 @@ class Scheme:
     rpic: float = 0.0
     mass_eps: float = 0.0
     gravity_on_empty: bool = False
+    f_bar: bool = False
 
     def __post_init__(self):
         if self.transfer not in TRANSFERS:
@@ -93,6 +96,7 @@ class Stepper:
         if not 0.0 < dx < np.inf:
             raise ValueError(f"dx = {dx}: expected a positive, finite length in m")
         self.storage = Storage(dx, scheme.stencil, dim, flip=scheme.transfer == "flip")
+        self.cells = Storage(dx, NODES, dim)
 
     def start(self, bodies):
         """Check that the bodies fit the scheme, and compute their stress; needed once, before the
@@ -126,8 +130,16 @@ class Stepper:
         """Update the bodies in place from the grid that `advance_grid` returned for them."""
         for body in bodies:
             gather(body, grid, self.scheme, dt)
-            deform_body(body, dt)
+            self.deform(body, dt)
             damp(body, self.scheme)
+
+    def deform(self, body, dt):
+        """Apply `deform_body` to a body in place, with averaged growth of volume for F-bar."""
+        if self.scheme.f_bar:
+            q = body.particles
+            Lbar = averaged(q, self.cells.cover([q.x]), dt)
+            body = body._replace(particles=q._replace(L=Lbar))
+        deform_body(body, dt)
 
     def sort(self, bodies):
         """Sort every body's particles by cell, for locality; results do not depend on it but for

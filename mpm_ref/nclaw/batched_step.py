@@ -69,9 +69,10 @@ def make_world(problem):
     features than those of NCLAW-sim.
     """
     walls, clip, scheme = getattr(problem.conditions, "walls", None), problem.clip, problem.scheme
-    if problem.dim != 3 or (scheme.transfer, scheme.degree, scheme.rpic) != ("mls", 2, 0.0):
+    kind = scheme.transfer, scheme.degree, scheme.rpic, scheme.f_bar
+    if problem.dim != 3 or kind != ("mls", 2, 0.0, False):
         raise ValueError(f"{problem.title!r}: expected MLS-MPM with quadratic splines in 3D, "
-                         "without damping")
+                         "without damping or averaged volumes (f_bar)")
     if len(problem.bodies) != 1 or problem.clock.dt is None:
         raise ValueError(f"{problem.title!r}: expected one body and a fixed dt")
     if clip is None or not is_nclaw_box(walls) or problem.conditions.parts:

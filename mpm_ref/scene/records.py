@@ -285,6 +285,7 @@ class Scheme(Record):
     rpic: Share = 0.0
     mass_eps: NotNegative = 0.0                 # [kg]
     gravity_on_empty: bool = False
+    f_bar: bool = False
 
     def __post_init__(self):
         self.for_integrator("explicit")
