@@ -10,6 +10,7 @@ A setting is a dictionary of some of these knobs; what it leaves out stays as th
     cfl         share of the stable time step (of an implicit step: cells that a particle crosses)
     degree      of the B-spline: 1, 2 or 3
     transfer    "mls", "apic", "flip 0.95" (with its share of FLIP), "apic rpic 0.5", "pic", ...
+    f_bar       whether explicit steps average volumes over cells, against locking
     integrator  "explicit", or the word of an implicit method such as "hot-plus"
     eps         tolerance of an implicit step
 """
@@ -52,7 +53,9 @@ def setting(**knobs):
 
 
 def _shown(name, value):
-    return f"x {value:.4g}" if name in ("dx", "particles") else str(value)
+    if name in ("dx", "particles"):
+        return f"x {value:.4g}"
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def scene_at(scene, chosen, others=None):
@@ -186,13 +189,25 @@ def change_transfer(tables, text):
 
 
 def change_integrator(tables, word):
-    """Step explicitly, or by an implicit method, whose transfer is APIC unless it is chosen."""
+    """Step explicitly, or by an implicit method, whose transfer is APIC unless it is chosen, and
+    which averages no volumes.
+    """
     tables["integrator"] = word
+    if word != "explicit":
+        tables["scheme"]["f_bar"] = False
     if word == "explicit":
         tables.pop("solver", None)
         tables.pop("longest", None)
     elif tables["scheme"].get("transfer") in (None, "mls"):
         tables["scheme"]["transfer"] = "apic"
+
+
+def change_f_bar(tables, averaged):
+    """Average volumes over cells, or not."""
+    if averaged and tables["integrator"] != "explicit":
+        raise SceneError("f_bar = true: implicit steps average no volumes; expected an explicit "
+                         "integrator")
+    tables["scheme"]["f_bar"] = averaged
 
 
 def change_eps(tables, eps):
@@ -205,6 +220,6 @@ def change_eps(tables, eps):
 CHANGES = {
     "dx": scale_dx, "particles": scale_particles, "sampling": change_sampling,
     "integrator": change_integrator, "cfl": change_cfl, "degree": change_degree,
-    "transfer": change_transfer, "eps": change_eps,
+    "transfer": change_transfer, "f_bar": change_f_bar, "eps": change_eps,
 }
 KNOBS = ("scene", *CHANGES)
