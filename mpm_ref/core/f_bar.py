@@ -2,7 +2,8 @@
 
 Each particle that cannot change its volume binds its nodes by a constraint; where there are more of
 these than nodes can follow, a body locks. F-bar [deSouzaNeto1996], in the increments of
-[Coombs2018] and by sums over particles as in [ZhaoJiangChoo2023], keeps one a cell. With G_p = I + dt L_p of the step,
+[Coombs2018] and by sums over particles as in [ZhaoJiangChoo2023], keeps one a cell. In a step with
+G_p = I + dt L_p,
 
     J_c = sum_p w_cp V0_p det G_p / sum_p w_cp V0_p           mean growth of volume in cell c
     J_p = sum_c w_cp J_c,    Gbar_p = (J_p/det G_p)^(1/d) G_p,    F <- Gbar_p F

@@ -194,9 +194,9 @@ def test_averaged_volumes_are_tried_near_incompressibility():
     """With nu >= 0.45 in explicit scenes alone; where a scene has them, it is tried without."""
     stiff = FLIGHT.replace("nu = 0.3", "nu = 0.49")
     assert stiff != FLIGHT
-    averaged = 'scheme = { f_bar = true }'
-    for text, expected in ((FLIGHT, []), (stiff, ["f_bar true"]), ('integrator = "hot"' + stiff, []),
-                           (averaged + FLIGHT, ["f_bar false"])):
+    averaged, implicit = 'scheme = { f_bar = true }' + FLIGHT, 'integrator = "hot"' + stiff
+    for text, expected in ((FLIGHT, []), (stiff, ["f_bar true"]), (implicit, []),
+                           (averaged, ["f_bar false"])):
         texts = [one.text for one in single_knobs(loads(text))]
         assert [text for text in texts if "f_bar" in text] == expected
 
