@@ -17,7 +17,7 @@ from scipy.sparse.linalg import spsolve
 GAUSS = np.polynomial.legendre.leggauss(3)
 
 
-class Mesh(NamedTuple):
+class Quadrilaterals(NamedTuple):
     """Quadrilaterals on a grid of n x n; nodes come row by row, and so do corners."""
 
     X: np.ndarray           # (K, 2)   nodes of degree 2 [m]; K = (2 n + 1)^2
@@ -26,10 +26,10 @@ class Mesh(NamedTuple):
     n: int
 
 
-class Solution(NamedTuple):
+class MixedSolution(NamedTuple):
     """Displacements and pressures of a mesh."""
 
-    mesh: Mesh
+    mesh: Quadrilaterals
     u: np.ndarray           # (K, 2)         [m]
     p: np.ndarray           # (n + 1, n + 1) at the corners [Pa]
     b: np.ndarray           # (K, 2)         consistent nodal loads [N/m]
@@ -48,15 +48,15 @@ class Solution(NamedTuple):
 
 
 def mapped_square(mapping, n):
-    """Return the `Mesh` of n x n elements; mapping(s, t) gives x and y of points in the unit
-    square.
+    """Return the `Quadrilaterals` of n x n elements; mapping(s, t) gives x and y of points of the
+    unit square.
     """
     m = 2 * n + 1
     s, t = np.meshgrid(np.linspace(0.0, 1.0, m), np.linspace(0.0, 1.0, m), indexing="ij")
     i, j = (a.ravel()[:, None] for a in np.meshgrid(range(n), range(n), indexing="ij"))
     a, b = (k.ravel() for k in np.meshgrid(range(3), range(3), indexing="ij"))
     c, d = (k.ravel() for k in np.meshgrid(range(2), range(2), indexing="ij"))
-    return Mesh(np.stack(mapping(s.ravel(), t.ravel()), axis=-1),
+    return Quadrilaterals(np.stack(mapping(s.ravel(), t.ravel()), axis=-1),
                 (2 * i + a) * m + 2 * j + b, (i + c) * (n + 1) + j + d, n)
 
 
@@ -112,7 +112,7 @@ def summed(A, rows, columns, shape):
 
 
 def solve(mesh, moduli, fixed, load):
-    """Return the `Solution` under load(x), a body force (.., 2) [N/m^2] at places (.., 2) [m].
+    """Return the `MixedSolution` under load(x), a body force (.., 2) [N/m^2] at places (.., 2) [m].
 
     moduli is (mu, lam) [Pa]; fixed(X) tells which displacements (K, 2) are zero.
     """
@@ -133,4 +133,4 @@ def solve(mesh, moduli, fixed, load):
     area = np.zeros(count)
     np.add.at(area, mesh.nodes, V)
     p = unknowns[len(free):].reshape(mesh.n + 1, mesh.n + 1)
-    return Solution(mesh, u.reshape(-1, 2), p, loads, area)
+    return MixedSolution(mesh, u.reshape(-1, 2), p, loads, area)
