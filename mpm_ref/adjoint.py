@@ -41,6 +41,9 @@ class StepAdjoint:
                 f"conditions of type {type(stepper.conditions).__name__} have no adjoint: "
                 "expected core.boundary.Conditions, or None"
             )
+        if stepper.scheme.f_bar:
+            raise ValueError("f_bar = True: averaged volumes have no adjoint; expected a scheme "
+                             "with f_bar = False")
         self.scheme, self.gravity = stepper.scheme, stepper.gravity.copy()
         self.conditions = stepper.conditions
         sizes = (stepper.dx, self.scheme.stencil, len(self.gravity),

@@ -119,8 +119,9 @@ class BudgetStepper(Stepper):
         plastic = 0.0
         for body in bodies:
             gather(body, grid, self.scheme, dt)
-            trial = trial_elastic(body, dt)
-            deform_body(body, dt)
+            deforming = self.deforming(body, dt)
+            trial = trial_elastic(deforming, dt)
+            deform_body(deforming, dt)
             damp(body, self.scheme)
             if trial is not None:
                 plastic += total(elastic(body)) - trial

@@ -14,6 +14,7 @@ import numpy as np
 
 from .body import AFFINE, check_fit, permute
 from .core import deform
+from .core.f_bar import NODES, averaged
 from .core.grid import Storage, update
 from .core.law import returned
 from .core.order import by_cell, slabs_of
@@ -31,8 +32,9 @@ class Scheme:
     degree of the B-spline (1, 2, 3); transfer "pic", "flip", "apic" or "mls"; flip is the share
     of FLIP (1) against PIC (0); rpic in [0, 1] damps the strain rate in C (NSF-rpic); relaxation
     [s] is the time in which v and C of the particles relax to those of the grid, 0 for at once;
-    mass_eps [kg] and gravity_on_empty are NCLAW's, the latter without effect on particles. Raises
-    ValueError for a combination that does not exist.
+    mass_eps [kg] and gravity_on_empty are NCLAW's, the latter without effect on particles; f_bar
+    averages the growth of volume over cells, against locking (see `core.f_bar`). Raises ValueError
+    for a combination that does not exist.
     """
 
     degree: int = 2
@@ -42,6 +44,7 @@ class Scheme:
     relaxation: float = 0.0
     mass_eps: float = 0.0
     gravity_on_empty: bool = False
+    f_bar: bool = False
 
     def __post_init__(self):
         if self.transfer not in TRANSFERS:
@@ -126,6 +129,7 @@ class Stepper:
         if not 0.0 < dx < np.inf:
             raise ValueError(f"dx = {dx}: expected a positive, finite length in m")
         self.storage = Storage(dx, scheme.stencil, dim, flip=scheme.keeps_old_velocity)
+        self.cells = Storage(dx, NODES, dim)
 
     def start(self, bodies):
         """Check that the bodies fit the scheme, and compute their stress; needed once, before the
@@ -168,8 +172,18 @@ class Stepper:
         """Update the bodies in place from the grid that `advance_grid` returned for them."""
         for body in bodies:
             gather(body, grid, self.scheme, dt)
-            deform_body(body, dt)
+            deform_body(self.deforming(body, dt), dt)
             damp(body, self.scheme)
+
+    def deforming(self, body, dt):
+        """Return the body with the velocity gradient that deforms it, with averaged growth of
+        volume for F-bar; all other arrays are the body's own.
+        """
+        if not self.scheme.f_bar:
+            return body
+        q = body.particles
+        Lbar = averaged(q, self.cells.cover([q.x]), dt)
+        return body._replace(particles=q._replace(L=Lbar))
 
     def sort(self, bodies):
         """Sort every body's particles by cell, for locality; results do not depend on it but for

@@ -30,6 +30,7 @@ STAGES = {          # of a step: beginnings of the names of the kernels that it 
     "implicit solve": ("hot.",),
     "multigrid": ("hot.multigrid.",),
     "grid to particles": ("core.transfer._gather", "core.transfer_mls3.gather"),
+    "averaged volumes": ("core.f_bar._",),
     "J alone": ("core.deform.fluid",),
     "F": ("core.deform.elastic", "core.deform.plastic", "core.deform.full"),
     "return map": ("core.deform.plastic", "core.deform.full"),

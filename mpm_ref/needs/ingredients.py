@@ -102,7 +102,8 @@ def scheme_removals(scene):
         yield Removal("FLIP part", transfer_edit("pic"), "PIC")
     for key, name in (("rpic", "RPIC damping"), ("relaxation", "relaxation of the transfer"),
                       ("mass_eps", "mass added to nodes"),
-                      ("gravity_on_empty", "gravity on empty nodes")):
+                      ("gravity_on_empty", "gravity on empty nodes"),
+                      ("f_bar", "averaged volumes (F-bar)")):
         if getattr(scheme, key):
             yield Removal(name, default_edit("scheme", key))
     if scheme.degree > (2 if scheme.transfer in AFFINE else 1):

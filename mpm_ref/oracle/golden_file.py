@@ -132,8 +132,8 @@ def is_golden(path):
 
 
 def require_recordable(problem):
-    """Raise ValueError for names of bodies that cannot name groups of the file, and for laws and
-    flows that the plain twin does not have.
+    """Raise ValueError for names of bodies that cannot name groups of the file, for averaged
+    volumes, and for laws and flows that the plain twin does not have.
     """
     names = [body.name for body in problem.bodies]
     clash = sorted(reserved_names(problem.integrator) & set(names))
@@ -142,6 +142,9 @@ def require_recordable(problem):
     if clash:
         raise ValueError(f"body {clash[0]!r}: this names an array, or a group, of every "
                          f"{problem.integrator} step in the file; rename the body")
+    if problem.scheme.f_bar:
+        raise ValueError("f_bar = true: golden files have no arrays of averaged volumes; expected "
+                         "a scene with f_bar = false")
     for body in problem.bodies:
         for part, table in ((body.law, LAWS), (body.flow, FLOWS)):
             if type(part).__name__ not in table:

@@ -3,7 +3,8 @@
 1. P2G: mass, momentum and force of the particles, with the stress of their F, go to the nodes.
 2. Grid: the nodes' velocities advance by explicit Euler, and contact changes them.
 3. G2P: particles take velocity, position, affine field C and velocity gradient L from the nodes.
-4. Deformation: F_trial = (I + dt L) F, the return map of the material, and the new stress tau.
+4. Deformation: F_trial = (I + dt L) F, the return map of the material, and the new stress tau. With
+   F-bar, L is changed so that volumes grow by their mean over cells.
 """
 
 from typing import NamedTuple
@@ -11,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import transfer
+from .f_bar import averaged
 from .flows import intact, return_map
 from .laws import energy, kirchhoff
 from .spline import pairs
@@ -48,6 +50,7 @@ class Method(NamedTuple):
     rpic: float = 0         # damping, see `transfer.rpic`
     relaxation: float = 0   # time in which v and C relax to the grid [s]; 0: in each step
     mass_eps: float = 0     # see `transfer.grid_velocity` [kg]
+    f_bar: bool = False     # whether volumes are averaged, see `f_bar`
 
     @property
     def moment(self):
@@ -105,7 +108,8 @@ def step(bodies, method, gravity, dt, conditions=None):
     if conditions is not None:
         nodes = nodes._replace(v=conditions(nodes.v_free, nodes.m, nodes.box))
     motions = [grid_to_particles(q, ip, nodes, method, dt) for q, ip in zip(bodies, stencils)]
-    updates = [deform(q, motion.L, dt) for q, motion in zip(bodies, motions)]
+    updates = [deform(q, deforming(q, motion, method, dt), dt)
+               for q, motion in zip(bodies, motions)]
     return StepStages(stencils, nodes, motions, updates, dt)
 
 
@@ -177,6 +181,13 @@ def relaxed_motion(q, ip, nodes, method, dt):
     spin = transfer.shift_spin(dt * u, v - u)
     L = affine[0] if method.transfer == "mls" else transfer.velocity_gradient(nodes.v, ip, box)
     return ParticleMotion(v, q.x + dt * u, transfer.relaxed_affine(q.C, affine, D, share, spin), L)
+
+
+def deforming(q, motion, method, dt):
+    """Return the velocity gradient (N, d, d) that deforms a body (see `f_bar`)."""
+    if not method.f_bar:
+        return motion.L
+    return averaged(motion, q.V0, method.dx, dt)
 
 
 def deform(q, L, dt):

@@ -286,6 +286,7 @@ class Scheme(Record):
     relaxation: NotNegative = 0.0               # [s]
     mass_eps: NotNegative = 0.0                 # [kg]
     gravity_on_empty: bool = False
+    f_bar: bool = False
 
     def __post_init__(self):
         self.for_integrator("explicit")

@@ -11,6 +11,7 @@ A setting is a dictionary of some of these knobs; what it leaves out stays as th
     degree      of the B-spline: 1, 2 or 3
     transfer    "mls", "apic", "flip 0.95" (with its share of FLIP), "apic rpic 0.5", "pic",
                 "mls relaxation 1e-3" (with its time in s, whatever the grid), ...
+    f_bar       whether explicit steps average volumes over cells, against locking
     integrator  "explicit", or the word of an implicit method such as "hot-plus"
     eps         tolerance of an implicit step
     boundary    "nodes" or "surface": where the conditions of colliders hold
@@ -54,7 +55,9 @@ def setting(**knobs):
 
 
 def _shown(name, value):
-    return f"x {value:.4g}" if name in ("dx", "particles") else str(value)
+    if name in ("dx", "particles"):
+        return f"x {value:.4g}"
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def scene_at(scene, chosen, others=None):
@@ -195,8 +198,8 @@ def change_transfer(tables, text):
 
 
 def change_integrator(tables, word):
-    """Step explicitly, or by an implicit method, whose transfer is APIC unless it is chosen and
-    whose conditions hold at nodes.
+    """Step explicitly, or by an implicit method, whose transfer is APIC unless it is chosen, which
+    averages no volumes and does not relax, and whose conditions hold at nodes.
     """
     tables["integrator"] = word
     if word == "explicit":
@@ -204,8 +207,17 @@ def change_integrator(tables, word):
         tables.pop("longest", None)
         return
     tables["boundary"] = "nodes"
+    tables["scheme"] |= {"f_bar": False, "relaxation": 0.0}
     if tables["scheme"].get("transfer") in (None, "mls"):
         tables["scheme"]["transfer"] = "apic"
+
+
+def change_f_bar(tables, averaged):
+    """Average volumes over cells, or not."""
+    if averaged and tables["integrator"] != "explicit":
+        raise SceneError("f_bar = true: implicit steps average no volumes; expected an explicit "
+                         "integrator")
+    tables["scheme"]["f_bar"] = averaged
 
 
 def change_eps(tables, eps):
@@ -225,6 +237,7 @@ def change_boundary(tables, boundary):
 CHANGES = {
     "dx": scale_dx, "particles": scale_particles, "sampling": change_sampling,
     "integrator": change_integrator, "cfl": change_cfl, "degree": change_degree,
-    "transfer": change_transfer, "eps": change_eps, "boundary": change_boundary,
+    "transfer": change_transfer, "f_bar": change_f_bar, "eps": change_eps,
+    "boundary": change_boundary,
 }
 KNOBS = ("scene", *CHANGES)

@@ -8,6 +8,7 @@ CFL, CELLS = (0.9, 0.5, 0.25), (0.9, 0.6, 0.3)      # of the explicit bound; of 
 PARTICLES = (0.5, 2 / 3, 1.5, 2.0)                  # per cell and axis, times the scene's
 TRANSFERS = ("mls", "apic", "apic rpic 0.1", "flip 0.95", "flip", "pic")
 DEGREES = (1, 2, 3)
+LOCKING = 0.45                      # Poisson's ratio from which on averaged volumes are tried
 TOLERANCES = (1e-3, 1e-5, 1e-7)     # of implicit steps; the last is HOT's
 IMPLICIT = "hot-plus"
 GRIDS = (4.0, 3.0, 2.0, 1.5, 1.0, 0.75, 0.5, 0.375, 0.25, 0.1875, 0.125)    # factors of dx
@@ -28,7 +29,9 @@ def single_knobs(scene):
     settings += [setting(sampling=kind) for kind in other_samplings(scene)]
     if scene.collider and scene.integrator == "explicit":
         settings += [setting(boundary="nodes" if scene.boundary == "surface" else "surface")]
-    if scene.integrator != "explicit":
+    if scene.integrator == "explicit":
+        settings += volume_settings(scene)
+    else:
         solver = scene.solver
         given = TOLERANCES[-1] if solver is None or solver.eps is None else solver.eps
         settings += [setting(eps=eps) for eps in TOLERANCES if eps != given]
@@ -44,6 +47,16 @@ def relaxed_transfers(scene):
     if crossing is None:
         return []
     return [f"{name} relaxation {crossing:.3g}" for name in AFFINE]
+
+
+def volume_settings(scene):
+    """Return the settings without averaged volumes where an explicit scene has them, or with them
+    where one of its bodies is nearly incompressible.
+    """
+    if scene.scheme.f_bar:
+        return [setting(f_bar=False)]
+    ratios = [body.material.nu or 0.0 for body in scene.body]
+    return [setting(f_bar=True)] if max(ratios) >= LOCKING else []
 
 
 def with_degree(degree, transfer):

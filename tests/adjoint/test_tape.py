@@ -1,6 +1,7 @@
 """Gradients through many steps in 2D: Taylor tests of rollouts, checkpoints, threads, refusals."""
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -194,6 +195,12 @@ def empty_tape(conditions=FREE, every=1):
 def test_what_has_no_adjoint_is_refused(options, said):
     with pytest.raises(ValueError, match=said):
         empty_tape(**options)
+
+
+def test_averaged_volumes_are_refused():
+    run = dive()
+    with pytest.raises(ValueError, match="f_bar = True: averaged volumes have no adjoint"):
+        Tape(Stepper(replace(run.scheme, f_bar=True), DX, 2, run.gravity, FREE), run.bodies)
 
 
 def test_an_implicit_stepper_is_refused():

@@ -136,6 +136,12 @@ def test_block_on_a_floor_enters_boundaries_and_return_map(block):
     assert "core.deform.fluid" not in block.kernels
 
 
+def test_averaged_volumes_are_a_stage():
+    text = DROP.partition("[[collider]]")[0]
+    parts = code_parts(loads(text.replace("scheme = { ", "scheme = { f_bar = true, ")))
+    assert len(parts.stages["averaged volumes"]) == 2
+
+
 def test_each_kernel_has_one_form_but_distances(drop, block):
     for parts in (drop, block):
         assert {name for name, forms in parts.kernels.items() if forms > 1} <= {

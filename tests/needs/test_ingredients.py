@@ -8,7 +8,8 @@ from mpm_ref.scene import loads
 from mpm_ref.scene.validate import plain
 
 EXTRAS = HEAD + """
-scheme = { transfer = "apic", degree = 3, rpic = 0.1, mass_eps = 1e-9, gravity_on_empty = true }
+scheme = { transfer = "apic", degree = 3, rpic = 0.1, mass_eps = 1e-9, gravity_on_empty = true,\
+  f_bar = true }
 walls = { low = [1, "open"], high = ["open", "open"], friction = 0.2 }
 clip = { lower = [-1.0, -1.0], upper = [1.0, 1.0] }
 interval = 0.002
@@ -44,6 +45,7 @@ def changed_keys(text, label):
     ("RPIC damping", "rpic", 0.0),
     ("mass added to nodes", "mass_eps", 0.0),
     ("gravity on empty nodes", "gravity_on_empty", False),
+    ("averaged volumes (F-bar)", "f_bar", False),
     ("splines of degree 3 (degree 2 instead)", "degree", 2),
 ])
 def test_removal_from_the_transfer(label, key, value):

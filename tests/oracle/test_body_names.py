@@ -7,6 +7,7 @@ from goldens import kernel_arrays, stretched
 from goldens_hot import EPS, problem_of
 
 from mpm_ref import oracle
+from mpm_ref.explicit import Scheme
 from mpm_ref.oracle.schema import reserved_names
 
 
@@ -32,6 +33,12 @@ def test_names_of_what_stands_elsewhere_are_taken(names, tmp_path):
 def test_names_that_clash_are_refused(name, tmp_path):
     with pytest.raises(ValueError, match=f"body '{name}': this names an array, or a group, of ev"):
         oracle.record(named(stretched(), name, "metal"), tmp_path / "golden.h5", 1)
+
+
+def test_averaged_volumes_are_refused(tmp_path):
+    problem = replace(stretched(), scheme=Scheme(f_bar=True))
+    with pytest.raises(ValueError, match="f_bar = true: golden files have no arrays of averaged"):
+        oracle.record(problem, tmp_path / "golden.h5", 1)
 
 
 @pytest.mark.parametrize("name", ["bar", "report", "probe3", "nodes2", "dv", "load", "E_trial"])

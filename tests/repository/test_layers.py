@@ -21,7 +21,7 @@ FLOORS = (
     ("core.stencil", "core.state"),
     ("core.order", "core.adjoint.shape_gradient"),
     ("core.grid", "core.transfer core.transfer_mls3", "core.deform", "core.levelset"),
-    ("core.motion", "core.contact", "core.displacement",
+    ("core.motion", "core.contact", "core.displacement", "core.f_bar",
      "core.adjoint.transfer core.adjoint.transfer_mls3",
      "core.adjoint.grid", "core.adjoint.deform"),
     ("core.boundary",),

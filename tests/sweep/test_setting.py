@@ -48,6 +48,12 @@ def test_knobs_change_what_they_name():
     assert scene_at(relaxed, setting(dx=0.5)).step_scheme.relaxation == 0.5e-3
     assert scene_at(scene, setting(sampling="poisson")).body[0].sampling.per_cell == 2
     assert particles(scene_at(scene, setting(particles=1.5))) == particles(scene) * 9 // 4
+    averaged = scene_at(scene, setting(f_bar=True))
+    assert averaged.scheme.f_bar
+    assert not scene_at(averaged, setting(f_bar=False)).scheme.f_bar
+    assert not scene_at(averaged, setting(integrator="hot-plus")).scheme.f_bar
+    with pytest.raises(SceneError, match="implicit steps average no volumes"):
+        scene_at(scene, setting(integrator="hot-plus", f_bar=True))
     implicit = scene_at(scene, setting(integrator="hot-plus"))
     assert (implicit.integrator, implicit.step_scheme.transfer) == ("hot-plus", "apic")
     assert scene_at(implicit, setting(eps=1e-3)).solver.eps == 1e-3

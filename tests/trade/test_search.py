@@ -194,6 +194,17 @@ def test_single_knobs_are_not_those_of_the_scene():
     assert not any("relaxation" in text for text in implicit)
 
 
+def test_averaged_volumes_are_tried_near_incompressibility():
+    """With nu >= 0.45 in explicit scenes alone; where a scene has them, it is tried without."""
+    stiff = FLIGHT.replace("nu = 0.3", "nu = 0.49")
+    assert stiff != FLIGHT
+    averaged, implicit = 'scheme = { f_bar = true }' + FLIGHT, 'integrator = "hot"' + stiff
+    for text, expected in ((FLIGHT, []), (stiff, ["f_bar true"]), (implicit, []),
+                           (averaged, ["f_bar false"])):
+        texts = [one.text for one in single_knobs(loads(text))]
+        assert [text for text in texts if "f_bar" in text] == expected
+
+
 def test_pairs_change_different_knobs():
     a, b, c = setting(cfl=0.9), setting(cfl=0.25), setting(transfer="apic")
     assert pairs([a, b, c]) == [a | c, b | c]
