@@ -160,8 +160,11 @@ def run_facts(run, result):
     return asdict(run) | {"saving": share if isfinite(share) else None}
 
 
-def lean_text(answer, folder):
-    """Return the TOML text of the lean scene for a file in a folder, with comments."""
+def lean_text(answer, folder, quantities=()):
+    """Return the TOML text of the lean scene for a file in a folder, with comments.
+
+    quantities: records of quantities of interest that the scene as given has.
+    """
     result = answer.result
     head = [f"{result.first.scene.title or answer.name}, without what it does not require at "
             f"{percent(answer.error)}.", "", f"Written by mpm_ref {__version__}: {answer.command}",
@@ -170,4 +173,4 @@ def lean_text(answer, folder):
     gone = [removal for removal in result.lean.removals if removal.body or removal.plane]
     head += [f"{removal.label}: positions are compared on the matter that is left."
              for removal in gone]
-    return scene_text(head, result.lean.scene, folder)
+    return scene_text(head, result.lean.scene, folder, quantities)
