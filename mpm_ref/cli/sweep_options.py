@@ -19,6 +19,7 @@ from ..sweep.quantity import DEFAULT, OutputQuantity, check_quantities
 from ..sweep.runs import SceneRuns
 from ..sweep.setting import in_seconds
 from ..sweep.store import RunStore
+from ..store.text import counted
 from .catalogue import find_scene
 from .errors import options
 from .options import make_folder, on_interrupt
@@ -155,8 +156,8 @@ def open_runs(request, observed):
                                          f"{folder}; the same command goes on"))
 
         def show(label, observation):
-            bar.set_postfix_str(f"{runs.count} runs, {max(runs.left, 0.0):.0f} s left, last: "
-                                f"{label}: {observation.outcome}")
+            bar.set_postfix_str(f"{counted(runs.count, 'run')}, {max(runs.left, 0.0):.0f} s left, "
+                                f"last: {label}: {observation.outcome}")
             bar.update(request.budget - max(runs.left, 0.0) - bar.n)
 
         runs.on_run = show
