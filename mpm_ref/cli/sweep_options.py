@@ -12,6 +12,7 @@ import typer
 from .. import scene
 from ..executor import open_executor
 from ..scene.validate import validate_scene
+from ..store.text import counted
 from ..sweep.conditions import record_impulses
 from ..sweep.observation import ObservedRun, RunObserver
 from ..sweep.probes import choose_probes
@@ -19,7 +20,6 @@ from ..sweep.quantity import DEFAULT, OutputQuantity, check_quantities
 from ..sweep.runs import SceneRuns
 from ..sweep.setting import in_seconds
 from ..sweep.store import RunStore
-from ..store.text import counted
 from .catalogue import find_scene
 from .errors import options
 from .options import make_folder, on_interrupt

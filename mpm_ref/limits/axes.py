@@ -47,7 +47,7 @@ class ScaleAxis:
     reading: Callable               # (tables) -> text of a value that it changes; "" where absent
     is_numerical: bool = False      # the physical problem stays
     is_geometric: bool = False      # coordinates of the scene change
-    is_inverse: bool = False        # what `text` names, which `reading` gives, falls as factors grow
+    is_inverse: bool = False        # `text` names what falls as the factor grows
 
 
 def rungs(axis, tables, direction):
