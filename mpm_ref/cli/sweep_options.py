@@ -72,8 +72,11 @@ class SweepRequest(NamedTuple):
 
     @property
     def stem(self):
-        """Return the name that output files begin with."""
-        return Path(self.name).stem
+        """Return the name that output files begin with: that of the scene's file without its
+        suffix; all of it where only dots would be left, which name a folder.
+        """
+        path = Path(self.name)
+        return path.stem if path.stem.strip(".") else path.name
 
 
 def parse_error(text):
