@@ -12,12 +12,13 @@ from typing import NamedTuple
 from .attempt import take_step
 from .core.grid import OutOfRange
 from .monitor import CHECK, Account, account, check, lost, runs_away
-from .timestep import TimeStep, advective, refuse, stable_dt
+from .timestep import TimeStep, TooLarge, advective, refuse, stable_dt
 
 SORT = 64        # steps between physical sorts of the particles by cell
 AHEAD = 0.01     # of a step, or of a second, over which the speed of parts is taken
 REBOUND = 10     # steps between evaluations of the stable time step
 EVEN = 1e-9      # of a step: a frame or end this near is met, whatever the sum of the steps lost
+MOST_STEPS = 1e15       # of a run: sums of shorter steps lose their last digit
 
 
 @dataclass
@@ -154,6 +155,8 @@ def swiftest(problem, stepper, state):
 def next_dt(clock, state, advective_bound):
     """Return the length of the next step [s]: fixed, or such that equal steps within the bounds
     meet the next frame or the end.
+
+    Raises `TooLarge` where steps are so short that sums of them lose their last digit.
     """
     if clock.dt is not None:
         return clock.dt
@@ -163,7 +166,12 @@ def next_dt(clock, state, advective_bound):
     dt = min(clock.cfl * min(state.bound, advective_bound), clock.longest)
     if target == inf:
         return dt
-    return (target - state.t) / max(ceil((target - state.t) / dt - EVEN), 1)
+    left = (target - state.t) / dt if dt > 0.0 else inf
+    if left > MOST_STEPS:
+        raise TooLarge(f"dt = {dt:.6g} s is too small: from t = {state.t:.6g} to {target:.6g} s "
+                       f"there would be more than {MOST_STEPS:.0e} steps, in which time stands "
+                       "still; take a larger `cfl` or `longest`, or another material")
+    return (target - state.t) / max(ceil(left - EVEN), 1)
 
 
 def last_step(clock):

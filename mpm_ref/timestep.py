@@ -46,7 +46,7 @@ from .materials.waves import moduli_at_rest, wave_modulus
 
 
 class TooLarge(ValueError):
-    """A fixed time step is past its bound."""
+    """A fixed time step is past its bound, or an adaptive one so small that time stands still."""
 
 
 class TimeStep(NamedTuple):

@@ -250,8 +250,15 @@ def _facts_of_npz_or_text(name):
 
 def _facts_of_scene(path):
     with compiling(), at_start(path):
-        facts = of_problem(scene.build(scene.load(path), str(path)))
-    return facts, problem_lines(facts)
+        record = scene.load(path)
+        quantities = [one.text for one in record.quantity]
+        facts = of_problem(scene.build(record, str(path))) | {"quantities": quantities}
+    return facts, [*problem_lines(facts), *quantities_line(quantities)]
+
+
+def quantities_line(texts):
+    """Return the quantities of interest of a scene as a list of one line or none."""
+    return [f"quantities of interest: {', '.join(texts)}"] if texts else []
 
 
 SHOWN = 4           # names of arrays that a sentence shows

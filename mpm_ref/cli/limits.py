@@ -56,7 +56,8 @@ def measure(
         with options():
             request = SweepRequest(name, error, budget, quantity, workers, scheduler, out,
                                    quiet).parsed()
-            record, path = load_sweep(name)
+            record, path, tables = load_sweep(name)
+            request = request.for_scene(tables)
             texts = with_companions(request.quantities, record.dim)     # `trade` has these runs
             observed = observed_of(record, path, texts)
         search = run_search(record, observed, request)

@@ -57,10 +57,11 @@ def find(
         with options():
             request = SweepRequest(name, error, budget, quantity, workers, scheduler, out,
                                    quiet).parsed()
-            record, path = load_sweep(name)
+            record, path, tables = load_sweep(name)
+            request = request.for_scene(tables)
             observed = observed_of(record, path, request.quantities)
         answer = answer_of(first_variant(record, observed.probes), observed, request)
-        write_answer(answer, out)
+        write_answer(answer, out, tables)
         print(as_json(answer.facts) if json else "\n".join(answer.lines))
     raise typer.Exit(0 if answer.result.complete else NO_ANSWER)
 
@@ -107,10 +108,12 @@ def command_of(request):
                      f"--budget {request.budget:g}s", *texts])
 
 
-def write_answer(answer, out):
-    """Write the JSON, the page, the figure and the lean scene. Raises `NotWritten`."""
+def write_answer(answer, out, tables):
+    """Write the JSON, the page, the figure and the lean scene, with the quantities of interest of
+    the scene as given. Raises `NotWritten`.
+    """
     base = Path(out) / answer.name
     write_bytes(f"{base}.needs.json", as_json(answer.facts).encode())
     write_bytes(f"{base}.needs.html", page_of(finite(page_facts(answer)), "needs").encode())
-    write_bytes(f"{base}.lean.toml", lean_text(answer, out).encode())
+    write_bytes(f"{base}.lean.toml", lean_text(answer, out, tables).encode())
     save_figure(answer, f"{base}.needs.png")

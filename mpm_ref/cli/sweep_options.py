@@ -12,10 +12,11 @@ import typer
 from .. import scene
 from ..executor import open_executor
 from ..scene.validate import validate_scene
+from ..store.text import counted
 from ..sweep.conditions import record_impulses
 from ..sweep.observation import ObservedRun, RunObserver
 from ..sweep.probes import choose_probes
-from ..sweep.quantity import DEFAULT, OutputQuantity
+from ..sweep.quantity import DEFAULT, OutputQuantity, check_quantities
 from ..sweep.runs import SceneRuns
 from ..sweep.setting import in_seconds
 from ..sweep.store import RunStore
@@ -33,8 +34,8 @@ ErrorOption = Annotated[str, typer.Option("--error", help="Error asked, such as 
 BudgetOption = Annotated[str, typer.Option("--budget", help="Time after which no run begins, such "
                                            "as 90s, 20min or 2h.")]
 QuantityOption = Annotated[list[str] | None, typer.Option(
-    "--quantity", help="Quantity of interest, such as positions (default), front:x+, kinetic or "
-    "impulse:floor; may be given several times.")]
+    "--quantity", help="Quantity of interest, such as positions, front:x+, kinetic or force:floor; "
+    "may be given several times (default: the [[quantity]] tables of the scene, or positions).")]
 WorkersOption = Annotated[int, typer.Option(help="Number of runs at a time.")]
 SchedulerOption = Annotated[str | None, typer.Option(
     help="Where runs are made: local:N, or the address of a Dask scheduler (default: processes "
@@ -62,10 +63,20 @@ class SweepRequest(NamedTuple):
         return self._replace(error=parse_error(self.error), budget=parse_budget(self.budget),
                              quantities=parse_quantities(self.quantities))
 
+    def for_scene(self, tables):
+        """Return the request with the quantities of a scene's `[[quantity]]` tables where it names
+        none, and those of `DEFAULT` where the scene has none either.
+        """
+        texts = self.quantities or tuple(dict.fromkeys(one.text for one in tables)) or DEFAULT
+        return self._replace(quantities=texts)
+
     @property
     def stem(self):
-        """Return the name that output files begin with."""
-        return Path(self.name).stem
+        """Return the name that output files begin with: that of the scene's file without its
+        suffix; all of it where only dots would be left, which name a folder.
+        """
+        path = Path(self.name)
+        return path.stem if path.stem.strip(".") else path.name
 
 
 def parse_error(text):
@@ -94,20 +105,25 @@ def parse_budget(text):
 
 
 def parse_quantities(texts):
-    """Return the texts of quantities, each once. Raises ValueError for one that names none."""
-    unique = tuple(dict.fromkeys(texts or DEFAULT))
+    """Return the texts of quantities, each once; () without any. Raises ValueError for a text that
+    names none.
+    """
+    unique = tuple(dict.fromkeys(texts or ()))
     for text in unique:
         OutputQuantity(text)
     return unique
 
 
 def load_sweep(name):
-    """Return (scene, path) by the scene's name, with its end as a time.
+    """Return (scene, path, quantities) by the scene's name: with its end as a time, and without its
+    quantities of interest, which are the last.
 
     Raises SceneError for a scene that cannot be read, or whose run has no end in seconds.
     """
     path = find_scene(name)
-    return validate_scene(in_seconds(scene.load(path)), str(path)), path
+    record = scene.load(path)
+    tables = in_seconds(record) | {"quantity": ()}
+    return validate_scene(tables, str(path)), path, record.quantity
 
 
 def observed_of(record, path, quantities):
@@ -116,6 +132,7 @@ def observed_of(record, path, quantities):
     Raises SceneError for a scene that cannot be built, ValueError for a quantity that does not fit
     it.
     """
+    check_quantities(quantities, record)
     problem, recorder = record_impulses(scene.build(record, str(path)), record)
     probes = tuple((p.body, p.X) for p in choose_probes(problem.bodies))
     times = tuple(np.linspace(0.0, record.end, TIMES).tolist())
@@ -142,8 +159,8 @@ def open_runs(request, observed):
                                          f"{folder}; the same command goes on"))
 
         def show(label, observation):
-            bar.set_postfix_str(f"{runs.count} runs, {max(runs.left, 0.0):.0f} s left, last: "
-                                f"{label}: {observation.outcome}")
+            bar.set_postfix_str(f"{counted(runs.count, 'run')}, {max(runs.left, 0.0):.0f} s left, "
+                                f"last: {label}: {observation.outcome}")
             bar.update(request.budget - max(runs.left, 0.0) - bar.n)
 
         runs.on_run = show

@@ -51,9 +51,18 @@ class Progress(tqdm):
             self.n += n         # which tqdm does only where it shows a bar
         if self._tells and monotonic() > self._next:
             self._next = monotonic() + EVERY
-            total = f" of {self.total:g}" if self.total else ""
-            tell(f"{self._name}{': ' if self._name else ''}{self._unit} {self.n:.4g}{total}")
+            tell(f"{self._name}{': ' if self._name else ''}{self._count()}")
         return super().update(n)
+
+    def _count(self):
+        """Return what was counted as text, such as "run 4 of 9", or "15 s of 60 s, 3 runs" with
+        the remark after a time.
+        """
+        if self._unit == "s":
+            remark = getattr(self, "postfix", None)     # which tqdm sets late where it is disabled
+            return f"{self.n:.0f} s of {self.total:g} s" + (f", {remark}" if remark else "")
+        total = f" of {self.total:g}" if self.total else ""
+        return f"{self._unit} {self.n:.4g}{total}"
 
 
 def tell_progress():

@@ -2,7 +2,7 @@
 
 from json import loads as json_loads
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import typer
@@ -93,22 +93,34 @@ def measure(
             if like is not None and (alternative or compare):
                 raise ValueError(f"--like {like}: it measures nothing, so that --alternative and "
                                  "--compare have no meaning beside it")
-            record, path = load_sweep(name)
+            record, path, tables = load_sweep(name)
+            request = request.for_scene(tables)
             texts = with_companions(request.quantities, record.dim)
             observed = observed_of(record, path, texts)
             others = load_alternatives(record, alternative or ())
             compared = load_compared(compare or (), observed, request)
         if like is not None:
-            raise typer.Exit(answer_from(like, record, observed, request))
+            raise typer.Exit(answer_from(like, SweptScene(record, observed, tables), request))
         search = run_search(record, observed, request, others)
         facts = json_loads(as_json(answer_of(search, path.stem, compared)))
-        write_answer(search, facts, request)
+        write_answer(search, facts, request, tables)
         print(as_json(facts) if json else "\n".join(answer_lines(facts)))
     raise typer.Exit(0 if facts["best"] is not None and is_whole(facts) else NO_ANSWER)
 
 
-def answer_from(like, record, observed, request):
-    """Write and say the advice that the answer on a similar scene gives; return the exit status."""
+class SweptScene(NamedTuple):
+    """A scene without its quantities of interest, its `ObservedRun`, and these quantities."""
+
+    record: object
+    observed: object
+    tables: tuple
+
+
+def answer_from(like, swept, request):
+    """Write and say the advice that the answer on a similar scene gives; return the exit status.
+
+    swept: the `SweptScene` that the advice is for.
+    """
     name = Path(like).stem
     answer = read_answer(request.out / f"{name}.trade.json")
     with options():
@@ -118,13 +130,13 @@ def answer_from(like, record, observed, request):
         print(f"{name}: no setting of its answer keeps {percent(request.error)}")
         return NO_ANSWER
     with options():
-        cells = largest_extent(observed.probes) / record.dx
+        cells = largest_extent(swept.observed.probes) / swept.record.dx
         chosen = carried_over(row, answer.cells, cells)
-        scene = scene_at(record, chosen)
+        scene = scene_at(swept.record, chosen)
     sentence = (f"as on {name}: {chosen.text}, which had an error of {percent(row.error)} of "
                 f"{', '.join(answer.quantities)} there, until t = {answer.until:.4g} s of "
                 f"{answer.end:.4g} s; nothing was measured on {request.stem}")
-    text = scene_text([sentence], scene, request.out)
+    text = scene_text([sentence], scene, request.out, swept.tables)
     write_bytes(request.out / f"{request.stem}.best.toml", text.encode())
     print(f"{sentence}\nwrote {request.out / request.stem}.best.toml")
     return 0
@@ -134,7 +146,7 @@ def load_alternatives(record, names):
     """Return {name: scene} of scenes of the same problem. Raises SceneError for one of another."""
     others = {}
     for name in names:
-        other, path = load_sweep(name)
+        other, path, _ = load_sweep(name)
         for what, of in PROBLEM.items():
             if of(record) != of(other):
                 raise SceneError(f"--alternative {name}: {what} {of(other)}, in the scene "
@@ -163,12 +175,14 @@ def run_search(record, observed, request, others):
     return search
 
 
-def write_answer(search, facts, request):
-    """Write the JSON, the page, the figure, and the recommended scene. Raises `NotWritten`."""
+def write_answer(search, facts, request, tables):
+    """Write the JSON, the page, the figure, and the recommended scene, with the quantities of
+    interest of the scene as given. Raises `NotWritten`.
+    """
     base = request.out / request.stem
     write_bytes(f"{base}.trade.json", as_json(facts).encode())
     write_bytes(f"{base}.trade.html", page_of(facts, "trade").encode())
     save_figure(facts, f"{base}.trade.png")
-    text = best_scene(search, request.stem, request.out)
+    text = best_scene(search, request.stem, request.out, tables)
     if text is not None:
         write_bytes(f"{base}.best.toml", text.encode())

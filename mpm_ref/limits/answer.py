@@ -60,6 +60,7 @@ def direction_facts(one, scenes):
     name, bad = one.axis.name, one.bad
     facts = {
         "axis": name, "text": one.axis.text, "direction": one.direction, "margin": one.margin,
+        "verb": "grow" if (one.direction == UP) != one.axis.is_inverse else "fall",
         "good": one.good, "bad": bad, "end": end_of(one), "now": value(one, scenes, 1.0),
         "good_value": value(one, scenes, one.good),
         "bad_value": None if bad is None else value(one, scenes, bad),
@@ -156,21 +157,31 @@ def nearest_lines(facts):
 
 def sentence(facts):
     """Return how far one axis may change in one direction, and what happens then."""
-    verb = "grow" if facts["direction"] == UP else "fall"
     if facts["margin"] == 1.0 and facts["bad"] is None:
-        return f"{facts['text']}: whether it may {verb} was not tried within the budget"
-    begin = f"{facts['text']} may {verb}"
+        return f"{facts['text']}: whether it may {facts['verb']} was not tried within the budget"
+    begin = f"{facts['text']} may {facts['verb']}"
     if facts["margin"] > 1.0:
-        begin += f" {number(facts['margin'])} times" + changed(facts, "good_value")
+        begin += f" {extent(facts, 'good', 'to ')}"
     else:
         begin += " by less than was tried"
     if facts["bad"] is None:
         return begin + ("; the budget ended the search" if facts["end"] == BUDGET_END
                         else ", as far as was tried")
-    times = max(facts["bad"], 1.0 / facts["bad"])
-    then = f"at {number(times)} times{changed(facts, 'bad_value')}: {reason(facts['first_bad'])}"
+    then = f"at {extent(facts, 'bad')}: {reason(facts['first_bad'])}"
     late = " (the budget ended the search between them)" if facts["end"] == BUDGET_END else ""
     return f"{begin}; {then}{late}"
+
+
+def extent(facts, key, preposition=""):
+    """Return a factor as text with the value that it leads to: that value alone, from that of the
+    scene as given, where it is not the factor's multiple.
+    """
+    value = facts[f"{key}_value"]
+    if AXIS[facts["axis"]].is_inverse and value:
+        origin = f" (from {facts['now']})" if preposition else ""
+        return f"{preposition}{value}{origin}"
+    factor = facts[key]
+    return f"{number(max(factor, 1.0 / factor))} times{changed(facts, f'{key}_value')}"
 
 
 def changed(facts, key):

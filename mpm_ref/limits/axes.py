@@ -19,7 +19,7 @@ change the physical problem: they are numerical.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import atan, degrees, radians, tan
+from math import atan, degrees, floor, log10, radians, tan
 
 import numpy as np
 
@@ -47,6 +47,7 @@ class ScaleAxis:
     reading: Callable               # (tables) -> text of a value that it changes; "" where absent
     is_numerical: bool = False      # the physical problem stays
     is_geometric: bool = False      # coordinates of the scene change
+    is_inverse: bool = False        # `text` names what falls as the factor grows
 
 
 def rungs(axis, tables, direction):
@@ -181,6 +182,18 @@ def material_reading(*keys):
     return lambda tables: first(tables, lambda body: body["material"], keys)
 
 
+def poisson_reading(tables):
+    """Return "nu = value" of the first material that has one, with three digits of its distance
+    from 1/2; else "".
+    """
+    values = [body["material"]["nu"] for body in tables["body"]
+              if body["material"].get("nu") is not None]
+    if not values:
+        return ""
+    distance = abs(0.5 - values[0])
+    return f"nu = {round(values[0], 2 - floor(log10(distance))):.15g}"
+
+
 def flow_reading(*keys):
     """Return the reading of the first of some keys that a return map has."""
     return lambda tables: first(tables, lambda body: body["material"]["flow"], keys)
@@ -252,7 +265,7 @@ AXES = (
     ScaleAxis("time_step", "the time step", scale_time_step, time_step_reading, is_numerical=True),
     ScaleAxis("stiffness", "the stiffness", scale_material(("E", "lam")),
               material_reading("E", "lam")),
-    ScaleAxis("poisson", "1 - 2 nu", scale_poisson, material_reading("nu")),
+    ScaleAxis("poisson", "Poisson's ratio", scale_poisson, poisson_reading, is_inverse=True),
     ScaleAxis("density", "the density", scale_density,
               lambda tables: first(tables, lambda body: body, ("density",))),
     ScaleAxis("speed", "the speed", scale_speed, speed_reading),

@@ -6,6 +6,7 @@ Matplotlib is imported when a figure is made.
 from math import log10
 
 from ..store.atomic import replacing
+from ..store.text import figure_text
 from ..sweep.observation import CRASHED, REFUSED, STOPPED, UNSTABLE
 from .answer import BUDGET_END, LAST_RUNG, counts_text, number
 from .axes import UP
@@ -63,7 +64,7 @@ def draw_margins(axes, facts):
              xticklabels=[f"{10.0**k:g}" for k in ticks], yticks=range(len(names)),
              yticklabels=[name.replace("_", " ") for name in names],
              xlabel="factor, 1 is the scene as given")
-    axes.set_title(f"{facts['title'] or facts['scene']}: changed this far it is right",
+    axes.set_title(f"{figure_text(facts['title'] or facts['scene'])}: changed this far it is right",
                    fontsize=9)
     axes.grid(axis="x", color="0.9", linewidth=0.6)
     axes.set_axisbelow(True)

@@ -39,10 +39,14 @@ class NeedsAnswer:
                 *lean_lines(self), "", *table_lines(self.code)]
 
     @property
+    def outputs(self):
+        """Return the labels of the removals of output, which the lean scene keeps."""
+        return [label for label, one in self.result.first.offers.items() if one.is_output]
+
+    @property
     def facts(self):
         """Return all that was measured as plain values."""
         result = self.result
-        outputs = [label for label, one in result.first.offers.items() if one.is_output]
         return {
             "command": self.command,
             "title": result.first.scene.title,
@@ -53,7 +57,7 @@ class NeedsAnswer:
             "given": asdict(result.base.cost) | {"cpu": result.cpu, "noise": result.noise},
             "errors": asdict(result.errors),
             "removals": [run_facts(run, result) | {"text": removal_line(run, self),
-                                                   "output": run.label in outputs}
+                                                   "output": run.label in self.outputs}
                          for run in result.singles],
             "order": [run_facts(run, result) for run in result.order],
             "lean_removals": [removal.label for removal in result.lean.removals],
@@ -89,7 +93,8 @@ def scene_lines(result):
 
 def removal_line(run, answer):
     """Return the sentence on one removal."""
-    return f"{run.label}: {verdict_text(run, answer)}"
+    note = "; the lean scene keeps its frames" if run.label in answer.outputs else ""
+    return f"{run.label}: {verdict_text(run, answer)}{note}"
 
 
 def verdict_text(run, answer):
@@ -160,8 +165,11 @@ def run_facts(run, result):
     return asdict(run) | {"saving": share if isfinite(share) else None}
 
 
-def lean_text(answer, folder):
-    """Return the TOML text of the lean scene for a file in a folder, with comments."""
+def lean_text(answer, folder, quantities=()):
+    """Return the TOML text of the lean scene for a file in a folder, with comments.
+
+    quantities: records of quantities of interest that the scene as given has.
+    """
     result = answer.result
     head = [f"{result.first.scene.title or answer.name}, without what it does not require at "
             f"{percent(answer.error)}.", "", f"Written by mpm_ref {__version__}: {answer.command}",
@@ -170,4 +178,4 @@ def lean_text(answer, folder):
     gone = [removal for removal in result.lean.removals if removal.body or removal.plane]
     head += [f"{removal.label}: positions are compared on the matter that is left."
              for removal in gone]
-    return scene_text(head, result.lean.scene, folder)
+    return scene_text(head, result.lean.scene, folder, quantities)

@@ -255,11 +255,14 @@ def attempts(variant, offers):
 
 
 def attempt(variant, removal):
-    """Return a variant after a removal, or the SceneError that says why there is none."""
+    """Return a variant after a removal, or the SceneError that says why there is none: it may not
+    change the scene, as fewer points than one.
+    """
     try:
-        return variant.without(removal)
+        after = variant.without(removal)
     except SceneError as fault:
         return fault
+    return SceneError("the scene stays as it is") if after.scene == variant.scene else after
 
 
 def best_of(runs, cpu_alone):

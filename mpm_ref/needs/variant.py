@@ -84,10 +84,10 @@ def changes(base, observation, variant, first):
 
 def columns(text, variant, first):
     """Return the columns of a quantity "positions[:BODY]" at first that are left in a variant."""
-    name = OutputQuantity(text).arguments
+    name = OutputQuantity(text).record.body
     left, result, start = dict(variant.rows), [], 0
     for body, X in first.probes:
-        if name and name[0] != body:
+        if name not in (None, body):
             continue
         n, d = X.shape
         remaining = left.get(body, np.empty(0, dtype=int))

@@ -31,6 +31,7 @@ from ..shapes.quantities import (
     Share,
     Vector,
 )
+from .quantity_records import Quantities
 
 Name = Annotated[str, Meta(min_length=1, max_length=100, pattern=r"^[A-Za-z0-9_. -]+\Z")]
 Time = Annotated[float, Meta(ge=-1e12, le=1e12)]                        # [s]
@@ -358,6 +359,7 @@ class Scene(Record, dict=True):
     boundary: Literal["nodes", "surface"] = "nodes"     # where the conditions of colliders hold
     clip: Clip | None = None
     limits: Limits = Limits()
+    quantity: tuple[Quantities, ...] = ()       # of interest; no run depends on them
 
     @property
     def parts(self):

@@ -13,6 +13,7 @@ from .messages import SceneError, joined
 from .validate import validate_scene
 
 FILES = "file", "weights"       # keys that name a file
+MANY = "body", "collider", "fixed", "quantity"      # lists of tables
 LARGEST = 10_000_000            # bytes of a text
 DEEPEST = 50                    # tables and lists within each other
 
@@ -94,7 +95,7 @@ def _located(data, folder):
 def dumps(scene):
     """Return the TOML text of a scene without its defaults, which `loads` reads back."""
     tables = _tables(validate_scene(scene))
-    many = {key: tables.pop(key) for key in ("body", "collider", "fixed") if key in tables}
+    many = {key: tables.pop(key) for key in MANY if key in tables}
     lines = [_pair(key, value) for key, value in tables.items()]
     for key, items in many.items():
         for item in items:
@@ -119,9 +120,11 @@ def _toml(value):
 def canonical(scene):
     """Return the canonical JSON text of a scene: sorted keys, no defaults, files by name and hash.
 
-    Equal scenes have equal texts, independent of their folder. Raises SceneError.
+    Scenes whose runs are equal have equal texts, independent of their folder, and of quantities of
+    interest, which it leaves out. Raises SceneError.
     """
     tables = _by_content(_tables(validate_scene(scene)))
+    tables.pop("quantity", None)
     return json.dumps(tables, sort_keys=True, separators=(",", ":"))
 
 

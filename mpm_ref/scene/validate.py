@@ -12,7 +12,8 @@ import numpy as np
 from ..shapes import Mesh
 from ..shapes.quantities import Vector
 from .builder import build_parts
-from .messages import SceneError, joined, rephrase, shown
+from .messages import SceneError, errors_at, joined, rephrase, shown
+from .quantity_records import check_quantity
 from .records import Scene
 
 
@@ -78,7 +79,11 @@ def check_scene(scene):
             raise SceneError(f"body[{k}].name = {body.name!r}: another body has this name")
     if scene.clip and not all(a < b for a, b in zip(scene.clip.lower, scene.clip.upper)):
         raise SceneError("clip: expected lower < upper on every axis")
-    return build_parts(scene)
+    parts = build_parts(scene)
+    for k, quantity in enumerate(scene.quantity):
+        with errors_at(f"quantity[{k}]"):
+            check_quantity(quantity, scene)
+    return parts
 
 
 def check_body(body, dim, path):

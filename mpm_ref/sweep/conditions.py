@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .quantity import AXES
+from ..scene.quantity_records import part_names
 
 EVEN = 1e-12        # of a step: a step that begins before another ended replaces it
 
@@ -44,13 +44,3 @@ def record_impulses(problem, scene):
         return problem, None
     recorder = ImpulseRecorder(problem.conditions, part_names(scene), problem.dim)
     return replace(problem, conditions=recorder), recorder
-
-
-def part_names(scene):
-    """Return the names of a scene's parts in the order of their impulses; "collider0" and the like
-    where the scene gives none.
-    """
-    colliders = [part.name or f"collider{k}" for k, part in enumerate(scene.collider)]
-    fixed = [part.name or f"fixed{k}" for k, part in enumerate(scene.fixed)]
-    sides = [f"wall {axis}{side}" for axis in AXES[:scene.dim] for side in "-+"]
-    return [*colliders, *fixed, *(sides if scene.walls is not None else [])]

@@ -20,7 +20,7 @@ from ..timestep import TooLarge
 from .conditions import record_impulses
 from .contacts import ContactRecorder
 from .probes import initial_order, interpolation
-from .quantity import OutputQuantity, Snapshot
+from .quantity import OutputQuantity, Snapshot, check_quantities
 
 FINISHED, UNSTABLE, REFUSED, STOPPED = "finished", "unstable", "refused", "too long"
 CRASHED = "crashed"     # its process was killed, it had no memory, or a file could not be read
@@ -82,6 +82,7 @@ def observe(run):
     blank = {text: np.full((len(run.times), 0), np.nan) for text in run.quantities}
     try:
         scene = validate_scene(parse(run.scene))
+        check_quantities(run.quantities, scene)
         problem, recorder = record_impulses(build(scene), scene)
         observer = RunObserver(problem, run, recorder)
     except (OSError, MemoryError) as fault:
@@ -175,10 +176,11 @@ class RunObserver:
     def result(self, outcome, message):
         """Return the `RunObservation`."""
         n, values = len(self._run.times), {}
-        for k, text in enumerate(self._run.quantities):
+        for k, quantity in enumerate(self._quantities):
             rows = np.array([row[k] for row in self._rows])
-            values[text] = np.full((n, rows.shape[1] if rows.ndim == 2 else 0), np.nan)
-            values[text][:len(rows)] = rows
+            samples = np.full((n, rows.shape[1] if rows.ndim == 2 else 0), np.nan)
+            samples[:len(rows)] = rows
+            values[quantity.text] = quantity.series(samples, self._run.times)
         particles = sum(len(body.id) for body in self._problem.bodies)
         cost = RunCost(*self._clock.total(), self._clock.steps, particles,
                        bytes_of(self._problem.bodies) + self._nodes)

@@ -7,15 +7,14 @@
     front:AXIS+ | AXIS-     farthest material along an axis, such as front:x+            [m]
     profile:AXIS            quantiles of the mass along an axis: a distribution          [m]
     kinetic, elastic, gravity, energy       energies                                     [J]
-    impulse:NAME            impulse of a collider, region or "walls" on the matter     [N s]
+    impulse:NAME            impulse of a collider, region or wall on the matter        [N s]
+    force:NAME              its mean force between two times of observation, 0 at first  [N]
     mean:FIELD:X0,Y0,X1,Y1  mean of J, speed or pressure over the matter in a box
 
 The suffix "@end" compares the last state alone, not the whole run. A difference is relative to the
-largest change of the quantity during the reference run.
+largest change of the quantity during the reference run. `scene.quantity_records` reads the texts.
 """
 
-import difflib
-import re
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -23,16 +22,12 @@ import numpy as np
 
 from ..energy import energy
 from ..monitor import volume_ratio
+from ..scene.quantity_records import AXES, QuantityOfInterest, check_quantity, quantity_of
 
-AXES = "xyz"
 QUANTILES = np.linspace(0.02, 0.98, 33)
 ENERGIES = ("kinetic", "elastic", "gravity", "energy")
-FIELDS = ("J", "speed", "pressure")
 DEFAULT = ("positions",)
 CHAOTIC = ("kinetic", "elastic")        # see `with_companions`
-EXPECTED = ("expected positions, centroid, path:X,Y, region:X0,Y0,X1,Y1, front:x+, profile:x, "
-            "kinetic, elastic, gravity, energy, impulse:NAME or mean:J:X0,Y0,X1,Y1, with @end for "
-            "the last state alone")
 
 
 class Snapshot(NamedTuple):
@@ -53,31 +48,51 @@ class OutputQuantity:
     """
 
     text: str
-    kind: str = field(init=False, default="")
-    arguments: tuple = field(init=False, default=())
-    at_end: bool = field(init=False, default=False)
+    record: QuantityOfInterest = field(init=False)
 
     def __post_init__(self):
-        name, at, when = self.text.partition("@")
-        kind, *arguments = name.strip().split(":")
-        if kind not in SAMPLES or (at and when.strip() != "end"):
-            near = difflib.get_close_matches(kind, SAMPLES, 1)
-            hint = f"did you mean {near[0]}? " if near else ""
-            raise ValueError(f"quantity {self.text!r}: {hint}{EXPECTED}")
-        object.__setattr__(self, "kind", kind)
-        object.__setattr__(self, "arguments", tuple(argument.strip() for argument in arguments))
-        object.__setattr__(self, "at_end", bool(at))
+        object.__setattr__(self, "record", quantity_of(self.text))
+
+    @property
+    def kind(self):
+        """Return the name of what is measured, the first word of the text."""
+        return self.record.__struct_config__.tag
+
+    @property
+    def at_end(self):
+        """Return whether the last state alone is compared."""
+        return self.record.at_end
 
     def sample(self, snapshot):
-        """Return the value (k,) in a `Snapshot`. Raises ValueError for arguments that do not fit
-        the scene.
+        """Return the value (k,) in a `Snapshot` of a scene that it fits (see `check_quantities`).
+
+        Raises ValueError where a region holds no material.
         """
         try:
-            return np.atleast_1d(SAMPLES[self.kind](snapshot, *self.arguments)).ravel()
-        except TypeError:
-            raise ValueError(f"quantity {self.text!r}: {EXPECTED}") from None
+            return np.atleast_1d(SAMPLES[self.kind](snapshot, self.record)).ravel()
         except ValueError as fault:
             raise ValueError(f"quantity {self.text!r}: {fault}") from None
+
+    def series(self, samples, times):
+        """Return the values (T, k) at times (T,) [s] from the samples (T, k) there.
+
+        Those of a force are means since the time before, from samples of the impulse; 0 at first.
+        """
+        if self.kind != "force":
+            return samples
+        force = np.zeros_like(samples)
+        force[1:] = np.diff(samples, axis=0) / np.diff(times)[:, None]
+        return force
+
+
+def check_quantities(texts, scene):
+    """Raise ValueError, in one sentence, for the text of a quantity that does not fit a scene."""
+    for text in texts:
+        record = OutputQuantity(text).record
+        try:
+            check_quantity(record, scene)
+        except ValueError as fault:
+            raise ValueError(f"quantity {text!r}: {fault}") from None
 
 
 def with_companions(texts, dim):
@@ -89,58 +104,51 @@ def with_companions(texts, dim):
 
 
 def named_bodies(snapshot, name):
-    """Return the bodies of a name, all for "". Raises ValueError for an unknown name."""
-    chosen = [body for body in snapshot.bodies if name in ("", body.name)]
-    if not chosen:
-        names = ", ".join(body.name for body in snapshot.bodies)
-        raise ValueError(f"body {name!r}: expected one of {names}")
-    return chosen
+    """Return the bodies of a name, all for None."""
+    return [body for body in snapshot.bodies if name in (None, body.name)]
 
 
-def positions(snapshot, body=""):
+def positions(snapshot, record):
     """Return the positions of all probes, (n d,)."""
-    return np.concatenate([snapshot.probes[b.name] for b in named_bodies(snapshot, body)])
+    bodies = named_bodies(snapshot, record.body)
+    return np.concatenate([snapshot.probes[body.name] for body in bodies])
 
 
-def centroid(snapshot, body=""):
+def centroid(snapshot, record):
     """Return the centre of mass (d,)."""
-    bodies = named_bodies(snapshot, body)
+    bodies = named_bodies(snapshot, record.body)
     mass = sum(b.particles.m.sum() for b in bodies)
     return sum(b.particles.m @ b.particles.x for b in bodies) / mass
 
 
-def path(snapshot, point):
+def path(snapshot, record):
     """Return the position (d,) of the probe that starts nearest to a point."""
-    X = numbers(point, snapshot.problem.dim)
     starts = np.concatenate(list(snapshot.starts.values()))
-    nearest = np.argmin(np.sum((starts - X) ** 2, axis=1))
+    nearest = np.argmin(np.sum((starts - record.point) ** 2, axis=1))
     return np.concatenate(list(snapshot.probes.values()))[nearest]
 
 
-def region(snapshot, box):
+def region(snapshot, record):
     """Return the mean position (d,) of the probes that start in a box."""
-    low, high = corners(box, snapshot.problem.dim)
     starts = np.concatenate(list(snapshot.starts.values()))
-    inside = ((low <= starts) & (starts <= high)).all(axis=1)
+    inside = is_inside(starts, record)
     if not inside.any():
         raise ValueError("no probe starts in this box; expected a box that "
                          "holds material")
     return np.concatenate(list(snapshot.probes.values()))[inside].mean(axis=0)
 
 
-def front(snapshot, side, body=""):
+def front(snapshot, record):
     """Return the farthest material along an axis: the outermost particle and half its width."""
-    axis, sign = axis_of(side[:-1], snapshot), {"+": 1.0, "-": -1.0}.get(side[-1:])
-    if sign is None:
-        raise ValueError("expected an axis with its side, such as x+")
+    axis, sign = AXES.index(record.side[0]), 1.0 if record.side[1] == "+" else -1.0
     d = snapshot.problem.dim
     return sign * max(np.max(sign * b.particles.x[:, axis] + 0.5 * b.particles.V0 ** (1.0 / d))
-                      for b in named_bodies(snapshot, body))
+                      for b in named_bodies(snapshot, record.body))
 
 
-def profile(snapshot, axis, body=""):
+def profile(snapshot, record):
     """Return quantiles (33,) of the mass along an axis, each particle as wide as it is at rest."""
-    a, bodies = axis_of(axis, snapshot), named_bodies(snapshot, body)
+    a, bodies = AXES.index(record.axis), named_bodies(snapshot, record.body)
     x = np.concatenate([b.particles.x[:, a] for b in bodies])
     m = np.concatenate([b.particles.m for b in bodies])
     width = np.concatenate([b.particles.V0 for b in bodies]) ** (1.0 / snapshot.problem.dim)
@@ -154,32 +162,31 @@ def profile(snapshot, axis, body=""):
 
 def energy_of(name):
     """Return the sampling function of an energy by its name."""
-    def sample(snapshot):
+    def sample(snapshot, record):
         problem = snapshot.problem
         now = energy(snapshot.bodies, problem.gravity, problem.inertia)
         return now.sum if name == "energy" else getattr(now, name)
     return sample
 
 
-def impulse(snapshot, name):
+def impulse(snapshot, record):
     """Return the impulse (d,) of a part of the conditions on the matter since the start."""
-    if name not in snapshot.impulses:
-        names = ", ".join(snapshot.impulses) or "none; the scene has no collider, region or wall"
-        raise ValueError(f"expected one of {names}")
-    return snapshot.impulses[name]
+    return snapshot.impulses[record.part]
 
 
-def mean(snapshot, name, box):
+def mean(snapshot, record):
     """Return the mean of a field over the mass in a box; NaN where the box is empty."""
-    if name not in FIELDS:
-        raise ValueError(f"expected one of {', '.join(FIELDS)}")
-    low, high = corners(box, snapshot.problem.dim)
     top = bottom = 0.0
     for body in snapshot.bodies:
         q = body.particles
-        m = q.m * ((low <= q.x) & (q.x <= high)).all(axis=1)
-        top, bottom = top + m @ particle_field(q, name), bottom + m.sum()
+        m = q.m * is_inside(q.x, record)
+        top, bottom = top + m @ particle_field(q, record.field), bottom + m.sum()
     return top / bottom if bottom else np.nan
+
+
+def is_inside(x, box):
+    """Return the mask (N,) of points x (N, d) in a box with corners `lower` and `upper`."""
+    return ((np.array(box.lower) <= x) & (x <= np.array(box.upper))).all(axis=1)
 
 
 def particle_field(particles, name):
@@ -193,34 +200,8 @@ def particle_field(particles, name):
     return -trace / volume_ratio(particles)
 
 
-def axis_of(name, snapshot):
-    """Return the index of an axis by its letter. Raises ValueError."""
-    known = AXES[:snapshot.problem.dim]
-    if name not in known or len(name) != 1:
-        raise ValueError(f"axis {name!r}: expected one of {', '.join(known)}")
-    return known.index(name)
-
-
-def corners(text, dim):
-    """Return the two corners of a box (d,). Raises ValueError."""
-    values = numbers(text, 2 * dim)
-    return values[:dim], values[dim:]
-
-
-def numbers(text, n):
-    """Return n numbers separated by commas as an array. Raises ValueError."""
-    parts = re.split(r"\s*,\s*", text)
-    try:
-        values = np.array([float(part) for part in parts])
-    except ValueError:
-        values = np.empty(0)
-    if len(values) != n or not np.isfinite(values).all():
-        raise ValueError(f"{text!r}: expected {n} numbers with commas between them")
-    return values
-
-
 SAMPLES = {
     "positions": positions, "centroid": centroid, "path": path, "region": region, "front": front,
     "profile": profile, **{name: energy_of(name) for name in ENERGIES}, "impulse": impulse,
-    "mean": mean,
+    "force": impulse, "mean": mean,
 }

@@ -124,8 +124,8 @@ def require_dense(path, series, error):
             enough = ceil(len(rows) * sqrt(gap / (SHARE * error)))
             raise SceneError(f"{path}: {len(rows)} frames, between which {text} is known to "
                              f"{100.0 * gap:.2g} % only; expected at most {100.0 * SHARE:g} % of "
-                             f"the error asked: about {enough} frames would do (`interval` of the "
-                             "scene)")
+                             f"the error asked: about {enough} frames would do where the motion "
+                             "is smooth (`interval` of the scene)")
 
 
 def series_of(results, observed):
@@ -152,8 +152,8 @@ def snapshots(results, observed):
 def is_stored(quantity, results):
     """Return whether a file has what a quantity is computed from."""
     if quantity.kind == "mean":
-        return results.offers(quantity.arguments[0])
-    return quantity.kind != "impulse"
+        return results.offers(quantity.record.field)
+    return quantity.kind not in ("impulse", "force")
 
 
 def at_times(series, t, times):

@@ -2,15 +2,33 @@
 
 import os
 
+from ..scene.quantity_records import check_quantity
 from ..scene.toml import FILES, dumps
 from ..scene.validate import plain, validate_scene
 
 
-def scene_text(comments, scene, folder):
-    """Return the TOML text of a scene for a file in a folder, after lines of comments."""
-    head = "".join(f"# {one_line(line)}".rstrip() + "\n" for line in comments)
+def scene_text(comments, scene, folder, quantities=()):
+    """Return the TOML text of a scene for a file in a folder, after lines of comments.
+
+    quantities: records of quantities of interest. A comment names those that do not fit the scene,
+    such as the impulse of a part that it does not have; the others become tables.
+    """
+    faults = {one: fault_of(one, scene) for one in quantities}
+    lines = [*comments, *(f"No [[quantity]] {one.text}: {fault}" for one, fault in faults.items()
+                          if fault)]
+    head = "".join(f"# {one_line(line)}".rstrip() + "\n" for line in lines)
     tables = {key: value for key, value in plain(scene).items() if value is not None}
+    tables["quantity"] = [plain(one) for one, fault in faults.items() if not fault]
     return head + "\n" + dumps(validate_scene(from_folder(tables, folder)))
+
+
+def fault_of(quantity, scene):
+    """Return why a quantity of interest does not fit a scene; "" where it does."""
+    try:
+        check_quantity(quantity, scene)
+    except ValueError as fault:
+        return str(fault)
+    return ""
 
 
 def one_line(text):

@@ -147,7 +147,7 @@ def scale_particles(tables, factor):
 def scale_points(sampling, factor, dim, per_cell):
     """Multiply the points per axis of a sampling; per_cell: also where they are per cell."""
     if sampling.get("counts") is not None:
-        sampling["counts"] = [max(round(n * factor), 2) for n in sampling["counts"]]
+        sampling["counts"] = [max(round(n * factor), min(n, 2)) for n in sampling["counts"]]
     if sampling.get("count") is not None:
         sampling["count"] = max(round(sampling["count"] * factor**dim), 1)
     for key in ("spacing", "radius"):

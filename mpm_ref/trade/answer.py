@@ -216,22 +216,24 @@ def percent(value):
     return "unknown" if value is None or not isfinite(value) else f"{100.0 * value:.3g} %"
 
 
-def best_scene(search, name, folder="."):
+def best_scene(search, name, folder=".", quantities=()):
     """Return the TOML text of the scene under the recommended setting, for a file in a folder, with
     comments on its error and cost; None without one.
+
+    quantities: records of quantities of interest that the scene as given has.
     """
     best = search.best()
     if best is None:
         return None
     run, error = search.observations[best], search.error_of(best)
-    quantities = ", ".join(search.quantities)
+    asked = ", ".join(search.quantities)
     head = [
         f"{name}, with the setting that `mpm-ref trade` recommends: {best.text}",
-        f"Error asked: {percent(search.error)} of {quantities}, until t = "
+        f"Error asked: {percent(search.error)} of {asked}, until t = "
         f"{search.horizon():.4g} s.",
         f"Expected error: {percent(error)}; the reference's own: "
         f"{percent(search.reference_error())}.",
         f"Cost: {run.cost.cpu:.3g} s of CPU time, {run.cost.steps} steps, "
         f"{run.cost.particles} particles.",
     ]
-    return scene_text(head, scene_at(search.scene, best, search.others), folder)
+    return scene_text(head, scene_at(search.scene, best, search.others), folder, quantities)

@@ -4,6 +4,7 @@ Matplotlib is imported when a figure is made.
 """
 
 from ..store.atomic import replacing
+from ..store.text import figure_text
 from ..sweep.observation import FINISHED
 
 COSTS = {"cpu": "CPU time [s]", "wall": "wall time [s]", "memory": "memory [bytes]"}
@@ -43,7 +44,7 @@ def draw_trade(facts):
                for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=5,
                   fontsize=8, frameon=False)
-    figure.suptitle(f"{facts['scene']}, until t = {facts['until']:.4g} s", fontsize=10)
+    figure.suptitle(f"{figure_text(facts['scene'])}, until t = {facts['until']:.4g} s", fontsize=10)
     return figure
 
 

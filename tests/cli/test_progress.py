@@ -1,15 +1,19 @@
 """Where there is no terminal, the program tells of compilation and of long waits in lines."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 from command_line import SCENE
+from sweep_scenes import FLIGHT, observed_run, scene_of
 
 from mpm_ref.cli import terminal
+from mpm_ref.cli.sweep_options import SweepRequest, open_runs
 from mpm_ref.core import kernel_cache
+from mpm_ref.sweep.runs import RunRequest
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -47,6 +51,32 @@ def test_a_long_wait_is_told_of_after_some_seconds(telling, capsys, monkeypatch)
     for clock[0] in terminal.passing(iterable=[5.0, 20.0, 21.0], unit="run"):
         continue
     assert capsys.readouterr().err == "mpm-ref: run 2 of 3\n"
+
+
+def test_a_wait_of_seconds_is_told_with_its_remark(telling, capsys, monkeypatch):
+    clock = [0.0]
+    monkeypatch.setattr(terminal, "monotonic", lambda: clock[0])
+    with terminal.passing(total=60.0, unit="s", desc="flight") as bar:
+        clock[0] = 11.0
+        bar.update(15.24)
+        bar.set_postfix_str("3 runs, 28 s left, last: dx x 2: finished")
+        clock[0] = 75.0
+        bar.update(16.76)
+    assert capsys.readouterr().err.splitlines() == [
+        "mpm-ref: flight: 15 s of 60 s",
+        "mpm-ref: flight: 32 s of 60 s, 3 runs, 28 s left, last: dx x 2: finished"]
+
+
+def test_runs_of_a_sweep_are_told_of_as_they_end(telling, capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr(terminal, "FIRST", -1.0)
+    monkeypatch.setattr(terminal, "EVERY", -1.0)
+    request = SweepRequest("flight.toml", 0.01, 60.0, (), 1, None, tmp_path, False)
+    scene = scene_of(FLIGHT)
+    with open_runs(request, observed_run(scene)) as runs:
+        runs.observe({"as given": RunRequest(scene)})
+    line, = capsys.readouterr().err.splitlines()
+    assert re.fullmatch(r"mpm-ref: flight: \d+ s of 60 s, 1 run, \d+ s left, last: as given: "
+                        "finished", line)
 
 
 def test_a_quiet_command_and_one_that_is_tested_tell_nothing(telling, capsys, monkeypatch):

@@ -118,6 +118,14 @@ def test_poisson_scales_the_distance_from_one_half(sand):
     assert [body["material"]["nu"] for body in tables["body"]] == pytest.approx([0.48, 0.47])
 
 
+@pytest.mark.parametrize(("nu", "text"), [
+    (0.3, "nu = 0.3"), (-0.98, "nu = -0.98"), (0.49981234, "nu = 0.499812"),
+    (0.49999995, "nu = 0.49999995"), (0.0, "nu = 0")])
+def test_poissons_ratio_is_shown_with_its_distance_from_one_half(nu, text):
+    tables = {"body": [{"material": {"lam": 1.0}}, {"material": {"nu": nu}}]}
+    assert AXIS["poisson"].reading(tables) == text
+
+
 def test_friction_scales_the_tangent(sand):
     flow = sand.tables(cell_of({"friction": 3.0}))["body"][0]["material"]["flow"]
     assert flow["friction_angle"] == pytest.approx(degrees(atan(3.0 * tan(radians(30.0)))))

@@ -122,7 +122,7 @@ def test_second_command_makes_no_new_run(falling, monkeypatch):
 def test_the_scene_as_given_and_its_grids_are_runs_of_trade(falling, monkeypatch):
     _, _, folder = falling
     monkeypatch.setattr(RunStore, "put", lambda *_: pytest.fail("a new run"))
-    record, path = load_sweep(folder / "disk.toml")
+    record, path, _ = load_sweep(folder / "disk.toml")
     observed = observed_of(record, path, with_companions(("positions",), 2))
     with open_executor(workers=1) as executor:
         runs = SceneRuns(observed, executor, RunStore(folder / "disk.trade"))
@@ -155,7 +155,8 @@ def test_scene_that_breaks_as_given_has_no_answer(tmp_path):
     (("--budget", "soon"), ("--budget soon", "20min")),
     (("--quantity", "warmth"), ("warmth", "expected positions")),
     (("--workers", "0"), ("--workers 0",)),
-    (("--quantity", "path:0.5"), ("0.5", "expected 2 numbers")),
+    (("--quantity", "path:0.5"), ("path:0.5", "expected path:X,Y")),
+    (("--quantity", "path:0.5,1,1"), ("[0.5, 1.0, 1.0]", "expected 2 numbers")),
 ])
 def test_bad_option_is_one_sentence(tmp_path, arguments, words):
     done, facts = limits(tmp_path, SCENE, *arguments)

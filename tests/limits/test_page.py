@@ -120,3 +120,15 @@ def test_a_direction_that_the_budget_ended_has_no_outcome():
     assert late
     assert {(one["outcome"], one["ends"]) for one in late} == {
         (None, "the budget ended the search")}
+
+
+def test_poissons_ratio_is_told_by_its_values():
+    """Its factors are those of 1 - 2 nu, which grows where nu falls."""
+    sentences = {one["direction"]: one["sentence"] for one in facts_of()["directions"]
+                 if one["axis"] == "poisson"}
+    assert sentences["down"] == ("Poisson's ratio may grow to nu = 0.4998 (from nu = 0.3), as far "
+                                 "as was tried")
+    assert sentences["up"].startswith("Poisson's ratio may fall ")
+    verbs = {(one["axis"], one["direction"]): one["verb"] for one in facts_of()["directions"]}
+    assert (verbs["poisson", "up"], verbs["poisson", "down"]) == ("fall", "grow")
+    assert (verbs["speed", "up"], verbs["speed", "down"]) == ("grow", "fall")

@@ -166,7 +166,7 @@ def test_without_a_table_of_the_code_the_answer_is_written(drop, tmp_path, monke
 
 def test_a_title_cannot_write_into_the_lean_scene(drop, monkeypatch):
     answers = []
-    monkeypatch.setattr(command, "write_answer", lambda answer, out: answers.append(answer))
+    monkeypatch.setattr(command, "write_answer", lambda answer, *_: answers.append(answer))
     folder, _ = drop
     mpm_ref("needs", folder / "drop.toml", "--budget", "5min", "--workers", "1", "--out", folder,
             "--quiet")

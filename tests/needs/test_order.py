@@ -61,6 +61,8 @@ class ToyVariant:
         """The variant after a removal."""
         if removal.label == "broken":
             raise SceneError("broken: no scene")
+        if removal.label == "fewer than one":
+            return self
         left = ToyScene(self.scene.names - {removal.label})
         return ToyVariant(left, (*self.removals, removal))
 
@@ -136,6 +138,14 @@ def test_error_since_the_scene_as_given_bounds_the_order():
 def test_required_ones_are_not_tried_again():
     _, runs = result_of({"a": 0.5, "b": 0.002}, {"b": 0.9})
     assert runs.labels.count("a") == 1
+
+
+def test_a_removal_that_leaves_the_scene_as_it_is_ends():
+    """One point is offered to become fewer again and again."""
+    result, _ = result_of({"fewer than one": 0.0, "a": 0.002}, budget=100)
+    assert verdicts(result)["fewer than one"] == IMPOSSIBLE
+    assert [run.label for run in result.order] == ["a"]
+    assert result.complete
 
 
 def test_removals_that_change_nothing_go_together():

@@ -4,12 +4,14 @@ import json
 from dataclasses import replace
 from math import inf, nan
 
+import msgspec
 import pytest
 from offline_page import HOSTILE, assert_holds
 
 from mpm_ref.cli.terminal import as_json
 from mpm_ref.needs.answer import NeedsAnswer
 from mpm_ref.needs.code_parts import CodeParts, table_lines
+from mpm_ref.needs.figure import draw_needs
 from mpm_ref.needs.ingredients import Removal
 from mpm_ref.needs.page import DEARER, page_facts, verdict_cases
 from mpm_ref.needs.removal import (
@@ -92,6 +94,33 @@ def answer_of(singles=SINGLES, order=ORDER):
 def test_the_page_holds_the_facts_and_loads_nothing(parts):
     facts = json.loads(as_json(page_facts(answer_of(*parts))))
     assert_holds(page_of(facts, "needs"), facts)
+
+
+def test_the_figure_is_drawn_of_any_change_and_name(recwarn):
+    """A change without bound, names with dollars and of thousands of characters."""
+    singles = (run_of("$\\frac{$", REQUIRED, inf), run_of("x" * 5000, REQUIRED, 1e300),
+               run_of("gravity", NOT_REQUIRED, 0.0, nan))
+    answer = answer_of(singles)
+    scene = msgspec.structs.replace(answer.result.first.scene, title="$x_$" + "y" * 5000)
+    errors = replace(answer.result.errors, grid={"positions": inf})
+    result = replace(answer.result, errors=errors, first=replace(answer.result.first, scene=scene))
+    figure = draw_needs(replace(answer, result=result))
+    figure.canvas.draw()
+    labels = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    assert labels[0] == r"\$\frac{\$"
+    assert max(map(len, labels)) < 70
+    assert not recwarn.list
+
+
+def test_a_line_on_frames_says_that_they_stay():
+    label = "frames every 0.1 s (a tenth instead)"
+    answer = answer_of((run_of(label, NOT_REQUIRED, 0.004, 6.0), *SINGLES[2:3]))
+    first = SceneVariant(loads(SCENE.replace("end =", "interval = 0.1\nend =")), (), ())
+    answer = replace(answer, result=replace(answer.result, first=first))
+    frames, friction = (one["text"] for one in page_facts(answer)["removals"])
+    assert frames == (f"{label}: not required at 1 % (positions by 0.4 %, kinetic by 0.2 %), saves "
+                      "40 % of CPU time; the lean scene keeps its frames")
+    assert friction.endswith("saves 40 % of CPU time")
 
 
 def verdict_at(run, x):

@@ -1,6 +1,7 @@
 """The stable time step: closed forms for one particle, and that it suffices for a cloud."""
 
 from math import sqrt
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,8 @@ import pytest
 from mpm_ref.body import Body, particles_at, with_separate_gradient
 from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.materials import FixedCorotated, HerschelBulkley, NeoHookean, NoFlow
+from mpm_ref.problem import Clock
+from mpm_ref.simulate import MOST_STEPS, next_dt
 from mpm_ref.timestep import TooLarge, largest_modulus, moduli, refuse, stable_dt
 
 DX, RHO, LAW = 0.1, 1000.0, FixedCorotated(4e4, 6e4)
@@ -132,3 +135,12 @@ def test_dt_past_the_bound_is_refused_with_all_terms():
     refuse(terms.dt, terms)
     with pytest.raises(TooLarge, match=r"past the stable.*1\.001 times.*elastic.*single particle"):
         refuse(1.001 * terms.dt, terms)
+
+
+@pytest.mark.parametrize("bound", [0.0, 1e-320, 0.5 / MOST_STEPS])
+def test_steps_in_which_time_stands_still_are_refused(bound):
+    clock, state = Clock(end=1.0, cfl=1.0), SimpleNamespace(t=0.25, frame=1, bound=bound)
+    with pytest.raises(TooLarge, match=r"^dt = .* is too small: from t = 0.25 to 1 s there would"):
+        next_dt(clock, state, 1.0)
+    state.bound = 2.0 / MOST_STEPS
+    assert next_dt(clock, state, 1.0) == pytest.approx(2.0 / MOST_STEPS)

@@ -96,18 +96,24 @@ def commands(path, folder):
     return [["info", path]]
 
 
-def fault_of(app, command):
-    """Return what is wrong with the answer to a command, or None."""
-    signal.alarm(SECONDS)
+def answer_to(app, command, seconds=SECONDS):
+    """Return the answer to a command, None where it takes longer."""
+    signal.alarm(seconds)
     try:
-        done = CliRunner().invoke(app, [str(word) for word in command])
+        return CliRunner().invoke(app, [str(word) for word in command])
     except TooLong:
-        return "too long"
+        return None
     finally:
         signal.alarm(0)
+
+
+def fault_of(done, statuses=(0, 2, 3, 4)):
+    """Return what is wrong with an answer, or None; statuses: of exits that are right."""
+    if done is None:
+        return "too long"
     if done.exception is not None and not isinstance(done.exception, SystemExit):
         return "".join(traceback.format_exception(done.exception))[-2000:]
-    if done.exit_code not in (0, 2, 3, 4):
+    if done.exit_code not in statuses:
         return f"exit status {done.exit_code}: {done.stderr[-500:]}"
     if len(done.stderr) > SAID:
         return f"{len(done.stderr)} characters on stderr"
@@ -132,7 +138,7 @@ def main(folder, seed, count):
         path.write_bytes(content)
         began = time.perf_counter()
         for command in commands(path, folder):
-            if fault := fault_of(app, command):
+            if fault := fault_of(answer_to(app, command)):
                 path.with_name(f"{k}-{name}").write_bytes(content)
                 faults.append({"case": k, "file": name, "fault": fault,
                                "seconds": round(time.perf_counter() - began, 1)})

@@ -4,19 +4,27 @@ from sweep_scenes import BOUNCE, observed_run, scene_of
 
 from mpm_ref.energy import energy
 from mpm_ref.scene import build
-from mpm_ref.sweep.observation import observe
-from mpm_ref.sweep.quantity import OutputQuantity, Snapshot, with_companions
+from mpm_ref.sweep.observation import REFUSED, observe
+from mpm_ref.sweep.quantity import (
+    OutputQuantity,
+    Snapshot,
+    check_quantities,
+    with_companions,
+)
+
+SCENE = scene_of(BOUNCE)
 
 
 @pytest.fixture
 def snapshot():
-    problem = build(scene_of(BOUNCE))
+    problem = build(SCENE)
     x = problem.bodies[0].particles.x
     probes = {"block": x[:7]}
     return Snapshot(problem, problem.bodies, probes, probes, {"floor": np.array([1.0, 2.0])})
 
 
 def value(text, snapshot):
+    check_quantities((text,), SCENE)
     return OutputQuantity(text).sample(snapshot)
 
 
@@ -71,6 +79,19 @@ def test_a_path_is_that_of_the_nearest_probe(snapshot):
         assert value(f"path:{x},{y}", moved) == pytest.approx(X[k] + [10.0 * k, 0.0])
 
 
+@pytest.mark.parametrize(("text", "near"), [
+    ("postions", "positions"), ("frnt:x+", "front"), ("inpulse:floor", "impulse"),
+    ("kinetics@end", "kinetic")])
+def test_the_nearest_quantity_is_offered(text, near):
+    with pytest.raises(ValueError, match=rf"^quantity '.*': did you mean {near}[?] expected pos"):
+        OutputQuantity(text)
+
+
+def test_a_quantity_that_resembles_none_has_no_near_one():
+    with pytest.raises(ValueError, match=r"^quantity 'beauty': expected positions, centroid,"):
+        OutputQuantity("beauty")
+
+
 def test_companions_are_energies_and_profiles_each_once():
     assert with_companions(("elastic", "front:x+"), 2) == (
         "elastic", "front:x+", "kinetic", "profile:x", "profile:y")
@@ -100,3 +121,50 @@ def test_impulse_of_the_floor_is_the_change_of_momentum():
     change = momentum(problem.bodies) - start - m * np.array([0.0, -9.8]) * 0.3
     assert change[1] > 100.0
     assert run.values["impulse:floor"][-1] == pytest.approx(change, rel=1e-9, abs=1e-9)
+
+
+RESTING = """
+dim = 2
+dx = 0.1
+end = 1.0
+gravity = [0.0, -9.8]
+scheme = { transfer = "pic" }
+[[body]]
+name = "block"
+density = 1000.0
+shape = { type = "box", lower = [0.2, 0.1], upper = [0.6, 0.5] }
+material = { law = "fixed_corotated", E = 1e6, nu = 0.3 }
+[[collider]]
+name = "floor"
+kind = "separate"
+shape = { type = "half_space", point = [0.0, 0.1], normal = [0.0, 1.0] }
+"""     # PIC damps the oscillation under its own weight
+
+
+def test_force_of_the_floor_on_a_block_at_rest_is_its_weight():
+    scene = scene_of(RESTING)
+    run = observe(observed_run(scene, ("force:floor", "impulse:floor"), n=6))
+    weight = 1000.0 * 0.4 * 0.4 * 9.8
+    assert run.finished
+    assert run.values["force:floor"][0] == pytest.approx([0.0, 0.0])
+    assert run.values["force:floor"][-1] == pytest.approx(
+        [0.0, weight], rel=1e-3, abs=1e-3 * weight)
+    assert run.values["impulse:floor"][-1] == pytest.approx(
+        0.2 * run.values["force:floor"].sum(axis=0), rel=1e-12)
+
+
+def test_a_force_is_the_mean_between_two_times():
+    force, impulse = OutputQuantity("force:floor"), OutputQuantity("impulse:floor")
+    J, t = np.array([[0.0, 0.0], [1.0, 2.0], [1.0, 6.0], [np.nan, np.nan]]), (0.0, 0.5, 1.5, 2.0)
+    assert force.series(J, t)[:3].tolist() == [[0.0, 0.0], [2.0, 4.0], [0.0, 4.0]]
+    assert np.isnan(force.series(J, t)[3]).all()
+    assert impulse.series(J, t) is J
+    assert force.series(np.empty((4, 0)), t).shape == (4, 0)
+
+
+@pytest.mark.parametrize("text", ["impulse:floor", "force:floor"])
+def test_a_run_of_a_scene_without_the_part_is_refused(text):
+    scene = scene_of(BOUNCE, collider=())
+    run = observe(observed_run(scene, (text,)))
+    assert run.outcome == REFUSED
+    assert run.message.startswith(f"quantity '{text}': part = 'floor': expected a quantity without")

@@ -1,7 +1,9 @@
+import re
+
 import numpy as np
 import pytest
 from command_line import mpm_ref
-from sweep_scenes import BOUNCE, observed_run, scene_of
+from sweep_scenes import BOUNCE, FLIGHT, observed_run, scene_of
 
 from mpm_ref.scene import SceneError
 from mpm_ref.store.results import BadResults, Results
@@ -52,7 +54,8 @@ def test_what_a_file_does_not_hold_is_not_known(recorded, tmp_path):
     run, _ = recorded
     (tmp_path / "bounce.toml").write_text(FIXED)
     mpm_ref("run", tmp_path / "bounce.toml", "--out", tmp_path / "x.h5", "--fields", "x", "--quiet")
-    texts = ("positions", "mean:speed:0,0,1,1", "mean:J:0,0,1,1", "impulse:floor")
+    texts = ("positions", "mean:speed:0,0,1,1", "mean:J:0,0,1,1", "impulse:floor",
+             "force:floor")
     values = observe_results(tmp_path / "x.h5", run._replace(quantities=texts)).values
     assert np.isfinite(values["positions"]).all()
     assert all(np.isnan(values[text]).all() for text in texts[1:])
@@ -90,6 +93,30 @@ def test_frames_need_increasing_times(recorded, times):
             require_same_problem(results, run)
 
 
+def frames_that_would_do(error):
+    return int(re.search(r"about (\d+) frames would do where the motion is smooth \(`interval` of "
+                         r"the scene\)$", str(error.value))[1])
+
+
+def test_so_many_frames_would_do(tmp_path):
+    """Of a smooth motion, a file with the number of frames that the refusal names is accepted."""
+    run, error = observed_run(scene_of(FLIGHT), ("centroid",), n=7), 0.01
+
+    def frames(n):
+        text = FLIGHT.replace("end = 0.2", f"end = 0.2\ndt = 0.0005\ninterval = {0.2 / (n - 1)}")
+        (tmp_path / "flight.toml").write_text(text)
+        assert mpm_ref("run", tmp_path / "flight.toml", "--out", tmp_path / f"{n}.h5",
+                       "--quiet").exit_code == 0
+        return tmp_path / f"{n}.h5"
+
+    with pytest.raises(SceneError) as few:
+        observe_results(frames(5), run, error)
+    n = frames_that_would_do(few)
+    observe_results(frames(n), run, error)
+    with pytest.raises(SceneError):
+        observe_results(frames(n // 2), run, error)
+
+
 def test_too_few_frames_are_refused(recorded):
     run, path = recorded
     between = run._replace(times=(0.0, 0.015, 0.3), quantities=("positions",))
@@ -98,8 +125,12 @@ def test_too_few_frames_are_refused(recorded):
     gap = np.sqrt(np.mean((ours - exact)[1] ** 2)) / largest_change(ours)
     assert 0.0 < gap < SHARE * 0.5
     observe_results(path, between, error=0.5)
-    with pytest.raises(SceneError, match="11 frames, between which positions is known to"):
+    with pytest.raises(SceneError, match="11 frames, between which positions is known to") as few:
         observe_results(path, between, error=gap / SHARE)
+    assert 11 < frames_that_would_do(few) < 33          # linear interpolation is of second order
+    with pytest.raises(SceneError) as fewer:
+        observe_results(path, between, error=gap / SHARE / 16.0)
+    assert frames_that_would_do(fewer) == pytest.approx(4 * frames_that_would_do(few), abs=4)
     observe_results(path, run, error=gap / SHARE)       # at the frames nothing is interpolated
 
 

@@ -33,6 +33,14 @@ def test_other_samplings_follow_the_grid(sampling, share):
         share * particles(scene))
 
 
+@pytest.mark.parametrize(("counts", "factor", "expected"), [
+    ("[1, 1]", 0.75, 1), ("[2, 1]", 0.25, 2), ("[1, 1]", 2.0, 4), ("[6, 6]", 0.25, 4)])
+def test_fewer_points_of_a_lattice_are_not_more(counts, factor, expected):
+    sampling = f'{{ type = "lattice", counts = {counts} }}'
+    scene = loads(BOUNCE.replace("velocity", f"sampling = {sampling}\nvelocity"))
+    assert particles(scene_at(scene, setting(particles=factor))) == expected
+
+
 def test_knobs_change_what_they_name():
     scene = scene_of(BOUNCE)
     assert scene_at(scene, setting(cfl=0.9)).cfl == 0.9

@@ -97,7 +97,8 @@ def search_of(case, asked, folder):
     """Return a finished `TradeSearch`; its runs stay in a folder."""
     request = SweepRequest(case.scene, asked, case.budget, None, WORKERS, None, folder,
                            True).parsed()
-    scene, path = load_sweep(case.scene)
+    scene, path, tables = load_sweep(case.scene)
+    request = request.for_scene(tables)
     observed = observed_of(scene, path, with_companions(request.quantities, scene.dim))
     return run_search(scene, observed, request, {})
 
