@@ -43,8 +43,6 @@ def draw_limits(facts):
         for axes, one in zip(parts[1].subplots(1, len(maps), squeeze=False)[0], maps, strict=True):
             draw_map(axes, one)
     explain_colours(figure, facts, maps)
-    if facts["wrong"]:
-        figure.supxlabel(f"finished and wrong: {counts_text(facts['limits'])}", fontsize=7)
     return figure
 
 
@@ -106,7 +104,7 @@ def draw_map(axes, one):
 
 
 def explain_colours(figure, facts, maps):
-    """Add a legend of the outcomes that occur."""
+    """Add a legend of the outcomes that occur, with the limits of wrong cells as its title."""
     from matplotlib.patches import Patch
 
     shown = {RIGHT} | {one["first_bad"]["outcome"] for one in facts["directions"]
@@ -114,5 +112,6 @@ def explain_colours(figure, facts, maps):
     shown |= {cell["outcome"] for one in maps for row in one["cells"] for cell in row}
     patches = [Patch(facecolor=COLOURS[name], edgecolor="0.6", linewidth=0.5,
                      label=NAMES.get(name, name)) for name in COLOURS if name in shown]
+    caption = f"finished and wrong: {counts_text(facts['limits'])}" if facts["wrong"] else None
     figure.legend(handles=patches, loc="outside lower center", ncols=len(patches), fontsize=7,
-                  frameon=False)
+                  frameon=False, title=caption, title_fontsize=7)

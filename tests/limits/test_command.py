@@ -98,7 +98,8 @@ def test_figure_shows_margins_and_maps(falling):
     assert len(bars.patches) == 4
     assert len(maps) == len(facts["maps"]) == 1
     assert {text.get_text() for text in figure.legends[0].texts} >= {"right", "finished and wrong"}
-    assert figure.get_supxlabel() == f"finished and wrong: {len(facts['wrong'])} by setting"
+    caption = figure.legends[0].get_title().get_text()
+    assert caption == f"finished and wrong: {len(facts['wrong'])} by setting"
     labels = [text.get_text() for text in bars.texts]
     assert any(label.endswith(" setting") for label in labels)
     assert (folder / "disk.limits.png").read_bytes().startswith(b"\x89PNG")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from sweep_scenes import BOUNCE, scene_of
 
-from mpm_ref.energy import Energy
+from mpm_ref.energy import Energy, energy
 from mpm_ref.indicators import (
     INDICATORS,
     SAMPLES,
@@ -175,6 +175,17 @@ def test_a_stiff_body_vibrates_too_often_for_its_grid():
     names, values, _ = warnings_of(problem)
     assert "dispersion" in names
     assert values["dispersion"] > INDICATORS["dispersion"].bound
+
+
+@pytest.mark.parametrize(("velocity", "low", "high"), [("angular = 40.0", 0.3, 0.6),
+                                                       ("linear = [1.0, 0.0]", -1e-9, 1e-9)])
+def test_lost_energy_is_that_of_the_whole_run(velocity, low, high):
+    problem = bar(velocity=velocity)
+    start = energy(problem.bodies, problem.gravity, problem.inertia)
+    _, values, _ = warnings_of(problem)
+    end = energy(problem.bodies, problem.gravity, problem.inertia)
+    assert low < values["dissipation"] < high
+    assert values["dissipation"] >= (start.sum - end.sum) / start.kinetic - 1e-12
 
 
 def test_each_indicator_is_reported_once_and_finite():
