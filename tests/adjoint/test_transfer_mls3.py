@@ -59,7 +59,7 @@ def test_bars_of_particles_are_those_of_the_plain_adjoint(fluid, forced):
 def test_bars_of_nodes_are_those_of_the_plain_adjoint():
     rng = np.random.default_rng(1)
     particles, grid = random_particles(rng, False, False), random_grid(rng)
-    moved = Advection(particles.x, rng.normal(size=(N, 3)))
+    moved = Advection(particles.x, rng.normal(size=(N, 3)), NONE)
     bars = bars_of(particles, rng)
     bars.v[:] = 0.0                                     # what FLIP alone has
     found, expected = twice(bars)
