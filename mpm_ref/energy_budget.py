@@ -74,7 +74,7 @@ class EnergyBudget:
 
 
 class Noted(NamedTuple):
-    """What a step notes before its particles change."""
+    """The energy and the velocities of a step before its particles change."""
 
     before: Energy          # of the particles
     v_s: np.ndarray         # (n1, .., nd, d)  velocities of the scattered momenta [m/s]
