@@ -5,11 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.body import Body, particles_at
+from mpm_ref.body import Body, particles_at, with_separate_gradient
 from mpm_ref.core.boundary import Collider, Conditions, nclaw_walls
 from mpm_ref.core.jit import set_threads
 from mpm_ref.core.levelset import half_space
+from mpm_ref.core.surface import SurfaceConditions
 from mpm_ref.energy import energy
+from mpm_ref.energy_budget import BudgetStepper, EnergyBudget
 from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.materials import Material, make_flow, make_law
 
@@ -17,6 +19,7 @@ from .problem import GRAVITY, NU, RHO, WALL, E
 
 ELASTIC = {"law": "fixed_corotated"}
 SAND = {"law": "hencky", "flow": "drucker_prager", "friction_angle": 30.0}
+FLOORS = {"floor": Conditions, "surface": SurfaceConditions}
 METAL = {"law": "hencky", "flow": "von_mises_hardening", "tau_y": 1e9, "xi": 0.1}
 
 
@@ -28,6 +31,7 @@ class Variant(NamedTuple):
     material: dict = ELASTIC
     conditions: str = "none"
     monitor: bool = False
+    budget: bool = False
 
 
 VARIANTS = (
@@ -42,9 +46,14 @@ VARIANTS = (
     Variant("Hencky", material={"law": "hencky"}),
     Variant("Hencky with Drucker-Prager", material=SAND),
     Variant("Hencky with hardening von Mises", material=METAL),
+    Variant("MLS that relaxes", Scheme(relaxation=1e-3)),
+    Variant("APIC that relaxes", Scheme(transfer="apic", relaxation=1e-3)),
+    Variant("averaged volumes (F-bar)", Scheme(f_bar=True)),
     Variant("walls of a box", conditions="walls"),
     Variant("floor with friction", conditions="floor"),
+    Variant("floor with friction, at its surface", conditions="surface"),
     Variant("energies every step", monitor=True),
+    Variant("energy budget", budget=True),
 )
 
 
@@ -56,7 +65,8 @@ class Run:
         self.bodies = (make_body(variant, block),)
         self.gravity = (0.0, 0.0, GRAVITY)
         conditions = make_conditions(variant.conditions, block)
-        self.stepper = Stepper(variant.scheme, block.dx, 3, self.gravity, conditions)
+        setup = variant.scheme, block.dx, 3, self.gravity, conditions
+        self.stepper = BudgetStepper(EnergyBudget(), *setup) if variant.budget else Stepper(*setup)
         self.stepper.start(self.bodies)
         self.stepper.sort(self.bodies)
 
@@ -84,6 +94,8 @@ def make_body(variant, block):
         block.x.copy(), block.v.copy(), np.full(count, RHO * block.V0), np.full(count, block.V0),
         variant.scheme.transfer, fluid=not material.needs_F,
     )
+    if variant.scheme.relaxation:
+        particles = with_separate_gradient(particles)
     if material.has_history:
         particles = particles._replace(y=np.full(count, material.initial_y))
     return Body("block", particles, law, material.flow, np.arange(count))
@@ -93,9 +105,9 @@ def make_conditions(name, block):
     """Return walls, a floor just below the block, or None."""
     if name == "walls":
         return Conditions(walls=nclaw_walls(block.n, WALL))
-    if name == "floor":
+    if name in FLOORS:
         floor = half_space((0.0, 0.0, 0.25), (0.0, 0.0, 1.0))
-        return Conditions(colliders=(Collider(floor, "separate", friction=0.3),))
+        return FLOORS[name](colliders=(Collider(floor, "separate", friction=0.3),))
     return None
 
 

@@ -20,6 +20,7 @@ from .core.grid import Storage, update
 from .core.jit import CHUNKS
 from .core.law import kirchhoff_vjp, project_vjp
 from .core.order import slabs_of
+from .core.surface import AT_NODES
 from .explicit import damp, gather, scatter
 from .materials import NoFlow
 
@@ -41,6 +42,8 @@ class StepAdjoint:
                 f"conditions of type {type(stepper.conditions).__name__} have no adjoint: "
                 "expected core.boundary.Conditions, or None"
             )
+        if hasattr(stepper.conditions, "apply_at_surface"):
+            raise ValueError(AT_NODES)
         if stepper.scheme.f_bar:
             raise ValueError("f_bar = True: averaged volumes have no adjoint; expected a scheme "
                              "with f_bar = False")

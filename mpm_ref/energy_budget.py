@@ -11,7 +11,7 @@ m_i dv_i . (v_s + v_c)/2.
     plastic     U after the return map - U of the trial strain
     time        work of the impulses m_i (v_f - v_s) + change of U to the trial strain + change of
                 G: the error of the time integration, and the work of the body forces b
-    clip        change of G by the box that keeps the particles
+    clip        change of E between steps, by the box that keeps the particles; not of the last step
 
 The terms are changes of E and add up to its change in the run, but for round-off. They cost two
 more scatters and two evaluations of the energy a step.

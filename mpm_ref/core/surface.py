@@ -14,11 +14,14 @@ the velocity of a node, with an impulse l_j for each node j that changes the nod
     m_i dv_i = a_ji l_j,                        u_j = sum_i a_ji v_i,   sum_i a_ji = 1
 
 so that the momentum and the moment of l_j act at the surface. All rules are satisfied at once, by
-projected Gauss-Seidel sweeps over the impulses in a fixed order, which converge for convex rules:
+projected Gauss-Seidel sweeps over the impulses in a fixed order:
 
     l_j <- P(l_j - (u_j - v_w) / sum_i a_ji^2 / m_i)
 
-where P is the identity (sticky), n n^T (slip), or the projection on the cone of Coulomb's law.
+where P keeps all of l_j (sticky), or its normal part (slip; separate: where it pushes) and a
+tangential part of at most mu times that, Coulomb's law. Where the sweeps do not converge, since
+parts that close on each other contradict, the step has conditions at nodes, with their rule for
+matter that is squeezed.
 Ghost values by mirrors and by extrapolation are common for grids [Mittal2008]; constraints in the
 metric of the nodal masses keep the step's momentum exact and its bound of the time step.
 """
@@ -37,8 +40,12 @@ NEAR = 0.75         # cells in front of a surface, up to which nodes carry its c
 EDGE = 1e-6         # cells: nodes this near to NEAR do not, so that D - d >= 1 for those that do
 DEEP = 2.0          # cells behind a surface, out of reach of matter in front of it
 LIGHTEST = 1e-200   # [kg] least mass of a node, so that its inverse is finite
-SWEEPS = 200        # at most
+SWEEPS = 300        # at most
 CLOSE = 1e-11       # of the largest speed: change of a velocity at the surface in the last sweep
+
+
+AT_NODES = ('boundary = "surface": expected "nodes" for adjoints, golden files, reduced models and '
+            "implicit steps, which know conditions at nodes alone")
 
 
 class SurfacePoints(NamedTuple):
@@ -67,6 +74,17 @@ class SurfaceConditions(Conditions):
 
     def apply(self, grid, t, dt):
         """Change the velocities of an updated grid; see `Conditions.apply`."""
+        before = grid.v.copy()
+        J, converged = self.apply_at_surface(grid, t, dt)
+        if converged:
+            return J
+        grid.v[:] = before
+        return solve(*super().touched(grid, t, dt), grid)
+
+    def apply_at_surface(self, grid, t, dt):
+        """Change the velocities of a grid; return the impulses of the parts (P, d) [kg m/s], and
+        whether all rules are satisfied.
+        """
         nodes, dim = nodes_with_mass(grid), grid.m.ndim
         regions = [part.touch(nodes, t, dt) for part in self.prescribed]
         J_regions = solve(regions, *rules_of(self.prescribed), grid)
@@ -74,14 +92,14 @@ class SurfaceConditions(Conditions):
         points = [surface_points(nodes, grid, part, (t, dt)) for part in self.colliders]
         points += [node_points(wall, dim) for wall in walls]
         rules = rules_of([*self.colliders, *[self.walls] * len(walls)])
-        J = satisfy(points, rules, [node for touch in regions for node in touch.node], grid)
+        prescribed = [node for touch in regions for node in touch.node]
+        J, converged = satisfy(points, rules, prescribed, grid)
         count = len(self.colliders)
-        return np.concatenate((J[:count], J_regions, J[count:]))
+        return np.concatenate((J[:count], J_regions, J[count:])), converged
 
     def touched(self, grid, t, dt):
         """Raise ValueError: a condition is not one of a single node."""
-        raise ValueError('boundary = "surface": expected "nodes" for the adjoint, the stages of an '
-                         "oracle and implicit steps, which know conditions at nodes alone")
+        raise ValueError(AT_NODES)
 
 
 def rules_of(parts):
@@ -110,24 +128,34 @@ def node_points(touch, dim):
 
 
 def satisfy(points, rules, prescribed, grid):
-    """Change grid.v to satisfy all parts; return the impulse of each, (P, d) [kg m/s].
+    """Change grid.v to satisfy all parts; return the impulse of each, (P, d) [kg m/s], and whether
+    the sweeps converged.
 
     points has one `SurfacePoints` for each part, rules its kinds and frictions (see `rules_of`);
-    the velocities of the nodes `prescribed`, indices in the flattened arrays, stay as they are.
+    the velocities of the nodes `prescribed`, indices in the flattened arrays, stay as they are, and
+    a point that needs one of them is at its node.
     """
     d, sizes = grid.m.ndim, [len(p.node) for p in points]
     if not sum(sizes):
-        return np.zeros((len(sizes), d))
+        return np.zeros((len(sizes), d)), True
     every = SurfacePoints(*(np.concatenate(column) for column in zip(*points, strict=True)))
     v = grid.v.reshape(-1, d)
+    fixed = np.isin(every.node, prescribed)
+    detach(every, (fixed & (every.a != 0.0)).any(axis=1))
     m = np.maximum(grid.m.reshape(-1)[every.node], LIGHTEST)
-    share = np.where(every.a != 0.0, 1.0 / m, 0.0)
-    share[np.isin(every.node, prescribed)] = 0.0
+    share = np.where((every.a != 0.0) & ~fixed, 1.0 / m, 0.0)
     kind, mu = (np.repeat(rule, sizes) for rule in rules)
     kind = by_approach(every, kind, v)
     J = np.zeros((len(kind), d))
-    solve_impulses(every, Rules(share, kind, mu.astype(float)), J, v, tuple(range(d)))
-    return np.array([part.sum(axis=0) for part in np.split(J, np.cumsum(sizes)[:-1])])
+    rules = Rules(share, kind, mu.astype(float))
+    sweeps = solve_impulses(every, rules, J, v, tuple(range(d)))
+    sums = [part.sum(axis=0) for part in np.split(J, np.cumsum(sizes)[:-1])]
+    return np.array(sums), sweeps <= SWEEPS
+
+
+def detach(points, chosen):
+    """Let the chosen points, a mask (K,), be at their nodes."""
+    points.a[chosen, 0], points.a[chosen, 1:] = 1.0, 0.0
 
 
 def by_approach(points, kind, v):
@@ -251,7 +279,9 @@ def velocity_at(points, j, v, like):
 
 @kernel
 def projected_impulse(l, n, kind, mu):
-    """P(l): the nearest impulse that a part of this kind can give."""
+    """P(l): the normal part of an impulse where the kind allows it, and a tangential part of at
+    most mu times that.
+    """
     if kind <= STICKY:
         return l
     normal = dot(l, n)
@@ -289,7 +319,7 @@ def relax(points, rules, J, v, like):
 @kernel
 def solve_impulses(points, rules, J, v, like):
     """Sweep until the velocities at the surfaces change by CLOSE of the largest; returns the number
-    of sweeps.
+    of sweeps, SWEEPS + 1 where they did not converge.
     """
     scale = 0.0
     for j in range(len(points.node)):
@@ -297,7 +327,7 @@ def solve_impulses(points, rules, J, v, like):
     for k in range(SWEEPS):
         if not relax(points, rules, J, v, like) > CLOSE * scale:
             return k + 1
-    return SWEEPS
+    return SWEEPS + 1
 
 
 @parallel

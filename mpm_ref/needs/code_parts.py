@@ -27,6 +27,7 @@ STAGES = {          # of a step: beginnings of the names of the kernels that it 
     "gravity on empty nodes": ("core.grid._update_all_empty",),
     "colliders and regions: nodes tested": ("core.boundary._pull_back",),
     "colliders, regions, walls: nodes in contact": ("core.boundary._settle",),
+    "colliders: points of their surface": ("core.surface.",),
     "implicit solve": ("hot.",),
     "multigrid": ("hot.multigrid.",),
     "grid to particles": ("core.transfer._gather", "core.transfer_mls3.gather"),

@@ -87,7 +87,18 @@ def removals_of(scene):
     """
     return (*part_removals(scene), *load_removals(scene),
             *(removal for body in scene.body for removal in body_removals(scene, body)),
-            *resolution_removals(scene), *scheme_removals(scene))
+            *boundary_removals(scene), *resolution_removals(scene), *scheme_removals(scene))
+
+
+def boundary_removals(scene):
+    """Yield the removal of conditions at surfaces, which nodes behind them may replace."""
+    if scene.boundary == "surface" and scene.collider:
+        yield Removal("conditions at the surface", at_nodes, "at nodes")
+
+
+def at_nodes(tables):
+    """Impose the conditions of colliders at nodes."""
+    tables["boundary"] = "nodes"
 
 
 # the transfer

@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 
 from ..body import Body
+from ..core.surface import AT_NODES
 from ..plain.flows import FLOWS
 from ..plain.laws import LAWS
 from ..store.atomic import NotWritten, replacing, require_place
@@ -133,7 +134,7 @@ def is_golden(path):
 
 def require_recordable(problem):
     """Raise ValueError for names of bodies that cannot name groups of the file, for averaged
-    volumes, and for laws and flows that the plain twin does not have.
+    volumes, for conditions at surfaces, and for laws and flows that the plain twin does not have.
     """
     names = [body.name for body in problem.bodies]
     clash = sorted(reserved_names(problem.integrator) & set(names))
@@ -142,6 +143,8 @@ def require_recordable(problem):
     if clash:
         raise ValueError(f"body {clash[0]!r}: this names an array, or a group, of every "
                          f"{problem.integrator} step in the file; rename the body")
+    if hasattr(problem.conditions, "apply_at_surface"):
+        raise ValueError(AT_NODES)
     if problem.scheme.f_bar:
         raise ValueError("f_bar = true: golden files have no arrays of averaged volumes; expected "
                          "a scene with f_bar = false")

@@ -18,7 +18,7 @@ from ..scene.validate import validate_scene
 from ..simulate import simulate
 from ..timestep import TooLarge
 from .conditions import record_impulses
-from .contacts import ContactRecorder
+from .contacts import REACH, ContactRecorder
 from .probes import initial_order, interpolation
 from .quantity import OutputQuantity, Snapshot, check_quantities
 
@@ -124,7 +124,7 @@ class RunObserver:
         self._rows, self._before, self._t = [], None, 0.0
         self._clock = StepClock()
         self._nodes = 0
-        self._contacts = ContactRecorder(problem)
+        self._contacts, self._way = ContactRecorder(problem), 0.0
         self._indicators = IndicatorWatch(problem)
         self._warnings = misplaced(problem)
 
@@ -140,6 +140,7 @@ class RunObserver:
         self._clock.stop()
         self._t = state.t
         self._warnings += self._indicators.news(state, dt)
+        self._note_contacts(state, dt)
         times, k = self._run.times, len(self._rows)
         if k < len(times) and state.t + NEAR * dt >= times[k]:
             self._sample_step(state.t, times)
@@ -150,6 +151,15 @@ class RunObserver:
         if self._clock.measured[0] > self._run.most_cpu:
             raise _TooLong
         self._clock.start()
+
+    def _note_contacts(self, state, dt):
+        """Note the contacts where bodies may have moved by half of their reach since the last
+        time.
+        """
+        self._way += dt * max(np.abs(body.particles.v).max() for body in state.bodies)
+        if self._way > 0.25 * REACH * self._problem.dx:
+            self._contacts.note(state.bodies, state.t)
+            self._way = 0.0
 
     def _sample_step(self, t, times):
         now = self._sample()

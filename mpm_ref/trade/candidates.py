@@ -18,12 +18,12 @@ def single_knobs(scene):
     """Return the settings that change one knob of a scene, cheapest first by experience."""
     cells = CFL if scene.integrator == "explicit" else CELLS
     cfl = [value for value in cells if scene.dt is not None or value != (scene.cfl or 0.5)]
-    transfer = scene.step_scheme.transfer
+    transfer, given = scene.step_scheme.transfer, transfer_text(scene.step_scheme)
     settings = [setting(cfl=value) for value in cfl]
     settings += [setting(particles=factor) for factor in PARTICLES]
     settings += [setting(transfer=text) for text in TRANSFERS
-                 if text != transfer and not (scene.integrator != "explicit" and text == "mls")]
-    settings += [setting(transfer=text) for text in relaxed_transfers(scene)]
+                 if text != given and not (scene.integrator != "explicit" and text == "mls")]
+    settings += [setting(transfer=text) for text in relaxed_transfers(scene) if text != given]
     settings += [with_degree(degree, transfer) for degree in DEGREES
                  if degree != scene.scheme.degree]
     settings += [setting(sampling=kind) for kind in other_samplings(scene)]
@@ -33,10 +33,21 @@ def single_knobs(scene):
         settings += volume_settings(scene)
     else:
         solver = scene.solver
-        given = TOLERANCES[-1] if solver is None or solver.eps is None else solver.eps
-        settings += [setting(eps=eps) for eps in TOLERANCES if eps != given]
+        tolerance = TOLERANCES[-1] if solver is None or solver.eps is None else solver.eps
+        settings += [setting(eps=eps) for eps in TOLERANCES if eps != tolerance]
     other = IMPLICIT if scene.integrator == "explicit" else "explicit"
     return [*settings, setting(integrator=other, cfl=CELLS[1] if other == IMPLICIT else CFL[1])]
+
+
+def transfer_text(scheme):
+    """Return the text of a scheme's transfer with its blend, as the knob `transfer` has it."""
+    if scheme.relaxation:
+        return f"{scheme.transfer} relaxation {scheme.relaxation:.3g}"
+    if scheme.rpic:
+        return f"{scheme.transfer} rpic {scheme.rpic:g}"
+    if scheme.transfer == "flip" and scheme.flip < 1.0:
+        return f"flip {scheme.flip:g}"
+    return scheme.transfer
 
 
 def relaxed_transfers(scene):

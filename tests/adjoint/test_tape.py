@@ -11,6 +11,9 @@ from adjoints import H, rate
 from problems import DT, DX, FREE, digest, run_python
 from threads import MOST, by_threads
 
+from mpm_ref.core.boundary import Collider
+from mpm_ref.core.levelset import half_space
+from mpm_ref.core.surface import SurfaceConditions
 from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.hot.step import ImplicitStepper
 from mpm_ref.tape import Seed, Tape
@@ -201,6 +204,13 @@ def test_averaged_volumes_are_refused():
     run = dive()
     with pytest.raises(ValueError, match="f_bar = True: averaged volumes have no adjoint"):
         Tape(Stepper(replace(run.scheme, f_bar=True), DX, 2, run.gravity, FREE), run.bodies)
+
+
+def test_conditions_at_surfaces_are_refused():
+    run = dive()
+    floor = SurfaceConditions((Collider(half_space((0.0, 0.0), (0.0, 1.0))),))
+    with pytest.raises(ValueError, match=r'boundary = "surface": expected "nodes" for adjoints'):
+        Tape(Stepper(run.scheme, DX, 2, run.gravity, floor), run.bodies)
 
 
 def test_an_implicit_stepper_is_refused():

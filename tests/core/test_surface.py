@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from threads import by_threads
 
-from mpm_ref.core.boundary import BoxWalls, Collider, Prescribed
+from mpm_ref.core.boundary import BoxWalls, Collider, Conditions, Prescribed
 from mpm_ref.core.levelset import box, distances, half_space, normals, sphere
 from mpm_ref.core.motion import Motion, Steady
 from mpm_ref.core.surface import NEAR, SurfaceConditions
@@ -234,6 +234,20 @@ def test_two_planes_hold_their_edge(d, rng):
     assert u == pytest.approx(w, abs=1e-8)
 
 
+@pytest.mark.parametrize("kind", ["sticky", "separate"])
+def test_between_plates_that_close_on_each_other_conditions_hold_at_nodes(kind, rng):
+    """No velocity suits both surfaces; sweeps alone would add opposite loads without end."""
+    grid = full_grid(rng, 2)
+    floor = Collider(half_space((0.0, 0.137), (0.0, 1.0)), kind)
+    lid = Collider(half_space((0.0, 0.16), (0.0, -1.0)), kind, motion=Motion(Steady((0.0, -1.0),
+                                                                                   start=0.99)))
+    other = grid_of(grid.v, -2, grid.m)
+    _, u, J = constrained(grid, floor, lid)
+    expected = Conditions((floor, lid)).apply(other, 1.0, 0.1)
+    assert (u == other.v).all()
+    assert (J == expected).all()
+
+
 def test_same_bits_for_any_number_of_threads(d, rng):
     base = full_grid(rng, d)
     shape = solid_of("sphere", d)
@@ -255,5 +269,5 @@ def test_nan_stays_visible(rng):
 
 def test_nodes_alone_are_refused_where_conditions_of_nodes_are_asked_for(rng):
     conditions = SurfaceConditions((Collider(planes(2)[0]),))
-    with pytest.raises(ValueError, match='boundary = "surface": expected "nodes"'):
+    with pytest.raises(ValueError, match='boundary = "surface": expected "nodes" for adjoints'):
         conditions.touched(full_grid(rng, 2), 0.0, 0.1)

@@ -158,3 +158,10 @@ def test_names_by_place_stay_after_removals_and_are_unique():
     variant = variant_of(HEAD + BLOCK + FLOOR)
     left = variant.without(variant.offers["collider floor"])
     assert "collider collider1" in left.offers
+
+
+def test_conditions_at_the_surface_are_an_ingredient_where_there_are_colliders():
+    label = "conditions at the surface (at nodes instead)"
+    at_surface = 'boundary = "surface"\n' + EXTRAS
+    assert changed_keys(at_surface, label) == {"boundary"}
+    assert label not in variant_of(EXTRAS).offers

@@ -7,6 +7,9 @@ from goldens import kernel_arrays, stretched
 from goldens_hot import EPS, problem_of
 
 from mpm_ref import oracle
+from mpm_ref.core.boundary import Collider
+from mpm_ref.core.levelset import half_space
+from mpm_ref.core.surface import SurfaceConditions
 from mpm_ref.explicit import Scheme
 from mpm_ref.oracle.schema import reserved_names
 
@@ -39,6 +42,12 @@ def test_averaged_volumes_are_refused(tmp_path):
     problem = replace(stretched(), scheme=Scheme(f_bar=True))
     with pytest.raises(ValueError, match="f_bar = true: golden files have no arrays of averaged"):
         oracle.record(problem, tmp_path / "golden.h5", 1)
+
+
+def test_conditions_at_surfaces_are_refused(tmp_path):
+    floor = SurfaceConditions((Collider(half_space((0.0, 0.0), (0.0, 1.0))),))
+    with pytest.raises(ValueError, match=r'boundary = "surface": expected "nodes" for adj'):
+        oracle.record(replace(stretched(), conditions=floor), tmp_path / "golden.h5", 1)
 
 
 @pytest.mark.parametrize("name", ["bar", "report", "probe3", "nodes2", "dv", "load", "E_trial"])

@@ -35,7 +35,7 @@ def changed(path, value):
 WRONG = [
     # keys
     ("dims", 3, "dims: unknown key; did you mean `dim`?"),
-    ("xyzzy", 3, "xyzzy: unknown key; the keys here are body, cfl,"),
+    ("xyzzy", 3, "xyzzy: unknown key; the keys here are body, boundary,"),
     ("body.0.material.flow.fricton_angle", 3, "body[0].material.flow.fricton_angle: unknown key; "
      "did you mean `friction_angle`?"),
     ("body.0.shape.minus.0.centre", [0, 0, 0], "body[0].shape.minus[0].centre: unknown key; "

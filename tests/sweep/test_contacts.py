@@ -79,3 +79,10 @@ def test_a_moving_collider_comes_near():
     problem = build(loads(text))
     assert list(solid_contacts(problem, problem.bodies, 0.0)) == []
     assert list(solid_contacts(problem, problem.bodies, 0.25))
+
+
+def test_a_quick_contact_between_two_observations_is_noted():
+    """The block falls 0.2 m at 30 m/s, and is gone long before the only other observation."""
+    text = BOUNCE.replace("[0.5, -1.0]", "[0.0, -30.0]").replace("E = 1e5", "E = 1e7")
+    result = observe(observed_run(loads(text), n=2))
+    assert result.contacts == ("body 'block' with collider[0] 'floor'",)

@@ -205,6 +205,17 @@ def test_averaged_volumes_are_tried_near_incompressibility():
         assert [text for text in texts if "f_bar" in text] == expected
 
 
+@pytest.mark.parametrize(("scheme", "given", "other"), [
+    ('transfer = "mls", relaxation = 0.005', "transfer mls relaxation 0.005", "transfer mls"),
+    ('transfer = "apic", rpic = 0.1', "transfer apic rpic 0.1", "transfer apic"),
+    ('transfer = "flip", flip = 0.95', "transfer flip 0.95", "transfer flip"),
+    ('transfer = "apic"', "transfer apic", "transfer mls")])
+def test_the_transfer_of_the_scene_is_no_candidate_and_its_plain_form_is(scheme, given, other):
+    texts = [one.text for one in single_knobs(loads(f"scheme = {{ {scheme} }}" + FLIGHT))]
+    assert given not in texts
+    assert other in texts
+
+
 def test_pairs_change_different_knobs():
     a, b, c = setting(cfl=0.9), setting(cfl=0.25), setting(transfer="apic")
     assert pairs([a, b, c]) == [a | c, b | c]

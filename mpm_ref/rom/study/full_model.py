@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.levelset import distances
+from ...core.surface import SurfaceConditions
 from ...materials import NoFlow
 from ...scene import build
 from ...shapes import Difference, Intersection, Union, level_set
@@ -44,8 +45,8 @@ class FullModel(NamedTuple):
 
 def ldm_full_model(scene):
     """Return the `FullModel` of a scene that LDM reduces. Raises ValueError for features that its
-    reduced runs do not have: more bodies, plastic flow, an affine transfer, averaged volumes, a
-    velocity at the start, forces of single particles, a box.
+    reduced runs do not have: more bodies, plastic flow, an affine transfer, averaged volumes,
+    conditions at surfaces, a velocity at the start, forces of single particles, a box.
     """
     problem = build(scene)
     body = problem.bodies[0]
@@ -53,6 +54,7 @@ def ldm_full_model(scene):
                    "plastic flow": not isinstance(body.flow, NoFlow),
                    f"the transfer {problem.scheme.transfer}": problem.scheme.transfer != "pic",
                    "averaged volumes (f_bar)": problem.scheme.f_bar,
+                   'boundary = "surface"': isinstance(problem.conditions, SurfaceConditions),
                    "a start that moves": np.any(body.particles.v),
                    "forces of single particles": body.particles.b.ndim > 1,
                    "a box that clips": problem.clip is not None}
@@ -66,8 +68,9 @@ def ldm_full_model(scene):
 
 def nsf_full_model(scene):
     """Return the `FullModel` of a scene that NSF reduces. Raises ValueError for features that its
-    reduced runs do not have: an implicit integrator, a transfer other than apic, averaged volumes,
-    a fluid, forces of single particles, a box that clips.
+    reduced runs do not have: an implicit integrator, a transfer other than apic, its damping,
+    relaxation and added mass, averaged volumes, conditions at surfaces, a fluid, forces of single
+    particles, a box that clips.
     """
     problem = build(scene)
     particles = [body.particles for body in problem.bodies]
@@ -76,7 +79,11 @@ def nsf_full_model(scene):
          'integrator = "explicit", whose step they make'),
         (problem.scheme.transfer != "apic", f"the transfer {problem.scheme.transfer}",
          'scheme.transfer = "apic", whose affine field is one of theirs'),
+        *((getattr(problem.scheme, key) > 0.0, f"scheme.{key}", f"scheme.{key} = 0")
+          for key in ("rpic", "relaxation", "mass_eps")),
         (problem.scheme.f_bar, "averaged volumes", "scheme.f_bar = false"),
+        (isinstance(problem.conditions, SurfaceConditions), 'boundary = "surface"',
+         'boundary = "nodes"'),
         (any(p.F.ndim == 1 for p in particles), "a fluid", "solids, which have a shear stress"),
         (any(p.b.ndim > 1 for p in particles), "forces of single particles", "gravity alone"),
         (problem.clip is not None, "a box that clips", "none"))
