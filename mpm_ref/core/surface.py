@@ -19,9 +19,10 @@ projected Gauss-Seidel sweeps over the impulses in a fixed order:
     l_j <- P(l_j - (u_j - v_w) / sum_i a_ji^2 / m_i)
 
 where P keeps all of l_j (sticky), or its normal part (slip; separate: where it pushes) and a
-tangential part of at most mu times that, Coulomb's law. Where the sweeps do not converge, since
-parts that close on each other contradict, the step has conditions at nodes, with their rule for
-matter that is squeezed.
+tangential part of at most mu times that, Coulomb's law. Where parts that close on each other
+contradict, the impulses of each sweep add to those before without end, or nodes gain more energy
+than walls could give them: such a step has conditions at nodes, with their rule for matter that is
+squeezed.
 Ghost values by mirrors and by extrapolation are common for grids [Mittal2008]; constraints in the
 metric of the nodal masses keep the step's momentum exact and its bound of the time step.
 """
@@ -32,16 +33,19 @@ from typing import NamedTuple
 import numpy as np
 
 from .boundary import Conditions, nodes_with_mass, nodes_within, solve
-from .contact import NOSLIP, SEPARATE, SLIP, STICKY
+from .contact import ESCAPE, NOSLIP, SEPARATE, SLIP, STICKY
 from .jit import CHUNKS, chunk, kernel, parallel, prange
 from .tensor import dot, fill, lin, norm, put_vec, vec
 
 NEAR = 0.75         # cells in front of a surface, up to which nodes carry its condition
 EDGE = 1e-6         # cells: nodes this near to NEAR do not, so that D - d >= 1 for those that do
 DEEP = 2.0          # cells behind a surface, out of reach of matter in front of it
+LIGHT = 1e-2        # of the heaviest node of a plane: a node below it does not count
 LIGHTEST = 1e-200   # [kg] least mass of a node, so that its inverse is finite
 SWEEPS = 300        # at most
-CLOSE = 1e-11       # of the largest speed: change of a velocity at the surface in the last sweep
+CLOSE = 1e-12       # of an impulse: its change in the last sweep
+GROWING = 1e-3      # of an impulse: change in the last sweep that is one of parts that contradict
+SMALL = 1e-4        # of all impulses: that of a point which need not converge
 
 
 AT_NODES = ('boundary = "surface": expected "nodes" for adjoints, golden files, reduced models and '
@@ -75,15 +79,15 @@ class SurfaceConditions(Conditions):
     def apply(self, grid, t, dt):
         """Change the velocities of an updated grid; see `Conditions.apply`."""
         before = grid.v.copy()
-        J, converged = self.apply_at_surface(grid, t, dt)
-        if converged:
+        J, solved = self.apply_at_surface(grid, t, dt)
+        if solved:
             return J
         grid.v[:] = before
         return solve(*super().touched(grid, t, dt), grid)
 
     def apply_at_surface(self, grid, t, dt):
         """Change the velocities of a grid; return the impulses of the parts (P, d) [kg m/s], and
-        whether all rules are satisfied.
+        whether no parts contradict.
         """
         nodes, dim = nodes_with_mass(grid), grid.m.ndim
         regions = [part.touch(nodes, t, dt) for part in self.prescribed]
@@ -93,9 +97,9 @@ class SurfaceConditions(Conditions):
         points += [node_points(wall, dim) for wall in walls]
         rules = rules_of([*self.colliders, *[self.walls] * len(walls)])
         prescribed = [node for touch in regions for node in touch.node]
-        J, converged = satisfy(points, rules, prescribed, grid)
+        J, solved = satisfy(points, rules, prescribed, grid)
         count = len(self.colliders)
-        return np.concatenate((J[:count], J_regions, J[count:])), converged
+        return np.concatenate((J[:count], J_regions, J[count:])), solved
 
     def touched(self, grid, t, dt):
         """Raise ValueError: a condition is not one of a single node."""
@@ -129,7 +133,7 @@ def node_points(touch, dim):
 
 def satisfy(points, rules, prescribed, grid):
     """Change grid.v to satisfy all parts; return the impulse of each, (P, d) [kg m/s], and whether
-    the sweeps converged.
+    parts do not contradict, and squeeze no matter.
 
     points has one `SurfacePoints` for each part, rules its kinds and frictions (see `rules_of`);
     the velocities of the nodes `prescribed`, indices in the flattened arrays, stay as they are, and
@@ -148,9 +152,28 @@ def satisfy(points, rules, prescribed, grid):
     kind = by_approach(every, kind, v)
     J = np.zeros((len(kind), d))
     rules = Rules(share, kind, mu.astype(float))
-    sweeps = solve_impulses(every, rules, J, v, tuple(range(d)))
+    nodes = np.unique(every.node[every.a != 0.0])
+    most = largest_energy(grid.m.reshape(-1)[nodes], v[nodes], every.v)
+    solved = solve_impulses(every, rules, J, v, tuple(range(d)))
+    solved &= not kinetic(grid.m.reshape(-1)[nodes], v[nodes]) > most
     sums = [part.sum(axis=0) for part in np.split(J, np.cumsum(sizes)[:-1])]
-    return np.array(sums), sweeps <= SWEEPS
+    return np.array(sums), solved
+
+
+def largest_energy(m, v, v_w):
+    """Return the kinetic energy [J] above which matter counts as squeezed, of nodes of masses m and
+    velocities v, and of walls of velocities v_w [m/s].
+
+    Constraints at rest add no energy, and those of one rigid motion no more than nodes that move
+    with it would have; ESCAPE times these speeds is that of walls that leave no room.
+    """
+    speed = np.sqrt((v_w**2).sum(axis=1)).max()
+    return ESCAPE**2 * (kinetic(m, v) + 0.5 * m.sum() * speed**2)
+
+
+def kinetic(m, v):
+    """Return sum_i m_i |v_i|^2 / 2 [J]."""
+    return 0.5 * float(m @ (v**2).sum(axis=1))
 
 
 def detach(points, chosen):
@@ -244,19 +267,25 @@ def attach(points, d, m, bounds):
     """Nodes and weights of the points bounds[0] .. bounds[1] - 1; points.node[:, 0] and n are
     given, d (K,) is the distance of that node [cells], m the nodal masses.
 
-    A point whose plane of reference has no mass, or too deep in the part, is the node itself.
+    A point whose plane of reference has no mass, or too deep in the part, is the node itself. Nodes
+    of the plane that are LIGHT beside another do not count: two points that share a light node
+    would need as many sweeps as their other nodes are heavier.
     """
     shape, masses = m.shape, m.reshape(-1)
     for j in range(bounds[0], bounds[1]):
         x = position_of(points.node[j, 0], shape)
         D, r, axis = reference(x, d[j], vec(points.n, j, shape))
-        total = 0.0
+        total, heaviest = 0.0, 0.0
         for c in range(points.a.shape[1] - 1):
             k, w = corner(r, c, axis)
             i = flat_index(k, shape)
             if i >= 0 and w > 0.0 and masses[i] > 0.0:
                 points.node[j, 1 + c], points.a[j, 1 + c] = i, w
-                total += w
+                heaviest = max(heaviest, masses[i])
+        for c in range(1, points.a.shape[1]):
+            if masses[points.node[j, c]] < LIGHT * heaviest:
+                points.a[j, c] = 0.0
+            total += points.a[j, c]
         if total > 0.0 and d[j] >= -DEEP:
             points.a[j, 0] = D / (D - d[j])
             for c in range(1, points.a.shape[1]):
@@ -296,9 +325,9 @@ def projected_impulse(l, n, kind, mu):
 @kernel
 def relax(points, rules, J, v, like):
     """One sweep: improve the impulse J_j of each point and the nodal velocities v; returns the
-    largest change of a velocity at a surface.
+    largest |dJ_j|/|J_j| of points that bear more than SMALL of all impulses.
     """
-    worst = 0.0
+    worst, least = 0.0, SMALL * total_impulse(J, like)
     for j in range(len(points.node)):
         u, weight = velocity_at(points, j, v, like), 0.0
         for c in range(points.a.shape[1]):
@@ -309,7 +338,8 @@ def relax(points, rules, J, v, like):
                                   rules.kind[j], rules.mu[j])
             put_vec(J, j, l)
             dl = lin(1.0, l, -1.0, before)
-            worst = max(worst, weight * norm(dl))
+            if norm(l) > least:
+                worst = max(worst, norm(dl) / norm(l))
             for c in range(points.a.shape[1]):
                 i, share = points.node[j, c], points.a[j, c] * rules.share[j, c]
                 put_vec(v, i, lin(1.0, vec(v, i, like), share, dl))
@@ -317,17 +347,25 @@ def relax(points, rules, J, v, like):
 
 
 @kernel
+def total_impulse(J, like):
+    """Sum of |J_j|."""
+    s = 0.0
+    for j in range(len(J)):
+        s += norm(vec(J, j, like))
+    return s
+
+
+@kernel
 def solve_impulses(points, rules, J, v, like):
-    """Sweep until the velocities at the surfaces change by CLOSE of the largest; returns the number
-    of sweeps, SWEEPS + 1 where they did not converge.
+    """Sweep until no impulse changes by more than CLOSE, at most SWEEPS times; returns whether none
+    grows on as those of parts do that contradict.
     """
-    scale = 0.0
-    for j in range(len(points.node)):
-        scale = max(scale, norm(velocity_at(points, j, v, like)))
-    for k in range(SWEEPS):
-        if not relax(points, rules, J, v, like) > CLOSE * scale:
-            return k + 1
-    return SWEEPS + 1
+    worst = 0.0
+    for _ in range(SWEEPS):
+        worst = relax(points, rules, J, v, like)
+        if not worst > CLOSE:
+            return True
+    return not worst > GROWING
 
 
 @parallel

@@ -11,6 +11,7 @@ from itertools import product
 import numpy as np
 
 NEAR = 0.75         # cells in front of a surface, up to which nodes carry its condition
+LIGHT = 1e-2        # of the heaviest node of a plane: a node below it does not count
 DEEP = 2.0          # cells behind a surface, out of reach of matter in front of it
 
 
@@ -51,7 +52,8 @@ def plane_corners(r, axis, plane, m):
         inside = (corner >= 0).all() and (corner < m.shape).all()
         if inside and w > 0.0 and m[tuple(corner)] > 0.0:
             corners[tuple(corner)] = float(w)
-    return corners
+    heaviest = max((m[corner] for corner in corners), default=0.0)
+    return {corner: w for corner, w in corners.items() if m[corner] >= LIGHT * heaviest}
 
 
 def held_velocities(v, m, rows, targets):
