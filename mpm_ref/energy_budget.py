@@ -13,8 +13,8 @@ m_i dv_i . (v_s + v_c)/2.
                 G: the error of the time integration, and the work of the body forces b
     clip        change of E between steps, by the box that keeps the particles; not of the last step
 
-The terms are changes of E and add up to its change in the run, but for round-off. They cost two
-more scatters and two evaluations of the energy a step.
+The terms are changes of E and add up to its change in the run, but for round-off. They cost one
+more scatter and two evaluations of the energy a step.
 """
 
 from dataclasses import dataclass

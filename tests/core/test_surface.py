@@ -10,7 +10,7 @@ from threads import by_threads
 from mpm_ref.core.boundary import BoxWalls, Collider, Conditions, Prescribed
 from mpm_ref.core.levelset import box, distances, half_space, normals, sphere
 from mpm_ref.core.motion import Motion, Steady
-from mpm_ref.core.surface import NEAR, SurfaceConditions
+from mpm_ref.core.surface import NEAR, SurfaceConditions, largest_energy
 from mpm_ref.plain.surface import held_velocities, surface_row
 
 NORMALS = {2: ((0.0, 1.0), (0.6, 0.8), (-0.7, 0.3), (1.0, -1.0)),
@@ -110,6 +110,20 @@ def test_sticky_velocities_are_those_of_the_plain_twin(d, name, rng):
     assert u == pytest.approx(expected, abs=1e-8)
     assert J[0] == pytest.approx(l.sum(axis=0), abs=1e-8)
     assert at_surface(u, rows) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_light_nodes_of_a_plane_do_not_count(rng):
+    """Beside heavy ones; else points that share a light node need as many sweeps as it is light."""
+    grid, shape = full_grid(rng, 2), planes(2)[1]
+    grid.m[rng.random(grid.m.shape) < 0.3] = 1e-5
+    rows, _ = rows_of(grid, shape)
+    _, u, _ = constrained(grid, Collider(shape))
+    assert at_surface(u, rows) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_matter_counts_as_squeezed_beyond_ten_times_the_speeds():
+    m, v, walls = np.ones(3), np.ones((3, 2)), np.array([[0.0, -2.0]])
+    assert largest_energy(m, v, walls) == pytest.approx(100.0 * (3.0 + 6.0))
 
 
 def test_a_moving_collider_has_its_velocity_at_the_foot_point(rng):
