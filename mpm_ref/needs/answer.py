@@ -4,6 +4,8 @@ from dataclasses import asdict, dataclass
 from math import isfinite
 
 from .. import __version__
+from ..scene import SceneError
+from ..scene.quantity_records import quantity_of
 from ..scene.toml import digest
 from ..store.manifest import code
 from ..sweep.observation import FINISHED
@@ -178,4 +180,13 @@ def lean_text(answer, folder, quantities=()):
     gone = [removal for removal in result.lean.removals if removal.body or removal.plane]
     head += [f"{removal.label}: positions are compared on the matter that is left."
              for removal in gone]
-    return scene_text(head, result.lean.scene, folder, quantities)
+    if result.lean.length != 1.0:
+        head.append(f"Energies, impulses and forces times {result.lean.length:g} m are those of "
+                    "the scene in 3D.")
+    kept = []
+    for one in quantities:
+        try:
+            kept.append(quantity_of(result.lean.quantity(one.text)))
+        except SceneError as fault:
+            head.append(f"No [[quantity]] {one.text}: {fault}")
+    return scene_text(head, result.lean.scene, folder, kept)

@@ -43,6 +43,8 @@ class Removal:
     replacement: str = ""       # nothing
     body: str | None = None     # that is removed, and so not compared
     plane: tuple | None = None  # (axis, position [m]) below which matter is removed
+    axes: tuple | None = None   # that are left of a scene in 3D
+    length: float = 1.0         # of the matter along the axis that is removed [m]
     is_output: bool = False     # the lean scene keeps it: output is the user's choice
 
     @property

@@ -114,10 +114,17 @@ class RemovalStudy:
         """Return {label: observation} of {label: `SceneVariant` or SceneError}."""
         requests = {}
         for label, variant in variants.items():
-            is_scene = not isinstance(variant, SceneError)
-            requests[label] = RunRequest(variant.scene if is_scene else variant, most_cpu, seed,
-                                         variant.probes if is_scene else None)
+            requests[label] = (RunRequest(variant) if isinstance(variant, SceneError)
+                               else self.request(variant, most_cpu, seed))
         return self.runs.observe(requests)
+
+    def request(self, variant, most_cpu, seed):
+        """Return the `RunRequest` of a variant; it is refused where it has no such quantity."""
+        try:
+            texts = tuple(variant.quantity(text) for text in self.runs.quantities)
+        except SceneError as fault:
+            return RunRequest(fault)
+        return RunRequest(variant.scene, most_cpu, seed, variant.probes, texts)
 
     def measured(self, variants, cpu=None):
         """Return a `RemovalRun` for each of {label: `SceneVariant` or SceneError}.

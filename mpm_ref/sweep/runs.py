@@ -22,10 +22,13 @@ class RunRequest:
     most_cpu: float = np.inf        # [s]
     seed: int | None = None         # of a perturbation of the particles' positions
     probes: tuple | None = None     # other than those of the `SceneRuns`
+    quantities: tuple | None = None     # likewise
 
 
 class SceneRuns:
-    """Runs of variants of a scene, all with the same quantities at the same times."""
+    """Runs of variants of a scene, with the same quantities at the same times unless a request has
+    others.
+    """
 
     def __init__(self, observed, executor, store, budget=np.inf, on_run=None):
         """Prepare runs.
@@ -47,6 +50,11 @@ class SceneRuns:
     def probes(self):
         """Return the probes of all runs, (body, positions)."""
         return self._observed.probes
+
+    @property
+    def quantities(self):
+        """Return the texts of the quantities of all runs."""
+        return self._observed.quantities
 
     @property
     def workers(self):
@@ -87,9 +95,10 @@ class SceneRuns:
         except SceneError as fault:
             return RunObservation(blank_values(self._observed), RunCost(), REFUSED, str(fault))
         probes = self._observed.probes if request.probes is None else request.probes
+        texts = self._observed.quantities if request.quantities is None else request.quantities
         most = max(min(request.most_cpu, self.left), 0.0)
-        return self._observed._replace(scene=text, digest=name, most_cpu=most,
-                                      seed=request.seed, probes=probes)
+        return self._observed._replace(scene=text, digest=name, most_cpu=most, seed=request.seed,
+                                       probes=probes, quantities=texts)
 
     def _make(self, runs):
         labels, observations = list(runs), {}

@@ -50,6 +50,11 @@ class ToyVariant:
     probes: tuple = ()
     rows: tuple = ()
     share: float = 1.0
+    length: float = 1.0
+
+    def quantity(self, text):
+        """The text of a quantity, the same in all variants."""
+        return text
 
     @property
     def offers(self):
@@ -76,6 +81,7 @@ class ToyRuns:
     budget: int = 10**9
     left: float = inf
     labels: list = field(default_factory=list)
+    quantities: tuple = ("kinetic",)
 
     def observe(self, requests):
         """{label: observation} of requests, whose names that are gone say all."""

@@ -80,7 +80,7 @@ def parts_of(multigrid):
 
 
 def answer_of(singles=SINGLES, order=ORDER):
-    first = SceneVariant(loads(SCENE), (), ())
+    first = SceneVariant(loads(SCENE), (), (), (0, 1))
     lean = replace(first, removals=(Removal("collider roof", None),))
     base = RunObservation({"positions": None, "kinetic": None}, RunCost(CPU, CPU, 100, 9, 1),
                           FINISHED)
@@ -115,7 +115,7 @@ def test_the_figure_is_drawn_of_any_change_and_name(recwarn):
 def test_a_line_on_frames_says_that_they_stay():
     label = "frames every 0.1 s (a tenth instead)"
     answer = answer_of((run_of(label, NOT_REQUIRED, 0.004, 6.0), *SINGLES[2:3]))
-    first = SceneVariant(loads(SCENE.replace("end =", "interval = 0.1\nend =")), (), ())
+    first = SceneVariant(loads(SCENE.replace("end =", "interval = 0.1\nend =")), (), (), (0, 1))
     answer = replace(answer, result=replace(answer.result, first=first))
     frames, friction = (one["text"] for one in page_facts(answer)["removals"])
     assert frames == (f"{label}: not required at 1 % (positions by 0.4 %, kinetic by 0.2 %), saves "

@@ -91,7 +91,7 @@ def few_offers(text, labels):
     """The first variant of a scene, which offers some removals alone."""
     first = variant_of(text)
     kind = type("FewOffers", (FewOffers,), {"labels": labels})
-    return kind(first.scene, first.probes, first.rows)
+    return kind(first.scene, first.probes, first.rows, first.axes)
 
 
 def runs_of(variant, folder=None, quantities=("positions",), budget=np.inf):

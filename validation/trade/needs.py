@@ -24,6 +24,7 @@ from .advice_scenes import advice_scenes
 
 JUDGED = ("slide", "stick", "roll", "swing", "lean", "shove", "dam", "sand", "splash", "impact",
           "forge", "slope")
+SOLID = "channel"       # a scene in 3D whose section in 2D is enough
 QUANTITY, ERROR = "positions", 0.01
 TIMES, OTHER_TIMES = 17, 48
 REPEATS = 3
@@ -33,20 +34,53 @@ VITAL = {               # what cannot be removed without a change
     "swing": "initial velocity of body", "lean": "collider floor",
     "shove": "initial velocity of first", "dam": "gravity", "sand": "gravity",
     "splash": "initial velocity of body", "impact": "collider floor",
-    "forge": "initial velocity of hammer", "slope": "gravity"}
+    "forge": "initial velocity of hammer", "slope": "gravity", SOLID: "friction of collider floor"}
 IDLE = ("collider roof", "body distant")
 PARTS = """
+dim = {dim}
+dx = 0.1
+end = 1.0
+
 [[collider]]
 name = "roof"
-shape = { type = "half_space", point = [0.0, 4.0], normal = [0.0, -1.0] }
+shape = {{ type = "half_space", point = {above}, normal = {down} }}
 
 [[body]]
 name = "distant"
 density = 1000.0
-shape = { type = "sphere", center = [2.0, 2.0], radius = 0.1 }
-material = { law = "fixed_corotated", E = 1e5, nu = 0.3 }
+shape = {{ type = "sphere", center = {far}, radius = 0.1 }}
+material = {{ law = "fixed_corotated", E = 1e5, nu = 0.3 }}
 """
-COLUMNS = ("scene", "change", "again", "cpu", "lean_cpu", "vital", "idle", "removed")
+CHANNEL = """
+dim = 3
+dx = 0.04
+end = 0.25
+gravity = [0.0, 0.0, -9.8]
+
+[[body]]
+name = "block"
+density = 1200.0
+shape = { type = "box", lower = [0.2, 0.0, 0.0], upper = [0.6, 0.2, 0.2] }
+velocity = { linear = [1.2, 0.0, 0.0] }
+material = { law = "fixed_corotated", E = 2e5, nu = 0.3 }
+
+[[collider]]
+name = "floor"
+kind = "separate"
+friction = 0.4
+shape = { type = "half_space", point = [0.0, 0.0, 0.0], normal = [0.0, 0.0, 1.0] }
+
+[[collider]]
+name = "south"
+kind = "slip"
+shape = { type = "half_space", point = [0.0, 0.0, 0.0], normal = [0.0, 1.0, 0.0] }
+
+[[collider]]
+name = "north"
+kind = "slip"
+shape = { type = "half_space", point = [0.0, 0.2, 0.0], normal = [0.0, -1.0, 0.0] }
+"""
+COLUMNS = ("scene", "change", "again", "cpu", "lean_cpu", "vital", "idle", "removed", "dim")
 
 
 class Lean(NamedTuple):
@@ -60,14 +94,16 @@ class Lean(NamedTuple):
     vital: str              # verdict on what must not be removed
     idle: str               # verdicts on what does nothing
     removed: int            # number of removals
+    dim: int                # of the lean scene
 
 
 @experiment("trade.needs", title="The claims of `mpm-ref needs`, measured once more",
             profiles=("quick", "standard"), budget={"quick": 60, "standard": 1800})
 def needs(run):
     """Judge the claims on all scenes."""
-    names = run.choose(quick=("slope",), standard=JUDGED)
-    texts = {one.name: one.scene for one in advice_scenes() if one.name in names}
+    names = run.choose(quick=("slope",), standard=(*JUDGED, SOLID))
+    scenes = {one.name: one.scene for one in advice_scenes()} | {SOLID: loads(CHANNEL)}
+    texts = {name: scenes[name] for name in names}
     rows = [Lean(*run.cached(name, lambda name=name, scene=scene: list(lean_of(name, scene))))
             for name, scene in run.progress(texts.items(), "scenes")]
     run.table("scenes", COLUMNS, rows)
@@ -76,7 +112,9 @@ def needs(run):
 
 def with_idle_parts(scene):
     """Return a scene with a collider and a body that touch nothing."""
-    more = loads("dim = 2\ndx = 0.1\nend = 1.0\n" + PARTS)
+    d = scene.dim
+    more = loads(PARTS.format(dim=d, far=[2.0] * d, above=[0.0] * (d - 1) + [4.0],
+                              down=[0.0] * (d - 1) + [-1.0]))
     return msgspec.structs.replace(scene, collider=(*scene.collider, *more.collider),
                                    body=(*scene.body, *more.body))
 
@@ -96,7 +134,9 @@ def lean_of(name, scene):
     for removal in lean.removals:
         given = given.without(removal)
     first = first_variant(scene, other.probes)
-    both = [other._replace(scene=text_of(one.scene), probes=one.probes) for one in (first, given)]
+    both = [other._replace(scene=text_of(one.scene), probes=one.probes,
+                           quantities=tuple(map(one.quantity, quantities)))
+            for one in (first, given)]
     made = [[observe(one) for one in both] for _ in range(REPEATS)]
     change = changes(made[0][0], made[0][1], given, first)
     cpu = np.median([[one.cost.cpu for one in pair] for pair in made], axis=0)
@@ -104,7 +144,7 @@ def lean_of(name, scene):
     last = result.order[-1].change if result.order else 0.0
     return Lean(name, last, max(float(error[-1]) for error in change.values()), *cpu.tolist(),
                 verdicts[VITAL[name]], ", ".join(verdicts[label] for label in IDLE),
-                len(lean.removals))
+                len(lean.removals), lean.scene.dim)
 
 
 def observed_of(scene, quantities, times, seed):
@@ -137,3 +177,8 @@ def record_lean(run, rows):
     run.record("trade.needs.idle", sum(one.idle != idle for one in rows), unit="scenes",
                comparator="<=", bound=0, scale=scale, note="scenes in which a collider or a body "
                "that touches nothing was not found to be removable")
+    for one in rows:
+        if one.scene == SOLID:
+            run.record("trade.needs.section", one.dim, unit="dimensions", comparator="<=", bound=2,
+                       scale=one.scene, note="of the lean scene of a block between smooth plates "
+                       f"in 3D, in {one.lean_cpu / one.cpu:.2g} of the CPU time")
