@@ -177,7 +177,7 @@ def lean_text(answer, folder, quantities=()):
             f"{percent(answer.error)}.", "", f"Written by mpm_ref {__version__}: {answer.command}",
             f"As given: {result.cpu:.3g} s of CPU time. Removed, one after the other:",
             *([f"  {line}" for line in order_lines(result)] or ["  nothing"])]
-    gone = [removal for removal in result.lean.removals if removal.body or removal.plane]
+    gone = [removal for removal in result.lean.removals if removal.body or removal.half]
     head += [f"{removal.label}: positions are compared on the matter that is left."
              for removal in gone]
     if result.lean.length != 1.0:

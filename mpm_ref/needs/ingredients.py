@@ -7,6 +7,7 @@ part after others were removed.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import msgspec
 
@@ -34,6 +35,14 @@ FLOW_TERMS = {              # a term of a flow: its name, and its parameter, whi
 }
 
 
+class Half(NamedTuple):
+    """The upper half of a scene that a plane mirrors."""
+
+    axis: int
+    c: float            # position of the plane [m]
+    halved: tuple       # names of the bodies and parts that the plane cuts in two
+
+
 @dataclass(frozen=True)
 class Removal:
     """An ingredient, what stands in its place, and the edit of plain tables that replaces it."""
@@ -42,7 +51,7 @@ class Removal:
     edit: Callable              # tables -> None
     replacement: str = ""       # nothing
     body: str | None = None     # that is removed, and so not compared
-    plane: tuple | None = None  # (axis, position [m]) below which matter is removed
+    half: Half | None = None    # that is left of a symmetric scene
     axes: tuple | None = None   # that are left of a scene in 3D
     length: float = 1.0         # of the matter along the axis that is removed [m]
     is_output: bool = False     # the lean scene keeps it: output is the user's choice

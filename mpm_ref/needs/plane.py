@@ -10,6 +10,7 @@ from functools import singledispatch
 import numpy as np
 
 from ..sampling import Jittered, Lattice, Poisson, Regular
+from ..scene.quantity_records import AXES
 from ..shapes import (
     Box,
     Cylinder,
@@ -21,7 +22,6 @@ from ..shapes import (
 )
 from .ingredients import Removal
 
-AXES = "xyz"
 NEAR = 1e-9             # of a length: lengths that are equal
 SHAPES = "shape", "region"      # keys of tables that are replaced as a whole
 RATES = "rate", "values", "rates", "amplitude"      # keys of a schedule that hold its values

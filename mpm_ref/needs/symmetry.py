@@ -10,10 +10,10 @@ from scipy.spatial import cKDTree
 
 from ..core.levelset import distances
 from ..scene import build
+from ..scene.quantity_records import AXES, wall_name
 from ..shapes import level_set
-from .ingredients import MIRROR, Removal
+from .ingredients import MIRROR, Half, Removal
 
-AXES = "xyz"
 NEAR = 1e-6             # cells within which points and distances are equal
 SAMPLES = 2000          # points at which a shape is compared with its image
 
@@ -26,19 +26,23 @@ def mirror_removals(scene):
     for axis in range(scene.dim):
         c = float(middle[axis])
         sides = body_sides(scene, bodies, axis, c)
-        if sides is not None and is_symmetric(scene, x, axis, c):
+        if sides is None or not is_symmetric(scene, axis, c):
+            continue
+        images = part_images(scene, samples_around(x, axis, c), axis)
+        if None not in images.values():
+            halved = [body.name for body, side in zip(scene.body, sides) if side == 0]
+            halved += [name for name, image in images.items() if name == image]
+            halved += [wall_name(a, side) for a in range(scene.dim) if a != axis for side in "-+"]
             yield Removal(f"half {AXES[axis]} < {c:.6g} m", half_edit(sides, axis, c),
-                          "symmetry wall", plane=(axis, c))
+                          "symmetry wall", half=Half(axis, c, tuple(halved)))
 
 
-def is_symmetric(scene, x, axis, c):
-    """Return whether a plane mirrors all but the bodies; x (N, d) are their particles."""
+def is_symmetric(scene, axis, c):
+    """Return whether a plane mirrors gravity, clip and walls."""
     gravity = scene.gravity is None or not scene.gravity[axis]
     clip = scene.clip is None or is_centred(scene.clip.lower[axis] + scene.clip.upper[axis], c, 1.0)
     walls = scene.walls is None or walls_match(scene.walls, axis, c / scene.dx)
-    points = samples_around(x, axis, c)
-    return bool(gravity and clip and walls and parts_match(scene.collider, "shape", points, axis)
-                and parts_match(scene.fixed, "region", points, axis))
+    return bool(gravity and clip and walls)
 
 
 def is_centred(total, c, size):
@@ -70,13 +74,23 @@ def mirrored(x, axis, c):
     return image
 
 
-def parts_match(parts, key, points, axis):
-    """Return whether each part is the image of one that is alike in all else, perhaps of itself."""
-    values = [(distances(points[0], level_set(getattr(part, key))),
-               distances(points[1], level_set(getattr(part, key)))) for part in parts]
-    return all(any(alike(part, other, axis, part is other)
-                   and np.allclose(values[k][0], values[j][1], rtol=0.0, atol=points[2])
-                   for j, other in enumerate(parts)) for k, part in enumerate(parts))
+def part_images(scene, points, axis):
+    """Return {name: name of its image} of the colliders and regions, None for one without."""
+    return (images_among(scene.collider, "shape", points, axis)
+            | images_among(scene.fixed, "region", points, axis))
+
+
+def images_among(parts, key, points, axis):
+    """Return {name: name of the part, perhaps itself, that is its image and alike in all else}."""
+    values = {part.name: [distances(x, level_set(getattr(part, key))) for x in points[:2]]
+              for part in parts}
+
+    def is_image(part, other):
+        return alike(part, other, axis, part is other) and np.allclose(
+            values[part.name][0], values[other.name][1], rtol=0.0, atol=points[2])
+
+    return {part.name: next((other.name for other in (part, *parts) if is_image(part, other)), None)
+            for part in parts}
 
 
 def alike(part, other, axis, same):

@@ -1,8 +1,10 @@
 """A scene after some removals, the probes that it shares with the scene as given, and the change.
 
-A quantity is compared as it is, with these exceptions: positions are those of the probes that are
-left, energies of a symmetric half count twice, and of a section in 2D the vectors have two
-components, and energies, impulses and forces are multiplied by the length of the matter.
+A quantity is compared as it is, with these exceptions. Positions are those of the probes that are
+left. Energies of a symmetric half count twice, and so do impulses and forces of a part that the
+plane cuts in two; their component across the plane, and that of its mean position, is left out.
+Of a section in 2D the vectors have two components, and energies, impulses and forces are multiplied
+by the length of the matter.
 """
 
 from dataclasses import dataclass, replace
@@ -12,29 +14,28 @@ import msgspec
 import numpy as np
 
 from ..scene import SceneError
-from ..scene.quantity_records import AXES, quantity_of
+from ..scene.quantity_records import AXES, quantity_of, wall_name
 from ..sweep.difference import largest_change, relative_difference, running_maximum
 from ..sweep.quantity import ENERGIES, OutputQuantity
 from .ingredients import named_scene, removals_of, removed
 from .plane import plane_removals
 from .symmetry import mirror_removals
 
-ALONG_AXES = "side", "axis", "point", "lower", "upper"     # keys of quantities
+EXTENSIVE = (*ENERGIES, "impulse", "force")
 VECTORS = "centroid", "path", "region", "impulse", "force"
-PER_LENGTH = (*ENERGIES, "impulse", "force")               # in a section
 
 
 @dataclass(frozen=True)
 class SceneVariant:
-    """A scene, the probes left of it, the share of the matter that it stands for, and the removals
-    that led to it.
+    """A scene, the probes and axes left of it, its symmetric halves, and the removals that led to
+    it.
     """
 
     scene: object
     probes: tuple               # of (body, X (n, d))
     rows: tuple                 # of (body, indices (n,) of these probes among those at first)
     axes: tuple                 # of the scene at first that are left
-    share: float = 1.0
+    halves: tuple = ()          # of `Half`, by the axes of the scene at first
     length: float = 1.0         # along an axis that was removed [m]
     removals: tuple = ()
 
@@ -50,35 +51,72 @@ class SceneVariant:
         scene = removed(self.scene, removal)
         masks = [probe_mask(body, X, removal) for body, X in self.probes]
         left = [k for k, mask in enumerate(masks) if mask.any()]
-        axes = tuple(range(len(self.axes))) if removal.axes is None else removal.axes
+        axes = removal.axes or tuple(range(len(self.axes)))
+        probes = [(body, X[mask][:, axes]) for (body, X), mask in zip(self.probes, masks)]
+        rows = [(body, n[mask]) for (body, n), mask in zip(self.rows, masks)]
         return replace(
             self, scene=scene, removals=(*self.removals, removal),
-            probes=tuple((self.probes[k][0], self.probes[k][1][masks[k]][:, axes]) for k in left),
-            rows=tuple((self.rows[k][0], self.rows[k][1][masks[k]]) for k in left),
+            probes=tuple(probes[k] for k in left), rows=tuple(rows[k] for k in left),
             axes=tuple(self.axes[a] for a in axes), length=self.length * removal.length,
-            share=self.share * (1.0 if removal.plane is None else 0.5))
+            halves=self.halves + self.halves_of(removal))
+
+    def halves_of(self, removal):
+        """Return the `Half` that a removal leaves, by the axes at first, in a tuple."""
+        half = removal.half
+        return () if half is None else (half._replace(axis=self.axes[half.axis]),)
 
     def quantity(self, text):
         """Return the text in this scene of a quantity of the scene as given.
 
-        Raises SceneError for one along an axis that was removed.
+        Raises SceneError for one along an axis, or of a half, that was removed.
         """
         record = quantity_of(text)
-        keys = {key: in_axes(getattr(record, key), self.axes)
-                for key in record.__struct_fields__ if key in ALONG_AXES}
+        for half in self.halves:
+            if is_beyond(record, half):
+                raise SceneError(f"quantity {text!r} is of the half that is removed")
+        keys = {key: IN_AXES[key](getattr(record, key), self.axes)
+                for key in record.__struct_fields__ if key in IN_AXES}
         if None in keys.values():
             raise SceneError(f"quantity {text!r} is along the axis that is removed")
         return msgspec.structs.replace(record, **keys).text
 
+    def shared_by(self, record):
+        """Return the halves whose plane cuts in two what the record of a quantity is of."""
+        name = getattr(record, "part", getattr(record, "body", None))
+        return [half for half in self.halves if name is None or name in half.halved]
 
-def in_axes(value, axes):
-    """Return a key of a quantity, "x+", "x" or a vector, in a scene of these axes alone; None for
-    an axis that is none of them.
-    """
-    if not isinstance(value, str):
-        return tuple(value[a] for a in axes)
-    axis = AXES.index(value[0])
-    return AXES[axes.index(axis)] + value[1:] if axis in axes else None
+
+def is_beyond(record, half):
+    """Return whether a quantity is, all or in part, of the half that was removed."""
+    corner = getattr(record, "point", getattr(record, "lower", None))
+    if corner is not None:
+        return corner[half.axis] < half.c
+    along = getattr(record, "side", getattr(record, "axis", None))
+    return along in (f"{AXES[half.axis]}-", AXES[half.axis])
+
+
+def vector_in(vector, axes):
+    """Return the components of a vector along axes."""
+    return tuple(vector[a] for a in axes)
+
+
+def axis_in(text, axes):
+    """Return the text of an axis, "x" or "x+", in a scene of these axes alone; None for another."""
+    axis = AXES.index(text[0])
+    return AXES[axes.index(axis)] + text[1:] if axis in axes else None
+
+
+def part_in(name, axes):
+    """Return the name of a part, which is another one for walls, in a scene of these axes alone."""
+    walls = {wall_name(axis, side): (axis, side) for axis in range(3) for side in "-+"}
+    if name not in walls:
+        return name
+    axis, side = walls[name]
+    return wall_name(axes.index(axis), side) if axis in axes else None
+
+
+IN_AXES = {"side": axis_in, "axis": axis_in, "point": vector_in, "lower": vector_in,
+           "upper": vector_in, "part": part_in}      # by the keys of quantities
 
 
 def first_variant(scene, probes):
@@ -91,10 +129,9 @@ def probe_mask(body, X, removal):
     """Return which probes (n,) of a body are left after a removal."""
     if removal.body == body:
         return np.zeros(len(X), dtype=bool)
-    if removal.plane is None:
+    if removal.half is None:
         return np.ones(len(X), dtype=bool)
-    axis, c = removal.plane
-    return X[:, axis] > c
+    return X[:, removal.half.axis] > removal.half.c
 
 
 def changes(base, observation, variant, first):
@@ -104,22 +141,31 @@ def changes(base, observation, variant, first):
     """
     result = {}
     for text, reference in base.values.items():
-        kind = OutputQuantity(text).kind
-        values = observation.values[variant.quantity(text)]
-        if kind == "positions":
-            reference = reference[:, columns(text, variant, first)]
-        elif kind in VECTORS:
-            reference = reference[:, variant.axes]
-        if kind in ENERGIES:
-            values = values / variant.share
-        if kind in PER_LENGTH:
-            values = values * variant.length
+        reference, values = comparable(text, reference, observation, variant, first)
         scale = largest_change(reference)
         if OutputQuantity(text).at_end:
             reference, values = reference[[0, -1]], values[[0, -1]]
         error = relative_difference(values, reference, scale)
         result[text] = running_maximum(error)
     return result
+
+
+def comparable(text, reference, observation, variant, first):
+    """Return (reference (T, k), values (T, k)) of a quantity that stand for the same matter.
+
+    reference (T, n): values of the scene as given; the others as in `changes`.
+    """
+    quantity = OutputQuantity(text)
+    values, halves = observation.values[variant.quantity(text)], variant.shared_by(quantity.record)
+    if quantity.kind == "positions":
+        reference = reference[:, columns(text, variant, first)]
+    elif quantity.kind in VECTORS:
+        across = [half.axis for half in halves]
+        left = [(k, a) for k, a in enumerate(variant.axes) if a not in across]
+        values, reference = values[:, [k for k, _ in left]], reference[:, [a for _, a in left]]
+    if quantity.kind in EXTENSIVE:
+        values = values * variant.length * 2 ** len(halves)
+    return reference, values
 
 
 def columns(text, variant, first):

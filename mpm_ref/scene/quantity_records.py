@@ -215,8 +215,13 @@ def part_names(scene):
     """
     colliders = [part.name or f"collider{k}" for k, part in enumerate(scene.collider)]
     fixed = [part.name or f"fixed{k}" for k, part in enumerate(scene.fixed)]
-    sides = [f"wall {axis}{side}" for axis in AXES[:scene.dim] for side in "-+"]
+    sides = [wall_name(axis, side) for axis in range(scene.dim) for side in "-+"]
     return [*colliders, *fixed, *(sides if scene.walls is not None else [])]
+
+
+def wall_name(axis, side):
+    """Return the name of the wall at an end, side "-" or "+", of an axis 0, 1 or 2."""
+    return f"wall {AXES[axis]}{side}"
 
 
 def check_quantity(quantity, scene):

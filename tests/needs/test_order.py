@@ -29,6 +29,7 @@ from mpm_ref.sweep.observation import (
     RunObservation,
 )
 
+INSTEAD = " (other instead)"
 CPU = 100.0         # [s] of the scene as given
 ENDS = {"weak": UNSTABLE, "vital": REFUSED, "slow": STOPPED, "dark": CRASHED}
 
@@ -49,17 +50,23 @@ class ToyVariant:
     removals: tuple = ()
     probes: tuple = ()
     rows: tuple = ()
-    share: float = 1.0
+    halves: tuple = ()
+    axes: tuple = (0, 1)
     length: float = 1.0
 
     def quantity(self, text):
         """The text of a quantity, the same in all variants."""
         return text
 
+    def shared_by(self, record):
+        """No halves."""
+        return []
+
     @property
     def offers(self):
-        """One removal for each name."""
-        return {name: Removal(name, None, is_output=name == "frames")
+        """One removal for each name, which ends with what stands instead, if anything does."""
+        return {name: Removal(name.removesuffix(INSTEAD), None,
+                              "other" if name.endswith(INSTEAD) else "", is_output=name == "frames")
                 for name in sorted(self.scene.names)}
 
     def without(self, removal):
@@ -170,6 +177,15 @@ def test_removals_that_change_something_together_go_one_by_one(monkeypatch):
     monkeypatch.setattr(ToyRuns, "observation", together)
     result, _ = result_of({"a": 0.0, "b": 0.0})
     assert [run.label for run in result.order] == ["a"]
+
+
+@pytest.mark.parametrize("change", [0.0, 0.002])
+def test_what_is_replaced_must_save_time(change):
+    label = f"swap{INSTEAD}"
+    assert [run.label for run in result_of({label: change}, {label: 0.5})[0].order] == [label]
+    result, _ = result_of({label: change}, {label: 0.99})
+    assert verdicts(result) == {label: NOT_REQUIRED}
+    assert result.order == ()
 
 
 def test_lean_scene_keeps_the_output():

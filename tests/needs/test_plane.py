@@ -110,9 +110,10 @@ def test_quantities_of_the_section():
     _, section = section_of(solid(1), 1)
     texts = {"front:z+:roll@end": "front:y+:roll@end", "profile:x": "profile:x",
              "path:1,2,3": "path:1,3", "mean:J:0,1,2,3,4,5": "mean:J:0,2,3,5",
-             "impulse:paddle": "impulse:paddle", "kinetic": "kinetic"}
+             "impulse:paddle": "impulse:paddle", "kinetic": "kinetic",
+             "force:wall z-": "force:wall y-", "force:wall x+": "force:wall x+"}
     assert {text: section.quantity(text) for text in texts} == texts
-    for text in ("front:y+", "profile:y"):
+    for text in ("front:y+", "profile:y", "impulse:wall y+"):
         with pytest.raises(SceneError, match="along the axis that is removed"):
             section.quantity(text)
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from needs_toys import variant_of
 
+from mpm_ref.needs.ingredients import Half
 from mpm_ref.scene import build
 
 DISK = """
@@ -63,7 +64,7 @@ def test_half_of_a_disk():
     assert body.particles.m.sum() == pytest.approx(total.particles.m.sum() / 2, rel=1e-3)
     wall = left.scene.collider[-1]
     assert (wall.kind, wall.shape.point, wall.shape.normal) == ("slip", (0.5, 0.0), (1.0, 0.0))
-    assert left.share == 0.5
+    assert left.halves == (Half(0, 0.5, ("disk", "floor", "wall y-", "wall y+")),)
     assert left.probes[0][1][:, 0].min() > 0.5
     assert not any(label.startswith(("half", "collider mirror")) for label in left.offers)
 

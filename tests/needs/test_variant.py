@@ -5,6 +5,7 @@ import pytest
 from needs_toys import HEAD, SCENE, variant_of
 
 from mpm_ref.needs.variant import changes
+from mpm_ref.scene import SceneError
 from mpm_ref.sweep.observation import FINISHED, RunCost, RunObservation
 
 TIMES = 5
@@ -61,6 +62,74 @@ material = { law = "fixed_corotated", E = 1e5, nu = 0.3 }
     change = changes(observation(positions=base, kinetic=kinetic),
                      observation(positions=run, kinetic=0.5 * kinetic), variant, first)
     assert change["positions"].max() == change["kinetic"].max() == 0.0
+
+
+def half_of_a_disk():
+    """A scene with a disk on a floor beside walls, and its half x > 0.5 m."""
+    first = variant_of(HEAD + """
+walls = { low = [2, 2], high = [18, 18] }
+
+[[body]]
+name = "disk"
+density = 1000.0
+shape = { type = "sphere", center = [0.5, 0.3], radius = 0.2 }
+material = { law = "fixed_corotated", E = 1e5, nu = 0.3 }
+
+[[collider]]
+name = "floor"
+shape = { type = "half_space", point = [0.0, 0.1], normal = [0.0, 1.0] }
+
+[[collider]]
+name = "west"
+shape = { type = "sphere", center = [0.2, 0.3], radius = 0.05 }
+
+[[collider]]
+name = "east"
+shape = { type = "sphere", center = [0.8, 0.3], radius = 0.05 }
+""")
+    return first, first.without(first.offers["half x < 0.5 m (symmetry wall instead)"])
+
+
+@pytest.mark.parametrize(("text", "factor"), [
+    ("impulse:floor", 2.0), ("force:floor", 2.0), ("impulse:wall y-", 2.0), ("centroid", 1.0),
+    ("centroid:disk", 1.0)])
+def test_vectors_of_what_the_plane_halves(text, factor):
+    """The component across the plane has no meaning for one half; impulses count twice."""
+    first, half = half_of_a_disk()
+    base = np.arange(2.0 * TIMES).reshape(TIMES, 2)
+    run = base / factor
+    run[:, 0] = 77.0
+    names = {text: base}
+    change = changes(observation(**names), observation(**{text: run}), half, first)
+    assert change[text].max() == 0.0
+    run[-1, 1] += 0.1
+    assert changes(observation(**names), observation(**{text: run}), half, first)[text][-1] > 0.01
+
+
+@pytest.mark.parametrize("text", ["impulse:east", "force:wall x+"])
+def test_vectors_of_a_part_on_the_side_that_is_left(text):
+    first, half = half_of_a_disk()
+    base = np.arange(2.0 * TIMES).reshape(TIMES, 2)
+    same = changes(observation(**{text: base}), observation(**{text: base}), half, first)
+    assert same[text].max() == 0.0
+    moved = base + [[0.1, 0.0]]
+    other = changes(observation(**{text: base}), observation(**{text: moved}), half, first)
+    assert other[text].max() > 0.0
+
+
+@pytest.mark.parametrize("text", ["front:x-", "profile:x:disk", "path:0.4,0.3",
+                                  "region:0.4,0.1,0.9,0.5", "mean:J:0.4,0.1,0.9,0.5"])
+def test_quantity_of_the_half_that_is_removed(text):
+    first, half = half_of_a_disk()
+    assert first.quantity(text) == text
+    with pytest.raises(SceneError, match="of the half that is removed"):
+        half.quantity(text)
+
+
+@pytest.mark.parametrize("text", ["front:x+", "front:y-", "profile:y", "path:0.6,0.3", "kinetic",
+                                  "region:0.5,0.1,0.9,0.5", "positions", "impulse:west"])
+def test_quantity_of_the_half_that_is_left(text):
+    assert half_of_a_disk()[1].quantity(text) == text
 
 
 def test_largest_change_so_far_and_at_the_end(first):
