@@ -41,6 +41,9 @@ class SyntheticJudge:
                                                   cpu=self.cpu(dict(cell)))
         return {cell: self.verdicts.get(cell) for cell in cells}
 
+    def refused_alone(self, cell):
+        return None
+
 
 @pytest.mark.parametrize("limit", [1.02, 2.1, 37.0, 990.0])
 def test_margin_is_found_within_ten_percent(limit):
