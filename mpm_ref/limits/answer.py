@@ -62,6 +62,7 @@ def direction_facts(one, judge):
     """Return the facts of a `search.Direction`."""
     name, bad, scenes = one.axis.name, one.bad, judge.scenes
     late = None if one.late is None else judge.coarse.get(cell_of({name: one.late}))
+    late = late if late is not None and isfinite(late.error) else None
     facts = {
         "axis": name, "text": one.axis.text, "direction": one.direction, "margin": one.margin,
         "verb": "grow" if (one.direction == UP) != one.axis.is_inverse else "fall",
@@ -149,10 +150,10 @@ def counts_text(counts):
 def wrong_text(cell):
     """Return the limit that a wrong cell met, with its error beside its tolerance."""
     if cell["limit"] == VANISHING:
-        return (f"by {VANISHING}: {cell['quantity']} nearly vanishes here ({percent(cell['share'])} "
-                f"of its change in the scene as given, by {cell['reference']}), so that its "
-                f"relative error means little: it is "
-                f"{percent(cell['share'] * cell['error'])} of that change off")
+        off = percent(cell["share"] * cell["error"])
+        return (f"by {VANISHING}: {cell['quantity']} nearly vanishes here (at dx/2 it has "
+                f"{percent(cell['share'])} of its change in the scene as given), so that its "
+                f"relative error means little: it is {off} of that change off")
     return (f"by {cell['limit']}, {percent(cell['error'])} off in {cell['quantity']} (tolerance "
             f"{percent(cell['tolerance'])}), beside {cell['reference']}{coarse_text(cell)}")
 
@@ -194,7 +195,7 @@ def sentence(facts):
 def late_text(facts):
     """Return what is known of the factor at which the budget ended a search without a failure."""
     cell = facts["late_cell"]
-    if cell is None or not isfinite(cell["error"]):
+    if cell is None:
         return " the budget ended the search"
     return (f" {changed_by(facts, 'late')}: {percent(cell['error'])} off in {cell['quantity']} "
             f"(tolerance {percent(cell['tolerance'])}), beside {cell['reference']}; the budget "

@@ -30,7 +30,7 @@ NARROW = 1.1            # ratio of the first bad to the last good factor
 NARROW_SHIFT = 2.0      # of a shift's
 EVEN = 1e-9             # of a halving, which round-off may leave
 DIGITS = 9              # of decades, within which factors are equally near
-PER_WORKER = 2          # cells of a round, so that few workers wait for the last one
+PER_WORKER = 2          # cells of a round, so that few of several workers wait for the last one
 WIDEST = 3              # axes whose pairs are mapped
 SIDE = 5                # factors of an axis on a map
 
@@ -182,7 +182,7 @@ def explore(directions, judge, workers=1):
         if not factors and not confirm(directions, judge):
             return
         new = [pair for pair in factors if pair[0].is_new]
-        factors = new or factors[:PER_WORKER * workers]
+        factors = new or factors[:PER_WORKER * workers if workers > 1 else 1]
         for strict in (False, True):
             chosen = [pair for pair in factors if pair[0].by_fine_grids == strict]
             cells = [cell_of({one.axis.name: factor}) for one, factor in chosen]
