@@ -1,19 +1,22 @@
 """The answer of a search as plain data for JSON, and as sentences."""
 
 import re
+from collections import Counter
 from math import inf, isfinite, log10
 
 from .. import __version__
 from ..scene import digest
 from ..sweep.observation import REFUSED, STOPPED
 from .axes import AXIS, MOST_LONGER, UP
-from .cause import RESOLUTION, SETTING, limit_counts
+from .cause import RESOLUTION, SETTING, VANISHING, limit_counts
 from .cell import cell_of, cell_text
 from .search import NARROW
 from .verdict import LOST, RIGHT, SLACK, UNCHECKED, WRONG
 
 MARGIN, TOO_LONG, NOT_CHECKED, BUDGET_END, LAST_RUNG = (
     "failure", "too long", "not checked", "budget", "not tried farther")
+BOUNDS = {("poisson", UP): " (no scene has one below -1)"}      # of axis and direction
+UNRESOLVED = 0.5        # tolerance above which right and wrong mean little
 SHOWN_WRONG = 10        # cells in the sentences; the JSON has all
 SHOWN_MESSAGE = 150     # characters of a message
 
@@ -27,7 +30,7 @@ def answer_of(search, scene, name):
     """
     judge, scenes = search.judge, search.judge.scenes
     wrong = sorted(search.wrong_cells().items(), key=lambda item: distance(item[0]))
-    directions = [direction_facts(one, scenes) for one in search.directions]
+    directions = [direction_facts(one, judge) for one in search.directions]
     base = judge.base[1.0]
     wrong = [cell_facts(cell, verdict) for cell, verdict in wrong]
     return {
@@ -55,16 +58,20 @@ def cell_facts(cell, verdict):
     return facts | ({"outcome": None} if verdict is None else vars(verdict))
 
 
-def direction_facts(one, scenes):
+def direction_facts(one, judge):
     """Return the facts of a `search.Direction`."""
-    name, bad = one.axis.name, one.bad
+    name, bad, scenes = one.axis.name, one.bad, judge.scenes
+    late = None if one.late is None else judge.coarse.get(cell_of({name: one.late}))
+    late = late if late is not None and isfinite(late.error) else None
     facts = {
         "axis": name, "text": one.axis.text, "direction": one.direction, "margin": one.margin,
         "verb": "grow" if (one.direction == UP) != one.axis.is_inverse else "fall",
         "good": one.good, "bad": bad, "end": end_of(one), "now": value(one, scenes, 1.0),
         "good_value": value(one, scenes, one.good),
         "bad_value": None if bad is None else value(one, scenes, bad),
-        "first_bad": None if bad is None else cell_facts(cell_of({name: bad}), one.verdict)}
+        "first_bad": None if bad is None else cell_facts(cell_of({name: bad}), one.verdict),
+        "late": one.late, "late_value": None if one.late is None else value(one, scenes, one.late),
+        "late_cell": None if late is None else cell_facts(cell_of({name: one.late}), late)}
     return facts | {"sentence": sentence(facts)}
 
 
@@ -87,12 +94,17 @@ def end_of(one):
 
 def nearest(directions):
     """Return the facts of the direction with the least margin to a failure, or None. A refusal,
-    which warns before the run, and a lost contact count where nothing else fails.
+    which warns before the run, a lost contact and a vanishing quantity count where nothing else
+    fails.
     """
     failing = [one for one in directions if one["bad"] is not None
                and one["first_bad"]["outcome"] not in (STOPPED, UNCHECKED)]
-    return min(failing, key=lambda one: (one["first_bad"]["outcome"] in (REFUSED, LOST),
-                                         one["margin"]), default=None)
+    return min(failing, key=lambda one: (is_milder(one["first_bad"]), one["margin"]), default=None)
+
+
+def is_milder(cell):
+    """Return whether a failure counts only where there is no other."""
+    return cell["outcome"] in (REFUSED, LOST) or cell["limit"] == VANISHING
 
 
 def map_facts(one):
@@ -108,15 +120,16 @@ def map_facts(one):
 
 def answer_lines(facts):
     """Return the answer as lines of text."""
-    lines = [*wrong_lines(facts), "", *nearest_lines(facts), ""]
+    lines = [*wrong_lines(facts), "", *nearest_lines(facts), "", *tolerance_lines(facts), ""]
     lines += [one["sentence"] for one in facts["directions"]]
-    lines += [*left_out_lines(facts), "", *map_lines(facts), *tolerance_lines(facts)]
-    return lines + budget_lines(facts)
+    return [*lines, *left_out_lines(facts), "", *map_lines(facts), *budget_lines(facts)]
 
 
 def wrong_lines(facts):
-    """Return the cells that finished with a wrong result, those without a warning first."""
-    cells = sorted(facts["wrong"], key=lambda one: bool(one["warnings"]))
+    """Return the cells that finished with a wrong result, those without a warning first, and those
+    in which a quantity vanishes last.
+    """
+    cells = sorted(facts["wrong"], key=lambda one: (is_milder(one), bool(one["warnings"])))
     if not cells:
         return ["no cell finished with a wrong result"]
     lines = [f"finished and wrong: {len(cells)} of {len(facts['cells'])} cells, "
@@ -136,6 +149,11 @@ def counts_text(counts):
 
 def wrong_text(cell):
     """Return the limit that a wrong cell met, with its error beside its tolerance."""
+    if cell["limit"] == VANISHING:
+        off = percent(cell["share"] * cell["error"])
+        return (f"by {VANISHING}: {cell['quantity']} nearly vanishes here (at dx/2 it has "
+                f"{percent(cell['share'])} of its change in the scene as given), so that its "
+                f"relative error means little: it is {off} of that change off")
     return (f"by {cell['limit']}, {percent(cell['error'])} off in {cell['quantity']} (tolerance "
             f"{percent(cell['tolerance'])}), beside {cell['reference']}{coarse_text(cell)}")
 
@@ -157,31 +175,52 @@ def nearest_lines(facts):
 
 def sentence(facts):
     """Return how far one axis may change in one direction, and what happens then."""
+    text, is_late = facts["text"], facts["end"] == BUDGET_END
     if facts["margin"] == 1.0 and facts["bad"] is None:
-        return f"{facts['text']}: whether it may {facts['verb']} was not tried within the budget"
-    begin = f"{facts['text']} may {facts['verb']}"
-    if facts["margin"] > 1.0:
-        begin += f" {extent(facts, 'good', 'to ')}"
-    else:
-        begin += " by less than was tried"
+        return (f"{text}{late_text(facts)}" if facts["late_cell"] is not None else
+                f"{text}: whether it may {facts['verb']} was not tried within the budget")
+    if facts["margin"] == 1.0:
+        within = " within the budget" if is_late else ""
+        return (f"{text} {changed_by(facts, 'bad')}: {reason(facts['first_bad'])} (nothing nearer "
+                f"was tried{within})")
+    begin = f"{text} may {extent(facts)}"
+    if facts["bad"] is None and is_late:
+        return f"{begin};{late_text(facts)}"
     if facts["bad"] is None:
-        return begin + ("; the budget ended the search" if facts["end"] == BUDGET_END
-                        else ", as far as was tried")
-    then = f"at {extent(facts, 'bad')}: {reason(facts['first_bad'])}"
-    late = " (the budget ended the search between them)" if facts["end"] == BUDGET_END else ""
-    return f"{begin}; {then}{late}"
+        return f"{begin}, as far as was tried{BOUNDS.get((facts['axis'], facts['direction']), '')}"
+    late = " (the budget ended the search between them)" if is_late else ""
+    return f"{begin}; {changed_by(facts, 'bad')}: {reason(facts['first_bad'])}{late}"
 
 
-def extent(facts, key, preposition=""):
-    """Return a factor as text with the value that it leads to: that value alone, from that of the
-    scene as given, where it is not the factor's multiple.
+def late_text(facts):
+    """Return what is known of the factor at which the budget ended a search without a failure."""
+    cell = facts["late_cell"]
+    if cell is None:
+        return " the budget ended the search"
+    return (f" {changed_by(facts, 'late')}: {percent(cell['error'])} off in {cell['quantity']} "
+            f"(tolerance {percent(cell['tolerance'])}), beside {cell['reference']}; the budget "
+            "ended before dx/2 could decide")
+
+
+def extent(facts):
+    """Return the verb of a change with how far it is right, and the value that it leads to: that
+    value alone, from that of the scene as given, where it is not the factor's multiple.
     """
-    value = facts[f"{key}_value"]
+    value, factor = facts["good_value"], facts["good"]
     if AXIS[facts["axis"]].is_inverse and value:
-        origin = f" (from {facts['now']})" if preposition else ""
-        return f"{preposition}{value}{origin}"
-    factor = facts[key]
-    return f"{number(max(factor, 1.0 / factor))} times{changed(facts, f'{key}_value')}"
+        return f"{facts['verb']} to {value} (from {facts['now']})"
+    how = f"grow {number(factor)} times" if factor > 1.0 else (
+        f"be divided by {number(1.0 / factor)}")
+    return how + changed(facts, "good_value")
+
+
+def changed_by(facts, key):
+    """Return a change by the factor at a key in words, with the value that it leads to."""
+    value, factor = facts[f"{key}_value"], facts[key]
+    if AXIS[facts["axis"]].is_inverse and value:
+        return f"at {value}"
+    how = f"at {number(factor)} times" if factor > 1.0 else f"divided by {number(1.0 / factor)}"
+    return how + changed(facts, f"{key}_value")
 
 
 def changed(facts, key):
@@ -220,34 +259,52 @@ def budget_lines(facts):
 
 
 def map_lines(facts):
-    """Return a line for each pair of axes: cells that are right, and those that fail together
-    though each axis alone does not.
+    """Return a line for each pair of axes: how many of the pairs of factors that were judged are
+    right, those that fail together though each axis alone does not, and how many were not run.
     """
-    lines = []
-    for one in facts["maps"]:
-        cells = [cell for row in one["cells"] for cell in row]
-        judged = [cell for cell in cells if cell["outcome"] is not None]
-        alone = {(*cell["factors"].items(),)[0]: cell["outcome"] for cell in judged
-                 if len(cell["factors"]) == 1}
-        both = [cell for cell in judged if cell["outcome"] not in (RIGHT, STOPPED, UNCHECKED, LOST)
-                and len(cell["factors"]) == 2
-                and all(alone.get(pair) == RIGHT for pair in cell["factors"].items())]
-        right = sum(cell["outcome"] == RIGHT for cell in judged)
-        joint = f"; fails only together: {', '.join(cell['text'] for cell in both)}" if both else ""
-        lines.append(f"{' and '.join(one['axes'])}: {right} of {len(judged)} cells right{joint}")
-    return lines
+    return [f"{' and '.join(one['axes'])}: {'; '.join(map_parts(one))}" for one in facts["maps"]]
+
+
+def map_parts(one):
+    """Return the parts of the line of a map."""
+    cells = [cell for row in one["cells"] for cell in row]
+    pairs = [cell for cell in cells if len(cell["factors"]) == 2]
+    known = Counter(cell["alone"] for cell in pairs if cell.get("alone"))
+    judged = [cell for cell in pairs if cell["outcome"] is not None and not cell["alone"]]
+    right, late = (sum(cell["outcome"] == outcome for cell in pairs) for outcome in (RIGHT, None))
+    together = [cell["text"] for cell in judged if fails_together(cell, cells)]
+    return [f"{right} of {len(judged)} pairs right" if judged else "no pair was judged",
+            *[f"fails only together: {', '.join(together)}"] * bool(together),
+            *(f"{n} refused by {AXIS[name].text} alone, not counted" for name, n in known.items()),
+            *[f"{late} not run within the budget"] * bool(late)]
+
+
+def fails_together(cell, cells):
+    """Return whether a cell of two axes fails, and each axis alone is right."""
+    alone = {(*one["factors"].items(),)[0]: one["outcome"] for one in cells
+             if len(one["factors"]) == 1}
+    return cell["outcome"] not in (RIGHT, STOPPED, UNCHECKED, LOST) and all(
+        alone.get(pair) == RIGHT for pair in cell["factors"].items())
 
 
 def tolerance_lines(facts):
-    """Return what counts as right."""
-    lines = []
-    for text, tolerance in facts["tolerance"].items():
-        origin = "the error asked" if tolerance <= facts["error"] else (
-            f"{SLACK:g} times the difference of the scene as given from itself at dx/2")
-        lines.append(f"right: {text} within {percent(tolerance)}, {origin}")
-        if tolerance > 0.5:
-            lines.append(f"  the grid does not resolve {text}: right and wrong mean little here")
-    return lines
+    """Return what counts as right, and why that is more than the error asked."""
+    tolerances = facts["tolerance"].items()
+    wider = {text: share for text, share in tolerances if share > facts["error"]}
+    shares = ", ".join(f"{text} within {percent(share)}" for text, share in tolerances)
+    if not wider:
+        return [f"what counts as right: {shares}, the error asked"]
+    own = ", ".join(percent(share / facts["slack"]) for share in wider.values())
+    lines = [f"what counts as right: {shares}, not the {percent(facts['error'])} asked"
+             f"{only(wider, tolerances)}: the scene as given differs from itself at dx/2 by {own}, "
+             f"and {facts['slack']:g} times that is allowed; a smaller dx asks for more"]
+    return lines + [f"  the grid does not resolve {text}: right and wrong mean little here"
+                    for text, share in wider.items() if share > UNRESOLVED]
+
+
+def only(wider, tolerances):
+    """Return which quantities have a wider tolerance, where others have not."""
+    return f" (of {', '.join(wider)})" if len(wider) < len(tolerances) else ""
 
 
 def number(value):

@@ -32,6 +32,7 @@ MOST_LONGER = 20.0      # times the scene's own time that a run may take
 DECADES = (10.0, 100.0, 1000.0)
 SHIFTS = (1e2, 1e4, 1e6, 1e8, 1e10, 1e12)       # sizes
 SHORTER = (0.5, 0.2, 0.1)                       # steps that are tried, without bisection
+LEAST_NU = -0.9         # the least Poisson's ratio of a search; no scene has one below -1
 LOCATED = ("path", "region", "mean")            # kinds of quantities with coordinates
 MOST_POINTS = 4         # times the points per cell and axis
 DOWN, UP = "down", "up"
@@ -59,6 +60,18 @@ def rungs(axis, tables, direction):
     if axis.name == "time_step" and direction == DOWN:
         return SHORTER
     return DECADES if direction == UP else tuple(1.0 / factor for factor in DECADES)
+
+
+def searched_rungs(axis, tables, direction):
+    """Return the rungs of a search: `rungs`, but none past values that no scene can have."""
+    factors = rungs(axis, tables, direction)
+    if axis.name != "poisson" or direction == DOWN:
+        return factors
+    nus = [body["material"].get("nu") for body in tables["body"]]
+    most = min((0.5 - LEAST_NU) / (0.5 - nu) for nu in nus if nu is not None)
+    if most >= factors[-1]:
+        return factors
+    return (*(factor for factor in factors if factor < most), *(most,) * (most > 1.0))
 
 
 def is_discrete(axis, direction):

@@ -4,6 +4,8 @@
     NO_CONVERGENCE  it does not: paths that diverge, friction that sticks or slips, pieces
     SETTING         time step, points per cell or place, which do not change the physical problem,
                     change the result
+    VANISHING       the quantity hardly changes any more, so that its relative error divides by
+                    almost nothing, and no other quantity is wrong
 
 A cell whose run gave a warning has the limit of its warning too: the two are independent.
 """
@@ -11,11 +13,13 @@ A cell whose run gave a warning has the limit of its warning too: the two are in
 from math import isfinite
 
 RESOLUTION, NO_CONVERGENCE, SETTING = "resolution", "no convergence", "setting"
-LIMITS = (RESOLUTION, NO_CONVERGENCE, SETTING)
+VANISHING = "vanishing quantity"
+LIMITS = (RESOLUTION, NO_CONVERGENCE, SETTING, VANISHING)
+LITTLE = 0.01       # of the change in the scene as given, below which a quantity may vanish
 
 
 def limit_of(error, coarse_error, is_setting):
-    """Return the limit that a wrong cell met, of `LIMITS`.
+    """Return the limit that a wrong cell met, of `LIMITS` but VANISHING.
 
     error, coarse_error: relative differences of the cell and of its run at 2 dx from that at dx/2;
     the latter is not finite where that run did not finish, which leaves RESOLUTION. is_setting:
@@ -24,6 +28,16 @@ def limit_of(error, coarse_error, is_setting):
     if is_setting:
         return SETTING
     return NO_CONVERGENCE if isfinite(coarse_error) and coarse_error <= error else RESOLUTION
+
+
+def vanishes(error, share, tolerance):
+    """Return whether a quantity that is past its tolerance (relative) nearly vanishes: it changes
+    by less than `LITTLE` of its change in the scene as given, its error is larger than that change,
+    and yet within the tolerance of the change in the scene as given.
+
+    error: relative to the change of the reference; share: of that change in the one as given.
+    """
+    return share < LITTLE and error > 1.0 and error * share <= tolerance
 
 
 def limit_counts(cells):

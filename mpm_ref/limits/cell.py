@@ -1,11 +1,14 @@
 """A cell: a scene changed along some axes, with the probes and the reference that go with it."""
 
+from functools import cached_property
+
 import numpy as np
 
 from ..scene import SceneError
 from ..scene.validate import plain, validate_scene
 from ..sweep.setting import scene_at, setting
 from .axes import AXES, AXIS
+from .crossing import crossing_solids
 
 FINE, COARSE = 0.5, 2.0         # factors of dx of the companions
 
@@ -39,6 +42,7 @@ class CellScenes:
         self._scene, self._probes = scene, probes
         X = np.concatenate([X for _, X in probes])
         self.size = float(np.max(X.max(axis=0) - X.min(axis=0)))    # [m] of the bodies
+        self._refusals = {}
 
     def tables(self, cell=()):
         """Return the plain tables of a cell, without the keys that have no value.
@@ -59,6 +63,33 @@ class CellScenes:
             return scene if dx == 1.0 else scene_at(scene, setting(dx=dx))
         except ValueError as fault:
             return fault if isinstance(fault, SceneError) else SceneError(str(fault))
+
+    def refusal(self, cell):
+        """Return why a cell is no scene to be run, "" where it is one. No run is made."""
+        if cell not in self._refusals:
+            scene = self.scene(cell)
+            self._refusals[cell] = str(scene) if isinstance(scene, SceneError) else (
+                self._crossing(cell, scene))
+        return self._refusals[cell]
+
+    def _crossing(self, cell, scene):
+        """Return which solids a change of the speed carries into each other."""
+        if "speed" not in dict(cell):
+            return ""
+        pairs = crossing_solids(scene, self._box(cell)) - self._crossing_as_given
+        return "".join(f"{a} and {b} move into each other, which they do not in the scene as given"
+                       for a, b in sorted(pairs)[:1])
+
+    @cached_property
+    def _crossing_as_given(self):
+        return crossing_solids(self.scene(()), self._box(()))
+
+    def _box(self, cell):
+        """Return the corners of a box about the bodies of a cell, three times as large."""
+        X = np.concatenate([X for _, X in self.probes(cell)])
+        low, high = X.min(axis=0), X.max(axis=0)
+        size = np.max(high - low)
+        return low - size, high + size
 
     def probes(self, cell):
         """Return the probes of the scene as given where they are in a cell."""

@@ -16,6 +16,9 @@ COLOURS = {RIGHT: "#4c9f70", WRONG: "#c0392b", LOST: "#3b7fb5", UNSTABLE: "#e08e
            REFUSED: "#7a6fb0", STOPPED: "#9aa5b1", UNCHECKED: "#cfd6dd", CRASHED: "#222222",
            None: "white"}
 NAMES = {WRONG: "finished and wrong", None: "not run"}      # of outcomes in the legend
+SIGNS = {BUDGET_END: (" ?", "the budget ended the search"),
+         LAST_RUNG: (" +", "not tried farther")}        # after the margin of a bar, by its end
+COLUMNS = 5                 # of the legend
 DECADES = 3.3               # shown on each side; a longer bar is cut, and its number says how far
 ROW, BAR = 0.42, 0.62       # height of an axis [inch], share of it that its bar takes
 WIDTH, MAP, HEAD = 7.0, 2.6, 1.1        # of the figure and of a row of maps [inch]
@@ -79,7 +82,7 @@ def draw_bar(axes, row, one):
         end = min(abs(log10(one["bad"])), DECADES)
         axes.plot(2 * [sign * end], [row - 0.5 * BAR, row + 0.5 * BAR], linewidth=3.0,
                   color=COLOURS[one["first_bad"]["outcome"]], solid_capstyle="butt")
-    text = number(one["margin"]) + {BUDGET_END: " ?", LAST_RUNG: " +"}.get(one["end"], "")
+    text = number(one["margin"]) + SIGNS.get(one["end"], ("", ""))[0]
     if one["bad"] is not None and one["first_bad"]["limit"]:
         text += f" {one['first_bad']['limit']}"
     inside = length > 0.6 * DECADES
@@ -104,7 +107,10 @@ def draw_map(axes, one):
 
 
 def explain_colours(figure, facts, maps):
-    """Add a legend of the outcomes that occur, with the limits of wrong cells as its title."""
+    """Add a legend of the outcomes and signs that occur, with the limits of wrong cells as its
+    title.
+    """
+    from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
     shown = {RIGHT} | {one["first_bad"]["outcome"] for one in facts["directions"]
@@ -112,6 +118,9 @@ def explain_colours(figure, facts, maps):
     shown |= {cell["outcome"] for one in maps for row in one["cells"] for cell in row}
     patches = [Patch(facecolor=COLOURS[name], edgecolor="0.6", linewidth=0.5,
                      label=NAMES.get(name, name)) for name in COLOURS if name in shown]
+    ends = {one["end"] for one in facts["directions"]}
+    patches += [Line2D([], [], linestyle="", marker=f"${sign.strip()}$", color="0.2", label=words)
+                for end, (sign, words) in SIGNS.items() if end in ends]
     caption = f"finished and wrong: {counts_text(facts['limits'])}" if facts["wrong"] else None
-    figure.legend(handles=patches, loc="outside lower center", ncols=len(patches), fontsize=7,
-                  frameon=False, title=caption, title_fontsize=7)
+    figure.legend(handles=patches, loc="outside lower center", ncols=min(len(patches), COLUMNS),
+                  fontsize=7, frameon=False, title=caption, title_fontsize=7)

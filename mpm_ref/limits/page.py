@@ -31,7 +31,8 @@ def page_facts(facts):
         "directions": [one | ending(one) for one in facts["directions"]],
         "maps": [one | {"line": line} for one, line in maps],
         "nearest_lines": nearest_lines(facts), "wrong_lines": wrong_lines(facts),
-        "lines": [*left_out_lines(facts), *tolerance_lines(facts), *budget_lines(facts)],
+        "tolerance_lines": tolerance_lines(facts),
+        "lines": [*left_out_lines(facts), *budget_lines(facts)],
     }
 
 

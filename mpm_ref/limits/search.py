@@ -1,16 +1,20 @@
 """Search outward from a scene for its nearest failures, along each axis, then on pairs of axes.
 
-Along each direction of each axis the factors of `axes.rungs` are tried from 1 outward until one is
-not right. Between the last good factor and the first bad one, the interval is halved in the
-logarithm until it spans at most `NARROW`. A failure between two good rungs is not found. The
-directions that have cost least so far go first, so that a small budget gives a coarse answer for
-all of them, and a fine one for what is refused at once.
+Along each direction of each axis the factors of `axes.searched_rungs` are tried from 1 outward
+until one is not right. Between the last good factor and the first bad one, the interval is halved
+in the logarithm until it spans at most `NARROW`. A failure between two good rungs is not found. All
+directions have their first factors tried together, then those nearest to 1 go first: the intervals
+of the nearest failures, and then what lies farther out. Where several are equally near, the
+directions that have cost least so far go first.
 
 The farthest good factor of a direction must be right beside the grid of half the spacing. If it is
 not, the direction goes back to 1, and all its factors are compared with that grid.
 
 A bad factor whose run is too long or not checked ends its direction without halving: that is the
 end of what was looked at, no failure of the scene.
+
+A cell of a pair that one of its axes alone refuses, by the same message and before any run, is
+known and not judged.
 """
 
 from dataclasses import dataclass
@@ -18,14 +22,15 @@ from itertools import combinations
 from math import ceil, inf, isnan, log2, log10, sqrt
 
 from ..sweep.observation import STOPPED
-from .axes import DOWN, UP, applicable, is_discrete, rungs
+from .axes import DOWN, UP, applicable, is_discrete, searched_rungs
 from .cell import cell_of
 from .verdict import UNCHECKED, WRONG, CellVerdict
 
 NARROW = 1.1            # ratio of the first bad to the last good factor
 NARROW_SHIFT = 2.0      # of a shift's
 EVEN = 1e-9             # of a halving, which round-off may leave
-PER_WORKER = 2          # cells of a round, so that few workers wait for the last one
+DIGITS = 9              # of decades, within which factors are equally near
+PER_WORKER = 2          # cells of a round, so that few of several workers wait for the last one
 WIDEST = 3              # axes whose pairs are mapped
 SIDE = 5                # factors of an axis on a map
 
@@ -42,6 +47,7 @@ class Direction:
     bad: float | None = None            # the nearest one that is not
     verdict: CellVerdict | None = None  # on the bad one
     is_late: bool = False               # whether the budget ended the search
+    late: float | None = None           # the factor that it left without a verdict
     by_fine_grids: bool = False         # whether agreement with coarse grids does not suffice
     cpu: float = 0.0                    # [s] of its runs so far
 
@@ -54,6 +60,11 @@ class Direction:
     def margin(self):
         """Return the factor > 1 by which the axis may change in this direction."""
         return max(self.good, 1.0 / self.good)
+
+    @property
+    def is_new(self):
+        """Return whether no factor has been tried."""
+        return self.good == 1.0 and self.bad is None and not self.is_late
 
     def next_factor(self):
         """Return the factor to be tried next, or None at the end of the search."""
@@ -99,7 +110,7 @@ class Direction:
         """Take the verdict on the factor that was tried; None ends the search as late."""
         self.cpu += 0.0 if verdict is None or isnan(verdict.cpu) else verdict.cpu
         if verdict is None:
-            self.is_late = True
+            self.is_late, self.late = True, factor
         elif verdict.is_right:
             self.good = factor
         else:
@@ -124,9 +135,9 @@ class LimitsSearch:
         tables = judge.scenes.tables()
         self.axes, self.left_out = applicable(tables, judge.quantities)
         self.directions = [
-            Direction(axis, direction, rungs(axis, tables, direction), is_discrete(axis, direction))
+            Direction(axis, direction, factors, is_discrete(axis, direction))
             for axis in self.axes for direction in (DOWN, UP)
-            if rungs(axis, tables, direction)]
+            if (factors := searched_rungs(axis, tables, direction))]
         self.maps = []
 
     def run(self):
@@ -141,7 +152,10 @@ class LimitsSearch:
                         for axis in pair)
         cells = [[cell_of({pair[0].name: a, pair[1].name: b}) for b in factors[1]]
                  for a in factors[0]]
-        verdicts = self.judge.judge([cell for row in cells for cell in row])
+        known = {cell: verdict for row in cells for cell in row
+                 if (verdict := self.judge.refused_alone(cell)) is not None}
+        verdicts = known | self.judge.judge([cell for row in cells for cell in row
+                                             if cell not in known])
         return PairMap(pair, factors, tuple(tuple(verdicts[cell] for cell in row)
                                             for row in cells))
 
@@ -157,23 +171,32 @@ class LimitsSearch:
 
 
 def explore(directions, judge, workers=1):
-    """Move all directions on to their ends, first those that have cost least so far.
+    """Move all directions on to their ends: the first factors of all of them together, then the
+    factors nearest to 1 first.
 
     judge(cells, by_fine_grids) returns {cell: verdict}; see `verdict.CellJudge.judge`.
     workers: runs at a time.
     """
     while True:
-        factors = [(one, factor) for one in sorted(directions, key=lambda one: one.cpu)
-                   if (factor := one.next_factor()) is not None]
+        factors = next_factors(directions)
         if not factors and not confirm(directions, judge):
             return
-        factors = factors[:PER_WORKER * workers]
+        new = [pair for pair in factors if pair[0].is_new]
+        factors = new or factors[:PER_WORKER * workers if workers > 1 else 1]
         for strict in (False, True):
             chosen = [pair for pair in factors if pair[0].by_fine_grids == strict]
             cells = [cell_of({one.axis.name: factor}) for one, factor in chosen]
             verdicts = judge(cells, strict) if cells else {}
             for (one, factor), cell in zip(chosen, cells, strict=True):
                 one.note(factor, verdicts[cell])
+
+
+def next_factors(directions):
+    """Return (direction, factor to be tried next) of all directions that go on, nearest to 1 first,
+    and of equally near ones that which has cost least.
+    """
+    factors = [(one, factor) for one in directions if (factor := one.next_factor()) is not None]
+    return sorted(factors, key=lambda pair: (round(abs(log10(pair[1])), DIGITS), pair[0].cpu))
 
 
 def confirm(directions, judge):

@@ -14,6 +14,11 @@ quantity, or with "@end" the last one, relative to its largest change during the
   run for all of them; of shifted scenes the changes since the start are compared.
 * A wrong cell has the name of its limit (see `cause`), for which its run at 2 dx is compared with
   that at dx/2 as well, and the warnings of its run.
+* Where the only wrong quantity nearly vanishes, beside its change in the scene as given, that is
+  the limit of the cell. A quantity that is zero throughout the reference is compared with its
+  change in the scene as given.
+* A cell in which a change of the speed carries two colliders into each other is refused without a
+  run.
 * A cell that changes the physical problem and has no contact that the scene as given has is another
   scene, whether it is right or wrong: its contact is lost.
 * A cell is not checked where its run at dx/2 does not finish.
@@ -31,7 +36,7 @@ from ..sweep.observation import CRASHED, REFUSED, STOPPED, UNSTABLE
 from ..sweep.quantity import OutputQuantity
 from ..sweep.runs import RunRequest
 from .axes import AXIS, MOST_LONGER
-from .cause import limit_of
+from .cause import VANISHING, limit_of, vanishes
 from .cell import COARSE, FINE, CellScenes, cell_text, physical
 
 RIGHT, WRONG, UNCHECKED, LOST = "right", "wrong", "not checked", "contact lost"
@@ -48,7 +53,7 @@ class CellVerdict:
 
     outcome: str                # of OUTCOMES
     message: str = ""           # of the run that did not finish
-    error: float = np.nan       # difference from the reference
+    error: float = np.nan       # difference from the reference, relative to its change
     tolerance: float = np.nan
     quantity: str = ""
     reference: str = ""         # in words
@@ -59,6 +64,8 @@ class CellVerdict:
     limit: str = ""             # of a wrong cell, of `cause.LIMITS`
     coarse_error: float = np.nan        # of the run at 2 dx of a wrong cell, as `error`
     indicators: dict = field(default_factory=dict)      # {name: worst value} of the cell's run
+    share: float = np.nan       # of the reference's change in that of the scene as given
+    alone: str = ""             # the axis that alone refuses a cell of two axes, which was not run
 
     @property
     def is_right(self):
@@ -90,6 +97,7 @@ class CellJudge:
         self.runs, self.quantities, self.error = runs, quantities, error
         self.verdicts, self.base = {}, {}       # {cell: CellVerdict}, {dx: RunObservation}
         self.tolerance = {}                     # {quantity: relative}
+        self.coarse = {}                        # {cell: CellVerdict beside itself at 2 dx}
         self.cpu = 0.0                          # [s] of all runs, references included
 
     def start(self):
@@ -127,6 +135,9 @@ class CellJudge:
         """
         new = [cell for cell in dict.fromkeys(cells)
                if self.needs_verdict(cell, by_fine_grids)]
+        for cell in filter(self.scenes.refusal, new):
+            self._note(cell, CellVerdict(REFUSED, self.scenes.refusal(cell)))
+        new = [cell for cell in new if not self.scenes.refusal(cell)]
         runs = self._observe({cell: (cell, 1.0, self._most(1.0), cell_text(cell))
                               for cell in new})
         finished = [cell for cell in new if runs[cell].finished]
@@ -143,6 +154,14 @@ class CellJudge:
                 finished.remove(cell)
         return {cell: None if self.needs_verdict(cell, by_fine_grids) else self.verdicts[cell]
                 for cell in cells}
+
+    def refused_alone(self, cell):
+        """Return the verdict on a cell of two axes that one of them alone refuses by the same
+        message before any run, else None.
+        """
+        message = self.scenes.refusal(cell)
+        axes = [one[0] for one in cell if message and message == self.scenes.refusal((one,))]
+        return CellVerdict(REFUSED, message, alone=axes[0]) if axes and len(cell) > 1 else None
 
     def needs_verdict(self, cell, by_fine_grids):
         """Return whether a cell has no verdict yet, or one by a coarse grid where a fine one is
@@ -184,10 +203,12 @@ class CellJudge:
         coarse = self._companions(runs, COARSE)
         verdicts = {cell: self._compared(run, coarse[cell], cell, AT_COARSE)
                     for cell, run in runs.items()}
+        self.coarse |= verdicts
         return {cell: verdict for cell, verdict in verdicts.items() if verdict.is_right}
 
     def _by_fine_grids(self, runs):
-        """Compare cells with their physical problem at dx/2."""
+        """Compare cells with their physical problem at dx/2, the cheapest first."""
+        runs = dict(sorted(runs.items(), key=lambda item: item[1].cost.cpu))
         fine, verdicts = self._companions(runs, FINE), {}
         for cell, run in runs.items():
             reference = fine[physical(cell)]
@@ -209,8 +230,8 @@ class CellJudge:
             own = physical(cell)
             error = self._differences(coarse[own], fine[own], False)[one.quantity]
             is_setting = own != cell and own in self.verdicts and self.verdicts[own].is_right
-            named[cell] = replace(one, coarse_error=error,
-                                  limit=limit_of(one.error, error, is_setting))
+            limit = VANISHING if one.limit == VANISHING else limit_of(one.error, error, is_setting)
+            named[cell] = replace(one, coarse_error=error, limit=limit)
         return named
 
     def _companions(self, cells, dx):
@@ -254,28 +275,51 @@ class CellJudge:
         """Return RIGHT or WRONG of a run beside a reference."""
         shifted = any(AXIS[name].name == "origin" for name, _ in cell)
         errors = self._differences(run, reference, shifted)
-        worst = max(errors, key=lambda name: errors[name] / self.tolerance[name])
-        outcome = RIGHT if errors[worst] <= self.tolerance[worst] else WRONG
-        limit = limit_of(errors[worst], np.nan, not physical(cell)) if outcome == WRONG else ""
-        return CellVerdict(outcome, "", errors[worst], self.tolerance[worst], worst, text,
-                           run.cost.cpu, run.cost.steps, run.until, run.warnings, limit,
-                           indicators=run.indicators)
+        shares = {name: self._scale(name, reference) / self._scale(name, self.base[FINE])
+                  for name in errors}
+        worst = self._worst(errors, shares)
+        error, tolerance, share = errors[worst], self.tolerance[worst], shares[worst]
+        outcome = RIGHT if error <= tolerance else WRONG
+        limit = limit_of(error, np.nan, not physical(cell)) if outcome == WRONG else ""
+        if outcome == WRONG and vanishes(error, share, tolerance):
+            limit = VANISHING
+        return CellVerdict(outcome, "", error, tolerance, worst, text, run.cost.cpu,
+                           run.cost.steps, run.until, run.warnings, limit,
+                           indicators=run.indicators, share=share)
+
+    def _worst(self, errors, shares):
+        """Return the quantity that is farthest past its tolerance: one that nearly vanishes only
+        where no other is past it.
+        """
+        def rank(name):
+            error, tolerance = errors[name], self.tolerance[name]
+            is_past = error > tolerance and not vanishes(error, shares[name], tolerance)
+            return is_past, error / tolerance
+        return max(errors, key=rank)
 
     def _differences(self, run, reference, shifted):
         """Return {quantity: largest relative difference of two runs}."""
-        errors = {text: differences(run.values[text], reference.values[text], shifted)
+        errors = {text: differences(run.values[text], reference.values[text], shifted,
+                                    self._scale(text, reference))
                   for text in self.quantities}
         return {text: float(error[-1] if OutputQuantity(text).at_end else error.max())
                 for text, error in errors.items()}
 
+    def _scale(self, text, reference):
+        """Return the largest change of a quantity in a reference, or in the scene as given where
+        it is zero throughout the reference.
+        """
+        values = reference.values[text]
+        return largest_change(values if values.any() else self.base[FINE].values[text])
 
-def differences(values, reference, shifted):
-    """Return the differences (T,) of values (T, k), relative to the largest change of the
-    reference; infinite where they cannot be compared.
+
+def differences(values, reference, shifted, scale=None):
+    """Return the differences (T,) of values (T, k), relative to a scale, the largest change of the
+    reference by default; infinite where they cannot be compared.
 
     shifted: whether the changes since the start are compared.
     """
-    scale = largest_change(reference)
+    scale = largest_change(reference) if scale is None else scale
     if shifted:
         values, reference = values - values[0], reference - reference[0]
     error = relative_difference(values, reference, scale)

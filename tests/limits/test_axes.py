@@ -5,7 +5,17 @@ from math import atan, degrees, radians, tan
 import numpy as np
 import pytest
 
-from mpm_ref.limits.axes import AXES, AXIS, DOWN, SHORTER, UP, applicable, is_discrete, rungs
+from mpm_ref.limits.axes import (
+    AXES,
+    AXIS,
+    DOWN,
+    SHORTER,
+    UP,
+    applicable,
+    is_discrete,
+    rungs,
+    searched_rungs,
+)
 from mpm_ref.limits.cell import CellScenes, cell_of, cell_text, physical
 from mpm_ref.scene import SceneError, build, canonical, loads
 from mpm_ref.sweep.probes import choose_probes
@@ -124,6 +134,16 @@ def test_poisson_scales_the_distance_from_one_half(sand):
 def test_poissons_ratio_is_shown_with_its_distance_from_one_half(nu, text):
     tables = {"body": [{"material": {"lam": 1.0}}, {"material": {"nu": nu}}]}
     assert AXIS["poisson"].reading(tables) == text
+
+
+@pytest.mark.parametrize(("nus", "factors"), [
+    ((0.4,), (10.0, 14.0)), ((0.3,), (7.0,)), ((0.3, -0.2), (2.0,)), ((-0.95,), ()),
+    ((0.4995,), (10.0, 100.0, 1000.0))])
+def test_poissons_ratio_stays_above_the_least_of_a_scene(nus, factors):
+    tables = {"body": [{"material": {}}, *({"material": {"nu": nu}} for nu in nus)]}
+    found = searched_rungs(AXIS["poisson"], tables, UP)
+    assert found == pytest.approx(factors)
+    assert searched_rungs(AXIS["poisson"], tables, DOWN) == rungs(AXIS["poisson"], tables, DOWN)
 
 
 def test_friction_scales_the_tangent(sand):

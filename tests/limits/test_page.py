@@ -51,13 +51,16 @@ class SyntheticJudge:
         self.error, self.cpu, self.tolerance = 0.01, 80.0, {"positions": 0.02}
         self.base = {1.0: SimpleNamespace(outcome=FINISHED, cost=RunCost(1.0, 1.0, 10, 4, 1))}
         self.runs = SimpleNamespace(workers=1)
-        self.verdicts, self.most = {(): self.verdict({})}, most
+        self.verdicts, self.most, self.coarse = {(): self.verdict({})}, most, {}
 
     def judge(self, cells, by_fine_grids=False):
         for cell in cells:
             if cell not in self.verdicts and len(self.verdicts) < self.most:
                 self.verdicts[cell] = self.verdict(dict(cell))
         return {cell: self.verdicts.get(cell) for cell in cells}
+
+    def refused_alone(self, cell):
+        return None
 
     def verdict(self, factors):
         get = lambda name: factors.get(name, 1.0)       # noqa: E731
@@ -90,7 +93,7 @@ def test_the_page_holds_the_facts_and_loads_nothing(most):
 def test_words_of_the_page_are_those_of_the_terminal():
     facts = facts_of()
     page, lines = page_facts(facts), answer_lines(facts)
-    words = [*page["nearest_lines"], *page["wrong_lines"], *page["lines"],
+    words = [*page["nearest_lines"], *page["wrong_lines"], *page["tolerance_lines"], *page["lines"],
              *(one["line"] for one in page["maps"]), *(one["sentence"] for one in
                                                        page["directions"])]
     assert page["nearest_lines"] == [f"nearest failure: {facts['nearest']['sentence']}"]

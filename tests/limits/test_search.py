@@ -1,5 +1,6 @@
 """Margins and maps of synthetic verdicts with failures at given factors."""
 
+from math import log10
 from types import SimpleNamespace
 
 import pytest
@@ -29,6 +30,7 @@ class SyntheticJudge:
 
     def __init__(self, outcome, most=10**9, cpu=lambda factors: 1.0, by_fine_grids=None):
         self.outcome, self.most, self.rounds, self.verdicts = outcome, most, 0, {}
+        self.known = {}
         self.cpu, self.by_fine_grids = cpu, by_fine_grids or outcome
 
     def judge(self, cells, by_fine_grids=False):
@@ -40,6 +42,9 @@ class SyntheticJudge:
                 self.verdicts[cell] = CellVerdict(self.outcome(dict(cell)),
                                                   cpu=self.cpu(dict(cell)))
         return {cell: self.verdicts.get(cell) for cell in cells}
+
+    def refused_alone(self, cell):
+        return self.known.get(cell)
 
 
 @pytest.mark.parametrize("limit", [1.02, 2.1, 37.0, 990.0])
@@ -73,6 +78,46 @@ def test_directions_that_cost_least_go_first():
     assert (cheap.is_late, cheap.failed) == (False, True)
     assert cheap.bad / cheap.good <= 1.1
     assert any(one.is_late for one in dear)
+
+
+def test_all_directions_have_a_first_factor_before_any_is_searched_on():
+    """However many there are, cheap or dear, and though one fails at once."""
+    names = ("stiffness", "density", "speed", "gravity", "friction", "yield")
+    directions = [direction(name, way) for name in names for way in (DOWN, UP)]
+    judge = SyntheticJudge(lambda f: REFUSED if "stiffness" in f else RIGHT, len(directions),
+                           lambda f: 0.0 if "stiffness" in f else 100.0)
+    explore(directions, judge.judge)
+    assert {abs(round(log10(dict(cell)[name]), 9)) for cell in judge.verdicts
+            for name in dict(cell)} == {1.0}
+    assert not any(one.is_new for one in directions if one.bad is None and one.good != 1.0)
+    assert len(judge.verdicts) == len(directions)
+
+
+def test_the_nearest_failure_is_narrowed_down_before_what_lies_farther_out():
+    near, far, right = direction("speed"), direction("density"), direction("gravity")
+    judge = SyntheticJudge(lambda f: WRONG if f.get("speed", 1.0) > 4.0
+                           or f.get("density", 1.0) > 40.0 else RIGHT,
+                           cpu=lambda f: 100.0 if "speed" in f else 1.0)
+    explore([right, far, near], judge.judge)
+    tried = list(judge.verdicts)
+    inside = [k for k, cell in enumerate(tried) if "speed" in dict(cell)]
+    outside = [k for k, cell in enumerate(tried) if max(dict(cell).values()) > 10.0]
+    assert max(inside) < min(outside)
+    assert near.bad / near.good <= 1.1
+
+
+def test_equally_near_factors_of_the_least_cost_go_first():
+    dear, cheap = direction("stiffness"), direction("density")
+    judge = SyntheticJudge(lambda f: RIGHT, cpu=lambda f: 9.0 if "stiffness" in f else 1.0)
+    explore([dear, cheap], judge.judge)
+    assert [dict(cell) for cell in judge.verdicts][2:4] == [{"density": 100.0},
+                                                            {"stiffness": 100.0}]
+
+
+def test_the_factor_that_the_budget_left_is_kept():
+    one = direction("stiffness")
+    explore([one], SyntheticJudge(lambda f: RIGHT, 1).judge)
+    assert (one.good, one.late, one.is_late) == (10.0, 100.0, True)
 
 
 @pytest.mark.parametrize("outcome", [STOPPED, UNCHECKED])
@@ -184,3 +229,24 @@ def test_search_maps_the_pairs_of_the_nearest_axes():
             assert (verdict.outcome == RIGHT) == (a[i] * b[j] < 50.0)
     assert cell_of({"stiffness": a[-1], "density": b[-1]}) in search.wrong_cells()
     assert set(search.left_out) == {"speed", "gravity", "friction", "yield"}
+
+
+def test_a_pair_that_one_axis_alone_refuses_is_not_judged():
+    """Refused stiffness is known, whatever the density."""
+    judge = SyntheticJudge(lambda f: REFUSED if f.get("stiffness", 1.0) > 2.0 else (
+        RIGHT if f.get("density", 1.0) < 50.0 else WRONG))
+    judge.scenes, judge.quantities = SyntheticScenes(), ("positions",)
+    judge.runs = SimpleNamespace(workers=2)
+    known = CellVerdict(REFUSED, "too stiff", alone="stiffness")
+    judge.refused_alone = lambda cell: known if len(cell) > 1 and dict(cell)["stiffness"] > 2.0 \
+        else None
+    search = LimitsSearch(judge)
+    search.run()
+    cells = {cell: verdict for one in search.maps for row, a in zip(
+        one.verdicts, one.factors[0], strict=True) for verdict, b in zip(
+        row, one.factors[1], strict=True)
+        for cell in [cell_of({one.axes[0].name: a, one.axes[1].name: b})]}
+    alone = [cell for cell, verdict in cells.items() if verdict.alone]
+    assert len(alone) == 4
+    assert not set(alone) & set(judge.verdicts)
+    assert set(cells) - set(alone) <= {*judge.verdicts, ()}

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpm_ref.limits.cause import NO_CONVERGENCE, RESOLUTION, SETTING
+from mpm_ref.limits.cause import NO_CONVERGENCE, RESOLUTION, SETTING, VANISHING
 from mpm_ref.limits.cell import cell_of
 from mpm_ref.limits.verdict import (
     AS_GIVEN,
@@ -243,6 +243,72 @@ def test_quantity_at_the_end_is_compared_there_alone():
     judge.start()
     assert judge.tolerance == {"positions": pytest.approx(8.0),
                                "positions@end": pytest.approx(0.2)}
+
+
+@pytest.mark.parametrize(("own", "fine", "limit"), [
+    (0.02, 0.001, VANISHING),       # 20 times its change, 2 % of that in the scene as given
+    (0.5, 0.001, RESOLUTION),       # half the change in the scene as given is no little
+    (0.002, 0.0015, RESOLUTION),    # small, and a third off
+    (0.04, 0.015, RESOLUTION)])     # 1.5 % of the change is left
+def test_a_quantity_that_nearly_vanishes_is_wrong_by_name(own, fine, limit):
+    verdict, _ = verdict_on({"density": 2.0}, **labels("density x 2", own, 9.0, fine))
+    assert (verdict.outcome, verdict.limit) == (WRONG, limit)
+    assert verdict.error == pytest.approx((own - fine) / fine)
+    assert verdict.share == pytest.approx(fine)
+
+
+def test_an_ordinary_wrong_quantity_stands_before_one_that_vanishes():
+    def run(kinetic, elastic):
+        return replace(observation(), values={"kinetic": np.array([[0.0], [kinetic]]),
+                                              "elastic": np.array([[0.0], [elastic]])})
+    base = {"as given": run(1.1, 1.1), "as given, dx/2": run(1.0, 1.0)}
+    for elastic, expected in ((1.5, ("elastic", RESOLUTION)), (1.1, ("kinetic", VANISHING))):
+        runs = SyntheticRuns(base | labels("density x 2", run(0.02, elastic), run(9.0, 9.0),
+                                           run(0.001, 1.0)))
+        judge = CellJudge(loads(SCENE), runs, PROBES, ("kinetic", "elastic"), 0.01)
+        judge.start()
+        verdict = judge.judge([cell_of({"density": 2.0})])[cell_of({"density": 2.0})]
+        assert (verdict.quantity, verdict.limit) == expected
+
+
+@pytest.mark.parametrize(("own", "outcome"), [(0.1, RIGHT), (0.3, WRONG)])
+def test_what_is_zero_is_compared_with_the_change_in_the_scene_as_given(own, outcome):
+    """The tolerance is 20 % of a displacement of 50 m."""
+    base = {label: 50.0 * x for label, x in BASE.items()}
+    verdict, _ = verdict_on({"density": 2.0}, **base, **labels(
+        "density x 2", 50.0 * own, 400.0, 0.0))
+    assert (verdict.outcome, verdict.error) == (outcome, pytest.approx(own))
+
+
+def test_cheapest_cells_have_their_fine_runs_first():
+    runs = {label: value for factor, cpu in ((2.0, 5.0), (3.0, 1.0)) for label, value in labels(
+        f"density x {factor:g}", observation(3.0, cpu=cpu), 9.0, 3.0).items()}
+    judge = judge_of(**runs)
+    judge.judge([cell_of({"density": factor}) for factor in (2.0, 3.0)])
+    fine = [label for label in judge.runs.requests if label.startswith("density")
+            and label.endswith("dx/2")]
+    assert fine == ["density x 3, dx/2", "density x 2, dx/2"]
+
+
+def test_a_difference_from_the_coarse_grid_is_kept_where_the_budget_ends():
+    cell = cell_of({"density": 2.0})
+    late = observation(outcome=STOPPED, cpu=0.0)
+    judge = judge_of(**labels("density x 2", 3.0, 4.5, late))
+    assert judge.judge([cell])[cell] is None
+    assert judge.coarse[cell].error == pytest.approx(1.0 / 3.0)
+    assert judge.coarse[cell].reference == AT_COARSE
+
+
+def test_a_pair_is_refused_by_one_axis_alone_for_the_same_cause():
+    judge = judge_of()
+    judge.runs.requests.clear()
+    known = judge.refused_alone(cell_of({"time_step": 10.0, "density": 2.0}))
+    assert (known.outcome, known.alone) == (REFUSED, "time_step")
+    assert "cfl = 5.0" in known.message
+    assert judge.refused_alone(cell_of({"time_step": 10.0})) is None
+    assert judge.refused_alone(cell_of({"stiffness": 10.0, "density": 2.0})) is None
+    assert not judge.runs.requests
+    assert list(judge.verdicts) == [()]
 
 
 def test_no_run_is_asked_for_twice():

@@ -126,7 +126,7 @@ def test_silent_cells_are_counted_by_their_limits():
     assert records.values == {
         "trade.limits.silent": 3, "trade.limits.far_silent": 2,
         "trade.limits.limit.resolution": 2, "trade.limits.limit.no_convergence": 1,
-        "trade.limits.limit.setting": 0}
+        "trade.limits.limit.setting": 0, "trade.limits.limit.vanishing_quantity": 0}
     note = records.notes["trade.limits.far_silent"]
     assert "toy density x 2: 0.3 (tolerance 0.1), resolution; toy density x 2: 0.25" in note
 
