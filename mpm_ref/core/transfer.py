@@ -11,11 +11,14 @@ and NCLAW-alg3 are special cases. There are two forms of force and velocity grad
 with D = sum_i w_ip r_ip r_ip^T = dx^2 (degree + 1)/12 I, for degrees 2 and 3 only. Where an affine
 transfer carries v_old on the grid, v and C relax to those of the grid, so that the filter of the
 exchange acts per time, not per step (docs/explanation/transfers.md). `scatter*` and
-`gather*` are the loops over particles; `p2g` and `g2p` run them in parallel. Which fields the
-particles and the grid carry (see `state`) selects the transfer, when the kernel is compiled.
+`gather*` are the loops over particles, as plain as the sums are; `p2g` and `g2p` run in parallel
+the same sums written for speed, `transfer_lines` and `transfer_mls3`, which are tested against
+them. Which fields the particles and the grid carry (see `state`) selects the transfer, when the
+kernel is compiled.
 """
 
 from .jit import CHUNKS, chunk, kernel, parallel, prange
+from .relaxation import blend, blend_moment, moment, shift_spin
 from .state import affine, body_force, full, put_affine
 from .stencil import (
     add_to_node,
@@ -32,6 +35,12 @@ from .stencil import (
     weights_per_axis,
 )
 from .tensor import fill, lin, mat, mlin, mv, outer, put_mat, put_vec, transpose, vec
+from .transfer_lines import (
+    gather_lines_all,
+    gather_lines_mls_all,
+    scatter_lines_color,
+    scatter_lines_mls_color,
+)
 from .transfer_mls3 import fits, gather_mls3_all, scatter_mls3_color
 
 
@@ -151,13 +160,6 @@ def gather(particles, grid, stencil, dt, flip, bounds):
 
 
 @kernel
-def moment(C, p, D, like):
-    """D C_p, the moment sum_i w_ip v_i r_ip^T of an affine field; zero where none is carried."""
-    A = affine(C, p, like)
-    return mlin(D, A, 0.0, A)
-
-
-@kernel
 def minus_old_moment(lag, w_ip, v_old, i, r_ip):
     """lag - w_ip v_old_i r_ip^T, where the old velocity is carried."""
     if v_old.ndim == 1:
@@ -167,41 +169,12 @@ def minus_old_moment(lag, w_ip, v_old, i, r_ip):
 
 
 @kernel
-def shift_spin(u, lag, flip, dt):
-    """(q s^T - s q^T)/2 with q = flip lag and s = dt u.
-
-    A particle with velocity u + q that moves by s gains the angular momentum m s x q about any
-    point; a moment that is smaller by this one takes it back.
-    """
-    A = outer(lag, u)
-    return mlin(0.5 * dt * flip, A, -0.5 * dt * flip, transpose(A))
-
-
-@kernel
-def blend_moment(B, flip, lag, spin, v_old):
-    """B + flip lag - spin, where the old velocity is carried."""
-    if v_old.ndim == 1:
-        return B
-    else:
-        return mlin(1.0, mlin(1.0, B, flip, lag), -1.0, spin)
-
-
-@kernel
 def minus_old(lag, w_ip, v_old, i):
     """lag - w_ip v_old_i, where the old velocity is carried."""
     if v_old.ndim == 1:
         return lag
     else:
         return lin(1.0, lag, -w_ip, of_node(v_old, i))
-
-
-@kernel
-def blend(u, flip, lag, v_old):
-    """u + flip lag, where the old velocity is carried (FLIP)."""
-    if v_old.ndim == 1:
-        return u
-    else:
-        return lin(1.0, u, flip, lag)
 
 
 @kernel
@@ -250,32 +223,6 @@ def damp(C, rpic, like, bounds):
 
 
 @parallel
-def _scatter_color(particles, grid, stencil, dt, slabs, color):
-    for h in prange((len(slabs.start) - color) // 2):
-        a = 2 * h + color
-        scatter(particles, grid, stencil, dt, slabs.order[slabs.start[a] : slabs.start[a + 1]])
-
-
-@parallel
-def _scatter_mls_color(particles, grid, stencil, dt, slabs, color):
-    for h in prange((len(slabs.start) - color) // 2):
-        a = 2 * h + color
-        scatter_mls(particles, grid, stencil, dt, slabs.order[slabs.start[a] : slabs.start[a + 1]])
-
-
-@parallel
-def _gather(particles, grid, stencil, dt, flip):
-    for c in prange(CHUNKS):
-        gather(particles, grid, stencil, dt, flip, chunk(c, len(particles.x)))
-
-
-@parallel
-def _gather_mls(particles, grid, stencil, dt, flip):
-    for c in prange(CHUNKS):
-        gather_mls(particles, grid, stencil, dt, flip, chunk(c, len(particles.x)))
-
-
-@parallel
 def _damp(C, damping, like):
     for c in prange(CHUNKS):
         damp(C, damping, like, chunk(c, len(C)))
@@ -287,10 +234,9 @@ def p2g(particles, grid, stencil, dt, slabs, mls):
     Slabs of one colour are far enough apart to share no node, so they run in parallel; within a
     slab particles come in a fixed order. Hence the same bits for any number of threads.
     """
-    if grid.f.ndim == 1 and fits(grid, stencil, mls):
+    run = scatter_lines_mls_color if mls else scatter_lines_color
+    if fits(grid, stencil, mls):
         run = scatter_mls3_color
-    else:
-        run = _scatter_mls_color if mls else _scatter_color
     for color in (0, 1):
         run(particles, grid, stencil, dt, slabs, color)
 
@@ -299,12 +245,12 @@ def g2p(particles, grid, stencil, dt, flip, mls):
     """New velocity, position and velocity gradient of all particles; see `gather` and
     `gather_mls`.
     """
-    if grid.f.ndim == 1 and fits(grid, stencil, mls):
+    if fits(grid, stencil, mls):
         gather_mls3_all(particles, grid, stencil, dt)
     elif mls:
-        _gather_mls(particles, grid, stencil, dt, flip)
+        gather_lines_mls_all(particles, grid, stencil, dt, flip)
     else:
-        _gather(particles, grid, stencil, dt, flip)
+        gather_lines_all(particles, grid, stencil, dt, flip)
 
 
 def rpic(C, damping):

@@ -11,20 +11,16 @@ The same sums as `scatter_mls` and `gather_mls` of `transfer`, 2.5 times as fast
   and the entries of a line are no longer known to be consecutive.
 """
 
-import numpy as np
-
 from .jit import CHUNKS, chunk, kernel, parallel, prange
+from .lines import _1, _2, _3, _4, _5, _6, _7, _8, node_number, strides
 from .state import affine, body_force, full, put_affine
 from .stencil import inverse_inertia, locate, weights_per_axis
 from .tensor import lin, mlin, mul, mv, outer, put_vec, transpose, vec, vm
 
-# Offsets in an array, unsigned as the indices are: their sum with a signed integer is a float.
-_1, _2, _3, _4, _5, _6, _7, _8 = (np.uint64(k) for k in range(1, 9))
-
 
 def fits(grid, stencil, mls):
-    """Return whether a transfer is the one of this file."""
-    return mls and grid.m.ndim == 3 and len(stencil) == 3
+    """Return whether a transfer is the one of this file: forces join the momenta at once."""
+    return mls and grid.m.ndim == 3 and len(stencil) == 3 and grid.f.ndim == 1
 
 
 @kernel
@@ -69,19 +65,6 @@ def gather_mls3(particles, grid, stencil, dt, bounds):
         put_vec(particles.v, p, v_p)
         put_vec(particles.x, p, lin(1.0, x, dt, v_p))
         put_affine(particles.C, p, grid.dx * inverse_inertia(grid.dx, stencil), rv)
-
-
-@kernel
-def strides(m):
-    """Nodes from one to the next along the first two axes."""
-    n = np.uint64(m.shape[2])
-    return np.uint64(m.shape[1]) * n, n
-
-
-@kernel
-def node_number(base, n):
-    """Number of the base node in the flattened grid."""
-    return np.uint64(base[0]) * n[0] + np.uint64(base[1]) * n[1] + np.uint64(base[2])
 
 
 @kernel

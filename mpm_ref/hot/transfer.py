@@ -13,6 +13,7 @@ from math import inf, isfinite, sqrt
 import numpy as np
 
 from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
+from ..core.lines import node_number, strides
 from ..core.stencil import (
     add_to_node,
     column,
@@ -25,7 +26,7 @@ from ..core.stencil import (
     weights_per_axis,
 )
 from ..core.tensor import dot, fill, lin, mat, mlin, mv, outer, put_mat, transpose, vec, vm
-from ..core.transfer_mls3 import add_momenta, node_number, plane, strides, weighted
+from ..core.transfer_mls3 import add_momenta, plane, weighted
 
 
 @kernel

@@ -21,7 +21,7 @@ from . import code_probe
 
 STAGES = {          # of a step: beginnings of the names of the kernels that it calls
     "sort particles by cell": ("core.order._place",),
-    "particles to grid": ("core.transfer._scatter", "core.transfer_mls3.scatter"),
+    "particles to grid": ("core.transfer_lines.scatter", "core.transfer_mls3.scatter"),
     "velocities of nodes": ("core.grid._update_all",),
     "forces apart from momenta": ("core.grid._update_all_apart",),
     "gravity on empty nodes": ("core.grid._update_all_empty",),
@@ -30,7 +30,7 @@ STAGES = {          # of a step: beginnings of the names of the kernels that it 
     "colliders: points of their surface": ("core.surface.",),
     "implicit solve": ("hot.",),
     "multigrid": ("hot.multigrid.",),
-    "grid to particles": ("core.transfer._gather", "core.transfer_mls3.gather"),
+    "grid to particles": ("core.transfer_lines.gather", "core.transfer_mls3.gather"),
     "averaged volumes": ("core.f_bar._",),
     "J alone": ("core.deform.fluid",),
     "F": ("core.deform.elastic", "core.deform.plastic", "core.deform.full"),

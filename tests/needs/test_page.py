@@ -74,7 +74,8 @@ ORDER = (run_of("collider roof", NOT_REQUIRED, 0.0, 9.5),
 
 
 def parts_of(multigrid):
-    kernels = {"core.transfer._scatter": 1} | ({"hot.multigrid.smooth": 2} if multigrid else {})
+    kernels = {"core.transfer_lines.scatter": 1}
+    kernels |= {"hot.multigrid.smooth": 2} if multigrid else {}
     return CodeParts(70, {"block": {"F": 32 * 9, "y": 0}}, {"block": 9}, kernels,
                      {"block": "every step"}, multigrid, False)
 

@@ -11,10 +11,11 @@ with w and dw along it.
 """
 
 from ..jit import CHUNKS, chunk, kernel, parallel, prange
+from ..lines import _1, _2, _3, node_number, strides
 from ..state import add_body_force, affine, body_force, full, put_affine, put_full
 from ..stencil import inverse_inertia, locate, slopes_per_axis, weights_per_axis
 from ..tensor import dot, fill, inner, lin, mlin, mv, outer, put_vec, transpose, vec, vm
-from ..transfer_mls3 import _1, _2, _3, add_momenta, line_of, moments, node_number, strides
+from ..transfer_mls3 import add_momenta, line_of, moments
 
 
 @kernel

@@ -26,12 +26,13 @@ class Records:
 
 
 def test_records_count_what_is_wrong():
-    good = Lean("a", 0.005, 0.006, 2.0, 1.0, "required", "not required, not required", 4)
+    good = Lean("a", 0.005, 0.006, 2.0, 1.0, "required", "not required, not required", 4, 2)
     rows = [good, good._replace(scene="b", again=0.02), good._replace(vital="not required"),
             good._replace(idle="not required, required", lean_cpu=4.0),
-            good._replace(scene="c", again=float("nan"))]
+            good._replace(scene="c", again=float("nan")), good._replace(scene=needs.SOLID, dim=3)]
     records = Records()
     record_lean(records, rows)
-    assert records.values == {"trade.needs.kept": pytest.approx(0.6), "trade.needs.cost": 0.5,
-                              "trade.needs.vital": 1, "trade.needs.idle": 1}
+    assert records.values == {"trade.needs.kept": pytest.approx(4 / 6), "trade.needs.cost": 0.5,
+                              "trade.needs.vital": 1, "trade.needs.idle": 1,
+                              "trade.needs.section": 3}
     assert "b 0.02, c nan" in records.notes["trade.needs.kept"]
