@@ -35,7 +35,7 @@ BudgetOption = Annotated[str, typer.Option("--budget", help="Time after which no
                                            "as 90s, 20min or 2h.")]
 QuantityOption = Annotated[list[str] | None, typer.Option(
     "--quantity", help="Quantity of interest, such as positions, front:x+, kinetic or force:floor; "
-    "may be given several times (default: the [[quantity]] tables of the scene, or positions).")]
+    "may be given several times (default: the [\\[quantity]] tables of the scene, or positions).")]
 WorkersOption = Annotated[int, typer.Option(help="Number of runs at a time.")]
 SchedulerOption = Annotated[str | None, typer.Option(
     help="Where runs are made: local:N, or the address of a Dask scheduler (default: processes "

@@ -102,7 +102,7 @@ def measure(
         if like is not None:
             raise typer.Exit(answer_from(like, SweptScene(record, observed, tables), request))
         search = run_search(record, observed, request, others)
-        facts = json_loads(as_json(answer_of(search, path.stem, compared)))
+        facts = json_loads(as_json(answer_of(search, path.stem, compared, request.budget)))
         write_answer(search, facts, request, tables)
         print(as_json(facts) if json else "\n".join(answer_lines(facts)))
     raise typer.Exit(0 if facts["best"] is not None and is_whole(facts) else NO_ANSWER)
@@ -183,6 +183,6 @@ def write_answer(search, facts, request, tables):
     write_bytes(f"{base}.trade.json", as_json(facts).encode())
     write_bytes(f"{base}.trade.html", page_of(facts, "trade").encode())
     save_figure(facts, f"{base}.trade.png")
-    text = best_scene(search, request.stem, request.out, tables)
+    text = best_scene(search, request.stem, request.out, tables, facts["start_fault"])
     if text is not None:
         write_bytes(f"{base}.best.toml", text.encode())

@@ -1,6 +1,6 @@
 """The answer of a search: rows of all settings, the recommended one, and what is not known."""
 
-from math import isfinite, log2
+from math import ceil, isfinite, log2
 
 import numpy as np
 
@@ -9,30 +9,38 @@ from ..store.text import counted
 from ..sweep.observation import FINISHED
 from ..sweep.runs import LATE
 from ..sweep.scene_text import scene_text
-from ..sweep.setting import scene_at
+from ..sweep.setting import scene_at, setting
+from .cost import next_grid_facts, next_grid_text, price_text, rounded_up
 from .reference import LEAST
 from .search import REFERENCE_PART, without_grid
+from .start import start_fault
 
-NOT_RUN = "not run"   # outcome of a setting that the budget left out
+NOT_RUN = "not run"         # outcome of a setting that the budget left out
+AS_GIVEN = setting(dx=1.0)  # that of the scene itself
+MOST_ERROR = 1.0            # that can be asked
 
 
-def answer_of(search, name, compared=None):
+def answer_of(search, name, compared=None, budget=None):
     """Return the answer as plain data, for JSON; errors are relative, times in s, memory in bytes.
 
-    name: that of the scene; compared: {name: `RunObservation`} of results files.
+    name: that of the scene; compared: {name: `RunObservation`} of results files; budget [s].
     """
     best, horizon = search.best(), search.horizon()
-    return {
-        "scene": name, "version": __version__, "error": search.error, "end": search.times[-1],
+    facts = {
+        "scene": name, "version": __version__, "error": search.error, "budget": budget,
+        "end": search.times[-1],
         "quantities": list(search.quantities), "until": horizon, "chaos": search.chaos,
         "compared_with": search.compared_with,
         "grids": [search.scene.dx * factor for factor in search.levels],
         "cells": largest_extent(search.runs.probes) / search.scene.dx,
         "references": {text: reference_facts(search, text) for text in search.references},
+        "next_grid": next_grid_facts(search),
         "best": None if best is None else best.text,
+        "start_fault": "" if best is None else start_fault(search, best),
         "rows": [row(search, chosen) for chosen in ranked(search)],
         "compared": [compared_row(search, file, run) for file, run in (compared or {}).items()],
     }
+    return facts | {"advice": advice_lines(facts)}
 
 
 def largest_extent(probes):
@@ -47,7 +55,8 @@ def reference_facts(search, text):
     reference = search.references[text]
     return {"error": float(reference.error[search.last]),
             "error_at_end": float(reference.error[-1]), "order_at_end": float(reference.order[-1]),
-            "differences": list(reference.differences), "scale": float(reference.scale[-1])}
+            "differences": list(reference.differences), "scale": float(reference.scale[-1]),
+            "least_error": search.least_error(text)}
 
 
 def ranked(search):
@@ -63,35 +72,59 @@ def row(search, chosen):
     run = search.observations[chosen]
     return {"setting": dict(chosen.items), "text": chosen.text, **run_facts(search, run),
             "keeps": bool(search.horizon() > 0.0 and search.keeps(chosen)),
-            "best": chosen == search.best(), "family": without_grid(chosen).text}
+            "best": chosen == search.best(), "as_given": chosen == AS_GIVEN,
+            "family": without_grid(chosen).text}
 
 
 def compared_row(search, file, run):
     """Return the facts of a results file, which is no setting that could be recommended."""
     return {"setting": {}, "text": file, **run_facts(search, run), "keeps": False, "best": False,
-            "family": "results file"}
+            "as_given": False, "family": "results file"}
 
 
 def run_facts(search, run):
-    """Return how a run ended, its errors and its cost."""
-    errors = {text: search.error_of_run(run, (text,)) for text in search.references}
+    """Return how a run ended, its errors until the horizon and until the end, and its cost.
+
+    Until the end they are differences from a reference that is not known so far.
+    """
+    errors, at_end = ({text: search.error_of_run(run, (text,), k) for text in search.references}
+                      for k in (None, -1))
     return {"outcome": NOT_RUN if run.message == LATE else run.outcome, "message": run.message,
             "error": search.error_of_run(run), "errors": errors,
+            "error_at_end": search.error_of_run(run, k=-1), "errors_at_end": at_end,
             "dominated": is_dominated(search, run), **vars(run.cost)}
 
 
 def is_dominated(search, run):
-    """Return whether a setting has at most the error and less CPU time than a run."""
+    """Return whether a setting has at most the error and less CPU time than a run: until the
+    horizon, or until the end where no error is known.
+    """
     if not run.finished:
         return True
-    error, cpu = search.error_of_run(run), run.cost.cpu
-    return any(search.error_of(chosen) <= error and search.observations[chosen].cost.cpu < cpu
-               for chosen in search.settings() if search.observations[chosen].finished)
+    k = search.last or -1
+    error, cpu = search.error_of_run(run, k=k), run.cost.cpu
+    others = [search.observations[chosen] for chosen in search.settings()]
+    return any(search.error_of_run(one, k=k) <= error and one.cost.cpu < cpu
+               for one in others if one.finished)
 
 
 def is_whole(facts):
     """Return whether the errors hold until the end of the run."""
     return facts["until"] >= facts["end"] * (1.0 - 1e-9)
+
+
+def has_errors(facts):
+    """Return whether the errors hold until some time."""
+    return facts["until"] > 0.0
+
+
+def shown_rows(facts, key="rows"):
+    """Return the rows with the errors that are shown: differences from the reference until the end
+    where no error is known.
+    """
+    if has_errors(facts):
+        return facts[key]
+    return [one | {"error": one["error_at_end"]} for one in facts[key]]
 
 
 # in words
@@ -103,17 +136,31 @@ def answer_lines(facts):
 
 
 def front_lines(facts):
-    """Return the table of the settings on the front, and how many others there are."""
-    lines = [] if is_whole(facts) else [f"errors until t = {facts['until']:.4g} s:"]
-    lines.append(f"{'setting':44} {'error':>9} {'CPU [s]':>9} {'particles':>9} {'steps':>7}")
-    shown = [one for one in facts["rows"] if not one["dominated"] and one["error"] is not None]
-    for one in shown:
-        mark = "  <- recommended" if one["best"] else ""
-        lines.append(f"{one['text']:44} {percent(one['error']):>9} {one['cpu'] or 0.0:9.3g} "
-                     f"{one['particles']:9d} {one['steps']:7d}{mark}")
-    outcomes = [one["outcome"] for one in facts["rows"]]
+    """Return the table of the settings on the front, with the scene as given, and how many others
+    there are; where no error is known, with the grids of the reference.
+    """
+    known, rows = has_errors(facts), shown_rows(facts)
+    front = [one for one in rows if not one["dominated"] and is_number(one["error"])]
+    shown = [one for one in rows if one in front or one["as_given"]
+             or (not known and list(one["setting"]) == ["dx"])]
+    lines = [] if is_whole(facts) else [f"errors until t = {facts['until']:.4g} s:" if known else
+                                        "no error is known; differences from the reference "
+                                        "over the whole run:"]
+    lines.append(f"{'setting':44} {'error' if known else 'differs':>9} {'CPU [s]':>9} "
+                 f"{'particles':>9} {'steps':>7}")
+    outcomes = [one["outcome"] for one in rows]
     counts = ", ".join(f"{outcomes.count(word)} {word}" for word in dict.fromkeys(outcomes))
-    return [*lines, f"({len(shown)} settings on the front; of {len(outcomes)} settings {counts})"]
+    number = f"{len(front)} settings on the front; " if known else ""
+    return [*lines, *map(row_line, shown), f"({number}of {len(outcomes)} settings {counts})"]
+
+
+def row_line(one):
+    """Return the line of a row in the table."""
+    marks = [word for key, word in (("best", "recommended"), ("as_given", "as given")) if one[key]]
+    mark = f"  <- {', '.join(marks)}" if marks else ""
+    error = percent(one["error"]) if one["outcome"] == FINISHED else one["outcome"]
+    return (f"{one['text']:44} {error:>9} {one['cpu'] or 0.0:9.3g} {one['particles']:9d} "
+            f"{one['steps']:7d}{mark}")
 
 
 def reference_lines(facts):
@@ -125,9 +172,12 @@ def reference_lines(facts):
     for text in facts["quantities"]:
         reference = facts["references"][text]
         between = ", ".join(percent(value) for value in reference["differences"])
-        lines.append(f"  {text}: known to {percent(reference['error'])} until t = "
-                     f"{facts['until']:.4g} s; differences of grids over the whole run: {between}")
-    if facts["chaos"] is not None and isfinite(facts["chaos"]):
+        error = f"{percent(reference['error'])} until t = {facts['until']:.4g} s"
+        if not has_errors(facts):
+            error = f"{percent(reference['error_at_end'])} over the whole run"
+        lines.append(f"  {text}: known to {error}; differences of grids over the whole run: "
+                     f"{between}")
+    if is_number(facts["chaos"]):
         lines.append(f"  from t = {facts['chaos']:.4g} s on a run perturbed by round-off diverges: "
                      "single paths have no meaning there; ask for profile:x or energies")
     return lines
@@ -136,20 +186,35 @@ def reference_lines(facts):
 def advice_lines(facts):
     """Return the recommendation, or what it would take."""
     if facts["best"] is None:
-        return [f"no setting keeps {percent(facts['error'])}: {shortfall(facts)}"]
+        return [f"no setting keeps {percent(facts['error'])}:",
+                *(f"  {text}" for text in shortfalls(facts)), *least_error_lines(facts),
+                *companion_lines(facts)]
     return [*recommendation(facts), *caveats(facts)]
+
+
+def least_error_lines(facts):
+    """Return the line of what can be asked for the whole run without a finer grid."""
+    if len(facts["grids"]) < 2:
+        return []
+    least = {text: facts["references"][text]["least_error"] for text in facts["quantities"]}
+    texts = [f"{text} at {percent(rounded_up(error))}" if is_number(error) and error < MOST_ERROR
+             else f"{text} at no error below {percent(MOST_ERROR)}"
+             for text, error in least.items()]
+    return [f"what can be asked now for the whole run: {', '.join(texts)} (the reference's own "
+            f"error may be {percent(REFERENCE_PART)} of the error asked)"]
 
 
 def recommendation(facts):
     """Return the recommended setting, and until when it holds."""
     best = next(one for one in facts["rows"] if one["best"])
+    warning = [f"warning: {facts['start_fault']}"] if facts["start_fault"] else []
     margin = max(facts["references"][text]["error"] for text in facts["quantities"])
     lines = [f"recommended: {best['text']}: error {percent(best['error'])} (the reference's own: "
-             f"{percent(margin)}), {best['cpu']:.3g} s of CPU time"]
+             f"{percent(margin)}), {best['cpu']:.3g} s of CPU time", *warning]
     if not is_whole(facts):
         lines += companion_lines(facts)
         lines.append(f"this holds until t = {facts['until']:.4g} s of {facts['end']:.4g} s; for "
-                     f"the whole run: {shortfall(facts)}")
+                     f"the whole run: {'; '.join(shortfalls(facts))}")
     return lines
 
 
@@ -183,44 +248,48 @@ def companion_lines(facts):
     return [f"over the whole run these are known: {texts}; ask for one of them by --quantity"]
 
 
-def shortfall(facts):
-    """Return what it would take to know the quantities for the whole run."""
+def shortfalls(facts):
+    """Return what it would take to know the quantities for the whole run, in some texts."""
     if len(facts["grids"]) < 2:
         own = next((one for one in facts["rows"] if one["setting"] == {"dx": 1.0}), None)
         why = ("" if own is None or own["outcome"] == FINISHED else
                f" (the scene as given: {own['outcome']}: {own['message']})")
-        return f"at least two grids must finish{why}; give a larger --budget"
-    texts = []
+        return [f"at least two grids must finish{why}; give a larger --budget"]
+    asked, texts = REFERENCE_PART * facts["error"], []
     for text in facts["quantities"]:
         reference = facts["references"][text]
         error, order = reference["error_at_end"], reference["order_at_end"]
-        if error is None or not isfinite(error) or order < LEAST:
+        if not is_number(error) or order < LEAST:
             texts.append(f"the grids do not approach one solution of {text} yet (order "
-                         f"{order:.2g}; it is known to {percent(error)}); a larger --budget halves "
-                         "the grid further")
-        elif error > (asked := REFERENCE_PART * facts["error"]):
-            halvings = max(1, int(np.ceil(log2(error / asked) / order)))
+                         f"{order:.2g}; it is known to {percent(error)})")
+        elif error > asked:
+            halvings = max(1, ceil(log2(error / asked) / order))
             finest = facts["grids"][-1] / 2**halvings
             texts.append(f"{text} is known to {percent(error)}; a reference of {percent(asked)} "
-                         f"would take dx = {finest:.3g} m")
-    if texts:
-        return "; ".join(texts)
-    if facts["chaos"] is not None and isfinite(facts["chaos"]):
-        return "chaos ends what can be known"
-    return (f"the finest grid, dx = {facts['grids'][-1]:.3g} m, does not keep the error; a larger "
-            "--budget halves it further")
+                         f"would take dx = {finest:.3g} m, {price_text(facts, halvings)}")
+    if not texts and is_number(facts["chaos"]):
+        return ["chaos ends what can be known"]
+    if not texts:
+        texts.append(f"the finest grid, dx = {facts['grids'][-1]:.3g} m, does not keep the error")
+    return [*texts, next_grid_text(facts)]
+
+
+def is_number(value):
+    """Return whether a value is a finite number, not None."""
+    return value is not None and isfinite(value)
 
 
 def percent(value):
     """Return a relative error as text."""
-    return "unknown" if value is None or not isfinite(value) else f"{100.0 * value:.3g} %"
+    return f"{100.0 * value:.3g} %" if is_number(value) else "unknown"
 
 
-def best_scene(search, name, folder=".", quantities=()):
+def best_scene(search, name, folder=".", quantities=(), fault=""):
     """Return the TOML text of the scene under the recommended setting, for a file in a folder, with
     comments on its error and cost; None without one.
 
-    quantities: records of quantities of interest that the scene as given has.
+    quantities: records of quantities of interest that the scene as given has; fault: sentence of
+    its start, see `start_fault`.
     """
     best = search.best()
     if best is None:
@@ -235,5 +304,6 @@ def best_scene(search, name, folder=".", quantities=()):
         f"{percent(search.reference_error())}.",
         f"Cost: {run.cost.cpu:.3g} s of CPU time, {run.cost.steps} steps, "
         f"{run.cost.particles} particles.",
+        *([f"Warning: {fault}."] if fault else []),
     ]
     return scene_text(head, scene_at(search.scene, best, search.others), folder, quantities)

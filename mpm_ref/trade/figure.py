@@ -3,9 +3,12 @@
 Matplotlib is imported when a figure is made.
 """
 
+from math import inf
+
 from ..store.atomic import replacing
 from ..store.text import figure_text
 from ..sweep.observation import FINISHED
+from .answer import has_errors, percent, shown_rows
 
 COSTS = {"cpu": "CPU time [s]", "wall": "wall time [s]", "memory": "memory [bytes]"}
 LEAST = 1e-8            # an error that is drawn for less, on a logarithmic axis
@@ -24,28 +27,55 @@ def save_figure(facts, path):
 
 def draw_trade(facts):
     """Return a Matplotlib `Figure` of three fronts: filled settings have no other one that is at
-    most as wrong at less cost; crosses at the top failed.
+    most as wrong at less cost; crosses at the top failed. Where no error is known, differences from
+    the reference until the end are drawn, without those of the run that is the reference.
     """
     from matplotlib.figure import Figure
 
     figure = Figure((WIDTH, HEIGHT), layout="constrained")
     panels = figure.subplots(1, len(COSTS), sharey=True)
-    rows = [*facts["rows"], *facts["compared"]]
+    own, compared = drawn_rows(facts, "rows"), drawn_rows(facts, "compared")
+    rows = [*own, *compared]
     errors = [row["error"] for row in rows if row["error"] is not None]
     for axes, (key, label) in zip(panels, COSTS.items(), strict=True):
-        draw_costs(axes, facts["rows"], key)
-        draw_compared(axes, facts["compared"], key)
+        draw_costs(axes, own, key)
+        draw_compared(axes, compared, key)
         axes.axhline(facts["error"], color="0.35", linestyle=":", label="error asked")
         axes.set(xscale="log", yscale="log", xlabel=label, ylim=limits([facts["error"], *errors]),
                  xlim=limits([row[key] for row in rows if (row[key] or 0.0) > 0.0]))
-    panels[0].set_ylabel(f"error of {', '.join(facts['quantities'])}")
-    draw_failures(panels[0], facts["rows"])
+    panels[0].set_ylabel(error_label(facts))
+    draw_failures(panels[0], own)
     handles = {label: handle for axes in panels[:1]
                for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=5,
                   fontsize=8, frameon=False)
-    figure.suptitle(f"{figure_text(facts['scene'])}, until t = {facts['until']:.4g} s", fontsize=10)
+    figure.suptitle(f"{figure_text(facts['scene'])}, {title_text(facts)}", fontsize=10)
     return figure
+
+
+def error_label(facts):
+    """Return the label of the axis of errors."""
+    what, texts = "error" if has_errors(facts) else "difference", facts["quantities"]
+    if len(texts) > 1:
+        return f"largest {what} of {len(texts)} quantities"
+    return f"{what} of {figure_text(texts[0])}"
+
+
+def title_text(facts):
+    """Return what a figure shows, in words."""
+    if has_errors(facts):
+        return f"until t = {facts['until']:.4g} s"
+    if len(facts["grids"]) < 2:
+        return "nothing is known: fewer than two grids finished"
+    own = max(facts["references"][text]["error_at_end"] or inf for text in facts["quantities"])
+    return ("no error is known; differences from the reference over the whole run "
+            f"(its own error: {percent(own)})")
+
+
+def drawn_rows(facts, key):
+    """Return the rows with the errors that are drawn."""
+    rows = shown_rows(facts, key)
+    return rows if has_errors(facts) else [one | {"error": one["error"] or None} for one in rows]
 
 
 def rows_with_error(rows, key):

@@ -56,6 +56,7 @@ class TradeSearch:
     levels: tuple = ()                  # factors of dx of the reference
     chaos: float = np.inf               # [s] from which a perturbed run diverges
     compared_with: str | None = None    # another transfer, which the references' errors include
+    idle: int = 0                       # grids since the last that made the reference better known
 
     def run(self):
         """Make all runs."""
@@ -86,28 +87,26 @@ class TradeSearch:
 
     def refine(self):
         """Halve the grid until the reference is known, stops improving, or the budget says so."""
-        idle = 0                # grids since the last that made it better known
+        self.idle = 0
         while self.levels and (len(self.levels) < GRIDS_OF_REFERENCE
                                or self.horizon() < self.times[-1]):
             chosen, n, before = setting(dx=self.levels[-1] / 2.0), len(self.levels), self.horizon()
-            if not self.is_next_grid(chosen, idle):
+            if not self.is_next_grid(chosen):
                 break
             side_runs = self.side_runs(self.expected_cpu(chosen))
             self.observe([chosen, *side_runs], most_cpu=np.inf)
             self.update_references()
-            idle = idle + 1 if 0.0 < self.horizon() <= before else 0
+            self.idle = self.idle + 1 if 0.0 < self.horizon() <= before else 0
             if len(self.levels) == n:
                 break
 
-    def is_next_grid(self, chosen, idle):
-        """Return whether a finer grid is run for the reference, after `idle` grids that did not
-        make it better known; one that is stored always is.
-        """
+    def is_next_grid(self, chosen):
+        """Return whether a finer grid is run for the reference; one that is stored always is."""
         if chosen.get("dx") < self.finest:
             return False
         if self.runs.has(RunRequest(self._scene_at(chosen))):
             return True
-        helps = idle <= PATIENCE or len(self.levels) < GRIDS_OF_REFERENCE
+        helps = self.idle <= PATIENCE or len(self.levels) < GRIDS_OF_REFERENCE
         return helps and self.expected_cpu(chosen) <= REFERENCE_SHARE * self.runs.left
 
     def side_runs(self, cpu):
@@ -141,15 +140,19 @@ class TradeSearch:
 
     def time_of_divergence(self):
         """Return the time [s] at which the perturbed run leaves the scene's; infinite if never."""
+        diverged = np.any([self.divergence(text) > DIVERGED * self.error
+                           for text in self.quantities], axis=0)
+        return float(self.times[np.argmax(diverged)]) if diverged.any() else np.inf
+
+    def divergence(self, text):
+        """Return the relative difference so far (T,) of the perturbed run from the scene's; zero
+        where one of them did not finish.
+        """
         a = self.observations.get(setting(dx=1.0))
         b = self.observations.get(PERTURBED)
         if not (a and b and a.finished and b.finished):
-            return np.inf
-        diverged = np.zeros(len(self.times), dtype=bool)
-        for text in self.quantities:
-            q, p = a.values[text], b.values[text]
-            diverged |= difference_so_far(p, q) > DIVERGED * self.error * largest_change(q)
-        return float(self.times[np.argmax(diverged)]) if diverged.any() else np.inf
+            return np.zeros(len(self.times))
+        return difference_so_far(b.values[text], a.values[text]) / largest_change(a.values[text])
 
     def compare_families(self):
         """Raise the references' errors where another transfer approaches another solution.
@@ -202,11 +205,13 @@ class TradeSearch:
         run = self.observations.get(chosen)
         return np.inf if run is None else self.error_of_run(run, texts)
 
-    def error_of_run(self, run, texts=None):
-        """Return the error of a `RunObservation`, as `error_of` does of a setting's."""
+    def error_of_run(self, run, texts=None, k=None):
+        """Return the error of a `RunObservation`, as `error_of` does of a setting's; until another
+        time than the horizon where its index k is given.
+        """
         if not run.finished or not self.references:
             return np.inf
-        return float(self.errors_of_run(run, texts)[self.last])
+        return float(self.errors_of_run(run, texts)[self.last if k is None else k])
 
     def errors_of_run(self, run, texts=None):
         """Return the largest error (T,) until each time of a run that finished."""
@@ -216,6 +221,14 @@ class TradeSearch:
     def reference_error(self):
         """Return the largest error of the references until the horizon."""
         return max(float(self.references[text].error[self.last]) for text in self.quantities)
+
+    def least_error(self, text):
+        """Return the least error for which a quantity is known for the whole run by the grids that
+        finished.
+        """
+        own = self.references[text].error[-1]
+        finest = self.error_of_run(self.observations[setting(dx=self.levels[-1])], (text,), -1)
+        return float(max(own / REFERENCE_PART, own + finest, self.divergence(text)[-1] / DIVERGED))
 
     def keeps(self, chosen):
         """Return whether a setting keeps the error asked, that of the reference included."""

@@ -1,12 +1,15 @@
 import json
+import shutil
 
 import numpy as np
 import pytest
 from command_line import assert_told, mpm_ref
+from offline_page import facts_of
 from sweep_scenes import FLIGHT
 
 from mpm_ref.cli.sweep_options import parse_budget, parse_error
 from mpm_ref.scene import load
+from mpm_ref.trade import answer
 from mpm_ref.trade.search import TradeSearch
 
 FAST = "--budget", "60s", "--workers", "1", "--quiet"
@@ -41,6 +44,14 @@ def test_a_second_call_makes_no_run_again(folder):
     assert json.loads(done.stdout)["best"] is not None
     again = {file: file.stat().st_mtime_ns for file in (folder / "flight.trade").iterdir()}
     assert {file: again[file] for file in stored} == stored
+
+
+def test_a_bad_start_is_told_and_written(folder, tmp_path, monkeypatch):
+    shutil.copytree(folder / "flight.trade", tmp_path / "flight.trade")
+    monkeypatch.setattr(answer, "start_fault", lambda search, chosen: "a face is off")
+    done = mpm_ref("trade", folder / "flight.toml", "--error", "4%", "--out", tmp_path, *FAST)
+    assert "warning: a face is off\n" in done.stdout
+    assert "# Warning: a face is off.\n" in (tmp_path / "flight.best.toml").read_text()
 
 
 def test_a_similar_scene_answers_without_a_run(folder):
@@ -185,6 +196,12 @@ def test_without_a_budget_there_is_no_answer(folder, tmp_path):
     assert done.exit_code == 1
     assert "no setting keeps" in done.stdout
     assert not (tmp_path / "flight.best.toml").exists()
+    facts = json.loads((tmp_path / "flight.trade.json").read_text())
+    assert facts["advice"][0] == "no setting keeps 0.0001 %:"
+    assert all(line in done.stdout.splitlines() for line in facts["advice"])
+    page = (tmp_path / "flight.trade.html").read_text()
+    assert facts_of(page)["advice"] == facts["advice"]
+    assert 'el("advice").replaceChildren(...paragraphs(facts.advice))' in page
 
 
 @pytest.mark.parametrize(("option", "value", "word"), [

@@ -8,17 +8,21 @@ from offline_page import HOSTILE, assert_holds
 from mpm_ref.cli.terminal import as_json
 from mpm_ref.scene import loads
 from mpm_ref.store.page import page_of
+from mpm_ref.sweep.difference import difference_so_far
 from mpm_ref.sweep.observation import STOPPED, RunCost, RunObservation
 from mpm_ref.sweep.runs import LATE
 from mpm_ref.sweep.setting import setting
 from mpm_ref.trade.answer import (
     NOT_RUN,
+    advice_lines,
     answer_lines,
     answer_of,
     best_scene,
     is_whole,
-    shortfall,
+    percent,
+    shortfalls,
 )
+from mpm_ref.trade.cost import rounded_up
 
 
 def facts_of(runs=None, error=0.01):
@@ -57,11 +61,77 @@ def test_without_an_answer_words_say_what_it_would_take():
     _, facts = facts_of(ModelRuns(order=0.2))
     text = "\n".join(answer_lines(facts))
     assert facts["best"] is None
-    assert "no setting keeps 1 %" in text
+    assert "no setting keeps 1 %:" in text
     assert "do not approach one solution" in text
     _, facts = facts_of(ModelRuns(left=20.0), error=1e-3)
     text = "\n".join(answer_lines(facts))
     assert re.search(r"a reference of 0\.05 % would take dx = \S+ m", text)
+
+
+def test_without_a_known_error_the_differences_of_the_grids_are_given():
+    search, facts = facts_of(ModelRuns(order=0.2))
+    assert facts["until"] == 0.0
+    finest = search.observations[setting(dx=search.levels[-1])].values["positions"]
+    for row in facts["rows"]:
+        chosen = setting(**row["setting"])
+        difference = difference_so_far(search.observations[chosen].values["positions"], finest)
+        expected = difference[-1] / search.references["positions"].scale[-1]
+        assert row["error"] is None
+        assert row["error_at_end"] == row["errors_at_end"]["positions"] == pytest.approx(expected)
+    head, _, *table = answer_lines(facts)
+    assert head == "no error is known; differences from the reference over the whole run:"
+    for factor in search.levels:
+        shown, = (line for line in table if line.startswith(f"dx x {factor:.4g} "))
+        row, = (one for one in facts["rows"] if one["setting"] == {"dx": factor})
+        assert f" {percent(row['error_at_end'])} " in shown
+    text = "\n".join(answer_lines(facts))
+    assert "unknown" not in text
+    assert "positions: known to " in text
+    assert "on the front" not in text
+
+
+def test_dominance_without_a_known_error_is_by_differences_until_the_end():
+    _, facts = facts_of(ModelRuns(order=0.2))
+    for row in facts["rows"]:
+        better = [one for one in facts["rows"] if one["error_at_end"] <= row["error_at_end"]
+                  and one["cpu"] < row["cpu"]]
+        assert row["dominated"] == bool(better)
+
+
+def test_the_advice_stands_in_the_facts_and_says_what_can_be_asked():
+    _, facts = facts_of(ModelRuns(left=20.0), error=1e-3)
+    assert facts["advice"] == advice_lines(facts)
+    least = rounded_up(facts["references"]["positions"]["least_error"])
+    assert f"can be asked now for the whole run: positions at {percent(least)} " in "\n".join(
+        facts["advice"])
+    _, facts = facts_of(ModelRuns(order=0.0), error=1e-3)
+    facts["references"]["positions"]["least_error"] = 1.2
+    assert "positions at no error below 100 %" in "\n".join(advice_lines(facts))
+
+
+def test_the_scene_as_given_is_always_in_the_table():
+    for runs in (ModelRuns(), ModelRuns(order=0.2), ModelRuns(left=0.0)):
+        _, facts = facts_of(runs)
+        lines = [line for line in answer_lines(facts) if "as given" in line]
+        assert len(lines) == 1
+        assert lines[0].startswith("dx x 1 ")
+        assert lines[0].endswith("as given")
+    runs.fails = lambda text: text == "dx x 1"
+    _, facts = facts_of(runs)
+    line, = (line for line in answer_lines(facts) if line.endswith("<- as given"))
+    assert "refused" in line
+
+
+def test_a_bad_start_is_told_beside_the_recommendation_and_in_its_scene():
+    search, facts = facts_of()
+    assert facts["start_fault"] == ""
+    assert not [line for line in answer_lines(facts) if line.startswith("warning")]
+    assert "Warning" not in best_scene(search, "toy")
+    facts["start_fault"] = "at the start, a face is off"
+    assert "warning: at the start, a face is off" in answer_lines(facts)
+    text = best_scene(search, "toy", fault=facts["start_fault"])
+    assert "\n# Warning: at the start, a face is off.\n" in text
+    loads(text)
 
 
 def test_words_say_until_when_the_errors_of_the_table_hold():
@@ -93,9 +163,8 @@ def test_words_say_what_was_not_tried_and_not_checked():
 def test_words_name_the_reason_that_ends_what_is_known():
     _, facts = facts_of()
     facts["references"]["positions"]["error_at_end"] = 0.001
-    assert "the finest grid" in shortfall(facts)
-    assert "chaos" not in shortfall(facts)
-    assert shortfall(facts | {"chaos": 0.5}) == "chaos ends what can be known"
+    assert "the finest grid" in shortfalls(facts)[0]
+    assert shortfalls(facts | {"chaos": 0.5}) == ["chaos ends what can be known"]
 
 
 def test_words_say_why_no_grid_finished():
@@ -143,6 +212,13 @@ def test_the_page_holds_the_facts_and_loads_nothing():
     _, facts = facts_of()
     facts["scene"] = facts["rows"][0]["message"] = HOSTILE
     assert_holds(page_of(facts, "trade"), facts)
+
+
+@pytest.mark.parametrize("command", ["trade", "limits", "needs"])
+def test_a_page_without_javascript_names_the_file_of_its_numbers(command):
+    body = page_of({}, command).partition("<body>")[2]
+    sentence = re.search(r"<noscript><p>(.*)</p></noscript>", body)[1]
+    assert f"<code>.{command}.json</code>" in sentence
 
 
 def test_a_page_of_a_number_that_is_not_finite_is_refused():

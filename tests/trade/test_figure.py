@@ -62,10 +62,32 @@ def test_a_figure_that_cannot_be_written_is_an_error(facts, tmp_path):
         save_figure(facts, tmp_path / "none" / "toy.trade.png")
 
 
-def test_nothing_known_is_drawn_too():
+def test_without_a_known_error_differences_from_the_reference_are_drawn():
     search = search_of(ModelRuns(order=0.2))
     search.run()
-    draw_trade(json.loads(as_json(answer_of(search, "toy"))))
+    facts = json.loads(as_json(answer_of(search, "toy")))
+    figure = draw_trade(facts)
+    axes = figure.axes[0]
+    drawn = np.concatenate([points(axes, "front"), points(axes, "dominated")])
+    expected = [[row["cpu"], row["error_at_end"]] for row in facts["rows"] if row["error_at_end"]]
+    assert len(expected) == len(facts["rows"]) - 1      # the finest grid is the reference
+    assert sorted(drawn.tolist()) == sorted(expected)
+    assert axes.get_ylabel() == "difference of positions"
+    assert "no error is known" in figure.get_suptitle()
+
+
+def test_a_figure_of_nothing_says_so():
+    runs = ModelRuns()
+    runs.fails = lambda text: True
+    search = search_of(runs)
+    search.run()
+    figure = draw_trade(json.loads(as_json(answer_of(search, "toy"))))
+    assert "fewer than two grids finished" in figure.get_suptitle()
+
+
+def test_many_quantities_are_counted_on_the_axis(facts):
+    facts["quantities"] = ["positions", "kinetic"]
+    assert draw_trade(facts).axes[0].get_ylabel() == "largest error of 2 quantities"
 
 
 def test_failures_beside_one_setting_are_drawn_without_a_warning(facts, recwarn):
