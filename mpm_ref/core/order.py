@@ -1,7 +1,8 @@
 """Order of particles for a scatter that is parallel and yet gives the same bits for any number of
 threads.
 
-The box of cells is cut along the first axis into slabs of as many cells as the degree, at least 2.
+The box of cells is cut into slabs of as many cells as the degree, at least 2: across the first
+axis, in whose order the particles lie, unless that gives few slabs and another axis is far longer.
 A particle whose base cell is in a slab writes nodes of that slab and at most `degree` beyond, so
 slabs of the same colour (every other one) share no node. Within a slab the particles keep their
 order. A physical sort by cell, now and then, keeps memory access local.
@@ -15,6 +16,9 @@ from .jit import CHUNKS, chunk, kernel, parallel, prange
 from .spline import base_of
 from .stencil import locate
 from .tensor import vec
+
+ENOUGH = 64         # slabs, 32 of a colour, which many threads can share
+FAR_LONGER = 2      # times as long as the first axis
 
 
 class Slabs(NamedTuple):
@@ -30,45 +34,55 @@ def slab_width(stencil):
     return max(len(stencil) - 1, 2)
 
 
-@kernel
-def _slab_of(x, p, grid, stencil):
-    return (base_of(x[p, 0], grid.dx, stencil) - grid.origin[0]) // slab_width(stencil)
+def slab_axis(shape, width):
+    """Return the axis across which a box of nodes is cut into slabs of `width` cells: the first,
+    unless it has at most half of `ENOUGH` slabs and another is `FAR_LONGER`.
+    """
+    longest = int(np.argmax(shape))
+    return longest if FAR_LONGER * shape[0] <= min(shape[longest], ENOUGH * width) else 0
 
 
 @kernel
-def _count(x, grid, stencil, count, bounds):
+def _slab_of(x, p, grid, stencil, axis):
+    return (base_of(x[p, axis], grid.dx, stencil) - grid.origin[axis]) // slab_width(stencil)
+
+
+@kernel
+def _count(x, grid, stencil, axis, count, bounds):
     for p in range(bounds[0], bounds[1]):
-        count[_slab_of(x, p, grid, stencil)] += 1
+        count[_slab_of(x, p, grid, stencil, axis)] += 1
 
 
 @kernel
-def _place(x, grid, stencil, at, order, bounds):
+def _place(x, grid, stencil, axis, at, order, bounds):
     for p in range(bounds[0], bounds[1]):
-        a = _slab_of(x, p, grid, stencil)
+        a = _slab_of(x, p, grid, stencil, axis)
         order[at[a]] = p
         at[a] += 1
 
 
 @parallel
-def _count_all(x, grid, stencil, count):
+def _count_all(x, grid, stencil, axis, count):
     for c in prange(CHUNKS):
-        _count(x, grid, stencil, count[c], chunk(c, len(x)))
+        _count(x, grid, stencil, axis, count[c], chunk(c, len(x)))
 
 
 @parallel
-def _place_all(x, grid, stencil, at, order):
+def _place_all(x, grid, stencil, axis, at, order):
     for c in prange(CHUNKS):
-        _place(x, grid, stencil, at[c], order, chunk(c, len(x)))
+        _place(x, grid, stencil, axis, at[c], order, chunk(c, len(x)))
 
 
 def slabs_of(x, grid, stencil):
     """Stable counting sort of the particles at x (N, d) by slab. All must lie inside the grid."""
-    n_slabs = -(-grid.m.shape[0] // slab_width(stencil))
+    width = slab_width(stencil)
+    axis = slab_axis(grid.m.shape, width)
+    n_slabs = -(-grid.m.shape[axis] // width)
     count = np.zeros((CHUNKS, n_slabs), dtype=np.int64)
-    _count_all(x, grid, stencil, count)
+    _count_all(x, grid, stencil, axis, count)
     ends = np.cumsum(count.T.ravel()).reshape(n_slabs, CHUNKS)     # by slab, then by chunk
     order = np.empty(len(x), dtype=np.int64)
-    _place_all(x, grid, stencil, np.ascontiguousarray((ends - count.T).T), order)
+    _place_all(x, grid, stencil, axis, np.ascontiguousarray((ends - count.T).T), order)
     return Slabs(order, np.concatenate(([0], ends[:, -1])))
 
 
