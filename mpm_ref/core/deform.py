@@ -118,8 +118,7 @@ def radial_return(F, eps, y, law, flow):
     if dgamma > 0.0:
         flowed = scale(-dgamma / size, eps_hat)
         F, eps = mm(exponential(flowed, dgamma), F), mlin(1.0, eps, 1.0, flowed)
-    tau = kirchhoff_of_strain(eps, law)
-    return F, scale(intact(y, flow), tau), y
+    return F, kirchhoff_of_strain(eps, law), y
 
 
 @kernel

@@ -8,7 +8,8 @@ they are handed.
 
 A radial return map takes dgamma dev eps/|dev eps| from the Hencky strain eps = log(F F^T)/2, or
 releases all of it. `plastic_strain` returns dgamma, not above 0 inside the surface; y'; and whether
-all of eps is released. Such a flow has the field `s_min`, the least stretch of a trial F.
+all of eps is released, as it is where the material has failed. Such a flow has the field `s_min`,
+the least stretch of a trial F.
 
 The adjoint of a return map s, y -> s', y': `project_vjp` turns bars = (s'_bar, y'_bar) at state =
 (s, y) into (s_bar, y_bar), the bars of all parameters (the law's, then the flow's, in the order of

@@ -17,9 +17,9 @@ from math import factorial
 from .jit import kernel, leaf
 from .tensor import cofactor, det, dot, inner, mlin, mmt, plus_diagonal, scale, trace
 
-RADIUS = 0.45           # |eps| below which the quadrature is exact to round-off
+RADIUS = 0.45           # |eps| below which the quadrature with many nodes errs by round-off alone
 LEAST_STRETCH = 0.637   # every singular value of F is larger where |eps| < RADIUS
-SMALL = 0.05            # |A| and |N| below which few terms are
+SMALL = 0.05            # |A| and |N| below which few nodes and terms suffice
 LARGEST = 4.0           # trace of A up to which the quadrature tells whether |eps| < RADIUS
 
 FEW = (
