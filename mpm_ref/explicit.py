@@ -231,6 +231,8 @@ def deform_body(body, dt):
         deform.elastic(particles, law, dt, like)
     elif type(flow) in returned.methods:
         deform.full(particles, law, flow, dt, like)
+    elif deform.is_radial(law, flow):
+        deform.radial(particles, law, flow, dt, like)
     else:
         deform.plastic(particles, law, flow, dt, like)
 

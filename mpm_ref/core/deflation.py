@@ -12,7 +12,7 @@ stay in the range of floats.
 from math import copysign, sqrt
 
 from .jit import leaf
-from .tensor import cross, det, inner, lin, norm
+from .tensor import cross, det, inner, lin, norm, plus_diagonal
 
 NEGLIGIBLE = 1e-40      # of one square against another: far below round-off
 NO_LENGTH = 1e-200      # a square too small for its root to have a direction; negligible as well
@@ -36,16 +36,6 @@ def separated(A):
     sign = r if largest else -r
     B = times(sign, D[0]), times(sign, D[1]), times(sign, D[2])
     return null_vector(plus_diagonal(B, -largest_root(min(abs(d), 2.0)))), largest
-
-
-@leaf
-def plus_diagonal(A, c):
-    """A + c I, 3 x 3."""
-    return (
-        (A[0][0] + c, A[0][1], A[0][2]),
-        (A[1][0], A[1][1] + c, A[1][2]),
-        (A[2][0], A[2][1], A[2][2] + c),
-    )
 
 
 @leaf

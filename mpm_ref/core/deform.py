@@ -3,15 +3,43 @@
     F_trial = (I + dt L) F,   F = project(F_trial),   tau = kirchhoff(F)
 
 as in NSF-alg-mpm step 3, LDM-sec2.2-Frate and NCLAW-alg1.
-Four passes, by what the law needs: J alone (no F is carried), F without a return map, F with
+Five passes, by what the law needs: J alone (no F is carried), F without a return map, F with
 one. Return maps act on the singular values: F_trial = U diag(s) V^T becomes U diag(s_new) V^T,
 and tau = U diag(kirchhoff_hat(s_new)) U^T. The fourth is for those that act on the whole of F.
+The fifth is for radial return maps on Hencky's law, which need no singular values while strains
+are moderate: eps = log(F_trial F_trial^T)/2 becomes eps_new, F = exp(eps_new - eps) F_trial.
 """
 
+from math import sqrt
+
 from .jit import CHUNKS, chunk, kernel, parallel, prange
-from .law import intact, kirchhoff, kirchhoff_hat, pressure, project, returned
-from .spectral import svd
-from .tensor import det, identity, lin, mat, mlin, mm, mmt, put_mat, scale_columns
+from .law import (
+    intact,
+    kirchhoff,
+    kirchhoff_hat,
+    kirchhoff_of_strain,
+    plastic_strain,
+    pressure,
+    project,
+    returned,
+)
+from .logarithm import LEAST_STRETCH, exponential, hencky_strain
+from .spectral import rotation, svd
+from .tensor import (
+    det,
+    identity,
+    inner,
+    lin,
+    mat,
+    mlin,
+    mm,
+    mmt,
+    plus_diagonal,
+    put_mat,
+    scale,
+    scale_columns,
+    trace,
+)
 
 
 @kernel
@@ -44,14 +72,53 @@ def deform_plastic(particles, law, flow, dt, like, bounds):
     """F <- U diag(s') V^T of (I + dt L) F = U diag(s) V^T with s', y' = project(s, y)."""
     for p in range(bounds[0], bounds[1]):
         F = mm(growth(particles.L, p, dt, like), mat(particles.F, p, like))
-        U, s, V, _ = svd(F)
-        s, y = project(s, recall(particles.y, p), dt, law, flow)
-        tau = kirchhoff_hat(s, law)
+        F, tau, y = principal_return(F, recall(particles.y, p), dt, law, flow)
         remember(particles.y, p, y)
-        tau = lin(intact(y, flow), tau, 0.0, tau)
-        F, tau = mmt(scale_columns(U, s), V), mmt(scale_columns(U, tau), U)
         put_mat(particles.F, p, F)
         put_mat(particles.tau, p, tau)
+
+
+@kernel
+def deform_radial(particles, law, flow, dt, like, bounds):
+    """F <- exp(eps' - eps) F of (I + dt L) F with eps' the radial return of eps; or as
+    `deform_plastic`, where strains are large or singular values may need a lift to s_min.
+    """
+    for p in range(bounds[0], bounds[1]):
+        F = mm(growth(particles.L, p, dt, like), mat(particles.F, p, like))
+        y = recall(particles.y, p)
+        eps, moderate = hencky_strain(F)
+        if moderate and flow.s_min < LEAST_STRETCH:
+            F, tau, y = radial_return(F, eps, y, law, flow)
+        else:
+            F, tau, y = principal_return(F, y, dt, law, flow)
+        remember(particles.y, p, y)
+        put_mat(particles.F, p, F)
+        put_mat(particles.tau, p, tau)
+
+
+@kernel
+def principal_return(F, y, dt, law, flow):
+    """F, tau and y after a return map of singular values."""
+    U, s, V, _ = svd(F)
+    s, y = project(s, y, dt, law, flow)
+    tau = kirchhoff_hat(s, law)
+    tau = lin(intact(y, flow), tau, 0.0, tau)
+    return mmt(scale_columns(U, s), V), mmt(scale_columns(U, tau), U), y
+
+
+@kernel
+def radial_return(F, eps, y, law, flow):
+    """F, tau and y after a radial return map of the strain eps of F."""
+    tr = trace(eps)
+    eps_hat = plus_diagonal(eps, -tr * (1.0 / len(F)))
+    size = sqrt(inner(eps_hat, eps_hat))
+    dgamma, y, released = plastic_strain(len(F), tr, size, y, law, flow)
+    if released:
+        return rotation(F), scale(0.0, eps), y
+    if dgamma > 0.0:
+        flowed = scale(-dgamma / size, eps_hat)
+        F, eps = mm(exponential(flowed, dgamma), F), mlin(1.0, eps, 1.0, flowed)
+    return F, kirchhoff_of_strain(eps, law), y
 
 
 @kernel
@@ -114,6 +181,18 @@ def plastic(particles, law, flow, dt, like):
     """`deform_plastic` for all particles. `like` is any tuple of length d."""
     for c in prange(CHUNKS):
         deform_plastic(particles, law, flow, dt, like, chunk(c, len(particles.x)))
+
+
+def is_radial(law, flow):
+    """Return whether `radial` is for the law and the flow: it has their formulas in strains."""
+    return type(law) in kirchhoff_of_strain.methods and type(flow) in plastic_strain.methods
+
+
+@parallel
+def radial(particles, law, flow, dt, like):
+    """`deform_radial` for all particles. `like` is any tuple of length d."""
+    for c in prange(CHUNKS):
+        deform_radial(particles, law, flow, dt, like, chunk(c, len(particles.x)))
 
 
 @parallel

@@ -6,6 +6,11 @@ in Pa. Laws register their functions here (`kirchhoff.method(FixedCorotated, ...
 over particles, which know no material, can call `kirchhoff(F, law)` and be compiled for the law
 they are handed.
 
+A radial return map takes dgamma dev eps/|dev eps| from the Hencky strain eps = log(F F^T)/2, or
+releases all of it. `plastic_strain` returns dgamma, not above 0 inside the surface; y'; and whether
+all of eps is released, as it is where the material has failed. Such a flow has the field `s_min`,
+the least stretch of a trial F.
+
 The adjoint of a return map s, y -> s', y': `project_vjp` turns bars = (s'_bar, y'_bar) at state =
 (s, y) into (s_bar, y_bar), the bars of all parameters (the law's, then the flow's, in the order of
 their fields), and the share of the deviator that the return leaves, 1 where nothing flows.
@@ -23,6 +28,8 @@ kirchhoff_hat = by_type("kirchhoff_hat")  # (s, law) -> principal Kirchhoff stre
 psi_volume = by_type("psi_volume")        # (J, law) -> energy density of a law that needs J only
 pressure = by_type("pressure")            # (J, law) -> isotropic tau of a law that needs J only
 project = by_type("project")              # (s, y, dt, law, flow) -> s, y after the return map
+plastic_strain = by_type("plastic_strain")  # (d, tr eps, |dev eps|, y, law, flow) -> see above
+kirchhoff_of_strain = by_type("kirchhoff_of_strain")    # (eps, law) -> tau of a Hencky strain
 returned = by_type("returned")            # (F, flow) -> F of a return map that is no function of s
 intact = by_type("intact")                # (y, flow) -> 1.0, or 0.0 where the material has failed
 

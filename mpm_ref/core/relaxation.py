@@ -1,4 +1,4 @@
-"""How v and C of a particle relax to those of the grid, where the grid carries its old velocity.
+"""Relaxation of a particle's v and C to those of a grid that carries its old velocity.
 
 The lag of a particle is what it has and the grid's old velocity does not give it; a share `flip` of
 it stays (FLIP, and affine transfers with a relaxation time; docs/explanation/transfers.md).

@@ -135,6 +135,34 @@ def mlin(a, A, b, B):
 
 
 @kernel
+def scale(a, A):
+    """a A of a matrix."""
+    if len(A) == 2:
+        (p, q), (r, s) = A
+        return (a * p, a * q), (a * r, a * s)
+    else:
+        x, y, z = A
+        return (
+            (a * x[0], a * x[1], a * x[2]),
+            (a * y[0], a * y[1], a * y[2]),
+            (a * z[0], a * z[1], a * z[2]),
+        )
+
+
+@kernel
+def plus_diagonal(A, c):
+    """A + c I of a matrix."""
+    if len(A) == 2:
+        return (A[0][0] + c, A[0][1]), (A[1][0], A[1][1] + c)
+    else:
+        return (
+            (A[0][0] + c, A[0][1], A[0][2]),
+            (A[1][0], A[1][1] + c, A[1][2]),
+            (A[2][0], A[2][1], A[2][2] + c),
+        )
+
+
+@kernel
 def outer(x, y):
     """Return x y^T."""
     if len(x) == 2:

@@ -56,7 +56,7 @@ def scatter_lines(particles, grid, stencil, dt, members):
 
 @kernel
 def scatter_lines_mls(particles, grid, stencil, dt, members):
-    """`transfer.scatter_mls`."""
+    """`transfer.scatter_mls`, the MLS form."""
     m, v, f = grid.m.reshape(-1), grid.v.reshape(-1), grid.f.reshape(-1)
     n = strides(grid.m)
     for p in members:
@@ -112,7 +112,7 @@ def gather_lines(particles, grid, stencil, dt, flip, bounds):
 
 @kernel
 def gather_lines_mls(particles, grid, stencil, dt, flip, bounds):
-    """`transfer.gather_mls`."""
+    """`transfer.gather_mls`, the MLS form."""
     v, n = grid.v.reshape(-1), strides(grid.m)
     scale = grid.dx * inverse_inertia(grid.dx, stencil)
     for p in range(bounds[0], bounds[1]):

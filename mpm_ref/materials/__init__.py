@@ -83,14 +83,15 @@ for _law, _file in ((FixedCorotated, fixed_corotated), (Hencky, hencky),
     for _function in _OF_LAWS:
         _function.method(_law, getattr(_file, _function.__name__))
     law.kirchhoff_vjp.method(_law, principal.kirchhoff_vjp)
+law.kirchhoff_of_strain.method(Hencky, hencky.kirchhoff_of_strain)
 law.pressure.method(Fluid, fluid.pressure)
 law.d_pressure.method(Fluid, fluid.d_pressure)
 law.psi_volume.method(Fluid, fluid.psi_volume)
 
 for _flow, _file, _project, _project_vjp, _intact in (
     (VonMises, von_mises, von_mises.project, von_mises.project_vjp, von_mises.intact),
-    (Hardening, von_mises, von_mises.harden, von_mises.harden_vjp, von_mises.intact),
-    (Softening, von_mises, von_mises.soften, von_mises.soften_vjp, von_mises.carries),
+    (Hardening, von_mises, von_mises.project, von_mises.harden_vjp, von_mises.intact),
+    (Softening, von_mises, von_mises.project, von_mises.soften_vjp, von_mises.carries),
     *((_flow, _file, _file.project, _file.project_vjp, _file.intact) for _flow, _file in (
         (NoFlow, no_flow),
         (DruckerPrager, drucker_prager),
@@ -104,3 +105,11 @@ for _flow, _file, _project, _project_vjp, _intact in (
     law.project_vjp.method(_flow, _project_vjp)
     law.gap_ratio.method(_flow, _file.gap_ratio)
     law.intact.method(_flow, _intact)
+
+for _flow, _plastic_strain in (
+    (DruckerPrager, drucker_prager.plastic_strain),
+    (VonMises, von_mises.plastic_strain),
+    (Hardening, von_mises.harden),
+    (Softening, von_mises.soften),
+):
+    law.plastic_strain.method(_flow, _plastic_strain)

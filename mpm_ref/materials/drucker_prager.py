@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from ..core.jit import kernel
 from ..core.tensor import fill, lin, mul, norm, total_of
-from .log_strain import deviator, lifted, log_strain, stretches
+from .log_strain import deviator, lifted, log_strain, radial_return, stretches
 from .log_strain_adjoint import lifted_vjp, log_gap_ratio, log_strain_vjp, radial_vjp
 from .moduli import least_stretch
 from .no_flow import never_fails
@@ -55,17 +55,15 @@ def slope(friction_angle, dim):
 @kernel
 def project(s, y, dt, law, flow):
     """Return the singular values after the return; y as it is."""
-    s = lifted(s, flow.s_min)
-    eps = log_strain(s)
-    eps_hat = deviator(eps)
-    size, tr = norm(eps_hat), total_of(eps)
-    dgamma = size + steepness(len(s), law, flow) * tr
-    if tr > 0.0:
-        return fill(1.0, s), y
-    elif dgamma > 0.0:
-        return stretches(lin(1.0, eps, -dgamma / size, eps_hat)), y
-    else:
-        return s, y
+    return radial_return(lifted(s, flow.s_min), y, dt, law, flow)
+
+
+@kernel
+def plastic_strain(d, tr, size, y, law, flow):
+    """Return dgamma of tr = tr eps and size = |eps_hat| in d dimensions; y; whether tr > 0, the
+    tip.
+    """
+    return size + steepness(d, law, flow) * tr, y, tr > 0.0
 
 
 @kernel

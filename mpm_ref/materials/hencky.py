@@ -12,8 +12,23 @@ from math import inf, log1p
 from typing import NamedTuple
 
 from ..core.jit import kernel
+from ..core.logarithm import hencky_strain
 from ..core.spectral import svd
-from ..core.tensor import diag, dot, fill, lin, mlin, mmt, mul, outer, scale_columns, total_of
+from ..core.tensor import (
+    diag,
+    dot,
+    fill,
+    lin,
+    mlin,
+    mmt,
+    mul,
+    outer,
+    plus_diagonal,
+    scale,
+    scale_columns,
+    total_of,
+    trace,
+)
 from . import principal
 from .log_strain import log_strain
 from .moduli import lame
@@ -68,8 +83,17 @@ def kirchhoff(F, law):
     """Return the Kirchhoff stress U diag(kirchhoff_hat(s)) U^T [Pa] (NSF-eq13); NaN unless det F >
     0.
     """
+    eps, moderate = hencky_strain(F)
+    if moderate:
+        return kirchhoff_of_strain(eps, law)
     U, s, _, _ = svd(F)
     return mmt(scale_columns(U, kirchhoff_hat(s, law)), U)
+
+
+@kernel
+def kirchhoff_of_strain(eps, law):
+    """Return the Kirchhoff stress 2 mu eps + lam tr(eps) I [Pa] of eps = log(F F^T)/2."""
+    return plus_diagonal(scale(2.0 * law.mu, eps), law.lam * trace(eps))
 
 
 @kernel

@@ -3,6 +3,7 @@
 from math import exp, inf, log
 
 from ..core.jit import kernel
+from ..core.law import plastic_strain
 from ..core.tensor import fill, lin, norm, total_of
 from .stretches import positive_stretches
 
@@ -60,20 +61,22 @@ def lifted(s, s_min):
 
 
 @kernel
-def radial_return(s, tau_y, law, s_min):
-    """Return the singular values on the surface |dev tau| = 2 mu |eps_hat| = tau_y, and dgamma; s,
-    0 inside.
+def radial_return(s, y, dt, law, flow):
+    """Return the singular values after the return, s inside the surface, 1 where all strain is
+    released; and y.
 
-        dgamma = |eps_hat| - tau_y / (2 mu)                 (NSF-F4, NCLAW-eq18)
-        eps   <- eps - dgamma eps_hat / |eps_hat|           (NSF-F4, NCLAW-eq19)
+        eps <- eps - dgamma eps_hat / |eps_hat|           (NSF-F3, NSF-F4, NCLAW-eq16, NCLAW-eq19)
 
-    NSF-F4 prints |eps| for the denominator |eps_hat|, with which the return misses the surface.
+    dgamma is that of `plastic_strain`. NSF-F4 prints |eps| for the denominator |eps_hat|, with
+    which the return misses the surface.
     """
-    eps = log_strain(lifted(s, s_min))
+    eps = log_strain(lifted(s, flow.s_min))
     eps_hat = deviator(eps)
     size = norm(eps_hat)
-    dgamma = size - tau_y / (2.0 * law.mu)
-    if dgamma > 0.0:
-        return stretches(lin(1.0, eps, -dgamma / size, eps_hat)), dgamma
+    dgamma, y, released = plastic_strain(len(s), total_of(eps), size, y, law, flow)
+    if released:
+        return fill(1.0, s), y
+    elif dgamma > 0.0:
+        return stretches(lin(1.0, eps, -dgamma / size, eps_hat)), y
     else:
-        return s, 0.0
+        return s, y

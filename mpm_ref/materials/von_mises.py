@@ -9,8 +9,8 @@ fails (`Softening`: cake). Where the yield stress of a paper is that of uniaxial
 from typing import NamedTuple
 
 from ..core.jit import kernel
-from ..core.tensor import fill
-from .log_strain import radial_return
+from ..core.tensor import fill, norm
+from .log_strain import deviator, lifted, log_strain, radial_return
 from .log_strain_adjoint import log_gap_ratio, radial_return_vjp
 from .moduli import least_stretch, not_negative, yield_radius
 from .no_flow import never_fails
@@ -57,11 +57,28 @@ def build_softening(dim, theta, sigma_y=None, tau_y=None, s_min=0.0):
     return Softening(radius, not_negative(theta=theta), least_stretch(s_min))
 
 
+project = radial_return
+
+
 @kernel
-def project(s, y, dt, law, flow):
-    """Return the singular values after the return; y as it is."""
-    s, _ = radial_return(s, flow.tau_y, law, flow.s_min)
-    return s, y
+def beyond(size, tau_y, law):
+    """Return dgamma = |eps_hat| - tau_y / (2 mu) of size = |eps_hat| (NSF-F4, NCLAW-eq18); 0
+    inside.
+    """
+    dgamma = size - tau_y / (2.0 * law.mu)
+    return dgamma if dgamma > 0.0 else 0.0
+
+
+@kernel
+def beyond_of(s, tau_y, law, flow):
+    """Return `beyond` of the singular values."""
+    return beyond(norm(deviator(log_strain(lifted(s, flow.s_min)))), tau_y, law)
+
+
+@kernel
+def plastic_strain(d, tr, size, y, law, flow):
+    """Return dgamma; y as it is; False."""
+    return beyond(size, flow.tau_y, law), y, False
 
 
 @kernel
@@ -83,12 +100,10 @@ def radius_vjp(radius_bar, tau_y, law):
 
 
 @kernel
-def harden(s, y, dt, law, flow):
-    """Return the singular values after the return to the yield stress y; y + 2 mu xi dgamma
-    (NSF-F4).
-    """
-    s, dgamma = radial_return(s, y, law, flow.s_min)
-    return s, y + 2.0 * law.mu * flow.xi * dgamma
+def harden(d, tr, size, y, law, flow):
+    """Return dgamma to the yield stress y; y + 2 mu xi dgamma (NSF-F4); False."""
+    dgamma = beyond(size, y, law)
+    return dgamma, y + 2.0 * law.mu * flow.xi * dgamma, False
 
 
 @kernel
@@ -99,7 +114,7 @@ def harden_vjp(state, bars, dt, law, flow):
     s, y = state
     s_bar, y_bar = bars
     dgamma_bar = 2.0 * law.mu * flow.xi * y_bar
-    _, dgamma = radial_return(s, y, law, flow.s_min)
+    dgamma = beyond_of(s, y, law, flow)
     s_bar, r_bar, s_min_bar, share = radial_return_vjp(s, (s_bar, dgamma_bar), y, law, flow.s_min)
     mu_bar, of_radius = radius_vjp(r_bar, y, law)
     growth = 2.0 * dgamma * y_bar
@@ -108,17 +123,17 @@ def harden_vjp(state, bars, dt, law, flow):
 
 
 @kernel
-def soften(s, y, dt, law, flow):
-    """Return the singular values after the return to y; y - theta |eps - proj(eps)|, at least 0
-    (NSF-F4).
+def soften(d, tr, size, y, law, flow):
+    """Return dgamma to the yield stress y; y - theta |eps - proj(eps)|, at least 0 (NSF-F4);
+    whether it failed.
 
     The plastic strain of the step is |eps - proj(eps)| = dgamma. NSF sets mu = lam = 0 in a
     failed particle, whose F is then of no consequence; here its elastic strain is released, s =
     1, so that neither F nor energy grows without meaning.
     """
-    s, dgamma = radial_return(s, y, law, flow.s_min)
+    dgamma = beyond(size, y, law)
     y = max(y - flow.theta * dgamma, 0.0)
-    return (s, y) if y > 0.0 else (fill(1.0, s), y)
+    return dgamma, y, not y > 0.0
 
 
 @kernel
@@ -134,7 +149,7 @@ def soften_vjp(state, bars, dt, law, flow):
     """
     s, y = state
     s_bar, y_bar = bars
-    _, dgamma = radial_return(s, y, law, flow.s_min)
+    dgamma = beyond_of(s, y, law, flow)
     if not y - flow.theta * dgamma > 0.0:
         return (fill(0.0, s), 0.0), (0.0, 0.0, 0.0, 0.0, 0.0), 0.0
     dgamma_bar = -flow.theta * y_bar

@@ -33,8 +33,8 @@ STAGES = {          # of a step: beginnings of the names of the kernels that it 
     "grid to particles": ("core.transfer_lines.gather", "core.transfer_mls3.gather"),
     "averaged volumes": ("core.f_bar._",),
     "J alone": ("core.deform.fluid",),
-    "F": ("core.deform.elastic", "core.deform.plastic", "core.deform.full"),
-    "return map": ("core.deform.plastic", "core.deform.full"),
+    "F": ("core.deform.elastic", "core.deform.plastic", "core.deform.radial", "core.deform.full"),
+    "return map": ("core.deform.plastic", "core.deform.radial", "core.deform.full"),
     "RPIC damping": ("core.transfer._damp",),
 }
 DOUBLE = 8          # bytes
@@ -49,7 +49,7 @@ class CodeParts:
     arrays: dict        # {body: {field: bytes}}, 0 where it is not carried
     particles: dict     # {body: number}
     kernels: dict       # {name: number of compiled forms}
-    svd: dict           # {body: "every step", "near singular F alone" or "never"}
+    svd: dict           # {body: "every step", "large strains alone" or "never"}
     implicit: bool
     torch: bool
 

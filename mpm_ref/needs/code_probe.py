@@ -20,8 +20,9 @@ from ..simulate import simulate
 PACKAGE = __package__.partition(".")[0]
 STEPS = {"explicit": 70, "implicit": 3}     # past the first sort, checks and stable steps
 SVD = "core.spectral.svd"
-FALLBACKS = ("core.spectral.rotation", "core.spectral.stretch")     # SVD where F is near singular
-ALWAYS, RARELY, NEVER = "every step", "near singular F alone", "never"
+FALLBACKS = ("core.spectral.rotation", "core.spectral.stretch",     # SVD where strains are large
+             "core.deform.deform_radial", "materials.hencky.kirchhoff")
+ALWAYS, RARELY, NEVER = "every step", "large strains alone", "never"
 
 
 class _Enough(Exception):
@@ -99,10 +100,10 @@ def svd_of(body):
 def deform_kernel(body):
     """Return the kernel that `explicit.deform_body` calls for a body."""
     calls = []
-    names = ("fluid", "elastic", "full", "plastic")
+    names = ("fluid", "elastic", "full", "radial", "plastic")
     recorder = {name: lambda *_, name=name: calls.append(name) for name in names}
     spy = ModuleType("deform")
-    vars(spy).update(recorder)
+    vars(spy).update(recorder, is_radial=deform.is_radial)
     explicit.deform, original = spy, explicit.deform
     try:
         explicit.deform_body(body, 0.0)

@@ -76,11 +76,11 @@ def mirrored(x, axis, c):
 
 def part_images(scene, points, axis):
     """Return {name: name of its image} of the colliders and regions, None for one without."""
-    return (images_among(scene.collider, "shape", points, axis)
-            | images_among(scene.fixed, "region", points, axis))
+    return (images_of_parts(scene.collider, "shape", points, axis)
+            | images_of_parts(scene.fixed, "region", points, axis))
 
 
-def images_among(parts, key, points, axis):
+def images_of_parts(parts, key, points, axis):
     """Return {name: name of the part, perhaps itself, that is its image and alike in all else}."""
     values = {part.name: [distances(x, level_set(getattr(part, key))) for x in points[:2]]
               for part in parts}

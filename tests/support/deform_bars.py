@@ -106,6 +106,8 @@ def loss(q, law, flow):
         deform.deform_fluid(p, law, DT, like, bounds)
     elif isinstance(flow, NoFlow):
         deform.deform_elastic(p, law, DT, like, bounds)
+    elif deform.is_radial(law, flow):
+        deform.deform_radial(p, law, flow, DT, like, bounds)
     else:
         deform.deform_plastic(p, law, flow, DT, like, bounds)
     return np.concatenate([(a * w).ravel() for a, w in zip((p.F, p.tau, p.y), q.weights)])
