@@ -11,9 +11,10 @@ from math import inf, isfinite, sqrt
 import numpy as np
 
 from .jit import CHUNKS, chunk, kernel, parallel, prange
+from .relaxation import blend
 from .stencil import column, columns, locate, node, of_node, product, weights_per_axis
 from .tensor import dot, fill, lin, vec
-from .transfer import blend, minus_old
+from .transfer import minus_old
 
 
 @kernel

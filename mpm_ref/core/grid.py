@@ -1,6 +1,7 @@
 """Grid storage that covers the matter and moves with it, and the momentum update of its nodes.
 
-The grid is the smallest box of nodes, aligned to whole slabs, that the particles reach. A domain
+The grid is the smallest box of nodes that the particles reach, aligned to whole slabs along the
+first axis. A domain
 box is a boundary condition (see `boundary`), not an array bound.
 """
 
@@ -64,7 +65,7 @@ class Storage:
         """
         low, high = self._box(clouds)
         first = self._base(low)
-        first[0] -= first[0] % (2 * slab_width(self.stencil))     # colours are fixed in the world
+        first[0] -= first[0] % (2 * slab_width(self.stencil))     # see `order`
         shape = tuple(int(k) for k in self._base(high) + len(self.stencil) - first)
         size = int(np.prod(np.array(shape, dtype=float)))
         needed = size * (1 + self.vectors * self.dim)

@@ -148,7 +148,7 @@ def by_plane(w, of_plane):
 
 @kernel
 def strides(m):
-    """Nodes from one plane, and one line, to the next."""
+    """Nodes from one plane, and one line, to the next; the one plane in 2D has no next."""
     n = np.uint64(m.shape[m.ndim - 1])
     return (n if m.ndim == 2 else np.uint64(m.shape[1]) * n), n
 

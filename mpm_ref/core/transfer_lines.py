@@ -26,7 +26,7 @@ from .lines import (
 from .relaxation import blend, blend_moment, moment, shift_spin
 from .state import affine, body_force, full, put_affine
 from .stencil import inverse_inertia, locate, slopes_per_axis, weights_per_axis
-from .tensor import lin, mlin, mv, outer, put_mat, put_vec, vec
+from .tensor import lin, mlin, mv, outer, put_mat, put_vec, scale, vec
 
 # particles to grid
 
@@ -45,12 +45,12 @@ def scatter_lines(particles, grid, stencil, dt, members):
         V = particles.V0[p] / grid.dx
         if grid.f.ndim == 1:
             A = momentum_rows(particles.C, p, lin(1.0, mv_p, dt, mb_p), m_p * grid.dx, s, w[2])
-            S = force_rows(mlin(-dt * V, tau, 0.0, tau), w[2], dw[2])
+            S = force_rows(scale(-dt * V, tau), w[2], dw[2])
             spread_all(m, v, i, n, w, dw, m_p, A, S, s)
         else:
             spread_mass(m, i, n, w, m_p)
             spread(v, i, n, w, momentum_rows(particles.C, p, mv_p, m_p * grid.dx, s, w[2]), s)
-            S, S_x, S_y = force_rows(mlin(-V, tau, 0.0, tau), w[2], dw[2])
+            S, S_x, S_y = force_rows(scale(-V, tau), w[2], dw[2])
             spread_force(f, i, n, w, dw, (plus(S, 1.0, rows(w[2], mb_p)), S_x, S_y), s)
 
 
@@ -71,9 +71,9 @@ def scatter_lines_mls(particles, grid, stencil, dt, members):
             Q = mlin(m_p * grid.dx, C, -dt * V, tau)
             spread(v, i, n, w, rows_about(lin(1.0, mv_p, dt, mb_p), Q, s, w[2]), s)
         else:
-            Q = mlin(m_p * grid.dx, C, 0.0, C)
+            Q = scale(m_p * grid.dx, C)
             spread(v, i, n, w, rows_about(mv_p, Q, s, w[2]), s)
-            spread(f, i, n, w, rows_about(mb_p, mlin(-V, tau, 0.0, tau), s, w[2]), s)
+            spread(f, i, n, w, rows_about(mb_p, scale(-V, tau), s, w[2]), s)
 
 
 @kernel
@@ -86,7 +86,7 @@ def rows_about(x_p, Q, s, w):
 def momentum_rows(C, p, mv_p, m_dx, s, w):
     """Rows of the momentum m_p (v_p + C_p r_ip); of a constant field where no C is carried."""
     if C.ndim == 3:
-        return rows_about(mv_p, mlin(m_dx, affine(C, p, s), 0.0, affine(C, p, s)), s, w)
+        return rows_about(mv_p, scale(m_dx, affine(C, p, s)), s, w)
     else:
         return (rows(w, mv_p),)
 
@@ -106,7 +106,7 @@ def gather_lines(particles, grid, stencil, dt, flip, bounds):
         i = node_number(base, n)
         u, L, B = sums_with_moment(particles.C, v, i, n, w, dw, r, s)
         put_vec(particles.x, p, lin(1.0, x, dt, u))
-        put_mat(particles.L, p, mlin(1.0 / grid.dx, L, 0.0, L))
+        put_mat(particles.L, p, scale(1.0 / grid.dx, L))
         put_relaxed(particles, p, grid, stencil, dt, flip, u, B, (i, n, w, r))
 
 
@@ -114,7 +114,7 @@ def gather_lines(particles, grid, stencil, dt, flip, bounds):
 def gather_lines_mls(particles, grid, stencil, dt, flip, bounds):
     """`transfer.gather_mls`, the MLS form."""
     v, n = grid.v.reshape(-1), strides(grid.m)
-    scale = grid.dx * inverse_inertia(grid.dx, stencil)
+    growth = grid.dx * inverse_inertia(grid.dx, stencil)
     for p in range(bounds[0], bounds[1]):
         x = vec(particles.x, p, grid.m.shape)
         base, s = locate(x, grid, stencil)
@@ -124,7 +124,7 @@ def gather_lines_mls(particles, grid, stencil, dt, flip, bounds):
         u, B = sums_of(v, i, n, w, r, s)
         put_vec(particles.x, p, lin(1.0, x, dt, u))
         if grid.v_old.ndim > 1:
-            put_affine(particles.L, p, scale, B)
+            put_affine(particles.L, p, growth, B)
         put_relaxed(particles, p, grid, stencil, dt, flip, u, B, (i, n, w, r))
 
 
@@ -144,7 +144,7 @@ def put_relaxed(particles, p, grid, stencil, dt, flip, u, B, place):
     of their own lag behind it (see `transfer.gather`). place: (i, n, w, r) of the sums.
     """
     D_inv = inverse_inertia(grid.dx, stencil)
-    B = mlin(grid.dx, B, 0.0, B)
+    B = scale(grid.dx, B)
     if grid.v_old.ndim > 1:
         u_old, B_old = old_sums(particles.C, grid.v_old.reshape(-1), place, u)
         lag = lin(1.0, vec(particles.v, p, u), -1.0, u_old)

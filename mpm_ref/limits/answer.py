@@ -7,7 +7,7 @@ from math import inf, isfinite, log10
 from .. import __version__
 from ..scene import digest
 from ..sweep.observation import REFUSED, STOPPED
-from .axes import AXIS, MOST_LONGER, UP
+from .axes import AXIS, LEAST_NU, MOST_LONGER, UP
 from .cause import RESOLUTION, SETTING, VANISHING, limit_counts
 from .cell import cell_of, cell_text
 from .search import NARROW
@@ -15,7 +15,7 @@ from .verdict import LOST, RIGHT, SLACK, UNCHECKED, WRONG
 
 MARGIN, TOO_LONG, NOT_CHECKED, BUDGET_END, LAST_RUNG = (
     "failure", "too long", "not checked", "budget", "not tried farther")
-BOUNDS = {("poisson", UP): " (no scene has one below -1)"}      # of axis and direction
+LEAST_POISSON = f" (no scene has one below -1, and none below {LEAST_NU:g} is tried)"
 UNRESOLVED = 0.5        # tolerance above which right and wrong mean little
 SHOWN_WRONG = 10        # cells in the sentences; the JSON has all
 SHOWN_MESSAGE = 150     # characters of a message
@@ -187,7 +187,8 @@ def sentence(facts):
     if facts["bad"] is None and is_late:
         return f"{begin};{late_text(facts)}"
     if facts["bad"] is None:
-        return f"{begin}, as far as was tried{BOUNDS.get((facts['axis'], facts['direction']), '')}"
+        ends = facts["axis"] == "poisson" and f"{LEAST_NU:g}" in facts["good_value"]
+        return f"{begin}, as far as was tried{LEAST_POISSON if ends else ''}"
     late = " (the budget ended the search between them)" if is_late else ""
     return f"{begin}; {changed_by(facts, 'bad')}: {reason(facts['first_bad'])}{late}"
 

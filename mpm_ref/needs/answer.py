@@ -180,9 +180,10 @@ def lean_text(answer, folder, quantities=()):
     gone = [removal for removal in result.lean.removals if removal.body or removal.half]
     head += [f"{removal.label}: positions are compared on the matter that is left."
              for removal in gone]
-    if result.lean.length != 1.0:
-        head.append(f"Energies, impulses and forces times {result.lean.length:g} m are those of "
-                    "the scene in 3D.")
+    if len(result.lean.axes) < result.first.scene.dim:
+        factor = result.lean.length * 2 ** len(result.lean.halves)
+        head.append(f"Energies, and impulses and forces of parts that no mirror plane leaves out, "
+                    f"times {factor:g} m are those of the scene in 3D.")
     kept = []
     for one in quantities:
         try:

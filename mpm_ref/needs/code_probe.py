@@ -12,6 +12,7 @@ from types import FunctionType, ModuleType
 
 from .. import explicit
 from ..core import deform, jit
+from ..core.logarithm import LEAST_STRETCH
 from ..scene import build
 from ..scene.toml import parse
 from ..scene.validate import validate_scene
@@ -92,6 +93,8 @@ def name_of(function):
 def svd_of(body):
     """Return when the deformation stage of a body computes an SVD: ALWAYS, RARELY or NEVER."""
     entry, classes = deform_kernel(body), (type(body.law), type(body.flow))
+    if entry is deform.radial and body.flow.s_min >= LEAST_STRETCH:
+        return ALWAYS
     if SVD in reached(entry, classes, FALLBACKS):
         return ALWAYS
     return RARELY if SVD in reached(entry, classes, ()) else NEVER

@@ -2,7 +2,8 @@
 
 A scene is uniform along an axis if each shape is a prism along it, the bodies' prisms have the same
 ends, and nothing moves, falls or turns out of the section. What bounds the ends alone, such as
-plates and walls there, is no part of the section, which is in plane strain.
+plates and walls there, is no part of the section. An elastic section is in plane strain; return
+maps in 2D have the deviator of the plane, and so another yield surface than in 3D.
 """
 
 from functools import singledispatch
@@ -44,7 +45,7 @@ def plane_removals(scene):
         left = left_axes(axis)
         names = " and ".join(AXES[a] for a in left)
         yield Removal(f"third dimension {AXES[axis]}", section_edit(scene, axis),
-                      f"plane strain in {names}", axes=left, length=length)
+                      f"section in {names}", axes=left, length=length)
 
 
 def left_axes(axis):
@@ -72,7 +73,7 @@ def in_section(vector, axis):
 # shapes
 
 class Prism:
-    """The tables of a section, and the ends of the prism along the axis [m]."""
+    """The tables of a section, None for all of it, and the ends of the prism along the axis [m]."""
 
     def __init__(self, tables, ends=(-np.inf, np.inf)):
         self.tables, self.ends = tables, ends
@@ -92,6 +93,9 @@ def _(shape: Box, axis):
 
 @prism.register
 def _(shape: HalfSpace, axis):
+    if not any(across(shape.normal, axis)):
+        end = shape.point[axis]
+        return Prism(None, (-np.inf, end) if shape.normal[axis] > 0.0 else (end, np.inf))
     normal = in_section(shape.normal, axis)
     return Prism({"type": "half_space", "point": across(shape.point, axis), "normal": normal})
 
@@ -116,7 +120,7 @@ def _(shape: Wedge, axis):
 
 @prism.register
 def _(shape: Union, axis):
-    parts = [prism(part, axis) for part in shape.shapes]
+    parts = [bounded(prism(part, axis)) for part in shape.shapes]
     return Prism({"type": "union", "shapes": [part.tables for part in parts]}, same_ends(parts))
 
 
@@ -124,16 +128,28 @@ def _(shape: Union, axis):
 def _(shape: Intersection, axis):
     parts = [prism(part, axis) for part in shape.shapes]
     ends = max(part.ends[0] for part in parts), min(part.ends[1] for part in parts)
-    return Prism({"type": "intersection", "shapes": [part.tables for part in parts]}, ends)
+    sections = [part.tables for part in parts if part.tables is not None]
+    if not sections:
+        raise NotUniform("an intersection of half-spaces across the axis")
+    tables = {"type": "intersection", "shapes": sections}
+    return Prism(tables if len(sections) > 1 else sections[0], ends)
 
 
 @prism.register
 def _(shape: Difference, axis):
-    first, minus = prism(shape.shape, axis), [prism(part, axis) for part in shape.minus]
+    first = bounded(prism(shape.shape, axis))
+    minus = [bounded(prism(part, axis)) for part in shape.minus]
     if not all(covers(part.ends, first.ends) for part in minus):
         raise NotUniform("a part is taken away over a part of the length")
     return Prism({"type": "difference", "shape": first.tables,
                   "minus": [part.tables for part in minus]}, first.ends)
+
+
+def bounded(part):
+    """Return a prism with a section. Raises NotUniform for one that has none."""
+    if part.tables is None:
+        raise NotUniform("a half-space across the axis")
+    return part
 
 
 def same_ends(parts):
@@ -155,7 +171,7 @@ def common_length(scene, axis):
     """Return the length of the bodies along an axis [m]. Raises NotUniform where they differ."""
     if any(body.shape is None for body in scene.body):
         raise NotUniform("particles from arrays")
-    ends = same_ends([prism(body.shape, axis) for body in scene.body])
+    ends = same_ends([bounded(prism(body.shape, axis)) for body in scene.body])
     if not all(map(np.isfinite, ends)):
         raise NotUniform("a body without ends")
     return ends[1] - ends[0]
@@ -168,7 +184,7 @@ def section_tables(scene, axis):
 
     Raises NotUniform where a part is not uniform along the axis.
     """
-    bodies = [prism(body.shape, axis) for body in scene.body]
+    bodies = [bounded(prism(body.shape, axis)) for body in scene.body]
     ends = same_ends(bodies)
     tables = {
         "dim": 2,
@@ -191,13 +207,24 @@ def part_tables(part, key, axis, ends):
     """Return the tables of a collider or region that differ in the section; None for a plate at
     the ends, which the section does not have.
     """
-    shape, motion = getattr(part, key), motion_tables(part.motion, axis)
-    if isinstance(shape, HalfSpace) and not any(across(shape.normal, axis)):
+    motion, section = motion_tables(part.motion, axis), prism(getattr(part, key), axis)
+    if section.tables is None:
+        require_outside(section.ends, part.inside, ends)
         return None
-    section = prism(shape, axis)
     if not covers(section.ends, ends):
         raise NotUniform("a collider ends within the bodies")
     return {key: section.tables, "motion": motion}
+
+
+def require_outside(held, inside, ends):
+    """Raise NotUniform unless the nodes that a half-space across the axis holds, those within
+    `held` or outside of it, lie beyond the bodies' ends.
+    """
+    if inside:
+        held = (held[1], np.inf) if np.isinf(held[0]) else (-np.inf, held[0])
+    slack = NEAR * (ends[1] - ends[0])
+    if held[1] > ends[0] + slack and held[0] < ends[1] - slack:
+        raise NotUniform("a half-space across the axis reaches into the bodies")
 
 
 @singledispatch

@@ -5,7 +5,7 @@ the largest change of the quantity during that run. A removal is required where 
 than the error asked. First all removals that change nothing are made at once; then, again and
 again, the one that saves most CPU time and leaves the change since the scene as given within the
 error, each of the others being measured anew on the scene that is left. Where something stands in
-place of an ingredient, it must save time: slip instead of separation, for instance, is no less.
+place of an ingredient, it must save time: slip instead of separation, for instance, is no simpler.
 """
 
 from dataclasses import dataclass, replace

@@ -18,8 +18,11 @@ NEAR = 1e-6             # cells within which points and distances are equal
 SAMPLES = 2000          # points at which a shape is compared with its image
 
 
-def mirror_removals(scene):
-    """Yield the removal of one half of a scene for each of its mirror planes."""
+def mirror_removals(scene, axes):
+    """Yield the removal of one half of a scene for each of its mirror planes.
+
+    axes: those of the scene as given that the scene's own are; names are of these.
+    """
     bodies = build(scene).bodies
     x = np.concatenate([body.particles.x for body in bodies])
     middle = 0.5 * (x.min(axis=0) + x.max(axis=0))
@@ -32,8 +35,9 @@ def mirror_removals(scene):
         if None not in images.values():
             halved = [body.name for body, side in zip(scene.body, sides) if side == 0]
             halved += [name for name, image in images.items() if name == image]
-            halved += [wall_name(a, side) for a in range(scene.dim) if a != axis for side in "-+"]
-            yield Removal(f"half {AXES[axis]} < {c:.6g} m", half_edit(sides, axis, c),
+            halved += [wall_name(a, side) for a in axes if a != axes[axis] for side in "-+"]
+            letter = AXES[axes[axis]]
+            yield Removal(f"half {letter} < {c:.6g} m", half_edit(sides, axis, c, letter),
                           "symmetry wall", half=Half(axis, c, tuple(halved)))
 
 
@@ -141,8 +145,10 @@ def is_image(particles, others, dx, plane):
                for a, b in fields)
 
 
-def half_edit(sides, axis, c):
-    """Return the edit that leaves the half above the plane, with a wall at the plane."""
+def half_edit(sides, axis, c, letter):
+    """Return the edit that leaves the half above the plane, with a wall at the plane, which is
+    named by the letter of its axis.
+    """
     def edit(tables):
         dim = tables["dim"]
         for side, body in zip(sides, tables["body"]):
@@ -150,7 +156,7 @@ def half_edit(sides, axis, c):
                 body["shape"] = upper_part(body["shape"], axis, c, dim)
         tables["body"] = [body for side, body in zip(sides, tables["body"]) if side >= 0]
         tables["collider"] = [*tables.get("collider", ()), {
-            "name": f"{MIRROR}{AXES[axis]}", "kind": "slip", "shape": half_space(axis, c, dim)}]
+            "name": f"{MIRROR}{letter}", "kind": "slip", "shape": half_space(axis, c, dim)}]
     return edit
 
 

@@ -44,7 +44,7 @@ class SceneVariant:
         """Return {label: `Removal`} of what can be removed from the scene."""
         return {removal.label: removal
                 for removal in (*plane_removals(self.scene), *removals_of(self.scene),
-                                *mirror_removals(self.scene))}
+                                *mirror_removals(self.scene, self.axes))}
 
     def without(self, removal):
         """Return the variant after a `Removal`. Raises SceneError where that is no scene."""
@@ -80,8 +80,13 @@ class SceneVariant:
             raise SceneError(f"quantity {text!r} is along the axis that is removed")
         return msgspec.structs.replace(record, **keys).text
 
-    def shared_by(self, record):
-        """Return the halves whose plane cuts in two what the record of a quantity is of."""
+    def cuts_of(self, quantity):
+        """Return the halves whose plane cuts in two what an `OutputQuantity` sums over: all matter,
+        a body or a part. What is elsewhere than on the plane, as a path, is cut by none.
+        """
+        record = quantity.record
+        if quantity.kind not in (*EXTENSIVE, "centroid"):
+            return []
         name = getattr(record, "part", getattr(record, "body", None))
         return [half for half in self.halves if name is None or name in half.halved]
 
@@ -156,7 +161,7 @@ def comparable(text, reference, observation, variant, first):
     reference (T, n): values of the scene as given; the others as in `changes`.
     """
     quantity = OutputQuantity(text)
-    values, halves = observation.values[variant.quantity(text)], variant.shared_by(quantity.record)
+    values, halves = observation.values[variant.quantity(text)], variant.cuts_of(quantity)
     if quantity.kind == "positions":
         reference = reference[:, columns(text, variant, first)]
     elif quantity.kind in VECTORS:

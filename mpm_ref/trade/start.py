@@ -22,8 +22,9 @@ def start_fault(search, chosen):
     fine = max(search.levels[-1], FINE_ENOUGH)
     reference = starts_of(scene_at(scene, setting(dx=fine)))
     starts = starts_of(scene_at(scene, chosen, search.others))
-    share, text = max(fault_of(name, starts[name], expected, scene.dx)
-                      for name, expected in reference.items())
+    faults = [fault_of(name, starts[name], expected, scene.dx)
+              for name, expected in reference.items() if name in starts]
+    share, text = max(faults, default=(0.0, ""))
     return text if share > 1.0 else ""
 
 

@@ -60,7 +60,7 @@ def direction(good=1.0, bad=None, end=MARGIN, axis="stiffness", **more):
      "the budget"),
     (direction(14.0, end=LAST_RUNG, axis="poisson", verb="fall", good_value="nu = -0.9",
                now="nu = 0.4"), "the stiffness may fall to nu = -0.9 (from nu = 0.4), as far as "
-     "was tried (no scene has one below -1)"),
+     "was tried (no scene has one below -1, and none below -0.9 is tried)"),
     (direction(bad=14.0, axis="poisson", bad_value="nu = -0.9"), "the stiffness at nu = -0.9: "
      "refused: it was so (nothing nearer was tried)"),
 ])

@@ -58,7 +58,7 @@ class ToyVariant:
         """The text of a quantity, the same in all variants."""
         return text
 
-    def shared_by(self, record):
+    def cuts_of(self, quantity):
         """No halves."""
         return []
 

@@ -106,6 +106,73 @@ def test_plates_at_the_ends_go():
     assert [part.name for part in section.scene.collider] == ["paddle"]
 
 
+WALLED = """
+dim = 3
+dx = 0.05
+dt = 0.001
+end = 0.02
+walls = { low = [2, 2, 2], high = [18, 18, 18] }
+
+[[body]]
+name = "block"
+density = 1000.0
+shape = { type = "box", lower = [0.3, 0.2, 0.1], upper = [0.7, 0.8, 0.9] }
+material = { law = "fixed_corotated", E = 1e5, nu = 0.3 }
+"""
+
+
+def offered(variant, begin):
+    """The removal of a variant whose label begins so."""
+    label, = (one for one in variant.offers if one.startswith(begin))
+    return variant.offers[label]
+
+
+@pytest.mark.parametrize("order", [("third dimension x", "half z"),
+                                   ("half z", "third dimension x")])
+def test_halves_and_sections_have_names_of_the_axes_at_first(order):
+    first = variant_of(WALLED)
+    variant = first.without(offered(first, order[0]))
+    variant = variant.without(offered(variant, order[1]))
+    half, = variant.halves
+    assert half.axis == 2
+    assert {"block", "wall y-", "wall y+"} <= set(half.halved)
+    assert not {"wall z-", "wall z+"} & set(half.halved)
+    assert [part.name for part in variant.scene.collider] == ["mirror z"]
+    assert variant.quantity("force:wall z+") == "force:wall y+"
+    assert variant.length == pytest.approx(0.4)
+
+
+def test_half_of_each_axis_has_a_wall_of_its_own():
+    variant = variant_of(WALLED)
+    for begin in ("half y", "third dimension x", "half z"):
+        variant = variant.without(offered(variant, begin))
+    assert [part.name for part in variant.scene.collider] == ["mirror y", "mirror z"]
+    assert variant.scene.body[0].shape.lower == (0.5, 0.5)
+
+
+@pytest.mark.parametrize(("point", "normal", "inside", "uniform"), [
+    (0.1, 1.0, False, True), (0.05, 1.0, False, True), (0.2, 1.0, False, False),
+    (0.25, -1.0, False, True), (0.2, -1.0, False, False), (0.3, 1.0, True, True),
+    (0.25, 1.0, True, True), (0.2, 1.0, True, False), (0.0, -1.0, True, True)])
+def test_plate_that_reaches_into_the_bodies(point, normal, inside, uniform):
+    text = solid(2) + f"""
+[[collider]]
+inside = {str(inside).lower()}
+shape = {{ type = "half_space", point = [0.0, 0.0, {point}], normal = [0.0, 0.0, {normal}] }}
+"""
+    offers = variant_of(text).offers
+    assert any(one.startswith("third dimension z") for one in offers) == uniform
+
+
+def test_half_cylinder_has_a_section():
+    half = {"type": "intersection", "shapes": [
+        {"type": "cylinder", "start": [0, 0, 0], "end": [0, 2, 0], "radius": 1},
+        {"type": "half_space", "point": [0, 1, 0], "normal": [0, -1, 0]}]}
+    made = prism(msgspec.convert(half, Shape), 1)
+    assert made.tables == {"type": "sphere", "center": [0, 0], "radius": 1}
+    assert made.ends == (1, 2)
+
+
 def test_quantities_of_the_section():
     _, section = section_of(solid(1), 1)
     texts = {"front:z+:roll@end": "front:y+:roll@end", "profile:x": "profile:x",
@@ -169,6 +236,10 @@ def test_prisms_along_y(shape, tables, ends):
     {"type": "half_space", "point": [0, 0, 0], "normal": [0, 1, 1]},
     {"type": "difference", "shape": {"type": "box", "lower": [0, 0, 0], "upper": [1, 1, 1]},
      "minus": [{"type": "box", "lower": [0, 0, 0], "upper": [0.5, 0.5, 0.5]}]},
+    {"type": "union", "shapes": [{"type": "box", "lower": [0, 0, 0], "upper": [1, 1, 1]},
+                                 {"type": "half_space", "point": [0, 0, 0], "normal": [0, 1, 0]}]},
+    {"type": "intersection", "shapes": [
+        {"type": "half_space", "point": [0, 0, 0], "normal": [0, 1, 0]}]},
 ])
 def test_shapes_that_are_no_prisms(shape):
     with pytest.raises(NotUniform):

@@ -117,6 +117,18 @@ def test_vectors_of_a_part_on_the_side_that_is_left(text):
     assert other[text].max() > 0.0
 
 
+@pytest.mark.parametrize("text", ["path:0.6,0.3", "region:0.5,0.1,0.9,0.5"])
+def test_vectors_of_a_place_in_the_half_that_is_left(text):
+    """They have all components: nothing is summed over both halves."""
+    first, half = half_of_a_disk()
+    base = np.arange(2.0 * TIMES).reshape(TIMES, 2)
+    same = changes(observation(**{text: base}), observation(**{text: base}), half, first)
+    assert same[text].max() == 0.0
+    moved = base + np.arange(TIMES)[:, None] * [0.1, 0.0]
+    other = changes(observation(**{text: base}), observation(**{text: moved}), half, first)
+    assert other[text][-1] > 0.01
+
+
 @pytest.mark.parametrize("text", ["front:x-", "profile:x:disk", "path:0.4,0.3",
                                   "region:0.4,0.1,0.9,0.5", "mean:J:0.4,0.1,0.9,0.5"])
 def test_quantity_of_the_half_that_is_removed(text):
