@@ -10,6 +10,8 @@ for each node, here `rows`. A stencil is planes of lines of nodes; in 2D it is o
 Indices are unsigned (see `transfer_mls3`). `transfer_lines` puts the sums together.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from .jit import kernel, leaf
@@ -135,6 +137,17 @@ def add_mass_line(m, i, mass, w):
 
 # the stencil: planes, lines, nodes
 
+class Stencil(NamedTuple):
+    """The lines that a particle reaches, and its weights by plane, line and node."""
+
+    i: np.uint64        # number of the base node in the flattened grid
+    n: tuple            # nodes from one plane, and one line, to the next
+    w: tuple            # weights of planes, of lines, and of the nodes of a line
+    dw: tuple           # slopes likewise; 0 for the one plane in 2D
+    r: tuple            # w_k (k - s) likewise, arms times weights
+    s: tuple            # offset of the particle from the base node [cells]
+
+
 @kernel
 def by_plane(w, of_plane):
     """Weights of planes, lines and nodes from those of the axes; in 2D `of_plane` is that of the
@@ -232,8 +245,9 @@ def grown(A, weight, field, k):
 
 
 @leaf
-def spread_mass(m, i, n, w, mass):
-    """m += w_a w_b w_c mass from node i on."""
+def spread_mass(m, mass, at):
+    """m += w_a w_b w_c mass."""
+    i, n, w, _, _, _ = at
     for a in range(len(w[0])):
         j = i
         for b in range(len(w[1])):
@@ -243,40 +257,43 @@ def spread_mass(m, i, n, w, mass):
 
 
 @leaf
-def spread(v, i, n, w, A, like):
-    """v += A_ab from node i on, of a field that is affine or constant."""
+def spread(v, A, at):
+    """v += A_ab of a field that is affine or constant."""
+    i, n, w, _, _, s = at
     first = A[0]
     for a in range(len(w[0])):
         line, j = first, i
         for b in range(len(w[1])):
-            line_ab = plus(line_at(v, j, w[2], like), w[0][a] * w[1][b], line)
-            put_line(v, j, line_ab, like)
+            line_ab = plus(line_at(v, j, w[2], s), w[0][a] * w[1][b], line)
+            put_line(v, j, line_ab, s)
             line, j = grown(line, 1.0, A, 2), j + n[1]
         first, i = grown(first, 1.0, A, 1), i + n[0]
 
 
 @leaf
-def spread_force(v, i, n, w, dw, S, like):
-    """v += S_ab from node i on."""
+def spread_force(v, S, at):
+    """v += S_ab."""
+    i, n, w, dw, _, s = at
     for a in range(len(w[0])):
         P, R, j = plus(scaled(w[0][a], S[0]), dw[0][a], S[1]), scaled(w[0][a], S[2]), i
         for b in range(len(w[1])):
-            line = plus(line_at(v, j, w[2], like), w[1][b], P)
-            put_line(v, j, plus(line, dw[1][b], R), like)
+            line = plus(line_at(v, j, w[2], s), w[1][b], P)
+            put_line(v, j, plus(line, dw[1][b], R), s)
             j += n[1]
         i += n[0]
 
 
 @leaf
-def spread_all(m, v, i, n, w, dw, mass, A, S, like):
+def spread_all(m, v, mass, A, S, at):
     """`spread_mass`, `spread` and `spread_force` at once."""
+    i, n, w, dw, _, s = at
     first = plus(A[0], 1.0, S[0])
     for a in range(len(w[0])):
         P, R, j = plus(scaled(w[0][a], first), dw[0][a], S[1]), scaled(w[0][a], S[2]), i
         for b in range(len(w[1])):
             add_mass_line(m, j, w[0][a] * w[1][b] * mass, w[2])
-            line = plus(line_at(v, j, w[2], like), w[1][b], P)
-            put_line(v, j, plus(line, dw[1][b], R), like)
+            line = plus(line_at(v, j, w[2], s), w[1][b], P)
+            put_line(v, j, plus(line, dw[1][b], R), s)
             P, j = grown(P, w[0][a], A, 2), j + n[1]
         first, i = grown(first, 1.0, A, 1), i + n[0]
 
@@ -293,52 +310,56 @@ def gradient_of(x, y, z):
 
 
 @leaf
-def mean_of(v, i, n, w, like):
-    """u = sum_i w_ip v_i from node i on."""
-    W = scaled(0.0, line_at(v, i, w[2], like))
+def mean_of(v, at):
+    """u = sum_i w_ip v_i."""
+    i, n, w, _, _, s = at
+    W = scaled(0.0, line_at(v, i, w[2], s))
     for a in range(len(w[0])):
         j = i
         for b in range(len(w[1])):
-            W, j = plus(W, w[0][a] * w[1][b], line_at(v, j, w[2], like)), j + n[1]
+            W, j = plus(W, w[0][a] * w[1][b], line_at(v, j, w[2], s)), j + n[1]
         i += n[0]
     return summed(w[2], W)
 
 
 @leaf
-def sums_of(v, i, n, w, r, like):
-    """u = sum_i w_ip v_i, and sum_i v_i g_ip^T from node i on, where g_ip has the factor r in place
-    of w for its own axis: (r_a w_b w_c, w_a r_b w_c, w_a w_b r_c).
+def sums_of(v, g, at):
+    """u = sum_i w_ip v_i, and sum_i v_i g_ip^T, where g_ip has the factor g, which is dw or r, in
+    place of w for its own axis: (g_a w_b w_c, w_a g_b w_c, w_a w_b g_c).
     """
-    A, R = plane(v, i, n, w, r, like)
-    W, X, Y = scaled(w[0][0], A), scaled(r[0][0], A), scaled(w[0][0], R)
+    i, n, w, _, _, _ = at
+    A, R = plane(v, i, g, at)
+    W, X, Y = scaled(w[0][0], A), scaled(g[0][0], A), scaled(w[0][0], R)
     for a in range(1, len(w[0])):
         i += n[0]
-        A, R = plane(v, i, n, w, r, like)
-        W, X, Y = plus(W, w[0][a], A), plus(X, r[0][a], A), plus(Y, w[0][a], R)
-    return summed(w[2], W), gradient_of(summed(w[2], X), summed(w[2], Y), summed(r[2], W))
+        A, R = plane(v, i, g, at)
+        W, X, Y = plus(W, w[0][a], A), plus(X, g[0][a], A), plus(Y, w[0][a], R)
+    return summed(w[2], W), gradient_of(summed(w[2], X), summed(w[2], Y), summed(g[2], W))
 
 
 @leaf
-def plane(v, i, n, w, r, like):
-    """Sums of the lines of a plane, which begins with node i, with the weights w and with r."""
-    line = line_at(v, i, w[2], like)
-    A, R = scaled(w[1][0], line), scaled(r[1][0], line)
+def plane(v, i, g, at):
+    """Sums of the lines of a plane, which begins with node i, with the weights w and with g."""
+    _, n, w, _, _, s = at
+    line = line_at(v, i, w[2], s)
+    A, R = scaled(w[1][0], line), scaled(g[1][0], line)
     for b in range(1, len(w[1])):
         i += n[1]
-        line = line_at(v, i, w[2], like)
-        A, R = plus(A, w[1][b], line), plus(R, r[1][b], line)
+        line = line_at(v, i, w[2], s)
+        A, R = plus(A, w[1][b], line), plus(R, g[1][b], line)
     return A, R
 
 
 @leaf
-def both_sums_of(v, i, n, w, dw, r, like):
+def both_sums_of(v, at):
     """`sums_of` with the factors dw and with r at once: u, and both matrices."""
-    A, D, R = plane_of_both(v, i, n, w, dw, r, like)
+    i, n, w, dw, r, _ = at
+    A, D, R = plane_of_both(v, i, at)
     W, X, Y = scaled(w[0][0], A), scaled(dw[0][0], A), scaled(w[0][0], D)
     Z, T = scaled(r[0][0], A), scaled(w[0][0], R)
     for a in range(1, len(w[0])):
         i += n[0]
-        A, D, R = plane_of_both(v, i, n, w, dw, r, like)
+        A, D, R = plane_of_both(v, i, at)
         W, X, Y = plus(W, w[0][a], A), plus(X, dw[0][a], A), plus(Y, w[0][a], D)
         Z, T = plus(Z, r[0][a], A), plus(T, w[0][a], R)
     G = gradient_of(summed(w[2], X), summed(w[2], Y), summed(dw[2], W))
@@ -347,12 +368,13 @@ def both_sums_of(v, i, n, w, dw, r, like):
 
 
 @leaf
-def plane_of_both(v, i, n, w, dw, r, like):
+def plane_of_both(v, i, at):
     """`plane` with the weights w, dw and r."""
-    line = line_at(v, i, w[2], like)
+    _, n, w, dw, r, s = at
+    line = line_at(v, i, w[2], s)
     A, D, R = scaled(w[1][0], line), scaled(dw[1][0], line), scaled(r[1][0], line)
     for b in range(1, len(w[1])):
         i += n[1]
-        line = line_at(v, i, w[2], like)
+        line = line_at(v, i, w[2], s)
         A, D, R = plus(A, w[1][b], line), plus(D, dw[1][b], line), plus(R, r[1][b], line)
     return A, D, R

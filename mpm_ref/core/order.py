@@ -42,35 +42,42 @@ def slab_axis(shape, width):
     return longest if FAR_LONGER * shape[0] <= min(shape[longest], ENOUGH * width) else 0
 
 
-@kernel
-def _slab_of(x, p, grid, stencil, axis):
-    return (base_of(x[p, axis], grid.dx, stencil) - grid.origin[axis]) // slab_width(stencil)
+class Cut(NamedTuple):
+    """The nodes of an axis that is cut into slabs."""
+
+    first: int          # number of the grid's first node along it
+    dx: float           # [m]
 
 
 @kernel
-def _count(x, grid, stencil, axis, count, bounds):
+def _slab_of(x_p, cut, stencil):
+    return (base_of(x_p, cut.dx, stencil) - cut.first) // slab_width(stencil)
+
+
+@kernel
+def _count(x, cut, stencil, count, bounds):
     for p in range(bounds[0], bounds[1]):
-        count[_slab_of(x, p, grid, stencil, axis)] += 1
+        count[_slab_of(x[p], cut, stencil)] += 1
 
 
 @kernel
-def _place(x, grid, stencil, axis, at, order, bounds):
+def _place(x, cut, stencil, at, order, bounds):
     for p in range(bounds[0], bounds[1]):
-        a = _slab_of(x, p, grid, stencil, axis)
+        a = _slab_of(x[p], cut, stencil)
         order[at[a]] = p
         at[a] += 1
 
 
 @parallel
-def _count_all(x, grid, stencil, axis, count):
+def _count_all(x, cut, stencil, count):
     for c in prange(CHUNKS):
-        _count(x, grid, stencil, axis, count[c], chunk(c, len(x)))
+        _count(x, cut, stencil, count[c], chunk(c, len(x)))
 
 
 @parallel
-def _place_all(x, grid, stencil, axis, at, order):
+def _place_all(x, cut, stencil, at, order):
     for c in prange(CHUNKS):
-        _place(x, grid, stencil, axis, at[c], order, chunk(c, len(x)))
+        _place(x, cut, stencil, at[c], order, chunk(c, len(x)))
 
 
 def slabs_of(x, grid, stencil):
@@ -78,11 +85,12 @@ def slabs_of(x, grid, stencil):
     width = slab_width(stencil)
     axis = slab_axis(grid.m.shape, width)
     n_slabs = -(-grid.m.shape[axis] // width)
+    along, cut = x[:, axis], Cut(grid.origin[axis], grid.dx)
     count = np.zeros((CHUNKS, n_slabs), dtype=np.int64)
-    _count_all(x, grid, stencil, axis, count)
+    _count_all(along, cut, stencil, count)
     ends = np.cumsum(count.T.ravel()).reshape(n_slabs, CHUNKS)     # by slab, then by chunk
     order = np.empty(len(x), dtype=np.int64)
-    _place_all(x, grid, stencil, axis, np.ascontiguousarray((ends - count.T).T), order)
+    _place_all(along, cut, stencil, np.ascontiguousarray((ends - count.T).T), order)
     return Slabs(order, np.concatenate(([0], ends[:, -1])))
 
 

@@ -6,6 +6,7 @@ nodes (see `lines`): 3 to 18 times as fast in 3D.
 
 from .jit import CHUNKS, chunk, kernel, leaf, parallel, prange
 from .lines import (
+    Stencil,
     affine_rows,
     arms_per_axis,
     both_sums_of,
@@ -28,67 +29,71 @@ from .state import affine, body_force, full, put_affine
 from .stencil import inverse_inertia, locate, slopes_per_axis, weights_per_axis
 from .tensor import lin, mlin, mv, outer, put_mat, put_vec, scale, vec
 
+
+@kernel
+def reached(x, grid, stencil):
+    """The `Stencil` of a particle at x."""
+    base, s = locate(x, grid, stencil)
+    w, n = weights_per_axis(s, stencil), strides(grid.m)
+    dw, r = by_plane(slopes_per_axis(s, stencil), 0.0), by_plane(arms_per_axis(w, s), 0.0)
+    return Stencil(node_number(base, n), n, by_plane(w, 1.0), dw, r, s)
+
+
 # particles to grid
 
 @kernel
 def scatter_lines(particles, grid, stencil, dt, members):
     """`transfer.scatter`, the gradient form."""
     m, v, f = grid.m.reshape(-1), grid.v.reshape(-1), grid.f.reshape(-1)
-    n = strides(grid.m)
     for p in members:
-        base, s = locate(vec(particles.x, p, grid.m.shape), grid, stencil)
-        w = by_plane(weights_per_axis(s, stencil), 1.0)
-        dw = by_plane(slopes_per_axis(s, stencil), 0.0)
-        i, m_p, tau = node_number(base, n), particles.m[p], full(particles.tau, p, s)
-        mv_p = times(m_p, vec(particles.v, p, s))
-        mb_p = times(m_p, body_force(particles.b, p, s))
+        at = reached(vec(particles.x, p, grid.m.shape), grid, stencil)
+        m_p, tau = particles.m[p], full(particles.tau, p, at.s)
+        mv_p = times(m_p, vec(particles.v, p, at.s))
+        mb_p = times(m_p, body_force(particles.b, p, at.s))
         V = particles.V0[p] / grid.dx
         if grid.f.ndim == 1:
-            A = momentum_rows(particles.C, p, lin(1.0, mv_p, dt, mb_p), m_p * grid.dx, s, w[2])
-            S = force_rows(scale(-dt * V, tau), w[2], dw[2])
-            spread_all(m, v, i, n, w, dw, m_p, A, S, s)
+            A = momentum_rows(particles.C, p, lin(1.0, mv_p, dt, mb_p), m_p * grid.dx, at)
+            S = force_rows(scale(-dt * V, tau), at.w[2], at.dw[2])
+            spread_all(m, v, m_p, A, S, at)
         else:
-            spread_mass(m, i, n, w, m_p)
-            spread(v, i, n, w, momentum_rows(particles.C, p, mv_p, m_p * grid.dx, s, w[2]), s)
-            S, S_x, S_y = force_rows(scale(-V, tau), w[2], dw[2])
-            spread_force(f, i, n, w, dw, (plus(S, 1.0, rows(w[2], mb_p)), S_x, S_y), s)
+            spread_mass(m, m_p, at)
+            spread(v, momentum_rows(particles.C, p, mv_p, m_p * grid.dx, at), at)
+            S, S_x, S_y = force_rows(scale(-V, tau), at.w[2], at.dw[2])
+            spread_force(f, (plus(S, 1.0, rows(at.w[2], mb_p)), S_x, S_y), at)
 
 
 @kernel
 def scatter_lines_mls(particles, grid, stencil, dt, members):
     """`transfer.scatter_mls`, the MLS form."""
     m, v, f = grid.m.reshape(-1), grid.v.reshape(-1), grid.f.reshape(-1)
-    n = strides(grid.m)
     for p in members:
-        base, s = locate(vec(particles.x, p, grid.m.shape), grid, stencil)
-        w = by_plane(weights_per_axis(s, stencil), 1.0)
-        i, m_p, tau = node_number(base, n), particles.m[p], full(particles.tau, p, s)
-        mv_p, C = times(m_p, vec(particles.v, p, s)), affine(particles.C, p, s)
-        mb_p = times(m_p, body_force(particles.b, p, s))
+        at = reached(vec(particles.x, p, grid.m.shape), grid, stencil)
+        m_p, tau = particles.m[p], full(particles.tau, p, at.s)
+        mv_p, C = times(m_p, vec(particles.v, p, at.s)), affine(particles.C, p, at.s)
+        mb_p = times(m_p, body_force(particles.b, p, at.s))
         V = inverse_inertia(grid.dx, stencil) * particles.V0[p] * grid.dx
-        spread_mass(m, i, n, w, m_p)
+        spread_mass(m, m_p, at)
         if grid.f.ndim == 1:
             Q = mlin(m_p * grid.dx, C, -dt * V, tau)
-            spread(v, i, n, w, rows_about(lin(1.0, mv_p, dt, mb_p), Q, s, w[2]), s)
+            spread(v, rows_about(lin(1.0, mv_p, dt, mb_p), Q, at), at)
         else:
-            Q = scale(m_p * grid.dx, C)
-            spread(v, i, n, w, rows_about(mv_p, Q, s, w[2]), s)
-            spread(f, i, n, w, rows_about(mb_p, scale(-V, tau), s, w[2]), s)
+            spread(v, rows_about(mv_p, scale(m_p * grid.dx, C), at), at)
+            spread(f, rows_about(mb_p, scale(-V, tau), at), at)
 
 
 @kernel
-def rows_about(x_p, Q, s, w):
+def rows_about(x_p, Q, at):
     """`affine_rows` of the field x_p + Q (k - s) of the nodes k, which is x_p at the particle."""
-    return affine_rows(lin(1.0, x_p, -1.0, mv(Q, s)), Q, w)
+    return affine_rows(lin(1.0, x_p, -1.0, mv(Q, at.s)), Q, at.w[2])
 
 
 @kernel
-def momentum_rows(C, p, mv_p, m_dx, s, w):
+def momentum_rows(C, p, mv_p, m_dx, at):
     """Rows of the momentum m_p (v_p + C_p r_ip); of a constant field where no C is carried."""
     if C.ndim == 3:
-        return rows_about(mv_p, scale(m_dx, affine(C, p, s)), s, w)
+        return rows_about(mv_p, scale(m_dx, affine(C, p, at.s)), at)
     else:
-        return (rows(w, mv_p),)
+        return (rows(at.w[2], mv_p),)
 
 
 # grid to particles
@@ -96,57 +101,50 @@ def momentum_rows(C, p, mv_p, m_dx, s, w):
 @kernel
 def gather_lines(particles, grid, stencil, dt, flip, bounds):
     """`transfer.gather`, the gradient form."""
-    v, n = grid.v.reshape(-1), strides(grid.m)
+    v = grid.v.reshape(-1)
     for p in range(bounds[0], bounds[1]):
         x = vec(particles.x, p, grid.m.shape)
-        base, s = locate(x, grid, stencil)
-        w = weights_per_axis(s, stencil)
-        r = by_plane(arms_per_axis(w, s), 0.0)
-        w, dw = by_plane(w, 1.0), by_plane(slopes_per_axis(s, stencil), 0.0)
-        i = node_number(base, n)
-        u, L, B = sums_with_moment(particles.C, v, i, n, w, dw, r, s)
+        at = reached(x, grid, stencil)
+        u, L, B = sums_with_moment(particles.C, v, at)
         put_vec(particles.x, p, lin(1.0, x, dt, u))
         put_mat(particles.L, p, scale(1.0 / grid.dx, L))
-        put_relaxed(particles, p, grid, stencil, dt, flip, u, B, (i, n, w, r))
+        put_relaxed(particles, p, grid, (stencil, dt, flip), (u, B), at)
 
 
 @kernel
 def gather_lines_mls(particles, grid, stencil, dt, flip, bounds):
     """`transfer.gather_mls`, the MLS form."""
-    v, n = grid.v.reshape(-1), strides(grid.m)
-    growth = grid.dx * inverse_inertia(grid.dx, stencil)
+    v, growth = grid.v.reshape(-1), grid.dx * inverse_inertia(grid.dx, stencil)
     for p in range(bounds[0], bounds[1]):
         x = vec(particles.x, p, grid.m.shape)
-        base, s = locate(x, grid, stencil)
-        w = weights_per_axis(s, stencil)
-        w, r = by_plane(w, 1.0), by_plane(arms_per_axis(w, s), 0.0)
-        i = node_number(base, n)
-        u, B = sums_of(v, i, n, w, r, s)
+        at = reached(x, grid, stencil)
+        u, B = sums_of(v, at.r, at)
         put_vec(particles.x, p, lin(1.0, x, dt, u))
         if grid.v_old.ndim > 1:
             put_affine(particles.L, p, growth, B)
-        put_relaxed(particles, p, grid, stencil, dt, flip, u, B, (i, n, w, r))
+        put_relaxed(particles, p, grid, (stencil, dt, flip), (u, B), at)
 
 
 @kernel
-def sums_with_moment(C, v, i, n, w, dw, r, like):
+def sums_with_moment(C, v, at):
     """u, L dx and the moment B/dx of the grid's velocity; no moment where no C is carried."""
     if C.ndim == 3:
-        return both_sums_of(v, i, n, w, dw, r, like)
+        return both_sums_of(v, at)
     else:
-        u, L = sums_of(v, i, n, w, dw, like)
+        u, L = sums_of(v, at.dw, at)
         return u, L, L
 
 
 @leaf
-def put_relaxed(particles, p, grid, stencil, dt, flip, u, B, place):
-    """v_p and C_p from the grid's u and moment B/dx; where v_old is carried, with the share `flip`
-    of their own lag behind it (see `transfer.gather`). place: (i, n, w, r) of the sums.
+def put_relaxed(particles, p, grid, step, sums, at):
+    """v_p and C_p from the grid's u and moment B/dx, `sums`; where v_old is carried, with the share
+    `flip` of their own lag behind it (see `transfer.gather`). step: (stencil, dt, flip).
     """
-    D_inv = inverse_inertia(grid.dx, stencil)
-    B = scale(grid.dx, B)
+    stencil, dt, flip = step
+    u, D_inv = sums[0], inverse_inertia(grid.dx, stencil)
+    B = scale(grid.dx, sums[1])
     if grid.v_old.ndim > 1:
-        u_old, B_old = old_sums(particles.C, grid.v_old.reshape(-1), place, u)
+        u_old, B_old = old_sums(particles.C, grid.v_old.reshape(-1), at)
         lag = lin(1.0, vec(particles.v, p, u), -1.0, u_old)
         lag_B = mlin(1.0, moment(particles.C, p, 1.0 / D_inv, u), -grid.dx, B_old)
         B = blend_moment(B, flip, lag_B, shift_spin(u, lag, flip, dt), grid.v_old)
@@ -156,13 +154,12 @@ def put_relaxed(particles, p, grid, stencil, dt, flip, u, B, place):
 
 
 @leaf
-def old_sums(C, v_old, place, like):
+def old_sums(C, v_old, at):
     """Mean and moment of the old velocity; no moment where no C is carried."""
-    i, n, w, r = place
     if C.ndim == 3:
-        return sums_of(v_old, i, n, w, r, like)
+        return sums_of(v_old, at.r, at)
     else:
-        u = mean_of(v_old, i, n, w, like)
+        u = mean_of(v_old, at)
         return u, outer(u, u)
 
 

@@ -216,14 +216,14 @@ def part_tables(part, key, axis, ends):
     return {key: section.tables, "motion": motion}
 
 
-def require_outside(held, inside, ends):
-    """Raise NotUniform unless the nodes that a half-space across the axis holds, those within
-    `held` or outside of it, lie beyond the bodies' ends.
+def require_outside(plate, inside, ends):
+    """Raise NotUniform unless the nodes that a half-space across the axis constrains, those between
+    the ends of `plate` or the others, lie beyond the bodies' ends.
     """
     if inside:
-        held = (held[1], np.inf) if np.isinf(held[0]) else (-np.inf, held[0])
+        plate = (plate[1], np.inf) if np.isinf(plate[0]) else (-np.inf, plate[0])
     slack = NEAR * (ends[1] - ends[0])
-    if held[1] > ends[0] + slack and held[0] < ends[1] - slack:
+    if plate[1] > ends[0] + slack and plate[0] < ends[1] - slack:
         raise NotUniform("a half-space across the axis reaches into the bodies")
 
 

@@ -116,9 +116,10 @@ def once(case, lost=0):
         cut = tuple(slice(0, k) for k in last)
         grid = grid._replace(m=grid.m[cut].copy(), v=grid.v[cut].copy())
     count = np.zeros(-(-grid.m.shape[0] // order.slab_width(case.stencil)), dtype=np.int64)
-    order._count(q.x, grid, case.stencil, 0, count, n)
+    cut = order.Cut(grid.origin[0], grid.dx)
+    order._count(q.x[:, 0], cut, case.stencil, count, n)
     at, where = np.cumsum(count) - count, np.empty(50, dtype=np.int64)
-    order._place(q.x, grid, case.stencil, 0, at, where, n)
+    order._place(q.x[:, 0], cut, case.stencil, at, where, n)
     if case.transfer == "mls":
         scatter_mls(q, grid, case.stencil, 0.1, where)
         gather_mls(q, grid, case.stencil, 0.1, 1.0, n)
