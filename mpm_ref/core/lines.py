@@ -137,7 +137,7 @@ def add_mass_line(m, i, mass, w):
 
 # the stencil: planes, lines, nodes
 
-class Stencil(NamedTuple):
+class NodeLines(NamedTuple):
     """The lines that a particle reaches, and its weights by plane, line and node."""
 
     i: np.uint64        # number of the base node in the flattened grid
@@ -245,9 +245,9 @@ def grown(A, weight, field, k):
 
 
 @leaf
-def spread_mass(m, mass, at):
+def spread_mass(m, mass, nodes):
     """m += w_a w_b w_c mass."""
-    i, n, w, _, _, _ = at
+    i, n, w, _, _, _ = nodes
     for a in range(len(w[0])):
         j = i
         for b in range(len(w[1])):
@@ -257,9 +257,9 @@ def spread_mass(m, mass, at):
 
 
 @leaf
-def spread(v, A, at):
+def spread(v, A, nodes):
     """v += A_ab of a field that is affine or constant."""
-    i, n, w, _, _, s = at
+    i, n, w, _, _, s = nodes
     first = A[0]
     for a in range(len(w[0])):
         line, j = first, i
@@ -271,9 +271,9 @@ def spread(v, A, at):
 
 
 @leaf
-def spread_force(v, S, at):
+def spread_force(v, S, nodes):
     """v += S_ab."""
-    i, n, w, dw, _, s = at
+    i, n, w, dw, _, s = nodes
     for a in range(len(w[0])):
         P, R, j = plus(scaled(w[0][a], S[0]), dw[0][a], S[1]), scaled(w[0][a], S[2]), i
         for b in range(len(w[1])):
@@ -284,9 +284,9 @@ def spread_force(v, S, at):
 
 
 @leaf
-def spread_all(m, v, mass, A, S, at):
+def spread_all(m, v, mass, A, S, nodes):
     """`spread_mass`, `spread` and `spread_force` at once."""
-    i, n, w, dw, _, s = at
+    i, n, w, dw, _, s = nodes
     first = plus(A[0], 1.0, S[0])
     for a in range(len(w[0])):
         P, R, j = plus(scaled(w[0][a], first), dw[0][a], S[1]), scaled(w[0][a], S[2]), i
@@ -310,9 +310,9 @@ def gradient_of(x, y, z):
 
 
 @leaf
-def mean_of(v, at):
+def mean_of(v, nodes):
     """u = sum_i w_ip v_i."""
-    i, n, w, _, _, s = at
+    i, n, w, _, _, s = nodes
     W = scaled(0.0, line_at(v, i, w[2], s))
     for a in range(len(w[0])):
         j = i
@@ -323,24 +323,24 @@ def mean_of(v, at):
 
 
 @leaf
-def sums_of(v, g, at):
+def sums_of(v, g, nodes):
     """u = sum_i w_ip v_i, and sum_i v_i g_ip^T, where g_ip has the factor g, which is dw or r, in
     place of w for its own axis: (g_a w_b w_c, w_a g_b w_c, w_a w_b g_c).
     """
-    i, n, w, _, _, _ = at
-    A, R = plane(v, i, g, at)
+    i, n, w, _, _, _ = nodes
+    A, R = plane(v, i, g, nodes)
     W, X, Y = scaled(w[0][0], A), scaled(g[0][0], A), scaled(w[0][0], R)
     for a in range(1, len(w[0])):
         i += n[0]
-        A, R = plane(v, i, g, at)
+        A, R = plane(v, i, g, nodes)
         W, X, Y = plus(W, w[0][a], A), plus(X, g[0][a], A), plus(Y, w[0][a], R)
     return summed(w[2], W), gradient_of(summed(w[2], X), summed(w[2], Y), summed(g[2], W))
 
 
 @leaf
-def plane(v, i, g, at):
+def plane(v, i, g, nodes):
     """Sums of the lines of a plane, which begins with node i, with the weights w and with g."""
-    _, n, w, _, _, s = at
+    _, n, w, _, _, s = nodes
     line = line_at(v, i, w[2], s)
     A, R = scaled(w[1][0], line), scaled(g[1][0], line)
     for b in range(1, len(w[1])):
@@ -351,15 +351,15 @@ def plane(v, i, g, at):
 
 
 @leaf
-def both_sums_of(v, at):
+def both_sums_of(v, nodes):
     """`sums_of` with the factors dw and with r at once: u, and both matrices."""
-    i, n, w, dw, r, _ = at
-    A, D, R = plane_of_both(v, i, at)
+    i, n, w, dw, r, _ = nodes
+    A, D, R = plane_of_both(v, i, nodes)
     W, X, Y = scaled(w[0][0], A), scaled(dw[0][0], A), scaled(w[0][0], D)
     Z, T = scaled(r[0][0], A), scaled(w[0][0], R)
     for a in range(1, len(w[0])):
         i += n[0]
-        A, D, R = plane_of_both(v, i, at)
+        A, D, R = plane_of_both(v, i, nodes)
         W, X, Y = plus(W, w[0][a], A), plus(X, dw[0][a], A), plus(Y, w[0][a], D)
         Z, T = plus(Z, r[0][a], A), plus(T, w[0][a], R)
     G = gradient_of(summed(w[2], X), summed(w[2], Y), summed(dw[2], W))
@@ -368,9 +368,9 @@ def both_sums_of(v, at):
 
 
 @leaf
-def plane_of_both(v, i, at):
+def plane_of_both(v, i, nodes):
     """`plane` with the weights w, dw and r."""
-    _, n, w, dw, r, s = at
+    _, n, w, dw, r, s = nodes
     line = line_at(v, i, w[2], s)
     A, D, R = scaled(w[1][0], line), scaled(dw[1][0], line), scaled(r[1][0], line)
     for b in range(1, len(w[1])):
