@@ -157,6 +157,10 @@ class Stepper:
         self.constrain(grid, t, dt)
         return grid
 
+    def parts(self, grid, bodies):
+        """Return pairs of a grid of a step and the bodies that move with it."""
+        return [(grid, bodies)]
+
     def accelerate(self, bodies, dt):
         """Return the grid with the velocities that forces and gravity give it in dt [s]."""
         grid = scatter(bodies, self.storage, self.scheme, dt)
